@@ -1,0 +1,23 @@
+# Compiler options as interface targets: a folder links what applies to it.
+
+# Warnings of our own code, errors all of them.
+add_library(project_warnings INTERFACE)
+target_compile_options(project_warnings INTERFACE
+  -Wall -Wextra -Wshadow -Wconversion -Wsign-conversion -Wnon-virtual-dtor -Woverloaded-virtual -Wimplicit-fallthrough
+  -Werror)
+
+# The dialect of code that also runs on the robot: no exceptions, no run-time types, no silent double arithmetic.
+add_library(firmware_dialect INTERFACE)
+target_compile_options(firmware_dialect INTERFACE
+  $<$<COMPILE_LANGUAGE:CXX>:-std=c++17 -fno-exceptions -fno-rtti -Wdouble-promotion -Wfloat-conversion -ffp-contract=off>)
+
+# RHEONAUT_SANITIZE: a list for -fsanitize, empty for none. `enum` is left out because protobuf enumerators are open:
+# a newer peer may send a value that this version does not know.
+set(RHEONAUT_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
+if(RHEONAUT_SANITIZE)
+  add_compile_options(-fsanitize=${RHEONAUT_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  if(RHEONAUT_SANITIZE MATCHES "undefined")
+    add_compile_options(-fno-sanitize=enum)
+  endif()
+  add_link_options(-fsanitize=${RHEONAUT_SANITIZE})
+endif()

@@ -1,0 +1,194 @@
+// Encodes and decodes through nanopb, and names the enumerators.
+#include "protocol/messages.hpp"
+
+#include <pb_decode.h>
+#include <pb_encode.h>
+
+namespace protocol {
+namespace {
+
+template <class Frame>
+std::size_t encode_any(const pb_msgdesc_t* fields, const Frame& frame, std::uint8_t* out, std::size_t capacity) {
+  pb_ostream_t stream = pb_ostream_from_buffer(out, capacity);
+  if (frame.which_body == 0 || !pb_encode(&stream, fields, &frame)) return 0;
+  return stream.bytes_written;
+}
+
+template <class Frame>
+std::optional<Frame> decode_any(const pb_msgdesc_t* fields, Bytes payload) {
+  std::optional<Frame> frame{std::in_place};
+  pb_istream_t stream = pb_istream_from_buffer(payload.first, payload.size);
+  if (!pb_decode(&stream, fields, &*frame) || frame->which_body == 0) return std::nullopt;
+  return frame;
+}
+
+bool columns_agree(const Telemetry& batch) {
+  const pb_size_t count = batch.position_m_count;
+  return count > 0 && batch.velocity_m_s_count == count && batch.acceleration_m_s2_count == count &&
+         batch.duty_count == count && batch.impedance_mv_count == count && batch.reference_m_count == count;
+}
+
+}  // namespace
+
+std::size_t encode(const RobotFrame& frame, std::uint8_t* out, std::size_t capacity) {
+  return encode_any(rheonaut_RobotFrame_fields, frame, out, capacity);
+}
+
+std::size_t encode(const StationFrame& frame, std::uint8_t* out, std::size_t capacity) {
+  return encode_any(rheonaut_StationFrame_fields, frame, out, capacity);
+}
+
+std::optional<RobotFrame> decode_robot_frame(Bytes payload) {
+  auto frame = decode_any<RobotFrame>(rheonaut_RobotFrame_fields, payload);
+  if (frame && frame->which_body == rheonaut_RobotFrame_telemetry_tag && !columns_agree(frame->body.telemetry)) {
+    return std::nullopt;
+  }
+  return frame;
+}
+
+std::optional<StationFrame> decode_station_frame(Bytes payload) {
+  return decode_any<StationFrame>(rheonaut_StationFrame_fields, payload);
+}
+
+const char* text(Mode value) {
+  switch (value) {
+    case rheonaut_MODE_UNSPECIFIED: return "unspecified";
+    case rheonaut_MODE_MANUAL: return "manual";
+    case rheonaut_MODE_AUTO: return "auto";
+    case rheonaut_MODE_EMERGENCY: return "emergency";
+  }
+  return "unknown";
+}
+
+const char* text(SubState value) {
+  switch (value) {
+    case rheonaut_SUB_STATE_NONE: return "none";
+    case rheonaut_SUB_STATE_NAVIGATING: return "navigating";
+    case rheonaut_SUB_STATE_HOLDING: return "holding";
+    case rheonaut_SUB_STATE_DELIVERING: return "delivering";
+  }
+  return "unknown";
+}
+
+const char* text(ResetCause value) {
+  switch (value) {
+    case rheonaut_RESET_CAUSE_UNKNOWN: return "unknown";
+    case rheonaut_RESET_CAUSE_POWER_ON: return "power_on";
+    case rheonaut_RESET_CAUSE_SOFTWARE: return "software";
+    case rheonaut_RESET_CAUSE_WATCHDOG: return "watchdog";
+    case rheonaut_RESET_CAUSE_BROWN_OUT: return "brown_out";
+    case rheonaut_RESET_CAUSE_EXTERNAL: return "external";
+  }
+  return "unknown";
+}
+
+const char* text(EmergencyCause value) {
+  switch (value) {
+    case rheonaut_EMERGENCY_CAUSE_NONE: return "none";
+    case rheonaut_EMERGENCY_CAUSE_OPERATOR: return "operator";
+    case rheonaut_EMERGENCY_CAUSE_SENSOR_STUCK: return "sensor_stuck";
+    case rheonaut_EMERGENCY_CAUSE_SENSOR_OUT_OF_RANGE: return "sensor_out_of_range";
+    case rheonaut_EMERGENCY_CAUSE_SENSOR_MISSING: return "sensor_missing";
+    case rheonaut_EMERGENCY_CAUSE_POSITION_LIMIT: return "position_limit";
+    case rheonaut_EMERGENCY_CAUSE_TIME_AT_POWER: return "time_at_power";
+    case rheonaut_EMERGENCY_CAUSE_INTERNAL_ERROR: return "internal_error";
+    case rheonaut_EMERGENCY_CAUSE_RESET: return "reset";
+  }
+  return "unknown";
+}
+
+const char* text(EventKind value) {
+  switch (value) {
+    case rheonaut_EVENT_KIND_UNSPECIFIED: return "unspecified";
+    case rheonaut_EVENT_KIND_BOOT: return "boot";
+    case rheonaut_EVENT_KIND_MODE_CHANGED: return "mode_changed";
+    case rheonaut_EVENT_KIND_SUB_STATE_CHANGED: return "sub_state_changed";
+    case rheonaut_EVENT_KIND_EMERGENCY: return "emergency";
+    case rheonaut_EVENT_KIND_EMERGENCY_CLEARED: return "emergency_cleared";
+    case rheonaut_EVENT_KIND_LINK_LOST: return "link_lost";
+    case rheonaut_EVENT_KIND_LINK_RESTORED: return "link_restored";
+    case rheonaut_EVENT_KIND_LEASE_LAPSED: return "lease_lapsed";
+    case rheonaut_EVENT_KIND_DUTY_SCHEDULE_ENDED: return "duty_schedule_ended";
+    case rheonaut_EVENT_KIND_SETPOINT_CHANGED: return "setpoint_changed";
+    case rheonaut_EVENT_KIND_DISTURBANCE: return "disturbance";
+    case rheonaut_EVENT_KIND_DETECTION: return "detection";
+    case rheonaut_EVENT_KIND_DELIVERY_STARTED: return "delivery_started";
+    case rheonaut_EVENT_KIND_DELIVERY_ENDED: return "delivery_ended";
+    case rheonaut_EVENT_KIND_SENSOR_FAULT: return "sensor_fault";
+    case rheonaut_EVENT_KIND_SENSOR_RECOVERED: return "sensor_recovered";
+    case rheonaut_EVENT_KIND_LIMIT_HIT: return "limit_hit";
+    case rheonaut_EVENT_KIND_CONTROLLER_CHANGED: return "controller_changed";
+    case rheonaut_EVENT_KIND_PARAMETER_CHANGED: return "parameter_changed";
+    case rheonaut_EVENT_KIND_POSITION_ZEROED: return "position_zeroed";
+    case rheonaut_EVENT_KIND_MODEL_MISMATCH: return "model_mismatch";
+    case rheonaut_EVENT_KIND_AUTO_LIMIT: return "auto_limit";
+    case rheonaut_EVENT_KIND_TIME_STEP: return "time_step";
+  }
+  return "unknown";
+}
+
+const char* text(EventCause value) {
+  switch (value) {
+    case rheonaut_EVENT_CAUSE_NONE: return "none";
+    case rheonaut_EVENT_CAUSE_COMMAND: return "command";
+    case rheonaut_EVENT_CAUSE_LINK_LOSS: return "link_loss";
+    case rheonaut_EVENT_CAUSE_IMPEDANCE: return "impedance";
+    case rheonaut_EVENT_CAUSE_LIMIT: return "limit";
+    case rheonaut_EVENT_CAUSE_SENSOR: return "sensor";
+    case rheonaut_EVENT_CAUSE_INTERNAL: return "internal";
+    case rheonaut_EVENT_CAUSE_RESET: return "reset";
+    case rheonaut_EVENT_CAUSE_TIME: return "time";
+  }
+  return "unknown";
+}
+
+const char* text(CommandResult value) {
+  switch (value) {
+    case rheonaut_COMMAND_RESULT_UNSPECIFIED: return "unspecified";
+    case rheonaut_COMMAND_RESULT_ACCEPTED: return "accepted";
+    case rheonaut_COMMAND_RESULT_REJECTED: return "rejected";
+    case rheonaut_COMMAND_RESULT_EXPIRED: return "expired";
+    case rheonaut_COMMAND_RESULT_DUPLICATE: return "duplicate";
+    case rheonaut_COMMAND_RESULT_OTHER_BOOT: return "other_boot";
+  }
+  return "unknown";
+}
+
+const char* text(RejectReason value) {
+  switch (value) {
+    case rheonaut_REJECT_REASON_NONE: return "none";
+    case rheonaut_REJECT_REASON_MALFORMED: return "malformed";
+    case rheonaut_REJECT_REASON_NOT_FINITE: return "not_finite";
+    case rheonaut_REJECT_REASON_OUT_OF_RANGE: return "out_of_range";
+    case rheonaut_REJECT_REASON_WRONG_MODE: return "wrong_mode";
+    case rheonaut_REJECT_REASON_LATCHED: return "latched";
+    case rheonaut_REJECT_REASON_OTHER_EMERGENCY: return "other_emergency";
+    case rheonaut_REJECT_REASON_CAUSE_STANDS: return "cause_stands";
+    case rheonaut_REJECT_REASON_LIFE_TOO_LONG: return "life_too_long";
+    case rheonaut_REJECT_REASON_NOTHING_TO_RENEW: return "nothing_to_renew";
+    case rheonaut_REJECT_REASON_MOTOR_ON: return "motor_on";
+    case rheonaut_REJECT_REASON_OUTWARD: return "outward";
+    case rheonaut_REJECT_REASON_BUSY: return "busy";
+    case rheonaut_REJECT_REASON_UNSTABLE: return "unstable";
+    case rheonaut_REJECT_REASON_CHECKSUM: return "checksum";
+    case rheonaut_REJECT_REASON_UNKNOWN_PARAMETER: return "unknown_parameter";
+    case rheonaut_REJECT_REASON_UNSUPPORTED: return "unsupported";
+  }
+  return "unknown";
+}
+
+const char* text(RefusalReason value) {
+  switch (value) {
+    case rheonaut_REFUSAL_REASON_NONE: return "none";
+    case rheonaut_REFUSAL_REASON_VERSION: return "version";
+    case rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT: return "unknown_robot";
+    case rheonaut_REFUSAL_REASON_WRONG_TOKEN: return "wrong_token";
+    case rheonaut_REFUSAL_REASON_ALREADY_CONNECTED: return "already_connected";
+    case rheonaut_REFUSAL_REASON_BOOT_ID_REUSED: return "boot_id_reused";
+    case rheonaut_REFUSAL_REASON_MALFORMED: return "malformed";
+    case rheonaut_REFUSAL_REASON_STATION_BUSY: return "station_busy";
+  }
+  return "unknown";
+}
+
+}  // namespace protocol
