@@ -191,4 +191,24 @@ const char* text(RefusalReason value) {
   return "unknown";
 }
 
+const char* kind(const Command& command) {
+  switch (command.which_action) {
+    case rheonaut_Command_set_mode_tag: return "set_mode";
+    case rheonaut_Command_set_setpoint_tag: return "set_setpoint";
+    case rheonaut_Command_set_duty_tag: return "set_duty";
+    case rheonaut_Command_renew_lease_tag: return "renew_lease";
+    case rheonaut_Command_set_duty_schedule_tag: return "set_duty_schedule";
+    case rheonaut_Command_emergency_stop_tag: return "emergency_stop";
+    case rheonaut_Command_clear_emergency_tag: return "clear_emergency";
+    case rheonaut_Command_set_controller_tag: return "set_controller";
+    case rheonaut_Command_restore_controller_tag: return "restore_controller";
+    case rheonaut_Command_set_parameter_tag: return "set_parameter";
+    case rheonaut_Command_get_parameters_tag: return "get_parameters";
+    case rheonaut_Command_inject_disturbance_tag: return "inject_disturbance";
+    case rheonaut_Command_zero_position_tag: return "zero_position";
+    case rheonaut_Command_ping_tag: return "ping";
+    default: return "unknown";
+  }
+}
+
 }  // namespace protocol

@@ -13,11 +13,11 @@
 namespace protocol {
 
 constexpr std::uint32_t kProtocolVersion = 1;
-constexpr std::size_t kMaxFrameBytes = 1024;      // payload, without the length prefix
-constexpr std::size_t kMaxSamplesPerFrame = 25;   // as in robot.options
+constexpr std::size_t kMaxFrameBytes = 1024;     // payload, without the length prefix
+constexpr std::size_t kMaxSamplesPerFrame = 25;  // as in robot.options
 constexpr std::uint32_t kDefaultLinkTimeoutMs = 1000;
 constexpr std::uint32_t kDefaultHeartbeatIntervalMs = 200;
-constexpr std::uint32_t kLeaseMs = 500;              // a manual duty lives this long unless renewed
+constexpr std::uint32_t kLeaseMs = 500;  // a manual duty lives this long unless renewed
 constexpr std::uint64_t kMaxCommandLifeUs = 10'000'000;
 
 static_assert(rheonaut_RobotFrame_size <= kMaxFrameBytes, "a robot frame may exceed the frame limit");
@@ -65,5 +65,8 @@ const char* text(EventCause value);
 const char* text(CommandResult value);
 const char* text(RejectReason value);
 const char* text(RefusalReason value);
+
+// The name of the action that a command carries, e.g. "set_setpoint"; "unknown" for none.
+const char* kind(const Command& command);
 
 }  // namespace protocol

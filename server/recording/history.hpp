@@ -1,0 +1,67 @@
+// What was recorded, for people and programs: samples of a run, events, commands, gaps.
+//
+// Loop thread; the queries run on a worker with a read-only connection, each a page, so no read transaction lives long.
+// A query first lets the recorder commit what it has received, so an answer holds everything up to its question.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "server/recording/runs.hpp"
+#include "server/result.hpp"
+#include "server/worker.hpp"
+
+namespace server {
+
+struct StoredSample {
+  std::uint32_t span = 0;  // index of the run's span
+  BootId boot_id = 0;
+  std::uint64_t seq = 0;
+  std::uint64_t robot_time_us = 0;
+  std::int64_t utc_us = 0;  // robot time + the clock estimate stored with it
+  std::int64_t received_at_us = 0;
+  Sample sample;
+  protocol::Mode mode = rheonaut_MODE_UNSPECIFIED;
+  protocol::SubState sub_state = rheonaut_SUB_STATE_NONE;
+  std::optional<float> setpoint_m;
+  float disturbance_m = 0;
+};
+
+// Where a page ended: the span and seq of its last sample. A page begins after it.
+struct SampleCursor {
+  std::uint32_t span = 0;
+  std::uint64_t seq = 0;
+};
+
+struct SamplePage {
+  std::vector<StoredSample> samples;
+  std::optional<SampleCursor> next;  // empty: the end
+};
+
+struct Gap {
+  BootId boot_id = 0;
+  std::uint64_t first_seq = 0;
+  std::uint64_t last_seq = 0;
+  std::string cause;
+  std::int64_t noticed_at_us = 0;
+};
+
+class History {
+ public:
+  History(std::filesystem::path database, Recorder& recorder, WorkerThread& readers);
+  ~History();
+
+  // At most `limit` samples (1 to 10000) of a run, in order of span and seq, after the cursor.
+  boost::asio::awaitable<Result<SamplePage>> samples(RunId run, std::optional<SampleCursor> after, std::size_t limit);
+  boost::asio::awaitable<Result<std::vector<Gap>>> gaps(RunId run);
+
+  // Newest first, at most `limit` (1 to 1000).
+  boost::asio::awaitable<std::vector<RobotEvent>> events(RobotId robot_id, std::size_t limit);
+  boost::asio::awaitable<std::vector<CommandRecord>> commands(RobotId robot_id, std::size_t limit);
+  boost::asio::awaitable<Result<CommandRecord>> command(CommandId id);
+};
+
+}  // namespace server

@@ -1,0 +1,29 @@
+// The way from the station to one connected robot; a robot session implements it.
+//
+// Loop thread. The station forgets the port in Station::on_disconnected, which the session calls before it ends.
+#pragma once
+
+#include <string>
+
+#include "server/station/station_state.hpp"
+
+namespace server {
+
+class RobotPort {
+ public:
+  virtual ~RobotPort() = default;
+
+  // Queues a command. False when the bounded queue is full: the command was not taken.
+  virtual bool send(const protocol::Command& command) = 0;
+
+  // SAFETY: written ahead of everything that waits; drops the queued commands it supersedes. Never refused.
+  virtual void send_emergency_stop(const protocol::Command& command) = 0;
+
+  // Everything of this boot below these numbers is durable or known lost.
+  virtual void acknowledge(std::uint64_t durable_next_seq, std::uint64_t durable_next_event_seq) = 0;
+
+  // Ends the connection; the reason is logged.
+  virtual void close(const std::string& reason) = 0;
+};
+
+}  // namespace server

@@ -1,0 +1,107 @@
+// The centre of the station: the only owner of live state, and the only door for commands.
+//
+//   robot sessions → Station → sinks (recorder, live feed, runs)
+//   people and scripts → Station::submit → robot session
+//
+// Loop thread only. Outlives the sessions and everything that submits; sinks and the archive outlive it.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/clock.hpp"
+#include "server/result.hpp"
+#include "server/station/robot_archive.hpp"
+#include "server/station/robot_port.hpp"
+#include "server/station/station_sink.hpp"
+#include "server/station/station_state.hpp"
+
+namespace server {
+
+// What the station allows to be commanded, and for how long a command may live.
+struct CommandLimits {
+  double setpoint_min_m = -1.0;
+  double setpoint_max_m = 1.0;
+  double duty_min = -1.0;
+  double duty_max = 1.0;
+  double disturbance_max_m = 0.5;  // magnitude
+};
+
+struct LinkTimes {
+  std::uint32_t link_timeout_ms = protocol::kDefaultLinkTimeoutMs;
+  std::uint32_t heartbeat_interval_ms = protocol::kDefaultHeartbeatIntervalMs;
+  std::uint32_t samples_per_frame = 5;
+};
+
+// A wish to command a robot. `action` has its action member set; the station fills id, boot and validity.
+struct CommandRequest {
+  RobotId robot_id;
+  protocol::Command action;
+  std::string arguments = "{}";  // as JSON, for the record
+  std::string actor;
+  microseconds life{2'000'000};  // at most 10 s
+};
+
+class Station {
+ public:
+  Station(boost::asio::io_context& loop, Clock& clock, CommandLimits limits, LinkTimes times);
+  ~Station();
+
+  void add_sink(StationSink& sink);
+
+  // Emergency stops of an earlier run of the station that no robot has acknowledged; call before robots arrive.
+  void restore_pending_stops(const std::vector<CommandRecord>& stops);
+  // Robots of the archive, shown as disconnected; call before robots arrive.
+  void restore_robots(const std::vector<RobotId>& ids);
+
+  const std::map<RobotId, RobotState>& robots() const { return robots_; }
+  const RobotState* find(const RobotId& id) const;
+
+  // The one door. Checks the request, sends it and waits for its end (acknowledged, rejected, expired or failed), which
+  // comes at most `life` and a second later. An error means that nothing was sent.
+  boost::asio::awaitable<Result<CommandRecord>> submit(CommandRequest request);
+
+  // SAFETY: the frame is handed to the link before anything else is done; then as submit, but at most `patience`. When
+  // the robot is not connected, or does not answer in time, the stop is kept and sent first when it comes back; the
+  // record then says queued or sent.
+  boost::asio::awaitable<Result<CommandRecord>> emergency_stop(RobotId robot_id, std::string actor,
+                                                               microseconds patience);
+
+  // --- called by robot sessions (link/) ---
+
+  LinkTimes link_times() const { return times_; }
+  // Decides whether a robot that is already connected is replaced (same boot) or keeps its place. On admission the
+  // session becomes the robot's port, and pending stops are sent to it first.
+  Result<void> may_connect(const RobotId& id, BootId boot_id) const;
+  void on_connected(RobotPort& port, const AdmissionRequest& hello, const protocol::Hello& details,
+                    const Admission& admission, const std::string& peer);
+  void on_disconnected(RobotPort& port, const std::string& reason);
+  void on_frame(RobotPort& port, std::uint64_t robot_time_us);  // any frame: a sign of life
+  void on_samples(RobotPort& port, const protocol::Telemetry& telemetry);
+  void on_event(RobotPort& port, const protocol::Event& event);
+  void on_status(RobotPort& port, const protocol::Status& status);
+  void on_command_ack(RobotPort& port, const protocol::CommandAck& ack);
+  void on_command_sent(RobotPort& port, CommandId id);
+  void on_clock(RobotPort& port, const ClockEstimate& estimate);
+
+  // --- called when a commit is done (wired by main) ---
+
+  void on_durable(const RobotId& id, BootId boot_id, std::uint64_t durable_next_seq,
+                  std::uint64_t durable_next_event_seq);
+
+ private:
+  struct Seat;  // a robot's port and its commands on their way
+
+  boost::asio::io_context& loop_;
+  Clock& clock_;
+  CommandLimits limits_;
+  LinkTimes times_;
+  std::map<RobotId, RobotState> robots_;
+  std::map<RobotId, std::unique_ptr<Seat>> seats_;
+  std::vector<StationSink*> sinks_;
+};
+
+}  // namespace server

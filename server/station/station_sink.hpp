@@ -1,0 +1,21 @@
+// What hears the station: the recorder, the live feed, the runs.
+//
+// Called on the loop's thread. A sink returns at once, copies what it keeps, and never calls the station from inside.
+#pragma once
+
+#include "server/station/station_state.hpp"
+
+namespace server {
+
+class StationSink {
+ public:
+  virtual ~StationSink() = default;
+
+  // The robot's state changed otherwise than by samples: connected, lost, status, durable, clock.
+  virtual void on_robot(const RobotState&) {}
+  virtual void on_samples(const RobotState&, const SampleBatch&) {}
+  virtual void on_event(const RobotState&, const RobotEvent&) {}
+  virtual void on_command(const CommandRecord&) {}
+};
+
+}  // namespace server

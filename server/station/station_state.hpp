@@ -1,0 +1,147 @@
+// The values that flow through the station: what is known of a robot, its samples, events and commands.
+//
+// Plain values, copied freely. Enumerators are those of the protocol; protocol::text() gives their JSON spelling.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/messages.hpp"
+
+namespace server {
+
+using RobotId = std::string;      // 1 to 31 characters of [a-z0-9_-]
+using BootId = std::uint64_t;     // random per boot of a robot, never 0; a decimal string in JSON
+using CommandId = std::uint64_t;  // random, never 0; a decimal string in JSON
+
+struct Sample {
+  float position_m = 0;
+  float velocity_m_s = 0;
+  float acceleration_m_s2 = 0;
+  float duty = 0;  // in [-1, 1]
+  float impedance_mv = 0;
+  float reference_m = 0;
+  bool operator==(const Sample&) const = default;
+};
+
+// What a telemetry frame says once for all its samples; a change of any of it begins a new segment in the store.
+struct SampleContext {
+  std::uint32_t period_us = 0;
+  protocol::Mode mode = rheonaut_MODE_UNSPECIFIED;
+  protocol::SubState sub_state = rheonaut_SUB_STATE_NONE;
+  std::optional<float> setpoint_m;
+  float disturbance_m = 0;
+  float position_sd_m = 0;
+  std::uint32_t controller_id = 0;
+  std::uint64_t emergency_id = 0;  // 0: not latched
+  protocol::EmergencyCause emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;
+  std::uint32_t flags = 0;  // TelemetryFlag
+  bool operator==(const SampleContext&) const = default;
+};
+
+// Consecutive samples of one boot, as they arrived in one frame.
+struct SampleBatch {
+  RobotId robot_id;
+  BootId boot_id = 0;
+  std::uint64_t first_seq = 0;
+  std::uint64_t first_robot_time_us = 0;
+  std::uint64_t oldest_seq = 0;  // the oldest the robot still held
+  SampleContext context;
+  std::vector<Sample> samples;
+  std::int64_t received_at_us = 0;         // UTC
+  std::int64_t utc_offset_us = 0;          // UTC = robot time + this, by the estimate at reception
+  std::int64_t clock_uncertainty_us = -1;  // half-width of that estimate; -1: no estimate yet
+
+  std::uint64_t next_seq() const { return first_seq + samples.size(); }
+};
+
+// An event of a robot (event_seq counts per boot) or of the station about a robot (no boot, no event_seq).
+struct RobotEvent {
+  RobotId robot_id;
+  BootId boot_id = 0;
+  std::optional<std::uint64_t> event_seq;
+  std::uint64_t oldest_event_seq = 0;
+  std::uint64_t robot_time_us = 0;
+  std::uint64_t sample_seq = 0;
+  std::string kind;   // the text of EventKind, or a station's own: "connected", "link_lost_by_station", …
+  std::string cause;  // the text of EventCause, or a sentence
+  protocol::Mode mode = rheonaut_MODE_UNSPECIFIED;
+  protocol::SubState sub_state = rheonaut_SUB_STATE_NONE;
+  float position_m = 0;
+  float value = 0;
+  std::uint64_t emergency_id = 0;
+  CommandId command_id = 0;
+  std::int64_t received_at_us = 0;  // UTC
+};
+
+enum class LinkState : std::uint8_t { disconnected, connected };
+const char* text(LinkState value);
+
+struct ClockEstimate {
+  bool valid = false;
+  std::int64_t offset_us = 0;  // station steady time = robot time + offset_us
+  std::int64_t uncertainty_us = 0;
+  double drift_ppm = 0;
+  std::int64_t round_trip_us = 0;  // of the latest exchange
+};
+
+// All that is known of one robot now. Owned by Station; others get const access or a copy.
+struct RobotState {
+  RobotId id;
+  LinkState link = LinkState::disconnected;
+  std::string peer;                      // address, while connected
+  std::int64_t connected_at_us = 0;      // UTC
+  std::int64_t last_received_at_us = 0;  // UTC of the last frame
+  std::int64_t last_received_steady_us = 0;
+
+  BootId boot_id = 0;  // 0: never seen since the station started
+  protocol::ResetCause reset_cause = rheonaut_RESET_CAUSE_UNKNOWN;
+  std::string firmware_version;
+  std::uint32_t sample_period_us = 0;
+  std::uint32_t ring_capacity = 0;
+  std::uint32_t parameters_checksum = 0;
+  std::uint32_t controller_checksum = 0;
+
+  SampleContext context;         // of the latest live batch (from Hello before the first)
+  std::optional<Sample> sample;  // the latest
+  std::uint64_t next_seq = 0;    // after the latest sample received
+  std::uint64_t oldest_seq = 0;
+  std::uint64_t durable_next_seq = 0;
+  std::uint64_t durable_next_event_seq = 0;
+  std::uint64_t latest_robot_time_us = 0;  // of the latest frame
+  std::optional<protocol::Status> status;
+  ClockEstimate clock;
+
+  std::optional<CommandId> pending_stop;  // an emergency stop that no robot has acknowledged yet
+};
+
+enum class CommandState : std::uint8_t {
+  queued,        // accepted by the station, not written yet
+  sent,          // its frame was written
+  acknowledged,  // the robot accepted it
+  rejected,      // the robot refused it: `reason`
+  expired,       // its life ended before it took effect
+  failed,        // the link ended before an answer, or a newer command took its place: `reason`
+};
+const char* text(CommandState value);
+
+// One command from submission to its end. What is published is always a copy.
+struct CommandRecord {
+  CommandId id = 0;
+  RobotId robot_id;
+  BootId boot_id = 0;
+  std::string kind;       // "set_mode", "set_setpoint", …
+  std::string arguments;  // as JSON, e.g. {"setpoint_m":0.1}
+  std::string actor;      // who asked, e.g. "token:local" or "session:3"
+  CommandState state = CommandState::queued;
+  std::string reason;                // text of RejectReason or CommandResult, or a station's own
+  std::int64_t submitted_at_us = 0;  // UTC
+  std::int64_t sent_at_us = 0;
+  std::int64_t ended_at_us = 0;
+  std::uint64_t effect_at_robot_us = 0;
+  std::uint64_t emergency_id = 0;  // the latch after it, as the robot says
+};
+
+}  // namespace server

@@ -1,0 +1,46 @@
+// Starts, names and stops the station's coroutines.
+#include "server/tasks.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/system/system_error.hpp>
+
+namespace server {
+namespace asio = boost::asio;
+
+void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
+  if (stopping_) return;
+  const auto signal = signals_.emplace(signals_.end());
+  auto on_end = [this, signal, name = std::move(name)](std::exception_ptr failure) {
+    signals_.erase(signal);
+    ended(name, failure);
+  };
+  asio::co_spawn(loop_, std::move(task), asio::bind_cancellation_slot(signal->slot(), std::move(on_end)));
+}
+
+void TaskGroup::ended(const std::string& name, std::exception_ptr failure) {
+  try {
+    if (failure) std::rethrow_exception(failure);
+  } catch (const boost::system::system_error& error) {
+    if (error.code() == asio::error::operation_aborted) return;
+    spdlog::critical("{} failed: {}; stopping", name, error.what());
+    exit_code_ = 1;
+    stop();
+  } catch (const std::exception& error) {
+    spdlog::critical("{} failed: {}; stopping", name, error.what());
+    exit_code_ = 1;
+    stop();
+  }
+}
+
+void TaskGroup::stop() {
+  stopping_ = true;
+  for (auto signal = signals_.begin(); signal != signals_.end();) {
+    const auto current = signal++;  // emitting may end the task, which erases its signal
+    current->emit(asio::cancellation_type::terminal);
+  }
+}
+
+}  // namespace server
