@@ -37,7 +37,8 @@ std::unique_ptr<ByteStream> make_tcp_stream(boost::asio::ip::tcp::socket socket)
 // Two connected streams in memory, and the faults of the link between them.
 class MemoryLink {
  public:
-  explicit MemoryLink(boost::asio::io_context& loop);
+  // A writer waits while more than `capacity_bytes` would lie unread in its direction.
+  explicit MemoryLink(boost::asio::io_context& loop, std::size_t capacity_bytes = 64 * 1024);
   ~MemoryLink();
 
   // Each end once.

@@ -10,9 +10,9 @@ namespace asio = boost::asio;
 
 // One direction: a bounded queue of bytes, as a socket buffer is.
 struct MemoryLink::Pipe {
-  static constexpr std::size_t kCapacityBytes = 64 * 1024;
+  Pipe(asio::io_context& loop, std::size_t capacity) : capacity_bytes{capacity}, readable{loop}, writable{loop} {}
 
-  explicit Pipe(asio::io_context& loop) : readable{loop}, writable{loop} {}
+  bool fits(std::size_t size) const { return bytes.empty() || bytes.size() + size <= capacity_bytes; }
 
   void close() {
     closed = true;
@@ -20,6 +20,7 @@ struct MemoryLink::Pipe {
     writable.notify();
   }
 
+  std::size_t capacity_bytes;
   std::deque<std::uint8_t> bytes;
   Signal readable, writable;
   bool closed = false;
@@ -44,7 +45,7 @@ class MemoryLink::End final : public ByteStream {
 
   asio::awaitable<bool> write(asio::const_buffer bytes) override {
     const auto out = out_;
-    while (out->bytes.size() + bytes.size() > Pipe::kCapacityBytes && !out->closed) co_await out->writable.wait();
+    while (!out->fits(bytes.size()) && !out->closed) co_await out->writable.wait();
     if (out->closed) co_return false;
     const auto* first = static_cast<const std::uint8_t*>(bytes.data());
     out->bytes.insert(out->bytes.end(), first, first + bytes.size());
@@ -64,8 +65,8 @@ class MemoryLink::End final : public ByteStream {
   std::shared_ptr<Pipe> in_, out_;
 };
 
-MemoryLink::MemoryLink(asio::io_context& loop)
-    : there_{std::make_shared<Pipe>(loop)}, back_{std::make_shared<Pipe>(loop)} {}
+MemoryLink::MemoryLink(asio::io_context& loop, std::size_t capacity_bytes)
+    : there_{std::make_shared<Pipe>(loop, capacity_bytes)}, back_{std::make_shared<Pipe>(loop, capacity_bytes)} {}
 
 MemoryLink::~MemoryLink() { cut(); }
 
