@@ -2,8 +2,8 @@
 """Holds tests/data/golden_frames.txt to Google's protobuf compiler, which shares no code with our codec.
 
 For each frame the payload must decode (protoc --decode) to the text of the file, and the text must encode
-(protoc --encode) to the payload. Every message of robot.proto must have a frame, and every byte quoted in
-docs/protocol.md must be in the file. With --write, bytes and text are written anew from the text.
+(protoc --encode) to the payload. Every message of robot.proto must have a frame. docs/protocol.md must quote bytes of
+the file and name every field and enumerator. With --write, bytes and text are written anew from the text.
 """
 import argparse
 import os
@@ -121,11 +121,24 @@ def missing_frames(frames):
 def wrong_quotes(frames):
     """A block ```hex NAME in the document quotes the named frame from its first byte on; `;` starts a remark."""
     by_name = {frame.name: frame.bytes for frame in frames}
-    text = QUOTES.read_text(encoding="utf-8") if QUOTES.exists() else ""
+    text = QUOTES.read_text(encoding="utf-8")
     for name, body in re.findall(r"^```hex (\S+)\n(.*?)^```", text, re.S | re.M):
         quoted = bytes.fromhex("".join(line.split(";")[0] for line in body.splitlines()))
         if not quoted or quoted != by_name.get(name):
             yield f"{QUOTES.name}: the bytes quoted for {name} are not those of {GOLDEN.name}"
+
+
+def undocumented_words():
+    """Fields and enumerators (as text() spells them) that docs/protocol.md does not mention."""
+    proto = re.sub(r"//.*", "", PROTO.read_text(encoding="utf-8"))
+    words = re.findall(r"^\s*(?:optional |repeated )?\w+ (\w+) = \d+;", proto, re.M)
+    for enum, body in re.findall(r"^enum (\w+) {(.*?)^}", proto, re.S | re.M):
+        prefix = re.sub(r"(?<!^)(?=[A-Z])", "_", enum).upper() + "_"
+        words += [value.removeprefix(prefix).lower() for value in re.findall(r"(\w+) = \d+;", body)]
+    known = set(re.findall(r"\w+", QUOTES.read_text(encoding="utf-8"))) | {"unspecified"}
+    for word in dict.fromkeys(words):
+        if word not in known:
+            yield f"{QUOTES.name}: does not mention {word}"
 
 
 def main():
@@ -137,7 +150,7 @@ def main():
     if options.write:
         rewrite(options.protoc, head, frames)
         return 0
-    faults = [*wrong_frames(options.protoc, frames), *missing_frames(frames), *wrong_quotes(frames)]
+    faults = [*wrong_frames(options.protoc, frames), *missing_frames(frames), *wrong_quotes(frames), *undocumented_words()]
     for fault in faults:
         print(fault)
     print(f"{len(frames)} frames, {len(faults)} faults")
