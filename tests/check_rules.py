@@ -93,7 +93,7 @@ def check_includes(source):
     folder = source.parts[0]
     if not source.is_cpp or folder not in FOLDERS:
         return
-    area = "/".join(source.parts[:2])
+    area = "/".join(source.parts[:2]) if len(source.parts) > 2 else folder
     for line, quoted, target in includes(source):
         parts = target.split("/")
         if quoted and target == "robot.pb.h" and folder == "protocol":
@@ -259,7 +259,7 @@ def check_text(source):
 def check_first_line(source):
     """first-line: each file opens with a sentence on what the reader will find."""
     suffix = source.path.suffix
-    if source.parts[-1] == "__init__.py" or suffix not in SOURCE and source.parts[-1] != "CMakeLists.txt":
+    if suffix not in SOURCE and (source.parts[-1] != "CMakeLists.txt" or source.in_tests):
         return
     lines = source.lines[1:] if source.text.startswith("#!") else source.lines
     mark = {".py": '"""', ".cmake": "# ", ".txt": "# ", ".sql": "-- ", ".css": "/*"}.get(suffix, "//")

@@ -80,7 +80,7 @@ GOOD = [
     ("server/worker.cpp", FIRST + "std::thread t;\n"),
     ("server/a.cpp", long_file(450, FIRST + "// LONG: one table.\n")),
     ("web/src/api_types.ts", long_file(900, "// Generated from openapi.yaml.\n")),
-    ("tests/CMakeLists.txt", "# Long.\n" * 31),
+    ("tests/CMakeLists.txt", "add_test(a)\n" * 31),
     ("tests/system/process_test.cpp", FIRST),
     ("server/a.hpp", FIRST + "class Processor;\nint handler_count;\n"),
     ("deploy/a.py", '#!/usr/bin/env python3\n"""Says what it does."""\n'),
