@@ -10,7 +10,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "server/net/listener.hpp"
+#include "server/endpoint.hpp"
 
 namespace server {
 namespace {
