@@ -145,8 +145,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--protoc", default="/usr/bin/protoc")
     parser.add_argument("--write", action="store_true", help="fill in the bytes, and the text as protoc spells it")
+    parser.add_argument("--export", type=pathlib.Path, help="write each frame as a file into this folder, and end")
     options = parser.parse_args()
     head, frames = read(GOLDEN)
+    if options.export:
+        for frame in frames:
+            (options.export / frame.name).write_bytes(frame.bytes)
+        return 0
     if options.write:
         rewrite(options.protoc, head, frames)
         return 0
