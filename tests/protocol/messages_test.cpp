@@ -53,6 +53,18 @@ TEST(Text, IsUniqueForEveryEnumeratorAndUnknownForOthers) {
   expect_own_texts(_rheonaut_RefusalReason_MIN, _rheonaut_RefusalReason_MAX);
 }
 
+TEST(Kind, IsUniqueForEveryActionAndUnknownForOthers) {
+  std::set<std::string> kinds;
+  Command command = rheonaut_Command_init_zero;
+  for (pb_size_t tag = rheonaut_Command_set_mode_tag; tag <= rheonaut_Command_ping_tag; ++tag) {
+    command.which_action = tag;
+    EXPECT_TRUE(kinds.insert(kind(command)).second) << kind(command) << " names two actions";
+  }
+  EXPECT_EQ(kinds.count("unknown"), 0u);
+  command.which_action = 0;
+  EXPECT_STREQ(kind(command), "unknown");
+}
+
 // Half of the numbers use all bits, the others are small, since varints differ in length.
 std::uint64_t random_number(Random& random) { return random() % 2 == 0 ? random() : random() % 200; }
 
