@@ -152,11 +152,11 @@ void build_heartbeats(Built& built) {
   auto station = from_station(rheonaut_StationFrame_heartbeat_tag);
   StationHeartbeat& heartbeat = station.body.heartbeat;
   built["station_heartbeat_empty"] = framed(station);
-  heartbeat = {86'400'000'000, 140, 1, 0, 0};
+  heartbeat = {86'400'000'000, 140, 1, 0, 0, false};
   built["station_heartbeat"] = framed(station);
-  heartbeat = {0, 140, 1, 145, 150};
+  heartbeat = {0, 140, 1, 145, 150, true};
   built["station_heartbeat_resend"] = framed(station);
-  heartbeat = {kMax64, kMax64, kMax64, kMax64, kMax64};
+  heartbeat = {kMax64, kMax64, kMax64, kMax64, kMax64, true};
   built["station_heartbeat_limits"] = framed(station);
 }
 
