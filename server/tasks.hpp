@@ -24,6 +24,9 @@ class TaskGroup {
   // Cancels every task; each ends at its next wait.
   void stop();
 
+  // A task that stops the group at SIGINT or SIGTERM.
+  boost::asio::awaitable<void> stop_on_signal();
+
   bool stopping() const { return stopping_; }
   int exit_code() const { return exit_code_; }
 
@@ -51,6 +54,14 @@ T run_first(boost::asio::io_context& loop, boost::asio::awaitable<T> coroutine) 
   loop.restart();
   if (failure) std::rethrow_exception(failure);
   return std::move(*result);
+}
+
+inline void run_first(boost::asio::io_context& loop, boost::asio::awaitable<void> coroutine) {
+  std::exception_ptr failure;
+  boost::asio::co_spawn(loop, std::move(coroutine), [&](std::exception_ptr error) { failure = error; });
+  loop.run();
+  loop.restart();
+  if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace server
