@@ -10,7 +10,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "server/net/listener.hpp"
+#include "server/endpoint.hpp"
 
 namespace server {
 namespace {
@@ -33,10 +33,8 @@ class ConfigFile {
     known_.insert(fmt::format("{}.{}", section, key));
     const toml::node* node = find(section, key);
     if (node == nullptr) return false;
-    const auto value = node->value<T>();
-    if (!value || (!node->is_number() && std::is_arithmetic_v<T> && !std::is_same_v<T, bool>)) {
-      fail(*node, section, key, fmt::format("must be {}", type_name(into)));
-    }
+    const auto value = exact<T>(*node);
+    if (!value) fail(*node, section, key, fmt::format("must be {}", type_name(into)));
     into = *value;
     return true;
   }
@@ -91,6 +89,15 @@ class ConfigFile {
   const toml::node* find(const char* section, const char* key) const { return table_[section][key].node(); }
 
  private:
+  template <class T>
+  static std::optional<T> exact(const toml::node& node) {
+    if constexpr (std::is_same_v<T, double>) {
+      return node.is_number() ? node.value<double>() : std::nullopt;
+    } else {
+      return node.value_exact<T>();
+    }
+  }
+
   static const char* type_name(bool) { return "true or false"; }
   static const char* type_name(const std::string&) { return "a text in quotes"; }
   static const char* type_name(std::int64_t) { return "a whole number"; }

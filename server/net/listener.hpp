@@ -28,8 +28,4 @@ class Listener {
   boost::asio::ip::tcp::acceptor acceptor_;
 };
 
-// "127.0.0.1:8080" or "[::1]:8080"; throws std::invalid_argument that quotes the text.
-boost::asio::ip::tcp::endpoint parse_endpoint(const std::string& text);
-std::string text(const boost::asio::ip::tcp::endpoint& endpoint);
-
 }  // namespace server

@@ -1,0 +1,56 @@
+// Sensors from the plant into the core, duty from the core into the plant.
+#include "sim_robot/simulated_robot.hpp"
+
+#include <random>
+#include <utility>
+
+namespace sim_robot {
+namespace {
+
+constexpr float kImpedance_mv = 175;  // no glucose anywhere
+constexpr float kSupply_mv = 3000;    // a fresh CR123A
+constexpr int kRssi_dbm = -50;
+constexpr unsigned kImuCalibration = 3;  // the best the BNO055 reports
+
+robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
+  robot_fw::RobotConfig core;
+  core.robot_id = config.robot_id.c_str();
+  core.token = config.token.c_str();
+  core.firmware_version = "sim-0.1.0";
+  core.boot_id = config.boot_id;
+  core.reset_cause = config.reset_cause;
+  core.duty_min = config.duty.min;
+  core.duty_max = config.duty.max;
+  core.sample_period_us = SimulatedRobot::kPeriodUs;
+  return core;
+}
+
+}  // namespace
+
+std::uint64_t random_boot_id() {
+  std::random_device random;
+  for (;;) {
+    const std::uint64_t id = (std::uint64_t{random()} << 32) | random();
+    if (id != 0) return id;
+  }
+}
+
+SimulatedRobot::SimulatedRobot(SimulatedRobotConfig config)
+    : config_(std::move(config)), core_(core_config(config_)), plant_(config_.model, kPeriod_s) {}
+
+void SimulatedRobot::step() {
+  robot_fw::Inputs inputs;
+  inputs.robot_time_us = robot_time_us_;
+  inputs.position_m = static_cast<float>(plant_.position_m());
+  inputs.velocity_m_s = static_cast<float>(plant_.velocity_m_s());
+  inputs.acceleration_m_s2 = static_cast<float>(plant_.acceleration_m_s2());
+  inputs.impedance_mv = kImpedance_mv;
+  inputs.supply_mv = kSupply_mv;
+  inputs.rssi_dbm = kRssi_dbm;
+  inputs.imu_calibration = kImuCalibration;
+  const robot_fw::Outputs outputs = core_.step(inputs, static_cast<float>(kPeriod_s));
+  plant_.step(static_cast<double>(outputs.duty));
+  robot_time_us_ += kPeriodUs;
+}
+
+}  // namespace sim_robot
