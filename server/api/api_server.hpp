@@ -32,7 +32,8 @@ class ApiServer {
 
   std::uint16_t port() const { return listener_.endpoint().port(); }
   std::string address() const;  // "127.0.0.1:8080"
-  std::string login_url();      // a link that lets one page in, for 10 minutes
+  const Router& router() const { return router_; }
+  std::string login_url();  // a link that lets one page in, for 10 minutes
 
  private:
   Listener listener_;

@@ -1,0 +1,194 @@
+// Wires the station as main does, and pumps it while a client waits.
+#include "tests/server/api/api_fixture.hpp"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <fstream>
+
+namespace server {
+namespace asio = boost::asio;
+
+TemporaryFolder::TemporaryFolder() {
+  std::string name = (std::filesystem::temp_directory_path() / "rheonaut-api-XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error{"cannot make a folder " + name};
+  path_ = name;
+}
+
+TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
+
+namespace {
+asio::awaitable<void> start(Recorder& recorder, Runs& runs, bool& started) {
+  co_await recorder.open();
+  co_await runs.load();
+  started = true;
+}
+}  // namespace
+
+ApiTest::ApiTest() {
+  clock.add_worker(disk);
+  clock.add_worker(readers);
+  station.add_sink(recorder);
+  station.add_sink(runs);
+  station.add_sink(live);
+  recorder.set_on_durable([this](const RobotId& id, BootId boot, std::uint64_t seq, std::uint64_t event_seq) {
+    station.on_durable(id, boot, seq, event_seq);
+  });
+  bool started = false;
+  tasks.spawn("start", start(recorder, runs, started));
+  EXPECT_TRUE(clock.run_until([&] { return started; }, 10s));
+  ApiOptions options;
+  options.endpoint = {asio::ip::address_v4::loopback(), 0};
+  options.data_dir = folder.path();
+  options.hosts = {"station.lab"};
+  options.version = "0.1.0";
+  options.store_id = 0xfedcba9876543210;
+  options.robots_address = "127.0.0.1:7070";
+  api = std::make_unique<ApiServer>(loop, tasks, clock, options, station, live, runs, history);
+  tasks.spawn("recorder", recorder.run());
+  tasks.spawn("live feed", live.run());
+  tasks.spawn("api", api->run());
+  clock.settle();
+}
+
+ApiTest::~ApiTest() {
+  tasks.stop();
+  clock.settle();
+}
+
+TestRobot& ApiTest::connect_robot() {
+  robot = std::make_unique<TestRobot>(loop, clock, tasks, robots);
+  robot->say_hello();
+  EXPECT_TRUE(clock.run_until([&] { return !robot->welcomes().empty(); }, 1s));
+  robot->keep_talking();
+  clock.settle();
+  return *robot;
+}
+
+asio::awaitable<void> ApiTest::answer(Request request, std::shared_ptr<std::optional<Answered>> into) {
+  Answered answered;
+  answered.response = co_await api->router().dispatch(std::move(request));
+  answered.status = answered.response.status;
+  answered.body = answered.response.body;
+  while (answered.response.stream != nullptr) {
+    const auto piece = co_await answered.response.stream->next();
+    if (!piece || !*piece) break;
+    answered.body += **piece;
+  }
+  into->emplace(std::move(answered));
+}
+
+std::shared_ptr<std::optional<Answered>> ApiTest::begin(const std::string& method, const std::string& target,
+                                                        const json& body) {
+  Request request;
+  request.method = method;
+  request.target = target;
+  if (!body.is_null()) request.body = body.dump();
+  request.actor = "token:local";
+  auto into = std::make_shared<std::optional<Answered>>();
+  tasks.spawn("ask", answer(std::move(request), into));
+  clock.settle();
+  return into;
+}
+
+Answered ApiTest::end(const std::shared_ptr<std::optional<Answered>>& asked, microseconds limit) {
+  EXPECT_TRUE(clock.run_until([&] { return asked->has_value(); }, limit));
+  return asked->has_value() ? std::move(**asked) : Answered{};
+}
+
+Answered ApiTest::ask(const std::string& method, const std::string& target, const json& body) {
+  return end(begin(method, target, body));
+}
+
+void ApiTest::make_samples(TestRobot& from, std::uint64_t first_seq, pb_size_t count) {
+  from.send_samples(first_seq, count, from.robot_now_us(), 0);
+  clock.settle();
+}
+
+std::string ApiTest::token() const {
+  std::ifstream in{folder.path() / "rheonaut.token"};
+  std::string token;
+  std::getline(in, token);
+  return token;
+}
+
+RawClient::RawClient(VirtualClock& clock, std::uint16_t port) : clock_{clock} {
+  socket_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  if (::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    throw std::runtime_error{"cannot connect"};
+  }
+  ::fcntl(socket_, F_SETFL, O_NONBLOCK);
+  clock_.settle();
+}
+
+RawClient::~RawClient() { ::close(socket_); }
+
+bool RawClient::pump() {
+  clock_.settle();
+  pollfd readable{socket_, POLLIN, 0};
+  ::poll(&readable, 1, 1);
+  for (;;) {
+    char bytes[16384];
+    const ssize_t size = ::recv(socket_, bytes, sizeof bytes, 0);
+    if (size > 0) {
+      received_.append(bytes, static_cast<std::size_t>(size));
+      continue;
+    }
+    if (size == 0 || (errno != EAGAIN && errno != EWOULDBLOCK)) ended_ = true;
+    return !ended_;
+  }
+}
+
+bool RawClient::send(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t size = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (size > 0) {
+      bytes.remove_prefix(static_cast<std::size_t>(size));
+      continue;
+    }
+    if (errno != EAGAIN && errno != EWOULDBLOCK) return false;
+    pump();
+  }
+  pump();
+  return true;
+}
+
+std::string RawClient::read_until(const std::string& mark) {
+  constexpr int kPatience = 2000;  // times 1 ms of real time
+  for (int i = 0; i < kPatience && received_.find(mark) == std::string::npos && pump(); ++i) continue;
+  const auto found = received_.find(mark);
+  const auto end = found == std::string::npos ? received_.size() : found + mark.size();
+  const std::string text = received_.substr(0, end);
+  received_.erase(0, end);
+  return text;
+}
+
+std::string RawClient::read_to_end() {
+  constexpr int kPatience = 2000;
+  for (int i = 0; i < kPatience && pump(); ++i) continue;
+  return std::exchange(received_, {});
+}
+
+std::string RawClient::read_exactly(std::size_t count) {
+  constexpr int kPatience = 2000;
+  for (int i = 0; i < kPatience && received_.size() < count && pump(); ++i) continue;
+  const std::string text = received_.substr(0, count);
+  received_.erase(0, count);
+  return text;
+}
+
+bool RawClient::closed() {
+  pump();
+  return ended_ && received_.empty();
+}
+
+}  // namespace server

@@ -1,0 +1,96 @@
+// A whole station with its API in virtual time, one hand-made robot, and clients that talk over real loopback sockets.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "server/api/api_server.hpp"
+#include "server/recording/recorder.hpp"
+#include "tests/server/link/test_robot.hpp"
+
+namespace server {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// An answer with its stream, if it has one, read to the end.
+struct Answered {
+  int status = 0;
+  std::string body;
+  Response response;
+  json parsed() const { return json::parse(body); }
+};
+
+class ApiTest : public ::testing::Test {
+ protected:
+  ApiTest();
+  ~ApiTest() override;
+
+  TestRobot& connect_robot();  // "r1", boot 77, in manual
+
+  // Asks the routes directly, past socket and guard.
+  Answered ask(const std::string& method, const std::string& target, const json& body = nullptr);
+  // The same in two steps, for what the robot must answer in between.
+  std::shared_ptr<std::optional<Answered>> begin(const std::string& method, const std::string& target,
+                                                 const json& body = nullptr);
+  Answered end(const std::shared_ptr<std::optional<Answered>>& asked, microseconds limit = 10s);
+
+  void make_samples(TestRobot& robot, std::uint64_t first_seq, pb_size_t count);
+  std::string token() const;
+
+  TemporaryFolder folder;
+  WorkerThread disk{"disk"}, readers{"readers"};
+  boost::asio::io_context loop{1};
+  VirtualClock clock{loop};
+  TaskGroup tasks{loop};
+  Station station{loop, clock, CommandLimits{}, LinkTimes{}};
+  Recorder recorder{loop, clock, disk, {.path = folder.path() / "station.sqlite"}};
+  Runs runs{clock, recorder};
+  History history{folder.path() / "station.sqlite", recorder, readers};
+  LiveFeed live{clock};
+  RobotListener robots{loop, clock, tasks, station, recorder, {boost::asio::ip::address_v4::loopback(), 0}, false};
+  std::unique_ptr<ApiServer> api;
+  std::unique_ptr<TestRobot> robot;
+
+ private:
+  boost::asio::awaitable<void> answer(Request request, std::shared_ptr<std::optional<Answered>> into);
+};
+
+// A client that sends raw bytes and lets the station run while it waits.
+class RawClient {
+ public:
+  RawClient(VirtualClock& clock, std::uint16_t port);
+  ~RawClient();
+  RawClient(const RawClient&) = delete;
+  RawClient& operator=(const RawClient&) = delete;
+
+  bool send(std::string_view bytes);                // false when the station closed before it took them all
+  std::string read_until(const std::string& mark);  // everything up to and with the mark, or what came before the end
+  std::string read_to_end();                        // until the station closes
+  std::string read_exactly(std::size_t count);      // or less at the end
+  bool closed();                                    // the station has closed, and everything was read
+
+ private:
+  bool pump();  // lets the station run, takes what arrived; false after the end
+
+  VirtualClock& clock_;
+  int socket_ = -1;
+  std::string received_;
+  bool ended_ = false;
+};
+
+}  // namespace server

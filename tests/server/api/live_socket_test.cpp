@@ -1,0 +1,219 @@
+// /live over a real socket, with WebSocket frames made by hand.
+#include "tests/server/api/api_fixture.hpp"
+
+namespace server {
+namespace {
+
+// A page: the handshake, then text frames.
+class Page {
+ public:
+  Page(VirtualClock& clock, std::uint16_t port, const std::string& headers) : client_{clock, port} {
+    client_.send(
+        "GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n" +
+        headers + "\r\n");
+    answer = client_.read_until("\r\n\r\n");
+  }
+
+  bool open() const { return answer.starts_with("HTTP/1.1 101 "); }
+
+  void say(const json& message) { say_text(message.dump()); }
+  void say_text(const std::string& text) { send_frame('\x81', text); }
+
+  // The next message of this type; others are passed over, pings are answered when `answers_pings`.
+  json hear(const std::string& type) {
+    for (int i = 0; i < 1000; ++i) {
+      const auto text = next_message();
+      if (!text) return nullptr;
+      json message = json::parse(*text);
+      if (message["type"] == type) return message;
+    }
+    return nullptr;
+  }
+
+  bool closed() { return client_.closed(); }
+  RawClient& client() { return client_; }
+
+  std::string answer;
+  int pings = 0;
+  bool answers_pings = true;
+
+ private:
+  void send_frame(char first, const std::string& payload) {
+    std::string frame{first};
+    if (payload.size() < 126) {
+      frame += static_cast<char>(0x80U | payload.size());
+    } else {
+      frame += '\xfe';
+      frame += static_cast<char>(payload.size() >> 8U);
+      frame += static_cast<char>(payload.size() & 0xffU);
+    }
+    client_.send(frame + std::string(4, '\0') + payload);  // a mask of zeros
+  }
+
+  std::optional<std::string> next_message() {
+    for (;;) {
+      const std::string head = client_.read_exactly(2);
+      if (head.size() < 2) return std::nullopt;
+      std::size_t size = static_cast<unsigned char>(head[1]) & 0x7fU;
+      if (size >= 126) {
+        std::size_t extended = 0;
+        for (const char c : client_.read_exactly(size == 126 ? 2 : 8)) {
+          extended = extended * 256 + static_cast<unsigned char>(c);
+        }
+        size = extended;
+      }
+      std::string payload = client_.read_exactly(size);
+      if (head[0] == '\x88') return std::nullopt;
+      if (head[0] != '\x89') return payload;
+      ++pings;
+      if (answers_pings) send_frame('\x8a', payload);
+    }
+  }
+
+  RawClient client_;
+};
+
+class LiveSocketTest : public ApiTest {
+ protected:
+  std::string bearer() const { return "Authorization: Bearer " + token() + "\r\n"; }
+  std::unique_ptr<Page> open_page() {
+    auto page = std::make_unique<Page>(clock, api->port(), bearer());
+    EXPECT_TRUE(page->open()) << page->answer;
+    return page;
+  }
+  std::vector<protocol::Command> commands(pb_size_t action) const {
+    auto all = robot->commands();
+    std::erase_if(all, [action](const protocol::Command& command) { return command.which_action != action; });
+    return all;
+  }
+};
+
+TEST_F(LiveSocketTest, WelcomesWithEveryRobotThenTellsWhatHappens) {
+  connect_robot();
+  const auto page = open_page();
+  const json welcome = page->hear("welcome");
+  EXPECT_EQ(welcome["robots"][0]["robot_id"], "r1");
+  EXPECT_EQ(welcome["version"], "0.1.0");
+  make_samples(*robot, 0, 5);
+  EXPECT_EQ(page->hear("samples")["position_m"], (json{0, 1, 2, 3, 4}));
+  clock.run_for(200ms);
+  EXPECT_LE(page->hear("stamp")["stamp_us"], clock.steady_us());
+}
+
+TEST_F(LiveSocketTest, NeedsACredentialAndItsOwnOrigin) {
+  EXPECT_TRUE(Page(clock, api->port(), "").answer.starts_with("HTTP/1.1 401"));
+  EXPECT_TRUE(
+      Page(clock, api->port(), bearer() + "Origin: http://evil.example\r\n").answer.starts_with("HTTP/1.1 403"));
+  EXPECT_TRUE(Page(clock, api->port(), bearer() + "Origin: http://localhost\r\n").open());
+}
+
+TEST_F(LiveSocketTest, SpeaksWebSocketOnly) {
+  RawClient client{clock, api->port()};
+  client.send("GET /live HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" + bearer() + "\r\n");
+  EXPECT_TRUE(client.read_to_end().starts_with("HTTP/1.1 426"));
+}
+
+TEST_F(LiveSocketTest, StopsOneRobotOrAll) {
+  connect_robot();
+  const auto page = open_page();
+  page->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
+  ASSERT_EQ(commands(rheonaut_Command_emergency_stop_tag).size(), 1U);
+  const json heard = page->hear("command");
+  EXPECT_EQ(heard["command"]["kind"], "emergency_stop");
+  EXPECT_EQ(heard["command"]["actor"], "token:local");
+  page->say({{"type", "emergency_stop"}, {"robot_id", nullptr}});
+  EXPECT_EQ(commands(rheonaut_Command_emergency_stop_tag).size(), 2U);
+}
+
+TEST_F(LiveSocketTest, AStopIsObeyedFromAPageThatDoesNotRead) {
+  connect_robot();
+  const auto page = open_page();
+  SampleBatch batch;
+  batch.robot_id = "r1";
+  batch.boot_id = 77;
+  batch.samples.resize(25);
+  for (int i = 0; i < 2000; ++i) live.on_samples(*station.find("r1"), batch);
+  clock.settle();
+  page->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
+  EXPECT_EQ(commands(rheonaut_Command_emergency_stop_tag).size(), 1U);
+}
+
+TEST_F(LiveSocketTest, RenewsALeaseWithAFreshStampOnly) {
+  connect_robot();
+  const auto page = open_page();
+  const auto renew = [&](std::int64_t stamp_us) {
+    page->say({{"type", "renew_lease"}, {"robot_id", "r1"}, {"stamp_us", stamp_us}});
+  };
+  renew(clock.steady_us() - 400'000);
+  EXPECT_EQ(commands(rheonaut_Command_renew_lease_tag).size(), 1U);
+  renew(clock.steady_us() - 400'001);
+  EXPECT_EQ(page->hear("problem")["problem"]["reason"], "stale");
+  renew(clock.steady_us() + 1);
+  EXPECT_EQ(page->hear("problem")["problem"]["reason"], "stale");
+  EXPECT_EQ(commands(rheonaut_Command_renew_lease_tag).size(), 1U);
+}
+
+TEST_F(LiveSocketTest, SaysWhatItDoesNotUnderstand) {
+  connect_robot();
+  const auto page = open_page();
+  const struct {
+    const char* text;
+    const char* reason;
+  } cases[] = {{"nonsense", "malformed_json"},
+               {R"({"type":"dance"})", "unknown_type"},
+               {R"({"kind":"ping"})", "missing_member"},
+               {R"({"type":"emergency_stop","robot_id":"r9"})", "unknown_robot"},
+               {R"({"type":"emergency_stop"})", "missing_member"},
+               {R"({"type":"renew_lease","robot_id":"r1"})", "missing_member"},
+               {R"({"type":"keep_alive","extra":1})", "unknown_member"}};
+  for (const auto& one : cases) {
+    page->say_text(one.text);
+    EXPECT_EQ(page->hear("problem")["problem"]["reason"], one.reason) << one.text;
+  }
+  page->say({{"type", "keep_alive"}});
+  EXPECT_FALSE(page->closed());
+}
+
+TEST_F(LiveSocketTest, RefusesAMessageOverFourKilobytes) {
+  const auto page = open_page();
+  page->say_text(std::string(5000, ' '));
+  page->hear("nothing");
+  EXPECT_TRUE(page->closed());
+}
+
+TEST_F(LiveSocketTest, LetsASilentPageGo) {
+  const auto page = open_page();
+  page->answers_pings = false;
+  clock.run_for(31s);
+  page->hear("nothing");
+  EXPECT_GE(page->pings, 1);
+  EXPECT_TRUE(page->closed());
+}
+
+TEST_F(LiveSocketTest, KeepsAPageThatAnswersPings) {
+  const auto page = open_page();
+  for (int i = 0; i < 12; ++i) {
+    clock.run_for(5s);
+    EXPECT_FALSE(page->hear("stamp").is_null());
+    while (page->hear("stamp")["stamp_us"] < clock.steady_us() - 100'000) continue;
+  }
+  EXPECT_GE(page->pings, 3);
+  EXPECT_FALSE(page->closed());
+}
+
+TEST_F(LiveSocketTest, EndsWhenTheStationStopsAndWhenThePageLeaves) {
+  {
+    const auto leaving = open_page();
+  }
+  clock.settle();
+  const auto page = open_page();
+  page->hear("welcome");
+  tasks.stop();
+  clock.settle();
+  page->hear("nothing");
+  EXPECT_TRUE(page->closed());
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,121 @@
+// Bodies of commands: what is understood, and the sentence for what is not.
+#include <gtest/gtest.h>
+
+#include "server/api/json.hpp"
+
+namespace server {
+namespace {
+
+TEST(ParseCommand, UnderstandsEveryKind) {
+  const struct {
+    const char* body;
+    pb_size_t action;
+  } cases[] = {
+      {R"({"kind":"set_mode","mode":"manual"})", rheonaut_Command_set_mode_tag},
+      {R"({"kind":"set_mode","mode":"auto","setpoint_m":0.1})", rheonaut_Command_set_mode_tag},
+      {R"({"kind":"set_setpoint","setpoint_m":-0.25,"life_ms":500})", rheonaut_Command_set_setpoint_tag},
+      {R"({"kind":"set_duty","duty":1})", rheonaut_Command_set_duty_tag},
+      {R"({"kind":"set_duty","duty":0.5,"lease_ms":250})", rheonaut_Command_set_duty_tag},
+      {R"({"kind":"renew_lease"})", rheonaut_Command_renew_lease_tag},
+      {R"({"kind":"clear_emergency","emergency_id":"18446744073709551615"})", rheonaut_Command_clear_emergency_tag},
+      {R"({"kind":"inject_disturbance","disturbance_m":-0.05})", rheonaut_Command_inject_disturbance_tag},
+      {R"({"kind":"zero_position"})", rheonaut_Command_zero_position_tag},
+      {R"({"kind":"ping"})", rheonaut_Command_ping_tag},
+  };
+  for (const auto& one : cases) {
+    const auto command = parse_command(one.body);
+    ASSERT_TRUE(command) << one.body << ": " << command.error().detail;
+    EXPECT_EQ(command->action.which_action, one.action) << one.body;
+  }
+}
+
+TEST(ParseCommand, CarriesTheValues) {
+  const auto command = parse_command(R"({"kind":"set_mode","mode":"auto","setpoint_m":0.1,"life_ms":500})");
+  ASSERT_TRUE(command);
+  EXPECT_EQ(command->action.action.set_mode.mode, rheonaut_MODE_AUTO);
+  EXPECT_TRUE(command->action.action.set_mode.has_setpoint_m);
+  EXPECT_EQ(command->action.action.set_mode.setpoint_m, 0.1F);
+  EXPECT_EQ(command->life, std::chrono::milliseconds{500});
+  EXPECT_EQ(command->arguments, R"({"mode":"auto","setpoint_m":0.1})");
+  const auto clear = parse_command(R"({"kind":"clear_emergency","emergency_id":"18446744073709551615"})");
+  ASSERT_TRUE(clear);
+  EXPECT_EQ(clear->action.action.clear_emergency.emergency_id, UINT64_MAX);
+}
+
+TEST(ParseCommand, RefusesWithMemberAndValue) {
+  const struct {
+    const char* body;
+    int status;
+    const char* says;
+  } cases[] = {
+      {"", 400, "not valid JSON"},
+      {"{", 400, "not valid JSON"},
+      {R"({"kind":"set_setpoint","setpoint_m":NaN})", 400, "NaN"},
+      {R"({"kind":"set_setpoint","setpoint_m":1e999})", 400, "not valid JSON"},
+      {"[]", 400, "not a JSON object"},
+      {"{}", 400, "kind is missing"},
+      {R"({"kind":7})", 400, "kind = 7 is not a string"},
+      {R"({"kind":"dance"})", 422, "unknown command kind 'dance'"},
+      {R"({"kind":"emergency_stop"})", 422, "unknown command kind 'emergency_stop'"},
+      {R"({"kind":"set_duty_schedule"})", 422, "unknown command kind"},
+      {R"({"kind":"set_setpoint"})", 400, "setpoint_m is missing"},
+      {R"({"kind":"set_setpoint","setpoint_m":"0.1"})", 400, "setpoint_m = \"0.1\" is not a number"},
+      {R"({"kind":"set_setpoint","setpoint_m":null})", 400, "setpoint_m = null is not a number"},
+      {R"({"kind":"set_setpoint","setpoint_m":1e39})", 422, "setpoint_m = 1e+39 is beyond"},
+      {R"({"kind":"set_setpoint","setpoint_m":0.1,"speed":1})", 400, "\"speed\" is not known"},
+      {R"({"kind":"set_mode","mode":"auto"})", 400, "setpoint_m is missing"},
+      {R"({"kind":"set_mode","mode":"manual","setpoint_m":0})", 400, "setpoint_m"},
+      {R"({"kind":"set_mode","mode":"emergency"})", 422, "mode = 'emergency'"},
+      {R"({"kind":"set_duty","duty":0.1,"lease_ms":501})", 422, "lease_ms = 501 is outside 1 to 500"},
+      {R"({"kind":"set_duty","duty":0.1,"lease_ms":0.5})", 400, "lease_ms = 0.5 is not an integer"},
+      {R"({"kind":"ping","life_ms":0})", 422, "life_ms = 0 is outside 1 to 10000"},
+      {R"({"kind":"ping","life_ms":10001})", 422, "life_ms = 10001"},
+      {R"({"kind":"ping","life_ms":18446744073709551615})", 422, "life_ms = 18446744073709551615"},
+      {R"({"kind":"clear_emergency","emergency_id":5})", 400, "emergency_id = 5 is not a string"},
+      {R"({"kind":"clear_emergency","emergency_id":"0"})", 400, "emergency_id"},
+      {R"({"kind":"clear_emergency","emergency_id":"18446744073709551616"})", 400, "emergency_id"},
+      {R"({"kind":"clear_emergency","emergency_id":"-1"})", 400, "emergency_id"},
+      {R"({"kind":"clear_emergency","emergency_id":"12x"})", 400, "emergency_id"},
+  };
+  for (const auto& one : cases) {
+    const auto command = parse_command(one.body);
+    ASSERT_FALSE(command) << one.body;
+    EXPECT_EQ(http_status(command.error().code), one.status) << one.body << ": " << command.error().detail;
+    EXPECT_NE(command.error().detail.find(one.says), std::string::npos) << one.body << ": " << command.error().detail;
+  }
+}
+
+TEST(ParseCommand, SurvivesDeepNesting) {
+  const std::string deep = R"({"kind":)" + std::string(30000, '[') + std::string(30000, ']') + "}";
+  EXPECT_FALSE(parse_command(deep));
+  EXPECT_FALSE(parse_command(std::string(60000, '[')));
+}
+
+TEST(ParseRun, NeedsRobotAndNameAndKnowsItsMembers) {
+  const auto wish = parse_run(R"({"robot_id":"r1","name":"first","fluid":"water","mean_flow_m_s":0.02})");
+  ASSERT_TRUE(wish) << wish.error().detail;
+  EXPECT_EQ(wish->conditions.name, "first");
+  EXPECT_EQ(wish->conditions.mean_flow_m_s, 0.02);
+  EXPECT_FALSE(parse_run(R"({"robot_id":"r1"})"));
+  EXPECT_FALSE(parse_run(R"({"robot_id":"R 1","name":"x"})"));
+  EXPECT_FALSE(parse_run(R"({"robot_id":"r1","name":""})"));
+  EXPECT_FALSE(parse_run(R"({"robot_id":"r1","name":"x","verdict":"good"})"));
+  EXPECT_EQ(parse_run_end("").value(), "");
+  EXPECT_EQ(parse_run_end(R"({"verdict":"good"})").value(), "good");
+}
+
+TEST(StateJson, WritesFloatsAsTheShortestDecimal) {
+  EXPECT_EQ(decimal(0.1F).dump(), "0.1");
+  EXPECT_EQ(decimal(std::numeric_limits<float>::quiet_NaN()).dump(), "null");
+  EXPECT_EQ(decimal(1e-30F).dump(), "1e-30");
+}
+
+TEST(StateJson, ReplacesBytesThatAreNotText) {
+  RobotState robot;
+  robot.id = "r1";
+  robot.firmware_version = "1.0\xff";
+  EXPECT_EQ(nlohmann::json::parse(dump(to_json(robot)))["firmware_version"], "1.0\xef\xbf\xbd");
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,213 @@
+// Robots, commands, stops and runs through the routes, with the real station and recorder and a hand-made robot.
+#include "tests/server/api/api_fixture.hpp"
+
+namespace server {
+namespace {
+
+class RoutesTest : public ApiTest {
+ protected:
+  const json ping{{"kind", "ping"}};
+};
+
+TEST_F(RoutesTest, StationSaysWhatItIs) {
+  clock.run_for(2s);
+  const json station_json = ask("GET", "/api/v1/station").parsed();
+  EXPECT_EQ(station_json["version"], "0.1.0");
+  EXPECT_EQ(station_json["store_id"], "18364758544493064720");
+  EXPECT_EQ(station_json["http_address"], "127.0.0.1:" + std::to_string(api->port()));
+  EXPECT_GE(station_json["uptime_s"], 2.0);
+}
+
+TEST_F(RoutesTest, RobotsAreListedWithTheirState) {
+  EXPECT_EQ(ask("GET", "/api/v1/robots").parsed(), (json{{"robots", json::array()}}));
+  connect_robot();
+  make_samples(*robot, 0, 5);
+  const json listed = ask("GET", "/api/v1/robots").parsed()["robots"][0];
+  EXPECT_EQ(listed["robot_id"], "r1");
+  EXPECT_EQ(listed["link"], "connected");
+  EXPECT_EQ(listed["boot_id"], "77");
+  EXPECT_EQ(listed["mode"], "manual");
+  EXPECT_EQ(listed["next_seq"], 5);
+  EXPECT_EQ(listed["sample"]["position_m"], 4);
+  EXPECT_EQ(listed["emergency_id"], nullptr);
+  EXPECT_EQ(ask("GET", "/api/v1/robots/r1").parsed()["robot_id"], "r1");
+}
+
+TEST_F(RoutesTest, AnUnknownRobotIsNotFound) {
+  for (const char* target : {"/api/v1/robots/r9", "/api/v1/robots/r9/commands", "/api/v1/robots/r9/events"}) {
+    const Answered answered = ask("GET", target);
+    EXPECT_EQ(answered.status, 404) << target;
+    EXPECT_EQ(answered.parsed()["reason"], "unknown_robot");
+    EXPECT_EQ(answered.response.content_type, "application/problem+json");
+  }
+  EXPECT_EQ(ask("POST", "/api/v1/robots/r9/commands", ping).status, 404);
+  EXPECT_EQ(ask("POST", "/api/v1/robots/r9/emergency-stop").status, 404);
+}
+
+TEST_F(RoutesTest, AnAcknowledgedCommandIs200WithItsRecord) {
+  connect_robot();
+  const auto asked = begin("POST", "/api/v1/robots/r1/commands", {{"kind", "set_duty"}, {"duty", 0.25}});
+  ASSERT_EQ(robot->commands().size(), 1U);
+  EXPECT_EQ(robot->commands()[0].action.set_duty.duty, 0.25F);
+  robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_ACCEPTED);
+  const Answered answered = end(asked);
+  EXPECT_EQ(answered.status, 200);
+  const json record = answered.parsed();
+  EXPECT_EQ(record["state"], "acknowledged");
+  EXPECT_EQ(record["arguments"], (json{{"duty", 0.25}}));
+  EXPECT_EQ(record["actor"], "token:local");
+  EXPECT_EQ(record["command_id"], std::to_string(robot->commands()[0].command_id));
+  const std::string id = record["command_id"];
+  EXPECT_EQ(ask("GET", "/api/v1/commands/" + id).parsed()["state"], "acknowledged");
+  EXPECT_EQ(ask("GET", "/api/v1/robots/r1/commands?limit=5").parsed()["commands"].size(), 1U);
+}
+
+TEST_F(RoutesTest, ARefusedCommandIs409WithReasonAndRecord) {
+  connect_robot();
+  const auto asked = begin("POST", "/api/v1/robots/r1/commands", ping);
+  robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_WRONG_MODE);
+  const Answered answered = end(asked);
+  EXPECT_EQ(answered.status, 409);
+  EXPECT_EQ(answered.parsed()["reason"], "wrong_mode");
+  EXPECT_EQ(answered.parsed()["command"]["state"], "rejected");
+}
+
+TEST_F(RoutesTest, ACommandWithoutAnswerIs504) {
+  connect_robot();
+  const Answered answered = ask("POST", "/api/v1/robots/r1/commands", ping);
+  EXPECT_EQ(answered.status, 504);
+  EXPECT_EQ(answered.parsed()["command"]["state"], "expired");
+}
+
+TEST_F(RoutesTest, ACommandForAnAbsentRobotIs409) {
+  station.restore_robots({"r2"});
+  const Answered answered = ask("POST", "/api/v1/robots/r2/commands", ping);
+  EXPECT_EQ(answered.status, 409);
+  EXPECT_EQ(answered.parsed()["reason"], "not_connected");
+}
+
+TEST_F(RoutesTest, AValueOutsideTheLimitsIs422AndSaysThem) {
+  connect_robot();
+  const Answered answered = ask("POST", "/api/v1/robots/r1/commands", {{"kind", "set_setpoint"}, {"setpoint_m", 1.5}});
+  EXPECT_EQ(answered.status, 422);
+  EXPECT_EQ(answered.parsed()["detail"], "setpoint_m = 1.5 is outside -1 to 1");
+}
+
+TEST_F(RoutesTest, AnAcknowledgedStopIs200) {
+  connect_robot();
+  const auto asked = begin("POST", "/api/v1/robots/r1/emergency-stop");
+  ASSERT_EQ(robot->commands().size(), 1U);
+  robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_ACCEPTED, 99);
+  const Answered answered = end(asked);
+  EXPECT_EQ(answered.status, 200);
+  EXPECT_EQ(answered.parsed()["emergency_id"], "99");
+  EXPECT_EQ(ask("GET", "/api/v1/robots/r1").parsed()["emergency_id"], "99");
+}
+
+TEST_F(RoutesTest, AStopForAnAbsentRobotIs202AtOnce) {
+  station.restore_robots({"r2"});
+  const std::int64_t before_us = clock.steady_us();
+  const Answered answered = ask("POST", "/api/v1/robots/r2/emergency-stop");
+  EXPECT_EQ(answered.status, 202);
+  EXPECT_EQ(answered.parsed()["state"], "queued");
+  EXPECT_LT(clock.steady_us() - before_us, 10'000);
+}
+
+TEST_F(RoutesTest, AStopThatNobodyAnswersIs202) {
+  connect_robot();
+  EXPECT_EQ(ask("POST", "/api/v1/robots/r1/emergency-stop").status, 202);
+}
+
+TEST_F(RoutesTest, StopAllReachesEveryRobotBeforeItWaitsForAny) {
+  connect_robot();
+  station.restore_robots({"a-silent-one", "r2"});
+  const auto asked = begin("POST", "/api/v1/emergency-stop");
+  ASSERT_EQ(robot->commands().size(), 1U);
+  robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_ACCEPTED, 99);
+  const Answered answered = end(asked);
+  EXPECT_EQ(answered.status, 202);
+  EXPECT_EQ(answered.parsed()["commands"].size(), 3U);
+  for (const char* id : {"a-silent-one", "r2"}) EXPECT_TRUE(station.find(id)->pending_stop) << id;
+}
+
+TEST_F(RoutesTest, ARunHoldsWhatWasMadeBetweenItsBeginAndItsEnd) {
+  connect_robot();
+  make_samples(*robot, 0, 5);
+  const Answered created = ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}, {"fluid", "water"}});
+  ASSERT_EQ(created.status, 201) << created.body;
+  const std::string path = "/api/v1/runs/" + std::to_string(created.parsed()["run_id"].get<int>());
+  make_samples(*robot, 5, 5);
+  make_samples(*robot, 10, 5);
+  EXPECT_EQ(ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "second"}}).status, 409);
+  const Answered ended = ask("POST", path + "/end", {{"verdict", "good"}});
+  ASSERT_EQ(ended.status, 200) << ended.body;
+  EXPECT_EQ(ended.parsed()["verdict"], "good");
+  EXPECT_EQ(ended.parsed()["samples_stored"], 10);
+  EXPECT_EQ(ask("GET", path).parsed()["fluid"], "water");
+  EXPECT_EQ(ask("GET", "/api/v1/runs?robot_id=r1").parsed()["runs"].size(), 1U);
+  EXPECT_EQ(ask("GET", "/api/v1/runs?robot_id=r9").parsed()["runs"].size(), 0U);
+
+  const json first = ask("GET", path + "/samples?limit=6").parsed();
+  ASSERT_EQ(first["samples"].size(), 6U);
+  EXPECT_EQ(first["samples"][0]["seq"], 5);
+  EXPECT_EQ(first["samples"][0]["position_m"], 5);
+  ASSERT_TRUE(first["next"].is_string());
+  const json rest = ask("GET", path + "/samples?after=" + first["next"].get<std::string>()).parsed();
+  ASSERT_EQ(rest["samples"].size(), 4U);
+  EXPECT_EQ(rest["samples"][0]["seq"], 11);
+  EXPECT_EQ(rest["next"], nullptr);
+
+  const std::string csv = ask("GET", path + "/samples.csv").body;
+  EXPECT_EQ(std::ranges::count(csv, '\n'), 11);
+  EXPECT_TRUE(csv.starts_with("span,boot_id,seq,robot_time_us,utc,position_m,velocity_m_s,"));
+  EXPECT_NE(csv.find("\n0,77,5,"), std::string::npos) << csv;
+  EXPECT_NE(csv.find("Z,14,0,0,0,0,0,manual,none,,0\n"), std::string::npos) << csv;
+  EXPECT_EQ(ask("GET", path + "/gaps").parsed()["gaps"].size(), 0U);
+}
+
+TEST_F(RoutesTest, CsvOfALongRunComesInPieces) {
+  connect_robot();
+  const Answered created = ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "long"}});
+  for (std::uint64_t seq = 0; seq < 5000; seq += 25) make_samples(*robot, seq, 25);
+  const std::string path = "/api/v1/runs/" + std::to_string(created.parsed()["run_id"].get<int>());
+  EXPECT_EQ(std::ranges::count(ask("GET", path + "/samples.csv").body, '\n'), 5001);
+}
+
+TEST_F(RoutesTest, BadRunRequestsAreRefused) {
+  connect_robot();
+  EXPECT_EQ(ask("POST", "/api/v1/runs", {{"robot_id", "r9"}, {"name", "x"}}).status, 404);
+  EXPECT_EQ(ask("POST", "/api/v1/runs", {{"robot_id", "r1"}}).status, 400);
+  EXPECT_EQ(ask("GET", "/api/v1/runs/99").status, 404);
+  EXPECT_EQ(ask("GET", "/api/v1/runs/99/samples").status, 404);
+  EXPECT_EQ(ask("GET", "/api/v1/runs/99/samples.csv").status, 404);
+  EXPECT_EQ(ask("POST", "/api/v1/runs/99/end").status, 404);
+  EXPECT_EQ(ask("GET", "/api/v1/runs/x").status, 400);
+  EXPECT_EQ(ask("GET", "/api/v1/runs?limit=0").status, 400);
+  EXPECT_EQ(ask("GET", "/api/v1/runs?limit=1001").status, 400);
+  EXPECT_EQ(ask("GET", "/api/v1/runs/1/samples?after=x").status, 400);
+  EXPECT_EQ(ask("GET", "/api/v1/commands/0").status, 400);
+  EXPECT_EQ(ask("GET", "/api/v1/commands/5").status, 404);
+}
+
+TEST_F(RoutesTest, EventsComeNewestFirst) {
+  connect_robot();
+  clock.run_for(1s);
+  const json events = ask("GET", "/api/v1/robots/r1/events?limit=1").parsed()["events"];
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0]["kind"], "connected");
+  EXPECT_EQ(events[0]["event_seq"], nullptr);
+}
+
+TEST_F(RoutesTest, PagesHearOfRuns) {
+  connect_robot();
+  Subscriber page{loop};
+  live.add(page);
+  ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}});
+  bool heard = false;
+  for (LiveText text = page.pop(); text != nullptr; text = page.pop()) heard |= json::parse(*text)["type"] == "run";
+  EXPECT_TRUE(heard);
+  live.remove(page);
+}
+
+}  // namespace
+}  // namespace server
