@@ -20,8 +20,13 @@ struct SimulatedRobotConfig {
   control::FractionalModel model = control::kNonNewtonianModel;
 };
 
+// Throws std::invalid_argument, quoting the value, when a name, token, boot id or duty range cannot be.
+void check(const SimulatedRobotConfig& config);
+
 // Never 0, never from a seed.
 std::uint64_t random_boot_id();
+// From 1 to 16 hexadecimal digits, with or without 0x; throws std::invalid_argument.
+std::uint64_t parse_boot_id(const std::string& text);
 
 class SimulatedRobot {
  public:

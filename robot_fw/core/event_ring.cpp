@@ -16,7 +16,7 @@ void EventRing::push(protocol::Event event) {
 }
 
 void EventRing::acknowledge(std::uint64_t next_event_seq) {
-  oldest_seq_ = std::clamp(next_event_seq, oldest_seq_, next_seq_);
+  if (next_event_seq <= next_seq_) oldest_seq_ = std::max(oldest_seq_, next_event_seq);
 }
 
 protocol::Event EventRing::at(std::uint64_t event_seq) const {

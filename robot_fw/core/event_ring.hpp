@@ -14,7 +14,7 @@ class EventRing {
 
   // Numbers the event and keeps it; the oldest one makes room and is counted as lost.
   void push(protocol::Event event);
-  // Forgets every event below `next_event_seq`.
+  // Forgets every event below `next_event_seq`; a number above next_seq() is ignored.
   void acknowledge(std::uint64_t next_event_seq);
   // The event with this number; it must lie in [oldest_seq(), next_seq()).
   protocol::Event at(std::uint64_t event_seq) const;

@@ -34,8 +34,16 @@ void Outbox::ack(const protocol::CommandAck& ack) {
   if (ack_count_ == kMaxAcks) {
     first_ack_ = (first_ack_ + 1) % kMaxAcks;
     --ack_count_;
+    if (stop_acks_ > 0) --stop_acks_;
   }
   acks_[(first_ack_ + ack_count_++) % kMaxAcks] = ack;
+}
+
+void Outbox::ack_stop(const protocol::CommandAck& ack) {
+  first_ack_ = (first_ack_ + kMaxAcks - 1) % kMaxAcks;
+  acks_[first_ack_] = ack;
+  ack_count_ = std::min(ack_count_ + 1, kMaxAcks);
+  stop_acks_ = std::min(stop_acks_ + 1, kMaxAcks);
 }
 
 void Outbox::echo(std::uint64_t station_time_us, std::uint64_t received_at_us) {
@@ -64,6 +72,7 @@ Outgoing Outbox::next(const Link& link, const TelemetryRing& samples, const Even
                       std::uint32_t samples_per_frame, std::uint64_t now_us) {
   if (link.phase() == Link::Phase::closed) return Outgoing::none;
   if (hello_due_) return Outgoing::hello;
+  if (stop_acks_ > 0) return Outgoing::ack;
   if (!link.up()) return Outgoing::none;
   catch_up(samples, events);
   if (ack_count_ > 0) return Outgoing::ack;
@@ -82,6 +91,7 @@ void Outbox::sent(Outgoing what, std::size_t samples_in_frame, std::uint64_t now
     case Outgoing::none: break;
     case Outgoing::hello: hello_due_ = false; break;
     case Outgoing::ack:
+      if (stop_acks_ > 0) --stop_acks_;
       first_ack_ = (first_ack_ + 1) % kMaxAcks;
       --ack_count_;
       break;

@@ -1,7 +1,8 @@
 // What is sent next: the order of the messages and the place each of them has reached.
 //
-// First to last: hello, acks, events, live samples, status, heartbeat, backfill. Backfill is what the station lacks
-// from before this connection or asks for again; it flows at no more than twice the rate of the live samples.
+// First to last: hello, acks of stops, acks, events, live samples, status, heartbeat, backfill. Backfill is what the
+// station lacks from before this connection or asks for again; it flows at no more than twice the rate of the live
+// samples.
 #pragma once
 
 #include <array>
@@ -34,9 +35,12 @@ class Outbox {
   // The station is there: what the rings hold by now is backfill, what follows is live.
   void welcomed(const TelemetryRing& samples, const EventRing& events);
   void resend(std::uint64_t first_seq, std::uint64_t end_seq) { backfill_.extend(first_seq, end_seq); }
+  void resend_events(const EventRing& events) { event_next_ = events.oldest_seq(); }
 
   // When the queue is full the oldest ack makes room; the station then asks by repeating the command.
   void ack(const protocol::CommandAck& ack);
+  // Ahead of every other ack, and already before Welcome.
+  void ack_stop(const protocol::CommandAck& ack);
   void echo(std::uint64_t station_time_us, std::uint64_t received_at_us);
   // Once per tick, after the sample was made; `urgent` sends it, and all before it, at once.
   void sample_made(const TelemetryRing& samples, bool urgent);
@@ -59,6 +63,7 @@ class Outbox {
   bool hello_due_ = false;
   std::array<protocol::CommandAck, kMaxAcks> acks_{};
   std::size_t first_ack_ = 0, ack_count_ = 0;
+  std::size_t stop_acks_ = 0;  // how many of them, the first ones, answer a stop
   std::uint64_t event_next_ = 0;
   SampleRun live_;  // end_seq: samples below it are due at once
   SampleRun backfill_;

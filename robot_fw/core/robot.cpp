@@ -74,7 +74,7 @@ void Robot::watch_link() {
 
 void Robot::run_due_commands() {
   protocol::Command command;
-  while (timed_.take_due(now_us_, command)) answer(command, execute(command));
+  while (timed_.take_due(now_us_, command)) run_timed_command(command);
 }
 
 void Robot::let_orders_run_out() {

@@ -12,6 +12,7 @@ bool allowed_when_latched(const protocol::Command& command) {
   switch (command.which_action) {
     case rheonaut_Command_emergency_stop_tag:
     case rheonaut_Command_clear_emergency_tag:
+    case rheonaut_Command_set_parameter_tag:
     case rheonaut_Command_get_parameters_tag:
     case rheonaut_Command_ping_tag: return true;
     default: return false;
@@ -28,26 +29,40 @@ void Robot::on_command(const protocol::Command& command) {
   if (!later) return answer(command, execute(command));
   if (safety_.latched() && !allowed_when_latched(command))
     return answer(command, rejected(rheonaut_REJECT_REASON_LATCHED));
-  if (!timed_.hold(command)) answer(command, rejected(rheonaut_REJECT_REASON_BUSY));
+  if (!timed_.hold(command)) return answer(command, rejected(rheonaut_REJECT_REASON_BUSY));
+  outbox_.ack(ack_for(command, kAccepted, command.execute_at_robot_us));
 }
 
 // SAFETY: a stop asks for no boot, no life, no mode and no id, and acts before this returns.
 void Robot::on_emergency_stop(const protocol::Command& command) {
   const bool repeated = command.command_id != 0 && !gate_.remember(command.command_id);
-  if (repeated && safety_.latched()) return answer(command, {rheonaut_COMMAND_RESULT_DUPLICATE});
+  if (repeated && safety_.latched()) {
+    return outbox_.ack_stop(ack_for(command, {rheonaut_COMMAND_RESULT_DUPLICATE}, 0));
+  }
   emergency(rheonaut_EMERGENCY_CAUSE_OPERATOR, rheonaut_EVENT_CAUSE_COMMAND, command.command_id);
-  answer(command, kAccepted);
+  outbox_.ack_stop(ack_for(command, kAccepted, now_us_));
 }
 
-void Robot::answer(const protocol::Command& command, Verdict verdict) {
+protocol::CommandAck Robot::ack_for(const protocol::Command& command, Verdict verdict,
+                                    std::uint64_t effect_at_us) const {
   protocol::CommandAck ack = rheonaut_CommandAck_init_zero;
   ack.command_id = command.command_id;
   ack.result = verdict.result;
   ack.reason = verdict.reason;
-  ack.effect_at_robot_us = verdict.accepted() ? now_us_ : 0;
+  ack.effect_at_robot_us = effect_at_us;
   ack.emergency_id = safety_.emergency_id();
-  outbox_.ack(ack);
+  return ack;
+}
+
+void Robot::answer(const protocol::Command& command, Verdict verdict) {
+  outbox_.ack(ack_for(command, verdict, verdict.accepted() ? now_us_ : 0));
   if (verdict.accepted()) sample_is_urgent_ = true;
+}
+
+// The ack went out when the command was taken in; a second one is only due when nothing came of it.
+void Robot::run_timed_command(const protocol::Command& command) {
+  const Verdict verdict = execute(command);
+  if (!verdict.accepted()) answer(command, verdict);
 }
 
 void Robot::drop_timed_commands(Verdict verdict) {

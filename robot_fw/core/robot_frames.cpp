@@ -87,6 +87,7 @@ void Robot::on_heartbeat(const protocol::StationHeartbeat& heartbeat) {
   samples_.acknowledge(heartbeat.durable_next_seq);
   events_.acknowledge(heartbeat.durable_next_event_seq);
   outbox_.resend(heartbeat.resend_first_seq, heartbeat.resend_next_seq);
+  if (heartbeat.resend_events) outbox_.resend_events(events_);
   if (heartbeat.station_time_us != 0) outbox_.echo(heartbeat.station_time_us, now_us_);
 }
 

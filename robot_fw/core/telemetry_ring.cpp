@@ -37,7 +37,9 @@ bool TelemetryRing::push(const Sample& sample, const BatchValues& values, bool s
   return starts_segment;
 }
 
-void TelemetryRing::acknowledge(std::uint64_t next_seq) { forget_below(std::clamp(next_seq, oldest_seq_, next_seq_)); }
+void TelemetryRing::acknowledge(std::uint64_t next_seq) {
+  if (next_seq > oldest_seq_ && next_seq <= next_seq_) forget_below(next_seq);
+}
 
 void TelemetryRing::forget_below(std::uint64_t seq) {
   oldest_seq_ = seq;

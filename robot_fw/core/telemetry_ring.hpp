@@ -46,7 +46,7 @@ class TelemetryRing {
   // says whether it did. The oldest sample, or segment, makes room and is counted as lost.
   bool push(const Sample& sample, const BatchValues& values, bool saturated, std::uint64_t robot_time_us,
             std::uint32_t period_us);
-  // Forgets every sample below `next_seq`.
+  // Forgets every sample below `next_seq`; a number above next_seq() is ignored.
   void acknowledge(std::uint64_t next_seq);
   // Fills `batch` with samples from `first_seq` on, at most `max_samples` and never beyond a segment;
   // `first_seq` must lie in [oldest_seq(), next_seq()).
