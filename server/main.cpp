@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <functional>
 
+#include "server/analysis/analysis_service.hpp"
 #include "server/api/api_server.hpp"
 #include "server/cli/command_line.hpp"
 #include "server/config.hpp"
@@ -43,7 +44,7 @@ int serve(const Config& config) {
   // The ground everything stands on; declared first, destroyed last.
   boost::asio::io_context loop{1};  // all sockets, all live state
   SystemClock clock{loop};
-  WorkerThread disk{"disk"}, readers{"readers", 10};  // blocking work
+  WorkerThread disk{"disk"}, readers{"readers", 10}, maths{"maths", 10};  // blocking work
   TaskGroup tasks{loop};
 
   // Centre: the only owner of live state, and the only door for commands.
@@ -68,7 +69,8 @@ int serve(const Config& config) {
   RobotListener robots{loop, clock, tasks, station, recorder, parse_endpoint(config.robots), config.robots_or_any_port};
 
   // People and scripts.
-  ApiServer api{loop, tasks, clock, api_options(config, restored, robots), station, live, runs, history};
+  AnalysisService analysis{history, maths};
+  ApiServer api{loop, tasks, clock, api_options(config, restored, robots), station, live, runs, history, analysis};
 
   tasks.spawn("recorder", recorder.run());
   tasks.spawn("live feed", live.run());

@@ -21,11 +21,11 @@ StationFacts facts_of(const ApiOptions& options, const Listener& listener, const
 }  // namespace
 
 ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clock, const ApiOptions& options,
-                     Station& station, LiveFeed& live, Runs& runs, History& history)
+                     Station& station, LiveFeed& live, Runs& runs, History& history, AnalysisService& analysis)
     : listener_{loop, clock, options.endpoint, options.or_any_port},
       auth_{clock, options.data_dir},
       guard_{auth_, host_names(options)},
-      parts_{loop, tasks, clock, station, live, runs, history, auth_, facts_of(options, listener_, clock)},
+      parts_{loop, tasks, clock, station, live, runs, history, analysis, auth_, facts_of(options, listener_, clock)},
       live_{loop, tasks, clock, station, live, options.version},
       server_{tasks, clock, listener_, guard_, router_, live_} {
   add_routes(router_, parts_);

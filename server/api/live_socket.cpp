@@ -74,7 +74,8 @@ class LivePage {
       const std::int64_t now_us = parts_.clock.steady_us();
       if (now_us - std::max(heard_at_us_, pinged_at_us_) < kPingAfterUs) continue;
       pinged_at_us_ = now_us;
-      const auto [error] = co_await socket_.async_ping({}, asio::as_tuple(asio::use_awaitable));
+      const websocket::ping_data empty;
+      const auto [error] = co_await socket_.async_ping(empty, asio::as_tuple(asio::use_awaitable));
       if (error) co_return;
     }
   }

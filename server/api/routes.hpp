@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "server/analysis/analysis_service.hpp"
 #include "server/api/auth.hpp"
 #include "server/api/json.hpp"
 #include "server/api/router.hpp"
@@ -34,6 +35,7 @@ struct ApiParts {
   LiveFeed& live;
   Runs& runs;
   History& history;
+  AnalysisService& analysis;
   Auth& auth;
   StationFacts facts;
 };

@@ -1,9 +1,11 @@
-// Runs: begin, end, list.
+// Runs: begin, end, list, measure.
 #include <fmt/format.h>
 
 #include "server/api/routes.hpp"
 
 namespace server {
+using nlohmann::json;
+
 namespace {
 
 constexpr std::int64_t kMaxRunId = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
@@ -52,6 +54,36 @@ Answer end_run(ApiParts& parts, Request request) {
   co_return json_response(200, to_json(*run));
 }
 
+json or_null(std::optional<double> value) { return value ? json(*value) : json(nullptr); }
+
+json to_json(const MeasuredStep& step) {
+  json out;
+  out["cause"] = text(step.cause);
+  out["span"] = step.span;
+  out["first_seq"] = step.first_seq;
+  out["last_seq"] = step.last_seq;
+  out["at_s"] = step.at_s;
+  out["start_m"] = decimal(static_cast<float>(step.start_m));
+  out["target_m"] = decimal(static_cast<float>(step.target_m));
+  out["band_m"] = step.band_m;
+  out["settling_s"] = or_null(step.metrics.settling_s);
+  out["overshoot_percent"] = step.metrics.overshoot_percent;
+  out["peak_m"] = step.metrics.peak_m;
+  out["rise_10_90_s"] = or_null(step.metrics.rise_10_90_s);
+  out["steady_state_error_m"] = step.metrics.steady_state_error_m;
+  return out;
+}
+
+Answer get_step_metrics(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  const auto steps = co_await parts.analysis.steps(*id);
+  if (!steps) co_return problem(steps.error());
+  json list = json::array();
+  for (const MeasuredStep& step : *steps) list.push_back(to_json(step));
+  co_return json_response(200, {{"steps", std::move(list)}});
+}
+
 }  // namespace
 
 Result<RunId> run_id_of(const Request& request) {
@@ -72,6 +104,7 @@ void add_run_routes(Router& router, ApiParts& parts) {
   add("POST", "/api/v1/runs", {}, create_run);
   add("GET", "/api/v1/runs/{run_id}", {}, get_run);
   add("POST", "/api/v1/runs/{run_id}/end", {}, end_run);
+  add("GET", "/api/v1/runs/{run_id}/step-metrics", {}, get_step_metrics);
 }
 
 }  // namespace server

@@ -33,6 +33,7 @@ asio::awaitable<void> start(Recorder& recorder, Runs& runs, bool& started) {
 ApiTest::ApiTest() {
   clock.add_worker(disk);
   clock.add_worker(readers);
+  clock.add_worker(maths);
   station.add_sink(recorder);
   station.add_sink(runs);
   station.add_sink(live);
@@ -49,7 +50,7 @@ ApiTest::ApiTest() {
   options.version = "0.1.0";
   options.store_id = 0xfedcba9876543210;
   options.robots_address = "127.0.0.1:7070";
-  api = std::make_unique<ApiServer>(loop, tasks, clock, options, station, live, runs, history);
+  api = std::make_unique<ApiServer>(loop, tasks, clock, options, station, live, runs, history, analysis);
   tasks.spawn("recorder", recorder.run());
   tasks.spawn("live feed", live.run());
   tasks.spawn("api", api->run());

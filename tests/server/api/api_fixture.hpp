@@ -53,7 +53,7 @@ class ApiTest : public ::testing::Test {
   std::string token() const;
 
   TemporaryFolder folder;
-  WorkerThread disk{"disk"}, readers{"readers"};
+  WorkerThread disk{"disk"}, readers{"readers"}, maths{"maths"};
   boost::asio::io_context loop{1};
   VirtualClock clock{loop};
   TaskGroup tasks{loop};
@@ -61,6 +61,7 @@ class ApiTest : public ::testing::Test {
   Recorder recorder{loop, clock, disk, {.path = folder.path() / "station.sqlite"}};
   Runs runs{clock, recorder};
   History history{folder.path() / "station.sqlite", recorder, readers};
+  AnalysisService analysis{history, maths};
   LiveFeed live{clock};
   RobotListener robots{loop, clock, tasks, station, recorder, {boost::asio::ip::address_v4::loopback(), 0}, false};
   std::unique_ptr<ApiServer> api;

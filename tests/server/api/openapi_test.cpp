@@ -62,6 +62,36 @@ TEST_F(OpenapiTest, QueryParametersAreTheSame) {
   }
 }
 
+// Every example of docs/api.md calls a route that exists, and its JSON is JSON.
+TEST_F(OpenapiTest, TheExamplesOfTheDocumentCallExistingRoutes) {
+  std::ifstream in{API_MD};
+  std::set<std::string> called;
+  std::string line, block;
+  bool in_json = false;
+  int json_blocks = 0;
+  while (std::getline(in, line)) {
+    if (line == "```json") {
+      in_json = true;
+      block.clear();
+    } else if (line == "```" && in_json) {
+      in_json = false;
+      ++json_blocks;
+      EXPECT_TRUE(json::accept(block)) << block;
+    } else if (in_json) {
+      block += line;
+    }
+    const auto target = line.find("$STATION/");
+    if (!line.starts_with("ask ") || target == std::string::npos) continue;
+    const auto begin = target + std::string_view{"$STATION"}.size();
+    const std::string method = line.find("-X POST") == std::string::npos ? "GET" : "POST";
+    const int status = ask(method, line.substr(begin, line.find_first_of("' \"", begin) - begin)).status;
+    EXPECT_NE(status, 405) << line;
+    called.insert(line);
+  }
+  EXPECT_GE(called.size(), 15U);
+  EXPECT_GE(json_blocks, 5);
+}
+
 TEST_F(OpenapiTest, IsServedAsItStandsInTheRepository) {
   std::ifstream in{OPENAPI_YAML};
   const std::string file{std::istreambuf_iterator<char>{in}, {}};

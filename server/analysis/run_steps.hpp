@@ -1,0 +1,45 @@
+// Finds the steps of a recorded experiment and measures each: new setpoints and injected disturbances, in auto mode.
+//
+// A step begins with the first sample that carries a new setpoint_m or disturbance_m, and ends with the next step, with
+// auto mode, or with the recording's span. It starts from the position of its first sample. The settling band is ±2 %
+// of the latest change of setpoint, for disturbances too (as the paper's table reads).
+// Pure and slow for long runs: call it on a worker.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "control/step_metrics.hpp"
+
+namespace server {
+
+// What of a stored sample matters here.
+struct StepPoint {
+  std::uint32_t span = 0;
+  std::uint64_t seq = 0;
+  std::uint64_t robot_time_us = 0;
+  float position_m = 0;
+  float disturbance_m = 0;
+  float setpoint_m = 0;
+  bool steered = false;  // in auto mode with a setpoint
+};
+
+enum class StepCause : std::uint8_t { setpoint, disturbance };
+const char* text(StepCause value);
+
+struct MeasuredStep {
+  StepCause cause = StepCause::setpoint;
+  std::uint32_t span = 0;
+  std::uint64_t first_seq = 0;
+  std::uint64_t last_seq = 0;
+  double at_s = 0;  // since the first sample of the span
+  double start_m = 0;
+  double target_m = 0;
+  double band_m = 0;
+  control::StepMetrics metrics;
+};
+
+// Points in order of span and seq. A step that goes nowhere is left out; a position that is not finite ends a step.
+std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points);
+
+}  // namespace server
