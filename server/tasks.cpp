@@ -5,10 +5,26 @@
 
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/multiple_exceptions.hpp>
 #include <boost/system/system_error.hpp>
 
 namespace server {
 namespace asio = boost::asio;
+
+namespace {
+
+// `co_await (a || b)` throws both failures in one when it is cancelled; the first of them tells what happened.
+std::exception_ptr first_of(std::exception_ptr failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const asio::multiple_exceptions& both) {
+    return both.first_exception();
+  } catch (...) {
+    return failure;
+  }
+}
+
+}  // namespace
 
 void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
   if (stopping_) return;
@@ -22,7 +38,7 @@ void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
 
 void TaskGroup::ended(const std::string& name, std::exception_ptr failure) {
   try {
-    if (failure) std::rethrow_exception(failure);
+    if (failure) std::rethrow_exception(first_of(failure));
   } catch (const boost::system::system_error& error) {
     if (error.code() == asio::error::operation_aborted) return;
     spdlog::critical("{} failed: {}; stopping", name, error.what());

@@ -74,8 +74,10 @@ TEST_F(VirtualClockTest, TheLoserOfARaceIsCancelledAndForgotten) {
   EXPECT_FALSE(clock_.advance_to_next());
 }
 
-TEST_F(VirtualClockTest, StoppingTheTasksEndsTheirSleep) {
+TEST_F(VirtualClockTest, StoppingTheTasksEndsTheirSleepAndTheirRaces) {
   tasks_.spawn("sleeper", sleep_and_note(1h));
+  auto race = [](Clock& clock) -> asio::awaitable<void> { co_await (clock.sleep_for(1h) || clock.sleep_for(2h)); };
+  tasks_.spawn("race", race(clock_));
   clock_.settle();
   tasks_.stop();
   clock_.settle();
