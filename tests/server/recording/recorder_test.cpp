@@ -247,8 +247,8 @@ TEST_F(RecorderTest, CloseWritesEverythingThatWasHeard) {
   connect(robot_);
   make(robot_, 33);
   stop();
-  EXPECT_EQ(samples(), 33);
   EXPECT_FALSE(std::filesystem::exists(path_.string() + "-wal"));
+  EXPECT_EQ(samples(), 33);
 }
 
 TEST_F(RecorderTest, RowsAreNumberedOnAcrossRestarts) {
