@@ -106,7 +106,7 @@ void Robot::record_sample(const Measured& measured, float dt_s) {
   sample.reference_m = pilot_.setpoint_m().value_or(0.0F);
   const bool usable_period = dt_s > 0 && dt_s < 1;
   const std::uint32_t period_us =
-      usable_period ? static_cast<std::uint32_t>(dt_s * 1e6F + 0.5F) : config_.sample_period_us;
+      usable_period ? static_cast<std::uint32_t>(std::lround(dt_s * 1e6F)) : config_.sample_period_us;
   const bool changed = samples_.push(sample, batch_values(), saturated_, now_us_, period_us);
   outbox_.sample_made(samples_, changed || sample_is_urgent_);
   sample_is_urgent_ = false;
