@@ -1,73 +1,20 @@
 // The station's HTTP API as the page uses it: one function for each thing that is asked, errors as sentences.
+//
+// The types are generated from server/api/openapi.yaml (npm run types), so that a difference is a compile error.
 
-export interface Status {
-  supply_mv: number;
-  rssi_dbm: number;
-  free_memory_bytes: number;
-  worst_tick_us: number;
-  missed_ticks: number;
-  ring_fill: number;
-  imu_calibration: number;
-  bad_frames: number;
-  lost_samples: number;
-  lost_events: number;
-}
+import type { components } from './api_types';
 
-export interface RobotState {
-  id: string;
-  link: 'connected' | 'disconnected';
-  boot_id: string | null;
-  firmware_version: string;
-  sample_period_us: number;
-  ring_capacity: number;
-  mode: string;
-  sub_state: string;
-  setpoint_m: number | null;
-  position_sd_m: number;
-  emergency_id: string | null;
-  emergency_cause: string;
-  next_seq: number;
-  durable_next_seq: number;
-  status: Status | null;
-  clock: { valid: boolean; uncertainty_us: number; round_trip_us: number; drift_ppm: number } | null;
-  pending_stop: string | null;
-}
-
-export interface CommandRecord {
-  id: string;
-  robot_id: string;
-  kind: string;
-  arguments: Record<string, unknown>;
-  actor: string;
-  state: string;
-  reason: string;
-  submitted_at_us: number;
-  ended_at_us: number | null;
-  emergency_id: string | null;
-}
-
-export interface EventRecord {
-  robot_id: string;
-  boot_id: string | null;
-  event_seq: number | null;
-  kind: string;
-  cause: string;
-  mode: string;
-  sub_state: string;
-  position_m: number;
-  value: number;
-  emergency_id: string | null;
-  received_at_us: number;
-}
-
-export interface RunRecord {
-  id: string;
-  name: string;
-  fluid: string;
-  robot_id: string;
-  started_at_ms: number;
-  ended_at_ms: number | null;
-}
+type Schemas = components['schemas'];
+export type RobotState = Schemas['Robot'];
+export type CommandRecord = Schemas['Command'];
+export type CommandBody = Schemas['CommandBody'];
+export type EventRecord = Schemas['Event'];
+export type RunRecord = Schemas['Run'];
+export type Station = Schemas['Station'];
+export type SamplesMessage = Schemas['LiveSamples'];
+export type LiveMessage = Schemas['LiveServerMessage'];
+export type ClientMessage = Schemas['LiveClientMessage'];
+type Problem = Schemas['Problem'];
 
 // A refusal or failure. `message` is a sentence for the operator; `reason` the station's identifier, "" when unknown.
 export class ApiError extends Error {
@@ -75,6 +22,7 @@ export class ApiError extends Error {
     message: string,
     readonly status: number, // 0: no answer at all
     readonly reason = '',
+    readonly detail = '', // what the station says beyond the sentence
   ) {
     super(message);
   }
@@ -102,9 +50,7 @@ const kReasons: Record<string, string> = {
 };
 
 // An identifier of a refusal as a sentence.
-export function sentence(reason: string, otherwise = ''): string {
-  return kReasons[reason] ?? (otherwise || reason.replaceAll('_', ' '));
-}
+export const sentence = (reason: string) => kReasons[reason] ?? reason.replaceAll('_', ' ');
 
 export type Fetch = (path: string, options: RequestInit) => Promise<Response>;
 
@@ -122,37 +68,45 @@ export class Api {
   clear_emergency = (robot_id: string, emergency_id: string) =>
     this.command(robot_id, { kind: 'clear_emergency', emergency_id });
 
-  async emergency_stop(robot_id: string): Promise<CommandRecord[]> {
-    return [(await this.send('POST', `/robots/${robot_id}/emergency-stop`, {})) as CommandRecord];
-  }
-  async emergency_stop_all(): Promise<CommandRecord[]> {
-    return (await this.send('POST', '/emergency-stop', {})) as CommandRecord[];
-  }
+  emergency_stop = async (robot_id: string) => [
+    await this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/emergency-stop`),
+  ];
+  emergency_stop_all = async () => (await this.ask<{ commands: CommandRecord[] }>('POST', '/emergency-stop')).commands;
+
+  station = () => this.ask<Station>('GET', '/station');
+  open_run = async (robot_id: string) => {
+    const path = `/runs?robot_id=${encodeURIComponent(robot_id)}&limit=1`;
+    const { runs } = await this.ask<{ runs: RunRecord[] }>('GET', path);
+    return runs.find((run) => run.ended_at_us === null) ?? null;
+  };
   start_run = (robot_id: string, name: string, fluid: string) =>
-    this.send('POST', '/runs', { robot_id, name, fluid }) as Promise<RunRecord>;
-  end_run = (run_id: string) => this.send('POST', `/runs/${run_id}/end`, {}) as Promise<RunRecord>;
+    this.ask<RunRecord>('POST', '/runs', { robot_id, name, fluid });
+  end_run = (run_id: number) => this.ask<RunRecord>('POST', `/runs/${run_id}/end`);
 
   // True when the station answers that this page may not speak to it.
   async is_signed_out(): Promise<boolean> {
-    return (await this.fetch('/api/v1/robots', { method: 'GET' })).status === 401;
+    return (await this.fetch('/api/v1/station', { method: 'GET' })).status === 401;
   }
 
-  // A command's end; anything but "acknowledged" is an error in words.
-  private async command(robot_id: string, body: object): Promise<CommandRecord> {
-    const record = (await this.send('POST', `/robots/${robot_id}/commands`, body)) as CommandRecord;
-    if (record.state === 'acknowledged') return record;
-    throw new ApiError(sentence(record.reason || record.state, record.state), 200, record.reason || record.state);
+  private command(robot_id: string, body: CommandBody): Promise<CommandRecord> {
+    return this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/commands`, body);
   }
 
-  private async send(method: string, path: string, body: object): Promise<unknown> {
-    const headers = { 'Content-Type': 'application/json' };
-    const options = { method, headers, body: JSON.stringify(body), signal: AbortSignal.timeout(kPatience_ms) };
+  private async ask<Answer>(method: string, path: string, body?: object): Promise<Answer> {
+    const options: RequestInit = { method, signal: AbortSignal.timeout(kPatience_ms) };
+    if (body) Object.assign(options, { body: JSON.stringify(body), headers: { 'Content-Type': 'application/json' } });
     const answer = await this.fetch(`/api/v1${path}`, options).catch(() => {
       throw new ApiError('The station did not answer.', 0);
     });
-    const content = (await answer.json().catch(() => null)) as { title?: string; detail?: string; reason?: string } | null;
-    if (answer.ok) return content;
-    const reason = content?.reason ?? '';
-    throw new ApiError(content?.detail || sentence(reason, content?.title ?? `The station answered ${answer.status}.`), answer.status, reason);
+    const content = (await answer.json().catch(() => null)) as unknown;
+    if (answer.ok && content !== null) return content as Answer;
+    throw error_of(answer.status, content as Partial<Problem> | null);
   }
+}
+
+function error_of(status: number, problem: Partial<Problem> | null): ApiError {
+  const reason = problem?.reason ?? '';
+  const known = kReasons[reason];
+  const otherwise = problem?.detail || problem?.title || `The station answered ${status} without a reason.`;
+  return new ApiError(known ?? otherwise, status, reason, known ? (problem?.detail ?? '') : '');
 }

@@ -201,18 +201,18 @@ export class ChartDeck {
   constructor(
     private ring: SampleRing,
     private readonly on_state: (state: DeckState) => void,
-    private readonly on_cursor: (index: number | null, window: PlotWindow) => void,
   ) {
     this.frame = requestAnimationFrame(this.tick);
   }
 
-  add(host: HTMLElement, options: StripOptions): void {
+  // on_cursor hears which sample the pointer is at, null when it left.
+  add(host: HTMLElement, options: StripOptions, on_cursor: (index: number | null, window: PlotWindow) => void): void {
     const chart: StripChart = new StripChart(
       host,
       options,
       this.ring.capacity,
       (from_s, to_s) => this.zoom(from_s, to_s),
-      (index) => this.on_cursor(index, chart.window),
+      (index) => on_cursor(index, chart.window),
     );
     this.charts.push(chart);
   }

@@ -3,8 +3,6 @@
 // Pressing sends set_duty, holding renews its lease, letting go sends duty 0 at once. Two requests may overtake each
 // other on their way, so when the hand let go before the first was answered, duty 0 is sent once more after it.
 
-import type { ApiError } from './api';
-
 export const kRenew_ms = 150;
 
 export interface HoldWays {
@@ -17,7 +15,7 @@ export interface HoldWays {
 
 export class DutyHold {
   robot_id: string | null = null; // of the held duty; null when nothing is held
-  error: ApiError | Error | null = null;
+  error: Error | null = null;
   lapsed = false; // the last hold ended because its lease could not be renewed
   private duty = 0; // wanted
   private sent_duty = 0;
@@ -69,7 +67,12 @@ export class DutyHold {
   }
 
   private renew(): void {
-    if (this.robot_id === null || this.ways.renew_lease(this.robot_id)) return;
+    if (this.robot_id !== null && !this.ways.renew_lease(this.robot_id)) this.lapse();
+  }
+
+  // The lease could not be renewed.
+  lapse(): void {
+    if (this.robot_id === null) return;
     // The lease ends by now, and only a new command may move the motor: so only a new press does.
     this.lapsed = true;
     this.release();

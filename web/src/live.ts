@@ -6,14 +6,14 @@
 // The station sends a stamp each 100 ms, so silence means that the link is dead, whatever TCP believes.
 // Time, timers, sockets and chance are handed in, so that tests run it without any of them.
 
-import type { ClientMessage, LiveMessage } from './live_messages';
+import type { ClientMessage, LiveMessage } from './api';
 
 export type LinkPhase = 'connecting' | 'live' | 'waiting' | 'signed_out';
 
 export interface Socket {
   readyState: number;
   onopen: ((event: never) => void) | null;
-  onmessage: ((event: { data: unknown }) => void) | null;
+  onmessage: ((event: never) => void) | null;
   onclose: ((event: never) => void) | null;
   onerror: ((event: never) => void) | null;
   send(text: string): void;
@@ -88,7 +88,7 @@ export class LiveLink {
     this.set_phase('connecting');
     const socket = this.surroundings.open_socket();
     this.socket = socket;
-    socket.onmessage = (event) => this.hear(event.data);
+    socket.onmessage = (event: { data: unknown }) => this.hear(event.data);
     socket.onclose = () => this.lose();
     socket.onerror = () => undefined; // a close follows
     this.set_timer(() => this.lose(), kOpen_ms);

@@ -5,21 +5,11 @@
 // them. Times on the plot are page time in seconds (performance.now() / 1000), laid on the robot's own clock at the
 // first batch of a boot: the spacing of samples is the robot's, never that of their arrival.
 
+import type { SamplesMessage } from './api';
+
 export const kColumns = ['position_m', 'reference_m', 'setpoint_m', 'duty', 'impedance_mv', 'velocity_m_s'] as const;
 export type Column = (typeof kColumns)[number];
 
-export interface Batch {
-  boot_id: string;
-  first_seq: number;
-  first_robot_time_us: number;
-  period_us: number;
-  setpoint_m: number | null;
-  position_m: number[];
-  reference_m: number[];
-  duty: number[];
-  impedance_mv: number[];
-  velocity_m_s: number[];
-}
 
 // Consecutive samples further apart than this many periods are not joined by a line.
 const kGapPeriods = 1.5;
@@ -48,7 +38,7 @@ export class SampleRing {
   }
 
   // Lays a batch down; page_now_s is when it arrived.
-  append(batch: Batch, page_now_s: number): void {
+  append(batch: SamplesMessage, page_now_s: number): void {
     const size = batch.position_m.length;
     if (size === 0) return;
     const last_robot_s = (batch.first_robot_time_us + (size - 1) * batch.period_us) / 1e6;

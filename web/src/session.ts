@@ -1,15 +1,18 @@
 // One running page: the store, the live link, the API and the controls that outlive a view, wired together.
 
 import { signal } from '@preact/signals';
-import { Api } from './api';
+import { Api, type Station } from './api';
 import { DutyHold } from './duty_hold';
 import { EmergencyStop, kIdleStop } from './emergency';
 import { LiveLink, type LinkPhase, type Surroundings } from './live';
 import { kRefresh_ms, Store } from './store';
 
+const kKeepAlive_ms = 10_000; // the station drops a page that is silent for 30 s
+
 export class Session {
   readonly api = new Api((path, options) => fetch(path, options));
   readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => Date.now() });
+  readonly station = signal<Station | null>(null);
   readonly phase = signal<LinkPhase>('connecting');
   readonly stop_state = signal(kIdleStop);
   readonly held = signal<{ robot_id: string | null; lapsed: boolean; error: string }>({ robot_id: null, lapsed: false, error: '' });
@@ -28,7 +31,10 @@ export class Session {
         is_signed_out: () => this.api.is_signed_out(),
         ...surroundings,
       },
-      (message) => this.store.hear(message),
+      (message) => {
+        if (message.type === 'problem') this.hold.lapse(); // the only message that it can be about, but for a stop
+        this.store.hear(message);
+      },
       () => this.on_phase(),
     );
     this.emergency = new EmergencyStop({
@@ -49,7 +55,7 @@ export class Session {
   start(): void {
     this.link.start();
     setInterval(() => this.refresh(), kRefresh_ms);
-    setInterval(() => this.link.send({ type: 'keep_alive' }), 1000);
+    setInterval(() => this.link.send({ type: 'keep_alive' }), kKeepAlive_ms);
     addEventListener('online', () => this.link.hurry());
     document.addEventListener('visibilitychange', () => {
       if (document.hidden) this.hold.release();
@@ -69,6 +75,18 @@ export class Session {
     this.hold.forget();
     void this.emergency.stop(null);
   };
+
+  // What /live does not tell: the station itself and the run that is open.
+  private async load(): Promise<void> {
+    try {
+      this.station.value = await this.api.station();
+      const robot_ids = this.store.robots.peek().map((robot) => robot.state.peek().robot_id);
+      const runs = await Promise.all(robot_ids.map((robot_id) => this.api.open_run(robot_id)));
+      this.store.set_runs(runs.filter((run) => run !== null));
+    } catch (error) {
+      this.store.note(error instanceof Error ? error.message : String(error));
+    }
+  }
 
   private refresh(): void {
     this.store.refresh();
@@ -92,6 +110,7 @@ export class Session {
       this.store.note('The live connection was lost.');
     } else if (now === 'live') {
       this.store.note('The live connection is up.');
+      void this.load();
     }
   }
 

@@ -3,8 +3,7 @@
 // One flow: /live message → Store.hear → rings and pending values → Store.refresh (10 Hz) → signals → views.
 
 import { batch, computed, signal, type Signal } from '@preact/signals';
-import type { CommandRecord, EventRecord, RobotState, RunRecord } from './api';
-import type { LiveMessage, SamplesMessage } from './live_messages';
+import type { CommandRecord, EventRecord, LiveMessage, RobotState, RunRecord, SamplesMessage } from './api';
 import { SampleRing } from './samples';
 
 export const kRefresh_ms = 100;
@@ -119,9 +118,9 @@ export class Robot {
 export class Store {
   readonly robots = signal<Robot[]>([]);
   readonly selected_id = signal<string | null>(null);
-  readonly selected = computed(() => this.robots.value.find((r) => r.state.value.id === this.selected_id.value) ?? null);
+  readonly selected = computed(() => this.robots.value.find((r) => r.state.value.robot_id === this.selected_id.value) ?? null);
   readonly log = signal<LogLine[]>([]);
-  readonly run = signal<RunRecord | null>(null);
+  readonly runs = signal<RunRecord[]>([]); // that are open, at most one for each robot
   readonly now_ms = signal(0); // page time, for ages
   private pending_log: LogLine[] = [];
   private notes = 0;
@@ -152,6 +151,9 @@ export class Store {
       case 'dropped':
         this.note(`This page was too slow: the station left out ${message.count} messages.`);
         break;
+      case 'problem':
+        this.note(`The station refused a message of this page: ${message.problem.detail}`);
+        break;
       case 'stamp':
         break;
     }
@@ -164,10 +166,13 @@ export class Store {
     this.write({ key: `note-${this.notes}`, at_ms, robot_id: '', event: null, command: null, note: text });
   }
 
+  set_runs(open: RunRecord[]): void {
+    this.runs.value = open;
+  }
+
   take_run(run: RunRecord): void {
-    const current = this.run.peek();
-    if (run.ended_at_ms === null) this.run.value = run;
-    else if (current?.id === run.id) this.run.value = null;
+    const others = this.runs.peek().filter((other) => other.run_id !== run.run_id);
+    this.runs.value = run.ended_at_us === null ? [...others, run] : others;
   }
 
   refresh(): void {
@@ -183,18 +188,18 @@ export class Store {
   }
 
   find(robot_id: string): Robot | undefined {
-    return this.robots.peek().find((robot) => robot.state.peek().id === robot_id);
+    return this.robots.peek().find((robot) => robot.state.peek().robot_id === robot_id);
   }
 
   private take_state(state: RobotState): void {
-    const known = this.find(state.id);
+    const known = this.find(state.robot_id);
     if (known) {
       known.state.value = state;
       this.select_by_itself();
       return;
     }
     const robots = [...this.robots.peek(), new Robot(state)];
-    this.robots.value = robots.sort((a, b) => a.state.peek().id.localeCompare(b.state.peek().id));
+    this.robots.value = robots.sort((a, b) => a.state.peek().robot_id.localeCompare(b.state.peek().robot_id));
     this.select_by_itself();
   }
 
@@ -209,7 +214,7 @@ export class Store {
     if (this.chosen || selected?.state.peek().link === 'connected') return;
     const robots = this.robots.peek();
     const best = robots.find((robot) => robot.state.peek().link === 'connected') ?? selected ?? robots[0];
-    this.selected_id.value = best?.state.peek().id ?? null;
+    this.selected_id.value = best?.state.peek().robot_id ?? null;
   }
 
   private write(line: LogLine): void {
@@ -237,5 +242,5 @@ function line_of_event(event: EventRecord): LogLine {
 
 function line_of_command(command: CommandRecord): LogLine {
   const at_ms = command.submitted_at_us / 1000;
-  return { key: `command-${command.id}`, at_ms, robot_id: command.robot_id, event: null, command, note: null };
+  return { key: `command-${command.command_id}`, at_ms, robot_id: command.robot_id, event: null, command, note: null };
 }
