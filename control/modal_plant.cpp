@@ -15,7 +15,7 @@ using std::numbers::pi;
 
 constexpr double kLowestLogRate = -10, kHighestLogRate = 12;  // of (4), rates in 1/s
 constexpr double kLargestLogStep = 0.12;
-constexpr double kSmallestPoleDistance_rad = 0.02;  // from the cut; nearer poles would need thousands of modes
+constexpr double kSmallestPoleDistanceRad = 0.02;  // from the cut; nearer poles would need thousands of modes
 
 [[noreturn]] void refuse(const char* what, double value) {
   std::ostringstream text;
@@ -127,7 +127,7 @@ void ModalPlant::add_fractional_order_modes(const FractionalModel& model) {
     if (angle_rad > pi) continue;
     add_complex_mode(std::exp(log_pole), model.gain_m_s / denominator_slope(model, log_pole));  // (3)
   }
-  if (distance_rad < kSmallestPoleDistance_rad) {
+  if (distance_rad < kSmallestPoleDistanceRad) {
     refuse("the nearest pole must keep 0.02 rad from the negative axis, its distance is", distance_rad);
   }
   const double wanted_step = std::min(kLargestLogStep, distance_rad * 2 * pi / std::log(1e8));

@@ -1,15 +1,17 @@
 // Drives a simulated robot through the experiment and measures what its telemetry says.
 #include "sim_robot/experiment.hpp"
 
+#include <cmath>
+
 #include "sim_robot/station_peer.hpp"
 
 namespace sim_robot {
 namespace {
 
-constexpr double kSetpoint_m = 0.1, kDisturbance_m = -0.05, kBand_m = 0.02 * kSetpoint_m;
-constexpr double kDisturbedAt_s = 20, kEnd_s = 40;
+constexpr double kSetpointM = 0.1, kDisturbanceM = -0.05, kBandM = 0.02 * kSetpointM;
+constexpr double kDisturbedAtS = 20, kEndS = 40;
 
-int ticks(double duration_s) { return static_cast<int>(duration_s / SimulatedRobot::kPeriod_s + 0.5); }
+int ticks(double duration_s) { return static_cast<int>(std::lround(duration_s / SimulatedRobot::kPeriodS)); }
 
 }  // namespace
 
@@ -18,10 +20,10 @@ ExperimentResult run_experiment(const SimulatedRobotConfig& config) {
   StationPeer station{robot};
   station.welcome.samples_per_frame = 1;  // so that the last sample is sent in its own tick
   station.connect();
-  station.send(set_auto(static_cast<float>(kSetpoint_m)));
-  station.run(ticks(kDisturbedAt_s));
-  station.send(inject_disturbance(static_cast<float>(kDisturbance_m)));
-  station.run(ticks(kEnd_s - kDisturbedAt_s) + 1);  // the sample at 40 s too
+  station.send(set_auto(static_cast<float>(kSetpointM)));
+  station.run(ticks(kDisturbedAtS));
+  station.send(inject_disturbance(static_cast<float>(kDisturbanceM)));
+  station.run(ticks(kEndS - kDisturbedAtS) + 1);  // the sample at 40 s too
   station.disconnect();
 
   ExperimentResult result;
@@ -30,9 +32,9 @@ ExperimentResult run_experiment(const SimulatedRobotConfig& config) {
     result.position_m.push_back(static_cast<double>(sample.position_m));
     result.duty.push_back(static_cast<double>(sample.duty));
   }
-  result.step = control::measure_step(result.time_s, result.position_m, {0, kDisturbedAt_s, 0, kSetpoint_m, kBand_m});
-  result.disturbance = control::measure_step(
-      result.time_s, result.position_m, {kDisturbedAt_s, kEnd_s, kSetpoint_m + kDisturbance_m, kSetpoint_m, kBand_m});
+  result.step = control::measure_step(result.time_s, result.position_m, {0, kDisturbedAtS, 0, kSetpointM, kBandM});
+  result.disturbance = control::measure_step(result.time_s, result.position_m,
+                                             {kDisturbedAtS, kEndS, kSetpointM + kDisturbanceM, kSetpointM, kBandM});
   return result;
 }
 

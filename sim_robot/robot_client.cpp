@@ -58,7 +58,7 @@ asio::awaitable<void> RobotClient::tick() {
     next_tick_at_ += kPeriod;
     flush();
     if (connected_ && robot_.core().connection_is_silent(robot_now_us())) {
-      say("the station is silent, dialling again");
+      say("the station is silent");
       close_connection();
     }
   }

@@ -9,9 +9,9 @@
 namespace sim_robot {
 namespace {
 
-constexpr float kImpedance_mv = 175;  // no glucose anywhere
-constexpr float kSupply_mv = 3000;    // a fresh CR123A
-constexpr int kRssi_dbm = -50;
+constexpr float kImpedanceMv = 175;  // no glucose anywhere
+constexpr float kSupplyMv = 3000;    // a fresh CR123A
+constexpr int kRssiDbm = -50;
 constexpr unsigned kImuCalibration = 3;  // the best the BNO055 reports
 
 robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
@@ -64,7 +64,7 @@ void check(const SimulatedRobotConfig& config) {
 }
 
 SimulatedRobot::SimulatedRobot(SimulatedRobotConfig config)
-    : config_(std::move(config)), core_(core_config(config_)), plant_(config_.model, kPeriod_s) {}
+    : config_(std::move(config)), core_(core_config(config_)), plant_(config_.model, kPeriodS) {}
 
 void SimulatedRobot::step() {
   robot_fw::Inputs inputs;
@@ -72,11 +72,11 @@ void SimulatedRobot::step() {
   inputs.position_m = static_cast<float>(plant_.position_m());
   inputs.velocity_m_s = static_cast<float>(plant_.velocity_m_s());
   inputs.acceleration_m_s2 = static_cast<float>(plant_.acceleration_m_s2());
-  inputs.impedance_mv = kImpedance_mv;
-  inputs.supply_mv = kSupply_mv;
-  inputs.rssi_dbm = kRssi_dbm;
+  inputs.impedance_mv = kImpedanceMv;
+  inputs.supply_mv = kSupplyMv;
+  inputs.rssi_dbm = kRssiDbm;
   inputs.imu_calibration = kImuCalibration;
-  const robot_fw::Outputs outputs = core_.step(inputs, static_cast<float>(kPeriod_s));
+  const robot_fw::Outputs outputs = core_.step(inputs, static_cast<float>(kPeriodS));
   plant_.step(static_cast<double>(outputs.duty));
   robot_time_us_ += kPeriodUs;
 }

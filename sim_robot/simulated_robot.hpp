@@ -31,13 +31,13 @@ std::uint64_t parse_boot_id(const std::string& text);
 class SimulatedRobot {
  public:
   static constexpr std::uint64_t kPeriodUs = 10'000;
-  static constexpr double kPeriod_s = 0.01;
+  static constexpr double kPeriodS = 0.01;
 
   explicit SimulatedRobot(SimulatedRobotConfig config);
   SimulatedRobot(const SimulatedRobot&) = delete;  // the core points into the config
   SimulatedRobot& operator=(const SimulatedRobot&) = delete;
 
-  void step();  // one tick of kPeriod_s
+  void step();  // one tick of kPeriodS
 
   // As of the core; times are robot times, see robot_fw/core/robot.hpp.
   void link_opened(std::uint64_t now_us) { core_.link_opened(now_us); }

@@ -23,9 +23,9 @@ Robot::Robot(const RobotConfig& config)
 }
 
 Outputs Robot::step(const Inputs& inputs, float dt_s) {
+  inputs_are_sound_ = sound(inputs, dt_s);
   watch_clock(inputs.robot_time_us, dt_s);
   inputs_ = inputs;
-  inputs_are_finite_ = all_finite(inputs, dt_s);
   worst_tick_us_ = std::max(worst_tick_us_, inputs.tick_us);
 
   watch_link();
@@ -34,8 +34,8 @@ Outputs Robot::step(const Inputs& inputs, float dt_s) {
 
   const Measured measured = read_perfect_sensor(inputs);
   const float wanted = wanted_duty(measured);
-  if (!inputs_are_finite_ || !std::isfinite(wanted)) {
-    // SAFETY: a value that is not a number stops the robot; one stop, not one per tick.
+  if (!inputs_are_sound_ || !std::isfinite(wanted)) {
+    // SAFETY: a value that is not a number, or a clock that goes back, stops the robot; once, not in every tick.
     if (!safety_.latched()) emergency(rheonaut_EMERGENCY_CAUSE_INTERNAL_ERROR, rheonaut_EVENT_CAUSE_INTERNAL, 0);
   }
   duty_ = safety_.permit(wanted);  // SAFETY: nothing after this line touches the duty
@@ -44,10 +44,10 @@ Outputs Robot::step(const Inputs& inputs, float dt_s) {
   return {duty_};
 }
 
-bool Robot::all_finite(const Inputs& inputs, float dt_s) const {
-  return std::isfinite(inputs.position_m) && std::isfinite(inputs.velocity_m_s) &&
-         std::isfinite(inputs.acceleration_m_s2) && std::isfinite(inputs.impedance_mv) &&
-         std::isfinite(inputs.supply_mv) && std::isfinite(dt_s) && dt_s > 0;
+bool Robot::sound(const Inputs& inputs, float dt_s) const {
+  return inputs.robot_time_us >= inputs_.robot_time_us && std::isfinite(inputs.position_m) &&
+         std::isfinite(inputs.velocity_m_s) && std::isfinite(inputs.acceleration_m_s2) &&
+         std::isfinite(inputs.impedance_mv) && std::isfinite(inputs.supply_mv) && std::isfinite(dt_s) && dt_s > 0;
 }
 
 Robot::Measured Robot::read_perfect_sensor(const Inputs& inputs) const {
@@ -56,7 +56,7 @@ Robot::Measured Robot::read_perfect_sensor(const Inputs& inputs) const {
 
 // Takes over the time of this tick; a missed tick is an event.
 void Robot::watch_clock(std::uint64_t robot_time_us, float dt_s) {
-  now_us_ = std::max(now_us_, robot_time_us);  // SAFETY: time never goes back, so nothing lives longer
+  now_us_ = std::max(now_us_, robot_time_us);  // frames may have come in after this tick was due
   const float stepped_s = static_cast<float>(now_us_ - inputs_.robot_time_us) * 1e-6F - dt_s;
   if (samples_.next_seq() > 0 && stepped_s > dt_s / 2) {
     note(rheonaut_EVENT_KIND_TIME_STEP, rheonaut_EVENT_CAUSE_TIME, stepped_s);
@@ -106,7 +106,7 @@ void Robot::record_sample(const Measured& measured, float dt_s) {
   sample.reference_m = pilot_.setpoint_m().value_or(0.0F);
   const bool usable_period = dt_s > 0 && dt_s < 1;
   const std::uint32_t period_us =
-      usable_period ? static_cast<std::uint32_t>(dt_s * 1e6F + 0.5F) : config_.sample_period_us;
+      usable_period ? static_cast<std::uint32_t>(std::lround(dt_s * 1e6F)) : config_.sample_period_us;
   const bool changed = samples_.push(sample, batch_values(), saturated_, now_us_, period_us);
   outbox_.sample_made(samples_, changed || sample_is_urgent_);
   sample_is_urgent_ = false;
@@ -126,7 +126,7 @@ BatchValues Robot::batch_values() const {
   unsigned flags = 0;
   if (link_.lost()) flags |= rheonaut_TELEMETRY_FLAG_LINK_LOSS;
   if (pilot_.lease_lapsed()) flags |= rheonaut_TELEMETRY_FLAG_LEASE_LAPSED;
-  if (!inputs_are_finite_) flags |= rheonaut_TELEMETRY_FLAG_SENSOR_FAULT;
+  if (!inputs_are_sound_) flags |= rheonaut_TELEMETRY_FLAG_SENSOR_FAULT;
   values.flags = static_cast<std::uint16_t>(flags);
   return values;
 }

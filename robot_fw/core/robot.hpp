@@ -69,7 +69,7 @@ class Robot {
 
   // The parts of a tick, in robot.cpp.
   Measured read_perfect_sensor(const Inputs& inputs) const;
-  bool all_finite(const Inputs& inputs, float dt_s) const;
+  bool sound(const Inputs& inputs, float dt_s) const;
   void watch_clock(std::uint64_t robot_time_us, float dt_s);
   void watch_link();
   void run_due_commands();
@@ -111,7 +111,7 @@ class Robot {
   RobotConfig config_;
   std::uint64_t now_us_ = 0;
   Inputs inputs_{};  // of the last tick
-  bool inputs_are_finite_ = true;
+  bool inputs_are_sound_ = true;
   float position_zero_m_ = 0;
   float duty_ = 0;
   bool saturated_ = false;

@@ -155,9 +155,8 @@ Verdict Robot::clear_emergency(std::uint64_t emergency_id, std::uint64_t command
   if (!safety_.latched() || emergency_id != safety_.emergency_id()) {
     return rejected(rheonaut_REJECT_REASON_OTHER_EMERGENCY);
   }
-  if (!inputs_are_finite_) return rejected(rheonaut_REJECT_REASON_CAUSE_STANDS);
-  safety_.clear(emergency_id);
-  stop_motion();  // SAFETY: manual, duty 0, no setpoint
+  if (!inputs_are_sound_) return rejected(rheonaut_REJECT_REASON_CAUSE_STANDS);
+  safety_.clear(emergency_id);  // into manual at rest: the stop ended every order, and the latch let none in
   note(rheonaut_EVENT_KIND_EMERGENCY_CLEARED, rheonaut_EVENT_CAUSE_COMMAND, 0, command_id);
   return kAccepted;
 }

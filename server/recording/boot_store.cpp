@@ -151,8 +151,10 @@ StoredBoot BootStore::load(std::int64_t boot_key, bool with_intervals) {
 
 void BootStore::start(const BootStart& start) {
   SQLite::Database& handle = database_.handle();
+  // One that was admitted and has not connected is not older than this one.
   SQLite::Statement others{handle,
-                           "SELECT boot_key FROM boot WHERE robot_id = ? AND boot_key <> ? AND ended_next_seq IS NULL"};
+                           "SELECT boot_key FROM boot WHERE robot_id = ? AND boot_key <> ?"
+                           " AND connected_at_us IS NOT NULL AND ended_next_seq IS NULL"};
   bind_all(others, start.robot_id, start.boot_key);
   std::vector<std::int64_t> ending;
   while (others.executeStep()) ending.push_back(others.getColumn(0).getInt64());
@@ -167,10 +169,11 @@ void BootStore::start(const BootStart& start) {
       " FROM run WHERE robot_id = ?1 AND ended_at_us IS NULL"
       " AND NOT EXISTS (SELECT 1 FROM run_span WHERE run_id = run.run_id AND last_seq IS NULL)"};
   execute(continue_run, start.robot_id, start.boot_key);
-  SQLite::Statement update{handle,
-                           "UPDATE boot SET ended_next_seq = NULL, announced_next_seq = max(announced_next_seq, ?),"
-                           " last_robot_time_us = max(last_robot_time_us, ?) WHERE boot_key = ?"};
-  execute(update, start.announced_next_seq, start.robot_time_us, start.boot_key);
+  SQLite::Statement update{
+      handle,
+      "UPDATE boot SET ended_next_seq = NULL, connected_at_us = ?, announced_next_seq = max(announced_next_seq, ?),"
+      " last_robot_time_us = max(last_robot_time_us, ?) WHERE boot_key = ?"};
+  execute(update, start.noticed_at_us, start.announced_next_seq, start.robot_time_us, start.boot_key);
 }
 
 void BootStore::end(std::int64_t boot_key, std::int64_t noticed_at_us) {

@@ -37,11 +37,21 @@ void set_up_blank(SQLite::Database& database) {
   database.exec("PRAGMA auto_vacuum = INCREMENTAL");
 }
 
+// synchronous=FULL: what is committed survives a power cut, so a commit may be acknowledged to the robot.
+void configure(SQLite::Database& database) {
+  database.exec("PRAGMA journal_mode = WAL");
+  database.exec("PRAGMA synchronous = FULL");
+  database.exec("PRAGMA foreign_keys = ON");
+  database.exec("PRAGMA wal_autocheckpoint = 16384");  // pages: 64 MB
+  database.exec("PRAGMA journal_size_limit = 67108864");
+}
+
 SQLite::Database open_checked(const std::filesystem::path& path) {
   try {
     SQLite::Database database{path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs};
     if (is_blank(database)) {
       set_up_blank(database);
+      configure(database);
       return database;
     }
     const std::int64_t application_id = pragma(database, "application_id");
@@ -55,6 +65,7 @@ SQLite::Database open_checked(const std::filesystem::path& path) {
       refuse(path, fmt::format("its schema is version {}, this program knows 1 to {}; a newer Rheonaut made it",
                                version, known));
     }
+    configure(database);
     return database;
   } catch (const SQLite::Exception& error) {
     if (error.getErrorCode() == SQLITE_NOTADB) refuse(path, "it is not an SQLite database");
@@ -62,20 +73,10 @@ SQLite::Database open_checked(const std::filesystem::path& path) {
   }
 }
 
-// synchronous=FULL: what is committed survives a power cut, so a commit may be acknowledged to the robot.
-void configure(SQLite::Database& database) {
-  database.exec("PRAGMA journal_mode = WAL");
-  database.exec("PRAGMA synchronous = FULL");
-  database.exec("PRAGMA foreign_keys = ON");
-  database.exec("PRAGMA wal_autocheckpoint = 16384");  // pages: 64 MB
-  database.exec("PRAGMA journal_size_limit = 67108864");
-}
-
 }  // namespace
 
 Database::Database(const std::filesystem::path& path) : handle_{open_checked(path)} {
   if (sodium_init() < 0) throw std::runtime_error{"libsodium cannot be initialised: the system gives no random bytes"};
-  configure(handle_);
   migrate(path);
   store_id_ = unsigned_id(handle_.execAndGet("SELECT value FROM meta WHERE name = 'store_id'"));
 }

@@ -26,6 +26,7 @@ CREATE TABLE boot (
   firmware_version TEXT NOT NULL,
   sample_period_us INTEGER NOT NULL,
   first_seen_at_us INTEGER NOT NULL,
+  connected_at_us INTEGER,              -- the latest time; NULL: admitted, but never connected
   announced_next_seq INTEGER NOT NULL,  -- from its latest Hello: the samples below were made
   last_robot_time_us INTEGER NOT NULL,  -- of the latest Hello or stored sample
   ended_next_seq INTEGER                -- set when a later boot of this robot connected; NULL: may go on

@@ -62,14 +62,14 @@ TEST(ModalPlant, GivesTheSameMotionForOneStepOfTenMillisecondsAsForTenOfOne) {
 }
 
 TEST(ModalPlant, AccelerationIsTheSlopeOfTheVelocity) {
-  constexpr double kFine_s = 1e-5;
-  ModalPlant plant{kNonNewtonianModel, kFine_s};
+  constexpr double kFineS = 1e-5;
+  ModalPlant plant{kNonNewtonianModel, kFineS};
   for (int i = 0; i < 5000; ++i) plant.step(kDuty);
   const double before = plant.velocity_m_s();
   plant.step(kDuty);
   const double acceleration = plant.acceleration_m_s2();
   plant.step(kDuty);
-  EXPECT_NEAR(acceleration, (plant.velocity_m_s() - before) / (2 * kFine_s), 1e-3 * std::abs(acceleration));
+  EXPECT_NEAR(acceleration, (plant.velocity_m_s() - before) / (2 * kFineS), 1e-3 * std::abs(acceleration));
 }
 
 TEST(ModalPlant, ApproachesItsGainForOtherOrdersToo) {

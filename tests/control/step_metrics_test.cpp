@@ -15,7 +15,7 @@
 namespace control {
 namespace {
 
-constexpr double kPeriod_s = 0.01, kTarget_m = 0.1, kDisturbance_m = -0.05, kDisturbedAt_s = 20;
+constexpr double kPeriodS = 0.01, kTargetM = 0.1, kDisturbanceM = -0.05, kDisturbedAtS = 20;
 
 struct Trajectory {
   std::vector<double> time_s, position_m;
@@ -25,13 +25,13 @@ struct Trajectory {
 Trajectory run_reference(const nlohmann::json& golden, const FractionalModel& model, double duty_min, double duty_max) {
   const std::vector<double> b = golden["controller_b"], a = golden["controller_a"];
   std::vector<double> memory(b.size(), 0);  // direct form II transposed
-  ModalPlant plant{model, kPeriod_s};
+  ModalPlant plant{model, kPeriodS};
   Trajectory trajectory;
   for (int k = 0; k < 4000; ++k) {
-    const double measured_m = plant.position_m() + (k >= 2000 ? kDisturbance_m : 0);
-    trajectory.time_s.push_back(k * kPeriod_s);
+    const double measured_m = plant.position_m() + (k >= 2000 ? kDisturbanceM : 0);
+    trajectory.time_s.push_back(k * kPeriodS);
     trajectory.position_m.push_back(measured_m);
-    const double error_m = kTarget_m - measured_m, duty = b[0] * error_m + memory[0];
+    const double error_m = kTargetM - measured_m, duty = b[0] * error_m + memory[0];
     for (std::size_t i = 1; i < b.size(); ++i) {
       memory[i - 1] = b[i] * error_m - a[i] * duty + (i + 1 < b.size() ? memory[i] : 0);
     }
@@ -59,8 +59,8 @@ TEST(StepMetrics, ReproducesTheReferenceClosedLoopTable) {
     const auto& model = row["plant"] == "Eq(29)" ? kNonNewtonianModel : kNewtonianModel;
     const double max = row["duty_limits"] == "none" ? 1e9 : 1, min = row["duty_limits"] == "0..1" ? 0 : -max;
     const Trajectory run = run_reference(golden, model, min, max);
-    const StepExperiment step{0, kDisturbedAt_s, 0, kTarget_m, 0.002};
-    const StepExperiment disturbance{kDisturbedAt_s, 40, kTarget_m + kDisturbance_m, kTarget_m, 0.002};
+    const StepExperiment step{0, kDisturbedAtS, 0, kTargetM, 0.002};
+    const StepExperiment disturbance{kDisturbedAtS, 40, kTargetM + kDisturbanceM, kTargetM, 0.002};
     expect_metrics(measure_step(run.time_s, run.position_m, step), row["step"]);
     expect_metrics(measure_step(run.time_s, run.position_m, disturbance), row["disturbance"]);
     ++checked;

@@ -219,6 +219,13 @@ TEST_F(BareRobot, StopsOnATimeStepThatIsNotFinite) {
   EXPECT_EQ(robot.mode(), rheonaut_MODE_EMERGENCY);
 }
 
+TEST_F(BareRobot, StopsWhenTheClockGoesBack) {
+  Inputs earlier = inputs();
+  earlier.robot_time_us -= 2 * kTickUs;
+  EXPECT_EQ(robot.step(earlier, 0.01F).duty, 0);
+  EXPECT_EQ(robot.mode(), rheonaut_MODE_EMERGENCY);
+}
+
 TEST_F(BareRobot, RefusesAClearWhileTheInputIsStillBroken) {
   Inputs broken = inputs();
   broken.position_m = std::numeric_limits<float>::quiet_NaN();

@@ -28,6 +28,12 @@ inline SampleContext manual_at_100_hz() {
   return context;
 }
 
+inline RunConditions named(std::string name) {
+  RunConditions conditions;
+  conditions.name = std::move(name);
+  return conditions;
+}
+
 // A robot that makes a sample every 10 ms; position_m of sample n is n/1000.
 struct TestRobot {
   RobotId id = "nemo";
@@ -50,6 +56,8 @@ struct Missing {
 
 class RecordingTest : public ::testing::Test {
  protected:
+  using Run = server::Run;  // and not testing::Test's
+
   RecordingTest();
   ~RecordingTest() override;
 
