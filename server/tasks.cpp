@@ -6,7 +6,10 @@
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/multiple_exceptions.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <boost/system/system_error.hpp>
+#include <csignal>
 
 namespace server {
 namespace asio = boost::asio;
@@ -57,6 +60,13 @@ void TaskGroup::stop() {
     const auto current = signal++;  // emitting may end the task, which erases its signal
     current->emit(asio::cancellation_type::terminal);
   }
+}
+
+asio::awaitable<void> TaskGroup::stop_on_signal() {
+  asio::signal_set signals{loop_, SIGINT, SIGTERM};
+  const int number = co_await signals.async_wait(asio::use_awaitable);
+  spdlog::info("stopping on {}", number == SIGINT ? "SIGINT" : "SIGTERM");
+  stop();
 }
 
 }  // namespace server

@@ -41,7 +41,7 @@ asio::awaitable<RestoredState> Recorder::open() {
     database_ = std::make_unique<Database>(options_.path);
     store_ = std::make_unique<SampleStore>(*database_);
     fail_unfinished_commands(*database_, utc_us);
-    return RestoredState{BootStore{*database_}.robots(), pending_stops(*database_)};
+    return RestoredState{database_->store_id(), BootStore{*database_}.robots(), pending_stops(*database_)};
   };
   co_return co_await disk_.run(std::move(job));
 }

@@ -1,0 +1,112 @@
+// The station's HTTP API as the page uses it: one function for each thing that is asked, errors as sentences.
+//
+// The types are generated from server/api/openapi.yaml (npm run types), so that a difference is a compile error.
+
+import type { components } from './api_types';
+
+type Schemas = components['schemas'];
+export type RobotState = Schemas['Robot'];
+export type CommandRecord = Schemas['Command'];
+export type CommandBody = Schemas['CommandBody'];
+export type EventRecord = Schemas['Event'];
+export type RunRecord = Schemas['Run'];
+export type Station = Schemas['Station'];
+export type SamplesMessage = Schemas['LiveSamples'];
+export type LiveMessage = Schemas['LiveServerMessage'];
+export type ClientMessage = Schemas['LiveClientMessage'];
+type Problem = Schemas['Problem'];
+
+// A refusal or failure. `message` is a sentence for the operator; `reason` the station's identifier, "" when unknown.
+export class ApiError extends Error {
+  constructor(
+    message: string,
+    readonly status: number, // 0: no answer at all
+    readonly reason = '',
+    readonly detail = '', // what the station says beyond the sentence
+  ) {
+    super(message);
+  }
+}
+
+const kReasons: Record<string, string> = {
+  malformed: 'The command was malformed.',
+  not_finite: 'That is not a finite number.',
+  out_of_range: 'Outside the range that is allowed.',
+  wrong_mode: 'Not possible in this mode.',
+  latched: 'The emergency stop is latched. Clear it first.',
+  other_emergency: 'Another emergency is in force than the one you meant to clear. Look again.',
+  cause_stands: 'The cause of the emergency still stands.',
+  life_too_long: 'The command would have lived too long.',
+  nothing_to_renew: 'The duty had ended already.',
+  motor_on: 'Not while the motor runs.',
+  outward: 'Outside the position limit: only motion inward is accepted.',
+  busy: 'Too many commands wait.',
+  unsupported: 'This firmware does not have it.',
+  not_connected: 'The robot is not connected.',
+  expired: 'It arrived too late and was discarded.',
+  superseded: 'A newer command took its place.',
+  link_lost: 'The link to the robot broke before it answered.',
+  other_boot: 'The robot restarted in between.',
+};
+
+// An identifier of a refusal as a sentence.
+export const sentence = (reason: string) => kReasons[reason] ?? reason.replaceAll('_', ' ');
+
+export type Fetch = (path: string, options: RequestInit) => Promise<Response>;
+
+const kPatience_ms = 6000;
+
+export class Api {
+  constructor(private readonly fetch: Fetch) {}
+
+  set_manual = (robot_id: string) => this.command(robot_id, { kind: 'set_mode', mode: 'manual' });
+  set_auto = (robot_id: string, setpoint_m: number) =>
+    this.command(robot_id, { kind: 'set_mode', mode: 'auto', setpoint_m });
+  set_setpoint = (robot_id: string, setpoint_m: number) => this.command(robot_id, { kind: 'set_setpoint', setpoint_m });
+  set_duty = (robot_id: string, duty: number) => this.command(robot_id, { kind: 'set_duty', duty });
+  zero_position = (robot_id: string) => this.command(robot_id, { kind: 'zero_position' });
+  clear_emergency = (robot_id: string, emergency_id: string) =>
+    this.command(robot_id, { kind: 'clear_emergency', emergency_id });
+
+  emergency_stop = async (robot_id: string) => [
+    await this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/emergency-stop`),
+  ];
+  emergency_stop_all = async () => (await this.ask<{ commands: CommandRecord[] }>('POST', '/emergency-stop')).commands;
+
+  station = () => this.ask<Station>('GET', '/station');
+  open_run = async (robot_id: string) => {
+    const path = `/runs?robot_id=${encodeURIComponent(robot_id)}&limit=1`;
+    const { runs } = await this.ask<{ runs: RunRecord[] }>('GET', path);
+    return runs.find((run) => run.ended_at_us === null) ?? null;
+  };
+  start_run = (robot_id: string, name: string, fluid: string) =>
+    this.ask<RunRecord>('POST', '/runs', { robot_id, name, fluid });
+  end_run = (run_id: number) => this.ask<RunRecord>('POST', `/runs/${run_id}/end`);
+
+  // True when the station answers that this page may not speak to it.
+  async is_signed_out(): Promise<boolean> {
+    return (await this.fetch('/api/v1/station', { method: 'GET' })).status === 401;
+  }
+
+  private command(robot_id: string, body: CommandBody): Promise<CommandRecord> {
+    return this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/commands`, body);
+  }
+
+  private async ask<Answer>(method: string, path: string, body?: object): Promise<Answer> {
+    const options: RequestInit = { method, signal: AbortSignal.timeout(kPatience_ms) };
+    if (body) Object.assign(options, { body: JSON.stringify(body), headers: { 'Content-Type': 'application/json' } });
+    const answer = await this.fetch(`/api/v1${path}`, options).catch(() => {
+      throw new ApiError('The station did not answer.', 0);
+    });
+    const content = (await answer.json().catch(() => null)) as unknown;
+    if (answer.ok && content !== null) return content as Answer;
+    throw error_of(answer.status, content as Partial<Problem> | null);
+  }
+}
+
+function error_of(status: number, problem: Partial<Problem> | null): ApiError {
+  const reason = problem?.reason ?? '';
+  const known = kReasons[reason];
+  const otherwise = problem?.detail || problem?.title || `The station answered ${status} without a reason.`;
+  return new ApiError(known ?? otherwise, status, reason, known ? (problem?.detail ?? '') : '');
+}

@@ -1,0 +1,45 @@
+// The quality of the link and the health of the robot, as a column of figures.
+
+import { count, milliseconds_of_us, percent, volts_of_mv } from '../format';
+import type { Robot } from '../store';
+
+export function LinkPanel({ robot }: { robot: Robot }) {
+  const state = robot.state.value;
+  const { received, missing, stale } = robot.readout.value;
+  const { status, clock } = state;
+  const lag = Math.max(0, state.next_seq - state.durable_next_seq);
+  const lost = status?.lost_samples ?? 0;
+  const fill = status && state.ring_capacity > 0 ? status.ring_fill / state.ring_capacity : null;
+  return (
+    <section class={`link-panel ${stale ? 'stale' : ''}`} aria-label="Link and health">
+      <h2>Link</h2>
+      <dl>
+        <Figure name="Round trip" unit="ms" value={milliseconds_of_us(clock?.round_trip_us)} />
+        <Figure name="Clock ±" unit="ms" value={milliseconds_of_us(clock?.uncertainty_us, 2)} title="Uncertainty of the robot's clock against the station's" />
+        <Figure name="Shown here" unit="" value={count(received)} title="Samples that this page has received" />
+        <Figure name="Missed here" unit="" value={count(missing)} tone={missing > 0 ? 'caution' : ''} title="Samples that this page has not received; the recording has its own count" />
+        <Figure name="Lost for good" unit="" value={count(lost)} tone={lost > 0 ? 'alarm' : ''} title="Overwritten on the robot before the station had them on disk" />
+        <Figure name="Not yet on disk" unit="" value={count(lag)} tone={lag > 200 ? 'caution' : ''} title="Samples received but not yet durable" />
+      </dl>
+      <h2>Robot</h2>
+      <dl>
+        <Figure name="Buffer" unit="%" value={percent(fill, 0)} tone={(fill ?? 0) > 0.8 ? 'caution' : ''} title="Fill of the robot's ring of samples" />
+        <Figure name="Supply" unit="V" value={volts_of_mv(status?.supply_mv)} />
+        <Figure name="Signal" unit="dBm" value={count(status?.rssi_dbm)} />
+        <Figure name="Missed ticks" unit="" value={count(status?.missed_ticks)} tone={(status?.missed_ticks ?? 0) > 0 ? 'caution' : ''} />
+      </dl>
+    </section>
+  );
+}
+
+function Figure(props: { name: string; unit: string; value: string; tone?: string; title?: string }) {
+  return (
+    <div class={props.tone ?? ''} title={props.title}>
+      <dt>{props.name}</dt>
+      <dd>
+        {props.value}
+        <span class="unit">{props.unit}</span>
+      </dd>
+    </div>
+  );
+}

@@ -1,0 +1,60 @@
+// The last events and commands, newest first.
+
+import { sentence } from '../api';
+import { clock_time, millimetres, percent, words } from '../format';
+import type { Session } from '../session';
+import type { LogLine } from '../store';
+
+export function LogStrip({ session }: { session: Session }) {
+  const lines = session.store.log.value;
+  return (
+    <section class="log-strip" aria-label="Events and commands">
+      <h2>Log</h2>
+      <ol tabIndex={0}>
+        {lines.length === 0 && <li class="quiet">Nothing yet.</li>}
+        {lines.map((line) => (
+          <Line key={line.key} line={line} />
+        ))}
+      </ol>
+    </section>
+  );
+}
+
+function Line({ line }: { line: LogLine }) {
+  const [tone, sort, text] = describe(line);
+  return (
+    <li class={tone}>
+      <time>{clock_time(line.at_ms)}</time>
+      <span class="who">{line.robot_id}</span>
+      <span class="sort">{sort}</span>
+      <span class="text">{text}</span>
+    </li>
+  );
+}
+
+function describe({ event, command, note }: LogLine): [tone: string, sort: string, text: string] {
+  if (command) {
+    const refused = ['rejected', 'expired', 'failed'].includes(command.state);
+    const alarm = command.kind === 'emergency_stop';
+    const end = refused ? `${command.state}: ${sentence(command.reason)}` : command.state;
+    return [refused ? 'caution' : alarm ? 'alarm' : '', 'command', `${words(command.kind)}${arguments_text(command.arguments)} · ${end}`];
+  }
+  if (event) {
+    const alarm = event.kind === 'emergency';
+    const where = event.kind === 'mode_changed' ? ` to ${event.mode}` : event.kind === 'sub_state_changed' ? ` to ${event.sub_state}` : '';
+    const cause = event.cause && event.cause !== 'none' ? ` · ${words(event.cause)}` : '';
+    const at = event.position_m !== null ? ` · at ${millimetres(event.position_m)} mm` : '';
+    return [alarm ? 'alarm' : /lost|fault|limit|lapsed/.test(event.kind) ? 'caution' : '', 'event', words(event.kind) + where + cause + at];
+  }
+  return ['quiet', 'page', note ?? ''];
+}
+
+function arguments_text(values: Record<string, unknown>): string {
+  return Object.entries(values)
+    .map(([name, value]) => {
+      if (typeof value === 'number' && name.endsWith('_m')) return ` ${millimetres(value)} mm`;
+      if (typeof value === 'number' && name === 'duty') return ` ${percent(value)} %`;
+      return name === 'emergency_id' ? ` …${String(value).slice(-6)}` : ` ${String(value)}`;
+    })
+    .join('');
+}

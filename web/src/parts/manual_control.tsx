@@ -1,0 +1,87 @@
+// Manual: a duty that runs while the key is held, the way back from auto, and zeroing of the position.
+
+import { useSignal } from '@preact/signals';
+import { percent, percent_to_duty } from '../format';
+import type { Session } from '../session';
+import type { Robot } from '../store';
+import { HeldButton } from './hold_button';
+import { OutcomeLine, useAsking } from './request';
+
+export function ManualControl({ session, robot }: { session: Session; robot: Robot }) {
+  const { robot_id, link } = robot.state.value;
+  const { mode, duty } = robot.readout.value;
+  const duty_percent = useSignal(20);
+  const asking = useAsking();
+  const in_manual = mode === 'manual';
+  const connected = link === 'connected';
+  const possible = connected && in_manual && session.phase.value === 'live';
+  const held = session.held.value;
+  const running = held.robot_id === robot_id;
+
+  return (
+    <fieldset class={`control manual ${in_manual ? 'engaged' : ''}`}>
+      <legend>Manual</legend>
+      {mode === 'auto' && (
+        <button
+          type="button"
+          class="primary"
+          id="to-manual"
+          disabled={!connected || asking.pending}
+          onClick={() => void asking.ask('Manual', () => session.api.set_manual(robot_id))}
+        >
+          Switch to manual, motor off
+        </button>
+      )}
+      <label for="duty-entry">
+        Duty <output class="figure">{percent(percent_to_duty(duty_percent.value), 0)} %</output>
+      </label>
+      <input
+        id="duty-entry"
+        class="duty-slider"
+        type="range"
+        min={-100}
+        max={100}
+        step={1}
+        list="duty-marks"
+        value={duty_percent.value}
+        onInput={(event) => {
+          duty_percent.value = event.currentTarget.valueAsNumber;
+          session.hold.change(percent_to_duty(duty_percent.value));
+        }}
+        onDblClick={() => (duty_percent.value = 0)}
+      />
+      <datalist id="duty-marks">
+        <option value={-100} />
+        <option value={0} />
+        <option value={100} />
+      </datalist>
+      <div class="pair">
+        <HeldButton
+          id="hold-to-run"
+          class={`hold-to-run ${running ? 'running' : ''}`}
+          disabled={!possible}
+          described_by="hold-outcome"
+          on_press={() => session.hold.press(robot_id, percent_to_duty(duty_percent.value))}
+          on_release={() => session.hold.release()}
+        >
+          {running ? 'Running: let go to stop' : 'Hold to run'}
+        </HeldButton>
+        <button
+          type="button"
+          id="zero-position"
+          disabled={!possible || duty !== 0 || asking.pending}
+          title="Only at duty 0"
+          onClick={() => void asking.ask('Zero position', () => session.api.zero_position(robot_id))}
+        >
+          Zero position
+        </button>
+      </div>
+      {(held.error || held.lapsed) && (
+        <p class="outcome failed" id="hold-outcome" role="alert">
+          {held.error || 'The link was too slow to keep the motor running. Let go, then press again.'}
+        </p>
+      )}
+      <OutcomeLine asking={asking} />
+    </fieldset>
+  );
+}

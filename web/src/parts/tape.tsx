@@ -1,0 +1,38 @@
+// A horizontal scale as on an altimeter tape: ticks, the robot as a pointer, reference and setpoint as bugs.
+
+import { useRef } from 'preact/hooks';
+import { next_range, range_splits, round_step } from '../chart';
+import { m_to_millimetres } from '../format';
+import type { Robot } from '../store';
+
+const kLeastSpan_m = 0.24;
+
+export function Tape({ robot }: { robot: Robot }) {
+  const { position_m, setpoint_m, reference_m, mode } = robot.readout.value;
+  const range = useRef<[number, number]>([-0.02, 0.22]);
+  const shown = [position_m, setpoint_m].filter((value) => value !== null);
+  const [low, high] = [Math.min(...shown, 0), Math.max(...shown, 0)];
+  range.current = next_range(range.current, low, high, kLeastSpan_m);
+  const [from, to] = range.current;
+  const place = (value_m: number) => `${(Math.max(0, Math.min(1, (value_m - from) / (to - from))) * 100).toFixed(3)}%`;
+  const major = range_splits(range.current);
+  const step = round_step((to - from) / 5) / 5;
+  const minor = Array.from({ length: Math.floor((to - from) / step) + 1 }, (_, i) => from + i * step);
+  return (
+    <div class="tape" aria-hidden="true">
+      <div class="ticks">
+        {minor.map((value_m) => (
+          <s key={value_m} style={{ left: place(value_m) }} />
+        ))}
+        {major.map((value_m) => (
+          <b key={value_m} style={{ left: place(value_m) }}>
+            <span>{Math.round(m_to_millimetres(value_m))}</span>
+          </b>
+        ))}
+      </div>
+      {reference_m !== null && mode === 'auto' && <i class="reference" style={{ left: place(reference_m) }} />}
+      {setpoint_m !== null && <i class="setpoint-bug" style={{ left: place(setpoint_m) }} />}
+      {position_m !== null && <i class="pointer" style={{ left: place(position_m) }} />}
+    </div>
+  );
+}

@@ -1,0 +1,58 @@
+// The top bar: whose page this is, whether it is live, what is being recorded, and the stop for every robot.
+
+import { age, duration } from '../format';
+import type { Session } from '../session';
+
+export function TopBar({ session }: { session: Session }) {
+  const { store, station } = session;
+  return (
+    <header class="top-bar">
+      <a class="wordmark" href="/api/v1/station" title="What the station says of itself" target="_blank" rel="noreferrer">
+        <svg viewBox="0 0 34 20" aria-hidden="true">
+          <path d="M1 12c4.5 0 4.5-8 9-8s4.5 8 9 8 4.5-8 9-8" />
+          <circle cx="19" cy="12" r="3.4" />
+        </svg>
+        Rheonaut
+      </a>
+      <span class="station quiet">{station.value ? `station ${station.value.version}` : ''}</span>
+      <ConnectionState session={session} />
+      <span class="recording" aria-live="polite">
+        {store.runs.value.map((run) => (
+          <span class="lamp recording-lamp" key={run.run_id}>
+            Run “{run.name}” <RunTime session={session} started_at_us={run.started_at_us} />
+          </span>
+        ))}
+      </span>
+      <button type="button" class="stop-all" onClick={session.stop_all}>
+        Stop all robots
+      </button>
+    </header>
+  );
+}
+
+function RunTime({ session, started_at_us }: { session: Session; started_at_us: number }) {
+  void session.store.now_ms.value; // ten times a second
+  return <time>{duration(Date.now() - started_at_us / 1000)}</time>;
+}
+
+function ConnectionState({ session }: { session: Session }) {
+  const phase = session.phase.value;
+  if (phase === 'live') {
+    return (
+      <span class="lamp good" role="status">
+        Live
+      </span>
+    );
+  }
+  return (
+    <span class="lamp caution" role="status">
+      {session.link.attempt === 0 ? 'Connecting' : 'Reconnecting'} <LostFor session={session} />
+    </span>
+  );
+}
+
+function LostFor({ session }: { session: Session }) {
+  const now_ms = session.store.now_ms.value;
+  const lost_at_ms = session.link.lost_at_ms;
+  return <time aria-hidden="true">{lost_at_ms === null ? '' : age(now_ms - lost_at_ms)}</time>;
+}

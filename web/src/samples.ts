@@ -1,0 +1,163 @@
+// The last minutes of one robot's samples in fixed memory, and the part of them that a plot shows.
+//
+// A slot is chosen by the sample's number, so a batch that is sent again later falls into its place and a lost sample
+// simply stays missing. Each boot of the robot counts from 0 again; `base` lines the boots up with one slot between
+// them. Times on the plot are page time in seconds (performance.now() / 1000), laid on the robot's own clock at the
+// first batch of a boot: the spacing of samples is the robot's, never that of their arrival.
+
+import type { SamplesMessage } from './api';
+
+export const kColumns = ['position_m', 'reference_m', 'setpoint_m', 'duty', 'impedance_mv', 'velocity_m_s'] as const;
+export type Column = (typeof kColumns)[number];
+
+
+// Consecutive samples further apart than this many periods are not joined by a line.
+const kGapPeriods = 1.5;
+// How fast the right edge may fall back when samples come later than they used to, in s per s.
+const kEdgeRelaxation = 0.02;
+
+export class SampleRing {
+  readonly capacity: number;
+  readonly time_s: Float64Array;
+  readonly columns: Record<Column, Float64Array>;
+  received = 0; // samples, without repetitions
+  private readonly slot_index: Float64Array; // the running index held by a slot, -1: none
+  private boot_id = '';
+  private base = 0; // running index = base + seq
+  private newest = -1; // highest running index
+  private time_base_s = 0; // page time = robot time + this
+  private lead_s = -Infinity; // how far the newest sample is ahead of page time
+  private lead_at_s = 0;
+  private period_s = 0.01;
+
+  constructor(capacity = 8192) {
+    this.capacity = capacity;
+    this.time_s = new Float64Array(capacity);
+    this.slot_index = new Float64Array(capacity).fill(-1);
+    this.columns = Object.fromEntries(kColumns.map((name) => [name, new Float64Array(capacity)])) as typeof this.columns;
+  }
+
+  // Lays a batch down; page_now_s is when it arrived.
+  append(batch: SamplesMessage, page_now_s: number): void {
+    const size = batch.position_m.length;
+    if (size === 0) return;
+    const last_robot_s = (batch.first_robot_time_us + (size - 1) * batch.period_us) / 1e6;
+    this.period_s = batch.period_us / 1e6;
+    if (batch.boot_id !== this.boot_id) {
+      this.boot_id = batch.boot_id;
+      this.base = this.newest + 2 - batch.first_seq;
+      if (this.newest < 0) this.base = 0;
+      this.time_base_s = page_now_s - last_robot_s;
+      this.lead_s = -Infinity;
+    }
+    const first = this.base + batch.first_seq;
+    for (let i = 0; i < size; ++i) {
+      const index = first + i;
+      if (index <= this.newest - this.capacity || index < 0) continue; // too old to be shown
+      const slot = index % this.capacity;
+      if (this.slot_index[slot] !== index) this.received += 1;
+      this.slot_index[slot] = index;
+      this.time_s[slot] = (batch.first_robot_time_us + i * batch.period_us) / 1e6 + this.time_base_s;
+      this.columns.position_m[slot] = batch.position_m[i] ?? NaN;
+      this.columns.reference_m[slot] = batch.reference_m[i] ?? NaN;
+      this.columns.setpoint_m[slot] = batch.setpoint_m ?? NaN;
+      this.columns.duty[slot] = batch.duty[i] ?? NaN;
+      this.columns.impedance_mv[slot] = batch.impedance_mv[i] ?? NaN;
+      this.columns.velocity_m_s[slot] = batch.velocity_m_s[i] ?? NaN;
+    }
+    if (first + size - 1 <= this.newest) return; // sent again: the edge is led by new samples alone
+    this.newest = first + size - 1;
+    const lead_s = last_robot_s + this.time_base_s - page_now_s;
+    const relaxed_s = this.lead_s - kEdgeRelaxation * (page_now_s - this.lead_at_s);
+    this.lead_s = Math.max(lead_s, relaxed_s);
+    this.lead_at_s = page_now_s;
+  }
+
+  // The time at the right edge of a plot that runs: new samples appear there, and it moves evenly between them.
+  edge_s(page_now_s: number): number {
+    return this.newest < 0 ? page_now_s : page_now_s + this.lead_s;
+  }
+
+  // Running indexes that may be held, oldest first; holds() tells which are.
+  get first_index(): number {
+    return Math.max(0, this.newest - this.capacity + 1);
+  }
+  get next_index(): number {
+    return this.newest + 1;
+  }
+  holds(index: number): boolean {
+    return index >= 0 && this.slot_index[index % this.capacity] === index;
+  }
+  get gap_s(): number {
+    return kGapPeriods * this.period_s;
+  }
+
+  clear(): void {
+    this.slot_index.fill(-1);
+    this.newest = -1;
+    this.boot_id = '';
+    this.received = 0;
+  }
+}
+
+// What a plot draws: times relative to the right edge, values without holes, and the stretches that are not drawn.
+export class PlotWindow {
+  readonly time_s: Float64Array;
+  readonly values: Float64Array[];
+  readonly gaps_s: [number, number][][];
+  private readonly in_hole: boolean[]; // the sample before had no value
+  size = 0;
+  low = 0; // over all columns
+  high = 0;
+
+  constructor(
+    capacity: number,
+    readonly names: readonly Column[],
+  ) {
+    this.time_s = new Float64Array(capacity);
+    this.values = names.map(() => new Float64Array(capacity));
+    this.gaps_s = names.map(() => []);
+    this.in_hole = names.map(() => false);
+  }
+
+  // Takes from the ring what lies in [edge - span, edge].
+  fill(ring: SampleRing, edge_s: number, span_s: number): void {
+    this.size = 0;
+    this.low = Infinity;
+    this.high = -Infinity;
+    for (const gaps of this.gaps_s) gaps.length = 0;
+    this.in_hole.fill(false);
+    let previous_s = -Infinity;
+    for (let index = ring.first_index; index < ring.next_index; ++index) {
+      if (!ring.holds(index)) continue;
+      const slot = index % ring.capacity;
+      const time_s = (ring.time_s[slot] ?? 0) - edge_s;
+      if (time_s < -span_s - ring.gap_s || time_s > ring.gap_s) continue;
+      if (time_s <= previous_s) continue; // a boot that overlaps the one before
+      this.put(ring, slot, time_s, time_s - previous_s > ring.gap_s && this.size > 0 ? previous_s : null);
+      previous_s = time_s;
+    }
+  }
+
+  private put(ring: SampleRing, slot: number, time_s: number, gap_from_s: number | null): void {
+    const at = this.size;
+    this.time_s[at] = time_s;
+    for (let c = 0; c < this.names.length; ++c) {
+      const name = this.names[c] as Column;
+      const values = this.values[c] as Float64Array;
+      const gaps = this.gaps_s[c] as [number, number][];
+      const value = ring.columns[name][slot] as number;
+      const last = gaps[gaps.length - 1];
+      if (gap_from_s !== null) gaps.push([gap_from_s, time_s]);
+      else if (this.in_hole[c] && last) last[1] = time_s;
+      const missing = !Number.isFinite(value);
+      if (missing && !this.in_hole[c]) gaps.push([time_s, time_s]);
+      this.in_hole[c] = missing;
+      values[at] = missing ? (at > 0 ? (values[at - 1] as number) : 0) : value; // a missing one lies in a gap
+      if (missing) continue;
+      this.low = Math.min(this.low, value);
+      this.high = Math.max(this.high, value);
+    }
+    this.size += 1;
+  }
+}

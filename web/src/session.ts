@@ -1,0 +1,121 @@
+// One running page: the store, the live link, the API and the controls that outlive a view, wired together.
+
+import { signal } from '@preact/signals';
+import { Api, type Station } from './api';
+import { DutyHold } from './duty_hold';
+import { EmergencyStop, kIdleStop } from './emergency';
+import { LiveLink, type LinkPhase, type Surroundings } from './live';
+import { kRefresh_ms, Store } from './store';
+
+const kKeepAlive_ms = 10_000; // the station drops a page that is silent for 30 s
+
+export class Session {
+  readonly api = new Api((path, options) => fetch(path, options));
+  readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => Date.now() });
+  readonly station = signal<Station | null>(null);
+  readonly phase = signal<LinkPhase>('connecting');
+  readonly stop_state = signal(kIdleStop);
+  readonly held = signal<{ robot_id: string | null; lapsed: boolean; error: string }>({ robot_id: null, lapsed: false, error: '' });
+  readonly link: LiveLink;
+  readonly emergency: EmergencyStop;
+  readonly hold: DutyHold;
+
+  constructor(surroundings: Partial<Surroundings> = {}) {
+    this.link = new LiveLink(
+      {
+        open_socket: () => new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/live`),
+        now_ms: () => performance.now(),
+        set_timer: (callback, delay_ms) => setTimeout(callback, delay_ms),
+        clear_timer: (timer) => clearTimeout(timer as number),
+        random: () => Math.random(),
+        is_signed_out: () => this.api.is_signed_out(),
+        ...surroundings,
+      },
+      (message) => {
+        if (message.type === 'problem') this.hold.lapse(); // the only message that it can be about, but for a stop
+        this.store.hear(message);
+      },
+      () => this.on_phase(),
+    );
+    this.emergency = new EmergencyStop({
+      over_socket: (robot_id) => this.link.send({ type: 'emergency_stop', robot_id }),
+      over_http: (robot_id) => (robot_id === null ? this.api.emergency_stop_all() : this.api.emergency_stop(robot_id)),
+      now_ms: () => performance.now(),
+      on_change: (state) => (this.stop_state.value = state),
+    });
+    this.hold = new DutyHold({
+      set_duty: (robot_id, duty) => this.api.set_duty(robot_id, duty),
+      renew_lease: (robot_id) => this.renew_lease(robot_id),
+      set_interval: (callback, period_ms) => setInterval(callback, period_ms),
+      clear_interval: (timer) => clearInterval(timer as number),
+      on_change: () => this.on_hold(),
+    });
+  }
+
+  start(): void {
+    this.link.start();
+    setInterval(() => this.refresh(), kRefresh_ms);
+    setInterval(() => this.link.send({ type: 'keep_alive' }), kKeepAlive_ms);
+    addEventListener('online', () => this.link.hurry());
+    document.addEventListener('visibilitychange', () => {
+      if (document.hidden) this.hold.release();
+      else this.link.hurry();
+    });
+    addEventListener('blur', () => this.hold.release());
+    addEventListener('pagehide', () => this.hold.release());
+  }
+
+  // Stops the robot that is looked at; without one, every robot.
+  stop_selected = (): void => {
+    this.hold.forget();
+    void this.emergency.stop(this.store.selected_id.peek());
+  };
+
+  stop_all = (): void => {
+    this.hold.forget();
+    void this.emergency.stop(null);
+  };
+
+  // What /live does not tell: the station itself and the run that is open.
+  private async load(): Promise<void> {
+    try {
+      this.station.value = await this.api.station();
+      const robot_ids = this.store.robots.peek().map((robot) => robot.state.peek().robot_id);
+      const runs = await Promise.all(robot_ids.map((robot_id) => this.api.open_run(robot_id)));
+      this.store.set_runs(runs.filter((run) => run !== null));
+    } catch (error) {
+      this.store.note(error instanceof Error ? error.message : String(error));
+    }
+  }
+
+  private refresh(): void {
+    this.store.refresh();
+    // A mode that takes no duty ended the hold; the hand has to press again.
+    const held_id = this.hold.robot_id;
+    if (held_id !== null && this.store.find(held_id)?.readout.peek().mode !== 'manual') this.hold.forget();
+  }
+
+  private renew_lease(robot_id: string): boolean {
+    const { link } = this;
+    if (!link.stamp_is_fresh() || link.stamp_us === null) return false;
+    return link.send({ type: 'renew_lease', robot_id, stamp_us: link.stamp_us });
+  }
+
+  private on_phase(): void {
+    const before = this.phase.peek();
+    const now = this.link.phase;
+    this.phase.value = now;
+    if (before === 'live') {
+      this.hold.release();
+      this.store.note('The live connection was lost.');
+    } else if (now === 'live') {
+      this.store.note('The live connection is up.');
+      void this.load();
+    }
+  }
+
+  private on_hold(): void {
+    const { robot_id, lapsed, error } = this.hold;
+    this.held.value = { robot_id, lapsed, error: error?.message ?? '' };
+  }
+}

@@ -1,0 +1,65 @@
+// The cockpit: one page with everything an operator watches and touches, and the stop always in reach.
+
+import { SignedOut } from './signed_out';
+import { AutoControl } from '../parts/auto_control';
+import { LinkPanel } from '../parts/link_panel';
+import { LogStrip } from '../parts/log_strip';
+import { ManualControl } from '../parts/manual_control';
+import { ModeAnnunciator } from '../parts/mode_annunciator';
+import { Plots } from '../parts/plots';
+import { Readouts } from '../parts/readouts';
+import { RobotList } from '../parts/robot_list';
+import { RunControl } from '../parts/run_control';
+import { StopPanel } from '../parts/stop_panel';
+import { TopBar } from '../parts/top_bar';
+import type { Session } from '../session';
+
+export function Cockpit({ session }: { session: Session }) {
+  if (session.phase.value === 'signed_out') return <SignedOut />;
+  const robot = session.store.selected.value;
+  const key = session.store.selected_id.value; // controls begin anew with another robot
+  return (
+    <div class="cockpit">
+      <TopBar session={session} />
+      <aside class="side">
+        <RobotList session={session} />
+        {robot && <LinkPanel robot={robot} />}
+      </aside>
+      <main class="scope" aria-label={robot ? `Robot ${key}` : 'No robot'}>
+        {robot ? (
+          <>
+            <ModeAnnunciator robot={robot} />
+            <Readouts robot={robot} />
+            <Plots robot={robot} />
+          </>
+        ) : (
+          <Waiting session={session} />
+        )}
+      </main>
+      <StopPanel session={session} />
+      <section class="controls" aria-label="Controls">
+        {robot && (
+          <>
+            <AutoControl key={`auto-${key}`} session={session} robot={robot} />
+            <ManualControl key={`manual-${key}`} session={session} robot={robot} />
+            <RunControl key={`run-${key}`} session={session} robot={robot} />
+          </>
+        )}
+      </section>
+      <LogStrip session={session} />
+    </div>
+  );
+}
+
+function Waiting({ session }: { session: Session }) {
+  const address = session.station.value?.robots_address;
+  return (
+    <div class="waiting">
+      <h2>No robot yet</h2>
+      <p>
+        Robots connect to the station by themselves{address && <>, at <code>{address}</code></>}. The first one that
+        does is shown here.
+      </p>
+    </div>
+  );
+}
