@@ -16,3 +16,4 @@ find_package(PkgConfig REQUIRED)
 pkg_check_modules(sodium REQUIRED IMPORTED_TARGET libsodium)
 find_program(PROTOC protoc REQUIRED)
 find_program(PROTOC_GEN_NANOPB protoc-gen-nanopb REQUIRED)
+find_program(PYTHON3 python3 REQUIRED)  # checks in tests/ use its standard library only

@@ -21,3 +21,6 @@ if(RHEONAUT_SANITIZE)
   endif()
   add_link_options(-fsanitize=${RHEONAUT_SANITIZE})
 endif()
+
+# Without it a precompiled header differs each time it is made, and the compiler cache never finds its users again.
+add_compile_options("$<$<COMPILE_LANG_AND_ID:CXX,Clang>:SHELL:-Xclang -fno-pch-timestamp>")

@@ -5,10 +5,29 @@
 
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/multiple_exceptions.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <boost/system/system_error.hpp>
+#include <csignal>
 
 namespace server {
 namespace asio = boost::asio;
+
+namespace {
+
+// `co_await (a || b)` throws both failures in one when it is cancelled; the first of them tells what happened.
+std::exception_ptr first_of(std::exception_ptr failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const asio::multiple_exceptions& both) {
+    return both.first_exception();
+  } catch (...) {
+    return failure;
+  }
+}
+
+}  // namespace
 
 void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
   if (stopping_) return;
@@ -22,7 +41,7 @@ void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
 
 void TaskGroup::ended(const std::string& name, std::exception_ptr failure) {
   try {
-    if (failure) std::rethrow_exception(failure);
+    if (failure) std::rethrow_exception(first_of(failure));
   } catch (const boost::system::system_error& error) {
     if (error.code() == asio::error::operation_aborted) return;
     spdlog::critical("{} failed: {}; stopping", name, error.what());
@@ -41,6 +60,13 @@ void TaskGroup::stop() {
     const auto current = signal++;  // emitting may end the task, which erases its signal
     current->emit(asio::cancellation_type::terminal);
   }
+}
+
+asio::awaitable<void> TaskGroup::stop_on_signal() {
+  asio::signal_set signals{loop_, SIGINT, SIGTERM};
+  const int number = co_await signals.async_wait(asio::use_awaitable);
+  spdlog::info("stopping on {}", number == SIGINT ? "SIGINT" : "SIGTERM");
+  stop();
 }
 
 }  // namespace server

@@ -5,8 +5,10 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/cancellation_signal.hpp>
+#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <list>
+#include <optional>
 #include <string>
 
 namespace server {
@@ -22,6 +24,9 @@ class TaskGroup {
   // Cancels every task; each ends at its next wait.
   void stop();
 
+  // A task that stops the group at SIGINT or SIGTERM.
+  boost::asio::awaitable<void> stop_on_signal();
+
   bool stopping() const { return stopping_; }
   int exit_code() const { return exit_code_; }
 
@@ -33,5 +38,30 @@ class TaskGroup {
   bool stopping_ = false;
   int exit_code_ = 0;
 };
+
+// Runs the loop until this one coroutine has ended, and gives its result or its exception: for what must be done before
+// the tasks start. Nothing else may be started on the loop yet.
+template <class T>
+T run_first(boost::asio::io_context& loop, boost::asio::awaitable<T> coroutine) {
+  std::optional<T> result;
+  std::exception_ptr failure;
+  auto on_end = [&](std::exception_ptr error, T value) {
+    failure = error;
+    if (!error) result = std::move(value);
+  };
+  boost::asio::co_spawn(loop, std::move(coroutine), on_end);
+  loop.run();
+  loop.restart();
+  if (failure) std::rethrow_exception(failure);
+  return std::move(*result);
+}
+
+inline void run_first(boost::asio::io_context& loop, boost::asio::awaitable<void> coroutine) {
+  std::exception_ptr failure;
+  boost::asio::co_spawn(loop, std::move(coroutine), [&](std::exception_ptr error) { failure = error; });
+  loop.run();
+  loop.restart();
+  if (failure) std::rethrow_exception(failure);
+}
 
 }  // namespace server

@@ -2,12 +2,18 @@
 //
 // Loop thread; the queries run on a worker with a read-only connection, each a page, so no read transaction lives long.
 // A query first lets the recorder commit what it has received, so an answer holds everything up to its question.
+// Needs a running Recorder, which has opened the database; recorder and worker outlive it.
 #pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
 
 #include <boost/asio/awaitable.hpp>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
+#include <string>
+#include <type_traits>
 #include <vector>
 
 #include "server/recording/runs.hpp"
@@ -62,6 +68,15 @@ class History {
   boost::asio::awaitable<std::vector<RobotEvent>> events(RobotId robot_id, std::size_t limit);
   boost::asio::awaitable<std::vector<CommandRecord>> commands(RobotId robot_id, std::size_t limit);
   boost::asio::awaitable<Result<CommandRecord>> command(CommandId id);
+
+ private:
+  template <class Query>
+  boost::asio::awaitable<std::invoke_result_t<Query, SQLite::Database&>> ask(Query query);
+
+  std::filesystem::path path_;
+  Recorder& recorder_;
+  WorkerThread& readers_;
+  std::unique_ptr<SQLite::Database> database_;  // opened by the first query; used on the readers' thread only
 };
 
 }  // namespace server

@@ -75,6 +75,26 @@ class Runs final : public StationSink {
 
   void on_robot(const RobotState& robot) override;
   void on_samples(const RobotState& robot, const SampleBatch& batch) override;
+
+ private:
+  // What a new run takes from its robot.
+  struct Robot {
+    bool connected = false;
+    BootId boot_id = 0;
+    std::string firmware_version;
+    std::uint32_t controller_id = 0;
+    std::uint32_t controller_checksum = 0;
+    std::uint32_t parameters_checksum = 0;
+  };
+
+  // How far each robot's boot has come; what the database does not know yet of an open span.
+  std::map<BootId, std::uint64_t> heads() const;
+  boost::asio::awaitable<std::optional<Run>> read(RunId id);
+
+  Clock& clock_;
+  Recorder& recorder_;
+  std::map<RobotId, Robot> robots_;
+  std::map<RobotId, RunId> open_runs_;  // 0: being created
 };
 
 }  // namespace server

@@ -13,14 +13,20 @@ class RobotPort {
  public:
   virtual ~RobotPort() = default;
 
-  // Queues a command. False when the bounded queue is full: the command was not taken.
-  virtual bool send(const protocol::Command& command) = 0;
+  virtual const RobotId& robot_id() const = 0;
+
+  // Queues a command, to be written before `deadline_us` (steady) or not at all. False when the bounded queue is full:
+  // the command was not taken.
+  virtual bool send(const protocol::Command& command, std::int64_t deadline_us) = 0;
 
   // SAFETY: written ahead of everything that waits; drops the queued commands it supersedes. Never refused.
   virtual void send_emergency_stop(const protocol::Command& command) = 0;
 
   // Everything of this boot below these numbers is durable or known lost.
   virtual void acknowledge(std::uint64_t durable_next_seq, std::uint64_t durable_next_event_seq) = 0;
+
+  // Asks for the samples [first_seq, next_seq) again.
+  virtual void request_resend(std::uint64_t first_seq, std::uint64_t next_seq) = 0;
 
   // Ends the connection; the reason is logged.
   virtual void close(const std::string& reason) = 0;

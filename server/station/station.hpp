@@ -14,21 +14,13 @@
 
 #include "server/clock.hpp"
 #include "server/result.hpp"
+#include "server/station/command_gate.hpp"
 #include "server/station/robot_archive.hpp"
 #include "server/station/robot_port.hpp"
 #include "server/station/station_sink.hpp"
 #include "server/station/station_state.hpp"
 
 namespace server {
-
-// What the station allows to be commanded, and for how long a command may live.
-struct CommandLimits {
-  double setpoint_min_m = -1.0;
-  double setpoint_max_m = 1.0;
-  double duty_min = -1.0;
-  double duty_max = 1.0;
-  double disturbance_max_m = 0.5;  // magnitude
-};
 
 struct LinkTimes {
   std::uint32_t link_timeout_ms = protocol::kDefaultLinkTimeoutMs;
@@ -91,16 +83,31 @@ class Station {
 
   void on_durable(const RobotId& id, BootId boot_id, std::uint64_t durable_next_seq,
                   std::uint64_t durable_next_event_seq);
+  void request_resend(const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t next_seq);
 
  private:
-  struct Seat;  // a robot's port and its commands on their way
+  struct PendingCommand;
+  struct Seat;  // a connected robot's port, and its commands on their way
+
+  Seat* seat_of(const RobotPort& port);  // null when the port's place was taken
+  Seat& add_seat(const RobotId& id);
+  std::int64_t robot_now_us(const RobotState& robot) const;
+  void publish(const RobotState& robot);
+  void publish(const CommandRecord& record);
+  void note(const RobotState& robot, std::string kind, std::string cause);
+
+  std::shared_ptr<PendingCommand> make_pending(const CommandRequest& request, const RobotState& robot);
+  void hand_stop_to(Seat& seat, const std::shared_ptr<PendingCommand>& stop);
+  void finish(Seat& seat, CommandId id, CommandState state, std::string reason);
+  void expire_commands(Seat& seat);
+  void settle_stops(Seat& seat, const protocol::CommandAck& ack);
 
   boost::asio::io_context& loop_;
   Clock& clock_;
   CommandLimits limits_;
   LinkTimes times_;
   std::map<RobotId, RobotState> robots_;
-  std::map<RobotId, std::unique_ptr<Seat>> seats_;
+  std::map<RobotId, Seat> seats_;  // one for each robot, connected or not
   std::vector<StationSink*> sinks_;
 };
 

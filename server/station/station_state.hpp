@@ -115,6 +115,9 @@ struct RobotState {
   ClockEstimate clock;
 
   std::optional<CommandId> pending_stop;  // an emergency stop that no robot has acknowledged yet
+
+  // The station's own latch: no motion command passes while it is set.
+  bool latched() const { return pending_stop.has_value() || context.emergency_id != 0; }
 };
 
 enum class CommandState : std::uint8_t {

@@ -1,0 +1,109 @@
+// Chooses the next message.
+#include "robot_fw/core/outbox.hpp"
+
+#include <algorithm>
+
+namespace robot_fw {
+namespace {
+
+using protocol::kMaxSamplesPerFrame;
+
+constexpr std::uint64_t kStatusPeriodUs = 1'000'000;
+constexpr std::uint64_t kMaxLiveBacklog = 100;  // samples; what is older is no longer live
+constexpr std::size_t kBackfillPerTick = 2;     // samples, against the one that is made
+constexpr std::size_t kMaxBackfillCredit = 2 * kMaxSamplesPerFrame;
+
+}  // namespace
+
+void SampleRun::extend(std::uint64_t from_seq, std::uint64_t to_seq) {
+  if (from_seq >= to_seq) return;
+  next_seq = empty() ? from_seq : std::min(next_seq, from_seq);
+  end_seq = std::max(end_seq, to_seq);
+}
+
+void Outbox::welcomed(const TelemetryRing& samples, const EventRing& events) {
+  backfill_ = {samples.oldest_seq(), samples.next_seq()};
+  backfill_credit_ = 0;
+  live_ = {samples.next_seq(), samples.next_seq()};
+  event_next_ = events.oldest_seq();
+  heartbeat_ = rheonaut_Heartbeat_init_zero;
+  status_due_us_ = 0;
+}
+
+void Outbox::ack(const protocol::CommandAck& ack) {
+  if (ack_count_ == kMaxAcks) {
+    first_ack_ = (first_ack_ + 1) % kMaxAcks;
+    --ack_count_;
+    if (stop_acks_ > 0) --stop_acks_;
+  }
+  acks_[(first_ack_ + ack_count_++) % kMaxAcks] = ack;
+}
+
+void Outbox::ack_stop(const protocol::CommandAck& ack) {
+  first_ack_ = (first_ack_ + kMaxAcks - 1) % kMaxAcks;
+  acks_[first_ack_] = ack;
+  ack_count_ = std::min(ack_count_ + 1, kMaxAcks);
+  stop_acks_ = std::min(stop_acks_ + 1, kMaxAcks);
+}
+
+void Outbox::echo(std::uint64_t station_time_us, std::uint64_t received_at_us) {
+  heartbeat_.echo_station_time_us = station_time_us;
+  heartbeat_.echo_received_at_robot_us = received_at_us;
+}
+
+void Outbox::sample_made(const TelemetryRing& samples, bool urgent) {
+  if (urgent) live_.end_seq = samples.next_seq();
+  if (samples.next_seq() > live_.next_seq + kMaxLiveBacklog) {
+    backfill_.extend(live_.next_seq, samples.next_seq() - 1);
+    live_.next_seq = samples.next_seq() - 1;
+  }
+  backfill_credit_ = std::min(backfill_credit_ + kBackfillPerTick, kMaxBackfillCredit);
+}
+
+// Skips what the rings have given up or the station has by now.
+void Outbox::catch_up(const TelemetryRing& samples, const EventRing& events) {
+  event_next_ = std::clamp(event_next_, events.oldest_seq(), events.next_seq());
+  live_.next_seq = std::max(live_.next_seq, samples.oldest_seq());
+  backfill_.next_seq = std::max(backfill_.next_seq, samples.oldest_seq());
+  backfill_.end_seq = std::min(backfill_.end_seq, samples.next_seq());
+}
+
+Outgoing Outbox::next(const Link& link, const TelemetryRing& samples, const EventRing& events,
+                      std::uint32_t samples_per_frame, std::uint64_t now_us) {
+  if (link.phase() == Link::Phase::closed) return Outgoing::none;
+  if (hello_due_) return Outgoing::hello;
+  if (stop_acks_ > 0) return Outgoing::ack;
+  if (!link.up()) return Outgoing::none;
+  catch_up(samples, events);
+  if (ack_count_ > 0) return Outgoing::ack;
+  if (event_next_ < events.next_seq()) return Outgoing::event;
+  const bool some_are_urgent = !live_.empty() && live_.next_seq < samples.next_seq();
+  if (some_are_urgent || samples.next_seq() - live_.next_seq >= samples_per_frame) return Outgoing::live;
+  if (now_us >= status_due_us_) return Outgoing::status;
+  if (heartbeat_.echo_station_time_us != 0 || link.heartbeat_due(now_us)) return Outgoing::heartbeat;
+  if (backfill_.empty()) return Outgoing::none;
+  const std::uint64_t wanted = std::min<std::uint64_t>(backfill_.end_seq - backfill_.next_seq, kMaxSamplesPerFrame);
+  return wanted <= backfill_credit_ ? Outgoing::backfill : Outgoing::none;
+}
+
+void Outbox::sent(Outgoing what, std::size_t samples_in_frame, std::uint64_t now_us) {
+  switch (what) {
+    case Outgoing::none: break;
+    case Outgoing::hello: hello_due_ = false; break;
+    case Outgoing::ack:
+      if (stop_acks_ > 0) --stop_acks_;
+      first_ack_ = (first_ack_ + 1) % kMaxAcks;
+      --ack_count_;
+      break;
+    case Outgoing::event: ++event_next_; break;
+    case Outgoing::live: live_.next_seq += samples_in_frame; break;
+    case Outgoing::status: status_due_us_ = now_us + kStatusPeriodUs; break;
+    case Outgoing::heartbeat: heartbeat_ = rheonaut_Heartbeat_init_zero; break;
+    case Outgoing::backfill:
+      backfill_.next_seq += samples_in_frame;
+      backfill_credit_ -= std::min(samples_in_frame, backfill_credit_);
+      break;
+  }
+}
+
+}  // namespace robot_fw

@@ -1,0 +1,75 @@
+// What is sent next: the order of the messages and the place each of them has reached.
+//
+// First to last: hello, acks of stops, acks, events, live samples, status, heartbeat, backfill. Backfill is what the
+// station lacks from before this connection or asks for again; it flows at no more than twice the rate of the live
+// samples.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "protocol/messages.hpp"
+#include "robot_fw/core/event_ring.hpp"
+#include "robot_fw/core/link.hpp"
+#include "robot_fw/core/telemetry_ring.hpp"
+
+namespace robot_fw {
+
+enum class Outgoing { none, hello, ack, event, live, status, heartbeat, backfill };
+
+// A run of samples still to be sent: [next_seq, end_seq).
+struct SampleRun {
+  std::uint64_t next_seq = 0;
+  std::uint64_t end_seq = 0;
+
+  bool empty() const { return next_seq >= end_seq; }
+  void extend(std::uint64_t from_seq, std::uint64_t to_seq);
+};
+
+class Outbox {
+ public:
+  static constexpr std::size_t kMaxAcks = 16;
+
+  // A new connection: hello first. Acks that were not sent stay due.
+  void opened() { hello_due_ = true; }
+  // The station is there: what the rings hold by now is backfill, what follows is live.
+  void welcomed(const TelemetryRing& samples, const EventRing& events);
+  void resend(std::uint64_t first_seq, std::uint64_t end_seq) { backfill_.extend(first_seq, end_seq); }
+  void resend_events(const EventRing& events) { event_next_ = events.oldest_seq(); }
+
+  // When the queue is full the oldest ack makes room; the station then asks by repeating the command.
+  void ack(const protocol::CommandAck& ack);
+  // Ahead of every other ack, and already before Welcome.
+  void ack_stop(const protocol::CommandAck& ack);
+  void echo(std::uint64_t station_time_us, std::uint64_t received_at_us);
+  // Once per tick, after the sample was made; `urgent` sends it, and all before it, at once.
+  void sample_made(const TelemetryRing& samples, bool urgent);
+
+  // The message due first; nothing changes until sent() confirms it.
+  Outgoing next(const Link& link, const TelemetryRing& samples, const EventRing& events,
+                std::uint32_t samples_per_frame, std::uint64_t now_us);
+  // The message that next() named was written. `samples_in_frame` counts for telemetry.
+  void sent(Outgoing what, std::size_t samples_in_frame, std::uint64_t now_us);
+
+  const protocol::CommandAck& first_ack() const { return acks_[first_ack_]; }
+  std::uint64_t event_seq() const { return event_next_; }
+  std::uint64_t live_seq() const { return live_.next_seq; }
+  const SampleRun& backfill() const { return backfill_; }
+  const protocol::Heartbeat& heartbeat() const { return heartbeat_; }
+
+ private:
+  void catch_up(const TelemetryRing& samples, const EventRing& events);
+
+  bool hello_due_ = false;
+  std::array<protocol::CommandAck, kMaxAcks> acks_{};
+  std::size_t first_ack_ = 0, ack_count_ = 0;
+  std::size_t stop_acks_ = 0;  // how many of them, the first ones, answer a stop
+  std::uint64_t event_next_ = 0;
+  SampleRun live_;  // end_seq: samples below it are due at once
+  SampleRun backfill_;
+  std::size_t backfill_credit_ = 0;  // samples that may be sent now
+  protocol::Heartbeat heartbeat_{};  // the answer to a clock probe, zero when none is due
+  std::uint64_t status_due_us_ = 0;
+};
+
+}  // namespace robot_fw

@@ -1,0 +1,82 @@
+// Keeps the order in force and lets it run out.
+#include "robot_fw/core/pilot.hpp"
+
+namespace robot_fw {
+namespace {
+
+std::uint64_t lease_end_us(std::uint32_t lease_ms, std::uint64_t now_us) {
+  return now_us + std::uint64_t{lease_ms == 0 ? protocol::kLeaseMs : lease_ms} * 1000;
+}
+
+}  // namespace
+
+Pilot::Pilot(float auto_limit_s) : auto_limit_us_(static_cast<std::uint64_t>(auto_limit_s) * 1'000'000) {}
+
+void Pilot::end_motion() {
+  manual_duty_ = 0;
+  lease_until_us_ = 0;
+  schedule_size_ = schedule_next_ = 0;
+  schedule_tick_ = 0;
+}
+
+void Pilot::halt() {
+  end_motion();
+  setpoint_m_.reset();
+  disturbance_m_ = 0;
+  lease_lapsed_ = false;
+}
+
+void Pilot::enter_auto(float setpoint_m, std::uint64_t now_us) {
+  halt();
+  setpoint_m_ = setpoint_m;
+  auto_until_us_ = now_us + auto_limit_us_;
+}
+
+void Pilot::set_duty(float duty, std::uint32_t lease_ms, std::uint64_t now_us) {
+  end_motion();
+  lease_lapsed_ = false;
+  manual_duty_ = duty;
+  if (duty != 0) lease_until_us_ = lease_end_us(lease_ms, now_us);
+}
+
+void Pilot::set_schedule(const rheonaut_SetDutySchedule& schedule, std::uint64_t now_us) {
+  end_motion();
+  lease_lapsed_ = false;
+  for (std::size_t i = 0; i < schedule.tick_count; ++i) schedule_[i] = {schedule.tick[i], schedule.duty[i]};
+  schedule_size_ = schedule.tick_count;
+  lease_until_us_ = lease_end_us(0, now_us);
+}
+
+bool Pilot::renew_lease(std::uint32_t lease_ms, std::uint64_t now_us) {
+  if (!motion_ordered() || now_us >= lease_until_us_) return false;  // SAFETY: what has lapsed stays lapsed
+  lease_until_us_ = lease_end_us(lease_ms, now_us);
+  return true;
+}
+
+Pilot::Lapse Pilot::tick(std::uint64_t now_us) {
+  if (is_auto()) {
+    if (now_us < auto_until_us_) return Lapse::none;
+    halt();  // SAFETY: auto ends by itself
+    return Lapse::auto_limit;
+  }
+  if (!motion_ordered()) return Lapse::none;
+  if (now_us >= lease_until_us_) {
+    end_motion();  // SAFETY: a manual duty or schedule that nobody renews ends
+    lease_lapsed_ = true;
+    return Lapse::lease;
+  }
+  return schedule_size_ > 0 && follow_schedule() ? Lapse::schedule : Lapse::none;
+}
+
+// Takes the duty due at this tick; true when that was the last entry.
+bool Pilot::follow_schedule() {
+  while (schedule_next_ < schedule_size_ && schedule_[schedule_next_].tick <= schedule_tick_) {
+    manual_duty_ = schedule_[schedule_next_++].duty;
+  }
+  ++schedule_tick_;
+  if (schedule_next_ < schedule_size_) return false;
+  end_motion();  // the last entry is 0
+  return true;
+}
+
+}  // namespace robot_fw

@@ -1,0 +1,66 @@
+// What the robot has been told to do: manual with a duty, or auto with a setpoint.
+//
+// Everything here dies with halt(): no setpoint, duty, lease, schedule or disturbance outlives a change of mode, an
+// emergency or a lost link.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "protocol/messages.hpp"
+
+namespace robot_fw {
+
+constexpr std::size_t kMaxScheduleEntries = 64;
+
+class Pilot {
+ public:
+  enum class Lapse { none, lease, schedule, auto_limit };
+
+  explicit Pilot(float auto_limit_s);
+
+  // Manual at duty 0 with nothing pending: the state after boot, and the end of every motion.
+  void halt();
+  void enter_auto(float setpoint_m, std::uint64_t now_us);
+  void set_setpoint(float setpoint_m) { setpoint_m_ = setpoint_m; }
+  void set_disturbance(float disturbance_m) { disturbance_m_ = disturbance_m; }
+  // A duty of 0 needs no lease and ends one.
+  void set_duty(float duty, std::uint32_t lease_ms, std::uint64_t now_us);
+  void set_schedule(const rheonaut_SetDutySchedule& schedule, std::uint64_t now_us);
+  // Extends a duty or schedule that still runs; false when there is none.
+  bool renew_lease(std::uint32_t lease_ms, std::uint64_t now_us);
+
+  // Once per tick, before the duty is asked for: ends what has run out and says so.
+  Lapse tick(std::uint64_t now_us);
+
+  bool is_auto() const { return setpoint_m_.has_value(); }
+  std::optional<float> setpoint_m() const { return setpoint_m_; }
+  float disturbance_m() const { return disturbance_m_; }
+  float manual_duty() const { return manual_duty_; }
+  bool lease_lapsed() const { return lease_lapsed_; }  // since the last order
+
+ private:
+  bool motion_ordered() const { return lease_until_us_ != 0; }
+  void end_motion();
+  bool follow_schedule();
+
+  std::uint64_t auto_limit_us_;
+  std::uint64_t auto_until_us_ = 0;
+  std::optional<float> setpoint_m_;  // present in auto, and only there
+  float disturbance_m_ = 0;
+  float manual_duty_ = 0;
+  bool lease_lapsed_ = false;
+  std::uint64_t lease_until_us_ = 0;  // 0: neither duty nor schedule runs
+
+  struct Entry {
+    std::uint32_t tick;
+    float duty;
+  };
+  std::array<Entry, kMaxScheduleEntries> schedule_{};
+  std::size_t schedule_size_ = 0;  // 0: no schedule
+  std::size_t schedule_next_ = 0;
+  std::uint32_t schedule_tick_ = 0;
+};
+
+}  // namespace robot_fw

@@ -1,0 +1,170 @@
+// The tick: sensor, link, orders, controller, safety, telemetry.
+#include "robot_fw/core/robot.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace robot_fw {
+
+Robot::Robot(const RobotConfig& config)
+    : config_(config),
+      pilot_(config.auto_limit_s),
+      safety_({config.duty_min, config.duty_max}, config.boot_id),
+      gate_(config.boot_id) {
+  note(rheonaut_EVENT_KIND_BOOT, rheonaut_EVENT_CAUSE_RESET, 0);
+  const bool suspicious_reset =
+      config.reset_cause == rheonaut_RESET_CAUSE_WATCHDOG || config.reset_cause == rheonaut_RESET_CAUSE_BROWN_OUT;
+  if (config.restored_emergency_id != 0) {
+    safety_.restore(config.restored_emergency_id, config.restored_emergency_cause);  // SAFETY: a reset clears nothing
+    note(rheonaut_EVENT_KIND_EMERGENCY, rheonaut_EVENT_CAUSE_RESET, 0);
+  } else if (suspicious_reset) {
+    emergency(rheonaut_EMERGENCY_CAUSE_RESET, rheonaut_EVENT_CAUSE_RESET, 0);  // SAFETY: comes up latched
+  }
+}
+
+Outputs Robot::step(const Inputs& inputs, float dt_s) {
+  inputs_are_sound_ = sound(inputs, dt_s);
+  watch_clock(inputs.robot_time_us, dt_s);
+  inputs_ = inputs;
+  worst_tick_us_ = std::max(worst_tick_us_, inputs.tick_us);
+
+  watch_link();
+  run_due_commands();
+  let_orders_run_out();
+
+  const Measured measured = read_perfect_sensor(inputs);
+  const float wanted = wanted_duty(measured);
+  if (!inputs_are_sound_ || !std::isfinite(wanted)) {
+    // SAFETY: a value that is not a number, or a clock that goes back, stops the robot; once, not in every tick.
+    if (!safety_.latched()) emergency(rheonaut_EMERGENCY_CAUSE_INTERNAL_ERROR, rheonaut_EVENT_CAUSE_INTERNAL, 0);
+  }
+  duty_ = safety_.permit(wanted);  // SAFETY: nothing after this line touches the duty
+  saturated_ = !safety_.latched() && duty_ != wanted;
+  record_sample(measured, dt_s);
+  return {duty_};
+}
+
+bool Robot::sound(const Inputs& inputs, float dt_s) const {
+  return inputs.robot_time_us >= inputs_.robot_time_us && std::isfinite(inputs.position_m) &&
+         std::isfinite(inputs.velocity_m_s) && std::isfinite(inputs.acceleration_m_s2) &&
+         std::isfinite(inputs.impedance_mv) && std::isfinite(inputs.supply_mv) && std::isfinite(dt_s) && dt_s > 0;
+}
+
+Robot::Measured Robot::read_perfect_sensor(const Inputs& inputs) const {
+  return {inputs.position_m - position_zero_m_ + pilot_.disturbance_m(), inputs.velocity_m_s, inputs.acceleration_m_s2};
+}
+
+// Takes over the time of this tick; a missed tick is an event.
+void Robot::watch_clock(std::uint64_t robot_time_us, float dt_s) {
+  now_us_ = std::max(now_us_, robot_time_us);  // frames may have come in after this tick was due
+  const float stepped_s = static_cast<float>(now_us_ - inputs_.robot_time_us) * 1e-6F - dt_s;
+  if (samples_.next_seq() > 0 && stepped_s > dt_s / 2) {
+    note(rheonaut_EVENT_KIND_TIME_STEP, rheonaut_EVENT_CAUSE_TIME, stepped_s);
+  }
+}
+
+void Robot::watch_link() {
+  if (!link_.goes_lost(now_us_)) return;
+  note(rheonaut_EVENT_KIND_LINK_LOST, rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
+  const bool was_auto = pilot_.is_auto();
+  stop_motion();  // SAFETY: nobody is there to stop it
+  drop_timed_commands({rheonaut_COMMAND_RESULT_EXPIRED});
+  if (was_auto) note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
+}
+
+void Robot::run_due_commands() {
+  protocol::Command command;
+  while (timed_.take_due(now_us_, command)) run_timed_command(command);
+}
+
+void Robot::let_orders_run_out() {
+  const float duty_before = pilot_.manual_duty();
+  switch (pilot_.tick(now_us_)) {
+    case Pilot::Lapse::none: break;
+    case Pilot::Lapse::lease: note(rheonaut_EVENT_KIND_LEASE_LAPSED, rheonaut_EVENT_CAUSE_TIME, duty_before); break;
+    case Pilot::Lapse::schedule: note(rheonaut_EVENT_KIND_DUTY_SCHEDULE_ENDED, rheonaut_EVENT_CAUSE_TIME, 0); break;
+    case Pilot::Lapse::auto_limit:
+      note(rheonaut_EVENT_KIND_AUTO_LIMIT, rheonaut_EVENT_CAUSE_TIME, config_.auto_limit_s);
+      note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_TIME, 0);
+      drop_timed_commands(rejected(rheonaut_REJECT_REASON_WRONG_MODE));
+      break;
+  }
+}
+
+float Robot::wanted_duty(const Measured& measured) {
+  const auto setpoint_m = pilot_.setpoint_m();
+  return setpoint_m ? controller_.step(*setpoint_m - measured.position_m) : pilot_.manual_duty();
+}
+
+void Robot::record_sample(const Measured& measured, float dt_s) {
+  Sample sample;
+  sample.position_m = measured.position_m;
+  sample.velocity_m_s = measured.velocity_m_s;
+  sample.acceleration_m_s2 = measured.acceleration_m_s2;
+  sample.duty = duty_;
+  sample.impedance_mv = inputs_.impedance_mv;
+  sample.reference_m = pilot_.setpoint_m().value_or(0.0F);
+  const bool usable_period = dt_s > 0 && dt_s < 1;
+  const std::uint32_t period_us =
+      usable_period ? static_cast<std::uint32_t>(std::lround(dt_s * 1e6F)) : config_.sample_period_us;
+  const bool changed = samples_.push(sample, batch_values(), saturated_, now_us_, period_us);
+  outbox_.sample_made(samples_, changed || sample_is_urgent_);
+  sample_is_urgent_ = false;
+}
+
+BatchValues Robot::batch_values() const {
+  BatchValues values;
+  values.emergency_id = safety_.emergency_id();
+  values.emergency_cause = static_cast<std::uint8_t>(safety_.cause());
+  values.mode = static_cast<std::uint8_t>(mode());
+  values.sub_state =
+      static_cast<std::uint8_t>(pilot_.is_auto() ? rheonaut_SUB_STATE_NAVIGATING : rheonaut_SUB_STATE_NONE);
+  values.has_setpoint = pilot_.setpoint_m().has_value();
+  values.setpoint_m = pilot_.setpoint_m().value_or(0.0F);
+  values.disturbance_m = pilot_.disturbance_m();
+  values.controller_id = controller_.controller_id();
+  unsigned flags = 0;
+  if (link_.lost()) flags |= rheonaut_TELEMETRY_FLAG_LINK_LOSS;
+  if (pilot_.lease_lapsed()) flags |= rheonaut_TELEMETRY_FLAG_LEASE_LAPSED;
+  if (!inputs_are_sound_) flags |= rheonaut_TELEMETRY_FLAG_SENSOR_FAULT;
+  values.flags = static_cast<std::uint16_t>(flags);
+  return values;
+}
+
+protocol::Mode Robot::mode() const {
+  if (safety_.latched()) return rheonaut_MODE_EMERGENCY;
+  return pilot_.is_auto() ? rheonaut_MODE_AUTO : rheonaut_MODE_MANUAL;
+}
+
+// The motor is off from here on, not only from the next tick.
+void Robot::stop_motion() {
+  pilot_.halt();
+  controller_.reset();
+  duty_ = 0;
+}
+
+void Robot::emergency(protocol::EmergencyCause cause, protocol::EventCause event_cause, std::uint64_t command_id) {
+  safety_.latch(cause);
+  stop_motion();  // SAFETY: off at once, also between ticks
+  drop_timed_commands(rejected(rheonaut_REJECT_REASON_LATCHED));
+  note(rheonaut_EVENT_KIND_EMERGENCY, event_cause, 0, command_id);
+}
+
+void Robot::note(protocol::EventKind kind, protocol::EventCause cause, float value, std::uint64_t command_id) {
+  protocol::Event event = rheonaut_Event_init_zero;
+  event.event_robot_time_us = now_us_;
+  event.kind = kind;
+  event.cause = cause;
+  event.sample_seq = samples_.next_seq();
+  event.mode = mode();
+  event.sub_state = pilot_.is_auto() ? rheonaut_SUB_STATE_NAVIGATING : rheonaut_SUB_STATE_NONE;
+  event.position_m = read_perfect_sensor(inputs_).position_m;
+  event.value = value;
+  event.emergency_id = safety_.emergency_id();
+  event.command_id = command_id;
+  event.emergency_cause = safety_.cause();
+  events_.push(event);
+  sample_is_urgent_ = true;
+}
+
+}  // namespace robot_fw

@@ -1,0 +1,135 @@
+// The whole robot: a tick, bytes in, bytes out.
+//
+//   step()      one tick, 100 Hz: sensor, link, orders, controller, safety, telemetry
+//   receive()   bytes from the station, at any time between ticks; an emergency stop acts in here
+//   transmit()  bytes to the station, at any time between ticks; never waits
+// The port (a simulated robot, an ESP8266) owns the clock, the connection and the motor pin. After every call it puts
+// duty() on the motor.
+#pragma once
+
+#include "protocol/frame.hpp"
+#include "robot_fw/core/commands.hpp"
+#include "robot_fw/core/controller.hpp"
+#include "robot_fw/core/event_ring.hpp"
+#include "robot_fw/core/hardware_io.hpp"
+#include "robot_fw/core/link.hpp"
+#include "robot_fw/core/outbox.hpp"
+#include "robot_fw/core/pilot.hpp"
+#include "robot_fw/core/safety.hpp"
+#include "robot_fw/core/telemetry_ring.hpp"
+
+namespace robot_fw {
+
+struct RobotConfig {
+  const char* robot_id = "";          // 1 to 31 characters of [a-z0-9_-]; must outlive the robot, as all text here
+  const char* token = "";             // at most 71 characters
+  const char* firmware_version = "";  // at most 23 characters
+  std::uint64_t boot_id = 0;          // random, new in each boot, never 0
+  protocol::ResetCause reset_cause = rheonaut_RESET_CAUSE_POWER_ON;
+  float duty_min = -1;                  // in [-1, 0]
+  float duty_max = 1;                   // in (0, 1]
+  float setpoint_limit_m = 1;           // setpoints and disturbances lie in [-limit, limit]
+  float auto_limit_s = 600;             // auto ends by itself after this
+  std::uint32_t samples_per_frame = 5;  // 1 to 25; the station may ask for another
+  std::uint32_t sample_period_us = 10'000;
+  std::uint64_t restored_emergency_id = 0;  // a latch that the port's memory kept over the reset; 0: none
+  protocol::EmergencyCause restored_emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;
+};
+
+class Robot {
+ public:
+  explicit Robot(const RobotConfig& config);
+
+  Outputs step(const Inputs& inputs, float dt_s);
+
+  void link_opened(std::uint64_t now_us);
+  void link_closed(std::uint64_t now_us);
+  // False when the connection must be closed: it speaks something else, or the station refused it.
+  bool receive(protocol::Bytes bytes, std::uint64_t now_us);
+  // Writes the message due first to `out`, one whole frame; 0 when none is due or it does not fit.
+  std::size_t transmit(std::uint8_t* out, std::size_t capacity, std::uint64_t now_us);
+  // The station has been silent on an open connection for the time-out: close it and dial again.
+  bool connection_is_silent(std::uint64_t now_us) const { return link_.connection_is_silent(now_us); }
+
+  float duty() const { return duty_; }
+  protocol::Mode mode() const;
+  std::uint64_t emergency_id() const { return safety_.emergency_id(); }
+  bool link_up() const { return link_.up(); }
+  bool link_lost() const { return link_.lost(); }
+  // Why the station refused the last connection; the detail is for people.
+  protocol::RefusalReason refusal() const { return refusal_; }
+  const char* refusal_detail() const { return refusal_detail_.data(); }
+
+ private:
+  struct Measured {
+    float position_m;
+    float velocity_m_s;
+    float acceleration_m_s2;
+  };
+
+  // The parts of a tick, in robot.cpp.
+  Measured read_perfect_sensor(const Inputs& inputs) const;
+  bool sound(const Inputs& inputs, float dt_s) const;
+  void watch_clock(std::uint64_t robot_time_us, float dt_s);
+  void watch_link();
+  void run_due_commands();
+  void let_orders_run_out();
+  float wanted_duty(const Measured& measured);
+  void record_sample(const Measured& measured, float dt_s);
+  BatchValues batch_values() const;
+  void stop_motion();
+  void emergency(protocol::EmergencyCause cause, protocol::EventCause event_cause, std::uint64_t command_id);
+  void note(protocol::EventKind kind, protocol::EventCause cause, float value, std::uint64_t command_id = 0);
+
+  // Commands, in robot_commands.cpp.
+  void on_command(const protocol::Command& command);
+  void on_emergency_stop(const protocol::Command& command);
+  protocol::CommandAck ack_for(const protocol::Command& command, Verdict verdict, std::uint64_t effect_at_us) const;
+  void answer(const protocol::Command& command, Verdict verdict);
+  void run_timed_command(const protocol::Command& command);
+  void drop_timed_commands(Verdict verdict);
+  Verdict execute(const protocol::Command& command);
+  Verdict set_mode(const rheonaut_SetMode& order, std::uint64_t command_id);
+  Verdict set_setpoint(float setpoint_m, std::uint64_t command_id);
+  Verdict set_duty(const rheonaut_SetDuty& order);
+  Verdict renew_lease(const rheonaut_RenewLease& order);
+  Verdict set_duty_schedule(const rheonaut_SetDutySchedule& order);
+  Verdict clear_emergency(std::uint64_t emergency_id, std::uint64_t command_id);
+  Verdict inject_disturbance(float disturbance_m, std::uint64_t command_id);
+  Verdict zero_position(std::uint64_t command_id);
+  Verdict check_position(float position_m) const;
+
+  // Frames in and out, in robot_frames.cpp.
+  bool on_frame(protocol::Bytes payload);
+  bool on_welcome(const protocol::Welcome& welcome);
+  void on_heartbeat(const protocol::StationHeartbeat& heartbeat);
+  void station_heard();
+  void fill(Outgoing what, protocol::RobotFrame& frame) const;
+  void fill_hello(protocol::Hello& hello) const;
+  void fill_status(protocol::Status& status) const;
+
+  RobotConfig config_;
+  std::uint64_t now_us_ = 0;
+  Inputs inputs_{};  // of the last tick
+  bool inputs_are_sound_ = true;
+  float position_zero_m_ = 0;
+  float duty_ = 0;
+  bool saturated_ = false;
+  bool sample_is_urgent_ = false;  // something happened since the last one
+
+  Pilot pilot_;
+  Controller controller_{kPaperController};
+  Safety safety_;
+  CommandGate gate_;
+  TimedCommands timed_;
+  TelemetryRing samples_;
+  EventRing events_;
+  Link link_;
+  Outbox outbox_;
+  std::uint32_t bad_frames_ = 0;
+  std::uint32_t worst_tick_us_ = 0;  // since the last status
+  protocol::RefusalReason refusal_ = rheonaut_REFUSAL_REASON_NONE;
+  std::array<char, sizeof(protocol::Welcome::detail)> refusal_detail_{};
+};
+
+}  // namespace robot_fw

@@ -1,0 +1,183 @@
+// What each command does, and when it is refused.
+#include <algorithm>
+#include <cmath>
+
+#include "robot_fw/core/robot.hpp"
+
+namespace robot_fw {
+namespace {
+
+// The commands that cannot move the motor, and the one that ends an emergency.
+bool allowed_when_latched(const protocol::Command& command) {
+  switch (command.which_action) {
+    case rheonaut_Command_emergency_stop_tag:
+    case rheonaut_Command_clear_emergency_tag:
+    case rheonaut_Command_set_parameter_tag:
+    case rheonaut_Command_get_parameters_tag:
+    case rheonaut_Command_ping_tag: return true;
+    default: return false;
+  }
+}
+
+}  // namespace
+
+void Robot::on_command(const protocol::Command& command) {
+  if (command.which_action == rheonaut_Command_emergency_stop_tag) return on_emergency_stop(command);
+  const Verdict verdict = gate_.admit(command, now_us_);
+  if (!verdict.accepted()) return answer(command, verdict);
+  const bool later = command.has_execute_at_robot_us && command.execute_at_robot_us > now_us_;
+  if (!later) return answer(command, execute(command));
+  if (safety_.latched() && !allowed_when_latched(command))
+    return answer(command, rejected(rheonaut_REJECT_REASON_LATCHED));
+  if (!timed_.hold(command)) return answer(command, rejected(rheonaut_REJECT_REASON_BUSY));
+  outbox_.ack(ack_for(command, kAccepted, command.execute_at_robot_us));
+}
+
+// SAFETY: a stop asks for no boot, no life, no mode and no id, and acts before this returns.
+void Robot::on_emergency_stop(const protocol::Command& command) {
+  const bool repeated = command.command_id != 0 && !gate_.remember(command.command_id);
+  if (repeated && safety_.latched()) {
+    return outbox_.ack_stop(ack_for(command, {rheonaut_COMMAND_RESULT_DUPLICATE}, 0));
+  }
+  emergency(rheonaut_EMERGENCY_CAUSE_OPERATOR, rheonaut_EVENT_CAUSE_COMMAND, command.command_id);
+  outbox_.ack_stop(ack_for(command, kAccepted, now_us_));
+}
+
+protocol::CommandAck Robot::ack_for(const protocol::Command& command, Verdict verdict,
+                                    std::uint64_t effect_at_us) const {
+  protocol::CommandAck ack = rheonaut_CommandAck_init_zero;
+  ack.command_id = command.command_id;
+  ack.result = verdict.result;
+  ack.reason = verdict.reason;
+  ack.effect_at_robot_us = effect_at_us;
+  ack.emergency_id = safety_.emergency_id();
+  return ack;
+}
+
+void Robot::answer(const protocol::Command& command, Verdict verdict) {
+  outbox_.ack(ack_for(command, verdict, verdict.accepted() ? now_us_ : 0));
+  if (verdict.accepted()) sample_is_urgent_ = true;
+}
+
+// The ack went out when the command was taken in; a second one is only due when nothing came of it.
+void Robot::run_timed_command(const protocol::Command& command) {
+  const Verdict verdict = execute(command);
+  if (!verdict.accepted()) answer(command, verdict);
+}
+
+void Robot::drop_timed_commands(Verdict verdict) {
+  protocol::Command command;
+  while (timed_.take_any(command)) answer(command, verdict);
+}
+
+Verdict Robot::execute(const protocol::Command& command) {
+  if (safety_.latched() && !allowed_when_latched(command)) return rejected(rheonaut_REJECT_REASON_LATCHED);
+  const std::uint64_t id = command.command_id;
+  switch (command.which_action) {
+    case rheonaut_Command_set_mode_tag: return set_mode(command.action.set_mode, id);
+    case rheonaut_Command_set_setpoint_tag: return set_setpoint(command.action.set_setpoint.setpoint_m, id);
+    case rheonaut_Command_set_duty_tag: return set_duty(command.action.set_duty);
+    case rheonaut_Command_renew_lease_tag: return renew_lease(command.action.renew_lease);
+    case rheonaut_Command_set_duty_schedule_tag: return set_duty_schedule(command.action.set_duty_schedule);
+    case rheonaut_Command_clear_emergency_tag: return clear_emergency(command.action.clear_emergency.emergency_id, id);
+    case rheonaut_Command_inject_disturbance_tag:
+      return inject_disturbance(command.action.inject_disturbance.disturbance_m, id);
+    case rheonaut_Command_zero_position_tag: return zero_position(id);
+    case rheonaut_Command_ping_tag: return kAccepted;
+    default: return rejected(rheonaut_REJECT_REASON_UNSUPPORTED);
+  }
+}
+
+Verdict Robot::check_position(float position_m) const {
+  if (!std::isfinite(position_m)) return rejected(rheonaut_REJECT_REASON_NOT_FINITE);
+  if (std::fabs(position_m) > config_.setpoint_limit_m) return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
+  return kAccepted;
+}
+
+Verdict Robot::set_mode(const rheonaut_SetMode& order, std::uint64_t command_id) {
+  const bool to_auto = order.mode == rheonaut_MODE_AUTO;
+  const bool known = to_auto || order.mode == rheonaut_MODE_MANUAL;
+  if (!known || order.has_setpoint_m != to_auto) return rejected(rheonaut_REJECT_REASON_MALFORMED);
+  if (to_auto) {
+    const Verdict verdict = check_position(order.setpoint_m);
+    if (!verdict.accepted()) return verdict;
+  }
+  const protocol::Mode before = mode();
+  stop_motion();  // SAFETY: nothing outlives a change of mode
+  drop_timed_commands(rejected(rheonaut_REJECT_REASON_WRONG_MODE));
+  if (to_auto) pilot_.enter_auto(order.setpoint_m, now_us_);
+  if (mode() != before) note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, 0, command_id);
+  if (to_auto) {
+    note(rheonaut_EVENT_KIND_SETPOINT_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, order.setpoint_m, command_id);
+  }
+  return kAccepted;
+}
+
+Verdict Robot::set_setpoint(float setpoint_m, std::uint64_t command_id) {
+  const Verdict verdict = check_position(setpoint_m);
+  if (!verdict.accepted()) return verdict;
+  if (!pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
+  pilot_.set_setpoint(setpoint_m);
+  note(rheonaut_EVENT_KIND_SETPOINT_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, setpoint_m, command_id);
+  return kAccepted;
+}
+
+Verdict Robot::set_duty(const rheonaut_SetDuty& order) {
+  if (!std::isfinite(order.duty)) return rejected(rheonaut_REJECT_REASON_NOT_FINITE);
+  if (!safety_.range().contains(order.duty) || order.lease_ms > protocol::kLeaseMs) {
+    return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
+  }
+  if (pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
+  pilot_.set_duty(order.duty, order.lease_ms, now_us_);
+  return kAccepted;
+}
+
+Verdict Robot::renew_lease(const rheonaut_RenewLease& order) {
+  if (order.lease_ms > protocol::kLeaseMs) return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
+  const bool renewed = pilot_.renew_lease(order.lease_ms, now_us_);
+  return renewed ? kAccepted : rejected(rheonaut_REJECT_REASON_NOTHING_TO_RENEW);
+}
+
+Verdict Robot::set_duty_schedule(const rheonaut_SetDutySchedule& order) {
+  if (order.tick_count == 0 || order.tick_count != order.duty_count) return rejected(rheonaut_REJECT_REASON_MALFORMED);
+  for (pb_size_t i = 0; i < order.duty_count; ++i) {
+    if (!std::isfinite(order.duty[i])) return rejected(rheonaut_REJECT_REASON_NOT_FINITE);
+    if (!safety_.range().contains(order.duty[i])) return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
+    if (i > 0 && order.tick[i] <= order.tick[i - 1]) return rejected(rheonaut_REJECT_REASON_MALFORMED);
+  }
+  if (order.duty[order.duty_count - 1] != 0) return rejected(rheonaut_REJECT_REASON_MALFORMED);
+  if (pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
+  pilot_.set_schedule(order, now_us_);
+  return kAccepted;
+}
+
+Verdict Robot::clear_emergency(std::uint64_t emergency_id, std::uint64_t command_id) {
+  if (!safety_.latched() || emergency_id != safety_.emergency_id()) {
+    return rejected(rheonaut_REJECT_REASON_OTHER_EMERGENCY);
+  }
+  if (!inputs_are_sound_) return rejected(rheonaut_REJECT_REASON_CAUSE_STANDS);
+  safety_.clear(emergency_id);  // into manual at rest: the stop ended every order, and the latch let none in
+  note(rheonaut_EVENT_KIND_EMERGENCY_CLEARED, rheonaut_EVENT_CAUSE_COMMAND, 0, command_id);
+  return kAccepted;
+}
+
+Verdict Robot::inject_disturbance(float disturbance_m, std::uint64_t command_id) {
+  const Verdict verdict = check_position(disturbance_m);
+  if (!verdict.accepted()) return verdict;
+  if (!pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
+  pilot_.set_disturbance(disturbance_m);
+  note(rheonaut_EVENT_KIND_DISTURBANCE, rheonaut_EVENT_CAUSE_COMMAND, disturbance_m, command_id);
+  return kAccepted;
+}
+
+Verdict Robot::zero_position(std::uint64_t command_id) {
+  if (pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
+  if (duty_ != 0 || pilot_.manual_duty() != 0) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
+  const float before_m = read_perfect_sensor(inputs_).position_m;
+  if (!std::isfinite(before_m)) return rejected(rheonaut_REJECT_REASON_NOT_FINITE);
+  position_zero_m_ = inputs_.position_m;
+  note(rheonaut_EVENT_KIND_POSITION_ZEROED, rheonaut_EVENT_CAUSE_COMMAND, before_m, command_id);
+  return kAccepted;
+}
+
+}  // namespace robot_fw

@@ -1,0 +1,49 @@
+// Latches, clears and limits.
+#include "robot_fw/core/safety.hpp"
+
+#include <cmath>
+
+namespace robot_fw {
+namespace {
+
+// splitmix64: neighbouring inputs give unrelated outputs (Steele, Lea and Flood 2014).
+std::uint64_t mix(std::uint64_t value) {
+  value += 0x9E3779B97F4A7C15U;
+  value = (value ^ (value >> 30)) * 0xBF58476D1CE4E5B9U;
+  value = (value ^ (value >> 27)) * 0x94D049BB133111EBU;
+  return value ^ (value >> 31);
+}
+
+}  // namespace
+
+Safety::Safety(DutyRange range, std::uint64_t boot_id) : range_(range), boot_id_(boot_id) {}
+
+void Safety::latch(protocol::EmergencyCause cause) {
+  const std::uint64_t before = emergency_id_;
+  do {
+    emergency_id_ = mix(boot_id_ ^ mix(++stops_));
+  } while (emergency_id_ == 0 || emergency_id_ == before);  // SAFETY: never the id that a clear may name already
+  cause_ = cause;
+}
+
+void Safety::restore(std::uint64_t emergency_id, protocol::EmergencyCause cause) {
+  emergency_id_ = emergency_id;
+  cause_ = cause;
+}
+
+bool Safety::clear(std::uint64_t emergency_id) {
+  if (!latched() || emergency_id != emergency_id_) return false;  // SAFETY: a clear never undoes a later stop
+  emergency_id_ = 0;
+  cause_ = rheonaut_EMERGENCY_CAUSE_NONE;
+  return true;
+}
+
+float Safety::permit(float wanted_duty) const {
+  if (latched()) return 0;                          // SAFETY: emergency overrides every mode; it coasts
+  if (!std::isfinite(wanted_duty)) return 0;        // SAFETY: no NaN reaches the motor
+  if (wanted_duty < range_.min) return range_.min;  // SAFETY: within the motor's range
+  if (wanted_duty > range_.max) return range_.max;
+  return wanted_duty;
+}
+
+}  // namespace robot_fw

@@ -1,0 +1,47 @@
+// Everything that people and scripts reach by HTTP: the port, the credentials, the routes, /live and the cockpit.
+//
+// Loop thread. What it is given outlives it; it outlives its connections, which are tasks of the group.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "server/api/http_server.hpp"
+#include "server/api/routes.hpp"
+
+namespace server {
+
+struct ApiOptions {
+  boost::asio::ip::tcp::endpoint endpoint;  // port 0: any free one
+  bool or_any_port = false;                 // a taken port is replaced by a free one
+  std::filesystem::path data_dir;           // rheonaut.token lives here; must exist
+  std::vector<std::string> hosts;           // further names for the Host header
+  std::string version;
+  std::uint64_t store_id = 0;
+  std::string robots_address;  // "127.0.0.1:7070", for people
+};
+
+class ApiServer {
+ public:
+  // Opens the port and makes the token. Throws when either is not possible.
+  ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clock, const ApiOptions& options, Station& station,
+            LiveFeed& live, Runs& runs, History& history);
+
+  boost::asio::awaitable<void> run() { return server_.run(); }
+
+  std::uint16_t port() const { return listener_.endpoint().port(); }
+  std::string address() const;  // "127.0.0.1:8080"
+  std::string login_url();      // a link that lets one page in, for 10 minutes
+
+ private:
+  Listener listener_;
+  Auth auth_;
+  RequestGuard guard_;
+  ApiParts parts_;
+  LiveParts live_;
+  Router router_;
+  HttpServer server_;
+};
+
+}  // namespace server

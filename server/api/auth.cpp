@@ -1,0 +1,134 @@
+// Makes, keeps and compares secrets.
+#include "server/api/auth.hpp"
+
+#include <fcntl.h>
+#include <sodium.h>
+#include <spdlog/spdlog.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+
+namespace server {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kSecretBytes = 32;
+constexpr std::size_t kSecretText = sodium_base64_ENCODED_LEN(kSecretBytes, sodium_base64_VARIANT_URLSAFE_NO_PADDING);
+
+std::string random_secret() {
+  unsigned char bytes[kSecretBytes];
+  randombytes_buf(bytes, sizeof bytes);
+  char text[kSecretText];
+  sodium_bin2base64(text, sizeof text, bytes, sizeof bytes, sodium_base64_VARIANT_URLSAFE_NO_PADDING);
+  return text;
+}
+
+bool is_secret(const std::string& text) {
+  unsigned char bytes[kSecretBytes];
+  std::size_t size = 0;
+  return sodium_base642bin(bytes, sizeof bytes, text.data(), text.size(), nullptr, &size, nullptr,
+                           sodium_base64_VARIANT_URLSAFE_NO_PADDING) == 0 &&
+         size == kSecretBytes;
+}
+
+[[noreturn]] void cannot(const char* what, const fs::path& file) {
+  throw std::runtime_error{std::string{"cannot "} + what + " " + file.string() + ": " + std::strerror(errno)};
+}
+
+// The whole file or nothing appears under its name, readable by its owner only from the first moment.
+void write_secret(const fs::path& file, const std::string& secret) {
+  const fs::path temporary = file.string() + ".new";
+  fs::remove(temporary);
+  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
+  if (descriptor < 0) cannot("create", temporary);
+  const std::string line = secret + "\n";
+  const bool written =
+      ::write(descriptor, line.data(), line.size()) == static_cast<ssize_t>(line.size()) && ::fsync(descriptor) == 0;
+  const int error = errno;
+  ::close(descriptor);
+  errno = error;
+  if (!written) cannot("write", temporary);
+  fs::rename(temporary, file);
+}
+
+std::string load_or_make_token(const fs::path& file) {
+  std::string token;
+  std::ifstream in{file};
+  std::getline(in, token);
+  if (is_secret(token)) {
+    struct stat status{};
+    if (::stat(file.c_str(), &status) != 0) cannot("look at", file);
+    if ((status.st_mode & 077U) != 0) {
+      spdlog::warn("{} was readable by others (mode {:o}); now it is not", file.string(), status.st_mode & 0777U);
+      if (::chmod(file.c_str(), 0600) != 0) cannot("protect", file);
+    }
+    return token;
+  }
+  if (fs::exists(file)) spdlog::warn("{} held no valid token; a new one was made", file.string());
+  token = random_secret();
+  write_secret(file, token);
+  return token;
+}
+
+}  // namespace
+
+Auth::Auth(Clock& clock, const fs::path& data_dir) : clock_{clock} {
+  if (sodium_init() < 0) throw std::runtime_error{"libsodium cannot start: no source of random numbers"};
+  token_ = hash_of(load_or_make_token(data_dir / "rheonaut.token"));
+}
+
+Auth::Hash Auth::hash_of(const std::string& secret) {
+  Hash hash{};
+  crypto_generichash(hash.data(), hash.size(), reinterpret_cast<const unsigned char*>(secret.data()), secret.size(),
+                     nullptr, 0);
+  return hash;
+}
+
+bool Auth::same(const Hash& a, const Hash& b) { return sodium_memcmp(a.data(), b.data(), a.size()) == 0; }
+
+void Auth::forget_expired() {
+  const auto expired = [now_us = clock_.steady_us()](const Secret& secret) { return secret.ends_at_us <= now_us; };
+  codes_.remove_if(expired);
+  sessions_.remove_if(expired);
+}
+
+std::string Auth::new_login_code() {
+  forget_expired();
+  if (codes_.size() >= kMaxLoginCodes) codes_.pop_front();
+  const std::string code = random_secret();
+  codes_.push_back({hash_of(code), clock_.steady_us() + kLoginCodeLife.count(), 0});
+  return code;
+}
+
+std::optional<std::string> Auth::log_in(const std::string& code) {
+  forget_expired();
+  const Hash hash = hash_of(code);
+  const auto used = codes_.remove_if([&hash](const Secret& secret) { return same(secret.hash, hash); });
+  if (used == 0) return std::nullopt;
+  if (sessions_.size() >= kMaxSessions) sessions_.pop_front();
+  const std::string session = random_secret();
+  sessions_.push_back({hash_of(session), clock_.steady_us() + kSessionLife.count(), next_session_++});
+  return session;
+}
+
+std::optional<std::string> Auth::actor_of_token(const std::string& token) const {
+  if (!same(hash_of(token), token_)) return std::nullopt;
+  return "token:local";
+}
+
+std::optional<std::string> Auth::actor_of_session(const std::string& secret) const {
+  const Hash hash = hash_of(secret);
+  for (const Secret& session : sessions_) {
+    if (same(session.hash, hash) && session.ends_at_us > clock_.steady_us()) {
+      return "session:" + std::to_string(session.number);
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace server

@@ -1,0 +1,22 @@
+// Emergency stops on behalf of people: one robot, or all of them at once.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/station/station.hpp"
+#include "server/tasks.hpp"
+
+namespace server {
+
+// How long a stop waits for the robot's answer before the asker is told that it is kept.
+inline constexpr microseconds kStopPatience{1'500'000};
+
+// A robot that is not connected cannot answer: its stop is kept and the asker is told at once.
+boost::asio::awaitable<Result<CommandRecord>> stop_robot(Station& station, RobotId robot_id, std::string actor);
+
+// SAFETY: every robot's stop is on its way before the answer of any is waited for.
+boost::asio::awaitable<std::vector<CommandRecord>> stop_all_robots(boost::asio::io_context& loop, TaskGroup& tasks,
+                                                                   Station& station, std::string actor);
+
+}  // namespace server

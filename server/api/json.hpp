@@ -1,0 +1,76 @@
+// JSON of the API: bodies of requests checked member by member, and what was recorded as JSON.
+//
+// Errors: bad_request for what is not JSON or has a wrong form, invalid for a value out of range or an unknown kind;
+// each sentence names the member and quotes the value.
+#pragma once
+
+#include <initializer_list>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "server/clock.hpp"
+#include "server/live/state_json.hpp"
+#include "server/recording/history.hpp"
+#include "server/result.hpp"
+
+namespace server {
+
+// The one table from ErrorCode to HTTP status.
+int http_status(ErrorCode code);
+
+// The members of one JSON object, taken one by one.
+class Members {
+ public:
+  // Errors when the text is not one JSON object, or has a member that is not in `known`.
+  static Result<Members> parse(const std::string& text, std::initializer_list<const char*> known);
+  explicit Members(nlohmann::json object) : object_{std::move(object)} {}
+
+  Result<void> only(std::initializer_list<const char*> known) const;
+  bool has(const char* name) const { return object_.contains(name); }
+
+  // Each errors when the member is missing or of another type or outside its range.
+  Result<std::string> text(const char* name, std::size_t min_length, std::size_t max_length) const;
+  Result<double> number(const char* name) const;
+  Result<float> number_as_float(const char* name) const;
+  Result<std::int64_t> integer(const char* name, std::int64_t minimum, std::int64_t maximum) const;
+  Result<std::uint64_t> id(const char* name) const;
+
+  const nlohmann::json& object() const { return object_; }
+
+ private:
+  nlohmann::json object_;
+};
+
+struct ParsedCommand {
+  protocol::Command action;
+  std::string arguments;  // as JSON, without kind and life_ms
+  microseconds life{2'000'000};
+};
+
+// The body of POST …/commands, e.g. {"kind":"set_setpoint","setpoint_m":0.1,"life_ms":2000}.
+Result<ParsedCommand> parse_command(const std::string& body);
+
+struct RunWish {
+  RobotId robot_id;
+  RunConditions conditions;
+};
+Result<RunWish> parse_run(const std::string& body);
+Result<std::string> parse_run_end(const std::string& body);  // the verdict; an empty body has none
+
+std::optional<std::uint64_t> parse_id(const std::string& text);  // decimal, not 0
+bool is_robot_id(const std::string& text);
+
+nlohmann::json to_json(const Run& run);
+nlohmann::json to_json(const StoredSample& sample);
+nlohmann::json to_json(const Gap& gap);
+
+// {"<name>": [ … ]}
+template <class Items>
+nlohmann::json list_json(const char* name, const Items& items) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const auto& item : items) list.push_back(to_json(item));
+  return {{name, std::move(list)}};
+}
+
+}  // namespace server

@@ -1,0 +1,111 @@
+// Emergency stops and lease renewals from pages.
+#include "server/api/live_messages.hpp"
+
+#include <fmt/format.h>
+
+#include "server/api/emergency.hpp"
+#include "server/api/http.hpp"
+#include "server/api/json.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+using nlohmann::json;
+
+namespace {
+
+// A renewal that waited longer is worth nothing: the lease it would extend has lapsed.
+constexpr microseconds kRenewalLife{protocol::kLeaseMs * 1000};
+
+asio::awaitable<void> stop_one(LiveParts& parts, RobotId robot_id, std::string actor) {
+  co_await stop_robot(parts.station, std::move(robot_id), std::move(actor));
+}
+
+asio::awaitable<void> stop_all(LiveParts& parts, std::string actor) {
+  co_await stop_all_robots(parts.loop, parts.tasks, parts.station, std::move(actor));
+}
+
+struct Counted {
+  explicit Counted(std::size_t& count) : count_{count} { ++count_; }
+  ~Counted() { --count_; }
+  Counted(const Counted&) = delete;
+  Counted& operator=(const Counted&) = delete;
+  std::size_t& count_;
+};
+
+asio::awaitable<void> renew(LiveParts& parts, CommandRequest request) {
+  const Counted counted{parts.renewals};
+  co_await parts.station.submit(std::move(request));
+}
+
+Result<RobotId> known_robot(const Members& message, const LiveParts& parts) {
+  auto id = message.text("robot_id", 0, 100);
+  if (!id) return id;
+  if (parts.station.find(*id) != nullptr) return id;
+  return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", *id), "unknown_robot");
+}
+
+Result<void> on_emergency_stop(const Members& message, const std::string& actor, LiveParts& parts) {
+  // SAFETY: a stop is obeyed also when the message carries members that nobody knows.
+  if (message.has("robot_id") && message.object().at("robot_id").is_null()) {
+    parts.tasks.spawn("emergency stop", stop_all(parts, actor));
+    return {};
+  }
+  const auto robot_id = known_robot(message, parts);
+  if (!robot_id) return std::unexpected{robot_id.error()};
+  parts.tasks.spawn("emergency stop", stop_one(parts, *robot_id, actor));
+  return {};
+}
+
+Result<void> on_renew_lease(const Members& message, const std::string& actor, LiveParts& parts) {
+  if (auto known = message.only({"type", "robot_id", "stamp_us"}); !known) return known;
+  const auto robot_id = known_robot(message, parts);
+  if (!robot_id) return std::unexpected{robot_id.error()};
+  const auto stamp_us = message.integer("stamp_us", 0, INT64_MAX);
+  if (!stamp_us) return std::unexpected{stamp_us.error()};
+  // SAFETY: what the page saw is too old, so its operator may be looking at a robot that has moved on.
+  const std::int64_t age_us = parts.clock.steady_us() - *stamp_us;
+  if (age_us > kMaxStampAgeUs || age_us < 0) {
+    return fail(ErrorCode::conflict, fmt::format("the stamp is {} ms old; at most 400 renew a lease", age_us / 1000),
+                "stale");
+  }
+  if (parts.renewals >= kMaxRenewals) return fail(ErrorCode::unavailable, "too many renewals are on their way", "busy");
+  CommandRequest request;
+  request.robot_id = *robot_id;
+  request.action = rheonaut_Command_init_zero;
+  request.action.which_action = rheonaut_Command_renew_lease_tag;
+  request.actor = actor;
+  request.life = kRenewalLife - microseconds{age_us};
+  parts.tasks.spawn("lease renewal", renew(parts, std::move(request)));
+  return {};
+}
+
+}  // namespace
+
+std::string welcome_message(const LiveParts& parts) {
+  json message;
+  message["type"] = "welcome";
+  message["version"] = parts.version;
+  message["utc_us"] = parts.clock.utc_us();
+  message["stamp_us"] = parts.clock.steady_us();
+  message["robots"] = json::array();
+  for (const auto& [id, robot] : parts.station.robots()) message["robots"].push_back(to_json(robot));
+  return dump(message);
+}
+
+Result<void> on_page_message(const std::string& text, const std::string& actor, LiveParts& parts) {
+  const auto message = Members::parse(text, {});
+  if (!message) return std::unexpected{message.error()};
+  const auto type = message->text("type", 1, 40);
+  if (!type) return std::unexpected{type.error()};
+  if (*type == "emergency_stop") return on_emergency_stop(*message, actor, parts);
+  if (*type == "renew_lease") return on_renew_lease(*message, actor, parts);
+  if (*type == "keep_alive") return message->only({"type"});
+  return fail(ErrorCode::invalid, fmt::format("unknown message type '{}'", *type), "unknown_type");
+}
+
+std::string problem_message(const Error& error) {
+  const json body = problem_json(http_status(error.code), error.detail, error.reason);
+  return dump({{"type", "problem"}, {"problem", body}});
+}
+
+}  // namespace server

@@ -1,0 +1,37 @@
+// What a page says on /live and what it means, without a socket.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "server/live/live_feed.hpp"
+#include "server/result.hpp"
+#include "server/station/station.hpp"
+#include "server/tasks.hpp"
+
+namespace server {
+
+// Everything outlives every page.
+struct LiveParts {
+  boost::asio::io_context& loop;
+  TaskGroup& tasks;
+  Clock& clock;
+  Station& station;
+  LiveFeed& live;
+  std::string version;
+  std::size_t renewals = 0;  // on their way
+};
+
+inline constexpr std::int64_t kMaxStampAgeUs = 400'000;
+inline constexpr std::size_t kMaxRenewals = 256;
+
+std::string welcome_message(const LiveParts& parts);
+
+// Acts on one message. Returns at once: a stop or a renewal goes on as a task, and what becomes of it is heard as
+// `command`. The error, if any, is for the page.
+Result<void> on_page_message(const std::string& text, const std::string& actor, LiveParts& parts);
+
+std::string problem_message(const Error& error);
+
+}  // namespace server

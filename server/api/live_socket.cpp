@@ -1,0 +1,104 @@
+// The WebSocket of one page.
+#include "server/api/live_socket.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/experimental/awaitable_operators.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/websocket.hpp>
+
+namespace server {
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace websocket = boost::beast::websocket;
+using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
+
+namespace {
+
+constexpr std::size_t kMaxMessageBytes = 4096;
+constexpr std::int64_t kPingAfterUs = 10'000'000;
+constexpr std::int64_t kSilenceUs = 30'000'000;
+
+class LivePage {
+ public:
+  LivePage(HttpStream stream, std::string actor, LiveParts& parts)
+      : socket_{std::move(stream)}, actor_{std::move(actor)}, parts_{parts}, queue_{parts.loop} {
+    websocket::stream_base::timeout none;  // time is the injected clock's business
+    none.handshake_timeout = none.idle_timeout = websocket::stream_base::none();
+    none.keep_alive_pings = false;
+    socket_.set_option(none);
+    socket_.read_message_max(kMaxMessageBytes);
+    socket_.text(true);
+    heard_at_us_ = parts_.clock.steady_us();
+    auto on_control = [this](websocket::frame_type, beast::string_view) { heard_at_us_ = parts_.clock.steady_us(); };
+    socket_.control_callback(std::move(on_control));
+  }
+  ~LivePage() { parts_.live.remove(queue_); }
+  LivePage(const LivePage&) = delete;
+  LivePage& operator=(const LivePage&) = delete;
+
+  asio::awaitable<void> run(UpgradeRequest upgrade) {
+    const auto [error] = co_await socket_.async_accept(upgrade, asio::as_tuple(asio::use_awaitable));
+    if (error) co_return;
+    parts_.live.add(queue_);
+    queue_.push(std::make_shared<const std::string>(welcome_message(parts_)), false);
+    co_await (read() || write() || watch());
+  }
+
+ private:
+  asio::awaitable<void> read() {
+    beast::flat_buffer buffer{kMaxMessageBytes};
+    for (;;) {
+      const auto [error, size] = co_await socket_.async_read(buffer, asio::as_tuple(asio::use_awaitable));
+      if (error) co_return;
+      heard_at_us_ = parts_.clock.steady_us();
+      const auto understood = on_page_message(beast::buffers_to_string(buffer.data()), actor_, parts_);
+      buffer.clear();
+      if (!understood) {
+        queue_.push(std::make_shared<const std::string>(problem_message(understood.error())), true);
+      }
+    }
+  }
+
+  asio::awaitable<void> write() {
+    for (;;) {
+      co_await queue_.wait();
+      for (LiveText message = queue_.pop(); message != nullptr; message = queue_.pop()) {
+        const auto [error, size] =
+            co_await socket_.async_write(asio::buffer(*message), asio::as_tuple(asio::use_awaitable));
+        if (error) co_return;
+      }
+      const std::int64_t now_us = parts_.clock.steady_us();
+      if (now_us - std::max(heard_at_us_, pinged_at_us_) < kPingAfterUs) continue;
+      pinged_at_us_ = now_us;
+      const auto [error] = co_await socket_.async_ping({}, asio::as_tuple(asio::use_awaitable));
+      if (error) co_return;
+    }
+  }
+
+  asio::awaitable<void> watch() {
+    while (parts_.clock.steady_us() < heard_at_us_ + kSilenceUs) {
+      co_await parts_.clock.sleep_until(heard_at_us_ + kSilenceUs);
+    }
+    spdlog::info("the page of {} fell silent", actor_);
+  }
+
+  websocket::stream<HttpStream> socket_;
+  std::string actor_;
+  LiveParts& parts_;
+  Subscriber queue_;
+  std::int64_t heard_at_us_ = 0;
+  std::int64_t pinged_at_us_ = 0;
+};
+
+}  // namespace
+
+asio::awaitable<void> serve_live(HttpStream stream, UpgradeRequest upgrade, std::string actor, LiveParts& parts) {
+  LivePage page{std::move(stream), std::move(actor), parts};
+  co_await page.run(std::move(upgrade));
+}
+
+}  // namespace server

@@ -1,0 +1,23 @@
+// One page on /live: sends what the feed says, and takes emergency stops and lease renewals.
+//
+// One reader and one writer. The queue between feed and writer is bounded (Subscriber: oldest samples are dropped, and
+// the page hears so). A message of a page has at most 4 kB; a page that is silent for 30 s, pings unanswered, is let
+// go. Loop thread; the parts outlive the connection.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <string>
+
+#include "server/api/http_stream.hpp"
+#include "server/api/live_messages.hpp"
+
+namespace server {
+
+using UpgradeRequest = boost::beast::http::request<boost::beast::http::empty_body>;
+
+// Ends when the page leaves or falls silent. Throws operation_aborted when cancelled.
+boost::asio::awaitable<void> serve_live(HttpStream stream, UpgradeRequest upgrade, std::string actor, LiveParts& parts);
+
+}  // namespace server

@@ -1,0 +1,189 @@
+// Reads the bodies of requests: commands and runs.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "server/api/json.hpp"
+
+namespace server {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxNameBytes = 200;
+constexpr std::size_t kMaxTextBytes = 4000;
+constexpr std::int64_t kMaxLifeMs = protocol::kMaxCommandLifeUs / 1000;
+
+Result<void> read_set_mode(const Members& body, protocol::Command& action) {
+  if (auto known = body.only({"kind", "life_ms", "mode", "setpoint_m"}); !known) return known;
+  const auto mode = body.text("mode", 0, kMaxTextBytes);
+  if (!mode) return std::unexpected{mode.error()};
+  action.which_action = rheonaut_Command_set_mode_tag;
+  auto& set_mode = action.action.set_mode;
+  if (*mode == "manual") {
+    set_mode.mode = rheonaut_MODE_MANUAL;
+    if (!body.has("setpoint_m")) return {};
+    return fail(ErrorCode::bad_request, "setpoint_m is not known here: mode manual takes none", "unknown_member");
+  }
+  if (*mode != "auto") {
+    return fail(ErrorCode::invalid, fmt::format("mode = '{}' is neither manual nor auto", mode->substr(0, 40)),
+                "out_of_range");
+  }
+  const auto setpoint_m = body.number_as_float("setpoint_m");
+  if (!setpoint_m) return std::unexpected{setpoint_m.error()};
+  set_mode.mode = rheonaut_MODE_AUTO;
+  set_mode.has_setpoint_m = true;
+  set_mode.setpoint_m = *setpoint_m;
+  return {};
+}
+
+Result<void> read_float(const Members& body, const char* name, float& into) {
+  if (auto known = body.only({"kind", "life_ms", name}); !known) return known;
+  const auto value = body.number_as_float(name);
+  if (!value) return std::unexpected{value.error()};
+  into = *value;
+  return {};
+}
+
+Result<void> read_set_setpoint(const Members& body, protocol::Command& action) {
+  action.which_action = rheonaut_Command_set_setpoint_tag;
+  return read_float(body, "setpoint_m", action.action.set_setpoint.setpoint_m);
+}
+
+Result<void> read_inject_disturbance(const Members& body, protocol::Command& action) {
+  action.which_action = rheonaut_Command_inject_disturbance_tag;
+  return read_float(body, "disturbance_m", action.action.inject_disturbance.disturbance_m);
+}
+
+Result<void> read_lease(const Members& body, std::uint32_t& lease_ms) {
+  if (!body.has("lease_ms")) return {};
+  const auto value = body.integer("lease_ms", 1, protocol::kLeaseMs);
+  if (!value) return std::unexpected{value.error()};
+  lease_ms = static_cast<std::uint32_t>(*value);
+  return {};
+}
+
+Result<void> read_set_duty(const Members& body, protocol::Command& action) {
+  if (auto known = body.only({"kind", "life_ms", "duty", "lease_ms"}); !known) return known;
+  const auto duty = body.number_as_float("duty");
+  if (!duty) return std::unexpected{duty.error()};
+  action.which_action = rheonaut_Command_set_duty_tag;
+  action.action.set_duty.duty = *duty;
+  return read_lease(body, action.action.set_duty.lease_ms);
+}
+
+Result<void> read_renew_lease(const Members& body, protocol::Command& action) {
+  if (auto known = body.only({"kind", "life_ms", "lease_ms"}); !known) return known;
+  action.which_action = rheonaut_Command_renew_lease_tag;
+  return read_lease(body, action.action.renew_lease.lease_ms);
+}
+
+Result<void> read_clear_emergency(const Members& body, protocol::Command& action) {
+  if (auto known = body.only({"kind", "life_ms", "emergency_id"}); !known) return known;
+  const auto id = body.id("emergency_id");
+  if (!id) return std::unexpected{id.error()};
+  action.which_action = rheonaut_Command_clear_emergency_tag;
+  action.action.clear_emergency.emergency_id = *id;
+  return {};
+}
+
+Result<void> read_zero_position(const Members& body, protocol::Command& action) {
+  action.which_action = rheonaut_Command_zero_position_tag;
+  return body.only({"kind", "life_ms"});
+}
+
+Result<void> read_ping(const Members& body, protocol::Command& action) {
+  action.which_action = rheonaut_Command_ping_tag;
+  return body.only({"kind", "life_ms"});
+}
+
+struct Kind {
+  const char* name;
+  Result<void> (*read)(const Members& body, protocol::Command& action);
+};
+constexpr Kind kKinds[] = {
+    {"set_mode", read_set_mode},
+    {"set_setpoint", read_set_setpoint},
+    {"set_duty", read_set_duty},
+    {"renew_lease", read_renew_lease},
+    {"clear_emergency", read_clear_emergency},
+    {"inject_disturbance", read_inject_disturbance},
+    {"zero_position", read_zero_position},
+    {"ping", read_ping},
+};
+
+Result<void> read_text(const Members& body, const char* name, std::string& into) {
+  if (!body.has(name)) return {};
+  auto value = body.text(name, 0, kMaxTextBytes);
+  if (!value) return std::unexpected{value.error()};
+  into = std::move(*value);
+  return {};
+}
+
+}  // namespace
+
+Result<ParsedCommand> parse_command(const std::string& text) {
+  const auto body = Members::parse(text, {});
+  if (!body) return std::unexpected{body.error()};
+  const auto kind = body->text("kind", 0, kMaxTextBytes);
+  if (!kind) return std::unexpected{kind.error()};
+  const auto* known = std::ranges::find_if(kKinds, [&kind](const Kind& one) { return *kind == one.name; });
+  if (known == std::end(kKinds)) {
+    return fail(ErrorCode::invalid, fmt::format("unknown command kind '{}'", kind->substr(0, 40)), "unknown_kind");
+  }
+  ParsedCommand command;
+  command.action = rheonaut_Command_init_zero;
+  if (auto read = known->read(*body, command.action); !read) return std::unexpected{read.error()};
+  if (body->has("life_ms")) {
+    const auto life_ms = body->integer("life_ms", 1, kMaxLifeMs);
+    if (!life_ms) return std::unexpected{life_ms.error()};
+    command.life = std::chrono::milliseconds{*life_ms};
+  }
+  json arguments = body->object();
+  arguments.erase("kind");
+  arguments.erase("life_ms");
+  command.arguments = dump(arguments);
+  return command;
+}
+
+Result<RunWish> parse_run(const std::string& text) {
+  const auto body = Members::parse(
+      text, {"robot_id", "name", "fluid", "pump_profile", "mean_flow_m_s", "tube", "operator_name", "notes"});
+  if (!body) return std::unexpected{body.error()};
+  RunWish wish;
+  const auto robot_id = body->text("robot_id", 0, kMaxTextBytes);
+  if (!robot_id) return std::unexpected{robot_id.error()};
+  if (!is_robot_id(*robot_id)) {
+    return fail(ErrorCode::invalid, "robot_id is not 1 to 31 characters of [a-z0-9_-]", "out_of_range");
+  }
+  wish.robot_id = *robot_id;
+  const auto name = body->text("name", 1, kMaxNameBytes);
+  if (!name) return std::unexpected{name.error()};
+  RunConditions& conditions = wish.conditions;
+  conditions.name = *name;
+  if (body->has("mean_flow_m_s")) {
+    const auto flow = body->number("mean_flow_m_s");
+    if (!flow) return std::unexpected{flow.error()};
+    conditions.mean_flow_m_s = *flow;
+  }
+  const std::pair<const char*, std::string*> texts[] = {{"fluid", &conditions.fluid},
+                                                        {"pump_profile", &conditions.pump_profile},
+                                                        {"tube", &conditions.tube},
+                                                        {"operator_name", &conditions.operator_name},
+                                                        {"notes", &conditions.notes}};
+  for (const auto& [member, into] : texts) {
+    if (auto read = read_text(*body, member, *into); !read) return std::unexpected{read.error()};
+  }
+  return wish;
+}
+
+Result<std::string> parse_run_end(const std::string& text) {
+  std::string verdict;
+  if (text.empty()) return verdict;
+  const auto body = Members::parse(text, {"verdict"});
+  if (!body) return std::unexpected{body.error()};
+  if (auto read = read_text(*body, "verdict", verdict); !read) return std::unexpected{read.error()};
+  return verdict;
+}
+
+}  // namespace server

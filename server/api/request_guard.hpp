@@ -1,0 +1,39 @@
+// Decides whether a request is let in, before any route sees it.
+//
+// In this order: the Host header names this station (421; keeps out pages that point their own name at this machine);
+// a request that changes something, and /live, comes from the station's own page if from a page at all (403);
+// everything but /login and the files of the cockpit, which hold no data, has a credential (401); a request that
+// changes something and rests on the cookie says where it comes from (403); a body is JSON (415).
+#pragma once
+
+#include <expected>
+#include <string>
+#include <vector>
+
+#include "server/api/auth.hpp"
+#include "server/api/http.hpp"
+
+namespace server {
+
+class RequestGuard {
+ public:
+  // `hosts` are names or addresses without port, besides localhost and the loopback addresses.
+  RequestGuard(Auth& auth, std::vector<std::string> hosts);
+
+  // Who asks (empty where nobody needs to say), or the refusal.
+  std::expected<std::string, Response> admit(const Request& request) const;
+
+ private:
+  struct Credential {
+    std::string actor;
+    bool by_cookie = false;
+  };
+
+  bool host_is_ours(const std::string& host) const;
+  std::optional<Credential> credential_of(const Request& request) const;
+
+  Auth& auth_;
+  std::vector<std::string> hosts_;
+};
+
+}  // namespace server

@@ -1,0 +1,58 @@
+// Finds the route of a request: method and path pattern to a coroutine that answers.
+//
+//   router.add({"GET", "/api/v1/runs/{run_id}/gaps", {}, list_gaps});
+//
+// A path is split at '/', then decoded; a segment with a hidden '/', a control character or ".." is refused with 400,
+// an unknown or repeated query parameter too. An unknown path under /api/ is 404, a known one with another method 405
+// with Allow. HEAD is answered as GET (the server leaves the body out). Every other path goes to the fallback.
+// Loop thread. Routes are added before the first request and outlive every request.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/api/http.hpp"
+
+namespace server {
+
+using Answer = boost::asio::awaitable<Response>;
+
+struct Route {
+  std::string method;
+  std::string pattern;             // "/api/v1/robots/{robot_id}"
+  std::vector<std::string> query;  // the parameters it knows
+  std::function<Answer(Request)> answer;
+};
+
+class Router {
+ public:
+  void add(Route route);
+  void set_fallback(std::function<Response(const Request&)> fallback) { fallback_ = std::move(fallback); }
+
+  // A coroutine that throws passes its exception on.
+  Answer dispatch(Request request) const;
+
+  const std::vector<Route>& routes() const { return routes_; }
+
+ private:
+  struct Entry {
+    std::vector<std::string> segments;
+    std::size_t route = 0;
+  };
+
+  std::vector<Route> routes_;
+  std::vector<Entry> entries_;
+  std::function<Response(const Request&)> fallback_;
+};
+
+// The segments of the target's path, split and then decoded; empty when it is not acceptable.
+std::optional<std::vector<std::string>> path_segments(const std::string& target);
+
+// The same as one text. Whoever judges a request by its path uses this, never the target.
+std::optional<std::string> path_of(const std::string& target);
+
+// "%41" to "A"; empty when the text is not a valid encoding, or decodes to a control character.
+std::optional<std::string> percent_decode(std::string_view text, bool plus_is_space);
+
+}  // namespace server

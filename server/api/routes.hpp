@@ -1,0 +1,57 @@
+// All routes of the API, grouped by noun: routes_station, routes_robots, routes_runs, routes_samples.
+//
+// Held to openapi.yaml both ways by a test. Each answer is a coroutine that can be called without a server.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "server/api/auth.hpp"
+#include "server/api/json.hpp"
+#include "server/api/router.hpp"
+#include "server/live/live_feed.hpp"
+#include "server/recording/history.hpp"
+#include "server/recording/runs.hpp"
+#include "server/station/station.hpp"
+#include "server/tasks.hpp"
+
+namespace server {
+
+struct StationFacts {
+  std::string version;
+  std::uint64_t store_id = 0;
+  std::string http_address;
+  std::string robots_address;
+  std::int64_t started_at_us = 0;  // steady
+};
+
+// What the routes work with; everything outlives the router.
+struct ApiParts {
+  boost::asio::io_context& loop;
+  TaskGroup& tasks;
+  Clock& clock;
+  Station& station;
+  LiveFeed& live;
+  Runs& runs;
+  History& history;
+  Auth& auth;
+  StationFacts facts;
+};
+
+void add_station_routes(Router& router, ApiParts& parts);
+void add_robot_routes(Router& router, ApiParts& parts);
+void add_run_routes(Router& router, ApiParts& parts);
+void add_sample_routes(Router& router, ApiParts& parts);
+
+// Everything above, and the cockpit as fallback.
+void add_routes(Router& router, ApiParts& parts);
+
+// A query parameter as a number within limits; `fallback` when it is not given.
+Result<std::int64_t> query_number(const Request& request, const std::string& name, std::int64_t minimum,
+                                  std::int64_t maximum, std::int64_t fallback);
+Result<RunId> run_id_of(const Request& request);
+
+inline constexpr std::int64_t kDefaultLimit = 100;
+inline constexpr std::int64_t kMaxLimit = 1000;
+
+}  // namespace server

@@ -1,0 +1,82 @@
+// The station itself, its documents, the login, and the cockpit's files.
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "server/api/assets.hpp"
+#include "server/api/routes.hpp"
+
+namespace server {
+namespace {
+
+Answer get_station(ApiParts& parts, Request) {
+  const StationFacts& facts = parts.facts;
+  co_return json_response(200, {{"version", facts.version},
+                                {"store_id", std::to_string(facts.store_id)},
+                                {"utc_us", parts.clock.utc_us()},
+                                {"uptime_s", static_cast<double>(parts.clock.steady_us() - facts.started_at_us) / 1e6},
+                                {"http_address", facts.http_address},
+                                {"robots_address", facts.robots_address}});
+}
+
+Answer get_openapi(ApiParts&, Request request) { co_return asset_response(request, openapi_document()); }
+
+Answer log_in(ApiParts& parts, Request request) {
+  const auto session = parts.auth.log_in(request.query["code"]);
+  if (!session) {
+    co_return html_response(401,
+                            "<!doctype html><title>Rheonaut</title><p>This link was used already or is too old. Open "
+                            "the link that the station prints when it starts.");
+  }
+  Response response = html_response(303, "");
+  response.headers.emplace_back("Location", "/");
+  response.headers.emplace_back("Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age={}",
+                                                          kSessionCookie, *session, kSessionLife.count() / 1'000'000));
+  co_return response;
+}
+
+Answer live_without_upgrade(ApiParts&, Request) {
+  Response response = problem(426, "/live speaks WebSocket only", "upgrade_required");
+  response.headers.emplace_back("Upgrade", "websocket");
+  co_return response;
+}
+
+}  // namespace
+
+Result<std::int64_t> query_number(const Request& request, const std::string& name, std::int64_t minimum,
+                                  std::int64_t maximum, std::int64_t fallback) {
+  const auto given = request.query.find(name);
+  if (given == request.query.end()) return fallback;
+  const std::string& text = given->second;
+  std::int64_t value = 0;
+  const char* end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc{} || rest != end || value < minimum || value > maximum) {
+    return fail(ErrorCode::bad_request,
+                fmt::format("{} = '{}' is not a number from {} to {}", name, text.substr(0, 40), minimum, maximum),
+                "out_of_range");
+  }
+  return value;
+}
+
+void add_station_routes(Router& router, ApiParts& parts) {
+  const auto add = [&router, &parts](const char* pattern, std::vector<std::string> query,
+                                     Answer (*answer)(ApiParts&, Request)) {
+    router.add({"GET", pattern, std::move(query),
+                [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+  };
+  add("/login", {"code"}, log_in);
+  add("/live", {}, live_without_upgrade);
+  add("/api/v1/station", {}, get_station);
+  add("/api/v1/openapi.yaml", {}, get_openapi);
+  router.set_fallback(page_response);
+}
+
+void add_routes(Router& router, ApiParts& parts) {
+  add_station_routes(router, parts);
+  add_robot_routes(router, parts);
+  add_run_routes(router, parts);
+  add_sample_routes(router, parts);
+}
+
+}  // namespace server

@@ -1,0 +1,48 @@
+// All settings of the station: one struct, each field with its key in the file, its flag, its default and its unit.
+//
+// Order of precedence: flag, file, default. deploy/rheonaut.toml documents the file; a test holds it to this struct.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/station/command_gate.hpp"
+#include "server/station/station.hpp"
+
+namespace server {
+
+struct Config {
+  std::filesystem::path data_dir = "rheonaut-data";  // data.dir, --data: database, token, endpoints
+
+  std::string http = "127.0.0.1:8080";  // http.listen, --http
+  bool http_or_any_port = true;         // only while the default stands: a taken port is replaced by a free one
+  std::vector<std::string> http_hosts;  // http.hosts: further names by which pages may address the station
+
+  std::string robots = "127.0.0.1:7070";  // robots.listen, --robots
+  bool robots_or_any_port = true;         // as above
+  bool enrol_on_loopback = true;  // robots.enrol_on_loopback: accept a new robot that dials in from this machine
+  LinkTimes link;                 // robots.link_timeout_ms, .heartbeat_interval_ms, .samples_per_frame
+
+  CommandLimits limits;  // limits.setpoint_min_m, .setpoint_max_m, .duty_min, .duty_max, …
+
+  std::string log_level = "info";  // log.level: trace, debug, info, warn, error
+
+  std::filesystem::path database() const { return data_dir / "station.sqlite"; }
+};
+
+// What the command line gives; empty fields were not given.
+struct ConfigFlags {
+  std::optional<std::filesystem::path> file;
+  std::optional<std::filesystem::path> data_dir;
+  std::optional<std::string> http;
+  std::optional<std::string> robots;
+};
+
+// Reads the file (if one is given), then applies the flags, then checks every value. Throws std::invalid_argument that
+// says file, line, key, value and what to do.
+Config load_config(const ConfigFlags& flags);
+
+}  // namespace server

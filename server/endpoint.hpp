@@ -1,0 +1,13 @@
+// Addresses and ports as text: "127.0.0.1:8080", "[::1]:8080".
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <string>
+
+namespace server {
+
+// "localhost" stands for 127.0.0.1. Throws std::invalid_argument that quotes the text.
+boost::asio::ip::tcp::endpoint parse_endpoint(const std::string& text);
+std::string text(const boost::asio::ip::tcp::endpoint& endpoint);
+
+}  // namespace server

@@ -1,0 +1,47 @@
+// Picks the best exchange of the window and fits the drift.
+#include "server/link/clock_sync.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace server {
+
+ClockEstimate ClockSync::add(const ClockExchange& exchange) {
+  const std::int64_t held_us = exchange.answered_at_robot_us - exchange.received_at_robot_us;
+  const std::int64_t round_trip_us = exchange.answer_received_at_us - exchange.sent_at_us - held_us;
+  if (held_us < 0 || round_trip_us < 0) return estimate_;
+
+  const std::int64_t sum_us = (exchange.sent_at_us - exchange.received_at_robot_us) +
+                              (exchange.answer_received_at_us - exchange.answered_at_robot_us);
+  measurements_.push_back({exchange.answer_received_at_us, sum_us / 2, round_trip_us});
+  if (measurements_.size() > kWindow) measurements_.pop_front();
+
+  const std::int64_t now_us = exchange.answer_received_at_us;
+  const auto bound_us = [now_us](const Measurement& measurement) {
+    const auto age_us = static_cast<double>(now_us - measurement.at_us);
+    return static_cast<double>(measurement.round_trip_us) / 2 + age_us * kMaxDriftPpm * 1e-6;
+  };
+  const auto by_bound = [&](const Measurement& a, const Measurement& b) { return bound_us(a) < bound_us(b); };
+  const Measurement best = *std::min_element(measurements_.begin(), measurements_.end(), by_bound);
+  estimate_.valid = true;
+  estimate_.offset_us = best.offset_us;
+  estimate_.uncertainty_us = static_cast<std::int64_t>(std::ceil(bound_us(best)));
+  estimate_.drift_ppm = drift_ppm();
+  estimate_.round_trip_us = round_trip_us;
+  return estimate_;
+}
+
+// Between the quickest exchange of the older half and that of the newer half; 0 before there are 10 of them.
+double ClockSync::drift_ppm() const {
+  if (measurements_.size() < 10) return 0;
+  const auto middle = measurements_.begin() + static_cast<std::ptrdiff_t>(measurements_.size() / 2);
+  const auto by_round_trip = [](const Measurement& a, const Measurement& b) {
+    return a.round_trip_us < b.round_trip_us;
+  };
+  const Measurement older = *std::min_element(measurements_.begin(), middle, by_round_trip);
+  const Measurement newer = *std::min_element(middle, measurements_.end(), by_round_trip);
+  const auto span_us = static_cast<double>(newer.at_us - older.at_us);
+  return span_us <= 0 ? 0 : static_cast<double>(newer.offset_us - older.offset_us) / span_us * 1e6;
+}
+
+}  // namespace server

@@ -1,0 +1,45 @@
+// Estimates a robot's clock from exchanges of four time stamps, as NTP does.
+//
+//   station sends at t1 (station steady), robot receives at t2 (robot), answers at t3 (robot), station receives at t4
+//   offset = ((t1 - t2) + (t4 - t3)) / 2     station steady time = robot time + offset
+//   round trip = (t4 - t1) - (t3 - t2)       |offset error| ≤ round trip / 2, whatever the asymmetry
+//
+// The exchange with the smallest bound among the latest counts; its bound grows with its age by kMaxDriftPpm.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+
+#include "server/station/station_state.hpp"
+
+namespace server {
+
+struct ClockExchange {
+  std::int64_t sent_at_us = 0;             // t1
+  std::int64_t received_at_robot_us = 0;   // t2
+  std::int64_t answered_at_robot_us = 0;   // t3
+  std::int64_t answer_received_at_us = 0;  // t4
+};
+
+class ClockSync {
+ public:
+  static constexpr double kMaxDriftPpm = 100;  // of a cheap crystal against ours
+  static constexpr std::size_t kWindow = 60;   // exchanges kept, one a second
+
+  // Takes one exchange and returns the new estimate. An impossible one (negative times or round trip) changes nothing.
+  ClockEstimate add(const ClockExchange& exchange);
+
+ private:
+  struct Measurement {
+    std::int64_t at_us = 0;
+    std::int64_t offset_us = 0;
+    std::int64_t round_trip_us = 0;
+  };
+
+  double drift_ppm() const;
+
+  std::deque<Measurement> measurements_;
+  ClockEstimate estimate_;
+};
+
+}  // namespace server

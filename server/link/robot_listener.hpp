@@ -1,0 +1,38 @@
+// The port where robots dial in: each connection becomes a task of its own.
+//
+// Loop thread. Outlives the sessions it started.
+#pragma once
+
+#include "server/link/robot_session.hpp"
+#include "server/net/listener.hpp"
+#include "server/tasks.hpp"
+
+namespace server {
+
+class RobotListener {
+ public:
+  static constexpr int kMaxConnections = 8192;  // a further one is closed at once
+
+  RobotListener(boost::asio::io_context& loop, Clock& clock, TaskGroup& tasks, Station& station, RobotArchive& archive,
+                const boost::asio::ip::tcp::endpoint& endpoint, bool or_any_port);
+
+  boost::asio::awaitable<void> run();
+
+  // Serves an already connected stream, e.g. one end of a MemoryLink.
+  void serve(std::unique_ptr<ByteStream> stream);
+
+  boost::asio::ip::tcp::endpoint endpoint() const { return listener_.endpoint(); }
+
+ private:
+  boost::asio::awaitable<void> session(std::unique_ptr<ByteStream> stream);
+
+  boost::asio::io_context& loop_;
+  Clock& clock_;
+  TaskGroup& tasks_;
+  Station& station_;
+  RobotArchive& archive_;
+  Listener listener_;
+  int connections_ = 0;
+};
+
+}  // namespace server

@@ -1,0 +1,312 @@
+// Serves one robot's connection.
+#include "server/link/robot_session.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <boost/asio/experimental/awaitable_operators.hpp>
+#include <cstring>
+
+namespace server {
+namespace asio = boost::asio;
+using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
+
+namespace {
+
+constexpr std::int64_t kProbePeriodUs = 1'000'000;
+constexpr std::uint64_t kMaxSeq = std::uint64_t{1} << 62;  // far beyond any boot, and safe to add to
+
+template <std::size_t Size>
+void copy_text(char (&to)[Size], const std::string& from) {
+  const std::size_t count = std::min(from.size(), Size - 1);
+  std::memcpy(to, from.data(), count);
+  to[count] = '\0';
+}
+
+bool is_robot_id(const std::string& id) {
+  constexpr auto allowed = "abcdefghijklmnopqrstuvwxyz0123456789_-";
+  return !id.empty() && id.find_first_not_of(allowed) == std::string::npos;
+}
+
+AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t robot_time_us, const ByteStream& stream,
+                                   std::int64_t utc_us) {
+  AdmissionRequest request;
+  request.robot_id = hello.robot_id;
+  request.token = hello.token;
+  request.from_loopback = stream.from_loopback();
+  request.boot_id = hello.boot_id;
+  request.reset_cause = hello.reset_cause;
+  request.firmware_version = hello.firmware_version;
+  request.sample_period_us = hello.sample_period_us;
+  request.robot_time_us = robot_time_us;
+  request.oldest_seq = hello.oldest_seq;
+  request.next_seq = hello.next_seq;
+  request.next_event_seq = hello.next_event_seq;
+  request.received_at_us = utc_us;
+  return request;
+}
+
+}  // namespace
+
+RobotSession::RobotSession(asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
+                           RobotArchive& archive)
+    : clock_{clock}, stream_{std::move(stream)}, station_{station}, archive_{archive}, wake_writer_{loop} {}
+
+asio::awaitable<void> RobotSession::run() {
+  const auto hello = co_await (read_hello() || clock_.sleep_for(kHelloTimeout));
+  const auto* received = std::get_if<0>(&hello);
+  if (received == nullptr || !received->has_value()) {
+    spdlog::info("robot port: {} sent no valid hello{}", stream_->peer(),
+                 close_reason_.empty() ? "" : ": " + close_reason_);
+    co_return;
+  }
+  const bool welcomed = co_await welcome(**received);
+  if (!welcomed) co_return;
+
+  std::string reason;
+  try {
+    const auto ended = co_await (read_frames() || write_frames() || watch_link());
+    std::visit([&reason](const EndReason& end) { reason = end; }, ended);
+  } catch (const std::exception&) {  // all three were cancelled
+    reason = "the station stops";
+  }
+  stream_->close();
+  station_.on_disconnected(*this, close_reason_.empty() ? reason : close_reason_);
+}
+
+asio::awaitable<std::optional<protocol::RobotFrame>> RobotSession::read_frame() {
+  for (;;) {
+    while (!unread_.empty()) {
+      const auto state = reader_.push(unread_);
+      if (state == protocol::FrameReader::State::incomplete) break;
+      if (state == protocol::FrameReader::State::oversize) {
+        close_reason_ = "a frame longer than 1024 bytes: not this protocol";
+        co_return std::nullopt;
+      }
+      auto frame = protocol::decode_robot_frame(reader_.payload());
+      if (!frame) close_reason_ = "a frame that does not decode";
+      co_return frame;
+    }
+    const std::size_t size = co_await stream_->read_some(asio::buffer(input_));
+    if (size == 0) co_return std::nullopt;
+    unread_ = {input_.data(), size};
+  }
+}
+
+asio::awaitable<std::optional<protocol::Hello>> RobotSession::read_hello() {
+  const auto frame = co_await read_frame();
+  if (!frame) co_return std::nullopt;
+  if (frame->which_body != rheonaut_RobotFrame_hello_tag) {
+    close_reason_ = "the first frame is not a hello";
+    co_return std::nullopt;
+  }
+  hello_robot_time_us_ = frame->robot_time_us;
+  co_return frame->body.hello;
+}
+
+// Checks the hello, asks the archive, and answers. True when the robot is welcome.
+asio::awaitable<bool> RobotSession::welcome(const protocol::Hello& hello) {
+  const std::string id = hello.robot_id;
+  if (hello.protocol_version != protocol::kProtocolVersion) {
+    co_return co_await refuse(rheonaut_REFUSAL_REASON_VERSION,
+                              "this station speaks protocol version " + std::to_string(protocol::kProtocolVersion) +
+                                  ", the robot " + std::to_string(hello.protocol_version));
+  }
+  if (!is_robot_id(id) || hello.boot_id == 0 || hello.oldest_seq > hello.next_seq || hello.next_seq > kMaxSeq ||
+      hello.oldest_event_seq > hello.next_event_seq || hello.next_event_seq > kMaxSeq) {
+    co_return co_await refuse(rheonaut_REFUSAL_REASON_MALFORMED,
+                              "robot_id must be 1 to 31 of [a-z0-9_-], boot_id not 0, and oldest_seq ≤ next_seq");
+  }
+  const auto request = admission_request(hello, hello_robot_time_us_, *stream_, clock_.utc_us());
+  auto seat = station_.may_connect(id, hello.boot_id);
+  if (!seat) co_return co_await refuse(rheonaut_REFUSAL_REASON_ALREADY_CONNECTED, seat.error().detail);
+  const Admission admission = co_await archive_.admit(request);
+  if (admission.refusal != rheonaut_REFUSAL_REASON_NONE) co_return co_await refuse(admission.refusal, admission.detail);
+  seat = station_.may_connect(id, hello.boot_id);  // another connection may have won while we asked
+  if (!seat) co_return co_await refuse(rheonaut_REFUSAL_REASON_ALREADY_CONNECTED, seat.error().detail);
+
+  const LinkTimes times = station_.link_times();
+  protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+  frame.which_body = rheonaut_StationFrame_welcome_tag;
+  protocol::Welcome& welcome = frame.body.welcome;
+  welcome.protocol_version = protocol::kProtocolVersion;
+  welcome.store_id = admission.store_id;
+  welcome.durable_next_seq = admission.durable_next_seq;
+  welcome.durable_next_event_seq = admission.durable_next_event_seq;
+  welcome.link_timeout_ms = times.link_timeout_ms;
+  welcome.heartbeat_interval_ms = times.heartbeat_interval_ms;
+  welcome.samples_per_frame = times.samples_per_frame;
+  welcome.utc_us = clock_.utc_us();
+  const bool written = co_await write(frame);
+  if (!written) co_return false;
+
+  robot_id_ = id;
+  durable_.durable_next_seq = admission.durable_next_seq;
+  durable_.durable_next_event_seq = admission.durable_next_event_seq;
+  last_received_us_ = clock_.steady_us();
+  station_.on_connected(*this, request, hello, admission, stream_->peer());
+  co_return true;
+}
+
+asio::awaitable<bool> RobotSession::refuse(protocol::RefusalReason reason, std::string detail) {
+  spdlog::warn("robot port: refused {}: {}: {}", stream_->peer(), protocol::text(reason), detail);
+  protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+  frame.which_body = rheonaut_StationFrame_welcome_tag;
+  frame.body.welcome.protocol_version = protocol::kProtocolVersion;
+  frame.body.welcome.refusal = reason;
+  copy_text(frame.body.welcome.detail, detail);
+  co_await write(frame);
+  co_return false;
+}
+
+asio::awaitable<RobotSession::EndReason> RobotSession::read_frames() {
+  for (;;) {
+    const auto frame = co_await read_frame();
+    if (!frame) co_return close_reason_.empty() ? "the robot closed the connection" : close_reason_;
+    last_received_us_ = clock_.steady_us();
+    on_frame(*frame);
+    if (!close_reason_.empty()) co_return close_reason_;
+  }
+}
+
+void RobotSession::on_frame(const protocol::RobotFrame& frame) {
+  station_.on_frame(*this, frame.robot_time_us);
+  switch (frame.which_body) {
+    case rheonaut_RobotFrame_telemetry_tag:
+      if (frame.body.telemetry.first_seq > kMaxSeq) {
+        close_reason_ = "a sample number beyond 2^62";
+        return;
+      }
+      station_.on_samples(*this, frame.body.telemetry);
+      break;
+    case rheonaut_RobotFrame_event_tag:
+      if (frame.body.event.event_seq > kMaxSeq) {
+        close_reason_ = "an event number beyond 2^62";
+        return;
+      }
+      station_.on_event(*this, frame.body.event);
+      break;
+    case rheonaut_RobotFrame_status_tag: station_.on_status(*this, frame.body.status); break;
+    case rheonaut_RobotFrame_command_ack_tag: station_.on_command_ack(*this, frame.body.command_ack); break;
+    case rheonaut_RobotFrame_heartbeat_tag: on_heartbeat(frame); break;
+    case rheonaut_RobotFrame_hello_tag: close_reason_ = "a second hello on one connection"; break;
+    default: break;  // a message of a newer version, or one nobody here uses yet
+  }
+}
+
+void RobotSession::on_heartbeat(const protocol::RobotFrame& frame) {
+  const protocol::Heartbeat& answer = frame.body.heartbeat;
+  if (answer.echo_station_time_us == 0) return;
+  ClockExchange exchange;
+  exchange.sent_at_us = static_cast<std::int64_t>(answer.echo_station_time_us);
+  exchange.received_at_robot_us = static_cast<std::int64_t>(answer.echo_received_at_robot_us);
+  exchange.answered_at_robot_us = static_cast<std::int64_t>(frame.robot_time_us);
+  exchange.answer_received_at_us = last_received_us_;
+  station_.on_clock(*this, clock_sync_.add(exchange));
+}
+
+asio::awaitable<RobotSession::EndReason> RobotSession::write_frames() {
+  for (;;) {
+    const auto frame = next_frame();
+    if (!frame) {
+      co_await (wake_writer_.wait() || clock_.sleep_until(next_heartbeat_us_));
+      continue;
+    }
+    const bool written = co_await write(*frame);
+    if (!written) co_return "the robot closed the connection";
+    if (frame->which_body == rheonaut_StationFrame_command_tag) {
+      station_.on_command_sent(*this, frame->body.command.command_id);
+    }
+  }
+}
+
+std::optional<protocol::StationFrame> RobotSession::next_frame() {
+  const std::int64_t now_us = clock_.steady_us();
+  protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+  frame.which_body = rheonaut_StationFrame_command_tag;
+  if (!stops_.empty()) {  // SAFETY: an emergency stop goes ahead of everything that waits
+    frame.body.command = stops_.front();
+    stops_.pop_front();
+    return frame;
+  }
+  while (!commands_.empty()) {
+    const QueuedCommand next = commands_.front();
+    commands_.pop_front();
+    if (now_us >= next.deadline_us) continue;  // SAFETY: what waited longer than its life is never sent
+    frame.body.command = next.command;
+    return frame;
+  }
+  if (durable_changed_ || now_us >= next_heartbeat_us_) return heartbeat();
+  return std::nullopt;
+}
+
+protocol::StationFrame RobotSession::heartbeat() {
+  const std::int64_t now_us = clock_.steady_us();
+  protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+  frame.which_body = rheonaut_StationFrame_heartbeat_tag;
+  frame.body.heartbeat = durable_;
+  if (now_us >= next_probe_us_) {
+    frame.body.heartbeat.station_time_us = static_cast<std::uint64_t>(std::max<std::int64_t>(now_us, 1));
+    next_probe_us_ = now_us + kProbePeriodUs;
+  }
+  durable_.resend_first_seq = durable_.resend_next_seq = 0;
+  durable_changed_ = false;
+  next_heartbeat_us_ = now_us + std::int64_t{station_.link_times().heartbeat_interval_ms} * 1000;
+  return frame;
+}
+
+// A robot that is silent, or that does not take what we write, is lost: TCP alone would notice much later.
+asio::awaitable<RobotSession::EndReason> RobotSession::watch_link() {
+  const std::int64_t timeout_us = std::int64_t{station_.link_times().link_timeout_ms} * 1000;
+  for (;;) {
+    const std::int64_t now_us = clock_.steady_us();
+    if (now_us - last_received_us_ >= timeout_us) co_return "no frame within the link time-out";
+    if (writing_since_us_ && now_us - *writing_since_us_ >= timeout_us) co_return "the robot does not read";
+    const std::int64_t silent_since_us = std::min(last_received_us_, writing_since_us_.value_or(last_received_us_));
+    co_await clock_.sleep_until(silent_since_us + timeout_us);
+  }
+}
+
+asio::awaitable<bool> RobotSession::write(const protocol::StationFrame& frame) {
+  std::array<std::uint8_t, protocol::kMaxFramedBytes> bytes;
+  const std::size_t size = protocol::write_frame(frame, bytes.data(), bytes.size());
+  writing_since_us_ = clock_.steady_us();
+  const bool written = co_await stream_->write(asio::buffer(bytes.data(), size));
+  writing_since_us_.reset();
+  co_return written;
+}
+
+bool RobotSession::send(const protocol::Command& command, std::int64_t deadline_us) {
+  if (commands_.size() >= kMaxQueuedCommands) return false;
+  commands_.push_back({command, deadline_us});
+  wake_writer_.notify();
+  return true;
+}
+
+void RobotSession::send_emergency_stop(const protocol::Command& command) {
+  commands_.clear();  // SAFETY: a stop supersedes everything queued for this robot
+  if (stops_.size() >= kMaxQueuedStops) stops_.pop_front();
+  stops_.push_back(command);
+  wake_writer_.notify();
+}
+
+void RobotSession::acknowledge(std::uint64_t durable_next_seq, std::uint64_t durable_next_event_seq) {
+  durable_.durable_next_seq = durable_next_seq;
+  durable_.durable_next_event_seq = durable_next_event_seq;
+  durable_changed_ = true;
+  wake_writer_.notify();
+}
+
+void RobotSession::request_resend(std::uint64_t first_seq, std::uint64_t next_seq) {
+  durable_.resend_first_seq = first_seq;
+  durable_.resend_next_seq = next_seq;
+  durable_changed_ = true;
+  wake_writer_.notify();
+}
+
+void RobotSession::close(const std::string& reason) {
+  close_reason_ = reason;
+  stream_->close();
+}
+
+}  // namespace server

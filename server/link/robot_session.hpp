@@ -1,0 +1,90 @@
+// One connection of a robot: hello and welcome, then frames both ways until the link is lost.
+//
+//   Hello → (Station::may_connect, RobotArchive::admit) → Welcome → { reader ‖ writer ‖ watch }
+//
+// Loop thread. Owns its stream; lives in the frame of run_robot_session and is the Station's RobotPort while welcomed.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "protocol/frame.hpp"
+#include "server/clock.hpp"
+#include "server/link/clock_sync.hpp"
+#include "server/net/byte_stream.hpp"
+#include "server/station/robot_archive.hpp"
+#include "server/station/robot_port.hpp"
+#include "server/station/station.hpp"
+
+namespace server {
+
+class RobotSession final : public RobotPort {
+ public:
+  static constexpr std::size_t kMaxQueuedCommands = 64;  // a further one is refused
+  static constexpr std::size_t kMaxQueuedStops = 16;     // a further one takes the place of the oldest
+  static constexpr std::chrono::seconds kHelloTimeout{5};
+
+  RobotSession(boost::asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
+               RobotArchive& archive);
+
+  // Serves the connection to its end.
+  boost::asio::awaitable<void> run();
+
+  const RobotId& robot_id() const override { return robot_id_; }
+  bool send(const protocol::Command& command, std::int64_t deadline_us) override;
+  void send_emergency_stop(const protocol::Command& command) override;
+  void acknowledge(std::uint64_t durable_next_seq, std::uint64_t durable_next_event_seq) override;
+  void request_resend(std::uint64_t first_seq, std::uint64_t next_seq) override;
+  void close(const std::string& reason) override;
+
+ private:
+  struct QueuedCommand {
+    protocol::Command command;
+    std::int64_t deadline_us;
+  };
+  using EndReason = std::string;
+
+  boost::asio::awaitable<std::optional<protocol::RobotFrame>> read_frame();
+  boost::asio::awaitable<std::optional<protocol::Hello>> read_hello();
+  boost::asio::awaitable<bool> welcome(const protocol::Hello& hello);
+  boost::asio::awaitable<bool> refuse(protocol::RefusalReason reason, std::string detail);
+
+  boost::asio::awaitable<EndReason> read_frames();
+  boost::asio::awaitable<EndReason> write_frames();
+  boost::asio::awaitable<EndReason> watch_link();
+  boost::asio::awaitable<bool> write(const protocol::StationFrame& frame);
+
+  void on_frame(const protocol::RobotFrame& frame);
+  void on_heartbeat(const protocol::RobotFrame& frame);
+  std::optional<protocol::StationFrame> next_frame();
+  protocol::StationFrame heartbeat();
+
+  Clock& clock_;
+  std::unique_ptr<ByteStream> stream_;
+  Station& station_;
+  RobotArchive& archive_;
+
+  protocol::FrameReader reader_;
+  std::array<std::uint8_t, 4096> input_{};
+  protocol::Bytes unread_;
+  std::uint64_t hello_robot_time_us_ = 0;
+  RobotId robot_id_;  // from the hello
+
+  Signal wake_writer_;
+  std::deque<protocol::Command> stops_;  // SAFETY: always written first
+  std::deque<QueuedCommand> commands_;
+  protocol::StationHeartbeat durable_ = rheonaut_StationHeartbeat_init_zero;
+  bool durable_changed_ = false;
+  std::int64_t next_heartbeat_us_ = 0;
+  std::int64_t next_probe_us_ = 0;
+
+  ClockSync clock_sync_;
+  std::int64_t last_received_us_ = 0;
+  std::optional<std::int64_t> writing_since_us_;
+  std::string close_reason_;
+};
+
+}  // namespace server

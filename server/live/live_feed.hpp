@@ -1,0 +1,84 @@
+// What happens now, for everyone who watches: hears the station, writes each message once, and hands the same text to
+// every subscriber.
+//
+// Loop thread. Outlives its subscribers. Never waits for anyone: a subscriber's queue is bounded (see Subscriber).
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "server/clock.hpp"
+#include "server/station/station_sink.hpp"
+
+namespace server {
+
+using LiveText = std::shared_ptr<const std::string>;
+
+// One listener's queue. At most kMaxMessages and kMaxBytes wait in it: when it is full the oldest samples and stamps
+// are dropped first, then the oldest of whatever waits, and the reader is told how many by a `dropped` message.
+class Subscriber {
+ public:
+  static constexpr std::size_t kMaxMessages = 256;
+  static constexpr std::size_t kMaxBytes = 1024 * 1024;
+
+  explicit Subscriber(boost::asio::io_context& loop) : arrived_{loop} {}
+
+  void push(LiveText message, bool droppable);
+  boost::asio::awaitable<void> wait();  // until a message waits; throws operation_aborted when cancelled
+  LiveText pop();                       // null when none waits
+
+  std::size_t size() const { return queue_.size(); }
+
+ private:
+  struct Entry {
+    LiveText message;
+    bool droppable = false;
+  };
+
+  void drop_one();
+
+  std::deque<Entry> queue_;
+  std::size_t queued_bytes_ = 0;
+  std::uint64_t dropped_ = 0;
+  Signal arrived_;
+};
+
+class LiveFeed final : public StationSink {
+ public:
+  explicit LiveFeed(Clock& clock) : clock_{clock} {}
+
+  // Every 100 ms: a stamp, and the robots whose state changed in small ways. Until cancelled.
+  boost::asio::awaitable<void> run();
+
+  void add(Subscriber& subscriber) { subscribers_.push_back(&subscriber); }
+  void remove(Subscriber& subscriber) { std::erase(subscribers_, &subscriber); }
+
+  void publish_run(nlohmann::json run);
+
+  void on_robot(const RobotState& robot) override;
+  void on_samples(const RobotState& robot, const SampleBatch& batch) override;
+  void on_event(const RobotState& robot, const RobotEvent& event) override;
+  void on_command(const CommandRecord& record) override;
+
+ private:
+  // What of a robot is told at once when it changes; everything else waits for the next stamp.
+  using Headline = std::tuple<LinkState, BootId, protocol::Mode, protocol::SubState, std::uint64_t, CommandId>;
+
+  bool headline_changed(const RobotState& robot);
+  void publish_robot(const RobotState& robot);
+  void publish(std::string message, bool droppable);
+
+  Clock& clock_;
+  std::vector<Subscriber*> subscribers_;
+  std::map<RobotId, Headline> headlines_;
+  std::map<RobotId, RobotState> changed_;  // since the last stamp
+};
+
+}  // namespace server

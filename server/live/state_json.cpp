@@ -1,0 +1,178 @@
+// Writes robots, samples, commands and events as JSON.
+#include "server/live/state_json.hpp"
+
+#include <charconv>
+#include <cmath>
+
+namespace server {
+namespace {
+
+using nlohmann::json;
+
+json status_json(const protocol::Status& status) {
+  return {{"supply_mv", decimal(status.supply_mv)},        {"rssi_dbm", status.rssi_dbm},
+          {"free_memory_bytes", status.free_memory_bytes}, {"worst_tick_us", status.worst_tick_us},
+          {"missed_ticks", status.missed_ticks},           {"ring_fill", status.ring_fill},
+          {"imu_calibration", status.imu_calibration},     {"bad_frames", status.bad_frames},
+          {"lost_samples", status.lost_samples},           {"lost_events", status.lost_events}};
+}
+
+json clock_json(const ClockEstimate& clock) {
+  return {{"offset_us", clock.offset_us},
+          {"uncertainty_us", clock.uncertainty_us},
+          {"drift_ppm", clock.drift_ppm},
+          {"round_trip_us", clock.round_trip_us}};
+}
+
+void append(std::string& out, float value) {
+  if (!std::isfinite(value)) {
+    out += "null";
+    return;
+  }
+  char digits[32];
+  const auto [end, error] = std::to_chars(digits, digits + sizeof digits, value);
+  out.append(digits, end);
+}
+
+void append_column(std::string& out, const char* name, const std::vector<Sample>& samples, float Sample::* channel) {
+  out += ",\"";
+  out += name;
+  out += "\":[";
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (i > 0) out += ',';
+    append(out, samples[i].*channel);
+  }
+  out += ']';
+}
+
+}  // namespace
+
+json decimal(float value) {
+  if (!std::isfinite(value)) return nullptr;
+  char digits[32];
+  const auto written = std::to_chars(digits, digits + sizeof digits, value);
+  double shortest = 0;
+  std::from_chars(digits, written.ptr, shortest);
+  return shortest;
+}
+
+json id_text(std::uint64_t id) { return id == 0 ? json(nullptr) : json(std::to_string(id)); }
+
+json time_or_null(std::int64_t time_us) { return time_us == 0 ? json(nullptr) : json(time_us); }
+
+std::string dump(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
+
+json to_json(const Sample& sample) {
+  return {{"position_m", decimal(sample.position_m)},
+          {"velocity_m_s", decimal(sample.velocity_m_s)},
+          {"acceleration_m_s2", decimal(sample.acceleration_m_s2)},
+          {"duty", decimal(sample.duty)},
+          {"impedance_mv", decimal(sample.impedance_mv)},
+          {"reference_m", decimal(sample.reference_m)}};
+}
+
+json to_json(const RobotState& robot) {
+  const SampleContext& context = robot.context;
+  json out;
+  out["robot_id"] = robot.id;
+  out["link"] = text(robot.link);
+  out["peer"] = robot.link == LinkState::connected ? json(robot.peer) : json(nullptr);
+  out["connected_at_us"] = time_or_null(robot.connected_at_us);
+  out["last_received_at_us"] = time_or_null(robot.last_received_at_us);
+  out["boot_id"] = id_text(robot.boot_id);
+  out["reset_cause"] = protocol::text(robot.reset_cause);
+  out["firmware_version"] = robot.firmware_version;
+  out["sample_period_us"] = robot.sample_period_us;
+  out["ring_capacity"] = robot.ring_capacity;
+  out["parameters_checksum"] = robot.parameters_checksum;
+  out["controller_id"] = context.controller_id;
+  out["controller_checksum"] = robot.controller_checksum;
+  out["mode"] = protocol::text(context.mode);
+  out["sub_state"] = protocol::text(context.sub_state);
+  out["setpoint_m"] = context.setpoint_m ? decimal(*context.setpoint_m) : json(nullptr);
+  out["disturbance_m"] = decimal(context.disturbance_m);
+  out["position_sd_m"] = decimal(context.position_sd_m);
+  out["emergency_id"] = id_text(context.emergency_id);
+  out["emergency_cause"] = protocol::text(context.emergency_cause);
+  out["flags"] = context.flags;
+  out["sample"] = robot.sample ? to_json(*robot.sample) : json(nullptr);
+  out["next_seq"] = robot.next_seq;
+  out["oldest_seq"] = robot.oldest_seq;
+  out["durable_next_seq"] = robot.durable_next_seq;
+  out["latest_robot_time_us"] = robot.latest_robot_time_us;
+  out["status"] = robot.status ? status_json(*robot.status) : json(nullptr);
+  out["clock"] = robot.clock.valid ? clock_json(robot.clock) : json(nullptr);
+  out["pending_stop"] = id_text(robot.pending_stop.value_or(0));
+  return out;
+}
+
+json to_json(const CommandRecord& record) {
+  json arguments = json::parse(record.arguments, nullptr, false);
+  json out;
+  out["command_id"] = std::to_string(record.id);
+  out["robot_id"] = record.robot_id;
+  out["boot_id"] = id_text(record.boot_id);
+  out["kind"] = record.kind;
+  out["arguments"] = arguments.is_object() ? std::move(arguments) : json::object();
+  out["actor"] = record.actor;
+  out["state"] = text(record.state);
+  out["reason"] = record.reason;
+  out["submitted_at_us"] = record.submitted_at_us;
+  out["sent_at_us"] = time_or_null(record.sent_at_us);
+  out["ended_at_us"] = time_or_null(record.ended_at_us);
+  out["effect_at_robot_us"] = time_or_null(static_cast<std::int64_t>(record.effect_at_robot_us));
+  out["emergency_id"] = id_text(record.emergency_id);
+  return out;
+}
+
+json to_json(const RobotEvent& event) {
+  const bool of_robot = event.event_seq.has_value();
+  const bool mode_known = event.mode != rheonaut_MODE_UNSPECIFIED;
+  json out;
+  out["robot_id"] = event.robot_id;
+  out["boot_id"] = id_text(event.boot_id);
+  out["event_seq"] = of_robot ? json(*event.event_seq) : json(nullptr);
+  out["robot_time_us"] = of_robot || event.robot_time_us > 0 ? json(event.robot_time_us) : json(nullptr);
+  out["sample_seq"] = of_robot ? json(event.sample_seq) : json(nullptr);
+  out["kind"] = event.kind;
+  out["cause"] = event.cause;
+  out["mode"] = mode_known ? json(protocol::text(event.mode)) : json(nullptr);
+  out["sub_state"] = mode_known ? json(protocol::text(event.sub_state)) : json(nullptr);
+  out["position_m"] = of_robot ? decimal(event.position_m) : json(nullptr);
+  out["value"] = of_robot ? decimal(event.value) : json(nullptr);
+  out["emergency_id"] = id_text(event.emergency_id);
+  out["command_id"] = id_text(event.command_id);
+  out["received_at_us"] = event.received_at_us;
+  return out;
+}
+
+std::string samples_message(const SampleBatch& batch) {
+  const SampleContext& context = batch.context;
+  json head;
+  head["type"] = "samples";
+  head["robot_id"] = batch.robot_id;
+  head["boot_id"] = std::to_string(batch.boot_id);
+  head["first_seq"] = batch.first_seq;
+  head["first_robot_time_us"] = batch.first_robot_time_us;
+  head["period_us"] = context.period_us;
+  head["mode"] = protocol::text(context.mode);
+  head["sub_state"] = protocol::text(context.sub_state);
+  head["setpoint_m"] = context.setpoint_m ? decimal(*context.setpoint_m) : json(nullptr);
+  head["disturbance_m"] = decimal(context.disturbance_m);
+  head["position_sd_m"] = decimal(context.position_sd_m);
+  head["emergency_id"] = id_text(context.emergency_id);
+  head["flags"] = context.flags;
+  head["backfill"] = (context.flags & rheonaut_TELEMETRY_FLAG_BACKFILL) != 0;
+  std::string out = dump(head);
+  out.pop_back();  // the closing brace: the columns follow
+  append_column(out, "position_m", batch.samples, &Sample::position_m);
+  append_column(out, "velocity_m_s", batch.samples, &Sample::velocity_m_s);
+  append_column(out, "acceleration_m_s2", batch.samples, &Sample::acceleration_m_s2);
+  append_column(out, "duty", batch.samples, &Sample::duty);
+  append_column(out, "impedance_mv", batch.samples, &Sample::impedance_mv);
+  append_column(out, "reference_m", batch.samples, &Sample::reference_m);
+  out += '}';
+  return out;
+}
+
+}  // namespace server

@@ -1,0 +1,31 @@
+// The station's values as JSON, spelled as openapi.yaml says.
+//
+// 64-bit ids become strings, ids of 0 and times of 0 become null, a number that is not finite becomes null.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "server/station/station_state.hpp"
+
+namespace server {
+
+nlohmann::json to_json(const RobotState& robot);
+nlohmann::json to_json(const Sample& sample);
+nlohmann::json to_json(const CommandRecord& record);
+nlohmann::json to_json(const RobotEvent& event);
+
+// The message `samples` of /live as text. Its columns are written without a JSON tree, since it is made often.
+std::string samples_message(const SampleBatch& batch);
+
+// A float as the shortest decimal that gives the same float back: 0.1, not 0.10000000149011612.
+nlohmann::json decimal(float value);
+
+// null for 0.
+nlohmann::json id_text(std::uint64_t id);
+nlohmann::json time_or_null(std::int64_t time_us);
+
+// The text of a JSON value; bytes that are not UTF-8 are replaced.
+std::string dump(const nlohmann::json& value);
+
+}  // namespace server

@@ -1,0 +1,53 @@
+// Binds, listens, accepts.
+#include "server/net/listener.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "server/endpoint.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+using asio::ip::tcp;
+
+namespace {
+
+constexpr std::chrono::milliseconds kPause{50};
+
+void bind(tcp::acceptor& acceptor, const tcp::endpoint& endpoint, boost::system::error_code& error) {
+  acceptor.open(endpoint.protocol());
+  acceptor.set_option(tcp::acceptor::reuse_address{true});
+  acceptor.bind(endpoint, error);
+  if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+  if (error) acceptor.close();
+}
+
+}  // namespace
+
+Listener::Listener(asio::io_context& loop, Clock& clock, const tcp::endpoint& endpoint, bool or_any_port)
+    : clock_{clock}, acceptor_{loop} {
+  boost::system::error_code error;
+  bind(acceptor_, endpoint, error);
+  if (error == asio::error::address_in_use && or_any_port) {
+    spdlog::warn("port {} is taken; using a free one", endpoint.port());
+    bind(acceptor_, tcp::endpoint{endpoint.address(), 0}, error);
+  }
+  if (error) throw boost::system::system_error{error, "cannot listen on " + text(endpoint)};
+}
+
+asio::awaitable<void> Listener::run(std::function<void(tcp::socket)> on_connection) {
+  for (;;) {
+    auto [error, socket] = co_await acceptor_.async_accept(asio::as_tuple(asio::use_awaitable));
+    if (error == asio::error::operation_aborted) co_return;
+    if (error) {  // out of descriptors, or a peer that left before it was accepted
+      spdlog::warn("accept on {}: {}", text(endpoint()), error.message());
+      co_await clock_.sleep_for(kPause);
+      continue;
+    }
+    on_connection(std::move(socket));
+  }
+}
+
+}  // namespace server

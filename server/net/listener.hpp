@@ -1,0 +1,31 @@
+// A listening TCP port that hands each connection on, and survives what accept() may throw at it.
+//
+// Loop thread. Outlives its run(). Uses the clock to pause when the process is out of file descriptors.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <functional>
+
+#include "server/clock.hpp"
+
+namespace server {
+
+class Listener {
+ public:
+  // Binds and listens at once; port 0 takes any free one. With `or_any_port` a taken port is replaced by a free one.
+  // Throws boost::system::system_error that names the address.
+  Listener(boost::asio::io_context& loop, Clock& clock, const boost::asio::ip::tcp::endpoint& endpoint,
+           bool or_any_port = false);
+
+  // Accepts until cancelled; `on_connection` starts a task with the socket and returns at once.
+  boost::asio::awaitable<void> run(std::function<void(boost::asio::ip::tcp::socket)> on_connection);
+
+  boost::asio::ip::tcp::endpoint endpoint() const { return acceptor_.local_endpoint(); }
+
+ private:
+  Clock& clock_;
+  boost::asio::ip::tcp::acceptor acceptor_;
+};
+
+}  // namespace server

@@ -1,0 +1,195 @@
+// SQL of admission and of the succession of boots.
+#include "server/recording/boot_store.hpp"
+
+#include <fmt/format.h>
+#include <sodium.h>
+
+#include <algorithm>
+#include <array>
+
+#include "server/recording/statement.hpp"
+
+namespace server {
+namespace {
+
+using TokenHash = std::array<unsigned char, crypto_generichash_BYTES>;
+
+// Robot tokens are 256 random bits, so a fast hash is enough.
+TokenHash hash_of(const std::string& token) {
+  TokenHash hash{};
+  crypto_generichash(hash.data(), hash.size(), reinterpret_cast<const unsigned char*>(token.data()), token.size(),
+                     nullptr, 0);
+  return hash;
+}
+
+bool matches(const SQLite::Column& stored, const std::string& token) {
+  const TokenHash hash = hash_of(token);
+  return static_cast<std::size_t>(stored.getBytes()) == hash.size() &&
+         sodium_memcmp(stored.getBlob(), hash.data(), hash.size()) == 0;
+}
+
+Admission refusal(protocol::RefusalReason reason, std::string detail) {
+  Admission admission;
+  admission.refusal = reason;
+  admission.detail = std::move(detail);
+  return admission;
+}
+
+void set_token(SQLite::Statement& statement, int index, const std::string& token) {
+  if (token.empty()) return statement.bind(index);
+  const TokenHash hash = hash_of(token);
+  statement.bind(index, hash.data(), static_cast<int>(hash.size()));
+}
+
+void add_intervals(SQLite::Database& database, const char* sql, std::int64_t boot_key, IntervalSet& set) {
+  SQLite::Statement query{database, sql};
+  bind_all(query, boot_key);
+  while (query.executeStep()) set.insert({unsigned_id(query.getColumn(0)), unsigned_id(query.getColumn(1)) + 1});
+}
+
+}  // namespace
+
+std::vector<RobotId> BootStore::robots() {
+  std::vector<RobotId> ids;
+  SQLite::Statement query{database_.handle(), "SELECT robot_id FROM robot ORDER BY robot_id"};
+  while (query.executeStep()) ids.push_back(query.getColumn(0).getString());
+  return ids;
+}
+
+AdmissionOutcome BootStore::admit(const AdmissionRequest& request, bool enrol_on_loopback, bool with_intervals) {
+  SQLite::Transaction transaction{database_.handle()};  // becomes a writing one only if something is new
+  AdmissionOutcome outcome;
+  outcome.admission = check_robot(request, enrol_on_loopback);
+  outcome.admission.store_id = database_.store_id();
+  if (outcome.admission.refusal != rheonaut_REFUSAL_REASON_NONE) return outcome;
+
+  SQLite::Statement known{database_.handle(), "SELECT boot_key, robot_id FROM boot WHERE boot_id = ?"};
+  bind_all(known, request.boot_id);
+  if (!known.executeStep()) {
+    outcome.boot = load(remember_boot(request), with_intervals);
+  } else if (known.getColumn(1).getString() == request.robot_id) {
+    outcome.boot = load(known.getColumn(0).getInt64(), with_intervals);
+  } else {
+    outcome.admission = refusal(rheonaut_REFUSAL_REASON_BOOT_ID_REUSED,
+                                fmt::format("boot {} belongs to robot '{}'; a boot_id must be random, new in each boot",
+                                            request.boot_id, known.getColumn(1).getString()));
+    return outcome;
+  }
+  known.reset();
+  transaction.commit();
+  return outcome;
+}
+
+Admission BootStore::check_robot(const AdmissionRequest& request, bool enrol_on_loopback) {
+  Admission admission;
+  const bool may_enrol = enrol_on_loopback && request.from_loopback;
+  if (request.token.empty() && !request.from_loopback) {
+    return refusal(rheonaut_REFUSAL_REASON_WRONG_TOKEN,
+                   fmt::format("robot '{}' brings no token; without one a robot is admitted from loopback only",
+                               request.robot_id));
+  }
+  SQLite::Statement known{database_.handle(), "SELECT token_hash FROM robot WHERE robot_id = ?"};
+  bind_all(known, request.robot_id);
+  if (!known.executeStep()) {
+    if (!may_enrol) {
+      return refusal(rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT,
+                     fmt::format("robot '{}' is not enrolled; connect it once from loopback with enrol_on_loopback = "
+                                 "true",
+                                 request.robot_id));
+    }
+    SQLite::Statement add{database_.handle(),
+                          "INSERT INTO robot (robot_id, enrolled_at_us, token_hash) VALUES (?, ?, ?)"};
+    bind_all(add, request.robot_id, request.received_at_us);
+    set_token(add, 3, request.token);
+    add.exec();
+    admission.newly_enrolled = true;
+    return admission;
+  }
+  const SQLite::Column stored = known.getColumn(0);
+  if (stored.isNull() ? request.token.empty() : matches(stored, request.token)) return admission;
+  if (stored.isNull() && may_enrol) {  // enrolled without a token, brings one now: needed from here on
+    SQLite::Statement add{database_.handle(), "UPDATE robot SET token_hash = ?2 WHERE robot_id = ?1"};
+    bind_all(add, request.robot_id);
+    set_token(add, 2, request.token);
+    add.exec();
+    admission.newly_enrolled = true;
+    return admission;
+  }
+  return refusal(rheonaut_REFUSAL_REASON_WRONG_TOKEN,
+                 fmt::format("the token of robot '{}' is not the one it was enrolled with", request.robot_id));
+}
+
+std::int64_t BootStore::remember_boot(const AdmissionRequest& request) {
+  SQLite::Statement add{database_.handle(),
+                        "INSERT INTO boot (boot_id, robot_id, reset_cause, firmware_version, sample_period_us,"
+                        " first_seen_at_us, announced_next_seq, last_robot_time_us) VALUES (?,?,?,?,?,?,?,?)"};
+  execute(add, request.boot_id, request.robot_id, protocol::text(request.reset_cause), request.firmware_version,
+          request.sample_period_us, request.received_at_us, request.next_seq, request.robot_time_us);
+  return database_.handle().getLastInsertRowid();
+}
+
+StoredBoot BootStore::load(std::int64_t boot_key, bool with_intervals) {
+  StoredBoot boot;
+  boot.key = boot_key;
+  if (!with_intervals) return boot;
+  SQLite::Database& handle = database_.handle();
+  SQLite::Statement query{handle, "SELECT announced_next_seq, last_robot_time_us FROM boot WHERE boot_key = ?"};
+  bind_all(query, boot_key);
+  query.executeStep();
+  add_intervals(handle, "SELECT first_seq, last_seq FROM segment WHERE boot_key = ? ORDER BY first_seq", boot_key,
+                boot.samples);
+  add_intervals(handle, "SELECT first_seq, last_seq FROM gap WHERE boot_key = ?", boot_key, boot.samples);
+  add_intervals(
+      handle, "SELECT event_seq, event_seq FROM event WHERE boot_key = ? AND event_seq IS NOT NULL ORDER BY event_seq",
+      boot_key, boot.events);
+  add_intervals(handle, "SELECT first_event_seq, last_event_seq FROM event_gap WHERE boot_key = ?", boot_key,
+                boot.events);
+  boot.next_seq = std::max(unsigned_id(query.getColumn(0)), boot.samples.end());
+  boot.last_robot_time_us = unsigned_id(query.getColumn(1));
+  return boot;
+}
+
+void BootStore::start(const BootStart& start) {
+  SQLite::Database& handle = database_.handle();
+  // One that was admitted and has not connected is not older than this one.
+  SQLite::Statement others{handle,
+                           "SELECT boot_key FROM boot WHERE robot_id = ? AND boot_key <> ?"
+                           " AND connected_at_us IS NOT NULL AND ended_next_seq IS NULL"};
+  bind_all(others, start.robot_id, start.boot_key);
+  std::vector<std::int64_t> ending;
+  while (others.executeStep()) ending.push_back(others.getColumn(0).getInt64());
+  for (const std::int64_t boot_key : ending) end(boot_key, start.noticed_at_us);
+
+  // A boot that had ended and comes back goes on where it ended; any other boot belongs to the run from its beginning.
+  SQLite::Statement continue_run{
+      handle,
+      "INSERT INTO run_span (run_id, span, boot_key, first_seq)"
+      " SELECT run_id, (SELECT coalesce(max(span) + 1, 0) FROM run_span WHERE run_id = run.run_id), ?2,"
+      " (SELECT coalesce(ended_next_seq, 0) FROM boot WHERE boot_key = ?2)"
+      " FROM run WHERE robot_id = ?1 AND ended_at_us IS NULL"
+      " AND NOT EXISTS (SELECT 1 FROM run_span WHERE run_id = run.run_id AND last_seq IS NULL)"};
+  execute(continue_run, start.robot_id, start.boot_key);
+  SQLite::Statement update{
+      handle,
+      "UPDATE boot SET ended_next_seq = NULL, connected_at_us = ?, announced_next_seq = max(announced_next_seq, ?),"
+      " last_robot_time_us = max(last_robot_time_us, ?) WHERE boot_key = ?"};
+  execute(update, start.noticed_at_us, start.announced_next_seq, start.robot_time_us, start.boot_key);
+}
+
+void BootStore::end(std::int64_t boot_key, std::int64_t noticed_at_us) {
+  SQLite::Database& handle = database_.handle();
+  const StoredBoot boot = load(boot_key, true);
+  SQLite::Statement add_gap{handle, "INSERT INTO gap VALUES (?, ?, ?, 'reboot', ?)"};
+  for (const Interval& lost : boot.samples.missing({0, boot.next_seq})) {
+    execute(add_gap, boot_key, lost.first, lost.next - 1, noticed_at_us);
+  }
+  SQLite::Statement mark{handle, "UPDATE boot SET ended_next_seq = ? WHERE boot_key = ?"};
+  execute(mark, boot.next_seq, boot_key);
+  SQLite::Statement drop_empty{handle,
+                               "DELETE FROM run_span WHERE boot_key = ? AND last_seq IS NULL AND first_seq >= ?"};
+  execute(drop_empty, boot_key, boot.next_seq);
+  SQLite::Statement close{handle, "UPDATE run_span SET last_seq = ?2 - 1 WHERE boot_key = ?1 AND last_seq IS NULL"};
+  execute(close, boot_key, boot.next_seq);
+}
+
+}  // namespace server

@@ -1,0 +1,110 @@
+// Opens the database, refuses what is not ours, and brings an older one up to date.
+#include "server/recording/database.hpp"
+
+#include <fmt/format.h>
+#include <sodium.h>
+#include <sqlite3.h>
+#include <sys/stat.h>
+
+#include <stdexcept>
+
+#include "server/recording/schema.hpp"
+#include "server/recording/statement.hpp"
+
+namespace server {
+namespace {
+
+constexpr int kBusyTimeoutMs = 5000;
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
+  throw std::runtime_error{fmt::format(
+      "cannot record into {}: {}. The file was left as it is; move it away, or choose another folder with --data",
+      path.string(), why)};
+}
+
+std::int64_t pragma(SQLite::Database& database, const char* name) {
+  return database.execAndGet(fmt::format("PRAGMA {}", name)).getInt64();
+}
+
+// A file of length 0, or one whose creation was cut off before its first transaction: nothing in it.
+bool is_blank(SQLite::Database& database) {
+  return pragma(database, "application_id") == 0 && pragma(database, "user_version") == 0 &&
+         database.execAndGet("SELECT count(*) FROM sqlite_master").getInt64() == 0;
+}
+
+void set_up_blank(SQLite::Database& database) {
+  database.exec("PRAGMA page_size = 4096");
+  database.exec("PRAGMA auto_vacuum = INCREMENTAL");
+}
+
+// synchronous=FULL: what is committed survives a power cut, so a commit may be acknowledged to the robot.
+void configure(SQLite::Database& database) {
+  database.exec("PRAGMA journal_mode = WAL");
+  database.exec("PRAGMA synchronous = FULL");
+  database.exec("PRAGMA foreign_keys = ON");
+  database.exec("PRAGMA wal_autocheckpoint = 16384");  // pages: 64 MB
+  database.exec("PRAGMA journal_size_limit = 67108864");
+}
+
+SQLite::Database open_checked(const std::filesystem::path& path) {
+  try {
+    SQLite::Database database{path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs};
+    if (is_blank(database)) {
+      set_up_blank(database);
+      configure(database);
+      return database;
+    }
+    const std::int64_t application_id = pragma(database, "application_id");
+    const std::int64_t version = pragma(database, "user_version");
+    const auto known = static_cast<std::int64_t>(migrations().size());
+    if (application_id != kApplicationId) {
+      refuse(path, fmt::format("it belongs to another program (application_id {:#x}, Rheonaut's is {:#x})",
+                               application_id, kApplicationId));
+    }
+    if (version < 1 || version > known) {
+      refuse(path, fmt::format("its schema is version {}, this program knows 1 to {}; a newer Rheonaut made it",
+                               version, known));
+    }
+    configure(database);
+    return database;
+  } catch (const SQLite::Exception& error) {
+    if (error.getErrorCode() == SQLITE_NOTADB) refuse(path, "it is not an SQLite database");
+    refuse(path, fmt::format("SQLite says '{}' (code {})", error.what(), error.getExtendedErrorCode()));
+  }
+}
+
+}  // namespace
+
+Database::Database(const std::filesystem::path& path) : handle_{open_checked(path)} {
+  if (sodium_init() < 0) throw std::runtime_error{"libsodium cannot be initialised: the system gives no random bytes"};
+  migrate(path);
+  store_id_ = unsigned_id(handle_.execAndGet("SELECT value FROM meta WHERE name = 'store_id'"));
+}
+
+void Database::migrate(const std::filesystem::path& path) {
+  const auto version = static_cast<std::size_t>(pragma(handle_, "user_version"));
+  if (version == migrations().size()) return;
+  ::chmod(path.c_str(), S_IRUSR | S_IWUSR);  // it holds token hashes
+  SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
+  for (const char* script : migrations().subspan(version)) handle_.exec(script);
+  if (version == 0) {
+    std::uint64_t store_id = 0;
+    randombytes_buf(&store_id, sizeof store_id);
+    SQLite::Statement add{handle_, "INSERT INTO meta (name, value) VALUES (?, ?)"};
+    execute(add, "store_id", store_id);
+    execute(add, "next_row", std::int64_t{1});
+  }
+  handle_.exec(fmt::format("PRAGMA application_id = {}", kApplicationId));
+  handle_.exec(fmt::format("PRAGMA user_version = {}", migrations().size()));
+  transaction.commit();
+}
+
+void Database::checkpoint() { handle_.exec("PRAGMA wal_checkpoint(TRUNCATE)"); }
+
+SQLite::Database open_for_reading(const std::filesystem::path& path) {
+  SQLite::Database database{path.string(), SQLite::OPEN_READONLY, kBusyTimeoutMs};
+  database.exec("PRAGMA query_only = ON");
+  return database;
+}
+
+}  // namespace server

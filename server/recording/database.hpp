@@ -1,0 +1,37 @@
+// The one writing handle of the station's database: opened, checked and migrated here.
+//
+// Used on the disk thread only (and by its owner before that thread works and after it has ended). A file that is not
+// ours is refused with an exception that says what it is and what to do, and is left as it was.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <cstdint>
+#include <filesystem>
+
+namespace server {
+
+class Database {
+ public:
+  // Creates the file if there is none.
+  explicit Database(const std::filesystem::path& path);
+
+  SQLite::Database& handle() { return handle_; }
+
+  // Random, made with the file: a robot sees by it that it talks to another store.
+  std::uint64_t store_id() const { return store_id_; }
+
+  // Moves the write-ahead log into the file and empties it.
+  void checkpoint();
+
+ private:
+  void migrate(const std::filesystem::path& path);
+
+  SQLite::Database handle_;
+  std::uint64_t store_id_ = 0;
+};
+
+// For queries, beside the writing handle; never blocks it.
+SQLite::Database open_for_reading(const std::filesystem::path& path);
+
+}  // namespace server

@@ -1,0 +1,151 @@
+// Records everything, always: hears the station, writes groups to disk, and says what has become durable.
+//
+//   Station → on_samples, on_event, on_command → queue → one transaction per 100 ms → set_on_durable's function
+//
+// A robot's samples are written when they are 100, or 1 s old; events and commands with the next commit. Duplicates
+// are dropped against what is stored and what waits. What the robot no longer holds is a gap, stored with its cause.
+//
+// Overflow: when the queue is full a batch is neither queued nor acknowledged; the robot still holds it, and it is
+// asked for again (set_on_missing's function) once the queue has drained. Missing samples are asked for the same way.
+//
+// Loop thread; SQL on the disk thread. The loop, the clock and the worker outlive it; runs and history use it. When it
+// is destroyed no job of it may be under way, that is: the loop's run() has returned.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "server/clock.hpp"
+#include "server/recording/boot_recording.hpp"
+#include "server/station/robot_archive.hpp"
+#include "server/station/station_sink.hpp"
+#include "server/worker.hpp"
+
+namespace server {
+
+struct RecorderOptions {
+  std::filesystem::path path;     // of the database
+  bool enrol_on_loopback = true;  // a new robot that connects from this machine is enrolled
+  std::size_t max_queued_samples = 2'000'000;
+  std::size_t max_queued_records = 100'000;  // events and commands
+};
+
+// What the station must know again after a restart.
+struct RestoredState {
+  std::uint64_t store_id = 0;
+  std::vector<RobotId> robots;
+  std::vector<CommandRecord> pending_stops;  // emergency stops that no robot has acknowledged
+};
+
+// Since the start of the program.
+struct RecorderCounters {
+  std::uint64_t samples_written = 0;
+  std::uint64_t samples_duplicate = 0;
+  std::uint64_t samples_refused = 0;  // not queued because the queue was full; each is asked for again
+  std::uint64_t samples_lost = 0;     // in stored gaps
+  std::uint64_t records_refused = 0;  // events and commands that the full queue did not take
+  std::uint64_t batches_malformed = 0;
+  std::uint64_t commits = 0;
+};
+
+class Recorder final : public StationSink, public RobotArchive {
+ public:
+  using OnDurable = std::function<void(const RobotId&, BootId, std::uint64_t next_seq, std::uint64_t next_event_seq)>;
+  using OnMissing = std::function<void(const RobotId&, BootId, std::uint64_t first_seq, std::uint64_t next_seq)>;
+
+  Recorder(boost::asio::io_context& loop, Clock& clock, WorkerThread& disk, RecorderOptions options);
+  ~Recorder() override;
+
+  void set_on_durable(OnDurable on_durable) { on_durable_ = std::move(on_durable); }
+  void set_on_missing(OnMissing on_missing) { on_missing_ = std::move(on_missing); }
+
+  // Opens or creates the database; before everything else. Throws when the file is not ours or cannot be written.
+  boost::asio::awaitable<RestoredState> open();
+
+  // Commits and asks for what is missing, until cancelled.
+  boost::asio::awaitable<void> run();
+
+  // Returns when everything heard so far is durable. Needs run().
+  boost::asio::awaitable<void> flush();
+
+  // After the loop has ended: writes and commits everything left.
+  void close();
+
+  boost::asio::awaitable<Admission> admit(AdmissionRequest request) override;
+
+  void on_robot(const RobotState& robot) override;
+  void on_samples(const RobotState& robot, const SampleBatch& batch) override;
+  void on_event(const RobotState& robot, const RobotEvent& event) override;
+  void on_command(const CommandRecord& command) override;
+
+  // Runs job(Database&) on the disk thread, between two commits.
+  template <class Job>
+  boost::asio::awaitable<std::invoke_result_t<Job, Database&>> on_disk(Job job) {
+    auto with_database = [this, job = std::move(job)]() mutable { return job(*database_); };
+    co_return co_await disk_.run(std::move(with_database));
+  }
+
+  // One above the newest sample that a boot is known to have made; 0 when the boot is not in use.
+  std::uint64_t next_seq(BootId boot_id) const;
+
+  boost::asio::io_context& loop() { return loop_; }
+  const RecorderCounters& counters() const { return counters_; }
+  std::size_t queued_samples() const { return queued_samples_; }
+
+ private:
+  struct Boot {
+    explicit Boot(RobotId robot_id) : recording{std::move(robot_id)} {}
+    BootRecording recording;
+    bool connected = false;
+    bool started = false;            // has been connected
+    bool replaced = false;           // a later boot of this robot has connected
+    int admissions = 0;              // under way
+    std::int64_t last_used_us = 0;   // steady time of the last admission
+    std::optional<BootStart> hello;  // admitted, and not connected since
+    std::uint64_t hello_oldest_seq = 0;
+  };
+  using Boots = std::map<BootId, Boot>;
+
+  boost::asio::awaitable<void> wait_for_commit();
+  boost::asio::awaitable<void> commit(bool everything);
+  void take(bool everything);
+  void set_durable(const WriteBatch& written);
+  void ask_for_missing();
+  void forget_unused();
+  Admission take_in(Boot& boot, AdmissionOutcome outcome, const AdmissionRequest& request);
+  void replace_others(const RobotId& robot_id, BootId boot_id);
+  void wake();
+  bool room_for_record();
+
+  boost::asio::io_context& loop_;
+  Clock& clock_;
+  WorkerThread& disk_;
+  RecorderOptions options_;
+  OnDurable on_durable_;
+  OnMissing on_missing_;
+
+  std::unique_ptr<Database> database_;  // used by jobs; by close() when no job can be under way
+  std::unique_ptr<SampleStore> store_;
+
+  Boots boots_;
+  WriteBatch queue_;    // all but samples, which wait in their boot
+  WriteBatch writing_;  // being written; kept until it is durable
+  std::size_t queued_samples_ = 0;
+  RecorderCounters counters_;
+  std::int64_t last_commit_us_ = 0;      // steady
+  std::int64_t overflow_logged_us_ = 0;  // steady
+  bool idle_ = false;                    // run() waits for work_
+
+  Signal work_{loop_};  // something to record, or a robot to watch
+  Signal flush_wanted_{loop_};
+  std::vector<std::shared_ptr<Signal>> flushes_;  // shared with the coroutines that wait, which may be gone
+};
+
+}  // namespace server

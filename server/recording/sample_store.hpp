@@ -1,0 +1,82 @@
+// Writes what the recorder collected, one transaction at a time: samples with their segments, gaps, events, commands.
+//
+// Disk thread only. Uses the Database, which outlives it. The recorder has already dropped every duplicate and cut the
+// samples into segments; the store numbers their rows and computes the extremes.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/recording/boot_store.hpp"
+#include "server/recording/database.hpp"
+#include "server/recording/interval_set.hpp"
+#include "server/station/station_state.hpp"
+
+namespace server {
+
+// 1 to 100 consecutive samples that share everything but their values.
+struct Segment {
+  std::int64_t boot_key = 0;
+  std::uint64_t first_seq = 0;
+  std::uint64_t first_robot_time_us = 0;
+  SampleContext context;
+  std::vector<Sample> samples;
+  std::int64_t received_at_us = 0;  // UTC, when the last of them had arrived
+  std::int64_t utc_offset_us = 0;
+  std::int64_t clock_uncertainty_us = -1;
+
+  std::uint64_t next_seq() const { return first_seq + samples.size(); }
+};
+
+// Samples (or events) that are lost for good.
+struct LostRange {
+  std::int64_t boot_key = 0;
+  Interval lost;
+  std::string cause;
+  std::int64_t noticed_at_us = 0;  // UTC
+};
+
+struct StoredEvent {
+  std::int64_t boot_key = 0;  // 0: an event of the station
+  RobotEvent event;
+};
+
+// All that is written in one transaction.
+struct WriteBatch {
+  std::vector<Segment> segments;
+  std::vector<LostRange> gaps;
+  std::vector<StoredEvent> events;
+  std::vector<LostRange> event_gaps;
+  std::vector<CommandRecord> commands;  // each replaces what is stored of the same command
+  std::vector<BootStart> boots;         // applied last: they end the robots' earlier boots
+
+  bool empty() const;
+};
+
+class SampleStore {
+ public:
+  explicit SampleStore(Database& database);
+
+  // Durable when it returns. Throws when it cannot be (disk full): nothing of the batch is stored then.
+  void write(const WriteBatch& batch);
+
+ private:
+  std::int64_t write_segment(const Segment& segment, std::int64_t first_row);  // returns the row after its last
+  void write_event(const StoredEvent& stored);
+  void write_command(const CommandRecord& command);
+
+  Database& database_;
+  BootStore boots_;
+  std::int64_t next_row_ = 0;
+  SQLite::Statement insert_sample_;
+  SQLite::Statement insert_segment_;
+  SQLite::Statement insert_gap_;
+  SQLite::Statement insert_event_;
+  SQLite::Statement insert_event_gap_;
+  SQLite::Statement upsert_command_;
+  SQLite::Statement advance_row_;
+  SQLite::Statement advance_boot_;
+};
+
+}  // namespace server

@@ -1,0 +1,65 @@
+// Binding and reading of the store's value types, on top of SQLiteCpp: 64-bit ids are stored as two's complement, a
+// missing or non-finite number as NULL.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+
+namespace server {
+
+inline std::int64_t signed_id(std::uint64_t id) { return std::bit_cast<std::int64_t>(id); }
+inline std::uint64_t unsigned_id(const SQLite::Column& column) {
+  return std::bit_cast<std::uint64_t>(column.getInt64());
+}
+
+inline void bind_value(SQLite::Statement& statement, int index, std::int64_t value) { statement.bind(index, value); }
+inline void bind_value(SQLite::Statement& statement, int index, std::uint64_t value) {
+  statement.bind(index, signed_id(value));
+}
+inline void bind_value(SQLite::Statement& statement, int index, std::uint32_t value) { statement.bind(index, value); }
+inline void bind_value(SQLite::Statement& statement, int index, const std::string& value) {
+  statement.bind(index, value);
+}
+inline void bind_value(SQLite::Statement& statement, int index, const char* value) { statement.bind(index, value); }
+inline void bind_value(SQLite::Statement& statement, int index, double value) {
+  std::isfinite(value) ? statement.bind(index, value) : statement.bind(index);
+}
+inline void bind_value(SQLite::Statement& statement, int index, float value) {
+  bind_value(statement, index, static_cast<double>(value));
+}
+template <class T>
+void bind_value(SQLite::Statement& statement, int index, const std::optional<T>& value) {
+  value ? bind_value(statement, index, *value) : statement.bind(index);
+}
+
+// Binds all values in order, before the rows are fetched.
+template <class... Values>
+void bind_all(SQLite::Statement& statement, const Values&... values) {
+  statement.reset();
+  int index = 0;
+  (bind_value(statement, ++index, values), ...);
+}
+
+// Runs a statement that gives no rows; returns the number of rows it changed.
+template <class... Values>
+int execute(SQLite::Statement& statement, const Values&... values) {
+  bind_all(statement, values...);
+  const int changed = statement.exec();
+  statement.reset();
+  return changed;
+}
+
+inline float float_or_nan(const SQLite::Column& column) {
+  return column.isNull() ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(column.getDouble());
+}
+inline std::optional<float> optional_float(const SQLite::Column& column) {
+  return column.isNull() ? std::nullopt : std::optional{static_cast<float>(column.getDouble())};
+}
+
+}  // namespace server

@@ -1,0 +1,104 @@
+// Column lists stand beside the functions that read them.
+#include "server/recording/stored_rows.hpp"
+
+#include <fmt/format.h>
+
+#include "server/recording/statement.hpp"
+
+namespace server {
+namespace {
+
+CommandState command_state_from(const std::string& name) {
+  for (int value = 0; value <= static_cast<int>(CommandState::failed); ++value) {
+    if (name == text(static_cast<CommandState>(value))) return static_cast<CommandState>(value);
+  }
+  return CommandState::failed;
+}
+
+constexpr const char* kUnfinished = "state IN ('queued', 'sent')";
+
+}  // namespace
+
+protocol::Mode mode_from(const std::string& text) {
+  for (int value = _rheonaut_Mode_MIN; value <= _rheonaut_Mode_MAX; ++value) {
+    if (text == protocol::text(static_cast<protocol::Mode>(value))) return static_cast<protocol::Mode>(value);
+  }
+  return rheonaut_MODE_UNSPECIFIED;
+}
+
+protocol::SubState sub_state_from(const std::string& text) {
+  for (int value = _rheonaut_SubState_MIN; value <= _rheonaut_SubState_MAX; ++value) {
+    if (text == protocol::text(static_cast<protocol::SubState>(value))) return static_cast<protocol::SubState>(value);
+  }
+  return rheonaut_SUB_STATE_NONE;
+}
+
+std::string select_commands(const char* condition) {
+  return fmt::format(
+      "SELECT command_id, robot_id, boot_id, kind, arguments, actor, state, reason, submitted_at_us, sent_at_us,"
+      " ended_at_us, effect_at_robot_us, emergency_id FROM command {}",
+      condition);
+}
+
+CommandRecord command_from(SQLite::Statement& row) {
+  CommandRecord command;
+  command.id = unsigned_id(row.getColumn(0));
+  command.robot_id = row.getColumn(1).getString();
+  command.boot_id = unsigned_id(row.getColumn(2));
+  command.kind = row.getColumn(3).getString();
+  command.arguments = row.getColumn(4).getString();
+  command.actor = row.getColumn(5).getString();
+  command.state = command_state_from(row.getColumn(6).getString());
+  command.reason = row.getColumn(7).getString();
+  command.submitted_at_us = row.getColumn(8).getInt64();
+  command.sent_at_us = row.getColumn(9).getInt64();
+  command.ended_at_us = row.getColumn(10).getInt64();
+  command.effect_at_robot_us = unsigned_id(row.getColumn(11));
+  command.emergency_id = unsigned_id(row.getColumn(12));
+  return command;
+}
+
+std::string select_events(const char* condition) {
+  return fmt::format(
+      "SELECT event.robot_id, boot.boot_id, event_seq, robot_time_us, sample_seq, kind, cause, mode, sub_state,"
+      " position_m, value, emergency_id, command_id, received_at_us FROM event LEFT JOIN boot USING (boot_key) {}",
+      condition);
+}
+
+RobotEvent event_from(SQLite::Statement& row) {
+  RobotEvent event;
+  event.robot_id = row.getColumn(0).getString();
+  event.boot_id = unsigned_id(row.getColumn(1));
+  if (!row.getColumn(2).isNull()) event.event_seq = unsigned_id(row.getColumn(2));
+  event.robot_time_us = unsigned_id(row.getColumn(3));
+  event.sample_seq = unsigned_id(row.getColumn(4));
+  event.kind = row.getColumn(5).getString();
+  event.cause = row.getColumn(6).getString();
+  event.mode = mode_from(row.getColumn(7).getString());
+  event.sub_state = sub_state_from(row.getColumn(8).getString());
+  event.position_m = float_or_nan(row.getColumn(9));
+  event.value = float_or_nan(row.getColumn(10));
+  event.emergency_id = unsigned_id(row.getColumn(11));
+  event.command_id = unsigned_id(row.getColumn(12));
+  event.received_at_us = row.getColumn(13).getInt64();
+  return event;
+}
+
+std::vector<CommandRecord> pending_stops(Database& database) {
+  std::vector<CommandRecord> stops;
+  const std::string condition =
+      fmt::format("WHERE kind = 'emergency_stop' AND {} ORDER BY submitted_at_us", kUnfinished);
+  SQLite::Statement query{database.handle(), select_commands(condition.c_str())};
+  while (query.executeStep()) stops.push_back(command_from(query));
+  return stops;
+}
+
+void fail_unfinished_commands(Database& database, std::int64_t utc_us) {
+  SQLite::Statement update{database.handle(),
+                           fmt::format("UPDATE command SET state = 'failed', reason = 'station_restarted',"
+                                       " ended_at_us = ? WHERE kind <> 'emergency_stop' AND {}",
+                                       kUnfinished)};
+  execute(update, utc_us);
+}
+
+}  // namespace server

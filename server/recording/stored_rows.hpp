@@ -1,0 +1,33 @@
+// From stored rows back to the station's values, and the queries over commands and events that give them.
+//
+// On the thread that owns the handle.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/recording/database.hpp"
+#include "server/station/station_state.hpp"
+
+namespace server {
+
+// The enumerator whose text() this is; the unspecified one for a text that this version does not know.
+protocol::Mode mode_from(const std::string& text);
+protocol::SubState sub_state_from(const std::string& text);
+
+// `condition` is SQL that follows SELECT … FROM; its `?` are bound by the caller.
+std::string select_commands(const char* condition);
+std::string select_events(const char* condition);
+CommandRecord command_from(SQLite::Statement& row);
+RobotEvent event_from(SQLite::Statement& row);
+
+// Emergency stops that no robot has acknowledged, oldest first.
+std::vector<CommandRecord> pending_stops(Database& database);
+
+// Commands other than emergency stops that were on their way when the station stopped: nobody follows them any more.
+void fail_unfinished_commands(Database& database, std::int64_t utc_us);
+
+}  // namespace server

@@ -1,0 +1,30 @@
+// One robot's place in the station: its port while it is connected, and its commands on their way.
+#pragma once
+
+#include <limits>
+
+#include "server/station/station.hpp"
+
+namespace server {
+
+// A command from submission to its end; the submitter waits for `ended`. Shared by the seat and the submitter, since
+// either may go first.
+struct Station::PendingCommand {
+  explicit PendingCommand(boost::asio::io_context& loop) : ended{loop} {}
+
+  bool is_stop() const { return wire.which_action == rheonaut_Command_emergency_stop_tag; }
+
+  CommandRecord record;
+  protocol::Command wire = rheonaut_Command_init_zero;
+  std::int64_t deadline_us = std::numeric_limits<std::int64_t>::max();  // steady
+  Signal ended;
+};
+
+struct Station::Seat {
+  RobotState* robot = nullptr;  // in Station::robots_
+  RobotPort* port = nullptr;    // null while disconnected
+  std::map<CommandId, std::shared_ptr<PendingCommand>> commands;
+  std::uint64_t latch_known_at_robot_us = 0;  // older telemetry says nothing about the latch
+};
+
+}  // namespace server

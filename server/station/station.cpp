@@ -1,0 +1,285 @@
+// Live state: robots come and go, samples and events pass through to the sinks.
+#include "server/station/station.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <fmt/format.h>
+#include <algorithm>
+
+#include "server/station/seat.hpp"
+
+namespace server {
+namespace {
+
+SampleContext context_of(const protocol::Telemetry& telemetry) {
+  SampleContext context;
+  context.period_us = telemetry.period_us;
+  context.mode = telemetry.mode;
+  context.sub_state = telemetry.sub_state;
+  if (telemetry.has_setpoint_m) context.setpoint_m = telemetry.setpoint_m;
+  context.disturbance_m = telemetry.disturbance_m;
+  context.position_sd_m = telemetry.position_sd_m;
+  context.controller_id = telemetry.controller_id;
+  context.emergency_id = telemetry.emergency_id;
+  context.emergency_cause = telemetry.emergency_cause;
+  context.flags = telemetry.flags;
+  return context;
+}
+
+std::vector<Sample> samples_of(const protocol::Telemetry& telemetry) {
+  std::vector<Sample> samples(telemetry.position_m_count);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i] = {telemetry.position_m[i], telemetry.velocity_m_s[i], telemetry.acceleration_m_s2[i],
+                  telemetry.duty[i],       telemetry.impedance_mv[i], telemetry.reference_m[i]};
+  }
+  return samples;
+}
+
+}  // namespace
+
+const char* text(LinkState value) { return value == LinkState::connected ? "connected" : "disconnected"; }
+
+Station::Station(boost::asio::io_context& loop, Clock& clock, CommandLimits limits, LinkTimes times)
+    : loop_{loop}, clock_{clock}, limits_{limits}, times_{times} {}
+
+Station::~Station() = default;
+
+void Station::add_sink(StationSink& sink) { sinks_.push_back(&sink); }
+
+void Station::restore_robots(const std::vector<RobotId>& ids) {
+  for (const RobotId& id : ids) add_seat(id);
+}
+
+const RobotState* Station::find(const RobotId& id) const {
+  const auto robot = robots_.find(id);
+  return robot == robots_.end() ? nullptr : &robot->second;
+}
+
+Station::Seat* Station::seat_of(const RobotPort& port) {
+  const auto seat = seats_.find(port.robot_id());
+  return seat == seats_.end() || seat->second.port != &port ? nullptr : &seat->second;
+}
+
+Station::Seat& Station::add_seat(const RobotId& id) {
+  RobotState& robot = robots_[id];
+  robot.id = id;
+  Seat& seat = seats_[id];
+  seat.robot = &robot;
+  return seat;
+}
+
+std::int64_t Station::robot_now_us(const RobotState& robot) const {
+  return static_cast<std::int64_t>(robot.latest_robot_time_us) + clock_.steady_us() - robot.last_received_steady_us;
+}
+
+void Station::publish(const RobotState& robot) {
+  for (StationSink* sink : sinks_) sink->on_robot(robot);
+}
+
+void Station::publish(const CommandRecord& record) {
+  for (StationSink* sink : sinks_) sink->on_command(record);
+}
+
+// An event of the station itself about a robot.
+void Station::note(const RobotState& robot, std::string kind, std::string cause) {
+  RobotEvent event;
+  event.robot_id = robot.id;
+  event.boot_id = robot.boot_id;
+  event.kind = std::move(kind);
+  event.cause = std::move(cause);
+  event.mode = robot.context.mode;
+  event.sub_state = robot.context.sub_state;
+  event.robot_time_us = robot.latest_robot_time_us;
+  event.received_at_us = clock_.utc_us();
+  for (StationSink* sink : sinks_) sink->on_event(robot, event);
+}
+
+Result<void> Station::may_connect(const RobotId& id, BootId boot_id) const {
+  const auto seat = seats_.find(id);
+  if (seat == seats_.end() || seat->second.port == nullptr) return {};
+  const RobotState& robot = robots_.at(id);
+  if (robot.boot_id == boot_id) return {};
+  const std::int64_t silent_us = clock_.steady_us() - robot.last_received_steady_us;
+  if (silent_us >= std::int64_t{times_.link_timeout_ms} * 1000) return {};
+  return fail(ErrorCode::conflict, fmt::format("robot '{}' is connected from {} with boot {}; it was heard {} ms ago",
+                                               id, robot.peer, robot.boot_id, silent_us / 1000));
+}
+
+void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const protocol::Hello& details,
+                           const Admission& admission, const std::string& peer) {
+  Seat& seat = add_seat(hello.robot_id);
+  RobotState& robot = *seat.robot;
+  if (RobotPort* previous = std::exchange(seat.port, nullptr); previous != nullptr) {
+    previous->close(fmt::format("replaced by a connection from {}", peer));
+    note(robot, "connection_replaced", fmt::format("{} takes the place of {}", peer, robot.peer));
+  }
+  const bool was_latched = robot.latched();
+  const bool other_boot = robot.boot_id != hello.boot_id;
+  if (other_boot) robot.sample.reset();
+  seat.port = &port;
+  seat.latch_known_at_robot_us = hello.robot_time_us;
+  robot.link = LinkState::connected;
+  robot.peer = peer;
+  robot.connected_at_us = robot.last_received_at_us = hello.received_at_us;
+  robot.last_received_steady_us = clock_.steady_us();
+  robot.latest_robot_time_us = hello.robot_time_us;
+  robot.boot_id = hello.boot_id;
+  robot.reset_cause = hello.reset_cause;
+  robot.firmware_version = hello.firmware_version;
+  robot.sample_period_us = hello.sample_period_us;
+  robot.ring_capacity = details.ring_capacity;
+  robot.parameters_checksum = details.parameters_checksum;
+  robot.controller_checksum = details.controller_checksum;
+  if (other_boot) robot.context = SampleContext{};
+  robot.context.controller_id = details.controller_id;
+  robot.context.mode = details.mode;
+  robot.context.emergency_id = details.emergency_id;
+  robot.context.emergency_cause = details.emergency_cause;
+  robot.next_seq = other_boot ? details.next_seq : std::max(robot.next_seq, details.next_seq);
+  robot.oldest_seq = details.oldest_seq;
+  robot.durable_next_seq = admission.durable_next_seq;
+  robot.durable_next_event_seq = admission.durable_next_event_seq;
+  robot.status.reset();
+  robot.clock = ClockEstimate{};
+  spdlog::info("robot '{}' connected from {}: boot {}, {} samples held, durable to {}", robot.id, peer, robot.boot_id,
+               details.next_seq - details.oldest_seq, admission.durable_next_seq);
+
+  // SAFETY: stops that no robot has acknowledged go first; a robot that lost its latch in a reset is latched again.
+  bool stop_waits = false;
+  for (const auto& [id, pending] : seat.commands) {
+    if (!pending->is_stop()) continue;
+    hand_stop_to(seat, pending);
+    stop_waits = true;
+  }
+  if (was_latched && other_boot && !stop_waits && details.emergency_id == 0) {
+    CommandRequest request;
+    request.robot_id = robot.id;
+    request.action.which_action = rheonaut_Command_emergency_stop_tag;
+    request.actor = "station:latch";
+    const auto stop = make_pending(request, robot);
+    seat.commands.emplace(stop->record.id, stop);
+    robot.pending_stop = stop->record.id;
+    hand_stop_to(seat, stop);
+    publish(stop->record);
+  }
+  note(robot, "connected", fmt::format("from {}", peer));
+  publish(robot);
+}
+
+void Station::on_disconnected(RobotPort& port, const std::string& reason) {
+  Seat* seat = seat_of(port);
+  if (seat == nullptr) return;  // its place was taken
+  seat->port = nullptr;
+  RobotState& robot = *seat->robot;
+  robot.link = LinkState::disconnected;
+  spdlog::info("robot '{}' disconnected: {}", robot.id, reason);
+  std::vector<CommandId> ended;
+  for (const auto& [id, pending] : seat->commands) {
+    if (!pending->is_stop()) ended.push_back(id);  // SAFETY: a stop is kept until a robot acknowledges it
+  }
+  for (const CommandId id : ended) finish(*seat, id, CommandState::failed, "link_lost");
+  note(robot, "disconnected", reason);
+  publish(robot);
+}
+
+void Station::on_frame(RobotPort& port, std::uint64_t robot_time_us) {
+  Seat* seat = seat_of(port);
+  if (seat == nullptr) return;
+  RobotState& robot = *seat->robot;
+  robot.last_received_at_us = clock_.utc_us();
+  robot.last_received_steady_us = clock_.steady_us();
+  robot.latest_robot_time_us = std::max(robot.latest_robot_time_us, robot_time_us);
+  expire_commands(*seat);
+}
+
+void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) {
+  Seat* seat = seat_of(port);
+  if (seat == nullptr) return;
+  RobotState& robot = *seat->robot;
+  SampleBatch batch;
+  batch.robot_id = robot.id;
+  batch.boot_id = robot.boot_id;
+  batch.first_seq = telemetry.first_seq;
+  batch.first_robot_time_us = telemetry.first_robot_time_us;
+  batch.oldest_seq = telemetry.oldest_seq;
+  batch.context = context_of(telemetry);
+  batch.samples = samples_of(telemetry);
+  batch.received_at_us = robot.last_received_at_us;
+  const std::int64_t utc_minus_steady_us = robot.last_received_at_us - robot.last_received_steady_us;
+  if (robot.clock.valid) {
+    batch.utc_offset_us = robot.clock.offset_us + utc_minus_steady_us;
+    batch.clock_uncertainty_us = robot.clock.uncertainty_us;
+  } else {
+    batch.utc_offset_us = robot.last_received_at_us - static_cast<std::int64_t>(robot.latest_robot_time_us);
+  }
+  if (batch.next_seq() > robot.next_seq) {  // live, not sent again
+    const std::uint64_t emergency_id = robot.context.emergency_id;
+    const auto emergency_cause = robot.context.emergency_cause;
+    robot.context = batch.context;
+    // SAFETY: a batch that was made before the latest ack of a stop or clear does not undo what that ack said.
+    if (batch.first_robot_time_us < seat->latch_known_at_robot_us) {
+      robot.context.emergency_id = emergency_id;
+      robot.context.emergency_cause = emergency_cause;
+    }
+    robot.sample = batch.samples.back();
+    robot.next_seq = batch.next_seq();
+  }
+  robot.oldest_seq = std::max(robot.oldest_seq, batch.oldest_seq);
+  for (StationSink* sink : sinks_) sink->on_samples(robot, batch);
+}
+
+void Station::on_event(RobotPort& port, const protocol::Event& event) {
+  const Seat* seat = seat_of(port);
+  if (seat == nullptr) return;
+  const RobotState& robot = *seat->robot;
+  RobotEvent out;
+  out.robot_id = robot.id;
+  out.boot_id = robot.boot_id;
+  out.event_seq = event.event_seq;
+  out.oldest_event_seq = event.oldest_event_seq;
+  out.robot_time_us = event.event_robot_time_us;
+  out.sample_seq = event.sample_seq;
+  out.kind = protocol::text(event.kind);
+  out.cause = event.emergency_cause == rheonaut_EMERGENCY_CAUSE_NONE ? protocol::text(event.cause)
+                                                                     : protocol::text(event.emergency_cause);
+  out.mode = event.mode;
+  out.sub_state = event.sub_state;
+  out.position_m = event.position_m;
+  out.value = event.value;
+  out.emergency_id = event.emergency_id;
+  out.command_id = event.command_id;
+  out.received_at_us = robot.last_received_at_us;
+  for (StationSink* sink : sinks_) sink->on_event(robot, out);
+}
+
+void Station::on_status(RobotPort& port, const protocol::Status& status) {
+  Seat* seat = seat_of(port);
+  if (seat == nullptr) return;
+  RobotState& robot = *seat->robot;
+  robot.status = status;
+  publish(robot);
+}
+
+void Station::on_clock(RobotPort& port, const ClockEstimate& estimate) {
+  Seat* seat = seat_of(port);
+  if (seat == nullptr) return;
+  seat->robot->clock = estimate;
+}
+
+void Station::on_durable(const RobotId& id, BootId boot_id, std::uint64_t durable_next_seq,
+                         std::uint64_t durable_next_event_seq) {
+  const auto robot = robots_.find(id);
+  if (robot == robots_.end() || robot->second.boot_id != boot_id) return;
+  robot->second.durable_next_seq = durable_next_seq;
+  robot->second.durable_next_event_seq = durable_next_event_seq;
+  if (RobotPort* port = seats_.at(id).port; port != nullptr)
+    port->acknowledge(durable_next_seq, durable_next_event_seq);
+}
+
+void Station::request_resend(const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t next_seq) {
+  const auto robot = robots_.find(id);
+  if (robot == robots_.end() || robot->second.boot_id != boot_id) return;
+  if (RobotPort* port = seats_.at(id).port; port != nullptr) port->request_resend(first_seq, next_seq);
+}
+
+}  // namespace server

@@ -1,0 +1,161 @@
+// Ticks, dials, reads and writes.
+#include "sim_robot/robot_client.hpp"
+
+#include <algorithm>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/connect.hpp>
+#include <boost/asio/experimental/awaitable_operators.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <chrono>
+#include <utility>
+
+namespace sim_robot {
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using namespace asio::experimental::awaitable_operators;
+using namespace std::chrono_literals;
+
+constexpr auto kPeriod = std::chrono::microseconds(SimulatedRobot::kPeriodUs);
+constexpr auto kConnectTimeout = 1s;
+constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
+constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
+
+asio::awaitable<void> pause(std::chrono::milliseconds duration) {
+  asio::steady_timer timer{co_await asio::this_coro::executor, duration};
+  co_await timer.async_wait(asio::use_awaitable);
+}
+
+}  // namespace
+
+RobotClient::RobotClient(asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log)
+    : robot_(std::move(config)),
+      station_(std::move(station)),
+      log_(std::move(log)),
+      socket_(loop),
+      tick_timer_(loop),
+      next_tick_at_(Clock::now()) {}
+
+asio::awaitable<void> RobotClient::run() {
+  next_tick_at_ = Clock::now();
+  co_await (tick() && stay_connected());
+}
+
+// The robot's time between two ticks: that of the last one plus what has passed, never beyond the next.
+std::uint64_t RobotClient::robot_now_us() const {
+  const auto ahead = std::chrono::duration_cast<std::chrono::microseconds>(next_tick_at_ - Clock::now());
+  const auto ahead_us = static_cast<std::uint64_t>(std::clamp(ahead, 0us, kPeriod).count());
+  return robot_.robot_time_us() - std::min(ahead_us, robot_.robot_time_us());
+}
+
+asio::awaitable<void> RobotClient::tick() {
+  for (;;) {
+    tick_timer_.expires_at(next_tick_at_);
+    co_await tick_timer_.async_wait(asio::use_awaitable);
+    robot_.step();
+    next_tick_at_ += kPeriod;
+    flush();
+    if (connected_ && robot_.core().connection_is_silent(robot_now_us())) {
+      say("the station is silent");
+      close_connection();
+    }
+  }
+}
+
+asio::awaitable<void> RobotClient::stay_connected() {
+  for (;;) {
+    const bool dialled = co_await dial();
+    if (dialled) {
+      co_await serve();
+      say_how_it_ended();
+    } else {
+      say("cannot reach the station at " + station_.host + ":" + station_.port + ", trying again");
+    }
+    std::uniform_int_distribution<int> pause_ms{kMinPauseMs, kMaxPauseMs};
+    co_await pause(std::chrono::milliseconds(pause_ms(jitter_)));
+  }
+}
+
+asio::awaitable<bool> RobotClient::dial() {
+  socket_ = tcp::socket{socket_.get_executor()};
+  tcp::resolver resolver{socket_.get_executor()};
+  auto resolving = resolver.async_resolve(station_.host, station_.port, kNoThrow) || pause(kConnectTimeout);
+  auto resolved = co_await std::move(resolving);
+  if (resolved.index() == 1) co_return false;
+  const auto [resolve_error, endpoints] = std::get<0>(resolved);
+  if (resolve_error) co_return false;
+  auto connecting = asio::async_connect(socket_, endpoints, kNoThrow) || pause(kConnectTimeout);
+  auto outcome = co_await std::move(connecting);
+  if (outcome.index() == 1 || std::get<0>(std::get<0>(outcome))) co_return false;
+  boost::system::error_code error;
+  socket_.set_option(tcp::no_delay{true}, error);
+  socket_.non_blocking(true, error);
+  co_return !error;
+}
+
+// Bytes go to the robot as they arrive, and what it answers leaves at once.
+asio::awaitable<void> RobotClient::serve() {
+  connected_ = true;
+  was_up_ = false;
+  frame_size_ = frame_sent_ = 0;
+  robot_.link_opened(robot_now_us());
+  flush();
+  std::array<std::uint8_t, 4096> bytes;
+  while (connected_) {
+    const auto [error, size] = co_await socket_.async_read_some(asio::buffer(bytes), kNoThrow);
+    if (error) break;
+    const bool keep = robot_.receive({bytes.data(), size}, robot_now_us());
+    flush();
+    if (!was_up_ && robot_.core().link_up()) {
+      was_up_ = true;
+      say("connected to " + station_.host + ":" + station_.port + " as " + robot_.config().robot_id);
+    }
+    if (!keep) break;
+  }
+  close_connection();
+}
+
+// Hands the socket what it takes without waiting, one write per frame.
+void RobotClient::flush() {
+  while (connected_) {
+    if (frame_sent_ == frame_size_) {
+      frame_size_ = robot_.transmit(frame_.data(), frame_.size(), robot_now_us());
+      frame_sent_ = 0;
+      if (frame_size_ == 0) return;
+    }
+    boost::system::error_code error;
+    frame_sent_ += socket_.write_some(asio::buffer(frame_.data() + frame_sent_, frame_size_ - frame_sent_), error);
+    if (error == asio::error::would_block) return;
+    if (error) return close_connection();
+  }
+}
+
+// Also ends the read under way.
+void RobotClient::close_connection() {
+  if (!connected_) return;
+  connected_ = false;
+  robot_.link_closed(robot_now_us());
+  boost::system::error_code ignored;
+  socket_.close(ignored);
+}
+
+void RobotClient::say_how_it_ended() {
+  const robot_fw::Robot& core = robot_.core();
+  if (core.refusal() != rheonaut_REFUSAL_REASON_NONE) {
+    const std::string detail = core.refusal_detail();
+    say("refused by the station: " + std::string(protocol::text(core.refusal())) +
+        (detail.empty() ? "" : " (" + detail + ")"));
+  } else {
+    say(was_up_ ? "connection lost, dialling again" : "the station closed the connection before its welcome");
+  }
+}
+
+// Says each thing once, however often it happens in a row.
+void RobotClient::say(const std::string& line) {
+  if (line != last_line_) log_(line);
+  last_line_ = line;
+}
+
+}  // namespace sim_robot

@@ -1,0 +1,66 @@
+// Runs a simulated robot in real time and connects it to a station over TCP.
+//
+// Ticks follow absolute deadlines: a late one is caught up at once, so the robot's time never drifts from the wall's.
+// A tick never waits for the network: what the socket does not take at once stays in the one frame under way, and the
+// robot keeps the rest. The connection is dialled again for ever, at most 1 s apart.
+// Owns robot and socket. One thread: that of `loop`, which must outlive the client.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <functional>
+#include <random>
+#include <string>
+
+#include "sim_robot/simulated_robot.hpp"
+
+namespace sim_robot {
+
+struct StationAddress {
+  std::string host;
+  std::string port;
+};
+
+// What people are told about the link, one line each.
+using LinkLog = std::function<void(const std::string& line)>;
+
+class RobotClient {
+ public:
+  RobotClient(boost::asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log);
+
+  // Ticks and connects until cancelled. Never returns otherwise.
+  boost::asio::awaitable<void> run();
+
+  const SimulatedRobot& robot() const { return robot_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  boost::asio::awaitable<void> tick();
+  boost::asio::awaitable<void> stay_connected();
+  boost::asio::awaitable<bool> dial();
+  boost::asio::awaitable<void> serve();
+  void flush();
+  void close_connection();
+  std::uint64_t robot_now_us() const;
+  void say_how_it_ended();
+  void say(const std::string& line);
+
+  SimulatedRobot robot_;
+  StationAddress station_;
+  LinkLog log_;
+  boost::asio::ip::tcp::socket socket_;
+  boost::asio::steady_timer tick_timer_;
+  bool connected_ = false;
+  bool was_up_ = false;  // welcomed on this connection
+  std::string last_line_;
+
+  Clock::time_point next_tick_at_;                               // when robot_.robot_time_us() is due
+  std::array<std::uint8_t, protocol::kMaxFramedBytes> frame_{};  // under way
+  std::size_t frame_size_ = 0, frame_sent_ = 0;
+  std::minstd_rand jitter_{std::random_device{}()};
+};
+
+}  // namespace sim_robot

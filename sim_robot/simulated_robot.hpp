@@ -1,0 +1,62 @@
+// A robot without hardware: the firmware core in a plant, stepped in virtual time, without sockets.
+//
+// robot_time_us() is the time of the next tick. A tick reads the sensors at that time; the duty that comes out of it
+// acts on the plant for the whole period that follows.
+#pragma once
+
+#include <string>
+
+#include "robot_fw/core/robot.hpp"
+#include "sim_robot/plant.hpp"
+
+namespace sim_robot {
+
+struct SimulatedRobotConfig {
+  std::string robot_id = "sim-1";
+  std::string token;
+  std::uint64_t boot_id = 1;  // random in earnest, see random_boot_id()
+  protocol::ResetCause reset_cause = rheonaut_RESET_CAUSE_POWER_ON;
+  robot_fw::DutyRange duty{-1, 1};
+  control::FractionalModel model = control::kNonNewtonianModel;
+};
+
+// Throws std::invalid_argument, quoting the value, when a name, token, boot id or duty range cannot be.
+void check(const SimulatedRobotConfig& config);
+
+// Never 0, never from a seed.
+std::uint64_t random_boot_id();
+// From 1 to 16 hexadecimal digits, with or without 0x; throws std::invalid_argument.
+std::uint64_t parse_boot_id(const std::string& text);
+
+class SimulatedRobot {
+ public:
+  static constexpr std::uint64_t kPeriodUs = 10'000;
+  static constexpr double kPeriodS = 0.01;
+
+  explicit SimulatedRobot(SimulatedRobotConfig config);
+  SimulatedRobot(const SimulatedRobot&) = delete;  // the core points into the config
+  SimulatedRobot& operator=(const SimulatedRobot&) = delete;
+
+  void step();  // one tick of kPeriodS
+
+  // As of the core; times are robot times, see robot_fw/core/robot.hpp.
+  void link_opened(std::uint64_t now_us) { core_.link_opened(now_us); }
+  void link_closed(std::uint64_t now_us) { core_.link_closed(now_us); }
+  bool receive(protocol::Bytes bytes, std::uint64_t now_us) { return core_.receive(bytes, now_us); }
+  std::size_t transmit(std::uint8_t* out, std::size_t capacity, std::uint64_t now_us) {
+    return core_.transmit(out, capacity, now_us);
+  }
+
+  const robot_fw::Robot& core() const { return core_; }
+  const Plant& plant() const { return plant_; }
+  const SimulatedRobotConfig& config() const { return config_; }
+  std::uint64_t robot_time_us() const { return robot_time_us_; }
+
+ private:
+  SimulatedRobotConfig config_;
+  robot_fw::Robot core_;
+  Plant plant_;
+  std::uint64_t robot_time_us_ = 0;
+};
+
+}  // namespace sim_robot

@@ -1,0 +1,46 @@
+#!/usr/bin/env python3
+"""Checks that what the documents point to is there: relative links, and paths such as `server/link/robot_session`.
+
+A path in backquotes that begins with one of our folders must be a file or folder, with or without its suffix; `*` and
+`<noun>` match anything. Prints `file:line: what is missing` and fails if anything is.
+"""
+import pathlib
+import re
+import sys
+
+FOLDERS = {"protocol", "control", "robot_fw", "sim_robot", "server", "external", "web", "tests", "deploy", "cmake", "docs"}
+SUFFIXES = ("", ".hpp", ".cpp", ".ts", ".tsx", ".py")
+
+
+def exists(root, path):
+    pattern = re.sub(r"<\w+>", "*", path.rstrip("/"))
+    return any(any(root.glob(pattern + suffix)) for suffix in SUFFIXES)
+
+
+def faults(root):
+    documents = [*root.glob("*.md"), *root.glob("docs/**/*.md")]
+    for document in sorted(documents):
+        in_block = False
+        for number, line in enumerate(document.read_text(encoding="utf-8").splitlines(), 1):
+            place = f"{document.relative_to(root)}:{number}"
+            in_block ^= line.startswith("```")
+            for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", line):
+                if not re.match(r"\w+:", target) and not (document.parent / target).exists():
+                    yield f"{place}: the link to {target} leads nowhere"
+            for quoted in [] if in_block else re.findall(r"`([^`]+)`", line):
+                path = quoted.split(" ")[0]
+                if "/" in path and path.split("/")[0] in FOLDERS and not exists(root, path):
+                    yield f"{place}: there is no {path}"
+
+
+def main():
+    root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).parents[1]).resolve()
+    found = list(faults(root))
+    for fault in found:
+        print(fault)
+    print(f"{len(found)} faults" if found else "all links and paths lead somewhere")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

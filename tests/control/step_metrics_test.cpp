@@ -1,0 +1,98 @@
+// The measures of a step response follow the conventions of the reference closed-loop table.
+#include "control/step_metrics.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <vector>
+
+#include "control/modal_plant.hpp"
+
+namespace control {
+namespace {
+
+constexpr double kPeriodS = 0.01, kTargetM = 0.1, kDisturbanceM = -0.05, kDisturbedAtS = 20;
+
+struct Trajectory {
+  std::vector<double> time_s, position_m;
+};
+
+// The reference experiment in double: the golden recurrence, unsaturated memory, on the plant.
+Trajectory run_reference(const nlohmann::json& golden, const FractionalModel& model, double duty_min, double duty_max) {
+  const std::vector<double> b = golden["controller_b"], a = golden["controller_a"];
+  std::vector<double> memory(b.size(), 0);  // direct form II transposed
+  ModalPlant plant{model, kPeriodS};
+  Trajectory trajectory;
+  for (int k = 0; k < 4000; ++k) {
+    const double measured_m = plant.position_m() + (k >= 2000 ? kDisturbanceM : 0);
+    trajectory.time_s.push_back(k * kPeriodS);
+    trajectory.position_m.push_back(measured_m);
+    const double error_m = kTargetM - measured_m, duty = b[0] * error_m + memory[0];
+    for (std::size_t i = 1; i < b.size(); ++i) {
+      memory[i - 1] = b[i] * error_m - a[i] * duty + (i + 1 < b.size() ? memory[i] : 0);
+    }
+    plant.step(std::clamp(duty, duty_min, duty_max));
+  }
+  return trajectory;
+}
+
+void expect_metrics(const StepMetrics& metrics, const nlohmann::json& expected) {
+  EXPECT_EQ(metrics.settling_s.has_value(), !expected["settling_2pct_s"].is_null());
+  if (metrics.settling_s) EXPECT_NEAR(*metrics.settling_s, expected["settling_2pct_s"], 1e-6);
+  EXPECT_NEAR(metrics.overshoot_percent, expected["overshoot_pct"], 1e-3);
+  EXPECT_NEAR(metrics.peak_m, expected["peak"], 1e-6);
+  ASSERT_TRUE(metrics.rise_10_90_s.has_value());
+  EXPECT_NEAR(*metrics.rise_10_90_s, expected["rise_10_90_s"], 1e-6);
+  EXPECT_NEAR(metrics.steady_state_error_m, expected["final_error"], 1e-6);
+}
+
+TEST(StepMetrics, ReproducesTheReferenceClosedLoopTable) {
+  const auto golden = nlohmann::json::parse(std::ifstream(TEST_DATA_DIR "/closed_loop_cases.json"));
+  int checked = 0;
+  for (const auto& row : golden["sampled"]) {
+    if (row["recurrence_memory"] != "unsaturated") continue;
+    SCOPED_TRACE(row["plant"].get<std::string>() + " " + row["duty_limits"].get<std::string>());
+    const auto& model = row["plant"] == "Eq(29)" ? kNonNewtonianModel : kNewtonianModel;
+    const double max = row["duty_limits"] == "none" ? 1e9 : 1, min = row["duty_limits"] == "0..1" ? 0 : -max;
+    const Trajectory run = run_reference(golden, model, min, max);
+    const StepExperiment step{0, kDisturbedAtS, 0, kTargetM, 0.002};
+    const StepExperiment disturbance{kDisturbedAtS, 40, kTargetM + kDisturbanceM, kTargetM, 0.002};
+    expect_metrics(measure_step(run.time_s, run.position_m, step), row["step"]);
+    expect_metrics(measure_step(run.time_s, run.position_m, disturbance), row["disturbance"]);
+    ++checked;
+  }
+  EXPECT_EQ(checked, 6);
+}
+
+TEST(StepMetrics, SaysThatItNeverSettledWhenTheLastSampleIsOutsideTheBand) {
+  const std::vector<double> time_s{0, 1, 2, 3}, position_m{0, 0.1, 0.1, 0.11};
+  EXPECT_FALSE(measure_step(time_s, position_m, {0, 10, 0, 0.1, 0.002}).settling_s.has_value());
+  EXPECT_EQ(measure_step(time_s, position_m, {0, 3, 0, 0.1, 0.002}).settling_s, 1.0);
+}
+
+TEST(StepMetrics, MeasuresAStepBackwardsLikeOneForwards) {
+  const std::vector<double> time_s{0, 1, 2, 3}, position_m{0.1, 0.05, -0.01, 0};
+  const StepMetrics metrics = measure_step(time_s, position_m, {0, 10, 0.1, 0, 0.002});
+  EXPECT_NEAR(metrics.overshoot_percent, 10, 1e-9);
+  EXPECT_NEAR(metrics.peak_m, -0.01, 1e-12);
+  EXPECT_EQ(metrics.settling_s, 3.0);
+  EXPECT_EQ(metrics.rise_10_90_s, 1.0);
+}
+
+TEST(StepMetrics, RefusesRecordsThatAreNoStepResponse) {
+  const std::vector<double> time_s{0, 1}, position_m{0, 0.1}, backwards{1, 0}, broken{0, std::nan("")}, short_m{0};
+  const StepExperiment step{0, 10, 0, 0.1, 0.002};
+  EXPECT_THROW(measure_step(time_s, short_m, step), std::invalid_argument);
+  EXPECT_THROW(measure_step(backwards, position_m, step), std::invalid_argument);
+  EXPECT_THROW(measure_step(time_s, broken, step), std::invalid_argument);
+  EXPECT_THROW(measure_step(time_s, position_m, {0, 10, 0.1, 0.1, 0.002}), std::invalid_argument);
+  EXPECT_THROW(measure_step(time_s, position_m, {0, 10, 0, 0.1, 0}), std::invalid_argument);
+  EXPECT_THROW(measure_step(time_s, position_m, {5, 10, 0, 0.1, 0.002}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace control

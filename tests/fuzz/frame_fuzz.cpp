@@ -1,0 +1,42 @@
+// Feeds any bytes to the frame reader and both decoders: what decodes must encode, and decode to the same again.
+#include <cstdlib>
+#include <vector>
+
+#include "protocol/frame.hpp"
+
+namespace protocol {
+namespace {
+
+using ByteVector = std::vector<std::uint8_t>;
+
+template <class Frame>
+ByteVector encoded(const Frame& frame) {
+  ByteVector bytes(kMaxFrameBytes);
+  bytes.resize(encode(frame, bytes.data(), bytes.size()));
+  if (bytes.empty()) std::abort();
+  return bytes;
+}
+
+template <class Decode>
+void decode_twice(Bytes payload, Decode decode_frame) {
+  const auto frame = decode_frame(payload);
+  if (!frame) return;
+  const ByteVector bytes = encoded(*frame);
+  const auto again = decode_frame({bytes.data(), bytes.size()});
+  if (!again || encoded(*again) != bytes) std::abort();
+}
+
+}  // namespace
+}  // namespace protocol
+
+// The name and the signature that libFuzzer calls.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
+  protocol::FrameReader reader;
+  protocol::Bytes input{data, size};
+  while (!input.empty()) {
+    if (reader.push(input) != protocol::FrameReader::State::complete) break;
+    protocol::decode_twice(reader.payload(), protocol::decode_robot_frame);
+    protocol::decode_twice(reader.payload(), protocol::decode_station_frame);
+  }
+  return 0;
+}

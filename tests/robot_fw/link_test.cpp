@@ -1,0 +1,219 @@
+// The link: hello first, signs of life, loss by silence, and what the robot does then.
+#include <cstring>
+
+#include "tests/robot_fw/driven_robot.hpp"
+
+namespace robot_fw {
+namespace {
+
+using namespace sim_robot;
+using RobotLink = DrivenRobot;
+
+protocol::StationFrame welcome_frame() {
+  protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+  frame.which_body = rheonaut_StationFrame_welcome_tag;
+  frame.body.welcome.protocol_version = protocol::kProtocolVersion;
+  return frame;
+}
+
+TEST(Hello, IsTheFirstFrameAndTheOnlyOneBeforeWelcome) {
+  SimulatedRobotConfig config;
+  config.robot_id = "swimmer-1";
+  config.token = "secret";
+  config.boot_id = 0x1234;
+  SimulatedRobot robot{config};
+  StationPeer station{robot};
+  station.run(30);
+  robot.link_opened(robot.robot_time_us());
+  for (int i = 0; i < 50; ++i) {
+    station.listen();
+    robot.step();
+  }
+  ASSERT_EQ(station.frames.size(), 1u);
+  ASSERT_TRUE(station.hello.has_value());
+  EXPECT_STREQ(station.hello->robot_id, "swimmer-1");
+  EXPECT_STREQ(station.hello->token, "secret");
+  EXPECT_EQ(station.hello->boot_id, 0x1234u);
+  EXPECT_EQ(station.hello->protocol_version, 1u);
+  EXPECT_EQ(station.hello->next_seq, 30u);
+  EXPECT_EQ(station.hello->ring_capacity, 800u);
+  EXPECT_EQ(station.hello->mode, rheonaut_MODE_MANUAL);
+}
+
+TEST(Hello, GetsTheConnectionClosedByARefusal) {
+  SimulatedRobot robot{{}};
+  StationPeer station{robot};
+  robot.link_opened(0);
+  protocol::StationFrame frame = welcome_frame();
+  frame.body.welcome.refusal = rheonaut_REFUSAL_REASON_WRONG_TOKEN;
+  std::strcpy(frame.body.welcome.detail, "enrol it anew");
+  EXPECT_FALSE(station.send(frame));
+  EXPECT_EQ(robot.core().refusal(), rheonaut_REFUSAL_REASON_WRONG_TOKEN);
+  EXPECT_STREQ(robot.core().refusal_detail(), "enrol it anew");
+  EXPECT_FALSE(robot.core().link_up());
+}
+
+TEST(Hello, RefusesAStationOfAnotherVersion) {
+  SimulatedRobot robot{{}};
+  StationPeer station{robot};
+  robot.link_opened(0);
+  protocol::StationFrame frame = welcome_frame();
+  frame.body.welcome.protocol_version = 2;
+  EXPECT_FALSE(station.send(frame));
+  EXPECT_EQ(robot.core().refusal(), rheonaut_REFUSAL_REASON_VERSION);
+}
+
+TEST(Hello, ANewConnectionForgetsHalfAFrameOfTheOldOne) {
+  SimulatedRobot robot{{}};
+  StationPeer station{robot};
+  robot.link_opened(0);
+  const std::uint8_t half[] = {0x20, 0x01};
+  EXPECT_TRUE(robot.receive({half, 2}, 0));
+  robot.link_closed(0);
+  station.connect();
+  EXPECT_TRUE(robot.core().link_up());
+}
+
+TEST_F(RobotLink, ClosesOnASecondWelcomeAndOnCommandsBeforeTheFirst) {
+  EXPECT_FALSE(station.send(welcome_frame()));
+  robot.link_opened(robot.robot_time_us());
+  protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+  frame.which_body = rheonaut_StationFrame_heartbeat_tag;
+  EXPECT_FALSE(station.send(frame));
+}
+
+TEST_F(RobotLink, ClosesAndCountsOnWhatIsNoFrame) {
+  const std::uint8_t oversize[] = {0xFF, 0x7F};
+  EXPECT_FALSE(robot.receive({oversize, 2}, robot.robot_time_us()));
+  station.disconnect();
+  station.connect();
+  const std::uint8_t garbage[] = {2, 0xFF, 0xFF};
+  EXPECT_FALSE(robot.receive({garbage, 3}, robot.robot_time_us()));
+  station.disconnect();
+  station.connect();
+  station.run(100);
+  const protocol::RobotFrame* status = nullptr;
+  for (const auto& frame : station.frames) {
+    if (frame.which_body == rheonaut_RobotFrame_status_tag) status = &frame;
+  }
+  ASSERT_NE(status, nullptr);
+  EXPECT_EQ(status->body.status.bad_frames, 2u);
+}
+
+TEST_F(RobotLink, IsLostAfterOneSecondOfSilenceAndStopsAuto) {
+  order(set_auto(0.1F));
+  station.attentive = false;
+  station.run(99);
+  EXPECT_EQ(mode(), "auto");
+  station.run(3);
+  EXPECT_TRUE(core().link_lost());
+  EXPECT_EQ(core().duty(), 0);
+  expect_at_rest();
+  EXPECT_NE(last().flags & rheonaut_TELEMETRY_FLAG_LINK_LOSS, 0u);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_LINK_LOST), 1);
+}
+
+TEST_F(RobotLink, IsRestoredByAnyFrameAndNothingMovesByItself) {
+  order(set_auto(0.1F));
+  station.attentive = false;
+  station.run(150);
+  station.attentive = true;
+  station.run(2);
+  EXPECT_FALSE(core().link_lost());
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_LINK_RESTORED), 1);
+  EXPECT_NEAR(station.events.back().value, 1.5, 0.05);
+  expect_at_rest();
+}
+
+TEST_F(RobotLink, LossDropsTimedCommands) {
+  protocol::Command later = set_auto(0.1F);
+  later.has_execute_at_robot_us = true;
+  later.execute_at_robot_us = robot.robot_time_us() + 150 * kTickUs;
+  order(later);
+  station.attentive = false;
+  station.run(120);
+  station.attentive = true;
+  station.run(40);
+  expect_at_rest();
+}
+
+TEST_F(RobotLink, OutlivesAConnectionWithinTheTimeOut) {
+  order(set_auto(0.1F));
+  station.disconnect();
+  station.run(80);
+  station.connect();
+  station.run(80);
+  EXPECT_EQ(mode(), "auto");
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_LINK_LOST), 0);
+}
+
+TEST_F(RobotLink, OfARobotThatNeverHadOneIsNotLost) {
+  SimulatedRobot alone{{}};
+  for (int i = 0; i < 500; ++i) alone.step();
+  EXPECT_FALSE(alone.core().link_lost());
+}
+
+TEST_F(RobotLink, TakesItsTimeOutFromWelcomeWithinBounds) {
+  station.disconnect();
+  station.welcome.link_timeout_ms = 300;
+  station.connect();
+  station.attentive = false;
+  station.run(32);
+  EXPECT_TRUE(core().link_lost());
+
+  station.disconnect();
+  station.welcome.link_timeout_ms = 4'000'000;
+  station.connect();
+  station.run(502);
+  EXPECT_TRUE(core().link_lost());
+}
+
+TEST_F(RobotLink, AnswersAStampedHeartbeat) {
+  protocol::StationHeartbeat probe = rheonaut_StationHeartbeat_init_zero;
+  probe.station_time_us = 86'400'000'000;
+  station.send_heartbeat(probe);
+  const std::uint64_t received_at_us = robot.robot_time_us();
+  station.step();
+  int answers = 0;
+  for (const auto& frame : station.frames) {
+    if (frame.which_body != rheonaut_RobotFrame_heartbeat_tag) continue;
+    if (frame.body.heartbeat.echo_station_time_us == 0) continue;
+    EXPECT_EQ(frame.body.heartbeat.echo_station_time_us, probe.station_time_us);
+    EXPECT_EQ(frame.body.heartbeat.echo_received_at_robot_us, received_at_us);
+    EXPECT_GE(frame.robot_time_us, received_at_us);
+    ++answers;
+  }
+  EXPECT_EQ(answers, 1);
+}
+
+TEST_F(RobotLink, SendsAHeartbeatOnlyWhenNothingElseWasSent) {
+  station.disconnect();
+  station.welcome.samples_per_frame = 25;  // a frame every 250 ms
+  station.connect();
+  station.run(50);
+  station.frames.clear();
+  station.run(100);
+  int heartbeats = 0;
+  std::uint64_t before_us = station.frames.front().robot_time_us;
+  for (const auto& frame : station.frames) {
+    heartbeats += frame.which_body == rheonaut_RobotFrame_heartbeat_tag;
+    EXPECT_LE(frame.robot_time_us - before_us, 210'000u);
+    before_us = frame.robot_time_us;
+  }
+  EXPECT_GE(heartbeats, 2);
+  EXPECT_LE(heartbeats, 4);
+}
+
+TEST_F(RobotLink, SaysWhenTheConnectionIsSilent) {
+  EXPECT_FALSE(core().connection_is_silent(robot.robot_time_us()));
+  station.attentive = false;
+  station.run(102);
+  EXPECT_TRUE(core().connection_is_silent(robot.robot_time_us()));
+  station.disconnect();
+  EXPECT_FALSE(core().connection_is_silent(robot.robot_time_us()));
+  station.connect();
+  EXPECT_FALSE(core().connection_is_silent(robot.robot_time_us()));
+}
+
+}  // namespace
+}  // namespace robot_fw

@@ -1,0 +1,115 @@
+// The configuration: precedence, the documented file, and what is said about mistakes.
+#include "server/config.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+namespace server {
+namespace {
+
+using ::testing::HasSubstr;
+
+class ConfigTest : public ::testing::Test {
+ protected:
+  ConfigTest() { std::filesystem::create_directories(folder_); }
+  ~ConfigTest() override { std::filesystem::remove_all(folder_); }
+
+  ConfigFlags file(const std::string& content) {
+    std::ofstream{folder_ / "station.toml"} << content;
+    ConfigFlags flags;
+    flags.file = folder_ / "station.toml";
+    return flags;
+  }
+
+  std::string mistake(const std::string& content) {
+    try {
+      load_config(file(content));
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no mistake was found";
+  }
+
+ private:
+  std::filesystem::path folder_ = std::filesystem::path{::testing::TempDir()} / ("config_" + std::to_string(getpid()));
+};
+
+TEST_F(ConfigTest, DefaultsListenOnLoopbackOnly) {
+  const Config config = load_config({});
+  EXPECT_EQ(config.http, "127.0.0.1:8080");
+  EXPECT_EQ(config.robots, "127.0.0.1:7070");
+  EXPECT_TRUE(config.http_or_any_port && config.robots_or_any_port);
+}
+
+TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
+  ConfigFlags flags;
+  flags.file = std::filesystem::path{TEST_DATA_DIR} / "../../deploy/rheonaut.toml";
+  const Config from_file = load_config(flags);
+  const Config defaults;
+  EXPECT_EQ(from_file.data_dir, defaults.data_dir);
+  EXPECT_EQ(from_file.http, defaults.http);
+  EXPECT_EQ(from_file.http_hosts, defaults.http_hosts);
+  EXPECT_EQ(from_file.robots, defaults.robots);
+  EXPECT_EQ(from_file.enrol_on_loopback, defaults.enrol_on_loopback);
+  EXPECT_EQ(from_file.link.link_timeout_ms, defaults.link.link_timeout_ms);
+  EXPECT_EQ(from_file.link.heartbeat_interval_ms, defaults.link.heartbeat_interval_ms);
+  EXPECT_EQ(from_file.link.samples_per_frame, defaults.link.samples_per_frame);
+  EXPECT_EQ(from_file.limits.setpoint_min_m, defaults.limits.setpoint_min_m);
+  EXPECT_EQ(from_file.limits.setpoint_max_m, defaults.limits.setpoint_max_m);
+  EXPECT_EQ(from_file.limits.duty_min, defaults.limits.duty_min);
+  EXPECT_EQ(from_file.limits.duty_max, defaults.limits.duty_max);
+  EXPECT_EQ(from_file.limits.disturbance_max_m, defaults.limits.disturbance_max_m);
+  EXPECT_EQ(from_file.log_level, defaults.log_level);
+}
+
+// The error for an unknown option lists all known ones, so each of them can be looked for in the documented file.
+TEST_F(ConfigTest, TheDocumentedFileNamesEveryOption) {
+  std::string known = mistake("[log]\nlevle = \"info\"\n");
+  ASSERT_THAT(known, HasSubstr("known are "));
+  std::ifstream in{std::filesystem::path{TEST_DATA_DIR} / "../../deploy/rheonaut.toml"};
+  std::stringstream documented;
+  documented << in.rdbuf();
+  std::istringstream options{known.substr(known.find("known are ") + 10)};
+  int count = 0;
+  for (std::string option; std::getline(options >> std::ws, option, ','); ++count) {
+    const auto dot = option.find('.');
+    EXPECT_THAT(documented.str(), HasSubstr("[" + option.substr(0, dot) + "]"));
+    EXPECT_THAT(documented.str(), HasSubstr("\n" + option.substr(dot + 1) + " = "));
+  }
+  EXPECT_GE(count, 14);
+}
+
+TEST_F(ConfigTest, FlagsGoBeforeTheFileAndMakeAPortBinding) {
+  ConfigFlags flags = file("[http]\nlisten = \"127.0.0.1:9000\"\n[robots]\nlisten = \"127.0.0.1:9001\"\n");
+  flags.robots = "127.0.0.1:0";
+  const Config config = load_config(flags);
+  EXPECT_EQ(config.http, "127.0.0.1:9000");
+  EXPECT_EQ(config.robots, "127.0.0.1:0");
+  EXPECT_FALSE(config.http_or_any_port);
+  EXPECT_FALSE(config.robots_or_any_port);
+}
+
+TEST_F(ConfigTest, MistakesNameFileLineOptionAndRemedy) {
+  EXPECT_THAT(mistake("[log]\nlevel = \"loud\"\n"), HasSubstr("station.toml:2: log.level = 'loud' must be one of"));
+  EXPECT_THAT(mistake("[robots]\n\nlink_timeout_ms = 5\n"), HasSubstr(":3: robots.link_timeout_ms = 5 is outside 200"));
+  EXPECT_THAT(mistake("[robots]\nlink_timeout_ms = \"1\"\n"), HasSubstr("must be a whole number"));
+  EXPECT_THAT(mistake("[robots]\nenrol_on_loopback = 1\n"), HasSubstr("must be true or false"));
+  EXPECT_THAT(mistake("[limits]\nduty_max = nan\n"), HasSubstr("is outside 0 to 1"));
+  EXPECT_THAT(mistake("[limits]\nsetpoint_min_m = 2.0\n"), HasSubstr("must be below"));
+  EXPECT_THAT(mistake("[http]\nlisten = \"here\"\n"), HasSubstr("'here' is not ADDR:PORT"));
+  EXPECT_THAT(mistake("[http]\nhosts = [1]\n"), HasSubstr("must be an array of texts"));
+  EXPECT_THAT(mistake("[http\n"), HasSubstr("station.toml:1:"));
+  EXPECT_THAT(mistake("level = 1\n"), HasSubstr("outside a section"));
+}
+
+TEST_F(ConfigTest, AMissingFileIsAMistake) {
+  ConfigFlags flags;
+  flags.file = "no/such/file.toml";
+  EXPECT_THROW(load_config(flags), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace server

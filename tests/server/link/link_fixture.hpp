@@ -1,0 +1,86 @@
+// A station with its robot link in virtual time, a fake archive, and words to talk about them.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include "tests/server/link/test_robot.hpp"
+
+namespace server {
+
+using namespace std::chrono_literals;
+
+class LinkTest : public ::testing::Test {
+ protected:
+  LinkTest() { station.add_sink(sink); }
+  ~LinkTest() override {
+    tasks.stop();
+    clock.settle();
+  }
+
+  TestRobot* dial(std::size_t capacity_bytes = 64 * 1024) {
+    robots_.push_back(std::make_unique<TestRobot>(loop, clock, tasks, listener, capacity_bytes));
+    return robots_.back().get();
+  }
+
+  // A robot that is welcomed and goes on talking.
+  TestRobot* connect() {
+    auto* robot = dial();
+    robot->say_hello();
+    EXPECT_TRUE(clock.run_until([&] { return !robot->welcomes().empty(); }, 1s));
+    robot->keep_talking();
+    clock.settle();
+    return robot;
+  }
+
+  // Submits without waiting for the end; the result appears in `results`.
+  void submit(protocol::Command action, microseconds life = 2s) {
+    CommandRequest request;
+    request.robot_id = "r1";
+    request.action = action;
+    request.actor = "test";
+    request.life = life;
+    tasks.spawn("submit", run_submit(request));
+  }
+  void stop_robot(microseconds patience = 1s) { tasks.spawn("stop", run_stop(patience)); }
+
+  static protocol::Command set_duty(float duty) {
+    protocol::Command command = rheonaut_Command_init_zero;
+    command.which_action = rheonaut_Command_set_duty_tag;
+    command.action.set_duty.duty = duty;
+    return command;
+  }
+  static protocol::Command clear_emergency(std::uint64_t emergency_id) {
+    protocol::Command command = rheonaut_Command_init_zero;
+    command.which_action = rheonaut_Command_clear_emergency_tag;
+    command.action.clear_emergency.emergency_id = emergency_id;
+    return command;
+  }
+
+  bool connected() const {
+    const RobotState* robot = station.find("r1");
+    return robot != nullptr && robot->link == LinkState::connected;
+  }
+
+  boost::asio::io_context loop;
+  VirtualClock clock{loop};
+  TaskGroup tasks{loop};
+  Station station{loop, clock, CommandLimits{}, LinkTimes{}};
+  RecordingSink sink;
+  FakeArchive archive;
+  RobotListener listener{loop, clock, tasks, station, archive, {boost::asio::ip::address_v4::loopback(), 0}, false};
+  std::vector<Result<CommandRecord>> results;
+
+ private:
+  boost::asio::awaitable<void> run_submit(CommandRequest request) {
+    auto result = co_await station.submit(std::move(request));
+    results.push_back(std::move(result));
+  }
+  boost::asio::awaitable<void> run_stop(microseconds patience) {
+    auto result = co_await station.emergency_stop("r1", "test", patience);
+    results.push_back(std::move(result));
+  }
+
+  std::vector<std::unique_ptr<TestRobot>> robots_;
+};
+
+}  // namespace server

@@ -1,0 +1,209 @@
+// How a robot is welcomed, refused and lost.
+#include "tests/server/link/link_fixture.hpp"
+
+namespace server {
+namespace {
+
+TEST_F(LinkTest, WelcomesARobotAndTellsItWhatIsDurable) {
+  archive.answer.store_id = 5;
+  archive.answer.durable_next_seq = 120;
+  archive.answer.durable_next_event_seq = 3;
+  auto* robot = connect();
+  ASSERT_EQ(robot->welcomes().size(), 1u);
+  const auto welcome = robot->welcomes()[0];
+  EXPECT_EQ(welcome.refusal, rheonaut_REFUSAL_REASON_NONE);
+  EXPECT_EQ(welcome.store_id, 5u);
+  EXPECT_EQ(welcome.durable_next_seq, 120u);
+  EXPECT_EQ(welcome.durable_next_event_seq, 3u);
+  EXPECT_EQ(welcome.link_timeout_ms, 1000u);
+  EXPECT_TRUE(connected());
+  ASSERT_EQ(archive.requests.size(), 1u);
+  EXPECT_EQ(archive.requests[0].robot_id, "r1");
+  EXPECT_TRUE(archive.requests[0].from_loopback);
+}
+
+TEST_F(LinkTest, RefusesAnotherProtocolVersionWithTheReason) {
+  auto* robot = dial();
+  auto hello = TestRobot::hello_frame();
+  hello.body.hello.protocol_version = 2;
+  robot->send(hello);
+  ASSERT_TRUE(clock.run_until([&] { return robot->closed; }, 1s));
+  ASSERT_EQ(robot->welcomes().size(), 1u);
+  EXPECT_EQ(robot->welcomes()[0].refusal, rheonaut_REFUSAL_REASON_VERSION);
+  EXPECT_FALSE(connected());
+}
+
+TEST_F(LinkTest, RefusesWhatTheArchiveRefuses) {
+  archive.answer.refusal = rheonaut_REFUSAL_REASON_WRONG_TOKEN;
+  archive.answer.detail = "the token of 'r1' is another one";
+  auto* robot = dial();
+  robot->say_hello();
+  ASSERT_TRUE(clock.run_until([&] { return robot->closed; }, 1s));
+  EXPECT_EQ(robot->welcomes()[0].refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);
+  EXPECT_STREQ(robot->welcomes()[0].detail, "the token of 'r1' is another one");
+}
+
+TEST_F(LinkTest, RefusesAMalformedHello) {
+  const auto spoil = [](auto change) {
+    auto frame = TestRobot::hello_frame();
+    change(frame.body.hello);
+    return frame;
+  };
+  for (const auto& frame :
+       {spoil([](auto& hello) { hello.robot_id[0] = 'R'; }), spoil([](auto& hello) { hello.robot_id[0] = '\0'; }),
+        spoil([](auto& hello) { hello.boot_id = 0; }), spoil([](auto& hello) { hello.oldest_seq = 10; }),
+        spoil([](auto& hello) { hello.next_seq = ~std::uint64_t{0}; })}) {
+    auto* robot = dial();
+    robot->send(frame);
+    ASSERT_TRUE(clock.run_until([&] { return robot->closed; }, 1s));
+    EXPECT_EQ(robot->welcomes().at(0).refusal, rheonaut_REFUSAL_REASON_MALFORMED);
+  }
+}
+
+TEST_F(LinkTest, ClosesOnGarbageOversizeAndAnythingButHello) {
+  auto* garbage = dial();
+  garbage->send_bytes({5, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF});
+  auto* oversize = dial();
+  oversize->send_bytes({0xFF, 0x7F});
+  auto* impolite = dial();
+  auto frame = TestRobot::hello_frame();
+  frame.which_body = rheonaut_RobotFrame_status_tag;
+  impolite->send(frame);
+  EXPECT_TRUE(clock.run_until([&] { return garbage->closed && oversize->closed && impolite->closed; }, 100ms));
+  EXPECT_TRUE(garbage->frames.empty() && oversize->frames.empty() && impolite->frames.empty());
+}
+
+TEST_F(LinkTest, ClosesAConnectionThatSaysNothing) {
+  auto* robot = dial();
+  EXPECT_FALSE(clock.run_until([&] { return robot->closed; }, 4900ms));
+  EXPECT_TRUE(clock.run_until([&] { return robot->closed; }, 200ms));
+}
+
+TEST_F(LinkTest, GarbageInMidConnectionEndsItWithAReason) {
+  auto* robot = connect();
+  robot->send_bytes({3, 0xFF, 0xFF, 0xFF});
+  ASSERT_TRUE(clock.run_until([&] { return robot->closed; }, 100ms));
+  EXPECT_FALSE(connected());
+  ASSERT_FALSE(sink.events.empty());
+  EXPECT_EQ(sink.events.back().kind, "disconnected");
+  EXPECT_EQ(sink.events.back().cause, "a frame that does not decode");
+}
+
+TEST_F(LinkTest, DeclaresAHalfOpenLinkLostAfterTheTimeout) {
+  auto* robot = connect();
+  clock.run_for(1s);
+  ASSERT_TRUE(connected());
+  robot->link.stall(true);
+  const auto stalled_at_us = clock.steady_us();
+  ASSERT_TRUE(clock.run_until([&] { return !connected(); }, 2s));
+  EXPECT_LE(clock.steady_us() - stalled_at_us, 1'200'000);
+  EXPECT_EQ(sink.events.back().cause, "no frame within the link time-out");
+}
+
+TEST_F(LinkTest, DropsARobotThatTalksButDoesNotRead) {
+  auto* robot = dial(64);
+  robot->say_hello();
+  ASSERT_TRUE(clock.run_until([&] { return !robot->welcomes().empty(); }, 1s));
+  robot->keep_talking();
+  robot->reading = false;
+  ASSERT_TRUE(clock.run_until([&] { return !connected(); }, 10s));
+  EXPECT_EQ(sink.events.back().cause, "the robot does not read");
+}
+
+TEST_F(LinkTest, SendsASignOfLifeEvery200ms) {
+  auto* robot = connect();
+  const std::size_t before = robot->heartbeats().size();
+  clock.run_for(2s);
+  EXPECT_NEAR(static_cast<double>(robot->heartbeats().size() - before), 10, 1);
+}
+
+TEST_F(LinkTest, TheSameBootTakesThePlaceOfItsOldConnection) {
+  auto* old_connection = connect();
+  auto* new_connection = dial();
+  new_connection->say_hello();
+  ASSERT_TRUE(clock.run_until([&] { return old_connection->closed; }, 1s));
+  EXPECT_TRUE(connected());
+  EXPECT_FALSE(new_connection->closed);
+}
+
+TEST_F(LinkTest, AnotherBootIsRefusedUntilTheFirstWasSilent) {
+  auto* first = connect();
+  auto hello = TestRobot::hello_frame();
+  hello.body.hello.boot_id = 78;
+  auto* second = dial();
+  second->send(hello);
+  ASSERT_TRUE(clock.run_until([&] { return second->closed; }, 1s));
+  EXPECT_EQ(second->welcomes().at(0).refusal, rheonaut_REFUSAL_REASON_ALREADY_CONNECTED);
+  EXPECT_TRUE(connected());
+  first->link.stall(true);
+  clock.run_for(1100ms);
+  auto* third = dial();
+  third->send(hello);
+  ASSERT_TRUE(clock.run_until([&] { return !third->welcomes().empty(); }, 100ms));
+  EXPECT_EQ(third->welcomes()[0].refusal, rheonaut_REFUSAL_REASON_NONE);
+  EXPECT_EQ(station.find("r1")->boot_id, 78u);
+}
+
+TEST_F(LinkTest, SamplesReachTheSinksWithTheirContext) {
+  auto* robot = connect();
+  robot->send_samples(0, 5, robot->robot_now_us(), 0);
+  ASSERT_TRUE(clock.run_until([&] { return !sink.batches.empty(); }, 100ms));
+  const SampleBatch& batch = sink.batches[0];
+  EXPECT_EQ(batch.robot_id, "r1");
+  EXPECT_EQ(batch.boot_id, 77u);
+  EXPECT_EQ(batch.next_seq(), 5u);
+  EXPECT_EQ(batch.samples[4].position_m, 4.0F);
+  EXPECT_EQ(batch.context.mode, rheonaut_MODE_MANUAL);
+  EXPECT_EQ(station.find("r1")->next_seq, 5u);
+  EXPECT_EQ(station.find("r1")->sample->position_m, 4.0F);
+}
+
+TEST_F(LinkTest, SamplesSentAgainDoNotChangeTheLiveState) {
+  auto* robot = connect();
+  robot->send_samples(100, 5, robot->robot_now_us(), 0);
+  robot->send_samples(10, 5, robot->robot_now_us() - 900'000, 0);
+  ASSERT_TRUE(clock.run_until([&] { return sink.batches.size() == 2; }, 100ms));
+  EXPECT_EQ(station.find("r1")->next_seq, 105u);
+  EXPECT_EQ(station.find("r1")->sample->position_m, 104.0F);
+}
+
+TEST_F(LinkTest, ASampleNumberBeyondAllReasonEndsTheConnection) {
+  auto* robot = connect();
+  robot->send_samples(~std::uint64_t{0} - 2, 5, robot->robot_now_us(), 0);
+  EXPECT_TRUE(clock.run_until([&] { return robot->closed; }, 100ms));
+  EXPECT_TRUE(sink.batches.empty());
+}
+
+TEST_F(LinkTest, TellsTheRobotWhatIsDurableAndWhatToSendAgain) {
+  auto* robot = connect();
+  station.on_durable("r1", 77, 40, 2);
+  station.request_resend("r1", 77, 40, 60);
+  clock.settle();
+  const auto last = robot->heartbeats().back();
+  EXPECT_EQ(last.durable_next_seq, 40u);
+  EXPECT_EQ(last.durable_next_event_seq, 2u);
+  EXPECT_EQ(last.resend_first_seq, 40u);
+  EXPECT_EQ(last.resend_next_seq, 60u);
+  clock.run_for(300ms);
+  EXPECT_EQ(robot->heartbeats().back().resend_next_seq, 0u) << "asked once";
+}
+
+TEST_F(LinkTest, AnswersOfTheRobotGiveTheClockOffset) {
+  auto* robot = connect();
+  const auto probe = robot->heartbeats().back();
+  ASSERT_NE(probe.station_time_us, 0u);
+  clock.run_for(20ms);
+  protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
+  frame.which_body = rheonaut_RobotFrame_heartbeat_tag;
+  frame.body.heartbeat.echo_station_time_us = probe.station_time_us;
+  frame.body.heartbeat.echo_received_at_robot_us = robot->robot_now_us() - 10'000;
+  robot->send(frame);
+  clock.settle();
+  const ClockEstimate estimate = station.find("r1")->clock;
+  ASSERT_TRUE(estimate.valid);
+  EXPECT_LE(std::abs(estimate.offset_us - robot->booted_at_us), estimate.uncertainty_us);
+  EXPECT_LE(estimate.uncertainty_us, 15'000);
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,77 @@
+// A robot made by hand for tests of the link: says what the test tells it and keeps what the station says.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "server/link/robot_listener.hpp"
+#include "tests/server/virtual_clock.hpp"
+
+namespace server {
+
+// Admits everyone, unless told otherwise; remembers what it was asked.
+class FakeArchive final : public RobotArchive {
+ public:
+  boost::asio::awaitable<Admission> admit(AdmissionRequest request) override {
+    requests.push_back(request);
+    co_return answer;
+  }
+
+  Admission answer;
+  std::vector<AdmissionRequest> requests;
+};
+
+// Keeps everything it hears.
+class RecordingSink final : public StationSink {
+ public:
+  void on_robot(const RobotState& robot) override { robots.push_back(robot); }
+  void on_samples(const RobotState&, const SampleBatch& batch) override { batches.push_back(batch); }
+  void on_event(const RobotState&, const RobotEvent& event) override { events.push_back(event); }
+  void on_command(const CommandRecord& record) override { commands.push_back(record); }
+
+  std::vector<RobotState> robots;
+  std::vector<SampleBatch> batches;
+  std::vector<RobotEvent> events;
+  std::vector<CommandRecord> commands;
+};
+
+class TestRobot {
+ public:
+  TestRobot(boost::asio::io_context& loop, Clock& clock, TaskGroup& tasks, RobotListener& listener,
+            std::size_t capacity_bytes = 64 * 1024);
+
+  static protocol::RobotFrame hello_frame(protocol::Mode mode = rheonaut_MODE_MANUAL);
+
+  void send(protocol::RobotFrame frame);  // stamps robot_time_us when it is 0
+  void send_bytes(std::vector<std::uint8_t> bytes);
+  void say_hello() { send(hello_frame()); }
+  void send_samples(std::uint64_t first_seq, pb_size_t count, std::uint64_t robot_time_us, std::uint64_t emergency_id);
+  void acknowledge(const protocol::Command& command, protocol::CommandResult result, std::uint64_t emergency_id = 0,
+                   protocol::RejectReason reason = rheonaut_REJECT_REASON_NONE);
+  void keep_talking();  // a heartbeat every 200 ms
+
+  std::uint64_t robot_now_us() const { return static_cast<std::uint64_t>(clock_.steady_us() - booted_at_us); }
+
+  // What arrived, of one kind.
+  std::vector<protocol::Welcome> welcomes() const;
+  std::vector<protocol::Command> commands() const;
+  std::vector<protocol::StationHeartbeat> heartbeats() const;
+
+  MemoryLink link;
+  std::int64_t booted_at_us;
+  bool reading = true;  // false: nothing is taken from the link any more
+  bool closed = false;  // the station ended the stream
+  std::vector<protocol::StationFrame> frames;
+
+ private:
+  boost::asio::awaitable<void> read();
+  boost::asio::awaitable<void> write(std::vector<std::uint8_t> bytes);
+  boost::asio::awaitable<void> talk();
+
+  Clock& clock_;
+  TaskGroup& tasks_;
+  std::unique_ptr<ByteStream> stream_;
+};
+
+}  // namespace server

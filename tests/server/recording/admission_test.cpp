@@ -1,0 +1,140 @@
+// Who may connect, and with which boot.
+#include "tests/server/recording/recording_test.hpp"
+
+namespace server {
+namespace {
+
+class AdmissionTest : public RecordingTest {
+ protected:
+  TestRobot robot_;
+
+  // From elsewhere than loopback.
+  Admission admit_remote(const std::string& token) {
+    TestRobot remote = robot_;
+    remote.from_loopback = false;
+    remote.token = token;
+    return admit(remote);
+  }
+};
+
+TEST_F(AdmissionTest, FollowsTheTable) {
+  struct Case {
+    const char* enrolled_with;  // null: the robot is unknown
+    const char* token;
+    bool from_loopback;
+    bool enrol_on_loopback;
+    protocol::RefusalReason expected;
+    bool newly_enrolled;
+  };
+  constexpr auto kNone = rheonaut_REFUSAL_REASON_NONE;
+  constexpr auto kWrongToken = rheonaut_REFUSAL_REASON_WRONG_TOKEN;
+  constexpr auto kUnknownRobot = rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT;
+  const std::vector<Case> table{
+      {nullptr, "", true, true, kNone, true},
+      {nullptr, "secret", true, true, kNone, true},
+      {nullptr, "secret", true, false, kUnknownRobot, false},
+      {nullptr, "", true, false, kUnknownRobot, false},
+      {nullptr, "secret", false, true, kUnknownRobot, false},
+      {nullptr, "", false, true, kWrongToken, false},
+      {"", "", true, true, kNone, false},
+      {"", "", true, false, kNone, false},
+      {"", "", false, true, kWrongToken, false},
+      {"", "secret", true, true, kNone, true},  // brings a token from now on
+      {"", "secret", true, false, kWrongToken, false},
+      {"", "secret", false, true, kWrongToken, false},
+      {"secret", "secret", true, true, kNone, false},
+      {"secret", "secret", false, false, kNone, false},
+      {"secret", "other", true, true, kWrongToken, false},
+      {"secret", "other", false, true, kWrongToken, false},
+      {"secret", "", true, true, kWrongToken, false},
+      {"secret", "", false, true, kWrongToken, false},
+  };
+  int number = 0;
+  for (const Case& entry : table) {
+    SCOPED_TRACE(number++);
+    std::filesystem::remove(path_);
+    TestRobot robot;
+    if (entry.enrolled_with != nullptr) {
+      start();
+      robot.token = entry.enrolled_with;
+      ASSERT_TRUE(admit(robot).newly_enrolled);
+      stop();
+    }
+    RecorderOptions options;
+    options.enrol_on_loopback = entry.enrol_on_loopback;
+    start(options);
+    robot.token = entry.token;
+    robot.from_loopback = entry.from_loopback;
+    robot.boot_id = 77;
+    const Admission admission = admit(robot);
+    EXPECT_EQ(admission.refusal, entry.expected) << admission.detail;
+    EXPECT_EQ(admission.newly_enrolled, entry.newly_enrolled);
+    EXPECT_EQ(admission.detail.empty(), entry.expected == kNone);
+    stop();
+  }
+}
+
+TEST_F(AdmissionTest, TheTokenIsStoredAsAHashOnly) {
+  start();
+  robot_.token = "a token of 256 random bits";
+  admit(robot_);
+  EXPECT_EQ(number("SELECT length(token_hash) FROM robot"), 32);
+  EXPECT_EQ(number("SELECT instr(token_hash, 'random') FROM robot"), 0);
+}
+
+TEST_F(AdmissionTest, ANewRobotsTokenIsNeededFromElsewhere) {
+  start();
+  robot_.token = "secret";
+  EXPECT_TRUE(admit(robot_).newly_enrolled);
+  EXPECT_EQ(admit_remote("secret").refusal, rheonaut_REFUSAL_REASON_NONE);
+  EXPECT_EQ(admit_remote("guess").refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);
+}
+
+TEST_F(AdmissionTest, TellsTheStoreAndWhatIsDurable) {
+  start();
+  connect(robot_);
+  make(robot_, 20);
+  flush();
+  const Admission again = admit(robot_);
+  EXPECT_EQ(again.durable_next_seq, 20u);
+  EXPECT_NE(again.store_id, 0u);
+}
+
+TEST_F(AdmissionTest, RefusesABootIdOfAnotherRobot) {
+  start();
+  connect(robot_);
+  TestRobot other;
+  other.id = "dory";
+  EXPECT_EQ(admit(other).refusal, rheonaut_REFUSAL_REASON_BOOT_ID_REUSED);
+  EXPECT_EQ(number("SELECT count(*) FROM robot"), 1);  // and does not enrol its bearer
+}
+
+TEST_F(AdmissionTest, RefusesABootThatLiesBeforeWhatIsStored) {
+  for (const bool restarted : {false, true}) {
+    SCOPED_TRACE(restarted);
+    std::filesystem::remove(path_);
+    TestRobot robot;
+    start();
+    connect(robot);
+    make(robot, 20);
+    flush();
+    if (restarted) {
+      kill();
+      start();
+    }
+    TestRobot earlier = robot;
+    earlier.next_seq = 19;
+    EXPECT_EQ(admit(earlier).refusal, rheonaut_REFUSAL_REASON_BOOT_ID_REUSED);
+    EXPECT_EQ(admit(robot).refusal, rheonaut_REFUSAL_REASON_NONE);
+    kill();
+  }
+}
+
+TEST_F(AdmissionTest, RefusesNumbersThatCannotBe) {
+  start();
+  robot_.oldest_seq = 5;  // but next_seq is 0
+  EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_MALFORMED);
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,149 @@
+// Pages of samples, gaps, events and commands give back what was recorded.
+#include "server/recording/history.hpp"
+
+#include "tests/server/recording/recording_test.hpp"
+
+namespace server {
+namespace {
+
+class HistoryTest : public RecordingTest {
+ protected:
+  TestRobot robot_;
+
+  RunId create() { return wait(runs_->create(robot_.id, named("run")))->id; }
+  SamplePage page(RunId id, std::optional<SampleCursor> after, std::size_t limit) {
+    return wait(history_->samples(id, after, limit)).value();
+  }
+};
+
+TEST_F(HistoryTest, GivesBackEveryValueOfASample) {
+  start();
+  connect(robot_);
+  robot_.context.setpoint_m = 0.1F;
+  robot_.context.mode = rheonaut_MODE_AUTO;
+  robot_.context.sub_state = rheonaut_SUB_STATE_NAVIGATING;
+  robot_.context.disturbance_m = -0.05F;
+  const RunId id = create();
+  SampleBatch batch = robot_.batch(0, 2);
+  batch.samples[1] = {1, 2, 3, -0.5, 175, 0.1F};
+  send(robot_, batch);
+  const SamplePage all = page(id, std::nullopt, 10);
+  ASSERT_EQ(all.samples.size(), 2u);
+  EXPECT_FALSE(all.next.has_value());
+  const StoredSample& stored = all.samples[1];
+  EXPECT_EQ(stored.boot_id, robot_.boot_id);
+  EXPECT_EQ(stored.seq, 1u);
+  EXPECT_EQ(stored.robot_time_us, 510'000u);
+  EXPECT_EQ(stored.utc_us, 1'700'000'000'510'000);
+  EXPECT_EQ(stored.received_at_us, clock_.utc_us());
+  EXPECT_EQ(stored.sample, (Sample{1, 2, 3, -0.5, 175, 0.1F}));
+  EXPECT_EQ(stored.mode, rheonaut_MODE_AUTO);
+  EXPECT_EQ(stored.sub_state, rheonaut_SUB_STATE_NAVIGATING);
+  EXPECT_EQ(stored.setpoint_m, 0.1F);
+  EXPECT_EQ(stored.disturbance_m, -0.05F);
+}
+
+TEST_F(HistoryTest, PagesFollowOneAnotherOverSegmentsAndSpans) {
+  start();
+  connect(robot_);
+  make(robot_, 37);
+  const RunId id = create();
+  make(robot_, 230);
+  robot_.boot_id += 1;
+  robot_.next_seq = 0;
+  connect(robot_);
+  make(robot_, 120);
+  for (const std::size_t limit : {1u, 7u, 100u, 230u, 349u, 350u, 10000u}) {
+    SCOPED_TRACE(limit);
+    std::vector<std::pair<std::uint32_t, std::uint64_t>> seen;
+    std::optional<SampleCursor> after;
+    do {
+      const SamplePage next = page(id, after, limit);
+      for (const StoredSample& sample : next.samples) {
+        seen.emplace_back(sample.span, sample.seq);
+        EXPECT_FLOAT_EQ(sample.sample.position_m, static_cast<float>(sample.seq) / 1000);
+      }
+      after = next.next;
+    } while (after);
+    ASSERT_EQ(seen.size(), 350u);
+    for (std::size_t i = 0; i < 350; ++i) {
+      const std::pair<std::uint32_t, std::uint64_t> expected{i < 230 ? 0 : 1, i < 230 ? 37 + i : i - 230};
+      ASSERT_EQ(seen[i], expected);
+    }
+  }
+}
+
+TEST_F(HistoryTest, AnswersHoldWhatWasHeardBeforeTheQuestion) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  make(robot_, 3);
+  EXPECT_EQ(page(id, std::nullopt, 10).samples.size(), 3u);
+}
+
+TEST_F(HistoryTest, RefusesUnknownRunsAndBadLimits) {
+  start();
+  EXPECT_EQ(wait(history_->samples(1, std::nullopt, 10)).error().code, ErrorCode::not_found);
+  EXPECT_EQ(wait(history_->gaps(1)).error().code, ErrorCode::not_found);
+  EXPECT_EQ(wait(history_->samples(1, std::nullopt, 0)).error().code, ErrorCode::invalid);
+  EXPECT_EQ(wait(history_->samples(1, std::nullopt, 10001)).error().code, ErrorCode::invalid);
+  EXPECT_EQ(wait(history_->command(1)).error().code, ErrorCode::not_found);
+}
+
+TEST_F(HistoryTest, ListsTheGapsOfARunCutToItsSpans) {
+  start();
+  connect(robot_);
+  make(robot_, 10);
+  robot_.next_seq = 20;
+  const RunId id = create();  // begins in sample 10, the newest is 9
+  robot_.oldest_seq = 15;
+  make(robot_, 10);
+  const std::vector<Gap> gaps = wait(history_->gaps(id)).value();
+  ASSERT_EQ(gaps.size(), 1u);
+  EXPECT_EQ(gaps[0].boot_id, robot_.boot_id);
+  EXPECT_EQ(gaps[0].first_seq, 10u);
+  EXPECT_EQ(gaps[0].last_seq, 14u);
+  EXPECT_EQ(gaps[0].cause, "ring_overrun");
+}
+
+TEST_F(HistoryTest, GivesBackEventsAndCommandsNewestFirst) {
+  start();
+  connect(robot_);
+  for (std::uint64_t n = 0; n < 3; ++n) {
+    RobotEvent event;
+    event.robot_id = robot_.id;
+    event.kind = "event " + std::to_string(n);
+    if (n > 0) {
+      event.boot_id = robot_.boot_id;
+      event.event_seq = n - 1;
+      event.mode = rheonaut_MODE_EMERGENCY;
+      event.emergency_id = 0xf000000000000001;
+    }
+    recorder_->on_event(state_of(robot_, LinkState::connected), event);
+    CommandRecord command;
+    command.id = 0xf000000000000000 + n;
+    command.robot_id = robot_.id;
+    command.boot_id = robot_.boot_id;
+    command.kind = "set_duty";
+    command.state = CommandState::acknowledged;
+    command.submitted_at_us = static_cast<std::int64_t>(n);
+    recorder_->on_command(command);
+  }
+  const std::vector<RobotEvent> events = wait(history_->events(robot_.id, 10));
+  ASSERT_EQ(events.size(), 3u);
+  EXPECT_EQ(events[0].kind, "event 2");
+  EXPECT_EQ(events[0].boot_id, robot_.boot_id);
+  EXPECT_EQ(events[0].event_seq, 1u);
+  EXPECT_EQ(events[0].mode, rheonaut_MODE_EMERGENCY);
+  EXPECT_EQ(events[0].emergency_id, 0xf000000000000001);
+  EXPECT_EQ(events[2].boot_id, 0u);
+  EXPECT_FALSE(events[2].event_seq.has_value());
+  EXPECT_EQ(wait(history_->events(robot_.id, 2)).size(), 2u);
+  const std::vector<CommandRecord> commands = wait(history_->commands(robot_.id, 2));
+  ASSERT_EQ(commands.size(), 2u);
+  EXPECT_EQ(commands[0].id, 0xf000000000000002);
+  EXPECT_EQ(wait(history_->command(0xf000000000000001))->state, CommandState::acknowledged);
+}
+
+}  // namespace
+}  // namespace server

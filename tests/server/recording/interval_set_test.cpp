@@ -1,0 +1,78 @@
+// The set of intervals behaves as a set of numbers.
+#include "server/recording/interval_set.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <set>
+
+namespace server {
+namespace {
+
+using Intervals = std::vector<Interval>;
+
+TEST(IntervalSet, InsertReturnsOnlyWhatWasNew) {
+  IntervalSet set;
+  EXPECT_EQ(set.insert({10, 20}), (Intervals{{10, 20}}));
+  EXPECT_EQ(set.insert({5, 25}), (Intervals{{5, 10}, {20, 25}}));
+  EXPECT_EQ(set.insert({5, 25}), Intervals{});
+  EXPECT_EQ(set.insert({7, 7}), Intervals{});
+}
+
+TEST(IntervalSet, TheFirstHoleIsWhereTheCumulativePartEnds) {
+  IntervalSet set;
+  EXPECT_EQ(set.first_hole(), 0u);
+  set.insert({5, 10});
+  EXPECT_EQ(set.first_hole(), 0u);
+  set.insert({0, 5});
+  EXPECT_EQ(set.first_hole(), 10u);
+  EXPECT_EQ(set.end(), 10u);
+}
+
+TEST(IntervalSet, TellsWhatIsCoveredAndWhatIsMissing) {
+  IntervalSet set;
+  set.insert({2, 4});
+  set.insert({6, 8});
+  EXPECT_EQ(set.missing({0, 10}), (Intervals{{0, 2}, {4, 6}, {8, 10}}));
+  EXPECT_EQ(set.covered({3, 7}), (Intervals{{3, 4}, {6, 7}}));
+}
+
+std::set<std::uint64_t> numbers(const Intervals& intervals) {
+  std::set<std::uint64_t> found;
+  for (const Interval& interval : intervals) {
+    for (std::uint64_t n = interval.first; n < interval.next; ++n) EXPECT_TRUE(found.insert(n).second);
+  }
+  return found;
+}
+
+TEST(IntervalSet, AgreesWithANaiveSetUnderRandomInsertions) {
+  constexpr std::uint64_t kLimit = 80;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    std::mt19937 random{seed};
+    IntervalSet set;
+    std::set<std::uint64_t> model;
+    for (int step = 0; step < 30; ++step) {
+      const std::uint64_t first = random() % kLimit;
+      const Interval added{first, first + random() % 12};
+      std::set<std::uint64_t> expected;
+      for (std::uint64_t n = added.first; n < added.next; ++n) {
+        if (model.insert(n).second) expected.insert(n);
+      }
+      ASSERT_EQ(numbers(set.insert(added)), expected);
+      std::uint64_t hole = 0;
+      while (model.contains(hole)) ++hole;
+      ASSERT_EQ(set.first_hole(), hole);
+      ASSERT_EQ(set.end(), model.empty() ? 0 : *model.rbegin() + 1);
+      const Interval range{random() % kLimit, kLimit + 20};
+      std::set<std::uint64_t> covered;
+      std::set<std::uint64_t> missing;
+      for (std::uint64_t n = range.first; n < range.next; ++n) (model.contains(n) ? covered : missing).insert(n);
+      ASSERT_EQ(numbers(set.covered(range)), covered);
+      ASSERT_EQ(numbers(set.missing(range)), missing);
+      for (std::uint64_t n = 0; n < kLimit + 20; ++n) ASSERT_EQ(set.contains(n), model.contains(n));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,327 @@
+// Every sample that is acknowledged is stored once, in its place; what is lost is listed.
+#include "server/recording/recorder.hpp"
+
+#include "tests/server/recording/recording_test.hpp"
+
+namespace server {
+namespace {
+
+using Rows = std::vector<std::string>;
+
+class RecorderTest : public RecordingTest {
+ protected:
+  Rows segments() { return rows("SELECT first_seq, last_seq FROM segment ORDER BY first_seq"); }
+  Rows gaps() { return rows("SELECT first_seq, last_seq, cause FROM gap ORDER BY first_seq"); }
+  std::int64_t samples() { return number("SELECT count(*) FROM sample"); }
+
+  void send_event(const TestRobot& robot, std::uint64_t event_seq, std::uint64_t oldest = 0) {
+    RobotEvent event;
+    event.robot_id = robot.id;
+    event.boot_id = robot.boot_id;
+    event.event_seq = event_seq;
+    event.oldest_event_seq = oldest;
+    event.kind = "mode_changed";
+    event.cause = "command";
+    event.mode = rheonaut_MODE_AUTO;
+    recorder_->on_event(state_of(robot, LinkState::connected), event);
+  }
+
+  void send_command(CommandId id, const char* kind, CommandState state) {
+    CommandRecord command;
+    command.id = id;
+    command.robot_id = robot_.id;
+    command.kind = kind;
+    command.state = state;
+    recorder_->on_command(command);
+  }
+
+  TestRobot robot_;
+};
+
+TEST_F(RecorderTest, StoresAFullGroupAtTheNextCommitAndAcknowledgesIt) {
+  start();
+  connect(robot_);
+  make(robot_, 100);
+  EXPECT_TRUE(clock_.run_until([&] { return durable_next_seq_ == 100; }, 150ms));
+  EXPECT_EQ(segments(), Rows{"0|99"});
+  EXPECT_EQ(rows("SELECT row, position_m FROM sample WHERE row IN (1, 100)"),
+            (Rows{"1|0.0", "100|0.0989999994635582"}));
+}
+
+TEST_F(RecorderTest, StoresASmallGroupWhenItIsASecondOld) {
+  start();
+  connect(robot_);
+  make(robot_, 7);
+  clock_.run_for(900ms);
+  EXPECT_EQ(durable_next_seq_, 0u);
+  clock_.run_for(250ms);
+  EXPECT_EQ(durable_next_seq_, 7u);
+  EXPECT_EQ(segments(), Rows{"0|6"});
+}
+
+TEST_F(RecorderTest, StoresASegmentsTimesAndExtremes) {
+  start();
+  connect(robot_);
+  make(robot_, 100);
+  flush();
+  EXPECT_EQ(rows("SELECT first_robot_time_us, period_us, utc_offset_us, clock_uncertainty_us, mode, setpoint_m,"
+                 " min_position_m, round(max_position_m, 6), max_impedance_mv FROM segment"),
+            Rows{"500000|10000|1700000000000000|300|manual||0.0|0.099|175.0"});
+}
+
+TEST_F(RecorderTest, BeginsASegmentWhenAnyPerBatchValueChanges) {
+  start();
+  connect(robot_);
+  make(robot_, 10);
+  robot_.context.setpoint_m = 0.1F;
+  make(robot_, 10);
+  robot_.context.mode = rheonaut_MODE_AUTO;
+  make(robot_, 10);
+  robot_.context.flags = rheonaut_TelemetryFlag_TELEMETRY_FLAG_SATURATED;
+  make(robot_, 10);
+  flush();
+  EXPECT_EQ(segments(), (Rows{"0|9", "10|19", "20|29", "30|39"}));
+}
+
+TEST_F(RecorderTest, BeginsASegmentWhenTimeSteps) {
+  start();
+  connect(robot_);
+  make(robot_, 10);
+  SampleBatch late = robot_.batch(10, 5);
+  late.first_robot_time_us += 50;  // jitter of a tick
+  send(robot_, late);
+  late = robot_.batch(15, 5);
+  late.first_robot_time_us += 5000;
+  send(robot_, late);
+  late = robot_.batch(20, 5);
+  late.first_robot_time_us += 5000;
+  late.utc_offset_us += 3'600'000'000;  // somebody set the station's clock
+  send(robot_, late);
+  flush();
+  EXPECT_EQ(segments(), (Rows{"0|14", "15|19", "20|24"}));
+  EXPECT_EQ(rows("SELECT first_robot_time_us FROM segment WHERE first_seq = 15"), Rows{"655000"});
+}
+
+TEST_F(RecorderTest, NoSegmentIsLongerThan100Samples) {
+  start();
+  connect(robot_);
+  make(robot_, 250, 25);
+  flush();
+  EXPECT_EQ(segments(), (Rows{"0|99", "100|199", "200|249"}));
+}
+
+TEST_F(RecorderTest, DropsDuplicatesOfStoredAndOfWaitingSamples) {
+  start();
+  connect(robot_);
+  make(robot_, 50);
+  flush();
+  make(robot_, 10);
+  send(robot_, 40, 25);  // 40..49 stored, 50..59 wait, 60..64 new
+  flush();
+  EXPECT_EQ(segments(), (Rows{"0|49", "50|64"}));
+  EXPECT_EQ(samples(), 65);
+  EXPECT_EQ(recorder_->counters().samples_duplicate, 20u);
+}
+
+TEST_F(RecorderTest, DropsDuplicatesWhileACommitIsUnderWay) {
+  start();
+  connect(robot_);
+  send(robot_, 0, 10);
+  auto flushing = [](Recorder& recorder) -> boost::asio::awaitable<void> { co_await recorder.flush(); };
+  tasks_->spawn("flush", flushing(*recorder_));
+  while (disk_.jobs() == 0) loop_.poll_one();
+  send(robot_, 5, 10);
+  flush();
+  EXPECT_EQ(segments(), (Rows{"0|9", "10|14"}));
+}
+
+TEST_F(RecorderTest, AcknowledgesUpToTheFirstHoleAndPassesItWhenBackfilled) {
+  start();
+  connect(robot_);
+  send(robot_, 0, 10);
+  send(robot_, 50, 10);
+  flush();
+  EXPECT_EQ(durable_next_seq_, 10u);
+  send(robot_, 10, 20);  // backfill and live samples come in turns
+  send(robot_, 60, 5);
+  send(robot_, 30, 20);
+  send(robot_, 65, 5);
+  flush();
+  EXPECT_EQ(durable_next_seq_, 70u);
+  EXPECT_EQ(segments(), (Rows{"0|9", "10|49", "50|59", "60|69"}));
+  EXPECT_EQ(samples(), 70);
+}
+
+TEST_F(RecorderTest, WhatTheRobotNoLongerHoldsIsAGapAndIsPassed) {
+  start();
+  connect(robot_);
+  send(robot_, 0, 10);
+  robot_.oldest_seq = 25;
+  send(robot_, 30, 10);
+  flush();
+  EXPECT_EQ(gaps(), Rows{"10|24|ring_overrun"});
+  EXPECT_EQ(durable_next_seq_, 25u);
+  send(robot_, 25, 5);
+  flush();
+  EXPECT_EQ(durable_next_seq_, 40u);
+  EXPECT_EQ(recorder_->counters().samples_lost, 15u);
+}
+
+TEST_F(RecorderTest, AGapBelowTheHelloIsStoredOnceConnected) {
+  robot_.next_seq = 900;
+  robot_.oldest_seq = 100;
+  start();
+  connect(robot_);
+  flush();
+  EXPECT_EQ(gaps(), Rows{"0|99|ring_overrun"});
+  EXPECT_EQ(durable_next_seq_, 100u);
+}
+
+TEST_F(RecorderTest, AsksForAHoleThatDoesNotShrinkOnceASecond) {
+  start();
+  connect(robot_);
+  send(robot_, 0, 10);
+  send(robot_, 20, 10);
+  clock_.run_for(400ms);
+  EXPECT_TRUE(missing_.empty());
+  clock_.run_for(300ms);
+  EXPECT_EQ(missing_, (std::vector<Missing>{{10, 20}}));
+  clock_.run_for(1s);
+  EXPECT_EQ(missing_, (std::vector<Missing>{{10, 20}, {10, 20}}));
+  send(robot_, 10, 10);
+  clock_.run_for(5s);
+  EXPECT_EQ(missing_.size(), 2u);
+}
+
+TEST_F(RecorderTest, AsksNothingOfARobotThatIsNotConnected) {
+  start();
+  connect(robot_);
+  send(robot_, 10, 10);
+  disconnect(robot_);
+  clock_.run_for(5s);
+  EXPECT_TRUE(missing_.empty());
+}
+
+TEST_F(RecorderTest, AFullQueueRefusesAndAsksAgainSoThatSentIsStoredPlusLost) {
+  RecorderOptions options;
+  options.max_queued_samples = 30;
+  start(options);
+  connect(robot_);
+  make(robot_, 60);  // within one instant: 30 are queued, 30 refused
+  EXPECT_EQ(recorder_->counters().samples_refused, 30u);
+  EXPECT_EQ(recorder_->queued_samples(), 30u);
+  flush();
+  EXPECT_EQ(durable_next_seq_, 30u);
+  EXPECT_TRUE(clock_.run_until([&] { return !missing_.empty(); }, 2s));
+  EXPECT_EQ(missing_.back(), (Missing{30, 60}));
+  robot_.oldest_seq = 40;  // too late for ten of them
+  send(robot_, 40, 20);
+  flush();
+  EXPECT_EQ(gaps(), Rows{"30|39|queue_full"});
+  EXPECT_EQ(samples() + number("SELECT sum(last_seq - first_seq + 1) FROM gap"), 60);
+  EXPECT_EQ(durable_next_seq_, 60u);
+}
+
+TEST_F(RecorderTest, AcknowledgedSamplesSurviveAKillAndTheRestIsAskedFor) {
+  start();
+  connect(robot_);
+  make(robot_, 100);
+  clock_.run_for(200ms);
+  make(robot_, 40);
+  const std::uint64_t acknowledged = durable_next_seq_;
+  kill();
+  start();
+  EXPECT_EQ(restored_.robots, std::vector<RobotId>{"nemo"});
+  EXPECT_EQ(admit(robot_).durable_next_seq, acknowledged);
+  connect(robot_);
+  make(robot_, 10);
+  send(robot_, acknowledged, 140 - acknowledged);
+  flush();
+  EXPECT_EQ(samples(), 150);
+  EXPECT_EQ(number("SELECT count(DISTINCT row) FROM sample"), 150);
+  EXPECT_EQ(durable_next_seq_, 150u);
+}
+
+TEST_F(RecorderTest, CloseWritesEverythingThatWasHeard) {
+  start();
+  connect(robot_);
+  make(robot_, 33);
+  stop();
+  EXPECT_FALSE(std::filesystem::exists(path_.string() + "-wal"));
+  EXPECT_EQ(samples(), 33);
+}
+
+TEST_F(RecorderTest, RowsAreNumberedOnAcrossRestarts) {
+  start();
+  connect(robot_);
+  make(robot_, 10);
+  stop();
+  start();
+  connect(robot_);
+  make(robot_, 10);
+  flush();
+  EXPECT_EQ(rows("SELECT first_row, last_row FROM segment"), (Rows{"1|10", "11|20"}));
+}
+
+TEST_F(RecorderTest, EventsAreStoredOnceWithTheNextCommit) {
+  start();
+  connect(robot_);
+  send_event(robot_, 0);
+  send_event(robot_, 1);
+  send_event(robot_, 1);
+  EXPECT_TRUE(clock_.run_until([&] { return durable_next_event_seq_ == 2; }, 110ms));
+  EXPECT_EQ(rows("SELECT event_seq, kind, mode FROM event"), (Rows{"0|mode_changed|auto", "1|mode_changed|auto"}));
+  send_event(robot_, 5, 4);
+  flush();
+  EXPECT_EQ(rows("SELECT first_event_seq, last_event_seq FROM event_gap"), Rows{"2|3"});
+  EXPECT_EQ(durable_next_event_seq_, 4u);
+  kill();
+  start();
+  EXPECT_EQ(admit(robot_).durable_next_event_seq, 4u);
+}
+
+TEST_F(RecorderTest, RestoresPendingStopsAndFailsOtherCommands) {
+  start();
+  send_command(0xffffffffffffffff, "emergency_stop", CommandState::queued);
+  send_command(0xffffffffffffffff, "emergency_stop", CommandState::sent);
+  send_command(2, "emergency_stop", CommandState::acknowledged);
+  send_command(3, "set_duty", CommandState::sent);
+  flush();
+  kill();
+  start();
+  ASSERT_EQ(restored_.pending_stops.size(), 1u);
+  EXPECT_EQ(restored_.pending_stops[0].id, 0xffffffffffffffff);
+  EXPECT_EQ(restored_.pending_stops[0].state, CommandState::sent);
+  EXPECT_EQ(rows("SELECT state, reason FROM command WHERE command_id = 3"), Rows{"failed|station_restarted"});
+}
+
+TEST_F(RecorderTest, IgnoresNumbersThatCannotBe) {
+  start();
+  connect(robot_);
+  SampleBatch absurd = robot_.batch(0, 5);
+  absurd.first_seq = ~0ULL - 2;
+  send(robot_, absurd);
+  absurd = robot_.batch(0, 5);
+  absurd.oldest_seq = 1ULL << 63;
+  send(robot_, absurd);
+  flush();
+  EXPECT_EQ(samples(), 0);
+  EXPECT_EQ(recorder_->counters().batches_malformed, 2u);
+}
+
+TEST_F(RecorderTest, KeepsNoBookkeepingOfBootsThatAreGone) {
+  start();
+  connect(robot_);
+  make(robot_, 10);
+  disconnect(robot_);
+  clock_.run_for(120s);
+  EXPECT_EQ(recorder_->next_seq(robot_.boot_id), 0u);
+  EXPECT_FALSE(clock_.advance_to_next());  // and does not wake up any more
+  connect(robot_);
+  make(robot_, 10);
+  flush();
+  EXPECT_EQ(samples(), 20);
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,235 @@
+// A run holds every sample between its begin and its end, over reboots of the robot and of the station.
+#include "tests/server/recording/recording_test.hpp"
+
+namespace server {
+namespace {
+
+class RunsTest : public RecordingTest {
+ protected:
+  TestRobot robot_;
+
+  RunId create(const std::string& name = "step 1") {
+    RunConditions conditions;
+    conditions.name = name;
+    conditions.fluid = "water";
+    conditions.mean_flow_m_s = 0.25;
+    const Result<Run> run = wait(runs_->create(robot_.id, conditions));
+    EXPECT_TRUE(run.has_value()) << run.error().detail;
+    return run ? run->id : 0;
+  }
+  Run find(RunId id) {
+    const Result<Run> run = wait(runs_->find(id));
+    EXPECT_TRUE(run.has_value());
+    return run.value_or(Run{});
+  }
+  Run end(RunId id, const std::string& verdict = "good") {
+    const Result<Run> run = wait(runs_->end(id, verdict));
+    EXPECT_TRUE(run.has_value());
+    return run.value_or(Run{});
+  }
+  void reboot() {
+    disconnect(robot_);
+    robot_.boot_id += 1;
+    robot_.next_seq = robot_.oldest_seq = 0;
+    connect(robot_);
+  }
+  std::int64_t samples_in(RunId id) {
+    return number("SELECT count(*) FROM run_sample WHERE run_id = " + std::to_string(id));
+  }
+};
+
+TEST_F(RunsTest, HoldsTheSamplesBetweenCreateAndEnd) {
+  start();
+  connect(robot_);
+  make(robot_, 30);
+  const RunId id = create();
+  make(robot_, 250);
+  const Run run = end(id);
+  make(robot_, 30);
+  flush();
+  EXPECT_EQ(run.robot_id, "nemo");
+  EXPECT_EQ(run.conditions.fluid, "water");
+  EXPECT_EQ(run.conditions.mean_flow_m_s, 0.25);
+  EXPECT_EQ(run.conditions.verdict, "good");
+  EXPECT_EQ(run.firmware_version, "1.2.3");
+  EXPECT_EQ(run.controller_checksum, 0xfedcba98u);
+  EXPECT_TRUE(run.ended_at_us.has_value());
+  ASSERT_EQ(run.spans.size(), 1u);
+  EXPECT_EQ(run.spans[0].first_seq, 30u);
+  EXPECT_EQ(run.spans[0].last_seq, 279u);
+  EXPECT_EQ(run.samples_expected, 250u);
+  EXPECT_EQ(run.samples_stored, 250u);
+  EXPECT_EQ(run.samples_lost, 0u);
+  EXPECT_EQ(samples_in(id), 250);
+}
+
+TEST_F(RunsTest, AnOpenRunCountsWhatIsOnItsWay) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  make(robot_, 100);
+  clock_.run_for(150ms);
+  make(robot_, 7);
+  const Run run = find(id);
+  EXPECT_EQ(run.samples_expected, 107u);
+  EXPECT_EQ(run.samples_stored, 100u);
+  EXPECT_FALSE(run.spans[0].last_seq.has_value());
+}
+
+TEST_F(RunsTest, RefusesASecondRunAnUnknownRobotAndABadName) {
+  start();
+  EXPECT_EQ(wait(runs_->create("nemo", named("x"))).error().code, ErrorCode::not_connected);
+  connect(robot_);
+  EXPECT_EQ(wait(runs_->create("nemo", named(""))).error().code, ErrorCode::invalid);
+  EXPECT_EQ(wait(runs_->create("nemo", named("two\nlines"))).error().code, ErrorCode::invalid);
+  EXPECT_EQ(wait(runs_->create("nemo", named(std::string(201, 'x')))).error().code, ErrorCode::invalid);
+  const RunId id = create();
+  EXPECT_EQ(wait(runs_->create("nemo", named("x"))).error().code, ErrorCode::conflict);
+  end(id);
+  create("the next one");
+  EXPECT_EQ(wait(runs_->end(id, "")).error().code, ErrorCode::conflict);
+  EXPECT_EQ(wait(runs_->end(99, "")).error().code, ErrorCode::not_found);
+  EXPECT_EQ(wait(runs_->find(99)).error().code, ErrorCode::not_found);
+  disconnect(robot_);
+}
+
+TEST_F(RunsTest, ListsNewestFirstInPages) {
+  start();
+  connect(robot_);
+  for (int i = 0; i < 5; ++i) end(create("run " + std::to_string(i)));
+  const auto ids = [&](RunId before, std::size_t limit, std::optional<RobotId> robot = std::nullopt) {
+    std::vector<RunId> found;
+    for (const Run& run : wait(runs_->list(robot, before, limit))) found.push_back(run.id);
+    return found;
+  };
+  EXPECT_EQ(ids(0, 2), (std::vector<RunId>{5, 4}));
+  EXPECT_EQ(ids(4, 2), (std::vector<RunId>{3, 2}));
+  EXPECT_EQ(ids(2, 2), (std::vector<RunId>{1}));
+  EXPECT_EQ(ids(0, 10, "nemo").size(), 5u);
+  EXPECT_TRUE(ids(0, 10, "dory").empty());
+}
+
+TEST_F(RunsTest, EndWaitsForBackfillAndAnswersAsSoonAsItIsThere) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  make(robot_, 20);
+  robot_.next_seq = 40;  // 20..39 are on their way
+  make(robot_, 10);
+  const std::int64_t begin_us = clock_.steady_us();
+  auto backfill = [](VirtualClock& clock, RecordingTest& test, auto send) -> boost::asio::awaitable<void> {
+    co_await clock.sleep_for(400ms);
+    send(test);
+  };
+  tasks_->spawn("backfill", backfill(clock_, *this, [this](RecordingTest&) { send(robot_, 20, 20); }));
+  const Run run = end(id);
+  EXPECT_EQ(run.samples_stored, 50u);
+  EXPECT_LE(clock_.steady_us() - begin_us, 500'000);
+}
+
+TEST_F(RunsTest, EndAnswersAfter3SecondsWithWhatIsStillMissing) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  make(robot_, 20);
+  robot_.next_seq = 40;
+  make(robot_, 10);
+  const std::int64_t begin_us = clock_.steady_us();
+  const Run run = end(id);
+  EXPECT_EQ(run.samples_expected, 50u);
+  EXPECT_EQ(run.samples_stored, 30u);
+  EXPECT_NEAR(static_cast<double>(clock_.steady_us() - begin_us), 3e6, 1e5);
+  send(robot_, 20, 20);  // comes after all
+  flush();
+  EXPECT_EQ(find(id).samples_stored, 50u);
+}
+
+TEST_F(RunsTest, ARunWithoutSamplesEndsEmpty) {
+  start();
+  connect(robot_);
+  const Run run = end(create());
+  EXPECT_TRUE(run.spans.empty());
+  EXPECT_EQ(run.samples_expected, 0u);
+}
+
+TEST_F(RunsTest, ARebootOpensANewSpanAndWhatItLostIsCounted) {
+  start();
+  connect(robot_);
+  make(robot_, 50);
+  const RunId id = create();
+  make(robot_, 50);
+  robot_.next_seq = 110;  // 100..109 never arrive
+  make(robot_, 15);
+  reboot();
+  make(robot_, 40);
+  const Run run = end(id);
+  ASSERT_EQ(run.spans.size(), 2u);
+  EXPECT_EQ(run.spans[0].first_seq, 50u);
+  EXPECT_EQ(run.spans[0].last_seq, 124u);
+  EXPECT_EQ(run.spans[1].boot_id, robot_.boot_id);
+  EXPECT_EQ(run.spans[1].first_seq, 0u);
+  EXPECT_EQ(run.spans[1].last_seq, 39u);
+  EXPECT_EQ(run.samples_expected, 115u);
+  EXPECT_EQ(run.samples_stored, 105u);
+  EXPECT_EQ(run.samples_lost, 10u);
+  EXPECT_EQ(samples_in(id), 105);
+  EXPECT_EQ(rows("SELECT first_seq, last_seq, cause FROM run_gap"), std::vector<std::string>{"100|109|reboot"});
+}
+
+TEST_F(RunsTest, GoesOnAfterAKillWithoutMissingASample) {
+  start();
+  connect(robot_);
+  make(robot_, 30);
+  const RunId id = create();
+  make(robot_, 100);
+  clock_.run_for(150ms);
+  make(robot_, 44);  // heard, but not committed: gone with the station
+  kill();
+  start();
+  EXPECT_EQ(wait(runs_->create(robot_.id, named("x"))).error().code, ErrorCode::not_connected);
+  robot_.next_seq += 200;  // made while there was no station
+  const std::uint64_t durable = admit(robot_).durable_next_seq;
+  connect(robot_);
+  EXPECT_EQ(find(id).samples_expected, 344u);
+  make(robot_, 10);
+  send(robot_, durable, 374 - durable);
+  const Run run = end(id);
+  EXPECT_EQ(run.spans.size(), 1u);
+  EXPECT_EQ(run.samples_expected, 354u);
+  EXPECT_EQ(run.samples_stored, 354u);
+  EXPECT_EQ(rows("SELECT count(DISTINCT seq), min(seq), max(seq) FROM run_sample"),
+            std::vector<std::string>{"354|30|383"});
+}
+
+TEST_F(RunsTest, ARebootWhileTheStationIsDownMovesTheRunOn) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  make(robot_, 50);
+  flush();
+  kill();
+  start();
+  reboot();
+  make(robot_, 20);
+  const Run run = end(id);
+  ASSERT_EQ(run.spans.size(), 2u);
+  EXPECT_EQ(run.spans[0].last_seq, 49u);
+  EXPECT_EQ(run.samples_stored, 70u);
+  EXPECT_EQ(run.samples_expected, 70u);
+}
+
+TEST_F(RunsTest, ARunThatEndsWhileTheRobotIsAwayAfterARestartEndsAtWhatIsKnown) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  make(robot_, 50);
+  flush();
+  kill();
+  start();
+  const Run run = end(id);
+  EXPECT_EQ(run.spans.at(0).last_seq, 49u);
+  EXPECT_EQ(run.samples_stored, 50u);
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,65 @@
+// The robot closes its loop as the reference does: the golden experiment, in virtual time, through the protocol.
+#include "sim_robot/experiment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace sim_robot {
+namespace {
+
+nlohmann::json golden_case(const std::string& plant, const std::string& duty_limits) {
+  const auto golden = nlohmann::json::parse(std::ifstream(TEST_DATA_DIR "/closed_loop_cases.json"));
+  for (const auto& row : golden["sampled"]) {
+    if (row["plant"] == plant && row["duty_limits"] == duty_limits && row["recurrence_memory"] == "unsaturated") {
+      return row;
+    }
+  }
+  return {};
+}
+
+void expect_trajectory(const ExperimentResult& result, const nlohmann::json& golden) {
+  ASSERT_EQ(result.position_m.size(), 4001u);
+  const auto& k = golden["k"];
+  ASSERT_EQ(k.size(), 99u);
+  for (std::size_t i = 0; i < k.size(); ++i) {
+    EXPECT_NEAR(result.position_m.at(k[i]), golden["measured"][i], 1e-4) << "at sample " << k[i];
+  }
+}
+
+// The bounds of the first-light demonstration.
+TEST(Experiment, FollowsTheReferenceWithReverseThrust) {
+  const ExperimentResult result = run_experiment({});
+  expect_trajectory(result, golden_case("Eq(29)", "-1..1"));
+  ASSERT_TRUE(result.step.settling_s && result.disturbance.settling_s);
+  EXPECT_NEAR(*result.step.settling_s, 1.15, 0.05);
+  EXPECT_NEAR(result.step.overshoot_percent, 0.45, 0.2);
+  EXPECT_NEAR(*result.disturbance.settling_s, 0.63, 0.05);
+  EXPECT_NEAR(result.step.steady_state_error_m, 0, 1e-5);
+}
+
+TEST(Experiment, WithoutReverseThrustAnOvershootStays) {
+  SimulatedRobotConfig config;
+  config.duty = {0, 1};
+  const ExperimentResult result = run_experiment(config);
+  expect_trajectory(result, golden_case("Eq(29)", "0..1"));
+  EXPECT_FALSE(result.step.settling_s.has_value());
+  EXPECT_FALSE(result.disturbance.settling_s.has_value());
+  EXPECT_NEAR(result.step.overshoot_percent, 3.29, 0.2);
+  EXPECT_NEAR(result.step.steady_state_error_m, -0.00329, 1e-4);
+}
+
+TEST(Experiment, FollowsTheReferenceInANewtonianFluid) {
+  SimulatedRobotConfig config;
+  config.model = control::kNewtonianModel;
+  const ExperimentResult result = run_experiment(config);
+  EXPECT_NEAR(result.step.overshoot_percent, 9.82, 0.5);
+  EXPECT_NEAR(*result.step.settling_s, 0.84, 0.05);
+}
+
+TEST(Experiment, IsTheSameEveryTime) { EXPECT_EQ(run_experiment({}).duty, run_experiment({}).duty); }
+
+}  // namespace
+}  // namespace sim_robot

@@ -1,0 +1,86 @@
+"""Real stations and simulated robots as processes, for the tests in this folder. Standard library only."""
+import contextlib
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "deploy"))
+
+from station_api import ApiError, Station, wait_until  # noqa: E402, F401  (used by the tests)
+
+BIN = pathlib.Path(os.environ["RHEONAUT_BIN"])  # set by CTest
+
+
+class Lab:
+    """A data folder, and the processes that were started for it; all of them are gone at the end."""
+
+    def __init__(self, folder):
+        self.folder = pathlib.Path(folder)
+        self.data = self.folder / "data"
+        self.processes = []
+        self.station_process = None
+
+    def _start(self, name, *arguments):
+        log = open(self.folder / f"{name}.log", "ab")
+        process = subprocess.Popen([str(BIN / arguments[0]), *map(str, arguments[1:])], stdout=log,
+                                   stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+        log.close()
+        self.processes.append(process)
+        return process
+
+    def start_station(self, http="127.0.0.1:0", robots="127.0.0.1:0"):
+        with contextlib.suppress(FileNotFoundError):
+            (self.data / "endpoints.json").unlink()  # of a station that was killed
+        self.station_process = self._start("station", "rheonaut", "serve", "--data", self.data, "--http", http,
+                                           "--robots", robots)
+        try:
+            return Station(self.data, timeout_s=60)
+        except TimeoutError:
+            print(self.log("station"))
+            raise
+
+    def start_robot(self, station, robot_id="sim-1", *flags):
+        return self._start(robot_id, "rheonaut-sim", "--station", station.endpoints["robots"], "--id", robot_id, *flags)
+
+    def kill_station(self):
+        self.station_process.kill()
+        self.station_process.wait()
+
+    def stop_station(self, timeout_s=30):
+        """SIGTERM; returns the exit code."""
+        self.station_process.send_signal(signal.SIGTERM)
+        return self.station_process.wait(timeout=timeout_s)
+
+    def log(self, name):
+        path = self.folder / f"{name}.log"
+        return path.read_text(errors="replace") if path.exists() else ""
+
+    def close(self):
+        for process in reversed(self.processes):
+            if process.poll() is None:
+                process.terminate()
+        for process in reversed(self.processes):
+            try:
+                process.wait(timeout=30)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+@contextlib.contextmanager
+def lab():
+    """A Lab in a folder of its own. When the test fails, the logs are printed."""
+    with tempfile.TemporaryDirectory(prefix="rheonaut-") as folder:
+        place = Lab(folder)
+        try:
+            yield place
+        except BaseException:
+            for path in sorted(place.folder.glob("*.log")):
+                print(f"--- {path.name}\n{path.read_text(errors='replace')[-4000:]}", file=sys.stderr)
+            raise
+        finally:
+            place.close()
