@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <cstdio>
+
 #include "server/endpoint.hpp"
 
 namespace server {
@@ -20,6 +22,18 @@ StationFacts facts_of(const ApiOptions& options, const Listener& listener, const
 
 }  // namespace
 
+ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string robots_address) {
+  ApiOptions options;
+  options.endpoint = parse_endpoint(config.http);
+  options.or_any_port = config.http_or_any_port;
+  options.data_dir = config.data_dir;
+  options.hosts = config.http_hosts;
+  options.version = RHEONAUT_VERSION;
+  options.store_id = store_id;
+  options.robots_address = std::move(robots_address);
+  return options;
+}
+
 ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clock, const ApiOptions& options,
                      Station& station, LiveFeed& live, Runs& runs, History& history, AnalysisService& analysis)
     : listener_{loop, clock, options.endpoint, options.or_any_port},
@@ -32,6 +46,11 @@ ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clo
 }
 
 std::string ApiServer::address() const { return text(listener_.endpoint()); }
+
+void ApiServer::print_login_url() {
+  fmt::print("Open the cockpit with this one-time link:\n  {}\n", login_url());
+  std::fflush(stdout);
+}
 
 std::string ApiServer::login_url() {
   auto endpoint = listener_.endpoint();

@@ -9,6 +9,7 @@
 
 #include "server/api/http_server.hpp"
 #include "server/api/routes.hpp"
+#include "server/config.hpp"
 
 namespace server {
 
@@ -21,6 +22,8 @@ struct ApiOptions {
   std::uint64_t store_id = 0;
   std::string robots_address;  // "127.0.0.1:7070", for people
 };
+
+ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string robots_address);
 
 class ApiServer {
  public:

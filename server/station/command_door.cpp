@@ -122,17 +122,15 @@ void Station::hand_stop_to(Seat& seat, const std::shared_ptr<PendingCommand>& st
   for (const CommandId id : superseded) finish(seat, id, CommandState::failed, "superseded_by_emergency_stop");
 }
 
-void Station::restore_pending_stops(const std::vector<CommandRecord>& stops) {
-  for (const CommandRecord& record : stops) {
-    Seat& seat = add_seat(record.robot_id);
-    auto pending = std::make_shared<PendingCommand>(loop_);
-    pending->record = record;
-    pending->wire.command_id = record.id;
-    pending->wire.which_action = rheonaut_Command_emergency_stop_tag;
-    seat.commands.emplace(record.id, pending);
-    seat.robot->pending_stop = record.id;
-    spdlog::warn("an emergency stop of robot '{}' waits for the robot to return", record.robot_id);
-  }
+void Station::restore_stop(const CommandRecord& record) {
+  Seat& seat = add_seat(record.robot_id);
+  auto pending = std::make_shared<PendingCommand>(loop_);
+  pending->record = record;
+  pending->wire.command_id = record.id;
+  pending->wire.which_action = rheonaut_Command_emergency_stop_tag;
+  seat.commands.emplace(record.id, pending);
+  seat.robot->pending_stop = record.id;
+  spdlog::warn("an emergency stop of robot '{}' waits for the robot to return", record.robot_id);
 }
 
 void Station::on_command_sent(RobotPort& port, CommandId id) {

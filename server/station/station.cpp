@@ -46,8 +46,9 @@ Station::~Station() = default;
 
 void Station::add_sink(StationSink& sink) { sinks_.push_back(&sink); }
 
-void Station::restore_robots(const std::vector<RobotId>& ids) {
-  for (const RobotId& id : ids) add_seat(id);
+void Station::restore(const std::vector<RobotId>& robots, const std::vector<CommandRecord>& pending_stops) {
+  for (const RobotId& id : robots) add_seat(id);
+  for (const CommandRecord& record : pending_stops) restore_stop(record);
 }
 
 const RobotState* Station::find(const RobotId& id) const {

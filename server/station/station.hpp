@@ -44,10 +44,9 @@ class Station {
 
   void add_sink(StationSink& sink);
 
-  // Emergency stops of an earlier run of the station that no robot has acknowledged; call before robots arrive.
-  void restore_pending_stops(const std::vector<CommandRecord>& stops);
-  // Robots of the archive, shown as disconnected; call before robots arrive.
-  void restore_robots(const std::vector<RobotId>& ids);
+  // What the archive knows, before robots arrive: its robots, shown as disconnected, and the emergency stops of an
+  // earlier run of the station that no robot has acknowledged.
+  void restore(const std::vector<RobotId>& robots, const std::vector<CommandRecord>& pending_stops);
 
   const std::map<RobotId, RobotState>& robots() const { return robots_; }
   const RobotState* find(const RobotId& id) const;
@@ -97,6 +96,7 @@ class Station {
   void note(const RobotState& robot, std::string kind, std::string cause);
 
   std::shared_ptr<PendingCommand> make_pending(const CommandRequest& request, const RobotState& robot);
+  void restore_stop(const CommandRecord& record);
   void hand_stop_to(Seat& seat, const std::shared_ptr<PendingCommand>& stop);
   void finish(Seat& seat, CommandId id, CommandState state, std::string reason);
   void expire_commands(Seat& seat);

@@ -68,7 +68,7 @@ TEST_F(LinkTest, AnUnknownAndADisconnectedRobotAreToldApart) {
   submit(set_duty(0));
   clock.settle();
   EXPECT_EQ(results.at(0).error().code, ErrorCode::not_found);
-  station.restore_robots({"r1"});
+  station.restore({"r1"}, {});
   submit(set_duty(0));
   clock.settle();
   EXPECT_EQ(results.at(1).error().code, ErrorCode::not_connected);
@@ -171,7 +171,7 @@ TEST_F(LinkTest, AStopOfAnEarlierStationIsSentWhenTheRobotReturns) {
   kept.id = 1234;
   kept.robot_id = "r1";
   kept.kind = "emergency_stop";
-  station.restore_pending_stops({kept});
+  station.restore({}, {kept});
   auto* robot = dial();
   robot->say_hello();
   ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));

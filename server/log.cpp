@@ -1,0 +1,15 @@
+// Sets up spdlog.
+#include "server/log.hpp"
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+namespace server {
+
+void start_log(const std::string& level) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("rheonaut"));
+  spdlog::set_level(spdlog::level::from_str(level));
+  spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e  %^%-7l%$  %v");
+}
+
+}  // namespace server
