@@ -1,0 +1,59 @@
+// Requests to the station, and its refusals as sentences.
+import { expect, test } from 'vitest';
+import { Api, ApiError } from '../src/api';
+
+function api_that_answers(status: number, body: unknown) {
+  const asked: { path: string; options: RequestInit }[] = [];
+  const api = new Api((path, options) => {
+    asked.push({ path, options });
+    return Promise.resolve(new Response(body === null ? 'not JSON' : JSON.stringify(body), { status }));
+  });
+  return { api, asked };
+}
+
+const failure = (promise: Promise<unknown>) =>
+  promise.then(
+    () => expect.unreachable(),
+    (error: unknown) => error as ApiError,
+  );
+
+test('a command is a POST of JSON with SI units', async () => {
+  const { api, asked } = api_that_answers(200, { state: 'acknowledged' });
+  await api.set_auto('rheo-1', 0.1);
+  expect(asked[0]?.path).toBe('/api/v1/robots/rheo-1/commands');
+  expect(asked[0]?.options.method).toBe('POST');
+  expect(JSON.parse(String(asked[0]?.options.body))).toEqual({ kind: 'set_mode', mode: 'auto', setpoint_m: 0.1 });
+});
+
+test('a known refusal is said in the words of the operator', async () => {
+  const { api } = api_that_answers(409, { title: 'Conflict', status: 409, detail: 'latch 5', reason: 'latched' });
+  const error = await failure(api.set_duty('rheo-1', 0.3));
+  expect(error.message).toBe('The emergency stop is latched. Clear it first.');
+  expect(error).toMatchObject({ status: 409, reason: 'latched', detail: 'latch 5' });
+});
+
+test('an unknown refusal is said in the words of the station', async () => {
+  const { api } = api_that_answers(422, { title: 'Unprocessable', detail: 'setpoint_m is 4, allowed is -1 to 1', reason: 'new_one' });
+  expect((await failure(api.set_setpoint('rheo-1', 4))).message).toBe('setpoint_m is 4, allowed is -1 to 1');
+});
+
+test('an answer that is no JSON is an error with its status', async () => {
+  const { api } = api_that_answers(502, null);
+  expect((await failure(api.set_manual('rheo-1'))).message).toContain('502');
+});
+
+test('no answer at all is said', async () => {
+  const api = new Api(() => Promise.reject(new TypeError('fetch failed')));
+  expect((await failure(api.set_manual('rheo-1'))).message).toBe('The station did not answer.');
+});
+
+test('only 401 means signed out', async () => {
+  expect(await api_that_answers(401, {}).api.is_signed_out()).toBe(true);
+  expect(await api_that_answers(500, {}).api.is_signed_out()).toBe(false);
+});
+
+test('ids of 64 bits pass through unrounded', async () => {
+  const { api, asked } = api_that_answers(200, { state: 'acknowledged' });
+  await api.clear_emergency('rheo-1', '18446744073709551615');
+  expect(String(asked[0]?.options.body)).toContain('"18446744073709551615"');
+});

@@ -1,0 +1,102 @@
+// The emergency stop and its key.
+import { expect, test } from 'vitest';
+import type { CommandRecord } from '../src/api';
+import { EmergencyStop, type StopState } from '../src/emergency';
+import { listen_for_stop_key } from '../src/keys';
+import { settle } from './fakes';
+
+const record = (state: CommandRecord['state'], robot_id = 'rheo-1', reason = '') => ({ state, robot_id, reason }) as CommandRecord;
+
+function stop_with(over_http: () => Promise<CommandRecord[]>, over_socket: () => boolean = () => true) {
+  const world = { now_ms: 0, ways: [] as string[], states: [] as StopState[] };
+  const emergency = new EmergencyStop({
+    over_socket: (robot_id) => {
+      world.ways.push(`socket ${robot_id}`);
+      return over_socket();
+    },
+    over_http: (robot_id) => {
+      world.ways.push(`http ${robot_id}`);
+      return over_http();
+    },
+    now_ms: () => world.now_ms,
+    on_change: (state) => world.states.push(state),
+  });
+  return { emergency, world };
+}
+
+test('leaves over both ways in the call that pressed it', () => {
+  const { emergency, world } = stop_with(() => new Promise(() => undefined));
+  void emergency.stop('rheo-1');
+  expect(world.ways).toEqual(['socket rheo-1', 'http rheo-1']);
+  expect(emergency.state.phase).toBe('sent');
+});
+
+test('a broken socket does not keep it from the other way', async () => {
+  const { emergency, world } = stop_with(
+    () => Promise.resolve([record('acknowledged')]),
+    () => {
+      throw new Error('socket');
+    },
+  );
+  world.now_ms = 1000;
+  const done = emergency.stop('rheo-1');
+  world.now_ms = 1023;
+  await done;
+  expect(emergency.state).toMatchObject({ phase: 'stopped', answered_after_ms: 23, detail: 'rheo-1' });
+});
+
+test('for a robot that is away it says that the stop is kept', async () => {
+  const { emergency } = stop_with(() => Promise.resolve([record('acknowledged', 'a'), record('queued', 'b')]));
+  await emergency.stop(null);
+  expect(emergency.state).toMatchObject({ phase: 'kept', detail: 'b' });
+});
+
+test('a sent stop without an answer is not shown as stopped', async () => {
+  const { emergency } = stop_with(() => Promise.resolve([record('sent')]));
+  await emergency.stop('rheo-1');
+  expect(emergency.state.phase).toBe('unanswered');
+});
+
+test('a failure is said, with what did work', async () => {
+  const { emergency } = stop_with(() => Promise.reject(new Error('The station did not answer.')));
+  await emergency.stop('rheo-1');
+  expect(emergency.state.phase).toBe('failed');
+  expect(emergency.state.detail).toContain('over the live link');
+});
+
+test('a second press sends again, and the answer to the first is not shown over it', async () => {
+  const answers: ((records: CommandRecord[]) => void)[] = [];
+  const { emergency, world } = stop_with(() => new Promise((done) => answers.push(done)));
+  void emergency.stop('a');
+  void emergency.stop('b');
+  expect(world.ways).toHaveLength(4);
+  answers[0]?.([record('acknowledged', 'a')]);
+  await settle();
+  expect(emergency.state).toMatchObject({ phase: 'sent', robot_id: 'b' });
+});
+
+function press(key: string, change: Partial<KeyboardEvent> = {}) {
+  let stops = 0;
+  let listener: (event: KeyboardEvent) => void = () => undefined;
+  let prevented = false;
+  const target = {
+    addEventListener: (_: 'keydown', given: (event: KeyboardEvent) => void, options: { capture: boolean }) => {
+      expect(options.capture).toBe(true); // ahead of every field and dialog
+      listener = given;
+    },
+    removeEventListener: () => undefined,
+  };
+  listen_for_stop_key(target, () => (stops += 1));
+  listener({ key, repeat: false, preventDefault: () => (prevented = true), ...change } as KeyboardEvent);
+  return { stops, prevented };
+}
+
+test('Escape stops, also from inside a field, once however long it is held', () => {
+  expect(press('Escape').stops).toBe(1);
+  expect(press('Escape', { target: { tagName: 'INPUT' } as never }).stops).toBe(1);
+  expect(press('Escape', { repeat: true }).stops).toBe(0);
+});
+
+test('typing does not stop', () => {
+  for (const key of ['a', ' ', 'Enter', 'Backspace', '1']) expect(press(key)).toEqual({ stops: 0, prevented: false });
+});

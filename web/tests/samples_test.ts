@@ -1,0 +1,93 @@
+// The ring of samples and the window that a plot takes from it.
+import { expect, test } from 'vitest';
+import { PlotWindow, SampleRing } from '../src/samples';
+import { batch } from './fakes';
+
+function window_of(ring: SampleRing, edge_s: number, span_s = 60): PlotWindow {
+  const window = new PlotWindow(ring.capacity, ['position_m', 'setpoint_m']);
+  window.fill(ring, edge_s, span_s);
+  return window;
+}
+
+test('samples keep the spacing of the robot, whenever they arrive', () => {
+  const ring = new SampleRing(64);
+  ring.append(batch(0, 5), 10);
+  ring.append(batch(5, 5), 10.2); // 150 ms late
+  const window = window_of(ring, ring.edge_s(10.2));
+  for (let i = 1; i < 10; ++i) expect((window.time_s[i] ?? 0) - (window.time_s[i - 1] ?? 0)).toBeCloseTo(0.01, 9);
+});
+
+test('a jump of seq is a gap, not a line', () => {
+  const ring = new SampleRing(64);
+  ring.append(batch(0, 5), 10);
+  ring.append(batch(20, 5), 10.2);
+  const window = window_of(ring, 10.2);
+  expect(window.size).toBe(10);
+  expect(window.gaps_s[0]).toHaveLength(1);
+  const [from_s, to_s] = window.gaps_s[0]?.[0] ?? [0, 0];
+  expect(to_s - from_s).toBeCloseTo(0.16, 9);
+});
+
+test('a batch that is sent again closes the gap', () => {
+  const ring = new SampleRing(64);
+  ring.append(batch(0, 5), 10);
+  ring.append(batch(20, 5), 10.2);
+  ring.append(batch(5, 15, { backfill: true }), 11);
+  const window = window_of(ring, 10.2);
+  expect(window.size).toBe(25);
+  expect(window.gaps_s[0]).toHaveLength(0);
+  expect([...window.values[0]!.subarray(0, 25)]).toEqual(Array.from({ length: 25 }, (_, i) => i / 1000));
+});
+
+test('a repeated sample is counted once', () => {
+  const ring = new SampleRing(64);
+  ring.append(batch(0, 5), 10);
+  ring.append(batch(0, 5), 10.1);
+  expect(ring.received).toBe(5);
+});
+
+test('hours of samples stay in the memory of the first minute', () => {
+  const ring = new SampleRing(128);
+  const arrays = [ring.time_s, ...Object.values(ring.columns)];
+  for (let seq = 0; seq < 100_000; seq += 5) ring.append(batch(seq, 5), seq / 100);
+  expect([ring.time_s, ...Object.values(ring.columns)]).toEqual(arrays);
+  expect(ring.next_index - ring.first_index).toBe(128);
+  expect(window_of(ring, 1000).size).toBe(128);
+});
+
+test('a sample older than the ring does not overwrite a newer one', () => {
+  const ring = new SampleRing(64);
+  ring.append(batch(0, 1), 1);
+  ring.append(batch(100, 60), 2);
+  ring.append(batch(0, 5), 3);
+  expect(ring.holds(0)).toBe(false);
+  expect(ring.holds(100 + 59)).toBe(true);
+});
+
+test('a reboot starts at seq 0 again and is a gap', () => {
+  const ring = new SampleRing(64);
+  ring.append(batch(1000, 5), 10);
+  ring.append(batch(0, 5, { boot_id: '12' }), 12);
+  const window = window_of(ring, 12);
+  expect(window.size).toBe(10);
+  expect(window.gaps_s[0]).toHaveLength(1);
+});
+
+test('a missing setpoint is not drawn', () => {
+  const ring = new SampleRing(64);
+  ring.append(batch(0, 5, { setpoint_m: null }), 10);
+  ring.append(batch(5, 5), 10.05);
+  const window = window_of(ring, 10.05);
+  expect(window.gaps_s[0]).toHaveLength(0);
+  expect(window.gaps_s[1]).toHaveLength(1);
+  const [from_s, to_s] = window.gaps_s[1]?.[0] ?? [0, 0];
+  expect(from_s).toBeCloseTo(window.time_s[0] ?? 0, 9);
+  expect(to_s).toBeCloseTo(window.time_s[5] ?? 0, 9);
+});
+
+test('the right edge moves evenly while batches arrive unevenly', () => {
+  const ring = new SampleRing(256);
+  for (let i = 0; i < 20; ++i) ring.append(batch(i * 5, 5), 10 + i * 0.05 + (i % 3) * 0.01);
+  expect(ring.edge_s(11.5) - ring.edge_s(11.4)).toBeCloseTo(0.1, 9);
+  expect(ring.time_s[99]).toBeLessThanOrEqual(ring.edge_s(10.95) + 0.005);
+});

@@ -1,0 +1,108 @@
+// What the page knows: numerals, stale marks, the log, selection.
+import { expect, test } from 'vitest';
+import type { CommandRecord, RobotState } from '../src/api';
+import { kLogLines, Store } from '../src/store';
+import { batch } from './fakes';
+
+const robot = (robot_id: string, change: Partial<RobotState> = {}) =>
+  ({ robot_id, link: 'connected', mode: 'manual', sub_state: 'none', emergency_id: null, ...change }) as RobotState;
+
+function store_with(...robots: RobotState[]) {
+  const clock = { page: 0 };
+  const store = new Store({ page_ms: () => clock.page, utc_ms: () => 1_700_000_000_000 });
+  store.hear({ type: 'welcome', version: '', utc_us: 0, stamp_us: 0, robots });
+  return { store, clock };
+}
+
+test('numerals follow the last sample, at the refresh and not per sample', () => {
+  const { store } = store_with(robot('rheo-1'));
+  const one = store.find('rheo-1')!;
+  store.hear(batch(0, 5));
+  expect(one.readout.value.position_m).toBeNull();
+  store.refresh();
+  expect(one.readout.value).toMatchObject({ position_m: 0.004, setpoint_m: 0.1, duty: 0.5, mode: 'auto', stale: false });
+});
+
+test('no sample for over half a second marks every numeral stale and tells the age', () => {
+  const { store, clock } = store_with(robot('rheo-1'));
+  store.hear(batch(0, 5));
+  clock.page = 500;
+  store.refresh();
+  expect(store.find('rheo-1')!.readout.value.stale).toBe(false);
+  clock.page = 620;
+  store.refresh();
+  expect(store.find('rheo-1')!.readout.value).toMatchObject({ stale: true, sample_age_ms: 620, position_m: 0.004 });
+});
+
+test('of a silent robot the mode is the one that the station knows', () => {
+  const { store, clock } = store_with(robot('rheo-1'));
+  store.hear(batch(0, 5));
+  clock.page = 1000;
+  store.hear({ type: 'robot', robot: robot('rheo-1', { mode: 'emergency', emergency_id: '9' }) });
+  store.refresh();
+  expect(store.find('rheo-1')!.readout.value).toMatchObject({ mode: 'emergency', emergency_id: '9' });
+});
+
+test('backfill is history: it does not move the numerals back', () => {
+  const { store } = store_with(robot('rheo-1'));
+  store.hear(batch(0, 5));
+  store.hear(batch(20, 5));
+  store.refresh();
+  expect(store.find('rheo-1')!.readout.value).toMatchObject({ received: 10, missing: 15 });
+  store.hear(batch(5, 15, { backfill: true, mode: 'manual' }));
+  store.refresh();
+  expect(store.find('rheo-1')!.readout.value).toMatchObject({ position_m: 0.024, mode: 'auto', received: 25, missing: 0 });
+});
+
+test('a new boot counts anew', () => {
+  const { store } = store_with(robot('rheo-1'));
+  store.hear(batch(500, 5));
+  store.hear(batch(0, 5, { boot_id: '12' }));
+  store.refresh();
+  expect(store.find('rheo-1')!.readout.value).toMatchObject({ received: 5, missing: 0 });
+});
+
+test('the only robot is selected by itself, a connected one rather than one that is away', () => {
+  const { store } = store_with(robot('a', { link: 'disconnected' }), robot('b'));
+  expect(store.selected_id.value).toBe('b');
+});
+
+test('what a person selected stays, whoever connects', () => {
+  const { store } = store_with(robot('a', { link: 'disconnected' }));
+  store.select('a');
+  store.hear({ type: 'robot', robot: robot('b') });
+  expect(store.selected_id.value).toBe('a');
+  expect(store.robots.value).toHaveLength(2);
+});
+
+test('the log keeps the last lines, newest first, and a command has one line that changes', () => {
+  const { store } = store_with(robot('rheo-1'));
+  const command = (n: number, state: CommandRecord['state']) =>
+    store.hear({ type: 'command', command: { command_id: String(n), robot_id: 'rheo-1', state, submitted_at_us: n } as CommandRecord });
+  for (let n = 0; n < 3 * kLogLines; ++n) {
+    command(n, 'sent');
+    if (n % 7 === 0) store.refresh();
+  }
+  store.refresh();
+  command(3 * kLogLines - 2, 'acknowledged');
+  store.refresh();
+  expect(store.log.value).toHaveLength(kLogLines);
+  expect(store.log.value[0]?.key).toBe(`command-${3 * kLogLines - 1}`);
+  expect(store.log.value[1]?.command?.state).toBe('acknowledged');
+});
+
+test('dropped messages are said', () => {
+  const { store } = store_with(robot('rheo-1'));
+  store.hear({ type: 'dropped', count: 12 });
+  store.refresh();
+  expect(store.log.value[0]?.note).toContain('12');
+});
+
+test('an open run is shown until it ends', () => {
+  const { store } = store_with(robot('rheo-1'));
+  const run = { run_id: 7, robot_id: 'rheo-1', ended_at_us: null } as never as Parameters<Store['take_run']>[0];
+  store.hear({ type: 'run', run });
+  expect(store.runs.value).toHaveLength(1);
+  store.hear({ type: 'run', run: { ...run, ended_at_us: 5 } });
+  expect(store.runs.value).toHaveLength(0);
+});
