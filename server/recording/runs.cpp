@@ -80,6 +80,7 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
   };
   open_runs_[robot_id] = 0;
   const Creating creating{open_runs_, robot_id};
+  co_await recorder_.flush();  // the run is stored after the connection it begins in, so a later boot can follow it
   auto job = [run](Database& database) { return RunStore{database, {}}.add(run); };
   const Result<RunId> id = co_await recorder_.on_disk(std::move(job));
   if (!id) co_return std::unexpected{id.error()};

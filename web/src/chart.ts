@@ -14,7 +14,7 @@ export interface Trace {
 }
 
 export interface StripOptions {
-  traces: Trace[];
+  traces: Trace[]; // the last one is drawn on top and is the main one
   label: (value: number) => string; // of the graticule, in the unit people read
   fixed_range?: [number, number];
   least_span?: number; // of a range that follows the data
@@ -35,7 +35,7 @@ export function next_range(now: [number, number], low: number, high: number, lea
   const middle = (low + high) / 2;
   const fits = low >= now[0] && high <= now[1];
   if (fits && span * 1.08 > (now[1] - now[0]) / 2) return now;
-  const step = round_step(span / 4);
+  const step = round_step(span / 8);
   const pad = span * 0.04;
   const from = Math.floor((middle - span / 2 - pad) / step) * step;
   const to = Math.ceil((middle + span / 2 + pad) / step) * step;
@@ -88,6 +88,7 @@ export class StripChart {
     this.plot.batch(() => {
       this.plot.setData(data as unknown as uPlot.AlignedData, false);
       this.plot.setScale('x', { min: view_s[0], max: view_s[1] });
+      this.plot.setScale('y', { min: this.range[0], max: this.range[1] });
     });
   }
 
@@ -138,7 +139,7 @@ export class StripChart {
       hooks: {
         setSelect: [(u) => this.selected(u)],
         setCursor: [(u) => this.on_cursor(u.cursor.left === undefined || u.cursor.left < 0 ? null : (u.cursor.idx ?? null))],
-        draw: [(u) => this.draw_pen(u, colour('--plot'), colour(traces[0]?.colour ?? '--ink'))],
+        draw: [(u) => this.draw_pen(u, colour('--plot'), colour(traces.at(-1)?.colour ?? '--ink'))],
       },
     };
     return new uPlot(options, [[], ...traces.map(() => [])] as unknown as uPlot.AlignedData, this.host);
@@ -160,7 +161,7 @@ export class StripChart {
     return from === -kSpan_s && to === 0 ? kTimeSplits_s : range_splits(this.view_s);
   }
 
-  // The pen: a dot where the first trace ends now.
+  // The pen: a dot where the main trace ends now.
   private draw_pen(u: uPlot, fill: string, stroke: string): void {
     const last = this.window.size - 1;
     if (last < 0 || this.view_s[1] !== 0) return;
@@ -168,7 +169,7 @@ export class StripChart {
     if (time_s < -0.5) return;
     const ratio = devicePixelRatio;
     u.ctx.beginPath();
-    u.ctx.arc(u.valToPos(time_s, 'x', true), u.valToPos(this.window.values[0]?.[last] as number, 'y', true), 3.5 * ratio, 0, 7);
+    u.ctx.arc(u.valToPos(time_s, 'x', true), u.valToPos(this.window.values.at(-1)?.[last] as number, 'y', true), 3.5 * ratio, 0, 7);
     u.ctx.fillStyle = fill;
     u.ctx.fill();
     u.ctx.lineWidth = 2 * ratio;

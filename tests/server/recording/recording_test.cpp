@@ -43,10 +43,11 @@ void RecordingTest::start(RecorderOptions options) {
   recorder_ = std::make_unique<Recorder>(loop_, clock_, disk_, options);
   runs_ = std::make_unique<Runs>(clock_, *recorder_);
   history_ = std::make_unique<History>(path_, *recorder_, readers_);
-  recorder_->set_on_durable([this](const RobotId&, BootId, std::uint64_t next_seq, std::uint64_t next_event_seq) {
-    durable_next_seq_ = next_seq;
-    durable_next_event_seq_ = next_event_seq;
-  });
+  recorder_->set_on_durable(
+      [this](const RobotId&, BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event_seq) {
+        durable_next_seq_ = durable_next_seqs_[boot_id] = next_seq;
+        durable_next_event_seq_ = next_event_seq;
+      });
   recorder_->set_on_missing([this](const RobotId&, BootId, std::uint64_t first_seq, std::uint64_t next_seq) {
     missing_.push_back({first_seq, next_seq});
   });

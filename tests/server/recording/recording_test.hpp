@@ -6,6 +6,7 @@
 #include <boost/asio/co_spawn.hpp>
 #include <exception>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -125,6 +126,7 @@ class RecordingTest : public ::testing::Test {
   std::unique_ptr<History> history_;
   RestoredState restored_;
   std::uint64_t durable_next_seq_ = 0;  // as told last
+  std::map<BootId, std::uint64_t> durable_next_seqs_;
   std::uint64_t durable_next_event_seq_ = 0;
   std::vector<Missing> missing_;  // as asked for
 };

@@ -218,6 +218,20 @@ TEST_F(RunsTest, ARebootWhileTheStationIsDownMovesTheRunOn) {
   EXPECT_EQ(run.samples_expected, 70u);
 }
 
+TEST_F(RunsTest, ARunMadeJustAfterTheConnectionSurvivesAKillAndAReboot) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  kill();
+  start();
+  reboot();
+  make(robot_, 20);
+  const Run run = end(id);
+  ASSERT_EQ(run.spans.size(), 1u);
+  EXPECT_EQ(run.spans[0].boot_id, robot_.boot_id);
+  EXPECT_EQ(run.samples_stored, 20u);
+}
+
 TEST_F(RunsTest, ARunThatEndsWhileTheRobotIsAwayAfterARestartEndsAtWhatIsKnown) {
   start();
   connect(robot_);

@@ -11,9 +11,9 @@ import type { Robot } from '../store';
 
 const kPosition: StripOptions = {
   traces: [
-    { column: 'position_m', colour: '--measured', width_px: 1.8 },
     { column: 'reference_m', colour: '--commanded-soft', width_px: 1.2 },
     { column: 'setpoint_m', colour: '--commanded', width_px: 1.4, dash_px: [7, 5] },
+    { column: 'position_m', colour: '--measured', width_px: 1.8 },
   ],
   label: (value) => millimetres(value, 0),
   least_span: 0.08,
@@ -100,7 +100,7 @@ const PositionKey = () => (
 function cursor_text(options: StripOptions, index: number | null, window: PlotWindow): string {
   if (index === null || index >= window.size) return '';
   const unit = options === kPosition ? 'mm' : options === kDuty ? '%' : 'mV';
-  const value = window.values[0]?.[index];
+  const value = window.values.at(-1)?.[index];
   const shown = options === kPosition ? millimetres(value) : options === kDuty ? percent(value) : millivolts(value);
   return `${shown} ${unit} at \u2212${Math.abs(window.time_s[index] ?? 0).toFixed(2)} s`;
 }
