@@ -93,10 +93,17 @@ class Connection {
 
 asio::awaitable<void> Connection::talk() {
   allow(kRequestTime);
-  for (;;) {
-    const Next next = co_await read_and_answer();
-    if (next == Next::end) co_return;
-    allow(kIdleTime);
+  try {
+    for (;;) {
+      const Next next = co_await read_and_answer();
+      if (next == Next::end) co_return;
+      allow(kIdleTime);
+    }
+  } catch (const boost::system::system_error& error) {
+    if (error.code() == asio::error::operation_aborted) throw;
+    spdlog::error("an http connection ended: {}", error.what());
+  } catch (const std::exception& error) {  // ends this connection, never the station
+    spdlog::error("an http connection ended: {}", error.what());
   }
 }
 
