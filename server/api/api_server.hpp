@@ -37,6 +37,7 @@ class ApiServer {
   std::string address() const;  // "127.0.0.1:8080"
   const Router& router() const { return router_; }
   std::string login_url();  // a link that lets one page in, for 10 minutes
+  void print_login_url();   // on standard output, for the person at the console
 
  private:
   Listener listener_;
