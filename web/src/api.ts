@@ -3,6 +3,7 @@
 // The types are generated from server/api/openapi.yaml (npm run types), so that a difference is a compile error.
 
 import type { components } from './api_types';
+import { millimetres, percent } from './format';
 
 type Schemas = components['schemas'];
 export type RobotState = Schemas['Robot'];
@@ -31,7 +32,7 @@ export class ApiError extends Error {
 const kReasons: Record<string, string> = {
   malformed: 'The command was malformed.',
   not_finite: 'That is not a finite number.',
-  out_of_range: 'Outside the range that is allowed.',
+  stop_pending: 'An emergency stop is still on its way to the robot. Clear it when it has arrived.',
   wrong_mode: 'Not possible in this mode.',
   latched: 'The emergency stop is latched. Clear it first.',
   other_emergency: 'Another emergency is in force than the one you meant to clear. Look again.',
@@ -44,7 +45,12 @@ const kReasons: Record<string, string> = {
   unsupported: 'This firmware does not have it.',
   not_connected: 'The robot is not connected.',
   expired: 'It arrived too late and was discarded.',
-  superseded: 'A newer command took its place.',
+  superseded_by_emergency_stop: 'An emergency stop took its place.',
+  stopped_by_another_stop: 'Another stop had stopped it already.',
+  timed_out: 'The robot did not answer in time.',
+  no_answer: 'The robot did not answer in time.',
+  not_sent_in_time: 'It could not be sent in time and was discarded.',
+  unknown_robot: 'The station does not know this robot.',
   link_lost: 'The link to the robot broke before it answered.',
   other_boot: 'The robot restarted in between.',
 };
@@ -106,7 +112,15 @@ export class Api {
 
 function error_of(status: number, problem: Partial<Problem> | null): ApiError {
   const reason = problem?.reason ?? '';
-  const known = kReasons[reason];
+  const known = allowed_range(problem?.detail ?? '') ?? kReasons[reason];
   const otherwise = problem?.detail || problem?.title || `The station answered ${status} without a reason.`;
   return new ApiError(known ?? otherwise, status, reason, known ? (problem?.detail ?? '') : '');
+}
+
+// "setpoint_m = 99 is outside -1 to 1" in the unit that the operator typed.
+function allowed_range(detail: string): string | undefined {
+  const [, name, low, high] = /^(\w+) = \S+ is outside (\S+) to ([^\s.]\S*)$/.exec(detail) ?? [];
+  if (name === 'setpoint_m') return `Allowed is ${millimetres(Number(low), 0)} to ${millimetres(Number(high), 0)} mm.`;
+  if (name === 'duty') return `Allowed is ${percent(Number(low), 0)} to ${percent(Number(high), 0)} %.`;
+  return undefined;
 }

@@ -118,7 +118,7 @@ export class StripChart {
     const options: uPlot.Options = {
       width: Math.max(this.host.clientWidth, 50),
       height: Math.max(this.host.clientHeight, 40),
-      padding: [8, 14, show_time ? 0 : 8, 0],
+      padding: [8, 18, show_time ? 0 : 8, 0],
       legend: { show: false },
       cursor: {
         sync: { key: 'deck', setSeries: false },

@@ -59,7 +59,8 @@ export class SampleRing {
       this.slot_index[slot] = index;
       this.time_s[slot] = (batch.first_robot_time_us + i * batch.period_us) / 1e6 + this.time_base_s;
       this.columns.position_m[slot] = batch.position_m[i] ?? NaN;
-      this.columns.reference_m[slot] = batch.reference_m[i] ?? NaN;
+      // Without a setpoint there is nothing that the robot follows.
+      this.columns.reference_m[slot] = batch.setpoint_m === null ? NaN : (batch.reference_m[i] ?? NaN);
       this.columns.setpoint_m[slot] = batch.setpoint_m ?? NaN;
       this.columns.duty[slot] = batch.duty[i] ?? NaN;
       this.columns.impedance_mv[slot] = batch.impedance_mv[i] ?? NaN;

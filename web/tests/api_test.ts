@@ -33,8 +33,8 @@ test('a known refusal is said in the words of the operator', async () => {
 });
 
 test('an unknown refusal is said in the words of the station', async () => {
-  const { api } = api_that_answers(422, { title: 'Unprocessable', detail: 'setpoint_m is 4, allowed is -1 to 1', reason: 'new_one' });
-  expect((await failure(api.set_setpoint('rheo-1', 4))).message).toBe('setpoint_m is 4, allowed is -1 to 1');
+  const { api } = api_that_answers(422, { title: 'Unprocessable', detail: 'the tide is out', reason: 'new_one' });
+  expect((await failure(api.set_setpoint('rheo-1', 4))).message).toBe('the tide is out');
 });
 
 test('an answer that is no JSON is an error with its status', async () => {
@@ -56,4 +56,10 @@ test('ids of 64 bits pass through unrounded', async () => {
   const { api, asked } = api_that_answers(200, { state: 'acknowledged' });
   await api.clear_emergency('rheo-1', '18446744073709551615');
   expect(String(asked[0]?.options.body)).toContain('"18446744073709551615"');
+});
+
+test('a refused setpoint tells the range that is allowed, in millimetres', async () => {
+  const detail = 'setpoint_m = 99.999 is outside -1 to 1';
+  const { api } = api_that_answers(422, { title: 'Unprocessable', detail, reason: 'out_of_range' });
+  expect((await failure(api.set_setpoint('rheo-1', 99.999))).message).toBe('Allowed is \u22121000 to 1000 mm.');
 });

@@ -16,7 +16,7 @@ export function LinkPanel({ robot }: { robot: Robot }) {
       <dl>
         <Figure name="Round trip" unit="ms" value={milliseconds_of_us(clock?.round_trip_us)} />
         <Figure name="Clock ±" unit="ms" value={milliseconds_of_us(clock?.uncertainty_us, 2)} title="Uncertainty of the robot's clock against the station's" />
-        <Figure name="Shown here" unit="" value={count(received)} title="Samples that this page has received" />
+        <Figure name="Shown here" unit="" value={count(received)} tone="on-desk-only" title="Samples that this page has received" />
         <Figure name="Missed here" unit="" value={count(missing)} tone={missing > 0 ? 'caution' : ''} title="Samples that this page has not received; the recording has its own count" />
         <Figure name="Lost for good" unit="" value={count(lost)} tone={lost > 0 ? 'alarm' : ''} title="Overwritten on the robot before the station had them on disk" />
         <Figure name="Not yet on disk" unit="" value={count(lag)} tone={lag > 200 ? 'caution' : ''} title="Samples received but not yet durable" />

@@ -8,7 +8,7 @@ import type { Robot } from '../store';
 const kLeastSpan_m = 0.24;
 
 export function Tape({ robot }: { robot: Robot }) {
-  const { position_m, setpoint_m, reference_m, mode } = robot.readout.value;
+  const { position_m, setpoint_m, reference_m } = robot.readout.value;
   const range = useRef<[number, number]>([-0.02, 0.22]);
   const shown = [position_m, setpoint_m].filter((value) => value !== null);
   const [low, high] = [Math.min(...shown, 0), Math.max(...shown, 0)];
@@ -30,7 +30,7 @@ export function Tape({ robot }: { robot: Robot }) {
           </b>
         ))}
       </div>
-      {reference_m !== null && mode === 'auto' && <i class="reference" style={{ left: place(reference_m) }} />}
+      {reference_m !== null && setpoint_m !== null && <i class="reference" style={{ left: place(reference_m) }} />}
       {setpoint_m !== null && <i class="setpoint-bug" style={{ left: place(setpoint_m) }} />}
       {position_m !== null && <i class="pointer" style={{ left: place(position_m) }} />}
     </div>

@@ -1,0 +1,208 @@
+// Drives the cockpit in a real browser, from the login link to a station that was killed and came back.
+//
+//   cockpit_test.mjs [--screenshot PATH]     PATH gets a picture of the cockpit in the closed-loop experiment
+import assert from 'node:assert/strict';
+import { mkdirSync } from 'node:fs';
+import { Bench, until } from './programs.mjs';
+
+const kRobot = 'rheo-1';
+const at = process.argv.indexOf('--screenshot');
+const screenshot = at > 0 ? process.argv[at + 1] : null;
+const bench = new Bench();
+const faults = []; // errors of the page itself
+let page;
+
+// ---- a small vocabulary
+
+const text = (selector) => page.locator(selector).first().innerText({ timeout: 5000 });
+const number = async (name) => Number((await text(`#numeral-${name} output`)).replace('\u2212', '-'));
+const mode = () => page.locator('.annunciator').getAttribute('data-mode');
+const seen_mode = (wanted) => until(`the page shows ${wanted}`, async () => (await mode()) === wanted);
+const robot = () => bench.ask(`/robots/${kRobot}`);
+const fresh = () => until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0);
+
+// The samples of a second, as the station has them: the motor is off and the position is the same.
+async function nothing_moves(what) {
+  const before = await robot();
+  const after = await until(`another second of samples (${what})`, async () => {
+    const now = await robot();
+    assert.equal(now.sample.duty, 0, what);
+    return now.next_seq >= before.next_seq + 100 ? now : null;
+  });
+  assert.ok(Math.abs(after.sample.velocity_m_s) < 2e-3, `${what}: velocity ${after.sample.velocity_m_s} m/s`);
+  assert.equal(after.setpoint_m, null, what);
+}
+
+async function engage_auto(setpoint_mm) {
+  await page.fill('#setpoint-entry', String(setpoint_mm));
+  await page.press('#setpoint-entry', 'Enter');
+  await seen_mode('auto');
+}
+
+async function latched() {
+  await seen_mode('emergency');
+  await until('the page shows duty 0', async () => (await number('duty')) === 0);
+  const state = await until('the station knows the latch', async () => {
+    const now = await robot();
+    return now.mode === 'emergency' && now.sample.duty === 0 ? now : null;
+  });
+  const shown = await until('the latch is named', () => page.locator('#latch').getAttribute('data-emergency-id'));
+  assert.equal(shown, state.emergency_id);
+}
+
+async function clear_latch() {
+  const button = page.locator('#clear-emergency');
+  await button.hover();
+  await page.mouse.down();
+  await page.waitForTimeout(300); // let go too early: it is guarded
+  await page.mouse.up();
+  assert.equal(await mode(), 'emergency');
+  await page.mouse.down();
+  await seen_mode('manual');
+  await page.mouse.up();
+}
+
+// ---- what an operator does, in order
+
+const steps = {
+  async 'without the link there is one calm screen'() {
+    await page.goto(bench.http);
+    await page.getByText('Open the link that the station printed').waitFor();
+  },
+
+  async 'the link opens the cockpit, and the robot selects itself'() {
+    await page.goto(await bench.login_link());
+    await page.getByText('No robot yet').waitFor();
+    bench.start_robot(kRobot);
+    await page.locator('.annunciator h1').getByText(kRobot).waitFor();
+    await fresh();
+    await seen_mode('manual');
+  },
+
+  async 'a setpoint out of range is refused in words'() {
+    await page.fill('#setpoint-entry', '99999');
+    await page.press('#setpoint-entry', 'Enter');
+    await page.locator('#setpoint-outcome.failed').waitFor();
+    await seen_mode('manual');
+  },
+
+  async 'auto brings the robot to 100 mm'() {
+    await engage_auto(100);
+    await page.locator('#setpoint-outcome.done').waitFor();
+    await until('the position arrives', async () => Math.abs((await number('position')) - 100) < 2, 15_000);
+    assert.equal(await number('setpoint'), 100);
+    const drawn = await page.evaluate(() => {
+      const canvas = document.querySelector('.strip-0 canvas');
+      const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+      return new Set(Uint32Array.from(new Uint32Array(pixels.buffer))).size;
+    });
+    assert.ok(drawn > 10, 'the plot has traces');
+  },
+
+  async 'a picture, when asked for'() {
+    if (!screenshot) return;
+    await page.fill('#run-name', 'closed loop, 100 mm');
+    await page.click('#start-run');
+    await page.locator('#end-run').waitFor();
+    const first = (await robot()).next_seq;
+    for (const [setpoint_mm, seconds] of [[60, 12], [150, 14], [100, 12]]) {
+      await page.fill('#setpoint-entry', String(setpoint_mm));
+      await page.press('#setpoint-entry', 'Enter');
+      const until_seq = (await robot()).next_seq + seconds * 100;
+      await until('the experiment goes on', async () => (await robot()).next_seq >= until_seq, 30_000);
+    }
+    assert.ok((await robot()).next_seq > first);
+    await page.mouse.move(5, 5);
+    await page.screenshot({ path: screenshot });
+    await page.click('#end-run');
+  },
+
+  async 'Escape stops, also from inside a field; the time is shown'() {
+    await page.fill('#setpoint-entry', '30');
+    await page.press('#setpoint-entry', 'Enter');
+    await until('the motor runs', async () => Math.abs((await robot()).sample.duty) > 0.05);
+    await page.press('#setpoint-entry', 'Escape');
+    await latched();
+    await page.locator('#stop-line[data-phase=stopped]').waitFor();
+    console.log(`    ${await text('#stop-line')}`);
+  },
+
+  async 'while latched nothing can be engaged, and clearing is guarded'() {
+    assert.ok(await page.locator('#send-setpoint').isDisabled());
+    await clear_latch();
+    await nothing_moves('after the clear');
+  },
+
+  async 'the button stops'() {
+    await engage_auto(120);
+    await until('the motor runs', async () => Math.abs((await robot()).sample.duty) > 0.05);
+    await page.click('#emergency-stop');
+    await latched();
+    await clear_latch();
+    await nothing_moves('after the second clear');
+  },
+
+  async 'a duty runs while its key is held and no longer'() {
+    const hold = page.locator('#hold-to-run');
+    await hold.hover();
+    await page.mouse.down();
+    await until('the duty runs', async () => (await robot()).sample.duty > 0.1);
+    const running = await robot();
+    await until('it outlives its first lease', async () => {
+      const now = await robot();
+      assert.ok(now.sample.duty > 0.1, 'the lease was renewed');
+      return now.next_seq > running.next_seq + 120;
+    });
+    await page.mouse.up();
+    await until('the duty ends', async () => (await robot()).sample.duty === 0, 1000);
+    await until('the page shows it', async () => (await number('duty')) === 0);
+  },
+
+  async 'a killed station is waited for, and the page heals by itself'() {
+    await bench.station.end('SIGKILL');
+    await page.locator('.top-bar .lamp.caution').waitFor();
+    await page.locator('.readouts.stale').waitFor();
+    await bench.start_station();
+    await page.locator('.top-bar .lamp.good').waitFor({ timeout: 15_000 });
+    await fresh();
+    await seen_mode('manual');
+    await nothing_moves('after the station came back');
+    await engage_auto(50);
+  },
+
+  async 'a stop for a robot that is away is kept, and delivered first when it returns'() {
+    bench.robot.process.kill('SIGSTOP');
+    await until('the station misses the robot', async () => (await robot()).link === 'disconnected');
+    await page.keyboard.press('Escape');
+    await page.locator('#stop-line[data-phase=kept]').waitFor();
+    bench.robot.process.kill('SIGCONT');
+    await latched();
+  },
+
+  async 'the page itself made no error'() {
+    assert.deepEqual(faults, []);
+  },
+};
+
+let failed = false;
+try {
+  await bench.start_station();
+  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+  page.on('pageerror', (error) => faults.push(error.message));
+  page.on('console', (message) => /Content.Security.Policy/i.test(message.text()) && faults.push(message.text()));
+  for (const [name, step] of Object.entries(steps)) {
+    const start_ms = performance.now();
+    await step();
+    console.log(`ok  ${name} (${Math.round(performance.now() - start_ms)} ms)`);
+  }
+} catch (error) {
+  failed = true;
+  console.error(error);
+  const out = new URL('out/', import.meta.url).pathname;
+  mkdirSync(out, { recursive: true });
+  await page?.screenshot({ path: `${out}failed.png` }).catch(() => undefined);
+  console.error(`station:\n${bench.station?.output}\nrobot:\n${bench.robot?.output}`);
+} finally {
+  await bench.close();
+}
+process.exit(failed ? 1 : 0);

@@ -1,0 +1,99 @@
+// The real programs that the browser test drives: station, simulated robot and Chromium, each ended by its own id.
+import { spawn } from 'node:child_process';
+import { once } from 'node:events';
+import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+
+const bin = process.env.RHEONAUT_BIN ?? new URL('../../build/dev/bin', import.meta.url).pathname;
+const { chromium } = createRequire(new URL('../../web/package.json', import.meta.url))('playwright-core');
+
+const kChromium = {
+  executablePath: process.env.RHEONAUT_CHROMIUM ?? '/usr/bin/chromium',
+  args: ['--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage', '--disable-background-networking',
+         '--disable-component-update', '--disable-sync', '--no-first-run'],
+};
+
+// Waits until probe() gives something true, and returns that; fails with `what` after a bound.
+export async function until(what, probe, bound_ms = 10_000) {
+  const end_ms = performance.now() + bound_ms;
+  for (;;) {
+    const found = await probe();
+    if (found) return found;
+    if (performance.now() > end_ms) throw new Error(`not within ${bound_ms} ms: ${what}`);
+    await new Promise((resolve) => setTimeout(resolve, 20));
+  }
+}
+
+class Program {
+  output = '';
+
+  constructor(name, ...args) {
+    this.name = name;
+    this.process = spawn(join(bin, name), args, { stdio: ['ignore', 'pipe', 'pipe'] });
+    this.process.on('error', (error) => (this.output += `${error}\n`));
+    for (const stream of [this.process.stdout, this.process.stderr]) stream.on('data', (text) => (this.output += text));
+  }
+  get runs() {
+    return this.process.exitCode === null && this.process.signalCode === null;
+  }
+  async end(signal = 'SIGTERM') {
+    if (!this.runs) return;
+    const ended = once(this.process, 'exit');
+    this.process.kill(signal);
+    await ended;
+  }
+}
+
+// A folder for one station; the station can be killed and started again on the same ports.
+export class Bench {
+  data = mkdtempSync(join(tmpdir(), 'rheonaut-browser-'));
+  endpoints = null;
+  station = null;
+  robot = null;
+  browser = null;
+
+  async start_station() {
+    const { http = '127.0.0.1:0', robots = '127.0.0.1:0' } = this.endpoints ?? {};
+    const file = join(this.data, 'endpoints.json');
+    this.station = new Program('rheonaut', 'serve', '--data', this.data, '--http', http, '--robots', robots);
+    const pid = this.station.process.pid;
+    this.endpoints = await until('the station announces its endpoints', () => {
+      if (!this.station.runs) throw new Error('the station ended');
+      const said = existsSync(file) && JSON.parse(readFileSync(file, 'utf8'));
+      return said && said.pid === pid ? said : null;
+    }, 30_000);
+  }
+
+  login_link() {
+    return until('the login link is printed', () => /https?:\/\/\S+\/login\?code=\S+/.exec(this.station.output)?.[0]);
+  }
+
+  start_robot(id) {
+    this.robot = new Program('rheonaut-sim', '--station', this.endpoints.robots, '--id', id);
+  }
+
+  async open_browser(options) {
+    this.browser = await chromium.launch(kChromium);
+    return (await this.browser.newContext(options)).newPage();
+  }
+
+  get http() {
+    return `http://${this.endpoints.http}`;
+  }
+
+  // Asks the station as a script does, to see what the page does not say.
+  async ask(path) {
+    const token = readFileSync(join(this.data, 'rheonaut.token'), 'utf8').trim();
+    const answer = await fetch(`${this.http}/api/v1${path}`, { headers: { Authorization: `Bearer ${token}` } });
+    return answer.json();
+  }
+
+  async close() {
+    await this.browser?.close();
+    await this.robot?.end();
+    await this.station?.end();
+    rmSync(this.data, { recursive: true, force: true });
+  }
+}
