@@ -1,7 +1,7 @@
 // The /live WebSocket that heals itself: opens, notices silence, and tries again until it is told to stop.
 //
 //   connecting → (welcome) → live → (closed, or silent for 1.5 s) → waiting → connecting → …
-//   waiting → (the station says 401) → signed_out, the only state that needs a person
+//   waiting → (the station says 401) → signed_out → (a person opened the link, in whatever tab) → connecting → …
 //
 // The station sends a stamp each 100 ms, so silence means that the link is dead, whatever TCP believes.
 // Time, timers, sockets and chance are handed in, so that tests run it without any of them.
@@ -36,6 +36,7 @@ export const kLongestDelay_ms = 2000;
 const kDelayGrowth = 1.6;
 const kJitter = 0.3; // of the delay, either way
 export const kFresh_ms = 400; // a stamp younger than this proves that the station hears and answers
+export const kSignedOut_ms = 2000; // how often a signed-out page asks whether it still is
 const kOpenState = 1;
 
 export class LiveLink {
@@ -137,11 +138,15 @@ export class LiveLink {
 
   // A refused WebSocket does not say why; HTTP does.
   private async ask_whether_signed_out(): Promise<void> {
-    const signed_out = await this.surroundings.is_signed_out().catch(() => false);
-    if (!signed_out || this.stopped || this.phase === 'live') return;
-    this.drop_socket();
-    this.set_timer(null, 0);
-    this.set_phase('signed_out');
+    const signed_out = await this.surroundings.is_signed_out().catch(() => this.phase === 'signed_out');
+    if (this.stopped || this.phase === 'live') return;
+    if (signed_out) {
+      this.drop_socket();
+      this.set_phase('signed_out');
+      this.set_timer(() => void this.ask_whether_signed_out(), kSignedOut_ms);
+    } else if (this.phase === 'signed_out') {
+      this.connect();
+    }
   }
 
   private drop_socket(): void {

@@ -1,6 +1,6 @@
 // The live link: how it notices a dead connection, and how it comes back.
 import { expect, test } from 'vitest';
-import { kFirstDelay_ms, kLongestDelay_ms, kSilence_ms, LiveLink } from '../src/live';
+import { kFirstDelay_ms, kLongestDelay_ms, kSignedOut_ms, kSilence_ms, LiveLink } from '../src/live';
 import { FakeSurroundings } from './fakes';
 
 function started(): { around: FakeSurroundings; link: LiveLink; heard: string[] } {
@@ -67,7 +67,7 @@ test('a connection that is never welcomed is given up', async () => {
   expect(around.sockets).toHaveLength(2);
 });
 
-test('401 ends the trying; any other failure does not', async () => {
+test('401 ends the trying until the link was opened; any other failure does not', async () => {
   const { around, link } = started();
   around.socket.break();
   await around.time.advance(10_000);
@@ -79,6 +79,10 @@ test('401 ends the trying; any other failure does not', async () => {
   const tried = around.sockets.length;
   await around.time.advance(60_000);
   expect(around.sockets).toHaveLength(tried);
+  around.signed_out = false; // the link was opened in another tab
+  await around.time.advance(kSignedOut_ms);
+  around.socket.welcome();
+  expect(link.phase).toBe('live');
 });
 
 test('a stamp is fresh for 400 ms and only on the connection that brought it', async () => {
