@@ -1,6 +1,7 @@
 // The folder of everything one station keeps: made when missing, locked against a second station, announced when ready.
 //
-//   station.sqlite, rheonaut.token   written by the recorder and the API
+//   station.sqlite                   written by the recorder
+//   rheonaut.token, .sessions        written by the API
 //   endpoints.json                   {"http":"127.0.0.1:8080","robots":"127.0.0.1:7070","pid":123}, while it runs
 //   rheonaut.lock                    locked while it runs
 #pragma once

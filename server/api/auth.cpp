@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -41,14 +42,13 @@ bool is_secret(const std::string& text) {
 }
 
 // The whole file or nothing appears under its name, readable by its owner only from the first moment.
-void write_secret(const fs::path& file, const std::string& secret) {
+void write_private(const fs::path& file, const std::string& content) {
   const fs::path temporary = file.string() + ".new";
   fs::remove(temporary);
   const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
   if (descriptor < 0) cannot("create", temporary);
-  const std::string line = secret + "\n";
-  const bool written =
-      ::write(descriptor, line.data(), line.size()) == static_cast<ssize_t>(line.size()) && ::fsync(descriptor) == 0;
+  const bool written = ::write(descriptor, content.data(), content.size()) == static_cast<ssize_t>(content.size()) &&
+                       ::fsync(descriptor) == 0;
   const int error = errno;
   ::close(descriptor);
   errno = error;
@@ -71,15 +71,42 @@ std::string load_or_make_token(const fs::path& file) {
   }
   if (fs::exists(file)) spdlog::warn("{} held no valid token; a new one was made", file.string());
   token = random_secret();
-  write_secret(file, token);
+  write_private(file, token + "\n");
   return token;
 }
 
 }  // namespace
 
-Auth::Auth(Clock& clock, const fs::path& data_dir) : clock_{clock} {
+Auth::Auth(Clock& clock, const fs::path& data_dir) : clock_{clock}, sessions_file_{data_dir / "rheonaut.sessions"} {
   if (sodium_init() < 0) throw std::runtime_error{"libsodium cannot start: no source of random numbers"};
   token_ = hash_of(load_or_make_token(data_dir / "rheonaut.token"));
+  load_sessions();
+}
+
+// One session a line: number, end (UTC, µs), hash in hexadecimal. A line that is none ends the reading.
+void Auth::load_sessions() {
+  std::ifstream in{sessions_file_};
+  Secret session;
+  std::string hex;
+  while (sessions_.size() < kMaxSessions && in >> session.number >> session.ends_at_us >> hex) {
+    std::size_t size = 0;
+    const int read =
+        sodium_hex2bin(session.hash.data(), session.hash.size(), hex.data(), hex.size(), nullptr, &size, nullptr);
+    if (read != 0 || size != session.hash.size()) break;
+    sessions_.push_back(session);
+    next_session_ = std::max(next_session_, session.number + 1);
+  }
+  forget_expired();
+}
+
+void Auth::save_sessions() const {
+  std::string lines;
+  for (const Secret& session : sessions_) {
+    char hex[2 * sizeof session.hash + 1];
+    sodium_bin2hex(hex, sizeof hex, session.hash.data(), session.hash.size());
+    lines += std::to_string(session.number) + ' ' + std::to_string(session.ends_at_us) + ' ' + hex + '\n';
+  }
+  write_private(sessions_file_, lines);
 }
 
 Auth::Hash Auth::hash_of(const std::string& secret) {
@@ -92,9 +119,11 @@ Auth::Hash Auth::hash_of(const std::string& secret) {
 bool Auth::same(const Hash& a, const Hash& b) { return sodium_memcmp(a.data(), b.data(), a.size()) == 0; }
 
 void Auth::forget_expired() {
-  const auto expired = [now_us = clock_.steady_us()](const Secret& secret) { return secret.ends_at_us <= now_us; };
-  codes_.remove_if(expired);
-  sessions_.remove_if(expired);
+  const auto ended_by = [](std::int64_t now_us) {
+    return [now_us](const Secret& secret) { return secret.ends_at_us <= now_us; };
+  };
+  codes_.remove_if(ended_by(clock_.steady_us()));
+  sessions_.remove_if(ended_by(clock_.utc_us()));
 }
 
 std::string Auth::new_login_code() {
@@ -112,7 +141,8 @@ std::optional<std::string> Auth::log_in(const std::string& code) {
   if (used == 0) return std::nullopt;
   if (sessions_.size() >= kMaxSessions) sessions_.pop_front();
   const std::string session = random_secret();
-  sessions_.push_back({hash_of(session), clock_.steady_us() + kSessionLife.count(), next_session_++});
+  sessions_.push_back({hash_of(session), clock_.utc_us() + kSessionLife.count(), next_session_++});
+  save_sessions();
   return session;
 }
 
@@ -124,7 +154,7 @@ std::optional<std::string> Auth::actor_of_token(const std::string& token) const 
 std::optional<std::string> Auth::actor_of_session(const std::string& secret) const {
   const Hash hash = hash_of(secret);
   for (const Secret& session : sessions_) {
-    if (same(session.hash, hash) && session.ends_at_us > clock_.steady_us()) {
+    if (same(session.hash, hash) && session.ends_at_us > clock_.utc_us()) {
       return "session:" + std::to_string(session.number);
     }
   }

@@ -1,8 +1,8 @@
 // Credentials: the station's token, one-time login codes, and the sessions of pages.
 //
 // The token (256 random bits, base64url) stands in `rheonaut.token`, mode 0600, in the data folder and stays the same
-// over restarts. Codes and sessions live in memory only. What is compared is a BLAKE2b hash, in constant time.
-// Loop thread.
+// over restarts. Sessions stand in `rheonaut.sessions`, as hashes, so that a page comes back by itself when the station
+// does. Codes live in memory only. What is compared is a BLAKE2b hash, in constant time. Loop thread.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ inline constexpr std::size_t kMaxSessions = 64;
 
 class Auth {
  public:
-  // Reads the token, or makes one. Throws std::runtime_error that names the file.
+  // Reads the token and the sessions, or makes a token. Throws std::runtime_error that names the file.
   Auth(Clock& clock, const std::filesystem::path& data_dir);
 
   std::string new_login_code();  // the oldest code is forgotten when there are too many
@@ -40,15 +40,18 @@ class Auth {
   using Hash = std::array<unsigned char, 32>;
   struct Secret {
     Hash hash{};
-    std::int64_t ends_at_us = 0;  // steady
+    std::int64_t ends_at_us = 0;  // steady for a code, UTC for a session, which outlives the program
     std::uint64_t number = 0;
   };
 
   static Hash hash_of(const std::string& secret);
   static bool same(const Hash& a, const Hash& b);
   void forget_expired();
+  void load_sessions();
+  void save_sessions() const;
 
   Clock& clock_;
+  std::filesystem::path sessions_file_;
   Hash token_{};
   std::list<Secret> codes_;     // oldest first
   std::list<Secret> sessions_;  // oldest first

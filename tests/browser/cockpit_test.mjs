@@ -163,15 +163,6 @@ const steps = {
     await page.locator('.top-bar .lamp.caution').waitFor();
     await page.locator('.readouts.stale').waitFor();
     await bench.start_station();
-    const signed_out = page.getByText('Open the link that the station printed');
-    await page.locator('.top-bar .lamp.good').or(signed_out).waitFor({ timeout: 15_000 });
-    if (await signed_out.isVisible()) {
-      // A station that forgets its sessions when it restarts: the link is opened in another tab, and this one heals.
-      console.log('    the station had forgotten the session');
-      const other = await page.context().newPage();
-      await other.goto(await bench.login_link());
-      await other.close();
-    }
     await page.locator('.top-bar .lamp.good').waitFor({ timeout: 15_000 });
     await fresh();
     await seen_mode('manual');

@@ -81,6 +81,31 @@ TEST_F(AuthTest, ACodeOpensOneSessionOnce) {
   EXPECT_FALSE(auth.actor_of_token(*session));
 }
 
+TEST_F(AuthTest, ASessionOutlivesTheStation) {
+  std::string session;
+  {
+    Auth auth{clock, folder.path()};
+    session = *auth.log_in(auth.new_login_code());
+  }
+  struct stat status{};
+  stat((folder.path() / "rheonaut.sessions").c_str(), &status);
+  EXPECT_EQ(status.st_mode & 0777U, 0600U);
+  {
+    Auth auth{clock, folder.path()};
+    EXPECT_EQ(auth.actor_of_session(session), "session:1");
+    EXPECT_EQ(auth.actor_of_session(*auth.log_in(auth.new_login_code())), "session:2");
+  }
+  clock.run_for(12h);
+  const Auth late{clock, folder.path()};
+  EXPECT_FALSE(late.actor_of_session(session));
+}
+
+TEST_F(AuthTest, ADamagedSessionFileLetsNobodyIn) {
+  std::ofstream{folder.path() / "rheonaut.sessions"} << "1 99999999999999999 zz\n2 99999999999999999\n";
+  const Auth auth{clock, folder.path()};
+  EXPECT_FALSE(auth.actor_of_session(""));
+}
+
 TEST_F(AuthTest, CodesAndSessionsEndInTime) {
   Auth auth{clock, folder.path()};
   const std::string late = auth.new_login_code();
