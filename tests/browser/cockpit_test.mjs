@@ -113,6 +113,7 @@ const steps = {
     }
     assert.ok((await robot()).next_seq > first);
     await page.mouse.move(5, 5);
+    await page.evaluate(() => document.activeElement.blur());
     await page.screenshot({ path: screenshot });
     await page.click('#end-run');
   },

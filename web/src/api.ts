@@ -32,6 +32,7 @@ export class ApiError extends Error {
 const kReasons: Record<string, string> = {
   malformed: 'The command was malformed.',
   not_finite: 'That is not a finite number.',
+  out_of_range: 'Outside the range that is allowed.',
   stop_pending: 'An emergency stop is still on its way to the robot. Clear it when it has arrived.',
   wrong_mode: 'Not possible in this mode.',
   latched: 'The emergency stop is latched. Clear it first.',

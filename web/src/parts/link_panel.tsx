@@ -26,7 +26,7 @@ export function LinkPanel({ robot }: { robot: Robot }) {
         <Figure name="Buffer" unit="%" value={percent(fill, 0)} tone={(fill ?? 0) > 0.8 ? 'caution' : ''} title="Fill of the robot's ring of samples" />
         <Figure name="Supply" unit="V" value={volts_of_mv(status?.supply_mv)} />
         <Figure name="Signal" unit="dBm" value={count(status?.rssi_dbm)} />
-        <Figure name="Missed ticks" unit="" value={count(status?.missed_ticks)} tone={(status?.missed_ticks ?? 0) > 0 ? 'caution' : ''} />
+        <Figure name="Missed ticks" unit="" value={count(status?.missed_ticks)} tone={(status?.missed_ticks ?? 0) > 0 ? 'caution' : 'on-desk-only'} />
       </dl>
     </section>
   );
