@@ -86,7 +86,7 @@ def predict(sim, duty_min):
 
 
 def number(value, scale=1.0):
-    return "never" if value is None else f"{scale * value:.2f}"
+    return "never" if value is None else f"{round(scale * value, 2) + 0.0:.2f}"
 
 
 def print_table(rows):
