@@ -49,11 +49,11 @@ void add_intervals(SQLite::Database& database, const char* sql, std::int64_t boo
 
 }  // namespace
 
-std::vector<RobotId> BootStore::robots() {
-  std::vector<RobotId> ids;
+std::vector<RestoredRobot> BootStore::robots() {
+  std::vector<RestoredRobot> robots;
   SQLite::Statement query{database_.handle(), "SELECT robot_id FROM robot ORDER BY robot_id"};
-  while (query.executeStep()) ids.push_back(query.getColumn(0).getString());
-  return ids;
+  while (query.executeStep()) robots.push_back({query.getColumn(0).getString(), 0, 0});
+  return robots;
 }
 
 AdmissionOutcome BootStore::admit(const AdmissionRequest& request, bool enrol_on_loopback, bool with_intervals) {

@@ -39,7 +39,7 @@ class BootStore {
  public:
   explicit BootStore(Database& database) : database_{database} {}
 
-  std::vector<RobotId> robots();
+  std::vector<RestoredRobot> robots();
 
   // Checks robot, token and boot; remembers a new robot or boot, durably. With `with_intervals` false, what is stored
   // of the boot is not read (the recorder has it in memory).

@@ -40,7 +40,7 @@ struct RecorderOptions {
 // What the station must know again after a restart.
 struct RestoredState {
   std::uint64_t store_id = 0;
-  std::vector<RobotId> robots;
+  std::vector<RestoredRobot> robots;
   std::vector<CommandRecord> pending_stops;  // emergency stops that no robot has acknowledged
 };
 

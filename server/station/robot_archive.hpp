@@ -31,6 +31,13 @@ struct Admission {
   std::uint64_t durable_next_event_seq = 0;
 };
 
+// A robot of the archive, as the station knows it again after a restart.
+struct RestoredRobot {
+  RobotId id;
+  BootId boot_id = 0;              // its latest; 0: none is known
+  std::uint64_t emergency_id = 0;  // the latch it was last known to be in; 0: none
+};
+
 class RobotArchive {
  public:
   virtual ~RobotArchive() = default;

@@ -46,8 +46,12 @@ Station::~Station() = default;
 
 void Station::add_sink(StationSink& sink) { sinks_.push_back(&sink); }
 
-void Station::restore(const std::vector<RobotId>& robots, const std::vector<CommandRecord>& pending_stops) {
-  for (const RobotId& id : robots) add_seat(id);
+void Station::restore(const std::vector<RestoredRobot>& robots, const std::vector<CommandRecord>& pending_stops) {
+  for (const RestoredRobot& restored : robots) {
+    RobotState& robot = *add_seat(restored.id).robot;
+    robot.boot_id = restored.boot_id;
+    robot.context.emergency_id = restored.emergency_id;  // SAFETY: the station's latch outlives the station
+  }
   for (const CommandRecord& record : pending_stops) restore_stop(record);
 }
 

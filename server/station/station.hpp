@@ -44,9 +44,9 @@ class Station {
 
   void add_sink(StationSink& sink);
 
-  // What the archive knows, before robots arrive: its robots, shown as disconnected, and the emergency stops of an
-  // earlier run of the station that no robot has acknowledged.
-  void restore(const std::vector<RobotId>& robots, const std::vector<CommandRecord>& pending_stops);
+  // What the archive knows, before robots arrive: its robots, shown as disconnected and latched as they were, and the
+  // emergency stops of an earlier run of the station that no robot has acknowledged.
+  void restore(const std::vector<RestoredRobot>& robots, const std::vector<CommandRecord>& pending_stops);
 
   const std::map<RobotId, RobotState>& robots() const { return robots_; }
   const RobotState* find(const RobotId& id) const;

@@ -80,7 +80,7 @@ TEST_F(RoutesTest, ACommandWithoutAnswerIs504) {
 }
 
 TEST_F(RoutesTest, ACommandForAnAbsentRobotIs409) {
-  station.restore({"r2"}, {});
+  station.restore({{"r2", 0, 0}}, {});
   const Answered answered = ask("POST", "/api/v1/robots/r2/commands", ping);
   EXPECT_EQ(answered.status, 409);
   EXPECT_EQ(answered.parsed()["reason"], "not_connected");
@@ -105,7 +105,7 @@ TEST_F(RoutesTest, AnAcknowledgedStopIs200) {
 }
 
 TEST_F(RoutesTest, AStopForAnAbsentRobotIs202AtOnce) {
-  station.restore({"r2"}, {});
+  station.restore({{"r2", 0, 0}}, {});
   const std::int64_t before_us = clock.steady_us();
   const Answered answered = ask("POST", "/api/v1/robots/r2/emergency-stop");
   EXPECT_EQ(answered.status, 202);
@@ -120,7 +120,7 @@ TEST_F(RoutesTest, AStopThatNobodyAnswersIs202) {
 
 TEST_F(RoutesTest, StopAllReachesEveryRobotBeforeItWaitsForAny) {
   connect_robot();
-  station.restore({"a-silent-one", "r2"}, {});
+  station.restore({{"a-silent-one", 0, 0}, {"r2", 0, 0}}, {});
   const auto asked = begin("POST", "/api/v1/emergency-stop");
   ASSERT_EQ(robot->commands().size(), 1U);
   robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_ACCEPTED, 99);

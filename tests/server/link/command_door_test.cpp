@@ -68,7 +68,7 @@ TEST_F(LinkTest, AnUnknownAndADisconnectedRobotAreToldApart) {
   submit(set_duty(0));
   clock.settle();
   EXPECT_EQ(results.at(0).error().code, ErrorCode::not_found);
-  station.restore({"r1"}, {});
+  station.restore({{"r1", 0, 0}}, {});
   submit(set_duty(0));
   clock.settle();
   EXPECT_EQ(results.at(1).error().code, ErrorCode::not_connected);

@@ -231,7 +231,8 @@ TEST_F(RecorderTest, AcknowledgedSamplesSurviveAKillAndTheRestIsAskedFor) {
   const std::uint64_t acknowledged = durable_next_seq_;
   kill();
   start();
-  EXPECT_EQ(restored_.robots, std::vector<RobotId>{"nemo"});
+  ASSERT_EQ(restored_.robots.size(), 1u);
+  EXPECT_EQ(restored_.robots[0].id, "nemo");
   EXPECT_EQ(admit(robot_).durable_next_seq, acknowledged);
   connect(robot_);
   make(robot_, 10);
