@@ -24,18 +24,20 @@ asio::awaitable<void> SystemClock::sleep_until(std::int64_t deadline_us) {
 }
 
 void Signal::notify() {
-  notified_ = true;
+  ++notifications_;
+  remembered_ = true;
   timer_.cancel();
 }
 
 asio::awaitable<void> Signal::wait() {
-  while (!notified_) {
+  const std::uint64_t before = notifications_;
+  while (!remembered_ && notifications_ == before) {
     boost::system::error_code error;
     co_await timer_.async_wait(asio::redirect_error(asio::use_awaitable, error));
     const auto cancelled = (co_await asio::this_coro::cancellation_state).cancelled();
     if (cancelled != asio::cancellation_type::none) throw boost::system::system_error{asio::error::operation_aborted};
   }
-  notified_ = false;
+  remembered_ = false;
 }
 
 }  // namespace server

@@ -43,8 +43,8 @@ class SystemClock final : public Clock {
   boost::asio::io_context& loop_;
 };
 
-// Wakes one coroutine: notify() is remembered until the next wait() takes it. Not a timer, so virtual time needs no
-// other kind. Loop thread only; must outlive the waiting coroutine.
+// Wakes the coroutines that wait; when none does, the next wait() returns at once. Not a timer, so virtual time needs
+// no other kind. Loop thread only; must outlive the waiting coroutine.
 class Signal {
  public:
   explicit Signal(boost::asio::io_context& loop) : timer_{loop, boost::asio::steady_timer::time_point::max()} {}
@@ -54,7 +54,8 @@ class Signal {
 
  private:
   boost::asio::steady_timer timer_;
-  bool notified_ = false;
+  std::uint64_t notifications_ = 0;
+  bool remembered_ = false;  // a notification that nobody has taken yet
 };
 
 }  // namespace server

@@ -5,7 +5,8 @@
 //
 // An exception of the job is rethrown in the waiting coroutine. Cancelling the coroutine does not cancel the job: the
 // wait ends when the job ends, so a job must be short or watch a stop token of its own. The worker outlives the loop's
-// run(); its destructor joins the thread.
+// run(); its destructor joins the thread. Declare it after the loop:
+// its thread may touch the loop for a moment after a result has arrived.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

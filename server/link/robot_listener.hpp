@@ -12,6 +12,7 @@ namespace server {
 class RobotListener {
  public:
   static constexpr int kMaxConnections = 8192;  // a further one is closed at once
+  static constexpr int kMaxGreetings = 512;     // of them, how many may not have been welcomed yet
 
   RobotListener(boost::asio::io_context& loop, Clock& clock, TaskGroup& tasks, Station& station, RobotArchive& archive,
                 const boost::asio::ip::tcp::endpoint& endpoint, bool or_any_port);
@@ -33,6 +34,7 @@ class RobotListener {
   RobotArchive& archive_;
   Listener listener_;
   int connections_ = 0;
+  int greetings_ = 0;
 };
 
 }  // namespace server

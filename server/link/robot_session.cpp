@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <boost/asio/experimental/awaitable_operators.hpp>
+#include <cmath>
 #include <cstring>
+#include <utility>
 
 namespace server {
 namespace asio = boost::asio;
@@ -14,7 +16,8 @@ using namespace asio::experimental::awaitable_operators;  // NOLINT: operators o
 namespace {
 
 constexpr std::int64_t kProbePeriodUs = 1'000'000;
-constexpr std::uint64_t kMaxSeq = std::uint64_t{1} << 62;  // far beyond any boot, and safe to add to
+constexpr std::uint64_t kMaxNumber = std::uint64_t{1} << 62;  // of a sample or µs: beyond any boot, and safe to add to
+constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
 
 template <std::size_t Size>
 void copy_text(char (&to)[Size], const std::string& from) {
@@ -26,6 +29,33 @@ void copy_text(char (&to)[Size], const std::string& from) {
 bool is_robot_id(const std::string& id) {
   constexpr auto allowed = "abcdefghijklmnopqrstuvwxyz0123456789_-";
   return !id.empty() && id.find_first_not_of(allowed) == std::string::npos;
+}
+
+const char* fault_of(const protocol::Telemetry& batch) {
+  if (batch.first_seq > kMaxNumber || batch.oldest_seq > kMaxNumber) return "a sample number beyond 2^62";
+  if (batch.first_robot_time_us > kMaxNumber) return "a time beyond 2^62 µs";
+  if (batch.period_us == 0 || batch.period_us > kMaxPeriodUs) return "a sample period outside 1 µs to 10 s";
+  const bool finite = std::isfinite(batch.disturbance_m) && std::isfinite(batch.position_sd_m) &&
+                      (!batch.has_setpoint_m || std::isfinite(batch.setpoint_m));
+  return finite ? nullptr : "a setpoint, disturbance or standard deviation that is not a number";
+}
+
+// What in a frame cannot be, and would harm those who compute with it; null when all can.
+const char* fault_of(const protocol::RobotFrame& frame) {
+  if (frame.robot_time_us > kMaxNumber) return "a time beyond 2^62 µs";
+  switch (frame.which_body) {
+    case rheonaut_RobotFrame_hello_tag: return "a second hello on one connection";
+    case rheonaut_RobotFrame_telemetry_tag: return fault_of(frame.body.telemetry);
+    case rheonaut_RobotFrame_event_tag: {
+      const protocol::Event& event = frame.body.event;
+      const bool possible = event.event_seq <= kMaxNumber && event.oldest_event_seq <= kMaxNumber &&
+                            event.event_robot_time_us <= kMaxNumber && event.sample_seq <= kMaxNumber;
+      return possible ? nullptr : "an event with a number or time beyond 2^62";
+    }
+    case rheonaut_RobotFrame_heartbeat_tag:
+      return frame.body.heartbeat.echo_received_at_robot_us <= kMaxNumber ? nullptr : "a time beyond 2^62 µs";
+    default: return nullptr;
+  }
 }
 
 AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t robot_time_us, const ByteStream& stream,
@@ -52,17 +82,18 @@ RobotSession::RobotSession(asio::io_context& loop, Clock& clock, std::unique_ptr
                            RobotArchive& archive)
     : clock_{clock}, stream_{std::move(stream)}, station_{station}, archive_{archive}, wake_writer_{loop} {}
 
-asio::awaitable<void> RobotSession::run() {
+asio::awaitable<bool> RobotSession::greet() {
   const auto hello = co_await (read_hello() || clock_.sleep_for(kHelloTimeout));
   const auto* received = std::get_if<0>(&hello);
   if (received == nullptr || !received->has_value()) {
     spdlog::info("robot port: {} sent no valid hello{}", stream_->peer(),
                  close_reason_.empty() ? "" : ": " + close_reason_);
-    co_return;
+    co_return false;
   }
-  const bool welcomed = co_await welcome(**received);
-  if (!welcomed) co_return;
+  co_return co_await admit(**received);
+}
 
+asio::awaitable<void> RobotSession::serve() {
   std::string reason;
   try {
     const auto ended = co_await (read_frames() || write_frames() || watch_link());
@@ -104,16 +135,17 @@ asio::awaitable<std::optional<protocol::Hello>> RobotSession::read_hello() {
   co_return frame->body.hello;
 }
 
-// Checks the hello, asks the archive, and answers. True when the robot is welcome.
-asio::awaitable<bool> RobotSession::welcome(const protocol::Hello& hello) {
+// Checks the hello, asks the archive, and takes the robot's seat or refuses it.
+asio::awaitable<bool> RobotSession::admit(const protocol::Hello& hello) {
   const std::string id = hello.robot_id;
   if (hello.protocol_version != protocol::kProtocolVersion) {
     co_return co_await refuse(rheonaut_REFUSAL_REASON_VERSION,
                               "this station speaks protocol version " + std::to_string(protocol::kProtocolVersion) +
                                   ", the robot " + std::to_string(hello.protocol_version));
   }
-  if (!is_robot_id(id) || hello.boot_id == 0 || hello.oldest_seq > hello.next_seq || hello.next_seq > kMaxSeq ||
-      hello.oldest_event_seq > hello.next_event_seq || hello.next_event_seq > kMaxSeq) {
+  if (!is_robot_id(id) || hello.boot_id == 0 || hello.oldest_seq > hello.next_seq || hello.next_seq > kMaxNumber ||
+      hello.oldest_event_seq > hello.next_event_seq || hello.next_event_seq > kMaxNumber ||
+      hello_robot_time_us_ > kMaxNumber) {
     co_return co_await refuse(rheonaut_REFUSAL_REASON_MALFORMED,
                               "robot_id must be 1 to 31 of [a-z0-9_-], boot_id not 0, and oldest_seq ≤ next_seq");
   }
@@ -125,6 +157,16 @@ asio::awaitable<bool> RobotSession::welcome(const protocol::Hello& hello) {
   seat = station_.may_connect(id, hello.boot_id);  // another connection may have won while we asked
   if (!seat) co_return co_await refuse(rheonaut_REFUSAL_REASON_ALREADY_CONNECTED, seat.error().detail);
 
+  robot_id_ = id;
+  welcome_ = welcome(admission);
+  durable_.durable_next_seq = admission.durable_next_seq;
+  durable_.durable_next_event_seq = admission.durable_next_event_seq;
+  last_received_us_ = clock_.steady_us();
+  station_.on_connected(*this, request, hello, admission, stream_->peer());
+  co_return true;
+}
+
+protocol::StationFrame RobotSession::welcome(const Admission& admission) const {
   const LinkTimes times = station_.link_times();
   protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
   frame.which_body = rheonaut_StationFrame_welcome_tag;
@@ -137,15 +179,7 @@ asio::awaitable<bool> RobotSession::welcome(const protocol::Hello& hello) {
   welcome.heartbeat_interval_ms = times.heartbeat_interval_ms;
   welcome.samples_per_frame = times.samples_per_frame;
   welcome.utc_us = clock_.utc_us();
-  const bool written = co_await write(frame);
-  if (!written) co_return false;
-
-  robot_id_ = id;
-  durable_.durable_next_seq = admission.durable_next_seq;
-  durable_.durable_next_event_seq = admission.durable_next_event_seq;
-  last_received_us_ = clock_.steady_us();
-  station_.on_connected(*this, request, hello, admission, stream_->peer());
-  co_return true;
+  return frame;
 }
 
 asio::awaitable<bool> RobotSession::refuse(protocol::RefusalReason reason, std::string detail) {
@@ -170,33 +204,25 @@ asio::awaitable<RobotSession::EndReason> RobotSession::read_frames() {
 }
 
 void RobotSession::on_frame(const protocol::RobotFrame& frame) {
+  if (const char* fault = fault_of(frame); fault != nullptr) {
+    close_reason_ = fault;
+    return;
+  }
   station_.on_frame(*this, frame.robot_time_us);
   switch (frame.which_body) {
-    case rheonaut_RobotFrame_telemetry_tag:
-      if (frame.body.telemetry.first_seq > kMaxSeq) {
-        close_reason_ = "a sample number beyond 2^62";
-        return;
-      }
-      station_.on_samples(*this, frame.body.telemetry);
-      break;
-    case rheonaut_RobotFrame_event_tag:
-      if (frame.body.event.event_seq > kMaxSeq) {
-        close_reason_ = "an event number beyond 2^62";
-        return;
-      }
-      station_.on_event(*this, frame.body.event);
-      break;
+    case rheonaut_RobotFrame_telemetry_tag: station_.on_samples(*this, frame.body.telemetry); break;
+    case rheonaut_RobotFrame_event_tag: station_.on_event(*this, frame.body.event); break;
     case rheonaut_RobotFrame_status_tag: station_.on_status(*this, frame.body.status); break;
     case rheonaut_RobotFrame_command_ack_tag: station_.on_command_ack(*this, frame.body.command_ack); break;
     case rheonaut_RobotFrame_heartbeat_tag: on_heartbeat(frame); break;
-    case rheonaut_RobotFrame_hello_tag: close_reason_ = "a second hello on one connection"; break;
     default: break;  // a message of a newer version, or one nobody here uses yet
   }
 }
 
 void RobotSession::on_heartbeat(const protocol::RobotFrame& frame) {
   const protocol::Heartbeat& answer = frame.body.heartbeat;
-  if (answer.echo_station_time_us == 0) return;
+  if (answer.echo_station_time_us == 0 || answer.echo_station_time_us != probe_us_) return;
+  probe_us_ = 0;
   ClockExchange exchange;
   exchange.sent_at_us = static_cast<std::int64_t>(answer.echo_station_time_us);
   exchange.received_at_robot_us = static_cast<std::int64_t>(answer.echo_received_at_robot_us);
@@ -212,15 +238,17 @@ asio::awaitable<RobotSession::EndReason> RobotSession::write_frames() {
       co_await (wake_writer_.wait() || clock_.sleep_until(next_heartbeat_us_));
       continue;
     }
-    const bool written = co_await write(*frame);
-    if (!written) co_return "the robot closed the connection";
+    // Before the write: from here on the robot may have it.
     if (frame->which_body == rheonaut_StationFrame_command_tag) {
       station_.on_command_sent(*this, frame->body.command.command_id);
     }
+    const bool written = co_await write(*frame);
+    if (!written) co_return "the robot closed the connection";
   }
 }
 
 std::optional<protocol::StationFrame> RobotSession::next_frame() {
+  if (welcome_) return std::exchange(welcome_, std::nullopt);
   const std::int64_t now_us = clock_.steady_us();
   protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
   frame.which_body = rheonaut_StationFrame_command_tag;
@@ -246,7 +274,8 @@ protocol::StationFrame RobotSession::heartbeat() {
   frame.which_body = rheonaut_StationFrame_heartbeat_tag;
   frame.body.heartbeat = durable_;
   if (now_us >= next_probe_us_) {
-    frame.body.heartbeat.station_time_us = static_cast<std::uint64_t>(std::max<std::int64_t>(now_us, 1));
+    probe_us_ = static_cast<std::uint64_t>(std::max<std::int64_t>(now_us, 1));
+    frame.body.heartbeat.station_time_us = probe_us_;
     next_probe_us_ = now_us + kProbePeriodUs;
   }
   durable_.resend_first_seq = durable_.resend_next_seq = 0;

@@ -30,8 +30,9 @@ class RobotSession final : public RobotPort {
   RobotSession(boost::asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
                RobotArchive& archive);
 
-  // Serves the connection to its end.
-  boost::asio::awaitable<void> run();
+  // Hello to Welcome; false when the robot was refused or said nothing. Then serve() to the end of the connection.
+  boost::asio::awaitable<bool> greet();
+  boost::asio::awaitable<void> serve();
 
   const RobotId& robot_id() const override { return robot_id_; }
   bool send(const protocol::Command& command, std::int64_t deadline_us) override;
@@ -49,7 +50,8 @@ class RobotSession final : public RobotPort {
 
   boost::asio::awaitable<std::optional<protocol::RobotFrame>> read_frame();
   boost::asio::awaitable<std::optional<protocol::Hello>> read_hello();
-  boost::asio::awaitable<bool> welcome(const protocol::Hello& hello);
+  boost::asio::awaitable<bool> admit(const protocol::Hello& hello);
+  protocol::StationFrame welcome(const Admission& admission) const;
   boost::asio::awaitable<bool> refuse(protocol::RefusalReason reason, std::string detail);
 
   boost::asio::awaitable<EndReason> read_frames();
@@ -74,12 +76,14 @@ class RobotSession final : public RobotPort {
   RobotId robot_id_;  // from the hello
 
   Signal wake_writer_;
-  std::deque<protocol::Command> stops_;  // SAFETY: always written first
+  std::optional<protocol::StationFrame> welcome_;  // the first frame that is written
+  std::deque<protocol::Command> stops_;            // SAFETY: always written first
   std::deque<QueuedCommand> commands_;
   protocol::StationHeartbeat durable_ = rheonaut_StationHeartbeat_init_zero;
   bool durable_changed_ = false;
   std::int64_t next_heartbeat_us_ = 0;
   std::int64_t next_probe_us_ = 0;
+  std::uint64_t probe_us_ = 0;  // the stamp that waits for its answer; 0: none
 
   ClockSync clock_sync_;
   std::int64_t last_received_us_ = 0;

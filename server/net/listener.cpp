@@ -2,6 +2,9 @@
 #include "server/net/listener.hpp"
 
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
+
+#include <algorithm>
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/use_awaitable.hpp>
@@ -15,6 +18,15 @@ using asio::ip::tcp;
 namespace {
 
 constexpr std::chrono::milliseconds kPause{50};
+constexpr rlim_t kDescriptors = 65'536;
+
+// Each connection takes a file descriptor, and the usual soft limit of 1024 is for programs that need few.
+void raise_descriptor_limit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, kDescriptors);
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
 
 void bind(tcp::acceptor& acceptor, const tcp::endpoint& endpoint, boost::system::error_code& error) {
   acceptor.open(endpoint.protocol());
@@ -28,6 +40,7 @@ void bind(tcp::acceptor& acceptor, const tcp::endpoint& endpoint, boost::system:
 
 Listener::Listener(asio::io_context& loop, Clock& clock, const tcp::endpoint& endpoint, bool or_any_port)
     : clock_{clock}, acceptor_{loop} {
+  raise_descriptor_limit();
   boost::system::error_code error;
   bind(acceptor_, endpoint, error);
   if (error == asio::error::address_in_use && or_any_port) {

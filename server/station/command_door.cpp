@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <fmt/format.h>
+#include <algorithm>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 
 #include "server/station/seat.hpp"
@@ -14,6 +15,8 @@ using namespace asio::experimental::awaitable_operators;  // NOLINT: operators o
 namespace {
 
 constexpr microseconds kMaxLife{protocol::kMaxCommandLifeUs};
+constexpr microseconds kRepeatStop{1'000'000};
+constexpr std::size_t kMaxStops = 16;  // on their way to one robot; who asks for more waits for the newest of them
 constexpr microseconds kAckGrace{1'000'000};  // an answer may come this much after the life ended
 
 CommandId random_id() {
@@ -82,7 +85,7 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
     co_return fail(ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),
                    "queue_full");
   }
-  seat.commands.emplace(pending->record.id, pending);
+  add_pending(seat, pending);
   publish(pending->record);
   co_await (pending->ended.wait() || clock_.sleep_for(request.life + 2 * kAckGrace));
   co_return pending->record;
@@ -95,31 +98,60 @@ asio::awaitable<Result<CommandRecord>> Station::emergency_stop(RobotId robot_id,
     co_return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", robot_id), "unknown_robot");
   }
   Seat& seat = seat_entry->second;
-  CommandRequest request;
-  request.robot_id = robot_id;
-  request.action.which_action = rheonaut_Command_emergency_stop_tag;
-  request.actor = std::move(actor);
-  const auto stop = make_pending(request, *seat.robot);
-  hand_stop_to(seat, stop);  // SAFETY: the frame first, the record afterwards
-  spdlog::warn("emergency stop of robot '{}' by {}{}", robot_id, stop->record.actor,
-               seat.port == nullptr ? "; kept until it returns" : "");
-  seat.commands.emplace(stop->record.id, stop);
-  seat.robot->pending_stop = stop->record.id;
-  publish(stop->record);
-  publish(*seat.robot);
+  auto stop = seat.newest_stop();
+  if (stop == nullptr || (seat.port != nullptr && seat.stops() < kMaxStops)) {
+    CommandRequest request;
+    request.robot_id = robot_id;
+    request.action.which_action = rheonaut_Command_emergency_stop_tag;
+    request.actor = std::move(actor);
+    stop = make_pending(request, *seat.robot);
+    hand_stop_to(seat, *stop);  // SAFETY: the frame first, the record afterwards
+    spdlog::warn("emergency stop of robot '{}' by {}{}", robot_id, stop->record.actor,
+                 seat.port == nullptr ? "; kept until it returns" : "");
+    add_pending(seat, stop);
+    publish(stop->record);
+    publish(*seat.robot);
+  }
   co_await (stop->ended.wait() || clock_.sleep_for(patience));
   co_return stop->record;
 }
 
+void Station::add_pending(Seat& seat, const std::shared_ptr<PendingCommand>& pending) {
+  pending->number = ++seat.last_number;
+  seat.commands.emplace(pending->record.id, pending);
+  if (pending->is_stop()) seat.robot->pending_stop = pending->record.id;
+}
+
+std::shared_ptr<Station::PendingCommand> Station::Seat::newest_stop() const {
+  std::shared_ptr<PendingCommand> newest;
+  for (const auto& [id, pending] : commands) {
+    if (pending->is_stop() && (newest == nullptr || pending->number > newest->number)) newest = pending;
+  }
+  return newest;
+}
+
+std::size_t Station::Seat::stops() const {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(commands, [](const auto& entry) { return entry.second->is_stop(); }));
+}
+
 // SAFETY: the session writes it before anything else; what was queued for the robot never reaches it.
-void Station::hand_stop_to(Seat& seat, const std::shared_ptr<PendingCommand>& stop) {
+void Station::hand_stop_to(Seat& seat, PendingCommand& stop) {
   if (seat.port == nullptr) return;
-  seat.port->send_emergency_stop(stop->wire);
+  stop.handed_at_us = clock_.steady_us();
+  seat.port->send_emergency_stop(stop.wire);
   std::vector<CommandId> superseded;
   for (const auto& [id, pending] : seat.commands) {
     if (!pending->is_stop() && pending->record.state == CommandState::queued) superseded.push_back(id);
   }
   for (const CommandId id : superseded) finish(seat, id, CommandState::failed, "superseded_by_emergency_stop");
+}
+
+// SAFETY: a stop that a connected robot leaves unanswered is sent again each second, under the same id.
+void Station::repeat_stop(Seat& seat) {
+  if (!seat.robot->pending_stop) return;
+  const auto stop = seat.newest_stop();
+  if (stop != nullptr && clock_.steady_us() - stop->handed_at_us >= kRepeatStop.count()) hand_stop_to(seat, *stop);
 }
 
 void Station::restore_stop(const CommandRecord& record) {
@@ -128,8 +160,7 @@ void Station::restore_stop(const CommandRecord& record) {
   pending->record = record;
   pending->wire.command_id = record.id;
   pending->wire.which_action = rheonaut_Command_emergency_stop_tag;
-  seat.commands.emplace(record.id, pending);
-  seat.robot->pending_stop = record.id;
+  add_pending(seat, pending);
   spdlog::warn("an emergency stop of robot '{}' waits for the robot to return", record.robot_id);
 }
 
@@ -153,12 +184,10 @@ void Station::on_command_ack(RobotPort& port, const protocol::CommandAck& ack) {
   record.effect_at_robot_us = ack.effect_at_robot_us;
   record.emergency_id = ack.emergency_id;
   const bool clears = pending->wire.which_action == rheonaut_Command_clear_emergency_tag;
-  if (pending->is_stop()) {
-    settle_stops(*seat, ack);
-    return;
-  }
+  if (pending->is_stop()) return settle_stops(*seat, *pending, ack);
   const bool accepted = ack.result == rheonaut_COMMAND_RESULT_ACCEPTED;
-  if (clears && accepted) {
+  // SAFETY: a clear that took effect before the latest stop says nothing of the latch now.
+  if (clears && accepted && ack.effect_at_robot_us > seat->latch_known_at_robot_us) {
     seat->latch_known_at_robot_us = ack.effect_at_robot_us;
     seat->robot->context.emergency_id = ack.emergency_id;
     if (ack.emergency_id == 0) seat->robot->context.emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;
@@ -174,23 +203,36 @@ void Station::on_command_ack(RobotPort& port, const protocol::CommandAck& ack) {
   publish(*seat->robot);
 }
 
-// Any acknowledged stop means that the robot stands latched: every stop that was on its way has reached its purpose.
-void Station::settle_stops(Seat& seat, const protocol::CommandAck& ack) {
-  seat.latch_known_at_robot_us = ack.effect_at_robot_us;
-  seat.robot->context.emergency_id = ack.emergency_id;
-  seat.robot->context.emergency_cause = rheonaut_EMERGENCY_CAUSE_OPERATOR;
-  seat.robot->pending_stop.reset();
-  std::vector<CommandId> stops;
+// The robot stands latched: this stop and those asked for before it have reached their purpose. A later one has not.
+void Station::settle_stops(Seat& seat, const PendingCommand& acknowledged, const protocol::CommandAck& ack) {
+  RobotState& robot = *seat.robot;
+  const bool obeyed = ack.result == rheonaut_COMMAND_RESULT_ACCEPTED || ack.result == rheonaut_COMMAND_RESULT_DUPLICATE;
+  if (!obeyed || ack.emergency_id == 0) {
+    spdlog::error("robot '{}' answered an emergency stop with {} and latch {}; it is sent again", robot.id,
+                  protocol::text(ack.result), ack.emergency_id);
+    return;
+  }
+  // A stop that was repeated is answered without a time: what it says is as new as its frame.
+  const std::uint64_t known_at_us = ack.effect_at_robot_us != 0 ? ack.effect_at_robot_us : robot.latest_robot_time_us;
+  if (known_at_us >= seat.latch_known_at_robot_us) {
+    seat.latch_known_at_robot_us = known_at_us;
+    robot.context.emergency_id = ack.emergency_id;
+    robot.context.emergency_cause = rheonaut_EMERGENCY_CAUSE_OPERATOR;
+  }
+  const CommandId acknowledged_id = acknowledged.record.id;
+  std::vector<CommandId> settled;
   for (const auto& [id, pending] : seat.commands) {
-    if (!pending->is_stop()) continue;
+    if (!pending->is_stop() || pending->number > acknowledged.number) continue;
     pending->record.effect_at_robot_us = ack.effect_at_robot_us;
     pending->record.emergency_id = ack.emergency_id;
-    stops.push_back(id);
+    settled.push_back(id);
   }
-  for (const CommandId id : stops) {
-    finish(seat, id, CommandState::acknowledged, id == ack.command_id ? "" : "stopped_by_another_stop");
+  for (const CommandId id : settled) {
+    finish(seat, id, CommandState::acknowledged, id == acknowledged_id ? "" : "stopped_by_a_later_stop");
   }
-  publish(*seat.robot);
+  const auto still = seat.newest_stop();
+  robot.pending_stop = still == nullptr ? std::nullopt : std::optional{still->record.id};
+  publish(robot);
 }
 
 void Station::finish(Seat& seat, CommandId id, CommandState state, std::string reason) {

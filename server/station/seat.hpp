@@ -17,6 +17,8 @@ struct Station::PendingCommand {
   CommandRecord record;
   protocol::Command wire = rheonaut_Command_init_zero;
   std::int64_t deadline_us = std::numeric_limits<std::int64_t>::max();  // steady
+  std::uint64_t number = 0;       // counts the commands of its seat: a stop of a higher number was asked for later
+  std::int64_t handed_at_us = 0;  // a stop: when it was last given to the link
   Signal ended;
 };
 
@@ -25,6 +27,11 @@ struct Station::Seat {
   RobotPort* port = nullptr;    // null while disconnected
   std::map<CommandId, std::shared_ptr<PendingCommand>> commands;
   std::uint64_t latch_known_at_robot_us = 0;  // older telemetry says nothing about the latch
+  std::uint64_t last_number = 0;
+
+  // Stops that no robot has acknowledged; the newest, null when there is none, and how many there are.
+  std::shared_ptr<PendingCommand> newest_stop() const;
+  std::size_t stops() const;
 };
 
 }  // namespace server

@@ -149,23 +149,18 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   spdlog::info("robot '{}' connected from {}: boot {}, {} samples held, durable to {}", robot.id, peer, robot.boot_id,
                details.next_seq - details.oldest_seq, admission.durable_next_seq);
 
-  // SAFETY: stops that no robot has acknowledged go first; a robot that lost its latch in a reset is latched again.
-  bool stop_waits = false;
-  for (const auto& [id, pending] : seat.commands) {
-    if (!pending->is_stop()) continue;
-    hand_stop_to(seat, pending);
-    stop_waits = true;
-  }
-  if (was_latched && other_boot && !stop_waits && details.emergency_id == 0) {
+  // SAFETY: a stop that no robot has acknowledged goes first; a robot that lost its latch in a reset is latched again.
+  if (const auto stop = seat.newest_stop(); stop != nullptr) {
+    hand_stop_to(seat, *stop);
+  } else if (was_latched && other_boot && details.emergency_id == 0) {
     CommandRequest request;
     request.robot_id = robot.id;
     request.action.which_action = rheonaut_Command_emergency_stop_tag;
     request.actor = "station:latch";
-    const auto stop = make_pending(request, robot);
-    seat.commands.emplace(stop->record.id, stop);
-    robot.pending_stop = stop->record.id;
-    hand_stop_to(seat, stop);
-    publish(stop->record);
+    const auto relatch = make_pending(request, robot);
+    add_pending(seat, relatch);
+    hand_stop_to(seat, *relatch);
+    publish(relatch->record);
   }
   note(robot, "connected", fmt::format("from {}", peer));
   publish(robot);
@@ -195,6 +190,7 @@ void Station::on_frame(RobotPort& port, std::uint64_t robot_time_us) {
   robot.last_received_steady_us = clock_.steady_us();
   robot.latest_robot_time_us = std::max(robot.latest_robot_time_us, robot_time_us);
   expire_commands(*seat);
+  repeat_stop(*seat);
 }
 
 void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) {

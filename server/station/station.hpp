@@ -97,10 +97,12 @@ class Station {
 
   std::shared_ptr<PendingCommand> make_pending(const CommandRequest& request, const RobotState& robot);
   void restore_stop(const CommandRecord& record);
-  void hand_stop_to(Seat& seat, const std::shared_ptr<PendingCommand>& stop);
+  void add_pending(Seat& seat, const std::shared_ptr<PendingCommand>& pending);
+  void hand_stop_to(Seat& seat, PendingCommand& stop);
+  void repeat_stop(Seat& seat);
   void finish(Seat& seat, CommandId id, CommandState state, std::string reason);
   void expire_commands(Seat& seat);
-  void settle_stops(Seat& seat, const protocol::CommandAck& ack);
+  void settle_stops(Seat& seat, const PendingCommand& acknowledged, const protocol::CommandAck& ack);
 
   boost::asio::io_context& loop_;
   Clock& clock_;

@@ -17,8 +17,8 @@ using namespace std::chrono_literals;
 
 class VirtualClockTest : public ::testing::Test {
  protected:
-  WorkerThread worker_{"worker"};
   asio::io_context loop_{1};
+  WorkerThread worker_{"worker"};
   VirtualClock clock_{loop_};
   TaskGroup tasks_{loop_};
   std::vector<std::int64_t> woken_us_;

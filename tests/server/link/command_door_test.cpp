@@ -109,6 +109,7 @@ TEST_F(LinkTest, AStopLatchesTheStationUntilItIsCleared) {
   submit(set_duty(0.1F));
   clock.settle();
   EXPECT_EQ(results.at(2).error().reason, "latched");
+  clock.run_for(10ms);
   submit(clear_emergency(9));
   clock.settle();
   robot->acknowledge(robot->commands().at(1), rheonaut_COMMAND_RESULT_ACCEPTED, 0);
@@ -202,6 +203,91 @@ TEST_F(LinkTest, ManyStopsAreBoundedAndAllAnswered) {
   for (const auto& command : robot->commands()) robot->acknowledge(command, rheonaut_COMMAND_RESULT_ACCEPTED, 9);
   ASSERT_TRUE(clock.run_until([&] { return results.size() == 100; }, 2s));
   for (const auto& result : results) EXPECT_EQ(result->state, CommandState::acknowledged);
+}
+
+TEST_F(LinkTest, TheAnswerToAnEarlierStopDoesNotSettleALaterOne) {
+  auto* robot = connect();
+  stop_robot(100ms);
+  clock.settle();
+  stop_robot(100ms);
+  clock.settle();
+  ASSERT_EQ(robot->commands().size(), 2u);
+  robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_ACCEPTED, 9);
+  clock.settle();
+  EXPECT_TRUE(station.find("r1")->pending_stop.has_value()) << "the second has not arrived";
+  submit(clear_emergency(9));
+  clock.settle();
+  EXPECT_EQ(results.back().error().reason, "stop_pending");
+  robot->link.cut();
+  clock.settle();
+  auto* again = dial();
+  again->say_hello();
+  ASSERT_TRUE(clock.run_until([&] { return !again->commands().empty(); }, 1s));
+  EXPECT_EQ(again->commands()[0].command_id, robot->commands()[1].command_id);
+}
+
+TEST_F(LinkTest, AStopThatTheRobotRefusesIsSentAgainAndStaysPending) {
+  auto* robot = connect();
+  stop_robot(100ms);
+  clock.settle();
+  robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_UNSUPPORTED);
+  clock.settle();
+  EXPECT_TRUE(station.find("r1")->pending_stop.has_value());
+  ASSERT_TRUE(clock.run_until([&] { return robot->commands().size() == 2; }, 1300ms));
+  EXPECT_EQ(robot->commands()[1].command_id, robot->commands()[0].command_id);
+}
+
+TEST_F(LinkTest, AClearThatTookEffectBeforeTheLatestStopDoesNotUnlatch) {
+  auto* robot = connect();
+  stop_robot();
+  clock.settle();
+  robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_ACCEPTED, 9);
+  clock.run_for(10ms);
+  submit(clear_emergency(9));
+  stop_robot();
+  clock.settle();
+  const auto commands = robot->commands();
+  ASSERT_GE(commands.size(), 2u);
+  const auto cleared_at_us = robot->robot_now_us();
+  clock.run_for(1ms);
+  robot->acknowledge(commands.back(), rheonaut_COMMAND_RESULT_ACCEPTED, 10);
+  clock.settle();
+  EXPECT_EQ(station.find("r1")->context.emergency_id, 10u);
+  protocol::RobotFrame late = rheonaut_RobotFrame_init_zero;  // the clear's answer, sent behind the stop's
+  late.which_body = rheonaut_RobotFrame_command_ack_tag;
+  for (const auto& command : commands) {
+    if (command.which_action == rheonaut_Command_clear_emergency_tag)
+      late.body.command_ack.command_id = command.command_id;
+  }
+  late.body.command_ack.result = rheonaut_COMMAND_RESULT_ACCEPTED;
+  late.body.command_ack.effect_at_robot_us = cleared_at_us;
+  robot->send(late);
+  clock.settle();
+  EXPECT_EQ(station.find("r1")->context.emergency_id, 10u);
+}
+
+TEST_F(LinkTest, StopsForARobotThatIsAwayAreOneStop) {
+  station.restore({{"r1", 0, 0}}, {});
+  for (int i = 0; i < 1000; ++i) stop_robot(10ms);
+  ASSERT_TRUE(clock.run_until([&] { return results.size() == 1000; }, 1s));
+  for (const auto& result : results) EXPECT_EQ(result->id, results[0]->id);
+  auto* robot = dial();
+  robot->say_hello();
+  ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));
+  EXPECT_EQ(robot->commands().size(), 1u);
+}
+
+TEST_F(LinkTest, TheLatchOutlivesTheStation) {
+  station.restore({{"r1", 77, 9}}, {});
+  auto* rebooted = dial();
+  auto hello = TestRobot::hello_frame();
+  hello.body.hello.boot_id = 78;
+  rebooted->send(hello);
+  ASSERT_TRUE(clock.run_until([&] { return !rebooted->commands().empty(); }, 1s));
+  EXPECT_EQ(rebooted->commands()[0].which_action, rheonaut_Command_emergency_stop_tag);
+  submit(set_duty(0.1F));
+  clock.settle();
+  EXPECT_EQ(results.at(0).error().reason, "latched");
 }
 
 }  // namespace

@@ -205,5 +205,52 @@ TEST_F(LinkTest, AnswersOfTheRobotGiveTheClockOffset) {
   EXPECT_LE(estimate.uncertainty_us, 15'000);
 }
 
+TEST_F(LinkTest, WhatIsNoNumberOrBeyondAllTimeEndsTheConnection) {
+  const auto telemetry = [](auto change) {
+    protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
+    frame.robot_time_us = 6'000'000;
+    frame.which_body = rheonaut_RobotFrame_telemetry_tag;
+    protocol::Telemetry& batch = frame.body.telemetry;
+    batch.period_us = 10'000;
+    batch.position_m_count = batch.velocity_m_s_count = batch.acceleration_m_s2_count = 1;
+    batch.duty_count = batch.impedance_mv_count = batch.reference_m_count = 1;
+    change(frame);
+    return frame;
+  };
+  constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
+  constexpr std::uint64_t far = std::uint64_t{1} << 63;
+  for (const auto& frame : {telemetry([](auto& f) { f.body.telemetry.disturbance_m = not_a_number; }),
+                            telemetry([](auto& f) { f.body.telemetry.position_sd_m = not_a_number; }),
+                            telemetry([](auto& f) { f.body.telemetry.period_us = 0; }),
+                            telemetry([](auto& f) { f.body.telemetry.first_robot_time_us = far; }),
+                            telemetry([](auto& f) { f.robot_time_us = far; })}) {
+    auto* robot = connect();
+    robot->send(frame);
+    ASSERT_TRUE(clock.run_until([&] { return robot->closed; }, 100ms));
+  }
+  EXPECT_TRUE(sink.batches.empty());
+}
+
+TEST_F(LinkTest, AnAnswerToNoProbeOfOursDoesNotMoveTheClock) {
+  auto* robot = connect();
+  protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
+  frame.which_body = rheonaut_RobotFrame_heartbeat_tag;
+  frame.body.heartbeat.echo_station_time_us = 12345;
+  frame.body.heartbeat.echo_received_at_robot_us = 5'000'000;
+  robot->send(frame);
+  clock.settle();
+  EXPECT_FALSE(station.find("r1")->clock.valid);
+}
+
+TEST_F(LinkTest, ManySilentConnectionsAreBounded) {
+  for (int i = 0; i < RobotListener::kMaxGreetings; ++i) dial();
+  clock.settle();
+  auto* late = dial();
+  ASSERT_TRUE(clock.run_until([&] { return late->closed; }, 100ms));
+  clock.run_for(6s);  // the silent ones are gone
+  connect();
+  EXPECT_TRUE(connected());
+}
+
 }  // namespace
 }  // namespace server
