@@ -1,7 +1,6 @@
 // Ticks, dials, reads and writes.
 #include "sim_robot/robot_client.hpp"
 
-#include <algorithm>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/connect.hpp>
@@ -18,7 +17,6 @@ using asio::ip::tcp;
 using namespace asio::experimental::awaitable_operators;
 using namespace std::chrono_literals;
 
-constexpr auto kPeriod = std::chrono::microseconds(SimulatedRobot::kPeriodUs);
 constexpr auto kConnectTimeout = 1s;
 constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
 constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
@@ -36,32 +34,42 @@ RobotClient::RobotClient(asio::io_context& loop, SimulatedRobotConfig config, St
       log_(std::move(log)),
       socket_(loop),
       tick_timer_(loop),
-      next_tick_at_(Clock::now()) {}
+      booted_at_(Clock::now()) {}
 
 asio::awaitable<void> RobotClient::run() {
-  next_tick_at_ = Clock::now();
+  booted_at_ = Clock::now();
   co_await (tick() && stay_connected());
 }
 
-// The robot's time between two ticks: that of the last one plus what has passed, never beyond the next.
-std::uint64_t RobotClient::robot_now_us() const {
-  const auto ahead = std::chrono::duration_cast<std::chrono::microseconds>(next_tick_at_ - Clock::now());
-  const auto ahead_us = static_cast<std::uint64_t>(std::clamp(ahead, 0us, kPeriod).count());
-  return robot_.robot_time_us() - std::min(ahead_us, robot_.robot_time_us());
+// Runs the ticks that are due and returns the true robot time, which lies before the next of them.
+// SAFETY: this is the only way to a time here, so that what waited in a stopped process is judged by the time it is
+// now.
+std::uint64_t RobotClient::catch_up() {
+  for (;;) {
+    const auto since_boot = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - booted_at_);
+    const auto now_us = static_cast<std::uint64_t>(since_boot.count());
+    if (now_us < robot_.robot_time_us()) return now_us;
+    robot_.advance_to(now_us);
+  }
 }
 
 asio::awaitable<void> RobotClient::tick() {
   for (;;) {
-    tick_timer_.expires_at(next_tick_at_);
+    tick_timer_.expires_at(booted_at_ + std::chrono::microseconds(robot_.robot_time_us()));
     co_await tick_timer_.async_wait(asio::use_awaitable);
-    robot_.step();
-    next_tick_at_ += kPeriod;
+    catch_up();
     flush();
-    if (connected_ && robot_.core().connection_is_silent(robot_now_us())) {
-      say("the station is silent");
-      close_connection();
-    }
+    close_if_silent();
   }
+}
+
+// SAFETY: after a stall the silence may be the robot's own; a stop that came meanwhile is read before the verdict.
+void RobotClient::close_if_silent() {
+  if (!connected_ || !robot_.core().connection_is_silent(catch_up())) return;
+  boost::system::error_code ignored;
+  if (socket_.available(ignored) > 0) return;
+  say("the station is silent");
+  close_connection();
 }
 
 asio::awaitable<void> RobotClient::stay_connected() {
@@ -100,13 +108,13 @@ asio::awaitable<void> RobotClient::serve() {
   connected_ = true;
   was_up_ = false;
   frame_size_ = frame_sent_ = 0;
-  robot_.link_opened(robot_now_us());
+  robot_.link_opened(catch_up());
   flush();
   std::array<std::uint8_t, 4096> bytes;
   while (connected_) {
     const auto [error, size] = co_await socket_.async_read_some(asio::buffer(bytes), kNoThrow);
     if (error) break;
-    const bool keep = robot_.receive({bytes.data(), size}, robot_now_us());
+    const bool keep = robot_.receive({bytes.data(), size}, catch_up());
     flush();
     if (!was_up_ && robot_.core().link_up()) {
       was_up_ = true;
@@ -121,7 +129,7 @@ asio::awaitable<void> RobotClient::serve() {
 void RobotClient::flush() {
   while (connected_) {
     if (frame_sent_ == frame_size_) {
-      frame_size_ = robot_.transmit(frame_.data(), frame_.size(), robot_now_us());
+      frame_size_ = robot_.transmit(frame_.data(), frame_.size(), catch_up());
       frame_sent_ = 0;
       if (frame_size_ == 0) return;
     }
@@ -136,7 +144,7 @@ void RobotClient::flush() {
 void RobotClient::close_connection() {
   if (!connected_) return;
   connected_ = false;
-  robot_.link_closed(robot_now_us());
+  robot_.link_closed(catch_up());
   boost::system::error_code ignored;
   socket_.close(ignored);
 }

@@ -1,6 +1,8 @@
 // Runs a simulated robot in real time and connects it to a station over TCP.
 //
-// Ticks follow absolute deadlines: a late one is caught up at once, so the robot's time never drifts from the wall's.
+// Robot time is the host's steady clock since run() began, on time or late, in a tick or between two. Ticks are due at
+// multiples of the period; late ones run before any byte is handed to the robot, so its time never goes back. After a
+// stall (the process was stopped, the machine busy) the missed ones are skipped and counted.
 // A tick never waits for the network: what the socket does not take at once stays in the one frame under way, and the
 // robot keeps the rest. The connection is dialled again for ever, at most 1 s apart.
 // Owns robot and socket. One thread: that of `loop`, which must outlive the client.
@@ -43,8 +45,9 @@ class RobotClient {
   boost::asio::awaitable<bool> dial();
   boost::asio::awaitable<void> serve();
   void flush();
+  void close_if_silent();
   void close_connection();
-  std::uint64_t robot_now_us() const;
+  std::uint64_t catch_up();
   void say_how_it_ended();
   void say(const std::string& line);
 
@@ -57,7 +60,7 @@ class RobotClient {
   bool was_up_ = false;  // welcomed on this connection
   std::string last_line_;
 
-  Clock::time_point next_tick_at_;                               // when robot_.robot_time_us() is due
+  Clock::time_point booted_at_;                                  // robot time 0
   std::array<std::uint8_t, protocol::kMaxFramedBytes> frame_{};  // under way
   std::size_t frame_size_ = 0, frame_sent_ = 0;
   std::minstd_rand jitter_{std::random_device{}()};

@@ -76,9 +76,21 @@ void SimulatedRobot::step() {
   inputs.supply_mv = kSupplyMv;
   inputs.rssi_dbm = kRssiDbm;
   inputs.imu_calibration = kImuCalibration;
+  inputs.missed_ticks = missed_ticks_;
   const robot_fw::Outputs outputs = core_.step(inputs, static_cast<float>(kPeriodS));
   plant_.step(static_cast<double>(outputs.duty));
   robot_time_us_ += kPeriodUs;
+}
+
+void SimulatedRobot::advance_to(std::uint64_t now_us) {
+  if (now_us > robot_time_us_ + kMaxLatenessUs) skip((now_us - robot_time_us_) / kPeriodUs);
+  while (robot_time_us_ <= now_us) step();
+}
+
+void SimulatedRobot::skip(std::uint64_t ticks) {
+  for (std::uint64_t i = 0; i < ticks; ++i) plant_.step(static_cast<double>(core_.duty()));
+  robot_time_us_ += ticks * kPeriodUs;
+  missed_ticks_ += static_cast<std::uint32_t>(ticks);
 }
 
 }  // namespace sim_robot

@@ -32,12 +32,19 @@ class SimulatedRobot {
  public:
   static constexpr std::uint64_t kPeriodUs = 10'000;
   static constexpr double kPeriodS = 0.01;
+  static constexpr std::uint64_t kMaxLatenessUs = 50'000;
 
   explicit SimulatedRobot(SimulatedRobotConfig config);
   SimulatedRobot(const SimulatedRobot&) = delete;  // the core points into the config
   SimulatedRobot& operator=(const SimulatedRobot&) = delete;
 
   void step();  // one tick of kPeriodS
+
+  // Lets robot time reach `now_us`: afterwards no tick is due. Ticks that are up to kMaxLatenessUs late run one by one,
+  // each at its own time. After a longer stall only the latest one runs; those before it are skipped.
+  void advance_to(std::uint64_t now_us);
+  // Time passes without ticks: the motor keeps the duty it has, and the core sees nothing but the later time.
+  void skip(std::uint64_t ticks);
 
   // As of the core; times are robot times, see robot_fw/core/robot.hpp.
   void link_opened(std::uint64_t now_us) { core_.link_opened(now_us); }
@@ -57,6 +64,7 @@ class SimulatedRobot {
   robot_fw::Robot core_;
   Plant plant_;
   std::uint64_t robot_time_us_ = 0;
+  std::uint32_t missed_ticks_ = 0;
 };
 
 }  // namespace sim_robot

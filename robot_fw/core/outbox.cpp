@@ -31,19 +31,25 @@ void Outbox::welcomed(const TelemetryRing& samples, const EventRing& events) {
 }
 
 void Outbox::ack(const protocol::CommandAck& ack) {
-  if (ack_count_ == kMaxAcks) {
-    first_ack_ = (first_ack_ + 1) % kMaxAcks;
-    --ack_count_;
-    if (stop_acks_ > 0) --stop_acks_;
-  }
+  if (stop_acks_ == kMaxAcks) return;  // SAFETY: no other ack displaces a stop's
+  if (ack_count_ == kMaxAcks) drop_oldest_ordinary_ack();
   acks_[(first_ack_ + ack_count_++) % kMaxAcks] = ack;
 }
 
 void Outbox::ack_stop(const protocol::CommandAck& ack) {
+  if (ack_count_ == kMaxAcks && stop_acks_ < kMaxAcks) drop_oldest_ordinary_ack();
   first_ack_ = (first_ack_ + kMaxAcks - 1) % kMaxAcks;
   acks_[first_ack_] = ack;
   ack_count_ = std::min(ack_count_ + 1, kMaxAcks);
   stop_acks_ = std::min(stop_acks_ + 1, kMaxAcks);
+}
+
+// The first one behind the stops'; those behind it move up.
+void Outbox::drop_oldest_ordinary_ack() {
+  for (std::size_t i = stop_acks_; i + 1 < ack_count_; ++i) {
+    acks_[(first_ack_ + i) % kMaxAcks] = acks_[(first_ack_ + i + 1) % kMaxAcks];
+  }
+  --ack_count_;
 }
 
 void Outbox::echo(std::uint64_t station_time_us, std::uint64_t received_at_us) {

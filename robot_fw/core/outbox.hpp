@@ -37,9 +37,10 @@ class Outbox {
   void resend(std::uint64_t first_seq, std::uint64_t end_seq) { backfill_.extend(first_seq, end_seq); }
   void resend_events(const EventRing& events) { event_next_ = events.oldest_seq(); }
 
-  // When the queue is full the oldest ack makes room; the station then asks by repeating the command.
+  // When the queue is full the oldest ack that does not answer a stop makes room, or, if all do, this one is not kept;
+  // the station then asks by repeating the command.
   void ack(const protocol::CommandAck& ack);
-  // Ahead of every other ack, and already before Welcome.
+  // Ahead of every other ack, and already before Welcome. Always kept; if all answer stops, the oldest makes room.
   void ack_stop(const protocol::CommandAck& ack);
   void echo(std::uint64_t station_time_us, std::uint64_t received_at_us);
   // Once per tick, after the sample was made; `urgent` sends it, and all before it, at once.
@@ -59,6 +60,7 @@ class Outbox {
 
  private:
   void catch_up(const TelemetryRing& samples, const EventRing& events);
+  void drop_oldest_ordinary_ack();
 
   bool hello_due_ = false;
   std::array<protocol::CommandAck, kMaxAcks> acks_{};

@@ -61,7 +61,8 @@ void Robot::answer(const protocol::Command& command, Verdict verdict) {
 
 // The ack went out when the command was taken in; a second one is only due when nothing came of it.
 void Robot::run_timed_command(const protocol::Command& command) {
-  const Verdict verdict = execute(command);
+  const bool expired = now_us_ > command.valid_until_robot_us;  // SAFETY: a tick that came too late runs nothing stale
+  const Verdict verdict = expired ? Verdict{rheonaut_COMMAND_RESULT_EXPIRED} : execute(command);
   if (!verdict.accepted()) answer(command, verdict);
 }
 

@@ -171,6 +171,31 @@ TEST_F(Commands, ATimedCommandActsAtItsTick) {
   }
 }
 
+TEST_F(Commands, ATimedCommandWhoseTickComesAfterItsLifeExpires) {
+  protocol::Command command = set_duty(0.5F);
+  command.has_execute_at_robot_us = true;
+  command.execute_at_robot_us = robot.robot_time_us() + 5 * kTickUs;
+  command.valid_until_robot_us = robot.robot_time_us() + 10 * kTickUs;
+  const auto id = station.send(command);
+  station.step();
+  EXPECT_EQ(result(*station.ack_of(id)), "accepted");
+  robot.skip(10);
+  station.step();
+  EXPECT_EQ(result(*station.ack_of(id)), "expired");
+  expect_at_rest();
+}
+
+TEST_F(Commands, ATimedCommandRunsToTheEndOfItsLife) {
+  protocol::Command command = set_duty(0.5F);
+  command.has_execute_at_robot_us = true;
+  command.execute_at_robot_us = robot.robot_time_us() + 5 * kTickUs;
+  command.valid_until_robot_us = robot.robot_time_us() + 10 * kTickUs;
+  order(command);
+  robot.skip(9);
+  station.step();
+  EXPECT_EQ(core().duty(), 0.5F);
+}
+
 TEST_F(Commands, OnlyAFewWaitAndNoneLongerThanItLives) {
   const auto timed = [this](std::uint64_t ticks) {
     protocol::Command command = ping();

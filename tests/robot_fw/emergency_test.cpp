@@ -89,12 +89,31 @@ TEST_F(Emergency, ARepeatedStopIsADuplicateButLatchesAgainAfterAClear) {
   stop.command_id = 77;
   order(stop);
   const auto id = core().emergency_id();
-  EXPECT_EQ(answer(stop), "duplicate");
+  const auto repeated = order(stop);
+  EXPECT_EQ(result(repeated), "duplicate");
+  EXPECT_EQ(repeated.emergency_id, id);
   EXPECT_EQ(core().emergency_id(), id);
   order(clear_emergency(id));
-  EXPECT_EQ(answer(stop), "accepted");
+  const auto anew = order(stop);
+  EXPECT_EQ(result(anew), "accepted");
   EXPECT_EQ(mode(), "emergency");
   EXPECT_NE(core().emergency_id(), id);
+  EXPECT_EQ(anew.emergency_id, core().emergency_id());
+}
+
+TEST_F(Emergency, ARepeatedStopNamesTheEmergencyInForce) {
+  protocol::Command stop = emergency_stop();
+  stop.command_id = 77;
+  order(stop);
+  order(emergency_stop());
+  const auto in_force = core().emergency_id();
+  for (int second = 0; second < 3; ++second) {
+    const auto repeated = order(stop);
+    EXPECT_EQ(result(repeated), "duplicate");
+    EXPECT_EQ(repeated.emergency_id, in_force);
+    station.run(100);
+  }
+  EXPECT_EQ(core().emergency_id(), in_force);
 }
 
 TEST_F(Emergency, RefusesEveryMotionWhileLatched) {

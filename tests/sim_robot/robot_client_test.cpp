@@ -60,25 +60,34 @@ class Loopback : public ::testing::Test {
     const std::size_t size = protocol::write_frame(frame, out.data(), out.size());
     asio::write(connection, asio::buffer(out, size));
   }
-  void welcome(protocol::RefusalReason refusal = rheonaut_REFUSAL_REASON_NONE) {
+  void welcome(protocol::RefusalReason refusal = rheonaut_REFUSAL_REASON_NONE, std::uint32_t link_timeout_ms = 0) {
     protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
     frame.which_body = rheonaut_StationFrame_welcome_tag;
     frame.body.welcome.protocol_version = protocol::kProtocolVersion;
     frame.body.welcome.refusal = refusal;
+    frame.body.welcome.link_timeout_ms = link_timeout_ms;
     send(frame);
   }
-  void command(protocol::Command command) {
+  void command(protocol::Command command, std::uint64_t life_us = 5'000'000) {
     protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
     frame.which_body = rheonaut_StationFrame_command_tag;
     command.command_id = ++last_command_id;
     command.boot_id = client->robot().config().boot_id;
-    command.valid_until_robot_us = client->robot().robot_time_us() + 5'000'000;
+    command.valid_until_robot_us = client->robot().robot_time_us() + life_us;
     frame.body.command = command;
     send(frame);
   }
   bool has(int body) const {
     return std::any_of(frames.begin(), frames.end(), [body](const auto& frame) { return frame.which_body == body; });
   }
+  std::optional<protocol::CommandAck> ack() const {
+    for (const auto& frame : frames) {
+      if (frame.which_body == rheonaut_RobotFrame_command_ack_tag) return frame.body.command_ack;
+    }
+    return std::nullopt;
+  }
+  // Nothing here runs meanwhile, as when the process is stopped.
+  void stall(std::chrono::milliseconds duration) { asio::steady_timer{loop, duration}.wait(); }
   bool said(const std::string& text) const {
     return std::any_of(log.begin(), log.end(), [&](const auto& line) { return line.find(text) != line.npos; });
   }
@@ -173,6 +182,30 @@ TEST_F(Loopback, TicksOnWhileNobodyReads) {
   welcome();
   const auto before_us = client->robot().robot_time_us();
   ASSERT_TRUE(run_until([&] { return client->robot().robot_time_us() > before_us + 500'000; }));
+}
+
+TEST_F(Loopback, WhatWaitsInAStalledRobotExpires) {
+  ASSERT_TRUE(run_until([&] { return has(rheonaut_RobotFrame_hello_tag); }));
+  welcome();
+  ASSERT_TRUE(run_until([&] { return client->robot().core().link_up(); }));
+  const auto before_us = client->robot().robot_time_us();
+  command(set_duty(0.5F), 100'000);
+  stall(300ms);
+  ASSERT_TRUE(run_until([&] { return ack().has_value(); }));
+  EXPECT_EQ(ack()->result, rheonaut_COMMAND_RESULT_EXPIRED);
+  EXPECT_EQ(client->robot().core().duty(), 0);
+  EXPECT_GE(client->robot().robot_time_us(), before_us + 290'000);
+}
+
+TEST_F(Loopback, AStopThatWaitsInAStalledRobotIsObeyed) {
+  ASSERT_TRUE(run_until([&] { return has(rheonaut_RobotFrame_hello_tag); }));
+  welcome(rheonaut_REFUSAL_REASON_NONE, 100);
+  ASSERT_TRUE(run_until([&] { return client->robot().core().link_up(); }));
+  command(emergency_stop());
+  stall(300ms);  // the silence time-out passes, too
+  ASSERT_TRUE(run_until([&] { return ack().has_value(); }));
+  EXPECT_EQ(client->robot().core().mode(), rheonaut_MODE_EMERGENCY);
+  EXPECT_EQ(connections, 1);
 }
 
 TEST(RobotClient, KeepsTryingAStationThatIsNotThere) {
