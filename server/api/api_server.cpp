@@ -55,7 +55,7 @@ void ApiServer::print_login_url() {
 std::string ApiServer::login_url() {
   auto endpoint = listener_.endpoint();
   if (endpoint.address().is_unspecified()) endpoint.address(boost::asio::ip::address_v4::loopback());
-  return fmt::format("http://{}/login?code={}", text(endpoint), auth_.new_login_code());
+  return server::login_url(text(endpoint), auth_.new_login_code());
 }
 
 }  // namespace server

@@ -93,13 +93,14 @@ void Auth::load_sessions() {
     const int read =
         sodium_hex2bin(session.hash.data(), session.hash.size(), hex.data(), hex.size(), nullptr, &size, nullptr);
     if (read != 0 || size != session.hash.size()) break;
+    session.saved_end_us = session.ends_at_us;
     sessions_.push_back(session);
     next_session_ = std::max(next_session_, session.number + 1);
   }
   forget_expired();
 }
 
-void Auth::save_sessions() const {
+void Auth::save_sessions() {
   std::string lines;
   for (const Secret& session : sessions_) {
     char hex[2 * sizeof session.hash + 1];
@@ -107,6 +108,19 @@ void Auth::save_sessions() const {
     lines += std::to_string(session.number) + ' ' + std::to_string(session.ends_at_us) + ' ' + hex + '\n';
   }
   write_private(sessions_file_, lines);
+  for (Secret& session : sessions_) session.saved_end_us = session.ends_at_us;
+}
+
+// SAFETY: a full disk must not refuse who is signed in, so a session that cannot be saved is renewed all the same.
+void Auth::renew(Secret& session) {
+  session.ends_at_us = std::max(session.ends_at_us, clock_.utc_us() + kSessionLife.count());
+  if (session.ends_at_us - session.saved_end_us < kSessionSaveInterval.count()) return;
+  try {
+    save_sessions();
+  } catch (const std::exception& error) {
+    session.saved_end_us = session.ends_at_us;  // tried again in an hour
+    spdlog::warn("the renewed session {} is not saved: {}", session.number, error.what());
+  }
 }
 
 Auth::Hash Auth::hash_of(const std::string& secret) {
@@ -151,10 +165,11 @@ std::optional<std::string> Auth::actor_of_token(const std::string& token) const 
   return "token:local";
 }
 
-std::optional<std::string> Auth::actor_of_session(const std::string& secret) const {
+std::optional<std::string> Auth::actor_of_session(const std::string& secret) {
   const Hash hash = hash_of(secret);
-  for (const Secret& session : sessions_) {
+  for (Secret& session : sessions_) {
     if (same(session.hash, hash) && session.ends_at_us > clock_.utc_us()) {
+      renew(session);
       return "session:" + std::to_string(session.number);
     }
   }

@@ -18,7 +18,10 @@ namespace server {
 
 inline constexpr const char* kSessionCookie = "rheonaut_session";
 inline constexpr microseconds kLoginCodeLife{std::chrono::minutes{10}};
-inline constexpr microseconds kSessionLife{std::chrono::hours{12}};
+inline constexpr microseconds kSessionLife{std::chrono::hours{12}};  // from its last use
+inline constexpr microseconds kSessionSaveInterval{std::chrono::hours{1}};
+inline constexpr microseconds kCookieLife{
+    std::chrono::days{30}};  // in the browser; the station decides what it is worth
 inline constexpr std::size_t kMaxLoginCodes = 16;
 inline constexpr std::size_t kMaxSessions = 64;
 
@@ -34,7 +37,8 @@ class Auth {
 
   // Who the secret belongs to: "token:local", "session:3"; empty when nobody.
   std::optional<std::string> actor_of_token(const std::string& token) const;
-  std::optional<std::string> actor_of_session(const std::string& secret) const;
+  // A session that is used is renewed.
+  std::optional<std::string> actor_of_session(const std::string& secret);
 
  private:
   using Hash = std::array<unsigned char, 32>;
@@ -42,13 +46,15 @@ class Auth {
     Hash hash{};
     std::int64_t ends_at_us = 0;  // steady for a code, UTC for a session, which outlives the program
     std::uint64_t number = 0;
+    std::int64_t saved_end_us = 0;  // as in the file, so at most an hour before ends_at_us
   };
 
   static Hash hash_of(const std::string& secret);
   static bool same(const Hash& a, const Hash& b);
   void forget_expired();
   void load_sessions();
-  void save_sessions() const;
+  void save_sessions();
+  void renew(Secret& session);
 
   Clock& clock_;
   std::filesystem::path sessions_file_;

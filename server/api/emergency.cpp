@@ -1,6 +1,10 @@
 // Hands stops to the station and gathers the answers.
 #include "server/api/emergency.hpp"
 
+#include <memory>
+
+#include "server/api/contained.hpp"
+
 namespace server {
 namespace asio = boost::asio;
 
@@ -11,14 +15,37 @@ struct Gathering {
   explicit Gathering(asio::io_context& loop) : all_ended{loop} {}
   Signal all_ended;
   std::size_t waiting = 0;
-  std::vector<CommandRecord> records;
+  StopsOfAll stops;
+};
+
+// Counts one stop down, however it ends.
+class Awaited {
+ public:
+  Awaited(std::shared_ptr<Gathering> gathering, RobotId robot_id)
+      : gathering_{std::move(gathering)}, robot_id_{std::move(robot_id)} {}
+  ~Awaited() {
+    if (!taken_) gathering_->stops.failed.push_back(robot_id_);
+    if (--gathering_->waiting == 0) gathering_->all_ended.notify();
+  }
+  Awaited(const Awaited&) = delete;
+  Awaited& operator=(const Awaited&) = delete;
+
+  void take(CommandRecord record) {
+    gathering_->stops.records.push_back(std::move(record));
+    taken_ = true;
+  }
+
+ private:
+  std::shared_ptr<Gathering> gathering_;
+  RobotId robot_id_;
+  bool taken_ = false;
 };
 
 asio::awaitable<void> stop_one(Station& station, RobotId robot_id, std::string actor,
                                std::shared_ptr<Gathering> gathering) {
+  Awaited awaited{std::move(gathering), robot_id};
   auto record = co_await stop_robot(station, std::move(robot_id), std::move(actor));
-  if (record) gathering->records.push_back(std::move(*record));
-  if (--gathering->waiting == 0) gathering->all_ended.notify();
+  if (record) awaited.take(std::move(*record));
 }
 
 }  // namespace
@@ -30,15 +57,18 @@ asio::awaitable<Result<CommandRecord>> stop_robot(Station& station, RobotId robo
   co_return co_await station.emergency_stop(std::move(robot_id), std::move(actor), patience);
 }
 
-asio::awaitable<std::vector<CommandRecord>> stop_all_robots(asio::io_context& loop, TaskGroup& tasks, Station& station,
-                                                            std::string actor) {
+asio::awaitable<StopsOfAll> stop_all_robots(asio::io_context& loop, TaskGroup& tasks, Station& station,
+                                            std::string actor) {
   const auto gathering = std::make_shared<Gathering>(loop);
   std::vector<RobotId> ids;
   for (const auto& [id, robot] : station.robots()) ids.push_back(id);
   gathering->waiting = ids.size();
-  for (const RobotId& id : ids) tasks.spawn("emergency stop of " + id, stop_one(station, id, actor, gathering));
+  for (const RobotId& id : ids) {
+    const std::string name = "emergency stop of " + id;
+    tasks.spawn(name, contained(name, stop_one(station, id, actor, gathering)));
+  }
   if (!ids.empty()) co_await gathering->all_ended.wait();
-  co_return gathering->records;
+  co_return gathering->stops;
 }
 
 }  // namespace server

@@ -15,8 +15,14 @@ inline constexpr microseconds kStopPatience{1'500'000};
 // A robot that is not connected cannot answer: its stop is kept and the asker is told at once.
 boost::asio::awaitable<Result<CommandRecord>> stop_robot(Station& station, RobotId robot_id, std::string actor);
 
-// SAFETY: every robot's stop is on its way before the answer of any is waited for.
-boost::asio::awaitable<std::vector<CommandRecord>> stop_all_robots(boost::asio::io_context& loop, TaskGroup& tasks,
-                                                                   Station& station, std::string actor);
+struct StopsOfAll {
+  std::vector<CommandRecord> records;
+  std::vector<RobotId> failed;  // the station could not take their stop; its log says why
+};
+
+// SAFETY: every robot's stop is on its way before the answer of any is waited for, and none that fails keeps the others
+// or the asker waiting.
+boost::asio::awaitable<StopsOfAll> stop_all_robots(boost::asio::io_context& loop, TaskGroup& tasks, Station& station,
+                                                   std::string actor);
 
 }  // namespace server

@@ -34,11 +34,13 @@ const char* reason_phrase(int status) {
   }
 }
 
-Response json_response(int status, const json& body) {
+Response json_response(int status, const json& body) { return json_text_response(status, dump(body)); }
+
+Response json_text_response(int status, std::string text) {
   Response response;
   response.status = status;
   response.content_type = "application/json";
-  response.body = dump(body);
+  response.body = std::move(text);
   response.headers.emplace_back("Cache-Control", "no-store");
   return response;
 }

@@ -50,6 +50,7 @@ struct Response {
 const char* reason_phrase(int status);
 
 Response json_response(int status, const nlohmann::json& body);
+Response json_text_response(int status, std::string text);  // text that is JSON already
 Response html_response(int status, std::string body);
 
 // Problem details (RFC 9457). `extra` adds members.

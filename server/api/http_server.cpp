@@ -15,6 +15,7 @@
 #include <cctype>
 #include <limits>
 
+#include "server/api/contained.hpp"
 #include "server/api/live_socket.hpp"
 
 namespace server {
@@ -54,8 +55,14 @@ Request plain_request(const HttpRequest& message) {
 // One connection: requests and answers in turn, until it ends or asks for /live.
 class Connection {
  public:
-  Connection(HttpStream stream, Clock& clock, const RequestGuard& guard, const Router& router)
-      : stream_{std::move(stream)}, clock_{clock}, guard_{guard}, router_{router} {}
+  Connection(HttpStream stream, Clock& clock, const RequestGuard& guard, const Router& router,
+             std::list<HttpStream*>& strangers)
+      : stream_{std::move(stream)}, clock_{clock}, guard_{guard}, router_{router}, strangers_{strangers} {
+    strangers_.push_back(&stream_);
+  }
+  ~Connection() { strangers_.remove(&stream_); }
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
 
   asio::awaitable<void> talk();
   asio::awaitable<void> watch();  // ends when the deadline of whatever talk() waits for has passed
@@ -84,6 +91,7 @@ class Connection {
   Clock& clock_;
   const RequestGuard& guard_;
   const Router& router_;
+  std::list<HttpStream*>& strangers_;
   boost::beast::flat_buffer buffer_{kMaxHeaderBytes + kMaxBodyBytes};
   std::int64_t deadline_us_ = kNever;
   bool request_has_begun_ = false;
@@ -152,6 +160,7 @@ asio::awaitable<Connection::Next> Connection::read_and_answer() {
   Request request = plain_request(message);
   auto admitted = guard_.admit(request);
   if (!admitted) co_return co_await send(std::move(admitted.error()), message);
+  if (!admitted->empty()) strangers_.remove(&stream_);
   if (wants_live(message)) {
     upgrade_.emplace(message.base());
     actor_ = *admitted;
@@ -323,7 +332,7 @@ asio::awaitable<void> HttpServer::run() {
 void HttpServer::on_connection(tcp::socket socket) {
   boost::system::error_code ignored;
   socket.set_option(tcp::no_delay{true}, ignored);
-  if (connections_ >= kMaxConnections) {
+  if (connections_ >= kMaxConnections && !make_room()) {
     const std::string busy = "HTTP/1.1 503 Service Unavailable\r\nConnection: close\r\nContent-Length: 0\r\n\r\n";
     socket.non_blocking(true, ignored);
     socket.write_some(asio::buffer(busy), ignored);
@@ -332,12 +341,21 @@ void HttpServer::on_connection(tcp::socket socket) {
   tasks_.spawn("http connection", serve(std::move(socket)));
 }
 
+bool HttpServer::make_room() {
+  if (strangers_.empty()) return false;
+  boost::system::error_code ignored;
+  strangers_.front()->close(ignored);  // its connection ends with the next turn of the loop
+  strangers_.pop_front();
+  return true;
+}
+
 asio::awaitable<void> HttpServer::serve(tcp::socket socket) {
   const Counted counted{connections_};
-  Connection connection{std::move(socket), clock_, guard_, router_};
+  Connection connection{std::move(socket), clock_, guard_, router_, strangers_};
   co_await (connection.talk() || connection.watch());
   if (!connection.wants_live()) co_return;
-  co_await serve_live(connection.take_stream(), connection.take_upgrade(), connection.actor(), live_);
+  co_await contained("page of " + connection.actor(),
+                     serve_live(connection.take_stream(), connection.take_upgrade(), connection.actor(), live_));
 }
 
 }  // namespace server

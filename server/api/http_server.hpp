@@ -1,15 +1,20 @@
 // The HTTP port: accepts connections, reads requests within limits, and answers through guard and router.
 //
-// Limits: 256 connections (503), header 16 kB (431), body 64 kB (413), 10 s for a request to arrive (408), 60 s idle,
+// Limits: 256 connections (below), header 16 kB (431), body 64 kB (413), 10 s for a request to arrive (408), 60 s idle,
 // 30 s for a client to take a piece of the answer. Malformed HTTP is 400 and the end of the connection. An exception of
 // a route is logged and answered with 500. An upgrade at /live becomes a LivePage.
+//
+// SAFETY: silent connections must not lock out a stop. When all 256 are taken, a new one replaces the oldest stranger,
+// that is a connection which has sent no request with a valid credential; it is refused (503) when there is none.
 // Loop thread. Outlives its connections, which are tasks of the group; everything it is given outlives it.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <cstdint>
+#include <list>
 
+#include "server/api/http_stream.hpp"
 #include "server/api/live_messages.hpp"
 #include "server/api/request_guard.hpp"
 #include "server/api/router.hpp"
@@ -36,6 +41,7 @@ class HttpServer {
 
  private:
   void on_connection(boost::asio::ip::tcp::socket socket);
+  bool make_room();  // false when everyone is known
   boost::asio::awaitable<void> serve(boost::asio::ip::tcp::socket socket);
 
   TaskGroup& tasks_;
@@ -45,6 +51,7 @@ class HttpServer {
   const Router& router_;
   LiveParts& live_;
   std::size_t connections_ = 0;
+  std::list<HttpStream*> strangers_;  // oldest first; each owned by its connection
 };
 
 }  // namespace server

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "server/api/contained.hpp"
 #include "server/api/emergency.hpp"
 #include "server/api/http.hpp"
 #include "server/api/json.hpp"
@@ -47,12 +48,12 @@ Result<RobotId> known_robot(const Members& message, const LiveParts& parts) {
 Result<void> on_emergency_stop(const Members& message, const std::string& actor, LiveParts& parts) {
   // SAFETY: a stop is obeyed also when the message carries members that nobody knows.
   if (message.has("robot_id") && message.object().at("robot_id").is_null()) {
-    parts.tasks.spawn("emergency stop", stop_all(parts, actor));
+    parts.tasks.spawn("emergency stop", contained("emergency stop", stop_all(parts, actor)));
     return {};
   }
   const auto robot_id = known_robot(message, parts);
   if (!robot_id) return std::unexpected{robot_id.error()};
-  parts.tasks.spawn("emergency stop", stop_one(parts, *robot_id, actor));
+  parts.tasks.spawn("emergency stop", contained("emergency stop", stop_one(parts, *robot_id, actor)));
   return {};
 }
 
@@ -75,7 +76,7 @@ Result<void> on_renew_lease(const Members& message, const std::string& actor, Li
   request.action.which_action = rheonaut_Command_renew_lease_tag;
   request.actor = actor;
   request.life = kRenewalLife - microseconds{age_us};
-  parts.tasks.spawn("lease renewal", renew(parts, std::move(request)));
+  parts.tasks.spawn("lease renewal", contained("lease renewal", renew(parts, std::move(request))));
   return {};
 }
 

@@ -49,13 +49,23 @@ class LivePage {
   }
 
  private:
+  // The boundary: a message that cannot be acted on ends neither the page nor the station.
+  Result<void> act_on(const std::string& text) {
+    try {
+      return on_page_message(text, actor_, parts_);
+    } catch (const std::exception& error) {
+      spdlog::error("a message of {}: {}", actor_, error.what());
+      return fail(ErrorCode::internal, "the station could not act on this message; its log says why", "internal");
+    }
+  }
+
   asio::awaitable<void> read() {
     beast::flat_buffer buffer{kMaxMessageBytes};
     for (;;) {
       const auto [error, size] = co_await socket_.async_read(buffer, asio::as_tuple(asio::use_awaitable));
       if (error) co_return;
       heard_at_us_ = parts_.clock.steady_us();
-      const auto understood = on_page_message(beast::buffers_to_string(buffer.data()), actor_, parts_);
+      const auto understood = act_on(beast::buffers_to_string(buffer.data()));
       buffer.clear();
       if (!understood) {
         queue_.push(std::make_shared<const std::string>(problem_message(understood.error())), true);

@@ -1,5 +1,6 @@
 // Robots, their commands, events and emergency stops.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "server/api/emergency.hpp"
 #include "server/api/routes.hpp"
@@ -61,19 +62,29 @@ Answer submit_command(ApiParts& parts, Request request) {
   co_return command_response(*record);
 }
 
+// An acknowledged stop is in force and answered at once; one that is kept must outlive whatever happens after the
+// answer, so it is on disk first.
 int stop_status(const CommandRecord& record) { return record.state == CommandState::acknowledged ? 200 : 202; }
 
 Answer emergency_stop(ApiParts& parts, Request request) {
   const auto record = co_await stop_robot(parts.station, request.param.at("robot_id"), request.actor);
   if (!record) co_return problem(record.error());
-  co_return json_response(stop_status(*record), to_json(*record));
+  const int status = stop_status(*record);
+  if (status == 202) co_await parts.history.settle();
+  co_return json_response(status, to_json(*record));
 }
 
 Answer emergency_stop_all(ApiParts& parts, Request request) {
-  const auto records = co_await stop_all_robots(parts.loop, parts.tasks, parts.station, request.actor);
+  const StopsOfAll stops = co_await stop_all_robots(parts.loop, parts.tasks, parts.station, request.actor);
   int status = 200;
-  for (const CommandRecord& record : records) status = std::max(status, stop_status(record));
-  co_return json_response(status, list_json("commands", records));
+  for (const CommandRecord& record : stops.records) status = std::max(status, stop_status(record));
+  if (status == 202) co_await parts.history.settle();
+  json body = list_json("commands", stops.records);
+  if (!stops.failed.empty()) {
+    co_return problem(500, fmt::format("the stop of {} failed; the log says why", fmt::join(stops.failed, ", ")),
+                      "internal", std::move(body));
+  }
+  co_return json_response(status, body);
 }
 
 Answer list_commands(ApiParts& parts, Request request) {

@@ -28,6 +28,13 @@ std::optional<SampleCursor> parse_cursor(const std::string& text) {
   return cursor;
 }
 
+// Text of many samples takes milliseconds: it is made on the readers' thread, never on the loop.
+std::string page_text(const SamplePage& page) {
+  json body = list_json("samples", page.samples);
+  body["next"] = page.next ? json(cursor_text(*page.next)) : json(nullptr);
+  return dump(body);
+}
+
 Answer list_samples(ApiParts& parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
@@ -38,11 +45,11 @@ Answer list_samples(ApiParts& parts, Request request) {
     after = parse_cursor(given->second);
     if (!after) co_return problem(400, "after is not the `next` of a page", "out_of_range");
   }
-  const auto page = co_await parts.history.samples(*id, after, static_cast<std::size_t>(*limit));
+  auto page = co_await parts.history.samples(*id, after, static_cast<std::size_t>(*limit));
   if (!page) co_return problem(page.error());
-  json body = list_json("samples", page->samples);
-  body["next"] = page->next ? json(cursor_text(*page->next)) : json(nullptr);
-  co_return json_response(200, body);
+  auto job = [page = std::move(*page)] { return page_text(page); };
+  std::string text = co_await parts.history.on_reader(std::move(job));
+  co_return json_text_response(200, std::move(text));
 }
 
 Answer list_gaps(ApiParts& parts, Request request) {
@@ -77,30 +84,35 @@ void append_csv(std::string& out, const StoredSample& stored) {
                  protocol::text(stored.mode), protocol::text(stored.sub_state), setpoint, stored.disturbance_m);
 }
 
+std::string csv_text(const SamplePage& page, std::string text) {
+  for (const StoredSample& sample : page.samples) append_csv(text, sample);
+  return text;
+}
+
 // The run page by page, so that memory does not grow with its length.
 class CsvStream final : public BodyStream {
  public:
   CsvStream(History& history, RunId run, SamplePage first) : history_{history}, run_{run}, page_{std::move(first)} {}
 
   asio::awaitable<Result<std::optional<std::string>>> next() override {
-    std::string text;
-    if (!begun_) {
-      begun_ = true;
-      text = kCsvHeader;
-    } else {
-      if (!page_.next) co_return std::optional<std::string>{};
-      auto page = co_await history_.samples(run_, page_.next, kCsvPage);
+    if (begun_) {
+      if (!next_) co_return std::optional<std::string>{};
+      auto page = co_await history_.samples(run_, next_, kCsvPage);
       if (!page) co_return std::unexpected{page.error()};
       page_ = std::move(*page);
     }
-    for (const StoredSample& sample : page_.samples) append_csv(text, sample);
+    next_ = page_.next;
+    auto job = [page = std::move(page_), header = begun_ ? "" : kCsvHeader] { return csv_text(page, header); };
+    begun_ = true;
+    std::string text = co_await history_.on_reader(std::move(job));
     co_return std::optional{std::move(text)};
   }
 
  private:
   History& history_;
   RunId run_;
-  SamplePage page_;
+  SamplePage page_;                   // the first, then the one being written
+  std::optional<SampleCursor> next_;  // of the page before
   bool begun_ = false;
 };
 

@@ -21,17 +21,30 @@ Answer get_station(ApiParts& parts, Request) {
 
 Answer get_openapi(ApiParts&, Request request) { co_return asset_response(request, openapi_document()); }
 
+// A link that lets one page in. Its address is the one that was asked, which RequestGuard knows to be ours.
+Answer make_login_link(ApiParts& parts, Request request) {
+  const std::string host = request.header("host");
+  const std::string url = login_url(host.empty() ? parts.facts.http_address : host, parts.auth.new_login_code());
+  co_return json_response(201, {{"url", url}, {"expires_at_us", parts.clock.utc_us() + kLoginCodeLife.count()}});
+}
+
 Answer log_in(ApiParts& parts, Request request) {
+  if (request.method == "HEAD") {  // whoever only looks, as previews of links do, does not use the code up
+    Response response = problem(405, "HEAD is not possible here", "method_not_allowed");
+    response.headers.emplace_back("Allow", "GET");
+    co_return response;
+  }
   const auto session = parts.auth.log_in(request.query["code"]);
   if (!session) {
-    co_return html_response(401,
-                            "<!doctype html><title>Rheonaut</title><p>This link was used already or is too old. Open "
-                            "the link that the station prints when it starts.");
+    co_return html_response(
+        401,
+        "<!doctype html><title>Rheonaut</title><p>This link was used already or is too old. Open "
+        "the link that the station prints when it starts, or make a new one: docs/api.md says how.");
   }
   Response response = html_response(303, "");
   response.headers.emplace_back("Location", "/");
   response.headers.emplace_back("Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age={}",
-                                                          kSessionCookie, *session, kSessionLife.count() / 1'000'000));
+                                                          kSessionCookie, *session, kCookieLife.count() / 1'000'000));
   co_return response;
 }
 
@@ -42,6 +55,10 @@ Answer live_without_upgrade(ApiParts&, Request) {
 }
 
 }  // namespace
+
+std::string login_url(const std::string& address, const std::string& code) {
+  return fmt::format("http://{}/login?code={}", address, code);
+}
 
 Result<std::int64_t> query_number(const Request& request, const std::string& name, std::int64_t minimum,
                                   std::int64_t maximum, std::int64_t fallback) {
@@ -69,6 +86,9 @@ void add_station_routes(Router& router, ApiParts& parts) {
   add("/live", {}, live_without_upgrade);
   add("/api/v1/station", {}, get_station);
   add("/api/v1/openapi.yaml", {}, get_openapi);
+  router.add({"POST", "/api/v1/login-links", {}, [&parts](Request request) {
+                return make_login_link(parts, std::move(request));
+              }});
   router.set_fallback(page_response);
 }
 

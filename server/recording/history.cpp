@@ -125,6 +125,8 @@ History::History(std::filesystem::path database, Recorder& recorder, WorkerThrea
 
 History::~History() = default;
 
+asio::awaitable<void> History::settle() { co_await recorder_.flush(); }
+
 template <class Query>
 asio::awaitable<std::invoke_result_t<Query, SQLite::Database&>> History::ask(Query query) {
   co_await recorder_.flush();

@@ -69,6 +69,15 @@ class History {
   boost::asio::awaitable<std::vector<CommandRecord>> commands(RobotId robot_id, std::size_t limit);
   boost::asio::awaitable<Result<CommandRecord>> command(CommandId id);
 
+  // Returns when everything that the recorder has heard is durable.
+  boost::asio::awaitable<void> settle();
+
+  // Runs job() on the readers' thread: for text that is made of what a query gave.
+  template <class Job>
+  boost::asio::awaitable<std::invoke_result_t<Job>> on_reader(Job job) {
+    co_return co_await readers_.run(std::move(job));
+  }
+
  private:
   template <class Query>
   boost::asio::awaitable<std::invoke_result_t<Query, SQLite::Database&>> ask(Query query);

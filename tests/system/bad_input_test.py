@@ -1,10 +1,12 @@
 """Bad input on both ports of a real station: each a clear refusal, and the station lives on."""
 import http.client
 import json
+import select
 import socket
+import struct
 import unittest
 
-from processes import lab
+from processes import lab, wait_until
 
 
 def varint(value):
@@ -30,6 +32,18 @@ def hello(version=1, robot_id=b"stranger", boot_id=99):
             + field(4, 1, boot_id.to_bytes(8, "little")))
     frame = field(1, 0, varint(1000)) + text_field(2, body)
     return varint(len(frame)) + frame
+
+
+def robot_frame(number, body):
+    frame = field(1, 0, varint(1000)) + text_field(number, body)
+    return varint(len(frame)) + frame
+
+
+def telemetry(disturbance_m):
+    """A framed Telemetry of one sample in manual."""
+    floats = b"".join(text_field(number, struct.pack("<f", 0)) for number in range(16, 22))
+    return robot_frame(4, field(2, 0, varint(1000)) + field(3, 0, varint(10000)) + field(5, 0, varint(1))
+                       + field(8, 5, struct.pack("<f", disturbance_m)) + floats)
 
 
 class BadInputTest(unittest.TestCase):
@@ -97,17 +111,14 @@ class BadInputTest(unittest.TestCase):
             connection.sendall(f"POST /api/v1/runs HTTP/1.1\r\nHost: {host}:{port}\r\nAuthorization: Bearer "
                                f"{self.station.token}\r\nContent-Type: application/json\r\n"
                                f"Content-Length: 10000000\r\n\r\n".encode())
-            try:
-                for _ in range(100):
-                    connection.sendall(b"x" * 100_000)
-            except OSError:
-                pass  # the station closed before it had it all
-            try:
-                answer = connection.recv(4096)
-            except OSError:
-                answer = b""
-        if answer:  # a reset may overtake the answer
-            self.assertIn(b" 413 ", answer.split(b"\r\n")[0])
+            for _ in range(100):  # a client that listens while it sends, and stops when it is answered
+                readable, writable, _ = select.select([connection], [connection], [], 20)
+                if readable:
+                    break
+                self.assertTrue(writable, "the station neither reads nor answers")
+                connection.send(b"x" * 100_000)
+            answer = connection.recv(4096)
+        self.assertIn(b" 413 ", answer.split(b"\r\n")[0])
 
     def robot_port(self, content):
         """Sends bytes to the robot port; returns what came back until the station closed."""
@@ -126,6 +137,31 @@ class BadInputTest(unittest.TestCase):
         self.assertEqual(self.robot_port(b"GET / HTTP/1.1\r\n\r\n" * 100), b"")
         self.assertEqual(self.robot_port(bytes(range(256)) * 64), b"")
         self.assertEqual(self.robot_port(b"\xff\x7f"), b"")
+
+    def test_telemetry_that_is_not_finite_ends_the_connection(self):
+        for robot_id, value in ((b"nan-1", float("nan")), (b"inf-1", float("inf"))):
+            with self.subTest(value=value):
+                host, port = self.station.endpoints["robots"].split(":")
+                with socket.create_connection((host, int(port)), timeout=20) as connection:
+                    connection.sendall(hello(robot_id=robot_id, boot_id=4712))
+                    self.assertTrue(connection.recv(4096), "the robot is welcome")
+                    connection.sendall(telemetry(value))
+                    self.assertTrue(self.closes_while_it_hears_heartbeats(connection))
+                wait_until(lambda: self.station.robot(robot_id.decode())["link"] == "disconnected", 20, "the end of the link")
+
+    def closes_while_it_hears_heartbeats(self, connection):
+        """So that silence is no reason to close."""
+        connection.settimeout(0.2)
+        for _ in range(50):
+            try:
+                connection.sendall(robot_frame(3, b""))
+                if not connection.recv(4096):
+                    return True
+            except TimeoutError:
+                continue
+            except (ConnectionResetError, BrokenPipeError):
+                return True
+        return False
 
     def test_another_protocol_version_is_refused_with_the_reason(self):
         answer = self.robot_port(hello(version=7))

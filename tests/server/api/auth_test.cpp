@@ -96,13 +96,13 @@ TEST_F(AuthTest, ASessionOutlivesTheStation) {
     EXPECT_EQ(auth.actor_of_session(*auth.log_in(auth.new_login_code())), "session:2");
   }
   clock.run_for(12h);
-  const Auth late{clock, folder.path()};
+  Auth late{clock, folder.path()};
   EXPECT_FALSE(late.actor_of_session(session));
 }
 
 TEST_F(AuthTest, ADamagedSessionFileLetsNobodyIn) {
   std::ofstream{folder.path() / "rheonaut.sessions"} << "1 99999999999999999 zz\n2 99999999999999999\n";
-  const Auth auth{clock, folder.path()};
+  Auth auth{clock, folder.path()};
   EXPECT_FALSE(auth.actor_of_session(""));
 }
 
@@ -113,10 +113,42 @@ TEST_F(AuthTest, CodesAndSessionsEndInTime) {
   EXPECT_FALSE(auth.log_in(late));
   const auto session = auth.log_in(auth.new_login_code());
   ASSERT_TRUE(session);
-  clock.run_for(12h - 1s);
-  EXPECT_TRUE(auth.actor_of_session(*session));
-  clock.run_for(1s);
+  clock.run_for(12h);
   EXPECT_FALSE(auth.actor_of_session(*session));
+}
+
+TEST_F(AuthTest, ASessionInUseIsRenewed) {
+  const auto saved = [this] {
+    std::ifstream in{folder.path() / "rheonaut.sessions"};
+    return std::string{std::istreambuf_iterator<char>{in}, {}};
+  };
+  std::string session;
+  {
+    Auth auth{clock, folder.path()};
+    session = *auth.log_in(auth.new_login_code());
+    const std::string first = saved();
+    clock.run_for(59min);
+    EXPECT_TRUE(auth.actor_of_session(session));
+    EXPECT_EQ(saved(), first) << "saved at most once an hour";
+    clock.run_for(12h - 1s);
+    EXPECT_TRUE(auth.actor_of_session(session));
+    EXPECT_NE(saved(), first);
+  }
+  clock.run_for(12h - 1s);
+  Auth restarted{clock, folder.path()};
+  EXPECT_TRUE(restarted.actor_of_session(session));
+  clock.run_for(12h);
+  EXPECT_FALSE(restarted.actor_of_session(session));
+}
+
+TEST_F(AuthTest, ASessionThatCannotBeSavedIsRenewedAllTheSame) {
+  Auth auth{clock, folder.path()};
+  const auto session = auth.log_in(auth.new_login_code());
+  std::filesystem::remove_all(folder.path());
+  for (int i = 0; i < 4; ++i) {
+    clock.run_for(6h);
+    EXPECT_TRUE(auth.actor_of_session(*session));
+  }
 }
 
 TEST_F(AuthTest, ForgetsTheOldestWhenThereAreTooMany) {

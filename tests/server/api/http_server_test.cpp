@@ -72,6 +72,22 @@ TEST_F(HttpServerTest, TheLoginLinkGivesACookieOnce) {
   EXPECT_TRUE(with_cookie.starts_with("HTTP/1.1 200")) << with_cookie;
 }
 
+TEST_F(HttpServerTest, WhoIsInMakesALinkForAnotherPageAndALookDoesNotUseItUp) {
+  const std::string made = talk(head("POST /api/v1/login-links", "Connection: close\r\n"));
+  ASSERT_TRUE(made.starts_with("HTTP/1.1 201 ")) << made;
+  const json link = json::parse(made.substr(made.find("\r\n\r\n")));
+  EXPECT_EQ(link["expires_at_us"], clock.utc_us() + 600'000'000);
+  const std::string url = link["url"];
+  ASSERT_TRUE(url.starts_with("http://localhost/login?code=")) << url;
+  const std::string rest =
+      " " + url.substr(url.find("/login")) + " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+  EXPECT_TRUE(talk("HEAD" + rest).starts_with("HTTP/1.1 405 "));
+  EXPECT_TRUE(talk("GET" + rest).starts_with("HTTP/1.1 303 "));
+  EXPECT_TRUE(talk("GET" + rest).starts_with("HTTP/1.1 401 "));
+  const std::string stranger = "POST /api/v1/login-links HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+  EXPECT_TRUE(talk(stranger).starts_with("HTTP/1.1 401 "));
+}
+
 TEST_F(HttpServerTest, RefusesAWrongHost) {
   const std::string answer = talk("GET / HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n");
   EXPECT_TRUE(answer.starts_with("HTTP/1.1 421")) << answer;
@@ -192,9 +208,33 @@ TEST_F(HttpServerTest, CsvIsChunkedOrEndsWithTheConnection) {
   EXPECT_TRUE(plain.ends_with(",4999,0,0,0,0,0,manual,none,,0\n"));
 }
 
-TEST_F(HttpServerTest, TooManyConnectionsAre503) {
+TEST_F(HttpServerTest, SilentConnectionsDoNotKeepAStopOut) {
+  connect_robot();
+  RawClient known{clock, api->port()};  // the oldest, but it has shown the token
+  known.send(head("GET /api/v1/station"));
+  known.read_until("}");
+  std::vector<std::unique_ptr<RawClient>> silent;
+  for (std::size_t i = 1; i < kMaxConnections + 40; ++i) {
+    silent.push_back(std::make_unique<RawClient>(clock, api->port()));
+  }
+  RawClient person{clock, api->port()};
+  person.send(head("POST /api/v1/robots/r1/emergency-stop"));
+  ASSERT_EQ(robot->commands().size(), 1U);
+  robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_ACCEPTED, 99);
+  clock.settle();
+  EXPECT_TRUE(person.read_until("\r\n").starts_with("HTTP/1.1 200 "));
+  EXPECT_TRUE(silent.front()->closed());
+  EXPECT_FALSE(silent.back()->closed());
+  EXPECT_FALSE(known.closed());
+}
+
+TEST_F(HttpServerTest, TooManyConnectionsOfKnownPeopleAre503) {
   std::vector<std::unique_ptr<RawClient>> idle;
-  for (std::size_t i = 0; i < kMaxConnections; ++i) idle.push_back(std::make_unique<RawClient>(clock, api->port()));
+  for (std::size_t i = 0; i < kMaxConnections; ++i) {
+    idle.push_back(std::make_unique<RawClient>(clock, api->port()));
+    idle.back()->send(head("GET /api/v1/robots"));
+    idle.back()->read_until("{\"robots\":[]}");
+  }
   EXPECT_TRUE(RawClient(clock, api->port()).read_to_end().starts_with("HTTP/1.1 503 "));
   idle.pop_back();
   clock.settle();
@@ -233,6 +273,53 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
     EXPECT_FALSE(says(answer, "secret"));
   }
   EXPECT_EQ(tasks.exit_code(), 0);
+  tasks.stop();
+  clock.settle();
+}
+
+// The station's clock, until it breaks.
+class BrokenClock final : public Clock {
+ public:
+  explicit BrokenClock(Clock& clock) : clock_{clock} {}
+  std::int64_t steady_us() const override { throw std::runtime_error{"the clock is broken"}; }
+  std::int64_t utc_us() const override { return clock_.utc_us(); }
+  boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us) override {
+    return clock_.sleep_until(deadline_us);
+  }
+
+ private:
+  Clock& clock_;
+};
+
+TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
+  TemporaryFolder folder;
+  boost::asio::io_context loop{1};
+  VirtualClock clock{loop};
+  BrokenClock broken{clock};
+  TaskGroup tasks{loop};
+  Station station{loop, clock, CommandLimits{}, LinkTimes{}};
+  LiveFeed feed{clock};
+  LiveParts live{loop, tasks, broken, station, feed, "0"};
+  Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
+  Auth auth{clock, folder.path()};
+  const RequestGuard guard{auth, {}};
+  const Router router;
+  HttpServer server{tasks, clock, listener, guard, router, live};
+  tasks.spawn("http", server.run());
+  const auto session = auth.log_in(auth.new_login_code());
+  {
+    RawClient client{clock, listener.endpoint().port()};
+    client.send(
+        "GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        "Cookie: rheonaut_session=" +
+        *session + "\r\n\r\n");
+    client.read_to_end();
+    EXPECT_TRUE(client.closed());
+  }
+  EXPECT_EQ(tasks.exit_code(), 0);
+  EXPECT_FALSE(tasks.stopping());
+  EXPECT_EQ(server.connections(), 0U);
   tasks.stop();
   clock.settle();
 }

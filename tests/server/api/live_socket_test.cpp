@@ -202,6 +202,38 @@ TEST_F(LiveSocketTest, KeepsAPageThatAnswersPings) {
   EXPECT_FALSE(page->closed());
 }
 
+// While it is broken it throws at everything that becomes of a command.
+class BrokenSink final : public StationSink {
+ public:
+  void on_robot(const RobotState&) override {}
+  void on_samples(const RobotState&, const SampleBatch&) override {}
+  void on_event(const RobotState&, const RobotEvent&) override {}
+  void on_command(const CommandRecord&) override {
+    if (is_broken) throw std::runtime_error{"the sink is broken"};
+  }
+  bool is_broken = false;
+};
+
+TEST_F(LiveSocketTest, AnExceptionBehindAMessageEndsNeitherPageNorStation) {
+  connect_robot();
+  static BrokenSink sink;  // outlives the station
+  sink.is_broken = true;
+  station.add_sink(sink);
+  const auto page = open_page();
+  page->hear("welcome");
+  page->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
+  page->say({{"type", "emergency_stop"}, {"robot_id", nullptr}});
+  page->say({{"type", "renew_lease"}, {"robot_id", "r1"}, {"stamp_us", clock.steady_us()}});
+  EXPECT_FALSE(tasks.stopping());
+  EXPECT_EQ(tasks.exit_code(), 0);
+  page->say_text("nonsense");
+  EXPECT_EQ(page->hear("problem")["problem"]["reason"], "malformed_json");
+  const Answered answered = ask("POST", "/api/v1/emergency-stop");
+  sink.is_broken = false;
+  EXPECT_EQ(answered.status, 500) << answered.body;
+  EXPECT_NE(answered.parsed()["detail"].get<std::string>().find("r1"), std::string::npos) << answered.body;
+}
+
 TEST_F(LiveSocketTest, EndsWhenTheStationStopsAndWhenThePageLeaves) {
   {
     const auto leaving = open_page();

@@ -1,4 +1,8 @@
 // Robots, commands, stops and runs through the routes, with the real station and recorder and a hand-made robot.
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <ctime>
+
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -7,6 +11,14 @@ namespace {
 class RoutesTest : public ApiTest {
  protected:
   const json ping{{"kind", "ping"}};
+
+  // What a station would find that was started now, after a kill.
+  int stops_on_disk() const {
+    const SQLite::Database database{(folder.path() / "station.sqlite").string(), SQLite::OPEN_READONLY};
+    SQLite::Statement count{database, "SELECT count(*) FROM command WHERE kind = 'emergency_stop'"};
+    count.executeStep();
+    return count.getColumn(0).getInt();
+  }
 };
 
 TEST_F(RoutesTest, StationSaysWhatItIs) {
@@ -118,6 +130,25 @@ TEST_F(RoutesTest, AStopThatNobodyAnswersIs202) {
   EXPECT_EQ(ask("POST", "/api/v1/robots/r1/emergency-stop").status, 202);
 }
 
+TEST_F(RoutesTest, AKeptStopIsOnDiskBeforeItIsAnswered) {
+  station.restore({{"r2", 0, 0}, {"r3", 0, 0}}, {});
+  ASSERT_EQ(ask("POST", "/api/v1/robots/r2/emergency-stop").status, 202);
+  EXPECT_EQ(stops_on_disk(), 1);
+  ASSERT_EQ(ask("POST", "/api/v1/emergency-stop").status, 202);
+  EXPECT_GE(stops_on_disk(), 2);
+}
+
+TEST_F(RoutesTest, AnAcknowledgedStopDoesNotWaitForTheDisk) {
+  connect_robot();
+  clock.run_for(500ms);
+  const auto asked = begin("POST", "/api/v1/robots/r1/emergency-stop");
+  const auto commits = recorder.counters().commits;
+  robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_ACCEPTED, 99);
+  clock.settle();
+  EXPECT_EQ(end(asked).status, 200);
+  EXPECT_EQ(recorder.counters().commits, commits);
+}
+
 TEST_F(RoutesTest, StopAllReachesEveryRobotBeforeItWaitsForAny) {
   connect_robot();
   station.restore({{"a-silent-one", 0, 0}, {"r2", 0, 0}}, {});
@@ -179,6 +210,57 @@ TEST_F(RoutesTest, CsvOfALongRunComesInPieces) {
   for (std::uint64_t seq = 0; seq < 5000; seq += 25) make_samples(*robot, seq, 25);
   const std::string path = "/api/v1/runs/" + std::to_string(created.parsed()["run_id"].get<int>());
   EXPECT_EQ(std::ranges::count(ask("GET", path + "/samples.csv").body, '\n'), 5001);
+}
+
+// How long this thread has worked.
+std::int64_t worked_us() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return time.tv_sec * 1'000'000 + time.tv_nsec / 1000;
+}
+
+boost::asio::awaitable<void> fetch(const Router& router, std::string target, std::optional<std::string>& into) {
+  Request request;
+  request.method = "GET";
+  request.target = std::move(target);
+  Response response = co_await router.dispatch(std::move(request));
+  std::string text = std::move(response.body);
+  if (response.stream != nullptr) {
+    const auto piece = co_await response.stream->next();
+    if (piece && *piece) text = **piece;
+  }
+  into = std::move(text);
+}
+
+// The longest that the loop worked without a break is small beside the reading of the same text.
+TEST_F(RoutesTest, TheTextOfManySamplesIsNotMadeOnTheLoop) {
+  connect_robot();
+  ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "long"}});
+  for (std::uint64_t seq = 0; seq < 10'000; seq += 25) make_samples(*robot, seq, 25);
+  const auto longest_us = [&](const char* target, std::string& text) {
+    std::optional<std::string> answer;
+    tasks.spawn("fetch", fetch(api->router(), target, answer));
+    std::int64_t longest = 0;
+    const auto patience = std::chrono::steady_clock::now() + 60s;
+    while (!answer && std::chrono::steady_clock::now() < patience) {
+      const std::int64_t before_us = worked_us();
+      loop.poll_one();
+      longest = std::max(longest, worked_us() - before_us);
+    }
+    text = answer.value_or("");
+    return longest;
+  };
+  ask("GET", "/api/v1/runs/1/samples?limit=1");  // commits the samples
+  std::string text;
+  const std::int64_t json_us = longest_us("/api/v1/runs/1/samples?limit=10000", text);
+  const std::int64_t before_us = worked_us();
+  const json page = json::parse(text);
+  const std::int64_t parse_us = worked_us() - before_us;
+  EXPECT_EQ(page["samples"].size(), 10'000U);
+  EXPECT_LT(json_us, parse_us / 4);
+  const std::int64_t csv_us = longest_us("/api/v1/runs/1/samples.csv", text);
+  EXPECT_EQ(std::ranges::count(text, '\n'), 2001);
+  EXPECT_LT(csv_us, parse_us / 20);  // a fifth of the samples
 }
 
 TEST_F(RoutesTest, BadRunRequestsAreRefused) {
