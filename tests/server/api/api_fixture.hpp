@@ -53,8 +53,8 @@ class ApiTest : public ::testing::Test {
   std::string token() const;
 
   TemporaryFolder folder;
-  WorkerThread disk{"disk"}, readers{"readers"}, maths{"maths"};
   boost::asio::io_context loop{1};
+  WorkerThread disk{"disk"}, readers{"readers"}, maths{"maths"};
   VirtualClock clock{loop};
   TaskGroup tasks{loop};
   Station station{loop, clock, CommandLimits{}, LinkTimes{}};
