@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstring>
@@ -14,6 +15,7 @@
 namespace server {
 
 DataFolder::DataFolder(std::filesystem::path path) : path_{std::move(path)} {
+  umask(077);  // of the whole program: SQLite's files, tokens and logs are for this user only, also in an open folder
   std::error_code error;
   const bool made = std::filesystem::create_directories(path_, error);
   if (error)

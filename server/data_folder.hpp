@@ -13,6 +13,7 @@ namespace server {
 
 class DataFolder {
  public:
+  // Also takes from everyone else the rights on whatever the program makes from now on (umask).
   // Throws std::runtime_error that names the folder: it cannot be made, or another station runs in it.
   explicit DataFolder(std::filesystem::path path);
   ~DataFolder();  // removes endpoints.json

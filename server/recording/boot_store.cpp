@@ -51,9 +51,35 @@ void add_intervals(SQLite::Database& database, const char* sql, std::int64_t boo
 
 std::vector<RestoredRobot> BootStore::robots() {
   std::vector<RestoredRobot> robots;
-  SQLite::Statement query{database_.handle(), "SELECT robot_id FROM robot ORDER BY robot_id"};
-  while (query.executeStep()) robots.push_back({query.getColumn(0).getString(), 0, 0});
+  SQLite::Statement query{database_.handle(),
+                          "SELECT robot.robot_id, boot_key, boot_id FROM robot LEFT JOIN boot ON boot_key ="
+                          " (SELECT max(boot_key) FROM boot WHERE boot.robot_id = robot.robot_id)"
+                          " ORDER BY robot.robot_id"};
+  while (query.executeStep()) {
+    const std::int64_t boot_key = query.getColumn(1).getInt64();  // 0 when it has none
+    robots.push_back({query.getColumn(0).getString(), unsigned_id(query.getColumn(2)), last_emergency(boot_key)});
+  }
   return robots;
+}
+
+// A change of the latch is an event and begins a new segment: whichever of the two is later tells. A stop's event is
+// the earlier one where its samples have arrived, and the only one where they have not.
+std::uint64_t BootStore::last_emergency(std::int64_t boot_key) {
+  SQLite::Statement event{database_.handle(),
+                          "SELECT robot_time_us, iif(kind = 'emergency', emergency_id, 0) FROM event"
+                          " WHERE boot_key = ? AND event_seq IS NOT NULL AND kind IN ('emergency', 'emergency_cleared')"
+                          " ORDER BY event_seq DESC LIMIT 1"};
+  SQLite::Statement segment{database_.handle(),
+                            "SELECT first_robot_time_us, emergency_id FROM segment"
+                            " WHERE boot_key = ? ORDER BY first_seq DESC LIMIT 1"};
+  bind_all(event, boot_key);
+  bind_all(segment, boot_key);
+  const bool has_event = event.executeStep();
+  const bool has_segment = segment.executeStep();
+  const bool event_is_later =
+      has_event && (!has_segment || event.getColumn(0).getInt64() >= segment.getColumn(0).getInt64());
+  if (event_is_later) return unsigned_id(event.getColumn(1));
+  return has_segment ? unsigned_id(segment.getColumn(1)) : 0;
 }
 
 AdmissionOutcome BootStore::admit(const AdmissionRequest& request, bool enrol_on_loopback, bool with_intervals) {

@@ -39,6 +39,7 @@ class BootStore {
  public:
   explicit BootStore(Database& database) : database_{database} {}
 
+  // Every robot, with its latest boot and the latch that boot was last known to be in.
   std::vector<RestoredRobot> robots();
 
   // Checks robot, token and boot; remembers a new robot or boot, durably. With `with_intervals` false, what is stored
@@ -51,6 +52,7 @@ class BootStore {
 
  private:
   Admission check_robot(const AdmissionRequest& request, bool enrol_on_loopback);
+  std::uint64_t last_emergency(std::int64_t boot_key);
   std::int64_t remember_boot(const AdmissionRequest& request);
   StoredBoot load(std::int64_t boot_key, bool with_intervals);
   void end(std::int64_t boot_key, std::int64_t noticed_at_us);

@@ -14,7 +14,7 @@
 namespace server {
 namespace {
 
-constexpr int kBusyTimeoutMs = 5000;
+constexpr int kBusyTimeoutMs = 1000;  // of another program's lock; short, for all other jobs of the disk thread wait
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
   throw std::runtime_error{fmt::format(

@@ -129,7 +129,6 @@ asio::awaitable<void> History::settle() { co_await recorder_.flush(); }
 
 template <class Query>
 asio::awaitable<std::invoke_result_t<Query, SQLite::Database&>> History::ask(Query query) {
-  co_await recorder_.flush();
   auto job = [this, query = std::move(query)]() mutable {
     if (!database_) database_ = std::make_unique<SQLite::Database>(open_for_reading(path_));
     return query(*database_);
@@ -145,6 +144,7 @@ asio::awaitable<Result<SamplePage>> History::samples(RunId run, std::optional<Sa
     if (!run_exists(database, run)) return std::unexpected{no_such_run(run)};
     return read_page(database, read_spans(database, run, after ? after->span : 0), after, limit);
   };
+  co_await recorder_.flush();
   co_return co_await ask(std::move(query));
 }
 
@@ -153,6 +153,7 @@ asio::awaitable<Result<std::vector<Gap>>> History::gaps(RunId run) {
     if (!run_exists(database, run)) return std::unexpected{no_such_run(run)};
     return read_gaps(database, read_spans(database, run, 0));
   };
+  co_await recorder_.flush();
   co_return co_await ask(std::move(query));
 }
 
@@ -164,6 +165,7 @@ asio::awaitable<std::vector<RobotEvent>> History::events(RobotId robot_id, std::
     while (rows.executeStep()) events.push_back(event_from(rows));
     return events;
   };
+  co_await recorder_.flush_records();
   co_return co_await ask(std::move(query));
 }
 
@@ -175,6 +177,7 @@ asio::awaitable<std::vector<CommandRecord>> History::commands(RobotId robot_id, 
     while (rows.executeStep()) commands.push_back(command_from(rows));
     return commands;
   };
+  co_await recorder_.flush_records();
   co_return co_await ask(std::move(query));
 }
 
@@ -185,6 +188,7 @@ asio::awaitable<Result<CommandRecord>> History::command(CommandId id) {
     if (!row.executeStep()) return fail(ErrorCode::not_found, fmt::format("there is no command {}", id));
     return command_from(row);
   };
+  co_await recorder_.flush_records();
   co_return co_await ask(std::move(query));
 }
 

@@ -1,7 +1,8 @@
 // What was recorded, for people and programs: samples of a run, events, commands, gaps.
 //
 // Loop thread; the queries run on a worker with a read-only connection, each a page, so no read transaction lives long.
-// A query first lets the recorder commit what it has received, so an answer holds everything up to its question.
+// A query first lets the recorder commit what it has received (only queries of samples and gaps the samples), so an
+// answer holds everything up to its question; while the disk fails it comes after 3 s, with what is stored.
 // Needs a running Recorder, which has opened the database; recorder and worker outlive it.
 #pragma once
 

@@ -4,8 +4,11 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <boost/asio/experimental/awaitable_operators.hpp>
-#include <unordered_map>
+#include <cmath>
+#include <iterator>
+#include <variant>
 
 #include "server/recording/stored_rows.hpp"
 
@@ -21,12 +24,23 @@ constexpr microseconds kGroupAge = 1s;         // a robot's samples wait at most
 constexpr microseconds kHolePatience = 500ms;  // before a hole that does not shrink is asked for
 constexpr microseconds kAskInterval = 1s;
 constexpr microseconds kOverflowLogInterval = 10s;
+constexpr microseconds kRetryInterval = 1s;  // after a commit that failed
+constexpr microseconds kFailureLogInterval = 10s;
+constexpr microseconds kFlushPatience = 3s;
 constexpr microseconds kKeepUnused = 60s;         // a boot's bookkeeping, after its last admission
 constexpr std::uint64_t kMaxNumber = 1ULL << 62;  // of a sample, or microseconds: far from SQLite's signed limit
+constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
 
+// What a table would refuse (NULL in a NOT NULL column) or no robot can mean. One such value in a commit would keep
+// everything behind it from being stored.
 bool is_malformed(const SampleBatch& batch) {
-  return batch.samples.empty() || batch.first_seq >= kMaxNumber || batch.oldest_seq >= kMaxNumber ||
-         batch.first_robot_time_us >= kMaxNumber;
+  const SampleContext& context = batch.context;
+  const bool numbers = batch.first_seq < kMaxNumber && batch.oldest_seq < kMaxNumber &&
+                       batch.first_robot_time_us < kMaxNumber && context.period_us > 0 &&
+                       context.period_us <= kMaxPeriodUs;
+  const bool finite = std::isfinite(context.disturbance_m) && std::isfinite(context.position_sd_m) &&
+                      std::isfinite(context.setpoint_m.value_or(0));
+  return batch.samples.empty() || !numbers || !finite;
 }
 
 }  // namespace
@@ -49,33 +63,77 @@ asio::awaitable<RestoredState> Recorder::open() {
 asio::awaitable<void> Recorder::run() {
   for (;;) {
     co_await wait_for_commit();
-    const auto served = std::exchange(flushes_, {});
-    co_await commit(!served.empty());
-    for (const auto& flushed : served) flushed->notify();
+    if (!writing_.empty()) co_await write();  // the same content, until it is stored
+    if (failing()) continue;
+    std::vector<Flush> served = std::exchange(flushes_, {});
+    if (!served.empty()) last_flush_us_ = clock_.steady_us();
+    take(std::ranges::any_of(served, &Flush::samples));
+    co_await write();
+    if (failing()) {
+      std::ranges::move(served, std::back_inserter(flushes_));
+      continue;
+    }
+    for (const Flush& flush : served) {
+      if (const auto done = flush.done.lock()) done->notify();
+    }
     ask_for_missing();
     forget_unused();
   }
 }
 
 asio::awaitable<void> Recorder::wait_for_commit() {
+  if (failing()) {
+    co_await clock_.sleep_until(retry_at_us_);
+    co_return;
+  }
   if (boots_.empty() && queue_.empty() && flushes_.empty()) {
     idle_ = true;
     co_await work_.wait();
     idle_ = false;
   }
-  if (flushes_.empty()) {
-    co_await (clock_.sleep_until(last_commit_us_ + kCommitInterval.count()) || flush_wanted_.wait());
+  const std::int64_t regular_us = last_commit_us_ + kCommitInterval.count();
+  while (flushes_.empty() && clock_.steady_us() < regular_us) {
+    co_await (clock_.sleep_until(regular_us) || flush_wanted_.wait());
   }
+  const std::int64_t next_flush_us = last_flush_us_ + kCommitInterval.count();
+  if (!flushes_.empty() && clock_.steady_us() < next_flush_us) co_await clock_.sleep_until(next_flush_us);
   last_commit_us_ = clock_.steady_us();
 }
 
-asio::awaitable<void> Recorder::commit(bool everything) {
-  if (writing_.empty()) take(everything);
+asio::awaitable<void> Recorder::write() {
   if (writing_.empty()) co_return;
-  auto job = [this] { store_->write(writing_); };
-  co_await disk_.run(std::move(job));
+  auto job = [this] { return try_to_write(); };
+  const std::string problem = co_await disk_.run(std::move(job));
+  if (!problem.empty()) {
+    note_failure(problem);
+    co_return;
+  }
+  if (failing()) spdlog::info("recording goes on: what had waited for the disk is stored");
+  retry_at_us_ = 0;
   const WriteBatch written = std::exchange(writing_, {});
   set_durable(written);
+}
+
+std::string Recorder::try_to_write() {
+  try {
+    store_->write(writing_);
+    return {};
+  } catch (const std::exception& error) {  // disk full, locked, unreadable: never a reason to end the emergency stop
+    return error.what();
+  }
+}
+
+void Recorder::note_failure(const std::string& problem) {
+  const std::int64_t now_us = clock_.steady_us();
+  ++counters_.commits_failed;
+  if (!failing() || now_us - failure_logged_us_ >= kFailureLogInterval.count()) {
+    failure_logged_us_ = now_us;
+    spdlog::error(
+        "nothing is recorded now, {} cannot be written: {}. Make room on the disk, or end the program that holds the "
+        "file; it is tried again every second, and the robots keep what they can",
+        options_.path.string(), problem);
+  }
+  retry_at_us_ = now_us + kRetryInterval.count();
 }
 
 void Recorder::take(bool everything) {
@@ -85,6 +143,7 @@ void Recorder::take(bool everything) {
     boot.recording.take(queue_, now_us, at_once ? 0 : kGroupAge.count());
   }
   writing_ = std::exchange(queue_, {});
+  queued_commands_.clear();
 }
 
 void Recorder::set_durable(const WriteBatch& written) {
@@ -138,23 +197,42 @@ void Recorder::forget_unused() {
   });
 }
 
-asio::awaitable<void> Recorder::flush() {
-  const auto flushed = std::make_shared<Signal>(loop_);
-  flushes_.push_back(flushed);
+asio::awaitable<bool> Recorder::flush() { co_return co_await flush(true); }
+
+asio::awaitable<bool> Recorder::flush_records() { co_return co_await flush(false); }
+
+asio::awaitable<bool> Recorder::flush(bool samples) {
+  const auto done = std::make_shared<Signal>(loop_);
+  flushes_.push_back({done, samples});
   flush_wanted_.notify();
   wake();
-  co_await flushed->wait();
+  const std::variant<std::monostate, std::monostate> first =
+      co_await (done->wait() || clock_.sleep_for(kFlushPatience));
+  co_return first.index() == 0;
 }
 
 void Recorder::close() {
   if (!store_) return;
-  if (!writing_.empty()) store_->write(writing_);  // a commit that was cancelled before it began
-  writing_ = {};
-  take(true);
-  if (!writing_.empty()) store_->write(writing_);
+  std::string problem = writing_.empty() ? "" : try_to_write();  // a commit that failed, or was cancelled
+  if (problem.empty()) {
+    writing_ = {};
+    take(true);
+    if (!writing_.empty()) problem = try_to_write();
+  }
+  if (!problem.empty()) {
+    spdlog::error(
+        "the last {} samples, {} events and {} commands could not be written into {}: {}. Robots send again what they "
+        "still hold",
+        queued_samples_, writing_.events.size() + queue_.events.size(),
+        writing_.commands.size() + queue_.commands.size(), options_.path.string(), problem);
+  }
   writing_ = {};
   store_.reset();
-  database_->checkpoint();
+  try {
+    database_->checkpoint();
+  } catch (const std::exception& error) {  // only the log stays longer: it is read at the next start
+    spdlog::warn("the write-ahead log of {} could not be emptied: {}", options_.path.string(), error.what());
+  }
   database_.reset();
 }
 
@@ -175,7 +253,14 @@ asio::awaitable<Admission> Recorder::admit(AdmissionRequest request) {
   const Admitting admitting{boot.admissions};
   wake();
   auto job = [request, enrol = options_.enrol_on_loopback, load = !boot.recording.loaded()](Database& database) {
-    return BootStore{database}.admit(request, enrol, load);
+    try {
+      return BootStore{database}.admit(request, enrol, load);
+    } catch (const std::exception& error) {
+      AdmissionOutcome busy;
+      busy.admission.refusal = rheonaut_REFUSAL_REASON_STATION_BUSY;
+      busy.admission.detail = fmt::format("the station's database cannot be used now: {}; try again", error.what());
+      return busy;
+    }
   };
   AdmissionOutcome outcome = co_await on_disk(std::move(job));
   co_return take_in(boot, std::move(outcome), request);
@@ -281,7 +366,13 @@ void Recorder::on_event(const RobotState&, const RobotEvent& event) {
 }
 
 void Recorder::on_command(const CommandRecord& command) {
-  if (!room_for_record()) return;
+  if (const auto queued = queued_commands_.find(command.id); queued != queued_commands_.end()) {
+    queue_.commands[queued->second] = command;
+    return;
+  }
+  // SAFETY: a stop must be known after a restart, so it is recorded whatever waits.
+  if (command.kind != "emergency_stop" && !room_for_record()) return;
+  queued_commands_.emplace(command.id, queue_.commands.size());
   queue_.commands.push_back(command);
   wake();
 }

@@ -7,6 +7,10 @@
 //
 // Overflow: when the queue is full a batch is neither queued nor acknowledged; the robot still holds it, and it is
 // asked for again (set_on_missing's function) once the queue has drained. Missing samples are asked for the same way.
+// Events and commands beyond the limit are counted and not recorded, but an emergency stop always is.
+//
+// A disk that fails (full, locked by another program) never ends the station: what could not be written is kept, not
+// acknowledged, and tried again every second; everything behind it waits in the queue.
 //
 // Loop thread; SQL on the disk thread. The loop, the clock and the worker outlive it; runs and history use it. When it
 // is destroyed no job of it may be under way, that is: the loop's run() has returned.
@@ -18,7 +22,9 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <string>
 #include <type_traits>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -53,6 +59,7 @@ struct RecorderCounters {
   std::uint64_t records_refused = 0;  // events and commands that the full queue did not take
   std::uint64_t batches_malformed = 0;
   std::uint64_t commits = 0;
+  std::uint64_t commits_failed = 0;  // each was, or is being, tried again
 };
 
 class Recorder final : public StationSink, public RobotArchive {
@@ -72,10 +79,14 @@ class Recorder final : public StationSink, public RobotArchive {
   // Commits and asks for what is missing, until cancelled.
   boost::asio::awaitable<void> run();
 
-  // Returns when everything heard so far is durable. Needs run().
-  boost::asio::awaitable<void> flush();
+  // Returns true when everything heard so far is durable, and false after 3 s if it is not yet. Flushes are at least
+  // 100 ms apart: one that comes sooner waits for the rest of it. It cuts segments short, so it is for readers of
+  // samples. Needs run().
+  boost::asio::awaitable<bool> flush();
+  // The same for events and commands; samples go on waiting for a full segment.
+  boost::asio::awaitable<bool> flush_records();
 
-  // After the loop has ended: writes and commits everything left.
+  // After the loop has ended: writes and commits everything left, or logs what could not be written. Does not throw.
   void close();
 
   boost::asio::awaitable<Admission> admit(AdmissionRequest request) override;
@@ -98,6 +109,8 @@ class Recorder final : public StationSink, public RobotArchive {
   boost::asio::io_context& loop() { return loop_; }
   const RecorderCounters& counters() const { return counters_; }
   std::size_t queued_samples() const { return queued_samples_; }
+  // The last commit failed: nothing becomes durable now.
+  bool failing() const { return retry_at_us_ != 0; }
 
  private:
   struct Boot {
@@ -113,8 +126,17 @@ class Recorder final : public StationSink, public RobotArchive {
   };
   using Boots = std::map<BootId, Boot>;
 
+  // A coroutine waits until everything before it is stored, or does no longer.
+  struct Flush {
+    std::weak_ptr<Signal> done;
+    bool samples = false;  // and not only events and commands
+  };
+
   boost::asio::awaitable<void> wait_for_commit();
-  boost::asio::awaitable<void> commit(bool everything);
+  boost::asio::awaitable<void> write();
+  std::string try_to_write();  // the problem, empty when writing_ is durable
+  void note_failure(const std::string& problem);
+  boost::asio::awaitable<bool> flush(bool samples);
   void take(bool everything);
   void set_durable(const WriteBatch& written);
   void ask_for_missing();
@@ -135,17 +157,21 @@ class Recorder final : public StationSink, public RobotArchive {
   std::unique_ptr<SampleStore> store_;
 
   Boots boots_;
-  WriteBatch queue_;    // all but samples, which wait in their boot
-  WriteBatch writing_;  // being written; kept until it is durable
+  WriteBatch queue_;                                            // all but samples, which wait in their boot
+  WriteBatch writing_;                                          // being written; kept until it is durable
+  std::unordered_map<CommandId, std::size_t> queued_commands_;  // where each waits in queue_.commands
   std::size_t queued_samples_ = 0;
   RecorderCounters counters_;
   std::int64_t last_commit_us_ = 0;      // steady
+  std::int64_t last_flush_us_ = 0;       // steady
+  std::int64_t retry_at_us_ = 0;         // steady; 0 unless the last commit failed
+  std::int64_t failure_logged_us_ = 0;   // steady
   std::int64_t overflow_logged_us_ = 0;  // steady
   bool idle_ = false;                    // run() waits for work_
 
   Signal work_{loop_};  // something to record, or a robot to watch
   Signal flush_wanted_{loop_};
-  std::vector<std::shared_ptr<Signal>> flushes_;  // shared with the coroutines that wait, which may be gone
+  std::vector<Flush> flushes_;
 };
 
 }  // namespace server

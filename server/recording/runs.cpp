@@ -38,6 +38,10 @@ Result<void> check(const RunConditions& conditions) {
 
 bool is_complete(const Run& run) { return run.samples_stored + run.samples_lost >= run.samples_expected; }
 
+Error disk_fails() {
+  return {ErrorCode::unavailable, "the disk cannot be written now; the station's log says why. Try again", ""};
+}
+
 Error no_such_run(RunId id) { return {ErrorCode::not_found, fmt::format("there is no run {}", id), ""}; }
 
 }  // namespace
@@ -80,7 +84,9 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
   };
   open_runs_[robot_id] = 0;
   const Creating creating{open_runs_, robot_id};
-  co_await recorder_.flush();  // the run is stored after the connection it begins in, so a later boot can follow it
+  // The run is stored after the connection it begins in, so a later boot can follow it.
+  const bool flushed = co_await recorder_.flush_records();
+  if (!flushed) co_return std::unexpected{disk_fails()};
   auto job = [run](Database& database) { return RunStore{database, {}}.add(run); };
   const Result<RunId> id = co_await recorder_.on_disk(std::move(job));
   if (!id) co_return std::unexpected{id.error()};
@@ -93,7 +99,8 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
   if (verdict.size() > kMaxTextBytes) {
     co_return fail(ErrorCode::invalid, fmt::format("a verdict has at most {} bytes", kMaxTextBytes));
   }
-  co_await recorder_.flush();  // a reboot heard before this moves the open span first
+  const bool flushed = co_await recorder_.flush();  // a reboot heard before this moves the open span first
+  if (!flushed) co_return std::unexpected{disk_fails()};
   const auto open = std::ranges::find(open_runs_, id, [](const auto& entry) { return entry.second; });
   if (id == 0 || open == open_runs_.end()) {
     const std::optional<Run> known = co_await read(id);
@@ -103,15 +110,24 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
   auto job = [id, verdict, utc_us = clock_.utc_us(), heads = heads()](Database& database) {
     RunStore{database, heads}.end(id, verdict, utc_us);
   };
-  open_runs_.erase(open);
-  co_await recorder_.on_disk(std::move(job));
+  struct Ending {  // by one request at a time; the run stays open when the job throws
+    std::set<RunId>& ending;
+    RunId id;
+    ~Ending() { ending.erase(id); }
+  };
+  if (!ending_.insert(id).second) co_return fail(ErrorCode::conflict, fmt::format("run {} is being ended", id));
+  {
+    const Ending ending{ending_, id};
+    co_await recorder_.on_disk(std::move(job));
+  }
+  std::erase_if(open_runs_, [id](const auto& entry) { return entry.second == id; });
 
   const std::int64_t deadline_us = clock_.steady_us() + kEndPatience.count();
   for (;;) {
-    co_await recorder_.flush();
+    const bool stored = co_await recorder_.flush();
     std::optional<Run> run = co_await read(id);
     if (!run) co_return std::unexpected{no_such_run(id)};
-    if (is_complete(*run) || clock_.steady_us() >= deadline_us) co_return std::move(*run);
+    if (!stored || is_complete(*run) || clock_.steady_us() >= deadline_us) co_return std::move(*run);
     co_await clock_.sleep_for(kEndLook);
   }
 }

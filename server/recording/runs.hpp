@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -62,6 +63,7 @@ class Runs final : public StationSink {
   // Reads the runs that were open when the station stopped; they go on. Call before robots arrive.
   boost::asio::awaitable<void> load();
 
+  // create and end: unavailable while the disk cannot be written.
   // conflict when the robot has an open run, not_connected when it is not there, invalid for a bad name.
   boost::asio::awaitable<Result<Run>> create(RobotId robot_id, RunConditions conditions);
 
@@ -95,6 +97,7 @@ class Runs final : public StationSink {
   Recorder& recorder_;
   std::map<RobotId, Robot> robots_;
   std::map<RobotId, RunId> open_runs_;  // 0: being created
+  std::set<RunId> ending_;              // of these, the ones whose end is being stored
 };
 
 }  // namespace server

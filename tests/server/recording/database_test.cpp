@@ -3,10 +3,12 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <sstream>
 
+#include "server/data_folder.hpp"
 #include "server/recording/schema.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
@@ -35,6 +37,24 @@ class DatabaseTest : public RecordingTest {
     database.exec(sql);
   }
 };
+
+TEST_F(DatabaseTest, ItsFilesAreForTheStationsUserOnlyAlsoInAnOpenFolder) {
+  namespace fs = std::filesystem;
+  const mode_t before = umask(022);
+  fs::permissions(folder_, fs::perms{0755});
+  {
+    const DataFolder data{folder_};
+    start();
+    TestRobot robot;
+    connect(robot);
+    flush();
+    for (const char* name : {"station.sqlite", "station.sqlite-wal", "station.sqlite-shm"}) {
+      EXPECT_EQ(fs::status(folder_ / name).permissions(), fs::perms::owner_read | fs::perms::owner_write) << name;
+    }
+    stop();
+  }
+  umask(before);
+}
 
 TEST_F(DatabaseTest, ANewFileHasOurMarksAndAStoreId) {
   std::uint64_t store_id = 0;

@@ -27,6 +27,7 @@ TEST_F(HistoryTest, GivesBackEveryValueOfASample) {
   SampleBatch batch = robot_.batch(0, 2);
   batch.samples[1] = {1, 2, 3, -0.5, 175, 0.1F};
   send(robot_, batch);
+  const std::int64_t received_at_us = clock_.utc_us();
   const SamplePage all = page(id, std::nullopt, 10);
   ASSERT_EQ(all.samples.size(), 2u);
   EXPECT_FALSE(all.next.has_value());
@@ -35,7 +36,7 @@ TEST_F(HistoryTest, GivesBackEveryValueOfASample) {
   EXPECT_EQ(stored.seq, 1u);
   EXPECT_EQ(stored.robot_time_us, 510'000u);
   EXPECT_EQ(stored.utc_us, 1'700'000'000'510'000);
-  EXPECT_EQ(stored.received_at_us, clock_.utc_us());
+  EXPECT_EQ(stored.received_at_us, received_at_us);
   EXPECT_EQ(stored.sample, (Sample{1, 2, 3, -0.5, 175, 0.1F}));
   EXPECT_EQ(stored.mode, rheonaut_MODE_AUTO);
   EXPECT_EQ(stored.sub_state, rheonaut_SUB_STATE_NAVIGATING);
@@ -79,6 +80,38 @@ TEST_F(HistoryTest, AnswersHoldWhatWasHeardBeforeTheQuestion) {
   const RunId id = create();
   make(robot_, 3);
   EXPECT_EQ(page(id, std::nullopt, 10).samples.size(), 3u);
+}
+
+TEST_F(HistoryTest, QueriesOfEventsAndCommandsCutNoSegmentShort) {
+  start();
+  connect(robot_);
+  for (std::uint64_t n = 0; n < 20; ++n) {
+    make(robot_, 5);
+    RobotEvent event;
+    event.robot_id = robot_.id;
+    event.kind = "event " + std::to_string(n);
+    recorder_->on_event(state_of(robot_, LinkState::connected), event);
+    EXPECT_EQ(wait(history_->events(robot_.id, 1)).at(0).kind, event.kind);
+    EXPECT_EQ(wait(history_->commands(robot_.id, 1)).size(), 0u);
+    clock_.run_for(1ms);
+  }
+  clock_.run_for(2s);
+  EXPECT_LE(number("SELECT count(*) FROM segment"), 6);  // 4 s, and no segment waits for more than 1 s
+}
+
+TEST_F(HistoryTest, QueriesOfSamplesCommitAtMostOncePer100Ms) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  clock_.run_for(1s);
+  const std::uint64_t before = recorder_->counters().commits;
+  const std::int64_t began_us = clock_.steady_us();
+  for (int i = 0; i < 10; ++i) {
+    make(robot_, 1);
+    EXPECT_EQ(page(id, std::nullopt, 100).samples.size(), static_cast<std::size_t>(i) + 1);
+  }
+  EXPECT_EQ(recorder_->counters().commits - before, 10u);
+  EXPECT_GE(clock_.steady_us() - began_us, 900'000);
 }
 
 TEST_F(HistoryTest, RefusesUnknownRunsAndBadLimits) {

@@ -1,5 +1,8 @@
 // Every sample that is acknowledged is stored once, in its place; what is lost is listed.
+// LONG: one rule each of one class, in one vocabulary.
 #include "server/recording/recorder.hpp"
+
+#include <limits>
 
 #include "tests/server/recording/recording_test.hpp"
 
@@ -308,6 +311,156 @@ TEST_F(RecorderTest, IgnoresNumbersThatCannotBe) {
   flush();
   EXPECT_EQ(samples(), 0);
   EXPECT_EQ(recorder_->counters().batches_malformed, 2u);
+}
+
+// Another program that has the database locked.
+class ForeignWriter {
+ public:
+  explicit ForeignWriter(const std::filesystem::path& path) : database_{path.string(), SQLite::OPEN_READWRITE, 5000} {}
+  void run(const char* sql) { database_.exec(sql); }
+
+ private:
+  SQLite::Database database_;
+};
+
+TEST_F(RecorderTest, AForeignLockDelaysRecordingAndLosesNothing) {
+  start();
+  connect(robot_);
+  make(robot_, 10);
+  flush();
+  ForeignWriter foreign{path_};
+  foreign.run("BEGIN IMMEDIATE");
+  make(robot_, 100);
+  EXPECT_TRUE(clock_.run_until([&] { return recorder_->failing(); }, 1s));
+  EXPECT_EQ(durable_next_seq_, 10u);
+  make(robot_, 20);
+  const std::int64_t began_us = clock_.steady_us();
+  EXPECT_FALSE(wait(recorder_->flush()));
+  EXPECT_EQ(clock_.steady_us() - began_us, 3'000'000);
+  TestRobot other;
+  other.id = "dory";
+  other.boot_id = 7;
+  EXPECT_EQ(admit(other).refusal, rheonaut_REFUSAL_REASON_STATION_BUSY);
+  foreign.run("ROLLBACK");
+  EXPECT_TRUE(wait(recorder_->flush()));
+  EXPECT_FALSE(recorder_->failing());
+  EXPECT_EQ(durable_next_seq_, 130u);
+  EXPECT_EQ(samples(), 130);
+  EXPECT_EQ(tasks_->exit_code(), 0);
+}
+
+TEST_F(RecorderTest, AFailingDiskIsTriedAgainEverySecondWithTheSameContent) {
+  start();
+  connect(robot_);
+  flush();
+  ForeignWriter foreign{path_};
+  foreign.run("CREATE TRIGGER full BEFORE INSERT ON segment BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
+  make(robot_, 100);
+  clock_.run_for(10s);
+  EXPECT_TRUE(recorder_->failing());
+  EXPECT_GE(recorder_->counters().commits_failed, 9u);
+  EXPECT_LE(recorder_->counters().commits_failed, 11u);
+  make(robot_, 100);
+  foreign.run("DROP TRIGGER full");
+  clock_.run_for(1100ms);
+  EXPECT_FALSE(recorder_->failing());
+  EXPECT_EQ(durable_next_seq_, 200u);
+  EXPECT_EQ(segments(), (Rows{"0|99", "100|199"}));
+}
+
+TEST_F(RecorderTest, CloseDoesNotThrowWhenTheDiskFails) {
+  start();
+  connect(robot_);
+  make(robot_, 10);
+  ForeignWriter foreign{path_};
+  foreign.run("BEGIN IMMEDIATE");
+  stop();
+  foreign.run("ROLLBACK");
+  EXPECT_EQ(samples(), 0);
+}
+
+TEST_F(RecorderTest, AFullQueueStillTakesEveryStopAndTheNewestStateOfACommand) {
+  RecorderOptions options;
+  options.max_queued_records = 2;
+  start(options);
+  send_command(1, "set_duty", CommandState::queued);
+  send_command(2, "set_duty", CommandState::queued);
+  send_command(3, "set_duty", CommandState::queued);  // beyond the limit
+  send_command(1, "set_duty", CommandState::acknowledged);
+  send_command(4, "emergency_stop", CommandState::queued);
+  send_command(5, "emergency_stop", CommandState::queued);
+  send_command(5, "emergency_stop", CommandState::acknowledged);
+  EXPECT_EQ(recorder_->counters().records_refused, 1u);
+  flush();
+  EXPECT_EQ(rows("SELECT command_id, state FROM command ORDER BY command_id"),
+            (Rows{"1|acknowledged", "2|queued", "4|queued", "5|acknowledged"}));
+  send_command(4, "emergency_stop", CommandState::acknowledged);
+  flush();
+  EXPECT_EQ(rows("SELECT state FROM command WHERE command_id = 4"), Rows{"acknowledged"});
+}
+
+TEST_F(RecorderTest, RestoresTheLatestBootAndTheLatchItWasIn) {
+  const auto restored = [this] {
+    flush();
+    kill();
+    start();
+    return restored_.robots.at(0);
+  };
+  const auto send_latch = [this](std::uint64_t seq, const char* kind, std::uint64_t id, std::uint64_t robot_time_us) {
+    RobotEvent event;
+    event.robot_id = robot_.id;
+    event.boot_id = robot_.boot_id;
+    event.event_seq = seq;
+    event.kind = kind;
+    event.emergency_id = id;
+    event.robot_time_us = robot_time_us;
+    recorder_->on_event(state_of(robot_, LinkState::connected), event);
+  };
+  start();
+  connect(robot_);
+  EXPECT_EQ(restored().boot_id, robot_.boot_id);
+  EXPECT_EQ(restored_.robots.at(0).emergency_id, 0u);
+
+  connect(robot_);
+  make(robot_, 10);
+  send_latch(0, "emergency", 0xf000000000000001, robot_.time_of(9) + 1);  // its samples have not come
+  EXPECT_EQ(restored().emergency_id, 0xf000000000000001);
+
+  connect(robot_);
+  robot_.context.emergency_id = 0xf000000000000002;  // of a stop whose event has not come
+  make(robot_, 10);
+  EXPECT_EQ(restored().emergency_id, 0xf000000000000002);
+
+  connect(robot_);
+  send_latch(1, "mode_changed", 5, robot_.time_of(30));  // says nothing of the latch
+  send_latch(2, "emergency_cleared", 0xf000000000000002, robot_.time_of(19) + 1);
+  EXPECT_EQ(restored().emergency_id, 0u);
+
+  TestRobot rebooted;
+  rebooted.boot_id = 3;  // a smaller number, and a later boot
+  connect(rebooted);
+  EXPECT_EQ(restored().boot_id, 3u);
+}
+
+TEST_F(RecorderTest, IgnoresABatchWithAContextThatNoTableTakes) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  start();
+  connect(robot_);
+  std::vector<SampleBatch> malformed(6, robot_.batch(0, 5));
+  malformed[0].context.disturbance_m = kNan;
+  malformed[1].context.position_sd_m = kInfinity;
+  malformed[2].context.setpoint_m = kNan;
+  malformed[3].context.period_us = 0;
+  malformed[4].context.period_us = 10'000'001;
+  malformed[5].first_robot_time_us = 1ULL << 62;
+  for (const SampleBatch& batch : malformed) send(robot_, batch);
+  EXPECT_EQ(recorder_->counters().batches_malformed, 6u);
+  EXPECT_EQ(recorder_->queued_samples(), 0u);
+  make(robot_, 10);
+  flush();
+  EXPECT_EQ(samples(), 10);
+  stop();
 }
 
 TEST_F(RecorderTest, KeepsNoBookkeepingOfBootsThatAreGone) {
