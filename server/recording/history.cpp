@@ -125,7 +125,7 @@ History::History(std::filesystem::path database, Recorder& recorder, WorkerThrea
 
 History::~History() = default;
 
-asio::awaitable<void> History::settle() { co_await recorder_.flush(); }
+asio::awaitable<void> History::settle() { co_await recorder_.flush_records(); }
 
 template <class Query>
 asio::awaitable<std::invoke_result_t<Query, SQLite::Database&>> History::ask(Query query) {
@@ -144,6 +144,12 @@ asio::awaitable<Result<SamplePage>> History::samples(RunId run, std::optional<Sa
     if (!run_exists(database, run)) return std::unexpected{no_such_run(run)};
     return read_page(database, read_spans(database, run, after ? after->span : 0), after, limit);
   };
+  // The first page has everything heard so far stored, so only a page at the end must ask again for what came since.
+  if (after) {
+    auto full = co_await ask(query);
+    const bool is_full = full && full->samples.size() == limit;
+    if (is_full) co_return full;
+  }
   co_await recorder_.flush();
   co_return co_await ask(std::move(query));
 }

@@ -70,7 +70,7 @@ class History {
   boost::asio::awaitable<std::vector<CommandRecord>> commands(RobotId robot_id, std::size_t limit);
   boost::asio::awaitable<Result<CommandRecord>> command(CommandId id);
 
-  // Returns when everything that the recorder has heard is durable.
+  // Returns when every command and event that the recorder has heard is durable, or after 3 s when the disk fails.
   boost::asio::awaitable<void> settle();
 
   // Runs job() on the readers' thread: for text that is made of what a query gave.

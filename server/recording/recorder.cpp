@@ -66,7 +66,6 @@ asio::awaitable<void> Recorder::run() {
     if (!writing_.empty()) co_await write();  // the same content, until it is stored
     if (failing()) continue;
     std::vector<Flush> served = std::exchange(flushes_, {});
-    if (!served.empty()) last_flush_us_ = clock_.steady_us();
     take(std::ranges::any_of(served, &Flush::samples));
     co_await write();
     if (failing()) {
@@ -95,8 +94,6 @@ asio::awaitable<void> Recorder::wait_for_commit() {
   while (flushes_.empty() && clock_.steady_us() < regular_us) {
     co_await (clock_.sleep_until(regular_us) || flush_wanted_.wait());
   }
-  const std::int64_t next_flush_us = last_flush_us_ + kCommitInterval.count();
-  if (!flushes_.empty() && clock_.steady_us() < next_flush_us) co_await clock_.sleep_until(next_flush_us);
   last_commit_us_ = clock_.steady_us();
 }
 

@@ -79,9 +79,8 @@ class Recorder final : public StationSink, public RobotArchive {
   // Commits and asks for what is missing, until cancelled.
   boost::asio::awaitable<void> run();
 
-  // Returns true when everything heard so far is durable, and false after 3 s if it is not yet. Flushes are at least
-  // 100 ms apart: one that comes sooner waits for the rest of it. It cuts segments short, so it is for readers of
-  // samples. Needs run().
+  // Returns true when everything heard so far is durable, and false after 3 s if it is not yet. It cuts segments short,
+  // so it is for readers of samples. Needs run().
   boost::asio::awaitable<bool> flush();
   // The same for events and commands; samples go on waiting for a full segment.
   boost::asio::awaitable<bool> flush_records();
@@ -163,7 +162,6 @@ class Recorder final : public StationSink, public RobotArchive {
   std::size_t queued_samples_ = 0;
   RecorderCounters counters_;
   std::int64_t last_commit_us_ = 0;      // steady
-  std::int64_t last_flush_us_ = 0;       // steady
   std::int64_t retry_at_us_ = 0;         // steady; 0 unless the last commit failed
   std::int64_t failure_logged_us_ = 0;   // steady
   std::int64_t overflow_logged_us_ = 0;  // steady

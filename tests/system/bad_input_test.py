@@ -139,11 +139,11 @@ class BadInputTest(unittest.TestCase):
         self.assertEqual(self.robot_port(b"\xff\x7f"), b"")
 
     def test_telemetry_that_is_not_finite_ends_the_connection(self):
-        for robot_id, value in ((b"nan-1", float("nan")), (b"inf-1", float("inf"))):
+        for robot_id, boot_id, value in ((b"nan-1", 4712, float("nan")), (b"inf-1", 4713, float("inf"))):
             with self.subTest(value=value):
                 host, port = self.station.endpoints["robots"].split(":")
                 with socket.create_connection((host, int(port)), timeout=20) as connection:
-                    connection.sendall(hello(robot_id=robot_id, boot_id=4712))
+                    connection.sendall(hello(robot_id=robot_id, boot_id=boot_id))
                     self.assertTrue(connection.recv(4096), "the robot is welcome")
                     connection.sendall(telemetry(value))
                     self.assertTrue(self.closes_while_it_hears_heartbeats(connection))

@@ -99,21 +99,6 @@ TEST_F(HistoryTest, QueriesOfEventsAndCommandsCutNoSegmentShort) {
   EXPECT_LE(number("SELECT count(*) FROM segment"), 6);  // 4 s, and no segment waits for more than 1 s
 }
 
-TEST_F(HistoryTest, QueriesOfSamplesCommitAtMostOncePer100Ms) {
-  start();
-  connect(robot_);
-  const RunId id = create();
-  clock_.run_for(1s);
-  const std::uint64_t before = recorder_->counters().commits;
-  const std::int64_t began_us = clock_.steady_us();
-  for (int i = 0; i < 10; ++i) {
-    make(robot_, 1);
-    EXPECT_EQ(page(id, std::nullopt, 100).samples.size(), static_cast<std::size_t>(i) + 1);
-  }
-  EXPECT_EQ(recorder_->counters().commits - before, 10u);
-  EXPECT_GE(clock_.steady_us() - began_us, 900'000);
-}
-
 TEST_F(HistoryTest, RefusesUnknownRunsAndBadLimits) {
   start();
   EXPECT_EQ(wait(history_->samples(1, std::nullopt, 10)).error().code, ErrorCode::not_found);

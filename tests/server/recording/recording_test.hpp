@@ -116,9 +116,9 @@ class RecordingTest : public ::testing::Test {
 
   std::filesystem::path folder_;
   std::filesystem::path path_;
+  boost::asio::io_context loop_{1};
   WorkerThread disk_{"disk"};
   WorkerThread readers_{"readers"};
-  boost::asio::io_context loop_{1};
   VirtualClock clock_{loop_};
   std::unique_ptr<TaskGroup> tasks_;
   std::unique_ptr<Recorder> recorder_;
