@@ -23,8 +23,8 @@ constexpr double kSmallestPoleDistanceRad = 0.02;  // from the cut; nearer poles
   throw std::invalid_argument(text.str());
 }
 
-void check(const FractionalModel& model, double dt_s) {
-  if (!std::isfinite(model.gain_m_s)) refuse("gain must be finite, is", model.gain_m_s);
+void check_range(const FractionalModel& model, double dt_s) {
+  if (!std::isfinite(model.kp)) refuse("gain must be finite, is", model.kp);
   if (!(model.b1 > 0 && std::isfinite(model.b1))) refuse("b1 must be positive, is", model.b1);
   if (!(model.b2 > 0 && std::isfinite(model.b2))) refuse("b2 must be positive, is", model.b2);
   if (!(model.b3 > 0 && std::isfinite(model.b3))) refuse("b3 must be positive, is", model.b3);
@@ -89,7 +89,7 @@ std::pair<Number, Number> phi(Number z) {
 }  // namespace
 
 ModalPlant::ModalPlant(const FractionalModel& model, double dt_s) : dt_s_(dt_s) {
-  check(model, dt_s);
+  check_range(model, dt_s);
   if (model.alpha == 2) {
     add_integer_order_modes(model);
   } else {
@@ -113,7 +113,7 @@ void ModalPlant::add_integer_order_modes(const FractionalModel& model) {
   const double half = model.b2 / (2 * model.b1), square = half * half - model.b3 / model.b1;
   if (square == 0) refuse("a double pole is not supported, b2^2 - 4 b1 b3 is", square);
   const Complex root = std::sqrt(Complex{square, 0});
-  const Complex residue = model.gain_m_s / (2 * model.b1 * root);
+  const Complex residue = model.kp / (2 * model.b1 * root);
   if (square < 0) return add_complex_mode(-half + root, residue);
   add_real_mode(half - root.real(), residue.real());
   add_real_mode(half + root.real(), -residue.real());
@@ -125,7 +125,7 @@ void ModalPlant::add_fractional_order_modes(const FractionalModel& model) {
     const double angle_rad = log_pole.imag();
     distance_rad = std::min(distance_rad, std::abs(angle_rad - pi));
     if (angle_rad > pi) continue;
-    add_complex_mode(std::exp(log_pole), model.gain_m_s / denominator_slope(model, log_pole));  // (3)
+    add_complex_mode(std::exp(log_pole), model.kp / denominator_slope(model, log_pole));  // (3)
   }
   if (distance_rad < kSmallestPoleDistanceRad) {
     refuse("the nearest pole must keep 0.02 rad from the negative axis, its distance is", distance_rad);
@@ -135,7 +135,7 @@ void ModalPlant::add_fractional_order_modes(const FractionalModel& model) {
   const double log_step = (kHighestLogRate - kLowestLogRate) / count;
   for (int i = 0; i <= count; ++i) {
     const double log_rate = kLowestLogRate + i * log_step;
-    const Complex response = model.gain_m_s / denominator(model, {log_rate, pi});
+    const Complex response = model.kp / denominator(model, {log_rate, pi});
     const double rate = std::exp(log_rate);
     add_real_mode(rate, -log_step * rate * response.imag() / pi);  // (3), (4)
   }

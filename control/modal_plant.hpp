@@ -14,21 +14,9 @@
 #include <complex>
 #include <vector>
 
+#include "control/plant_models.hpp"
+
 namespace control {
-
-// The denominator is b1 s^alpha + b2 s^beta + b3. Either 0 < beta < 1 < alpha < 2, or alpha = 2 and beta = 1;
-// b1, b2, b3 > 0. Every such model is stable.
-struct FractionalModel {
-  double gain_m_s = 0.1;  // k
-  double b1 = 0.005682;
-  double b2 = 0.11031;
-  double b3 = 1.0;
-  double alpha = 1.7263;
-  double beta = 0.8682;
-};
-
-constexpr FractionalModel kNonNewtonianModel{};                                 // (29)
-constexpr FractionalModel kNewtonianModel{232.0, 1.0, 60.13, 667.1, 2.0, 1.0};  // (28)
 
 class ModalPlant {
  public:

@@ -80,8 +80,8 @@ TEST(ModalPlant, ApproachesItsGainForOtherOrdersToo) {
       model.beta = beta;
       ModalPlant plant{model, 0.01};
       for (int i = 0; i < 60'000; ++i) plant.step(1);
-      const double creep = model.gain_m_s * model.b2 / (std::pow(600, beta) * std::tgamma(1 - beta));
-      EXPECT_NEAR(plant.velocity_m_s(), model.gain_m_s - creep, 0.02 * creep + 1e-6) << alpha << " " << beta;
+      const double creep = model.kp * model.b2 / (std::pow(600, beta) * std::tgamma(1 - beta));
+      EXPECT_NEAR(plant.velocity_m_s(), model.kp - creep, 0.02 * creep + 1e-6) << alpha << " " << beta;
     }
   }
 }

@@ -1,0 +1,2 @@
+// Steps plant and controller together.
+#include "control/closed_loop.hpp"

@@ -1,0 +1,44 @@
+// Predicts a closed-loop experiment: sampled controller, clamp, profile, disturbance, measurement noise.
+//
+//   e[k] = r[k] - (x[k] + disturbance[k] + noise[k]),  u[k] = clamp(G(z) e)[k],  x from the plant under u held     (1)
+//   x measured at kT, u applied from kT on: no computational delay                                               (2)
+//
+// Errors: throws std::invalid_argument quoting the bad value.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "control/plant_models.hpp"
+#include "control/sections.hpp"
+#include "control/step_metrics.hpp"
+
+namespace control {
+
+struct ClosedLoopExperiment {
+  FractionalModel plant;
+  ParallelSections controller;
+  double period_s = 0.01;
+  double duration_s = 40;
+  double setpoint_m = 0.1;
+  double duty_min = -1, duty_max = 1;  // infinite for no clamp
+  double disturbance_m = -0.05;        // added to the measured position from disturbance_at_s on
+  double disturbance_at_s = 20;        // beyond duration_s for none
+  double profile_velocity_m_s = 0;     // limits of the reference; 0 for a plain step
+  double profile_acceleration_m_s2 = 0;
+  double noise_sd_m = 0;  // white, on the measured position
+  std::uint64_t noise_seed = 1;
+  double settling_band_m = 0;  // 0: 2 % of the setpoint
+};
+
+struct ClosedLoopPrediction {
+  std::vector<double> time_s, position_m, velocity_m_s, measured_m, duty, reference_m;
+  StepMetrics step;             // up to the disturbance, of the noise-free measured position
+  StepMetrics disturbance;      // after it
+  double duty_sd_at_rest = 0;   // over the last quarter before the disturbance
+  double clipped_fraction = 0;  // of all samples
+};
+
+ClosedLoopPrediction predict_closed_loop(const ClosedLoopExperiment& experiment);
+
+}  // namespace control

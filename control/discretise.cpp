@@ -1,0 +1,2 @@
+// Fits, measures and chooses.
+#include "control/discretise.hpp"

@@ -1,0 +1,2 @@
+// The scheme, term by term.
+#include "control/grunwald_letnikov.hpp"

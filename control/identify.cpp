@@ -1,0 +1,2 @@
+// Searches, compares and judges.
+#include "control/identify.hpp"

@@ -1,0 +1,115 @@
+// Identifies a motion model from a recorded run, and says what the run cannot tell.
+//
+//   y(t) = model(duty; kp, b1, b2, α, β) + offset,  b3 = 1              (1)   [birs2021] (20); one scale is redundant
+//   least squares: Σ (y - model)²/σ_channel²                            (2)   output error
+//   absolute error: Σ |y - model|                                       (3)   [birs2021] (21), read literally
+//   0 < kp, b1, b2;  1 < α < 2;  0 < β < 1                              (4)   [birs2021] 3.2
+//   covariance = σ² (JᵀJ)⁻¹ at the optimum                              (5)   Cramér-Rao: what no estimator can beat
+//
+// Structures: fractional (20); second_order, (19) with α = 2, β = 1; first_order, b1 = 0, β = 1. One is chosen by AIC.
+// The search starts from the Newtonian model (28), as the paper does, and from further points against local minima.
+// Errors: throws std::invalid_argument quoting the bad value for data that cannot be used. Not having converged, having
+// been cancelled or having run out of time is a field of the result.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "control/plant_models.hpp"
+
+namespace control {
+
+enum class Structure { fractional, second_order, first_order };
+
+// Uniformly sampled; duty[k] holds from sample k to sample k + 1. An empty channel was not recorded; one of the two
+// must be. Values are finite.
+struct Recording {
+  double dt_s = 0.01;
+  std::vector<double> duty;
+  std::vector<double> position_m;
+  std::vector<double> velocity_m_s;
+};
+
+// From columns with times, which must be equally spaced within 1 % of a step.
+Recording make_recording(std::span<const double> time_s, std::span<const double> duty,
+                         std::span<const double> position_m, std::span<const double> velocity_m_s);
+
+enum class Cost { least_squares, absolute_error };
+enum class SearchEnd { converged, iteration_limit, time_limit, cancelled };
+
+struct Progress {
+  Structure structure = Structure::fractional;
+  int start = 0, starts = 0;  // which of the multi-starts, from 0
+  int iteration = 0;
+  double sse = 0;
+};
+
+struct IdentificationOptions {
+  std::optional<Structure> structure;  // none: all three, best by AIC
+  Cost cost = Cost::least_squares;
+  bool fits_offset = false;                          // unknown initial position
+  double longest_dead_time_s = 0;                    // 0: no dead time; else it is found in [0, this]
+  int further_starts = 4;                            // beside the paper's
+  int iteration_limit = 200;                         // per start
+  double time_limit_s = 60;                          // in all
+  std::function<bool(const Progress&)> on_progress;  // return false to cancel
+};
+
+inline constexpr std::size_t kParameters = 5;  // ln-scaled inside; reported as kp, b1, b2, alpha, beta
+inline constexpr std::array<const char*, kParameters> kParameterNames{"kp", "b1", "b2", "alpha", "beta"};
+
+// Absent parameters (b1 of first order, the orders of integer structures) have no sigma and correlation 0.
+struct Fit {
+  Structure structure = Structure::fractional;
+  FractionalModel model;  // b3 = 1
+  double offset_m = 0, dead_time_s = 0;
+  std::array<std::optional<double>, kParameters> one_sigma;
+  std::array<std::array<double, kParameters>, kParameters> correlation{};
+  double sse = 0;             // sum of squared residuals, of both channels in their own units
+  double absolute_error = 0;  // (3) as an integral over time
+  double fit_percent = 0;     // 100 (1 - |y - model|/|y - mean y|), of position if recorded, else of velocity
+  double residual_sd = 0;     // of the same channel
+  double aic = 0;
+  int free_parameters = 0;
+  bool residuals_are_white = false;
+  double whiteness_p_value = 0;  // Ljung-Box
+  SearchEnd end = SearchEnd::converged;
+  int iterations = 0, starts = 0, starts_that_agree = 0;           // with the best cost
+  std::vector<double> position_residual_m, velocity_residual_m_s;  // measured less model, empty if not recorded
+};
+
+struct Identification {
+  Fit best;
+  std::vector<Fit> compared;          // one per structure tried, best AIC first: the table
+  std::vector<std::string> warnings;  // in words, with numbers and what to do
+};
+
+Identification identify(const Recording& recording, const IdentificationOptions& options);
+
+// What a planned experiment would tell: one-sigma of each parameter by (5), for white noise of these sizes (0: channel
+// not recorded).
+struct PlannedExperiment {
+  double dt_s = 0.01;
+  std::vector<double> duty;
+  double position_sd_m = 0;
+  double velocity_sd_m_s = 0;
+  bool fits_offset = false;
+};
+
+struct ExpectedUncertainty {
+  std::array<std::optional<double>, kParameters> one_sigma;  // none: this experiment cannot tell at all
+  std::array<std::array<double, kParameters>, kParameters> correlation{};
+};
+
+ExpectedUncertainty expected_uncertainty(const FractionalModel& model, const PlannedExperiment& experiment);
+
+// Duties for such plans: a step, and a pseudo-random binary sequence of ±amplitude.
+std::vector<double> step_duty(double amplitude, double duration_s, double dt_s);
+std::vector<double> prbs_duty(double amplitude, double bit_s, double duration_s, double dt_s);
+
+}  // namespace control

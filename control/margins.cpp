@@ -1,0 +1,2 @@
+// Scans for crossovers and peaks, and polishes them.
+#include "control/margins.hpp"

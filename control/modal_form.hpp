@@ -1,0 +1,57 @@
+// Writes a model as a sum of decaying exponentials, which can be stepped exactly.
+//
+//   h(t) = (1/π) Im ∫_0^∞ H(s) e^{st} ds  along s = x e^{iθ},  + 2 Re[r e^{pt}]  if the pole p has arg p < θ   (1)
+//        ≈ Σ_i 2 Re[w_i e^{s_i t}],   s_i = e^{y_i + iθ},  w_i = (δ/2πi) H(s_i) s_i                            (2)
+//   r = kp/D'(p)                                                                                                 (3)
+//   H(s) = H(0) a/(s + a) + rest: the first term is one slow real mode, (2) is applied to the rest                (4)
+//
+// (1) is the inverse Laplace integral bent onto two rays, which is allowed because H is analytic in the plane cut along
+// the negative real axis but for at most one pole pair, and because no ray crosses it. (2) is the trapezoid in y = ln x
+// with step δ. Its error is about exp(-2πd/δ), d being the angle between the ray and the nearest of: the imaginary axis
+// (where e^{st} stops decaying), the pole, the cut. The ray takes the middle of the wider gap, so d ≥ π/8 for every
+// model and no parameters need thousands of modes. (4) makes the rest vanish at s = 0, so that the sum may begin at
+// much faster rates. Shapes:   rate and weight have the same length; every rate lies left of the imaginary axis, in the
+// upper half plane or
+//           on the real axis, and its mode counts twice the real part.
+// Accuracy: velocity and position step responses within `tolerance` relative for shortest_s ≤ t ≤ longest_s, held by
+//           modal_form_test.cpp; 171 modes for (29) at 1e-7, 457 at 1e-13.
+// Errors:   throws std::invalid_argument quoting the bad value.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "control/transfer_function.hpp"
+
+namespace control {
+
+struct ModalRange {
+  double shortest_s = 0.01;
+  double longest_s = 1e5;
+  double tolerance = 1e-7;
+};
+
+struct ModalForm {
+  std::vector<Complex> rate;    // s_i, 1/s
+  std::vector<Complex> weight;  // w_i, m/s² per duty
+};
+
+// The rates of (2), which are the same for all models that share a ray: count values of y from first_log_rate on.
+struct Ray {
+  double angle_rad = 0;  // θ
+  double log_step = 0;   // δ
+  double first_log_rate = 0;
+  int count = 0;
+  double slow_rate = 0;  // a of (4), 1/s
+
+  Complex rate(int i) const { return std::polar(std::exp(first_log_rate + i * log_step), angle_rad); }
+};
+
+// ln p of the pole with 0 < arg p < π, if there is one nearer than π - 1e-9; there is never a second.
+std::optional<Complex> log_pole(const FractionalModel& model);
+
+Ray choose_ray(const FractionalModel& model, const ModalRange& range);
+
+ModalForm modal_form(const FractionalModel& model, const ModalRange& range);
+
+}  // namespace control

@@ -1,0 +1,2 @@
+// Two parameters, by least squares.
+#include "control/motor_fit.hpp"

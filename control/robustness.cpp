@@ -1,0 +1,2 @@
+// Runs the table.
+#include "control/robustness.hpp"

@@ -1,0 +1,2 @@
+// Partial fractions and their filters.
+#include "control/sections.hpp"

@@ -1,0 +1,58 @@
+// Tunes the fractional PD controller to gain crossover, phase margin and iso-damping, in closed form.
+//
+//   |C(jω)P(jω)| = 1, arg C(jω)P(jω) = -π + φ_m, d arg CP/dω = 0 at ω = ω_gc     (1)   [birs2021] (24), (25), (26)
+//   θ = -π + φ_m - arg P(jω_gc),  R = -d arg P/d ln ω,  q = μπ/2                 (2)
+//   kd ω^μ = sin θ/sin(q - θ)                                                   (3)   from the phase
+//   μ sin θ sin(q - θ)/sin q = R                                                (4)   from the slope: monotone in μ
+//   0 < θ < 90° and R < sin(2θ)/2                                               (5)   a solution with 0 < μ < 1 exists
+//                                                                                     exactly then, and it is unique
+//   kp = 1/(|1 + kd (jω)^μ| |P(jω)|)                                            (6)
+//
+// Differs from the paper: (25) prints a sum of frequency responses where their phases are meant. Its specification (65
+// rad/s, 72 degrees, iso-damped) has no solution on its plant: θ = 107°.
+// Errors: throws std::invalid_argument quoting the bad value. No solution is a result, not an error.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "control/margins.hpp"
+
+namespace control {
+
+struct TuningSpec {
+  double gain_crossover_rad_s = 5;
+  double phase_margin_deg = 91;
+  std::optional<double> mu;  // fixed: iso-damping is dropped, and (3), (6) alone are met
+  bool is_velocity_loop = false;
+};
+
+// A specification that has a solution, and the controller for it.
+struct TunedController {
+  std::string name;  // in words: what was kept and what was given up
+  TuningSpec spec;
+  FopdController controller;
+  Margins achieved;  // computed from the controller's own numbers
+};
+
+struct TuningResult {
+  bool is_feasible = false;
+  std::optional<TunedController> tuned;
+  std::string reason;                    // if not feasible: one sentence that says why, with the numbers of (5)
+  double theta_deg = 0, phase_fall = 0;  // θ and R of (2)
+  std::vector<TunedController> nearest;  // iso-damped: nearest feasible phase margin here, nearest crossover
+  std::vector<TunedController> relaxed;  // mu fixed; flattest phase for this crossover and margin; mu > 1, named so
+};
+
+TuningResult tune(const FractionalModel& plant, const TuningSpec& spec);
+
+// Every phase margin that has an iso-damped solution at this crossover: the ends of the interval, none if there is
+// none.
+struct PhaseMarginRange {
+  double low_deg = 0, high_deg = 0;
+};
+std::optional<PhaseMarginRange> feasible_phase_margins(const FractionalModel& plant, double gain_crossover_rad_s,
+                                                       bool is_velocity_loop = false);
+
+}  // namespace control

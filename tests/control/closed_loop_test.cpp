@@ -1,0 +1,4 @@
+// Predicted experiments agree with the reference cases.
+#include "control/closed_loop.hpp"
+
+#include <gtest/gtest.h>

@@ -1,0 +1,2 @@
+// Figure 8: the same controller in both fluids.
+#include <gtest/gtest.h>

@@ -1,0 +1,2 @@
+// Figure 9: the closed loop in water, with a disturbance.
+#include <gtest/gtest.h>
