@@ -124,10 +124,10 @@ void read(ConfigFile& file, Config& config) {
   file.take_number("limits", "duty_max", 0, 1, config.limits.duty_max);
   file.take_number("limits", "disturbance_max_m", 0, 100, config.limits.disturbance_max_m);
   if (file.take("log", "level", config.log_level)) {
-    constexpr std::array levels{"trace", "debug", "info", "warn", "error"};
-    if (std::ranges::find(levels, config.log_level) == levels.end()) {
+    constexpr std::array kLevels{"trace", "debug", "info", "warn", "error"};
+    if (std::ranges::find(kLevels, config.log_level) == kLevels.end()) {
       file.fail(*file.find("log", "level"), "log", "level",
-                fmt::format("= '{}' must be one of {}", config.log_level, fmt::join(levels, ", ")));
+                fmt::format("= '{}' must be one of {}", config.log_level, fmt::join(kLevels, ", ")));
     }
   }
   file.refuse_unknown_keys();

@@ -18,6 +18,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "server/counted.hpp"
+
 namespace server {
 
 class WorkerThread {
@@ -31,7 +33,7 @@ class WorkerThread {
   // Call from the loop's thread.
   template <class Job>
   boost::asio::awaitable<std::invoke_result_t<Job>> run(Job job) {
-    const Pending pending{jobs_};
+    const Counted pending{jobs_};
     using Value = std::invoke_result_t<Job>;
     const boost::asio::cancellation_slot not_cancellable;
     co_return co_await boost::asio::co_spawn(
@@ -43,14 +45,6 @@ class WorkerThread {
   int jobs() const { return jobs_; }
 
  private:
-  struct Pending {
-    explicit Pending(int& count) : count_{count} { ++count_; }
-    ~Pending() { --count_; }
-    Pending(const Pending&) = delete;
-    Pending& operator=(const Pending&) = delete;
-    int& count_;
-  };
-
   template <class Value, class Job>
   static boost::asio::awaitable<Value> invoke(Job job) {
     co_return job();

@@ -17,6 +17,7 @@
 
 #include "server/api/contained.hpp"
 #include "server/api/live_socket.hpp"
+#include "server/counted.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -310,14 +311,6 @@ asio::awaitable<Result<std::optional<std::string>>> Connection::next_piece(BodyS
   spdlog::error("an answer was cut short: {}", failure);
   co_return fail(ErrorCode::internal, failure);
 }
-
-struct Counted {
-  explicit Counted(std::size_t& count) : count_{count} { ++count_; }
-  ~Counted() { --count_; }
-  Counted(const Counted&) = delete;
-  Counted& operator=(const Counted&) = delete;
-  std::size_t& count_;
-};
 
 }  // namespace
 

@@ -7,6 +7,7 @@
 #include "server/api/emergency.hpp"
 #include "server/api/http.hpp"
 #include "server/api/json.hpp"
+#include "server/counted.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -24,14 +25,6 @@ asio::awaitable<void> stop_one(LiveParts& parts, RobotId robot_id, std::string a
 asio::awaitable<void> stop_all(LiveParts& parts, std::string actor) {
   co_await stop_all_robots(parts.loop, parts.tasks, parts.station, std::move(actor));
 }
-
-struct Counted {
-  explicit Counted(std::size_t& count) : count_{count} { ++count_; }
-  ~Counted() { --count_; }
-  Counted(const Counted&) = delete;
-  Counted& operator=(const Counted&) = delete;
-  std::size_t& count_;
-};
 
 asio::awaitable<void> renew(LiveParts& parts, CommandRequest request) {
   const Counted counted{parts.renewals};

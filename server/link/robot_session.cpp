@@ -19,16 +19,16 @@ constexpr std::int64_t kProbePeriodUs = 1'000'000;
 constexpr std::uint64_t kMaxNumber = std::uint64_t{1} << 62;  // of a sample or µs: beyond any boot, and safe to add to
 constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
 
-template <std::size_t Size>
-void copy_text(char (&to)[Size], const std::string& from) {
-  const std::size_t count = std::min(from.size(), Size - 1);
+template <std::size_t size>
+void copy_text(char (&to)[size], const std::string& from) {
+  const std::size_t count = std::min(from.size(), size - 1);
   std::memcpy(to, from.data(), count);
   to[count] = '\0';
 }
 
 bool is_robot_id(const std::string& id) {
-  constexpr auto allowed = "abcdefghijklmnopqrstuvwxyz0123456789_-";
-  return !id.empty() && id.find_first_not_of(allowed) == std::string::npos;
+  constexpr auto kAllowed = "abcdefghijklmnopqrstuvwxyz0123456789_-";
+  return !id.empty() && id.find_first_not_of(kAllowed) == std::string::npos;
 }
 
 const char* fault_of(const protocol::Telemetry& batch) {

@@ -13,10 +13,11 @@ namespace {
 using ::testing::HasSubstr;
 
 class ConfigTest : public ::testing::Test {
- protected:
+ public:
   ConfigTest() { std::filesystem::create_directories(folder_); }
   ~ConfigTest() override { std::filesystem::remove_all(folder_); }
 
+ protected:
   ConfigFlags file(const std::string& content) {
     std::ofstream{folder_ / "station.toml"} << content;
     ConfigFlags flags;

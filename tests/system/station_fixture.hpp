@@ -16,10 +16,11 @@ namespace server {
 using namespace std::chrono_literals;
 
 class SystemTest : public ::testing::Test {
- protected:
+ public:
   SystemTest();
   ~SystemTest() override;
 
+ protected:
   // Runs a coroutine to its end, in virtual time, and gives its result.
   template <class T>
   T wait_for(boost::asio::awaitable<T> coroutine, microseconds limit = 10s) {

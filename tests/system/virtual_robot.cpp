@@ -93,8 +93,8 @@ void VirtualRobot::lose(const std::shared_ptr<Link>& link) {
 }
 
 asio::awaitable<void> VirtualRobot::dial_later() {
-  constexpr std::chrono::milliseconds pause{500};
-  co_await clock_.sleep_for(pause);
+  constexpr std::chrono::milliseconds kPause{500};
+  co_await clock_.sleep_for(kPause);
   if (!link_) dial(*listener_);
 }
 

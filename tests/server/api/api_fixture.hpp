@@ -36,10 +36,11 @@ struct Answered {
 };
 
 class ApiTest : public ::testing::Test {
- protected:
+ public:
   ApiTest();
   ~ApiTest() override;
 
+ protected:
   TestRobot& connect_robot();  // "r1", boot 77, in manual
 
   // Asks the routes directly, past socket and guard.

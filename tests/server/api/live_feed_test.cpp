@@ -15,7 +15,7 @@ using nlohmann::json;
 LiveText message(const std::string& text) { return std::make_shared<const std::string>(text); }
 
 class LiveFeedTest : public ::testing::Test {
- protected:
+ public:
   LiveFeedTest() {
     robot.id = "r1";
     robot.link = LinkState::connected;
@@ -29,6 +29,7 @@ class LiveFeedTest : public ::testing::Test {
     clock.settle();
   }
 
+ protected:
   std::vector<json> heard() {
     std::vector<json> all;
     for (LiveText text = listener.pop(); text != nullptr; text = listener.pop()) all.push_back(json::parse(*text));

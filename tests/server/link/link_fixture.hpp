@@ -10,13 +10,14 @@ namespace server {
 using namespace std::chrono_literals;
 
 class LinkTest : public ::testing::Test {
- protected:
+ public:
   LinkTest() { station.add_sink(sink); }
   ~LinkTest() override {
     tasks.stop();
     clock.settle();
   }
 
+ protected:
   TestRobot* dial(std::size_t capacity_bytes = 64 * 1024) {
     robots_.push_back(std::make_unique<TestRobot>(loop, clock, tasks, listener, capacity_bytes));
     return robots_.back().get();

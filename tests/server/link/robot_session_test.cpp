@@ -217,13 +217,13 @@ TEST_F(LinkTest, WhatIsNoNumberOrBeyondAllTimeEndsTheConnection) {
     change(frame);
     return frame;
   };
-  constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
-  constexpr std::uint64_t far = std::uint64_t{1} << 63;
-  for (const auto& frame : {telemetry([](auto& f) { f.body.telemetry.disturbance_m = not_a_number; }),
-                            telemetry([](auto& f) { f.body.telemetry.position_sd_m = not_a_number; }),
+  constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
+  constexpr std::uint64_t kFar = std::uint64_t{1} << 63;
+  for (const auto& frame : {telemetry([](auto& f) { f.body.telemetry.disturbance_m = kNotANumber; }),
+                            telemetry([](auto& f) { f.body.telemetry.position_sd_m = kNotANumber; }),
                             telemetry([](auto& f) { f.body.telemetry.period_us = 0; }),
-                            telemetry([](auto& f) { f.body.telemetry.first_robot_time_us = far; }),
-                            telemetry([](auto& f) { f.robot_time_us = far; })}) {
+                            telemetry([](auto& f) { f.body.telemetry.first_robot_time_us = kFar; }),
+                            telemetry([](auto& f) { f.robot_time_us = kFar; })}) {
     auto* robot = connect();
     robot->send(frame);
     ASSERT_TRUE(clock.run_until([&] { return robot->closed; }, 100ms));

@@ -72,12 +72,12 @@ void TestRobot::acknowledge(const protocol::Command& command, protocol::CommandR
 void TestRobot::keep_talking() { tasks_.spawn("test robot talks", talk()); }
 
 asio::awaitable<void> TestRobot::talk() {
-  constexpr std::chrono::milliseconds interval{200};
+  constexpr std::chrono::milliseconds kInterval{200};
   for (;;) {
     protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
     frame.which_body = rheonaut_RobotFrame_heartbeat_tag;
     send(frame);
-    co_await clock_.sleep_for(interval);
+    co_await clock_.sleep_for(kInterval);
   }
 }
 

@@ -56,11 +56,12 @@ struct Missing {
 };
 
 class RecordingTest : public ::testing::Test {
- protected:
-  using Run = server::Run;  // and not testing::Test's
-
+ public:
   RecordingTest();
   ~RecordingTest() override;
+
+ protected:
+  using Run = server::Run;  // and not testing::Test's
 
   // A station begins on this folder: opens the database, loads the runs, records.
   void start(RecorderOptions options = {});
