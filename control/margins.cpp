@@ -16,8 +16,10 @@ using std::numbers::pi;
 
 constexpr double kDegPerRad = 180 / pi;
 constexpr double kDbPerNeper = 20 / std::numbers::ln10;
-constexpr double kScanStep = 0.06;  // in ln ω; the phase of a power law has no feature narrower than about 1
-constexpr double kMostSamples = 4000;
+constexpr double kScanStep = 0.2;        // in ln ω; a power law has no feature narrower than about 1
+constexpr double kAsymptoteStep = 0.6;   // far from every break
+constexpr double kResonanceStep = 0.06;  // near where D or C may resonate
+constexpr double kResonanceReach = 2;
 constexpr double kBeyond = 9.2;     // ln 1e4: how far the scan goes past the outermost break
 constexpr double kAsymptote = 2.1;  // ln 8: |L| is that near to its asymptote past the breaks, or nearer
 constexpr double kSlightest = -14;  // ln 1e-6: changes of |L| that are not worth a longer scan
@@ -71,42 +73,66 @@ Asymptote right_asymptote(const OpenLoop& loop) {
 
 struct LogRange {
   double low = 0, high = 0;
+  void include(double log_omega) { low = std::min(low, log_omega), high = std::max(high, log_omega); }
 };
 
-// From below the lowest to above the highest frequency where anything happens.
-LogRange range_to_scan(const OpenLoop& loop) {
+// The frequencies at which two terms of D or of C are equal: between and near them |L| bends.
+LogRange range_of_breaks(const OpenLoop& loop) {
   const auto& [kp, b1, b2, b3, alpha, beta] = loop.plant;
-  const auto& [controller_kp, kd, mu] = loop.controller;
   LogRange range{std::log(b3 / b2) / beta, std::log(b3 / b2) / beta};
-  const auto include = [&range](double log_omega) {
-    range = {std::min(range.low, log_omega), std::max(range.high, log_omega)};
-  };
-  if (b1 > 0) include(std::log(b2 / b1) / (alpha - beta));
-  if (b1 > 0) include(std::log(b3 / b1) / alpha);
-  if (kd > 0) include(-std::log(kd) / mu);
-  const double dc = log_dc_gain(loop);
+  if (b1 > 0) range.include(std::log(b2 / b1) / (alpha - beta));
+  if (b1 > 0) range.include(std::log(b3 / b1) / alpha);
+  if (loop.controller.kd > 0) range.include(-std::log(loop.controller.kd) / loop.controller.mu);
+  return range;
+}
+
+// From below the lowest to above the highest frequency where anything happens: the asymptotes may reach 1 far away.
+LogRange range_to_scan(const OpenLoop& loop, LogRange range) {
+  const double beta = loop.plant.beta, dc = log_dc_gain(loop);
+  const auto& [kp, kd, mu] = loop.controller;
+  const double lowest_break = range.low;
   if (!loop.is_velocity_loop) {
-    include(dc);  // |L| ≈ K/ω on the left
+    range.include(dc);  // |L| ≈ K/ω on the left
   } else if (dc != 0) {
-    include(range.low + std::min(0.0, std::log(std::abs(dc)) / std::min(beta, mu)));  // leaves K ≈ 1 that far down
+    range.include(lowest_break +
+                  std::min(0.0, std::log(std::abs(dc))) / std::min(beta, mu));  // leaves K ≈ 1 that far down
   }
   if (loop.is_velocity_loop && kd > 0 && mu != beta) {
-    const double turn = std::log(kd * b3 / b2) / (beta - mu);  // |L| leaves K on one side, and turns to the other
-    if (std::log(kd) + mu * turn > kSlightest) include(turn);
+    const double turn = std::log(kd * loop.plant.b3 / loop.plant.b2) / (beta - mu);  // leaves K up, and turns down
+    if (std::log(kd) + mu * turn > kSlightest) range.include(turn);
   }
   const Asymptote right = right_asymptote(loop);
-  if (right.slope != 0) include(-right.log_gain / right.slope + kAsymptote / std::abs(right.slope));
+  if (right.slope != 0) range.include(-right.log_gain / right.slope + kAsymptote / std::abs(right.slope));
   return {std::clamp(range.low - kBeyond, -kLargestLogOmega, kLargestLogOmega - 1),
           std::clamp(range.high + kBeyond, 1 - kLargestLogOmega, kLargestLogOmega)};
 }
 
-std::vector<Sample> scan(const LoopOnAxis& loop, const LogRange& range) {
-  const double intervals = std::clamp(std::ceil((range.high - range.low) / kScanStep), 1.0, kMostSamples);
-  std::vector<Sample> samples(static_cast<std::size_t>(intervals) + 1);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    const double log_omega = range.low + (range.high - range.low) * static_cast<double>(i) / intervals;
-    samples[i] = {log_omega, loop.at(log_omega)};
+// Where D (alpha near 2, b2 small) and C (mu above 1) may have sharp turns; 0 rad/s where they cannot.
+struct Resonances {
+  double plant = -HUGE_VAL, controller = -HUGE_VAL;
+};
+
+Resonances possible_resonances(const OpenLoop& loop) {
+  Resonances result;
+  if (loop.plant.b1 > 0) result.plant = std::log(loop.plant.b3 / loop.plant.b1) / loop.plant.alpha;
+  const auto& [kp, kd, mu] = loop.controller;
+  if (kd > 0 && mu > 1) result.controller = -std::log(kd) / mu;
+  return result;
+}
+
+std::vector<Sample> scan(const OpenLoop& loop, const LoopOnAxis& on_axis) {
+  const LogRange breaks = range_of_breaks(loop), range = range_to_scan(loop, breaks);
+  const Resonances resonances = possible_resonances(loop);
+  const auto step_at = [&](double log_omega) {
+    const double away = std::min(std::abs(log_omega - resonances.plant), std::abs(log_omega - resonances.controller));
+    if (away < kResonanceReach) return kResonanceStep;
+    return log_omega > breaks.low - kBeyond && log_omega < breaks.high + kBeyond ? kScanStep : kAsymptoteStep;
+  };
+  std::vector<Sample> samples;
+  for (double log_omega = range.low; log_omega < range.high; log_omega += step_at(log_omega)) {
+    samples.push_back({log_omega, on_axis.at(log_omega)});
   }
+  samples.push_back({range.high, on_axis.at(range.high)});
   return samples;
 }
 
@@ -173,7 +199,7 @@ Peak peak_between(double low, double high, const Function& f) {
   constexpr double kGolden = std::numbers::phi - 1;
   double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
   double at_a = f(a), at_b = f(b);
-  while (high - low > 1e-11) {
+  while (high - low > 1e-9) {
     if (at_a > at_b) {
       high = b, b = a, at_b = at_a;
       a = high - kGolden * (high - low), at_a = f(a);
@@ -318,7 +344,7 @@ std::vector<double> log_spaced(double first_rad_s, double last_rad_s, int count)
 Margins margins(const OpenLoop& loop) {
   check(loop);
   const LoopOnAxis on_axis{loop};
-  const std::vector<Sample> samples = scan(on_axis, range_to_scan(loop));
+  const std::vector<Sample> samples = scan(loop, on_axis);
   std::vector<double> crossovers = zeros(on_axis, samples, log_gain);
   const std::vector<double> phase_crossovers = zeros(on_axis, samples, phase_above_minus_pi);
   Margins result;
