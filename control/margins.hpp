@@ -9,7 +9,7 @@
 //
 // The frequencies worth searching follow from where the terms of D and C are equal and from the asymptotes of |L|, so
 // that time constants of milliseconds and of hours are alike.
-// Accuracy: crossovers 1e-12 relative; magnitude and phase 1e-12 dB and degrees; held by margins_test.cpp.
+// Accuracy: crossovers 1e-12 relative; magnitude and phase 1e-10 dB and degrees; held by margins_test.cpp.
 // Errors:   throws std::invalid_argument quoting the bad value.
 // Differs from the paper: no.
 #pragma once

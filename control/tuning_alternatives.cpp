@@ -34,7 +34,7 @@ bool is_inside(const ThetaRange& range, double theta_rad) {
   return theta_rad > range.low_rad && theta_rad < range.high_rad;
 }
 
-// How far the specification, moved to this frequency, is inside the feasible region; negative outside.
+// Whether the specification would have a solution if its crossover were here.
 bool is_feasible_at(const PlantOnAxis& plant, const TuningSpec& spec, double log_omega) {
   const TuningDemand demand = tuning_demand(plant, log_omega, spec.phase_margin_deg);
   return is_inside(feasible_theta(spec, demand.phase_fall), demand.theta_rad);
