@@ -14,7 +14,9 @@ using std::numbers::pi;
 
 constexpr double kNearestToCutRad = 1e-7;  // nearer, a pole cannot be told from a double one on the cut
 constexpr double kFastestLogRate = 40;     // of a mode, against 1/shortest_s; still faster ones follow at once
-constexpr double kLargestLogRate = 4e4;    // where those are given up: enough for beta = 0.001
+constexpr double kLargestGrowth = 1e20;
+constexpr double kLargestPoleLogRate = 200;  // faster and slower poles are beyond any time of interest
+constexpr double kLargestLogRate = 4e4;      // where those are given up: enough for beta = 0.001
 
 void check(const ModalRange& range) {
   std::ostringstream text;
@@ -49,10 +51,15 @@ double magnitude(const FractionalModel& model, double log_frequency) {
   return std::abs(denominator(model, {log_frequency, pi / 2}));
 }
 
+// How much more the velocity of a step is in the end than at t, about; beyond what rounding leaves it does not matter.
+double growth_after(const FractionalModel& model, double t) {
+  return std::clamp(magnitude(model, -std::log(t)) / model.b3, 1.0, kLargestGrowth);
+}
+
 // A mode of rate x adds x t |H(x) - H(0) a/(x + a)|/H(0) to a response that has come to b3/|D(1/t)|: ln x where that is
 // the tolerance. The difference is at most 1, and below the sum of b1/b3 x^α, b2/b3 x^β and x/a.
 double lowest_log_rate(const FractionalModel& model, double slow_rate, double t, double tolerance) {
-  const double growth = std::max(magnitude(model, -std::log(t)) / model.b3, 1.0);
+  const double growth = growth_after(model, t);
   const double allowed = std::log(tolerance / growth) - std::log(t);
   double lowest = (allowed + std::log(slow_rate)) / 2;
   lowest = std::min(lowest, (allowed - std::log(model.b2 / model.b3)) / (1 + model.beta));
@@ -85,9 +92,18 @@ std::optional<Complex> log_pole(const FractionalModel& model) {
   }
   Complex log_p = where_imaginary_part_vanishes(model, high);
   for (int i = 0; i < 3; ++i) {  // Newton in ln s
-    log_p -= denominator(model, log_p) / (denominator_slope(model, log_p) * std::exp(log_p));
+    const Complex correction = denominator(model, log_p) / (denominator_slope(model, log_p) * std::exp(log_p));
+    if (!(std::abs(correction) < 1e-3)) break;  // at magnitudes beyond a double the bisection must do
+    log_p -= correction;
   }
   return log_p;
+}
+
+std::optional<PolePair> pole_pair(const FractionalModel& model, double largest_angle_rad) {
+  const std::optional<Complex> log_p = log_pole(model);
+  if (!log_p || log_p->imag() >= largest_angle_rad || std::abs(log_p->real()) > kLargestPoleLogRate)
+    return std::nullopt;
+  return PolePair{std::exp(*log_p), model.kp / denominator_slope(model, *log_p)};  // (3)
 }
 
 Ray choose_ray(const FractionalModel& model, const ModalRange& range) {
@@ -99,7 +115,7 @@ Ray choose_ray(const FractionalModel& model, const ModalRange& range) {
   Ray ray;
   ray.angle_rad = (low + high) / 2;
   double highest = -std::log(range.shortest_s);
-  const double growth = std::max(magnitude(model, highest) / model.b3, 1.0);  // of the response after shortest_s
+  const double growth = growth_after(model, range.shortest_s);
   ray.log_step = pi * (high - low) / std::log(20 * growth / range.tolerance);
 
   // Up to where H has become small against its value at 1/shortest_s.
@@ -132,10 +148,9 @@ ModalForm modal_form(const FractionalModel& model, const ModalRange& range) {
   form.weight.push_back(follows_at_once(model, ray, 0.01 * range.tolerance / ray.growth) * fastest / 2);
   form.rate.push_back(-ray.slow_rate);
   form.weight.push_back(gain * ray.slow_rate / 2);
-  const std::optional<Complex> pole = log_pole(model);
-  if (pole && pole->imag() < ray.angle_rad) {
-    form.rate.push_back(std::exp(*pole));
-    form.weight.push_back(model.kp / denominator_slope(model, *pole));  // (3)
+  if (const std::optional<PolePair> pair = pole_pair(model, ray.angle_rad)) {
+    form.rate.push_back(pair->pole);
+    form.weight.push_back(pair->residue);
   }
   return form;
 }

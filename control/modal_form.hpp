@@ -55,6 +55,14 @@ struct Ray {
 // ln p of the pole with 0 < arg p < π, if there is one nearer than π - 1e-7; there is never a second.
 std::optional<Complex> log_pole(const FractionalModel& model);
 
+struct PolePair {
+  Complex pole;     // p, 1/s; the other is its conjugate
+  Complex residue;  // r of (3)
+};
+
+// The pole pair if 0 < arg p < largest_angle_rad and p is between e^-200 and e^200 1/s.
+std::optional<PolePair> pole_pair(const FractionalModel& model, double largest_angle_rad);
+
 Ray choose_ray(const FractionalModel& model, const ModalRange& range);
 
 ModalForm modal_form(const FractionalModel& model, const ModalRange& range);

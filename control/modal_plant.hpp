@@ -6,7 +6,7 @@
 //
 // Modes that settle within one step have no state: y = -w u/s, which makes c and its part of (3). Thus (3) makes the
 // position one more weighted sum of the same states, and keeps it consistent with the velocity for days. Accuracy:
-// velocity and position step responses within 2e-6 relative from 10 ms to a day, or 1e-15 of kp/b3 and of
+// velocity and position step responses within 2e-6 relative from 10 ms to a day, or 1e-14 of kp/b3 and of
 //           kp/b3 ∫|u| dt where that is more, for every model that check() allows and every dt_s; before 10 ms within
 //           2e-6 of the value at 10 ms. Held by modal_plant_test.cpp.
 // Errors:   throws std::invalid_argument quoting the bad value.

@@ -45,16 +45,6 @@ std::array<Node, kNodes / 2> talbot_nodes() {
   return nodes;
 }
 
-struct PolePair {
-  Complex pole, residue;  // of H
-};
-
-std::optional<PolePair> pole_pair(const FractionalModel& model) {
-  const std::optional<Complex> log_p = log_pole(model);
-  if (!log_p || log_p->imag() > kNarrowestRad) return std::nullopt;
-  return PolePair{std::exp(*log_p), model.kp / denominator_slope(model, *log_p)};
-}
-
 struct Motion {
   double velocity_m_s = 0;
   double position_m = 0;
@@ -141,7 +131,7 @@ class Modes {
 TimeResponse step_response(const FractionalModel& model, double duty, std::span<const double> time_s) {
   check(model);
   if (!std::isfinite(duty)) refuse("duty must be finite, is", duty);
-  const std::optional<PolePair> pair = pole_pair(model);
+  const std::optional<PolePair> pair = pole_pair(model, kNarrowestRad);
   TimeResponse response;
   for (const double t : time_s) {
     if (!(t >= 0 && std::isfinite(t))) refuse("times must be finite and not negative, is", t);

@@ -136,6 +136,23 @@ TEST(ModalForm, HasOnlyDecayingModesAndFewOfThem) {
   EXPECT_LE(modal_form(kNonNewtonianModel, {0.01, 1e5, 1e-6}).rate.size(), 150u);
 }
 
+TEST(ModalForm, IsFiniteForAbsurdCoefficients) {
+  for (const double b1 : {0.0, 1e-200, 1.0, 1e200}) {
+    for (const double b2 : {1e-200, 1.0, 1e200}) {
+      for (const double b3 : {1e-100, 1.0, 1e100}) {
+        for (const double alpha : {1.01, 1.7, 2.0}) {
+          const FractionalModel model{1, b1, b2, b3, alpha, 1};
+          const ModalForm form = modal_form(model, {});
+          EXPECT_LE(form.rate.size(), 5000u) << described(model);
+          const Motion motion = unit_step(form, 1);
+          EXPECT_TRUE(std::isfinite(motion.velocity_m_s)) << described(model);
+          EXPECT_TRUE(std::isfinite(motion.position_m)) << described(model);
+        }
+      }
+    }
+  }
+}
+
 TEST(LogPole, IsThePoleOfTheReference) {
   const auto pole = golden("fo_step_velocity.json")["poles_principal_sheet"][0];
   const std::optional<Complex> log_p = log_pole(kNonNewtonianModel);

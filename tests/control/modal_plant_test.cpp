@@ -154,7 +154,7 @@ TEST(ModalPlant, FollowsModelsFromTheWholeRangeThroughChangingDuty) {
         fastest_m_s = std::max(fastest_m_s, std::abs(expected.velocity_m_s[k]));
         farthest_m = std::max(farthest_m, std::abs(expected.position_m[k]));
         if (time_s[k] < 0.01) continue;
-        const double rounding_m_s = 1e-15 * std::abs(model.kp / model.b3), rounding_m = rounding_m_s * time_s[k];
+        const double rounding_m_s = 1e-14 * std::abs(model.kp / model.b3), rounding_m = rounding_m_s * time_s[k];
         ASSERT_NEAR(plant.velocity_m_s(), expected.velocity_m_s[k], 2e-6 * fastest_m_s + rounding_m_s)
             << model.alpha << " " << dt_s;
         ASSERT_NEAR(plant.position_m(), expected.position_m[k], 2e-6 * farthest_m + rounding_m)
