@@ -11,8 +11,9 @@
 // (where e^{st} stops decaying), the pole, the cut. The ray takes the middle of the wider gap, so d ≥ π/8 for every
 // model and no parameters need thousands of modes. (4) makes the rest vanish at s = 0, so that the sum may begin at
 // much faster rates. What the sum leaves out beyond its fastest rate is one more real mode of that rate: such modes
-// have settled by shortest_s, so only their sum matters. Shapes:   rate and weight have the same length; every rate
-// lies left of the imaginary axis, in the upper half plane
+// have settled by shortest_s, so only their sum matters.
+//
+// Shapes:   rate and weight have the same length; every rate lies left of the imaginary axis, in the upper half plane
 //           or on the real axis, and its mode counts twice the real part.
 // Accuracy: velocity and position step responses for shortest_s ≤ t ≤ longest_s within `tolerance` relative, or within
 //           1e-15 of kp/b3 and of kp/b3·t where that is more (rounding: a model of hours has hardly begun after
