@@ -47,7 +47,7 @@ std::size_t smoothing_length(const StepExperiment& experiment, std::size_t sampl
   return std::min(length, (samples - 1) | 1);
 }
 
-// The value at time 0 of the least-squares parabola, or straight line, through these points.
+// The value at at_s of the least-squares parabola, or straight line, through these points.
 double fitted_value(std::span<const double> time_s, std::span<const double> position_m, double at_s, bool is_parabola) {
   const double half_s = (time_s.back() - time_s.front()) / 2 + 1e-300;
   double s0 = 0, s1 = 0, s2 = 0, s3 = 0, s4 = 0, y0 = 0, y1 = 0, y2 = 0;

@@ -129,7 +129,7 @@ TEST(StepMetrics, OfANoisyRecordAreCloseToThoseOfTheCleanOne) {
         ASSERT_TRUE(metrics.settling_s.has_value());
         // In water the last swing ends just inside the band, where noise decides by one swing.
         EXPECT_NEAR(*metrics.settling_s, *exact.settling_s, 0.02 + (model.kp == kNewtonianModel.kp ? 400 : 80) * sd_m);
-        EXPECT_NEAR(metrics.overshoot_percent, exact.overshoot_percent, 0.45 + 600 * sd_m);
+        EXPECT_NEAR(metrics.overshoot_percent, exact.overshoot_percent, 0.45 + 900 * sd_m);  // the allowance
         EXPECT_NEAR(metrics.steady_state_error_m, exact.steady_state_error_m, 0.3 * sd_m);
         EXPECT_NEAR(*metrics.rise_10_90_s, *exact.rise_10_90_s, 0.03);
         EXPECT_NEAR(metrics.iae_m_s, exact.iae_m_s, 5 * sd_m);
