@@ -10,8 +10,8 @@
 // exp(-2πd/δ) with d the angle from the ray to either.
 // Accuracy: 1e-9 relative from 0.02 s on, held by continuous_loop_test.cpp against the reference cases. From 1.7 s on
 // the
-//           reference for (28) is itself off, by up to 1.7e-5: its contour leaves out the loop's poles. There, the test
-//           holds that two different rays agree to 1e-12.
+//           reference for (28) is itself off, by up to 1.7e-5: presumably its contour leaves out the loop's poles.
+//           There, the test holds that two different rays agree to 1e-12.
 // Errors:   throws std::invalid_argument quoting the bad value, or saying that the loop is unstable.
 #pragma once
 

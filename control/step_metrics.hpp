@@ -11,8 +11,8 @@
 //
 // With noise_sd_m > 0 the record is smoothed first: each sample becomes the value of the parabola fitted to the
 // m = (16 sd/band)² samples around it, 5 ≤ m ≤ 21 (near the ends, of the straight line through the m first or last
-// samples). It follows slope and curvature, so it neither lags nor cuts peaks off; noise of sd becomes 1.5 sd/√m. All
-// measures but the total variation are those of the smoothed record, and
+// samples). It follows slope and curvature, so it does not lag, but a peak narrower than m samples comes out lower;
+// noise of sd becomes 1.5 sd/√m. All measures but the total variation are those of the smoothed record, and
 //   settling   is none only if the smoothed record ends outside the band
 //   overshoot  is 0 unless beyond 1.5 sd √(2 ln n)/√m, which noise alone reaches among n samples
 //   IAE, ISE, ITAE count errors below 2.5 · 1.5 sd/√m as 0, or they would grow with the length of the record

@@ -23,7 +23,7 @@ TEST(ContinuousLoop, FollowsTheReferenceResponses) {
     const ContinuousLoop loop{is_fractional ? kNonNewtonianModel : kNewtonianModel, kPaperController};
     for (std::size_t i = 0; i < row["t"].size(); ++i) {
       const double expected = row["y"][i];
-      if (!is_fractional && row["t"][i] > 1.65) {  // the reference's contour leaves out the loop's poles
+      if (!is_fractional && row["t"][i] > 1.65) {  // the reference is off here: see the header
         ASSERT_NEAR(kSetpointM * loop.position(row["t"][i]), expected, 2e-5 * expected) << row["t"][i];
         continue;
       }
