@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kModelTolerance = 3e-13;
+constexpr double kModelTolerance = 1e-14;
 constexpr double kNearestToBound = 1e-9;  // of the orders and the dead time, as a share of their interval
 constexpr double kLargestLog = 60;        // of the gain and the coefficients, against their start in the search
 constexpr double kRoundingShare = 1e-9;   // residuals below this share of the signal are equal
@@ -247,7 +247,7 @@ SearchEnd OutputErrorSearch::descend(Structure structure, SearchPoint& point, in
   Eigen::VectorXd x = coordinates(structure, point);
   Descent descent{*this, structure};
   Eigen::LevenbergMarquardt<Descent> solver(descent);
-  solver.parameters.ftol = 1e-13;
+  solver.parameters.ftol = 1e-10;
   solver.parameters.xtol = 1e-11;
   solver.parameters.maxfev = 20 * (iteration_limit + 1);
   SearchEnd end = SearchEnd::converged;

@@ -13,7 +13,7 @@ namespace {
 using Eigen::Index;
 using std::numbers::pi;
 
-constexpr double kShortestShare = 1e-3;  // of a step, between a delayed change and a sample
+constexpr double kShortestShare = 1e-2;  // of a step, between a delayed change and a sample
 
 struct Terms {
   Complex first, second;  // b1 s^α, b2 s^β
