@@ -1,13 +1,17 @@
 // Frequency response and stability margins of the open loop, plant times controller.
 //
-//   L(jω) = C(jω) H(jω)/(jω)                 (1)   position loop, [birs2021] (22), (23); the velocity loop has no
-//   1/(jω) arg L = -π/2 + arg C - arg D             (2)   unwrapped: both arguments are continuous in ω, since D and C
-//   stay
-//                                                  in one half plane along the imaginary axis
-//   phase slope = d arg L/dω                 (3)   0 at the crossover is iso-damping, [birs2021] (26)
-//   Ms = max |1/(1 + L)|,  Mt = max |L/(1 + L)|   (4)
+//   L(jω) = C(jω) H(jω)/(jω)                      (1)   position loop, [birs2021] (22), (23)
+//   L(jω) = C(jω) H(jω)                           (2)   velocity loop
+//   arg L = -π/2 + arg C - arg D                  (3)   unwrapped: both arguments are continuous in ω, since D and C
+//                                                       stay in one half plane along the imaginary axis
+//   phase slope = d arg L/dω                      (4)   0 at the crossover is iso-damping, [birs2021] (26); analytic
+//   Ms = sup |1/(1 + L)|,  Mt = sup |L/(1 + L)|   (5)   over all ω, the limits at 0 and ∞ included
 //
-// Errors: throws std::invalid_argument quoting the bad value.
+// The frequencies worth searching follow from where the terms of D and C are equal and from the asymptotes of |L|, so
+// that time constants of milliseconds and of hours are alike.
+// Accuracy: crossovers 1e-12 relative; magnitude and phase 1e-12 dB and degrees; held by margins_test.cpp.
+// Errors:   throws std::invalid_argument quoting the bad value.
+// Differs from the paper: no.
 #pragma once
 
 #include <optional>
@@ -27,8 +31,8 @@ struct OpenLoop {
 void check(const OpenLoop& loop);
 
 Complex open_loop_response(const OpenLoop& loop, double omega_rad_s);      // L(jω), principal value
-double open_loop_phase_rad(const OpenLoop& loop, double omega_rad_s);      // (2), unwrapped
-double open_loop_phase_slope_s(const OpenLoop& loop, double omega_rad_s);  // (3), rad/(rad/s)
+double open_loop_phase_rad(const OpenLoop& loop, double omega_rad_s);      // (3), unwrapped
+double open_loop_phase_slope_s(const OpenLoop& loop, double omega_rad_s);  // (4), rad/(rad/s)
 
 struct BodePoint {
   double omega_rad_s = 0;
@@ -44,15 +48,17 @@ std::vector<double> log_spaced(double first_rad_s, double last_rad_s, int count)
 
 struct Margins {
   std::vector<double> gain_crossovers_rad_s;   // every ω with |L| = 1, ascending
-  std::vector<double> phase_crossovers_rad_s;  // every ω with arg L = -π - 2πk, ascending
+  std::vector<double> phase_crossovers_rad_s;  // every ω with arg L = -π, ascending
   // At the crossover with the smallest phase margin; none if |L| never is 1.
   std::optional<double> gain_crossover_rad_s;
   std::optional<double> phase_margin_deg;
   std::optional<double> phase_slope_deg_per_rad_s;
-  std::optional<double> gain_margin_db;  // the smallest; none if the phase never reaches -180 degrees: infinite
+  // The one nearest to 0 dB, negative where the gain must not fall; none if the phase never reaches -180 degrees.
+  std::optional<double> gain_margin_db;
+  bool is_closed_loop_stable = false;  // by Nyquist's criterion; if not, the other numbers are no margins
   double ms = 0;
   double mt = 0;
-  double ms_at_rad_s = 0;
+  double ms_at_rad_s = 0;  // the end of the searched range if (5) is a limit
   double mt_at_rad_s = 0;
 };
 

@@ -1,11 +1,12 @@
 // The motion models of the paper, and the hydrodynamics that one of them comes from.
 //
-//   H(s) = kp / (b1 s^α + b2 s^β + b3)        (1)   velocity, m/s per duty: [birs2021] (20), (28), (29); position
-//   H(s)/s (22) H_motor(s) = km / (Tm s + 1)              (2)   propeller rate, rad/s per duty: (17), (27) M = m +
-//   (4/3) β ρ π · π d²/4              (3)   mass and added mass, (13) read so that it gives (28): see below D = 2 u0
-//   X|u|u + Xu,  X|u|u = ρ Cd Af / 2,  Xu = ρ V Af Cd                (4)   (14), (15) H(s) = k / (s² + (1/Tm + D/M) s +
-//   D/(Tm M))                               (5)   (18), (19), normalised k = km Ct ρ A r² / (Tm M) (6)   (18), read
-//   literally
+//   H(s) = kp / (b1 s^α + b2 s^β + b3)                     (1)   velocity, m/s per duty: [birs2021] (20), (28), (29);
+//                                                                position, m per duty: H(s)/s, (22)
+//   H_motor(s) = km / (Tm s + 1)                           (2)   propeller rate, rad/s per duty: (17), (27)
+//   M = m + (4/3) β ρ π · π d²/4                           (3)   mass and added mass: (13), read so that it gives (28)
+//   D = 2 u0 X|u|u + Xu,  X|u|u = ρ Cd Af/2,  Xu = ρ V Af Cd     (4)   (14), (15)
+//   H(s) = k / (s² + (1/Tm + D/M) s + D/(Tm M))            (5)   (18), (19), normalised
+//   k = km Ct ρ A r² / (Tm M)                              (6)   (18), read literally
 //
 // Differs from the paper: (3) has π (d/2)² where (13) prints (d/2)²; only so are 60.13 and 667.1 of (28) met, within
 // 0.04 % and 0.15 %. No sound reading of (18) gives its 232; (6) gives 3.4 to 3.6. The model keeps 232 as an empirical

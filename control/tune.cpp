@@ -1,2 +1,134 @@
 // The closed form, its condition, and what to offer instead.
 #include "control/tune.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <sstream>
+#include <stdexcept>
+
+#include "control/tuning_alternatives.hpp"
+#include "control/tuning_equations.hpp"
+
+namespace control {
+namespace {
+
+using std::numbers::pi;
+
+constexpr double kDegPerRad = 180 / pi;
+
+[[noreturn]] void refuse(const char* what, double value) {
+  std::ostringstream text;
+  text.precision(10);
+  text << "tuning: " << what << ' ' << value;
+  throw std::invalid_argument(text.str());
+}
+
+void check_plant(const FractionalModel& plant) {
+  check(plant);
+  if (plant.kp < 0) refuse("the plant's kp must be positive (turn the sign of the duty), is", plant.kp);
+}
+
+void check_crossover(double omega_rad_s) {
+  if (!(omega_rad_s > 0 && std::abs(std::log(omega_rad_s)) <= kLargestLogOmega)) {
+    refuse("gain_crossover_rad_s must be positive, and within 1e-65 and 1e65, is", omega_rad_s);
+  }
+}
+
+void check(const TuningSpec& spec) {
+  check_crossover(spec.gain_crossover_rad_s);
+  if (!(spec.phase_margin_deg > 0 && spec.phase_margin_deg < 180)) {
+    refuse("phase_margin_deg must lie in (0, 180), is", spec.phase_margin_deg);
+  }
+  if (spec.mu && !(*spec.mu > 0 && *spec.mu < 2)) refuse("mu must lie in (0, 2), is", *spec.mu);
+}
+
+bool is_feasible(const TuningSpec& spec, const TuningDemand& demand) {
+  if (spec.mu) return demand.theta_rad >= 0 && demand.theta_rad < *spec.mu * pi / 2;
+  return demand.phase_fall < largest_phase_fall(demand.theta_rad);  // (5)
+}
+
+std::string name_of(const TuningSpec& spec) {
+  if (!spec.mu) return "as asked: iso-damped";
+  if (*spec.mu <= 1) return "as asked: mu fixed, iso-damping dropped";
+  return "as asked: mu fixed, above 1: amplifies noise more than a derivative, not in the paper; iso-damping dropped";
+}
+
+std::string no_phase_to_add(const TuningSpec& spec, double theta_deg) {
+  std::ostringstream text;
+  text.precision(6);
+  const double plant_deg = spec.phase_margin_deg - theta_deg;
+  text << "the plant with a plain gain has a phase margin of " << plant_deg << " degrees at "
+       << spec.gain_crossover_rad_s << " rad/s, " << (theta_deg < 0 ? "more than" : "just") << " the "
+       << spec.phase_margin_deg << " asked for, and a fractional PD can only add phase (theta = " << theta_deg
+       << " degrees)";
+  return text.str();
+}
+
+std::string why_not_with_mu(const TuningSpec& spec, double theta_deg) {
+  if (theta_deg < 0) return no_phase_to_add(spec, theta_deg);
+  std::ostringstream text;
+  text.precision(6);
+  text << "the controller would have to add theta = " << theta_deg << " degrees of phase at "
+       << spec.gain_crossover_rad_s << " rad/s, and with mu = " << *spec.mu << " it adds less than " << *spec.mu * 90
+       << "; ";
+  if (theta_deg < 180) {
+    text << "a mu above " << theta_deg / 90 << " would do";
+  } else {
+    text << "no mu below 2 would do";
+  }
+  return text.str();
+}
+
+std::string why_not_iso_damped(const TuningSpec& spec, double theta_deg, double phase_fall) {
+  if (theta_deg <= 0) return no_phase_to_add(spec, theta_deg);
+  std::ostringstream text;
+  text.precision(6);
+  if (theta_deg >= 90) {
+    text << "the controller would have to add theta = " << theta_deg << " degrees of phase at "
+         << spec.gain_crossover_rad_s << " rad/s, and a fractional PD with mu up to 1 adds less than 90";
+    return text.str();
+  }
+  const double bound = largest_phase_fall(theta_deg / kDegPerRad);
+  text << "at " << spec.gain_crossover_rad_s << " rad/s the phase of the plant falls by R = " << phase_fall
+       << " rad per unit of ln omega, and a fractional PD with mu up to 1 that adds theta = " << theta_deg
+       << " degrees can make up for less than sin(2 theta)/2 = " << bound;
+  if (phase_fall >= 0.5) text << " (and never for more than 0.5, so no phase margin is iso-damped at this crossover)";
+  return text.str();
+}
+
+}  // namespace
+
+TuningResult tune(const FractionalModel& plant, const TuningSpec& spec) {
+  check_plant(plant);
+  check(spec);
+  const PlantOnAxis on_axis{plant, spec.is_velocity_loop};
+  const TuningDemand demand = tuning_demand(on_axis, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
+  TuningResult result;
+  result.theta_deg = demand.theta_rad * kDegPerRad;
+  result.phase_fall = demand.phase_fall;
+  result.is_feasible = is_feasible(spec, demand);
+  if (result.is_feasible) {
+    const double mu = spec.mu ? *spec.mu : iso_damping_mu(demand);
+    result.tuned = tuned_controller(plant, spec, mu, name_of(spec));
+  } else {
+    result.reason = spec.mu ? why_not_with_mu(spec, result.theta_deg)
+                            : why_not_iso_damped(spec, result.theta_deg, result.phase_fall);
+    result.nearest = nearest_designs(plant, spec);
+    result.relaxed = relaxed_designs(plant, spec);
+  }
+  return result;
+}
+
+std::optional<PhaseMarginRange> feasible_phase_margins(const FractionalModel& plant, double gain_crossover_rad_s,
+                                                       bool is_velocity_loop) {
+  check_plant(plant);
+  check_crossover(gain_crossover_rad_s);
+  const PlantOnAxis on_axis{plant, is_velocity_loop};
+  const TuningDemand demand = tuning_demand(on_axis, std::log(gain_crossover_rad_s), 0);
+  if (demand.phase_fall >= 0.5) return std::nullopt;
+  const double plain_deg = -demand.theta_rad * kDegPerRad;                   // the phase margin with θ = 0
+  const double low_deg = std::asin(2 * demand.phase_fall) / 2 * kDegPerRad;  // (5)
+  return PhaseMarginRange{plain_deg + low_deg, plain_deg + 90 - low_deg};
+}
+
+}  // namespace control

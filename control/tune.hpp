@@ -8,6 +8,9 @@
 //                                                                                     exactly then, and it is unique
 //   kp = 1/(|1 + kd (jω)^μ| |P(jω)|)                                            (6)
 //
+// The left side of (4) is the slope that the controller adds, R the slope that the plant takes away. With 1 < μ < 2 (4)
+// has a solution for every 0 < θ < 180°; such a controller amplifies noise more than a derivative, and is named so.
+// Accuracy: crossover 1e-9 relative, phase margin 1e-7 degrees, slope 1e-9; held by tune_test.cpp.
 // Differs from the paper: (25) prints a sum of frequency responses where their phases are meant. Its specification (65
 // rad/s, 72 degrees, iso-damped) has no solution on its plant: θ = 107°.
 // Errors: throws std::invalid_argument quoting the bad value. No solution is a result, not an error.
@@ -23,15 +26,15 @@ namespace control {
 
 struct TuningSpec {
   double gain_crossover_rad_s = 5;
-  double phase_margin_deg = 91;
-  std::optional<double> mu;  // fixed: iso-damping is dropped, and (3), (6) alone are met
+  double phase_margin_deg = 91;             // in (0, 180)
+  std::optional<double> mu = std::nullopt;  // in (0, 2); fixed: iso-damping is dropped, and (3), (6) alone are met
   bool is_velocity_loop = false;
 };
 
 // A specification that has a solution, and the controller for it.
 struct TunedController {
-  std::string name;  // in words: what was kept and what was given up
-  TuningSpec spec;
+  std::string name;  // in words: what was kept and what was given up, and what else is to be known of it
+  TuningSpec spec;   // tuning to this returns this controller
   FopdController controller;
   Margins achieved;  // computed from the controller's own numbers
 };
@@ -41,14 +44,17 @@ struct TuningResult {
   std::optional<TunedController> tuned;
   std::string reason;                    // if not feasible: one sentence that says why, with the numbers of (5)
   double theta_deg = 0, phase_fall = 0;  // θ and R of (2)
-  std::vector<TunedController> nearest;  // iso-damped: nearest feasible phase margin here, nearest crossover
-  std::vector<TunedController> relaxed;  // mu fixed; flattest phase for this crossover and margin; mu > 1, named so
+  // If not feasible, what is: nearest keeps iso-damping or the fixed mu, and offers the nearest phase margin at this
+  // crossover and the nearest crossovers below and above for this phase margin; relaxed keeps crossover and margin.
+  std::vector<TunedController> nearest;
+  std::vector<TunedController> relaxed;  // mu fixed; the flattest phase with mu up to 1; mu > 1, named so
 };
 
+// The plant's gain must be positive.
 TuningResult tune(const FractionalModel& plant, const TuningSpec& spec);
 
-// Every phase margin that has an iso-damped solution at this crossover: the ends of the interval, none if there is
-// none.
+// Every phase margin that has an iso-damped solution at this crossover: the ends of the open interval, none if there
+// is none. It may reach below 0: such loops are unstable, and tune refuses them.
 struct PhaseMarginRange {
   double low_deg = 0, high_deg = 0;
 };

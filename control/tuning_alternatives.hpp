@@ -1,0 +1,20 @@
+// What to offer when a tuning specification has no solution: the nearest that has one, and designs that give up less
+// important wishes.
+//
+// Nearest crossovers are looked for within a factor of 1e6, in steps of 2 %, so that a band narrower than that may be
+// missed. What is offered lies a little inside the feasible region, where it really can be solved: 0.1 degrees or 0.1 %
+// of the frequency, or less where the region is narrow.
+// Errors: none; the arguments have been checked.
+#pragma once
+
+#include "control/tune.hpp"
+
+namespace control {
+
+// Tunes to a specification that has a solution, with this mu, and measures what came of it.
+TunedController tuned_controller(const FractionalModel& plant, const TuningSpec& spec, double mu, std::string name);
+
+std::vector<TunedController> nearest_designs(const FractionalModel& plant, const TuningSpec& spec);
+std::vector<TunedController> relaxed_designs(const FractionalModel& plant, const TuningSpec& spec);
+
+}  // namespace control
