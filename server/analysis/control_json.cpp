@@ -176,6 +176,7 @@ OrderedJson json_of(const control::Margins& margins) {
           {"ms_at_rad_s", margins.ms_at_rad_s},
           {"mt_at_rad_s", margins.mt_at_rad_s},
           {"gain_margin_db", or_null(margins.gain_margin_db)},
+          {"is_closed_loop_stable", margins.is_closed_loop_stable},
           {"gain_crossovers_rad_s", margins.gain_crossovers_rad_s},
           {"phase_crossovers_rad_s", margins.phase_crossovers_rad_s}};
 }
@@ -214,8 +215,8 @@ OrderedJson json_of(const control::TuningResult& result) {
   }
   out["theta_deg"] = result.theta_deg;
   out["phase_fall"] = result.phase_fall;
-  out["iso_damped"] = OrderedJson::array();
-  for (const auto& tuned : result.nearest) out["iso_damped"].push_back(json_of(tuned));
+  out["nearest_all"] = OrderedJson::array();
+  for (const auto& tuned : result.nearest) out["nearest_all"].push_back(json_of(tuned));
   out["relaxed"] = OrderedJson::array();
   for (const auto& tuned : result.relaxed) out["relaxed"].push_back(json_of(tuned));
   return out;

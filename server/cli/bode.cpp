@@ -71,6 +71,7 @@ void write_margins(std::ostream& out, const control::Margins& margins) {
     table.row({"phase crossovers", list(margins.phase_crossovers_rad_s), "rad/s"});
   }
   table.write(out);
+  if (!margins.is_closed_loop_stable) out << "the closed loop is UNSTABLE: these numbers are no margins\n";
 }
 
 int run(const Bode& wish, std::ostream& out) {

@@ -2,7 +2,6 @@
 #include "server/cli/command_line.hpp"
 
 #include <CLI/CLI.hpp>
-#include <iostream>
 #include <memory>
 #include <sstream>
 #include <stdexcept>
@@ -66,9 +65,9 @@ Wish parse_command_line(int argc, char** argv) {
   return wish;
 }
 
-std::optional<int> answer(const Wish& wish) {
+std::optional<int> answer(const Wish& wish, std::ostream& out) {
   return std::visit(
-      [](const auto& wanted) -> std::optional<int> {
+      [&out](const auto& wanted) -> std::optional<int> {
         using T = std::decay_t<decltype(wanted)>;
         if constexpr (std::is_same_v<T, Serve>) {
           return std::nullopt;
@@ -79,8 +78,8 @@ std::optional<int> answer(const Wish& wish) {
         } else {
           std::ostringstream text;
           const int exit_code = run(wanted, text);
-          std::cout << text.view() << std::flush;
-          if (!std::cout) throw std::runtime_error{"the answer could not be written to the standard output"};
+          out << text.view() << std::flush;
+          if (!out) throw std::runtime_error{"the answer could not be written; is the disk full?"};
           return exit_code;
         }
       },

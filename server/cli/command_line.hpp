@@ -32,9 +32,9 @@ using Wish = std::variant<Answered, Serve, CheckConfig, Model, Bode, Step, Ident
 
 Wish parse_command_line(int argc, char** argv);
 
-// Does everything but to serve, and returns the exit code; none for Serve. Prints only complete answers. Throws what
-// the tools throw: a sentence for the user.
-std::optional<int> answer(const Wish& wish);
+// Does everything but to serve, and returns the exit code; none for Serve. Writes to `out` only what is complete.
+// Throws what the tools throw: a sentence for the user.
+std::optional<int> answer(const Wish& wish, std::ostream& out);
 
 // Reads and checks a configuration, and prints what it means. Returns the exit code.
 int check_config(const CheckConfig& wish);

@@ -100,7 +100,7 @@ int run(const Tune& wish, std::ostream& out) {
   } else {
     fmt::print(out, "not feasible: {}\n", result.reason);
     write_range(out, wish, range);
-    write_offers(out, "nearest, iso-damped", result.nearest);
+    write_offers(out, "nearest", result.nearest);
     write_offers(out, "relaxed", result.relaxed);
   }
   return result.is_feasible ? 0 : kInfeasible;
