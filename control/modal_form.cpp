@@ -12,8 +12,9 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kNearestToCutRad = 1e-9;
-constexpr double kLargestLogRate = 650;  // e^650 is still a number
+constexpr double kNearestToCutRad = 1e-7;  // nearer, a pole cannot be told from a double one on the cut
+constexpr double kFastestLogRate = 40;     // of a mode, against 1/shortest_s; still faster ones follow at once
+constexpr double kLargestLogRate = 4e4;    // where those are given up: enough for beta = 0.001
 
 void check(const ModalRange& range) {
   std::ostringstream text;
@@ -36,12 +37,40 @@ Complex where_imaginary_part_vanishes(const FractionalModel& model, double angle
   return {log_ratio / (model.alpha - model.beta), angle_rad};
 }
 
+// Whether Re D < 0 there. With Im D = 0 it is b3 + b2 r^β sin((α - β)φ)/sin(αφ), whose terms may be beyond a double.
 bool is_outside(const FractionalModel& model, double angle_rad) {
-  return denominator(model, where_imaginary_part_vanishes(model, angle_rad)).real() < 0;
+  const double sine = std::sin((model.alpha - model.beta) * angle_rad);
+  if (sine <= 0) return false;
+  const double log_radius = where_imaginary_part_vanishes(model, angle_rad).real();
+  return std::log(model.b2 * sine) + model.beta * log_radius > std::log(-model.b3 * std::sin(model.alpha * angle_rad));
 }
 
 double magnitude(const FractionalModel& model, double log_frequency) {
   return std::abs(denominator(model, {log_frequency, pi / 2}));
+}
+
+// A mode of rate x adds x t |H(x) - H(0) a/(x + a)|/H(0) to a response that has come to b3/|D(1/t)|: ln x where that is
+// the tolerance. The difference is at most 1, and below the sum of b1/b3 x^α, b2/b3 x^β and x/a.
+double lowest_log_rate(const FractionalModel& model, double slow_rate, double t, double tolerance) {
+  const double growth = std::max(magnitude(model, -std::log(t)) / model.b3, 1.0);
+  const double allowed = std::log(tolerance / growth) - std::log(t);
+  double lowest = (allowed + std::log(slow_rate)) / 2;
+  lowest = std::min(lowest, (allowed - std::log(model.b2 / model.b3)) / (1 + model.beta));
+  if (model.b1 > 0) lowest = std::min(lowest, (allowed - std::log(model.b1 / model.b3)) / (1 + model.alpha));
+  return std::max(lowest, allowed);
+}
+
+// What the rates of (2) above the last one do to a response that is older than they are: -2 Re Σ w/s.
+double follows_at_once(const FractionalModel& model, const Ray& ray, double tolerance) {
+  double sum = 0;
+  Complex log_s{ray.first_log_rate + ray.count * ray.log_step, ray.angle_rad};
+  const double gain = model.kp / model.b3, slow_rate_log = std::log(ray.slow_rate);
+  for (; log_s.real() < kLargestLogRate; log_s += ray.log_step) {
+    const Complex response = model.kp / denominator(model, log_s);
+    if (std::abs(response) < tolerance * std::abs(gain)) break;
+    sum -= ray.log_step / pi * (response - gain * std::exp(slow_rate_log - log_s)).imag();
+  }
+  return sum;
 }
 
 }  // namespace
@@ -71,18 +100,17 @@ Ray choose_ray(const FractionalModel& model, const ModalRange& range) {
   ray.angle_rad = (low + high) / 2;
   double highest = -std::log(range.shortest_s);
   const double growth = std::max(magnitude(model, highest) / model.b3, 1.0);  // of the response after shortest_s
-  ray.log_step = pi * (high - low) / std::log(10 * growth / range.tolerance);
+  ray.log_step = pi * (high - low) / std::log(20 * growth / range.tolerance);
 
   // Up to where H has become small against its value at 1/shortest_s.
-  const double enough = magnitude(model, highest) / range.tolerance;
-  while (highest < kLargestLogRate && magnitude(model, highest) < enough) highest += ray.log_step;
+  const double enough = magnitude(model, highest) / range.tolerance, fastest = highest + kFastestLogRate;
+  while (highest < fastest && magnitude(model, highest) < enough) highest += ray.log_step;
+  ray.growth = growth;
   ray.slow_rate = std::exp(highest) * range.tolerance / growth;  // (4): a/s is as small as H there
 
-  // Down to where H - H(0) a/(s + a) has become small, or so slow that nothing of it is seen by longest_s.
-  const double constant = std::log(range.tolerance * model.b3 / model.b2) / model.beta;
-  const double slow = std::log(range.tolerance) / (1 + model.beta) - std::log(range.longest_s);
-  const double slow_rate = (std::log(range.tolerance * ray.slow_rate) - std::log(range.longest_s)) / 2;
-  ray.first_log_rate = std::min(std::max(constant, slow), slow_rate);
+  // Down to where nothing is seen by longest_s, of a response that may still be growing then.
+  const double slowest = lowest_log_rate(model, ray.slow_rate, range.shortest_s, range.tolerance);
+  ray.first_log_rate = std::min(slowest, lowest_log_rate(model, ray.slow_rate, range.longest_s, range.tolerance));
   ray.count = 1 + static_cast<int>(std::ceil((highest - ray.first_log_rate) / ray.log_step));
   return ray;
 }
@@ -99,6 +127,9 @@ ModalForm modal_form(const FractionalModel& model, const ModalRange& range) {
     const Complex rest = model.kp / denominator(model, log_s) - gain * ray.slow_rate / (s + ray.slow_rate);  // (4)
     form.weight.push_back(ray.log_step / Complex{0, 2 * pi} * rest * s);                                     // (2)
   }
+  const double fastest = std::abs(form.rate.back());
+  form.rate.push_back(-fastest);
+  form.weight.push_back(follows_at_once(model, ray, 0.01 * range.tolerance / ray.growth) * fastest / 2);
   form.rate.push_back(-ray.slow_rate);
   form.weight.push_back(gain * ray.slow_rate / 2);
   const std::optional<Complex> pole = log_pole(model);
@@ -107,6 +138,18 @@ ModalForm modal_form(const FractionalModel& model, const ModalRange& range) {
     form.weight.push_back(model.kp / denominator_slope(model, *pole));  // (3)
   }
   return form;
+}
+
+// The series where the differences of (5) would cancel.
+StepFactors step_factors(Complex rate, double dt_s) {
+  const Complex z = rate * dt_s, decay = std::exp(z);
+  if (std::abs(z) >= 0.5) {
+    const Complex first = (decay - 1.0) / z;
+    return {decay, dt_s * first, dt_s * dt_s * ((first - 1.0) / z)};
+  }
+  Complex second = 0;
+  for (int n = 16; n >= 2; --n) second = (1.0 + second * z) / static_cast<double>(n);  // Σ z^k/(k + 2)!
+  return {decay, dt_s * (1.0 + z * second), dt_s * dt_s * second};
 }
 
 }  // namespace control

@@ -8,6 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "control/time_response.hpp"
+#include "model_samples.hpp"
+
 namespace control {
 namespace {
 
@@ -43,10 +46,10 @@ TEST(ModalPlant, FollowsModel29Within2e6AtAnyStepSize) {
   }
 }
 
-TEST(ModalPlant, FollowsTheIntegerOrderModel28) {
+TEST(ModalPlant, FollowsTheIntegerModel28Within2e6AtAnyStepSize) {
   for (const double dt_s : {1e-3, 1e-2}) {
-    expect_golden(kNewtonianModel, dt_s, golden("io_step.json"), "velocity", 1e-10, velocity);
-    expect_golden(kNewtonianModel, dt_s, golden("io_step.json"), "position", 1e-10, position);
+    expect_golden(kNewtonianModel, dt_s, golden("io_step.json"), "velocity", 2e-6, velocity);
+    expect_golden(kNewtonianModel, dt_s, golden("io_step.json"), "position", 2e-6, position);
   }
 }
 
@@ -96,17 +99,113 @@ TEST(ModalPlant, StartsAgainFromRestAfterReset) {
   EXPECT_EQ(plant.position_m(), moved_m);
 }
 
-TEST(ModalPlant, RefusesModelsOutsideItsRange) {
-  const auto with = [](auto change) {
-    FractionalModel model;
-    change(model);
-    return model;
+// Ten milliseconds is the first time that is promised, and none of the references has it.
+TEST(ModalPlant, FollowsTheStepResponseFrom10MillisecondsOn) {
+  std::vector<double> time_s;
+  for (int k = 10; k <= 200; ++k) time_s.push_back(1e-3 * k);
+  for (const FractionalModel& model : {kNonNewtonianModel, kNewtonianModel}) {
+    const TimeResponse expected = step_response(model, kDuty, time_s);
+    ModalPlant plant{model, 1e-3};
+    for (int k = 1; k < 10; ++k) plant.step(kDuty);
+    for (std::size_t k = 0; k < time_s.size(); ++k) {
+      plant.step(kDuty);
+      EXPECT_NEAR(plant.velocity_m_s(), expected.velocity_m_s[k], 2e-6 * expected.velocity_m_s[k]) << time_s[k];
+      EXPECT_NEAR(plant.position_m(), expected.position_m[k], 2e-6 * expected.position_m[k]) << time_s[k];
+    }
+  }
+}
+
+TEST(ModalPlant, IsStillRightAfterADay) {
+  constexpr double kDayS = 86'400;
+  const double day[] = {kDayS};
+  for (const FractionalModel& model : {kNonNewtonianModel, kNewtonianModel}) {
+    const TimeResponse expected = step_response(model, kDuty, day);
+    for (const double dt_s : {0.5, 10.0}) {
+      ModalPlant plant{model, dt_s};
+      for (long i = 0; i < std::lround(kDayS / dt_s); ++i) plant.step(kDuty);
+      EXPECT_NEAR(plant.velocity_m_s(), expected.velocity_m_s[0], 5e-7 * expected.velocity_m_s[0]) << dt_s;
+      EXPECT_NEAR(plant.position_m(), expected.position_m[0], 5e-7 * expected.position_m[0]) << dt_s;
+    }
+  }
+}
+
+TEST(ModalPlant, ComesBackToWhereItStartedAfterADayOfBackAndForth) {
+  ModalPlant plant{kNonNewtonianModel, 0.5};
+  for (int i = 0; i < 86'400; ++i) plant.step(i < 43'200 ? 1 : -1);
+  const double time_s[] = {0, 21'600, 43'200}, duty[] = {1, -1, 0};
+  EXPECT_NEAR(plant.position_m(), sampled_response(kNonNewtonianModel, time_s, duty).position_m[2], 2e-6 * 2160);
+}
+
+// Whatever the model, the duty and the step size; errors are counted against the largest motion so far, or against what
+// modal_plant.hpp allows to rounding.
+TEST(ModalPlant, FollowsModelsFromTheWholeRangeThroughChangingDuty) {
+  for (const double dt_s : {1e-3, 1e-2, 0.7}) {
+    std::vector<double> time_s, duty;
+    for (int k = 0; k <= 300; ++k) {
+      time_s.push_back(dt_s * k);
+      duty.push_back(k < 50 ? 1 : std::sin(0.001 * k * k));
+    }
+    for (const FractionalModel& model : sample_models(21, 40)) {
+      const TimeResponse expected = sampled_response(model, time_s, duty);
+      ModalPlant plant{model, dt_s};
+      double fastest_m_s = 0, farthest_m = 0;
+      for (std::size_t k = 1; k < time_s.size(); ++k) {
+        plant.step(duty[k - 1]);
+        fastest_m_s = std::max(fastest_m_s, std::abs(expected.velocity_m_s[k]));
+        farthest_m = std::max(farthest_m, std::abs(expected.position_m[k]));
+        if (time_s[k] < 0.01) continue;
+        const double rounding_m_s = 1e-15 * std::abs(model.kp / model.b3), rounding_m = rounding_m_s * time_s[k];
+        ASSERT_NEAR(plant.velocity_m_s(), expected.velocity_m_s[k], 2e-6 * fastest_m_s + rounding_m_s)
+            << model.alpha << " " << dt_s;
+        ASSERT_NEAR(plant.position_m(), expected.position_m[k], 2e-6 * farthest_m + rounding_m)
+            << model.alpha << " " << dt_s;
+      }
+    }
+  }
+}
+
+TEST(ModalPlant, MovesTheSameForHalfTheStepSizeWhateverTheModel) {
+  for (const FractionalModel& model : sample_models(22, 40)) {
+    ModalPlant coarse{model, 0.04}, fine{model, 0.02};
+    for (int i = 0; i < 100; ++i) {
+      const double duty = std::cos(0.3 * i);
+      coarse.step(duty);
+      fine.step(duty);
+      fine.step(duty);
+      const double gain = std::abs(model.kp / model.b3);
+      ASSERT_NEAR(coarse.velocity_m_s(), fine.velocity_m_s(), 1e-12 * gain) << i;
+      ASSERT_NEAR(coarse.position_m(), fine.position_m(), 1e-12 * gain) << i;
+    }
+  }
+}
+
+TEST(ModalPlant, AnswersAtOnceWhereTheModelIsMuchFasterThanTheStep) {
+  const FractionalModel model{2, 0, 1e-9, 1, 2, 1};  // a lag of 1 ns
+  ModalPlant plant{model, 0.1};
+  plant.step(0.5);
+  EXPECT_NEAR(plant.velocity_m_s(), 1, 1e-6);
+  EXPECT_NEAR(plant.position_m(), 0.1, 1e-7);
+  EXPECT_NEAR(plant.acceleration_m_s2(), 0, 1e-5);
+  plant.step(-0.5);
+  EXPECT_NEAR(plant.velocity_m_s(), -1, 1e-6);
+  EXPECT_NEAR(plant.position_m(), 0, 1e-7);
+}
+
+TEST(ModalPlant, QuotesTheModelsAndStepSizesItRefuses) {
+  const auto message = [](const FractionalModel& model, double dt_s) -> std::string {
+    try {
+      const ModalPlant plant{model, dt_s};
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "accepted";
   };
-  EXPECT_THROW(ModalPlant(with([](auto& m) { m.alpha = 2.1; }), 0.01), std::invalid_argument);
-  EXPECT_THROW(ModalPlant(with([](auto& m) { m.beta = 1.0; }), 0.01), std::invalid_argument);
-  EXPECT_THROW(ModalPlant(with([](auto& m) { m.b1 = 0; }), 0.01), std::invalid_argument);
-  EXPECT_THROW(ModalPlant(with([](auto& m) { m.b2 = std::nan(""); }), 0.01), std::invalid_argument);
-  EXPECT_THROW(ModalPlant(kNonNewtonianModel, 0), std::invalid_argument);
+  EXPECT_EQ(message({1, 1, 1, 1, 2.1, 1}, 0.01), "model: alpha must lie in (beta, 2], is 2.1");
+  EXPECT_EQ(message({1, 1, 1, 1, 2, 0}, 0.01), "model: beta must lie in (0, 1], is 0");
+  EXPECT_EQ(message({1, 1, std::nan(""), 1, 2, 1}, 0.01), "model: b2 must be positive, is nan");
+  EXPECT_EQ(message(kNonNewtonianModel, 0), "modal plant: dt_s must be positive and finite, is 0");
+  EXPECT_EQ(message(kNonNewtonianModel, INFINITY), "modal plant: dt_s must be positive and finite, is inf");
+  EXPECT_EQ(message({1, 0, 1, 1, 2, 1}, 0.01), "accepted");
 }
 
 }  // namespace
