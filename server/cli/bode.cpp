@@ -57,7 +57,7 @@ void add_options(CLI::App& command, Bode& wish) {
 }
 
 void write_margins(std::ostream& out, const control::Margins& margins) {
-  Table table{{"open loop", "value", "unit"}};
+  Table table{{"open loop", "value", "<unit"}};
   table.row({"gain crossover", cell(margins.gain_crossover_rad_s, 8), "rad/s"});
   table.row({"phase margin", cell(margins.phase_margin_deg, 8), "deg"});
   table.row({"phase slope there", cell(margins.phase_slope_deg_per_rad_s, 6), "deg/(rad/s)"});

@@ -69,7 +69,7 @@ std::string poles_text(const control::FractionalModel& model) {
 }
 
 void write_models(std::ostream& out, const control::HydrodynamicModel& derived) {
-  Table table{{"model", "kp", "b1", "b2", "b3", "alpha", "beta", "DC gain (m/s)", "poles (1/s)"}};
+  Table table{{"model", "kp", "b1", "b2", "b3", "alpha", "beta", "DC gain (m/s)", "<poles (1/s)"}};
   const auto add = [&table](const char* name, const control::FractionalModel& m) {
     table.row({name, cell(m.kp), cell(m.b1), cell(m.b2), cell(m.b3), cell(m.alpha), cell(m.beta), cell(m.kp / m.b3),
                poles_text(m)});
@@ -81,7 +81,7 @@ void write_models(std::ostream& out, const control::HydrodynamicModel& derived) 
 }
 
 void write_hydrodynamics(std::ostream& out, const control::HydrodynamicModel& derived) {
-  Table table{{"hydrodynamics", "value", "unit"}};
+  Table table{{"hydrodynamics", "value", "<unit"}};
   table.row({"mass and added mass M", cell(derived.total_mass_kg), "kg"});
   table.row({"linear drag Xu", cell(derived.linear_drag_kg_s), "kg/s"});
   table.row({"quadratic drag X|u|u", cell(derived.quadratic_drag_kg_m), "kg/m"});
@@ -92,7 +92,7 @@ void write_hydrodynamics(std::ostream& out, const control::HydrodynamicModel& de
 }
 
 void write_fit(std::ostream& out, const control::MotorFit& fit) {
-  Table table{{"motor", "value", "one sigma", "unit"}};
+  Table table{{"motor", "value", "one sigma", "<unit"}};
   table.row({"gain km", cell(fit.motor.gain_rad_s), cell(fit.gain_sigma_rad_s, 3), "rad/s"});
   table.row({"time constant Tm", cell(fit.motor.time_constant_s), cell(fit.time_constant_sigma_s, 3), "s"});
   table.write(out);

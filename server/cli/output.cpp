@@ -16,6 +16,10 @@ std::size_t width_of(const std::string& text) {
   return static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return (c & 0xC0) != 0x80; }));
 }
 
+constexpr char kToTheLeft = '<';
+
+std::string shown(const std::string& text) { return text.starts_with(kToTheLeft) ? text.substr(1) : text; }
+
 }  // namespace
 
 void add_json_flag(CLI::App& command, OutputForm& form) { command.add_flag("--json", form.is_json, "Answer in JSON"); }
@@ -54,13 +58,15 @@ void Table::write(std::ostream& out) const {
   std::vector<std::size_t> widths;
   for (const auto& row : rows_) {
     widths.resize(std::max(widths.size(), row.size()));
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width_of(row[i]));
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width_of(shown(row[i])));
   }
   for (const auto& row : rows_) {
     std::string line;
     for (std::size_t i = 0; i < row.size(); ++i) {
-      const std::string padding(widths[i] - width_of(row[i]), ' ');
-      line += i == 0 ? row[i] + padding : "  " + padding + row[i];
+      const std::string text = shown(row[i]);
+      const std::string padding(widths[i] - width_of(text), ' ');
+      const bool is_left = i == 0 || rows_.front()[i].starts_with(kToTheLeft);
+      line += (i == 0 ? "" : "  ") + (is_left ? text + padding : padding + text);
     }
     line.erase(line.find_last_not_of(' ') + 1);
     out << line << '\n';

@@ -33,7 +33,7 @@ struct CsvColumn {
 };
 void write_csv(std::ostream& out, std::initializer_list<CsvColumn> columns);
 
-// Aligned columns: the first to the left, the others to the right.
+// Aligned columns: the first to the left, the others to the right unless their heading begins with "<".
 class Table {
  public:
   explicit Table(std::vector<std::string> head) { row(std::move(head)); }

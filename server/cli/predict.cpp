@@ -5,6 +5,7 @@
 #include <fmt/ostream.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/run_steps.hpp"
@@ -13,11 +14,42 @@
 namespace server::cli {
 namespace {
 
-std::vector<MeasuredStep> measured_steps(const RunChoice& choice) {
-  if (!choice.run) return {};
+// What a run did, and when the experiment that is predicted began in it.
+struct Measured {
+  std::vector<MeasuredStep> steps;
+  double began_at_s = 0;
+};
+
+double time_of(std::span<const StepPoint> points, std::uint32_t span, std::uint64_t seq) {
+  const auto is_of_span = [span](const StepPoint& point) { return point.span == span; };
+  const auto first = std::ranges::find_if(points, is_of_span);
+  const auto at = std::ranges::find_if(first, points.end(), [seq](const StepPoint& point) { return point.seq == seq; });
+  return static_cast<double>(at->robot_time_us - first->robot_time_us) * 1e-6;
+}
+
+// Makes the experiment the run's first step of setpoint, with the disturbance that follows it.
+Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experiment) {
   std::vector<StepPoint> points;
   for (const StoredSample& stored : read_samples(choice)) points.push_back(step_point(stored));
-  return measure_steps(points);
+  Measured measured{measure_steps(points)};
+  const auto& steps = measured.steps;
+  const auto first = std::ranges::find(steps, StepCause::setpoint, &MeasuredStep::cause);
+  if (first == steps.end()) {
+    throw std::runtime_error{fmt::format("run {} has no step of setpoint in auto mode to compare with", *choice.run)};
+  }
+  measured.began_at_s = first->at_s;
+  experiment.setpoint_m = first->target_m - first->start_m;
+  experiment.duration_s = time_of(points, first->span, first->last_seq) - first->at_s;
+  experiment.disturbance_at_s = 2 * experiment.duration_s;
+  const auto next = first + 1;
+  if (next != steps.end() && next->cause == StepCause::disturbance && next->span == first->span) {
+    const auto at = std::ranges::find_if(
+        points, [&](const StepPoint& point) { return point.span == next->span && point.seq == next->first_seq; });
+    experiment.disturbance_m = static_cast<double>(at->disturbance_m) - static_cast<double>((at - 1)->disturbance_m);
+    experiment.disturbance_at_s = next->at_s - first->at_s;
+    experiment.duration_s = time_of(points, next->span, next->last_seq) - first->at_s;
+  }
+  return measured;
 }
 
 OrderedJson json_of(const MeasuredStep& step) {
@@ -34,14 +66,14 @@ void add_row(Table& table, const std::string& name, double at_s, const control::
 }
 
 void write_table(std::ostream& out, const control::ClosedLoopExperiment& experiment,
-                 const control::ClosedLoopPrediction& prediction, std::span<const MeasuredStep> measured) {
+                 const control::ClosedLoopPrediction& prediction, const Measured& measured) {
   Table table{{"step", "at (s)", "settling (s)", "overshoot (%)", "rise 10-90 % (s)", "error at the end (mm)"}};
-  add_row(table, fmt::format("to {:g} m, predicted", experiment.setpoint_m), 0, prediction.step);
+  add_row(table, fmt::format("to {:g} m, predicted", experiment.setpoint_m), measured.began_at_s, prediction.step);
   if (experiment.disturbance_at_s < experiment.duration_s) {
-    add_row(table, fmt::format("disturbance {:g} m, predicted", experiment.disturbance_m), experiment.disturbance_at_s,
-            prediction.disturbance);
+    add_row(table, fmt::format("disturbance {:g} m, predicted", experiment.disturbance_m),
+            measured.began_at_s + experiment.disturbance_at_s, prediction.disturbance);
   }
-  for (const MeasuredStep& step : measured) {
+  for (const MeasuredStep& step : measured.steps) {
     add_row(table, fmt::format("{} {:.4g} to {:.4g} m, measured", text(step.cause), step.start_m, step.target_m),
             step.at_s, step.metrics);
   }
@@ -76,10 +108,14 @@ void add_world(CLI::App& command, control::ClosedLoopExperiment& e) {
 }
 
 OrderedJson answer_of(const control::ClosedLoopExperiment& experiment, const control::DiscretisationChoice& controller,
-                      const control::ClosedLoopPrediction& prediction, std::span<const MeasuredStep> measured) {
+                      const control::ClosedLoopPrediction& prediction, const Measured& measured) {
   OrderedJson answer = server::json_of(prediction);
+  answer["experiment"] = {
+      {"setpoint_m", experiment.setpoint_m},       {"duration_s", experiment.duration_s},
+      {"disturbance_m", experiment.disturbance_m}, {"disturbance_at_s", experiment.disturbance_at_s},
+      {"duty_min", experiment.duty_min},           {"duty_max", experiment.duty_max}};
   answer["measured_steps"] = OrderedJson::array();
-  for (const MeasuredStep& step : measured) answer["measured_steps"].push_back(json_of(step));
+  for (const MeasuredStep& step : measured.steps) answer["measured_steps"].push_back(json_of(step));
   answer["plant"] = server::json_of(experiment.plant);
   answer["sections"] = server::json_of(experiment.controller);
   answer["period_s"] = experiment.period_s;
@@ -95,17 +131,21 @@ void add_options(CLI::App& command, Predict& wish) {
   add_options(command, wish.sampling);
   add_world(command, wish.experiment);
   add_options(command, wish.run);
+  for (const char* flag : {"--setpoint-m", "--duration-s", "--disturbance-m", "--disturbance-at-s"}) {
+    command.get_option("--run")->excludes(flag);
+  }
   command.add_flag("--robustness", wish.with_robustness, "Also for other gains, the other fluid, a one-way motor");
   add_json_and_csv_flags(command, wish.form);
   command.footer(
-      "With --run, the steps that a recorded run made stand beside the predicted ones.\n"
+      "With --run, the experiment is the run's first step of setpoint and the disturbance after it, and what the run\n"
+      "did stands beside the prediction.\n"
       "Example: rheonaut predict --setpoint-m 0.1 --duration-s 40 --disturbance-m -0.05 --disturbance-at-s 20");
 }
 
 int run(const Predict& wish, std::ostream& out) {
-  const std::vector<MeasuredStep> measured = measured_steps(wish.run);
   const control::DiscretisationChoice controller = discretised(read(wish.controller), wish.sampling);
   control::ClosedLoopExperiment experiment = wish.experiment;
+  const Measured measured = wish.run.run ? follow(wish.run, experiment) : Measured{};
   experiment.plant = read(wish.plant);
   experiment.controller = controller.chosen.sections;
   experiment.period_s = wish.sampling.period_s;

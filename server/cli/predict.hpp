@@ -16,7 +16,7 @@ struct Predict {
   ControllerChoice controller;
   Sampling sampling;
   control::ClosedLoopExperiment experiment;  // plant and controller are filled in by run
-  RunChoice run;                             // to compare with
+  RunChoice run;                             // whose first step, and disturbance, are then the experiment
   bool with_robustness = false;
   OutputForm form;
 };

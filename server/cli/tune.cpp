@@ -23,7 +23,7 @@ void write_asked_and_achieved(std::ostream& out, const Tune& wish, const control
   const auto& c = tuned.controller;
   fmt::print(out, "kp = {:.8g}, kd = {:.8g}, mu = {:.8g}\n\n", c.kp, c.kd, c.mu);
   const control::Margins& achieved = tuned.achieved;
-  Table table{{"specification", "asked", "achieved", "unit"}};
+  Table table{{"specification", "asked", "achieved", "<unit"}};
   table.row({"gain crossover", cell(wish.spec.gain_crossover_rad_s), cell(achieved.gain_crossover_rad_s), "rad/s"});
   table.row({"phase margin", cell(wish.spec.phase_margin_deg), cell(achieved.phase_margin_deg), "deg"});
   table.row({"phase slope (iso-damping)", wish.spec.mu ? "-" : "0", cell(achieved.phase_slope_deg_per_rad_s, 3),
@@ -35,14 +35,14 @@ void write_asked_and_achieved(std::ostream& out, const Tune& wish, const control
 
 void write_offers(std::ostream& out, const char* title, std::span<const control::TunedController> offers) {
   if (offers.empty()) return;
-  Table table{{title, "crossover (rad/s)", "margin (deg)", "slope (deg/(rad/s))", "kp", "kd", "mu"}};
+  Table table{{"kp", "kd", "mu", "crossover (rad/s)", "margin (deg)", "slope (deg/(rad/s))", "<design"}};
   for (const auto& offer : offers) {
+    const auto& c = offer.controller;
     const control::Margins& achieved = offer.achieved;
-    table.row({offer.name, cell(achieved.gain_crossover_rad_s, 5), cell(achieved.phase_margin_deg, 5),
-               cell(achieved.phase_slope_deg_per_rad_s, 3), cell(offer.controller.kp), cell(offer.controller.kd),
-               cell(offer.controller.mu)});
+    table.row({cell(c.kp), cell(c.kd), cell(c.mu), cell(achieved.gain_crossover_rad_s, 5),
+               cell(achieved.phase_margin_deg, 5), cell(achieved.phase_slope_deg_per_rad_s, 3), offer.name});
   }
-  out << '\n';
+  fmt::print(out, "\n{}:\n", title);
   table.write(out);
 }
 
