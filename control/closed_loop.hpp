@@ -3,6 +3,7 @@
 //   e[k] = r[k] - (x[k] + disturbance[k] + noise[k]),  u[k] = clamp(G(z) e)[k],  x from the plant under u held     (1)
 //   x measured at kT, u applied from kT on: no computational delay                                               (2)
 //
+// Samples k = 0 .. duration/T, both included. The settling band is the same for the step and for the disturbance.
 // Errors: throws std::invalid_argument quoting the bad value.
 #pragma once
 
@@ -33,8 +34,8 @@ struct ClosedLoopExperiment {
 
 struct ClosedLoopPrediction {
   std::vector<double> time_s, position_m, velocity_m_s, measured_m, duty, reference_m;
-  StepMetrics step;             // up to the disturbance, of the noise-free measured position
-  StepMetrics disturbance;      // after it
+  StepMetrics step;             // up to the disturbance, of the noise-free measured position; empty for setpoint 0
+  StepMetrics disturbance;      // after it, back from setpoint + disturbance; empty without one
   double duty_sd_at_rest = 0;   // over the last quarter before the disturbance
   double clipped_fraction = 0;  // of all samples
 };

@@ -1,2 +1,230 @@
-// Fits, measures and chooses.
+// The two methods, and what is reported of their results.
 #include "control/discretise.hpp"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <expected>
+#include <iomanip>
+#include <numbers>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <unsupported/Eigen/FFT>
+
+#include "control/closed_loop.hpp"
+#include "control/oustaloup.hpp"
+#include "control/steiglitz_mcbride.hpp"
+
+namespace control {
+namespace {
+
+constexpr int kIterations = 10;
+constexpr int kLargestOrder = 10;
+constexpr double kUselessFit = 0.25;  // relative
+constexpr double kGoodRelative = 0.01, kGoodDeg = 0.6;
+constexpr double kStepS = 20;
+constexpr int kStepSamples = 2000;
+constexpr const char* kAdvice = "; take a lower order, a smaller a, or Oustaloup's method";
+
+template <class... Parts>
+std::string said(const Parts&... parts) {
+  std::ostringstream text;
+  text.precision(10);
+  text << "discretisation: ";
+  (text << ... << parts);
+  return text.str();
+}
+
+template <class... Parts>
+[[noreturn]] void refuse(const Parts&... parts) {
+  throw std::invalid_argument(said(parts...));
+}
+
+bool is_positive(double value) { return value > 0 && std::isfinite(value); }
+
+void check(const FopdController& controller, const DiscretisationOptions& options) {
+  check(controller);
+  if (!is_positive(options.period_s)) refuse("period_s must be positive, is ", options.period_s);
+  if (options.order < 1 || options.order > kLargestOrder) {
+    refuse("order must lie in 1..", kLargestOrder, ", is ", options.order);
+  }
+  if (!is_positive(options.loop_bandwidth_rad_s)) {
+    refuse("loop_bandwidth_rad_s must be positive, is ", options.loop_bandwidth_rad_s);
+  }
+  if (options.method == DiscretisationMethod::oustaloup) {
+    const double low = options.band_low_rad_s, high = options.band_high_rad_s;
+    if (is_positive(low) && high > low && std::isfinite(high)) return;
+    refuse("the band must have 0 < band_low_rad_s < band_high_rad_s, has ", low, " and ", high);
+  }
+  if (!(options.a >= 0 && options.a <= 1)) refuse("a must lie in [0, 1], is ", options.a);
+  const int points = options.grid_points;
+  if (points < 128 || points > 65536 || !std::has_single_bit(static_cast<unsigned>(points))) {
+    refuse("grid_points must be a power of two in 128..65536, is ", points);
+  }
+}
+
+// (2) up to the fit. At z = -1 Tustin's s is infinite: there, the value half a grid step aside.
+std::vector<double> impulse_response(const FopdController& controller, const DiscretisationOptions& options) {
+  const int points = options.grid_points;
+  std::vector<Complex> response(static_cast<std::size_t>(points)), samples;
+  for (int k = 0; k <= points / 2; ++k) {
+    const bool is_pole = options.a == 1 && k == points / 2;
+    const double angle = 2 * std::numbers::pi * (k - (is_pole ? 0.5 : 0)) / points;
+    const Complex value = generating_function(controller, options.a, options.period_s, std::polar(1.0, angle));
+    response[static_cast<std::size_t>(k)] = value;
+    if (k > 0) response[static_cast<std::size_t>(points - k)] = std::conj(value);
+  }
+  response[response.size() / 2] = response[response.size() / 2].real();
+  Eigen::FFT<double> fft;
+  fft.inv(samples, response);
+  std::vector<double> half;
+  for (std::size_t k = 0; k < samples.size() / 2; ++k) half.push_back(samples[k].real());
+  return half;
+}
+
+struct DirectFit {
+  ParallelSections sections;
+  double output_error = 0;  // in the impulse response
+  bool is_minimum_phase = false;
+};
+
+double largest(const std::vector<Complex>& values) {
+  double result = 0;
+  for (const Complex value : values) result = std::max(result, std::abs(value));
+  return result;
+}
+
+std::expected<ParallelSections, std::string> fit_direct(const FopdController& controller,
+                                                        const DiscretisationOptions& options) {
+  std::optional<DirectFit> best;
+  for (const auto& [b, a, error] :
+       steiglitz_mcbride(impulse_response(controller, options), options.order, kIterations)) {
+    auto sections = partial_fractions({b, a, options.period_s});
+    if (!sections || b[0] == 0) continue;
+    const bool is_minimum_phase = largest(zeros(*sections)) < 1;
+    const bool is_better =
+        !best || (is_minimum_phase == best->is_minimum_phase ? error < best->output_error : is_minimum_phase);
+    if (is_better) best = DirectFit{*std::move(sections), error, is_minimum_phase};
+  }
+  if (best) return std::move(best->sections);
+  return std::unexpected(said("order ", options.order, " with a = ", options.a, " at ", options.period_s,
+                              " s gives no stable fit with distinct poles", kAdvice));
+}
+
+// The error signal on which float32 and double are compared.
+std::vector<double> step_error_m(const ParallelSections& sections, double period_s) {
+  ClosedLoopExperiment experiment;
+  experiment.controller = sections;
+  experiment.period_s = period_s;
+  experiment.duration_s = std::min(kStepS, kStepSamples * period_s);
+  experiment.disturbance_at_s = 2 * experiment.duration_s;
+  const ClosedLoopPrediction prediction = predict_closed_loop(experiment);
+  std::vector<double> error_m = prediction.reference_m;
+  for (std::size_t k = 0; k < error_m.size(); ++k) error_m[k] -= prediction.measured_m[k];
+  return error_m;
+}
+
+std::expected<Discretisation, std::string> try_discretise(const FopdController& controller,
+                                                          const DiscretisationOptions& options) {
+  check(controller, options);
+  Discretisation result;
+  result.options = options;
+  double fit_max_relative = 0;
+  if (options.method == DiscretisationMethod::oustaloup) {
+    const OustaloupBand band{options.band_low_rad_s, options.band_high_rad_s};
+    result.sections = oustaloup_tustin(controller, band, options.order, options.period_s);
+  } else {
+    auto fit = fit_direct(controller, options);
+    if (!fit) return std::unexpected(std::move(fit.error()));
+    result.sections = *std::move(fit);
+    fit_max_relative = max_fit_error(result.sections, options.period_s, controller, options.a,
+                                     error_frequencies(options.period_s, options.loop_bandwidth_rad_s));
+    if (!(fit_max_relative <= kUselessFit)) {
+      return std::unexpected(said("order ", options.order, " with a = ", options.a, " at ", options.period_s,
+                                  " s fits only to ", 100 * fit_max_relative, " %", kAdvice));
+    }
+  }
+  result.dc_gain_before = dc_gain(result.sections);
+  for (int pass = 0; pass < 2; ++pass) result.sections.direct += controller.kp - dc_gain(result.sections);  // (4)
+  result.dc_gain = dc_gain(result.sections);
+  result.transfer = to_transfer_function(result.sections, options.period_s);
+  result.errors = measure_errors(result.sections, options.period_s, controller, options.loop_bandwidth_rad_s);
+  result.errors.fit_max_relative = fit_max_relative;
+  result.largest_pole = largest(poles(result.sections));
+  result.largest_zero = largest(zeros(result.sections));
+  result.is_stable = result.largest_pole < 1;
+  result.is_minimum_phase = result.largest_zero < 1;
+  result.noise_gain = white_noise_gain(result.sections);
+  result.float32_rms_duty = float32_rms_error(result.sections, step_error_m(result.sections, options.period_s));
+  return result;
+}
+
+std::string name_of(const Discretisation& tried) {
+  std::ostringstream text;
+  if (tried.options.method == DiscretisationMethod::oustaloup) return "Oustaloup and Tustin";
+  text << "The direct method with a = " << tried.options.a;
+  return text.str();
+}
+
+bool is_accurate(const Discretisation& tried) {
+  return tried.errors.max_relative_in_bandwidth <= kGoodRelative && tried.errors.max_deg_in_bandwidth <= kGoodDeg;
+}
+
+std::string reason_for(const Discretisation& chosen, const std::vector<Discretisation>& compared) {
+  const auto accurate = std::ranges::count_if(compared, is_accurate);
+  const auto& errors = chosen.errors;
+  std::ostringstream text;
+  text << std::setprecision(3) << name_of(chosen) << " is off by at most " << 100 * errors.max_relative_in_bandwidth
+       << " % and " << errors.max_deg_in_bandwidth << " degrees below " << errors.bandwidth_rad_s << " rad/s";
+  if (accurate == 0) {
+    text << ", the least of " << compared.size() << " tried, none of which stays within 1 % and 0.6 degrees; a shorter "
+         << "period or a higher order would help. Its duty noise is " << chosen.noise_gain << " per m.";
+  } else {
+    text << "; of the " << accurate << " of " << compared.size()
+         << " tried that stay within 1 % and 0.6 degrees there, it has the least duty noise, " << chosen.noise_gain
+         << " per m of noise on the position.";
+  }
+  return text.str();
+}
+
+}  // namespace
+
+Discretisation discretise(const FopdController& controller, const DiscretisationOptions& options) {
+  auto result = try_discretise(controller, options);
+  if (!result) throw std::runtime_error(result.error());
+  return *std::move(result);
+}
+
+DiscretisationChoice choose_discretisation(const FopdController& controller, double period_s, int order,
+                                           double loop_bandwidth_rad_s) {
+  DiscretisationOptions options;
+  options.period_s = period_s;
+  options.order = order;
+  options.loop_bandwidth_rad_s = loop_bandwidth_rad_s;
+  DiscretisationChoice choice;
+  const auto compare = [&] {
+    auto tried = try_discretise(controller, options);
+    if (tried && tried->is_stable) choice.compared.push_back(*std::move(tried));
+  };
+  for (const double a : {0.0, 0.25, 0.5, 0.8, 0.9, 1.0}) {
+    options.a = a;
+    compare();
+  }
+  options.method = DiscretisationMethod::oustaloup;
+  compare();
+  if (choice.compared.empty()) {
+    throw std::runtime_error(said("nothing stable at ", period_s, " s with order ", order, "; take a lower order"));
+  }
+  const auto is_better = [](const Discretisation& left, const Discretisation& right) {
+    if (is_accurate(left) != is_accurate(right)) return is_accurate(left);
+    if (is_accurate(left)) return left.noise_gain < right.noise_gain;
+    return left.errors.max_relative_in_bandwidth < right.errors.max_relative_in_bandwidth;
+  };
+  choice.chosen = *std::ranges::min_element(choice.compared, is_better);
+  choice.reason = reason_for(choice.chosen, choice.compared);
+  return choice;
+}
+
+}  // namespace control

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <stdexcept>
 #include <vector>
 
@@ -83,6 +84,76 @@ TEST(StepMetrics, MeasuresAStepBackwardsLikeOneForwards) {
   EXPECT_EQ(metrics.rise_10_90_s, 1.0);
 }
 
+TEST(StepMetrics, IntegratesTheErrorByTheTrapezoidalRule) {
+  const std::vector<double> time_s{1, 2, 4}, position_m{0, 0.1, 0.2}, duty{1, -0.5, 0};
+  const StepMetrics metrics = measure_step(time_s, position_m, duty, {1, 10, 0, 0.1, 0.002});
+  EXPECT_NEAR(metrics.iae_m_s, 0.05 + 0.1, 1e-12);
+  EXPECT_NEAR(metrics.ise_m2_s, 0.005 + 0.01, 1e-12);
+  EXPECT_NEAR(metrics.itae_m_s2, 0 + 0.3, 1e-12);
+  EXPECT_EQ(metrics.peak_time_s, 3);
+  EXPECT_EQ(metrics.duty_total_variation, 2.0);
+  EXPECT_FALSE(measure_step(time_s, position_m, {1, 10, 0, 0.1, 0.002}).duty_total_variation.has_value());
+}
+
+TEST(StepMetrics, IntegralsOfAnExponentialAreThoseOfTheTextbook) {
+  std::vector<double> time_s, position_m;
+  for (int k = 0; k <= 3000; ++k) {
+    time_s.push_back(k * kPeriodS);
+    position_m.push_back(1 - std::exp(-k * kPeriodS));
+  }
+  const StepMetrics metrics = measure_step(time_s, position_m, {0, 100, 0, 1, 0.02});
+  EXPECT_NEAR(metrics.iae_m_s, 1, 1e-4);
+  EXPECT_NEAR(metrics.ise_m2_s, 0.5, 1e-4);
+  EXPECT_NEAR(metrics.itae_m_s2, 1, 1e-4);
+}
+
+Trajectory with_noise(Trajectory run, double sd_m, std::uint64_t seed) {
+  std::mt19937_64 generator{seed};
+  std::normal_distribution<double> noise(0, sd_m);
+  for (double& value : run.position_m) value += noise(generator);
+  return run;
+}
+
+TEST(StepMetrics, OfANoisyRecordAreCloseToThoseOfTheCleanOne) {
+  const auto golden = nlohmann::json::parse(std::ifstream(TEST_DATA_DIR "/closed_loop_cases.json"));
+  for (const auto& model : {kNonNewtonianModel, kNewtonianModel}) {
+    const Trajectory clean = run_reference(golden, model, -1, 1);
+    StepExperiment step{0, kDisturbedAtS, 0, kTargetM, 0.002};
+    const StepMetrics exact = measure_step(clean.time_s, clean.position_m, step);
+    for (const double sd_m : {0.05e-3, 0.2e-3, 0.5e-3, 1e-3}) {
+      for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+        SCOPED_TRACE(testing::Message() << model.kp << ", sd " << sd_m << ", seed " << seed);
+        const Trajectory noisy = with_noise(clean, sd_m, seed);
+        step.noise_sd_m = sd_m;
+        const StepMetrics metrics = measure_step(noisy.time_s, noisy.position_m, step);
+        ASSERT_TRUE(metrics.settling_s.has_value());
+        EXPECT_NEAR(*metrics.settling_s, *exact.settling_s, 0.02 + 40 * sd_m);
+        EXPECT_NEAR(metrics.overshoot_percent, exact.overshoot_percent, 0.45 + 600 * sd_m);
+        EXPECT_NEAR(metrics.steady_state_error_m, exact.steady_state_error_m, 0.3 * sd_m);
+        EXPECT_NEAR(*metrics.rise_10_90_s, *exact.rise_10_90_s, 0.03);
+        EXPECT_NEAR(metrics.iae_m_s, exact.iae_m_s, 5 * sd_m);
+      }
+    }
+  }
+}
+
+TEST(StepMetrics, SayThatANoisyRecordNeverSettledAndThatNoiseIsNoOvershoot) {
+  Trajectory outside, inside;
+  for (int k = 0; k < 2000; ++k) {
+    for (Trajectory* run : {&outside, &inside}) run->time_s.push_back(k * kPeriodS);
+    outside.position_m.push_back(k < 100 ? 0.001 * k : 0.1033);
+    inside.position_m.push_back(std::min(0.001 * k, 0.1));
+  }
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const StepExperiment step{0, 20, 0, 0.1, 0.002, 0.5e-3};
+    const Trajectory never = with_noise(outside, 0.5e-3, seed), exact = with_noise(inside, 0.5e-3, seed);
+    EXPECT_FALSE(measure_step(never.time_s, never.position_m, step).settling_s.has_value());
+    const StepMetrics metrics = measure_step(exact.time_s, exact.position_m, step);
+    EXPECT_NEAR(metrics.settling_s.value(), 0.98, 0.1);
+    EXPECT_LT(metrics.overshoot_percent, 1);
+  }
+}
+
 TEST(StepMetrics, RefusesRecordsThatAreNoStepResponse) {
   const std::vector<double> time_s{0, 1}, position_m{0, 0.1}, backwards{1, 0}, broken{0, std::nan("")}, short_m{0};
   const StepExperiment step{0, 10, 0, 0.1, 0.002};
@@ -92,6 +163,8 @@ TEST(StepMetrics, RefusesRecordsThatAreNoStepResponse) {
   EXPECT_THROW(measure_step(time_s, position_m, {0, 10, 0.1, 0.1, 0.002}), std::invalid_argument);
   EXPECT_THROW(measure_step(time_s, position_m, {0, 10, 0, 0.1, 0}), std::invalid_argument);
   EXPECT_THROW(measure_step(time_s, position_m, {5, 10, 0, 0.1, 0.002}), std::invalid_argument);
+  EXPECT_THROW(measure_step(time_s, position_m, {0, 10, 0, 0.1, 0.002, -1}), std::invalid_argument);
+  EXPECT_THROW(measure_step(time_s, position_m, short_m, step), std::invalid_argument);
 }
 
 }  // namespace
