@@ -68,18 +68,20 @@ struct Fit {
   Structure structure = Structure::fractional;
   FractionalModel model;  // b3 = 1
   double offset_m = 0, dead_time_s = 0;
+  std::optional<double> offset_sigma_m, dead_time_sigma_s;
   std::array<std::optional<double>, kParameters> one_sigma;
   std::array<std::array<double, kParameters>, kParameters> correlation{};
   double sse = 0;             // sum of squared residuals, of both channels in their own units
   double absolute_error = 0;  // (3) as an integral over time
   double fit_percent = 0;     // 100 (1 - |y - model|/|y - mean y|), of position if recorded, else of velocity
   double residual_sd = 0;     // of the same channel
-  double aic = 0;
-  int free_parameters = 0;
+  double aic =
+      0;  // Σ_channels n ln(sse/n) + 2 free_parameters; for the absolute error 2 n ln(Σ|r|/n) + 2 free_parameters
+  int free_parameters = 0;  // of the model, and offset and dead time if they are fitted; the noise's sd is not counted
   bool residuals_are_white = false;
-  double whiteness_p_value = 0;  // Ljung-Box
+  double whiteness_p_value = 0;  // Ljung-Box; white means at least 0.01
   SearchEnd end = SearchEnd::converged;
-  int iterations = 0, starts = 0, starts_that_agree = 0;           // with the best cost
+  int iterations = 0, starts = 0, starts_that_agree = 0;  // iterations: of the best start; agree: with the best cost
   std::vector<double> position_residual_m, velocity_residual_m_s;  // measured less model, empty if not recorded
 };
 
