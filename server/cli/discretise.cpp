@@ -63,8 +63,10 @@ void add_options(CLI::App& command, Sampling& sampling) {
       ->check(CLI::Range(1, 20));
   auto* method = command.add_option("--method", sampling.method,
                                     "direct or oustaloup (default: several are tried, the choice is explained)");
-  method->transform(CLI::CheckedTransformer(std::map<std::string, DiscretisationMethod>{
-      {"direct", DiscretisationMethod::direct}, {"oustaloup", DiscretisationMethod::oustaloup}}));
+  method->transform(CLI::CheckedTransformer(
+                        std::map<std::string, DiscretisationMethod>{{"direct", DiscretisationMethod::direct},
+                                                                    {"oustaloup", DiscretisationMethod::oustaloup}})
+                        .description(""));
   command
       .add_option("--a", sampling.a,
                   "Of the direct method: 0 is Euler, 1 Tustin (0.5 if only --method is given); implies --method direct")

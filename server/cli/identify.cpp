@@ -44,10 +44,12 @@ void add_search(CLI::App& command, control::IdentificationOptions& options) {
                   "first_order, second_order or fractional (default: all three, the best by AIC)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Structure>{{"first_order", Structure::first_order},
                                                                            {"second_order", Structure::second_order},
-                                                                           {"fractional", Structure::fractional}}));
+                                                                           {"fractional", Structure::fractional}})
+                      .description(""));
   command.add_option("--cost", options.cost, "least_squares or absolute_error (default: least_squares)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Cost>{{"least_squares", Cost::least_squares},
-                                                                      {"absolute_error", Cost::absolute_error}}));
+                                                                      {"absolute_error", Cost::absolute_error}})
+                      .description(""));
   command.add_flag("--offset", options.fits_offset, "Fit the initial position too");
   command.add_option("--dead-time-s", options.longest_dead_time_s, "Find a dead time up to this (default: 0, none)")
       ->check(CLI::NonNegativeNumber);

@@ -57,7 +57,7 @@ TEST_F(Predicting, GivesTheReferenceMetrics) {
 TEST_F(Predicting, AOneWayMotorNeverArrivesInWater) {
   const Answer answer = ask("predict --plant newtonian --duty-min 0 --method direct");
   EXPECT_THAT(answer.text, HasSubstr("never"));
-  EXPECT_THAT(answer.text, HasSubstr("-20.4"));
+  EXPECT_THAT(answer.text, HasSubstr("20.40"));
 }
 
 TEST_F(Predicting, PrintsSamplesAndRobustness) {
