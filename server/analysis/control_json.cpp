@@ -20,7 +20,9 @@ namespace {
 
 constexpr std::size_t kMaxQuoted = 60;
 
+// Arrays and objects are only named: writing one that is nested 100 000 deep would exhaust the stack.
 std::string quote(const json& value) {
+  if (value.is_structured()) return value.is_array() ? "an array" : "an object";
   std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
   if (text.size() > kMaxQuoted) text = text.substr(0, kMaxQuoted) + "...";
   return text;
@@ -86,8 +88,8 @@ OrderedJson complex_json(control::Complex value) { return {{"real", value.real()
 
 }  // namespace
 
-Result<control::FractionalModel> model_from(const json& value) {
-  if (value.is_object() && value.contains("parameters")) return model_from(value.at("parameters"));
+Result<control::FractionalModel> model_from(const json& given) {
+  const json& value = given.is_object() && given.contains("parameters") ? given.at("parameters") : given;
   if (!value.is_object()) {
     return not_an_object(value, "model",
                          R"({"kp":0.1,"b1":0.005682,"b2":0.11031,"b3":1,"alpha":1.7263,"beta":0.8682})");

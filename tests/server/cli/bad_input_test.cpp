@@ -37,7 +37,7 @@ class BadInput : public ToolTest {
 TEST_F(BadInput, ModelFiles) {
   EXPECT_THAT(plant("{"), AllOf(HasSubstr("m.json: is not JSON"), HasSubstr("line 1, column 2")));
   EXPECT_THAT(plant(""), HasSubstr("is not JSON"));
-  EXPECT_THAT(plant("[1]"), HasSubstr("[1] is not a model"));
+  EXPECT_THAT(plant("[1]"), HasSubstr("an array is not a model"));
   EXPECT_THAT(plant(R"({"kp":1,"b1":1,"b2":1,"alpha":1.5})"), HasSubstr("key \"beta\" is missing"));
   EXPECT_THAT(plant(R"({"kp":1,"b1":1,"b2":1,"aplha":1.5,"beta":0.5})"),
               AllOf(HasSubstr("\"aplha\" = 1.5"), HasSubstr("kp, b1, b2, b3, alpha, beta")));
@@ -45,6 +45,7 @@ TEST_F(BadInput, ModelFiles) {
   EXPECT_THAT(plant(R"({"kp":1e999,"b1":1,"b2":1,"alpha":1.5,"beta":0.5})"), HasSubstr("m.json"));
   EXPECT_THAT(plant(R"({"kp":1,"b1":1,"b2":1,"alpha":2.5,"beta":0.5})"), AllOf(HasSubstr("alpha"), HasSubstr("2.5")));
   EXPECT_THAT(plant(R"({"parameters":{"kp":1}})"), HasSubstr("missing"));
+  EXPECT_THAT(plant(std::string(400'000, '[') + std::string(400'000, ']')), HasSubstr("an array is not a model"));
 }
 
 TEST_F(BadInput, ModelFilesMayHaveRemarksAndLackB3) {

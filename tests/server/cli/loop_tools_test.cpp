@@ -124,6 +124,21 @@ TEST_F(LoopTools, ModelShowsThePresetsAndTheDerivedNumerator) {
   EXPECT_NEAR(json["non_newtonian"]["dc_gain_m_s"], 0.1, 1e-12);
 }
 
+TEST_F(LoopTools, ModelFitsTheMotorAndUsesIt) {
+  std::string csv = "t_s,duty,rate_rad_s\n";
+  double rate_rad_s = 0;
+  for (int k = 0; k < 200; ++k) {
+    const double duty = k / 40 % 2 == 0 ? 0.5 : -0.2;
+    csv += std::to_string(0.005 * k) + "," + std::to_string(duty) + "," + std::to_string(rate_rad_s) + "\n";
+    rate_rad_s += (1 - std::exp(-0.005 / 0.03)) * (600 * duty - rate_rad_s);
+  }
+  save("motor.csv", csv);
+  const auto json = ask("model --motor-csv @motor.csv --json").json();
+  EXPECT_NEAR(json["motor_fit"]["gain_rad_s"], 600, 1e-3);
+  EXPECT_NEAR(json["hydrodynamic"]["parameters"]["motor_time_constant_s"], 0.03, 1e-6);
+  EXPECT_THAT(ask("model --motor-csv @motor.csv").text, HasSubstr("gain km"));
+}
+
 TEST_F(LoopTools, APresetIsAModelFile) {
   save("m.json", ask("model --preset newtonian").text);
   EXPECT_NEAR(ask("bode --plant @m.json --json").json()["gain_crossover_rad_s"], 15.98298126, 1e-8);
