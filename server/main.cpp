@@ -3,6 +3,7 @@
 
 #include <csignal>
 #include <functional>
+#include <iostream>
 
 #include "server/analysis/analysis_service.hpp"
 #include "server/api/api_server.hpp"
@@ -71,8 +72,7 @@ int serve(const Config& config) {
 int main(int argc, char** argv) try {
   std::signal(SIGPIPE, SIG_IGN);
   const cli::Wish wish = cli::parse_command_line(argc, argv);
-  if (const auto* answered = std::get_if<cli::Answered>(&wish)) return answered->exit_code;
-  if (const auto* check = std::get_if<cli::CheckConfig>(&wish)) return cli::check_config(*check);
+  if (const auto exit_code = cli::answer(wish, std::cout)) return *exit_code;
   return serve(load_config(std::get<cli::Serve>(wish).flags));
 } catch (const std::exception& error) {
   fmt::print(stderr, "rheonaut: {}\n", error.what());

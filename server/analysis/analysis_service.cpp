@@ -3,24 +3,14 @@
 
 #include <fmt/format.h>
 
+#include "server/analysis/run_recording.hpp"
+
 namespace server {
 namespace asio = boost::asio;
 
 namespace {
 
 constexpr std::size_t kPage = 5000;
-
-StepPoint point_of(const StoredSample& stored) {
-  StepPoint point;
-  point.span = stored.span;
-  point.seq = stored.seq;
-  point.robot_time_us = stored.robot_time_us;
-  point.position_m = stored.sample.position_m;
-  point.disturbance_m = stored.disturbance_m;
-  point.setpoint_m = stored.setpoint_m.value_or(0);
-  point.steered = stored.mode == rheonaut_MODE_AUTO && stored.setpoint_m.has_value();
-  return point;
-}
 
 }  // namespace
 
@@ -34,7 +24,7 @@ asio::awaitable<Result<std::vector<StepPoint>>> AnalysisService::points(RunId ru
       co_return fail(ErrorCode::invalid, fmt::format("the run has more than {} samples", kMaxAnalysedSamples),
                      "run_too_long");
     }
-    for (const StoredSample& sample : page->samples) points.push_back(point_of(sample));
+    for (const StoredSample& sample : page->samples) points.push_back(step_point(sample));
     after = page->next;
   } while (after);
   co_return points;

@@ -2,6 +2,10 @@
 #include "server/cli/command_line.hpp"
 
 #include <CLI/CLI.hpp>
+#include <memory>
+#include <sstream>
+#include <stdexcept>
+#include <type_traits>
 
 #ifndef RHEONAUT_VERSION
 #error "RHEONAUT_VERSION comes from CMake"
@@ -10,11 +14,30 @@
 namespace server::cli {
 namespace {
 
-void add_config_flags(CLI::App& command, ConfigFlags& flags) {
+void add_options(CLI::App& command, ConfigFlags& flags) {
   command.add_option("--config", flags.file, "Configuration file in TOML; deploy/rheonaut.toml documents every option");
   command.add_option("--data", flags.data_dir, "Folder of everything the station keeps (default: rheonaut-data)");
   command.add_option("--http", flags.http, "ADDR:PORT of the page and the API (default: 127.0.0.1:8080; port 0: any)");
   command.add_option("--robots", flags.robots, "ADDR:PORT where robots dial in (default: 127.0.0.1:7070; port 0: any)");
+}
+
+void add_options(CLI::App& command, Serve& wish) {
+  add_options(command, wish.flags);
+  command.footer("Example: rheonaut serve --data ~/lab --robots 127.0.0.1:7070");
+}
+
+void add_options(CLI::App& command, CheckConfig& wish) {
+  add_options(command, wish.flags);
+  command.footer("Example: rheonaut check-config --data ~/lab");
+}
+
+// A command whose options fill a T, which becomes the wish.
+template <class T>
+void offer(CLI::App& app, const char* name, const char* purpose, Wish& wish) {
+  auto parsed = std::make_shared<T>();
+  CLI::App* command = app.add_subcommand(name, purpose);
+  add_options(*command, *parsed);
+  command->callback([parsed, &wish] { wish = *parsed; });
 }
 
 }  // namespace
@@ -24,18 +47,43 @@ Wish parse_command_line(int argc, char** argv) {
   app.set_version_flag("--version", RHEONAUT_VERSION);
   app.require_subcommand(1);
   app.footer("Example: rheonaut serve --data ~/lab --robots 127.0.0.1:7070");
-  ConfigFlags flags;
-  auto* serve = app.add_subcommand("serve", "Run the station until SIGINT or SIGTERM");
-  add_config_flags(*serve, flags);
-  auto* check = app.add_subcommand("check-config", "Check a configuration and print what it means");
-  add_config_flags(*check, flags);
+  Wish wish;
+  offer<Serve>(app, "serve", "Run the station until SIGINT or SIGTERM", wish);
+  offer<CheckConfig>(app, "check-config", "Check a configuration and print what it means", wish);
+  offer<Model>(app, "model", "Show the motion models, compute the hydrodynamic one, fit the motor", wish);
+  offer<Bode>(app, "bode", "Crossover, margins and frequency response of the open loop", wish);
+  offer<Step>(app, "step", "Velocity and position after a step of duty, or any duty", wish);
+  offer<Identify>(app, "identify", "Find the model that fits a recording; plan an experiment", wish);
+  offer<Tune>(app, "tune", "Find the controller for a crossover and a phase margin", wish);
+  offer<Discretise>(app, "discretise", "Turn the controller into coefficients for the robot", wish);
+  offer<Predict>(app, "predict", "Predict a closed-loop experiment, beside a recorded one", wish);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return Answered{app.exit(error)};
   }
-  if (serve->parsed()) return Serve{flags};
-  return CheckConfig{flags};
+  return wish;
+}
+
+std::optional<int> answer(const Wish& wish, std::ostream& out) {
+  return std::visit(
+      [&out](const auto& wanted) -> std::optional<int> {
+        using T = std::decay_t<decltype(wanted)>;
+        if constexpr (std::is_same_v<T, Serve>) {
+          return std::nullopt;
+        } else if constexpr (std::is_same_v<T, Answered>) {
+          return wanted.exit_code;
+        } else if constexpr (std::is_same_v<T, CheckConfig>) {
+          return check_config(wanted);
+        } else {
+          std::ostringstream text;
+          const int exit_code = run(wanted, text);
+          out << text.view() << std::flush;
+          if (!out) throw std::runtime_error{"the answer could not be written; is the disk full?"};
+          return exit_code;
+        }
+      },
+      wish);
 }
 
 }  // namespace server::cli

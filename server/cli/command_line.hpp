@@ -1,8 +1,16 @@
 // What the user asked for on the command line.
 #pragma once
 
+#include <optional>
 #include <variant>
 
+#include "server/cli/bode.hpp"
+#include "server/cli/discretise.hpp"
+#include "server/cli/identify.hpp"
+#include "server/cli/model.hpp"
+#include "server/cli/predict.hpp"
+#include "server/cli/step.hpp"
+#include "server/cli/tune.hpp"
 #include "server/config.hpp"
 
 namespace server::cli {
@@ -20,9 +28,13 @@ struct Answered {
   int exit_code = 0;
 };
 
-using Wish = std::variant<Serve, CheckConfig, Answered>;
+using Wish = std::variant<Answered, Serve, CheckConfig, Model, Bode, Step, Identify, Tune, Discretise, Predict>;
 
 Wish parse_command_line(int argc, char** argv);
+
+// Does everything but to serve, and returns the exit code; none for Serve. Writes to `out` only what is complete.
+// Throws what the tools throw: a sentence for the user.
+std::optional<int> answer(const Wish& wish, std::ostream& out);
 
 // Reads and checks a configuration, and prints what it means. Returns the exit code.
 int check_config(const CheckConfig& wish);

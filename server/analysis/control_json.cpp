@@ -1,0 +1,242 @@
+// Reads models and controllers strictly; writes models, margins and tunings.
+#include "server/analysis/control_json.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <numbers>
+#include <stdexcept>
+
+#include "control/modal_form.hpp"
+#include "server/analysis/optional_json.hpp"
+
+namespace server {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr std::size_t kMaxQuoted = 60;
+
+// Arrays and objects are only named: writing one that is nested 100 000 deep would exhaust the stack.
+std::string quote(const json& value) {
+  if (value.is_structured()) return value.is_array() ? "an array" : "an object";
+  std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
+  if (text.size() > kMaxQuoted) text = text.substr(0, kMaxQuoted) + "...";
+  return text;
+}
+
+std::string list(std::initializer_list<const char*> names) { return fmt::format("{}", fmt::join(names, ", ")); }
+
+bool is_remark(const std::string& key) { return key == "name" || key == "comment" || key == "description"; }
+
+Result<void> only(const json& object, const char* what, std::initializer_list<const char*> keys) {
+  for (const auto& [key, value] : object.items()) {
+    const bool known = std::ranges::any_of(keys, [&key](const char* other) { return key == other; });
+    if (!known && !is_remark(key)) {
+      return fail(ErrorCode::bad_request,
+                  fmt::format("key {} = {} is not known in a {}; it has {}, and may have a name, comment, description",
+                              quote(key), quote(value), what, list(keys)),
+                  "unknown_member");
+    }
+  }
+  return {};
+}
+
+struct Key {
+  const char* name;
+  double* value;
+  bool is_required = true;
+};
+
+Result<void> read_numbers(const json& object, const char* what, std::initializer_list<Key> keys) {
+  for (const Key& key : keys) {
+    const auto found = object.find(key.name);
+    if (found == object.end()) {
+      if (!key.is_required) continue;
+      return fail(ErrorCode::bad_request, fmt::format("key \"{}\" is missing, a {} needs it", key.name, what),
+                  "missing_member");
+    }
+    if (!found->is_number() || !std::isfinite(found->get<double>())) {
+      return fail(ErrorCode::bad_request,
+                  fmt::format("key \"{}\" = {} is not a number; give a finite one", key.name, quote(*found)),
+                  "wrong_type");
+    }
+    *key.value = found->get<double>();
+  }
+  return {};
+}
+
+std::unexpected<Error> not_an_object(const json& value, const char* what, const char* example) {
+  return fail(ErrorCode::bad_request,
+              fmt::format("{} is not a {}; give an object such as {}", quote(value), what, example), "wrong_type");
+}
+
+template <class T>
+Result<T> checked(const T& value) {
+  try {
+    control::check(value);
+    return value;
+  } catch (const std::invalid_argument& error) {
+    return fail(ErrorCode::invalid, error.what());
+  }
+}
+
+OrderedJson complex_json(control::Complex value) { return {{"real", value.real()}, {"imaginary", value.imag()}}; }
+
+}  // namespace
+
+Result<control::FractionalModel> model_from(const json& given) {
+  const json& value = given.is_object() && given.contains("parameters") ? given.at("parameters") : given;
+  if (!value.is_object()) {
+    return not_an_object(value, "model",
+                         R"({"kp":0.1,"b1":0.005682,"b2":0.11031,"b3":1,"alpha":1.7263,"beta":0.8682})");
+  }
+  control::FractionalModel model;
+  if (auto known = only(value, "model", {"kp", "b1", "b2", "b3", "alpha", "beta"}); !known) {
+    return std::unexpected{known.error()};
+  }
+  model.b3 = 1;
+  auto read = read_numbers(value, "model",
+                           {{"kp", &model.kp},
+                            {"b1", &model.b1},
+                            {"b2", &model.b2},
+                            {"b3", &model.b3, false},
+                            {"alpha", &model.alpha},
+                            {"beta", &model.beta}});
+  if (!read) return std::unexpected{read.error()};
+  return checked(model);
+}
+
+Result<control::FopdController> controller_from(const json& value) {
+  if (!value.is_object()) return not_an_object(value, "controller", R"({"kp":65.0028,"kd":0.0305,"mu":0.6524})");
+  if (const auto feasible = value.find("feasible"); feasible == value.end()) {
+    if (auto known = only(value, "controller", {"kp", "kd", "mu"}); !known) return std::unexpected{known.error()};
+  } else if (*feasible == false) {
+    return fail(ErrorCode::invalid, "it holds no controller: the tuning was not feasible; see its \"reason\"");
+  }
+  control::FopdController controller;
+  auto read =
+      read_numbers(value, "controller", {{"kp", &controller.kp}, {"kd", &controller.kd}, {"mu", &controller.mu}});
+  if (!read) return std::unexpected{read.error()};
+  return checked(controller);
+}
+
+OrderedJson json_of(const control::FractionalModel& model) {
+  return {{"kp", model.kp}, {"b1", model.b1},       {"b2", model.b2},
+          {"b3", model.b3}, {"alpha", model.alpha}, {"beta", model.beta}};
+}
+
+OrderedJson json_of(const control::FopdController& controller) {
+  return {{"kp", controller.kp}, {"kd", controller.kd}, {"mu", controller.mu}};
+}
+
+OrderedJson json_of(const control::HydrodynamicParameters& p) {
+  return {{"thrust_coefficient", p.thrust_coefficient},
+          {"drag_coefficient", p.drag_coefficient},
+          {"propeller_diameter_m", p.propeller_diameter_m},
+          {"propeller_radius_m", p.propeller_radius_m},
+          {"blade_area_m2", p.blade_area_m2},
+          {"fluid_density_kg_m3", p.fluid_density_kg_m3},
+          {"frontal_area_m2", p.frontal_area_m2},
+          {"added_mass_coefficient", p.added_mass_coefficient},
+          {"flow_velocity_m_s", p.flow_velocity_m_s},
+          {"mass_kg", p.mass_kg},
+          {"operating_velocity_m_s", p.operating_velocity_m_s},
+          {"motor_gain_rad_s", p.motor.gain_rad_s},
+          {"motor_time_constant_s", p.motor.time_constant_s},
+          {"numerator", p.numerator}};
+}
+
+OrderedJson json_of(const control::HydrodynamicModel& model) {
+  return {{"model", json_of(model.model)},
+          {"derived_numerator", model.derived_numerator},
+          {"total_mass_kg", model.total_mass_kg},
+          {"damping_kg_s", model.damping_kg_s},
+          {"linear_drag_kg_s", model.linear_drag_kg_s},
+          {"quadratic_drag_kg_m", model.quadratic_drag_kg_m}};
+}
+
+OrderedJson json_of(const control::MotorFit& fit) {
+  return {{"gain_rad_s", fit.motor.gain_rad_s},
+          {"time_constant_s", fit.motor.time_constant_s},
+          {"gain_sigma_rad_s", fit.gain_sigma_rad_s},
+          {"time_constant_sigma_s", fit.time_constant_sigma_s},
+          {"sse", fit.sse},
+          {"fit_percent", fit.fit_percent},
+          {"residual_sd_rad_s", fit.residual_sd_rad_s}};
+}
+
+OrderedJson json_of(const control::Margins& margins) {
+  return {{"gain_crossover_rad_s", or_null(margins.gain_crossover_rad_s)},
+          {"phase_margin_deg", or_null(margins.phase_margin_deg)},
+          {"phase_slope_deg_per_rad_s", or_null(margins.phase_slope_deg_per_rad_s)},
+          {"ms", margins.ms},
+          {"mt", margins.mt},
+          {"ms_at_rad_s", margins.ms_at_rad_s},
+          {"mt_at_rad_s", margins.mt_at_rad_s},
+          {"gain_margin_db", or_null(margins.gain_margin_db)},
+          {"is_closed_loop_stable", margins.is_closed_loop_stable},
+          {"gain_crossovers_rad_s", margins.gain_crossovers_rad_s},
+          {"phase_crossovers_rad_s", margins.phase_crossovers_rad_s}};
+}
+
+OrderedJson json_of(std::span<const control::BodePoint> points) {
+  OrderedJson out = {{"omega_rad_s", OrderedJson::array()},
+                     {"magnitude_db", OrderedJson::array()},
+                     {"phase_deg", OrderedJson::array()}};
+  for (const control::BodePoint& point : points) {
+    out["omega_rad_s"].push_back(point.omega_rad_s);
+    out["magnitude_db"].push_back(point.magnitude_db);
+    out["phase_deg"].push_back(point.phase_deg);
+  }
+  return out;
+}
+
+OrderedJson json_of(const control::TunedController& tuned) {
+  return {{"name", tuned.name},
+          {"crossover_rad_s", tuned.spec.gain_crossover_rad_s},
+          {"phase_margin_deg", tuned.spec.phase_margin_deg},
+          {"kp", tuned.controller.kp},
+          {"kd", tuned.controller.kd},
+          {"mu", tuned.controller.mu},
+          {"achieved", json_of(tuned.achieved)}};
+}
+
+OrderedJson json_of(const control::TuningResult& result) {
+  OrderedJson out = {{"feasible", result.is_feasible}};
+  if (result.tuned) {
+    out.update(json_of(result.tuned->controller));
+    out["achieved"] = json_of(result.tuned->achieved);
+  } else {
+    out["reason"] = result.reason;
+    const auto& offered = result.nearest.empty() ? result.relaxed : result.nearest;
+    out["nearest"] = offered.empty() ? OrderedJson{} : json_of(offered.front());
+  }
+  out["theta_deg"] = result.theta_deg;
+  out["phase_fall"] = result.phase_fall;
+  out["nearest_all"] = OrderedJson::array();
+  for (const auto& tuned : result.nearest) out["nearest_all"].push_back(json_of(tuned));
+  out["relaxed"] = OrderedJson::array();
+  for (const auto& tuned : result.relaxed) out["relaxed"].push_back(json_of(tuned));
+  return out;
+}
+
+OrderedJson poles_json(const control::FractionalModel& model) {
+  OrderedJson out = OrderedJson::array();
+  if (const auto pole = control::log_pole(model)) {
+    out.push_back(complex_json(std::exp(*pole)));
+    out.push_back(complex_json(std::conj(std::exp(*pole))));
+  } else if (model.b1 > 0 && model.alpha == 2 && model.beta == 1) {
+    const double sum = model.b2 / model.b1, root = std::sqrt(std::max(0.0, sum * sum - 4 * model.b3 / model.b1));
+    out.push_back(complex_json(-2 * model.b3 / model.b1 / (sum + root)));
+    out.push_back(complex_json(-(sum + root) / 2));
+  } else if (model.b1 == 0 && model.beta == 1) {
+    out.push_back(complex_json(-model.b3 / model.b2));
+  }
+  return out;
+}
+
+}  // namespace server

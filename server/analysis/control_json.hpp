@@ -1,0 +1,55 @@
+// Models, controllers and what control/ computes of them, as JSON: one spelling for files, command line and API.
+//
+// Keys are the names of the fields in control/, with their units. A number that is not finite or not there is null.
+// Reading is strict: a model has kp, b1, b2, alpha, beta and perhaps b3, a controller kp, kd, mu; beside them only
+// name, comment and description may stand. What our own commands print can be read back: a model from `parameters`, a
+// controller from what has `feasible`.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "control/closed_loop.hpp"
+#include "control/discretise.hpp"
+#include "control/identify.hpp"
+#include "control/margins.hpp"
+#include "control/motor_fit.hpp"
+#include "control/robustness.hpp"
+#include "control/tune.hpp"
+#include "server/result.hpp"
+
+namespace server {
+
+using OrderedJson = nlohmann::ordered_json;  // keys in the order in which a person reads them
+
+// bad_request for a wrong shape, invalid for a value out of range; the detail names key, value and what is allowed.
+Result<control::FractionalModel> model_from(const nlohmann::json& value);
+Result<control::FopdController> controller_from(const nlohmann::json& value);
+
+const char* text(control::Structure value);
+const char* text(control::Cost value);
+const char* text(control::SearchEnd value);
+const char* text(control::DiscretisationMethod value);
+
+OrderedJson json_of(const control::FractionalModel& model);
+OrderedJson json_of(const control::FopdController& controller);
+OrderedJson json_of(const control::HydrodynamicParameters& parameters);
+OrderedJson json_of(const control::HydrodynamicModel& model);
+OrderedJson json_of(const control::MotorFit& fit);
+OrderedJson json_of(const control::Margins& margins);
+OrderedJson json_of(std::span<const control::BodePoint> points);  // one array per column
+OrderedJson json_of(const control::TunedController& tuned);
+OrderedJson json_of(const control::TuningResult& result);
+OrderedJson json_of(const control::Fit& fit);
+OrderedJson json_of(const control::Identification& identification);
+OrderedJson json_of(const control::ExpectedUncertainty& uncertainty);
+OrderedJson json_of(const control::ParallelSections& sections);
+OrderedJson json_of(const control::Discretisation& discretisation);
+OrderedJson json_of(const control::StepMetrics& metrics);
+OrderedJson json_of(const control::ClosedLoopPrediction& prediction);  // metrics and every sample
+OrderedJson json_of(const control::RobustnessTable& table);
+
+// ln p of the poles as 1/s, upper half plane first; real poles of integer orders too.
+OrderedJson poles_json(const control::FractionalModel& model);
+
+}  // namespace server

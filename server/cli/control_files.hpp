@@ -1,0 +1,38 @@
+// The files that the tools read: models, controllers and recordings.
+//
+// Errors: throws std::runtime_error naming the file, the place in it, what is wrong and what is allowed.
+#pragma once
+
+#include <string>
+
+#include "control/identify.hpp"
+#include "control/transfer_function.hpp"
+#include "server/cli/csv_columns.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace server::cli {
+
+// Which plant and controller: files, or empty for the paper's.
+struct PlantChoice {
+  std::string file;  // or newtonian, non_newtonian
+};
+struct ControllerChoice {
+  std::string file;
+};
+
+void add_option(CLI::App& command, PlantChoice& choice);
+void add_option(CLI::App& command, ControllerChoice& choice);
+
+control::FractionalModel read(const PlantChoice& choice);      // none: (29)
+control::FopdController read(const ControllerChoice& choice);  // none: (30)
+
+CsvColumns read_csv(const std::string& file, std::initializer_list<const char*> required,
+                    std::initializer_list<const char*> optional = {});
+
+// Columns t_s (or robot_time_us, as the station exports), duty, and position_m or velocity_m_s or both.
+control::Recording read_recording(const std::string& file);
+
+}  // namespace server::cli

@@ -1,0 +1,141 @@
+// A line at a time; numbers by from_chars, so that no locale matters.
+#include "server/cli/csv_columns.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+
+namespace server::cli {
+namespace {
+
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+constexpr std::size_t kMaxQuoted = 40;
+
+std::string_view trimmed(std::string_view cell) {
+  const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!cell.empty() && is_space(cell.front())) cell.remove_prefix(1);
+  while (!cell.empty() && is_space(cell.back())) cell.remove_suffix(1);
+  if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') cell = trimmed(cell.substr(1, cell.size() - 2));
+  return cell;
+}
+
+std::vector<std::string_view> cells_of(std::string_view line, char separator) {
+  std::vector<std::string_view> cells;
+  for (std::size_t begin = 0;;) {
+    const std::size_t end = line.find(separator, begin);
+    cells.push_back(trimmed(line.substr(begin, end - begin)));
+    if (end == std::string_view::npos) return cells;
+    begin = end + 1;
+  }
+}
+
+char separator_of(std::string_view heading) {
+  for (const char separator : {',', ';', '\t'}) {
+    if (heading.find(separator) != std::string_view::npos) return separator;
+  }
+  return ',';
+}
+
+class Reader {
+ public:
+  Reader(const std::string& source, std::initializer_list<const char*> required,
+         std::initializer_list<const char*> optional)
+      : source_{source}, required_{required}, optional_{optional} {}
+
+  void take(std::string_view line) {
+    ++line_;
+    const std::string_view content = trimmed(line);
+    if (content.empty() || content.front() == '#') return;
+    has_heading_ ? take_row(line) : take_heading(line);
+  }
+
+  CsvColumns end() {
+    if (!has_heading_) refuse(fmt::format("has no heading; its first line must name the columns {}", wanted()));
+    return std::move(columns_);
+  }
+
+ private:
+  struct Column {
+    std::size_t index = 0;
+    std::vector<double>* values = nullptr;
+    std::string name;
+  };
+
+  [[noreturn]] void refuse(const std::string& why) const {
+    throw std::runtime_error{fmt::format("{} {}", source_, why)};
+  }
+  [[noreturn]] void refuse_line(const std::string& why) const { refuse(fmt::format("line {}: {}", line_, why)); }
+
+  std::string wanted() const { return fmt::format("{}", fmt::join(required_, ", ")); }
+
+  bool wants(std::string_view name) const {
+    const auto same = [name](const char* other) { return name == other; };
+    return std::ranges::any_of(required_, same) || std::ranges::any_of(optional_, same);
+  }
+
+  void take_heading(std::string_view line) {
+    separator_ = separator_of(line);
+    const auto names = cells_of(line, separator_);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (!wants(names[i])) continue;
+      const std::string name{names[i]};
+      if (columns_.contains(name)) refuse_line(fmt::format("column {} stands twice in the heading", name));
+      chosen_.push_back({i, &columns_[name], name});
+    }
+    for (const char* name : required_) {
+      if (!columns_.contains(name)) {
+        refuse_line(fmt::format("column {} is missing in the heading '{}'; needed are {}", name,
+                                trimmed(line).substr(0, 2 * kMaxQuoted), wanted()));
+      }
+    }
+    has_heading_ = true;
+  }
+
+  void take_row(std::string_view line) {
+    if (++rows_ > kMaxCsvRows) refuse(fmt::format("has more than {} rows", kMaxCsvRows));
+    const auto cells = cells_of(line, separator_);
+    for (const Column& column : chosen_) {
+      if (column.index >= cells.size()) {
+        refuse_line(fmt::format("has {} cells, column {} is number {}", cells.size(), column.name, column.index + 1));
+      }
+      column.values->push_back(number(cells[column.index], column.name));
+    }
+  }
+
+  double number(std::string_view cell, const std::string& column) const {
+    if (cell.starts_with('+')) cell.remove_prefix(1);
+    double value = 0;
+    const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+    if (error != std::errc{} || end != cell.data() + cell.size() || !std::isfinite(value)) {
+      refuse_line(fmt::format("'{}' in column {} is not a finite number", cell.substr(0, kMaxQuoted), column));
+    }
+    return value;
+  }
+
+  const std::string& source_;
+  std::vector<const char*> required_, optional_;
+  std::size_t line_ = 0, rows_ = 0;
+  bool has_heading_ = false;
+  char separator_ = ',';
+  CsvColumns columns_;  // nodes stay where they are: chosen_ points into it
+  std::vector<Column> chosen_;
+};
+
+}  // namespace
+
+CsvColumns parse_csv(std::string_view text, const std::string& source, std::initializer_list<const char*> required,
+                     std::initializer_list<const char*> optional) {
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  Reader reader{source, required, optional};
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    reader.take(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return reader.end();
+}
+
+}  // namespace server::cli

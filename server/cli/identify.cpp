@@ -1,0 +1,167 @@
+// `rheonaut identify`.
+#include "server/cli/identify.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "server/analysis/control_json.hpp"
+
+namespace server::cli {
+namespace {
+
+using control::Fit;
+using control::kParameterNames;
+using control::kParameters;
+
+std::array<double, kParameters> values_of(const control::FractionalModel& model) {
+  return {model.kp, model.b1, model.b2, model.alpha, model.beta};
+}
+
+void add_source(CLI::App& command, Identify& wish) {
+  auto* csv = command.add_option("--csv", wish.csv,
+                                 "Recording with columns t_s (equally spaced), duty, and position_m or velocity_m_s");
+  add_options(command, wish.run);
+  auto* run = command.get_option("--run");
+  run->excludes(csv);
+  command.add_option("--span", wish.window.span, "Which span of the run, if the robot rebooted during it")->needs(run);
+  command.add_option("--from-s", wish.window.from_s, "First second of the span to use")->needs(run);
+  command.add_option("--to-s", wish.window.to_s, "Last second of the span to use")->needs(run);
+  command
+      .add_flag("--with-velocity", wish.window.with_velocity,
+                "Also fit the velocity that the robot estimated in the run")
+      ->needs(run);
+}
+
+void add_search(CLI::App& command, control::IdentificationOptions& options) {
+  using control::Cost;
+  using control::Structure;
+  command
+      .add_option("--structure", options.structure,
+                  "first_order, second_order or fractional (default: all three, the best by AIC)")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Structure>{{"first_order", Structure::first_order},
+                                                                           {"second_order", Structure::second_order},
+                                                                           {"fractional", Structure::fractional}})
+                      .description(""));
+  command.add_option("--cost", options.cost, "least_squares or absolute_error (default: least_squares)")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Cost>{{"least_squares", Cost::least_squares},
+                                                                      {"absolute_error", Cost::absolute_error}})
+                      .description(""));
+  command.add_flag("--offset", options.fits_offset, "Fit the initial position too");
+  command.add_option("--dead-time-s", options.longest_dead_time_s, "Find a dead time up to this (default: 0, none)")
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 60)")->check(CLI::PositiveNumber);
+}
+
+void add_plan(CLI::App& command, Identify& wish) {
+  Plan& plan = wish.plan;
+  auto* flag = command.add_flag("--plan", plan.is_wanted, "No recording: what an experiment would tell about --plant");
+  flag->excludes(command.get_option("--csv"))->excludes(command.get_option("--run"))->group("Planning");
+  const auto add = [&command, flag](const char* name, auto& value, const char* meaning) {
+    return command.add_option(name, value, fmt::format("{} (default: {})", meaning, value))
+        ->needs(flag)
+        ->group("Planning");
+  };
+  add("--plan-duty", plan.duty, "prbs or step")->check(CLI::IsMember({"prbs", "step"}));
+  add("--plan-amplitude", plan.amplitude, "Of the duty")->check(CLI::Range(-1.0, 1.0));
+  add("--plan-duration-s", plan.duration_s, "Length")->check(CLI::PositiveNumber);
+  add("--plan-bit-s", plan.bit_s, "Length of a bit of the prbs")->check(CLI::PositiveNumber);
+  add("--plan-dt-s", plan.dt_s, "Sampling period")->check(CLI::PositiveNumber);
+  add("--plan-position-sd-m", plan.position_sd_m, "Noise of the position; 0: not recorded");
+  add("--plan-velocity-sd-m-s", plan.velocity_sd_m_s, "Noise of the velocity; 0: not recorded");
+}
+
+control::Recording recording_for(const Identify& wish) {
+  if (!wish.csv.empty()) return read_recording(wish.csv);
+  if (!wish.run.run) {
+    throw std::runtime_error{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
+  }
+  const std::vector<StoredSample> samples = read_samples(wish.run);
+  auto recording = recording_of(samples, wish.window);
+  if (!recording) throw std::runtime_error{fmt::format("run {}: {}", *wish.run.run, recording.error().detail)};
+  return std::move(*recording);
+}
+
+bool show_progress(const control::Progress& progress) {
+  fmt::print(stderr, "\r{}: start {} of {}, iteration {}, sse {:.6g}   ", text(progress.structure), progress.start + 1,
+             progress.starts, progress.iteration, progress.sse);
+  std::fflush(stderr);
+  return true;
+}
+
+control::Identification search(const Identify& wish, const control::Recording& recording) {
+  control::IdentificationOptions options = wish.options;
+  const bool is_watched = ::isatty(STDERR_FILENO) != 0;
+  if (is_watched) options.on_progress = show_progress;
+  control::Identification found = control::identify(recording, options);
+  if (is_watched) fmt::print(stderr, "\r\x1b[K");
+  return found;
+}
+
+void write_parameters(std::ostream& out, const Fit& fit) {
+  Table table{{text(fit.structure), "value", "one sigma"}};
+  const auto values = values_of(fit.model);
+  for (std::size_t i = 0; i < kParameters; ++i) {
+    if (i == 1 && fit.model.b1 == 0) continue;
+    table.row({kParameterNames[i], cell(values[i], 8), cell(fit.one_sigma[i], 3)});
+  }
+  table.write(out);
+  fmt::print(out, "fit {:.3f} %, residual sd {:.4g}, sse {:.6g}; offset {:.4g} m, dead time {:.4g} s\n",
+             fit.fit_percent, fit.residual_sd, fit.sse, fit.offset_m, fit.dead_time_s);
+  fmt::print(out, "residuals {} white (p = {:.3g}); {} after {} iterations; {} of {} starts agree\n",
+             fit.residuals_are_white ? "look" : "are not", fit.whiteness_p_value, text(fit.end), fit.iterations,
+             fit.starts_that_agree, fit.starts);
+}
+
+void write_compared(std::ostream& out, std::span<const Fit> compared) {
+  if (compared.size() < 2) return;
+  Table table{{"structure", "AIC", "fit (%)", "sse", "free", "kp", "b1", "b2", "alpha", "beta"}};
+  for (const Fit& fit : compared) {
+    std::vector<std::string> row{text(fit.structure), fmt::format("{:.1f}", fit.aic),
+                                 fmt::format("{:.3f}", fit.fit_percent), cell(fit.sse),
+                                 fmt::format("{}", fit.free_parameters)};
+    for (const double value : values_of(fit.model)) row.push_back(cell(value, 5));
+    table.row(std::move(row));
+  }
+  out << '\n';
+  table.write(out);
+}
+
+OrderedJson residuals_json(const Fit& fit) {
+  return {{"position_m", fit.position_residual_m}, {"velocity_m_s", fit.velocity_residual_m_s}};
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, Identify& wish) {
+  add_source(command, wish);
+  add_search(command, wish.options);
+  command.add_flag("--residuals", wish.with_residuals, "With --json: also the residuals, measured less model");
+  add_json_flag(command, wish.form);
+  add_plan(command, wish);
+  add_option(command, wish.plant);
+  command.get_option("--plant")->needs("--plan")->group("Planning");
+  command.footer(
+      "Exit status 4: the search did not converge; the best that was found is printed.\n"
+      "Example: rheonaut identify --csv run.csv --structure fractional");
+}
+
+int run(const Identify& wish, std::ostream& out) {
+  if (wish.plan.is_wanted) return run_plan(wish, out);
+  const control::Identification found = search(wish, recording_for(wish));
+  if (wish.form.is_json) {
+    OrderedJson answer = json_of(found);
+    if (wish.with_residuals) answer["residuals"] = residuals_json(found.best);
+    write_json(out, answer);
+  } else {
+    write_parameters(out, found.best);
+    write_compared(out, found.compared);
+    for (const std::string& warning : found.warnings) fmt::print(out, "\nwarning: {}\n", warning);
+  }
+  return found.best.end == control::SearchEnd::converged ? 0 : kNotConverged;
+}
+
+}  // namespace server::cli

@@ -1,0 +1,22 @@
+// `rheonaut model`: the motion models of the paper, the hydrodynamics behind one of them, and the motor's fit.
+#pragma once
+
+#include <string>
+
+#include "control/plant_models.hpp"
+#include "server/cli/control_files.hpp"
+#include "server/cli/output.hpp"
+
+namespace server::cli {
+
+struct Model {
+  control::HydrodynamicParameters parameters;
+  std::string preset;     // prints this model as a model file
+  std::string motor_csv;  // columns t_s, duty, rate_rad_s: fits the motor and uses it
+  OutputForm form;
+};
+
+void add_options(CLI::App& command, Model& wish);
+int run(const Model& wish, std::ostream& out);
+
+}  // namespace server::cli

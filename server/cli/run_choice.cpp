@@ -1,0 +1,27 @@
+// Flags, and the reading itself.
+#include "server/cli/run_choice.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <stdexcept>
+
+#include "server/analysis/analysis_service.hpp"
+#include "server/recording/run_reader.hpp"
+
+namespace server::cli {
+
+void add_options(CLI::App& command, RunChoice& choice) {
+  auto* run = command.add_option("--run", choice.run, "A recorded run by its number");
+  run->check(CLI::PositiveNumber);
+  command.add_option("--data", choice.data_dir, "Folder of the station that recorded it (default: rheonaut-data)")
+      ->needs(run);
+}
+
+std::vector<StoredSample> read_samples(const RunChoice& choice) {
+  auto samples = read_run(choice.data_dir / "station.sqlite", choice.run.value(), kMaxAnalysedSamples);
+  if (!samples) throw std::runtime_error{samples.error().detail};
+  return std::move(*samples);
+}
+
+}  // namespace server::cli

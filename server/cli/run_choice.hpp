@@ -1,0 +1,26 @@
+// A recorded run as a tool's input: which one, from which station's folder.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "server/analysis/run_recording.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace server::cli {
+
+struct RunChoice {
+  std::optional<std::int64_t> run;
+  std::filesystem::path data_dir = "rheonaut-data";
+};
+
+void add_options(CLI::App& command, RunChoice& choice);
+
+// Throws std::runtime_error saying what is wrong; never creates or changes anything.
+std::vector<StoredSample> read_samples(const RunChoice& choice);
+
+}  // namespace server::cli

@@ -1,0 +1,94 @@
+// One query over the view run_sample.
+#include "server/recording/run_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "server/recording/database.hpp"
+#include "server/recording/schema.hpp"
+#include "server/recording/statement.hpp"
+#include "server/recording/stored_rows.hpp"
+
+namespace server {
+namespace {
+
+// The view gives the samples of a run in order of span and seq, without sorting.
+constexpr const char* kQuery =
+    "SELECT span, boot_id, seq, robot_time_us, utc_us, received_at_us, position_m, velocity_m_s, acceleration_m_s2,"
+    " duty, impedance_mv, reference_m, mode, sub_state, setpoint_m, disturbance_m FROM run_sample WHERE run_id = ?"
+    " LIMIT ?";
+
+StoredSample sample_from(SQLite::Statement& row) {
+  StoredSample stored;
+  stored.span = row.getColumn(0).getUInt();
+  const std::string boot_id = row.getColumn(1).getString();  // decimal text: it may exceed int64
+  std::from_chars(boot_id.data(), boot_id.data() + boot_id.size(), stored.boot_id);
+  stored.seq = unsigned_id(row.getColumn(2));
+  stored.robot_time_us = unsigned_id(row.getColumn(3));
+  stored.utc_us = row.getColumn(4).getInt64();
+  stored.received_at_us = row.getColumn(5).getInt64();
+  stored.sample.position_m = float_or_nan(row.getColumn(6));
+  stored.sample.velocity_m_s = float_or_nan(row.getColumn(7));
+  stored.sample.acceleration_m_s2 = float_or_nan(row.getColumn(8));
+  stored.sample.duty = float_or_nan(row.getColumn(9));
+  stored.sample.impedance_mv = float_or_nan(row.getColumn(10));
+  stored.sample.reference_m = float_or_nan(row.getColumn(11));
+  stored.mode = mode_from(row.getColumn(12).getString());
+  stored.sub_state = sub_state_from(row.getColumn(13).getString());
+  stored.setpoint_m = optional_float(row.getColumn(14));
+  stored.disturbance_m = float_or_nan(row.getColumn(15));
+  return stored;
+}
+
+Result<void> check_ours(SQLite::Database& database, const std::filesystem::path& path) {
+  const auto application_id = database.execAndGet("PRAGMA application_id").getInt64();
+  const auto version = database.execAndGet("PRAGMA user_version").getInt64();
+  if (application_id != kApplicationId) {
+    return fail(ErrorCode::invalid,
+                fmt::format("{} is not a database of Rheonaut (application_id {:#x})", path.string(), application_id));
+  }
+  if (version < 1 || version > static_cast<std::int64_t>(migrations().size())) {
+    return fail(ErrorCode::invalid, fmt::format("{} has schema version {}, this program knows 1 to {}", path.string(),
+                                                version, migrations().size()));
+  }
+  return {};
+}
+
+Result<std::vector<StoredSample>> query_run(SQLite::Database& database, RunId run, std::size_t limit) {
+  SQLite::Statement exists{database, "SELECT 1 FROM run WHERE run_id = ?"};
+  bind_all(exists, run);
+  if (!exists.executeStep()) {
+    SQLite::Statement range{database, "SELECT count(*), min(run_id), max(run_id) FROM run"};
+    range.executeStep();
+    return fail(ErrorCode::not_found, range.getColumn(0).getInt64() == 0
+                                          ? fmt::format("there is no run {}: the database holds no runs", run)
+                                          : fmt::format("there is no run {}: the database holds runs {} to {}", run,
+                                                        range.getColumn(1).getInt64(), range.getColumn(2).getInt64()));
+  }
+  std::vector<StoredSample> samples;
+  SQLite::Statement rows{database, kQuery};
+  bind_all(rows, run, static_cast<std::int64_t>(limit + 1));
+  while (rows.executeStep()) samples.push_back(sample_from(rows));
+  if (samples.size() > limit) {
+    return fail(ErrorCode::invalid, fmt::format("run {} has more than {} samples", run, limit), "run_too_long");
+  }
+  return samples;
+}
+
+}  // namespace
+
+Result<std::vector<StoredSample>> read_run(const std::filesystem::path& path, RunId run, std::size_t limit) {
+  if (!std::filesystem::exists(path)) {
+    return fail(ErrorCode::not_found, fmt::format("there is no {}; --data names the station's folder", path.string()));
+  }
+  try {
+    SQLite::Database database = open_for_reading(path);
+    if (auto ours = check_ours(database, path); !ours) return std::unexpected{ours.error()};
+    return query_run(database, run, limit);
+  } catch (const SQLite::Exception& error) {
+    return fail(ErrorCode::unavailable, fmt::format("cannot read {}: SQLite says '{}'", path.string(), error.what()));
+  }
+}
+
+}  // namespace server

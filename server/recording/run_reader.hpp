@@ -1,0 +1,19 @@
+// Reads a run out of a station's database for a program that is not the station.
+//
+// Opens the file read-only, so it works while the station runs (the write-ahead log allows that), creates nothing, and
+// goes through the view run_sample, which docs/database.md promises. Blocks; for command-line tools.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "server/recording/history.hpp"
+#include "server/result.hpp"
+
+namespace server {
+
+// The samples in order of span and seq. not_found: no such file, no such run. invalid: not a station's database, or
+// more than limit samples.
+Result<std::vector<StoredSample>> read_run(const std::filesystem::path& database, RunId run, std::size_t limit);
+
+}  // namespace server

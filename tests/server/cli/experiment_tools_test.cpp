@@ -1,0 +1,112 @@
+// The fixed forms of identify, discretise and predict, with the numbers of the paper's plant and controller.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "tests/server/cli/tool_test.hpp"
+
+namespace server::cli {
+namespace {
+
+using ::testing::HasSubstr;
+
+class Discretising : public ToolTest {};
+
+TEST_F(Discretising, DirectGivesTheReferenceSections) {
+  const Answer answer = ask("discretise --period-s 0.01 --order 5 --method direct --a 0.5 --json");
+  ASSERT_EQ(answer.exit_code, 0) << answer.error;
+  const auto json = answer.json();
+  EXPECT_EQ(json["numerator"].size(), 6u);
+  EXPECT_EQ(json["denominator"][0], 1.0);
+  EXPECT_NEAR(json["dc_gain"], 65.0028, 1e-9);
+  EXPECT_EQ(json["sections"]["first_order"].size(), 5u);
+  double largest_pole = 0;
+  for (const auto& section : json["sections"]["first_order"]) {
+    largest_pole = std::max(largest_pole, section["pole"].get<double>());
+  }
+  EXPECT_NEAR(largest_pole, 0.97084, 1e-5);
+  EXPECT_NEAR(json["errors"]["max_deg"], 13.4, 0.1);
+  EXPECT_EQ(json["is_stable"], true);
+}
+
+TEST_F(Discretising, ExplainsItsChoiceWhenNoMethodIsGiven) {
+  const auto json = ask("discretise --json").json();
+  EXPECT_FALSE(json["reason"].get<std::string>().empty());
+  EXPECT_GT(json["compared"].size(), 2u);
+  const Answer table = ask("discretise");
+  EXPECT_THAT(table.text, HasSubstr("noise gain"));
+  EXPECT_THAT(table.text, HasSubstr("oustaloup"));
+  EXPECT_EQ(ask("discretise --method oustaloup --json").json()["method"], "oustaloup");
+}
+
+class Predicting : public ToolTest {};
+
+TEST_F(Predicting, GivesTheReferenceMetrics) {
+  const Answer answer = ask("predict --method direct --a 0.5 --json");
+  ASSERT_EQ(answer.exit_code, 0) << answer.error;
+  const auto json = answer.json();
+  EXPECT_NEAR(json["step"]["settling_s"], 1.15, 0.011);
+  // The reference case runs the fit as it is, with 0.9 % more gain at rest, and has 0.45.
+  EXPECT_NEAR(json["step"]["overshoot_percent"], 0.4175, 1e-3);
+  EXPECT_NEAR(json["disturbance"]["settling_s"], 0.63, 0.011);
+  EXPECT_EQ(json["t_s"].size(), json["duty"].size());
+  EXPECT_EQ(json["experiment"]["setpoint_m"], 0.1);
+}
+
+TEST_F(Predicting, AOneWayMotorNeverArrivesInWater) {
+  const Answer answer = ask("predict --plant newtonian --duty-min 0 --method direct");
+  EXPECT_THAT(answer.text, HasSubstr("never"));
+  EXPECT_THAT(answer.text, HasSubstr("20.40"));
+}
+
+TEST_F(Predicting, PrintsSamplesAndRobustness) {
+  const Answer csv = ask("predict --duration-s 1 --csv");
+  EXPECT_THAT(csv.text, ::testing::StartsWith("t_s,position_m,velocity_m_s,measured_m,duty,reference_m\n0,0,"));
+  const Answer table = ask("predict --duration-s 1 --robustness");
+  EXPECT_THAT(table.text, HasSubstr("0 to 1"));
+  EXPECT_THAT(ask("tune --crossover-rad-s 3 --phase-margin-deg 90 --robustness").text, HasSubstr("robustness"));
+}
+
+class Identifying : public ToolTest {};
+
+TEST_F(Identifying, FindsTheModelOfACleanRecordingWhichIsThenAPlant) {
+  save("run.csv", ask("step --duty 0.3 --every-s 0.01 --until-s 5 --csv").text);
+  const Answer answer = ask("identify --csv @run.csv --structure fractional --json");
+  ASSERT_EQ(answer.exit_code, 0) << answer.error;
+  const auto json = answer.json();
+  EXPECT_NEAR(json["parameters"]["alpha"], 1.7263, 1e-4);
+  EXPECT_NEAR(json["parameters"]["kp"], 0.1, 1e-6);
+  EXPECT_TRUE(json["one_sigma"].contains("beta"));
+  EXPECT_LT(json["sse"], 1e-9);
+  EXPECT_GT(json["fit_percent"], 99.99);
+  EXPECT_TRUE(json["warnings"].is_array());
+  save("m.json", answer.text);
+  const auto again = ask("step --plant @m.json --times 5 --json").json();
+  EXPECT_NEAR(again["velocity_m_s"][0], 0.0298827143987, 1e-8);
+}
+
+TEST_F(Identifying, ComparesTheStructuresInATable) {
+  save("run.csv", ask("step --duty 0.3 --every-s 0.02 --until-s 3 --csv").text);
+  const Answer table = ask("identify --csv @run.csv");
+  EXPECT_EQ(table.exit_code, 0) << table.error;
+  EXPECT_THAT(table.text, HasSubstr("first_order"));
+  EXPECT_THAT(table.text, HasSubstr("one sigma"));
+}
+
+TEST_F(Identifying, ExitsWith4WhenTimeRunsOut) {
+  save("run.csv", ask("step --duty 0.3 --every-s 0.01 --until-s 5 --csv").text);
+  const Answer answer = ask("identify --csv @run.csv --structure fractional --time-limit-s 0.000001 --json");
+  EXPECT_EQ(answer.exit_code, 4);
+  EXPECT_EQ(answer.json()["end"], "time_limit");
+}
+
+TEST_F(Identifying, APlanTellsWhatAnExperimentWouldTell) {
+  const auto prbs = ask("identify --plan --json").json();
+  EXPECT_NEAR(prbs["one_sigma"]["alpha"], 0.021, 0.006);
+  EXPECT_THAT(ask("identify --plan --plan-duty step --plan-amplitude 0.3").text, HasSubstr("relative (%)"));
+  EXPECT_EQ(ask("identify --plan --plan-dt-s 1e-9").exit_code, 1);
+}
+
+}  // namespace
+}  // namespace server::cli

@@ -1,0 +1,150 @@
+// The fixed forms of model, bode, step and tune, with the numbers of the paper's plant and controller.
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "tests/server/cli/tool_test.hpp"
+
+namespace server::cli {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class LoopTools : public ToolTest {};
+
+TEST_F(LoopTools, BodeGivesTheMarginsOfThePapersLoop) {
+  const Answer answer = ask("bode --json");
+  ASSERT_EQ(answer.exit_code, 0) << answer.error;
+  const auto json = answer.json();
+  EXPECT_NEAR(json["gain_crossover_rad_s"], 5.9995012056, 1e-9);
+  EXPECT_NEAR(json["phase_margin_deg"], 64.99778607, 1e-7);
+  EXPECT_NEAR(json["phase_slope_deg_per_rad_s"], -3.8399899, 1e-6);
+  EXPECT_NEAR(json["ms"], 1.3350, 5e-5);
+  EXPECT_NEAR(json["mt"], 1.0008, 5e-5);
+  EXPECT_TRUE(json["gain_crossovers_rad_s"].is_array());
+  EXPECT_TRUE(json.contains("gain_margin_db"));
+  EXPECT_FALSE(json.contains("response"));
+}
+
+TEST_F(LoopTools, BodeOfTheVelocityLoopAndOfWater) {
+  EXPECT_NEAR(ask("bode --velocity-loop --json").json()["gain_crossover_rad_s"], 62.921, 1e-3);
+  const auto water = ask("bode --plant newtonian --json").json();
+  EXPECT_NEAR(water["gain_crossover_rad_s"], 15.98298126, 1e-8);
+  EXPECT_NEAR(water["phase_margin_deg"], 31.435452, 1e-6);
+}
+
+TEST_F(LoopTools, BodePrintsATableOrTheResponseInCsv) {
+  const Answer table = ask("bode");
+  EXPECT_THAT(table.text, HasSubstr("gain crossover"));
+  EXPECT_THAT(table.text, HasSubstr("5.9995012"));
+  EXPECT_THAT(table.text, HasSubstr("omega (rad/s)"));
+  const Answer csv = ask("bode --csv --from-rad-s 65 --to-rad-s 66 --points 2");
+  EXPECT_THAT(csv.text, ::testing::StartsWith("omega_rad_s,magnitude_db,phase_deg\n65,-36.65"));
+  EXPECT_EQ(std::ranges::count(csv.text, '\n'), 3);
+  EXPECT_EQ(ask("bode --json --points 7").json()["response"]["phase_deg"].size(), 7u);
+}
+
+TEST_F(LoopTools, StepGivesTheReferenceValues) {
+  const auto json = ask("step --duty 0.3 --times 0.1,1,5,60 --json").json();
+  EXPECT_EQ(json["t_s"], (std::vector<double>{0.1, 1, 5, 60}));
+  EXPECT_NEAR(json["velocity_m_s"][0], 0.0191855562727, 1e-12);
+  EXPECT_NEAR(json["velocity_m_s"][1], 0.0294947721762, 1e-12);
+  EXPECT_NEAR(json["velocity_m_s"][2], 0.0298827143987, 1e-12);
+  EXPECT_NEAR(json["position_m"][1], 0.0265317661481, 1e-12);
+  EXPECT_NEAR(json["position_m"][3], 1.79395895164, 1e-10);
+}
+
+TEST_F(LoopTools, StepTakesEquallySpacedTimesAndAnyDuty) {
+  const Answer csv = ask("step --every-s 0.5 --until-s 1 --csv");
+  EXPECT_THAT(csv.text, ::testing::StartsWith("t_s,duty,velocity_m_s,position_m\n0,0.3,0,0\n0.5,0.3,0.0"));
+  EXPECT_EQ(std::ranges::count(csv.text, '\n'), 4);
+  save("duty.csv", "# a step, late\nduty; t_s\r\n0;0\r\n0.3;1\r\n0.3;2\r\n");
+  const auto json = ask("step --duty-csv @duty.csv --json").json();
+  EXPECT_NEAR(json["velocity_m_s"][1], 0, 1e-15);
+  EXPECT_NEAR(json["position_m"][2], 0.0265317661481, 1e-9);
+  EXPECT_THAT(ask("step").text, HasSubstr("velocity (m/s)"));
+}
+
+TEST_F(LoopTools, TuneMeetsWhatIsAsked) {
+  const auto json = ask("tune --crossover-rad-s 5 --phase-margin-deg 91 --json").json();
+  EXPECT_EQ(json["feasible"], true);
+  EXPECT_NEAR(json["kp"], 49.413, 1e-3);
+  EXPECT_NEAR(json["kd"], 0.10214, 1e-5);
+  EXPECT_NEAR(json["mu"], 0.98463, 1e-5);
+  EXPECT_NEAR(json["achieved"]["gain_crossover_rad_s"], 5, 1e-8);
+  EXPECT_NEAR(json["achieved"]["phase_margin_deg"], 91, 1e-7);
+  EXPECT_NEAR(json["achieved"]["phase_slope_deg_per_rad_s"], 0, 1e-7);
+}
+
+TEST_F(LoopTools, TuneWithAGivenMuReturnsThePapersController) {
+  const auto json = ask("tune --crossover-rad-s 5.9995012056 --phase-margin-deg 64.99778607 --mu 0.6524 --json").json();
+  EXPECT_NEAR(json["kp"], 65.0028, 1e-3);
+  EXPECT_NEAR(json["kd"], 0.0305, 1e-6);
+  EXPECT_EQ(json["mu"], 0.6524);
+}
+
+TEST_F(LoopTools, TuneSaysWhyThePapersSpecificationHasNoSolution) {
+  const Answer answer = ask("tune --crossover-rad-s 65 --phase-margin-deg 72 --json");
+  EXPECT_EQ(answer.exit_code, 3);
+  const auto json = answer.json();
+  EXPECT_EQ(json["feasible"], false);
+  EXPECT_THAT(json["reason"].get<std::string>(), HasSubstr("107"));
+  EXPECT_LT(json["nearest"]["phase_margin_deg"], 22.38);
+  EXPECT_GT(json["nearest"]["kp"], 0);
+  EXPECT_FALSE(json.contains("kp"));
+  const Answer table = ask("tune --crossover-rad-s 65 --phase-margin-deg 72");
+  EXPECT_EQ(table.exit_code, 3);
+  EXPECT_THAT(table.text, HasSubstr("not feasible"));
+  EXPECT_THAT(table.text, HasSubstr("nearest"));
+}
+
+TEST_F(LoopTools, TuneTableShowsAskedBesideAchieved) {
+  const Answer answer = ask("tune --crossover-rad-s 5 --phase-margin-deg 91");
+  EXPECT_THAT(answer.text, HasSubstr("asked"));
+  EXPECT_THAT(answer.text, HasSubstr("kp = 49.41"));
+}
+
+TEST_F(LoopTools, ATuningIsAControllerFile) {
+  save("c.json", ask("tune --crossover-rad-s 5 --phase-margin-deg 91 --json").text);
+  EXPECT_NEAR(ask("bode --controller @c.json --json").json()["phase_margin_deg"], 91, 1e-7);
+  save("none.json", ask("tune --crossover-rad-s 65 --phase-margin-deg 72 --json").text);
+  EXPECT_THAT(ask("bode --controller @none.json").error, HasSubstr("not feasible"));
+}
+
+TEST_F(LoopTools, ModelShowsThePresetsAndTheDerivedNumerator) {
+  const Answer table = ask("model");
+  ASSERT_EQ(table.exit_code, 0) << table.error;
+  EXPECT_THAT(table.text, HasSubstr("-18.4249 +- 6.76898j"));
+  EXPECT_THAT(table.text, HasSubstr("newtonian (28)"));
+  const auto json = ask("model --json").json();
+  EXPECT_NEAR(json["hydrodynamic"]["model"]["b2"], 60.1099, 1e-4);
+  EXPECT_NEAR(json["hydrodynamic"]["derived_numerator"], 3.5554, 1e-4);
+  EXPECT_NEAR(json["newtonian"]["poles_rad_s"][1]["real"], -45.4534445283, 1e-9);
+  EXPECT_NEAR(json["non_newtonian"]["dc_gain_m_s"], 0.1, 1e-12);
+}
+
+TEST_F(LoopTools, ModelFitsTheMotorAndUsesIt) {
+  std::string csv = "t_s,duty,rate_rad_s\n";
+  double rate_rad_s = 0;
+  for (int k = 0; k < 200; ++k) {
+    const double duty = k / 40 % 2 == 0 ? 0.5 : -0.2;
+    csv += std::to_string(0.005 * k) + "," + std::to_string(duty) + "," + std::to_string(rate_rad_s) + "\n";
+    rate_rad_s += (1 - std::exp(-0.005 / 0.03)) * (600 * duty - rate_rad_s);
+  }
+  save("motor.csv", csv);
+  const auto json = ask("model --motor-csv @motor.csv --json").json();
+  EXPECT_NEAR(json["motor_fit"]["gain_rad_s"], 600, 1e-3);
+  EXPECT_NEAR(json["hydrodynamic"]["parameters"]["motor_time_constant_s"], 0.03, 1e-6);
+  EXPECT_THAT(ask("model --motor-csv @motor.csv").text, HasSubstr("gain km"));
+}
+
+TEST_F(LoopTools, APresetIsAModelFile) {
+  save("m.json", ask("model --preset newtonian").text);
+  EXPECT_NEAR(ask("bode --plant @m.json --json").json()["gain_crossover_rad_s"], 15.98298126, 1e-8);
+  const auto heavy = ask("model --preset hydrodynamic --mass-kg 1").json();
+  EXPECT_LT(heavy["b2"], 60);
+}
+
+}  // namespace
+}  // namespace server::cli

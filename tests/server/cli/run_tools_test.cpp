@@ -1,0 +1,114 @@
+// Tools that read a recorded run: while the station records, with gaps and reboots, and without changing a byte.
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "control/modal_plant.hpp"
+#include "server/recording/run_reader.hpp"
+#include "tests/server/cli/tool_test.hpp"
+#include "tests/server/recording/recording_test.hpp"
+
+namespace server {
+namespace {
+
+using cli::ToolAnswer;
+using ::testing::HasSubstr;
+
+class RunTools : public RecordingTest {
+ protected:
+  ToolAnswer ask(const std::string& command) { return cli::ask_tool(folder_, command + " --data @."); }
+
+  // The robot swims for this many samples under this duty, and the station hears of it.
+  void swim(std::size_t count, double duty) {
+    SampleBatch batch = robot_.batch(robot_.next_seq, count);
+    for (Sample& sample : batch.samples) {
+      sample.position_m = static_cast<float>(plant_.position_m()) + robot_.context.disturbance_m;
+      sample.velocity_m_s = static_cast<float>(plant_.velocity_m_s());
+      sample.duty = static_cast<float>(duty);
+      plant_.step(duty);
+    }
+    send(robot_, batch);
+    robot_.next_seq += count;
+  }
+
+  RunId begin() {
+    start();
+    connect(robot_);
+    return wait(runs_->create(robot_.id, named("duty step"))).value().id;
+  }
+
+  TestRobot robot_;
+  control::ModalPlant plant_{control::kNonNewtonianModel, 0.01};
+};
+
+TEST_F(RunTools, ReadsTheSamplesWhileTheStationRecords) {
+  const RunId run = begin();
+  swim(100, 0.3);
+  flush();
+  const auto samples = read_run(path_, run, 1000);
+  ASSERT_TRUE(samples) << samples.error().detail;
+  EXPECT_EQ(samples->size(), 100u);
+  EXPECT_EQ(samples->front().boot_id, robot_.boot_id);
+  EXPECT_EQ(samples->back().sample.duty, 0.3F);
+  EXPECT_FALSE(read_run(path_, run, 99));
+  EXPECT_THAT(read_run(path_, run + 1, 99).error().detail, HasSubstr("the database holds runs 1 to 1"));
+}
+
+TEST_F(RunTools, RefusesAFileThatIsNotAStations) {
+  std::ofstream{folder_ / "station.sqlite"} << "not a database, but long enough to be looked at as one";
+  EXPECT_THAT(ask("identify --run 1").error, HasSubstr("station.sqlite"));
+}
+
+TEST_F(RunTools, IdentifyFindsTheModelWithoutTheDisturbance) {
+  begin();
+  swim(200, 0.3);
+  robot_.context.disturbance_m = -0.05F;
+  swim(200, -0.5);
+  flush();
+  const ToolAnswer answer = ask("identify --run 1 --structure fractional --json");
+  ASSERT_EQ(answer.exit_code, 0) << answer.error;
+  EXPECT_NEAR(answer.json()["parameters"]["kp"], 0.1, 1e-3);
+}
+
+TEST_F(RunTools, IdentifyRefusesAGapAndSaysWhereItIs) {
+  begin();
+  swim(100, 0.3);
+  robot_.next_seq += 20;
+  robot_.oldest_seq = robot_.next_seq;
+  swim(100, 0.3);
+  flush();
+  const ToolAnswer answer = ask("identify --run 1");
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_THAT(answer.error, HasSubstr("run 1: the run has a gap of 0.210 s at 1.200 s (20 samples after seq 99"));
+  EXPECT_THAT(ask("identify --run 1 --from-s 5").error, HasSubstr("has 0 samples"));
+  EXPECT_NE(ask("identify --run 1 --to-s 0.99 --structure first_order").exit_code, 1);
+}
+
+TEST_F(RunTools, PredictRepeatsTheRunsStepAndDisturbance) {
+  begin();
+  robot_.context.mode = rheonaut_MODE_AUTO;
+  robot_.context.setpoint_m = 0.2F;
+  swim(300, 0.3);
+  robot_.context.disturbance_m = -0.05F;
+  swim(200, 0.3);
+  flush();
+  const ToolAnswer answer = ask("predict --run 1 --json");
+  ASSERT_EQ(answer.exit_code, 0) << answer.error;
+  const auto json = answer.json();
+  EXPECT_NEAR(json["experiment"]["setpoint_m"], 0.2, 1e-6);
+  EXPECT_NEAR(json["experiment"]["disturbance_m"], -0.05, 1e-6);
+  EXPECT_NEAR(json["experiment"]["disturbance_at_s"], 3, 1e-6);
+  EXPECT_NEAR(json["experiment"]["duration_s"], 4.99, 1e-6);
+  EXPECT_EQ(json["measured_steps"].size(), 2u);
+  EXPECT_THAT(ask("predict --run 1").text, HasSubstr("setpoint 0 to 0.2 m, measured"));
+}
+
+TEST_F(RunTools, PredictNeedsAStepInTheRun) {
+  begin();
+  swim(50, 0.3);
+  flush();
+  EXPECT_THAT(ask("predict --run 1").error, HasSubstr("no step"));
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,33 @@
+// Stands for main: parses the words, runs the tool, and catches what it throws.
+#include "tests/server/cli/tool_test.hpp"
+
+#include <sstream>
+
+namespace server::cli {
+
+ToolAnswer ask_tool(const std::filesystem::path& folder, const std::string& command) {
+  std::vector<std::string> words{"rheonaut"};
+  std::istringstream stream{command};
+  for (std::string word; stream >> word;) {
+    words.push_back(word.starts_with('@') ? (folder / word.substr(1)).string() : word);
+  }
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  ToolAnswer given;
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  const Wish wish = parse_command_line(static_cast<int>(arguments.size()), arguments.data());
+  const std::string help = ::testing::internal::GetCapturedStdout();
+  given.error = ::testing::internal::GetCapturedStderr();
+  std::ostringstream out;
+  try {
+    given.exit_code = answer(wish, out).value_or(0);
+  } catch (const std::exception& error) {
+    given.exit_code = 1;
+    given.error += error.what();
+  }
+  given.text = help + out.str();
+  return given;
+}
+
+}  // namespace server::cli
