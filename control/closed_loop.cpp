@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <sstream>
-#include <stdexcept>
 
+#include "control/invalid_argument.hpp"
 #include "control/modal_plant.hpp"
 #include "control/reference_profile.hpp"
 
@@ -18,10 +17,7 @@ constexpr double kBandFraction = 0.02;
 
 void require(bool is_good, const char* what, double value) {
   if (is_good) return;
-  std::ostringstream text;
-  text.precision(10);
-  text << "closed loop: " << what << ", is " << value;
-  throw std::invalid_argument(text.str());
+  throw_invalid("closed loop: ", what, ", is ", value);
 }
 
 void check(const ClosedLoopExperiment& e) {

@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <sstream>
 #include <stdexcept>
+
+#include "control/invalid_argument.hpp"
 
 namespace control {
 namespace {
@@ -44,10 +45,8 @@ long zeros_before(const FractionalModel& plant, const FopdController& controller
 // The first zero to the left of the imaginary axis, or the cut, as an angle from that axis.
 double free_angle(const FractionalModel& plant, const FopdController& controller) {
   if (zeros_before(plant, controller, pi / 2) != 0) {
-    std::ostringstream text;
-    text << "continuous loop: kp " << controller.kp << ", kd " << controller.kd << ", mu " << controller.mu
-         << " make the loop with this plant unstable; take a lower kp";
-    throw std::invalid_argument(text.str());
+    throw_invalid("continuous loop: kp ", controller.kp, ", kd ", controller.kd, ", mu ", controller.mu,
+                  " make the loop with this plant unstable; take a lower kp");
   }
   double free_rad = pi / 2;  // no zero up to here
   for (int i = 1; i <= kAngles; ++i) {
@@ -73,8 +72,8 @@ double bisect(double low, double high, Condition condition) {
 ContinuousLoop::ContinuousLoop(const FractionalModel& plant, const FopdController& controller, double ray) {
   check(plant);
   check(controller);
-  if (!(plant.kp > 0)) throw std::invalid_argument("continuous loop: the plant's kp must be positive");
-  if (!(ray > 0 && ray < 1)) throw std::invalid_argument("continuous loop: ray must lie in (0, 1)");
+  if (!(plant.kp > 0)) throw_invalid("continuous loop: the plant's kp must be positive, is ", plant.kp);
+  if (!(ray > 0 && ray < 1)) throw_invalid("continuous loop: ray must lie in (0, 1), is ", ray);
   const double free_rad = std::max(free_angle(plant, controller), kSmallestGapRad), angle_rad = pi / 2 + ray * free_rad;
   const double step = 2 * pi * std::min(ray, 1 - ray) * free_rad / kDigits;
   const double log_high = std::log(kDigits / (-std::cos(angle_rad) * kShortestS));

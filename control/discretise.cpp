@@ -14,6 +14,7 @@
 #include <unsupported/Eigen/FFT>
 
 #include "control/closed_loop.hpp"
+#include "control/invalid_argument.hpp"
 #include "control/oustaloup.hpp"
 #include "control/steiglitz_mcbride.hpp"
 
@@ -30,11 +31,7 @@ constexpr const char* kAdvice = "; take a lower order, a smaller a, or Oustaloup
 
 template <class... Parts>
 std::string said(const Parts&... parts) {
-  std::ostringstream text;
-  text.precision(10);
-  text << "discretisation: ";
-  (text << ... << parts);
-  return text.str();
+  return join_text("discretisation: ", parts...);
 }
 
 template <class... Parts>

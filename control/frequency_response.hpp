@@ -10,10 +10,13 @@
 // Errors:   none; the arguments have been checked.
 #pragma once
 
+#include <numbers>
+
 #include "control/transfer_function.hpp"
 
 namespace control {
 
+constexpr double kDegPerRad = 180 / std::numbers::pi;
 constexpr double kLargestLogOmega = 150;  // 1e65 rad/s; the squares of s² are still numbers there
 
 // A complex function of frequency at one point of the axis.

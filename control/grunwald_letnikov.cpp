@@ -3,18 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
-#include <stdexcept>
+
+#include "control/invalid_argument.hpp"
 
 namespace control {
 namespace {
 
-[[noreturn]] void refuse(const char* what, double value) {
-  std::ostringstream text;
-  text.precision(10);
-  text << "Grünwald-Letnikov: " << what << ' ' << value;
-  throw std::invalid_argument(text.str());
-}
+[[noreturn]] void refuse(const char* what, double value) { throw_invalid("Grünwald-Letnikov: ", what, ' ', value); }
 
 // c_0 .. c_{count-1} of (1).
 std::vector<double> coefficients(const FractionalModel& model, double dt_s, std::size_t count) {

@@ -9,6 +9,7 @@
 
 #include "control/fit_statistics.hpp"
 #include "control/identifiability.hpp"
+#include "control/invalid_argument.hpp"
 #include "control/output_error_search.hpp"
 
 namespace control {
@@ -23,10 +24,7 @@ constexpr double kWhite = 0.01;
 
 template <typename... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
-  std::ostringstream text;
-  text.precision(10);
-  (text << ... << parts);
-  throw std::invalid_argument("identification: " + text.str());
+  throw_invalid("identification: ", parts...);
 }
 
 void check_column(const char* name, std::span<const double> values, std::size_t expected) {

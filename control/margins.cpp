@@ -4,17 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <sstream>
-#include <stdexcept>
 
 #include "control/frequency_response.hpp"
+#include "control/invalid_argument.hpp"
 
 namespace control {
 namespace {
 
 using std::numbers::pi;
 
-constexpr double kDegPerRad = 180 / pi;
 constexpr double kDbPerNeper = 20 / std::numbers::ln10;
 constexpr double kScanStep = 0.2;        // in ln ω; a power law has no feature narrower than about 1
 constexpr double kAsymptoteStep = 0.6;   // far from every break
@@ -27,9 +25,7 @@ constexpr int kPeaksPolished = 3;
 
 void check_frequency(double omega_rad_s) {
   if (omega_rad_s > 0 && std::isfinite(omega_rad_s)) return;
-  std::ostringstream text;
-  text << "frequency must be positive and finite, is " << omega_rad_s << " rad/s";
-  throw std::invalid_argument(text.str());
+  throw_invalid("frequency must be positive and finite, is ", omega_rad_s, " rad/s");
 }
 
 class LoopOnAxis {
@@ -328,10 +324,8 @@ std::vector<double> log_spaced(double first_rad_s, double last_rad_s, int count)
   check_frequency(first_rad_s);
   check_frequency(last_rad_s);
   if (!(last_rad_s > first_rad_s && count >= 2)) {
-    std::ostringstream text;
-    text << "frequencies: need at least 2 from low to high, not " << count << " from " << first_rad_s << " to "
-         << last_rad_s << " rad/s";
-    throw std::invalid_argument(text.str());
+    throw_invalid("frequencies: need at least 2 from low to high, not ", count, " from ", first_rad_s, " to ",
+                  last_rad_s, " rad/s");
   }
   const double first = std::log(first_rad_s), step = (std::log(last_rad_s) - first) / (count - 1);
   std::vector<double> frequencies(static_cast<std::size_t>(count));

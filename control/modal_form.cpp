@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <sstream>
-#include <stdexcept>
+
+#include "control/invalid_argument.hpp"
 
 namespace control {
 namespace {
@@ -19,17 +19,15 @@ constexpr double kLargestPoleLogRate = 200;  // faster and slower poles are beyo
 constexpr double kLargestLogRate = 4e4;      // where those are given up: enough for beta = 0.001
 
 void check(const ModalRange& range) {
-  std::ostringstream text;
   if (!(range.shortest_s > 0 && std::isfinite(range.shortest_s))) {
-    text << "modal form: shortest_s must be positive, is " << range.shortest_s;
-  } else if (!(range.longest_s > range.shortest_s && std::isfinite(range.longest_s))) {
-    text << "modal form: longest_s must be above shortest_s, is " << range.longest_s;
-  } else if (!(range.tolerance >= 1e-14 && range.tolerance <= 0.1)) {
-    text << "modal form: tolerance must lie in [1e-14, 0.1], is " << range.tolerance;
-  } else {
-    return;
+    throw_invalid("modal form: shortest_s must be positive, is ", range.shortest_s);
   }
-  throw std::invalid_argument(text.str());
+  if (!(range.longest_s > range.shortest_s && std::isfinite(range.longest_s))) {
+    throw_invalid("modal form: longest_s must be above shortest_s, is ", range.longest_s);
+  }
+  if (!(range.tolerance >= 1e-14 && range.tolerance <= 0.1)) {
+    throw_invalid("modal form: tolerance must lie in [1e-14, 0.1], is ", range.tolerance);
+  }
 }
 
 // On each ray of angle φ in (π/α, π) there is one radius where Im D = 0; ln s there.

@@ -3,9 +3,8 @@
 
 #include <cmath>
 #include <numeric>
-#include <sstream>
-#include <stdexcept>
 
+#include "control/invalid_argument.hpp"
 #include "control/modal_form.hpp"
 
 namespace control {
@@ -18,9 +17,7 @@ constexpr double kSettled = 1e-17;  // what is left of a mode after one step, wh
 
 ModalPlant::ModalPlant(const FractionalModel& model, double dt_s) : dt_s_(dt_s) {
   if (!(dt_s > 0 && std::isfinite(dt_s))) {
-    std::ostringstream text;
-    text << "modal plant: dt_s must be positive and finite, is " << dt_s;
-    throw std::invalid_argument(text.str());
+    throw_invalid("modal plant: dt_s must be positive and finite, is ", dt_s);
   }
   const ModalForm form = modal_form(model, kRange);
   std::size_t kept = 0;

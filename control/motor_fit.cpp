@@ -5,11 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
-#include <stdexcept>
 #include <unsupported/Eigen/NonLinearOptimization>
 
 #include "control/fit_statistics.hpp"
+#include "control/invalid_argument.hpp"
 
 namespace control {
 namespace {
@@ -20,10 +19,7 @@ constexpr std::size_t kFewestSamples = 10;
 
 template <typename... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
-  std::ostringstream text;
-  text.precision(10);
-  (text << ... << parts);
-  throw std::invalid_argument("motor fit: " + text.str());
+  throw_invalid("motor fit: ", parts...);
 }
 
 void check(double dt_s, std::span<const double> duty, std::span<const double> rate_rad_s) {

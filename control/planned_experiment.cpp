@@ -2,11 +2,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <sstream>
-#include <stdexcept>
 
 #include "control/fit_statistics.hpp"
 #include "control/identify.hpp"
+#include "control/invalid_argument.hpp"
 #include "control/output_model.hpp"
 
 namespace control {
@@ -17,11 +16,7 @@ using Eigen::Index;
 constexpr double kModelTolerance = 1e-9;
 constexpr double kMostSamples = 400000;
 
-[[noreturn]] void refuse(const char* what, double value) {
-  std::ostringstream text;
-  text << "planned experiment: " << what << ' ' << value;
-  throw std::invalid_argument(text.str());
-}
+[[noreturn]] void refuse(const char* what, double value) { throw_invalid("planned experiment: ", what, ' ', value); }
 
 void check(const PlannedExperiment& experiment) {
   if (!(experiment.dt_s > 0 && std::isfinite(experiment.dt_s))) refuse("dt_s must be positive, is", experiment.dt_s);

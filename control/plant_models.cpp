@@ -3,20 +3,15 @@
 
 #include <cmath>
 #include <numbers>
-#include <sstream>
-#include <stdexcept>
+
+#include "control/invalid_argument.hpp"
 
 namespace control {
 namespace {
 
 using std::numbers::pi;
 
-[[noreturn]] void refuse(const char* what, double value) {
-  std::ostringstream text;
-  text.precision(10);
-  text << what << ' ' << value;
-  throw std::invalid_argument(text.str());
-}
+[[noreturn]] void refuse(const char* what, double value) { throw_invalid(what, ' ', value); }
 
 void check_positive(const char* what, double value) {
   if (!(value > 0 && std::isfinite(value))) refuse(what, value);

@@ -2,17 +2,15 @@
 #include "control/reference_profile.hpp"
 
 #include <cmath>
-#include <sstream>
-#include <stdexcept>
+
+#include "control/invalid_argument.hpp"
 
 namespace control {
 namespace {
 
 void check_limit(const char* name, double value) {
   if (value >= 0 && std::isfinite(value)) return;
-  std::ostringstream text;
-  text << "reference profile: " << name << " must be positive, or 0 for no limit, is " << value;
-  throw std::invalid_argument(text.str());
+  throw_invalid("reference profile: ", name, " must be positive, or 0 for no limit, is ", value);
 }
 
 }  // namespace

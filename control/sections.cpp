@@ -3,8 +3,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
+
+#include "control/invalid_argument.hpp"
 
 namespace control {
 namespace {
@@ -14,26 +15,22 @@ constexpr double kSamePole = 1e-9;      // relative distance of poles that count
 
 template <class... Parts>
 std::string said(const Parts&... parts) {
-  std::ostringstream text;
-  text.precision(10);
-  text << "sections: ";
-  (text << ... << parts);
-  return text.str();
+  return join_text("sections: ", parts...);
 }
 
 void check(const DiscreteTransferFunction& transfer) {
   const auto &b = transfer.numerator, &a = transfer.denominator;
   if (a.empty() || a.size() != b.size()) {
-    throw std::invalid_argument(said("numerator and denominator must have the same length, have ", b.size(), " and ",
-                                     a.size(), "; fill the shorter up with zeros"));
+    throw_invalid("sections: ", "numerator and denominator must have the same length, have ", b.size(), " and ",
+                  a.size(), "; fill the shorter up with zeros");
   }
-  if (a[0] != 1) throw std::invalid_argument(said("denominator must begin with 1, begins with ", a[0]));
+  if (a[0] != 1) throw_invalid("sections: ", "denominator must begin with 1, begins with ", a[0]);
   for (std::size_t k = 0; k < a.size(); ++k) {
     if (std::isfinite(a[k]) && std::isfinite(b[k])) continue;
-    throw std::invalid_argument(said("coefficient ", k, " is not finite (", b[k], ", ", a[k], ")"));
+    throw_invalid("sections: ", "coefficient ", k, " is not finite (", b[k], ", ", a[k], ")");
   }
   if (!(transfer.period_s > 0 && std::isfinite(transfer.period_s))) {
-    throw std::invalid_argument(said("period_s must be positive, is ", transfer.period_s));
+    throw_invalid("sections: ", "period_s must be positive, is ", transfer.period_s);
   }
 }
 
@@ -185,8 +182,7 @@ std::vector<Complex> zeros(const ParallelSections& sections) {
     through += s.b0;
     i += 2;
   }
-  if (through == 0)
-    throw std::invalid_argument(said("the first sample of the impulse response is 0: zeros at infinity"));
+  if (through == 0) throw_invalid("sections: ", "the first sample of the impulse response is 0: zeros at infinity");
   return eigenvalues(a - b * c.transpose() / through);
 }
 
@@ -296,7 +292,7 @@ void SectionFilter::reset() {
 }
 
 double float32_rms_error(const ParallelSections& sections, std::span<const double> error_m) {
-  if (error_m.empty()) throw std::invalid_argument(said("no error signal to compare float32 and double on"));
+  if (error_m.empty()) throw_invalid("sections: ", "no error signal to compare float32 and double on");
   std::vector<float> first(sections.first_order.size()), second(2 * sections.second_order.size());
   SectionFilter exact{sections};
   double sum = 0;

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
-#include <stdexcept>
 #include <vector>
+
+#include "control/invalid_argument.hpp"
 
 namespace control {
 namespace {
@@ -16,10 +16,7 @@ constexpr double kFewestSmoothed = 5, kMostSmoothed = 21;
 
 template <class... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
-  std::ostringstream text;
-  text << "step metrics: ";
-  (text << ... << parts);
-  throw std::invalid_argument(text.str());
+  throw_invalid("step metrics: ", parts...);
 }
 
 void check(std::span<const double> time_s, std::span<const double> position_m, const StepExperiment& experiment) {

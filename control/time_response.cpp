@@ -6,9 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <sstream>
-#include <stdexcept>
 
+#include "control/invalid_argument.hpp"
 #include "control/modal_form.hpp"
 
 namespace control {
@@ -20,12 +19,7 @@ constexpr int kNodes = 32;  // N of (2): the contour errs by e^{-1.36 N}, roundi
 constexpr double kNarrowestRad = 0.88 * pi;  // poles nearer to the negative axis stay inside the contour
 constexpr double kModalTolerance = 1e-12;
 
-[[noreturn]] void refuse(const char* what, double value) {
-  std::ostringstream text;
-  text.precision(10);
-  text << "time response: " << what << ' ' << value;
-  throw std::invalid_argument(text.str());
-}
+[[noreturn]] void refuse(const char* what, double value) { throw_invalid("time response: ", what, ' ', value); }
 
 // A point z = s t of the upper half of (2), and e^z dz/dφ · 2/N.
 struct Node {

@@ -2,18 +2,13 @@
 #include "control/transfer_function.hpp"
 
 #include <cmath>
-#include <sstream>
-#include <stdexcept>
+
+#include "control/invalid_argument.hpp"
 
 namespace control {
 namespace {
 
-[[noreturn]] void refuse(const char* what, double value) {
-  std::ostringstream text;
-  text.precision(10);
-  text << "controller: " << what << ' ' << value;
-  throw std::invalid_argument(text.str());
-}
+[[noreturn]] void refuse(const char* what, double value) { throw_invalid("controller: ", what, ' ', value); }
 
 }  // namespace
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 #include <sstream>
-#include <stdexcept>
 
+#include "control/invalid_argument.hpp"
 #include "control/tuning_alternatives.hpp"
 #include "control/tuning_equations.hpp"
 
@@ -14,14 +14,8 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kDegPerRad = 180 / pi;
 
-[[noreturn]] void refuse(const char* what, double value) {
-  std::ostringstream text;
-  text.precision(10);
-  text << "tuning: " << what << ' ' << value;
-  throw std::invalid_argument(text.str());
-}
+[[noreturn]] void refuse(const char* what, double value) { throw_invalid("tuning: ", what, ' ', value); }
 
 void check_plant(const FractionalModel& plant) {
   check(plant);

@@ -13,7 +13,6 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kDegPerRad = 180 / pi;
 constexpr double kInsideDeg = 0.1, kInsideLogOmega = 1e-3;  // how far inside the feasible region an offer lies
 constexpr double kSearchStep = 0.02, kSearchWidth = 13.8;   // in ln ω; ln 1e6
 constexpr double kPracticalMu = 0.9;

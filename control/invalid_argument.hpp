@@ -1,0 +1,24 @@
+// Refuses an argument: what is wrong, which value it has, and what is allowed, as std::invalid_argument.
+#pragma once
+
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+namespace control {
+
+// The parts one after the other, numbers with ten digits.
+template <class... Parts>
+std::string join_text(const Parts&... parts) {
+  std::ostringstream text;
+  text.precision(10);
+  (text << ... << parts);
+  return text.str();
+}
+
+template <class... Parts>
+[[noreturn]] void throw_invalid(const Parts&... parts) {
+  throw std::invalid_argument(join_text(parts...));
+}
+
+}  // namespace control
