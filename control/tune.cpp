@@ -2,7 +2,6 @@
 #include "control/tune.hpp"
 
 #include <cmath>
-#include <numbers>
 #include <sstream>
 
 #include "control/invalid_argument.hpp"
@@ -11,9 +10,6 @@
 
 namespace control {
 namespace {
-
-using std::numbers::pi;
-
 
 [[noreturn]] void refuse(const char* what, double value) { throw_invalid("tuning: ", what, ' ', value); }
 
@@ -34,11 +30,6 @@ void check(const TuningSpec& spec) {
     refuse("phase_margin_deg must lie in (0, 180), is", spec.phase_margin_deg);
   }
   if (spec.mu && !(*spec.mu > 0 && *spec.mu < 2)) refuse("mu must lie in (0, 2), is", *spec.mu);
-}
-
-bool is_feasible(const TuningSpec& spec, const TuningDemand& demand) {
-  if (spec.mu) return demand.theta_rad >= 0 && demand.theta_rad < *spec.mu * pi / 2;
-  return demand.phase_fall < largest_phase_fall(demand.theta_rad);  // (5)
 }
 
 std::string name_of(const TuningSpec& spec) {
@@ -100,7 +91,7 @@ TuningResult tune(const FractionalModel& plant, const TuningSpec& spec) {
   TuningResult result;
   result.theta_deg = demand.theta_rad * kDegPerRad;
   result.phase_fall = demand.phase_fall;
-  result.is_feasible = is_feasible(spec, demand);
+  result.is_feasible = feasible_theta(spec.mu, demand.phase_fall).contains(demand.theta_rad);  // (5)
   if (result.is_feasible) {
     const double mu = spec.mu ? *spec.mu : iso_damping_mu(demand);
     result.tuned = tuned_controller(plant, spec, mu, name_of(spec));
@@ -119,10 +110,10 @@ std::optional<PhaseMarginRange> feasible_phase_margins(const FractionalModel& pl
   check_crossover(gain_crossover_rad_s);
   const PlantOnAxis on_axis{plant, is_velocity_loop};
   const TuningDemand demand = tuning_demand(on_axis, std::log(gain_crossover_rad_s), 0);
-  if (demand.phase_fall >= 0.5) return std::nullopt;
-  const double plain_deg = -demand.theta_rad * kDegPerRad;                   // the phase margin with θ = 0
-  const double low_deg = std::asin(2 * demand.phase_fall) / 2 * kDegPerRad;  // (5)
-  return PhaseMarginRange{plain_deg + low_deg, plain_deg + 90 - low_deg};
+  const ThetaRange theta = feasible_theta(std::nullopt, demand.phase_fall);  // (5)
+  if (theta.low_rad >= theta.high_rad) return std::nullopt;
+  const double plain_deg = -demand.theta_rad * kDegPerRad;  // the phase margin with θ = 0
+  return PhaseMarginRange{plain_deg + theta.low_rad * kDegPerRad, plain_deg + theta.high_rad * kDegPerRad};
 }
 
 }  // namespace control

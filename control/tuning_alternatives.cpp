@@ -17,26 +17,10 @@ constexpr double kInsideDeg = 0.1, kInsideLogOmega = 1e-3;  // how far inside th
 constexpr double kSearchStep = 0.02, kSearchWidth = 13.8;   // in ln ω; ln 1e6
 constexpr double kPracticalMu = 0.9;
 
-// The θ that can be met, for this R: an open interval, empty if low ≥ high.
-struct ThetaRange {
-  double low_rad = 0, high_rad = 0;
-};
-
-ThetaRange feasible_theta(const TuningSpec& spec, double phase_fall) {
-  if (spec.mu) return {0, *spec.mu * pi / 2};
-  if (phase_fall >= 0.5) return {};
-  const double low_rad = std::asin(2 * phase_fall) / 2;
-  return {low_rad, pi / 2 - low_rad};  // (5)
-}
-
-bool is_inside(const ThetaRange& range, double theta_rad) {
-  return theta_rad > range.low_rad && theta_rad < range.high_rad;
-}
-
 // Whether the specification would have a solution if its crossover were here.
 bool is_feasible_at(const PlantOnAxis& plant, const TuningSpec& spec, double log_omega) {
   const TuningDemand demand = tuning_demand(plant, log_omega, spec.phase_margin_deg);
-  return is_inside(feasible_theta(spec, demand.phase_fall), demand.theta_rad);
+  return feasible_theta(spec.mu, demand.phase_fall).contains(demand.theta_rad);
 }
 
 double mu_for(const TuningSpec& spec, const TuningDemand& demand) {
@@ -45,7 +29,7 @@ double mu_for(const TuningSpec& spec, const TuningDemand& demand) {
 
 std::optional<TuningSpec> nearest_phase_margin(const PlantOnAxis& plant, TuningSpec spec) {
   const TuningDemand demand = tuning_demand(plant, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
-  const ThetaRange theta = feasible_theta(spec, demand.phase_fall);
+  const ThetaRange theta = feasible_theta(spec.mu, demand.phase_fall);
   const double at_theta_0_deg = spec.phase_margin_deg - demand.theta_rad * kDegPerRad;
   const double low_deg = std::max(0.0, at_theta_0_deg + theta.low_rad * kDegPerRad);
   const double high_deg = std::min(180.0, at_theta_0_deg + theta.high_rad * kDegPerRad);

@@ -23,6 +23,13 @@ double largest_phase_fall(double theta_rad) {
   return theta_rad > 0 && theta_rad < pi / 2 ? std::sin(2 * theta_rad) / 2 : 0;
 }
 
+ThetaRange feasible_theta(std::optional<double> mu, double phase_fall) {
+  if (mu) return {0, *mu * pi / 2, true};
+  if (phase_fall >= 0.5) return {};
+  const double low_rad = std::asin(2 * phase_fall) / 2;
+  return {low_rad, pi / 2 - low_rad, false};
+}
+
 double iso_damping_mu(const TuningDemand& demand) {
   const double sine = std::sin(demand.theta_rad), cosine = std::cos(demand.theta_rad);
   double low = 2 * demand.theta_rad / pi, high = 2;  // the left side of (4) rises from 0 to infinity between them

@@ -3,6 +3,8 @@
 // Errors: none; the arguments have been checked.
 #pragma once
 
+#include <optional>
+
 #include "control/frequency_response.hpp"
 
 namespace control {
@@ -18,6 +20,18 @@ TuningDemand tuning_demand(const PlantOnAxis& plant, double log_omega, double ph
 
 // sin(2θ)/2, the bound on R in (5); 0 where θ is outside (0, 90°).
 double largest_phase_fall(double theta_rad);
+
+// The θ for which there is a solution: (5), solved for θ; with a fixed mu, 0 ≤ θ < μπ/2.
+struct ThetaRange {
+  double low_rad = 0, high_rad = 0;  // empty if low ≥ high
+  bool has_low_end = false;
+
+  bool contains(double theta_rad) const {
+    return theta_rad < high_rad && (theta_rad > low_rad || (has_low_end && theta_rad == low_rad));
+  }
+};
+
+ThetaRange feasible_theta(std::optional<double> mu, double phase_fall);
 
 // The solution of (4). Needs 0 < θ < 180°.
 double iso_damping_mu(const TuningDemand& demand);
