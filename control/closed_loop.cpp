@@ -25,7 +25,8 @@ void check(const ClosedLoopExperiment& e) {
   check(e.plant);
   require(is_positive(e.period_s), "period_s must be positive", e.period_s);
   require(is_positive(e.duration_s), "duration_s must be positive", e.duration_s);
-  require(e.duration_s / e.period_s <= kMostSamples, "duration_s must be at most 1e6 periods: shorten it or lengthen period_s", e.duration_s);
+  require(e.duration_s / e.period_s <= kMostSamples,
+          "duration_s must be at most 1e6 periods: shorten it or lengthen period_s", e.duration_s);
   require(std::isfinite(e.setpoint_m), "setpoint_m must be finite", e.setpoint_m);
   require(e.duty_min <= 0, "duty_min must be 0 or negative", e.duty_min);
   require(e.duty_max > 0, "duty_max must be positive", e.duty_max);

@@ -23,7 +23,7 @@ constexpr double kDigits = 32;                     // exp(-kDigits): what (4) le
 constexpr double kLogNodes = 90;                   // of |s| to either side of a, at most, for (4)
 constexpr double kNegligible = 1e-17;
 constexpr double kGridPoints = 2000, kMostGridPoints = 100'000;
-constexpr double kGridPerRate = 0.1;  // the step of the grid, of 1/a
+constexpr double kGridPerRate = 0.1;   // the step of the grid, of 1/a
 constexpr double kLeastExcess = 0.25;  // of the order of s D over that of C
 constexpr int kBisections = 60;
 
@@ -43,7 +43,7 @@ struct Loop {
   double magnitude(double log_rate_of_s) const {
     return integrated(log_rate_of_s).real() + control(log_rate_of_s).real();
   }
-  Complex slope(Complex log_s) const {                                                             // s Q'
+  Complex slope(Complex log_s) const {  // s Q'
     const Complex s = std::exp(log_s), controlled = std::exp(controller.mu * log_s);
     return s * (denominator(plant, log_s) + s * denominator_slope(plant, log_s)) +
            plant.kp * controller.kp * controller.kd * controller.mu * controlled;

@@ -16,7 +16,8 @@
 //           setpoint against the partial fractions of (28) to within 0.1 % of its limit of stability. From 1.7 s on the
 //           reference for (28) is itself off, by up to 1.7e-5: presumably its contour leaves out the loop's poles.
 //           There, the test holds that two different rays agree to 1e-12.
-// Errors:   throws std::invalid_argument quoting the bad value, or saying that the loop is unstable. μ must be 0.25 below
+// Errors:   throws std::invalid_argument quoting the bad value, or saying that the loop is unstable. μ must be 0.25
+// below
 //           n, or T hardly falls off and the loop would follow at once.
 #pragma once
 
@@ -33,8 +34,8 @@ class ContinuousLoop {
   // ray: where it runs within its gap, 0 at one end, 1 at the other. No result depends on it.
   ContinuousLoop(const FractionalModel& plant, const FopdController& controller, double ray = 0.5);
 
-  double position(double time_s) const;             // per setpoint; time_s ≥ 0
-  double velocity(double time_s) const;             // its slope, 1/s; time_s > 0
+  double position(double time_s) const;              // per setpoint; time_s ≥ 0
+  double velocity(double time_s) const;              // its slope, 1/s; time_s > 0
   double rate_rad_s() const { return rate_rad_s_; }  // a of (3): how fast the loop is
 
  private:

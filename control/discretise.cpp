@@ -133,10 +133,10 @@ void add_transfer(Discretisation& result) {
     result.transfer = std::move(transfer);
     return;
   }
-  result.transfer_note = join_text(
-      "no numerator and denominator: with poles this near 1 (order ", result.options.order, " at ", period_s,
-      " s) coefficients in double are off by ", std::setprecision(2), 100 * result.transfer_max_relative,
-      " % of the response; run the sections, which are not");
+  result.transfer_note =
+      join_text("no numerator and denominator: with poles this near 1 (order ", result.options.order, " at ", period_s,
+                " s) coefficients in double are off by ", std::setprecision(2), 100 * result.transfer_max_relative,
+                " % of the response; run the sections, which are not");
 }
 
 // Why not, without naming the options.
@@ -222,8 +222,8 @@ std::string reason_for(const DiscretisationChoice& choice) {
   std::string name = name_of(choice.chosen.options);
   if (choice.chosen.options.method == DiscretisationMethod::direct) name = "The " + name;
   std::ostringstream text;
-  text << std::setprecision(3) << name << " is off by at most " << 100 * errors.max_relative_in_bandwidth
-       << " % and " << errors.max_deg_in_bandwidth << " degrees below " << errors.bandwidth_rad_s << " rad/s";
+  text << std::setprecision(3) << name << " is off by at most " << 100 * errors.max_relative_in_bandwidth << " % and "
+       << errors.max_deg_in_bandwidth << " degrees below " << errors.bandwidth_rad_s << " rad/s";
   const std::size_t tried = choice.compared.size() + choice.refused.size();
   if (choice.compared.size() == 1) {
     text << ", and the only one of " << tried << " tried that comes out stable and near its target.";
@@ -275,7 +275,8 @@ DiscretisationChoice choose_discretisation(const FopdController& controller, dou
   if (choice.compared.empty()) {
     std::string reasons;
     for (const auto& [name, reason] : choice.refused) reasons += join_text("; the ", name, " ", reason);
-    throw std::runtime_error(join_text("discretisation: nothing stable at ", period_s, " s with order ", order, reasons));
+    throw std::runtime_error(
+        join_text("discretisation: nothing stable at ", period_s, " s with order ", order, reasons));
   }
   const auto is_better = [](const Discretisation& left, const Discretisation& right) {
     if (is_accurate(left) != is_accurate(right)) return is_accurate(left);

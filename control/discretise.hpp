@@ -13,12 +13,11 @@
 //           discretise_test.cpp.
 // The sections are the result. The same controller as coefficients of 1/z loses digits where poles crowd near 1: with
 // (30) at 10 ms beyond order 6, at 1 ms beyond order 4. The coefficients are formed in extended precision, rounded, and
-// compared with the sections; if they are more than 1e-6 off anywhere there is no `transfer`, and transfer_note says so.
-// Errors: throws std::invalid_argument quoting the bad value. A fit that does not come out stable, or is more than 25 %
-// off its own target (1) somewhere below 0.8 of the Nyquist frequency, throws std::runtime_error, which names what was
-// tried in its place and found to work.
-// Controllers that are exactly rational (mu = 1, kd = 0) get as many sections as they need, which may be fewer than
-// `order`.
+// compared with the sections; if they are more than 1e-6 off anywhere there is no `transfer`, and transfer_note says
+// so. Errors: throws std::invalid_argument quoting the bad value. A fit that does not come out stable, or is more than
+// 25 % off its own target (1) somewhere below 0.8 of the Nyquist frequency, throws std::runtime_error, which names what
+// was tried in its place and found to work. Controllers that are exactly rational (mu = 1, kd = 0) get as many sections
+// as they need, which may be fewer than `order`.
 #pragma once
 
 #include <optional>
@@ -49,8 +48,8 @@ struct Discretisation {
   std::optional<DiscreteTransferFunction> transfer;  // none if its coefficients cannot hold the sections
   double transfer_max_relative = 0;                  // |transfer/sections - 1| at DC and over the band of errors
   std::string transfer_note;                         // why there is no transfer; else empty
-  double dc_gain = 0;         // after (4): kp
-  double dc_gain_before = 0;  // of the fit
+  double dc_gain = 0;                                // after (4): kp
+  double dc_gain_before = 0;                         // of the fit
   DiscretisationErrors errors;
   bool is_stable = false;
   bool is_minimum_phase = false;

@@ -71,7 +71,8 @@ std::pair<Complex, Complex> pole_pair(const SecondOrderSection& section) {
 std::string find_fault(const std::vector<Complex>& pole) {
   for (std::size_t i = 0; i < pole.size(); ++i) {
     if (!(std::abs(pole[i]) < 1)) {
-      return join_text("sections: pole ", pole[i].real(), " + ", pole[i].imag(), "i is not inside the unit circle; fit again");
+      return join_text("sections: pole ", pole[i].real(), " + ", pole[i].imag(),
+                       "i is not inside the unit circle; fit again");
     }
     for (std::size_t j = 0; j < i; ++j) {
       const double distance = std::abs(pole[i] - pole[j]);

@@ -60,9 +60,8 @@ OrderedJson json_of(const MeasuredStep& step) {
 }
 
 void add_row(Table& table, const std::string& name, double at_s, const control::StepMetrics& m) {
-  table.row({name, cell(at_s, 5), m.settling_s ? cell(*m.settling_s, 4) : "never",
-             fixed_cell(m.overshoot_percent, 2), cell(m.rise_10_90_s, 4),
-             fixed_cell(1e3 * m.steady_state_error_m, 3)});
+  table.row({name, cell(at_s, 5), m.settling_s ? cell(*m.settling_s, 4) : "never", fixed_cell(m.overshoot_percent, 2),
+             cell(m.rise_10_90_s, 4), fixed_cell(1e3 * m.steady_state_error_m, 3)});
 }
 
 void write_table(std::ostream& out, const control::ClosedLoopExperiment& experiment,

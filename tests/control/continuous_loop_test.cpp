@@ -124,8 +124,8 @@ TEST(ContinuousLoop, HasNoTimeScaleOfItsOwn) {
                                 plant.b3,
                                 plant.alpha,
                                 plant.beta};
-    const ContinuousLoop slower{
-        other, {controller.kp / scale, controller.kd * std::pow(scale, controller.mu), controller.mu}};
+    const ContinuousLoop slower{other,
+                                {controller.kp / scale, controller.kd * std::pow(scale, controller.mu), controller.mu}};
     for (const double t : {1e-4, 0.01, 0.1, 1.0, 10.0}) {
       EXPECT_NEAR(slower.position(t * scale), loop.position(t), 1e-12) << t;
     }
