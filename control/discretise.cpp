@@ -230,6 +230,8 @@ std::string reason_for(const DiscretisationChoice& choice) {
   } else if (accurate == 0) {
     text << ", the least of the " << choice.compared.size() << " of " << tried
          << " tried that come out stable and near their target; none of them stays within 1 % and 0.6 degrees there.";
+  } else if (accurate == 1) {
+    text << "; of " << tried << " tried it is the only one that stays within 1 % and 0.6 degrees there.";
   } else {
     text << "; of the " << accurate << " of " << tried
          << " tried that stay within 1 % and 0.6 degrees there, it has the least duty noise.";
