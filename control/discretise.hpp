@@ -11,13 +11,16 @@
 // good or better. So the paper's "direct is more accurate" holds in phase near Nyquist only.
 // Accuracy: reproduces the reference coefficients for a = 0, 0.5, 0.9 and for (3) to 1e-9 relative, held by
 //           discretise_test.cpp.
-// The sections are the result. The same controller as coefficients of 1/z loses digits where poles crowd near 1: of
-// (30) with (3) beyond order 8 at 10 ms and beyond order 4 at 1 ms, later with the direct method. The coefficients are
-// formed in extended precision, rounded, and compared with the sections; if they are more than 1e-6 off anywhere there
-// is no `transfer`, and transfer_note says so. Errors: throws std::invalid_argument quoting the bad value. A fit that
-// does not come out stable, or is more than 25 % off its own target (1) somewhere below 0.8 of the Nyquist frequency,
-// throws std::runtime_error, which names what was tried in its place and found to work. Controllers that are exactly
-// rational (mu = 1, kd = 0) get as many sections as they need, which may be fewer than `order`.
+// The sections are the result. The same controller as coefficients of 1/z loses digits where poles crowd near 1: with
+// (30) and (3) beyond order 8 at 10 ms, beyond order 4 at 1 ms; later with the direct method. So the coefficients are
+// formed in extended precision, rounded, and compared with the sections: if they are more than 1e-6 off anywhere, there
+// is no `transfer`, and transfer_note says so.
+//
+// Errors: throws std::invalid_argument quoting the bad value. A fit that does not come out stable, or is more than 25 %
+// off its own target (1) somewhere below 0.8 of the Nyquist frequency, throws std::runtime_error, which names what was
+// tried in its place and found to work.
+// Controllers that are exactly rational (mu = 1, kd = 0) get as many sections as they need, which may be fewer than
+// `order`.
 #pragma once
 
 #include <optional>
