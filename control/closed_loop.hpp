@@ -4,6 +4,8 @@
 //   x measured at kT, u applied from kT on: no computational delay                                               (2)
 //
 // Samples k = 0 .. duration/T, both included. The settling band is the same for the step and for the disturbance.
+// A loop whose measured position leaves 1000 times the largest of setpoint, disturbance and noise diverges: the record
+// ends there, what is measured is of the record so far, and nothing of it has settled.
 // Errors: throws std::invalid_argument quoting the bad value.
 #pragma once
 
@@ -36,6 +38,7 @@ struct ClosedLoopPrediction {
   std::vector<double> time_s, position_m, velocity_m_s, measured_m, duty, reference_m;
   StepMetrics step;             // up to the disturbance, of the noise-free measured position; empty for setpoint 0
   StepMetrics disturbance;      // after it, back from setpoint + disturbance; empty without one
+  bool is_diverging = false;    // the record is shorter than asked for
   double duty_sd_at_rest = 0;   // over the last quarter before the disturbance
   double clipped_fraction = 0;  // of all samples
 };

@@ -27,19 +27,14 @@ constexpr double kUselessFit = 0.25;  // relative
 constexpr double kGoodRelative = 0.01, kGoodDeg = 0.6;
 constexpr double kStepS = 20;
 constexpr int kStepSamples = 2000;
-constexpr const char* kAdvice = "; take a lower order, a smaller a, or Oustaloup's method";
-
-template <class... Parts>
-std::string said(const Parts&... parts) {
-  return join_text("discretisation: ", parts...);
-}
+constexpr double kUselessTransfer = 1e-6;  // relative
+constexpr double kNothingLeft = 1e300;     // of the digits of a transfer function
+constexpr double kTriedA[] = {0.0, 0.25, 0.5, 0.8, 0.9, 1.0};
 
 template <class... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
-  throw std::invalid_argument(said(parts...));
+  throw_invalid("discretisation: ", parts...);
 }
-
-bool is_positive(double value) { return value > 0 && std::isfinite(value); }
 
 void check(const FopdController& controller, const DiscretisationOptions& options) {
   check(controller);
@@ -106,8 +101,7 @@ std::expected<ParallelSections, std::string> fit_direct(const FopdController& co
     if (is_better) best = DirectFit{*std::move(sections), error, is_minimum_phase};
   }
   if (best) return std::move(best->sections);
-  return std::unexpected(said("order ", options.order, " with a = ", options.a, " at ", options.period_s,
-                              " s gives no stable fit with distinct poles", kAdvice));
+  return std::unexpected("gives no stable fit with distinct poles");
 }
 
 // The error signal on which float32 and double are compared.
@@ -123,6 +117,29 @@ std::vector<double> step_error_m(const ParallelSections& sections, double period
   return error_m;
 }
 
+// The coefficients, if they hold the sections.
+void add_transfer(Discretisation& result) {
+  const double period_s = result.options.period_s;
+  DiscreteTransferFunction transfer = to_transfer_function(result.sections, period_s);
+  std::vector<double> omega_rad_s = error_frequencies(period_s, result.options.loop_bandwidth_rad_s);
+  omega_rad_s.push_back(0);
+  for (const double omega : omega_rad_s) {
+    const Complex ratio = discrete_response(transfer, omega) / discrete_response(result.sections, period_s, omega);
+    const double off = std::abs(ratio - 1.0);  // infinite or NaN where the denominator has rounded to 0
+    result.transfer_max_relative = std::isfinite(off) ? std::max(result.transfer_max_relative, off) : kNothingLeft;
+    if (!std::isfinite(off)) break;
+  }
+  if (result.transfer_max_relative <= kUselessTransfer) {
+    result.transfer = std::move(transfer);
+    return;
+  }
+  result.transfer_note =
+      join_text("no numerator and denominator: with poles this near 1 (order ", result.options.order, " at ", period_s,
+                " s) coefficients in double are off by ", std::setprecision(2), 100 * result.transfer_max_relative,
+                " % of the response; run the sections, which are not");
+}
+
+// Why not, without naming the options.
 std::expected<Discretisation, std::string> try_discretise(const FopdController& controller,
                                                           const DiscretisationOptions& options) {
   check(controller, options);
@@ -139,14 +156,13 @@ std::expected<Discretisation, std::string> try_discretise(const FopdController& 
     fit_max_relative = max_fit_error(result.sections, options.period_s, controller, options.a,
                                      error_frequencies(options.period_s, options.loop_bandwidth_rad_s));
     if (!(fit_max_relative <= kUselessFit)) {
-      return std::unexpected(said("order ", options.order, " with a = ", options.a, " at ", options.period_s,
-                                  " s fits only to ", 100 * fit_max_relative, " %", kAdvice));
+      return std::unexpected(join_text("fits only to ", std::setprecision(3), 100 * fit_max_relative, " %"));
     }
   }
   result.dc_gain_before = dc_gain(result.sections);
   for (int pass = 0; pass < 2; ++pass) result.sections.direct += controller.kp - dc_gain(result.sections);  // (4)
   result.dc_gain = dc_gain(result.sections);
-  result.transfer = to_transfer_function(result.sections, options.period_s);
+  add_transfer(result);
   result.errors = measure_errors(result.sections, options.period_s, controller, options.loop_bandwidth_rad_s);
   result.errors.fit_max_relative = fit_max_relative;
   result.largest_pole = largest(poles(result.sections));
@@ -158,31 +174,69 @@ std::expected<Discretisation, std::string> try_discretise(const FopdController& 
   return result;
 }
 
-std::string name_of(const Discretisation& tried) {
-  std::ostringstream text;
-  if (tried.options.method == DiscretisationMethod::oustaloup) return "Oustaloup and Tustin";
-  text << "The direct method with a = " << tried.options.a;
-  return text.str();
+std::string name_of(const DiscretisationOptions& options) {
+  if (options.method == DiscretisationMethod::oustaloup) return "Oustaloup and Tustin";
+  return join_text("direct method with a = ", options.a);
+}
+
+// What works where these options do not: every one has been tried.
+std::string advice(const FopdController& controller, const DiscretisationOptions& refused) {
+  std::string advice;
+  const auto works = [&](const DiscretisationOptions& options, const std::string& name) {
+    const auto tried = try_discretise(controller, options);
+    if (!tried || !tried->is_stable) return false;
+    advice += join_text(advice.empty() ? "" : ", ", name, std::setprecision(2), " (off by ",
+                        100 * tried->errors.max_relative_in_bandwidth, " % below ", std::setprecision(4),
+                        tried->errors.bandwidth_rad_s, " rad/s)");
+    return true;
+  };
+  DiscretisationOptions options = refused;
+  for (int distance = 1; distance < kLargestOrder; ++distance) {  // the nearest order
+    bool is_found = false;
+    for (const int order : {refused.order + distance, refused.order - distance}) {
+      options.order = order;
+      is_found = is_found || (order >= 1 && order <= kLargestOrder && works(options, join_text("order ", order)));
+    }
+    if (is_found) break;
+  }
+  options = refused;
+  for (const double a : kTriedA) {
+    options.a = a;
+    if (a != refused.a && works(options, join_text("a = ", a))) break;
+  }
+  options = refused;
+  options.method = DiscretisationMethod::oustaloup;
+  works(options, "Oustaloup's method");
+  return advice.empty() ? "no other order, no other a and not Oustaloup's method comes out stable either; change the "
+                          "period"
+                        : "what works in its place: " + advice;
 }
 
 bool is_accurate(const Discretisation& tried) {
   return tried.errors.max_relative_in_bandwidth <= kGoodRelative && tried.errors.max_deg_in_bandwidth <= kGoodDeg;
 }
 
-std::string reason_for(const Discretisation& chosen, const std::vector<Discretisation>& compared) {
-  const auto accurate = std::ranges::count_if(compared, is_accurate);
-  const auto& errors = chosen.errors;
+std::string reason_for(const DiscretisationChoice& choice) {
+  const auto accurate = std::ranges::count_if(choice.compared, is_accurate);
+  const auto& errors = choice.chosen.errors;
+  std::string name = name_of(choice.chosen.options);
+  if (choice.chosen.options.method == DiscretisationMethod::direct) name = "The " + name;
   std::ostringstream text;
-  text << std::setprecision(3) << name_of(chosen) << " is off by at most " << 100 * errors.max_relative_in_bandwidth
-       << " % and " << errors.max_deg_in_bandwidth << " degrees below " << errors.bandwidth_rad_s << " rad/s";
-  if (accurate == 0) {
-    text << ", the least of " << compared.size() << " tried, none of which stays within 1 % and 0.6 degrees; a shorter "
-         << "period or a higher order would help. Its duty noise is " << chosen.noise_gain << " per m.";
+  text << std::setprecision(3) << name << " is off by at most " << 100 * errors.max_relative_in_bandwidth << " % and "
+       << errors.max_deg_in_bandwidth << " degrees below " << errors.bandwidth_rad_s << " rad/s";
+  const std::size_t tried = choice.compared.size() + choice.refused.size();
+  if (choice.compared.size() == 1) {
+    text << ", and the only one of " << tried << " tried that comes out stable and near its target.";
+  } else if (accurate == 0) {
+    text << ", the least of the " << choice.compared.size() << " of " << tried
+         << " tried that come out stable and near their target; none of them stays within 1 % and 0.6 degrees there.";
+  } else if (accurate == 1) {
+    text << "; of " << tried << " tried it is the only one that stays within 1 % and 0.6 degrees there.";
   } else {
-    text << "; of the " << accurate << " of " << compared.size()
-         << " tried that stay within 1 % and 0.6 degrees there, it has the least duty noise, " << chosen.noise_gain
-         << " per m of noise on the position.";
+    text << "; of the " << accurate << " of " << tried
+         << " tried that stay within 1 % and 0.6 degrees there, it has the least duty noise.";
   }
+  text << " Its duty noise is " << choice.chosen.noise_gain << " per m of noise on the position.";
   return text.str();
 }
 
@@ -190,7 +244,10 @@ std::string reason_for(const Discretisation& chosen, const std::vector<Discretis
 
 Discretisation discretise(const FopdController& controller, const DiscretisationOptions& options) {
   auto result = try_discretise(controller, options);
-  if (!result) throw std::runtime_error(result.error());
+  if (!result) {
+    throw std::runtime_error(join_text("discretisation: the ", name_of(options), " of order ", options.order, " at ",
+                                       options.period_s, " s ", result.error(), "; ", advice(controller, options)));
+  }
   return *std::move(result);
 }
 
@@ -203,16 +260,25 @@ DiscretisationChoice choose_discretisation(const FopdController& controller, dou
   DiscretisationChoice choice;
   const auto compare = [&] {
     auto tried = try_discretise(controller, options);
-    if (tried && tried->is_stable) choice.compared.push_back(*std::move(tried));
+    if (!tried) {
+      choice.refused.push_back({name_of(options), tried.error()});
+    } else if (!tried->is_stable) {
+      choice.refused.push_back({name_of(options), join_text("has a pole of magnitude ", tried->largest_pole)});
+    } else {
+      choice.compared.push_back(*std::move(tried));
+    }
   };
-  for (const double a : {0.0, 0.25, 0.5, 0.8, 0.9, 1.0}) {
+  for (const double a : kTriedA) {
     options.a = a;
     compare();
   }
   options.method = DiscretisationMethod::oustaloup;
   compare();
   if (choice.compared.empty()) {
-    throw std::runtime_error(said("nothing stable at ", period_s, " s with order ", order, "; take a lower order"));
+    std::string reasons;
+    for (const auto& [name, reason] : choice.refused) reasons += join_text("; the ", name, " ", reason);
+    throw std::runtime_error(
+        join_text("discretisation: nothing stable at ", period_s, " s with order ", order, reasons));
   }
   const auto is_better = [](const Discretisation& left, const Discretisation& right) {
     if (is_accurate(left) != is_accurate(right)) return is_accurate(left);
@@ -220,7 +286,7 @@ DiscretisationChoice choose_discretisation(const FopdController& controller, dou
     return left.errors.max_relative_in_bandwidth < right.errors.max_relative_in_bandwidth;
   };
   choice.chosen = *std::ranges::min_element(choice.compared, is_better);
-  choice.reason = reason_for(choice.chosen, choice.compared);
+  choice.reason = reason_for(choice);
   return choice;
 }
 

@@ -11,12 +11,19 @@
 // good or better. So the paper's "direct is more accurate" holds in phase near Nyquist only.
 // Accuracy: reproduces the reference coefficients for a = 0, 0.5, 0.9 and for (3) to 1e-9 relative, held by
 //           discretise_test.cpp.
+// The sections are the result. The same controller as coefficients of 1/z loses digits where poles crowd near 1: with
+// (30) and (3) beyond order 8 at 10 ms, beyond order 4 at 1 ms; later with the direct method. So the coefficients are
+// formed in extended precision, rounded, and compared with the sections: if they are more than 1e-6 off anywhere, there
+// is no `transfer`, and transfer_note says so.
+//
 // Errors: throws std::invalid_argument quoting the bad value. A fit that does not come out stable, or is more than 25 %
-// off its own target (1) somewhere below 0.8 of the Nyquist frequency, throws std::runtime_error saying what to change.
+// off its own target (1) somewhere below 0.8 of the Nyquist frequency, throws std::runtime_error, which names what was
+// tried in its place and found to work.
 // Controllers that are exactly rational (mu = 1, kd = 0) get as many sections as they need, which may be fewer than
 // `order`.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,10 +47,12 @@ struct DiscretisationOptions {
 
 struct Discretisation {
   DiscretisationOptions options;
-  DiscreteTransferFunction transfer;
   ParallelSections sections;
-  double dc_gain = 0;         // after (4): kp
-  double dc_gain_before = 0;  // of the fit
+  std::optional<DiscreteTransferFunction> transfer;  // none if its coefficients cannot hold the sections
+  double transfer_max_relative = 0;                  // |transfer/sections - 1| at DC and over the band of errors
+  std::string transfer_note;                         // why there is no transfer; else empty
+  double dc_gain = 0;                                // after (4): kp
+  double dc_gain_before = 0;                         // of the fit
   DiscretisationErrors errors;
   bool is_stable = false;
   bool is_minimum_phase = false;
@@ -57,10 +66,16 @@ struct Discretisation {
 
 Discretisation discretise(const FopdController& controller, const DiscretisationOptions& options);
 
+struct RefusedDiscretisation {
+  std::string name;    // e.g. "direct method with a = 0.9"
+  std::string reason;  // e.g. "fits only to 67 %"
+};
+
 struct DiscretisationChoice {
   Discretisation chosen;
-  std::string reason;                    // one or two sentences with the numbers that decided
-  std::vector<Discretisation> compared;  // everything that was tried
+  std::string reason;                          // one or two sentences with the numbers that decided
+  std::vector<Discretisation> compared;        // what was tried and came out stable
+  std::vector<RefusedDiscretisation> refused;  // what was tried and did not
 };
 
 // Tries the direct method with a = 0, 0.25, 0.5, 0.8, 0.9, 1 and Oustaloup's. Of those within 1 % and 0.6 degrees of

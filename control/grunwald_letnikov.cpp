@@ -9,6 +9,8 @@
 namespace control {
 namespace {
 
+constexpr std::size_t kMostSamples = 200'000;
+
 [[noreturn]] void refuse(const char* what, double value) { throw_invalid("Grünwald-Letnikov: ", what, ' ', value); }
 
 // c_0 .. c_{count-1} of (1).
@@ -30,6 +32,10 @@ std::vector<double> grunwald_letnikov_velocity(const FractionalModel& model, dou
                                                std::size_t terms) {
   check(model);
   if (!(dt_s > 0 && std::isfinite(dt_s))) refuse("dt_s must be positive, is", dt_s);
+  if (duty.size() > kMostSamples) {
+    throw_invalid("Grünwald-Letnikov: at most ", kMostSamples, " samples, there are ", duty.size(),
+                  "; lengthen dt_s, or use step_response or ModalPlant");
+  }
   for (const double u : duty) {
     if (!std::isfinite(u)) refuse("duty must be finite, is", u);
   }

@@ -1,6 +1,7 @@
 // Refuses an argument: what is wrong, which value it has, and what is allowed, as std::invalid_argument.
 #pragma once
 
+#include <cmath>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -20,5 +21,7 @@ template <class... Parts>
 [[noreturn]] void throw_invalid(const Parts&... parts) {
   throw std::invalid_argument(join_text(parts...));
 }
+
+inline bool is_positive(double value) { return value > 0 && std::isfinite(value); }
 
 }  // namespace control

@@ -12,8 +12,9 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kNearestToCutRad = 1e-7;  // nearer, a pole cannot be told from a double one on the cut
-constexpr double kFastestLogRate = 40;     // of a mode, against 1/shortest_s; still faster ones follow at once
+constexpr double kNearestToCutRad = 1e-7;    // nearer, a pole cannot be told from a double one on the cut
+constexpr double kNearestToUndamped = 1e-9;  // relative to π/α; nearer, sin αφ has too few digits to bisect by
+constexpr double kFastestLogRate = 40;       // of a mode, against 1/shortest_s; still faster ones follow at once
 constexpr double kLargestGrowth = 1e20;
 constexpr double kLargestPoleLogRate = 200;  // faster and slower poles are beyond any time of interest
 constexpr double kLargestLogRate = 4e4;      // where those are given up: enough for beta = 0.001
@@ -82,18 +83,22 @@ double follows_at_once(const FractionalModel& model, const Ray& ray, double tole
 
 std::optional<Complex> log_pole(const FractionalModel& model) {
   if (model.b1 == 0 || model.alpha <= 1) return std::nullopt;
-  double low = pi / model.alpha * (1 + 1e-12), high = pi - kNearestToCutRad;
+  double low = pi / model.alpha * (1 + kNearestToUndamped), high = pi - kNearestToCutRad;
   if (low >= high || is_outside(model, high)) return std::nullopt;
-  for (int halving = 0; halving < 60; ++halving) {
-    const double middle = (low + high) / 2;
-    (is_outside(model, middle) ? low : high) = middle;
+  Complex log_p{std::log(model.b3 / model.b1) / model.alpha, pi / model.alpha};  // without b2
+  if (is_outside(model, low)) {
+    for (int halving = 0; halving < 60; ++halving) {
+      const double middle = (low + high) / 2;
+      (is_outside(model, middle) ? low : high) = middle;
+    }
+    log_p = where_imaginary_part_vanishes(model, high);
   }
-  Complex log_p = where_imaginary_part_vanishes(model, high);
   for (int i = 0; i < 3; ++i) {  // Newton in ln s
     const Complex correction = denominator(model, log_p) / (denominator_slope(model, log_p) * std::exp(log_p));
     if (!(std::abs(correction) < 1e-3)) break;  // at magnitudes beyond a double the bisection must do
     log_p -= correction;
   }
+  log_p.imag(std::max(log_p.imag(), std::nextafter(pi / model.alpha, pi)));  // where rounding would make it grow
   return log_p;
 }
 

@@ -6,17 +6,13 @@
 #include <stdexcept>
 
 #include "control/invalid_argument.hpp"
+#include "control/polynomial_roots.hpp"
 
 namespace control {
 namespace {
 
 constexpr double kNearZeroPole = 1e-3;  // below it a pole shares a section with the direct term
 constexpr double kSamePole = 1e-9;      // relative distance of poles that count as one
-
-template <class... Parts>
-std::string said(const Parts&... parts) {
-  return join_text("sections: ", parts...);
-}
 
 void check(const DiscreteTransferFunction& transfer) {
   const auto &b = transfer.numerator, &a = transfer.denominator;
@@ -40,15 +36,6 @@ std::vector<Complex> eigenvalues(const Eigen::MatrixXd& matrix) {
   return {values.begin(), values.end()};
 }
 
-// Roots of Σ c_k z^(n-k) with c_0 ≠ 0: eigenvalues of the companion matrix.
-std::vector<Complex> roots(const std::vector<double>& c) {
-  const auto n = static_cast<Eigen::Index>(c.size()) - 1;
-  Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(n, n);
-  for (Eigen::Index k = 0; k < n; ++k) companion(0, k) = -c[static_cast<std::size_t>(k) + 1] / c[0];
-  for (Eigen::Index k = 1; k < n; ++k) companion(k, k - 1) = 1;
-  return eigenvalues(companion);
-}
-
 // Σ c_k x^(n-k)
 Complex horner(const std::vector<double>& c, Complex x) {
   Complex sum = 0;
@@ -56,8 +43,10 @@ Complex horner(const std::vector<double>& c, Complex x) {
   return sum;
 }
 
-std::vector<double> product(const std::vector<double>& left, const std::vector<double>& right) {
-  std::vector<double> result(left.size() + right.size() - 1, 0);
+using LongPolynomial = std::vector<long double>;  // ascending powers of 1/z
+
+LongPolynomial product(const LongPolynomial& left, const LongPolynomial& right) {
+  LongPolynomial result(left.size() + right.size() - 1, 0);
   for (std::size_t i = 0; i < left.size(); ++i) {
     for (std::size_t j = 0; j < right.size(); ++j) result[i + j] += left[i] * right[j];
   }
@@ -82,13 +71,14 @@ std::pair<Complex, Complex> pole_pair(const SecondOrderSection& section) {
 std::string find_fault(const std::vector<Complex>& pole) {
   for (std::size_t i = 0; i < pole.size(); ++i) {
     if (!(std::abs(pole[i]) < 1)) {
-      return said("pole ", pole[i].real(), " + ", pole[i].imag(), "i is not inside the unit circle; fit again");
+      return join_text("sections: pole ", pole[i].real(), " + ", pole[i].imag(),
+                       "i is not inside the unit circle; fit again");
     }
     for (std::size_t j = 0; j < i; ++j) {
       const double distance = std::abs(pole[i] - pole[j]);
       const bool both_near_zero = std::abs(pole[i]) < kNearZeroPole && std::abs(pole[j]) < kNearZeroPole;
       if (distance > kSamePole * std::abs(pole[i]) && !both_near_zero) continue;
-      return said("poles ", pole[j].real(), " and ", pole[i].real(), " coincide; take a lower order");
+      return join_text("sections: poles ", pole[j].real(), " and ", pole[i].real(), " coincide; take a lower order");
     }
   }
   return "";
@@ -129,7 +119,7 @@ double dc_gain(const DiscreteTransferFunction& transfer) {
 
 std::vector<Complex> poles(const DiscreteTransferFunction& transfer) {
   check(transfer);
-  return roots(transfer.denominator);
+  return polynomial_roots(transfer.denominator);
 }
 
 std::vector<Complex> zeros(const DiscreteTransferFunction& transfer) {
@@ -137,7 +127,7 @@ std::vector<Complex> zeros(const DiscreteTransferFunction& transfer) {
   std::vector<double> numerator = transfer.numerator;
   while (!numerator.empty() && numerator.front() == 0) numerator.erase(numerator.begin());
   if (numerator.empty()) return {};
-  return roots(numerator);
+  return polynomial_roots(numerator);
 }
 
 Complex discrete_response(const ParallelSections& sections, double period_s, double omega_rad_s) {
@@ -217,7 +207,7 @@ std::expected<ParallelSections, std::string> partial_fractions(const DiscreteTra
     a.pop_back();
     b.pop_back();
   }
-  const std::vector<Complex> pole = roots(a);
+  const std::vector<Complex> pole = polynomial_roots(a);
   if (std::string fault = find_fault(pole); !fault.empty()) return std::unexpected(std::move(fault));
   ParallelSections sections;
   double remaining_first_sample = b[0], near_zero_pole = 1;
@@ -255,9 +245,9 @@ ParallelSections to_parallel_sections(const DiscreteTransferFunction& transfer) 
 }
 
 DiscreteTransferFunction to_transfer_function(const ParallelSections& sections, double period_s) {
-  std::vector<double> numerator{sections.direct}, denominator{1};
-  const auto add = [&](const std::vector<double>& b, const std::vector<double>& a) {
-    const std::vector<double> left = product(numerator, a), right = product(b, denominator);
+  LongPolynomial numerator{sections.direct}, denominator{1};
+  const auto add = [&](const LongPolynomial& b, const LongPolynomial& a) {
+    const LongPolynomial left = product(numerator, a), right = product(b, denominator);
     numerator.assign(std::max(left.size(), right.size()), 0);
     for (std::size_t k = 0; k < left.size(); ++k) numerator[k] += left[k];
     for (std::size_t k = 0; k < right.size(); ++k) numerator[k] += right[k];
@@ -265,9 +255,10 @@ DiscreteTransferFunction to_transfer_function(const ParallelSections& sections, 
   };
   for (const auto& s : sections.first_order) add({s.residue}, {1, -s.pole});
   for (const auto& s : sections.second_order) {
-    add({s.b0, s.b1}, s.a2 == 0 ? std::vector<double>{1, s.a1} : std::vector<double>{1, s.a1, s.a2});
+    add({s.b0, s.b1}, s.a2 == 0 ? LongPolynomial{1, s.a1} : LongPolynomial{1, s.a1, s.a2});
   }
-  return {numerator, denominator, period_s};
+  const auto rounded = [](const LongPolynomial& c) { return std::vector<double>(c.begin(), c.end()); };
+  return {rounded(numerator), rounded(denominator), period_s};
 }
 
 void add_first_order(ParallelSections& sections, double b0, double b1, double pole) {

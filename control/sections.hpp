@@ -9,7 +9,7 @@
 // forms do. A pair of complex poles becomes one second-order section. So does a real pole within 0.001 of 0 together
 // with the direct term: by (3) both would be huge and cancel.
 // What is asked of sections is computed from the poles themselves: with poles that crowd near 1 (short periods, high
-// orders) the coefficients of (1) no longer hold the digits.
+// orders) no coefficients (1) in double hold the digits, however they are computed: discretise.hpp measures that.
 // Errors: throws std::invalid_argument quoting the bad value.
 #pragma once
 

@@ -2,8 +2,11 @@
 #include "control/steiglitz_mcbride.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cassert>
 #include <complex>
+
+#include "control/polynomial_roots.hpp"
 
 namespace control {
 namespace {
@@ -31,11 +34,8 @@ MatrixXd delayed(const VectorXd& signal, Index first, Index last) {
 // Moves the roots of A inside the unit circle; says whether there were any outside.
 bool reflect_poles(VectorXd& a) {
   const Index n = a.size() - 1;
-  MatrixXd companion = MatrixXd::Zero(n, n);
-  companion.row(0) = -a.tail(n).transpose();
-  for (Index k = 1; k < n; ++k) companion(k, k - 1) = 1;
-  const Eigen::VectorXcd poles = companion.eigenvalues();
-  if (poles.cwiseAbs().maxCoeff() < 1) return false;
+  const std::vector<std::complex<double>> poles = polynomial_roots({a.data(), static_cast<std::size_t>(a.size())});
+  if (std::ranges::all_of(poles, [](std::complex<double> pole) { return std::abs(pole) < 1; })) return false;
   Eigen::VectorXcd product = Eigen::VectorXcd::Zero(n + 1);
   product(0) = 1;
   for (std::complex<double> pole : poles) {

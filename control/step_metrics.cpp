@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kSteadyFraction = 0.1;
 constexpr double kIgnoredSds = 2.5;
+constexpr double kShortestDwell = 0.05;  // of the record
+constexpr double kSdsInBand = 5;         // of the smoothed noise
 constexpr double kFewestSmoothed = 5, kMostSmoothed = 21;
 
 template <class... Parts>
@@ -71,8 +73,9 @@ std::vector<double> smoothed(std::span<const double> time_s, std::span<const dou
 }
 
 void measure_excursions(std::span<const double> time_s, std::span<const double> position_m,
-                        const StepExperiment& experiment, StepMetrics& metrics) {
+                        const StepExperiment& experiment, std::size_t fewest_inside, StepMetrics& metrics) {
   const double step_m = experiment.target_m - experiment.start_m;
+  std::size_t inside = 0;  // samples since it entered the band
   std::optional<double> settled_at_s, beyond_10_at_s, beyond_90_at_s;
   double furthest = -std::numeric_limits<double>::infinity();  // in steps: 0 at the start, 1 at the target
   for (std::size_t i = 0; i < time_s.size(); ++i) {
@@ -85,11 +88,16 @@ void measure_excursions(std::span<const double> time_s, std::span<const double> 
     if (!beyond_90_at_s && travelled >= 0.9) beyond_90_at_s = time_s[i];
     if (std::abs(position_m[i] - experiment.target_m) > experiment.band_m) {
       settled_at_s.reset();
-    } else if (!settled_at_s) {
-      settled_at_s = time_s[i];
+      inside = 0;
+    } else {
+      if (!settled_at_s) settled_at_s = time_s[i];
+      ++inside;
     }
   }
-  if (settled_at_s) metrics.settling_s = *settled_at_s - experiment.step_at_s;
+  const double dwell_s = kShortestDwell * (time_s.back() - experiment.step_at_s);
+  if (settled_at_s && time_s.back() - *settled_at_s >= dwell_s && inside >= fewest_inside) {
+    metrics.settling_s = *settled_at_s - experiment.step_at_s;
+  }
   if (beyond_90_at_s) metrics.rise_10_90_s = *beyond_90_at_s - *beyond_10_at_s;
   metrics.overshoot_percent = std::max(0.0, 100 * (furthest - 1));
   metrics.peak_m = experiment.start_m + furthest * step_m;
@@ -116,6 +124,7 @@ double smoothed_sd_m(const StepExperiment& experiment, std::size_t length) {
 // What is different about a noisy record: position_m is as recorded, metrics are those of the smoothed one.
 void allow_for_noise(std::span<const double> position_m, const StepExperiment& experiment, std::size_t length,
                      StepMetrics& metrics) {
+  if (kSdsInBand * smoothed_sd_m(experiment, length) > experiment.band_m) metrics.settling_s.reset();
   const auto samples = static_cast<double>(position_m.size());
   const double allowance_m = smoothed_sd_m(experiment, length) * std::sqrt(2 * std::log(samples));
   if (std::abs(metrics.peak_m - experiment.target_m) <= allowance_m) metrics.overshoot_percent = 0;
@@ -144,14 +153,14 @@ StepMetrics measure_step(std::span<const double> time_s, std::span<const double>
   const auto times_s = time_s.subspan(first, count), recorded_m = position_m.subspan(first, count);
   StepMetrics metrics;
   if (experiment.noise_sd_m == 0) {
-    measure_excursions(times_s, recorded_m, experiment, metrics);
+    measure_excursions(times_s, recorded_m, experiment, 2, metrics);
     integrate_error(times_s, recorded_m, experiment, 0, metrics);
     metrics.steady_state_error_m = experiment.target_m - recorded_m.back();
     return metrics;
   }
   const std::size_t length = smoothing_length(experiment, count);
   const std::vector<double> smooth_m = smoothed(times_s, recorded_m, length);
-  measure_excursions(times_s, smooth_m, experiment, metrics);
+  measure_excursions(times_s, smooth_m, experiment, length, metrics);
   integrate_error(times_s, smooth_m, experiment, kIgnoredSds * smoothed_sd_m(experiment, length), metrics);
   allow_for_noise(recorded_m, experiment, length, metrics);
   return metrics;

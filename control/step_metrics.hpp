@@ -2,7 +2,8 @@
 //
 // All of it is seen in the direction of the step, from start_m to target_m, over the samples with
 // step_at_s ≤ time_s < end_at_s; times count from step_at_s and are those of samples, never interpolated.
-//   settling   the first sample after which every sample lies within band_m of the target; none if the last does not
+//   settling   the first sample after which every sample lies within band_m of the target; none if the last does not,
+//              or if that stretch is shorter than 5 % of the record: an oscillation is inside the band now and then
 //   overshoot  the furthest excursion beyond the target, in % of the step; 0 if there is none
 //   rise       from the first sample beyond 10 % of the step to the first beyond 90 %
 //   steady     target less the last sample
@@ -13,7 +14,8 @@
 // m = (16 sd/band)² samples around it, 5 ≤ m ≤ 21 (near the ends, of the straight line through the m first or last
 // samples). It follows slope and curvature, so it does not lag, but a peak narrower than m samples comes out lower;
 // noise of sd becomes 1.5 sd/√m. All measures but the total variation are those of the smoothed record, and
-//   settling   is none only if the smoothed record ends outside the band
+//   settling   needs a stretch of m samples, too, and is none if 5 · 1.5 sd/√m is more than the band: then the noise
+//              that is left may leave the band at any time, and where it last did says nothing of the response
 //   overshoot  is 0 unless beyond 1.5 sd √(2 ln n)/√m, which noise alone reaches among n samples
 //   IAE, ISE, ITAE count errors below 2.5 · 1.5 sd/√m as 0, or they would grow with the length of the record
 //   steady     is the mean over the last tenth of the samples

@@ -106,8 +106,8 @@ OrderedJson json_of(const control::ParallelSections& sections) {
 
 OrderedJson json_of(const control::Discretisation& d) {
   const bool is_direct = d.options.method == control::DiscretisationMethod::direct;
-  return {{"numerator", d.transfer.numerator},
-          {"denominator", d.transfer.denominator},
+  return {{"numerator", d.transfer ? OrderedJson(d.transfer->numerator) : OrderedJson(nullptr)},
+          {"denominator", d.transfer ? OrderedJson(d.transfer->denominator) : OrderedJson(nullptr)},
           {"sections", json_of(d.sections)},
           {"dc_gain", d.dc_gain},
           {"errors", json_of(d.errors)},
@@ -121,7 +121,9 @@ OrderedJson json_of(const control::Discretisation& d) {
           {"largest_pole", d.largest_pole},
           {"largest_zero", d.largest_zero},
           {"noise_gain", d.noise_gain},
-          {"float32_rms_duty", d.float32_rms_duty}};
+          {"float32_rms_duty", d.float32_rms_duty},
+          {"transfer_max_relative", d.transfer_max_relative},
+          {"transfer_note", d.transfer ? OrderedJson(nullptr) : OrderedJson(d.transfer_note)}};
 }
 
 OrderedJson json_of(const control::StepMetrics& metrics) {
@@ -137,6 +139,7 @@ OrderedJson json_of(const control::ClosedLoopPrediction& prediction) {
           {"disturbance", json_of(prediction.disturbance)},
           {"duty_sd_at_rest", prediction.duty_sd_at_rest},
           {"clipped_fraction", prediction.clipped_fraction},
+          {"is_diverging", prediction.is_diverging},
           {"t_s", prediction.time_s},
           {"position_m", prediction.position_m},
           {"velocity_m_s", prediction.velocity_m_s},
@@ -146,14 +149,16 @@ OrderedJson json_of(const control::ClosedLoopPrediction& prediction) {
 }
 
 OrderedJson json_of(const control::RobustnessTable& table) {
-  OrderedJson out = {{"rows", OrderedJson::array()}, {"duty_sd_per_noise_sd", table.duty_sd_per_noise_sd}};
+  OrderedJson out = {{"rows", OrderedJson::array()}, {"duty_sd_per_noise_sd", or_null(table.duty_sd_per_noise_sd)}};
   for (const control::RobustnessRow& row : table.rows) {
     out["rows"].push_back({{"name", row.name},
                            {"plant", json_of(row.plant)},
                            {"duty_min", row.duty_min},
                            {"duty_max", row.duty_max},
                            {"step", json_of(row.step)},
-                           {"disturbance", json_of(row.disturbance)}});
+                           {"disturbance", json_of(row.disturbance)},
+                           {"is_stable", row.is_stable},
+                           {"is_diverging", row.is_diverging}});
   }
   return out;
 }

@@ -38,11 +38,16 @@ void write_compared(std::ostream& out, std::span<const Discretisation> compared)
 }
 
 void write_coefficients(std::ostream& out, const Discretisation& d) {
-  Table coefficients{{"power of 1/z", "numerator", "denominator"}};
-  for (std::size_t i = 0; i < d.transfer.numerator.size(); ++i) {
-    coefficients.row({fmt::format("{}", i), cell(d.transfer.numerator[i], 12), cell(d.transfer.denominator[i], 12)});
+  if (d.transfer) {
+    const auto& [numerator, denominator, period_s] = *d.transfer;
+    Table coefficients{{"power of 1/z", "numerator", "denominator"}};
+    for (std::size_t i = 0; i < numerator.size(); ++i) {
+      coefficients.row({fmt::format("{}", i), cell(numerator[i], 12), cell(denominator[i], 12)});
+    }
+    coefficients.write(out);
+  } else {
+    fmt::print(out, "{}\n", d.transfer_note);
   }
-  coefficients.write(out);
   out << '\n';
   Table sections{{"section", "pole or a1", "a2", "residue or b0", "b1"}};
   sections.row({"direct", "-", "-", cell(d.sections.direct, 12), "-"});
@@ -90,7 +95,7 @@ control::DiscretisationChoice discretised(const control::FopdController& control
     throw std::invalid_argument{fmt::format("--a {} belongs to --method direct; drop one of them", *sampling.a)};
   }
   const Discretisation made = control::discretise(controller, options);
-  return {made, "as asked for", {made}};
+  return {made, "as asked for", {made}, {}};
 }
 
 void add_options(CLI::App& command, Discretise& wish) {
@@ -108,6 +113,8 @@ int run(const Discretise& wish, std::ostream& out) {
     answer["reason"] = choice.reason;
     answer["compared"] = OrderedJson::array();
     for (const Discretisation& other : choice.compared) answer["compared"].push_back(json_of(other));
+    answer["refused"] = OrderedJson::array();
+    for (const auto& [name, reason] : choice.refused) answer["refused"].push_back({{"name", name}, {"reason", reason}});
     answer["controller"] = json_of(controller);
     write_json(out, answer);
     return 0;
@@ -116,6 +123,7 @@ int run(const Discretise& wish, std::ostream& out) {
              choice.chosen.options.order, choice.chosen.options.period_s, choice.reason, choice.chosen.dc_gain,
              choice.chosen.dc_gain_before);
   write_compared(out, choice.compared);
+  for (const auto& [name, reason] : choice.refused) fmt::print(out, "refused: the {} {}\n", name, reason);
   out << '\n';
   write_coefficients(out, choice.chosen);
   return 0;

@@ -73,8 +73,17 @@ void Table::write(std::ostream& out) const {
   }
 }
 
-std::string cell(double value, int digits) { return std::isnan(value) ? "-" : fmt::format("{:.{}g}", value, digits); }
+std::string cell(double value, int digits) {
+  return std::isnan(value) ? "-" : fmt::format("{:.{}g}", value == 0 ? 0 : value, digits);
+}
 
 std::string cell(const std::optional<double>& value, int digits) { return value ? cell(*value, digits) : "-"; }
+
+std::string fixed_cell(double value, int decimals) {
+  if (std::isnan(value)) return "-";
+  std::string text = fmt::format("{:.{}f}", value, decimals);
+  const bool is_zero = text.find_first_not_of("-0.") == std::string::npos;
+  return is_zero && text.front() == '-' ? text.substr(1) : text;
+}
 
 }  // namespace server::cli

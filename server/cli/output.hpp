@@ -47,5 +47,7 @@ class Table {
 // For tables: as many significant digits as a reader wants, "-" for what is not there.
 std::string cell(double value, int digits = 6);
 std::string cell(const std::optional<double>& value, int digits = 6);
+// With this many digits after the point; what rounds to zero has no sign.
+std::string fixed_cell(double value, int decimals);
 
 }  // namespace server::cli

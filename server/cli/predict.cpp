@@ -60,9 +60,8 @@ OrderedJson json_of(const MeasuredStep& step) {
 }
 
 void add_row(Table& table, const std::string& name, double at_s, const control::StepMetrics& m) {
-  table.row({name, cell(at_s, 5), m.settling_s ? cell(*m.settling_s, 4) : "never",
-             fmt::format("{:.2f}", m.overshoot_percent), cell(m.rise_10_90_s, 4),
-             fmt::format("{:.3f}", 1e3 * m.steady_state_error_m)});
+  table.row({name, cell(at_s, 5), m.settling_s ? cell(*m.settling_s, 4) : "never", fixed_cell(m.overshoot_percent, 2),
+             cell(m.rise_10_90_s, 4), fixed_cell(1e3 * m.steady_state_error_m, 3)});
 }
 
 void write_table(std::ostream& out, const control::ClosedLoopExperiment& experiment,
@@ -78,6 +77,10 @@ void write_table(std::ostream& out, const control::ClosedLoopExperiment& experim
             step.at_s, step.metrics);
   }
   table.write(out);
+  if (prediction.is_diverging) {
+    fmt::print(out, "the predicted loop diverges: it is {:.3g} m off after {:.4g} s, where the prediction ends\n",
+               prediction.measured_m.back(), prediction.time_s.back());
+  }
   fmt::print(out, "predicted duty: clipped in {:.2f} % of the samples, sd at rest {:.4g}\n",
              100 * prediction.clipped_fraction, prediction.duty_sd_at_rest);
 }

@@ -100,6 +100,26 @@ TEST(ClosedLoop, LeavesOutTheMeasuresOfWhatDoesNotHappen) {
   EXPECT_TRUE(predict_closed_loop(quiet).disturbance.settling_s.has_value());
 }
 
+TEST(ClosedLoop, EndsTheRecordOfALoopThatDiverges) {
+  ClosedLoopExperiment wild = experiment(kNonNewtonianModel, -kUnlimited, kUnlimited);
+  for (const double gain : {1.0, 100.0, 1e300}) {
+    SCOPED_TRACE(gain);
+    wild.plant.kp = gain;
+    const ClosedLoopPrediction prediction = predict_closed_loop(wild);
+    EXPECT_TRUE(prediction.is_diverging);
+    EXPECT_LT(prediction.time_s.size(), 4001U);
+    EXPECT_EQ(prediction.time_s.size(), prediction.measured_m.size());
+    EXPECT_GT(std::abs(prediction.measured_m.back()), 100);
+    EXPECT_FALSE(prediction.step.settling_s.has_value());
+    EXPECT_FALSE(prediction.disturbance.settling_s.has_value());
+  }
+  wild.duty_min = -1;
+  wild.duty_max = 1;
+  wild.plant.kp = 1;
+  EXPECT_FALSE(predict_closed_loop(wild).is_diverging);  // the clamp holds it in a limit cycle
+  EXPECT_FALSE(predict_closed_loop(experiment(kNonNewtonianModel)).is_diverging);
+}
+
 TEST(ClosedLoop, RefusesExperimentsOutsideTheirRange) {
   const auto refuses = [](auto change) {
     ClosedLoopExperiment e = experiment(kNonNewtonianModel);
@@ -115,11 +135,7 @@ TEST(ClosedLoop, RefusesExperimentsOutsideTheirRange) {
   refuses([](auto& e) { e.noise_sd_m = -1; });
   refuses([](auto& e) { e.profile_velocity_m_s = -1; });
   refuses([](auto& e) { e.plant.b2 = 0; });
-  refuses([](auto& e) {  // a loop that blows up
-    e.controller = {1e6, {}, {}};
-    e.duty_min = -kUnlimited;
-    e.duty_max = kUnlimited;
-  });
+  refuses([](auto& e) { e.duration_s = 1.1e6 * e.period_s; });
 }
 
 }  // namespace

@@ -6,8 +6,11 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <random>
+#include <regex>
 #include <stdexcept>
+#include <string>
 
 namespace control {
 namespace {
@@ -106,7 +109,7 @@ TEST(Discretise, HasADcGainOfExactlyKp) {
   for (const auto& options : {direct(0), direct(0.5), direct(0.9), oustaloup()}) {
     const Discretisation result = discretise(kPaperController, options);
     EXPECT_NEAR(dc_gain(result.sections), kPaperController.kp, 1e-12 * kPaperController.kp);
-    EXPECT_NEAR(dc_gain(result.transfer), kPaperController.kp, 1e-9 * kPaperController.kp);
+    EXPECT_NEAR(dc_gain(result.transfer.value()), kPaperController.kp, 1e-9 * kPaperController.kp);
   }
 }
 
@@ -131,7 +134,7 @@ TEST(Discretise, UsesNoMoreSectionsThanAnExactlyRationalControllerHas) {
   EXPECT_EQ(classical.sections.first_order.size(), 1U);
   EXPECT_LT(classical.errors.fit_max_relative, 1e-9);
   const Discretisation euler = discretise({40, 0.05, 1}, direct(0));
-  EXPECT_EQ(euler.transfer.numerator.size(), 2U);
+  EXPECT_EQ(euler.transfer->numerator.size(), 2U);
   EXPECT_LT(euler.errors.fit_max_relative, 1e-9);
   const Discretisation proportional = discretise({40, 0, 0.5}, direct(0.5));
   EXPECT_NEAR(proportional.sections.direct, 40, 1e-9);
@@ -154,6 +157,86 @@ void expect_sound(const FopdController& controller, const DiscretisationOptions&
   EXPECT_LE(std::abs(std::arg(ratio)) * 57.29578, 1.1 * errors.max_deg + 0.1);
 }
 
+// Whatever a refusal says works in its place does.
+void expect_true_advice(const std::string& refusal, const FopdController& controller,
+                        const DiscretisationOptions& refused) {
+  const auto expect_works = [&](auto change) {
+    DiscretisationOptions options = refused;
+    change(options);
+    EXPECT_NO_THROW(discretise(controller, options)) << refusal;
+  };
+  const std::string text = refusal.substr(refusal.find("; ") + 1);
+  ASSERT_NE(text.find("works in its place: "), std::string::npos) << refusal;
+  std::smatch match;
+  if (std::regex_search(text, match, std::regex("order (\\d+) \\(off by"))) {
+    expect_works([&](auto& options) { options.order = std::stoi(match[1]); });
+  }
+  if (std::regex_search(text, match, std::regex("a = ([0-9.]+) \\(off by"))) {
+    EXPECT_NE(std::stod(match[1]), refused.a);
+    expect_works([&](auto& options) { options.a = std::stod(match[1]); });
+  }
+  EXPECT_NE(text.find("Oustaloup's method (off by"), std::string::npos) << refusal;
+}
+
+TEST(Discretise, GivesNoAdviceThatDoesNotHelp) {
+  int refusals = 0;
+  for (const double period_s : {0.001, 0.01}) {
+    for (const int order : {1, 2, 3, 10}) {
+      for (const double a : {0.0, 0.9}) {
+        DiscretisationOptions options = direct(a);
+        options.period_s = period_s;
+        options.order = order;
+        try {
+          discretise(kPaperController, options);
+        } catch (const std::runtime_error& error) {
+          expect_true_advice(error.what(), kPaperController, options);
+          ++refusals;
+        }
+      }
+    }
+  }
+  EXPECT_GT(refusals, 3);
+}
+
+// The largest relative difference of the coefficients' response from the sections', at DC and over the band.
+double off_by(const DiscreteTransferFunction& transfer, const ParallelSections& sections) {
+  double largest = std::abs(dc_gain(transfer) / dc_gain(sections) - 1);
+  for (double omega = 0.1; omega < 0.8 * 3.1416 / transfer.period_s; omega *= 1.3) {
+    const Complex exact = discrete_response(sections, transfer.period_s, omega);
+    largest = std::max(largest, std::abs(discrete_response(transfer, omega) / exact - 1.0));
+  }
+  return largest;
+}
+
+TEST(Discretise, PublishesNoCoefficientsThatAreNotTheSections) {
+  int without = 0;
+  for (const double period_s : {0.001, 0.002, 0.005, 0.01}) {
+    for (int order = 1; order <= 10; ++order) {
+      for (const bool is_direct : {false, true}) {
+        DiscretisationOptions options = is_direct ? direct(0.25) : oustaloup();
+        options.period_s = period_s;
+        options.order = order;
+        SCOPED_TRACE(testing::Message() << period_s << " s, order " << order << ", direct " << is_direct);
+        std::optional<Discretisation> result;
+        try {
+          result = discretise(kPaperController, options);
+        } catch (const std::runtime_error&) {
+          continue;
+        }
+        EXPECT_NEAR(dc_gain(result->sections), kPaperController.kp, 1e-11 * kPaperController.kp);
+        EXPECT_EQ(result->transfer.has_value(), result->transfer_max_relative <= 1e-6);
+        EXPECT_EQ(result->transfer.has_value(), result->transfer_note.empty());
+        if (result->transfer) EXPECT_LE(off_by(*result->transfer, result->sections), 1e-6);
+        without += result->transfer ? 0 : 1;
+        if (order <= 4) EXPECT_TRUE(result->transfer);
+        if ((period_s == 0.01 || is_direct) && order <= 8) EXPECT_TRUE(result->transfer);
+        if (period_s == 0.001 && order >= 7 && !is_direct) EXPECT_FALSE(result->transfer);
+      }
+    }
+  }
+  EXPECT_GT(without, 0);
+}
+
 TEST(Discretise, IsSoundOrSaysWhatToChangeForRandomControllersAndRates) {
   std::mt19937 generator{11};
   std::uniform_real_distribution<double> log_kp(0, 5), log_kd(-5, -1), mu(0.05, 1.95), log_period(-6.9, -2.3),
@@ -170,7 +253,7 @@ TEST(Discretise, IsSoundOrSaysWhatToChangeForRandomControllersAndRates) {
     try {
       expect_sound(controller, options, unit(generator));
     } catch (const std::runtime_error& error) {
-      EXPECT_NE(std::string(error.what()).find("take a lower order"), std::string::npos);
+      expect_true_advice(error.what(), controller, options);
       EXPECT_EQ(options.method, DiscretisationMethod::direct);
       ++failed;
     }
@@ -198,7 +281,22 @@ TEST(ChooseDiscretisation, TakesTheMostAccurateIfNoneIsAccurate) {
   for (const auto& other : choice.compared) {
     EXPECT_LE(choice.chosen.errors.max_relative_in_bandwidth, other.errors.max_relative_in_bandwidth);
   }
-  EXPECT_NE(choice.reason.find("none of which"), std::string::npos) << choice.reason;
+  EXPECT_NE(choice.reason.find("none of them"), std::string::npos) << choice.reason;
+  EXPECT_EQ(choice.reason.find("would help"), std::string::npos) << choice.reason;
+}
+
+TEST(ChooseDiscretisation, CountsAndNamesWhatWasRefused) {
+  for (const int order : {1, 2, 3, 5, 9}) {
+    const DiscretisationChoice choice = choose_discretisation(kPaperController, 0.001, order, 30);
+    SCOPED_TRACE(choice.reason);
+    EXPECT_EQ(choice.compared.size() + choice.refused.size(), 7U);
+    EXPECT_NE(choice.reason.find("of 7 tried"), std::string::npos);
+    for (const auto& [name, reason] : choice.refused) {
+      EXPECT_NE(name.find("direct method with a = "), std::string::npos);
+      EXPECT_FALSE(reason.empty());
+    }
+  }
+  EXPECT_FALSE(choose_discretisation(kPaperController, 0.001, 1, 30).refused.empty());
 }
 
 TEST(Discretise, RefusesOptionsOutsideTheirRange) {

@@ -57,6 +57,8 @@ TEST(GrunwaldLetnikov, RefusesBadStepsDutiesAndModels) {
   EXPECT_THROW(grunwald_letnikov_velocity(kNonNewtonianModel, -1, good), std::invalid_argument);
   EXPECT_THROW(grunwald_letnikov_velocity(kNonNewtonianModel, std::nan(""), good), std::invalid_argument);
   EXPECT_THROW(grunwald_letnikov_velocity(kNonNewtonianModel, 0.01, bad), std::invalid_argument);
+  const std::vector<double> endless(200'001, 1.0);
+  EXPECT_THROW(grunwald_letnikov_velocity(kNonNewtonianModel, 0.01, endless, 10), std::invalid_argument);
   FractionalModel model;
   model.beta = 1.5;
   EXPECT_THROW(grunwald_letnikov_velocity(model, 0.01, good), std::invalid_argument);

@@ -191,6 +191,29 @@ TEST(ModalPlant, AnswersAtOnceWhereTheModelIsMuchFasterThanTheStep) {
   EXPECT_NEAR(plant.position_m(), 0, 1e-7);
 }
 
+// With b2 this small the response is that of b1 s^α + b3 for hours: 1 - cos for α = 2.
+TEST(ModalPlant, FollowsModelsWithHardlyAnyDamping) {
+  for (const double alpha : {2.0, 1.9, 1.5}) {
+    for (const double beta : {1.0, 0.5, 0.02}) {
+      ModalPlant reference{{0.1, 0.1, 1e-8, 1, alpha, beta}, 0.01};
+      std::vector<ModalPlant> plants;
+      for (const double b2 : {1e-10, 1e-12, 1e-14, 1e-100}) {
+        plants.emplace_back(FractionalModel{0.1, 0.1, b2, 1, alpha, beta}, 0.01);
+      }
+      for (int k = 1; k <= 1000; ++k) {
+        reference.step(1);
+        const double undamped_m_s = 0.1 * (1 - std::cos(0.01 * k / std::sqrt(0.1)));
+        for (ModalPlant& plant : plants) {
+          plant.step(1);
+          ASSERT_NEAR(plant.velocity_m_s(), reference.velocity_m_s(), 1e-7) << alpha << " " << beta << " " << k;
+          ASSERT_NEAR(plant.position_m(), reference.position_m(), 1e-6) << alpha << " " << beta << " " << k;
+          if (alpha == 2) ASSERT_NEAR(plant.velocity_m_s(), undamped_m_s, 1e-8) << beta << " " << k;
+        }
+      }
+    }
+  }
+}
+
 TEST(ModalPlant, QuotesTheModelsAndStepSizesItRefuses) {
   const auto message = [](const FractionalModel& model, double dt_s) -> std::string {
     try {

@@ -31,7 +31,7 @@ TEST(Robustness, ReproducesTheKnownTableForThePapersController) {
   EXPECT_NEAR(row(table, "gain -30 %", -1).step.overshoot_percent, 0.06, 0.005);
   EXPECT_NEAR(row(table, "gain +30 %", -1).step.overshoot_percent, 1.46, 0.005);
   EXPECT_NEAR(row(table, "water (28)", -1).disturbance.overshoot_percent, 20.1, 0.05);
-  EXPECT_NEAR(table.duty_sd_per_noise_sd, 129, 0.5);
+  EXPECT_NEAR(table.duty_sd_per_noise_sd.value(), 129, 0.5);
 }
 
 TEST(Robustness, ShowsThatAMotorThatCannotReverseLeavesItsOvershootForEver) {
@@ -59,8 +59,40 @@ TEST(Robustness, AgreesWithTheKnownTableForTheOtherSets) {
     EXPECT_NEAR(row(table, "as modelled", -1).step.settling_s.value(), set.settling_s, 0.025);
     EXPECT_NEAR(row(table, "water (28)", -1).step.overshoot_percent, set.water_overshoot, 0.15);
     EXPECT_NEAR(row(table, "water (28)", -1).step.settling_s.value(), set.water_settling_s, 0.025);
-    EXPECT_NEAR(table.duty_sd_per_noise_sd, set.noise, 0.05 * set.noise);
+    EXPECT_NEAR(table.duty_sd_per_noise_sd.value(), set.noise, 0.05 * set.noise);
   }
+}
+
+FractionalModel times(FractionalModel plant, double gain) {
+  plant.kp *= gain;
+  return plant;
+}
+
+TEST(Robustness, SaysWhichLoopsAreUnstableAndGivesThemNoNoiseGain) {
+  const RobustnessTable good = robustness(kNonNewtonianModel, reference_discretisation());
+  for (const auto& each : good.rows) {
+    EXPECT_TRUE(each.is_stable) << each.name;
+    EXPECT_FALSE(each.is_diverging) << each.name;
+  }
+  for (const double gain : {10.0, 30.0, 100.0, -1.0}) {
+    SCOPED_TRACE(gain);
+    const RobustnessTable table = robustness(times(kNonNewtonianModel, gain), reference_discretisation());
+    EXPECT_FALSE(table.duty_sd_per_noise_sd.has_value());
+    EXPECT_FALSE(row(table, "as modelled", -1).is_stable);
+    EXPECT_TRUE(row(table, "water (28)", -1).is_stable);
+  }
+}
+
+TEST(Robustness, IsNotFooledByFewSamples) {
+  DiscretisationOptions slow;
+  slow.method = DiscretisationMethod::oustaloup;
+  slow.period_s = 1;
+  const RobustnessTable table = robustness(kNonNewtonianModel, discretise(kPaperController, slow));
+  EXPECT_FALSE(table.duty_sd_per_noise_sd.has_value());
+  EXPECT_FALSE(row(table, "as modelled", -1).is_stable);
+  const RobustnessTable gentle = robustness(kNonNewtonianModel, discretise({1, 0.0305, 0.6524}, slow));
+  EXPECT_TRUE(gentle.duty_sd_per_noise_sd.has_value());
+  EXPECT_TRUE(row(gentle, "as modelled", -1).is_stable);
 }
 
 TEST(Robustness, RefusesAPlantOutsideItsRange) {

@@ -76,7 +76,7 @@ TEST(StepMetrics, SaysThatItNeverSettledWhenTheLastSampleIsOutsideTheBand) {
 }
 
 TEST(StepMetrics, MeasuresAStepBackwardsLikeOneForwards) {
-  const std::vector<double> time_s{0, 1, 2, 3}, position_m{0.1, 0.05, -0.01, 0};
+  const std::vector<double> time_s{0, 1, 2, 3, 4}, position_m{0.1, 0.05, -0.01, 0, 0};
   const StepMetrics metrics = measure_step(time_s, position_m, {0, 10, 0.1, 0, 0.002});
   EXPECT_NEAR(metrics.overshoot_percent, 10, 1e-9);
   EXPECT_NEAR(metrics.peak_m, -0.01, 1e-12);
@@ -152,6 +152,47 @@ TEST(StepMetrics, SayThatANoisyRecordNeverSettledAndThatNoiseIsNoOvershoot) {
     const StepMetrics metrics = measure_step(exact.time_s, exact.position_m, step);
     EXPECT_NEAR(metrics.settling_s.value(), 0.98, 0.1);
     EXPECT_LT(metrics.overshoot_percent, 1);
+  }
+}
+
+TEST(StepMetrics, NeverCallsAnOscillationThroughTheBandSettled) {
+  for (int phase = 0; phase < 60; ++phase) {
+    Trajectory run;
+    for (int k = 0; k < 2000; ++k) {
+      run.time_s.push_back(k * kPeriodS);
+      run.position_m.push_back(k < 10 ? 0 : kTargetM + 0.01 * std::sin(4 * k * kPeriodS + phase * 2 * 3.14159265 / 60));
+    }
+    EXPECT_FALSE(measure_step(run.time_s, run.position_m, {0, 20, 0, kTargetM, 0.002}).settling_s.has_value()) << phase;
+  }
+}
+
+TEST(StepMetrics, WantTheLastTwentiethOfTheRecordInsideTheBand) {
+  for (const int entered : {0, 500, 948, 952, 999}) {
+    Trajectory run;
+    for (int k = 0; k <= 1000; ++k) {
+      run.time_s.push_back(k * kPeriodS);
+      run.position_m.push_back(k < entered ? 0 : kTargetM);
+    }
+    const StepMetrics metrics = measure_step(run.time_s, run.position_m, {0, 20, 0, kTargetM, 0.002});
+    EXPECT_EQ(metrics.settling_s.has_value(), entered < 950) << entered;
+  }
+}
+
+TEST(StepMetrics, GiveNoSettlingWhereTheNoiseIsAsWideAsTheBand) {
+  Trajectory still;
+  for (int k = 0; k < 4000; ++k) {
+    still.time_s.push_back(k * kPeriodS);
+    still.position_m.push_back(std::min(0.001 * k, kTargetM));
+  }
+  StepExperiment step{0, 40, 0, kTargetM, 0.002};
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    for (const double sd_m : {0.5e-3, 1e-3, 1.5e-3, 3e-3}) {
+      const Trajectory noisy = with_noise(still, sd_m, seed);
+      step.noise_sd_m = sd_m;
+      const StepMetrics metrics = measure_step(noisy.time_s, noisy.position_m, step);
+      EXPECT_EQ(metrics.settling_s.has_value(), sd_m <= 1e-3) << sd_m;
+      if (metrics.settling_s) EXPECT_NEAR(*metrics.settling_s, 0.98, 0.15) << sd_m;
+    }
   }
 }
 

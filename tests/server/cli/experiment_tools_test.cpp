@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/cli/output.hpp"
 #include "tests/server/cli/tool_test.hpp"
 
 namespace server::cli {
@@ -40,6 +41,22 @@ TEST_F(Discretising, ExplainsItsChoiceWhenNoMethodIsGiven) {
   EXPECT_EQ(ask("discretise --method oustaloup --json").json()["method"], "oustaloup");
 }
 
+TEST_F(Discretising, PublishesNoCoefficientsThatCannotHoldTheSections) {
+  const auto json = ask("discretise --method oustaloup --period-s 0.001 --order 8 --json").json();
+  EXPECT_TRUE(json["numerator"].is_null());
+  EXPECT_TRUE(json["denominator"].is_null());
+  EXPECT_FALSE(json["transfer_note"].get<std::string>().empty());
+  EXPECT_EQ(json["sections"]["first_order"].size(), 8u);
+  EXPECT_THAT(ask("discretise --method oustaloup --period-s 0.001 --order 8").text, HasSubstr("run the sections"));
+}
+
+TEST_F(Discretising, ListsWhatItRefused) {
+  const auto json = ask("discretise --period-s 0.001 --order 1 --json").json();
+  EXPECT_EQ(json["refused"].size(), 6u);
+  EXPECT_THAT(json["refused"][0]["name"].get<std::string>(), HasSubstr("a = 0"));
+  EXPECT_THAT(ask("discretise --period-s 0.001 --order 1").text, HasSubstr("refused: the direct method"));
+}
+
 class Predicting : public ToolTest {};
 
 TEST_F(Predicting, GivesTheReferenceMetrics) {
@@ -66,6 +83,25 @@ TEST_F(Predicting, PrintsSamplesAndRobustness) {
   const Answer table = ask("predict --duration-s 1 --robustness");
   EXPECT_THAT(table.text, HasSubstr("0 to 1"));
   EXPECT_THAT(ask("tune --crossover-rad-s 3 --phase-margin-deg 90 --robustness").text, HasSubstr("robustness"));
+}
+
+TEST_F(Predicting, SaysPlainlyThatALoopIsUnstableOrDiverges) {
+  save("strong.json", R"({"kp":3,"b1":0.005682,"b2":0.11031,"b3":1,"alpha":1.7263,"beta":0.8682})");
+  const std::string runaway = "predict --plant @strong.json --duty-min -inf --duty-max inf";
+  EXPECT_THAT(ask(runaway).text, HasSubstr("diverges"));
+  EXPECT_EQ(ask(runaway + " --json").json()["is_diverging"], true);
+  const auto robustness = ask("predict --plant @strong.json --robustness --json").json()["robustness"];
+  EXPECT_TRUE(robustness["duty_sd_per_noise_sd"].is_null());
+  EXPECT_EQ(robustness["rows"][0]["is_stable"], false);
+  EXPECT_THAT(ask("predict --plant @strong.json --robustness").text, HasSubstr("none, the loop is not stable"));
+}
+
+TEST(Cells, HaveNoSignOnZero) {
+  EXPECT_EQ(fixed_cell(-1e-9, 3), "0.000");
+  EXPECT_EQ(fixed_cell(-0.0, 0), "0");
+  EXPECT_EQ(fixed_cell(-0.5, 2), "-0.50");
+  EXPECT_EQ(cell(-0.0), "0");
+  EXPECT_EQ(cell(-1e-9, 2), "-1e-09");
 }
 
 class Identifying : public ToolTest {};
