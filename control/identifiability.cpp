@@ -134,11 +134,10 @@ bool dead_time_is_at_its_limit(const Fit& fit, const IdentificationOptions& opti
 
 void add_at_bounds(const Fit& fit, const IdentificationOptions& options, std::vector<std::string>& warnings) {
   if (fit.structure != Structure::fractional) return;
-  const char* meaning = dead_time_is_at_its_limit(fit, options)
-                            ? "probably because the dead time is at its limit; raise that first"
-                        : fit.fit_percent < kPoorFitPercent
-                            ? "the model does not describe the run, so this order means nothing"
-                            : "the data do not need this fractional order, or do not show it";
+  const char* meaning =
+      dead_time_is_at_its_limit(fit, options) ? "probably because the dead time is at its limit; raise that first"
+      : fit.fit_percent < kPoorFitPercent     ? "the model does not describe the run, so this order means nothing"
+                                              : "the data do not need this fractional order, or do not show it";
   const auto add = [&](const char* name, double order, double lower, double upper) {
     if (order > lower + kNearBound && order < upper - kNearBound) return;
     std::ostringstream text;

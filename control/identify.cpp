@@ -75,7 +75,8 @@ void check(const Recording& recording) {
   const std::size_t samples = recording.duty.size();
   if (!(recording.dt_s > 0)) refuse("dt_s must be positive, is ", recording.dt_s);
   if (!(recording.dt_s >= kShortestStepS && recording.dt_s <= kLongestStepS)) {
-    refuse("dt_s must be from ", kShortestStepS, " to ", kLongestStepS, ", is ", recording.dt_s, ": give it in seconds");
+    refuse("dt_s must be from ", kShortestStepS, " to ", kLongestStepS, ", is ", recording.dt_s,
+           ": give it in seconds");
   }
   if (samples < kFewestSamples) refuse("duty has ", samples, " samples: record at least ", kFewestSamples);
   if (samples > kMostSamples) {
@@ -102,8 +103,8 @@ void check(const IdentificationOptions& options, const Recording& recording) {
   }
 }
 
-// The least AIC among those searched, first. The AIC of an unfinished one is an upper bound: so it may win, but where it
-// does not it is not ranked, and stands after the finished ones.
+// The least AIC among those searched, first. The AIC of an unfinished one is an upper bound: so it may win, but where
+// it does not it is not ranked, and stands after the finished ones.
 void put_best_first(std::vector<Fit>& fits) {
   const auto key = [](const Fit& fit) { return std::pair(fit.aic, fit.free_parameters); };
   std::ranges::sort(fits, {}, [&](const Fit& fit) { return std::tuple(fit.starts == 0, key(fit)); });
@@ -120,8 +121,8 @@ std::vector<std::string> untried_structures(const std::vector<Fit>& fits) {
     warnings.push_back(fit.starts == 0
                            ? join_text("the ", name, " model was not tried, since the search ", end_words(fit.end),
                                        ": the one given may not be the best of the structures; raise the limit")
-                           : join_text("the search for the ", name, " model ", end_words(fit.end), " after ", fit.starts,
-                                       fit.starts == 1 ? " start" : " starts",
+                           : join_text("the search for the ", name, " model ", end_words(fit.end), " after ",
+                                       fit.starts, fit.starts == 1 ? " start" : " starts",
                                        ": it may be better than it looks, and is not compared; raise the limit"));
   }
   return warnings;

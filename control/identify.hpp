@@ -5,7 +5,8 @@
 //   absolute error: Σ |y - model|                                       (3)   [birs2021] (21), read literally
 //   0 < kp, b1, b2;  1 < α < 2;  0 < β < 1                              (4)   [birs2021] 3.2
 //   covariance = σ² (JᵀJ)⁻¹ at the optimum of (2)                       (5)   Cramér-Rao: what no estimator can beat
-//   covariance = τ² (JᵀJ)⁻¹ at the optimum of (3), τ = 1/(2 f(0))       (6)   [koenker-bassett]; f: density of residuals
+//   covariance = τ² (JᵀJ)⁻¹ at the optimum of (3), τ = 1/(2 f(0))       (6)   [koenker-bassett]; f: density of
+//   residuals
 //
 // Structures: fractional (20); second_order, (19) with α = 2, β = 1; first_order, b1 = 0, β = 1. One is chosen by AIC.
 // The search starts from the Newtonian model (28), as the paper does, and from further points against local minima.

@@ -57,7 +57,8 @@ class ModalRegressors {
   const Eigen::MatrixXd& expansion() const { return expansion_; }
 
   Eigen::MatrixXd responses(const DelayedDuty& duty, const Stop& stop = {}) const;
-  Eigen::MatrixXd response_slopes(const DelayedDuty& duty, const Stop& stop = {}) const;  // their derivatives with respect to time
+  Eigen::MatrixXd response_slopes(const DelayedDuty& duty,
+                                  const Stop& stop = {}) const;  // their derivatives with respect to time
 
  private:
   struct Column {

@@ -10,9 +10,9 @@ namespace {
 
 using Eigen::Index;
 
-constexpr std::size_t kScanSamples = 4000;  // of the piece on which dead times are tried
+constexpr std::size_t kScanSamples = 4000;   // of the piece on which dead times are tried
 constexpr std::size_t kFewestSamples = 100;  // of the piece
-constexpr double kScanDeadTimes = 4;        // the piece is at least so many of the longest
+constexpr double kScanDeadTimes = 4;         // the piece is at least so many of the longest
 
 // 1/2, 1/4, 3/4, 1/8, 5/8, ... for 1, 2, ...: spread evenly however many are taken.
 double spread(int index) {
@@ -21,8 +21,8 @@ double spread(int index) {
   return value;
 }
 
-// From the first sample with a duty on: before it the robot rests, whatever the model. Each duty is the mean of those it
-// stands for, so that its integral is right.
+// From the first sample with a duty on: before it the robot rests, whatever the model. Each duty is the mean of those
+// it stands for, so that its integral is right.
 Recording short_piece(const Recording& recording, double longest_dead_time_s) {
   const auto moves = std::ranges::find_if(recording.duty, [](double duty) { return duty != 0; });
   const auto first = static_cast<std::size_t>(moves - recording.duty.begin());

@@ -158,7 +158,8 @@ Eigen::MatrixXd OutputModel::jacobian(const FractionalModel& model) const {
 
 Eigen::VectorXd OutputModel::slope(const FractionalModel& model, const Stop& stop) const {
   const std::optional<PolePair> pair = explicit_pole(model);
-  Eigen::VectorXd result = regressors_.response_slopes(delayed_, stop) * (regressors_.expansion() * weights(model, pair));
+  Eigen::VectorXd result =
+      regressors_.response_slopes(delayed_, stop) * (regressors_.expansion() * weights(model, pair));
   if (!pair) return result;
   const Eigen::VectorXcd exponential = exponential_response(delayed_, pair->pole);
   const Complex gain = 2.0 * pair->residue / pair->pole;

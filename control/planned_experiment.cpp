@@ -19,7 +19,8 @@ constexpr double kLargestDuty = 1e3;
 [[noreturn]] void refuse(const char* what, double value) { throw_invalid("planned experiment: ", what, ' ', value); }
 
 void check(const PlannedExperiment& experiment) {
-  if (!(experiment.dt_s >= 1e-6 && experiment.dt_s <= 1e4)) refuse("dt_s must be from 1e-6 to 1e4, is", experiment.dt_s);
+  if (!(experiment.dt_s >= 1e-6 && experiment.dt_s <= 1e4))
+    refuse("dt_s must be from 1e-6 to 1e4, is", experiment.dt_s);
   if (experiment.duty.size() < 20) {
     refuse("duty must have at least 20 samples, has", static_cast<double>(experiment.duty.size()));
   }

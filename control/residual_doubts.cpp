@@ -100,10 +100,8 @@ std::vector<std::string> residual_doubts(const Recording& recording, const Ident
   take("velocity_m_s", "m/s", fit.velocity_residual_m_s, recording.velocity_m_s, fit.velocity_whiteness_p_value);
 
   std::vector<std::string> warnings;
+  for (const ChannelResidual& channel : channels) add_outliers(channel, recording.dt_s, options.cost, warnings);
   for (const ChannelResidual& channel : channels) add_poor_fit(channel, warnings);
-  for (const ChannelResidual& channel : channels) {
-    if (channel.fit_percent >= kPoorFitPercent) add_outliers(channel, recording.dt_s, options.cost, warnings);
-  }
   for (const ChannelResidual& channel : channels) add_mean(channel, warnings);
   for (const ChannelResidual& channel : channels) add_colour(channel, warnings);
   return warnings;

@@ -41,9 +41,7 @@ bool SearchLimit::is_reached() {
   return end_.has_value();
 }
 
-double SearchLimit::left_s() const {
-  return end_ == SearchEnd::cancelled ? 0 : std::max(0.0, deadline_s_ - clock_());
-}
+double SearchLimit::left_s() const { return end_ == SearchEnd::cancelled ? 0 : std::max(0.0, deadline_s_ - clock_()); }
 
 void SearchLimit::ask_watcher(double now_s) {
   last_told_s_ = now_s;

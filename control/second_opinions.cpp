@@ -19,6 +19,7 @@ using Eigen::Index;
 
 constexpr double kLookForSignPercent = 80;  // below this fit
 constexpr double kClearlyLowerAic = 10;
+constexpr double kRoughBeginning = 3;                     // times the size of the other residuals, by the medians
 constexpr double kMotionSigmas = 5, kMotionShare = 0.01;  // of v0, and of the squares that it explains
 
 double lowest_percent(const Recording& recording, const Fit& fit) {
@@ -77,52 +78,107 @@ void add_missing_offset(const OutputErrorSearch& search, const Recording& record
   warnings.push_back(text.str());
 }
 
-// Residuals, their slopes and the response to an initial velocity of 1 m/s, of all channels, in units of their sd.
+// Residuals and slopes of all channels, in units of the channel's sd.
 struct Stacked {
-  Eigen::VectorXd residual, motion;
+  Eigen::VectorXd residual;
   Eigen::MatrixXd slopes;
-  double per_independent_one = 1;  // samples, in the channel that is worst
+  std::vector<Channel> channels;
+  std::vector<double> sd;
 };
 
 Stacked stacked(OutputErrorSearch& search, const Recording& recording, const Fit& fit) {
   const SearchPoint point{fit.model, fit.offset_m, fit.dead_time_s};
   const auto residuals = search.residuals(point);
   const auto jacobians = search.jacobians(fit.structure, point);
-  const auto channels = search.channels();
-  const Index samples = static_cast<Index>(recording.duty.size()), rows = samples * std::ssize(channels);
-  const double record_s = recording.dt_s * static_cast<double>(samples);
-  const double lag_s = std::clamp(std::pow(fit.model.b2, 1 / fit.model.beta), 2 * recording.dt_s, record_s / 4);
-  Stacked all{Eigen::VectorXd(rows), Eigen::VectorXd(rows), Eigen::MatrixXd(rows, jacobians.front().cols())};
-  const Eigen::ArrayXd decay =
-      (Eigen::ArrayXd::LinSpaced(samples, 0, static_cast<double>(samples - 1)) * (-recording.dt_s / lag_s)).exp();
-  for (std::size_t c = 0; c < channels.size(); ++c) {
+  const Index samples = static_cast<Index>(recording.duty.size()), rows = samples * std::ssize(residuals);
+  Stacked all{Eigen::VectorXd(rows), Eigen::MatrixXd(rows, jacobians.front().cols()), search.channels(), {}};
+  for (std::size_t c = 0; c < residuals.size(); ++c) {
     const Index row = static_cast<Index>(c) * samples;
-    const double sd = std::max(1e-200, residuals[c].norm() / std::sqrt(static_cast<double>(samples)));
-    all.residual.segment(row, samples) = residuals[c] / sd;
-    all.slopes.middleRows(row, samples) = jacobians[c] / sd;
-    const bool is_position = channels[c] == Channel::position;
-    all.motion.segment(row, samples) = (is_position ? lag_s * (1 - decay) : decay) / sd;
-    all.per_independent_one = std::max(all.per_independent_one, samples_per_independent_one(residuals[c]));
+    all.sd.push_back(std::max(1e-200, residuals[c].norm() / std::sqrt(static_cast<double>(samples))));
+    all.residual.segment(row, samples) = residuals[c] / all.sd[c];
+    all.slopes.middleRows(row, samples) = jacobians[c] / all.sd[c];
   }
   return all;
+}
+
+// To an initial velocity of 1 m/s.
+Eigen::VectorXd response_to_motion(const Stacked& all, double dt_s, double lag_s) {
+  const Index samples = all.residual.size() / std::ssize(all.channels);
+  const Eigen::ArrayXd decay =
+      (Eigen::ArrayXd::LinSpaced(samples, 0, static_cast<double>(samples - 1)) * (-dt_s / lag_s)).exp();
+  Eigen::VectorXd response(all.residual.size());
+  for (std::size_t c = 0; c < all.channels.size(); ++c) {
+    auto part = response.segment(static_cast<Index>(c) * samples, samples);
+    if (all.channels[c] == Channel::position) {
+      part = lag_s * (1 - decay) / all.sd[c];
+    } else {
+      part = decay / all.sd[c];
+    }
+  }
+  return response;
+}
+
+struct InitialMotion {
+  double velocity_m_s = 0, sigmas = 0, share = 0;
+};
+
+InitialMotion motion_with_lag(const Stacked& all, const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr, double dt_s,
+                              double lag_s) {
+  const Eigen::VectorXd motion = response_to_motion(all, dt_s, lag_s);
+  const Eigen::VectorXd own = motion - all.slopes * qr.solve(motion);
+  const double size = own.squaredNorm();
+  if (!(size > 1e-8 * motion.squaredNorm())) return {};
+  const double velocity_m_s = own.dot(all.residual) / size;
+  const Eigen::VectorXd rest = all.residual - velocity_m_s * own;
+  const Index samples = all.residual.size() / std::ssize(all.channels);
+  double per_independent_one = 1;
+  for (Index row = 0; row < rest.size(); row += samples) {
+    per_independent_one = std::max(per_independent_one, samples_per_independent_one(rest.segment(row, samples)));
+  }
+  const double sd = std::sqrt(rest.squaredNorm() / static_cast<double>(rest.size()) * per_independent_one / size);
+  return {velocity_m_s, std::abs(velocity_m_s) / std::max(1e-300, sd),
+          1 - rest.squaredNorm() / all.residual.squaredNorm()};
+}
+
+// What a flexible model has bent itself to, (1) no longer shows; but its first second then fits worse than the rest.
+void add_rough_beginning(const Recording& recording, const Fit& fit, std::vector<std::string>& warnings) {
+  const auto& residual = recording.position_m.empty() ? fit.velocity_residual_m_s : fit.position_residual_m;
+  const double in_a_second = std::max(20.0, 1 / recording.dt_s);
+  const auto first = static_cast<std::ptrdiff_t>(std::min(in_a_second, static_cast<double>(residual.size()) / 4));
+  std::vector<double> size(residual.size());
+  std::ranges::transform(residual, size.begin(), [](double r) { return std::abs(r); });
+  const double ratio = median({size.begin(), size.begin() + first}) / median({size.begin() + first, size.end()});
+  if (first < 20 || !(ratio > kRoughBeginning) || !std::isfinite(ratio)) return;
+  std::ostringstream text;
+  text.precision(2);
+  text << "the first " << recording.dt_s * static_cast<double>(first) << " s fit " << ratio
+       << " times worse than the rest: the run seems to begin in motion, or shows fast terms that the model lacks; "
+          "begin "
+          "the record at rest";
+  warnings.push_back(text.str());
 }
 
 void add_initial_motion(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
                         std::vector<std::string>& warnings) {
   if (!(lowest_percent(recording, fit) < 100 - 1e-6)) return;  // rounding
-  const Stacked all = stacked(search, recording, fit);
-  if (!all.slopes.allFinite() || !all.motion.allFinite() || !all.residual.allFinite()) return;
+  Stacked all = stacked(search, recording, fit);
   const Eigen::VectorXd scale = all.slopes.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(all.slopes * scale.asDiagonal());
-  const Eigen::VectorXd own = all.motion - all.slopes * (scale.asDiagonal() * qr.solve(all.motion));
-  const double size = own.squaredNorm(), along = own.dot(all.residual);
-  if (!(size > 1e-8 * all.motion.squaredNorm())) return;
-  const double sigmas = std::abs(along) / std::sqrt(size * all.per_independent_one);
-  const double share = along * along / size / all.residual.squaredNorm();
-  if (!(sigmas > kMotionSigmas && share > kMotionShare)) return;
+  all.slopes *= scale.asDiagonal();
+  if (!all.slopes.allFinite() || !all.residual.allFinite()) return;
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(all.slopes);
+  const double longest_s = recording.dt_s * static_cast<double>(recording.duty.size()) / 4;
+  InitialMotion best;
+  for (double lag_s = longest_s; lag_s > 2 * recording.dt_s; lag_s /= 3) {
+    const InitialMotion found = motion_with_lag(all, qr, recording.dt_s, lag_s);
+    if (found.sigmas > best.sigmas) best = found;
+  }
+  if (!(best.sigmas > kMotionSigmas && best.share > kMotionShare)) {
+    add_rough_beginning(recording, fit, warnings);
+    return;
+  }
   std::ostringstream text;
   text.precision(2);
-  text << "the run seems to begin in motion, at about " << along / size << " m/s (" << sigmas
+  text << "the run seems to begin in motion, at about " << best.velocity_m_s << " m/s (" << best.sigmas
        << " sigmas): the model is at rest before the first sample; begin the record at rest";
   warnings.push_back(text.str());
 }

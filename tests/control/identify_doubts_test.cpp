@@ -89,7 +89,8 @@ TEST(IdentifyDoubts, ColourOfEitherChannelCounts) {
     EXPECT_FALSE(found.best.residuals_are_white);
     EXPECT_EQ(found.best.whiteness_p_value,
               std::min(*found.best.position_whiteness_p_value, *found.best.velocity_whiteness_p_value));
-    const char* name = is_position ? "residuals of position_m are not white" : "residuals of velocity_m_s are not white";
+    const char* name =
+        is_position ? "residuals of position_m are not white" : "residuals of velocity_m_s are not white";
     EXPECT_THAT(found.warnings, Contains(HasSubstr(name)));
   }
 }

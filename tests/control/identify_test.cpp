@@ -238,7 +238,7 @@ TEST(Identify, WarnsOfWhatItCannotTell) {
   for (std::size_t k = 0; k < recording.position_m.size(); ++k) {
     recording.position_m[k] += 1e-3 * std::sin(0.3 * static_cast<double>(k));
   }
-  EXPECT_THAT(identify(recording, one_start()).warnings, Contains(HasSubstr("residuals are not white")));
+  EXPECT_THAT(identify(recording, one_start()).warnings, Contains(HasSubstr("residuals of position_m are not white")));
   const Recording lag = position_run({0.1, 0, 0.2, 1, 2, 1}, std::vector<double>(301, 0.3), 1e-4, 2);
   const std::vector<std::string> warnings = identify(lag, one_start()).warnings;
   EXPECT_THAT(warnings, Contains(HasSubstr("the duty is 0.3 throughout")));

@@ -126,7 +126,6 @@ TEST(SearchLimit, AnUntriedStructureLosesNoComparison) {
   IdentificationOptions options;
   options.on_progress = [](const Progress& progress) { return progress.structure == Structure::first_order; };
   const Identification found = identify(long_run(301), options);
-  EXPECT_EQ(found.best.structure, Structure::first_order);
   ASSERT_EQ(found.compared.size(), 3U);
   EXPECT_EQ(found.compared.back().structure, Structure::fractional);
   EXPECT_EQ(found.compared.back().starts, 0);
