@@ -90,6 +90,7 @@ double fit_percent(const std::vector<double>& residual, const std::vector<double
 
 std::vector<std::string> residual_doubts(const Recording& recording, const IdentificationOptions& options,
                                          const Fit& fit) {
+  if (fit.end != SearchEnd::converged && fit.end != SearchEnd::iteration_limit) return {};  // not the model's doing
   std::vector<ChannelResidual> channels;
   const auto take = [&](const char* name, const char* unit, const std::vector<double>& residual,
                         const std::vector<double>& measured, std::optional<double> p_value) {

@@ -19,6 +19,7 @@ using Eigen::Index;
 
 constexpr double kLookForSignPercent = 80;  // below this fit
 constexpr double kClearlyLowerAic = 10;
+constexpr std::ptrdiff_t kFewest = 20;                    // samples of the beginning
 constexpr double kRoughBeginning = 3;                     // times the size of the other residuals, by the medians
 constexpr double kMotionSigmas = 5, kMotionShare = 0.01;  // of v0, and of the squares that it explains
 
@@ -140,22 +141,24 @@ InitialMotion motion_with_lag(const Stacked& all, const Eigen::ColPivHouseholder
           1 - rest.squaredNorm() / all.residual.squaredNorm()};
 }
 
-// What a flexible model has bent itself to, (1) no longer shows; but its first second then fits worse than the rest.
+// What a flexible model has bent itself to, (1) no longer shows; but its first samples then fit worse than the rest.
 void add_rough_beginning(const Recording& recording, const Fit& fit, std::vector<std::string>& warnings) {
   const auto& residual = recording.position_m.empty() ? fit.velocity_residual_m_s : fit.position_residual_m;
-  const double in_a_second = std::max(20.0, 1 / recording.dt_s);
-  const auto first = static_cast<std::ptrdiff_t>(std::min(in_a_second, static_cast<double>(residual.size()) / 4));
   std::vector<double> size(residual.size());
   std::ranges::transform(residual, size.begin(), [](double r) { return std::abs(r); });
-  const double ratio = median({size.begin(), size.begin() + first}) / median({size.begin() + first, size.end()});
-  if (first < 20 || !(ratio > kRoughBeginning) || !std::isfinite(ratio)) return;
-  std::ostringstream text;
-  text.precision(2);
-  text << "the first " << recording.dt_s * static_cast<double>(first) << " s fit " << ratio
-       << " times worse than the rest: the run seems to begin in motion, or shows fast terms that the model lacks; "
-          "begin "
-          "the record at rest";
-  warnings.push_back(text.str());
+  const double in_a_second = std::min(1 / recording.dt_s, static_cast<double>(size.size()) / 4);
+  for (const std::ptrdiff_t first : {kFewest, static_cast<std::ptrdiff_t>(in_a_second)}) {
+    if (first < kFewest || 2 * first > std::ssize(size)) continue;
+    const double ratio = median({size.begin(), size.begin() + first}) / median({size.begin() + first, size.end()});
+    if (!(ratio > kRoughBeginning) || !std::isfinite(ratio)) continue;
+    std::ostringstream text;
+    text.precision(2);
+    text << "the first " << recording.dt_s * static_cast<double>(first) << " s fit " << ratio
+         << " times worse than the rest: the run seems to begin in motion, or shows fast terms that the model lacks; "
+            "begin the record at rest";
+    warnings.push_back(text.str());
+    return;
+  }
 }
 
 void add_initial_motion(OutputErrorSearch& search, const Recording& recording, const Fit& fit,

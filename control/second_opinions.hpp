@@ -4,7 +4,7 @@
 //   an offset, if it was not to be fitted: AIC lower by more than 10
 //   a run that begins in motion: v0 e^{-t/T} added to the model by one linear step, for the best of some T        (1)
 // (1) is the change of least squares with all parameters free, so a part of v0 that they can imitate does not count.
-// or a first second that fits three times worse than the rest.
+// or first samples, 20 or one second of them, that fit three times worse than the rest.
 // Each costs one search at most, within the time that is left; none is tried when the search was cut off.
 // Errors: none thrown.
 #pragma once

@@ -24,7 +24,7 @@ double covered_share(bool is_laplace, Cost cost, unsigned seeds) {
   options.structure = Structure::first_order;
   options.further_starts = 0;
   options.cost = cost;
-  const std::vector<double> duty = prbs_duty(1, 0.1, 1.5, 0.02);
+  const std::vector<double> duty = prbs_duty(1, 0.1, 2, 0.02);
   const Recording clean{0.02, duty, {}, output_of(kLag, Channel::velocity, 0.02, duty)};
   int covered = 0, all = 0;
   for (unsigned seed = 1; seed <= seeds; ++seed) {
@@ -41,7 +41,7 @@ double covered_share(bool is_laplace, Cost cost, unsigned seeds) {
 TEST(IdentifyCoverage, OneSigmaHoldsTheTruthAboutTwoTimesInThree) {
   for (const bool is_laplace : {false, true}) {
     for (const Cost cost : {Cost::least_squares, Cost::absolute_error}) {
-      const double share = covered_share(is_laplace, cost, cost == Cost::least_squares ? 30 : 20);
+      const double share = covered_share(is_laplace, cost, 30);
       EXPECT_GT(share, 0.55) << is_laplace << ' ' << static_cast<int>(cost);
       EXPECT_LT(share, 0.8) << is_laplace << ' ' << static_cast<int>(cost);
     }
