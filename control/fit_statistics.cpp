@@ -5,6 +5,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace control {
 
@@ -50,7 +51,8 @@ double whiteness_p_value(const Eigen::VectorXd& residual) {
   const Index n = residual.size(), lags = std::max<Index>(2, std::min<Index>(20, n / 5 / 2 * 2));
   const Eigen::VectorXd centred = residual.array() - residual.mean();
   const double power = centred.squaredNorm();
-  if (!(power > 0)) return 1;
+  if (!std::isfinite(power)) return 0;
+  if (power == 0) return 1;
   double q = 0;
   for (Index lag = 1; lag <= lags; ++lag) {
     const double rho = centred.head(n - lag).dot(centred.tail(n - lag)) / power;
@@ -63,6 +65,40 @@ double whiteness_p_value(const Eigen::VectorXd& residual) {
     term *= q / 2 / static_cast<double>(k + 1);
   }
   return std::min(sum, 1.0);
+}
+
+double absolute_error_scale(const Eigen::VectorXd& residual, int free_parameters) {
+  constexpr double kZ = 1.96;
+  std::vector<double> size(static_cast<std::size_t>(residual.size()));
+  for (std::size_t k = 0; k < size.size(); ++k) size[k] = std::abs(residual[static_cast<Index>(k)]);
+  std::ranges::sort(size);
+  const auto zeros = std::min(size.size() / 2, static_cast<std::size_t>(std::max(0, free_parameters)));
+  const double n = static_cast<double>(size.size() - zeros);
+  const double h = std::cbrt(kZ * kZ * 1.5 / (2 * std::numbers::pi) / n);  // (6)
+  const double share = std::min(2 * h, 0.9);
+  const double quantile = size[zeros + static_cast<std::size_t>(share * (n - 1))];
+  return quantile / share * std::sqrt(static_cast<double>(size.size()) / n);  // (5)
+}
+
+double samples_per_independent_one(const Eigen::VectorXd& residual) {
+  constexpr Index kMostLags = 1000;
+  const Index n = residual.size(), lags = std::min(kMostLags, n / 4);
+  const Eigen::VectorXd centred = residual.array() - residual.mean();
+  const double power = centred.squaredNorm();
+  double sum = 1;
+  for (Index lag = 1; lag <= lags && power > 0; ++lag) {
+    const double rho = centred.head(n - lag).dot(centred.tail(n - lag)) / power;
+    if (!(rho > 0)) break;
+    sum += 2 * rho;
+  }
+  return sum;
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
 }
 
 }  // namespace control

@@ -4,6 +4,10 @@
 //   AIC = Σ_channels n ln(sse/n) + 2 k                                        (2)   Gaussian; k: free parameters
 //   AIC = Σ_channels 2 n ln(Σ|r|/n) + 2 k                                     (3)   Laplacian, for the absolute error
 //   Q = n (n + 2) Σ_{j≤h} ρ_j²/(n - j),  p = P(χ²_h > Q)                      (4)   Ljung-Box, h even and ≤ 20
+//   τ = 1/(2 f(0)) ≈ |r|_(2h)/(2h), |r|_(q): the q-quantile of the sizes                (5)   [koenker-bassett]
+//   h = n^(-1/3) z^(2/3) (1.5 φ(0)²)^(1/3), z = 1.96                                    (6)   [hall-sheather]
+//   n_effective = n/(1 + 2 Σ ρ_j), up to the first ρ_j < 0                              (7)   of a mean
+// (5) takes the residuals to be symmetrical and leaves out those that the parameters bring to zero.
 // Errors: none thrown. A parameter about which J says nothing has no sigma.
 #pragma once
 
@@ -20,6 +24,13 @@ struct Uncertainty {
 
 Uncertainty uncertainty(const Eigen::MatrixXd& jacobian);  // (1)
 
-double whiteness_p_value(const Eigen::VectorXd& residual);  // (4)
+double whiteness_p_value(const Eigen::VectorXd& residual);  // (4); 1 if all are equal, 0 if one is no number
+
+// (5): what takes the place of the sd in (1) for the absolute error.
+double absolute_error_scale(const Eigen::VectorXd& residual, int free_parameters);
+
+double samples_per_independent_one(const Eigen::VectorXd& residual);  // n/n_effective of (7), at least 1
+
+double median(std::vector<double> values);
 
 }  // namespace control

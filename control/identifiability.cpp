@@ -5,13 +5,16 @@
 #include <cmath>
 #include <sstream>
 
+#include "control/invalid_argument.hpp"
+
 namespace control {
 namespace {
 
 constexpr std::array<double, kParameters> kLargestSigma{0.1, 0.5, 0.5, 0.1, 0.1};  // relative but for the orders
 constexpr double kLargestCorrelation = 0.99;
 constexpr double kNearBound = 2e-3;
-constexpr double kFitOfRounding = 100 - 1e-6;  // percent; what is left is no noise
+constexpr double kDeadTimeAtLimit = 0.99;  // of the longest
+constexpr double kWorthPlanning = 2;       // times better
 constexpr double kPlanDurationS = 60, kPlanBitS = 0.2;
 constexpr double kPlanMostSamples = 20000;
 
@@ -46,26 +49,46 @@ std::string sigma_words(std::size_t parameter, std::optional<double> sigma, doub
   return text.str();
 }
 
+bool can_be_planned_with(const FractionalModel& m, const PlannedExperiment& plan) {
+  const auto is_positive = [](double value) { return value > 0 && std::isfinite(value); };
+  const auto is_sd = [](double value) { return value >= 0 && std::isfinite(value); };
+  return is_positive(m.kp) && is_positive(m.b2) && is_positive(m.b3) && m.b1 >= 0 && std::isfinite(m.b1) &&
+         m.beta > 0 && m.beta <= 1 && m.alpha > m.beta && m.alpha <= 2 && is_sd(plan.position_sd_m) &&
+         is_sd(plan.velocity_sd_m_s) && plan.position_sd_m + plan.velocity_sd_m_s > 0;
+}
+
+double standard_deviation(const std::vector<double>& residual) {
+  double sum = 0;
+  for (const double r : residual) sum += r * r;
+  return residual.empty() ? 0 : std::sqrt(sum / static_cast<double>(residual.size()));
+}
+
 // What a longer run with more changes would reach, with the residuals of this one.
 std::string better_experiment(const Recording& recording, const Fit& fit, bool fits_offset,
                               const std::vector<std::size_t>& parameters) {
-  const auto sd = [](const std::vector<double>& residual) {
-    double sum = 0;
-    for (const double r : residual) sum += r * r;
-    return residual.empty() ? 0 : std::sqrt(sum / static_cast<double>(residual.size()));
-  };
+  if (!(fit.fit_percent >= kPoorFitPercent)) {
+    return "the model does not describe the run, so that no better experiment can be computed from it";
+  }
   PlannedExperiment plan;
   plan.dt_s = std::max(recording.dt_s, kPlanDurationS / kPlanMostSamples);
   if (plan.dt_s > kPlanBitS) return "a duty that changes often, sampled faster than every 0.2 s, would tell more";
   plan.duty = prbs_duty(1, kPlanBitS, kPlanDurationS, plan.dt_s);
-  plan.position_sd_m = sd(fit.position_residual_m);
-  plan.velocity_sd_m_s = sd(fit.velocity_residual_m_s);
+  plan.position_sd_m = standard_deviation(fit.position_residual_m);
+  plan.velocity_sd_m_s = standard_deviation(fit.velocity_residual_m_s);
   plan.fits_offset = fits_offset;
-  if (plan.position_sd_m == 0 && plan.velocity_sd_m_s == 0) return "the residuals are zero";
+  if (!can_be_planned_with(fit.model, plan)) return "change the duty during a longer run";
   const ExpectedUncertainty expected = expected_uncertainty(fit.model, plan);
   std::vector<std::string> words;
+  bool is_better = false;
   for (const std::size_t i : parameters) {
-    words.push_back(sigma_words(i, expected.one_sigma[i], values(fit.model)[i]));
+    const auto& sigma = expected.one_sigma[i];
+    if (!sigma || !std::isfinite(*sigma)) continue;
+    is_better = is_better || !fit.one_sigma[i] || !(*fit.one_sigma[i] < kWorthPlanning * *sigma);
+    words.push_back(sigma_words(i, sigma, values(fit.model)[i]));
+  }
+  if (!is_better) {
+    return "a ±1 PRBS of 60 s with 0.2 s bits would not do much better: make the run longer or the motion larger, or "
+           "measure with less noise";
   }
   return "a ±1 PRBS of 60 s with 0.2 s bits and the same noise would give " + enumerated(words);
 }
@@ -105,9 +128,17 @@ void add_correlated(const Fit& fit, std::vector<std::string>& warnings) {
   }
 }
 
-void add_at_bounds(const Fit& fit, std::vector<std::string>& warnings) {
+bool dead_time_is_at_its_limit(const Fit& fit, const IdentificationOptions& options) {
+  return options.longest_dead_time_s > 0 && fit.dead_time_s > kDeadTimeAtLimit * options.longest_dead_time_s;
+}
+
+void add_at_bounds(const Fit& fit, const IdentificationOptions& options, std::vector<std::string>& warnings) {
   if (fit.structure != Structure::fractional) return;
-  const auto add = [&](const char* name, double order, double lower, double upper, const char* meaning) {
+  const char* meaning =
+      dead_time_is_at_its_limit(fit, options) ? "probably because the dead time is at its limit; raise that first"
+      : fit.fit_percent < kPoorFitPercent     ? "the model does not describe the run, so this order means nothing"
+                                              : "the data do not need this fractional order, or do not show it";
+  const auto add = [&](const char* name, double order, double lower, double upper) {
     if (order > lower + kNearBound && order < upper - kNearBound) return;
     std::ostringstream text;
     text.precision(6);
@@ -116,39 +147,14 @@ void add_at_bounds(const Fit& fit, std::vector<std::string>& warnings) {
          << "; its sigma means little there, so compare with the integer structures by AIC";
     warnings.push_back(text.str());
   };
-  add("alpha", fit.model.alpha, 1, 2, "the data do not need this fractional order, or do not show it");
-  add("beta", fit.model.beta, 0, 1, "the data do not need this fractional order, or do not show it");
+  add("alpha", fit.model.alpha, 1, 2);
+  add("beta", fit.model.beta, 0, 1);
 }
 
-void add_of_search(const Fit& fit, const Recording& recording, std::vector<std::string>& warnings) {
-  std::ostringstream text;
-  text.precision(3);
-  if (std::ranges::all_of(recording.duty, [&](double duty) { return duty == recording.duty.front(); })) {
-    text << "the duty is " << recording.duty.front()
-         << " throughout: a single step shows fast terms only in its first samples; change the duty during the run";
-    warnings.push_back(text.str());
-  }
-  if (!fit.residuals_are_white && fit.fit_percent < kFitOfRounding) {
-    text.str("");
-    text << "the residuals are not white (Ljung-Box p = " << fit.whiteness_p_value
-         << ", below 0.01): the sigmas are too small; look for disturbances, a dead time, or noise that is filtered";
-    warnings.push_back(text.str());
-  }
-  if (fit.starts > 1 && fit.starts_that_agree < 2) {
-    text.str("");
-    text << "only " << fit.starts_that_agree << " of " << fit.starts
-         << " starts reached the best cost: it may be a local minimum; raise further_starts or the iteration limit";
-    warnings.push_back(text.str());
-  }
-  if (fit.end != SearchEnd::converged) {
-    const char* how = fit.end == SearchEnd::cancelled         ? "was cancelled"
-                      : fit.end == SearchEnd::iteration_limit ? "reached its iteration limit"
-                                                              : "reached its time limit";
-    text.str("");
-    text << "the search " << how << " after " << fit.iterations
-         << " iterations: the parameters are the best so far, not the optimum; raise the limit";
-    warnings.push_back(text.str());
-  }
+void add_constant_duty(const Recording& recording, std::vector<std::string>& warnings) {
+  if (!std::ranges::all_of(recording.duty, [&](double duty) { return duty == recording.duty.front(); })) return;
+  warnings.push_back(join_text("the duty is ", recording.duty.front(), " throughout: a single step shows fast terms ",
+                               "only in its first samples; change the duty during the run"));
 }
 
 }  // namespace
@@ -159,12 +165,52 @@ std::string structure_name(Structure structure) {
                                                 : "first order";
 }
 
-std::vector<std::string> identifiability_warnings(const Recording& recording, const Fit& fit, bool fits_offset) {
+std::string end_words(SearchEnd end) {
+  switch (end) {
+    case SearchEnd::converged: return "converged";
+    case SearchEnd::iteration_limit: return "reached its iteration limit";
+    case SearchEnd::time_limit: return "reached its time limit";
+    case SearchEnd::cancelled: return "was cancelled";
+    case SearchEnd::not_finite: return "met numbers that are not finite";
+  }
+  return "ended";
+}
+
+std::vector<std::string> search_doubts(const Fit& fit, const IdentificationOptions& options) {
   std::vector<std::string> warnings;
-  add_undetermined(recording, fit, fits_offset, warnings);
+  if (fit.starts == 0) {
+    warnings.push_back(join_text("the search ", end_words(fit.end),
+                                 " before its first iteration: the parameters are the paper's start, with the best "
+                                 "gain, and say nothing; raise the limit"));
+  } else if (fit.end == SearchEnd::not_finite) {
+    warnings.push_back(join_text("the search ", end_words(fit.end), " after ", fit.iterations,
+                                 " iterations: the parameters are the best so far; check the units of the recording"));
+  } else if (fit.end != SearchEnd::converged) {
+    warnings.push_back(join_text("the search ", end_words(fit.end), " after ", fit.iterations, " iterations of start ",
+                                 fit.starts, " of ", 1 + options.further_starts,
+                                 ": the parameters are the best so far, not the optimum; raise the limit"));
+  }
+  if (dead_time_is_at_its_limit(fit, options)) {
+    warnings.push_back(join_text("the dead time, ", fit.dead_time_s, " s, lies at the longest that was allowed, ",
+                                 options.longest_dead_time_s,
+                                 " s: the other parameters make up for what it lacks; allow a longer one"));
+  }
+  if (fit.starts > 1 && fit.starts_that_agree < 2) {
+    warnings.push_back(join_text("only ", fit.starts_that_agree, " of ", fit.starts,
+                                 " starts reached the best cost: it may be a local minimum; raise further_starts or "
+                                 "the iteration limit"));
+  }
+  return warnings;
+}
+
+std::vector<std::string> identifiability_warnings(const Recording& recording, const Fit& fit,
+                                                  const IdentificationOptions& options) {
+  std::vector<std::string> warnings;
+  add_constant_duty(recording, warnings);
+  if (fit.starts == 0) return warnings;
+  add_undetermined(recording, fit, options.fits_offset && !recording.position_m.empty(), warnings);
   add_correlated(fit, warnings);
-  add_at_bounds(fit, warnings);
-  add_of_search(fit, recording, warnings);
+  add_at_bounds(fit, options, warnings);
   return warnings;
 }
 

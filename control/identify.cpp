@@ -3,24 +3,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <sstream>
-#include <stdexcept>
+#include <tuple>
 #include <utility>
 
-#include "control/fit_statistics.hpp"
+#include "control/fit_summary.hpp"
 #include "control/identifiability.hpp"
 #include "control/invalid_argument.hpp"
 #include "control/output_error_search.hpp"
+#include "control/residual_doubts.hpp"
+#include "control/second_opinions.hpp"
 
 namespace control {
 namespace {
 
-using Eigen::Index;
-
-constexpr std::size_t kFewestSamples = 20, kMostSamples = 200000;
+constexpr std::size_t kFewestSamples = 20;
 constexpr double kEqualSteps = 0.01;
-constexpr double kSmallestResidualShare = 1e-9;  // of the signal; what is less is rounding and no reason to choose
-constexpr double kWhite = 0.01;
+constexpr double kShortestStepS = 1e-6, kLongestStepS = 1e4;
+constexpr double kLargestDuty = 1e3, kSmallestDuty = 1e-9;
+constexpr double kLargestOutput = 1e50, kSmallestSpread = 1e-50;  // so that squares and their sums are finite
 
 template <typename... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
@@ -42,11 +44,40 @@ void check_output(const char* name, std::span<const double> values, std::size_t 
   if (std::ranges::all_of(values, [&](double value) { return value == values.front(); })) {
     refuse(name, " is ", values.front(), " throughout: record a run in which the robot moves");
   }
+  const auto [least, most] = std::ranges::minmax(values);
+  const double largest = std::abs(least) > most ? least : most;
+  if (std::abs(largest) > kLargestOutput) {
+    refuse(name, " reaches ", largest, ", beyond ", kLargestOutput, ": give it in metres and seconds");
+  }
+  if (!(most - least > kSmallestSpread)) {
+    refuse(name, " varies by ", most - least, " only, below ", kSmallestSpread, ": give it in metres and seconds");
+  }
+}
+
+void check_duty(const std::vector<double>& duty) {
+  check_column("duty", duty, duty.size());
+  double largest = 0;
+  for (std::size_t k = 0; k < duty.size(); ++k) {
+    if (std::abs(duty[k]) > kLargestDuty) {
+      refuse("duty[", k, "] is ", duty[k], ", beyond ", kLargestDuty, ": give it from -1 to 1");
+    }
+    if (k + 1 < duty.size()) largest = std::max(largest, std::abs(duty[k]));
+  }
+  if (largest == 0) {
+    refuse("duty is 0 throughout, which excites nothing: record a run with a step or a changing duty");
+  }
+  if (largest < kSmallestDuty) {
+    refuse("duty is at most ", largest, ", below ", kSmallestDuty, ", which excites nothing: give it from -1 to 1");
+  }
 }
 
 void check(const Recording& recording) {
   const std::size_t samples = recording.duty.size();
-  if (!(recording.dt_s > 0 && std::isfinite(recording.dt_s))) refuse("dt_s must be positive, is ", recording.dt_s);
+  if (!(recording.dt_s > 0)) refuse("dt_s must be positive, is ", recording.dt_s);
+  if (!(recording.dt_s >= kShortestStepS && recording.dt_s <= kLongestStepS)) {
+    refuse("dt_s must be from ", kShortestStepS, " to ", kLongestStepS, ", is ", recording.dt_s,
+           ": give it in seconds");
+  }
   if (samples < kFewestSamples) refuse("duty has ", samples, " samples: record at least ", kFewestSamples);
   if (samples > kMostSamples) {
     refuse("duty has ", samples, " samples, more than ", kMostSamples, ": cut the run or sample it more slowly");
@@ -54,12 +85,9 @@ void check(const Recording& recording) {
   if (recording.position_m.empty() && recording.velocity_m_s.empty()) {
     refuse("position_m and velocity_m_s are both empty: give one of them");
   }
-  check_column("duty", recording.duty, samples);
+  check_duty(recording.duty);
   check_output("position_m", recording.position_m, samples);
   check_output("velocity_m_s", recording.velocity_m_s, samples);
-  if (std::all_of(recording.duty.begin(), recording.duty.end() - 1, [](double duty) { return duty == 0; })) {
-    refuse("duty is 0 throughout, which excites nothing: record a run with a step or a changing duty");
-  }
 }
 
 void check(const IdentificationOptions& options, const Recording& recording) {
@@ -75,86 +103,43 @@ void check(const IdentificationOptions& options, const Recording& recording) {
   }
 }
 
-double akaike(Cost cost, const std::vector<Eigen::VectorXd>& residuals,
-              const std::vector<const std::vector<double>*>& measured, int free_parameters) {
-  double sum = 2.0 * free_parameters;
-  for (std::size_t c = 0; c < residuals.size(); ++c) {
-    const double n = static_cast<double>(residuals[c].size());
-    const Eigen::Map<const Eigen::VectorXd> y(measured[c]->data(), residuals[c].size());
-    const double floor = kSmallestResidualShare * std::sqrt((y.array() - y.mean()).square().mean());
-    const double sd = std::max(floor, residuals[c].norm() / std::sqrt(n));
-    const double mean_size = std::max(floor, residuals[c].lpNorm<1>() / n);
-    sum += 2 * n * std::log(cost == Cost::least_squares ? sd : mean_size);
-  }
-  return sum;
+// The least AIC among those searched, first. The AIC of an unfinished one is an upper bound: so it may win, but where
+// it does not it is not ranked, and stands after the finished ones.
+void put_best_first(std::vector<Fit>& fits) {
+  const auto key = [](const Fit& fit) { return std::pair(fit.aic, fit.free_parameters); };
+  std::ranges::sort(fits, {}, [&](const Fit& fit) { return std::tuple(fit.starts == 0, key(fit)); });
+  std::ranges::sort(fits.begin() + 1, fits.end(), {}, [&](const Fit& fit) {
+    return std::tuple(fit.starts == 0, fit.end != SearchEnd::converged, key(fit));
+  });
 }
 
-void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const std::vector<Eigen::VectorXd>& residuals,
-                     Fit& fit) {
-  const std::vector<int> free = search.free_parameters(fit.structure);
-  std::vector<Eigen::MatrixXd> jacobians = search.jacobians(fit.structure, point);
-  const double channels = static_cast<double>(jacobians.size());
-  Eigen::MatrixXd stacked(jacobians.front().rows() * static_cast<Index>(jacobians.size()),
-                          static_cast<Index>(free.size()));
-  for (std::size_t c = 0; c < jacobians.size(); ++c) {
-    const Index samples = jacobians[c].rows();
-    const double freedom = static_cast<double>(samples) - static_cast<double>(free.size()) / channels;
-    const double sd = std::max(1e-200, residuals[c].norm() / std::sqrt(freedom));
-    stacked.middleRows(static_cast<Index>(c) * samples, samples) = jacobians[c] / sd;
+std::vector<std::string> untried_structures(const std::vector<Fit>& fits) {
+  std::vector<std::string> warnings;
+  for (const Fit& fit : std::span(fits).subspan(1)) {
+    if (fit.end == SearchEnd::converged) continue;
+    const std::string name = structure_name(fit.structure);
+    warnings.push_back(fit.starts == 0
+                           ? join_text("the ", name, " model was not tried, since the search ", end_words(fit.end),
+                                       ": the one given may not be the best of the structures; raise the limit")
+                           : join_text("the search for the ", name, " model ", end_words(fit.end), " after ",
+                                       fit.starts, fit.starts == 1 ? " start" : " starts",
+                                       ": it may be better than it looks, and is not compared; raise the limit"));
   }
-  const Uncertainty found = uncertainty(stacked);
-  const std::array<double, kParameters> unit{fit.model.kp, fit.model.b1, fit.model.b2, 1, 1};
-  for (std::size_t i = 0; i < free.size(); ++i) {
-    const auto row = static_cast<std::size_t>(free[i]);
-    if (free[i] == kOffset) fit.offset_sigma_m = found.one_sigma[i];
-    if (free[i] == kDeadTime) fit.dead_time_sigma_s = found.one_sigma[i];
-    if (row >= kParameters) continue;
-    if (found.one_sigma[i]) fit.one_sigma[row] = *found.one_sigma[i] * unit[row];
-    for (std::size_t j = 0; j < free.size(); ++j) {
-      const auto column = static_cast<std::size_t>(free[j]);
-      if (column >= kParameters) continue;
-      fit.correlation[row][column] = found.correlation(static_cast<Index>(i), static_cast<Index>(j));
-    }
-  }
+  return warnings;
 }
 
-void add_quality(const Eigen::VectorXd& residual, const std::vector<double>& measured, Fit& fit) {
-  const Eigen::Map<const Eigen::VectorXd> y(measured.data(), residual.size());
-  fit.fit_percent = 100 * (1 - residual.norm() / (y.array() - y.mean()).matrix().norm());
-  fit.residual_sd = residual.norm() / std::sqrt(static_cast<double>(residual.size()));
-  fit.whiteness_p_value = whiteness_p_value(residual);
-  fit.residuals_are_white = fit.whiteness_p_value >= kWhite;
-}
-
-Fit fit_structure(OutputErrorSearch& search, const Recording& recording, const IdentificationOptions& options,
-                  Structure structure) {
-  const SearchResult found = search.run(structure);
-  Fit fit;
-  fit.structure = structure;
-  fit.model = found.point.model;
-  fit.offset_m = found.point.offset_m;
-  fit.dead_time_s = found.point.dead_time_s;
-  fit.end = found.end;
-  fit.iterations = found.iterations;
-  fit.starts = found.starts;
-  fit.starts_that_agree = found.starts_that_agree;
-  fit.free_parameters = static_cast<int>(search.free_parameters(structure).size());
-
-  const std::vector<Eigen::VectorXd> residuals = search.residuals(found.point);
-  std::vector<const std::vector<double>*> measured;
-  const std::vector<Channel> channels = search.channels();
-  for (std::size_t c = 0; c < residuals.size(); ++c) {
-    const bool is_position = channels[c] == Channel::position;
-    measured.push_back(is_position ? &recording.position_m : &recording.velocity_m_s);
-    auto& kept = is_position ? fit.position_residual_m : fit.velocity_residual_m_s;
-    kept.assign(residuals[c].begin(), residuals[c].end());
-    fit.sse += residuals[c].squaredNorm();
-    fit.absolute_error += residuals[c].lpNorm<1>() * recording.dt_s;
+// Only finished searches can say that something is not needed.
+void add_verdict(const std::vector<Fit>& fits, std::vector<std::string>& warnings) {
+  const Fit& best = fits.front();
+  for (const Fit& fit : std::span(fits).subspan(1)) {
+    if (fit.structure != Structure::fractional || fit.end != SearchEnd::converged) continue;
+    std::ostringstream text;
+    text.precision(3);
+    text << "this run does not call for fractional orders: the AIC of the " << structure_name(best.structure)
+         << " model is lower by " << fit.aic - best.aic
+         << "; a duty that changes faster, less noise or a longer run would tell them apart if they are there";
+    warnings.push_back(text.str());
   }
-  add_quality(residuals.front(), *measured.front(), fit);
-  fit.aic = akaike(options.cost, residuals, measured, fit.free_parameters);
-  add_uncertainty(search, found.point, residuals, fit);
-  return fit;
 }
 
 }  // namespace
@@ -191,22 +176,21 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   if (options.structure) structures = {*options.structure};
 
   Identification result;
+  int left = static_cast<int>(structures.size());
   for (const Structure structure : structures) {
-    result.compared.push_back(fit_structure(search, recording, options, structure));
-    if (result.compared.back().end == SearchEnd::cancelled) break;
+    const SearchResult found = search.run(structure, left--);
+    result.compared.push_back(summary(search, recording, options.cost, structure, found));
   }
-  std::ranges::sort(result.compared, {}, [](const Fit& fit) { return std::pair(fit.aic, fit.free_parameters); });
+  put_best_first(result.compared);
   result.best = result.compared.front();
-  result.warnings = identifiability_warnings(recording, result.best, options.fits_offset);
-  for (const Fit& fit : result.compared) {
-    if (fit.structure != Structure::fractional || result.best.structure == Structure::fractional) continue;
-    std::ostringstream text;
-    text.precision(3);
-    text << "this run does not call for fractional orders: the AIC of the " << structure_name(result.best.structure)
-         << " model is lower by " << fit.aic - result.best.aic
-         << "; a duty that changes faster, less noise or a longer run would tell them apart if they are there";
-    result.warnings.push_back(text.str());
-  }
+  std::vector<std::string>& warnings = result.warnings;
+  const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings)); };
+  add(search_doubts(result.best, options));  // causes first, then what follows from them
+  add(untried_structures(result.compared));
+  add(second_opinions(search, recording, options, result.best));
+  add(residual_doubts(recording, options, result.best));
+  add(identifiability_warnings(recording, result.best, options));
+  add_verdict(result.compared, warnings);
   return result;
 }
 

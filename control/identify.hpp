@@ -4,12 +4,17 @@
 //   least squares: Σ (y - model)²/σ_channel²                            (2)   output error
 //   absolute error: Σ |y - model|                                       (3)   [birs2021] (21), read literally
 //   0 < kp, b1, b2;  1 < α < 2;  0 < β < 1                              (4)   [birs2021] 3.2
-//   covariance = σ² (JᵀJ)⁻¹ at the optimum                              (5)   Cramér-Rao: what no estimator can beat
+//   covariance = σ² (JᵀJ)⁻¹ at the optimum of (2)                       (5)   Cramér-Rao: what no estimator can beat
+//   covariance = τ² (JᵀJ)⁻¹ at the optimum of (3), τ = 1/(2 f(0))       (6)   [koenker-bassett]; f: density of
+//   residuals
 //
 // Structures: fractional (20); second_order, (19) with α = 2, β = 1; first_order, b1 = 0, β = 1. One is chosen by AIC.
 // The search starts from the Newtonian model (28), as the paper does, and from further points against local minima.
+// The simplest structure is searched first; each may use an equal part of the time that is left, so what the simple
+// ones leave is the fractional one's. The AIC of a search that was cut off is only an upper bound: such a fit can be
+// the best, but is not taken to be worse than another, and a warning names it.
 // Errors: throws std::invalid_argument quoting the bad value for data that cannot be used. Not having converged, having
-// been cancelled or having run out of time is a field of the result.
+// been cancelled, having run out of time or of finite numbers is a field of the result.
 #pragma once
 
 #include <array>
@@ -40,7 +45,9 @@ Recording make_recording(std::span<const double> time_s, std::span<const double>
                          std::span<const double> position_m, std::span<const double> velocity_m_s);
 
 enum class Cost { least_squares, absolute_error };
-enum class SearchEnd { converged, iteration_limit, time_limit, cancelled };
+enum class SearchEnd { converged, iteration_limit, time_limit, cancelled, not_finite };
+
+inline constexpr std::size_t kMostSamples = 200000;  // of a recording and of a planned experiment
 
 struct Progress {
   Structure structure = Structure::fractional;
@@ -52,7 +59,7 @@ struct Progress {
 struct IdentificationOptions {
   std::optional<Structure> structure;  // none: all three, best by AIC
   Cost cost = Cost::least_squares;
-  bool fits_offset = false;                          // unknown initial position
+  bool fits_offset = true;                           // the initial position is unknown, where position is recorded
   double longest_dead_time_s = 0;                    // 0: no dead time; else it is found in [0, this]
   int further_starts = 4;                            // beside the paper's
   int iteration_limit = 200;                         // per start
@@ -75,19 +82,20 @@ struct Fit {
   double absolute_error = 0;  // (3) as an integral over time
   double fit_percent = 0;     // 100 (1 - |y - model|/|y - mean y|), of position if recorded, else of velocity
   double residual_sd = 0;     // of the same channel
-  double aic =
-      0;  // Σ_channels n ln(sse/n) + 2 free_parameters; for the absolute error 2 n ln(Σ|r|/n) + 2 free_parameters
+  double aic = 0;             // Σ_channels n ln(sse/n) + 2 free_parameters; absolute error: 2 n ln(Σ|r|/n) for the sum
   int free_parameters = 0;  // of the model, and offset and dead time if they are fitted; the noise's sd is not counted
   bool residuals_are_white = false;
-  double whiteness_p_value = 0;  // Ljung-Box; white means at least 0.01
+  double whiteness_p_value = 0;  // Ljung-Box, the smallest of the channels; white means at least 0.01
+  std::optional<double> position_whiteness_p_value, velocity_whiteness_p_value;
   SearchEnd end = SearchEnd::converged;
-  int iterations = 0, starts = 0, starts_that_agree = 0;  // iterations: of the best start; agree: with the best cost
+  // iterations: of the best start; starts: made, 0 if the structure was never searched; agree: with the best cost
+  int iterations = 0, starts = 0, starts_that_agree = 0;
   std::vector<double> position_residual_m, velocity_residual_m_s;  // measured less model, empty if not recorded
 };
 
 struct Identification {
   Fit best;
-  std::vector<Fit> compared;          // one per structure tried, best AIC first: the table
+  std::vector<Fit> compared;          // one per structure: the best, then by AIC; unfinished and untried ones last
   std::vector<std::string> warnings;  // in words, with numbers and what to do
 };
 

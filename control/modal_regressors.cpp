@@ -167,24 +167,24 @@ void ModalRegressors::expand_slow_rates() {
   }
 }
 
-Eigen::MatrixXd ModalRegressors::responses(const DelayedDuty& duty) const {
-  Eigen::MatrixXd result = stepped(duty, 0);
+Eigen::MatrixXd ModalRegressors::responses(const DelayedDuty& duty, const Stop& stop) const {
+  Eigen::MatrixXd result = stepped(duty, 0, stop);
   result.rightCols(kIntegrals) = duty.integral;
   return result;
 }
 
-Eigen::MatrixXd ModalRegressors::response_slopes(const DelayedDuty& duty) const {
-  Eigen::MatrixXd result = stepped(duty, 1);
+Eigen::MatrixXd ModalRegressors::response_slopes(const DelayedDuty& duty, const Stop& stop) const {
+  Eigen::MatrixXd result = stepped(duty, 1, stop);
   result.col(result.cols() - kIntegrals).setZero();
   result.rightCols(kIntegrals - 1) = duty.integral.leftCols(kIntegrals - 1);
   return result;
 }
 
 // All columns but those of the integrals.
-Eigen::MatrixXd ModalRegressors::stepped(const DelayedDuty& duty, int derivative) const {
+Eigen::MatrixXd ModalRegressors::stepped(const DelayedDuty& duty, int derivative, const Stop& stop) const {
   const Index count = static_cast<Index>(columns_.size());
-  Eigen::MatrixXd result(duty.integral.rows(), count + kIntegrals);
-  for (Index j = 0; j < count; ++j) {
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(duty.integral.rows(), count + kIntegrals);
+  for (Index j = 0; j < count && !(stop && stop()); ++j) {
     const auto [s, is_imaginary] = columns_[static_cast<std::size_t>(j)];
     const Complex turn = is_imaginary ? Complex{0, -1} : Complex{1, 0};  // so that the real part is what is wanted
     const Complex scale = channel_ == Channel::velocity ? turn : turn / s;

@@ -17,12 +17,16 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "control/transfer_function.hpp"
 
 namespace control {
+
+// Asked between the columns of long records; what is computed after it said true is of no use.
+using Stop = std::function<bool()>;
 
 enum class Channel { position, velocity };
 
@@ -52,8 +56,9 @@ class ModalRegressors {
   double log_step() const { return log_step_; }  // δ
   const Eigen::MatrixXd& expansion() const { return expansion_; }
 
-  Eigen::MatrixXd responses(const DelayedDuty& duty) const;
-  Eigen::MatrixXd response_slopes(const DelayedDuty& duty) const;  // their derivatives with respect to time
+  Eigen::MatrixXd responses(const DelayedDuty& duty, const Stop& stop = {}) const;
+  Eigen::MatrixXd response_slopes(const DelayedDuty& duty,
+                                  const Stop& stop = {}) const;  // their derivatives with respect to time
 
  private:
   struct Column {
@@ -61,7 +66,7 @@ class ModalRegressors {
     bool is_imaginary;
   };
 
-  Eigen::MatrixXd stepped(const DelayedDuty& duty, int derivative) const;
+  Eigen::MatrixXd stepped(const DelayedDuty& duty, int derivative, const Stop& stop) const;
   Complex rate(Eigen::Index i) const { return std::exp(log_rate_[static_cast<std::size_t>(i)]); }
   void lay_rates(double longest_s, double shortest_s, double tolerance);
   void choose_columns(double longest_s, double shortest_s);

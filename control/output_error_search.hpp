@@ -2,20 +2,22 @@
 //
 //   minimise Σ_channels Σ_k (y_k - output_k(q) - offset)²/σ²_channel            (1)   σ: re-estimated, for two channels
 //   minimise Σ_channels Σ_k |y_k - output_k(q) - offset|/σ_channel              (2)   reweighted least squares on (1)
-//   q = ln kp, ln b1, ln b2, ln((α - 1)/(2 - α)), ln(β/(1 - β)), offset, ln(τ/(longest - τ))         (3)   no bounds
-//   left
+//   q = ln kp, ln b1, ln b2, ln((α - 1)/(2 - α)), ln(β/(1 - β)), offset, ln(τ/(longest - τ))         (3)   unbounded
 //
 // Eigen's Levenberg-Marquardt (MINPACK's lmder) with the exact Jacobian. Every start's gain is the best for its other
 // parameters, which are the Newtonian model's for the first: so the units of the output do not matter.
+// The dead time's start is scanned for on a short piece of the record. The limits are asked for between all steps, and
+// inside those that are long; a start that was cut off before its first iteration does not count.
 // Errors: none thrown; how a search ended is in the result.
 #pragma once
 
 #include <Eigen/Core>
-#include <chrono>
+#include <memory>
 #include <vector>
 
 #include "control/identify.hpp"
 #include "control/output_model.hpp"
+#include "control/search_limit.hpp"
 
 namespace control {
 
@@ -35,12 +37,19 @@ enum FreeParameter : int { kOffset = kParameters, kDeadTime };
 
 class OutputErrorSearch {
  public:
-  OutputErrorSearch(const Recording& recording, const IdentificationOptions& options);
+  OutputErrorSearch(const Recording& recording, const IdentificationOptions& options,
+                    SearchLimit::Clock clock = steady_now_s);
 
-  SearchResult run(Structure structure);
+  // Within one of parts equal shares of the time that is left. With no time at all the result is the paper's start.
+  SearchResult run(Structure structure, int parts = 1);
 
+  SearchPoint start(Structure structure, int index) const;
+  // The best gain, and offset if it is fitted; false, with a positive stand-in, if the best gain is not positive.
+  bool fit_gain(SearchPoint& point);
   std::vector<int> free_parameters(Structure structure) const;
   std::vector<Channel> channels() const;
+  const SearchLimit& limit() const { return limit_; }
+  long outputs_computed() const { return outputs_computed_; }  // of one channel each
   // One per channel, measured less output, in its own unit.
   std::vector<Eigen::VectorXd> residuals(const SearchPoint& point);
   // Of the outputs with respect to ln kp, ln b1, ln b2, alpha, beta, offset, dead time, as far as they are free.
@@ -56,9 +65,9 @@ class OutputErrorSearch {
   };
   struct Descent;  // what Eigen's solver calls
 
-  SearchPoint start(Structure structure, int index) const;
-  void fit_gain(SearchPoint& point);
+  void run_starts(Structure structure, SearchResult& result);
   void fit_dead_time(SearchPoint& point);
+  void make_scan(const Recording& recording);
   SearchEnd descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress);
   void refine_channel_weights(Structure structure, SearchResult& result);
   void refine_absolute_error(Structure structure, SearchResult& result);
@@ -67,15 +76,18 @@ class OutputErrorSearch {
   Eigen::VectorXd coordinates(Structure structure, const SearchPoint& point) const;  // (3)
   SearchPoint point_at(Structure structure, const Eigen::VectorXd& x) const;
   Eigen::VectorXd coordinate_slopes(Structure structure, const SearchPoint& point) const;
-  bool is_late() const { return std::chrono::steady_clock::now() >= deadline_; }
 
   IdentificationOptions options_;
   double dt_s_;
   Eigen::Index samples_;
   double offset_scale_m_ = 1;
   int last_iterations_ = 0;
-  std::chrono::steady_clock::time_point deadline_;
+  double last_cost_ = 0;  // of the last descent, by its own weights
+  long outputs_computed_ = 0;
+  SearchLimit limit_;
+  Stop stop_;  // asks the limit while a search runs; empty else, so that what was found can be looked at
   std::vector<Measured> measured_;
+  std::unique_ptr<OutputErrorSearch> scan_;  // of a short piece, for the dead time; none if the record is short
 };
 
 }  // namespace control

@@ -2,6 +2,7 @@
 #include "control/output_model.hpp"
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -37,11 +38,14 @@ OutputModel::OutputModel(Channel channel, double dt_s, std::vector<double> duty,
       delayed_(delayed(duty_, dt_s, 0)),
       responses_(regressors_.responses(delayed_)) {}
 
-void OutputModel::set_delay(double delay_s) {
-  if (delay_s == delay_s_) return;
-  delay_s_ = delay_s;
+bool OutputModel::set_delay(double delay_s, const Stop& stop) {
+  if (delay_s == delay_s_) return true;
+  delay_s_ = std::numeric_limits<double>::quiet_NaN();  // equals none, if this is not brought to its end
   delayed_ = delayed(duty_, dt_s_, delay_s);
-  responses_ = regressors_.responses(delayed_);
+  responses_ = regressors_.responses(delayed_, stop);
+  if (stop && stop()) return false;
+  delay_s_ = delay_s;
+  return true;
 }
 
 // None if it lies in the sector that the ray takes care of, or has decayed before the first sample.
@@ -152,9 +156,10 @@ Eigen::MatrixXd OutputModel::jacobian(const FractionalModel& model) const {
   return result;
 }
 
-Eigen::VectorXd OutputModel::slope(const FractionalModel& model) const {
+Eigen::VectorXd OutputModel::slope(const FractionalModel& model, const Stop& stop) const {
   const std::optional<PolePair> pair = explicit_pole(model);
-  Eigen::VectorXd result = regressors_.response_slopes(delayed_) * (regressors_.expansion() * weights(model, pair));
+  Eigen::VectorXd result =
+      regressors_.response_slopes(delayed_, stop) * (regressors_.expansion() * weights(model, pair));
   if (!pair) return result;
   const Eigen::VectorXcd exponential = exponential_response(delayed_, pair->pole);
   const Complex gain = 2.0 * pair->residue / pair->pole;

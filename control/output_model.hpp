@@ -24,11 +24,13 @@ class OutputModel {
   OutputModel(Channel channel, double dt_s, std::vector<double> duty, double longest_dead_time_s, double tolerance);
 
   Eigen::Index samples() const { return static_cast<Eigen::Index>(duty_.size()); }
-  void set_delay(double delay_s);
+  // False if stop said so on the way: then the output is of no use until a delay is set to the end.
+  bool set_delay(double delay_s, const Stop& stop = {});
 
   Eigen::VectorXd output(const FractionalModel& model) const;
   Eigen::MatrixXd jacobian(const FractionalModel& model) const;
-  Eigen::VectorXd slope(const FractionalModel& model) const;  // derivative with respect to time
+  // Derivative with respect to time; of no use if stop said so on the way.
+  Eigen::VectorXd slope(const FractionalModel& model, const Stop& stop = {}) const;
 
  private:
   struct PolePair {

@@ -14,17 +14,21 @@ namespace {
 using Eigen::Index;
 
 constexpr double kModelTolerance = 1e-9;
-constexpr double kMostSamples = 400000;
+constexpr double kLargestDuty = 1e3;
 
 [[noreturn]] void refuse(const char* what, double value) { throw_invalid("planned experiment: ", what, ' ', value); }
 
 void check(const PlannedExperiment& experiment) {
-  if (!(experiment.dt_s > 0 && std::isfinite(experiment.dt_s))) refuse("dt_s must be positive, is", experiment.dt_s);
+  if (!(experiment.dt_s >= 1e-6 && experiment.dt_s <= 1e4))
+    refuse("dt_s must be from 1e-6 to 1e4, is", experiment.dt_s);
   if (experiment.duty.size() < 20) {
     refuse("duty must have at least 20 samples, has", static_cast<double>(experiment.duty.size()));
   }
   for (const double duty : experiment.duty) {
-    if (!std::isfinite(duty)) refuse("duty must be finite, has", duty);
+    if (!(std::abs(duty) <= kLargestDuty)) refuse("duty must be finite and at most 1000 in size, has", duty);
+  }
+  if (experiment.duty.size() > kMostSamples) {
+    refuse("duty must have at most 200000 samples, has", static_cast<double>(experiment.duty.size()));
   }
   if (std::ranges::all_of(experiment.duty, [](double duty) { return duty == 0; })) {
     refuse("duty must not be zero throughout, which moves nothing; its first value is", experiment.duty.front());
@@ -43,10 +47,14 @@ std::vector<Index> free_parameters(const FractionalModel& model) {
   return {0, 1, 2, 3, 4};
 }
 
+void check_amplitude(double amplitude) {
+  if (!(std::abs(amplitude) <= kLargestDuty)) refuse("amplitude must be finite and at most 1000, is", amplitude);
+}
+
 Index sample_count(double duration_s, double dt_s) {
   if (!(dt_s > 0 && std::isfinite(dt_s))) refuse("dt_s must be positive, is", dt_s);
-  if (!(duration_s >= dt_s && duration_s / dt_s <= kMostSamples)) {
-    refuse("duration_s must be between 1 and 400000 steps, is", duration_s);
+  if (!(duration_s >= dt_s && std::round(duration_s / dt_s) < static_cast<double>(kMostSamples))) {
+    refuse("duration_s must be between 1 and 199999 steps, is", duration_s);
   }
   return 1 + static_cast<Index>(std::lround(duration_s / dt_s));
 }
@@ -89,11 +97,13 @@ ExpectedUncertainty expected_uncertainty(const FractionalModel& given, const Pla
 }
 
 std::vector<double> step_duty(double amplitude, double duration_s, double dt_s) {
+  check_amplitude(amplitude);
   return std::vector<double>(static_cast<std::size_t>(sample_count(duration_s, dt_s)), amplitude);
 }
 
 // The bits of a 16-bit shift register with taps 16, 14, 13, 11, which repeat after 65535.
 std::vector<double> prbs_duty(double amplitude, double bit_s, double duration_s, double dt_s) {
+  check_amplitude(amplitude);
   if (!(bit_s >= dt_s)) refuse("bit_s must be at least dt_s, is", bit_s);
   const auto count = static_cast<std::size_t>(sample_count(duration_s, dt_s));
   std::vector<double> duty(count);

@@ -46,6 +46,7 @@ const char* text(control::SearchEnd value) {
     case control::SearchEnd::iteration_limit: return "iteration_limit";
     case control::SearchEnd::time_limit: return "time_limit";
     case control::SearchEnd::cancelled: return "cancelled";
+    case control::SearchEnd::not_finite: return "not_finite";
   }
   return "unknown";
 }
@@ -70,6 +71,8 @@ OrderedJson json_of(const control::Fit& fit) {
           {"free_parameters", fit.free_parameters},
           {"residuals_are_white", fit.residuals_are_white},
           {"whiteness_p_value", fit.whiteness_p_value},
+          {"position_whiteness_p_value", or_null(fit.position_whiteness_p_value)},
+          {"velocity_whiteness_p_value", or_null(fit.velocity_whiteness_p_value)},
           {"correlation_of", control::kParameterNames},
           {"correlation", fit.correlation},
           {"end", text(fit.end)},

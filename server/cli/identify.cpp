@@ -50,7 +50,8 @@ void add_search(CLI::App& command, control::IdentificationOptions& options) {
       ->transform(CLI::CheckedTransformer(std::map<std::string, Cost>{{"least_squares", Cost::least_squares},
                                                                       {"absolute_error", Cost::absolute_error}})
                       .description(""));
-  command.add_flag("--offset", options.fits_offset, "Fit the initial position too");
+  command.add_flag("--offset,!--no-offset", options.fits_offset,
+                   "Whether the initial position is fitted too (default: it is, where position is recorded)");
   command.add_option("--dead-time-s", options.longest_dead_time_s, "Find a dead time up to this (default: 0, none)")
       ->check(CLI::NonNegativeNumber);
   command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 60)")->check(CLI::PositiveNumber);

@@ -17,6 +17,15 @@ namespace {
 using testing::Contains;
 using testing::HasSubstr;
 
+// As the reference was made.
+IdentificationOptions reference_options() {
+  IdentificationOptions options;
+  options.structure = Structure::fractional;
+  options.further_starts = 0;
+  options.fits_offset = false;
+  return options;
+}
+
 IdentificationOptions one_start(Structure structure = Structure::fractional) {
   IdentificationOptions options;
   options.structure = structure;
@@ -54,7 +63,7 @@ struct Reference : testing::Test {
 
 TEST_F(Reference, OptimumIsReachedFromTheNewtonianModelAlone) {
   for (std::size_t set = 0; set < 3; ++set) {
-    const Fit fit = identify(recording(set), one_start()).best;
+    const Fit fit = identify(recording(set), reference_options()).best;
     const auto& expected = file["datasets"][set]["scipy_fit"];
     EXPECT_LE(fit.sse, expected["sse"].get<double>() * (1 + 1e-4)) << set;
     EXPECT_EQ(fit.end, SearchEnd::converged);
@@ -66,7 +75,7 @@ TEST_F(Reference, OptimumIsReachedFromTheNewtonianModelAlone) {
 
 TEST_F(Reference, UncertaintyIsTheReferenceOne) {
   for (std::size_t set = 0; set < 3; ++set) {
-    const Identification found = identify(recording(set), one_start());
+    const Identification found = identify(recording(set), reference_options());
     const Fit& fit = found.best;
     const auto& expected = file["datasets"][set]["one_sigma"];
     EXPECT_NEAR(*fit.one_sigma[0] / fit.model.kp / expected["ln_kp"].get<double>(), 1, 0.02) << set;
@@ -131,9 +140,7 @@ TEST(Identify, TakesAnyDutyAndBothChannels) {
 TEST(Identify, FindsTheOffset) {
   Recording recording = position_run(kNonNewtonianModel, prbs_duty(1, 0.2, 5, 0.01), 0, 1);
   for (double& x : recording.position_m) x += 0.25;
-  IdentificationOptions options = one_start();
-  options.fits_offset = true;
-  const Fit fit = identify(recording, options).best;
+  const Fit fit = identify(recording, one_start()).best;
   EXPECT_NEAR(fit.offset_m, 0.25, 1e-9);
   EXPECT_EQ(fit.free_parameters, 6);
   expect_model(fit.model, kNonNewtonianModel, 1e-7);
@@ -213,8 +220,10 @@ TEST(Identify, EndsWhenToldTo) {
   EXPECT_THAT(cancelled.warnings, Contains(HasSubstr("was cancelled")));
 
   options = {};
-  options.time_limit_s = 1e-6;
-  EXPECT_EQ(identify(recording, options).best.end, SearchEnd::time_limit);
+  options.time_limit_s = 1e-9;
+  const Identification untried = identify(recording, options);
+  EXPECT_EQ(untried.best.end, SearchEnd::time_limit);
+  EXPECT_THAT(untried.warnings, Contains(HasSubstr("before its first iteration")));
 
   options = one_start();
   options.iteration_limit = 2;
@@ -229,7 +238,7 @@ TEST(Identify, WarnsOfWhatItCannotTell) {
   for (std::size_t k = 0; k < recording.position_m.size(); ++k) {
     recording.position_m[k] += 1e-3 * std::sin(0.3 * static_cast<double>(k));
   }
-  EXPECT_THAT(identify(recording, one_start()).warnings, Contains(HasSubstr("residuals are not white")));
+  EXPECT_THAT(identify(recording, one_start()).warnings, Contains(HasSubstr("residuals of position_m are not white")));
   const Recording lag = position_run({0.1, 0, 0.2, 1, 2, 1}, std::vector<double>(301, 0.3), 1e-4, 2);
   const std::vector<std::string> warnings = identify(lag, one_start()).warnings;
   EXPECT_THAT(warnings, Contains(HasSubstr("the duty is 0.3 throughout")));
@@ -255,6 +264,14 @@ TEST(Identify, RefusesWhatItCannotUse) {
   IdentificationOptions options;
   options.longest_dead_time_s = 2;
   EXPECT_THAT(refusal(good, options), HasSubstr("longest_dead_time_s"));
+  EXPECT_THAT(changed([](Recording& r) { r.dt_s = 1e-9; }), HasSubstr("dt_s must be from 1e-06 to 10000, is 1e-09"));
+  EXPECT_THAT(changed([](Recording& r) { r.duty[3] = 2e4; }), HasSubstr("duty[3] is 20000, beyond 1000"));
+  EXPECT_THAT(changed([](Recording& r) { r.duty.assign(101, 1e-12); }), HasSubstr("duty is at most 1e-12"));
+  EXPECT_THAT(changed([](Recording& r) { r.position_m[3] = -1e200; }), HasSubstr("position_m reaches -1e+200"));
+  EXPECT_THAT(changed([](Recording& r) {
+                for (double& x : r.position_m) x *= 1e-100;
+              }),
+              HasSubstr("position_m varies by"));
 }
 
 TEST(MakeRecording, RefusesUnequalSteps) {
@@ -281,6 +298,8 @@ TEST(ExpectedUncertainty, IsThatOfTheReferencePlans) {
   EXPECT_FALSE(integer.one_sigma[3]);
   EXPECT_THROW(expected_uncertainty(model, {0.01, std::vector<double>(100, 0.0), 1e-3, 0, false}),
                std::invalid_argument);
+  EXPECT_THROW(expected_uncertainty(model, {0.01, std::vector<double>(kMostSamples + 1, 0.3), 1e-3, 0, false}),
+               std::invalid_argument);
 }
 
 TEST(Duties, HaveTheirShape) {
@@ -294,6 +313,10 @@ TEST(Duties, HaveTheirShape) {
     ups += duty[k] > 0 ? 1 : 0;
   }
   EXPECT_NEAR(ups, 3000, 500);
+  EXPECT_THROW(prbs_duty(std::nan(""), 0.2, 60, 0.01), std::invalid_argument);
+  EXPECT_THROW(step_duty(std::nan(""), 60, 0.01), std::invalid_argument);
+  EXPECT_EQ(step_duty(1, 1999.99, 0.01).size(), kMostSamples);
+  EXPECT_THROW(step_duty(1, 2000, 0.01), std::invalid_argument);
 }
 
 }  // namespace

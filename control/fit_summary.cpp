@@ -1,0 +1,112 @@
+// Residuals, AIC and uncertainty of a point that a search ended at.
+#include "control/fit_summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "control/fit_statistics.hpp"
+
+namespace control {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kSmallestResidualShare = 1e-9;  // of the signal; what is less is rounding and no reason to choose
+constexpr double kWhite = 0.01;
+
+double akaike(Cost cost, const std::vector<Eigen::VectorXd>& residuals,
+              const std::vector<const std::vector<double>*>& measured, int free_parameters) {
+  double sum = 2.0 * free_parameters;
+  for (std::size_t c = 0; c < residuals.size(); ++c) {
+    const double n = static_cast<double>(residuals[c].size());
+    const Eigen::Map<const Eigen::VectorXd> y(measured[c]->data(), residuals[c].size());
+    const double floor = kSmallestResidualShare * std::sqrt((y.array() - y.mean()).square().mean());
+    const double sd = std::max(floor, residuals[c].norm() / std::sqrt(n));
+    const double mean_size = std::max(floor, residuals[c].lpNorm<1>() / n);
+    sum += 2 * n * std::log(cost == Cost::least_squares ? sd : mean_size);
+  }
+  return sum;
+}
+
+void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const std::vector<Eigen::VectorXd>& residuals,
+                     Cost cost, Fit& fit) {
+  const std::vector<int> free = search.free_parameters(fit.structure);
+  std::vector<Eigen::MatrixXd> jacobians = search.jacobians(fit.structure, point);
+  const double channels = static_cast<double>(jacobians.size());
+  Eigen::MatrixXd stacked(jacobians.front().rows() * static_cast<Index>(jacobians.size()),
+                          static_cast<Index>(free.size()));
+  for (std::size_t c = 0; c < jacobians.size(); ++c) {
+    const Index samples = jacobians[c].rows();
+    const double freedom = static_cast<double>(samples) - static_cast<double>(free.size()) / channels;
+    const double scale = cost == Cost::least_squares
+                             ? residuals[c].norm() / std::sqrt(freedom)
+                             : absolute_error_scale(residuals[c], static_cast<int>(free.size()));
+    const double sd = std::max(1e-200, scale);
+    stacked.middleRows(static_cast<Index>(c) * samples, samples) = jacobians[c] / sd;
+  }
+  const Uncertainty found = uncertainty(stacked);
+  const std::array<double, kParameters> unit{fit.model.kp, fit.model.b1, fit.model.b2, 1, 1};
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    const auto row = static_cast<std::size_t>(free[i]);
+    if (free[i] == kOffset) fit.offset_sigma_m = found.one_sigma[i];
+    if (free[i] == kDeadTime) fit.dead_time_sigma_s = found.one_sigma[i];
+    if (row >= kParameters) continue;
+    if (found.one_sigma[i]) fit.one_sigma[row] = *found.one_sigma[i] * unit[row];
+    for (std::size_t j = 0; j < free.size(); ++j) {
+      const auto column = static_cast<std::size_t>(free[j]);
+      if (column >= kParameters) continue;
+      fit.correlation[row][column] = found.correlation(static_cast<Index>(i), static_cast<Index>(j));
+    }
+  }
+}
+
+void add_quality(const Eigen::VectorXd& residual, const std::vector<double>& measured, Fit& fit) {
+  const Eigen::Map<const Eigen::VectorXd> y(measured.data(), residual.size());
+  fit.fit_percent = 100 * (1 - residual.norm() / (y.array() - y.mean()).matrix().norm());
+  fit.residual_sd = residual.norm() / std::sqrt(static_cast<double>(residual.size()));
+}
+
+void add_whiteness(const std::vector<Channel>& channels, const std::vector<Eigen::VectorXd>& residuals, Fit& fit) {
+  fit.whiteness_p_value = 1;
+  for (std::size_t c = 0; c < residuals.size(); ++c) {
+    const double p = whiteness_p_value(residuals[c]);
+    (channels[c] == Channel::position ? fit.position_whiteness_p_value : fit.velocity_whiteness_p_value) = p;
+    fit.whiteness_p_value = std::min(fit.whiteness_p_value, p);
+  }
+  fit.residuals_are_white = fit.whiteness_p_value >= kWhite;
+}
+
+}  // namespace
+
+Fit summary(OutputErrorSearch& search, const Recording& recording, Cost cost, Structure structure,
+            const SearchResult& found) {
+  Fit fit;
+  fit.structure = structure;
+  fit.model = found.point.model;
+  fit.offset_m = found.point.offset_m;
+  fit.dead_time_s = found.point.dead_time_s;
+  fit.end = found.end;
+  fit.iterations = found.iterations;
+  fit.starts = found.starts;
+  fit.starts_that_agree = found.starts_that_agree;
+  fit.free_parameters = static_cast<int>(search.free_parameters(structure).size());
+
+  const std::vector<Eigen::VectorXd> residuals = search.residuals(found.point);
+  std::vector<const std::vector<double>*> measured;
+  const std::vector<Channel> channels = search.channels();
+  for (std::size_t c = 0; c < residuals.size(); ++c) {
+    const bool is_position = channels[c] == Channel::position;
+    measured.push_back(is_position ? &recording.position_m : &recording.velocity_m_s);
+    auto& kept = is_position ? fit.position_residual_m : fit.velocity_residual_m_s;
+    kept.assign(residuals[c].begin(), residuals[c].end());
+    fit.sse += residuals[c].squaredNorm();
+    fit.absolute_error += residuals[c].lpNorm<1>() * recording.dt_s;
+  }
+  add_quality(residuals.front(), *measured.front(), fit);
+  add_whiteness(channels, residuals, fit);
+  fit.aic = akaike(cost, residuals, measured, fit.free_parameters);
+  if (found.starts > 0) add_uncertainty(search, found.point, residuals, cost, fit);
+  return fit;
+}
+
+}  // namespace control

@@ -1,0 +1,165 @@
+// What is wrong with a run is said, in the words of its cause, and not said where nothing is wrong.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "control/fit_statistics.hpp"
+#include "control/identify.hpp"
+#include "recorded_runs.hpp"
+
+namespace control {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+const FractionalModel kLag{0.1, 0, 0.2, 1, 2, 1};
+
+IdentificationOptions one_start(Structure structure) {
+  IdentificationOptions options;
+  options.structure = structure;
+  options.further_starts = 0;
+  return options;
+}
+
+Recording lag_run(double sd_m = 1e-4, std::size_t samples = 401) {
+  std::vector<double> duty = prbs_duty(1, 0.2, 0.01 * static_cast<double>(samples - 1), 0.01);
+  return position_run(kLag, duty, sd_m, 4);
+}
+
+Recording two_channel_run() {
+  Recording run = lag_run();
+  run.velocity_m_s = output_of(kLag, Channel::velocity, 0.01, run.duty);
+  add_noise(run.velocity_m_s, 1e-3, 8);
+  return run;
+}
+
+std::vector<std::string> warnings_of(const Recording& run,
+                                     const IdentificationOptions& options = one_start(Structure::first_order)) {
+  return identify(run, options).warnings;
+}
+
+TEST(IdentifyDoubts, AreNoneForACleanRun) {
+  EXPECT_THAT(warnings_of(lag_run()), IsEmpty());
+  EXPECT_THAT(warnings_of(two_channel_run()), IsEmpty());
+  IdentificationOptions options = one_start(Structure::first_order);
+  options.fits_offset = false;
+  EXPECT_THAT(warnings_of(lag_run(), options), IsEmpty());
+  options.cost = Cost::absolute_error;
+  EXPECT_THAT(warnings_of(lag_run(), options), IsEmpty());
+}
+
+TEST(IdentifyDoubts, AnUnknownOffsetIsFittedByDefaultAndMissedAloud) {
+  for (const Structure structure : {Structure::first_order, Structure::fractional}) {
+    Recording run = position_run(kLag, step_duty(0.3, 3, 0.01), 1e-4, 4);
+    for (double& x : run.position_m) x += 0.01;
+    IdentificationOptions options = one_start(structure);
+    const Identification found = identify(run, options);
+    EXPECT_NEAR(found.best.offset_m, 0.01, 5e-4);
+    EXPECT_THAT(found.warnings, Not(Contains(HasSubstr("offset"))));
+    options.fits_offset = false;
+    EXPECT_THAT(warnings_of(run, options), Contains(HasSubstr("position_m begins at 0.0")));
+  }
+}
+
+TEST(IdentifyDoubts, ARunThatBeginsInMotionIsNamed) {
+  for (const Structure structure : {Structure::first_order, Structure::fractional}) {
+    for (const bool has_velocity : {false, true}) {
+      Recording run = has_velocity ? two_channel_run() : lag_run();
+      for (std::size_t k = 0; k < run.duty.size(); ++k) {
+        const double decay = std::exp(-0.01 * static_cast<double>(k) / 0.2);
+        run.position_m[k] += 0.1 * 0.2 * (1 - decay);
+        if (has_velocity) run.velocity_m_s[k] += 0.1 * decay;
+      }
+      EXPECT_THAT(warnings_of(run, one_start(structure)), Contains(HasSubstr("begin the record at rest")));
+    }
+  }
+}
+
+TEST(IdentifyDoubts, ColourOfEitherChannelCounts) {
+  for (const bool is_position : {true, false}) {
+    Recording run = two_channel_run();
+    std::vector<double>& channel = is_position ? run.position_m : run.velocity_m_s;
+    const double size = is_position ? 2e-4 : 2e-3;
+    for (std::size_t k = 0; k < channel.size(); ++k) channel[k] += size * std::sin(0.9 * static_cast<double>(k));
+    const Identification found = identify(run, one_start(Structure::first_order));
+    EXPECT_FALSE(found.best.residuals_are_white);
+    EXPECT_EQ(found.best.whiteness_p_value,
+              std::min(*found.best.position_whiteness_p_value, *found.best.velocity_whiteness_p_value));
+    const char* name =
+        is_position ? "residuals of position_m are not white" : "residuals of velocity_m_s are not white";
+    EXPECT_THAT(found.warnings, Contains(HasSubstr(name)));
+  }
+}
+
+TEST(IdentifyDoubts, ABiasIsNamedWithItsSize) {
+  Recording run = two_channel_run();
+  for (double& v : run.velocity_m_s) v += 5e-4;
+  EXPECT_THAT(warnings_of(run), Contains(testing::ContainsRegex("velocity_m_s lies 0.000[456].* m/s beside")));
+}
+
+TEST(IdentifyDoubts, OutliersAreCountedAndTheRemedyIsNamed) {
+  Recording run = lag_run(1e-4, 2001);
+  for (const std::size_t k : {300U, 700U, 1100U, 1500U, 1900U}) run.position_m[k] += 0.5;
+  const std::vector<std::string> warnings = warnings_of(run);
+  EXPECT_THAT(warnings, Contains(HasSubstr("5 of the 2001 values of position_m")));
+  EXPECT_THAT(warnings, Contains(HasSubstr("the first at 3 s")));
+  EXPECT_THAT(warnings, Contains(HasSubstr("use the absolute error cost")));
+}
+
+TEST(IdentifyDoubts, ATurnedSignIsNamed) {
+  Recording run = lag_run();
+  for (double& x : run.position_m) x = -x;
+  for (const Structure structure : {Structure::first_order, Structure::fractional}) {
+    const std::vector<std::string> warnings = warnings_of(run, one_start(structure));
+    EXPECT_THAT(warnings, Contains(HasSubstr("turn one sign")));
+    EXPECT_THAT(warnings, Not(Contains(HasSubstr("would give"))));
+  }
+  Recording both = two_channel_run();
+  for (double& v : both.velocity_m_s) v = -v;
+  EXPECT_THAT(warnings_of(both), Contains(HasSubstr("the sign of velocity_m_s turned round")));
+}
+
+TEST(IdentifyDoubts, APoorFitPlansNoExperiment) {
+  Recording run = lag_run();
+  std::fill(run.position_m.begin(), run.position_m.end(), 0);
+  add_noise(run.position_m, 1, 5);
+  const std::vector<std::string> warnings = warnings_of(run, one_start(Structure::fractional));
+  EXPECT_THAT(warnings, Contains(HasSubstr("the model explains only")));
+  EXPECT_THAT(warnings, Not(Contains(HasSubstr("would give"))));
+}
+
+TEST(IdentifyDoubts, ThePlanIsNotTheRunThatWasMade) {
+  const Recording run = position_run(kNonNewtonianModel, prbs_duty(1, 0.2, 60, 0.01), 0.05, 4);
+  const std::vector<std::string> warnings = warnings_of(run, one_start(Structure::fractional));
+  EXPECT_THAT(warnings, Contains(HasSubstr("cannot determine")));
+  EXPECT_THAT(warnings, Not(Contains(HasSubstr("would give"))));
+  EXPECT_THAT(warnings, Contains(HasSubstr("make the run longer")));
+}
+
+TEST(IdentifyDoubts, ADeadTimeAtItsLimitComesFirst) {
+  Recording run = lag_run();
+  run.position_m = output_of(kLag, Channel::position, 0.01, run.duty, 0.15);
+  add_noise(run.position_m, 1e-4, 1);
+  for (const Structure structure : {Structure::first_order, Structure::fractional}) {
+    IdentificationOptions options = one_start(structure);
+    options.longest_dead_time_s = 0.05;
+    const std::vector<std::string> warnings = warnings_of(run, options);
+    ASSERT_FALSE(warnings.empty());
+    EXPECT_THAT(warnings.front(), HasSubstr("lies at the longest that was allowed, 0.05 s"));
+    EXPECT_THAT(warnings, Not(Contains(HasSubstr("do not need this fractional order"))));
+  }
+}
+
+TEST(IdentifyDoubts, ResidualsThatAreNoNumbersAreNotWhite) {
+  Eigen::VectorXd residual = Eigen::VectorXd::Zero(50);
+  EXPECT_EQ(whiteness_p_value(residual), 1);
+  residual[7] = std::nan("");
+  EXPECT_EQ(whiteness_p_value(residual), 0);
+}
+
+}  // namespace
+}  // namespace control
