@@ -1,0 +1,266 @@
+// Integrates in every tick; compares with the model in every fifth, where the covariance's work is.
+#include "robot_fw/core/estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace robot_fw {
+namespace {
+
+constexpr float kMS2PerCount = 0.01F;
+constexpr float kMaxDtS = 0.1F;
+constexpr int kTicksPerMeasurement = 5;
+constexpr int kStuckReadings = 25;            // equal ones in a row: with the noise, never by chance
+constexpr float kStartVelocityM_S = 0.0005F;  // sd
+constexpr float kGainWalk = 0.003F;           // sd of the gain's change in 1 s
+constexpr float kLostM = 10;                  // sd of the position after a restart
+
+// Of a reading: sd of its age, and of the velocity that repeated and skipped ones cost, relative to a tick's change.
+constexpr float kAgeS = 0.004F;
+constexpr float kSlip = 0.15F;
+// Of the model's change in a tick without a reading: sd, relative, and in m/s².
+constexpr float kUnsensedShare = 0.3F;
+constexpr float kUnsensedM_S2 = 0.02F;
+
+constexpr float kShapeCorrelationS = 0.1F;   // for so long an error of the model's shape keeps its sign
+constexpr float kRestingModelM_S = 0.0003F;  // below it the modelled velocity has died down
+constexpr float kDoubt = 0.6F;               // share of the doubtful way that is one sd
+
+constexpr float kPulseLeakPerS = 2;      // slower changes of velocity are no pulsation
+constexpr float kWindowS = 1;            // longer than a period of the pump
+constexpr float kLeastFlowM_S = 0.004F;  // rms; the noise gives less
+constexpr float kDriftPerFlow = 1.5F;    // sd of the mean flow, relative to the pulsation's rms
+constexpr float kUnseenFlowS = 4;        // for so long a flow may have been there when it is seen first
+constexpr float kDriftDecayPerS = 0.5F;  // once the flow is over
+
+constexpr float kSurprising = 9;           // innovation squared by its variance
+constexpr float kExpectedSurprise = 4;     // generously: the mean is 1
+constexpr float kGreatestSurprise = 20;    // counted at once
+constexpr float kMismatchSurprises = 60;   // summed
+constexpr float kStrangeGain = 0.35F;      // surely beyond it, the gain is not that of the model's fluid
+constexpr int kMismatchStrangeGains = 10;  // in a row
+
+constexpr float square(float x) { return x * x; }
+
+// 1 - e^-x as a fraction of polynomials: within 1e-5 for x ≤ 0.5, and in [0, 1.1] for all.
+float decayed_share(float x) { return 12 * x / (12 + 6 * x + x * x); }
+
+}  // namespace
+
+Estimator::Estimator(const EstimatorParameters& parameters) : parameters_(parameters) {
+  for (const float gain_m_s : parameters.model.gain_m_s) steady_gain_m_s_ += gain_m_s;
+  start();
+}
+
+void Estimator::start() {
+  for (Vector& row : covariance_) row.fill(0);
+  covariance_[velocity][velocity] = square(kStartVelocityM_S);
+  covariance_[bias][bias] = square(parameters_.bias_m_s2);
+  covariance_[gain][gain] = square(parameters_.gain_error);
+  velocity_m_s_ = bias_m_s2_ = gain_error_ = drift_m_s_ = unexplained_m_s_ = 0;
+}
+
+void Estimator::step(const EstimatorInputs& inputs) {
+  if (!(inputs.dt_s > 0 && inputs.dt_s <= kMaxDtS)) return;
+  tune_sections(inputs.dt_s);
+  integrate(inputs, advance_model(inputs.duty));
+  if (++interval_.ticks < kTicksPerMeasurement) return;
+  propagate_covariance();
+  if (flow_m_s_ > 0) {
+    admit_drift();
+  } else {
+    let_drift_die_down();
+  }
+  compare_with_model();
+  guard();
+  interval_ = {};
+}
+
+void Estimator::tune_sections(float dt_s) {
+  if (dt_s == tuned_dt_s_) return;
+  tuned_dt_s_ = dt_s;
+  for (std::size_t i = 0; i < kModelSections; ++i) {
+    section_share_[i] = decayed_share(dt_s / parameters_.model.time_constant_s[i]);
+  }
+}
+
+// (1); the change of the model's velocity.
+float Estimator::advance_model(float duty) {
+  duty_ = std::isfinite(duty) ? std::clamp(duty, -1.0F, 1.0F) : 0;
+  if (std::fabs(duty_) < parameters_.dead_zone_duty) duty_ = 0;
+  if (std::fabs(duty_) < parameters_.doubtful_duty) doubtful_m_ += steady_gain_m_s_ * duty_ * tuned_dt_s_;
+  const float before_m_s = model_m_s_;
+  model_m_s_ = 0;
+  for (std::size_t i = 0; i < kModelSections; ++i) {
+    section_m_s_[i] += section_share_[i] * (parameters_.model.gain_m_s[i] * duty_ - section_m_s_[i]);
+    model_m_s_ += section_m_s_[i];
+  }
+  return model_m_s_ - before_m_s;
+}
+
+bool Estimator::has_reading(const EstimatorInputs& inputs) {
+  if (!inputs.is_valid) return false;
+  repeats_ = inputs.counts == last_counts_ ? std::min(repeats_ + 1, kStuckReadings) : 0;
+  last_counts_ = inputs.counts;
+  return repeats_ < kStuckReadings;
+}
+
+// (2)
+void Estimator::integrate(const EstimatorInputs& inputs, float model_change_m_s) {
+  const float dt_s = inputs.dt_s;
+  const float explained_m_s = (1 + gain_error_) * model_change_m_s;
+  float change_m_s = explained_m_s;
+  if (has_reading(inputs)) {
+    acceleration_m_s2_ = kMS2PerCount * static_cast<float>(inputs.counts) - bias_m_s2_;
+    change_m_s = dt_s * acceleration_m_s2_;  // of a reading 5 ms old in the mean: the middle of the tick
+    interval_.sensed_s += dt_s;
+    interval_.velocity_variance += square(parameters_.noise_m_s2 * dt_s) + square(kSlip * change_m_s);
+    interval_.fastest_change_m_s2 = std::max(interval_.fastest_change_m_s2, std::fabs(acceleration_m_s2_));
+  } else {
+    interval_.modelled_m_s += model_change_m_s;
+    interval_.velocity_variance += square(kUnsensedShare * explained_m_s) + square(kUnsensedM_S2 * dt_s);
+  }
+  position_m_ += dt_s * (velocity_m_s_ + 0.5F * change_m_s);
+  velocity_m_s_ += change_m_s;
+  interval_.duration_s += dt_s;
+  watch_flow(change_m_s - explained_m_s, dt_s);
+}
+
+// A flow is what goes on pulsating through three windows; a move ends sooner, or its gain is found.
+void Estimator::watch_flow(float unexplained_m_s, float dt_s) {
+  unexplained_m_s_ += unexplained_m_s - unexplained_m_s_ * dt_s * kPulseLeakPerS;
+  window_sum_ += square(unexplained_m_s_) * dt_s;
+  window_s_ += dt_s;
+  if (window_s_ < kWindowS) return;
+  window_mean_square_ = {window_mean_square_[1], window_mean_square_[2], window_sum_ / window_s_};
+  window_s_ = window_sum_ = 0;
+  const float least = *std::min_element(window_mean_square_.begin(), window_mean_square_.end());
+  flow_m_s_ = least > square(kLeastFlowM_S) ? std::sqrt(least) : 0;
+}
+
+// P → F P Fᵀ + Q, F - 1 having but the rows of position and velocity.
+void Estimator::propagate_covariance() {
+  const float t_s = interval_.duration_s, sensed_s = interval_.sensed_s, modelled_m_s = interval_.modelled_m_s;
+  auto& p = covariance_;
+  for (std::size_t j = 0; j < kStates; ++j) {
+    p[position][j] += t_s * (p[velocity][j] - 0.5F * t_s * p[bias][j]);
+    p[velocity][j] += modelled_m_s * p[gain][j] - sensed_s * p[bias][j];
+  }
+  for (std::size_t i = 0; i < kStates; ++i) {
+    p[i][position] += t_s * (p[i][velocity] - 0.5F * t_s * p[i][bias]);
+    p[i][velocity] += modelled_m_s * p[i][gain] - sensed_s * p[i][bias];
+  }
+  const float came_in = interval_.velocity_variance;
+  p[position][position] += came_in * square(t_s) * (1.0F / 3);
+  p[position][velocity] += came_in * t_s * 0.5F;
+  p[velocity][position] = p[position][velocity];
+  p[velocity][velocity] += came_in;
+  p[bias][bias] += square(parameters_.bias_walk_m_s2) * t_s;
+  p[gain][gain] += square(kGainWalk) * t_s;
+}
+
+void Estimator::let_drift_die_down() {
+  drift_admitted_ = false;
+  const float keep = 1 - std::min(kDriftDecayPerS * interval_.duration_s, 1.0F);
+  drift_m_s_ *= keep;
+  for (std::size_t i = 0; i < kStates; ++i) covariance_[drift][i] *= keep;
+  for (std::size_t i = 0; i < kStates; ++i) covariance_[i][drift] *= keep;
+}
+
+// Velocity and drift become unknown alike, and with them the position since the flow may have begun.
+void Estimator::admit_drift() {
+  auto& p = covariance_;
+  float since_s = 0;
+  if (!drift_admitted_) {
+    drift_admitted_ = true;
+    since_s = kUnseenFlowS;
+    gain_error_ = surprises_ = 0;  // what the gain has learned was the flow
+    for (std::size_t i = 0; i < kStates; ++i) p[gain][i] = p[i][gain] = 0;
+    p[gain][gain] = square(parameters_.gain_error);
+  }
+  const float missing = square(kDriftPerFlow * flow_m_s_) - p[drift][drift];
+  if (missing <= 0) return;
+  const Vector along{since_s, 1, 0, 0, 1};
+  for (std::size_t i = 0; i < kStates; ++i) {
+    for (std::size_t j = 0; j < kStates; ++j) p[i][j] += along[i] * along[j] * missing;
+  }
+}
+
+// Of ε in (3), as white noise.
+float Estimator::measurement_variance() const {
+  const bool resting = duty_ == 0 && std::fabs(model_m_s_) < kRestingModelM_S;
+  const float floor_m_s = resting ? parameters_.resting_velocity_m_s : parameters_.driven_velocity_m_s;
+  const float shape = square(parameters_.shape_error * model_m_s_) + square(kAgeS * interval_.fastest_change_m_s2);
+  const float area = parameters_.correlation_s * (square(floor_m_s) + square(flow_m_s_)) + kShapeCorrelationS * shape;
+  return 2 * area / interval_.duration_s;
+}
+
+// (3)
+void Estimator::compare_with_model() {
+  auto& p = covariance_;
+  const float innovation = (1 + gain_error_) * model_m_s_ + drift_m_s_ - velocity_m_s_;
+  Vector ph{};  // P Hᵀ
+  for (std::size_t i = 0; i < kStates; ++i) ph[i] = p[i][velocity] - model_m_s_ * p[i][gain] - p[i][drift];
+  float variance = ph[velocity] - model_m_s_ * ph[gain] - ph[drift] + measurement_variance();
+  const float surprise = square(innovation) / variance;
+  const bool moving = std::fabs(model_m_s_) > kRestingModelM_S;
+  if (surprise > kSurprising && moving && flow_m_s_ == 0 && p[gain][gain] < 1) {  // the gain is quite another
+    const float reopened = std::min(square(innovation / model_m_s_), 4.0F);
+    p[gain][gain] += reopened;
+    ph[gain] -= model_m_s_ * reopened;
+    variance += square(model_m_s_) * reopened;
+  }
+  const float by_variance = 1 / variance;
+  Vector gains{};
+  for (std::size_t i = 0; i < kStates; ++i) gains[i] = ph[i] * by_variance;
+  correct(gains, ph, variance, innovation);
+  watch_model(surprise);
+}
+
+// The covariance in Joseph's form, (1 - K H) P (1 - K H)ᵀ + K R Kᵀ, multiplied out.
+void Estimator::correct(const Vector& gains, const Vector& ph, float variance, float innovation) {
+  position_m_ += gains[position] * innovation;
+  velocity_m_s_ += gains[velocity] * innovation;
+  bias_m_s2_ += gains[bias] * innovation;
+  gain_error_ += gains[gain] * innovation;
+  drift_m_s_ += gains[drift] * innovation;
+  auto& p = covariance_;
+  for (std::size_t i = 0; i < kStates; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      p[i][j] += gains[i] * (gains[j] * variance - ph[j]) - ph[i] * gains[j];
+      p[j][i] = p[i][j];
+    }
+  }
+}
+
+void Estimator::watch_model(float surprise) {
+  const float more = std::min(surprise, kGreatestSurprise) - kExpectedSurprise;
+  surprises_ = std::clamp(surprises_ + more, 0.0F, 2 * kMismatchSurprises);
+  const float gain_sd = std::sqrt(std::max(covariance_[gain][gain], 0.0F));
+  const bool strange = std::fabs(gain_error_) - 2 * gain_sd > kStrangeGain;
+  strange_gains_ = strange ? std::min(strange_gains_ + 1, kMismatchStrangeGains) : 0;
+  mismatch_ = surprises_ > kMismatchSurprises || strange_gains_ == kMismatchStrangeGains;
+}
+
+void Estimator::guard() {
+  bool sound = std::isfinite(position_m_) && std::isfinite(velocity_m_s_) && std::isfinite(bias_m_s2_) &&
+               std::isfinite(gain_error_) && std::isfinite(drift_m_s_);
+  for (std::size_t i = 0; i < kStates; ++i) {
+    sound = sound && std::isfinite(covariance_[i][i]);
+    covariance_[i][i] = std::max(covariance_[i][i], 1e-12F);
+  }
+  if (!sound) {
+    start();
+    if (!std::isfinite(position_m_)) position_m_ = 0;
+    covariance_[position][position] = square(kLostM);
+    surprises_ = 0;
+  }
+  position_sd_m_ = std::sqrt(covariance_[position][position] + square(kDoubt * doubtful_m_));
+}
+
+void Estimator::zero_position() {
+  position_m_ = position_sd_m_ = doubtful_m_ = 0;
+  for (std::size_t i = 0; i < kStates; ++i) covariance_[position][i] = covariance_[i][position] = 0;
+}
+
+}  // namespace robot_fw

@@ -1,0 +1,158 @@
+// The estimator's rules, one by one; what it is worth in numbers is in estimator_study_test.cpp.
+#include "robot_fw/core/estimator.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "control/modal_plant.hpp"
+
+namespace robot_fw {
+namespace {
+
+constexpr float kTickS = 0.01F;
+
+// Ticks of an estimator whose accelerometer has neither noise nor bias.
+class EstimatorTest : public ::testing::Test {
+ protected:
+  void tick(float duty, int counts, bool is_valid = true) {
+    estimator.step({static_cast<std::int16_t>(counts), is_valid, duty, kTickS});
+  }
+  void rest(double seconds) {
+    for (int k = 0; k < std::lround(seconds * 100); ++k) tick(0, noise(random));
+  }
+  void drive_unsensed(float duty, double seconds) {
+    for (int k = 0; k < std::lround(seconds * 100); ++k) tick(duty, 0, false);
+  }
+
+  std::minstd_rand random{1};
+  std::uniform_int_distribution<> noise{-2, 2};  // counts; mean 0
+  Estimator estimator{EstimatorParameters{}};
+};
+
+void expect_to_follow(const VelocityModel& model, const control::FractionalModel& truth, float tolerance) {
+  EstimatorParameters parameters;
+  parameters.model = model;
+  Estimator estimator{parameters};
+  control::ModalPlant plant{truth, static_cast<double>(kTickS)};
+  for (int k = 0; k < 6000; ++k) {
+    const float duty = k % 200 < 100 ? 1.0F : -0.5F;
+    plant.step(static_cast<double>(duty));
+    estimator.step({0, false, duty, kTickS});
+    ASSERT_NEAR(estimator.velocity_m_s(), plant.velocity_m_s(), tolerance) << "tick " << k;
+  }
+}
+
+TEST_F(EstimatorTest, WithoutReadingsFollowsTheFluidsModel) {
+  expect_to_follow(kFluidVelocityModel, control::kNonNewtonianModel, 0.001F);
+}
+
+TEST_F(EstimatorTest, WithoutReadingsFollowsTheWatersModel) {
+  expect_to_follow(kWaterVelocityModel, control::kNewtonianModel, 0.001F);
+}
+
+TEST_F(EstimatorTest, WithoutReadingsIsAsUnsureAsTheModelsGain) {
+  drive_unsensed(1, 10);
+  EXPECT_NEAR(estimator.position_m(), 1, 0.02F);
+  EXPECT_GT(estimator.position_sd_m(), 0.15F);
+  EXPECT_LT(estimator.position_sd_m(), 0.3F);
+}
+
+TEST_F(EstimatorTest, AtRestStaysWhereItIsAndFindsTheBias) {
+  constexpr int kBiasCounts = 3;
+  for (int k = 0; k < 3000; ++k) tick(0, kBiasCounts + noise(random));
+  EXPECT_NEAR(estimator.bias_m_s2(), 0.03F, 0.003F);
+  EXPECT_NEAR(estimator.velocity_m_s(), 0, 0.0005F);
+  EXPECT_LT(std::fabs(estimator.position_m()), 2 * estimator.position_sd_m());
+  EXPECT_FALSE(estimator.model_mismatch());
+}
+
+TEST_F(EstimatorTest, IsSurerAtRestWithTheMotorOffThanWithTheMotorOn) {
+  Estimator driven{EstimatorParameters{}};
+  for (int k = 0; k < 3000; ++k) {
+    const int counts = noise(random);
+    tick(0, counts);
+    driven.step({static_cast<std::int16_t>(counts), true, 1e-6F, kTickS});
+  }
+  EXPECT_LT(2 * estimator.position_sd_m(), driven.position_sd_m());
+}
+
+TEST_F(EstimatorTest, CountsTheWayUnderADoubtfulDutyAsUnsure) {
+  for (int k = 0; k < 1000; ++k) tick(0.04F, noise(random));  // it stands still
+  EXPECT_LT(estimator.position_m(), 2 * estimator.position_sd_m());
+}
+
+TEST_F(EstimatorTest, TakesADutyInTheDeadZoneAsZero) {
+  EstimatorParameters parameters;
+  parameters.dead_zone_duty = 0.05F;
+  Estimator told{parameters};
+  for (int k = 0; k < 500; ++k) told.step({0, false, 0.04F, kTickS});
+  EXPECT_EQ(told.position_m(), 0);
+}
+
+TEST_F(EstimatorTest, TakesReadingsThatNeverChangeAsMissing) {
+  for (int k = 0; k < 1000; ++k) tick(0, 40);  // 0.4 m/s² would be 20 m
+  EXPECT_LT(std::fabs(estimator.position_m()), 0.5F);
+}
+
+TEST_F(EstimatorTest, SeesAPulsatingFlowAndIsUnsureOfTheMeanFlow) {
+  for (int k = 0; k < 1000; ++k) tick(0, static_cast<int>(std::lround(60 * std::cos(0.0733 * k))));
+  EXPECT_NEAR(estimator.flow_m_s(), 0.058F, 0.02F);  // 0.6/7.33/√2
+  EXPECT_GT(estimator.position_sd_m(), 0.3F);
+  rest(10);
+  EXPECT_EQ(estimator.flow_m_s(), 0);
+}
+
+TEST_F(EstimatorTest, SaysAMismatchWhenTheMotorDoesNotMoveIt) {
+  for (int k = 0; k < 200; ++k) tick(1, noise(random));
+  EXPECT_TRUE(estimator.model_mismatch());
+  EXPECT_LT(estimator.model_gain(), 0.2F);
+}
+
+TEST_F(EstimatorTest, ZeroPositionIsExactAndKeepsWhatIsKnownOfTheRest) {
+  drive_unsensed(0.5F, 2);
+  const float velocity_m_s = estimator.velocity_m_s();
+  estimator.zero_position();
+  EXPECT_EQ(estimator.position_m(), 0);
+  EXPECT_EQ(estimator.position_sd_m(), 0);
+  EXPECT_EQ(estimator.velocity_m_s(), velocity_m_s);
+}
+
+TEST_F(EstimatorTest, PassesOverTicksOfNoLength) {
+  rest(1);
+  const float position_m = estimator.position_m();
+  for (const float dt_s : {0.0F, -1.0F, 1.0F, std::numeric_limits<float>::quiet_NaN()}) {
+    estimator.step({1000, true, 1, dt_s});
+  }
+  EXPECT_EQ(estimator.position_m(), position_m);
+}
+
+TEST_F(EstimatorTest, StaysFiniteWhateverComesIn) {
+  std::uniform_int_distribution<> counts{-32768, 32767}, kind{0, 9};
+  std::uniform_real_distribution<float> duty{-3, 3}, dt_s{0.0001F, 0.1F};
+  for (int k = 0; k < 100'000; ++k) {
+    const int what = kind(random);
+    const bool wild = k / 10'000 % 2 == 0;
+    const float wanted = what == 0 ? std::numeric_limits<float>::infinity() : duty(random);
+    estimator.step({static_cast<std::int16_t>(wild ? counts(random) : noise(random)), what != 1, wanted,
+                    what == 2 ? dt_s(random) : kTickS});
+    ASSERT_TRUE(std::isfinite(estimator.position_m()) && std::isfinite(estimator.velocity_m_s())) << "tick " << k;
+    ASSERT_TRUE(std::isfinite(estimator.position_sd_m()) && estimator.position_sd_m() >= 0) << "tick " << k;
+  }
+}
+
+TEST_F(EstimatorTest, StartsAnewAndUnsureWhenItsParametersAreNotFinite) {
+  EstimatorParameters parameters;
+  parameters.noise_m_s2 = std::numeric_limits<float>::quiet_NaN();
+  Estimator broken{parameters};
+  for (int k = 0; k < 100; ++k) broken.step({static_cast<std::int16_t>(noise(random)), true, 0, kTickS});
+  EXPECT_EQ(broken.position_m(), 0);
+  EXPECT_EQ(broken.position_sd_m(), 10);
+}
+
+TEST_F(EstimatorTest, IsSmall) { EXPECT_LE(sizeof(Estimator), 400u); }
+
+}  // namespace
+}  // namespace robot_fw

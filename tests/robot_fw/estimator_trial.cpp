@@ -1,0 +1,166 @@
+// Runs trials in virtual time and gathers what many seeds give.
+#include "tests/robot_fw/estimator_trial.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <numbers>
+
+#include "robot_fw/core/controller.hpp"
+#include "sim_robot/plant.hpp"
+
+namespace robot_fw {
+namespace {
+
+constexpr double kTickS = 0.01, kSecondPartS = 20;
+
+double flow_profile(double time_s) {  // (1)
+  const double whole = 7 * time_s / 6, p = whole - std::floor(whole);
+  return (p <= 0.436 ? 0.5 * std::sin(2 * std::numbers::pi * (p + 0.0320472)) : 0.1) / 0.212349;
+}
+
+control::FractionalModel scaled(control::FractionalModel model, double gain) {
+  model.kp *= gain;
+  return model;
+}
+
+// Truth and sensor: what happens under a duty.
+class Water {
+ public:
+  Water(const EstimatorTrial& trial, std::uint64_t seed)
+      : trial_(trial), plant_(scaled(trial.truth, trial.plant_gain), kTickS), imu_(trial.imu, seed) {}
+
+  void step(double duty) {
+    const double before_m_s = flow_m_s();
+    plant_.step(std::abs(duty) < trial_.dead_zone_duty ? 0 : duty);
+    time_s_ += kTickS;
+    carried_m_ += kTickS * (before_m_s + flow_m_s()) / 2;
+    imu_.accelerate(plant_.acceleration_m_s2() + (flow_m_s() - before_m_s) / kTickS, kTickS);
+  }
+  double position_m() const { return plant_.position_m() + carried_m_; }
+  sim_robot::ImuReading read() { return imu_.read(); }
+
+ private:
+  double flow_m_s() const {
+    const double opened = std::clamp(time_s_ - trial_.pump_on_at_s, 0.0, 1.0);
+    return trial_.mean_flow_m_s * flow_profile(time_s_) * opened;
+  }
+
+  EstimatorTrial trial_;
+  sim_robot::Plant plant_;
+  sim_robot::Imu imu_;
+  double time_s_ = 0, carried_m_ = 0;
+};
+
+double percentile_95(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values[static_cast<std::size_t>(std::ceil(0.95 * static_cast<double>(values.size()))) - 1];
+}
+
+}  // namespace
+
+TrialResult run_trial(const EstimatorTrial& trial, std::uint64_t seed) {
+  Water water{trial, seed};
+  Estimator estimator{trial.estimator};
+  Controller controller{kPaperController};
+  TrialResult result;
+  float duty = 0;
+  const auto ticks = std::lround(trial.duration_s / kTickS);
+  int seconds_within = 0;
+  for (long tick = 1; tick <= ticks; ++tick) {
+    water.step(static_cast<double>(duty));
+    const auto reading = water.read();
+    estimator.step({reading.counts, reading.is_valid, duty, static_cast<float>(kTickS)});
+
+    const double time_s = static_cast<double>(tick) * kTickS;
+    const bool second_part = time_s >= kSecondPartS;
+    const double target_m =
+        second_part ? trial.second_setpoint_m - trial.disturbance_m : trial.setpoint_m;  // of the true position
+    const double seen_m = trial.closed_loop ? static_cast<double>(estimator.position_m()) : water.position_m();
+    duty = std::clamp(controller.step(static_cast<float>(target_m - seen_m)), trial.duty.min, trial.duty.max);
+
+    result.estimate_error_m = static_cast<double>(estimator.position_m()) - water.position_m();
+    result.target_error_m = water.position_m() - target_m;
+    result.position_sd_m = static_cast<double>(estimator.position_sd_m());
+    if (result.mismatch_s < 0 && estimator.model_mismatch()) result.mismatch_s = time_s;
+    const bool within = std::abs(result.estimate_error_m) <= 2 * result.position_sd_m;
+    if (tick % 100 == 0 && within) ++seconds_within;
+  }
+  result.share_within = seconds_within / std::floor(trial.duration_s);
+  return result;
+}
+
+StudyRow run_study(const EstimatorTrial& trial, int seeds) {
+  StudyRow row;
+  std::vector<double> errors_m, targets_m, sds_m;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const TrialResult result = run_trial(trial, static_cast<std::uint64_t>(seed));
+    errors_m.push_back(std::abs(result.estimate_error_m));
+    targets_m.push_back(std::abs(result.target_error_m));
+    sds_m.push_back(result.position_sd_m);
+    row.error_rms_m += result.estimate_error_m * result.estimate_error_m / seeds;
+    row.share_within += (errors_m.back() <= 2 * result.position_sd_m ? 1.0 : 0.0) / seeds;
+    row.seconds_within += result.share_within / seeds;
+    if (result.mismatch_s < 0) continue;
+    row.mismatch_first_s = row.mismatches == 0 ? result.mismatch_s : std::min(row.mismatch_first_s, result.mismatch_s);
+    row.mismatch_last_s = std::max(row.mismatch_last_s, result.mismatch_s);
+    ++row.mismatches;
+  }
+  row.error_rms_m = std::sqrt(row.error_rms_m);
+  row.error_95_m = percentile_95(errors_m);
+  row.target_95_m = percentile_95(targets_m);
+  std::ranges::nth_element(sds_m, sds_m.begin() + seeds / 2);
+  row.sd_m = sds_m[static_cast<std::size_t>(seeds / 2)];
+  return row;
+}
+
+std::vector<NamedTrial> study_trials() {
+  using Change = void (*)(EstimatorTrial&);
+  std::vector<NamedTrial> rows;
+  const auto add = [&rows](const char* name, Expectation expected, std::initializer_list<Change> changes) {
+    EstimatorTrial trial;
+    for (const Change change : changes) change(trial);
+    rows.push_back({name, trial, expected});
+  };
+  constexpr Change kWeaker = [](EstimatorTrial& t) { t.plant_gain = 0.8; };
+  constexpr Change kStronger = [](EstimatorTrial& t) { t.plant_gain = 1.2; };
+  constexpr Change kSecond = [](EstimatorTrial& t) { t.second_setpoint_m = 0.2, t.duration_s = 62; };
+  constexpr Change kFigure7 = [](EstimatorTrial& t) { t.closed_loop = true, t.disturbance_m = -0.05; };
+  constexpr Change kForward = [](EstimatorTrial& t) { t.duty.min = 0; };
+  constexpr Change kInWater = [](EstimatorTrial& t) { t.truth = control::kNewtonianModel; };
+  constexpr Change kKnowsWater = [](EstimatorTrial& t) { t.estimator.model = kWaterVelocityModel; };
+  constexpr Change kDeadZone = [](EstimatorTrial& t) { t.dead_zone_duty = 0.03, t.imu.missed_read_probability = 0.02; };
+  constexpr Change kKnowsDeadZone = [](EstimatorTrial& t) { t.estimator.dead_zone_duty = 0.03F; };
+  constexpr Change kHolding = [](EstimatorTrial& t) { t.closed_loop = true; };
+  constexpr Change kFlow40 = [](EstimatorTrial& t) { t.mean_flow_m_s = 0.04; };
+  constexpr Change kFlow100 = [](EstimatorTrial& t) { t.mean_flow_m_s = 0.1; };
+  constexpr Change kLater = [](EstimatorTrial& t) { t.pump_on_at_s = 20; };
+  constexpr Expectation kHeld, kNoTarget{false, Mismatch::never}, kWrong{false, Mismatch::always},
+      kAllowed{false, Mismatch::allowed}, kHeldAllowed{true, Mismatch::allowed};
+
+  add("0.1 m move", kHeld, {});
+  add("plant gain 0.8", kHeld, {kWeaker});
+  add("plant gain 1.2", kHeld, {kStronger});
+  add("second move", kHeld, {kSecond});
+  add("second move, gain 0.8", kHeld, {kSecond, kWeaker});
+  add("second move, gain 1.2", kHeld, {kSecond, kStronger});
+  add("loop on the estimate, duty [-1, 1]", kHeld, {kFigure7});
+  add("the same, gain 0.8", kHeld, {kFigure7, kWeaker});
+  add("the same, gain 1.2", kHeld, {kFigure7, kStronger});
+  add("loop on the estimate, duty [0, 1]", kNoTarget, {kFigure7, kForward});
+  add("water, water's parameters", kHeld, {kInWater, kKnowsWater});
+  add("the same, loop on the estimate", kHeld, {kInWater, kKnowsWater, kFigure7});
+  add("water, the fluid's parameters", kWrong, {kInWater});
+  add("the same, loop on the estimate", kWrong, {kInWater, kFigure7});
+  add("fluid, water's parameters", kWrong, {kKnowsWater});
+  add("water, dead zone 0.03, 2 % misreads", kAllowed, {kInWater, kKnowsWater, kDeadZone});
+  add("the same, loop on the estimate", kHeldAllowed, {kInWater, kKnowsWater, kDeadZone, kFigure7});
+  add("the same, dead zone told", kHeld, {kInWater, kKnowsWater, kDeadZone, kFigure7, kKnowsDeadZone});
+  add("pump on, mean flow 0", kHeld, {kHolding});
+  add("pump on, mean flow 0.04 m/s", kAllowed, {kHolding, kFlow40});
+  add("pump on, mean flow 0.1 m/s", kAllowed, {kHolding, kFlow100});
+  add("pump on from 20 s, mean flow 0.1 m/s", kAllowed, {kHolding, kFlow100, kLater});
+  return rows;
+}
+
+}  // namespace robot_fw

@@ -1,0 +1,72 @@
+// One trial of the estimator: a robot in a fluid, its sensor, its motor, and what the estimate comes to.
+//
+// The duty comes from the paper's controller, on the estimate or, `closed_loop` false, on the true position.
+// At the pump's profile q, mean 1, the fluid carries the robot: v = v_plant + U q(t); the sensor feels the sum's rate.
+//   p = frac(7 t/6);  q = 0.5 sin(2π (p + 0.0320472))/0.212349 for p ≤ 0.436, else 0.1/0.212349          (1)
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "control/plant_models.hpp"
+#include "robot_fw/core/estimator.hpp"
+#include "robot_fw/core/safety.hpp"
+#include "sim_robot/imu.hpp"
+
+namespace robot_fw {
+
+struct EstimatorTrial {
+  control::FractionalModel truth = control::kNonNewtonianModel;
+  EstimatorParameters estimator;
+  sim_robot::ImuParameters imu;
+  double plant_gain = 1;      // of the truth
+  double dead_zone_duty = 0;  // of the truth: below it the motor does not turn
+  double mean_flow_m_s = 0;   // U
+  double pump_on_at_s = -1;   // within 1 s; before 0 it was on all the time
+  DutyRange duty{-1, 1};
+  bool closed_loop = false;
+  double setpoint_m = 0.1;
+  double second_setpoint_m = 0.1;  // from 20 s on
+  double disturbance_m = 0;        // added to the measured position from 20 s on
+  double duration_s = 42;
+};
+
+struct TrialResult {
+  double estimate_error_m = 0;  // at the end
+  double target_error_m = 0;    // true position less setpoint and disturbance's share, at the end
+  double position_sd_m = 0;     // at the end
+  double mismatch_s = -1;       // when first said; -1: never
+  double share_within = 0;      // of all seconds, the estimate within 2 sd of the truth
+};
+
+TrialResult run_trial(const EstimatorTrial& trial, std::uint64_t seed);
+
+// The 95th percentile of the absolute values, root mean square, share of trials within 2 sd at the end, and so on.
+struct StudyRow {
+  double error_95_m = 0, error_rms_m = 0, target_95_m = 0;
+  double sd_m = 0;            // median
+  double share_within = 0;    // of trials, at the end
+  double seconds_within = 0;  // of trials and seconds
+  int mismatches = 0;         // trials
+  double mismatch_first_s = -1, mismatch_last_s = -1;
+};
+
+StudyRow run_study(const EstimatorTrial& trial, int seeds);
+
+enum class Mismatch { never, always, allowed };  // always: within 5 s
+
+struct Expectation {
+  bool within_5_mm = true;  // 95 % of trials; in a closed loop also of the true position from the target
+  Mismatch mismatch = Mismatch::never;
+};
+
+struct NamedTrial {
+  const char* name;
+  EstimatorTrial trial;
+  Expectation expected;
+};
+
+// The cases of docs/robot.md, in its order.
+std::vector<NamedTrial> study_trials();
+
+}  // namespace robot_fw

@@ -1,0 +1,106 @@
+// The simulated accelerometer has the faults that its header states.
+#include "sim_robot/imu.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+namespace sim_robot {
+namespace {
+
+ImuParameters silent() {
+  ImuParameters parameters;
+  parameters.noise_m_s2 = parameters.offset_m_s2 = parameters.wander_m_s2 = parameters.drift_m_s3 = 0;
+  parameters.clock_error = parameters.missed_read_probability = 0;
+  return parameters;
+}
+
+TEST(Imu, CountsHundredthsOfAMetrePerSecondSquared) {
+  Imu imu{silent(), 1};
+  for (int k = 0; k < 3; ++k) imu.accelerate(-1.234, 0.01);
+  EXPECT_EQ(imu.read().counts, -123);
+  EXPECT_TRUE(imu.read().is_valid);
+}
+
+TEST(Imu, SaturatesInsteadOfWrapping) {
+  Imu imu{silent(), 1};
+  for (int k = 0; k < 3; ++k) imu.accelerate(1e6, 0.01);
+  EXPECT_EQ(imu.read().counts, 32767);
+}
+
+TEST(Imu, HasTheNoiseOfTheDataSheetsBand) {
+  ImuParameters parameters = silent();
+  parameters.noise_m_s2 = 0.0116;
+  Imu imu{parameters, 1};
+  double sum = 0, squares = 0;
+  constexpr int kReadings = 20'000;
+  for (int k = 0; k < kReadings; ++k) {
+    imu.accelerate(0, 0.01);
+    const double reading = imu.read().counts / Imu::kCountsPerMS2;
+    sum += reading;
+    squares += reading * reading;
+  }
+  const double mean = sum / kReadings;
+  EXPECT_NEAR(mean, imu.bias_m_s2(), 3e-4);
+  EXPECT_NEAR(std::sqrt(squares / kReadings - mean * mean), std::hypot(0.0116, 0.01 / std::sqrt(12)), 3e-4);
+}
+
+TEST(Imu, StartsWithWhatTheCalibrationLeavesOfTheOffset) {
+  double squares = 0;
+  constexpr int kImus = 500;
+  for (int seed = 0; seed < kImus; ++seed) squares += std::pow(Imu{{}, static_cast<unsigned>(seed)}.bias_m_s2(), 2);
+  EXPECT_NEAR(std::sqrt(squares / kImus), 0.0116 / std::sqrt(200), 1e-4);  // of 0.11 m/s² rms
+}
+
+TEST(Imu, DriftsByTenMicroGInASecondEitherWay) {
+  ImuParameters parameters = silent();
+  parameters.drift_m_s3 = 0.000098;
+  int upwards = 0;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    Imu imu{parameters, seed};
+    for (int k = 0; k < 1000; ++k) imu.accelerate(0, 0.01);
+    EXPECT_NEAR(std::abs(imu.bias_m_s2()), 0.00098, 1e-9);
+    if (imu.bias_m_s2() > 0) ++upwards;
+  }
+  EXPECT_NEAR(upwards, 50, 20);
+}
+
+TEST(Imu, RepeatsAndSkipsReadingsByItsOwnClock) {
+  ImuParameters parameters = silent();
+  parameters.clock_error = 0.005;
+  int repeated = 0, skipped = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    Imu imu{parameters, seed};
+    int last = imu.read().counts;
+    for (int k = 1; k < 1000; ++k) {
+      imu.accelerate(0.1 * k, 0.01);  // 10 counts a tick
+      const int counts = imu.read().counts;
+      if (counts == last) ++repeated;
+      if (counts - last > 15) ++skipped;
+      last = counts;
+    }
+  }
+  EXPECT_GT(repeated, 5);
+  EXPECT_LT(repeated, 60);
+  EXPECT_GT(skipped, 5);
+  EXPECT_LT(skipped, 60);
+}
+
+TEST(Imu, MissesReadsAsOftenAsItIsTold) {
+  ImuParameters parameters = silent();
+  parameters.missed_read_probability = 0.1;
+  Imu imu{parameters, 1};
+  int missed = 0;
+  for (int k = 0; k < 10'000; ++k) missed += imu.read().is_valid ? 0 : 1;
+  EXPECT_NEAR(missed, 1000, 100);
+}
+
+TEST(Imu, RefusesAProbabilityBeyondOne) {
+  ImuParameters parameters;
+  parameters.missed_read_probability = 1.5;
+  EXPECT_THROW((Imu{parameters, 1}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sim_robot
