@@ -46,7 +46,7 @@ TEST(Safety, NeverGivesALatchTheSameIdTwice) {
 }
 
 TEST(Pilot, ALeaseThatRanOutSinceTheLastTickCannotBeRenewed) {
-  Pilot pilot{600};
+  Pilot pilot;
   pilot.set_duty(0.5F, 500, 1'000);
   EXPECT_TRUE(pilot.renew_lease(500, 500'999));
   EXPECT_FALSE(pilot.renew_lease(500, 1'000'999));
