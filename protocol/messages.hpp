@@ -35,6 +35,7 @@ using Welcome = rheonaut_Welcome;
 using StationHeartbeat = rheonaut_StationHeartbeat;
 using Command = rheonaut_Command;
 using Controller = rheonaut_Controller;
+using ParameterPage = rheonaut_ParameterPage;
 
 using Mode = rheonaut_Mode;
 using SubState = rheonaut_SubState;

@@ -24,6 +24,7 @@ robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
   core.duty_min = config.duty.min;
   core.duty_max = config.duty.max;
   core.sample_period_us = SimulatedRobot::kPeriodUs;
+  core.storage = config.storage;
   return core;
 }
 

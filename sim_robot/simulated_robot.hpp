@@ -18,6 +18,7 @@ struct SimulatedRobotConfig {
   protocol::ResetCause reset_cause = rheonaut_RESET_CAUSE_POWER_ON;
   robot_fw::DutyRange duty{-1, 1};
   control::FractionalModel model = control::kNonNewtonianModel;
+  robot_fw::Storage* storage = nullptr;  // of parameters and controller; null: they end with the robot
 };
 
 // Throws std::invalid_argument, quoting the value, when a name, token, boot id or duty range cannot be.

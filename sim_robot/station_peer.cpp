@@ -2,6 +2,7 @@
 #include "sim_robot/station_peer.hpp"
 
 #include <array>
+#include <cstring>
 
 namespace sim_robot {
 namespace {
@@ -60,6 +61,28 @@ protocol::Command zero_position() { return command_of(rheonaut_Command_zero_posi
 
 protocol::Command ping() { return command_of(rheonaut_Command_ping_tag); }
 
+protocol::Command set_controller(const protocol::Controller& controller) {
+  protocol::Command command = command_of(rheonaut_Command_set_controller_tag);
+  command.action.set_controller = controller;
+  return command;
+}
+
+protocol::Command restore_controller() { return command_of(rheonaut_Command_restore_controller_tag); }
+
+protocol::Command set_parameter(const char* name, float value) {
+  protocol::Command command = command_of(rheonaut_Command_set_parameter_tag);
+  auto& order = command.action.set_parameter;
+  std::strncpy(order.name, name, sizeof(order.name) - 1);
+  order.value = value;
+  return command;
+}
+
+protocol::Command get_parameters(std::uint32_t first_index) {
+  protocol::Command command = command_of(rheonaut_Command_get_parameters_tag);
+  command.action.get_parameters.first_index = first_index;
+  return command;
+}
+
 void StationPeer::connect() {
   robot_.link_opened(robot_.robot_time_us());
   connected_ = true;
@@ -106,6 +129,8 @@ void StationPeer::on_frame(const protocol::RobotFrame& frame) {
     case rheonaut_RobotFrame_hello_tag: hello = frame.body.hello; break;
     case rheonaut_RobotFrame_command_ack_tag: acks.push_back(frame.body.command_ack); break;
     case rheonaut_RobotFrame_event_tag: events.push_back(frame.body.event); break;
+    case rheonaut_RobotFrame_parameter_page_tag: pages.push_back(frame.body.parameter_page); break;
+    case rheonaut_RobotFrame_controller_tag: controllers.push_back(frame.body.controller); break;
     case rheonaut_RobotFrame_telemetry_tag: {
       const protocol::Telemetry& batch = frame.body.telemetry;
       for (pb_size_t i = 0; i < batch.position_m_count; ++i) {
@@ -122,6 +147,7 @@ void StationPeer::on_frame(const protocol::RobotFrame& frame) {
         sample.disturbance_m = batch.disturbance_m;
         sample.emergency_id = batch.emergency_id;
         sample.flags = batch.flags;
+        sample.controller_id = batch.controller_id;
         samples[batch.first_seq + i] = sample;
       }
       break;

@@ -24,6 +24,7 @@ struct ReceivedSample {
   float disturbance_m = 0;
   std::uint64_t emergency_id = 0;
   std::uint32_t flags = 0;
+  std::uint32_t controller_id = 0;
 };
 
 // Commands without ids and times; send() adds them.
@@ -37,6 +38,10 @@ protocol::Command clear_emergency(std::uint64_t emergency_id);
 protocol::Command inject_disturbance(float disturbance_m);
 protocol::Command zero_position();
 protocol::Command ping();
+protocol::Command set_controller(const protocol::Controller& controller);
+protocol::Command restore_controller();
+protocol::Command set_parameter(const char* name, float value);
+protocol::Command get_parameters(std::uint32_t first_index);
 
 class StationPeer {
  public:
@@ -68,6 +73,8 @@ class StationPeer {
   std::vector<protocol::RobotFrame> frames;  // all of them, in the order of arrival
   std::vector<protocol::CommandAck> acks;
   std::vector<protocol::Event> events;
+  std::vector<protocol::ParameterPage> pages;
+  std::vector<protocol::Controller> controllers;
   std::map<std::uint64_t, ReceivedSample> samples;  // by seq
 
  private:

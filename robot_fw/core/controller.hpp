@@ -1,14 +1,20 @@
-// The fractional PD controller of the paper, executed as parallel first-order sections.
+// The fractional PD controller of the paper, executed as parallel first- and second-order sections.
 //
 //   C(s) = 65.0028 (1 + 0.0305 s^0.6524)                                   (30) of the paper
-//   u = direct · e + Σ residue_i · x_i,   x_i[k+1] = pole_i · x_i[k] + e[k]    (1)
-//   C(z = 1) = direct + Σ residue_i/(1 - pole_i) = kp                        (2)
+//   u = direct · e + Σ residue_i · x_i + Σ y_j                                 (1)
+//       x_i[k+1] = pole_i · x_i[k] + e[k]
+//       y_j = b0 · w_j[k-1] + b1 · w_j[k-2],   w_j[k] = e[k] - a1 · w_j[k-1] - a2 · w_j[k-2]
+//   C(z = 1) = direct + Σ residue_i/(1 - pole_i) + Σ (b0 + b1)/(1 + a1 + a2) = kp    (2)
+//   u = kp · e + (C - kp) · (y_0 - y)      with the derivative on the measurement     (3)
 //
-//   e → error_m, reference less position in m;  u → duty wanted, not yet limited;  sampling period 10 ms
-// The states are driven by the error alone. The limited duty is never written back: with some coefficients that
-// locks the motor for ever, and without an integrator there is nothing to wind up.
-// Accuracy: the sections are the order 5 fit of (30), with (2) at most 1.2 % and 0.25 deg off below 30 rad/s.
-// Differs from the paper: `direct` is corrected so that (2) holds exactly; the fit alone has C(1) = 65.59.
+//   e → error_m, reference less position in m;  y → position_m, y_0 the first one after a reset
+//   u → duty wanted, not yet limited;  sampling period 10 ms
+// The states are driven by the error (or, in (3), the position) alone. The limited duty is never written back: with
+// some coefficients that locks the motor for ever, and without an integrator there is nothing to wind up. In (3) a
+// change of the setpoint acts through kp alone. C - kp has no gain at DC, so that y_0 changes nothing but that the
+// sections start as if the robot had always been there. Accuracy: the sections are the order 5 fit of (30), with (2) at
+// most 1.2 % and 0.25 deg off below 30 rad/s. Differs from the paper: `direct` is corrected so that (2) holds exactly;
+// the fit alone has C(1) = 65.59.
 #pragma once
 
 #include <array>
@@ -17,36 +23,63 @@
 
 namespace robot_fw {
 
-constexpr std::size_t kMaxSections = 10;
+constexpr std::size_t kMaxSections = 10;  // a biquad counts as two
+constexpr std::size_t kMaxBiquads = kMaxSections / 2;
+
+struct Biquad {
+  float b0 = 0, b1 = 0, a1 = 0, a2 = 0;
+};
 
 struct ControllerSections {
   std::uint32_t controller_id = 0;
+  std::uint32_t checksum = 0;  // as the station gave it; 0: not computed
   float kp = 0;
+  float direct = 0;  // as designed; the controller executes (2)
   std::array<float, kMaxSections> pole{};
   std::array<float, kMaxSections> residue{};
   std::size_t count = 0;
+  std::array<Biquad, kMaxBiquads> biquad{};
+  std::size_t biquad_count = 0;
+  float duty_min = -1;  // in [-1, 0]
+  float duty_max = 1;   // in (0, 1]
+  bool derivative_on_measurement = false;
 };
 
 constexpr ControllerSections kPaperController{1,
+                                              0,
                                               65.0028F,
+                                              117.11186F,
                                               {-0.464926381F, -0.102256174F, 0.438034375F, 0.822226735F, 0.970840994F},
                                               {-29.9971855F, -14.5876807F, -5.32587518F, -1.00519276F, -0.0781306414F},
                                               5};
+
+// The direct term for which (2) holds; not finite where some section has no DC gain.
+float corrected_direct(const ControllerSections& sections);
+
+// What a controller asks for, and what its own limits leave of it.
+struct ControllerDuty {
+  float asked = 0;
+  float limited = 0;
+};
 
 class Controller {
  public:
   explicit Controller(const ControllerSections& sections);
 
-  // The duty wanted for this sample's error; call once per period.
-  float step(float error_m);
-  void reset() { state_.fill(0); }
+  // The duty for this sample; call once per period.
+  ControllerDuty step(float error_m, float position_m);
+  void reset();
 
-  std::uint32_t controller_id() const { return sections_.controller_id; }
+  const ControllerSections& sections() const { return sections_; }
 
  private:
+  float drive_sections(float input_m);
+
   ControllerSections sections_;
   float direct_;
-  std::array<float, kMaxSections> state_{};
+  std::array<float, kMaxSections> state_{};  // x_i, then w_j[k-1] and w_j[k-2] of each biquad
+  bool has_origin_ = false;
+  float origin_m_ = 0;  // y_0
 };
 
 }  // namespace robot_fw

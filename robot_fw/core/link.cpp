@@ -21,12 +21,12 @@ void Link::opened(std::uint64_t now_us) {
   connection_at_us_ = now_us;
 }
 
-void Link::welcomed(const protocol::Welcome& welcome, std::uint64_t now_us) {
+void Link::welcomed(const protocol::Welcome& welcome, std::uint32_t default_timeout_ms, std::uint64_t now_us) {
   phase_ = Phase::up;
   const auto or_default = [](std::uint32_t wish, std::uint32_t preset) { return wish == 0 ? preset : wish; };
   // SAFETY: whatever the station asks for, silence is noticed within 5 s.
-  const std::uint32_t timeout_ms = std::clamp(or_default(welcome.link_timeout_ms, protocol::kDefaultLinkTimeoutMs),
-                                              kMinLinkTimeoutMs, kMaxLinkTimeoutMs);
+  const std::uint32_t timeout_ms =
+      std::clamp(or_default(welcome.link_timeout_ms, default_timeout_ms), kMinLinkTimeoutMs, kMaxLinkTimeoutMs);
   const std::uint32_t interval_ms =
       std::clamp(or_default(welcome.heartbeat_interval_ms, protocol::kDefaultHeartbeatIntervalMs),
                  kMinHeartbeatIntervalMs, timeout_ms / 2);

@@ -18,7 +18,7 @@ class Link {
   void opened(std::uint64_t now_us);
   void closed() { phase_ = Phase::closed; }
   // Takes over the station's time-outs, within bounds; the link is up from here on.
-  void welcomed(const protocol::Welcome& welcome, std::uint64_t now_us);
+  void welcomed(const protocol::Welcome& welcome, std::uint32_t default_timeout_ms, std::uint64_t now_us);
   // Any frame of a link that is up. Returns the seconds without link when this restores a lost one.
   std::optional<float> heard(std::uint64_t now_us);
   // Once per tick: true in the tick in which the link is found to be lost.

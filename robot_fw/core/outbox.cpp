@@ -82,6 +82,8 @@ Outgoing Outbox::next(const Link& link, const TelemetryRing& samples, const Even
   if (!link.up()) return Outgoing::none;
   catch_up(samples, events);
   if (ack_count_ > 0) return Outgoing::ack;
+  if (page_count_ > 0) return Outgoing::parameters;
+  if (controller_due_) return Outgoing::controller;
   if (event_next_ < events.next_seq()) return Outgoing::event;
   const bool some_are_urgent = !live_.empty() && live_.next_seq < samples.next_seq();
   if (some_are_urgent || samples.next_seq() - live_.next_seq >= samples_per_frame) return Outgoing::live;
@@ -101,6 +103,11 @@ void Outbox::sent(Outgoing what, std::size_t samples_in_frame, std::uint64_t now
       first_ack_ = (first_ack_ + 1) % kMaxAcks;
       --ack_count_;
       break;
+    case Outgoing::parameters:
+      std::copy(pages_.begin() + 1, pages_.end(), pages_.begin());
+      --page_count_;
+      break;
+    case Outgoing::controller: controller_due_ = false; break;
     case Outgoing::event: ++event_next_; break;
     case Outgoing::live: live_.next_seq += samples_in_frame; break;
     case Outgoing::status: status_due_us_ = now_us + kStatusPeriodUs; break;

@@ -1,8 +1,8 @@
 // What is sent next: the order of the messages and the place each of them has reached.
 //
-// First to last: hello, acks of stops, acks, events, live samples, status, heartbeat, backfill. Backfill is what the
-// station lacks from before this connection or asks for again; it flows at no more than twice the rate of the live
-// samples.
+// First to last: hello, acks of stops, acks, parameters and controller as asked for, events, live samples, status,
+// heartbeat, backfill. Backfill is what the station lacks from before this connection or asks for again; it flows at no
+// more than twice the rate of the live samples.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@
 
 namespace robot_fw {
 
-enum class Outgoing { none, hello, ack, event, live, status, heartbeat, backfill };
+enum class Outgoing { none, hello, ack, parameters, controller, event, live, status, heartbeat, backfill };
 
 // A run of samples still to be sent: [next_seq, end_seq).
 struct SampleRun {
@@ -26,9 +26,17 @@ struct SampleRun {
   void extend(std::uint64_t from_seq, std::uint64_t to_seq);
 };
 
+// A page of the parameter table, as the answer to a command.
+struct PageRequest {
+  std::uint64_t command_id = 0;
+  std::size_t first_index = 0;
+  std::size_t count = 0;
+};
+
 class Outbox {
  public:
   static constexpr std::size_t kMaxAcks = 16;
+  static constexpr std::size_t kMaxPages = 4;
 
   // A new connection: hello first. Acks that were not sent stay due.
   void opened() { hello_due_ = true; }
@@ -42,6 +50,10 @@ class Outbox {
   void ack(const protocol::CommandAck& ack);
   // Ahead of every other ack, and already before Welcome. Always kept; if all answer stops, the oldest makes room.
   void ack_stop(const protocol::CommandAck& ack);
+  // There must be room for it.
+  void ask_page(const PageRequest& page) { pages_[page_count_++] = page; }
+  bool has_room_for_page() const { return page_count_ < kMaxPages; }
+  void controller_changed() { controller_due_ = true; }
   void echo(std::uint64_t station_time_us, std::uint64_t received_at_us);
   // Once per tick, after the sample was made; `urgent` sends it, and all before it, at once.
   void sample_made(const TelemetryRing& samples, bool urgent);
@@ -53,6 +65,7 @@ class Outbox {
   void sent(Outgoing what, std::size_t samples_in_frame, std::uint64_t now_us);
 
   const protocol::CommandAck& first_ack() const { return acks_[first_ack_]; }
+  const PageRequest& first_page() const { return pages_[0]; }
   std::uint64_t event_seq() const { return event_next_; }
   std::uint64_t live_seq() const { return live_.next_seq; }
   const SampleRun& backfill() const { return backfill_; }
@@ -66,6 +79,9 @@ class Outbox {
   std::array<protocol::CommandAck, kMaxAcks> acks_{};
   std::size_t first_ack_ = 0, ack_count_ = 0;
   std::size_t stop_acks_ = 0;  // how many of them, the first ones, answer a stop
+  std::array<PageRequest, kMaxPages> pages_{};
+  std::size_t page_count_ = 0;
+  bool controller_due_ = false;
   std::uint64_t event_next_ = 0;
   SampleRun live_;  // end_seq: samples below it are due at once
   SampleRun backfill_;

@@ -10,8 +10,6 @@ std::uint64_t lease_end_us(std::uint32_t lease_ms, std::uint64_t now_us) {
 
 }  // namespace
 
-Pilot::Pilot(float auto_limit_s) : auto_limit_us_(static_cast<std::uint64_t>(auto_limit_s) * 1'000'000) {}
-
 void Pilot::end_motion() {
   manual_duty_ = 0;
   lease_until_us_ = 0;
@@ -26,10 +24,11 @@ void Pilot::halt() {
   lease_lapsed_ = false;
 }
 
-void Pilot::enter_auto(float setpoint_m, std::uint64_t now_us) {
+void Pilot::enter_auto(float setpoint_m, float limit_s, std::uint64_t now_us) {
   halt();
   setpoint_m_ = setpoint_m;
-  auto_until_us_ = now_us + auto_limit_us_;
+  auto_limit_s_ = limit_s;
+  auto_until_us_ = now_us + static_cast<std::uint64_t>(limit_s * 1e6F);
 }
 
 void Pilot::set_duty(float duty, std::uint32_t lease_ms, std::uint64_t now_us) {
@@ -48,7 +47,7 @@ void Pilot::set_schedule(const rheonaut_SetDutySchedule& schedule, std::uint64_t
 }
 
 bool Pilot::renew_lease(std::uint32_t lease_ms, std::uint64_t now_us) {
-  if (!motion_ordered() || now_us >= lease_until_us_) return false;  // SAFETY: what has lapsed stays lapsed
+  if (lease_until_us_ == 0 || now_us >= lease_until_us_) return false;  // SAFETY: what has lapsed stays lapsed
   lease_until_us_ = lease_end_us(lease_ms, now_us);
   return true;
 }

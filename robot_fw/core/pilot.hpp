@@ -18,11 +18,10 @@ class Pilot {
  public:
   enum class Lapse { none, lease, schedule, auto_limit };
 
-  explicit Pilot(float auto_limit_s);
-
   // Manual at duty 0 with nothing pending: the state after boot, and the end of every motion.
   void halt();
-  void enter_auto(float setpoint_m, std::uint64_t now_us);
+  // Ends by itself after `limit_s`.
+  void enter_auto(float setpoint_m, float limit_s, std::uint64_t now_us);
   void set_setpoint(float setpoint_m) { setpoint_m_ = setpoint_m; }
   void set_disturbance(float disturbance_m) { disturbance_m_ = disturbance_m; }
   // A duty of 0 needs no lease and ends one.
@@ -38,14 +37,15 @@ class Pilot {
   std::optional<float> setpoint_m() const { return setpoint_m_; }
   float disturbance_m() const { return disturbance_m_; }
   float manual_duty() const { return manual_duty_; }
+  bool motion_ordered() const { return is_auto() || lease_until_us_ != 0; }
+  float auto_limit_s() const { return auto_limit_s_; }
   bool lease_lapsed() const { return lease_lapsed_; }  // since the last order
 
  private:
-  bool motion_ordered() const { return lease_until_us_ != 0; }
   void end_motion();
   bool follow_schedule();
 
-  std::uint64_t auto_limit_us_;
+  float auto_limit_s_ = 0;  // of the last entry
   std::uint64_t auto_until_us_ = 0;
   std::optional<float> setpoint_m_;  // present in auto, and only there
   float disturbance_m_ = 0;

@@ -1,16 +1,19 @@
-// The tick: sensor, link, orders, controller, safety, telemetry.
+// The tick: sensor, link, orders, limits, reference, controller, safety, telemetry.
 #include "robot_fw/core/robot.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "robot_fw/core/controller_message.hpp"
+
 namespace robot_fw {
 
 Robot::Robot(const RobotConfig& config)
     : config_(config),
-      pilot_(config.auto_limit_s),
+      controllers_(adapted(kPaperController, {config.duty_min, config.duty_max}, config.sample_period_us)),
       safety_({config.duty_min, config.duty_max}, config.boot_id),
       gate_(config.boot_id) {
+  load_settings();
   note(rheonaut_EVENT_KIND_BOOT, rheonaut_EVENT_CAUSE_RESET, 0);
   const bool suspicious_reset =
       config.reset_cause == rheonaut_RESET_CAUSE_WATCHDOG || config.reset_cause == rheonaut_RESET_CAUSE_BROWN_OUT;
@@ -33,14 +36,17 @@ Outputs Robot::step(const Inputs& inputs, float dt_s) {
   let_orders_run_out();
 
   const Measured measured = read_perfect_sensor(inputs);
-  const float wanted = wanted_duty(measured);
-  if (!inputs_are_sound_ || !std::isfinite(wanted)) {
+  watch_limits(measured, dt_s);
+  const ControllerDuty wanted = wanted_duty(measured, dt_s);
+  if (!inputs_are_sound_ || !std::isfinite(wanted.asked)) {
     // SAFETY: a value that is not a number, or a clock that goes back, stops the robot; once, not in every tick.
     if (!safety_.latched()) emergency(rheonaut_EMERGENCY_CAUSE_INTERNAL_ERROR, rheonaut_EVENT_CAUSE_INTERNAL, 0);
   }
-  duty_ = safety_.permit(wanted);  // SAFETY: nothing after this line touches the duty
-  saturated_ = !safety_.latched() && duty_ != wanted;
+  saturated_ = !safety_.latched() && safety_.permit(wanted.limited) != wanted.asked;
+  duty_ = safety_.permit(slewed(wanted.limited, dt_s));  // SAFETY: nothing after this line touches the duty
+  announce_controller();
   record_sample(measured, dt_s);
+  save_settings();
   return {duty_};
 }
 
@@ -84,16 +90,45 @@ void Robot::let_orders_run_out() {
     case Pilot::Lapse::lease: note(rheonaut_EVENT_KIND_LEASE_LAPSED, rheonaut_EVENT_CAUSE_TIME, duty_before); break;
     case Pilot::Lapse::schedule: note(rheonaut_EVENT_KIND_DUTY_SCHEDULE_ENDED, rheonaut_EVENT_CAUSE_TIME, 0); break;
     case Pilot::Lapse::auto_limit:
-      note(rheonaut_EVENT_KIND_AUTO_LIMIT, rheonaut_EVENT_CAUSE_TIME, config_.auto_limit_s);
+      note(rheonaut_EVENT_KIND_AUTO_LIMIT, rheonaut_EVENT_CAUSE_TIME, pilot_.auto_limit_s());
       note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_TIME, 0);
       drop_timed_commands(rejected(rheonaut_REJECT_REASON_WRONG_MODE));
       break;
   }
 }
 
-float Robot::wanted_duty(const Measured& measured) {
+// Where the robot is, without the disturbance, and how long the motor has been at power in the ticks before this one.
+void Robot::watch_limits(const Measured& measured, float dt_s) {
+  if (!inputs_are_sound_) return;
+  const PositionLimits limits = position_limits();
+  const float position_m = measured.position_m - pilot_.disturbance_m();
+  if (safety_.leaves_limits(position_m, limits)) {
+    const float limit_m = position_m > limits.max_m ? limits.max_m : limits.min_m;
+    note(rheonaut_EVENT_KIND_LIMIT_HIT, rheonaut_EVENT_CAUSE_LIMIT, limit_m);
+    // SAFETY: a robot that leaves its stretch of the vessel stops; a latch of another cause stays what it is.
+    if (!safety_.latched()) emergency(rheonaut_EMERGENCY_CAUSE_POSITION_LIMIT, rheonaut_EVENT_CAUSE_LIMIT, 0);
+  }
+  const PowerLimit power{parameters_[ParameterId::power_limit_duty], parameters_[ParameterId::power_limit_s]};
+  if (safety_.too_long_at_power(duty_, dt_s, power)) {
+    note(rheonaut_EVENT_KIND_LIMIT_HIT, rheonaut_EVENT_CAUSE_LIMIT, power.time_s);
+    emergency(rheonaut_EMERGENCY_CAUSE_TIME_AT_POWER, rheonaut_EVENT_CAUSE_LIMIT, 0);  // SAFETY: a motor gets hot
+  }
+}
+
+ControllerDuty Robot::wanted_duty(const Measured& measured, float dt_s) {
   const auto setpoint_m = pilot_.setpoint_m();
-  return setpoint_m ? controller_.step(*setpoint_m - measured.position_m) : pilot_.manual_duty();
+  if (!setpoint_m) return {pilot_.manual_duty(), pilot_.manual_duty()};
+  const ProfileLimits limits{parameters_[ParameterId::profile_velocity_m_s],
+                             parameters_[ParameterId::profile_acceleration_m_s2]};
+  reference_m_ = profile_.step(*setpoint_m, measured.position_m, limits, dt_s);
+  return controllers_.step(reference_m_ - measured.position_m, measured.position_m);
+}
+
+// The duty as near to the one wanted as the slew allows. In manual 0 is 0 at once: what ends, ends.
+float Robot::slewed(float duty, float dt_s) const {
+  const float slew_per_s = parameters_[ParameterId::duty_slew_per_s];
+  if (slew_per_s <= 0 || (!pilot_.is_auto() && duty == 0)) return duty;
+  return std::clamp(duty, duty_ - slew_per_s * dt_s, duty_ + slew_per_s * dt_s);
 }
 
 void Robot::record_sample(const Measured& measured, float dt_s) {
@@ -103,7 +138,7 @@ void Robot::record_sample(const Measured& measured, float dt_s) {
   sample.acceleration_m_s2 = measured.acceleration_m_s2;
   sample.duty = duty_;
   sample.impedance_mv = inputs_.impedance_mv;
-  sample.reference_m = pilot_.setpoint_m().value_or(0.0F);
+  sample.reference_m = pilot_.is_auto() ? reference_m_ : 0;
   const bool usable_period = dt_s > 0 && dt_s < 1;
   const std::uint32_t period_us =
       usable_period ? static_cast<std::uint32_t>(std::lround(dt_s * 1e6F)) : config_.sample_period_us;
@@ -122,10 +157,11 @@ BatchValues Robot::batch_values() const {
   values.has_setpoint = pilot_.setpoint_m().has_value();
   values.setpoint_m = pilot_.setpoint_m().value_or(0.0F);
   values.disturbance_m = pilot_.disturbance_m();
-  values.controller_id = controller_.controller_id();
+  values.controller_id = controllers_.in_force().controller_id;
   unsigned flags = 0;
   if (link_.lost()) flags |= rheonaut_TELEMETRY_FLAG_LINK_LOSS;
   if (pilot_.lease_lapsed()) flags |= rheonaut_TELEMETRY_FLAG_LEASE_LAPSED;
+  if (safety_.outside_limits()) flags |= rheonaut_TELEMETRY_FLAG_POSITION_LIMIT;
   if (!inputs_are_sound_) flags |= rheonaut_TELEMETRY_FLAG_SENSOR_FAULT;
   values.flags = static_cast<std::uint16_t>(flags);
   return values;
@@ -139,7 +175,8 @@ protocol::Mode Robot::mode() const {
 // The motor is off from here on, not only from the next tick.
 void Robot::stop_motion() {
   pilot_.halt();
-  controller_.reset();
+  controllers_.reset();
+  profile_.restart();
   duty_ = 0;
 }
 

@@ -1,6 +1,6 @@
 // The whole robot: a tick, bytes in, bytes out.
 //
-//   step()      one tick, 100 Hz: sensor, link, orders, controller, safety, telemetry
+//   step()      one tick, 100 Hz: sensor, link, orders, limits, reference, controller, safety, telemetry
 //   receive()   bytes from the station, at any time between ticks; an emergency stop acts in here
 //   transmit()  bytes to the station, at any time between ticks; never waits
 // The port (a simulated robot, an ESP8266) owns the clock, the connection and the motor pin. After every call it puts
@@ -9,13 +9,16 @@
 
 #include "protocol/frame.hpp"
 #include "robot_fw/core/commands.hpp"
-#include "robot_fw/core/controller.hpp"
+#include "robot_fw/core/controller_switch.hpp"
 #include "robot_fw/core/event_ring.hpp"
 #include "robot_fw/core/hardware_io.hpp"
 #include "robot_fw/core/link.hpp"
 #include "robot_fw/core/outbox.hpp"
+#include "robot_fw/core/parameters.hpp"
 #include "robot_fw/core/pilot.hpp"
+#include "robot_fw/core/reference_profile.hpp"
 #include "robot_fw/core/safety.hpp"
+#include "robot_fw/core/settings_store.hpp"
 #include "robot_fw/core/telemetry_ring.hpp"
 
 namespace robot_fw {
@@ -28,12 +31,11 @@ struct RobotConfig {
   protocol::ResetCause reset_cause = rheonaut_RESET_CAUSE_POWER_ON;
   float duty_min = -1;                  // in [-1, 0]
   float duty_max = 1;                   // in (0, 1]
-  float setpoint_limit_m = 1;           // setpoints and disturbances lie in [-limit, limit]
-  float auto_limit_s = 600;             // auto ends by itself after this
   std::uint32_t samples_per_frame = 5;  // 1 to 25; the station may ask for another
   std::uint32_t sample_period_us = 10'000;
   std::uint64_t restored_emergency_id = 0;  // a latch that the port's memory kept over the reset; 0: none
   protocol::EmergencyCause restored_emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;
+  Storage* storage = nullptr;  // of parameters and controller, outlives the robot; null: they end with the boot
 };
 
 class Robot {
@@ -74,7 +76,9 @@ class Robot {
   void watch_link();
   void run_due_commands();
   void let_orders_run_out();
-  float wanted_duty(const Measured& measured);
+  void watch_limits(const Measured& measured, float dt_s);
+  ControllerDuty wanted_duty(const Measured& measured, float dt_s);
+  float slewed(float duty, float dt_s) const;
   void record_sample(const Measured& measured, float dt_s);
   BatchValues batch_values() const;
   void stop_motion();
@@ -98,6 +102,18 @@ class Robot {
   Verdict inject_disturbance(float disturbance_m, std::uint64_t command_id);
   Verdict zero_position(std::uint64_t command_id);
   Verdict check_position(float position_m) const;
+  Verdict check_setpoint(float setpoint_m) const;
+
+  // Parameters and controllers, in robot_settings.cpp.
+  Verdict set_controller(const protocol::Controller& controller, std::uint64_t command_id);
+  Verdict restore_controller(std::uint64_t command_id);
+  Verdict set_parameter(const rheonaut_SetParameter& order, std::uint64_t command_id);
+  Verdict get_parameters(std::uint32_t first_index, std::uint64_t command_id);
+  void announce_controller();
+  bool motor_on() const { return duty_ != 0 || pilot_.motion_ordered(); }
+  void load_settings();
+  void save_settings();
+  PositionLimits position_limits() const;
 
   // Frames in and out, in robot_frames.cpp.
   bool on_frame(protocol::Bytes payload);
@@ -105,6 +121,7 @@ class Robot {
   void on_heartbeat(const protocol::StationHeartbeat& heartbeat);
   void station_heard();
   void fill(Outgoing what, protocol::RobotFrame& frame) const;
+  void fill_parameters(protocol::ParameterPage& page) const;
   void fill_hello(protocol::Hello& hello) const;
   void fill_status(protocol::Status& status) const;
 
@@ -113,12 +130,17 @@ class Robot {
   Inputs inputs_{};  // of the last tick
   bool inputs_are_sound_ = true;
   float position_zero_m_ = 0;
+  float reference_m_ = 0;  // in auto
   float duty_ = 0;
   bool saturated_ = false;
   bool sample_is_urgent_ = false;  // something happened since the last one
 
   Pilot pilot_;
-  Controller controller_{kPaperController};
+  ReferenceProfile profile_;
+  Parameters parameters_;
+  ControllerSwitch controllers_;
+  std::uint64_t controller_command_id_ = 0;  // the last command about the controller
+  bool parameters_unsaved_ = false, controller_unsaved_ = false;
   Safety safety_;
   CommandGate gate_;
   TimedCommands timed_;

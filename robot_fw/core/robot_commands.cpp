@@ -85,14 +85,27 @@ Verdict Robot::execute(const protocol::Command& command) {
       return inject_disturbance(command.action.inject_disturbance.disturbance_m, id);
     case rheonaut_Command_zero_position_tag: return zero_position(id);
     case rheonaut_Command_ping_tag: return kAccepted;
+    case rheonaut_Command_set_controller_tag: return set_controller(command.action.set_controller, id);
+    case rheonaut_Command_restore_controller_tag: return restore_controller(id);
+    case rheonaut_Command_set_parameter_tag: return set_parameter(command.action.set_parameter, id);
+    case rheonaut_Command_get_parameters_tag: return get_parameters(command.action.get_parameters.first_index, id);
     default: return rejected(rheonaut_REJECT_REASON_UNSUPPORTED);
   }
 }
 
 Verdict Robot::check_position(float position_m) const {
   if (!std::isfinite(position_m)) return rejected(rheonaut_REJECT_REASON_NOT_FINITE);
-  if (std::fabs(position_m) > config_.setpoint_limit_m) return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
+  if (std::fabs(position_m) > parameters_[ParameterId::setpoint_limit_m]) {
+    return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
+  }
   return kAccepted;
+}
+
+Verdict Robot::check_setpoint(float setpoint_m) const {
+  const Verdict verdict = check_position(setpoint_m);
+  if (!verdict.accepted() || position_limits().contain(setpoint_m)) return verdict;
+  // SAFETY: nothing sends the robot beyond its limits, and outside them only back in.
+  return rejected(safety_.outside_limits() ? rheonaut_REJECT_REASON_OUTWARD : rheonaut_REJECT_REASON_OUT_OF_RANGE);
 }
 
 Verdict Robot::set_mode(const rheonaut_SetMode& order, std::uint64_t command_id) {
@@ -100,13 +113,13 @@ Verdict Robot::set_mode(const rheonaut_SetMode& order, std::uint64_t command_id)
   const bool known = to_auto || order.mode == rheonaut_MODE_MANUAL;
   if (!known || order.has_setpoint_m != to_auto) return rejected(rheonaut_REJECT_REASON_MALFORMED);
   if (to_auto) {
-    const Verdict verdict = check_position(order.setpoint_m);
+    const Verdict verdict = check_setpoint(order.setpoint_m);
     if (!verdict.accepted()) return verdict;
   }
   const protocol::Mode before = mode();
   stop_motion();  // SAFETY: nothing outlives a change of mode
   drop_timed_commands(rejected(rheonaut_REJECT_REASON_WRONG_MODE));
-  if (to_auto) pilot_.enter_auto(order.setpoint_m, now_us_);
+  if (to_auto) pilot_.enter_auto(order.setpoint_m, parameters_[ParameterId::auto_limit_s], now_us_);
   if (mode() != before) note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, 0, command_id);
   if (to_auto) {
     note(rheonaut_EVENT_KIND_SETPOINT_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, order.setpoint_m, command_id);
@@ -115,10 +128,11 @@ Verdict Robot::set_mode(const rheonaut_SetMode& order, std::uint64_t command_id)
 }
 
 Verdict Robot::set_setpoint(float setpoint_m, std::uint64_t command_id) {
-  const Verdict verdict = check_position(setpoint_m);
+  const Verdict verdict = check_setpoint(setpoint_m);
   if (!verdict.accepted()) return verdict;
   if (!pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
   pilot_.set_setpoint(setpoint_m);
+  profile_.restart();
   note(rheonaut_EVENT_KIND_SETPOINT_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, setpoint_m, command_id);
   return kAccepted;
 }
@@ -129,6 +143,7 @@ Verdict Robot::set_duty(const rheonaut_SetDuty& order) {
     return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
   }
   if (pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
+  if (safety_.outward(order.duty)) return rejected(rheonaut_REJECT_REASON_OUTWARD);  // SAFETY: outside, only inward
   pilot_.set_duty(order.duty, order.lease_ms, now_us_);
   return kAccepted;
 }
@@ -148,6 +163,9 @@ Verdict Robot::set_duty_schedule(const rheonaut_SetDutySchedule& order) {
   }
   if (order.duty[order.duty_count - 1] != 0) return rejected(rheonaut_REJECT_REASON_MALFORMED);
   if (pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
+  const bool leads_out =
+      std::any_of(order.duty, order.duty + order.duty_count, [this](float duty) { return safety_.outward(duty); });
+  if (leads_out) return rejected(rheonaut_REJECT_REASON_OUTWARD);  // SAFETY: outside, only inward
   pilot_.set_schedule(order, now_us_);
   return kAccepted;
 }

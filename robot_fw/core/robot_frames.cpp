@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "robot_fw/core/controller_message.hpp"
 #include "robot_fw/core/robot.hpp"
 
 namespace robot_fw {
@@ -70,7 +71,7 @@ bool Robot::on_welcome(const protocol::Welcome& welcome) {
   }
   std::copy(std::begin(welcome.detail), std::end(welcome.detail), refusal_detail_.begin());
   if (refusal_ != rheonaut_REFUSAL_REASON_NONE) return false;
-  link_.welcomed(welcome, now_us_);
+  link_.welcomed(welcome, static_cast<std::uint32_t>(parameters_[ParameterId::link_timeout_ms]), now_us_);
   station_heard();
   samples_.acknowledge(welcome.durable_next_seq);
   events_.acknowledge(welcome.durable_next_event_seq);
@@ -116,6 +117,12 @@ void Robot::fill(Outgoing what, protocol::RobotFrame& frame) const {
       frame.which_body = rheonaut_RobotFrame_command_ack_tag;
       frame.body.command_ack = outbox_.first_ack();
       return;
+    case Outgoing::parameters:
+      frame.which_body = rheonaut_RobotFrame_parameter_page_tag;
+      return fill_parameters(frame.body.parameter_page);
+    case Outgoing::controller:
+      frame.which_body = rheonaut_RobotFrame_controller_tag;
+      return write_controller(controllers_.in_force(), config_.sample_period_us, frame.body.controller);
     case Outgoing::event:
       frame.which_body = rheonaut_RobotFrame_event_tag;
       frame.body.event = events_.at(outbox_.event_seq());
@@ -138,6 +145,24 @@ void Robot::fill(Outgoing what, protocol::RobotFrame& frame) const {
   }
 }
 
+void Robot::fill_parameters(protocol::ParameterPage& page) const {
+  const PageRequest& request = outbox_.first_page();
+  page.command_id = request.command_id;
+  page.first_index = static_cast<std::uint32_t>(request.first_index);
+  page.total = kParameterCount;
+  page.parameters_count = static_cast<pb_size_t>(request.count);
+  for (std::size_t i = 0; i < request.count; ++i) {
+    const ParameterSpec& spec = Parameters::spec(request.first_index + i);
+    rheonaut_Parameter& parameter = page.parameters[i];
+    copy_text(parameter.name, spec.name);
+    copy_text(parameter.unit, spec.unit);
+    parameter.value = parameters_.value(request.first_index + i);
+    parameter.minimum = spec.minimum;
+    parameter.maximum = spec.maximum;
+    parameter.default_value = spec.default_value;
+  }
+}
+
 void Robot::fill_hello(protocol::Hello& hello) const {
   hello.protocol_version = protocol::kProtocolVersion;
   copy_text(hello.robot_id, config_.robot_id);
@@ -151,7 +176,9 @@ void Robot::fill_hello(protocol::Hello& hello) const {
   hello.next_seq = samples_.next_seq();
   hello.oldest_event_seq = events_.oldest_seq();
   hello.next_event_seq = events_.next_seq();
-  hello.controller_id = controller_.controller_id();
+  hello.parameters_checksum = parameters_.checksum();
+  hello.controller_id = controllers_.in_force().controller_id;
+  hello.controller_checksum = controllers_.in_force().checksum;
   hello.mode = mode();
   hello.emergency_id = safety_.emergency_id();
   hello.emergency_cause = safety_.cause();

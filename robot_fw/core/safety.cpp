@@ -1,6 +1,7 @@
 // Latches, clears and limits.
 #include "robot_fw/core/safety.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace robot_fw {
@@ -38,9 +39,32 @@ bool Safety::clear(std::uint64_t emergency_id) {
   return true;
 }
 
+bool Safety::leaves_limits(float position_m, const PositionLimits& limits) {
+  const Side before = side_;
+  if (position_m > limits.max_m) {
+    side_ = Side::above;
+  } else if (position_m < limits.min_m) {
+    side_ = Side::below;
+  } else if (limits.contain(position_m)) {  // NaN is nowhere
+    side_ = Side::inside;
+  }
+  return side_ != Side::inside && side_ != before;
+}
+
+bool Safety::outward(float duty) const {
+  return (side_ == Side::above && duty > 0) || (side_ == Side::below && duty < 0);
+}
+
+bool Safety::too_long_at_power(float duty, float dt_s, const PowerLimit& limit) {
+  const bool at_power = std::fabs(duty) > limit.duty;
+  at_power_s_ = std::clamp(at_power_s_ + (at_power ? dt_s : -dt_s), 0.0F, limit.time_s);
+  return at_power && at_power_s_ >= limit.time_s;
+}
+
 float Safety::permit(float wanted_duty) const {
   if (latched()) return 0;                          // SAFETY: emergency overrides every mode; it coasts
   if (!std::isfinite(wanted_duty)) return 0;        // SAFETY: no NaN reaches the motor
+  if (outward(wanted_duty)) return 0;               // SAFETY: outside a limit only inward
   if (wanted_duty < range_.min) return range_.min;  // SAFETY: within the motor's range
   if (wanted_duty > range_.max) return range_.max;
   return wanted_duty;

@@ -1,4 +1,4 @@
-// The emergency latch, and the last word on the duty.
+// The emergency latch, the position limits, the time at power, and the last word on the duty.
 //
 // Each stop gives the latch a new id, so that a clear, which names an id, can never undo a later stop.
 #pragma once
@@ -16,6 +16,18 @@ struct DutyRange {
   bool contains(float duty) const { return duty >= min && duty <= max; }  // false for NaN
 };
 
+struct PositionLimits {
+  float min_m = -100;
+  float max_m = 100;
+
+  bool contain(float position_m) const { return position_m >= min_m && position_m <= max_m; }
+};
+
+struct PowerLimit {
+  float duty = 0.9F;  // above this |duty| the motor is at power
+  float time_s = 60;  // for at most this long
+};
+
 class Safety {
  public:
   Safety(DutyRange range, std::uint64_t boot_id);
@@ -27,20 +39,32 @@ class Safety {
   // Unlatches if `emergency_id` is the one in force; says whether it did.
   bool clear(std::uint64_t emergency_id);
 
+  // Follows the position; says so in the tick in which it leaves the limits.
+  bool leaves_limits(float position_m, const PositionLimits& limits);
+  // Outside the limits, the duty that leads further out.
+  bool outward(float duty) const;
+  bool outside_limits() const { return side_ != Side::inside; }
+  // Counts the time at power, which goes down again as fast as it went up; says when it is too much.
+  bool too_long_at_power(float duty, float dt_s, const PowerLimit& limit);
+
   bool latched() const { return emergency_id_ != 0; }
   std::uint64_t emergency_id() const { return emergency_id_; }
   protocol::EmergencyCause cause() const { return cause_; }
   const DutyRange& range() const { return range_; }
 
-  // What the motor gets of the duty wanted: 0 when latched or not finite, otherwise within the range.
+  // What the motor gets of the duty wanted: 0 when latched, not finite or outward, otherwise within the range.
   float permit(float wanted_duty) const;
 
  private:
+  enum class Side { inside, below, above };
+
   DutyRange range_;
   std::uint64_t boot_id_;
   std::uint64_t stops_ = 0;
   std::uint64_t emergency_id_ = 0;
   protocol::EmergencyCause cause_ = rheonaut_EMERGENCY_CAUSE_NONE;
+  Side side_ = Side::inside;
+  float at_power_s_ = 0;
 };
 
 }  // namespace robot_fw

@@ -126,15 +126,6 @@ TEST_F(Commands, SetModeWantsASetpointForAutoAndNoneForManual) {
   EXPECT_EQ(answer(emergency), "malformed");
 }
 
-TEST_F(Commands, OfLaterFirmwareAreUnsupported) {
-  for (const int action : {rheonaut_Command_set_controller_tag, rheonaut_Command_restore_controller_tag,
-                           rheonaut_Command_set_parameter_tag, rheonaut_Command_get_parameters_tag}) {
-    protocol::Command command = rheonaut_Command_init_zero;
-    command.which_action = static_cast<pb_size_t>(action);
-    EXPECT_EQ(answer(command), "unsupported");
-  }
-}
-
 TEST_F(Commands, ADisturbanceShiftsTheMeasurementAndEndsWithAuto) {
   order(set_auto(0));
   order(inject_disturbance(-0.05F));

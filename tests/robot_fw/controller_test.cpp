@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "tests/robot_fw/controllers.hpp"
+
 namespace robot_fw {
 namespace {
 
@@ -53,7 +55,7 @@ TEST(Controller, FollowsTheGoldenRecurrenceButForItsDcGain) {
     for (std::size_t i = 1; i < b.size(); ++i) {
       memory[i - 1] = b[i] * error_m - a[i] * duty + (i + 1 < b.size() ? memory[i] : 0);
     }
-    const auto got = static_cast<double>(controller.step(static_cast<float>(error_m)));
+    const auto got = static_cast<double>(controller.step(static_cast<float>(error_m), 0).asked);
     ASSERT_NEAR(got, duty - excess * error_m, 2e-5) << "sample " << k;
   }
 }
@@ -61,16 +63,69 @@ TEST(Controller, FollowsTheGoldenRecurrenceButForItsDcGain) {
 TEST(Controller, HasADcGainOfExactlyKp) {
   Controller controller{kPaperController};
   float duty = 0;
-  for (int k = 0; k < 2000; ++k) duty = controller.step(0.1F);
+  for (int k = 0; k < 2000; ++k) duty = controller.step(0.1F, 0).asked;
   EXPECT_NEAR(duty, 6.50028F, 1e-5F);
 }
 
 TEST(Controller, ForgetsEverythingOnReset) {
   Controller controller{kPaperController};
-  const float first = controller.step(0.1F);
-  controller.step(0.05F);
+  const float first = controller.step(0.1F, 0).asked;
+  controller.step(0.05F, 0);
   controller.reset();
-  EXPECT_EQ(controller.step(0.1F), first);
+  EXPECT_EQ(controller.step(0.1F, 0).asked, first);
+}
+
+ControllerSections biquads() {
+  ControllerSections sections = sections_of(golden_biquads());
+  sections.derivative_on_measurement = false;
+  return sections;
+}
+
+// The same transfer function in double precision, section by section, as the protocol writes it.
+TEST(Controller, RunsBiquadsAsTheProtocolDefinesThem) {
+  Controller controller{biquads()};
+  const double direct = 30 + 3 / 0.5 - 0.375 / 0.125;  // DC gain of exactly kp
+  double x = 0, y1 = 0, y2 = 0, e1 = 0, e2 = 0;
+  for (int k = 0; k < 500; ++k) {
+    const double e = std::sin(0.3 * k) * std::exp(-0.01 * k);
+    const double y = 0.25 * e1 + 0.125 * e2 + 1.5 * y1 - 0.625 * y2;
+    const auto got = static_cast<double>(controller.step(static_cast<float>(e), 0).asked);
+    ASSERT_NEAR(got, direct * e - 3 * x + y, 2e-5) << k;
+    x = 0.5 * x + e;
+    y2 = y1, y1 = y, e2 = e1, e1 = e;
+  }
+}
+
+TEST(Controller, HasItsDcGainWithBiquadsAndWithTheDerivativeOnTheMeasurement) {
+  for (const bool on_measurement : {false, true}) {
+    ControllerSections sections = biquads();
+    sections.derivative_on_measurement = on_measurement;
+    Controller controller{sections};
+    float duty = 0;
+    for (int k = 0; k < 2000; ++k) duty = controller.step(0.01F, 0.09F).asked;
+    EXPECT_NEAR(duty, 0.3F, 1e-5F);
+  }
+}
+
+TEST(Controller, WithTheDerivativeOnTheMeasurementASetpointActsThroughKpAlone) {
+  ControllerSections sections = kPaperController;
+  sections.derivative_on_measurement = true;
+  Controller controller{sections};
+  EXPECT_FLOAT_EQ(controller.step(0.01F, 0.5F).asked, 0.650028F);  // wherever it starts
+  EXPECT_FLOAT_EQ(controller.step(0.02F, 0.5F).asked, 1.300056F);
+}
+
+// With the setpoint at rest the two differ only by where they started: their answers to motion are the same.
+TEST(Controller, AnswersToMotionAreTheSameWithTheDerivativeOnEither) {
+  ControllerSections sections = kPaperController;
+  Controller on_error{sections};
+  sections.derivative_on_measurement = true;
+  Controller on_measurement{sections};
+  for (int k = 0; k < 500; ++k) {
+    const float position_m = k == 0 ? 0 : 0.01F * std::sin(0.1F * static_cast<float>(k));
+    ASSERT_NEAR(on_error.step(-position_m, position_m).asked, on_measurement.step(-position_m, position_m).asked,
+                1e-5F);
+  }
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ class Acks : public ::testing::Test {
 
   Acks() {
     link.opened(0);
-    link.welcomed(rheonaut_Welcome_init_zero, 0);
+    link.welcomed(rheonaut_Welcome_init_zero, protocol::kDefaultLinkTimeoutMs, 0);
   }
   static protocol::CommandAck numbered(std::uint64_t number) {
     protocol::CommandAck ack = rheonaut_CommandAck_init_zero;

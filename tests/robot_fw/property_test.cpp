@@ -4,7 +4,9 @@
 #include <random>
 #include <vector>
 
+#include "tests/robot_fw/controllers.hpp"
 #include "tests/robot_fw/driven_robot.hpp"
+#include "tests/robot_fw/memory_storage.hpp"
 
 namespace robot_fw {
 namespace {
@@ -48,7 +50,7 @@ class RandomStation {
     return values[number() % std::size(values)];
   }
   protocol::Command action() {
-    switch (number() % 12) {
+    switch (number() % 16) {
       case 0: return emergency_stop();
       case 1: return set_manual();
       case 2:
@@ -59,9 +61,29 @@ class RandomStation {
       case 7: return renew_lease();
       case 8: return inject_disturbance(value());
       case 9: return zero_position();
-      case 10: return clear_emergency(number() % 8 == 0 ? number() : robot_.core().emergency_id());
+      case 10: return set_controller(controller());
+      case 11: return restore_controller();
+      case 12: {
+        const ParameterSpec& spec = Parameters::spec(number() % kParameterCount);
+        return set_parameter(spec.name,
+                             number() % 4 == 0 ? value() : spec.minimum + 0.1F * (spec.maximum - spec.minimum));
+      }
+      case 13: return get_parameters(number() % (kParameterCount + 1));
+      case 14: return clear_emergency(number() % 8 == 0 ? number() : robot_.core().emergency_id());
       default: return schedule();
     }
+  }
+  // Sound ones, ones with a wrong value and the right checksum, and ones with a wrong checksum.
+  protocol::Controller controller() {
+    protocol::Controller controller = number() % 2 == 0 ? golden_biquads() : scaled_controller(3, 1.5F);
+    controller.duty_min = number() % 2 == 0 ? 0 : -0.4F;
+    if (number() % 2 == 0) controller.duty_max = 0.5F;
+    controller.derivative_on = number() % 2 == 0 ? rheonaut_DERIVATIVE_ON_ERROR : rheonaut_DERIVATIVE_ON_MEASUREMENT;
+    float* numbers[] = {&controller.kp,           &controller.direct,       &controller.pole[0],
+                        &controller.residue[0],   &controller.biquad_b0[0], &controller.biquad_a1[0],
+                        &controller.biquad_a2[0], &controller.duty_max};
+    if (number() % 2 == 0) *numbers[number() % std::size(numbers)] = value();
+    return number() % 8 == 0 ? controller : with_checksum(controller);
   }
   protocol::Command schedule() {
     protocol::Command command = rheonaut_Command_init_zero;
@@ -86,6 +108,8 @@ TEST_P(AnyOrder, TheDutyStaysInRangeAndIsZeroInEmergency) {
   SimulatedRobotConfig config;
   config.boot_id = kBootId;
   if (GetParam() % 2 == 0) config.duty = {0, 0.6F};
+  MemoryStorage storage;
+  config.storage = &storage;
   SimulatedRobot robot{config};
   StationPeer station{robot};
   RandomStation random{GetParam(), robot};
@@ -142,8 +166,16 @@ TEST_P(AnyOrder, ExpiredAndRepeatedCommandsChangeNothing) {
     pest.run(ticks);
     ASSERT_EQ(plain.core().duty(), pestered.core().duty()) << "round " << round;
     ASSERT_EQ(plain.core().mode(), pestered.core().mode()) << "round " << round;
+    const auto &said_by_plain = station.controllers, &said_by_pestered = pest.controllers;
+    ASSERT_EQ(said_by_plain.size(), said_by_pestered.size()) << "round " << round;
     ASSERT_EQ(plain.plant().position_m(), pestered.plant().position_m()) << "round " << round;
   }
+  for (StationPeer* each : {&station, &pest}) {
+    each->disconnect();
+    each->connect();
+  }
+  EXPECT_EQ(station.hello->parameters_checksum, pest.hello->parameters_checksum);
+  EXPECT_EQ(station.hello->controller_checksum, pest.hello->controller_checksum);
 }
 
 TEST_P(AnyOrder, RandomBytesNeitherCrashNorMoveTheRobot) {

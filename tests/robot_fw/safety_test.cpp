@@ -23,6 +23,23 @@ TEST(Safety, PermitsOnlyFiniteDutiesWithinTheRange) {
   EXPECT_EQ(safety.permit(-kInf), 0);
 }
 
+TEST(Safety, OutsideThePositionLimitsPermitsNothingThatLeadsFurtherOut) {
+  Safety safety{{-1, 1}, 1};
+  const PositionLimits limits{-0.2F, 0.1F};
+  EXPECT_FALSE(safety.leaves_limits(0.1F, limits));
+  EXPECT_TRUE(safety.leaves_limits(0.11F, limits));
+  EXPECT_FALSE(safety.leaves_limits(0.12F, limits)) << "only once";
+  EXPECT_EQ(safety.permit(0.3F), 0);
+  EXPECT_EQ(safety.permit(-0.3F), -0.3F);
+  safety.leaves_limits(kNan, limits);
+  EXPECT_EQ(safety.permit(0.3F), 0);
+  EXPECT_TRUE(safety.leaves_limits(-0.21F, limits));
+  EXPECT_EQ(safety.permit(-0.3F), 0);
+  EXPECT_EQ(safety.permit(0.3F), 0.3F);
+  EXPECT_FALSE(safety.leaves_limits(0, limits));
+  EXPECT_EQ(safety.permit(-0.3F), -0.3F);
+}
+
 TEST(Safety, PermitsNothingWhileLatched) {
   Safety safety{{-1, 1}, 1};
   safety.latch(rheonaut_EMERGENCY_CAUSE_OPERATOR);
@@ -46,7 +63,7 @@ TEST(Safety, NeverGivesALatchTheSameIdTwice) {
 }
 
 TEST(Pilot, ALeaseThatRanOutSinceTheLastTickCannotBeRenewed) {
-  Pilot pilot{600};
+  Pilot pilot;
   pilot.set_duty(0.5F, 500, 1'000);
   EXPECT_TRUE(pilot.renew_lease(500, 500'999));
   EXPECT_FALSE(pilot.renew_lease(500, 1'000'999));

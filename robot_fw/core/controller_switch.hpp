@@ -1,0 +1,45 @@
+// The controller in force, the one before it, and the way from one to the other.
+//
+//   at rest   the new one is in force at once
+//   in auto   it runs on the same error beside the old one for 1 s, then the duty passes from the old one to the new
+//             one over 0.2 s; it is in force from the first tick of that cross-fade on
+// A reset, which ends motion or starts auto afresh, ends a change at once.
+#pragma once
+
+#include "robot_fw/core/controller.hpp"
+
+namespace robot_fw {
+
+class ControllerSwitch {
+ public:
+  static constexpr std::uint32_t kWarmUpTicks = 100;
+  static constexpr std::uint32_t kFadeTicks = 20;
+
+  explicit ControllerSwitch(const ControllerSections& first) : newest_(first), former_(first) {}
+
+  // Takes a new controller, in place of one that is not in force yet; false during a cross-fade.
+  bool set(const ControllerSections& sections, bool moving);
+  // Back to the one before. A change that was under way turns back where it is, without a jump. False if there is none.
+  bool restore(bool moving);
+
+  ControllerDuty step(float error_m, float position_m);
+  void reset();
+
+  const ControllerSections& in_force() const { return (warming_up() ? former_ : newest_).sections(); }
+  // Whether another controller has come into force since the last call.
+  bool take_news();
+
+ private:
+  static constexpr std::uint32_t kDone = kWarmUpTicks + kFadeTicks;
+
+  bool changing() const { return ticks_ < kDone; }
+  bool warming_up() const { return ticks_ <= kWarmUpTicks && changing(); }
+
+  Controller newest_;
+  Controller former_;
+  bool has_former_ = false;
+  bool news_ = false;
+  std::uint32_t ticks_ = kDone;  // since the change began
+};
+
+}  // namespace robot_fw

@@ -1,0 +1,58 @@
+// The numbers of the firmware that a station may set: one table with name, unit, range and default.
+//
+// Each takes effect as its row says. Their checksum covers, in the order of the table, the characters of each name and
+// then its value as 4 bytes, little-endian: another table or another value is another checksum.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+namespace robot_fw {
+
+enum class ParameterId : std::uint8_t {
+  auto_limit_s,               // auto ends by itself after this; from the next entry into auto on
+  setpoint_limit_m,           // setpoints and disturbances lie in [-limit, limit]
+  link_timeout_ms,            // when Welcome leaves it to the robot; from the next Welcome on
+  profile_velocity_m_s,       // of the reference; 0: no limit
+  profile_acceleration_m_s2,  // of the reference; 0: no limit
+  duty_slew_per_s,            // how fast the duty may change; 0: no limit
+  position_limit_min_m,       // below it: emergency
+  position_limit_max_m,       // above it: emergency
+  power_limit_duty,           // above this |duty| the motor is at power
+  power_limit_s,              // longer at power: emergency
+};
+constexpr std::size_t kParameterCount = 10;
+
+struct ParameterSpec {
+  const char* name;
+  const char* unit;
+  float minimum;
+  float maximum;
+  float default_value;
+  bool only_at_rest;  // refused while the motor is on
+};
+
+class Parameters {
+ public:
+  Parameters() { set_defaults(); }
+
+  static const ParameterSpec& spec(std::size_t index);
+  static std::optional<std::size_t> find(const char* name);
+  // Finite and within the range of its row.
+  static bool in_range(std::size_t index, float value);
+
+  float operator[](ParameterId id) const { return values_[static_cast<std::size_t>(id)]; }
+  float value(std::size_t index) const { return values_[index]; }
+  // The value must be in_range().
+  void set(std::size_t index, float value) { values_[index] = value; }
+  void set_defaults();
+
+  std::uint32_t checksum() const;
+
+ private:
+  std::array<float, kParameterCount> values_{};
+};
+
+}  // namespace robot_fw

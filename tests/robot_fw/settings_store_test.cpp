@@ -1,0 +1,126 @@
+// What outlives a reset: parameters and controller, unless a bit of them is wrong.
+#include "robot_fw/core/settings_store.hpp"
+
+#include <cmath>
+#include <memory>
+
+#include "tests/robot_fw/controllers.hpp"
+#include "tests/robot_fw/driven_robot.hpp"
+#include "tests/robot_fw/memory_storage.hpp"
+
+namespace robot_fw {
+namespace {
+
+using namespace sim_robot;
+
+SimulatedRobotConfig with_storage(Storage& storage, DutyRange duty = {-1, 1}) {
+  SimulatedRobotConfig config;
+  config.storage = &storage;
+  config.duty = duty;
+  return with_boot_id(config);
+}
+
+// One boot of a robot that keeps its settings in `storage`.
+struct Boot {
+  explicit Boot(Storage& storage, DutyRange duty = {-1, 1}) : robot(with_storage(storage, duty)) {
+    station.connect();
+    station.run(2);
+  }
+  void order(const protocol::Command& command) {
+    station.send(command);
+    station.run(2);
+  }
+  SimulatedRobot robot;
+  StationPeer station{robot};
+};
+
+class Settings : public ::testing::Test {
+ protected:
+  MemoryStorage storage;
+};
+
+TEST_F(Settings, ComeBackAfterAReset) {
+  {
+    Boot boot{storage};
+    boot.order(set_parameter("auto_limit_s", 42));
+    boot.order(set_controller(golden_biquads()));
+  }
+  Boot boot{storage};
+  EXPECT_EQ(boot.station.hello->controller_id, 2u);
+  EXPECT_EQ(boot.station.hello->controller_checksum, golden_biquads().checksum);
+  boot.order(get_parameters(0));
+  EXPECT_EQ(boot.station.pages[0].parameters[0].value, 42);
+  EXPECT_NE(boot.station.hello->parameters_checksum, Parameters{}.checksum());
+  EXPECT_TRUE(boot.station.controllers.empty());
+}
+
+TEST_F(Settings, AfterAResetTheBuiltInControllerIsTheOneBefore) {
+  Boot{storage}.order(set_controller(golden_biquads()));
+  Boot boot{storage};
+  boot.order(restore_controller());
+  EXPECT_EQ(boot.station.controllers.back().controller_id, 1u);
+  Boot next{storage};
+  EXPECT_EQ(next.station.hello->controller_id, 1u);
+}
+
+TEST_F(Settings, AreWrittenOncePerChangeAndOnlyWithTheMotorOff) {
+  Boot boot{storage};
+  EXPECT_EQ(storage.saves, 0);
+  boot.order(set_auto(0.1F));
+  boot.order(set_parameter("auto_limit_s", 42));
+  boot.order(set_controller(scaled_controller(7, 0.5F)));
+  boot.station.run(200);
+  EXPECT_EQ(storage.saves, 0);
+  boot.order(set_manual());
+  EXPECT_EQ(storage.saves, 2);
+  boot.station.run(50);
+  EXPECT_EQ(storage.saves, 2);
+}
+
+TEST_F(Settings, WithAnyBitWrongAreTheDefaults) {
+  Boot{storage}.order(set_parameter("auto_limit_s", 42));
+  Boot{storage}.order(set_controller(golden_biquads()));
+  const auto sound = storage.values;
+  ASSERT_EQ(sound.size(), 2u);
+  const auto defaults = Boot{*std::make_unique<MemoryStorage>()}.station.hello;
+  for (const auto& [key, bytes] : sound) {
+    for (std::size_t bit = 0; bit < bytes.size() * 8; bit += 3) {
+      storage.values = sound;
+      storage.values[key][bit / 8] ^= static_cast<std::uint8_t>(1U << bit % 8);
+      if (key == StorageKey::parameters) EXPECT_FALSE(load_parameters(storage)) << bit;
+      if (key == StorageKey::controller) EXPECT_FALSE(load_controller(storage)) << bit;
+    }
+    storage.values[key].resize(bytes.size() - 1);
+    Boot boot{storage};
+    if (key == StorageKey::parameters) {
+      EXPECT_EQ(boot.station.hello->parameters_checksum, defaults->parameters_checksum);
+    } else {
+      EXPECT_EQ(boot.station.hello->controller_checksum, defaults->controller_checksum);
+    }
+    storage.values = sound;
+  }
+}
+
+// The CRC is right, the content is not: a firmware with other ranges wrote it.
+TEST_F(Settings, OutOfTheirRangeAreTheDefaults) {
+  Parameters parameters;
+  parameters.set(0, 1e9F);
+  save_parameters(storage, parameters);
+  EXPECT_FALSE(load_parameters(storage));
+  parameters.set(0, NAN);
+  save_parameters(storage, parameters);
+  EXPECT_FALSE(load_parameters(storage));
+}
+
+TEST_F(Settings, AStoredControllerMustFitTheMotorOfThisBoot) {
+  Boot{storage}.order(set_controller(scaled_controller(7, 0.5F)));
+  EXPECT_EQ(Boot(storage).station.hello->controller_id, 7u);
+  EXPECT_EQ(Boot(storage, {0, 1}).station.hello->controller_id, 1u);
+  auto unstable = scaled_controller(8, 0.5F);
+  unstable.pole[0] = 2;
+  save_controller(storage, with_checksum(unstable));
+  EXPECT_EQ(Boot(storage).station.hello->controller_id, 1u);
+}
+
+}  // namespace
+}  // namespace robot_fw
