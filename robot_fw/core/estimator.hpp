@@ -20,6 +20,7 @@
 // - Velocity that pulsates unexplained for 3 s is a flow: it carries the robot by an unknown mean, with an sd 1.5 times
 //   the pulsation's rms, in v and d alike; γ starts afresh.
 // Cannot see: a steady drift with the fluid. With the motor off, 1 mm/s for 40 s is 40 mm, outside any position_sd_m.
+//             Nor a pulsating flow below 4 mm/s rms, 8 mm/s mean with the pump's profile.
 // Accuracy: ≤ 5 mm at 95 % 42 s after moves of 0.1 m, within 2 position_sd_m in ≥ 90 % of trials; the table is in
 //           docs/robot.md, held by estimator_study_test.cpp.
 // Cost:     25 multiplications a tick and 140 more, 2 divisions and 2 roots in every fifth; 328 bytes.
