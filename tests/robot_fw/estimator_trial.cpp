@@ -77,7 +77,8 @@ TrialResult run_trial(const EstimatorTrial& trial, std::uint64_t seed) {
     const double target_m =
         second_part ? trial.second_setpoint_m - trial.disturbance_m : trial.setpoint_m;  // of the true position
     const double seen_m = trial.closed_loop ? static_cast<double>(estimator.position_m()) : water.position_m();
-    duty = std::clamp(controller.step(static_cast<float>(target_m - seen_m)), trial.duty.min, trial.duty.max);
+    const float wanted = controller.step(static_cast<float>(target_m - seen_m), static_cast<float>(seen_m)).asked;
+    duty = std::clamp(wanted, trial.duty.min, trial.duty.max);
 
     result.estimate_error_m = static_cast<double>(estimator.position_m()) - water.position_m();
     result.target_error_m = water.position_m() - target_m;
