@@ -9,6 +9,7 @@
 #include <cstdio>
 
 #include "server/analysis/control_json.hpp"
+#include "server/analysis/motion_at_start.hpp"
 
 namespace server::cli {
 namespace {
@@ -74,8 +75,12 @@ void add_plan(CLI::App& command, Identify& wish) {
   add("--plan-velocity-sd-m-s", plan.velocity_sd_m_s, "Noise of the velocity; 0: not recorded");
 }
 
-control::Recording recording_for(const Identify& wish) {
-  if (!wish.csv.empty()) return read_recording(wish.csv);
+RunRecording recording_for(const Identify& wish) {
+  if (!wish.csv.empty()) {
+    RunRecording given{read_recording(wish.csv), {}};
+    if (auto moves = motion_at_start(given.recording)) given.warnings.push_back(*moves);
+    return given;
+  }
   if (!wish.run.run) {
     throw std::runtime_error{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
   }
@@ -151,7 +156,10 @@ void add_options(CLI::App& command, Identify& wish) {
 
 int run(const Identify& wish, std::ostream& out) {
   if (wish.plan.is_wanted) return run_plan(wish, out);
-  const control::Identification found = search(wish, recording_for(wish));
+  const RunRecording given = recording_for(wish);
+  for (const std::string& warning : given.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
+  control::Identification found = search(wish, given.recording);
+  found.warnings.insert(found.warnings.end(), given.warnings.begin(), given.warnings.end());
   if (wish.form.is_json) {
     OrderedJson answer = json_of(found);
     if (wish.with_residuals) answer["residuals"] = residuals_json(found.best);

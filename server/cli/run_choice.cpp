@@ -6,7 +6,6 @@
 #include <CLI/CLI.hpp>
 #include <stdexcept>
 
-#include "server/analysis/analysis_service.hpp"
 #include "server/recording/run_reader.hpp"
 
 namespace server::cli {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <sstream>
 
 #include "tests/server/cli/tool_test.hpp"
 
@@ -84,6 +85,22 @@ TEST_F(Identifying, FindsTheModelOfACleanRecordingWhichIsThenAPlant) {
   save("m.json", answer.text);
   const auto again = ask("step --plant @m.json --times 5 --json").json();
   EXPECT_NEAR(again["velocity_m_s"][0], 0.0298827143987, 1e-8);
+}
+
+TEST_F(Identifying, WarnsOfACsvThatBeginsInMotion) {
+  std::istringstream whole{ask("step --duty 0.3 --every-s 0.01 --until-s 5 --csv").text};
+  std::string late, line;
+  for (int i = 0; std::getline(whole, line); ++i) {
+    if (i == 0 || i > 30) late += line + "\n";
+  }
+  save("late.csv", late);
+  const Answer answer = ask("identify --csv @late.csv --structure first_order --json");
+  EXPECT_THAT(answer.error, HasSubstr("rheonaut: warning: the recording begins in motion, at about 0.0"));
+  EXPECT_THAT(answer.json()["warnings"].back().get<std::string>(), HasSubstr("assumes rest"));
+  for (const char* every : {"0.01", "0.02", "0.05"}) {
+    save("run.csv", ask(std::string{"step --until-s 5 --csv --every-s "} + every).text);
+    EXPECT_EQ(ask("identify --csv @run.csv --structure first_order").error, "") << every;
+  }
 }
 
 TEST_F(Identifying, ComparesTheStructuresInATable) {
