@@ -62,13 +62,4 @@ CLI::Validator named() {
   return CLI::Validator{refuse, ""};
 }
 
-std::string one_line(std::string_view text) {
-  std::string shown;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    shown += byte < 0x20 || byte == 0x7F ? fmt::format("\\x{:02X}", byte) : std::string{c};
-  }
-  return shown;
-}
-
 }  // namespace server::cli

@@ -12,7 +12,11 @@
 #include <string>
 #include <vector>
 
+#include "server/analysis/control_json.hpp"
+
 namespace server::cli {
+
+using server::text;  // beside those of the tools' own enumerations
 
 // Each is a validator for CLI::Option::check.
 CLI::Validator finite();
@@ -41,8 +45,5 @@ CLI::Option* add_word(CLI::App& command, const char* name, Target& target, std::
   option->check(CLI::Validator{refuse, ""});
   return option;
 }
-
-// For messages: what a terminal would obey, or what would break the line, as \xNN.
-std::string one_line(std::string_view text);
 
 }  // namespace server::cli

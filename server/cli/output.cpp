@@ -73,8 +73,23 @@ void Table::write(std::ostream& out) const {
   }
 }
 
-std::string cell(double value, int digits) { return std::isnan(value) ? "-" : fmt::format("{:.{}g}", value, digits); }
+std::string cell(double value, int digits) {
+  return !std::isfinite(value) ? "-" : fmt::format("{:.{}g}", value, digits);
+}
+
+std::string fixed(double value, int decimals) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "-";
+}
 
 std::string cell(const std::optional<double>& value, int digits) { return value ? cell(*value, digits) : "-"; }
+
+std::string one_line(std::string_view text) {
+  std::string shown;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    shown += byte < 0x20 || byte == 0x7F ? fmt::format("\\x{:02X}", byte) : std::string{c};
+  }
+  return shown;
+}
 
 }  // namespace server::cli

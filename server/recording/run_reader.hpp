@@ -2,7 +2,8 @@
 //
 // Opens the file read-only, so it works while the station runs (the write-ahead log allows that), and goes through the
 // view run_sample, which docs/database.md promises. A database that no station has open, closed cleanly, is read as a
-// file that does not change: nothing appears beside it, and its folder may be read-only. Blocks; for command-line tools.
+// file that does not change: nothing appears beside it, and its folder may be read-only. Blocks; for command-line
+// tools.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,5 @@
 // The fixed forms of identify, discretise and predict, with the numbers of the paper's plant and controller.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -11,6 +12,7 @@ namespace server::cli {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class Discretising : public ToolTest {};
 
@@ -116,6 +118,16 @@ TEST_F(Identifying, ExitsWith4WhenTimeRunsOut) {
   const Answer answer = ask("identify --csv @run.csv --structure fractional --time-limit-s 0.000001 --json");
   EXPECT_EQ(answer.exit_code, 4);
   EXPECT_EQ(answer.json()["end"], "time_limit");
+}
+
+TEST_F(Identifying, NumbersBeyondAllBoundsAreNoSuccess) {
+  std::string csv = "t_s,duty,position_m\n";
+  for (int k = 0; k < 60; ++k) csv += fmt::format("{},0.3,{}\n", 0.01 * k, 1e200 * k);
+  save("huge.csv", csv);
+  const Answer answer = ask("identify --csv @huge.csv --structure first_order");
+  EXPECT_NE(answer.exit_code, 0);
+  EXPECT_NE(answer.error, "");
+  EXPECT_THAT(answer.text, Not(HasSubstr("inf")));
 }
 
 TEST_F(Identifying, APlanTellsWhatAnExperimentWouldTell) {

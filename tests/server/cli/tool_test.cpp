@@ -9,7 +9,7 @@ ToolAnswer ask_tool(const std::filesystem::path& folder, const std::string& comm
   std::vector<std::string> words{"rheonaut"};
   std::istringstream stream{command};
   for (std::string word; stream >> word;) {
-    words.push_back(word.starts_with('@') ? (folder / word.substr(1)).string() : word);
+    words.push_back(word == "@@" ? "" : word.starts_with('@') ? (folder / word.substr(1)).string() : word);
   }
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
