@@ -22,7 +22,6 @@ namespace control {
 namespace {
 
 constexpr int kIterations = 10;
-constexpr int kLargestOrder = 10;
 constexpr double kUselessFit = 0.25;  // relative
 constexpr double kGoodRelative = 0.01, kGoodDeg = 0.6;
 constexpr double kStepS = 20;

@@ -34,9 +34,11 @@ namespace control {
 
 enum class DiscretisationMethod { direct, oustaloup };
 
+inline constexpr int kLargestOrder = 10;
+
 struct DiscretisationOptions {
   double period_s = 0.01;
-  int order = 5;
+  int order = 5;  // 1 to kLargestOrder
   DiscretisationMethod method = DiscretisationMethod::direct;
   double a = 0.5;                    // of (1), in [0, 1]; direct only
   double band_low_rad_s = 0.1;       // of (3)

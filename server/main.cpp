@@ -75,6 +75,6 @@ int main(int argc, char** argv) try {
   if (const auto exit_code = cli::answer(wish, std::cout)) return *exit_code;
   return serve(load_config(std::get<cli::Serve>(wish).flags));
 } catch (const std::exception& error) {
-  fmt::print(stderr, "rheonaut: {}\n", error.what());
+  fmt::print(stderr, "rheonaut: {}\n", server::cli::one_line(error.what()));
   return EXIT_FAILURE;
 }

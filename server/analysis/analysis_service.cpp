@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include "server/analysis/run_recording.hpp"
-
 namespace server {
 namespace asio = boost::asio;
 

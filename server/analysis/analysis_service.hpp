@@ -6,14 +6,13 @@
 #include <boost/asio/awaitable.hpp>
 #include <vector>
 
+#include "server/analysis/run_recording.hpp"
 #include "server/analysis/run_steps.hpp"
 #include "server/recording/history.hpp"
 #include "server/result.hpp"
 #include "server/worker.hpp"
 
 namespace server {
-
-inline constexpr std::size_t kMaxAnalysedSamples = 2'000'000;  // 5 h at 100 Hz; 80 MB
 
 class AnalysisService {
  public:

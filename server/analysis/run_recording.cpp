@@ -3,19 +3,26 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "server/analysis/motion_at_start.hpp"
 
 namespace server {
 namespace {
 
 constexpr std::size_t kFewestSamples = 10;
+constexpr std::size_t kMostFaults = 5, kMostWindows = 3;  // in a message
+constexpr double kTimeToRest_s = 5;
 
 struct Piece {
   std::uint64_t span_began_us = 0;
   std::vector<StoredSample> samples;
+  std::optional<double> driven_at_s;  // the last duty before them, if it is not long ago
 
   double seconds(const StoredSample& stored) const {
-    return static_cast<double>(stored.robot_time_us - span_began_us) * 1e-6;
+    return static_cast<double>(stored.robot_time_us - span_began_us) / 1e6;
   }
 };
 
@@ -34,41 +41,116 @@ Result<Piece> select(std::span<const StoredSample> samples, const RunWindow& win
     if (!has_begun) piece.span_began_us = stored.robot_time_us;
     has_begun = true;
     const double at_s = piece.seconds(stored);
+    if (at_s < window.from_s && std::abs(stored.sample.duty) > 0) piece.driven_at_s = at_s;
     if (at_s >= window.from_s && at_s <= window.to_s) piece.samples.push_back(stored);
   }
   if (piece.samples.size() < kFewestSamples) {
     return fail(ErrorCode::invalid, fmt::format("span {} has {} samples from {} to {} s; at least {} are needed", span,
                                                 piece.samples.size(), window.from_s, window.to_s, kFewestSamples));
   }
+  if (piece.driven_at_s && piece.seconds(piece.samples.front()) - *piece.driven_at_s > kTimeToRest_s) {
+    piece.driven_at_s.reset();
+  }
   return piece;
 }
 
-std::unexpected<Error> gap_between(const StoredSample& before, const StoredSample& after, double at_s) {
-  const double length_s = static_cast<double>(after.robot_time_us - before.robot_time_us) * 1e-6;
-  return fail(ErrorCode::invalid,
-              fmt::format("the run has a gap of {:.3f} s at {:.3f} s ({} samples after seq {} are not there); "
-                          "choose a part without it with --from-s and --to-s",
-                          length_s, at_s, after.seq - before.seq - 1, before.seq),
-              "gap");
+// The middle one of the steps between samples that follow each other: what gaps cannot move.
+double usual_step_s(const Piece& piece) {
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < piece.samples.size(); ++i) {
+    const StoredSample &before = piece.samples[i - 1], &after = piece.samples[i];
+    if (after.seq == before.seq + 1) steps_s.push_back(piece.seconds(after) - piece.seconds(before));
+  }
+  if (steps_s.empty()) return 0;
+  const auto middle = steps_s.begin() + static_cast<std::ptrdiff_t>(steps_s.size() / 2);
+  std::ranges::nth_element(steps_s, middle);
+  return *middle;
 }
 
-// Stored times are right to 100 us, so equal spacing is asked for within a tenth.
-bool is_gap(const StoredSample& before, const StoredSample& after, double dt_s) {
-  const double step_s = static_cast<double>(after.robot_time_us - before.robot_time_us) * 1e-6;
-  return after.seq != before.seq + 1 || std::abs(step_s - dt_s) > 0.1 * dt_s;
+// What is wrong between two neighbours, if anything. Stored times are right to 100 us, so equal spacing is asked for
+// within a tenth.
+std::optional<std::string> gap_between(const Piece& piece, const StoredSample& before, const StoredSample& after,
+                                       double dt_s) {
+  const double at_s = piece.seconds(before), step_s = piece.seconds(after) - at_s;
+  if (after.seq != before.seq + 1) {
+    return fmt::format("a gap of {:.3f} s at {:.3f} s ({} samples after seq {} are not there)", step_s, at_s,
+                       after.seq - before.seq - 1, before.seq);
+  }
+  if (std::abs(step_s - dt_s) <= 0.1 * dt_s) return std::nullopt;
+  const double skipped = std::round(step_s / dt_s) - 1;
+  if (!(skipped >= 1)) return fmt::format("a step of {:.4g} s, not {:.4g} s, at {:.3f} s", step_s, dt_s, at_s);
+  return fmt::format("the robot skipped {} {} at {:.3f} s; no sample was lost", skipped,
+                     skipped == 1 ? "period" : "periods", at_s);
 }
 
-bool is_whole(const StoredSample& stored, const RunWindow& window) {
+std::optional<std::string> missing_in(const Piece& piece, const StoredSample& stored, const RunWindow& window) {
   const Sample& sample = stored.sample;
-  return std::isfinite(sample.position_m) && std::isfinite(stored.disturbance_m) && std::isfinite(sample.duty) &&
-         (!window.with_velocity || std::isfinite(sample.velocity_m_s));
+  const bool is_whole = std::isfinite(sample.position_m) && std::isfinite(stored.disturbance_m) &&
+                        std::isfinite(sample.duty) && (!window.with_velocity || std::isfinite(sample.velocity_m_s));
+  if (is_whole) return std::nullopt;
+  return fmt::format("sample seq {} at {:.3f} s lacks a value (duty {}, position_m {}, velocity_m_s {})", stored.seq,
+                     piece.seconds(stored), sample.duty, sample.position_m, sample.velocity_m_s);
 }
 
-std::unexpected<Error> incomplete(const StoredSample& stored, double at_s) {
-  return fail(ErrorCode::invalid,
-              fmt::format("sample seq {} at {:.3f} s lacks a value (duty {}, position_m {}, velocity_m_s {}); choose a "
-                          "part without it with --from-s and --to-s",
-                          stored.seq, at_s, stored.sample.duty, stored.sample.position_m, stored.sample.velocity_m_s));
+// Cuts the piece where it is not whole.
+class Cut {
+ public:
+  Cut(const Piece& piece, const RunWindow& window, double dt_s) {
+    for (std::size_t i = 0; i < piece.samples.size(); ++i) {
+      const StoredSample& stored = piece.samples[i];
+      if (i > 0) {
+        if (const auto gap = gap_between(piece, piece.samples[i - 1], stored, dt_s)) end_part(i, i, *gap);
+      }
+      if (const auto missing = missing_in(piece, stored, window)) end_part(i, i + 1, *missing);
+    }
+    end_part(piece.samples.size(), 0, "");
+    faults_.pop_back();
+  }
+
+  bool is_whole() const { return faults_.empty(); }
+
+  // Every fault, up to a few, and the longest windows that have none.
+  std::unexpected<Error> refusal(const Piece& piece) const {
+    std::string detail = fmt::format("not a whole recording: {}",
+                                     fmt::join(std::span{faults_}.first(std::min(faults_.size(), kMostFaults)), "; "));
+    if (faults_.size() > kMostFaults) detail += fmt::format("; and {} more", faults_.size() - kMostFaults);
+    std::vector<Part> longest = parts_;
+    std::erase_if(longest, [](const Part& part) { return part.size() < kFewestSamples; });
+    std::ranges::sort(longest, {}, [](const Part& part) { return std::pair(~part.size(), part.begin); });
+    longest.resize(std::min(longest.size(), kMostWindows));
+    if (longest.empty()) return fail(ErrorCode::invalid, detail + "; no part of it is long enough", "gap");
+    std::vector<std::string> windows;
+    for (const Part& part : longest) {
+      windows.push_back(fmt::format("--from-s {} --to-s {}", piece.seconds(piece.samples[part.begin]),
+                                    piece.seconds(piece.samples[part.end - 1])));
+    }
+    return fail(ErrorCode::invalid, fmt::format("{}; choose {}", detail, fmt::join(windows, ", or ")), "gap");
+  }
+
+ private:
+  struct Part {
+    std::size_t begin = 0, end = 0;
+    std::size_t size() const { return end - begin; }
+  };
+
+  void end_part(std::size_t end, std::size_t next_begin, std::string why) {
+    if (end > begin_) parts_.push_back({begin_, end});
+    begin_ = next_begin;
+    faults_.push_back(std::move(why));
+  }
+
+  std::size_t begin_ = 0;
+  std::vector<Part> parts_;
+  std::vector<std::string> faults_;
+};
+
+std::optional<std::string> driven_before(const Piece& piece) {
+  if (!piece.driven_at_s) return std::nullopt;
+  const double begins_s = piece.seconds(piece.samples.front());
+  return fmt::format(
+      "the window begins at {:.3f} s, {:.3f} s after the run's duty was last not 0; the model assumes rest before the "
+      "first sample, so its parameters may be wrong: begin the window at rest, {:g} s after the last duty",
+      begins_s, begins_s - *piece.driven_at_s, kTimeToRest_s);
 }
 
 }  // namespace
@@ -85,24 +167,29 @@ StepPoint step_point(const StoredSample& stored) {
   return point;
 }
 
-Result<control::Recording> recording_of(std::span<const StoredSample> samples, const RunWindow& window) {
+Result<RunRecording> recording_of(std::span<const StoredSample> samples, const RunWindow& window) {
   const auto piece = select(samples, window);
   if (!piece) return std::unexpected{piece.error()};
   const auto& chosen = piece->samples;
-  control::Recording recording;
+  const double dt_s = usual_step_s(*piece);
+  const Cut cut{*piece, window, dt_s};
+  if (!cut.is_whole()) return cut.refusal(*piece);
+  RunRecording made;
+  control::Recording& recording = made.recording;
   recording.dt_s =
       (piece->seconds(chosen.back()) - piece->seconds(chosen.front())) / static_cast<double>(chosen.size() - 1);
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const StoredSample& stored = chosen[i];
-    const double at_s = piece->seconds(stored);
-    if (i > 0 && is_gap(chosen[i - 1], stored, recording.dt_s)) return gap_between(chosen[i - 1], stored, at_s);
-    if (!is_whole(stored, window)) return incomplete(stored, at_s);
+  for (const StoredSample& stored : chosen) {
     recording.duty.push_back(static_cast<double>(stored.sample.duty));
     recording.position_m.push_back(static_cast<double>(stored.sample.position_m) -
                                    static_cast<double>(stored.disturbance_m));
     if (window.with_velocity) recording.velocity_m_s.push_back(static_cast<double>(stored.sample.velocity_m_s));
   }
-  return recording;
+  if (const auto warning = driven_before(*piece)) {
+    made.warnings.push_back(*warning);
+  } else if (const auto moves = motion_at_start(recording)) {
+    made.warnings.push_back(*moves);
+  }
+  return made;
 }
 
 }  // namespace server

@@ -4,14 +4,17 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "control/identify.hpp"
 #include "server/analysis/run_steps.hpp"
-#include "server/recording/history.hpp"
+#include "server/recording/stored_sample.hpp"
 #include "server/result.hpp"
 
 namespace server {
+
+inline constexpr std::size_t kMaxAnalysedSamples = 2'000'000;  // 5 h at 100 Hz; 80 MB
 
 StepPoint step_point(const StoredSample& stored);
 
@@ -23,9 +26,15 @@ struct RunWindow {
   bool with_velocity = false;  // the robot's own estimate of it, which is no second measurement
 };
 
+// A piece of a run, and what a reader of its numbers must know about how it begins.
+struct RunRecording {
+  control::Recording recording;
+  std::vector<std::string> warnings;
+};
+
 // position_m is what was measured: without the disturbance, which the robot adds to it.
-// invalid: several spans to choose from, too few samples, a gap or a value that is missing; the detail says where, how
-// long, and which window would do.
-Result<control::Recording> recording_of(std::span<const StoredSample> samples, const RunWindow& window);
+// invalid: several spans to choose from, too few samples, or gaps or missing values; the detail names each (samples
+// that were lost told from periods that the robot skipped) and the longest windows without one, as flags.
+Result<RunRecording> recording_of(std::span<const StoredSample> samples, const RunWindow& window);
 
 }  // namespace server

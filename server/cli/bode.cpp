@@ -6,18 +6,20 @@
 #include <CLI/CLI.hpp>
 
 #include "server/analysis/control_json.hpp"
+#include "server/cli/options.hpp"
 
 namespace server::cli {
 namespace {
 
 constexpr int kTablePoints = 13, kCsvPoints = 200, kMaxPoints = 100'000;
+constexpr double kFrom_rad_s = 0.1, kTo_rad_s = 1000;
 
 std::vector<control::BodePoint> response(const Bode& wish, const control::OpenLoop& loop, int points) {
-  if (!(wish.to_rad_s > wish.from_rad_s)) {
-    throw std::invalid_argument{
-        fmt::format("--to-rad-s {} must lie above --from-rad-s {}", wish.to_rad_s, wish.from_rad_s)};
+  const double from_rad_s = wish.from_rad_s.value_or(kFrom_rad_s), to_rad_s = wish.to_rad_s.value_or(kTo_rad_s);
+  if (!(to_rad_s > from_rad_s)) {
+    throw std::invalid_argument{fmt::format("--to-rad-s {} must lie above --from-rad-s {}", to_rad_s, from_rad_s)};
   }
-  return control::bode(loop, control::log_spaced(wish.from_rad_s, wish.to_rad_s, points));
+  return control::bode(loop, control::log_spaced(from_rad_s, to_rad_s, points));
 }
 
 void write_points(std::ostream& out, std::span<const control::BodePoint> points) {
@@ -43,13 +45,13 @@ void add_options(CLI::App& command, Bode& wish) {
   add_option(command, wish.controller);
   command.add_flag("--velocity-loop", wish.is_velocity_loop, "Without the integrator from velocity to position");
   command.add_option("--from-rad-s", wish.from_rad_s, "First frequency of the response (default: 0.1)")
-      ->check(CLI::PositiveNumber);
-  command.add_option("--to-rad-s", wish.to_rad_s, "Last frequency (default: 1000)")->check(CLI::PositiveNumber);
+      ->check(positive());
+  command.add_option("--to-rad-s", wish.to_rad_s, "Last frequency (default: 1000)")->check(positive());
   command
       .add_option("--points", wish.points,
                   "How many frequencies, evenly in the logarithm (default: 13 in the table, 200 in CSV); with --json "
                   "adds the response")
-      ->check(CLI::Range(2, kMaxPoints));
+      ->check(whole(2, kMaxPoints));
   add_json_and_csv_flags(command, wish.form);
   command.footer(
       "The margins are those of the open loop, plant times controller.\n"
@@ -82,6 +84,9 @@ int run(const Bode& wish, std::ostream& out) {
   }
   const control::Margins margins = control::margins(loop);
   if (wish.form.is_json) {
+    if (!wish.points && (wish.from_rad_s || wish.to_rad_s)) {
+      throw std::invalid_argument{"--from-rad-s and --to-rad-s belong to the response, which --json has with --points"};
+    }
     OrderedJson answer = json_of(margins);
     answer["plant"] = json_of(loop.plant);
     answer["controller"] = json_of(loop.controller);
@@ -95,8 +100,7 @@ int run(const Bode& wish, std::ostream& out) {
   out << '\n';
   Table table{{"omega (rad/s)", "magnitude (dB)", "phase (deg)"}};
   for (const auto& point : response(wish, loop, wish.points.value_or(kTablePoints))) {
-    table.row({cell(point.omega_rad_s, 5), fmt::format("{:.2f}", point.magnitude_db),
-               fmt::format("{:.2f}", point.phase_deg)});
+    table.row({cell(point.omega_rad_s, 5), fixed(point.magnitude_db, 2), fixed(point.phase_deg, 2)});
   }
   table.write(out);
   return 0;

@@ -13,8 +13,7 @@ struct Bode {
   PlantChoice plant;
   ControllerChoice controller;
   bool is_velocity_loop = false;
-  double from_rad_s = 0.1;
-  double to_rad_s = 1000;
+  std::optional<double> from_rad_s, to_rad_s;  // of the response; none: 0.1 to 1000
   std::optional<int> points;
   OutputForm form;
 };

@@ -1,11 +1,16 @@
 // The command line, by CLI11.
 #include "server/cli/command_line.hpp"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <iostream>
 #include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <type_traits>
+
+#include "server/cli/options.hpp"
 
 #ifndef RHEONAUT_VERSION
 #error "RHEONAUT_VERSION comes from CMake"
@@ -14,11 +19,16 @@
 namespace server::cli {
 namespace {
 
+constexpr const char* kNotWritten = "the answer could not be written; is the disk full?";
+
 void add_options(CLI::App& command, ConfigFlags& flags) {
-  command.add_option("--config", flags.file, "Configuration file in TOML; deploy/rheonaut.toml documents every option");
-  command.add_option("--data", flags.data_dir, "Folder of everything the station keeps (default: rheonaut-data)");
-  command.add_option("--http", flags.http, "ADDR:PORT of the page and the API (default: 127.0.0.1:8080; port 0: any)");
-  command.add_option("--robots", flags.robots, "ADDR:PORT where robots dial in (default: 127.0.0.1:7070; port 0: any)");
+  const auto add = [&command](const char* name, auto& value, const char* meaning) {
+    command.add_option(name, value, meaning)->check(named());
+  };
+  add("--config", flags.file, "Configuration file in TOML; deploy/rheonaut.toml documents every option");
+  add("--data", flags.data_dir, "Folder of everything the station keeps (default: rheonaut-data)");
+  add("--http", flags.http, "ADDR:PORT of the page and the API (default: 127.0.0.1:8080; port 0: any)");
+  add("--robots", flags.robots, "ADDR:PORT where robots dial in (default: 127.0.0.1:7070; port 0: any)");
 }
 
 void add_options(CLI::App& command, Serve& wish) {
@@ -40,6 +50,22 @@ void offer(CLI::App& app, const char* name, const char* purpose, Wish& wish) {
   command->callback([parsed, &wish] { wish = *parsed; });
 }
 
+// One line, also for what CLI11 says in two; a word that is no command is named.
+std::string complaint(const CLI::App& app, const CLI::Error& error) {
+  const auto chosen = app.get_subcommands();
+  const auto unknown = app.remaining(false);
+  std::string what = error.what();
+  if (chosen.empty() && !unknown.empty() && !unknown.front().starts_with('-')) {
+    what = fmt::format("there is no command '{}'", unknown.front());
+  }
+  // CLI11 puts "--name: " before what a validator says.
+  if (const std::size_t colon = what.find(": must "); what.starts_with("--") && colon != std::string::npos) {
+    what.erase(colon, 1);
+  }
+  const std::string command = chosen.empty() ? "" : chosen.front()->get_name() + " ";
+  return fmt::format("rheonaut: {}; see rheonaut {}--help\n", one_line(what), command);
+}
+
 }  // namespace
 
 Wish parse_command_line(int argc, char** argv) {
@@ -47,6 +73,7 @@ Wish parse_command_line(int argc, char** argv) {
   app.set_version_flag("--version", RHEONAUT_VERSION);
   app.require_subcommand(1);
   app.footer("Example: rheonaut serve --data ~/lab --robots 127.0.0.1:7070");
+  app.failure_message([](const CLI::App* whole, const CLI::Error& error) { return complaint(*whole, error); });
   Wish wish;
   offer<Serve>(app, "serve", "Run the station until SIGINT or SIGTERM", wish);
   offer<CheckConfig>(app, "check-config", "Check a configuration and print what it means", wish);
@@ -60,7 +87,9 @@ Wish parse_command_line(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return Answered{app.exit(error)};
+    const Answered answered{app.exit(error)};
+    if (!std::cout.flush()) throw std::runtime_error{kNotWritten};
+    return answered;
   }
   return wish;
 }
@@ -73,13 +102,11 @@ std::optional<int> answer(const Wish& wish, std::ostream& out) {
           return std::nullopt;
         } else if constexpr (std::is_same_v<T, Answered>) {
           return wanted.exit_code;
-        } else if constexpr (std::is_same_v<T, CheckConfig>) {
-          return check_config(wanted);
         } else {
           std::ostringstream text;
           const int exit_code = run(wanted, text);
           out << text.view() << std::flush;
-          if (!out) throw std::runtime_error{"the answer could not be written; is the disk full?"};
+          if (!out) throw std::runtime_error{kNotWritten};
           return exit_code;
         }
       },

@@ -36,7 +36,7 @@ Wish parse_command_line(int argc, char** argv);
 // Throws what the tools throw: a sentence for the user.
 std::optional<int> answer(const Wish& wish, std::ostream& out);
 
-// Reads and checks a configuration, and prints what it means. Returns the exit code.
-int check_config(const CheckConfig& wish);
+// Reads and checks a configuration, and prints what it means.
+int run(const CheckConfig& wish, std::ostream& out);
 
 }  // namespace server::cli

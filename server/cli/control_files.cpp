@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -11,6 +12,7 @@
 #include <stdexcept>
 
 #include "server/analysis/control_json.hpp"
+#include "server/cli/options.hpp"
 
 namespace server::cli {
 namespace {
@@ -31,6 +33,7 @@ std::string read_text(const std::string& file, std::size_t max_bytes) {
     text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
     if (text.size() > max_bytes) refuse(file, fmt::format("has more than {} bytes", max_bytes));
   }
+  if (stream.bad()) refuse(file, fmt::format("cannot be read: {}", std::strerror(errno)));
   return text;
 }
 
@@ -54,25 +57,29 @@ T value_of(const std::string& file, const Result<T>& result) {
 }  // namespace
 
 void add_option(CLI::App& command, PlantChoice& choice) {
-  command.add_option("--plant", choice.file,
-                     "Model file {\"kp\":...,\"b1\":...,\"b2\":...,\"b3\":...,\"alpha\":...,\"beta\":...}, or "
-                     "newtonian or non_newtonian (default: non_newtonian, the paper's (29))");
+  command
+      .add_option("--plant", choice.file,
+                  "Model file {\"kp\":...,\"b1\":...,\"b2\":...,\"b3\":...,\"alpha\":...,\"beta\":...}, or "
+                  "newtonian or non_newtonian (default: non_newtonian, the paper's (29))")
+      ->check(named());
 }
 
 void add_option(CLI::App& command, ControllerChoice& choice) {
-  command.add_option("--controller", choice.file,
-                     "Controller file {\"kp\":...,\"kd\":...,\"mu\":...} (default: the paper's (30))");
+  command
+      .add_option("--controller", choice.file,
+                  "Controller file {\"kp\":...,\"kd\":...,\"mu\":...} (default: the paper's (30))")
+      ->check(named());
 }
 
 control::FractionalModel read(const PlantChoice& choice) {
-  if (choice.file.empty() || choice.file == "non_newtonian") return control::kNonNewtonianModel;
-  if (choice.file == "newtonian") return control::kNewtonianModel;
-  return value_of(choice.file, model_from(read_json(choice.file)));
+  if (!choice.file || *choice.file == "non_newtonian") return control::kNonNewtonianModel;
+  if (*choice.file == "newtonian") return control::kNewtonianModel;
+  return value_of(*choice.file, model_from(read_json(*choice.file)));
 }
 
 control::FopdController read(const ControllerChoice& choice) {
-  if (choice.file.empty()) return control::kPaperController;
-  return value_of(choice.file, controller_from(read_json(choice.file)));
+  if (!choice.file) return control::kPaperController;
+  return value_of(*choice.file, controller_from(read_json(*choice.file)));
 }
 
 CsvColumns read_csv(const std::string& file, std::initializer_list<const char*> required,

@@ -3,6 +3,7 @@
 // Errors: throws std::runtime_error naming the file, the place in it, what is wrong and what is allowed.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "control/identify.hpp"
@@ -15,12 +16,12 @@ class App;
 
 namespace server::cli {
 
-// Which plant and controller: files, or empty for the paper's.
+// Which plant and controller: files, or none for the paper's.
 struct PlantChoice {
-  std::string file;  // or newtonian, non_newtonian
+  std::optional<std::string> file;  // or newtonian, non_newtonian
 };
 struct ControllerChoice {
-  std::string file;
+  std::optional<std::string> file;
 };
 
 void add_option(CLI::App& command, PlantChoice& choice);

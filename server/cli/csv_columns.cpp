@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::size_t kMaxQuoted = 40;
+constexpr const char* kDuty = "duty";  // the one column whose range its name tells
 
 std::string_view trimmed(std::string_view cell) {
   const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
@@ -22,10 +23,20 @@ std::string_view trimmed(std::string_view cell) {
   return cell;
 }
 
+// The end of the cell that begins at `begin`: the next separator that stands outside quotes.
+std::size_t end_of_cell(std::string_view line, std::size_t begin, char separator) {
+  bool is_quoted = false;
+  for (std::size_t i = begin; i < line.size(); ++i) {
+    if (line[i] == '"') is_quoted = !is_quoted;
+    if (line[i] == separator && !is_quoted) return i;
+  }
+  return std::string_view::npos;
+}
+
 std::vector<std::string_view> cells_of(std::string_view line, char separator) {
   std::vector<std::string_view> cells;
   for (std::size_t begin = 0;;) {
-    const std::size_t end = line.find(separator, begin);
+    const std::size_t end = end_of_cell(line, begin, separator);
     cells.push_back(trimmed(line.substr(begin, end - begin)));
     if (end == std::string_view::npos) return cells;
     begin = end + 1;
@@ -79,6 +90,7 @@ class Reader {
   void take_heading(std::string_view line) {
     separator_ = separator_of(line);
     const auto names = cells_of(line, separator_);
+    headings_ = names.size();
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (!wants(names[i])) continue;
       const std::string name{names[i]};
@@ -96,7 +108,12 @@ class Reader {
 
   void take_row(std::string_view line) {
     if (++rows_ > kMaxCsvRows) refuse(fmt::format("has more than {} rows", kMaxCsvRows));
-    const auto cells = cells_of(line, separator_);
+    auto cells = cells_of(line, separator_);
+    if (cells.size() == headings_ + 1 && cells.back().empty()) cells.pop_back();
+    if (cells.size() > headings_) {
+      refuse_line(
+          fmt::format("has {} cells, the heading has {}; decimal comma? use ; between cells", cells.size(), headings_));
+    }
     for (const Column& column : chosen_) {
       if (column.index >= cells.size()) {
         refuse_line(fmt::format("has {} cells, column {} is number {}", cells.size(), column.name, column.index + 1));
@@ -112,12 +129,15 @@ class Reader {
     if (error != std::errc{} || end != cell.data() + cell.size() || !std::isfinite(value)) {
       refuse_line(fmt::format("'{}' in column {} is not a finite number", cell.substr(0, kMaxQuoted), column));
     }
+    if (column == kDuty && std::abs(value) > 1) {
+      refuse_line(fmt::format("duty {} is outside [-1, 1]; is it in percent?", value));
+    }
     return value;
   }
 
   const std::string& source_;
   std::vector<const char*> required_, optional_;
-  std::size_t line_ = 0, rows_ = 0;
+  std::size_t line_ = 0, rows_ = 0, headings_ = 0;
   bool has_heading_ = false;
   char separator_ = ',';
   CsvColumns columns_;  // nodes stay where they are: chosen_ points into it

@@ -4,7 +4,9 @@
 //   remark = "#" ...            heading, row = cell { separator cell }
 //   separator = "," or, if the heading has no comma, ";" or tab          cell: spaces and quotes around it are dropped
 //
-// Columns may stand in any order, others beside them. Only the cells of wanted columns are read.
+// Columns may stand in any order, others beside them. Only the cells of wanted columns are read. A row has no more
+// cells than the heading, except for one empty cell at its end; a separator inside quotes separates nothing. A column
+// named duty lies in [-1, 1].
 // Errors: throws std::runtime_error naming source, line, column and cell.
 #pragma once
 

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "server/analysis/control_json.hpp"
+#include "server/cli/options.hpp"
 
 namespace server::cli {
 namespace {
@@ -63,22 +64,21 @@ void write_coefficients(std::ostream& out, const Discretisation& d) {
 }  // namespace
 
 void add_options(CLI::App& command, Sampling& sampling) {
-  command.add_option("--period-s", sampling.period_s, "Sampling period (default: 0.01)")->check(CLI::PositiveNumber);
-  command.add_option("--order", sampling.order, "Order of the transfer function (default: 5)")
-      ->check(CLI::Range(1, 20));
-  auto* method = command.add_option("--method", sampling.method,
-                                    "direct or oustaloup (default: several are tried, the choice is explained)");
-  method->transform(CLI::CheckedTransformer(
-                        std::map<std::string, DiscretisationMethod>{{"direct", DiscretisationMethod::direct},
-                                                                    {"oustaloup", DiscretisationMethod::oustaloup}})
-                        .description(""));
+  command.add_option("--period-s", sampling.period_s, "Sampling period (default: 0.01)")->check(positive());
+  command
+      .add_option("--order", sampling.order,
+                  fmt::format("Order of the transfer function, 1 to {} (default: 5)", control::kLargestOrder))
+      ->check(whole(1, control::kLargestOrder));
+  add_word(command, "--method", sampling.method,
+           std::array{DiscretisationMethod::direct, DiscretisationMethod::oustaloup},
+           "direct or oustaloup (default: several are tried, the choice is explained)");
   command
       .add_option("--a", sampling.a,
                   "Of the direct method: 0 is Euler, 1 Tustin (0.5 if only --method is given); implies --method direct")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(from_to(0, 1));
   command
       .add_option("--bandwidth-rad-s", sampling.bandwidth_rad_s, "Of the loop: accuracy matters below it (default: 30)")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
 }
 
 control::DiscretisationChoice discretised(const control::FopdController& controller, const Sampling& sampling) {

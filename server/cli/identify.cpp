@@ -6,9 +6,14 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
+#include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "server/analysis/control_json.hpp"
+#include "server/analysis/motion_at_start.hpp"
+#include "server/cli/options.hpp"
 
 namespace server::cli {
 namespace {
@@ -24,12 +29,15 @@ std::array<double, kParameters> values_of(const control::FractionalModel& model)
 void add_source(CLI::App& command, Identify& wish) {
   auto* csv = command.add_option("--csv", wish.csv,
                                  "Recording with columns t_s (equally spaced), duty, and position_m or velocity_m_s");
+  csv->check(named());
   add_options(command, wish.run);
   auto* run = command.get_option("--run");
   run->excludes(csv);
-  command.add_option("--span", wish.window.span, "Which span of the run, if the robot rebooted during it")->needs(run);
-  command.add_option("--from-s", wish.window.from_s, "First second of the span to use")->needs(run);
-  command.add_option("--to-s", wish.window.to_s, "Last second of the span to use")->needs(run);
+  command.add_option("--span", wish.window.span, "Which span of the run, if the robot rebooted during it")
+      ->check(whole(0, std::numeric_limits<std::uint32_t>::max()))
+      ->needs(run);
+  command.add_option("--from-s", wish.window.from_s, "First second of the span to use")->check(finite())->needs(run);
+  command.add_option("--to-s", wish.window.to_s, "Last second of the span to use")->check(finite())->needs(run);
   command
       .add_flag("--with-velocity", wish.window.with_velocity,
                 "Also fit the velocity that the robot estimated in the run")
@@ -39,22 +47,16 @@ void add_source(CLI::App& command, Identify& wish) {
 void add_search(CLI::App& command, control::IdentificationOptions& options) {
   using control::Cost;
   using control::Structure;
-  command
-      .add_option("--structure", options.structure,
-                  "first_order, second_order or fractional (default: all three, the best by AIC)")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Structure>{{"first_order", Structure::first_order},
-                                                                           {"second_order", Structure::second_order},
-                                                                           {"fractional", Structure::fractional}})
-                      .description(""));
-  command.add_option("--cost", options.cost, "least_squares or absolute_error (default: least_squares)")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Cost>{{"least_squares", Cost::least_squares},
-                                                                      {"absolute_error", Cost::absolute_error}})
-                      .description(""));
+  add_word(command, "--structure", options.structure,
+           std::array{Structure::first_order, Structure::second_order, Structure::fractional},
+           "first_order, second_order or fractional (default: all three, the best by AIC)");
+  add_word(command, "--cost", options.cost, std::array{Cost::least_squares, Cost::absolute_error},
+           "least_squares or absolute_error (default: least_squares)");
   command.add_flag("--offset,!--no-offset", options.fits_offset,
                    "Whether the initial position is fitted too (default: it is, where position is recorded)");
   command.add_option("--dead-time-s", options.longest_dead_time_s, "Find a dead time up to this (default: 0, none)")
-      ->check(CLI::NonNegativeNumber);
-  command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 60)")->check(CLI::PositiveNumber);
+      ->check(non_negative());
+  command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 60)")->check(positive());
 }
 
 void add_plan(CLI::App& command, Identify& wish) {
@@ -66,17 +68,24 @@ void add_plan(CLI::App& command, Identify& wish) {
         ->needs(flag)
         ->group("Planning");
   };
-  add("--plan-duty", plan.duty, "prbs or step")->check(CLI::IsMember({"prbs", "step"}));
-  add("--plan-amplitude", plan.amplitude, "Of the duty")->check(CLI::Range(-1.0, 1.0));
-  add("--plan-duration-s", plan.duration_s, "Length")->check(CLI::PositiveNumber);
-  add("--plan-bit-s", plan.bit_s, "Length of a bit of the prbs")->check(CLI::PositiveNumber);
-  add("--plan-dt-s", plan.dt_s, "Sampling period")->check(CLI::PositiveNumber);
-  add("--plan-position-sd-m", plan.position_sd_m, "Noise of the position; 0: not recorded");
-  add("--plan-velocity-sd-m-s", plan.velocity_sd_m_s, "Noise of the velocity; 0: not recorded");
+  add_word(command, "--plan-duty", plan.duty, std::array{PlannedDuty::prbs, PlannedDuty::step},
+           "prbs or step (default: prbs)")
+      ->needs(flag)
+      ->group("Planning");
+  add("--plan-amplitude", plan.amplitude, "Of the duty")->check(from_to(-1, 1));
+  add("--plan-duration-s", plan.duration_s, "Length")->check(positive());
+  add("--plan-bit-s", plan.bit_s, "Length of a bit of the prbs")->check(positive());
+  add("--plan-dt-s", plan.dt_s, "Sampling period")->check(positive());
+  add("--plan-position-sd-m", plan.position_sd_m, "Noise of the position; 0: not recorded")->check(non_negative());
+  add("--plan-velocity-sd-m-s", plan.velocity_sd_m_s, "Noise of the velocity; 0: not recorded")->check(non_negative());
 }
 
-control::Recording recording_for(const Identify& wish) {
-  if (!wish.csv.empty()) return read_recording(wish.csv);
+RunRecording recording_for(const Identify& wish) {
+  if (wish.csv) {
+    RunRecording given{read_recording(*wish.csv), {}};
+    if (auto moves = motion_at_start(given.recording)) given.warnings.push_back(*moves);
+    return given;
+  }
   if (!wish.run.run) {
     throw std::runtime_error{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
   }
@@ -110,19 +119,18 @@ void write_parameters(std::ostream& out, const Fit& fit) {
     table.row({kParameterNames[i], cell(values[i], 8), cell(fit.one_sigma[i], 3)});
   }
   table.write(out);
-  fmt::print(out, "fit {:.3f} %, residual sd {:.4g}, sse {:.6g}; offset {:.4g} m, dead time {:.4g} s\n",
-             fit.fit_percent, fit.residual_sd, fit.sse, fit.offset_m, fit.dead_time_s);
-  fmt::print(out, "residuals {} white (p = {:.3g}); {} after {} iterations; {} of {} starts agree\n",
-             fit.residuals_are_white ? "look" : "are not", fit.whiteness_p_value, text(fit.end), fit.iterations,
-             fit.starts_that_agree, fit.starts);
+  fmt::print(out, "fit {} %, residual sd {}, sse {}; offset {} m, dead time {} s\n", fixed(fit.fit_percent, 3),
+             cell(fit.residual_sd, 4), cell(fit.sse), cell(fit.offset_m, 4), cell(fit.dead_time_s, 4));
+  fmt::print(out, "residuals {} white (p = {}); {} after {} iterations; {} of {} starts agree\n",
+             fit.residuals_are_white ? "look" : "are not", cell(fit.whiteness_p_value, 3), text(fit.end),
+             fit.iterations, fit.starts_that_agree, fit.starts);
 }
 
 void write_compared(std::ostream& out, std::span<const Fit> compared) {
   if (compared.size() < 2) return;
   Table table{{"structure", "AIC", "fit (%)", "sse", "free", "kp", "b1", "b2", "alpha", "beta"}};
   for (const Fit& fit : compared) {
-    std::vector<std::string> row{text(fit.structure), fmt::format("{:.1f}", fit.aic),
-                                 fmt::format("{:.3f}", fit.fit_percent), cell(fit.sse),
+    std::vector<std::string> row{text(fit.structure), fixed(fit.aic, 1), fixed(fit.fit_percent, 3), cell(fit.sse),
                                  fmt::format("{}", fit.free_parameters)};
     for (const double value : values_of(fit.model)) row.push_back(cell(value, 5));
     table.row(std::move(row));
@@ -142,9 +150,13 @@ void add_options(CLI::App& command, Identify& wish) {
   add_search(command, wish.options);
   command.add_flag("--residuals", wish.with_residuals, "With --json: also the residuals, measured less model");
   add_json_flag(command, wish.form);
+  command.get_option("--residuals")->needs("--json");
   add_plan(command, wish);
   add_option(command, wish.plant);
   command.get_option("--plant")->needs("--plan")->group("Planning");
+  for (const char* searching : {"--structure", "--cost", "--dead-time-s", "--time-limit-s", "--residuals"}) {
+    command.get_option("--plan")->excludes(searching);
+  }
   command.footer(
       "Exit status 4: the search did not converge; the best that was found is printed.\n"
       "Example: rheonaut identify --csv run.csv --structure fractional");
@@ -152,7 +164,10 @@ void add_options(CLI::App& command, Identify& wish) {
 
 int run(const Identify& wish, std::ostream& out) {
   if (wish.plan.is_wanted) return run_plan(wish, out);
-  const control::Identification found = search(wish, recording_for(wish));
+  const RunRecording given = recording_for(wish);
+  for (const std::string& warning : given.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
+  control::Identification found = search(wish, given.recording);
+  found.warnings.insert(found.warnings.end(), given.warnings.begin(), given.warnings.end());
   if (wish.form.is_json) {
     OrderedJson answer = json_of(found);
     if (wish.with_residuals) answer["residuals"] = residuals_json(found.best);
@@ -161,6 +176,11 @@ int run(const Identify& wish, std::ostream& out) {
     write_parameters(out, found.best);
     write_compared(out, found.compared);
     for (const std::string& warning : found.warnings) fmt::print(out, "\nwarning: {}\n", warning);
+  }
+  if (!std::isfinite(found.best.sse)) {
+    fmt::print(stderr,
+               "rheonaut: no model fits this recording with finite numbers; are its units and columns right?\n");
+    return kNotConverged;
   }
   return found.best.end == control::SearchEnd::converged ? 0 : kNotConverged;
 }

@@ -1,6 +1,8 @@
 // `rheonaut identify`: a model from a recording, and what a planned experiment would tell.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "control/identify.hpp"
@@ -12,10 +14,13 @@ namespace server::cli {
 
 inline constexpr int kNotConverged = 4;  // exit status
 
+enum class PlannedDuty : std::uint8_t { prbs, step };
+const char* text(PlannedDuty value);
+
 // The duty of an experiment that has not been made.
 struct Plan {
   bool is_wanted = false;
-  std::string duty = "prbs";  // or step
+  PlannedDuty duty = PlannedDuty::prbs;
   double amplitude = 1;
   double duration_s = 60;
   double bit_s = 0.2;
@@ -25,7 +30,7 @@ struct Plan {
 };
 
 struct Identify {
-  std::string csv;
+  std::optional<std::string> csv;
   RunChoice run;
   RunWindow window;
   control::IdentificationOptions options;

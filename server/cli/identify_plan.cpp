@@ -20,8 +20,9 @@ control::PlannedExperiment experiment_of(const Plan& plan, bool fits_offset) {
   }
   control::PlannedExperiment experiment;
   experiment.dt_s = plan.dt_s;
-  experiment.duty = plan.duty == "step" ? control::step_duty(plan.amplitude, plan.duration_s, plan.dt_s)
-                                        : control::prbs_duty(plan.amplitude, plan.bit_s, plan.duration_s, plan.dt_s);
+  experiment.duty = plan.duty == PlannedDuty::step
+                        ? control::step_duty(plan.amplitude, plan.duration_s, plan.dt_s)
+                        : control::prbs_duty(plan.amplitude, plan.bit_s, plan.duration_s, plan.dt_s);
   experiment.position_sd_m = plan.position_sd_m;
   experiment.velocity_sd_m_s = plan.velocity_sd_m_s;
   experiment.fits_offset = fits_offset;
@@ -29,6 +30,8 @@ control::PlannedExperiment experiment_of(const Plan& plan, bool fits_offset) {
 }
 
 }  // namespace
+
+const char* text(PlannedDuty value) { return value == PlannedDuty::step ? "step" : "prbs"; }
 
 int run_plan(const Identify& wish, std::ostream& out) {
   const control::FractionalModel plant = read(wish.plant);
@@ -47,8 +50,8 @@ int run_plan(const Identify& wish, std::ostream& out) {
     table.row({control::kParameterNames[i], cell(values[i]), sigma ? cell(*sigma, 3) : "cannot tell",
                sigma ? cell(100 * *sigma / std::abs(values[i]), 3) : "-"});
   }
-  fmt::print(out, "{} of {} s, amplitude {}, every {} s; noise sd {} m, {} m/s (0: not recorded)\n\n", wish.plan.duty,
-             wish.plan.duration_s, wish.plan.amplitude, wish.plan.dt_s, wish.plan.position_sd_m,
+  fmt::print(out, "{} of {} s, amplitude {}, every {} s; noise sd {} m, {} m/s (0: not recorded)\n\n",
+             text(wish.plan.duty), wish.plan.duration_s, wish.plan.amplitude, wish.plan.dt_s, wish.plan.position_sd_m,
              wish.plan.velocity_sd_m_s);
   table.write(out);
   return 0;

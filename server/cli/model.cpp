@@ -8,15 +8,19 @@
 
 #include "control/motor_fit.hpp"
 #include "server/analysis/control_json.hpp"
+#include "server/cli/options.hpp"
 
 namespace server::cli {
 namespace {
 
 constexpr double kSpacingTolerance = 0.01;
+constexpr const char* kHydrodynamics = "Hydrodynamics, Table 1";
 
 void add_parameters(CLI::App& command, control::HydrodynamicParameters& p) {
   const auto add = [&command](const char* flag, double& value, const char* meaning) {
-    command.add_option(flag, value, fmt::format("{} (default: {})", meaning, value))->group("Hydrodynamics, Table 1");
+    command.add_option(flag, value, fmt::format("{} (default: {})", meaning, value))
+        ->check(finite())
+        ->group(kHydrodynamics);
   };
   add("--thrust-coefficient", p.thrust_coefficient, "Ct");
   add("--drag-coefficient", p.drag_coefficient, "Cd");
@@ -96,17 +100,47 @@ void write_fit(std::ostream& out, const control::MotorFit& fit) {
   table.row({"gain km", cell(fit.motor.gain_rad_s), cell(fit.gain_sigma_rad_s, 3), "rad/s"});
   table.row({"time constant Tm", cell(fit.motor.time_constant_s), cell(fit.time_constant_sigma_s, 3), "s"});
   table.write(out);
-  fmt::print(out, "fit {:.2f} %, residual sd {:.4g} rad/s\n\n", fit.fit_percent, fit.residual_sd_rad_s);
+  fmt::print(out, "fit {} %, residual sd {} rad/s\n\n", fixed(fit.fit_percent, 2), cell(fit.residual_sd_rad_s, 4));
+}
+
+control::FractionalModel chosen(Preset preset, const control::HydrodynamicModel& derived) {
+  switch (preset) {
+    case Preset::non_newtonian: return control::kNonNewtonianModel;
+    case Preset::newtonian: return control::kNewtonianModel;
+    case Preset::hydrodynamic: return derived.model;
+  }
+  throw std::logic_error{"no such preset"};
 }
 
 }  // namespace
 
+const char* text(Preset value) {
+  switch (value) {
+    case Preset::non_newtonian: return "non_newtonian";
+    case Preset::newtonian: return "newtonian";
+    case Preset::hydrodynamic: return "hydrodynamic";
+  }
+  return "unknown";
+}
+
 void add_options(CLI::App& command, Model& wish) {
-  command
-      .add_option("--preset", wish.preset, "Print this model as a model file: non_newtonian, newtonian, hydrodynamic")
-      ->check(CLI::IsMember({"non_newtonian", "newtonian", "hydrodynamic"}));
-  command.add_option("--motor-csv", wish.motor_csv, "Fit the motor to a CSV with columns t_s, duty, rate_rad_s");
+  add_word(command, "--preset", wish.preset, std::array{Preset::non_newtonian, Preset::newtonian, Preset::hydrodynamic},
+           "Print this model as a model file: non_newtonian, newtonian, hydrodynamic");
+  auto* motor =
+      command.add_option("--motor-csv", wish.motor_csv, "Fit the motor to a CSV with columns t_s, duty, rate_rad_s");
+  motor->check(named());
   add_parameters(command, wish.parameters);
+  motor->excludes("--motor-gain-rad-s")->excludes("--motor-time-constant-s");
+  // What would go unused: the printed presets of the paper do not depend on it.
+  command.parse_complete_callback([&command, &wish] {
+    if (!wish.preset || *wish.preset == Preset::hydrodynamic) return;
+    for (const CLI::Option* option : command.get_options()) {
+      if (option->count() == 0 || (option->get_group() != kHydrodynamics && option->get_name() != "--motor-csv"))
+        continue;
+      throw CLI::ExcludesError{option->get_name(),
+                               fmt::format("--preset {}, which it does not change", text(*wish.preset))};
+    }
+  });
   add_json_flag(command, wish.form);
   command.footer("Example: rheonaut model --preset hydrodynamic --mass-kg 0.12");
 }
@@ -114,13 +148,13 @@ void add_options(CLI::App& command, Model& wish) {
 int run(const Model& wish, std::ostream& out) {
   control::HydrodynamicParameters parameters = wish.parameters;
   std::optional<control::MotorFit> motor;
-  if (!wish.motor_csv.empty()) {
-    motor = fit_motor(wish.motor_csv);
+  if (wish.motor_csv) {
+    motor = fit_motor(*wish.motor_csv);
     parameters.motor = motor->motor;
   }
   const control::HydrodynamicModel derived = control::hydrodynamic_model(parameters);
-  if (!wish.preset.empty()) {
-    write_json(out, json_of(wish.preset == "hydrodynamic" ? derived.model : read(PlantChoice{wish.preset})));
+  if (wish.preset) {
+    write_json(out, json_of(chosen(*wish.preset, derived)));
     return 0;
   }
   if (wish.form.is_json) {

@@ -1,6 +1,8 @@
 // `rheonaut model`: the motion models of the paper, the hydrodynamics behind one of them, and the motor's fit.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "control/plant_models.hpp"
@@ -9,10 +11,13 @@
 
 namespace server::cli {
 
+enum class Preset : std::uint8_t { non_newtonian, newtonian, hydrodynamic };
+const char* text(Preset value);
+
 struct Model {
   control::HydrodynamicParameters parameters;
-  std::string preset;     // prints this model as a model file
-  std::string motor_csv;  // columns t_s, duty, rate_rad_s: fits the motor and uses it
+  std::optional<Preset> preset;          // prints this model as a model file
+  std::optional<std::string> motor_csv;  // columns t_s, duty, rate_rad_s: fits the motor and uses it
   OutputForm form;
 };
 

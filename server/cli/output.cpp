@@ -74,16 +74,25 @@ void Table::write(std::ostream& out) const {
 }
 
 std::string cell(double value, int digits) {
-  return std::isnan(value) ? "-" : fmt::format("{:.{}g}", value == 0 ? 0 : value, digits);
+  return std::isfinite(value) ? fmt::format("{:.{}g}", value == 0 ? 0 : value, digits) : "-";
+}
+
+std::string fixed(double value, int decimals) {
+  if (!std::isfinite(value)) return "-";
+  std::string text = fmt::format("{:.{}f}", value, decimals);
+  const bool is_zero = text.find_first_not_of("-0.") == std::string::npos;
+  return is_zero && text.front() == '-' ? text.substr(1) : text;
 }
 
 std::string cell(const std::optional<double>& value, int digits) { return value ? cell(*value, digits) : "-"; }
 
-std::string fixed_cell(double value, int decimals) {
-  if (std::isnan(value)) return "-";
-  std::string text = fmt::format("{:.{}f}", value, decimals);
-  const bool is_zero = text.find_first_not_of("-0.") == std::string::npos;
-  return is_zero && text.front() == '-' ? text.substr(1) : text;
+std::string one_line(std::string_view text) {
+  std::string shown;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    shown += byte < 0x20 || byte == 0x7F ? fmt::format("\\x{:02X}", byte) : std::string{c};
+  }
+  return shown;
 }
 
 }  // namespace server::cli

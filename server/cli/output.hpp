@@ -6,6 +6,7 @@
 #include <ostream>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -44,10 +45,12 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
+// For messages: what a terminal would obey, or what would break the line, as \xNN.
+std::string one_line(std::string_view text);
+
 // For tables: as many significant digits as a reader wants, "-" for what is not there.
 std::string cell(double value, int digits = 6);
+std::string fixed(double value, int decimals);  // with this many decimals, and no sign on zero
 std::string cell(const std::optional<double>& value, int digits = 6);
-// With this many digits after the point; what rounds to zero has no sign.
-std::string fixed_cell(double value, int decimals);
 
 }  // namespace server::cli

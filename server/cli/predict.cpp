@@ -9,10 +9,13 @@
 
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/run_steps.hpp"
+#include "server/cli/options.hpp"
 #include "server/cli/robustness_table.hpp"
 
 namespace server::cli {
 namespace {
+
+constexpr long long kLargestSeed = (1LL << 53) - 1;  // what JSON holds exactly
 
 // What a run did, and when the experiment that is predicted began in it.
 struct Measured {
@@ -60,8 +63,8 @@ OrderedJson json_of(const MeasuredStep& step) {
 }
 
 void add_row(Table& table, const std::string& name, double at_s, const control::StepMetrics& m) {
-  table.row({name, cell(at_s, 5), m.settling_s ? cell(*m.settling_s, 4) : "never", fixed_cell(m.overshoot_percent, 2),
-             cell(m.rise_10_90_s, 4), fixed_cell(1e3 * m.steady_state_error_m, 3)});
+  table.row({name, cell(at_s, 5), m.settling_s ? cell(*m.settling_s, 4) : "never", fixed(m.overshoot_percent, 2),
+             cell(m.rise_10_90_s, 4), fixed(1e3 * m.steady_state_error_m, 3)});
 }
 
 void write_table(std::ostream& out, const control::ClosedLoopExperiment& experiment,
@@ -81,8 +84,8 @@ void write_table(std::ostream& out, const control::ClosedLoopExperiment& experim
     fmt::print(out, "the predicted loop diverges: it is {:.3g} m off after {:.4g} s, where the prediction ends\n",
                prediction.measured_m.back(), prediction.time_s.back());
   }
-  fmt::print(out, "predicted duty: clipped in {:.2f} % of the samples, sd at rest {:.4g}\n",
-             100 * prediction.clipped_fraction, prediction.duty_sd_at_rest);
+  fmt::print(out, "predicted duty: clipped in {} % of the samples, sd at rest {}\n",
+             fixed(100 * prediction.clipped_fraction, 2), cell(prediction.duty_sd_at_rest, 4));
 }
 
 void write_samples(std::ostream& out, const control::ClosedLoopPrediction& p) {
@@ -98,16 +101,18 @@ void add_world(CLI::App& command, control::ClosedLoopExperiment& e) {
   const auto add = [&command](const char* flag, auto& value, const char* meaning) {
     return command.add_option(flag, value, fmt::format("{} (default: {})", meaning, value));
   };
-  add("--setpoint-m", e.setpoint_m, "The step");
-  add("--duration-s", e.duration_s, "Length of the experiment")->check(CLI::PositiveNumber);
-  add("--disturbance-m", e.disturbance_m, "Offset of the measured position");
-  add("--disturbance-at-s", e.disturbance_at_s, "When it begins; beyond the duration for none");
-  add("--duty-min", e.duty_min, "Lowest duty; 0 for a motor without reverse");
-  add("--duty-max", e.duty_max, "Highest duty");
-  add("--profile-velocity-m-s", e.profile_velocity_m_s, "Limit of the reference's velocity; 0 for a plain step");
-  add("--profile-acceleration-m-s2", e.profile_acceleration_m_s2, "Limit of the reference's acceleration");
-  add("--noise-sd-m", e.noise_sd_m, "White noise on the measured position");
-  add("--seed", e.noise_seed, "Of the noise");
+  add("--setpoint-m", e.setpoint_m, "The step")->check(finite());
+  add("--duration-s", e.duration_s, "Length of the experiment")->check(positive());
+  add("--disturbance-m", e.disturbance_m, "Offset of the measured position")->check(finite());
+  add("--disturbance-at-s", e.disturbance_at_s, "When it begins; beyond the duration for none")->check(non_negative());
+  add("--duty-min", e.duty_min, "Lowest duty; 0 for a motor without reverse")->check(from_to(-1, 1));
+  add("--duty-max", e.duty_max, "Highest duty")->check(from_to(-1, 1));
+  add("--profile-velocity-m-s", e.profile_velocity_m_s, "Limit of the reference's velocity; 0 for a plain step")
+      ->check(non_negative());
+  add("--profile-acceleration-m-s2", e.profile_acceleration_m_s2, "Limit of the reference's acceleration")
+      ->check(non_negative());
+  add("--noise-sd-m", e.noise_sd_m, "White noise on the measured position")->check(non_negative());
+  add("--seed", e.noise_seed, "Of the noise")->check(whole(0, kLargestSeed));
 }
 
 OrderedJson answer_of(const control::ClosedLoopExperiment& experiment, const control::DiscretisationChoice& controller,

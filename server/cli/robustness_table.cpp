@@ -17,10 +17,9 @@ void write_robustness(std::ostream& out, const control::RobustnessTable& robustn
                row.is_diverging ? "diverges"
                : row.is_stable  ? "yes"
                                 : "no",
-               settling(row.step), fixed_cell(row.step.overshoot_percent, 2),
-               fixed_cell(1e3 * row.step.steady_state_error_m, 2), settling(row.disturbance),
-               fixed_cell(row.disturbance.overshoot_percent, 2),
-               fixed_cell(1e3 * row.disturbance.steady_state_error_m, 2)});
+               settling(row.step), fixed(row.step.overshoot_percent, 2), fixed(1e3 * row.step.steady_state_error_m, 2),
+               settling(row.disturbance), fixed(row.disturbance.overshoot_percent, 2),
+               fixed(1e3 * row.disturbance.steady_state_error_m, 2)});
   }
   out << '\n';
   table.write(out);

@@ -4,17 +4,19 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <limits>
 #include <stdexcept>
 
-#include "server/analysis/analysis_service.hpp"
+#include "server/cli/options.hpp"
 #include "server/recording/run_reader.hpp"
 
 namespace server::cli {
 
 void add_options(CLI::App& command, RunChoice& choice) {
   auto* run = command.add_option("--run", choice.run, "A recorded run by its number");
-  run->check(CLI::PositiveNumber);
+  run->check(whole(1, std::numeric_limits<RunId>::max()));
   command.add_option("--data", choice.data_dir, "Folder of the station that recorded it (default: rheonaut-data)")
+      ->check(named())
       ->needs(run);
 }
 

@@ -8,6 +8,7 @@
 #include "control/margins.hpp"
 #include "control/time_response.hpp"
 #include "server/analysis/control_json.hpp"
+#include "server/cli/options.hpp"
 
 namespace server::cli {
 namespace {
@@ -44,15 +45,16 @@ void write_table(std::ostream& out, std::span<const double> times_s, std::span<c
 void add_options(CLI::App& command, Step& wish) {
   add_option(command, wish.plant);
   auto* duty = command.add_option("--duty", wish.duty, "Height of the step, -1 to 1 (default: 0.3)");
-  duty->check(CLI::Range(-1.0, 1.0));
+  duty->check(from_to(-1, 1));
   auto* times = command.add_option("--times", wish.times_s, "Times in s, e.g. 0.1,1,5,60")->delimiter(',');
-  times->check(CLI::NonNegativeNumber);
+  times->check(non_negative());
   auto* every = command.add_option("--every-s", wish.every_s, "Equally spaced times from 0 on");
-  every->check(CLI::PositiveNumber)->excludes(times);
+  every->check(positive())->excludes(times);
   auto* until = command.add_option("--until-s", wish.until_s, "The last time (default: 60)");
-  until->check(CLI::PositiveNumber)->excludes(times);
+  until->check(positive())->excludes(times);
   command
       .add_option("--duty-csv", wish.duty_csv, "Any input: CSV with columns t_s and duty, which holds until the next")
+      ->check(named())
       ->excludes(duty)
       ->excludes(times)
       ->excludes(every)
@@ -65,12 +67,12 @@ int run(const Step& wish, std::ostream& out) {
   const control::FractionalModel plant = read(wish.plant);
   std::vector<double> times_s, duty;
   control::TimeResponse response;
-  if (wish.duty_csv.empty()) {
+  if (!wish.duty_csv) {
     times_s = times_of(wish);
     duty.assign(times_s.size(), wish.duty);
     response = control::step_response(plant, wish.duty, times_s);
   } else {
-    CsvColumns columns = read_csv(wish.duty_csv, {"t_s", "duty"});
+    CsvColumns columns = read_csv(*wish.duty_csv, {"t_s", "duty"});
     times_s = std::move(columns["t_s"]);
     duty = std::move(columns["duty"]);
     response = control::sampled_response(plant, times_s, duty);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "server/cli/control_files.hpp"
@@ -15,7 +16,7 @@ struct Step {
   std::vector<double> times_s;    // or, if empty,
   std::optional<double> every_s;  // equally spaced up to until_s, or log-spaced up to it
   double until_s = 60;
-  std::string duty_csv;  // columns t_s, duty: in place of the step and the times
+  std::optional<std::string> duty_csv;  // columns t_s, duty: in place of the step and the times
   OutputForm form;
 };
 

@@ -9,6 +9,7 @@
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/optional_json.hpp"
 #include "server/cli/discretise.hpp"
+#include "server/cli/options.hpp"
 #include "server/cli/robustness_table.hpp"
 
 namespace server::cli {
@@ -76,9 +77,10 @@ void add_options(CLI::App& command, Tune& wish) {
   add_option(command, wish.plant);
   command.add_option("--crossover-rad-s", wish.spec.gain_crossover_rad_s, "Gain crossover")
       ->required()
-      ->check(CLI::PositiveNumber);
-  command.add_option("--phase-margin-deg", wish.spec.phase_margin_deg, "Phase margin")->required();
-  command.add_option("--mu", wish.spec.mu, "Order of the derivative, which gives up iso-damping (default: iso-damped)");
+      ->check(positive());
+  command.add_option("--phase-margin-deg", wish.spec.phase_margin_deg, "Phase margin")->required()->check(finite());
+  command.add_option("--mu", wish.spec.mu, "Order of the derivative, which gives up iso-damping (default: iso-damped)")
+      ->check(finite());
   command.add_flag("--velocity-loop", wish.spec.is_velocity_loop, "Without the integrator from velocity to position");
   command.add_flag("--robustness", wish.with_robustness, "Also predict what becomes of it when the plant differs");
   add_json_flag(command, wish.form);

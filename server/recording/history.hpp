@@ -18,24 +18,11 @@
 #include <vector>
 
 #include "server/recording/runs.hpp"
+#include "server/recording/stored_sample.hpp"
 #include "server/result.hpp"
 #include "server/worker.hpp"
 
 namespace server {
-
-struct StoredSample {
-  std::uint32_t span = 0;  // index of the run's span
-  BootId boot_id = 0;
-  std::uint64_t seq = 0;
-  std::uint64_t robot_time_us = 0;
-  std::int64_t utc_us = 0;  // robot time + the clock estimate stored with it
-  std::int64_t received_at_us = 0;
-  Sample sample;
-  protocol::Mode mode = rheonaut_MODE_UNSPECIFIED;
-  protocol::SubState sub_state = rheonaut_SUB_STATE_NONE;
-  std::optional<float> setpoint_m;
-  float disturbance_m = 0;
-};
 
 // Where a page ended: the span and seq of its last sample. A page begins after it.
 struct SampleCursor {

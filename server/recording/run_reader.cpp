@@ -1,8 +1,13 @@
 // One query over the view run_sample.
 #include "server/recording/run_reader.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
+#include <cctype>
+#include <cerrno>
 #include <charconv>
 
 #include "server/recording/database.hpp"
@@ -76,6 +81,37 @@ Result<std::vector<StoredSample>> query_run(SQLite::Database& database, RunId ru
   return samples;
 }
 
+Result<std::vector<StoredSample>> read_from(SQLite::Database database, const std::filesystem::path& path, RunId run,
+                                            std::size_t limit) {
+  if (auto ours = check_ours(database, path); !ours) return std::unexpected{ours.error()};
+  return query_run(database, run, limit);
+}
+
+// No station runs on the folder: nobody holds its lock, or there is none.
+bool lock_is_free(const std::filesystem::path& database) {
+  const auto lock_path = database.parent_path() / "rheonaut.lock";
+  const int lock = ::open(lock_path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (lock < 0) return errno == ENOENT;
+  const bool is_free = ::flock(lock, LOCK_SH | LOCK_NB) == 0;
+  ::close(lock);
+  return is_free;
+}
+
+// Everything is in the file itself, and nobody writes.
+bool is_at_rest(const std::filesystem::path& path) {
+  return !std::filesystem::exists(path.string() + "-wal") && lock_is_free(path);
+}
+
+// As a URI, which alone can say that the file does not change: then SQLite makes no files beside it.
+SQLite::Database open_at_rest(const std::filesystem::path& path) {
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(path).string()) {
+    const bool is_plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || std::string_view{"/._-"}.contains(c);
+    uri += is_plain ? std::string{c} : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return SQLite::Database{uri + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI};
+}
+
 }  // namespace
 
 Result<std::vector<StoredSample>> read_run(const std::filesystem::path& path, RunId run, std::size_t limit) {
@@ -83,9 +119,12 @@ Result<std::vector<StoredSample>> read_run(const std::filesystem::path& path, Ru
     return fail(ErrorCode::not_found, fmt::format("there is no {}; --data names the station's folder", path.string()));
   }
   try {
-    SQLite::Database database = open_for_reading(path);
-    if (auto ours = check_ours(database, path); !ours) return std::unexpected{ours.error()};
-    return query_run(database, run, limit);
+    if (is_at_rest(path)) {
+      const auto written = std::filesystem::last_write_time(path);
+      auto samples = read_from(open_at_rest(path), path, run, limit);
+      if (is_at_rest(path) && std::filesystem::last_write_time(path) == written) return samples;
+    }
+    return read_from(open_for_reading(path), path, run, limit);  // also when a station has begun meanwhile
   } catch (const SQLite::Exception& error) {
     return fail(ErrorCode::unavailable, fmt::format("cannot read {}: SQLite says '{}'", path.string(), error.what()));
   }

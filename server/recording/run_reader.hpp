@@ -1,13 +1,16 @@
 // Reads a run out of a station's database for a program that is not the station.
 //
-// Opens the file read-only, so it works while the station runs (the write-ahead log allows that), creates nothing, and
-// goes through the view run_sample, which docs/database.md promises. Blocks; for command-line tools.
+// Opens the file read-only, so it works while the station runs (the write-ahead log allows that), and goes through the
+// view run_sample, which docs/database.md promises. A database that no station has open, closed cleanly, is read as a
+// file that does not change: nothing appears beside it, and its folder may be read-only. Blocks; for command-line
+// tools.
 #pragma once
 
 #include <filesystem>
 #include <vector>
 
-#include "server/recording/history.hpp"
+#include "server/recording/runs.hpp"
+#include "server/recording/stored_sample.hpp"
 #include "server/result.hpp"
 
 namespace server {

@@ -80,6 +80,63 @@ TEST_F(BadInput, CsvFiles) {
   EXPECT_THAT(csv("t_s,duty,duty,position_m\n"), HasSubstr("twice"));
 }
 
+TEST_F(BadInput, CsvRowsLongerThanTheHeading) {
+  EXPECT_THAT(csv("t_s,duty,position_m\n0,0,0\n0,1,0,3,0,05\n"),
+              AllOf(HasSubstr("line 3: has 6 cells, the heading has 3"), HasSubstr("decimal comma? use ;")));
+  const auto columns = parse_csv("note,t_s\n\"a,b\",1,\n", "text", {"t_s"});
+  EXPECT_EQ(columns.at("t_s"), (std::vector<double>{1}));
+}
+
+TEST_F(BadInput, DutyInPercent) {
+  EXPECT_THAT(csv("t_s,duty,position_m\n0,30,0\n"), HasSubstr("line 2: duty 30 is outside [-1, 1]; is it in percent?"));
+  EXPECT_THAT(complaint("step --duty-csv @run.csv"), HasSubstr("in percent?"));
+  save("motor.csv", "t_s,duty,rate_rad_s\n0,-1.5,0\n");
+  EXPECT_THAT(complaint("model --motor-csv @motor.csv"), HasSubstr("duty -1.5"));
+  EXPECT_GT(ask("predict --duty-max 2").exit_code, 100);
+}
+
+TEST_F(BadInput, ValuesAreRefusedInOneSentence) {
+  const auto said = [this](const std::string& command) {
+    const Answer answer = ask(command);
+    EXPECT_GT(answer.exit_code, 100) << command;
+    EXPECT_EQ(std::ranges::count(answer.error, '\n'), 1) << answer.error;
+    EXPECT_THAT(answer.error, ::testing::StartsWith("rheonaut: ")) << command;
+    return answer.error;
+  };
+  EXPECT_THAT(said("tune --crossover-rad-s 0 --phase-margin-deg 90"),
+              HasSubstr("--crossover-rad-s must be positive and finite, is 0"));
+  EXPECT_THAT(said("tune --crossover-rad-s nan --phase-margin-deg 90"), HasSubstr("is nan"));
+  EXPECT_THAT(said("tune --crossover-rad-s 5 --phase-margin-deg inf"), HasSubstr("must be a finite number, is inf"));
+  EXPECT_THAT(said("bode --points 1e9"), HasSubstr("--points must be a whole number from 2 to 100000, is 1e9"));
+  EXPECT_THAT(said("discretise --order 11"), HasSubstr("from 1 to 10, is 11"));
+  EXPECT_THAT(said("discretise --method foo"), HasSubstr("--method must be one of direct, oustaloup, is 'foo'"));
+  EXPECT_THAT(said("discretise --method 0"), HasSubstr("is '0'"));
+  EXPECT_THAT(said("identify --csv x --structure 2"), HasSubstr("is '2'"));
+  EXPECT_THAT(said("predict --seed 1.5"), HasSubstr("--seed must be a whole number"));
+  EXPECT_THAT(said("predict --disturbance-at-s -1"), HasSubstr("must be 0 or more"));
+  EXPECT_THAT(said("foo"), HasSubstr("'foo'"));
+}
+
+TEST_F(BadInput, EmptyNamesAreNotTheDefault) {
+  for (const char* command : {"bode --plant", "bode --controller", "step --duty-csv", "model --motor-csv",
+                              "identify --csv", "identify --run 1 --data", "check-config --data"}) {
+    const Answer answer = ask(command + std::string{" @@"});
+    EXPECT_GT(answer.exit_code, 100) << command;
+    EXPECT_THAT(answer.error, HasSubstr("must not be empty")) << command;
+  }
+}
+
+TEST_F(BadInput, OptionsThatWouldGoUnused) {
+  for (const char* command : {"model --preset newtonian --mass-kg 3", "model --preset newtonian --motor-csv m.csv",
+                              "model --motor-csv m.csv --motor-gain-rad-s 3", "identify --plan --structure fractional",
+                              "identify --csv run.csv --residuals"}) {
+    const Answer answer = ask(command);
+    EXPECT_GT(answer.exit_code, 100) << command;
+    EXPECT_NE(answer.error, "") << command;
+  }
+  EXPECT_THAT(complaint("bode --json --from-rad-s 2"), HasSubstr("--points"));
+}
+
 TEST_F(BadInput, CsvIsReadInAnyOrderWithSpacesQuotesAndOtherColumns) {
   const auto columns = parse_csv("\xEF\xBB\xBF# x\r\n\r\n \"duty\" , note,t_s\r\n +0.5, a,1e-1\r\n\"-1\",,0.2", "text",
                                  {"t_s", "duty"}, {"position_m"});

@@ -52,8 +52,12 @@ class DocumentedCommands(unittest.TestCase):
             self.assertEqual((done.returncode, done.stdout), (1, ""))
             self.assertRegex(done.stderr, r"^rheonaut: none\.json: [^\n]*\n$")
             self.assertEqual(os.listdir(folder), [])
-            full = run("rheonaut bode > /dev/full", folder)
-            self.assertEqual(full.returncode, 1)
+            for command in ("bode", "--help", "--version", "bode --help", "check-config"):
+                full = run(f"rheonaut {command} > /dev/full", folder)
+                self.assertEqual(full.returncode, 1, command)
+                self.assertRegex(full.stderr, r"^rheonaut: [^\n]*\n$")
+            loud = run("rheonaut bode --plant $'no\\x1b[1m\\n.json'", folder)
+            self.assertRegex(loud.stderr, r"^rheonaut: no\\x1B\[1m\\x0A\.json: [^\n]*\n$")
 
 
 if __name__ == "__main__":

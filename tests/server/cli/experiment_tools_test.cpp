@@ -1,8 +1,10 @@
 // The fixed forms of identify, discretise and predict, with the numbers of the paper's plant and controller.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <numeric>
+#include <sstream>
 
 #include "server/cli/output.hpp"
 #include "tests/server/cli/tool_test.hpp"
@@ -11,6 +13,7 @@ namespace server::cli {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class Discretising : public ToolTest {};
 
@@ -97,9 +100,9 @@ TEST_F(Predicting, SaysPlainlyThatALoopIsUnstableOrDiverges) {
 }
 
 TEST(Cells, HaveNoSignOnZero) {
-  EXPECT_EQ(fixed_cell(-1e-9, 3), "0.000");
-  EXPECT_EQ(fixed_cell(-0.0, 0), "0");
-  EXPECT_EQ(fixed_cell(-0.5, 2), "-0.50");
+  EXPECT_EQ(fixed(-1e-9, 3), "0.000");
+  EXPECT_EQ(fixed(-0.0, 0), "0");
+  EXPECT_EQ(fixed(-0.5, 2), "-0.50");
   EXPECT_EQ(cell(-0.0), "0");
   EXPECT_EQ(cell(-1e-9, 2), "-1e-09");
 }
@@ -122,6 +125,22 @@ TEST_F(Identifying, FindsTheModelOfACleanRecordingWhichIsThenAPlant) {
   EXPECT_NEAR(again["velocity_m_s"][0], 0.0298827143987, 1e-8);
 }
 
+TEST_F(Identifying, WarnsOfACsvThatBeginsInMotion) {
+  std::istringstream whole{ask("step --duty 0.3 --every-s 0.01 --until-s 5 --csv").text};
+  std::string late, line;
+  for (int i = 0; std::getline(whole, line); ++i) {
+    if (i == 0 || i > 30) late += line + "\n";
+  }
+  save("late.csv", late);
+  const Answer answer = ask("identify --csv @late.csv --structure first_order --json");
+  EXPECT_THAT(answer.error, HasSubstr("rheonaut: warning: the recording begins in motion, at about 0.0"));
+  EXPECT_THAT(answer.json()["warnings"].back().get<std::string>(), HasSubstr("assumes rest"));
+  for (const char* every : {"0.01", "0.02", "0.05"}) {
+    save("run.csv", ask(std::string{"step --until-s 5 --csv --every-s "} + every).text);
+    EXPECT_EQ(ask("identify --csv @run.csv --structure first_order").error, "") << every;
+  }
+}
+
 TEST_F(Identifying, ComparesTheStructuresInATable) {
   save("run.csv", ask("step --duty 0.3 --every-s 0.02 --until-s 3 --csv").text);
   const Answer table = ask("identify --csv @run.csv");
@@ -135,6 +154,16 @@ TEST_F(Identifying, ExitsWith4WhenTimeRunsOut) {
   const Answer answer = ask("identify --csv @run.csv --structure fractional --time-limit-s 0.000001 --json");
   EXPECT_EQ(answer.exit_code, 4);
   EXPECT_EQ(answer.json()["end"], "time_limit");
+}
+
+TEST_F(Identifying, NumbersBeyondAllBoundsAreNoSuccess) {
+  std::string csv = "t_s,duty,position_m\n";
+  for (int k = 0; k < 60; ++k) csv += fmt::format("{},0.3,{}\n", 0.01 * k, 1e200 * k);
+  save("huge.csv", csv);
+  const Answer answer = ask("identify --csv @huge.csv --structure first_order");
+  EXPECT_NE(answer.exit_code, 0);
+  EXPECT_NE(answer.error, "");
+  EXPECT_THAT(answer.text, Not(HasSubstr("inf")));
 }
 
 TEST_F(Identifying, APlanTellsWhatAnExperimentWouldTell) {

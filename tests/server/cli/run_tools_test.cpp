@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <set>
 
 #include "control/modal_plant.hpp"
 #include "server/recording/run_reader.hpp"
@@ -12,7 +13,9 @@ namespace server {
 namespace {
 
 using cli::ToolAnswer;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class RunTools : public RecordingTest {
  protected:
@@ -79,9 +82,62 @@ TEST_F(RunTools, IdentifyRefusesAGapAndSaysWhereItIs) {
   flush();
   const ToolAnswer answer = ask("identify --run 1");
   EXPECT_EQ(answer.exit_code, 1);
-  EXPECT_THAT(answer.error, HasSubstr("run 1: the run has a gap of 0.210 s at 1.200 s (20 samples after seq 99"));
+  EXPECT_THAT(answer.error, AllOf(HasSubstr("run 1: "),
+                                  HasSubstr("a gap of 0.210 s at 0.990 s (20 samples after seq 99 are not there)"),
+                                  HasSubstr("--from-s 0 --to-s 0.99, or --from-s 1.2 --to-s 2.19")));
   EXPECT_THAT(ask("identify --run 1 --from-s 5").error, HasSubstr("has 0 samples"));
   EXPECT_NE(ask("identify --run 1 --to-s 0.99 --structure first_order").exit_code, 1);
+}
+
+TEST_F(RunTools, IdentifyTellsARobotThatRanLateFromLostSamples) {
+  begin();
+  swim(100, 0.3);
+  robot_.late_us = 60'000;
+  swim(50, 0.3);
+  robot_.late_us = 80'000;
+  swim(200, 0.3);
+  flush();
+  const ToolAnswer answer = ask("identify --run 1");
+  EXPECT_EQ(answer.exit_code, 1);
+  EXPECT_THAT(answer.error, AllOf(HasSubstr("the robot skipped 6 periods at 0.990 s; no sample was lost"),
+                                  HasSubstr("the robot skipped 2 periods at 1.550 s; no sample was lost"),
+                                  HasSubstr("choose --from-s 1.58 --to-s 3.57, or --from-s 0 --to-s 0.99"),
+                                  Not(HasSubstr("not there"))));
+  EXPECT_NE(ask("identify --run 1 --from-s 1.58 --to-s 3.57 --structure first_order").exit_code, 1);
+}
+
+TEST_F(RunTools, IdentifyWarnsOfAWindowThatBeginsInMotion) {
+  begin();
+  swim(100, 0);
+  swim(200, 0.3);
+  swim(600, 0);
+  swim(200, -0.3);
+  flush();
+  const ToolAnswer moving = ask("identify --run 1 --from-s 1.5 --structure first_order --json");
+  EXPECT_THAT(moving.error, AllOf(HasSubstr("rheonaut: warning: the window begins at 1.500 s"), HasSubstr("at rest")));
+  EXPECT_THAT(moving.json()["warnings"].back().get<std::string>(), HasSubstr("assumes rest"));
+  EXPECT_EQ(ask("identify --run 1 --from-s 8.5 --structure first_order").error, "");
+  EXPECT_EQ(ask("identify --run 1 --structure first_order").error, "");
+}
+
+TEST_F(RunTools, ReadingADatabaseAtRestLeavesNothingBeside) {
+  const RunId run = begin();
+  swim(100, 0.3);
+  flush();
+  stop();
+  const auto listing = [this] {
+    std::set<std::filesystem::path> files;
+    for (const auto& entry : std::filesystem::directory_iterator{folder_}) files.insert(entry.path().filename());
+    return files;
+  };
+  const auto before = listing();
+  EXPECT_FALSE(before.contains("station.sqlite-wal"));
+  std::filesystem::permissions(folder_, std::filesystem::perms{0500});
+  const auto samples = read_run(path_, run, 1000);
+  std::filesystem::permissions(folder_, std::filesystem::perms{0700});
+  ASSERT_TRUE(samples) << samples.error().detail;
+  EXPECT_EQ(samples->size(), 100u);
+  EXPECT_EQ(listing(), before);
 }
 
 TEST_F(RunTools, PredictRepeatsTheRunsStepAndDisturbance) {

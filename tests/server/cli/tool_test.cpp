@@ -9,7 +9,7 @@ ToolAnswer ask_tool(const std::filesystem::path& folder, const std::string& comm
   std::vector<std::string> words{"rheonaut"};
   std::istringstream stream{command};
   for (std::string word; stream >> word;) {
-    words.push_back(word.starts_with('@') ? (folder / word.substr(1)).string() : word);
+    words.push_back(word == "@@" ? "" : word.starts_with('@') ? (folder / word.substr(1)).string() : word);
   }
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -20,12 +20,15 @@ ToolAnswer ask_tool(const std::filesystem::path& folder, const std::string& comm
   const std::string help = ::testing::internal::GetCapturedStdout();
   given.error = ::testing::internal::GetCapturedStderr();
   std::ostringstream out;
+  ::testing::internal::CaptureStderr();
+  std::string thrown;
   try {
     given.exit_code = answer(wish, out).value_or(0);
   } catch (const std::exception& error) {
     given.exit_code = 1;
-    given.error += error.what();
+    thrown = error.what();
   }
+  given.error += ::testing::internal::GetCapturedStderr() + thrown;
   given.text = help + out.str();
   return given;
 }

@@ -19,7 +19,7 @@ struct ToolAnswer {
   nlohmann::json json() const { return nlohmann::json::parse(text); }
 };
 
-// Words of the command are separated by spaces; "@name" is a file of the folder.
+// Words of the command are separated by spaces; "@name" is a file of the folder, "@@" an empty word.
 ToolAnswer ask_tool(const std::filesystem::path& folder, const std::string& command);
 
 class ToolTest : public ::testing::Test {

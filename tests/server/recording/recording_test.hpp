@@ -45,7 +45,9 @@ struct TestRobot {
   bool from_loopback = true;
   SampleContext context = manual_at_100_hz();
 
-  std::uint64_t time_of(std::uint64_t seq) const { return 500'000 + seq * 10'000; }
+  std::uint64_t late_us = 0;  // by periods that it skipped
+
+  std::uint64_t time_of(std::uint64_t seq) const { return 500'000 + late_us + seq * 10'000; }
   SampleBatch batch(std::uint64_t first_seq, std::size_t count) const;
 };
 

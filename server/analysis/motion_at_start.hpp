@@ -1,0 +1,15 @@
+// Sees whether a recording begins in motion, which identification cannot know: its model rests before the first sample.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "control/identify.hpp"
+
+namespace server {
+
+// A warning for the reader of the fit: the speed of the first samples, and what to do. None when the recording may well
+// begin at rest, also under a duty that sets in with its first sample.
+std::optional<std::string> motion_at_start(const control::Recording& recording);
+
+}  // namespace server
