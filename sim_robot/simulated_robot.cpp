@@ -70,9 +70,8 @@ SimulatedRobot::SimulatedRobot(SimulatedRobotConfig config)
 void SimulatedRobot::step() {
   robot_fw::Inputs inputs;
   inputs.robot_time_us = robot_time_us_;
-  inputs.position_m = static_cast<float>(plant_.position_m());
-  inputs.velocity_m_s = static_cast<float>(plant_.velocity_m_s());
-  inputs.acceleration_m_s2 = static_cast<float>(plant_.acceleration_m_s2());
+  inputs.known_motion = {static_cast<float>(plant_.position_m()), static_cast<float>(plant_.velocity_m_s()),
+                         static_cast<float>(plant_.acceleration_m_s2())};
   inputs.impedance_mv = kImpedanceMv;
   inputs.supply_mv = kSupplyMv;
   inputs.rssi_dbm = kRssiDbm;

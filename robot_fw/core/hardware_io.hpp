@@ -2,18 +2,26 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 namespace robot_fw {
+
+// Along the tube, forwards positive.
+struct Motion {
+  float position_m = 0;
+  float velocity_m_s = 0;
+  float acceleration_m_s2 = 0;
+};
 
 struct Inputs {
   std::uint64_t robot_time_us = 0;  // since boot, never goes back
 
-  // A perfect position sensor; positions count along the tube, forwards positive.
-  float position_m = 0;
-  float velocity_m_s = 0;
-  float acceleration_m_s2 = 0;
+  std::int16_t acceleration_counts = 0;  // along the tube, gravity removed, 100 per m/s²
+  bool acceleration_is_valid = false;    // a reading came since the last tick
+  // From a perfect sensor, in place of the estimate: the simulator has one, a robot leaves it empty.
+  std::optional<Motion> known_motion;
 
-  float impedance_mv = 0;
+  float impedance_mv = 0;  // of the electrode; 0 when it could not be read
   float supply_mv = 0;
   std::int32_t rssi_dbm = 0;
   std::uint32_t free_memory_bytes = 0;

@@ -7,6 +7,14 @@
 #include "robot_fw/core/controller_message.hpp"
 
 namespace robot_fw {
+namespace {
+
+bool finite(const Motion& motion) {
+  return std::isfinite(motion.position_m) && std::isfinite(motion.velocity_m_s) &&
+         std::isfinite(motion.acceleration_m_s2);
+}
+
+}  // namespace
 
 Robot::Robot(const RobotConfig& config)
     : config_(config),
@@ -35,7 +43,7 @@ Outputs Robot::step(const Inputs& inputs, float dt_s) {
   run_due_commands();
   let_orders_run_out();
 
-  const Measured measured = read_perfect_sensor(inputs);
+  const Motion measured = read_perfect_sensor(inputs);
   watch_limits(measured, dt_s);
   const ControllerDuty wanted = wanted_duty(measured, dt_s);
   if (!inputs_are_sound_ || !std::isfinite(wanted.asked)) {
@@ -51,13 +59,14 @@ Outputs Robot::step(const Inputs& inputs, float dt_s) {
 }
 
 bool Robot::sound(const Inputs& inputs, float dt_s) const {
-  return inputs.robot_time_us >= inputs_.robot_time_us && std::isfinite(inputs.position_m) &&
-         std::isfinite(inputs.velocity_m_s) && std::isfinite(inputs.acceleration_m_s2) &&
+  return inputs.robot_time_us >= inputs_.robot_time_us && finite(inputs.known_motion.value_or(Motion{})) &&
          std::isfinite(inputs.impedance_mv) && std::isfinite(inputs.supply_mv) && std::isfinite(dt_s) && dt_s > 0;
 }
 
-Robot::Measured Robot::read_perfect_sensor(const Inputs& inputs) const {
-  return {inputs.position_m - position_zero_m_ + pilot_.disturbance_m(), inputs.velocity_m_s, inputs.acceleration_m_s2};
+Motion Robot::read_perfect_sensor(const Inputs& inputs) const {
+  Motion motion = inputs.known_motion.value_or(Motion{});
+  motion.position_m += pilot_.disturbance_m() - position_zero_m_;
+  return motion;
 }
 
 // Takes over the time of this tick; a missed tick is an event.
@@ -98,7 +107,7 @@ void Robot::let_orders_run_out() {
 }
 
 // Where the robot is, without the disturbance, and how long the motor has been at power in the ticks before this one.
-void Robot::watch_limits(const Measured& measured, float dt_s) {
+void Robot::watch_limits(const Motion& measured, float dt_s) {
   if (!inputs_are_sound_) return;
   const PositionLimits limits = position_limits();
   const float position_m = measured.position_m - pilot_.disturbance_m();
@@ -115,7 +124,7 @@ void Robot::watch_limits(const Measured& measured, float dt_s) {
   }
 }
 
-ControllerDuty Robot::wanted_duty(const Measured& measured, float dt_s) {
+ControllerDuty Robot::wanted_duty(const Motion& measured, float dt_s) {
   const auto setpoint_m = pilot_.setpoint_m();
   if (!setpoint_m) return {pilot_.manual_duty(), pilot_.manual_duty()};
   const ProfileLimits limits{parameters_[ParameterId::profile_velocity_m_s],
@@ -131,7 +140,7 @@ float Robot::slewed(float duty, float dt_s) const {
   return std::clamp(duty, duty_ - slew_per_s * dt_s, duty_ + slew_per_s * dt_s);
 }
 
-void Robot::record_sample(const Measured& measured, float dt_s) {
+void Robot::record_sample(const Motion& measured, float dt_s) {
   Sample sample;
   sample.position_m = measured.position_m;
   sample.velocity_m_s = measured.velocity_m_s;

@@ -63,23 +63,17 @@ class Robot {
   const char* refusal_detail() const { return refusal_detail_.data(); }
 
  private:
-  struct Measured {
-    float position_m;
-    float velocity_m_s;
-    float acceleration_m_s2;
-  };
-
   // The parts of a tick, in robot.cpp.
-  Measured read_perfect_sensor(const Inputs& inputs) const;
+  Motion read_perfect_sensor(const Inputs& inputs) const;
   bool sound(const Inputs& inputs, float dt_s) const;
   void watch_clock(std::uint64_t robot_time_us, float dt_s);
   void watch_link();
   void run_due_commands();
   void let_orders_run_out();
-  void watch_limits(const Measured& measured, float dt_s);
-  ControllerDuty wanted_duty(const Measured& measured, float dt_s);
+  void watch_limits(const Motion& measured, float dt_s);
+  ControllerDuty wanted_duty(const Motion& measured, float dt_s);
   float slewed(float duty, float dt_s) const;
-  void record_sample(const Measured& measured, float dt_s);
+  void record_sample(const Motion& measured, float dt_s);
   BatchValues batch_values() const;
   void stop_motion();
   void emergency(protocol::EmergencyCause cause, protocol::EventCause event_cause, std::uint64_t command_id);

@@ -194,7 +194,7 @@ Verdict Robot::zero_position(std::uint64_t command_id) {
   if (duty_ != 0 || pilot_.manual_duty() != 0) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
   const float before_m = read_perfect_sensor(inputs_).position_m;
   if (!std::isfinite(before_m)) return rejected(rheonaut_REJECT_REASON_NOT_FINITE);
-  position_zero_m_ = inputs_.position_m;
+  position_zero_m_ = inputs_.known_motion.value_or(Motion{}).position_m;
   note(rheonaut_EVENT_KIND_POSITION_ZEROED, rheonaut_EVENT_CAUSE_COMMAND, before_m, command_id);
   return kAccepted;
 }

@@ -186,6 +186,8 @@ class BareRobot : public ::testing::Test {
   Inputs inputs() {
     Inputs inputs;
     inputs.robot_time_us = now_us += kTickUs;
+    inputs.known_motion = Motion{};
+    inputs.impedance_mv = 175;
     return inputs;
   }
   void send_welcome() {
@@ -216,11 +218,15 @@ class BareRobot : public ::testing::Test {
 
 TEST_F(BareRobot, StopsOnAnyInputThatIsNotFinite) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
-  for (float Inputs::* field : {&Inputs::position_m, &Inputs::velocity_m_s, &Inputs::acceleration_m_s2,
-                                &Inputs::impedance_mv, &Inputs::supply_mv}) {
+  using Field = float& (*)(Inputs&);
+  for (const Field field : {Field([](Inputs& in) -> float& { return in.known_motion->position_m; }),
+                            Field([](Inputs& in) -> float& { return in.known_motion->velocity_m_s; }),
+                            Field([](Inputs& in) -> float& { return in.known_motion->acceleration_m_s2; }),
+                            Field([](Inputs& in) -> float& { return in.impedance_mv; }),
+                            Field([](Inputs& in) -> float& { return in.supply_mv; })}) {
     for (const float bad : {kNan, kInf}) {
       Inputs broken = inputs();
-      broken.*field = bad;
+      field(broken) = bad;
       EXPECT_EQ(robot.step(broken, 0.01F).duty, 0);
       EXPECT_EQ(robot.mode(), rheonaut_MODE_EMERGENCY);
       const auto id = robot.emergency_id();
@@ -247,7 +253,7 @@ TEST_F(BareRobot, StopsWhenTheClockGoesBack) {
 
 TEST_F(BareRobot, RefusesAClearWhileTheInputIsStillBroken) {
   Inputs broken = inputs();
-  broken.position_m = std::numeric_limits<float>::quiet_NaN();
+  broken.known_motion->position_m = std::numeric_limits<float>::quiet_NaN();
   robot.step(broken, 0.01F);
   send(clear_emergency(robot.emergency_id()));
   EXPECT_EQ(robot.mode(), rheonaut_MODE_EMERGENCY);
@@ -255,7 +261,7 @@ TEST_F(BareRobot, RefusesAClearWhileTheInputIsStillBroken) {
 
 TEST_F(BareRobot, AutoStopsWhenTheControllerAsksForMoreThanFloatHolds) {
   Inputs far = inputs();
-  far.position_m = -std::numeric_limits<float>::max();
+  far.known_motion->position_m = -std::numeric_limits<float>::max();
   EXPECT_EQ(robot.step(far, 0.01F).duty, 0);
   EXPECT_EQ(robot.mode(), rheonaut_MODE_EMERGENCY);
 }
