@@ -81,7 +81,8 @@ void SimulatedRobot::step() {
     inputs.known_motion = {static_cast<float>(plant_.position_m()), static_cast<float>(plant_.velocity_m_s()),
                            static_cast<float>(plant_.acceleration_m_s2())};
   }
-  inputs.impedance_mv = kImpedanceMv;
+  const double time_s = 1e-6 * static_cast<double>(robot_time_us_);
+  inputs.impedance_mv = config_.impedance_mv ? config_.impedance_mv(plant_.position_m(), time_s) : kImpedanceMv;
   inputs.supply_mv = kSupplyMv;
   inputs.rssi_dbm = kRssiDbm;
   inputs.imu_calibration = kImuCalibration;

@@ -4,6 +4,7 @@
 // acts on the plant for the whole period that follows.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -20,8 +21,10 @@ struct SimulatedRobotConfig {
   protocol::ResetCause reset_cause = rheonaut_RESET_CAUSE_POWER_ON;
   robot_fw::DutyRange duty{-1, 1};
   control::FractionalModel model = control::kNonNewtonianModel;
-  std::optional<ImuParameters> imu;      // empty: a perfect sensor, which tells the core the truth
-  std::uint64_t seed = 1;                // of the sensors' noise
+  std::optional<ImuParameters> imu;  // empty: a perfect sensor, which tells the core the truth
+  std::uint64_t seed = 1;            // of the sensors' noise
+  // What the electrode reads at a true position and time; empty: 175 mV everywhere.
+  std::function<float(double position_m, double time_s)> impedance_mv;
   robot_fw::Storage* storage = nullptr;  // of parameters and controller; null: they end with the robot
 };
 
