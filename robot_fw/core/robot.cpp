@@ -88,8 +88,7 @@ void Robot::watch_link() {
 }
 
 void Robot::run_due_commands() {
-  protocol::Command command;
-  while (timed_.take_due(now_us_, command)) run_timed_command(command);
+  while (const auto command = timed_.take_due(now_us_)) run_timed_command(*command);
 }
 
 void Robot::let_orders_run_out() {

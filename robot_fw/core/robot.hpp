@@ -82,8 +82,8 @@ class Robot {
   // Commands, in robot_commands.cpp.
   void on_command(const protocol::Command& command);
   void on_emergency_stop(const protocol::Command& command);
-  protocol::CommandAck ack_for(const protocol::Command& command, Verdict verdict, std::uint64_t effect_at_us) const;
-  void answer(const protocol::Command& command, Verdict verdict);
+  protocol::CommandAck ack_for(std::uint64_t command_id, Verdict verdict, std::uint64_t effect_at_us) const;
+  void answer(std::uint64_t command_id, Verdict verdict);
   void run_timed_command(const protocol::Command& command);
   void drop_timed_commands(Verdict verdict);
   Verdict execute(const protocol::Command& command);
