@@ -1,4 +1,4 @@
-// The last 32 events, kept until the station has them on disk.
+// The last 16 events, kept until the station has them on disk.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@ namespace robot_fw {
 
 class EventRing {
  public:
-  static constexpr std::size_t kCapacity = 32;
+  static constexpr std::size_t kCapacity = 16;
 
   // Numbers the event and keeps it; the oldest one makes room and is counted as lost.
   void push(const protocol::Event& event);

@@ -35,7 +35,7 @@ struct PageRequest {
 
 class Outbox {
  public:
-  static constexpr std::size_t kMaxAcks = 16;
+  static constexpr std::size_t kMaxAcks = 8;
   static constexpr std::size_t kMaxPages = 4;
 
   // A new connection: hello first. Acks that were not sent stay due.
