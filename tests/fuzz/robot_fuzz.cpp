@@ -27,7 +27,7 @@ class Session {
     while (!source_.empty()) operate(source_.byte());
     for (int i = 0; i < 3; ++i) tick();
     robot_->transmit_all();
-    if (choice_ & 0x80) robot_->expect_every_sample();
+    if (choice_ >= 0xC0) robot_->expect_every_sample();
   }
 
  private:

@@ -122,8 +122,10 @@ void WatchedRobot::overhear(const protocol::StationFrame& frame) {
   const protocol::Command& command = frame.body.command;
   switch (command.which_action) {
     case rheonaut_Command_clear_emergency_tag: cleared_ids_.insert(command.action.clear_emergency.emergency_id); break;
-    case rheonaut_Command_set_duty_tag:
     case rheonaut_Command_renew_lease_tag:
+      if (!command.has_execute_at_robot_us && now_us_ >= moves_until_us_) break;  // what has lapsed stays lapsed
+      [[fallthrough]];
+    case rheonaut_Command_set_duty_tag:
     case rheonaut_Command_set_duty_schedule_tag: {
       const std::uint64_t latest_us = std::min(command.valid_until_robot_us, now_us_ + protocol::kMaxCommandLifeUs);
       const std::uint64_t acts_by_us = command.has_execute_at_robot_us ? std::max(latest_us, now_us_) : now_us_;
@@ -209,12 +211,16 @@ void WatchedRobot::check_live(const protocol::Telemetry& batch) {
 void WatchedRobot::order(const protocol::Command& command) {
   if (!can_order()) return;
   transmit_all();
+  answer_to(command);
+  if (command.command_id != 0) require(answer_to(command) != rheonaut_COMMAND_RESULT_ACCEPTED, "no command runs twice");
+}
+
+protocol::CommandResult WatchedRobot::answer_to(const protocol::Command& command) {
   Robot without = robot_;
   const float duty = robot_.duty();
   const auto mode = robot_.mode();
   const std::uint64_t latch = robot_.emergency_id();
-  std::uint8_t bytes[protocol::kMaxFramedBytes];
-  receive({bytes, protocol::write_frame(frame_of(command), bytes, sizeof bytes)});
+  send(frame_of(command));
   require(open_, "a command closes no connection");
   if (command.which_action == rheonaut_Command_emergency_stop_tag) {
     require(robot_.emergency_id() != 0 && robot_.duty() == 0, "a stop is obeyed at once");
@@ -223,19 +229,26 @@ void WatchedRobot::order(const protocol::Command& command) {
   const auto ack = std::find_if(acks_.begin(), acks_.end(),
                                 [&command](const auto& each) { return each.command_id == command.command_id; });
   require(ack != acks_.end(), "a command is answered at once");
-  if (ack->result == rheonaut_COMMAND_RESULT_ACCEPTED) return;
+  if (ack->result == rheonaut_COMMAND_RESULT_ACCEPTED) return ack->result;
   const bool unchanged = same(duty, robot_.duty()) && mode == robot_.mode() && latch == robot_.emergency_id();
   require(unchanged, "a refused command changes nothing");
+  check_twins(robot_, without);
+  return ack->result;
+}
+
+void WatchedRobot::send(const protocol::StationFrame& frame) {
+  std::uint8_t bytes[protocol::kMaxFramedBytes];
+  receive({bytes, protocol::write_frame(frame, bytes, sizeof bytes)});
+}
+
+void WatchedRobot::check_twins(Robot with, Robot without) const {
   protocol::Command ping = rheonaut_Command_init_zero;
   ping.which_action = rheonaut_Command_ping_tag;
   ping.command_id = 0xF1F1'0000'0000'0000 + made_;
   ping.boot_id = config_.boot_id;
   ping.valid_until_robot_us = now_us_;
+  std::uint8_t bytes[protocol::kMaxFramedBytes];
   without.receive({bytes, protocol::write_frame(frame_of(ping), bytes, sizeof bytes)}, now_us_);
-  check_twins(robot_, without);
-}
-
-void WatchedRobot::check_twins(Robot with, Robot without) const {
   Inputs inputs = inputs_;
   inputs.robot_time_us = now_us_;
   for (int tick = 0; tick < 20; ++tick) {
@@ -249,11 +262,10 @@ void WatchedRobot::check_twins(Robot with, Robot without) const {
 
 void WatchedRobot::expect_every_sample() {
   open();
-  std::uint8_t bytes[protocol::kMaxFramedBytes];
   protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
   frame.which_body = rheonaut_StationFrame_welcome_tag;
   frame.body.welcome.protocol_version = protocol::kProtocolVersion;
-  receive({bytes, protocol::write_frame(frame, bytes, sizeof bytes)});
+  send(frame);
   require(up_, "a welcome opens the link");
   std::set<std::uint64_t> arrived;
   arrived_ = &arrived;

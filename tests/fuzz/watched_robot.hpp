@@ -27,8 +27,8 @@ class WatchedRobot {
   // Returns the size.
   std::size_t transmit(std::size_t capacity);
   void transmit_all();
-  // Sends it alone on a connection where nothing waits. It is answered at once; refused, it changes nothing, now or
-  // later: a copy that hears a ping instead drives on in the same way.
+  // Sends it alone on a connection where nothing waits, and again. It is answered at once and runs once at most;
+  // refused, it changes nothing, now or later: a copy that hears a ping instead drives on in the same way.
   void order(const protocol::Command& command);
   // Connects anew: every sample that the robot still holds arrives.
   void expect_every_sample();
@@ -50,6 +50,8 @@ class WatchedRobot {
   void check_frame(const protocol::RobotFrame& frame);
   void check_telemetry(const protocol::Telemetry& batch);
   void check_live(const protocol::Telemetry& batch);
+  protocol::CommandResult answer_to(const protocol::Command& command);
+  void send(const protocol::StationFrame& frame);
   void check_twins(robot_fw::Robot with, robot_fw::Robot without) const;
   bool can_order() const { return open_ && up_ && between_frames_; }
 
