@@ -34,7 +34,8 @@ void Electrode::step() { drift_mv_ += parameters_.drift_mv_s * kTickS; }
 
 double Electrode::read(double impedance_mv) {
   if (fault_.kind == FaultKind::missing) return 0;
-  if (fault_.kind == FaultKind::stuck) return reading_mv_;
+  if (fault_.kind == FaultKind::stuck && has_read_) return reading_mv_;
+  has_read_ = true;
   reading_mv_ = impedance_mv + parameters_.offset_mv + drift_mv_;
   if (parameters_.noise_mv > 0) reading_mv_ += parameters_.noise_mv * normal_(random_);  // (1)
   if (fault_.kind == FaultKind::offset) reading_mv_ += fault_.magnitude;

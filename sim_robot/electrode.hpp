@@ -39,6 +39,7 @@ class Electrode {
   Fault fault_;
   double drift_mv_ = 0;
   double reading_mv_ = 0;
+  bool has_read_ = false;
 };
 
 }  // namespace sim_robot

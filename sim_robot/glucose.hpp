@@ -3,11 +3,10 @@
 //   Z = Z_nominal + (Z_glucose - Z_nominal) · min(1, Σ c)                                           (1)   mV
 //   c(x, t) = C e^{-t/τ} [F((x - a)/σ) - F((x - b)/σ)],  σ² = edge² + 2 D t                         (2)
 //
-// A patch is poured from a to b with concentration C, 1 being the paper's mixture. It spreads by D (mixing), which keeps
-// its amount, and fades by τ (decay), both from the time it was poured on. F is the normal distribution. A patch stays
-// where it was poured: it is not carried along by the flow.
-// Accuracy: F from a table, within 2e-5.
-// Errors:   throws std::invalid_argument quoting the bad value.
+// A patch is poured from a to b with concentration C, 1 being the paper's mixture. It spreads by D (mixing), which
+// keeps its amount, and fades by τ (decay), both from the time it was poured on. F is the normal distribution. A patch
+// stays where it was poured: it is not carried along by the flow. Accuracy: F from a table, within 2e-5. Errors: throws
+// std::invalid_argument quoting the bad value.
 #pragma once
 
 #include <limits>
@@ -16,11 +15,11 @@
 namespace sim_robot {
 
 struct GlucosePatch {
-  double position_m = 0;     // its middle, (a + b)/2
-  double length_m = 0.1;     // b - a
-  double concentration = 1;  // C
-  double edge_m = 0;         // sd of the edges when poured; 0: sharp
-  double mixing_m2_s = 0;    // D; 0: does not spread
+  double position_m = 0;                                     // its middle, (a + b)/2
+  double length_m = 0.1;                                     // b - a
+  double concentration = 1;                                  // C
+  double edge_m = 0;                                         // sd of the edges when poured; 0: sharp
+  double mixing_m2_s = 0;                                    // D; 0: does not spread
   double decay_s = std::numeric_limits<double>::infinity();  // τ
   double poured_at_s = 0;                                    // robot time
   double removed_at_s = std::numeric_limits<double>::infinity();
@@ -50,8 +49,8 @@ class Glucose {
  private:
   struct Patch {
     double start_m, end_m;
-    double strength, decay;           // C e^{-t/τ}, and its change in a tick
-    double variance_m2, growth_m2;    // σ², and its change in a tick
+    double strength, decay;         // C e^{-t/τ}, and its change in a tick
+    double variance_m2, growth_m2;  // σ², and its change in a tick
     double poured_at_s, removed_at_s;
   };
   static Patch begun(const GlucosePatch& patch);

@@ -44,7 +44,7 @@ int main(int argc, char** argv) try {
   app.add_option("--sensor", sensor, "bno055: its accelerometer and the estimate; perfect: the true position")
       ->check(CLI::IsMember({"bno055", "perfect"}))
       ->capture_default_str();
-  app.add_option("--seed", config.seed, "of the sensors' noise")->capture_default_str();
+  app.add_option("--seed", config.world.seed, "of the sensors' noise")->capture_default_str();
   CLI::App* predict = app.add_subcommand("predict", "compute the closed-loop experiment and print what it measures");
   add_duty(*predict);
   predict->add_flag("--json", json, "as JSON");
@@ -55,7 +55,7 @@ int main(int argc, char** argv) try {
       std::cout << sim_robot::predict(config.duty, json);
       return EXIT_SUCCESS;
     }
-    if (sensor == "bno055") config.imu.emplace();
+    if (sensor == "bno055") config.world.imu.emplace();
     if (station.empty()) throw CLI::RequiredError("--station");
     config.boot_id = boot_id.empty() ? sim_robot::random_boot_id() : sim_robot::parse_boot_id(boot_id);
     return run_robot(config, sim_robot::parse_station_address(station));

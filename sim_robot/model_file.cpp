@@ -15,9 +15,9 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr std::array<std::string_view, 6> kNumbers{"kp", "b1", "b2", "b3", "alpha", "beta"};
 // What the tools add to a model, and what people do.
-constexpr std::array<std::string_view, 6> kPassedOver{"name",    "comment",    "description",
-                                                      "dc_gain_m_s", "poles_rad_s", "units"};
+constexpr std::array<std::string_view, 5> kPassedOver{"name", "comment", "description", "dc_gain_m_s", "poles_rad_s"};
 
 const Json& model_in(const Json& given) {
   if (!given.is_object()) control::throw_invalid("model: ", given.dump(), " is not an object with kp, b1, b2, …");
@@ -35,9 +35,9 @@ double number(const Json& model, const char* key) {
 }
 
 void refuse_unknown(const Json& model) {
-  constexpr std::array<std::string_view, 6> kKnown{"kp", "b1", "b2", "b3", "alpha", "beta"};
   for (const auto& [key, value] : model.items()) {
-    if (std::ranges::contains(kKnown, key) || std::ranges::contains(kPassedOver, key)) continue;
+    if (std::ranges::find(kNumbers, key) != kNumbers.end()) continue;
+    if (std::ranges::find(kPassedOver, key) != kPassedOver.end()) continue;
     control::throw_invalid("model: there is no '", key, "'; it has kp, b1, b2, b3, alpha, beta");
   }
 }
@@ -49,12 +49,9 @@ control::FractionalModel parse_model(const std::string& json) {
   if (given.is_discarded()) control::throw_invalid("model: this is not JSON");
   const Json& model = model_in(given);
   refuse_unknown(model);
-  const control::FractionalModel read{number(model, "kp"),
-                                      number(model, "b1"),
-                                      number(model, "b2"),
-                                      model.contains("b3") ? number(model, "b3") : 1,
-                                      number(model, "alpha"),
-                                      number(model, "beta")};
+  const control::FractionalModel read{number(model, "kp"),    number(model, "b1"),
+                                      number(model, "b2"),    model.contains("b3") ? number(model, "b3") : 1,
+                                      number(model, "alpha"), number(model, "beta")};
   control::check(read);
   return read;
 }

@@ -2,7 +2,8 @@
 //
 //   {"kp":0.1,"b1":0.005682,"b2":0.11031,"b3":1,"alpha":1.7263,"beta":0.8682}        a model file; b3 is 1 if left out
 //   {"parameters":{…},…}                                                             `rheonaut identify --json`
-//   {"model":{…},…}                                                                  `hydrodynamic` of `rheonaut model --json`
+//   {"model":{…},…}                                                                  `hydrodynamic` of `rheonaut model
+//   --json`
 // See docs/commands.md. Keys of a model that say something else about it are passed over.
 // Errors: throws std::invalid_argument that says what is wrong, which value it has, and what is allowed.
 #pragma once

@@ -25,9 +25,9 @@ Motor::Motor(const MotorParameters& parameters)
 }
 
 double Motor::step(double duty, double supply_ratio) {
-  const double wanted = driven(duty) * supply_ratio;              // (1)
-  const double mean = wanted + (rate_ - wanted) * mean_share_;    // (3)
-  rate_ = wanted + (rate_ - wanted) * decay_;                     // (2)
+  const double wanted = driven(duty) * supply_ratio;            // (1)
+  const double mean = wanted + (rate_ - wanted) * mean_share_;  // (3)
+  rate_ = wanted + (rate_ - wanted) * decay_;                   // (2)
   return mean;
 }
 

@@ -23,7 +23,7 @@ enum class PlantKind { linear, nonlinear };
 struct PlantParameters {
   PlantKind kind = PlantKind::linear;
   control::FractionalModel model = control::kNonNewtonianModel;  // of the linear one
-  control::HydrodynamicParameters hydrodynamics;                 // of the nonlinear one
+  control::HydrodynamicParameters hydrodynamics{};               // of the nonlinear one
 };
 
 void check(const PlantParameters& parameters);

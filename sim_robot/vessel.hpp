@@ -23,10 +23,10 @@ struct VesselParameters {
   double small_length_m = 1.5;
   double reservoir_diameter_m = 0.25;
   double reservoir_length_m = 0.3;
-  double junction_m = 1.4;         // where the tubes meet
+  double junction_m = 1.4;          // where the tubes meet
   bool is_large_tube_first = true;  // forwards: from the large tube into the small one
   double body_length_m = 0.09;      // of the robot
-  PumpParameters pump;
+  PumpParameters pump{};
 };
 
 void check(const VesselParameters& parameters);

@@ -53,7 +53,7 @@ TEST(Experiment, WithoutReverseThrustAnOvershootStays) {
 
 TEST(Experiment, FollowsTheReferenceInANewtonianFluid) {
   SimulatedRobotConfig config;
-  config.model = control::kNewtonianModel;
+  config.world.plant.model = control::kNewtonianModel;
   const ExperimentResult result = run_experiment(config);
   EXPECT_NEAR(result.step.overshoot_percent, 9.82, 0.5);
   EXPECT_NEAR(*result.step.settling_s, 0.84, 0.05);

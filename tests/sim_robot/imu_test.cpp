@@ -11,32 +11,32 @@ namespace {
 
 ImuParameters silent() {
   ImuParameters parameters;
-  parameters.noise_m_s2 = parameters.offset_m_s2 = parameters.wander_m_s2 = parameters.drift_m_s3 = 0;
+  parameters.noise_m_s2_rthz = parameters.offset_m_s2 = parameters.wander_m_s2 = parameters.drift_m_s3 = 0;
   parameters.clock_error = parameters.missed_read_probability = 0;
   return parameters;
 }
 
 TEST(Imu, CountsHundredthsOfAMetrePerSecondSquared) {
   Imu imu{silent(), 1};
-  for (int k = 0; k < 3; ++k) imu.accelerate(-1.234, 0.01);
+  for (int k = 0; k < 3; ++k) imu.accelerate(-1.234);
   EXPECT_EQ(imu.read().counts, -123);
   EXPECT_TRUE(imu.read().is_valid);
 }
 
 TEST(Imu, SaturatesInsteadOfWrapping) {
   Imu imu{silent(), 1};
-  for (int k = 0; k < 3; ++k) imu.accelerate(1e6, 0.01);
+  for (int k = 0; k < 3; ++k) imu.accelerate(1e6);
   EXPECT_EQ(imu.read().counts, 32767);
 }
 
 TEST(Imu, HasTheNoiseOfTheDataSheetsBand) {
   ImuParameters parameters = silent();
-  parameters.noise_m_s2 = 0.0116;
+  parameters.noise_m_s2_rthz = 0.0116 / std::sqrt(62.5);
   Imu imu{parameters, 1};
   double sum = 0, squares = 0;
   constexpr int kReadings = 20'000;
   for (int k = 0; k < kReadings; ++k) {
-    imu.accelerate(0, 0.01);
+    imu.accelerate(0);
     const double reading = imu.read().counts / Imu::kCountsPerMS2;
     sum += reading;
     squares += reading * reading;
@@ -59,7 +59,7 @@ TEST(Imu, DriftsByTenMicroGInASecondEitherWay) {
   int upwards = 0;
   for (unsigned seed = 0; seed < 100; ++seed) {
     Imu imu{parameters, seed};
-    for (int k = 0; k < 1000; ++k) imu.accelerate(0, 0.01);
+    for (int k = 0; k < 1000; ++k) imu.accelerate(0);
     EXPECT_NEAR(std::abs(imu.bias_m_s2()), 0.00098, 1e-9);
     if (imu.bias_m_s2() > 0) ++upwards;
   }
@@ -74,7 +74,7 @@ TEST(Imu, RepeatsAndSkipsReadingsByItsOwnClock) {
     Imu imu{parameters, seed};
     int last = imu.read().counts;
     for (int k = 1; k < 1000; ++k) {
-      imu.accelerate(0.1 * k, 0.01);  // 10 counts a tick
+      imu.accelerate(0.1 * k);  // 10 counts a tick
       const int counts = imu.read().counts;
       if (counts == last) ++repeated;
       if (counts - last > 15) ++skipped;
