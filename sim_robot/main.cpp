@@ -1,10 +1,11 @@
-// The program rheonaut-sim: one simulated robot that dials a station, or the prediction of an experiment.
+// The program rheonaut-sim: simulated robots that dial a station, or the prediction of an experiment.
 #include <CLI/CLI.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <csignal>
 #include <iostream>
 
+#include "sim_robot/fleet_command.hpp"
 #include "sim_robot/predict.hpp"
 #include "sim_robot/robot_client.hpp"
 
@@ -38,13 +39,16 @@ int main(int argc, char** argv) try {
   };
   add_duty(app);
   app.add_option("--station", station, "ADDR:PORT of the station's robot door");
-  app.add_option("--id", config.robot_id, "name of the robot, 1 to 31 of [a-z0-9_-]")->capture_default_str();
+  const auto* id =
+      app.add_option("--id", config.robot_id, "name of the robot, 1 to 31 of [a-z0-9_-]")->capture_default_str();
   app.add_option("--token", config.token, "enrolment token, at most 71 characters");
   app.add_option("--boot-id", boot_id, "fixed boot id in hexadecimal instead of a random one");
   app.add_option("--sensor", sensor, "bno055: its accelerometer and the estimate; perfect: the true position")
       ->check(CLI::IsMember({"bno055", "perfect"}))
       ->capture_default_str();
   app.add_option("--seed", config.world.seed, "of the sensors' noise")->capture_default_str();
+  app.add_option("--samples-per-frame", config.samples_per_frame, "of telemetry, 1 to 25")->capture_default_str();
+  sim_robot::FleetCommand fleet{app};
   CLI::App* predict = app.add_subcommand("predict", "compute the closed-loop experiment and print what it measures");
   add_duty(*predict);
   predict->add_flag("--json", json, "as JSON");
@@ -55,8 +59,10 @@ int main(int argc, char** argv) try {
       std::cout << sim_robot::predict(config.duty, json);
       return EXIT_SUCCESS;
     }
+    if (fleet.is_replay()) return fleet.replay();
     if (sensor == "bno055") config.world.imu.emplace();
     if (station.empty()) throw CLI::RequiredError("--station");
+    if (fleet.is_fleet()) return fleet.run(station, config, id->count() > 0);
     config.boot_id = boot_id.empty() ? sim_robot::random_boot_id() : sim_robot::parse_boot_id(boot_id);
     return run_robot(config, sim_robot::parse_station_address(station));
   } catch (const CLI::ParseError& error) {

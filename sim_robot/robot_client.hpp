@@ -1,71 +1,60 @@
 // Runs a simulated robot in real time and connects it to a station over TCP.
 //
-// Robot time is the host's steady clock since run() began, on time or late, in a tick or between two. Ticks are due at
-// multiples of the period; late ones run before any byte is handed to the robot, so its time never goes back. After a
-// stall (the process was stopped, the machine busy) the missed ones are skipped and counted.
-// A tick never waits for the network: what the socket does not take at once stays in the one frame under way, and the
-// robot keeps the rest. The connection is dialled again for ever, at most 1 s apart.
-// Owns robot and socket. One thread: that of `loop`, which must outlive the client.
+// Robot time is the host's steady clock since the robot booted, on time or late, in a tick or between two. Ticks are
+// due at multiples of the period; late ones run before any byte is handed to the robot, so its time never goes back.
+// After a stall (the process was stopped, the machine busy) the missed ones are skipped and counted. A tick never waits
+// for the network: see station_connection.hpp. Owns robot and connection. One thread: that of `loop`, which must
+// outlive the client.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <functional>
-#include <random>
-#include <string>
+#include <chrono>
+#include <cstdint>
 
+#include "sim_robot/fleet_member.hpp"
 #include "sim_robot/simulated_robot.hpp"
 
 namespace sim_robot {
 
-struct StationAddress {
-  std::string host;
-  std::string port;
-};
-// "host:port" or "[v6]:port"; throws std::invalid_argument.
-StationAddress parse_station_address(const std::string& text);
-
-// What people are told about the link, one line each.
-using LinkLog = std::function<void(const std::string& line)>;
-
-class RobotClient {
+class RobotClient final : public FleetMember, private Speaker {
  public:
   RobotClient(boost::asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log);
 
-  // Ticks and connects until cancelled. Never returns otherwise.
+  // Boots now, ticks and connects until cancelled. Never returns otherwise.
   boost::asio::awaitable<void> run();
 
+  // The parts of run(), for who has many robots.
+  void boot(Clock::time_point at) override { booted_at_ = at; }
+  void tick() override;
+  Clock::time_point next_tick_at() const override {
+    return booted_at_ + std::chrono::microseconds(robot_.robot_time_us());
+  }
+  boost::asio::awaitable<void> stay_connected() override { return connection_.run(); }
+
+  SampleCounts samples() const override;
+  const StationConnection& connection() const override { return connection_; }
   const SimulatedRobot& robot() const { return robot_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
+  void on_opened() override { robot_.link_opened(catch_up()); }
+  void on_closed() override { robot_.link_closed(catch_up()); }
+  bool on_bytes(protocol::Bytes bytes) override { return robot_.receive(bytes, catch_up()); }
+  std::size_t next_frame(std::uint8_t* out, std::size_t capacity) override;
+  bool is_welcome() const override { return robot_.core().link_up(); }
+  protocol::RefusalReason refusal() const override { return robot_.core().refusal(); }
+  std::string refusal_detail() const override { return robot_.core().refusal_detail(); }
 
-  boost::asio::awaitable<void> tick();
-  boost::asio::awaitable<void> stay_connected();
-  boost::asio::awaitable<bool> dial();
-  boost::asio::awaitable<void> serve();
-  void flush();
-  void close_if_silent();
-  void close_connection();
+  boost::asio::awaitable<void> tick_for_ever();
   std::uint64_t catch_up();
-  void say_how_it_ended();
-  void say(const std::string& line);
+  void watch_gaps();
 
   SimulatedRobot robot_;
-  StationAddress station_;
-  LinkLog log_;
-  boost::asio::ip::tcp::socket socket_;
-  boost::asio::steady_timer tick_timer_;
-  bool connected_ = false;
-  bool was_up_ = false;  // welcomed on this connection
-  std::string last_line_;
-
-  Clock::time_point booted_at_;                                  // robot time 0
-  std::array<std::uint8_t, protocol::kMaxFramedBytes> frame_{};  // under way
-  std::size_t frame_size_ = 0, frame_sent_ = 0;
-  std::minstd_rand jitter_{std::random_device{}()};
+  Clock::time_point booted_at_;  // robot time 0
+  StationConnection connection_;
+  std::uint64_t sent_ = 0, resent_ = 0;          // samples
+  std::uint64_t gaps_ = 0, lost_before_ = 0;     // at the last tick
+  std::uint64_t oldest_after_gap_ = UINT64_MAX;  // it is this while the latest gap grows
 };
 
 }  // namespace sim_robot
