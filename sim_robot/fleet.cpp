@@ -40,6 +40,7 @@ void Fleet::take_turn(std::uint64_t turn) {
     lateness_.add(std::chrono::duration_cast<std::chrono::microseconds>(late).count());
     member.tick();
   }
+  for (std::size_t i = 0; i < slot.booted; ++i) slot.members[i]->send();
 }
 
 void Fleet::boot_due(Slot& slot, std::uint64_t turn) {

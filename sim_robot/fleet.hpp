@@ -4,6 +4,8 @@
 // One timer turns the wheel, whatever the number of robots. Robots boot and dial kBootEveryUs apart, each at a turn of
 // its own slot: so neither their ticks nor their frames nor their dialling come all at once. A late turn is taken as
 // soon as possible, and robots catch up by themselves; after a stall of over a period the wheel goes on from now.
+// In a turn all robots of the slot tick, then all of them send: a station that is woken by the first frame is still
+// awake for the others, which halves the cost of a frame.
 // Owns the robots. One thread: that of `loop`, which must outlive the fleet and be stopped before it ends.
 #pragma once
 
@@ -32,7 +34,7 @@ struct FleetCounts {
 class Fleet {
  public:
   using Members = std::vector<std::unique_ptr<FleetMember>>;
-  static constexpr std::uint64_t kSlotUs = 500;
+  static constexpr std::uint64_t kSlotUs = 1000;
   static constexpr std::uint64_t kBootEveryUs = 2000;
 
   // The period is at least kSlotUs.

@@ -33,8 +33,10 @@ class FleetMember {
 
   // Robot time 0 is at `at`, which is not later than now.
   virtual void boot(Clock::time_point at) = 0;
-  // Makes the samples that are due and sends what can be sent.
+  // Makes the samples that are due.
   virtual void tick() = 0;
+  // Sends what can be sent without waiting, and gives up a connection that is silent.
+  virtual void send() = 0;
   virtual Clock::time_point next_tick_at() const = 0;
   // Never returns but by cancellation.
   virtual boost::asio::awaitable<void> stay_connected() = 0;

@@ -48,8 +48,7 @@ FleetMember::Clock::time_point ReplayedRobot::next_tick_at() const {
   return booted_at_ + std::chrono::microseconds((recording_.end_seq(next_) - 1) * config_.period_us);
 }
 
-void ReplayedRobot::tick() {
-  make_frames();
+void ReplayedRobot::send() {
   if (!connection_.is_open()) return;
   backfill_credit_ = kBackfillPerTurn;
   connection_.flush();

@@ -28,12 +28,16 @@ asio::awaitable<void> RobotClient::tick_for_ever() {
     timer.expires_at(next_tick_at());
     co_await timer.async_wait(asio::use_awaitable);
     tick();
+    send();
   }
 }
 
 void RobotClient::tick() {
   catch_up();
   watch_gaps();
+}
+
+void RobotClient::send() {
   if (!connection_.is_open()) return;
   connection_.flush();
   if (robot_.core().connection_is_silent(catch_up())) connection_.close_as_silent();

@@ -27,6 +27,7 @@ class RobotClient final : public FleetMember, private Speaker {
   // The parts of run(), for who has many robots.
   void boot(Clock::time_point at) override { booted_at_ = at; }
   void tick() override;
+  void send() override;
   Clock::time_point next_tick_at() const override {
     return booted_at_ + std::chrono::microseconds(robot_.robot_time_us());
   }
