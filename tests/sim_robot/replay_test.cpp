@@ -4,8 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <optional>
+#include <limits>
 #include <stdexcept>
+#include <vector>
 
 namespace sim_robot {
 namespace {
