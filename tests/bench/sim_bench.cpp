@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
+#include "sim_robot/replay.hpp"
 #include "sim_robot/simulated_robot.hpp"
-#include "sim_robot/station_peer.hpp"
 
 namespace sim_robot {
 namespace {
@@ -106,6 +106,19 @@ void fleet_tick(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * state.range(0));
 }
 BENCHMARK(fleet_tick)->Arg(1)->Arg(100)->Arg(1000)->Unit(benchmark::kMicrosecond);
+
+// One frame of 10 samples of a replayed robot.
+void replay_frame(benchmark::State& state) {
+  const Recording recording = make_recording(5, 10, 1);
+  std::array<std::uint8_t, protocol::kMaxFramedBytes> bytes;
+  std::uint64_t number = 0;
+  for (auto _ : state) {
+    const Recording::Head head{number * 100'000, 10'000, number * 10, false};
+    benchmark::DoNotOptimize(recording.write(number, head, bytes.data(), bytes.size()));
+    ++number;
+  }
+}
+BENCHMARK(replay_frame);
 
 // What every tick is compared with: the smallest plant that can be, one complex number turned 144 times.
 void bare_loop(benchmark::State& state) {

@@ -6,6 +6,7 @@
 #include <boost/asio/co_spawn.hpp>
 #include <map>
 #include <optional>
+#include <stdexcept>
 
 #include "sim_robot/fleet_report.hpp"
 #include "sim_robot/replayed_robot.hpp"
@@ -63,6 +64,12 @@ class FleetTest : public ::testing::Test {
       }
       return true;
     });
+  }
+  const StoredBoot& stored(const std::string& robot_id) const {
+    for (const auto& [id, boot] : sink.boots()) {
+      if (boot.robot_id == robot_id) return boot;
+    }
+    throw std::out_of_range("nothing came of " + robot_id);
   }
   void expect_exact() const {
     const SampleCounts sum = fleet->counts().samples;
@@ -198,13 +205,13 @@ TEST_F(FleetTest, AReplayedRobotSendsAgainAfterAnOutageAndOnRequest) {
   sink.acknowledges = false;
   const std::uint64_t acknowledged = fleet->robot(0).samples().acknowledged;
   ASSERT_TRUE(run_until([&] { return fleet->robot(0).samples().held >= 60; }));
-  const std::uint64_t repeated_before = sink.boots().begin()->second.repeated;
+  const std::uint64_t repeated_before = stored("sim-1").repeated;
   protocol::StationFrame ask = rheonaut_StationFrame_init_zero;
   ask.which_body = rheonaut_StationFrame_heartbeat_tag;
   ask.body.heartbeat.resend_first_seq = acknowledged + 10;
   ask.body.heartbeat.resend_next_seq = acknowledged + 40;
   sink.send_all(ask);
-  ASSERT_TRUE(run_until([&] { return sink.boots().begin()->second.repeated >= repeated_before + 30; }));
+  ASSERT_TRUE(run_until([&] { return stored("sim-1").repeated >= repeated_before + 30; }));
   expect_exact();
 }
 
@@ -220,7 +227,7 @@ TEST_F(FleetTest, AReplayedRobotRefusesCommandsAndAnswersClockProbes) {
   frame.body.command = emergency_stop();
   frame.body.command.command_id = 1;
   sink.send_all(frame);
-  ASSERT_TRUE(run_until([&] { return sink.boots().begin()->second.refused_commands == 1; }));
+  ASSERT_TRUE(run_until([&] { return stored("sim-1").refused_commands == 1; }));
   frame = rheonaut_StationFrame_init_zero;
   frame.which_body = rheonaut_StationFrame_heartbeat_tag;
   frame.body.heartbeat.station_time_us = 4711;
