@@ -21,7 +21,7 @@ double per_second(std::uint64_t from, std::uint64_t to, double dt_s) {
   return dt_s > 0 ? static_cast<double>(to - from) / dt_s : 0;
 }
 
-double rounded(double value, double step) { return std::round(value / step) * step; }
+double rounded(double value, double decimal) { return std::round(value / decimal) / std::round(1 / decimal); }
 
 Json late_ms(const Lateness& lateness) {
   return {{"p50", lateness.quantile_ms(0.5)}, {"p99", lateness.quantile_ms(0.99)}, {"max", lateness.max_ms()}};
