@@ -163,8 +163,9 @@ TEST_F(Telemetry, ExactlyWhatIsCountedAsLostIsMissing) {
   std::uint64_t oldest_seq = 0;
   for (int i = 0; i < 600; ++i) {
     station.step();
-    if (i % 10 != 0 || batches(true).empty()) continue;
-    const protocol::Telemetry last = batches(true).back();
+    const auto backfill = batches(true);
+    if (backfill.empty()) continue;
+    const protocol::Telemetry& last = backfill.back();
     oldest_seq = last.oldest_seq;
     protocol::StationHeartbeat heartbeat = rheonaut_StationHeartbeat_init_zero;
     heartbeat.durable_next_seq = last.first_seq + last.position_m_count;
