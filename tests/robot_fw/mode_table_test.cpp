@@ -157,6 +157,14 @@ TEST_P(EveryState, AnswersEachCommandAsThePageSays) {
       expect_alike(after, before, 60);
     }
     if (command.which_action == rheonaut_Command_emergency_stop_tag || command.which_action == 0) continue;
+    if (cell == "latched") {  // also for later: after a clear nothing moves by itself
+      BareCore ahead = before;
+      protocol::Command later = command;
+      later.has_execute_at_robot_us = true;
+      later.execute_at_robot_us = before.now_us + 2 * BareCore::kTickUs;
+      EXPECT_EQ(ahead.order(later).reason, rheonaut_REJECT_REASON_LATCHED);
+      expect_alike(ahead, before, 3);
+    }
     BareCore late = before, elsewhere = before, twice = after;
     protocol::Command stale = command;
     stale.valid_until_robot_us = before.now_us - 1;
