@@ -210,6 +210,10 @@ TEST(ModeTable, ALaterStopHidesASensorsCauseButDoesNotForgetIt) {
   core.accelerometer_answers = true;
   core.run(50);
   EXPECT_EQ(state_of(core), "recovered");
+  core.order(sim_robot::clear_emergency(core.robot.emergency_id()));
+  core.order(sim_robot::emergency_stop());
+  core.tick();
+  EXPECT_EQ(state_of(core), "emergency") << "a clear forgets it";
 }
 
 TEST(ModeTable, AClearOutsideTheLimitsLeavesTheRobotOutside) {
