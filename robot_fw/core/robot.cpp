@@ -200,7 +200,7 @@ void Robot::note(protocol::EventKind kind, protocol::EventCause cause, float val
   event.cause = cause;
   event.sample_seq = samples_.next_seq();
   event.mode = mode();
-  event.sub_state = pilot_.sub_state();
+  event.sub_state = mode() == rheonaut_MODE_AUTO ? pilot_.sub_state() : rheonaut_SUB_STATE_NONE;
   event.position_m = seen_motion().position_m;
   event.value = value;
   event.emergency_id = safety_.emergency_id();
