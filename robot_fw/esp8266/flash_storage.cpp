@@ -1,0 +1,92 @@
+// Reads and writes the two sectors.
+#include "robot_fw/esp8266/flash_storage.hpp"
+
+#include <Arduino.h>
+#include <flash_hal.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+
+#include "robot_fw/core/crc32.hpp"
+
+namespace robot_fw::esp8266 {
+namespace {
+
+constexpr std::uint32_t kMagic = 0x31'4E'48'52;  // "RHN1"
+constexpr std::uint32_t kSectorBytes = 4096;
+constexpr std::uint32_t kAttempts = 3;
+
+std::uint32_t address_of(std::uint32_t sector) { return FS_PHYS_ADDR + sector * kSectorBytes; }
+
+std::size_t slot(StorageKey key) { return static_cast<std::size_t>(key) - 1; }
+
+template <typename Record>
+std::uint32_t crc_of(const Record& record) {
+  Crc32 crc;
+  crc.add(&record, offsetof(Record, crc));
+  return crc.value();
+}
+
+template <typename Record>
+std::uint32_t* words_of(Record& record) {
+  return reinterpret_cast<std::uint32_t*>(&record);
+}
+
+}  // namespace
+
+bool FlashStorage::sound(const Record& record) {
+  return record.magic == kMagic && record.size[0] <= kMaxBytes && record.size[1] <= kMaxBytes &&
+         record.crc == crc_of(record);
+}
+
+void FlashStorage::begin() {
+  there_ = FS_PHYS_SIZE >= 2 * kSectorBytes;
+  if (!there_) return;
+  const bool first = ESP.flashRead(address_of(0), words_of(record_), sizeof(Record)) && sound(record_);
+  const bool second = ESP.flashRead(address_of(1), words_of(read_back_), sizeof(Record)) && sound(read_back_);
+  if (second && (!first || read_back_.sequence > record_.sequence)) {
+    record_ = read_back_;
+    sector_ = 1;
+  } else if (!first) {
+    record_ = Record{};
+    sector_ = 1;  // the first write goes to sector 0
+  }
+}
+
+std::size_t FlashStorage::load(StorageKey key, std::uint8_t* bytes, std::size_t capacity) {
+  const std::size_t size = record_.size[slot(key)];
+  if (size > capacity) return 0;
+  std::copy_n(record_.value[slot(key)], size, bytes);
+  return size;
+}
+
+bool FlashStorage::save(StorageKey key, protocol::Bytes bytes) {
+  if (!there_ || bytes.size() > kMaxBytes) return false;
+  std::copy(bytes.begin(), bytes.end(), record_.value[slot(key)]);
+  record_.size[slot(key)] = static_cast<std::uint32_t>(bytes.size());
+  attempts_left_ = kAttempts;
+  return true;
+}
+
+void FlashStorage::write_pending() {
+  // SAFETY: erasing stops the program for up to 0.4 s, in which no tick controls the motor.
+  if (attempts_left_ == 0 || !motor_.is_off()) return;
+  --attempts_left_;
+  record_.magic = kMagic;
+  ++record_.sequence;
+  record_.crc = crc_of(record_);
+  const std::uint32_t other = 1 - sector_;
+  if (!write(other)) return;
+  sector_ = other;
+  attempts_left_ = 0;
+}
+
+bool FlashStorage::write(std::uint32_t sector) {
+  return ESP.flashEraseSector(address_of(sector) / kSectorBytes) &&
+         ESP.flashWrite(address_of(sector), words_of(record_), sizeof(Record)) &&
+         ESP.flashRead(address_of(sector), words_of(read_back_), sizeof(Record)) &&
+         std::memcmp(&record_, &read_back_, sizeof(Record)) == 0;
+}
+
+}  // namespace robot_fw::esp8266

@@ -1,0 +1,49 @@
+// What outlives a loss of power: parameters and controller, in two sectors of flash that take turns.
+//
+//   record := magic sequence size[2] value[2] crc     words little-endian; the CRC-32 covers all before it
+// The sector with the higher sequence counts. A write erases and fills the other one, so a cut of power in the middle
+// of it leaves the older record whole. save() keeps the value in RAM; write_pending() writes it, with the motor off.
+// The two sectors are the first of the file system's area, which nothing else here uses.
+#pragma once
+
+#include "robot_fw/core/settings_store.hpp"
+#include "robot_fw/esp8266/motor.hpp"
+
+namespace robot_fw::esp8266 {
+
+class FlashStorage final : public Storage {
+ public:
+  explicit FlashStorage(const Motor& motor) : motor_(motor) {}
+
+  // Reads the newer record that is sound.
+  void begin();
+  std::size_t load(StorageKey key, std::uint8_t* bytes, std::size_t capacity) override;
+  bool save(StorageKey key, protocol::Bytes bytes) override;
+  // Writes what was saved since; blocks for up to half a second when there is something.
+  void write_pending();
+  bool pending() const { return attempts_left_ > 0; }
+
+ private:
+  static constexpr std::size_t kKeys = 2;
+
+  struct Record {
+    std::uint32_t magic;
+    std::uint32_t sequence;
+    std::uint32_t size[kKeys];
+    std::uint8_t value[kKeys][kMaxBytes];
+    std::uint32_t crc;
+  };
+  static_assert(sizeof(Record) % 4 == 0 && sizeof(Record) <= 4096, "flash is written in words, a sector at a time");
+
+  static bool sound(const Record& record);
+  bool write(std::uint32_t sector);
+
+  const Motor& motor_;
+  Record record_{};           // as it is or is to be in flash
+  Record read_back_{};        // of the sector just written; at boot, of the other one
+  std::uint32_t sector_ = 0;  // 0 or 1: where the newest record is
+  bool there_ = false;        // this flash layout has room for it
+  std::uint32_t attempts_left_ = 0;
+};
+
+}  // namespace robot_fw::esp8266
