@@ -19,7 +19,7 @@ constexpr std::uint32_t kAttempts = 3;
 
 std::uint32_t address_of(std::uint32_t sector) { return FS_PHYS_ADDR + sector * kSectorBytes; }
 
-std::size_t slot(StorageKey key) { return static_cast<std::size_t>(key) - 1; }
+std::size_t slot_of(StorageKey key) { return static_cast<std::size_t>(key) - 1; }
 
 template <typename Record>
 std::uint32_t crc_of(const Record& record) {
@@ -55,16 +55,16 @@ void FlashStorage::begin() {
 }
 
 std::size_t FlashStorage::load(StorageKey key, std::uint8_t* bytes, std::size_t capacity) {
-  const std::size_t size = record_.size[slot(key)];
+  const std::size_t size = record_.size[slot_of(key)];
   if (size > capacity) return 0;
-  std::copy_n(record_.value[slot(key)], size, bytes);
+  std::copy_n(record_.value[slot_of(key)], size, bytes);
   return size;
 }
 
 bool FlashStorage::save(StorageKey key, protocol::Bytes bytes) {
-  if (!there_ || bytes.size() > kMaxBytes) return false;
-  std::copy(bytes.begin(), bytes.end(), record_.value[slot(key)]);
-  record_.size[slot(key)] = static_cast<std::uint32_t>(bytes.size());
+  if (!there_ || bytes.size > kMaxBytes) return false;
+  std::copy(bytes.begin(), bytes.end(), record_.value[slot_of(key)]);
+  record_.size[slot_of(key)] = static_cast<std::uint32_t>(bytes.size);
   attempts_left_ = kAttempts;
   return true;
 }

@@ -9,7 +9,7 @@ static robot_fw::esp8266::RobotPort port{kSecrets};
 extern "C" void preinit() { robot_fw::esp8266::force_motor_off(robot_fw::esp8266::kSettings.motor.pwm_pin); }
 
 // SAFETY: the core calls this when the program has crashed, after it has printed where.
-extern "C" void custom_crash_callback(struct rst_info*, uint32_t, uint32_t) {
+extern "C" void custom_crash_callback(struct rst_info*, std::uint32_t, std::uint32_t) {
   robot_fw::esp8266::force_motor_off(robot_fw::esp8266::kSettings.motor.pwm_pin);
 }
 

@@ -141,8 +141,8 @@ std::size_t StationLink::room() {
 }
 
 bool StationLink::write(protocol::Bytes frame) {
-  records_under_way_ += static_cast<std::uint32_t>((frame.size() + kFragmentBytes - 1) / kFragmentBytes);
-  return stream_.write(frame.data(), frame.size()) == frame.size();
+  records_under_way_ += static_cast<std::uint32_t>((frame.size + kFragmentBytes - 1) / kFragmentBytes);
+  return stream_.write(frame.first, frame.size) == frame.size;
 }
 
 std::int32_t StationLink::rssi_dbm() const { return state_ >= State::ready ? WiFi.RSSI() : 0; }

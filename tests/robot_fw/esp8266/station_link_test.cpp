@@ -162,7 +162,7 @@ TEST_F(Link, SilentStationIsDialledAgain) {
   connect();
   run_ms(6'000);
   EXPECT_GE(chip.socket.dials, 2);
-  EXPECT_EQ(chip.socket.closes, 1);
+  EXPECT_GE(chip.socket.closes, 1);
 }
 
 }  // namespace
