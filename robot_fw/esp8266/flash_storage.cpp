@@ -35,22 +35,23 @@ std::uint32_t* words_of(Record& record) {
 
 }  // namespace
 
-bool FlashStorage::sound(const Record& record) {
-  return record.magic == kMagic && record.size[0] <= kMaxBytes && record.size[1] <= kMaxBytes &&
-         record.crc == crc_of(record);
+bool FlashStorage::read(std::uint32_t sector) {
+  return ESP.flashRead(address_of(sector), words_of(record_), sizeof(Record)) && record_.magic == kMagic &&
+         record_.size[0] <= kMaxBytes && record_.size[1] <= kMaxBytes && record_.crc == crc_of(record_);
 }
 
 void FlashStorage::begin() {
   there_ = FS_PHYS_SIZE >= 2 * kSectorBytes;
   if (!there_) return;
-  const bool first = ESP.flashRead(address_of(0), words_of(record_), sizeof(Record)) && sound(record_);
-  const bool second = ESP.flashRead(address_of(1), words_of(read_back_), sizeof(Record)) && sound(read_back_);
-  if (second && (!first || read_back_.sequence > record_.sequence)) {
-    record_ = read_back_;
-    sector_ = 1;
-  } else if (!first) {
+  const bool first = read(0);
+  const std::uint32_t first_sequence = record_.sequence;
+  const bool second = read(1);
+  sector_ = 1;  // where neither is sound, the first write goes to sector 0
+  if (second && (!first || record_.sequence > first_sequence)) return;
+  if (first && read(0)) {
+    sector_ = 0;
+  } else {
     record_ = Record{};
-    sector_ = 1;  // the first write goes to sector 0
   }
 }
 
@@ -84,9 +85,19 @@ void FlashStorage::write_pending() {
 
 bool FlashStorage::write(std::uint32_t sector) {
   return ESP.flashEraseSector(address_of(sector) / kSectorBytes) &&
-         ESP.flashWrite(address_of(sector), words_of(record_), sizeof(Record)) &&
-         ESP.flashRead(address_of(sector), words_of(read_back_), sizeof(Record)) &&
-         std::memcmp(&record_, &read_back_, sizeof(Record)) == 0;
+         ESP.flashWrite(address_of(sector), words_of(record_), sizeof(Record)) && is_written(sector);
+}
+
+// Reads it back in small pieces.
+bool FlashStorage::is_written(std::uint32_t sector) const {
+  const auto* expected = reinterpret_cast<const std::uint8_t*>(&record_);
+  std::uint32_t piece[16];
+  for (std::uint32_t at = 0; at < sizeof(Record); at += sizeof(piece)) {
+    const std::size_t size = std::min(sizeof(piece), sizeof(Record) - at);
+    if (!ESP.flashRead(address_of(sector) + at, piece, size) || std::memcmp(expected + at, piece, size) != 0)
+      return false;
+  }
+  return true;
 }
 
 }  // namespace robot_fw::esp8266

@@ -35,12 +35,13 @@ class FlashStorage final : public Storage {
   };
   static_assert(sizeof(Record) % 4 == 0 && sizeof(Record) <= 4096, "flash is written in words, a sector at a time");
 
-  static bool sound(const Record& record);
+  // Into `record_`; says whether what is there is sound.
+  bool read(std::uint32_t sector);
   bool write(std::uint32_t sector);
+  bool is_written(std::uint32_t sector) const;
 
   const Motor& motor_;
   Record record_{};           // as it is or is to be in flash
-  Record read_back_{};        // of the sector just written; at boot, of the other one
   std::uint32_t sector_ = 0;  // 0 or 1: where the newest record is
   bool there_ = false;        // this flash layout has room for it
   std::uint32_t attempts_left_ = 0;

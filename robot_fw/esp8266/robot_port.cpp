@@ -10,6 +10,7 @@ namespace robot_fw::esp8266 {
 namespace {
 
 constexpr char kFirmwareVersion[] = "0.1.0-esp8266";
+constexpr std::size_t kPieceBytes = 512;  // read in one turn
 
 // From the hardware's generator, which is only random while the radio is on.
 std::uint64_t random_boot_id() {
@@ -92,9 +93,9 @@ Inputs RobotPort::read_inputs(std::uint64_t robot_time_us) {
 
 // At most one piece a turn, so that a flood from the network delays no tick.
 bool RobotPort::receive() {
-  const std::size_t size = link_.read(received_.data(), received_.size());
+  const std::size_t size = link_.read(bytes_.data(), kPieceBytes);
   if (size == 0) return false;
-  const bool keep = robot_->receive({received_.data(), size}, clock_.now_us());
+  const bool keep = robot_->receive({bytes_.data(), size}, clock_.now_us());
   motor_.follow(robot_->duty());  // SAFETY: a stop acts now, not with the next tick
   keep_latch();
   if (robot_->link_up()) link_.welcomed();
@@ -106,9 +107,9 @@ void RobotPort::transmit() {
   const std::size_t room = link_.room();
   if (room == 0) return;
   // SAFETY: only what TCP takes at once; a frame that does not fit stays with the core.
-  const std::size_t capacity = room < frame_.size() ? room : frame_.size();
-  const std::size_t size = robot_->transmit(frame_.data(), capacity, clock_.now_us());
-  if (size > 0 && !link_.write({frame_.data(), size})) close_link();
+  const std::size_t capacity = room < bytes_.size() ? room : bytes_.size();
+  const std::size_t size = robot_->transmit(bytes_.data(), capacity, clock_.now_us());
+  if (size > 0 && !link_.write({bytes_.data(), size})) close_link();
 }
 
 // SAFETY: only when nothing came in this turn; after a stall the silence may be the robot's own, and a stop that waited

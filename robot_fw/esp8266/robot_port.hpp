@@ -54,9 +54,8 @@ class RobotPort {
   LatchMemory latch_;
   FlashStorage storage_{motor_};
   StationLink link_;
-  std::optional<Robot> robot_;  // from begin() on
-  std::array<std::uint8_t, protocol::kMaxFramedBytes> frame_{};
-  std::array<std::uint8_t, 512> received_{};
+  std::optional<Robot> robot_;                                   // from begin() on
+  std::array<std::uint8_t, protocol::kMaxFramedBytes> bytes_{};  // just read, or about to be written
   std::uint32_t tick_us_ = 0;
 };
 

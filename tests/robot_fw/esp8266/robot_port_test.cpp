@@ -214,6 +214,11 @@ TEST_F(Port, StopThatWaitedInAStallIsReadBeforeTheLinkIsGivenUp) {
   drive(0.5F);
   chip.pass(3'000'000);
   order(sim_robot::emergency_stop());
+  const std::deque<std::uint8_t> stop = chip.socket.incoming;
+  chip.socket.incoming.resize(stop.size() / 2);  // its other half is still on the way
+  port->step();
+  EXPECT_EQ(port->link().state(), StationLink::State::open);
+  chip.socket.incoming.assign(stop.begin() + static_cast<long>(stop.size() / 2), stop.end());
   port->step();
   EXPECT_NE(port->robot().emergency_id(), 0U);
 }

@@ -78,9 +78,10 @@ TEST_F(Link, NeverDialsWithTheMotorOn) {
 
 TEST_F(Link, NeverDialsInAutoEvenAtDutyZero) {
   connect();
-  order(sim_robot::set_auto(0.1F));
+  order(sim_robot::set_auto(0));
   run_ms(20);
   ASSERT_EQ(port->robot().mode(), rheonaut_MODE_AUTO);
+  ASSERT_TRUE(port->motor().is_off());
   const int dials = chip.socket.dials;
   chip.socket.connected = false;
   chip.before_blocking = [this] { EXPECT_NE(port->robot().mode(), rheonaut_MODE_AUTO); };
