@@ -19,8 +19,6 @@ constexpr std::uint32_t kAttempts = 3;
 
 std::uint32_t address_of(std::uint32_t sector) { return FS_PHYS_ADDR + sector * kSectorBytes; }
 
-std::size_t slot_of(StorageKey key) { return static_cast<std::size_t>(key) - 1; }
-
 template <typename Record>
 std::uint32_t crc_of(const Record& record) {
   Crc32 crc;
@@ -37,7 +35,8 @@ std::uint32_t* words_of(Record& record) {
 
 bool FlashStorage::read(std::uint32_t sector) {
   return ESP.flashRead(address_of(sector), words_of(record_), sizeof(Record)) && record_.magic == kMagic &&
-         record_.size[0] <= kMaxBytes && record_.size[1] <= kMaxBytes && record_.crc == crc_of(record_);
+         record_.parameters_size <= kParameterBytes && record_.controller_size <= kControllerBytes &&
+         record_.crc == crc_of(record_);
 }
 
 void FlashStorage::begin() {
@@ -55,17 +54,23 @@ void FlashStorage::begin() {
   }
 }
 
+FlashStorage::Place FlashStorage::place_of(StorageKey key) {
+  if (key == StorageKey::parameters) return {record_.parameters_size, record_.parameters, kParameterBytes};
+  return {record_.controller_size, record_.controller, kControllerBytes};
+}
+
 std::size_t FlashStorage::load(StorageKey key, std::uint8_t* bytes, std::size_t capacity) {
-  const std::size_t size = record_.size[slot_of(key)];
-  if (size > capacity) return 0;
-  std::copy_n(record_.value[slot_of(key)], size, bytes);
-  return size;
+  const Place place = place_of(key);
+  if (place.size > capacity) return 0;
+  std::copy_n(place.value, place.size, bytes);
+  return place.size;
 }
 
 bool FlashStorage::save(StorageKey key, protocol::Bytes bytes) {
-  if (!there_ || bytes.size > kMaxBytes) return false;
-  std::copy(bytes.begin(), bytes.end(), record_.value[slot_of(key)]);
-  record_.size[slot_of(key)] = static_cast<std::uint32_t>(bytes.size);
+  const Place place = place_of(key);
+  if (!there_ || bytes.size > place.capacity) return false;
+  std::copy(bytes.begin(), bytes.end(), place.value);
+  place.size = static_cast<std::uint32_t>(bytes.size);
   attempts_left_ = kAttempts;
   return true;
 }

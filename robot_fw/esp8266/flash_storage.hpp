@@ -1,6 +1,7 @@
 // What outlives a loss of power: parameters and controller, in two sectors of flash that take turns.
 //
-//   record := magic sequence size[2] value[2] crc     words little-endian; the CRC-32 covers all before it
+//   record := magic sequence parameters_size controller_size parameters controller crc
+// with words of 4 bytes, little-endian, values of 160 and 272, and the CRC-32 of all before it: 452 bytes.
 // The sector with the higher sequence counts. A write erases and fills the other one, so a cut of power in the middle
 // of it leaves the older record whole. save() keeps the value in RAM; write_pending() writes it, with the motor off.
 // The two sectors are the first of the file system's area, which nothing else here uses.
@@ -24,16 +25,26 @@ class FlashStorage final : public Storage {
   bool pending() const { return attempts_left_ > 0; }
 
  private:
-  static constexpr std::size_t kKeys = 2;
+  static constexpr std::size_t kParameterBytes = 160, kControllerBytes = 272;
 
   struct Record {
     std::uint32_t magic;
     std::uint32_t sequence;
-    std::uint32_t size[kKeys];
-    std::uint8_t value[kKeys][kMaxBytes];
+    std::uint32_t parameters_size, controller_size;
+    std::uint8_t parameters[kParameterBytes];
+    std::uint8_t controller[kControllerBytes];
     std::uint32_t crc;
   };
-  static_assert(sizeof(Record) % 4 == 0 && sizeof(Record) <= 4096, "flash is written in words, a sector at a time");
+  static_assert(sizeof(Record) == 452, "flash is written in words, and the format has no gaps");
+  static_assert((kParameterCount + 1) * 4 <= kParameterBytes, "the parameters outgrew their place");
+  static_assert(rheonaut_Controller_size + 20 <= kControllerBytes, "a controller outgrew its place");
+
+  struct Place {
+    std::uint32_t& size;
+    std::uint8_t* value;
+    std::size_t capacity;
+  };
+  Place place_of(StorageKey key);
 
   // Into `record_`; says whether what is there is sound.
   bool read(std::uint32_t sector);

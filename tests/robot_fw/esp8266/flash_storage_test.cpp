@@ -63,7 +63,7 @@ TEST_F(Flash, PowerCutAtAnyByteKeepsTheOlderRecord) {
   keep("first");
   keep("older");
   const std::vector<std::uint8_t> before = chip.flash;
-  for (int cut = 0; cut < 660; ++cut) {
+  for (int cut = 0; cut < 452; ++cut) {
     chip.flash = before;
     chip.power_cut_after_bytes = cut;
     keep("newer");
@@ -101,6 +101,19 @@ TEST_F(Flash, ThatDoesNotTakeItIsTriedThreeTimes) {
   for (int i = 0; i < 10; ++i) storage.write_pending();
   EXPECT_FALSE(storage.pending());
   EXPECT_EQ(load(storage, StorageKey::parameters), "x") << "it holds until the next boot";
+}
+
+TEST_F(Flash, ValueTooLargeForItsPlaceIsRefused) {
+  FlashStorage storage{motor};
+  storage.begin();
+  EXPECT_FALSE(save(storage, StorageKey::parameters, std::string(161, 'x')));
+  EXPECT_FALSE(save(storage, StorageKey::controller, std::string(273, 'x')));
+  EXPECT_FALSE(storage.pending());
+  EXPECT_TRUE(save(storage, StorageKey::parameters, std::string(160, 'x')));
+  EXPECT_TRUE(save(storage, StorageKey::controller, std::string(272, 'y')));
+  storage.write_pending();
+  EXPECT_EQ(after_boot(), std::string(160, 'x'));
+  EXPECT_EQ(after_boot(StorageKey::controller), std::string(272, 'y'));
 }
 
 TEST_F(Flash, LayoutWithoutRoomKeepsNothingAndSaysSo) {

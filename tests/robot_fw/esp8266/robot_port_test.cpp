@@ -223,6 +223,11 @@ TEST_F(Port, StopThatWaitedInAStallIsReadBeforeTheLinkIsGivenUp) {
   EXPECT_NE(port->robot().emergency_id(), 0U);
 }
 
+// The memory table of docs/robot.md: a frame of 1.0 kB, the flash record of 0.5 kB, the rest 0.4 kB.
+TEST_F(Port, AddsAsMuchMemoryToTheCoreAsTheTableSays) {
+  EXPECT_LE(sizeof(RobotPort) - sizeof(Robot) - sizeof(StationLink), 1'900U);
+}
+
 TEST_F(Port, DirectionPinAllowsNegativeDuties) {
   Settings settings;
   settings.motor.direction_pin = 13;

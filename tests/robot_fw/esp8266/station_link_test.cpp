@@ -141,6 +141,22 @@ TEST_F(Link, StopsWritingWhenNothingIsAcknowledged) {
   EXPECT_GT(chip.socket.writes.size() - writes, 0U);
 }
 
+// Small frames fill lwIP's queue of 8 pieces long before its buffer.
+TEST_F(Link, CountsSmallFramesUnderWay) {
+  connect();
+  chip.socket.acknowledges = false;
+  const std::size_t writes = chip.socket.writes.size();
+  for (int i = 0; i < 12; ++i) {
+    protocol::Command ping = rheonaut_Command_init_zero;
+    ping.which_action = rheonaut_Command_ping_tag;
+    order(ping);
+  }
+  run_ms(30);
+  EXPECT_GT(chip.socket.room, 400U);
+  EXPECT_LE(chip.socket.writes.size() - writes, 6U);
+  EXPECT_GE(chip.socket.writes.size() - writes, 4U);
+}
+
 TEST_F(Link, LargestFrameFitsAnEmptySendBuffer) {
   boot();
   for (int i = 0; i < 100 && port->link().state() != StationLink::State::open; ++i) run_ms(100);
