@@ -134,7 +134,7 @@ TEST_F(DeliveryRules, AnElectrodeThatCannotBeBelievedKeepsTheRobotOutOfAuto) {
   EXPECT_EQ(core.order(sim_robot::set_auto(kSetpointM)).result, rheonaut_COMMAND_RESULT_ACCEPTED);
 }
 
-class HoldAlone : public Delivery {
+class HoldAlone : public DeliveryRules {
  protected:
   HoldAlone() {
     core.order(sim_robot::set_manual());
