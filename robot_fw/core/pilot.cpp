@@ -1,6 +1,8 @@
 // Keeps the order in force and lets it run out.
 #include "robot_fw/core/pilot.hpp"
 
+#include "robot_fw/core/saturate.hpp"
+
 namespace robot_fw {
 namespace {
 
@@ -28,7 +30,7 @@ void Pilot::enter_auto(float setpoint_m, float limit_s, std::uint64_t now_us) {
   halt();
   setpoint_m_ = setpoint_m;
   auto_limit_s_ = limit_s;
-  auto_until_us_ = now_us + static_cast<std::uint64_t>(limit_s * 1e6F);
+  auto_until_us_ = now_us + saturated<std::uint64_t>(limit_s * 1e6F);
 }
 
 void Pilot::set_duty(float duty, std::uint32_t lease_ms, std::uint64_t now_us) {

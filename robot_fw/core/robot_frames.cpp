@@ -4,6 +4,7 @@
 
 #include "robot_fw/core/controller_message.hpp"
 #include "robot_fw/core/robot.hpp"
+#include "robot_fw/core/saturate.hpp"
 
 namespace robot_fw {
 namespace {
@@ -71,7 +72,7 @@ bool Robot::on_welcome(const protocol::Welcome& welcome) {
   }
   std::copy(std::begin(welcome.detail), std::end(welcome.detail), refusal_detail_.begin());
   if (refusal_ != rheonaut_REFUSAL_REASON_NONE) return false;
-  link_.welcomed(welcome, static_cast<std::uint32_t>(parameters_[ParameterId::link_timeout_ms]), now_us_);
+  link_.welcomed(welcome, saturated<std::uint32_t>(parameters_[ParameterId::link_timeout_ms]), now_us_);
   station_heard();
   samples_.acknowledge(welcome.durable_next_seq);
   events_.acknowledge(welcome.durable_next_event_seq);
