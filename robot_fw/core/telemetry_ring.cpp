@@ -31,8 +31,8 @@ bool TelemetryRing::push(const Sample& sample, const BatchValues& values, bool s
   lost_ += static_cast<std::uint32_t>(keep_from - oldest_seq_);
   forget_below(keep_from);
   if (starts_segment) segments_[next_segment_++ % kMaxSegments] = {next_seq_, robot_time_us, period_us, values};
-  samples_[next_seq_ % kCapacity] = sample;
-  saturated_[next_seq_ % kCapacity] = saturated;
+  samples_[static_cast<std::size_t>(next_seq_ % kCapacity)] = sample;
+  saturated_[static_cast<std::size_t>(next_seq_ % kCapacity)] = saturated;
   ++next_seq_;
   return starts_segment;
 }
@@ -71,7 +71,7 @@ void TelemetryRing::read(std::uint64_t first_seq, std::size_t max_samples, proto
   const auto count = static_cast<pb_size_t>(
       std::min<std::uint64_t>({end_seq - first_seq, max_samples, protocol::kMaxSamplesPerFrame}));
   for (pb_size_t i = 0; i < count; ++i) {
-    const std::size_t at = (first_seq + i) % kCapacity;
+    const auto at = static_cast<std::size_t>((first_seq + i) % kCapacity);
     batch.position_m[i] = samples_[at].position_m;
     batch.velocity_m_s[i] = samples_[at].velocity_m_s;
     batch.acceleration_m_s2[i] = samples_[at].acceleration_m_s2;
