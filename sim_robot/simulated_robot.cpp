@@ -12,6 +12,7 @@ namespace {
 constexpr float kImpedanceMv = 175;  // no glucose anywhere
 constexpr float kSupplyMv = 3000;    // a fresh CR123A
 constexpr int kRssiDbm = -50;
+constexpr std::uint64_t kTicksToMotorOff = 5;
 constexpr unsigned kImuCalibration = 3;  // the best the BNO055 reports
 
 robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
@@ -65,21 +66,35 @@ void check(const SimulatedRobotConfig& config) {
 }
 
 SimulatedRobot::SimulatedRobot(SimulatedRobotConfig config)
-    : config_(std::move(config)), core_(core_config(config_)), plant_(config_.model, kPeriodS) {}
+    : config_(std::move(config)), core_(core_config(config_)), plant_(config_.model, kPeriodS) {
+  if (config_.imu) imu_.emplace(*config_.imu, config_.seed);
+}
 
 void SimulatedRobot::step() {
   robot_fw::Inputs inputs;
   inputs.robot_time_us = robot_time_us_;
-  inputs.known_motion = {static_cast<float>(plant_.position_m()), static_cast<float>(plant_.velocity_m_s()),
-                         static_cast<float>(plant_.acceleration_m_s2())};
-  inputs.impedance_mv = kImpedanceMv;
+  if (imu_) {
+    const ImuReading reading = imu_->read();
+    inputs.acceleration_counts = reading.counts;
+    inputs.acceleration_is_valid = reading.is_valid;
+  } else {
+    inputs.known_motion = {static_cast<float>(plant_.position_m()), static_cast<float>(plant_.velocity_m_s()),
+                           static_cast<float>(plant_.acceleration_m_s2())};
+  }
+  const double time_s = 1e-6 * static_cast<double>(robot_time_us_);
+  inputs.impedance_mv = config_.impedance_mv ? config_.impedance_mv(plant_.position_m(), time_s) : kImpedanceMv;
   inputs.supply_mv = kSupplyMv;
   inputs.rssi_dbm = kRssiDbm;
   inputs.imu_calibration = kImuCalibration;
   inputs.missed_ticks = missed_ticks_;
   const robot_fw::Outputs outputs = core_.step(inputs, static_cast<float>(kPeriodS));
-  plant_.step(static_cast<double>(outputs.duty));
+  move(outputs.duty);
   robot_time_us_ += kPeriodUs;
+}
+
+void SimulatedRobot::move(float duty) {
+  plant_.step(static_cast<double>(duty));
+  if (imu_) imu_->accelerate(plant_.acceleration_m_s2(), kPeriodS);
 }
 
 void SimulatedRobot::advance_to(std::uint64_t now_us) {
@@ -88,7 +103,7 @@ void SimulatedRobot::advance_to(std::uint64_t now_us) {
 }
 
 void SimulatedRobot::skip(std::uint64_t ticks) {
-  for (std::uint64_t i = 0; i < ticks; ++i) plant_.step(static_cast<double>(core_.duty()));
+  for (std::uint64_t i = 0; i < ticks; ++i) move(i < kTicksToMotorOff ? core_.duty() : 0);
   robot_time_us_ += ticks * kPeriodUs;
   missed_ticks_ += static_cast<std::uint32_t>(ticks);
 }

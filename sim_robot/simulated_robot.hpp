@@ -4,9 +4,12 @@
 // acts on the plant for the whole period that follows.
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <string>
 
 #include "robot_fw/core/robot.hpp"
+#include "sim_robot/imu.hpp"
 #include "sim_robot/plant.hpp"
 
 namespace sim_robot {
@@ -18,6 +21,10 @@ struct SimulatedRobotConfig {
   protocol::ResetCause reset_cause = rheonaut_RESET_CAUSE_POWER_ON;
   robot_fw::DutyRange duty{-1, 1};
   control::FractionalModel model = control::kNonNewtonianModel;
+  std::optional<ImuParameters> imu;  // empty: a perfect sensor, which tells the core the truth
+  std::uint64_t seed = 1;            // of the sensors' noise
+  // What the electrode reads at a true position and time; empty: 175 mV everywhere.
+  std::function<float(double position_m, double time_s)> impedance_mv;
   robot_fw::Storage* storage = nullptr;  // of parameters and controller; null: they end with the robot
 };
 
@@ -44,7 +51,8 @@ class SimulatedRobot {
   // Lets robot time reach `now_us`: afterwards no tick is due. Ticks that are up to kMaxLatenessUs late run one by one,
   // each at its own time. After a longer stall only the latest one runs; those before it are skipped.
   void advance_to(std::uint64_t now_us);
-  // Time passes without ticks: the motor keeps the duty it has, and the core sees nothing but the later time.
+  // Time passes without ticks: the motor keeps the duty it has for 50 ms and is off then, as on the robot's board; the
+  // core sees nothing but the later time.
   void skip(std::uint64_t ticks);
 
   // As of the core; times are robot times, see robot_fw/core/robot.hpp.
@@ -61,9 +69,12 @@ class SimulatedRobot {
   std::uint64_t robot_time_us() const { return robot_time_us_; }
 
  private:
+  void move(float duty);
+
   SimulatedRobotConfig config_;
   robot_fw::Robot core_;
   Plant plant_;
+  std::optional<Imu> imu_;
   std::uint64_t robot_time_us_ = 0;
   std::uint32_t missed_ticks_ = 0;
 };

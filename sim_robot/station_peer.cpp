@@ -143,6 +143,8 @@ void StationPeer::on_frame(const protocol::RobotFrame& frame) {
         sample.impedance_mv = batch.impedance_mv[i];
         sample.reference_m = batch.reference_m[i];
         sample.mode = batch.mode;
+        sample.sub_state = batch.sub_state;
+        sample.position_sd_m = batch.position_sd_m;
         if (batch.has_setpoint_m) sample.setpoint_m = batch.setpoint_m;
         sample.disturbance_m = batch.disturbance_m;
         sample.emergency_id = batch.emergency_id;

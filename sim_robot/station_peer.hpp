@@ -20,8 +20,10 @@ struct ReceivedSample {
   float impedance_mv = 0;
   float reference_m = 0;
   protocol::Mode mode = rheonaut_MODE_UNSPECIFIED;
+  protocol::SubState sub_state = rheonaut_SUB_STATE_NONE;
   std::optional<float> setpoint_m;
   float disturbance_m = 0;
+  float position_sd_m = 0;
   std::uint64_t emergency_id = 0;
   std::uint32_t flags = 0;
   std::uint32_t controller_id = 0;

@@ -52,4 +52,8 @@ float Controller::drive_sections(float input_m) {
   return duty;
 }
 
+void Controller::add_to(Crc32& crc) const {
+  for (const float value : state_) crc.add_float(value);
+}
+
 }  // namespace robot_fw

@@ -21,6 +21,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "robot_fw/core/crc32.hpp"
+
 namespace robot_fw {
 
 constexpr std::size_t kMaxSections = 10;  // a biquad counts as two
@@ -69,6 +71,7 @@ class Controller {
   // The duty for this sample; call once per period.
   ControllerDuty step(float error_m, float position_m);
   void reset();
+  void add_to(Crc32& crc) const;  // its state
 
   const ControllerSections& sections() const { return sections_; }
 

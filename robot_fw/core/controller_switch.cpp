@@ -52,4 +52,9 @@ void ControllerSwitch::reset() {
 
 bool ControllerSwitch::take_news() { return std::exchange(news_, false); }
 
+void ControllerSwitch::add_to(Crc32& crc) const {
+  newest_.add_to(crc);
+  former_.add_to(crc);
+}
+
 }  // namespace robot_fw

@@ -24,6 +24,7 @@ class ControllerSwitch {
 
   ControllerDuty step(float error_m, float position_m);
   void reset();
+  void add_to(Crc32& crc) const;  // its state
 
   const ControllerSections& in_force() const { return (warming_up() ? former_ : newest_).sections(); }
   // Whether another controller has come into force since the last call.

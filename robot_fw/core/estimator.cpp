@@ -7,7 +7,6 @@
 namespace robot_fw {
 namespace {
 
-constexpr float kMS2PerCount = 0.01F;
 constexpr float kMaxDtS = 0.1F;
 constexpr int kTicksPerMeasurement = 5;
 constexpr int kStuckReadings = 25;            // equal ones in a row: with the noise, never by chance
@@ -47,9 +46,20 @@ float decayed_share(float x) { return 12 * x / (12 + 6 * x + x * x); }
 
 }  // namespace
 
-Estimator::Estimator(const EstimatorParameters& parameters) : parameters_(parameters) {
-  for (const float gain_m_s : parameters.model.gain_m_s) steady_gain_m_s_ += gain_m_s;
+Estimator::Estimator(const EstimatorParameters& parameters) {
+  set_parameters(parameters);
   start();
+}
+
+void Estimator::set_parameters(const EstimatorParameters& parameters) {
+  parameters_ = parameters;
+  tuned_dt_s_ = steady_gain_m_s_ = 0;
+  for (const float gain_m_s : parameters.model.gain_m_s) steady_gain_m_s_ += gain_m_s;
+  section_m_s_.fill(0);
+  model_m_s_ = gain_error_ = surprises_ = 0;
+  for (std::size_t i = 0; i < kStates; ++i) covariance_[gain][i] = covariance_[i][gain] = 0;
+  covariance_[gain][gain] = square(parameters.gain_error);
+  covariance_[bias][bias] = std::max(covariance_[bias][bias], square(parameters.bias_m_s2));
 }
 
 void Estimator::start() {
@@ -202,7 +212,7 @@ void Estimator::compare_with_model() {
   Vector ph{};  // P Hᵀ
   for (std::size_t i = 0; i < kStates; ++i) ph[i] = p[i][velocity] - model_m_s_ * p[i][gain] - p[i][drift];
   float variance = ph[velocity] - model_m_s_ * ph[gain] - ph[drift] + measurement_variance();
-  const float surprise = square(innovation) / variance;
+  const float surprise = surprise_ = square(innovation) / variance;
   const bool moving = std::fabs(model_m_s_) > kRestingModelM_S;
   if (surprise > kSurprising && moving && flow_m_s_ == 0 && p[gain][gain] < 1) {  // the gain is quite another
     const float reopened = std::min(square(innovation / model_m_s_), 4.0F);
@@ -256,6 +266,17 @@ void Estimator::guard() {
     surprises_ = 0;
   }
   position_sd_m_ = std::sqrt(covariance_[position][position] + square(kDoubt * doubtful_m_));
+}
+
+void Estimator::add_to(Crc32& crc) const {
+  for (const float value : section_m_s_) crc.add_float(value);
+  for (const Vector& row : covariance_) {
+    for (const float value : row) crc.add_float(value);
+  }
+  for (const float value : {position_m_, velocity_m_s_, bias_m_s2_, gain_error_, drift_m_s_, position_sd_m_, flow_m_s_,
+                            model_m_s_, doubtful_m_, unexplained_m_s_, surprises_}) {
+    crc.add_float(value);
+  }
 }
 
 void Estimator::zero_position() {

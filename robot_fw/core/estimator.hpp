@@ -33,9 +33,12 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "robot_fw/core/crc32.hpp"
+
 namespace robot_fw {
 
 constexpr std::size_t kModelSections = 4;
+constexpr float kMS2PerCount = 0.01F;
 
 // (1); unused sections have gain 0.
 struct VelocityModel {
@@ -78,6 +81,8 @@ class Estimator {
   void step(const EstimatorInputs& inputs);
   // Position is 0 here, and known.
   void zero_position();
+  // From the next tick on; the motor is off and the robot at rest.
+  void set_parameters(const EstimatorParameters& parameters);
 
   float position_m() const { return position_m_; }
   float velocity_m_s() const { return velocity_m_s_; }
@@ -88,6 +93,9 @@ class Estimator {
   float flow_m_s() const { return flow_m_s_; }          // rms of a pulsating flow; 0: none seen
   // The model does not explain the motion: another fluid, or one that moves.
   bool model_mismatch() const { return mismatch_; }
+  float surprise() const { return surprise_; }  // of the last measurement: innovation² by its variance
+
+  void add_to(Crc32& crc) const;  // its state
 
  private:
   static constexpr std::size_t kStates = 5;
@@ -142,6 +150,7 @@ class Estimator {
   std::array<float, 3> window_mean_square_{};  // the last windows
   float flow_m_s_ = 0;
   bool drift_admitted_ = false;
+  float surprise_ = 0;
   float surprises_ = 0;    // over what is to be expected, summed
   int strange_gains_ = 0;  // measurements in a row
   bool mismatch_ = false;

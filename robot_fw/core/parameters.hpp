@@ -9,6 +9,9 @@
 #include <cstdint>
 #include <optional>
 
+#include "robot_fw/core/estimator.hpp"
+#include "robot_fw/core/impedance_monitor.hpp"
+
 namespace robot_fw {
 
 enum class ParameterId : std::uint8_t {
@@ -22,8 +25,31 @@ enum class ParameterId : std::uint8_t {
   position_limit_max_m,       // above it: emergency
   power_limit_duty,           // above this |duty| the motor is at power
   power_limit_s,              // longer at power: emergency
+  link_loss_action,           // LinkLossAction
+  link_loss_limit_s,          // of auto without a link, unless the action is stop
+  impedance_monitor,          // 1: on; 0: off, neither detections nor faults of the electrode
+  impedance_nominal_mv,       // without glucose
+  impedance_band_mv,          // beyond it: glucose
+  impedance_exit_band_mv,     // within it: mixed
+  delivery_limit_s,
+  // Of the estimator, in the order of EstimatorParameters.
+  model_gain_1_m_s,
+  model_time_constant_1_s = model_gain_1_m_s + 4,
+  dead_zone_duty = model_time_constant_1_s + 4,
+  doubtful_duty,
+  model_gain_error,
+  model_shape_error,
+  driven_velocity_sd_m_s,
+  resting_velocity_sd_m_s,
+  velocity_correlation_s,
+  acceleration_noise_m_s2,
+  acceleration_bias_m_s2,
+  acceleration_bias_walk_m_s2,
 };
-constexpr std::size_t kParameterCount = 10;
+constexpr std::size_t kParameterCount = static_cast<std::size_t>(ParameterId::acceleration_bias_walk_m_s2) + 1;
+
+// What auto does when the link is lost; manual always stops.
+enum class LinkLossAction : std::uint8_t { stop, hold, go_on };
 
 struct ParameterSpec {
   const char* name;
@@ -32,6 +58,7 @@ struct ParameterSpec {
   float maximum;
   float default_value;
   bool only_at_rest;  // refused while the motor is on
+  bool whole;         // a whole number
 };
 
 class Parameters {
@@ -40,7 +67,7 @@ class Parameters {
 
   static const ParameterSpec& spec(std::size_t index);
   static std::optional<std::size_t> find(const char* name);
-  // Finite and within the range of its row.
+  // Finite, within the range of its row, and whole where that says so.
   static bool in_range(std::size_t index, float value);
 
   float operator[](ParameterId id) const { return values_[static_cast<std::size_t>(id)]; }
@@ -48,6 +75,10 @@ class Parameters {
   // The value must be in_range().
   void set(std::size_t index, float value) { values_[index] = value; }
   void set_defaults();
+
+  LinkLossAction link_loss_action() const;
+  ImpedanceRules impedance() const;
+  EstimatorParameters estimator() const;
 
   std::uint32_t checksum() const;
 

@@ -16,13 +16,14 @@ constexpr std::size_t kMaxScheduleEntries = 64;
 
 class Pilot {
  public:
-  enum class Lapse { none, lease, schedule, auto_limit };
+  enum class Lapse { none, lease, schedule, auto_limit, delivery_limit, link_loss };
 
   // Manual at duty 0 with nothing pending: the state after boot, and the end of every motion.
   void halt();
   // Ends by itself after `limit_s`.
   void enter_auto(float setpoint_m, float limit_s, std::uint64_t now_us);
-  void set_setpoint(float setpoint_m) { setpoint_m_ = setpoint_m; }
+  // Ends a delivery.
+  void set_setpoint(float setpoint_m);
   void set_disturbance(float disturbance_m) { disturbance_m_ = disturbance_m; }
   // A duty of 0 needs no lease and ends one.
   void set_duty(float duty, std::uint32_t lease_ms, std::uint64_t now_us);
@@ -30,11 +31,26 @@ class Pilot {
   // Extends a duty or schedule that still runs; false when there is none.
   bool renew_lease(std::uint32_t lease_ms, std::uint64_t now_us);
 
-  // Once per tick, before the duty is asked for: ends what has run out and says so.
+  // In auto: holds `position_m` in place of the setpoint, for at most `limit_s`.
+  void start_delivery(float position_m, float limit_s, std::uint64_t now_us);
+  // Goes on to the setpoint; says how long it was.
+  float end_delivery(std::uint64_t now_us);
+  // In auto: the link is gone, auto ends after `limit_s` unless it comes back.
+  void outlive_link(float limit_s, std::uint64_t now_us);
+  void link_restored() { alone_until_us_ = 0; }
+
+  // Once per tick, before the duty is asked for: says what has run out. A duty or schedule has ended by then; auto and
+  // deliveries are the caller's to end.
   Lapse tick(std::uint64_t now_us);
+  // Once per tick, in auto: whether the robot has come to its setpoint to stay, or has left it again.
+  bool arrival_changed(float position_m);
 
   bool is_auto() const { return setpoint_m_.has_value(); }
+  bool delivering() const { return delivery_m_.has_value(); }
+  protocol::SubState sub_state() const;
   std::optional<float> setpoint_m() const { return setpoint_m_; }
+  // Where it is to be: the setpoint, or where it delivers.
+  std::optional<float> target_m() const { return delivery_m_ ? delivery_m_ : setpoint_m_; }
   float disturbance_m() const { return disturbance_m_; }
   float manual_duty() const { return manual_duty_; }
   bool motion_ordered() const { return is_auto() || lease_until_us_ != 0; }
@@ -49,6 +65,11 @@ class Pilot {
   std::uint64_t auto_until_us_ = 0;
   std::optional<float> setpoint_m_;  // present in auto, and only there
   float disturbance_m_ = 0;
+  std::optional<float> delivery_m_;
+  std::uint64_t delivery_since_us_ = 0, delivery_until_us_ = 0;
+  std::uint64_t alone_until_us_ = 0;  // 0: the link is there
+  bool arrived_ = false;
+  int near_ticks_ = 0;  // at the setpoint, in a row
   float manual_duty_ = 0;
   bool lease_lapsed_ = false;
   std::uint64_t lease_until_us_ = 0;  // 0: neither duty nor schedule runs

@@ -1,4 +1,4 @@
-// The tick: sensor, link, orders, limits, reference, controller, safety, telemetry.
+// The tick.
 #include "robot_fw/core/robot.hpp"
 
 #include <algorithm>
@@ -10,6 +10,9 @@
 namespace robot_fw {
 namespace {
 
+// The DS550's range; its readings may well be equal.
+constexpr SensorRules kElectrodeRules{20, 1000, 1, 0, 5};
+
 bool finite(const Motion& motion) {
   return std::isfinite(motion.position_m) && std::isfinite(motion.velocity_m_s) &&
          std::isfinite(motion.acceleration_m_s2);
@@ -19,11 +22,13 @@ bool finite(const Motion& motion) {
 
 Robot::Robot(const RobotConfig& config)
     : config_(config),
+      motion_sense_(parameters_.estimator()),
+      electrode_(kElectrodeRules),
       controllers_(adapted(kPaperController, {config.duty_min, config.duty_max}, config.sample_period_us)),
       safety_({config.duty_min, config.duty_max}, config.boot_id),
       gate_(config.boot_id) {
-  load_settings();
   note(rheonaut_EVENT_KIND_BOOT, rheonaut_EVENT_CAUSE_RESET, 0);
+  load_settings();
   const bool suspicious_reset =
       config.reset_cause == rheonaut_RESET_CAUSE_WATCHDOG || config.reset_cause == rheonaut_RESET_CAUSE_BROWN_OUT;
   if (config.restored_emergency_id != 0) {
@@ -36,16 +41,20 @@ Robot::Robot(const RobotConfig& config)
 
 Outputs Robot::step(const Inputs& inputs, float dt_s) {
   inputs_are_sound_ = sound(inputs, dt_s);
-  watch_clock(inputs.robot_time_us, dt_s);
+  const float missed_s = watch_clock(inputs.robot_time_us, dt_s);
   inputs_ = inputs;
   worst_tick_us_ = std::max(worst_tick_us_, inputs.tick_us);
 
+  motion_sense_.step(inputs, duty_, dt_s, missed_s);
+  watch_sensors();
   watch_link();
   run_due_commands();
   let_orders_run_out();
 
-  const Motion measured = read_perfect_sensor(inputs);
+  const Motion measured = seen_motion();
   watch_limits(measured, dt_s);
+  watch_impedance(measured);
+  watch_arrival(measured);
   const ControllerDuty wanted = wanted_duty(measured, dt_s);
   if (!inputs_are_sound_ || !std::isfinite(wanted.asked)) {
     // SAFETY: a value that is not a number, or a clock that goes back, stops the robot; once, not in every tick.
@@ -64,28 +73,19 @@ bool Robot::sound(const Inputs& inputs, float dt_s) const {
          std::isfinite(inputs.impedance_mv) && std::isfinite(inputs.supply_mv) && std::isfinite(dt_s) && dt_s > 0;
 }
 
-Motion Robot::read_perfect_sensor(const Inputs& inputs) const {
-  Motion motion = inputs.known_motion.value_or(Motion{});
-  motion.position_m += pilot_.disturbance_m() - position_zero_m_;
+Motion Robot::seen_motion() const {
+  Motion motion = motion_sense_.motion();
+  motion.position_m += pilot_.disturbance_m();
   return motion;
 }
 
-// Takes over the time of this tick; a missed tick is an event.
-void Robot::watch_clock(std::uint64_t robot_time_us, float dt_s) {
+// Takes over the time of this tick; a missed tick is an event. Says how much time was missed.
+float Robot::watch_clock(std::uint64_t robot_time_us, float dt_s) {
   now_us_ = std::max(now_us_, robot_time_us);  // frames may have come in after this tick was due
   const float stepped_s = static_cast<float>(now_us_ - inputs_.robot_time_us) * 1e-6F - dt_s;
-  if (samples_.next_seq() > 0 && stepped_s > dt_s / 2) {
-    note(rheonaut_EVENT_KIND_TIME_STEP, rheonaut_EVENT_CAUSE_TIME, stepped_s);
-  }
-}
-
-void Robot::watch_link() {
-  if (!link_.goes_lost(now_us_)) return;
-  note(rheonaut_EVENT_KIND_LINK_LOST, rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
-  const bool was_auto = pilot_.is_auto();
-  stop_motion();  // SAFETY: nobody is there to stop it
-  drop_timed_commands({rheonaut_COMMAND_RESULT_EXPIRED});
-  if (was_auto) note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
+  const bool stepped = samples_.next_seq() > 0 && stepped_s > dt_s / 2;
+  if (stepped) note(rheonaut_EVENT_KIND_TIME_STEP, rheonaut_EVENT_CAUSE_TIME, stepped_s);
+  return stepped ? stepped_s : 0;
 }
 
 void Robot::run_due_commands() {
@@ -99,7 +99,13 @@ void Robot::let_orders_run_out() {
     case Pilot::Lapse::none: break;
     case Pilot::Lapse::lease: note(rheonaut_EVENT_KIND_LEASE_LAPSED, rheonaut_EVENT_CAUSE_TIME, duty_before); break;
     case Pilot::Lapse::schedule: note(rheonaut_EVENT_KIND_DUTY_SCHEDULE_ENDED, rheonaut_EVENT_CAUSE_TIME, 0); break;
+    case Pilot::Lapse::delivery_limit: end_delivery(rheonaut_EVENT_CAUSE_LIMIT, 0); break;
+    case Pilot::Lapse::link_loss:
+      stop_motion(rheonaut_EVENT_CAUSE_LINK_LOSS);  // SAFETY: without a station only for a while
+      note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
+      break;
     case Pilot::Lapse::auto_limit:
+      stop_motion(rheonaut_EVENT_CAUSE_TIME);  // SAFETY: auto ends by itself
       note(rheonaut_EVENT_KIND_AUTO_LIMIT, rheonaut_EVENT_CAUSE_TIME, pilot_.auto_limit_s());
       note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_TIME, 0);
       drop_timed_commands(rejected(rheonaut_REJECT_REASON_WRONG_MODE));
@@ -107,30 +113,12 @@ void Robot::let_orders_run_out() {
   }
 }
 
-// Where the robot is, without the disturbance, and how long the motor has been at power in the ticks before this one.
-void Robot::watch_limits(const Motion& measured, float dt_s) {
-  if (!inputs_are_sound_) return;
-  const PositionLimits limits = position_limits();
-  const float position_m = measured.position_m - pilot_.disturbance_m();
-  if (safety_.leaves_limits(position_m, limits)) {
-    const float limit_m = position_m > limits.max_m ? limits.max_m : limits.min_m;
-    note(rheonaut_EVENT_KIND_LIMIT_HIT, rheonaut_EVENT_CAUSE_LIMIT, limit_m);
-    // SAFETY: a robot that leaves its stretch of the vessel stops; a latch of another cause stays what it is.
-    if (!safety_.latched()) emergency(rheonaut_EMERGENCY_CAUSE_POSITION_LIMIT, rheonaut_EVENT_CAUSE_LIMIT, 0);
-  }
-  const PowerLimit power{parameters_[ParameterId::power_limit_duty], parameters_[ParameterId::power_limit_s]};
-  if (safety_.too_long_at_power(duty_, dt_s, power)) {
-    note(rheonaut_EVENT_KIND_LIMIT_HIT, rheonaut_EVENT_CAUSE_LIMIT, power.time_s);
-    emergency(rheonaut_EMERGENCY_CAUSE_TIME_AT_POWER, rheonaut_EVENT_CAUSE_LIMIT, 0);  // SAFETY: a motor gets hot
-  }
-}
-
 ControllerDuty Robot::wanted_duty(const Motion& measured, float dt_s) {
-  const auto setpoint_m = pilot_.setpoint_m();
-  if (!setpoint_m) return {pilot_.manual_duty(), pilot_.manual_duty()};
+  const auto target_m = pilot_.target_m();
+  if (!target_m) return {pilot_.manual_duty(), pilot_.manual_duty()};
   const ProfileLimits limits{parameters_[ParameterId::profile_velocity_m_s],
                              parameters_[ParameterId::profile_acceleration_m_s2]};
-  reference_m_ = profile_.step(*setpoint_m, measured.position_m, limits, dt_s);
+  reference_m_ = profile_.step(*target_m, measured.position_m, limits, dt_s);
   return controllers_.step(reference_m_ - measured.position_m, measured.position_m);
 }
 
@@ -162,17 +150,17 @@ BatchValues Robot::batch_values() const {
   values.emergency_id = safety_.emergency_id();
   values.emergency_cause = static_cast<std::uint8_t>(safety_.cause());
   values.mode = static_cast<std::uint8_t>(mode());
-  values.sub_state =
-      static_cast<std::uint8_t>(pilot_.is_auto() ? rheonaut_SUB_STATE_NAVIGATING : rheonaut_SUB_STATE_NONE);
+  values.sub_state = static_cast<std::uint8_t>(pilot_.sub_state());
   values.has_setpoint = pilot_.setpoint_m().has_value();
   values.setpoint_m = pilot_.setpoint_m().value_or(0.0F);
   values.disturbance_m = pilot_.disturbance_m();
+  values.position_sd_m = motion_sense_.position_sd_m();
   values.controller_id = controllers_.in_force().controller_id;
   unsigned flags = 0;
   if (link_.lost()) flags |= rheonaut_TELEMETRY_FLAG_LINK_LOSS;
   if (pilot_.lease_lapsed()) flags |= rheonaut_TELEMETRY_FLAG_LEASE_LAPSED;
   if (safety_.outside_limits()) flags |= rheonaut_TELEMETRY_FLAG_POSITION_LIMIT;
-  if (!inputs_are_sound_) flags |= rheonaut_TELEMETRY_FLAG_SENSOR_FAULT;
+  if (!inputs_are_sound_ || sensor_fault_stands()) flags |= rheonaut_TELEMETRY_FLAG_SENSOR_FAULT;
   values.flags = static_cast<std::uint16_t>(flags);
   return values;
 }
@@ -183,7 +171,8 @@ protocol::Mode Robot::mode() const {
 }
 
 // The motor is off from here on, not only from the next tick.
-void Robot::stop_motion() {
+void Robot::stop_motion(protocol::EventCause cause, std::uint64_t command_id) {
+  if (pilot_.delivering()) end_delivery(cause, command_id);
   pilot_.halt();
   controllers_.reset();
   profile_.restart();
@@ -192,9 +181,18 @@ void Robot::stop_motion() {
 
 void Robot::emergency(protocol::EmergencyCause cause, protocol::EventCause event_cause, std::uint64_t command_id) {
   safety_.latch(cause);
-  stop_motion();  // SAFETY: off at once, also between ticks
+  stop_motion(event_cause, command_id);  // SAFETY: off at once, also between ticks
   drop_timed_commands(rejected(rheonaut_REJECT_REASON_LATCHED));
   note(rheonaut_EVENT_KIND_EMERGENCY, event_cause, 0, command_id);
+}
+
+std::uint32_t Robot::float_state_checksum() const {
+  Crc32 crc;
+  motion_sense_.add_to(crc);
+  controllers_.add_to(crc);
+  crc.add_float(reference_m_);
+  crc.add_float(duty_);
+  return crc.value();
 }
 
 void Robot::note(protocol::EventKind kind, protocol::EventCause cause, float value, std::uint64_t command_id) {
@@ -204,8 +202,8 @@ void Robot::note(protocol::EventKind kind, protocol::EventCause cause, float val
   event.cause = cause;
   event.sample_seq = samples_.next_seq();
   event.mode = mode();
-  event.sub_state = pilot_.is_auto() ? rheonaut_SUB_STATE_NAVIGATING : rheonaut_SUB_STATE_NONE;
-  event.position_m = read_perfect_sensor(inputs_).position_m;
+  event.sub_state = pilot_.sub_state();
+  event.position_m = seen_motion().position_m;
   event.value = value;
   event.emergency_id = safety_.emergency_id();
   event.command_id = command_id;

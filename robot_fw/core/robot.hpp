@@ -1,6 +1,7 @@
 // The whole robot: a tick, bytes in, bytes out.
 //
-//   step()      one tick, 100 Hz: sensor, link, orders, limits, reference, controller, safety, telemetry
+//   step()      one tick, 100 Hz: sensors, estimator, link, orders, limits, impedance, reference, controller, safety,
+//               telemetry
 //   receive()   bytes from the station, at any time between ticks; an emergency stop acts in here
 //   transmit()  bytes to the station, at any time between ticks; never waits
 // The port (a simulated robot, an ESP8266) owns the clock, the connection and the motor pin. After every call it puts
@@ -12,12 +13,15 @@
 #include "robot_fw/core/controller_switch.hpp"
 #include "robot_fw/core/event_ring.hpp"
 #include "robot_fw/core/hardware_io.hpp"
+#include "robot_fw/core/impedance_monitor.hpp"
 #include "robot_fw/core/link.hpp"
+#include "robot_fw/core/motion_sense.hpp"
 #include "robot_fw/core/outbox.hpp"
 #include "robot_fw/core/parameters.hpp"
 #include "robot_fw/core/pilot.hpp"
 #include "robot_fw/core/reference_profile.hpp"
 #include "robot_fw/core/safety.hpp"
+#include "robot_fw/core/sensor_watch.hpp"
 #include "robot_fw/core/settings_store.hpp"
 #include "robot_fw/core/telemetry_ring.hpp"
 
@@ -61,23 +65,34 @@ class Robot {
   // Why the station refused the last connection; the detail is for people.
   protocol::RefusalReason refusal() const { return refusal_; }
   const char* refusal_detail() const { return refusal_detail_.data(); }
+  // CRC-32 over every float that a tick works with: equal on two machines that compute alike.
+  std::uint32_t float_state_checksum() const;
 
  private:
   // The parts of a tick, in robot.cpp.
-  Motion read_perfect_sensor(const Inputs& inputs) const;
   bool sound(const Inputs& inputs, float dt_s) const;
-  void watch_clock(std::uint64_t robot_time_us, float dt_s);
-  void watch_link();
+  float watch_clock(std::uint64_t robot_time_us, float dt_s);
   void run_due_commands();
   void let_orders_run_out();
-  void watch_limits(const Motion& measured, float dt_s);
   ControllerDuty wanted_duty(const Motion& measured, float dt_s);
   float slewed(float duty, float dt_s) const;
   void record_sample(const Motion& measured, float dt_s);
   BatchValues batch_values() const;
-  void stop_motion();
+  Motion seen_motion() const;  // by the controller: disturbance included
+  void stop_motion(protocol::EventCause cause, std::uint64_t command_id = 0);
   void emergency(protocol::EmergencyCause cause, protocol::EventCause event_cause, std::uint64_t command_id);
   void note(protocol::EventKind kind, protocol::EventCause cause, float value, std::uint64_t command_id = 0);
+
+  // What ends or changes motion by itself, in robot_watch.cpp.
+  void watch_sensors();
+  void watch_sensor(SensorFault fault, bool is_news, protocol::EventCause which, float reading);
+  SensorFault electrode_fault() const;
+  bool sensor_fault_stands() const;
+  void watch_link();
+  void watch_limits(const Motion& measured, float dt_s);
+  void watch_impedance(const Motion& measured);
+  void end_delivery(protocol::EventCause cause, std::uint64_t command_id);
+  void watch_arrival(const Motion& measured);
 
   // Commands, in robot_commands.cpp.
   void on_command(const protocol::Command& command);
@@ -123,15 +138,17 @@ class Robot {
   std::uint64_t now_us_ = 0;
   Inputs inputs_{};  // of the last tick
   bool inputs_are_sound_ = true;
-  float position_zero_m_ = 0;
   float reference_m_ = 0;  // in auto
   float duty_ = 0;
   bool saturated_ = false;
   bool sample_is_urgent_ = false;  // something happened since the last one
 
+  Parameters parameters_;
+  MotionSense motion_sense_;
+  SensorWatch electrode_;
+  ImpedanceMonitor impedance_;
   Pilot pilot_;
   ReferenceProfile profile_;
-  Parameters parameters_;
   ControllerSwitch controllers_;
   std::uint64_t controller_command_id_ = 0;  // the last command about the controller
   bool parameters_unsaved_ = false, controller_unsaved_ = false;

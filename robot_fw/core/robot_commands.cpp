@@ -2,21 +2,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "robot_fw/core/mode_table.hpp"
 #include "robot_fw/core/robot.hpp"
 
 namespace robot_fw {
 namespace {
 
-// The commands that cannot move the motor, and the one that ends an emergency.
-bool allowed_when_latched(const protocol::Command& command) {
-  switch (command.which_action) {
-    case rheonaut_Command_emergency_stop_tag:
-    case rheonaut_Command_clear_emergency_tag:
-    case rheonaut_Command_set_parameter_tag:
-    case rheonaut_Command_get_parameters_tag:
-    case rheonaut_Command_ping_tag: return true;
-    default: return false;
-  }
+bool runs_when_latched(const protocol::Command& command) {
+  return refusal_in(rheonaut_MODE_EMERGENCY, command.which_action) == rheonaut_REJECT_REASON_NONE;
 }
 
 }  // namespace
@@ -27,8 +20,9 @@ void Robot::on_command(const protocol::Command& command) {
   if (!verdict.accepted()) return answer(command, verdict);
   const bool later = command.has_execute_at_robot_us && command.execute_at_robot_us > now_us_;
   if (!later) return answer(command, execute(command));
-  if (safety_.latched() && !allowed_when_latched(command))
+  if (safety_.latched() && !runs_when_latched(command)) {
     return answer(command, rejected(rheonaut_REJECT_REASON_LATCHED));
+  }
   if (!timed_.hold(command)) return answer(command, rejected(rheonaut_REJECT_REASON_BUSY));
   outbox_.ack(ack_for(command, kAccepted, command.execute_at_robot_us));
 }
@@ -72,7 +66,8 @@ void Robot::drop_timed_commands(Verdict verdict) {
 }
 
 Verdict Robot::execute(const protocol::Command& command) {
-  if (safety_.latched() && !allowed_when_latched(command)) return rejected(rheonaut_REJECT_REASON_LATCHED);
+  const protocol::RejectReason refusal = refusal_in(mode(), command.which_action);  // SAFETY: the table comes first
+  if (refusal != rheonaut_REJECT_REASON_NONE) return rejected(refusal);
   const std::uint64_t id = command.command_id;
   switch (command.which_action) {
     case rheonaut_Command_set_mode_tag: return set_mode(command.action.set_mode, id);
@@ -115,9 +110,11 @@ Verdict Robot::set_mode(const rheonaut_SetMode& order, std::uint64_t command_id)
   if (to_auto) {
     const Verdict verdict = check_setpoint(order.setpoint_m);
     if (!verdict.accepted()) return verdict;
+    // SAFETY: nothing steers by a sensor that cannot be believed.
+    if (sensor_fault_stands()) return rejected(rheonaut_REJECT_REASON_CAUSE_STANDS);
   }
   const protocol::Mode before = mode();
-  stop_motion();  // SAFETY: nothing outlives a change of mode
+  stop_motion(rheonaut_EVENT_CAUSE_COMMAND, command_id);  // SAFETY: nothing outlives a change of mode
   drop_timed_commands(rejected(rheonaut_REJECT_REASON_WRONG_MODE));
   if (to_auto) pilot_.enter_auto(order.setpoint_m, parameters_[ParameterId::auto_limit_s], now_us_);
   if (mode() != before) note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, 0, command_id);
@@ -130,7 +127,7 @@ Verdict Robot::set_mode(const rheonaut_SetMode& order, std::uint64_t command_id)
 Verdict Robot::set_setpoint(float setpoint_m, std::uint64_t command_id) {
   const Verdict verdict = check_setpoint(setpoint_m);
   if (!verdict.accepted()) return verdict;
-  if (!pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
+  if (pilot_.delivering()) end_delivery(rheonaut_EVENT_CAUSE_COMMAND, command_id);
   pilot_.set_setpoint(setpoint_m);
   profile_.restart();
   note(rheonaut_EVENT_KIND_SETPOINT_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, setpoint_m, command_id);
@@ -142,7 +139,6 @@ Verdict Robot::set_duty(const rheonaut_SetDuty& order) {
   if (!safety_.range().contains(order.duty) || order.lease_ms > protocol::kLeaseMs) {
     return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
   }
-  if (pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
   if (safety_.outward(order.duty)) return rejected(rheonaut_REJECT_REASON_OUTWARD);  // SAFETY: outside, only inward
   pilot_.set_duty(order.duty, order.lease_ms, now_us_);
   return kAccepted;
@@ -162,7 +158,6 @@ Verdict Robot::set_duty_schedule(const rheonaut_SetDutySchedule& order) {
     if (i > 0 && order.tick[i] <= order.tick[i - 1]) return rejected(rheonaut_REJECT_REASON_MALFORMED);
   }
   if (order.duty[order.duty_count - 1] != 0) return rejected(rheonaut_REJECT_REASON_MALFORMED);
-  if (pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
   const bool leads_out =
       std::any_of(order.duty, order.duty + order.duty_count, [this](float duty) { return safety_.outward(duty); });
   if (leads_out) return rejected(rheonaut_REJECT_REASON_OUTWARD);  // SAFETY: outside, only inward
@@ -171,10 +166,9 @@ Verdict Robot::set_duty_schedule(const rheonaut_SetDutySchedule& order) {
 }
 
 Verdict Robot::clear_emergency(std::uint64_t emergency_id, std::uint64_t command_id) {
-  if (!safety_.latched() || emergency_id != safety_.emergency_id()) {
-    return rejected(rheonaut_REJECT_REASON_OTHER_EMERGENCY);
-  }
-  if (!inputs_are_sound_) return rejected(rheonaut_REJECT_REASON_CAUSE_STANDS);
+  if (emergency_id != safety_.emergency_id()) return rejected(rheonaut_REJECT_REASON_OTHER_EMERGENCY);
+  const bool sensor_cause_stands = safety_.has_sensor_cause() && sensor_fault_stands();
+  if (!inputs_are_sound_ || sensor_cause_stands) return rejected(rheonaut_REJECT_REASON_CAUSE_STANDS);
   safety_.clear(emergency_id);  // into manual at rest: the stop ended every order, and the latch let none in
   note(rheonaut_EVENT_KIND_EMERGENCY_CLEARED, rheonaut_EVENT_CAUSE_COMMAND, 0, command_id);
   return kAccepted;
@@ -183,18 +177,16 @@ Verdict Robot::clear_emergency(std::uint64_t emergency_id, std::uint64_t command
 Verdict Robot::inject_disturbance(float disturbance_m, std::uint64_t command_id) {
   const Verdict verdict = check_position(disturbance_m);
   if (!verdict.accepted()) return verdict;
-  if (!pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
   pilot_.set_disturbance(disturbance_m);
   note(rheonaut_EVENT_KIND_DISTURBANCE, rheonaut_EVENT_CAUSE_COMMAND, disturbance_m, command_id);
   return kAccepted;
 }
 
 Verdict Robot::zero_position(std::uint64_t command_id) {
-  if (pilot_.is_auto()) return rejected(rheonaut_REJECT_REASON_WRONG_MODE);
   if (duty_ != 0 || pilot_.manual_duty() != 0) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
-  const float before_m = read_perfect_sensor(inputs_).position_m;
+  const float before_m = motion_sense_.motion().position_m;
   if (!std::isfinite(before_m)) return rejected(rheonaut_REJECT_REASON_NOT_FINITE);
-  position_zero_m_ = inputs_.known_motion.value_or(Motion{}).position_m;
+  motion_sense_.zero_position();
   note(rheonaut_EVENT_KIND_POSITION_ZEROED, rheonaut_EVENT_CAUSE_COMMAND, before_m, command_id);
   return kAccepted;
 }

@@ -82,6 +82,7 @@ bool Robot::on_welcome(const protocol::Welcome& welcome) {
 
 void Robot::station_heard() {
   const auto silence_s = link_.heard(now_us_);
+  if (silence_s) pilot_.link_restored();
   if (silence_s) note(rheonaut_EVENT_KIND_LINK_RESTORED, rheonaut_EVENT_CAUSE_NONE, *silence_s);
 }
 

@@ -41,6 +41,9 @@ Verdict Robot::set_parameter(const rheonaut_SetParameter& order, std::uint64_t c
   if (Parameters::spec(*index).only_at_rest && motor_on()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
   if (!outbox_.has_room_for_page()) return rejected(rheonaut_REJECT_REASON_BUSY);
   parameters_.set(*index, order.value);
+  if (*index >= static_cast<std::size_t>(ParameterId::model_gain_1_m_s)) {
+    motion_sense_.set_parameters(parameters_.estimator());
+  }
   parameters_unsaved_ = true;
   note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, order.value, command_id);
   outbox_.ask_page({command_id, *index, 1});
@@ -61,24 +64,39 @@ PositionLimits Robot::position_limits() const {
 
 void Robot::load_settings() {
   if (config_.storage == nullptr) return;
-  parameters_ = load_parameters(*config_.storage).value_or(Parameters{});
-  const auto controller = load_controller(*config_.storage);
+  Storage& storage = *config_.storage;
+  const auto parameters = load_parameters(storage);
+  if (!parameters && is_kept(storage, StorageKey::parameters)) {
+    note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_RESET, 0);  // to the defaults
+  }
+  parameters_ = parameters.value_or(Parameters{});
+  motion_sense_.set_parameters(parameters_.estimator());
+  const auto controller = load_controller(storage);
   // SAFETY: what was kept is judged like what comes over the link; this port may have another motor by now.
   if (!controller || fault_of(*controller, safety_.range(), config_.sample_period_us) != rheonaut_REJECT_REASON_NONE) {
+    if (is_kept(storage, StorageKey::controller)) {
+      note(rheonaut_EVENT_KIND_CONTROLLER_CHANGED, rheonaut_EVENT_CAUSE_RESET, 1);  // to the built-in one
+    }
     return;
   }
   controllers_.set(sections_of(*controller), false);
   controllers_.take_news();
 }
 
-// Each change is written once, at the first tick at rest; a write that fails is not tried again.
+// Each change is written once, at the first tick at rest; a write that fails is an event and not tried again.
 void Robot::save_settings() {
   if (config_.storage == nullptr || motor_on()) return;  // SAFETY: writing may block for long
-  if (parameters_unsaved_) save_parameters(*config_.storage, parameters_);
+  if (parameters_unsaved_ && !save_parameters(*config_.storage, parameters_)) {
+    note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_INTERNAL, 0);
+  }
   if (controller_unsaved_) {
+    const ControllerSections& in_force = controllers_.in_force();
     protocol::Controller controller;
-    write_controller(controllers_.in_force(), config_.sample_period_us, controller);
-    save_controller(*config_.storage, controller);
+    write_controller(in_force, config_.sample_period_us, controller);
+    if (!save_controller(*config_.storage, controller)) {
+      note(rheonaut_EVENT_KIND_CONTROLLER_CHANGED, rheonaut_EVENT_CAUSE_INTERNAL,
+           static_cast<float>(in_force.controller_id));
+    }
   }
   parameters_unsaved_ = controller_unsaved_ = false;
 }

@@ -24,18 +24,26 @@ void Safety::latch(protocol::EmergencyCause cause) {
   do {
     emergency_id_ = mix(boot_id_ ^ mix(++stops_));
   } while (emergency_id_ == 0 || emergency_id_ == before);  // SAFETY: never the id that a clear may name already
-  cause_ = cause;
+  take_cause(cause);
 }
 
 void Safety::restore(std::uint64_t emergency_id, protocol::EmergencyCause cause) {
   emergency_id_ = emergency_id;
+  take_cause(cause);
+}
+
+void Safety::take_cause(protocol::EmergencyCause cause) {
   cause_ = cause;
+  has_sensor_cause_ = has_sensor_cause_ || cause == rheonaut_EMERGENCY_CAUSE_SENSOR_MISSING ||
+                      cause == rheonaut_EMERGENCY_CAUSE_SENSOR_STUCK ||
+                      cause == rheonaut_EMERGENCY_CAUSE_SENSOR_OUT_OF_RANGE;
 }
 
 bool Safety::clear(std::uint64_t emergency_id) {
   if (!latched() || emergency_id != emergency_id_) return false;  // SAFETY: a clear never undoes a later stop
   emergency_id_ = 0;
   cause_ = rheonaut_EMERGENCY_CAUSE_NONE;
+  has_sensor_cause_ = false;
   return true;
 }
 

@@ -50,12 +50,16 @@ class Safety {
   bool latched() const { return emergency_id_ != 0; }
   std::uint64_t emergency_id() const { return emergency_id_; }
   protocol::EmergencyCause cause() const { return cause_; }
+  // Whether a sensor caused this emergency, or a stop before it that was not cleared.
+  bool has_sensor_cause() const { return has_sensor_cause_; }
   const DutyRange& range() const { return range_; }
 
   // What the motor gets of the duty wanted: 0 when latched, not finite or outward, otherwise within the range.
   float permit(float wanted_duty) const;
 
  private:
+  void take_cause(protocol::EmergencyCause cause);
+
   enum class Side { inside, below, above };
 
   DutyRange range_;
@@ -63,6 +67,7 @@ class Safety {
   std::uint64_t stops_ = 0;
   std::uint64_t emergency_id_ = 0;
   protocol::EmergencyCause cause_ = rheonaut_EMERGENCY_CAUSE_NONE;
+  bool has_sensor_cause_ = false;
   Side side_ = Side::inside;
   float at_power_s_ = 0;
 };

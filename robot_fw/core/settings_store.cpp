@@ -32,6 +32,11 @@ std::uint32_t crc_of(const std::uint8_t* bytes, std::size_t size) {
 
 }  // namespace
 
+bool is_kept(Storage& storage, StorageKey key) {
+  std::uint8_t bytes[Storage::kMaxBytes];
+  return storage.load(key, bytes, sizeof(bytes)) > 0;
+}
+
 bool save_parameters(Storage& storage, const Parameters& parameters) {
   std::uint8_t bytes[kParameterBytes + kWordBytes];
   for (std::size_t i = 0; i < kParameterCount; ++i) {

@@ -30,6 +30,8 @@ class Storage {
   ~Storage() = default;
 };
 
+bool is_kept(Storage& storage, StorageKey key);  // anything, good or bad
+
 bool save_parameters(Storage& storage, const Parameters& parameters);
 // The table as it was saved; empty when none is there, or a value is out of its range by now.
 std::optional<Parameters> load_parameters(Storage& storage);

@@ -3,8 +3,6 @@
 
 #include <cstring>
 
-#include "robot_fw/core/crc32.hpp"
-
 namespace robot_fw::lx106 {
 namespace {
 
@@ -30,16 +28,12 @@ char* put_hex(char* at, std::uint64_t value, unsigned digits) {
 
 }  // namespace
 
-Replay::Replay() : robot_(config()), estimator_(EstimatorParameters{}) {}
+Replay::Replay() : robot_(config()) {}
 
 void Replay::play(const Record& record) {
   sent_bytes_ = 0;
   switch (record.kind) {
-    case RecordKind::tick:
-      estimator_.step(
-          {record.inputs.acceleration_counts, record.inputs.acceleration_is_valid, robot_.duty(), record.dt_s});
-      robot_.step(record.inputs, record.dt_s);
-      return;
+    case RecordKind::tick: robot_.step(record.inputs, record.dt_s); return;
     case RecordKind::bytes:
       wants_connection_ = robot_.receive({record.bytes.data(), record.size}, record.now_us);
       return;
@@ -56,21 +50,10 @@ std::size_t Replay::describe(const Record& record, char (&line)[kMaxLineBytes]) 
   char* at = put_text(line, ticks ? "tick " : closes ? "closes " : "sent ");
   at = put_hex(at, record.now_us, 10);
   *at++ = ' ';
-  if (ticks) at = put_hex(at, float_state_checksum(), 8);
+  if (ticks) at = put_hex(at, robot_.float_state_checksum(), 8);
   for (std::size_t i = 0; i < sent_bytes_; ++i) at = put_hex(at, frame_[i], 2);
   *at++ = '\n';
   return static_cast<std::size_t>(at - line);
-}
-
-// All floats that live from tick to tick, as far as they can be seen from outside.
-std::uint32_t Replay::float_state_checksum() const {
-  Crc32 crc;
-  for (const float value :
-       {robot_.duty(), estimator_.position_m(), estimator_.velocity_m_s(), estimator_.acceleration_m_s2(),
-        estimator_.position_sd_m(), estimator_.bias_m_s2(), estimator_.model_gain(), estimator_.flow_m_s()}) {
-    crc.add_float(value);
-  }
-  return crc.value();
 }
 
 }  // namespace robot_fw::lx106

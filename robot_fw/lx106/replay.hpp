@@ -6,7 +6,6 @@
 //          | "closes " now_us                  the robot wants the connection closed
 #pragma once
 
-#include "robot_fw/core/estimator.hpp"
 #include "robot_fw/core/robot.hpp"
 #include "robot_fw/lx106/recording.hpp"
 
@@ -31,10 +30,7 @@ class Replay {
   const Robot& robot() const { return robot_; }
 
  private:
-  std::uint32_t float_state_checksum() const;
-
   Robot robot_;
-  Estimator estimator_;
   std::array<std::uint8_t, protocol::kMaxFramedBytes> frame_{};
   std::size_t sent_bytes_ = 0;
   bool wants_connection_ = true;

@@ -1,6 +1,7 @@
 // Parameters over the link: read, set, refused, and in effect.
 #include "robot_fw/core/parameters.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <set>
@@ -50,23 +51,33 @@ TEST(ParameterTable, EveryIdNamesItsRow) {
   EXPECT_EQ(Parameters::find("position_limit_max_m"), static_cast<std::size_t>(ParameterId::position_limit_max_m));
   EXPECT_EQ(Parameters::find("power_limit_duty"), static_cast<std::size_t>(ParameterId::power_limit_duty));
   EXPECT_EQ(Parameters::find("power_limit_s"), static_cast<std::size_t>(ParameterId::power_limit_s));
+  EXPECT_EQ(Parameters::find("link_loss_action"), static_cast<std::size_t>(ParameterId::link_loss_action));
+  EXPECT_EQ(Parameters::find("link_loss_limit_s"), static_cast<std::size_t>(ParameterId::link_loss_limit_s));
+  EXPECT_EQ(Parameters::find("impedance_monitor"), static_cast<std::size_t>(ParameterId::impedance_monitor));
+  EXPECT_EQ(Parameters::find("delivery_limit_s"), static_cast<std::size_t>(ParameterId::delivery_limit_s));
+  EXPECT_EQ(Parameters::find("model_gain_1_m_s"), static_cast<std::size_t>(ParameterId::model_gain_1_m_s));
+  EXPECT_EQ(Parameters::find("model_time_constant_1_s"),
+            static_cast<std::size_t>(ParameterId::model_time_constant_1_s));
+  EXPECT_EQ(Parameters::find("dead_zone_duty"), static_cast<std::size_t>(ParameterId::dead_zone_duty));
+  EXPECT_EQ(Parameters::find("acceleration_bias_walk_m_s2"),
+            static_cast<std::size_t>(ParameterId::acceleration_bias_walk_m_s2));
 }
 
 // Computed apart, with Python: binascii.crc32 over name.encode() + struct.pack("<f", value) of each row.
 TEST(ParameterTable, HasTheChecksumThatTheDocumentDefines) {
   const Parameters p;
-  EXPECT_EQ(p.checksum(), 0x931E5A06U);
+  EXPECT_EQ(p.checksum(), 0x6BB9790DU);
 }
 
 TEST_F(ParametersOverTheLink, ArePagedSixAtATime) {
-  EXPECT_EQ(answer(get_parameters(0)), "accepted");
-  EXPECT_EQ(answer(get_parameters(6)), "accepted");
-  ASSERT_EQ(station.pages.size(), 2u);
-  EXPECT_EQ(station.pages[0].parameters_count, 6u);
-  EXPECT_EQ(station.pages[1].first_index, 6u);
-  EXPECT_EQ(station.pages[1].parameters_count, kParameterCount - 6);
+  for (std::uint32_t first = 0; first < kParameterCount; first += 6) {
+    EXPECT_EQ(answer(get_parameters(first)), "accepted");
+  }
+  ASSERT_EQ(station.pages.size(), (kParameterCount + 5) / 6);
   std::size_t index = 0;
   for (const auto& page : station.pages) {
+    EXPECT_EQ(page.first_index, index);
+    EXPECT_EQ(page.parameters_count, std::min<std::size_t>(6, kParameterCount - index));
     EXPECT_EQ(page.total, kParameterCount);
     EXPECT_NE(page.command_id, 0u);
     for (pb_size_t i = 0; i < page.parameters_count; ++i, ++index) {
@@ -112,11 +123,34 @@ TEST_F(ParametersOverTheLink, WhatShapesMotionStaysAsItIsWhileTheMotorIsOn) {
     EXPECT_EQ(set(spec.name, spec.default_value), spec.only_at_rest ? "motor_on" : "accepted");
     refused += spec.only_at_rest;
   }
-  EXPECT_EQ(refused, 7);
+  EXPECT_EQ(refused, static_cast<int>(kParameterCount) - 3);
   order(set_manual());
   EXPECT_EQ(set("duty_slew_per_s", 1), "accepted");
   order(set_duty(0.1F));
   EXPECT_EQ(set("duty_slew_per_s", 2), "motor_on");
+}
+
+TEST_F(ParametersOverTheLink, WhatNamesAChoiceIsAWholeNumber) {
+  EXPECT_EQ(set("link_loss_action", 0.5F), "out_of_range");
+  EXPECT_EQ(set("link_loss_action", 2), "accepted");
+  EXPECT_EQ(set("impedance_monitor", 0.999F), "out_of_range");
+  EXPECT_EQ(set("impedance_monitor", 0), "accepted");
+}
+
+TEST(ParameterTable, GivesTheEstimatorsDefaultsBack) {
+  const EstimatorParameters by_table = Parameters{}.estimator(), preset;
+  EXPECT_EQ(by_table.model.gain_m_s, preset.model.gain_m_s);
+  EXPECT_EQ(by_table.model.time_constant_s, preset.model.time_constant_s);
+  EXPECT_EQ(by_table.dead_zone_duty, preset.dead_zone_duty);
+  EXPECT_EQ(by_table.doubtful_duty, preset.doubtful_duty);
+  EXPECT_EQ(by_table.gain_error, preset.gain_error);
+  EXPECT_EQ(by_table.shape_error, preset.shape_error);
+  EXPECT_EQ(by_table.driven_velocity_m_s, preset.driven_velocity_m_s);
+  EXPECT_EQ(by_table.resting_velocity_m_s, preset.resting_velocity_m_s);
+  EXPECT_EQ(by_table.correlation_s, preset.correlation_s);
+  EXPECT_EQ(by_table.noise_m_s2, preset.noise_m_s2);
+  EXPECT_EQ(by_table.bias_m_s2, preset.bias_m_s2);
+  EXPECT_EQ(by_table.bias_walk_m_s2, preset.bias_walk_m_s2);
 }
 
 TEST_F(ParametersOverTheLink, MayBeSetInEmergency) {

@@ -72,19 +72,22 @@ TEST_F(LateTicks, AStallIsOneTickThatSeesTheTimeStep) {
   EXPECT_EQ(missed_ticks(), kStallUs / kTickUs);
 }
 
-TEST_F(LateTicks, TheMotorRunsOnThroughAStall) {
-  SimulatedRobot punctual{{}};
-  StationPeer other{punctual};
+TEST_F(LateTicks, TheMotorRunsOnFor50MsOfAStall) {
+  SimulatedRobot short_push{{}};
+  StationPeer other{short_push};
   other.connect();
   other.run(2);
   other.send(set_duty(0.5F));
-  other.run(41);
+  other.run(7);  // one tick, five more of the stall, and the one of the stop
+  other.send(set_duty(0));
   station.send(set_duty(0.5F));
   station.step();
   stall(39 * kTickUs);
-  EXPECT_EQ(robot.robot_time_us(), punctual.robot_time_us());
-  EXPECT_GT(robot.plant().position_m(), 0.005);
-  EXPECT_EQ(robot.plant().position_m(), punctual.plant().position_m());
+  other.run(static_cast<int>((robot.robot_time_us() - short_push.robot_time_us()) / kTickUs));
+  EXPECT_EQ(robot.robot_time_us(), short_push.robot_time_us());
+  EXPECT_GT(robot.plant().position_m(), 0.001);
+  EXPECT_NEAR(robot.plant().position_m(), short_push.plant().position_m(), 0.002);
+  EXPECT_EQ(robot.core().duty(), 0.5F);  // the lease runs
 }
 
 TEST_F(LateTicks, AStallEndsAuto) {

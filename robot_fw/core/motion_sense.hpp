@@ -1,0 +1,52 @@
+// Where the robot is and how fast: the estimate, or in its place what a perfect sensor says.
+//
+// Ticks that never came are made up for as the motor has spent them: with its duty for 50 ms, then off, as a port
+// forces it off. The standard deviation goes in steps, so that it does not change in every batch: it is 1 to 2 times
+// that of the estimator, and at least 0.1 mm.
+#pragma once
+
+#include "robot_fw/core/crc32.hpp"
+#include "robot_fw/core/estimator.hpp"
+#include "robot_fw/core/hardware_io.hpp"
+#include "robot_fw/core/sensor_watch.hpp"
+
+namespace robot_fw {
+
+class MotionSense {
+ public:
+  // At rest, at position 0.
+  explicit MotionSense(const EstimatorParameters& parameters) : estimator_(parameters) {}
+
+  // Once per tick: `duty` is what the motor had since the last one, `missed_s` the time since then beyond dt_s.
+  void step(const Inputs& inputs, float duty, float dt_s, float missed_s);
+  // The position is 0 from here on. The motor is off.
+  void zero_position();
+  // Takes effect in the next tick; the motor is off.
+  void set_parameters(const EstimatorParameters& parameters) { estimator_.set_parameters(parameters); }
+
+  const Motion& motion() const { return motion_; }
+  float position_sd_m() const { return position_sd_m_; }  // 0: known
+  // Of the accelerometer; whether that is news in this tick.
+  SensorFault fault() const { return watch_.fault(); }
+  bool fault_changed() const { return fault_changed_; }
+  // The model does not explain the motion, since this tick.
+  bool mismatch_begins() const { return mismatch_begins_; }
+  float surprise() const { return estimator_.surprise(); }  // see there
+
+  void add_to(Crc32& crc) const;  // its floats
+
+ private:
+  Estimator estimator_;
+  SensorWatch watch_{kAccelerometerRules};
+  bool fault_changed_ = false;
+  bool mismatch_ = false, mismatch_begins_ = false;
+  Motion motion_;
+  float known_position_m_ = 0;  // as the perfect sensor said
+  float origin_m_ = 0;          // of the perfect sensor
+  float position_sd_m_ = 0;
+
+  // The BNO055's fusion has ±4 g; with its noise, a second of equal readings is none.
+  static constexpr SensorRules kAccelerometerRules{-39.2F, 39.2F, 25, 100, 5};
+};
+
+}  // namespace robot_fw

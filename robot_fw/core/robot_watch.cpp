@@ -1,0 +1,119 @@
+// What the robot watches in each tick: sensors, link, limits, impedance, arrival.
+#include <algorithm>
+#include <cmath>
+
+#include "robot_fw/core/robot.hpp"
+
+namespace robot_fw {
+namespace {
+
+constexpr float kInPlaceM = 0.005F;  // while delivering: farther off, a reading says nothing about the place
+
+protocol::EmergencyCause cause_of(SensorFault fault) {
+  switch (fault) {
+    case SensorFault::none: break;
+    case SensorFault::missing: return rheonaut_EMERGENCY_CAUSE_SENSOR_MISSING;
+    case SensorFault::stuck: return rheonaut_EMERGENCY_CAUSE_SENSOR_STUCK;
+    case SensorFault::out_of_range: return rheonaut_EMERGENCY_CAUSE_SENSOR_OUT_OF_RANGE;
+  }
+  return rheonaut_EMERGENCY_CAUSE_INTERNAL_ERROR;
+}
+
+}  // namespace
+
+// A fault is an event, and in auto an emergency. In manual the operator may go on by eye.
+void Robot::watch_sensors() {
+  const bool electrode_is_used = parameters_[ParameterId::impedance_monitor] != 0;
+  const bool news = electrode_is_used && electrode_.step(inputs_.impedance_mv, true);
+  watch_sensor(motion_sense_.fault(), motion_sense_.fault_changed(), rheonaut_EVENT_CAUSE_SENSOR,
+               kMS2PerCount * static_cast<float>(inputs_.acceleration_counts));
+  watch_sensor(electrode_fault(), news, rheonaut_EVENT_CAUSE_IMPEDANCE, inputs_.impedance_mv);
+  if (motion_sense_.mismatch_begins()) {
+    note(rheonaut_EVENT_KIND_MODEL_MISMATCH, rheonaut_EVENT_CAUSE_SENSOR, std::sqrt(motion_sense_.surprise()));
+  }
+}
+
+void Robot::watch_sensor(SensorFault fault, bool is_news, protocol::EventCause which, float reading) {
+  if (!is_news) return;
+  const bool faulty = fault != SensorFault::none;
+  note(faulty ? rheonaut_EVENT_KIND_SENSOR_FAULT : rheonaut_EVENT_KIND_SENSOR_RECOVERED, which, reading);
+  // SAFETY: nothing steers by a sensor that cannot be believed.
+  if (faulty && pilot_.is_auto()) emergency(cause_of(fault), which, 0);
+}
+
+SensorFault Robot::electrode_fault() const {
+  return parameters_[ParameterId::impedance_monitor] == 0 ? SensorFault::none : electrode_.fault();
+}
+
+bool Robot::sensor_fault_stands() const {
+  return motion_sense_.fault() != SensorFault::none || electrode_fault() != SensorFault::none;
+}
+
+void Robot::watch_link() {
+  if (!link_.goes_lost(now_us_)) return;
+  note(rheonaut_EVENT_KIND_LINK_LOST, rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
+  drop_timed_commands({rheonaut_COMMAND_RESULT_EXPIRED});
+  const LinkLossAction action = parameters_.link_loss_action();
+  if (!pilot_.is_auto() || action == LinkLossAction::stop) {
+    const bool was_auto = pilot_.is_auto();
+    stop_motion(rheonaut_EVENT_CAUSE_LINK_LOSS);  // SAFETY: nobody is there to stop it
+    if (was_auto) note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
+    return;
+  }
+  pilot_.outlive_link(parameters_[ParameterId::link_loss_limit_s], now_us_);
+  if (action == LinkLossAction::go_on) return;
+  if (pilot_.delivering()) end_delivery(rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
+  const PositionLimits limits = position_limits();
+  const float here_m = std::clamp(seen_motion().position_m, limits.min_m, limits.max_m);
+  pilot_.set_setpoint(here_m);
+  profile_.restart();
+  note(rheonaut_EVENT_KIND_SETPOINT_CHANGED, rheonaut_EVENT_CAUSE_LINK_LOSS, here_m);
+}
+
+// Where the robot is, without the disturbance, and how long the motor has been at power in the ticks before this one.
+void Robot::watch_limits(const Motion& measured, float dt_s) {
+  if (!inputs_are_sound_) return;
+  const PositionLimits limits = position_limits();
+  const float position_m = measured.position_m - pilot_.disturbance_m();
+  if (safety_.leaves_limits(position_m, limits)) {
+    const float limit_m = position_m > limits.max_m ? limits.max_m : limits.min_m;
+    note(rheonaut_EVENT_KIND_LIMIT_HIT, rheonaut_EVENT_CAUSE_LIMIT, limit_m);
+    // SAFETY: a robot that leaves its stretch of the vessel stops; a latch of another cause stays what it is.
+    if (!safety_.latched()) emergency(rheonaut_EMERGENCY_CAUSE_POSITION_LIMIT, rheonaut_EVENT_CAUSE_LIMIT, 0);
+  }
+  const PowerLimit power{parameters_[ParameterId::power_limit_duty], parameters_[ParameterId::power_limit_s]};
+  if (safety_.too_long_at_power(duty_, dt_s, power)) {
+    note(rheonaut_EVENT_KIND_LIMIT_HIT, rheonaut_EVENT_CAUSE_LIMIT, power.time_s);
+    emergency(rheonaut_EMERGENCY_CAUSE_TIME_AT_POWER, rheonaut_EVENT_CAUSE_LIMIT, 0);  // SAFETY: a motor gets hot
+  }
+}
+
+// Glucose on the way: the robot holds where it has found it until it has mixed.
+void Robot::watch_impedance(const Motion& measured) {
+  if (parameters_[ParameterId::impedance_monitor] == 0 || !inputs_are_sound_) return;
+  const float impedance_mv = inputs_.impedance_mv;
+  const bool in_place = !pilot_.delivering() || std::fabs(measured.position_m - *pilot_.target_m()) <= kInPlaceM;
+  const bool usable = electrode_fault() == SensorFault::none && electrode_.in_range(impedance_mv);
+  const bool detected = impedance_.step(impedance_mv, usable, in_place, parameters_.impedance());
+  if (pilot_.delivering() && impedance_.mixed()) end_delivery(rheonaut_EVENT_CAUSE_IMPEDANCE, 0);
+  if (!detected) return;
+  note(rheonaut_EVENT_KIND_DETECTION, rheonaut_EVENT_CAUSE_IMPEDANCE, impedance_mv);
+  if (!pilot_.is_auto() || pilot_.delivering()) return;
+  pilot_.start_delivery(measured.position_m, parameters_[ParameterId::delivery_limit_s], now_us_);
+  profile_.restart();
+  note(rheonaut_EVENT_KIND_DELIVERY_STARTED, rheonaut_EVENT_CAUSE_IMPEDANCE, impedance_mv);
+}
+
+void Robot::end_delivery(protocol::EventCause cause, std::uint64_t command_id) {
+  const float lasted_s = pilot_.end_delivery(now_us_);
+  profile_.restart();
+  note(rheonaut_EVENT_KIND_DELIVERY_ENDED, cause, lasted_s, command_id);
+}
+
+void Robot::watch_arrival(const Motion& measured) {
+  if (pilot_.arrival_changed(measured.position_m)) {
+    note(rheonaut_EVENT_KIND_SUB_STATE_CHANGED, rheonaut_EVENT_CAUSE_NONE, measured.position_m);
+  }
+}
+
+}  // namespace robot_fw

@@ -1,0 +1,251 @@
+// Targeted delivery: what the robot does about glucose, with a plant around it.
+#include <cmath>
+
+#include "robot_fw/core/impedance_monitor.hpp"
+#include "tests/robot_fw/driven_robot.hpp"
+
+namespace robot_fw {
+namespace {
+
+using namespace sim_robot;
+
+constexpr float kNominalMv = 175, kGlucoseMv = 120;
+
+// A robot on its way to 0.1 m through a vessel whose impedance a test sets.
+class Delivery : public ::testing::Test {
+ protected:
+  using Impedance = std::function<float(double position_m, double time_s)>;
+
+  void start(Impedance impedance_mv) {
+    SimulatedRobotConfig config;
+    config.boot_id = kBootId;
+    config.impedance_mv = std::move(impedance_mv);
+    robot.emplace(config);
+    station.emplace(*robot);
+    station->welcome.samples_per_frame = 1;
+    station->connect();
+    station->run(2);
+  }
+  void go(float setpoint_m) {
+    station->send(set_auto(setpoint_m));
+    station->step();
+  }
+  void run_s(double seconds) { station->run(static_cast<int>(std::lround(seconds * 100))); }
+  std::vector<protocol::Event> events_of(protocol::EventKind kind) const {
+    std::vector<protocol::Event> found;
+    for (const auto& event : station->events) {
+      if (event.kind == kind) found.push_back(event);
+    }
+    return found;
+  }
+  std::size_t detections() const { return events_of(rheonaut_EVENT_KIND_DETECTION).size(); }
+  protocol::SubState sub_state() const { return station->samples.rbegin()->second.sub_state; }
+  double position_m() const { return robot->plant().position_m(); }
+  double now_s() const { return 1e-6 * static_cast<double>(robot->robot_time_us()); }
+
+  std::optional<SimulatedRobot> robot;
+  std::optional<StationPeer> station;
+};
+
+// Between 0.05 m and `end_m`, mixed from `mixed_at_s` on.
+auto patch(double end_m, double mixed_at_s) {
+  return [end_m, mixed_at_s](double position_m, double time_s) {
+    return position_m > 0.05 && position_m < end_m && time_s < mixed_at_s ? kGlucoseMv : kNominalMv;
+  };
+}
+
+TEST_F(Delivery, HoldsWhereItFindsGlucoseUntilThatHasMixedAndGoesOn) {
+  start(patch(0.08, 5));
+  go(0.1F);
+  run_s(3);
+  ASSERT_EQ(detections(), 1u);
+  const auto started = events_of(rheonaut_EVENT_KIND_DELIVERY_STARTED);
+  ASSERT_EQ(started.size(), 1u);
+  EXPECT_EQ(started[0].value, kGlucoseMv);
+  EXPECT_GT(started[0].position_m, 0.05F);
+  EXPECT_LT(started[0].position_m, 0.06F);
+  EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
+  EXPECT_NEAR(position_m(), started[0].position_m, 0.002);
+  EXPECT_EQ(station->samples.rbegin()->second.setpoint_m, 0.1F);
+  EXPECT_EQ(station->samples.rbegin()->second.reference_m, started[0].position_m);
+  run_s(5);
+  const auto ended = events_of(rheonaut_EVENT_KIND_DELIVERY_ENDED);
+  ASSERT_EQ(ended.size(), 1u);
+  EXPECT_EQ(ended[0].cause, rheonaut_EVENT_CAUSE_IMPEDANCE);
+  const double held_s = 5 + 0.5 - 1e-6 * static_cast<double>(started[0].event_robot_time_us);
+  EXPECT_NEAR(ended[0].value, held_s, 0.03);  // mixed at 5 s, and 50 readings
+  EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_HOLDING);
+  EXPECT_NEAR(position_m(), 0.1, 0.002);
+  EXPECT_EQ(detections(), 1u);
+}
+
+TEST_F(Delivery, APatchThatNeverMixesIsLeftAtTheLimit) {
+  start([](double position_m, double) {
+    const bool second = position_m > 0.2;
+    return (position_m > 0.05 && position_m < 0.1) || second ? kGlucoseMv : kNominalMv;
+  });
+  station->send(set_parameter("delivery_limit_s", 4));
+  go(0.15F);
+  run_s(10);
+  const auto ended = events_of(rheonaut_EVENT_KIND_DELIVERY_ENDED);
+  ASSERT_EQ(ended.size(), 1u);
+  EXPECT_EQ(ended[0].cause, rheonaut_EVENT_CAUSE_LIMIT);
+  EXPECT_NEAR(ended[0].value, 4, 0.02);
+  EXPECT_EQ(detections(), 1u);  // not again in the same patch
+  EXPECT_NEAR(position_m(), 0.15, 0.002);
+  go(0.25F);
+  run_s(3);
+  EXPECT_EQ(detections(), 2u);  // armed again in between
+  EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
+}
+
+TEST_F(Delivery, ASensorThatDriftsBy30MvCostsOneDeliveryAtMost) {
+  start([](double, double time_s) { return kNominalMv + 30 * static_cast<float>(std::min(time_s / 20, 1.0)); });
+  station->send(set_parameter("delivery_limit_s", 3));
+  go(0.1F);
+  run_s(60);
+  EXPECT_EQ(detections(), 1u);
+  ASSERT_EQ(events_of(rheonaut_EVENT_KIND_DELIVERY_ENDED).size(), 1u);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_DELIVERY_ENDED)[0].cause, rheonaut_EVENT_CAUSE_LIMIT);
+  EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_HOLDING);
+}
+
+TEST_F(Delivery, ADriftWithinTheBandIsNothing) {
+  start([](double, double time_s) { return kNominalMv + 19 * static_cast<float>(std::min(time_s / 20, 1.0)); });
+  go(0.1F);
+  run_s(60);
+  EXPECT_EQ(detections(), 0u);
+}
+
+TEST_F(Delivery, AnEdgeThatChattersIsNoPatch) {
+  start([](double position_m, double time_s) {
+    const bool high = std::lround(time_s * 100) % 5 == 0;  // four readings in glucose, one out of it
+    return position_m > 0.05 && !high ? kGlucoseMv : kNominalMv;
+  });
+  go(0.1F);
+  run_s(10);
+  EXPECT_EQ(detections(), 0u);
+}
+
+TEST_F(Delivery, AnEdgeThatChattersStartsNoSecondDelivery) {
+  start([](double position_m, double time_s) {
+    const bool solid = position_m > 0.05 && time_s < 2;
+    const bool chatters = position_m > 0.05 && std::lround(time_s * 100) % 40 < 10;  // 0.1 s in glucose, 0.3 s out
+    return solid || chatters ? kGlucoseMv : kNominalMv;
+  });
+  station->send(set_parameter("delivery_limit_s", 4));
+  go(0.1F);
+  run_s(20);
+  EXPECT_EQ(detections(), 1u);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_DELIVERY_ENDED).size(), 1u);
+}
+
+TEST_F(Delivery, ARobotThatOvershootsThePatchComesBackToIt) {
+  start(patch(0.0565, 6));  // 6.5 mm: at full speed five readings fit in
+  go(0.3F);
+  double farthest_m = 0;
+  for (int k = 0; k < 400; ++k) {
+    station->step();
+    farthest_m = std::max(farthest_m, position_m());
+  }
+  ASSERT_EQ(detections(), 1u);
+  EXPECT_GT(farthest_m, 0.0565);  // beyond the patch, where the impedance is nominal
+  EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
+  EXPECT_LT(position_m(), 0.0565);
+  run_s(4);
+  ASSERT_EQ(events_of(rheonaut_EVENT_KIND_DELIVERY_ENDED).size(), 1u);
+  EXPECT_NEAR(1e-6 * static_cast<double>(events_of(rheonaut_EVENT_KIND_DELIVERY_ENDED)[0].event_robot_time_us), 6.5,
+              0.05);
+}
+
+TEST_F(Delivery, InManualADetectionIsAnEventOnly) {
+  start(patch(1, 100));
+  for (int k = 0; k < 40; ++k) {
+    station->send(set_duty(0.8F));
+    run_s(0.1);
+  }
+  ASSERT_EQ(detections(), 1u);
+  EXPECT_TRUE(events_of(rheonaut_EVENT_KIND_DELIVERY_STARTED).empty());
+  EXPECT_EQ(robot->core().mode(), rheonaut_MODE_MANUAL);
+  EXPECT_EQ(robot->core().duty(), 0.8F);
+}
+
+TEST_F(Delivery, EveryEndIsAnEventWithItsCause) {
+  using End = std::function<void()>;
+  const std::pair<protocol::EventCause, End> ends[] = {
+      {rheonaut_EVENT_CAUSE_COMMAND, [this] { station->send(set_setpoint(0.2F)); }},
+      {rheonaut_EVENT_CAUSE_COMMAND, [this] { station->send(set_manual()); }},
+      {rheonaut_EVENT_CAUSE_COMMAND, [this] { station->send(set_auto(0.2F)); }},
+      {rheonaut_EVENT_CAUSE_COMMAND, [this] { station->send(emergency_stop()); }},
+      {rheonaut_EVENT_CAUSE_LINK_LOSS,
+       [this] {
+         station->attentive = false;
+         run_s(1.2);
+         station->attentive = true;
+       }},
+  };
+  for (const auto& [cause, end] : ends) {
+    start(patch(0.08, 1000));
+    go(0.1F);
+    run_s(3);
+    ASSERT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
+    end();
+    run_s(0.1);
+    const auto ended = events_of(rheonaut_EVENT_KIND_DELIVERY_ENDED);
+    ASSERT_EQ(ended.size(), 1u);
+    EXPECT_EQ(ended[0].cause, cause);
+    EXPECT_GT(ended[0].value, 1);
+    EXPECT_NE(sub_state(), rheonaut_SUB_STATE_DELIVERING);
+  }
+}
+
+TEST_F(Delivery, CanBeSwitchedOff) {
+  start(patch(0.08, 1000));
+  station->send(set_parameter("impedance_monitor", 0));
+  go(0.1F);
+  run_s(3);
+  EXPECT_EQ(detections(), 0u);
+  EXPECT_NEAR(position_m(), 0.1, 0.002);
+}
+
+TEST(ImpedanceMonitor, TakesFiveReadingsInARow) {
+  ImpedanceMonitor monitor;
+  for (int k = 0; k < 4; ++k) EXPECT_FALSE(monitor.step(kGlucoseMv, true, true, {}));
+  EXPECT_FALSE(monitor.step(kNominalMv, true, true, {}));
+  for (int k = 0; k < 4; ++k) EXPECT_FALSE(monitor.step(kGlucoseMv, true, true, {}));
+  EXPECT_TRUE(monitor.step(kGlucoseMv, true, true, {}));
+}
+
+TEST(ImpedanceMonitor, ReadingsThatCannotBeUsedAreNoGlucose) {
+  ImpedanceMonitor monitor;
+  for (int k = 0; k < 20; ++k) EXPECT_FALSE(monitor.step(5, false, true, {}));
+}
+
+TEST(ImpedanceMonitor, IsArmedAgainAfter50ReadingsInTheBand) {
+  ImpedanceMonitor monitor;
+  const auto detects = [&] {
+    bool detected = false;
+    for (int k = 0; k < 5; ++k) detected = monitor.step(kGlucoseMv, true, true, {});
+    return detected;
+  };
+  EXPECT_TRUE(detects());
+  for (int k = 0; k < 49; ++k) monitor.step(kNominalMv + 19, true, true, {});
+  EXPECT_FALSE(detects());
+  for (int k = 0; k < 50; ++k) monitor.step(kNominalMv + 19, true, true, {});
+  EXPECT_TRUE(detects());
+}
+
+TEST(ImpedanceMonitor, HasMixedAfter50ReadingsInTheNarrowBandTakenInPlace) {
+  ImpedanceMonitor monitor;
+  for (int k = 0; k < 100; ++k) monitor.step(kNominalMv + 16, true, true, {});
+  EXPECT_FALSE(monitor.mixed());
+  for (int k = 0; k < 100; ++k) monitor.step(kNominalMv, true, false, {});
+  EXPECT_FALSE(monitor.mixed());
+  for (int k = 0; k < 49; ++k) monitor.step(kNominalMv - 14, true, true, {});
+  EXPECT_FALSE(monitor.mixed());
+  monitor.step(kNominalMv - 14, true, true, {});
+  EXPECT_TRUE(monitor.mixed());
+}
+
+}  // namespace
+}  // namespace robot_fw
