@@ -10,19 +10,23 @@
 namespace protocol {
 namespace {
 
-template <class Frame>
-std::size_t encode_any(const pb_msgdesc_t* fields, const Frame& frame, std::uint8_t* out, std::size_t capacity) {
+bool has_content(const RobotFrame& frame) { return frame.which_body != 0; }
+bool has_content(const StationFrame& frame) { return frame.which_body != 0; }
+bool has_content(const Command& command) { return command.which_action != 0; }
+
+template <class Message>
+std::size_t encode_any(const pb_msgdesc_t* fields, const Message& message, std::uint8_t* out, std::size_t capacity) {
   pb_ostream_t stream = pb_ostream_from_buffer(out, capacity);
-  if (frame.which_body == 0 || !pb_encode(&stream, fields, &frame)) return 0;
+  if (!has_content(message) || !pb_encode(&stream, fields, &message)) return 0;
   return stream.bytes_written;
 }
 
-template <class Frame>
-std::optional<Frame> decode_any(const pb_msgdesc_t* fields, Bytes payload) {
-  std::optional<Frame> frame{std::in_place};
+template <class Message>
+std::optional<Message> decode_any(const pb_msgdesc_t* fields, Bytes payload) {
+  std::optional<Message> message{std::in_place};
   pb_istream_t stream = pb_istream_from_buffer(payload.first, payload.size);
-  if (!pb_decode(&stream, fields, &*frame) || frame->which_body == 0) return std::nullopt;
-  return frame;
+  if (!pb_decode(&stream, fields, &*message) || !has_content(*message)) return std::nullopt;
+  return message;
 }
 
 bool columns_agree(const Telemetry& batch) {
@@ -71,6 +75,10 @@ std::size_t encode(const StationFrame& frame, std::uint8_t* out, std::size_t cap
   return encode_any(rheonaut_StationFrame_fields, frame, out, capacity);
 }
 
+std::size_t encode(const Command& command, std::uint8_t* out, std::size_t capacity) {
+  return encode_any(rheonaut_Command_fields, command, out, capacity);
+}
+
 std::optional<RobotFrame> decode_robot_frame(Bytes payload) {
   auto frame = decode_any<RobotFrame>(rheonaut_RobotFrame_fields, payload);
   if (frame && frame->which_body == rheonaut_RobotFrame_telemetry_tag && !columns_agree(frame->body.telemetry)) {
@@ -82,6 +90,8 @@ std::optional<RobotFrame> decode_robot_frame(Bytes payload) {
 std::optional<StationFrame> decode_station_frame(Bytes payload) {
   return decode_any<StationFrame>(rheonaut_StationFrame_fields, payload);
 }
+
+std::optional<Command> decode_command(Bytes payload) { return decode_any<Command>(rheonaut_Command_fields, payload); }
 
 const char* text(Mode value) {
   switch (value) {

@@ -50,11 +50,13 @@ using RefusalReason = rheonaut_RefusalReason;
 // Encodes into `out`; returns the number of bytes, or 0 when the message does not fit (or a string is not terminated).
 std::size_t encode(const RobotFrame& frame, std::uint8_t* out, std::size_t capacity);
 std::size_t encode(const StationFrame& frame, std::uint8_t* out, std::size_t capacity);
+std::size_t encode(const Command& command, std::uint8_t* out, std::size_t capacity);  // as it lies in its frame
 
 // Decodes one payload. Empty when the bytes are not such a message, carry no body, break a fixed size, or (telemetry)
 // the columns differ in length or are empty. Values are not judged: a float may be NaN, an enumerator unknown.
 std::optional<RobotFrame> decode_robot_frame(Bytes payload);
 std::optional<StationFrame> decode_station_frame(Bytes payload);
+std::optional<Command> decode_command(Bytes payload);
 
 // The JSON and SQL text of an enumerator; "unknown" for a value this version does not know.
 const char* text(Mode value);

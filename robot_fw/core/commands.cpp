@@ -2,6 +2,7 @@
 #include "robot_fw/core/commands.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 namespace robot_fw {
 
@@ -27,25 +28,47 @@ bool CommandGate::remember(std::uint64_t command_id) {
 }
 
 bool TimedCommands::hold(const protocol::Command& command) {
-  for (std::size_t i = 0; i < held_.size(); ++i) {
-    if (used_[i]) continue;
-    held_[i] = command;
-    used_[i] = true;
-    return true;
-  }
-  return false;
+  const auto free = std::find(size_bytes_.begin(), size_bytes_.end(), 0);
+  if (free == size_bytes_.end()) return false;
+  const auto index = static_cast<std::size_t>(free - size_bytes_.begin());
+  const std::size_t first = first_byte(index);
+  const std::size_t size = protocol::encode(command, bytes_.data() + first, kMaxBytes - first);
+  if (size == 0) return false;
+  size_bytes_[index] = static_cast<std::uint16_t>(size);
+  held_[index] = {command.execute_at_robot_us, command.command_id};
+  return true;
 }
 
-bool TimedCommands::take_due(std::uint64_t now_us, protocol::Command& command) {
-  std::size_t earliest = held_.size();
-  for (std::size_t i = 0; i < held_.size(); ++i) {
-    if (!used_[i] || held_[i].execute_at_robot_us > now_us) continue;
-    if (earliest == held_.size() || held_[i].execute_at_robot_us < held_[earliest].execute_at_robot_us) earliest = i;
+std::optional<protocol::Command> TimedCommands::take_due(std::uint64_t now_us) {
+  std::size_t earliest = kMaxCommands;
+  for (std::size_t i = 0; i < kMaxCommands && size_bytes_[i] > 0; ++i) {
+    const std::uint64_t at_us = held_[i].execute_at_robot_us;
+    if (at_us <= now_us && (earliest == kMaxCommands || at_us < held_[earliest].execute_at_robot_us)) earliest = i;
   }
-  if (earliest == held_.size()) return false;
-  command = held_[earliest];
-  used_[earliest] = false;
-  return true;
+  if (earliest == kMaxCommands) return std::nullopt;
+  auto command = protocol::decode_command({bytes_.data() + first_byte(earliest), size_bytes_[earliest]});
+  remove(earliest);
+  return command;
+}
+
+std::optional<std::uint64_t> TimedCommands::drop_any() {
+  if (size_bytes_[0] == 0) return std::nullopt;
+  const std::uint64_t command_id = held_[0].command_id;
+  remove(0);
+  return command_id;
+}
+
+// Those behind it move up.
+void TimedCommands::remove(std::size_t index) {
+  const std::size_t first = first_byte(index);
+  std::copy(bytes_.begin() + first + size_bytes_[index], bytes_.end(), bytes_.begin() + first);
+  std::copy(held_.begin() + index + 1, held_.end(), held_.begin() + index);
+  std::copy(size_bytes_.begin() + index + 1, size_bytes_.end(), size_bytes_.begin() + index);
+  size_bytes_.back() = 0;
+}
+
+std::size_t TimedCommands::first_byte(std::size_t index) const {
+  return std::accumulate(size_bytes_.begin(), size_bytes_.begin() + index, std::size_t{0});
 }
 
 }  // namespace robot_fw

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "protocol/messages.hpp"
 
@@ -34,19 +35,30 @@ class CommandGate {
   std::size_t oldest_ = 0;
 };
 
-// Commands admitted with a time still to come.
+// Commands admitted with a time still to come, encoded one behind the other in the order in which they came.
 class TimedCommands {
  public:
-  // False when no place is free.
+  static constexpr std::size_t kMaxCommands = 4;
+  static constexpr std::size_t kMaxBytes = 496;  // of all; a schedule of 64 entries with ticks below 2 million fits
+
+  // False when there is no room for it.
   bool hold(const protocol::Command& command);
-  // Takes the earliest one due at `now_us` out into `command`; false when none is.
-  bool take_due(std::uint64_t now_us, protocol::Command& command);
-  // Takes any one out; false when none is left.
-  bool take_any(protocol::Command& command) { return take_due(UINT64_MAX, command); }
+  // Takes out the earliest one due at `now_us`, of several for the same time the one that came first.
+  std::optional<protocol::Command> take_due(std::uint64_t now_us);
+  // Drops one and says its id; empty when none is left.
+  std::optional<std::uint64_t> drop_any();
 
  private:
-  std::array<protocol::Command, 4> held_{};
-  std::array<bool, 4> used_{};
+  void remove(std::size_t index);
+  std::size_t first_byte(std::size_t index) const;
+
+  struct Held {
+    std::uint64_t execute_at_robot_us;
+    std::uint64_t command_id;
+  };
+  std::array<Held, kMaxCommands> held_{};
+  std::array<std::uint16_t, kMaxCommands> size_bytes_{};  // of each; 0 behind the last
+  std::array<std::uint8_t, kMaxBytes> bytes_{};
 };
 
 }  // namespace robot_fw

@@ -7,9 +7,9 @@ namespace robot_fw {
 
 float corrected_direct(const ControllerSections& sections) {
   float direct = sections.kp;  // (2)
-  for (std::size_t i = 0; i < sections.count; ++i) direct -= sections.residue[i] / (1 - sections.pole[i]);
+  for (std::size_t i = 0; i < sections.count; ++i) direct -= sections.residue(i) / (1 - sections.pole(i));
   for (std::size_t j = 0; j < sections.biquad_count; ++j) {
-    const Biquad& biquad = sections.biquad[j];
+    const Biquad biquad = sections.biquad(j);
     direct -= (biquad.b0 + biquad.b1) / (1 + biquad.a1 + biquad.a2);
   }
   return direct;
@@ -38,11 +38,11 @@ ControllerDuty Controller::step(float error_m, float position_m) {
 float Controller::drive_sections(float input_m) {
   float duty = 0;
   for (std::size_t i = 0; i < sections_.count; ++i) {
-    duty += sections_.residue[i] * state_[i];
-    state_[i] = sections_.pole[i] * state_[i] + input_m;
+    duty += sections_.residue(i) * state_[i];
+    state_[i] = sections_.pole(i) * state_[i] + input_m;
   }
   for (std::size_t j = 0; j < sections_.biquad_count; ++j) {
-    const Biquad& biquad = sections_.biquad[j];
+    const Biquad biquad = sections_.biquad(j);
     float* w = &state_[sections_.count + 2 * j];
     duty += biquad.b0 * w[0] + biquad.b1 * w[1];
     const float next = input_m - biquad.a1 * w[0] - biquad.a2 * w[1];

@@ -26,33 +26,43 @@
 namespace robot_fw {
 
 constexpr std::size_t kMaxSections = 10;  // a biquad counts as two
-constexpr std::size_t kMaxBiquads = kMaxSections / 2;
+constexpr std::size_t kMaxCoefficients = 2 * kMaxSections;
 
 struct Biquad {
   float b0 = 0, b1 = 0, a1 = 0, a2 = 0;
 };
 
+// Of a controller with at most kMaxSections.
 struct ControllerSections {
   std::uint32_t controller_id = 0;
   std::uint32_t checksum = 0;  // as the station gave it; 0: not computed
   float kp = 0;
   float direct = 0;  // as designed; the controller executes (2)
-  std::array<float, kMaxSections> pole{};
-  std::array<float, kMaxSections> residue{};
-  std::size_t count = 0;
-  std::array<Biquad, kMaxBiquads> biquad{};
-  std::size_t biquad_count = 0;
+  // Pole and residue of each real section, then b0, b1, a1 and a2 of each biquad.
+  std::array<float, kMaxCoefficients> coefficients{};
+  std::uint8_t count = 0;  // of real sections
+  std::uint8_t biquad_count = 0;
+  bool derivative_on_measurement = false;
   float duty_min = -1;  // in [-1, 0]
   float duty_max = 1;   // in (0, 1]
-  bool derivative_on_measurement = false;
+
+  constexpr float pole(std::size_t i) const { return coefficients[2 * i]; }
+  constexpr float residue(std::size_t i) const { return coefficients[2 * i + 1]; }
+  constexpr Biquad biquad(std::size_t j) const {
+    const std::size_t b0 = 2U * count + 4 * j;
+    return {coefficients[b0], coefficients[b0 + 1], coefficients[b0 + 2], coefficients[b0 + 3]};
+  }
 };
 
 constexpr ControllerSections kPaperController{1,
                                               0,
                                               65.0028F,
                                               117.11186F,
-                                              {-0.464926381F, -0.102256174F, 0.438034375F, 0.822226735F, 0.970840994F},
-                                              {-29.9971855F, -14.5876807F, -5.32587518F, -1.00519276F, -0.0781306414F},
+                                              {-0.464926381F, -29.9971855F,  //
+                                               -0.102256174F, -14.5876807F,  //
+                                               0.438034375F, -5.32587518F,   //
+                                               0.822226735F, -1.00519276F,   //
+                                               0.970840994F, -0.0781306414F},
                                               5};
 
 // The direct term for which (2) holds; not finite where some section has no DC gain.

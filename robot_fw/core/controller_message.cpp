@@ -89,13 +89,18 @@ ControllerSections sections_of(const protocol::Controller& controller) {
   sections.checksum = controller.checksum;
   sections.kp = controller.kp;
   sections.direct = controller.direct;
-  sections.count = controller.pole_count;
-  std::copy_n(controller.pole, controller.pole_count, sections.pole.begin());
-  std::copy_n(controller.residue, controller.residue_count, sections.residue.begin());
-  sections.biquad_count = controller.biquad_b0_count;
+  sections.count = static_cast<std::uint8_t>(controller.pole_count);
+  sections.biquad_count = static_cast<std::uint8_t>(controller.biquad_b0_count);
+  auto next = sections.coefficients.begin();
+  for (pb_size_t i = 0; i < controller.pole_count; ++i) {
+    *next++ = controller.pole[i];
+    *next++ = controller.residue[i];
+  }
   for (pb_size_t j = 0; j < controller.biquad_b0_count; ++j) {
-    sections.biquad[j] = {controller.biquad_b0[j], controller.biquad_b1[j], controller.biquad_a1[j],
-                          controller.biquad_a2[j]};
+    *next++ = controller.biquad_b0[j];
+    *next++ = controller.biquad_b1[j];
+    *next++ = controller.biquad_a1[j];
+    *next++ = controller.biquad_a2[j];
   }
   sections.duty_min = controller.duty_min;
   sections.duty_max = controller.duty_max;
@@ -110,16 +115,18 @@ void write_controller(const ControllerSections& sections, std::uint32_t sample_p
   out.period_us = sample_period_us;
   out.kp = sections.kp;
   out.direct = sections.direct;
-  out.pole_count = out.residue_count = static_cast<pb_size_t>(sections.count);
-  std::copy_n(sections.pole.begin(), sections.count, out.pole);
-  std::copy_n(sections.residue.begin(), sections.count, out.residue);
-  out.biquad_b0_count = out.biquad_b1_count = static_cast<pb_size_t>(sections.biquad_count);
-  out.biquad_a1_count = out.biquad_a2_count = static_cast<pb_size_t>(sections.biquad_count);
+  out.pole_count = out.residue_count = sections.count;
+  for (std::size_t i = 0; i < sections.count; ++i) {
+    out.pole[i] = sections.pole(i);
+    out.residue[i] = sections.residue(i);
+  }
+  out.biquad_b0_count = out.biquad_b1_count = out.biquad_a1_count = out.biquad_a2_count = sections.biquad_count;
   for (std::size_t j = 0; j < sections.biquad_count; ++j) {
-    out.biquad_b0[j] = sections.biquad[j].b0;
-    out.biquad_b1[j] = sections.biquad[j].b1;
-    out.biquad_a1[j] = sections.biquad[j].a1;
-    out.biquad_a2[j] = sections.biquad[j].a2;
+    const Biquad biquad = sections.biquad(j);
+    out.biquad_b0[j] = biquad.b0;
+    out.biquad_b1[j] = biquad.b1;
+    out.biquad_a1[j] = biquad.a1;
+    out.biquad_a2[j] = biquad.a2;
   }
   out.duty_min = sections.duty_min;
   out.duty_max = sections.duty_max;

@@ -1,4 +1,4 @@
-// The last 32 events, kept until the station has them on disk.
+// The last 16 events, kept until the station has them on disk.
 #pragma once
 
 #include <array>
@@ -10,10 +10,10 @@ namespace robot_fw {
 
 class EventRing {
  public:
-  static constexpr std::size_t kCapacity = 32;
+  static constexpr std::size_t kCapacity = 16;
 
   // Numbers the event and keeps it; the oldest one makes room and is counted as lost.
-  void push(protocol::Event event);
+  void push(const protocol::Event& event);
   // Forgets every event below `next_event_seq`; a number above next_seq() is ignored.
   void acknowledge(std::uint64_t next_event_seq);
   // The event with this number; it must lie in [oldest_seq(), next_seq()).
@@ -24,7 +24,24 @@ class EventRing {
   std::uint32_t lost() const { return lost_; }
 
  private:
-  std::array<protocol::Event, kCapacity> events_{};
+  // An event without its number, which follows from its place. Every enumerator is below 256; 48 bits of microseconds
+  // are 8 years, 40 bits of samples 348 years.
+  struct Record {
+    std::uint64_t robot_time_us : 48;
+    std::uint64_t kind : 8;
+    std::uint64_t cause : 8;
+    std::uint64_t sample_seq : 40;
+    std::uint64_t mode : 8;
+    std::uint64_t sub_state : 8;
+    std::uint64_t emergency_cause : 8;
+    std::uint64_t emergency_id;
+    std::uint64_t command_id;
+    float position_m;
+    float value;
+  };
+  static_assert(sizeof(Record) == 40, "an event outgrew its place");
+
+  std::array<Record, kCapacity> records_{};
   std::uint64_t oldest_seq_ = 0;
   std::uint64_t next_seq_ = 0;
   std::uint32_t lost_ = 0;

@@ -12,6 +12,7 @@ constexpr std::uint64_t kStatusPeriodUs = 1'000'000;
 constexpr std::uint64_t kMaxLiveBacklog = 100;  // samples; what is older is no longer live
 constexpr std::size_t kBackfillPerTick = 2;     // samples, against the one that is made
 constexpr std::size_t kMaxBackfillCredit = 2 * kMaxSamplesPerFrame;
+constexpr std::uint64_t kLow48 = (1ULL << 48) - 1;
 
 }  // namespace
 
@@ -30,16 +31,34 @@ void Outbox::welcomed(const TelemetryRing& samples, const EventRing& events) {
   status_due_us_ = 0;
 }
 
+Outbox::Ack::Ack(const protocol::CommandAck& ack)
+    : command_id(ack.command_id),
+      emergency_id(ack.emergency_id),
+      effect_at_robot_us(ack.effect_at_robot_us & kLow48),
+      result(static_cast<std::uint8_t>(ack.result)),
+      reason(static_cast<std::uint8_t>(ack.reason)) {}
+
+protocol::CommandAck Outbox::first_ack() const {
+  const Ack& first = acks_[first_ack_];
+  protocol::CommandAck ack = rheonaut_CommandAck_init_zero;
+  ack.command_id = first.command_id;
+  ack.result = static_cast<protocol::CommandResult>(first.result);
+  ack.reason = static_cast<protocol::RejectReason>(first.reason);
+  ack.effect_at_robot_us = first.effect_at_robot_us;
+  ack.emergency_id = first.emergency_id;
+  return ack;
+}
+
 void Outbox::ack(const protocol::CommandAck& ack) {
   if (stop_acks_ == kMaxAcks) return;  // SAFETY: no other ack displaces a stop's
   if (ack_count_ == kMaxAcks) drop_oldest_ordinary_ack();
-  acks_[(first_ack_ + ack_count_++) % kMaxAcks] = ack;
+  acks_[(first_ack_ + ack_count_++) % kMaxAcks] = Ack{ack};
 }
 
 void Outbox::ack_stop(const protocol::CommandAck& ack) {
   if (ack_count_ == kMaxAcks && stop_acks_ < kMaxAcks) drop_oldest_ordinary_ack();
   first_ack_ = (first_ack_ + kMaxAcks - 1) % kMaxAcks;
-  acks_[first_ack_] = ack;
+  acks_[first_ack_] = Ack{ack};
   ack_count_ = std::min(ack_count_ + 1, kMaxAcks);
   stop_acks_ = std::min(stop_acks_ + 1, kMaxAcks);
 }

@@ -35,7 +35,7 @@ struct PageRequest {
 
 class Outbox {
  public:
-  static constexpr std::size_t kMaxAcks = 16;
+  static constexpr std::size_t kMaxAcks = 8;
   static constexpr std::size_t kMaxPages = 4;
 
   // A new connection: hello first. Acks that were not sent stay due.
@@ -64,7 +64,7 @@ class Outbox {
   // The message that next() named was written. `samples_in_frame` counts for telemetry.
   void sent(Outgoing what, std::size_t samples_in_frame, std::uint64_t now_us);
 
-  const protocol::CommandAck& first_ack() const { return acks_[first_ack_]; }
+  protocol::CommandAck first_ack() const;
   const PageRequest& first_page() const { return pages_[0]; }
   std::uint64_t event_seq() const { return event_next_; }
   std::uint64_t live_seq() const { return live_.next_seq; }
@@ -75,8 +75,21 @@ class Outbox {
   void catch_up(const TelemetryRing& samples, const EventRing& events);
   void drop_oldest_ordinary_ack();
 
+  // An acknowledgement in little room: every enumerator is below 256, 48 bits of microseconds are 8 years.
+  struct Ack {
+    Ack() = default;
+    explicit Ack(const protocol::CommandAck& ack);
+
+    std::uint64_t command_id = 0;
+    std::uint64_t emergency_id = 0;
+    std::uint64_t effect_at_robot_us : 48;
+    std::uint64_t result : 8;
+    std::uint64_t reason : 8;
+  };
+  static_assert(sizeof(Ack) == 24, "an acknowledgement outgrew its place");
+
   bool hello_due_ = false;
-  std::array<protocol::CommandAck, kMaxAcks> acks_{};
+  std::array<Ack, kMaxAcks> acks_{};
   std::size_t first_ack_ = 0, ack_count_ = 0;
   std::size_t stop_acks_ = 0;  // how many of them, the first ones, answer a stop
   std::array<PageRequest, kMaxPages> pages_{};

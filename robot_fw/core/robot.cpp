@@ -89,8 +89,7 @@ float Robot::watch_clock(std::uint64_t robot_time_us, float dt_s) {
 }
 
 void Robot::run_due_commands() {
-  protocol::Command command;
-  while (timed_.take_due(now_us_, command)) run_timed_command(command);
+  while (const auto command = timed_.take_due(now_us_)) run_timed_command(*command);
 }
 
 void Robot::let_orders_run_out() {

@@ -97,8 +97,8 @@ class Robot {
   // Commands, in robot_commands.cpp.
   void on_command(const protocol::Command& command);
   void on_emergency_stop(const protocol::Command& command);
-  protocol::CommandAck ack_for(const protocol::Command& command, Verdict verdict, std::uint64_t effect_at_us) const;
-  void answer(const protocol::Command& command, Verdict verdict);
+  protocol::CommandAck ack_for(std::uint64_t command_id, Verdict verdict, std::uint64_t effect_at_us) const;
+  void answer(std::uint64_t command_id, Verdict verdict);
   void run_timed_command(const protocol::Command& command);
   void drop_timed_commands(Verdict verdict);
   Verdict execute(const protocol::Command& command);
@@ -162,7 +162,13 @@ class Robot {
   std::uint32_t bad_frames_ = 0;
   std::uint32_t worst_tick_us_ = 0;  // since the last status
   protocol::RefusalReason refusal_ = rheonaut_REFUSAL_REASON_NONE;
-  std::array<char, sizeof(protocol::Welcome::detail)> refusal_detail_{};
+  std::array<char, 64> refusal_detail_{};
 };
+
+// What the ESP8266 has for all of it besides the ring and the bytes of a frame. A host's pointers and sizes take more;
+// its limit is there to notice growth in every build.
+static_assert(sizeof(Robot) - sizeof(TelemetryRing) - sizeof(protocol::FrameReader) <=
+                  (sizeof(void*) == 4 ? 4096 : 4224),
+              "the robot outgrew its memory");
 
 }  // namespace robot_fw

@@ -17,30 +17,29 @@ bool runs_when_latched(const protocol::Command& command) {
 void Robot::on_command(const protocol::Command& command) {
   if (command.which_action == rheonaut_Command_emergency_stop_tag) return on_emergency_stop(command);
   const Verdict verdict = gate_.admit(command, now_us_);
-  if (!verdict.accepted()) return answer(command, verdict);
+  if (!verdict.accepted()) return answer(command.command_id, verdict);
   const bool later = command.has_execute_at_robot_us && command.execute_at_robot_us > now_us_;
-  if (!later) return answer(command, execute(command));
+  if (!later) return answer(command.command_id, execute(command));
   if (safety_.latched() && !runs_when_latched(command)) {
-    return answer(command, rejected(rheonaut_REJECT_REASON_LATCHED));
+    return answer(command.command_id, rejected(rheonaut_REJECT_REASON_LATCHED));
   }
-  if (!timed_.hold(command)) return answer(command, rejected(rheonaut_REJECT_REASON_BUSY));
-  outbox_.ack(ack_for(command, kAccepted, command.execute_at_robot_us));
+  if (!timed_.hold(command)) return answer(command.command_id, rejected(rheonaut_REJECT_REASON_BUSY));
+  outbox_.ack(ack_for(command.command_id, kAccepted, command.execute_at_robot_us));
 }
 
 // SAFETY: a stop asks for no boot, no life, no mode and no id, and acts before this returns.
 void Robot::on_emergency_stop(const protocol::Command& command) {
   const bool repeated = command.command_id != 0 && !gate_.remember(command.command_id);
   if (repeated && safety_.latched()) {
-    return outbox_.ack_stop(ack_for(command, {rheonaut_COMMAND_RESULT_DUPLICATE}, 0));
+    return outbox_.ack_stop(ack_for(command.command_id, {rheonaut_COMMAND_RESULT_DUPLICATE}, 0));
   }
   emergency(rheonaut_EMERGENCY_CAUSE_OPERATOR, rheonaut_EVENT_CAUSE_COMMAND, command.command_id);
-  outbox_.ack_stop(ack_for(command, kAccepted, now_us_));
+  outbox_.ack_stop(ack_for(command.command_id, kAccepted, now_us_));
 }
 
-protocol::CommandAck Robot::ack_for(const protocol::Command& command, Verdict verdict,
-                                    std::uint64_t effect_at_us) const {
+protocol::CommandAck Robot::ack_for(std::uint64_t command_id, Verdict verdict, std::uint64_t effect_at_us) const {
   protocol::CommandAck ack = rheonaut_CommandAck_init_zero;
-  ack.command_id = command.command_id;
+  ack.command_id = command_id;
   ack.result = verdict.result;
   ack.reason = verdict.reason;
   ack.effect_at_robot_us = effect_at_us;
@@ -48,8 +47,8 @@ protocol::CommandAck Robot::ack_for(const protocol::Command& command, Verdict ve
   return ack;
 }
 
-void Robot::answer(const protocol::Command& command, Verdict verdict) {
-  outbox_.ack(ack_for(command, verdict, verdict.accepted() ? now_us_ : 0));
+void Robot::answer(std::uint64_t command_id, Verdict verdict) {
+  outbox_.ack(ack_for(command_id, verdict, verdict.accepted() ? now_us_ : 0));
   if (verdict.accepted()) sample_is_urgent_ = true;
 }
 
@@ -57,12 +56,11 @@ void Robot::answer(const protocol::Command& command, Verdict verdict) {
 void Robot::run_timed_command(const protocol::Command& command) {
   const bool expired = now_us_ > command.valid_until_robot_us;  // SAFETY: a tick that came too late runs nothing stale
   const Verdict verdict = expired ? Verdict{rheonaut_COMMAND_RESULT_EXPIRED} : execute(command);
-  if (!verdict.accepted()) answer(command, verdict);
+  if (!verdict.accepted()) answer(command.command_id, verdict);
 }
 
 void Robot::drop_timed_commands(Verdict verdict) {
-  protocol::Command command;
-  while (timed_.take_any(command)) answer(command, verdict);
+  while (const auto command_id = timed_.drop_any()) answer(*command_id, verdict);
 }
 
 Verdict Robot::execute(const protocol::Command& command) {

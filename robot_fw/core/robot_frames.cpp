@@ -15,6 +15,15 @@ void copy_text(char (&to)[size], const char* from) {
   to[size - 1] = '\0';
 }
 
+// As much as there is room for, cut between two characters of UTF-8.
+template <std::size_t size>
+void cut_text(std::array<char, size>& to, const char* from) {
+  std::strncpy(to.data(), from, size);
+  std::size_t end = size - 1;
+  while (end > 0 && (static_cast<unsigned char>(to[end]) & 0xC0U) == 0x80U) --end;
+  to[end] = '\0';
+}
+
 }  // namespace
 
 void Robot::link_opened(std::uint64_t now_us) {
@@ -70,7 +79,7 @@ bool Robot::on_welcome(const protocol::Welcome& welcome) {
   if (refusal_ == rheonaut_REFUSAL_REASON_NONE && welcome.protocol_version != protocol::kProtocolVersion) {
     refusal_ = rheonaut_REFUSAL_REASON_VERSION;
   }
-  std::copy(std::begin(welcome.detail), std::end(welcome.detail), refusal_detail_.begin());
+  cut_text(refusal_detail_, welcome.detail);
   if (refusal_ != rheonaut_REFUSAL_REASON_NONE) return false;
   link_.welcomed(welcome, saturated<std::uint32_t>(parameters_[ParameterId::link_timeout_ms]), now_us_);
   station_heard();

@@ -31,15 +31,15 @@ TEST(Controller, HasThePolesAndResiduesOfTheGoldenFit) {
   const std::vector<double> b = golden["b"], a = golden["a"];
   ASSERT_EQ(kPaperController.count, 5u);
   for (std::size_t i = 0; i < kPaperController.count; ++i) {
-    double pole = kPaperController.pole[i], slope = 1;
+    double pole = kPaperController.pole(i), slope = 1;
     for (int newton = 0; newton < 20; ++newton) {
       slope = 0;
       for (std::size_t k = 0; k + 1 < a.size(); ++k) slope = slope * pole + a[k] * static_cast<double>(5 - k);
       pole -= polynomial(a, pole) / slope;
     }
     const double residue = polynomial(b, pole) / slope;  // of b/a in z, where a is 0
-    EXPECT_NEAR(kPaperController.pole[i], pole, 1e-7);
-    EXPECT_NEAR(kPaperController.residue[i], residue, 1e-6 * std::abs(residue));
+    EXPECT_NEAR(kPaperController.pole(i), pole, 1e-7);
+    EXPECT_NEAR(kPaperController.residue(i), residue, 1e-6 * std::abs(residue));
   }
 }
 

@@ -53,6 +53,18 @@ TEST(Hello, GetsTheConnectionClosedByARefusal) {
   EXPECT_FALSE(robot.core().link_up());
 }
 
+TEST(Hello, KeepsTheBeginningOfALongRefusalAndCutsNoCharacter) {
+  SimulatedRobot robot{{}};
+  StationPeer station{robot};
+  robot.link_opened(0);
+  protocol::StationFrame frame = welcome_frame();
+  frame.body.welcome.refusal = rheonaut_REFUSAL_REASON_WRONG_TOKEN;
+  const std::string beginning(62, 'a');
+  std::strcpy(frame.body.welcome.detail, (beginning + "€ and more").c_str());
+  EXPECT_FALSE(station.send(frame));
+  EXPECT_EQ(robot.core().refusal_detail(), beginning);
+}
+
 TEST(Hello, RefusesAStationOfAnotherVersion) {
   SimulatedRobot robot{{}};
   StationPeer station{robot};

@@ -50,34 +50,49 @@ TEST_F(Acks, OfStopsGoFirst) {
 }
 
 TEST_F(Acks, TheOldestMakesRoom) {
-  ack(1, 18);
-  EXPECT_EQ(sent(), (Numbers{3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18}));
+  ack(1, 10);
+  EXPECT_EQ(sent(), (Numbers{3, 4, 5, 6, 7, 8, 9, 10}));
 }
 
 TEST_F(Acks, OfAStopOutlivesAnyNumberOfOthers) {
   ack_stop(100, 100);
   ack(1, 40);
-  EXPECT_EQ(sent(), (Numbers{100, 26, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40}));
+  EXPECT_EQ(sent(), (Numbers{100, 34, 35, 36, 37, 38, 39, 40}));
 }
 
 TEST_F(Acks, OfAStopTakesThePlaceOfTheOldestOther) {
-  ack(1, 16);
+  ack(1, 8);
   ack_stop(100, 100);
-  EXPECT_EQ(sent(), (Numbers{100, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16}));
+  EXPECT_EQ(sent(), (Numbers{100, 2, 3, 4, 5, 6, 7, 8}));
 }
 
 TEST_F(Acks, AmongNothingButStopsAnotherIsNotKept) {
-  ack_stop(101, 116);
+  ack_stop(101, 108);
   ack(1, 3);
-  EXPECT_EQ(sent(), (Numbers{116, 115, 114, 113, 112, 111, 110, 109, 108, 107, 106, 105, 104, 103, 102, 101}));
+  EXPECT_EQ(sent(), (Numbers{108, 107, 106, 105, 104, 103, 102, 101}));
 }
 
 TEST_F(Acks, OfTheLatestStopIsAlwaysKept) {
-  ack_stop(101, 117);
+  ack_stop(101, 109);
   const Numbers kept = sent();
   EXPECT_EQ(kept.size(), Outbox::kMaxAcks);
-  EXPECT_EQ(kept.front(), 117u);
+  EXPECT_EQ(kept.front(), 109u);
   EXPECT_EQ(kept.back(), 102u);
+}
+
+TEST_F(Acks, SayAllThatTheyWereGiven) {
+  protocol::CommandAck given = numbered(0xFEDC'BA98'7654'3210);
+  given.result = rheonaut_COMMAND_RESULT_REJECTED;
+  given.reason = rheonaut_REJECT_REASON_UNSUPPORTED;
+  given.effect_at_robot_us = 250'000'000'000'000;  // eight years
+  given.emergency_id = 0x8000'0000'0000'0001;
+  outbox.ack_stop(given);
+  const protocol::CommandAck ack = outbox.first_ack();
+  EXPECT_EQ(ack.command_id, given.command_id);
+  EXPECT_EQ(ack.result, given.result);
+  EXPECT_EQ(ack.reason, given.reason);
+  EXPECT_EQ(ack.effect_at_robot_us, given.effect_at_robot_us);
+  EXPECT_EQ(ack.emergency_id, given.emergency_id);
 }
 
 }  // namespace

@@ -1,0 +1,116 @@
+// Timed commands keep their order and their content in the room there is for them.
+#include "tests/robot_fw/controllers.hpp"
+#include "tests/robot_fw/driven_robot.hpp"
+
+namespace robot_fw {
+namespace {
+
+protocol::Command timed(protocol::Command command, std::uint64_t id, std::uint64_t execute_at_us) {
+  command.command_id = id;
+  command.boot_id = kBootId;
+  command.has_execute_at_robot_us = true;
+  command.execute_at_robot_us = execute_at_us;
+  command.valid_until_robot_us = execute_at_us + 1'000'000;
+  return command;
+}
+
+// 64 entries of which each takes as much room as ticks of this size need; the last one ends it.
+protocol::Command whole_schedule(std::uint32_t first_tick) {
+  protocol::Command command = rheonaut_Command_init_zero;
+  command.which_action = rheonaut_Command_set_duty_schedule_tag;
+  rheonaut_SetDutySchedule& schedule = command.action.set_duty_schedule;
+  schedule.tick_count = schedule.duty_count = kMaxScheduleEntries;
+  for (std::uint32_t i = 0; i < kMaxScheduleEntries; ++i) {
+    schedule.tick[i] = first_tick + i;
+    schedule.duty[i] = i + 1 < kMaxScheduleEntries ? 0.01F * static_cast<float>(i + 1) : 0;
+  }
+  return command;
+}
+
+std::uint64_t taken_id(TimedCommands& commands, std::uint64_t now_us) {
+  const auto command = commands.take_due(now_us);
+  return command ? command->command_id : 0;
+}
+
+TEST(TimedCommands, AreTakenInTheOrderOfTheirTimesAndThenOfTheirComing) {
+  TimedCommands commands;
+  for (const auto& [id, at_us] : {std::pair{1U, 300U}, {2U, 100U}, {3U, 200U}, {4U, 100U}}) {
+    EXPECT_TRUE(commands.hold(timed(sim_robot::set_duty(0.5F), id, at_us)));
+  }
+  EXPECT_EQ(taken_id(commands, 99), 0u);
+  EXPECT_EQ(taken_id(commands, 250), 2u);
+  EXPECT_TRUE(commands.hold(timed(sim_robot::ping(), 5, 100)));
+  EXPECT_EQ(taken_id(commands, 250), 4u);
+  EXPECT_EQ(taken_id(commands, 250), 5u);
+  EXPECT_EQ(taken_id(commands, 250), 3u);
+  EXPECT_EQ(taken_id(commands, 250), 0u);
+  EXPECT_EQ(taken_id(commands, 300), 1u);
+}
+
+TEST(TimedCommands, AWholeScheduleOfALongLifeComesBackAsItWas) {
+  TimedCommands commands;
+  const std::uint64_t years_us = 250'000'000'000'000;
+  const protocol::Command given = timed(whole_schedule(2'000'000), 0xFEDC'BA98'7654'3210, years_us);
+  ASSERT_TRUE(commands.hold(given));
+  const auto taken = commands.take_due(years_us);
+  ASSERT_TRUE(taken.has_value());
+  EXPECT_EQ(taken->command_id, given.command_id);
+  EXPECT_EQ(taken->valid_until_robot_us, given.valid_until_robot_us);
+  const auto& schedule = taken->action.set_duty_schedule;
+  ASSERT_EQ(schedule.tick_count, kMaxScheduleEntries);
+  for (std::size_t i = 0; i < kMaxScheduleEntries; ++i) {
+    EXPECT_EQ(schedule.tick[i], given.action.set_duty_schedule.tick[i]);
+    EXPECT_EQ(schedule.duty[i], given.action.set_duty_schedule.duty[i]);
+  }
+}
+
+TEST(TimedCommands, WithoutRoomAreNotHeldAndHarmNoOther) {
+  TimedCommands commands;
+  EXPECT_TRUE(commands.hold(timed(sim_robot::set_controller(golden_biquads()), 1, 200)));
+  EXPECT_FALSE(commands.hold(timed(whole_schedule(2'000'000), 2, 100)));
+  EXPECT_TRUE(commands.hold(timed(sim_robot::set_duty(-0.25F), 3, 300)));
+  const auto controller = commands.take_due(1000);
+  ASSERT_TRUE(controller.has_value());
+  EXPECT_EQ(checksum_of(controller->action.set_controller), golden_biquads().checksum);
+  const auto duty = commands.take_due(1000);
+  ASSERT_TRUE(duty.has_value());
+  EXPECT_EQ(duty->action.set_duty.duty, -0.25F);
+  EXPECT_TRUE(commands.hold(timed(whole_schedule(2'000'000), 4, 100)));  // the room is free again
+}
+
+TEST(TimedCommands, AreAllDroppedByTheirIds) {
+  TimedCommands commands;
+  commands.hold(timed(sim_robot::ping(), 7, 200));
+  commands.hold(timed(sim_robot::ping(), 8, 100));
+  EXPECT_EQ(commands.drop_any().value_or(0) + commands.drop_any().value_or(0), 15u);
+  EXPECT_FALSE(commands.drop_any().has_value());
+}
+
+using HeldSchedule = DrivenRobot;
+
+TEST_F(HeldSchedule, Of64EntriesRunsTickByTick) {
+  const std::uint64_t at_us = robot.robot_time_us() + 5 * kTickUs;
+  EXPECT_EQ(answer(timed(whole_schedule(0), 42, at_us)), "accepted");
+  station.run(30);
+  EXPECT_EQ(answer(sim_robot::renew_lease()), "accepted");
+  station.run(50);
+  std::size_t seen = 0;
+  for (const auto& [seq, sample] : station.samples) {
+    if (sample.robot_time_us < at_us) continue;
+    const std::size_t i = seen++;
+    EXPECT_EQ(sample.duty, i + 1 < kMaxScheduleEntries ? 0.01F * static_cast<float>(i + 1) : 0) << i;
+  }
+  EXPECT_GT(seen, kMaxScheduleEntries);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_DUTY_SCHEDULE_ENDED), 1);
+}
+
+TEST_F(HeldSchedule, MakesASecondOneBusyAndStillRuns) {
+  const std::uint64_t at_us = robot.robot_time_us() + 5 * kTickUs;
+  EXPECT_EQ(answer(timed(whole_schedule(0), 42, at_us)), "accepted");
+  EXPECT_EQ(answer(timed(whole_schedule(0), 43, at_us)), "busy");
+  station.run(10);
+  EXPECT_GT(core().duty(), 0);
+}
+
+}  // namespace
+}  // namespace robot_fw
