@@ -7,6 +7,7 @@
 #include <iostream>
 #include <set>
 
+#include "robot_fw/core/send_turn.hpp"
 #include "robot_fw/lx106/replay.hpp"
 #include "sim_robot/imu.hpp"
 #include "sim_robot/plant.hpp"
@@ -31,7 +32,7 @@ class Session final : public RecordingSink {
   }
   void connect(std::uint32_t samples_per_frame);
   void disconnect();
-  std::uint64_t send(protocol::Command command);
+  std::uint64_t send(protocol::Command command);  // execute_at_robot_us: from now
 
   bool accepted(std::uint64_t command_id) const { return accepted_.contains(command_id); }
   std::uint64_t samples_heard() const { return samples_.size(); }
@@ -96,21 +97,20 @@ void Session::tick() {
   if (connected_) acknowledge();
 }
 
-// As a port does in a tick: until nothing is due, and at most one batch.
+// As a port does in a tick.
 void Session::listen() {
   Record record;
   record.kind = RecordKind::transmit;
   record.now_us = now_us_;
   record.size = protocol::kMaxFramedBytes;
-  for (bool more = connected_; more;) {
+  robot_fw::SendTurn turn;
+  while (connected_ && turn.goes_on()) {
     play(record);
     protocol::Bytes bytes = replay_.sent();
-    more = !bytes.empty();
+    turn.sent(bytes.size);
     protocol::FrameReader reader;
     if (reader.push(bytes) != protocol::FrameReader::State::complete) continue;
-    const auto frame = protocol::decode_robot_frame(reader.payload());
-    if (frame) on_frame(*frame);
-    more = !frame || frame->which_body != rheonaut_RobotFrame_telemetry_tag;
+    if (const auto frame = protocol::decode_robot_frame(reader.payload())) on_frame(*frame);
   }
 }
 
@@ -169,6 +169,7 @@ std::uint64_t Session::send(protocol::Command command) {
   frame.body.command.command_id = next_command_id_++;
   frame.body.command.boot_id = Replay::kBootId;
   frame.body.command.valid_until_robot_us = now_us_ + kCommandLifeUs;
+  if (command.has_execute_at_robot_us) frame.body.command.execute_at_robot_us += now_us_;
   send(frame);
   return frame.body.command.command_id;
 }
@@ -193,11 +194,28 @@ struct Expectations {
   }
 };
 
+// The longest message there is, due half a second later: from 0.25 to -0.25 within the lease.
+protocol::Command longest_schedule() {
+  protocol::Command command = rheonaut_Command_init_zero;
+  command.has_execute_at_robot_us = true;
+  command.execute_at_robot_us = 500'000;
+  command.which_action = rheonaut_Command_set_duty_schedule_tag;
+  rheonaut_SetDutySchedule& schedule = command.action.set_duty_schedule;
+  constexpr pb_size_t kEntries = sizeof(schedule.duty) / sizeof(schedule.duty[0]);
+  schedule.tick_count = schedule.duty_count = kEntries;
+  for (pb_size_t i = 0; i < kEntries; ++i) {
+    schedule.tick[i] = i;
+    schedule.duty[i] = 0.25F - 0.5F * static_cast<float>(i) / static_cast<float>(kEntries);
+  }
+  schedule.duty[kEntries - 1] = 0;
+  return command;
+}
+
 void manual_duty(Session& session, Expectations& expect) {
   const auto page = session.send(sim_robot::get_parameters(0));
   session.send(sim_robot::set_parameter("profile_velocity_m_s", 0.08F));
   session.send(sim_robot::set_parameter("profile_acceleration_m_s2", 0.2F));
-  session.run(10);
+  session.run(20);
   expect.that(session.accepted(page), "a page of parameters");
   const auto duty = session.send(sim_robot::set_duty(0.4F));
   session.run(40);
@@ -205,6 +223,12 @@ void manual_duty(Session& session, Expectations& expect) {
   session.run(150);
   expect.that(session.accepted(duty) && session.accepted(lease), "a manual duty with a lease renewed");
   expect.that(session.has_event(rheonaut_EVENT_KIND_LEASE_LAPSED), "a lease that lapses");
+  const auto schedule = session.send(longest_schedule());
+  session.run(90);
+  session.send(sim_robot::renew_lease());  // it lasts longer than one
+  session.run(60);
+  expect.that(session.accepted(schedule), "a schedule of 64 duties, held for its time");
+  expect.that(session.has_event(rheonaut_EVENT_KIND_DUTY_SCHEDULE_ENDED), "the end of the schedule");
   const auto zero = session.send(sim_robot::zero_position());
   session.run(5);
   expect.that(session.accepted(zero), "a position set to zero");
