@@ -21,11 +21,12 @@ std::size_t encode_any(const pb_msgdesc_t* fields, const Message& message, std::
   return stream.bytes_written;
 }
 
+// One variable and one return, so that a message, which is large, lies on the robot's stack only once.
 template <class Message>
 std::optional<Message> decode_any(const pb_msgdesc_t* fields, Bytes payload) {
   std::optional<Message> message{std::in_place};
   pb_istream_t stream = pb_istream_from_buffer(payload.first, payload.size);
-  if (!pb_decode(&stream, fields, &*message) || !has_content(*message)) return std::nullopt;
+  if (!pb_decode(&stream, fields, &*message) || !has_content(*message)) message.reset();
   return message;
 }
 
@@ -82,7 +83,7 @@ std::size_t encode(const Command& command, std::uint8_t* out, std::size_t capaci
 std::optional<RobotFrame> decode_robot_frame(Bytes payload) {
   auto frame = decode_any<RobotFrame>(rheonaut_RobotFrame_fields, payload);
   if (frame && frame->which_body == rheonaut_RobotFrame_telemetry_tag && !columns_agree(frame->body.telemetry)) {
-    return std::nullopt;
+    frame.reset();
   }
   return frame;
 }
