@@ -10,22 +10,6 @@
 
 namespace {
 
-// "host:port" or "[v6]:port".
-sim_robot::StationAddress parse_address(const std::string& text) {
-  const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos || colon == 0 || colon + 1 == text.size()) {
-    throw CLI::ValidationError("--station", "'" + text + "' is not ADDR:PORT");
-  }
-  std::string host = text.substr(0, colon);
-  if (host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
-  const std::string port = text.substr(colon + 1);
-  if (port.size() > 5 || port.find_first_not_of("0123456789") != std::string::npos || std::stoi(port) > 65535 ||
-      std::stoi(port) == 0) {
-    throw CLI::ValidationError("--station", "'" + port + "' is not a port");
-  }
-  return {host, port};
-}
-
 int run_robot(const sim_robot::SimulatedRobotConfig& config, const sim_robot::StationAddress& station) {
   boost::asio::io_context loop{1};
   const auto log = [](const std::string& line) { std::cout << "rheonaut-sim: " << line << std::endl; };
@@ -46,7 +30,7 @@ int main(int argc, char** argv) try {
       "Simulated swimming robot: the firmware core in a simulated fluid, connected to a Rheonaut station.\n"
       "Example: rheonaut-sim --station 127.0.0.1:7700 --id sim-1"};
   sim_robot::SimulatedRobotConfig config;
-  std::string station, boot_id;
+  std::string station, boot_id, sensor = "bno055";
   bool json = false;
   const auto add_duty = [&config](CLI::App& to) {
     to.add_option("--duty-min", config.duty.min, "lowest duty of the motor, in [-1, 0]")->capture_default_str();
@@ -57,6 +41,10 @@ int main(int argc, char** argv) try {
   app.add_option("--id", config.robot_id, "name of the robot, 1 to 31 of [a-z0-9_-]")->capture_default_str();
   app.add_option("--token", config.token, "enrolment token, at most 71 characters");
   app.add_option("--boot-id", boot_id, "fixed boot id in hexadecimal instead of a random one");
+  app.add_option("--sensor", sensor, "bno055: its accelerometer and the estimate; perfect: the true position")
+      ->check(CLI::IsMember({"bno055", "perfect"}))
+      ->capture_default_str();
+  app.add_option("--seed", config.seed, "of the sensors' noise")->capture_default_str();
   CLI::App* predict = app.add_subcommand("predict", "compute the closed-loop experiment and print what it measures");
   add_duty(*predict);
   predict->add_flag("--json", json, "as JSON");
@@ -67,9 +55,10 @@ int main(int argc, char** argv) try {
       std::cout << sim_robot::predict(config.duty, json);
       return EXIT_SUCCESS;
     }
+    if (sensor == "bno055") config.imu.emplace();
     if (station.empty()) throw CLI::RequiredError("--station");
     config.boot_id = boot_id.empty() ? sim_robot::random_boot_id() : sim_robot::parse_boot_id(boot_id);
-    return run_robot(config, parse_address(station));
+    return run_robot(config, sim_robot::parse_station_address(station));
   } catch (const CLI::ParseError& error) {
     return app.exit(error);
   }

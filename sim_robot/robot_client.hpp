@@ -24,6 +24,8 @@ struct StationAddress {
   std::string host;
   std::string port;
 };
+// "host:port" or "[v6]:port"; throws std::invalid_argument.
+StationAddress parse_station_address(const std::string& text);
 
 // What people are told about the link, one line each.
 using LinkLog = std::function<void(const std::string& line)>;

@@ -112,7 +112,7 @@ void Robot::end_delivery(protocol::EventCause cause, std::uint64_t command_id) {
 
 void Robot::watch_arrival(const Motion& measured) {
   if (pilot_.arrival_changed(measured.position_m)) {
-    note(rheonaut_EVENT_KIND_SUB_STATE_CHANGED, rheonaut_EVENT_CAUSE_NONE, measured.position_m);
+    note(rheonaut_EVENT_KIND_SUB_STATE_CHANGED, rheonaut_EVENT_CAUSE_NONE, 0);
   }
 }
 

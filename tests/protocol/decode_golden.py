@@ -146,11 +146,14 @@ def main():
     parser.add_argument("--protoc", default="/usr/bin/protoc")
     parser.add_argument("--write", action="store_true", help="fill in the bytes, and the text as protoc spells it")
     parser.add_argument("--export", type=pathlib.Path, help="write each frame as a file into this folder, and end")
+    parser.add_argument("--sender", choices=MESSAGE, help="export the frames of this one only")
+    parser.add_argument("--prefix", type=bytes.fromhex, default=b"", help="bytes in hex before each exported frame")
     options = parser.parse_args()
     head, frames = read(GOLDEN)
     if options.export:
         for frame in frames:
-            (options.export / frame.name).write_bytes(frame.bytes)
+            if options.sender in (None, frame.sender):
+                (options.export / frame.name).write_bytes(options.prefix + frame.bytes)
         return 0
     if options.write:
         rewrite(options.protoc, head, frames)

@@ -10,7 +10,7 @@ class ExperimentTest(unittest.TestCase):
     def test_the_measured_experiment_meets_its_bounds_and_the_prediction(self):
         with lab() as place:
             station = place.start_station()
-            place.start_robot(station)
+            place.start_robot(station, "sim-1", "--sensor", "perfect")
             station.wait_for_robot("sim-1")
             run, measures = perform(station, "sim-1")
             self.assertEqual(faults(run, measures), [])
