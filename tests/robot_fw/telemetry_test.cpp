@@ -187,7 +187,7 @@ TEST_F(Telemetry, EventsThatNobodyKeptAreCountedAsLost) {
   for (int i = 0; i < 40; ++i) order(i % 2 == 0 ? set_auto(0) : set_manual());
   station.run(101);
   const protocol::Event& last_event = station.events.back();
-  EXPECT_EQ(last_event.oldest_event_seq, last_event.event_seq + 1 - 32);
+  EXPECT_EQ(last_event.oldest_event_seq, last_event.event_seq + 1 - EventRing::kCapacity);
   EXPECT_EQ(last_status().lost_events, last_event.oldest_event_seq - durable);
 }
 
