@@ -22,6 +22,7 @@ class Board : public ::testing::Test {
   Board() {
     chip = Chip{};
     chip.imu_registers[0x00] = 0xA0;
+    chip.analogue = 180;  // counts; the electrode in clear fluid
   }
 
   void boot(const Settings& settings = kSettings) {
@@ -34,6 +35,8 @@ class Board : public ::testing::Test {
   void run_ms(std::uint32_t ms) {
     for (std::uint32_t i = 0; i < ms * 1000 / kTurnUs; ++i) {
       chip.pass(kTurnUs);
+      auto& low_byte = chip.imu_registers[0x28];  // at rest: a reading that never changes is a fault
+      if (low_byte <= 1 && chip.now_us % 10'000 < kTurnUs) low_byte ^= 1;
       port->step();
     }
   }
@@ -74,6 +77,13 @@ class Board : public ::testing::Test {
     protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
     frame.which_body = rheonaut_StationFrame_heartbeat_tag;
     say(frame);
+  }
+  // Long enough for the accelerometer, which starts slowly, to be believed.
+  void wait_for_sensors() {
+    for (int i = 0; i < 15; ++i) {
+      heartbeat();
+      run_ms(100);
+    }
   }
   // A duty under a lease of 0.5 s, and the ticks it takes to act.
   void drive(float duty) {

@@ -186,6 +186,7 @@ TEST_F(Port, ParametersAreWrittenWithTheMotorOffAndKept) {
   EXPECT_EQ(chip.flash_erases, 1);
   chip.reset(4);
   connect();
+  wait_for_sensors();
   order(sim_robot::set_auto(2.0F));
   run_ms(20);
   EXPECT_EQ(port->robot().mode(), rheonaut_MODE_AUTO) << "beyond the default limit of 1 m";

@@ -78,6 +78,7 @@ TEST_F(Link, NeverDialsWithTheMotorOn) {
 
 TEST_F(Link, NeverDialsInAutoEvenAtDutyZero) {
   connect();
+  wait_for_sensors();
   order(sim_robot::set_auto(0));
   run_ms(20);
   ASSERT_EQ(port->robot().mode(), rheonaut_MODE_AUTO);
