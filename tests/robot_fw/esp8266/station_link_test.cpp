@@ -79,7 +79,7 @@ TEST_F(Link, NeverDialsWithTheMotorOn) {
 TEST_F(Link, NeverDialsInAutoEvenAtDutyZero) {
   connect();
   wait_for_sensors();
-  order(sim_robot::set_auto(0));
+  order(sim_robot::set_auto(-0.1F));  // behind it, and the motor has no reverse
   run_ms(20);
   ASSERT_EQ(port->robot().mode(), rheonaut_MODE_AUTO);
   ASSERT_TRUE(port->motor().is_off());
