@@ -39,12 +39,18 @@ bool FlashStorage::read(std::uint32_t sector) {
          record_.crc == crc_of(record_);
 }
 
+bool FlashStorage::is_blank(std::uint32_t sector) const {
+  std::uint32_t magic = 0;
+  return ESP.flashRead(address_of(sector), &magic, sizeof(magic)) && magic == 0xFFFF'FFFFU;
+}
+
 void FlashStorage::begin() {
   there_ = FS_PHYS_SIZE >= 2 * kSectorBytes;
   if (!there_) return;
   const bool first = read(0);
   const std::uint32_t first_sequence = record_.sequence;
   const bool second = read(1);
+  damaged_ = (!first && !is_blank(0)) || (!second && !is_blank(1));  // as a write that was cut off leaves it, too
   sector_ = 1;  // where neither is sound, the first write goes to sector 0
   if (second && (!first || record_.sequence > first_sequence)) return;
   if (first && read(0)) {
@@ -75,17 +81,18 @@ bool FlashStorage::save(StorageKey key, protocol::Bytes bytes) {
   return true;
 }
 
-void FlashStorage::write_pending() {
+bool FlashStorage::write_pending() {
   // SAFETY: erasing stops the program for up to 0.4 s, in which no tick controls the motor.
-  if (attempts_left_ == 0 || !motor_.is_off()) return;
+  if (attempts_left_ == 0 || !motor_.is_off()) return true;
   --attempts_left_;
   record_.magic = kMagic;
   ++record_.sequence;
   record_.crc = crc_of(record_);
   const std::uint32_t other = 1 - sector_;
-  if (!write(other)) return;
+  if (!write(other)) return attempts_left_ > 0;
   sector_ = other;
   attempts_left_ = 0;
+  return true;
 }
 
 bool FlashStorage::write(std::uint32_t sector) {

@@ -20,8 +20,10 @@ class FlashStorage final : public Storage {
   void begin();
   std::size_t load(StorageKey key, std::uint8_t* bytes, std::size_t capacity) override;
   bool save(StorageKey key, protocol::Bytes bytes) override;
-  // Writes what was saved since; blocks for up to half a second when there is something.
-  void write_pending();
+  bool damaged() const override { return damaged_; }
+  // Writes what was saved since; blocks for up to half a second when there is something. False when it has failed for
+  // the last time.
+  bool write_pending();
   bool pending() const { return attempts_left_ > 0; }
 
  private:
@@ -48,12 +50,14 @@ class FlashStorage final : public Storage {
 
   // Into `record_`; says whether what is there is sound.
   bool read(std::uint32_t sector);
+  bool is_blank(std::uint32_t sector) const;
   bool write(std::uint32_t sector);
   bool is_written(std::uint32_t sector) const;
 
   const Motor& motor_;
   Record record_{};           // as it is or is to be in flash
   std::uint32_t sector_ = 0;  // 0 or 1: where the newest record is
+  bool damaged_ = false;      // a sector that is not blank is not sound
   bool there_ = false;        // this flash layout has room for it
   std::uint32_t attempts_left_ = 0;
 };

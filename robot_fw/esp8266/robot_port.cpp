@@ -122,7 +122,7 @@ void RobotPort::close_when_dead() {
 // What may block, for seconds.
 void RobotPort::use_rest() {
   const bool at_rest = robot_->at_rest() && motor_.is_off();
-  if (at_rest) storage_.write_pending();
+  if (at_rest && !storage_.write_pending()) robot_->storage_failed();
   const bool was_open = link_.state() == StationLink::State::open;
   if (link_.step(at_rest)) {
     robot_->link_opened(clock_.now_us());

@@ -242,5 +242,20 @@ TEST(OneWayMotor, RefusesAReverseDuty) {
   EXPECT_EQ(station.ack_of(id)->reason, rheonaut_REJECT_REASON_OUT_OF_RANGE);
 }
 
+TEST_F(Commands, ThePositionIsNotZeroedInThePauseOfASchedule) {
+  protocol::Command command = rheonaut_Command_init_zero;
+  command.which_action = rheonaut_Command_set_duty_schedule_tag;
+  auto& schedule = command.action.set_duty_schedule;
+  schedule.tick_count = schedule.duty_count = 4;
+  for (pb_size_t i = 0; i < 4; ++i) {
+    schedule.tick[i] = i * 10;
+    schedule.duty[i] = i % 2 == 0 ? 0.5F : 0;
+  }
+  order(command);
+  station.run(13);
+  ASSERT_EQ(core().duty(), 0);
+  EXPECT_EQ(answer(zero_position()), "motor_on");
+}
+
 }  // namespace
 }  // namespace robot_fw

@@ -16,8 +16,9 @@ class Delivery : public ::testing::Test {
  protected:
   using Impedance = std::function<float(double position_m, double time_s)>;
 
-  void start(Impedance impedance_mv) {
+  void start(Impedance impedance_mv, DutyRange duty = {-1, 1}) {
     SimulatedRobotConfig config;
+    config.duty = duty;
     config.boot_id = kBootId;
     config.impedance_mv = std::move(impedance_mv);
     robot.emplace(config);
@@ -206,6 +207,58 @@ TEST_F(Delivery, CanBeSwitchedOff) {
   run_s(3);
   EXPECT_EQ(detections(), 0u);
   EXPECT_NEAR(position_m(), 0.1, 0.002);
+}
+
+TEST_F(Delivery, AMotorWithoutReverseDeliversWhereItComesToRest) {
+  start(patch(0.08, 5), {0, 1});
+  go(0.2F);
+  run_s(4.5);
+  ASSERT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
+  EXPECT_GT(position_m(), 0.06);  // it has shot beyond the place and cannot come back
+  run_s(1.5);
+  const auto ended = events_of(rheonaut_EVENT_KIND_DELIVERY_ENDED);
+  ASSERT_EQ(ended.size(), 1u);
+  EXPECT_EQ(ended[0].cause, rheonaut_EVENT_CAUSE_IMPEDANCE);
+}
+
+TEST_F(Delivery, WhatManualHasFoundIsDeliveredToOnceInAuto) {
+  start([](double, double) { return kGlucoseMv; });
+  station->send(set_parameter("delivery_limit_s", 2));
+  run_s(1);
+  EXPECT_EQ(detections(), 1u);
+  go(0.1F);
+  run_s(1);
+  EXPECT_EQ(detections(), 2u);
+  EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
+  run_s(4);
+  go(0.2F);  // auto anew: the same glucose, already delivered to
+  run_s(1);
+  EXPECT_EQ(detections(), 2u);
+}
+
+TEST_F(Delivery, GlucoseThatComesAndGoesDuringADeliveryIsTheSame) {
+  start([](double position_m, double time_s) {
+    const bool flickers = std::lround(time_s * 100) % 100 < 10;
+    return position_m < 0.05 ? kNominalMv : flickers ? kGlucoseMv : kNominalMv - 17;  // in the band, but not mixed
+  });
+  go(0.1F);
+  run_s(20);
+  EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
+  EXPECT_EQ(detections(), 1u);
+}
+
+TEST_F(Delivery, TheElectrodesFaultIsKnownWhenTheMonitorIsSwitchedOn) {
+  start([](double, double time_s) { return time_s < 2 ? 0 : kNominalMv; });
+  run_s(0.5);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_SENSOR_FAULT).size(), 1u);
+  station->send(set_parameter("impedance_monitor", 0));
+  run_s(0.1);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_SENSOR_RECOVERED).size(), 1u);
+  run_s(4);
+  station->send(set_parameter("impedance_monitor", 1));
+  run_s(0.1);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_SENSOR_FAULT).size(), 1u);  // it has recovered meanwhile
+  EXPECT_EQ(station->samples.rbegin()->second.flags & rheonaut_TELEMETRY_FLAG_SENSOR_FAULT, 0u);
 }
 
 TEST(ImpedanceMonitor, TakesFiveReadingsInARow) {

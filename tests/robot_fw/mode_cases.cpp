@@ -125,7 +125,7 @@ void recover(BareCore& core) {
   core.steady_counts.reset();
   core.swing_counts = 1;
   if (core.impedance_mv < 20) core.impedance_mv = 175;
-  core.run(51);
+  core.run(101);
 }
 
 // Events.

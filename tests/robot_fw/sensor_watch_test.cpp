@@ -49,12 +49,21 @@ TEST_F(Watched, IsMissingAfterSoManyTicksWithoutAReading) {
   EXPECT_EQ(changes, 1) << "news once, not in every tick";
 }
 
-TEST_F(Watched, IsMissingAlsoWhenItNeverSaidAnything) {
-  silent(3);
+TEST_F(Watched, IsMissingAtOnceWhenItNeverSaidAnything) {
+  silent(1);
   EXPECT_EQ(watch.fault(), SensorFault::missing);
 }
 
+TEST_F(Watched, OneThatIsDistrustedIsMissingUntilItHasBeenGoodForLongEnough) {
+  watch.distrust();
+  good(49);
+  EXPECT_EQ(watch.fault(), SensorFault::missing);
+  good(1);
+  EXPECT_EQ(watch.fault(), SensorFault::none);
+}
+
 TEST_F(Watched, IsNotMissingWhenAReadingComesInBetween) {
+  good(1);
   for (int i = 0; i < 20; ++i) {
     silent(2);
     good(1);

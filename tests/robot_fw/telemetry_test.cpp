@@ -264,5 +264,23 @@ TEST_F(Telemetry, StatusComesOnceASecond) {
   EXPECT_EQ(count, 10);
 }
 
+TEST_F(Telemetry, TicksThatAreMissedAllTheTimeAreOneEventASecond) {
+  station.run(200);
+  const auto before = station.events.size();
+  for (int i = 0; i < 100; ++i) {  // of 5 s
+    robot.skip(1);
+    station.run(4);
+  }
+  float told_s = 0;
+  for (std::size_t i = before; i < station.events.size(); ++i) {
+    ASSERT_EQ(station.events[i].kind, rheonaut_EVENT_KIND_TIME_STEP);
+    told_s += station.events[i].value;
+  }
+  EXPECT_GE(station.events.size() - before, 4u);
+  EXPECT_LE(station.events.size() - before, 6u);
+  EXPECT_GT(told_s, 0.8F);
+  EXPECT_LE(told_s, 1.001F);
+}
+
 }  // namespace
 }  // namespace robot_fw
