@@ -26,7 +26,7 @@ void check(const ElectrodeParameters& parameters) {
 }
 
 Electrode::Electrode(const ElectrodeParameters& parameters, std::uint64_t seed)
-    : parameters_(parameters), random_(static_cast<std::minstd_rand::result_type>(seed ^ (seed >> 32))) {
+    : parameters_(parameters), noise_(seed) {
   check(parameters);
 }
 
@@ -37,9 +37,9 @@ double Electrode::read(double impedance_mv) {
   if (fault_.kind == FaultKind::stuck && has_read_) return reading_mv_;
   has_read_ = true;
   reading_mv_ = impedance_mv + parameters_.offset_mv + drift_mv_;
-  if (parameters_.noise_mv > 0) reading_mv_ += parameters_.noise_mv * normal_(random_);  // (1)
+  if (parameters_.noise_mv > 0) reading_mv_ += parameters_.noise_mv * noise_.normal();  // (1)
   if (fault_.kind == FaultKind::offset) reading_mv_ += fault_.magnitude;
-  if (fault_.kind == FaultKind::noisy) reading_mv_ += fault_.magnitude * normal_(random_);
+  if (fault_.kind == FaultKind::noisy) reading_mv_ += fault_.magnitude * noise_.normal();
   return reading_mv_;
 }
 

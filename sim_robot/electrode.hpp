@@ -6,8 +6,8 @@
 #pragma once
 
 #include <cstdint>
-#include <random>
 
+#include "sim_robot/noise.hpp"
 #include "sim_robot/sensor_fault.hpp"
 
 namespace sim_robot {
@@ -34,8 +34,7 @@ class Electrode {
 
  private:
   ElectrodeParameters parameters_;
-  std::minstd_rand random_;
-  std::normal_distribution<double> normal_;
+  Noise noise_;
   Fault fault_;
   double drift_mv_ = 0;
   double reading_mv_ = 0;

@@ -16,8 +16,8 @@
 #pragma once
 
 #include <cstdint>
-#include <random>
 
+#include "sim_robot/noise.hpp"
 #include "sim_robot/sensor_fault.hpp"
 
 namespace sim_robot {
@@ -58,11 +58,8 @@ class Imu {
  private:
   std::int16_t sample(double acceleration_m_s2);
   double fault_m_s2();
-  double normal() { return normal_(random_); }
 
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
-  std::uniform_real_distribution<double> uniform_{0, 1};
+  Noise noise_;
   double noise_m_s2_;                        // sd of a sample
   double wander_decay_, wander_step_m_s2_;   // of (3), in a tick
   double filter_decay_, filter_late_share_;  // of (4): e^{-2πB dt}, and 1 - (1 - e^{-2πB dt})/(2πB dt)
