@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "robot_fw/core/controller_message.hpp"
+#include "robot_fw/core/saturate.hpp"
 
 namespace robot_fw {
 namespace {
@@ -137,7 +138,7 @@ void Robot::record_sample(const Motion& measured, float dt_s) {
   sample.reference_m = pilot_.is_auto() ? reference_m_ : 0;
   const bool usable_period = dt_s > 0 && dt_s < 1;
   const std::uint32_t period_us =
-      usable_period ? static_cast<std::uint32_t>(std::lround(dt_s * 1e6F)) : config_.sample_period_us;
+      usable_period ? saturated<std::uint32_t>(dt_s * 1e6F + 0.5F) : config_.sample_period_us;
   const bool changed = samples_.push(sample, batch_values(), saturated_, now_us_, period_us);
   outbox_.sample_made(samples_, changed || sample_is_urgent_);
   sample_is_urgent_ = false;
@@ -200,7 +201,7 @@ void Robot::note(protocol::EventKind kind, protocol::EventCause cause, float val
   event.cause = cause;
   event.sample_seq = samples_.next_seq();
   event.mode = mode();
-  event.sub_state = pilot_.sub_state();
+  event.sub_state = mode() == rheonaut_MODE_AUTO ? pilot_.sub_state() : rheonaut_SUB_STATE_NONE;
   event.position_m = seen_motion().position_m;
   event.value = value;
   event.emergency_id = safety_.emergency_id();

@@ -15,7 +15,6 @@ bool runs_when_latched(const protocol::Command& command) {
 }  // namespace
 
 void Robot::on_command(const protocol::Command& command) {
-  if (command.which_action == rheonaut_Command_emergency_stop_tag) return on_emergency_stop(command);
   const Verdict verdict = gate_.admit(command, now_us_);
   if (!verdict.accepted()) return answer(command.command_id, verdict);
   const bool later = command.has_execute_at_robot_us && command.execute_at_robot_us > now_us_;
