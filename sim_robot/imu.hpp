@@ -1,34 +1,40 @@
-// What a BNO055 makes of the acceleration: noise, a bias that wanders, quantisation, a clock of its own.
+// What a BNO055 makes of the acceleration: bandwidth, noise, a bias that wanders, quantisation, a clock of its own.
 //
-//   reading = round((a + bias + noise) / 0.01 m/s²)                                    (1)   100 LSB per m/s²
+//   reading = round((f + bias + noise) / 0.01 m/s²)                                    (1)   100 LSB per m/s²
 //   bias = offset - mean of 2 s at rest + wander + drift · t                            (2)
 //   wander' = -wander/τ + white noise, sd σ                                             (3)
+//   f' = 2π B (a - f)                                                                   (4)   B: bandwidth
 //
-// BNO055 data sheet: output unit 0.01 m/s², fusion at 100 Hz. Noise density 150 µg/√Hz over 62.5 Hz (0.0116 m/s² a
-// sample), offset ±20 mg, bias instability 0.05 mg with τ = 100 s and drift 10 µg/s are assumed values.
-// (2): the sensor's fusion removes the offset while it lies at rest before the motion; what remains is the mean of 2 s
-// of noise. The drift takes either direction.
+// BNO055 data sheet: output unit 0.01 m/s², fusion at 100 Hz with a bandwidth of 62.5 Hz. Noise density 150 µg/√Hz over
+// that bandwidth (0.0116 m/s² a sample), offset ±20 mg, bias instability 0.05 mg with τ = 100 s and drift 10 µg/s are
+// assumed values. (2): the sensor's fusion removes the offset while it lies at rest before the motion; what remains is
+// the mean of 2 s of noise. The drift takes either direction.
 // The sensor samples by its own clock, off by up to 0.5 %, at a phase of its own: a tick reads the latest sample, which
 // is up to 10 ms old, now and then the one it read before, and now and then one is skipped. A read can fail.
 // Shapes:   one accelerate() for each tick, then one read().
-// Errors:   throws std::invalid_argument quoting a probability outside [0, 1].
+// Errors:   throws std::invalid_argument quoting the bad value.
 #pragma once
 
 #include <cstdint>
-#include <random>
+
+#include "sim_robot/noise.hpp"
+#include "sim_robot/sensor_fault.hpp"
 
 namespace sim_robot {
 
 struct ImuParameters {
-  double noise_m_s2 = 0.0116;              // sd of a sample
+  double noise_m_s2_rthz = 0.0014673;      // noise density, per √Hz
+  double bandwidth_hz = 62.5;              // B
   double offset_m_s2 = 0.196;              // the largest, 20 mg
   double calibration_s = 2;                // at rest
   double wander_m_s2 = 0.00049;            // σ, 0.05 mg
   double wander_time_s = 100;              // τ
   double drift_m_s3 = 0.000098;            // 10 µg/s
-  double clock_error = 0.005;              // the largest, relative
+  double clock_error = 0.005;              // the largest, relative; [0, 0.1]
   double missed_read_probability = 0.001;  // of each read
 };
+
+void check(const ImuParameters& parameters);
 
 struct ImuReading {
   std::int16_t counts = 0;  // of 0.01 m/s²; the latest sample also when the read failed
@@ -37,30 +43,33 @@ struct ImuReading {
 
 class Imu {
  public:
-  static constexpr double kPeriodS = 0.01;
   static constexpr double kCountsPerMS2 = 100;
 
   Imu(const ImuParameters& parameters, std::uint64_t seed);
 
   // Time passes up to the next tick, at whose end the acceleration is `acceleration_m_s2`; linear in between.
-  void accelerate(double acceleration_m_s2, double dt_s);
+  void accelerate(double acceleration_m_s2);
   ImuReading read();
 
-  double bias_m_s2() const { return residual_m_s2_ + wander_m_s2_ + drift_m_s2_; }  // the truth, for judging
+  void set_fault(const Fault& fault) { fault_ = fault; }
+
+  double bias_m_s2() const { return residual_m_s2_ + wander_m_s2_ + drift_m_s2_; }  // the truth, without a fault
 
  private:
   std::int16_t sample(double acceleration_m_s2);
-  double normal() { return normal_(random_); }
+  double fault_m_s2();
 
-  ImuParameters parameters_;
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
-  std::uniform_real_distribution<double> uniform_{0, 1};
+  Noise noise_;
+  double noise_m_s2_;                        // sd of a sample
+  double wander_decay_, wander_step_m_s2_;   // of (3), in a tick
+  double filter_decay_, filter_late_share_;  // of (4): e^{-2πB dt}, and 1 - (1 - e^{-2πB dt})/(2πB dt)
+  double missed_read_probability_;
   double sample_period_s_, drift_m_s3_;
   double residual_m_s2_ = 0, wander_m_s2_ = 0, drift_m_s2_ = 0;
   double until_sample_s_;
-  double acceleration_m_s2_ = 0;  // at the last tick
+  double acceleration_m_s2_ = 0, filtered_m_s2_ = 0;  // a and f at the last tick
   std::int16_t counts_ = 0;
+  Fault fault_;
 };
 
 }  // namespace sim_robot

@@ -1,4 +1,4 @@
-// Sensors from the plant into the core, duty from the core into the plant.
+// Readings from the world into the core, duty from the core into the world.
 #include "sim_robot/simulated_robot.hpp"
 
 #include <charconv>
@@ -9,11 +9,8 @@
 namespace sim_robot {
 namespace {
 
-constexpr float kImpedanceMv = 175;  // no glucose anywhere
-constexpr float kSupplyMv = 3000;    // a fresh CR123A
 constexpr int kRssiDbm = -50;
 constexpr std::uint64_t kTicksToMotorOff = 5;
-constexpr unsigned kImuCalibration = 3;  // the best the BNO055 reports
 
 robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
   robot_fw::RobotConfig core;
@@ -63,38 +60,19 @@ void check(const SimulatedRobotConfig& config) {
     throw std::invalid_argument("duty range [" + std::to_string(min) + ", " + std::to_string(max) +
                                 "] is not within [-1, 0] and (0, 1]");
   }
+  check(config.world);
 }
 
 SimulatedRobot::SimulatedRobot(SimulatedRobotConfig config)
-    : config_(std::move(config)), core_(core_config(config_)), plant_(config_.model, kPeriodS) {
-  if (config_.imu) imu_.emplace(*config_.imu, config_.seed);
-}
+    : config_(std::move(config)), core_(core_config(config_)), world_(config_.world) {}
 
 void SimulatedRobot::step() {
-  robot_fw::Inputs inputs;
-  inputs.robot_time_us = robot_time_us_;
-  if (imu_) {
-    const ImuReading reading = imu_->read();
-    inputs.acceleration_counts = reading.counts;
-    inputs.acceleration_is_valid = reading.is_valid;
-  } else {
-    inputs.known_motion = {static_cast<float>(plant_.position_m()), static_cast<float>(plant_.velocity_m_s()),
-                           static_cast<float>(plant_.acceleration_m_s2())};
-  }
-  const double time_s = 1e-6 * static_cast<double>(robot_time_us_);
-  inputs.impedance_mv = config_.impedance_mv ? config_.impedance_mv(plant_.position_m(), time_s) : kImpedanceMv;
-  inputs.supply_mv = kSupplyMv;
+  robot_fw::Inputs inputs = world_.read(robot_time_us_);
   inputs.rssi_dbm = kRssiDbm;
-  inputs.imu_calibration = kImuCalibration;
   inputs.missed_ticks = missed_ticks_;
   const robot_fw::Outputs outputs = core_.step(inputs, static_cast<float>(kPeriodS));
-  move(outputs.duty);
+  world_.step(static_cast<double>(outputs.duty));
   robot_time_us_ += kPeriodUs;
-}
-
-void SimulatedRobot::move(float duty) {
-  plant_.step(static_cast<double>(duty));
-  if (imu_) imu_->accelerate(plant_.acceleration_m_s2(), kPeriodS);
 }
 
 void SimulatedRobot::advance_to(std::uint64_t now_us) {
@@ -103,7 +81,9 @@ void SimulatedRobot::advance_to(std::uint64_t now_us) {
 }
 
 void SimulatedRobot::skip(std::uint64_t ticks) {
-  for (std::uint64_t i = 0; i < ticks; ++i) move(i < kTicksToMotorOff ? core_.duty() : 0);
+  for (std::uint64_t i = 0; i < ticks; ++i) {
+    world_.step(i < kTicksToMotorOff ? static_cast<double>(core_.duty()) : 0);
+  }
   robot_time_us_ += ticks * kPeriodUs;
   missed_ticks_ += static_cast<std::uint32_t>(ticks);
 }

@@ -1,16 +1,13 @@
-// A robot without hardware: the firmware core in a plant, stepped in virtual time, without sockets.
+// A robot without hardware: the firmware core in a simulated world, stepped in virtual time, without sockets.
 //
 // robot_time_us() is the time of the next tick. A tick reads the sensors at that time; the duty that comes out of it
-// acts on the plant for the whole period that follows.
+// acts on the world for the whole period that follows.
 #pragma once
 
-#include <functional>
-#include <optional>
 #include <string>
 
 #include "robot_fw/core/robot.hpp"
-#include "sim_robot/imu.hpp"
-#include "sim_robot/plant.hpp"
+#include "sim_robot/world.hpp"
 
 namespace sim_robot {
 
@@ -20,15 +17,11 @@ struct SimulatedRobotConfig {
   std::uint64_t boot_id = 1;  // random in earnest, see random_boot_id()
   protocol::ResetCause reset_cause = rheonaut_RESET_CAUSE_POWER_ON;
   robot_fw::DutyRange duty{-1, 1};
-  control::FractionalModel model = control::kNonNewtonianModel;
-  std::optional<ImuParameters> imu;  // empty: a perfect sensor, which tells the core the truth
-  std::uint64_t seed = 1;            // of the sensors' noise
-  // What the electrode reads at a true position and time; empty: 175 mV everywhere.
-  std::function<float(double position_m, double time_s)> impedance_mv;
+  WorldConfig world;
   robot_fw::Storage* storage = nullptr;  // of parameters and controller; null: they end with the robot
 };
 
-// Throws std::invalid_argument, quoting the value, when a name, token, boot id or duty range cannot be.
+// Throws std::invalid_argument, quoting the value, when a name, token, boot id, duty range or the world cannot be.
 void check(const SimulatedRobotConfig& config);
 
 // Never 0, never from a seed.
@@ -39,7 +32,7 @@ std::uint64_t parse_boot_id(const std::string& text);
 class SimulatedRobot {
  public:
   static constexpr std::uint64_t kPeriodUs = 10'000;
-  static constexpr double kPeriodS = 0.01;
+  static constexpr double kPeriodS = kTickS;
   static constexpr std::uint64_t kMaxLatenessUs = 50'000;
 
   explicit SimulatedRobot(SimulatedRobotConfig config);
@@ -64,17 +57,15 @@ class SimulatedRobot {
   }
 
   const robot_fw::Robot& core() const { return core_; }
-  const Plant& plant() const { return plant_; }
+  const World& world() const { return world_; }
+  World& world() { return world_; }  // for faults, flow and glucose while it runs
   const SimulatedRobotConfig& config() const { return config_; }
   std::uint64_t robot_time_us() const { return robot_time_us_; }
 
  private:
-  void move(float duty);
-
   SimulatedRobotConfig config_;
   robot_fw::Robot core_;
-  Plant plant_;
-  std::optional<Imu> imu_;
+  World world_;
   std::uint64_t robot_time_us_ = 0;
   std::uint32_t missed_ticks_ = 0;
 };

@@ -8,9 +8,8 @@
 #include <set>
 
 #include "robot_fw/lx106/replay.hpp"
-#include "sim_robot/imu.hpp"
-#include "sim_robot/plant.hpp"
 #include "sim_robot/station_peer.hpp"
+#include "sim_robot/world.hpp"
 #include "tests/lx106/send_turn.hpp"
 #include "tests/robot_fw/controllers.hpp"
 
@@ -19,9 +18,16 @@ namespace {
 using namespace robot_fw::lx106;
 
 constexpr std::uint64_t kPeriodUs = 10'000;
-constexpr double kPeriodS = 0.01;
+constexpr double kPeriodS = sim_robot::kTickS;
 constexpr std::uint64_t kCommandLifeUs = 2'000'000;
 constexpr std::uint64_t kImuSeed = 106;
+
+sim_robot::World on_its_accelerometer() {
+  sim_robot::WorldConfig config;
+  config.imu.emplace();
+  config.seed = kImuSeed;
+  return sim_robot::World{config};
+}
 
 class Session final : public RecordingSink {
  public:
@@ -54,8 +60,7 @@ class Session final : public RecordingSink {
 
   std::ofstream file_;
   Replay replay_;
-  sim_robot::Plant plant_{control::kNonNewtonianModel, kPeriodS};
-  sim_robot::Imu imu_{sim_robot::ImuParameters{}, kImuSeed};
+  sim_robot::World world_ = on_its_accelerometer();
   std::uint64_t now_us_ = 0;
   bool connected_ = false;
   std::uint64_t next_command_id_ = 1000;
@@ -74,24 +79,18 @@ void Session::tick() {
   Record record;
   record.now_us = now_us_;
   record.dt_s = static_cast<float>(kPeriodS);
-  imu_.accelerate(plant_.acceleration_m_s2(), kPeriodS);
-  const sim_robot::ImuReading reading = imu_.read();
   robot_fw::Inputs& inputs = record.inputs;
-  inputs.robot_time_us = now_us_;
-  inputs.acceleration_counts = reading.counts;
-  inputs.acceleration_is_valid = reading.is_valid;
+  inputs = world_.read(now_us_);
   if (perfect_sensor) {
-    inputs.known_motion = {static_cast<float>(plant_.position_m()), static_cast<float>(plant_.velocity_m_s()),
-                           static_cast<float>(plant_.acceleration_m_s2())};
+    inputs.known_motion = {static_cast<float>(world_.position_m()), static_cast<float>(world_.velocity_m_s()),
+                           static_cast<float>(world_.acceleration_m_s2())};
   }
   inputs.impedance_mv = 175 + 0.25F * static_cast<float>(ticks() % 8);
-  inputs.supply_mv = 3000;
   inputs.rssi_dbm = -61;
   inputs.free_memory_bytes = 21'000;
   inputs.tick_us = 150 + static_cast<std::uint32_t>(ticks() % 37);
-  inputs.imu_calibration = 3;
   play(record);
-  plant_.step(static_cast<double>(robot().duty()));
+  world_.step(static_cast<double>(robot().duty()));
   listen();
   now_us_ += kPeriodUs;
   if (connected_) acknowledge();

@@ -1,5 +1,6 @@
 // Targeted delivery: what the robot does about glucose, with a plant around it.
 #include <cmath>
+#include <limits>
 
 #include "robot_fw/core/impedance_monitor.hpp"
 #include "tests/robot_fw/driven_robot.hpp"
@@ -11,16 +12,15 @@ using namespace sim_robot;
 
 constexpr float kNominalMv = 175, kGlucoseMv = 120;
 
-// A robot on its way to 0.1 m through a vessel whose impedance a test sets.
+// A robot on its way to 0.1 m through a fluid in which a test pours glucose.
 class Delivery : public ::testing::Test {
  protected:
-  using Impedance = std::function<float(double position_m, double time_s)>;
-
-  void start(Impedance impedance_mv, DutyRange duty = {-1, 1}) {
+  void start(const std::vector<GlucosePatch>& patches, double drift_mv_s = 0, DutyRange duty = {-1, 1}) {
     SimulatedRobotConfig config;
     config.duty = duty;
     config.boot_id = kBootId;
-    config.impedance_mv = std::move(impedance_mv);
+    config.world.glucose.patches = patches;
+    config.world.electrode.drift_mv_s = drift_mv_s;
     robot.emplace(config);
     station.emplace(*robot);
     station->welcome.samples_per_frame = 1;
@@ -41,19 +41,30 @@ class Delivery : public ::testing::Test {
   }
   std::size_t detections() const { return events_of(rheonaut_EVENT_KIND_DETECTION).size(); }
   protocol::SubState sub_state() const { return station->samples.rbegin()->second.sub_state; }
-  double position_m() const { return robot->plant().position_m(); }
+  double position_m() const { return robot->world().position_m(); }
   double now_s() const { return 1e-6 * static_cast<double>(robot->robot_time_us()); }
+  // One tick after another in which the electrode is off by 55 mV upwards, so that glucose reads as none, or is right.
+  template <class IsOff>
+  void run_chattering_s(double seconds, IsOff is_off) {
+    for (int k = 0; k < std::lround(seconds * 100); ++k) {
+      const bool off = is_off(std::lround(now_s() * 100));
+      robot->world().set_fault(Sensor::electrode, {off ? FaultKind::offset : FaultKind::none, kNominalMv - kGlucoseMv});
+      station->step();
+    }
+  }
 
   std::optional<SimulatedRobot> robot;
   std::optional<StationPeer> station;
 };
 
-// Between 0.05 m and `end_m`, mixed from `mixed_at_s` on.
-auto patch(double end_m, double mixed_at_s) {
-  return [end_m, mixed_at_s](double position_m, double time_s) {
-    return position_m > 0.05 && position_m < end_m && time_s < mixed_at_s ? kGlucoseMv : kNominalMv;
-  };
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+GlucosePatch between(double start_m, double end_m, double mixed_at_s = kNever) {
+  return {.position_m = (start_m + end_m) / 2, .length_m = end_m - start_m, .removed_at_s = mixed_at_s};
 }
+
+// From 0.05 m on.
+std::vector<GlucosePatch> patch(double end_m, double mixed_at_s = kNever) { return {between(0.05, end_m, mixed_at_s)}; }
 
 TEST_F(Delivery, HoldsWhereItFindsGlucoseUntilThatHasMixedAndGoesOn) {
   start(patch(0.08, 5));
@@ -81,10 +92,7 @@ TEST_F(Delivery, HoldsWhereItFindsGlucoseUntilThatHasMixedAndGoesOn) {
 }
 
 TEST_F(Delivery, APatchThatNeverMixesIsLeftAtTheLimit) {
-  start([](double position_m, double) {
-    const bool second = position_m > 0.2;
-    return (position_m > 0.05 && position_m < 0.1) || second ? kGlucoseMv : kNominalMv;
-  });
+  start({between(0.05, 0.1), between(0.2, 9)});
   station->send(set_parameter("delivery_limit_s", 4));
   go(0.15F);
   run_s(10);
@@ -101,7 +109,7 @@ TEST_F(Delivery, APatchThatNeverMixesIsLeftAtTheLimit) {
 }
 
 TEST_F(Delivery, ASensorThatDriftsBy30MvCostsOneDeliveryAtMost) {
-  start([](double, double time_s) { return kNominalMv + 30 * static_cast<float>(std::min(time_s / 20, 1.0)); });
+  start({}, 0.5);
   station->send(set_parameter("delivery_limit_s", 3));
   go(0.1F);
   run_s(60);
@@ -112,31 +120,25 @@ TEST_F(Delivery, ASensorThatDriftsBy30MvCostsOneDeliveryAtMost) {
 }
 
 TEST_F(Delivery, ADriftWithinTheBandIsNothing) {
-  start([](double, double time_s) { return kNominalMv + 19 * static_cast<float>(std::min(time_s / 20, 1.0)); });
+  start({}, 19.0 / 61);
   go(0.1F);
   run_s(60);
   EXPECT_EQ(detections(), 0u);
 }
 
 TEST_F(Delivery, AnEdgeThatChattersIsNoPatch) {
-  start([](double position_m, double time_s) {
-    const bool high = std::lround(time_s * 100) % 5 == 0;  // four readings in glucose, one out of it
-    return position_m > 0.05 && !high ? kGlucoseMv : kNominalMv;
-  });
-  go(0.1F);
-  run_s(10);
+  start(patch(9));
+  station->send(set_auto(0.1F));
+  run_chattering_s(10, [](long tick) { return tick % 5 == 0; });  // four readings in glucose, one out of it
   EXPECT_EQ(detections(), 0u);
 }
 
 TEST_F(Delivery, AnEdgeThatChattersStartsNoSecondDelivery) {
-  start([](double position_m, double time_s) {
-    const bool solid = position_m > 0.05 && time_s < 2;
-    const bool chatters = position_m > 0.05 && std::lround(time_s * 100) % 40 < 10;  // 0.1 s in glucose, 0.3 s out
-    return solid || chatters ? kGlucoseMv : kNominalMv;
-  });
+  start(patch(9));
   station->send(set_parameter("delivery_limit_s", 4));
   go(0.1F);
-  run_s(20);
+  run_s(2);
+  run_chattering_s(18, [](long tick) { return tick % 40 >= 10; });  // 0.1 s in glucose, 0.3 s out
   EXPECT_EQ(detections(), 1u);
   EXPECT_EQ(events_of(rheonaut_EVENT_KIND_DELIVERY_ENDED).size(), 1u);
 }
@@ -210,7 +212,7 @@ TEST_F(Delivery, CanBeSwitchedOff) {
 }
 
 TEST_F(Delivery, AMotorWithoutReverseDeliversWhereItComesToRest) {
-  start(patch(0.08, 5), {0, 1});
+  start(patch(0.08, 5), 0, {0, 1});
   go(0.2F);
   run_s(4.5);
   ASSERT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
@@ -222,7 +224,7 @@ TEST_F(Delivery, AMotorWithoutReverseDeliversWhereItComesToRest) {
 }
 
 TEST_F(Delivery, WhatManualHasFoundIsDeliveredToOnceInAuto) {
-  start([](double, double) { return kGlucoseMv; });
+  start({between(-1, 9)});
   station->send(set_parameter("delivery_limit_s", 2));
   run_s(1);
   EXPECT_EQ(detections(), 1u);
@@ -237,23 +239,27 @@ TEST_F(Delivery, WhatManualHasFoundIsDeliveredToOnceInAuto) {
 }
 
 TEST_F(Delivery, GlucoseThatComesAndGoesDuringADeliveryIsTheSame) {
-  start([](double position_m, double time_s) {
-    const bool flickers = std::lround(time_s * 100) % 100 < 10;
-    return position_m < 0.05 ? kNominalMv : flickers ? kGlucoseMv : kNominalMv - 17;  // in the band, but not mixed
-  });
+  start(patch(9));
   go(0.1F);
-  run_s(20);
+  run_s(2);
+  for (int k = 0; k < 2000; ++k) {  // in the band, but not mixed; and back
+    const bool diluted = k % 100 >= 10;
+    robot->world().set_fault(Sensor::electrode, {diluted ? FaultKind::offset : FaultKind::none, 38});
+    station->step();
+  }
   EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
   EXPECT_EQ(detections(), 1u);
 }
 
 TEST_F(Delivery, TheElectrodesFaultIsKnownWhenTheMonitorIsSwitchedOn) {
-  start([](double, double time_s) { return time_s < 2 ? 0 : kNominalMv; });
+  start({});
+  robot->world().set_fault(Sensor::electrode, {FaultKind::missing, 0});
   run_s(0.5);
   EXPECT_EQ(events_of(rheonaut_EVENT_KIND_SENSOR_FAULT).size(), 1u);
   station->send(set_parameter("impedance_monitor", 0));
   run_s(0.1);
   EXPECT_EQ(events_of(rheonaut_EVENT_KIND_SENSOR_RECOVERED).size(), 1u);
+  robot->world().set_fault(Sensor::electrode, {});
   run_s(4);
   station->send(set_parameter("impedance_monitor", 1));
   run_s(0.1);

@@ -13,8 +13,8 @@ constexpr int kSeeds = 40;  // docs/robot.md has 200 of the estimator alone
 SimulatedRobotConfig on_its_accelerometer(std::uint64_t seed) {
   SimulatedRobotConfig config;
   config.boot_id = kBootId;
-  config.imu = ImuParameters{};
-  config.seed = seed;
+  config.world.imu = ImuParameters{};
+  config.world.seed = seed;
   return config;
 }
 
@@ -36,7 +36,7 @@ Outcome figure_7(std::uint64_t seed) {
   station.send(inject_disturbance(kDisturbanceM));
   station.run(2200);
   const auto& last = station.samples.rbegin()->second;
-  const double true_m = robot.plant().position_m();
+  const double true_m = robot.world().position_m();
   return {true_m - static_cast<double>(kSetpointM - kDisturbanceM),
           static_cast<double>(last.position_m - kDisturbanceM) - true_m, static_cast<double>(last.position_sd_m)};
 }
@@ -90,12 +90,12 @@ TEST_F(Estimate, FollowsTheMotorThroughMissedTicks) {
   robot.skip(4);
   station.run(200);  // the lease has ended by then
   EXPECT_EQ(core().duty(), 0);
-  EXPECT_NEAR(last().position_m, robot.plant().position_m(), 0.003);
+  EXPECT_NEAR(last().position_m, robot.world().position_m(), 0.003);
 }
 
 TEST(OnItsAccelerometer, AnotherFluidIsAnEventWithin5S) {
   SimulatedRobotConfig config = on_its_accelerometer(3);
-  config.model = control::kNewtonianModel;
+  config.world.plant.model = control::kNewtonianModel;
   SimulatedRobot robot{config};
   StationPeer station{robot};
   station.connect();
@@ -113,7 +113,7 @@ TEST(OnItsAccelerometer, AnotherFluidIsAnEventWithin5S) {
 
 TEST(OnItsAccelerometer, TheWatersParametersSetOverTheLinkServeInWater) {
   SimulatedRobotConfig config = on_its_accelerometer(3);
-  config.model = control::kNewtonianModel;
+  config.world.plant.model = control::kNewtonianModel;
   SimulatedRobot robot{config};
   StationPeer station{robot};
   station.connect();
@@ -130,7 +130,7 @@ TEST(OnItsAccelerometer, TheWatersParametersSetOverTheLinkServeInWater) {
   station.send(set_auto(0.1F));
   station.run(4200);
   for (const auto& event : station.events) EXPECT_NE(event.kind, rheonaut_EVENT_KIND_MODEL_MISMATCH);
-  EXPECT_NEAR(station.samples.rbegin()->second.position_m, robot.plant().position_m(), 0.005);
+  EXPECT_NEAR(station.samples.rbegin()->second.position_m, robot.world().position_m(), 0.005);
 }
 
 TEST_F(Estimate, ItsParametersAreRefusedWhileTheRobotCoasts) {
@@ -142,7 +142,7 @@ TEST_F(Estimate, ItsParametersAreRefusedWhileTheRobotCoasts) {
   station.run(3000);  // the fluid remembers for long
   EXPECT_EQ(answer(set_parameter("model_gain_error", 0.2F)), "accepted");
   station.run(500);
-  EXPECT_LE(std::abs(last().position_m - static_cast<float>(robot.plant().position_m())), 2 * last().position_sd_m);
+  EXPECT_LE(std::abs(last().position_m - static_cast<float>(robot.world().position_m())), 2 * last().position_sd_m);
 }
 
 TEST(OnItsAccelerometer, ARobotThatWasResetMayBeCoastingAndSaysSo) {

@@ -7,50 +7,39 @@
 #include <numbers>
 
 #include "robot_fw/core/controller.hpp"
-#include "sim_robot/plant.hpp"
+#include "sim_robot/world.hpp"
 
 namespace robot_fw {
 namespace {
 
-constexpr double kTickS = 0.01, kSecondPartS = 20;
+using sim_robot::kTickS;
 
-double flow_profile(double time_s) {  // (1)
-  const double whole = 7 * time_s / 6, p = whole - std::floor(whole);
-  return (p <= 0.436 ? 0.5 * std::sin(2 * std::numbers::pi * (p + 0.0320472)) : 0.1) / 0.212349;
-}
+constexpr double kSecondPartS = 20;
 
 control::FractionalModel scaled(control::FractionalModel model, double gain) {
   model.kp *= gain;
   return model;
 }
 
-// Truth and sensor: what happens under a duty.
-class Water {
- public:
-  Water(const EstimatorTrial& trial, std::uint64_t seed)
-      : trial_(trial), plant_(scaled(trial.truth, trial.plant_gain), kTickS), imu_(trial.imu, seed) {}
+// A tube without end, so that the flow is the same wherever the robot goes.
+sim_robot::VesselParameters endless_tube(double mean_flow_m_s, double pump_on_at_s) {
+  sim_robot::VesselParameters tube;
+  tube.large_length_m = 1e5;
+  tube.junction_m = 5e4;
+  const double area_m2 = std::numbers::pi / 4 * tube.large_diameter_m * tube.large_diameter_m;
+  tube.pump = {.mean_flow_m3_s = mean_flow_m_s * area_m2, .starts_at_s = pump_on_at_s, .compliance_s = 0};
+  return tube;
+}
 
-  void step(double duty) {
-    const double before_m_s = flow_m_s();
-    plant_.step(std::abs(duty) < trial_.dead_zone_duty ? 0 : duty);
-    time_s_ += kTickS;
-    carried_m_ += kTickS * (before_m_s + flow_m_s()) / 2;
-    imu_.accelerate(plant_.acceleration_m_s2() + (flow_m_s() - before_m_s) / kTickS, kTickS);
-  }
-  double position_m() const { return plant_.position_m() + carried_m_; }
-  sim_robot::ImuReading read() { return imu_.read(); }
-
- private:
-  double flow_m_s() const {
-    const double opened = std::clamp(time_s_ - trial_.pump_on_at_s, 0.0, 1.0);
-    return trial_.mean_flow_m_s * flow_profile(time_s_) * opened;
-  }
-
-  EstimatorTrial trial_;
-  sim_robot::Plant plant_;
-  sim_robot::Imu imu_;
-  double time_s_ = 0, carried_m_ = 0;
-};
+sim_robot::World world_of(const EstimatorTrial& trial, std::uint64_t seed) {
+  sim_robot::WorldConfig config;
+  config.plant.model = scaled(trial.truth, trial.plant_gain);
+  config.motor.dead_zone_duty = trial.dead_zone_duty;
+  if (trial.mean_flow_m_s != 0) config.vessel = endless_tube(trial.mean_flow_m_s, trial.pump_on_at_s);
+  config.imu = trial.imu;
+  config.seed = seed;
+  return sim_robot::World{config};
+}
 
 double percentile_95(std::vector<double> values) {
   std::ranges::sort(values);
@@ -60,7 +49,7 @@ double percentile_95(std::vector<double> values) {
 }  // namespace
 
 TrialResult run_trial(const EstimatorTrial& trial, std::uint64_t seed) {
-  Water water{trial, seed};
+  sim_robot::World world = world_of(trial, seed);
   Estimator estimator{trial.estimator};
   Controller controller{kPaperController};
   TrialResult result;
@@ -68,20 +57,20 @@ TrialResult run_trial(const EstimatorTrial& trial, std::uint64_t seed) {
   const auto ticks = std::lround(trial.duration_s / kTickS);
   int seconds_within = 0;
   for (long tick = 1; tick <= ticks; ++tick) {
-    water.step(static_cast<double>(duty));
-    const auto reading = water.read();
-    estimator.step({reading.counts, reading.is_valid, duty, static_cast<float>(kTickS)});
+    world.step(static_cast<double>(duty));
+    const Inputs inputs = world.read(0);
+    estimator.step({inputs.acceleration_counts, inputs.acceleration_is_valid, duty, static_cast<float>(kTickS)});
 
     const double time_s = static_cast<double>(tick) * kTickS;
     const bool second_part = time_s >= kSecondPartS;
     const double target_m =
         second_part ? trial.second_setpoint_m - trial.disturbance_m : trial.setpoint_m;  // of the true position
-    const double seen_m = trial.closed_loop ? static_cast<double>(estimator.position_m()) : water.position_m();
+    const double seen_m = trial.closed_loop ? static_cast<double>(estimator.position_m()) : world.position_m();
     const float wanted = controller.step(static_cast<float>(target_m - seen_m), static_cast<float>(seen_m)).asked;
     duty = std::clamp(wanted, trial.duty.min, trial.duty.max);
 
-    result.estimate_error_m = static_cast<double>(estimator.position_m()) - water.position_m();
-    result.target_error_m = water.position_m() - target_m;
+    result.estimate_error_m = static_cast<double>(estimator.position_m()) - world.position_m();
+    result.target_error_m = world.position_m() - target_m;
     result.position_sd_m = static_cast<double>(estimator.position_sd_m());
     if (result.mismatch_s < 0 && estimator.model_mismatch()) result.mismatch_s = time_s;
     const bool within = std::abs(result.estimate_error_m) <= 2 * result.position_sd_m;

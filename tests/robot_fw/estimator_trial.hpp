@@ -1,8 +1,7 @@
 // One trial of the estimator: a robot in a fluid, its sensor, its motor, and what the estimate comes to.
 //
 // The duty comes from the paper's controller, on the estimate or, `closed_loop` false, on the true position.
-// At the pump's profile q, mean 1, the fluid carries the robot: v = v_plant + U q(t); the sensor feels the sum's rate.
-//   p = frac(7 t/6);  q = 0.5 sin(2π (p + 0.0320472))/0.212349 for p ≤ 0.436, else 0.1/0.212349          (1)
+// With a mean flow U, the robot is in a tube without end in which sim_robot/pump makes the fluid pulsate.
 #pragma once
 
 #include <cstdint>

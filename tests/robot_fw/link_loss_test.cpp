@@ -17,7 +17,7 @@ class LinkLoss : public DrivenRobot {
     station.attentive = false;
     station.run(102);  // the time-out is 1 s
     ASSERT_TRUE(core().link_lost());
-    lost_at_m = robot.plant().position_m();
+    lost_at_m = robot.world().position_m();
   }
 
   double lost_at_m = 0;
@@ -41,7 +41,7 @@ TEST_F(LinkLoss, HoldStaysWhereTheLinkWasLostAndThenStops) {
   EXPECT_EQ(mode(), "auto");
   ASSERT_TRUE(last().setpoint_m.has_value());
   EXPECT_NEAR(*last().setpoint_m, lost_at_m, 0.002);
-  EXPECT_NEAR(robot.plant().position_m(), lost_at_m, 0.003);
+  EXPECT_NEAR(robot.world().position_m(), lost_at_m, 0.003);
   EXPECT_EQ(last().sub_state, rheonaut_SUB_STATE_HOLDING);
   station.run(55);
   expect_at_rest();
@@ -57,7 +57,7 @@ TEST_F(LinkLoss, GoOnGoesOnAndThenStops) {
   station.run(195);
   EXPECT_EQ(mode(), "auto");
   EXPECT_EQ(last().setpoint_m, 0.5F);
-  EXPECT_GT(robot.plant().position_m(), lost_at_m + 0.1);
+  EXPECT_GT(robot.world().position_m(), lost_at_m + 0.1);
   station.run(10);
   expect_at_rest();
 }
@@ -78,7 +78,7 @@ TEST_F(LinkLoss, AHeldRobotDoesNotMoveByItselfWhenTheLinkComesBack) {
   station.attentive = true;
   station.run(200);
   EXPECT_EQ(mode(), "auto");
-  EXPECT_NEAR(robot.plant().position_m(), lost_at_m, 0.003);
+  EXPECT_NEAR(robot.world().position_m(), lost_at_m, 0.003);
 }
 
 TEST_F(LinkLoss, AManualDutyStopsWhateverTheAction) {

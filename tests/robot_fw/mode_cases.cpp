@@ -48,7 +48,7 @@ void run_schedule(BareCore& core) {
 }
 // The accelerometer says what the duty makes of the robot, until that has come to rest.
 void drive_outside(BareCore& core) {
-  sim_robot::Plant plant{control::kNonNewtonianModel, 0.01};
+  sim_robot::Plant plant{sim_robot::PlantParameters{}, 0.01};
   const auto swim = [&](int ticks) {
     for (int i = 0; i < ticks; ++i) {
       plant.step(static_cast<double>(core.robot.duty()));

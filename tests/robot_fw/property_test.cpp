@@ -200,7 +200,7 @@ TEST_P(AnyOrder, ExpiredAndRepeatedCommandsChangeNothing) {
     ASSERT_EQ(plain.core().mode(), pestered.core().mode()) << "round " << round;
     const auto &said_by_plain = station.controllers, &said_by_pestered = pest.controllers;
     ASSERT_EQ(said_by_plain.size(), said_by_pestered.size()) << "round " << round;
-    ASSERT_EQ(plain.plant().position_m(), pestered.plant().position_m()) << "round " << round;
+    ASSERT_EQ(plain.world().position_m(), pestered.world().position_m()) << "round " << round;
   }
   for (StationPeer* each : {&station, &pest}) {
     each->disconnect();

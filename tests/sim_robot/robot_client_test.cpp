@@ -232,7 +232,7 @@ TEST(Check, RefusesNamesTokensAndRangesThatCannotBe) {
     change(config);
     return config;
   };
-  EXPECT_NO_THROW(check({}));
+  EXPECT_NO_THROW(check(SimulatedRobotConfig{}));
   EXPECT_THROW(check(with([](auto& c) { c.robot_id = ""; })), std::invalid_argument);
   EXPECT_THROW(check(with([](auto& c) { c.robot_id = "Robot 1"; })), std::invalid_argument);
   EXPECT_THROW(check(with([](auto& c) { c.robot_id = std::string(32, 'a'); })), std::invalid_argument);

@@ -85,8 +85,8 @@ TEST_F(LateTicks, TheMotorRunsOnFor50MsOfAStall) {
   stall(39 * kTickUs);
   other.run(static_cast<int>((robot.robot_time_us() - short_push.robot_time_us()) / kTickUs));
   EXPECT_EQ(robot.robot_time_us(), short_push.robot_time_us());
-  EXPECT_GT(robot.plant().position_m(), 0.001);
-  EXPECT_NEAR(robot.plant().position_m(), short_push.plant().position_m(), 0.002);
+  EXPECT_GT(robot.world().position_m(), 0.001);
+  EXPECT_NEAR(robot.world().position_m(), short_push.world().position_m(), 0.002);
   EXPECT_EQ(robot.core().duty(), 0.5F);  // the lease runs
 }
 
