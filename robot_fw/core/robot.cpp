@@ -11,6 +11,7 @@ namespace {
 
 // The DS550's range; its readings may well be equal.
 constexpr SensorRules kElectrodeRules{20, 1000, 1, 0, 5};
+constexpr std::uint64_t kMaxTickLatenessUs = 100'000;  // against frames that came in before the tick
 
 bool finite(const Motion& motion) {
   return std::isfinite(motion.position_m) && std::isfinite(motion.velocity_m_s) &&
@@ -67,9 +68,11 @@ Outputs Robot::step(const Inputs& inputs, float dt_s) {
   return {duty_};
 }
 
+// SAFETY: while a clock that went back catches up, time stands still here: no lease and no link would run out.
 bool Robot::sound(const Inputs& inputs, float dt_s) const {
-  return inputs.robot_time_us >= inputs_.robot_time_us && finite(inputs.known_motion.value_or(Motion{})) &&
-         std::isfinite(inputs.impedance_mv) && std::isfinite(inputs.supply_mv) && std::isfinite(dt_s) && dt_s > 0;
+  return inputs.robot_time_us >= inputs_.robot_time_us && inputs.robot_time_us + kMaxTickLatenessUs >= now_us_ &&
+         finite(inputs.known_motion.value_or(Motion{})) && std::isfinite(inputs.impedance_mv) &&
+         std::isfinite(inputs.supply_mv) && std::isfinite(dt_s) && dt_s > 0;
 }
 
 Motion Robot::seen_motion() const {
@@ -81,7 +84,8 @@ Motion Robot::seen_motion() const {
 // Takes over the time of this tick; a missed tick is an event. Says how much time was missed.
 float Robot::watch_clock(std::uint64_t robot_time_us, float dt_s) {
   now_us_ = std::max(now_us_, robot_time_us);  // frames may have come in after this tick was due
-  const float stepped_s = static_cast<float>(now_us_ - inputs_.robot_time_us) * 1e-6F - dt_s;
+  const auto elapsed_us = static_cast<std::int64_t>(robot_time_us - inputs_.robot_time_us);  // negative: it went back
+  const float stepped_s = static_cast<float>(elapsed_us) * 1e-6F - dt_s;
   const bool stepped = samples_.next_seq() > 0 && stepped_s > dt_s / 2;
   if (stepped) note(rheonaut_EVENT_KIND_TIME_STEP, rheonaut_EVENT_CAUSE_TIME, stepped_s);
   return stepped ? stepped_s : 0;

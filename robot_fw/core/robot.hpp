@@ -60,6 +60,9 @@ class Robot {
   float duty() const { return duty_; }
   protocol::Mode mode() const;
   std::uint64_t emergency_id() const { return safety_.emergency_id(); }
+  protocol::EmergencyCause emergency_cause() const { return safety_.cause(); }
+  // Nothing moves or is ordered to: what blocks for long may be done now.
+  bool at_rest() const { return !motor_on(); }
   bool link_up() const { return link_.up(); }
   bool link_lost() const { return link_.lost(); }
   // Why the station refused the last connection; the detail is for people.
