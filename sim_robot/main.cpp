@@ -1,4 +1,5 @@
-// The program rheonaut-sim: one simulated robot that dials a station, or the prediction of an experiment.
+// The program rheonaut-sim: one simulated robot that dials a station, the prediction of an experiment, or a bad
+// network.
 #include <CLI/CLI.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/signal_set.hpp>
@@ -6,6 +7,7 @@
 #include <iostream>
 
 #include "sim_robot/predict.hpp"
+#include "sim_robot/proxy_command.hpp"
 #include "sim_robot/robot_client.hpp"
 
 namespace {
@@ -48,8 +50,10 @@ int main(int argc, char** argv) try {
   CLI::App* predict = app.add_subcommand("predict", "compute the closed-loop experiment and print what it measures");
   add_duty(*predict);
   predict->add_flag("--json", json, "as JSON");
+  sim_robot::ProxyCommand proxy{app};
   try {
     app.parse(argc, argv);
+    if (proxy.chosen()) return proxy.run();
     sim_robot::check(config);
     if (predict->parsed()) {
       std::cout << sim_robot::predict(config.duty, json);

@@ -29,17 +29,17 @@ asio::awaitable<void> pause(std::chrono::milliseconds duration) {
 
 }  // namespace
 
-StationAddress parse_station_address(const std::string& text) {
+StationAddress parse_station_address(const std::string& text, const std::string& option, int lowest_port) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos || colon == 0 || colon + 1 == text.size()) {
-    throw std::invalid_argument("--station: '" + text + "' is not ADDR:PORT");
+    throw std::invalid_argument(option + ": '" + text + "' is not ADDR:PORT");
   }
   std::string host = text.substr(0, colon);
   if (host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
   const std::string port = text.substr(colon + 1);
   if (port.size() > 5 || port.find_first_not_of("0123456789") != std::string::npos || std::stoi(port) > 65535 ||
-      std::stoi(port) == 0) {
-    throw std::invalid_argument("--station: '" + port + "' is not a port");
+      std::stoi(port) < lowest_port) {
+    throw std::invalid_argument(option + ": '" + port + "' is not a port");
   }
   return {host, port};
 }

@@ -24,8 +24,9 @@ struct StationAddress {
   std::string host;
   std::string port;
 };
-// "host:port" or "[v6]:port"; throws std::invalid_argument.
-StationAddress parse_station_address(const std::string& text);
+// "host:port" or "[v6]:port"; throws std::invalid_argument that names the option.
+StationAddress parse_station_address(const std::string& text, const std::string& option = "--station",
+                                     int lowest_port = 1);
 
 // What people are told about the link, one line each.
 using LinkLog = std::function<void(const std::string& line)>;
