@@ -12,10 +12,11 @@
 
 namespace {
 
-int run_robot(const sim_robot::SimulatedRobotConfig& config, const sim_robot::StationAddress& station) {
+int run_robot(const sim_robot::SimulatedRobotConfig& config, const sim_robot::StationAddress& station,
+              int handshake_ms) {
   boost::asio::io_context loop{1};
   const auto log = [](const std::string& line) { std::cout << "rheonaut-sim: " << line << std::endl; };
-  sim_robot::RobotClient client{loop, config, station, log};
+  sim_robot::RobotClient client{loop, config, station, log, std::chrono::milliseconds(handshake_ms)};
   boost::asio::co_spawn(loop, client.run(), [](const std::exception_ptr& error) {
     if (error) std::rethrow_exception(error);
   });
@@ -34,6 +35,7 @@ int main(int argc, char** argv) try {
   sim_robot::SimulatedRobotConfig config;
   std::string station, boot_id, sensor = "bno055";
   bool json = false;
+  int handshake_ms = 0;
   const auto add_duty = [&config](CLI::App& to) {
     to.add_option("--duty-min", config.duty.min, "lowest duty of the motor, in [-1, 0]")->capture_default_str();
     to.add_option("--duty-max", config.duty.max, "highest duty of the motor, in (0, 1]")->capture_default_str();
@@ -47,6 +49,9 @@ int main(int argc, char** argv) try {
       ->check(CLI::IsMember({"bno055", "perfect"}))
       ->capture_default_str();
   app.add_option("--seed", config.seed, "of the sensors' noise")->capture_default_str();
+  app.add_option("--handshake-ms", handshake_ms, "as TLS on the robot's board: it dials at rest, and ticks are missed")
+      ->check(CLI::Range(0, 30'000))
+      ->capture_default_str();
   CLI::App* predict = app.add_subcommand("predict", "compute the closed-loop experiment and print what it measures");
   add_duty(*predict);
   predict->add_flag("--json", json, "as JSON");
@@ -62,7 +67,7 @@ int main(int argc, char** argv) try {
     if (sensor == "bno055") config.imu.emplace();
     if (station.empty()) throw CLI::RequiredError("--station");
     config.boot_id = boot_id.empty() ? sim_robot::random_boot_id() : sim_robot::parse_boot_id(boot_id);
-    return run_robot(config, sim_robot::parse_station_address(station));
+    return run_robot(config, sim_robot::parse_station_address(station), handshake_ms);
   } catch (const CLI::ParseError& error) {
     return app.exit(error);
   }

@@ -70,6 +70,12 @@ void RobotLife::jump_clock(double by_s) {
   clock_base_us_ += static_cast<double>(robot_.robot_time_us()) - static_cast<double>(before_us);
 }
 
+std::uint64_t RobotLife::next_tick_us() const {
+  const double ahead_us = static_cast<double>(robot_.robot_time_us()) - clock_base_us_;
+  const auto until_due_us = static_cast<std::uint64_t>(std::ceil(std::max(0.0, ahead_us) / clock_rate_));
+  return std::max({true_base_us_ + until_due_us, on_at_us_, free_at_us_});
+}
+
 std::uint64_t RobotLife::robot_clock_us() const {
   return static_cast<std::uint64_t>(std::floor(std::max(0.0, clock_us())));
 }

@@ -37,6 +37,9 @@ class RobotLife {
   void drift(double ppm);        // of the robot's clock against true time, from now on
   void jump_clock(double by_s);  // the clock alone
 
+  // When the next tick is due in true time, or the robot is back.
+  std::uint64_t next_tick_us() const;
+
   bool is_on() const { return true_us_ >= on_at_us_; }
   bool is_blocked() const { return !is_on() || true_us_ < free_at_us_; }
   int boots() const { return boots_; }
