@@ -1,10 +1,11 @@
 // Runs a simulated robot in real time and connects it to a station over TCP.
 //
-// Robot time is the host's steady clock since run() began, on time or late, in a tick or between two. Ticks are due at
+// True time is the host's steady clock since run() began, on time or late, in a tick or between two. Ticks are due at
 // multiples of the period; late ones run before any byte is handed to the robot, so its time never goes back. After a
 // stall (the process was stopped, the machine busy) the missed ones are skipped and counted.
 // A tick never waits for the network: what the socket does not take at once stays in the one frame under way, and the
-// robot keeps the rest. The connection is dialled again for ever, at most 1 s apart.
+// robot keeps the rest. The connection is dialled again for ever, at most 1 s apart. With a handshake, as TLS on the
+// robot's board, it dials only at rest, and nothing ticks until the handshake is over.
 // Owns robot and socket. One thread: that of `loop`, which must outlive the client.
 #pragma once
 
@@ -12,11 +13,13 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <chrono>
 #include <functional>
+#include <optional>
 #include <random>
 #include <string>
 
-#include "sim_robot/simulated_robot.hpp"
+#include "sim_robot/robot_life.hpp"
 
 namespace sim_robot {
 
@@ -24,20 +27,26 @@ struct StationAddress {
   std::string host;
   std::string port;
 };
-// "host:port" or "[v6]:port"; throws std::invalid_argument.
-StationAddress parse_station_address(const std::string& text);
+// "host:port" or "[v6]:port"; throws std::invalid_argument that names the option.
+StationAddress parse_station_address(const std::string& text, const std::string& option = "--station",
+                                     int lowest_port = 1);
 
 // What people are told about the link, one line each.
 using LinkLog = std::function<void(const std::string& line)>;
 
 class RobotClient {
  public:
-  RobotClient(boost::asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log);
+  RobotClient(boost::asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log,
+              std::chrono::milliseconds handshake = {});
 
   // Ticks and connects until cancelled. Never returns otherwise.
   boost::asio::awaitable<void> run();
 
-  const SimulatedRobot& robot() const { return robot_; }
+  // The connection is left without an end, and reset when the robot is back.
+  void reboot(const Reboot& reboot);
+
+  const SimulatedRobot& robot() const { return life_.robot(); }
+  RobotLife& life() { return life_; }  // for its clock
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -45,6 +54,7 @@ class RobotClient {
   boost::asio::awaitable<void> tick();
   boost::asio::awaitable<void> stay_connected();
   boost::asio::awaitable<bool> dial();
+  boost::asio::awaitable<bool> shake_hands();
   boost::asio::awaitable<void> serve();
   void flush();
   void close_if_silent();
@@ -53,16 +63,21 @@ class RobotClient {
   void say_how_it_ended();
   void say(const std::string& line);
 
-  SimulatedRobot robot_;
+  bool may_dial() const;
+  void forget_connection();
+
+  RobotLife life_;
   StationAddress station_;
   LinkLog log_;
+  std::chrono::milliseconds handshake_;
   boost::asio::ip::tcp::socket socket_;
+  std::optional<boost::asio::ip::tcp::socket> forgotten_;  // of the boot before
   boost::asio::steady_timer tick_timer_;
   bool connected_ = false;
   bool was_up_ = false;  // welcomed on this connection
   std::string last_line_;
 
-  Clock::time_point booted_at_;                                  // robot time 0
+  Clock::time_point booted_at_;                                  // true time 0
   std::array<std::uint8_t, protocol::kMaxFramedBytes> frame_{};  // under way
   std::size_t frame_size_ = 0, frame_sent_ = 0;
   std::minstd_rand jitter_{std::random_device{}()};

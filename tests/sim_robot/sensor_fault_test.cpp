@@ -65,7 +65,7 @@ TEST_F(FaultySensor, AStuckAccelerometerIsAnEventAfter100EqualReadings) {
   robot->world().set_fault(Sensor::accelerometer, {.kind = FaultKind::stuck});
   EXPECT_NEAR(ticks_to_fault(200), 100, 2);
   robot->world().set_fault(Sensor::accelerometer, {});
-  station->run(60);
+  station->run(105);
   EXPECT_EQ(events_of(rheonaut_EVENT_KIND_SENSOR_RECOVERED), 1);
 }
 
