@@ -30,8 +30,8 @@ constexpr std::uint64_t kJoinUs = 15'000'000;
 constexpr std::uint32_t kFirstPauseMs = 1'000, kMaxDoublings = 3;
 constexpr unsigned kDialTimeoutMs = 15'000;  // connecting and handshake each
 // SAFETY: should a call that is not to wait do so after all, it gives up before the motor's interrupt does. The core
-// waits up to twice as long for each record, and a turn of the loop may try four times: once reading, a record of the
-// frame, the same again before the next one, and once more for the record that is left.
+// waits up to twice as long, and a turn of the loop may try three times: reading, pushing a record, looking for the
+// peer.
 constexpr unsigned kOpenTimeoutMs = 5;
 
 }  // namespace
