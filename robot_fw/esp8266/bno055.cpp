@@ -32,11 +32,11 @@ std::int16_t reversed(std::int16_t counts) {
 
 void Bno055::begin(std::uint64_t now_us) { restart(now_us, kBootUs); }
 
-// Opens the bus again too, which frees one that is stuck.
 void Bno055::restart(std::uint64_t now_us, std::uint32_t wait_us) {
   Wire.begin(settings_.sda_pin, settings_.scl_pin);
   Wire.setClock(400'000);
   Wire.setClockStretchLimit(kStretchLimitUs);
+  (void)Wire.status();  // clocks a sensor that holds the data line out of its byte; nothing else does
   failures_ = reads_ = 0;
   enter(Phase::booting, now_us, wait_us);
 }
@@ -52,12 +52,13 @@ Bno055::Reading Bno055::read(std::uint64_t now_us) {
     return {};
   }
   if (++reads_ >= kReadsPerModeCheck) {
-    reads_ = 0;
     std::uint8_t mode = 0;
-    if (!read_registers(kModeAt, &mode, 1) || mode != kImuPlusMode) {
+    if (!read_registers(kModeAt, &mode, 1)) return failed(now_us);  // and asks again in the next tick
+    if (mode != kImuPlusMode) {
       restart(now_us, kRetryUs);
       return {};
     }
+    reads_ = 0;
   }
   std::uint8_t bytes[kCalibrationAt - kAccelerationAt + 1];
   if (!read_registers(kAccelerationAt, bytes, sizeof(bytes))) return failed(now_us);

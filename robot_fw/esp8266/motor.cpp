@@ -82,8 +82,13 @@ void Motor::begin() {
 void Motor::complete_tick(float duty) {
   const bool possible = duty >= duty_min();  // false for what is not a number
   const float share = possible ? pwm_share(duty, settings_.dead_zone) : 0;
-  if (share <= 0) return disarm();
-  turn(duty < 0);
+  const bool turns = settings_.direction_pin != kNoPin && (duty < 0) != backwards_;
+  if (share <= 0 || (turns && drove_)) {
+    drove_ = false;
+    return disarm();
+  }
+  if (turns) turn(duty < 0);
+  drove_ = true;
   wave.high = static_cast<std::uint32_t>(share * static_cast<float>(wave.period));
   // One period earlier than it must be: the interrupt may be one period away when the deadline comes.
   wave.deadline = esp_get_cycle_count() + clockCyclesPerMicrosecond() * kDeadManUs - wave.period;
@@ -94,10 +99,9 @@ void Motor::follow(float duty) {
   if (!(std::fabs(duty) > 0)) disarm();  // SAFETY: a stop between two ticks does not wait for the next
 }
 
-// Switches the bridge only while no current flows through it.
+// SAFETY: only after a tick of 0, in which the current of the direction before has died away (assumed: the windings'
+// time constant is below 1 ms). The propeller may still turn.
 void Motor::turn(bool backwards) {
-  if (settings_.direction_pin == kNoPin || backwards == backwards_) return;
-  disarm();
   digitalWrite(static_cast<std::uint8_t>(settings_.direction_pin), backwards ? HIGH : LOW);
   backwards_ = backwards;
 }

@@ -25,7 +25,8 @@ class Motor {
 
   // The pin is low from here on, and the interrupt runs.
   void begin();
-  // A tick has completed: its duty is on the motor until the next, or for 50 ms.
+  // A tick has completed: its duty is on the motor until the next, or for 50 ms. The first duty of the other sign is
+  // left out: the motor is off for that tick, and the next one turns the bridge.
   void complete_tick(float duty);
   // Between ticks: 0 is off at once, anything else waits for a tick.
   void follow(float duty);
@@ -42,6 +43,7 @@ class Motor {
 
   MotorSettings settings_;
   bool backwards_ = false;
+  bool drove_ = false;  // in the latest tick
 };
 
 // Off by registers alone: at boot before anything is set up, and in a crash.

@@ -141,7 +141,8 @@ void RobotPort::close_link() {
 LedPattern RobotPort::led_pattern() const {
   if (robot_->emergency_id() != 0) return LedPattern::emergency;
   if (robot_->link_up()) return LedPattern::connected;
-  return robot_->refusal() != rheonaut_REFUSAL_REASON_NONE ? LedPattern::refused : LedPattern::connecting;
+  const bool refused = robot_->refusal() != rheonaut_REFUSAL_REASON_NONE || !link_.key_is_sound();
+  return refused ? LedPattern::refused : LedPattern::connecting;
 }
 
 }  // namespace robot_fw::esp8266

@@ -8,9 +8,6 @@
 namespace robot_fw::esp8266 {
 namespace {
 
-constexpr int kFragmentBytes = 512;  // the smallest that TLS can agree on
-// Of a record, with the ciphers below: header 5, nonce 8, tag 16.
-constexpr std::size_t kRecordOverheadBytes = 29;
 constexpr std::size_t kMaxRecordsPerFrame = 2;
 // lwIP "v2 Lower Memory": 2 segments of 536 bytes, and 8 pieces in its queue, each record one.
 constexpr std::size_t kSendBufferBytes = 1072;
@@ -32,13 +29,18 @@ constexpr std::uint16_t kCiphers[] = {
 constexpr std::uint64_t kJoinUs = 15'000'000;
 constexpr std::uint32_t kFirstPauseMs = 1'000, kMaxDoublings = 3;
 constexpr unsigned kDialTimeoutMs = 15'000;  // connecting and handshake each
-// SAFETY: should a call that is not to wait do so after all, it gives up before the motor's interrupt does.
-constexpr unsigned kOpenTimeoutMs = 20;
+// SAFETY: should a call that is not to wait do so after all, it gives up before the motor's interrupt does. The core
+// waits up to twice as long, and a turn of the loop may try three times: reading, pushing a record, looking for the
+// peer.
+constexpr unsigned kOpenTimeoutMs = 5;
 
 }  // namespace
 
 StationLink::StationLink(const Secrets& secrets, WideClock& clock)
-    : secrets_(secrets), clock_(clock), station_key_(secrets.station_key_pem) {}
+    : secrets_(secrets),
+      clock_(clock),
+      station_key_(secrets.station_key_pem),
+      key_is_sound_(station_key_.isEC() || station_key_.isRSA()) {}
 
 void StationLink::begin() {
   WiFi.persistent(false);        // SAFETY: nothing of the network is ever written to flash
@@ -48,6 +50,7 @@ void StationLink::begin() {
 }
 
 bool StationLink::step(bool at_rest) {
+  if (!key_is_sound_) return false;  // nobody could be trusted
   if (state_ != State::off && state_ != State::joining && WiFi.status() != WL_CONNECTED) {
     close();
     state_ = State::off;
@@ -97,7 +100,7 @@ bool StationLink::handshake() {
   stream_.setTimeout(kDialTimeoutMs);
   stream_.setKnownKey(&station_key_);
   stream_.setCiphers(kCiphers, sizeof(kCiphers) / sizeof(kCiphers[0]));
-  stream_.setBufferSizes(kFragmentBytes, kFragmentBytes);
+  stream_.setBufferSizes(static_cast<int>(kFragmentBytes), static_cast<int>(kFragmentBytes));
   stream_.setSession(&session_);
   if (!stream_.connect(secrets_.station_host, secrets_.station_port)) return false;
   // SAFETY: a station that did not agree on short records would overflow the buffer with one, maybe that of a stop.
@@ -128,8 +131,8 @@ std::size_t StationLink::read(std::uint8_t* bytes, std::size_t capacity) {
 }
 
 std::size_t StationLink::room() {
-  if (state_ != State::open) return 0;
-  const std::size_t free = static_cast<std::size_t>(stream_.availableForWrite());
+  if (state_ != State::open || !stream_.push()) return 0;
+  const std::size_t free = stream_.tcp_room();
   if (free >= empty_buffer_) {
     empty_buffer_ = free;
     records_under_way_ = 0;
@@ -142,7 +145,7 @@ std::size_t StationLink::room() {
 
 bool StationLink::write(protocol::Bytes frame) {
   records_under_way_ += static_cast<std::uint32_t>((frame.size + kFragmentBytes - 1) / kFragmentBytes);
-  return stream_.write(frame.first, frame.size) == frame.size;
+  return stream_.send(frame);
 }
 
 std::int32_t StationLink::rssi_dbm() const { return state_ >= State::ready ? WiFi.RSSI() : 0; }

@@ -28,6 +28,8 @@ class StationLink {
   void close();
 
   State state() const { return state_; }
+  // False when the key in the secrets is none: nothing is joined and nobody dialled then.
+  bool key_is_sound() const { return key_is_sound_; }
   // False once the peer or the Wi-Fi is gone.
   bool alive();
   // Takes what has come, at most `capacity` bytes; 0 when nothing has.
@@ -35,6 +37,7 @@ class StationLink {
   // How large a frame may be that write() hands to TCP at once; 0 for none.
   std::size_t room();
   // One frame, in one write; it must not be larger than room(). False when it did not go: the stream is broken then.
+  // Its last record may wait in TLS while TCP is out of memory; room() is 0 until that has gone.
   bool write(protocol::Bytes frame);
   // The station has welcomed the robot: the next loss is dialled after the shortest pause again.
   void welcomed() { failures_ = 0; }
@@ -50,6 +53,7 @@ class StationLink {
   const Secrets& secrets_;
   WideClock& clock_;
   BearSSL::PublicKey station_key_;
+  bool key_is_sound_;
   BearSSL::Session session_;  // a later handshake takes it up, which is faster
   TlsStream stream_;
   State state_ = State::off;

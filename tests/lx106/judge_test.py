@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Shows that judge.py finds what it looks for: a byte that differs, a float that differs, a double, a cost."""
+"""Shows that judge.py finds what it looks for: a byte or a float that differs, a double, a cost, nothing at all."""
 import pathlib
 import tempfile
 import unittest
@@ -12,6 +12,23 @@ class Judge(unittest.TestCase):
         temporary = tempfile.TemporaryDirectory()
         self.addCleanup(temporary.cleanup)
         self.folder = pathlib.Path(temporary.name)
+
+    def blocks(self, count=judge.TRIAL_BLOCKS):
+        return [f"block {number:08x} " + " ".join(["00000001"] * 13) for number in range(count)]
+
+    def write_trials(self, host, chip):
+        self.write("trials.host", *host)
+        self.write("trials.chip", *chip)
+
+    def trial_faults(self, host, chip):
+        self.write_trials(host, chip)
+        return list(judge.compare_trials(self.folder))
+
+    def session_faults(self, host_ticks, chip_ticks, **figures):
+        self.write("trace.host", *["tick 0000002710 1a2b3c4d"] * host_ticks)
+        self.write("trace.chip", *["tick 0000002710 1a2b3c4d"] * chip_ticks)
+        found = {"ticks": 3000, "worst_step": 1, "worst_transmit": 1, "worst_receive": 1} | figures
+        return list(judge.check_session(self.folder, found))
 
     def write(self, name, *lines):
         (self.folder / name).write_text("".join(line + "\n" for line in lines))
@@ -33,10 +50,48 @@ class Judge(unittest.TestCase):
         self.assertEqual(len(list(judge.compare_traces(self.folder))), 1)
 
     def test_names_the_operation_that_differs(self):
-        self.write("trials.host", "block 00000000 " + " ".join(["00000001"] * 13))
-        self.write("trials.chip", "block 00000000 " + " ".join(["00000001"] * 3 + ["00000002"] + ["00000001"] * 9))
-        fault, = judge.compare_trials(self.folder)
-        self.assertIn("divide differs", fault)
+        chip = self.blocks()
+        chip[7] = "block 00000007 " + " ".join(["00000001"] * 3 + ["00000002"] + ["00000001"] * 9)
+        fault, = self.trial_faults(self.blocks(), chip)
+        self.assertIn("divide differs from the host's in 1 of 1000", fault)
+
+    def test_all_blocks_alike_have_no_fault(self):
+        self.assertEqual(self.trial_faults(self.blocks(), self.blocks()), [])
+
+    def test_trials_that_are_missing_are_a_fault_also_on_both_sides(self):
+        self.assertEqual(len(self.trial_faults([], [])), 2)
+        self.assertEqual(len(self.trial_faults(self.blocks(999), self.blocks(999))), 2)
+        self.assertEqual(len(self.trial_faults(self.blocks(), self.blocks(999))), 1)
+
+    def test_a_trial_of_another_block_or_with_other_columns_is_a_fault_also_on_both_sides(self):
+        for wrong in ("block 00000008 " + " ".join(["00000001"] * 13), "block 00000007 " + " ".join(["00000001"] * 12),
+                      "block 00000007 " + " ".join(["00000001"] * 14)):
+            blocks = self.blocks()
+            blocks[7] = wrong
+            self.assertTrue(self.trial_faults(blocks, blocks), wrong)
+            self.assertTrue(self.trial_faults(self.blocks(), blocks), wrong)
+
+    def test_traces_that_are_both_empty_are_a_fault(self):
+        self.write("trace.host")
+        self.write("trace.chip")
+        self.assertEqual(len(list(judge.compare_traces(self.folder))), 1)
+
+    def test_a_line_without_a_time_is_told_all_the_same(self):
+        self.write("trace.host", "tick")
+        self.write("trace.chip", "tick 0000002710 1a2b3c4d")
+        self.assertEqual(len(list(judge.compare_traces(self.folder))), 1)
+
+    def test_a_session_that_is_short_or_silent_is_a_fault(self):
+        self.assertEqual(self.session_faults(3000, 3000), [])
+        self.assertEqual(len(self.session_faults(2999, 2999, ticks=2999)), 1)
+        self.assertEqual(len(self.session_faults(3000, 2999)), 1)
+        self.assertEqual(len(self.session_faults(0, 0)), 2)
+        self.assertEqual(len(self.session_faults(3000, 3000, worst_transmit=0, worst_receive=0)), 2)
+
+    def test_figures_without_a_tick_are_zeros(self):
+        self.write("figures", "robot_bytes 26000", "ring_bytes 21000", "reader_bytes 1000")
+        figures = judge.figures_of(self.folder / "figures")
+        self.assertEqual((figures["ticks"], figures["worst_tick"], figures["worst_receive"]), (0, 0, 0))
 
     def test_a_tick_is_a_step_and_what_is_sent_after_it(self):
         self.write("figures", "robot_bytes 26000", "ring_bytes 21000", "reader_bytes 1000", "step 100", "stack 50",

@@ -45,6 +45,11 @@ class Session final : public RecordingSink {
   std::uint64_t ticks() const { return now_us_ / kPeriodUs; }
   bool has_event(protocol::EventKind kind) const { return events_.contains(kind); }
   const robot_fw::Robot& robot() const { return replay_.robot(); }
+  // The file is whole; nothing may be recorded afterwards.
+  bool close() {
+    file_.close();
+    return file_.good();
+  }
   bool perfect_sensor = false;
 
  private:
@@ -286,5 +291,6 @@ int record_session(const std::string& path) {
   session.run(50);
   session.perfect_sensor = false;
   link_cut_and_backfill(session, expect);
+  expect.that(session.close(), "a file that took all of it");
   return expect.missing == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -87,6 +87,25 @@ TEST_F(Sensor, IsStartedAnewAfterTenFailures) {
   EXPECT_TRUE(next(imu).is_valid);
 }
 
+TEST_F(Sensor, ThatHoldsTheDataLineIsClockedOut) {
+  Bno055 imu{{}};
+  start(imu);
+  chip.imu_holds_data_line = true;
+  for (int i = 0; i < 40; ++i) next(imu);
+  EXPECT_TRUE(next(imu).is_valid);
+}
+
+TEST_F(Sensor, FailedLookAtItsModeIsAFailedReadAndNoMore) {
+  Bno055 imu{{}};
+  start(imu);
+  const int starts = chip.bus_starts;
+  for (int i = 0; i < 99; ++i) EXPECT_TRUE(next(imu).is_valid);
+  chip.imu_reads_to_fail = 1;
+  EXPECT_FALSE(next(imu).is_valid);
+  EXPECT_TRUE(next(imu).is_valid);
+  EXPECT_EQ(chip.bus_starts, starts);
+}
+
 TEST_F(Sensor, ThatHasLeftItsModeIsStartedAnew) {
   Bno055 imu{{}};
   start(imu);

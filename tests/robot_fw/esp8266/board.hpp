@@ -13,7 +13,8 @@
 
 namespace robot_fw::esp8266 {
 
-inline const Secrets kTestSecrets{"robot-1", "token", "wifi", "password", "192.0.2.1", 7070, "the station's key"};
+constexpr char kStationKey[] = "-----BEGIN PUBLIC KEY-----\nthe station's";
+inline const Secrets kTestSecrets{"robot-1", "token", "wifi", "password", "192.0.2.1", 7070, kStationKey};
 constexpr int kMotorPin = kSettings.motor.pwm_pin;
 constexpr std::uint32_t kTurnUs = 250;  // of the loop
 

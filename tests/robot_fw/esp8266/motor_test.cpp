@@ -66,8 +66,30 @@ TEST_F(MotorOnChip, TurnsTheBridgeOnlyWhileThePinIsLow) {
   EXPECT_NEAR(share(motor, -1), 1, 0.01);
   EXPECT_TRUE(chip.level(kDirection));
   motor.complete_tick(1);
+  EXPECT_TRUE(motor.is_off());
   EXPECT_FALSE(chip.level(kPin));
+  EXPECT_TRUE(chip.level(kDirection));
+  EXPECT_EQ(high_us(10'000), 0U) << "a tick of 0, in which its current dies";
+  motor.complete_tick(1);
+  EXPECT_FALSE(chip.level(kPin)) << "until the interrupt comes";
   EXPECT_FALSE(chip.level(kDirection));
+  EXPECT_NEAR(share(motor, 1), 1, 0.02);
+}
+
+TEST_F(MotorOnChip, StopBetweenTicksDoesNotReplaceTheTickOfZero) {
+  Motor motor{{.pwm_pin = kPin, .direction_pin = kDirection}};
+  motor.begin();
+  share(motor, 1);
+  motor.complete_tick(1);
+  chip.pass(9'000);
+  motor.follow(0);
+  chip.pass(1'000);
+  motor.complete_tick(-1);
+  EXPECT_TRUE(motor.is_off());
+  motor.complete_tick(0);
+  motor.complete_tick(-1);
+  EXPECT_FALSE(motor.is_off()) << "after a tick of 0 there is no other";
+  EXPECT_TRUE(chip.level(kDirection));
 }
 
 TEST_F(MotorOnChip, InterruptTurnsItOffFiftyMillisecondsAfterTheLastTick) {
@@ -105,9 +127,12 @@ TEST_F(MotorOnChip, StopBetweenTicksActsAtOnce) {
 }
 
 TEST_F(MotorOnChip, BeginsLowWhateverAResetLeft) {
-  chip.pins[kPin].latch = true;
-  Motor motor{{.pwm_pin = kPin}};
+  chip.pins[kPin].latch = chip.pins[kDirection].latch = true;
+  Motor motor{{.pwm_pin = kPin, .direction_pin = kDirection}};
   motor.begin();
+  EXPECT_TRUE(chip.pins[kPin].output);
+  EXPECT_EQ(chip.pins[kPin].rises, 0);
+  EXPECT_EQ(chip.pins[kDirection].rises, 0);
   EXPECT_EQ(high_us(100'000), 0U);
 }
 

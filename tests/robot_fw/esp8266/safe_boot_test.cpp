@@ -31,8 +31,17 @@ TEST_F(SafeBoot, PinIsLowBeforeDuringAndAfterSetup) {
 TEST_F(SafeBoot, PinIsNoOutputUntilItIsLow) {
   chip.pins[kMotorPin].latch = true;
   boot();
+  EXPECT_TRUE(chip.pins[kMotorPin].output);
+  EXPECT_EQ(chip.pins[kMotorPin].rises, 0);
   EXPECT_EQ(chip.pins[kMotorPin].high_us, 0U);
   EXPECT_FALSE(chip.level(kMotorPin));
+}
+
+TEST_F(SafeBoot, WatchdogRunsAndTicksFeedIt) {
+  boot();
+  EXPECT_EQ(chip.watchdog_enables, 1);
+  run_ms(100);
+  EXPECT_NEAR(chip.watchdog_feeds, 10, 1);
 }
 
 TEST_F(SafeBoot, HangAndCrashTurnTheMotorOff) {

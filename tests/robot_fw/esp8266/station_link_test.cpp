@@ -6,16 +6,61 @@
 namespace robot_fw::esp8266 {
 namespace {
 
-class Link : public Board {};
+class Link : public Board {
+ protected:
+  // Opens, and is welcomed with this batch.
+  void connect_with(std::uint32_t samples_per_frame) {
+    boot();
+    for (int i = 0; i < 100 && port->link().state() != StationLink::State::open; ++i) run_ms(100);
+    protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+    frame.which_body = rheonaut_StationFrame_welcome_tag;
+    frame.body.welcome.protocol_version = protocol::kProtocolVersion;
+    frame.body.welcome.samples_per_frame = samples_per_frame;
+    say(frame);
+  }
+  void ping() {
+    protocol::Command ping = rheonaut_Command_init_zero;
+    ping.which_action = rheonaut_Command_ping_tag;
+    order(ping);
+  }
+};
 
 TEST_F(Link, PinsTheKeyAndAsksForShortRecords) {
   connect();
-  EXPECT_EQ(chip.socket.known_key, "the station's key");
+  EXPECT_EQ(chip.socket.known_key, kStationKey);
   EXPECT_EQ(chip.socket.receive_bytes, 512);
   EXPECT_EQ(chip.socket.send_bytes, 512);
   EXPECT_GT(chip.socket.ciphers, 0);
   EXPECT_TRUE(chip.socket.no_delay);
-  EXPECT_LE(chip.socket.timeout_ms, 20U) << "what is not to wait gives up before the motor's interrupt does";
+}
+
+// A turn may wait for TCP three times, each up to twice the time-out, and a tick may have been due for a period.
+TEST_F(Link, TimeoutsOfATurnAreShorterThanTheMotors) {
+  connect_with(25);
+  const std::uint64_t expected_us = 3 * 2 * chip.socket.timeout_ms * 1000;
+  EXPECT_LT(expected_us, kDeadManUs - kTickUs);
+  chip.socket.takes = false;
+  std::uint64_t longest_us = 0;
+  while (chip.now_us < 8'000'000 && port->link().state() == StationLink::State::open) {
+    chip.pass(kTurnUs);
+    const std::uint64_t before_us = chip.now_us;
+    port->step();
+    if (port->link().state() == StationLink::State::open) longest_us = std::max(longest_us, chip.now_us - before_us);
+  }
+  EXPECT_GT(longest_us, 0U);
+  EXPECT_LE(longest_us, expected_us);
+}
+
+TEST_F(Link, KeyThatIsNoneIsShownAndNobodyIsDialled) {
+  Secrets secrets = kTestSecrets;
+  secrets.station_key_pem = "MFkwEwYHKoZIzj0CAQYIKoZIzj0DAQcDQgAE";
+  port.emplace(secrets);
+  port->begin();
+  run_ms(10'000);
+  EXPECT_EQ(port->led_pattern(), LedPattern::refused);
+  EXPECT_EQ(chip.joins, 0);
+  EXPECT_EQ(chip.socket.dials, 0);
+  port.reset();  // before the secrets
 }
 
 TEST_F(Link, NetworkIsNeverKeptInFlashNorRejoinedBehindOurBack) {
@@ -147,11 +192,7 @@ TEST_F(Link, CountsSmallFramesUnderWay) {
   connect();
   chip.socket.acknowledges = false;
   const std::size_t writes = chip.socket.writes.size();
-  for (int i = 0; i < 12; ++i) {
-    protocol::Command ping = rheonaut_Command_init_zero;
-    ping.which_action = rheonaut_Command_ping_tag;
-    order(ping);
-  }
+  for (int i = 0; i < 12; ++i) ping();
   run_ms(30);
   EXPECT_GT(chip.socket.room, 400U);
   EXPECT_LE(chip.socket.writes.size() - writes, 6U);
@@ -159,13 +200,7 @@ TEST_F(Link, CountsSmallFramesUnderWay) {
 }
 
 TEST_F(Link, LargestFrameFitsAnEmptySendBuffer) {
-  boot();
-  for (int i = 0; i < 100 && port->link().state() != StationLink::State::open; ++i) run_ms(100);
-  protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
-  frame.which_body = rheonaut_StationFrame_welcome_tag;
-  frame.body.welcome.protocol_version = protocol::kProtocolVersion;
-  frame.body.welcome.samples_per_frame = 25;
-  say(frame);
+  connect_with(25);
   run_ms(1'000);
   std::size_t largest = 0;
   for (const protocol::RobotFrame& sent : heard()) {
@@ -174,6 +209,35 @@ TEST_F(Link, LargestFrameFitsAnEmptySendBuffer) {
     }
   }
   EXPECT_EQ(largest, 25U);
+}
+
+// While input waits, looking for more does not send.
+TEST_F(Link, LastRecordLeavesAlsoWhileInputWaits) {
+  connect();
+  const std::size_t writes = chip.socket.writes.size();
+  for (int i = 0; i < 100; ++i) ping();  // more than a turn reads
+  for (int turn = 0; turn < 5; ++turn) {
+    chip.pass(kTurnUs);
+    port->step();
+    ASSERT_TRUE(chip.socket.input_is_found);
+    EXPECT_EQ(chip.socket.sealed, 0U) << "turn " << turn;
+  }
+  EXPECT_GT(chip.socket.writes.size(), writes);
+}
+
+TEST_F(Link, NoFrameFollowsARecordThatTlsStillHolds) {
+  connect();
+  chip.socket.takes = false;
+  const std::size_t writes = chip.socket.writes.size();
+  const std::uint64_t until_us = chip.now_us + 300'000;
+  while (chip.now_us < until_us) run_ms(1);
+  ASSERT_EQ(port->link().state(), StationLink::State::open);
+  EXPECT_EQ(chip.socket.writes.size(), writes + 1);
+  EXPECT_GT(chip.socket.sealed, 0U);
+  chip.socket.takes = true;
+  run_ms(200);
+  EXPECT_EQ(chip.socket.sealed, 0U);
+  EXPECT_GT(chip.socket.writes.size(), writes + 1);
 }
 
 TEST_F(Link, SilentStationIsDialledAgain) {

@@ -10,6 +10,7 @@ class TwoWire {
   void begin(int sda, int scl);
   void setClock(std::uint32_t hz);
   void setClockStretchLimit(std::uint32_t us);
+  std::uint8_t status();
   void beginTransmission(std::uint8_t address);
   std::size_t write(std::uint8_t byte);
   std::uint8_t endTransmission(std::uint8_t send_stop = 1);

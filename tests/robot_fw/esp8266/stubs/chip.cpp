@@ -68,7 +68,10 @@ SetRegister& SetRegister::operator=(std::uint32_t mask) {
 
 unsigned long micros() { return static_cast<std::uint32_t>(chip.counter_us + chip.now_us); }
 std::uint32_t esp_get_cycle_count() { return static_cast<std::uint32_t>(chip.now_us * kCyclesPerUs); }
-void pinMode(std::uint8_t pin, std::uint8_t mode) { chip.pins[pin].output = mode == OUTPUT; }
+void pinMode(std::uint8_t pin, std::uint8_t mode) {
+  chip.pins[pin].output = mode == OUTPUT;
+  if (chip.level(pin)) ++chip.pins[pin].rises;
+}
 void digitalWrite(std::uint8_t pin, std::uint8_t level) { chip.pins[pin].latch = level != LOW; }
 int analogRead(std::uint8_t) {
   const bool supply = chip.supply_pin >= 0 && chip.level(chip.supply_pin);
@@ -81,7 +84,7 @@ void setTimer1Callback(std::uint32_t (*function)()) {
 
 std::uint32_t EspClass::random() { return chip.random_state = chip.random_state * 1664525U + 1013904223U; }
 std::uint32_t EspClass::getFreeHeap() { return 20'000; }
-void EspClass::wdtEnable(std::uint32_t) {}
+void EspClass::wdtEnable(std::uint32_t) { ++chip.watchdog_enables; }
 void EspClass::wdtFeed() { ++chip.watchdog_feeds; }
 rst_info* EspClass::getResetInfoPtr() {
   static rst_info reset_info;
@@ -127,6 +130,10 @@ bool EspClass::flashRead(std::uint32_t address, std::uint32_t* words, std::size_
 void TwoWire::begin(int, int) { ++chip.bus_starts; }
 void TwoWire::setClock(std::uint32_t) {}
 void TwoWire::setClockStretchLimit(std::uint32_t) {}
+std::uint8_t TwoWire::status() {
+  chip.imu_holds_data_line = false;
+  return 0;
+}
 void TwoWire::beginTransmission(std::uint8_t address) {
   address_ = address;
   written_.clear();
@@ -136,6 +143,7 @@ std::size_t TwoWire::write(std::uint8_t byte) {
   return 1;
 }
 std::uint8_t TwoWire::endTransmission(std::uint8_t) {
+  if (chip.imu_holds_data_line) return 4;
   if (!chip.imu_there || address_ != 0x28) return 2;
   register_ = written_.at(0);
   for (std::size_t i = 1; i < written_.size(); ++i) chip.imu_registers.at(register_ + i - 1) = written_[i];
@@ -143,7 +151,8 @@ std::uint8_t TwoWire::endTransmission(std::uint8_t) {
 }
 std::uint8_t TwoWire::requestFrom(std::uint8_t address, std::uint8_t count) {
   chip.pass(chip.imu_read_takes_us);
-  if (!chip.imu_there || address != 0x28) return 0;
+  if (!chip.imu_there || chip.imu_holds_data_line || address != 0x28) return 0;
+  if (chip.imu_reads_to_fail > 0) return --chip.imu_reads_to_fail, 0;
   return count;
 }
 int TwoWire::read() { return chip.imu_registers.at(register_++); }
@@ -161,8 +170,23 @@ void WiFiClass::begin(const char*, const char*) {
 wl_status_t WiFiClass::status() { return chip.wifi_joined() ? WL_CONNECTED : WL_DISCONNECTED; }
 std::int32_t WiFiClass::RSSI() { return -60; }
 
+int WiFiClient::availableForWrite() { return static_cast<int>(chip.socket.room); }
+void WiFiClient::setTimeout(unsigned long timeout_ms) { chip.socket.timeout_ms = timeout_ms; }
+std::size_t WiFiClient::write_some(std::size_t size) {
+  const std::size_t taken = chip.socket.takes ? std::min(size, chip.socket.room) : 0;
+  if (!chip.socket.acknowledges) chip.socket.room -= taken;
+  if (taken < size) chip.blocks(2 * chip.socket.timeout_ms * 1000);
+  return taken;
+}
+
 namespace BearSSL {
 
+bool WiFiClientSecureCtx::run_engine(bool may_wait) {
+  std::size_t size = chip.socket.sealed;
+  if (!may_wait) size = std::min(size, chip.socket.room);
+  if (size > 0) chip.socket.sealed -= write_some(size);
+  return chip.socket.sealed == 0;
+}
 int WiFiClientSecureCtx::connect(const char*, std::uint16_t) {
   ++chip.socket.dials;
   chip.blocks(chip.socket.connect_takes_us);
@@ -170,22 +194,28 @@ int WiFiClientSecureCtx::connect(const char*, std::uint16_t) {
   return chip.socket.connected;
 }
 std::uint8_t WiFiClientSecureCtx::connected() { return available() > 0 || chip.socket.connected; }
-int WiFiClientSecureCtx::available() { return static_cast<int>(chip.socket.incoming.size()); }
+int WiFiClientSecureCtx::available() {
+  if (!chip.socket.input_is_found) {
+    if (!run_engine(false)) return 0;
+    chip.socket.input_is_found = !chip.socket.incoming.empty();
+  }
+  return static_cast<int>(chip.socket.incoming.size());
+}
 int WiFiClientSecureCtx::read(std::uint8_t* bytes, std::size_t size) {
   const std::size_t count = std::min(size, chip.socket.incoming.size());
   std::copy_n(chip.socket.incoming.begin(), count, bytes);
   chip.socket.incoming.erase(chip.socket.incoming.begin(), chip.socket.incoming.begin() + static_cast<long>(count));
+  chip.socket.input_is_found = false;
   return static_cast<int>(count);
 }
-int WiFiClientSecureCtx::availableForWrite() { return static_cast<int>(chip.socket.room); }
+int WiFiClientSecureCtx::availableForWrite() { return chip.socket.connected && run_engine(true) ? 512 : 0; }
 // As the core does it: record by record, with a flush after each.
 std::size_t WiFiClientSecureCtx::write(const std::uint8_t* bytes, std::size_t size) {
-  if (!chip.socket.connected) return 0;
+  if (!connected()) return 0;
   chip.socket.writes.emplace_back(bytes, bytes + size);
   for (std::size_t sent = 0; sent < size; sent += 512) {
-    const std::size_t on_the_wire = std::min<std::size_t>(512, size - sent) + 29;
-    if (on_the_wire > chip.socket.room) chip.blocks(chip.socket.timeout_ms * 1000);
-    if (!chip.socket.acknowledges) chip.socket.room -= std::min(on_the_wire, chip.socket.room);
+    if (!run_engine(true)) return sent;
+    chip.socket.sealed = std::min<std::size_t>(512, size - sent) + 29;
     flush();
   }
   return size;
@@ -199,9 +229,10 @@ void WiFiClientSecureCtx::stop() {
   chip.blocks(300'000);
   chip.socket.connected = false;
   chip.socket.incoming.clear();
+  chip.socket.sealed = 0;
+  chip.socket.input_is_found = false;
 }
 void WiFiClientSecureCtx::setNoDelay(bool on) { chip.socket.no_delay = on; }
-void WiFiClientSecureCtx::setTimeout(unsigned long timeout_ms) { chip.socket.timeout_ms = timeout_ms; }
 void WiFiClientSecureCtx::setKnownKey(const PublicKey* key) { chip.socket.known_key = key->pem; }
 bool WiFiClientSecureCtx::setCiphers(const std::uint16_t*, int count) {
   chip.socket.ciphers = count;

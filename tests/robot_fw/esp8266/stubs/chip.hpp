@@ -17,6 +17,7 @@ constexpr std::uint32_t kFlashSectorBytes = 4096;
 struct Pin {
   bool output = false;
   bool latch = false;  // as a soft reset leaves it
+  int rises = 0;       // when it became an output, its latch high
   std::uint64_t high_us = 0;
 };
 
@@ -27,6 +28,7 @@ struct Socket {
   std::uint64_t connect_takes_us = 3'000'000;
   std::size_t room = 1072;   // what TCP takes at once
   bool acknowledges = true;  // at once, so that the room stays
+  bool takes = true;         // false: lwIP is out of memory or of places in its queue, whatever its room
   std::deque<std::uint8_t> incoming;
   // What the robot did.
   bool connected = false;
@@ -38,6 +40,9 @@ struct Socket {
   int dials = 0, closes = 0;
   int waiting_flushes = 0;  // each waits for the peer's acknowledgement
   std::vector<std::vector<std::uint8_t>> writes;
+  // Inside TLS.
+  std::size_t sealed = 0;       // of a record that TCP does not have yet
+  bool input_is_found = false;  // by available(), which does nothing until that is read
 };
 
 struct Chip {
@@ -52,6 +57,8 @@ struct Chip {
 
   std::array<std::uint8_t, 256> imu_registers{};
   bool imu_there = true;
+  bool imu_holds_data_line = false;  // in the middle of a byte, until it is clocked
+  int imu_reads_to_fail = 0;         // the next ones
   std::uint64_t imu_read_takes_us = 0;
   int bus_starts = 0;
 
@@ -71,7 +78,7 @@ struct Chip {
   int power_cut_after_bytes = -1;  // of the next write; -1: none
   bool power_lost = false;
   std::uint32_t random_state = 1;
-  int watchdog_feeds = 0;
+  int watchdog_enables = 0, watchdog_feeds = 0;
 
   std::function<void()> before_blocking;  // called by whatever stops the program for long
 
