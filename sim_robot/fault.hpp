@@ -1,8 +1,8 @@
 // Everything that can be made to go wrong with a simulated robot while it runs: by time line, over HTTP, or by a test.
 //
-// One struct for all kinds; fields() says which of its members a kind has, with names, units, ranges and defaults. TOML,
-// JSON and docs/scenarios.md follow from it. A fault on a target replaces the one that is in force there.
-// Errors:   throws std::invalid_argument that says what is wrong, which value it has, and what is allowed.
+// One struct for all kinds; fields() says which of its members a kind has, with names, units, ranges and defaults.
+// TOML, JSON and docs/scenarios.md follow from it. A fault on a target replaces the one that is in force there. Errors:
+// throws std::invalid_argument that says what is wrong, which value it has, and what is allowed.
 #pragma once
 
 #include <cstddef>
@@ -20,6 +20,7 @@
 namespace sim_robot {
 
 class SimulatedRobot;
+struct WorldConfig;
 
 // In the order of fault_types().
 enum class FaultKind {
@@ -70,8 +71,8 @@ struct Fault {
   GlucosePatch patch{.position_m = kMustBeGiven};  // poured at once; its for_s says when it is removed
 
   LinkDirection direction = LinkDirection::both;
-  bool then_reset = false;          // an outage ends with the end of the connections
-  std::uint64_t after_bytes = 0;    // a cut: so many of those under way still arrive
+  bool then_reset = false;        // an outage ends with the end of the connections
+  std::uint64_t after_bytes = 0;  // a cut: so many of those under way still arrive
   double delay_s = kMustBeGiven, jitter_s = 0;
   double bytes_per_s = kMustBeGiven;
   double loss_probability = kMustBeGiven, retransmit_s = 0.2;
@@ -89,9 +90,12 @@ void fields(Fields& fields, Fault& fault);
 // Kind and members: the key `fault` first.
 void fields_with_kind(Fields& fields, Fault& fault);
 
-// Empty when it can be done to this robot now; otherwise why not.
-std::string why_not(const Fault& fault, const SimulatedRobot& robot);
-// From the robot's next tick on. Throws when why_not() has a reason.
+// Throws what is wrong with its values, or what the world lacks for it.
+void check(const Fault& fault, const WorldConfig& world);
+
+// Empty when this run can do it; otherwise why not.
+std::string why_not(FaultKind kind);
+// From the robot's next tick on. Throws as check() does, and what why_not() says.
 void apply(const Fault& fault, SimulatedRobot& robot);
 // Ends one that lasts: as it was when the robot was made.
 void end(const Fault& fault, SimulatedRobot& robot);

@@ -33,8 +33,8 @@ class Fields {
   // One of the names; the index says which. An index beyond them: it must be given.
   virtual void choice(const char* key, std::size_t& index, std::span<const char* const> names, const char* what) = 0;
 
-  // A table and a list of tables with fields of their own; nothing is asked of those that are absent. `inside` is called
-  // once for the table, and once for each one of the list.
+  // A table and a list of tables with fields of their own; nothing is asked of those that are absent. `inside` is
+  // called once for the table, and once for each one of the list.
   virtual void table(const char* key, const char* what, const Inside& inside) = 0;
   virtual void tables(const char* key, const char* what, const Inside& inside) = 0;
 

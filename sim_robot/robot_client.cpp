@@ -44,10 +44,12 @@ StationAddress parse_station_address(const std::string& text) {
   return {host, port};
 }
 
-RobotClient::RobotClient(asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log)
+RobotClient::RobotClient(asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log,
+                         std::vector<TimedFault> faults)
     : robot_(std::move(config)),
       station_(std::move(station)),
       log_(std::move(log)),
+      faults_(std::move(faults), log_),
       socket_(loop),
       tick_timer_(loop),
       booted_at_(Clock::now()) {}
@@ -65,7 +67,7 @@ std::uint64_t RobotClient::catch_up() {
     const auto since_boot = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - booted_at_);
     const auto now_us = static_cast<std::uint64_t>(since_boot.count());
     if (now_us < robot_.robot_time_us()) return now_us;
-    robot_.advance_to(now_us);
+    faults_.advance(robot_, now_us);
   }
 }
 

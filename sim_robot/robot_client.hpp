@@ -16,6 +16,7 @@
 #include <random>
 #include <string>
 
+#include "sim_robot/fault_timeline.hpp"
 #include "sim_robot/simulated_robot.hpp"
 
 namespace sim_robot {
@@ -32,12 +33,16 @@ using LinkLog = std::function<void(const std::string& line)>;
 
 class RobotClient {
  public:
-  RobotClient(boost::asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log);
+  RobotClient(boost::asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log,
+              std::vector<TimedFault> faults = {});
 
   // Ticks and connects until cancelled. Never returns otherwise.
   boost::asio::awaitable<void> run();
 
   const SimulatedRobot& robot() const { return robot_; }
+  // For who injects faults while it runs, on the same thread.
+  SimulatedRobot& robot() { return robot_; }
+  FaultTimeline& faults() { return faults_; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -56,6 +61,7 @@ class RobotClient {
   SimulatedRobot robot_;
   StationAddress station_;
   LinkLog log_;
+  FaultTimeline faults_;
   boost::asio::ip::tcp::socket socket_;
   boost::asio::steady_timer tick_timer_;
   bool connected_ = false;

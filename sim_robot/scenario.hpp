@@ -49,7 +49,7 @@ struct Scenario {
   std::string name;  // of the file, without .toml
   std::string description;
   SimulatedRobotConfig robot;
-  double duration_s = 0;  // 0: for ever
+  double duration_s = 0;           // 0: for ever
   std::vector<TimedFault> faults;  // by time
   std::vector<ScriptStep> script;  // by time; a simulated robot that dials a station leaves it to the station
 };
