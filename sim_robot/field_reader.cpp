@@ -88,10 +88,22 @@ void FieldReader::fail(const toml::node& node, const std::string& key, const std
   fail(node.source().begin, key, why);
 }
 
+// A key of the table that is nearly the one that is missing.
+std::string FieldReader::meant_for(const std::string& key) const {
+  const std::vector<std::string> wanted{key};
+  for (const auto& [given, value] : table_) {
+    const std::string name{given.str()};
+    if (std::ranges::find(known_, name) == known_.end() && !nearest(name, wanted).empty()) {
+      return control::join_text("; is '", cut(name), "' in line ", given.source().begin.line, " meant for it?");
+    }
+  }
+  return "";
+}
+
 const toml::node* FieldReader::find(const char* key, bool must_be_given, const char* what) {
   known_.emplace_back(key);
   const toml::node* node = table_.get(key);
-  if (node == nullptr && must_be_given) fail(table_, key, std::string("is missing and must be given: ") + what);
+  if (node == nullptr && must_be_given) fail(table_, key, std::string("must be given: ") + what + meant_for(key));
   return node;
 }
 

@@ -31,6 +31,7 @@ class FieldReader final : public Fields {
   void finish() const;
 
  private:
+  std::string meant_for(const std::string& key) const;
   const toml::node* find(const char* key, bool must_be_given, const char* what);
   [[noreturn]] void fail(const toml::source_position& at, const std::string& key, const std::string& why) const;
   [[noreturn]] void fail(const toml::node& node, const std::string& key, const std::string& why) const;

@@ -47,7 +47,7 @@ struct ScriptStep {
 
 struct Scenario {
   std::string name;  // of the file, without .toml
-  std::string description;
+  std::string description = "no description";
   SimulatedRobotConfig robot;
   double duration_s = 0;           // 0: for ever
   std::vector<TimedFault> faults;  // by time
@@ -58,7 +58,7 @@ struct Scenario {
 Scenario parse_scenario(std::string_view text, const std::string& name);
 Scenario load_scenario(const std::filesystem::path& file);
 
-// Every key of a scenario, for the documents: calls as parse_scenario() makes them.
+// Every key that parse_scenario() takes.
 void fields(Fields& fields, Scenario& scenario);
 void fields(Fields& fields, ScriptStep& step);
 

@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "sim_robot/scenario.hpp"
+#include "sim_robot/scenario_tables.hpp"
 
 namespace sim_robot {
 
@@ -13,11 +14,16 @@ ScenariosCommand::ScenariosCommand(CLI::App& app)
     : command_(app.add_subcommand("scenarios", "list the scenarios that come with the program")) {
   auto* show = command_->add_option("--show", shown_, "print the file of one, to begin your own with");
   command_->add_option("--check", checked_, "check a file, and say nothing when it is right")->excludes(show);
+  command_->add_flag("--keys", keys_, "print every key that a file may have, as docs/scenarios.md does");
 }
 
 bool ScenariosCommand::chosen() const { return command_->parsed(); }
 
 int ScenariosCommand::run() const {
+  if (keys_) {
+    std::cout << scenario_tables();
+    return EXIT_SUCCESS;
+  }
   if (!checked_.empty()) {
     load_scenario(checked_);
     return EXIT_SUCCESS;

@@ -19,6 +19,7 @@ class ScenariosCommand {
  private:
   CLI::App* command_;
   std::string shown_, checked_;
+  bool keys_ = false;
 };
 
 }  // namespace sim_robot

@@ -3,6 +3,8 @@
 
 #include <array>
 
+#include "sim_robot/tick.hpp"
+
 namespace sim_robot {
 namespace {
 
@@ -28,7 +30,10 @@ void fluid_fields(Fields& fields, PlantParameters& plant) {
     fields.number("alpha", model.alpha, {0, 2}, "order, above beta");
     fields.number("beta", model.beta, {0, 2}, "order");
   }
-  fields.must([&plant] { check(plant); });
+  fields.must([&plant] {
+    check(plant);
+    const Plant made{plant, kTickS};  // not every model has a modal form
+  });
 }
 
 void motor_fields(Fields& fields, MotorParameters& motor) {

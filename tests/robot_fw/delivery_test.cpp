@@ -47,7 +47,8 @@ class Delivery : public ::testing::Test {
   void run_chattering_s(double seconds, IsOff is_off) {
     for (int k = 0; k < std::lround(seconds * 100); ++k) {
       const bool off = is_off(std::lround(now_s() * 100));
-      robot->world().set_fault(Sensor::electrode, {off ? SensorFaultKind::offset : FaultKind::none, kNominalMv - kGlucoseMv});
+      robot->world().set_fault(Sensor::electrode,
+                               {off ? SensorFaultKind::offset : SensorFaultKind::none, kNominalMv - kGlucoseMv});
       station->step();
     }
   }
