@@ -41,7 +41,7 @@ struct ScriptStep {
   double duty = kMustBeGiven;
   double for_s = kForEver;  // the duty's lease is renewed for so long, or until the next step with a duty
   double disturbance_m = kMustBeGiven;
-  std::string parameter;
+  std::string parameter{};
   double value = kMustBeGiven;
 };
 

@@ -28,9 +28,9 @@ constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 asio::awaitable<std::string> exchange(tcp::endpoint server, std::string request) {
   tcp::socket socket{co_await asio::this_coro::executor};
   co_await socket.async_connect(server, asio::use_awaitable);
-  const auto [write_error, written] = co_await asio::async_write(socket, asio::buffer(request), kNoThrow);
+  co_await asio::async_write(socket, asio::buffer(request), kNoThrow);
   std::string answer;
-  const auto [error, size] = co_await asio::async_read(socket, asio::dynamic_buffer(answer), kNoThrow);
+  co_await asio::async_read(socket, asio::dynamic_buffer(answer), kNoThrow);
   co_return answer;
 }
 
