@@ -60,9 +60,10 @@ TEST(FaultTypes, ReadBackWhatTheTableSaysOfEachKind) {
 
 class Timeline : public ::testing::Test {
  protected:
-  Timeline() {
-    config_.world.vessel.emplace();
-    config_.world.vessel->pump.ramp_s = 0.01;
+  static SimulatedRobotConfig in_a_vessel() {
+    SimulatedRobotConfig config;
+    config.world.vessel.emplace().pump.ramp_s = 0.01;
+    return config;
   }
   static Fault offset(double mv, double for_s = kForEver) {
     return {.kind = FaultKind::electrode_offset, .for_s = for_s, .magnitude = mv};
@@ -75,8 +76,7 @@ class Timeline : public ::testing::Test {
     return reading_mv();
   }
 
-  SimulatedRobotConfig config_;
-  SimulatedRobot robot_{config_};
+  SimulatedRobot robot_{in_a_vessel()};
 };
 
 TEST_F(Timeline, BeginsAndEndsEachFaultAtItsTime) {
