@@ -17,7 +17,8 @@ void run(Scenario scenario) {
   scenario.duration_s = kRunS;
   ScenarioRun run{scenario};
   run.run();
-  if (run.bytes().empty()) std::abort();
+  if (run.time_s() < kRunS - kTickS) std::abort();
+  run.bytes();
 }
 
 void read_scenario(std::string_view text) {
