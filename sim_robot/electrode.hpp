@@ -27,7 +27,7 @@ class Electrode {
   Electrode(const ElectrodeParameters& parameters, std::uint64_t seed);
 
   void step();  // one tick
-  void set_fault(const Fault& fault) { fault_ = fault; }
+  void set_fault(const SensorFault& fault) { fault_ = fault; }
 
   // 0 when it is missing, as on the robot.
   double read(double impedance_mv);
@@ -35,7 +35,7 @@ class Electrode {
  private:
   ElectrodeParameters parameters_;
   Noise noise_;
-  Fault fault_;
+  SensorFault fault_;
   double drift_mv_ = 0;
   double reading_mv_ = 0;
   bool has_read_ = false;

@@ -71,19 +71,19 @@ void Imu::accelerate(double acceleration_m_s2) {
 
 ImuReading Imu::read() {
   const bool is_missed = noise_.uniform() < missed_read_probability_;
-  return {counts_, !is_missed && fault_.kind != FaultKind::missing};
+  return {counts_, !is_missed && fault_.kind != SensorFaultKind::missing};
 }
 
 double Imu::fault_m_s2() {
-  if (fault_.kind == FaultKind::offset) return fault_.magnitude;
-  if (fault_.kind == FaultKind::noisy) return fault_.magnitude * noise_.normal();
+  if (fault_.kind == SensorFaultKind::offset) return fault_.magnitude;
+  if (fault_.kind == SensorFaultKind::noisy) return fault_.magnitude * noise_.normal();
   return 0;
 }
 
 std::int16_t Imu::sample(double acceleration_m_s2) {
   using Limits = std::numeric_limits<std::int16_t>;
   const double sensed_m_s2 = acceleration_m_s2 + bias_m_s2() + noise_m_s2_ * noise_.normal() + fault_m_s2();
-  if (fault_.kind == FaultKind::stuck) return counts_;
+  if (fault_.kind == SensorFaultKind::stuck) return counts_;
   const double counts = std::clamp<double>(kCountsPerMS2 * sensed_m_s2, Limits::min(), Limits::max());
   return static_cast<std::int16_t>(std::lround(counts));  // (1)
 }

@@ -51,7 +51,7 @@ class Imu {
   void accelerate(double acceleration_m_s2);
   ImuReading read();
 
-  void set_fault(const Fault& fault) { fault_ = fault; }
+  void set_fault(const SensorFault& fault) { fault_ = fault; }
 
   double bias_m_s2() const { return residual_m_s2_ + wander_m_s2_ + drift_m_s2_; }  // the truth, without a fault
 
@@ -69,7 +69,7 @@ class Imu {
   double until_sample_s_;
   double acceleration_m_s2_ = 0, filtered_m_s2_ = 0;  // a and f at the last tick
   std::int16_t counts_ = 0;
-  Fault fault_;
+  SensorFault fault_;
 };
 
 }  // namespace sim_robot

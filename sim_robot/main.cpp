@@ -1,59 +1,49 @@
-// The program rheonaut-sim: a robot that dials a station, an experiment's prediction, the pump's profile, a bad
-// network.
+// The program rheonaut-sim: a simulated robot that dials a station, scenarios, the prediction of an experiment, the
+// pump's profile, a bad network.
 #include <CLI/CLI.hpp>
 #include <iostream>
 
-#include "sim_robot/predict.hpp"
+#include "sim_robot/flow_command.hpp"
+#include "sim_robot/play_command.hpp"
+#include "sim_robot/predict_command.hpp"
 #include "sim_robot/proxy_command.hpp"
-#include "sim_robot/run_robot.hpp"
-#include "sim_robot/world_options.hpp"
+#include "sim_robot/run_command.hpp"
+#include "sim_robot/scenarios_command.hpp"
+
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  rheonaut-sim --station 127.0.0.1:7070                        one robot in the fabric softener
+  rheonaut-sim --station 127.0.0.1:7070 --scenario bad_day     the same robot on a bad day
+  rheonaut-sim --station 127.0.0.1:7070 --scenario mine.toml --faults 127.0.0.1:7400 --duration-s 60
+  curl -H 'Content-Type: application/json' -d '{"fault":"electrode_offset","offset_mv":40,"for_s":5}' \
+       http://127.0.0.1:7400/faults
+  rheonaut-sim scenarios                                       which there are
+  rheonaut-sim scenarios --show figure_7 > mine.toml           one to begin with
+  rheonaut-sim play figure_7 > figure_7.csv                    in virtual time, with its script
+  rheonaut-sim predict --fluid water                           what the closed loop will do
+The keys of a scenario and the HTTP control: docs/scenarios.md)";
+
+}  // namespace
 
 int main(int argc, char** argv) try {
-  CLI::App app{
-      "Simulated swimming robot: the firmware core in a simulated fluid, connected to a Rheonaut station.\n"
-      "Example: rheonaut-sim --station 127.0.0.1:7700 --id sim-1"};
-  sim_robot::SimulatedRobotConfig config;
-  sim_robot::WorldOptions world;
-  std::string station, boot_id;
-  double mean_flow_m3_s = sim_robot::kPaperFlowM3S;
-  bool json = false;
-  int handshake_ms = 0;
-  const auto add_motion = [&config, &world](CLI::App& to) {
-    to.add_option("--duty-min", config.duty.min, "lowest duty of the motor, in [-1, 0]")->capture_default_str();
-    to.add_option("--duty-max", config.duty.max, "highest duty of the motor, in (0, 1]")->capture_default_str();
-    sim_robot::add_fluid(to, world);
-  };
-  add_motion(app);
-  sim_robot::add_surroundings(app, world);
-  app.add_option("--station", station, "ADDR:PORT of the station's robot door");
-  app.add_option("--id", config.robot_id, "name of the robot, 1 to 31 of [a-z0-9_-]")->capture_default_str();
-  app.add_option("--token", config.token, "enrolment token, at most 71 characters");
-  app.add_option("--boot-id", boot_id, "fixed boot id in hexadecimal instead of a random one");
-  app.add_option("--handshake-ms", handshake_ms, "as TLS on the robot's board: it dials at rest, and ticks are missed")
-      ->check(CLI::Range(0, 30'000))
-      ->capture_default_str();
-  CLI::App* predict = app.add_subcommand("predict", "compute the closed-loop experiment and print what it measures");
-  add_motion(*predict);
-  predict->add_flag("--json", json, "as JSON");
-  CLI::App* flow_csv = app.add_subcommand("flow-csv", "print one period of the flow for a pump controller");
-  flow_csv->add_option("--mean-flow-m3-s", mean_flow_m3_s, "negative: backwards")->capture_default_str();
+  CLI::App app{"Simulated swimming robot: the firmware core in a simulated world, connected to a Rheonaut station."};
+  app.footer(kExamples);
+  app.require_subcommand(0, 1);
+  sim_robot::RunCommand run{app};
+  sim_robot::ScenariosCommand scenarios{app};
+  sim_robot::PlayCommand play{app};
+  sim_robot::PredictCommand predict{app};
+  sim_robot::FlowCommand flow{app};
   sim_robot::ProxyCommand proxy{app};
   try {
     app.parse(argc, argv);
+    if (scenarios.chosen()) return scenarios.run();
+    if (play.chosen()) return play.run();
+    if (predict.chosen()) return predict.run();
+    if (flow.chosen()) return flow.run();
     if (proxy.chosen()) return proxy.run();
-    if (flow_csv->parsed()) {
-      sim_robot::write_flow_csv(std::cout, mean_flow_m3_s);
-      return EXIT_SUCCESS;
-    }
-    config.world = sim_robot::world_of(world);
-    sim_robot::check(config);
-    if (predict->parsed()) {
-      std::cout << sim_robot::predict(config, json);
-      return EXIT_SUCCESS;
-    }
-    if (station.empty()) throw CLI::RequiredError("--station");
-    config.boot_id = boot_id.empty() ? sim_robot::random_boot_id() : sim_robot::parse_boot_id(boot_id);
-    return sim_robot::run_robot(config, sim_robot::parse_station_address(station), handshake_ms);
+    return run.run();
   } catch (const CLI::ParseError& error) {
     return app.exit(error);
   }

@@ -46,11 +46,12 @@ StationAddress parse_station_address(const std::string& text, const std::string&
 }
 
 RobotClient::RobotClient(asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log,
-                         std::chrono::milliseconds handshake)
+                         std::chrono::milliseconds handshake, std::vector<TimedFault> faults)
     : life_(std::move(config)),
       station_(std::move(station)),
       log_(std::move(log)),
       handshake_(handshake),
+      faults_(std::move(faults), log_),
       socket_(loop),
       tick_timer_(loop),
       booted_at_(Clock::now()) {}
@@ -65,7 +66,7 @@ asio::awaitable<void> RobotClient::run() {
 // now.
 std::uint64_t RobotClient::catch_up() {
   const auto since = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - booted_at_);
-  life_.advance_to(static_cast<std::uint64_t>(since.count()));
+  faults_.advance(life_, static_cast<std::uint64_t>(since.count()));
   return life_.robot_clock_us();
 }
 

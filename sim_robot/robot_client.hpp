@@ -19,6 +19,7 @@
 #include <random>
 #include <string>
 
+#include "sim_robot/fault_timeline.hpp"
 #include "sim_robot/robot_life.hpp"
 
 namespace sim_robot {
@@ -37,7 +38,7 @@ using LinkLog = std::function<void(const std::string& line)>;
 class RobotClient {
  public:
   RobotClient(boost::asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log,
-              std::chrono::milliseconds handshake = {});
+              std::chrono::milliseconds handshake = {}, std::vector<TimedFault> faults = {});
 
   // Ticks and connects until cancelled. Never returns otherwise.
   boost::asio::awaitable<void> run();
@@ -46,6 +47,9 @@ class RobotClient {
   void reboot(const Reboot& reboot);
 
   const SimulatedRobot& robot() const { return life_.robot(); }
+  // For who injects faults while it runs, on the same thread.
+  SimulatedRobot& robot() { return life_.robot(); }
+  FaultTimeline& faults() { return faults_; }
   RobotLife& life() { return life_; }  // for its clock
 
  private:
@@ -70,6 +74,7 @@ class RobotClient {
   StationAddress station_;
   LinkLog log_;
   std::chrono::milliseconds handshake_;
+  FaultTimeline faults_;
   boost::asio::ip::tcp::socket socket_;
   std::optional<boost::asio::ip::tcp::socket> forgotten_;  // of the boot before
   boost::asio::steady_timer tick_timer_;

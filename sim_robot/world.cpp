@@ -93,7 +93,7 @@ robot_fw::Inputs World::read(std::uint64_t robot_time_us) {
   return inputs;
 }
 
-void World::set_fault(Sensor sensor, const Fault& fault) {
+void World::set_fault(Sensor sensor, const SensorFault& fault) {
   check(fault);
   if (sensor == Sensor::electrode) return electrode_.set_fault(fault);
   if (!imu_) control::throw_invalid("the perfect sensor has no faults; give the world an imu");

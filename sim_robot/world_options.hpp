@@ -13,18 +13,19 @@ class App;
 
 namespace sim_robot {
 
+// What was given; the rest is as it was.
 struct WorldOptions {
-  std::string fluid = "non_newtonian";
-  std::string model_file;  // in place of the fluid
-  std::string sensor = "bno055";
-  std::optional<double> mean_flow_m3_s;  // given: in the vessel
-  std::uint64_t seed = 1;
+  std::optional<std::string> fluid;
+  std::optional<std::string> model_file;  // in place of the fluid
+  std::optional<std::string> sensor;
+  std::optional<double> mean_flow_m3_s;  // in the vessel
+  std::optional<std::uint64_t> seed;
 };
 
 void add_fluid(CLI::App& app, WorldOptions& options);
 void add_surroundings(CLI::App& app, WorldOptions& options);
 
-// Reads the model's file; throws std::invalid_argument.
-WorldConfig world_of(const WorldOptions& options);
+// Puts what was given into the world. Reads the model's file; throws std::invalid_argument.
+void put(const WorldOptions& options, WorldConfig& world);
 
 }  // namespace sim_robot

@@ -48,7 +48,8 @@ class Delivery : public ::testing::Test {
   void run_chattering_s(double seconds, IsOff is_off) {
     for (int k = 0; k < std::lround(seconds * 100); ++k) {
       const bool off = is_off(std::lround(now_s() * 100));
-      robot->world().set_fault(Sensor::electrode, {off ? FaultKind::offset : FaultKind::none, kNominalMv - kGlucoseMv});
+      robot->world().set_fault(Sensor::electrode,
+                               {off ? SensorFaultKind::offset : SensorFaultKind::none, kNominalMv - kGlucoseMv});
       station->step();
     }
   }
@@ -244,7 +245,7 @@ TEST_F(Delivery, GlucoseThatComesAndGoesDuringADeliveryIsTheSame) {
   run_s(2);
   for (int k = 0; k < 2000; ++k) {  // in the band, but not mixed; and back
     const bool diluted = k % 100 >= 10;
-    robot->world().set_fault(Sensor::electrode, {diluted ? FaultKind::offset : FaultKind::none, 38});
+    robot->world().set_fault(Sensor::electrode, {diluted ? SensorFaultKind::offset : SensorFaultKind::none, 38});
     station->step();
   }
   EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
@@ -253,7 +254,7 @@ TEST_F(Delivery, GlucoseThatComesAndGoesDuringADeliveryIsTheSame) {
 
 TEST_F(Delivery, TheElectrodesFaultIsKnownWhenTheMonitorIsSwitchedOn) {
   start({});
-  robot->world().set_fault(Sensor::electrode, {FaultKind::missing, 0});
+  robot->world().set_fault(Sensor::electrode, {SensorFaultKind::missing, 0});
   run_s(0.5);
   EXPECT_EQ(events_of(rheonaut_EVENT_KIND_SENSOR_FAULT).size(), 1u);
   station->send(set_parameter("impedance_monitor", 0));

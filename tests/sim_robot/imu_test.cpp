@@ -120,7 +120,7 @@ TEST(Imu, SmoothsFastMotionAndLosesNoVelocity) {
 TEST(Imu, IsStuckAtItsLastReadingUntilTheFaultEnds) {
   Imu imu{{}, 1};
   for (int k = 0; k < 10; ++k) imu.accelerate(1);
-  imu.set_fault({.kind = FaultKind::stuck});
+  imu.set_fault({.kind = SensorFaultKind::stuck});
   const int stuck = imu.read().counts;
   for (int k = 0; k < 100; ++k) {
     imu.accelerate(-3);
@@ -133,17 +133,17 @@ TEST(Imu, IsStuckAtItsLastReadingUntilTheFaultEnds) {
 
 TEST(Imu, ThatIsMissingGivesNoReading) {
   Imu imu{silent(), 1};
-  imu.set_fault({.kind = FaultKind::missing});
+  imu.set_fault({.kind = SensorFaultKind::missing});
   EXPECT_FALSE(imu.read().is_valid);
 }
 
 TEST(Imu, CanBeOffOrNoisyOnTop) {
   Imu imu{silent(), 1};
-  imu.set_fault({FaultKind::offset, 0.5});
+  imu.set_fault({SensorFaultKind::offset, 0.5});
   for (int k = 0; k < 3; ++k) imu.accelerate(1);
   EXPECT_EQ(imu.read().counts, 150);
   EXPECT_EQ(imu.bias_m_s2(), 0);
-  imu.set_fault({FaultKind::noisy, 0.3});
+  imu.set_fault({SensorFaultKind::noisy, 0.3});
   double squares = 0;
   constexpr int kReadings = 5000;
   for (int k = 0; k < kReadings; ++k) {

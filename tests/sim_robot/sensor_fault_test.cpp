@@ -52,7 +52,7 @@ class FaultySensor : public ::testing::Test {
     start(seed);
     station->send(set_auto(0.1F));
     station->run(500);
-    robot->world().set_fault(Sensor::accelerometer, {FaultKind::offset, offset_m_s2});
+    robot->world().set_fault(Sensor::accelerometer, {SensorFaultKind::offset, offset_m_s2});
     station->run(2000);
     return is_honest();
   }
@@ -62,7 +62,7 @@ class FaultySensor : public ::testing::Test {
 };
 
 TEST_F(FaultySensor, AStuckAccelerometerIsAnEventAfter100EqualReadings) {
-  robot->world().set_fault(Sensor::accelerometer, {.kind = FaultKind::stuck});
+  robot->world().set_fault(Sensor::accelerometer, {.kind = SensorFaultKind::stuck});
   EXPECT_NEAR(ticks_to_fault(200), 100, 2);
   robot->world().set_fault(Sensor::accelerometer, {});
   station->run(105);
@@ -70,12 +70,12 @@ TEST_F(FaultySensor, AStuckAccelerometerIsAnEventAfter100EqualReadings) {
 }
 
 TEST_F(FaultySensor, AMissingAccelerometerIsAnEventAfter25Ticks) {
-  robot->world().set_fault(Sensor::accelerometer, {.kind = FaultKind::missing});
+  robot->world().set_fault(Sensor::accelerometer, {.kind = SensorFaultKind::missing});
   EXPECT_NEAR(ticks_to_fault(50), 25, 1);
 }
 
 TEST_F(FaultySensor, AnAccelerometerBeyond4GIsAnEventAfter5Readings) {
-  robot->world().set_fault(Sensor::accelerometer, {FaultKind::offset, 45});
+  robot->world().set_fault(Sensor::accelerometer, {SensorFaultKind::offset, 45});
   EXPECT_NEAR(ticks_to_fault(20), 6, 1);  // the sensor takes its next sample within a tick
 }
 
@@ -83,29 +83,29 @@ TEST_F(FaultySensor, InAutoALostAccelerometerIsAnEmergency) {
   station->send(set_auto(0.1F));
   station->run(20);
   ASSERT_NE(robot->core().duty(), 0);
-  robot->world().set_fault(Sensor::accelerometer, {.kind = FaultKind::missing});
+  robot->world().set_fault(Sensor::accelerometer, {.kind = SensorFaultKind::missing});
   station->run(30);
   EXPECT_EQ(robot->core().mode(), rheonaut_MODE_EMERGENCY);
   EXPECT_EQ(robot->core().duty(), 0);
 }
 
 TEST_F(FaultySensor, AnElectrodeThatIsMissingOrOutOfRangeIsAnEventAfter5Readings) {
-  robot->world().set_fault(Sensor::electrode, {.kind = FaultKind::missing});
+  robot->world().set_fault(Sensor::electrode, {.kind = SensorFaultKind::missing});
   EXPECT_EQ(ticks_to_fault(20), 5);
   start();
-  robot->world().set_fault(Sensor::electrode, {FaultKind::offset, 900});
+  robot->world().set_fault(Sensor::electrode, {SensorFaultKind::offset, 900});
   EXPECT_EQ(ticks_to_fault(20), 5);
 }
 
 TEST_F(FaultySensor, AnElectrodeOffByMoreThanTheBandIsTakenForGlucose) {
-  robot->world().set_fault(Sensor::electrode, {FaultKind::offset, -30});
+  robot->world().set_fault(Sensor::electrode, {SensorFaultKind::offset, -30});
   station->run(20);
   EXPECT_EQ(events_of(rheonaut_EVENT_KIND_DETECTION), 1);
   EXPECT_EQ(faults(), 0);
 }
 
 TEST_F(FaultySensor, AStuckElectrodeOverlooksGlucose) {
-  robot->world().set_fault(Sensor::electrode, {.kind = FaultKind::stuck});
+  robot->world().set_fault(Sensor::electrode, {.kind = SensorFaultKind::stuck});
   robot->world().pour({.position_m = 0, .length_m = 9});
   station->run(200);
   EXPECT_EQ(events_of(rheonaut_EVENT_KIND_DETECTION), 0);
@@ -115,7 +115,7 @@ TEST_F(FaultySensor, AStuckElectrodeOverlooksGlucose) {
 }
 
 TEST_F(FaultySensor, ANoisyElectrodeWithinTheBandIsNothing) {
-  robot->world().set_fault(Sensor::electrode, {FaultKind::noisy, 5});
+  robot->world().set_fault(Sensor::electrode, {SensorFaultKind::noisy, 5});
   station->run(6000);
   EXPECT_EQ(events_of(rheonaut_EVENT_KIND_DETECTION), 0);
   EXPECT_EQ(faults(), 0);
@@ -126,7 +126,7 @@ TEST_F(FaultySensor, WithFiveTimesTheNoiseTheEstimateStaysHonest) {
   constexpr int kSeeds = 10;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     start(seed);
-    robot->world().set_fault(Sensor::accelerometer, {FaultKind::noisy, 0.058});
+    robot->world().set_fault(Sensor::accelerometer, {SensorFaultKind::noisy, 0.058});
     station->send(set_auto(0.1F));
     station->run(2000);
     honest += is_honest();
@@ -153,7 +153,7 @@ TEST_F(FaultySensor, AnOffsetInBetweenIsSeldomWrongInSilence) {
 
 TEST(PerfectSensor, HasNoFaults) {
   World world{WorldConfig{}};
-  EXPECT_THROW(world.set_fault(Sensor::accelerometer, {.kind = FaultKind::stuck}), std::invalid_argument);
+  EXPECT_THROW(world.set_fault(Sensor::accelerometer, {.kind = SensorFaultKind::stuck}), std::invalid_argument);
 }
 
 }  // namespace
