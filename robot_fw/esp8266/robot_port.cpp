@@ -4,6 +4,7 @@
 #include <Arduino.h>
 #include <user_interface.h>
 
+#include "robot_fw/esp8266/instruction_ram.hpp"
 #include "robot_fw/esp8266/reset_cause.hpp"
 
 namespace robot_fw::esp8266 {
@@ -19,6 +20,13 @@ std::uint64_t random_boot_id() {
   return boot_id;
 }
 
+// The samples of the ring that lie in instruction RAM; says whether there is room for them.
+bool place_samples() {
+  void* const memory = instruction_ram(kSamplesElsewhere * sizeof(Sample));
+  TelemetryRing::set_memory_elsewhere(static_cast<Sample*>(memory));
+  return memory != nullptr;
+}
+
 }  // namespace
 
 RobotPort::RobotPort(const Secrets& secrets, const Settings& settings)
@@ -32,6 +40,8 @@ RobotPort::RobotPort(const Secrets& secrets, const Settings& settings)
 void RobotPort::begin() {
   motor_.begin();  // SAFETY: first of all
   led_.begin();
+  // SAFETY: without memory there is no robot: no tick completes, so nothing ever raises the motor's pin.
+  if (!place_samples()) return;
   analogue_.begin();
   latch_.begin();
   storage_.begin();
@@ -55,6 +65,10 @@ void RobotPort::begin() {
 }
 
 void RobotPort::step() {
+  if (!robot_) {
+    led_.show(led_pattern(), clock_.now_us());
+    return;
+  }
   if (ticks_.due(clock_.now_us())) tick();
   const bool heard = receive();
   transmit();
@@ -139,6 +153,7 @@ void RobotPort::close_link() {
 }
 
 LedPattern RobotPort::led_pattern() const {
+  if (!robot_) return LedPattern::refused;
   if (robot_->emergency_id() != 0) return LedPattern::emergency;
   if (robot_->link_up()) return LedPattern::connected;
   const bool refused = robot_->refusal() != rheonaut_REFUSAL_REASON_NONE || !link_.key_is_sound();

@@ -1,7 +1,8 @@
 // The robot on its board: ties the core to the clock, the sensors, the motor, the link and the flash.
 //
 // begin() once, then step() for ever. Owns everything; one instance, since the motor's interrupt has no owner, and in
-// static storage: it holds the core with its ring, 30 kB.
+// static storage: it holds the core with its ring, 22 kB. 7.7 kB more of the ring lie in instruction RAM; where
+// there is none, no robot is made, the motor stays off and the LED says "refused".
 #pragma once
 
 #include <array>
@@ -29,6 +30,7 @@ class RobotPort {
   void begin();
   void step();
 
+  bool has_robot() const { return robot_.has_value(); }  // from begin() on, when it found the memory
   const Robot& robot() const { return *robot_; }
   const StationLink& link() const { return link_; }
   const Motor& motor() const { return motor_; }
@@ -54,7 +56,7 @@ class RobotPort {
   LatchMemory latch_;
   FlashStorage storage_{motor_};
   StationLink link_;
-  std::optional<Robot> robot_;                                   // from begin() on
+  std::optional<Robot> robot_;                                   // see has_robot()
   std::array<std::uint8_t, protocol::kMaxFramedBytes> bytes_{};  // just read, or about to be written
   std::uint32_t tick_us_ = 0;
 };

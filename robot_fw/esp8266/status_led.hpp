@@ -2,7 +2,7 @@
 //
 //   connecting  1 s: half on, half off
 //   connected   2 s: one short flash
-//   refused     2 s: three short flashes (unknown robot, wrong token, another version), or its key is none
+//   refused     2 s: three short flashes (unknown robot, wrong token, another version), its key is none, or no memory
 //   emergency   0.2 s: half on, half off; whatever the link does
 #pragma once
 

@@ -59,6 +59,7 @@ void Chip::reset(std::uint32_t reason) {
 void Chip::power_cycle() {
   reset(REASON_DEFAULT_RST);
   for (std::uint32_t& word : rtc_memory) word = ESP.random();
+  for (std::uint32_t& word : instruction_ram) word = ESP.random();
 }
 
 SetRegister& SetRegister::operator=(std::uint32_t mask) {

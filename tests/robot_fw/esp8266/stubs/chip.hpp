@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -71,6 +72,8 @@ struct Chip {
 
   std::uint32_t reset_reason = 0;
   std::array<std::uint32_t, 128> rtc_memory{};
+  std::array<std::uint32_t, 4096> instruction_ram{};  // words: on the chip anything narrower is an exception
+  std::size_t instruction_ram_bytes = 16'384;
   std::vector<std::uint8_t> flash = std::vector<std::uint8_t>(2 * kFlashSectorBytes, 0xFF);
   std::uint32_t flash_area_bytes = 2 * kFlashSectorBytes;
   int flash_erases = 0, flash_writes = 0;
