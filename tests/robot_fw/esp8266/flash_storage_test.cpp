@@ -77,6 +77,18 @@ TEST_F(Flash, DecayedRecordIsNotTaken) {
   keep("newer");
   chip.flash[kFlashSectorBytes + 20] ^= 1;
   EXPECT_EQ(after_boot(), "older");
+  FlashStorage storage{motor};
+  storage.begin();
+  EXPECT_TRUE(storage.damaged());
+}
+
+TEST_F(Flash, ThatIsBlankOrSoundIsNotDamaged) {
+  for (int writes = 0; writes < 3; ++writes) {
+    FlashStorage storage{motor};
+    storage.begin();
+    EXPECT_FALSE(storage.damaged()) << writes;
+    keep("value");
+  }
 }
 
 TEST_F(Flash, IsNeverWrittenWithTheMotorOn) {
@@ -98,7 +110,9 @@ TEST_F(Flash, ThatDoesNotTakeItIsTriedThreeTimes) {
   storage.begin();
   save(storage, StorageKey::parameters, "x");
   chip.power_lost = true;
-  for (int i = 0; i < 10; ++i) storage.write_pending();
+  int failures = 0;
+  for (int i = 0; i < 10; ++i) failures += !storage.write_pending();
+  EXPECT_EQ(failures, 1) << "said once, after the third";
   EXPECT_FALSE(storage.pending());
   EXPECT_EQ(load(storage, StorageKey::parameters), "x") << "it holds until the next boot";
 }
