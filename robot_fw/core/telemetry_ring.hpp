@@ -55,7 +55,7 @@ class TelemetryRing {
   // Memory for kSamplesElsewhere samples, for the life of the program, set before the first push. There is one for all
   // rings: where some samples lie elsewhere, a program has one ring and copies none. It is only accessed as whole words
   // of 32 bits, and what it holds at first does not matter.
-  static void set_memory_elsewhere(Sample* samples) { elsewhere_ = samples; }
+  static void set_memory_elsewhere(Sample* samples) { elsewhere = samples; }
 
   // Numbers the sample and keeps it. Starts a segment when a batch value changed or time did not move by one period;
   // says whether it did. The oldest sample, or segment, makes room and is counted as lost.
@@ -83,11 +83,11 @@ class TelemetryRing {
   bool continues(const BatchValues& values, std::uint64_t robot_time_us, std::uint32_t period_us) const;
   void forget_below(std::uint64_t seq);
   const Sample& place(std::size_t at) const {
-    return at < kSamplesElsewhere ? elsewhere_[at] : samples_[at - kSamplesElsewhere];
+    return at < kSamplesElsewhere ? elsewhere[at] : samples_[at - kSamplesElsewhere];
   }
-  Sample& place(std::size_t at) { return at < kSamplesElsewhere ? elsewhere_[at] : samples_[at - kSamplesElsewhere]; }
+  Sample& place(std::size_t at) { return at < kSamplesElsewhere ? elsewhere[at] : samples_[at - kSamplesElsewhere]; }
 
-  static inline Sample* elsewhere_ = nullptr;
+  static inline Sample* elsewhere = nullptr;
   std::array<Sample, kCapacity - kSamplesElsewhere> samples_{};
   std::bitset<kCapacity> saturated_;
   std::array<Segment, kMaxSegments> segments_{};
