@@ -9,7 +9,7 @@ target_compile_options(project_warnings INTERFACE
 # The dialect of code that also runs on the robot: no exceptions, no run-time types, no silent double arithmetic.
 add_library(firmware_dialect INTERFACE)
 target_compile_options(firmware_dialect INTERFACE
-  $<$<COMPILE_LANGUAGE:CXX>:-std=c++17 -fno-exceptions -fno-rtti -Wdouble-promotion -Wfloat-conversion -ffp-contract=off>)
+  $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions -fno-rtti -Wdouble-promotion -Wfloat-conversion -ffp-contract=off>)
 
 # RHEONAUT_SANITIZE: a list for -fsanitize, empty for none. `enum` is left out because protobuf enumerators are open:
 # a newer peer may send a value that this version does not know.

@@ -9,17 +9,18 @@ namespace {
 
 template <class Frame>
 std::size_t write_any_frame(const Frame& frame, std::uint8_t* out, std::size_t capacity) {
-  std::array<std::uint8_t, kMaxFrameBytes> payload;
-  const std::size_t length = encode(frame, payload.data(), payload.size());
+  // The payload is written behind one byte of length, and moved when it needs two: a buffer would cost 1 kB of stack.
+  if (capacity == 0) return 0;
+  const std::size_t length = encode(frame, out + 1, std::min(capacity - 1, kMaxFrameBytes));
   const std::size_t prefix = length < 0x80 ? 1 : 2;
   if (length == 0 || prefix + length > capacity) return 0;
   if (prefix == 1) {
     out[0] = static_cast<std::uint8_t>(length);
   } else {
+    std::memmove(out + prefix, out + 1, length);
     out[0] = static_cast<std::uint8_t>(0x80 | (length & 0x7F));
     out[1] = static_cast<std::uint8_t>(length >> 7);
   }
-  std::memcpy(out + prefix, payload.data(), length);
   return prefix + length;
 }
 

@@ -1,8 +1,11 @@
 // Encodes and decodes through nanopb, and names the enumerators.
 #include "protocol/messages.hpp"
 
+#include <pb_common.h>
 #include <pb_decode.h>
 #include <pb_encode.h>
+
+#include <cstring>
 
 namespace protocol {
 namespace {
@@ -18,11 +21,12 @@ std::size_t encode_any(const pb_msgdesc_t* fields, const Message& message, std::
   return stream.bytes_written;
 }
 
+// One variable and one return, so that a message, which is large, lies on the robot's stack only once.
 template <class Message>
 std::optional<Message> decode_any(const pb_msgdesc_t* fields, Bytes payload) {
   std::optional<Message> message{std::in_place};
   pb_istream_t stream = pb_istream_from_buffer(payload.first, payload.size);
-  if (!pb_decode(&stream, fields, &*message) || !has_content(*message)) return std::nullopt;
+  if (!pb_decode(&stream, fields, &*message) || !has_content(*message)) message.reset();
   return message;
 }
 
@@ -32,10 +36,40 @@ bool columns_agree(const Telemetry& batch) {
          batch.duty_count == count && batch.impedance_mv_count == count && batch.reference_m_count == count;
 }
 
+bool encode_uint64(pb_ostream_t& stream, std::uint32_t tag, std::uint64_t value) {
+  return value == 0 || (pb_encode_tag(&stream, PB_WT_VARINT, tag) && pb_encode_varint(&stream, value));
+}
+
+// A submessage as nanopb encodes it, to `out`, where `stream` writes. But nanopb encodes it twice, first for its length
+// alone, and that is half of a frame's cost on a robot. Here it is written behind one byte of length, and moved if it
+// needs two.
+bool encode_once(pb_ostream_t& stream, const pb_field_iter_t& field, std::uint8_t* out, std::size_t capacity) {
+  static_assert(rheonaut_RobotFrame_size < 1 << 14, "the length of a submessage may need three bytes");
+  if (!pb_encode_tag(&stream, PB_WT_STRING, field.tag)) return false;
+  std::size_t at = stream.bytes_written + 1;
+  if (at > capacity) return false;
+  pb_ostream_t inner = pb_ostream_from_buffer(out + at, capacity - at);
+  if (!pb_encode(&inner, field.submsg_desc, field.pData)) return false;
+  const std::size_t length = inner.bytes_written;
+  if (length >= 0x80) {
+    if (at + 1 + length > capacity) return false;
+    std::memmove(out + at + 1, out + at, length);
+    ++at;
+  }
+  if (!pb_encode_varint(&stream, length)) return false;
+  stream.bytes_written = at + length;
+  return true;
+}
+
 }  // namespace
 
 std::size_t encode(const RobotFrame& frame, std::uint8_t* out, std::size_t capacity) {
-  return encode_any(rheonaut_RobotFrame_fields, frame, out, capacity);
+  pb_field_iter_t body;
+  if (!pb_field_iter_begin_const(&body, rheonaut_RobotFrame_fields, &frame)) return 0;
+  pb_ostream_t stream = pb_ostream_from_buffer(out, capacity);
+  const bool fits = encode_uint64(stream, rheonaut_RobotFrame_robot_time_us_tag, frame.robot_time_us) &&
+                    pb_field_iter_find(&body, frame.which_body) && encode_once(stream, body, out, capacity);
+  return fits ? stream.bytes_written : 0;
 }
 
 std::size_t encode(const StationFrame& frame, std::uint8_t* out, std::size_t capacity) {
@@ -49,7 +83,7 @@ std::size_t encode(const Command& command, std::uint8_t* out, std::size_t capaci
 std::optional<RobotFrame> decode_robot_frame(Bytes payload) {
   auto frame = decode_any<RobotFrame>(rheonaut_RobotFrame_fields, payload);
   if (frame && frame->which_body == rheonaut_RobotFrame_telemetry_tag && !columns_agree(frame->body.telemetry)) {
-    return std::nullopt;
+    frame.reset();
   }
   return frame;
 }

@@ -8,11 +8,11 @@
 
 namespace sim_robot {
 
-void check(const Fault& fault) {
+void check(const SensorFault& fault) {
   if (!std::isfinite(fault.magnitude)) {
     control::throw_invalid("sensor fault: its magnitude must be finite, is ", fault.magnitude);
   }
-  if (fault.kind == FaultKind::noisy && fault.magnitude < 0) {
+  if (fault.kind == SensorFaultKind::noisy && fault.magnitude < 0) {
     control::throw_invalid("sensor fault: noise must be 0 or more, is ", fault.magnitude);
   }
 }
@@ -26,20 +26,20 @@ void check(const ElectrodeParameters& parameters) {
 }
 
 Electrode::Electrode(const ElectrodeParameters& parameters, std::uint64_t seed)
-    : parameters_(parameters), random_(static_cast<std::minstd_rand::result_type>(seed ^ (seed >> 32))) {
+    : parameters_(parameters), noise_(seed) {
   check(parameters);
 }
 
 void Electrode::step() { drift_mv_ += parameters_.drift_mv_s * kTickS; }
 
 double Electrode::read(double impedance_mv) {
-  if (fault_.kind == FaultKind::missing) return 0;
-  if (fault_.kind == FaultKind::stuck && has_read_) return reading_mv_;
+  if (fault_.kind == SensorFaultKind::missing) return 0;
+  if (fault_.kind == SensorFaultKind::stuck && has_read_) return reading_mv_;
   has_read_ = true;
   reading_mv_ = impedance_mv + parameters_.offset_mv + drift_mv_;
-  if (parameters_.noise_mv > 0) reading_mv_ += parameters_.noise_mv * normal_(random_);  // (1)
-  if (fault_.kind == FaultKind::offset) reading_mv_ += fault_.magnitude;
-  if (fault_.kind == FaultKind::noisy) reading_mv_ += fault_.magnitude * normal_(random_);
+  if (parameters_.noise_mv > 0) reading_mv_ += parameters_.noise_mv * noise_.normal();  // (1)
+  if (fault_.kind == SensorFaultKind::offset) reading_mv_ += fault_.magnitude;
+  if (fault_.kind == SensorFaultKind::noisy) reading_mv_ += fault_.magnitude * noise_.normal();
   return reading_mv_;
 }
 

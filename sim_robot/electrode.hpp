@@ -6,8 +6,8 @@
 #pragma once
 
 #include <cstdint>
-#include <random>
 
+#include "sim_robot/noise.hpp"
 #include "sim_robot/sensor_fault.hpp"
 
 namespace sim_robot {
@@ -27,16 +27,15 @@ class Electrode {
   Electrode(const ElectrodeParameters& parameters, std::uint64_t seed);
 
   void step();  // one tick
-  void set_fault(const Fault& fault) { fault_ = fault; }
+  void set_fault(const SensorFault& fault) { fault_ = fault; }
 
   // 0 when it is missing, as on the robot.
   double read(double impedance_mv);
 
  private:
   ElectrodeParameters parameters_;
-  std::minstd_rand random_;
-  std::normal_distribution<double> normal_;
-  Fault fault_;
+  Noise noise_;
+  SensorFault fault_;
   double drift_mv_ = 0;
   double reading_mv_ = 0;
   bool has_read_ = false;

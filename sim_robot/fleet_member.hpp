@@ -9,7 +9,7 @@
 
 namespace sim_robot {
 
-// Since boot, of one robot or in sum. Always: made = acknowledged + held + lost.
+// Of one robot over all its boots, or in sum. Always: made = acknowledged + held + lost.
 struct SampleCounts {
   std::uint64_t made = 0;
   std::uint64_t acknowledged = 0;  // the station has them on disk

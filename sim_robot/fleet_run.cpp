@@ -133,7 +133,8 @@ int run_fleet(const FleetOptions& options, const SimulatedRobotConfig& kind, std
     config.boot_id = random_boot_id();
     config.world.seed += static_cast<std::uint64_t>(i);
     check(config);
-    robots.push_back(std::make_unique<RobotClient>(loop, std::move(config), options.station, LinkLog{}));
+    robots.push_back(std::make_unique<RobotClient>(loop, std::move(config), options.station, LinkLog{},
+                                                   options.handshake, options.faults));
   }
   Fleet fleet{loop, std::move(robots), std::chrono::microseconds(SimulatedRobot::kPeriodUs)};
   return run(options, loop, fleet, out);

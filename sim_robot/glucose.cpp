@@ -80,6 +80,10 @@ Glucose::Glucose(const GlucoseParameters& parameters)
 }
 
 void Glucose::pour(GlucosePatch patch) {
+  std::erase_if(patches_, [this](const Patch& each) { return time_s_ >= each.removed_at_s - kHalfTickS; });
+  if (patches_.size() >= kMaxPatches) {
+    control::throw_invalid("glucose: there are ", patches_.size(), " patches, more are not allowed");
+  }
   patch.poured_at_s = time_s_;
   patches_.push_back(begun(patch));
 }

@@ -9,6 +9,7 @@
 // std::invalid_argument quoting the bad value.
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <vector>
 
@@ -36,13 +37,16 @@ void check(const GlucoseParameters& parameters);
 
 class Glucose {
  public:
+  static constexpr std::size_t kMaxPatches = 100;  // each costs time in every tick
+
   explicit Glucose(const GlucoseParameters& parameters);
 
   void step();  // one tick
 
-  // One more, from now on; poured_at_s is taken as now.
+  // One more, from now on; poured_at_s is taken as now. Throws when there are kMaxPatches that are not removed.
   void pour(GlucosePatch patch);
 
+  double time_s() const { return time_s_; }       // since it began, in which patches are removed
   double concentration(double position_m) const;  // Σ c
   double impedance_mv(double position_m) const;   // (1)
 

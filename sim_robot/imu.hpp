@@ -16,8 +16,8 @@
 #pragma once
 
 #include <cstdint>
-#include <random>
 
+#include "sim_robot/noise.hpp"
 #include "sim_robot/sensor_fault.hpp"
 
 namespace sim_robot {
@@ -51,18 +51,15 @@ class Imu {
   void accelerate(double acceleration_m_s2);
   ImuReading read();
 
-  void set_fault(const Fault& fault) { fault_ = fault; }
+  void set_fault(const SensorFault& fault) { fault_ = fault; }
 
   double bias_m_s2() const { return residual_m_s2_ + wander_m_s2_ + drift_m_s2_; }  // the truth, without a fault
 
  private:
   std::int16_t sample(double acceleration_m_s2);
   double fault_m_s2();
-  double normal() { return normal_(random_); }
 
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
-  std::uniform_real_distribution<double> uniform_{0, 1};
+  Noise noise_;
   double noise_m_s2_;                        // sd of a sample
   double wander_decay_, wander_step_m_s2_;   // of (3), in a tick
   double filter_decay_, filter_late_share_;  // of (4): e^{-2πB dt}, and 1 - (1 - e^{-2πB dt})/(2πB dt)
@@ -72,7 +69,7 @@ class Imu {
   double until_sample_s_;
   double acceleration_m_s2_ = 0, filtered_m_s2_ = 0;  // a and f at the last tick
   std::int16_t counts_ = 0;
-  Fault fault_;
+  SensorFault fault_;
 };
 
 }  // namespace sim_robot

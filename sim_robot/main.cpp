@@ -1,70 +1,54 @@
-// The program rheonaut-sim: simulated robots that dial a station, or the prediction of an experiment.
+// The program rheonaut-sim: simulated robots that dial a station, scenarios, the prediction of an experiment, the
+// pump's profile, a bad network.
 #include <CLI/CLI.hpp>
-#include <boost/asio/co_spawn.hpp>
-#include <boost/asio/signal_set.hpp>
-#include <csignal>
 #include <iostream>
 
-#include "sim_robot/fleet_command.hpp"
-#include "sim_robot/predict.hpp"
-#include "sim_robot/robot_client.hpp"
+#include "sim_robot/flow_command.hpp"
+#include "sim_robot/play_command.hpp"
+#include "sim_robot/predict_command.hpp"
+#include "sim_robot/proxy_command.hpp"
+#include "sim_robot/replay_command.hpp"
+#include "sim_robot/run_command.hpp"
+#include "sim_robot/scenarios_command.hpp"
 
 namespace {
 
-int run_robot(const sim_robot::SimulatedRobotConfig& config, const sim_robot::StationAddress& station) {
-  boost::asio::io_context loop{1};
-  const auto log = [](const std::string& line) { std::cout << "rheonaut-sim: " << line << std::endl; };
-  sim_robot::RobotClient client{loop, config, station, log};
-  boost::asio::co_spawn(loop, client.run(), [](const std::exception_ptr& error) {
-    if (error) std::rethrow_exception(error);
-  });
-  boost::asio::signal_set stop{loop, SIGINT, SIGTERM};
-  stop.async_wait([&loop](const boost::system::error_code&, int) { loop.stop(); });
-  loop.run();
-  return EXIT_SUCCESS;
-}
+constexpr const char* kExamples = R"(Examples:
+  rheonaut-sim --station 127.0.0.1:7070                        one robot in the fabric softener
+  rheonaut-sim --station 127.0.0.1:7070 --scenario bad_day     the same robot on a bad day
+  rheonaut-sim --station 127.0.0.1:7070 --scenario mine.toml --faults 127.0.0.1:7400 --duration-s 60
+  curl -H 'Content-Type: application/json' -d '{"fault":"electrode_offset","offset_mv":40,"for_s":5}' \
+       http://127.0.0.1:7400/faults
+  rheonaut-sim --station 127.0.0.1:7070 --robots 1000 --duration-s 60     a fleet, and what became of its samples
+  rheonaut-sim replay --station 127.0.0.1:7070 --robots 5000              the same with recorded telemetry
+  rheonaut-sim scenarios                                       which there are
+  rheonaut-sim scenarios --show figure_7 > mine.toml           one to begin with
+  rheonaut-sim play figure_7 > figure_7.csv                    in virtual time, with its script
+  rheonaut-sim predict --fluid water                           what the closed loop will do
+The keys of a scenario and the HTTP control: docs/scenarios.md; fleets: docs/fleet.md)";
 
 }  // namespace
 
 int main(int argc, char** argv) try {
-  CLI::App app{
-      "Simulated swimming robot: the firmware core in a simulated fluid, connected to a Rheonaut station.\n"
-      "Example: rheonaut-sim --station 127.0.0.1:7700 --id sim-1"};
-  sim_robot::SimulatedRobotConfig config;
-  std::string station, boot_id, sensor = "bno055";
-  bool json = false;
-  const auto add_duty = [&config](CLI::App& to) {
-    to.add_option("--duty-min", config.duty.min, "lowest duty of the motor, in [-1, 0]")->capture_default_str();
-    to.add_option("--duty-max", config.duty.max, "highest duty of the motor, in (0, 1]")->capture_default_str();
-  };
-  add_duty(app);
-  app.add_option("--station", station, "ADDR:PORT of the station's robot door");
-  const auto* id =
-      app.add_option("--id", config.robot_id, "name of the robot, 1 to 31 of [a-z0-9_-]")->capture_default_str();
-  app.add_option("--token", config.token, "enrolment token, at most 71 characters");
-  app.add_option("--boot-id", boot_id, "fixed boot id in hexadecimal instead of a random one");
-  app.add_option("--sensor", sensor, "bno055: its accelerometer and the estimate; perfect: the true position")
-      ->check(CLI::IsMember({"bno055", "perfect"}))
-      ->capture_default_str();
-  app.add_option("--seed", config.world.seed, "of the sensors' noise")->capture_default_str();
-  app.add_option("--samples-per-frame", config.samples_per_frame, "of telemetry, 1 to 25")->capture_default_str();
-  sim_robot::FleetCommand fleet{app};
-  CLI::App* predict = app.add_subcommand("predict", "compute the closed-loop experiment and print what it measures");
-  add_duty(*predict);
-  predict->add_flag("--json", json, "as JSON");
+  CLI::App app{"Simulated swimming robot: the firmware core in a simulated world, connected to a Rheonaut station."};
+  app.footer(kExamples);
+  app.require_subcommand(0, 1);
+  sim_robot::RunCommand run{app};
+  sim_robot::ReplayCommand replay{app};
+  sim_robot::ScenariosCommand scenarios{app};
+  sim_robot::PlayCommand play{app};
+  sim_robot::PredictCommand predict{app};
+  sim_robot::FlowCommand flow{app};
+  sim_robot::ProxyCommand proxy{app};
   try {
     app.parse(argc, argv);
-    sim_robot::check(config);
-    if (predict->parsed()) {
-      std::cout << sim_robot::predict(config.duty, json);
-      return EXIT_SUCCESS;
-    }
-    if (fleet.is_replay()) return fleet.replay();
-    if (sensor == "bno055") config.world.imu.emplace();
-    if (station.empty()) throw CLI::RequiredError("--station");
-    if (fleet.is_fleet()) return fleet.run(station, config, id->count() > 0);
-    config.boot_id = boot_id.empty() ? sim_robot::random_boot_id() : sim_robot::parse_boot_id(boot_id);
-    return run_robot(config, sim_robot::parse_station_address(station));
+    if (replay.chosen()) return replay.run();
+    if (scenarios.chosen()) return scenarios.run();
+    if (play.chosen()) return play.run();
+    if (predict.chosen()) return predict.run();
+    if (flow.chosen()) return flow.run();
+    if (proxy.chosen()) return proxy.run();
+    return run.run();
   } catch (const CLI::ParseError& error) {
     return app.exit(error);
   }

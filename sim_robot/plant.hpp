@@ -6,7 +6,7 @@
 //   x' = v                                                               (3)
 // with the values of control::HydrodynamicParameters. Duty backwards turns the thrust around. (28) is (2) linearised,
 // with an empirical gain: see docs/simulator.md for how far the two are apart.
-// Accuracy: (1) exact, (2) and (3) by Runge-Kutta of 4th order in 4 steps a tick: within 1e-6 m/s of 100 times as many
+// Accuracy: (1) exact, (2) and (3) by Runge-Kutta of 4th order in 4 steps a tick: within 1e-5 m/s of 100 times as many
 //           steps, held by plant_test.cpp.
 // Errors:   throws std::invalid_argument quoting the bad value.
 #pragma once

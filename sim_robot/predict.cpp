@@ -39,14 +39,13 @@ std::string as_table(const robot_fw::DutyRange& duty, const ExperimentResult& re
 
 }  // namespace
 
-std::string predict(const robot_fw::DutyRange& duty, bool as_json) {
-  SimulatedRobotConfig config;
-  config.duty = duty;
+std::string predict(SimulatedRobotConfig config, bool as_json) {
+  config.world.imu.reset();
   const ExperimentResult result = run_experiment(config);
-  if (!as_json) return as_table(duty, result);
+  if (!as_json) return as_table(config.duty, result);
   Json json;
-  json["duty_min"] = duty.min;
-  json["duty_max"] = duty.max;
+  json["duty_min"] = config.duty.min;
+  json["duty_max"] = config.duty.max;
   json["settling_s"] = or_null(result.step.settling_s);
   json["overshoot_percent"] = result.step.overshoot_percent;
   json["steady_state_error_m"] = result.step.steady_state_error_m;

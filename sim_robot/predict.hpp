@@ -7,8 +7,8 @@
 
 namespace sim_robot {
 
-// JSON keys: duty_min, duty_max, settling_s, overshoot_percent, steady_state_error_m and the same with disturbance_ in
-// front; settling is null when the robot never settles.
-std::string predict(const robot_fw::DutyRange& duty, bool as_json);
+// With a perfect sensor, whatever the config says. JSON keys: duty_min, duty_max, settling_s, overshoot_percent,
+// steady_state_error_m and the same with disturbance_ in front; settling is null when the robot never settles.
+std::string predict(SimulatedRobotConfig config, bool as_json);
 
 }  // namespace sim_robot

@@ -1,25 +1,31 @@
 // Runs a simulated robot in real time and connects it to a station over TCP.
 //
-// Robot time is the host's steady clock since the robot booted, on time or late, in a tick or between two. Ticks are
-// due at multiples of the period; late ones run before any byte is handed to the robot, so its time never goes back.
-// After a stall (the process was stopped, the machine busy) the missed ones are skipped and counted. A tick never waits
-// for the network: see station_connection.hpp. Owns robot and connection. One thread: that of `loop`, which must
-// outlive the client.
+// True time is the host's steady clock since the robot booted first, on time or late, in a tick or between two. Ticks
+// are due at multiples of the period; late ones run before any byte is handed to the robot, so its time never goes
+// back. After a stall (the process was stopped, the machine busy) the missed ones are skipped and counted. A tick never
+// waits for the network: see station_connection.hpp. A reboot leaves the connection without an end, and resets it when
+// the robot is back. With a handshake, as TLS on the robot's board, it dials only at rest, and nothing ticks until the
+// handshake is over.
+// Owns robot and connection. One thread: that of `loop`, which must outlive the client.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
 #include <chrono>
 #include <cstdint>
+#include <optional>
+#include <vector>
 
+#include "sim_robot/fault_timeline.hpp"
 #include "sim_robot/fleet_member.hpp"
-#include "sim_robot/simulated_robot.hpp"
+#include "sim_robot/robot_life.hpp"
 
 namespace sim_robot {
 
 class RobotClient final : public FleetMember, private Speaker {
  public:
-  RobotClient(boost::asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log);
+  RobotClient(boost::asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log,
+              std::chrono::milliseconds handshake = {}, std::vector<TimedFault> faults = {});
 
   // Boots now, ticks and connects until cancelled. Never returns otherwise.
   boost::asio::awaitable<void> run();
@@ -29,30 +35,42 @@ class RobotClient final : public FleetMember, private Speaker {
   void tick() override;
   void send() override;
   Clock::time_point next_tick_at() const override {
-    return booted_at_ + std::chrono::microseconds(robot_.robot_time_us());
+    return booted_at_ + std::chrono::microseconds(life_.next_tick_us());
   }
   boost::asio::awaitable<void> stay_connected() override { return connection_.run(); }
 
+  void reboot(const Reboot& reboot);
+
   SampleCounts samples() const override;
   const StationConnection& connection() const override { return connection_; }
-  const SimulatedRobot& robot() const { return robot_; }
+  const SimulatedRobot& robot() const { return life_.robot(); }
+  // For who injects faults while it runs, on the same thread.
+  SimulatedRobot& robot() { return life_.robot(); }
+  FaultTimeline& faults() { return faults_; }
+  RobotLife& life() { return life_; }  // for its clock
 
  private:
-  void on_opened() override { robot_.link_opened(catch_up()); }
-  void on_closed() override { robot_.link_closed(catch_up()); }
-  bool on_bytes(protocol::Bytes bytes) override { return robot_.receive(bytes, catch_up()); }
+  void on_opened() override;
+  void on_closed() override { life_.robot().link_closed(catch_up()); }
+  bool on_bytes(protocol::Bytes bytes) override;
   std::size_t next_frame(std::uint8_t* out, std::size_t capacity) override;
-  bool is_welcome() const override { return robot_.core().link_up(); }
-  protocol::RefusalReason refusal() const override { return robot_.core().refusal(); }
-  std::string refusal_detail() const override { return robot_.core().refusal_detail(); }
+  bool is_welcome() const override { return life_.core().link_up(); }
+  protocol::RefusalReason refusal() const override { return life_.core().refusal(); }
+  std::string refusal_detail() const override { return life_.core().refusal_detail(); }
+  bool may_dial() const override;
+  std::optional<std::chrono::milliseconds> begin_handshake() override;
 
   boost::asio::awaitable<void> tick_for_ever();
   std::uint64_t catch_up();
+  void follow_reboot();
   void watch_gaps();
 
-  SimulatedRobot robot_;
-  Clock::time_point booted_at_;  // robot time 0
+  RobotLife life_;
+  std::chrono::milliseconds handshake_;
+  FaultTimeline faults_;
+  Clock::time_point booted_at_;  // true time 0
   StationConnection connection_;
+  int boots_ = 1;
   std::uint64_t sent_ = 0, resent_ = 0;          // samples
   std::uint64_t gaps_ = 0, lost_before_ = 0;     // at the last tick
   std::uint64_t oldest_after_gap_ = UINT64_MAX;  // it is this while the latest gap grows

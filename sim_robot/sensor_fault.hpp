@@ -5,7 +5,7 @@ namespace sim_robot {
 
 enum class Sensor { accelerometer, electrode };
 
-enum class FaultKind {
+enum class SensorFaultKind {
   none,
   stuck,    // gives the same reading for ever
   noisy,    // white noise of sd `magnitude` on top
@@ -13,12 +13,12 @@ enum class FaultKind {
   missing,  // gives no reading
 };
 
-struct Fault {
-  FaultKind kind = FaultKind::none;
+struct SensorFault {
+  SensorFaultKind kind = SensorFaultKind::none;
   double magnitude = 0;  // m/s² of the accelerometer, mV of the electrode
 };
 
 // Throws std::invalid_argument quoting the bad value.
-void check(const Fault& fault);
+void check(const SensorFault& fault);
 
 }  // namespace sim_robot

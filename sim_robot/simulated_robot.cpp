@@ -1,7 +1,9 @@
 // Readings from the world into the core, duty from the core into the world.
 #include "sim_robot/simulated_robot.hpp"
 
+#include <algorithm>
 #include <charconv>
+#include <memory>
 #include <random>
 #include <stdexcept>
 #include <utility>
@@ -24,6 +26,8 @@ robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
   core.samples_per_frame = config.samples_per_frame;
   core.sample_period_us = SimulatedRobot::kPeriodUs;
   core.storage = config.storage;
+  core.restored_emergency_id = config.restored_emergency_id;
+  core.restored_emergency_cause = config.restored_emergency_cause;
   return core;
 }
 
@@ -90,6 +94,23 @@ void SimulatedRobot::skip(std::uint64_t ticks) {
   }
   robot_time_us_ += ticks * kPeriodUs;
   missed_ticks_ += static_cast<std::uint32_t>(ticks);
+}
+
+void SimulatedRobot::reset(const SimulatedRobotConfig& config) {
+  config_ = config;
+  std::destroy_at(&core_);
+  std::construct_at(&core_, core_config(config_));
+  robot_time_us_ = 0;
+  missed_ticks_ = 0;
+}
+
+void SimulatedRobot::coast(std::uint64_t ticks) {
+  for (std::uint64_t i = 0; i < ticks; ++i) world_.step(0);
+}
+
+void SimulatedRobot::jump_clock(std::int64_t by_us) {
+  robot_time_us_ =
+      static_cast<std::uint64_t>(std::max<std::int64_t>(0, static_cast<std::int64_t>(robot_time_us_) + by_us));
 }
 
 }  // namespace sim_robot

@@ -19,7 +19,9 @@ struct SimulatedRobotConfig {
   robot_fw::DutyRange duty{-1, 1};
   std::uint32_t samples_per_frame = 5;  // 1 to 25; the station may ask for another
   WorldConfig world;
-  robot_fw::Storage* storage = nullptr;  // of parameters and controller; null: they end with the robot
+  robot_fw::Storage* storage = nullptr;     // of parameters and controller; null: they end with the robot
+  std::uint64_t restored_emergency_id = 0;  // a latch that outlived the reset; 0: none
+  protocol::EmergencyCause restored_emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;
 };
 
 // Throws std::invalid_argument, quoting the value, when a name, token, boot id, duty range or the world cannot be.
@@ -48,6 +50,12 @@ class SimulatedRobot {
   // Time passes without ticks: the motor keeps the duty it has for 50 ms and is off then, as on the robot's board; the
   // core sees nothing but the later time.
   void skip(std::uint64_t ticks);
+
+  // What sim_robot/robot_life makes of a robot. A reset begins the core anew at robot time 0 with what `config` says of
+  // boot, cause, duty, storage and latch; plant and sensors are the same and go on.
+  void reset(const SimulatedRobotConfig& config);
+  void coast(std::uint64_t ticks);      // without power: the plant alone, robot time stands still
+  void jump_clock(std::int64_t by_us);  // robot time alone; back to 0 at most
 
   // As of the core; times are robot times, see robot_fw/core/robot.hpp.
   void link_opened(std::uint64_t now_us) { core_.link_opened(now_us); }

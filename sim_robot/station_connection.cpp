@@ -20,6 +20,7 @@ using namespace asio::experimental::awaitable_operators;
 using namespace std::chrono_literals;
 
 constexpr auto kConnectTimeout = 1s;
+constexpr auto kMayDialPeriod = 10ms;
 constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
 constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
@@ -30,17 +31,17 @@ asio::awaitable<void> pause(std::chrono::milliseconds duration) {
 
 }  // namespace
 
-StationAddress parse_station_address(const std::string& text) {
+StationAddress parse_station_address(const std::string& text, const std::string& option, int lowest_port) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos || colon == 0 || colon + 1 == text.size()) {
-    throw std::invalid_argument("--station: '" + text + "' is not ADDR:PORT");
+    throw std::invalid_argument(option + ": '" + text + "' is not ADDR:PORT");
   }
   std::string host = text.substr(0, colon);
   if (host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
   const std::string port = text.substr(colon + 1);
   if (port.size() > 5 || port.find_first_not_of("0123456789") != std::string::npos || std::stoi(port) > 65535 ||
-      std::stoi(port) == 0) {
-    throw std::invalid_argument("--station: '" + port + "' is not a port");
+      std::stoi(port) < lowest_port) {
+    throw std::invalid_argument(option + ": '" + port + "' is not a port");
   }
   return {host, port};
 }
@@ -51,13 +52,18 @@ StationConnection::StationConnection(asio::io_context& loop, Speaker& speaker, S
 
 asio::awaitable<void> StationConnection::run() {
   for (;;) {
+    while (!speaker_.may_dial()) co_await pause(kMayDialPeriod);
+    const int times_forgotten = times_forgotten_;
     const bool dialled = co_await dial();
-    if (dialled) {
-      co_await serve();
-      say_how_it_ended();
-    } else {
+    if (!dialled) {
       ++counts_.unreachable;
       say("cannot reach the station at " + station_.host + ":" + station_.port + ", trying again");
+    } else {
+      const bool ready = co_await shake_hands();
+      if (ready && times_forgotten == times_forgotten_) {
+        co_await serve();
+        say_how_it_ended();
+      }
     }
     std::uniform_int_distribution<int> pause_ms{kMinPauseMs, kMaxPauseMs};
     co_await pause(std::chrono::milliseconds(pause_ms(jitter_)));
@@ -94,13 +100,19 @@ asio::awaitable<bool> StationConnection::reach(std::vector<tcp::endpoint> endpoi
   co_return !error;
 }
 
+asio::awaitable<bool> StationConnection::shake_hands() {
+  const auto handshake = speaker_.begin_handshake();
+  if (handshake && *handshake > 0ms) co_await pause(*handshake);
+  co_return handshake.has_value();
+}
+
 // Bytes go to the speaker as they arrive, and what it answers leaves at once.
 asio::awaitable<void> StationConnection::serve() {
   is_open_ = true;
   was_welcome_ = false;
   unsent_.clear();
   speaker_.on_opened();
-  flush();
+  if (is_open_) flush();
   while (is_open_) {
     const auto [error] = co_await socket_.async_wait(tcp::socket::wait_read, kNoThrow);
     if (error) break;
@@ -131,7 +143,7 @@ void StationConnection::notice_welcome() {
 }
 
 void StationConnection::flush() {
-  if (!unsent_.empty()) {
+  if (is_open_ && !unsent_.empty()) {
     const auto rest = std::exchange(unsent_, {});
     if (!write({rest.data(), rest.size()})) return;
   }
@@ -164,7 +176,22 @@ void StationConnection::close_as_silent() {
   close();
 }
 
-// Also ends the read under way.
+// Also ends the read under way, as close() does.
+void StationConnection::forget() {
+  ++times_forgotten_;
+  boost::system::error_code ignored;
+  socket_.cancel(ignored);
+  if (is_open_) forgotten_.emplace(std::move(socket_));
+  is_open_ = false;
+}
+
+void StationConnection::reset_forgotten() {
+  if (!forgotten_) return;
+  boost::system::error_code ignored;
+  forgotten_->set_option(asio::socket_base::linger{true, 0}, ignored);
+  forgotten_.reset();
+}
+
 void StationConnection::close() {
   if (!is_open_) return;
   is_open_ = false;

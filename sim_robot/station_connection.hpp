@@ -10,8 +10,10 @@
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <chrono>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -24,8 +26,9 @@ struct StationAddress {
   std::string host;
   std::string port;
 };
-// "host:port" or "[v6]:port"; throws std::invalid_argument.
-StationAddress parse_station_address(const std::string& text);
+// "host:port" or "[v6]:port"; throws std::invalid_argument that names the option.
+StationAddress parse_station_address(const std::string& text, const std::string& option = "--station",
+                                     int lowest_port = 1);
 
 // What people are told about the link, one line each.
 using LinkLog = std::function<void(const std::string& line)>;
@@ -42,6 +45,10 @@ class Speaker {
   virtual bool is_welcome() const = 0;
   virtual protocol::RefusalReason refusal() const = 0;
   virtual std::string refusal_detail() const = 0;
+  // Whether to dial now; asked again every 10 ms.
+  virtual bool may_dial() const { return true; }
+  // How long until a connection made is open; empty: it is not wanted any more.
+  virtual std::optional<std::chrono::milliseconds> begin_handshake() { return std::chrono::milliseconds(0); }
 
  protected:
   ~Speaker() = default;
@@ -68,12 +75,17 @@ class StationConnection {
   void flush();
   // Closes the connection of a station that is silent, unless bytes of it wait to be read.
   void close_as_silent();
+  // The speaker has lost its memory: the socket stays as it is, without a word to either side.
+  void forget();
+  // Resets what was forgotten.
+  void reset_forgotten();
 
   bool is_open() const { return is_open_; }
   const LinkCounts& counts() const { return counts_; }
 
  private:
   boost::asio::awaitable<bool> dial();
+  boost::asio::awaitable<bool> shake_hands();
   boost::asio::awaitable<bool> reach(std::vector<boost::asio::ip::tcp::endpoint> endpoints);
   boost::asio::awaitable<void> serve();
   bool take_bytes();
@@ -88,6 +100,8 @@ class StationConnection {
   std::string name_;
   LinkLog log_;
   boost::asio::ip::tcp::socket socket_;
+  std::optional<boost::asio::ip::tcp::socket> forgotten_;
+  int times_forgotten_ = 0;
   bool is_open_ = false;
   bool was_welcome_ = false;  // on this connection
   LinkCounts counts_;

@@ -37,20 +37,23 @@ World::World(const WorldConfig& config)
 }
 
 void World::step(double duty) {
+  const double velocity_before_m_s = velocity_m_s_;
   const double driven = motor_.driven(duty);
   battery_.step(driven);
   plant_.step(motor_.step(driven, battery_.supply_ratio()));
   position_m_ = plant_.position_m();
   velocity_m_s_ = plant_.velocity_m_s();
   acceleration_m_s2_ = plant_.acceleration_m_s2();
-  if (vessel_) carry();
+  if (vessel_) {
+    carry();
+    stop_at_walls(velocity_before_m_s);
+  }
   glucose_.step();
   electrode_.step();
   if (imu_) imu_->accelerate(acceleration_m_s2_);
 }
 
 void World::carry() {
-  const double velocity_before_m_s = velocity_m_s_;
   const double flow_before_m_s = flow_velocity_m_s_;
   vessel_->step();
   const double expected_m = position_m_ + carried_m_ + kTickS * flow_before_m_s;
@@ -59,7 +62,6 @@ void World::carry() {
   position_m_ += carried_m_;  // (1)
   velocity_m_s_ += flow_velocity_m_s_;
   acceleration_m_s2_ += (flow_velocity_m_s_ - flow_before_m_s) / kTickS;
-  stop_at_walls(velocity_before_m_s);
 }
 
 void World::stop_at_walls(double velocity_before_m_s) {
@@ -91,7 +93,7 @@ robot_fw::Inputs World::read(std::uint64_t robot_time_us) {
   return inputs;
 }
 
-void World::set_fault(Sensor sensor, const Fault& fault) {
+void World::set_fault(Sensor sensor, const SensorFault& fault) {
   check(fault);
   if (sensor == Sensor::electrode) return electrode_.set_fault(fault);
   if (!imu_) control::throw_invalid("the perfect sensor has no faults; give the world an imu");

@@ -47,7 +47,7 @@ class World {
   robot_fw::Inputs read(std::uint64_t robot_time_us);
 
   // From the next reading on, until another is set.
-  void set_fault(Sensor sensor, const Fault& fault);
+  void set_fault(Sensor sensor, const SensorFault& fault);
   // From now on, over the pump's ramp; there must be a vessel.
   void set_mean_flow_m3_s(double flow_m3_s);
   void pour(const GlucosePatch& patch) { glucose_.pour(patch); }

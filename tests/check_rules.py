@@ -39,7 +39,8 @@ MAY_INCLUDE_IN_SERVER = {
 FOREIGN = {
     "protocol": ("boost/", "Eigen/", "nlohmann/", "spdlog/", "SQLiteCpp/"),
     "control": ("boost/", "nlohmann/", "spdlog/", "SQLiteCpp/", "pb"),
-    "robot_fw/core": ("boost/", "Eigen/", "nlohmann/", "spdlog/", "SQLiteCpp/"),
+    "robot_fw/core": ("boost/", "Eigen/", "nlohmann/", "spdlog/", "SQLiteCpp/", "Arduino", "ESP8266", "Wire", "WiFi"),
+    "robot_fw/esp8266": ("boost/", "Eigen/", "nlohmann/", "spdlog/", "SQLiteCpp/"),
 }
 # What a robot has not: heap, streams, threads, clocks.
 NOT_ON_THE_ROBOT = set("vector string map set list deque unordered_map unordered_set memory functional iostream sstream "
@@ -113,10 +114,12 @@ def check_includes(source):
                     continue
             if parts[0] not in allowed:
                 yield line, f"{folder}/ may not include {parts[0]}/"
+            elif parts[:2] == ["robot_fw", "esp8266"] and area != "robot_fw/esp8266":
+                yield line, "robot_fw/esp8266/ is included by its tests only"
         elif not quoted:
             if target.startswith(FOREIGN.get(folder, ()) + FOREIGN.get(area, ())):
                 yield line, f"{folder}/ does not use <{target}>"
-            if area in ("robot_fw/core",) or folder == "protocol":
+            if area in ("robot_fw/core", "robot_fw/esp8266") or folder == "protocol":
                 if target in NOT_ON_THE_ROBOT:
                     yield line, f"<{target}> needs heap, threads or clocks, which the robot has not"
 

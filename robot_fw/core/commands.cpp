@@ -39,15 +39,21 @@ bool TimedCommands::hold(const protocol::Command& command) {
   return true;
 }
 
-std::optional<protocol::Command> TimedCommands::take_due(std::uint64_t now_us) {
+std::size_t TimedCommands::earliest_due(std::uint64_t now_us) const {
   std::size_t earliest = kMaxCommands;
   for (std::size_t i = 0; i < kMaxCommands && size_bytes_[i] > 0; ++i) {
     const std::uint64_t at_us = held_[i].execute_at_robot_us;
     if (at_us <= now_us && (earliest == kMaxCommands || at_us < held_[earliest].execute_at_robot_us)) earliest = i;
   }
-  if (earliest == kMaxCommands) return std::nullopt;
-  auto command = protocol::decode_command({bytes_.data() + first_byte(earliest), size_bytes_[earliest]});
-  remove(earliest);
+  return earliest;
+}
+
+std::optional<protocol::Command> TimedCommands::take_due(std::uint64_t now_us) {
+  const std::size_t index = earliest_due(now_us);
+  const bool is_due = index < kMaxCommands;
+  auto command = is_due ? protocol::decode_command({bytes_.data() + first_byte(index), size_bytes_[index]})
+                        : std::optional<protocol::Command>{};
+  if (is_due) remove(index);
   return command;
 }
 

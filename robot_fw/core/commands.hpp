@@ -49,6 +49,7 @@ class TimedCommands {
   std::optional<std::uint64_t> drop_any();
 
  private:
+  std::size_t earliest_due(std::uint64_t now_us) const;  // kMaxCommands: none
   void remove(std::size_t index);
   std::size_t first_byte(std::size_t index) const;
 

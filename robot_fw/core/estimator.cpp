@@ -46,10 +46,14 @@ float decayed_share(float x) { return 12 * x / (12 + 6 * x + x * x); }
 
 }  // namespace
 
-Estimator::Estimator(const EstimatorParameters& parameters) {
+Estimator::Estimator(const EstimatorParameters& parameters, float position_sd_m) {
   set_parameters(parameters);
   start();
+  covariance_[position][position] = square(position_sd_m);
+  position_sd_m_ = position_sd_m;
 }
+
+bool Estimator::at_rest() const { return duty_ == 0 && std::fabs(model_m_s_) < kRestingModelM_S; }
 
 void Estimator::set_parameters(const EstimatorParameters& parameters) {
   parameters_ = parameters;
@@ -198,8 +202,7 @@ void Estimator::admit_drift() {
 
 // Of ε in (3), as white noise.
 float Estimator::measurement_variance() const {
-  const bool resting = duty_ == 0 && std::fabs(model_m_s_) < kRestingModelM_S;
-  const float floor_m_s = resting ? parameters_.resting_velocity_m_s : parameters_.driven_velocity_m_s;
+  const float floor_m_s = at_rest() ? parameters_.resting_velocity_m_s : parameters_.driven_velocity_m_s;
   const float shape = square(parameters_.shape_error * model_m_s_) + square(kAgeS * interval_.fastest_change_m_s2);
   const float area = parameters_.correlation_s * (square(floor_m_s) + square(flow_m_s_)) + kShapeCorrelationS * shape;
   return 2 * area / interval_.duration_s;

@@ -76,13 +76,17 @@ struct EstimatorInputs {
 
 class Estimator {
  public:
-  explicit Estimator(const EstimatorParameters& parameters);  // at rest, at position 0
+  // At position 0, at rest; `position_sd_m` is for one that may yet be coasting.
+  explicit Estimator(const EstimatorParameters& parameters, float position_sd_m = 0);
 
   void step(const EstimatorInputs& inputs);
   // Position is 0 here, and known.
   void zero_position();
-  // From the next tick on; the motor is off and the robot at rest.
+  // From the next tick on; at_rest() must hold.
   void set_parameters(const EstimatorParameters& parameters);
+
+  // The motor is off and the model's velocity has died down.
+  bool at_rest() const;
 
   float position_m() const { return position_m_; }
   float velocity_m_s() const { return velocity_m_s_; }

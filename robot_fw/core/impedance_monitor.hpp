@@ -20,6 +20,7 @@ class ImpedanceMonitor {
   // hold. True in the tick of a detection.
   bool step(float impedance_mv, bool usable, bool in_place, const ImpedanceRules& rules);
   bool mixed() const;
+  void arm() { armed_ = true; }
 
  private:
   bool armed_ = true;

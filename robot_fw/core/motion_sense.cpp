@@ -6,7 +6,6 @@
 namespace robot_fw {
 namespace {
 
-constexpr float kMotorOffS = 0.05F;    // a port forces the motor off after so long without a tick
 constexpr float kLongestStepS = 0.1F;  // of the estimator; by then a motor that is off has stopped the robot
 constexpr float kSmallestSdM = 0.0001F;
 constexpr float kSdStep = 1.4F;

@@ -12,17 +12,23 @@
 
 namespace robot_fw {
 
+constexpr float kMotorOffS = 0.05F;  // a port forces the motor off after so long without a tick
+
 class MotionSense {
  public:
-  // At rest, at position 0.
-  explicit MotionSense(const EstimatorParameters& parameters) : estimator_(parameters) {}
+  // At position 0, see Estimator.
+  MotionSense(const EstimatorParameters& parameters, float position_sd_m) : estimator_(parameters, position_sd_m) {}
 
   // Once per tick: `duty` is what the motor had since the last one, `missed_s` the time since then beyond dt_s.
   void step(const Inputs& inputs, float duty, float dt_s, float missed_s);
   // The position is 0 from here on. The motor is off.
   void zero_position();
-  // Takes effect in the next tick; the motor is off.
+  // Takes effect in the next tick; at_rest() must hold.
   void set_parameters(const EstimatorParameters& parameters) { estimator_.set_parameters(parameters); }
+
+  bool at_rest() const { return estimator_.at_rest(); }
+  // A fault that a reset has not ended: it stands until readings say otherwise.
+  void distrust() { watch_.distrust(); }
 
   const Motion& motion() const { return motion_; }
   float position_sd_m() const { return position_sd_m_; }  // 0: known

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "robot_fw/core/saturate.hpp"
+
 namespace robot_fw {
 namespace {
 
@@ -11,7 +13,7 @@ constexpr float kArrivedM = 0.002F;  // from the setpoint; twice as far it has l
 constexpr int kArrivalTicks = 50;
 
 std::uint64_t after_us(float seconds, std::uint64_t now_us) {
-  return now_us + static_cast<std::uint64_t>(seconds * 1e6F);
+  return now_us + saturated<std::uint64_t>(seconds * 1e6F);
 }
 
 std::uint64_t lease_end_us(std::uint32_t lease_ms, std::uint64_t now_us) {

@@ -5,12 +5,16 @@
 #include <cmath>
 
 #include "robot_fw/core/controller_message.hpp"
+#include "robot_fw/core/saturate.hpp"
 
 namespace robot_fw {
 namespace {
 
 // The DS550's range; its readings may well be equal.
 constexpr SensorRules kElectrodeRules{20, 1000, 1, 0, 5};
+constexpr float kCoastingSdM = 0.025F;  // of the way that a robot reset at full speed still coasts, docs/robot.md
+constexpr std::uint64_t kTimeStepPauseUs = 1'000'000;  // between two events, which are few in the ring
+constexpr std::uint64_t kMaxTickLatenessUs = 100'000;  // against frames that came in before the tick
 
 bool finite(const Motion& motion) {
   return std::isfinite(motion.position_m) && std::isfinite(motion.velocity_m_s) &&
@@ -21,7 +25,7 @@ bool finite(const Motion& motion) {
 
 Robot::Robot(const RobotConfig& config)
     : config_(config),
-      motion_sense_(parameters_.estimator()),
+      motion_sense_(parameters_.estimator(), config.reset_cause == rheonaut_RESET_CAUSE_POWER_ON ? 0.0F : kCoastingSdM),
       electrode_(kElectrodeRules),
       controllers_(adapted(kPaperController, {config.duty_min, config.duty_max}, config.sample_period_us)),
       safety_({config.duty_min, config.duty_max}, config.boot_id),
@@ -32,6 +36,11 @@ Robot::Robot(const RobotConfig& config)
       config.reset_cause == rheonaut_RESET_CAUSE_WATCHDOG || config.reset_cause == rheonaut_RESET_CAUSE_BROWN_OUT;
   if (config.restored_emergency_id != 0) {
     safety_.restore(config.restored_emergency_id, config.restored_emergency_cause);  // SAFETY: a reset clears nothing
+    if (safety_.has_sensor_cause()) {
+      motion_sense_.distrust();  // SAFETY: nor does it mend a sensor
+      electrode_.distrust();
+      told_electrode_fault_ = electrode_fault();
+    }
     note(rheonaut_EVENT_KIND_EMERGENCY, rheonaut_EVENT_CAUSE_RESET, 0);
   } else if (suspicious_reset) {
     emergency(rheonaut_EMERGENCY_CAUSE_RESET, rheonaut_EVENT_CAUSE_RESET, 0);  // SAFETY: comes up latched
@@ -51,7 +60,7 @@ Outputs Robot::step(const Inputs& inputs, float dt_s) {
   let_orders_run_out();
 
   const Motion measured = seen_motion();
-  watch_limits(measured, dt_s);
+  watch_limits(measured, dt_s + std::min(missed_s, kMotorOffS));
   watch_impedance(measured);
   watch_arrival(measured);
   const ControllerDuty wanted = wanted_duty(measured, dt_s);
@@ -62,14 +71,16 @@ Outputs Robot::step(const Inputs& inputs, float dt_s) {
   saturated_ = !safety_.latched() && safety_.permit(wanted.limited) != wanted.asked;
   duty_ = safety_.permit(slewed(wanted.limited, dt_s));  // SAFETY: nothing after this line touches the duty
   announce_controller();
-  record_sample(measured, dt_s);
+  record_sample(seen_motion(), dt_s);  // an emergency has ended the disturbance
   save_settings();
   return {duty_};
 }
 
+// SAFETY: while a clock that went back catches up, time stands still here: no lease and no link would run out.
 bool Robot::sound(const Inputs& inputs, float dt_s) const {
-  return inputs.robot_time_us >= inputs_.robot_time_us && finite(inputs.known_motion.value_or(Motion{})) &&
-         std::isfinite(inputs.impedance_mv) && std::isfinite(inputs.supply_mv) && std::isfinite(dt_s) && dt_s > 0;
+  return inputs.robot_time_us >= inputs_.robot_time_us && inputs.robot_time_us + kMaxTickLatenessUs >= now_us_ &&
+         finite(inputs.known_motion.value_or(Motion{})) && std::isfinite(inputs.impedance_mv) &&
+         std::isfinite(inputs.supply_mv) && std::isfinite(dt_s) && dt_s > 0;
 }
 
 Motion Robot::seen_motion() const {
@@ -81,10 +92,17 @@ Motion Robot::seen_motion() const {
 // Takes over the time of this tick; a missed tick is an event. Says how much time was missed.
 float Robot::watch_clock(std::uint64_t robot_time_us, float dt_s) {
   now_us_ = std::max(now_us_, robot_time_us);  // frames may have come in after this tick was due
-  const float stepped_s = static_cast<float>(now_us_ - inputs_.robot_time_us) * 1e-6F - dt_s;
+  const auto elapsed_us = static_cast<std::int64_t>(robot_time_us - inputs_.robot_time_us);  // negative: it went back
+  const float stepped_s = static_cast<float>(elapsed_us) * 1e-6F - dt_s;
   const bool stepped = samples_.next_seq() > 0 && stepped_s > dt_s / 2;
-  if (stepped) note(rheonaut_EVENT_KIND_TIME_STEP, rheonaut_EVENT_CAUSE_TIME, stepped_s);
-  return stepped ? stepped_s : 0;
+  if (!stepped) return 0;
+  untold_step_s_ += stepped_s;
+  if (time_step_told_us_ == 0 || now_us_ - time_step_told_us_ >= kTimeStepPauseUs) {
+    note(rheonaut_EVENT_KIND_TIME_STEP, rheonaut_EVENT_CAUSE_TIME, untold_step_s_);
+    time_step_told_us_ = now_us_;
+    untold_step_s_ = 0;
+  }
+  return stepped_s;
 }
 
 void Robot::run_due_commands() {
@@ -137,7 +155,7 @@ void Robot::record_sample(const Motion& measured, float dt_s) {
   sample.reference_m = pilot_.is_auto() ? reference_m_ : 0;
   const bool usable_period = dt_s > 0 && dt_s < 1;
   const std::uint32_t period_us =
-      usable_period ? static_cast<std::uint32_t>(std::lround(dt_s * 1e6F)) : config_.sample_period_us;
+      usable_period ? saturated<std::uint32_t>(dt_s * 1e6F + 0.5F) : config_.sample_period_us;
   const bool changed = samples_.push(sample, batch_values(), saturated_, now_us_, period_us);
   outbox_.sample_made(samples_, changed || sample_is_urgent_);
   sample_is_urgent_ = false;
@@ -170,11 +188,13 @@ protocol::Mode Robot::mode() const {
 
 // The motor is off from here on, not only from the next tick.
 void Robot::stop_motion(protocol::EventCause cause, std::uint64_t command_id) {
-  if (pilot_.delivering()) end_delivery(cause, command_id);
+  const bool was_delivering = pilot_.delivering();
+  const float delivered_s = was_delivering ? pilot_.end_delivery(now_us_) : 0;
   pilot_.halt();
   controllers_.reset();
   profile_.restart();
   duty_ = 0;
+  if (was_delivering) note(rheonaut_EVENT_KIND_DELIVERY_ENDED, cause, delivered_s, command_id);
 }
 
 void Robot::emergency(protocol::EmergencyCause cause, protocol::EventCause event_cause, std::uint64_t command_id) {
@@ -200,7 +220,7 @@ void Robot::note(protocol::EventKind kind, protocol::EventCause cause, float val
   event.cause = cause;
   event.sample_seq = samples_.next_seq();
   event.mode = mode();
-  event.sub_state = pilot_.sub_state();
+  event.sub_state = mode() == rheonaut_MODE_AUTO ? pilot_.sub_state() : rheonaut_SUB_STATE_NONE;
   event.position_m = seen_motion().position_m;
   event.value = value;
   event.emergency_id = safety_.emergency_id();

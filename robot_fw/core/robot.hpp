@@ -57,9 +57,15 @@ class Robot {
   // The station has been silent on an open connection for the time-out: close it and dial again.
   bool connection_is_silent(std::uint64_t now_us) const { return link_.connection_is_silent(now_us); }
 
+  // What the storage was given could not be kept after all.
+  void storage_failed();
+
   float duty() const { return duty_; }
   protocol::Mode mode() const;
   std::uint64_t emergency_id() const { return safety_.emergency_id(); }
+  protocol::EmergencyCause emergency_cause() const { return safety_.cause(); }
+  // Nothing moves or is ordered to: what blocks for long may be done now.
+  bool at_rest() const { return !motor_on(); }
   bool link_up() const { return link_.up(); }
   bool link_lost() const { return link_.lost(); }
   // Why the station refused the last connection; the detail is for people.
@@ -89,7 +95,7 @@ class Robot {
 
   // What ends or changes motion by itself, in robot_watch.cpp.
   void watch_sensors();
-  void watch_sensor(SensorFault fault, bool is_news, protocol::EventCause which, float reading);
+  void on_sensor_news(SensorFault fault, protocol::EventCause which, float reading);
   SensorFault electrode_fault() const;
   bool sensor_fault_stands() const;
   void watch_link();
@@ -145,11 +151,14 @@ class Robot {
   float reference_m_ = 0;  // in auto
   float duty_ = 0;
   bool saturated_ = false;
+  std::uint64_t time_step_told_us_ = 0;
+  float untold_step_s_ = 0;
   bool sample_is_urgent_ = false;  // something happened since the last one
 
   Parameters parameters_;
   MotionSense motion_sense_;
   SensorWatch electrode_;
+  SensorFault told_electrode_fault_ = SensorFault::none;
   ImpedanceMonitor impedance_;
   Pilot pilot_;
   ReferenceProfile profile_;

@@ -15,7 +15,6 @@ bool runs_when_latched(const protocol::Command& command) {
 }  // namespace
 
 void Robot::on_command(const protocol::Command& command) {
-  if (command.which_action == rheonaut_Command_emergency_stop_tag) return on_emergency_stop(command);
   const Verdict verdict = gate_.admit(command, now_us_);
   if (!verdict.accepted()) return answer(command.command_id, verdict);
   const bool later = command.has_execute_at_robot_us && command.execute_at_robot_us > now_us_;
@@ -114,6 +113,7 @@ Verdict Robot::set_mode(const rheonaut_SetMode& order, std::uint64_t command_id)
   const protocol::Mode before = mode();
   stop_motion(rheonaut_EVENT_CAUSE_COMMAND, command_id);  // SAFETY: nothing outlives a change of mode
   drop_timed_commands(rejected(rheonaut_REJECT_REASON_WRONG_MODE));
+  if (to_auto && before == rheonaut_MODE_MANUAL) impedance_.arm();  // what manual has found is not delivered to yet
   if (to_auto) pilot_.enter_auto(order.setpoint_m, parameters_[ParameterId::auto_limit_s], now_us_);
   if (mode() != before) note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, 0, command_id);
   if (to_auto) {
@@ -181,7 +181,7 @@ Verdict Robot::inject_disturbance(float disturbance_m, std::uint64_t command_id)
 }
 
 Verdict Robot::zero_position(std::uint64_t command_id) {
-  if (duty_ != 0 || pilot_.manual_duty() != 0) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
+  if (motor_on()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
   const float before_m = motion_sense_.motion().position_m;
   if (!std::isfinite(before_m)) return rejected(rheonaut_REJECT_REASON_NOT_FINITE);
   motion_sense_.zero_position();

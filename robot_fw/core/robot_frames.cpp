@@ -4,6 +4,7 @@
 
 #include "robot_fw/core/controller_message.hpp"
 #include "robot_fw/core/robot.hpp"
+#include "robot_fw/core/saturate.hpp"
 
 namespace robot_fw {
 namespace {
@@ -81,7 +82,7 @@ bool Robot::on_welcome(const protocol::Welcome& welcome) {
   }
   cut_text(refusal_detail_, welcome.detail);
   if (refusal_ != rheonaut_REFUSAL_REASON_NONE) return false;
-  link_.welcomed(welcome, static_cast<std::uint32_t>(parameters_[ParameterId::link_timeout_ms]), now_us_);
+  link_.welcomed(welcome, saturated<std::uint32_t>(parameters_[ParameterId::link_timeout_ms]), now_us_);
   station_heard();
   samples_.acknowledge(welcome.durable_next_seq);
   events_.acknowledge(welcome.durable_next_event_seq);

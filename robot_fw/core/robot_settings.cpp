@@ -39,11 +39,12 @@ Verdict Robot::set_parameter(const rheonaut_SetParameter& order, std::uint64_t c
   if (!Parameters::in_range(*index, order.value)) return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
   // SAFETY: what shapes or limits motion stays as it is while the motor is on.
   if (Parameters::spec(*index).only_at_rest && motor_on()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
+  const bool is_estimators = *index >= static_cast<std::size_t>(ParameterId::model_gain_1_m_s);
+  // SAFETY: an estimator that starts anew while the robot coasts would take it to stand, and be sure of that.
+  if (is_estimators && !motion_sense_.at_rest()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
   if (!outbox_.has_room_for_page()) return rejected(rheonaut_REJECT_REASON_BUSY);
   parameters_.set(*index, order.value);
-  if (*index >= static_cast<std::size_t>(ParameterId::model_gain_1_m_s)) {
-    motion_sense_.set_parameters(parameters_.estimator());
-  }
+  if (is_estimators) motion_sense_.set_parameters(parameters_.estimator());
   parameters_unsaved_ = true;
   note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, order.value, command_id);
   outbox_.ask_page({command_id, *index, 1});
@@ -66,7 +67,7 @@ void Robot::load_settings() {
   if (config_.storage == nullptr) return;
   Storage& storage = *config_.storage;
   const auto parameters = load_parameters(storage);
-  if (!parameters && is_kept(storage, StorageKey::parameters)) {
+  if (storage.damaged() || (!parameters && is_kept(storage, StorageKey::parameters))) {
     note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_RESET, 0);  // to the defaults
   }
   parameters_ = parameters.value_or(Parameters{});
@@ -83,12 +84,12 @@ void Robot::load_settings() {
   controllers_.take_news();
 }
 
+void Robot::storage_failed() { note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_INTERNAL, 0); }
+
 // Each change is written once, at the first tick at rest; a write that fails is an event and not tried again.
 void Robot::save_settings() {
   if (config_.storage == nullptr || motor_on()) return;  // SAFETY: writing may block for long
-  if (parameters_unsaved_ && !save_parameters(*config_.storage, parameters_)) {
-    note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_INTERNAL, 0);
-  }
+  if (parameters_unsaved_ && !save_parameters(*config_.storage, parameters_)) storage_failed();
   if (controller_unsaved_) {
     const ControllerSections& in_force = controllers_.in_force();
     protocol::Controller controller;

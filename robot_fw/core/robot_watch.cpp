@@ -23,18 +23,21 @@ protocol::EmergencyCause cause_of(SensorFault fault) {
 
 // A fault is an event, and in auto an emergency. In manual the operator may go on by eye.
 void Robot::watch_sensors() {
-  const bool electrode_is_used = parameters_[ParameterId::impedance_monitor] != 0;
-  const bool news = electrode_is_used && electrode_.step(inputs_.impedance_mv, true);
-  watch_sensor(motion_sense_.fault(), motion_sense_.fault_changed(), rheonaut_EVENT_CAUSE_SENSOR,
-               kMS2PerCount * static_cast<float>(inputs_.acceleration_counts));
-  watch_sensor(electrode_fault(), news, rheonaut_EVENT_CAUSE_IMPEDANCE, inputs_.impedance_mv);
+  if (motion_sense_.fault_changed()) {
+    on_sensor_news(motion_sense_.fault(), rheonaut_EVENT_CAUSE_SENSOR,
+                   kMS2PerCount * static_cast<float>(inputs_.acceleration_counts));
+  }
+  electrode_.step(inputs_.impedance_mv, true);
+  if (electrode_fault() != told_electrode_fault_) {
+    told_electrode_fault_ = electrode_fault();
+    on_sensor_news(told_electrode_fault_, rheonaut_EVENT_CAUSE_IMPEDANCE, inputs_.impedance_mv);
+  }
   if (motion_sense_.mismatch_begins()) {
     note(rheonaut_EVENT_KIND_MODEL_MISMATCH, rheonaut_EVENT_CAUSE_SENSOR, std::sqrt(motion_sense_.surprise()));
   }
 }
 
-void Robot::watch_sensor(SensorFault fault, bool is_news, protocol::EventCause which, float reading) {
-  if (!is_news) return;
+void Robot::on_sensor_news(SensorFault fault, protocol::EventCause which, float reading) {
   const bool faulty = fault != SensorFault::none;
   note(faulty ? rheonaut_EVENT_KIND_SENSOR_FAULT : rheonaut_EVENT_KIND_SENSOR_RECOVERED, which, reading);
   // SAFETY: nothing steers by a sensor that cannot be believed.
@@ -64,7 +67,8 @@ void Robot::watch_link() {
   if (action == LinkLossAction::go_on) return;
   if (pilot_.delivering()) end_delivery(rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
   const PositionLimits limits = position_limits();
-  const float here_m = std::clamp(seen_motion().position_m, limits.min_m, limits.max_m);
+  const float here_m =
+      std::clamp(motion_sense_.motion().position_m, limits.min_m, limits.max_m) + pilot_.disturbance_m();
   pilot_.set_setpoint(here_m);
   profile_.restart();
   note(rheonaut_EVENT_KIND_SETPOINT_CHANGED, rheonaut_EVENT_CAUSE_LINK_LOSS, here_m);
@@ -92,13 +96,15 @@ void Robot::watch_limits(const Motion& measured, float dt_s) {
 void Robot::watch_impedance(const Motion& measured) {
   if (parameters_[ParameterId::impedance_monitor] == 0 || !inputs_are_sound_) return;
   const float impedance_mv = inputs_.impedance_mv;
-  const bool in_place = !pilot_.delivering() || std::fabs(measured.position_m - *pilot_.target_m()) <= kInPlaceM;
+  const bool can_return = controllers_.in_force().duty_min < 0;  // a motor without reverse stays where it comes to rest
+  const bool in_place =
+      !pilot_.delivering() || !can_return || std::fabs(measured.position_m - *pilot_.target_m()) <= kInPlaceM;
   const bool usable = electrode_fault() == SensorFault::none && electrode_.in_range(impedance_mv);
   const bool detected = impedance_.step(impedance_mv, usable, in_place, parameters_.impedance());
   if (pilot_.delivering() && impedance_.mixed()) end_delivery(rheonaut_EVENT_CAUSE_IMPEDANCE, 0);
-  if (!detected) return;
+  if (!detected || pilot_.delivering()) return;  // in a delivery it is the same glucose
   note(rheonaut_EVENT_KIND_DETECTION, rheonaut_EVENT_CAUSE_IMPEDANCE, impedance_mv);
-  if (!pilot_.is_auto() || pilot_.delivering()) return;
+  if (!pilot_.is_auto()) return;
   pilot_.start_delivery(measured.position_m, parameters_[ParameterId::delivery_limit_s], now_us_);
   profile_.restart();
   note(rheonaut_EVENT_KIND_DELIVERY_STARTED, rheonaut_EVENT_CAUSE_IMPEDANCE, impedance_mv);

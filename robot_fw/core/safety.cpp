@@ -15,6 +15,8 @@ std::uint64_t mix(std::uint64_t value) {
   return value ^ (value >> 31);
 }
 
+constexpr float kReturnM = 0.001F;  // so far inside it is inside again; at the very limit noise would go to and fro
+
 }  // namespace
 
 Safety::Safety(DutyRange range, std::uint64_t boot_id) : range_(range), boot_id_(boot_id) {}
@@ -53,7 +55,7 @@ bool Safety::leaves_limits(float position_m, const PositionLimits& limits) {
     side_ = Side::above;
   } else if (position_m < limits.min_m) {
     side_ = Side::below;
-  } else if (limits.contain(position_m)) {  // NaN is nowhere
+  } else if (position_m <= limits.max_m - kReturnM && position_m >= limits.min_m + kReturnM) {  // NaN is nowhere
     side_ = Side::inside;
   }
   return side_ != Side::inside && side_ != before;

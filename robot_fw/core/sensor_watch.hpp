@@ -3,7 +3,8 @@
 //   missing       no reading in `missing_ticks` ticks in a row
 //   stuck         `stuck_readings` in a row are equal; 0: not looked for
 //   out_of_range  `wrong_readings` in a row lie outside [min, max]
-// A fault ends after 50 good readings in a row.
+// A fault ends after 50 good readings in a row, and as many as it takes to see one that is stuck. A sensor that has
+// never given a reading is missing.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +16,9 @@ enum class SensorFault : std::uint8_t { none, missing, stuck, out_of_range };
 struct SensorRules {
   float min;
   float max;
-  int missing_ticks;
-  int stuck_readings;
-  int wrong_readings;
+  std::int16_t missing_ticks;
+  std::int16_t stuck_readings;
+  std::int16_t wrong_readings;
 };
 
 class SensorWatch {
@@ -26,6 +27,9 @@ class SensorWatch {
 
   // Once per tick. True when a fault begins, ends or becomes another.
   bool step(float reading, bool is_valid);
+
+  // Takes the sensor for missing until it has been good for long enough.
+  void distrust() { fault_ = SensorFault::missing; }
 
   SensorFault fault() const { return fault_; }
   bool in_range(float reading) const { return reading >= rules_.min && reading <= rules_.max; }
@@ -36,7 +40,8 @@ class SensorWatch {
   SensorRules rules_;
   SensorFault fault_ = SensorFault::none;
   float last_ = 0;
-  int silent_ = 0, equal_ = 0, wrong_ = 0, good_ = 0;  // in a row
+  bool has_spoken_ = false;
+  std::int16_t silent_ = 0, equal_ = 0, wrong_ = 0, good_ = 0;  // in a row
 };
 
 }  // namespace robot_fw

@@ -23,6 +23,8 @@ class Storage {
 
   // Fills `bytes` and says how many there are; 0 when nothing is kept.
   virtual std::size_t load(StorageKey key, std::uint8_t* bytes, std::size_t capacity) = 0;
+  // Something was kept and has decayed: what load() gives is older, or nothing.
+  virtual bool damaged() const { return false; }
   // False when it could not be kept.
   virtual bool save(StorageKey key, protocol::Bytes bytes) = 0;
 

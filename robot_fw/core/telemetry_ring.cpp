@@ -5,6 +5,21 @@
 
 namespace robot_fw {
 
+namespace {
+
+// Float by float: the place may lie in memory that takes whole words only, and the library's memcpy, which the
+// assignment of a whole sample may become, is free to move bytes.
+void copy(const Sample& from, Sample& to) {
+  to.position_m = from.position_m;
+  to.velocity_m_s = from.velocity_m_s;
+  to.acceleration_m_s2 = from.acceleration_m_s2;
+  to.duty = from.duty;
+  to.impedance_mv = from.impedance_mv;
+  to.reference_m = from.reference_m;
+}
+
+}  // namespace
+
 bool BatchValues::operator==(const BatchValues& other) const {
   return emergency_id == other.emergency_id && setpoint_m == other.setpoint_m && disturbance_m == other.disturbance_m &&
          position_sd_m == other.position_sd_m && controller_id == other.controller_id && flags == other.flags &&
@@ -31,8 +46,9 @@ bool TelemetryRing::push(const Sample& sample, const BatchValues& values, bool s
   lost_ += static_cast<std::uint32_t>(keep_from - oldest_seq_);
   forget_below(keep_from);
   if (starts_segment) segments_[next_segment_++ % kMaxSegments] = {next_seq_, robot_time_us, period_us, values};
-  samples_[next_seq_ % kCapacity] = sample;
-  saturated_[next_seq_ % kCapacity] = saturated;
+  const auto at = static_cast<std::size_t>(next_seq_ % kCapacity);
+  copy(sample, place(at));
+  saturated_[at] = saturated;
   ++next_seq_;
   return starts_segment;
 }
@@ -70,15 +86,17 @@ void TelemetryRing::read(std::uint64_t first_seq, std::size_t max_samples, proto
 
   const auto count = static_cast<pb_size_t>(
       std::min<std::uint64_t>({end_seq - first_seq, max_samples, protocol::kMaxSamplesPerFrame}));
+  auto at = static_cast<std::size_t>(first_seq % kCapacity);
   for (pb_size_t i = 0; i < count; ++i) {
-    const std::size_t at = (first_seq + i) % kCapacity;
-    batch.position_m[i] = samples_[at].position_m;
-    batch.velocity_m_s[i] = samples_[at].velocity_m_s;
-    batch.acceleration_m_s2[i] = samples_[at].acceleration_m_s2;
-    batch.duty[i] = samples_[at].duty;
-    batch.impedance_mv[i] = samples_[at].impedance_mv;
-    batch.reference_m[i] = samples_[at].reference_m;
+    const Sample& sample = place(at);
+    batch.position_m[i] = sample.position_m;
+    batch.velocity_m_s[i] = sample.velocity_m_s;
+    batch.acceleration_m_s2[i] = sample.acceleration_m_s2;
+    batch.duty[i] = sample.duty;
+    batch.impedance_mv[i] = sample.impedance_mv;
+    batch.reference_m[i] = sample.reference_m;
     if (saturated_[at]) batch.flags |= rheonaut_TELEMETRY_FLAG_SATURATED;
+    at = at + 1 == kCapacity ? 0 : at + 1;  // a division of 64 bits costs a robot as much as the rest
   }
   batch.position_m_count = batch.velocity_m_s_count = batch.acceleration_m_s2_count = count;
   batch.duty_count = batch.impedance_mv_count = batch.reference_m_count = count;

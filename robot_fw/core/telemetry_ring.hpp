@@ -1,11 +1,13 @@
 // The last 8 s of samples, kept until the station has them on disk.
 //
 // Samples hold only what changes in every tick. What changes rarely (mode, setpoint, time base...) is kept once, as a
-// segment with the first seq it applies to; a sample's time is its segment's first time plus whole periods. 21.6 kB.
+// segment with the first seq it applies to; a sample's time is its segment's first time plus whole periods. 21.6 kB;
+// on the ESP8266 7.7 kB of them lie outside, in memory that the port provides.
 #pragma once
 
 #include <array>
 #include <bitset>
+#include <cstddef>
 #include <cstdint>
 
 #include "protocol/messages.hpp"
@@ -20,6 +22,14 @@ struct Sample {
   float impedance_mv = 0;
   float reference_m = 0;  // 0 without a setpoint
 };
+
+// How many of the ring's samples lie outside of it. The platform decides, since the Arduino IDE passes no
+// definitions of ours.
+#if defined(ARDUINO_ARCH_ESP8266)
+constexpr std::size_t kSamplesElsewhere = 320;
+#else
+constexpr std::size_t kSamplesElsewhere = 0;
+#endif
 
 // The values that a batch of telemetry carries once.
 struct BatchValues {
@@ -41,6 +51,11 @@ class TelemetryRing {
  public:
   static constexpr std::size_t kCapacity = 800;
   static constexpr std::size_t kMaxSegments = 32;
+
+  // Memory for kSamplesElsewhere samples, for the life of the program, set before the first push. There is one for all
+  // rings: where some samples lie elsewhere, a program has one ring and copies none. It is only accessed as whole words
+  // of 32 bits, and what it holds at first does not matter.
+  static void set_memory_elsewhere(Sample* samples) { elsewhere = samples; }
 
   // Numbers the sample and keeps it. Starts a segment when a batch value changed or time did not move by one period;
   // says whether it did. The oldest sample, or segment, makes room and is counted as lost.
@@ -67,8 +82,13 @@ class TelemetryRing {
   const Segment& segment(std::uint64_t number) const { return segments_[number % kMaxSegments]; }
   bool continues(const BatchValues& values, std::uint64_t robot_time_us, std::uint32_t period_us) const;
   void forget_below(std::uint64_t seq);
+  const Sample& place(std::size_t at) const {
+    return at < kSamplesElsewhere ? elsewhere[at] : samples_[at - kSamplesElsewhere];
+  }
+  Sample& place(std::size_t at) { return at < kSamplesElsewhere ? elsewhere[at] : samples_[at - kSamplesElsewhere]; }
 
-  std::array<Sample, kCapacity> samples_{};
+  static inline Sample* elsewhere = nullptr;
+  std::array<Sample, kCapacity - kSamplesElsewhere> samples_{};
   std::bitset<kCapacity> saturated_;
   std::array<Segment, kMaxSegments> segments_{};
   std::uint64_t oldest_segment_ = 0, next_segment_ = 0;  // numbers, as of samples
@@ -76,6 +96,8 @@ class TelemetryRing {
   std::uint32_t lost_ = 0;
 };
 
-static_assert(sizeof(TelemetryRing) <= 22'000, "the ring outgrew its memory on the robot");
+static_assert(sizeof(Sample) == 24 && alignof(Sample) == 4, "a sample is six words");
+static_assert(sizeof(TelemetryRing) + kSamplesElsewhere * sizeof(Sample) <= 22'000,
+              "the ring outgrew its memory on the robot");
 
 }  // namespace robot_fw

@@ -12,10 +12,10 @@
 namespace control {
 namespace {
 
-constexpr double kStep_s = 0.01;
+constexpr double kStepS = 0.01;
 
 void run(ModalPlant& plant, double duty, double time_s) {
-  for (long i = std::lround(time_s / kStep_s); i > 0; --i) plant.step(duty);
+  for (long i = std::lround(time_s / kStepS); i > 0; --i) plant.step(duty);
 }
 
 struct Coast {
@@ -26,7 +26,7 @@ struct Coast {
 };
 
 double stopping_distance_mm(const FractionalModel& model, double duty, double driven_s, double late_s) {
-  ModalPlant plant{model, kStep_s};
+  ModalPlant plant{model, kStepS};
   run(plant, duty, driven_s);
   const double ordered_at_m = plant.position_m();
   run(plant, duty, late_s);
@@ -35,7 +35,7 @@ double stopping_distance_mm(const FractionalModel& model, double duty, double dr
 }
 
 Coast coast(const FractionalModel& model, double duty, double driven_s) {
-  ModalPlant plant{model, kStep_s};
+  ModalPlant plant{model, kStepS};
   run(plant, duty, driven_s);
   Coast coast;
   coast.speed_m_s = plant.velocity_m_s();

@@ -16,8 +16,9 @@ using robot_fw::Robot;
 
 constexpr std::uint64_t kTickUs = 10'000;
 constexpr std::uint64_t kLeaseUs = protocol::kLeaseMs * 1000ULL;
-constexpr std::uint64_t kMaxSilenceUs = 5'000'000;  // the longest link time-out; nothing moves beyond it
-constexpr std::uint64_t kLiveBacklog = 100;         // samples; what is older comes as backfill
+constexpr std::uint64_t kMaxSilenceUs =
+    35'000'000;                              // the longest link time-out and link_loss_limit_s; nothing moves beyond
+constexpr std::uint64_t kLiveBacklog = 100;  // samples; what is older comes as backfill
 // In one tick: hello, acks, pages, controller, events, live samples, status, heartbeat, backfill.
 constexpr int kMaxFramesAtOnce = 1 + 16 + 4 + 1 + 32 + 101 + 1 + 1 + 50;
 

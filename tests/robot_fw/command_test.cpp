@@ -57,6 +57,27 @@ TEST_F(Commands, ExpireWithoutEffect) {
   EXPECT_EQ(core().duty(), 0);
 }
 
+// By the robot's clock, which also runs between ticks: the moment at which the bytes arrive counts.
+TEST_F(Commands, LiveToTheMicrosecondByTheRobotsClock) {
+  const std::uint64_t now_us = robot.robot_time_us();
+  const auto answer_at = [this](std::uint64_t at_us, std::uint64_t valid_until_us) {
+    protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+    frame.which_body = rheonaut_StationFrame_command_tag;
+    frame.body.command = ping();
+    frame.body.command.command_id = valid_until_us;
+    frame.body.command.boot_id = kBootId;
+    frame.body.command.valid_until_robot_us = valid_until_us;
+    std::uint8_t bytes[protocol::kMaxFramedBytes];
+    EXPECT_TRUE(robot.receive({bytes, protocol::write_frame(frame, bytes, sizeof bytes)}, at_us));
+    station.listen();
+    return result(station.ack_of(valid_until_us).value_or(protocol::CommandAck{}));
+  };
+  EXPECT_EQ(answer_at(now_us + 3'000, now_us + 3'000), "accepted");
+  EXPECT_EQ(answer_at(now_us + 3'000, now_us + 2'999), "expired");
+  EXPECT_EQ(answer_at(now_us + 3'000, now_us + 10'003'000), "accepted");
+  EXPECT_EQ(answer_at(now_us + 3'000, now_us + 10'003'001), "life_too_long");
+}
+
 TEST_F(Commands, AreRefusedWithALifeOverTenSeconds) {
   protocol::Command command = set_duty(0.5F);
   command.valid_until_robot_us = robot.robot_time_us() + 10'000'001;
@@ -219,6 +240,21 @@ TEST(OneWayMotor, RefusesAReverseDuty) {
   const auto id = station.send(set_duty(-0.1F));
   station.run(2);
   EXPECT_EQ(station.ack_of(id)->reason, rheonaut_REJECT_REASON_OUT_OF_RANGE);
+}
+
+TEST_F(Commands, ThePositionIsNotZeroedInThePauseOfASchedule) {
+  protocol::Command command = rheonaut_Command_init_zero;
+  command.which_action = rheonaut_Command_set_duty_schedule_tag;
+  auto& schedule = command.action.set_duty_schedule;
+  schedule.tick_count = schedule.duty_count = 4;
+  for (pb_size_t i = 0; i < 4; ++i) {
+    schedule.tick[i] = i * 10;
+    schedule.duty[i] = i % 2 == 0 ? 0.5F : 0;
+  }
+  order(command);
+  station.run(13);
+  ASSERT_EQ(core().duty(), 0);
+  EXPECT_EQ(answer(zero_position()), "motor_on");
 }
 
 }  // namespace

@@ -15,8 +15,9 @@ constexpr float kNominalMv = 175, kGlucoseMv = 120;
 // A robot on its way to 0.1 m through a fluid in which a test pours glucose.
 class Delivery : public ::testing::Test {
  protected:
-  void start(const std::vector<GlucosePatch>& patches, double drift_mv_s = 0) {
+  void start(const std::vector<GlucosePatch>& patches, double drift_mv_s = 0, DutyRange duty = {-1, 1}) {
     SimulatedRobotConfig config;
+    config.duty = duty;
     config.boot_id = kBootId;
     config.world.glucose.patches = patches;
     config.world.electrode.drift_mv_s = drift_mv_s;
@@ -47,7 +48,8 @@ class Delivery : public ::testing::Test {
   void run_chattering_s(double seconds, IsOff is_off) {
     for (int k = 0; k < std::lround(seconds * 100); ++k) {
       const bool off = is_off(std::lround(now_s() * 100));
-      robot->world().set_fault(Sensor::electrode, {off ? FaultKind::offset : FaultKind::none, kNominalMv - kGlucoseMv});
+      robot->world().set_fault(Sensor::electrode,
+                               {off ? SensorFaultKind::offset : SensorFaultKind::none, kNominalMv - kGlucoseMv});
       station->step();
     }
   }
@@ -208,6 +210,62 @@ TEST_F(Delivery, CanBeSwitchedOff) {
   run_s(3);
   EXPECT_EQ(detections(), 0u);
   EXPECT_NEAR(position_m(), 0.1, 0.002);
+}
+
+TEST_F(Delivery, AMotorWithoutReverseDeliversWhereItComesToRest) {
+  start(patch(0.08, 5), 0, {0, 1});
+  go(0.2F);
+  run_s(4.5);
+  ASSERT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
+  EXPECT_GT(position_m(), 0.06);  // it has shot beyond the place and cannot come back
+  run_s(1.5);
+  const auto ended = events_of(rheonaut_EVENT_KIND_DELIVERY_ENDED);
+  ASSERT_EQ(ended.size(), 1u);
+  EXPECT_EQ(ended[0].cause, rheonaut_EVENT_CAUSE_IMPEDANCE);
+}
+
+TEST_F(Delivery, WhatManualHasFoundIsDeliveredToOnceInAuto) {
+  start({between(-1, 9)});
+  station->send(set_parameter("delivery_limit_s", 2));
+  run_s(1);
+  EXPECT_EQ(detections(), 1u);
+  go(0.1F);
+  run_s(1);
+  EXPECT_EQ(detections(), 2u);
+  EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
+  run_s(4);
+  go(0.2F);  // auto anew: the same glucose, already delivered to
+  run_s(1);
+  EXPECT_EQ(detections(), 2u);
+}
+
+TEST_F(Delivery, GlucoseThatComesAndGoesDuringADeliveryIsTheSame) {
+  start(patch(9));
+  go(0.1F);
+  run_s(2);
+  for (int k = 0; k < 2000; ++k) {  // in the band, but not mixed; and back
+    const bool diluted = k % 100 >= 10;
+    robot->world().set_fault(Sensor::electrode, {diluted ? SensorFaultKind::offset : SensorFaultKind::none, 38});
+    station->step();
+  }
+  EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
+  EXPECT_EQ(detections(), 1u);
+}
+
+TEST_F(Delivery, TheElectrodesFaultIsKnownWhenTheMonitorIsSwitchedOn) {
+  start({});
+  robot->world().set_fault(Sensor::electrode, {SensorFaultKind::missing, 0});
+  run_s(0.5);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_SENSOR_FAULT).size(), 1u);
+  station->send(set_parameter("impedance_monitor", 0));
+  run_s(0.1);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_SENSOR_RECOVERED).size(), 1u);
+  robot->world().set_fault(Sensor::electrode, {});
+  run_s(4);
+  station->send(set_parameter("impedance_monitor", 1));
+  run_s(0.1);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_SENSOR_FAULT).size(), 1u);  // it has recovered meanwhile
+  EXPECT_EQ(station->samples.rbegin()->second.flags & rheonaut_TELEMETRY_FLAG_SENSOR_FAULT, 0u);
 }
 
 TEST(ImpedanceMonitor, TakesFiveReadingsInARow) {

@@ -168,6 +168,51 @@ TEST(Boot, TakesOverALatchThatOutlivedTheReset) {
   EXPECT_EQ(robot.emergency_id(), 4711u);
 }
 
+TEST(Boot, ASensorThatCausedTheLatchIsNotBelievedAtOnce) {
+  RobotConfig config;
+  config.boot_id = kBootId;
+  config.reset_cause = rheonaut_RESET_CAUSE_SOFTWARE;
+  config.restored_emergency_id = 4711;
+  config.restored_emergency_cause = rheonaut_EMERGENCY_CAUSE_SENSOR_STUCK;
+  Robot robot{config};
+  std::uint64_t now_us = 0;
+  const auto tick = [&](std::int16_t counts) {
+    Inputs inputs;
+    inputs.robot_time_us = now_us += kTickUs;
+    inputs.impedance_mv = 175;
+    inputs.acceleration_is_valid = true;
+    inputs.acceleration_counts = counts;
+    robot.step(inputs, 0.01F);
+  };
+  const auto send = [&](protocol::StationFrame frame) {
+    std::uint8_t bytes[protocol::kMaxFramedBytes];
+    EXPECT_TRUE(robot.receive({bytes, protocol::write_frame(frame, bytes, sizeof bytes)}, now_us));
+  };
+  std::uint64_t id = 0;
+  const auto clear = [&] {
+    protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+    frame.which_body = rheonaut_StationFrame_command_tag;
+    frame.body.command = clear_emergency(4711);
+    frame.body.command.command_id = ++id;
+    frame.body.command.boot_id = kBootId;
+    frame.body.command.valid_until_robot_us = now_us + 1'000'000;
+    send(frame);
+  };
+  tick(5);
+  robot.link_opened(now_us);
+  protocol::StationFrame welcome = rheonaut_StationFrame_init_zero;
+  welcome.which_body = rheonaut_StationFrame_welcome_tag;
+  welcome.body.welcome.protocol_version = protocol::kProtocolVersion;
+  send(welcome);
+  clear();
+  for (int i = 0; i < 300; ++i) tick(5);  // stuck still
+  clear();
+  EXPECT_EQ(robot.mode(), rheonaut_MODE_EMERGENCY);
+  for (std::int16_t i = 0; i < 101; ++i) tick(i);
+  clear();
+  EXPECT_EQ(robot.mode(), rheonaut_MODE_MANUAL);
+}
+
 // A core without a plant, in auto at full duty.
 class BareRobot : public ::testing::Test {
  protected:

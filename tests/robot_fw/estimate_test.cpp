@@ -108,7 +108,7 @@ TEST(OnItsAccelerometer, AnotherFluidIsAnEventWithin5S) {
     ++mismatches;
     EXPECT_TRUE(std::isfinite(event.value));
   }
-  EXPECT_GE(mismatches, 1);
+  EXPECT_EQ(mismatches, 1);
 }
 
 TEST(OnItsAccelerometer, TheWatersParametersSetOverTheLinkServeInWater) {
@@ -131,6 +131,33 @@ TEST(OnItsAccelerometer, TheWatersParametersSetOverTheLinkServeInWater) {
   station.run(4200);
   for (const auto& event : station.events) EXPECT_NE(event.kind, rheonaut_EVENT_KIND_MODEL_MISMATCH);
   EXPECT_NEAR(station.samples.rbegin()->second.position_m, robot.world().position_m(), 0.005);
+}
+
+TEST_F(Estimate, ItsParametersAreRefusedWhileTheRobotCoasts) {
+  order(set_duty(1));
+  station.run(45);
+  order(emergency_stop());
+  EXPECT_EQ(answer(set_parameter("model_gain_error", 0.2F)), "motor_on");
+  EXPECT_EQ(answer(set_parameter("auto_limit_s", 100)), "accepted");
+  station.run(3000);  // the fluid remembers for long
+  EXPECT_EQ(answer(set_parameter("model_gain_error", 0.2F)), "accepted");
+  station.run(500);
+  EXPECT_LE(std::abs(last().position_m - static_cast<float>(robot.world().position_m())), 2 * last().position_sd_m);
+}
+
+TEST(OnItsAccelerometer, ARobotThatWasResetMayBeCoastingAndSaysSo) {
+  for (const auto [cause, sd_m] :
+       {std::pair{rheonaut_RESET_CAUSE_POWER_ON, 0.0F}, std::pair{rheonaut_RESET_CAUSE_SOFTWARE, 0.025F},
+        std::pair{rheonaut_RESET_CAUSE_BROWN_OUT, 0.025F}}) {
+    SimulatedRobotConfig config = on_its_accelerometer(1);
+    config.reset_cause = cause;
+    SimulatedRobot robot{config};
+    StationPeer station{robot};
+    station.connect();
+    station.run(20);
+    EXPECT_GE(station.samples.rbegin()->second.position_sd_m, sd_m);
+    if (sd_m == 0) EXPECT_LE(station.samples.rbegin()->second.position_sd_m, 0.001F);
+  }
 }
 
 }  // namespace

@@ -198,5 +198,46 @@ TEST_F(Limits, TheReferenceFollowsItsProfileFromTheMeasuredPosition) {
   EXPECT_NEAR(last().position_m, -0.1F, 1e-3F);
 }
 
+TEST_F(Limits, TimeAtPowerCountsTicksThatWereMissed) {
+  set("power_limit_s", 2);
+  order(set_duty(1));
+  int ticks = 0;
+  for (; mode() == "manual" && ticks < 400; ticks += 4) {
+    station.send(renew_lease());
+    station.step();
+    robot.skip(3);
+  }
+  EXPECT_EQ(cause(), "time_at_power");
+  EXPECT_NEAR(ticks, 200, 8);
+}
+
+TEST_F(Limits, AtTheVeryLimitARobotDoesNotGoToAndFro) {
+  Safety safety{{}, 1};
+  const PositionLimits limits{-1, 0.1F};
+  EXPECT_TRUE(safety.leaves_limits(0.100001F, limits));
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_FALSE(safety.leaves_limits(0.099999F, limits));
+    EXPECT_FALSE(safety.leaves_limits(0.100001F, limits));
+  }
+  EXPECT_TRUE(safety.outside_limits());
+  EXPECT_FALSE(safety.leaves_limits(0.098F, limits));
+  EXPECT_FALSE(safety.outside_limits());
+  EXPECT_TRUE(safety.leaves_limits(0.101F, limits));
+}
+
+TEST_F(Limits, TheSampleOfTheEmergencyHasNoDisturbanceLeftInIt) {
+  set("position_limit_max_m", 0.05F);
+  order(set_auto(0.05F));
+  order(inject_disturbance(-0.02F));  // believes to be farther back than it is, and drives on over the limit
+  station.run(200);
+  ASSERT_EQ(mode(), "emergency");
+  for (const auto& [seq, sample] : station.samples) {
+    if (sample.emergency_id == 0) continue;
+    EXPECT_EQ(sample.disturbance_m, 0);
+    EXPECT_GT(sample.position_m, 0.05F);
+    break;
+  }
+}
+
 }  // namespace
 }  // namespace robot_fw

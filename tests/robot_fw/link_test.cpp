@@ -40,17 +40,28 @@ TEST(Hello, IsTheFirstFrameAndTheOnlyOneBeforeWelcome) {
   EXPECT_EQ(station.hello->mode, rheonaut_MODE_MANUAL);
 }
 
-TEST(Hello, GetsTheConnectionClosedByARefusal) {
-  SimulatedRobot robot{{}};
-  StationPeer station{robot};
-  robot.link_opened(0);
-  protocol::StationFrame frame = welcome_frame();
-  frame.body.welcome.refusal = rheonaut_REFUSAL_REASON_WRONG_TOKEN;
-  std::strcpy(frame.body.welcome.detail, "enrol it anew");
-  EXPECT_FALSE(station.send(frame));
-  EXPECT_EQ(robot.core().refusal(), rheonaut_REFUSAL_REASON_WRONG_TOKEN);
-  EXPECT_STREQ(robot.core().refusal_detail(), "enrol it anew");
-  EXPECT_FALSE(robot.core().link_up());
+TEST(Hello, GetsTheConnectionClosedByARefusalOfAnyReason) {
+  for (const auto reason :
+       {rheonaut_REFUSAL_REASON_VERSION, rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT, rheonaut_REFUSAL_REASON_WRONG_TOKEN,
+        rheonaut_REFUSAL_REASON_ALREADY_CONNECTED, rheonaut_REFUSAL_REASON_BOOT_ID_REUSED,
+        rheonaut_REFUSAL_REASON_MALFORMED, rheonaut_REFUSAL_REASON_STATION_BUSY}) {
+    SimulatedRobot robot{{}};
+    StationPeer station{robot};
+    robot.link_opened(0);
+    protocol::StationFrame frame = welcome_frame();
+    frame.body.welcome.refusal = reason;
+    std::strcpy(frame.body.welcome.detail, "enrol it anew");
+    EXPECT_FALSE(station.send(frame));
+    EXPECT_EQ(robot.core().refusal(), reason);
+    EXPECT_STREQ(robot.core().refusal_detail(), "enrol it anew");
+    EXPECT_FALSE(robot.core().link_up());
+
+    robot.link_closed(0);  // the next connection starts anew
+    robot.link_opened(0);
+    EXPECT_EQ(robot.core().refusal(), rheonaut_REFUSAL_REASON_NONE);
+    EXPECT_TRUE(station.send(welcome_frame()));
+    EXPECT_TRUE(robot.core().link_up());
+  }
 }
 
 TEST(Hello, KeepsTheBeginningOfALongRefusalAndCutsNoCharacter) {
@@ -196,6 +207,22 @@ TEST_F(RobotLink, AnswersAStampedHeartbeat) {
     ++answers;
   }
   EXPECT_EQ(answers, 1);
+}
+
+TEST_F(RobotLink, AnswersOnlyTheLatestOfTwoStampsAndNoneWithout) {
+  protocol::StationHeartbeat probe = rheonaut_StationHeartbeat_init_zero;
+  for (const std::uint64_t stamp_us : {5'000U, 6'000U, 0U}) {
+    probe.station_time_us = stamp_us;
+    station.send_heartbeat(probe);
+  }
+  station.frames.clear();
+  station.run(100);
+  std::vector<std::uint64_t> echoes;
+  for (const auto& frame : station.frames) {
+    const bool heartbeat = frame.which_body == rheonaut_RobotFrame_heartbeat_tag;
+    if (heartbeat) echoes.push_back(frame.body.heartbeat.echo_station_time_us);
+  }
+  EXPECT_EQ(echoes, std::vector<std::uint64_t>{6'000U});
 }
 
 TEST_F(RobotLink, SendsAHeartbeatOnlyWhenNothingElseWasSent) {

@@ -18,12 +18,15 @@ class MemoryStorage final : public Storage {
   }
   bool save(StorageKey key, protocol::Bytes bytes) override {
     ++saves;
+    if (is_full) return false;
     values[key].assign(bytes.begin(), bytes.end());
     return true;
   }
+  bool damaged() const override { return is_damaged; }
 
   std::map<StorageKey, std::vector<std::uint8_t>> values;
   int saves = 0;
+  bool is_full = false, is_damaged = false;
 };
 
 }  // namespace robot_fw

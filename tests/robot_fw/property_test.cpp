@@ -4,6 +4,7 @@
 #include <random>
 #include <vector>
 
+#include "tests/robot_fw/bare_core.hpp"
 #include "tests/robot_fw/controllers.hpp"
 #include "tests/robot_fw/driven_robot.hpp"
 #include "tests/robot_fw/memory_storage.hpp"
@@ -16,13 +17,12 @@ using namespace sim_robot;
 // Commands as a confused or hostile station might make them.
 class RandomStation {
  public:
-  RandomStation(unsigned seed, const SimulatedRobot& robot) : random_(seed), robot_(robot) {}
+  RandomStation(unsigned seed, const Robot& core) : random_(seed), core_(core) {}
 
-  protocol::Command command() {
+  protocol::Command command(std::uint64_t now_us) {
     protocol::Command command = action();
     command.command_id = pick({number(), number(), 1 + number() % 50, 0});
     command.boot_id = pick({kBootId, kBootId, kBootId, kBootId, kBootId, 0, number()});
-    const std::uint64_t now_us = robot_.robot_time_us();
     command.valid_until_robot_us =
         pick({now_us + 1'000'000, now_us + 1'000'000, now_us + 1'000'000, now_us - std::min<std::uint64_t>(now_us, 1),
               now_us + 20'000'000, UINT64_MAX, 0});
@@ -69,7 +69,7 @@ class RandomStation {
                              number() % 4 == 0 ? value() : spec.minimum + 0.1F * (spec.maximum - spec.minimum));
       }
       case 13: return get_parameters(number() % (kParameterCount + 1));
-      case 14: return clear_emergency(number() % 8 == 0 ? number() : robot_.core().emergency_id());
+      case 14: return clear_emergency(number() % 8 == 0 ? number() : core_.emergency_id());
       default: return schedule();
     }
   }
@@ -99,8 +99,40 @@ class RandomStation {
   }
 
   std::mt19937 random_;
-  const SimulatedRobot& robot_;
+  const Robot& core_;
 };
+
+// Sensors that fail in every way, and recover.
+void turn_sensors(BareCore& core, RandomStation& random) {
+  const auto one_in = [&](unsigned n) { return random.number() % n == 0; };
+  core.accelerometer_answers = !one_in(6);
+  core.steady_counts.reset();
+  if (one_in(6)) core.steady_counts = static_cast<std::int16_t>(random.number());
+  core.mean_counts = one_in(4) ? static_cast<int>(random.number() % 8001) - 4000 : 0;
+  core.swing_counts = 1 + static_cast<int>(random.number() % 20);
+  core.known_position_m.reset();
+  if (one_in(5)) core.known_position_m = static_cast<float>(random.number() % 2001) * 1e-3F - 1;
+  const float impedances_mv[] = {175, 175, 175, 165, 120, 120, 0, 1500};
+  core.impedance_mv = impedances_mv[random.number() % std::size(impedances_mv)];
+  core.supply_mv = one_in(40) ? std::numeric_limits<float>::quiet_NaN() : 3000;
+}
+
+// An answer that nothing was done must be true; that the station lives is all that the robot has learnt.
+void expect_refusal_to_change_nothing(const BareCore& before, const BareCore& after) {
+  BareCore told = after, untold = before;
+  untold.heartbeat();
+  for (BareCore* each : {&told, &untold}) each->run(2);
+  ASSERT_EQ(told.robot.float_state_checksum(), untold.robot.float_state_checksum());
+  ASSERT_EQ(told.robot.mode(), untold.robot.mode());
+  ASSERT_EQ(told.robot.emergency_id(), untold.robot.emergency_id());
+  ASSERT_EQ(told.sample.sub_state, untold.sample.sub_state);
+  ASSERT_EQ(told.sample.setpoint_m, untold.sample.setpoint_m);
+  ASSERT_EQ(told.sample.disturbance_m, untold.sample.disturbance_m);
+  ASSERT_EQ(told.sample.flags, untold.sample.flags);
+  const auto told_hello = told.hello_now(), untold_hello = untold.hello_now();
+  ASSERT_EQ(told_hello.parameters_checksum, untold_hello.parameters_checksum);
+  ASSERT_EQ(told_hello.controller_checksum, untold_hello.controller_checksum);
+}
 
 class AnyOrder : public ::testing::TestWithParam<unsigned> {};
 
@@ -112,10 +144,10 @@ TEST_P(AnyOrder, TheDutyStaysInRangeAndIsZeroInEmergency) {
   config.storage = &storage;
   SimulatedRobot robot{config};
   StationPeer station{robot};
-  RandomStation random{GetParam(), robot};
+  RandomStation random{GetParam(), robot.core()};
   station.connect();
   for (int round = 0; round < 400; ++round) {
-    station.send(random.command());
+    station.send(random.command(robot.robot_time_us()));
     if (robot.core().mode() == rheonaut_MODE_EMERGENCY) ASSERT_EQ(robot.core().duty(), 0);
     if (round % 50 == 49) {  // a cut, sometimes longer than the time-out
       station.disconnect();
@@ -141,19 +173,19 @@ TEST_P(AnyOrder, ExpiredAndRepeatedCommandsChangeNothing) {
   config.boot_id = kBootId;
   SimulatedRobot plain{config}, pestered{config};
   StationPeer station{plain}, pest{pestered};
-  RandomStation random{GetParam(), plain};
+  RandomStation random{GetParam(), plain.core()};
   station.connect();
   pest.connect();
   std::vector<protocol::Command> said;
   for (int round = 0; round < 200; ++round) {
-    protocol::Command command = random.command();
+    protocol::Command command = random.command(plain.robot_time_us());
     if (command.which_action == rheonaut_Command_emergency_stop_tag) command = ping();
     command.command_id = 1'000'000 + static_cast<std::uint64_t>(round);
     station.send(command);
     pest.send(command);
     said.push_back(command);
     pest.send(said[said.size() - 1 - random.number() % std::min<std::size_t>(said.size(), 20)]);
-    protocol::Command late = random.command();
+    protocol::Command late = random.command(plain.robot_time_us());
     if (late.which_action != rheonaut_Command_emergency_stop_tag && pestered.robot_time_us() > 0) {
       late.command_id = 0;
       late.boot_id = kBootId;
@@ -176,6 +208,37 @@ TEST_P(AnyOrder, ExpiredAndRepeatedCommandsChangeNothing) {
   }
   EXPECT_EQ(station.hello->parameters_checksum, pest.hello->parameters_checksum);
   EXPECT_EQ(station.hello->controller_checksum, pest.hello->controller_checksum);
+}
+
+// BareCore holds the invariants in every tick and after every command. Some commands arrive late and in another order.
+TEST_P(AnyOrder, SensorsAndLinksThatFailLeaveTheInvariants) {
+  RobotConfig config = BareCore::config();
+  if (GetParam() % 2 == 0) config.duty_min = 0, config.duty_max = 0.6F;
+  BareCore core{config};
+  core.tick();
+  core.renews = false;
+  core.order(set_parameter("link_loss_action", static_cast<float>(GetParam() % 3)));
+  RandomStation random{GetParam(), core.robot};
+  std::vector<protocol::Command> on_the_way;
+  for (int round = 0; round < 150 && !HasFatalFailure(); ++round) {
+    on_the_way.push_back(random.command(core.now_us));
+    while (on_the_way.size() > random.number() % 6) {
+      const auto next = on_the_way.begin() + random.number() % static_cast<unsigned>(on_the_way.size());
+      const BareCore before = core;
+      const auto result = core.order(*next).result;
+      const bool is_stop = next->which_action == rheonaut_Command_emergency_stop_tag;
+      on_the_way.erase(next);
+      if (result != rheonaut_COMMAND_RESULT_ACCEPTED && !is_stop) expect_refusal_to_change_nothing(before, core);
+    }
+    if (random.number() % 4 == 0) turn_sensors(core, random);
+    core.attentive = random.number() % 5 != 0;
+    for (unsigned ticks = random.ticks(); ticks > 0; --ticks) {
+      core.tick();
+      if ((core.sample.flags & rheonaut_TELEMETRY_FLAG_POSITION_LIMIT) == 0) continue;
+      const float position_m = core.sample.position_m[0] - core.sample.disturbance_m;
+      ASSERT_LE(core.robot.duty() * position_m, 0) << "outside, only inward; the limits have 0 between them";
+    }
+  }
 }
 
 TEST_P(AnyOrder, RandomBytesNeitherCrashNorMoveTheRobot) {

@@ -122,5 +122,39 @@ TEST_F(Settings, AStoredControllerMustFitTheMotorOfThisBoot) {
   EXPECT_EQ(Boot(storage).station.hello->controller_id, 1u);
 }
 
+int events_of(const StationPeer& station, protocol::EventKind kind, protocol::EventCause cause) {
+  int count = 0;
+  for (const auto& event : station.events) count += event.kind == kind && event.cause == cause;
+  return count;
+}
+
+TEST_F(Settings, ThatDecayedAreAnEventOfTheBoot) {
+  {
+    Boot boot{storage};
+    boot.order(set_parameter("auto_limit_s", 42));
+    boot.order(set_controller(golden_biquads()));
+    EXPECT_EQ(events_of(boot.station, rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_RESET), 0);
+  }
+  for (auto& [key, bytes] : storage.values) bytes.back() ^= 1;
+  Boot boot{storage};
+  EXPECT_EQ(events_of(boot.station, rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_RESET), 1);
+  EXPECT_EQ(events_of(boot.station, rheonaut_EVENT_KIND_CONTROLLER_CHANGED, rheonaut_EVENT_CAUSE_RESET), 1);
+}
+
+TEST_F(Settings, OfAStorageThatIsDamagedAreAnEventOfTheBoot) {
+  storage.is_damaged = true;
+  Boot boot{storage};
+  EXPECT_EQ(events_of(boot.station, rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_RESET), 1);
+}
+
+TEST_F(Settings, ThatCannotBeKeptAreAnEvent) {
+  storage.is_full = true;
+  Boot boot{storage};
+  boot.order(set_parameter("auto_limit_s", 42));
+  boot.order(set_controller(golden_biquads()));
+  EXPECT_EQ(events_of(boot.station, rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_INTERNAL), 1);
+  EXPECT_EQ(events_of(boot.station, rheonaut_EVENT_KIND_CONTROLLER_CHANGED, rheonaut_EVENT_CAUSE_INTERNAL), 1);
+}
+
 }  // namespace
 }  // namespace robot_fw

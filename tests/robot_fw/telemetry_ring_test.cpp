@@ -68,6 +68,24 @@ TEST_F(Ring, OverwritesTheOldestAndCountsIt) {
   EXPECT_EQ(read(200).oldest_seq, 200u);
 }
 
+TEST_F(Ring, HoldsEightSecondsInTwentyTwoKilobytes) {
+  EXPECT_LE(sizeof ring, 22'000u);
+  while (now_us < 8'000'000) push();
+  EXPECT_EQ(ring.fill(), 800u);
+  EXPECT_EQ(ring.oldest_seq(), 0u);
+  EXPECT_EQ(ring.lost(), 0u);
+  push();
+  EXPECT_EQ(ring.oldest_seq(), 1u);
+  EXPECT_EQ(ring.lost(), 1u);
+}
+
+TEST_F(Ring, GivesBatchesOfOneToTwentyFive) {
+  for (int i = 0; i < 30; ++i) push();
+  for (std::size_t wish = 1; wish <= 25; ++wish) EXPECT_EQ(read(2, wish).position_m_count, wish);
+  EXPECT_EQ(read(2, 800).position_m_count, 25);  // more do not fit into a frame
+  EXPECT_EQ(read(28, 25).position_m_count, 2);
+}
+
 TEST_F(Ring, ForgetsWhatIsDurableWithoutCountingIt) {
   for (int i = 0; i < 1000; ++i) {
     push();

@@ -1,4 +1,6 @@
 // Every sample reaches the station: batches, order of sending, backfill, resending, and the counting of losses.
+#include <algorithm>
+
 #include "tests/robot_fw/driven_robot.hpp"
 
 namespace robot_fw {
@@ -25,6 +27,13 @@ class Telemetry : public DrivenRobot {
     }
     return found;
   }
+  protocol::Status last_status() const {
+    protocol::Status status = rheonaut_Status_init_zero;
+    for (const auto& frame : station.frames) {
+      if (frame.which_body == rheonaut_RobotFrame_status_tag) status = frame.body.status;
+    }
+    return status;
+  }
   // Every sample from the first to the last heard is there.
   void expect_no_hole() const {
     ASSERT_FALSE(station.samples.empty());
@@ -36,6 +45,19 @@ TEST_F(Telemetry, BringsFiveSamplesInAFrame) {
   station.run(100);
   for (const auto& batch : batches(false)) EXPECT_EQ(batch.position_m_count, 5);
   EXPECT_EQ(batches(false).size(), 20u);
+  expect_no_hole();
+}
+
+TEST_F(Telemetry, BringsAsManySamplesInAFrameAsTheStationWishes) {
+  for (const std::uint32_t wish : {1U, 2U, 7U, 24U, 25U, 26U, UINT32_MAX}) {
+    station.disconnect();
+    station.welcome.samples_per_frame = wish;
+    station.connect();
+    station.frames.clear();
+    station.run(100);
+    ASSERT_FALSE(batches(false).empty());
+    for (const auto& batch : batches(false)) EXPECT_EQ(batch.position_m_count, std::min(wish, 25U)) << wish;
+  }
   expect_no_hole();
 }
 
@@ -129,11 +151,44 @@ TEST_F(Telemetry, ALongOutageLosesTheOldestAndSaysSo) {
   EXPECT_EQ(station.hello->oldest_seq, next_seq() - TelemetryRing::kCapacity);
   EXPECT_GT(station.hello->oldest_seq, next);
   station.run(600);
-  std::uint32_t lost = 0;
-  for (const auto& frame : station.frames) {
-    if (frame.which_body == rheonaut_RobotFrame_status_tag) lost = frame.body.status.lost_samples;
+  EXPECT_GE(last_status().lost_samples, 195u);
+}
+
+TEST_F(Telemetry, ExactlyWhatIsCountedAsLostIsMissing) {
+  station.disconnect();
+  station.run(1000);
+  station.connect();
+  station.keeps_samples = false;  // the samples are durable here as they come as backfill, across the gap
+  station.frames.clear();
+  std::uint64_t oldest_seq = 0;
+  for (int i = 0; i < 600; ++i) {
+    station.step();
+    const auto backfill = batches(true);
+    if (backfill.empty()) continue;
+    const protocol::Telemetry& last = backfill.back();
+    oldest_seq = last.oldest_seq;
+    protocol::StationHeartbeat heartbeat = rheonaut_StationHeartbeat_init_zero;
+    heartbeat.durable_next_seq = last.first_seq + last.position_m_count;
+    station.send_heartbeat(heartbeat);
   }
-  EXPECT_GE(lost, 195u);
+  std::uint64_t missing = 0;
+  for (std::uint64_t seq = station.samples.begin()->first; seq < station.samples.rbegin()->first; ++seq) {
+    if (station.samples.count(seq) != 0) continue;
+    ++missing;
+    EXPECT_LT(seq, oldest_seq);
+  }
+  EXPECT_GE(missing, 195u);
+  EXPECT_EQ(missing, last_status().lost_samples);
+}
+
+TEST_F(Telemetry, EventsThatNobodyKeptAreCountedAsLost) {
+  const auto durable = station.events.back().event_seq + 1;
+  station.keeps_samples = false;
+  for (int i = 0; i < 40; ++i) order(i % 2 == 0 ? set_auto(0) : set_manual());
+  station.run(101);
+  const protocol::Event& last_event = station.events.back();
+  EXPECT_EQ(last_event.oldest_event_seq, last_event.event_seq + 1 - EventRing::kCapacity);
+  EXPECT_EQ(last_status().lost_events, last_event.oldest_event_seq - durable);
 }
 
 TEST_F(Telemetry, AStalledTransportDelaysNothingButItself) {
@@ -207,6 +262,24 @@ TEST_F(Telemetry, StatusComesOnceASecond) {
   int count = 0;
   for (const auto& frame : station.frames) count += frame.which_body == rheonaut_RobotFrame_status_tag;
   EXPECT_EQ(count, 10);
+}
+
+TEST_F(Telemetry, TicksThatAreMissedAllTheTimeAreOneEventASecond) {
+  station.run(200);
+  const auto before = station.events.size();
+  for (int i = 0; i < 100; ++i) {  // of 5 s
+    robot.skip(1);
+    station.run(4);
+  }
+  float told_s = 0;
+  for (std::size_t i = before; i < station.events.size(); ++i) {
+    ASSERT_EQ(station.events[i].kind, rheonaut_EVENT_KIND_TIME_STEP);
+    told_s += station.events[i].value;
+  }
+  EXPECT_GE(station.events.size() - before, 4u);
+  EXPECT_LE(station.events.size() - before, 6u);
+  EXPECT_GT(told_s, 0.8F);
+  EXPECT_LE(told_s, 1.001F);
 }
 
 }  // namespace

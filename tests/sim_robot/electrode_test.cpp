@@ -55,7 +55,7 @@ TEST(Electrode, IsTheSameForTheSameSeedAndAnotherForAnother) {
 TEST(Electrode, IsStuckAtItsLastReadingUntilTheFaultEnds) {
   Electrode electrode{{}, 1};
   EXPECT_EQ(electrode.read(150), 150);
-  electrode.set_fault({.kind = FaultKind::stuck});
+  electrode.set_fault({.kind = SensorFaultKind::stuck});
   EXPECT_EQ(electrode.read(120), 150);
   EXPECT_EQ(electrode.read(175), 150);
   electrode.set_fault({});
@@ -64,22 +64,22 @@ TEST(Electrode, IsStuckAtItsLastReadingUntilTheFaultEnds) {
 
 TEST(Electrode, ThatIsMissingReads0) {
   Electrode electrode{{}, 1};
-  electrode.set_fault({.kind = FaultKind::missing});
+  electrode.set_fault({.kind = SensorFaultKind::missing});
   EXPECT_EQ(electrode.read(175), 0);
 }
 
 TEST(Electrode, CanBeOffOrNoisyOnTop) {
   Electrode electrode{{}, 1};
-  electrode.set_fault({FaultKind::offset, 40});
+  electrode.set_fault({SensorFaultKind::offset, 40});
   EXPECT_EQ(electrode.read(175), 215);
-  electrode.set_fault({FaultKind::noisy, 10});
+  electrode.set_fault({SensorFaultKind::noisy, 10});
   EXPECT_NEAR(spread_of(electrode).sd, 10, 0.3);
 }
 
 TEST(Electrode, RefusesWhatCannotBe) {
   EXPECT_THROW(check(ElectrodeParameters{.noise_mv = -1}), std::invalid_argument);
-  EXPECT_THROW(check(Fault{FaultKind::noisy, -1}), std::invalid_argument);
-  EXPECT_THROW(check(Fault{FaultKind::offset, std::nan("")}), std::invalid_argument);
+  EXPECT_THROW(check(SensorFault{SensorFaultKind::noisy, -1}), std::invalid_argument);
+  EXPECT_THROW(check(SensorFault{SensorFaultKind::offset, std::nan("")}), std::invalid_argument);
 }
 
 }  // namespace

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 namespace sim_robot {
@@ -94,6 +96,61 @@ TEST(Imu, MissesReadsAsOftenAsItIsTold) {
   int missed = 0;
   for (int k = 0; k < 10'000; ++k) missed += imu.read().is_valid ? 0 : 1;
   EXPECT_NEAR(missed, 1000, 100);
+}
+
+// Of a vibration of f Hz, 1/sqrt(1 + (f/B)²) is left; and all of the velocity that it adds up to.
+TEST(Imu, SmoothsFastMotionAndLosesNoVelocity) {
+  ImuParameters parameters = silent();
+  parameters.bandwidth_hz = 5;
+  Imu imu{parameters, 1};
+  double largest = 0, sum = 0;
+  for (int k = 0; k < 2000; ++k) {
+    imu.accelerate(10 * std::sin(2 * std::numbers::pi * 5 * 0.01 * k));
+    if (k > 1000) largest = std::max(largest, imu.read().counts / Imu::kCountsPerMS2);
+  }
+  EXPECT_NEAR(largest, 10 / std::sqrt(2), 0.15);
+  Imu pushed{parameters, 1};
+  for (int k = 0; k < 200; ++k) {
+    pushed.accelerate(k > 20 && k <= 30 ? 5 : 0);
+    sum += pushed.read().counts / Imu::kCountsPerMS2;
+  }
+  EXPECT_NEAR(0.01 * sum, 0.5, 0.01);
+}
+
+TEST(Imu, IsStuckAtItsLastReadingUntilTheFaultEnds) {
+  Imu imu{{}, 1};
+  for (int k = 0; k < 10; ++k) imu.accelerate(1);
+  imu.set_fault({.kind = SensorFaultKind::stuck});
+  const int stuck = imu.read().counts;
+  for (int k = 0; k < 100; ++k) {
+    imu.accelerate(-3);
+    ASSERT_EQ(imu.read().counts, stuck);
+  }
+  imu.set_fault({});
+  for (int k = 0; k < 3; ++k) imu.accelerate(-3);
+  EXPECT_NEAR(imu.read().counts, -300, 10);
+}
+
+TEST(Imu, ThatIsMissingGivesNoReading) {
+  Imu imu{silent(), 1};
+  imu.set_fault({.kind = SensorFaultKind::missing});
+  EXPECT_FALSE(imu.read().is_valid);
+}
+
+TEST(Imu, CanBeOffOrNoisyOnTop) {
+  Imu imu{silent(), 1};
+  imu.set_fault({SensorFaultKind::offset, 0.5});
+  for (int k = 0; k < 3; ++k) imu.accelerate(1);
+  EXPECT_EQ(imu.read().counts, 150);
+  EXPECT_EQ(imu.bias_m_s2(), 0);
+  imu.set_fault({SensorFaultKind::noisy, 0.3});
+  double squares = 0;
+  constexpr int kReadings = 5000;
+  for (int k = 0; k < kReadings; ++k) {
+    imu.accelerate(0);
+    squares += std::pow(imu.read().counts / Imu::kCountsPerMS2, 2);
+  }
+  EXPECT_NEAR(std::sqrt(squares / kReadings), 0.3, 0.02);
 }
 
 TEST(Imu, RefusesAProbabilityBeyondOne) {

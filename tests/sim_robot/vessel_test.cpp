@@ -75,8 +75,8 @@ TEST(Vessel, CarriesARobotAtRestByTheMeanFlow) {
 
 TEST(Vessel, CarriesBackwardsWhenTheFlowIsReversed) {
   World forwards{in_a_vessel(kPaperFlowM3S)}, backwards{in_a_vessel(-kPaperFlowM3S)};
-  drift(forwards, 2);
-  drift(backwards, 2);
+  drift(forwards, 1);
+  drift(backwards, 1);
   EXPECT_NEAR(backwards.position_m(), -forwards.position_m(), 1e-12);
 }
 
@@ -105,8 +105,7 @@ TEST(Vessel, TheRobotPassesAsMuchVolumeAsThePumpDrives) {
   // Over its length the robot takes the mean of 1/A, so the volume is that of a smooth transition.
   const double step = 1 / area(0.102) - 1 / area(0.16);
   const double in_transition_m3 = 0.09 / step * std::log(area(0.16) / area(0.102));
-  const double expected_m3 =
-      (0.2 - 0.045) * area(0.16) + in_transition_m3 + (world.position_m() - 0.245) * area(0.102);
+  const double expected_m3 = (0.2 - 0.045) * area(0.16) + in_transition_m3 + (world.position_m() - 0.245) * area(0.102);
   EXPECT_NEAR(driven_m3, expected_m3, 2e-4 * expected_m3);
 }
 

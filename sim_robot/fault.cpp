@@ -1,0 +1,125 @@
+// Does faults to a robot, and reads them from JSON.
+#include "sim_robot/fault.hpp"
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "control/invalid_argument.hpp"
+#include "sim_robot/field_reader.hpp"
+#include "sim_robot/simulated_robot.hpp"
+
+namespace sim_robot {
+namespace {
+
+using Json = nlohmann::json;
+
+// Kinds of a sensor come in the order of SensorFaultKind behind `none`.
+SensorFaultKind sensor_kind(const Fault& fault, FaultKind first) {
+  return static_cast<SensorFaultKind>(static_cast<int>(fault.kind) - static_cast<int>(first) + 1);
+}
+
+SensorFault sensor_fault(const Fault& fault, FaultKind first) {
+  const SensorFaultKind kind = sensor_kind(fault, first);
+  const bool has_magnitude = kind == SensorFaultKind::noisy || kind == SensorFaultKind::offset;
+  return {kind, has_magnitude ? fault.magnitude : 0};
+}
+
+// Objects of texts, numbers and true or false alone; a key that comes twice is refused.
+toml::table flat_table(std::string_view json) {
+  std::set<std::string> seen;
+  const auto watch = [&seen](int depth, Json::parse_event_t event, Json& parsed) {
+    const bool is_deep =
+        depth > 0 && (event == Json::parse_event_t::object_start || event == Json::parse_event_t::array_start);
+    if (is_deep)
+      control::throw_invalid("a fault is one object of texts, numbers, true and false, without objects in it");
+    if (event == Json::parse_event_t::key && !seen.insert(parsed.get<std::string>()).second) {
+      control::throw_invalid(parsed.get<std::string>(), ": is given twice");
+    }
+    return true;
+  };
+  const Json given = Json::parse(json, watch, false);
+  if (given.is_discarded()) control::throw_invalid("this is not JSON; a fault is {\"fault\":\"electrode_offset\",…}");
+  if (!given.is_object()) control::throw_invalid("a fault is an object, {\"fault\":\"electrode_offset\",…}");
+  toml::table table;
+  for (const auto& [key, value] : given.items()) {
+    if (value.is_number_integer() && (!value.is_number_unsigned() || value.get<std::uint64_t>() <= INT64_MAX)) {
+      table.insert(key, value.get<std::int64_t>());
+    } else if (value.is_number()) {
+      table.insert(key, value.get<double>());
+    } else if (value.is_boolean()) {
+      table.insert(key, value.get<bool>());
+    } else if (value.is_string()) {
+      table.insert(key, value.get<std::string>());
+    } else {
+      control::throw_invalid(key, ": must be a text, a number, true or false, is null");
+    }
+  }
+  return table;
+}
+
+}  // namespace
+
+Fault parse_fault_json(std::string_view json) {
+  const toml::table table = flat_table(json);
+  const std::string no_origin;
+  FieldReader reader{table, no_origin};
+  Fault fault;
+  fields_with_kind(reader, fault);
+  reader.finish();
+  return fault;
+}
+
+void check(const Fault& fault, const WorldConfig& world) {
+  const FaultType& type = type_of(fault.kind);
+  if (type.target == FaultTarget::accelerometer && !world.imu) {
+    control::throw_invalid(type.name, ": the perfect sensor has no faults; leave out preset = \"perfect\"");
+  }
+  if (fault.kind == FaultKind::mean_flow && !world.vessel) {
+    control::throw_invalid("mean_flow: there is no vessel; give the world a [vessel]");
+  }
+  if (fault.kind == FaultKind::pour_glucose) check(fault.patch);
+  if (!(fault.for_s > 0)) control::throw_invalid("for_s must be positive, is ", fault.for_s);
+}
+
+std::string why_not(FaultKind kind) {
+  const FaultType& type = type_of(kind);
+  switch (type.target) {
+    case FaultTarget::accelerometer:
+    case FaultTarget::electrode:
+    case FaultTarget::pump:
+    case FaultTarget::glucose: return "";
+    default:
+      return std::string(type.name) + ": not in this run, which has a world alone; link and robot are as they are";
+  }
+}
+
+void apply(const Fault& fault, SimulatedRobot& robot) {
+  check(fault, robot.config().world);
+  if (const std::string reason = why_not(fault.kind); !reason.empty()) throw std::invalid_argument(reason);
+  World& world = robot.world();
+  switch (type_of(fault.kind).target) {
+    case FaultTarget::accelerometer:
+      return world.set_fault(Sensor::accelerometer, sensor_fault(fault, FaultKind::accelerometer_stuck));
+    case FaultTarget::electrode:
+      return world.set_fault(Sensor::electrode, sensor_fault(fault, FaultKind::electrode_stuck));
+    case FaultTarget::pump: return world.set_mean_flow_m3_s(fault.mean_flow_m3_s);
+    case FaultTarget::glucose: {
+      GlucosePatch patch = fault.patch;
+      patch.removed_at_s = world.glucose().time_s() + fault.for_s;
+      return world.pour(patch);
+    }
+    default: return;
+  }
+}
+
+void end(const Fault& fault, SimulatedRobot& robot) {
+  World& world = robot.world();
+  switch (type_of(fault.kind).target) {
+    case FaultTarget::accelerometer: return world.set_fault(Sensor::accelerometer, {});
+    case FaultTarget::electrode: return world.set_fault(Sensor::electrode, {});
+    case FaultTarget::pump: return world.set_mean_flow_m3_s(robot.config().world.vessel->pump.mean_flow_m3_s);
+    default: return;
+  }
+}
+
+}  // namespace sim_robot

@@ -1,0 +1,109 @@
+// Begins and ends faults in the order of their times.
+#include "sim_robot/fault_timeline.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "control/invalid_argument.hpp"
+
+namespace sim_robot {
+namespace {
+
+constexpr double kMostSeconds = 1e12;  // fits as microseconds
+
+std::uint64_t microseconds(double seconds) {
+  if (!(seconds < kMostSeconds)) return FaultTimeline::kNever;
+  return static_cast<std::uint64_t>(std::llround(seconds * 1e6));
+}
+
+std::uint64_t end_of(const Fault& fault, std::uint64_t from_us) {
+  const std::uint64_t for_us = microseconds(fault.for_s);
+  return for_us == FaultTimeline::kNever ? for_us : from_us + for_us;
+}
+
+}  // namespace
+
+FaultTimeline::FaultTimeline(std::vector<TimedFault> faults, Log log)
+    : to_come_(std::move(faults)), log_(std::move(log)) {}
+
+void FaultTimeline::apply_due(SimulatedRobot& robot) {
+  now_us_ = robot.robot_time_us();
+  apply_until(robot, now_us_);
+}
+
+void FaultTimeline::advance(RobotLife& life, std::uint64_t true_us) {
+  now_us_ = true_us;
+  const bool is_late = true_us > life.true_us() + SimulatedRobot::kMaxLatenessUs;  // ticks will be skipped
+  while (!is_late && next_us() <= true_us) {
+    const std::uint64_t at_us = next_us();
+    if (at_us > 0) life.advance_to(std::max(at_us - 1, life.true_us()));
+    apply_until(life.robot(), at_us);
+  }
+  apply_until(life.robot(), true_us);
+  life.advance_to(true_us);
+}
+
+std::uint64_t FaultTimeline::inject(const Fault& fault, SimulatedRobot& robot) { return begin(fault, robot, now_us_); }
+
+bool FaultTimeline::withdraw(std::uint64_t id, SimulatedRobot& robot) {
+  const auto found = std::ranges::find(in_force_, id, &FaultInForce::id);
+  if (found == in_force_.end()) return false;
+  end(found->fault, robot);
+  say(now_us_, std::string(type_of(found->fault.kind).name) + " is withdrawn");
+  in_force_.erase(found);
+  return true;
+}
+
+std::uint64_t FaultTimeline::next_end_us() const {
+  std::uint64_t next = kNever;
+  for (const FaultInForce& each : in_force_) next = std::min(next, each.until_us);
+  return next;
+}
+
+std::uint64_t FaultTimeline::next_start_us() const {
+  return next_ < to_come_.size() ? microseconds(to_come_[next_].at_s) : kNever;
+}
+
+std::uint64_t FaultTimeline::next_us() const { return std::min(next_end_us(), next_start_us()); }
+
+void FaultTimeline::apply_until(SimulatedRobot& robot, std::uint64_t now_us) {
+  while (next_us() <= now_us && next_us() != kNever) {
+    const std::uint64_t at_us = next_us();
+    end_due(robot, at_us);
+    if (next_start_us() != at_us) continue;
+    const Fault& fault = to_come_[next_++].fault;
+    if (const std::string reason = why_not(fault.kind); !reason.empty()) {
+      ++passed_over_;
+      say(at_us, reason);
+      continue;
+    }
+    begin(fault, robot, at_us);
+  }
+}
+
+void FaultTimeline::end_due(SimulatedRobot& robot, std::uint64_t at_us) {
+  for (const FaultInForce& each : in_force_) {
+    if (each.until_us > at_us) continue;
+    end(each.fault, robot);
+    say(at_us, std::string(type_of(each.fault.kind).name) + " is over");
+  }
+  std::erase_if(in_force_, [at_us](const FaultInForce& each) { return each.until_us <= at_us; });
+}
+
+std::uint64_t FaultTimeline::begin(const Fault& fault, SimulatedRobot& robot, std::uint64_t at_us) {
+  apply(fault, robot);
+  const FaultType& type = type_of(fault.kind);
+  say(at_us, type.name);
+  ++last_id_;
+  if (!type.lasts) return last_id_;
+  std::erase_if(in_force_,
+                [&type](const FaultInForce& each) { return type_of(each.fault.kind).target == type.target; });
+  in_force_.push_back({last_id_, fault, at_us, end_of(fault, at_us)});
+  return last_id_;
+}
+
+void FaultTimeline::say(std::uint64_t at_us, const std::string& what) const {
+  if (log_) log_(control::join_text("at ", static_cast<double>(at_us) * 1e-6, " s: ", what));
+}
+
+}  // namespace sim_robot

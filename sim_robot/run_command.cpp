@@ -1,0 +1,101 @@
+// Connects a robot, its faults and their server to one loop.
+#include "sim_robot/run_command.hpp"
+
+#include <CLI/CLI.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <chrono>
+#include <csignal>
+#include <iostream>
+
+#include "control/invalid_argument.hpp"
+#include "sim_robot/fault_server.hpp"
+#include "sim_robot/fleet_run.hpp"
+#include "sim_robot/robot_client.hpp"
+
+namespace sim_robot {
+namespace {
+
+namespace asio = boost::asio;
+
+void say(const std::string& line) { std::cout << "rheonaut-sim: " << line << std::endl; }
+
+void spawn(asio::io_context& loop, asio::awaitable<void> task) {
+  asio::co_spawn(loop, std::move(task), [](const std::exception_ptr& error) {
+    if (error) std::rethrow_exception(error);
+  });
+}
+
+void announce(const Scenario& scenario) {
+  if (!scenario.name.empty()) say("scenario " + scenario.name + ": " + scenario.description);
+  if (!scenario.script.empty()) say("its script is for `rheonaut-sim play`; here the station gives the commands");
+  if (scenario.duration_s > 0) say(control::join_text("ends by itself after ", scenario.duration_s, " s"));
+  for (const TimedFault& timed : scenario.faults) {
+    const std::string reason = why_not(timed.fault.kind);
+    if (!reason.empty()) say(control::join_text("at ", timed.at_s, " s will be passed over: ", reason));
+  }
+}
+
+}  // namespace
+
+RunCommand::RunCommand(CLI::App& app) {
+  app.add_option("--station", station_, "ADDR:PORT of the station's robot door");
+  app.add_option("--handshake-ms", handshake_ms_, "as TLS on the robot's board: it dials at rest, and ticks are missed")
+      ->check(CLI::Range(0, 30'000))
+      ->capture_default_str();
+  app.add_option("--scenario", robot_.scenario, "a TOML file, or a name of those that `rheonaut-sim scenarios` lists");
+  app.add_option("--token", robot_.token, "enrolment token, at most 71 characters");
+  app.add_option("--faults", faults_at_, "ADDR:PORT to take faults at over HTTP while it runs; port 0: any")
+      ->type_name("ADDR:PORT");
+  app.add_flag("--faults-anywhere", faults_anywhere_, "allow an address beyond this machine; there is no password");
+  add_robot(app, robot_);
+  auto* robots = app.add_option("--robots", robots_, "a fleet of so many in this process, ID-1 to ID-N, with a summary")
+                     ->check(CLI::Range(1, kMostRobots))
+                     ->excludes("--faults")
+                     ->excludes("--boot-id");
+  app.add_flag("--json", json_, "a fleet's rates and summary as JSON lines")->needs(robots);
+}
+
+int RunCommand::run() const {
+  if (station_.empty()) throw CLI::RequiredError("--station");
+  const Scenario scenario = scenario_of(robot_);
+  const StationAddress station = parse_station_address(station_);
+  return robots_ > 0 ? run_many(scenario, station) : run_one(scenario, station);
+}
+
+int RunCommand::run_many(const Scenario& scenario, const StationAddress& station) const {
+  if (!json_) announce(scenario);
+  FleetOptions fleet;
+  fleet.station = station;
+  fleet.robots = robots_;
+  if (robot_.id) fleet.id_prefix = *robot_.id;
+  fleet.duration_s = scenario.duration_s;
+  fleet.json = json_;
+  fleet.handshake = std::chrono::milliseconds(handshake_ms_);
+  fleet.faults = scenario.faults;
+  return run_fleet(fleet, scenario.robot, std::cout);
+}
+
+int RunCommand::run_one(const Scenario& scenario, const StationAddress& station) const {
+  asio::io_context loop{1};
+  RobotClient client{loop, scenario.robot, station, say, std::chrono::milliseconds(handshake_ms_), scenario.faults};
+  std::optional<FaultServer> server;
+  if (!faults_at_.empty()) {
+    server.emplace(loop, parse_faults_address(faults_at_, faults_anywhere_), client.faults(), client.robot());
+    say(control::join_text("faults at http://", server->address(), "/faults"));
+    spawn(loop, server->run());
+  }
+  announce(scenario);
+  spawn(loop, client.run());
+  asio::signal_set stop{loop, SIGINT, SIGTERM};
+  stop.async_wait([&loop](const boost::system::error_code&, int) { loop.stop(); });
+  asio::steady_timer end{loop};
+  if (scenario.duration_s > 0) {
+    end.expires_after(std::chrono::microseconds(std::llround(scenario.duration_s * 1e6)));
+    end.async_wait([&loop](const boost::system::error_code&) { loop.stop(); });
+  }
+  loop.run();
+  return EXIT_SUCCESS;
+}
+
+}  // namespace sim_robot

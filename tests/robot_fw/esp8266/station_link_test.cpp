@@ -1,0 +1,251 @@
+// The way to the station: what is set before the handshake, when it may happen, and how frames leave.
+#include "robot_fw/esp8266/station_link.hpp"
+
+#include "board.hpp"
+
+namespace robot_fw::esp8266 {
+namespace {
+
+class Link : public Board {
+ protected:
+  // Opens, and is welcomed with this batch.
+  void connect_with(std::uint32_t samples_per_frame) {
+    boot();
+    for (int i = 0; i < 100 && port->link().state() != StationLink::State::open; ++i) run_ms(100);
+    protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+    frame.which_body = rheonaut_StationFrame_welcome_tag;
+    frame.body.welcome.protocol_version = protocol::kProtocolVersion;
+    frame.body.welcome.samples_per_frame = samples_per_frame;
+    say(frame);
+  }
+  void ping() {
+    protocol::Command ping = rheonaut_Command_init_zero;
+    ping.which_action = rheonaut_Command_ping_tag;
+    order(ping);
+  }
+};
+
+TEST_F(Link, PinsTheKeyAndAsksForShortRecords) {
+  connect();
+  EXPECT_EQ(chip.socket.known_key, kStationKey);
+  EXPECT_EQ(chip.socket.receive_bytes, 512);
+  EXPECT_EQ(chip.socket.send_bytes, 512);
+  EXPECT_GT(chip.socket.ciphers, 0);
+  EXPECT_TRUE(chip.socket.no_delay);
+}
+
+// A turn may wait for TCP three times, each up to twice the time-out, and a tick may have been due for a period.
+TEST_F(Link, TimeoutsOfATurnAreShorterThanTheMotors) {
+  connect_with(25);
+  const std::uint64_t expected_us = 3 * 2 * chip.socket.timeout_ms * 1000;
+  EXPECT_LT(expected_us, kDeadManUs - kTickUs);
+  chip.socket.takes = false;
+  std::uint64_t longest_us = 0;
+  while (chip.now_us < 8'000'000 && port->link().state() == StationLink::State::open) {
+    chip.pass(kTurnUs);
+    const std::uint64_t before_us = chip.now_us;
+    port->step();
+    if (port->link().state() == StationLink::State::open) longest_us = std::max(longest_us, chip.now_us - before_us);
+  }
+  EXPECT_GT(longest_us, 0U);
+  EXPECT_LE(longest_us, expected_us);
+}
+
+TEST_F(Link, KeyThatIsNoneIsShownAndNobodyIsDialled) {
+  Secrets secrets = kTestSecrets;
+  secrets.station_key_pem = "MFkwEwYHKoZIzj0CAQYIKoZIzj0DAQcDQgAE";
+  port.emplace(secrets);
+  port->begin();
+  run_ms(10'000);
+  EXPECT_EQ(port->led_pattern(), LedPattern::refused);
+  EXPECT_EQ(chip.joins, 0);
+  EXPECT_EQ(chip.socket.dials, 0);
+  port.reset();  // before the secrets
+}
+
+TEST_F(Link, NetworkIsNeverKeptInFlashNorRejoinedBehindOurBack) {
+  boot();
+  EXPECT_FALSE(chip.wifi_persistent);
+  EXPECT_FALSE(chip.wifi_reconnects);
+  EXPECT_FALSE(chip.wifi_sleeps);
+}
+
+TEST_F(Link, StationThatDoesNotAgreeOnShortRecordsIsLeft) {
+  chip.socket.agrees_on_fragments = false;
+  boot();
+  run_ms(6'000);
+  EXPECT_GT(chip.socket.dials, 0);
+  EXPECT_NE(port->link().state(), StationLink::State::open);
+  EXPECT_TRUE(chip.socket.writes.empty());
+}
+
+TEST_F(Link, PausesGrowAfterFailures) {
+  chip.socket.answers = false;
+  chip.socket.connect_takes_us = 0;
+  boot();
+  run_ms(60'000);
+  EXPECT_GE(chip.socket.dials, 60 / 12);
+  EXPECT_LE(chip.socket.dials, 4 + 60 / 8);
+}
+
+TEST_F(Link, WithoutWifiItJoinsAgainAndAgain) {
+  chip.wifi_there = false;
+  boot();
+  run_ms(60'000);
+  EXPECT_GE(chip.joins, 2);
+  EXPECT_EQ(chip.socket.dials, 0);
+  chip.wifi_there = true;
+  come_up();
+}
+
+// A lost link while the motor is on: no joining, no dialling, no closing until it is off.
+TEST_F(Link, NeverDialsWithTheMotorOn) {
+  connect();
+  for (int i = 0; i < 10; ++i) {
+    drive(0.5F);
+    run_ms(80);
+  }
+  chip.before_blocking = [this] {
+    EXPECT_TRUE(port->motor().is_off());
+    EXPECT_TRUE(port->robot().at_rest());
+    EXPECT_FALSE(chip.level(kMotorPin));
+  };
+  const int dials = chip.socket.dials;
+  chip.socket.connected = false;
+  run_ms(100);
+  EXPECT_NE(port->link().state(), StationLink::State::open);
+  EXPECT_FALSE(port->motor().is_off()) << "the lease still runs";
+  EXPECT_EQ(chip.socket.dials, dials);
+  run_ms(5'000);
+  EXPECT_TRUE(port->motor().is_off());
+  EXPECT_GT(chip.socket.dials, dials);
+}
+
+TEST_F(Link, NeverDialsInAutoEvenAtDutyZero) {
+  connect();
+  wait_for_sensors();
+  order(sim_robot::set_auto(-0.1F));  // behind it, and the motor has no reverse
+  run_ms(20);
+  ASSERT_EQ(port->robot().mode(), rheonaut_MODE_AUTO);
+  ASSERT_TRUE(port->motor().is_off());
+  const int dials = chip.socket.dials;
+  chip.socket.connected = false;
+  chip.before_blocking = [this] { EXPECT_NE(port->robot().mode(), rheonaut_MODE_AUTO); };
+  run_ms(900);
+  EXPECT_EQ(port->robot().mode(), rheonaut_MODE_AUTO) << "within the link time-out";
+  EXPECT_EQ(chip.socket.dials, dials);
+  run_ms(5'000);
+  EXPECT_GT(chip.socket.dials, dials);
+}
+
+TEST_F(Link, NeverRejoinsWithTheMotorOn) {
+  connect();
+  drive(0.5F);
+  chip.before_blocking = [this] { EXPECT_TRUE(port->motor().is_off()); };
+  const int joins = chip.joins;
+  chip.wifi_begun = false;
+  run_ms(200);
+  EXPECT_EQ(port->link().state(), StationLink::State::off);
+  EXPECT_EQ(chip.joins, joins);
+  run_ms(3'000);
+  EXPECT_GT(chip.joins, joins);
+}
+
+TEST_F(Link, WritesNeverWaitForThePeer) {
+  connect();
+  run_ms(500);
+  EXPECT_GT(chip.socket.writes.size(), 5U);
+  EXPECT_EQ(chip.socket.waiting_flushes, 0);
+}
+
+TEST_F(Link, FrameThatDoesNotFitWaitsAndThenGoesInOneWrite) {
+  connect();
+  chip.socket.room = 100;
+  run_ms(20);
+  heard();
+  const std::uint64_t before_us = chip.now_us;
+  run_ms(400);
+  EXPECT_EQ(chip.now_us - before_us, 400'000U) << "no tick waited";
+  for (const protocol::RobotFrame& frame : heard()) EXPECT_NE(frame.which_body, rheonaut_RobotFrame_telemetry_tag);
+  chip.socket.room = 1072;
+  run_ms(100);
+  std::size_t samples = 0;
+  for (const protocol::RobotFrame& frame : heard()) {
+    if (frame.which_body == rheonaut_RobotFrame_telemetry_tag) samples += frame.body.telemetry.position_m_count;
+  }
+  EXPECT_GE(samples, 40U);
+}
+
+TEST_F(Link, StopsWritingWhenNothingIsAcknowledged) {
+  connect();
+  chip.socket.acknowledges = false;
+  const std::uint64_t before_us = chip.now_us;
+  const std::size_t writes = chip.socket.writes.size();
+  run_ms(900);
+  EXPECT_EQ(chip.now_us - before_us, 900'000U) << "no write waited";
+  EXPECT_LE(chip.socket.writes.size() - writes, 6U) << "no more pieces than TCP has places for";
+  EXPECT_GT(chip.socket.writes.size() - writes, 0U);
+}
+
+// Small frames fill lwIP's queue of 8 pieces long before its buffer.
+TEST_F(Link, CountsSmallFramesUnderWay) {
+  connect();
+  chip.socket.acknowledges = false;
+  const std::size_t writes = chip.socket.writes.size();
+  for (int i = 0; i < 12; ++i) ping();
+  run_ms(30);
+  EXPECT_GT(chip.socket.room, 400U);
+  EXPECT_LE(chip.socket.writes.size() - writes, 6U);
+  EXPECT_GE(chip.socket.writes.size() - writes, 4U);
+}
+
+TEST_F(Link, LargestFrameFitsAnEmptySendBuffer) {
+  connect_with(25);
+  run_ms(1'000);
+  std::size_t largest = 0;
+  for (const protocol::RobotFrame& sent : heard()) {
+    if (sent.which_body == rheonaut_RobotFrame_telemetry_tag) {
+      largest = std::max<std::size_t>(largest, sent.body.telemetry.position_m_count);
+    }
+  }
+  EXPECT_EQ(largest, 25U);
+}
+
+// While input waits, looking for more does not send.
+TEST_F(Link, LastRecordLeavesAlsoWhileInputWaits) {
+  connect();
+  const std::size_t writes = chip.socket.writes.size();
+  for (int i = 0; i < 100; ++i) ping();  // more than a turn reads
+  for (int turn = 0; turn < 5; ++turn) {
+    chip.pass(kTurnUs);
+    port->step();
+    ASSERT_TRUE(chip.socket.input_is_found);
+    EXPECT_EQ(chip.socket.sealed, 0U) << "turn " << turn;
+  }
+  EXPECT_GT(chip.socket.writes.size(), writes);
+}
+
+TEST_F(Link, NoFrameFollowsARecordThatTlsStillHolds) {
+  connect();
+  chip.socket.takes = false;
+  const std::size_t writes = chip.socket.writes.size();
+  const std::uint64_t until_us = chip.now_us + 300'000;
+  while (chip.now_us < until_us) run_ms(1);
+  ASSERT_EQ(port->link().state(), StationLink::State::open);
+  EXPECT_EQ(chip.socket.writes.size(), writes + 1);
+  EXPECT_GT(chip.socket.sealed, 0U);
+  chip.socket.takes = true;
+  run_ms(200);
+  EXPECT_EQ(chip.socket.sealed, 0U);
+  EXPECT_GT(chip.socket.writes.size(), writes + 1);
+}
+
+TEST_F(Link, SilentStationIsDialledAgain) {
+  connect();
+  run_ms(6'000);
+  EXPECT_GE(chip.socket.dials, 2);
+  EXPECT_GE(chip.socket.closes, 1);
+}
+
+}  // namespace
+}  // namespace robot_fw::esp8266

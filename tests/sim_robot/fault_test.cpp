@@ -1,0 +1,169 @@
+// Faults from JSON, and what a time line makes of them.
+#include "sim_robot/fault.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "sim_robot/fault_timeline.hpp"
+
+namespace sim_robot {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+std::string error_of(const std::string& json) {
+  try {
+    parse_fault_json(json);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(FaultJson, TakesEachKindWithItsNumbers) {
+  const Fault offset = parse_fault_json(R"({"fault":"electrode_offset","offset_mv":-40,"for_s":2.5})");
+  EXPECT_EQ(offset.kind, FaultKind::electrode_offset);
+  EXPECT_EQ(offset.magnitude, -40);
+  EXPECT_EQ(offset.for_s, 2.5);
+  EXPECT_EQ(parse_fault_json(R"({"fault":"accelerometer_stuck"})").for_s, kForEver);
+  const Fault reboot = parse_fault_json(R"({"fault":"reboot","cause":"brown_out","keeps_latch":false})");
+  EXPECT_EQ(reboot.cause, rheonaut_RESET_CAUSE_BROWN_OUT);
+  EXPECT_FALSE(reboot.keeps_latch);
+  const Fault loss = parse_fault_json(R"({"fault":"link_loss","loss_probability":0.5,"direction":"up"})");
+  EXPECT_EQ(loss.direction, LinkDirection::up);
+  EXPECT_EQ(parse_fault_json(R"({"fault":"pour_glucose","position_m":0.2})").patch.position_m, 0.2);
+}
+
+TEST(FaultJson, SaysWhatIsWrongWhichValueAndWhatIsAllowed) {
+  EXPECT_THAT(error_of("nonsense"), HasSubstr("not JSON"));
+  EXPECT_THAT(error_of("[1]"), HasSubstr("a fault is an object"));
+  EXPECT_THAT(error_of("{}"), StartsWith("fault: must be given"));
+  EXPECT_THAT(error_of(R"({"fault":"electrode_ofset"})"), HasSubstr("did you mean 'electrode_offset'?"));
+  EXPECT_EQ(error_of(R"({"fault":"electrode_offset","offset_mv":9000})"),
+            "offset_mv: is 9000, allowed is -5000 to 5000");
+  EXPECT_EQ(error_of(R"({"fault":"electrode_offset","offset_mv":"x"})"), "offset_mv: must be a number, is 'x'");
+  EXPECT_THAT(error_of(R"({"fault":"electrode_stuck","offset_mv":1})"), StartsWith("offset_mv: is no key here"));
+  EXPECT_EQ(error_of(R"({"fault":"electrode_stuck","fault":"block"})"), "fault: is given twice");
+  EXPECT_THAT(error_of(R"({"fault":{"a":1}})"), HasSubstr("without objects in it"));
+  EXPECT_THAT(error_of(R"({"fault":null})"), HasSubstr("is null"));
+  EXPECT_THAT(error_of(R"({"fault":"electrode_stuck","for_s":1e999})"), HasSubstr("JSON"));
+  EXPECT_THAT(error_of(std::string(10'000, '[')), HasSubstr("without objects in it"));
+}
+
+TEST(FaultTypes, ReadBackWhatTheTableSaysOfEachKind) {
+  EXPECT_EQ(fault_types().size(), static_cast<std::size_t>(FaultKind::clock_jump) + 1);
+  EXPECT_STREQ(type_of(FaultKind::link_outage).name, "link_outage");
+  EXPECT_STREQ(type_of(FaultKind::clock_jump).name, "clock_jump");
+  EXPECT_STREQ(type_of(FaultKind::electrode_missing).name, "electrode_missing");
+}
+
+class Timeline : public ::testing::Test {
+ protected:
+  static SimulatedRobotConfig in_a_vessel() {
+    SimulatedRobotConfig config;
+    config.world.vessel.emplace().pump.ramp_s = 0.01;
+    return config;
+  }
+  static Fault offset(double mv, double for_s = kForEver) {
+    return {.kind = FaultKind::electrode_offset, .for_s = for_s, .magnitude = mv};
+  }
+  double reading_mv() { return static_cast<double>(robot_.world().read(robot_.robot_time_us()).impedance_mv); }
+  // In virtual time, before the tick at this time.
+  double reading_mv_at(FaultTimeline& faults, double time_s) {
+    const auto at_us = static_cast<std::uint64_t>(time_s * 1e6 + 0.5);
+    for (faults.apply_due(robot_); robot_.robot_time_us() < at_us; faults.apply_due(robot_)) robot_.step();
+    return reading_mv();
+  }
+
+  SimulatedRobot robot_{in_a_vessel()};
+};
+
+TEST_F(Timeline, BeginsAndEndsEachFaultAtItsTime) {
+  FaultTimeline faults{{{1, offset(40, 2)}}};
+  EXPECT_EQ(reading_mv_at(faults, 0.99), 175);
+  EXPECT_EQ(reading_mv_at(faults, 1), 215);
+  EXPECT_EQ(faults.in_force().size(), 1u);
+  EXPECT_EQ(reading_mv_at(faults, 2.99), 215);
+  EXPECT_EQ(reading_mv_at(faults, 3), 175);
+  EXPECT_TRUE(faults.in_force().empty());
+}
+
+TEST_F(Timeline, AFaultReplacesTheOneOnTheSameTarget) {
+  FaultTimeline faults{{{1, offset(40, 10)}, {2, offset(20, 1)}}};
+  EXPECT_EQ(reading_mv_at(faults, 2), 195);
+  EXPECT_EQ(faults.in_force().size(), 1u);
+  EXPECT_EQ(reading_mv_at(faults, 3), 175);
+}
+
+TEST_F(Timeline, OneThatBeginsWhenTheOtherEndsIsInForce) {
+  FaultTimeline faults{{{1, offset(40, 1)}, {2, offset(20)}}};
+  EXPECT_EQ(reading_mv_at(faults, 2), 195);
+}
+
+TEST_F(Timeline, RealTimeAppliesAtTheSameTicks) {
+  RobotLife life{in_a_vessel()};
+  const auto reading = [&life] {
+    SimulatedRobot& robot = life.robot();
+    return static_cast<double>(robot.world().read(robot.robot_time_us()).impedance_mv);
+  };
+  FaultTimeline faults{{{0.055, offset(40, 0.1)}}};
+  faults.advance(life, 52'000);
+  EXPECT_EQ(reading(), 175);
+  faults.advance(life, 59'000);
+  EXPECT_EQ(reading(), 215);
+  EXPECT_EQ(faults.in_force().at(0).since_us, 55'000u);
+  faults.advance(life, 10'000'000);  // after a stall, what was due meanwhile is over
+  EXPECT_EQ(reading(), 175);
+  EXPECT_GT(life.robot().robot_time_us(), 10'000'000u);
+}
+
+TEST_F(Timeline, TheFlowIsThatOfTheBeginningAfterwards) {
+  FaultTimeline faults{{{1, {.kind = FaultKind::mean_flow, .for_s = 1, .mean_flow_m3_s = 0.001}}}};
+  reading_mv_at(faults, 1.9);
+  EXPECT_GT(robot_.world().flow_m3_s(), 0.0001);
+  reading_mv_at(faults, 4);
+  EXPECT_NEAR(robot_.world().flow_m3_s(), 0, 1e-9);
+}
+
+TEST_F(Timeline, GlucoseIsPouredAndRemoved) {
+  FaultTimeline faults{{{1, {.kind = FaultKind::pour_glucose, .for_s = 2, .patch = {.position_m = 0}}}}};
+  EXPECT_EQ(reading_mv_at(faults, 1), 120);
+  EXPECT_EQ(reading_mv_at(faults, 3), 175);
+}
+
+TEST_F(Timeline, InjectsAndWithdrawsWhileItRuns) {
+  FaultTimeline faults;
+  const std::uint64_t id = faults.inject(offset(40), robot_);
+  EXPECT_EQ(reading_mv(), 215);
+  EXPECT_FALSE(faults.withdraw(id + 1, robot_));
+  EXPECT_TRUE(faults.withdraw(id, robot_));
+  EXPECT_EQ(reading_mv(), 175);
+  EXPECT_FALSE(faults.withdraw(id, robot_));
+}
+
+TEST_F(Timeline, PassesOverWhatThisRunCannotDoAndSaysSo) {
+  std::vector<std::string> lines;
+  FaultTimeline faults{{{1, {.kind = FaultKind::link_reset}}},
+                       [&lines](const std::string& line) { lines.push_back(line); }};
+  reading_mv_at(faults, 2);
+  EXPECT_EQ(faults.passed_over(), 1u);
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_THAT(lines[0], StartsWith("at 1 s: link_reset: not in this run"));
+  EXPECT_THROW(faults.inject({.kind = FaultKind::reboot}, robot_), std::invalid_argument);
+}
+
+TEST_F(Timeline, RefusesWhatTheWorldLacks) {
+  FaultTimeline faults;
+  EXPECT_THROW(faults.inject({.kind = FaultKind::accelerometer_stuck}, robot_), std::invalid_argument);
+}
+
+TEST_F(Timeline, RefusesGlucoseWithoutEnd) {
+  FaultTimeline faults;
+  const Fault pour{.kind = FaultKind::pour_glucose, .patch = {.position_m = 5}};
+  for (std::size_t i = 0; i < Glucose::kMaxPatches; ++i) faults.inject(pour, robot_);
+  EXPECT_THROW(faults.inject(pour, robot_), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sim_robot

@@ -1,0 +1,134 @@
+// A robot in real time behind the proxy: it keeps its link, or comes back.
+#include "tests/sim_robot/proxy_fixture.hpp"
+
+namespace sim_robot {
+namespace {
+
+// The least of a station behind the proxy: it welcomes, and answers telemetry with a sign of life.
+class RobotThroughProxy : public ProxyTest {
+ protected:
+  void begin(std::chrono::milliseconds handshake = {}) {
+    start();
+    accept();
+    const auto& at = proxy->endpoint();
+    SimulatedRobotConfig config;
+    config.boot_id = random_boot_id();
+    robot.emplace(
+        loop, config, StationAddress{"127.0.0.1", std::to_string(at.port())},
+        [this](const std::string& line) { log.push_back(line); }, handshake);
+    // The robot runs until the loop has gone; its frame is destroyed with the loop.
+    asio::co_spawn(loop, robot->run(), [](const std::exception_ptr&) {});
+    ASSERT_TRUE(run_until([&] { return robot->robot().core().link_up() && samples > 5; }));
+  }
+  ~RobotThroughProxy() override {
+    for (auto& end : ends) end->socket.close();
+    if (proxy) proxy->stop();
+    target.close();
+    loop.run_for(50ms);
+    loop.stop();  // the robot dials for ever
+  }
+  void accept() {
+    End& end = new_end();
+    target.async_accept(end.socket, [this, &end](const boost::system::error_code& error) {
+      if (error) return;
+      ++connections;
+      reader.reset();
+      read(end);
+      accept();
+    });
+  }
+  void read(End& end) {
+    end.socket.async_read_some(asio::buffer(end.bytes), [this, &end](const auto& error, std::size_t size) {
+      if (error) {
+        end.ended = error;
+        return;
+      }
+      protocol::Bytes input{reinterpret_cast<const std::uint8_t*>(end.bytes.data()), size};
+      while (!input.empty() && reader.push(input) == protocol::FrameReader::State::complete) {
+        if (const auto frame = protocol::decode_robot_frame(reader.payload())) answer(end, *frame);
+      }
+      read(end);
+    });
+  }
+  void answer(End& end, const protocol::RobotFrame& heard) {
+    protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+    frame.which_body = rheonaut_StationFrame_heartbeat_tag;
+    if (heard.which_body == rheonaut_RobotFrame_hello_tag) {
+      frame.which_body = rheonaut_StationFrame_welcome_tag;
+      frame.body.welcome.protocol_version = protocol::kProtocolVersion;
+    }
+    if (heard.which_body == rheonaut_RobotFrame_telemetry_tag) ++samples;
+    if (heard.which_body == rheonaut_RobotFrame_hello_tag) hello = heard.body.hello;
+    if (heard.which_body == rheonaut_RobotFrame_status_tag) missed_ticks = heard.body.status.missed_ticks;
+    std::array<std::uint8_t, protocol::kMaxFramedBytes> out;
+    const std::size_t size = protocol::write_frame(frame, out.data(), out.size());
+    boost::system::error_code ignored;
+    asio::write(end.socket, asio::buffer(out, size), ignored);
+  }
+  // The robot's next connection is up and telemetry comes.
+  bool comes_back() {
+    const int before = connections;
+    if (!run_until([&] { return connections > before; })) return false;
+    const int heard = samples;
+    return run_until([&] { return robot->robot().core().link_up() && samples > heard + 5; });
+  }
+
+  protocol::FrameReader reader;
+  int connections = 0, samples = 0;
+  protocol::Hello hello = rheonaut_Hello_init_zero;
+  std::uint32_t missed_ticks = 0;
+  std::optional<RobotClient> robot;
+};
+
+TEST_F(RobotThroughProxy, ComesBackAfterACutAResetAndHalfOpen) {
+  begin();
+  proxy->control("cut 3");
+  EXPECT_TRUE(comes_back());
+  proxy->control("reset");
+  EXPECT_TRUE(comes_back());
+  EXPECT_FALSE(said("silent"));
+  proxy->control("half-open");
+  EXPECT_TRUE(comes_back());
+  EXPECT_TRUE(said("the station is silent"));
+}
+
+TEST_F(RobotThroughProxy, KeepsItsLinkSplitDelayedAndThrottled) {
+  begin();
+  for (const char* fault : {"split 1", "delay 100", "jitter 50", "throttle 20000"}) {
+    EXPECT_EQ(proxy->control(fault).substr(0, 3), "ok:");
+    const int heard = samples;
+    ASSERT_TRUE(run_until([&] { return samples > heard + 15; })) << fault;
+  }
+  EXPECT_EQ(connections, 1);
+  EXPECT_TRUE(robot->robot().core().link_up());
+}
+
+TEST_F(RobotThroughProxy, ComesBackAfterAnOutage) {
+  begin();
+  proxy->control("outage 1.5");
+  ASSERT_TRUE(run_until([&] { return robot->robot().core().link_lost(); }));
+  EXPECT_TRUE(comes_back());
+  EXPECT_FALSE(robot->robot().core().link_lost());
+}
+
+TEST_F(RobotThroughProxy, ABrownOutLeavesItsConnectionOpenAndComesBackLatched) {
+  begin();
+  const auto boot_id = hello.boot_id;
+  robot->reboot({rheonaut_RESET_CAUSE_BROWN_OUT, 0.3, false});
+  EXPECT_EQ(proxy->open_connections(), 1u);
+  ASSERT_TRUE(run_until([&] { return ends.front()->ended == asio::error::connection_reset; })) << "when it is back";
+  EXPECT_TRUE(comes_back());
+  EXPECT_NE(hello.boot_id, boot_id);
+  EXPECT_EQ(hello.reset_cause, rheonaut_RESET_CAUSE_BROWN_OUT);
+  EXPECT_EQ(hello.mode, rheonaut_MODE_EMERGENCY);
+}
+
+TEST_F(RobotThroughProxy, AHandshakeMissesTicks) {
+  begin(400ms);
+  ASSERT_TRUE(run_until([&] { return missed_ticks > 0; }));
+  EXPECT_GE(missed_ticks, 35u);
+  EXPECT_EQ(connections, 1);
+}
+
+}  // namespace
+}  // namespace sim_robot
