@@ -203,8 +203,8 @@ TEST_F(FleetTest, AReplayedRobotSendsAgainAfterAnOutageAndOnRequest) {
   EXPECT_EQ(fleet->counts().samples.lost, 0u);
 
   sink.acknowledges = false;
-  const std::uint64_t acknowledged = fleet->robot(0).samples().acknowledged;
   ASSERT_TRUE(run_until([&] { return fleet->robot(0).samples().held >= 60; }));
+  const std::uint64_t acknowledged = fleet->robot(0).samples().acknowledged;  // by now none is under way
   const std::uint64_t repeated_before = stored("sim-1").repeated;
   protocol::StationFrame ask = rheonaut_StationFrame_init_zero;
   ask.which_body = rheonaut_StationFrame_heartbeat_tag;
