@@ -202,8 +202,9 @@ TEST_F(FleetTest, AReplayedRobotSendsAgainAfterAnOutageAndOnRequest) {
   EXPECT_EQ(fleet->counts().reconnects, 2u);
   EXPECT_EQ(fleet->counts().samples.lost, 0u);
 
+  ASSERT_TRUE(run_until([&] { return fleet->robot(0).samples().held < 50; })) << "the backfill is over";
   sink.acknowledges = false;
-  ASSERT_TRUE(run_until([&] { return fleet->robot(0).samples().held >= 60; }));
+  ASSERT_TRUE(run_until([&] { return fleet->robot(0).samples().held >= 90; }));
   const std::uint64_t acknowledged = fleet->robot(0).samples().acknowledged;  // by now none is under way
   const std::uint64_t repeated_before = stored("sim-1").repeated;
   protocol::StationFrame ask = rheonaut_StationFrame_init_zero;
