@@ -149,12 +149,16 @@ json to_json(const Run& run) {
   json out;
   out["run_id"] = run.id;
   out["robot_id"] = run.robot_id;
+  out["state"] = text(run.state);
+  out["made_afterwards"] = run.made_afterwards;
+  out["made_by"] = run.made_by;
   out["name"] = conditions.name;
   out["fluid"] = conditions.fluid;
   out["pump_profile"] = conditions.pump_profile;
   out["mean_flow_m_s"] = conditions.mean_flow_m_s ? json(*conditions.mean_flow_m_s) : json(nullptr);
   out["tube"] = conditions.tube;
   out["operator_name"] = conditions.operator_name;
+  out["profile"] = conditions.profile;
   out["notes"] = conditions.notes;
   out["verdict"] = conditions.verdict;
   out["firmware_version"] = run.firmware_version;

@@ -147,8 +147,8 @@ Result<ParsedCommand> parse_command(const std::string& text) {
 }
 
 Result<RunWish> parse_run(const std::string& text) {
-  const auto body = Members::parse(
-      text, {"robot_id", "name", "fluid", "pump_profile", "mean_flow_m_s", "tube", "operator_name", "notes"});
+  const auto body = Members::parse(text, {"robot_id", "name", "fluid", "pump_profile", "mean_flow_m_s", "tube",
+                                          "operator_name", "profile", "notes"});
   if (!body) return std::unexpected{body.error()};
   RunWish wish;
   const auto robot_id = body->text("robot_id", 0, kMaxTextBytes);
@@ -166,11 +166,10 @@ Result<RunWish> parse_run(const std::string& text) {
     if (!flow) return std::unexpected{flow.error()};
     conditions.mean_flow_m_s = *flow;
   }
-  const std::pair<const char*, std::string*> texts[] = {{"fluid", &conditions.fluid},
-                                                        {"pump_profile", &conditions.pump_profile},
-                                                        {"tube", &conditions.tube},
-                                                        {"operator_name", &conditions.operator_name},
-                                                        {"notes", &conditions.notes}};
+  const std::pair<const char*, std::string*> texts[] = {
+      {"fluid", &conditions.fluid},     {"pump_profile", &conditions.pump_profile},
+      {"tube", &conditions.tube},       {"operator_name", &conditions.operator_name},
+      {"profile", &conditions.profile}, {"notes", &conditions.notes}};
   for (const auto& [member, into] : texts) {
     if (auto read = read_text(*body, member, *into); !read) return std::unexpected{read.error()};
   }

@@ -27,7 +27,7 @@ Answer create_run(ApiParts& parts, Request request) {
   if (parts.station.find(wish->robot_id) == nullptr) {
     co_return problem(404, fmt::format("no robot '{}' is known", wish->robot_id), "unknown_robot");
   }
-  const auto run = co_await parts.runs.create(wish->robot_id, wish->conditions);
+  const auto run = co_await parts.runs.create(wish->robot_id, wish->conditions, request.actor);
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
   Response response = json_response(201, to_json(*run));

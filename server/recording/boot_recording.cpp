@@ -90,6 +90,7 @@ Segment& BootRecording::segment_for(const SampleBatch& batch, std::uint64_t seq)
   segment.first_seq = seq;
   segment.first_robot_time_us = batch.first_robot_time_us + (seq - batch.first_seq) * batch.context.period_us;
   segment.context = batch.context;
+  segment.first_received_at_us = batch.received_at_us;
   segment.utc_offset_us = batch.utc_offset_us;
   segment.clock_uncertainty_us = batch.clock_uncertainty_us;
   return segment;

@@ -205,7 +205,9 @@ void BootStore::start(const BootStart& start) {
 void BootStore::end(std::int64_t boot_key, std::int64_t noticed_at_us) {
   SQLite::Database& handle = database_.handle();
   const StoredBoot boot = load(boot_key, true);
-  SQLite::Statement add_gap{handle, "INSERT INTO gap VALUES (?, ?, ?, 'reboot', ?)"};
+  SQLite::Statement add_gap{handle,
+                            "INSERT INTO gap (boot_key, first_seq, last_seq, cause, noticed_at_us)"
+                            " VALUES (?, ?, ?, 'reboot', ?)"};
   for (const Interval& lost : boot.samples.missing({0, boot.next_seq})) {
     execute(add_gap, boot_key, lost.first, lost.next - 1, noticed_at_us);
   }

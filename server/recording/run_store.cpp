@@ -12,7 +12,15 @@ namespace {
 
 constexpr const char* kRunColumns =
     "run_id, robot_id, name, fluid, pump_profile, mean_flow_m_s, tube, operator_name, notes, verdict,"
-    " firmware_version, controller_id, controller_checksum, parameters_checksum, started_at_us, ended_at_us";
+    " firmware_version, controller_id, controller_checksum, parameters_checksum, started_at_us, ended_at_us, state,"
+    " made_afterwards, made_by, profile";
+
+RunState state_from(const std::string& name) {
+  for (const RunState state : {RunState::ended, RunState::interrupted, RunState::discarded}) {
+    if (name == text(state)) return state;
+  }
+  return RunState::open;
+}
 
 Run run_from(SQLite::Statement& row) {
   Run run;
@@ -32,6 +40,10 @@ Run run_from(SQLite::Statement& row) {
   run.parameters_checksum = row.getColumn(13).getUInt();
   run.started_at_us = row.getColumn(14).getInt64();
   if (!row.getColumn(15).isNull()) run.ended_at_us = row.getColumn(15).getInt64();
+  run.state = state_from(row.getColumn(16).getString());
+  run.made_afterwards = row.getColumn(17).getInt() != 0;
+  run.made_by = row.getColumn(18).getString();
+  run.conditions.profile = row.getColumn(19).getString();
   return run;
 }
 
@@ -54,10 +66,11 @@ Result<RunId> RunStore::add(const Run& run) {
   }
   const RunConditions& conditions = run.conditions;
   SQLite::Statement add_run{
-      handle_, fmt::format("INSERT INTO run ({}) VALUES (NULL,?,?,?,?,?,?,?,?,?,?,?,?,?,?,NULL)", kRunColumns)};
+      handle_, fmt::format("INSERT INTO run ({}) VALUES (NULL,?,?,?,?,?,?,?,?,?,?,?,?,?,?,NULL,?,?,?,?)", kRunColumns)};
   execute(add_run, run.robot_id, conditions.name, conditions.fluid, conditions.pump_profile, conditions.mean_flow_m_s,
           conditions.tube, conditions.operator_name, conditions.notes, conditions.verdict, run.firmware_version,
-          run.controller_id, run.controller_checksum, run.parameters_checksum, run.started_at_us);
+          run.controller_id, run.controller_checksum, run.parameters_checksum, run.started_at_us, text(run.state),
+          run.made_afterwards ? 1U : 0U, run.made_by, conditions.profile);
   const RunId id = handle_.getLastInsertRowid();
   SQLite::Statement add_span{handle_, "INSERT INTO run_span (run_id, span, boot_key, first_seq) VALUES (?, 0, ?, ?)"};
   execute(add_span, id, boot.getColumn(0).getInt64(), span.first_seq);
@@ -80,9 +93,10 @@ void RunStore::end(RunId id, const std::string& verdict, std::int64_t utc_us) {
     SQLite::Statement close{handle_, "UPDATE run_span SET last_seq = ?2 - 1 WHERE run_id = ?1 AND last_seq IS NULL"};
     execute(close, id, next);
   }
-  SQLite::Statement mark{handle_,
-                         "UPDATE run SET ended_at_us = ?2, verdict = CASE ?3 WHEN '' THEN verdict ELSE ?3 END"
-                         " WHERE run_id = ?1"};
+  SQLite::Statement mark{
+      handle_,
+      "UPDATE run SET ended_at_us = ?2, state = 'ended', verdict = CASE ?3 WHEN '' THEN verdict ELSE ?3 END"
+      " WHERE run_id = ?1"};
   execute(mark, id, utc_us, verdict);
   transaction.commit();
 }

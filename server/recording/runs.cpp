@@ -27,8 +27,9 @@ Result<void> check(const RunConditions& conditions) {
     return fail(ErrorCode::invalid,
                 fmt::format("a run's name has 1 to {} bytes and no control characters", kMaxNameBytes));
   }
-  for (const std::string* text : {&conditions.fluid, &conditions.pump_profile, &conditions.tube,
-                                  &conditions.operator_name, &conditions.notes, &conditions.verdict}) {
+  for (const std::string* text :
+       {&conditions.fluid, &conditions.pump_profile, &conditions.tube, &conditions.operator_name, &conditions.profile,
+        &conditions.notes, &conditions.verdict}) {
     if (text->size() > kMaxTextBytes) {
       return fail(ErrorCode::invalid, fmt::format("a run's texts have at most {} bytes each", kMaxTextBytes));
     }
@@ -46,6 +47,16 @@ Error no_such_run(RunId id) { return {ErrorCode::not_found, fmt::format("there i
 
 }  // namespace
 
+const char* text(RunState value) {
+  switch (value) {
+    case RunState::open: return "open";
+    case RunState::ended: return "ended";
+    case RunState::interrupted: return "interrupted";
+    case RunState::discarded: return "discarded";
+  }
+  return "open";
+}
+
 Runs::Runs(Clock& clock, Recorder& recorder) : clock_{clock}, recorder_{recorder} {}
 
 asio::awaitable<void> Runs::load() {
@@ -53,7 +64,7 @@ asio::awaitable<void> Runs::load() {
   open_runs_ = co_await recorder_.on_disk(std::move(job));
 }
 
-asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions conditions) {
+asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions conditions, std::string made_by) {
   const Result<void> valid = check(conditions);
   if (!valid) co_return std::unexpected{valid.error()};
   const auto found = robots_.find(robot_id);
@@ -67,6 +78,7 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
   const Robot& robot = found->second;
   Run run;
   run.robot_id = robot_id;
+  run.made_by = std::move(made_by);
   run.conditions = std::move(conditions);
   run.firmware_version = robot.firmware_version;
   run.controller_id = robot.controller_id;

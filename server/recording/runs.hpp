@@ -22,6 +22,14 @@ class Recorder;
 
 using RunId = std::int64_t;
 
+enum class RunState : std::uint8_t {
+  open,
+  ended,
+  interrupted,  // the station stopped while it was open
+  discarded,    // its samples are no longer held
+};
+const char* text(RunState value);
+
 // What the experimenter says of a run; all optional but the name.
 struct RunConditions {
   std::string name;
@@ -30,6 +38,7 @@ struct RunConditions {
   std::optional<double> mean_flow_m_s;
   std::string tube;
   std::string operator_name;
+  std::string profile;  // of the experiment, e.g. "step to 0.1 m"; pump_profile is the pump's
   std::string notes;
   std::string verdict;
 };
@@ -43,6 +52,9 @@ struct RunSpan {
 struct Run {
   RunId id = 0;
   RobotId robot_id;
+  RunState state = RunState::open;
+  bool made_afterwards = false;  // from what had been recorded already
+  std::string made_by;           // the actor, e.g. "token:local"; empty: not known
   RunConditions conditions;
   std::string firmware_version;
   std::uint32_t controller_id = 0;
@@ -65,7 +77,7 @@ class Runs final : public StationSink {
 
   // create and end: unavailable while the disk cannot be written.
   // conflict when the robot has an open run, not_connected when it is not there, invalid for a bad name.
-  boost::asio::awaitable<Result<Run>> create(RobotId robot_id, RunConditions conditions);
+  boost::asio::awaitable<Result<Run>> create(RobotId robot_id, RunConditions conditions, std::string made_by = {});
 
   // Ends the run with the latest sample received. Answers when that sample is durable or known lost, at most 3 s later.
   boost::asio::awaitable<Result<Run>> end(RunId id, std::string verdict);

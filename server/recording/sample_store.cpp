@@ -11,8 +11,21 @@
 namespace server {
 namespace {
 
+constexpr const char* kInsertSample =
+    "INSERT INTO sample (row, position_m, velocity_m_s, acceleration_m_s2, duty, impedance_mv, reference_m)"
+    " VALUES (?,?,?,?,?,?,?)";
 constexpr const char* kInsertSegment =
-    "INSERT INTO segment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?, ?,?,?,?,?,?,?,?,?,?,?,?)";
+    "INSERT INTO segment (boot_key, first_seq, last_seq, first_row, last_row, first_robot_time_us, period_us,"
+    " first_received_at_us, received_at_us, utc_offset_us, clock_uncertainty_us, mode, sub_state, setpoint_m,"
+    " disturbance_m, position_sd_m, controller_id, emergency_id, emergency_cause, flags, min_position_m, "
+    "max_position_m,"
+    " min_velocity_m_s, max_velocity_m_s, min_acceleration_m_s2, max_acceleration_m_s2, min_duty, max_duty,"
+    " min_impedance_mv, max_impedance_mv, min_reference_m, max_reference_m)"
+    " VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?, ?,?,?,?,?,?,?,?,?,?,?,?)";
+constexpr const char* kInsertGap =
+    "INSERT INTO gap (boot_key, first_seq, last_seq, cause, noticed_at_us) VALUES (?,?,?,?,?)";
+constexpr const char* kInsertEventGap =
+    "INSERT INTO event_gap (boot_key, first_event_seq, last_event_seq, cause, noticed_at_us) VALUES (?,?,?,?,?)";
 constexpr const char* kInsertEvent =
     "INSERT INTO event (robot_id, boot_key, event_seq, robot_time_us, sample_seq, kind, cause, mode, sub_state,"
     " position_m, value, emergency_id, command_id, received_at_us) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
@@ -46,11 +59,11 @@ SampleStore::SampleStore(Database& database)
     : database_{database},
       boots_{database},
       next_row_{database.handle().execAndGet("SELECT value FROM meta WHERE name = 'next_row'").getInt64()},
-      insert_sample_{database.handle(), "INSERT INTO sample VALUES (?,?,?,?,?,?,?)"},
+      insert_sample_{database.handle(), kInsertSample},
       insert_segment_{database.handle(), kInsertSegment},
-      insert_gap_{database.handle(), "INSERT INTO gap VALUES (?,?,?,?,?)"},
+      insert_gap_{database.handle(), kInsertGap},
       insert_event_{database.handle(), kInsertEvent},
-      insert_event_gap_{database.handle(), "INSERT INTO event_gap VALUES (?,?,?,?,?)"},
+      insert_event_gap_{database.handle(), kInsertEventGap},
       upsert_command_{database.handle(), kUpsertCommand},
       advance_row_{database.handle(), "UPDATE meta SET value = ? WHERE name = 'next_row' AND value = ?"},
       advance_boot_{database.handle(),
@@ -90,14 +103,13 @@ std::int64_t SampleStore::write_segment(const Segment& segment, std::int64_t fir
   const Extremes impedance = extremes(segment.samples, &Sample::impedance_mv);
   const Extremes reference = extremes(segment.samples, &Sample::reference_m);
   execute(insert_segment_, segment.boot_key, segment.first_seq, segment.next_seq() - 1, first_row, row - 1,
-          segment.first_robot_time_us, context.period_us, segment.received_at_us, segment.utc_offset_us,
-          segment.clock_uncertainty_us, protocol::text(context.mode), protocol::text(context.sub_state),
-          context.setpoint_m, context.disturbance_m, context.position_sd_m, context.controller_id, context.emergency_id,
-          protocol::text(context.emergency_cause), context.flags,                                      //
-          position.min, position.max, velocity.min, velocity.max, acceleration.min, acceleration.max,  //
+          segment.first_robot_time_us, context.period_us, segment.first_received_at_us, segment.received_at_us,
+          segment.utc_offset_us, segment.clock_uncertainty_us, protocol::text(context.mode),
+          protocol::text(context.sub_state), context.setpoint_m, context.disturbance_m, context.position_sd_m,
+          context.controller_id, context.emergency_id, protocol::text(context.emergency_cause), context.flags,  //
+          position.min, position.max, velocity.min, velocity.max, acceleration.min, acceleration.max,           //
           duty.min, duty.max, impedance.min, impedance.max, reference.min, reference.max);
-  execute(advance_boot_, segment.first_robot_time_us + (segment.samples.size() - 1) * context.period_us,
-          segment.boot_key);
+  execute(advance_boot_, segment.robot_time_us(segment.samples.size() - 1), segment.boot_key);
   return row;
 }
 

@@ -5,37 +5,14 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "server/recording/boot_store.hpp"
 #include "server/recording/database.hpp"
-#include "server/recording/interval_set.hpp"
+#include "server/recording/segment.hpp"
 #include "server/station/station_state.hpp"
 
 namespace server {
-
-// 1 to 100 consecutive samples that share everything but their values.
-struct Segment {
-  std::int64_t boot_key = 0;
-  std::uint64_t first_seq = 0;
-  std::uint64_t first_robot_time_us = 0;
-  SampleContext context;
-  std::vector<Sample> samples;
-  std::int64_t received_at_us = 0;  // UTC, when the last of them had arrived
-  std::int64_t utc_offset_us = 0;
-  std::int64_t clock_uncertainty_us = -1;
-
-  std::uint64_t next_seq() const { return first_seq + samples.size(); }
-};
-
-// Samples (or events) that are lost for good.
-struct LostRange {
-  std::int64_t boot_key = 0;
-  Interval lost;
-  std::string cause;
-  std::int64_t noticed_at_us = 0;  // UTC
-};
 
 struct StoredEvent {
   std::int64_t boot_key = 0;  // 0: an event of the station

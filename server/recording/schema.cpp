@@ -1,4 +1,6 @@
-// SQL of every migration. 64-bit ids are INTEGER in two's complement in tables and unsigned decimal text in views.
+// SQL of the first migration, which creates everything, and the list of all.
+//
+// 64-bit ids are INTEGER in two's complement in tables and unsigned decimal text in views.
 #include "server/recording/schema.hpp"
 
 #include <array>
@@ -239,10 +241,11 @@ SELECT printf('%llu', command_id) AS command_id, robot_id, printf('%llu', boot_i
 FROM command;
 )sql";
 
-constexpr std::array<const char*, 1> kMigrations{kFirstSchema};
-
 }  // namespace
 
-std::span<const char* const> migrations() { return kMigrations; }
+std::span<const char* const> migrations() {
+  static const std::array<const char*, 2> migrations{kFirstSchema, kSecondSchema};
+  return migrations;
+}
 
 }  // namespace server

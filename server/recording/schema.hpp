@@ -12,7 +12,8 @@ namespace server {
 constexpr std::int32_t kApplicationId = 0x5268656f;  // "Rheo"
 constexpr std::int64_t kMaxSegmentSamples = 100;     // the views and queries look this far back for a segment's begin
 
-// SQL scripts; the first one creates everything.
+// SQL scripts, in order. The second one is in schema_2.cpp.
 std::span<const char* const> migrations();
+extern const char* const kSecondSchema;
 
 }  // namespace server

@@ -1,0 +1,134 @@
+// A database of an older schema is brought up to date when it is opened, and reads the same before and after.
+#include <fstream>
+#include <sstream>
+
+#include "server/recording/schema.hpp"
+#include "tests/server/recording/recording_test.hpp"
+
+namespace server {
+namespace {
+
+class MigrationTest : public RecordingTest {
+ protected:
+  static constexpr BootId kFirstBoot = 18364758544493064720U;  // of tests/data/recording/version_1.sql
+  static constexpr BootId kSecondBoot = 4711;
+
+  void make_version_1() {
+    std::ifstream in{std::filesystem::path{TEST_DATA_DIR} / "recording/version_1.sql"};
+    std::ostringstream sql;
+    sql << in.rdbuf();
+    SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE};
+    database.exec(sql.str());
+    ASSERT_EQ(number("SELECT count(*) FROM run_sample"), 250);
+  }
+
+  // Everything that version 1 said of its runs.
+  std::vector<std::string> runs_as_read() {
+    std::vector<std::string> all;
+    for (const char* query :
+         {"SELECT run_id, span, boot_id, seq, robot_time_us, utc_us, clock_uncertainty_us, received_at_us, position_m,"
+          " velocity_m_s, acceleration_m_s2, duty, impedance_mv, reference_m, mode, sub_state, setpoint_m,"
+          " disturbance_m, position_sd_m, controller_id, emergency_id, emergency_cause, flags FROM run_sample",
+          "SELECT * FROM run_gap", "SELECT * FROM robot_gap", "SELECT * FROM robot_boot", "SELECT * FROM robot_event",
+          "SELECT run_id, robot_id, name, fluid, pump_profile, mean_flow_m_s, tube, operator_name, notes, verdict,"
+          " firmware_version, controller_id, controller_checksum, parameters_checksum, started_at_us, ended_at_us"
+          " FROM run"}) {
+      const std::vector<std::string> found = rows(query);
+      all.insert(all.end(), found.begin(), found.end());
+    }
+    return all;
+  }
+
+  std::vector<std::string> plan(const std::string& query) {
+    std::vector<std::string> steps;
+    for (const std::string& row : rows("EXPLAIN QUERY PLAN " + query)) {
+      steps.push_back(row.substr(row.rfind('|') + 1));
+    }
+    return steps;
+  }
+};
+
+TEST_F(MigrationTest, EveryRunOfVersion1ReadsTheSame) {
+  make_version_1();
+  const std::vector<std::string> before = runs_as_read();
+  {
+    const Database database{path_};
+    EXPECT_EQ(database.store_id(), kFirstBoot);  // the file's id is the same number
+  }
+  EXPECT_EQ(number("PRAGMA user_version"), static_cast<std::int64_t>(migrations().size()));
+  EXPECT_EQ(runs_as_read(), before);
+  EXPECT_EQ(number("SELECT count(*) FROM run_sample WHERE first_received_at_us <> received_at_us"), 0);
+  EXPECT_EQ(number("SELECT count(*) FROM run_sample WHERE backfilled"), 50);
+  EXPECT_EQ(rows("SELECT run_id, state, made_afterwards, made_by, profile FROM run ORDER BY run_id"),
+            (std::vector<std::string>{"1|ended|0||", "2|open|0||"}));
+  EXPECT_EQ(rows("PRAGMA foreign_key_check"), std::vector<std::string>{});
+  EXPECT_EQ(rows("PRAGMA integrity_check"), std::vector<std::string>{"ok"});
+}
+
+TEST_F(MigrationTest, AMigratedFileHasTheSchemaOfANewOne) {
+  constexpr const char* kSchema =
+      "SELECT type, name, sql FROM sqlite_master WHERE name NOT LIKE 'sqlite%' ORDER BY 1, 2";
+  make_version_1();
+  {
+    const Database database{path_};
+  }
+  const std::vector<std::string> migrated = rows(kSchema);
+  std::filesystem::remove(path_);
+  {
+    const Database database{path_};
+  }
+  EXPECT_EQ(rows(kSchema), migrated);
+}
+
+TEST_F(MigrationTest, AStationGoesOnWhereVersion1Stopped) {
+  make_version_1();
+  start();
+  TestRobot robot;
+  robot.boot_id = kSecondBoot;
+  robot.late_us = 100'000;
+  robot.next_seq = 90;
+  connect(robot);
+  make(robot, 10);
+  flush();
+  EXPECT_EQ(durable_next_seq_, 100u);
+  EXPECT_EQ(rows("SELECT first_row, last_row FROM segment ORDER BY first_row DESC LIMIT 1"),
+            std::vector<std::string>{"301|310"});
+  const SamplePage page = wait(history_->samples(2, std::nullopt, 1000)).value();
+  EXPECT_EQ(page.samples.size(), 70u);
+  EXPECT_EQ(page.samples.back().seq, 99u);
+  const Run first = wait(runs_->find(1)).value();
+  EXPECT_EQ(first.state, RunState::ended);
+  EXPECT_EQ(first.samples_stored, 190u);
+  EXPECT_EQ(first.samples_lost, 10u);
+}
+
+TEST_F(MigrationTest, TheNewViewsAndTheLatchAreAnsweredByIndex) {
+  {
+    const Database database{path_};
+  }
+  EXPECT_EQ(plan("SELECT robot_time_us, iif(kind = 'emergency', emergency_id, 0) FROM event WHERE boot_key = 1"
+                 " AND event_seq IS NOT NULL AND kind IN ('emergency', 'emergency_cleared')"
+                 " ORDER BY event_seq DESC LIMIT 1"),
+            (std::vector<std::string>{"SEARCH event USING INDEX event_of_latch (boot_key=? AND event_seq>?)"}));
+  EXPECT_EQ(plan("SELECT * FROM run_marker WHERE run_id = 1"),
+            (std::vector<std::string>{"SEARCH run_span USING PRIMARY KEY (run_id=?)",
+                                      "SEARCH boot USING INTEGER PRIMARY KEY (rowid=?)",
+                                      "SEARCH marker USING INDEX marker_by_seq (boot_key=? AND seq>? AND seq<?)"}));
+}
+
+// What was in force at a span's first sample counts, and what came into force within it; nothing before or after.
+TEST_F(MigrationTest, RunInForceShowsWhatASpanWasMadeWith) {
+  make_version_1();
+  Database database{path_};
+  database.handle().exec(
+      "INSERT INTO document VALUES (1, 'controller', x'01', '{\"id\":1}'), (2, 'controller', x'02', '{\"id\":2}'),"
+      " (3, 'controller', x'0a', '{\"id\":3}'), (4, 'parameters', x'04', '{}');"
+      "INSERT INTO in_force VALUES (1, 'controller', 0, 1, 0), (1, 'controller', 40, 2, 0),"
+      " (1, 'controller', 200, 3, 0), (1, 'controller', 230, 1, 0), (1, 'parameters', 50, 4, 0);");
+  EXPECT_EQ(rows("SELECT span, kind, first_seq, content, sha256 FROM run_in_force WHERE run_id = 1 ORDER BY 1, 2, 3"),
+            (std::vector<std::string>{"0|controller|50|{\"id\":2}|02", "0|controller|200|{\"id\":3}|0a",
+                                      "0|parameters|50|{}|04"}));
+}
+
+}  // namespace
+}  // namespace server
