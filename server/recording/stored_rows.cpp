@@ -33,6 +33,15 @@ protocol::SubState sub_state_from(const std::string& text) {
   return rheonaut_SUB_STATE_NONE;
 }
 
+protocol::EmergencyCause emergency_cause_from(const std::string& text) {
+  for (int value = _rheonaut_EmergencyCause_MIN; value <= _rheonaut_EmergencyCause_MAX; ++value) {
+    if (text == protocol::text(static_cast<protocol::EmergencyCause>(value))) {
+      return static_cast<protocol::EmergencyCause>(value);
+    }
+  }
+  return rheonaut_EMERGENCY_CAUSE_NONE;
+}
+
 std::string select_commands(const char* condition) {
   return fmt::format(
       "SELECT command_id, robot_id, boot_id, kind, arguments, actor, state, reason, submitted_at_us, sent_at_us,"

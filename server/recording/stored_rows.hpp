@@ -17,6 +17,7 @@ namespace server {
 // The enumerator whose text() this is; the unspecified one for a text that this version does not know.
 protocol::Mode mode_from(const std::string& text);
 protocol::SubState sub_state_from(const std::string& text);
+protocol::EmergencyCause emergency_cause_from(const std::string& text);
 
 // `condition` is SQL that follows SELECT … FROM; its `?` are bound by the caller.
 std::string select_commands(const char* condition);
