@@ -181,20 +181,25 @@ json to_json(const StoredSample& stored) {
   out["seq"] = stored.seq;
   out["robot_time_us"] = stored.robot_time_us;
   out["utc_us"] = stored.utc_us;
+  out["clock_uncertainty_us"] = stored.clock_uncertainty_us;
+  out["first_received_at_us"] = stored.first_received_at_us;
   out["received_at_us"] = stored.received_at_us;
   out["mode"] = protocol::text(stored.mode);
   out["sub_state"] = protocol::text(stored.sub_state);
   out["setpoint_m"] = stored.setpoint_m ? decimal(*stored.setpoint_m) : json(nullptr);
   out["disturbance_m"] = decimal(stored.disturbance_m);
+  out["position_sd_m"] = decimal(stored.position_sd_m);
+  out["controller_id"] = stored.controller_id;
+  out["emergency_id"] = id_text(stored.emergency_id);
+  out["emergency_cause"] = protocol::text(stored.emergency_cause);
+  out["flags"] = stored.flags;
   return out;
 }
 
 json to_json(const Gap& gap) {
-  return {{"boot_id", std::to_string(gap.boot_id)},
-          {"first_seq", gap.first_seq},
-          {"last_seq", gap.last_seq},
-          {"cause", gap.cause},
-          {"noticed_at_us", gap.noticed_at_us}};
+  return {{"robot_id", gap.robot_id},   {"boot_id", std::to_string(gap.boot_id)},
+          {"first_seq", gap.first_seq}, {"last_seq", gap.last_seq},
+          {"cause", gap.cause},         {"noticed_at_us", gap.noticed_at_us}};
 }
 
 }  // namespace server

@@ -49,6 +49,10 @@ class BootRecording {
   // The first missing range that the robot may still hold, when it was the same for `patience_us`.
   std::optional<Interval> overdue(std::int64_t steady_us, std::int64_t patience_us, std::int64_t repeat_us);
 
+  // Heard, and not taken yet; in the order of arrival.
+  const std::vector<Segment>& waiting() const { return waiting_; }
+  const std::vector<LostRange>& waiting_gaps() const { return waiting_gaps_; }
+
   std::uint64_t next_seq() const { return next_seq_; }
   std::uint64_t durable_next_seq() const { return durable_.first_hole(); }
   std::uint64_t durable_next_event_seq() const { return durable_events_.first_hole(); }

@@ -1,8 +1,9 @@
 // What was recorded, for people and programs: samples of a run, events, commands, gaps.
 //
 // Loop thread; the queries run on a worker with a read-only connection, each a page, so no read transaction lives long.
-// A query first lets the recorder commit what it has received (only queries of samples and gaps the samples), so an
-// answer holds everything up to its question; while the disk fails it comes after 3 s, with what is stored.
+// An answer holds everything up to its question. Samples and gaps that are not stored yet are joined from the
+// recorder's memory, so that a page which polls neither writes nor cuts a segment short. Queries of events and commands
+// let the recorder commit those first; while the disk fails they answer after 3 s, with what is stored.
 // Needs a running Recorder, which has opened the database; recorder and worker outlive it.
 #pragma once
 
@@ -18,30 +19,11 @@
 #include <vector>
 
 #include "server/recording/runs.hpp"
-#include "server/recording/stored_sample.hpp"
+#include "server/recording/span_reader.hpp"
 #include "server/result.hpp"
 #include "server/worker.hpp"
 
 namespace server {
-
-// Where a page ended: the span and seq of its last sample. A page begins after it.
-struct SampleCursor {
-  std::uint32_t span = 0;
-  std::uint64_t seq = 0;
-};
-
-struct SamplePage {
-  std::vector<StoredSample> samples;
-  std::optional<SampleCursor> next;  // empty: the end
-};
-
-struct Gap {
-  BootId boot_id = 0;
-  std::uint64_t first_seq = 0;
-  std::uint64_t last_seq = 0;
-  std::string cause;
-  std::int64_t noticed_at_us = 0;
-};
 
 class History {
  public:
@@ -69,6 +51,8 @@ class History {
  private:
   template <class Query>
   boost::asio::awaitable<std::invoke_result_t<Query, SQLite::Database&>> ask(Query query);
+  // From this index on, as the database has them.
+  boost::asio::awaitable<Result<std::vector<RecordedSpan>>> spans_of(RunId run, std::uint32_t first_span);
 
   std::filesystem::path path_;
   Recorder& recorder_;

@@ -8,7 +8,6 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cmath>
 #include <iterator>
-#include <variant>
 
 #include "server/recording/stored_rows.hpp"
 
@@ -26,7 +25,6 @@ constexpr microseconds kAskInterval = 1s;
 constexpr microseconds kOverflowLogInterval = 10s;
 constexpr microseconds kRetryInterval = 1s;  // after a commit that failed
 constexpr microseconds kFailureLogInterval = 10s;
-constexpr microseconds kFlushPatience = 3s;
 constexpr microseconds kKeepUnused = 60s;         // a boot's bookkeeping, after its last admission
 constexpr std::uint64_t kMaxNumber = 1ULL << 62;  // of a sample, or microseconds: far from SQLite's signed limit
 constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
@@ -66,7 +64,7 @@ asio::awaitable<void> Recorder::run() {
     if (!writing_.empty()) co_await write();  // the same content, until it is stored
     if (failing()) continue;
     std::vector<Flush> served = std::exchange(flushes_, {});
-    take(std::ranges::any_of(served, &Flush::samples));
+    take_for(served);
     co_await write();
     if (failing()) {
       std::ranges::move(served, std::back_inserter(flushes_));
@@ -133,10 +131,18 @@ void Recorder::note_failure(const std::string& problem) {
   retry_at_us_ = now_us + kRetryInterval.count();
 }
 
-void Recorder::take(bool everything) {
+void Recorder::take_for(const std::vector<Flush>& flushes) {
+  std::set<BootId> flushed;
+  for (const Flush& flush : flushes) {
+    if (flush.boot_id) flushed.insert(*flush.boot_id);
+  }
+  take(std::ranges::any_of(flushes, &Flush::everything), flushed);
+}
+
+void Recorder::take(bool everything, const std::set<BootId>& flushed) {
   const std::int64_t now_us = clock_.steady_us();
   for (auto& [boot_id, boot] : boots_) {
-    const bool at_once = everything || !boot.connected;
+    const bool at_once = everything || !boot.connected || flushed.contains(boot_id);
     boot.recording.take(queue_, now_us, at_once ? 0 : kGroupAge.count());
   }
   writing_ = std::exchange(queue_, {});
@@ -192,20 +198,6 @@ void Recorder::forget_unused() {
     const bool long_ago = boot.replaced || now_us - boot.last_used_us > kKeepUnused.count();
     return unused && long_ago && boot.recording.all_durable();
   });
-}
-
-asio::awaitable<bool> Recorder::flush() { co_return co_await flush(true); }
-
-asio::awaitable<bool> Recorder::flush_records() { co_return co_await flush(false); }
-
-asio::awaitable<bool> Recorder::flush(bool samples) {
-  const auto done = std::make_shared<Signal>(loop_);
-  flushes_.push_back({done, samples});
-  flush_wanted_.notify();
-  wake();
-  const std::variant<std::monostate, std::monostate> first =
-      co_await (done->wait() || clock_.sleep_for(kFlushPatience));
-  co_return first.index() == 0;
 }
 
 void Recorder::close() {
@@ -379,11 +371,6 @@ bool Recorder::room_for_record() {
   if (counters_.records_refused++ == 0)
     spdlog::error("the disk does not keep up: events and commands are not recorded");
   return false;
-}
-
-std::uint64_t Recorder::next_seq(BootId boot_id) const {
-  const auto found = boots_.find(boot_id);
-  return found == boots_.end() ? 0 : found->second.recording.next_seq();
 }
 
 void Recorder::wake() {

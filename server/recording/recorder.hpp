@@ -22,6 +22,8 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <type_traits>
 #include <unordered_map>
@@ -79,11 +81,12 @@ class Recorder final : public StationSink, public RobotArchive {
   // Commits and asks for what is missing, until cancelled.
   boost::asio::awaitable<void> run();
 
-  // Returns true when everything heard so far is durable, and false after 3 s if it is not yet. It cuts segments short,
-  // so it is for readers of samples. Needs run().
-  boost::asio::awaitable<bool> flush();
-  // The same for events and commands; samples go on waiting for a full segment.
-  boost::asio::awaitable<bool> flush_records();
+  // Return true when what they name, as far as it was heard, is durable, and false after 3 s if it is not yet. Need
+  // run(). Those of samples cut segments short; whoever only reads samples joins waiting() instead.
+  boost::asio::awaitable<bool> flush();          // everything: the segments of every robot are cut
+  boost::asio::awaitable<bool> flush(BootId);    // the samples and gaps of one boot; nothing is written if none wait
+  boost::asio::awaitable<bool> flush_records();  // events, commands and boots
+  boost::asio::awaitable<bool> flush_boots();    // boots and the spans that they moved; nothing is written if none wait
 
   // After the loop has ended: writes and commits everything left, or logs what could not be written. Does not throw.
   void close();
@@ -104,6 +107,12 @@ class Recorder final : public StationSink, public RobotArchive {
 
   // One above the newest sample that a boot is known to have made; 0 when the boot is not in use.
   std::uint64_t next_seq(BootId boot_id) const;
+
+  // What was heard of a boot and is not durable yet, ascending, in the form in which it will be read back: its samples,
+  // cut to the range, and its gaps. A reader takes both before it asks the database; what it then finds in both it
+  // takes from there. Nothing is missing so, since what was durable before is in every later read transaction.
+  std::vector<Segment> waiting(BootId boot_id, Interval samples) const;
+  std::vector<LostRange> waiting_gaps(BootId boot_id) const;
 
   boost::asio::io_context& loop() { return loop_; }
   const RecorderCounters& counters() const { return counters_; }
@@ -128,15 +137,17 @@ class Recorder final : public StationSink, public RobotArchive {
   // A coroutine waits until everything before it is stored, or does no longer.
   struct Flush {
     std::weak_ptr<Signal> done;
-    bool samples = false;  // and not only events and commands
+    bool everything = false;        // the samples of all boots, too
+    std::optional<BootId> boot_id;  // the samples of this boot, too
   };
 
   boost::asio::awaitable<void> wait_for_commit();
   boost::asio::awaitable<void> write();
   std::string try_to_write();  // the problem, empty when writing_ is durable
   void note_failure(const std::string& problem);
-  boost::asio::awaitable<bool> flush(bool samples);
-  void take(bool everything);
+  boost::asio::awaitable<bool> flush(bool everything, std::optional<BootId> boot_id);
+  void take_for(const std::vector<Flush>& flushes);
+  void take(bool everything, const std::set<BootId>& flushed = {});
   void set_durable(const WriteBatch& written);
   void ask_for_missing();
   void forget_unused();

@@ -18,17 +18,23 @@
 namespace server {
 namespace {
 
-// The view gives the samples of a run in order of span and seq, without sorting.
+// The view gives the samples of a run in order of span and seq, without sorting. That of schema version 1, which a
+// station has not opened since, knows no time of the first receipt: the same as the last one's then.
 constexpr const char* kQuery =
     "SELECT span, boot_id, seq, robot_time_us, utc_us, received_at_us, position_m, velocity_m_s, acceleration_m_s2,"
-    " duty, impedance_mv, reference_m, mode, sub_state, setpoint_m, disturbance_m FROM run_sample WHERE run_id = ?"
-    " LIMIT ?";
+    " duty, impedance_mv, reference_m, mode, sub_state, setpoint_m, disturbance_m, position_sd_m, controller_id,"
+    " emergency_id, emergency_cause, flags, clock_uncertainty_us, {} FROM run_sample WHERE run_id = ? LIMIT ?";
+
+std::uint64_t id_from(const std::string& text) {  // decimal text: it may exceed int64
+  std::uint64_t id = 0;
+  std::from_chars(text.data(), text.data() + text.size(), id);
+  return id;
+}
 
 StoredSample sample_from(SQLite::Statement& row) {
   StoredSample stored;
   stored.span = row.getColumn(0).getUInt();
-  const std::string boot_id = row.getColumn(1).getString();  // decimal text: it may exceed int64
-  std::from_chars(boot_id.data(), boot_id.data() + boot_id.size(), stored.boot_id);
+  stored.boot_id = id_from(row.getColumn(1).getString());
   stored.seq = unsigned_id(row.getColumn(2));
   stored.robot_time_us = unsigned_id(row.getColumn(3));
   stored.utc_us = row.getColumn(4).getInt64();
@@ -43,6 +49,13 @@ StoredSample sample_from(SQLite::Statement& row) {
   stored.sub_state = sub_state_from(row.getColumn(13).getString());
   stored.setpoint_m = optional_float(row.getColumn(14));
   stored.disturbance_m = float_or_nan(row.getColumn(15));
+  stored.position_sd_m = float_or_nan(row.getColumn(16));
+  stored.controller_id = row.getColumn(17).getUInt();
+  stored.emergency_id = id_from(row.getColumn(18).getString());
+  stored.emergency_cause = emergency_cause_from(row.getColumn(19).getString());
+  stored.flags = row.getColumn(20).getUInt();
+  stored.clock_uncertainty_us = row.getColumn(21).getInt64();
+  stored.first_received_at_us = row.getColumn(22).getInt64();
   return stored;
 }
 
@@ -72,7 +85,8 @@ Result<std::vector<StoredSample>> query_run(SQLite::Database& database, RunId ru
                                                         range.getColumn(1).getInt64(), range.getColumn(2).getInt64()));
   }
   std::vector<StoredSample> samples;
-  SQLite::Statement rows{database, kQuery};
+  const bool is_first_version = database.execAndGet("PRAGMA user_version").getInt64() == 1;
+  SQLite::Statement rows{database, fmt::format(kQuery, is_first_version ? "received_at_us" : "first_received_at_us")};
   bind_all(rows, run, static_cast<std::int64_t>(limit + 1));
   while (rows.executeStep()) samples.push_back(sample_from(rows));
   if (samples.size() > limit) {

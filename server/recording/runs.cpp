@@ -111,7 +111,7 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
   if (verdict.size() > kMaxTextBytes) {
     co_return fail(ErrorCode::invalid, fmt::format("a verdict has at most {} bytes", kMaxTextBytes));
   }
-  const bool flushed = co_await recorder_.flush();  // a reboot heard before this moves the open span first
+  const bool flushed = co_await recorder_.flush_records();  // a reboot heard before this moves the open span first
   if (!flushed) co_return std::unexpected{disk_fails()};
   const auto open = std::ranges::find(open_runs_, id, [](const auto& entry) { return entry.second; });
   if (id == 0 || open == open_runs_.end()) {
@@ -119,6 +119,8 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
     if (!known) co_return std::unexpected{no_such_run(id)};
     co_return fail(ErrorCode::conflict, fmt::format("run {} has ended already", id));
   }
+  const auto robot = robots_.find(open->first);
+  const BootId boot_id = robot == robots_.end() ? 0 : robot->second.boot_id;
   auto job = [id, verdict, utc_us = clock_.utc_us(), heads = heads()](Database& database) {
     RunStore{database, heads}.end(id, verdict, utc_us);
   };
@@ -136,7 +138,7 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
 
   const std::int64_t deadline_us = clock_.steady_us() + kEndPatience.count();
   for (;;) {
-    const bool stored = co_await recorder_.flush();
+    const bool stored = co_await recorder_.flush(boot_id);
     std::optional<Run> run = co_await read(id);
     if (!run) co_return std::unexpected{no_such_run(id)};
     if (!stored || is_complete(*run) || clock_.steady_us() >= deadline_us) co_return std::move(*run);

@@ -164,7 +164,8 @@ TEST_F(RoutesTest, StopAllReachesEveryRobotBeforeItWaitsForAny) {
 TEST_F(RoutesTest, ARunHoldsWhatWasMadeBetweenItsBeginAndItsEnd) {
   connect_robot();
   make_samples(*robot, 0, 5);
-  const Answered created = ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}, {"fluid", "water"}});
+  const Answered created =
+      ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}, {"fluid", "water"}, {"profile", "square"}});
   ASSERT_EQ(created.status, 201) << created.body;
   const std::string path = "/api/v1/runs/" + std::to_string(created.parsed()["run_id"].get<int>());
   make_samples(*robot, 5, 5);
@@ -173,6 +174,11 @@ TEST_F(RoutesTest, ARunHoldsWhatWasMadeBetweenItsBeginAndItsEnd) {
   const Answered ended = ask("POST", path + "/end", {{"verdict", "good"}});
   ASSERT_EQ(ended.status, 200) << ended.body;
   EXPECT_EQ(ended.parsed()["verdict"], "good");
+  EXPECT_EQ(created.parsed()["state"], "open");
+  EXPECT_EQ(ended.parsed()["state"], "ended");
+  EXPECT_EQ(ended.parsed()["made_by"], "token:local");
+  EXPECT_EQ(ended.parsed()["made_afterwards"], false);
+  EXPECT_EQ(ended.parsed()["profile"], "square");
   EXPECT_EQ(ended.parsed()["samples_stored"], 10);
   EXPECT_EQ(ask("GET", path).parsed()["fluid"], "water");
   EXPECT_EQ(ask("GET", "/api/v1/runs?robot_id=r1").parsed()["runs"].size(), 1U);
@@ -182,6 +188,12 @@ TEST_F(RoutesTest, ARunHoldsWhatWasMadeBetweenItsBeginAndItsEnd) {
   ASSERT_EQ(first["samples"].size(), 6U);
   EXPECT_EQ(first["samples"][0]["seq"], 5);
   EXPECT_EQ(first["samples"][0]["position_m"], 5);
+  EXPECT_EQ(first["samples"][0]["clock_uncertainty_us"], -1);
+  EXPECT_LE(first["samples"][0]["first_received_at_us"], first["samples"][0]["received_at_us"]);
+  EXPECT_EQ(first["samples"][0]["controller_id"], 0);
+  EXPECT_EQ(first["samples"][0]["emergency_id"], nullptr);
+  EXPECT_EQ(first["samples"][0]["emergency_cause"], "none");
+  EXPECT_EQ(first["samples"][0]["flags"], 0);
   ASSERT_TRUE(first["next"].is_string());
   const json rest = ask("GET", path + "/samples?after=" + first["next"].get<std::string>()).parsed();
   ASSERT_EQ(rest["samples"].size(), 4U);
@@ -250,7 +262,7 @@ TEST_F(RoutesTest, TheTextOfManySamplesIsNotMadeOnTheLoop) {
     text = answer.value_or("");
     return longest;
   };
-  ask("GET", "/api/v1/runs/1/samples?limit=1");  // commits the samples
+  ask("POST", "/api/v1/runs/1/end");  // commits the samples
   std::string text;
   const std::int64_t json_us = longest_us("/api/v1/runs/1/samples?limit=10000", text);
   const std::int64_t before_us = worked_us();

@@ -16,6 +16,7 @@ class HistoryTest : public RecordingTest {
   }
 };
 
+// From memory while the sample waits, and from the database afterwards.
 TEST_F(HistoryTest, GivesBackEveryValueOfASample) {
   start();
   connect(robot_);
@@ -23,25 +24,43 @@ TEST_F(HistoryTest, GivesBackEveryValueOfASample) {
   robot_.context.mode = rheonaut_MODE_AUTO;
   robot_.context.sub_state = rheonaut_SUB_STATE_NAVIGATING;
   robot_.context.disturbance_m = -0.05F;
+  robot_.context.position_sd_m = 0.002F;
+  robot_.context.controller_id = 0xfffffffe;
+  robot_.context.emergency_id = 0xfedcba9876543211;
+  robot_.context.emergency_cause = rheonaut_EMERGENCY_CAUSE_POSITION_LIMIT;
+  robot_.context.flags = rheonaut_TELEMETRY_FLAG_BACKFILL;
   const RunId id = create();
   SampleBatch batch = robot_.batch(0, 2);
   batch.samples[1] = {1, 2, 3, -0.5, 175, 0.1F};
   send(robot_, batch);
   const std::int64_t received_at_us = clock_.utc_us();
-  const SamplePage all = page(id, std::nullopt, 10);
-  ASSERT_EQ(all.samples.size(), 2u);
-  EXPECT_FALSE(all.next.has_value());
-  const StoredSample& stored = all.samples[1];
-  EXPECT_EQ(stored.boot_id, robot_.boot_id);
-  EXPECT_EQ(stored.seq, 1u);
-  EXPECT_EQ(stored.robot_time_us, 510'000u);
-  EXPECT_EQ(stored.utc_us, 1'700'000'000'510'000);
-  EXPECT_EQ(stored.received_at_us, received_at_us);
-  EXPECT_EQ(stored.sample, (Sample{1, 2, 3, -0.5, 175, 0.1F}));
-  EXPECT_EQ(stored.mode, rheonaut_MODE_AUTO);
-  EXPECT_EQ(stored.sub_state, rheonaut_SUB_STATE_NAVIGATING);
-  EXPECT_EQ(stored.setpoint_m, 0.1F);
-  EXPECT_EQ(stored.disturbance_m, -0.05F);
+  for (const std::int64_t on_disk : {0, 2}) {
+    SCOPED_TRACE(on_disk);
+    if (on_disk > 0) flush();
+    EXPECT_EQ(number("SELECT count(*) FROM sample"), on_disk);
+    const SamplePage all = page(id, std::nullopt, 10);
+    ASSERT_EQ(all.samples.size(), 2u);
+    EXPECT_FALSE(all.next.has_value());
+    const StoredSample& stored = all.samples[1];
+    EXPECT_EQ(stored.span, 0u);
+    EXPECT_EQ(stored.boot_id, robot_.boot_id);
+    EXPECT_EQ(stored.seq, 1u);
+    EXPECT_EQ(stored.robot_time_us, 510'000u);
+    EXPECT_EQ(stored.utc_us, 1'700'000'000'510'000);
+    EXPECT_EQ(stored.clock_uncertainty_us, 300);
+    EXPECT_EQ(stored.first_received_at_us, received_at_us);
+    EXPECT_EQ(stored.received_at_us, received_at_us);
+    EXPECT_EQ(stored.sample, (Sample{1, 2, 3, -0.5, 175, 0.1F}));
+    EXPECT_EQ(stored.mode, rheonaut_MODE_AUTO);
+    EXPECT_EQ(stored.sub_state, rheonaut_SUB_STATE_NAVIGATING);
+    EXPECT_EQ(stored.setpoint_m, 0.1F);
+    EXPECT_EQ(stored.disturbance_m, -0.05F);
+    EXPECT_EQ(stored.position_sd_m, 0.002F);
+    EXPECT_EQ(stored.controller_id, 0xfffffffe);
+    EXPECT_EQ(stored.emergency_id, 0xfedcba9876543211);
+    EXPECT_EQ(stored.emergency_cause, rheonaut_EMERGENCY_CAUSE_POSITION_LIMIT);
+    EXPECT_EQ(stored.flags, static_cast<std::uint32_t>(rheonaut_TELEMETRY_FLAG_BACKFILL));
+  }
 }
 
 TEST_F(HistoryTest, PagesFollowOneAnotherOverSegmentsAndSpans) {
@@ -82,6 +101,71 @@ TEST_F(HistoryTest, AnswersHoldWhatWasHeardBeforeTheQuestion) {
   EXPECT_EQ(page(id, std::nullopt, 10).samples.size(), 3u);
 }
 
+// A page in the browser asks each second, or more often.
+TEST_F(HistoryTest, PollingARunWritesNothingAndCutsNoSegmentShort) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  for (std::size_t made = 5; made <= 400; made += 5) {
+    make(robot_, 5);
+    const auto commits = recorder_->counters().commits;
+    EXPECT_EQ(page(id, std::nullopt, 1000).samples.size(), made);
+    EXPECT_EQ(page(id, SampleCursor{0, made - 2}, 1000).samples.size(), 1u);
+    EXPECT_TRUE(wait(history_->gaps(id)).has_value());
+    EXPECT_EQ(recorder_->counters().commits, commits);
+    clock_.run_for(49ms);
+  }
+  clock_.run_for(2s);
+  EXPECT_EQ(number("SELECT count(*) FROM sample"), 400);
+  EXPECT_LE(number("SELECT count(*) FROM segment"), 6);
+}
+
+TEST_F(HistoryTest, SamplesThatArriveLateArePutInTheirPlaceWhileTheyWait) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  send(robot_, 0, 10);
+  send(robot_, 30, 10);
+  flush();
+  send(robot_, 40, 5);
+  send(robot_, 10, 15);
+  for (const std::size_t limit : {1u, 3u, 12u, 40u, 100u}) {
+    SCOPED_TRACE(limit);
+    std::vector<std::uint64_t> seen;
+    std::optional<SampleCursor> after;
+    do {
+      const SamplePage next = page(id, after, limit);
+      for (const StoredSample& sample : next.samples) seen.push_back(sample.seq);
+      after = next.next;
+    } while (after);
+    ASSERT_EQ(seen.size(), 40u);
+    for (std::uint64_t index = 0; index < 40; ++index) EXPECT_EQ(seen[index], index < 25 ? index : index + 5);
+  }
+}
+
+TEST_F(HistoryTest, AnswersHoldWhatTheDiskDoesNotTake) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE};
+  foreign.exec("BEGIN IMMEDIATE");
+  make(robot_, 100);
+  robot_.oldest_seq = robot_.next_seq = 120;
+  make(robot_, 5);
+  ASSERT_TRUE(clock_.run_until([&] { return recorder_->failing(); }, 3s));
+  const std::int64_t asked_us = clock_.steady_us();
+  EXPECT_EQ(page(id, std::nullopt, 1000).samples.size(), 105u);
+  const std::vector<Gap> gaps = wait(history_->gaps(id)).value();
+  ASSERT_EQ(gaps.size(), 1u);
+  EXPECT_EQ(gaps[0].first_seq, 100u);
+  EXPECT_EQ(gaps[0].last_seq, 119u);
+  EXPECT_EQ(clock_.steady_us(), asked_us);
+  foreign.exec("ROLLBACK");
+  clock_.run_for(3s);
+  EXPECT_EQ(wait(history_->gaps(id)).value().size(), 1u);
+  EXPECT_EQ(page(id, std::nullopt, 1000).samples.size(), 105u);
+}
+
 TEST_F(HistoryTest, QueriesOfEventsAndCommandsCutNoSegmentShort) {
   start();
   connect(robot_);
@@ -118,6 +202,7 @@ TEST_F(HistoryTest, ListsTheGapsOfARunCutToItsSpans) {
   make(robot_, 10);
   const std::vector<Gap> gaps = wait(history_->gaps(id)).value();
   ASSERT_EQ(gaps.size(), 1u);
+  EXPECT_EQ(gaps[0].robot_id, robot_.id);
   EXPECT_EQ(gaps[0].boot_id, robot_.boot_id);
   EXPECT_EQ(gaps[0].first_seq, 10u);
   EXPECT_EQ(gaps[0].last_seq, 14u);

@@ -2,6 +2,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "server/recording/run_reader.hpp"
 #include "server/recording/schema.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
@@ -100,6 +101,23 @@ TEST_F(MigrationTest, AStationGoesOnWhereVersion1Stopped) {
   EXPECT_EQ(first.state, RunState::ended);
   EXPECT_EQ(first.samples_stored, 190u);
   EXPECT_EQ(first.samples_lost, 10u);
+}
+
+TEST_F(MigrationTest, ToolsReadVersion1WithoutChangingIt) {
+  make_version_1();
+  const auto samples = read_run(path_, 1, 1000);
+  ASSERT_TRUE(samples.has_value()) << samples.error().detail;
+  ASSERT_EQ(samples->size(), 190u);
+  const StoredSample& sample = samples->at(50);  // seq 100 of the first boot
+  EXPECT_EQ(sample.boot_id, kFirstBoot);
+  EXPECT_EQ(sample.first_received_at_us, 1'700'000'002'000'000);
+  EXPECT_EQ(sample.received_at_us, 1'700'000'002'000'000);
+  EXPECT_EQ(sample.emergency_id, kFirstBoot);
+  EXPECT_EQ(sample.emergency_cause, rheonaut_EMERGENCY_CAUSE_OPERATOR);
+  EXPECT_EQ(sample.controller_id, 7u);
+  EXPECT_EQ(sample.flags, 1u);
+  EXPECT_EQ(sample.clock_uncertainty_us, 300);
+  EXPECT_EQ(number("PRAGMA user_version"), 1);
 }
 
 TEST_F(MigrationTest, TheNewViewsAndTheLatchAreAnsweredByIndex) {

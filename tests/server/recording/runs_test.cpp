@@ -13,7 +13,8 @@ class RunsTest : public RecordingTest {
     conditions.name = name;
     conditions.fluid = "water";
     conditions.mean_flow_m_s = 0.25;
-    const Result<Run> run = wait(runs_->create(robot_.id, conditions));
+    conditions.profile = "step";
+    const Result<Run> run = wait(runs_->create(robot_.id, conditions, "token:local"));
     EXPECT_TRUE(run.has_value()) << run.error().detail;
     return run ? run->id : 0;
   }
@@ -50,7 +51,11 @@ TEST_F(RunsTest, HoldsTheSamplesBetweenCreateAndEnd) {
   EXPECT_EQ(run.robot_id, "nemo");
   EXPECT_EQ(run.conditions.fluid, "water");
   EXPECT_EQ(run.conditions.mean_flow_m_s, 0.25);
+  EXPECT_EQ(run.conditions.profile, "step");
   EXPECT_EQ(run.conditions.verdict, "good");
+  EXPECT_EQ(run.state, RunState::ended);
+  EXPECT_FALSE(run.made_afterwards);
+  EXPECT_EQ(run.made_by, "token:local");
   EXPECT_EQ(run.firmware_version, "1.2.3");
   EXPECT_EQ(run.controller_checksum, 0xfedcba98u);
   EXPECT_TRUE(run.ended_at_us.has_value());
@@ -73,7 +78,26 @@ TEST_F(RunsTest, AnOpenRunCountsWhatIsOnItsWay) {
   const Run run = find(id);
   EXPECT_EQ(run.samples_expected, 107u);
   EXPECT_EQ(run.samples_stored, 100u);
+  EXPECT_EQ(run.state, RunState::open);
   EXPECT_FALSE(run.spans[0].last_seq.has_value());
+}
+
+TEST_F(RunsTest, TheEndOfARunCutsNoSegmentOfAnotherRobotShort) {
+  TestRobot other;
+  other.id = "dory";
+  other.boot_id = 7;
+  start();
+  connect(robot_);
+  connect(other);
+  const RunId id = create();
+  clock_.run_for(1s);
+  make(robot_, 30);
+  make(other, 30);
+  EXPECT_EQ(end(id).samples_stored, 30u);
+  EXPECT_EQ(number("SELECT count(*) FROM segment"), 1);
+  make(other, 70);
+  flush();
+  EXPECT_EQ(number("SELECT count(*) FROM segment"), 2);
 }
 
 TEST_F(RunsTest, RefusesASecondRunAnUnknownRobotAndABadName) {

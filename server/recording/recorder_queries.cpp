@@ -1,0 +1,84 @@
+// What the recorder knows and the disk does not yet, and the ways to wait until it does.
+#include <algorithm>
+#include <boost/asio/experimental/awaitable_operators.hpp>
+#include <limits>
+#include <variant>
+
+#include "server/recording/recorder.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+using namespace asio::experimental::awaitable_operators;
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr microseconds kFlushPatience = 3s;
+constexpr Interval kAllSamples{0, std::numeric_limits<std::uint64_t>::max()};
+
+// Adds the samples of the boot in the range, as the database will give them back.
+void add_waiting(const std::vector<Segment>& segments, std::int64_t boot_key, Interval range,
+                 std::vector<Segment>& into) {
+  for (const Segment& segment : segments) {
+    const bool overlaps = std::max(segment.first_seq, range.first) < std::min(segment.next_seq(), range.next);
+    if (segment.boot_key != boot_key || !overlaps) continue;
+    Segment& part = into.emplace_back(part_of(segment, range));
+    std::ranges::transform(part.samples, part.samples.begin(), as_stored);
+  }
+}
+
+}  // namespace
+
+std::uint64_t Recorder::next_seq(BootId boot_id) const {
+  const auto found = boots_.find(boot_id);
+  return found == boots_.end() ? 0 : found->second.recording.next_seq();
+}
+
+std::vector<Segment> Recorder::waiting(BootId boot_id, Interval samples) const {
+  std::vector<Segment> segments;
+  const auto found = boots_.find(boot_id);
+  if (found == boots_.end() || !found->second.recording.loaded()) return segments;
+  const BootRecording& boot = found->second.recording;
+  add_waiting(writing_.segments, boot.key(), samples, segments);  // the disk thread only reads it, too
+  add_waiting(boot.waiting(), boot.key(), samples, segments);
+  std::ranges::sort(segments, {}, &Segment::first_seq);
+  return segments;
+}
+
+std::vector<LostRange> Recorder::waiting_gaps(BootId boot_id) const {
+  std::vector<LostRange> gaps;
+  const auto found = boots_.find(boot_id);
+  if (found == boots_.end() || !found->second.recording.loaded()) return gaps;
+  const BootRecording& boot = found->second.recording;
+  std::ranges::copy_if(writing_.gaps, std::back_inserter(gaps),
+                       [&boot](const LostRange& gap) { return gap.boot_key == boot.key(); });
+  std::ranges::copy(boot.waiting_gaps(), std::back_inserter(gaps));
+  std::ranges::sort(gaps, {}, [](const LostRange& gap) { return gap.lost.first; });
+  return gaps;
+}
+
+asio::awaitable<bool> Recorder::flush() { co_return co_await flush(true, std::nullopt); }
+
+asio::awaitable<bool> Recorder::flush(BootId boot_id) {
+  if (waiting(boot_id, kAllSamples).empty() && waiting_gaps(boot_id).empty()) co_return true;
+  co_return co_await flush(false, boot_id);
+}
+
+asio::awaitable<bool> Recorder::flush_records() { co_return co_await flush(false, std::nullopt); }
+
+asio::awaitable<bool> Recorder::flush_boots() {
+  if (queue_.boots.empty() && writing_.boots.empty()) co_return true;
+  co_return co_await flush_records();
+}
+
+asio::awaitable<bool> Recorder::flush(bool everything, std::optional<BootId> boot_id) {
+  const auto done = std::make_shared<Signal>(loop_);
+  flushes_.push_back({done, everything, boot_id});
+  flush_wanted_.notify();
+  wake();
+  const std::variant<std::monostate, std::monostate> first =
+      co_await (done->wait() || clock_.sleep_for(kFlushPatience));
+  co_return first.index() == 0;
+}
+
+}  // namespace server
