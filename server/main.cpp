@@ -2,7 +2,6 @@
 #include <spdlog/spdlog.h>
 
 #include <csignal>
-#include <functional>
 #include <iostream>
 
 #include "server/analysis/analysis_service.hpp"
@@ -13,8 +12,7 @@
 #include "server/link/robot_listener.hpp"
 #include "server/live/live_feed.hpp"
 #include "server/log.hpp"
-#include "server/recording/history.hpp"
-#include "server/recording/recorder.hpp"
+#include "server/recording/recording_parts.hpp"
 
 namespace {
 
@@ -34,26 +32,23 @@ int serve(const Config& config) {
   Station station{loop, clock, config.limits, config.link};
 
   // Out: they hear the station and never call it back; what has become durable comes back through one function.
-  Recorder recorder{loop, clock, disk, RecorderOptions{config.database(), config.enrol_on_loopback}};
-  Runs runs{clock, recorder};
-  History history{config.database(), recorder, readers};
+  RecordingParts recording{loop, clock, disk, readers, {config.database(), config.enrol_on_loopback}};
   LiveFeed live{clock};
-  for (StationSink* sink : std::initializer_list<StationSink*>{&recorder, &runs, &live}) station.add_sink(*sink);
-  recorder.set_on_durable(std::bind_front(&Station::on_durable, &station));
-  recorder.set_on_missing(std::bind_front(&Station::request_resend, &station));
-  const RestoredState restored = run_first(loop, recorder.open());
-  run_first(loop, runs.load());
+  recording.connect(station);
+  station.add_sink(live);
+  const RestoredState restored = run_first(loop, recording.open());
   station.restore(restored.robots, restored.pending_stops);
 
   // In: robots arrive here; each session becomes the station's RobotPort.
-  RobotListener robots{loop, clock, tasks, station, recorder, parse_endpoint(config.robots), config.robots_or_any_port};
+  RobotListener robots{
+      loop, clock, tasks, station, recording.recorder, parse_endpoint(config.robots), config.robots_or_any_port};
 
   // People and scripts.
-  AnalysisService analysis{history, maths};
-  ApiServer api{loop, tasks,   clock,   api_options(config, restored.store_id, text(robots.endpoint())), station, live,
-                runs, history, analysis};
+  AnalysisService analysis{recording.history, maths};
+  ApiServer api{loop,    tasks, clock,     api_options(config, restored.store_id, text(robots.endpoint())),
+                station, live,  recording, analysis};
 
-  tasks.spawn("recorder", recorder.run());
+  recording.spawn(tasks);
   tasks.spawn("live feed", live.run());
   tasks.spawn("robots", robots.run());
   tasks.spawn("api", api.run());
@@ -61,8 +56,8 @@ int serve(const Config& config) {
   folder.announce(api.address(), text(robots.endpoint()));
   spdlog::info("ready: page {}, robots {}, data {}", api.address(), text(robots.endpoint()), config.data_dir.string());
   api.print_login_url();
-  loop.run();        // returns when every task has ended
-  recorder.close();  // every sample that was received is on disk
+  loop.run();         // returns when every task has ended
+  recording.close();  // every sample that was received is on disk
   spdlog::info("stopped");
   return tasks.exit_code();
 }

@@ -35,11 +35,11 @@ ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string
 }
 
 ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clock, const ApiOptions& options,
-                     Station& station, LiveFeed& live, Runs& runs, History& history, AnalysisService& analysis)
+                     Station& station, LiveFeed& live, RecordingParts& recording, AnalysisService& analysis)
     : listener_{loop, clock, options.endpoint, options.or_any_port},
       auth_{clock, options.data_dir},
       guard_{auth_, host_names(options)},
-      parts_{loop, tasks, clock, station, live, runs, history, analysis, auth_, facts_of(options, listener_, clock)},
+      parts_{loop, tasks, clock, station, live, recording, analysis, auth_, facts_of(options, listener_, clock)},
       live_{loop, tasks, clock, station, live, options.version},
       server_{tasks, clock, listener_, guard_, router_, live_} {
   add_routes(router_, parts_);

@@ -29,7 +29,7 @@ class ApiServer {
  public:
   // Opens the port and makes the token. Throws when either is not possible.
   ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clock, const ApiOptions& options, Station& station,
-            LiveFeed& live, Runs& runs, History& history, AnalysisService& analysis);
+            LiveFeed& live, RecordingParts& recording, AnalysisService& analysis);
 
   boost::asio::awaitable<void> run() { return server_.run(); }
 

@@ -11,8 +11,7 @@
 #include "server/api/json.hpp"
 #include "server/api/router.hpp"
 #include "server/live/live_feed.hpp"
-#include "server/recording/history.hpp"
-#include "server/recording/runs.hpp"
+#include "server/recording/recording_parts.hpp"
 #include "server/station/station.hpp"
 #include "server/tasks.hpp"
 
@@ -33,8 +32,7 @@ struct ApiParts {
   Clock& clock;
   Station& station;
   LiveFeed& live;
-  Runs& runs;
-  History& history;
+  RecordingParts& recording;
   AnalysisService& analysis;
   Auth& auth;
   StationFacts facts;

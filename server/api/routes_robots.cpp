@@ -70,7 +70,7 @@ Answer emergency_stop(ApiParts& parts, Request request) {
   const auto record = co_await stop_robot(parts.station, request.param.at("robot_id"), request.actor);
   if (!record) co_return problem(record.error());
   const int status = stop_status(*record);
-  if (status == 202) co_await parts.history.settle();
+  if (status == 202) co_await parts.recording.history.settle();
   co_return json_response(status, to_json(*record));
 }
 
@@ -78,7 +78,7 @@ Answer emergency_stop_all(ApiParts& parts, Request request) {
   const StopsOfAll stops = co_await stop_all_robots(parts.loop, parts.tasks, parts.station, request.actor);
   int status = 200;
   for (const CommandRecord& record : stops.records) status = std::max(status, stop_status(record));
-  if (status == 202) co_await parts.history.settle();
+  if (status == 202) co_await parts.recording.history.settle();
   json body = list_json("commands", stops.records);
   if (!stops.failed.empty()) {
     co_return problem(500, fmt::format("the stop of {} failed; the log says why", fmt::join(stops.failed, ", ")),
@@ -92,7 +92,7 @@ Answer list_commands(ApiParts& parts, Request request) {
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
   const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
   if (!limit) co_return problem(limit.error());
-  const auto records = co_await parts.history.commands(id, static_cast<std::size_t>(*limit));
+  const auto records = co_await parts.recording.history.commands(id, static_cast<std::size_t>(*limit));
   co_return json_response(200, list_json("commands", records));
 }
 
@@ -101,14 +101,14 @@ Answer list_events(ApiParts& parts, Request request) {
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
   const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
   if (!limit) co_return problem(limit.error());
-  const auto events = co_await parts.history.events(id, static_cast<std::size_t>(*limit));
+  const auto events = co_await parts.recording.history.events(id, static_cast<std::size_t>(*limit));
   co_return json_response(200, list_json("events", events));
 }
 
 Answer get_command(ApiParts& parts, Request request) {
   const auto id = parse_id(request.param.at("command_id"));
   if (!id) co_return problem(400, "command_id is not a decimal number from 1", "out_of_range");
-  const auto record = co_await parts.history.command(*id);
+  const auto record = co_await parts.recording.history.command(*id);
   if (!record) co_return problem(record.error());
   co_return json_response(200, to_json(*record));
 }

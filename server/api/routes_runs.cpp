@@ -17,7 +17,7 @@ Answer list_runs(ApiParts& parts, Request request) {
   if (!before) co_return problem(before.error());
   std::optional<RobotId> robot_id;
   if (const auto given = request.query.find("robot_id"); given != request.query.end()) robot_id = given->second;
-  const auto runs = co_await parts.runs.list(std::move(robot_id), *before, static_cast<std::size_t>(*limit));
+  const auto runs = co_await parts.recording.runs.list(std::move(robot_id), *before, static_cast<std::size_t>(*limit));
   co_return json_response(200, list_json("runs", runs));
 }
 
@@ -27,7 +27,7 @@ Answer create_run(ApiParts& parts, Request request) {
   if (parts.station.find(wish->robot_id) == nullptr) {
     co_return problem(404, fmt::format("no robot '{}' is known", wish->robot_id), "unknown_robot");
   }
-  const auto run = co_await parts.runs.create(wish->robot_id, wish->conditions, request.actor);
+  const auto run = co_await parts.recording.runs.create(wish->robot_id, wish->conditions, request.actor);
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
   Response response = json_response(201, to_json(*run));
@@ -38,7 +38,7 @@ Answer create_run(ApiParts& parts, Request request) {
 Answer get_run(ApiParts& parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
-  const auto run = co_await parts.runs.find(*id);
+  const auto run = co_await parts.recording.runs.find(*id);
   if (!run) co_return problem(run.error());
   co_return json_response(200, to_json(*run));
 }
@@ -48,7 +48,7 @@ Answer end_run(ApiParts& parts, Request request) {
   if (!id) co_return problem(id.error());
   const auto verdict = parse_run_end(request.body);
   if (!verdict) co_return problem(verdict.error());
-  const auto run = co_await parts.runs.end(*id, *verdict);
+  const auto run = co_await parts.recording.runs.end(*id, *verdict);
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
   co_return json_response(200, to_json(*run));

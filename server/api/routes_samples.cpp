@@ -45,17 +45,17 @@ Answer list_samples(ApiParts& parts, Request request) {
     after = parse_cursor(given->second);
     if (!after) co_return problem(400, "after is not the `next` of a page", "out_of_range");
   }
-  auto page = co_await parts.history.samples(*id, after, static_cast<std::size_t>(*limit));
+  auto page = co_await parts.recording.history.samples(*id, after, static_cast<std::size_t>(*limit));
   if (!page) co_return problem(page.error());
   auto job = [page = std::move(*page)] { return page_text(page); };
-  std::string text = co_await parts.history.on_reader(std::move(job));
+  std::string text = co_await parts.recording.history.on_reader(std::move(job));
   co_return json_text_response(200, std::move(text));
 }
 
 Answer list_gaps(ApiParts& parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
-  const auto gaps = co_await parts.history.gaps(*id);
+  const auto gaps = co_await parts.recording.history.gaps(*id);
   if (!gaps) co_return problem(gaps.error());
   co_return json_response(200, list_json("gaps", *gaps));
 }
@@ -119,13 +119,13 @@ class CsvStream final : public BodyStream {
 Answer export_samples(ApiParts& parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
-  auto first = co_await parts.history.samples(*id, std::nullopt, kCsvPage);
+  auto first = co_await parts.recording.history.samples(*id, std::nullopt, kCsvPage);
   if (!first) co_return problem(first.error());
   Response response;
   response.content_type = "text/csv; charset=utf-8";
   response.headers.emplace_back("Cache-Control", "no-store");
   response.headers.emplace_back("Content-Disposition", fmt::format("attachment; filename=\"run-{}.csv\"", *id));
-  response.stream = std::make_unique<CsvStream>(parts.history, *id, std::move(*first));
+  response.stream = std::make_unique<CsvStream>(parts.recording.history, *id, std::move(*first));
   co_return response;
 }
 

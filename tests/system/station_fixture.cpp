@@ -10,19 +10,13 @@ SystemTest::SystemTest() {
   folder = mkdtemp(name.data());
   clock.add_worker(disk);
   clock.add_worker(readers);
-  recorder = std::make_unique<Recorder>(loop, clock, disk, RecorderOptions{folder / "station.sqlite"});
-  runs = std::make_unique<Runs>(clock, *recorder);
-  history = std::make_unique<History>(folder / "station.sqlite", *recorder, readers);
-  station.add_sink(*recorder);
-  station.add_sink(*runs);
-  recorder->set_on_durable([this](const RobotId& id, BootId boot_id, std::uint64_t seq, std::uint64_t event_seq) {
-    station.on_durable(id, boot_id, seq, event_seq);
-  });
-  recorder->set_on_missing([this](const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t next_seq) {
-    station.request_resend(id, boot_id, first_seq, next_seq);
-  });
-  run_first(loop, recorder->open());
-  tasks.spawn("recorder", recorder->run());
+  recording = std::make_unique<RecordingParts>(loop, clock, disk, readers, RecorderOptions{folder / "station.sqlite"});
+  recorder = &recording->recorder;
+  runs = &recording->runs;
+  history = &recording->history;
+  recording->connect(station);
+  run_first(loop, recording->open());
+  recording->spawn(tasks);
   const boost::asio::ip::tcp::endpoint any_port{boost::asio::ip::address_v4::loopback(), 0};
   listener = std::make_unique<RobotListener>(loop, clock, tasks, station, *recorder, any_port, false);
 }
@@ -30,7 +24,7 @@ SystemTest::SystemTest() {
 SystemTest::~SystemTest() {
   tasks.stop();
   clock.settle();
-  recorder->close();
+  recording->close();
   std::filesystem::remove_all(folder);
 }
 

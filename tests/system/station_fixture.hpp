@@ -5,9 +5,7 @@
 
 #include <filesystem>
 
-#include "server/recording/history.hpp"
-#include "server/recording/recorder.hpp"
-#include "server/recording/runs.hpp"
+#include "server/recording/recording_parts.hpp"
 #include "server/tasks.hpp"
 #include "tests/system/virtual_robot.hpp"
 
@@ -56,9 +54,10 @@ class SystemTest : public ::testing::Test {
   WorkerThread disk{"disk"}, readers{"readers"};
   TaskGroup tasks{loop};
   Station station{loop, clock, CommandLimits{}, LinkTimes{}};
-  std::unique_ptr<Recorder> recorder;
-  std::unique_ptr<Runs> runs;
-  std::unique_ptr<History> history;
+  std::unique_ptr<RecordingParts> recording;
+  Recorder* recorder = nullptr;  // of recording, as are the next two
+  Runs* runs = nullptr;
+  History* history = nullptr;
   std::unique_ptr<RobotListener> listener;
   std::unique_ptr<VirtualRobot> robot;
 };

@@ -23,9 +23,8 @@ TemporaryFolder::TemporaryFolder() {
 TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
 
 namespace {
-asio::awaitable<void> start(Recorder& recorder, Runs& runs, bool& started) {
-  co_await recorder.open();
-  co_await runs.load();
+asio::awaitable<void> start(RecordingParts& recording, bool& started) {
+  co_await recording.open();
   started = true;
 }
 }  // namespace
@@ -34,14 +33,10 @@ ApiTest::ApiTest() {
   clock.add_worker(disk);
   clock.add_worker(readers);
   clock.add_worker(maths);
-  station.add_sink(recorder);
-  station.add_sink(runs);
+  recording.connect(station);
   station.add_sink(live);
-  recorder.set_on_durable([this](const RobotId& id, BootId boot, std::uint64_t seq, std::uint64_t event_seq) {
-    station.on_durable(id, boot, seq, event_seq);
-  });
   bool started = false;
-  tasks.spawn("start", start(recorder, runs, started));
+  tasks.spawn("start", start(recording, started));
   EXPECT_TRUE(clock.run_until([&] { return started; }, 10s));
   ApiOptions options;
   options.endpoint = {asio::ip::address_v4::loopback(), 0};
@@ -50,8 +45,8 @@ ApiTest::ApiTest() {
   options.version = "0.1.0";
   options.store_id = 0xfedcba9876543210;
   options.robots_address = "127.0.0.1:7070";
-  api = std::make_unique<ApiServer>(loop, tasks, clock, options, station, live, runs, history, analysis);
-  tasks.spawn("recorder", recorder.run());
+  api = std::make_unique<ApiServer>(loop, tasks, clock, options, station, live, recording, analysis);
+  recording.spawn(tasks);
   tasks.spawn("live feed", live.run());
   tasks.spawn("api", api->run());
   clock.settle();

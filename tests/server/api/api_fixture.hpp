@@ -7,7 +7,7 @@
 #include <string>
 
 #include "server/api/api_server.hpp"
-#include "server/recording/recorder.hpp"
+#include "server/recording/recording_parts.hpp"
 #include "tests/server/link/test_robot.hpp"
 
 namespace server {
@@ -59,10 +59,9 @@ class ApiTest : public ::testing::Test {
   VirtualClock clock{loop};
   TaskGroup tasks{loop};
   Station station{loop, clock, CommandLimits{}, LinkTimes{}};
-  Recorder recorder{loop, clock, disk, {.path = folder.path() / "station.sqlite"}};
-  Runs runs{clock, recorder};
-  History history{folder.path() / "station.sqlite", recorder, readers};
-  AnalysisService analysis{history, maths};
+  RecordingParts recording{loop, clock, disk, readers, RecorderOptions{folder.path() / "station.sqlite"}};
+  Recorder& recorder{recording.recorder};
+  AnalysisService analysis{recording.history, maths};
   LiveFeed live{clock};
   RobotListener robots{loop, clock, tasks, station, recorder, {boost::asio::ip::address_v4::loopback(), 0}, false};
   std::unique_ptr<ApiServer> api;

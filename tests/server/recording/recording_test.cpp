@@ -40,9 +40,10 @@ RecordingTest::~RecordingTest() {
 void RecordingTest::start(RecorderOptions options) {
   options.path = path_;
   tasks_ = std::make_unique<TaskGroup>(loop_);
-  recorder_ = std::make_unique<Recorder>(loop_, clock_, disk_, options);
-  runs_ = std::make_unique<Runs>(clock_, *recorder_);
-  history_ = std::make_unique<History>(path_, *recorder_, readers_);
+  recording_ = std::make_unique<RecordingParts>(loop_, clock_, disk_, readers_, options);
+  recorder_ = &recording_->recorder;
+  runs_ = &recording_->runs;
+  history_ = &recording_->history;
   recorder_->set_on_durable(
       [this](const RobotId&, BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event_seq) {
         durable_next_seq_ = durable_next_seqs_[boot_id] = next_seq;
@@ -51,9 +52,8 @@ void RecordingTest::start(RecorderOptions options) {
   recorder_->set_on_missing([this](const RobotId&, BootId, std::uint64_t first_seq, std::uint64_t next_seq) {
     missing_.push_back({first_seq, next_seq});
   });
-  restored_ = wait(recorder_->open());
-  wait(runs_->load());
-  tasks_->spawn("recorder", recorder_->run());
+  restored_ = wait(recording_->open());
+  recording_->spawn(*tasks_);
   clock_.settle();
 }
 
@@ -61,16 +61,17 @@ void RecordingTest::stop() {
   tasks_->stop();
   clock_.settle();
   EXPECT_EQ(tasks_->exit_code(), 0);
-  recorder_->close();
+  recording_->close();
   kill();
 }
 
 void RecordingTest::kill() {
   if (tasks_) tasks_->stop();
   clock_.settle();
-  history_.reset();
-  runs_.reset();
-  recorder_.reset();
+  recorder_ = nullptr;
+  runs_ = nullptr;
+  history_ = nullptr;
+  recording_.reset();
   tasks_.reset();
 }
 

@@ -12,9 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "server/recording/history.hpp"
-#include "server/recording/recorder.hpp"
-#include "server/recording/runs.hpp"
+#include "server/recording/recording_parts.hpp"
 #include "server/tasks.hpp"
 #include "tests/server/virtual_clock.hpp"
 
@@ -124,9 +122,10 @@ class RecordingTest : public ::testing::Test {
   WorkerThread readers_{"readers"};
   VirtualClock clock_{loop_};
   std::unique_ptr<TaskGroup> tasks_;
-  std::unique_ptr<Recorder> recorder_;
-  std::unique_ptr<Runs> runs_;
-  std::unique_ptr<History> history_;
+  std::unique_ptr<RecordingParts> recording_;
+  Recorder* recorder_ = nullptr;  // of recording_, as are the next two
+  Runs* runs_ = nullptr;
+  History* history_ = nullptr;
   RestoredState restored_;
   std::uint64_t durable_next_seq_ = 0;  // as told last
   std::map<BootId, std::uint64_t> durable_next_seqs_;
