@@ -35,12 +35,14 @@ void Fleet::take_turn(std::uint64_t turn) {
   boot_due(slot, turn);
   for (std::size_t i = 0; i < slot.booted; ++i) {
     FleetMember& member = *slot.members[i];
+    if (i + 1 < slot.booted) slot.members[i + 1]->prefetch();
     const Clock::duration late = Clock::now() - member.next_tick_at();
     if (late < Clock::duration::zero()) continue;  // it had its turn when bytes came
     lateness_.add(std::chrono::duration_cast<std::chrono::microseconds>(late).count());
-    member.tick();
+    if (member.tick()) with_frames_.push_back(&member);
   }
-  for (std::size_t i = 0; i < slot.booted; ++i) slot.members[i]->send();
+  for (FleetMember* member : with_frames_) member->send();
+  with_frames_.clear();
 }
 
 void Fleet::boot_due(Slot& slot, std::uint64_t turn) {

@@ -4,8 +4,8 @@
 // One timer turns the wheel, whatever the number of robots. Robots boot and dial kBootEveryUs apart, each at a turn of
 // its own slot: so neither their ticks nor their frames nor their dialling come all at once. A late turn is taken as
 // soon as possible, and robots catch up by themselves; after a stall of over a period the wheel goes on from now.
-// In a turn all robots of the slot tick, then all of them send: a station that is woken by the first frame is still
-// awake for the others, which halves the cost of a frame.
+// In a turn all robots of the slot tick, then those with a frame send: a station that is woken by the first frame is
+// still awake for the others, which halves the cost of a frame, and a robot's memory is touched once a tick.
 // Owns the robots. One thread: that of `loop`, which must outlive the fleet and be stopped before it ends.
 #pragma once
 
@@ -64,6 +64,7 @@ class Fleet {
   std::vector<Slot> slots_;
   std::chrono::microseconds slot_{kSlotUs};
   Clock::time_point started_at_;
+  std::vector<FleetMember*> with_frames_;  // of this turn
   Lateness lateness_;
 };
 

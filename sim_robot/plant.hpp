@@ -62,6 +62,11 @@ class Plant {
   double velocity_m_s() const { return velocity_m_s_; }
   double acceleration_m_s2() const { return acceleration_m_s2_; }
 
+  // See ModalPlant; the other has nothing of the kind.
+  void prefetch() const {
+    if (const auto* modal = std::get_if<control::ModalPlant>(&motion_)) modal->prefetch();
+  }
+
  private:
   std::variant<control::ModalPlant, NonlinearPlant> motion_;
   double position_m_ = 0, velocity_m_s_ = 0, acceleration_m_s2_ = 0;

@@ -31,21 +31,16 @@ asio::awaitable<void> RobotClient::tick_for_ever() {
   for (;;) {
     timer.expires_at(next_tick_at());
     co_await timer.async_wait(asio::use_awaitable);
-    tick();
-    send();
+    if (tick()) send();
   }
 }
 
-void RobotClient::tick() {
-  catch_up();
+bool RobotClient::tick() {
+  const std::uint64_t now_us = catch_up();
   if (life_.is_on()) connection_.reset_forgotten();
   watch_gaps();
-}
-
-void RobotClient::send() {
-  if (!connection_.is_open()) return;
-  connection_.flush();
-  if (life_.core().connection_is_silent(catch_up())) connection_.close_as_silent();
+  if (connection_.is_open() && life_.core().connection_is_silent(now_us)) connection_.close_as_silent();
+  return connection_.prepare();
 }
 
 // Runs the ticks that are due and returns the robot's time, which lies before the next of them.

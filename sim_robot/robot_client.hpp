@@ -32,8 +32,9 @@ class RobotClient final : public FleetMember, private Speaker {
 
   // The parts of run(), for who has many robots.
   void boot(Clock::time_point at) override { booted_at_ = at; }
-  void tick() override;
-  void send() override;
+  bool tick() override;
+  void prefetch() const override { robot().prefetch(); }
+  void send() override { connection_.flush(); }
   Clock::time_point next_tick_at() const override {
     return booted_at_ + std::chrono::microseconds(life_.next_tick_us());
   }

@@ -43,6 +43,8 @@ class SimulatedRobot {
   SimulatedRobot& operator=(const SimulatedRobot&) = delete;
 
   void step();  // one tick of kPeriodS
+  // Asks for the memory that a tick works on, ahead of it: many robots do not fit a cache.
+  void prefetch() const;
 
   // Lets robot time reach `now_us`: afterwards no tick is due. Ticks that are up to kMaxLatenessUs late run one by one,
   // each at its own time. After a longer stall only the latest one runs; those before it are skipped.

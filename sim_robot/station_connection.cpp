@@ -64,7 +64,7 @@ asio::awaitable<bool> StationConnection::shake_hands() {
 asio::awaitable<void> StationConnection::serve() {
   is_open_ = true;
   was_welcome_ = false;
-  unsent_.clear();
+  frame_size_ = frame_sent_ = 0;
   speaker_.on_opened();
   if (is_open_) flush();
   while (is_open_) {
@@ -96,30 +96,29 @@ void StationConnection::notice_welcome() {
   say("connected to " + station_.host + ":" + station_.port + " as " + name_);
 }
 
+bool StationConnection::prepare() {
+  if (!is_open_) return false;
+  if (frame_sent_ < frame_size_) return true;
+  const std::size_t size = speaker_.next_frame(frame_.data(), frame_.size());
+  if (size == 0) return false;
+  frame_size_ = size;
+  frame_sent_ = 0;
+  ++counts_.frames;
+  return true;
+}
+
 void StationConnection::flush() {
-  if (is_open_ && !unsent_.empty()) {
-    const auto rest = std::exchange(unsent_, {});
-    if (!write({rest.data(), rest.size()})) return;
-  }
-  std::array<std::uint8_t, protocol::kMaxFramedBytes> frame;
-  while (is_open_) {
-    const std::size_t size = speaker_.next_frame(frame.data(), frame.size());
-    if (size == 0) return;
-    ++counts_.frames;
-    if (!write({frame.data(), size})) return;
+  while (prepare()) {
+    if (!write()) return;
   }
 }
 
 // True when all of it was taken; keeps the rest otherwise.
-bool StationConnection::write(protocol::Bytes bytes) {
+bool StationConnection::write() {
   boost::system::error_code error;
-  bytes.drop(socket_.write_some(asio::buffer(bytes.first, bytes.size), error));
-  if (error && error != asio::error::would_block) {
-    close();
-    return false;
-  }
-  unsent_.assign(bytes.begin(), bytes.end());
-  return bytes.empty();
+  frame_sent_ += socket_.write_some(asio::buffer(frame_.data() + frame_sent_, frame_size_ - frame_sent_), error);
+  if (error && error != asio::error::would_block) close();
+  return is_open_ && frame_sent_ == frame_size_;
 }
 
 // SAFETY: the silence may be the robot's own, after a stall; a stop that came meanwhile is read before the verdict.

@@ -64,6 +64,8 @@ class StationConnection {
   // Dials and reads until cancelled. Never returns otherwise.
   boost::asio::awaitable<void> run();
 
+  // Takes the frame that is due next from the speaker, unless one is still under way. True when there is one to write.
+  bool prepare();
   // Hands the socket what it takes without waiting, one write per frame.
   void flush();
   // Closes the connection of a station that is silent, unless bytes of it wait to be read.
@@ -81,7 +83,7 @@ class StationConnection {
   boost::asio::awaitable<bool> reach();
   boost::asio::awaitable<void> serve();
   bool take_bytes();
-  bool write(protocol::Bytes bytes);
+  bool write();
   void close();
   void notice_welcome();
   void say_how_it_ended();
@@ -98,7 +100,8 @@ class StationConnection {
   bool was_welcome_ = false;  // on this connection
   LinkCounts counts_;
   std::string last_line_;
-  std::vector<std::uint8_t> unsent_;  // of the frame under way
+  std::array<std::uint8_t, protocol::kMaxFramedBytes> frame_;  // under way
+  std::size_t frame_size_ = 0, frame_sent_ = 0;
   std::minstd_rand jitter_{std::random_device{}()};
 };
 
