@@ -66,7 +66,7 @@ asio::awaitable<void> RobotClient::run() {
 // now.
 std::uint64_t RobotClient::catch_up() {
   const auto since = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - booted_at_);
-  faults_.advance(life_, static_cast<std::uint64_t>(since.count()));
+  faults_.advance(faulty(), static_cast<std::uint64_t>(since.count()));
   return life_.robot_clock_us();
 }
 

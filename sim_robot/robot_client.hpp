@@ -50,6 +50,7 @@ class RobotClient {
   // For who injects faults while it runs, on the same thread.
   SimulatedRobot& robot() { return life_.robot(); }
   FaultTimeline& faults() { return faults_; }
+  FaultyRobot faulty() { return {life_, nullptr}; }
   RobotLife& life() { return life_; }  // for its clock
 
  private:

@@ -25,12 +25,12 @@ void spawn(asio::io_context& loop, asio::awaitable<void> task) {
   });
 }
 
-void announce(const Scenario& scenario) {
+void announce(const Scenario& scenario, const FaultyRobot& robot) {
   if (!scenario.name.empty()) say("scenario " + scenario.name + ": " + scenario.description);
   if (!scenario.script.empty()) say("its script is for `rheonaut-sim play`; here the station gives the commands");
   if (scenario.duration_s > 0) say(control::join_text("ends by itself after ", scenario.duration_s, " s"));
   for (const TimedFault& timed : scenario.faults) {
-    const std::string reason = why_not(timed.fault.kind);
+    const std::string reason = why_not(timed.fault.kind, robot);
     if (!reason.empty()) say(control::join_text("at ", timed.at_s, " s will be passed over: ", reason));
   }
 }
@@ -58,11 +58,11 @@ int RunCommand::run() const {
   RobotClient client{loop, scenario.robot, station, say, std::chrono::milliseconds(handshake_ms_), scenario.faults};
   std::optional<FaultServer> server;
   if (!faults_at_.empty()) {
-    server.emplace(loop, parse_faults_address(faults_at_, faults_anywhere_), client.faults(), client.robot());
+    server.emplace(loop, parse_faults_address(faults_at_, faults_anywhere_), client.faults(), client.faulty());
     say(control::join_text("faults at http://", server->address(), "/faults"));
     spawn(loop, server->run());
   }
-  announce(scenario);
+  announce(scenario, client.faulty());
   spawn(loop, client.run());
   asio::signal_set stop{loop, SIGINT, SIGTERM};
   stop.async_wait([&loop](const boost::system::error_code&, int) { loop.stop(); });

@@ -18,6 +18,7 @@ struct SimulatedRobotConfig {
   protocol::ResetCause reset_cause = rheonaut_RESET_CAUSE_POWER_ON;
   robot_fw::DutyRange duty{-1, 1};
   WorldConfig world;
+  double clock_drift_ppm = 0;               // of its clock against true time, see robot_life; fast is positive
   robot_fw::Storage* storage = nullptr;     // of parameters and controller; null: they end with the robot
   std::uint64_t restored_emergency_id = 0;  // a latch that outlived the reset; 0: none
   protocol::EmergencyCause restored_emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;
