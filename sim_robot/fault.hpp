@@ -91,8 +91,8 @@ void fields_with_kind(Fields& fields, Fault& fault);
 // Throws what is wrong with its values, or what the world lacks for it.
 void check(const Fault& fault, const WorldConfig& world);
 
-// Empty when this run can do it; otherwise why not.
-std::string why_not(FaultKind kind, const FaultyRobot& robot);
+// Empty when a run with, or without, a network of its own can do it; otherwise why not.
+std::string why_not(FaultKind kind, bool has_network);
 // The same for this robot; throws what why_not() says, too.
 void check(const Fault& fault, const FaultyRobot& robot);
 // From the robot's next tick on. Throws as check() does.

@@ -103,14 +103,15 @@ void upset(const Fault& fault, RobotLife& life) {
 
 }  // namespace
 
-std::string why_not(FaultKind kind, const FaultyRobot& robot) {
-  if (robot.link != nullptr || !is_of_link(type_of(kind).target)) return "";
+std::string why_not(FaultKind kind, bool has_network) {
+  if (has_network || !is_of_link(type_of(kind).target)) return "";
   return std::string(type_of(kind).name) + ": not in this run, which has no network of its own to break";
 }
 
 void check(const Fault& fault, const FaultyRobot& robot) {
   check(fault, robot.life.robot().config().world);
-  if (const std::string reason = why_not(fault.kind, robot); !reason.empty()) throw std::invalid_argument(reason);
+  if (const std::string reason = why_not(fault.kind, robot.link != nullptr); !reason.empty())
+    throw std::invalid_argument(reason);
 }
 
 void apply(const Fault& fault, const FaultyRobot& robot) {

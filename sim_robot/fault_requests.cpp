@@ -45,7 +45,7 @@ Json known_faults(const FaultyRobot& robot) {
     FieldList list;
     fields(list, fault);
     Json json{{"fault", fault_types()[i].name}, {"what", fault_types()[i].what}};
-    json["is_in_this_run"] = why_not(fault.kind, robot).empty();
+    json["is_in_this_run"] = why_not(fault.kind, robot.link != nullptr).empty();
     json["fields"] = Json::array();
     for (const Field& field : list.fields) json["fields"].push_back(describe(field));
     all.push_back(json);
@@ -85,7 +85,7 @@ FaultAnswer inject(const FaultRequest& request, FaultTimeline& faults, const Fau
   }
   try {
     const Fault fault = parse_fault_json(request.body);
-    if (const std::string reason = why_not(fault.kind, robot); !reason.empty()) {
+    if (const std::string reason = why_not(fault.kind, robot.link != nullptr); !reason.empty()) {
       return fault_problem(409, "not_in_this_run", reason);
     }
     const std::uint64_t id = faults.inject(fault, robot);

@@ -63,7 +63,7 @@ void FaultTimeline::apply_until(const FaultyRobot& robot, std::uint64_t now_us) 
     end_due(robot, at_us);
     if (next_start_us() != at_us) continue;
     const Fault& fault = to_come_[next_++].fault;
-    if (const std::string reason = why_not(fault.kind, robot); !reason.empty()) {
+    if (const std::string reason = why_not(fault.kind, robot.link != nullptr); !reason.empty()) {
       ++passed_over_;
       say(at_us, reason);
       continue;

@@ -25,6 +25,7 @@ robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
   core.reset_cause = config.reset_cause;
   core.duty_min = config.duty.min;
   core.duty_max = config.duty.max;
+  core.samples_per_frame = config.samples_per_frame;
   core.sample_period_us = SimulatedRobot::kPeriodUs;
   core.storage = config.storage;
   core.restored_emergency_id = config.restored_emergency_id;
@@ -69,6 +70,9 @@ void check(const SimulatedRobotConfig& config) {
   if (!(std::abs(config.clock_drift_ppm) <= kMostDriftPpm)) {
     throw std::invalid_argument("clock drift of " + std::to_string(config.clock_drift_ppm) +
                                 " ppm is not within -100000 and 100000");
+  }
+  if (config.samples_per_frame < 1 || config.samples_per_frame > protocol::kMaxSamplesPerFrame) {
+    throw std::invalid_argument(std::to_string(config.samples_per_frame) + " samples a frame is not within 1 and 25");
   }
   check(config.world);
 }
