@@ -3,12 +3,9 @@
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/connect.hpp>
-#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <chrono>
-#include <stdexcept>
 #include <utility>
 
 namespace sim_robot {
@@ -16,7 +13,6 @@ namespace {
 
 namespace asio = boost::asio;
 using asio::ip::tcp;
-using namespace asio::experimental::awaitable_operators;
 using namespace std::chrono_literals;
 
 constexpr auto kConnectTimeout = 1s;
@@ -24,27 +20,7 @@ constexpr auto kMayDialPeriod = 10ms;
 constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
 constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
-asio::awaitable<void> pause(std::chrono::milliseconds duration) {
-  asio::steady_timer timer{co_await asio::this_coro::executor, duration};
-  co_await timer.async_wait(asio::use_awaitable);
-}
-
 }  // namespace
-
-StationAddress parse_station_address(const std::string& text, const std::string& option, int lowest_port) {
-  const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos || colon == 0 || colon + 1 == text.size()) {
-    throw std::invalid_argument(option + ": '" + text + "' is not ADDR:PORT");
-  }
-  std::string host = text.substr(0, colon);
-  if (host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
-  const std::string port = text.substr(colon + 1);
-  if (port.size() > 5 || port.find_first_not_of("0123456789") != std::string::npos || std::stoi(port) > 65535 ||
-      std::stoi(port) < lowest_port) {
-    throw std::invalid_argument(option + ": '" + port + "' is not a port");
-  }
-  return {host, port};
-}
 
 StationConnection::StationConnection(asio::io_context& loop, Speaker& speaker, StationAddress station, std::string name,
                                      LinkLog log)
@@ -54,8 +30,8 @@ asio::awaitable<void> StationConnection::run() {
   for (;;) {
     while (!speaker_.may_dial()) co_await pause(kMayDialPeriod);
     const int times_forgotten = times_forgotten_;
-    const bool dialled = co_await dial();
-    if (!dialled) {
+    const bool reached = co_await reach();
+    if (!reached) {
       ++counts_.unreachable;
       say("cannot reach the station at " + station_.host + ":" + station_.port + ", trying again");
     } else {
@@ -70,34 +46,12 @@ asio::awaitable<void> StationConnection::run() {
   }
 }
 
-// An address in numbers needs no resolver, which would serve a fleet one by one.
-asio::awaitable<bool> StationConnection::dial() {
-  boost::system::error_code error;
-  const auto address = asio::ip::make_address(station_.host, error);
-  std::vector<tcp::endpoint> endpoints;
-  if (!error) {
-    endpoints.emplace_back(address, static_cast<std::uint16_t>(std::stoi(station_.port)));
-  } else {
-    tcp::resolver resolver{socket_.get_executor()};
-    auto resolving = resolver.async_resolve(station_.host, station_.port, kNoThrow) || pause(kConnectTimeout);
-    auto resolved = co_await std::move(resolving);
-    if (resolved.index() == 1) co_return false;
-    const auto [resolve_error, results] = std::get<0>(resolved);
-    if (resolve_error) co_return false;
-    endpoints.assign(results.begin(), results.end());
-  }
-  co_return co_await reach(std::move(endpoints));
-}
-
-asio::awaitable<bool> StationConnection::reach(std::vector<tcp::endpoint> endpoints) {
+asio::awaitable<bool> StationConnection::reach() {
   socket_ = tcp::socket{socket_.get_executor()};
-  auto connecting = asio::async_connect(socket_, endpoints, kNoThrow) || pause(kConnectTimeout);
-  auto outcome = co_await std::move(connecting);
-  if (outcome.index() == 1 || std::get<0>(std::get<0>(outcome))) co_return false;
+  const bool reached = co_await dial(socket_, station_, kConnectTimeout);
   boost::system::error_code error;
-  socket_.set_option(tcp::no_delay{true}, error);
-  socket_.non_blocking(true, error);
-  co_return !error;
+  if (reached) socket_.non_blocking(true, error);
+  co_return reached && !error;
 }
 
 asio::awaitable<bool> StationConnection::shake_hands() {

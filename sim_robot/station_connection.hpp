@@ -19,16 +19,9 @@
 #include <vector>
 
 #include "protocol/frame.hpp"
+#include "sim_robot/dialling.hpp"
 
 namespace sim_robot {
-
-struct StationAddress {
-  std::string host;
-  std::string port;
-};
-// "host:port" or "[v6]:port"; throws std::invalid_argument that names the option.
-StationAddress parse_station_address(const std::string& text, const std::string& option = "--station",
-                                     int lowest_port = 1);
 
 // What people are told about the link, one line each.
 using LinkLog = std::function<void(const std::string& line)>;
@@ -84,9 +77,8 @@ class StationConnection {
   const LinkCounts& counts() const { return counts_; }
 
  private:
-  boost::asio::awaitable<bool> dial();
   boost::asio::awaitable<bool> shake_hands();
-  boost::asio::awaitable<bool> reach(std::vector<boost::asio::ip::tcp::endpoint> endpoints);
+  boost::asio::awaitable<bool> reach();
   boost::asio::awaitable<void> serve();
   bool take_bytes();
   bool write(protocol::Bytes bytes);
