@@ -8,6 +8,13 @@
 namespace sim_robot {
 namespace {
 
+// What is left of one that its target ends by itself and that begins late.
+Fault late(Fault fault, std::uint64_t by_us) {
+  constexpr double kLeastS = 0.001;
+  if (ends_by_itself(fault.kind)) fault.for_s = std::max(kLeastS, fault.for_s - 1e-6 * static_cast<double>(by_us));
+  return fault;
+}
+
 // Whether `next` takes the place of `old`. A robot that boots hangs no more.
 bool replaces(const Fault& next, const Fault& old) {
   if (type_of(old.kind).target != type_of(next.kind).target) return false;
@@ -22,13 +29,13 @@ FaultTimeline::FaultTimeline(std::vector<TimedFault> faults, Log log)
 void FaultTimeline::advance(const FaultyRobot& robot, std::uint64_t true_us) {
   now_us_ = true_us;
   RobotLife& life = robot.life;
-  const bool is_late = true_us > life.true_us() + SimulatedRobot::kMaxLatenessUs;  // ticks will be skipped
-  while (!is_late && next_us() <= true_us) {
+  const bool is_late = true_us > life.true_us() + SimulatedRobot::kMaxLatenessUs;
+  if (is_late) life.advance_to(true_us);  // which skips ticks; what was due meanwhile comes behind them
+  while (next_us() <= true_us) {
     const std::uint64_t at_us = next_us();
-    if (at_us > 0) life.advance_to(std::max(at_us - 1, life.true_us()));
+    if (at_us > life.true_us()) life.advance_to(at_us - 1);
     apply_until(robot, at_us);
   }
-  apply_until(robot, true_us);
   life.advance_to(true_us);
 }
 
@@ -84,7 +91,8 @@ void FaultTimeline::end_due(const FaultyRobot& robot, std::uint64_t at_us) {
 std::uint64_t FaultTimeline::begin(const Fault& fault, const FaultyRobot& robot, std::uint64_t at_us) {
   check(fault, robot);  // before anything ends
   end_replaced(fault, robot);
-  apply(fault, robot);
+  const std::uint64_t true_us = robot.life.true_us();
+  apply(late(fault, true_us - std::min(at_us, true_us)), robot);
   const FaultType& type = type_of(fault.kind);
   say(at_us, type.name);
   ++last_id_;
