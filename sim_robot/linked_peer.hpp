@@ -17,11 +17,13 @@ class LinkedPeer : public HeardRobot {
 
   explicit LinkedPeer(ImpairedLink& link) : link_(link) {}
 
-  // Each step is one of the link, then what has arrived, then what is due.
+  // Each step is one of the link, then serve().
   void step();
+  // What has arrived, then what is due.
+  void serve();
   void run(double for_s);
 
-  // Adds id, boot and life where they are 0, queues it for the open connection, and returns the id. It is lost with it.
+  // Adds id, boot and life where they are 0, says it on the open connection, and returns the id. It is lost with it.
   std::uint64_t send(protocol::Command command);
 
   bool is_connected() const { return connected_; }
@@ -34,7 +36,8 @@ class LinkedPeer : public HeardRobot {
   void accept();
   void read();
   void speak();
-  void queue(const protocol::StationFrame& frame);
+  void say(const protocol::StationFrame& frame);
+  void flush();
 
   ImpairedLink& link_;
   int connections_ = 0;

@@ -7,8 +7,9 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
-#include <cmath>
 #include <utility>
+
+#include "sim_robot/microseconds.hpp"
 
 namespace sim_robot {
 namespace {
@@ -115,7 +116,7 @@ asio::awaitable<void> ProxyConnection::drain(Pipe& pipe) {
 }
 
 void ProxyConnection::stall(double for_s) {
-  stalled_until_us_ = now_us() + static_cast<std::uint64_t>(std::llround(1e6 * for_s));
+  stalled_until_us_ = end_us(now_us(), for_s);
   for (Pipe* pipe : {&up_, &down_}) pipe->stream.stall(now_us(), stalled_until_us_);
   wake_all();
 }

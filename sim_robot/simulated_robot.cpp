@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <memory>
 #include <random>
 #include <stdexcept>
@@ -12,6 +13,7 @@ namespace sim_robot {
 namespace {
 
 constexpr int kRssiDbm = -50;
+constexpr double kMostDriftPpm = 100'000;
 constexpr std::uint64_t kTicksToMotorOff = 5;
 
 robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
@@ -64,6 +66,10 @@ void check(const SimulatedRobotConfig& config) {
   if (!(min >= -1 && min <= 0 && max > 0 && max <= 1)) {
     throw std::invalid_argument("duty range [" + std::to_string(min) + ", " + std::to_string(max) +
                                 "] is not within [-1, 0] and (0, 1]");
+  }
+  if (!(std::abs(config.clock_drift_ppm) <= kMostDriftPpm)) {
+    throw std::invalid_argument("clock drift of " + std::to_string(config.clock_drift_ppm) +
+                                " ppm is not within -100000 and 100000");
   }
   if (config.samples_per_frame < 1 || config.samples_per_frame > protocol::kMaxSamplesPerFrame) {
     throw std::invalid_argument(std::to_string(config.samples_per_frame) + " samples a frame is not within 1 and 25");

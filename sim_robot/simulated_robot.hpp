@@ -19,6 +19,7 @@ struct SimulatedRobotConfig {
   robot_fw::DutyRange duty{-1, 1};
   std::uint32_t samples_per_frame = 5;  // 1 to 25; the station may ask for another
   WorldConfig world;
+  double clock_drift_ppm = 0;               // of its clock against true time, see robot_life; fast is positive
   robot_fw::Storage* storage = nullptr;     // of parameters and controller; null: they end with the robot
   std::uint64_t restored_emergency_id = 0;  // a latch that outlived the reset; 0: none
   protocol::EmergencyCause restored_emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;

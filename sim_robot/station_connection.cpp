@@ -16,7 +16,7 @@ using asio::ip::tcp;
 using namespace std::chrono_literals;
 
 constexpr auto kConnectTimeout = 1s;
-constexpr auto kMayDialPeriod = 10ms;
+constexpr auto kAskAgain = 10ms;
 constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
 constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
@@ -28,7 +28,7 @@ StationConnection::StationConnection(asio::io_context& loop, Speaker& speaker, S
 
 asio::awaitable<void> StationConnection::run() {
   for (;;) {
-    while (!speaker_.may_dial()) co_await pause(kMayDialPeriod);
+    while (!speaker_.may_dial()) co_await pause(kAskAgain);
     const int times_forgotten = times_forgotten_;
     const bool reached = co_await reach();
     if (!reached) {
@@ -70,6 +70,8 @@ asio::awaitable<void> StationConnection::serve() {
   while (is_open_) {
     const auto [error] = co_await socket_.async_wait(tcp::socket::wait_read, kNoThrow);
     if (error) break;
+    while (is_open_ && !speaker_.is_listening()) co_await pause(kAskAgain);
+    if (!is_open_) break;
     const bool keep = take_bytes();
     if (!keep) break;
   }

@@ -40,6 +40,8 @@ class Speaker {
   virtual std::string refusal_detail() const = 0;
   // Whether to dial now; asked again every 10 ms.
   virtual bool may_dial() const { return true; }
+  // Whether to read now what has arrived; asked again every 10 ms.
+  virtual bool is_listening() const { return true; }
   // How long until a connection made is open; empty: it is not wanted any more.
   virtual std::optional<std::chrono::milliseconds> begin_handshake() { return std::chrono::milliseconds(0); }
 
