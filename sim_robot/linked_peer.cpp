@@ -39,12 +39,14 @@ void LinkedPeer::read() {
   connected_ = link_.is_open();
   if (hello && connected_ && !welcomed_) {
     welcomed_ = true;
+    heartbeat_at_us_ = link_.now_us();
     queue(welcome_frame());
   }
 }
 
 void LinkedPeer::speak() {
-  if (welcomed_ && attentive && link_.now_us() >= said_at_us_ + kHeartbeatUs) {
+  if (welcomed_ && attentive && link_.now_us() >= heartbeat_at_us_ + kHeartbeatUs) {
+    heartbeat_at_us_ = link_.now_us();
     queue(heartbeat_frame(rheonaut_StationHeartbeat_init_zero));
   }
   const std::size_t taken = link_.send({unsent_.data(), unsent_.size()});
@@ -67,7 +69,6 @@ void LinkedPeer::queue(const protocol::StationFrame& frame) {
   std::array<std::uint8_t, protocol::kMaxFramedBytes> bytes;
   const std::size_t size = protocol::write_frame(frame, bytes.data(), bytes.size());
   unsent_.insert(unsent_.end(), bytes.data(), bytes.data() + size);
-  said_at_us_ = link_.now_us();
 }
 
 }  // namespace sim_robot
