@@ -26,6 +26,9 @@ struct View {
   std::uint32_t flags = 0;
 };
 
+class SimulatedRobot;
+View true_view(const SimulatedRobot& robot);
+
 struct Moment {
   double time_s = 0;               // virtual, since the story began
   View heard;                      // the newest that has arrived at the station

@@ -72,7 +72,8 @@ protocol::Status Story::status() const {
 Moment Story::moment() const {
   const LinkedPeer& station = lab_->station;
   const std::uint64_t made = station.samples.empty() ? 0 : station.samples.rbegin()->first + 1;
-  return {lab_->time_s(), heard(), truth(), lab_->link.connections(), made - station.durable_next_seq()};
+  return {lab_->time_s(), heard(), true_view(lab_->robot.robot()), lab_->link.connections(),
+          made - station.durable_next_seq()};
 }
 
 // After a reboot the newest sample is that of the boot before, but for what Hello has said.
@@ -94,21 +95,6 @@ View Story::heard() const {
   view.sub_state = newest.sub_state;
   if (newest.setpoint_m) view.setpoint_m = static_cast<double>(*newest.setpoint_m);
   view.flags = newest.flags;
-  return view;
-}
-
-View Story::truth() const {
-  const World& world = lab_->robot.robot().world();
-  const robot_fw::Robot& core = lab_->core();
-  View view;
-  view.is_truth = true;
-  view.position_m = world.position_m();
-  view.velocity_m_s = world.velocity_m_s();
-  view.impedance_mv = world.impedance_mv();
-  view.duty = static_cast<double>(core.duty());
-  view.mode = core.mode();
-  view.emergency_id = core.emergency_id();
-  view.link = core.link_lost() ? LinkView::lost : core.link_up() ? LinkView::up : LinkView::none;
   return view;
 }
 

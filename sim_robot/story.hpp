@@ -58,7 +58,6 @@ class Story : public StoryWords {
   void inject(const Fault& fault);
   void hear_news();
   View heard() const;
-  View truth() const;
 
   std::unique_ptr<Lab> lab_;
   std::size_t events_heard_ = 0;  // of the station's
