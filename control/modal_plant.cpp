@@ -15,7 +15,7 @@ constexpr double kSettled = 1e-17;  // what is left of a mode after one step, wh
 
 }  // namespace
 
-ModalPlant::ModalPlant(const FractionalModel& model, double dt_s) : dt_s_(dt_s) {
+ModalPlant::Modes::Modes(const FractionalModel& of_model, double of_dt_s) : model(of_model), dt_s(of_dt_s) {
   if (!(dt_s > 0 && std::isfinite(dt_s))) {
     throw_invalid("modal plant: dt_s must be positive and finite, is ", dt_s);
   }
@@ -24,57 +24,73 @@ ModalPlant::ModalPlant(const FractionalModel& model, double dt_s) : dt_s_(dt_s) 
   for (std::size_t i = 0; i < form.rate.size(); ++i) {
     const Complex rate = form.rate[i], weight = 2.0 * form.weight[i];
     const double steady = -(weight / rate).real();
-    position_per_travel_ += steady;
+    position_per_travel += steady;
     const StepFactors factors = step_factors(rate, dt_s);
     if (std::abs(factors.decay) < kSettled) {
-      velocity_at_once_ += steady;
-      position_at_once_ -= (weight / rate / rate).real();
+      velocity_at_once += steady;
+      position_at_once -= (weight / rate / rate).real();
       continue;
     }
     const std::size_t lane = kept++ % kLanes;
-    if (lane == 0) blocks_.emplace_back(), slopes_.emplace_back();
-    Block& block = blocks_.back();
+    if (lane == 0) blocks.emplace_back(), slopes.emplace_back();
+    Block& block = blocks.back();
     const Complex input = weight * factors.integral, position = 1.0 / rate;
     block.decay_re[lane] = factors.decay.real(), block.decay_im[lane] = factors.decay.imag();
     block.input_re[lane] = input.real(), block.input_im[lane] = input.imag();
     block.position_re[lane] = position.real(), block.position_im[lane] = position.imag();
-    slopes_.back().rate_re[lane] = rate.real(), slopes_.back().rate_im[lane] = rate.imag();
-    slopes_.back().weight[lane] = weight.real();
+    slopes.back().rate_re[lane] = rate.real(), slopes.back().rate_im[lane] = rate.imag();
+    slopes.back().weight[lane] = weight.real();
   }
 }
 
+// Those of the plant before, as long as it or a copy of it lives and is of the same model.
+std::shared_ptr<const ModalPlant::Modes> ModalPlant::modes_of(const FractionalModel& model, double dt_s) {
+  thread_local std::weak_ptr<const Modes> latest;
+  auto modes = latest.lock();
+  if (!modes || modes->model != model || modes->dt_s != dt_s) {
+    modes = std::make_shared<const Modes>(model, dt_s);
+    latest = modes;
+  }
+  return modes;
+}
+
+ModalPlant::ModalPlant(const FractionalModel& model, double dt_s)
+    : modes_(modes_of(model, dt_s)), states_(modes_->blocks.size()) {}
+
 void ModalPlant::step(double duty) {
   Lanes velocity{}, position{};
-  for (Block& block : blocks_) {
+  const Block* block = modes_->blocks.data();
+  for (State& state : states_) {
     for (std::size_t i = 0; i < kLanes; ++i) {
-      const double re = block.state_re[i], im = block.state_im[i];
-      block.state_re[i] = block.decay_re[i] * re - block.decay_im[i] * im + block.input_re[i] * duty;  // (2)
-      block.state_im[i] = block.decay_re[i] * im + block.decay_im[i] * re + block.input_im[i] * duty;
-      velocity[i] += block.state_re[i];
-      position[i] += block.position_re[i] * block.state_re[i] - block.position_im[i] * block.state_im[i];
+      const double re = state.re[i], im = state.im[i];
+      state.re[i] = block->decay_re[i] * re - block->decay_im[i] * im + block->input_re[i] * duty;  // (2)
+      state.im[i] = block->decay_re[i] * im + block->decay_im[i] * re + block->input_im[i] * duty;
+      velocity[i] += state.re[i];
+      position[i] += block->position_re[i] * state.re[i] - block->position_im[i] * state.im[i];
     }
+    ++block;
   }
   duty_ = duty;
-  travel_s_ += duty * dt_s_;
-  velocity_m_s_ = std::accumulate(velocity.begin(), velocity.end(), velocity_at_once_ * duty);  // (1)
+  travel_s_ += duty * modes_->dt_s;
+  velocity_m_s_ = std::accumulate(velocity.begin(), velocity.end(), modes_->velocity_at_once * duty);  // (1)
   position_m_ = std::accumulate(position.begin(), position.end(),
-                                position_per_travel_ * travel_s_ + position_at_once_ * duty);  // (3)
+                                modes_->position_per_travel * travel_s_ + modes_->position_at_once * duty);  // (3)
 }
 
 double ModalPlant::acceleration_m_s2() const {
   double sum = 0;
-  for (std::size_t k = 0; k < blocks_.size(); ++k) {
-    const Block& block = blocks_[k];
-    const Slope& slope = slopes_[k];
+  for (std::size_t k = 0; k < states_.size(); ++k) {
+    const State& state = states_[k];
+    const Slope& slope = modes_->slopes[k];
     for (std::size_t i = 0; i < kLanes; ++i) {
-      sum += slope.rate_re[i] * block.state_re[i] - slope.rate_im[i] * block.state_im[i] + slope.weight[i] * duty_;
+      sum += slope.rate_re[i] * state.re[i] - slope.rate_im[i] * state.im[i] + slope.weight[i] * duty_;
     }
   }
   return sum;
 }
 
 void ModalPlant::reset() {
-  for (Block& block : blocks_) block.state_re = block.state_im = {};
+  for (State& state : states_) state = {};
   travel_s_ = duty_ = position_m_ = velocity_m_s_ = 0;
 }
 

@@ -25,6 +25,8 @@ struct FractionalModel {
   double b3 = 1.0;
   double alpha = 1.7263;
   double beta = 0.8682;
+
+  bool operator==(const FractionalModel&) const = default;
 };
 
 constexpr FractionalModel kNonNewtonianModel{};                                 // (29) of the paper

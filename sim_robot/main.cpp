@@ -1,4 +1,4 @@
-// The program rheonaut-sim: a simulated robot that dials a station, scenarios, the prediction of an experiment, the
+// The program rheonaut-sim: simulated robots that dial a station, scenarios, the prediction of an experiment, the
 // pump's profile, a bad network.
 #include <CLI/CLI.hpp>
 #include <iostream>
@@ -7,6 +7,7 @@
 #include "sim_robot/play_command.hpp"
 #include "sim_robot/predict_command.hpp"
 #include "sim_robot/proxy_command.hpp"
+#include "sim_robot/replay_command.hpp"
 #include "sim_robot/run_command.hpp"
 #include "sim_robot/scenarios_command.hpp"
 
@@ -18,11 +19,13 @@ constexpr const char* kExamples = R"(Examples:
   rheonaut-sim --station 127.0.0.1:7070 --scenario mine.toml --faults 127.0.0.1:7400 --duration-s 60
   curl -H 'Content-Type: application/json' -d '{"fault":"electrode_offset","offset_mv":40,"for_s":5}' \
        http://127.0.0.1:7400/faults
+  rheonaut-sim --station 127.0.0.1:7070 --robots 1000 --duration-s 60     a fleet, and what became of its samples
+  rheonaut-sim replay --station 127.0.0.1:7070 --robots 5000              the same with recorded telemetry
   rheonaut-sim scenarios                                       which there are
   rheonaut-sim scenarios --show figure_7 > mine.toml           one to begin with
   rheonaut-sim play figure_7 > figure_7.csv                    in virtual time, with its script
   rheonaut-sim predict --fluid water                           what the closed loop will do
-The keys of a scenario and the HTTP control: docs/scenarios.md)";
+The keys of a scenario and the HTTP control: docs/scenarios.md; fleets: docs/fleet.md)";
 
 }  // namespace
 
@@ -31,6 +34,7 @@ int main(int argc, char** argv) try {
   app.footer(kExamples);
   app.require_subcommand(0, 1);
   sim_robot::RunCommand run{app};
+  sim_robot::ReplayCommand replay{app};
   sim_robot::ScenariosCommand scenarios{app};
   sim_robot::PlayCommand play{app};
   sim_robot::PredictCommand predict{app};
@@ -38,6 +42,7 @@ int main(int argc, char** argv) try {
   sim_robot::ProxyCommand proxy{app};
   try {
     app.parse(argc, argv);
+    if (replay.chosen()) return replay.run();
     if (scenarios.chosen()) return scenarios.run();
     if (play.chosen()) return play.run();
     if (predict.chosen()) return predict.run();

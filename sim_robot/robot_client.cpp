@@ -1,64 +1,51 @@
-// Ticks, dials, reads and writes.
+// Ticks by the host's clock.
 #include "sim_robot/robot_client.hpp"
 
-#include <boost/asio/as_tuple.hpp>
-#include <boost/asio/buffer.hpp>
-#include <boost/asio/connect.hpp>
+#include <algorithm>
 #include <boost/asio/experimental/awaitable_operators.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <chrono>
-#include <stdexcept>
 #include <utility>
 
 namespace sim_robot {
-namespace {
 
 namespace asio = boost::asio;
-using asio::ip::tcp;
-using namespace asio::experimental::awaitable_operators;
+using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
 using namespace std::chrono_literals;
-
-constexpr auto kConnectTimeout = 1s;
-constexpr auto kTick = 10ms;
-constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
-constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
-
-asio::awaitable<void> pause(std::chrono::milliseconds duration) {
-  asio::steady_timer timer{co_await asio::this_coro::executor, duration};
-  co_await timer.async_wait(asio::use_awaitable);
-}
-
-}  // namespace
-
-StationAddress parse_station_address(const std::string& text, const std::string& option, int lowest_port) {
-  const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos || colon == 0 || colon + 1 == text.size()) {
-    throw std::invalid_argument(option + ": '" + text + "' is not ADDR:PORT");
-  }
-  std::string host = text.substr(0, colon);
-  if (host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
-  const std::string port = text.substr(colon + 1);
-  if (port.size() > 5 || port.find_first_not_of("0123456789") != std::string::npos || std::stoi(port) > 65535 ||
-      std::stoi(port) < lowest_port) {
-    throw std::invalid_argument(option + ": '" + port + "' is not a port");
-  }
-  return {host, port};
-}
 
 RobotClient::RobotClient(asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log,
                          std::chrono::milliseconds handshake, std::vector<TimedFault> faults)
     : life_(std::move(config)),
-      station_(std::move(station)),
-      log_(std::move(log)),
       handshake_(handshake),
-      faults_(std::move(faults), log_),
-      socket_(loop),
-      tick_timer_(loop),
-      booted_at_(Clock::now()) {}
+      faults_(std::move(faults), log),
+      booted_at_(Clock::now()),
+      connection_(loop, *this, std::move(station), life_.robot().config().robot_id, std::move(log)) {}
 
 asio::awaitable<void> RobotClient::run() {
-  booted_at_ = Clock::now();
-  co_await (tick() && stay_connected());
+  boot(Clock::now());
+  co_await (tick_for_ever() && stay_connected());
+}
+
+asio::awaitable<void> RobotClient::tick_for_ever() {
+  asio::steady_timer timer{co_await asio::this_coro::executor};
+  for (;;) {
+    timer.expires_at(next_tick_at());
+    co_await timer.async_wait(asio::use_awaitable);
+    tick();
+    send();
+  }
+}
+
+void RobotClient::tick() {
+  catch_up();
+  if (life_.is_on()) connection_.reset_forgotten();
+  watch_gaps();
+}
+
+void RobotClient::send() {
+  if (!connection_.is_open()) return;
+  connection_.flush();
+  if (life_.core().connection_is_silent(catch_up())) connection_.close_as_silent();
 }
 
 // Runs the ticks that are due and returns the robot's time, which lies before the next of them.
@@ -67,154 +54,88 @@ asio::awaitable<void> RobotClient::run() {
 std::uint64_t RobotClient::catch_up() {
   const auto since = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - booted_at_);
   faults_.advance(life_, static_cast<std::uint64_t>(since.count()));
+  follow_reboot();
   return life_.robot_clock_us();
-}
-
-asio::awaitable<void> RobotClient::tick() {
-  for (;;) {
-    tick_timer_.expires_at(booted_at_ + std::chrono::microseconds(life_.next_tick_us()));
-    co_await tick_timer_.async_wait(asio::use_awaitable);
-    catch_up();
-    if (forgotten_ && life_.is_on()) forget_connection();
-    flush();
-    close_if_silent();
-  }
-}
-
-// SAFETY: after a stall the silence may be the robot's own; a stop that came meanwhile is read before the verdict.
-void RobotClient::close_if_silent() {
-  if (!connected_ || !life_.core().connection_is_silent(catch_up())) return;
-  boost::system::error_code ignored;
-  if (socket_.available(ignored) > 0) return;
-  say("the station is silent");
-  close_connection();
-}
-
-asio::awaitable<void> RobotClient::stay_connected() {
-  for (;;) {
-    while (!may_dial()) co_await pause(kTick);
-    const int boot = life_.boots();
-    const bool dialled = co_await dial();
-    if (!dialled) {
-      say("cannot reach the station at " + station_.host + ":" + station_.port + ", trying again");
-    } else {
-      const bool ready = co_await shake_hands();
-      if (ready && boot == life_.boots()) {
-        co_await serve();
-        say_how_it_ended();
-      }
-    }
-    std::uniform_int_distribution<int> pause_ms{kMinPauseMs, kMaxPauseMs};
-    co_await pause(std::chrono::milliseconds(pause_ms(jitter_)));
-  }
-}
-
-// SAFETY: while a handshake blocks the loop nothing could stop a motor.
-bool RobotClient::may_dial() const { return !life_.is_blocked() && (handshake_ == 0ms || life_.core().at_rest()); }
-
-// False when the robot has begun to move meanwhile.
-asio::awaitable<bool> RobotClient::shake_hands() {
-  if (handshake_ == 0ms) co_return true;
-  catch_up();
-  if (!may_dial()) co_return false;
-  life_.block(std::chrono::duration<double>(handshake_).count());
-  co_await pause(handshake_);
-  co_return true;
 }
 
 void RobotClient::reboot(const Reboot& reboot) {
   catch_up();
   life_.reboot(reboot);
-  boost::system::error_code ignored;
-  socket_.cancel(ignored);
-  if (connected_) forgotten_.emplace(std::move(socket_));
-  connected_ = false;
+  follow_reboot();
 }
 
-void RobotClient::forget_connection() {
-  boost::system::error_code ignored;
-  forgotten_->set_option(asio::socket_base::linger{true, 0}, ignored);
-  forgotten_.reset();
+// The new boot knows nothing of the connection.
+void RobotClient::follow_reboot() {
+  if (life_.boots() == boots_) return;
+  boots_ = life_.boots();
+  connection_.forget();
+  if (life_.lost_at_reboot() > 0) ++gaps_;
+  lost_before_ = 0;
+  oldest_after_gap_ = UINT64_MAX;
 }
 
-asio::awaitable<bool> RobotClient::dial() {
-  socket_ = tcp::socket{socket_.get_executor()};
-  tcp::resolver resolver{socket_.get_executor()};
-  auto resolving = resolver.async_resolve(station_.host, station_.port, kNoThrow) || pause(kConnectTimeout);
-  auto resolved = co_await std::move(resolving);
-  if (resolved.index() == 1) co_return false;
-  const auto [resolve_error, endpoints] = std::get<0>(resolved);
-  if (resolve_error) co_return false;
-  auto connecting = asio::async_connect(socket_, endpoints, kNoThrow) || pause(kConnectTimeout);
-  auto outcome = co_await std::move(connecting);
-  if (outcome.index() == 1 || std::get<0>(std::get<0>(outcome))) co_return false;
-  boost::system::error_code error;
-  socket_.set_option(tcp::no_delay{true}, error);
-  socket_.non_blocking(true, error);
-  co_return !error;
+// SAFETY: while a handshake blocks the loop nothing could stop a motor.
+bool RobotClient::may_dial() const { return !life_.is_blocked() && (handshake_ == 0ms || life_.core().at_rest()); }
+
+// Empty when the robot has begun to move meanwhile.
+std::optional<std::chrono::milliseconds> RobotClient::begin_handshake() {
+  if (handshake_ == 0ms) return 0ms;
+  catch_up();
+  if (!may_dial()) return std::nullopt;
+  life_.block(std::chrono::duration<double>(handshake_).count());
+  return handshake_;
 }
 
-// Bytes go to the robot as they arrive, and what it answers leaves at once.
-asio::awaitable<void> RobotClient::serve() {
-  connected_ = true;
-  was_up_ = false;
-  frame_size_ = frame_sent_ = 0;
-  life_.robot().link_opened(catch_up());
-  flush();
-  std::array<std::uint8_t, 4096> bytes;
-  while (connected_) {
-    const auto [error, size] = co_await socket_.async_read_some(asio::buffer(bytes), kNoThrow);
-    if (error) break;
-    const bool keep = life_.robot().receive({bytes.data(), size}, catch_up());
-    flush();
-    if (!was_up_ && life_.core().link_up()) {
-      was_up_ = true;
-      say("connected to " + station_.host + ":" + station_.port + " as " + life_.robot().config().robot_id);
-    }
-    if (!keep) break;
-  }
-  close_connection();
+// Time passes in catch_up(), and with it the connection may be forgotten.
+void RobotClient::on_opened() {
+  const std::uint64_t now_us = catch_up();
+  if (connection_.is_open()) life_.robot().link_opened(now_us);
 }
 
-// Hands the socket what it takes without waiting, one write per frame.
-void RobotClient::flush() {
-  while (connected_) {
-    if (frame_sent_ == frame_size_) {
-      frame_size_ = life_.robot().transmit(frame_.data(), frame_.size(), catch_up());
-      frame_sent_ = 0;
-      if (frame_size_ == 0) return;
-    }
-    boost::system::error_code error;
-    frame_sent_ += socket_.write_some(asio::buffer(frame_.data() + frame_sent_, frame_size_ - frame_sent_), error);
-    if (error == asio::error::would_block) return;
-    if (error) return close_connection();
-  }
+bool RobotClient::on_bytes(protocol::Bytes bytes) {
+  const std::uint64_t now_us = catch_up();
+  return connection_.is_open() && life_.robot().receive(bytes, now_us);
 }
 
-// Also ends the read under way.
-void RobotClient::close_connection() {
-  if (!connected_) return;
-  connected_ = false;
-  life_.robot().link_closed(catch_up());
-  boost::system::error_code ignored;
-  socket_.close(ignored);
+// Counts the samples in the frame by how far it moves the outbox, which skips first what the ring no longer holds.
+std::size_t RobotClient::next_frame(std::uint8_t* out, std::size_t capacity) {
+  const std::uint64_t now_us = catch_up();
+  if (!connection_.is_open()) return 0;
+  const robot_fw::Outbox& outbox = life_.core().outbox();
+  const std::uint64_t oldest = life_.core().samples().oldest_seq();
+  const std::uint64_t live = std::max(outbox.live_seq(), oldest);
+  const std::uint64_t backfill = std::max(outbox.backfill().next_seq, oldest);
+  const std::size_t size = life_.robot().transmit(out, capacity, now_us);
+  const std::uint64_t again = std::max(outbox.backfill().next_seq, backfill) - backfill;
+  resent_ += again;
+  sent_ += again + std::max(outbox.live_seq(), live) - live;
+  return size;
 }
 
-void RobotClient::say_how_it_ended() {
-  const robot_fw::Robot& core = life_.core();
-  if (core.refusal() != rheonaut_REFUSAL_REASON_NONE) {
-    const std::string detail = core.refusal_detail();
-    say("refused by the station: " + std::string(protocol::text(core.refusal())) +
-        (detail.empty() ? "" : " (" + detail + ")"));
-  } else {
-    say(was_up_ ? "connection lost, dialling again" : "the station closed the connection before its welcome");
-  }
+// A gap grows as long as nothing is acknowledged: then only losses move the oldest sample.
+void RobotClient::watch_gaps() {
+  const robot_fw::TelemetryRing& ring = life_.core().samples();
+  if (ring.lost() == lost_before_) return;
+  const std::uint64_t lost_now = ring.lost() - lost_before_;
+  if (ring.oldest_seq() - lost_now != oldest_after_gap_) ++gaps_;
+  oldest_after_gap_ = ring.oldest_seq();
+  lost_before_ = ring.lost();
 }
 
-// Says each thing once, however often it happens in a row.
-void RobotClient::say(const std::string& line) {
-  if (line != last_line_) log_(line);
-  last_line_ = line;
+SampleCounts RobotClient::samples() const {
+  const robot_fw::TelemetryRing& ring = life_.core().samples();
+  const EarlierBoots& earlier = life_.earlier_boots();
+  SampleCounts counts;
+  counts.made = earlier.samples_made + ring.next_seq();
+  counts.held = ring.fill();
+  counts.lost = earlier.samples_lost + ring.lost();
+  counts.acknowledged = counts.made - counts.held - counts.lost;
+  counts.gaps = gaps_;
+  counts.sent = sent_;
+  counts.resent = resent_;
+  counts.commands = earlier.commands + life_.core().commands_received();
+  counts.missed_ticks = robot().missed_ticks();
+  return counts;
 }
 
 }  // namespace sim_robot

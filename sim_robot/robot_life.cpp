@@ -49,11 +49,20 @@ void RobotLife::reboot(const Reboot& reboot) {
   next.restored_emergency_id = reboot.keeps_latch ? core().emergency_id() : 0;
   next.restored_emergency_cause = reboot.keeps_latch ? core().emergency_cause() : rheonaut_EMERGENCY_CAUSE_NONE;
   if (!reboot.keeps_storage) storage_.erase();
+  close_the_books();
   robot_.reset(next);
   ++boots_;
   coasted_to_us_ = true_us_;
   on_at_us_ = true_base_us_ = true_us_ + microseconds(reboot.off_for_s);
   clock_base_us_ = 0;
+}
+
+void RobotLife::close_the_books() {
+  const robot_fw::TelemetryRing& ring = core().samples();
+  lost_at_reboot_ = ring.fill();
+  earlier_.samples_made += ring.next_seq();
+  earlier_.samples_lost += ring.lost() + ring.fill();
+  earlier_.commands += core().commands_received();
 }
 
 void RobotLife::block(double for_s) { free_at_us_ = std::max(free_at_us_, true_us_ + microseconds(for_s)); }

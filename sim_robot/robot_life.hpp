@@ -23,6 +23,11 @@ struct Reboot {
   bool keeps_storage = true;  // the flash is not erased
 };
 
+// What became of the boots before this one: a ring that a reset found full of samples is lost with them.
+struct EarlierBoots {
+  std::uint64_t samples_made = 0, samples_lost = 0, commands = 0;
+};
+
 class RobotLife {
  public:
   explicit RobotLife(SimulatedRobotConfig config);
@@ -43,6 +48,8 @@ class RobotLife {
   bool is_on() const { return true_us_ >= on_at_us_; }
   bool is_blocked() const { return !is_on() || true_us_ < free_at_us_; }
   int boots() const { return boots_; }
+  const EarlierBoots& earlier_boots() const { return earlier_; }
+  std::uint64_t lost_at_reboot() const { return lost_at_reboot_; }  // samples, at the last one
   std::uint64_t true_us() const { return true_us_; }
   std::uint64_t robot_clock_us() const;  // never before the last tick
   SimulatedRobot& robot() { return robot_; }
@@ -61,6 +68,7 @@ class RobotLife {
     std::map<robot_fw::StorageKey, std::vector<std::uint8_t>> values_;
   };
 
+  void close_the_books();
   SimulatedRobotConfig with_storage(SimulatedRobotConfig config);
   void keep_clock();
   double clock_us() const;
@@ -71,6 +79,8 @@ class RobotLife {
   std::uint64_t on_at_us_ = 0, free_at_us_ = 0;
   std::uint64_t coasted_to_us_ = 0;  // while off
   int boots_ = 1;
+  EarlierBoots earlier_;
+  std::uint64_t lost_at_reboot_ = 0;
   double clock_rate_ = 1;           // of the robot's clock
   double clock_base_us_ = 0;        // what it showed
   std::uint64_t true_base_us_ = 0;  // then

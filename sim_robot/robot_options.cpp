@@ -32,6 +32,7 @@ void add_robot(CLI::App& app, RobotOptions& options) {
   add_surroundings(app, options.world);
   app.add_option("--id", options.id, "name of the robot, 1 to 31 of [a-z0-9_-]")->default_str("sim-1");
   app.add_option("--boot-id", options.boot_id, "fixed boot id in hexadecimal instead of a random one");
+  app.add_option("--samples-per-frame", options.samples_per_frame, "of telemetry, 1 to 25")->default_str("5");
   app.add_option("--duration-s", options.duration_s, "end by itself after so long; 0: never")
       ->check(CLI::Range(0.0, 1e9))
       ->type_name("S");
@@ -46,6 +47,7 @@ Scenario scenario_of(const RobotOptions& options) {
   if (options.duty_min) robot.duty.min = *options.duty_min;
   if (options.duty_max) robot.duty.max = *options.duty_max;
   if (options.id) robot.robot_id = *options.id;
+  if (options.samples_per_frame) robot.samples_per_frame = *options.samples_per_frame;
   if (options.token) robot.token = *options.token;
   if (options.duration_s) scenario.duration_s = *options.duration_s;
   robot.boot_id = options.boot_id ? parse_boot_id(*options.boot_id) : random_boot_id();

@@ -14,6 +14,7 @@ struct RobotOptions {
   WorldOptions world;
   std::optional<float> duty_min, duty_max;
   std::optional<std::string> id, token, boot_id;
+  std::optional<std::uint32_t> samples_per_frame;
   std::optional<double> duration_s;
 };
 

@@ -10,6 +10,7 @@
 
 #include "control/invalid_argument.hpp"
 #include "sim_robot/fault_server.hpp"
+#include "sim_robot/fleet_run.hpp"
 #include "sim_robot/robot_client.hpp"
 
 namespace sim_robot {
@@ -48,12 +49,34 @@ RunCommand::RunCommand(CLI::App& app) {
       ->type_name("ADDR:PORT");
   app.add_flag("--faults-anywhere", faults_anywhere_, "allow an address beyond this machine; there is no password");
   add_robot(app, robot_);
+  auto* robots = app.add_option("--robots", robots_, "a fleet of so many in this process, ID-1 to ID-N, with a summary")
+                     ->check(CLI::Range(1, kMostRobots))
+                     ->excludes("--faults")
+                     ->excludes("--boot-id");
+  app.add_flag("--json", json_, "a fleet's rates and summary as JSON lines")->needs(robots);
 }
 
 int RunCommand::run() const {
   if (station_.empty()) throw CLI::RequiredError("--station");
   const Scenario scenario = scenario_of(robot_);
   const StationAddress station = parse_station_address(station_);
+  return robots_ > 0 ? run_many(scenario, station) : run_one(scenario, station);
+}
+
+int RunCommand::run_many(const Scenario& scenario, const StationAddress& station) const {
+  if (!json_) announce(scenario);
+  FleetOptions fleet;
+  fleet.station = station;
+  fleet.robots = robots_;
+  if (robot_.id) fleet.id_prefix = *robot_.id;
+  fleet.duration_s = scenario.duration_s;
+  fleet.json = json_;
+  fleet.handshake = std::chrono::milliseconds(handshake_ms_);
+  fleet.faults = scenario.faults;
+  return run_fleet(fleet, scenario.robot, std::cout);
+}
+
+int RunCommand::run_one(const Scenario& scenario, const StationAddress& station) const {
   asio::io_context loop{1};
   RobotClient client{loop, scenario.robot, station, say, std::chrono::milliseconds(handshake_ms_), scenario.faults};
   std::optional<FaultServer> server;

@@ -1,9 +1,10 @@
-// `rheonaut-sim --station …`: one robot in real time, with or without a scenario.
+// `rheonaut-sim --station …`: one robot or a fleet in real time, with or without a scenario.
 #pragma once
 
 #include <string>
 
 #include "sim_robot/robot_options.hpp"
+#include "sim_robot/station_connection.hpp"
 
 namespace sim_robot {
 
@@ -16,10 +17,15 @@ class RunCommand {
   int run() const;
 
  private:
+  int run_one(const Scenario& scenario, const StationAddress& station) const;
+  int run_many(const Scenario& scenario, const StationAddress& station) const;
+
   RobotOptions robot_;
   int handshake_ms_ = 0;
   std::string station_, faults_at_;
   bool faults_anywhere_ = false;
+  int robots_ = 0;  // 0: one, without a fleet's summary
+  bool json_ = false;
 };
 
 }  // namespace sim_robot

@@ -23,6 +23,7 @@ robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
   core.reset_cause = config.reset_cause;
   core.duty_min = config.duty.min;
   core.duty_max = config.duty.max;
+  core.samples_per_frame = config.samples_per_frame;
   core.sample_period_us = SimulatedRobot::kPeriodUs;
   core.storage = config.storage;
   core.restored_emergency_id = config.restored_emergency_id;
@@ -63,6 +64,9 @@ void check(const SimulatedRobotConfig& config) {
   if (!(min >= -1 && min <= 0 && max > 0 && max <= 1)) {
     throw std::invalid_argument("duty range [" + std::to_string(min) + ", " + std::to_string(max) +
                                 "] is not within [-1, 0] and (0, 1]");
+  }
+  if (config.samples_per_frame < 1 || config.samples_per_frame > protocol::kMaxSamplesPerFrame) {
+    throw std::invalid_argument(std::to_string(config.samples_per_frame) + " samples a frame is not within 1 and 25");
   }
   check(config.world);
 }

@@ -17,6 +17,7 @@ struct SimulatedRobotConfig {
   std::uint64_t boot_id = 1;  // random in earnest, see random_boot_id()
   protocol::ResetCause reset_cause = rheonaut_RESET_CAUSE_POWER_ON;
   robot_fw::DutyRange duty{-1, 1};
+  std::uint32_t samples_per_frame = 5;  // 1 to 25; the station may ask for another
   WorldConfig world;
   robot_fw::Storage* storage = nullptr;     // of parameters and controller; null: they end with the robot
   std::uint64_t restored_emergency_id = 0;  // a latch that outlived the reset; 0: none
@@ -69,6 +70,7 @@ class SimulatedRobot {
   World& world() { return world_; }  // for faults, flow and glucose while it runs
   const SimulatedRobotConfig& config() const { return config_; }
   std::uint64_t robot_time_us() const { return robot_time_us_; }
+  std::uint32_t missed_ticks() const { return missed_ticks_; }
 
  private:
   SimulatedRobotConfig config_;

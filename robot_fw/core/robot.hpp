@@ -71,6 +71,10 @@ class Robot {
   // Why the station refused the last connection; the detail is for people.
   protocol::RefusalReason refusal() const { return refusal_; }
   const char* refusal_detail() const { return refusal_detail_.data(); }
+  // For who counts what became of the samples; commands include those that were refused.
+  const TelemetryRing& samples() const { return samples_; }
+  const Outbox& outbox() const { return outbox_; }
+  std::uint32_t commands_received() const { return commands_received_; }
   // CRC-32 over every float that a tick works with: equal on two machines that compute alike.
   std::uint32_t float_state_checksum() const;
 
@@ -169,6 +173,7 @@ class Robot {
   Link link_;
   Outbox outbox_;
   std::uint32_t bad_frames_ = 0;
+  std::uint32_t commands_received_ = 0;
   std::uint32_t worst_tick_us_ = 0;  // since the last status
   protocol::RefusalReason refusal_ = rheonaut_REFUSAL_REASON_NONE;
   std::array<char, 64> refusal_detail_{};

@@ -60,6 +60,7 @@ bool Robot::on_frame(protocol::Bytes payload) {
     return false;
   }
   if (link_.up()) station_heard();
+  if (frame->which_body == rheonaut_StationFrame_command_tag) ++commands_received_;
   if (frame->which_body == rheonaut_StationFrame_command_tag &&
       frame->body.command.which_action == rheonaut_Command_emergency_stop_tag) {
     on_emergency_stop(frame->body.command);  // SAFETY: a stop is obeyed before any Welcome

@@ -158,5 +158,19 @@ TEST_F(RobotFaults, AClockThatJumpsBackStopsTheRobotOnce) {
   expect_whole();
 }
 
+TEST(RobotLife, TheBooksOfABootAreClosedWhenItEnds) {
+  RobotLife life{{}};
+  life.advance_to(1'000'000);
+  const std::uint64_t made = life.core().samples().next_seq();
+  life.reboot({});
+  EXPECT_EQ(life.lost_at_reboot(), made);
+  life.advance_to(2'000'000);
+  const std::uint64_t made_then = life.core().samples().next_seq();
+  EXPECT_GT(made_then, 0u);
+  life.reboot({});
+  EXPECT_EQ(life.earlier_boots().samples_made, made + made_then);
+  EXPECT_EQ(life.earlier_boots().samples_lost, made + made_then) << "nobody acknowledged one";
+}
+
 }  // namespace
 }  // namespace sim_robot

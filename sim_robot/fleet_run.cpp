@@ -1,0 +1,160 @@
+// Makes the robots, watches them, and reports.
+#include "sim_robot/fleet_run.hpp"
+
+#include <sys/resource.h>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <csignal>
+#include <ostream>
+#include <stdexcept>
+
+#include "sim_robot/fleet.hpp"
+#include "sim_robot/fleet_report.hpp"
+#include "sim_robot/replayed_robot.hpp"
+#include "sim_robot/robot_client.hpp"
+
+namespace sim_robot {
+namespace {
+
+namespace asio = boost::asio;
+using Clock = FleetMember::Clock;
+
+constexpr rlim_t kOtherFiles = 32;
+
+// Each robot needs a socket; the soft limit is 1024 on many machines.
+void allow_sockets(int robots) {
+  rlimit limit{};
+  getrlimit(RLIMIT_NOFILE, &limit);
+  const rlim_t wanted = static_cast<rlim_t>(robots) + kOtherFiles;
+  if (limit.rlim_cur >= wanted) return;
+  if (limit.rlim_max < wanted) {
+    throw std::invalid_argument("--robots: " + std::to_string(robots) + " robots need " + std::to_string(wanted) +
+                                " open files, this process may have " + std::to_string(limit.rlim_max) +
+                                "; raise it with ulimit -Hn");
+  }
+  limit.rlim_cur = wanted;
+  setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+// Says what keeps robots out, each thing once.
+class LinkNews {
+ public:
+  LinkNews(const FleetOptions& options, std::ostream& out) : options_(options), out_(out) {}
+
+  void tell(const FleetCounts& counts) {
+    if (options_.json) return;  // the counts are in every line
+    const bool is_away = counts.connected == 0 && counts.links.unreachable > before_.links.unreachable;
+    if (is_away && !was_away_) {
+      out_ << "rheonaut-sim: cannot reach the station at " << options_.station.host << ':' << options_.station.port
+           << ", trying again" << std::endl;
+    }
+    if (counts.links.refusals > 0 && before_.links.refusals == 0) {
+      out_ << "rheonaut-sim: the station refuses robots; `--robots 1` says why" << std::endl;
+    }
+    if (is_away || counts.connected > 0) was_away_ = is_away;
+    before_ = counts;
+  }
+
+ private:
+  const FleetOptions& options_;
+  std::ostream& out_;
+  FleetCounts before_;
+  bool was_away_ = false;
+};
+
+// The fleet since it began.
+struct Watch {
+  const FleetOptions& options;
+  const Fleet& fleet;
+  std::ostream& out;
+  Clock::time_point start = Clock::now();
+  double cpu_at_start_s = process_cpu_s();
+
+  FleetSnapshot now() const {
+    const double time_s = std::chrono::duration<double>(Clock::now() - start).count();
+    return {time_s, process_cpu_s() - cpu_at_start_s, fleet.counts()};
+  }
+};
+
+asio::awaitable<void> report_rates(const Watch& watch) {
+  asio::steady_timer timer{co_await asio::this_coro::executor};
+  LinkNews news{watch.options, watch.out};
+  FleetSnapshot before;
+  for (int second = 1;; ++second) {
+    timer.expires_at(watch.start + std::chrono::seconds(second));
+    co_await timer.async_wait(asio::use_awaitable);
+    const FleetSnapshot now = watch.now();
+    news.tell(now.counts);
+    watch.out << (watch.options.json ? rates_json : rates_text)(before, now, watch.fleet.lateness()) << std::endl;
+    before = now;
+  }
+}
+
+int report_end(const Watch& watch) {
+  const FleetSnapshot end = watch.now();
+  const auto fault = fleet_fault(end.counts);
+  const std::string reason = fault ? fault->reason : "";
+  watch.out << (watch.options.json ? summary_json : summary_text)(end, watch.fleet.lateness(), reason) << std::flush;
+  return fault ? fault->exit_status : EXIT_SUCCESS;
+}
+
+int run(const FleetOptions& options, asio::io_context& loop, Fleet& fleet, std::ostream& out) {
+  const Watch watch{options, fleet, out};
+  asio::signal_set stop{loop, SIGINT, SIGTERM};
+  stop.async_wait([&loop](const boost::system::error_code&, int) { loop.stop(); });
+  asio::steady_timer end{loop};
+  if (options.duration_s > 0) {
+    end.expires_after(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.duration_s)));
+    end.async_wait([&loop](const boost::system::error_code&) { loop.stop(); });
+  }
+  const auto rethrow = [](const std::exception_ptr& error) {
+    if (error) std::rethrow_exception(error);
+  };
+  asio::co_spawn(loop, fleet.run(), rethrow);
+  asio::co_spawn(loop, report_rates(watch), rethrow);
+  loop.run();
+  return report_end(watch);
+}
+
+std::string id_of(const FleetOptions& options, int number) { return options.id_prefix + '-' + std::to_string(number); }
+
+}  // namespace
+
+int run_fleet(const FleetOptions& options, const SimulatedRobotConfig& kind, std::ostream& out) {
+  allow_sockets(options.robots);
+  asio::io_context loop{1};
+  Fleet::Members robots;
+  for (int i = 0; i < options.robots; ++i) {
+    SimulatedRobotConfig config = kind;
+    config.robot_id = id_of(options, i + 1);
+    config.boot_id = random_boot_id();
+    config.world.seed += static_cast<std::uint64_t>(i);
+    check(config);
+    robots.push_back(std::make_unique<RobotClient>(loop, std::move(config), options.station, LinkLog{},
+                                                   options.handshake, options.faults));
+  }
+  Fleet fleet{loop, std::move(robots), std::chrono::microseconds(SimulatedRobot::kPeriodUs)};
+  return run(options, loop, fleet, out);
+}
+
+int run_replay(const FleetOptions& options, const std::string& token, const Recording& recording, double rate,
+               std::ostream& out) {
+  allow_sockets(options.robots);
+  asio::io_context loop{1};
+  Fleet::Members robots;
+  ReplayConfig config;
+  config.token = token;
+  config.period_us = replay_period_us(recording, rate);
+  for (int i = 0; i < options.robots; ++i) {
+    config.robot_id = id_of(options, i + 1);
+    config.boot_id = random_boot_id();
+    robots.push_back(std::make_unique<ReplayedRobot>(loop, config, recording, options.station, LinkLog{}));
+  }
+  Fleet fleet{loop, std::move(robots), ReplayedRobot::turn_period(recording, config.period_us)};
+  return run(options, loop, fleet, out);
+}
+
+}  // namespace sim_robot

@@ -1,0 +1,175 @@
+// Dials, reads and writes.
+#include "sim_robot/station_connection.hpp"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <chrono>
+#include <utility>
+
+namespace sim_robot {
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using namespace std::chrono_literals;
+
+constexpr auto kConnectTimeout = 1s;
+constexpr auto kMayDialPeriod = 10ms;
+constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
+constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
+
+}  // namespace
+
+StationConnection::StationConnection(asio::io_context& loop, Speaker& speaker, StationAddress station, std::string name,
+                                     LinkLog log)
+    : speaker_(speaker), station_(std::move(station)), name_(std::move(name)), log_(std::move(log)), socket_(loop) {}
+
+asio::awaitable<void> StationConnection::run() {
+  for (;;) {
+    while (!speaker_.may_dial()) co_await pause(kMayDialPeriod);
+    const int times_forgotten = times_forgotten_;
+    const bool reached = co_await reach();
+    if (!reached) {
+      ++counts_.unreachable;
+      say("cannot reach the station at " + station_.host + ":" + station_.port + ", trying again");
+    } else {
+      const bool ready = co_await shake_hands();
+      if (ready && times_forgotten == times_forgotten_) {
+        co_await serve();
+        say_how_it_ended();
+      }
+    }
+    std::uniform_int_distribution<int> pause_ms{kMinPauseMs, kMaxPauseMs};
+    co_await pause(std::chrono::milliseconds(pause_ms(jitter_)));
+  }
+}
+
+asio::awaitable<bool> StationConnection::reach() {
+  socket_ = tcp::socket{socket_.get_executor()};
+  const bool reached = co_await dial(socket_, station_, kConnectTimeout);
+  boost::system::error_code error;
+  if (reached) socket_.non_blocking(true, error);
+  co_return reached && !error;
+}
+
+asio::awaitable<bool> StationConnection::shake_hands() {
+  const auto handshake = speaker_.begin_handshake();
+  if (handshake && *handshake > 0ms) co_await pause(*handshake);
+  co_return handshake.has_value();
+}
+
+// Bytes go to the speaker as they arrive, and what it answers leaves at once.
+asio::awaitable<void> StationConnection::serve() {
+  is_open_ = true;
+  was_welcome_ = false;
+  unsent_.clear();
+  speaker_.on_opened();
+  if (is_open_) flush();
+  while (is_open_) {
+    const auto [error] = co_await socket_.async_wait(tcp::socket::wait_read, kNoThrow);
+    if (error) break;
+    const bool keep = take_bytes();
+    if (!keep) break;
+  }
+  close();
+}
+
+// The wait came before, so that nothing lies in the buffer but what is handed on at once: all connections share it.
+bool StationConnection::take_bytes() {
+  thread_local std::array<std::uint8_t, 4096> bytes;
+  boost::system::error_code error;
+  const std::size_t size = socket_.read_some(asio::buffer(bytes), error);
+  if (error == asio::error::would_block) return true;
+  if (error) return false;
+  const bool keep = speaker_.on_bytes({bytes.data(), size});
+  flush();
+  notice_welcome();
+  return keep;
+}
+
+void StationConnection::notice_welcome() {
+  if (was_welcome_ || !speaker_.is_welcome()) return;
+  was_welcome_ = true;
+  ++counts_.welcomes;
+  say("connected to " + station_.host + ":" + station_.port + " as " + name_);
+}
+
+void StationConnection::flush() {
+  if (is_open_ && !unsent_.empty()) {
+    const auto rest = std::exchange(unsent_, {});
+    if (!write({rest.data(), rest.size()})) return;
+  }
+  std::array<std::uint8_t, protocol::kMaxFramedBytes> frame;
+  while (is_open_) {
+    const std::size_t size = speaker_.next_frame(frame.data(), frame.size());
+    if (size == 0) return;
+    ++counts_.frames;
+    if (!write({frame.data(), size})) return;
+  }
+}
+
+// True when all of it was taken; keeps the rest otherwise.
+bool StationConnection::write(protocol::Bytes bytes) {
+  boost::system::error_code error;
+  bytes.drop(socket_.write_some(asio::buffer(bytes.first, bytes.size), error));
+  if (error && error != asio::error::would_block) {
+    close();
+    return false;
+  }
+  unsent_.assign(bytes.begin(), bytes.end());
+  return bytes.empty();
+}
+
+// SAFETY: the silence may be the robot's own, after a stall; a stop that came meanwhile is read before the verdict.
+void StationConnection::close_as_silent() {
+  boost::system::error_code ignored;
+  if (!is_open_ || socket_.available(ignored) > 0) return;
+  say("the station is silent");
+  close();
+}
+
+// Also ends the read under way, as close() does.
+void StationConnection::forget() {
+  ++times_forgotten_;
+  boost::system::error_code ignored;
+  socket_.cancel(ignored);
+  if (is_open_) forgotten_.emplace(std::move(socket_));
+  is_open_ = false;
+}
+
+void StationConnection::reset_forgotten() {
+  if (!forgotten_) return;
+  boost::system::error_code ignored;
+  forgotten_->set_option(asio::socket_base::linger{true, 0}, ignored);
+  forgotten_.reset();
+}
+
+void StationConnection::close() {
+  if (!is_open_) return;
+  is_open_ = false;
+  speaker_.on_closed();
+  boost::system::error_code ignored;
+  socket_.close(ignored);
+}
+
+void StationConnection::say_how_it_ended() {
+  if (speaker_.refusal() != rheonaut_REFUSAL_REASON_NONE) {
+    ++counts_.refusals;
+    const std::string detail = speaker_.refusal_detail();
+    say("refused by the station: " + std::string(protocol::text(speaker_.refusal())) +
+        (detail.empty() ? "" : " (" + detail + ")"));
+  } else {
+    say(was_welcome_ ? "connection lost, dialling again" : "the station closed the connection before its welcome");
+  }
+}
+
+// Says each thing once, however often it happens in a row.
+void StationConnection::say(const std::string& line) {
+  if (!log_) return;
+  if (line != last_line_) log_(line);
+  last_line_ = line;
+}
+
+}  // namespace sim_robot
