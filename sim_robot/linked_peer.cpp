@@ -43,12 +43,14 @@ void LinkedPeer::read() {
   connected_ = link_.is_open();
   if (hello && connected_ && !welcomed_) {
     welcomed_ = true;
+    heartbeat_at_us_ = link_.now_us();
     say(welcome_frame());
   }
 }
 
 void LinkedPeer::speak() {
-  if (welcomed_ && attentive && link_.now_us() >= said_at_us_ + kHeartbeatUs) {
+  if (welcomed_ && attentive && link_.now_us() >= heartbeat_at_us_ + kHeartbeatUs) {
+    heartbeat_at_us_ = link_.now_us();
     say(heartbeat_frame(rheonaut_StationHeartbeat_init_zero));
   }
   flush();
@@ -70,7 +72,6 @@ void LinkedPeer::say(const protocol::StationFrame& frame) {
   std::array<std::uint8_t, protocol::kMaxFramedBytes> bytes;
   const std::size_t size = protocol::write_frame(frame, bytes.data(), bytes.size());
   unsent_.insert(unsent_.end(), bytes.data(), bytes.data() + size);
-  said_at_us_ = link_.now_us();
   flush();
 }
 

@@ -43,7 +43,7 @@ class LinkedPeer : public HeardRobot {
   int connections_ = 0;
   bool connected_ = false, welcomed_ = false;
   std::optional<std::uint64_t> heard_at_us_;
-  std::uint64_t said_at_us_ = 0;
+  std::uint64_t heartbeat_at_us_ = 0;  // they acknowledge samples, so commands take none's place
   std::vector<std::uint8_t> unsent_;
 };
 

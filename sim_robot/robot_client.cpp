@@ -136,7 +136,7 @@ SampleCounts RobotClient::samples() const {
   counts.sent = sent_;
   counts.resent = resent_;
   counts.commands = earlier.commands + life_.core().commands_received();
-  counts.missed_ticks = robot().missed_ticks();
+  counts.missed_ticks = earlier.missed_ticks + robot().missed_ticks();
   return counts;
 }
 

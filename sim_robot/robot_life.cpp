@@ -75,6 +75,7 @@ void RobotLife::close_the_books() {
   earlier_.samples_made += ring.next_seq();
   earlier_.samples_lost += ring.lost() + ring.fill();
   earlier_.commands += core().commands_received();
+  earlier_.missed_ticks += robot_.missed_ticks();
 }
 
 void RobotLife::block(double for_s) { free_at_us_ = std::max(free_at_us_, end_us(true_us_, for_s)); }

@@ -25,7 +25,7 @@ struct Reboot {
 
 // What became of the boots before this one: a ring that a reset found full of samples is lost with them.
 struct EarlierBoots {
-  std::uint64_t samples_made = 0, samples_lost = 0, commands = 0;
+  std::uint64_t samples_made = 0, samples_lost = 0, commands = 0, missed_ticks = 0;
 };
 
 class RobotLife {

@@ -2,6 +2,7 @@
 #include "sim_robot/robot_options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 
 #include "control/invalid_argument.hpp"
 
@@ -54,6 +55,8 @@ Scenario scenario_of(const RobotOptions& options) {
   if (options.clock_drift_ppm) robot.clock_drift_ppm = *options.clock_drift_ppm;
   if (options.token) robot.token = *options.token;
   if (options.duration_s) scenario.duration_s = *options.duration_s;
+  if (!std::isfinite(scenario.duration_s))
+    control::throw_invalid("--duration-s: ", scenario.duration_s, " is not a time");
   robot.boot_id = options.boot_id ? parse_boot_id(*options.boot_id) : random_boot_id();
   check(robot);
   check_faults(scenario);

@@ -20,7 +20,12 @@ namespace {
 
 namespace asio = boost::asio;
 
+constexpr int kNeverIn = 2;  // exit status, as of a fleet
+
 void say(const std::string& line) { std::cout << "rheonaut-sim: " << line << std::endl; }
+
+// What goes with a fleet's JSON.
+void say_aside(const std::string& line) { std::cerr << "rheonaut-sim: " << line << std::endl; }
 
 void spawn(asio::io_context& loop, asio::awaitable<void> task) {
   asio::co_spawn(loop, std::move(task), [](const std::exception_ptr& error) {
@@ -28,13 +33,13 @@ void spawn(asio::io_context& loop, asio::awaitable<void> task) {
   });
 }
 
-void announce(const Scenario& scenario, bool has_network) {
-  if (!scenario.name.empty()) say("scenario " + scenario.name + ": " + scenario.description);
-  if (!scenario.script.empty()) say("its script is for `rheonaut-sim play`; here the station gives the commands");
-  if (scenario.duration_s > 0) say(control::join_text("ends by itself after ", scenario.duration_s, " s"));
+void announce(const Scenario& scenario, bool has_network, const LinkLog& tell) {
+  if (!scenario.name.empty()) tell("scenario " + scenario.name + ": " + scenario.description);
+  if (!scenario.script.empty()) tell("its script is for `rheonaut-sim play`; here the station gives the commands");
+  if (scenario.duration_s > 0) tell(control::join_text("ends by itself after ", scenario.duration_s, " s"));
   for (const TimedFault& timed : scenario.faults) {
     const std::string reason = why_not(timed.fault.kind, has_network);
-    if (!reason.empty()) say(control::join_text("at ", timed.at_s, " s will be passed over: ", reason));
+    if (!reason.empty()) tell(control::join_text("at ", timed.at_s, " s will be passed over: ", reason));
   }
 }
 
@@ -98,7 +103,7 @@ int RunCommand::run() const {
 }
 
 int RunCommand::run_many(const Scenario& scenario, const StationAddress& station) const {
-  if (!json_) announce(scenario, false);
+  announce(scenario, false, json_ ? say_aside : say);
   FleetOptions fleet;
   fleet.station = station;
   fleet.robots = robots_;
@@ -128,13 +133,15 @@ int RunCommand::run_one(const Scenario& scenario, const StationAddress& station)
     say(control::join_text("faults at http://", server->address(), "/faults"));
     spawn(loop, server->run());
   }
-  announce(scenario, network.has_value());
+  announce(scenario, network.has_value(), say);
   spawn(loop, client.run());
   asio::signal_set stop{loop, SIGINT, SIGTERM};
   asio::steady_timer end{loop};
   stop_at_end(loop, stop, end, scenario.duration_s);
   loop.run();
-  return EXIT_SUCCESS;
+  if (client.connection().counts().welcomes > 0) return EXIT_SUCCESS;
+  say("no station has taken it in");
+  return kNeverIn;
 }
 
 }  // namespace sim_robot

@@ -1,6 +1,7 @@
 // Dials, reads and writes.
 #include "sim_robot/station_connection.hpp"
 
+#include <algorithm>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -18,6 +19,7 @@ using namespace std::chrono_literals;
 constexpr auto kConnectTimeout = 1s;
 constexpr auto kAskAgain = 10ms;
 constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
+constexpr int kMostPauses = 4;                       // taken together, for a station that is not there
 constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
 }  // namespace
@@ -27,10 +29,11 @@ StationConnection::StationConnection(asio::io_context& loop, Speaker& speaker, S
     : speaker_(speaker), station_(std::move(station)), name_(std::move(name)), log_(std::move(log)), socket_(loop) {}
 
 asio::awaitable<void> StationConnection::run() {
-  for (;;) {
+  for (int failures = 0;;) {
     while (!speaker_.may_dial()) co_await pause(kAskAgain);
     const int times_forgotten = times_forgotten_;
     const bool reached = co_await reach();
+    failures = reached ? 0 : failures + 1;
     if (!reached) {
       ++counts_.unreachable;
       say("cannot reach the station at " + station_.host + ":" + station_.port + ", trying again");
@@ -42,7 +45,7 @@ asio::awaitable<void> StationConnection::run() {
       }
     }
     std::uniform_int_distribution<int> pause_ms{kMinPauseMs, kMaxPauseMs};
-    co_await pause(std::chrono::milliseconds(pause_ms(jitter_)));
+    co_await pause(std::clamp(failures, 1, kMostPauses) * std::chrono::milliseconds(pause_ms(jitter_)));
   }
 }
 
@@ -63,6 +66,7 @@ asio::awaitable<bool> StationConnection::shake_hands() {
 // Bytes go to the speaker as they arrive, and what it answers leaves at once.
 asio::awaitable<void> StationConnection::serve() {
   is_open_ = true;
+  ++counts_.opened;
   was_welcome_ = false;
   frame_size_ = frame_sent_ = 0;
   speaker_.on_opened();
@@ -136,6 +140,7 @@ void StationConnection::forget() {
   ++times_forgotten_;
   boost::system::error_code ignored;
   socket_.cancel(ignored);
+  reset_forgotten();
   if (is_open_) forgotten_.emplace(std::move(socket_));
   is_open_ = false;
 }
@@ -159,8 +164,8 @@ void StationConnection::say_how_it_ended() {
   if (speaker_.refusal() != rheonaut_REFUSAL_REASON_NONE) {
     ++counts_.refusals;
     const std::string detail = speaker_.refusal_detail();
-    say("refused by the station: " + std::string(protocol::text(speaker_.refusal())) +
-        (detail.empty() ? "" : " (" + detail + ")"));
+    refusal_ = std::string(protocol::text(speaker_.refusal())) + (detail.empty() ? "" : " (" + detail + ")");
+    say("refused by the station: " + refusal_);
   } else {
     say(was_welcome_ ? "connection lost, dialling again" : "the station closed the connection before its welcome");
   }

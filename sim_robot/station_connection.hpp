@@ -2,7 +2,7 @@
 //
 // What speaks over it is a Speaker: a simulated robot, or a recording that is replayed. What the socket does not take
 // at once of a frame stays here, the speaker is asked for no other until it is gone. After a failure it is dialled
-// again 0.3 to 0.9 s later, at random, so that many do not come at once.
+// again 0.3 to 0.9 s later, at random, so that many do not come at once; up to four times as long where nobody answers.
 // One buffer serves the reads of all connections of a thread. The loop and the speaker must outlive the connection.
 #pragma once
 
@@ -52,6 +52,7 @@ class Speaker {
 // How the connections of this one went so far.
 struct LinkCounts {
   std::uint64_t unreachable = 0;  // attempts without a connection
+  std::uint64_t opened = 0;
   std::uint64_t welcomes = 0;
   std::uint64_t refusals = 0;
   std::uint64_t frames = 0;  // sent
@@ -79,6 +80,7 @@ class StationConnection {
 
   bool is_open() const { return is_open_; }
   const LinkCounts& counts() const { return counts_; }
+  const std::string& refusal() const { return refusal_; }  // the last one, as the log says it; empty: none
 
  private:
   boost::asio::awaitable<bool> shake_hands();
@@ -101,7 +103,7 @@ class StationConnection {
   bool is_open_ = false;
   bool was_welcome_ = false;  // on this connection
   LinkCounts counts_;
-  std::string last_line_;
+  std::string refusal_, last_line_;
   std::array<std::uint8_t, protocol::kMaxFramedBytes> frame_;  // under way
   std::size_t frame_size_ = 0, frame_sent_ = 0;
   std::minstd_rand jitter_{std::random_device{}()};
