@@ -35,6 +35,8 @@ class ModalPlant {
   double acceleration_m_s2() const;  // at the end of the last step, under its duty
 
   void reset();
+  // Asks for the memory of a step ahead of it.
+  void prefetch() const;
 
  private:
   // Modes side by side, so that one instruction advances several; the last block is filled with zeros. y is 2 y_i.

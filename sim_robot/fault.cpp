@@ -1,4 +1,4 @@
-// Does faults to a robot, and reads them from JSON.
+// Reads faults from JSON, and says what is wrong with them.
 #include "sim_robot/fault.hpp"
 
 #include <nlohmann/json.hpp>
@@ -12,17 +12,6 @@ namespace sim_robot {
 namespace {
 
 using Json = nlohmann::json;
-
-// Kinds of a sensor come in the order of SensorFaultKind behind `none`.
-SensorFaultKind sensor_kind(const Fault& fault, FaultKind first) {
-  return static_cast<SensorFaultKind>(static_cast<int>(fault.kind) - static_cast<int>(first) + 1);
-}
-
-SensorFault sensor_fault(const Fault& fault, FaultKind first) {
-  const SensorFaultKind kind = sensor_kind(fault, first);
-  const bool has_magnitude = kind == SensorFaultKind::noisy || kind == SensorFaultKind::offset;
-  return {kind, has_magnitude ? fault.magnitude : 0};
-}
 
 // Objects of texts, numbers and true or false alone; a key that comes twice is refused.
 toml::table flat_table(std::string_view json) {
@@ -79,47 +68,6 @@ void check(const Fault& fault, const WorldConfig& world) {
   }
   if (fault.kind == FaultKind::pour_glucose) check(fault.patch);
   if (!(fault.for_s > 0)) control::throw_invalid("for_s must be positive, is ", fault.for_s);
-}
-
-std::string why_not(FaultKind kind) {
-  const FaultType& type = type_of(kind);
-  switch (type.target) {
-    case FaultTarget::accelerometer:
-    case FaultTarget::electrode:
-    case FaultTarget::pump:
-    case FaultTarget::glucose: return "";
-    default:
-      return std::string(type.name) + ": not in this run, which has a world alone; link and robot are as they are";
-  }
-}
-
-void apply(const Fault& fault, SimulatedRobot& robot) {
-  check(fault, robot.config().world);
-  if (const std::string reason = why_not(fault.kind); !reason.empty()) throw std::invalid_argument(reason);
-  World& world = robot.world();
-  switch (type_of(fault.kind).target) {
-    case FaultTarget::accelerometer:
-      return world.set_fault(Sensor::accelerometer, sensor_fault(fault, FaultKind::accelerometer_stuck));
-    case FaultTarget::electrode:
-      return world.set_fault(Sensor::electrode, sensor_fault(fault, FaultKind::electrode_stuck));
-    case FaultTarget::pump: return world.set_mean_flow_m3_s(fault.mean_flow_m3_s);
-    case FaultTarget::glucose: {
-      GlucosePatch patch = fault.patch;
-      patch.removed_at_s = world.glucose().time_s() + fault.for_s;
-      return world.pour(patch);
-    }
-    default: return;
-  }
-}
-
-void end(const Fault& fault, SimulatedRobot& robot) {
-  World& world = robot.world();
-  switch (type_of(fault.kind).target) {
-    case FaultTarget::accelerometer: return world.set_fault(Sensor::accelerometer, {});
-    case FaultTarget::electrode: return world.set_fault(Sensor::electrode, {});
-    case FaultTarget::pump: return world.set_mean_flow_m3_s(robot.config().world.vessel->pump.mean_flow_m3_s);
-    default: return;
-  }
 }
 
 }  // namespace sim_robot

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "protocol/messages.hpp"
+#include "sim_robot/faulty_robot.hpp"
 #include "sim_robot/fields.hpp"
 #include "sim_robot/glucose.hpp"
 #include "sim_robot/pump.hpp"
@@ -19,7 +20,6 @@
 
 namespace sim_robot {
 
-class SimulatedRobot;
 struct WorldConfig;
 
 // In the order of fault_types().
@@ -60,8 +60,6 @@ struct FaultType {
 std::span<const FaultType> fault_types();
 const FaultType& type_of(FaultKind kind);
 
-enum class LinkDirection { up, down, both };  // up: robot to station
-
 struct Fault {
   FaultKind kind = FaultKind::accelerometer_stuck;
   double for_s = kForEver;  // of those that last; for ever: until it is withdrawn
@@ -70,7 +68,7 @@ struct Fault {
   double mean_flow_m3_s = kMustBeGiven;
   GlucosePatch patch{.position_m = kMustBeGiven};  // poured at once; its for_s says when it is removed
 
-  LinkDirection direction = LinkDirection::both;
+  Direction direction = Direction::both;
   bool then_reset = false;        // an outage ends with the end of the connections
   std::uint64_t after_bytes = 0;  // a cut: so many of those under way still arrive
   double delay_s = kMustBeGiven, jitter_s = 0;
@@ -93,12 +91,16 @@ void fields_with_kind(Fields& fields, Fault& fault);
 // Throws what is wrong with its values, or what the world lacks for it.
 void check(const Fault& fault, const WorldConfig& world);
 
-// Empty when this run can do it; otherwise why not.
-std::string why_not(FaultKind kind);
-// From the robot's next tick on. Throws as check() does, and what why_not() says.
-void apply(const Fault& fault, SimulatedRobot& robot);
-// Ends one that lasts: as it was when the robot was made.
-void end(const Fault& fault, SimulatedRobot& robot);
+// Empty when a run with, or without, a network of its own can do it; otherwise why not.
+std::string why_not(FaultKind kind, bool has_network);
+// The same for this robot; throws what why_not() says, too.
+void check(const Fault& fault, const FaultyRobot& robot);
+// From the robot's next tick on. Throws as check() does.
+void apply(const Fault& fault, const FaultyRobot& robot);
+// Ends one that lasts: its target is as it was when robot and link were made.
+void end(const Fault& fault, const FaultyRobot& robot);
+// Whether robot or link, which were told its for_s, end it when that is over.
+bool ends_by_itself(FaultKind kind);
 
 // {"fault":"electrode_offset","offset_mv":40,"for_s":5}
 Fault parse_fault_json(std::string_view json);

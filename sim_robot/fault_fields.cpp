@@ -43,7 +43,7 @@ constexpr double kMostAcceleration_m_s2 = 160, kMostImpedanceMv = 5000;
 void direction_field(Fields& fields, Fault& fault) {
   auto index = static_cast<std::size_t>(fault.direction);
   fields.choice("direction", index, kDirections, "up: robot to station; down: station to robot");
-  fault.direction = static_cast<LinkDirection>(index);
+  fault.direction = static_cast<Direction>(index);
 }
 
 void magnitude_field(Fields& fields, Fault& fault) {

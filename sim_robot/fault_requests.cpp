@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "sim_robot/field_list.hpp"
-#include "sim_robot/simulated_robot.hpp"
 
 namespace sim_robot {
 namespace {
@@ -39,14 +38,14 @@ Json describe(const Field& field) {
   return json;
 }
 
-Json known_faults() {
+Json known_faults(const FaultyRobot& robot) {
   Json all = Json::array();
   for (std::size_t i = 0; i < fault_types().size(); ++i) {
     Fault fault{.kind = static_cast<FaultKind>(i)};
     FieldList list;
     fields(list, fault);
     Json json{{"fault", fault_types()[i].name}, {"what", fault_types()[i].what}};
-    json["is_in_this_run"] = why_not(fault.kind).empty();
+    json["is_in_this_run"] = why_not(fault.kind, robot.link != nullptr).empty();
     json["fields"] = Json::array();
     for (const Field& field : list.fields) json["fields"].push_back(describe(field));
     all.push_back(json);
@@ -67,23 +66,26 @@ Json as_json(const FaultInForce& each) {
   return json;
 }
 
-FaultAnswer list_faults(const FaultTimeline& faults, const SimulatedRobot& robot) {
-  Json json{{"robot_id", robot.config().robot_id}, {"robot_time_s", seconds(robot.robot_time_us())}};
+FaultAnswer list_faults(const FaultTimeline& faults, const FaultyRobot& robot) {
+  const RobotLife& life = robot.life;
+  Json json{{"robot_id", life.robot().config().robot_id}, {"time_s", seconds(life.true_us())}};
+  json["robot_time_s"] = seconds(life.robot().robot_time_us());
+  json["boots"] = life.boots();
   json["in_force"] = Json::array();
   for (const FaultInForce& each : faults.in_force()) json["in_force"].push_back(as_json(each));
   json["to_come"] = faults.to_come();
-  json["known"] = known_faults();
+  json["known"] = known_faults(robot);
   return {200, json.dump() + "\n"};
 }
 
-FaultAnswer inject(const FaultRequest& request, FaultTimeline& faults, SimulatedRobot& robot) {
+FaultAnswer inject(const FaultRequest& request, FaultTimeline& faults, const FaultyRobot& robot) {
   if (!request.content_type.starts_with("application/json")) {
     return fault_problem(415, "not_json",
                          "content type is '" + request.content_type + "', allowed is application/json");
   }
   try {
     const Fault fault = parse_fault_json(request.body);
-    if (const std::string reason = why_not(fault.kind); !reason.empty()) {
+    if (const std::string reason = why_not(fault.kind, robot.link != nullptr); !reason.empty()) {
       return fault_problem(409, "not_in_this_run", reason);
     }
     const std::uint64_t id = faults.inject(fault, robot);
@@ -93,7 +95,7 @@ FaultAnswer inject(const FaultRequest& request, FaultTimeline& faults, Simulated
   }
 }
 
-FaultAnswer withdraw(const std::string& text, FaultTimeline& faults, SimulatedRobot& robot) {
+FaultAnswer withdraw(const std::string& text, FaultTimeline& faults, const FaultyRobot& robot) {
   std::uint64_t id = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
   if (error != std::errc{} || end != text.data() + text.size()) {
@@ -124,7 +126,7 @@ FaultAnswer fault_problem(int status, const std::string& reason, const std::stri
   return {status, json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"};
 }
 
-FaultAnswer answer(const FaultRequest& request, FaultTimeline& faults, SimulatedRobot& robot) {
+FaultAnswer answer(const FaultRequest& request, FaultTimeline& faults, const FaultyRobot& robot) {
   if (!is_plain_host(request.host) || !request.origin.empty()) {
     return fault_problem(403, "not_for_pages", "pages in a browser and other names of this host are refused");
   }

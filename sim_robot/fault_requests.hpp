@@ -18,7 +18,7 @@ struct FaultAnswer {
   std::string body;  // JSON
 };
 
-FaultAnswer answer(const FaultRequest& request, FaultTimeline& faults, SimulatedRobot& robot);
+FaultAnswer answer(const FaultRequest& request, FaultTimeline& faults, const FaultyRobot& robot);
 // {"status":…,"reason":…,"detail":…}
 FaultAnswer fault_problem(int status, const std::string& reason, const std::string& detail);
 

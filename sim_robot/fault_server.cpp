@@ -96,7 +96,7 @@ tcp::endpoint parse_faults_address(const std::string& text, bool anywhere) {
   return {address, port};
 }
 
-FaultServer::FaultServer(asio::io_context& loop, const tcp::endpoint& at, FaultTimeline& faults, SimulatedRobot& robot,
+FaultServer::FaultServer(asio::io_context& loop, const tcp::endpoint& at, FaultTimeline& faults, FaultyRobot robot,
                          std::chrono::milliseconds time)
     : acceptor_(loop, at), faults_(faults), robot_(robot), time_(time) {}
 

@@ -7,7 +7,7 @@
 // request each, 5 s for it to arrive or be answered, 128 faults that pour glucose.
 // SAFETY: it has no password. Only on the loopback unless forced, and never for a page in a browser: requests that name
 // another host than an address or localhost, or that come with an Origin, are refused (403).
-// Runs on the thread of `loop`, which must outlive it, as must the robot and the time line.
+// Runs on the thread of `loop`, which must outlive it, as must the time line, the robot and its link.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -29,7 +29,7 @@ class FaultServer {
  public:
   // Listens from here on; throws when the port is taken.
   FaultServer(boost::asio::io_context& loop, const boost::asio::ip::tcp::endpoint& at, FaultTimeline& faults,
-              SimulatedRobot& robot, std::chrono::milliseconds time = std::chrono::seconds{5});
+              FaultyRobot robot, std::chrono::milliseconds time = std::chrono::seconds{5});
 
   // Answers until cancelled.
   boost::asio::awaitable<void> run();
@@ -41,7 +41,7 @@ class FaultServer {
 
   boost::asio::ip::tcp::acceptor acceptor_;
   FaultTimeline& faults_;
-  SimulatedRobot& robot_;
+  FaultyRobot robot_;
   std::chrono::milliseconds time_;  // for a request, and again for its answer
 };
 

@@ -1,17 +1,16 @@
 // What is in force of the faults, and which of them are still to come.
 //
-// A scenario's faults come by time (robot time in virtual time, true time where a robot may reboot), others by inject()
-// at once. Each holds for its for_s; then its target is as
-// it was when the robot was made. One that follows on the same target replaces it. A fault that this run cannot do is
-// said and passed over. The same in virtual time (apply_due() before each step) and in real time (advance()).
+// A scenario's faults come by true time since the run began, others by inject() at once. Each holds for its for_s; then
+// its target is as it was when robot and link were made. One that follows on the same target replaces it, and a reboot
+// ends a block. A fault that this run cannot do is said and passed over. The same in virtual and in real time.
 #pragma once
 
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <string>
 #include <vector>
 
+#include "sim_robot/microseconds.hpp"
 #include "sim_robot/robot_life.hpp"
 #include "sim_robot/scenario.hpp"
 
@@ -25,21 +24,19 @@ struct FaultInForce {
 
 class FaultTimeline {
  public:
-  static constexpr std::uint64_t kNever = std::numeric_limits<std::uint64_t>::max();
+  static constexpr std::uint64_t kNever = kNeverUs;
   using Log = std::function<void(const std::string& line)>;
 
   // The faults by time. `log` is told what begins and ends; it may be empty.
   explicit FaultTimeline(std::vector<TimedFault> faults = {}, Log log = {});
 
-  // Everything up to the time of the robot's next tick.
-  void apply_due(SimulatedRobot& robot);
-  // As RobotLife::advance_to(), with what is due applied between the ticks, by true time.
-  void advance(RobotLife& life, std::uint64_t true_us);
+  // As RobotLife::advance_to(), with what is due applied between the ticks.
+  void advance(const FaultyRobot& robot, std::uint64_t true_us);
 
   // Returns its id; those that happen at once have one too, but are never in force. Throws as apply().
-  std::uint64_t inject(const Fault& fault, SimulatedRobot& robot);
+  std::uint64_t inject(const Fault& fault, const FaultyRobot& robot);
   // Ends it before its time. False when none in force has this id.
-  bool withdraw(std::uint64_t id, SimulatedRobot& robot);
+  bool withdraw(std::uint64_t id, const FaultyRobot& robot);
 
   const std::vector<FaultInForce>& in_force() const { return in_force_; }
   std::size_t passed_over() const { return passed_over_; }
@@ -49,9 +46,10 @@ class FaultTimeline {
   std::uint64_t next_us() const;  // when something is due, or kNever
   std::uint64_t next_end_us() const;
   std::uint64_t next_start_us() const;
-  void apply_until(SimulatedRobot& robot, std::uint64_t now_us);
-  void end_due(SimulatedRobot& robot, std::uint64_t at_us);
-  std::uint64_t begin(const Fault& fault, SimulatedRobot& robot, std::uint64_t at_us);
+  void apply_until(const FaultyRobot& robot, std::uint64_t now_us);
+  void end_due(const FaultyRobot& robot, std::uint64_t at_us);
+  std::uint64_t begin(const Fault& fault, const FaultyRobot& robot, std::uint64_t at_us);
+  void end_replaced(const Fault& next, const FaultyRobot& robot);
   void say(std::uint64_t at_us, const std::string& what) const;
 
   std::vector<TimedFault> to_come_;  // by time

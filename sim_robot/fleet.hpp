@@ -3,9 +3,9 @@
 //   turn k is at start + k · kSlotUs; robot i has the turns k ≡ i (mod slots), slots = period/kSlotUs               (1)
 // One timer turns the wheel, whatever the number of robots. Robots boot and dial kBootEveryUs apart, each at a turn of
 // its own slot: so neither their ticks nor their frames nor their dialling come all at once. A late turn is taken as
-// soon as possible, and robots catch up by themselves; after a stall of over a period the wheel goes on from now.
-// In a turn all robots of the slot tick, then all of them send: a station that is woken by the first frame is still
-// awake for the others, which halves the cost of a frame.
+// soon as possible, and robots catch up by themselves; after a stall of over a period whole rounds are left out.
+// In a turn all robots of the slot tick, then those with a frame send: a station that is woken by the first frame is
+// still awake for the others, which halves the cost of a frame, and a robot's memory is touched once a tick.
 // Owns the robots. One thread: that of `loop`, which must outlive the fleet and be stopped before it ends.
 #pragma once
 
@@ -13,6 +13,7 @@
 #include <boost/asio/io_context.hpp>
 #include <chrono>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "sim_robot/fleet_member.hpp"
@@ -29,6 +30,7 @@ struct FleetCounts {
   std::uint64_t reconnects = 0;
   SampleCounts samples;
   LinkCounts links;
+  std::string refusal;  // of one of those that were refused last, for people
 };
 
 class Fleet {
@@ -45,6 +47,7 @@ class Fleet {
 
   FleetCounts counts() const;
   const Lateness& lateness() const { return lateness_; }
+  std::size_t size() const { return members_.size(); }
   const FleetMember& robot(std::size_t i) const { return *members_[i]; }
   std::size_t slots() const { return slots_.size(); }
 
@@ -56,6 +59,7 @@ class Fleet {
   };
 
   void take_turn(std::uint64_t turn);
+  void count(Clock::duration late);
   void boot_due(Slot& slot, std::uint64_t turn);
   Clock::time_point time_of(std::uint64_t turn) const { return started_at_ + turn * slot_; }
 
@@ -64,6 +68,7 @@ class Fleet {
   std::vector<Slot> slots_;
   std::chrono::microseconds slot_{kSlotUs};
   Clock::time_point started_at_;
+  std::vector<FleetMember*> with_frames_;  // of this turn
   Lateness lateness_;
 };
 

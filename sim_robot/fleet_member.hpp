@@ -33,9 +33,11 @@ class FleetMember {
 
   // Robot time 0 is at `at`, which is not later than now.
   virtual void boot(Clock::time_point at) = 0;
-  // Makes the samples that are due.
-  virtual void tick() = 0;
-  // Sends what can be sent without waiting, and gives up a connection that is silent.
+  // Makes the samples that are due, and gives up a connection that is silent. True when there is something to send.
+  virtual bool tick() = 0;
+  // Asks for the memory of the next tick ahead of it.
+  virtual void prefetch() const {}
+  // Sends what can be sent without waiting.
   virtual void send() = 0;
   virtual Clock::time_point next_tick_at() const = 0;
   // Never returns but by cancellation.

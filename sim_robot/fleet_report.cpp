@@ -17,6 +17,8 @@ double seconds(const timeval& time) {
   return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_usec) / 1e6;
 }
 
+constexpr std::uint64_t kMissedShare = 20;  // one tick in so many may be skipped
+
 double per_second(std::uint64_t from, std::uint64_t to, double dt_s) {
   return dt_s > 0 ? static_cast<double>(to - from) / dt_s : 0;
 }
@@ -59,17 +61,21 @@ Json summary(const FleetSnapshot& end, const Lateness& lateness, const std::stri
   const auto made = static_cast<double>(samples.made);
   return {{"duration_s", rounded(end.time_s, 0.01)},
           {"robots", counts.robots},
+          {"robots_booted", counts.booted},
           {"robots_welcomed", counts.welcomed},
           {"samples_made", samples.made},
           {"samples_sent", samples.sent},
           {"samples_acknowledged", samples.acknowledged},
           {"samples_held", samples.held},
+          {"samples_unsettled", end.unsettled},
           {"samples_lost", samples.lost},
           {"samples_resent", samples.resent},
           {"gaps", samples.gaps},
           {"frames_sent", counts.links.frames},
           {"reconnects", counts.reconnects},
           {"refusals", counts.links.refusals},
+          {"refusal", counts.refusal},
+          {"connections", counts.links.opened},
           {"unreachable", counts.links.unreachable},
           {"commands", samples.commands},
           {"missed_ticks", samples.missed_ticks},
@@ -116,18 +122,31 @@ std::string summary_text(const FleetSnapshot& end, const Lateness& lateness, con
   return text;
 }
 
-std::optional<FleetFault> fleet_fault(const FleetCounts& counts) {
-  if (counts.welcomed == 0) {
-    const bool was_refused = counts.links.refusals > 0;
-    return FleetFault{2, was_refused ? "the station refused every robot" : "no robot ever reached the station"};
+std::optional<FleetFault> fleet_fault(const FleetSnapshot& end) {
+  const FleetCounts& counts = end.counts;
+  const SampleCounts& samples = counts.samples;
+  const std::string robots = std::to_string(counts.robots);
+  if (counts.booted < counts.robots) {
+    return FleetFault{1, "ended when " + std::to_string(counts.booted) + " of " + robots + " robots had booted"};
   }
-  if (counts.samples.lost > 0) {
-    return FleetFault{
-        1, std::to_string(counts.samples.lost) + " samples lost in " + std::to_string(counts.samples.gaps) + " gaps"};
+  if (counts.welcomed == 0) {
+    if (counts.links.refusals > 0) return FleetFault{2, "the station refused every robot: " + counts.refusal};
+    return FleetFault{2, counts.links.opened > 0
+                             ? "every connection ended before its welcome: is this the robots' door?"
+                             : "no robot ever reached the station"};
+  }
+  if (samples.lost > 0) {
+    return FleetFault{1, std::to_string(samples.lost) + " samples lost in " + std::to_string(samples.gaps) + " gaps"};
+  }
+  if (end.unsettled > 0) {
+    return FleetFault{1, std::to_string(end.unsettled) + " samples not acknowledged after the end"};
   }
   if (counts.welcomed < counts.robots) {
-    return FleetFault{1, std::to_string(counts.robots - counts.welcomed) + " of " + std::to_string(counts.robots) +
-                             " robots never got in"};
+    return FleetFault{1, std::to_string(counts.robots - counts.welcomed) + " of " + robots + " robots never got in"};
+  }
+  if (samples.missed_ticks > samples.made / kMissedShare) {
+    return FleetFault{1,
+                      std::to_string(samples.missed_ticks) + " ticks skipped: this machine is too slow for the fleet"};
   }
   return std::nullopt;
 }

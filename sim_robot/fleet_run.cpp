@@ -3,7 +3,9 @@
 
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
@@ -21,8 +23,11 @@ namespace {
 
 namespace asio = boost::asio;
 using Clock = FleetMember::Clock;
+using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
 
 constexpr rlim_t kOtherFiles = 32;
+constexpr auto kSettle = std::chrono::seconds(5);
+constexpr auto kLook = std::chrono::milliseconds(50);
 
 // Each robot needs a socket; the soft limit is 1024 on many machines.
 void allow_sockets(int robots) {
@@ -52,7 +57,7 @@ class LinkNews {
            << ", trying again" << std::endl;
     }
     if (counts.links.refusals > 0 && before_.links.refusals == 0) {
-      out_ << "rheonaut-sim: the station refuses robots; `--robots 1` says why" << std::endl;
+      out_ << "rheonaut-sim: the station refuses robots: " << counts.refusal << std::endl;
     }
     if (is_away || counts.connected > 0) was_away_ = is_away;
     before_ = counts;
@@ -75,7 +80,7 @@ struct Watch {
 
   FleetSnapshot now() const {
     const double time_s = std::chrono::duration<double>(Clock::now() - start).count();
-    return {time_s, process_cpu_s() - cpu_at_start_s, fleet.counts()};
+    return {time_s, process_cpu_s() - cpu_at_start_s, fleet.counts(), 0};
   }
 };
 
@@ -83,8 +88,9 @@ asio::awaitable<void> report_rates(const Watch& watch) {
   asio::steady_timer timer{co_await asio::this_coro::executor};
   LinkNews news{watch.options, watch.out};
   FleetSnapshot before;
-  for (int second = 1;; ++second) {
-    timer.expires_at(watch.start + std::chrono::seconds(second));
+  for (;;) {
+    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(Clock::now() - watch.start);
+    timer.expires_at(watch.start + seconds + std::chrono::seconds(1));
     co_await timer.async_wait(asio::use_awaitable);
     const FleetSnapshot now = watch.now();
     news.tell(now.counts);
@@ -93,9 +99,51 @@ asio::awaitable<void> report_rates(const Watch& watch) {
   }
 }
 
-int report_end(const Watch& watch) {
-  const FleetSnapshot end = watch.now();
-  const auto fault = fleet_fault(end.counts);
+// Of what was made up to the end, what is neither acknowledged nor lost yet. The robots go on meanwhile, for they send
+// whole frames.
+class Rest {
+ public:
+  explicit Rest(const Fleet& fleet) : fleet_(fleet) {
+    for (std::size_t i = 0; i < fleet.size(); ++i) made_.push_back(fleet.robot(i).samples().made);
+  }
+  std::uint64_t samples() const {
+    std::uint64_t rest = 0;
+    for (std::size_t i = 0; i < made_.size(); ++i) {
+      const SampleCounts now = fleet_.robot(i).samples();
+      rest += made_[i] - std::min(made_[i], now.made - now.held);
+    }
+    return rest;
+  }
+
+ private:
+  const Fleet& fleet_;
+  std::vector<std::uint64_t> made_;
+};
+
+// The duration and its end, or a signal; then up to kSettleS for the rest, or another signal.
+asio::awaitable<FleetSnapshot> last(const Watch& watch, asio::io_context& loop) {
+  asio::signal_set stop{loop, SIGINT, SIGTERM};
+  asio::steady_timer end{loop, Clock::time_point::max()};
+  if (watch.options.duration_s > 0) {
+    end.expires_after(
+        std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(watch.options.duration_s)));
+  }
+  auto either = end.async_wait(asio::use_awaitable) || stop.async_wait(asio::use_awaitable);
+  co_await std::move(either);
+  FleetSnapshot last = watch.now();
+  const Rest rest{watch.fleet};
+  const auto is_stopped = std::make_shared<bool>(false);
+  stop.async_wait([is_stopped](const boost::system::error_code& error, int) { *is_stopped = !error; });
+  const auto give_up_at = Clock::now() + kSettle;
+  while (last.counts.links.opened > 0 && !*is_stopped && rest.samples() > 0 && Clock::now() < give_up_at) {
+    co_await pause(kLook);
+  }
+  last.unsettled = rest.samples();
+  co_return last;
+}
+
+int report_end(const Watch& watch, const FleetSnapshot& end) {
+  const auto fault = fleet_fault(end);
   const std::string reason = fault ? fault->reason : "";
   watch.out << (watch.options.json ? summary_json : summary_text)(end, watch.fleet.lateness(), reason) << std::flush;
   return fault ? fault->exit_status : EXIT_SUCCESS;
@@ -103,20 +151,19 @@ int report_end(const Watch& watch) {
 
 int run(const FleetOptions& options, asio::io_context& loop, Fleet& fleet, std::ostream& out) {
   const Watch watch{options, fleet, out};
-  asio::signal_set stop{loop, SIGINT, SIGTERM};
-  stop.async_wait([&loop](const boost::system::error_code&, int) { loop.stop(); });
-  asio::steady_timer end{loop};
-  if (options.duration_s > 0) {
-    end.expires_after(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.duration_s)));
-    end.async_wait([&loop](const boost::system::error_code&) { loop.stop(); });
-  }
   const auto rethrow = [](const std::exception_ptr& error) {
     if (error) std::rethrow_exception(error);
   };
+  FleetSnapshot end;
+  asio::co_spawn(loop, last(watch, loop), [&](const std::exception_ptr& error, const FleetSnapshot& snapshot) {
+    rethrow(error);
+    end = snapshot;
+    loop.stop();
+  });
   asio::co_spawn(loop, fleet.run(), rethrow);
   asio::co_spawn(loop, report_rates(watch), rethrow);
   loop.run();
-  return report_end(watch);
+  return report_end(watch, end);
 }
 
 std::string id_of(const FleetOptions& options, int number) { return options.id_prefix + '-' + std::to_string(number); }
@@ -145,6 +192,10 @@ int run_replay(const FleetOptions& options, const std::string& token, const Reco
   allow_sockets(options.robots);
   asio::io_context loop{1};
   Fleet::Members robots;
+  SimulatedRobotConfig named;  // for the check of id and token
+  named.robot_id = id_of(options, options.robots);
+  named.token = token;
+  check(named);
   ReplayConfig config;
   config.token = token;
   config.period_us = replay_period_us(recording, rate);

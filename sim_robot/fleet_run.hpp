@@ -12,7 +12,7 @@
 
 namespace sim_robot {
 
-constexpr int kMostRobots = 50'000;  // beyond, one address has no ports left
+constexpr int kMostRobots = 28'000;  // beyond, one address has no ports left
 
 struct FleetOptions {
   StationAddress station;

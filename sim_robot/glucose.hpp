@@ -22,7 +22,7 @@ struct GlucosePatch {
   double edge_m = 0;                                         // sd of the edges when poured; 0: sharp
   double mixing_m2_s = 0;                                    // D; 0: does not spread
   double decay_s = std::numeric_limits<double>::infinity();  // τ
-  double poured_at_s = 0;                                    // robot time
+  double poured_at_s = 0;                                    // time of the run
   double removed_at_s = std::numeric_limits<double>::infinity();
 };
 

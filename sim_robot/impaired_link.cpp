@@ -2,7 +2,8 @@
 #include "sim_robot/impaired_link.hpp"
 
 #include <array>
-#include <cmath>
+
+#include "sim_robot/microseconds.hpp"
 
 namespace sim_robot {
 namespace {
@@ -10,20 +11,28 @@ namespace {
 constexpr std::uint64_t kConnectTimeoutUs = 1'000'000;
 constexpr std::uint64_t kMinPauseUs = 300'000, kMaxPauseUs = 900'000;  // between two attempts, as of RobotClient
 
-std::uint64_t microseconds(double seconds) { return static_cast<std::uint64_t>(std::llround(1e6 * seconds)); }
-
 }  // namespace
 
 ImpairedLink::ImpairedLink(RobotLife& robot, const LinkOptions& options)
-    : robot_(robot), options_(options), random_(options.seed), boots_(robot.boots()) {
+    : robot_(robot),
+      made_with_{options.up, options.down},
+      impairments_(made_with_),
+      handshake_s_(options.handshake_s),
+      random_(options.seed),
+      boots_(robot.boots()) {
   check(options.up);
   check(options.down);
 }
 
 void ImpairedLink::step() {
+  exchange();  // what the station has said since arrives before the next tick
   robot_.advance_to(now_us() + kStepUs);
+  exchange();
+}
+
+void ImpairedLink::exchange() {
   follow_reboot();
-  if (reset_after_outage_ && now_us() >= outage_until_us_) reset();
+  end_outage();
   if (robot_.is_blocked()) return;
   if (phase_ != Phase::open) dial();
   if (phase_ == Phase::open) {
@@ -41,6 +50,12 @@ void ImpairedLink::follow_reboot() {
   phase_ends_us_ = now_us();
 }
 
+void ImpairedLink::end_outage() {
+  if (now_us() < outage_until_us_ || !reset_after_outage_) return;
+  reset_after_outage_ = false;
+  reset();
+}
+
 void ImpairedLink::dial() {
   if (now_us() < phase_ends_us_) return;
   const bool reachable = now_us() >= outage_until_us_;
@@ -48,24 +63,24 @@ void ImpairedLink::dial() {
     case Phase::open: break;
     case Phase::idle:
       // SAFETY: while the handshake blocks the loop nothing could stop a motor.
-      if (options_.handshake_s > 0 && !robot_.core().at_rest()) break;
+      if (handshake_s_ > 0 && !robot_.core().at_rest()) break;
       if (!reachable) return pause_from(now_us() + kConnectTimeoutUs);
       phase_ = Phase::dialling;
-      phase_ends_us_ = now_us() + microseconds(options_.up.delay_s + options_.down.delay_s);
+      phase_ends_us_ = now_us() + microseconds(impairments_.up.delay_s + impairments_.down.delay_s);
       break;
     case Phase::dialling:
       if (!reachable) return pause_from(now_us() + kConnectTimeoutUs);
-      if (options_.handshake_s <= 0) return open();
+      if (handshake_s_ <= 0) return open();
       if (!robot_.core().at_rest()) break;
       phase_ = Phase::handshake;
-      robot_.block(options_.handshake_s);
+      robot_.block(handshake_s_);
       break;
     case Phase::handshake: return reachable ? open() : pause_from(now_us());
   }
 }
 
 void ImpairedLink::open() {
-  connection_.emplace(ImpairedStream{options_.up, random_()}, ImpairedStream{options_.down, random_()});
+  connection_.emplace(ImpairedStream{impairments_.up, random_()}, ImpairedStream{impairments_.down, random_()});
   ++connections_;
   unsent_.clear();
   phase_ = Phase::open;
@@ -132,7 +147,7 @@ void ImpairedLink::close() {
 }
 
 void ImpairedLink::outage(double for_s, bool then_reset) {
-  outage_until_us_ = now_us() + microseconds(for_s);
+  outage_until_us_ = end_us(now_us(), for_s);
   reset_after_outage_ = then_reset;
   if (!connection_) return;
   connection_->up.stall(now_us(), outage_until_us_);
@@ -152,12 +167,12 @@ void ImpairedLink::cut(std::size_t after_bytes) {
 }
 
 void ImpairedLink::reset() {
-  reset_after_outage_ = false;
+  follow_reboot();  // the robot's end may be gone already
   if (connection_) connection_->station_is_open = false;
   hang_up(false);
 }
 
-void ImpairedLink::heal() {
+void ImpairedLink::resume() {
   outage_until_us_ = 0;
   reset_after_outage_ = false;
   if (!connection_) return;
@@ -168,8 +183,8 @@ void ImpairedLink::heal() {
 void ImpairedLink::impair(const Impairment& up, const Impairment& down) {
   check(up);
   check(down);
-  options_.up = up;
-  options_.down = down;
+  impairments_.up = up;
+  impairments_.down = down;
   if (!connection_) return;
   connection_->up.impair(up);
   connection_->down.impair(down);

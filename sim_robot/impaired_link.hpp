@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "sim_robot/impairment.hpp"
+#include "sim_robot/faulty_robot.hpp"
 #include "sim_robot/robot_life.hpp"
 
 namespace sim_robot {
@@ -21,16 +21,16 @@ struct LinkOptions {
   std::uint64_t seed = 1;  // of jitter, loss and the pauses between two attempts to dial
 };
 
-enum class Direction { up, down, both };
-
-class ImpairedLink {
+class ImpairedLink final : public FaultyLink {
  public:
   static constexpr std::uint64_t kStepUs = SimulatedRobot::kPeriodUs;
 
   explicit ImpairedLink(RobotLife& robot, const LinkOptions& options = {});
 
-  // True time passes: robot, network, and what of the robot's end is due.
+  // True time passes: exchange(), the robot's ticks, exchange().
   void step();
+  // What is due at the robot's end: it dials, reads and writes.
+  void exchange();
   std::uint64_t now_us() const { return robot_.true_us(); }
 
   // The station's end, of the connection that reached it last.
@@ -41,12 +41,14 @@ class ImpairedLink {
   void close();
 
   // The faults. An outage takes every connection and every attempt to dial; the others take the one connection.
-  void outage(double for_s, bool then_reset = false);
-  void half_open(Direction direction = Direction::both);
-  void cut(std::size_t after_bytes = SIZE_MAX);  // both ends get so many of the bytes under way, then the end
-  void reset();                                  // nothing of them, at once
-  void heal();                                   // ends outage and half-open
-  void impair(const Impairment& up, const Impairment& down);
+  void outage(double for_s, bool then_reset = false) override;
+  void half_open(Direction direction = Direction::both) override;
+  void resume() override;
+  void cut(std::size_t after_bytes = SIZE_MAX) override;
+  void reset() override;
+  void impair(const Impairment& up, const Impairment& down) override;
+  const LinkImpairments& impairments() const override { return impairments_; }
+  const LinkImpairments& made_with() const override { return made_with_; }
 
   bool robot_is_connected() const { return phase_ == Phase::open; }
   RobotLife& robot() { return robot_; }
@@ -59,6 +61,7 @@ class ImpairedLink {
   };
 
   void follow_reboot();
+  void end_outage();
   void dial();
   void open();
   void read();
@@ -68,7 +71,9 @@ class ImpairedLink {
   void pause_from(std::uint64_t at_us);
 
   RobotLife& robot_;
-  LinkOptions options_;
+  const LinkImpairments made_with_;
+  LinkImpairments impairments_;
+  const double handshake_s_;
   std::mt19937_64 random_;
   Phase phase_ = Phase::idle;
   std::uint64_t phase_ends_us_ = 0;  // when it dials, or when the connection is there

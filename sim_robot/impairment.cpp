@@ -13,8 +13,6 @@ constexpr std::size_t kMaxSegmentBytes = 1460;
 constexpr double kThrottledSegmentS = 0.01;
 constexpr int kMaxLosses = 8;  // in a row: 51 s with the usual time-out, then TCP would be near giving up
 
-std::uint64_t microseconds(double seconds) { return static_cast<std::uint64_t>(std::llround(1e6 * seconds)); }
-
 void check_range(const char* name, double value, double max) {
   if (!(value >= 0 && value <= max)) {
     throw std::invalid_argument(std::string(name) + " " + std::to_string(value) + " is not within 0 and " +

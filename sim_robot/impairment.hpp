@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "protocol/frame.hpp"
+#include "sim_robot/microseconds.hpp"
 
 namespace sim_robot {
 
@@ -40,7 +41,7 @@ void check(const Impairment& impairment);
 
 class ImpairedStream {
  public:
-  static constexpr std::uint64_t kNever = UINT64_MAX;
+  static constexpr std::uint64_t kNever = kNeverUs;
 
   ImpairedStream(const Impairment& impairment, std::uint64_t seed);
 

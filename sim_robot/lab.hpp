@@ -17,19 +17,26 @@ class Lab {
   Lab(const Lab&) = delete;
   Lab& operator=(const Lab&) = delete;
 
-  // 10 ms: what is due of the faults, then robot, network and station.
+  // The tick that is due, with the faults that begin before it, and 10 ms of network and station behind it.
   void step() {
-    faults.apply_due(robot.robot());
-    station.step();
+    link.exchange();  // what the station has said since arrives before the tick
+    faults.advance(faulty(), next_us_);
+    link.exchange();
+    station.serve();
+    next_us_ += ImpairedLink::kStepUs;
   }
+  FaultyRobot faulty() { return {robot, &link}; }
 
-  double time_s() const { return 1e-6 * static_cast<double>(robot.true_us()); }  // true time
+  double time_s() const { return 1e-6 * static_cast<double>(next_us_); }  // true time of the next step; the first is 0
   const robot_fw::Robot& core() const { return robot.core(); }
 
   RobotLife robot;
   ImpairedLink link;
   LinkedPeer station;
   FaultTimeline faults;
+
+ private:
+  std::uint64_t next_us_ = 0;
 };
 
 }  // namespace sim_robot

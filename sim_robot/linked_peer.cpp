@@ -13,6 +13,10 @@ void LinkedPeer::run(double for_s) {
 
 void LinkedPeer::step() {
   link_.step();
+  serve();
+}
+
+void LinkedPeer::serve() {
   if (link_.connections() != connections_) accept();
   if (connected_) read();
   if (connected_) speak();
@@ -39,23 +43,24 @@ void LinkedPeer::read() {
   connected_ = link_.is_open();
   if (hello && connected_ && !welcomed_) {
     welcomed_ = true;
-    queue(welcome_frame());
+    heartbeat_at_us_ = link_.now_us();
+    say(welcome_frame());
   }
 }
 
 void LinkedPeer::speak() {
-  if (welcomed_ && attentive && link_.now_us() >= said_at_us_ + kHeartbeatUs) {
-    queue(heartbeat_frame(rheonaut_StationHeartbeat_init_zero));
+  if (welcomed_ && attentive && link_.now_us() >= heartbeat_at_us_ + kHeartbeatUs) {
+    heartbeat_at_us_ = link_.now_us();
+    say(heartbeat_frame(rheonaut_StationHeartbeat_init_zero));
   }
-  const std::size_t taken = link_.send({unsent_.data(), unsent_.size()});
-  unsent_.erase(unsent_.begin(), unsent_.begin() + static_cast<std::ptrdiff_t>(taken));
+  flush();
 }
 
 std::uint64_t LinkedPeer::send(protocol::Command command) {
   protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
   frame.which_body = rheonaut_StationFrame_command_tag;
   frame.body.command = completed(command, hello ? hello->boot_id : 0, robot_time_us());
-  if (connected_) queue(frame);
+  if (connected_) say(frame);
   return frame.body.command.command_id;
 }
 
@@ -63,11 +68,16 @@ std::uint64_t LinkedPeer::robot_time_us() const {
   return frames.empty() ? 0 : frames.back().robot_time_us + silence_us();
 }
 
-void LinkedPeer::queue(const protocol::StationFrame& frame) {
+void LinkedPeer::say(const protocol::StationFrame& frame) {
   std::array<std::uint8_t, protocol::kMaxFramedBytes> bytes;
   const std::size_t size = protocol::write_frame(frame, bytes.data(), bytes.size());
   unsent_.insert(unsent_.end(), bytes.data(), bytes.data() + size);
-  said_at_us_ = link_.now_us();
+  flush();
+}
+
+void LinkedPeer::flush() {
+  const std::size_t taken = link_.send({unsent_.data(), unsent_.size()});
+  unsent_.erase(unsent_.begin(), unsent_.begin() + static_cast<std::ptrdiff_t>(taken));
 }
 
 }  // namespace sim_robot

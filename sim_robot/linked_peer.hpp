@@ -17,11 +17,13 @@ class LinkedPeer : public HeardRobot {
 
   explicit LinkedPeer(ImpairedLink& link) : link_(link) {}
 
-  // Each step is one of the link, then what has arrived, then what is due.
+  // Each step is one of the link, then serve().
   void step();
+  // What has arrived, then what is due.
+  void serve();
   void run(double for_s);
 
-  // Adds id, boot and life where they are 0, queues it for the open connection, and returns the id. It is lost with it.
+  // Adds id, boot and life where they are 0, says it on the open connection, and returns the id. It is lost with it.
   std::uint64_t send(protocol::Command command);
 
   bool is_connected() const { return connected_; }
@@ -34,13 +36,14 @@ class LinkedPeer : public HeardRobot {
   void accept();
   void read();
   void speak();
-  void queue(const protocol::StationFrame& frame);
+  void say(const protocol::StationFrame& frame);
+  void flush();
 
   ImpairedLink& link_;
   int connections_ = 0;
   bool connected_ = false, welcomed_ = false;
   std::optional<std::uint64_t> heard_at_us_;
-  std::uint64_t said_at_us_ = 0;
+  std::uint64_t heartbeat_at_us_ = 0;  // they acknowledge samples, so commands take none's place
   std::vector<std::uint8_t> unsent_;
 };
 

@@ -19,6 +19,8 @@ constexpr const char* kExamples = R"(Examples:
   rheonaut-sim --station 127.0.0.1:7070 --scenario mine.toml --faults 127.0.0.1:7400 --duration-s 60
   curl -H 'Content-Type: application/json' -d '{"fault":"electrode_offset","offset_mv":40,"for_s":5}' \
        http://127.0.0.1:7400/faults
+  curl -H 'Content-Type: application/json' -d '{"fault":"reboot","cause":"brown_out","off_for_s":2}' \
+       http://127.0.0.1:7400/faults                            also link_outage, clock_jump, block, …
   rheonaut-sim --station 127.0.0.1:7070 --robots 1000 --duration-s 60     a fleet, and what became of its samples
   rheonaut-sim replay --station 127.0.0.1:7070 --robots 5000              the same with recorded telemetry
   rheonaut-sim scenarios                                       which there are

@@ -1,4 +1,4 @@
-// Takes six numbers from JSON.
+// Takes six numbers and a dead time from JSON.
 #include "sim_robot/model_file.hpp"
 
 #include <algorithm>
@@ -17,7 +17,8 @@ using Json = nlohmann::json;
 
 constexpr std::array<std::string_view, 6> kNumbers{"kp", "b1", "b2", "b3", "alpha", "beta"};
 // What the tools add to a model, and what people do.
-constexpr std::array<std::string_view, 5> kPassedOver{"name", "comment", "description", "dc_gain_m_s", "poles_rad_s"};
+constexpr std::array<std::string_view, 6> kPassedOver{"name",        "comment",     "description",
+                                                      "dc_gain_m_s", "poles_rad_s", "dead_time_s"};
 
 const Json& model_in(const Json& given) {
   if (!given.is_object()) control::throw_invalid("model: ", given.dump(), " is not an object with kp, b1, b2, …");
@@ -44,19 +45,21 @@ void refuse_unknown(const Json& model) {
 
 }  // namespace
 
-control::FractionalModel parse_model(const std::string& json) {
+PlantParameters parse_model(const std::string& json) {
   const Json given = Json::parse(json, nullptr, false);
   if (given.is_discarded()) control::throw_invalid("model: this is not JSON");
   const Json& model = model_in(given);
   refuse_unknown(model);
-  const control::FractionalModel read{number(model, "kp"),    number(model, "b1"),
-                                      number(model, "b2"),    model.contains("b3") ? number(model, "b3") : 1,
-                                      number(model, "alpha"), number(model, "beta")};
-  control::check(read);
+  PlantParameters read;
+  read.model = {number(model, "kp"),    number(model, "b1"),
+                number(model, "b2"),    model.contains("b3") ? number(model, "b3") : 1,
+                number(model, "alpha"), number(model, "beta")};
+  if (given.contains("dead_time_s")) read.dead_time_s = number(given, "dead_time_s");
+  check(read);
   return read;
 }
 
-control::FractionalModel load_model(const std::string& path) {
+PlantParameters load_model(const std::string& path) {
   std::ifstream file{path, std::ios::binary};
   std::ostringstream text;
   if (!(file && text << file.rdbuf())) control::throw_invalid(path, ": cannot be read");

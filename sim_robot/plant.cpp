@@ -2,6 +2,7 @@
 #include "sim_robot/plant.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "control/invalid_argument.hpp"
 
@@ -18,6 +19,9 @@ Motion motion_of(const PlantParameters& parameters, double dt_s) {
 }  // namespace
 
 void check(const PlantParameters& parameters) {
+  const double dead_time_s = parameters.dead_time_s;
+  if (!(dead_time_s >= 0 && dead_time_s <= 10))
+    control::throw_invalid("dead_time_s is ", dead_time_s, ", allowed is 0 to 10");
   if (parameters.kind == PlantKind::linear) return control::check(parameters.model);
   control::hydrodynamic_model(parameters.hydrodynamics);  // refuses what cannot be
 }
@@ -63,12 +67,21 @@ void NonlinearPlant::step(double duty) {
   }
 }
 
-Plant::Plant(const PlantParameters& parameters, double dt_s) : motion_(motion_of(parameters, dt_s)) {}
+Plant::Plant(const PlantParameters& parameters, double dt_s)
+    : motion_(motion_of(parameters, dt_s)),
+      duties_(static_cast<std::size_t>(std::lround(parameters.dead_time_s / dt_s)), 0.0) {}
+
+double Plant::delayed(double duty) {
+  if (duties_.empty()) return duty;
+  const double due = std::exchange(duties_[oldest_], duty);
+  oldest_ = (oldest_ + 1) % duties_.size();
+  return due;
+}
 
 void Plant::step(double duty) {
   std::visit(
-      [this, duty](auto& motion) {
-        motion.step(duty);
+      [this, due = delayed(duty)](auto& motion) {
+        motion.step(due);
         position_m_ = motion.position_m();
         velocity_m_s_ = motion.velocity_m_s();
         acceleration_m_s2_ = motion.acceleration_m_s2();

@@ -6,6 +6,7 @@
 //   x' = v                                                               (3)
 // with the values of control::HydrodynamicParameters. Duty backwards turns the thrust around. (28) is (2) linearised,
 // with an empirical gain: see docs/simulator.md for how far the two are apart.
+// Either may answer the duty a dead time late, in whole ticks.
 // Accuracy: (1) exact, (2) and (3) by Runge-Kutta of 4th order in 4 steps a tick: within 1e-5 m/s of 100 times as many
 //           steps, held by plant_test.cpp.
 // Errors:   throws std::invalid_argument quoting the bad value.
@@ -13,6 +14,7 @@
 
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "control/modal_plant.hpp"
 
@@ -24,6 +26,7 @@ struct PlantParameters {
   PlantKind kind = PlantKind::linear;
   control::FractionalModel model = control::kNonNewtonianModel;  // of the linear one
   control::HydrodynamicParameters hydrodynamics{};               // of the nonlinear one
+  double dead_time_s = 0;                                        // from the duty to its first effect; at most 10
 };
 
 void check(const PlantParameters& parameters);
@@ -62,8 +65,17 @@ class Plant {
   double velocity_m_s() const { return velocity_m_s_; }
   double acceleration_m_s2() const { return acceleration_m_s2_; }
 
+  // See ModalPlant; the other has nothing of the kind.
+  void prefetch() const {
+    if (const auto* modal = std::get_if<control::ModalPlant>(&motion_)) modal->prefetch();
+  }
+
  private:
+  double delayed(double duty);
+
   std::variant<control::ModalPlant, NonlinearPlant> motion_;
+  std::vector<double> duties_;  // of the dead time, as a ring
+  std::size_t oldest_ = 0;
   double position_m_ = 0, velocity_m_s_ = 0, acceleration_m_s2_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// Prints what the robot has sent.
+// Prints what the station has heard of the robot, boot by boot.
 #include "sim_robot/play_command.hpp"
 
 #include <CLI/CLI.hpp>
@@ -7,15 +7,24 @@
 namespace sim_robot {
 namespace {
 
-void write_csv(std::ostream& out, const StationPeer& station) {
-  out << "t_s,position_m,velocity_m_s,acceleration_m_s2,duty,impedance_mv,reference_m,position_sd_m,mode,sub_state\n";
-  out.precision(9);
-  for (const auto& [seq, sample] : station.samples) {
+using Samples = std::map<std::uint64_t, ReceivedSample>;
+
+void write_boot(std::ostream& out, const Samples& samples, std::size_t boot) {
+  for (const auto& [seq, sample] : samples) {
     out << static_cast<double>(sample.robot_time_us) * 1e-6 << ',' << sample.position_m << ',' << sample.velocity_m_s
         << ',' << sample.acceleration_m_s2 << ',' << sample.duty << ',' << sample.impedance_mv << ','
         << sample.reference_m << ',' << sample.position_sd_m << ',' << protocol::text(sample.mode) << ','
-        << protocol::text(sample.sub_state) << '\n';
+        << protocol::text(sample.sub_state) << ',' << boot << '\n';
   }
+}
+
+void write_csv(std::ostream& out, const HeardRobot& station) {
+  out << "t_s,position_m,velocity_m_s,acceleration_m_s2,duty,impedance_mv,reference_m,position_sd_m,mode,sub_state,"
+         "boot\n";
+  out.precision(9);
+  std::size_t boot = 0;
+  for (const Samples& samples : station.earlier_boots) write_boot(out, samples, ++boot);
+  write_boot(out, station.samples, ++boot);
 }
 
 }  // namespace

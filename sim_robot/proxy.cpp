@@ -7,6 +7,9 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <utility>
 
+#include "sim_robot/fields.hpp"
+#include "sim_robot/microseconds.hpp"
+
 namespace sim_robot {
 namespace {
 
@@ -20,8 +23,9 @@ std::string text(const tcp::endpoint& endpoint) {
   return (endpoint.address().is_v6() ? "[" + address + "]" : address) + ":" + std::to_string(endpoint.port());
 }
 
-std::chrono::microseconds microseconds(double seconds) {
-  return std::chrono::microseconds{static_cast<std::int64_t>(1e6 * seconds)};
+double seconds_until(std::chrono::steady_clock::time_point end) {
+  if (end == std::chrono::steady_clock::time_point::max()) return kForEver;
+  return std::max(0.0, std::chrono::duration<double>(end - std::chrono::steady_clock::now()).count());
 }
 
 // Holds the connection for as long as it lasts.
@@ -30,7 +34,13 @@ asio::awaitable<void> serve(std::shared_ptr<ProxyConnection> connection) { co_aw
 }  // namespace
 
 Proxy::Proxy(asio::io_context& loop, ProxyOptions options, LinkLog log)
-    : loop_(loop), options_(std::move(options)), log_(std::move(log)), acceptor_(loop), outage_timer_(loop) {
+    : loop_(loop),
+      options_(std::move(options)),
+      made_with_{options_.impairment, options_.impairment},
+      impairments_(made_with_),
+      log_(std::move(log)),
+      acceptor_(loop),
+      outage_timer_(loop) {
   check(options_.impairment);
   boost::system::error_code error;
   acceptor_.open(options_.listen.protocol());
@@ -44,9 +54,9 @@ Proxy::Proxy(asio::io_context& loop, ProxyOptions options, LinkLog log)
 }
 
 void Proxy::plan(const Outage& outage) {
-  planned_.push_back(std::make_unique<asio::steady_timer>(loop_, microseconds(outage.at_s)));
+  planned_.push_back(std::make_unique<asio::steady_timer>(loop_, std::chrono::microseconds(microseconds(outage.at_s))));
   planned_.back()->async_wait([this, for_s = outage.for_s](const boost::system::error_code& error) {
-    if (!error) this->outage(for_s);
+    if (!error) this->outage(for_s, false);
   });
 }
 
@@ -69,11 +79,11 @@ void Proxy::accept(tcp::socket client) {
   const std::string name = "connection " + std::to_string(++accepted_);
   log_(name + " from " + text(client.remote_endpoint(ignored)));
   LinkOptions options;
-  options.up = options.down = options_.impairment;
+  options.up = impairments_.up;
+  options.down = impairments_.down;
   options.seed = options_.seed + accepted_;
   const auto connection = std::make_shared<ProxyConnection>(std::move(client), options_.target, options, name, log_);
-  const double left_s = std::chrono::duration<double>(outage_ends_ - Clock::now()).count();
-  if (left_s > 0) connection->stall(left_s);
+  if (outage_ends_ > Clock::now()) connection->stall(seconds_until(outage_ends_));
   connections_.push_back(connection);
   asio::co_spawn(loop_, serve(connection), [log = log_, name](const std::exception_ptr& error) {
     if (error) log(name + " failed");
@@ -114,7 +124,8 @@ void Proxy::half_open(Direction direction) {
 
 void Proxy::outage(double for_s, bool then_reset) {
   log_("outage of " + std::to_string(for_s) + " s begins");
-  outage_ends_ = Clock::now() + microseconds(for_s);
+  const std::uint64_t for_us = microseconds(for_s);
+  outage_ends_ = for_us == kNeverUs ? Clock::time_point::max() : Clock::now() + std::chrono::microseconds(for_us);
   for (const auto& connection : open()) connection->stall(for_s);
   outage_timer_.expires_at(outage_ends_);
   outage_timer_.async_wait([this, then_reset](const boost::system::error_code& error) {
@@ -124,19 +135,24 @@ void Proxy::outage(double for_s, bool then_reset) {
   });
 }
 
-void Proxy::heal() {
+void Proxy::resume() {
   outage_timer_.cancel();
   outage_ends_ = {};
   for (const auto& connection : open()) connection->resume();
-  Impairment none;
-  none.buffer_bytes = options_.impairment.buffer_bytes;
-  impair(none);
 }
 
-void Proxy::impair(const Impairment& impairment) {
-  check(impairment);
-  options_.impairment = impairment;
-  for (const auto& connection : open()) connection->impair(impairment, impairment);
+void Proxy::heal() {
+  resume();
+  Impairment none;
+  none.buffer_bytes = options_.impairment.buffer_bytes;
+  impair(none, none);
+}
+
+void Proxy::impair(const Impairment& up, const Impairment& down) {
+  check(up);
+  check(down);
+  impairments_ = {up, down};
+  for (const auto& connection : open()) connection->impair(up, down);
 }
 
 }  // namespace sim_robot

@@ -29,7 +29,7 @@ struct ProxyOptions {
   std::uint64_t seed = 1;
 };
 
-class Proxy {
+class Proxy final : public FaultyLink {
  public:
   // Listens at once; throws boost::system::system_error that names the address.
   Proxy(boost::asio::io_context& loop, ProxyOptions options, LinkLog log);
@@ -40,16 +40,18 @@ class Proxy {
   // Obeys a line and answers with one: what it did, or what is wrong with the line.
   std::string control(const std::string& line);
 
-  void cut(std::size_t after_bytes = 0);
-  void reset();
-  void half_open(Direction direction = Direction::both);
-  void outage(double for_s, bool then_reset = false);
+  void cut(std::size_t after_bytes) override;
+  void reset() override;
+  void half_open(Direction direction) override;
+  void outage(double for_s, bool then_reset) override;
+  void resume() override;
   void heal();
-  void impair(const Impairment& impairment);
+  void impair(const Impairment& up, const Impairment& down) override;
 
   boost::asio::ip::tcp::endpoint endpoint() const { return endpoint_; }
   std::size_t open_connections();
-  const Impairment& impairment() const { return options_.impairment; }
+  const LinkImpairments& impairments() const override { return impairments_; }
+  const LinkImpairments& made_with() const override { return made_with_; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -60,6 +62,8 @@ class Proxy {
 
   boost::asio::io_context& loop_;
   ProxyOptions options_;
+  const LinkImpairments made_with_;
+  LinkImpairments impairments_;
   LinkLog log_;
   boost::asio::ip::tcp::acceptor acceptor_;
   boost::asio::ip::tcp::endpoint endpoint_;

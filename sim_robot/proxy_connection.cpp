@@ -4,12 +4,12 @@
 #include <array>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/connect.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
-#include <cmath>
 #include <utility>
+
+#include "sim_robot/microseconds.hpp"
 
 namespace sim_robot {
 namespace {
@@ -22,11 +22,6 @@ using namespace std::chrono_literals;
 constexpr auto kConnectTimeout = 2s;
 constexpr auto kCutDeadline = 1s;
 constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
-
-asio::awaitable<void> pause(std::chrono::milliseconds duration) {
-  asio::steady_timer timer{co_await asio::this_coro::executor, duration};
-  co_await timer.async_wait(kNoThrow);
-}
 
 }  // namespace
 
@@ -57,7 +52,7 @@ asio::awaitable<void> ProxyConnection::serve_target() {
   }
   if (up_.read_all) close();  // gone while nothing could reach the target: as a dial that timed out
   if (ended_) co_return;
-  const bool reached = co_await dial();
+  const bool reached = co_await dial(target_, address_, kConnectTimeout);
   if (!reached && !ended_) {
     log_("cannot reach " + address_.host + ":" + address_.port + ": " + name_ + " is closed");
     close();
@@ -65,21 +60,6 @@ asio::awaitable<void> ProxyConnection::serve_target() {
   if (ended_) co_return;
   auto all = drain(up_) && fill(down_) && drain(down_);
   co_await std::move(all);
-}
-
-asio::awaitable<bool> ProxyConnection::dial() {
-  tcp::resolver resolver{client_.get_executor()};
-  auto resolving = resolver.async_resolve(address_.host, address_.port, kNoThrow) || pause(kConnectTimeout);
-  auto resolved = co_await std::move(resolving);
-  if (resolved.index() == 1 || ended_) co_return false;
-  const auto [resolve_error, endpoints] = std::get<0>(resolved);
-  if (resolve_error) co_return false;
-  auto connecting = asio::async_connect(target_, endpoints, kNoThrow) || pause(kConnectTimeout);
-  auto outcome = co_await std::move(connecting);
-  if (outcome.index() == 1 || std::get<0>(std::get<0>(outcome))) co_return false;
-  boost::system::error_code error;
-  target_.set_option(tcp::no_delay{true}, error);
-  co_return !error;
 }
 
 asio::awaitable<void> ProxyConnection::fill(Pipe& pipe) {
@@ -136,7 +116,7 @@ asio::awaitable<void> ProxyConnection::drain(Pipe& pipe) {
 }
 
 void ProxyConnection::stall(double for_s) {
-  stalled_until_us_ = now_us() + static_cast<std::uint64_t>(std::llround(1e6 * for_s));
+  stalled_until_us_ = end_us(now_us(), for_s);
   for (Pipe* pipe : {&up_, &down_}) pipe->stream.stall(now_us(), stalled_until_us_);
   wake_all();
 }

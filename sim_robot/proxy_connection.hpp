@@ -54,7 +54,6 @@ class ProxyConnection {
   };
 
   boost::asio::awaitable<void> serve_target();
-  boost::asio::awaitable<bool> dial();
   boost::asio::awaitable<void> fill(Pipe& pipe);
   boost::asio::awaitable<void> drain(Pipe& pipe);
   void on_end(Pipe& pipe, const boost::system::error_code& error);

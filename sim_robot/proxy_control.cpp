@@ -58,9 +58,10 @@ struct Word {
 
 Word setting(std::function<void(Impairment&, const Words&)> change) {
   return {1, [change = std::move(change)](Proxy& proxy, const Words& words) {
-            Impairment impairment = proxy.impairment();
-            change(impairment, words);
-            proxy.impair(impairment);
+            LinkImpairments next = proxy.impairments();
+            change(next.up, words);
+            change(next.down, words);
+            proxy.impair(next.up, next.down);
           }};
 }
 

@@ -19,7 +19,7 @@ namespace sim_robot {
 
 struct PumpParameters {
   double mean_flow_m3_s = 0;   // negative: backwards
-  double starts_at_s = -1;     // robot time; before 0 it has been on for long
+  double starts_at_s = -1;     // time of the run; before 0 it has been on for long
   double ramp_s = 1;           // of each change of the mean flow
   double compliance_s = 0.02;  // τ; 0: rigid walls; at most 10
 };

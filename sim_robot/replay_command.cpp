@@ -1,7 +1,9 @@
 // Reads the flags of a replay and starts it.
 #include "sim_robot/replay_command.hpp"
 
+#include <cmath>
 #include <iostream>
+#include <stdexcept>
 
 namespace sim_robot {
 namespace {
@@ -31,6 +33,7 @@ ReplayCommand::ReplayCommand(CLI::App& app)
 
 int ReplayCommand::run() {
   options_.station = parse_station_address(station_);
+  if (!std::isfinite(options_.duration_s)) throw std::invalid_argument("--duration-s: not a time");
   const Recording recording =
       frames_.empty() ? make_recording(kRecordedS, samples_per_frame_, seed_) : load_recording(frames_);
   return run_replay(options_, token_, recording, rate_, std::cout);

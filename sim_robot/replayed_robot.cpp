@@ -48,11 +48,12 @@ FleetMember::Clock::time_point ReplayedRobot::next_tick_at() const {
   return booted_at_ + std::chrono::microseconds((recording_.end_seq(next_) - 1) * config_.period_us);
 }
 
-void ReplayedRobot::send() {
-  if (!connection_.is_open()) return;
+bool ReplayedRobot::tick() {
+  make_frames();
   backfill_credit_ = kBackfillPerTurn;
-  connection_.flush();
-  if (phase_ != Phase::closed && robot_time_us() > heard_at_us_ + silence_us_) connection_.close_as_silent();
+  const bool is_open = connection_.is_open() && phase_ != Phase::closed;
+  if (is_open && robot_time_us() > heard_at_us_ + silence_us_) connection_.close_as_silent();
+  return connection_.prepare();
 }
 
 void ReplayedRobot::make_frames() {

@@ -33,8 +33,8 @@ class ReplayedRobot final : public FleetMember, private Speaker {
 
   // The first sample is made a period after the turn, so that the last one of a frame is made at a turn.
   void boot(Clock::time_point at) override { booted_at_ = at + std::chrono::microseconds(config_.period_us); }
-  void tick() override { make_frames(); }
-  void send() override;
+  bool tick() override;
+  void send() override { connection_.flush(); }
   Clock::time_point next_tick_at() const override;
   boost::asio::awaitable<void> stay_connected() override { return connection_.run(); }
 

@@ -14,10 +14,11 @@ using namespace asio::experimental::awaitable_operators;  // NOLINT: operators o
 using namespace std::chrono_literals;
 
 RobotClient::RobotClient(asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log,
-                         std::chrono::milliseconds handshake, std::vector<TimedFault> faults)
+                         std::chrono::milliseconds handshake, std::vector<TimedFault> faults, FaultyLink* link)
     : life_(std::move(config)),
       handshake_(handshake),
       faults_(std::move(faults), log),
+      link_(link),
       booted_at_(Clock::now()),
       connection_(loop, *this, std::move(station), life_.robot().config().robot_id, std::move(log)) {}
 
@@ -31,21 +32,22 @@ asio::awaitable<void> RobotClient::tick_for_ever() {
   for (;;) {
     timer.expires_at(next_tick_at());
     co_await timer.async_wait(asio::use_awaitable);
-    tick();
-    send();
+    if (tick()) send();
   }
 }
 
-void RobotClient::tick() {
-  catch_up();
-  if (life_.is_on()) connection_.reset_forgotten();
-  watch_gaps();
+RobotClient::Clock::time_point RobotClient::next_tick_at() const {
+  const std::uint64_t next_us = std::min(life_.next_tick_us(), life_.true_us() + SimulatedRobot::kPeriodUs);
+  return booted_at_ + std::chrono::microseconds(next_us);
 }
 
-void RobotClient::send() {
-  if (!connection_.is_open()) return;
-  connection_.flush();
-  if (life_.core().connection_is_silent(catch_up())) connection_.close_as_silent();
+bool RobotClient::tick() {
+  const std::uint64_t now_us = catch_up();
+  if (life_.is_on()) connection_.reset_forgotten();
+  watch_gaps();
+  if (!connection_.is_open() || life_.is_blocked()) return false;
+  if (life_.core().connection_is_silent(now_us)) connection_.close_as_silent();
+  return connection_.prepare();
 }
 
 // Runs the ticks that are due and returns the robot's time, which lies before the next of them.
@@ -53,7 +55,7 @@ void RobotClient::send() {
 // now.
 std::uint64_t RobotClient::catch_up() {
   const auto since = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - booted_at_);
-  faults_.advance(life_, static_cast<std::uint64_t>(since.count()));
+  faults_.advance(faulty(), static_cast<std::uint64_t>(since.count()));
   follow_reboot();
   return life_.robot_clock_us();
 }
@@ -100,7 +102,7 @@ bool RobotClient::on_bytes(protocol::Bytes bytes) {
 // Counts the samples in the frame by how far it moves the outbox, which skips first what the ring no longer holds.
 std::size_t RobotClient::next_frame(std::uint8_t* out, std::size_t capacity) {
   const std::uint64_t now_us = catch_up();
-  if (!connection_.is_open()) return 0;
+  if (!connection_.is_open() || life_.is_blocked()) return 0;
   const robot_fw::Outbox& outbox = life_.core().outbox();
   const std::uint64_t oldest = life_.core().samples().oldest_seq();
   const std::uint64_t live = std::max(outbox.live_seq(), oldest);
@@ -134,7 +136,7 @@ SampleCounts RobotClient::samples() const {
   counts.sent = sent_;
   counts.resent = resent_;
   counts.commands = earlier.commands + life_.core().commands_received();
-  counts.missed_ticks = robot().missed_ticks();
+  counts.missed_ticks = earlier.missed_ticks + robot().missed_ticks();
   return counts;
 }
 

@@ -6,7 +6,9 @@
 // waits for the network: see station_connection.hpp. A reboot leaves the connection without an end, and resets it when
 // the robot is back. With a handshake, as TLS on the robot's board, it dials only at rest, and nothing ticks until the
 // handshake is over.
-// Owns robot and connection. One thread: that of `loop`, which must outlive the client.
+// Faults of the link need a proxy between it and the station: `link`, whose address is given as the station's, and
+// which must outlive the client. Null: there is none. A robot whose loop is blocked neither reads nor writes. Owns
+// robot and connection. One thread: that of `loop`, which must outlive the client.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -25,18 +27,19 @@ namespace sim_robot {
 class RobotClient final : public FleetMember, private Speaker {
  public:
   RobotClient(boost::asio::io_context& loop, SimulatedRobotConfig config, StationAddress station, LinkLog log,
-              std::chrono::milliseconds handshake = {}, std::vector<TimedFault> faults = {});
+              std::chrono::milliseconds handshake = {}, std::vector<TimedFault> faults = {},
+              FaultyLink* link = nullptr);
 
   // Boots now, ticks and connects until cancelled. Never returns otherwise.
   boost::asio::awaitable<void> run();
 
   // The parts of run(), for who has many robots.
   void boot(Clock::time_point at) override { booted_at_ = at; }
-  void tick() override;
-  void send() override;
-  Clock::time_point next_tick_at() const override {
-    return booted_at_ + std::chrono::microseconds(life_.next_tick_us());
-  }
+  bool tick() override;
+  void prefetch() const override { robot().prefetch(); }
+  void send() override { connection_.flush(); }
+  // A robot without power or with a blocked loop is looked after as often as any: a fault may be due, or end.
+  Clock::time_point next_tick_at() const override;
   boost::asio::awaitable<void> stay_connected() override { return connection_.run(); }
 
   void reboot(const Reboot& reboot);
@@ -47,6 +50,7 @@ class RobotClient final : public FleetMember, private Speaker {
   // For who injects faults while it runs, on the same thread.
   SimulatedRobot& robot() { return life_.robot(); }
   FaultTimeline& faults() { return faults_; }
+  FaultyRobot faulty() { return {life_, link_}; }
   RobotLife& life() { return life_; }  // for its clock
 
  private:
@@ -58,6 +62,7 @@ class RobotClient final : public FleetMember, private Speaker {
   protocol::RefusalReason refusal() const override { return life_.core().refusal(); }
   std::string refusal_detail() const override { return life_.core().refusal_detail(); }
   bool may_dial() const override;
+  bool is_listening() const override { return !life_.is_blocked(); }
   std::optional<std::chrono::milliseconds> begin_handshake() override;
 
   boost::asio::awaitable<void> tick_for_ever();
@@ -68,6 +73,7 @@ class RobotClient final : public FleetMember, private Speaker {
   RobotLife life_;
   std::chrono::milliseconds handshake_;
   FaultTimeline faults_;
+  FaultyLink* link_;
   Clock::time_point booted_at_;  // true time 0
   StationConnection connection_;
   int boots_ = 1;

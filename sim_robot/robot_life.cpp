@@ -4,10 +4,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim_robot/microseconds.hpp"
+
 namespace sim_robot {
 namespace {
 
-std::uint64_t microseconds(double seconds) { return static_cast<std::uint64_t>(std::llround(1e6 * seconds)); }
+// SplitMix64: one to one, so that what is random stays so.
+std::uint64_t boot_id_after(std::uint64_t boot_id) {
+  std::uint64_t mixed = boot_id + 0x9E3779B97F4A7C15;
+  mixed = (mixed ^ (mixed >> 30)) * 0xBF58476D1CE4E5B9;
+  mixed = (mixed ^ (mixed >> 27)) * 0x94D049BB133111EB;
+  mixed ^= mixed >> 31;
+  return mixed == 0 ? 1 : mixed;
+}
 
 }  // namespace
 
@@ -23,7 +32,9 @@ bool RobotLife::Storage::save(robot_fw::StorageKey key, protocol::Bytes bytes) {
   return true;
 }
 
-RobotLife::RobotLife(SimulatedRobotConfig config) : robot_(with_storage(std::move(config))) {}
+RobotLife::RobotLife(SimulatedRobotConfig config) : robot_(with_storage(std::move(config))) {
+  drift(robot_.config().clock_drift_ppm);
+}
 
 SimulatedRobotConfig RobotLife::with_storage(SimulatedRobotConfig config) {
   if (config.storage == nullptr) config.storage = &storage_;
@@ -44,7 +55,7 @@ void RobotLife::advance_to(std::uint64_t true_us) {
 // SAFETY: the old core is gone at once, and with it the duty; the new one starts with duty 0.
 void RobotLife::reboot(const Reboot& reboot) {
   SimulatedRobotConfig next = robot_.config();
-  next.boot_id = random_boot_id();
+  next.boot_id = boot_id_after(robot_.config().boot_id);
   next.reset_cause = reboot.cause;
   next.restored_emergency_id = reboot.keeps_latch ? core().emergency_id() : 0;
   next.restored_emergency_cause = reboot.keeps_latch ? core().emergency_cause() : rheonaut_EMERGENCY_CAUSE_NONE;
@@ -55,6 +66,7 @@ void RobotLife::reboot(const Reboot& reboot) {
   coasted_to_us_ = true_us_;
   on_at_us_ = true_base_us_ = true_us_ + microseconds(reboot.off_for_s);
   clock_base_us_ = 0;
+  free_at_us_ = 0;
 }
 
 void RobotLife::close_the_books() {
@@ -63,9 +75,12 @@ void RobotLife::close_the_books() {
   earlier_.samples_made += ring.next_seq();
   earlier_.samples_lost += ring.lost() + ring.fill();
   earlier_.commands += core().commands_received();
+  earlier_.missed_ticks += robot_.missed_ticks();
 }
 
-void RobotLife::block(double for_s) { free_at_us_ = std::max(free_at_us_, true_us_ + microseconds(for_s)); }
+void RobotLife::block(double for_s) { free_at_us_ = std::max(free_at_us_, end_us(true_us_, for_s)); }
+
+void RobotLife::unblock() { free_at_us_ = 0; }
 
 void RobotLife::drift(double ppm) {
   keep_clock();
@@ -91,7 +106,7 @@ std::uint64_t RobotLife::robot_clock_us() const {
 
 void RobotLife::keep_clock() {
   clock_base_us_ = clock_us();
-  true_base_us_ = true_us_;
+  true_base_us_ = std::max(true_base_us_, true_us_);  // while it is off, the clock stands
 }
 
 double RobotLife::clock_us() const {

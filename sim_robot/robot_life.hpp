@@ -25,7 +25,7 @@ struct Reboot {
 
 // What became of the boots before this one: a ring that a reset found full of samples is lost with them.
 struct EarlierBoots {
-  std::uint64_t samples_made = 0, samples_lost = 0, commands = 0;
+  std::uint64_t samples_made = 0, samples_lost = 0, commands = 0, missed_ticks = 0;
 };
 
 class RobotLife {
@@ -35,10 +35,11 @@ class RobotLife {
   // Runs the ticks that are due up to a true time.
   void advance_to(std::uint64_t true_us);
 
-  // From now on: off, then on again with a new boot id.
+  // From now on: off, then on again with another boot id, which follows from the one before and is as random as that.
   void reboot(const Reboot& reboot);
   // The loop does nothing else for so long, as in a TLS handshake: ticks are missed. A longer block under way stays.
   void block(double for_s);
+  void unblock();                // ends every block
   void drift(double ppm);        // of the robot's clock against true time, from now on
   void jump_clock(double by_s);  // the clock alone
 

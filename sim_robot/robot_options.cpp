@@ -2,6 +2,7 @@
 #include "sim_robot/robot_options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 
 #include "control/invalid_argument.hpp"
 
@@ -33,6 +34,9 @@ void add_robot(CLI::App& app, RobotOptions& options) {
   app.add_option("--id", options.id, "name of the robot, 1 to 31 of [a-z0-9_-]")->default_str("sim-1");
   app.add_option("--boot-id", options.boot_id, "fixed boot id in hexadecimal instead of a random one");
   app.add_option("--samples-per-frame", options.samples_per_frame, "of telemetry, 1 to 25")->default_str("5");
+  app.add_option("--clock-drift-ppm", options.clock_drift_ppm, "of its clock against true time; fast is positive")
+      ->default_str("0")
+      ->type_name("PPM");
   app.add_option("--duration-s", options.duration_s, "end by itself after so long; 0: never")
       ->check(CLI::Range(0.0, 1e9))
       ->type_name("S");
@@ -48,8 +52,11 @@ Scenario scenario_of(const RobotOptions& options) {
   if (options.duty_max) robot.duty.max = *options.duty_max;
   if (options.id) robot.robot_id = *options.id;
   if (options.samples_per_frame) robot.samples_per_frame = *options.samples_per_frame;
+  if (options.clock_drift_ppm) robot.clock_drift_ppm = *options.clock_drift_ppm;
   if (options.token) robot.token = *options.token;
   if (options.duration_s) scenario.duration_s = *options.duration_s;
+  if (!std::isfinite(scenario.duration_s))
+    control::throw_invalid("--duration-s: ", scenario.duration_s, " is not a time");
   robot.boot_id = options.boot_id ? parse_boot_id(*options.boot_id) : random_boot_id();
   check(robot);
   check_faults(scenario);

@@ -15,7 +15,7 @@ struct RobotOptions {
   std::optional<float> duty_min, duty_max;
   std::optional<std::string> id, token, boot_id;
   std::optional<std::uint32_t> samples_per_frame;
-  std::optional<double> duration_s;
+  std::optional<double> clock_drift_ppm, duration_s;
 };
 
 void add_duty(CLI::App& app, RobotOptions& options);

@@ -2,6 +2,7 @@
 #include "sim_robot/run_command.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <chrono>
@@ -11,6 +12,7 @@
 #include "control/invalid_argument.hpp"
 #include "sim_robot/fault_server.hpp"
 #include "sim_robot/fleet_run.hpp"
+#include "sim_robot/proxy.hpp"
 #include "sim_robot/robot_client.hpp"
 
 namespace sim_robot {
@@ -18,7 +20,12 @@ namespace {
 
 namespace asio = boost::asio;
 
+constexpr int kNeverIn = 2;  // exit status, as of a fleet
+
 void say(const std::string& line) { std::cout << "rheonaut-sim: " << line << std::endl; }
+
+// What goes with a fleet's JSON.
+void say_aside(const std::string& line) { std::cerr << "rheonaut-sim: " << line << std::endl; }
 
 void spawn(asio::io_context& loop, asio::awaitable<void> task) {
   asio::co_spawn(loop, std::move(task), [](const std::exception_ptr& error) {
@@ -26,14 +33,46 @@ void spawn(asio::io_context& loop, asio::awaitable<void> task) {
   });
 }
 
-void announce(const Scenario& scenario) {
-  if (!scenario.name.empty()) say("scenario " + scenario.name + ": " + scenario.description);
-  if (!scenario.script.empty()) say("its script is for `rheonaut-sim play`; here the station gives the commands");
-  if (scenario.duration_s > 0) say(control::join_text("ends by itself after ", scenario.duration_s, " s"));
+void announce(const Scenario& scenario, bool has_network, const LinkLog& tell) {
+  if (!scenario.name.empty()) tell("scenario " + scenario.name + ": " + scenario.description);
+  if (!scenario.script.empty()) tell("its script is for `rheonaut-sim play`; here the station gives the commands");
+  if (scenario.duration_s > 0) tell(control::join_text("ends by itself after ", scenario.duration_s, " s"));
   for (const TimedFault& timed : scenario.faults) {
-    const std::string reason = why_not(timed.fault.kind);
-    if (!reason.empty()) say(control::join_text("at ", timed.at_s, " s will be passed over: ", reason));
+    const std::string reason = why_not(timed.fault.kind, has_network);
+    if (!reason.empty()) tell(control::join_text("at ", timed.at_s, " s will be passed over: ", reason));
   }
+}
+
+bool breaks_the_link(const Scenario& scenario) {
+  return std::ranges::any_of(scenario.faults,
+                             [](const TimedFault& timed) { return !why_not(timed.fault.kind, false).empty(); });
+}
+
+// Of what a proxy says, that the station is not there, once; the time line says the faults.
+LinkLog only_unreachable() {
+  return [was_said = false](const std::string& line) mutable {
+    if (was_said || !line.starts_with("cannot reach")) return;
+    was_said = true;
+    say(line.substr(0, line.find(": ")));
+  };
+}
+
+// A network between robot and station, to be broken. The robot dials the address that this returns.
+StationAddress put_between(std::optional<Proxy>& network, asio::io_context& loop, const StationAddress& station) {
+  ProxyOptions options;
+  options.target = station;
+  network.emplace(loop, options, only_unreachable());
+  spawn(loop, network->run());
+  say(control::join_text("dials ", station.host, ":", station.port, " through ", network->endpoint(),
+                         " in this process, which does the faults of the link"));
+  return {"127.0.0.1", std::to_string(network->endpoint().port())};
+}
+
+void stop_at_end(asio::io_context& loop, asio::signal_set& stop, asio::steady_timer& end, double duration_s) {
+  stop.async_wait([&loop](const boost::system::error_code&, int) { loop.stop(); });
+  if (duration_s <= 0) return;
+  end.expires_after(std::chrono::microseconds(std::llround(duration_s * 1e6)));
+  end.async_wait([&loop](const boost::system::error_code&) { loop.stop(); });
 }
 
 }  // namespace
@@ -64,7 +103,7 @@ int RunCommand::run() const {
 }
 
 int RunCommand::run_many(const Scenario& scenario, const StationAddress& station) const {
-  if (!json_) announce(scenario);
+  announce(scenario, false, json_ ? say_aside : say);
   FleetOptions fleet;
   fleet.station = station;
   fleet.robots = robots_;
@@ -78,24 +117,31 @@ int RunCommand::run_many(const Scenario& scenario, const StationAddress& station
 
 int RunCommand::run_one(const Scenario& scenario, const StationAddress& station) const {
   asio::io_context loop{1};
-  RobotClient client{loop, scenario.robot, station, say, std::chrono::milliseconds(handshake_ms_), scenario.faults};
+  std::optional<Proxy> network;  // of its own, only when it is to be broken
+  const bool is_to_be_broken = !faults_at_.empty() || breaks_the_link(scenario);
+  const StationAddress dialled = is_to_be_broken ? put_between(network, loop, station) : station;
+  RobotClient client{loop,
+                     scenario.robot,
+                     dialled,
+                     say,
+                     std::chrono::milliseconds(handshake_ms_),
+                     scenario.faults,
+                     network ? &*network : nullptr};
   std::optional<FaultServer> server;
   if (!faults_at_.empty()) {
-    server.emplace(loop, parse_faults_address(faults_at_, faults_anywhere_), client.faults(), client.robot());
+    server.emplace(loop, parse_faults_address(faults_at_, faults_anywhere_), client.faults(), client.faulty());
     say(control::join_text("faults at http://", server->address(), "/faults"));
     spawn(loop, server->run());
   }
-  announce(scenario);
+  announce(scenario, network.has_value(), say);
   spawn(loop, client.run());
   asio::signal_set stop{loop, SIGINT, SIGTERM};
-  stop.async_wait([&loop](const boost::system::error_code&, int) { loop.stop(); });
   asio::steady_timer end{loop};
-  if (scenario.duration_s > 0) {
-    end.expires_after(std::chrono::microseconds(std::llround(scenario.duration_s * 1e6)));
-    end.async_wait([&loop](const boost::system::error_code&) { loop.stop(); });
-  }
+  stop_at_end(loop, stop, end, scenario.duration_s);
   loop.run();
-  return EXIT_SUCCESS;
+  if (client.connection().counts().welcomes > 0) return EXIT_SUCCESS;
+  say("no station has taken it in");
+  return kNeverIn;
 }
 
 }  // namespace sim_robot

@@ -16,7 +16,7 @@
 namespace sim_robot {
 
 struct TimedFault {
-  double at_s = kMustBeGiven;  // robot time
+  double at_s = kMustBeGiven;  // true time since the run began
   Fault fault;
 };
 

@@ -20,6 +20,8 @@ void robot_fields(Fields& fields, SimulatedRobotConfig& robot) {
   fields.text("id", robot.robot_id, "name, 1 to 31 of [a-z0-9_-]");
   fields.number("duty_min", duty_min, {-1, 0}, "lowest duty of the motor");
   fields.number("duty_max", duty_max, {0, 1}, "highest duty of the motor, above 0");
+  fields.number("clock_drift_ppm", robot.clock_drift_ppm, {-100'000, 100'000},
+                "of its clock against true time; fast is positive");
   robot.duty = {static_cast<float>(duty_min), static_cast<float>(duty_max)};
   fields.must([&robot] { check(robot); });
 }
@@ -65,7 +67,7 @@ void fields(Fields& fields, Scenario& scenario) {
   world_fields(fields, scenario.robot.world);
   const auto fault_inside = [&scenario](Fields& inside) {
     TimedFault timed;
-    inside.number("at_s", timed.at_s, kTimes, "robot time");
+    inside.number("at_s", timed.at_s, kTimes, "time of the run");
     fields_with_kind(inside, timed.fault);
     inside.must([&timed, &scenario] {
       check_time(timed.at_s, scenario.duration_s);
@@ -76,7 +78,7 @@ void fields(Fields& fields, Scenario& scenario) {
   fields.tables("faults", "", fault_inside);
   const auto step_inside = [&scenario](Fields& inside) {
     ScriptStep step;
-    inside.number("at_s", step.at_s, kTimes, "robot time");
+    inside.number("at_s", step.at_s, kTimes, "time of the run");
     std::size_t index = kCommands.size();
     inside.choice("command", index, kCommands, "what a station says to the robot");
     step.command = static_cast<ScriptCommand>(index < kCommands.size() ? index : 0);

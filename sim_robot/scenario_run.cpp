@@ -1,10 +1,11 @@
-// Steps robot, faults and script together.
+// Steps the lab and follows the script.
 #include "sim_robot/scenario_run.hpp"
 
 #include <array>
 #include <cmath>
 
 #include "control/invalid_argument.hpp"
+#include "sim_robot/station_commands.hpp"
 
 namespace sim_robot {
 namespace {
@@ -12,25 +13,17 @@ namespace {
 constexpr int kTicksToRenewal = 10;        // a lease lives longer
 constexpr double kHalfTickS = kTickS / 2;  // times are compared with this room for rounding
 
-std::vector<TimedFault> without_outages(const Scenario& scenario) {
-  std::vector<TimedFault> others;
-  for (const TimedFault& timed : scenario.faults) {
-    if (timed.fault.kind != FaultKind::link_outage) others.push_back(timed);
-  }
-  return others;
+LinkOptions perfect_link(const Scenario& scenario) {
+  LinkOptions options;
+  options.seed = scenario.robot.world.seed;  // of the faults' chance and the pauses before it dials again
+  return options;
 }
 
 }  // namespace
 
 ScenarioRun::ScenarioRun(const Scenario& scenario, FaultTimeline::Log log)
-    : scenario_(scenario),
-      robot_(scenario_.robot),
-      station_(robot_),
-      faults_(without_outages(scenario_), std::move(log)) {
-  for (const auto& [at_s, fault] : scenario_.faults) {
-    if (fault.kind == FaultKind::link_outage) outages_.push_back({at_s, at_s + fault.for_s});
-  }
-  station_.welcome.samples_per_frame = 1;  // so that the last sample is sent in its own tick
+    : scenario_(scenario), lab_(scenario_.robot, perfect_link(scenario_), scenario_.faults, std::move(log)) {
+  lab_.station.welcome.samples_per_frame = 1;  // so that the last sample is sent in its own tick
 }
 
 void ScenarioRun::run() {
@@ -39,27 +32,8 @@ void ScenarioRun::run() {
 }
 
 void ScenarioRun::step() {
-  follow_link();
-  faults_.apply_due(robot_);
-  if (is_connected_) follow_script();
-  station_.step();
-}
-
-bool ScenarioRun::link_is_out() const {
-  for (const Outage& outage : outages_) {
-    if (time_s() >= outage.from_s - kHalfTickS && time_s() < outage.until_s - kHalfTickS) return true;
-  }
-  return false;
-}
-
-void ScenarioRun::follow_link() {
-  if (link_is_out() == !is_connected_) return;
-  is_connected_ = !is_connected_;
-  if (is_connected_) {
-    station_.connect();
-  } else {
-    station_.disconnect();
-  }
+  if (lab_.station.link_is_up()) follow_script();
+  lab_.step();
 }
 
 void ScenarioRun::follow_script() {
@@ -70,22 +44,21 @@ void ScenarioRun::follow_script() {
 }
 
 void ScenarioRun::say(const ScriptStep& step) {
+  LinkedPeer& station = lab_.station;
   const auto setpoint_m = static_cast<float>(step.setpoint_m);
   switch (step.command) {
-    case ScriptCommand::set_auto: station_.send(set_auto(setpoint_m)); break;
-    case ScriptCommand::set_manual: station_.send(set_manual()); break;
-    case ScriptCommand::set_setpoint: station_.send(set_setpoint(setpoint_m)); break;
+    case ScriptCommand::set_auto: station.send(set_auto(setpoint_m)); break;
+    case ScriptCommand::set_manual: station.send(set_manual()); break;
+    case ScriptCommand::set_setpoint: station.send(set_setpoint(setpoint_m)); break;
     case ScriptCommand::inject_disturbance:
-      station_.send(inject_disturbance(static_cast<float>(step.disturbance_m)));
+      station.send(inject_disturbance(static_cast<float>(step.disturbance_m)));
       return;
     case ScriptCommand::set_parameter:
-      station_.send(set_parameter(step.parameter.c_str(), static_cast<float>(step.value)));
+      station.send(set_parameter(step.parameter.c_str(), static_cast<float>(step.value)));
       return;
-    case ScriptCommand::zero_position: station_.send(zero_position()); return;
-    case ScriptCommand::emergency_stop: station_.send(emergency_stop()); break;
-    case ScriptCommand::clear_emergency:
-      if (!station_.samples.empty()) station_.send(clear_emergency(station_.samples.rbegin()->second.emergency_id));
-      return;
+    case ScriptCommand::zero_position: station.send(zero_position()); return;
+    case ScriptCommand::emergency_stop: station.send(emergency_stop()); break;
+    case ScriptCommand::clear_emergency: station.send(clear_emergency(emergency_id())); return;
     case ScriptCommand::set_duty:
       duty_ = static_cast<float>(step.duty);
       duty_until_s_ = step.at_s + step.for_s;
@@ -95,13 +68,20 @@ void ScenarioRun::say(const ScriptStep& step) {
   duty_until_s_ = 0;  // another command for the motor ends the duty
 }
 
+// The last that the station has heard of; 0: none.
+std::uint64_t ScenarioRun::emergency_id() const {
+  const LinkedPeer& station = lab_.station;
+  if (!station.samples.empty()) return station.samples.rbegin()->second.emergency_id;
+  return station.hello ? station.hello->emergency_id : 0;
+}
+
 void ScenarioRun::renew_duty() {
   if (duty_until_s_ == 0) return;
   if (time_s() >= duty_until_s_ - kHalfTickS) {
     duty_until_s_ = 0;
-    station_.send(set_duty(0));
+    lab_.station.send(set_duty(0));
   } else if (ticks_to_renewal_-- == 0) {
-    station_.send(set_duty(duty_));
+    lab_.station.send(set_duty(duty_));
     ticks_to_renewal_ = kTicksToRenewal - 1;
   }
 }
@@ -109,7 +89,7 @@ void ScenarioRun::renew_duty() {
 std::vector<std::uint8_t> ScenarioRun::bytes() const {
   std::vector<std::uint8_t> all;
   std::array<std::uint8_t, protocol::kMaxFramedBytes> buffer;
-  for (const protocol::RobotFrame& frame : station_.frames) {
+  for (const protocol::RobotFrame& frame : lab_.station.frames) {
     const std::size_t size = protocol::write_frame(frame, buffer.data(), buffer.size());
     all.insert(all.end(), buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size));
   }

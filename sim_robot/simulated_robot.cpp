@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <memory>
 #include <random>
 #include <stdexcept>
@@ -12,6 +13,7 @@ namespace sim_robot {
 namespace {
 
 constexpr int kRssiDbm = -50;
+constexpr double kMostDriftPpm = 100'000;
 constexpr std::uint64_t kTicksToMotorOff = 5;
 
 robot_fw::RobotConfig core_config(const SimulatedRobotConfig& config) {
@@ -65,6 +67,10 @@ void check(const SimulatedRobotConfig& config) {
     throw std::invalid_argument("duty range [" + std::to_string(min) + ", " + std::to_string(max) +
                                 "] is not within [-1, 0] and (0, 1]");
   }
+  if (!(std::abs(config.clock_drift_ppm) <= kMostDriftPpm)) {
+    throw std::invalid_argument("clock drift of " + std::to_string(config.clock_drift_ppm) +
+                                " ppm is not within -100000 and 100000");
+  }
   if (config.samples_per_frame < 1 || config.samples_per_frame > protocol::kMaxSamplesPerFrame) {
     throw std::invalid_argument(std::to_string(config.samples_per_frame) + " samples a frame is not within 1 and 25");
   }
@@ -81,6 +87,17 @@ void SimulatedRobot::step() {
   const robot_fw::Outputs outputs = core_.step(inputs, static_cast<float>(kPeriodS));
   world_.step(static_cast<double>(outputs.duty));
   robot_time_us_ += kPeriodUs;
+}
+
+// The ring is left out: a tick writes one place of it.
+void SimulatedRobot::prefetch() const {
+  const auto fetch = [](const void* begin, const void* end) {
+    constexpr std::ptrdiff_t kLine = 64;
+    for (const auto* at = static_cast<const char*>(begin); at < end; at += kLine) __builtin_prefetch(at, 1);
+  };
+  fetch(&core_, &core_.samples());
+  fetch(&core_.samples() + 1, &world_ + 1);
+  world_.prefetch();
 }
 
 void SimulatedRobot::advance_to(std::uint64_t now_us) {

@@ -19,6 +19,7 @@ struct SimulatedRobotConfig {
   robot_fw::DutyRange duty{-1, 1};
   std::uint32_t samples_per_frame = 5;  // 1 to 25; the station may ask for another
   WorldConfig world;
+  double clock_drift_ppm = 0;               // of its clock against true time, see robot_life; fast is positive
   robot_fw::Storage* storage = nullptr;     // of parameters and controller; null: they end with the robot
   std::uint64_t restored_emergency_id = 0;  // a latch that outlived the reset; 0: none
   protocol::EmergencyCause restored_emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;
@@ -43,6 +44,8 @@ class SimulatedRobot {
   SimulatedRobot& operator=(const SimulatedRobot&) = delete;
 
   void step();  // one tick of kPeriodS
+  // Asks for the memory that a tick works on, ahead of it: many robots do not fit a cache.
+  void prefetch() const;
 
   // Lets robot time reach `now_us`: afterwards no tick is due. Ticks that are up to kMaxLatenessUs late run one by one,
   // each at its own time. After a longer stall only the latest one runs; those before it are skipped.

@@ -1,14 +1,12 @@
 // Dials, reads and writes.
 #include "sim_robot/station_connection.hpp"
 
+#include <algorithm>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/connect.hpp>
-#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <chrono>
-#include <stdexcept>
 #include <utility>
 
 namespace sim_robot {
@@ -16,46 +14,27 @@ namespace {
 
 namespace asio = boost::asio;
 using asio::ip::tcp;
-using namespace asio::experimental::awaitable_operators;
 using namespace std::chrono_literals;
 
 constexpr auto kConnectTimeout = 1s;
-constexpr auto kMayDialPeriod = 10ms;
+constexpr auto kAskAgain = 10ms;
 constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
+constexpr int kMostPauses = 4;                       // taken together, for a station that is not there
 constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
-asio::awaitable<void> pause(std::chrono::milliseconds duration) {
-  asio::steady_timer timer{co_await asio::this_coro::executor, duration};
-  co_await timer.async_wait(asio::use_awaitable);
-}
-
 }  // namespace
-
-StationAddress parse_station_address(const std::string& text, const std::string& option, int lowest_port) {
-  const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos || colon == 0 || colon + 1 == text.size()) {
-    throw std::invalid_argument(option + ": '" + text + "' is not ADDR:PORT");
-  }
-  std::string host = text.substr(0, colon);
-  if (host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
-  const std::string port = text.substr(colon + 1);
-  if (port.size() > 5 || port.find_first_not_of("0123456789") != std::string::npos || std::stoi(port) > 65535 ||
-      std::stoi(port) < lowest_port) {
-    throw std::invalid_argument(option + ": '" + port + "' is not a port");
-  }
-  return {host, port};
-}
 
 StationConnection::StationConnection(asio::io_context& loop, Speaker& speaker, StationAddress station, std::string name,
                                      LinkLog log)
     : speaker_(speaker), station_(std::move(station)), name_(std::move(name)), log_(std::move(log)), socket_(loop) {}
 
 asio::awaitable<void> StationConnection::run() {
-  for (;;) {
-    while (!speaker_.may_dial()) co_await pause(kMayDialPeriod);
+  for (int failures = 0;;) {
+    while (!speaker_.may_dial()) co_await pause(kAskAgain);
     const int times_forgotten = times_forgotten_;
-    const bool dialled = co_await dial();
-    if (!dialled) {
+    const bool reached = co_await reach();
+    failures = reached ? 0 : failures + 1;
+    if (!reached) {
       ++counts_.unreachable;
       say("cannot reach the station at " + station_.host + ":" + station_.port + ", trying again");
     } else {
@@ -66,38 +45,16 @@ asio::awaitable<void> StationConnection::run() {
       }
     }
     std::uniform_int_distribution<int> pause_ms{kMinPauseMs, kMaxPauseMs};
-    co_await pause(std::chrono::milliseconds(pause_ms(jitter_)));
+    co_await pause(std::clamp(failures, 1, kMostPauses) * std::chrono::milliseconds(pause_ms(jitter_)));
   }
 }
 
-// An address in numbers needs no resolver, which would serve a fleet one by one.
-asio::awaitable<bool> StationConnection::dial() {
-  boost::system::error_code error;
-  const auto address = asio::ip::make_address(station_.host, error);
-  std::vector<tcp::endpoint> endpoints;
-  if (!error) {
-    endpoints.emplace_back(address, static_cast<std::uint16_t>(std::stoi(station_.port)));
-  } else {
-    tcp::resolver resolver{socket_.get_executor()};
-    auto resolving = resolver.async_resolve(station_.host, station_.port, kNoThrow) || pause(kConnectTimeout);
-    auto resolved = co_await std::move(resolving);
-    if (resolved.index() == 1) co_return false;
-    const auto [resolve_error, results] = std::get<0>(resolved);
-    if (resolve_error) co_return false;
-    endpoints.assign(results.begin(), results.end());
-  }
-  co_return co_await reach(std::move(endpoints));
-}
-
-asio::awaitable<bool> StationConnection::reach(std::vector<tcp::endpoint> endpoints) {
+asio::awaitable<bool> StationConnection::reach() {
   socket_ = tcp::socket{socket_.get_executor()};
-  auto connecting = asio::async_connect(socket_, endpoints, kNoThrow) || pause(kConnectTimeout);
-  auto outcome = co_await std::move(connecting);
-  if (outcome.index() == 1 || std::get<0>(std::get<0>(outcome))) co_return false;
+  const bool reached = co_await dial(socket_, station_, kConnectTimeout);
   boost::system::error_code error;
-  socket_.set_option(tcp::no_delay{true}, error);
-  socket_.non_blocking(true, error);
-  co_return !error;
+  if (reached) socket_.non_blocking(true, error);
+  co_return reached && !error;
 }
 
 asio::awaitable<bool> StationConnection::shake_hands() {
@@ -109,13 +66,16 @@ asio::awaitable<bool> StationConnection::shake_hands() {
 // Bytes go to the speaker as they arrive, and what it answers leaves at once.
 asio::awaitable<void> StationConnection::serve() {
   is_open_ = true;
+  ++counts_.opened;
   was_welcome_ = false;
-  unsent_.clear();
+  frame_size_ = frame_sent_ = 0;
   speaker_.on_opened();
   if (is_open_) flush();
   while (is_open_) {
     const auto [error] = co_await socket_.async_wait(tcp::socket::wait_read, kNoThrow);
     if (error) break;
+    while (is_open_ && !speaker_.is_listening()) co_await pause(kAskAgain);
+    if (!is_open_) break;
     const bool keep = take_bytes();
     if (!keep) break;
   }
@@ -142,30 +102,29 @@ void StationConnection::notice_welcome() {
   say("connected to " + station_.host + ":" + station_.port + " as " + name_);
 }
 
+bool StationConnection::prepare() {
+  if (!is_open_) return false;
+  if (frame_sent_ < frame_size_) return true;
+  const std::size_t size = speaker_.next_frame(frame_.data(), frame_.size());
+  if (size == 0) return false;
+  frame_size_ = size;
+  frame_sent_ = 0;
+  ++counts_.frames;
+  return true;
+}
+
 void StationConnection::flush() {
-  if (is_open_ && !unsent_.empty()) {
-    const auto rest = std::exchange(unsent_, {});
-    if (!write({rest.data(), rest.size()})) return;
-  }
-  std::array<std::uint8_t, protocol::kMaxFramedBytes> frame;
-  while (is_open_) {
-    const std::size_t size = speaker_.next_frame(frame.data(), frame.size());
-    if (size == 0) return;
-    ++counts_.frames;
-    if (!write({frame.data(), size})) return;
+  while (prepare()) {
+    if (!write()) return;
   }
 }
 
 // True when all of it was taken; keeps the rest otherwise.
-bool StationConnection::write(protocol::Bytes bytes) {
+bool StationConnection::write() {
   boost::system::error_code error;
-  bytes.drop(socket_.write_some(asio::buffer(bytes.first, bytes.size), error));
-  if (error && error != asio::error::would_block) {
-    close();
-    return false;
-  }
-  unsent_.assign(bytes.begin(), bytes.end());
-  return bytes.empty();
+  frame_sent_ += socket_.write_some(asio::buffer(frame_.data() + frame_sent_, frame_size_ - frame_sent_), error);
+  if (error && error != asio::error::would_block) close();
+  return is_open_ && frame_sent_ == frame_size_;
 }
 
 // SAFETY: the silence may be the robot's own, after a stall; a stop that came meanwhile is read before the verdict.
@@ -181,6 +140,7 @@ void StationConnection::forget() {
   ++times_forgotten_;
   boost::system::error_code ignored;
   socket_.cancel(ignored);
+  reset_forgotten();
   if (is_open_) forgotten_.emplace(std::move(socket_));
   is_open_ = false;
 }
@@ -204,8 +164,8 @@ void StationConnection::say_how_it_ended() {
   if (speaker_.refusal() != rheonaut_REFUSAL_REASON_NONE) {
     ++counts_.refusals;
     const std::string detail = speaker_.refusal_detail();
-    say("refused by the station: " + std::string(protocol::text(speaker_.refusal())) +
-        (detail.empty() ? "" : " (" + detail + ")"));
+    refusal_ = std::string(protocol::text(speaker_.refusal())) + (detail.empty() ? "" : " (" + detail + ")");
+    say("refused by the station: " + refusal_);
   } else {
     say(was_welcome_ ? "connection lost, dialling again" : "the station closed the connection before its welcome");
   }

@@ -2,7 +2,7 @@
 //
 // What speaks over it is a Speaker: a simulated robot, or a recording that is replayed. What the socket does not take
 // at once of a frame stays here, the speaker is asked for no other until it is gone. After a failure it is dialled
-// again 0.3 to 0.9 s later, at random, so that many do not come at once.
+// again 0.3 to 0.9 s later, at random, so that many do not come at once; up to four times as long where nobody answers.
 // One buffer serves the reads of all connections of a thread. The loop and the speaker must outlive the connection.
 #pragma once
 
@@ -19,16 +19,9 @@
 #include <vector>
 
 #include "protocol/frame.hpp"
+#include "sim_robot/dialling.hpp"
 
 namespace sim_robot {
-
-struct StationAddress {
-  std::string host;
-  std::string port;
-};
-// "host:port" or "[v6]:port"; throws std::invalid_argument that names the option.
-StationAddress parse_station_address(const std::string& text, const std::string& option = "--station",
-                                     int lowest_port = 1);
 
 // What people are told about the link, one line each.
 using LinkLog = std::function<void(const std::string& line)>;
@@ -47,6 +40,8 @@ class Speaker {
   virtual std::string refusal_detail() const = 0;
   // Whether to dial now; asked again every 10 ms.
   virtual bool may_dial() const { return true; }
+  // Whether to read now what has arrived; asked again every 10 ms.
+  virtual bool is_listening() const { return true; }
   // How long until a connection made is open; empty: it is not wanted any more.
   virtual std::optional<std::chrono::milliseconds> begin_handshake() { return std::chrono::milliseconds(0); }
 
@@ -57,6 +52,7 @@ class Speaker {
 // How the connections of this one went so far.
 struct LinkCounts {
   std::uint64_t unreachable = 0;  // attempts without a connection
+  std::uint64_t opened = 0;
   std::uint64_t welcomes = 0;
   std::uint64_t refusals = 0;
   std::uint64_t frames = 0;  // sent
@@ -71,6 +67,8 @@ class StationConnection {
   // Dials and reads until cancelled. Never returns otherwise.
   boost::asio::awaitable<void> run();
 
+  // Takes the frame that is due next from the speaker, unless one is still under way. True when there is one to write.
+  bool prepare();
   // Hands the socket what it takes without waiting, one write per frame.
   void flush();
   // Closes the connection of a station that is silent, unless bytes of it wait to be read.
@@ -82,14 +80,14 @@ class StationConnection {
 
   bool is_open() const { return is_open_; }
   const LinkCounts& counts() const { return counts_; }
+  const std::string& refusal() const { return refusal_; }  // the last one, as the log says it; empty: none
 
  private:
-  boost::asio::awaitable<bool> dial();
   boost::asio::awaitable<bool> shake_hands();
-  boost::asio::awaitable<bool> reach(std::vector<boost::asio::ip::tcp::endpoint> endpoints);
+  boost::asio::awaitable<bool> reach();
   boost::asio::awaitable<void> serve();
   bool take_bytes();
-  bool write(protocol::Bytes bytes);
+  bool write();
   void close();
   void notice_welcome();
   void say_how_it_ended();
@@ -105,8 +103,9 @@ class StationConnection {
   bool is_open_ = false;
   bool was_welcome_ = false;  // on this connection
   LinkCounts counts_;
-  std::string last_line_;
-  std::vector<std::uint8_t> unsent_;  // of the frame under way
+  std::string refusal_, last_line_;
+  std::array<std::uint8_t, protocol::kMaxFramedBytes> frame_;  // under way
+  std::size_t frame_size_ = 0, frame_sent_ = 0;
   std::minstd_rand jitter_{std::random_device{}()};
 };
 

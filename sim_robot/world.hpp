@@ -53,6 +53,8 @@ class World {
   void pour(const GlucosePatch& patch) { glucose_.pour(patch); }
 
   // The truth. Positions from where the robot booted.
+  void prefetch() const { plant_.prefetch(); }  // see SimulatedRobot
+
   double position_m() const { return position_m_; }
   double velocity_m_s() const { return velocity_m_s_; }
   double acceleration_m_s2() const { return acceleration_m_s2_; }

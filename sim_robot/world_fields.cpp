@@ -30,6 +30,7 @@ void fluid_fields(Fields& fields, PlantParameters& plant) {
     fields.number("alpha", model.alpha, {0, 2}, "order, above beta");
     fields.number("beta", model.beta, {0, 2}, "order");
   }
+  fields.number("dead_time_s", plant.dead_time_s, {0, 10}, "from the duty to its first effect, in whole ticks");
   fields.must([&plant] {
     check(plant);
     const Plant made{plant, kTickS};  // not every model has a modal form
@@ -56,7 +57,7 @@ void battery_fields(Fields& fields, BatteryParameters& battery) {
 
 void pump_fields(Fields& fields, PumpParameters& pump) {
   fields.number("mean_flow_m3_s", pump.mean_flow_m3_s, kFlowRange, "negative: backwards");
-  fields.number("starts_at_s", pump.starts_at_s, {-1e9, 1e9}, "robot time; before 0 it has been on for long");
+  fields.number("starts_at_s", pump.starts_at_s, {-1e9, 1e9}, "time of the run; before 0 it has been on for long");
   fields.number("ramp_s", pump.ramp_s, {0, 1e6}, "of each change of the mean flow");
   fields.number("compliance_s", pump.compliance_s, {0, 10}, "of the walls; 0: rigid");
   fields.must([&pump] { check(pump); });
@@ -82,8 +83,8 @@ void glucose_fields(Fields& fields, GlucoseParameters& glucose) {
   const auto patch_inside = [&glucose](Fields& inside) {
     GlucosePatch patch{.position_m = kMustBeGiven};
     patch_fields(inside, patch);
-    inside.number("poured_at_s", patch.poured_at_s, {0, 1e9}, "robot time");
-    inside.number("removed_at_s", patch.removed_at_s, kTimes, "robot time");
+    inside.number("poured_at_s", patch.poured_at_s, {0, 1e9}, "time of the run");
+    inside.number("removed_at_s", patch.removed_at_s, kTimes, "time of the run");
     inside.must([&patch] { check(patch); });
     glucose.patches.push_back(patch);
   };

@@ -6,7 +6,7 @@
 
 namespace sim_robot {
 
-constexpr Range kFlowRange{-0.02, 0.02};  // m³/s; 25 times what the paper's tubes are assumed to carry
+constexpr Range kFlowRange{-0.01, 0.01};  // m³/s, as of the pump; 12 times what the paper's tubes are assumed to carry
 
 void patch_fields(Fields& fields, GlucosePatch& patch);
 // [fluid], [motor], [battery], [vessel], [vessel.pump], [glucose], [accelerometer], [electrode]

@@ -27,7 +27,7 @@ void add_surroundings(CLI::App& app, WorldOptions& options) {
 
 void put(const WorldOptions& options, WorldConfig& world) {
   if (options.fluid) world.plant = fluid(*options.fluid);
-  if (options.model_file) world.plant = {.model = load_model(*options.model_file)};
+  if (options.model_file) world.plant = load_model(*options.model_file);
   if (options.mean_flow_m3_s) {
     if (!world.vessel) world.vessel.emplace();
     world.vessel->pump.mean_flow_m3_s = *options.mean_flow_m3_s;

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Checks that what the documents point to is there: relative links, and paths such as `server/link/robot_session`.
+"""Checks that what the documents point to is there: relative links, paths such as `server/link/robot_session`, code.
 
 A path in backquotes that begins with one of our folders must be a file or folder, with or without its suffix; `*` and
-`<noun>` match anything. Prints `file:line: what is missing` and fails if anything is.
+`<noun>` match anything. A block of code that names a file, as "```cpp tests/sim_robot/story_examples_test.cpp", must
+stand in that file word for word. Prints `file:line: what is missing` and fails if anything is.
 """
 import pathlib
 import re
@@ -17,12 +18,26 @@ def exists(root, path):
     return any(any(root.glob(pattern + suffix)) for suffix in SUFFIXES)
 
 
+def misquotations(root, text):
+    """(line, what is wrong) of each block of code that names its file."""
+    for block in re.finditer(r"^```\w+ (\S+/\S+)\n(.*?)^```$", text, re.M | re.S):
+        path, code = block.groups()
+        line = text.count("\n", 0, block.start()) + 1
+        if not (root / path).is_file():
+            yield line, f"there is no {path} to quote"
+        elif code not in (root / path).read_text(encoding="utf-8"):
+            yield line, f"this code does not stand in {path}"
+
+
 def faults(root):
     documents = [*root.glob("*.md"), *root.glob("docs/**/*.md")]
     for document in sorted(documents):
+        text = document.read_text(encoding="utf-8")
+        name = document.relative_to(root)
+        yield from (f"{name}:{line}: {what}" for line, what in misquotations(root, text))
         in_block = False
-        for number, line in enumerate(document.read_text(encoding="utf-8").splitlines(), 1):
-            place = f"{document.relative_to(root)}:{number}"
+        for number, line in enumerate(text.splitlines(), 1):
+            place = f"{name}:{number}"
             in_block ^= line.startswith("```")
             for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", line):
                 if not re.match(r"\w+:", target) and not (document.parent / target).exists():
@@ -38,7 +53,7 @@ def main():
     found = list(faults(root))
     for fault in found:
         print(fault)
-    print(f"{len(found)} faults" if found else "all links and paths lead somewhere")
+    print(f"{len(found)} faults" if found else "all links and paths lead somewhere, and all code is quoted right")
     return 1 if found else 0
 
 

@@ -25,7 +25,7 @@ namespace server {
 struct LinkTimes {
   std::uint32_t link_timeout_ms = protocol::kDefaultLinkTimeoutMs;
   std::uint32_t heartbeat_interval_ms = protocol::kDefaultHeartbeatIntervalMs;
-  std::uint32_t samples_per_frame = 5;
+  std::uint32_t samples_per_frame = 0;  // 0: as each robot has it
 };
 
 // A wish to command a robot. `action` has its action member set; the station fills id, boot and validity.

@@ -48,6 +48,7 @@ class LinkedRobot {
     hear(welcome());
   }
 
+  void prefetch() const { robot_.prefetch(); }
   void tick() {
     robot_.step();
     drain();
@@ -101,7 +102,10 @@ void fleet_tick(benchmark::State& state) {
     robots.push_back(std::make_unique<LinkedRobot>(everything(static_cast<std::uint64_t>(i) + 1)));
   }
   for (auto _ : state) {
-    for (const auto& robot : robots) robot->tick();
+    for (std::size_t i = 0; i < robots.size(); ++i) {
+      robots[(i + 1) % robots.size()]->prefetch();  // as a fleet does
+      robots[i]->tick();
+    }
   }
   state.SetItemsProcessed(state.iterations() * state.range(0));
 }

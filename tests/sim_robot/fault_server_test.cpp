@@ -13,6 +13,8 @@
 #include <boost/asio/write.hpp>
 #include <nlohmann/json.hpp>
 
+#include "sim_robot/impaired_link.hpp"
+
 namespace sim_robot {
 namespace {
 
@@ -36,7 +38,9 @@ asio::awaitable<std::string> exchange(tcp::endpoint server, std::string request)
 
 class FaultServerTest : public ::testing::Test {
  protected:
-  FaultServerTest() {
+  static constexpr std::chrono::milliseconds kTime{200};
+
+  explicit FaultServerTest(bool has_network = false) : has_network_(has_network) {
     asio::co_spawn(loop_, server_.run(), asio::bind_cancellation_slot(stop_.slot(), [](std::exception_ptr) {}));
   }
   ~FaultServerTest() override {
@@ -68,14 +72,70 @@ class FaultServerTest : public ::testing::Test {
   static Json body_of(const std::string& answer) {
     return Json::parse(answer.substr(std::min(answer.size(), answer.find("\r\n\r\n") + 4)), nullptr, false);
   }
-  double reading_mv() { return static_cast<double>(robot_.world().read(robot_.robot_time_us()).impedance_mv); }
+  double reading_mv() {
+    SimulatedRobot& robot = life_.robot();
+    return static_cast<double>(robot.world().read(robot.robot_time_us()).impedance_mv);
+  }
 
+  static SimulatedRobotConfig in_a_tube() {
+    SimulatedRobotConfig config;
+    config.world.imu.emplace();
+    config.world.vessel.emplace();
+    return config;
+  }
+
+  const bool has_network_;
   asio::io_context loop_{1};
   asio::cancellation_signal stop_;
-  SimulatedRobot robot_{SimulatedRobotConfig{}};
+  RobotLife life_{has_network_ ? in_a_tube() : SimulatedRobotConfig{}};
+  ImpairedLink network_{life_};
   FaultTimeline faults_;
-  FaultServer server_{loop_, parse_faults_address("127.0.0.1:0"), faults_, robot_, std::chrono::milliseconds{200}};
+  FaultServer server_{
+      loop_, parse_faults_address("127.0.0.1:0"), faults_, {life_, has_network_ ? &network_ : nullptr}, kTime};
 };
+
+class FaultServerWithANetwork : public FaultServerTest {
+ protected:
+  FaultServerWithANetwork() : FaultServerTest(true) {}
+};
+
+// What must be given, at the least that is allowed.
+Json least_of(const Json& type) {
+  Json fault{{"fault", type.at("fault")}};
+  for (const Json& field : type.at("fields")) {
+    if (field.at("must_be_given") == true) fault[std::string(field.at("key"))] = field.at("minimum");
+  }
+  return fault;
+}
+
+TEST_F(FaultServerWithANetwork, TakesEveryFaultThereIsAndEndsThoseThatLast) {
+  network_.step();
+  for (const Json& type : body_of(request("GET", "/faults")).at("known")) {
+    EXPECT_EQ(type.at("is_in_this_run"), true) << type;
+    EXPECT_THAT(post(least_of(type).dump()), StartsWith("HTTP/1.1 201 ")) << type;
+    network_.step();
+  }
+  const Json in_force = body_of(request("GET", "/faults")).at("in_force");
+  EXPECT_EQ(in_force.size(), 10u) << "one of each target that lasts: " << in_force;
+  for (const Json& each : in_force) {
+    EXPECT_THAT(request("DELETE", "/faults/" + each.at("id").dump()), StartsWith("HTTP/1.1 204 "));
+  }
+  EXPECT_TRUE(faults_.in_force().empty());
+  EXPECT_EQ(network_.impairments().up.bytes_per_s, 0);
+  while (!life_.is_on()) network_.step();
+  EXPECT_FALSE(life_.is_blocked());
+}
+
+TEST_F(FaultServerWithANetwork, SaysHowOftenTheRobotHasBooted) {
+  network_.step();
+  EXPECT_EQ(body_of(request("GET", "/faults")).at("boots"), 1);
+  EXPECT_THAT(post(R"({"fault":"reboot","off_for_s":0})"), StartsWith("HTTP/1.1 201 "));
+  const Json shown = body_of(request("GET", "/faults"));
+  EXPECT_EQ(shown.at("boots"), 2);
+  EXPECT_EQ(shown.at("time_s"), 0.01);
+  EXPECT_EQ(shown.at("robot_time_s"), 0);
+  EXPECT_TRUE(shown.at("in_force").empty());
+}
 
 TEST_F(FaultServerTest, TakesAFaultShowsItAndEndsIt) {
   const std::string created = post(R"({"fault":"electrode_offset","offset_mv":40})");
@@ -110,6 +170,7 @@ TEST_F(FaultServerTest, RefusesWithAReasonAndWhatIsAllowed) {
   EXPECT_THAT(post("{"), StartsWith("HTTP/1.1 400 "));
   EXPECT_THAT(post("\xff\xfe"), StartsWith("HTTP/1.1 400 "));
   EXPECT_THAT(post(R"({"fault":"link_reset"})"), StartsWith("HTTP/1.1 409 "));
+  EXPECT_THAT(post(R"({"fault":"link_reset"})"), HasSubstr("has no network of its own"));
   EXPECT_THAT(post(R"({"fault":"mean_flow","mean_flow_m3_s":0})"), HasSubstr("there is no vessel"));
   EXPECT_THAT(post("{}", "Content-Type: text/plain\r\n"), StartsWith("HTTP/1.1 415 "));
   EXPECT_THAT(request("DELETE", "/faults/x"), StartsWith("HTTP/1.1 400 "));

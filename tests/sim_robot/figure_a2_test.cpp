@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "sim_robot/station_peer.hpp"
+#include "sim_robot/story.hpp"
 
 namespace sim_robot {
 namespace {
@@ -61,46 +62,40 @@ TEST(FigureA2, TheMarksLieWhereTheHalfwayValueIsCrossed) {
   EXPECT_NEAR(last_m, 0.3, 0.001);
 }
 
+class StopAndDeliver : public ::testing::Test, protected Story {
+ protected:
+  Setting setting;
+};
+
 // The patch mixes by itself: the robot stays until it has, and goes on.
-TEST(StopAndDeliver, WaitsUntilTheGlucoseHasMixedAndGoesOn) {
-  SimulatedRobotConfig config = with_a_patch({.position_m = 0.08, .length_m = 0.04, .mixing_m2_s = 1e-4});
-  config.world.electrode = kDs550;
-  SimulatedRobot robot{config};
-  StationPeer station{robot};
-  station.connect();
-  station.run(2);
-  station.send(set_auto(0.2F));
-  station.run(300);
-  EXPECT_LT(robot.world().position_m(), 0.1);
-  station.run(6000);
-  EXPECT_NEAR(robot.world().position_m(), 0.2, 0.002);
-  EXPECT_GT(robot.world().impedance_mv(), 155);
-  std::vector<protocol::Event> ended;
-  for (const auto& event : station.events) {
-    if (event.kind == rheonaut_EVENT_KIND_DELIVERY_ENDED) ended.push_back(event);
-  }
-  ASSERT_EQ(ended.size(), 1u);
-  EXPECT_EQ(ended[0].cause, rheonaut_EVENT_CAUSE_IMPEDANCE);
-  EXPECT_GT(ended[0].value, 5);
+TEST_F(StopAndDeliver, WaitsUntilTheGlucoseHasMixedAndGoesOn) {
+  setting.robot = with_a_patch({.position_m = 0.08, .length_m = 0.04, .mixing_m2_s = 1e-4});
+  setting.robot.world.electrode = kDs550;
+  begin(setting);
+  go_to(0.2);
+  await(delivering(), {.limit_s = 3});
+  const HeardEvent ended = expect_event("delivery_ended", {.within_s = 60});
+  EXPECT_EQ(ended.cause, "impedance");
+  EXPECT_GT(ended.value, 5);
+  EXPECT_LT(ended.position_m, 0.1);
+  await(holding());
+  holds(in_truth(position().within(0.002).of(0.2) and impedance().above(155)), {.for_s = 20});
+  expect_no_event("delivery_ended");
 }
 
 // With the true position to steer by, the robot holds its place in the stream.
-TEST(StopAndDeliver, HoldsInThePulsatingFlow) {
-  SimulatedRobotConfig config = with_a_patch({.position_m = 0.08, .length_m = 0.06, .removed_at_s = 20});
-  config.world.vessel.emplace();
-  config.world.vessel->pump.mean_flow_m3_s = -0.5 * kPaperFlowM3S;
-  SimulatedRobot robot{config};
-  StationPeer station{robot};
-  station.welcome.samples_per_frame = 1;
-  station.connect();
-  station.run(2);
-  station.send(set_auto(0.2F));
-  station.run(1500);
-  EXPECT_EQ(station.samples.rbegin()->second.sub_state, rheonaut_SUB_STATE_DELIVERING);
-  EXPECT_GT(robot.world().position_m(), 0.045);
-  EXPECT_LT(robot.world().position_m(), 0.08);
-  station.run(1500);
-  EXPECT_NEAR(robot.world().position_m(), 0.2, 0.015);
+TEST_F(StopAndDeliver, HoldsInThePulsatingFlow) {
+  setting.robot = with_a_patch({.position_m = 0.08, .length_m = 0.06, .removed_at_s = 20});
+  setting.robot.world.vessel.emplace();
+  setting.robot.world.vessel->pump.mean_flow_m3_s = -0.5 * kPaperFlowM3S;
+  begin(setting);
+  go_to(0.2);
+  await(delivering(), {.limit_s = 10});
+  pass(5);
+  holds(delivering() and in_truth(position().above(0.045) and position().below(0.08)), {.for_s = 5});
+  expect_event("delivery_ended", {.within_s = 15});
+  pass(10);
+  expect(in_truth(position().within(0.015).of(0.2)));
 }
 
 }  // namespace

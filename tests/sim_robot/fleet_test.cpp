@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <stdexcept>
+#include <thread>
 
 #include "sim_robot/fleet_report.hpp"
 #include "sim_robot/replayed_robot.hpp"
@@ -98,7 +99,7 @@ TEST_F(FleetTest, TwentyRobotsConnectAndEverySampleIsAccountedFor) {
   EXPECT_EQ(sink.boots().size(), 20u);
   for (const auto& [id, boot] : sink.boots()) EXPECT_EQ(boot.missing, 0u);
   expect_exact();
-  EXPECT_FALSE(fleet_fault(counts));
+  EXPECT_FALSE(fleet_fault({1, 0, counts, 0}));
 }
 
 TEST_F(FleetTest, RobotsAreSpreadOverTheSlots) {
@@ -141,10 +142,54 @@ TEST_F(FleetTest, WhatTheRingCannotHoldIsCountedAsLostInOneGap) {
   ASSERT_TRUE(run_until([&] { return fleet->robot(0).samples().lost > 0 && fleet->robot(1).samples().lost > 0; }));
   EXPECT_EQ(fleet->counts().samples.gaps, 2u);
   expect_exact();
-  const auto fault = fleet_fault(fleet->counts());
+  const auto fault = fleet_fault({1, 0, fleet->counts(), 0});
   ASSERT_TRUE(fault);
   EXPECT_EQ(fault->exit_status, 1);
   EXPECT_NE(fault->reason.find("lost in 2 gaps"), std::string::npos);
+}
+
+TEST_F(FleetTest, SamplesThatNobodyAcknowledgesAreNoSuccess) {
+  start(2);
+  ASSERT_TRUE(all_acknowledged(2, 10));
+  const auto fault = fleet_fault({1, 0, fleet->counts(), 7});
+  ASSERT_TRUE(fault);
+  EXPECT_EQ(fault->exit_status, 1);
+  EXPECT_EQ(fault->reason, "7 samples not acknowledged after the end");
+}
+
+TEST_F(FleetTest, TheBooksHoldOverReboots) {
+  Fleet::Members members;
+  members.push_back(std::make_unique<RobotClient>(loop, SimulatedRobotConfig{}, station(), LinkLog{}));
+  auto& robot = dynamic_cast<RobotClient&>(*members.front());
+  run(std::move(members), 10ms);
+  ASSERT_TRUE(all_acknowledged(1, 50));
+  sink.acknowledges = false;
+  ASSERT_TRUE(run_until([&] { return robot.samples().held >= 30; }));
+  const SampleCounts before = robot.samples();
+  Reboot reboot;
+  reboot.off_for_s = 0.1;
+  robot.reboot(reboot);
+  EXPECT_EQ(robot.samples().lost, robot.samples().made - before.acknowledged) << "the ring is gone";
+  EXPECT_EQ(robot.samples().gaps, before.gaps + 1);
+  sink.acknowledges = true;
+  ASSERT_TRUE(run_until([&] { return robot.samples().acknowledged >= before.acknowledged + 50; }));
+  EXPECT_EQ(fleet->counts().reconnects, 1u);
+  EXPECT_EQ(sink.boots().size(), 2u);
+  std::uint64_t stored_samples = 0;
+  for (const auto& [id, boot] : sink.boots()) stored_samples += boot.samples;
+  EXPECT_GE(stored_samples, robot.samples().acknowledged);
+  EXPECT_GE(robot.samples().made, stored_samples);
+}
+
+TEST_F(FleetTest, AStalledFleetCountsEveryLateTickAndServesAllSlotsAgain) {
+  start(20);
+  ASSERT_TRUE(all_acknowledged(20, 20));
+  const std::uint64_t ticks_before = fleet->lateness().count();
+  std::this_thread::sleep_for(300ms);  // the stall itself
+  ASSERT_TRUE(run_until([&] { return fleet->lateness().count() >= ticks_before + 20 * 25; }));
+  EXPECT_GE(fleet->lateness().max_ms(), 250);
+  const std::uint64_t made = fleet->robot(0).samples().made;
+  ASSERT_TRUE(all_acknowledged(20, made + 20)) << "no slot is left out";
 }
 
 TEST_F(FleetTest, ARefusedRobotIsCountedAndDoesNotStopTheOthers) {
@@ -154,7 +199,7 @@ TEST_F(FleetTest, ARefusedRobotIsCountedAndDoesNotStopTheOthers) {
   ASSERT_TRUE(run_until([&] { return fleet->robot(0).samples().acknowledged > 0; }));
   ASSERT_TRUE(run_until([&] { return fleet->robot(2).samples().acknowledged > 0; }));
   EXPECT_EQ(fleet->counts().welcomed, 2u);
-  const auto fault = fleet_fault(fleet->counts());
+  const auto fault = fleet_fault({1, 0, fleet->counts(), 0});
   ASSERT_TRUE(fault);
   EXPECT_EQ(fault->reason, "1 of 3 robots never got in");
 }
@@ -174,7 +219,7 @@ TEST_F(FleetTest, WithoutAStationItSaysSo) {
   sink.close();
   start(3);
   ASSERT_TRUE(run_until([&] { return fleet->counts().links.unreachable >= 6; }));
-  const auto fault = fleet_fault(fleet->counts());
+  const auto fault = fleet_fault({1, 0, fleet->counts(), 0});
   ASSERT_TRUE(fault);
   EXPECT_EQ(fault->exit_status, 2);
   EXPECT_EQ(fault->reason, "no robot ever reached the station");
@@ -237,7 +282,7 @@ TEST_F(FleetTest, AReplayedRobotRefusesCommandsAndAnswersClockProbes) {
 }
 
 TEST(FleetReport, NamesTheSameFieldsInTextAndJson) {
-  FleetSnapshot end{2, 0.5, {}};
+  FleetSnapshot end{2, 0.5, {}, 0};
   end.counts.robots = end.counts.welcomed = 3;
   end.counts.samples = {1000, 900, 90, 10, 1, 1005, 5, 2, 0};
   const std::string json = summary_json(end, Lateness{}, "10 samples lost in 1 gaps");

@@ -7,8 +7,9 @@
 #include <optional>
 #include <string>
 
+#include "sim_robot/fault_timeline.hpp"
 #include "sim_robot/linked_peer.hpp"
-#include "sim_robot/station_peer.hpp"  // the commands
+#include "sim_robot/station_commands.hpp"
 
 namespace sim_robot {
 
@@ -24,9 +25,20 @@ class LinkStory : public ::testing::Test {
   template <class Condition>
   bool run_until(Condition condition, double limit_s) {
     const double end_s = now_s() + limit_s;
-    while (!condition() && now_s() < end_s) station->step();
+    while (!condition() && now_s() < end_s) step();
     return condition();
   }
+  // As the station's, with the faults by time.
+  void step() {
+    link->exchange();
+    faults.advance(faulty(), life.true_us() + ImpairedLink::kStepUs);
+    link->exchange();
+    station->serve();
+  }
+  void run_to(double time_s) {
+    while (now_s() < time_s - 0.005) step();
+  }
+  FaultyRobot faulty() { return {life, &*link}; }
   // Seconds until the condition holds; the limit when it does not.
   template <class Condition>
   double time_to(Condition condition, double limit_s) {
@@ -92,6 +104,7 @@ class LinkStory : public ::testing::Test {
   RobotLife life{{}};
   std::optional<ImpairedLink> link;
   std::optional<LinkedPeer> station;
+  FaultTimeline faults;
 };
 
 }  // namespace sim_robot

@@ -20,7 +20,7 @@ std::string refusal(const std::string& json) {
 }
 
 void expect_the_numbers(const std::string& json) {
-  const control::FractionalModel model = parse_model(json);
+  const control::FractionalModel model = parse_model(json).model;
   EXPECT_EQ(model.kp, 0.2);
   EXPECT_EQ(model.b1, 0.01);
   EXPECT_EQ(model.b2, 0.3);
@@ -40,7 +40,15 @@ TEST(ModelFile, TakesAModelWithinAnObject) {
 }
 
 TEST(ModelFile, PassesOverWhatTheToolsSayAboutAModel) {
-  EXPECT_EQ(parse_model(R"({"name":"tank","kp":0.1,"b1":0,"b2":0.1,"alpha":2,"beta":1,"dc_gain_m_s":0.1})").b3, 1);
+  EXPECT_EQ(parse_model(R"({"name":"tank","kp":0.1,"b1":0,"b2":0.1,"alpha":2,"beta":1,"dc_gain_m_s":0.1})").model.b3,
+            1);
+}
+
+TEST(ModelFile, TakesTheDeadTimeThatIdentifyFound) {
+  const std::string identified = std::string(R"({"parameters":)") + kNumbers;
+  EXPECT_EQ(parse_model(identified + R"(,"dead_time_s":0.03})").dead_time_s, 0.03);
+  EXPECT_EQ(parse_model(identified + "}").dead_time_s, 0);
+  EXPECT_EQ(refusal(identified + R"(,"dead_time_s":-1})"), "dead_time_s is -1, allowed is 0 to 10");
 }
 
 TEST(ModelFile, SaysWhatIsWrong) {

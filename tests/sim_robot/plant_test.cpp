@@ -115,6 +115,20 @@ TEST(NonlinearPlant, HasThePolesOf28AtItsWorkingPoint) {
   EXPECT_NEAR(rate, linear.damping_kg_s / linear.total_mass_kg, 0.2);
 }
 
+TEST(Plant, ADeadTimeIsTheSameMotionSoMuchLater) {
+  for (const PlantKind kind : {PlantKind::linear, PlantKind::nonlinear}) {
+    Plant prompt{{.kind = kind}, kTickS}, late{{.kind = kind, .dead_time_s = 0.053}, kTickS};
+    for (int k = 0; k < 5; ++k) late.step(kDuty);
+    EXPECT_EQ(late.position_m(), 0);
+    for (int k = 0; k < 200; ++k) {
+      prompt.step(k < 100 ? kDuty : 0);
+      late.step(k < 95 ? kDuty : 0);
+      ASSERT_EQ(late.position_m(), prompt.position_m()) << k;
+    }
+  }
+  EXPECT_THROW(check(PlantParameters{.dead_time_s = -0.01}), std::invalid_argument);
+}
+
 TEST(NonlinearPlant, ServesInTheWorldAsOneOfTheFluids) {
   WorldConfig config;
   config.plant = fluid("water_nonlinear");

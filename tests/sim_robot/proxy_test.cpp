@@ -185,11 +185,11 @@ TEST_F(ProxyTest, AnswersWhatItDoesNotUnderstand) {
   for (const char* bad : {"delay -1", "delay nan", "delay inf", "delay 5x", "outage 1e9", "loss 2", "loss 1"}) {
     EXPECT_NE(proxy->control(bad).substr(0, 3), "ok:") << bad;
   }
-  EXPECT_EQ(proxy->impairment().loss_probability, 0);
+  EXPECT_EQ(proxy->impairments().up.loss_probability, 0);
   EXPECT_EQ(proxy->control("  delay   50 "), "ok: delay 50");
-  EXPECT_EQ(proxy->impairment().delay_s, 0.05);
+  EXPECT_EQ(proxy->impairments().up.delay_s, 0.05);
   EXPECT_EQ(proxy->control("heal"), "ok: heal");
-  EXPECT_EQ(proxy->impairment().delay_s, 0);
+  EXPECT_EQ(proxy->impairments().up.delay_s, 0);
 }
 
 }  // namespace

@@ -203,6 +203,8 @@ TEST_F(Loopback, AStopThatWaitsInAStalledRobotIsObeyed) {
   ASSERT_TRUE(run_until([&] { return client->robot().core().link_up(); }));
   command(emergency_stop());
   stall(300ms);  // the silence time-out passes, too
+  client->tick();
+  EXPECT_EQ(connections, 1) << "no verdict before the stop is read";
   ASSERT_TRUE(run_until([&] { return ack().has_value(); }));
   EXPECT_EQ(client->robot().core().mode(), rheonaut_MODE_EMERGENCY);
   EXPECT_EQ(connections, 1);

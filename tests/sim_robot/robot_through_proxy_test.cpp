@@ -7,7 +7,7 @@ namespace {
 // The least of a station behind the proxy: it welcomes, and answers telemetry with a sign of life.
 class RobotThroughProxy : public ProxyTest {
  protected:
-  void begin(std::chrono::milliseconds handshake = {}) {
+  void begin(std::chrono::milliseconds handshake = {}, std::vector<TimedFault> faults = {}) {
     start();
     accept();
     const auto& at = proxy->endpoint();
@@ -15,7 +15,7 @@ class RobotThroughProxy : public ProxyTest {
     config.boot_id = random_boot_id();
     robot.emplace(
         loop, config, StationAddress{"127.0.0.1", std::to_string(at.port())},
-        [this](const std::string& line) { log.push_back(line); }, handshake);
+        [this](const std::string& line) { log.push_back(line); }, handshake, std::move(faults), &*proxy);
     // The robot runs until the loop has gone; its frame is destroyed with the loop.
     asio::co_spawn(loop, robot->run(), [](const std::exception_ptr&) {});
     ASSERT_TRUE(run_until([&] { return robot->robot().core().link_up() && samples > 5; }));
@@ -65,9 +65,12 @@ class RobotThroughProxy : public ProxyTest {
     boost::system::error_code ignored;
     asio::write(end.socket, asio::buffer(out, size), ignored);
   }
+  std::uint64_t inject(const std::string& json) {
+    return robot->faults().inject(parse_fault_json(json), robot->faulty());
+  }
   // The robot's next connection is up and telemetry comes.
-  bool comes_back() {
-    const int before = connections;
+  bool comes_back() { return comes_back_after(connections); }
+  bool comes_back_after(int before) {
     if (!run_until([&] { return connections > before; })) return false;
     const int heard = samples;
     return run_until([&] { return robot->robot().core().link_up() && samples > heard + 5; });
@@ -121,6 +124,101 @@ TEST_F(RobotThroughProxy, ABrownOutLeavesItsConnectionOpenAndComesBackLatched) {
   EXPECT_NE(hello.boot_id, boot_id);
   EXPECT_EQ(hello.reset_cause, rheonaut_RESET_CAUSE_BROWN_OUT);
   EXPECT_EQ(hello.mode, rheonaut_MODE_EMERGENCY);
+}
+
+TEST_F(RobotThroughProxy, AScenarioRebootsItAndResetsItsLink) {
+  const Scenario scenario = parse_scenario(R"(
+[[faults]]
+at_s = 0.5
+fault = "link_reset"
+[[faults]]
+at_s = 2.5
+fault = "reboot"
+cause = "watchdog"
+off_for_s = 0.3
+)",
+                                           "reboot_and_reset.toml");
+  begin({}, scenario.faults);
+  const auto boot_id = hello.boot_id;
+  EXPECT_TRUE(comes_back_after(1));
+  EXPECT_EQ(hello.boot_id, boot_id);
+  EXPECT_TRUE(said("at 0.5 s: link_reset"));
+  ASSERT_TRUE(run_until([&] { return robot->life().boots() == 2; }));
+  ASSERT_TRUE(run_until([&] { return hello.boot_id != boot_id; }));
+  EXPECT_EQ(hello.reset_cause, rheonaut_RESET_CAUSE_WATCHDOG);
+  EXPECT_EQ(hello.mode, rheonaut_MODE_EMERGENCY);
+  EXPECT_EQ(robot->faults().passed_over(), 0u);
+}
+
+TEST_F(RobotThroughProxy, AnOutageOnDemandLastsUntilItIsWithdrawn) {
+  begin();
+  const auto id = inject(R"({"fault":"link_outage"})");
+  ASSERT_TRUE(run_until([&] { return robot->robot().core().link_lost(); }));
+  const int before = connections;
+  EXPECT_TRUE(robot->faults().withdraw(id, robot->faulty()));
+  EXPECT_TRUE(comes_back_after(before));
+  EXPECT_FALSE(robot->robot().core().link_lost());
+}
+
+TEST_F(RobotThroughProxy, AHalfOpenOnDemandIsWithdrawnBeforeItIsNoticed) {
+  begin();
+  const auto id = inject(R"({"fault":"link_half_open","direction":"up"})");
+  loop.run_for(100ms);
+  const int heard = samples;
+  EXPECT_TRUE(robot->faults().withdraw(id, robot->faulty()));
+  ASSERT_TRUE(run_until([&] { return samples > heard + 5; }));
+  EXPECT_EQ(connections, 1);
+}
+
+TEST_F(RobotThroughProxy, SettingsOnDemandEndByThemselvesAndLeaveTheOthers) {
+  begin();
+  inject(R"({"fault":"link_delay","delay_s":0.05,"direction":"up","for_s":0.2})");
+  const auto id = inject(R"({"fault":"link_throttle","bytes_per_s":20000})");
+  EXPECT_EQ(proxy->impairments().up.delay_s, 0.05);
+  EXPECT_EQ(proxy->impairments().down.delay_s, 0);
+  ASSERT_TRUE(run_until([&] { return robot->faults().in_force().size() == 1; }));
+  EXPECT_EQ(proxy->impairments().up.delay_s, 0);
+  EXPECT_EQ(proxy->impairments().down.bytes_per_s, 20'000);
+  robot->faults().withdraw(id, robot->faulty());
+  EXPECT_EQ(proxy->impairments().down.bytes_per_s, 0);
+  EXPECT_EQ(connections, 1);
+}
+
+TEST_F(RobotThroughProxy, ABlockedLoopSaysNothingMissesTicksAndGoesOn) {
+  begin();
+  inject(R"({"fault":"block","for_s":0.4})");
+  loop.run_for(50ms);  // what was under way
+  const int heard = samples;
+  ASSERT_TRUE(run_until([&] { return robot->faults().in_force().empty(); }));
+  EXPECT_LE(samples, heard + 1);
+  ASSERT_TRUE(run_until([&] { return missed_ticks > 0; }));
+  EXPECT_GE(missed_ticks, 35u);
+  EXPECT_EQ(connections, 1);
+}
+
+TEST_F(RobotThroughProxy, ABlockForEverEndsWhenTheWatchdogBites) {
+  begin();
+  const auto boot_id = hello.boot_id;
+  inject(R"({"fault":"block"})");
+  loop.run_for(100ms);
+  EXPECT_TRUE(robot->life().is_blocked());
+  inject(R"({"fault":"reboot","cause":"watchdog","off_for_s":0.1})");
+  ASSERT_TRUE(run_until([&] { return hello.boot_id != boot_id; }));
+  EXPECT_EQ(hello.reset_cause, rheonaut_RESET_CAUSE_WATCHDOG);
+  EXPECT_FALSE(robot->life().is_blocked());
+}
+
+TEST_F(RobotThroughProxy, AClockThatDriftsOnDemandIsFastAndThenRightAgain) {
+  begin();
+  inject(R"({"fault":"clock_drift","drift_ppm":100000,"for_s":0.5})");
+  ASSERT_TRUE(run_until([&] { return robot->faults().in_force().empty(); }));
+  const RobotLife& life = robot->life();
+  const auto ahead_us = [&life] { return static_cast<std::int64_t>(life.robot_clock_us() - life.true_us()); };
+  const std::int64_t ahead_then_us = ahead_us();
+  EXPECT_GE(ahead_then_us, 49'000);
+  const int heard = samples;
+  ASSERT_TRUE(run_until([&] { return samples > heard + 5; }));
+  EXPECT_NEAR(static_cast<double>(ahead_us()), static_cast<double>(ahead_then_us), 2);
 }
 
 TEST_F(RobotThroughProxy, AHandshakeMissesTicks) {

@@ -14,14 +14,14 @@ class DriveAndRecordTest : public SystemTest {
   std::vector<StoredSample> perform(robot_fw::DutyRange duty) {
     sim_robot::SimulatedRobotConfig config;
     config.duty = duty;
-    add_robot(config);
+    begin(config);
     const RunId run = begin_run();
-    const CommandRecord started = command(set_auto(0.1F));
+    const auto started = send(sim_robot::set_auto(0.1F)).expect_accepted();
     const std::uint64_t first_seq = started.effect_at_robot_us / 10'000 + 1;  // it acts in the next tick
     run_until_just_before(first_seq + 2000);
-    command(inject_disturbance(-0.05F));
+    send(sim_robot::inject_disturbance(-0.05F)).expect_accepted();
     run_until_just_before(first_seq + 4001);
-    clock.run_for(100ms);
+    pass(0.1);
     const auto ended = wait_for(runs->end(run, "done"));
     EXPECT_EQ(ended->samples_lost, 0u);
     EXPECT_EQ(ended->samples_stored, ended->samples_expected);

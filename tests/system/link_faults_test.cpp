@@ -4,55 +4,52 @@
 namespace server {
 namespace {
 
+using namespace sim_robot::conditions;
+using sim_robot::set_auto;
+
 class LinkFaultsTest : public SystemTest {
  protected:
-  void expect_whole(RunId id) {
-    const auto run = wait_for(runs->end(id, ""));
-    ASSERT_TRUE(run.has_value());
-    EXPECT_EQ(run->samples_lost, 0u);
-    EXPECT_EQ(run->samples_stored, run->samples_expected);
-    const auto samples = samples_of(id);
-    ASSERT_EQ(samples.size(), run->samples_expected);
-    for (std::size_t i = 1; i < samples.size(); ++i) ASSERT_EQ(samples[i].seq, samples[i - 1].seq + 1);
+  // No way from the robot to the station, until reconnect().
+  void cut_for_good() {
+    robot->redial = false;
+    robot->cut();
   }
-
-  bool connected() const { return state().link == LinkState::connected; }
+  void reconnect() { robot->dial(*listener); }
 };
 
 TEST_F(LinkFaultsTest, ACutLinkLosesNoSampleThatTheRingHolds) {
-  add_robot();
+  begin();
   const RunId run = begin_run();
-  for (int i = 0; i < 3; ++i) {
-    clock.run_for(2s);
+  for (int i = 2; i <= 4; ++i) {
+    pass(2);
     robot->cut();
-    ASSERT_TRUE(clock.run_until([&] { return connected() && robot->connected(); }, 3s));
+    await(connections().is(i) and link_up() and in_truth(link_up()), {.limit_s = 3});
   }
-  clock.run_for(5s);
+  pass(5);
   expect_whole(run);
 }
 
 TEST_F(LinkFaultsTest, AStallOf5SecondsLosesNoSample) {
-  add_robot();
+  begin();
   const RunId run = begin_run();
-  clock.run_for(1s);
+  pass(1);
   robot->redial = false;
   robot->stall(true);
-  ASSERT_TRUE(clock.run_until([&] { return !connected() && !robot->connected(); }, 3s));
-  clock.run_for(4s);
-  robot->dial(*listener);
-  clock.run_for(6s);
+  await(link_lost() and in_truth(link_lost()), {.limit_s = 3});
+  pass(4);
+  reconnect();
+  pass(6);
   expect_whole(run);
 }
 
 TEST_F(LinkFaultsTest, AnOutageLongerThanTheRingLeavesACountedGap) {
-  add_robot();
+  begin();
   const RunId run = begin_run();
-  clock.run_for(1s);
-  robot->redial = false;
-  robot->cut();
-  clock.run_for(12s);
-  robot->dial(*listener);
-  clock.run_for(10s);
+  pass(1);
+  cut_for_good();
+  pass(12);
+  reconnect();
+  pass(10);
   const auto ended = wait_for(runs->end(run, ""));
   EXPECT_GT(ended->samples_lost, 300u);
   EXPECT_LT(ended->samples_lost, 600u);
@@ -64,41 +61,51 @@ TEST_F(LinkFaultsTest, AnOutageLongerThanTheRingLeavesACountedGap) {
     if (&gap != &gaps->front()) EXPECT_EQ(gap.first_seq, (&gap - 1)->last_seq + 1);
   }
   EXPECT_EQ(lost, ended->samples_lost);
-  EXPECT_EQ(state().durable_next_seq, state().next_seq) << "the acknowledgement passes over the gap";
+  expect(caught_up());  // the acknowledgement passes over the gap
 }
 
 TEST_F(LinkFaultsTest, LinkLossStopsTheMotorAndNothingMovesWhenItReturns) {
-  add_robot();
-  command(set_auto(0.5F));
-  ASSERT_TRUE(clock.run_until([&] { return robot->core().duty() > 0.5F; }, 1s));
+  begin();
+  go_to(0.5);
+  await(in_truth(duty().above(0.5)), {.limit_s = 1});
   robot->stall(true);
-  EXPECT_TRUE(clock.run_until([&] { return robot->core().duty() == 0; }, 1100ms)) << "link time-out of 1 s";
-  ASSERT_TRUE(clock.run_until([&] { return connected() && robot->connected(); }, 5s));
-  clock.run_for(2s);
-  EXPECT_EQ(state().context.mode, rheonaut_MODE_MANUAL);
+  await(in_truth(motor_off()), {.limit_s = 1.1});  // link time-out of 1 s
+  await(connections().is(2) and link_up() and in_truth(link_up()));
+  pass(2);
+  expect(in_manual() and in_truth(motor_off()));
   EXPECT_FALSE(state().context.setpoint_m.has_value());
-  EXPECT_EQ(robot->core().duty(), 0);
+  expect_events({"link_lost", "link_restored"});
+}
+
+TEST_F(LinkFaultsTest, ADutyLivesAsLongAsItsLeaseIsRenewed) {
+  begin();
+  const RunId run = begin_run();
+  start_driving(0.4);
+  holds(in_truth(motor_on()), {.for_s = 3});
+  robot->stall(true);
+  await(in_truth(motor_off()), {.limit_s = 0.6});
+  expect_event("lease_lapsed", {.within_s = 5});
+  holds(in_truth(motor_off()), {.for_s = 3});  // a lease that has run out is renewed by nobody
+  pass(3);
+  expect_whole(run);
 }
 
 TEST_F(LinkFaultsTest, TheNextSampleAfterAnEmergencyStopHasDuty0) {
-  add_robot();
+  begin();
   const RunId run = begin_run();
-  command(set_auto(0.5F));
-  clock.run_for(300ms);
-  ASSERT_GT(state().sample->duty, 0.5F);
-  const CommandRecord stopped = stop();
-  EXPECT_EQ(stopped.state, CommandState::acknowledged);
+  go_to(0.5);
+  await(duty().above(0.5), {.limit_s = 0.3});
+  const auto stopped = stop();
   EXPECT_NE(stopped.emergency_id, 0u);
-  clock.run_for(500ms);
-  EXPECT_EQ(state().context.mode, rheonaut_MODE_EMERGENCY);
-  EXPECT_EQ(refused_command(set_auto(0.1F)).reason, "latched");
+  pass(0.5);
+  send(set_auto(0.1F)).expect_refused("latched");
 
-  const CommandRecord again = stop();
-  EXPECT_EQ(refused_command(clear_emergency(stopped.emergency_id)).reason, "other_emergency");
-  EXPECT_EQ(state().context.mode, rheonaut_MODE_EMERGENCY);
-  command(clear_emergency(again.emergency_id));
-  clock.run_for(1s);
-  EXPECT_EQ(state().context.mode, rheonaut_MODE_MANUAL);
+  stop();
+  send(sim_robot::clear_emergency(stopped.emergency_id)).expect_refused("other_emergency");
+  expect(in_emergency());
+  clear();
+  pass(1);
+  expect(in_manual());
   ASSERT_TRUE(wait_for(runs->end(run, "")).has_value());
   int after = 0;
   for (const StoredSample& sample : samples_of(run)) {
@@ -110,33 +117,30 @@ TEST_F(LinkFaultsTest, TheNextSampleAfterAnEmergencyStopHasDuty0) {
 }
 
 TEST_F(LinkFaultsTest, AStopDuringAnOutageReachesTheRobotFirst) {
-  add_robot();
-  command(set_auto(0.5F));
-  robot->redial = false;
-  robot->cut();
-  ASSERT_TRUE(clock.run_until([&] { return !connected(); }, 1s));
-  EXPECT_EQ(stop().state, CommandState::queued);
-  robot->dial(*listener);
-  ASSERT_TRUE(clock.run_until([&] { return robot->core().emergency_id() != 0; }, 100ms));
-  EXPECT_EQ(robot->core().duty(), 0);
-  clock.run_for(100ms);
+  begin();
+  go_to(0.5);
+  cut_for_good();
+  await(link_lost(), {.limit_s = 1});
+  EXPECT_EQ(send(sim_robot::emergency_stop()).answer().text, "queued");
+  reconnect();
+  await(in_truth(in_emergency() and motor_off()), {.limit_s = 0.1});
+  pass(0.1);
   EXPECT_FALSE(state().pending_stop.has_value());
   EXPECT_EQ(state().context.emergency_id, robot->core().emergency_id());
 }
 
 TEST_F(LinkFaultsTest, ARebootOpensANewSpanOfTheRun) {
-  add_robot();
+  begin();
   const RunId id = begin_run();
-  clock.run_for(1s);
-  robot->redial = false;
-  robot->cut();
-  clock.run_for(1500ms);
+  pass(1);
+  cut_for_good();
+  pass(1.5);
   const auto first_boot = std::move(robot);
   sim_robot::SimulatedRobotConfig rebooted;
   rebooted.boot_id = 2;
   robot = std::make_unique<VirtualRobot>(loop, clock, tasks, rebooted);
-  robot->dial(*listener);
-  clock.run_for(3s);
+  reconnect();
+  pass(3);
   const auto run = wait_for(runs->end(id, ""));
   ASSERT_EQ(run->spans.size(), 2u);
   EXPECT_EQ(run->spans[1].boot_id, 2u);

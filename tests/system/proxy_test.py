@@ -1,4 +1,5 @@
-"""`rheonaut-sim proxy` as a program: its lines, its control, and what it says of bad arguments."""
+"""`rheonaut-sim proxy` and a robot whose link is broken, as programs: lines, control, and what they say of bad arguments."""
+import json
 import os
 import pathlib
 import select
@@ -6,16 +7,17 @@ import signal
 import socket
 import subprocess
 import unittest
+import urllib.request
 
 PROGRAM = pathlib.Path(os.environ["RHEONAUT_BIN"]) / "rheonaut-sim"
 TIMEOUT_S = 30
 
 
 class Running:
-    """The proxy as a process, its lines, and its control."""
+    """The program as a process, its lines, and its control."""
 
     def __init__(self, *arguments):
-        self.process = subprocess.Popen([PROGRAM, "proxy", *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        self.process = subprocess.Popen([PROGRAM, *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                         stderr=subprocess.STDOUT, bufsize=0)
         self.waiting = b""
 
@@ -70,7 +72,7 @@ class ProxyTest(unittest.TestCase):
         self.to = "127.0.0.1:%d" % self.target.getsockname()[1]
 
     def start(self, *arguments):
-        proxy = Running("--to", self.to, *arguments)
+        proxy = Running("proxy", "--to", self.to, *arguments)
         self.addCleanup(proxy.close)
         return proxy
 
@@ -139,6 +141,40 @@ class ProxyTest(unittest.TestCase):
 
 
 class RobotTest(unittest.TestCase):
+    def ask(self, url, fault=None):
+        body = json.dumps(fault).encode() if fault else None
+        request = urllib.request.Request(url, body, {"Content-Type": "application/json"})
+        with urllib.request.urlopen(request, timeout=TIMEOUT_S) as answer:
+            return json.load(answer)
+
+    def test_faults_of_link_and_robot_come_over_http(self):
+        station = socket.create_server(("127.0.0.1", 0))
+        self.addCleanup(station.close)
+        station.settimeout(TIMEOUT_S)
+        robot = Running("--station", "127.0.0.1:%d" % station.getsockname()[1], "--faults", "127.0.0.1:0")
+        self.addCleanup(robot.close)
+        robot.line_with("in this process, which does the faults of the link")
+        url = robot.line_with("faults at ").split("faults at ")[1]
+        self.assertEqual([fault["fault"] for fault in self.ask(url)["known"] if not fault["is_in_this_run"]], [])
+
+        def is_reset():
+            connection, _ = station.accept()
+            with connection:
+                connection.settimeout(TIMEOUT_S)
+                connection.recv(1)  # the Hello has come
+                self.ask(url, {"fault": "link_reset"})
+                try:
+                    while connection.recv(4096):
+                        pass
+                except ConnectionResetError:
+                    return True
+            return False  # the robot was faster: nobody has welcomed it
+
+        self.assertTrue(any(is_reset() for _ in range(5)))
+        self.ask(url, {"fault": "reboot", "off_for_s": 0.1})
+        self.assertEqual(self.ask(url)["boots"], 2)
+        self.assertEqual(robot.stop(), 0)
+
     def test_a_robot_says_what_is_wrong_with_its_arguments(self):
         for arguments, words in (((), "--station is required"),
                                  (("--station", "nowhere"), "--station: 'nowhere' is not ADDR:PORT"),

@@ -15,6 +15,7 @@ SystemTest::SystemTest() {
   runs = &recording->runs;
   history = &recording->history;
   recording->connect(station);
+  station.add_sink(listener_of_events);
   run_first(loop, recording->open());
   recording->spawn(tasks);
   const boost::asio::ip::tcp::endpoint any_port{boost::asio::ip::address_v4::loopback(), 0};
@@ -28,61 +29,73 @@ SystemTest::~SystemTest() {
   std::filesystem::remove_all(folder);
 }
 
-void SystemTest::add_robot(sim_robot::SimulatedRobotConfig config) {
+void SystemTest::begin(sim_robot::SimulatedRobotConfig config) {
   robot = std::make_unique<VirtualRobot>(loop, clock, tasks, std::move(config));
   robot->dial(*listener);
   ASSERT_TRUE(clock.run_until([this] { return station.find("sim-1") != nullptr && state().sample; }, 2s));
 }
 
-CommandRecord SystemTest::command(protocol::Command action) {
-  const CommandRecord record = refused_command(action);
-  EXPECT_EQ(record.state, CommandState::acknowledged) << record.kind << ": " << record.reason;
-  return record;
+std::uint64_t SystemTest::give(const protocol::Command& command) {
+  tasks.spawn("test commands", submit(++commands_given_, command));
+  return commands_given_;
 }
 
-CommandRecord SystemTest::refused_command(protocol::Command action) {
+boost::asio::awaitable<void> SystemTest::submit(std::uint64_t id, protocol::Command action) {
+  const bool is_stop = action.which_action == rheonaut_Command_emergency_stop_tag;
   CommandRequest request;
   request.robot_id = "sim-1";
   request.action = action;
   request.actor = "test";
-  const auto result = wait_for(station.submit(request));
-  if (result) return *result;
-  CommandRecord refused;
-  refused.state = CommandState::failed;
-  refused.reason = result.error().reason;
-  return refused;
+  auto answered = is_stop ? station.emergency_stop("sim-1", "test", 1s) : station.submit(request);
+  const Result<CommandRecord> result = co_await std::move(answered);
+  if (!result) {
+    answers_[id].text = result.error().reason;
+    co_return;
+  }
+  const bool is_done = result->state == CommandState::acknowledged;
+  const std::string otherwise = result->reason.empty() ? text(result->state) : result->reason;
+  answers_[id] = {is_done ? "accepted" : otherwise, result->emergency_id, result->effect_at_robot_us};
 }
 
-CommandRecord SystemTest::stop() { return wait_for(station.emergency_stop("sim-1", "test", 1s)).value(); }
-
-protocol::Command SystemTest::set_auto(float setpoint_m) {
-  protocol::Command command = rheonaut_Command_init_zero;
-  command.which_action = rheonaut_Command_set_mode_tag;
-  command.action.set_mode.mode = rheonaut_MODE_AUTO;
-  command.action.set_mode.has_setpoint_m = true;
-  command.action.set_mode.setpoint_m = setpoint_m;
-  return command;
+std::optional<sim_robot::Answer> SystemTest::answer_to(std::uint64_t command_id) const {
+  const auto found = answers_.find(command_id);
+  if (found == answers_.end()) return std::nullopt;
+  return found->second;
 }
 
-protocol::Command SystemTest::set_duty(float duty) {
-  protocol::Command command = rheonaut_Command_init_zero;
-  command.which_action = rheonaut_Command_set_duty_tag;
-  command.action.set_duty.duty = duty;
-  return command;
+void SystemTest::Listener::on_robot(const RobotState& state) {
+  if (state.link != LinkState::connected || state.connected_at_us == connected_at_us_) return;
+  connected_at_us_ = state.connected_at_us;
+  ++connections;
 }
 
-protocol::Command SystemTest::inject_disturbance(float disturbance_m) {
-  protocol::Command command = rheonaut_Command_init_zero;
-  command.which_action = rheonaut_Command_inject_disturbance_tag;
-  command.action.inject_disturbance.disturbance_m = disturbance_m;
-  return command;
+void SystemTest::Listener::on_event(const RobotState&, const RobotEvent& event) {
+  const bool is_of_the_station = !event.event_seq.has_value();
+  if (is_of_the_station || !known_events_.insert({event.boot_id, *event.event_seq}).second) return;
+  test_.hear({event.kind, event.cause, 1e-6 * static_cast<double>(event.robot_time_us),
+              static_cast<double>(event.position_m), static_cast<double>(event.value), event.emergency_id});
 }
 
-protocol::Command SystemTest::clear_emergency(std::uint64_t emergency_id) {
-  protocol::Command command = rheonaut_Command_init_zero;
-  command.which_action = rheonaut_Command_clear_emergency_tag;
-  command.action.clear_emergency.emergency_id = emergency_id;
-  return command;
+sim_robot::Moment SystemTest::moment() const {
+  return {1e-6 * static_cast<double>(clock.steady_us()), heard(), sim_robot::true_view(robot->simulated()),
+          listener_of_events.connections, state().next_seq - state().durable_next_seq};
+}
+
+sim_robot::View SystemTest::heard() const {
+  const RobotState& known = state();
+  sim_robot::View view;
+  view.link = known.link == LinkState::connected ? sim_robot::LinkView::up : sim_robot::LinkView::lost;
+  view.mode = known.context.mode;
+  view.emergency_id = known.context.emergency_id;
+  view.sub_state = known.context.sub_state;
+  if (known.context.setpoint_m) view.setpoint_m = static_cast<double>(*known.context.setpoint_m);
+  view.flags = known.context.flags;
+  const Sample newest = known.sample.value_or(Sample{});
+  view.position_m = static_cast<double>(newest.position_m);
+  view.velocity_m_s = static_cast<double>(newest.velocity_m_s);
+  view.duty = static_cast<double>(newest.duty);
+  view.impedance_mv = static_cast<double>(newest.impedance_mv);
+  return view;
 }
 
 RunId SystemTest::begin_run() {
@@ -101,6 +114,16 @@ std::vector<StoredSample> SystemTest::samples_of(RunId run) {
     after = page->next;
   } while (after);
   return samples;
+}
+
+void SystemTest::expect_whole(RunId id) {
+  const auto run = wait_for(runs->end(id, ""));
+  ASSERT_TRUE(run.has_value());
+  EXPECT_EQ(run->samples_lost, 0u);
+  EXPECT_EQ(run->samples_stored, run->samples_expected);
+  const auto samples = samples_of(id);
+  ASSERT_EQ(samples.size(), run->samples_expected);
+  for (std::size_t i = 1; i < samples.size(); ++i) ASSERT_EQ(samples[i].seq, samples[i - 1].seq + 1);
 }
 
 }  // namespace server

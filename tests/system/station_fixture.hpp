@@ -1,19 +1,24 @@
 // A whole station with its recorder, and a simulated robot, in one process and in virtual time.
+//
+// Tests are told in the words of sim_robot/story_words.hpp. Here "accepted" is what the station makes of it
+// (acknowledged), a refusal may be its own, and a link that is not connected counts as lost.
 #pragma once
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <set>
 
 #include "server/recording/recording_parts.hpp"
 #include "server/tasks.hpp"
+#include "sim_robot/story_words.hpp"
 #include "tests/system/virtual_robot.hpp"
 
 namespace server {
 
 using namespace std::chrono_literals;
 
-class SystemTest : public ::testing::Test {
+class SystemTest : public ::testing::Test, public sim_robot::StoryWords {
  public:
   SystemTest();
   ~SystemTest() override;
@@ -28,20 +33,36 @@ class SystemTest : public ::testing::Test {
     return std::move(result).value();
   }
 
-  CommandRecord command(protocol::Command action);
-  CommandRecord refused_command(protocol::Command action);  // reached the robot, or was refused before
-  CommandRecord stop();
-  static protocol::Command set_auto(float setpoint_m);
-  static protocol::Command set_duty(float duty);
-  static protocol::Command inject_disturbance(float disturbance_m);
-  static protocol::Command clear_emergency(std::uint64_t emergency_id);
-
-  void add_robot(sim_robot::SimulatedRobotConfig config = {});  // dials, and waits for its first sample
+  void begin(sim_robot::SimulatedRobotConfig config = {});  // it dials, and its first sample is heard
   const RobotState& state() const { return *station.find("sim-1"); }
   RunId begin_run();
   std::vector<StoredSample> samples_of(RunId run);
+  // Ends the run: nothing of it is lost.
+  void expect_whole(RunId run);
+
+  sim_robot::Moment moment() const override;
 
  private:
+  class Listener final : public StationSink {
+   public:
+    explicit Listener(SystemTest& test) : test_{test} {}
+    void on_robot(const RobotState& state) override;
+    void on_event(const RobotState& state, const RobotEvent& event) override;
+
+    int connections = 0;
+
+   private:
+    SystemTest& test_;
+    std::int64_t connected_at_us_ = 0;
+    std::set<std::pair<BootId, std::uint64_t>> known_events_;  // one may come twice after a reconnect
+  };
+
+  void step() override { clock.run_for(10ms); }
+  std::uint64_t give(const protocol::Command& command) override;
+  std::optional<sim_robot::Answer> answer_to(std::uint64_t command_id) const override;
+  boost::asio::awaitable<void> submit(std::uint64_t id, protocol::Command action);
+  sim_robot::View heard() const;
+
   template <class T>
   static boost::asio::awaitable<void> keep_result(boost::asio::awaitable<T> coroutine, std::optional<T>& result) {
     result.emplace(co_await std::move(coroutine));
@@ -53,6 +74,7 @@ class SystemTest : public ::testing::Test {
   VirtualClock clock{loop};
   WorkerThread disk{"disk"}, readers{"readers"};
   TaskGroup tasks{loop};
+  Listener listener_of_events{*this};
   Station station{loop, clock, CommandLimits{}, LinkTimes{}};
   std::unique_ptr<RecordingParts> recording;
   Recorder* recorder = nullptr;  // of recording, as are the next two
@@ -60,6 +82,10 @@ class SystemTest : public ::testing::Test {
   History* history = nullptr;
   std::unique_ptr<RobotListener> listener;
   std::unique_ptr<VirtualRobot> robot;
+
+ private:
+  std::uint64_t commands_given_ = 0;
+  std::map<std::uint64_t, sim_robot::Answer> answers_;
 };
 
 }  // namespace server

@@ -24,6 +24,7 @@ class VirtualRobot {
   void cut();                // the link ends for both sides
   void stall(bool stalled);  // half-open: nothing arrives on either side
 
+  const sim_robot::SimulatedRobot& simulated() const { return robot_; }
   const robot_fw::Robot& core() const { return robot_.core(); }
   const sim_robot::SimulatedRobotConfig& config() const { return robot_.config(); }
   bool connected() const { return link_ != nullptr; }

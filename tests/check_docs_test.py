@@ -1,0 +1,35 @@
+#!/usr/bin/env python3
+"""Each kind of fault that check_docs.py finds, in a folder made for it."""
+import pathlib
+import tempfile
+import unittest
+
+from check_docs import faults
+
+
+def found(document):
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        (root / "tests").mkdir()
+        (root / "tests/a_test.cpp").write_text("int before;\nint one;\nint two;\n")
+        (root / "README.md").write_text(document)
+        return list(faults(root))
+
+
+class CheckDocs(unittest.TestCase):
+    def test_links_and_paths(self):
+        self.assertEqual(found("[a](tests/a_test.cpp) and `tests/a_test`\n"), [])
+        self.assertEqual(found("\n[a](gone.md)\n"), ["README.md:2: the link to gone.md leads nowhere"])
+        self.assertEqual(found("`tests/gone_test`\n"), ["README.md:1: there is no tests/gone_test"])
+
+    def test_code_that_names_its_file_stands_there(self):
+        self.assertEqual(found("```cpp tests/a_test.cpp\nint one;\nint two;\n```\n"), [])
+        self.assertEqual(found("a\n```cpp tests/a_test.cpp\nint one;\nint three;\n```\n"),
+                         ["README.md:2: this code does not stand in tests/a_test.cpp"])
+        self.assertEqual(found("```cpp tests/b_test.cpp\nint one;\n```\n"),
+                         ["README.md:1: there is no tests/b_test.cpp to quote"])
+        self.assertEqual(found("```cpp\nint anything;\n```\n```proto set_duty\nwords\n```\n"), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
