@@ -117,7 +117,7 @@ void read(ConfigFile& file, Config& config) {
   file.take("robots", "enrol_on_loopback", config.enrol_on_loopback);
   file.take_count("robots", "link_timeout_ms", 200, 5000, config.link.link_timeout_ms);
   file.take_count("robots", "heartbeat_interval_ms", 50, 2500, config.link.heartbeat_interval_ms);
-  file.take_count("robots", "samples_per_frame", 1, protocol::kMaxSamplesPerFrame, config.link.samples_per_frame);
+  file.take_count("robots", "samples_per_frame", 0, protocol::kMaxSamplesPerFrame, config.link.samples_per_frame);
   file.take_number("limits", "setpoint_min_m", -100, 100, config.limits.setpoint_min_m);
   file.take_number("limits", "setpoint_max_m", -100, 100, config.limits.setpoint_max_m);
   file.take_number("limits", "duty_min", -1, 0, config.limits.duty_min);

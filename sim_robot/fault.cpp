@@ -1,6 +1,7 @@
 // Reads faults from JSON, and says what is wrong with them.
 #include "sim_robot/fault.hpp"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -67,6 +68,9 @@ void check(const Fault& fault, const WorldConfig& world) {
     control::throw_invalid("mean_flow: there is no vessel; give the world a [vessel]");
   }
   if (fault.kind == FaultKind::pour_glucose) check(fault.patch);
+  const bool is_clock = fault.kind == FaultKind::clock_drift || fault.kind == FaultKind::clock_jump;
+  const double by = fault.kind == FaultKind::clock_drift ? fault.drift_ppm : fault.jump_s;
+  if (is_clock && !std::isfinite(by)) control::throw_invalid(type.name, ": ", by, " is no number to change a clock by");
   if (!(fault.for_s > 0)) control::throw_invalid("for_s must be positive, is ", fault.for_s);
 }
 

@@ -36,7 +36,7 @@ struct FleetCounts {
 class Fleet {
  public:
   using Members = std::vector<std::unique_ptr<FleetMember>>;
-  static constexpr std::uint64_t kSlotUs = 1000;
+  static constexpr std::uint64_t kSlotUs = 2500;
   static constexpr std::uint64_t kBootEveryUs = 2000;
 
   // The period is at least kSlotUs.

@@ -135,14 +135,14 @@ std::optional<FleetFault> fleet_fault(const FleetSnapshot& end) {
                              ? "every connection ended before its welcome: is this the robots' door?"
                              : "no robot ever reached the station"};
   }
+  if (counts.welcomed < counts.robots) {
+    return FleetFault{1, std::to_string(counts.robots - counts.welcomed) + " of " + robots + " robots never got in"};
+  }
   if (samples.lost > 0) {
     return FleetFault{1, std::to_string(samples.lost) + " samples lost in " + std::to_string(samples.gaps) + " gaps"};
   }
   if (end.unsettled > 0) {
     return FleetFault{1, std::to_string(end.unsettled) + " samples not acknowledged after the end"};
-  }
-  if (counts.welcomed < counts.robots) {
-    return FleetFault{1, std::to_string(counts.robots - counts.welcomed) + " of " + robots + " robots never got in"};
   }
   if (samples.missed_ticks > samples.made / kMissedShare) {
     return FleetFault{1,

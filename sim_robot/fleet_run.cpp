@@ -99,25 +99,34 @@ asio::awaitable<void> report_rates(const Watch& watch) {
   }
 }
 
-// Of what was made up to the end, what is neither acknowledged nor lost yet. The robots go on meanwhile, for they send
-// whole frames.
+// What was made up to the end by robots that got in. They go on meanwhile, for they send whole frames.
 class Rest {
  public:
   explicit Rest(const Fleet& fleet) : fleet_(fleet) {
-    for (std::size_t i = 0; i < fleet.size(); ++i) made_.push_back(fleet.robot(i).samples().made);
+    for (std::size_t i = 0; i < fleet.size(); ++i) at_end_.push_back(fleet.robot(i).samples());
   }
-  std::uint64_t samples() const {
-    std::uint64_t rest = 0;
-    for (std::size_t i = 0; i < made_.size(); ++i) {
+  // Neither acknowledged nor lost by now.
+  std::uint64_t unsettled() const {
+    std::uint64_t sum = 0;
+    for (std::size_t i = 0; i < at_end_.size(); ++i) {
       const SampleCounts now = fleet_.robot(i).samples();
-      rest += made_[i] - std::min(made_[i], now.made - now.held);
+      const bool got_in = fleet_.robot(i).connection().counts().welcomes > 0;
+      sum += got_in ? at_end_[i].made - std::min(at_end_[i].made, now.made - now.held) : 0;
     }
-    return rest;
+    return sum;
+  }
+  // Lost since the end: the oldest go first, so it is these.
+  std::uint64_t lost() const {
+    std::uint64_t sum = 0;
+    for (std::size_t i = 0; i < at_end_.size(); ++i) {
+      sum += std::min(fleet_.robot(i).samples().lost - at_end_[i].lost, at_end_[i].held);
+    }
+    return sum;
   }
 
  private:
   const Fleet& fleet_;
-  std::vector<std::uint64_t> made_;
+  std::vector<SampleCounts> at_end_;
 };
 
 // The duration and its end, or a signal; then up to kSettleS for the rest, or another signal.
@@ -135,10 +144,11 @@ asio::awaitable<FleetSnapshot> last(const Watch& watch, asio::io_context& loop) 
   const auto is_stopped = std::make_shared<bool>(false);
   stop.async_wait([is_stopped](const boost::system::error_code& error, int) { *is_stopped = !error; });
   const auto give_up_at = Clock::now() + kSettle;
-  while (last.counts.links.opened > 0 && !*is_stopped && rest.samples() > 0 && Clock::now() < give_up_at) {
+  while (last.counts.links.opened > 0 && !*is_stopped && rest.unsettled() > 0 && Clock::now() < give_up_at) {
     co_await pause(kLook);
   }
-  last.unsettled = rest.samples();
+  last.unsettled = rest.unsettled();
+  last.counts.samples.lost += rest.lost();
   co_return last;
 }
 

@@ -186,8 +186,8 @@ void ImpairedLink::impair(const Impairment& up, const Impairment& down) {
   impairments_.up = up;
   impairments_.down = down;
   if (!connection_) return;
-  connection_->up.impair(up);
-  connection_->down.impair(down);
+  connection_->up.impair(up, now_us());
+  connection_->down.impair(down, now_us());
 }
 
 }  // namespace sim_robot

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace sim_robot {
 namespace {
@@ -38,9 +39,22 @@ ImpairedStream::ImpairedStream(const Impairment& impairment, std::uint64_t seed)
   check(impairment);
 }
 
-void ImpairedStream::impair(const Impairment& impairment) {
+void ImpairedStream::impair(const Impairment& impairment, std::uint64_t now_us) {
   check(impairment);
-  impairment_ = impairment;
+  const double before_bytes_per_s = std::exchange(impairment_, impairment).bytes_per_s;
+  const bool is_wider =
+      before_bytes_per_s > 0 && (impairment.bytes_per_s <= 0 || impairment.bytes_per_s > before_bytes_per_s);
+  if (is_wider && !revived_at_us_) hurry(now_us);
+}
+
+void ImpairedStream::hurry(std::uint64_t now_us) {
+  sent_us_ = now_us;
+  for (Segment& segment : segments_) {
+    const auto size = static_cast<double>(segment.bytes.size() - segment.taken);
+    if (impairment_.bytes_per_s > 0) sent_us_ += microseconds(size / impairment_.bytes_per_s);
+    segment.due_us = std::min(segment.due_us, sent_us_ + microseconds(impairment_.delay_s));
+  }
+  if (!segments_.empty()) last_due_us_ = segments_.back().due_us;
 }
 
 std::size_t ImpairedStream::push(protocol::Bytes bytes, std::uint64_t now_us) {

@@ -60,8 +60,8 @@ class ImpairedStream {
   void stall(std::uint64_t now_us, std::uint64_t until_us);
   // Ends a stall, also one without end: what waits arrives now.
   void resume(std::uint64_t now_us);
-  // For what is pushed from now on.
-  void impair(const Impairment& impairment);
+  // For what is pushed from now on; what waits for a throttle that is less narrow now comes as early as that allows.
+  void impair(const Impairment& impairment, std::uint64_t now_us);
 
   // When the next byte or the end is due; empty when nothing is under way, or for ever.
   std::optional<std::uint64_t> next_at_us() const;
@@ -77,6 +77,7 @@ class ImpairedStream {
     std::uint64_t due_us = 0;
     std::size_t taken = 0;  // of bytes, by pull()
   };
+  void hurry(std::uint64_t now_us);
   std::uint64_t due_us(std::size_t size, std::uint64_t now_us);
   std::uint64_t after_stall(std::uint64_t arrival_us);
   std::uint64_t retransmission_us(int losses) const;

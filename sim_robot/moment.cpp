@@ -13,7 +13,7 @@ View true_view(const SimulatedRobot& robot) {
   view.position_m = world.position_m();
   view.velocity_m_s = world.velocity_m_s();
   view.impedance_mv = world.impedance_mv();
-  view.duty = static_cast<double>(core.duty());
+  view.duty = robot.motor_duty();
   view.mode = core.mode();
   view.emergency_id = core.emergency_id();
   view.link = core.link_lost() ? LinkView::lost : core.link_up() ? LinkView::up : LinkView::none;

@@ -135,18 +135,20 @@ void ProxyConnection::resume() {
 }
 
 void ProxyConnection::impair(const Impairment& up, const Impairment& down) {
-  up_.stream.impair(up);
-  down_.stream.impair(down);
+  up_.stream.impair(up, now_us());
+  down_.stream.impair(down, now_us());
   wake_all();
 }
 
 void ProxyConnection::cut(std::size_t after_bytes) {
-  resume();
+  const bool is_in_outage = stalled_until_us_ > now_us() && stalled_until_us_ != ImpairedStream::kNever;
+  if (!is_in_outage) resume();
   for (Pipe* pipe : {&up_, &down_}) pipe->stream.cut(after_bytes, now_us());
   wake_all();
-  deadline_.expires_after(kCutDeadline);
-  deadline_.async_wait([this](const boost::system::error_code& error) {
-    if (!error) close();
+  deadline_.expires_at((is_in_outage ? at(stalled_until_us_) : Clock::now()) + kCutDeadline);
+  deadline_.async_wait([self = weak_from_this()](const boost::system::error_code& error) {
+    const auto connection = error ? nullptr : self.lock();
+    if (connection) connection->close();
   });
 }
 

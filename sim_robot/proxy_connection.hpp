@@ -9,6 +9,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
+#include <memory>
 #include <string>
 
 #include "sim_robot/impaired_link.hpp"
@@ -16,7 +17,7 @@
 
 namespace sim_robot {
 
-class ProxyConnection {
+class ProxyConnection : public std::enable_shared_from_this<ProxyConnection> {
  public:
   ProxyConnection(boost::asio::ip::tcp::socket client, StationAddress target, const LinkOptions& options,
                   std::string name, LinkLog log);

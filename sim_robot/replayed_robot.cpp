@@ -31,7 +31,7 @@ ReplayedRobot::ReplayedRobot(boost::asio::io_context& loop, ReplayConfig config,
 
 // A whole number of turns to a frame, of whole slots if that can be; often enough for heartbeats.
 std::chrono::microseconds ReplayedRobot::turn_period(const Recording& recording, std::uint32_t period_us) {
-  constexpr std::uint64_t kShortestUs = 2000, kLongestUs = 100'000, kMostTurns = 32;
+  constexpr std::uint64_t kShortestUs = Fleet::kSlotUs, kLongestUs = 100'000, kMostTurns = 32;
   const std::uint64_t frame_us = recording.samples() * period_us / recording.frames();
   std::uint64_t turns = (frame_us + kLongestUs - 1) / kLongestUs;
   while (turns < kMostTurns && frame_us % (turns * Fleet::kSlotUs) != 0) ++turns;

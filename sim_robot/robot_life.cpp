@@ -49,7 +49,12 @@ void RobotLife::advance_to(std::uint64_t true_us) {
     coasted_to_us_ += ticks * SimulatedRobot::kPeriodUs;
   }
   true_us_ = true_us;
-  if (!is_blocked()) robot_.advance_to(robot_clock_us());
+  if (!is_on()) return;
+  if (is_blocked()) {
+    robot_.idle_to(robot_clock_us());
+  } else {
+    robot_.advance_to(robot_clock_us());
+  }
 }
 
 // SAFETY: the old core is gone at once, and with it the duty; the new one starts with duty 0.

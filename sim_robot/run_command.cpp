@@ -8,6 +8,7 @@
 #include <chrono>
 #include <csignal>
 #include <iostream>
+#include <memory>
 
 #include "control/invalid_argument.hpp"
 #include "sim_robot/fault_server.hpp"
@@ -50,9 +51,9 @@ bool breaks_the_link(const Scenario& scenario) {
 
 // Of what a proxy says, that the station is not there, once; the time line says the faults.
 LinkLog only_unreachable() {
-  return [was_said = false](const std::string& line) mutable {
-    if (was_said || !line.starts_with("cannot reach")) return;
-    was_said = true;
+  return [was_said = std::make_shared<bool>(false)](const std::string& line) {  // one for all connections
+    if (*was_said || !line.starts_with("cannot reach")) return;
+    *was_said = true;
     say(line.substr(0, line.find(": ")));
   };
 }

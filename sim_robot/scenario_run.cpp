@@ -61,7 +61,7 @@ void ScenarioRun::say(const ScriptStep& step) {
     case ScriptCommand::clear_emergency: station.send(clear_emergency(emergency_id())); return;
     case ScriptCommand::set_duty:
       duty_ = static_cast<float>(step.duty);
-      duty_until_s_ = step.at_s + step.for_s;
+      duty_until_s_ = time_s() + step.for_s;
       ticks_to_renewal_ = 0;
       return;
   }

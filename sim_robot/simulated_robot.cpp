@@ -85,7 +85,9 @@ void SimulatedRobot::step() {
   inputs.rssi_dbm = kRssiDbm;
   inputs.missed_ticks = missed_ticks_;
   const robot_fw::Outputs outputs = core_.step(inputs, static_cast<float>(kPeriodS));
-  world_.step(static_cast<double>(outputs.duty));
+  skipped_ = 0;
+  motor_duty_ = static_cast<double>(outputs.duty);
+  world_.step(motor_duty_);
   robot_time_us_ += kPeriodUs;
 }
 
@@ -105,9 +107,15 @@ void SimulatedRobot::advance_to(std::uint64_t now_us) {
   while (robot_time_us_ <= now_us) step();
 }
 
+void SimulatedRobot::idle_to(std::uint64_t now_us) {
+  const bool skips = skipped_ > 0 || now_us > robot_time_us_ + kMaxLatenessUs;
+  if (skips && now_us > robot_time_us_) skip((now_us - robot_time_us_) / kPeriodUs);
+}
+
 void SimulatedRobot::skip(std::uint64_t ticks) {
   for (std::uint64_t i = 0; i < ticks; ++i) {
-    world_.step(i < kTicksToMotorOff ? static_cast<double>(core_.duty()) : 0);
+    if (skipped_++ >= kTicksToMotorOff) motor_duty_ = 0;
+    world_.step(motor_duty_);
   }
   robot_time_us_ += ticks * kPeriodUs;
   missed_ticks_ += static_cast<std::uint32_t>(ticks);
@@ -119,6 +127,8 @@ void SimulatedRobot::reset(const SimulatedRobotConfig& config) {
   std::construct_at(&core_, core_config(config_));
   robot_time_us_ = 0;
   missed_ticks_ = 0;
+  skipped_ = 0;
+  motor_duty_ = 0;
 }
 
 void SimulatedRobot::coast(std::uint64_t ticks) {

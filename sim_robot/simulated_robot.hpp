@@ -53,6 +53,9 @@ class SimulatedRobot {
   // Time passes without ticks: the motor keeps the duty it has for 50 ms and is off then, as on the robot's board; the
   // core sees nothing but the later time.
   void skip(std::uint64_t ticks);
+  // As advance_to(), with a loop that does nothing: ticks that are over kMaxLatenessUs late, and those after them, are
+  // skipped; so when it goes on only the latest one runs.
+  void idle_to(std::uint64_t now_us);
 
   // What sim_robot/robot_life makes of a robot. A reset begins the core anew at robot time 0 with what `config` says of
   // boot, cause, duty, storage and latch; plant and sensors are the same and go on.
@@ -74,6 +77,7 @@ class SimulatedRobot {
   const SimulatedRobotConfig& config() const { return config_; }
   std::uint64_t robot_time_us() const { return robot_time_us_; }
   std::uint32_t missed_ticks() const { return missed_ticks_; }
+  double motor_duty() const { return motor_duty_; }  // what the world feels, also while ticks are skipped
 
  private:
   SimulatedRobotConfig config_;
@@ -81,6 +85,8 @@ class SimulatedRobot {
   World world_;
   std::uint64_t robot_time_us_ = 0;
   std::uint32_t missed_ticks_ = 0;
+  std::uint64_t skipped_ = 0;  // in a row
+  double motor_duty_ = 0;
 };
 
 }  // namespace sim_robot

@@ -19,7 +19,7 @@ using namespace std::chrono_literals;
 constexpr auto kConnectTimeout = 1s;
 constexpr auto kAskAgain = 10ms;
 constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
-constexpr int kMostPauses = 4;                       // taken together, for a station that is not there
+constexpr int kMostPauses = 4;                       // taken together, for a station that does not take it in
 constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
 }  // namespace
@@ -32,8 +32,8 @@ asio::awaitable<void> StationConnection::run() {
   for (int failures = 0;;) {
     while (!speaker_.may_dial()) co_await pause(kAskAgain);
     const int times_forgotten = times_forgotten_;
+    was_welcome_ = false;
     const bool reached = co_await reach();
-    failures = reached ? 0 : failures + 1;
     if (!reached) {
       ++counts_.unreachable;
       say("cannot reach the station at " + station_.host + ":" + station_.port + ", trying again");
@@ -44,6 +44,7 @@ asio::awaitable<void> StationConnection::run() {
         say_how_it_ended();
       }
     }
+    failures = was_welcome_ ? 0 : failures + 1;
     std::uniform_int_distribution<int> pause_ms{kMinPauseMs, kMaxPauseMs};
     co_await pause(std::clamp(failures, 1, kMostPauses) * std::chrono::milliseconds(pause_ms(jitter_)));
   }

@@ -2,7 +2,8 @@
 //
 // What speaks over it is a Speaker: a simulated robot, or a recording that is replayed. What the socket does not take
 // at once of a frame stays here, the speaker is asked for no other until it is gone. After a failure it is dialled
-// again 0.3 to 0.9 s later, at random, so that many do not come at once; up to four times as long where nobody answers.
+// again 0.3 to 0.9 s later, at random, so that many do not come at once; up to four times as long while nobody takes it
+// in.
 // One buffer serves the reads of all connections of a thread. The loop and the speaker must outlive the connection.
 #pragma once
 

@@ -310,6 +310,8 @@ TEST_F(FaultEffects, ABlockMissesTicksAndTheMotorGoesOffMeanwhile) {
   const auto before = samples();
   run_to(2.28);
   EXPECT_EQ(samples(), before);
+  EXPECT_NE(core().duty(), 0) << "nothing runs that could change it";
+  EXPECT_EQ(life.robot().motor_duty(), 0) << "the board's own watch";
   run_to(4);
   EXPECT_NEAR(status().missed_ticks, 30, 1);
   EXPECT_EQ(events_of(rheonaut_EVENT_KIND_TIME_STEP), 1);

@@ -99,6 +99,18 @@ TEST_F(ImpairedStreamTest, ThrottleLetsItsRatePass) {
   EXPECT_EQ(arrivals.back().at_us, 4 * kSUs);
 }
 
+TEST_F(ImpairedStreamTest, AThrottleThatIsLiftedLetsGoWhatWaits) {
+  ImpairedStream stream{with([](auto& i) { i.bytes_per_s = 100; }), 1};
+  push(stream, numbered(1000), 0);
+  take_until(stream, 2 * kSUs);
+  EXPECT_EQ(received.size(), 200u);
+  stream.impair({}, 2 * kSUs);
+  push(stream, {7}, 2 * kSUs);
+  take_until(stream, 2 * kSUs + 10 * kMsUs);
+  EXPECT_EQ(received.size(), 1001u);
+  EXPECT_EQ(received.back(), 7);
+}
+
 TEST_F(ImpairedStreamTest, ALossIsAStallOfATimeoutThatDoublesAndHoldsUpWhatFollows) {
   ImpairedStream stream{with([](auto& i) { i.loss_probability = 0.5; }), 3};
   for (std::uint64_t i = 0; i < 500; ++i) push(stream, {0}, i * 100 * kSUs);
@@ -222,7 +234,7 @@ std::vector<Arrival> storm(std::uint64_t seed, std::vector<std::uint8_t>& receiv
   std::vector<Arrival> arrivals;
   std::size_t pushed = 0;
   for (std::uint64_t now_us = 0; received.size() < sent.size() && now_us < 36'000 * kSUs; now_us += 10 * kMsUs) {
-    if (up_to(1) < 0.002) stream.impair(any());
+    if (up_to(1) < 0.002) stream.impair(any(), now_us);
     if (up_to(1) < 0.002) stream.stall(now_us, now_us + static_cast<std::uint64_t>(up_to(2e6)));
     if (up_to(1) < 0.0005) stream.stall(now_us, ImpairedStream::kNever);
     if (up_to(1) < 0.01) stream.resume(now_us);

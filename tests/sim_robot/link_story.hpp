@@ -68,6 +68,7 @@ class LinkStory : public ::testing::Test {
   }
   bool caught_up() const {
     return station->link_is_up() && !station->samples.empty() &&
+           station->durable_next_seq() >= station->hello->next_seq &&
            station->durable_next_seq() == station->samples.rbegin()->first + 1;
   }
   protocol::Status status() const {
@@ -87,6 +88,7 @@ class LinkStory : public ::testing::Test {
   // No sample of this boot is missing.
   void expect_whole() {
     station->run(2.5);  // the last batch, and a status
+    EXPECT_TRUE(station->link_is_up());
     EXPECT_EQ(station->lost_samples(), 0u);
     EXPECT_EQ(status().lost_samples, 0u);
     ASSERT_FALSE(station->samples.empty());

@@ -158,6 +158,24 @@ TEST_F(RobotFaults, AClockThatJumpsBackStopsTheRobotOnce) {
   expect_whole();
 }
 
+TEST(RobotLife, TheWorldGoesOnInABlockAlsoWhenAResetEndsIt) {
+  RobotLife life{{}};
+  const auto run_to = [&life](double time_s) {
+    for (std::uint64_t us = life.true_us(); us <= static_cast<std::uint64_t>(time_s * 1e6); us += 10'000) {
+      life.advance_to(us);
+    }
+  };
+  const auto world_s = [&life] { return life.robot().world().glucose().time_s(); };
+  run_to(2);
+  life.block(60);
+  run_to(5);
+  EXPECT_NEAR(world_s(), 5, 0.03);
+  life.reboot({});
+  run_to(6);
+  EXPECT_NEAR(world_s(), 6, 0.05);
+  EXPECT_GT(life.core().samples().next_seq(), 40u);
+}
+
 TEST(RobotLife, TheBooksOfABootAreClosedWhenItEnds) {
   RobotLife life{{}};
   life.advance_to(1'000'000);

@@ -173,7 +173,7 @@ class RobotTest(unittest.TestCase):
         self.assertTrue(any(is_reset() for _ in range(5)))
         self.ask(url, {"fault": "reboot", "off_for_s": 0.1})
         self.assertEqual(self.ask(url)["boots"], 2)
-        self.assertEqual(robot.stop(), 0)
+        self.assertEqual(robot.stop(), 2, "no station took it in")
 
     def test_a_robot_says_what_is_wrong_with_its_arguments(self):
         for arguments, words in (((), "--station is required"),

@@ -119,6 +119,7 @@ std::vector<StoredSample> SystemTest::samples_of(RunId run) {
 void SystemTest::expect_whole(RunId id) {
   const auto run = wait_for(runs->end(id, ""));
   ASSERT_TRUE(run.has_value());
+  EXPECT_GT(run->samples_expected, 0u);
   EXPECT_EQ(run->samples_lost, 0u);
   EXPECT_EQ(run->samples_stored, run->samples_expected);
   const auto samples = samples_of(id);
