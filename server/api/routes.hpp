@@ -49,6 +49,9 @@ void add_routes(Router& router, ApiParts& parts);
 // A query parameter as a number within limits; `fallback` when it is not given.
 Result<std::int64_t> query_number(const Request& request, const std::string& name, std::int64_t minimum,
                                   std::int64_t maximum, std::int64_t fallback);
+// A cursor is "span-seq"; opaque to its users.
+std::string cursor_text(const SampleCursor& cursor);
+std::optional<SampleCursor> parse_cursor(const std::string& text);
 std::string login_url(const std::string& address, const std::string& code);  // address: "127.0.0.1:8080"
 Result<RunId> run_id_of(const Request& request);
 

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <limits>
 
 #include "server/api/routes.hpp"
 
@@ -9,13 +10,6 @@ namespace server {
 namespace asio = boost::asio;
 using nlohmann::json;
 
-namespace {
-
-constexpr std::int64_t kMaxPage = 10000;
-constexpr std::int64_t kDefaultPage = 1000;
-constexpr std::size_t kCsvPage = 2000;  // samples held in memory at a time, about 300 kB of text
-
-// A cursor is "span-seq"; opaque to its users.
 std::string cursor_text(const SampleCursor& cursor) { return fmt::format("{}-{}", cursor.span, cursor.seq); }
 
 std::optional<SampleCursor> parse_cursor(const std::string& text) {
@@ -24,9 +18,16 @@ std::optional<SampleCursor> parse_cursor(const std::string& text) {
   const auto span = std::from_chars(text.data(), end, cursor.span);
   if (span.ec != std::errc{} || span.ptr == end || *span.ptr != '-') return std::nullopt;
   const auto seq = std::from_chars(span.ptr + 1, end, cursor.seq);
-  if (seq.ec != std::errc{} || seq.ptr != end) return std::nullopt;
+  const bool is_number = seq.ec == std::errc{} && seq.ptr == end;
+  if (!is_number || cursor.seq > std::numeric_limits<std::int64_t>::max()) return std::nullopt;  // beyond any sample
   return cursor;
 }
+
+namespace {
+
+constexpr std::int64_t kMaxPage = 10000;
+constexpr std::int64_t kDefaultPage = 1000;
+constexpr std::size_t kCsvPage = 2000;  // samples held in memory at a time, about 300 kB of text
 
 // Text of many samples takes milliseconds: it is made on the readers' thread, never on the loop.
 std::string page_text(const SamplePage& page) {

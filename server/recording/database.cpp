@@ -77,8 +77,22 @@ SQLite::Database open_checked(const std::filesystem::path& path) {
 
 Database::Database(const std::filesystem::path& path) : handle_{open_checked(path)} {
   if (sodium_init() < 0) throw std::runtime_error{"libsodium cannot be initialised: the system gives no random bytes"};
+  settle();
   migrate(path);
   store_id_ = unsigned_id(handle_.execAndGet("SELECT value FROM meta WHERE name = 'store_id'"));
+}
+
+// What a kill has left in the write-ahead log can be read, but the disk may not hold it yet, and robots will be told
+// that it is durable. And a log that goes on where a power cut has left it goes on inside a sector that holds a commit.
+// So it begins anew, after a checkpoint, which first syncs it (so when there is no room for the rest, that is done).
+void Database::settle() {
+  const int result =
+      sqlite3_wal_checkpoint_v2(handle_.getHandle(), nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+  if (result == SQLITE_BUSY) {  // another program is reading the log: it stays, and a commit syncs it
+    handle_.exec(fmt::format("PRAGMA user_version = {}", pragma(handle_, "user_version")));
+  } else if (result != SQLITE_OK && result != SQLITE_FULL) {
+    throw SQLite::Exception{handle_.getHandle(), result};
+  }
 }
 
 void Database::migrate(const std::filesystem::path& path) {

@@ -25,6 +25,7 @@ class Database {
   void checkpoint();
 
  private:
+  void settle();
   void migrate(const std::filesystem::path& path);
 
   SQLite::Database handle_;

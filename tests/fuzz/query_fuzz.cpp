@@ -1,0 +1,112 @@
+// Feeds any text to the readers of an HTTP target: path, query parameters, numbers within limits and cursors. Whatever
+// they do not take is answered with a problem of the client's making that is valid JSON; what they take means what it
+// says.
+#include <algorithm>
+#include <cstdlib>
+#include <limits>
+#include <string_view>
+
+#include "server/api/routes.hpp"
+#include "server/tasks.hpp"
+
+namespace server {
+namespace {
+
+constexpr std::int64_t kMaximum = 10'000;
+
+void require(bool condition) {
+  if (!condition) std::abort();
+}
+
+bool has_control_character(const std::string& text) {
+  return std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+}
+
+std::string percent_encode(const std::string& text) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    out += {'%', kDigits[byte / 16], kDigits[byte % 16]};
+  }
+  return out;
+}
+
+void decode(std::string_view text) {
+  for (const bool plus_is_space : {false, true}) {
+    const auto decoded = percent_decode(text, plus_is_space);
+    if (!decoded) continue;
+    require(!has_control_character(*decoded) && decoded->size() <= text.size());
+    require(percent_decode(percent_encode(*decoded), plus_is_space) == decoded);
+  }
+}
+
+// A segment never hides a way to another folder.
+void read_path(const std::string& target) {
+  const auto segments = path_segments(target);
+  require(segments.has_value() == path_of(target).has_value());
+  if (!segments) return;
+  for (const std::string& segment : *segments) {
+    require(segment != "." && segment != ".." && segment.find_first_of("/\\") == std::string::npos);
+    require(!has_control_character(segment));
+  }
+}
+
+void read_cursor(const std::string& text) {
+  const auto cursor = parse_cursor(text);
+  if (!cursor) return;
+  require(cursor->seq + 1 != 0);  // a page begins there
+  const auto again = parse_cursor(cursor_text(*cursor));
+  require(again && again->span == cursor->span && again->seq == cursor->seq);
+}
+
+// What the routes do with their parameters, without what they ask.
+Answer answer(Request request) {
+  const auto limit = query_number(request, "limit", 1, kMaximum, 100);
+  if (!limit) co_return problem(limit.error());
+  require(*limit >= 1 && *limit <= kMaximum);
+  const auto before = query_number(request, "before", 1, std::numeric_limits<std::int64_t>::max(), 0);
+  if (!before) co_return problem(before.error());
+  require(*before >= 0);
+  if (request.param.contains("run_id")) {
+    const auto run_id = run_id_of(request);
+    if (!run_id) co_return problem(run_id.error());
+  }
+  for (const auto& [name, value] : request.query) read_cursor(value);
+  co_return json_response(200, {{"path", request.path}, {"query", request.query}});
+}
+
+// run_first wants a result that can be made before it is known.
+boost::asio::awaitable<Response> dispatch(const Router& router, Request request) {
+  co_return co_await router.dispatch(std::move(request));
+}
+
+void ask(const std::string& target) {
+  Router router;
+  router.add({"GET", "/api/v1/runs", {"limit", "before", "robot_id"}, answer});
+  router.add({"POST", "/api/v1/runs", {}, answer});
+  router.add({"GET", "/api/v1/runs/{run_id}/samples", {"limit", "after"}, answer});
+  router.set_fallback([](const Request& request) { return json_response(200, {{"page", request.path}}); });
+  for (const char* method : {"GET", "HEAD", "POST"}) {
+    boost::asio::io_context loop;
+    Request request;
+    request.method = method;
+    request.target = target;
+    const Response response = run_first(loop, dispatch(router, std::move(request)));
+    require(response.status == 200 || (response.status >= 400 && response.status < 500));
+    require(nlohmann::json::accept(response.body));
+  }
+}
+
+}  // namespace
+}  // namespace server
+
+// The name and the signature that libFuzzer calls.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
+  const std::string text{reinterpret_cast<const char*>(data), size};
+  server::decode(text);
+  server::read_path(text);
+  server::read_cursor(text);
+  server::ask(text);
+  return 0;
+}
