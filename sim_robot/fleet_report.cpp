@@ -55,6 +55,10 @@ Json rates(const FleetSnapshot& from, const FleetSnapshot& to, const Lateness& l
           {"cpu_cores", rounded(dt_s > 0 ? (to.cpu_s - from.cpu_s) / dt_s : 0, 0.001)}};
 }
 
+Json acknowledged_after_ms(const FleetSnapshot& end) {
+  return end.acknowledged_after ? late_ms(*end.acknowledged_after) : Json{};
+}
+
 Json summary(const FleetSnapshot& end, const Lateness& lateness, const std::string& fault) {
   const FleetCounts& counts = end.counts;
   const SampleCounts& samples = counts.samples;
@@ -80,6 +84,7 @@ Json summary(const FleetSnapshot& end, const Lateness& lateness, const std::stri
           {"commands", samples.commands},
           {"missed_ticks", samples.missed_ticks},
           {"tick_late_ms", late_ms(lateness)},
+          {"acknowledged_after_ms", acknowledged_after_ms(end)},
           {"cpu_s", rounded(end.cpu_s, 0.001)},
           {"cpu_us_per_sample", rounded(made > 0 ? end.cpu_s * 1e6 / made : 0, 0.001)},
           {"result", fault.empty() ? "nothing lost" : fault}};

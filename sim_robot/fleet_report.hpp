@@ -16,6 +16,7 @@ struct FleetSnapshot {
   double cpu_s = 0;  // of this process, user and system
   FleetCounts counts;
   std::uint64_t unsettled = 0;  // samples made before the end and neither acknowledged nor lost some time after it
+  const Lateness* acknowledged_after = nullptr;  // replay only: how long the station took
 };
 
 double process_cpu_s();

@@ -75,12 +75,13 @@ struct Watch {
   const FleetOptions& options;
   const Fleet& fleet;
   std::ostream& out;
+  const Lateness* acknowledged_after = nullptr;
   Clock::time_point start = Clock::now();
   double cpu_at_start_s = process_cpu_s();
 
   FleetSnapshot now() const {
     const double time_s = std::chrono::duration<double>(Clock::now() - start).count();
-    return {time_s, process_cpu_s() - cpu_at_start_s, fleet.counts(), 0};
+    return {time_s, process_cpu_s() - cpu_at_start_s, fleet.counts(), 0, acknowledged_after};
   }
 };
 
@@ -159,8 +160,9 @@ int report_end(const Watch& watch, const FleetSnapshot& end) {
   return fault ? fault->exit_status : EXIT_SUCCESS;
 }
 
-int run(const FleetOptions& options, asio::io_context& loop, Fleet& fleet, std::ostream& out) {
-  const Watch watch{options, fleet, out};
+int run(const FleetOptions& options, asio::io_context& loop, Fleet& fleet, std::ostream& out,
+        const Lateness* acknowledged_after = nullptr) {
+  const Watch watch{options, fleet, out, acknowledged_after};
   const auto rethrow = [](const std::exception_ptr& error) {
     if (error) std::rethrow_exception(error);
   };
@@ -207,7 +209,9 @@ int run_replay(const FleetOptions& options, const std::string& token, const Reco
   named.token = token;
   check(named);
   ReplayConfig config;
+  Lateness acknowledged_after;
   config.token = token;
+  config.acknowledged_after = &acknowledged_after;
   config.period_us = replay_period_us(recording, rate);
   for (int i = 0; i < options.robots; ++i) {
     config.robot_id = id_of(options, i + 1);
@@ -215,7 +219,7 @@ int run_replay(const FleetOptions& options, const std::string& token, const Reco
     robots.push_back(std::make_unique<ReplayedRobot>(loop, config, recording, options.station, LinkLog{}));
   }
   Fleet fleet{loop, std::move(robots), ReplayedRobot::turn_period(recording, config.period_us)};
-  return run(options, loop, fleet, out);
+  return run(options, loop, fleet, out, &acknowledged_after);
 }
 
 }  // namespace sim_robot

@@ -127,7 +127,10 @@ bool ReplayedRobot::on_welcome(const protocol::Welcome& welcome) {
 // A frame is held until all of it is durable.
 void ReplayedRobot::acknowledge(std::uint64_t next_seq) {
   if (next_seq > recording_.first_seq(next_)) return;
+  const auto now_us = static_cast<std::int64_t>(robot_time_us());
   while (oldest_ < next_ && recording_.end_seq(oldest_) <= next_seq) {
+    const std::uint64_t made_us = (recording_.end_seq(oldest_) - 1) * config_.period_us;
+    if (config_.acknowledged_after) config_.acknowledged_after->add(now_us - static_cast<std::int64_t>(made_us));
     ++oldest_;
     gap_grows_ = false;
   }

@@ -10,6 +10,7 @@
 #include <deque>
 
 #include "sim_robot/fleet_member.hpp"
+#include "sim_robot/lateness.hpp"
 #include "sim_robot/replay.hpp"
 
 namespace sim_robot {
@@ -18,7 +19,8 @@ struct ReplayConfig {
   std::string robot_id = "sim-1";
   std::string token;
   std::uint64_t boot_id = 1;
-  std::uint32_t period_us = 10'000;  // of samples
+  std::uint32_t period_us = 10'000;        // of samples
+  Lateness* acknowledged_after = nullptr;  // told of each frame, from its last sample to its acknowledgement
 };
 
 class ReplayedRobot final : public FleetMember, private Speaker {
