@@ -80,11 +80,15 @@ std::size_t encode(const Command& command, std::uint8_t* out, std::size_t capaci
   return encode_any(rheonaut_Command_fields, command, out, capacity);
 }
 
+bool decode_robot_frame(Bytes payload, RobotFrame& into) {
+  pb_istream_t stream = pb_istream_from_buffer(payload.first, payload.size);
+  if (!pb_decode(&stream, rheonaut_RobotFrame_fields, &into) || !has_content(into)) return false;
+  return into.which_body != rheonaut_RobotFrame_telemetry_tag || columns_agree(into.body.telemetry);
+}
+
 std::optional<RobotFrame> decode_robot_frame(Bytes payload) {
-  auto frame = decode_any<RobotFrame>(rheonaut_RobotFrame_fields, payload);
-  if (frame && frame->which_body == rheonaut_RobotFrame_telemetry_tag && !columns_agree(frame->body.telemetry)) {
-    frame.reset();
-  }
+  std::optional<RobotFrame> frame{std::in_place};
+  if (!decode_robot_frame(payload, *frame)) frame.reset();
   return frame;
 }
 

@@ -55,6 +55,7 @@ std::size_t encode(const Command& command, std::uint8_t* out, std::size_t capaci
 // Decodes one payload. Empty when the bytes are not such a message, carry no body, break a fixed size, or (telemetry)
 // the columns differ in length or are empty. Values are not judged: a float may be NaN, an enumerator unknown.
 std::optional<RobotFrame> decode_robot_frame(Bytes payload);
+bool decode_robot_frame(Bytes payload, RobotFrame& into);  // false: `into` holds anything
 std::optional<StationFrame> decode_station_frame(Bytes payload);
 std::optional<Command> decode_command(Bytes payload);
 

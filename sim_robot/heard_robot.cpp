@@ -31,7 +31,9 @@ void HeardRobot::on_frame(const protocol::RobotFrame& frame) {
     case rheonaut_RobotFrame_hello_tag: on_hello(frame.body.hello); break;
     case rheonaut_RobotFrame_command_ack_tag: acks.push_back(frame.body.command_ack); break;
     case rheonaut_RobotFrame_event_tag: events.push_back(frame.body.event); break;
-    case rheonaut_RobotFrame_parameter_page_tag: pages.push_back(frame.body.parameter_page); break;
+    case rheonaut_RobotFrame_parameter_page_tag:
+      (frame.body.parameter_page.command_id == 0 ? table : pages).push_back(frame.body.parameter_page);
+      break;
     case rheonaut_RobotFrame_controller_tag: controllers.push_back(frame.body.controller); break;
     case rheonaut_RobotFrame_telemetry_tag: on_telemetry(frame.body.telemetry); break;
     default: break;

@@ -44,8 +44,9 @@ class HeardRobot {
   std::optional<protocol::Hello> hello;      // of the last connection
   std::vector<protocol::RobotFrame> frames;  // all of them, in the order of arrival
   std::vector<protocol::CommandAck> acks;
-  std::vector<protocol::Event> events;  // of all boots
-  std::vector<protocol::ParameterPage> pages;
+  std::vector<protocol::Event> events;         // of all boots
+  std::vector<protocol::ParameterPage> pages;  // answers
+  std::vector<protocol::ParameterPage> table;  // sent after each Welcome, unasked
   std::vector<protocol::Controller> controllers;
   std::map<std::uint64_t, ReceivedSample> samples;  // of this boot, by seq
   std::vector<std::map<std::uint64_t, ReceivedSample>> earlier_boots;

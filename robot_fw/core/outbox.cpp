@@ -29,6 +29,13 @@ void Outbox::welcomed(const TelemetryRing& samples, const EventRing& events) {
   event_next_ = events.oldest_seq();
   heartbeat_ = rheonaut_Heartbeat_init_zero;
   status_due_us_ = 0;
+  page_count_ = 0;  // those of commands of an earlier connection
+  controller_due_ = true;
+  table_index_ = 0;
+}
+
+PageRequest Outbox::table_page() const {
+  return {0, table_index_, std::min(PageRequest::kMost, kParameterCount - table_index_)};
 }
 
 Outbox::Ack::Ack(const protocol::CommandAck& ack)
@@ -108,6 +115,7 @@ Outgoing Outbox::next(const Link& link, const TelemetryRing& samples, const Even
   if (some_are_urgent || samples.next_seq() - live_.next_seq >= samples_per_frame) return Outgoing::live;
   if (now_us >= status_due_us_) return Outgoing::status;
   if (heartbeat_.echo_station_time_us != 0 || link.heartbeat_due(now_us)) return Outgoing::heartbeat;
+  if (table_index_ < kParameterCount) return Outgoing::table;
   if (backfill_.empty()) return Outgoing::none;
   const std::uint64_t wanted = std::min<std::uint64_t>(backfill_.end_seq - backfill_.next_seq, kMaxSamplesPerFrame);
   return wanted <= backfill_credit_ ? Outgoing::backfill : Outgoing::none;
@@ -131,6 +139,7 @@ void Outbox::sent(Outgoing what, std::size_t samples_in_frame, std::uint64_t now
     case Outgoing::live: live_.next_seq += samples_in_frame; break;
     case Outgoing::status: status_due_us_ = now_us + kStatusPeriodUs; break;
     case Outgoing::heartbeat: heartbeat_ = rheonaut_Heartbeat_init_zero; break;
+    case Outgoing::table: table_index_ = static_cast<std::uint8_t>(table_index_ + table_page().count); break;
     case Outgoing::backfill:
       backfill_.next_seq += samples_in_frame;
       backfill_credit_ -= std::min(samples_in_frame, backfill_credit_);

@@ -1,8 +1,8 @@
 // What is sent next: the order of the messages and the place each of them has reached.
 //
 // First to last: hello, acks of stops, acks, parameters and controller as asked for, events, live samples, status,
-// heartbeat, backfill. Backfill is what the station lacks from before this connection or asks for again; it flows at no
-// more than twice the rate of the live samples.
+// heartbeat, what is in force (after a Welcome), backfill. Backfill is what the station lacks from before this
+// connection or asks for again; it flows at no more than twice the rate of the live samples.
 #pragma once
 
 #include <array>
@@ -11,11 +11,12 @@
 #include "protocol/messages.hpp"
 #include "robot_fw/core/event_ring.hpp"
 #include "robot_fw/core/link.hpp"
+#include "robot_fw/core/parameters.hpp"
 #include "robot_fw/core/telemetry_ring.hpp"
 
 namespace robot_fw {
 
-enum class Outgoing { none, hello, ack, parameters, controller, event, live, status, heartbeat, backfill };
+enum class Outgoing { none, hello, ack, parameters, controller, event, live, status, heartbeat, table, backfill };
 
 // A run of samples still to be sent: [next_seq, end_seq).
 struct SampleRun {
@@ -26,8 +27,10 @@ struct SampleRun {
   void extend(std::uint64_t from_seq, std::uint64_t to_seq);
 };
 
-// A page of the parameter table, as the answer to a command.
+// A page of the parameter table, as the answer to a command; of command 0 when nobody asked.
 struct PageRequest {
+  static constexpr std::size_t kMost = sizeof(protocol::ParameterPage::parameters) / sizeof(rheonaut_Parameter);
+
   std::uint64_t command_id = 0;
   std::size_t first_index = 0;
   std::size_t count = 0;
@@ -66,6 +69,7 @@ class Outbox {
 
   protocol::CommandAck first_ack() const;
   const PageRequest& first_page() const { return pages_[0]; }
+  PageRequest table_page() const;
   std::uint64_t event_seq() const { return event_next_; }
   std::uint64_t live_seq() const { return live_.next_seq; }
   const SampleRun& backfill() const { return backfill_; }
@@ -95,6 +99,7 @@ class Outbox {
   std::array<PageRequest, kMaxPages> pages_{};
   std::size_t page_count_ = 0;
   bool controller_due_ = false;
+  std::uint8_t table_index_ = 0;  // of the parameter with which the table goes on; at its end nothing is due
   std::uint64_t event_next_ = 0;
   SampleRun live_;  // end_seq: samples below it are due at once
   SampleRun backfill_;

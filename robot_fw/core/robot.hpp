@@ -140,7 +140,7 @@ class Robot {
   void on_heartbeat(const protocol::StationHeartbeat& heartbeat);
   void station_heard();
   void fill(Outgoing what, protocol::RobotFrame& frame) const;
-  void fill_parameters(protocol::ParameterPage& page) const;
+  void fill_parameters(const PageRequest& request, protocol::ParameterPage& page) const;
   void fill_hello(protocol::Hello& hello) const;
   void fill_status(protocol::Status& status) const;
 

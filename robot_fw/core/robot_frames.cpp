@@ -131,7 +131,7 @@ void Robot::fill(Outgoing what, protocol::RobotFrame& frame) const {
       return;
     case Outgoing::parameters:
       frame.which_body = rheonaut_RobotFrame_parameter_page_tag;
-      return fill_parameters(frame.body.parameter_page);
+      return fill_parameters(outbox_.first_page(), frame.body.parameter_page);
     case Outgoing::controller:
       frame.which_body = rheonaut_RobotFrame_controller_tag;
       return write_controller(controllers_.in_force(), config_.sample_period_us, frame.body.controller);
@@ -148,6 +148,9 @@ void Robot::fill(Outgoing what, protocol::RobotFrame& frame) const {
       frame.which_body = rheonaut_RobotFrame_heartbeat_tag;
       frame.body.heartbeat = outbox_.heartbeat();
       return;
+    case Outgoing::table:
+      frame.which_body = rheonaut_RobotFrame_parameter_page_tag;
+      return fill_parameters(outbox_.table_page(), frame.body.parameter_page);
     case Outgoing::backfill: {
       const SampleRun& run = outbox_.backfill();
       frame.which_body = rheonaut_RobotFrame_telemetry_tag;
@@ -157,8 +160,7 @@ void Robot::fill(Outgoing what, protocol::RobotFrame& frame) const {
   }
 }
 
-void Robot::fill_parameters(protocol::ParameterPage& page) const {
-  const PageRequest& request = outbox_.first_page();
+void Robot::fill_parameters(const PageRequest& request, protocol::ParameterPage& page) const {
   page.command_id = request.command_id;
   page.first_index = static_cast<std::uint32_t>(request.first_index);
   page.total = kParameterCount;

@@ -52,10 +52,9 @@ Verdict Robot::set_parameter(const rheonaut_SetParameter& order, std::uint64_t c
 }
 
 Verdict Robot::get_parameters(std::uint32_t first_index, std::uint64_t command_id) {
-  constexpr std::size_t kPerPage = sizeof(protocol::ParameterPage::parameters) / sizeof(rheonaut_Parameter);
   if (first_index >= kParameterCount) return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
   if (!outbox_.has_room_for_page()) return rejected(rheonaut_REJECT_REASON_BUSY);
-  outbox_.ask_page({command_id, first_index, std::min(kPerPage, kParameterCount - first_index)});
+  outbox_.ask_page({command_id, first_index, std::min(PageRequest::kMost, kParameterCount - first_index)});
   return kAccepted;
 }
 

@@ -105,34 +105,37 @@ asio::awaitable<void> RobotSession::serve() {
   station_.on_disconnected(*this, close_reason_.empty() ? reason : close_reason_);
 }
 
-asio::awaitable<std::optional<protocol::RobotFrame>> RobotSession::read_frame() {
-  for (;;) {
-    while (!unread_.empty()) {
-      const auto state = reader_.push(unread_);
-      if (state == protocol::FrameReader::State::incomplete) break;
-      if (state == protocol::FrameReader::State::oversize) {
-        close_reason_ = "a frame longer than 1024 bytes: not this protocol";
-        co_return std::nullopt;
-      }
-      auto frame = protocol::decode_robot_frame(reader_.payload());
-      if (!frame) close_reason_ = "a frame that does not decode";
-      co_return frame;
-    }
-    const std::size_t size = co_await stream_->read_some(asio::buffer(input_));
-    if (size == 0) co_return std::nullopt;
-    unread_ = {input_.data(), size};
-  }
+// False at the end of the connection.
+asio::awaitable<bool> RobotSession::read_more() {
+  const std::size_t size = co_await stream_->read_some(asio::buffer(input_));
+  unread_ = {input_.data(), size};
+  co_return size > 0;
+}
+
+// Decodes the next frame of what was read into frame_; false when there is none, or a fault (then close_reason_ is
+// set).
+bool RobotSession::next_frame_read() {
+  const auto state = reader_.push(unread_);
+  if (state == protocol::FrameReader::State::oversize)
+    close_reason_ = "a frame longer than 1024 bytes: not this protocol";
+  if (state != protocol::FrameReader::State::complete) return false;
+  last_received_us_ = clock_.steady_us();
+  if (protocol::decode_robot_frame(reader_.payload(), frame_)) return true;
+  close_reason_ = "a frame that does not decode";
+  return false;
 }
 
 asio::awaitable<std::optional<protocol::Hello>> RobotSession::read_hello() {
-  const auto frame = co_await read_frame();
-  if (!frame) co_return std::nullopt;
-  if (frame->which_body != rheonaut_RobotFrame_hello_tag) {
+  while (!next_frame_read()) {
+    const bool goes_on = close_reason_.empty() && co_await read_more();
+    if (!goes_on) co_return std::nullopt;
+  }
+  if (frame_.which_body != rheonaut_RobotFrame_hello_tag) {
     close_reason_ = "the first frame is not a hello";
     co_return std::nullopt;
   }
-  hello_robot_time_us_ = frame->robot_time_us;
-  co_return frame->body.hello;
+  hello_robot_time_us_ = frame_.robot_time_us;
+  co_return frame_.body.hello;
 }
 
 // Checks the hello, asks the archive, and takes the robot's seat or refuses it.
@@ -195,11 +198,10 @@ asio::awaitable<bool> RobotSession::refuse(protocol::RefusalReason reason, std::
 
 asio::awaitable<RobotSession::EndReason> RobotSession::read_frames() {
   for (;;) {
-    const auto frame = co_await read_frame();
-    if (!frame) co_return close_reason_.empty() ? "the robot closed the connection" : close_reason_;
-    last_received_us_ = clock_.steady_us();
-    on_frame(*frame);
+    while (close_reason_.empty() && next_frame_read()) on_frame(frame_);
     if (!close_reason_.empty()) co_return close_reason_;
+    const bool more = co_await read_more();
+    if (!more) co_return "the robot closed the connection";
   }
 }
 
@@ -213,9 +215,11 @@ void RobotSession::on_frame(const protocol::RobotFrame& frame) {
     case rheonaut_RobotFrame_telemetry_tag: station_.on_samples(*this, frame.body.telemetry); break;
     case rheonaut_RobotFrame_event_tag: station_.on_event(*this, frame.body.event); break;
     case rheonaut_RobotFrame_status_tag: station_.on_status(*this, frame.body.status); break;
+    case rheonaut_RobotFrame_parameter_page_tag: station_.on_parameters(*this, frame.body.parameter_page); break;
+    case rheonaut_RobotFrame_controller_tag: station_.on_controller(*this, frame.body.controller); break;
     case rheonaut_RobotFrame_command_ack_tag: station_.on_command_ack(*this, frame.body.command_ack); break;
     case rheonaut_RobotFrame_heartbeat_tag: on_heartbeat(frame); break;
-    default: break;  // a message of a newer version, or one nobody here uses yet
+    default: break;  // a message of a newer version
   }
 }
 
@@ -228,7 +232,7 @@ void RobotSession::on_heartbeat(const protocol::RobotFrame& frame) {
   exchange.received_at_robot_us = static_cast<std::int64_t>(answer.echo_received_at_robot_us);
   exchange.answered_at_robot_us = static_cast<std::int64_t>(frame.robot_time_us);
   exchange.answer_received_at_us = last_received_us_;
-  station_.on_clock(*this, clock_sync_.add(exchange));
+  station_.on_clock(*this, exchange);
 }
 
 asio::awaitable<RobotSession::EndReason> RobotSession::write_frames() {

@@ -13,7 +13,6 @@
 
 #include "protocol/frame.hpp"
 #include "server/clock.hpp"
-#include "server/link/clock_sync.hpp"
 #include "server/net/byte_stream.hpp"
 #include "server/station/robot_archive.hpp"
 #include "server/station/robot_port.hpp"
@@ -48,7 +47,8 @@ class RobotSession final : public RobotPort {
   };
   using EndReason = std::string;
 
-  boost::asio::awaitable<std::optional<protocol::RobotFrame>> read_frame();
+  boost::asio::awaitable<bool> read_more();
+  bool next_frame_read();
   boost::asio::awaitable<std::optional<protocol::Hello>> read_hello();
   boost::asio::awaitable<bool> admit(const protocol::Hello& hello);
   protocol::StationFrame welcome(const Admission& admission) const;
@@ -71,7 +71,8 @@ class RobotSession final : public RobotPort {
 
   protocol::FrameReader reader_;
   std::array<std::uint8_t, 4096> input_{};
-  protocol::Bytes unread_;
+  protocol::Bytes unread_;      // of input_
+  protocol::RobotFrame frame_;  // the one that was decoded last
   std::uint64_t hello_robot_time_us_ = 0;
   RobotId robot_id_;  // from the hello
 
@@ -85,7 +86,6 @@ class RobotSession final : public RobotPort {
   std::int64_t next_probe_us_ = 0;
   std::uint64_t probe_us_ = 0;  // the stamp that waits for its answer; 0: none
 
-  ClockSync clock_sync_;
   std::int64_t last_received_us_ = 0;
   std::optional<std::int64_t> writing_since_us_;
   std::string close_reason_;

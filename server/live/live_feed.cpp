@@ -46,9 +46,19 @@ LiveText Subscriber::pop() {
   return message;
 }
 
+// While nobody listens nothing is kept up; whoever comes gets the state of the station first.
+void LiveFeed::add(Subscriber& subscriber) {
+  if (subscribers_.empty()) {
+    headlines_.clear();
+    changed_.clear();
+  }
+  subscribers_.push_back(&subscriber);
+}
+
 asio::awaitable<void> LiveFeed::run() {
   for (;;) {
     co_await clock_.sleep_for(kStampInterval);
+    if (subscribers_.empty()) continue;
     const auto changed = std::exchange(changed_, {});
     for (const auto& [id, robot] : changed) publish_robot(robot);
     publish(dump({{"type", "stamp"}, {"stamp_us", clock_.steady_us()}}), true);
@@ -56,7 +66,6 @@ asio::awaitable<void> LiveFeed::run() {
 }
 
 void LiveFeed::publish(std::string message, bool droppable) {
-  if (subscribers_.empty()) return;
   const auto shared = std::make_shared<const std::string>(std::move(message));
   for (Subscriber* subscriber : subscribers_) subscriber->push(shared, droppable);
 }
@@ -75,13 +84,15 @@ bool LiveFeed::headline_changed(const RobotState& robot) {
 }
 
 void LiveFeed::publish_robot(const RobotState& robot) {
-  if (subscribers_.empty()) return;
   publish(dump({{"type", "robot"}, {"robot", to_json(robot)}}), false);
 }
 
-void LiveFeed::publish_run(json run) { publish(dump({{"type", "run"}, {"run", std::move(run)}}), false); }
+void LiveFeed::publish_run(json run) {
+  if (!subscribers_.empty()) publish(dump({{"type", "run"}, {"run", std::move(run)}}), false);
+}
 
 void LiveFeed::on_robot(const RobotState& robot) {
+  if (subscribers_.empty()) return;
   if (!headline_changed(robot)) {
     changed_.insert_or_assign(robot.id, robot);
     return;
@@ -91,13 +102,14 @@ void LiveFeed::on_robot(const RobotState& robot) {
 }
 
 void LiveFeed::on_samples(const RobotState& robot, const SampleBatch& batch) {
+  if (subscribers_.empty()) return;
   if (headline_changed(robot)) {
     changed_.erase(robot.id);
     publish_robot(robot);
   } else if (const auto waiting = changed_.find(robot.id); waiting != changed_.end()) {
     waiting->second = robot;
   }
-  if (!subscribers_.empty()) publish(samples_message(batch), true);
+  publish(samples_message(batch), true);
 }
 
 void LiveFeed::on_event(const RobotState&, const RobotEvent& event) {

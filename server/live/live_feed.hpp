@@ -57,7 +57,7 @@ class LiveFeed final : public StationSink {
   // Every 100 ms: a stamp, and the robots whose state changed in small ways. Until cancelled.
   boost::asio::awaitable<void> run();
 
-  void add(Subscriber& subscriber) { subscribers_.push_back(&subscriber); }
+  void add(Subscriber& subscriber);
   void remove(Subscriber& subscriber) { std::erase(subscribers_, &subscriber); }
 
   void publish_run(nlohmann::json run);

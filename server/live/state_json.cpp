@@ -17,9 +17,10 @@ json status_json(const protocol::Status& status) {
           {"lost_samples", status.lost_samples},           {"lost_events", status.lost_events}};
 }
 
-json clock_json(const ClockEstimate& clock) {
+json clock_json(const RobotState& robot) {
+  const ClockEstimate& clock = robot.clock;
   return {{"offset_us", clock.offset_us},
-          {"uncertainty_us", clock.uncertainty_us},
+          {"uncertainty_us", clock.uncertainty_us(robot.latest_robot_time_us)},
           {"drift_ppm", clock.drift_ppm},
           {"round_trip_us", clock.round_trip_us}};
 }
@@ -46,15 +47,6 @@ void append_column(std::string& out, const char* name, const std::vector<Sample>
 }
 
 }  // namespace
-
-json decimal(float value) {
-  if (!std::isfinite(value)) return nullptr;
-  char digits[32];
-  const auto written = std::to_chars(digits, digits + sizeof digits, value);
-  double shortest = 0;
-  std::from_chars(digits, written.ptr, shortest);
-  return shortest;
-}
 
 json id_text(std::uint64_t id) { return id == 0 ? json(nullptr) : json(std::to_string(id)); }
 
@@ -101,7 +93,7 @@ json to_json(const RobotState& robot) {
   out["durable_next_seq"] = robot.durable_next_seq;
   out["latest_robot_time_us"] = robot.latest_robot_time_us;
   out["status"] = robot.status ? status_json(*robot.status) : json(nullptr);
-  out["clock"] = robot.clock.valid ? clock_json(robot.clock) : json(nullptr);
+  out["clock"] = robot.clock.valid ? clock_json(robot) : json(nullptr);
   out["pending_stop"] = id_text(robot.pending_stop.value_or(0));
   return out;
 }

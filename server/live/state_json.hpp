@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "server/decimal.hpp"
 #include "server/station/station_state.hpp"
 
 namespace server {
@@ -17,9 +18,6 @@ nlohmann::json to_json(const RobotEvent& event);
 
 // The message `samples` of /live as text. Its columns are written without a JSON tree, since it is made often.
 std::string samples_message(const SampleBatch& batch);
-
-// A float as the shortest decimal that gives the same float back: 0.1, not 0.10000000149011612.
-nlohmann::json decimal(float value);
 
 // null for 0.
 nlohmann::json id_text(std::uint64_t id);

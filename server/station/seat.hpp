@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "server/station/in_force.hpp"
 #include "server/station/station.hpp"
 
 namespace server {
@@ -26,6 +27,10 @@ struct Station::Seat {
   RobotState* robot = nullptr;  // in Station::robots_
   RobotPort* port = nullptr;    // null while disconnected
   std::map<CommandId, std::shared_ptr<PendingCommand>> commands;
+  ParameterTable parameters;                  // of the connection
+  ClockSync clock_sync;                       // of the boot that is, or was last, connected
+  ClockRecord clock_recorded;                 // the latest of that boot; boot_id 0: none yet
+  std::int64_t utc_minus_steady_us = 0;       // at its latest exchange
   std::uint64_t latch_known_at_robot_us = 0;  // older telemetry says nothing about the latch
   std::uint64_t last_number = 0;
 

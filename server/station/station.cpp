@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <cstdlib>
 
 #include "server/station/seat.hpp"
 
@@ -26,14 +27,16 @@ SampleContext context_of(const protocol::Telemetry& telemetry) {
   return context;
 }
 
-std::vector<Sample> samples_of(const protocol::Telemetry& telemetry) {
-  std::vector<Sample> samples(telemetry.position_m_count);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    samples[i] = {telemetry.position_m[i], telemetry.velocity_m_s[i], telemetry.acceleration_m_s2[i],
-                  telemetry.duty[i],       telemetry.impedance_mv[i], telemetry.reference_m[i]};
+void copy_samples(const protocol::Telemetry& telemetry, std::vector<Sample>& into) {
+  into.resize(telemetry.position_m_count);
+  for (std::size_t i = 0; i < into.size(); ++i) {
+    into[i] = {telemetry.position_m[i], telemetry.velocity_m_s[i], telemetry.acceleration_m_s2[i],
+               telemetry.duty[i],       telemetry.impedance_mv[i], telemetry.reference_m[i]};
   }
-  return samples;
 }
+
+constexpr std::int64_t kClockRecordPeriodUs = 60'000'000;
+constexpr std::int64_t kStationStepUs = 50'000;  // within a second; what NTP slews is far below
 
 }  // namespace
 
@@ -61,8 +64,8 @@ const RobotState* Station::find(const RobotId& id) const {
 }
 
 Station::Seat* Station::seat_of(const RobotPort& port) {
-  const auto seat = seats_.find(port.robot_id());
-  return seat == seats_.end() || seat->second.port != &port ? nullptr : &seat->second;
+  const auto seat = occupied_.find(&port);
+  return seat == occupied_.end() ? nullptr : seat->second;
 }
 
 Station::Seat& Station::add_seat(const RobotId& id) {
@@ -115,6 +118,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   Seat& seat = add_seat(hello.robot_id);
   RobotState& robot = *seat.robot;
   if (RobotPort* previous = std::exchange(seat.port, nullptr); previous != nullptr) {
+    occupied_.erase(previous);
     previous->close(fmt::format("replaced by a connection from {}", peer));
     note(robot, "connection_replaced", fmt::format("{} takes the place of {}", peer, robot.peer));
   }
@@ -122,6 +126,8 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   const bool other_boot = robot.boot_id != hello.boot_id;
   if (other_boot) robot.sample.reset();
   seat.port = &port;
+  occupied_[&port] = &seat;
+  seat.parameters = ParameterTable{};
   seat.latch_known_at_robot_us = hello.robot_time_us;
   robot.link = LinkState::connected;
   robot.peer = peer;
@@ -135,7 +141,12 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   robot.ring_capacity = details.ring_capacity;
   robot.parameters_checksum = details.parameters_checksum;
   robot.controller_checksum = details.controller_checksum;
-  if (other_boot) robot.context = SampleContext{};
+  if (other_boot) {
+    robot.context = SampleContext{};
+    robot.clock = ClockEstimate{};
+    seat.clock_sync = ClockSync{};
+    seat.clock_recorded = ClockRecord{};
+  }
   robot.context.controller_id = details.controller_id;
   robot.context.mode = details.mode;
   robot.context.emergency_id = details.emergency_id;
@@ -145,7 +156,6 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   robot.durable_next_seq = admission.durable_next_seq;
   robot.durable_next_event_seq = admission.durable_next_event_seq;
   robot.status.reset();
-  robot.clock = ClockEstimate{};
   spdlog::info("robot '{}' connected from {}: boot {}, {} samples held, durable to {}", robot.id, peer, robot.boot_id,
                details.next_seq - details.oldest_seq, admission.durable_next_seq);
 
@@ -170,6 +180,7 @@ void Station::on_disconnected(RobotPort& port, const std::string& reason) {
   Seat* seat = seat_of(port);
   if (seat == nullptr) return;  // its place was taken
   seat->port = nullptr;
+  occupied_.erase(&port);
   RobotState& robot = *seat->robot;
   robot.link = LinkState::disconnected;
   spdlog::info("robot '{}' disconnected: {}", robot.id, reason);
@@ -197,21 +208,24 @@ void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) 
   Seat* seat = seat_of(port);
   if (seat == nullptr) return;
   RobotState& robot = *seat->robot;
-  SampleBatch batch;
+  SampleBatch& batch = batch_;
   batch.robot_id = robot.id;
   batch.boot_id = robot.boot_id;
   batch.first_seq = telemetry.first_seq;
   batch.first_robot_time_us = telemetry.first_robot_time_us;
   batch.oldest_seq = telemetry.oldest_seq;
   batch.context = context_of(telemetry);
-  batch.samples = samples_of(telemetry);
+  copy_samples(telemetry, batch.samples);
   batch.received_at_us = robot.last_received_at_us;
   const std::int64_t utc_minus_steady_us = robot.last_received_at_us - robot.last_received_steady_us;
   if (robot.clock.valid) {
     batch.utc_offset_us = robot.clock.offset_us + utc_minus_steady_us;
-    batch.clock_uncertainty_us = robot.clock.uncertainty_us;
+    const std::uint64_t last_time_us = batch.first_robot_time_us + (batch.samples.size() - 1) * telemetry.period_us;
+    batch.clock_uncertainty_us =
+        std::max(robot.clock.uncertainty_us(batch.first_robot_time_us), robot.clock.uncertainty_us(last_time_us));
   } else {
     batch.utc_offset_us = robot.last_received_at_us - static_cast<std::int64_t>(robot.latest_robot_time_us);
+    batch.clock_uncertainty_us = -1;
   }
   if (batch.next_seq() > robot.next_seq) {  // live, not sent again
     const std::uint64_t emergency_id = robot.context.emergency_id;
@@ -261,10 +275,63 @@ void Station::on_status(RobotPort& port, const protocol::Status& status) {
   publish(robot);
 }
 
-void Station::on_clock(RobotPort& port, const ClockEstimate& estimate) {
+void Station::on_clock(RobotPort& port, const ClockExchange& exchange) {
   Seat* seat = seat_of(port);
   if (seat == nullptr) return;
-  seat->robot->clock = estimate;
+  seat->clock_sync.add(exchange);
+  seat->robot->clock = seat->clock_sync.estimate();
+  if (seat->robot->clock.valid) record_clock(*seat);
+}
+
+// Once a minute, when the estimate has moved by more than either says it may be wrong, and when the station's own UTC
+// was set. The estimate itself is against steady time, which nobody sets.
+void Station::record_clock(Seat& seat) {
+  const RobotState& robot = *seat.robot;
+  const ClockEstimate& clock = robot.clock;
+  const std::int64_t utc_minus_steady_us = clock_.utc_us() - clock_.steady_us();
+  ClockRecord record;
+  record.boot_id = robot.boot_id;
+  record.robot_time_us = robot.latest_robot_time_us;
+  record.utc_offset_us = clock.offset_us + utc_minus_steady_us;
+  record.uncertainty_us = clock.uncertainty_us(robot.latest_robot_time_us);
+  record.drift_ppm = clock.drift_ppm;
+  record.round_trip_us = clock.round_trip_us;
+
+  const ClockRecord& before = seat.clock_recorded;
+  const bool is_first = before.boot_id == 0;
+  const std::int64_t step_us = is_first ? 0 : utc_minus_steady_us - seat.utc_minus_steady_us;
+  seat.utc_minus_steady_us = utc_minus_steady_us;
+  if (std::abs(step_us) >= kStationStepUs) {
+    record.station_step_us = step_us;
+    note(robot, "station_clock_set", fmt::format("by {} ms", step_us / 1000));
+  }
+  const std::int64_t moved_us = std::abs(record.utc_offset_us - record.station_step_us - before.utc_offset_us);
+  const bool due = is_first || record.station_step_us != 0 ||
+                   moved_us > record.uncertainty_us + before.uncertainty_us ||
+                   record.robot_time_us >= before.robot_time_us + kClockRecordPeriodUs;
+  if (!due) return;
+  seat.clock_recorded = record;
+  for (StationSink* sink : sinks_) sink->on_clock(robot, record);
+}
+
+void Station::on_parameters(RobotPort& port, const protocol::ParameterPage& page) {
+  Seat* seat = seat_of(port);
+  if (seat == nullptr) return;
+  if (auto table = seat->parameters.add(page)) record_in_force(*seat->robot, "parameters", std::move(*table));
+}
+
+void Station::on_controller(RobotPort& port, const protocol::Controller& controller) {
+  if (const Seat* seat = seat_of(port)) record_in_force(*seat->robot, "controller", controller_json(controller));
+}
+
+void Station::record_in_force(const RobotState& robot, std::string kind, std::string content) {
+  InForceRecord record;
+  record.boot_id = robot.boot_id;
+  record.kind = std::move(kind);
+  record.first_seq = robot.next_seq;
+  record.content = std::move(content);
+  record.noticed_at_us = clock_.utc_us();
+  for (StationSink* sink : sinks_) sink->on_in_force(robot, record);
 }
 
 void Station::on_durable(const RobotId& id, BootId boot_id, std::uint64_t durable_next_seq,

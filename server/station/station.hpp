@@ -10,10 +10,12 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "server/clock.hpp"
 #include "server/result.hpp"
+#include "server/station/clock_sync.hpp"
 #include "server/station/command_gate.hpp"
 #include "server/station/robot_archive.hpp"
 #include "server/station/robot_port.hpp"
@@ -76,7 +78,9 @@ class Station {
   void on_status(RobotPort& port, const protocol::Status& status);
   void on_command_ack(RobotPort& port, const protocol::CommandAck& ack);
   void on_command_sent(RobotPort& port, CommandId id);
-  void on_clock(RobotPort& port, const ClockEstimate& estimate);
+  void on_clock(RobotPort& port, const ClockExchange& exchange);
+  void on_parameters(RobotPort& port, const protocol::ParameterPage& page);
+  void on_controller(RobotPort& port, const protocol::Controller& controller);
 
   // --- called when a commit is done (wired by main) ---
 
@@ -94,6 +98,8 @@ class Station {
   void publish(const RobotState& robot);
   void publish(const CommandRecord& record);
   void note(const RobotState& robot, std::string kind, std::string cause);
+  void record_clock(Seat& seat);
+  void record_in_force(const RobotState& robot, std::string kind, std::string content);
 
   std::shared_ptr<PendingCommand> make_pending(const CommandRequest& request, const RobotState& robot);
   void restore_stop(const CommandRecord& record);
@@ -109,7 +115,9 @@ class Station {
   CommandLimits limits_;
   LinkTimes times_;
   std::map<RobotId, RobotState> robots_;
-  std::map<RobotId, Seat> seats_;  // one for each robot, connected or not
+  std::map<RobotId, Seat> seats_;                         // one for each robot, connected or not
+  std::unordered_map<const RobotPort*, Seat*> occupied_;  // seats, by who sits there
+  SampleBatch batch_;                                     // of the frame that is being taken; kept for its memory
   std::vector<StationSink*> sinks_;
 };
 

@@ -16,6 +16,8 @@ class StationSink {
   virtual void on_samples(const RobotState&, const SampleBatch&) {}
   virtual void on_event(const RobotState&, const RobotEvent&) {}
   virtual void on_command(const CommandRecord&) {}
+  virtual void on_clock(const RobotState&, const ClockRecord&) {}
+  virtual void on_in_force(const RobotState&, const InForceRecord&) {}
 };
 
 }  // namespace server

@@ -79,12 +79,39 @@ struct RobotEvent {
 enum class LinkState : std::uint8_t { disconnected, connected };
 const char* text(LinkState value);
 
+// A robot's clock against the station's, for one boot. True at one moment, and less so the further a sample is from it.
 struct ClockEstimate {
+  static constexpr double kMaxDriftPpm = 100;  // of a cheap crystal against ours
+
   bool valid = false;
   std::int64_t offset_us = 0;  // station steady time = robot time + offset_us
-  std::int64_t uncertainty_us = 0;
+  std::int64_t bound_us = 0;   // of the error of offset_us, when it was measured
+  std::uint64_t measured_at_robot_us = 0;
   double drift_ppm = 0;
   std::int64_t round_trip_us = 0;  // of the latest exchange
+
+  // Of offset_us, at this time of the robot.
+  std::int64_t uncertainty_us(std::uint64_t robot_time_us) const;
+};
+
+// A clock estimate as it is recorded: once a minute, and whenever it or the station's own time has jumped.
+struct ClockRecord {
+  BootId boot_id = 0;
+  std::uint64_t robot_time_us = 0;
+  std::int64_t utc_offset_us = 0;  // UTC = robot time + this
+  std::int64_t uncertainty_us = 0;
+  double drift_ppm = 0;
+  std::int64_t round_trip_us = 0;
+  std::int64_t station_step_us = 0;  // UTC was set by so much since the record before; 0: it was not
+};
+
+// What is in force on a robot from a sample of its boot on, until the next of its kind.
+struct InForceRecord {
+  BootId boot_id = 0;
+  std::string kind;  // "parameters" or "controller"
+  std::uint64_t first_seq = 0;
+  std::string content;             // JSON
+  std::int64_t noticed_at_us = 0;  // UTC
 };
 
 // All that is known of one robot now. Owned by Station; others get const access or a copy.

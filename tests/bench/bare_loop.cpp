@@ -4,9 +4,9 @@
 //   bare_loop --no-disk        receives and acknowledges, stores nothing
 //   bare_loop --bytes          reads and throws away: what the kernel alone costs
 //
-// One thread reads whatever sockets are ready, decodes frames where they lie and fills groups of 100 samples; none of it
-// allocates per frame. A second thread writes the full groups, one transaction per 100 ms, and says what is durable. Each
-// robot gets the acknowledgements, signs of life and clock probes that the station sends.
+// One thread reads whatever sockets are ready, decodes frames where they lie and fills groups of 100 samples; none of
+// it allocates per frame. A second thread writes the full groups, one transaction per 100 ms, and says what is durable.
+// Each robot gets the acknowledgements, signs of life and clock probes that the station sends.
 //
 // It believes everything: no checks of values, no gaps, no duplicates, no reconnects, no commands, no second robot of a
 // name, no full queue, no failing disk. Prints its port; ends when its input does, with a line of JSON.
@@ -22,12 +22,10 @@
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
-#include <cstdio>
 #include <cstring>
-#include <filesystem>
+#include <iostream>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -59,8 +57,8 @@ struct Telemetry {
   std::array<const std::uint8_t*, kChannels> columns{};
 
   bool same_context(const Telemetry& other) const {
-    return std::memcmp(&emergency_id, &other.emergency_id, offsetof(Telemetry, samples) -
-                                                               offsetof(Telemetry, emergency_id)) == 0;
+    return std::memcmp(&emergency_id, &other.emergency_id,
+                       offsetof(Telemetry, samples) - offsetof(Telemetry, emergency_id)) == 0;
   }
 };
 
@@ -212,8 +210,8 @@ class Disk {
     }
     wake_.notify_one();
     thread_.join();
-    for (sqlite3_stmt* statement : {insert_sample_, insert_segment_, insert_robot_, insert_boot_, advance_row_,
-                                    advance_boot_}) {
+    for (sqlite3_stmt* statement :
+         {insert_sample_, insert_segment_, insert_robot_, insert_boot_, advance_row_, advance_boot_}) {
       sqlite3_finalize(statement);
     }
   }
@@ -296,23 +294,20 @@ class Disk {
       sqlite3_bind_int64(insert_segment_, ++column, static_cast<std::int64_t>(value));
     };
     const auto real = [&](float value) { sqlite3_bind_double(insert_segment_, ++column, value); };
-    const auto text = [&](const char* value) { sqlite3_bind_text(insert_segment_, ++column, value, -1, SQLITE_STATIC); };
-    integer(key(group.robot));
-    integer(head.first_seq);
-    integer(head.first_seq + group.count - 1);
-    integer(first_row);
-    integer(next_row_ - 1);
-    integer(head.first_robot_time_us);
-    integer(head.period_us);
-    integer(group.first_received_us);
-    integer(group.received_us);
-    integer(group.first_received_us - static_cast<std::int64_t>(head.first_robot_time_us));
-    integer(-1);
+    const auto text = [&](const char* value) {
+      sqlite3_bind_text(insert_segment_, ++column, value, -1, SQLITE_STATIC);
+    };
+    const auto first_seq = static_cast<std::int64_t>(head.first_seq);
+    const auto first_time_us = static_cast<std::int64_t>(head.first_robot_time_us);
+    for (const std::int64_t value :
+         {key(group.robot), first_seq, first_seq + static_cast<std::int64_t>(group.count) - 1, first_row, next_row_ - 1,
+          first_time_us, std::int64_t{head.period_us}, group.first_received_us, group.received_us,
+          group.first_received_us - first_time_us, std::int64_t{-1}}) {
+      integer(value);
+    }
     text(protocol::text(static_cast<protocol::Mode>(head.mode)));
     text(protocol::text(static_cast<protocol::SubState>(head.sub_state)));
-    real(head.setpoint_m);
-    real(head.disturbance_m);
-    real(head.position_sd_m);
+    for (const float value : {head.setpoint_m, head.disturbance_m, head.position_sd_m}) real(value);
     integer(head.controller_id);
     integer(head.emergency_id);
     text(protocol::text(static_cast<protocol::EmergencyCause>(head.cause)));
@@ -398,16 +393,8 @@ class BareLoop {
   void print_summary() {
     for (Robot& robot : robots_) close_group(robot);
     if (disk_) disk_->finish();
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    const auto seconds = [](const timeval& time) {
-      return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_usec) / 1e6;
-    };
-    std::printf("{\"robots\":%zu,\"frames\":%llu,\"samples\":%llu,\"bytes\":%llu,\"commits\":%llu,\"cpu_s\":%.3f}\n",
-                robots_.size(), static_cast<unsigned long long>(frames_), static_cast<unsigned long long>(samples_),
-                static_cast<unsigned long long>(bytes_),
-                static_cast<unsigned long long>(disk_ ? disk_->commits() : 0),
-                seconds(usage.ru_utime) + seconds(usage.ru_stime));
+    std::cout << "{\"robots\":" << robots_.size() << ",\"frames\":" << frames_ << ",\"samples\":" << samples_
+              << ",\"bytes\":" << bytes_ << ",\"commits\":" << (disk_ ? disk_->commits() : 0) << "}" << std::endl;
   }
 
  private:
@@ -593,12 +580,11 @@ int main(int argc, char** argv) try {
   const std::string what = argv[1];
   const bool keeps = !what.starts_with("--");
   BareLoop loop{keeps ? std::make_unique<Disk>(what) : nullptr, what != "--bytes"};
-  std::printf("%u\n", loop.port());
-  std::fflush(stdout);
+  std::cout << loop.port() << std::endl;
   loop.run();
   loop.print_summary();
   return 0;
 } catch (const std::exception& error) {
-  std::fprintf(stderr, "bare_loop: %s\n", error.what());
+  std::cerr << "bare_loop: " << error.what() << '\n';
   return 1;
 }

@@ -166,6 +166,30 @@ TEST_F(ParametersOverTheLink, AreBusyWhenTooManyAnswersWait) {
   EXPECT_EQ(answer(get_parameters(0)), "accepted");
 }
 
+TEST_F(ParametersOverTheLink, TheWholeTableFollowsEachWelcomeUnasked) {
+  order(set_parameter("auto_limit_s", 42));
+  for (int connection = 0; connection < 2; ++connection) {
+    station.table.clear();
+    station.controllers.clear();
+    station.disconnect();
+    station.connect();
+    station.run(20);
+    std::size_t next = 0;
+    for (const auto& page : station.table) {
+      EXPECT_EQ(page.first_index, next);
+      EXPECT_EQ(page.total, kParameterCount);
+      for (pb_size_t i = 0; i < page.parameters_count; ++i, ++next) {
+        EXPECT_STREQ(page.parameters[i].name, Parameters::spec(next).name);
+        const bool is_set = std::string{page.parameters[i].name} == "auto_limit_s";
+        EXPECT_EQ(page.parameters[i].value, is_set ? 42 : Parameters::spec(next).default_value);
+      }
+    }
+    EXPECT_EQ(next, kParameterCount);
+    ASSERT_EQ(station.controllers.size(), 1u);
+    EXPECT_EQ(station.controllers[0].controller_id, 1u);
+  }
+}
+
 TEST_F(ParametersOverTheLink, HelloCarriesTheChecksumOfTheTableInForce) {
   const auto before = checksum();
   EXPECT_EQ(before, Parameters{}.checksum());

@@ -11,6 +11,8 @@ using namespace sim_robot;
 
 class SetController : public DrivenRobot {
  protected:
+  SetController() { station.controllers.clear(); }  // what it said after the Welcome
+
   std::string set(const protocol::Controller& controller) { return answer(set_controller(controller)); }
   std::uint32_t checksum() {
     station.disconnect();
@@ -42,6 +44,8 @@ TEST_F(SetController, FromTheFirstHelloTheBuiltInOneHasItsChecksum) {
 
 TEST_F(SetController, ARefusedOneChangesNothing) {
   const auto before = checksum();
+  station.run(2);
+  station.controllers.clear();
   auto broken = golden_biquads();
   broken.kp = 31;
   EXPECT_EQ(set(broken), "checksum");

@@ -51,7 +51,8 @@ TEST_F(Settings, ComeBackAfterAReset) {
   boot.order(get_parameters(0));
   EXPECT_EQ(boot.station.pages[0].parameters[0].value, 42);
   EXPECT_NE(boot.station.hello->parameters_checksum, Parameters{}.checksum());
-  EXPECT_TRUE(boot.station.controllers.empty());
+  ASSERT_EQ(boot.station.controllers.size(), 1u);  // what is in force, after the Welcome
+  EXPECT_EQ(boot.station.controllers[0].controller_id, 2u);
 }
 
 TEST_F(Settings, AfterAResetTheBuiltInControllerIsTheOneBefore) {

@@ -201,8 +201,8 @@ TEST_F(LinkTest, AnswersOfTheRobotGiveTheClockOffset) {
   clock.settle();
   const ClockEstimate estimate = station.find("r1")->clock;
   ASSERT_TRUE(estimate.valid);
-  EXPECT_LE(std::abs(estimate.offset_us - robot->booted_at_us), estimate.uncertainty_us);
-  EXPECT_LE(estimate.uncertainty_us, 15'000);
+  EXPECT_LE(std::abs(estimate.offset_us - robot->booted_at_us), estimate.uncertainty_us(robot->robot_now_us()));
+  EXPECT_LE(estimate.uncertainty_us(robot->robot_now_us()), 15'000);
 }
 
 TEST_F(LinkTest, WhatIsNoNumberOrBeyondAllTimeEndsTheConnection) {

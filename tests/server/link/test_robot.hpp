@@ -29,11 +29,13 @@ class RecordingSink final : public StationSink {
   void on_samples(const RobotState&, const SampleBatch& batch) override { batches.push_back(batch); }
   void on_event(const RobotState&, const RobotEvent& event) override { events.push_back(event); }
   void on_command(const CommandRecord& record) override { commands.push_back(record); }
+  void on_clock(const RobotState&, const ClockRecord& record) override { clocks.push_back(record); }
 
   std::vector<RobotState> robots;
   std::vector<SampleBatch> batches;
   std::vector<RobotEvent> events;
   std::vector<CommandRecord> commands;
+  std::vector<ClockRecord> clocks;
 };
 
 class TestRobot {

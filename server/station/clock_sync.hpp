@@ -4,7 +4,8 @@
 //   offset = ((t1 - t2) + (t4 - t3)) / 2     station steady time = robot time + offset
 //   round trip = (t4 - t1) - (t3 - t2)       |offset error| ≤ round trip / 2, whatever the asymmetry
 //
-// The exchange with the smallest bound among the latest counts; its bound grows with its age by kMaxDriftPpm.
+// The exchange with the smallest bound among the latest counts; its bound grows with its age by
+// ClockEstimate::kMaxDriftPpm. One for each boot of a robot: it outlives a connection, for the robot's clock runs on.
 #pragma once
 
 #include <cstdint>
@@ -23,15 +24,17 @@ struct ClockExchange {
 
 class ClockSync {
  public:
-  static constexpr double kMaxDriftPpm = 100;  // of a cheap crystal against ours
-  static constexpr std::size_t kWindow = 60;   // exchanges kept, one a second
+  static constexpr std::size_t kWindow = 60;  // exchanges kept, one a second
 
-  // Takes one exchange and returns the new estimate. An impossible one (negative times or round trip) changes nothing.
-  ClockEstimate add(const ClockExchange& exchange);
+  // Takes one exchange. An impossible one (negative times or round trip) changes nothing.
+  void add(const ClockExchange& exchange);
+
+  const ClockEstimate& estimate() const { return estimate_; }
 
  private:
   struct Measurement {
-    std::int64_t at_us = 0;
+    std::int64_t at_us = 0;  // of the station, steady
+    std::uint64_t robot_time_us = 0;
     std::int64_t offset_us = 0;
     std::int64_t round_trip_us = 0;
   };
