@@ -7,14 +7,17 @@ namespace server {
 namespace asio = boost::asio;
 
 RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                               const RecorderOptions& options)
-    : recorder{loop, clock, disk, options}, runs{clock, recorder}, history{options.path, recorder, readers} {}
+                               WorkerThread& checkpoints, const RecorderOptions& options)
+    : recorder{loop, clock, disk, checkpoints, options},
+      runs{clock, recorder},
+      history{options.path, recorder, readers} {}
 
 void RecordingParts::connect(Station& station) {
   station.add_sink(recorder);
   station.add_sink(runs);
   recorder.set_on_durable(std::bind_front(&Station::on_durable, &station));
   recorder.set_on_missing(std::bind_front(&Station::request_resend, &station));
+  recorder.set_on_missing_events(std::bind_front(&Station::request_event_resend, &station));
 }
 
 asio::awaitable<RestoredState> RecordingParts::open() {
@@ -23,7 +26,10 @@ asio::awaitable<RestoredState> RecordingParts::open() {
   co_return restored;
 }
 
-void RecordingParts::spawn(TaskGroup& tasks) { tasks.spawn("recorder", recorder.run()); }
+void RecordingParts::spawn(TaskGroup& tasks) {
+  tasks.spawn("recorder", recorder.run());
+  tasks.spawn("checkpoints", recorder.run_checkpoints());
+}
 
 void RecordingParts::close() { recorder.close(); }
 
