@@ -214,6 +214,27 @@ void Recorder::on_command(const CommandRecord& command) {
   wake();
 }
 
+void Recorder::on_clock(const RobotState&, const ClockRecord& record) {
+  const std::int64_t boot_key = key_of(record.boot_id);
+  if (boot_key == 0 || !room_for_record()) return;
+  queue_.clocks.push_back({boot_key, record});
+  wake();
+}
+
+void Recorder::on_in_force(const RobotState&, const InForceRecord& record) {
+  const std::int64_t boot_key = key_of(record.boot_id);
+  if (boot_key == 0 || !room_for_record()) return;
+  queue_.in_force.push_back({boot_key, record});
+  wake();
+}
+
+// 0 unless samples of the boot are recorded now.
+std::int64_t Recorder::key_of(BootId boot_id) const {
+  const auto found = boots_.find(boot_id);
+  const bool known = found != boots_.end() && found->second.started && !found->second.replaced;
+  return known ? found->second.recording.key() : 0;
+}
+
 bool Recorder::room_for_record() {
   if (queued_records() < options_.max_queued_records) return true;
   if (counters_.records_refused++ == 0)

@@ -46,7 +46,7 @@ struct RecorderOptions {
   std::filesystem::path path;     // of the database
   bool enrol_on_loopback = true;  // a new robot that connects from this machine is enrolled
   std::size_t max_queued_samples = 2'000'000;
-  std::size_t max_queued_records = 100'000;   // events and commands
+  std::size_t max_queued_records = 100'000;   // events, commands, clock estimates, texts in force
   std::uint64_t checkpoint_bytes = 64 << 20;  // of the write-ahead log, from which on it is moved into the database
 };
 
@@ -111,6 +111,8 @@ class Recorder final : public StationSink, public RobotArchive {
   void on_samples(const RobotState& robot, const SampleBatch& batch) override;
   void on_event(const RobotState& robot, const RobotEvent& event) override;
   void on_command(const CommandRecord& command) override;
+  void on_clock(const RobotState& robot, const ClockRecord& record) override;
+  void on_in_force(const RobotState& robot, const InForceRecord& record) override;
 
   // Runs job(Database&) on the disk thread, between two commits.
   template <class Job>
@@ -220,8 +222,11 @@ class Recorder final : public StationSink, public RobotArchive {
   void add_boot(BootEntry& entry, StoredBoot stored, const AdmissionRequest& request);
   void replace_others(const RobotId& robot_id, BootId boot_id);
   void wake();
-  std::size_t queued_records() const { return queue_.events.size() + queue_.commands.size(); }
+  std::size_t queued_records() const {
+    return queue_.events.size() + queue_.commands.size() + queue_.clocks.size() + queue_.in_force.size();
+  }
   bool room_for_record();
+  std::int64_t key_of(BootId boot_id) const;
 
   boost::asio::io_context& loop_;
   Clock& clock_;

@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 
+#include "server/recording/in_force_store.hpp"
 #include "server/recording/statement.hpp"
 
 namespace server {
@@ -33,7 +34,7 @@ constexpr const char* kUpsertCommand =
 
 bool WriteBatch::empty() const {
   return new_boots.empty() && segments.empty() && gaps.empty() && events.empty() && event_gaps.empty() &&
-         commands.empty() && boots.empty();
+         commands.empty() && clocks.empty() && in_force.empty() && boots.empty();
 }
 
 SampleStore::SampleStore(Database& database)
@@ -72,6 +73,8 @@ void SampleStore::write(const WriteBatch& batch) {
     execute(insert_event_gap_, gap.boot_key, gap.lost.first, gap.lost.next - 1, gap.cause, gap.noticed_at_us);
   }
   for (const CommandRecord& command : batch.commands) write_command(command);
+  for (const auto& [boot_key, record] : batch.clocks) store_clock(database_.handle(), boot_key, record);
+  for (const auto& [boot_key, record] : batch.in_force) store_in_force(database_.handle(), boot_key, record);
   for (const BootProgress& boot : batch.progress) {
     execute(advance_boot_, boot.durable_next_seq, boot.durable_next_event_seq, boot.last_robot_time_us, boot.boot_key);
   }

@@ -20,6 +20,16 @@ struct StoredEvent {
   RobotEvent event;
 };
 
+struct StoredClock {
+  std::int64_t boot_key = 0;
+  ClockRecord record;
+};
+
+struct StoredInForce {
+  std::int64_t boot_key = 0;
+  InForceRecord record;
+};
+
 // All that is written in one transaction.
 struct WriteBatch {
   std::vector<NewBoot> new_boots;  // first, since all else may belong to them
@@ -28,8 +38,10 @@ struct WriteBatch {
   std::vector<StoredEvent> events;
   std::vector<LostRange> event_gaps;
   std::vector<CommandRecord> commands;  // each replaces what is stored of the same command
-  std::vector<BootProgress> progress;   // of each boot that any of this belongs to
-  std::vector<BootStart> boots;         // applied last: they end the robots' earlier boots
+  std::vector<StoredClock> clocks;
+  std::vector<StoredInForce> in_force;
+  std::vector<BootProgress> progress;  // of each boot that any of this belongs to
+  std::vector<BootStart> boots;        // applied last: they end the robots' earlier boots
 
   bool empty() const;
 };
