@@ -1,14 +1,24 @@
 // A part is a member, and a line in each function that concerns it.
 #include "server/recording/recording_parts.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <functional>
+
+#include "server/recording/run_store.hpp"
 
 namespace server {
 namespace asio = boost::asio;
 
 RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
                                const RecorderOptions& options)
-    : recorder{loop, clock, disk, options}, runs{clock, recorder}, history{options.path, recorder, readers} {}
+    : recorder{loop, clock, disk, options},
+      reader{options.path, readers},
+      certifier{clock, recorder, reader},
+      runs{clock, recorder, reader, certifier},
+      markers{clock, recorder, reader},
+      history{options.path, recorder, readers},
+      path_{options.path} {}
 
 void RecordingParts::connect(Station& station) {
   station.add_sink(recorder);
@@ -23,8 +33,22 @@ asio::awaitable<RestoredState> RecordingParts::open() {
   co_return restored;
 }
 
-void RecordingParts::spawn(TaskGroup& tasks) { tasks.spawn("recorder", recorder.run()); }
+void RecordingParts::spawn(TaskGroup& tasks) {
+  tasks.spawn("recorder", recorder.run());
+  tasks.spawn("certifier", certifier.run());
+}
 
-void RecordingParts::close() { recorder.close(); }
+void RecordingParts::close() {
+  reader.close();
+  recorder.close();
+  if (!runs.any_open()) return;
+  try {
+    Database database{path_};
+    RunStore{database, {}}.interrupt();
+    database.checkpoint();
+  } catch (const std::exception& error) {  // the next start does it
+    spdlog::warn("the open runs could not be interrupted: {}", error.what());
+  }
+}
 
 }  // namespace server
