@@ -9,6 +9,7 @@
 
 #include "server/recording/certificate.hpp"
 #include "server/recording/run_queries.hpp"
+#include "server/recording/sample_scanner.hpp"
 #include "server/recording/statement.hpp"
 
 namespace server {
@@ -45,9 +46,25 @@ std::string difference(const Certificate& found, const Certificate& stored) {
   return "its longest gap or its clock is not that of the certificate";
 }
 
+// Whether the extremes of the segment ?1, ?2 are those of the rows ?3 to ?4.
+std::string extremes_query() {
+  std::string found;
+  std::string differ;
+  for (std::size_t index = 0; index < kChannels; ++index) {
+    const char* channel = text(static_cast<Channel>(index));
+    found += fmt::format("{0}min({1}) AS low_{1}, max({1}) AS high_{1}", index == 0 ? "" : ", ", channel);
+    differ += fmt::format("{0}low_{1} IS NOT min_{1} OR high_{1} IS NOT max_{1}", index == 0 ? "" : " OR ", channel);
+  }
+  return fmt::format(
+      "SELECT {} FROM (SELECT {} FROM sample WHERE row BETWEEN ?3 AND ?4), segment WHERE boot_key = ?1 AND first_seq = "
+      "?2",
+      differ, found);
+}
+
 class Checking {
  public:
-  Checking(SQLite::Database& database, StoreFindings& findings) : database_{database}, findings_{findings} {}
+  Checking(SQLite::Database& database, const StoreCheck& wish, StoreFindings& findings)
+      : database_{database}, wish_{wish}, findings_{findings} {}
 
   void check_rows_counter();
   void check_boots();
@@ -70,10 +87,13 @@ class Checking {
   }
   void check_segments(std::int64_t boot_key, Interval range, const std::string& whose);
   void cover(Covered& covered, std::int64_t boot_key, Interval range, const char* by);
-  void count_rows(SQLite::Statement& segment, std::int64_t boot_key, const std::string& whose);
+  void check_rows(SQLite::Statement& segment, std::int64_t boot_key, const std::string& whose);
 
   SQLite::Database& database_;
+  const StoreCheck& wish_;
   StoreFindings& findings_;
+  SQLite::Statement rows_{database_, "SELECT count(*) FROM sample WHERE row BETWEEN ? AND ?"};
+  SQLite::Statement extremes_{database_, extremes_query()};
 };
 
 void Checking::check_rows_counter() {
@@ -133,7 +153,7 @@ void Checking::check_segments(std::int64_t boot_key, Interval range, const std::
         cover(covered, boot_key, {due->first, due->second}, "a gap");
       }
       cover(covered, boot_key, samples, "a segment");
-      count_rows(segment, boot_key, whose);
+      check_rows(segment, boot_key, whose);
     }
   }
   for (; due != gaps.end(); ++due) cover(covered, boot_key, {due->first, due->second}, "a gap");
@@ -147,17 +167,27 @@ void Checking::cover(Covered& covered, std::int64_t boot_key, Interval range, co
   if (range.next > covered.next_seq) covered = {range.next, by};
 }
 
-void Checking::count_rows(SQLite::Statement& segment, std::int64_t boot_key, const std::string& whose) {
-  SQLite::Statement rows{database_, "SELECT count(*) FROM sample WHERE row BETWEEN ? AND ?"};
-  bind_all(rows, segment.getColumn(2).getInt64(), segment.getColumn(3).getInt64());
-  rows.executeStep();
-  const std::int64_t found = rows.getColumn(0).getInt64();
-  const std::int64_t expected = segment.getColumn(3).getInt64() - segment.getColumn(2).getInt64() + 1;
+void Checking::check_rows(SQLite::Statement& segment, std::int64_t boot_key, const std::string& whose) {
+  const std::int64_t first_seq = segment.getColumn(0).getInt64();
+  const std::int64_t first_row = segment.getColumn(2).getInt64();
+  const std::int64_t last_row = segment.getColumn(3).getInt64();
+  bind_all(rows_, first_row, last_row);
+  rows_.executeStep();
+  const std::int64_t found = rows_.getColumn(0).getInt64();
+  rows_.reset();
   ++findings_.segments;
   findings_.samples += static_cast<std::uint64_t>(found);
-  if (found == expected) return;
-  fault("{}the segment at sample {} of boot key {} has {} of its {} rows", whose, segment.getColumn(0).getInt64(),
-        boot_key, found, expected);
+  if (found != last_row - first_row + 1) {
+    fault("{}the segment at sample {} of boot key {} has {} of its {} rows", whose, first_seq, boot_key, found,
+          last_row - first_row + 1);
+  }
+  if (!wish_.integrity) return;
+  bind_all(extremes_, boot_key, first_seq, first_row, last_row);
+  if (extremes_.executeStep() && extremes_.getColumn(0).getInt() != 0) {
+    fault("{}the extremes of the segment at sample {} of boot key {} are not those of its samples", whose, first_seq,
+          boot_key);
+  }
+  extremes_.reset();
 }
 
 void Checking::check_spans(std::optional<RunId> only) {
@@ -241,7 +271,7 @@ void Checking::check_integrity() {
 }
 
 void check_all(SQLite::Database& database, const StoreCheck& wish, StoreFindings& findings) {
-  Checking checking{database, findings};
+  Checking checking{database, wish, findings};
   if (wish.integrity) checking.check_integrity();
   checking.check_spans(wish.run);
   if (wish.run) {

@@ -17,7 +17,9 @@ namespace server {
 
 struct StoreCheck {
   std::optional<RunId> run;  // only this one, with the samples of its spans
-  bool integrity = false;    // let SQLite check every page, too: one long read transaction
+  // Also let SQLite check every page, in one long read transaction, and compare the extremes of each segment with its
+  // samples.
+  bool integrity = false;
 };
 
 struct StoreFindings {

@@ -115,6 +115,15 @@ TEST_F(StoreCheckTest, OverlapsAreFound) {
   EXPECT_THAT(faults(), Contains(HasSubstr("a gap of boot key 1 begins at sample 197")));
 }
 
+TEST_F(StoreCheckTest, ExtremesThatAreNotTheSamplesAreFoundWhenAllIsChecked) {
+  damage(
+      "UPDATE segment SET max_position_m = 7 WHERE first_row = 101; UPDATE segment SET min_duty = NULL"
+      " WHERE first_row = 1");
+  EXPECT_THAT(faults(), IsEmpty());
+  EXPECT_THAT(faults({.run = {}, .integrity = true}), ElementsAre(HasSubstr("extremes of the segment at sample 0"),
+                                                                  HasSubstr("extremes of the segment at sample 100")));
+}
+
 TEST_F(StoreCheckTest, SpansBeyondTheirBootAndHalfOpenRunsAreFound) {
   damage("UPDATE run_span SET last_seq = 500 WHERE run_id = 2");
   EXPECT_THAT(faults(), Contains(HasSubstr("run 2: span 0 ends at sample 500, but its boot made only 130")));
