@@ -153,6 +153,37 @@ TEST_F(CertificateTest, IsMadeByItselfWhenTheRestArrives) {
             std::vector<std::string>{std::to_string(id) + "|50"});
 }
 
+TEST_F(CertificateTest, IsMadeWhenTheDiskCanBeWrittenAgain) {
+  start();
+  change("CREATE TRIGGER full BEFORE INSERT ON run_certificate BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
+  const RunId id = make_eventful_run();
+  const Result<RunCertificate> now = wait(recording_->certifier.find(id));
+  ASSERT_TRUE(now.has_value());
+  EXPECT_FALSE(now->is_final);
+  EXPECT_EQ(now->certificate.samples_missing(), 0u);
+  change("DROP TRIGGER full");
+  clock_.run_for(60s);
+  EXPECT_EQ(number("SELECT count(*) FROM run_certificate"), 1);
+}
+
+TEST_F(CertificateTest, ADamagedRunHasNoneAndTheStationGoesOn) {
+  start();
+  connect(robot_);
+  const RunId damaged = create();
+  make(robot_, 100);
+  flush();
+  change("DELETE FROM sample WHERE row = 7");
+  end(damaged);
+  const Result<RunCertificate> found = wait(recording_->certifier.find(damaged));
+  ASSERT_TRUE(found.has_value());
+  EXPECT_FALSE(found->is_final);
+  const RunId next = create();
+  make(robot_, 20);
+  end(next);
+  EXPECT_EQ(final_certificate(next).samples_live, 20u);
+  EXPECT_EQ(number("SELECT count(*) FROM run_certificate"), 1);
+}
+
 TEST_F(CertificateTest, IsMadeAfterARestartForARunThatTheStopInterrupted) {
   start();
   connect(robot_);

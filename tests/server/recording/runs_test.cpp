@@ -82,6 +82,29 @@ TEST_F(RunsTest, AnOpenRunCountsWhatIsOnItsWay) {
   EXPECT_FALSE(run.spans[0].last_seq.has_value());
 }
 
+TEST_F(RunsTest, ReadingRunsWritesNothing) {
+  start();
+  connect(robot_);
+  const RunId ended = create();
+  make(robot_, 120);
+  end(ended);
+  const RunId open = create();
+  make(robot_, 30);
+  clock_.run_for(1200ms);
+  SQLite::Database observer = open_for_reading(path_);
+  const auto version = [&observer] { return observer.execAndGet("PRAGMA data_version").getInt64(); };
+  const std::int64_t before = version();
+  const std::uint64_t commits = recorder_->counters().commits;
+  make(robot_, 5);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(find(open).samples_stored, 30u);
+    EXPECT_EQ(find(ended).samples_stored, 120u);
+    EXPECT_EQ(wait(runs_->list({})).size(), 2u);
+  }
+  EXPECT_EQ(version(), before);
+  EXPECT_EQ(recorder_->counters().commits, commits);
+}
+
 // What the recorder keeps with the boot spares the reading of its segments: the same numbers, for any such mark.
 TEST_F(RunsTest, CountsAreTheSameHoweverFarTheBootIsSettled) {
   start();
