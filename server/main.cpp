@@ -13,6 +13,7 @@
 #include "server/live/live_feed.hpp"
 #include "server/log.hpp"
 #include "server/recording/recording_parts.hpp"
+#include "server/station_document.hpp"
 
 namespace {
 
@@ -36,6 +37,7 @@ int serve(const Config& config) {
   RecordingParts recording{loop, clock, disk, readers, checkpoints, {config.database(), config.enrol_on_loopback}};
   LiveFeed live{clock};
   recording.connect(station);
+  recording.runs.set_station_document(station_document(config));
   station.add_sink(live);
   const RestoredState restored = run_first(loop, recording.open());
   station.restore(restored.robots, restored.pending_stops);

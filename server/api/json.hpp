@@ -54,9 +54,17 @@ Result<ParsedCommand> parse_command(const std::string& body);
 struct RunWish {
   RobotId robot_id;
   RunConditions conditions;
+  std::optional<RecordedRange> range;  // of a run that is made afterwards
 };
 Result<RunWish> parse_run(const std::string& body);
 Result<std::string> parse_run_end(const std::string& body);  // the verdict; an empty body has none
+Result<RunAnnotation> parse_annotation(const std::string& body);
+Result<std::string> parse_discard(const std::string& body);  // the reason
+struct MarkerBody {
+  std::string text;
+  std::optional<std::int64_t> at_us;
+};
+Result<MarkerBody> parse_marker(const std::string& body);
 
 std::optional<std::uint64_t> parse_id(const std::string& text);  // decimal, not 0
 bool is_robot_id(const std::string& text);

@@ -1,7 +1,8 @@
-// Reads the bodies of requests: commands and runs.
+// Reads the bodies of requests: commands, runs, markers.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "server/api/json.hpp"
 
@@ -120,6 +121,29 @@ Result<void> read_text(const Members& body, const char* name, std::string& into)
   return {};
 }
 
+constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
+
+Result<RecordedRange> read_range(const json& value) {
+  if (!value.is_object()) return fail(ErrorCode::bad_request, "span is not an object", "wrong_type");
+  const Members span{value};
+  if (span.has("boot_id")) {
+    if (auto known = span.only({"boot_id", "first_seq", "last_seq"}); !known) return std::unexpected{known.error()};
+    const auto boot_id = span.id("boot_id");
+    if (!boot_id) return std::unexpected{boot_id.error()};
+    const auto first = span.integer("first_seq", 0, kLargest - 1);
+    if (!first) return std::unexpected{first.error()};
+    const auto last = span.integer("last_seq", *first, kLargest - 1);
+    if (!last) return std::unexpected{last.error()};
+    return SeqSpan{*boot_id, static_cast<std::uint64_t>(*first), static_cast<std::uint64_t>(*last)};
+  }
+  if (auto known = span.only({"from_us", "to_us"}); !known) return std::unexpected{known.error()};
+  const auto from_us = span.integer("from_us", 0, kLargest - 1);
+  if (!from_us) return std::unexpected{from_us.error()};
+  const auto to_us = span.integer("to_us", *from_us, kLargest - 1);
+  if (!to_us) return std::unexpected{to_us.error()};
+  return TimeSpan{*from_us, *to_us};
+}
+
 }  // namespace
 
 Result<ParsedCommand> parse_command(const std::string& text) {
@@ -148,7 +172,7 @@ Result<ParsedCommand> parse_command(const std::string& text) {
 
 Result<RunWish> parse_run(const std::string& text) {
   const auto body = Members::parse(text, {"robot_id", "name", "fluid", "pump_profile", "mean_flow_m_s", "tube",
-                                          "operator_name", "profile", "notes"});
+                                          "operator_name", "profile", "notes", "span"});
   if (!body) return std::unexpected{body.error()};
   RunWish wish;
   const auto robot_id = body->text("robot_id", 0, kMaxTextBytes);
@@ -173,6 +197,10 @@ Result<RunWish> parse_run(const std::string& text) {
   for (const auto& [member, into] : texts) {
     if (auto read = read_text(*body, member, *into); !read) return std::unexpected{read.error()};
   }
+  if (!body->has("span")) return wish;
+  auto range = read_range(body->object().at("span"));
+  if (!range) return std::unexpected{range.error()};
+  wish.range = *range;
   return wish;
 }
 
@@ -183,6 +211,45 @@ Result<std::string> parse_run_end(const std::string& text) {
   if (!body) return std::unexpected{body.error()};
   if (auto read = read_text(*body, "verdict", verdict); !read) return std::unexpected{read.error()};
   return verdict;
+}
+
+Result<RunAnnotation> parse_annotation(const std::string& text) {
+  const auto body = Members::parse(
+      text, {"name", "fluid", "pump_profile", "mean_flow_m_s", "tube", "operator_name", "profile", "notes", "verdict"});
+  if (!body) return std::unexpected{body.error()};
+  RunAnnotation annotation;
+  for (const auto& [member, value] : body->object().items()) {
+    if (member == "mean_flow_m_s") continue;
+    const bool is_name = member == "name";
+    const auto given = body->text(member.c_str(), is_name ? 1 : 0, is_name ? kMaxNameBytes : kMaxTextBytes);
+    if (!given) return std::unexpected{given.error()};
+    annotation.texts[member] = *given;
+  }
+  annotation.has_mean_flow = body->has("mean_flow_m_s");
+  if (!annotation.has_mean_flow || body->object().at("mean_flow_m_s").is_null()) return annotation;
+  const auto flow = body->number("mean_flow_m_s");
+  if (!flow) return std::unexpected{flow.error()};
+  annotation.mean_flow_m_s = *flow;
+  return annotation;
+}
+
+Result<std::string> parse_discard(const std::string& text) {
+  const auto body = Members::parse(text, {"reason"});
+  if (!body) return std::unexpected{body.error()};
+  return body->text("reason", 1, kMaxTextBytes);
+}
+
+Result<MarkerBody> parse_marker(const std::string& text) {
+  const auto body = Members::parse(text, {"text", "at_us"});
+  if (!body) return std::unexpected{body.error()};
+  const auto said = body->text("text", 1, kMaxTextBytes);
+  if (!said) return std::unexpected{said.error()};
+  MarkerBody marker{*said, {}};
+  if (!body->has("at_us")) return marker;
+  const auto at_us = body->integer("at_us", 0, kLargest - 1);
+  if (!at_us) return std::unexpected{at_us.error()};
+  marker.at_us = *at_us;
+  return marker;
 }
 
 }  // namespace server

@@ -1,4 +1,4 @@
-// Runs: begin, end, list, measure.
+// Runs: begin, end, make afterwards, annotate, discard, list, certify, measure.
 #include <fmt/format.h>
 
 #include "server/api/routes.hpp"
@@ -15,9 +15,17 @@ Answer list_runs(ApiParts& parts, Request request) {
   if (!limit) co_return problem(limit.error());
   const auto before = query_number(request, "before", 1, kMaxRunId, 0);
   if (!before) co_return problem(before.error());
-  std::optional<RobotId> robot_id;
-  if (const auto given = request.query.find("robot_id"); given != request.query.end()) robot_id = given->second;
-  const auto runs = co_await parts.recording.runs.list(std::move(robot_id), *before, static_cast<std::size_t>(*limit));
+  RunFilter filter;
+  filter.before = *before;
+  filter.limit = static_cast<std::size_t>(*limit);
+  if (const auto given = request.query.find("robot_id"); given != request.query.end()) filter.robot_id = given->second;
+  if (const auto given = request.query.find("state"); given != request.query.end()) {
+    filter.state = run_state_from(given->second);
+    if (!filter.state) {
+      co_return problem(400, "state is none of open, ended, interrupted and discarded", "out_of_range");
+    }
+  }
+  const auto runs = co_await parts.recording.runs.list(std::move(filter));
   co_return json_response(200, list_json("runs", runs));
 }
 
@@ -27,7 +35,10 @@ Answer create_run(ApiParts& parts, Request request) {
   if (parts.station.find(wish->robot_id) == nullptr) {
     co_return problem(404, fmt::format("no robot '{}' is known", wish->robot_id), "unknown_robot");
   }
-  const auto run = co_await parts.recording.runs.create(wish->robot_id, wish->conditions, request.actor);
+  Runs& runs = parts.recording.runs;
+  auto made = wish->range ? runs.make_afterwards(wish->robot_id, wish->conditions, *wish->range, request.actor)
+                          : runs.create(wish->robot_id, wish->conditions, request.actor);
+  const auto run = co_await std::move(made);
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
   Response response = json_response(201, to_json(*run));
@@ -52,6 +63,78 @@ Answer end_run(ApiParts& parts, Request request) {
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
   co_return json_response(200, to_json(*run));
+}
+
+Answer annotate_run(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  const auto annotation = parse_annotation(request.body);
+  if (!annotation) co_return problem(annotation.error());
+  const auto run = co_await parts.recording.runs.annotate(*id, *annotation, request.actor);
+  if (!run) co_return problem(run.error());
+  parts.live.publish_run(to_json(*run));
+  co_return json_response(200, to_json(*run));
+}
+
+Answer discard_run(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  const auto reason = parse_discard(request.body);
+  if (!reason) co_return problem(reason.error());
+  const auto run = co_await parts.recording.runs.discard(*id, *reason, request.actor);
+  if (!run) co_return problem(run.error());
+  parts.live.publish_run(to_json(*run));
+  co_return json_response(200, to_json(*run));
+}
+
+json to_json(const RunCertificate& found, RunId run) {
+  const Certificate& certificate = found.certificate;
+  json out;
+  out["run_id"] = run;
+  out["final"] = found.is_final;
+  out["format"] = kCertificateFormat;
+  out["samples_expected"] = certificate.samples_expected;
+  out["samples_live"] = certificate.samples_live;
+  out["samples_backfilled"] = certificate.samples_backfilled;
+  out["samples_lost"] = certificate.samples_lost;
+  out["samples_missing"] = certificate.samples_missing();
+  out["lost_by_cause"] = certificate.lost_by_cause;
+  out["longest_gap_samples"] = certificate.longest_gap_samples;
+  out["longest_gap_us"] = certificate.longest_gap_us;
+  out["worst_clock_uncertainty_us"] = certificate.worst_clock_uncertainty_us;
+  out["samples_without_clock"] = certificate.samples_without_clock;
+  out["sha256"] = found.is_final ? json(certificate.sha256) : json(nullptr);
+  out["made_at_us"] = certificate.made_at_us;
+  return out;
+}
+
+Answer get_certificate(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  const auto certificate = co_await parts.recording.certifier.find(*id);
+  if (!certificate) co_return problem(certificate.error());
+  co_return json_response(200, to_json(*certificate, *id));
+}
+
+Answer get_snapshot(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  const auto snapshot = co_await parts.recording.runs.snapshot(*id);
+  if (!snapshot) co_return problem(snapshot.error());
+  json in_force = json::array();
+  for (const InForce& document : snapshot->in_force) {
+    in_force.push_back({{"kind", document.kind},
+                        {"span", document.span},
+                        {"first_seq", document.first_seq},
+                        {"content", json::parse(document.content, nullptr, false)}});
+  }
+  json out;
+  out["firmware_version"] = snapshot->firmware_version;
+  out["controller_id"] = snapshot->controller_id;
+  out["controller_checksum"] = snapshot->controller_checksum;
+  out["parameters_checksum"] = snapshot->parameters_checksum;
+  out["in_force"] = std::move(in_force);
+  co_return json_response(200, out);
 }
 
 json or_null(std::optional<double> value) { return value ? json(*value) : json(nullptr); }
@@ -100,10 +183,14 @@ void add_run_routes(Router& router, ApiParts& parts) {
     router.add({method, pattern, std::move(query),
                 [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
   };
-  add("GET", "/api/v1/runs", {"robot_id", "before", "limit"}, list_runs);
+  add("GET", "/api/v1/runs", {"robot_id", "state", "before", "limit"}, list_runs);
   add("POST", "/api/v1/runs", {}, create_run);
   add("GET", "/api/v1/runs/{run_id}", {}, get_run);
   add("POST", "/api/v1/runs/{run_id}/end", {}, end_run);
+  add("POST", "/api/v1/runs/{run_id}/annotate", {}, annotate_run);
+  add("POST", "/api/v1/runs/{run_id}/discard", {}, discard_run);
+  add("GET", "/api/v1/runs/{run_id}/certificate", {}, get_certificate);
+  add("GET", "/api/v1/runs/{run_id}/snapshot", {}, get_snapshot);
   add("GET", "/api/v1/runs/{run_id}/step-metrics", {}, get_step_metrics);
 }
 

@@ -11,6 +11,7 @@
 #include "server/cli/predict.hpp"
 #include "server/cli/step.hpp"
 #include "server/cli/tune.hpp"
+#include "server/cli/verify.hpp"
 #include "server/config.hpp"
 
 namespace server::cli {
@@ -28,7 +29,7 @@ struct Answered {
   int exit_code = 0;
 };
 
-using Wish = std::variant<Answered, Serve, CheckConfig, Model, Bode, Step, Identify, Tune, Discretise, Predict>;
+using Wish = std::variant<Answered, Serve, CheckConfig, Model, Bode, Step, Identify, Tune, Discretise, Predict, Verify>;
 
 Wish parse_command_line(int argc, char** argv);
 

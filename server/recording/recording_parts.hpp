@@ -6,8 +6,12 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
+#include <filesystem>
 
+#include "server/recording/certifier.hpp"
+#include "server/recording/database_reader.hpp"
 #include "server/recording/history.hpp"
+#include "server/recording/markers.hpp"
 #include "server/recording/recorder.hpp"
 #include "server/recording/runs.hpp"
 #include "server/station/station.hpp"
@@ -29,12 +33,19 @@ struct RecordingParts {
   // Starts the lasting tasks.
   void spawn(TaskGroup& tasks);
 
-  // Every sample that was received is on disk afterwards, or it is logged why not. Does not throw.
+  // Every sample that was received is on disk afterwards and open runs are interrupted, or it is logged why not. Does
+  // not throw.
   void close();
 
   Recorder recorder;
+  DatabaseReader reader;
+  Certifier certifier;
   Runs runs;
+  Markers markers;
   History history;
+
+ private:
+  std::filesystem::path path_;
 };
 
 }  // namespace server

@@ -59,6 +59,8 @@ StoredSample sample_from(SQLite::Statement& row) {
   return stored;
 }
 
+}  // namespace
+
 Result<void> check_ours(SQLite::Database& database, const std::filesystem::path& path) {
   const auto application_id = database.execAndGet("PRAGMA application_id").getInt64();
   const auto version = database.execAndGet("PRAGMA user_version").getInt64();
@@ -72,6 +74,8 @@ Result<void> check_ours(SQLite::Database& database, const std::filesystem::path&
   }
   return {};
 }
+
+namespace {
 
 Result<std::vector<StoredSample>> query_run(SQLite::Database& database, RunId run, std::size_t limit) {
   SQLite::Statement exists{database, "SELECT 1 FROM run WHERE run_id = ?"};
@@ -101,7 +105,8 @@ Result<std::vector<StoredSample>> read_from(SQLite::Database database, const std
   return query_run(database, run, limit);
 }
 
-// No station runs on the folder: nobody holds its lock, or there is none.
+}  // namespace
+
 bool lock_is_free(const std::filesystem::path& database) {
   const auto lock_path = database.parent_path() / "rheonaut.lock";
   const int lock = ::open(lock_path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -111,7 +116,6 @@ bool lock_is_free(const std::filesystem::path& database) {
   return is_free;
 }
 
-// Everything is in the file itself, and nobody writes.
 bool is_at_rest(const std::filesystem::path& path) {
   return !std::filesystem::exists(path.string() + "-wal") && lock_is_free(path);
 }
@@ -125,8 +129,6 @@ SQLite::Database open_at_rest(const std::filesystem::path& path) {
   }
   return SQLite::Database{uri + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI};
 }
-
-}  // namespace
 
 Result<std::vector<StoredSample>> read_run(const std::filesystem::path& path, RunId run, std::size_t limit) {
   if (!std::filesystem::exists(path)) {

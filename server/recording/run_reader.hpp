@@ -6,6 +6,8 @@
 // tools.
 #pragma once
 
+#include <SQLiteCpp/SQLiteCpp.h>
+
 #include <filesystem>
 #include <vector>
 
@@ -18,5 +20,12 @@ namespace server {
 // The samples in order of span and seq. not_found: no such file, no such run. invalid: not a station's database, or
 // more than limit samples.
 Result<std::vector<StoredSample>> read_run(const std::filesystem::path& database, RunId run, std::size_t limit);
+
+// What it rests on, for other tools.
+bool lock_is_free(const std::filesystem::path& database);  // no station runs on its folder
+bool is_at_rest(const std::filesystem::path& database);    // nor is anything of it in a write-ahead log
+SQLite::Database open_at_rest(const std::filesystem::path& database);
+// invalid: of another program, or of a version that this one does not know.
+Result<void> check_ours(SQLite::Database& database, const std::filesystem::path& path);
 
 }  // namespace server

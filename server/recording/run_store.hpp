@@ -1,46 +1,52 @@
-// Runs and their spans in the database.
+// What changes runs in the database: begin, end, interrupt, make afterwards, annotate, discard.
 //
-// Disk thread only. Uses the Database, which outlives it. An open run has exactly one open span; BootStore::start moves
-// it to a new boot.
+// Disk thread only; each call is one transaction. Uses the Database, which outlives it. An open run has exactly one
+// open span; BootStore::start moves it to a new boot.
 #pragma once
 
 #include <cstdint>
-#include <map>
-#include <optional>
-#include <vector>
+#include <string>
 
 #include "server/recording/database.hpp"
-#include "server/recording/runs.hpp"
+#include "server/recording/run_queries.hpp"
 
 namespace server {
 
 class RunStore {
  public:
-  // One above the newest sample of each boot in use, as the recorder knows it.
-  using Heads = std::map<BootId, std::uint64_t>;
+  RunStore(Database& database, BootHeads heads) : handle_{database.handle()}, heads_{std::move(heads)} {}
 
-  RunStore(Database& database, Heads heads) : handle_{database.handle()}, heads_{std::move(heads)} {}
+  // Stores a run with its one open span. not_connected when that boot has ended meanwhile. The station's document, if
+  // there is one, is noted as in force in its spans, here and in end().
+  Result<RunId> add(const Run& run, const std::string& station_document);
 
-  std::map<RobotId, RunId> open_runs();
+  // The same of what is recorded: fills in its spans and times, and what is known of their robot.
+  Result<RunId> add_afterwards(Run run, const RecordedRange& range);
 
-  // Stores a run with its one open span and sets its id. not_connected when that boot has ended meanwhile.
-  Result<RunId> add(const Run& run);
+  // Who changes it, and when.
+  struct Author {
+    std::string actor;
+    std::int64_t utc_us = 0;
+  };
+  // Both: not_found, and conflict for a discarded (annotate) or open (discard) run.
+  Result<void> annotate(RunId id, const RunAnnotation& annotation, const Author& author);
+  Result<void> discard(RunId id, const std::string& reason, const Author& author);
 
   // Closes the open span at the newest sample (a span without samples is dropped) and the run.
-  void end(RunId id, const std::string& verdict, std::int64_t utc_us);
+  void end(RunId id, const std::string& verdict, std::int64_t utc_us, const std::string& station_document);
 
-  std::optional<Run> find(RunId id);
-  std::vector<Run> list(const std::optional<RobotId>& robot_id, RunId before, std::size_t limit);
+  // Closes every open run at the last sample known of its open span. Returns how many there were.
+  std::size_t interrupt();
 
  private:
-  std::vector<Run> read_runs(SQLite::Statement& query);
-  void read_spans(Run& run);
-  std::uint64_t next_seq(std::int64_t boot_key, BootId boot_id);
-  std::int64_t count_stored(std::int64_t boot_key, std::uint64_t first_seq, std::uint64_t last_seq);
-  std::int64_t count_lost(std::int64_t boot_key, std::uint64_t first_seq, std::uint64_t last_seq);
+  RunId insert(const Run& run);
+  void add_note(RunId id, const Author& author, const std::string& field, const std::string& before,
+                const std::string& after);
+  void put_in_force(RunId id, const std::string& station_document, std::int64_t utc_us);
+  void close_span(RunId id);
 
   SQLite::Database& handle_;
-  Heads heads_;
+  BootHeads heads_;
 };
 
 }  // namespace server

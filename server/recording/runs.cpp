@@ -1,10 +1,13 @@
-// Checks on the loop, SQL on the disk thread.
+// Checks on the loop, SQL on the disk thread and the readers'.
 #include "server/recording/runs.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 
+#include "server/recording/certifier.hpp"
+#include "server/recording/database_reader.hpp"
 #include "server/recording/recorder.hpp"
 #include "server/recording/run_store.hpp"
 
@@ -20,6 +23,10 @@ constexpr std::size_t kMaxListed = 1000;
 constexpr microseconds kEndPatience = 3s;
 constexpr microseconds kEndLook = 50ms;
 
+Error text_too_long() {
+  return {ErrorCode::invalid, fmt::format("a run's texts have at most {} bytes each", kMaxTextBytes), ""};
+}
+
 Result<void> check(const RunConditions& conditions) {
   const auto is_control = [](unsigned char c) { return c < 0x20 || c == 0x7f; };
   const std::string& name = conditions.name;
@@ -30,9 +37,7 @@ Result<void> check(const RunConditions& conditions) {
   for (const std::string* text :
        {&conditions.fluid, &conditions.pump_profile, &conditions.tube, &conditions.operator_name, &conditions.profile,
         &conditions.notes, &conditions.verdict}) {
-    if (text->size() > kMaxTextBytes) {
-      return fail(ErrorCode::invalid, fmt::format("a run's texts have at most {} bytes each", kMaxTextBytes));
-    }
+    if (text->size() > kMaxTextBytes) return std::unexpected{text_too_long()};
   }
   return {};
 }
@@ -57,11 +62,20 @@ const char* text(RunState value) {
   return "open";
 }
 
-Runs::Runs(Clock& clock, Recorder& recorder) : clock_{clock}, recorder_{recorder} {}
+std::optional<RunState> run_state_from(const std::string& name) {
+  for (const RunState state : {RunState::open, RunState::ended, RunState::interrupted, RunState::discarded}) {
+    if (name == text(state)) return state;
+  }
+  return std::nullopt;
+}
+
+Runs::Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, Certifier& certifier)
+    : clock_{clock}, recorder_{recorder}, reader_{reader}, certifier_{certifier} {}
 
 asio::awaitable<void> Runs::load() {
-  auto job = [](Database& database) { return RunStore{database, {}}.open_runs(); };
-  open_runs_ = co_await recorder_.on_disk(std::move(job));
+  auto job = [](Database& database) { return RunStore{database, {}}.interrupt(); };
+  const std::size_t interrupted = co_await recorder_.on_disk(std::move(job));
+  if (interrupted > 0) spdlog::warn("{} runs were open when the station stopped: they are interrupted", interrupted);
 }
 
 asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions conditions, std::string made_by) {
@@ -99,7 +113,9 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
   // The run is stored after the connection it begins in, so a later boot can follow it.
   const bool flushed = co_await recorder_.flush_records();
   if (!flushed) co_return std::unexpected{disk_fails()};
-  auto job = [run](Database& database) { return RunStore{database, {}}.add(run); };
+  auto job = [run, document = station_document_](Database& database) {
+    return RunStore{database, {}}.add(run, document);
+  };
   const Result<RunId> id = co_await recorder_.on_disk(std::move(job));
   if (!id) co_return std::unexpected{id.error()};
   open_runs_[robot_id] = *id;
@@ -121,9 +137,8 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
   }
   const auto robot = robots_.find(open->first);
   const BootId boot_id = robot == robots_.end() ? 0 : robot->second.boot_id;
-  auto job = [id, verdict, utc_us = clock_.utc_us(), heads = heads()](Database& database) {
-    RunStore{database, heads}.end(id, verdict, utc_us);
-  };
+  auto job = [id, verdict, utc_us = clock_.utc_us(), heads = heads(), document = station_document_](
+                 Database& database) { RunStore{database, heads}.end(id, verdict, utc_us, document); };
   struct Ending {  // by one request at a time; the run stays open when the job throws
     std::set<RunId>& ending;
     RunId id;
@@ -141,9 +156,79 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
     const bool stored = co_await recorder_.flush(boot_id);
     std::optional<Run> run = co_await read(id);
     if (!run) co_return std::unexpected{no_such_run(id)};
-    if (!stored || is_complete(*run) || clock_.steady_us() >= deadline_us) co_return std::move(*run);
+    if (!stored || is_complete(*run) || clock_.steady_us() >= deadline_us) {
+      certifier_.add(id);
+      co_return std::move(*run);
+    }
     co_await clock_.sleep_for(kEndLook);
   }
+}
+
+asio::awaitable<Result<Run>> Runs::make_afterwards(RobotId robot_id, RunConditions conditions, RecordedRange range,
+                                                   std::string made_by) {
+  const Result<void> valid = check(conditions);
+  if (!valid) co_return std::unexpected{valid.error()};
+  if (const auto* time = std::get_if<TimeSpan>(&range)) {
+    if (time->from_us > time->to_us) co_return fail(ErrorCode::invalid, "from_us is later than to_us", "out_of_range");
+    if (time->to_us > clock_.utc_us()) co_return fail(ErrorCode::invalid, "to_us is in the future", "out_of_range");
+  }
+  bool flushed = co_await recorder_.flush_boots();
+  if (const auto robot = robots_.find(robot_id); flushed && robot != robots_.end()) {
+    flushed = co_await recorder_.flush(robot->second.boot_id);
+  }
+  if (!flushed) co_return std::unexpected{disk_fails()};
+  Run run;
+  run.robot_id = std::move(robot_id);
+  run.conditions = std::move(conditions);
+  run.made_by = std::move(made_by);
+  auto job = [run, range](Database& database) { return RunStore{database, {}}.add_afterwards(run, range); };
+  const Result<RunId> id = co_await recorder_.on_disk(std::move(job));
+  if (!id) co_return std::unexpected{id.error()};
+  certifier_.add(*id);
+  co_return co_await find(*id);
+}
+
+asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, std::string actor) {
+  RunConditions given;
+  given.name = annotation.texts.contains("name") ? annotation.texts.at("name") : "unchanged";
+  Result<void> outcome = check(given);
+  for (const auto& [field, value] : annotation.texts) {
+    if (outcome && value.size() > kMaxTextBytes) outcome = std::unexpected{text_too_long()};
+  }
+  if (!outcome) co_return std::unexpected{outcome.error()};
+  const bool flushed = co_await recorder_.flush_records();
+  if (!flushed) co_return std::unexpected{disk_fails()};
+  auto job = [id, annotation, author = RunStore::Author{actor, clock_.utc_us()}](Database& database) {
+    return RunStore{database, {}}.annotate(id, annotation, author);
+  };
+  outcome = co_await recorder_.on_disk(std::move(job));
+  co_return co_await changed(id, std::move(outcome));
+}
+
+asio::awaitable<Result<Run>> Runs::discard(RunId id, std::string reason, std::string actor) {
+  if (reason.size() > kMaxTextBytes) co_return std::unexpected{text_too_long()};
+  const bool flushed = co_await recorder_.flush_records();
+  if (!flushed) co_return std::unexpected{disk_fails()};
+  auto job = [id, reason, author = RunStore::Author{actor, clock_.utc_us()}](Database& database) {
+    return RunStore{database, {}}.discard(id, reason, author);
+  };
+  Result<void> outcome = co_await recorder_.on_disk(std::move(job));
+  co_return co_await changed(id, std::move(outcome));
+}
+
+asio::awaitable<Result<Run>> Runs::changed(RunId id, Result<void> outcome) {
+  if (!outcome) co_return std::unexpected{outcome.error()};
+  co_return co_await find(id);
+}
+
+asio::awaitable<Result<RunSnapshot>> Runs::snapshot(RunId id) {
+  auto query = [id](SQLite::Database& database) {
+    const SQLite::Transaction moment{database};
+    return read_snapshot(database, id);
+  };
+  std::optional<RunSnapshot> snapshot = co_await reader_.ask(std::move(query));
+  if (!snapshot) co_return std::unexpected{no_such_run(id)};
+  co_return std::move(*snapshot);
 }
 
 asio::awaitable<Result<Run>> Runs::find(RunId id) {
@@ -153,16 +238,20 @@ asio::awaitable<Result<Run>> Runs::find(RunId id) {
 }
 
 asio::awaitable<std::optional<Run>> Runs::read(RunId id) {
-  auto job = [id, heads = heads()](Database& database) { return RunStore{database, heads}.find(id); };
-  co_return co_await recorder_.on_disk(std::move(job));
+  auto query = [id, heads = heads()](SQLite::Database& database) {
+    const SQLite::Transaction moment{database};
+    return find_run(database, heads, id);
+  };
+  co_return co_await reader_.ask(std::move(query));
 }
 
-asio::awaitable<std::vector<Run>> Runs::list(std::optional<RobotId> robot_id, RunId before, std::size_t limit) {
-  limit = std::clamp<std::size_t>(limit, 1, kMaxListed);
-  auto job = [robot_id, before, limit, heads = heads()](Database& database) {
-    return RunStore{database, heads}.list(robot_id, before, limit);
+asio::awaitable<std::vector<Run>> Runs::list(RunFilter filter) {
+  filter.limit = std::clamp<std::size_t>(filter.limit, 1, kMaxListed);
+  auto query = [filter, heads = heads()](SQLite::Database& database) {
+    const SQLite::Transaction moment{database};
+    return list_runs(database, heads, filter);
   };
-  co_return co_await recorder_.on_disk(std::move(job));
+  co_return co_await reader_.ask(std::move(query));
 }
 
 std::map<BootId, std::uint64_t> Runs::heads() const {

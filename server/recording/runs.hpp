@@ -1,7 +1,8 @@
 // Runs: named spans of a robot's recording, with the conditions of the experiment.
 //
 // Recording is always on; a run only says which samples belong together. A reboot of the robot opens a new span. At
-// most one run per robot is open. Loop thread; the database work is done on the disk thread.
+// most one run per robot is open, and none stays open when the station stops, for then nobody watches. Loop thread;
+// what changes a run is done on the disk thread, what reads runs on the readers'.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -10,6 +11,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "server/clock.hpp"
@@ -18,7 +20,9 @@
 
 namespace server {
 
+class Certifier;
 class Recorder;
+class DatabaseReader;
 
 using RunId = std::int64_t;
 
@@ -29,6 +33,7 @@ enum class RunState : std::uint8_t {
   discarded,    // its samples are no longer held
 };
 const char* text(RunState value);
+std::optional<RunState> run_state_from(const std::string& text);
 
 // What the experimenter says of a run; all optional but the name.
 struct RunConditions {
@@ -42,6 +47,25 @@ struct RunConditions {
   std::string notes;
   std::string verdict;
 };
+
+// What is to be said otherwise of a run: the conditions that are given, by their names in RunConditions.
+struct RunAnnotation {
+  std::map<std::string, std::string> texts;
+  bool has_mean_flow = false;
+  std::optional<double> mean_flow_m_s;
+};
+
+// Samples of a robot that were recorded already.
+struct TimeSpan {  // UTC, both ends included; over reboots
+  std::int64_t from_us = 0;
+  std::int64_t to_us = 0;
+};
+struct SeqSpan {  // both ends included
+  BootId boot_id = 0;
+  std::uint64_t first_seq = 0;
+  std::uint64_t last_seq = 0;
+};
+using RecordedRange = std::variant<TimeSpan, SeqSpan>;
 
 struct RunSpan {
   BootId boot_id = 0;
@@ -68,24 +92,65 @@ struct Run {
   std::uint64_t samples_lost = 0;  // known to be lost for good; expected - stored - lost is still on its way
 };
 
+// What a run was made with, as far as it is known.
+struct InForce {
+  std::uint32_t span = 0;
+  std::string kind;             // controller, parameters, station
+  std::uint64_t first_seq = 0;  // of the span: in force from here on
+  std::string content;          // JSON
+};
+struct RunSnapshot {
+  std::string firmware_version;
+  std::uint32_t controller_id = 0;
+  std::uint32_t controller_checksum = 0;
+  std::uint32_t parameters_checksum = 0;
+  std::vector<InForce> in_force;  // in order of span, kind and first_seq
+};
+
+// Which runs, newest first.
+struct RunFilter {
+  std::optional<RobotId> robot_id;
+  std::optional<RunState> state;  // empty: all but the discarded
+  RunId before = 0;               // 0: from the newest
+  std::size_t limit = 100;        // 1 to 1000
+};
+
 class Runs final : public StationSink {
  public:
-  Runs(Clock& clock, Recorder& recorder);
+  Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, Certifier& certifier);
 
-  // Reads the runs that were open when the station stopped; they go on. Call before robots arrive.
+  // Runs that were open when the station was killed are interrupted. Call before robots arrive.
   boost::asio::awaitable<void> load();
+
+  // Some run is open: it is to be interrupted when the recorder has written all it heard.
+  bool any_open() const { return !open_runs_.empty(); }
 
   // create and end: unavailable while the disk cannot be written.
   // conflict when the robot has an open run, not_connected when it is not there, invalid for a bad name.
   boost::asio::awaitable<Result<Run>> create(RobotId robot_id, RunConditions conditions, std::string made_by = {});
+
+  // A run of what was recorded already; it has ended. Its robot need not be there. invalid for a range without samples
+  // or in the future, not_found for a robot or boot that is not known.
+  boost::asio::awaitable<Result<Run>> make_afterwards(RobotId robot_id, RunConditions conditions, RecordedRange range,
+                                                      std::string made_by);
+
+  // Changes what was said of the run; each change leaves a row in run_note. Its samples and their certificate have
+  // nothing to do with it. conflict for a discarded run.
+  boost::asio::awaitable<Result<Run>> annotate(RunId id, RunAnnotation annotation, std::string actor);
+
+  // The run holds its samples no longer, and is not listed any more. conflict while it is open.
+  boost::asio::awaitable<Result<Run>> discard(RunId id, std::string reason, std::string actor);
+
+  // Of the station's configuration, as JSON: what each run keeps of it.
+  void set_station_document(std::string json) { station_document_ = std::move(json); }
+  boost::asio::awaitable<Result<RunSnapshot>> snapshot(RunId id);
 
   // Ends the run with the latest sample received. Answers when that sample is durable or known lost, at most 3 s later.
   boost::asio::awaitable<Result<Run>> end(RunId id, std::string verdict);
 
   boost::asio::awaitable<Result<Run>> find(RunId id);
 
-  // Newest first; `before` 0: from the newest. At most `limit` (1 to 1000).
-  boost::asio::awaitable<std::vector<Run>> list(std::optional<RobotId> robot_id, RunId before, std::size_t limit);
+  boost::asio::awaitable<std::vector<Run>> list(RunFilter filter);
 
   void on_robot(const RobotState& robot) override;
   void on_samples(const RobotState& robot, const SampleBatch& batch) override;
@@ -101,15 +166,20 @@ class Runs final : public StationSink {
     std::uint32_t parameters_checksum = 0;
   };
 
+  boost::asio::awaitable<Result<Run>> changed(RunId id, Result<void> outcome);
+
   // How far each robot's boot has come; what the database does not know yet of an open span.
   std::map<BootId, std::uint64_t> heads() const;
   boost::asio::awaitable<std::optional<Run>> read(RunId id);
 
   Clock& clock_;
   Recorder& recorder_;
+  DatabaseReader& reader_;
+  Certifier& certifier_;
   std::map<RobotId, Robot> robots_;
   std::map<RobotId, RunId> open_runs_;  // 0: being created
-  std::set<RunId> ending_;              // of these, the ones whose end is being stored
+  std::string station_document_;
+  std::set<RunId> ending_;  // of these, the ones whose end is being stored
 };
 
 }  // namespace server

@@ -48,7 +48,7 @@ class DocumentedQueries : public RecordingTest {
     return answer;
   }
 
-  // One run of 300 samples with a gap, an event and a command.
+  // One run of 300 samples with a gap, an event, a command and a marker.
   void record() {
     TestRobot robot;
     robot.context.mode = rheonaut_MODE_AUTO;
@@ -70,6 +70,7 @@ class DocumentedQueries : public RecordingTest {
     command.robot_id = robot.id;
     recorder_->on_command(command);
     flush();
+    ASSERT_TRUE(wait(recording_->markers.add({robot.id, "glucose in", "", std::nullopt, robot.boot_id})).has_value());
   }
 };
 

@@ -1,4 +1,4 @@
-// A run holds every sample between its begin and its end, over reboots of the robot and of the station.
+// A run holds every sample between its begin and its end, over reboots of the robot, until the station stops.
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
@@ -82,6 +82,52 @@ TEST_F(RunsTest, AnOpenRunCountsWhatIsOnItsWay) {
   EXPECT_FALSE(run.spans[0].last_seq.has_value());
 }
 
+TEST_F(RunsTest, ReadingRunsWritesNothing) {
+  start();
+  connect(robot_);
+  const RunId ended = create();
+  make(robot_, 120);
+  end(ended);
+  const RunId open = create();
+  make(robot_, 30);
+  clock_.run_for(1200ms);
+  SQLite::Database observer = open_for_reading(path_);
+  const auto version = [&observer] { return observer.execAndGet("PRAGMA data_version").getInt64(); };
+  const std::int64_t before = version();
+  const std::uint64_t commits = recorder_->counters().commits;
+  make(robot_, 5);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(find(open).samples_stored, 30u);
+    EXPECT_EQ(find(ended).samples_stored, 120u);
+    EXPECT_EQ(wait(runs_->list({})).size(), 2u);
+  }
+  EXPECT_EQ(version(), before);
+  EXPECT_EQ(recorder_->counters().commits, commits);
+}
+
+// What the recorder keeps with the boot spares the reading of its segments: the same numbers, for any such mark.
+TEST_F(RunsTest, CountsAreTheSameHoweverFarTheBootIsSettled) {
+  start();
+  connect(robot_);
+  make(robot_, 20);
+  const RunId id = create();
+  make(robot_, 130);
+  robot_.next_seq += 30;  // 150..179 are lost
+  robot_.oldest_seq = 180;
+  make(robot_, 100);
+  robot_.next_seq += 5;  // on their way
+  make(robot_, 100);
+  flush();
+  SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE, 5000};
+  for (const char* mark : {"0", "10", "20", "77", "150", "160", "180", "280"}) {
+    foreign.exec(std::string{"UPDATE boot SET durable_next_seq = "} + mark);
+    const Run run = find(id);
+    EXPECT_EQ(run.samples_expected, 365u) << mark;
+    EXPECT_EQ(run.samples_stored, 330u) << mark;
+    EXPECT_EQ(run.samples_lost, 30u) << mark;
+  }
+}
+
 TEST_F(RunsTest, TheEndOfARunCutsNoSegmentOfAnotherRobotShort) {
   TestRobot other;
   other.id = "dory";
@@ -135,7 +181,7 @@ TEST_F(RunsTest, ListsNewestFirstInPages) {
   for (int i = 0; i < 5; ++i) end(create("run " + std::to_string(i)));
   const auto ids = [&](RunId before, std::size_t limit, std::optional<RobotId> robot = std::nullopt) {
     std::vector<RunId> found;
-    for (const Run& run : wait(runs_->list(robot, before, limit))) found.push_back(run.id);
+    for (const Run& run : wait(runs_->list({robot, std::nullopt, before, limit}))) found.push_back(run.id);
     return found;
   };
   EXPECT_EQ(ids(0, 2), (std::vector<RunId>{5, 4}));
@@ -212,73 +258,105 @@ TEST_F(RunsTest, ARebootOpensANewSpanAndWhatItLostIsCounted) {
   EXPECT_EQ(rows("SELECT first_seq, last_seq, cause FROM run_gap"), std::vector<std::string>{"100|109|reboot"});
 }
 
-TEST_F(RunsTest, GoesOnAfterAKillWithoutMissingASample) {
+TEST_F(RunsTest, IsInterruptedByAKillAtTheLastSampleThatIsKnown) {
   start();
   connect(robot_);
   make(robot_, 30);
   const RunId id = create();
-  make(robot_, 100);
+  SampleBatch batch = robot_.batch(30, 100);
+  batch.utc_offset_us = clock_.utc_us();
+  send(robot_, batch);
+  robot_.next_seq = 130;
   clock_.run_for(150ms);
   make(robot_, 44);  // heard, but not committed: gone with the station
   kill();
   start();
-  EXPECT_EQ(wait(runs_->create(robot_.id, named("x"))).error().code, ErrorCode::not_connected);
+  const Run run = find(id);
+  EXPECT_EQ(run.state, RunState::interrupted);
+  ASSERT_EQ(run.spans.size(), 1u);
+  EXPECT_EQ(run.spans[0].last_seq, 129u);
+  EXPECT_EQ(run.ended_at_us, batch.utc_offset_us + static_cast<std::int64_t>(robot_.time_of(129)));
+  EXPECT_EQ(run.samples_expected, 100u);
+  EXPECT_EQ(run.samples_stored, 100u);
+  EXPECT_EQ(wait(runs_->end(id, "")).error().code, ErrorCode::conflict);
+}
+
+TEST_F(RunsTest, WhatTheStationMissedIsRecordedButNotInTheInterruptedRun) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  make(robot_, 100);
+  flush();
+  kill();
+  start();
   robot_.next_seq += 200;  // made while there was no station
   const std::uint64_t durable = admit(robot_).durable_next_seq;
   connect(robot_);
-  EXPECT_EQ(find(id).samples_expected, 344u);
+  send(robot_, durable, 300 - durable);
+  const RunId next = create("the next one");
   make(robot_, 10);
-  send(robot_, durable, 374 - durable);
-  const Run run = end(id);
-  EXPECT_EQ(run.spans.size(), 1u);
-  EXPECT_EQ(run.samples_expected, 354u);
-  EXPECT_EQ(run.samples_stored, 354u);
-  EXPECT_EQ(rows("SELECT count(DISTINCT seq), min(seq), max(seq) FROM run_sample"),
-            std::vector<std::string>{"354|30|383"});
+  EXPECT_EQ(end(next).samples_stored, 10u);
+  EXPECT_EQ(find(id).spans.at(0).last_seq, 99u);
+  EXPECT_EQ(find(id).samples_stored, 100u);
+  EXPECT_EQ(number("SELECT sum(last_seq - first_seq + 1) FROM segment"), 310);
 }
 
-TEST_F(RunsTest, ARebootWhileTheStationIsDownMovesTheRunOn) {
+TEST_F(RunsTest, ARobotThatSaidHowFarItWasMayStillSendTheRestOfAnInterruptedRun) {
   start();
   connect(robot_);
   const RunId id = create();
   make(robot_, 50);
   flush();
+  disconnect(robot_);
+  robot_.next_seq += 20;
+  connect(robot_);  // its Hello says that 70 samples were made
+  flush();
   kill();
   start();
-  reboot();
-  make(robot_, 20);
-  const Run run = end(id);
-  ASSERT_EQ(run.spans.size(), 2u);
-  EXPECT_EQ(run.spans[0].last_seq, 49u);
-  EXPECT_EQ(run.samples_stored, 70u);
-  EXPECT_EQ(run.samples_expected, 70u);
+  EXPECT_EQ(find(id).spans.at(0).last_seq, 69u);
+  EXPECT_EQ(find(id).samples_stored, 50u);
+  connect(robot_);
+  send(robot_, 50, 20);
+  flush();
+  EXPECT_EQ(find(id).samples_stored, 70u);
 }
 
-TEST_F(RunsTest, ARunMadeJustAfterTheConnectionSurvivesAKillAndAReboot) {
+TEST_F(RunsTest, AnOrderlyStopInterruptsARunWithEverySampleThatWasHeard) {
   start();
   connect(robot_);
   const RunId id = create();
-  kill();
-  start();
-  reboot();
-  make(robot_, 20);
-  const Run run = end(id);
-  ASSERT_EQ(run.spans.size(), 1u);
-  EXPECT_EQ(run.spans[0].boot_id, robot_.boot_id);
-  EXPECT_EQ(run.samples_stored, 20u);
+  make(robot_, 130);
+  stop();
+  EXPECT_EQ(rows("SELECT state, last_seq FROM run JOIN run_span USING (run_id)"),
+            std::vector<std::string>{"interrupted|129"});
+  EXPECT_EQ(samples_in(id), 130);
 }
 
-TEST_F(RunsTest, ARunThatEndsWhileTheRobotIsAwayAfterARestartEndsAtWhatIsKnown) {
+TEST_F(RunsTest, ARebootJustBeforeAnOrderlyStopIsInTheInterruptedRun) {
   start();
   connect(robot_);
   const RunId id = create();
   make(robot_, 50);
-  flush();
+  reboot();
+  make(robot_, 20);
+  stop();
+  EXPECT_EQ(samples_in(id), 70);
+  EXPECT_EQ(rows("SELECT span, first_seq, last_seq FROM run_span"), (std::vector<std::string>{"0|0|49", "1|0|19"}));
+}
+
+TEST_F(RunsTest, AnInterruptedRunWithoutSamplesIsEmpty) {
+  start();
+  connect(robot_);
+  const RunId id = create();
   kill();
   start();
-  const Run run = end(id);
-  EXPECT_EQ(run.spans.at(0).last_seq, 49u);
-  EXPECT_EQ(run.samples_stored, 50u);
+  const Run run = find(id);
+  EXPECT_EQ(run.state, RunState::interrupted);
+  EXPECT_TRUE(run.spans.empty());
+  EXPECT_EQ(run.ended_at_us, run.started_at_us);
+  reboot();
+  make(robot_, 20);
+  EXPECT_TRUE(find(id).spans.empty());
 }
 
 }  // namespace

@@ -1,0 +1,155 @@
+// SQL that makes runs of what is recorded, and that changes what is said of them.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "server/recording/in_force_store.hpp"
+#include "server/recording/run_spans.hpp"
+#include "server/recording/run_store.hpp"
+#include "server/recording/statement.hpp"
+
+namespace server {
+namespace {
+
+constexpr std::array<const char*, 8> kTextColumns{"name",          "fluid",   "pump_profile", "tube",
+                                                  "operator_name", "profile", "notes",        "verdict"};
+
+// The boots' samples that the range names, ascending.
+Result<std::vector<BootSamples>> samples_in(SQLite::Database& database, const RobotId& robot_id,
+                                            const RecordedRange& range) {
+  if (const auto* time = std::get_if<TimeSpan>(&range)) {
+    auto found = samples_between(database, robot_id, time->from_us, time->to_us);
+    if (found.empty()) {
+      return fail(ErrorCode::invalid, fmt::format("nothing was recorded of robot '{}' in that time", robot_id),
+                  "nothing_recorded");
+    }
+    return found;
+  }
+  const auto& named = std::get<SeqSpan>(range);
+  std::optional<BootSamples> boot = samples_of_boot(database, robot_id, named.boot_id);
+  if (!boot) {
+    return fail(ErrorCode::not_found, fmt::format("robot '{}' has had no boot {}", robot_id, named.boot_id));
+  }
+  if (named.first_seq > named.last_seq || named.last_seq >= boot->samples.next) {
+    return fail(ErrorCode::invalid,
+                fmt::format("samples {} to {} are not in the boot's 0 to {}", named.first_seq, named.last_seq,
+                            static_cast<std::int64_t>(boot->samples.next) - 1),
+                "nothing_recorded");
+  }
+  boot->samples = {named.first_seq, named.last_seq + 1};
+  return std::vector{*boot};
+}
+
+// What is known of the robot where the run begins, and when that was.
+void describe(SQLite::Database& database, const std::vector<BootSamples>& boots, Run& run) {
+  const BootSamples& first = boots.front();
+  const BootSamples& last = boots.back();
+  SQLite::Statement boot{database, "SELECT firmware_version, first_seen_at_us FROM boot WHERE boot_key = ?"};
+  bind_all(boot, first.boot_key);
+  boot.executeStep();
+  run.firmware_version = boot.getColumn(0).getString();
+  run.started_at_us = boot.getColumn(1).getInt64();
+  SQLite::Statement segment{database,
+                            "SELECT controller_id FROM segment WHERE boot_key = ? AND first_seq <= ?"
+                            " ORDER BY first_seq DESC LIMIT 1"};
+  bind_all(segment, first.boot_key, first.samples.first);
+  if (segment.executeStep()) run.controller_id = segment.getColumn(0).getUInt();
+  if (const auto time = time_of(database, first.boot_key, first.samples.first)) run.started_at_us = time->utc_us;
+  run.ended_at_us = run.started_at_us;
+  if (const auto time = time_of(database, last.boot_key, last.samples.next - 1)) {
+    run.ended_at_us = std::max(run.started_at_us, time->utc_us);
+  }
+}
+
+Result<RunState> state_of(SQLite::Database& database, RunId id) {
+  const std::optional<RunState> state = read_run_state(database, id);
+  if (!state) return fail(ErrorCode::not_found, fmt::format("there is no run {}", id));
+  return *state;
+}
+
+}  // namespace
+
+Result<RunId> RunStore::add_afterwards(Run run, const RecordedRange& range) {
+  SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};  // nothing is purged meanwhile
+  const auto boots = samples_in(handle_, run.robot_id, range);
+  if (!boots) return std::unexpected{boots.error()};
+  run.state = RunState::ended;
+  run.made_afterwards = true;
+  describe(handle_, *boots, run);
+  const RunId id = insert(run);
+  SQLite::Statement add{handle_,
+                        "INSERT INTO run_span (run_id, span, boot_key, first_seq, last_seq) VALUES (?, ?, ?, ?, ?)"};
+  for (std::size_t span = 0; span < boots->size(); ++span) {
+    const BootSamples& boot = (*boots)[span];
+    execute(add, id, static_cast<std::int64_t>(span), boot.boot_key, boot.samples.first, boot.samples.next - 1);
+  }
+  transaction.commit();
+  return id;
+}
+
+Result<void> RunStore::annotate(RunId id, const RunAnnotation& annotation, const Author& author) {
+  SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
+  const Result<RunState> state = state_of(handle_, id);
+  if (!state) return std::unexpected{state.error()};
+  if (*state == RunState::discarded) {
+    return fail(ErrorCode::conflict, fmt::format("run {} was discarded", id));
+  }
+  const auto change = [&](const std::string& column, const auto& after, const std::string& after_text) {
+    SQLite::Statement before{handle_, fmt::format("SELECT {} FROM run WHERE run_id = ?", column)};
+    bind_all(before, id);
+    before.executeStep();
+    const std::string before_text = before.getColumn(0).getString();
+    before.reset();
+    if (before_text == after_text) return;
+    SQLite::Statement update{handle_, fmt::format("UPDATE run SET {} = ?2 WHERE run_id = ?1", column)};
+    execute(update, id, after);
+    add_note(id, author, column, before_text, after_text);
+  };
+  for (const char* column : kTextColumns) {
+    if (const auto given = annotation.texts.find(column); given != annotation.texts.end()) {
+      change(column, given->second, given->second);
+    }
+  }
+  if (annotation.has_mean_flow) {
+    const std::optional<double>& flow = annotation.mean_flow_m_s;
+    change("mean_flow_m_s", flow, flow ? fmt::format("{}", *flow) : "");
+  }
+  transaction.commit();
+  return {};
+}
+
+Result<void> RunStore::discard(RunId id, const std::string& reason, const Author& author) {
+  SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
+  const Result<RunState> state = state_of(handle_, id);
+  if (!state) return std::unexpected{state.error()};
+  if (*state == RunState::open) return fail(ErrorCode::conflict, fmt::format("run {} is open; end it first", id));
+  if (*state == RunState::discarded) return fail(ErrorCode::conflict, fmt::format("run {} was discarded already", id));
+  SQLite::Statement mark{handle_, "UPDATE run SET state = 'discarded' WHERE run_id = ?"};
+  execute(mark, id);
+  add_note(id, author, "state", text(*state), "discarded");
+  add_note(id, author, "discard_reason", "", reason);
+  transaction.commit();
+  return {};
+}
+
+void RunStore::add_note(RunId id, const Author& author, const std::string& field, const std::string& before,
+                        const std::string& after) {
+  SQLite::Statement add{
+      handle_, "INSERT INTO run_note (run_id, made_at_us, actor, field, before, after) VALUES (?, ?, ?, ?, ?, ?)"};
+  execute(add, id, author.utc_us, author.actor, field, before, after);
+}
+
+// In each span of the run, unless it was already.
+void RunStore::put_in_force(RunId id, const std::string& station_document, std::int64_t utc_us) {
+  if (station_document.empty()) return;
+  const std::int64_t key = document_key(handle_, "station", station_document);
+  SQLite::Statement put{
+      handle_,
+      "INSERT OR REPLACE INTO in_force SELECT boot_key, 'station', first_seq, ?2, ?3 FROM run_span WHERE run_id = ?1"
+      " AND ?2 IS NOT (SELECT document_key FROM in_force WHERE in_force.boot_key = run_span.boot_key"
+      " AND kind = 'station' AND in_force.first_seq <= run_span.first_seq ORDER BY in_force.first_seq DESC LIMIT 1)"};
+  execute(put, id, key, utc_us);
+}
+
+}  // namespace server

@@ -1,0 +1,33 @@
+// Runs as they are stored, with the counts of their samples.
+//
+// On the thread that owns the database handle; reads only. The counts of a run that has a certificate are the
+// certificate's, so a list of ended runs reads no segment; those of any other run are summed over its segments.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "server/recording/runs.hpp"
+
+namespace server {
+
+// One above the newest sample of each boot in use, as the recorder knows it.
+using BootHeads = std::map<BootId, std::uint64_t>;
+
+std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, RunId id);
+std::optional<RunState> read_run_state(SQLite::Database& database, RunId id);
+std::vector<Run> list_runs(SQLite::Database& database, const BootHeads& heads, const RunFilter& filter);
+
+std::optional<RunSnapshot> read_snapshot(SQLite::Database& database, RunId id);
+
+// One above the newest sample that the boot is known to have made.
+std::uint64_t known_next_seq(SQLite::Database& database, const BootHeads& heads, std::int64_t boot_key, BootId boot_id);
+
+// The columns of `run`, in the order in which a row of it is read.
+extern const char* const kRunColumns;
+
+}  // namespace server

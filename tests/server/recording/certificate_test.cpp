@@ -1,0 +1,302 @@
+// The certificate says of a run exactly what a naive recount of its samples says.
+#include "server/recording/certificate.hpp"
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <map>
+
+#include "server/recording/statement.hpp"
+#include "tests/server/recording/recording_test.hpp"
+
+namespace server {
+namespace {
+
+class CertificateTest : public RecordingTest {
+ protected:
+  TestRobot robot_;
+
+  RunId create() { return wait(runs_->create(robot_.id, named("certified")))->id; }
+  void end(RunId id) { ASSERT_TRUE(wait(runs_->end(id, "")).has_value()); }
+  Certificate final_certificate(RunId id) {
+    const Result<RunCertificate> found = wait(recording_->certifier.find(id));
+    EXPECT_TRUE(found.has_value()) << found.error().detail;
+    EXPECT_TRUE(found && found->is_final);
+    return found ? found->certificate : Certificate{};
+  }
+  void reboot() {
+    disconnect(robot_);
+    robot_.boot_id += 1;
+    robot_.next_seq = robot_.oldest_seq = 0;
+    connect(robot_);
+  }
+  void change(const std::string& sql) {
+    SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE, 5000};
+    database.exec(sql);
+  }
+
+  // 300 samples in two boots, 7 of them backfilled, and 10 lost.
+  RunId make_eventful_run() {
+    connect(robot_);
+    make(robot_, 20);
+    const RunId id = create();
+    make(robot_, 93);
+    robot_.next_seq += 7;
+    make(robot_, 100);
+    TestRobot late = robot_;
+    late.context.flags = rheonaut_TELEMETRY_FLAG_BACKFILL;
+    send(late, 113, 7);
+    robot_.next_seq += 10;  // never arrive
+    make(robot_, 50);
+    reboot();
+    robot_.context.setpoint_m = 0.1F;
+    make(robot_, 50);
+    end(id);
+    return id;
+  }
+};
+
+TEST_F(CertificateTest, CountsWhatCameAndWhatIsLost) {
+  start();
+  const Certificate certificate = final_certificate(make_eventful_run());
+  EXPECT_EQ(certificate.samples_expected, 310u);
+  EXPECT_EQ(certificate.samples_live, 293u);
+  EXPECT_EQ(certificate.samples_backfilled, 7u);
+  EXPECT_EQ(certificate.samples_lost, 10u);
+  EXPECT_EQ(certificate.samples_missing(), 0u);
+  EXPECT_EQ(certificate.lost_by_cause, (std::map<std::string, std::uint64_t>{{"reboot", 10}}));
+  EXPECT_EQ(certificate.longest_gap_samples, 10u);
+  EXPECT_EQ(certificate.longest_gap_us, 100'000);
+  EXPECT_EQ(certificate.worst_clock_uncertainty_us, 300);
+  EXPECT_EQ(certificate.samples_without_clock, 0u);
+  EXPECT_EQ(certificate.made_at_us, clock_.utc_us());
+}
+
+// The bytes of docs/database.md, made another way: each sample as its page tells it, written member by member.
+TEST_F(CertificateTest, HashesTheDocumentedBytes) {
+  start();
+  robot_.context.controller_id = 7;
+  robot_.context.emergency_id = 0xfedcba9876543210;
+  robot_.context.position_sd_m = 0.25F;
+  const RunId id = make_eventful_run();
+  std::string bytes = "rheonaut-samples-1\n";
+  const auto put = [&bytes](std::uint64_t value, int size) {
+    for (int byte = 0; byte < size; ++byte) bytes += static_cast<char>(value >> (8 * byte));
+  };
+  const auto put_float = [&](float value) {
+    put(std::isnan(value) ? 0x7fc00000U : std::bit_cast<std::uint32_t>(value), 4);
+  };
+  for (const StoredSample& one : wait(history_->samples(id, std::nullopt, 10'000))->samples) {
+    put(one.boot_id, 8);
+    put(one.seq, 8);
+    put(one.robot_time_us, 8);
+    put(static_cast<std::uint64_t>(one.utc_us), 8);
+    put(static_cast<std::uint64_t>(one.clock_uncertainty_us), 8);
+    put_float(one.sample.position_m);
+    put_float(one.sample.velocity_m_s);
+    put_float(one.sample.acceleration_m_s2);
+    put_float(one.sample.duty);
+    put_float(one.sample.impedance_mv);
+    put_float(one.sample.reference_m);
+    put_float(one.setpoint_m.value_or(std::nanf("")));
+    put_float(one.disturbance_m);
+    put_float(one.position_sd_m);
+    put(static_cast<std::uint64_t>(one.mode), 1);
+    put(static_cast<std::uint64_t>(one.sub_state), 1);
+    put(static_cast<std::uint64_t>(one.emergency_cause), 1);
+    put(0, 1);
+    put(one.controller_id, 4);
+    put(one.flags, 4);
+    put(one.emergency_id, 8);
+  }
+  ASSERT_EQ(bytes.size(), 19 + 300 * 96u);
+  std::array<unsigned char, crypto_hash_sha256_BYTES> hash{};
+  crypto_hash_sha256(hash.data(), reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  std::string expected;
+  for (const unsigned char byte : hash)
+    expected += "0123456789abcdef"[byte >> 4U], expected += "0123456789abcdef"[byte & 15U];
+  EXPECT_EQ(final_certificate(id).sha256, expected);
+}
+
+TEST_F(CertificateTest, IsFinalOnlyWhenTheLastSampleHasArrived) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  make(robot_, 20);
+  robot_.next_seq = 40;  // 20..39 are on their way
+  make(robot_, 10);
+  end(id);
+  const Result<RunCertificate> now = wait(recording_->certifier.find(id));
+  ASSERT_TRUE(now.has_value());
+  EXPECT_FALSE(now->is_final);
+  EXPECT_EQ(now->certificate.samples_live, 30u);
+  EXPECT_EQ(now->certificate.samples_missing(), 20u);
+  EXPECT_EQ(now->certificate.longest_gap_samples, 20u);
+  EXPECT_EQ(now->certificate.sha256, "");
+  EXPECT_EQ(number("SELECT count(*) FROM run_certificate"), 0);
+  send(robot_, 20, 20);
+  flush();
+  EXPECT_EQ(final_certificate(id).samples_live, 50u);
+}
+
+TEST_F(CertificateTest, IsMadeByItselfWhenTheRestArrives) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  make(robot_, 20);
+  robot_.next_seq = 40;
+  make(robot_, 10);
+  end(id);
+  send(robot_, 20, 20);
+  clock_.run_for(30s);
+  EXPECT_EQ(rows("SELECT run_id, samples_live FROM run_certificate"),
+            std::vector<std::string>{std::to_string(id) + "|50"});
+}
+
+TEST_F(CertificateTest, IsMadeWhenTheDiskCanBeWrittenAgain) {
+  start();
+  change("CREATE TRIGGER full BEFORE INSERT ON run_certificate BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
+  const RunId id = make_eventful_run();
+  const Result<RunCertificate> now = wait(recording_->certifier.find(id));
+  ASSERT_TRUE(now.has_value());
+  EXPECT_FALSE(now->is_final);
+  EXPECT_EQ(now->certificate.samples_missing(), 0u);
+  change("DROP TRIGGER full");
+  clock_.run_for(60s);
+  EXPECT_EQ(number("SELECT count(*) FROM run_certificate"), 1);
+}
+
+TEST_F(CertificateTest, ADamagedRunHasNoneAndTheStationGoesOn) {
+  start();
+  connect(robot_);
+  const RunId damaged = create();
+  make(robot_, 100);
+  flush();
+  change("DELETE FROM sample WHERE row = 7");
+  end(damaged);
+  const Result<RunCertificate> found = wait(recording_->certifier.find(damaged));
+  ASSERT_TRUE(found.has_value());
+  EXPECT_FALSE(found->is_final);
+  const RunId next = create();
+  make(robot_, 20);
+  end(next);
+  EXPECT_EQ(final_certificate(next).samples_live, 20u);
+  EXPECT_EQ(number("SELECT count(*) FROM run_certificate"), 1);
+}
+
+TEST_F(CertificateTest, IsMadeAfterARestartForARunThatTheStopInterrupted) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  make(robot_, 250);
+  flush();
+  kill();
+  start();
+  clock_.run_for(1s);
+  EXPECT_EQ(number("SELECT count(*) FROM run_certificate"), 1);
+  EXPECT_EQ(final_certificate(id).samples_live, 250u);
+}
+
+TEST_F(CertificateTest, AThousandRunsAreListedFromTheirCertificatesWithoutASegment) {
+  start();
+  const RunId id = make_eventful_run();
+  final_certificate(id);
+  change(
+      "CREATE TEMP TABLE n AS WITH RECURSIVE count(i) AS (SELECT 2 UNION ALL SELECT i + 1 FROM count WHERE i < 1000)"
+      " SELECT i FROM count;"
+      "INSERT INTO run SELECT i, robot_id, name, fluid, pump_profile, mean_flow_m_s, tube, operator_name, notes,"
+      " verdict, firmware_version, controller_id, controller_checksum, parameters_checksum, started_at_us, ended_at_us,"
+      " state, made_afterwards, made_by, profile FROM run, n WHERE run_id = 1;"
+      "INSERT INTO run_span SELECT i, span, boot_key, first_seq, last_seq, NULL, NULL FROM run_span, n WHERE run_id = "
+      "1;"
+      "INSERT INTO run_certificate SELECT i, format, samples_expected, samples_live, samples_backfilled, samples_lost,"
+      " lost_by_cause, longest_gap_samples, longest_gap_us, worst_clock_uncertainty_us, samples_without_clock, sha256,"
+      " made_at_us FROM run_certificate, n WHERE run_id = 1;"
+      "DELETE FROM segment; DELETE FROM gap");
+  RunFilter filter;
+  filter.limit = 1000;
+  const std::vector<Run> runs = wait(runs_->list(filter));
+  ASSERT_EQ(runs.size(), 1000u);
+  for (const Run& run : runs) {
+    ASSERT_EQ(run.samples_expected, 310u);
+    ASSERT_EQ(run.samples_stored, 300u);
+    ASSERT_EQ(run.samples_lost, 10u);
+    ASSERT_EQ(run.spans.size(), 2u);
+  }
+}
+
+TEST_F(CertificateTest, ThereIsNoneOfAnOpenOrUnknownRun) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  EXPECT_EQ(wait(recording_->certifier.find(id)).error().code, ErrorCode::conflict);
+  EXPECT_EQ(wait(recording_->certifier.find(99)).error().code, ErrorCode::not_found);
+}
+
+TEST_F(CertificateTest, AnEmptyRunHasOne) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  end(id);
+  const Certificate certificate = final_certificate(id);
+  EXPECT_EQ(certificate.samples_expected, 0u);
+  EXPECT_EQ(certificate.worst_clock_uncertainty_us, -1);
+  EXPECT_EQ(certificate.sha256, SampleHash{}.text());
+}
+
+TEST_F(CertificateTest, CountsSamplesThatHaveNoClock) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  SampleBatch batch = robot_.batch(0, 5);
+  batch.clock_uncertainty_us = -1;
+  send(robot_, batch);
+  robot_.next_seq = 5;
+  make(robot_, 5);
+  end(id);
+  EXPECT_EQ(final_certificate(id).samples_without_clock, 5u);
+}
+
+TEST_F(CertificateTest, IsTheSameAfterAVacuumAndWhenSegmentsAreCutDifferently) {
+  start();
+  const RunId id = make_eventful_run();
+  const Certificate before = final_certificate(id);
+  stop();
+  // Each segment in two, the second half in rows of its own.
+  change(
+      "CREATE TEMP TABLE half AS SELECT rowid AS r, (last_seq - first_seq) / 2 + 1 AS n,"
+      " (SELECT value FROM meta WHERE name = 'next_row') + sum(100) OVER (ORDER BY rowid) AS at"
+      " FROM segment WHERE last_seq > first_seq;"
+      "INSERT INTO sample SELECT half.at + row - first_row - n, position_m, velocity_m_s, acceleration_m_s2, duty,"
+      " impedance_mv, reference_m FROM half JOIN segment ON segment.rowid = r JOIN sample"
+      " ON row BETWEEN first_row + n AND last_row;"
+      "CREATE TEMP TABLE second AS SELECT segment.*, n, at FROM half JOIN segment ON segment.rowid = r;"
+      "UPDATE segment SET last_seq = first_seq + n - 1, last_row = first_row + n - 1 FROM half WHERE segment.rowid = r;"
+      "UPDATE second SET first_seq = first_seq + n, first_robot_time_us = first_robot_time_us + n * period_us,"
+      " first_row = at;"
+      "UPDATE second SET last_row = first_row + last_seq - first_seq;"
+      "ALTER TABLE second DROP COLUMN n; ALTER TABLE second DROP COLUMN at;"
+      "INSERT INTO segment SELECT * FROM second;"
+      "UPDATE meta SET value = (SELECT max(row) + 1 FROM sample) WHERE name = 'next_row'");
+  change("VACUUM");
+  change("DELETE FROM run_certificate");
+  const auto segments = number("SELECT count(*) FROM segment");
+  start();
+  EXPECT_GT(segments, 8);
+  EXPECT_TRUE(final_certificate(id).agrees_with(before));
+}
+
+TEST_F(CertificateTest, ARunLongerThanAPageIsCountedWhole) {
+  start();
+  connect(robot_);
+  const RunId id = create();
+  for (int i = 0; i < 45; ++i) {
+    make(robot_, 1000, 25);
+    flush();
+  }
+  end(id);
+  EXPECT_EQ(final_certificate(id).samples_live, 45'000u);
+}
+
+}  // namespace
+}  // namespace server
