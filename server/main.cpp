@@ -32,7 +32,7 @@ int serve(const Config& config) {
   Station station{loop, clock, config.limits, config.link};
 
   // Out: they hear the station and never call it back; what has become durable comes back through one function.
-  RecordingParts recording{loop, clock, disk, readers, {config.database(), config.enrol_on_loopback}};
+  RecordingParts recording{loop, clock, disk, readers, {config.database(), config.enrol_on_loopback}, config.recording};
   LiveFeed live{clock};
   recording.connect(station);
   station.add_sink(live);

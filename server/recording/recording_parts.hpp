@@ -7,8 +7,12 @@
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
 
+#include "server/config.hpp"
+#include "server/recording/backup.hpp"
+#include "server/recording/disk_watch.hpp"
 #include "server/recording/history.hpp"
 #include "server/recording/recorder.hpp"
+#include "server/recording/retention.hpp"
 #include "server/recording/runs.hpp"
 #include "server/station/station.hpp"
 #include "server/tasks.hpp"
@@ -17,7 +21,7 @@ namespace server {
 
 struct RecordingParts {
   RecordingParts(boost::asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                 const RecorderOptions& options);
+                 const RecorderOptions& options, const RecordingConfig& config = {});
 
   // The station is heard from now on, and hears what has become durable and what is missing.
   void connect(Station& station);
@@ -35,6 +39,9 @@ struct RecordingParts {
   Recorder recorder;
   Runs runs;
   History history;
+  DiskWatch disk_watch;
+  Backups backups;
+  Retention retention;
 };
 
 }  // namespace server
