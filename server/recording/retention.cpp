@@ -136,29 +136,29 @@ asio::awaitable<void> Retention::purge_older_than(std::int64_t utc_us, std::uint
 asio::awaitable<void> Retention::purge_down_to_size() {
   const std::uint64_t limit = policy_.max_database_bytes;
   Size now = co_await size();
-  if (now.used_bytes <= limit / 100 * kBeginPercent) {
-    counters_.all_held = false;
-    co_return;
-  }
-  const std::uint64_t target = limit / 100 * kEndPercent;
-  while (now.used_bytes > target) {
-    const std::optional<std::int64_t> oldest = co_await oldest_us();
-    if (!oldest) {
-      if (!counters_.all_held) {
-        spdlog::warn(
-            "the database uses {} bytes, recording.max_database_mb allows {}, and runs hold all that could go: discard "
-            "runs, or allow more",
-            now.used_bytes, limit);
-      }
-      counters_.all_held = true;
-      co_return;
+  if (now.used_bytes > limit / 100 * kBeginPercent) {
+    const std::uint64_t target = limit / 100 * kEndPercent;
+    while (now.used_bytes > target) {
+      const std::optional<std::int64_t> oldest = co_await oldest_us();
+      if (!oldest) break;
+      const std::uint64_t purged = counters_.samples_purged;
+      co_await purge_older_than(*oldest + kSliceUs, target);
+      if (counters_.samples_purged == purged) co_return;  // the disk fails
+      now = co_await size();
     }
-    counters_.all_held = false;
-    const std::uint64_t purged = counters_.samples_purged;
-    co_await purge_older_than(*oldest + kSliceUs, target);
-    if (counters_.samples_purged == purged) co_return;  // the disk fails
-    now = co_await size();
   }
+  note_use(now.used_bytes);
+}
+
+void Retention::note_use(std::uint64_t used_bytes) {
+  const bool all_held = used_bytes > policy_.max_database_bytes;
+  if (all_held && !counters_.all_held) {
+    spdlog::warn(
+        "the database uses {} bytes, recording.max_database_mb allows {}, and runs hold all that could go: discard "
+        "runs, or allow more",
+        used_bytes, policy_.max_database_bytes);
+  }
+  counters_.all_held = all_held;
 }
 
 // Pages that are moved are written once more, so not one more than must be.

@@ -63,6 +63,7 @@ class Retention {
   };
   boost::asio::awaitable<void> purge_older_than(std::int64_t utc_us, std::uint64_t until_used_bytes);
   boost::asio::awaitable<void> purge_down_to_size();
+  void note_use(std::uint64_t used_bytes);  // after what could go has gone
   boost::asio::awaitable<void> shrink();
   boost::asio::awaitable<Size> size();
   boost::asio::awaitable<std::optional<std::int64_t>> oldest_us();

@@ -262,6 +262,25 @@ TEST_F(RetentionTest, WhatRunsHoldStaysAlsoWhenItIsTooMuch) {
   EXPECT_TRUE(counters().all_held);
 }
 
+TEST_F(RetentionTest, CommitsGoInBetween) {
+  keep(7);
+  record(200'000);
+  clock_.step_utc(8 * kDay);
+  tasks_->spawn("pass", recording_->retention.pass());
+  int commits = 0;
+  for (; counters().samples_purged < 199'000; ++commits) {
+    record(100);
+    ASSERT_EQ(durable_next_seq_, 200'000U + static_cast<std::uint64_t>(commits + 1) * 100);
+    clock_.run_for(5ms);
+    ASSERT_LT(commits, 100);
+  }
+  EXPECT_GT(commits, 3);
+  clock_.run_for(1s);
+  SQLite::Database database = open_for_reading(path_);
+  EXPECT_THAT(coverage_faults(database), IsEmpty());
+  EXPECT_EQ(gaps(), Rows{"0|199999|retention"});
+}
+
 TEST_F(RetentionTest, WhileTheDiskFailsNothingIsRemoved) {
   keep(7);
   record(1000);
