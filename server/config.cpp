@@ -123,6 +123,13 @@ void read(ConfigFile& file, Config& config) {
   file.take_number("limits", "duty_min", -1, 0, config.limits.duty_min);
   file.take_number("limits", "duty_max", 0, 1, config.limits.duty_max);
   file.take_number("limits", "disturbance_max_m", 0, 100, config.limits.disturbance_max_m);
+  RecordingConfig& recording = config.recording;
+  file.take_count("recording", "retention_days", 0, 36'500, recording.retention_days);
+  file.take_count("recording", "max_database_mb", 0, 100'000'000, recording.max_database_mb);
+  file.take_count("recording", "low_space_mb", 0, 100'000'000, recording.low_space_mb);
+  file.take_count("recording", "critical_space_mb", 0, 100'000'000, recording.critical_space_mb);
+  std::string backup_dir;
+  if (file.take("recording", "backup_dir", backup_dir)) recording.backup_dir = backup_dir;
   if (file.take("log", "level", config.log_level)) {
     constexpr std::array kLevels{"trace", "debug", "info", "warn", "error"};
     if (std::ranges::find(kLevels, config.log_level) == kLevels.end()) {
@@ -139,6 +146,11 @@ void check(const Config& config) {
   if (config.limits.setpoint_min_m >= config.limits.setpoint_max_m) {
     throw std::invalid_argument{fmt::format("limits.setpoint_min_m = {} must be below limits.setpoint_max_m = {}",
                                             config.limits.setpoint_min_m, config.limits.setpoint_max_m)};
+  }
+  if (config.recording.critical_space_mb > config.recording.low_space_mb) {
+    throw std::invalid_argument{
+        fmt::format("recording.critical_space_mb = {} must be at most recording.low_space_mb = {}",
+                    config.recording.critical_space_mb, config.recording.low_space_mb)};
   }
   if (config.link.heartbeat_interval_ms * 2 > config.link.link_timeout_ms) {
     throw std::invalid_argument{

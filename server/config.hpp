@@ -4,6 +4,7 @@
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -13,6 +14,16 @@
 #include "server/station/station.hpp"
 
 namespace server {
+
+// Section [recording]: how long samples that no run holds are kept, and how much room there must be. 1 MB is 10^6
+// bytes.
+struct RecordingConfig {
+  std::uint32_t retention_days = 0;       // recording.retention_days; 0: for ever
+  std::uint32_t max_database_mb = 0;      // recording.max_database_mb; 0: no limit
+  std::uint32_t low_space_mb = 2048;      // recording.low_space_mb: with less free space people are warned
+  std::uint32_t critical_space_mb = 512;  // recording.critical_space_mb: ... nothing new is begun
+  std::filesystem::path backup_dir;       // recording.backup_dir; empty: "backups" in the data folder
+};
 
 struct Config {
   std::filesystem::path data_dir = "rheonaut-data";  // data.dir, --data: database, token, endpoints
@@ -27,6 +38,8 @@ struct Config {
   LinkTimes link;                 // robots.link_timeout_ms, .heartbeat_interval_ms, .samples_per_frame
 
   CommandLimits limits;  // limits.setpoint_min_m, .setpoint_max_m, .duty_min, .duty_max, …
+
+  RecordingConfig recording;
 
   std::string log_level = "info";  // log.level: trace, debug, info, warn, error
 

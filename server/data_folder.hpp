@@ -7,14 +7,29 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <utility>
 
 namespace server {
 
+// Whoever holds it is the only program that writes into a data folder.
+class FolderLock {
+ public:
+  // None when another program holds it. The folder is there. Throws std::runtime_error when it cannot be asked.
+  static std::optional<FolderLock> try_take(const std::filesystem::path& folder);
+  FolderLock(FolderLock&& other) noexcept : file_{std::exchange(other.file_, -1)} {}
+  FolderLock& operator=(FolderLock&&) = delete;
+  ~FolderLock();
+
+ private:
+  explicit FolderLock(int file) : file_{file} {}
+  int file_ = -1;
+};
+
 class DataFolder {
  public:
-  // Also takes from everyone else the rights on whatever the program makes from now on (umask).
-  // Throws std::runtime_error that names the folder: it cannot be made, or another station runs in it.
+  // Makes it (make_data_folder), and throws std::runtime_error that names it also when another station runs in it.
   explicit DataFolder(std::filesystem::path path);
   ~DataFolder();  // removes endpoints.json
   DataFolder(const DataFolder&) = delete;
@@ -27,7 +42,11 @@ class DataFolder {
   std::filesystem::path endpoints() const { return path_ / "endpoints.json"; }
 
   std::filesystem::path path_;
-  int lock_ = -1;
+  FolderLock lock_;
 };
+
+// Takes from everyone else the rights on whatever the program makes from now on, and makes the folder when it is
+// missing. Throws std::runtime_error that names it.
+void make_data_folder(const std::filesystem::path& path);
 
 }  // namespace server

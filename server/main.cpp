@@ -34,7 +34,8 @@ int serve(const Config& config) {
   Station station{loop, clock, config.limits, config.link};
 
   // Out: they hear the station and never call it back; what has become durable comes back through one function.
-  RecordingParts recording{loop, clock, disk, readers, checkpoints, {config.database(), config.enrol_on_loopback}};
+  RecordingParts recording{
+      loop, clock, disk, readers, checkpoints, {config.database(), config.enrol_on_loopback}, config.recording};
   LiveFeed live{clock};
   recording.connect(station);
   recording.runs.set_station_document(station_document(config));

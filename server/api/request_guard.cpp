@@ -90,7 +90,8 @@ std::expected<std::string, Response> RequestGuard::admit(const Request& request)
   if (!origin.empty() && !same_origin && (live || changes_something(request))) {
     return refuse(403, "the request comes from a page of another origin", "wrong_origin");
   }
-  if (!live && !path->starts_with("/api/") && !changes_something(request)) return std::string{};
+  const bool holds_data = live || *path == "/metrics" || path->starts_with("/api/");
+  if (!holds_data && !changes_something(request)) return std::string{};
 
   const auto credential = credential_of(request);
   if (!credential) {

@@ -1,4 +1,4 @@
-// All routes of the API, grouped by noun: routes_station, routes_robots, routes_runs, routes_markers,
+// All routes of the API, grouped by noun: routes_station, routes_recording, routes_robots, routes_runs, routes_markers,
 // routes_samples.
 //
 // Held to openapi.yaml both ways by a test. Each answer is a coroutine that can be called without a server.
@@ -40,6 +40,7 @@ struct ApiParts {
 };
 
 void add_station_routes(Router& router, ApiParts& parts);
+void add_recording_routes(Router& router, ApiParts& parts);
 void add_robot_routes(Router& router, ApiParts& parts);
 void add_run_routes(Router& router, ApiParts& parts);
 void add_marker_routes(Router& router, ApiParts& parts);

@@ -32,6 +32,8 @@ Answer list_runs(ApiParts& parts, Request request) {
 Answer create_run(ApiParts& parts, Request request) {
   const auto wish = parse_run(request.body);
   if (!wish) co_return problem(wish.error());
+  const Result<void> room = parts.recording.disk_watch.may_begin("a run");
+  if (!room) co_return problem(room.error());
   if (parts.station.find(wish->robot_id) == nullptr) {
     co_return problem(404, fmt::format("no robot '{}' is known", wish->robot_id), "unknown_robot");
   }

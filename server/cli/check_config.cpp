@@ -7,6 +7,20 @@
 #include "server/cli/command_line.hpp"
 
 namespace server::cli {
+namespace {
+
+std::string or_none(std::uint32_t value, const char* unit, const char* none) {
+  return value == 0 ? none : fmt::format("{} {}", value, unit);
+}
+
+void print_recording(const RecordingConfig& recording, std::ostream& out) {
+  fmt::print(out, "keep     {}, database {}, warning below {} MB free, nothing new below {} MB\n",
+             or_none(recording.retention_days, "days", "for ever"),
+             or_none(recording.max_database_mb, "MB", "without limit"), recording.low_space_mb,
+             recording.critical_space_mb);
+}
+
+}  // namespace
 
 int run(const CheckConfig& wish, std::ostream& out) {
   const Config config = load_config(wish.flags);
@@ -16,6 +30,7 @@ int run(const CheckConfig& wish, std::ostream& out) {
   fmt::print(out, "limits   setpoint {} to {} m, duty {} to {}, disturbance {} m\n", config.limits.setpoint_min_m,
              config.limits.setpoint_max_m, config.limits.duty_min, config.limits.duty_max,
              config.limits.disturbance_max_m);
+  print_recording(config.recording, out);
   fmt::print(out, "the configuration is valid\n");
   return 0;
 }

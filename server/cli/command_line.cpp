@@ -77,6 +77,8 @@ Wish parse_command_line(int argc, char** argv) {
   Wish wish;
   offer<Serve>(app, "serve", "Run the station until SIGINT or SIGTERM", wish);
   offer<CheckConfig>(app, "check-config", "Check a configuration and print what it means", wish);
+  offer<Backup>(app, "backup", "Copy a station's database, also while it runs, and verify the copy", wish);
+  offer<Restore>(app, "restore", "Make a backup the database of a new data folder", wish);
   offer<Model>(app, "model", "Show the motion models, compute the hydrodynamic one, fit the motor", wish);
   offer<Bode>(app, "bode", "Crossover, margins and frequency response of the open loop", wish);
   offer<Step>(app, "step", "Velocity and position after a step of duty, or any duty", wish);

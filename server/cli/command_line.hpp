@@ -4,11 +4,13 @@
 #include <optional>
 #include <variant>
 
+#include "server/cli/backup.hpp"
 #include "server/cli/bode.hpp"
 #include "server/cli/discretise.hpp"
 #include "server/cli/identify.hpp"
 #include "server/cli/model.hpp"
 #include "server/cli/predict.hpp"
+#include "server/cli/restore.hpp"
 #include "server/cli/step.hpp"
 #include "server/cli/tune.hpp"
 #include "server/cli/verify.hpp"
@@ -29,7 +31,8 @@ struct Answered {
   int exit_code = 0;
 };
 
-using Wish = std::variant<Answered, Serve, CheckConfig, Model, Bode, Step, Identify, Tune, Discretise, Predict, Verify>;
+using Wish = std::variant<Answered, Serve, CheckConfig, Backup, Restore, Verify, Model, Bode, Step, Identify, Tune,
+                          Discretise, Predict>;
 
 Wish parse_command_line(int argc, char** argv);
 

@@ -8,6 +8,7 @@
 
 #include <stdexcept>
 
+#include "server/recording/file_check.hpp"
 #include "server/recording/schema.hpp"
 #include "server/recording/statement.hpp"
 
@@ -46,10 +47,18 @@ void configure(SQLite::Database& database) {
   database.exec("PRAGMA journal_size_limit = 67108864");
 }
 
+// While it is not known to be ours, its log is not written into it either when it is closed.
+void keep_log(SQLite::Database& database, bool keep) {
+  sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, keep ? 1 : 0, nullptr);
+}
+
 SQLite::Database open_checked(const std::filesystem::path& path) {
+  if (const auto problem = file_problem(path)) refuse(path, *problem);
   try {
     SQLite::Database database{path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs};
+    keep_log(database, true);
     if (is_blank(database)) {
+      keep_log(database, false);
       set_up_blank(database);
       configure(database);
       return database;
@@ -65,10 +74,11 @@ SQLite::Database open_checked(const std::filesystem::path& path) {
       refuse(path, fmt::format("its schema is version {}, this program knows 1 to {}; a newer Rheonaut made it",
                                version, known));
     }
+    keep_log(database, false);
     configure(database);
     return database;
   } catch (const SQLite::Exception& error) {
-    if (error.getErrorCode() == SQLITE_NOTADB) refuse(path, "it is not an SQLite database");
+    if (means_damage(error)) refuse(path, fmt::format("it is damaged ('{}'): {}", error.what(), kDamageRemedy));
     refuse(path, fmt::format("SQLite says '{}' (code {})", error.what(), error.getExtendedErrorCode()));
   }
 }
@@ -78,6 +88,7 @@ SQLite::Database open_checked(const std::filesystem::path& path) {
 Database::Database(const std::filesystem::path& path) : handle_{open_checked(path)} {
   if (sodium_init() < 0) throw std::runtime_error{"libsodium cannot be initialised: the system gives no random bytes"};
   settle();
+  if (const auto problem = file_problem(path)) refuse(path, *problem);  // what the log held is in the file now
   migrate(path);
   store_id_ = unsigned_id(handle_.execAndGet("SELECT value FROM meta WHERE name = 'store_id'"));
 }

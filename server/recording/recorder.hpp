@@ -135,11 +135,13 @@ class Recorder final : public StationSink, public RobotArchive {
   std::vector<LostRange> waiting_gaps(BootId boot_id) const;
 
   boost::asio::io_context& loop() { return loop_; }
+  const std::filesystem::path& path() const { return options_.path; }
   const RecorderCounters& counters() const { return counters_; }
   std::size_t queued_samples() const { return queued_samples_; }
   // The last commit failed: nothing becomes durable now.
   bool failing() const { return retry_at_us_ != 0; }
   const WalState& wal() const { return checkpointer_.state(); }
+  const std::string& problem() const { return problem_; }  // while it is failing: why, and what to do
 
  private:
   struct Boot {
@@ -265,6 +267,7 @@ class Recorder final : public StationSink, public RobotArchive {
   RecorderCounters counters_;
   std::int64_t last_commit_us_ = 0;      // steady
   std::int64_t retry_at_us_ = 0;         // steady; 0 unless the last commit failed
+  std::string problem_;                  // of that commit
   std::int64_t failure_logged_us_ = 0;   // steady
   std::int64_t overflow_logged_us_ = 0;  // steady
   std::int64_t next_forget_us_ = 0;      // steady

@@ -6,6 +6,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
+#include "server/recording/file_check.hpp"
 #include "server/recording/recorder.hpp"
 
 namespace server {
@@ -136,6 +137,7 @@ asio::awaitable<void> Recorder::write() {
   }
   if (failing()) spdlog::info("recording goes on: what had waited for the disk is stored");
   retry_at_us_ = 0;
+  problem_.clear();
   WriteBatch written = std::exchange(writing_, {});
   count_written(written);
   co_await tell_durable(std::move(written.progress));
@@ -146,18 +148,19 @@ std::string Recorder::try_to_write() {
     store_->write(writing_);
     return {};
   } catch (const std::exception& error) {  // disk full, locked, unreadable: never a reason to end the emergency stop
-    return error.what();
+    return write_problem(error);
   }
 }
 
 void Recorder::note_failure(const std::string& problem) {
+  problem_ = problem;
   const std::int64_t now_us = clock_.steady_us();
   ++counters_.commits_failed;
   if (!failing() || now_us - failure_logged_us_ >= kFailureLogInterval.count()) {
     failure_logged_us_ = now_us;
     spdlog::error(
-        "nothing is recorded now, {} cannot be written: {}. Make room on the disk, or end the program that holds the "
-        "file; it is tried again every second, and the robots keep what they can",
+        "nothing is recorded now, {} cannot be written: {}; it is tried again every second, and the robots keep what "
+        "they can",
         options_.path.string(), problem);
   }
   retry_at_us_ = now_us + kRetryInterval.count();

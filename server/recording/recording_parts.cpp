@@ -10,14 +10,30 @@
 namespace server {
 namespace asio = boost::asio;
 
+namespace {
+
+std::filesystem::path backup_folder(const std::filesystem::path& database, const RecordingConfig& config) {
+  return config.backup_dir.empty() ? database.parent_path() / "backups" : config.backup_dir;
+}
+
+RetentionPolicy retention_policy(const RecordingConfig& config) {
+  return {config.retention_days, config.max_database_mb * std::uint64_t{1'000'000}};
+}
+
+}  // namespace
+
 RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                               WorkerThread& checkpoints, const RecorderOptions& options)
+                               WorkerThread& checkpoints, const RecorderOptions& options,
+                               const RecordingConfig& config)
     : recorder{loop, clock, disk, checkpoints, options},
       reader{options.path, readers},
       certifier{clock, recorder, reader},
       runs{clock, recorder, reader, certifier},
       markers{clock, recorder, reader},
       history{options.path, recorder, readers},
+      disk_watch{clock, readers, options.path, space_limits(config)},
+      backups{loop, clock, recorder, disk_watch, backup_folder(options.path, config)},
+      retention{clock, recorder, readers, disk_watch, retention_policy(config)},
       path_{options.path} {}
 
 void RecordingParts::connect(Station& station) {
@@ -31,6 +47,7 @@ void RecordingParts::connect(Station& station) {
 asio::awaitable<RestoredState> RecordingParts::open() {
   RestoredState restored = co_await recorder.open();
   co_await runs.load();
+  co_await disk_watch.look();
   co_return restored;
 }
 
@@ -38,9 +55,13 @@ void RecordingParts::spawn(TaskGroup& tasks) {
   tasks.spawn("recorder", recorder.run());
   tasks.spawn("checkpoints", recorder.run_checkpoints());
   tasks.spawn("certifier", certifier.run());
+  tasks.spawn("disk watch", disk_watch.run());
+  tasks.spawn("backups", backups.run());
+  tasks.spawn("retention", retention.run());
 }
 
 void RecordingParts::close() {
+  backups.close();
   reader.close();
   recorder.close();
   if (!runs.any_open()) return;

@@ -8,11 +8,15 @@
 #include <boost/asio/io_context.hpp>
 #include <filesystem>
 
+#include "server/config.hpp"
+#include "server/recording/backup.hpp"
 #include "server/recording/certifier.hpp"
 #include "server/recording/database_reader.hpp"
+#include "server/recording/disk_watch.hpp"
 #include "server/recording/history.hpp"
 #include "server/recording/markers.hpp"
 #include "server/recording/recorder.hpp"
+#include "server/recording/retention.hpp"
 #include "server/recording/runs.hpp"
 #include "server/station/station.hpp"
 #include "server/tasks.hpp"
@@ -21,7 +25,7 @@ namespace server {
 
 struct RecordingParts {
   RecordingParts(boost::asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                 WorkerThread& checkpoints, const RecorderOptions& options);
+                 WorkerThread& checkpoints, const RecorderOptions& options, const RecordingConfig& config = {});
 
   // The station is heard from now on, and hears what has become durable and what is missing.
   void connect(Station& station);
@@ -43,6 +47,9 @@ struct RecordingParts {
   Runs runs;
   Markers markers;
   History history;
+  DiskWatch disk_watch;
+  Backups backups;
+  Retention retention;
 
  private:
   std::filesystem::path path_;

@@ -63,6 +63,11 @@ TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
   EXPECT_EQ(from_file.limits.duty_min, defaults.limits.duty_min);
   EXPECT_EQ(from_file.limits.duty_max, defaults.limits.duty_max);
   EXPECT_EQ(from_file.limits.disturbance_max_m, defaults.limits.disturbance_max_m);
+  EXPECT_EQ(from_file.recording.retention_days, defaults.recording.retention_days);
+  EXPECT_EQ(from_file.recording.max_database_mb, defaults.recording.max_database_mb);
+  EXPECT_EQ(from_file.recording.low_space_mb, defaults.recording.low_space_mb);
+  EXPECT_EQ(from_file.recording.critical_space_mb, defaults.recording.critical_space_mb);
+  EXPECT_EQ(from_file.recording.backup_dir, defaults.recording.backup_dir);
   EXPECT_EQ(from_file.log_level, defaults.log_level);
 }
 
@@ -80,7 +85,7 @@ TEST_F(ConfigTest, TheDocumentedFileNamesEveryOption) {
     EXPECT_THAT(documented.str(), HasSubstr("[" + option.substr(0, dot) + "]"));
     EXPECT_THAT(documented.str(), HasSubstr("\n" + option.substr(dot + 1) + " = "));
   }
-  EXPECT_GE(count, 14);
+  EXPECT_GE(count, 19);
 }
 
 TEST_F(ConfigTest, FlagsGoBeforeTheFileAndMakeAPortBinding) {
@@ -100,6 +105,8 @@ TEST_F(ConfigTest, MistakesNameFileLineOptionAndRemedy) {
   EXPECT_THAT(mistake("[robots]\nenrol_on_loopback = 1\n"), HasSubstr("must be true or false"));
   EXPECT_THAT(mistake("[limits]\nduty_max = nan\n"), HasSubstr("is outside 0 to 1"));
   EXPECT_THAT(mistake("[limits]\nsetpoint_min_m = 2.0\n"), HasSubstr("must be below"));
+  EXPECT_THAT(mistake("[recording]\nretention_days = -1\n"), HasSubstr("retention_days = -1 is outside 0 to 36500"));
+  EXPECT_THAT(mistake("[recording]\ncritical_space_mb = 3000\n"), HasSubstr("must be at most recording.low_space_mb"));
   EXPECT_THAT(mistake("[http]\nlisten = \"here\"\n"), HasSubstr("'here' is not ADDR:PORT"));
   EXPECT_THAT(mistake("[http]\nhosts = [1]\n"), HasSubstr("must be an array of texts"));
   EXPECT_THAT(mistake("[http\n"), HasSubstr("station.toml:1:"));

@@ -29,6 +29,7 @@ class VirtualClock final : public Clock {
 
   // Time stands still while this worker has a job.
   void add_worker(const WorkerThread& worker) { workers_.push_back(&worker); }
+  void remove_worker(const WorkerThread& worker) { std::erase(workers_, &worker); }
 
   // Moves UTC, and only UTC, as when somebody sets the machine's clock.
   void step_utc(microseconds by) { utc_offset_us_ += by.count(); }

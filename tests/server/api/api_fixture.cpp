@@ -34,6 +34,7 @@ ApiTest::ApiTest() {
   clock.add_worker(readers);
   clock.add_worker(checkpoints);
   clock.add_worker(maths);
+  clock.add_worker(recording.backups.checker());
   recording.connect(station);
   station.add_sink(live);
   bool started = false;

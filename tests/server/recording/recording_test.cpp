@@ -38,10 +38,11 @@ RecordingTest::~RecordingTest() {
   std::filesystem::remove_all(folder_);
 }
 
-void RecordingTest::start(RecorderOptions options) {
+void RecordingTest::start(RecorderOptions options, const RecordingConfig& config) {
   options.path = path_;
   tasks_ = std::make_unique<TaskGroup>(loop_);
-  recording_ = std::make_unique<RecordingParts>(loop_, clock_, disk_, readers_, checkpoints_, options);
+  recording_ = std::make_unique<RecordingParts>(loop_, clock_, disk_, readers_, checkpoints_, options, config);
+  clock_.add_worker(recording_->backups.checker());
   recorder_ = &recording_->recorder;
   runs_ = &recording_->runs;
   history_ = &recording_->history;
@@ -70,6 +71,7 @@ void RecordingTest::stop() {
 void RecordingTest::kill() {
   if (tasks_) tasks_->stop();
   clock_.settle();
+  if (recording_) clock_.remove_worker(recording_->backups.checker());
   recorder_ = nullptr;
   runs_ = nullptr;
   history_ = nullptr;

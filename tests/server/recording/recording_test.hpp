@@ -65,7 +65,7 @@ class RecordingTest : public ::testing::Test {
   using Run = server::Run;  // and not testing::Test's
 
   // A station begins on this folder: opens the database, loads the runs, records.
-  void start(RecorderOptions options = {});
+  void start(RecorderOptions options = {}, const RecordingConfig& config = {});
   // SIGTERM: everything heard is on disk afterwards.
   void stop();
   // kill -9: what was not committed is gone.

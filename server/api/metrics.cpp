@@ -1,0 +1,55 @@
+// One line of text a figure; no figure has labels, so there is nothing to quote.
+#include "server/api/metrics.hpp"
+
+#include <fmt/format.h>
+
+#include <iterator>
+#include <string_view>
+
+namespace server {
+namespace {
+
+class Metrics {
+ public:
+  void counter(std::string_view name, std::uint64_t value, std::string_view meaning) {
+    add(name, "counter", fmt::to_string(value), meaning);
+  }
+  void gauge(std::string_view name, std::uint64_t value, std::string_view meaning) {
+    add(name, "gauge", fmt::to_string(value), meaning);
+  }
+  std::string text() && { return std::move(text_); }
+
+ private:
+  void add(std::string_view name, const char* type, const std::string& value, std::string_view meaning) {
+    fmt::format_to(std::back_inserter(text_), "# HELP rheonaut_{0} {1}\n# TYPE rheonaut_{0} {2}\nrheonaut_{0} {3}\n",
+                   name, meaning, type, value);
+  }
+  std::string text_;
+};
+
+}  // namespace
+
+std::string metrics_text(const RecordingParts& recording) {
+  const RecorderCounters& counters = recording.recorder.counters();
+  const DiskUse& use = recording.disk_watch.use();
+  const RetentionCounters& retention = recording.retention.counters();
+  Metrics metrics;
+  metrics.gauge("recording_failing", recording.recorder.failing() ? 1 : 0, "1 while nothing becomes durable.");
+  metrics.gauge("space_state", static_cast<std::uint64_t>(recording.disk_watch.state()), "0 ok, 1 low, 2 critical.");
+  metrics.gauge("queued_samples", recording.recorder.queued_samples(), "Received and not durable yet.");
+  metrics.gauge("free_bytes", use.free_bytes, "On the disk of the database.");
+  metrics.gauge("database_bytes", use.database_bytes, "Of the database file.");
+  metrics.gauge("wal_bytes", use.wal_bytes, "Of the write-ahead log file.");
+  metrics.counter("samples_written_total", counters.samples_written, "Samples that became durable.");
+  metrics.counter("samples_duplicate_total", counters.samples_duplicate, "Samples that were received again.");
+  metrics.counter("samples_refused_total", counters.samples_refused, "Samples that the full queue did not take.");
+  metrics.counter("samples_lost_total", counters.samples_lost, "Samples in gaps that were noted.");
+  metrics.counter("samples_purged_total", retention.samples_purged, "Samples that retention removed.");
+  metrics.counter("records_refused_total", counters.records_refused, "Events and commands not recorded.");
+  metrics.counter("batches_malformed_total", counters.batches_malformed, "Frames of samples that cannot be.");
+  metrics.counter("commits_total", counters.commits, "Commits.");
+  metrics.counter("commits_failed_total", counters.commits_failed, "Commits that failed and were tried again.");
+  return std::move(metrics).text();
+}
+
+}  // namespace server

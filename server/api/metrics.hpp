@@ -1,0 +1,16 @@
+// The recording's figures as Prometheus reads them: text format 0.0.4.
+//
+//   # HELP rheonaut_samples_written_total Samples that are durable.
+//   # TYPE rheonaut_samples_written_total counter
+//   rheonaut_samples_written_total 4711
+#pragma once
+
+#include <string>
+
+#include "server/recording/recording_parts.hpp"
+
+namespace server {
+
+std::string metrics_text(const RecordingParts& recording);
+
+}  // namespace server

@@ -1,0 +1,23 @@
+// `rheonaut backup`: a verified copy of a station's database, also while the station runs.
+#pragma once
+
+#include <filesystem>
+#include <iosfwd>
+
+namespace CLI {
+class App;
+}
+
+namespace server::cli {
+
+struct Backup {
+  std::filesystem::path data_dir = "rheonaut-data";
+  std::filesystem::path to;
+};
+
+void add_options(CLI::App& command, Backup& wish);
+
+// Never replaces a file. Throws std::runtime_error saying why there is no backup.
+int run(const Backup& wish, std::ostream& out);
+
+}  // namespace server::cli

@@ -1,0 +1,23 @@
+// `rheonaut restore`: a backup becomes the database of a data folder that has none.
+#pragma once
+
+#include <filesystem>
+#include <iosfwd>
+
+namespace CLI {
+class App;
+}
+
+namespace server::cli {
+
+struct Restore {
+  std::filesystem::path from;
+  std::filesystem::path data_dir = "rheonaut-data";
+};
+
+void add_options(CLI::App& command, Restore& wish);
+
+// Never replaces a database. Throws std::runtime_error saying why nothing was restored.
+int run(const Restore& wish, std::ostream& out);
+
+}  // namespace server::cli

@@ -1,0 +1,30 @@
+// Asks the station that runs in a data folder, over loopback and with its own token: for tools that must not write into
+// the database themselves.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace server::cli {
+
+struct StationAnswer {
+  int status = 0;
+  nlohmann::json body;  // of an error: problem details
+};
+
+class StationClient {
+ public:
+  // Reads endpoints.json and rheonaut.token. Throws std::runtime_error when either is not there.
+  explicit StationClient(const std::filesystem::path& data_dir);
+
+  // One connection a request. Throws std::runtime_error when nobody answers in JSON.
+  StationAnswer ask(const std::string& method, const std::string& target, const nlohmann::json& body = nullptr) const;
+
+ private:
+  boost::asio::ip::tcp::endpoint endpoint_;
+  std::string token_;
+};
+
+}  // namespace server::cli

@@ -1,0 +1,27 @@
+// A file that others may use becomes visible whole or not at all, and stays after a power cut.
+#pragma once
+
+#include <filesystem>
+
+namespace server {
+
+// Syncs the file `part`, renames it to `path`, and syncs the folder. Throws std::system_error.
+void finish_file(const std::filesystem::path& part, const std::filesystem::path& path);
+
+// Removes a database that is not complete, with what SQLite has put beside it.
+void remove_draft(const std::filesystem::path& part);
+
+// The same at the end of a scope, and before: whatever happens, nothing is left of it.
+class Draft {
+ public:
+  explicit Draft(std::filesystem::path path) : path_{std::move(path)} { remove_draft(path_); }
+  ~Draft() { remove_draft(path_); }
+  Draft(const Draft&) = delete;
+  Draft& operator=(const Draft&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace server

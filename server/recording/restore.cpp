@@ -1,0 +1,106 @@
+// Copy, verify, mark, rename.
+#include "server/recording/restore.hpp"
+
+#include <fmt/format.h>
+#include <sodium.h>
+
+#include <stdexcept>
+
+#include "server/recording/backup_copy.hpp"
+#include "server/recording/database.hpp"
+#include "server/recording/file_check.hpp"
+#include "server/recording/finished_file.hpp"
+#include "server/recording/schema.hpp"
+#include "server/recording/statement.hpp"
+
+namespace server {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kPagesAtOnce = 4096;
+
+// A span ends with the last of its samples that the backup has; one that has none goes.
+constexpr const char* kCloseSpans = R"sql(
+UPDATE run_span SET last_seq = (
+  SELECT max(last_seq) FROM (
+    SELECT max(last_seq) AS last_seq FROM segment WHERE segment.boot_key = run_span.boot_key
+    UNION ALL SELECT max(last_seq) FROM gap WHERE gap.boot_key = run_span.boot_key))
+WHERE last_seq IS NULL AND EXISTS (
+  SELECT 1 FROM segment WHERE segment.boot_key = run_span.boot_key AND segment.last_seq >= run_span.first_seq
+  UNION ALL SELECT 1 FROM gap WHERE gap.boot_key = run_span.boot_key AND gap.last_seq >= run_span.first_seq);
+DELETE FROM run_span WHERE last_seq IS NULL;
+)sql";
+
+// A run ends when its last sample had arrived.
+constexpr const char* kInterruptRuns = R"sql(
+UPDATE run SET state = 'interrupted', ended_at_us = max(started_at_us, coalesce((
+  SELECT segment.received_at_us FROM run_span JOIN segment ON segment.boot_key = run_span.boot_key
+    AND segment.first_seq >= run_span.first_seq - 99 AND segment.first_seq <= run_span.last_seq
+  WHERE run_span.run_id = run.run_id ORDER BY run_span.span DESC, segment.first_seq DESC LIMIT 1), 0))
+WHERE ended_at_us IS NULL
+)sql";
+
+[[noreturn]] void refuse(const fs::path& from, const std::string& why) {
+  throw std::runtime_error{fmt::format("cannot restore from '{}': {}; nothing was restored", from.string(), why)};
+}
+
+void check(const fs::path& from, const fs::path& to) {
+  if (!fs::is_regular_file(from)) refuse(from, "there is no such file");
+  for (const char* suffix : {"", "-wal", "-journal"}) {
+    const fs::path existing = fs::path{to}.concat(suffix);
+    if (!fs::exists(existing)) continue;
+    refuse(from, fmt::format("'{}' is there; move it away, or choose another folder with --data", existing.string()));
+  }
+  if (fs::file_size(from) == 0) refuse(from, "it is empty");
+  if (const auto problem = file_problem(from)) refuse(from, *problem);
+}
+
+void copy_database(const fs::path& from, const fs::path& to) {
+  SQLite::Database source{from.string(), SQLite::OPEN_READONLY};
+  BackupCopy copy{source, to};
+  while (!copy.step(kPagesAtOnce)) continue;
+}
+
+RestoredStore mark(Database& database, std::int64_t utc_us) {
+  RestoredStore restored;
+  SQLite::Database& handle = database.handle();
+  SQLite::Transaction transaction{handle, SQLite::TransactionBehavior::IMMEDIATE};
+  handle.exec(kCloseSpans);
+  restored.runs_interrupted = handle.exec(kInterruptRuns);
+  randombytes_buf(&restored.store_id, sizeof restored.store_id);
+  SQLite::Statement set{handle, "INSERT OR REPLACE INTO meta (name, value) VALUES (?, ?)"};
+  execute(set, "store_id", restored.store_id);
+  execute(set, "restored_at_us", utc_us);
+  transaction.commit();
+  restored.runs = handle.execAndGet("SELECT count(*) FROM run").getInt64();
+  restored.samples = handle.execAndGet("SELECT coalesce(sum(last_seq - first_seq + 1), 0) FROM segment").getInt64();
+  return restored;
+}
+
+}  // namespace
+
+RestoredStore restore_database(const fs::path& from, const fs::path& folder, std::int64_t utc_us) {
+  const fs::path to = folder / "station.sqlite";
+  check(from, to);
+  const Draft draft{folder / "station.sqlite.part"};
+  RestoredStore restored;
+  try {
+    copy_database(from, draft.path());
+    SQLite::Database written{draft.path().string(), SQLite::OPEN_READWRITE};
+    if (written.execAndGet("PRAGMA application_id").getInt64() != kApplicationId) refuse(from, "it is not a backup");
+    const std::string damage = find_damage(written);
+    if (!damage.empty()) refuse(from, "it is damaged: " + damage);
+  } catch (const SQLite::Exception& error) {
+    refuse(from, fmt::format("SQLite says '{}'", error.what()));
+  }
+  {
+    Database database{draft.path()};
+    restored = mark(database, utc_us);
+    database.checkpoint();
+  }
+  finish_file(draft.path(), to);
+  return restored;
+}
+
+}  // namespace server

@@ -1,0 +1,115 @@
+// The recording's health, its figures and backups through the routes.
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <gmock/gmock.h>
+
+#include "tests/server/api/api_fixture.hpp"
+
+namespace server {
+namespace {
+
+using ::testing::HasSubstr;
+
+class RecordingRoutesTest : public ApiTest {
+ protected:
+  void set_free_bytes(std::uint64_t bytes) {
+    recording.disk_watch.set_free_bytes([bytes](const std::filesystem::path&) { return bytes; });
+    clock.run_for(6s);
+  }
+  json backup(const std::string& name) {
+    for (const json& listed : ask("GET", "/api/v1/backups").parsed()["backups"]) {
+      if (listed["name"] == name) return listed;
+    }
+    return {};
+  }
+};
+
+TEST_F(RecordingRoutesTest, TellsWhatWasRecordedAndHowMuchRoomThereIs) {
+  set_free_bytes(50'000'000'000);
+  connect_robot();
+  make_samples(*robot, 0, 20);
+  clock.run_for(2s);
+  const json health = ask("GET", "/api/v1/recording").parsed();
+  EXPECT_EQ(health["state"], "recording");
+  EXPECT_EQ(health["problem"], nullptr);
+  EXPECT_EQ(health["space"], "ok");
+  EXPECT_EQ(health["free_bytes"], 50'000'000'000);
+  EXPECT_EQ(health["queued_samples"], 0);
+  EXPECT_EQ(health["counters"]["samples_written"], 20);
+  EXPECT_EQ(health["retention"]["retention_days"], 0);
+  EXPECT_EQ(health["retention"]["all_held"], false);
+}
+
+TEST_F(RecordingRoutesTest, WithoutRoomNoRunBeginsAndCommandsLive) {
+  set_free_bytes(1'000'000);
+  connect_robot();
+  const json health = ask("GET", "/api/v1/recording").parsed();
+  EXPECT_EQ(health["state"], "low_space");
+  EXPECT_EQ(health["space"], "critical");
+  EXPECT_THAT(health["problem"].get<std::string>(), HasSubstr("1 MB are free"));
+  const Answered run = ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "no"}});
+  EXPECT_EQ(run.status, 503);
+  EXPECT_EQ(run.parsed()["reason"], "low_space");
+  const Answered copy = ask("POST", "/api/v1/backups", {{"name", "no"}});
+  EXPECT_EQ(copy.status, 503);
+  EXPECT_EQ(copy.parsed()["reason"], "low_space");
+  const auto stop = begin("POST", "/api/v1/robots/r1/emergency-stop");
+  ASSERT_EQ(robot->commands().size(), 1U);
+  robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_ACCEPTED, 99);
+  EXPECT_EQ(end(stop).status, 200);
+
+  set_free_bytes(50'000'000'000);
+  EXPECT_EQ(ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "yes"}}).status, 201);
+}
+
+TEST_F(RecordingRoutesTest, ALockedDatabaseIsFailingUntilItIsFree) {
+  set_free_bytes(50'000'000'000);
+  connect_robot();
+  SQLite::Database foreign{(folder.path() / "station.sqlite").string(), SQLite::OPEN_READWRITE};
+  foreign.exec("BEGIN IMMEDIATE");
+  make_samples(*robot, 0, 20);
+  clock.run_for(2s);
+  const json health = ask("GET", "/api/v1/recording").parsed();
+  EXPECT_EQ(health["state"], "failing");
+  EXPECT_THAT(health["problem"].get<std::string>(), HasSubstr("database is locked"));
+  EXPECT_EQ(health["queued_samples"], 20);
+  EXPECT_THAT(ask("GET", "/metrics").body, HasSubstr("\nrheonaut_recording_failing 1\n"));
+  foreign.exec("ROLLBACK");
+  clock.run_for(3s);
+  EXPECT_EQ(ask("GET", "/api/v1/recording").parsed()["state"], "recording");
+}
+
+TEST_F(RecordingRoutesTest, MetricsAreTextWithHelpAndTypeAndNeedACredential) {
+  connect_robot();
+  make_samples(*robot, 0, 20);
+  clock.run_for(2s);
+  const Answered metrics = ask("GET", "/metrics");
+  EXPECT_EQ(metrics.response.content_type, "text/plain; version=0.0.4");
+  EXPECT_THAT(metrics.body, HasSubstr("# TYPE rheonaut_samples_written_total counter\n"
+                                      "rheonaut_samples_written_total 20\n"));
+  EXPECT_THAT(metrics.body, HasSubstr("# HELP rheonaut_free_bytes "));
+
+  RawClient stranger{clock, api->port()};
+  stranger.send("GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_THAT(stranger.read_until("\r\n"), HasSubstr("401"));
+}
+
+TEST_F(RecordingRoutesTest, ABackupIsBegunListedAndDone) {
+  set_free_bytes(50'000'000'000);
+  connect_robot();
+  make_samples(*robot, 0, 20);
+  const Answered begun = ask("POST", "/api/v1/backups", {{"name", "monday"}});
+  ASSERT_EQ(begun.status, 202) << begun.body;
+  EXPECT_EQ(begun.parsed()["state"], "copying");
+  EXPECT_TRUE(clock.run_until([&] { return !recording.backups.busy(); }, 60s));
+  const json made = backup("monday");
+  EXPECT_EQ(made["state"], "done") << made;
+  EXPECT_EQ(made["problem"], nullptr);
+  EXPECT_EQ(made["pages_done"], made["pages_total"]);
+  EXPECT_TRUE(std::filesystem::exists(made["path"].get<std::string>()));
+  EXPECT_EQ(ask("POST", "/api/v1/backups", {{"name", "monday"}}).status, 409);
+  EXPECT_EQ(ask("POST", "/api/v1/backups", {{"name", "../monday"}}).status, 422);
+  EXPECT_EQ(ask("POST", "/api/v1/backups", {{"path", "/tmp/x"}}).status, 400);
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,167 @@
+// What is not ours, or not whole, is told from its bytes and stays as it is; damage at run time says what to do.
+#include "server/recording/file_check.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "tests/server/recording/recording_test.hpp"
+
+namespace server {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class FileCheckTest : public RecordingTest {
+ protected:
+  static std::string content(const fs::path& path) {
+    std::ostringstream bytes;
+    bytes << std::ifstream{path, std::ios::binary}.rdbuf();
+    return bytes.str();
+  }
+  static fs::path beside(const fs::path& path, const char* suffix) { return fs::path{path}.concat(suffix); }
+
+  std::string refusal() {
+    try {
+      const Database database{path_};
+      return "(it was opened)";
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+  }
+
+  // What a crash leaves: the files as they are now, without the process that works on them.
+  void leave_at(const fs::path& from, const fs::path& to) {
+    for (const char* suffix : {"", "-journal", "-wal"}) {
+      fs::remove(beside(to, suffix));
+      if (fs::exists(beside(from, suffix))) fs::copy_file(beside(from, suffix), beside(to, suffix));
+    }
+  }
+
+  void overwrite(std::size_t offset, const std::string& bytes) {
+    std::fstream file{path_, std::ios::binary | std::ios::in | std::ios::out};
+    file.seekp(static_cast<std::streamoff>(offset));
+    file << bytes;
+  }
+
+  const fs::path theirs_ = folder_ / "theirs.sqlite";
+};
+
+TEST_F(FileCheckTest, AForeignFileWithAHotJournalStaysByteForByte) {
+  {
+    SQLite::Database theirs{theirs_.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE};
+    theirs.exec("PRAGMA cache_size = 5; CREATE TABLE theirs (x)");
+    theirs.exec(
+        "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 2000)"
+        " INSERT INTO theirs SELECT randomblob(100) FROM n");
+    theirs.exec("BEGIN; UPDATE theirs SET x = randomblob(100)");  // more than the cache: pages and journal are written
+    leave_at(theirs_, path_);
+    theirs.exec("ROLLBACK");
+  }
+  const std::string file = content(path_);
+  const std::string journal = content(beside(path_, "-journal"));
+  ASSERT_GT(journal.size(), 10'000U);
+  EXPECT_THAT(refusal(), HasSubstr("belongs to another program"));
+  EXPECT_EQ(content(path_), file);
+  EXPECT_EQ(content(beside(path_, "-journal")), journal);
+
+  // Whoever lets SQLite look first changes it.
+  SQLite::Database{path_.string(), SQLite::OPEN_READWRITE}.execAndGet("SELECT count(*) FROM theirs");
+  EXPECT_NE(content(path_), file);
+}
+
+TEST_F(FileCheckTest, AForeignFileWhoseTablesAreInItsLogStaysByteForByte) {
+  {
+    SQLite::Database theirs{theirs_.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE};
+    theirs.exec("PRAGMA journal_mode = WAL; CREATE TABLE theirs (x); INSERT INTO theirs VALUES (1)");
+    leave_at(theirs_, path_);
+  }
+  const std::string file = content(path_);
+  const std::string log = content(beside(path_, "-wal"));
+  ASSERT_GT(log.size(), 4096U);
+  EXPECT_FALSE(file_problem(path_).has_value()) << "it looks blank: SQLite has to tell";
+  EXPECT_THAT(refusal(), HasSubstr("belongs to another program"));
+  EXPECT_EQ(content(path_), file);
+  EXPECT_EQ(content(beside(path_, "-wal")), log);
+}
+
+TEST_F(FileCheckTest, AnEmptyFileWithSomebodysJournalIsRefused) {
+  std::ofstream{path_}.flush();
+  std::ofstream{beside(path_, "-journal"), std::ios::binary}
+      << std::string{"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7\xff\xff\xff\xff\0\0\0\1\0\0\0\2\0\0\2\0\0\0\x10\0", 28};
+  EXPECT_THAT(refusal(), HasSubstr("a journal beside it is not ours"));
+}
+
+TEST_F(FileCheckTest, OurOwnFileWhoseTablesAreInItsLogIsOpened) {
+  std::uint64_t store_id = 0;
+  {
+    const Database database{theirs_};
+    store_id = database.store_id();
+    leave_at(theirs_, path_);
+  }
+  ASSERT_GT(content(beside(path_, "-wal")).size(), 4096U);
+  EXPECT_EQ(Database{path_}.store_id(), store_id);
+}
+
+TEST_F(FileCheckTest, ATruncatedFileIsRefused) {
+  {
+    const Database database{path_};
+  }
+  fs::resize_file(path_, fs::file_size(path_) - 4096);
+  const std::string file = content(path_);
+  EXPECT_THAT(refusal(), HasSubstr("it is truncated"));
+  EXPECT_EQ(content(path_), file);
+  fs::resize_file(path_, 50);
+  EXPECT_THAT(refusal(), HasSubstr("it is truncated: 50 bytes are there"));
+}
+
+TEST_F(FileCheckTest, AHeaderWithoutAPageSizeIsDamaged) {
+  {
+    const Database database{path_};
+  }
+  overwrite(16, std::string{"\x0f\xff", 2});
+  EXPECT_THAT(refusal(), HasSubstr("its header is damaged; stop the station, run rheonaut verify, restore a backup"));
+}
+
+TEST_F(FileCheckTest, FindsADamagedPageAndARowWithoutItsOther) {
+  {
+    Database database{path_};
+    EXPECT_EQ(find_damage(database.handle()), "");
+    database.handle().exec("PRAGMA foreign_keys = OFF; INSERT INTO gap VALUES (77, 0, 1, 'reboot', 0)");
+    EXPECT_EQ(find_damage(database.handle()), "a row of gap refers to a row of boot that is not there");
+  }
+  const std::int64_t page = number("SELECT rootpage FROM sqlite_master WHERE name = 'event'");
+  overwrite(static_cast<std::size_t>((page - 1) * 4096), std::string(100, '\xff'));
+  Database database{path_};
+  EXPECT_NE(find_damage(database.handle()), "");
+}
+
+TEST_F(FileCheckTest, DamageAtRunTimeSaysWhatToDoAndDoesNotAskForRoom) {
+  {
+    const Database database{path_};
+  }
+  const std::int64_t page = number("SELECT rootpage FROM sqlite_master WHERE name = 'sample'");
+  overwrite(static_cast<std::size_t>((page - 1) * 4096), std::string(100, '\xff'));
+  start();
+  TestRobot robot;
+  connect(robot);
+  make(robot, 200);
+  clock_.run_for(3s);
+  EXPECT_TRUE(recorder_->failing());
+  EXPECT_THAT(recorder_->problem(), HasSubstr("it is damaged"));
+  EXPECT_THAT(recorder_->problem(), HasSubstr("stop the station, run rheonaut verify, restore a backup"));
+  EXPECT_THAT(recorder_->problem(), ::testing::Not(HasSubstr("Make room")));
+  EXPECT_EQ(durable_next_seq_, 0U);
+}
+
+TEST_F(FileCheckTest, AFullDiskAsksForRoom) {
+  const SQLite::Exception full{"database or disk is full", SQLITE_FULL};
+  EXPECT_THAT(write_problem(full), HasSubstr("Make room on the disk"));
+  EXPECT_FALSE(means_damage(full));
+}
+
+}  // namespace
+}  // namespace server

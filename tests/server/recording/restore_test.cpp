@@ -1,0 +1,136 @@
+// A backup becomes a station's database again: verified, marked as another store, with no run left open.
+#include "server/recording/restore.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "server/recording/schema.hpp"
+#include "tests/server/recording/recording_test.hpp"
+#include "tests/server/recording/stored_runs.hpp"
+
+namespace server {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class RestoreTest : public RecordingTest {
+ protected:
+  RestoreTest() { fs::create_directories(new_folder_); }
+
+  // 1000 samples, a run that ended and one that is open; the backup is `from_`.
+  void record_and_back_up() {
+    start();
+    connect(robot_);
+    const RunId run = wait(runs_->create(robot_.id, named("ended")))->id;
+    make(robot_, 400);
+    EXPECT_TRUE(wait(runs_->end(run, "good")));
+    EXPECT_TRUE(wait(runs_->create(robot_.id, named("open"))));
+    make(robot_, 600);
+    flush();
+    EXPECT_TRUE(wait(recording_->backups.begin("b")));
+    EXPECT_TRUE(clock_.run_until([&] { return !recording_->backups.busy(); }, 60s));
+    store_id_ = restored_.store_id;
+    stop();
+  }
+
+  std::string refusal(const fs::path& from) {
+    try {
+      restore_database(from, new_folder_, clock_.utc_us());
+      return "(it was restored)";
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+  }
+
+  void use_restored() { path_ = new_folder_ / "station.sqlite"; }
+
+  TestRobot robot_;
+  std::uint64_t store_id_ = 0;
+  const fs::path from_ = folder_ / "backups" / "b.sqlite";
+  const fs::path new_folder_ = folder_ / "new";
+};
+
+TEST_F(RestoreTest, GivesTheSameRecordingUnderANewStoreId) {
+  record_and_back_up();
+  const RestoredStore restored = restore_database(from_, new_folder_, 1234);
+  EXPECT_EQ(restored.runs, 2);
+  EXPECT_EQ(restored.samples, 1000);
+  EXPECT_NE(restored.store_id, store_id_);
+  use_restored();
+  EXPECT_EQ(std::distance(fs::directory_iterator{new_folder_}, {}), 1) << "nothing beside the database";
+  EXPECT_EQ(rows("PRAGMA integrity_check"), std::vector<std::string>{"ok"});
+  EXPECT_EQ(number("SELECT value FROM meta WHERE name = 'restored_at_us'"), 1234);
+  EXPECT_EQ(rows("SELECT seq, position_m FROM run_sample WHERE run_id = 1 AND seq IN (0, 399)"),
+            (std::vector<std::string>{"0|0.0", "399|0.398999989032745"}));
+  EXPECT_EQ(fs::status(path_).permissions() & fs::perms::all, fs::perms::owner_read | fs::perms::owner_write);
+}
+
+TEST_F(RestoreTest, RunsThatWereOpenAreInterruptedAtTheirLastSample) {
+  record_and_back_up();
+  EXPECT_EQ(restore_database(from_, new_folder_, 1234).runs_interrupted, 1);
+  use_restored();
+  EXPECT_EQ(rows("SELECT run_id, state, ended_at_us IS NULL, last_seq FROM run JOIN run_span USING (run_id)"),
+            (std::vector<std::string>{"1|ended|0|399", "2|interrupted|0|999"}));
+  EXPECT_EQ(number("SELECT ended_at_us FROM run WHERE run_id = 2"), number("SELECT max(received_at_us) FROM segment"));
+  EXPECT_EQ(number("SELECT count(*) FROM run_sample WHERE run_id = 2"), 600);
+}
+
+TEST_F(RestoreTest, ARobotGoesOnWithTheRestoredStation) {
+  record_and_back_up();
+  restore_database(from_, new_folder_, 1234);
+  use_restored();
+  start();
+  EXPECT_NE(restored_.store_id, store_id_);
+  EXPECT_EQ(admit(robot_).durable_next_seq, 1000U);
+  connect(robot_);
+  make(robot_, 100);
+  flush();
+  EXPECT_EQ(durable_next_seq_, 1100U);
+  EXPECT_TRUE(wait(runs_->create(robot_.id, named("after"))));
+}
+
+TEST_F(RestoreTest, RefusesWhereThereIsADatabase) {
+  record_and_back_up();
+  std::ofstream{new_folder_ / "station.sqlite"} << "precious";
+  EXPECT_THAT(refusal(from_), HasSubstr("station.sqlite' is there; move it away"));
+  std::ifstream in{new_folder_ / "station.sqlite"};
+  EXPECT_EQ((std::string{std::istreambuf_iterator<char>{in}, {}}), "precious");
+}
+
+TEST_F(RestoreTest, RefusesWhatIsNoBackupAndLeavesNothing) {
+  record_and_back_up();
+  EXPECT_THAT(refusal(folder_ / "no.sqlite"), HasSubstr("there is no such file"));
+  std::ofstream{folder_ / "empty.sqlite"}.flush();
+  EXPECT_THAT(refusal(folder_ / "empty.sqlite"), HasSubstr("it is empty"));
+  SQLite::Database{(folder_ / "theirs.sqlite").string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE}.exec(
+      "CREATE TABLE theirs (x)");
+  EXPECT_THAT(refusal(folder_ / "theirs.sqlite"), HasSubstr("belongs to another program"));
+  SQLite::Database{(folder_ / "blank.sqlite").string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE}.exec("VACUUM");
+  EXPECT_THAT(refusal(folder_ / "blank.sqlite"), HasSubstr("nothing was restored"));
+  EXPECT_TRUE(fs::is_empty(new_folder_));
+}
+
+TEST_F(RestoreTest, RefusesADamagedBackupAndLeavesNothing) {
+  record_and_back_up();
+  path_ = from_;
+  const std::int64_t page = number("SELECT rootpage FROM sqlite_master WHERE name = 'segment_by_seq'");
+  std::fstream file{from_, std::ios::binary | std::ios::in | std::ios::out};
+  file.seekp((page - 1) * 4096);
+  file << std::string(4096, '\xff');
+  file.close();
+  EXPECT_THAT(refusal(from_), HasSubstr("nothing was restored"));
+  EXPECT_TRUE(fs::is_empty(new_folder_));
+}
+
+TEST_F(RestoreTest, TakesADatabaseWhoseLogIsBesideIt) {
+  start();
+  connect(robot_);
+  make(robot_, 300);
+  flush();
+  EXPECT_EQ(restore_database(path_, new_folder_, 1234).samples, 300);
+}
+
+}  // namespace
+}  // namespace server

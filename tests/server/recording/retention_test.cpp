@@ -1,0 +1,311 @@
+// What is too old or too much goes, whole segments at a time; a run, and what is not durable, stays.
+#include "server/recording/retention.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include "tests/server/recording/recording_test.hpp"
+#include "tests/server/recording/stored_runs.hpp"
+
+namespace server {
+namespace {
+
+using ::testing::IsEmpty;
+constexpr microseconds kDay = 24h;
+using Rows = std::vector<std::string>;
+
+class RetentionTest : public RecordingTest {
+ protected:
+  void keep(std::uint32_t days, std::uint32_t megabytes = 0) {
+    start({}, {.retention_days = days,
+               .max_database_mb = megabytes,
+               .low_space_mb = 0,
+               .critical_space_mb = 0,
+               .backup_dir = {}});
+    connect(robot_);
+  }
+  // Samples that are on disk, and known to be.
+  void record(std::size_t count) {
+    make(robot_, count, 25);
+    flush();
+    settle_durable();
+  }
+  // The recorder notes how far a boot is durable.
+  void settle_durable() {
+    for (const auto& [boot_id, next_seq] : durable_next_seqs_) set_durable(boot_id, next_seq);
+  }
+  void set_durable(BootId boot_id, std::uint64_t next_seq) {
+    execute(fmt::format("UPDATE boot SET durable_next_seq = {} WHERE boot_id = {}", next_seq, signed_id_of(boot_id)));
+  }
+  void execute(const std::string& sql) {
+    wait(recorder_->on_disk([sql](Database& database) { return database.handle().exec(sql); }));
+  }
+  static std::int64_t signed_id_of(BootId boot_id) { return static_cast<std::int64_t>(boot_id); }
+  void pass() {
+    wait(recording_->retention.pass());
+    SQLite::Database database = open_for_reading(path_);
+    EXPECT_THAT(coverage_faults(database), IsEmpty());
+    EXPECT_EQ(rows("PRAGMA integrity_check"), Rows{"ok"});
+  }
+  std::map<std::int64_t, std::vector<std::string>> runs() {
+    SQLite::Database database = open_for_reading(path_);
+    return stored_runs(database);
+  }
+  Rows gaps() { return rows("SELECT first_seq, last_seq, cause FROM gap ORDER BY boot_key, first_seq"); }
+  std::int64_t samples() { return number("SELECT count(*) FROM sample"); }
+  const RetentionCounters& counters() const { return recording_->retention.counters(); }
+
+  TestRobot robot_;
+};
+
+TEST_F(RetentionTest, RemovesWhatIsOldAndListsItAsAGap) {
+  keep(7);
+  record(1000);
+  clock_.step_utc(8 * kDay);
+  record(500);
+  pass();
+  EXPECT_EQ(gaps(), Rows{"0|999|retention"});
+  EXPECT_EQ(samples(), 500);
+  EXPECT_EQ(counters().samples_purged, 1000U);
+  EXPECT_NEAR(static_cast<double>(number("SELECT noticed_at_us FROM gap")), static_cast<double>(clock_.utc_us()), 1e6);
+  EXPECT_EQ(recorder_->counters().samples_lost, 0U) << "what was removed was not lost";
+}
+
+TEST_F(RetentionTest, WithoutAPolicyEverythingStays) {
+  keep(0);
+  record(1000);
+  clock_.step_utc(10'000 * kDay);
+  pass();
+  EXPECT_EQ(samples(), 1000);
+}
+
+TEST_F(RetentionTest, WorksByItself) {
+  keep(7);
+  record(1000);
+  clock_.step_utc(8 * kDay);
+  record(500);
+  clock_.run_for(40s);
+  EXPECT_EQ(samples(), 500);
+}
+
+TEST_F(RetentionTest, ARunHoldsItsSamplesUntilItIsDiscarded) {
+  keep(7);
+  record(250);
+  const RunId run = wait(runs_->create(robot_.id, named("kept")))->id;
+  record(300);
+  ASSERT_TRUE(wait(runs_->end(run, "good")));
+  record(450);
+  clock_.step_utc(8 * kDay);
+  record(500);
+  const auto before = runs();
+  ASSERT_EQ(before.at(run).size(), 301U);
+  pass();
+  EXPECT_EQ(runs(), before);
+  EXPECT_EQ(gaps(), (Rows{"0|249|retention", "550|999|retention"}));
+
+  execute(fmt::format("UPDATE run SET state = 'discarded' WHERE run_id = {}", run));
+  pass();
+  EXPECT_EQ(gaps(), Rows{"0|999|retention"}) << "with its neighbours it is one gap";
+}
+
+TEST_F(RetentionTest, ASegmentThatARunHoldsInPartStaysWhole) {
+  keep(7);
+  record(1000);
+  clock_.step_utc(8 * kDay);
+  record(500);
+  execute(
+      "INSERT INTO run (robot_id, name, fluid, pump_profile, tube, operator_name, notes, verdict, firmware_version,"
+      " controller_id, controller_checksum, parameters_checksum, started_at_us, ended_at_us, state)"
+      " VALUES ('nemo', 'afterwards', '', '', '', '', '', '', '', 0, 0, 0, 0, 0, 'ended');"
+      "INSERT INTO run_span (run_id, span, boot_key, first_seq, last_seq) VALUES (1, 0, 1, 350, 420)");
+  pass();
+  EXPECT_EQ(gaps(), (Rows{"0|299|retention", "500|999|retention"}));
+  EXPECT_EQ(number("SELECT count(*) FROM run_sample WHERE run_id = 1"), 71);
+}
+
+TEST_F(RetentionTest, AnOpenRunHoldsEverythingFromItsFirstSampleOn) {
+  keep(7);
+  record(300);
+  ASSERT_TRUE(wait(runs_->create(robot_.id, named("open"))));
+  record(700);
+  clock_.step_utc(8 * kDay);
+  record(500);
+  pass();
+  EXPECT_EQ(gaps(), Rows{"0|299|retention"});
+}
+
+TEST_F(RetentionTest, NothingGoesThatIsNotDurableWithAllBeforeIt) {
+  keep(7);
+  record(1000);
+  set_durable(robot_.boot_id, 450);
+  clock_.step_utc(8 * kDay);
+  pass();
+  EXPECT_EQ(gaps(), Rows{"0|399|retention"});
+}
+
+TEST_F(RetentionTest, GapsOfOtherCausesKeepTheirRows) {
+  keep(7);
+  record(200);
+  robot_.next_seq = robot_.oldest_seq = 250;  // its ring lost 50
+  record(300);
+  clock_.step_utc(8 * kDay);
+  record(500);
+  pass();
+  EXPECT_EQ(gaps(), (Rows{"0|199|retention", "200|249|ring_overrun", "250|549|retention"}));
+}
+
+TEST_F(RetentionTest, StepsOfAnySizeRemoveTheSame) {
+  keep(7);
+  record(1000);
+  ASSERT_TRUE(wait(runs_->create(robot_.id, named("open"))));
+  SQLite::Database database = open_for_reading(path_);
+  const auto seqs = [&](std::size_t limit) {
+    std::vector<std::uint64_t> firsts;
+    PurgePosition position;
+    for (bool finished = false; !finished;) {
+      RetentionPlan plan{database};
+      for (const StoredSegment& segment : plan.next(position, clock_.utc_us() + 1, limit)) {
+        firsts.push_back(segment.samples.first);
+      }
+      finished = plan.finished();
+    }
+    return firsts;
+  };
+  EXPECT_EQ(seqs(1000).size(), 9U) << "the newest of a boot that goes on stays";
+  for (const std::size_t limit : {1U, 2U, 3U, 9U}) EXPECT_EQ(seqs(limit), seqs(1000)) << limit;
+}
+
+// A gap row stands for what was removed, so the boot reads the same to the robot.
+TEST_F(RetentionTest, ARobotThatComesBackAfterARestartIsToldWhatItWasToldBefore) {
+  keep(7);
+  record(1000);
+  clock_.step_utc(8 * kDay);
+  record(500);
+  pass();
+  ASSERT_EQ(durable_next_seq_, 1500U);
+  stop();
+  start();
+  robot_.oldest_seq = 1400;
+  EXPECT_EQ(admit(robot_).durable_next_seq, 1500U);
+  connect(robot_);
+  record(100);
+  clock_.run_for(5s);
+  EXPECT_EQ(durable_next_seq_, 1600U);
+  EXPECT_THAT(missing_, IsEmpty());
+  EXPECT_EQ(gaps(), Rows{"0|999|retention"});
+}
+
+TEST_F(RetentionTest, ABootThatHasEndedGoesToItsLastSample) {
+  keep(7);
+  record(1000);
+  disconnect(robot_);
+  robot_.boot_id += 1;
+  robot_.next_seq = 0;
+  connect(robot_);
+  record(100);
+  clock_.step_utc(8 * kDay);
+  pass();
+  EXPECT_EQ(gaps(), Rows{"0|999|retention"});
+  EXPECT_EQ(samples(), 100) << "the newest segment of the boot that goes on";
+}
+
+// SAFETY: a station that starts again must know that a robot is latched.
+TEST_F(RetentionTest, ALatchIsKnownAfterTheRestartAlsoWhenAllIsOld) {
+  keep(7);
+  robot_.context.emergency_id = 4711;
+  record(1000);
+  clock_.step_utc(8 * kDay);
+  pass();
+  ASSERT_EQ(samples(), 100);
+  stop();
+  start();
+  ASSERT_EQ(restored_.robots.size(), 1U);
+  EXPECT_EQ(restored_.robots.front().emergency_id, 4711U);
+}
+
+TEST_F(RetentionTest, ATooLargeDatabaseLosesItsOldestAndShrinks) {
+  keep(0, 2);
+  for (int hour = 0; hour < 10; ++hour) {
+    record(10'000);
+    clock_.step_utc(1h);
+  }
+  ASSERT_GT(number("PRAGMA page_count") * 4096, 2'500'000);
+  pass();
+  EXPECT_LE(number("PRAGMA page_count") * 4096, 2'000'000);
+  EXPECT_GT(samples(), 45'000) << "not more than needed";
+  EXPECT_THAT(gaps(), ::testing::SizeIs(1));
+  EXPECT_EQ(rows("SELECT first_seq FROM gap"), Rows{"0"});
+  EXPECT_GT(counters().pages_returned, 0U);
+  EXPECT_FALSE(counters().all_held);
+}
+
+TEST_F(RetentionTest, TheOlderSamplesGoWhoseverTheyAre) {
+  keep(0, 1);
+  TestRobot other;
+  other.id = "dory";
+  other.boot_id = 7;
+  connect(other);
+  make(other, 22'000, 25);
+  flush();
+  clock_.step_utc(5h);
+  record(22'000);
+  pass();
+  EXPECT_EQ(rows("SELECT robot_id, first_seq, cause FROM robot_gap"), Rows{"dory|0|retention"});
+}
+
+TEST_F(RetentionTest, WhatRunsHoldStaysAlsoWhenItIsTooMuch) {
+  keep(0, 1);
+  ASSERT_TRUE(wait(runs_->create(robot_.id, named("large"))));
+  record(40'000);
+  pass();
+  EXPECT_EQ(samples(), 40'000);
+  EXPECT_TRUE(counters().all_held);
+}
+
+TEST_F(RetentionTest, CommitsGoInBetween) {
+  keep(7);
+  record(200'000);
+  clock_.step_utc(8 * kDay);
+  tasks_->spawn("pass", recording_->retention.pass());
+  int commits = 0;
+  for (; counters().samples_purged < 199'000; ++commits) {
+    record(100);
+    ASSERT_EQ(durable_next_seq_, 200'000U + static_cast<std::uint64_t>(commits + 1) * 100);
+    clock_.run_for(5ms);
+    ASSERT_LT(commits, 100);
+  }
+  EXPECT_GT(commits, 3);
+  clock_.run_for(1s);
+  SQLite::Database database = open_for_reading(path_);
+  EXPECT_THAT(coverage_faults(database), IsEmpty());
+  EXPECT_EQ(gaps(), Rows{"0|199999|retention"});
+}
+
+TEST_F(RetentionTest, WhileTheDiskFailsNothingIsRemoved) {
+  keep(7);
+  record(1000);
+  clock_.step_utc(8 * kDay);
+  record(500);
+  SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE};
+  foreign.exec("BEGIN IMMEDIATE");
+  wait(recording_->retention.pass());
+  EXPECT_EQ(counters().samples_purged, 0U);
+  foreign.exec("ROLLBACK");
+  pass();
+  EXPECT_EQ(samples(), 500);
+}
+
+TEST(StepSize, IsHalvedWhenAStepTookLongAndDoubledWhenItWasShort) {
+  StepSize size{50, 120};
+  size.note(36'000);
+  EXPECT_EQ(size.value(), 25U);
+  size.note(20'000);
+  EXPECT_EQ(size.value(), 25U);
+  for (int i = 0; i < 5; ++i) size.note(1000);
+  EXPECT_EQ(size.value(), 120U);
+  for (int i = 0; i < 20; ++i) size.note(1'000'000);
+  EXPECT_EQ(size.value(), 1U);
+}
+
+}  // namespace
+}  // namespace server

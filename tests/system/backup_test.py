@@ -1,0 +1,97 @@
+"""A live station is backed up, the backup restored, and the robot goes on with the restored station."""
+import pathlib
+import sqlite3
+import subprocess
+import unittest
+
+from processes import BIN, lab, wait_until
+
+
+def tool(*arguments):
+    """(exit status, output, error) of `rheonaut` with these arguments."""
+    done = subprocess.run([str(BIN / "rheonaut"), *map(str, arguments)], capture_output=True, text=True, timeout=120)
+    return done.returncode, done.stdout, done.stderr
+
+
+def samples(database, run_id):
+    """What is read in place without a file made beside it."""
+    with sqlite3.connect(f"file:{database}?mode=ro", uri=True) as connection:
+        return connection.execute("SELECT boot_id, seq, position_m, utc_us FROM run_sample WHERE run_id = ?"
+                                  " ORDER BY span, seq", (run_id,)).fetchall()
+
+
+class BackupTest(unittest.TestCase):
+    def record_a_run(self, place, station):
+        place.start_robot(station)
+        station.wait_for_robot("sim-1")
+        run_id = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "kept"})["run_id"]
+        seen = station.robot("sim-1")["next_seq"]
+        wait_until(lambda: station.robot("sim-1")["next_seq"] > seen + 150, 30, "150 samples")
+        station.post(f"/api/v1/runs/{run_id}/end")
+        return run_id
+
+    def test_a_backup_of_a_live_station_becomes_a_station(self):
+        with lab() as place:
+            station = place.start_station()
+            run_id = self.record_a_run(place, station)
+            copy = place.folder / "copy.sqlite"
+            status, out, error = tool("backup", "--data", place.data, "--to", copy)
+            self.assertEqual((status, error), (0, ""))
+            self.assertIn("verified", out)
+            self.assertEqual(list((place.data / "backups").iterdir()), [], "it was moved")
+            recorded = samples(station.database, run_id)
+            self.assertGreater(len(recorded), 150)
+            self.assertEqual(samples(copy, run_id), recorded)
+            self.assertEqual([path.name for path in place.folder.glob("copy.*")], ["copy.sqlite"])
+
+            status, _, error = tool("restore", "--from", copy, "--data", place.data)
+            self.assertEqual(status, 1)
+            self.assertIn("a station runs in", error)
+            ports = station.endpoints
+            before = station.get("/api/v1/station")["store_id"]
+            self.assertEqual(place.stop_station(), 0)
+            status, _, error = tool("restore", "--from", copy, "--data", place.data)
+            self.assertEqual(status, 1)
+            self.assertIn("station.sqlite' is there", error)
+
+            place.data = place.folder / "restored"
+            status, out, error = tool("restore", "--from", copy, "--data", place.data)
+            self.assertEqual((status, error), (0, ""))
+            self.assertEqual(samples(place.data / "station.sqlite", run_id), recorded)
+            restored = place.start_station(http=ports["http"], robots=ports["robots"])
+            self.assertNotEqual(restored.get("/api/v1/station")["store_id"], before)
+            seen = restored.wait_for_robot("sim-1", timeout_s=60)["next_seq"]
+            wait_until(lambda: restored.robot("sim-1")["durable_next_seq"] > seen + 50, 30, "the robot goes on")
+            self.assertEqual(restored.get("/api/v1/recording")["state"], "recording")
+
+    def test_without_a_station_it_copies_by_itself(self):
+        with lab() as place:
+            station = place.start_station()
+            run_id = self.record_a_run(place, station)
+            recorded = samples(station.database, run_id)
+            place.kill_station()  # its log is still beside the database
+            copy = place.folder / "copy.sqlite"
+            self.assertEqual(tool("backup", "--data", place.data, "--to", copy)[0], 0)
+            self.assertEqual(samples(copy, run_id), recorded)
+            status, _, error = tool("backup", "--data", place.data, "--to", copy)
+            self.assertEqual(status, 1)
+            self.assertIn("is there already", error)
+            self.assertIn("there is no", tool("backup", "--data", place.folder / "none", "--to", copy)[2])
+            self.assertFalse(pathlib.Path(place.folder / "none").exists())
+
+    def test_a_damaged_backup_is_refused(self):
+        with lab() as place:
+            station = place.start_station()
+            self.record_a_run(place, station)
+            copy = place.folder / "copy.sqlite"
+            self.assertEqual(tool("backup", "--data", place.data, "--to", copy)[0], 0)
+            with open(copy, "r+b") as file:
+                file.truncate(copy.stat().st_size - 4096)
+            status, _, error = tool("restore", "--from", copy, "--data", place.folder / "new")
+            self.assertEqual(status, 1)
+            self.assertIn("truncated", error)
+            self.assertFalse((place.folder / "new" / "station.sqlite").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
