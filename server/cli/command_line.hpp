@@ -6,6 +6,7 @@
 
 #include "server/cli/bode.hpp"
 #include "server/cli/discretise.hpp"
+#include "server/cli/export.hpp"
 #include "server/cli/identify.hpp"
 #include "server/cli/model.hpp"
 #include "server/cli/predict.hpp"
@@ -28,7 +29,7 @@ struct Answered {
   int exit_code = 0;
 };
 
-using Wish = std::variant<Answered, Serve, CheckConfig, Model, Bode, Step, Identify, Tune, Discretise, Predict>;
+using Wish = std::variant<Answered, Serve, CheckConfig, Model, Bode, Step, Identify, Tune, Discretise, Predict, Export>;
 
 Wish parse_command_line(int argc, char** argv);
 

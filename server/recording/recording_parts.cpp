@@ -7,8 +7,12 @@ namespace server {
 namespace asio = boost::asio;
 
 RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                               const RecorderOptions& options)
-    : recorder{loop, clock, disk, options}, runs{clock, recorder}, history{options.path, recorder, readers} {}
+                               WorkerThread& exports_worker, const RecorderOptions& options)
+    : recorder{loop, clock, disk, options},
+      runs{clock, recorder},
+      history{options.path, recorder, readers},
+      exports{options.path, recorder, exports_worker},
+      path_{options.path} {}
 
 void RecordingParts::connect(Station& station) {
   station.add_sink(recorder);
@@ -19,6 +23,8 @@ void RecordingParts::connect(Station& station) {
 
 asio::awaitable<RestoredState> RecordingParts::open() {
   RestoredState restored = co_await recorder.open();
+  std::error_code ignored;
+  std::filesystem::remove_all(exports_folder(), ignored);  // what a crash left
   co_await runs.load();
   co_return restored;
 }

@@ -6,6 +6,7 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
+#include <filesystem>
 
 #include "server/recording/history.hpp"
 #include "server/recording/recorder.hpp"
@@ -17,7 +18,7 @@ namespace server {
 
 struct RecordingParts {
   RecordingParts(boost::asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                 const RecorderOptions& options);
+                 WorkerThread& exports_worker, const RecorderOptions& options);
 
   // The station is heard from now on, and hears what has become durable and what is missing.
   void connect(Station& station);
@@ -29,12 +30,19 @@ struct RecordingParts {
   // Starts the lasting tasks.
   void spawn(TaskGroup& tasks);
 
+  std::filesystem::path path() const { return path_; }                                      // of the database
+  std::filesystem::path exports_folder() const { return path_.parent_path() / "exports"; }  // empty after open()
+
   // Every sample that was received is on disk afterwards, or it is logged why not. Does not throw.
   void close();
 
   Recorder recorder;
   Runs runs;
   History history;
+  History exports;  // the same on a worker of its own, so that no page waits behind an export
+
+ private:
+  std::filesystem::path path_;
 };
 
 }  // namespace server

@@ -6,7 +6,11 @@
 // tools.
 #pragma once
 
+#include <SQLiteCpp/SQLiteCpp.h>
+
 #include <filesystem>
+#include <functional>
+#include <string>
 #include <vector>
 
 #include "server/recording/runs.hpp"
@@ -18,5 +22,13 @@ namespace server {
 // The samples in order of span and seq. not_found: no such file, no such run. invalid: not a station's database, or
 // more than limit samples.
 Result<std::vector<StoredSample>> read_run(const std::filesystem::path& database, RunId run, std::size_t limit);
+
+// Reads something else in the same way. `read` gets the handle and the database as a URI for ATTACH; it begins again
+// from nothing when a station has opened the database meanwhile. Its failure is returned.
+using ReadStore = std::function<Result<void>(SQLite::Database& database, const std::string& uri)>;
+Result<void> read_store(const std::filesystem::path& database, const ReadStore& read);
+
+// The path of a database as a URI that opens it for reading only; at rest: nobody writes.
+std::string reading_uri(const std::filesystem::path& path, bool at_rest);
 
 }  // namespace server

@@ -93,7 +93,7 @@ TEST_P(RecorderModelTest, StoresOrListsEverySampleExactlyOnce) {
     ASSERT_FLOAT_EQ(stored.sample.position_m, static_cast<float>(stored.seq) / 1000);
     ASSERT_EQ(stored.robot_time_us, robot.time_of(stored.seq));
   }
-  for (const Gap& gap : wait(history_->gaps(run)).value()) {
+  for (const Gap& gap : wait(history_->gaps(excerpt_of(run))).value().gaps) {
     for (std::uint64_t seq = gap.first_seq; seq <= gap.last_seq; ++seq) ++seen[gap.boot_id][seq];
   }
   EXPECT_EQ(seen[robot.boot_id].size(), robot.next_seq);

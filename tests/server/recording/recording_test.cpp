@@ -30,6 +30,7 @@ RecordingTest::RecordingTest() {
   path_ = folder_ / "station.sqlite";
   clock_.add_worker(disk_);
   clock_.add_worker(readers_);
+  clock_.add_worker(exports_worker_);
 }
 
 RecordingTest::~RecordingTest() {
@@ -40,7 +41,7 @@ RecordingTest::~RecordingTest() {
 void RecordingTest::start(RecorderOptions options) {
   options.path = path_;
   tasks_ = std::make_unique<TaskGroup>(loop_);
-  recording_ = std::make_unique<RecordingParts>(loop_, clock_, disk_, readers_, options);
+  recording_ = std::make_unique<RecordingParts>(loop_, clock_, disk_, readers_, exports_worker_, options);
   recorder_ = &recording_->recorder;
   runs_ = &recording_->runs;
   history_ = &recording_->history;

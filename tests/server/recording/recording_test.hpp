@@ -120,6 +120,7 @@ class RecordingTest : public ::testing::Test {
   boost::asio::io_context loop_{1};
   WorkerThread disk_{"disk"};
   WorkerThread readers_{"readers"};
+  WorkerThread exports_worker_{"exports"};
   VirtualClock clock_{loop_};
   std::unique_ptr<TaskGroup> tasks_;
   std::unique_ptr<RecordingParts> recording_;
