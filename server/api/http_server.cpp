@@ -3,17 +3,21 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
+#include <boost/asio/multiple_exceptions.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <cctype>
+#include <cerrno>
 #include <limits>
+#include <variant>
 
 #include "server/api/contained.hpp"
 #include "server/api/live_socket.hpp"
@@ -79,6 +83,9 @@ class Connection {
   asio::awaitable<Next> read_and_answer();
   asio::awaitable<Next> refuse_unreadable(boost::system::error_code error);
   asio::awaitable<Response> answer(Request request);
+  asio::awaitable<void> peer_gone();
+  template <class T>
+  asio::awaitable<std::optional<T>> while_present(asio::awaitable<T> work);
   asio::awaitable<Next> send(Response response, const HttpRequest& to);
   asio::awaitable<Next> send_body(http::response<http::string_body> message);
   asio::awaitable<Next> send_stream(http::response<http::empty_body> head, std::unique_ptr<BodyStream> body);
@@ -168,8 +175,38 @@ asio::awaitable<Connection::Next> Connection::read_and_answer() {
     co_return Next::end;
   }
   request.actor = std::move(*admitted);
-  Response response = co_await answer(std::move(request));
-  co_return co_await send(std::move(response), message);
+  // SAFETY: what changes something, above all a stop, is carried out though its client has hung up.
+  if (request.method != "GET" && request.method != "HEAD") {
+    Response response = co_await answer(std::move(request));
+    co_return co_await send(std::move(response), message);
+  }
+  auto response = co_await while_present(answer(std::move(request)));
+  if (!response) co_return Next::end;
+  co_return co_await send(std::move(*response), message);
+}
+
+// Returns when the client has closed its side, also only half of it. What it sends ahead hides its end; then only a
+// reset counts.
+asio::awaitable<void> Connection::peer_gone() {
+  for (;;) {
+    co_await stream_.async_wait(tcp::socket::wait_read, asio::use_awaitable);
+    char byte = 0;
+    const ssize_t size = ::recv(stream_.native_handle(), &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+    if (size > 0) co_await stream_.async_wait(tcp::socket::wait_error, asio::use_awaitable);
+    if (size >= 0 || (errno != EAGAIN && errno != EINTR)) co_return;
+  }
+}
+
+// What the work gives, or nothing when the client goes first: the work is cancelled then, and has ended.
+template <class T>
+asio::awaitable<std::optional<T>> Connection::while_present(asio::awaitable<T> work) {
+  try {
+    std::variant<T, std::monostate> first = co_await (std::move(work) || peer_gone());
+    if (first.index() == 0) co_return std::move(std::get<0>(first));
+    co_return std::nullopt;
+  } catch (const asio::multiple_exceptions&) {  // both were cancelled: the station stops, or the time is over
+    throw boost::system::system_error{asio::error::operation_aborted};
+  }
 }
 
 // Says why, if the client spoke at all, and gives it the time to read that.
@@ -274,13 +311,14 @@ asio::awaitable<Connection::Next> Connection::send_stream(http::response<http::e
   const bool chunked = head.chunked();
   for (;;) {
     deadline_us_ = kNever;
-    const auto piece = co_await next_piece(*body);
-    if (!piece) co_return Next::end;  // the missing last chunk tells the client
-    if (!*piece) break;
-    if ((*piece)->empty()) continue;
+    const auto made = co_await while_present(next_piece(*body));
+    if (!made || !*made) co_return Next::end;  // the missing last chunk tells the client
+    const std::optional<std::string>& piece = **made;
+    if (!piece) break;
+    if (piece->empty()) continue;
     allow(kWriteTime);
     boost::system::error_code error;
-    const auto bytes = asio::buffer(**piece);
+    const auto bytes = asio::buffer(*piece);
     if (chunked) {
       std::tie(error, std::ignore) =
           co_await asio::async_write(stream_, http::make_chunk(bytes), asio::as_tuple(asio::use_awaitable));

@@ -2,7 +2,8 @@
 //
 // Limits: 256 connections (below), header 16 kB (431), body 64 kB (413), 10 s for a request to arrive (408), 60 s idle,
 // 30 s for a client to take a piece of the answer. Malformed HTTP is 400 and the end of the connection. An exception of
-// a route is logged and answered with 500. An upgrade at /live becomes a LivePage.
+// a route is logged and answered with 500. An upgrade at /live becomes a LivePage. A GET whose client has gone is
+// cancelled; a POST is always carried out.
 //
 // SAFETY: silent connections must not lock out a stop. When all 256 are taken, a new one replaces the oldest stranger,
 // that is a connection which has sent no request with a valid credential; it is refused (503) when there is none.

@@ -1,4 +1,4 @@
-// The table from error codes to statuses; the strict reading of a JSON object; runs, stored samples and gaps as JSON.
+// The table from error codes to statuses; the strict reading of a JSON object; runs and gaps as JSON.
 #include "server/api/json.hpp"
 
 #include <fmt/format.h>
@@ -171,28 +171,6 @@ json to_json(const Run& run) {
   out["samples_expected"] = run.samples_expected;
   out["samples_stored"] = run.samples_stored;
   out["samples_lost"] = run.samples_lost;
-  return out;
-}
-
-json to_json(const StoredSample& stored) {
-  json out = to_json(stored.sample);
-  out["span"] = stored.span;
-  out["boot_id"] = std::to_string(stored.boot_id);
-  out["seq"] = stored.seq;
-  out["robot_time_us"] = stored.robot_time_us;
-  out["utc_us"] = stored.utc_us;
-  out["clock_uncertainty_us"] = stored.clock_uncertainty_us;
-  out["first_received_at_us"] = stored.first_received_at_us;
-  out["received_at_us"] = stored.received_at_us;
-  out["mode"] = protocol::text(stored.mode);
-  out["sub_state"] = protocol::text(stored.sub_state);
-  out["setpoint_m"] = stored.setpoint_m ? decimal(*stored.setpoint_m) : json(nullptr);
-  out["disturbance_m"] = decimal(stored.disturbance_m);
-  out["position_sd_m"] = decimal(stored.position_sd_m);
-  out["controller_id"] = stored.controller_id;
-  out["emergency_id"] = id_text(stored.emergency_id);
-  out["emergency_cause"] = protocol::text(stored.emergency_cause);
-  out["flags"] = stored.flags;
   return out;
 }
 

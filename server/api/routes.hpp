@@ -1,5 +1,5 @@
 // All routes of the API, grouped by noun: routes_station, routes_recording, routes_robots, routes_runs, routes_markers,
-// routes_samples.
+// routes_samples, routes_overview, routes_exports.
 //
 // Held to openapi.yaml both ways by a test. Each answer is a coroutine that can be called without a server.
 #pragma once
@@ -10,6 +10,7 @@
 #include "server/analysis/analysis_service.hpp"
 #include "server/api/auth.hpp"
 #include "server/api/json.hpp"
+#include "server/api/query_params.hpp"
 #include "server/api/router.hpp"
 #include "server/live/live_feed.hpp"
 #include "server/recording/recording_parts.hpp"
@@ -45,16 +46,12 @@ void add_robot_routes(Router& router, ApiParts& parts);
 void add_run_routes(Router& router, ApiParts& parts);
 void add_marker_routes(Router& router, ApiParts& parts);
 void add_sample_routes(Router& router, ApiParts& parts);
+void add_overview_routes(Router& router, ApiParts& parts);
+void add_export_routes(Router& router, ApiParts& parts);
 
 // Everything above, and the cockpit as fallback.
 void add_routes(Router& router, ApiParts& parts);
 
-// A query parameter as a number within limits; `fallback` when it is not given.
-Result<std::int64_t> query_number(const Request& request, const std::string& name, std::int64_t minimum,
-                                  std::int64_t maximum, std::int64_t fallback);
-// A cursor is "span-seq"; opaque to its users.
-std::string cursor_text(const SampleCursor& cursor);
-std::optional<SampleCursor> parse_cursor(const std::string& text);
 std::string login_url(const std::string& address, const std::string& code);  // address: "127.0.0.1:8080"
 Result<RunId> run_id_of(const Request& request);
 

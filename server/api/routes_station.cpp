@@ -1,8 +1,6 @@
 // The station itself, its documents, the login, and the cockpit's files.
 #include <fmt/format.h>
 
-#include <charconv>
-
 #include "server/api/assets.hpp"
 #include "server/api/routes.hpp"
 
@@ -60,22 +58,6 @@ std::string login_url(const std::string& address, const std::string& code) {
   return fmt::format("http://{}/login?code={}", address, code);
 }
 
-Result<std::int64_t> query_number(const Request& request, const std::string& name, std::int64_t minimum,
-                                  std::int64_t maximum, std::int64_t fallback) {
-  const auto given = request.query.find(name);
-  if (given == request.query.end()) return fallback;
-  const std::string& text = given->second;
-  std::int64_t value = 0;
-  const char* end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, value);
-  if (error != std::errc{} || rest != end || value < minimum || value > maximum) {
-    return fail(ErrorCode::bad_request,
-                fmt::format("{} = '{}' is not a number from {} to {}", name, text.substr(0, 40), minimum, maximum),
-                "out_of_range");
-  }
-  return value;
-}
-
 void add_station_routes(Router& router, ApiParts& parts) {
   const auto add = [&router, &parts](const char* pattern, std::vector<std::string> query,
                                      Answer (*answer)(ApiParts&, Request)) {
@@ -99,6 +81,8 @@ void add_routes(Router& router, ApiParts& parts) {
   add_run_routes(router, parts);
   add_marker_routes(router, parts);
   add_sample_routes(router, parts);
+  add_overview_routes(router, parts);
+  add_export_routes(router, parts);
 }
 
 }  // namespace server

@@ -9,7 +9,6 @@
 #include <limits>
 
 #include "server/cli/options.hpp"
-#include "server/recording/database.hpp"
 #include "server/recording/run_reader.hpp"
 #include "server/recording/schema.hpp"
 #include "server/recording/store_check.hpp"
@@ -25,35 +24,25 @@ struct Verified {
   bool integrity_checked = false;
 };
 
-Result<Verified> verify_open(SQLite::Database database, const std::filesystem::path& path, const StoreCheck& check) {
-  if (auto ours = check_ours(database, path); !ours) return std::unexpected{ours.error()};
-  const auto version = database.execAndGet("PRAGMA user_version").getInt64();
-  if (version < static_cast<std::int64_t>(migrations().size())) {
-    return fail(ErrorCode::invalid, fmt::format("{} has schema version {}, which knows no certificates; a station "
-                                                "brings it up to date when it opens it",
-                                                path.string(), version));
-  }
-  auto findings = check_store(database, check);
-  if (!findings) return std::unexpected{findings.error()};
-  return Verified{std::move(*findings), check.integrity};
-}
-
+// A run alone is not worth reading every page for; nor is it done unasked beside a station, whose log would grow.
 Result<Verified> verify_file(const std::filesystem::path& path, const Verify& wish) {
-  if (!std::filesystem::exists(path)) {
-    return fail(ErrorCode::not_found, fmt::format("there is no {}; --data names the station's folder", path.string()));
-  }
-  StoreCheck check{wish.run, wish.integrity || (!wish.run && lock_is_free(path))};
-  try {
-    if (is_at_rest(path)) {
-      const auto written = std::filesystem::last_write_time(path);
-      auto verified = verify_open(open_at_rest(path), path, check);
-      if (is_at_rest(path) && std::filesystem::last_write_time(path) == written) return verified;
-      check.integrity = wish.integrity;  // a station has begun meanwhile
+  Verified verified;
+  auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
+    const auto version = database.execAndGet("PRAGMA user_version").getInt64();
+    if (version < static_cast<std::int64_t>(migrations().size())) {
+      return fail(ErrorCode::invalid, fmt::format("{} has schema version {}, which knows no certificates; a station "
+                                                  "brings it up to date when it opens it",
+                                                  path.string(), version));
     }
-    return verify_open(open_for_reading(path), path, check);
-  } catch (const SQLite::Exception& error) {
-    return fail(ErrorCode::unavailable, fmt::format("cannot read {}: SQLite says '{}'", path.string(), error.what()));
-  }
+    const StoreCheck check{wish.run, wish.integrity || (!wish.run && lock_is_free(path))};
+    auto findings = check_store(database, check);
+    if (!findings) return std::unexpected{findings.error()};
+    verified = {std::move(*findings), check.integrity};
+    return {};
+  };
+  auto done = read_store(path, read);
+  if (!done) return std::unexpected{done.error()};
+  return verified;
 }
 
 void write_table(std::ostream& out, const Verified& verified, const Verify& wish) {

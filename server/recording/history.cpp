@@ -14,61 +14,111 @@ namespace asio = boost::asio;
 
 namespace {
 
-constexpr std::size_t kMaxPageSamples = 10'000;
 constexpr std::size_t kMaxListed = 1000;
-
-Error no_such_run(RunId run) { return {ErrorCode::not_found, fmt::format("there is no run {}", run), ""}; }
+constexpr std::size_t kSliceSegments = 5'000;
 
 std::int64_t clamped(std::size_t limit) {
   return static_cast<std::int64_t>(std::clamp<std::size_t>(limit, 1, kMaxListed));
 }
 
+// As the database has them, without what waits.
+Result<std::vector<RecordedSpan>> read_excerpt(SQLite::Database& database, const Excerpt& excerpt,
+                                               std::uint32_t first_span) {
+  if (excerpt.run) {
+    if (run_exists(database, *excerpt.run)) return read_spans(database, *excerpt.run, first_span);
+    return fail(ErrorCode::not_found, fmt::format("there is no run {}", *excerpt.run));
+  }
+  if (!robot_exists(database, excerpt.robot_id)) {
+    return fail(ErrorCode::not_found, fmt::format("there is no robot {}", excerpt.robot_id));
+  }
+  auto boots = read_boots(database, excerpt.robot_id);
+  std::erase_if(boots, [first_span](const RecordedSpan& span) { return span.span < first_span; });
+  return boots;
+}
+
 }  // namespace
 
 History::History(std::filesystem::path database, Recorder& recorder, WorkerThread& readers)
-    : path_{std::move(database)}, recorder_{recorder}, readers_{readers} {}
-
-History::~History() = default;
+    : recorder_{recorder}, reader_{std::move(database), readers} {}
 
 asio::awaitable<void> History::settle() { co_await recorder_.flush_records(); }
 
-template <class Query>
-asio::awaitable<std::invoke_result_t<Query, SQLite::Database&>> History::ask(Query query) {
-  auto job = [this, query = std::move(query)]() mutable {
-    if (!database_) database_ = std::make_unique<SQLite::Database>(open_for_reading(path_));
-    return query(*database_);
+asio::awaitable<Result<std::vector<RecordedSpan>>> History::spans(Excerpt excerpt, std::uint32_t first_span) {
+  auto query = [excerpt, first_span](SQLite::Database& database) {
+    return read_excerpt(database, excerpt, first_span);
   };
-  co_return co_await readers_.run(std::move(job));
+  co_await recorder_.flush_boots();  // a reboot heard before this moves the open span first
+  auto found = co_await reader_.ask(std::move(query));
+  if (!found) co_return found;
+  for (RecordedSpan& span : *found) add_waiting(span);
+  if (!excerpt.window) co_return found;
+  auto cut = [spans = std::move(*found), window = *excerpt.window](SQLite::Database& database) mutable {
+    return cut_to_window(database, std::move(spans), window);
+  };
+  co_return co_await reader_.ask(std::move(cut));
 }
 
-asio::awaitable<Result<SamplePage>> History::samples(RunId run, std::optional<SampleCursor> after, std::size_t limit) {
+void History::add_waiting(RecordedSpan& span) const {
+  span.made_next = std::max(span.made_next, std::min(span.samples.next, recorder_.next_seq(span.boot_id)));
+  span.waiting = recorder_.waiting(span.boot_id, span.samples);
+  span.waiting_gaps = recorder_.waiting_gaps(span.boot_id);
+}
+
+asio::awaitable<Result<SegmentPage>> History::segments(Excerpt excerpt, std::optional<SampleCursor> after,
+                                                       std::size_t limit, Channels channels) {
   if (limit < 1 || limit > kMaxPageSamples) {
     co_return fail(ErrorCode::invalid, fmt::format("limit is {}, allowed are 1 to {}", limit, kMaxPageSamples));
   }
-  auto spans = co_await spans_of(run, after ? after->span : 0);
-  if (!spans) co_return std::unexpected{spans.error()};
-  for (RecordedSpan& span : *spans) span.waiting = recorder_.waiting(span.boot_id, span.samples);
-  auto query = [spans = std::move(*spans), after, limit](SQLite::Database& database) {
-    return read_page(database, spans, after, limit);
+  auto found = co_await spans(excerpt, after ? after->span : 0);
+  if (!found) co_return std::unexpected{found.error()};
+  auto query = [spans = std::move(*found), after, limit, channels](SQLite::Database& database) {
+    return read_segments(database, spans, after, limit, channels);
   };
-  co_return co_await ask(std::move(query));
+  co_return co_await reader_.ask(std::move(query));
 }
 
-asio::awaitable<Result<std::vector<Gap>>> History::gaps(RunId run) {
-  auto spans = co_await spans_of(run, 0);
-  if (!spans) co_return std::unexpected{spans.error()};
-  for (RecordedSpan& span : *spans) span.waiting_gaps = recorder_.waiting_gaps(span.boot_id);
-  auto query = [spans = std::move(*spans)](SQLite::Database& database) { return read_gaps(database, spans); };
-  co_return co_await ask(std::move(query));
+asio::awaitable<Result<SamplePage>> History::samples(RunId run, std::optional<SampleCursor> after, std::size_t limit) {
+  auto page = co_await segments(excerpt_of(run), after, limit);
+  if (!page) co_return std::unexpected{page.error()};
+  auto job = [page = std::move(*page)] { return samples_of(page); };
+  co_return co_await reader_.run(std::move(job));
 }
 
-asio::awaitable<Result<std::vector<RecordedSpan>>> History::spans_of(RunId run, std::uint32_t first_span) {
-  auto query = [run, first_span](SQLite::Database& database) -> Result<std::vector<RecordedSpan>> {
-    if (!run_exists(database, run)) return std::unexpected{no_such_run(run)};
-    return read_spans(database, run, first_span);
-  };
-  co_await recorder_.flush_boots();  // a reboot heard before this moves the open span first
-  co_return co_await ask(std::move(query));
+asio::awaitable<Result<Absences>> History::gaps(Excerpt excerpt) {
+  auto found = co_await spans(std::move(excerpt));
+  if (!found) co_return std::unexpected{found.error()};
+  const auto& spans = *found;
+  Absences absences;
+  auto query = [&spans](SQLite::Database& database) { return read_gaps(database, spans); };
+  absences.gaps = co_await reader_.ask(std::move(query));
+  for (const RecordedSpan& span : spans) {
+    std::uint64_t first_seq = std::max(span.samples.first, span.settled_next);
+    while (first_seq < span.made().next) {
+      auto slice = [&span, &first_seq](SQLite::Database& database) {
+        return read_missing(database, span, first_seq, kSliceSegments);
+      };
+      const auto missing = co_await reader_.ask(std::move(slice));
+      absences.missing.insert(absences.missing.end(), missing.begin(), missing.end());
+    }
+  }
+  co_return absences;
+}
+
+asio::awaitable<Result<Overview>> History::overview(Excerpt excerpt, OverviewQuery query) {
+  auto found = co_await spans(std::move(excerpt));
+  if (!found) co_return std::unexpected{found.error()};
+  const auto& spans = *found;
+  Overview overview;
+  auto gaps = [&spans](SQLite::Database& database) { return read_gaps(database, spans); };
+  overview.gaps = co_await reader_.ask(std::move(gaps));
+  OverviewScan scan{spans, query};
+  bool more = true;
+  while (more) {
+    auto slice = [&scan](SQLite::Database& database) { return scan.advance(database); };
+    more = co_await reader_.ask(std::move(slice));
+  }
+  overview.columns = scan.take();
+  co_return overview;
 }
 
 asio::awaitable<std::vector<RobotEvent>> History::events(RobotId robot_id, std::size_t limit) {
@@ -80,7 +130,7 @@ asio::awaitable<std::vector<RobotEvent>> History::events(RobotId robot_id, std::
     return events;
   };
   co_await recorder_.flush_records();
-  co_return co_await ask(std::move(query));
+  co_return co_await reader_.ask(std::move(query));
 }
 
 asio::awaitable<std::vector<CommandRecord>> History::commands(RobotId robot_id, std::size_t limit) {
@@ -92,7 +142,7 @@ asio::awaitable<std::vector<CommandRecord>> History::commands(RobotId robot_id, 
     return commands;
   };
   co_await recorder_.flush_records();
-  co_return co_await ask(std::move(query));
+  co_return co_await reader_.ask(std::move(query));
 }
 
 asio::awaitable<Result<CommandRecord>> History::command(CommandId id) {
@@ -103,7 +153,7 @@ asio::awaitable<Result<CommandRecord>> History::command(CommandId id) {
     return command_from(row);
   };
   co_await recorder_.flush_records();
-  co_return co_await ask(std::move(query));
+  co_return co_await reader_.ask(std::move(query));
 }
 
 }  // namespace server

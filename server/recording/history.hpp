@@ -1,38 +1,66 @@
-// What was recorded, for people and programs: samples of a run, events, commands, gaps.
+// What was recorded, for people and programs: samples, overviews and gaps of an excerpt; events, commands.
 //
-// Loop thread; the queries run on a worker with a read-only connection, each a page, so no read transaction lives long.
+// Loop thread; the queries run on a worker with a read-only connection, in slices of at most 20 ms, so no read
+// transaction lives long, nobody waits behind a long question, and a coroutine that is cancelled asks no further.
 // An answer holds everything up to its question. Samples and gaps that are not stored yet are joined from the
 // recorder's memory, so that a page which polls neither writes nor cuts a segment short. Queries of events and commands
 // let the recorder commit those first; while the disk fails they answer after 3 s, with what is stored.
 // Needs a running Recorder, which has opened the database; recorder and worker outlive it.
 #pragma once
 
-#include <SQLiteCpp/SQLiteCpp.h>
-
 #include <boost/asio/awaitable.hpp>
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
 
+#include "server/recording/database_reader.hpp"
+#include "server/recording/overview.hpp"
 #include "server/recording/runs.hpp"
+#include "server/recording/span_finder.hpp"
 #include "server/recording/span_reader.hpp"
 #include "server/result.hpp"
-#include "server/worker.hpp"
 
 namespace server {
+
+// A run or all that a robot recorded; or what of it lies in a window of time.
+struct Excerpt {
+  std::optional<RunId> run;
+  RobotId robot_id;  // when there is no run
+  std::optional<TimeWindow> window;
+};
+
+inline Excerpt excerpt_of(RunId run) { return {.run = run, .robot_id = {}, .window = {}}; }
+
+// What is not there, in order of span and seq.
+struct Absences {
+  std::vector<Gap> gaps;
+  std::vector<MissingRange> missing;
+};
+
+struct Overview {
+  OverviewColumns columns;
+  std::vector<Gap> gaps;
+};
+
+inline constexpr std::size_t kMaxPageSamples = 10'000;
 
 class History {
  public:
   History(std::filesystem::path database, Recorder& recorder, WorkerThread& readers);
-  ~History();
 
-  // At most `limit` samples (1 to 10000) of a run, in order of span and seq, after the cursor.
+  // not_found: there is no such run or robot, in all of these.
+  // At most `limit` samples (1 to 10000), in order of span and seq, after the cursor.
+  boost::asio::awaitable<Result<SegmentPage>> segments(Excerpt excerpt, std::optional<SampleCursor> after,
+                                                       std::size_t limit, Channels channels = all_channels());
   boost::asio::awaitable<Result<SamplePage>> samples(RunId run, std::optional<SampleCursor> after, std::size_t limit);
-  boost::asio::awaitable<Result<std::vector<Gap>>> gaps(RunId run);
+  boost::asio::awaitable<Result<Absences>> gaps(Excerpt excerpt);
+  boost::asio::awaitable<Result<Overview>> overview(Excerpt excerpt, OverviewQuery query);
+
+  // The spans of the excerpt, with what waits of them; from this index on.
+  boost::asio::awaitable<Result<std::vector<RecordedSpan>>> spans(Excerpt excerpt, std::uint32_t first_span = 0);
 
   // Newest first, at most `limit` (1 to 1000).
   boost::asio::awaitable<std::vector<RobotEvent>> events(RobotId robot_id, std::size_t limit);
@@ -42,22 +70,14 @@ class History {
   // Returns when every command and event that the recorder has heard is durable, or after 3 s when the disk fails.
   boost::asio::awaitable<void> settle();
 
-  // Runs job() on the readers' thread: for text that is made of what a query gave.
-  template <class Job>
-  boost::asio::awaitable<std::invoke_result_t<Job>> on_reader(Job job) {
-    co_return co_await readers_.run(std::move(job));
-  }
+  // For questions of one's own, and for text that is made of what a question gave.
+  DatabaseReader& reader() { return reader_; }
 
  private:
-  template <class Query>
-  boost::asio::awaitable<std::invoke_result_t<Query, SQLite::Database&>> ask(Query query);
-  // From this index on, as the database has them.
-  boost::asio::awaitable<Result<std::vector<RecordedSpan>>> spans_of(RunId run, std::uint32_t first_span);
+  void add_waiting(RecordedSpan& span) const;
 
-  std::filesystem::path path_;
   Recorder& recorder_;
-  WorkerThread& readers_;
-  std::unique_ptr<SQLite::Database> database_;  // opened by the first query; used on the readers' thread only
+  DatabaseReader reader_;
 };
 
 }  // namespace server

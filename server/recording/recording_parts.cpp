@@ -23,14 +23,15 @@ RetentionPolicy retention_policy(const RecordingConfig& config) {
 }  // namespace
 
 RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                               WorkerThread& checkpoints, const RecorderOptions& options,
-                               const RecordingConfig& config)
+                               WorkerThread& exports_worker, WorkerThread& checkpoints,
+                               const RecorderOptions& options, const RecordingConfig& config)
     : recorder{loop, clock, disk, checkpoints, options},
       reader{options.path, readers},
       certifier{clock, recorder, reader},
       runs{clock, recorder, reader, certifier},
       markers{clock, recorder, reader},
       history{options.path, recorder, readers},
+      exports{options.path, recorder, exports_worker},
       disk_watch{clock, readers, options.path, space_limits(config)},
       backups{loop, clock, recorder, disk_watch, backup_folder(options.path, config)},
       retention{clock, recorder, readers, disk_watch, retention_policy(config)},
@@ -46,6 +47,8 @@ void RecordingParts::connect(Station& station) {
 
 asio::awaitable<RestoredState> RecordingParts::open() {
   RestoredState restored = co_await recorder.open();
+  std::error_code ignored;
+  std::filesystem::remove_all(exports_folder(), ignored);  // what a crash left
   co_await runs.load();
   co_await disk_watch.look();
   co_return restored;

@@ -25,7 +25,8 @@ namespace server {
 
 struct RecordingParts {
   RecordingParts(boost::asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                 WorkerThread& checkpoints, const RecorderOptions& options, const RecordingConfig& config = {});
+                 WorkerThread& exports_worker, WorkerThread& checkpoints, const RecorderOptions& options,
+                 const RecordingConfig& config = {});
 
   // The station is heard from now on, and hears what has become durable and what is missing.
   void connect(Station& station);
@@ -37,6 +38,9 @@ struct RecordingParts {
   // Starts the lasting tasks.
   void spawn(TaskGroup& tasks);
 
+  std::filesystem::path path() const { return path_; }                                      // of the database
+  std::filesystem::path exports_folder() const { return path_.parent_path() / "exports"; }  // empty after open()
+
   // Every sample that was received is on disk afterwards and open runs are interrupted, or it is logged why not. Does
   // not throw.
   void close();
@@ -47,6 +51,7 @@ struct RecordingParts {
   Runs runs;
   Markers markers;
   History history;
+  History exports;  // the same on a worker of its own, so that no page waits behind an export
   DiskWatch disk_watch;
   Backups backups;
   Retention retention;

@@ -59,8 +59,6 @@ StoredSample sample_from(SQLite::Statement& row) {
   return stored;
 }
 
-}  // namespace
-
 Result<void> check_ours(SQLite::Database& database, const std::filesystem::path& path) {
   const auto application_id = database.execAndGet("PRAGMA application_id").getInt64();
   const auto version = database.execAndGet("PRAGMA user_version").getInt64();
@@ -74,8 +72,6 @@ Result<void> check_ours(SQLite::Database& database, const std::filesystem::path&
   }
   return {};
 }
-
-namespace {
 
 Result<std::vector<StoredSample>> query_run(SQLite::Database& database, RunId run, std::size_t limit) {
   SQLite::Statement exists{database, "SELECT 1 FROM run WHERE run_id = ?"};
@@ -99,12 +95,6 @@ Result<std::vector<StoredSample>> query_run(SQLite::Database& database, RunId ru
   return samples;
 }
 
-Result<std::vector<StoredSample>> read_from(SQLite::Database database, const std::filesystem::path& path, RunId run,
-                                            std::size_t limit) {
-  if (auto ours = check_ours(database, path); !ours) return std::unexpected{ours.error()};
-  return query_run(database, run, limit);
-}
-
 }  // namespace
 
 bool lock_is_free(const std::filesystem::path& database) {
@@ -116,34 +106,59 @@ bool lock_is_free(const std::filesystem::path& database) {
   return is_free;
 }
 
+namespace {
+
 bool is_at_rest(const std::filesystem::path& path) {
   return !std::filesystem::exists(path.string() + "-wal") && lock_is_free(path);
 }
 
 // As a URI, which alone can say that the file does not change: then SQLite makes no files beside it.
 SQLite::Database open_at_rest(const std::filesystem::path& path) {
+  return SQLite::Database{reading_uri(path, true), SQLite::OPEN_READONLY | SQLite::OPEN_URI};
+}
+
+}  // namespace
+
+std::string reading_uri(const std::filesystem::path& path, bool at_rest) {
   std::string uri = "file:";
   for (const char c : std::filesystem::absolute(path).string()) {
     const bool is_plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || std::string_view{"/._-"}.contains(c);
     uri += is_plain ? std::string{c} : fmt::format("%{:02X}", static_cast<unsigned char>(c));
   }
-  return SQLite::Database{uri + "?immutable=1", SQLite::OPEN_READONLY | SQLite::OPEN_URI};
+  return uri + (at_rest ? "?immutable=1" : "?mode=ro");
 }
 
-Result<std::vector<StoredSample>> read_run(const std::filesystem::path& path, RunId run, std::size_t limit) {
+Result<void> read_store(const std::filesystem::path& path, const ReadStore& read) {
   if (!std::filesystem::exists(path)) {
     return fail(ErrorCode::not_found, fmt::format("there is no {}; --data names the station's folder", path.string()));
   }
+  const auto checked = [&](SQLite::Database database, bool at_rest) {
+    auto ours = check_ours(database, path);
+    return ours ? read(database, reading_uri(path, at_rest)) : ours;
+  };
   try {
     if (is_at_rest(path)) {
       const auto written = std::filesystem::last_write_time(path);
-      auto samples = read_from(open_at_rest(path), path, run, limit);
-      if (is_at_rest(path) && std::filesystem::last_write_time(path) == written) return samples;
+      auto done = checked(open_at_rest(path), true);
+      if (is_at_rest(path) && std::filesystem::last_write_time(path) == written) return done;
     }
-    return read_from(open_for_reading(path), path, run, limit);  // also when a station has begun meanwhile
+    return checked(open_for_reading(path), false);  // also when a station has begun meanwhile
   } catch (const SQLite::Exception& error) {
     return fail(ErrorCode::unavailable, fmt::format("cannot read {}: SQLite says '{}'", path.string(), error.what()));
   }
+}
+
+Result<std::vector<StoredSample>> read_run(const std::filesystem::path& path, RunId run, std::size_t limit) {
+  std::vector<StoredSample> samples;
+  auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
+    auto found = query_run(database, run, limit);
+    if (!found) return std::unexpected{found.error()};
+    samples = std::move(*found);
+    return {};
+  };
+  auto done = read_store(path, read);
+  if (!done) return std::unexpected{done.error()};
+  return samples;
 }
 
 }  // namespace server

@@ -9,6 +9,8 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 
 #include <filesystem>
+#include <functional>
+#include <string>
 #include <vector>
 
 #include "server/recording/runs.hpp"
@@ -21,11 +23,14 @@ namespace server {
 // more than limit samples.
 Result<std::vector<StoredSample>> read_run(const std::filesystem::path& database, RunId run, std::size_t limit);
 
-// What it rests on, for other tools.
+// Reads something else in the same way. `read` gets the handle and the database as a URI for ATTACH; it begins again
+// from nothing when a station has opened the database meanwhile. Its failure is returned.
+using ReadStore = std::function<Result<void>(SQLite::Database& database, const std::string& uri)>;
+Result<void> read_store(const std::filesystem::path& database, const ReadStore& read);
+
+// The path of a database as a URI that opens it for reading only; at rest: nobody writes.
+std::string reading_uri(const std::filesystem::path& path, bool at_rest);
+
 bool lock_is_free(const std::filesystem::path& database);  // no station runs on its folder
-bool is_at_rest(const std::filesystem::path& database);    // nor is anything of it in a write-ahead log
-SQLite::Database open_at_rest(const std::filesystem::path& database);
-// invalid: of another program, or of a version that this one does not know.
-Result<void> check_ours(SQLite::Database& database, const std::filesystem::path& path);
 
 }  // namespace server

@@ -16,10 +16,6 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-constexpr std::array<float Sample::*, kChannels> kMembers{&Sample::position_m,        &Sample::velocity_m_s,
-                                                          &Sample::acceleration_m_s2, &Sample::duty,
-                                                          &Sample::impedance_mv,      &Sample::reference_m};
-
 // A segment that holds the first sample of the range begins at most 99 before it.
 constexpr const char* kInRange =
     " FROM segment WHERE boot_key = ?1 AND first_seq >= ?2 - 99 AND first_seq <= ?3 AND last_seq >= ?2"
@@ -81,6 +77,25 @@ const char* text(Channel value) {
   constexpr std::array<const char*, kChannels> kNames{"position_m", "velocity_m_s", "acceleration_m_s2",
                                                       "duty",       "impedance_mv", "reference_m"};
   return kNames[static_cast<std::size_t>(value)];
+}
+
+Result<Channels> parse_channels(std::string_view text) {
+  Channels channels;
+  for (bool more = true; more;) {
+    const std::size_t comma = text.find(',');
+    const std::string_view name = text.substr(0, comma);
+    std::size_t index = 0;
+    while (index < kChannels && name != server::text(channel(index))) ++index;
+    if (index == kChannels || channels[index]) {
+      const char* problem = index == kChannels ? "is no channel" : "is given twice";
+      return fail(ErrorCode::bad_request, fmt::format("channels: '{}' {}", name.substr(0, 40), problem),
+                  "out_of_range");
+    }
+    channels.set(index);
+    more = comma != std::string_view::npos;
+    if (more) text.remove_prefix(comma + 1);
+  }
+  return channels;
 }
 
 void FinalizeStatement::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
@@ -167,7 +182,7 @@ void SampleScanner::read_rows(std::int64_t first_row, Segment& into) {
     ++next_row_;
     int column = 0;
     for (std::size_t index = 0; index < kChannels; ++index) {
-      sample.*kMembers[index] = channels_[index] ? float_at(row, ++column) : kNaN;
+      sample.*kSampleMembers[index] = channels_[index] ? float_at(row, ++column) : kNaN;
     }
   }
 }
@@ -179,7 +194,7 @@ void SampleScanner::seek(std::int64_t row) {
 }
 
 std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boot_key, Interval samples,
-                                    Channels channels) {
+                                    Channels channels, std::size_t limit) {
   std::vector<SegmentHead> heads;
   if (samples.next <= samples.first) return heads;
   std::string sql =
@@ -187,9 +202,10 @@ std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boo
   for (std::size_t index = 0; index < kChannels; ++index) {
     if (channels[index]) sql += fmt::format(", min_{0}, max_{0}", text(channel(index)));
   }
-  const RawStatement statement = prepare(database, sql + kInRange);
+  const RawStatement statement = prepare(database, sql + kInRange + " LIMIT ?4");
   sqlite3_stmt* row = statement.get();
   bind_range(row, boot_key, samples);
+  sqlite3_bind_int64(row, 4, static_cast<std::int64_t>(limit));
   int result = SQLITE_ROW;
   while ((result = sqlite3_step(row)) == SQLITE_ROW) {
     SegmentHead& head = heads.emplace_back();

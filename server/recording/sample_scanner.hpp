@@ -12,11 +12,14 @@
 #include <bitset>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/recording/segment.hpp"
+#include "server/result.hpp"
 
 struct sqlite3_stmt;
 
@@ -28,7 +31,15 @@ constexpr std::size_t kChannels = 6;
 using Channels = std::bitset<kChannels>;
 inline Channels all_channels() { return Channels{}.set(); }
 
+// By Channel.
+inline constexpr std::array<float Sample::*, kChannels> kSampleMembers{
+    &Sample::position_m, &Sample::velocity_m_s, &Sample::acceleration_m_s2,
+    &Sample::duty,       &Sample::impedance_mv, &Sample::reference_m};
+
 const char* text(Channel value);
+
+// "position_m,duty": names with commas between them, each once; bad_request says which one is not.
+Result<Channels> parse_channels(std::string_view text);
 
 struct FinalizeStatement {
   void operator()(sqlite3_stmt* statement) const;
@@ -88,8 +99,8 @@ struct SegmentHead {
   std::uint32_t flags = 0;  // TelemetryFlag
 };
 
-// The heads of all segments that have a sample in the range, ascending and not cut to it.
+// The heads of the segments that have a sample in the range, ascending and not cut to it; the first `limit` of them.
 std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boot_key, Interval samples,
-                                    Channels channels);
+                                    Channels channels, std::size_t limit = std::numeric_limits<std::int32_t>::max());
 
 }  // namespace server

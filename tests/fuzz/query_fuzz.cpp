@@ -73,6 +73,12 @@ Answer answer(Request request) {
     if (!run_id) co_return problem(run_id.error());
   }
   for (const auto& [name, value] : request.query) read_cursor(value);
+  const auto channels = query_channels(request);
+  if (!channels) co_return problem(channels.error());
+  require(channels->any());
+  const auto window = query_window(request);
+  if (!window) co_return problem(window.error());
+  require(!*window || ((*window)->from_us >= 0 && (*window)->to_us > (*window)->from_us));
   co_return json_response(200, {{"path", request.path}, {"query", request.query}});
 }
 
@@ -86,6 +92,7 @@ void ask(const std::string& target) {
   router.add({"GET", "/api/v1/runs", {"limit", "before", "robot_id"}, answer});
   router.add({"POST", "/api/v1/runs", {}, answer});
   router.add({"GET", "/api/v1/runs/{run_id}/samples", {"limit", "after"}, answer});
+  router.add({"GET", "/api/v1/runs/{run_id}/overview", {"from_us", "to_us", "channels"}, answer});
   router.set_fallback([](const Request& request) { return json_response(200, {{"page", request.path}}); });
   for (const char* method : {"GET", "HEAD", "POST"}) {
     boost::asio::io_context loop;

@@ -54,11 +54,11 @@ TEST_F(LinkFaultsTest, AnOutageLongerThanTheRingLeavesACountedGap) {
   EXPECT_GT(ended->samples_lost, 300u);
   EXPECT_LT(ended->samples_lost, 600u);
   EXPECT_EQ(ended->samples_stored + ended->samples_lost, ended->samples_expected);
-  const auto gaps = wait_for(history->gaps(run));
+  const auto gaps = wait_for(history->gaps(excerpt_of(run)));
   std::uint64_t lost = 0;  // in one stretch, noticed in one or more pieces while the ring moved on
-  for (const Gap& gap : *gaps) {
+  for (const Gap& gap : gaps->gaps) {
     lost += gap.last_seq - gap.first_seq + 1;
-    if (&gap != &gaps->front()) EXPECT_EQ(gap.first_seq, (&gap - 1)->last_seq + 1);
+    if (&gap != &gaps->gaps.front()) EXPECT_EQ(gap.first_seq, (&gap - 1)->last_seq + 1);
   }
   EXPECT_EQ(lost, ended->samples_lost);
   expect(caught_up());  // the acknowledgement passes over the gap

@@ -10,9 +10,11 @@ SystemTest::SystemTest() {
   folder = mkdtemp(name.data());
   clock.add_worker(disk);
   clock.add_worker(readers);
+  clock.add_worker(exports);
   clock.add_worker(checkpoints);
-  recording = std::make_unique<RecordingParts>(loop, clock, disk, readers, checkpoints,
+  recording = std::make_unique<RecordingParts>(loop, clock, disk, readers, exports, checkpoints,
                                                RecorderOptions{folder / "station.sqlite"});
+  clock.add_worker(recording->backups.checker());
   recorder = &recording->recorder;
   runs = &recording->runs;
   history = &recording->history;

@@ -33,6 +33,7 @@ ApiTest::ApiTest() {
   clock.add_worker(disk);
   clock.add_worker(readers);
   clock.add_worker(checkpoints);
+  clock.add_worker(exports);
   clock.add_worker(maths);
   clock.add_worker(recording.backups.checker());
   recording.connect(station);

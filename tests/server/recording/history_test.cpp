@@ -111,7 +111,7 @@ TEST_F(HistoryTest, PollingARunWritesNothingAndCutsNoSegmentShort) {
     const auto commits = recorder_->counters().commits;
     EXPECT_EQ(page(id, std::nullopt, 1000).samples.size(), made);
     EXPECT_EQ(page(id, SampleCursor{0, made - 2}, 1000).samples.size(), 1u);
-    EXPECT_TRUE(wait(history_->gaps(id)).has_value());
+    EXPECT_TRUE(wait(history_->gaps(excerpt_of(id))).has_value());
     EXPECT_EQ(recorder_->counters().commits, commits);
     clock_.run_for(49ms);
   }
@@ -155,14 +155,14 @@ TEST_F(HistoryTest, AnswersHoldWhatTheDiskDoesNotTake) {
   ASSERT_TRUE(clock_.run_until([&] { return recorder_->failing(); }, 3s));
   const std::int64_t asked_us = clock_.steady_us();
   EXPECT_EQ(page(id, std::nullopt, 1000).samples.size(), 105u);
-  const std::vector<Gap> gaps = wait(history_->gaps(id)).value();
+  const std::vector<Gap> gaps = wait(history_->gaps(excerpt_of(id))).value().gaps;
   ASSERT_EQ(gaps.size(), 1u);
   EXPECT_EQ(gaps[0].first_seq, 100u);
   EXPECT_EQ(gaps[0].last_seq, 119u);
   EXPECT_EQ(clock_.steady_us(), asked_us);
   foreign.exec("ROLLBACK");
   clock_.run_for(3s);
-  EXPECT_EQ(wait(history_->gaps(id)).value().size(), 1u);
+  EXPECT_EQ(wait(history_->gaps(excerpt_of(id))).value().gaps.size(), 1u);
   EXPECT_EQ(page(id, std::nullopt, 1000).samples.size(), 105u);
 }
 
@@ -186,7 +186,7 @@ TEST_F(HistoryTest, QueriesOfEventsAndCommandsCutNoSegmentShort) {
 TEST_F(HistoryTest, RefusesUnknownRunsAndBadLimits) {
   start();
   EXPECT_EQ(wait(history_->samples(1, std::nullopt, 10)).error().code, ErrorCode::not_found);
-  EXPECT_EQ(wait(history_->gaps(1)).error().code, ErrorCode::not_found);
+  EXPECT_EQ(wait(history_->gaps(excerpt_of(1))).error().code, ErrorCode::not_found);
   EXPECT_EQ(wait(history_->samples(1, std::nullopt, 0)).error().code, ErrorCode::invalid);
   EXPECT_EQ(wait(history_->samples(1, std::nullopt, 10001)).error().code, ErrorCode::invalid);
   EXPECT_EQ(wait(history_->command(1)).error().code, ErrorCode::not_found);
@@ -200,7 +200,7 @@ TEST_F(HistoryTest, ListsTheGapsOfARunCutToItsSpans) {
   const RunId id = create();  // begins in sample 10, the newest is 9
   robot_.oldest_seq = 15;
   make(robot_, 10);
-  const std::vector<Gap> gaps = wait(history_->gaps(id)).value();
+  const std::vector<Gap> gaps = wait(history_->gaps(excerpt_of(id))).value().gaps;
   ASSERT_EQ(gaps.size(), 1u);
   EXPECT_EQ(gaps[0].robot_id, robot_.id);
   EXPECT_EQ(gaps[0].boot_id, robot_.boot_id);

@@ -122,6 +122,7 @@ class RecordingTest : public ::testing::Test {
   WorkerThread disk_{"disk"};
   WorkerThread readers_{"readers"};
   WorkerThread checkpoints_{"checkpoints"};
+  WorkerThread exports_worker_{"exports"};
   VirtualClock clock_{loop_};
   std::unique_ptr<TaskGroup> tasks_;
   std::unique_ptr<RecordingParts> recording_;

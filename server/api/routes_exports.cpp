@@ -1,0 +1,136 @@
+// A run to take away: as CSV, as a MAT file, as a SQLite file.
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "server/api/csv_export.hpp"
+#include "server/api/routes.hpp"
+#include "server/recording/mat_writer.hpp"
+#include "server/recording/run_file.hpp"
+#include "server/recording/run_reader.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr std::int64_t kMinGridUs = 100;
+constexpr std::int64_t kMaxGridUs = 3'600'000'000;
+constexpr std::uint64_t kSampleBytes = 200;                  // at most, in any format's file
+constexpr std::uint64_t kSpareBytes = 512ULL * 1024 * 1024;  // that the recording goes on with
+
+struct ParsedExport {
+  ExportQuery query;
+  std::vector<RecordedSpan> spans;  // as far as they were made when the export began
+};
+
+std::uint64_t samples_in(const std::vector<RecordedSpan>& spans) {
+  std::uint64_t samples = 0;
+  for (const RecordedSpan& span : spans) samples += span.samples.next - span.samples.first;
+  return samples;
+}
+
+asio::awaitable<Result<ParsedExport>> parse_export(ApiParts& parts, Request request) {
+  ParsedExport parsed;
+  const auto run = run_id_of(request);
+  if (!run) co_return std::unexpected{run.error()};
+  const auto channels = query_channels(request);
+  if (!channels) co_return std::unexpected{channels.error()};
+  const auto grid_us = query_number(request, "grid_us", kMinGridUs, kMaxGridUs, 0);
+  if (!grid_us) co_return std::unexpected{grid_us.error()};
+  parsed.query = {.run = *run, .channels = *channels, .grid_us = {}};
+  if (*grid_us != 0) parsed.query.grid_us = *grid_us;
+  auto spans = co_await parts.recording.exports.spans(excerpt_of(*run));
+  if (!spans) co_return std::unexpected{spans.error()};
+  for (RecordedSpan& span : *spans) span.cut(span.made());
+  parsed.spans = std::move(*spans);
+  co_return parsed;
+}
+
+Response attachment(const char* content_type, RunId run, const char* ending, std::unique_ptr<BodyStream> stream) {
+  Response response;
+  response.content_type = content_type;
+  response.headers.emplace_back("Cache-Control", "no-store");
+  response.headers.emplace_back("Content-Disposition", fmt::format("attachment; filename=\"run-{}{}\"", run, ending));
+  response.stream = std::move(stream);
+  return response;
+}
+
+Answer export_csv(ApiParts& parts, Request request) {
+  auto parsed = co_await parse_export(parts, std::move(request));
+  if (!parsed) co_return problem(parsed.error());
+  const RunId run = parsed->query.run;
+  co_return attachment("text/csv; charset=utf-8", run, ".csv",
+                       std::make_unique<CsvStream>(parts.recording.exports, std::move(parsed->spans), parsed->query));
+}
+
+// Makes the empty file, if there is room for what comes into it.
+Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folder, const char* ending,
+                                              std::uint64_t samples) {
+  auto file = std::make_unique<ExportFile>(folder, ending);
+  const auto space = std::filesystem::space(folder);
+  const std::uint64_t wanted = 2 * samples * kSampleBytes + kSpareBytes;
+  if (space.available < wanted) {
+    return fail(ErrorCode::unavailable,
+                fmt::format("the export needs up to {} MB on the station's disk, {} MB are free; export CSV, which "
+                            "needs none",
+                            wanted / 1'000'000, space.available / 1'000'000),
+                "low_space");
+  }
+  return file;
+}
+
+asio::awaitable<Result<std::unique_ptr<ExportFile>>> begin_file(ApiParts& parts, const ParsedExport& parsed,
+                                                                const char* ending) {
+  const std::uint64_t rows_per_sample =
+      parsed.query.grid_us ? 1 + 100'000 / static_cast<std::uint64_t>(*parsed.query.grid_us) : 1;
+  auto job = [folder = parts.recording.exports_folder(), ending, samples = samples_in(parsed.spans) * rows_per_sample] {
+    return make_file(folder, ending, samples);
+  };
+  co_return co_await parts.recording.exports.reader().run(std::move(job));
+}
+
+Answer export_mat(ApiParts& parts, Request request) {
+  auto parsed = co_await parse_export(parts, std::move(request));
+  if (!parsed) co_return problem(parsed.error());
+  auto file = co_await begin_file(parts, *parsed, ".mat");
+  if (!file) co_return problem(file.error());
+  MatWriter writer{(*file)->path(), std::move(parsed->spans), parsed->query};
+  for (Result<bool> more = true; *more;) {
+    auto slice = [&writer](SQLite::Database& database) { return writer.advance(database); };
+    more = co_await parts.recording.exports.reader().ask(std::move(slice));
+    if (!more) co_return problem(more.error());
+  }
+  co_return attachment("application/x-matlab-data", parsed->query.run, ".mat",
+                       std::make_unique<FileStream>(parts.recording.exports, std::move(*file)));
+}
+
+Answer export_sqlite(ApiParts& parts, Request request) {
+  auto parsed = co_await parse_export(parts, std::move(request));
+  if (!parsed) co_return problem(parsed.error());
+  auto file = co_await begin_file(parts, *parsed, ".sqlite");
+  if (!file) co_return problem(file.error());
+  co_await parts.recording.exports.settle();  // events and commands that were heard
+  RunFile writer{(*file)->path(), reading_uri(parts.recording.path(), false), std::move(parsed->spans), parsed->query};
+  for (bool more = true; more;) {
+    auto slice = [&writer](SQLite::Database& database) { return writer.advance(database); };
+    more = co_await parts.recording.exports.reader().ask(std::move(slice));
+  }
+  co_return attachment("application/vnd.sqlite3", parsed->query.run, ".sqlite",
+                       std::make_unique<FileStream>(parts.recording.exports, std::move(*file)));
+}
+
+}  // namespace
+
+void add_export_routes(Router& router, ApiParts& parts) {
+  const auto add = [&router, &parts](const char* pattern, std::vector<std::string> query,
+                                     Answer (*answer)(ApiParts&, Request)) {
+    router.add({"GET", pattern, std::move(query),
+                [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+  };
+  add("/api/v1/runs/{run_id}/samples.csv", {"channels", "grid_us"}, export_csv);
+  add("/api/v1/runs/{run_id}/samples.mat", {"channels", "grid_us"}, export_mat);
+  add("/api/v1/runs/{run_id}/samples.sqlite", {}, export_sqlite);
+}
+
+}  // namespace server

@@ -1,0 +1,33 @@
+// `rheonaut export`: a recorded run as a file of CSV, MAT or SQLite, read from a station's folder.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <iosfwd>
+#include <optional>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace server::cli {
+
+enum class ExportFormat : std::uint8_t { csv, mat, sqlite };
+const char* text(ExportFormat value);
+
+struct Export {
+  std::int64_t run = 0;
+  ExportFormat format = ExportFormat::csv;
+  std::filesystem::path to;
+  std::filesystem::path data_dir = "rheonaut-data";
+  std::optional<std::int64_t> grid_us;
+  std::string channels;  // empty: all
+};
+
+void add_options(CLI::App& command, Export& wish);
+
+// Throws std::runtime_error saying what is wrong; the file is there as a whole or not at all.
+int run(const Export& wish, std::ostream& out);
+
+}  // namespace server::cli

@@ -1,0 +1,88 @@
+// Steps through segments, and through the grid over them.
+#include "server/recording/export_rows.hpp"
+
+namespace server {
+
+void SegmentRows::give(SegmentPage page) {
+  page_ = std::move(page);
+  next_ = 0;
+}
+
+std::optional<ExportSegment> SegmentRows::next() {
+  if (next_ == page_.segments.size()) return std::nullopt;
+  const SpanSegment& part = page_.segments[next_++];
+  if (span_ != part.span) next_seq_ = part.span_first_seq;
+  span_ = part.span;
+  const ExportSegment found{&part, part.segment.first_seq - next_seq_};
+  next_seq_ = part.segment.next_seq();
+  return found;
+}
+
+void GridRows::give(SegmentPage page) {
+  page_ = std::move(page);
+  next_ = 0;
+}
+
+std::optional<GridRow> GridRows::next() {
+  for (; next_ < page_.segments.size(); ++next_) {
+    const SpanSegment& part = page_.segments[next_];
+    if (span_ != part.span) enter(part);
+    const Segment& segment = part.segment;
+    const std::uint64_t time_us = begin_us_ + row_ * grid_us_;
+    if (time_us <= segment.robot_time_us(segment.samples.size() - 1)) {
+      GridRow row = time_us < segment.first_robot_time_us ? between(segment, time_us) : within(segment, time_us);
+      row.span = part.span;
+      row.since_us = static_cast<std::int64_t>(time_us - begin_us_);
+      ++row_;
+      return row;
+    }
+    leave(segment);
+  }
+  return std::nullopt;
+}
+
+void GridRows::enter(const SpanSegment& part) {
+  span_ = part.span;
+  begin_us_ = part.segment.first_robot_time_us;
+  row_ = 0;
+  last_.reset();
+}
+
+void GridRows::leave(const Segment& segment) {
+  const std::size_t index = segment.samples.size() - 1;
+  last_ = Last{segment.samples[index], segment.context.setpoint_m, segment.robot_time_us(index),
+               segment.context.period_us, segment.utc_offset_us};
+}
+
+// Before the segment, and after the last sample before it, which there is: a span begins with a sample.
+GridRow GridRows::between(const Segment& next, std::uint64_t time_us) {
+  const Last& last = *last_;
+  const std::uint64_t since_us = time_us - last.robot_time_us;
+  const std::uint64_t until_us = next.first_robot_time_us - time_us;
+  GridRow row;
+  row.utc_us = static_cast<std::int64_t>(time_us) + last.utc_offset_us;
+  const bool last_is_near = 2 * since_us <= last.period_us;
+  if (2 * until_us <= next.context.period_us && !(last_is_near && since_us <= until_us)) {
+    row.sample = &next.samples.front();
+    row.setpoint_m = next.context.setpoint_m;
+    row.utc_us = static_cast<std::int64_t>(time_us) + next.utc_offset_us;
+  } else if (last_is_near) {
+    row.sample = &last.sample;
+    row.setpoint_m = last.setpoint_m;
+  }
+  return row;
+}
+
+GridRow GridRows::within(const Segment& segment, std::uint64_t time_us) {
+  const std::uint64_t period_us = segment.context.period_us;
+  const std::uint64_t since_us = time_us - segment.first_robot_time_us;
+  std::size_t index = period_us == 0 ? 0 : since_us / period_us;
+  if (period_us != 0 && 2 * (since_us % period_us) > period_us) ++index;
+  GridRow row;
+  row.utc_us = static_cast<std::int64_t>(time_us) + segment.utc_offset_us;
+  row.sample = &segment.samples[index];
+  row.setpoint_m = segment.context.setpoint_m;
+  return row;
+}
+
+}  // namespace server

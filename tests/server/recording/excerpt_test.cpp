@@ -1,0 +1,165 @@
+// What a robot recorded in a window of time, and what of it is missing.
+#include <algorithm>
+
+#include "server/recording/span_finder.hpp"
+#include "tests/server/recording/random_recording.hpp"
+
+namespace server {
+namespace {
+
+constexpr std::int64_t kUtcOffsetUs = 1'700'000'000'000'000;  // of every TestRobot
+
+class ExcerptTest : public RandomRecordingTest {
+ protected:
+  Excerpt window(std::int64_t from_us, std::int64_t to_us) const {
+    return {.run = {}, .robot_id = robot_.id, .window = TimeWindow{from_us, to_us}};
+  }
+  std::int64_t utc_of(std::uint64_t seq) const { return kUtcOffsetUs + static_cast<std::int64_t>(robot_.time_of(seq)); }
+
+  std::vector<std::uint64_t> seqs(const Excerpt& excerpt, std::size_t limit) {
+    std::vector<std::uint64_t> seen;
+    std::optional<SampleCursor> after;
+    do {
+      const SegmentPage page = wait(history_->segments(excerpt, after, limit)).value();
+      for (const StoredSample& stored : samples_of(page).samples) seen.push_back(stored.seq);
+      after = page.next;
+    } while (after);
+    return seen;
+  }
+  using RandomRecordingTest::samples_of;
+  static SamplePage samples_of(const SegmentPage& page) { return server::samples_of(page); }
+};
+
+TEST_F(ExcerptTest, PagesOfAWindowHoldItsSamplesWhetherStoredOrNot) {
+  start();
+  connect(robot_);
+  make(robot_, 350);
+  flush();
+  make(robot_, 50);
+  robot_.oldest_seq = robot_.next_seq = 500;  // 400 to 499 are lost
+  make(robot_, 20);
+  for (const auto& [first, next] : std::vector<std::pair<std::uint64_t, std::uint64_t>>{
+           {0, 520}, {0, 1}, {99, 101}, {340, 360}, {380, 505}, {420, 430}, {399, 400}, {519, 520}, {519, 900}}) {
+    SCOPED_TRACE(first);
+    std::vector<std::uint64_t> expected;
+    for (std::uint64_t seq = first; seq < std::min<std::uint64_t>(next, 520); ++seq) {
+      if (seq < 400 || seq >= 500) expected.push_back(seq);
+    }
+    EXPECT_EQ(seqs(window(utc_of(first), utc_of(next)), 7), expected);
+    EXPECT_EQ(seqs(window(utc_of(first) - 9'999, utc_of(next) - 9'999), 1000), expected);
+  }
+}
+
+TEST_F(ExcerptTest, AWindowOverSeveralBootsHoldsThemInOrder) {
+  start();
+  connect(robot_);
+  make(robot_, 30);
+  robot_.boot_id += 1;
+  robot_.next_seq = 0;
+  robot_.late_us = 5'000'000;  // its time begins later, so that boots follow one another
+  connect(robot_);
+  make(robot_, 30);
+  const std::vector<StoredSample> found =
+      samples_of(wait(history_->segments(window(kUtcOffsetUs + 700'000, utc_of(10)), {}, 1000)).value()).samples;
+  ASSERT_EQ(found.size(), 20u);
+  EXPECT_EQ(found.front().span, 0u);
+  EXPECT_EQ(found.front().seq, 20u);
+  EXPECT_EQ(found.back().span, 1u);
+  EXPECT_EQ(found.back().seq, 9u);
+  EXPECT_EQ(found.back().boot_id, robot_.boot_id);
+}
+
+TEST_F(ExcerptTest, GapsAreCutToTheWindow) {
+  start();
+  connect(robot_);
+  make(robot_, 100);
+  robot_.oldest_seq = robot_.next_seq = 200;
+  make(robot_, 100);
+  const Absences cut = wait(history_->gaps(window(utc_of(150), utc_of(250)))).value();
+  ASSERT_EQ(cut.gaps.size(), 1u);
+  EXPECT_EQ(cut.gaps[0].first_seq, 150u);
+  EXPECT_EQ(cut.gaps[0].last_seq, 199u);
+  EXPECT_EQ(cut.missing.size(), 0u);
+  EXPECT_EQ(wait(history_->gaps(window(utc_of(0), utc_of(100))))->gaps.size(), 0u);
+}
+
+TEST_F(ExcerptTest, WhatIsNeitherStoredNorLostIsMissing) {
+  start();
+  connect(robot_);
+  const RunId run = wait(runs_->create(robot_.id, named("run")))->id;
+  send(robot_, 0, 20);
+  send(robot_, 50, 20);
+  flush();
+  send(robot_, 90, 10);
+  const auto missing = [&](const Excerpt& excerpt) {
+    std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges;
+    for (const MissingRange& range : wait(history_->gaps(excerpt))->missing) {
+      EXPECT_EQ(range.boot_id, robot_.boot_id);
+      ranges.emplace_back(range.first_seq, range.last_seq);
+    }
+    return ranges;
+  };
+  using Ranges = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
+  EXPECT_EQ(missing(excerpt_of(run)), (Ranges{{20, 49}, {70, 89}}));
+  EXPECT_EQ(missing(window(utc_of(30), utc_of(95))), (Ranges{{30, 49}, {70, 89}}));
+  send(robot_, 20, 30);
+  EXPECT_EQ(missing(excerpt_of(run)), (Ranges{{70, 89}}));
+  robot_.oldest_seq = 80;
+  send(robot_, 100, 5);  // says that 70 to 79 are lost
+  EXPECT_EQ(missing(excerpt_of(run)), (Ranges{{80, 89}}));
+}
+
+// Each number up to the newest is in a sample, in a gap or missing, and only in one of them.
+TEST_F(ExcerptTest, SamplesGapsAndWhatIsMissingMakeTheWhole) {
+  std::size_t missing = 0;
+  for (const unsigned seed : {11U, 12U, 13U, 14U}) {
+    const RunId run = record(seed);
+    const Absences absences = wait(history_->gaps(excerpt_of(run))).value();
+    std::map<BootId, std::map<std::uint64_t, int>> times;
+    for (const StoredSample& stored : samples_of(run)) ++times[stored.boot_id][stored.seq];
+    for (const Gap& gap : absences.gaps) {
+      for (std::uint64_t seq = gap.first_seq; seq <= gap.last_seq; ++seq) ++times[gap.boot_id][seq];
+    }
+    for (const MissingRange& range : absences.missing) {
+      for (std::uint64_t seq = range.first_seq; seq <= range.last_seq; ++seq) ++times[range.boot_id][seq];
+    }
+    EXPECT_GT(absences.gaps.size(), 0u);
+    missing += absences.missing.size();
+    ASSERT_EQ(times.size(), 2u);
+    for (const auto& [boot_id, of_boot] : times) {
+      EXPECT_EQ(of_boot.rbegin()->first - of_boot.begin()->first + 1, of_boot.size());
+      for (const auto& [seq, count] : of_boot) EXPECT_EQ(count, 1) << seq;
+    }
+    EXPECT_EQ(times[robot_.boot_id].rbegin()->first, robot_.next_seq - 1);
+    kill();
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    robot_ = TestRobot{};
+  }
+  EXPECT_GT(missing, 0u);
+}
+
+// The station's clock was set back: what lies between the two ends that bear the time is one piece.
+TEST_F(ExcerptTest, AClockThatWasSetBackLosesNothingOfTheWholeTime) {
+  const RunId run = record(13);
+  std::int64_t first_us = std::numeric_limits<std::int64_t>::max();
+  for (const StoredSample& stored : samples_of(run)) first_us = std::min(first_us, stored.utc_us);
+  const auto whole = wait(history_->segments({.run = {}, .robot_id = robot_.id, .window = {}}, {}, 10'000)).value();
+  const auto window_of_all = wait(history_->segments(window(0, std::int64_t{1} << 52), {}, 10'000)).value();
+  EXPECT_EQ(samples_of(window_of_all).samples.size(), samples_of(whole).samples.size());
+  EXPECT_GT(samples_of(whole).samples.size(), 500u);
+}
+
+TEST_F(ExcerptTest, SegmentsAreFoundByTheIndex) {
+  start();
+  for (const char* condition :
+       {"first_seq <= 2 ORDER BY first_seq DESC LIMIT 1", "first_seq > 2 ORDER BY first_seq LIMIT 1"}) {
+    const auto plan = rows(
+        std::string{"EXPLAIN QUERY PLAN SELECT first_seq, last_seq FROM segment WHERE boot_key = 1 AND "} + condition);
+    ASSERT_EQ(plan.size(), 1u);
+    EXPECT_NE(plan[0].find("SEARCH segment USING INDEX segment_by_seq (boot_key=? AND first_seq"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace server
