@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::int64_t kMinGridUs = 100;
 constexpr std::int64_t kMaxGridUs = 3'600'000'000;
+constexpr std::uint64_t kUsualPeriodUs = 10'000;
 constexpr std::uint64_t kSampleBytes = 200;                  // at most, in any format's file
 constexpr std::uint64_t kSpareBytes = 512ULL * 1024 * 1024;  // that the recording goes on with
 
@@ -23,12 +24,6 @@ struct ParsedExport {
   ExportQuery query;
   std::vector<RecordedSpan> spans;  // as far as they were made when the export began
 };
-
-std::uint64_t samples_in(const std::vector<RecordedSpan>& spans) {
-  std::uint64_t samples = 0;
-  for (const RecordedSpan& span : spans) samples += span.samples.next - span.samples.first;
-  return samples;
-}
 
 asio::awaitable<Result<ParsedExport>> parse_export(ApiParts& parts, Request request) {
   ParsedExport parsed;
@@ -82,12 +77,12 @@ Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folde
 
 asio::awaitable<Result<std::unique_ptr<ExportFile>>> begin_file(ApiParts& parts, const ParsedExport& parsed,
                                                                 const char* ending) {
-  const std::uint64_t rows_per_sample =
-      parsed.query.grid_us ? 1 + 100'000 / static_cast<std::uint64_t>(*parsed.query.grid_us) : 1;
-  auto job = [folder = parts.recording.exports_folder(), ending, samples = samples_in(parsed.spans) * rows_per_sample] {
-    return make_file(folder, ending, samples);
+  const auto grid_us = static_cast<std::uint64_t>(parsed.query.grid_us.value_or(kMaxGridUs));
+  auto job = [folder = parts.recording.exports_folder(), ending, spans = parsed.spans,
+              grid_us](SQLite::Database& database) {
+    return make_file(folder, ending, most_samples(database, spans) * (1 + kUsualPeriodUs / grid_us));
   };
-  co_return co_await parts.recording.exports.reader().run(std::move(job));
+  co_return co_await parts.recording.exports.reader().ask(std::move(job));
 }
 
 Answer export_mat(ApiParts& parts, Request request) {

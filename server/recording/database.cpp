@@ -127,7 +127,7 @@ void Database::migrate(const std::filesystem::path& path) {
 void Database::checkpoint() { handle_.exec("PRAGMA wal_checkpoint(TRUNCATE)"); }
 
 SQLite::Database open_for_reading(const std::filesystem::path& path) {
-  SQLite::Database database{path.string(), SQLite::OPEN_READONLY, kBusyTimeoutMs};
+  SQLite::Database database{path.string(), SQLite::OPEN_READONLY | SQLite::OPEN_NOMUTEX, kBusyTimeoutMs};
   database.exec("PRAGMA query_only = ON");
   return database;
 }

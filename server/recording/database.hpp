@@ -32,7 +32,7 @@ class Database {
   std::uint64_t store_id_ = 0;
 };
 
-// For queries, beside the writing handle; never blocks it.
+// For queries, beside the writing handle; never blocks it. For one thread at a time: SQLite takes no lock for it.
 SQLite::Database open_for_reading(const std::filesystem::path& path);
 
 }  // namespace server

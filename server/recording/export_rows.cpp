@@ -1,7 +1,23 @@
 // Steps through segments, and through the grid over them.
 #include "server/recording/export_rows.hpp"
 
+#include "server/recording/schema.hpp"
+#include "server/recording/statement.hpp"
+
 namespace server {
+
+std::uint64_t most_samples(SQLite::Database& database, const std::vector<RecordedSpan>& spans) {
+  std::int64_t samples = 0;
+  SQLite::Statement query{database,
+                          "SELECT count(*) FROM segment WHERE boot_key = ? AND first_seq > ? AND first_seq < ?"};
+  for (const RecordedSpan& span : spans) {
+    bind_all(query, span.boot_key, static_cast<std::int64_t>(span.samples.first) - kMaxSegmentSamples,
+             span.samples.next);
+    query.executeStep();
+    samples += kMaxSegmentSamples * (query.getColumn(0).getInt64() + static_cast<std::int64_t>(span.waiting.size()));
+  }
+  return static_cast<std::uint64_t>(samples);
+}
 
 void SegmentRows::give(SegmentPage page) {
   page_ = std::move(page);

@@ -5,7 +5,7 @@
 // sample within half of that sample's period (of two as near the earlier one), else nothing: it is a gap. Nothing is
 // interpolated, and no clock's step bends the grid.
 //
-// Works page by page, so memory does not grow with the length of the run. Pure: no database, no thread.
+// The rows work page by page, so memory does not grow with the length of the run; they know no database and no thread.
 #pragma once
 
 #include <cstdint>
@@ -34,6 +34,9 @@ struct GridRow {
   const Sample* sample = nullptr;  // null: a gap
   std::optional<float> setpoint_m;
 };
+
+// At least as many samples as the spans hold, from the index alone.
+std::uint64_t most_samples(SQLite::Database& database, const std::vector<RecordedSpan>& spans);
 
 class SegmentRows {
  public:

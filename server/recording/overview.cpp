@@ -15,6 +15,14 @@ constexpr std::size_t kSliceSegments = 5'000;
 constexpr std::uint64_t kSegmentSamples = 100;  // at most
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
+// The point of a place, and the first place of a point; with room for whatever number a robot says it has reached.
+std::uint64_t point_of(std::uint64_t place, std::uint64_t points, std::uint64_t places) {
+  return static_cast<std::uint64_t>(static_cast<unsigned __int128>(place) * points / places);
+}
+std::uint64_t place_of(std::uint64_t point, std::uint64_t points, std::uint64_t places) {
+  return static_cast<std::uint64_t>((static_cast<unsigned __int128>(point) * places + points - 1) / points);
+}
+
 std::int64_t utc_us(const Segment& segment, std::size_t index) {
   return static_cast<std::int64_t>(segment.robot_time_us(index)) + segment.utc_offset_us;
 }
@@ -136,8 +144,8 @@ bool OverviewScan::advance_rows(SQLite::Database& database) {
 void OverviewScan::add_rows(std::size_t span, const Segment& segment) {
   const std::uint64_t first_place = first_place_[span] + segment.first_seq - spans_[span].samples.first;
   for (std::size_t begin = 0; begin < segment.samples.size();) {
-    const std::uint64_t point = (first_place + begin) * query_.points / places_;
-    const std::uint64_t next_place = ((point + 1) * places_ + query_.points - 1) / query_.points;
+    const std::uint64_t point = point_of(first_place + begin, query_.points, places_);
+    const std::uint64_t next_place = place_of(point + 1, query_.points, places_);
     const std::size_t end = std::min<std::size_t>(segment.samples.size(), next_place - first_place);
     add(first_place + begin, extent_of(segment, begin, end));
     begin = end;
@@ -159,7 +167,7 @@ bool OverviewScan::advance_segments(SQLite::Database& database) {
 }
 
 void OverviewScan::add(std::uint64_t place, const Extent& extent) {
-  const std::uint64_t point = place * query_.points / places_;
+  const std::uint64_t point = point_of(place, query_.points, places_);
   const bool begins = point_ != point;
   point_ = point;
   if (begins) {

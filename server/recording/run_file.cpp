@@ -13,7 +13,7 @@
 namespace server {
 namespace {
 
-constexpr std::size_t kSliceSamples = 5'000;
+constexpr std::size_t kSliceSamples = 2'500;
 
 constexpr const char* kTables = R"sql(
 CREATE TABLE sample (

@@ -56,9 +56,10 @@ std::uint64_t unsigned_at(sqlite3_stmt* row, int column) {
   return static_cast<std::uint64_t>(sqlite3_column_int64(row, column));
 }
 
+// NULL reads as 0, so only a 0 is looked at twice.
 float float_at(sqlite3_stmt* row, int column) {
-  return sqlite3_column_type(row, column) == SQLITE_NULL ? kNaN
-                                                         : static_cast<float>(sqlite3_column_double(row, column));
+  const double value = sqlite3_column_double(row, column);
+  return value == 0 && sqlite3_column_type(row, column) == SQLITE_NULL ? kNaN : static_cast<float>(value);
 }
 
 template <class Named, class Parse>

@@ -70,7 +70,7 @@ class CancelTest : public ApiTest {
   void poll_until(Condition condition) {
     const auto patience = std::chrono::steady_clock::now() + 10s;
     while (!condition() && std::chrono::steady_clock::now() < patience) {
-      loop.poll();
+      loop.poll_one();
       std::this_thread::yield();
     }
     ASSERT_TRUE(condition());
@@ -110,6 +110,24 @@ TEST_F(CancelTest, AQuestionWhoseClientHasGoneAsksNoFurther) {
   }
 }
 
+// The rest of an export is not read for nobody.
+TEST_F(CancelTest, AnExportWhoseClientHasGoneEnds) {
+  make_run();
+  for (std::uint64_t seq = 25; seq < 10'000; seq += 25) make_samples(*robot, seq, 25);
+  const auto& exports_reader = recording.exports.reader();
+  std::uint64_t of_whole = exports_reader.questions();
+  ask("GET", "/api/v1/runs/1/samples.csv");
+  of_whole = exports_reader.questions() - of_whole;
+  ASSERT_GT(of_whole, 5u);
+  QuietClient client{api->port()};
+  const std::uint64_t before = exports_reader.questions();
+  client.send(head("GET /api/v1/runs/1/samples.csv"));
+  poll_until([&] { return exports_reader.questions() >= before + 2; });  // it has begun
+  client.leave();
+  clock.settle();
+  EXPECT_LT(exports_reader.questions() - before, of_whole);
+}
+
 TEST_F(CancelTest, TheNextQuestionIsAnsweredAfterOneThatWasGivenUp) {
   make_run();
   questions_for("/api/v1/runs/1/overview", false);
@@ -135,6 +153,10 @@ TEST_F(CancelTest, APostIsCarriedOutThoughItsClientHasGone) {
   make_run();
   QuietClient client{api->port()};
   stop_working(disk);
+  RobotEvent event;  // that the run's end must wait for
+  event.robot_id = "r1";
+  event.kind = "limit";
+  recorder.on_event(*station.find("r1"), event);
   client.send(head("POST /api/v1/runs/1/end"));
   loop.poll();
   loop.poll();

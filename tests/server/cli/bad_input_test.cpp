@@ -69,6 +69,16 @@ TEST_F(BadInput, FilesThatAreNotThere) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "nowhere"));
 }
 
+TEST_F(BadInput, Exports) {
+  const std::string run = "export --run 1 --data @nowhere --to @out ";
+  EXPECT_THAT(complaint(run + "--format csv"), HasSubstr("there is no"));
+  EXPECT_THAT(complaint(run + "--format csv --channels duty,volume"), HasSubstr("'volume' is no channel"));
+  EXPECT_THAT(complaint(run + "--format sqlite --grid-us 10000"), HasSubstr("--grid-us is for csv and mat"));
+  EXPECT_THAT(ask(run + "--format xls").error, HasSubstr("must be one of csv, mat, sqlite, is 'xls'"));
+  EXPECT_THAT(ask(run + "--format csv --grid-us 1").error, HasSubstr("--grid-us must be"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
 TEST_F(BadInput, CsvFiles) {
   EXPECT_THAT(csv(""), HasSubstr("no heading"));
   EXPECT_THAT(csv("t_s,position_m\n0,0\n"), HasSubstr("column duty is missing"));

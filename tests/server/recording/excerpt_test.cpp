@@ -139,6 +139,27 @@ TEST_F(ExcerptTest, SamplesGapsAndWhatIsMissingMakeTheWhole) {
   EXPECT_GT(missing, 0u);
 }
 
+TEST_F(ExcerptTest, WhatIsMissingIsTheSameInSlicesOfAnySize) {
+  const RunId run = record(14);
+  const auto spans = wait(history_->spans(excerpt_of(run))).value();
+  SQLite::Database database = open_for_reading(path_);
+  std::vector<std::vector<std::uint64_t>> found;
+  for (const std::size_t segments : {1u, 3u, 10'000u}) {
+    std::vector<std::uint64_t>& numbers = found.emplace_back();
+    for (const RecordedSpan& span : spans) {
+      std::uint64_t first_seq = span.samples.first;
+      while (first_seq < span.made().next) {
+        for (const MissingRange& range : read_missing(database, span, first_seq, segments)) {
+          numbers.insert(numbers.end(), {range.boot_id, range.first_seq, range.last_seq});
+        }
+      }
+    }
+  }
+  EXPECT_GT(found[0].size(), 0u);
+  EXPECT_EQ(found[0], found[2]);
+  EXPECT_EQ(found[1], found[2]);
+}
+
 // The station's clock was set back: what lies between the two ends that bear the time is one piece.
 TEST_F(ExcerptTest, AClockThatWasSetBackLosesNothingOfTheWholeTime) {
   const RunId run = record(13);

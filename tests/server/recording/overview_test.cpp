@@ -173,6 +173,34 @@ TEST_F(OverviewTest, AsksInSlices) {
   EXPECT_EQ(questions_for(10'000), 5u);  // spans, gaps, and 20,000 rows thrice
 }
 
+TEST_F(OverviewTest, HoldsARobotThatBeginsFarAhead) {
+  start();
+  robot_.next_seq = robot_.oldest_seq = std::uint64_t{1} << 61;
+  connect(robot_);
+  make(robot_, 20);
+  const Excerpt all{.run = {}, .robot_id = robot_.id, .window = {}};
+  const OverviewColumns columns = overview(all, 10'000).columns;
+  EXPECT_EQ(columns.samples, (std::vector<std::uint64_t>{20}));
+  EXPECT_EQ(wait(history_->gaps(all))->missing.size(), 0u);
+}
+
+// More segments than a slice reads.
+TEST_F(OverviewTest, SlicesOfSegmentsJoinWithoutASeam) {
+  start();
+  connect(robot_);
+  const RunId run = wait(runs_->create(robot_.id, named("run")))->id;
+  for (int sample = 0; sample < 5'050; ++sample) {
+    robot_.context.mode = sample % 2 == 0 ? rheonaut_MODE_AUTO : rheonaut_MODE_MANUAL;
+    make(robot_, 1);
+  }
+  flush();
+  ASSERT_EQ(number("SELECT count(*) FROM segment"), 5'050);
+  const OverviewColumns columns = overview(excerpt_of(run), 50).columns;
+  EXPECT_TRUE(columns.from_segments);
+  EXPECT_EQ(columns.samples, (std::vector<std::uint64_t>(50, 101)));
+  expect_same(columns, samples_of(run), all_channels());
+}
+
 TEST_F(OverviewTest, TheCountOfSegmentsIsAnsweredByTheIndexAlone) {
   start();
   const auto plan = rows(
