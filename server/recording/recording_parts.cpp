@@ -23,8 +23,8 @@ RetentionPolicy retention_policy(const RecordingConfig& config) {
 }  // namespace
 
 RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                               WorkerThread& exports_worker, WorkerThread& checkpoints,
-                               const RecorderOptions& options, const RecordingConfig& config)
+                               WorkerThread& exports_worker, WorkerThread& checkpoints, const RecorderOptions& options,
+                               const RecordingConfig& config)
     : recorder{loop, clock, disk, checkpoints, options},
       reader{options.path, readers},
       certifier{clock, recorder, reader},

@@ -214,8 +214,8 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
 
   RecorderOptions options_;
   std::map<BootId, std::map<std::uint64_t, std::uint32_t>> stored_;  // flags of each stored sample
-  std::map<BootId, std::uint64_t> made_by_ended_;  // samples
-  std::set<std::uint64_t> heard_;                  // of the present boot
+  std::map<BootId, std::uint64_t> made_by_ended_;                    // samples
+  std::set<std::uint64_t> heard_;                                    // of the present boot
   std::uint64_t next_event_seq_ = 0;
   int answered_events_ = 0;
 };

@@ -42,8 +42,8 @@ RecordingTest::~RecordingTest() {
 void RecordingTest::start(RecorderOptions options, const RecordingConfig& config) {
   options.path = path_;
   tasks_ = std::make_unique<TaskGroup>(loop_);
-  recording_ = std::make_unique<RecordingParts>(loop_, clock_, disk_, readers_, exports_worker_, checkpoints_, options,
-                                                config);
+  recording_ =
+      std::make_unique<RecordingParts>(loop_, clock_, disk_, readers_, exports_worker_, checkpoints_, options, config);
   clock_.add_worker(recording_->backups.checker());
   recorder_ = &recording_->recorder;
   runs_ = &recording_->runs;
