@@ -19,8 +19,8 @@ RetentionPolicy retention_policy(const RecordingConfig& config) {
 }  // namespace
 
 RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                               const RecorderOptions& options, const RecordingConfig& config)
-    : recorder{loop, clock, disk, options},
+                               WorkerThread& checkpoints, const RecorderOptions& options, const RecordingConfig& config)
+    : recorder{loop, clock, disk, checkpoints, options},
       runs{clock, recorder},
       history{options.path, recorder, readers},
       disk_watch{clock, readers, options.path, space_limits(config)},
@@ -32,6 +32,7 @@ void RecordingParts::connect(Station& station) {
   station.add_sink(runs);
   recorder.set_on_durable(std::bind_front(&Station::on_durable, &station));
   recorder.set_on_missing(std::bind_front(&Station::request_resend, &station));
+  recorder.set_on_missing_events(std::bind_front(&Station::request_event_resend, &station));
 }
 
 asio::awaitable<RestoredState> RecordingParts::open() {
@@ -43,6 +44,7 @@ asio::awaitable<RestoredState> RecordingParts::open() {
 
 void RecordingParts::spawn(TaskGroup& tasks) {
   tasks.spawn("recorder", recorder.run());
+  tasks.spawn("checkpoints", recorder.run_checkpoints());
   tasks.spawn("disk watch", disk_watch.run());
   tasks.spawn("backups", backups.run());
   tasks.spawn("retention", retention.run());
