@@ -39,7 +39,11 @@ std::string metrics_text(const RecordingParts& recording) {
   metrics.gauge("queued_samples", recording.recorder.queued_samples(), "Received and not durable yet.");
   metrics.gauge("free_bytes", use.free_bytes, "On the disk of the database.");
   metrics.gauge("database_bytes", use.database_bytes, "Of the database file.");
-  metrics.gauge("wal_bytes", use.wal_bytes, "Of the write-ahead log file.");
+  const WalState& wal = recording.recorder.wal();
+  metrics.gauge("wal_bytes", wal.bytes, "In use in the write-ahead log.");
+  metrics.gauge("wal_held", wal.held_since_us == 0 ? 0 : 1,
+                "1 while another program keeps the log from beginning anew.");
+  metrics.counter("checkpoints_total", wal.checkpoints, "Passes that moved the log into the database.");
   metrics.counter("samples_written_total", counters.samples_written, "Samples that became durable.");
   metrics.counter("samples_duplicate_total", counters.samples_duplicate, "Samples that were received again.");
   metrics.counter("samples_refused_total", counters.samples_refused, "Samples that the full queue did not take.");

@@ -18,6 +18,8 @@ json to_json(const RecorderCounters& counters) {
           {"samples_lost", counters.samples_lost},
           {"records_refused", counters.records_refused},
           {"batches_malformed", counters.batches_malformed},
+          {"events_asked_again", counters.events_asked_again},
+          {"largest_commit_samples", counters.largest_commit_samples},
           {"commits", counters.commits},
           {"commits_failed", counters.commits_failed}};
 }
@@ -45,6 +47,8 @@ Answer get_recording(ApiParts& parts, Request) {
   const bool failing = recording.recorder.failing();
   const bool has_room = recording.disk_watch.state() == SpaceState::ok;
   const DiskUse& use = recording.disk_watch.use();
+  const WalState& wal = recording.recorder.wal();
+  const std::int64_t held_us = parts.clock.utc_us() - wal.held_since_us;
   co_return json_response(
       200, {{"state", failing    ? "failing"
                       : has_room ? "recording"
@@ -54,7 +58,8 @@ Answer get_recording(ApiParts& parts, Request) {
             {"queued_samples", recording.recorder.queued_samples()},
             {"free_bytes", use.free_bytes},
             {"database_bytes", use.database_bytes},
-            {"wal_bytes", use.wal_bytes},
+            {"wal_bytes", wal.bytes},
+            {"wal_held_s", wal.held_since_us == 0 ? 0 : static_cast<double>(held_us) / 1e6},
             {"counters", to_json(recording.recorder.counters())},
             {"retention", to_json(recording.retention)}});
 }

@@ -61,7 +61,6 @@ asio::awaitable<void> DiskWatch::look() {
   auto job = [path = database_, before = use_, free_bytes = free_bytes_] {
     DiskUse use = before;  // a file system that does not answer is as it was
     use.database_bytes = file_bytes(path);
-    use.wal_bytes = file_bytes(fs::path{path}.concat("-wal"));
     try {
       use.free_bytes = free_bytes(fs::absolute(path).parent_path());
     } catch (const std::system_error& error) {

@@ -34,8 +34,7 @@ SpaceState next_state(SpaceState now, std::uint64_t free_bytes, SpaceLimits limi
 
 struct DiskUse {
   std::uint64_t free_bytes = 0;      // for this user
-  std::uint64_t database_bytes = 0;  // the file
-  std::uint64_t wal_bytes = 0;       // its write-ahead log, as large as it once was
+  std::uint64_t database_bytes = 0;  // of the file
 };
 
 // How many bytes this user may still write into a folder. Throws std::system_error.

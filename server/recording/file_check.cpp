@@ -65,10 +65,11 @@ bool is_blank(const Bytes& head) {
   return head.number(68, 4) == 0 && head.number(60, 4) == 0 && head.at(100) == kLeafOfTable && head.number(103, 2) == 0;
 }
 
-// A rollback journal that would bring content back. That of our own creation brings back nothing.
+// A rollback journal that would bring tables back: each has a page of its own beside the first one. Those of our own
+// creation are of a file with one page at most.
 bool has_hot_journal(const fs::path& path) {
   const Bytes journal{beside(path, "-journal"), 28};
-  return journal.size() == 28 && journal.begins_with(kJournalMagic) && journal.number(16, 4) != 0;
+  return journal.size() == 28 && journal.begins_with(kJournalMagic) && journal.number(16, 4) > 1;
 }
 
 std::optional<std::string> problem_of_marks(const Bytes& head, const fs::path& path) {

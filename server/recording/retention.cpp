@@ -81,9 +81,9 @@ Step shrink_step(SQLite::Database& database, std::size_t pages) {
 }  // namespace
 
 void StepSize::note(std::int64_t took_us) {
-  if (took_us > kStepTime.count() * 7 / 10) {
+  if (took_us > kStepTime.count() / 2) {
     value_ = std::max<std::size_t>(value_ / 2, 1);
-  } else if (took_us < kStepTime.count() * 3 / 10) {
+  } else if (took_us < kStepTime.count() / 5) {
     value_ = std::min(value_ * 2, end_);
   }
 }
@@ -198,9 +198,8 @@ asio::awaitable<std::optional<std::int64_t>> Retention::oldest_us() {
 }
 
 asio::awaitable<void> Retention::make_room_for_commits(std::int64_t took_us) {
-  auto look = [log = std::filesystem::path{recorder_.path()}.concat("-wal")] { return file_bytes(log); };
-  const std::uint64_t log_bytes = co_await readers_.run(std::move(look));
-  const bool behind = recorder_.failing() || recorder_.queued_samples() > kManyQueued || log_bytes > kLargeLog;
+  const bool behind =
+      recorder_.failing() || recorder_.queued_samples() > kManyQueued || recorder_.wal().bytes > kLargeLog;
   const microseconds took{took_us};
   co_await clock_.sleep_for(behind ? kPauseWhenBehind : std::max(kPause, took));
 }

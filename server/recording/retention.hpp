@@ -76,7 +76,7 @@ class Retention {
   RetentionPolicy policy_;
   RetentionCounters counters_;
   StepSize segments_{50, 500};
-  StepSize pages_{64, 4096};
+  StepSize pages_{64, 1024};
 };
 
 }  // namespace server

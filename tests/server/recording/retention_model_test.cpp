@@ -77,14 +77,6 @@ class RetentionModelTest : public RecordingTest, public ::testing::WithParamInte
     return stored_runs(database);
   }
 
-  void flush_and_settle() {
-    flush();
-    for (const auto& [boot_id, next_seq] : durable_next_seqs_) {
-      execute("UPDATE boot SET durable_next_seq = max(durable_next_seq, " + std::to_string(next_seq) +
-              ") WHERE boot_id = " + std::to_string(boot_id));
-    }
-  }
-
   std::uint64_t pick(std::uint64_t limit) { return random_() % limit; }
 
   std::mt19937 random_{GetParam()};
@@ -102,7 +94,7 @@ TEST_P(RetentionModelTest, RunsStayAndEverySampleIsInOnePlace) {
   begin();
   for (int round = 0; round < 8; ++round) {
     for (int step = 0; step < 10; ++step) act();
-    flush_and_settle();
+    flush();
     const auto before = runs();
     wait(recording_->retention.pass());
     EXPECT_EQ(runs(), before) << "round " << round;
@@ -117,7 +109,7 @@ TEST_P(RetentionModelTest, RunsStayAndEverySampleIsInOnePlace) {
 TEST_P(RetentionModelTest, AVacuumByTheStockProgramChangesNoRun) {
   begin();
   for (int step = 0; step < 40; ++step) act();
-  flush_and_settle();
+  flush();
   wait(recording_->retention.pass());
   stop();
   const auto before = runs();
@@ -125,7 +117,7 @@ TEST_P(RetentionModelTest, AVacuumByTheStockProgramChangesNoRun) {
   EXPECT_EQ(runs(), before);
   begin();
   make(robots_.front(), 300, 25);
-  flush_and_settle();
+  flush();
   SQLite::Database database = open_for_reading(path_);
   EXPECT_THAT(coverage_faults(database), IsEmpty()) << "row numbers go on where they were";
 }
