@@ -15,6 +15,8 @@ constexpr std::uint64_t kFrameBytes = 4096 + 24;  // a page and its header
 constexpr std::uint64_t kPassShare = 4;           // a pass is worth while for a quarter of checkpoint_bytes
 constexpr microseconds kTryInterval = 200ms;      // readers of our own are gone after 250 ms
 constexpr microseconds kHeldTryInterval = 1s;
+constexpr microseconds kRestartInterval = 2s;  // for the disk thread waits up to a second
+constexpr microseconds kHeldRestartInterval = 10s;
 constexpr microseconds kHeldPatience = 5s;
 constexpr microseconds kWarningInterval = 10s;
 
@@ -23,7 +25,7 @@ CheckpointOutcome make_pass(const std::filesystem::path& path) {
     SQLite::Database database{path.string(), SQLite::OPEN_READWRITE};
     database.exec("PRAGMA synchronous = FULL");                // as the log must be synced before the file is written
     database.execAndGet("SELECT value FROM meta").getInt64();  // opens the log
-    return checkpoint_passively(database);
+    return checkpoint(database, CheckpointMode::passive);
   } catch (const std::exception& error) {
     return {.log_frames = 0, .moved_frames = 0, .is_busy = false, .problem = error.what()};
   }
@@ -31,11 +33,12 @@ CheckpointOutcome make_pass(const std::filesystem::path& path) {
 
 }  // namespace
 
-CheckpointOutcome checkpoint_passively(SQLite::Database& database) {
+CheckpointOutcome checkpoint(SQLite::Database& database, CheckpointMode mode) {
   int log_frames = 0;
   int moved_frames = 0;
   sqlite3* handle = database.getHandle();
-  const int result = sqlite3_wal_checkpoint_v2(handle, nullptr, SQLITE_CHECKPOINT_PASSIVE, &log_frames, &moved_frames);
+  const int how = mode == CheckpointMode::passive ? SQLITE_CHECKPOINT_PASSIVE : SQLITE_CHECKPOINT_RESTART;
+  const int result = sqlite3_wal_checkpoint_v2(handle, nullptr, how, &log_frames, &moved_frames);
   const bool is_busy = result == SQLITE_BUSY;
   CheckpointOutcome outcome{.log_frames = log_frames, .moved_frames = moved_frames, .is_busy = is_busy, .problem = {}};
   if (result != SQLITE_OK && !is_busy) outcome.problem = sqlite3_errmsg(handle);
@@ -69,6 +72,7 @@ void Checkpointer::on_log(std::uint64_t bytes) {
     if (state_.held_since_us != 0) spdlog::info("the write-ahead log of {} has begun anew", path_.string());
     was_passed_ = false;
     moved_bytes_ = 0;
+    next_restart_us_ = 0;
     is_finished_ = false;
     stuck_since_us_ = state_.held_since_us = 0;
   }
@@ -82,7 +86,7 @@ void Checkpointer::on_log(std::uint64_t bytes) {
 }
 
 asio::awaitable<void> Checkpointer::wait_for_room() {
-  while (is_passing_ && state_.bytes >= checkpoint_bytes_ + checkpoint_bytes_ / 2) co_await pass_ended_.wait();
+  while (is_passing_ && is_long()) co_await pass_ended_.wait();
 }
 
 bool Checkpointer::wants_finish() const {
@@ -91,8 +95,15 @@ bool Checkpointer::wants_finish() const {
   return was_passed_ || clock_.steady_us() >= next_try_us_;
 }
 
-void Checkpointer::on_finish(const CheckpointOutcome& outcome) {
+CheckpointMode Checkpointer::finish_mode() const {
+  const bool is_time = is_finished_ && is_long() && clock_.steady_us() >= next_restart_us_;
+  return is_time ? CheckpointMode::restart : CheckpointMode::passive;
+}
+
+void Checkpointer::on_finish(CheckpointMode mode, const CheckpointOutcome& outcome) {
   note(outcome);
+  const microseconds interval = state_.held_since_us == 0 ? kRestartInterval : kHeldRestartInterval;
+  if (mode == CheckpointMode::restart) next_restart_us_ = clock_.steady_us() + interval.count();
   was_passed_ = false;
   is_finished_ = true;
 }

@@ -3,8 +3,9 @@
 //   log ≥ checkpoint_bytes → a pass on a thread and handle of its own → the disk thread finishes between two commits
 //   → the next commit begins the log anew, unless a reader stands in it
 //
-// A commit waits only when the log has grown by half again while a pass is under way. So the log stays below twice
-// checkpoint_bytes; only a foreign program that holds a read transaction makes it longer, which is logged and counted.
+// When the log has grown by half again, a commit waits for a pass that is under way, and the disk thread waits for
+// readers that stand in the log (ours are gone after 250 ms). So it stays below twice checkpoint_bytes; only a foreign
+// program that holds a read transaction makes it longer, which is logged and counted.
 //
 // Loop thread; the work is done on the two workers. Loop, clock and worker outlive it.
 #pragma once
@@ -33,12 +34,17 @@ struct WalState {
 struct CheckpointOutcome {
   std::int64_t log_frames = 0;
   std::int64_t moved_frames = 0;  // of them, into the database
-  bool is_busy = false;           // another checkpoint is under way: nothing is known
+  bool is_busy = false;           // another checkpoint is under way, or a reader did not go
   std::string problem;            // empty: none
 };
 
-// Moves what no reader needs, and waits for nobody. Of the handle's thread.
-CheckpointOutcome checkpoint_passively(SQLite::Database& database);
+enum class CheckpointMode : std::uint8_t {
+  passive,  // moves what no reader needs, and waits for nobody
+  restart,  // waits for readers, as long as the handle waits for locks: the next commit begins the log anew
+};
+
+// Of the handle's thread.
+CheckpointOutcome checkpoint(SQLite::Database& database, CheckpointMode mode);
 
 class Checkpointer {
  public:
@@ -54,12 +60,14 @@ class Checkpointer {
   boost::asio::awaitable<void> wait_for_room();
   // Little is left to move, or a pass has left it: the disk thread is to do it now, and to say what came of it.
   bool wants_finish() const;
-  void on_finish(const CheckpointOutcome& outcome);
+  CheckpointMode finish_mode() const;
+  void on_finish(CheckpointMode mode, const CheckpointOutcome& outcome);
 
   const WalState& state() const { return state_; }
 
  private:
   void note(const CheckpointOutcome& outcome);
+  bool is_long() const { return state_.bytes >= checkpoint_bytes_ + checkpoint_bytes_ / 2; }
   void watch();
 
   Clock& clock_;
@@ -71,13 +79,14 @@ class Checkpointer {
 
   WalState state_;
   bool is_passing_ = false;
-  bool was_passed_ = false;          // since the log began, and something of it may be left
-  std::uint64_t moved_bytes_ = 0;    // of this log, into the database
-  std::int64_t next_try_us_ = 0;     // steady
-  bool is_finished_ = false;         // all that could be moved was, so it should begin anew
-  std::int64_t stuck_since_us_ = 0;  // steady; a commit did not begin it anew; 0: none was made, or it did
-  std::int64_t warned_at_us_ = 0;    // steady
-  std::string problem_;              // of the latest try
+  bool was_passed_ = false;           // since the log began, and something of it may be left
+  std::uint64_t moved_bytes_ = 0;     // of this log, into the database
+  std::int64_t next_try_us_ = 0;      // steady
+  std::int64_t next_restart_us_ = 0;  // steady
+  bool is_finished_ = false;          // all that could be moved was, so it should begin anew
+  std::int64_t stuck_since_us_ = 0;   // steady; a commit did not begin it anew; 0: none was made, or it did
+  std::int64_t warned_at_us_ = 0;     // steady
+  std::string problem_;               // of the latest try
 };
 
 }  // namespace server

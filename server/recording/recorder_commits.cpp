@@ -168,9 +168,10 @@ void Recorder::note_failure(const std::string& problem) {
 
 asio::awaitable<void> Recorder::finish_checkpoint() {
   if (!checkpointer_.wants_finish()) co_return;
-  auto finish = [](Database& database) { return checkpoint_passively(database.handle()); };
+  const CheckpointMode mode = checkpointer_.finish_mode();
+  auto finish = [mode](Database& database) { return checkpoint(database.handle(), mode); };
   const CheckpointOutcome outcome = co_await on_disk(std::move(finish));
-  checkpointer_.on_finish(outcome);
+  checkpointer_.on_finish(mode, outcome);
 }
 
 void Recorder::count_written(const WriteBatch& written) {

@@ -58,6 +58,37 @@ TEST_F(CheckpointTest, TheLogIsMovedBesideTheCommitsAndBeginsAnew) {
   EXPECT_EQ(rows("PRAGMA integrity_check"), std::vector<std::string>{"ok"});
 }
 
+// As exports do: one read transaction follows another, each through many commits.
+TEST_F(CheckpointTest, ReadersWithoutAPauseDoNotMakeTheLogLong) {
+  start(options_);
+  connect(robot_);
+  make_a_second();
+  WorkerThread exports{"exports"};
+  bool reads = true;
+  int pages = 0;
+  auto read = [path = path_] {
+    SQLite::Database database = open_for_reading(path);
+    SQLite::Statement page{database, "SELECT count(*) FROM (SELECT a.row FROM sample AS a, sample AS b LIMIT 60000)"};
+    page.executeStep();
+  };
+  auto read_on = [&]() -> boost::asio::awaitable<void> {
+    while (reads) {
+      co_await exports.run(read);
+      ++pages;
+    }
+  };
+  tasks_->spawn("exports", read_on());
+  for (int second = 0; second < 30; ++second) {
+    make_a_second();
+    EXPECT_LE(recorder_->wal().bytes, 2 * kCheckpointBytes);
+  }
+  reads = false;
+  while (exports.jobs() > 0) loop_.run_one();
+  clock_.settle();
+  EXPECT_GT(pages, 1);
+  EXPECT_EQ(durable_next_seq_, robot_.next_seq);
+}
+
 TEST_F(CheckpointTest, AForeignReaderThatHoldsTheLogIsWarnedOfUntilItEnds) {
   start(options_);
   connect(robot_);

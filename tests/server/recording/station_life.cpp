@@ -95,18 +95,20 @@ void StationLife::check_stops() {
 }
 
 void StationLife::end_well() {
+  const auto compare = [this](const char* when) {
+    SQLite::Database database = open_for_reading(path_);
+    note(audit_complete(database, truth_), when);
+  };
   try {
     vfs_.begin(survival_, 0);
     begin();
     for (RingRobot& robot : robots_) send_the_rest(robot);
-    SQLite::Database database = open_for_reading(path_);
-    note(audit_complete(database, truth_), "at the end");
-  } catch (const std::exception& error) {
+    compare("at the end");
+    stop();
+    compare("after the end");
+  } catch (const std::exception& error) {  // such as a file that is malformed
     note({error.what()}, "at the end");
   }
-  stop();
-  SQLite::Database database = open_for_reading(path_);
-  note(audit_complete(database, truth_), "after the end");
 }
 
 void StationLife::send_the_rest(RingRobot& robot) {
