@@ -26,14 +26,15 @@ int serve(const Config& config) {
   // The ground everything stands on; declared first, destroyed last.
   boost::asio::io_context loop{1};  // all sockets, all live state
   SystemClock clock{loop};
-  WorkerThread disk{"disk"}, readers{"readers", 10}, maths{"maths", 10};  // blocking work
+  WorkerThread disk{"disk"}, readers{"readers", 10}, checkpoints{"checkpoints", 10},
+      maths{"maths", 10};  // blocking work
   TaskGroup tasks{loop};
 
   // Centre: the only owner of live state, and the only door for commands.
   Station station{loop, clock, config.limits, config.link};
 
   // Out: they hear the station and never call it back; what has become durable comes back through one function.
-  RecordingParts recording{loop, clock, disk, readers, {config.database(), config.enrol_on_loopback}};
+  RecordingParts recording{loop, clock, disk, readers, checkpoints, {config.database(), config.enrol_on_loopback}};
   LiveFeed live{clock};
   recording.connect(station);
   recording.runs.set_station_document(station_document(config));

@@ -279,6 +279,7 @@ protocol::StationFrame RobotSession::heartbeat() {
     next_probe_us_ = now_us + kProbePeriodUs;
   }
   durable_.resend_first_seq = durable_.resend_next_seq = 0;
+  durable_.resend_events = false;
   durable_changed_ = false;
   next_heartbeat_us_ = now_us + std::int64_t{station_.link_times().heartbeat_interval_ms} * 1000;
   return frame;
@@ -329,6 +330,12 @@ void RobotSession::acknowledge(std::uint64_t durable_next_seq, std::uint64_t dur
 void RobotSession::request_resend(std::uint64_t first_seq, std::uint64_t next_seq) {
   durable_.resend_first_seq = first_seq;
   durable_.resend_next_seq = next_seq;
+  durable_changed_ = true;
+  wake_writer_.notify();
+}
+
+void RobotSession::request_event_resend() {
+  durable_.resend_events = true;
   durable_changed_ = true;
   wake_writer_.notify();
 }

@@ -39,6 +39,7 @@ class RobotSession final : public RobotPort {
   void send_emergency_stop(const protocol::Command& command) override;
   void acknowledge(std::uint64_t durable_next_seq, std::uint64_t durable_next_event_seq) override;
   void request_resend(std::uint64_t first_seq, std::uint64_t next_seq) override;
+  void request_event_resend() override;
   void close(const std::string& reason) override;
 
  private:

@@ -3,11 +3,15 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
 #include <utility>
 
+#include "server/clock.hpp"
 #include "server/recording/schema.hpp"
 
 namespace server {
+using namespace std::chrono_literals;
+
 namespace {
 
 // A segment stores one robot time and a period for all its samples: none may be further than this from the robot's.
@@ -15,15 +19,26 @@ constexpr std::int64_t kTimeToleranceUs = 100;
 // ... and one estimate of UTC: none of its batches had one further off.
 constexpr std::int64_t kUtcToleranceUs = 1000;
 
+// Successive boots have complete segments 37 samples apart: any 100 of them are spread evenly.
+constexpr std::uint64_t kBootsApart = 37;
+
+constexpr microseconds kHolePatience = 500ms;  // before a hole that does not shrink is asked for
+constexpr microseconds kAskInterval = 1s;
+
 std::int64_t distance(std::uint64_t a, std::uint64_t b) { return std::abs(static_cast<std::int64_t>(a - b)); }
 
 bool goes_on(const Segment& segment, const SampleBatch& batch) {
   const std::uint64_t batch_seq0_us = batch.first_robot_time_us - batch.first_seq * batch.context.period_us;
   const std::uint64_t segment_seq0_us = segment.first_robot_time_us - segment.first_seq * segment.context.period_us;
-  return segment.samples.size() < static_cast<std::size_t>(kMaxSegmentSamples) && segment.context == batch.context &&
-         distance(batch_seq0_us, segment_seq0_us) <= kTimeToleranceUs &&
+  return segment.context == batch.context && distance(batch_seq0_us, segment_seq0_us) <= kTimeToleranceUs &&
          std::abs(segment.utc_offset_us - batch.utc_offset_us) <= kUtcToleranceUs &&
          (segment.clock_uncertainty_us < 0) == (batch.clock_uncertainty_us < 0);
+}
+
+// How wrong the segment's estimate of UTC may be for the samples of this batch; -1: there was none.
+std::int64_t uncertainty_in(const Segment& segment, const SampleBatch& batch) {
+  if (batch.clock_uncertainty_us < 0) return -1;
+  return batch.clock_uncertainty_us + std::abs(batch.utc_offset_us - segment.utc_offset_us);
 }
 
 void add_gap(std::vector<LostRange>& gaps, LostRange gap) {
@@ -38,8 +53,10 @@ void add_gap(std::vector<LostRange>& gaps, LostRange gap) {
 
 void BootRecording::load(StoredBoot stored) {
   key_ = stored.key;
-  durable_ = received_ = std::move(stored.samples);
-  durable_events_ = received_events_ = std::move(stored.events);
+  taken_ = received_ = std::move(stored.samples);
+  received_events_ = std::move(stored.events);
+  durable_next_seq_ = received_.first_hole();
+  durable_next_event_seq_ = received_events_.first_hole();
   next_seq_ = stored.next_seq;
   last_robot_time_us_ = stored.last_robot_time_us;
 }
@@ -48,14 +65,17 @@ bool BootRecording::continues(std::uint64_t next_seq, std::uint64_t robot_time_u
   return next_seq >= next_seq_ && robot_time_us >= last_robot_time_us_;
 }
 
-void BootRecording::connect(const BootStart& hello, std::uint64_t oldest_seq) {
-  next_seq_ = std::max(next_seq_, hello.announced_next_seq);
+void BootRecording::connect(const AdmissionRequest& hello) {
+  next_seq_ = std::max(next_seq_, hello.next_seq);
   last_robot_time_us_ = std::max(last_robot_time_us_, hello.robot_time_us);
-  give_up_below(oldest_seq, "ring_overrun", hello.noticed_at_us);
-  hole_.reset();  // the robot now sends by itself what it holds
+  give_up_below(hello.oldest_seq, "ring_overrun", hello.received_at_us);
+  next_event_seq_ = std::max(next_event_seq_, hello.next_event_seq);
+  sample_hole_.reset();  // the robot now sends by itself what it holds
+  event_hole_.reset();
 }
 
 std::size_t BootRecording::count_new(const SampleBatch& batch) const {
+  if (batch.first_seq >= received_.end()) return batch.samples.size();  // live, as nearly all are
   return count(received_.missing({batch.first_seq, batch.next_seq()}));
 }
 
@@ -64,44 +84,64 @@ void BootRecording::append(const SampleBatch& batch, std::int64_t steady_us) {
   next_seq_ = std::max(next_seq_, batch.next_seq());
   last_robot_time_us_ = std::max(last_robot_time_us_, time_us);
   if (waiting_.empty()) waiting_since_us_ = steady_us;
-  for (const Interval& part : received_.insert({batch.first_seq, batch.next_seq()})) append_part(batch, part);
+  const Interval samples{batch.first_seq, batch.next_seq()};
+  if (received_.extend(samples)) return append_part(batch, samples, steady_us);
+  for (const Interval& part : received_.insert(samples)) {
+    append_part(batch, part, steady_us);
+  }
 }
 
-void BootRecording::append_part(const SampleBatch& batch, Interval part) {
+// How many samples from this one on the segment may have.
+std::uint64_t BootRecording::room_from(std::uint64_t seq) const {
+  constexpr std::uint64_t kMost = kMaxSegmentSamples;
+  return kMost - (seq + kBootsApart * static_cast<std::uint64_t>(key_ - 1)) % kMost;
+}
+
+void BootRecording::append_part(const SampleBatch& batch, Interval part, std::int64_t steady_us) {
   for (std::uint64_t seq = part.first; seq < part.next;) {
-    Segment& segment = segment_for(batch, seq);
-    const std::uint64_t room = static_cast<std::uint64_t>(kMaxSegmentSamples) - segment.samples.size();
-    const std::uint64_t next = std::min(part.next, seq + room);
+    const std::size_t index = segment_for(batch, seq);
+    Segment& segment = waiting_[index];
+    const std::uint64_t end = seq + room_from(seq);
+    const std::uint64_t next = std::min(part.next, end);
     const auto begin = batch.samples.begin() + static_cast<std::ptrdiff_t>(seq - batch.first_seq);
     segment.samples.insert(segment.samples.end(), begin, begin + static_cast<std::ptrdiff_t>(next - seq));
     segment.received_at_us = batch.received_at_us;
-    waiting_samples_ += next - seq;
+    segment.clock_uncertainty_us = std::max(segment.clock_uncertainty_us, uncertainty_in(segment, batch));
+    if (next == end) {
+      complete_ = std::max(complete_, index + 1);
+      completed_at_us_ = steady_us;
+    }
     seq = next;
   }
 }
 
 // Backfill and live samples come in turns, so the segment that goes on need not be the last one.
-Segment& BootRecording::segment_for(const SampleBatch& batch, std::uint64_t seq) {
-  const auto begun = std::ranges::find_if(
-      waiting_, [&](const Segment& segment) { return segment.next_seq() == seq && goes_on(segment, batch); });
-  if (begun != waiting_.end()) return *begun;
+std::size_t BootRecording::segment_for(const SampleBatch& batch, std::uint64_t seq) {
+  const bool begins = room_from(seq) == static_cast<std::uint64_t>(kMaxSegmentSamples);
+  for (std::size_t index = begins ? 0 : waiting_.size(); index > 0; --index) {
+    const Segment& segment = waiting_[index - 1];
+    if (segment.next_seq() == seq && goes_on(segment, batch)) return index - 1;
+  }
   Segment& segment = waiting_.emplace_back();
   segment.boot_key = key_;
   segment.first_seq = seq;
   segment.first_robot_time_us = batch.first_robot_time_us + (seq - batch.first_seq) * batch.context.period_us;
   segment.context = batch.context;
+  segment.samples.reserve(room_from(seq));
   segment.first_received_at_us = batch.received_at_us;
   segment.utc_offset_us = batch.utc_offset_us;
   segment.clock_uncertainty_us = batch.clock_uncertainty_us;
-  return segment;
+  return waiting_.size() - 1;
 }
 
 void BootRecording::refuse(const SampleBatch& batch) {
   next_seq_ = std::max(next_seq_, batch.next_seq());
+  refused_.erase_below(received_.first_hole());
   for (const Interval& part : received_.missing({batch.first_seq, batch.next_seq()})) refused_.insert(part);
 }
 
 void BootRecording::give_up_below(std::uint64_t oldest_seq, const char* cause, std::int64_t utc_us) {
+  if (oldest_seq <= received_.first_hole()) return;
   for (const Interval& lost : received_.insert({0, oldest_seq})) {
     for (const Interval& part : refused_.missing(lost)) add_gap(waiting_gaps_, {key_, part, cause, utc_us});
     for (const Interval& part : refused_.covered(lost)) add_gap(waiting_gaps_, {key_, part, "queue_full", utc_us});
@@ -110,48 +150,72 @@ void BootRecording::give_up_below(std::uint64_t oldest_seq, const char* cause, s
 }
 
 bool BootRecording::append_event(std::uint64_t event_seq) {
-  return !received_events_.insert({event_seq, event_seq + 1}).empty();
+  const bool is_new = !received_events_.insert({event_seq, event_seq + 1}).empty();
+  has_new_events_ = has_new_events_ || is_new;
+  next_event_seq_ = std::max(next_event_seq_, event_seq + 1);
+  return is_new;
+}
+
+void BootRecording::refuse_event(std::uint64_t event_seq) {
+  next_event_seq_ = std::max(next_event_seq_, event_seq + 1);
 }
 
 void BootRecording::give_up_events_below(std::uint64_t oldest_event_seq, std::int64_t utc_us) {
+  if (oldest_event_seq <= received_events_.first_hole()) return;
   for (const Interval& lost : received_events_.insert({0, oldest_event_seq})) {
     add_gap(waiting_event_gaps_, {key_, lost, "ring_overrun", utc_us});
   }
 }
 
-void BootRecording::take(WriteBatch& batch, std::int64_t steady_us, std::int64_t max_age_us) {
-  const auto move_into = [](auto& from, auto& to) {
-    to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
-    from.clear();
-  };
-  move_into(waiting_gaps_, batch.gaps);
-  move_into(waiting_event_gaps_, batch.event_gaps);
-  const bool due =
-      waiting_samples_ >= static_cast<std::size_t>(kMaxSegmentSamples) || steady_us - waiting_since_us_ >= max_age_us;
-  if (waiting_.empty() || !due) return;
-  move_into(waiting_, batch.segments);
-  waiting_samples_ = 0;
+void BootRecording::take_segments(bool all, std::deque<Segment>& into) {
+  const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(all ? waiting_.size() : complete_);
+  into.insert(into.end(), std::make_move_iterator(waiting_.begin()), std::make_move_iterator(end));
+  waiting_.erase(waiting_.begin(), end);
+  complete_ = 0;
+  waiting_since_us_ = completed_at_us_;  // what is left began then, or later
 }
 
-std::optional<Interval> BootRecording::overdue(std::int64_t steady_us, std::int64_t patience_us,
-                                               std::int64_t repeat_us) {
-  const std::uint64_t first = received_.first_hole();
-  if (first >= next_seq_) {
-    hole_.reset();
-    return std::nullopt;
-  }
-  const Interval hole = received_.missing({first, next_seq_}).front();
-  if (!hole_ || hole.first != hole_->first) hole_since_us_ = steady_us;
-  hole_ = hole;
-  const bool too_early = asked_at_us_ && steady_us - *asked_at_us_ < repeat_us;
-  if (steady_us - hole_since_us_ < patience_us || too_early) return std::nullopt;
+void BootRecording::take_records(WriteBatch& batch) {
+  for (const LostRange& gap : waiting_gaps_) taken_.insert(gap.lost);
+  std::ranges::move(std::exchange(waiting_gaps_, {}), std::back_inserter(batch.gaps));
+  std::ranges::move(std::exchange(waiting_event_gaps_, {}), std::back_inserter(batch.event_gaps));
+  has_new_events_ = false;
+}
+
+void BootRecording::set_taken(const Segment& segment) {
+  if (!taken_.extend(segment.interval())) taken_.insert(segment.interval());
+  taken_robot_time_us_ = std::max(taken_robot_time_us_, segment.robot_time_us(segment.samples.size() - 1));
+}
+
+BootProgress BootRecording::progress() const {
+  return {.boot_key = key_,
+          .durable_next_seq = taken_.first_hole(),
+          .durable_next_event_seq = received_events_.first_hole(),
+          .last_robot_time_us = taken_robot_time_us_};
+}
+
+void BootRecording::set_durable(const BootProgress& progress) {
+  durable_next_seq_ = progress.durable_next_seq;
+  durable_next_event_seq_ = progress.durable_next_event_seq;
+}
+
+bool HoleWatch::is_overdue(std::uint64_t first_missing, std::int64_t steady_us) {
+  if (first_ != first_missing) since_us_ = steady_us;
+  first_ = first_missing;
+  const bool too_early = asked_at_us_ && steady_us - *asked_at_us_ < kAskInterval.count();
+  if (steady_us - since_us_ < kHolePatience.count() || too_early) return false;
   asked_at_us_ = steady_us;
-  return hole;
+  return true;
 }
 
-bool BootRecording::all_durable() const {
-  return waiting_.empty() && waiting_gaps_.empty() && waiting_event_gaps_.empty() && durable_ == received_ &&
-         durable_events_ == received_events_;
+std::optional<Interval> BootRecording::overdue_samples(std::int64_t steady_us) {
+  const std::uint64_t first = received_.first_hole();
+  if (!misses_samples() || !sample_hole_.is_overdue(first, steady_us)) return std::nullopt;
+  return received_.missing({first, next_seq_}).front();
+}
+
+bool BootRecording::has_overdue_events(std::int64_t steady_us) {
+  return misses_events() && event_hole_.is_overdue(received_events_.first_hole(), steady_us);
 }
 
 }  // namespace server

@@ -41,13 +41,22 @@ void set_token(SQLite::Statement& statement, int index, const std::string& token
   statement.bind(index, hash.data(), static_cast<int>(hash.size()));
 }
 
-void add_intervals(SQLite::Database& database, const char* sql, std::int64_t boot_key, IntervalSet& set) {
+// Adds [0, from) and the ranges that begin there or later. Those before lie below: `from` is no sample of a range.
+void add_intervals(SQLite::Database& database, const char* sql, std::int64_t boot_key, std::uint64_t from,
+                   IntervalSet& set) {
+  if (from > 0) set.insert({0, from});
   SQLite::Statement query{database, sql};
-  bind_all(query, boot_key);
+  bind_all(query, boot_key, from);
   while (query.executeStep()) set.insert({unsigned_id(query.getColumn(0)), unsigned_id(query.getColumn(1)) + 1});
 }
 
 }  // namespace
+
+Admission reused(const AdmissionRequest& request, const RobotId& owner) {
+  return refusal(
+      rheonaut_REFUSAL_REASON_BOOT_ID_REUSED,
+      fmt::format("boot {} belongs to robot '{}'; a boot_id must be random, new in each boot", request.boot_id, owner));
+}
 
 std::vector<RestoredRobot> BootStore::robots() {
   std::vector<RestoredRobot> robots;
@@ -82,26 +91,34 @@ std::uint64_t BootStore::last_emergency(std::int64_t boot_key) {
   return has_segment ? unsigned_id(segment.getColumn(1)) : 0;
 }
 
-AdmissionOutcome BootStore::admit(const AdmissionRequest& request, bool enrol_on_loopback, bool with_intervals) {
-  SQLite::Transaction transaction{database_.handle()};  // becomes a writing one only if something is new
+std::int64_t BootStore::next_boot_key() {
+  return database_.handle()
+      .execAndGet(
+          "SELECT max(coalesce((SELECT value FROM meta WHERE name = 'next_boot_key'), 1),"
+          " coalesce((SELECT max(boot_key) FROM boot), 0) + 1)")
+      .getInt64();
+}
+
+AdmissionOutcome BootStore::admit(const AdmissionRequest& request, bool enrol_on_loopback,
+                                  std::optional<RobotId> owner) {
+  SQLite::Transaction transaction{database_.handle()};  // becomes a writing one only if the robot is new
   AdmissionOutcome outcome;
   outcome.admission = check_robot(request, enrol_on_loopback);
   outcome.admission.store_id = database_.store_id();
   if (outcome.admission.refusal != rheonaut_REFUSAL_REASON_NONE) return outcome;
 
-  SQLite::Statement known{database_.handle(), "SELECT boot_key, robot_id FROM boot WHERE boot_id = ?"};
-  bind_all(known, request.boot_id);
-  if (!known.executeStep()) {
-    outcome.boot = load(remember_boot(request), with_intervals);
-  } else if (known.getColumn(1).getString() == request.robot_id) {
-    outcome.boot = load(known.getColumn(0).getInt64(), with_intervals);
-  } else {
-    outcome.admission = refusal(rheonaut_REFUSAL_REASON_BOOT_ID_REUSED,
-                                fmt::format("boot {} belongs to robot '{}'; a boot_id must be random, new in each boot",
-                                            request.boot_id, known.getColumn(1).getString()));
+  if (!owner) {
+    SQLite::Statement known{database_.handle(), "SELECT boot_key, robot_id FROM boot WHERE boot_id = ?"};
+    bind_all(known, request.boot_id);
+    if (known.executeStep()) {
+      owner = known.getColumn(1).getString();
+      if (owner == request.robot_id) outcome.boot = load(known.getColumn(0).getInt64());
+    }
+  }
+  if (owner && owner != request.robot_id) {
+    outcome.admission = reused(request, *owner);
     return outcome;
   }
-  known.reset();
   transaction.commit();
   return outcome;
 }
@@ -145,31 +162,45 @@ Admission BootStore::check_robot(const AdmissionRequest& request, bool enrol_on_
                  fmt::format("the token of robot '{}' is not the one it was enrolled with", request.robot_id));
 }
 
-std::int64_t BootStore::remember_boot(const AdmissionRequest& request) {
+void BootStore::add(const std::vector<NewBoot>& boots) {
+  if (boots.empty()) return;
   SQLite::Statement add{database_.handle(),
-                        "INSERT INTO boot (boot_id, robot_id, reset_cause, firmware_version, sample_period_us,"
-                        " first_seen_at_us, announced_next_seq, last_robot_time_us) VALUES (?,?,?,?,?,?,?,?)"};
-  execute(add, request.boot_id, request.robot_id, protocol::text(request.reset_cause), request.firmware_version,
-          request.sample_period_us, request.received_at_us, request.next_seq, request.robot_time_us);
-  return database_.handle().getLastInsertRowid();
+                        "INSERT INTO boot (boot_key, boot_id, robot_id, reset_cause, firmware_version,"
+                        " sample_period_us, first_seen_at_us, announced_next_seq, last_robot_time_us)"
+                        " VALUES (?,?,?,?,?,?,?,?,?)"};
+  for (const auto& [boot_key, hello] : boots) {
+    execute(add, boot_key, hello.boot_id, hello.robot_id, protocol::text(hello.reset_cause), hello.firmware_version,
+            hello.sample_period_us, hello.received_at_us, hello.next_seq, hello.robot_time_us);
+  }
+  SQLite::Statement advance{database_.handle(),
+                            "INSERT INTO meta (name, value) VALUES ('next_boot_key', ?)"
+                            " ON CONFLICT (name) DO UPDATE SET value = excluded.value"};
+  execute(advance, boots.back().boot_key + 1);
 }
 
-StoredBoot BootStore::load(std::int64_t boot_key, bool with_intervals) {
+// Of a boot of an older program, where it is not stored how far it is recorded, all segments and gaps are read.
+StoredBoot BootStore::load(std::int64_t boot_key) {
   StoredBoot boot;
   boot.key = boot_key;
-  if (!with_intervals) return boot;
   SQLite::Database& handle = database_.handle();
-  SQLite::Statement query{handle, "SELECT announced_next_seq, last_robot_time_us FROM boot WHERE boot_key = ?"};
+  SQLite::Statement query{handle,
+                          "SELECT announced_next_seq, last_robot_time_us, durable_next_seq, durable_next_event_seq"
+                          " FROM boot WHERE boot_key = ?"};
   bind_all(query, boot_key);
   query.executeStep();
-  add_intervals(handle, "SELECT first_seq, last_seq FROM segment WHERE boot_key = ? ORDER BY first_seq", boot_key,
+  const std::uint64_t next_seq = unsigned_id(query.getColumn(2));
+  const std::uint64_t next_event_seq = unsigned_id(query.getColumn(3));
+  add_intervals(handle,
+                "SELECT first_seq, last_seq FROM segment WHERE boot_key = ? AND first_seq >= ? ORDER BY first_seq",
+                boot_key, next_seq, boot.samples);
+  add_intervals(handle, "SELECT first_seq, last_seq FROM gap WHERE boot_key = ? AND first_seq >= ?", boot_key, next_seq,
                 boot.samples);
-  add_intervals(handle, "SELECT first_seq, last_seq FROM gap WHERE boot_key = ?", boot_key, boot.samples);
-  add_intervals(
-      handle, "SELECT event_seq, event_seq FROM event WHERE boot_key = ? AND event_seq IS NOT NULL ORDER BY event_seq",
-      boot_key, boot.events);
-  add_intervals(handle, "SELECT first_event_seq, last_event_seq FROM event_gap WHERE boot_key = ?", boot_key,
-                boot.events);
+  add_intervals(handle,
+                "SELECT event_seq, event_seq FROM event WHERE boot_key = ? AND event_seq >= ? ORDER BY event_seq",
+                boot_key, next_event_seq, boot.events);
+  add_intervals(handle,
+                "SELECT first_event_seq, last_event_seq FROM event_gap WHERE boot_key = ? AND first_event_seq >= ?",
+                boot_key, next_event_seq, boot.events);
   boot.next_seq = std::max(unsigned_id(query.getColumn(0)), boot.samples.end());
   boot.last_robot_time_us = unsigned_id(query.getColumn(1));
   return boot;
@@ -204,14 +235,14 @@ void BootStore::start(const BootStart& start) {
 
 void BootStore::end(std::int64_t boot_key, std::int64_t noticed_at_us) {
   SQLite::Database& handle = database_.handle();
-  const StoredBoot boot = load(boot_key, true);
+  const StoredBoot boot = load(boot_key);
   SQLite::Statement add_gap{handle,
                             "INSERT INTO gap (boot_key, first_seq, last_seq, cause, noticed_at_us)"
                             " VALUES (?, ?, ?, 'reboot', ?)"};
   for (const Interval& lost : boot.samples.missing({0, boot.next_seq})) {
     execute(add_gap, boot_key, lost.first, lost.next - 1, noticed_at_us);
   }
-  SQLite::Statement mark{handle, "UPDATE boot SET ended_next_seq = ? WHERE boot_key = ?"};
+  SQLite::Statement mark{handle, "UPDATE boot SET ended_next_seq = ?1, durable_next_seq = ?1 WHERE boot_key = ?2"};
   execute(mark, boot.next_seq, boot_key);
   SQLite::Statement drop_empty{handle,
                                "DELETE FROM run_span WHERE boot_key = ? AND last_seq IS NULL AND first_seq >= ?"};

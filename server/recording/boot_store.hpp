@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "server/recording/database.hpp"
@@ -11,6 +12,9 @@
 #include "server/station/robot_archive.hpp"
 
 namespace server {
+
+// A number of a sample or event, or microseconds, is below this: far from SQLite's signed limit.
+inline constexpr std::uint64_t kMaxRecordedNumber = 1ULL << 62;
 
 // A boot as it is stored.
 struct StoredBoot {
@@ -23,7 +27,21 @@ struct StoredBoot {
 
 struct AdmissionOutcome {
   Admission admission;
-  StoredBoot boot;  // only when not refused
+  StoredBoot boot;  // key 0: it was refused, is not known here, or was not looked for
+};
+
+// A boot that was heard of for the first time; the recorder has numbered it.
+struct NewBoot {
+  std::int64_t boot_key = 0;
+  AdmissionRequest hello;
+};
+
+// How far a boot is recorded once a commit is durable.
+struct BootProgress {
+  std::int64_t boot_key = 0;
+  std::uint64_t durable_next_seq = 0;  // every sample below is stored or known lost
+  std::uint64_t durable_next_event_seq = 0;
+  std::uint64_t last_robot_time_us = 0;  // of a stored sample
 };
 
 // A robot has connected with this boot.
@@ -35,6 +53,9 @@ struct BootStart {
   std::int64_t noticed_at_us = 0;  // UTC
 };
 
+// The refusal of a boot_id that is another robot's.
+Admission reused(const AdmissionRequest& request, const RobotId& owner);
+
 class BootStore {
  public:
   explicit BootStore(Database& database) : database_{database} {}
@@ -42,9 +63,16 @@ class BootStore {
   // Every robot, with its latest boot and the latch that boot was last known to be in.
   std::vector<RestoredRobot> robots();
 
-  // Checks robot, token and boot; remembers a new robot or boot, durably. With `with_intervals` false, what is stored
-  // of the boot is not read (the recorder has it in memory).
-  AdmissionOutcome admit(const AdmissionRequest& request, bool enrol_on_loopback, bool with_intervals);
+  // The next new boot gets this key. Keys are given in the order of admission and never twice.
+  std::int64_t next_boot_key();
+
+  // Checks robot and token, and whose boot it is; remembers a new robot, durably, and writes nothing else, so a full
+  // disk still admits robots that are enrolled. `owner` is the robot that the recorder knows the boot of; without one
+  // the boot is looked for, and what is stored of it is read.
+  AdmissionOutcome admit(const AdmissionRequest& request, bool enrol_on_loopback, std::optional<RobotId> owner);
+
+  // Inside the caller's transaction: these boots are known from now on.
+  void add(const std::vector<NewBoot>& boots);
 
   // Inside the caller's transaction: ends the robot's other boots (what is missing of them is lost: `reboot`), and lets
   // its open run go on in this one.
@@ -53,8 +81,7 @@ class BootStore {
  private:
   Admission check_robot(const AdmissionRequest& request, bool enrol_on_loopback);
   std::uint64_t last_emergency(std::int64_t boot_key);
-  std::int64_t remember_boot(const AdmissionRequest& request);
-  StoredBoot load(std::int64_t boot_key, bool with_intervals);
+  StoredBoot load(std::int64_t boot_key);
   void end(std::int64_t boot_key, std::int64_t noticed_at_us);
 
   Database& database_;

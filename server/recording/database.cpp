@@ -42,7 +42,7 @@ void configure(SQLite::Database& database) {
   database.exec("PRAGMA journal_mode = WAL");
   database.exec("PRAGMA synchronous = FULL");
   database.exec("PRAGMA foreign_keys = ON");
-  database.exec("PRAGMA wal_autocheckpoint = 16384");  // pages: 64 MB
+  database.exec("PRAGMA wal_autocheckpoint = 0");  // Checkpointer
   database.exec("PRAGMA journal_size_limit = 67108864");
 }
 

@@ -41,6 +41,20 @@ std::vector<Interval> IntervalSet::insert(Interval added) {
   return parts;
 }
 
+bool IntervalSet::extend(Interval added) {
+  if (next_by_first_.empty() || next_by_first_.rbegin()->second != added.first) return false;
+  next_by_first_.rbegin()->second = added.next;
+  return true;
+}
+
+void IntervalSet::erase_below(std::uint64_t value) {
+  while (!next_by_first_.empty() && next_by_first_.begin()->first < value) {
+    const std::uint64_t next = next_by_first_.begin()->second;
+    next_by_first_.erase(next_by_first_.begin());
+    if (next > value) next_by_first_.emplace(value, next);
+  }
+}
+
 bool IntervalSet::contains(std::uint64_t value) const {
   const auto after = next_by_first_.upper_bound(value);
   return after != next_by_first_.begin() && value < std::prev(after)->second;

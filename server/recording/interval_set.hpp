@@ -18,6 +18,12 @@ class IntervalSet {
   // Adds an interval and returns the parts that were not in the set, ascending.
   std::vector<Interval> insert(Interval added);
 
+  // Removes everything below a number.
+  void erase_below(std::uint64_t value);
+
+  // Adds an interval that begins at end(), without allocating; false, and nothing is added, if it does not.
+  bool extend(Interval added);
+
   // The parts of an interval that are in the set, and those that are not; ascending.
   std::vector<Interval> covered(Interval range) const;
   std::vector<Interval> missing(Interval range) const;

@@ -19,22 +19,15 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr microseconds kCommitInterval = 100ms;
-constexpr microseconds kGroupAge = 1s;         // a robot's samples wait at most this long for a full segment
-constexpr microseconds kHolePatience = 500ms;  // before a hole that does not shrink is asked for
-constexpr microseconds kAskInterval = 1s;
 constexpr microseconds kOverflowLogInterval = 10s;
-constexpr microseconds kRetryInterval = 1s;  // after a commit that failed
-constexpr microseconds kFailureLogInterval = 10s;
-constexpr microseconds kKeepUnused = 60s;         // a boot's bookkeeping, after its last admission
-constexpr std::uint64_t kMaxNumber = 1ULL << 62;  // of a sample, or microseconds: far from SQLite's signed limit
 constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
 
 // What a table would refuse (NULL in a NOT NULL column) or no robot can mean. One such value in a commit would keep
 // everything behind it from being stored.
 bool is_malformed(const SampleBatch& batch) {
   const SampleContext& context = batch.context;
-  const bool numbers = batch.first_seq < kMaxNumber && batch.oldest_seq < kMaxNumber &&
-                       batch.first_robot_time_us < kMaxNumber && context.period_us > 0 &&
+  const bool numbers = batch.first_seq < kMaxRecordedNumber && batch.oldest_seq < kMaxRecordedNumber &&
+                       batch.first_robot_time_us < kMaxRecordedNumber && context.period_us > 0 &&
                        context.period_us <= kMaxPeriodUs;
   const bool finite = std::isfinite(context.disturbance_m) && std::isfinite(context.position_sd_m) &&
                       std::isfinite(context.setpoint_m.value_or(0));
@@ -43,8 +36,13 @@ bool is_malformed(const SampleBatch& batch) {
 
 }  // namespace
 
-Recorder::Recorder(asio::io_context& loop, Clock& clock, WorkerThread& disk, RecorderOptions options)
-    : loop_{loop}, clock_{clock}, disk_{disk}, options_{std::move(options)} {}
+Recorder::Recorder(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& checkpoints,
+                   RecorderOptions options)
+    : loop_{loop},
+      clock_{clock},
+      disk_{disk},
+      options_{std::move(options)},
+      checkpointer_{loop, clock, checkpoints, options_.path, options_.checkpoint_bytes} {}
 
 Recorder::~Recorder() = default;
 
@@ -53,7 +51,9 @@ asio::awaitable<RestoredState> Recorder::open() {
     database_ = std::make_unique<Database>(options_.path);
     store_ = std::make_unique<SampleStore>(*database_);
     fail_unfinished_commands(*database_, utc_us);
-    return RestoredState{database_->store_id(), BootStore{*database_}.robots(), pending_stops(*database_)};
+    BootStore boots{*database_};
+    next_boot_key_ = boots.next_boot_key();
+    return RestoredState{database_->store_id(), boots.robots(), pending_stops(*database_)};
   };
   co_return co_await disk_.run(std::move(job));
 }
@@ -61,18 +61,12 @@ asio::awaitable<RestoredState> Recorder::open() {
 asio::awaitable<void> Recorder::run() {
   for (;;) {
     co_await wait_for_commit();
-    if (!writing_.empty()) co_await write();  // the same content, until it is stored
-    if (failing()) continue;
-    std::vector<Flush> served = std::exchange(flushes_, {});
-    take_for(served);
+    co_await checkpointer_.wait_for_room();
+    if (writing_.empty()) take();  // or the same content, until it is stored
     co_await write();
-    if (failing()) {
-      std::ranges::move(served, std::back_inserter(flushes_));
-      continue;
-    }
-    for (const Flush& flush : served) {
-      if (const auto done = flush.done.lock()) done->notify();
-    }
+    if (failing()) continue;
+    end_flushes();
+    co_await finish_checkpoint();
     ask_for_missing();
     forget_unused();
   }
@@ -95,118 +89,21 @@ asio::awaitable<void> Recorder::wait_for_commit() {
   last_commit_us_ = clock_.steady_us();
 }
 
-asio::awaitable<void> Recorder::write() {
-  if (writing_.empty()) co_return;
-  auto job = [this] { return try_to_write(); };
-  const std::string problem = co_await disk_.run(std::move(job));
-  if (!problem.empty()) {
-    note_failure(problem);
-    co_return;
-  }
-  if (failing()) spdlog::info("recording goes on: what had waited for the disk is stored");
-  retry_at_us_ = 0;
-  const WriteBatch written = std::exchange(writing_, {});
-  set_durable(written);
-}
-
-std::string Recorder::try_to_write() {
-  try {
-    store_->write(writing_);
-    return {};
-  } catch (const std::exception& error) {  // disk full, locked, unreadable: never a reason to end the emergency stop
-    return error.what();
-  }
-}
-
-void Recorder::note_failure(const std::string& problem) {
-  const std::int64_t now_us = clock_.steady_us();
-  ++counters_.commits_failed;
-  if (!failing() || now_us - failure_logged_us_ >= kFailureLogInterval.count()) {
-    failure_logged_us_ = now_us;
-    spdlog::error(
-        "nothing is recorded now, {} cannot be written: {}. Make room on the disk, or end the program that holds the "
-        "file; it is tried again every second, and the robots keep what they can",
-        options_.path.string(), problem);
-  }
-  retry_at_us_ = now_us + kRetryInterval.count();
-}
-
-void Recorder::take_for(const std::vector<Flush>& flushes) {
-  std::set<BootId> flushed;
-  for (const Flush& flush : flushes) {
-    if (flush.boot_id) flushed.insert(*flush.boot_id);
-  }
-  take(std::ranges::any_of(flushes, &Flush::everything), flushed);
-}
-
-void Recorder::take(bool everything, const std::set<BootId>& flushed) {
-  const std::int64_t now_us = clock_.steady_us();
-  for (auto& [boot_id, boot] : boots_) {
-    const bool at_once = everything || !boot.connected || flushed.contains(boot_id);
-    boot.recording.take(queue_, now_us, at_once ? 0 : kGroupAge.count());
-  }
-  writing_ = std::exchange(queue_, {});
-  queued_commands_.clear();
-}
-
-void Recorder::set_durable(const WriteBatch& written) {
-  ++counters_.commits;
-  std::unordered_map<std::int64_t, Boots::value_type*> by_key;
-  for (auto& entry : boots_) by_key.emplace(entry.second.recording.key(), &entry);
-  std::map<BootId, Boot*> touched;
-  const auto recording = [&](std::int64_t boot_key) -> BootRecording& {
-    auto& [boot_id, boot] = *by_key.at(boot_key);  // kept until everything of it is durable
-    touched.emplace(boot_id, &boot);
-    return boot.recording;
-  };
-  for (const Segment& segment : written.segments) {
-    recording(segment.boot_key).set_durable({segment.first_seq, segment.next_seq()});
-    counters_.samples_written += segment.samples.size();
-    queued_samples_ -= segment.samples.size();
-  }
-  for (const LostRange& gap : written.gaps) {
-    recording(gap.boot_key).set_durable(gap.lost);
-    counters_.samples_lost += gap.lost.next - gap.lost.first;
-  }
-  for (const StoredEvent& stored : written.events) {
-    if (!stored.event.event_seq) continue;
-    recording(stored.boot_key).set_durable_events({*stored.event.event_seq, *stored.event.event_seq + 1});
-  }
-  for (const LostRange& gap : written.event_gaps) recording(gap.boot_key).set_durable_events(gap.lost);
-  if (!on_durable_) return;
-  for (const auto& [boot_id, boot] : touched) {
-    on_durable_(boot->recording.robot_id(), boot_id, boot->recording.durable_next_seq(),
-                boot->recording.durable_next_event_seq());
-  }
-}
-
-void Recorder::ask_for_missing() {
-  const bool drained = queued_samples_ <= options_.max_queued_samples / 2;
-  if (!drained || !on_missing_) return;
-  for (auto& [boot_id, boot] : boots_) {
-    if (!boot.connected) continue;
-    const auto hole = boot.recording.overdue(clock_.steady_us(), kHolePatience.count(), kAskInterval.count());
-    if (hole) on_missing_(boot.recording.robot_id(), boot_id, hole->first, hole->next);
-  }
-}
-
-void Recorder::forget_unused() {
-  const std::int64_t now_us = clock_.steady_us();
-  std::erase_if(boots_, [&](const Boots::value_type& entry) {
-    const Boot& boot = entry.second;
-    const bool unused = !boot.connected && boot.admissions == 0;
-    const bool long_ago = boot.replaced || now_us - boot.last_used_us > kKeepUnused.count();
-    return unused && long_ago && boot.recording.all_durable();
-  });
-}
-
 void Recorder::close() {
   if (!store_) return;
-  std::string problem = writing_.empty() ? "" : try_to_write();  // a commit that failed, or was cancelled
-  if (problem.empty()) {
+  std::string problem;
+  for (;;) {  // first a commit that failed, or was cancelled
+    if (writing_.empty()) {
+      for (BootEntry& entry : boots_) entry.second.is_written = false;
+      writing_boots_.clear();
+      line_up_everything();
+      take();
+    }
+    if (writing_.empty()) break;
+    problem = try_to_write();
+    if (!problem.empty()) break;
+    count_written(writing_);
     writing_ = {};
-    take(true);
-    if (!writing_.empty()) problem = try_to_write();
   }
   if (!problem.empty()) {
     spdlog::error(
@@ -225,92 +122,38 @@ void Recorder::close() {
   database_.reset();
 }
 
-asio::awaitable<Admission> Recorder::admit(AdmissionRequest request) {
-  if (request.next_seq >= kMaxNumber || request.oldest_seq > request.next_seq || request.robot_time_us >= kMaxNumber) {
-    Admission malformed;
-    malformed.refusal = rheonaut_REFUSAL_REASON_MALFORMED;
-    malformed.detail = fmt::format("oldest_seq {}, next_seq {} and robot time {} µs cannot be", request.oldest_seq,
-                                   request.next_seq, request.robot_time_us);
-    co_return malformed;
-  }
-  Boot& boot = boots_.try_emplace(request.boot_id, request.robot_id).first->second;
-  struct Admitting {  // keeps the boot, whatever happens
-    int& count;
-    explicit Admitting(int& admissions) : count{admissions} { ++count; }
-    ~Admitting() { --count; }
-  };
-  const Admitting admitting{boot.admissions};
-  wake();
-  auto job = [request, enrol = options_.enrol_on_loopback, load = !boot.recording.loaded()](Database& database) {
-    try {
-      return BootStore{database}.admit(request, enrol, load);
-    } catch (const std::exception& error) {
-      AdmissionOutcome busy;
-      busy.admission.refusal = rheonaut_REFUSAL_REASON_STATION_BUSY;
-      busy.admission.detail = fmt::format("the station's database cannot be used now: {}; try again", error.what());
-      return busy;
-    }
-  };
-  AdmissionOutcome outcome = co_await on_disk(std::move(job));
-  co_return take_in(boot, std::move(outcome), request);
-}
-
-Admission Recorder::take_in(Boot& boot, AdmissionOutcome outcome, const AdmissionRequest& request) {
-  Admission& admission = outcome.admission;
-  if (admission.refusal != rheonaut_REFUSAL_REASON_NONE) return admission;
-  if (admission.newly_enrolled) {
-    spdlog::info("robot '{}' enrolled from loopback {} a token", request.robot_id,
-                 request.token.empty() ? "without" : "with");
-  }
-  if (boot.replaced) {
-    admission.refusal = rheonaut_REFUSAL_REASON_STATION_BUSY;
-    admission.detail = "another boot of this robot has just connected; try again";
-    return admission;
-  }
-  if (!boot.recording.loaded()) {
-    boot.recording = BootRecording{request.robot_id};
-    boot.recording.load(std::move(outcome.boot));
-  }
-  if (!boot.recording.continues(request.next_seq, request.robot_time_us)) {
-    admission.refusal = rheonaut_REFUSAL_REASON_BOOT_ID_REUSED;
-    admission.detail = fmt::format(
-        "boot {} was already at a later sample or time than next_seq {} and {} µs; a boot_id must be random, new in "
-        "each boot",
-        request.boot_id, request.next_seq, request.robot_time_us);
-    return admission;
-  }
-  boot.last_used_us = clock_.steady_us();
-  boot.hello = BootStart{.robot_id = request.robot_id,
-                         .boot_key = boot.recording.key(),
-                         .announced_next_seq = request.next_seq,
-                         .robot_time_us = request.robot_time_us,
-                         .noticed_at_us = request.received_at_us};
-  boot.hello_oldest_seq = request.oldest_seq;
-  admission.durable_next_seq = boot.recording.durable_next_seq();
-  admission.durable_next_event_seq = boot.recording.durable_next_event_seq();
-  return admission;
-}
-
 void Recorder::on_robot(const RobotState& robot) {
   const auto found = boots_.find(robot.boot_id);
   if (found == boots_.end() || found->second.recording.robot_id() != robot.id) return;
   Boot& boot = found->second;
   boot.connected = robot.link == LinkState::connected && !boot.replaced;
-  if (!boot.connected || !boot.hello) return;
-  boot.recording.connect(*boot.hello, boot.hello_oldest_seq);
-  replace_others(robot.id, robot.boot_id);
-  queue_.boots.push_back(*boot.hello);
-  boot.hello.reset();
-  boot.started = true;
-  wake();
+  if (boot.connected && boot.hello) {
+    const AdmissionRequest hello = *std::exchange(boot.hello, {});
+    boot.recording.connect(hello);
+    replace_others(robot.id, robot.boot_id);
+    starts_.push_back({{.robot_id = hello.robot_id,
+                        .boot_key = boot.recording.key(),
+                        .announced_next_seq = hello.next_seq,
+                        .robot_time_us = hello.robot_time_us,
+                        .noticed_at_us = hello.received_at_us},
+                       lined_up_});
+    boot.started = true;
+  }
+  watch(*found);
 }
 
 void Recorder::replace_others(const RobotId& robot_id, BootId boot_id) {
-  for (auto& [other_id, other] : boots_) {
-    if (other_id == boot_id || other.recording.robot_id() != robot_id || !other.started) continue;
+  const auto [begin, end] = by_robot_.equal_range(robot_id);
+  for (auto of_robot = begin; of_robot != end; ++of_robot) {
+    BootEntry& entry = *of_robot->second;
+    Boot& other = entry.second;
+    if (entry.first == boot_id || !other.started) continue;
     other.connected = false;
+    replaced_boots_ += other.replaced ? 0 : 1;
     other.replaced = true;
     other.recording.give_up_below(other.recording.next_seq(), "reboot", clock_.utc_us());
+    line_up(entry, true);
+    watch(entry);
   }
 }
 
@@ -337,21 +180,26 @@ void Recorder::on_samples(const RobotState&, const SampleBatch& batch) {
     queued_samples_ += added;
   }
   recording.give_up_below(batch.oldest_seq, "ring_overrun", batch.received_at_us);
-  wake();
+  watch(*found);
 }
 
 void Recorder::on_event(const RobotState&, const RobotEvent& event) {
-  if (!room_for_record()) return;
   const auto found = boots_.find(event.boot_id);
   const bool known = found != boots_.end() && found->second.started && !found->second.replaced;
-  if (event.event_seq) {
-    if (!known || *event.event_seq >= kMaxNumber || event.oldest_event_seq >= kMaxNumber) return;
-    const bool is_new = found->second.recording.append_event(*event.event_seq);
-    found->second.recording.give_up_events_below(event.oldest_event_seq, event.received_at_us);
-    if (!is_new) return;
+  if (!event.event_seq) {
+    if (!room_for_record()) return;
+    queue_.events.push_back({known ? found->second.recording.key() : 0, event});
+    return wake();
   }
-  queue_.events.push_back({known ? found->second.recording.key() : 0, event});
-  wake();
+  if (!known || *event.event_seq >= kMaxRecordedNumber || event.oldest_event_seq >= kMaxRecordedNumber) return;
+  BootRecording& recording = found->second.recording;
+  if (!room_for_record()) {
+    recording.refuse_event(*event.event_seq);
+  } else if (recording.append_event(*event.event_seq)) {
+    queue_.events.push_back({recording.key(), event});
+  }
+  recording.give_up_events_below(event.oldest_event_seq, event.received_at_us);
+  watch(*found);
 }
 
 void Recorder::on_command(const CommandRecord& command) {
@@ -367,9 +215,9 @@ void Recorder::on_command(const CommandRecord& command) {
 }
 
 bool Recorder::room_for_record() {
-  if (queue_.events.size() + queue_.commands.size() < options_.max_queued_records) return true;
+  if (queued_records() < options_.max_queued_records) return true;
   if (counters_.records_refused++ == 0)
-    spdlog::error("the disk does not keep up: events and commands are not recorded");
+    spdlog::error("the disk does not keep up: commands are not recorded, events are asked for again");
   return false;
 }
 

@@ -2,15 +2,18 @@
 //
 //   Station → on_samples, on_event, on_command → queue → one transaction per 100 ms → set_on_durable's function
 //
-// A robot's samples are written when they are 100, or 1 s old; events and commands with the next commit. Duplicates
-// are dropped against what is stored and what waits. What the robot no longer holds is a gap, stored with its cause.
+// A robot's samples are written when their segment is complete, or about 1 s old; events and commands with the next
+// commit. Duplicates are dropped against what is stored and what waits. What the robot no longer holds is a gap, stored
+// with its cause. A commit has at most kMaxCommitSamples; what is beyond goes in its turn with the next ones.
 //
 // Overflow: when the queue is full a batch is neither queued nor acknowledged; the robot still holds it, and it is
 // asked for again (set_on_missing's function) once the queue has drained. Missing samples are asked for the same way.
-// Events and commands beyond the limit are counted and not recorded, but an emergency stop always is.
+// Events are asked for likewise. Commands beyond the limit, and what the station itself has to say, are counted and not
+// recorded, but an emergency stop always is.
 //
 // A disk that fails (full, locked by another program) never ends the station: what could not be written is kept, not
-// acknowledged, and tried again every second; everything behind it waits in the queue.
+// acknowledged, and tried again every second; everything behind it waits in the queue. Robots that are enrolled are
+// admitted meanwhile: a new boot is stored with the next commit.
 //
 // Loop thread; SQL on the disk thread. The loop, the clock and the worker outlive it; runs and history use it. When it
 // is destroyed no job of it may be under way, that is: the loop's run() has returned.
@@ -18,12 +21,12 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
+#include <deque>
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
-#include <set>
+#include <queue>
 #include <string>
 #include <type_traits>
 #include <unordered_map>
@@ -32,6 +35,7 @@
 
 #include "server/clock.hpp"
 #include "server/recording/boot_recording.hpp"
+#include "server/recording/checkpointer.hpp"
 #include "server/station/robot_archive.hpp"
 #include "server/station/station_sink.hpp"
 #include "server/worker.hpp"
@@ -42,7 +46,8 @@ struct RecorderOptions {
   std::filesystem::path path;     // of the database
   bool enrol_on_loopback = true;  // a new robot that connects from this machine is enrolled
   std::size_t max_queued_samples = 2'000'000;
-  std::size_t max_queued_records = 100'000;  // events and commands
+  std::size_t max_queued_records = 100'000;   // events and commands
+  std::uint64_t checkpoint_bytes = 64 << 20;  // of the write-ahead log, from which on it is moved into the database
 };
 
 // What the station must know again after a restart.
@@ -56,30 +61,39 @@ struct RestoredState {
 struct RecorderCounters {
   std::uint64_t samples_written = 0;
   std::uint64_t samples_duplicate = 0;
-  std::uint64_t samples_refused = 0;  // not queued because the queue was full; each is asked for again
-  std::uint64_t samples_lost = 0;     // in stored gaps
-  std::uint64_t records_refused = 0;  // events and commands that the full queue did not take
+  std::uint64_t samples_refused = 0;     // not queued because the queue was full; each is asked for again
+  std::uint64_t samples_lost = 0;        // in stored gaps
+  std::uint64_t records_refused = 0;     // events and commands that the full queue did not take
+  std::uint64_t events_asked_again = 0;  // requests
   std::uint64_t batches_malformed = 0;
   std::uint64_t commits = 0;
+  std::uint64_t largest_commit_samples = 0;
   std::uint64_t commits_failed = 0;  // each was, or is being, tried again
 };
 
 class Recorder final : public StationSink, public RobotArchive {
  public:
+  static constexpr std::size_t kMaxCommitSamples = 200'000;
+
   using OnDurable = std::function<void(const RobotId&, BootId, std::uint64_t next_seq, std::uint64_t next_event_seq)>;
   using OnMissing = std::function<void(const RobotId&, BootId, std::uint64_t first_seq, std::uint64_t next_seq)>;
+  using OnMissingEvents = std::function<void(const RobotId&, BootId)>;
 
-  Recorder(boost::asio::io_context& loop, Clock& clock, WorkerThread& disk, RecorderOptions options);
+  Recorder(boost::asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& checkpoints,
+           RecorderOptions options);
   ~Recorder() override;
 
   void set_on_durable(OnDurable on_durable) { on_durable_ = std::move(on_durable); }
   void set_on_missing(OnMissing on_missing) { on_missing_ = std::move(on_missing); }
+  void set_on_missing_events(OnMissingEvents on_missing) { on_missing_events_ = std::move(on_missing); }
 
   // Opens or creates the database; before everything else. Throws when the file is not ours or cannot be written.
   boost::asio::awaitable<RestoredState> open();
 
   // Commits and asks for what is missing, until cancelled.
   boost::asio::awaitable<void> run();
+  // Moves the write-ahead log into the database meanwhile, until cancelled.
+  boost::asio::awaitable<void> run_checkpoints() { return checkpointer_.run(); }
 
   // Return true when what they name, as far as it was heard, is durable, and false after 3 s if it is not yet. Need
   // run(). Those of samples cut segments short; whoever only reads samples joins waiting() instead.
@@ -101,7 +115,11 @@ class Recorder final : public StationSink, public RobotArchive {
   // Runs job(Database&) on the disk thread, between two commits.
   template <class Job>
   boost::asio::awaitable<std::invoke_result_t<Job, Database&>> on_disk(Job job) {
-    auto with_database = [this, job = std::move(job)]() mutable { return job(*database_); };
+    LogReport report{checkpointer_};
+    auto with_database = [this, &report, job = std::move(job)]() mutable {
+      const LogReport::Reading reading{report.bytes, *store_};
+      return job(*database_);
+    };
     co_return co_await disk_.run(std::move(with_database));
   }
 
@@ -119,41 +137,90 @@ class Recorder final : public StationSink, public RobotArchive {
   std::size_t queued_samples() const { return queued_samples_; }
   // The last commit failed: nothing becomes durable now.
   bool failing() const { return retry_at_us_ != 0; }
+  const WalState& wal() const { return checkpointer_.state(); }
 
  private:
   struct Boot {
     explicit Boot(RobotId robot_id) : recording{std::move(robot_id)} {}
     BootRecording recording;
     bool connected = false;
-    bool started = false;            // has been connected
-    bool replaced = false;           // a later boot of this robot has connected
-    int admissions = 0;              // under way
-    std::int64_t last_used_us = 0;   // steady time of the last admission
-    std::optional<BootStart> hello;  // admitted, and not connected since
-    std::uint64_t hello_oldest_seq = 0;
+    bool started = false;                   // has been connected
+    bool replaced = false;                  // a later boot of this robot has connected
+    int admissions = 0;                     // under way
+    std::int64_t last_used_us = 0;          // steady time of the last admission
+    std::optional<AdmissionRequest> hello;  // admitted, and not connected since
+
+    bool is_due = false;       // is in due_
+    bool is_ageing = false;    // is in ageing_
+    bool has_records = false;  // is in with_records_
+    bool has_hole = false;     // is in with_holes_
+    bool is_written = false;   // is in writing_boots_
+    std::size_t in_line = 0;   // its segments in line_
   };
-  using Boots = std::map<BootId, Boot>;
+  using Boots = std::unordered_map<BootId, Boot>;  // an entry stays where it is
+  using BootEntry = Boots::value_type;
 
   // A coroutine waits until everything before it is stored, or does no longer.
   struct Flush {
     std::weak_ptr<Signal> done;
-    bool everything = false;        // the samples of all boots, too
-    std::optional<BootId> boot_id;  // the samples of this boot, too
+    std::uint64_t after = 0;  // so many segments have left the line
+    bool is_taken = false;    // what is not in the line has gone into a commit
+  };
+
+  // A boot has connected. It is stored once the samples of the robot's earlier boots are.
+  struct WaitingStart {
+    BootStart start;
+    std::uint64_t after = 0;  // so many segments have left the line
+  };
+
+  struct Ageing {
+    std::int64_t due_us = 0;  // steady
+    BootEntry* boot = nullptr;
+    bool operator>(const Ageing& other) const { return due_us > other.due_us; }
+  };
+
+  // After a job of the disk thread, whatever came of it: tells how long the log is.
+  struct LogReport {
+    explicit LogReport(Checkpointer& to) : checkpointer{to} {}
+    ~LogReport() { checkpointer.on_log(bytes); }
+    LogReport(const LogReport&) = delete;
+    LogReport& operator=(const LogReport&) = delete;
+
+    struct Reading {  // on the disk thread
+      std::uint64_t& bytes;
+      const SampleStore& store;
+      ~Reading() { bytes = store.log_bytes(); }
+    };
+
+    Checkpointer& checkpointer;
+    std::uint64_t bytes = 0;
   };
 
   boost::asio::awaitable<void> wait_for_commit();
+  boost::asio::awaitable<void> finish_checkpoint();
   boost::asio::awaitable<void> write();
   std::string try_to_write();  // the problem, empty when writing_ is durable
   void note_failure(const std::string& problem);
-  boost::asio::awaitable<bool> flush(bool everything, std::optional<BootId> boot_id);
-  void take_for(const std::vector<Flush>& flushes);
-  void take(bool everything, const std::set<BootId>& flushed = {});
-  void set_durable(const WriteBatch& written);
+  boost::asio::awaitable<bool> flush_after(std::uint64_t segments);  // have left the line
+  void end_flushes();
+  void watch(BootEntry& entry);
+  void line_up(BootEntry& entry, bool all);
+  void line_up_due();
+  void line_up_everything();
+  void take();
+  void take_from_line();
+  void take_records();
+  void add_to_commit(BootEntry& entry);
+  void count_written(const WriteBatch& written);
+  boost::asio::awaitable<void> tell_durable(std::vector<BootProgress> progress);
   void ask_for_missing();
   void forget_unused();
-  Admission take_in(Boot& boot, AdmissionOutcome outcome, const AdmissionRequest& request);
+  bool is_unused(const Boot& boot) const;
+  Admission take_in(BootEntry& entry, AdmissionOutcome outcome, const AdmissionRequest& request);
+  void add_boot(BootEntry& entry, StoredBoot stored, const AdmissionRequest& request);
   void replace_others(const RobotId& robot_id, BootId boot_id);
   void wake();
+  std::size_t queued_records() const { return queue_.events.size() + queue_.commands.size(); }
   bool room_for_record();
 
   boost::asio::io_context& loop_;
@@ -162,13 +229,32 @@ class Recorder final : public StationSink, public RobotArchive {
   RecorderOptions options_;
   OnDurable on_durable_;
   OnMissing on_missing_;
+  OnMissingEvents on_missing_events_;
 
   std::unique_ptr<Database> database_;  // used by jobs; by close() when no job can be under way
   std::unique_ptr<SampleStore> store_;
 
+  Checkpointer checkpointer_;
+
   Boots boots_;
-  WriteBatch queue_;                                            // all but samples, which wait in their boot
+  std::unordered_map<std::int64_t, BootEntry*> by_key_;
+  std::unordered_multimap<RobotId, BootEntry*> by_robot_;  // as by_key_, those that are loaded
+  std::int64_t next_boot_key_ = 0;
+
+  // Boots that have something to write, or to ask for, so that nobody looks at all of them each 100 ms.
+  std::deque<BootEntry*> due_;  // with a complete segment, or not connected
+  std::priority_queue<Ageing, std::vector<Ageing>, std::greater<>> ageing_;
+  std::vector<BootEntry*> with_records_;
+  std::deque<BootEntry*> with_holes_;
+
+  std::deque<Segment> line_;  // go to the disk in this order
+  std::size_t line_samples_ = 0;
+  std::uint64_t lined_up_ = 0;  // segments, ever
+  std::uint64_t left_line_ = 0;
+  std::deque<WaitingStart> starts_;
+  WriteBatch queue_;                                            // records; segments are in their boot or in line
   WriteBatch writing_;                                          // being written; kept until it is durable
+  std::vector<BootEntry*> writing_boots_;                       // in the order of its progress
   std::unordered_map<CommandId, std::size_t> queued_commands_;  // where each waits in queue_.commands
   std::size_t queued_samples_ = 0;
   RecorderCounters counters_;
@@ -176,7 +262,9 @@ class Recorder final : public StationSink, public RobotArchive {
   std::int64_t retry_at_us_ = 0;         // steady; 0 unless the last commit failed
   std::int64_t failure_logged_us_ = 0;   // steady
   std::int64_t overflow_logged_us_ = 0;  // steady
-  bool idle_ = false;                    // run() waits for work_
+  std::int64_t next_forget_us_ = 0;      // steady
+  std::size_t replaced_boots_ = 0;
+  bool idle_ = false;  // run() waits for work_
 
   Signal work_{loop_};  // something to record, or a robot to watch
   Signal flush_wanted_{loop_};

@@ -17,8 +17,7 @@ constexpr microseconds kFlushPatience = 3s;
 constexpr Interval kAllSamples{0, std::numeric_limits<std::uint64_t>::max()};
 
 // Adds the samples of the boot in the range, as the database will give them back.
-void add_waiting(const std::vector<Segment>& segments, std::int64_t boot_key, Interval range,
-                 std::vector<Segment>& into) {
+void add_waiting(const auto& segments, std::int64_t boot_key, Interval range, std::vector<Segment>& into) {
   for (const Segment& segment : segments) {
     const bool overlaps = std::max(segment.first_seq, range.first) < std::min(segment.next_seq(), range.next);
     if (segment.boot_key != boot_key || !overlaps) continue;
@@ -40,6 +39,7 @@ std::vector<Segment> Recorder::waiting(BootId boot_id, Interval samples) const {
   if (found == boots_.end() || !found->second.recording.loaded()) return segments;
   const BootRecording& boot = found->second.recording;
   add_waiting(writing_.segments, boot.key(), samples, segments);  // the disk thread only reads it, too
+  if (found->second.in_line > 0) add_waiting(line_, boot.key(), samples, segments);
   add_waiting(boot.waiting(), boot.key(), samples, segments);
   std::ranges::sort(segments, {}, &Segment::first_seq);
   return segments;
@@ -57,23 +57,29 @@ std::vector<LostRange> Recorder::waiting_gaps(BootId boot_id) const {
   return gaps;
 }
 
-asio::awaitable<bool> Recorder::flush() { co_return co_await flush(true, std::nullopt); }
+asio::awaitable<bool> Recorder::flush() {
+  line_up_everything();
+  co_return co_await flush_after(lined_up_);
+}
 
 asio::awaitable<bool> Recorder::flush(BootId boot_id) {
   if (waiting(boot_id, kAllSamples).empty() && waiting_gaps(boot_id).empty()) co_return true;
-  co_return co_await flush(false, boot_id);
+  line_up(*boots_.find(boot_id), true);
+  co_return co_await flush_after(lined_up_);
 }
 
-asio::awaitable<bool> Recorder::flush_records() { co_return co_await flush(false, std::nullopt); }
+asio::awaitable<bool> Recorder::flush_records() {
+  co_return co_await flush_after(starts_.empty() ? 0 : starts_.back().after);
+}
 
 asio::awaitable<bool> Recorder::flush_boots() {
-  if (queue_.boots.empty() && writing_.boots.empty()) co_return true;
+  if (starts_.empty() && writing_.boots.empty()) co_return true;
   co_return co_await flush_records();
 }
 
-asio::awaitable<bool> Recorder::flush(bool everything, std::optional<BootId> boot_id) {
+asio::awaitable<bool> Recorder::flush_after(std::uint64_t segments) {
   const auto done = std::make_shared<Signal>(loop_);
-  flushes_.push_back({done, everything, boot_id});
+  flushes_.push_back({done, segments});
   flush_wanted_.notify();
   wake();
   const std::variant<std::monostate, std::monostate> first =

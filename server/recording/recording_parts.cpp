@@ -11,8 +11,8 @@ namespace server {
 namespace asio = boost::asio;
 
 RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                               const RecorderOptions& options)
-    : recorder{loop, clock, disk, options},
+                               WorkerThread& checkpoints, const RecorderOptions& options)
+    : recorder{loop, clock, disk, checkpoints, options},
       reader{options.path, readers},
       certifier{clock, recorder, reader},
       runs{clock, recorder, reader, certifier},
@@ -25,6 +25,7 @@ void RecordingParts::connect(Station& station) {
   station.add_sink(runs);
   recorder.set_on_durable(std::bind_front(&Station::on_durable, &station));
   recorder.set_on_missing(std::bind_front(&Station::request_resend, &station));
+  recorder.set_on_missing_events(std::bind_front(&Station::request_event_resend, &station));
 }
 
 asio::awaitable<RestoredState> RecordingParts::open() {
@@ -35,6 +36,7 @@ asio::awaitable<RestoredState> RecordingParts::open() {
 
 void RecordingParts::spawn(TaskGroup& tasks) {
   tasks.spawn("recorder", recorder.run());
+  tasks.spawn("checkpoints", recorder.run_checkpoints());
   tasks.spawn("certifier", certifier.run());
 }
 

@@ -21,7 +21,7 @@ namespace server {
 
 struct RecordingParts {
   RecordingParts(boost::asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                 const RecorderOptions& options);
+                 WorkerThread& checkpoints, const RecorderOptions& options);
 
   // The station is heard from now on, and hears what has become durable and what is missing.
   void connect(Station& station);

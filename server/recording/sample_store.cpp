@@ -1,9 +1,8 @@
 // Prepared statements, one transaction per batch; row numbers come from a counter that is stored with the rows.
 #include "server/recording/sample_store.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
+#include <sqlite3.h>
+
 #include <stdexcept>
 
 #include "server/recording/statement.hpp"
@@ -11,9 +10,6 @@
 namespace server {
 namespace {
 
-constexpr const char* kInsertSample =
-    "INSERT INTO sample (row, position_m, velocity_m_s, acceleration_m_s2, duty, impedance_mv, reference_m)"
-    " VALUES (?,?,?,?,?,?,?)";
 constexpr const char* kInsertSegment =
     "INSERT INTO segment (boot_key, first_seq, last_seq, first_row, last_row, first_robot_time_us, period_us,"
     " first_received_at_us, received_at_us, utc_offset_us, clock_uncertainty_us, mode, sub_state, setpoint_m,"
@@ -33,33 +29,18 @@ constexpr const char* kUpsertCommand =
     "INSERT OR REPLACE INTO command (command_id, robot_id, boot_id, kind, arguments, actor, state, reason,"
     " submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us, emergency_id) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?)";
 
-// The smallest and largest finite value of one channel; NaN (stored as NULL) when there is none.
-struct Extremes {
-  float min = std::numeric_limits<float>::quiet_NaN();
-  float max = std::numeric_limits<float>::quiet_NaN();
-};
-
-Extremes extremes(const std::vector<Sample>& samples, float Sample::* channel) {
-  Extremes found;
-  for (const Sample& sample : samples) {
-    if (!std::isfinite(sample.*channel)) continue;
-    found.min = std::fmin(found.min, sample.*channel);
-    found.max = std::fmax(found.max, sample.*channel);
-  }
-  return found;
-}
-
 }  // namespace
 
 bool WriteBatch::empty() const {
-  return segments.empty() && gaps.empty() && events.empty() && event_gaps.empty() && commands.empty() && boots.empty();
+  return new_boots.empty() && segments.empty() && gaps.empty() && events.empty() && event_gaps.empty() &&
+         commands.empty() && boots.empty();
 }
 
 SampleStore::SampleStore(Database& database)
     : database_{database},
       boots_{database},
       next_row_{database.handle().execAndGet("SELECT value FROM meta WHERE name = 'next_row'").getInt64()},
-      insert_sample_{database.handle(), kInsertSample},
+      rows_{database.handle()},
       insert_segment_{database.handle(), kInsertSegment},
       insert_gap_{database.handle(), kInsertGap},
       insert_event_{database.handle(), kInsertEvent},
@@ -67,10 +48,20 @@ SampleStore::SampleStore(Database& database)
       upsert_command_{database.handle(), kUpsertCommand},
       advance_row_{database.handle(), "UPDATE meta SET value = ? WHERE name = 'next_row' AND value = ?"},
       advance_boot_{database.handle(),
-                    "UPDATE boot SET last_robot_time_us = max(last_robot_time_us, ?) WHERE boot_key = ?"} {}
+                    "UPDATE boot SET durable_next_seq = ?, durable_next_event_seq = ?,"
+                    " last_robot_time_us = max(last_robot_time_us, ?) WHERE boot_key = ?"} {
+  const auto on_commit = [](void* pages, sqlite3*, const char*, int log_pages) {
+    *static_cast<std::uint64_t*>(pages) = static_cast<std::uint64_t>(log_pages);
+    return SQLITE_OK;
+  };
+  sqlite3_wal_hook(database.handle().getHandle(), on_commit, &log_pages_);
+}
+
+SampleStore::~SampleStore() { sqlite3_wal_hook(database_.handle().getHandle(), nullptr, nullptr); }
 
 void SampleStore::write(const WriteBatch& batch) {
   SQLite::Transaction transaction{database_.handle(), SQLite::TransactionBehavior::IMMEDIATE};
+  boots_.add(batch.new_boots);
   std::int64_t next_row = next_row_;
   for (const Segment& segment : batch.segments) next_row = write_segment(segment, next_row);
   for (const LostRange& gap : batch.gaps) {
@@ -81,6 +72,9 @@ void SampleStore::write(const WriteBatch& batch) {
     execute(insert_event_gap_, gap.boot_key, gap.lost.first, gap.lost.next - 1, gap.cause, gap.noticed_at_us);
   }
   for (const CommandRecord& command : batch.commands) write_command(command);
+  for (const BootProgress& boot : batch.progress) {
+    execute(advance_boot_, boot.durable_next_seq, boot.durable_next_event_seq, boot.last_robot_time_us, boot.boot_key);
+  }
   for (const BootStart& boot : batch.boots) boots_.start(boot);
   if (next_row != next_row_ && execute(advance_row_, next_row, next_row_) != 1) {
     throw std::runtime_error{"another program writes into the station's database; stop it"};
@@ -90,27 +84,16 @@ void SampleStore::write(const WriteBatch& batch) {
 }
 
 std::int64_t SampleStore::write_segment(const Segment& segment, std::int64_t first_row) {
-  std::int64_t row = first_row;
-  for (const Sample& sample : segment.samples) {
-    execute(insert_sample_, row++, sample.position_m, sample.velocity_m_s, sample.acceleration_m_s2, sample.duty,
-            sample.impedance_mv, sample.reference_m);
-  }
+  const auto& [min, max] = rows_.write(segment.samples, first_row);
+  const std::int64_t next_row = first_row + static_cast<std::int64_t>(segment.samples.size());
   const SampleContext& context = segment.context;
-  const Extremes position = extremes(segment.samples, &Sample::position_m);
-  const Extremes velocity = extremes(segment.samples, &Sample::velocity_m_s);
-  const Extremes acceleration = extremes(segment.samples, &Sample::acceleration_m_s2);
-  const Extremes duty = extremes(segment.samples, &Sample::duty);
-  const Extremes impedance = extremes(segment.samples, &Sample::impedance_mv);
-  const Extremes reference = extremes(segment.samples, &Sample::reference_m);
-  execute(insert_segment_, segment.boot_key, segment.first_seq, segment.next_seq() - 1, first_row, row - 1,
+  execute(insert_segment_, segment.boot_key, segment.first_seq, segment.next_seq() - 1, first_row, next_row - 1,
           segment.first_robot_time_us, context.period_us, segment.first_received_at_us, segment.received_at_us,
           segment.utc_offset_us, segment.clock_uncertainty_us, protocol::text(context.mode),
           protocol::text(context.sub_state), context.setpoint_m, context.disturbance_m, context.position_sd_m,
           context.controller_id, context.emergency_id, protocol::text(context.emergency_cause), context.flags,  //
-          position.min, position.max, velocity.min, velocity.max, acceleration.min, acceleration.max,           //
-          duty.min, duty.max, impedance.min, impedance.max, reference.min, reference.max);
-  execute(advance_boot_, segment.robot_time_us(segment.samples.size() - 1), segment.boot_key);
-  return row;
+          min[0], max[0], min[1], max[1], min[2], max[2], min[3], max[3], min[4], max[4], min[5], max[5]);
+  return next_row;
 }
 
 void SampleStore::write_event(const StoredEvent& stored) {

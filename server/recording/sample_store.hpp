@@ -9,6 +9,7 @@
 
 #include "server/recording/boot_store.hpp"
 #include "server/recording/database.hpp"
+#include "server/recording/row_writer.hpp"
 #include "server/recording/segment.hpp"
 #include "server/station/station_state.hpp"
 
@@ -21,11 +22,13 @@ struct StoredEvent {
 
 // All that is written in one transaction.
 struct WriteBatch {
+  std::vector<NewBoot> new_boots;  // first, since all else may belong to them
   std::vector<Segment> segments;
   std::vector<LostRange> gaps;
   std::vector<StoredEvent> events;
   std::vector<LostRange> event_gaps;
   std::vector<CommandRecord> commands;  // each replaces what is stored of the same command
+  std::vector<BootProgress> progress;   // of each boot that any of this belongs to
   std::vector<BootStart> boots;         // applied last: they end the robots' earlier boots
 
   bool empty() const;
@@ -34,19 +37,28 @@ struct WriteBatch {
 class SampleStore {
  public:
   explicit SampleStore(Database& database);
+  ~SampleStore();
+  SampleStore(const SampleStore&) = delete;
+  SampleStore& operator=(const SampleStore&) = delete;
 
   // Durable when it returns. Throws when it cannot be (disk full): nothing of the batch is stored then.
   void write(const WriteBatch& batch);
+
+  // The length of the write-ahead log after the latest commit of this handle.
+  std::uint64_t log_bytes() const { return log_pages_ * kLogPageBytes; }
 
  private:
   std::int64_t write_segment(const Segment& segment, std::int64_t first_row);  // returns the row after its last
   void write_event(const StoredEvent& stored);
   void write_command(const CommandRecord& command);
 
+  static constexpr std::uint64_t kLogPageBytes = 4096 + 24;
+
   Database& database_;
+  std::uint64_t log_pages_ = 0;
   BootStore boots_;
   std::int64_t next_row_ = 0;
-  SQLite::Statement insert_sample_;
+  RowWriter rows_;
   SQLite::Statement insert_segment_;
   SQLite::Statement insert_gap_;
   SQLite::Statement insert_event_;

@@ -28,6 +28,9 @@ class RobotPort {
   // Asks for the samples [first_seq, next_seq) again.
   virtual void request_resend(std::uint64_t first_seq, std::uint64_t next_seq) = 0;
 
+  // Asks for every event again that is not durable.
+  virtual void request_event_resend() = 0;
+
   // Ends the connection; the reason is logged.
   virtual void close(const std::string& reason) = 0;
 };

@@ -283,4 +283,10 @@ void Station::request_resend(const RobotId& id, BootId boot_id, std::uint64_t fi
   if (RobotPort* port = seats_.at(id).port; port != nullptr) port->request_resend(first_seq, next_seq);
 }
 
+void Station::request_event_resend(const RobotId& id, BootId boot_id) {
+  const auto robot = robots_.find(id);
+  if (robot == robots_.end() || robot->second.boot_id != boot_id) return;
+  if (RobotPort* port = seats_.at(id).port; port != nullptr) port->request_event_resend();
+}
+
 }  // namespace server

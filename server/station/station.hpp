@@ -83,6 +83,7 @@ class Station {
   void on_durable(const RobotId& id, BootId boot_id, std::uint64_t durable_next_seq,
                   std::uint64_t durable_next_event_seq);
   void request_resend(const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t next_seq);
+  void request_event_resend(const RobotId& id, BootId boot_id);
 
  private:
   struct PendingCommand;

@@ -10,7 +10,9 @@ SystemTest::SystemTest() {
   folder = mkdtemp(name.data());
   clock.add_worker(disk);
   clock.add_worker(readers);
-  recording = std::make_unique<RecordingParts>(loop, clock, disk, readers, RecorderOptions{folder / "station.sqlite"});
+  clock.add_worker(checkpoints);
+  recording = std::make_unique<RecordingParts>(loop, clock, disk, readers, checkpoints,
+                                               RecorderOptions{folder / "station.sqlite"});
   recorder = &recording->recorder;
   runs = &recording->runs;
   history = &recording->history;

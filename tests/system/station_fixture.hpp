@@ -72,7 +72,7 @@ class SystemTest : public ::testing::Test, public sim_robot::StoryWords {
   std::filesystem::path folder;
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  WorkerThread disk{"disk"}, readers{"readers"};
+  WorkerThread disk{"disk"}, readers{"readers"}, checkpoints{"checkpoints"};
   TaskGroup tasks{loop};
   Listener listener_of_events{*this};
   Station station{loop, clock, CommandLimits{}, LinkTimes{}};

@@ -32,6 +32,7 @@ asio::awaitable<void> start(RecordingParts& recording, bool& started) {
 ApiTest::ApiTest() {
   clock.add_worker(disk);
   clock.add_worker(readers);
+  clock.add_worker(checkpoints);
   clock.add_worker(maths);
   recording.connect(station);
   station.add_sink(live);

@@ -55,11 +55,11 @@ class ApiTest : public ::testing::Test {
 
   TemporaryFolder folder;
   boost::asio::io_context loop{1};
-  WorkerThread disk{"disk"}, readers{"readers"}, maths{"maths"};
+  WorkerThread disk{"disk"}, readers{"readers"}, checkpoints{"checkpoints"}, maths{"maths"};
   VirtualClock clock{loop};
   TaskGroup tasks{loop};
   Station station{loop, clock, CommandLimits{}, LinkTimes{}};
-  RecordingParts recording{loop, clock, disk, readers, RecorderOptions{folder.path() / "station.sqlite"}};
+  RecordingParts recording{loop, clock, disk, readers, checkpoints, RecorderOptions{folder.path() / "station.sqlite"}};
   Recorder& recorder{recording.recorder};
   AnalysisService analysis{recording.history, maths};
   LiveFeed live{clock};

@@ -184,8 +184,21 @@ TEST_F(LinkTest, TellsTheRobotWhatIsDurableAndWhatToSendAgain) {
   EXPECT_EQ(last.durable_next_event_seq, 2u);
   EXPECT_EQ(last.resend_first_seq, 40u);
   EXPECT_EQ(last.resend_next_seq, 60u);
+  EXPECT_FALSE(last.resend_events);
   clock.run_for(300ms);
   EXPECT_EQ(robot->heartbeats().back().resend_next_seq, 0u) << "asked once";
+}
+
+TEST_F(LinkTest, AsksTheRobotOnceToSendItsEventsAgain) {
+  auto* robot = connect();
+  station.request_event_resend("r1", 76);  // an earlier boot
+  clock.settle();
+  EXPECT_FALSE(robot->heartbeats().back().resend_events);
+  station.request_event_resend("r1", 77);
+  clock.settle();
+  EXPECT_TRUE(robot->heartbeats().back().resend_events);
+  clock.run_for(300ms);
+  EXPECT_FALSE(robot->heartbeats().back().resend_events);
 }
 
 TEST_F(LinkTest, AnswersOfTheRobotGiveTheClockOffset) {

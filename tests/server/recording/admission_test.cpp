@@ -130,6 +130,66 @@ TEST_F(AdmissionTest, RefusesABootThatLiesBeforeWhatIsStored) {
   }
 }
 
+TEST_F(AdmissionTest, ANewBootIsKnownBeforeItIsStored) {
+  start();
+  connect(robot_);
+  EXPECT_EQ(number("SELECT count(*) FROM boot"), 0);
+  const Admission again = admit(robot_);
+  EXPECT_EQ(again.refusal, rheonaut_REFUSAL_REASON_NONE) << again.detail;
+  TestRobot other;
+  other.id = "dory";
+  EXPECT_EQ(admit(other).refusal, rheonaut_REFUSAL_REASON_BOOT_ID_REUSED);
+  make(robot_, 10);
+  flush();
+  EXPECT_EQ(rows("SELECT boot_key, robot_id, durable_next_seq FROM boot"), std::vector<std::string>{"1|nemo|10"});
+}
+
+TEST_F(AdmissionTest, ADiskThatFailsStillAdmitsEnrolledRobots) {
+  start();
+  connect(robot_);
+  flush();
+  SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE};
+  foreign.exec("CREATE TRIGGER full BEFORE INSERT ON boot BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
+  TestRobot rebooted;
+  rebooted.boot_id = 77;
+  TestRobot unused;
+  unused.boot_id = 78;
+  EXPECT_EQ(admit(unused).refusal, rheonaut_REFUSAL_REASON_NONE);
+  connect(rebooted);
+  make(rebooted, 100);
+  clock_.run_for(100s);  // `unused` never connects, and is not forgotten before it is stored
+  ASSERT_TRUE(recorder_->failing());
+  EXPECT_EQ(admit(unused).refusal, rheonaut_REFUSAL_REASON_NONE);
+  foreign.exec("DROP TRIGGER full");
+  flush();
+  EXPECT_EQ(rows("SELECT boot_id, durable_next_seq FROM boot ORDER BY boot_key DESC LIMIT 2"),
+            (std::vector<std::string>{"77|100", "78|0"}));
+  EXPECT_EQ(number("SELECT value FROM meta WHERE name = 'next_boot_key'"), 4);
+}
+
+TEST_F(AdmissionTest, ManyBootsShareACommit) {
+  constexpr int kRobots = 200;
+  start();
+  auto enrol = [](Database& database) {
+    SQLite::Transaction transaction{database.handle()};
+    database.handle().exec(
+        "WITH RECURSIVE number(n) AS (VALUES (0) UNION ALL SELECT n + 1 FROM number WHERE n < 199)"
+        " INSERT INTO robot (robot_id, enrolled_at_us) SELECT 'r' || n, 1 FROM number");
+    transaction.commit();
+  };
+  wait(recorder_->on_disk(std::move(enrol)));
+  const std::uint64_t commits = recorder_->counters().commits;
+  for (int n = 0; n < kRobots; ++n) {
+    TestRobot robot;
+    robot.id = "r" + std::to_string(n);
+    robot.boot_id = 1000 + static_cast<BootId>(n);
+    connect(robot);
+  }
+  clock_.run_for(200ms);
+  EXPECT_LE(recorder_->counters().commits, commits + 2);
+  EXPECT_EQ(number("SELECT count(*) FROM boot WHERE connected_at_us IS NOT NULL"), kRobots);
+}
+
 TEST_F(AdmissionTest, RefusesNumbersThatCannotBe) {
   start();
   robot_.oldest_seq = 5;  // but next_seq is 0

@@ -37,6 +37,28 @@ TEST(IntervalSet, TellsWhatIsCoveredAndWhatIsMissing) {
   EXPECT_EQ(set.covered({3, 7}), (Intervals{{3, 4}, {6, 7}}));
 }
 
+TEST(IntervalSet, ExtendAddsOnlyAtTheEnd) {
+  IntervalSet set;
+  EXPECT_FALSE(set.extend({0, 5}));
+  set.insert({0, 5});
+  EXPECT_FALSE(set.extend({4, 8}));
+  EXPECT_FALSE(set.extend({6, 8}));
+  EXPECT_TRUE(set.extend({5, 9}));
+  EXPECT_EQ(set.covered({0, 20}), (Intervals{{0, 9}}));
+}
+
+TEST(IntervalSet, EraseBelowKeepsTheRestAsItWas) {
+  IntervalSet set;
+  set.insert({2, 4});
+  set.insert({6, 10});
+  set.erase_below(2);
+  EXPECT_EQ(set.covered({0, 20}), (Intervals{{2, 4}, {6, 10}}));
+  set.erase_below(7);
+  EXPECT_EQ(set.covered({0, 20}), (Intervals{{7, 10}}));
+  set.erase_below(10);
+  EXPECT_EQ(set, IntervalSet{});
+}
+
 std::set<std::uint64_t> numbers(const Intervals& intervals) {
   std::set<std::uint64_t> found;
   for (const Interval& interval : intervals) {

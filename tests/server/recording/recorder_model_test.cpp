@@ -1,7 +1,8 @@
-// The recorder against a naive model, under random batches, duplicates, holes, overruns, reboots, restarts and full
-// queues.
+// The recorder against a naive model, under random batches, duplicates, holes, overruns, reboots, restarts, full queues
+// and lost events; and what it says about itself on the way.
 #include <map>
 #include <random>
+#include <set>
 
 #include "server/recording/sample_scanner.hpp"
 #include "server/recording/statement.hpp"
@@ -16,7 +17,7 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
   // A robot whose ring holds 300 samples; sends any part of it, in any order.
   void act(std::mt19937& random, TestRobot& robot) {
     const auto pick = [&](std::uint64_t limit) { return random() % std::max<std::uint64_t>(limit, 1); };
-    switch (pick(12)) {
+    switch (pick(14)) {
       case 0: clock_.run_for(microseconds{pick(400'000)}); break;
       case 1: flush(); break;
       case 2: robot.next_seq += pick(40); break;  // made, and their frames were lost
@@ -26,22 +27,102 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
         if (pick(4) == 0) reboot(robot);
         break;
       case 6:
-      case 7: make(robot, 1 + pick(25), 1 + pick(25)); break;
+      case 7: make_heard(robot, 1 + pick(25), 1 + pick(25)); break;
+      case 8: make_events(random, robot, 1 + pick(4)); break;
+      case 9:
+        if (missing_events_ != answered_events_) send_events(robot);
+        break;
       default: {
         const std::uint64_t first = robot.oldest_seq + pick(robot.next_seq - robot.oldest_seq);
         const std::uint64_t count = std::min(1 + pick(25), robot.next_seq - first);
         TestRobot again = robot;
         again.context.flags = rheonaut_TELEMETRY_FLAG_BACKFILL;
-        if (count > 0) send(again, first, count);
+        if (count > 0) send_heard(again, first, count);
       }
     }
     trim(robot);
+  }
+
+  // What the queue takes whole is heard: it waits or is stored from then on.
+  void send_heard(const TestRobot& robot, std::uint64_t first_seq, std::size_t count) {
+    const std::uint64_t refused = recorder_->counters().samples_refused;
+    send(robot, first_seq, count);
+    if (recorder_->counters().samples_refused != refused) return;
+    for (std::uint64_t seq = first_seq; seq < first_seq + count; ++seq) heard_.insert(seq);
+  }
+
+  void make_heard(TestRobot& robot, std::size_t count, std::size_t per_frame) {
+    for (; count > 0; count -= std::min(count, per_frame)) {
+      const std::size_t size = std::min(count, per_frame);
+      robot.next_seq += size;
+      send_heard(robot, robot.next_seq - size, size);
+    }
+  }
+
+  // Every other event is lost on the way.
+  void make_events(std::mt19937& random, const TestRobot& robot, std::uint64_t count) {
+    for (; count > 0; --count, ++next_event_seq_) {
+      if (random() % 2 == 0) send_event(robot, next_event_seq_);
+    }
+  }
+
+  void send_event(const TestRobot& robot, std::uint64_t event_seq) {
+    RobotEvent event;
+    event.robot_id = robot.id;
+    event.boot_id = robot.boot_id;
+    event.event_seq = event_seq;
+    event.kind = "mode_changed";
+    recorder_->on_event(state_of(robot, LinkState::connected), event);
+  }
+
+  void send_events(const TestRobot& robot) {
+    answered_events_ = missing_events_;
+    for (std::uint64_t seq = durable_next_event_seq_; seq < next_event_seq_; ++seq) send_event(robot, seq);
+  }
+
+  // What was heard is read back from memory and disk, each sample from one of them; nothing else is; and what is stored
+  // as durable of a boot is no more than is there.
+  void check_on_the_way(const TestRobot& robot) {
+    std::set<std::uint64_t> waiting;
+    for (const Segment& segment : recorder_->waiting(robot.boot_id, {0, robot.next_seq})) {
+      for (std::uint64_t seq = segment.first_seq; seq < segment.next_seq(); ++seq) {
+        ASSERT_TRUE(waiting.insert(seq).second) << seq << " waits twice";
+        ASSERT_FLOAT_EQ(segment.samples[seq - segment.first_seq].position_m, static_cast<float>(seq) / 1000);
+      }
+    }
+    IntervalSet here;
+    SQLite::Database database = open_for_reading(path_);
+    SQLite::Statement stored{database,
+                             "SELECT first_seq, last_seq + 1, 0 FROM segment WHERE boot_key = ?1 UNION ALL"
+                             " SELECT first_seq, last_seq + 1, 1 FROM gap WHERE boot_key = ?1"};
+    stored.bind(1, key_of(database, robot));
+    while (stored.executeStep()) {
+      const Interval range{static_cast<std::uint64_t>(stored.getColumn(0).getInt64()),
+                           static_cast<std::uint64_t>(stored.getColumn(1).getInt64())};
+      ASSERT_EQ(count(here.insert(range)), range.next - range.first) << "stored twice";
+      const auto waits = waiting.lower_bound(range.first);
+      ASSERT_TRUE(waits == waiting.end() || *waits >= range.next) << *waits << " is stored, and waits";
+    }
+    EXPECT_LE(here.first_hole(), robot.next_seq);
+    const std::string boot = " FROM boot WHERE boot_key = " + std::to_string(key_of(database, robot));
+    EXPECT_LE(database.execAndGet("SELECT coalesce(max(durable_next_seq), 0)" + boot).getInt64(),
+              static_cast<std::int64_t>(here.first_hole()));
+    for (const LostRange& gap : recorder_->waiting_gaps(robot.boot_id)) here.insert(gap.lost);
+    for (const std::uint64_t seq : heard_) ASSERT_TRUE(waiting.contains(seq) || here.contains(seq)) << seq;
+    for (const std::uint64_t seq : waiting) ASSERT_LT(seq, robot.next_seq);
+  }
+
+  static std::int64_t key_of(SQLite::Database& database, const TestRobot& robot) {
+    SQLite::Statement query{database, "SELECT boot_key FROM boot WHERE boot_id = ?"};
+    query.bind(1, static_cast<std::int64_t>(robot.boot_id));
+    return query.executeStep() ? query.getColumn(0).getInt64() : 0;
   }
 
   void reconnect(std::mt19937& random, TestRobot& robot) {
     if (random() % 2 == 0) {
       if (random() % 2 == 0) {
         kill();
+        heard_.clear();  // what waited is gone
       } else {
         stop();
       }
@@ -58,6 +139,8 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
     made_by_ended_[robot.boot_id] = robot.next_seq;
     robot.boot_id += 1;
     robot.next_seq = robot.oldest_seq = 0;
+    heard_.clear();
+    next_event_seq_ = durable_next_event_seq_ = 0;
     connect(robot);
   }
 
@@ -132,17 +215,33 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
   RecorderOptions options_;
   std::map<BootId, std::map<std::uint64_t, std::uint32_t>> stored_;  // flags of each stored sample
   std::map<BootId, std::uint64_t> made_by_ended_;                    // samples
+  std::set<std::uint64_t> heard_;                                    // of the present boot
+  std::uint64_t next_event_seq_ = 0;
+  int answered_events_ = 0;
 };
 
 TEST_P(RecorderModelTest, StoresOrListsEverySampleExactlyOnce) {
   std::mt19937 random{GetParam()};
   options_.max_queued_samples = GetParam() % 3 == 0 ? 60 : 100'000;
+  if (GetParam() % 4 == 0) options_.max_queued_records = 3;
   TestRobot robot;
   start(options_);
   connect(robot);
-  for (int step = 0; step < 150; ++step) act(random, robot);
+  for (int step = 0; step < 150; ++step) {
+    act(random, robot);
+    ASSERT_NO_FATAL_FAILURE(check_on_the_way(robot)) << "step " << step;
+  }
   send_the_rest(robot);
   EXPECT_EQ(durable_next_seq_, robot.next_seq);
+  send_events(robot);
+  for (int asked = 0; asked < 100 && durable_next_event_seq_ < next_event_seq_; ++asked) {
+    clock_.run_until([&] { return missing_events_ != answered_events_; }, 2s);
+    send_events(robot);
+    flush();
+  }
+  EXPECT_EQ(durable_next_event_seq_, next_event_seq_);
+  EXPECT_EQ(number("SELECT count(*) FROM event WHERE boot_key = (SELECT max(boot_key) FROM boot)"),
+            static_cast<std::int64_t>(next_event_seq_));
 
   auto seen = recorded(robot);
   EXPECT_EQ(seen[robot.boot_id].size(), robot.next_seq);
@@ -162,6 +261,50 @@ TEST_P(RecorderModelTest, StoresOrListsEverySampleExactlyOnce) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, RecorderModelTest, ::testing::Range(0u, 24u));
+
+using OverloadTest = RecordingTest;
+
+// Robots that make twice what the queue takes: what is neither stored nor lost is none.
+TEST_F(OverloadTest, AtTwiceTheCapacityWhatIsMadeIsStoredOrLost) {
+  constexpr std::size_t kRing = 150;
+  RecorderOptions options;
+  options.max_queued_samples = 500;
+  start(options);
+  std::vector<TestRobot> robots(10);
+  for (std::size_t n = 0; n < robots.size(); ++n) {
+    robots[n].id = "r" + std::to_string(n);
+    robots[n].boot_id = 100 + n;
+    connect(robots[n]);
+  }
+  for (int tenth = 0; tenth < 100; ++tenth) {
+    for (TestRobot& robot : robots) {
+      robot.next_seq += 10;
+      const std::uint64_t oldest = robot.next_seq > kRing ? robot.next_seq - kRing : 0;
+      robot.oldest_seq = std::max({robot.oldest_seq, oldest, durable_next_seqs_[robot.boot_id]});
+      send(robot, robot.next_seq - 10, 10);
+      // Backfill, as much as the live rate.
+      if (robot.oldest_seq + 10 < robot.next_seq) send(robot, robot.oldest_seq, 10);
+      ASSERT_LE(recorder_->queued_samples(), 500u);
+    }
+    clock_.run_for(100ms);
+  }
+  EXPECT_GT(recorder_->counters().samples_refused, 1000u);
+  EXPECT_GT(recorder_->counters().samples_lost, 100u);
+  for (TestRobot& robot : robots) {
+    for (int turn = 0; turn < 20 && durable_next_seqs_[robot.boot_id] < robot.next_seq; ++turn) {
+      const std::uint64_t from = std::max(robot.oldest_seq, durable_next_seqs_[robot.boot_id]);
+      send(robot, from, std::min<std::uint64_t>(100, robot.next_seq - from));
+      flush();
+    }
+    EXPECT_EQ(durable_next_seqs_[robot.boot_id], robot.next_seq);
+  }
+  const auto& counters = recorder_->counters();
+  EXPECT_EQ(counters.samples_written + counters.samples_lost, 10'000u);
+  EXPECT_EQ(number("SELECT sum(last_seq - first_seq + 1) FROM segment"),
+            static_cast<std::int64_t>(counters.samples_written));
+  EXPECT_EQ(number("SELECT sum(last_seq - first_seq + 1) FROM gap"), static_cast<std::int64_t>(counters.samples_lost));
+  EXPECT_EQ(number("SELECT count(*) FROM gap WHERE cause = 'queue_full'") > 0, true);
+}
 
 }  // namespace
 }  // namespace server

@@ -51,11 +51,11 @@ TEST_F(RecorderTest, StoresAFullGroupAtTheNextCommitAndAcknowledgesIt) {
             (Rows{"1|0.0", "100|0.0989999994635582"}));
 }
 
-TEST_F(RecorderTest, StoresASmallGroupWhenItIsASecondOld) {
+TEST_F(RecorderTest, StoresASmallGroupWhenItIsALittleOverASecondOld) {
   start();
   connect(robot_);
   make(robot_, 7);
-  clock_.run_for(900ms);
+  clock_.run_for(1s);
   EXPECT_EQ(durable_next_seq_, 0u);
   clock_.run_for(250ms);
   EXPECT_EQ(durable_next_seq_, 7u);
@@ -282,6 +282,101 @@ TEST_F(RecorderTest, EventsAreStoredOnceWithTheNextCommit) {
   kill();
   start();
   EXPECT_EQ(admit(robot_).durable_next_event_seq, 4u);
+}
+
+TEST_F(RecorderTest, AsksForMissingEventsOnceASecond) {
+  start();
+  connect(robot_);
+  send_event(robot_, 0);
+  send_event(robot_, 2);
+  clock_.run_for(400ms);
+  EXPECT_EQ(missing_events_, 0);
+  clock_.run_for(1400ms);
+  EXPECT_EQ(missing_events_, 2);
+  send_event(robot_, 1);
+  clock_.run_for(5s);
+  EXPECT_EQ(missing_events_, 2);
+  EXPECT_EQ(durable_next_event_seq_, 3u);
+}
+
+TEST_F(RecorderTest, AnEventThatTheFullQueueRefusedIsAskedForAgain) {
+  RecorderOptions options;
+  options.max_queued_records = 2;
+  start(options);
+  connect(robot_);
+  for (std::uint64_t seq = 0; seq < 5; ++seq) send_event(robot_, seq);
+  EXPECT_EQ(recorder_->counters().records_refused, 3u);
+  for (std::uint64_t next = 2; durable_next_event_seq_ < 5;) {
+    const int asked = missing_events_;
+    ASSERT_TRUE(clock_.run_until([&] { return missing_events_ > asked; }, 2s));
+    EXPECT_EQ(durable_next_event_seq_, next);
+    for (std::uint64_t seq = next; seq < 5; ++seq) send_event(robot_, seq);
+    clock_.run_for(200ms);
+    next += 2;
+  }
+  EXPECT_EQ(number("SELECT count(*) FROM event"), 5);
+  EXPECT_EQ(number("SELECT count(*) FROM event_gap"), 0);
+}
+
+TEST_F(RecorderTest, SegmentsOfEachBootEndAtItsOwnSamples) {
+  start();
+  connect(robot_);
+  make(robot_, 30);
+  flush();  // cuts the segment; the next one ends where it would have ended
+  make(robot_, 270);
+  TestRobot other;
+  other.id = "dory";
+  other.boot_id = 7;
+  connect(other);
+  make(other, 200);
+  flush();
+  EXPECT_EQ(rows("SELECT boot_key, first_seq, last_seq FROM segment ORDER BY boot_key, first_seq"),
+            (Rows{"1|0|29", "1|30|99", "1|100|199", "1|200|299", "2|0|62", "2|63|162", "2|163|199"}));
+}
+
+TEST_F(RecorderTest, WhatComesAfterACompleteSegmentWaitsForItsOwn) {
+  start();
+  connect(robot_);
+  make(robot_, 103);
+  clock_.run_for(200ms);
+  EXPECT_EQ(durable_next_seq_, 100u);
+  make(robot_, 97);
+  clock_.run_for(100ms);
+  EXPECT_EQ(segments(), (Rows{"0|99", "100|199"}));
+}
+
+TEST_F(RecorderTest, ASegmentsUncertaintyHoldsForEachOfItsBatches) {
+  start();
+  connect(robot_);
+  SampleBatch batch = robot_.batch(0, 5);  // 300 µs
+  send(robot_, batch);
+  batch = robot_.batch(5, 5);
+  batch.utc_offset_us -= 400;
+  batch.clock_uncertainty_us = 200;
+  send(robot_, batch);
+  batch = robot_.batch(10, 5);
+  batch.utc_offset_us += 100;
+  batch.clock_uncertainty_us = 50;
+  send(robot_, batch);
+  flush();
+  EXPECT_EQ(rows("SELECT utc_offset_us, clock_uncertainty_us FROM segment"), Rows{"1700000000000000|600"});
+}
+
+TEST_F(RecorderTest, HowFarABootIsDurableIsStoredWithIt) {
+  const auto stored = [this] { return rows("SELECT durable_next_seq, durable_next_event_seq FROM boot"); };
+  start();
+  connect(robot_);
+  send(robot_, 0, 10);
+  send(robot_, 20, 10);
+  send_event(robot_, 0);
+  send_event(robot_, 2);
+  flush();
+  EXPECT_EQ(stored(), Rows{"10|1"});
+  robot_.oldest_seq = 15;
+  send(robot_, 15, 5);
+  send_event(robot_, 3, 2);
+  flush();
+  EXPECT_EQ(stored(), Rows{"30|4"});
 }
 
 TEST_F(RecorderTest, RestoresPendingStopsAndFailsOtherCommands) {

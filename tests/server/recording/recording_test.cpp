@@ -30,6 +30,7 @@ RecordingTest::RecordingTest() {
   path_ = folder_ / "station.sqlite";
   clock_.add_worker(disk_);
   clock_.add_worker(readers_);
+  clock_.add_worker(checkpoints_);
 }
 
 RecordingTest::~RecordingTest() {
@@ -40,7 +41,7 @@ RecordingTest::~RecordingTest() {
 void RecordingTest::start(RecorderOptions options) {
   options.path = path_;
   tasks_ = std::make_unique<TaskGroup>(loop_);
-  recording_ = std::make_unique<RecordingParts>(loop_, clock_, disk_, readers_, options);
+  recording_ = std::make_unique<RecordingParts>(loop_, clock_, disk_, readers_, checkpoints_, options);
   recorder_ = &recording_->recorder;
   runs_ = &recording_->runs;
   history_ = &recording_->history;
@@ -52,6 +53,7 @@ void RecordingTest::start(RecorderOptions options) {
   recorder_->set_on_missing([this](const RobotId&, BootId, std::uint64_t first_seq, std::uint64_t next_seq) {
     missing_.push_back({first_seq, next_seq});
   });
+  recorder_->set_on_missing_events([this](const RobotId&, BootId) { ++missing_events_; });
   restored_ = wait(recording_->open());
   recording_->spawn(*tasks_);
   clock_.settle();
@@ -86,6 +88,7 @@ Admission RecordingTest::admit(const TestRobot& robot) {
   request.robot_time_us = robot.time_of(robot.next_seq);
   request.oldest_seq = robot.oldest_seq;
   request.next_seq = robot.next_seq;
+  request.next_event_seq = robot.next_event_seq;
   request.received_at_us = clock_.utc_us();
   return wait(recorder_->admit(request));
 }

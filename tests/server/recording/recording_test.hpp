@@ -39,6 +39,7 @@ struct TestRobot {
   BootId boot_id = 0xfedcba9876543210;
   std::uint64_t next_seq = 0;    // the sample made next
   std::uint64_t oldest_seq = 0;  // the oldest still held
+  std::uint64_t next_event_seq = 0;
   std::string token;
   bool from_loopback = true;
   SampleContext context = manual_at_100_hz();
@@ -120,6 +121,7 @@ class RecordingTest : public ::testing::Test {
   boost::asio::io_context loop_{1};
   WorkerThread disk_{"disk"};
   WorkerThread readers_{"readers"};
+  WorkerThread checkpoints_{"checkpoints"};
   VirtualClock clock_{loop_};
   std::unique_ptr<TaskGroup> tasks_;
   std::unique_ptr<RecordingParts> recording_;
@@ -131,6 +133,7 @@ class RecordingTest : public ::testing::Test {
   std::map<BootId, std::uint64_t> durable_next_seqs_;
   std::uint64_t durable_next_event_seq_ = 0;
   std::vector<Missing> missing_;  // as asked for
+  int missing_events_ = 0;        // times that they were asked for
 };
 
 }  // namespace server

@@ -59,18 +59,20 @@ void StationLife::live_until_cut() {
 }
 
 void StationLife::begin() {
-  start();
+  RecorderOptions options;
+  options.checkpoint_bytes = (5 + pick(60)) * 4096;
+  start(options);
   recorder_->set_on_durable([this](const RobotId&, BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event) {
     acknowledge(boot_id, next_seq, next_event);
   });
   recorder_->set_on_missing([this](const RobotId&, BootId boot_id, std::uint64_t first_seq, std::uint64_t next_seq) {
     asked_[boot_id].push_back({first_seq, next_seq});
   });
+  recorder_->set_on_missing_events([this](const RobotId&, BootId boot_id) { asked_events_.insert(boot_id); });
   moving_commands_.clear();
   station_events_.clear();
   open_run_.reset();
-  auto job = [without_sync = mutant_ == Mutant::synchronous_off, pages = 5 + pick(60)](Database& database) {
-    database.handle().exec(fmt::format("PRAGMA wal_autocheckpoint = {}", pages));
+  auto job = [without_sync = mutant_ == Mutant::synchronous_off](Database& database) {
     if (without_sync) database.handle().exec("PRAGMA synchronous = OFF");
   };
   wait(recorder_->on_disk(std::move(job)));

@@ -53,6 +53,7 @@ class StationLife final : public RecordingTest {
   void answer_missing();
   void make_event(RingRobot& robot);
   void send_event(const RingRobot& robot, std::uint64_t event_seq);
+  void send_held_events(const RingRobot& robot);
   void let_go(RingRobot& robot);
   void acknowledge(BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event_seq);
 
@@ -79,6 +80,7 @@ class StationLife final : public RecordingTest {
   RecordingTruth truth_;
   std::map<BootId, IntervalSet> received_;
   std::map<BootId, std::vector<Missing>> asked_;
+  std::set<BootId> asked_events_;
   CommandId last_command_id_ = 0;
   std::vector<CommandId> moving_commands_;  // of this session
   std::set<std::uint64_t> station_events_;  // not flushed yet

@@ -72,7 +72,9 @@ void StationLife::send_held(const RingRobot& robot, std::uint64_t first_seq, std
 
 void StationLife::answer_missing() {
   const std::map<BootId, std::vector<Missing>> asked = std::exchange(asked_, {});
+  const std::set<BootId> asked_events = std::exchange(asked_events_, {});
   for (const RingRobot& robot : robots_) {
+    if (asked_events.contains(robot.own.boot_id)) send_held_events(robot);
     const auto found = asked.find(robot.own.boot_id);
     if (found == asked.end()) continue;
     for (const Missing& range : found->second) {
@@ -85,7 +87,11 @@ void StationLife::make_event(RingRobot& robot) {
   const std::uint64_t event_seq = robot.next_event_seq++;
   truth_.boots.at(robot.own.boot_id).events_made = robot.next_event_seq;
   let_go(robot);
-  send_event(robot, event_seq);
+  if (pick(6) > 0) send_event(robot, event_seq);
+}
+
+void StationLife::send_held_events(const RingRobot& robot) {
+  for (std::uint64_t seq = robot.oldest_event_seq; seq < robot.next_event_seq; ++seq) send_event(robot, seq);
 }
 
 void StationLife::send_event(const RingRobot& robot, std::uint64_t event_seq) {
@@ -146,6 +152,7 @@ void StationLife::reboot(RingRobot& robot) {
 }
 
 void StationLife::join(RingRobot& robot) {
+  robot.own.next_event_seq = robot.next_event_seq;
   const Admission admission = admit(robot.own);
   if (admission.refusal == rheonaut_REFUSAL_REASON_STATION_BUSY) return;
   if (admission.refusal != rheonaut_REFUSAL_REASON_NONE) return note({admission.detail}, "at a connection");
@@ -156,7 +163,7 @@ void StationLife::join(RingRobot& robot) {
   recorder_->on_robot(state);
   runs_->on_robot(state);
   robot.is_connected = true;
-  for (std::uint64_t seq = robot.oldest_event_seq; seq < robot.next_event_seq; ++seq) send_event(robot, seq);
+  if (pick(4) > 0) send_held_events(robot);
   if (pick(2) == 0) send_held(robot, robot.own.oldest_seq, kRingSamples);
 }
 

@@ -1,0 +1,83 @@
+// Moves the write-ahead log into the database beside the commits, and watches that the log does not grow.
+//
+//   log ≥ checkpoint_bytes → a pass on a thread and handle of its own → the disk thread finishes between two commits
+//   → the next commit begins the log anew, unless a reader stands in it
+//
+// A commit waits only when the log has grown by half again while a pass is under way. So the log stays below twice
+// checkpoint_bytes; only a foreign program that holds a read transaction makes it longer, which is logged and counted.
+//
+// Loop thread; the work is done on the two workers. Loop, clock and worker outlive it.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "server/clock.hpp"
+#include "server/worker.hpp"
+
+namespace server {
+
+// The write-ahead log.
+struct WalState {
+  std::uint64_t bytes = 0;         // in use; the file may be longer
+  std::int64_t held_since_us = 0;  // UTC since when it should have begun anew and could not; 0: it could
+  std::uint64_t checkpoints = 0;   // passes, since the start of the program
+};
+
+// What a checkpoint came to.
+struct CheckpointOutcome {
+  std::int64_t log_frames = 0;
+  std::int64_t moved_frames = 0;  // of them, into the database
+  bool is_busy = false;           // another checkpoint is under way: nothing is known
+  std::string problem;            // empty: none
+};
+
+// Moves what no reader needs, and waits for nobody. Of the handle's thread.
+CheckpointOutcome checkpoint_passively(SQLite::Database& database);
+
+class Checkpointer {
+ public:
+  Checkpointer(boost::asio::io_context& loop, Clock& clock, WorkerThread& worker, std::filesystem::path path,
+               std::uint64_t checkpoint_bytes);
+
+  // Makes the passes, until cancelled.
+  boost::asio::awaitable<void> run();
+
+  // After work of the disk thread: so long is the log.
+  void on_log(std::uint64_t bytes);
+  // Before a commit.
+  boost::asio::awaitable<void> wait_for_room();
+  // Little is left to move, or a pass has left it: the disk thread is to do it now, and to say what came of it.
+  bool wants_finish() const;
+  void on_finish(const CheckpointOutcome& outcome);
+
+  const WalState& state() const { return state_; }
+
+ private:
+  void note(const CheckpointOutcome& outcome);
+  void watch();
+
+  Clock& clock_;
+  WorkerThread& worker_;
+  std::filesystem::path path_;
+  std::uint64_t checkpoint_bytes_;
+  Signal pass_wanted_;
+  Signal pass_ended_;
+
+  WalState state_;
+  bool is_passing_ = false;
+  bool was_passed_ = false;          // since the log began, and something of it may be left
+  std::uint64_t moved_bytes_ = 0;    // of this log, into the database
+  std::int64_t next_try_us_ = 0;     // steady
+  bool is_finished_ = false;         // all that could be moved was, so it should begin anew
+  std::int64_t stuck_since_us_ = 0;  // steady; a commit did not begin it anew; 0: none was made, or it did
+  std::int64_t warned_at_us_ = 0;    // steady
+  std::string problem_;              // of the latest try
+};
+
+}  // namespace server
