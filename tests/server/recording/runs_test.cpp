@@ -267,7 +267,7 @@ TEST_F(RunsTest, IsInterruptedByAKillAtTheLastSampleThatIsKnown) {
   batch.utc_offset_us = clock_.utc_us();
   send(robot_, batch);
   robot_.next_seq = 130;
-  clock_.run_for(150ms);
+  flush();
   make(robot_, 44);  // heard, but not committed: gone with the station
   kill();
   start();
