@@ -25,16 +25,20 @@ Place place_of(const Segment& segment) {
 
 class Places {
  public:
-  Places(SQLite::Database& database, const RecordedSpan& span)
-      : waiting_{span.waiting},
-        at_or_before_{database, std::string{kColumns} + "first_seq <= ?2 ORDER BY first_seq DESC LIMIT 1"},
-        after_{database, std::string{kColumns} + "first_seq > ?2 ORDER BY first_seq LIMIT 1"},
-        boot_key_{span.boot_key} {}
+  explicit Places(SQLite::Database& database)
+      : at_or_before_{database, std::string{kColumns} + "first_seq <= ?2 ORDER BY first_seq DESC LIMIT 1"},
+        after_{database, std::string{kColumns} + "first_seq > ?2 ORDER BY first_seq LIMIT 1"} {}
+
+  // From now on those of this span's boot; it outlives the next look.
+  void enter(const RecordedSpan& span) {
+    waiting_ = &span.waiting;
+    boot_key_ = span.boot_key;
+  }
 
   // The last one that begins at the number or before it, and the first one that begins after it.
   std::optional<Place> at_or_before(std::uint64_t seq) {
     std::optional<Place> found = read(at_or_before_, seq);
-    for (const Segment& segment : waiting_) {
+    for (const Segment& segment : *waiting_) {
       const bool later = !found || segment.first_seq > found->first_seq;
       if (segment.first_seq <= seq && later) found = place_of(segment);
     }
@@ -42,7 +46,7 @@ class Places {
   }
   std::optional<Place> after(std::uint64_t seq) {
     std::optional<Place> found = read(after_, seq);
-    for (const Segment& segment : waiting_) {
+    for (const Segment& segment : *waiting_) {
       const bool earlier = !found || segment.first_seq < found->first_seq;
       if (segment.first_seq > seq && earlier) found = place_of(segment);
     }
@@ -63,10 +67,10 @@ class Places {
     return place;
   }
 
-  const std::vector<Segment>& waiting_;
   SQLite::Statement at_or_before_;
   SQLite::Statement after_;
-  std::int64_t boot_key_;
+  const std::vector<Segment>* waiting_ = nullptr;
+  std::int64_t boot_key_ = 0;
 };
 
 // The number of the first sample at the time or after it, reckoned from a place with its period.
@@ -108,8 +112,9 @@ std::uint64_t seq_at(Places& places, const Place& first, const Place& last, std:
 std::vector<RecordedSpan> cut_to_window(SQLite::Database& database, std::vector<RecordedSpan> spans,
                                         TimeWindow window) {
   std::vector<RecordedSpan> found;
+  Places places{database};
   for (RecordedSpan& span : spans) {
-    Places places{database, span};
+    places.enter(span);
     constexpr std::uint64_t kLargest = std::numeric_limits<std::int64_t>::max();
     const auto last = places.at_or_before(kLargest);
     if (!last) continue;

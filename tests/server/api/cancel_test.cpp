@@ -128,6 +128,19 @@ TEST_F(CancelTest, AnExportWhoseClientHasGoneEnds) {
   EXPECT_LT(exports_reader.questions() - before, of_whole);
 }
 
+TEST_F(CancelTest, AFileThatNobodyWaitsForIsRemoved) {
+  make_run();
+  for (const char* target : {"/api/v1/runs/1/samples.mat", "/api/v1/runs/1/samples.sqlite"}) {
+    QuietClient client{api->port()};
+    const std::uint64_t before = recording.exports.reader().questions();
+    client.send(head(std::string{"GET "} + target));
+    poll_until([&] { return recording.exports.reader().questions() >= before + 3; });  // it is being written
+    client.leave();
+    clock.settle();
+    EXPECT_TRUE(std::filesystem::is_empty(recording.exports_folder()));
+  }
+}
+
 TEST_F(CancelTest, TheNextQuestionIsAnsweredAfterOneThatWasGivenUp) {
   make_run();
   questions_for("/api/v1/runs/1/overview", false);
