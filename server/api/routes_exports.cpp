@@ -77,6 +77,9 @@ Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folde
 
 asio::awaitable<Result<std::unique_ptr<ExportFile>>> begin_file(ApiParts& parts, const ParsedExport& parsed,
                                                                 const char* ending) {
+  if (auto may = parts.recording.disk_watch.may_begin("an export to a file"); !may) {
+    co_return std::unexpected{may.error()};
+  }
   const auto grid_us = static_cast<std::uint64_t>(parsed.query.grid_us.value_or(kMaxGridUs));
   auto job = [folder = parts.recording.exports_folder(), ending, spans = parsed.spans,
               grid_us](SQLite::Database& database) {

@@ -65,7 +65,7 @@ void RecordingParts::spawn(TaskGroup& tasks) {
 
 void RecordingParts::close() {
   backups.close();
-  reader.close();
+  for (DatabaseReader* each : {&reader, &history.reader(), &exports.reader()}) each->close();
   recorder.close();
   if (!runs.any_open()) return;
   try {

@@ -10,6 +10,7 @@
 #include "server/recording/database.hpp"
 #include "server/recording/file_check.hpp"
 #include "server/recording/finished_file.hpp"
+#include "server/recording/run_store.hpp"
 #include "server/recording/schema.hpp"
 #include "server/recording/statement.hpp"
 
@@ -19,27 +20,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kPagesAtOnce = 4096;
-
-// A span ends with the last of its samples that the backup has; one that has none goes.
-constexpr const char* kCloseSpans = R"sql(
-UPDATE run_span SET last_seq = (
-  SELECT max(last_seq) FROM (
-    SELECT max(last_seq) AS last_seq FROM segment WHERE segment.boot_key = run_span.boot_key
-    UNION ALL SELECT max(last_seq) FROM gap WHERE gap.boot_key = run_span.boot_key))
-WHERE last_seq IS NULL AND EXISTS (
-  SELECT 1 FROM segment WHERE segment.boot_key = run_span.boot_key AND segment.last_seq >= run_span.first_seq
-  UNION ALL SELECT 1 FROM gap WHERE gap.boot_key = run_span.boot_key AND gap.last_seq >= run_span.first_seq);
-DELETE FROM run_span WHERE last_seq IS NULL;
-)sql";
-
-// A run ends when its last sample had arrived.
-constexpr const char* kInterruptRuns = R"sql(
-UPDATE run SET state = 'interrupted', ended_at_us = max(started_at_us, coalesce((
-  SELECT segment.received_at_us FROM run_span JOIN segment ON segment.boot_key = run_span.boot_key
-    AND segment.first_seq >= run_span.first_seq - 99 AND segment.first_seq <= run_span.last_seq
-  WHERE run_span.run_id = run.run_id ORDER BY run_span.span DESC, segment.first_seq DESC LIMIT 1), 0))
-WHERE ended_at_us IS NULL
-)sql";
 
 [[noreturn]] void refuse(const fs::path& from, const std::string& why) {
   throw std::runtime_error{fmt::format("cannot restore from '{}': {}; nothing was restored", from.string(), why)};
@@ -64,10 +44,9 @@ void copy_database(const fs::path& from, const fs::path& to) {
 
 RestoredStore mark(Database& database, std::int64_t utc_us) {
   RestoredStore restored;
+  restored.runs_interrupted = static_cast<std::int64_t>(RunStore{database, {}}.interrupt());
   SQLite::Database& handle = database.handle();
   SQLite::Transaction transaction{handle, SQLite::TransactionBehavior::IMMEDIATE};
-  handle.exec(kCloseSpans);
-  restored.runs_interrupted = handle.exec(kInterruptRuns);
   randombytes_buf(&restored.store_id, sizeof restored.store_id);
   SQLite::Statement set{handle, "INSERT OR REPLACE INTO meta (name, value) VALUES (?, ?)"};
   execute(set, "store_id", restored.store_id);
