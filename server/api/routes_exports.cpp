@@ -88,6 +88,13 @@ asio::awaitable<Result<std::unique_ptr<ExportFile>>> begin_file(ApiParts& parts,
   co_return co_await parts.recording.exports.reader().ask(std::move(job));
 }
 
+// An export of which nobody knew how long it would become ends before the recording has no room.
+Result<void> check_room(const std::filesystem::path& folder) {
+  if (free_bytes_of(folder) >= kSpareBytes) return {};
+  return fail(ErrorCode::unavailable, "the export would fill the station's disk; export CSV, which needs no room",
+              "low_space");
+}
+
 Answer export_mat(ApiParts& parts, Request request) {
   auto parsed = co_await parse_export(parts, std::move(request));
   if (!parsed) co_return problem(parsed.error());
@@ -95,7 +102,10 @@ Answer export_mat(ApiParts& parts, Request request) {
   if (!file) co_return problem(file.error());
   MatWriter writer{(*file)->path(), std::move(parsed->spans), parsed->query};
   for (Result<bool> more = true; *more;) {
-    auto slice = [&writer](SQLite::Database& database) { return writer.advance(database); };
+    auto slice = [&writer, folder = parts.recording.exports_folder()](SQLite::Database& database) -> Result<bool> {
+      if (auto room = check_room(folder); !room) return std::unexpected{room.error()};
+      return writer.advance(database);
+    };
     more = co_await parts.recording.exports.reader().ask(std::move(slice));
     if (!more) co_return problem(more.error());
   }
@@ -110,9 +120,13 @@ Answer export_sqlite(ApiParts& parts, Request request) {
   if (!file) co_return problem(file.error());
   co_await parts.recording.exports.settle();  // events and commands that were heard
   RunFile writer{(*file)->path(), reading_uri(parts.recording.path(), false), std::move(parsed->spans), parsed->query};
-  for (bool more = true; more;) {
-    auto slice = [&writer](SQLite::Database& database) { return writer.advance(database); };
+  for (Result<bool> more = true; *more;) {
+    auto slice = [&writer, folder = parts.recording.exports_folder()](SQLite::Database& database) -> Result<bool> {
+      if (auto room = check_room(folder); !room) return std::unexpected{room.error()};
+      return writer.advance(database);
+    };
     more = co_await parts.recording.exports.reader().ask(std::move(slice));
+    if (!more) co_return problem(more.error());
   }
   co_return attachment("application/vnd.sqlite3", parsed->query.run, ".sqlite",
                        std::make_unique<FileStream>(parts.recording.exports, std::move(*file)));

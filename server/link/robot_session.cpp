@@ -71,6 +71,7 @@ AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t r
   request.robot_time_us = robot_time_us;
   request.oldest_seq = hello.oldest_seq;
   request.next_seq = hello.next_seq;
+  request.oldest_event_seq = hello.oldest_event_seq;
   request.next_event_seq = hello.next_event_seq;
   request.received_at_us = utc_us;
   return request;

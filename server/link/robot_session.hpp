@@ -28,6 +28,7 @@ class RobotSession final : public RobotPort {
 
   RobotSession(boost::asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
                RobotArchive& archive);
+  ~RobotSession() override { station_.on_disconnected(*this, "the station stops"); }  // also when it was never served
 
   // Hello to Welcome; false when the robot was refused or said nothing. Then serve() to the end of the connection.
   boost::asio::awaitable<bool> greet();

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::size_t kMaxNameBytes = 64;
 constexpr std::size_t kMaxRecords = 100;
-constexpr int kPagesAtOnce = 256;
+constexpr int kPagesAtOnce = 64;
 constexpr int kMaxPagesAStep = 1024;
 constexpr microseconds kStepTime = 30ms;
 constexpr microseconds kPause = 20ms;  // at least, between two steps: for the commits
@@ -59,7 +59,8 @@ CopyStep make_step(std::unique_ptr<BackupCopy>& copy, const Clock& clock) {
   } catch (const std::exception& error) {
     step.problem = fmt::format("the copy cannot be written: {}", error.what());
   }
-  if (step.complete || !step.problem.empty()) copy.reset();
+  if (!step.problem.empty()) copy.reset();
+  if (step.complete) copy->finish();
   step.took_us = clock.steady_us() - begun_us;
   return step;
 }
@@ -113,8 +114,14 @@ const char* text(BackupState value) {
   return "failed";
 }
 
-Backups::Backups(asio::io_context& loop, Clock& clock, Recorder& recorder, const DiskWatch& disk_watch, fs::path folder)
-    : loop_{loop}, clock_{clock}, recorder_{recorder}, disk_watch_{disk_watch}, folder_{std::move(folder)} {}
+Backups::Backups(asio::io_context& loop, Clock& clock, Recorder& recorder, WorkerThread& readers,
+                 const DiskWatch& disk_watch, fs::path folder)
+    : loop_{loop},
+      clock_{clock},
+      recorder_{recorder},
+      readers_{readers},
+      disk_watch_{disk_watch},
+      folder_{std::move(folder)} {}
 
 Backups::~Backups() = default;
 
@@ -132,7 +139,13 @@ asio::awaitable<Result<BackupRecord>> Backups::begin(std::string name) {
   BackupRecord record;
   record.name = name;
   record.path = folder_ / (name + kSuffix);
-  auto check = [path = record.path, database = recorder_.path()] { return check_room(path, database); };
+  auto check = [path = record.path, database = recorder_.path()]() -> Result<void> {
+    try {
+      return check_room(path, database);
+    } catch (const std::exception& error) {
+      return fail(ErrorCode::unavailable, fmt::format("the folder of backups cannot be used: {}", error.what()));
+    }
+  };
   const Result<void> possible = co_await checker_.run(std::move(check));
   if (!possible) {
     busy_ = false;
@@ -148,7 +161,7 @@ asio::awaitable<Result<BackupRecord>> Backups::begin(std::string name) {
 
 asio::awaitable<std::vector<BackupRecord>> Backups::list() {
   auto look = [folder = folder_] { return found_in(folder); };
-  std::map<std::string, BackupRecord> found = co_await checker_.run(std::move(look));
+  std::map<std::string, BackupRecord> found = co_await readers_.run(std::move(look));
   for (const BackupRecord& record : records_) {
     const bool was_removed = record.state == BackupState::done && !found.contains(record.name);
     if (!was_removed) found[record.name] = record;
@@ -206,7 +219,11 @@ asio::awaitable<std::string> Backups::copy(BackupRecord& record) {
     if (!step.problem.empty()) co_return step.problem;
     record.pages_done = step.pages_done;
     record.pages_total = step.pages_total;
-    if (step.complete) co_return std::string{};
+    if (step.complete) {
+      auto close = [this] { copy_.reset(); };  // which may wait for a slow disk to take what it has not yet
+      co_await checker_.run(std::move(close));
+      co_return std::string{};
+    }
     if (disk_watch_.state() == SpaceState::critical) {
       auto give_up = [this](Database&) { copy_.reset(); };
       co_await recorder_.on_disk(std::move(give_up));

@@ -38,8 +38,8 @@ struct BackupRecord {
 
 class Backups {
  public:
-  Backups(boost::asio::io_context& loop, Clock& clock, Recorder& recorder, const DiskWatch& disk_watch,
-          std::filesystem::path folder);
+  Backups(boost::asio::io_context& loop, Clock& clock, Recorder& recorder, WorkerThread& readers,
+          const DiskWatch& disk_watch, std::filesystem::path folder);
   ~Backups();
 
   // Makes those that were begun, until cancelled.
@@ -70,9 +70,10 @@ class Backups {
   boost::asio::io_context& loop_;
   Clock& clock_;
   Recorder& recorder_;
+  WorkerThread& readers_;
   const DiskWatch& disk_watch_;
   std::filesystem::path folder_;
-  std::unique_ptr<BackupCopy> copy_;   // used by jobs of the disk thread; by close() when none can be under way
+  std::unique_ptr<BackupCopy> copy_;   // used by one job at a time; by close() when none can be under way
   std::vector<BackupRecord> records_;  // of this program, the latest last; never more than kMaxRecords
   bool busy_ = false;                  // the latest is being made
   bool asked_ = false;                 // begin() has promised what run() has not taken up

@@ -25,6 +25,10 @@ class BackupCopy {
   // Copies at most so many pages more. True: the copy is complete.
   bool step(int pages);
 
+  // Lets go of the handle it copies from, after the last step. What is left to do concerns the copy's file alone, and
+  // is done where this object is destroyed, on any thread.
+  void finish() { backup_.reset(); }
+
   std::uint64_t pages_done() const;
   std::uint64_t pages_total() const;
 

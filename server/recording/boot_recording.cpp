@@ -16,8 +16,10 @@ namespace {
 
 // A segment stores one robot time and a period for all its samples: none may be further than this from the robot's.
 constexpr std::int64_t kTimeToleranceUs = 100;
-// ... and one estimate of UTC: none of its batches had one further off.
+// ... and one estimate of UTC: none of its batches had one further off. Where there is no estimate it is the time of
+// receipt, whose jitter ends no segment.
 constexpr std::int64_t kUtcToleranceUs = 1000;
+constexpr std::int64_t kUnknownUtcToleranceUs = 1'000'000;
 
 // Successive boots have complete segments 37 samples apart: any 100 of them are spread evenly.
 constexpr std::uint64_t kBootsApart = 37;
@@ -30,8 +32,9 @@ std::int64_t distance(std::uint64_t a, std::uint64_t b) { return std::abs(static
 bool goes_on(const Segment& segment, const SampleBatch& batch) {
   const std::uint64_t batch_seq0_us = batch.first_robot_time_us - batch.first_seq * batch.context.period_us;
   const std::uint64_t segment_seq0_us = segment.first_robot_time_us - segment.first_seq * segment.context.period_us;
+  const std::int64_t utc_tolerance_us = batch.clock_uncertainty_us < 0 ? kUnknownUtcToleranceUs : kUtcToleranceUs;
   return segment.context == batch.context && distance(batch_seq0_us, segment_seq0_us) <= kTimeToleranceUs &&
-         std::abs(segment.utc_offset_us - batch.utc_offset_us) <= kUtcToleranceUs &&
+         std::abs(segment.utc_offset_us - batch.utc_offset_us) <= utc_tolerance_us &&
          (segment.clock_uncertainty_us < 0) == (batch.clock_uncertainty_us < 0);
 }
 
@@ -70,6 +73,7 @@ void BootRecording::connect(const AdmissionRequest& hello) {
   last_robot_time_us_ = std::max(last_robot_time_us_, hello.robot_time_us);
   give_up_below(hello.oldest_seq, "ring_overrun", hello.received_at_us);
   next_event_seq_ = std::max(next_event_seq_, hello.next_event_seq);
+  give_up_events_below(hello.oldest_event_seq, "ring_overrun", hello.received_at_us);
   sample_hole_.reset();  // the robot now sends by itself what it holds
   event_hole_.reset();
 }
@@ -104,6 +108,8 @@ void BootRecording::append_part(const SampleBatch& batch, Interval part, std::in
     const std::uint64_t end = seq + room_from(seq);
     const std::uint64_t next = std::min(part.next, end);
     const auto begin = batch.samples.begin() + static_cast<std::ptrdiff_t>(seq - batch.first_seq);
+    // Room for all only once it has gone on: one that a change of context ends soon waits in no more than it needs.
+    if (!segment.samples.empty()) segment.samples.reserve(end - segment.first_seq);
     segment.samples.insert(segment.samples.end(), begin, begin + static_cast<std::ptrdiff_t>(next - seq));
     segment.received_at_us = batch.received_at_us;
     segment.clock_uncertainty_us = std::max(segment.clock_uncertainty_us, uncertainty_in(segment, batch));
@@ -127,7 +133,6 @@ std::size_t BootRecording::segment_for(const SampleBatch& batch, std::uint64_t s
   segment.first_seq = seq;
   segment.first_robot_time_us = batch.first_robot_time_us + (seq - batch.first_seq) * batch.context.period_us;
   segment.context = batch.context;
-  segment.samples.reserve(room_from(seq));
   segment.first_received_at_us = batch.received_at_us;
   segment.utc_offset_us = batch.utc_offset_us;
   segment.clock_uncertainty_us = batch.clock_uncertainty_us;
@@ -160,10 +165,10 @@ void BootRecording::refuse_event(std::uint64_t event_seq) {
   next_event_seq_ = std::max(next_event_seq_, event_seq + 1);
 }
 
-void BootRecording::give_up_events_below(std::uint64_t oldest_event_seq, std::int64_t utc_us) {
+void BootRecording::give_up_events_below(std::uint64_t oldest_event_seq, const char* cause, std::int64_t utc_us) {
   if (oldest_event_seq <= received_events_.first_hole()) return;
   for (const Interval& lost : received_events_.insert({0, oldest_event_seq})) {
-    add_gap(waiting_event_gaps_, {key_, lost, "ring_overrun", utc_us});
+    add_gap(waiting_event_gaps_, {key_, lost, cause, utc_us});
   }
 }
 
@@ -211,7 +216,7 @@ bool HoleWatch::is_overdue(std::uint64_t first_missing, std::int64_t steady_us) 
 std::optional<Interval> BootRecording::overdue_samples(std::int64_t steady_us) {
   const std::uint64_t first = received_.first_hole();
   if (!misses_samples() || !sample_hole_.is_overdue(first, steady_us)) return std::nullopt;
-  return received_.missing({first, next_seq_}).front();
+  return Interval{first, received_.missing({first, next_seq_}).back().next};  // every hole; what comes twice is dropped
 }
 
 bool BootRecording::has_overdue_events(std::int64_t steady_us) {

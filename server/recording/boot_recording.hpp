@@ -56,7 +56,7 @@ class BootRecording {
   bool append_event(std::uint64_t event_seq);
   // There is no room: the event stays missing and is asked for again.
   void refuse_event(std::uint64_t event_seq);
-  void give_up_events_below(std::uint64_t oldest_event_seq, std::int64_t utc_us);
+  void give_up_events_below(std::uint64_t oldest_event_seq, const char* cause, std::int64_t utc_us);
 
   // A waiting segment is complete: nothing can be added to it.
   bool has_complete() const { return complete_ > 0; }
@@ -87,6 +87,7 @@ class BootRecording {
   const std::vector<LostRange>& waiting_gaps() const { return waiting_gaps_; }
 
   std::uint64_t next_seq() const { return next_seq_; }
+  std::uint64_t next_event_seq() const { return next_event_seq_; }
   std::uint64_t durable_next_seq() const { return durable_next_seq_; }
   std::uint64_t durable_next_event_seq() const { return durable_next_event_seq_; }
 

@@ -61,19 +61,29 @@ Admission reused(const AdmissionRequest& request, const RobotId& owner) {
 std::vector<RestoredRobot> BootStore::robots() {
   std::vector<RestoredRobot> robots;
   SQLite::Statement query{database_.handle(),
-                          "SELECT robot.robot_id, boot_key, boot_id FROM robot LEFT JOIN boot ON boot_key ="
+                          "SELECT robot.robot_id, boot_id FROM robot LEFT JOIN boot ON boot_key ="
                           " (SELECT max(boot_key) FROM boot WHERE boot.robot_id = robot.robot_id)"
                           " ORDER BY robot.robot_id"};
   while (query.executeStep()) {
-    const std::int64_t boot_key = query.getColumn(1).getInt64();  // 0 when it has none
-    robots.push_back({query.getColumn(0).getString(), unsigned_id(query.getColumn(2)), last_emergency(boot_key)});
+    const RobotId robot_id = query.getColumn(0).getString();
+    robots.push_back({robot_id, unsigned_id(query.getColumn(1)), latch_of(robot_id)});
   }
   return robots;
 }
 
+// SAFETY: a boot that has connected and of which nothing is stored yet says nothing: then the one before it tells.
+std::uint64_t BootStore::latch_of(const RobotId& robot_id) {
+  SQLite::Statement boots{database_.handle(), "SELECT boot_key FROM boot WHERE robot_id = ? ORDER BY boot_key DESC"};
+  bind_all(boots, robot_id);
+  while (boots.executeStep()) {
+    if (const auto latch = last_emergency(boots.getColumn(0).getInt64())) return *latch;
+  }
+  return 0;
+}
+
 // A change of the latch is an event and begins a new segment: whichever of the two is later tells. A stop's event is
 // the earlier one where its samples have arrived, and the only one where they have not.
-std::uint64_t BootStore::last_emergency(std::int64_t boot_key) {
+std::optional<std::uint64_t> BootStore::last_emergency(std::int64_t boot_key) {
   SQLite::Statement event{database_.handle(),
                           "SELECT robot_time_us, iif(kind = 'emergency', emergency_id, 0) FROM event"
                           " WHERE boot_key = ? AND event_seq IS NOT NULL AND kind IN ('emergency', 'emergency_cleared')"
@@ -88,7 +98,7 @@ std::uint64_t BootStore::last_emergency(std::int64_t boot_key) {
   const bool event_is_later =
       has_event && (!has_segment || event.getColumn(0).getInt64() >= segment.getColumn(0).getInt64());
   if (event_is_later) return unsigned_id(event.getColumn(1));
-  return has_segment ? unsigned_id(segment.getColumn(1)) : 0;
+  return has_segment ? std::optional{unsigned_id(segment.getColumn(1))} : std::nullopt;
 }
 
 std::int64_t BootStore::next_boot_key() {

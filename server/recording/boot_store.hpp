@@ -80,7 +80,8 @@ class BootStore {
 
  private:
   Admission check_robot(const AdmissionRequest& request, bool enrol_on_loopback);
-  std::uint64_t last_emergency(std::int64_t boot_key);
+  std::uint64_t latch_of(const RobotId& robot_id);
+  std::optional<std::uint64_t> last_emergency(std::int64_t boot_key);  // empty: nothing of it is stored
   StoredBoot load(std::int64_t boot_key);
   void end(std::int64_t boot_key, std::int64_t noticed_at_us);
 

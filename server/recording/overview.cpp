@@ -64,6 +64,7 @@ Extent extent_of(const SegmentHead& head) {
 // Of the stored segments in the range; one that reaches beyond it is cut, for which its rows are read.
 std::vector<Extent> read_extents(SQLite::Database& database, const RecordedSpan& span, Interval range,
                                  Channels channels) {
+  const SQLite::Transaction moment{database};  // nothing is purged between a head and its rows
   std::vector<Extent> extents;
   for (const SegmentHead& head : read_heads(database, span.boot_key, range, channels, kSliceSegments)) {
     if (head.first_seq >= range.first && head.next_seq <= range.next) {

@@ -50,7 +50,11 @@ asio::awaitable<RestoredState> Recorder::open() {
   auto job = [this, utc_us = clock_.utc_us()] {
     database_ = std::make_unique<Database>(options_.path);
     store_ = std::make_unique<SampleStore>(*database_);
-    fail_unfinished_commands(*database_, utc_us);
+    try {
+      fail_unfinished_commands(*database_, utc_us);
+    } catch (const SQLite::Exception& error) {  // SAFETY: with a full disk, too, robots come in and can be stopped
+      spdlog::warn("commands of an earlier start stay unfinished in the record: {}", error.what());
+    }
     BootStore boots{*database_};
     next_boot_key_ = boots.next_boot_key();
     return RestoredState{database_->store_id(), boots.robots(), pending_stops(*database_)};
@@ -64,11 +68,11 @@ asio::awaitable<void> Recorder::run() {
     co_await checkpointer_.wait_for_room();
     if (writing_.empty()) take();  // or the same content, until it is stored
     co_await write();
+    forget_unused();
     if (failing()) continue;
     end_flushes();
     co_await finish_checkpoint();
-    ask_for_missing();
-    forget_unused();
+    co_await ask_for_missing();
   }
 }
 
@@ -131,6 +135,7 @@ void Recorder::on_robot(const RobotState& robot) {
     const AdmissionRequest hello = *std::exchange(boot.hello, {});
     boot.recording.connect(hello);
     replace_others(robot.id, robot.boot_id);
+    std::erase_if(starts_, [&](const WaitingStart& waiting) { return waiting.start.boot_key == boot.recording.key(); });
     starts_.push_back({{.robot_id = hello.robot_id,
                         .boot_key = boot.recording.key(),
                         .announced_next_seq = hello.next_seq,
@@ -152,6 +157,7 @@ void Recorder::replace_others(const RobotId& robot_id, BootId boot_id) {
     replaced_boots_ += other.replaced ? 0 : 1;
     other.replaced = true;
     other.recording.give_up_below(other.recording.next_seq(), "reboot", clock_.utc_us());
+    other.recording.give_up_events_below(other.recording.next_event_seq(), "reboot", clock_.utc_us());
     line_up(entry, true);
     watch(entry);
   }
@@ -198,7 +204,7 @@ void Recorder::on_event(const RobotState&, const RobotEvent& event) {
   } else if (recording.append_event(*event.event_seq)) {
     queue_.events.push_back({recording.key(), event});
   }
-  recording.give_up_events_below(event.oldest_event_seq, event.received_at_us);
+  recording.give_up_events_below(event.oldest_event_seq, "ring_overrun", event.received_at_us);
   watch(*found);
 }
 

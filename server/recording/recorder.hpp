@@ -186,18 +186,20 @@ class Recorder final : public StationSink, public RobotArchive {
   // After a job of the disk thread, whatever came of it: tells how long the log is.
   struct LogReport {
     explicit LogReport(Checkpointer& to) : checkpointer{to} {}
-    ~LogReport() { checkpointer.on_log(bytes); }
+    ~LogReport() {
+      if (bytes) checkpointer.on_log(*bytes);  // else it was cancelled before it began
+    }
     LogReport(const LogReport&) = delete;
     LogReport& operator=(const LogReport&) = delete;
 
     struct Reading {  // on the disk thread
-      std::uint64_t& bytes;
+      std::optional<std::uint64_t>& bytes;
       const SampleStore& store;
       ~Reading() { bytes = store.log_bytes(); }
     };
 
     Checkpointer& checkpointer;
-    std::uint64_t bytes = 0;
+    std::optional<std::uint64_t> bytes;
   };
 
   boost::asio::awaitable<void> wait_for_commit();
@@ -217,7 +219,7 @@ class Recorder final : public StationSink, public RobotArchive {
   void add_to_commit(BootEntry& entry);
   void count_written(const WriteBatch& written);
   boost::asio::awaitable<void> tell_durable(std::vector<BootProgress> progress);
-  void ask_for_missing();
+  boost::asio::awaitable<void> ask_for_missing();
   void forget_unused();
   bool is_unused(const Boot& boot) const;
   Admission take_in(BootEntry& entry, AdmissionOutcome outcome, const AdmissionRequest& request);
@@ -272,7 +274,8 @@ class Recorder final : public StationSink, public RobotArchive {
   std::int64_t overflow_logged_us_ = 0;  // steady
   std::int64_t next_forget_us_ = 0;      // steady
   std::size_t replaced_boots_ = 0;
-  bool idle_ = false;  // run() waits for work_
+  bool forget_at_once_ = false;  // a boot was refused
+  bool idle_ = false;            // run() waits for work_
 
   Signal work_{loop_};  // something to record, or a robot to watch
   Signal flush_wanted_{loop_};

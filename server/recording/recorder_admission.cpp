@@ -48,7 +48,10 @@ asio::awaitable<Admission> Recorder::admit(AdmissionRequest request) {
     }
   };
   AdmissionOutcome outcome = co_await on_disk(std::move(job));
-  co_return take_in(entry, std::move(outcome), request);
+  Admission admission = take_in(entry, std::move(outcome), request);
+  const bool was_known = entry.second.recording.loaded() || entry.second.admissions > 1;
+  forget_at_once_ = forget_at_once_ || !was_known;  // who is refused leaves nothing behind
+  co_return admission;
 }
 
 Admission Recorder::take_in(BootEntry& entry, AdmissionOutcome outcome, const AdmissionRequest& request) {
@@ -98,14 +101,16 @@ void Recorder::add_boot(BootEntry& entry, StoredBoot stored, const AdmissionRequ
 }
 
 bool Recorder::is_unused(const Boot& boot) const {
-  const bool long_ago = boot.replaced || clock_.steady_us() - boot.last_used_us > kKeepUnused.count();
+  const bool long_ago =
+      boot.replaced || !boot.recording.loaded() || clock_.steady_us() - boot.last_used_us > kKeepUnused.count();
   const bool is_listed = boot.is_due || boot.is_ageing || boot.has_records || boot.has_hole || boot.is_written;
   return !boot.connected && boot.admissions == 0 && long_ago && !is_listed && boot.in_line == 0;
 }
 
 void Recorder::forget_unused() {
   const std::int64_t now_us = clock_.steady_us();
-  if (replaced_boots_ == 0 && now_us < next_forget_us_) return;
+  if (replaced_boots_ == 0 && !forget_at_once_ && now_us < next_forget_us_) return;
+  forget_at_once_ = false;
   next_forget_us_ = now_us + kForgetInterval.count();
   std::erase_if(boots_, [this](const BootEntry& entry) {
     const Boot& boot = entry.second;

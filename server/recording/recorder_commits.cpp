@@ -207,11 +207,13 @@ void Recorder::end_flushes() {
   });
 }
 
-void Recorder::ask_for_missing() {
+// All that miss something, in turns.
+asio::awaitable<void> Recorder::ask_for_missing() {
   const std::int64_t now_us = clock_.steady_us();
   const bool room_for_samples = on_missing_ && queued_samples_ <= options_.max_queued_samples / 2;
   const bool room_for_events = on_missing_events_ && queued_records() <= options_.max_queued_records / 2;
-  for (std::size_t left = std::min(with_holes_.size(), kBootsInATurn); left > 0; --left) {
+  for (std::size_t left = with_holes_.size(); left > 0; --left) {
+    if (left % kBootsInATurn == 0) co_await asio::post(loop_, asio::use_awaitable);
     BootEntry& entry = *with_holes_.front();
     with_holes_.pop_front();
     auto& [boot_id, boot] = entry;

@@ -14,7 +14,6 @@ using namespace std::chrono_literals;
 namespace {
 
 constexpr microseconds kFlushPatience = 3s;
-constexpr Interval kAllSamples{0, std::numeric_limits<std::uint64_t>::max()};
 
 // Adds the samples of the boot in the range, as the database will give them back.
 void add_waiting(const auto& segments, std::int64_t boot_key, Interval range, std::vector<Segment>& into) {
@@ -63,8 +62,12 @@ asio::awaitable<bool> Recorder::flush() {
 }
 
 asio::awaitable<bool> Recorder::flush(BootId boot_id) {
-  if (waiting(boot_id, kAllSamples).empty() && waiting_gaps(boot_id).empty()) co_return true;
-  line_up(*boots_.find(boot_id), true);
+  const auto found = boots_.find(boot_id);
+  if (found == boots_.end() || !found->second.recording.loaded()) co_return true;
+  const Boot& boot = found->second;
+  const bool waits = boot.is_written || boot.in_line > 0 || boot.has_records || !boot.recording.waiting().empty();
+  if (!waits) co_return true;
+  line_up(*found, true);
   co_return co_await flush_after(lined_up_);
 }
 

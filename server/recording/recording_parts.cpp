@@ -13,7 +13,7 @@ namespace asio = boost::asio;
 namespace {
 
 std::filesystem::path backup_folder(const std::filesystem::path& database, const RecordingConfig& config) {
-  return config.backup_dir.empty() ? database.parent_path() / "backups" : config.backup_dir;
+  return std::filesystem::absolute(config.backup_dir.empty() ? database.parent_path() / "backups" : config.backup_dir);
 }
 
 RetentionPolicy retention_policy(const RecordingConfig& config) {
@@ -33,7 +33,7 @@ RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThrea
       history{options.path, recorder, readers},
       exports{options.path, recorder, exports_worker},
       disk_watch{clock, readers, options.path, space_limits(config)},
-      backups{loop, clock, recorder, disk_watch, backup_folder(options.path, config)},
+      backups{loop, clock, recorder, readers, disk_watch, backup_folder(options.path, config)},
       retention{clock, recorder, readers, disk_watch, retention_policy(config)},
       path_{options.path} {}
 
@@ -58,6 +58,7 @@ void RecordingParts::spawn(TaskGroup& tasks) {
   tasks.spawn("recorder", recorder.run());
   tasks.spawn("checkpoints", recorder.run_checkpoints());
   tasks.spawn("certifier", certifier.run());
+  tasks.spawn("interrupted runs", runs.finish_loading());
   tasks.spawn("disk watch", disk_watch.run());
   tasks.spawn("backups", backups.run());
   tasks.spawn("retention", retention.run());

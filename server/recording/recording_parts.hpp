@@ -38,8 +38,8 @@ struct RecordingParts {
   // Starts the lasting tasks.
   void spawn(TaskGroup& tasks);
 
-  std::filesystem::path path() const { return path_; }                                      // of the database
-  std::filesystem::path exports_folder() const { return path_.parent_path() / "exports"; }  // empty after open()
+  std::filesystem::path path() const { return path_; }                                       // of the database
+  std::filesystem::path exports_folder() const { return path_.parent_path() / ".exports"; }  // empty after open()
 
   // Every sample that was received is on disk afterwards and open runs are interrupted, or it is logged why not. Does
   // not throw.

@@ -95,7 +95,11 @@ Retention::Retention(Clock& clock, Recorder& recorder, WorkerThread& readers, co
 asio::awaitable<void> Retention::run() {
   for (;;) {
     co_await clock_.sleep_for(kLookInterval);
-    co_await pass();
+    try {
+      co_await pass();
+    } catch (const SQLite::Exception& error) {  // an unreadable page is no reason to end the emergency stop
+      spdlog::error("what is to be removed cannot be found: {}; looked at again in 30 s", error.what());
+    }
   }
 }
 

@@ -51,14 +51,17 @@ CREATE TABLE gap (
 );
 )sql";
 
-// {0} is the run. Events of the station itself, and commands, are of the time between the run's beginning and its end.
+// {0} is the run. A robot's events are those of its samples, whenever they came; events of the station itself, and
+// commands, are of the time between the run's beginning and its end.
 constexpr const char* kCopies = R"sql(
 CREATE TABLE run AS SELECT * FROM store.run WHERE run_id = {0};
 CREATE TABLE span AS SELECT span, printf('%llu', boot_id) AS boot_id, first_seq, last_seq, firmware_version
   FROM store.run_span JOIN store.boot USING (boot_key) WHERE run_id = {0} ORDER BY span;
 CREATE TABLE event AS SELECT robot_event.* FROM store.run JOIN store.robot_event USING (robot_id)
-  WHERE run_id = {0} AND received_at_us >= started_at_us
-  AND received_at_us <= coalesce(ended_at_us, 9223372036854775807);
+  WHERE run_id = {0} AND (EXISTS (SELECT 1 FROM span WHERE span.boot_id = robot_event.boot_id AND event_seq IS NOT NULL
+      AND sample_seq >= first_seq AND sample_seq <= coalesce(last_seq, 9223372036854775807))
+    OR (event_seq IS NULL AND received_at_us >= started_at_us
+      AND received_at_us <= coalesce(ended_at_us, 9223372036854775807)));
 CREATE TABLE command AS SELECT robot_command.* FROM store.run JOIN store.robot_command USING (robot_id)
   WHERE run_id = {0} AND submitted_at_us >= started_at_us
   AND submitted_at_us <= coalesce(run.ended_at_us, 9223372036854775807);

@@ -22,6 +22,7 @@ constexpr std::size_t kMaxTextBytes = 10'000;
 constexpr std::size_t kMaxListed = 1000;
 constexpr microseconds kEndPatience = 3s;
 constexpr microseconds kEndLook = 50ms;
+constexpr microseconds kLoadInterval = 1s;
 
 Error text_too_long() {
   return {ErrorCode::invalid, fmt::format("a run's texts have at most {} bytes each", kMaxTextBytes), ""};
@@ -73,9 +74,27 @@ Runs::Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, Certifier& 
     : clock_{clock}, recorder_{recorder}, reader_{reader}, certifier_{certifier} {}
 
 asio::awaitable<void> Runs::load() {
-  auto job = [](Database& database) { return RunStore{database, {}}.interrupt(); };
-  const std::size_t interrupted = co_await recorder_.on_disk(std::move(job));
-  if (interrupted > 0) spdlog::warn("{} runs were open when the station stopped: they are interrupted", interrupted);
+  auto job = [](Database& database) -> Result<std::size_t> {
+    try {
+      return RunStore{database, {}}.interrupt();
+    } catch (const SQLite::Exception& error) {  // SAFETY: a full disk does not keep the station from starting
+      return fail(ErrorCode::unavailable, error.what());
+    }
+  };
+  const Result<std::size_t> interrupted = co_await recorder_.on_disk(std::move(job));
+  is_loaded_ = interrupted.has_value();
+  if (!is_loaded_) {
+    spdlog::warn("runs that were open cannot be interrupted now: {}; tried again", interrupted.error().detail);
+  } else if (*interrupted > 0) {
+    spdlog::warn("{} runs were open when the station stopped: they are interrupted", *interrupted);
+  }
+}
+
+asio::awaitable<void> Runs::finish_loading() {
+  while (!is_loaded_) {
+    co_await clock_.sleep_for(kLoadInterval);
+    co_await load();
+  }
 }
 
 asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions conditions, std::string made_by) {
@@ -89,6 +108,7 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
     co_return fail(ErrorCode::conflict,
                    fmt::format("robot '{}' has an open run ({}); end it first", robot_id, open->second));
   }
+  if (!is_loaded_) co_return std::unexpected{disk_fails()};
   const Robot& robot = found->second;
   Run run;
   run.robot_id = robot_id;
@@ -127,8 +147,10 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
   if (verdict.size() > kMaxTextBytes) {
     co_return fail(ErrorCode::invalid, fmt::format("a verdict has at most {} bytes", kMaxTextBytes));
   }
+  BootHeads heard = heads();                                // of the boot that a reboot may end meanwhile
   const bool flushed = co_await recorder_.flush_records();  // a reboot heard before this moves the open span first
   if (!flushed) co_return std::unexpected{disk_fails()};
+  for (const auto& [boot_id, next_seq] : heads()) heard[boot_id] = std::max(heard[boot_id], next_seq);
   const auto open = std::ranges::find(open_runs_, id, [](const auto& entry) { return entry.second; });
   if (id == 0 || open == open_runs_.end()) {
     const std::optional<Run> known = co_await read(id);
@@ -137,7 +159,7 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
   }
   const auto robot = robots_.find(open->first);
   const BootId boot_id = robot == robots_.end() ? 0 : robot->second.boot_id;
-  auto job = [id, verdict, utc_us = clock_.utc_us(), heads = heads(), document = station_document_](
+  auto job = [id, verdict, utc_us = clock_.utc_us(), heads = std::move(heard), document = station_document_](
                  Database& database) { RunStore{database, heads}.end(id, verdict, utc_us, document); };
   struct Ending {  // by one request at a time; the run stays open when the job throws
     std::set<RunId>& ending;

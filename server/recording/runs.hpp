@@ -121,6 +121,8 @@ class Runs final : public StationSink {
 
   // Runs that were open when the station was killed are interrupted. Call before robots arrive.
   boost::asio::awaitable<void> load();
+  // What load() could not do, because the disk could not be written: until it is done. No run begins before.
+  boost::asio::awaitable<void> finish_loading();
 
   // Some run is open: it is to be interrupted when the recorder has written all it heard.
   bool any_open() const { return !open_runs_.empty(); }
@@ -178,6 +180,7 @@ class Runs final : public StationSink {
   Certifier& certifier_;
   std::map<RobotId, Robot> robots_;
   std::map<RobotId, RunId> open_runs_;  // 0: being created
+  bool is_loaded_ = false;
   std::string station_document_;
   std::set<RunId> ending_;  // of these, the ones whose end is being stored
 };

@@ -83,28 +83,26 @@ std::uint64_t reckon(const Place& from, std::int64_t utc_us) {
   return back > from.first_seq ? 0 : from.first_seq - back;
 }
 
-// The number of the first sample at utc_us or after it. `last` is the last segment of the boot.
+// The number of the first sample at utc_us or after it. `last` is the last segment of the boot. Where the station's
+// clock was set back a time may occur twice, and this is one of the two places; a time that occurs is always found.
 std::uint64_t seq_at(Places& places, const Place& first, const Place& last, std::int64_t utc_us) {
-  if (utc_us <= first.first_utc_us) return reckon(first, utc_us);
-  Place low = first;  // begins before utc_us
-  Place high = last;
-  if (high.first_utc_us < utc_us) return reckon(high, utc_us);
-  while (low.first_seq < high.first_seq) {  // high begins at utc_us or after it
-    const std::uint64_t middle = low.first_seq + (high.first_seq - low.first_seq) / 2;
-    const Place probe = places.at_or_before(middle).value_or(low);
-    if (probe.first_seq > low.first_seq && probe.first_utc_us < utc_us) {
-      low = probe;
-      continue;
+  std::optional<Place> before;  // the latest found that begins before utc_us
+  std::optional<Place> after;   // the earliest found that begins at utc_us or after it
+  std::uint64_t begin = first.first_seq;
+  std::uint64_t end = last.first_seq + 1;
+  while (begin < end) {
+    const std::uint64_t middle = begin + (end - begin) / 2;
+    const Place probe = places.at_or_before(middle).value_or(first);
+    if (probe.first_utc_us < utc_us) {
+      before = probe;
+      begin = middle + 1;  // nothing begins between the probe and the middle
+    } else {
+      after = probe;
+      end = probe.first_seq;
     }
-    if (probe.first_seq > low.first_seq) {
-      high = probe;
-      continue;
-    }
-    const Place next = places.after(middle).value_or(high);  // nothing begins between low and the middle
-    if (next.first_seq >= high.first_seq) break;
-    (next.first_utc_us < utc_us ? low : high) = next;
   }
-  return std::min(reckon(low, utc_us), high.first_seq);
+  const std::uint64_t reckoned = reckon(before.value_or(first), utc_us);
+  return before && after ? std::min(reckoned, after->first_seq) : reckoned;
 }
 
 }  // namespace

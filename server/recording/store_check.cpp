@@ -8,6 +8,7 @@
 #include <map>
 
 #include "server/recording/certificate.hpp"
+#include "server/recording/interval_set.hpp"
 #include "server/recording/run_queries.hpp"
 #include "server/recording/sample_scanner.hpp"
 #include "server/recording/statement.hpp"
@@ -15,6 +16,7 @@
 namespace server {
 namespace {
 
+constexpr std::size_t kMostHoles = 100;  // told of a boot
 constexpr std::int64_t kPageSegments = 1000;
 constexpr std::uint64_t kPageSamples = 100'000;
 constexpr std::uint64_t kEverySeq = std::numeric_limits<std::int64_t>::max();
@@ -80,13 +82,17 @@ class Checking {
   struct Covered {
     std::uint64_t next_seq = 0;
     const char* by = "";
+    std::uint64_t durable = 0;  // below it nothing may be missing
+    std::vector<Interval> holes;
   };
   template <class... Parts>
   void fault(fmt::format_string<Parts...> text, Parts&&... parts) {
     findings_.faults.push_back(fmt::format(text, std::forward<Parts>(parts)...));
   }
   void check_segments(std::int64_t boot_key, Interval range, const std::string& whose);
+  std::uint64_t durable_next_seq(std::int64_t boot_key);
   void cover(Covered& covered, std::int64_t boot_key, Interval range, const char* by);
+  void check_hole(std::int64_t boot_key, Interval hole);
   void check_rows(SQLite::Statement& segment, std::int64_t boot_key, const std::string& whose);
 
   SQLite::Database& database_;
@@ -129,13 +135,14 @@ void Checking::check_owners() {
 }
 
 void Checking::check_segments(std::int64_t boot_key, Interval range, const std::string& whose) {
+  Covered covered;
+  if (whose.empty()) covered.durable = durable_next_seq(boot_key);
   std::map<std::uint64_t, std::uint64_t> gaps;  // first to next
   SQLite::Statement gap{database_, "SELECT first_seq, last_seq FROM gap WHERE boot_key = ? AND first_seq < ?"};
   bind_all(gap, boot_key, range.next);
   while (gap.executeStep()) gaps.emplace(unsigned_id(gap.getColumn(0)), unsigned_id(gap.getColumn(1)) + 1);
   gap.reset();
 
-  Covered covered;
   auto due = gaps.begin();
   std::uint64_t from = range.first < 99 ? 0 : range.first - 99;
   std::int64_t read = kPageSegments;
@@ -157,6 +164,30 @@ void Checking::check_segments(std::int64_t boot_key, Interval range, const std::
     }
   }
   for (; due != gaps.end(); ++due) cover(covered, boot_key, {due->first, due->second}, "a gap");
+  if (covered.next_seq < covered.durable) covered.holes.push_back({covered.next_seq, covered.durable});
+  for (const Interval& hole : covered.holes) check_hole(boot_key, hole);
+}
+
+std::uint64_t Checking::durable_next_seq(std::int64_t boot_key) {
+  SQLite::Statement query{database_, "SELECT durable_next_seq FROM boot WHERE boot_key = ?"};
+  bind_all(query, boot_key);
+  return query.executeStep() ? unsigned_id(query.getColumn(0)) : 0;
+}
+
+// Samples that every boot should have and that were in nothing when it was walked: they may have been purged meanwhile.
+void Checking::check_hole(std::int64_t boot_key, Interval hole) {
+  const SQLite::Transaction moment{database_};
+  IntervalSet found;
+  for (const char* table : {"gap", "segment"}) {
+    SQLite::Statement query{database_, fmt::format("SELECT first_seq, last_seq FROM {} WHERE boot_key = ?"
+                                                   " AND first_seq < ? AND last_seq >= ? ORDER BY first_seq",
+                                                   table)};
+    bind_all(query, boot_key, hole.next, hole.first);
+    while (query.executeStep()) found.insert({unsigned_id(query.getColumn(0)), unsigned_id(query.getColumn(1)) + 1});
+  }
+  for (const Interval& missing : found.missing(hole)) {
+    fault("samples {} to {} of boot key {} are neither stored nor in a gap", missing.first, missing.next - 1, boot_key);
+  }
 }
 
 void Checking::cover(Covered& covered, std::int64_t boot_key, Interval range, const char* by) {
@@ -164,7 +195,12 @@ void Checking::cover(Covered& covered, std::int64_t boot_key, Interval range, co
     fault("{} of boot key {} begins at sample {}, but {} before it ends only at {}", by, boot_key, range.first,
           covered.by, covered.next_seq - 1);
   }
-  if (range.next > covered.next_seq) covered = {range.next, by};
+  const Interval hole{covered.next_seq, std::min(range.first, covered.durable)};
+  if (hole.first < hole.next && covered.holes.size() < kMostHoles) covered.holes.push_back(hole);
+  if (range.next > covered.next_seq) {
+    covered.next_seq = range.next;
+    covered.by = by;
+  }
 }
 
 void Checking::check_rows(SQLite::Statement& segment, std::int64_t boot_key, const std::string& whose) {
@@ -227,9 +263,11 @@ void Checking::check_samples_of(RunId run) {
 
 void Checking::check_certificate(RunId run) {
   std::optional<Certification> certification;
+  std::optional<Certificate> stored;  // as it was when the last page was read
   auto progress = Certification::Progress::more;
   while (progress == Certification::Progress::more) {
     const SQLite::Transaction moment{database_};
+    stored = read_certificate(database_, run);
     const std::optional<RunState> state = read_run_state(database_, run);
     if (!state || *state == RunState::open || *state == RunState::discarded) return;
     if (!certification) certification.emplace(read_certified_spans(database_, run));
@@ -239,7 +277,6 @@ void Checking::check_certificate(RunId run) {
       return fault("run {}: {}", run, error.what());
     }
   }
-  const std::optional<Certificate> stored = read_certificate(database_, run);
   const bool is_complete = progress == Certification::Progress::done;
   if (!stored) {
     ++(is_complete ? findings_.runs_uncertified : findings_.runs_incomplete);

@@ -18,6 +18,7 @@ struct AdmissionRequest {
   std::uint64_t robot_time_us = 0;
   std::uint64_t oldest_seq = 0;
   std::uint64_t next_seq = 0;
+  std::uint64_t oldest_event_seq = 0;
   std::uint64_t next_event_seq = 0;
   std::int64_t received_at_us = 0;  // UTC
 };

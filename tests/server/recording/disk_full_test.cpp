@@ -106,12 +106,25 @@ TEST_F(DiskFullTest, RecordingWaitsCommandsLiveAndAllIsStoredWhenThereIsRoomAgai
 TEST_F(DiskFullTest, ARestartOnAFullDiskHasAllThatWasAcknowledged) {
   record(5000);
   const std::uint64_t acknowledged = durable_next_seq_;
+  ASSERT_TRUE(wait(runs_->create(robot_.id, named("open"))));
+  CommandRecord unfinished;
+  unfinished.id = 76;
+  unfinished.robot_id = robot_.id;
+  unfinished.kind = "set_mode";
+  recorder_->on_command(unfinished);
+  wait(recorder_->flush_records());
   {
     const Filler filler{disk()};
     make(robot_, 5000, 25);
     clock_.run_for(3s);
     kill();
+    start();  // SAFETY: the station is there, so that robots can be stopped
+    EXPECT_GE(admit(robot_).durable_next_seq, acknowledged);
+    EXPECT_EQ(number("SELECT count(*) FROM run WHERE state = 'open'"), 1);
   }
+  clock_.run_for(3s);
+  EXPECT_EQ(number("SELECT count(*) FROM run WHERE state = 'interrupted'"), 1) << "once there is room";
+  kill();
   start();
   EXPECT_GE(admit(robot_).durable_next_seq, acknowledged);
   expect_whole();

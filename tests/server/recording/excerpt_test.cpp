@@ -171,6 +171,32 @@ TEST_F(ExcerptTest, AClockThatWasSetBackLosesNothingOfTheWholeTime) {
   EXPECT_GT(samples_of(whole).samples.size(), 500u);
 }
 
+// A time that only one of the two stretches bears is found in it.
+TEST_F(ExcerptTest, ATimeThatOccursOnceIsFoundAlthoughTheClockWasSetBack) {
+  for (const microseconds step : {microseconds{-60s}, microseconds{60s}}) {
+    start();
+    connect(robot_);
+    make_slowly(robot_, 500);
+    clock_.step_utc(step);
+    make_slowly(robot_, 500);
+    flush();
+    const Excerpt all{.run = {}, .robot_id = robot_.id, .window = {}};
+    const auto recorded = samples_of(wait(history_->segments(all, {}, 10'000)).value()).samples;
+    ASSERT_EQ(recorded.size(), 1000u);
+    for (const std::size_t index : {3u, 250u, 490u, 510u, 750u, 990u}) {
+      const std::int64_t utc_us = recorded[index].utc_us;
+      const auto found = samples_of(wait(history_->segments(window(utc_us, utc_us + 50'000), {}, 100)).value()).samples;
+      ASSERT_FALSE(found.empty()) << index;
+      EXPECT_EQ(found.front().seq, recorded[index].seq);
+      EXPECT_EQ(found.size(), 5u);
+    }
+    kill();
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    robot_ = TestRobot{};
+  }
+}
+
 TEST_F(ExcerptTest, SegmentsAreFoundByTheIndex) {
   start();
   for (const char* condition :

@@ -49,8 +49,10 @@ void RecordingTest::start(RecorderOptions options, const RecordingConfig& config
   runs_ = &recording_->runs;
   history_ = &recording_->history;
   recorder_->set_on_durable(
-      [this](const RobotId&, BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event_seq) {
-        durable_next_seq_ = durable_next_seqs_[boot_id] = next_seq;
+      [this](const RobotId& robot_id, BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event_seq) {
+        durable_next_seqs_[boot_id] = next_seq;
+        if (latest_boots_[robot_id] != boot_id) return;  // nobody hears it any more
+        durable_next_seq_ = next_seq;
         durable_next_event_seq_ = next_event_seq;
       });
   recorder_->set_on_missing([this](const RobotId&, BootId, std::uint64_t first_seq, std::uint64_t next_seq) {
@@ -92,6 +94,7 @@ Admission RecordingTest::admit(const TestRobot& robot) {
   request.robot_time_us = robot.time_of(robot.next_seq);
   request.oldest_seq = robot.oldest_seq;
   request.next_seq = robot.next_seq;
+  request.oldest_event_seq = robot.oldest_event_seq;
   request.next_event_seq = robot.next_event_seq;
   request.received_at_us = clock_.utc_us();
   return wait(recorder_->admit(request));
@@ -111,6 +114,7 @@ RobotState RecordingTest::state_of(const TestRobot& robot, LinkState link) const
 void RecordingTest::connect(const TestRobot& robot) {
   const Admission admission = admit(robot);
   ASSERT_EQ(admission.refusal, rheonaut_REFUSAL_REASON_NONE) << admission.detail;
+  latest_boots_[robot.id] = robot.boot_id;
   const RobotState state = state_of(robot, LinkState::connected);
   recorder_->on_robot(state);
   runs_->on_robot(state);

@@ -39,6 +39,7 @@ struct TestRobot {
   BootId boot_id = 0xfedcba9876543210;
   std::uint64_t next_seq = 0;    // the sample made next
   std::uint64_t oldest_seq = 0;  // the oldest still held
+  std::uint64_t oldest_event_seq = 0;
   std::uint64_t next_event_seq = 0;
   std::string token;
   bool from_loopback = true;
@@ -130,7 +131,8 @@ class RecordingTest : public ::testing::Test {
   Runs* runs_ = nullptr;
   History* history_ = nullptr;
   RestoredState restored_;
-  std::uint64_t durable_next_seq_ = 0;  // as told last
+  std::map<RobotId, BootId> latest_boots_;
+  std::uint64_t durable_next_seq_ = 0;  // as told last, of a robot's latest boot
   std::map<BootId, std::uint64_t> durable_next_seqs_;
   std::uint64_t durable_next_event_seq_ = 0;
   std::vector<Missing> missing_;  // as asked for

@@ -1,0 +1,42 @@
+"""What the benches measure of a process, and a station as one. Standard library only."""
+import contextlib
+import os
+import pathlib
+import subprocess
+import time
+
+TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+
+
+def cpu_s(pid):
+    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
+
+
+def written_bytes(pid):
+    lines = pathlib.Path(f"/proc/{pid}/io").read_text().splitlines()
+    return int(dict(line.split(": ") for line in lines)["write_bytes"])
+
+
+def resident_mb(pid):
+    for line in pathlib.Path(f"/proc/{pid}/status").read_text().splitlines():
+        if line.startswith("VmHWM"):
+            return int(line.split()[1]) / 1024
+    return 0
+
+
+@contextlib.contextmanager
+def station(programs, folder):
+    data = folder / "data"
+    with open(folder / "station.log", "wb") as log:
+        process = subprocess.Popen([programs / "rheonaut", "serve", "--data", data, "--http", "127.0.0.1:0", "--robots",
+                                    "127.0.0.1:0"], stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+    try:
+        while not (data / "endpoints.json").exists():
+            if process.poll() is not None:
+                raise RuntimeError((folder / "station.log").read_text())
+            time.sleep(0.05)
+        yield process, json.loads((data / "endpoints.json").read_text())["robots"]
+    finally:
+        process.terminate()
+        process.wait()

@@ -1,0 +1,82 @@
+// What is missing is asked for while the robot may still have it, and listed when it has not.
+#include "tests/server/recording/recording_test.hpp"
+
+namespace server {
+namespace {
+
+using Rows = std::vector<std::string>;
+
+class AskingAgainTest : public RecordingTest {
+ protected:
+  Rows event_gaps() {
+    return rows(
+        "SELECT robot_id, first_event_seq, last_event_seq, cause FROM event_gap JOIN boot USING (boot_key)"
+        " ORDER BY boot_key, first_event_seq");
+  }
+  void send_event(const TestRobot& robot, std::uint64_t event_seq) {
+    RobotEvent event;
+    event.robot_id = robot.id;
+    event.boot_id = robot.boot_id;
+    event.event_seq = event_seq;
+    event.kind = "detection";
+    recorder_->on_event(RobotState{}, event);
+  }
+
+  TestRobot robot_;
+};
+
+TEST_F(AskingAgainTest, ForEveryHoleAtOnce) {
+  start();
+  connect(robot_);
+  for (std::uint64_t first = 0; first < 400; first += 40) send(robot_, first, 20);
+  ASSERT_TRUE(clock_.run_until([&] { return !missing_.empty(); }, 2s));
+  EXPECT_EQ(missing_, (std::vector<Missing>{{20, 360}}));
+  send(robot_, 20, 340);  // most of it a second time
+  flush();
+  EXPECT_EQ(durable_next_seq_, 380u);
+  EXPECT_EQ(number("SELECT count(*) FROM sample"), 380);
+}
+
+TEST_F(AskingAgainTest, AThousandRobotsWithinTwoSeconds) {
+  start();
+  for (BootId boot = 1; boot <= 1000; ++boot) {
+    TestRobot robot;
+    robot.id = "r" + std::to_string(boot);
+    robot.boot_id = boot;
+    connect(robot);
+    send(robot, 0, 10);
+    send(robot, 20, 10);
+  }
+  clock_.run_for(2s);
+  EXPECT_GE(missing_.size(), 1000u);
+}
+
+TEST_F(AskingAgainTest, EventsThatARebootTookAreListed) {
+  robot_.next_event_seq = 5;
+  start();
+  connect(robot_);
+  send_event(robot_, 0);
+  send_event(robot_, 3);
+  TestRobot rebooted = robot_;
+  rebooted.boot_id = 99;
+  rebooted.next_event_seq = 0;
+  connect(rebooted);
+  flush();
+  EXPECT_EQ(event_gaps(), (Rows{"nemo|1|2|reboot", "nemo|4|4|reboot"}));
+}
+
+TEST_F(AskingAgainTest, EventsThatTheRingLostBeforeAReconnectionAreListed) {
+  start();
+  connect(robot_);
+  send_event(robot_, 0);
+  disconnect(robot_);
+  robot_.oldest_event_seq = 7;
+  robot_.next_event_seq = 9;
+  connect(robot_);
+  flush();
+  EXPECT_EQ(event_gaps(), Rows{"nemo|1|6|ring_overrun"});
+  EXPECT_EQ(durable_next_event_seq_, 7u);
+}
+
+}  // namespace
+}  // namespace server
