@@ -35,7 +35,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   protocol::Bytes input{data, size};
   while (!input.empty()) {
     if (reader.push(input) != protocol::FrameReader::State::complete) break;
-    protocol::decode_twice(reader.payload(), protocol::decode_robot_frame);
+    protocol::decode_twice(reader.payload(),
+                           [](protocol::Bytes payload) { return protocol::decode_robot_frame(payload); });
     protocol::decode_twice(reader.payload(), protocol::decode_station_frame);
   }
   return 0;
