@@ -80,14 +80,15 @@ class EmergencyStopTest(unittest.TestCase):
         with lab() as place:
             station = self.moving_robot(place)
             ports = station.endpoints
-            run_id = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "link loss"})["run_id"]
+            first = self.latest(station)["next_seq"]
             place.kill_station()
             station = place.start_station(http=ports["http"], robots=ports["robots"])
             station.wait_for_robot("sim-1", timeout_s=30)
             seen = self.latest(station)["next_seq"]
             after = wait_until(lambda: self.latest(station)["next_seq"] > seen + 100 and self.latest(station), 20,
                                "one second more")
-            station.post(f"/api/v1/runs/{run_id}/end")
+            span = {"boot_id": after["boot_id"], "first_seq": first, "last_seq": after["next_seq"] - 1}
+            run_id = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "link loss", "span": span})["run_id"]
             events = station.get("/api/v1/robots/sim-1/events")["events"]
             lost = [event for event in events if event["kind"] == "link_lost"]
             if not lost:  # the station was back within the link time-out: the robot rightly went on
