@@ -26,7 +26,7 @@ int serve(const Config& config) {
   // The ground everything stands on; declared first, destroyed last.
   boost::asio::io_context loop{1};  // all sockets, all live state
   SystemClock clock{loop};
-  WorkerThread disk{"disk"}, readers{"readers", 10}, exports{"exports", 10}, checkpoints{"checkpoints", 10};
+  WorkerThread disk{"disk"}, readers{"readers", 10}, exports{"exports", 10}, checkpoints{"checkpoints"};
   WorkerThread maths{"maths", 10};
   TaskGroup tasks{loop};
 

@@ -1,5 +1,6 @@
 """What the benches measure of a process, and a station as one. Standard library only."""
 import contextlib
+import json
 import os
 import pathlib
 import subprocess
