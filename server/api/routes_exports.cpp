@@ -63,13 +63,13 @@ Answer export_csv(ApiParts& parts, Request request) {
 Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folder, const char* ending,
                                               std::uint64_t samples) {
   auto file = std::make_unique<ExportFile>(folder, ending);
-  const auto space = std::filesystem::space(folder);
+  const std::uint64_t free_bytes = free_bytes_of(folder);
   const std::uint64_t wanted = 2 * samples * kSampleBytes + kSpareBytes;
-  if (space.available < wanted) {
+  if (free_bytes < wanted) {
     return fail(ErrorCode::unavailable,
                 fmt::format("the export needs up to {} MB on the station's disk, {} MB are free; export CSV, which "
                             "needs none",
-                            wanted / 1'000'000, space.available / 1'000'000),
+                            wanted / 1'000'000, free_bytes / 1'000'000),
                 "low_space");
   }
   return file;
@@ -88,11 +88,19 @@ asio::awaitable<Result<std::unique_ptr<ExportFile>>> begin_file(ApiParts& parts,
   co_return co_await parts.recording.exports.reader().ask(std::move(job));
 }
 
-// An export of which nobody knew how long it would become ends before the recording has no room.
-Result<void> check_room(const std::filesystem::path& folder) {
-  if (free_bytes_of(folder) >= kSpareBytes) return {};
-  return fail(ErrorCode::unavailable, "the export would fill the station's disk; export CSV, which needs no room",
-              "low_space");
+// To its end, or until there is no room: nobody knows before how long the gaps of a grid are.
+template <class Writer>
+asio::awaitable<Result<void>> write_in_slices(ApiParts& parts, Writer& writer) {
+  for (Result<bool> more = true; *more;) {
+    auto slice = [&writer, folder = parts.recording.exports_folder()](SQLite::Database& database) -> Result<bool> {
+      if (free_bytes_of(folder) >= kSpareBytes) return writer.advance(database);
+      return fail(ErrorCode::unavailable, "the export would fill the station's disk; export CSV, which needs no room",
+                  "low_space");
+    };
+    more = co_await parts.recording.exports.reader().ask(std::move(slice));
+    if (!more) co_return std::unexpected{more.error()};
+  }
+  co_return Result<void>{};
 }
 
 Answer export_mat(ApiParts& parts, Request request) {
@@ -101,14 +109,8 @@ Answer export_mat(ApiParts& parts, Request request) {
   auto file = co_await begin_file(parts, *parsed, ".mat");
   if (!file) co_return problem(file.error());
   MatWriter writer{(*file)->path(), std::move(parsed->spans), parsed->query};
-  for (Result<bool> more = true; *more;) {
-    auto slice = [&writer, folder = parts.recording.exports_folder()](SQLite::Database& database) -> Result<bool> {
-      if (auto room = check_room(folder); !room) return std::unexpected{room.error()};
-      return writer.advance(database);
-    };
-    more = co_await parts.recording.exports.reader().ask(std::move(slice));
-    if (!more) co_return problem(more.error());
-  }
+  const Result<void> written = co_await write_in_slices(parts, writer);
+  if (!written) co_return problem(written.error());
   co_return attachment("application/x-matlab-data", parsed->query.run, ".mat",
                        std::make_unique<FileStream>(parts.recording.exports, std::move(*file)));
 }
@@ -120,14 +122,8 @@ Answer export_sqlite(ApiParts& parts, Request request) {
   if (!file) co_return problem(file.error());
   co_await parts.recording.exports.settle();  // events and commands that were heard
   RunFile writer{(*file)->path(), reading_uri(parts.recording.path(), false), std::move(parsed->spans), parsed->query};
-  for (Result<bool> more = true; *more;) {
-    auto slice = [&writer, folder = parts.recording.exports_folder()](SQLite::Database& database) -> Result<bool> {
-      if (auto room = check_room(folder); !room) return std::unexpected{room.error()};
-      return writer.advance(database);
-    };
-    more = co_await parts.recording.exports.reader().ask(std::move(slice));
-    if (!more) co_return problem(more.error());
-  }
+  const Result<void> written = co_await write_in_slices(parts, writer);
+  if (!written) co_return problem(written.error());
   co_return attachment("application/vnd.sqlite3", parsed->query.run, ".sqlite",
                        std::make_unique<FileStream>(parts.recording.exports, std::move(*file)));
 }
