@@ -12,7 +12,7 @@ namespace server {
 class RobotListener {
  public:
   static constexpr int kMaxConnections = 8192;  // a further one is closed at once
-  static constexpr int kMaxGreetings = 512;     // of them, how many may not have been welcomed yet
+  static constexpr int kMaxGreetings = 2048;    // of them, how many may not have been welcomed yet
 
   RobotListener(boost::asio::io_context& loop, Clock& clock, TaskGroup& tasks, Station& station, RobotArchive& archive,
                 const boost::asio::ip::tcp::endpoint& endpoint, bool or_any_port);

@@ -107,10 +107,9 @@ asio::awaitable<void> RobotSession::serve() {
 }
 
 // False at the end of the connection.
-asio::awaitable<bool> RobotSession::read_more() {
-  const std::size_t size = co_await stream_->read_some(asio::buffer(input_));
+bool RobotSession::take_read(std::size_t size) {
   unread_ = {input_.data(), size};
-  co_return size > 0;
+  return size > 0;
 }
 
 // Decodes the next frame of what was read into frame_; false when there is none, or a fault (then close_reason_ is
@@ -128,7 +127,7 @@ bool RobotSession::next_frame_read() {
 
 asio::awaitable<std::optional<protocol::Hello>> RobotSession::read_hello() {
   while (!next_frame_read()) {
-    const bool goes_on = close_reason_.empty() && co_await read_more();
+    const bool goes_on = close_reason_.empty() && take_read(co_await stream_->read_some(asio::buffer(input_)));
     if (!goes_on) co_return std::nullopt;
   }
   if (frame_.which_body != rheonaut_RobotFrame_hello_tag) {
@@ -193,7 +192,8 @@ asio::awaitable<bool> RobotSession::refuse(protocol::RefusalReason reason, std::
   frame.body.welcome.protocol_version = protocol::kProtocolVersion;
   frame.body.welcome.refusal = reason;
   copy_text(frame.body.welcome.detail, detail);
-  co_await write(frame);
+  const std::size_t size = protocol::write_frame(frame, output_.data(), output_.size());
+  co_await stream_->write(asio::buffer(output_.data(), size));
   co_return false;
 }
 
@@ -201,8 +201,8 @@ asio::awaitable<RobotSession::EndReason> RobotSession::read_frames() {
   for (;;) {
     while (close_reason_.empty() && next_frame_read()) on_frame(frame_);
     if (!close_reason_.empty()) co_return close_reason_;
-    const bool more = co_await read_more();
-    if (!more) co_return "the robot closed the connection";
+    const std::size_t size = co_await stream_->read_some(asio::buffer(input_));
+    if (!take_read(size)) co_return "the robot closed the connection";
   }
 }
 
@@ -236,20 +236,36 @@ void RobotSession::on_heartbeat(const protocol::RobotFrame& frame) {
   station_.on_clock(*this, exchange);
 }
 
+// Carries on where flush() cannot: with a stream that takes no more for now.
 asio::awaitable<RobotSession::EndReason> RobotSession::write_frames() {
   for (;;) {
-    const auto frame = next_frame();
-    if (!frame) {
-      co_await (wake_writer_.wait() || clock_.sleep_until(next_heartbeat_us_));
+    flush();
+    if (unsent_.empty()) {
+      co_await wake_writer_.wait();
       continue;
     }
-    // Before the write: from here on the robot may have it.
+    const bool written = co_await stream_->write(asio::buffer(unsent_.first, unsent_.size));
+    if (!written) co_return "the robot closed the connection";
+    unsent_ = {};
+    writing_since_us_.reset();
+  }
+}
+
+// Writes what is ready, in order of urgency, as far as the stream takes it at once.
+void RobotSession::flush() {
+  while (unsent_.empty()) {
+    const auto frame = next_frame();
+    if (!frame) return;
+    const std::size_t size = protocol::write_frame(*frame, output_.data(), output_.size());
+    const std::size_t taken = stream_->write_now(asio::buffer(output_.data(), size));
+    unsent_ = {output_.data() + taken, size - taken};
+    // SAFETY: the frame first, what the station says of it afterwards.
     if (frame->which_body == rheonaut_StationFrame_command_tag) {
       station_.on_command_sent(*this, frame->body.command.command_id);
     }
-    const bool written = co_await write(*frame);
-    if (!written) co_return "the robot closed the connection";
   }
+  writing_since_us_ = clock_.steady_us();
+  wake_writer_.notify();
 }
 
 std::optional<protocol::StationFrame> RobotSession::next_frame() {
@@ -290,25 +306,19 @@ protocol::StationFrame RobotSession::heartbeat() {
   return frame;
 }
 
-// A robot that is silent, or that does not take what we write, is lost: TCP alone would notice much later.
+// A robot that is silent, or that does not take what we write, is lost: TCP alone would notice much later. Signs of
+// life leave from here.
 asio::awaitable<RobotSession::EndReason> RobotSession::watch_link() {
   const std::int64_t timeout_us = std::int64_t{station_.link_times().link_timeout_ms} * 1000;
   for (;;) {
     const std::int64_t now_us = clock_.steady_us();
     if (now_us - last_received_us_ >= timeout_us) co_return "no frame within the link time-out";
     if (writing_since_us_ && now_us - *writing_since_us_ >= timeout_us) co_return "the robot does not read";
+    if (now_us >= next_heartbeat_us_) flush();
     const std::int64_t silent_since_us = std::min(last_received_us_, writing_since_us_.value_or(last_received_us_));
-    co_await clock_.sleep_until(silent_since_us + timeout_us);
+    const std::int64_t lost_us = silent_since_us + timeout_us;
+    co_await clock_.sleep_until(unsent_.empty() ? std::min(lost_us, next_heartbeat_us_) : lost_us);
   }
-}
-
-asio::awaitable<bool> RobotSession::write(const protocol::StationFrame& frame) {
-  std::array<std::uint8_t, protocol::kMaxFramedBytes> bytes;
-  const std::size_t size = protocol::write_frame(frame, bytes.data(), bytes.size());
-  writing_since_us_ = clock_.steady_us();
-  const bool written = co_await stream_->write(asio::buffer(bytes.data(), size));
-  writing_since_us_.reset();
-  co_return written;
 }
 
 bool RobotSession::send(const protocol::Command& command, std::int64_t deadline_us) {
@@ -322,27 +332,27 @@ void RobotSession::send_emergency_stop(const protocol::Command& command) {
   commands_.clear();  // SAFETY: a stop supersedes everything queued for this robot
   if (stops_.size() >= kMaxQueuedStops) stops_.pop_front();
   stops_.push_back(command);
-  wake_writer_.notify();
+  flush();  // SAFETY: it leaves now, not at the writer's next turn
 }
 
 void RobotSession::acknowledge(std::uint64_t durable_next_seq, std::uint64_t durable_next_event_seq) {
   durable_.durable_next_seq = durable_next_seq;
   durable_.durable_next_event_seq = durable_next_event_seq;
   durable_changed_ = true;
-  wake_writer_.notify();
+  flush();
 }
 
 void RobotSession::request_resend(std::uint64_t first_seq, std::uint64_t next_seq) {
   durable_.resend_first_seq = first_seq;
   durable_.resend_next_seq = next_seq;
   durable_changed_ = true;
-  wake_writer_.notify();
+  flush();
 }
 
 void RobotSession::request_event_resend() {
   durable_.resend_events = true;
   durable_changed_ = true;
-  wake_writer_.notify();
+  flush();
 }
 
 void RobotSession::close(const std::string& reason) {

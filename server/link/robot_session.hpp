@@ -49,7 +49,7 @@ class RobotSession final : public RobotPort {
   };
   using EndReason = std::string;
 
-  boost::asio::awaitable<bool> read_more();
+  bool take_read(std::size_t size);
   bool next_frame_read();
   boost::asio::awaitable<std::optional<protocol::Hello>> read_hello();
   boost::asio::awaitable<bool> admit(const protocol::Hello& hello);
@@ -59,10 +59,10 @@ class RobotSession final : public RobotPort {
   boost::asio::awaitable<EndReason> read_frames();
   boost::asio::awaitable<EndReason> write_frames();
   boost::asio::awaitable<EndReason> watch_link();
-  boost::asio::awaitable<bool> write(const protocol::StationFrame& frame);
 
   void on_frame(const protocol::RobotFrame& frame);
   void on_heartbeat(const protocol::RobotFrame& frame);
+  void flush();
   std::optional<protocol::StationFrame> next_frame();
   protocol::StationFrame heartbeat();
 
@@ -78,7 +78,9 @@ class RobotSession final : public RobotPort {
   std::uint64_t hello_robot_time_us_ = 0;
   RobotId robot_id_;  // from the hello
 
-  Signal wake_writer_;
+  Signal wake_writer_;  // something is ready that flush() could not write
+  std::array<std::uint8_t, protocol::kMaxFramedBytes> output_{};
+  protocol::Bytes unsent_;  // of output_: the rest of a frame that the stream did not take at once
   std::optional<protocol::StationFrame> welcome_;  // the first frame that is written
   std::deque<protocol::Command> stops_;            // SAFETY: always written first
   std::deque<QueuedCommand> commands_;
@@ -89,7 +91,7 @@ class RobotSession final : public RobotPort {
   std::uint64_t probe_us_ = 0;  // the stamp that waits for its answer; 0: none
 
   std::int64_t last_received_us_ = 0;
-  std::optional<std::int64_t> writing_since_us_;
+  std::optional<std::int64_t> writing_since_us_;  // while there is something unsent
   std::string close_reason_;
 };
 

@@ -21,6 +21,7 @@ class TcpStream final : public ByteStream {
   explicit TcpStream(tcp::socket socket) : socket_{std::move(socket)} {
     boost::system::error_code ignored;  // a peer that is gone already shows at the first read
     socket_.set_option(tcp::no_delay{true}, ignored);
+    socket_.non_blocking(true, ignored);
     using NotSentLowat = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
     socket_.set_option(NotSentLowat{kMaxUnsentBytes}, ignored);
     const auto remote = socket_.remote_endpoint(ignored);
@@ -31,6 +32,11 @@ class TcpStream final : public ByteStream {
   asio::awaitable<std::size_t> read_some(asio::mutable_buffer into) override {
     const auto [error, size] = co_await socket_.async_read_some(into, asio::as_tuple(asio::use_awaitable));
     co_return error ? 0 : size;
+  }
+
+  std::size_t write_now(asio::const_buffer bytes) override {
+    boost::system::error_code ignored;  // would block, or the stream has ended: write() tells which
+    return socket_.non_blocking() ? socket_.write_some(bytes, ignored) : 0;
   }
 
   asio::awaitable<bool> write(asio::const_buffer bytes) override {

@@ -20,6 +20,10 @@ class ByteStream {
   // At least one byte, or 0 when the stream has ended (closed by either side, reset, cancelled).
   virtual boost::asio::awaitable<std::size_t> read_some(boost::asio::mutable_buffer into) = 0;
 
+  // How many of the bytes the stream took without waiting: 0 also when it cannot say, or has ended. Not while a write()
+  // is under way.
+  virtual std::size_t write_now(boost::asio::const_buffer bytes) = 0;
+
   // All bytes; false when the stream ended before.
   virtual boost::asio::awaitable<bool> write(boost::asio::const_buffer bytes) = 0;
 

@@ -14,6 +14,12 @@ struct MemoryLink::Pipe {
 
   bool fits(std::size_t size) const { return bytes.empty() || bytes.size() + size <= capacity_bytes; }
 
+  void take(asio::const_buffer more) {
+    const auto* first = static_cast<const std::uint8_t*>(more.data());
+    bytes.insert(bytes.end(), first, first + more.size());
+    if (!stalled) readable.notify();
+  }
+
   void close() {
     closed = true;
     readable.notify();
@@ -43,13 +49,17 @@ class MemoryLink::End final : public ByteStream {
     co_return count;
   }
 
+  std::size_t write_now(asio::const_buffer bytes) override {
+    if (out_->closed || !out_->fits(bytes.size())) return 0;
+    out_->take(bytes);
+    return bytes.size();
+  }
+
   asio::awaitable<bool> write(asio::const_buffer bytes) override {
     const auto out = out_;
     while (!out->fits(bytes.size()) && !out->closed) co_await out->writable.wait();
     if (out->closed) co_return false;
-    const auto* first = static_cast<const std::uint8_t*>(bytes.data());
-    out->bytes.insert(out->bytes.end(), first, first + bytes.size());
-    if (!out->stalled) out->readable.notify();
+    out->take(bytes);
     co_return true;
   }
 

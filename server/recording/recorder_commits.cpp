@@ -20,8 +20,9 @@ namespace {
 constexpr microseconds kGroupAge = 1100ms;
 constexpr microseconds kRetryInterval = 1s;  // after a commit that failed
 constexpr microseconds kFailureLogInterval = 10s;
-// Boots in one turn of the loop, which must not take over 1 ms.
+// Boots in one turn of the loop, which must not take over 1 ms; those that are told something get a frame each.
 constexpr std::size_t kBootsInATurn = 128;
+constexpr std::size_t kToldInATurn = 32;
 
 }  // namespace
 
@@ -195,7 +196,7 @@ asio::awaitable<void> Recorder::tell_durable(std::vector<BootProgress> progress)
       on_durable_(boot.recording.robot_id(), boot_id, progress[at].durable_next_seq,
                   progress[at].durable_next_event_seq);
     }
-    if ((at + 1) % kBootsInATurn == 0) co_await asio::post(loop_, asio::use_awaitable);
+    if ((at + 1) % kToldInATurn == 0) co_await asio::post(loop_, asio::use_awaitable);
   }
 }
 

@@ -294,8 +294,4 @@ void Runs::on_robot(const RobotState& state) {
                        .parameters_checksum = state.parameters_checksum};
 }
 
-void Runs::on_samples(const RobotState& robot, const SampleBatch&) {
-  robots_[robot.id].controller_id = robot.context.controller_id;
-}
-
 }  // namespace server

@@ -155,7 +155,6 @@ class Runs final : public StationSink {
   boost::asio::awaitable<std::vector<Run>> list(RunFilter filter);
 
   void on_robot(const RobotState& robot) override;
-  void on_samples(const RobotState& robot, const SampleBatch& batch) override;
 
  private:
   // What a new run takes from its robot.

@@ -105,11 +105,11 @@ asio::awaitable<Result<CommandRecord>> Station::emergency_stop(RobotId robot_id,
     request.action.which_action = rheonaut_Command_emergency_stop_tag;
     request.actor = std::move(actor);
     stop = make_pending(request, *seat.robot);
+    add_pending(seat, stop);
     hand_stop_to(seat, *stop);  // SAFETY: the frame first, the record afterwards
     spdlog::warn("emergency stop of robot '{}' by {}{}", robot_id, stop->record.actor,
                  seat.port == nullptr ? "; kept until it returns" : "");
-    add_pending(seat, stop);
-    publish(stop->record);
+    if (stop->record.state == CommandState::queued) publish(stop->record);
     publish(*seat.robot);
   }
   co_await (stop->ended.wait() || clock_.sleep_for(patience));
@@ -248,6 +248,7 @@ void Station::finish(Seat& seat, CommandId id, CommandState state, std::string r
 }
 
 void Station::expire_commands(Seat& seat) {
+  if (seat.commands.empty()) return;
   const std::int64_t now_us = clock_.steady_us();
   std::vector<CommandId> expired;
   for (const auto& [id, pending] : seat.commands) {

@@ -19,7 +19,8 @@ class RobotPort {
   // the command was not taken.
   virtual bool send(const protocol::Command& command, std::int64_t deadline_us) = 0;
 
-  // SAFETY: written ahead of everything that waits; drops the queued commands it supersedes. Never refused.
+  // SAFETY: written ahead of everything that waits; drops the queued commands it supersedes. Never refused. When
+  // the link takes it at once, its frame leaves within this call.
   virtual void send_emergency_stop(const protocol::Command& command) = 0;
 
   // Everything of this boot below these numbers is durable or known lost.

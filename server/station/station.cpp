@@ -170,7 +170,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
     const auto relatch = make_pending(request, robot);
     add_pending(seat, relatch);
     hand_stop_to(seat, *relatch);
-    publish(relatch->record);
+    if (relatch->record.state == CommandState::queued) publish(relatch->record);
   }
   note(robot, "connected", fmt::format("from {}", peer));
   publish(robot);
@@ -230,6 +230,7 @@ void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) 
   if (batch.next_seq() > robot.next_seq) {  // live, not sent again
     const std::uint64_t emergency_id = robot.context.emergency_id;
     const auto emergency_cause = robot.context.emergency_cause;
+    const bool new_controller = robot.context.controller_id != batch.context.controller_id;
     robot.context = batch.context;
     // SAFETY: a batch that was made before the latest ack of a stop or clear does not undo what that ack said.
     if (batch.first_robot_time_us < seat->latch_known_at_robot_us) {
@@ -238,6 +239,7 @@ void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) 
     }
     robot.sample = batch.samples.back();
     robot.next_seq = batch.next_seq();
+    if (new_controller) publish(robot);
   }
   robot.oldest_seq = std::max(robot.oldest_seq, batch.oldest_seq);
   for (StationSink* sink : sinks_) sink->on_samples(robot, batch);
