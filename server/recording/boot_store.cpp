@@ -1,6 +1,7 @@
 // SQL of admission and of the succession of boots.
 #include "server/recording/boot_store.hpp"
 
+#include <SQLiteCpp/Savepoint.h>
 #include <fmt/format.h>
 #include <sodium.h>
 
@@ -109,9 +110,42 @@ std::int64_t BootStore::next_boot_key() {
       .getInt64();
 }
 
-AdmissionOutcome BootStore::admit(const AdmissionRequest& request, bool enrol_on_loopback,
-                                  std::optional<RobotId> owner) {
-  SQLite::Transaction transaction{database_.handle()};  // becomes a writing one only if the robot is new
+std::vector<AdmissionOutcome> BootStore::admit(const std::vector<AdmissionQuestion>& questions,
+                                               bool enrol_on_loopback) {
+  try {
+    return admit_together(questions, enrol_on_loopback);
+  } catch (const std::exception&) {  // one that cannot be stored keeps no other out: each by itself
+  }
+  std::vector<AdmissionOutcome> outcomes;
+  for (const AdmissionQuestion& question : questions) {
+    try {
+      outcomes.push_back(admit_together({&question, 1}, enrol_on_loopback).front());
+    } catch (const std::exception& error) {
+      outcomes.push_back(
+          {refusal(rheonaut_REFUSAL_REASON_STATION_BUSY,
+                   fmt::format("the station's database cannot be used now: {}; try again", error.what())),
+           {}});
+    }
+  }
+  return outcomes;
+}
+
+std::vector<AdmissionOutcome> BootStore::admit_together(std::span<const AdmissionQuestion> questions,
+                                                        bool enrol_on_loopback) {
+  SQLite::Transaction transaction{database_.handle()};  // becomes a writing one only if a robot is new
+  std::vector<AdmissionOutcome> outcomes;
+  for (const AdmissionQuestion& question : questions) {
+    SQLite::Savepoint savepoint{database_.handle(), "admission"};  // who is refused leaves nothing behind
+    outcomes.push_back(admit_one(question, enrol_on_loopback));
+    if (outcomes.back().admission.refusal == rheonaut_REFUSAL_REASON_NONE) savepoint.release();
+  }
+  transaction.commit();
+  return outcomes;
+}
+
+AdmissionOutcome BootStore::admit_one(const AdmissionQuestion& question, bool enrol_on_loopback) {
+  const AdmissionRequest& request = question.request;
+  std::optional<RobotId> owner = question.owner;
   AdmissionOutcome outcome;
   outcome.admission = check_robot(request, enrol_on_loopback);
   outcome.admission.store_id = database_.store_id();
@@ -125,11 +159,7 @@ AdmissionOutcome BootStore::admit(const AdmissionRequest& request, bool enrol_on
       if (owner == request.robot_id) outcome.boot = load(known.getColumn(0).getInt64());
     }
   }
-  if (owner && owner != request.robot_id) {
-    outcome.admission = reused(request, *owner);
-    return outcome;
-  }
-  transaction.commit();
+  if (owner && owner != request.robot_id) outcome.admission = reused(request, *owner);
   return outcome;
 }
 

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "server/recording/database.hpp"
@@ -23,6 +24,13 @@ struct StoredBoot {
   IntervalSet events;
   std::uint64_t next_seq = 0;  // every sample below was made
   std::uint64_t last_robot_time_us = 0;
+};
+
+// A robot asks to be let in. `owner` is the robot that the recorder knows the boot of; without one the boot is looked
+// for, and what is stored of it is read.
+struct AdmissionQuestion {
+  AdmissionRequest request;
+  std::optional<RobotId> owner;
 };
 
 struct AdmissionOutcome {
@@ -66,10 +74,10 @@ class BootStore {
   // The next new boot gets this key. Keys are given in the order of admission and never twice.
   std::int64_t next_boot_key();
 
-  // Checks robot and token, and whose boot it is; remembers a new robot, durably, and writes nothing else, so a full
-  // disk still admits robots that are enrolled. `owner` is the robot that the recorder knows the boot of; without one
-  // the boot is looked for, and what is stored of it is read.
-  AdmissionOutcome admit(const AdmissionRequest& request, bool enrol_on_loopback, std::optional<RobotId> owner);
+  // Checks robot and token of each, and whose boot it is; remembers new robots, durably and in one transaction, and
+  // writes nothing else, so a full disk still admits robots that are enrolled. Does not throw: who cannot be answered
+  // is refused as STATION_BUSY. One outcome for each question, in order.
+  std::vector<AdmissionOutcome> admit(const std::vector<AdmissionQuestion>& questions, bool enrol_on_loopback);
 
   // Inside the caller's transaction: these boots are known from now on.
   void add(const std::vector<NewBoot>& boots);
@@ -79,6 +87,8 @@ class BootStore {
   void start(const BootStart& start);
 
  private:
+  std::vector<AdmissionOutcome> admit_together(std::span<const AdmissionQuestion> questions, bool enrol_on_loopback);
+  AdmissionOutcome admit_one(const AdmissionQuestion& question, bool enrol_on_loopback);
   Admission check_robot(const AdmissionRequest& request, bool enrol_on_loopback);
   std::uint64_t latch_of(const RobotId& robot_id);
   std::optional<std::uint64_t> last_emergency(std::int64_t boot_key);  // empty: nothing of it is stored

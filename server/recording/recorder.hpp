@@ -90,7 +90,7 @@ class Recorder final : public StationSink, public RobotArchive {
   // Opens or creates the database; before everything else. Throws when the file is not ours or cannot be written.
   boost::asio::awaitable<RestoredState> open();
 
-  // Commits and asks for what is missing, until cancelled.
+  // Commits, asks for what is missing and answers robots that ask to be let in, until cancelled.
   boost::asio::awaitable<void> run();
   // Moves the write-ahead log into the database meanwhile, until cancelled.
   boost::asio::awaitable<void> run_checkpoints() { return checkpointer_.run(); }
@@ -177,6 +177,14 @@ class Recorder final : public StationSink, public RobotArchive {
     std::uint64_t after = 0;  // so many segments have left the line
   };
 
+  // A robot asks to be let in, and waits for the answer. Shared with it, since it may go.
+  struct Asked {
+    Asked(boost::asio::io_context& loop, AdmissionQuestion asks) : question{std::move(asks)}, answered{loop} {}
+    AdmissionQuestion question;
+    AdmissionOutcome outcome;
+    Signal answered;
+  };
+
   struct Ageing {
     std::int64_t due_us = 0;  // steady
     BootEntry* boot = nullptr;
@@ -202,6 +210,8 @@ class Recorder final : public StationSink, public RobotArchive {
     std::optional<std::uint64_t> bytes;
   };
 
+  boost::asio::awaitable<void> commit_regularly();
+  boost::asio::awaitable<void> answer_admissions();
   boost::asio::awaitable<void> wait_for_commit();
   boost::asio::awaitable<void> finish_checkpoint();
   boost::asio::awaitable<void> write();
@@ -244,6 +254,9 @@ class Recorder final : public StationSink, public RobotArchive {
   std::unique_ptr<SampleStore> store_;
 
   Checkpointer checkpointer_;
+
+  std::deque<std::shared_ptr<Asked>> asked_;  // as many as the robot port greets at most
+  Signal admission_wanted_;
 
   Boots boots_;
   std::unordered_map<std::int64_t, BootEntry*> by_key_;

@@ -15,6 +15,7 @@ namespace {
 
 constexpr microseconds kKeepUnused = 60s;  // a boot's bookkeeping, after its last admission
 constexpr microseconds kForgetInterval = 10s;
+constexpr std::size_t kMaxAdmissionsTogether = 128;  // they are all told in one turn of the loop
 
 Admission refused(protocol::RefusalReason reason, std::string detail) {
   Admission admission;
@@ -37,21 +38,36 @@ asio::awaitable<Admission> Recorder::admit(AdmissionRequest request) {
   wake();
   std::optional<RobotId> owner;
   if (entry.second.recording.loaded()) owner = entry.second.recording.robot_id();
-  auto job = [request, owner, enrol = options_.enrol_on_loopback](Database& database) {
-    try {
-      return BootStore{database}.admit(request, enrol, owner);
-    } catch (const std::exception& error) {
-      return AdmissionOutcome{
-          refused(rheonaut_REFUSAL_REASON_STATION_BUSY,
-                  fmt::format("the station's database cannot be used now: {}; try again", error.what())),
-          {}};
-    }
-  };
-  AdmissionOutcome outcome = co_await on_disk(std::move(job));
-  Admission admission = take_in(entry, std::move(outcome), request);
+  const auto asked = std::make_shared<Asked>(loop_, AdmissionQuestion{request, std::move(owner)});
+  asked_.push_back(asked);
+  admission_wanted_.notify();
+  co_await asked->answered.wait();
+  Admission admission = take_in(entry, std::move(asked->outcome), request);
   const bool was_known = entry.second.recording.loaded() || entry.second.admissions > 1;
   forget_at_once_ = forget_at_once_ || !was_known;  // who is refused leaves nothing behind
   co_return admission;
+}
+
+// Those who asked while the disk was busy are answered together: a thousand new robots are not a thousand commits.
+asio::awaitable<void> Recorder::answer_admissions() {
+  for (;;) {
+    while (asked_.empty()) co_await admission_wanted_.wait();
+    std::vector<std::shared_ptr<Asked>> together;
+    std::vector<AdmissionQuestion> questions;
+    while (!asked_.empty() && together.size() < kMaxAdmissionsTogether) {
+      together.push_back(std::move(asked_.front()));
+      questions.push_back(together.back()->question);
+      asked_.pop_front();
+    }
+    auto job = [questions = std::move(questions), enrol = options_.enrol_on_loopback](Database& database) {
+      return BootStore{database}.admit(questions, enrol);
+    };
+    auto outcomes = co_await on_disk(std::move(job));
+    for (std::size_t at = 0; at < together.size(); ++at) {
+      together[at]->outcome = std::move(outcomes[at]);
+      together[at]->answered.notify();
+    }
+  }
 }
 
 Admission Recorder::take_in(BootEntry& entry, AdmissionOutcome outcome, const AdmissionRequest& request) {
