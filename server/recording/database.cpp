@@ -55,7 +55,8 @@ void keep_log(SQLite::Database& database, bool keep) {
 SQLite::Database open_checked(const std::filesystem::path& path) {
   if (const auto problem = file_problem(path)) refuse(path, *problem);
   try {
-    SQLite::Database database{path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs};
+    SQLite::Database database{path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE | SQLite::OPEN_NOMUTEX,
+                              kBusyTimeoutMs};
     keep_log(database, true);
     if (is_blank(database)) {
       keep_log(database, false);

@@ -63,8 +63,10 @@ SampleStore::~SampleStore() { sqlite3_wal_hook(database_.handle().getHandle(), n
 void SampleStore::write(const WriteBatch& batch) {
   SQLite::Transaction transaction{database_.handle(), SQLite::TransactionBehavior::IMMEDIATE};
   boots_.add(batch.new_boots);
+  rows_.begin();
   std::int64_t next_row = next_row_;
   for (const Segment& segment : batch.segments) next_row = write_segment(segment, next_row);
+  rows_.finish();
   for (const LostRange& gap : batch.gaps) {
     execute(insert_gap_, gap.boot_key, gap.lost.first, gap.lost.next - 1, gap.cause, gap.noticed_at_us);
   }
