@@ -31,10 +31,12 @@ def wait_until(condition, timeout_s, what):
 class Station:
     """The API of the station that keeps its things in `data_dir`."""
 
-    def __init__(self, data_dir, timeout_s=15):
+    def __init__(self, data_dir, timeout_s=15, endpoints=None):
         self.data_dir = pathlib.Path(data_dir)
-        wait_until((self.data_dir / "endpoints.json").exists, timeout_s, f"endpoints.json in {data_dir}")
-        self.endpoints = json.loads((self.data_dir / "endpoints.json").read_text())
+        if endpoints is None:  # as the station announces them
+            wait_until((self.data_dir / "endpoints.json").exists, timeout_s, f"endpoints.json in {data_dir}")
+            endpoints = json.loads((self.data_dir / "endpoints.json").read_text())
+        self.endpoints = endpoints
         self.token = (self.data_dir / "rheonaut.token").read_text().strip()
         self.database = self.data_dir / "station.sqlite"
 

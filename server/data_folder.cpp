@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -13,8 +14,11 @@
 #include <stdexcept>
 
 namespace server {
+namespace asio = boost::asio;
 
 namespace {
+
+constexpr std::chrono::seconds kAnnounceInterval{2};
 
 FolderLock take_lock(const std::filesystem::path& folder) {
   make_data_folder(folder);
@@ -56,14 +60,25 @@ DataFolder::~DataFolder() {
   std::filesystem::remove(endpoints(), ignored);
 }
 
-void DataFolder::announce(const std::string& http, const std::string& robots) {
+asio::awaitable<void> DataFolder::announce(Clock& clock, std::string http, std::string robots) {
   const nlohmann::json content{{"http", http}, {"robots", robots}, {"pid", getpid()}};
+  for (bool warned = false; !write_endpoints(content.dump() + '\n'); warned = true) {
+    if (!warned) {
+      spdlog::warn("'{}' cannot be written, programs on this machine do not find the station at {} until there is room",
+                   endpoints().string(), http);
+    }
+    co_await clock.sleep_for(kAnnounceInterval);
+  }
+}
+
+bool DataFolder::write_endpoints(const std::string& content) const {
   const auto draft = path_ / "endpoints.json.new";
   std::ofstream out{draft};
-  out << content.dump() << '\n';
+  out << content;
   out.close();
-  if (!out) throw std::runtime_error{fmt::format("cannot write '{}'", draft.string())};
-  std::filesystem::rename(draft, endpoints());
+  std::error_code error;
+  if (out) std::filesystem::rename(draft, endpoints(), error);
+  return out && !error;
 }
 
 }  // namespace server

@@ -6,10 +6,13 @@
 //   rheonaut.lock                    locked while it runs
 #pragma once
 
+#include <boost/asio/awaitable.hpp>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
+
+#include "server/clock.hpp"
 
 namespace server {
 
@@ -35,10 +38,12 @@ class DataFolder {
   DataFolder(const DataFolder&) = delete;
   DataFolder& operator=(const DataFolder&) = delete;
 
-  // Writes endpoints.json, whole or not at all.
-  void announce(const std::string& http, const std::string& robots);
+  // Writes endpoints.json, whole or not at all. SAFETY: a full disk keeps no robot from being stopped: it is tried
+  // again until it is there.
+  boost::asio::awaitable<void> announce(Clock& clock, std::string http, std::string robots);
 
  private:
+  bool write_endpoints(const std::string& content) const;
   std::filesystem::path endpoints() const { return path_ / "endpoints.json"; }
 
   std::filesystem::path path_;

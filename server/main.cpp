@@ -57,7 +57,7 @@ int serve(const Config& config) {
   tasks.spawn("robots", robots.run());
   tasks.spawn("api", api.run());
   tasks.spawn("signals", tasks.stop_on_signal());
-  folder.announce(api.address(), text(robots.endpoint()));
+  tasks.spawn("announcement", folder.announce(clock, api.address(), text(robots.endpoint())));
   spdlog::info("ready: page {}, robots {}, data {}", api.address(), text(robots.endpoint()), config.data_dir.string());
   api.print_login_url();
   loop.run();         // returns when every task has ended

@@ -253,6 +253,7 @@ asio::awaitable<RobotSession::EndReason> RobotSession::write_frames() {
 
 // Writes what is ready, in order of urgency, as far as the stream takes it at once.
 void RobotSession::flush() {
+  if (!unsent_.empty()) return;  // the writer goes on here
   while (unsent_.empty()) {
     const auto frame = next_frame();
     if (!frame) return;

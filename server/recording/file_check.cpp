@@ -20,8 +20,11 @@ namespace {
 
 constexpr std::string_view kMagic{"SQLite format 3\0", 16};
 constexpr std::string_view kJournalMagic{"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7", 8};
-constexpr std::size_t kHeadBytes = 108;      // the header, and the head of the first page's b-tree
-constexpr std::uint64_t kLogHeadBytes = 32;  // a write-ahead log that has no frame
+constexpr std::string_view kLogMagic{"\x37\x7f\x06\x82", 4};
+constexpr std::string_view kLogMagicBigEndian{"\x37\x7f\x06\x83", 4};  // of its checksums
+constexpr std::size_t kHeadBytes = 108;          // the header, and the head of the first page's b-tree
+constexpr std::uint64_t kLogHeadBytes = 32;      // a write-ahead log that has no frame
+constexpr std::uint64_t kFirstPageBytes = 4096;  // of a database that we make
 constexpr char kLeafOfTable = 13;
 
 class Bytes {
@@ -53,6 +56,20 @@ std::uint64_t size_or_zero(const fs::path& path) {
 }
 
 fs::path beside(const fs::path& path, const char* suffix) { return fs::path{path}.concat(suffix); }
+
+// The power failed while a file was begun: one page at most was written, and the journal beside it says that the file
+// was empty before. SQLite empties it again.
+bool was_just_begun(const fs::path& path) {
+  const Bytes journal{beside(path, "-journal"), 28};
+  return size_or_zero(path) <= kFirstPageBytes && journal.size() == 28 && journal.begins_with(kJournalMagic) &&
+         journal.number(16, 4) == 0;
+}
+
+// A write-ahead log with a frame.
+bool has_log(const fs::path& path) {
+  const Bytes log{beside(path, "-wal"), kLogHeadBytes + 1};
+  return log.size() > kLogHeadBytes && (log.begins_with(kLogMagic) || log.begins_with(kLogMagicBigEndian));
+}
 
 std::optional<std::uint64_t> page_bytes(const Bytes& head) {
   const std::uint32_t written = head.number(16, 2);
@@ -88,9 +105,9 @@ std::optional<std::string> problem_of_marks(const Bytes& head, const fs::path& p
                      migrations().size());
 }
 
-// The number of pages is true in a file whose two counters agree. What is missing may still be in the log.
+// The number of pages is true in a file whose two counters agree.
 std::optional<std::string> problem_of_size(const Bytes& head, std::uint64_t page, const fs::path& path) {
-  if (head.number(24, 4) != head.number(92, 4) || size_or_zero(beside(path, "-wal")) > kLogHeadBytes) return {};
+  if (head.number(24, 4) != head.number(92, 4)) return {};
   const std::uint64_t expected = head.number(28, 4) * page;
   const std::uint64_t size = size_or_zero(path);
   if (size >= expected) return std::nullopt;
@@ -110,6 +127,9 @@ std::optional<std::string> file_problem(const fs::path& path) {
   }
   const Bytes head{path, kHeadBytes};
   if (head.size() == 0) return "it cannot be read";
+  // The power may have failed while the first page was moved out of the log: SQLite reads it from there, and whoever
+  // opens the file looks at its marks again.
+  if (has_log(path) || was_just_begun(path)) return std::nullopt;
   if (!head.begins_with(kMagic)) return "it is not an SQLite database";
   if (head.size() < kHeadBytes) return fmt::format("it is truncated: {} bytes are there", head.size());
   const auto page = page_bytes(head);

@@ -42,8 +42,7 @@ Recorder::Recorder(asio::io_context& loop, Clock& clock, WorkerThread& disk, Wor
       clock_{clock},
       disk_{disk},
       options_{std::move(options)},
-      checkpointer_{loop, clock, checkpoints, options_.path, options_.checkpoint_bytes},
-      admission_wanted_{loop} {}
+      checkpointer_{loop, clock, checkpoints, options_.path, options_.checkpoint_bytes} {}
 
 Recorder::~Recorder() = default;
 
@@ -63,9 +62,7 @@ asio::awaitable<RestoredState> Recorder::open() {
   co_return co_await disk_.run(std::move(job));
 }
 
-asio::awaitable<void> Recorder::run() { co_await (commit_regularly() && answer_admissions()); }
-
-asio::awaitable<void> Recorder::commit_regularly() {
+asio::awaitable<void> Recorder::run() {
   for (;;) {
     co_await wait_for_commit();
     co_await checkpointer_.wait_for_room();

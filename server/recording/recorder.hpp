@@ -90,7 +90,7 @@ class Recorder final : public StationSink, public RobotArchive {
   // Opens or creates the database; before everything else. Throws when the file is not ours or cannot be written.
   boost::asio::awaitable<RestoredState> open();
 
-  // Commits, asks for what is missing and answers robots that ask to be let in, until cancelled.
+  // Commits and asks for what is missing, until cancelled.
   boost::asio::awaitable<void> run();
   // Moves the write-ahead log into the database meanwhile, until cancelled.
   boost::asio::awaitable<void> run_checkpoints() { return checkpointer_.run(); }
@@ -179,10 +179,17 @@ class Recorder final : public StationSink, public RobotArchive {
 
   // A robot asks to be let in, and waits for the answer. Shared with it, since it may go.
   struct Asked {
-    Asked(boost::asio::io_context& loop, AdmissionQuestion asks) : question{std::move(asks)}, answered{loop} {}
+    Asked(boost::asio::io_context& loop, AdmissionQuestion asks) : question{std::move(asks)}, told{loop} {}
     AdmissionQuestion question;
-    AdmissionOutcome outcome;
-    Signal answered;
+    std::optional<AdmissionOutcome> outcome;
+    Signal told;
+  };
+  struct AskingTurn {
+    explicit AskingTurn(Recorder& of) : recorder{of} { recorder.is_asking_ = true; }
+    ~AskingTurn();
+    AskingTurn(const AskingTurn&) = delete;
+    AskingTurn& operator=(const AskingTurn&) = delete;
+    Recorder& recorder;
   };
 
   struct Ageing {
@@ -210,8 +217,7 @@ class Recorder final : public StationSink, public RobotArchive {
     std::optional<std::uint64_t> bytes;
   };
 
-  boost::asio::awaitable<void> commit_regularly();
-  boost::asio::awaitable<void> answer_admissions();
+  boost::asio::awaitable<AdmissionOutcome> ask(AdmissionQuestion question);
   boost::asio::awaitable<void> wait_for_commit();
   boost::asio::awaitable<void> finish_checkpoint();
   boost::asio::awaitable<void> write();
@@ -256,7 +262,7 @@ class Recorder final : public StationSink, public RobotArchive {
   Checkpointer checkpointer_;
 
   std::deque<std::shared_ptr<Asked>> asked_;  // as many as the robot port greets at most
-  Signal admission_wanted_;
+  bool is_asking_ = false;
 
   Boots boots_;
   std::unordered_map<std::int64_t, BootEntry*> by_key_;

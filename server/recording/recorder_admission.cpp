@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "server/counted.hpp"
 #include "server/recording/recorder.hpp"
@@ -15,7 +16,6 @@ namespace {
 
 constexpr microseconds kKeepUnused = 60s;  // a boot's bookkeeping, after its last admission
 constexpr microseconds kForgetInterval = 10s;
-constexpr std::size_t kMaxAdmissionsTogether = 128;  // they are all told in one turn of the loop
 
 Admission refused(protocol::RefusalReason reason, std::string detail) {
   Admission admission;
@@ -38,36 +38,44 @@ asio::awaitable<Admission> Recorder::admit(AdmissionRequest request) {
   wake();
   std::optional<RobotId> owner;
   if (entry.second.recording.loaded()) owner = entry.second.recording.robot_id();
-  const auto asked = std::make_shared<Asked>(loop_, AdmissionQuestion{request, std::move(owner)});
-  asked_.push_back(asked);
-  admission_wanted_.notify();
-  co_await asked->answered.wait();
-  Admission admission = take_in(entry, std::move(asked->outcome), request);
+  AdmissionQuestion question{request, std::move(owner)};
+  AdmissionOutcome outcome = co_await ask(std::move(question));
+  Admission admission = take_in(entry, std::move(outcome), request);
   const bool was_known = entry.second.recording.loaded() || entry.second.admissions > 1;
   forget_at_once_ = forget_at_once_ || !was_known;  // who is refused leaves nothing behind
   co_return admission;
 }
 
-// Those who asked while the disk was busy are answered together: a thousand new robots are not a thousand commits.
-asio::awaitable<void> Recorder::answer_admissions() {
-  for (;;) {
-    while (asked_.empty()) co_await admission_wanted_.wait();
-    std::vector<std::shared_ptr<Asked>> together;
-    std::vector<AdmissionQuestion> questions;
-    while (!asked_.empty() && together.size() < kMaxAdmissionsTogether) {
-      together.push_back(std::move(asked_.front()));
-      questions.push_back(together.back()->question);
-      asked_.pop_front();
+// Those who asked while the disk was busy are answered together: a thousand new robots are not a thousand commits. One
+// of them asks for all that are there; when it has ended, whatever came of it, another one asks for those that came
+// later.
+asio::awaitable<AdmissionOutcome> Recorder::ask(AdmissionQuestion question) {
+  const auto mine = std::make_shared<Asked>(loop_, std::move(question));
+  asked_.push_back(mine);
+  while (!mine->outcome) {
+    if (is_asking_) {
+      co_await mine->told.wait();
+      continue;
     }
+    const AskingTurn turn{*this};
+    std::vector<AdmissionQuestion> questions;
+    for (const auto& asked : asked_) questions.push_back(asked->question);
     auto job = [questions = std::move(questions), enrol = options_.enrol_on_loopback](Database& database) {
       return BootStore{database}.admit(questions, enrol);
     };
     auto outcomes = co_await on_disk(std::move(job));
-    for (std::size_t at = 0; at < together.size(); ++at) {
-      together[at]->outcome = std::move(outcomes[at]);
-      together[at]->answered.notify();
+    for (AdmissionOutcome& outcome : outcomes) {
+      asked_.front()->outcome = std::move(outcome);
+      asked_.front()->told.notify();
+      asked_.pop_front();
     }
   }
+  co_return std::move(*mine->outcome);
+}
+
+Recorder::AskingTurn::~AskingTurn() {
+  recorder.is_asking_ = false;
+  for (const auto& asked : recorder.asked_) asked->told.notify();
 }
 
 Admission Recorder::take_in(BootEntry& entry, AdmissionOutcome outcome, const AdmissionRequest& request) {

@@ -1,19 +1,24 @@
-"""20,000 samples/s from 200 robots, while the station or the robots are killed, or the link is cut, at random.
+"""20,000 samples/s from 200 robots, while the station or the robots are killed, or the link is cut, at random; once
+more with a disk that is full each time (a small one in memory, in a mount namespace of this program alone).
 
 Every sample is stored once, or is a gap and was overwritten in its robot's ring before it could be acknowledged; the
-database is whole. Rings hold 8 s: when several lives of the station in a row are too short for a robot to come back and
+database is whole. A run is under way at each kill, and `rheonaut verify` finds every certificate right. Rings hold 8 s: when several lives of the station in a row are too short for a robot to come back and
 be stored, they overrun. RHEONAUT_KILLS says how often (6 if not given; deploy/kill-storm takes 100), RHEONAUT_KILL_SEED
 when.
 """
+import contextlib
 import json
 import os
+import pathlib
 import random
+import shutil
 import subprocess
+import sys
 import threading
 import time
 import unittest
 
-from processes import BIN, lab
+from processes import BIN, ApiError, Station, lab, wait_until
 from recording_audit import audit
 
 KILLS = int(os.environ.get("RHEONAUT_KILLS", "6"))
@@ -21,6 +26,7 @@ SEED = int(os.environ.get("RHEONAUT_KILL_SEED", "1"))
 ROBOTS = 200
 LONGEST_S = 3  # between two kills
 SETTLE_S = 3
+SMALL_DISK = "RHEONAUT_SMALL_DISK"  # this program runs in its own mount namespace: the folder of the disk
 
 
 class Robots:
@@ -44,6 +50,32 @@ class Robots:
         self.process.communicate()
 
 
+def stops_the_swimmer(station):
+    with contextlib.suppress(ApiError, OSError):
+        return station.post("/api/v1/robots/swimmer/emergency-stop")["state"] == "acknowledged"
+
+
+def fill(path):
+    """Takes the rest of the disk."""
+    with contextlib.suppress(OSError), open(path, "ab", buffering=0) as file:
+        while True:
+            file.write(bytes(1 << 16))
+
+
+def enter_small_disk():
+    """This program once more, with a disk of its own to fill. Returns where that is not possible."""
+    if SMALL_DISK in os.environ or subprocess.run(["unshare", "-rm", "true"], stderr=subprocess.DEVNULL).returncode:
+        return
+    folder = pathlib.Path(os.environ.get("TMPDIR", "/tmp")) / f"rheonaut-disk-{os.getpid()}"
+    folder.mkdir()
+    size_mb = 1000 + 20 * KILLS  # a station begins runs only with 512 MB to spare
+    mount_and_run = 'mount -t tmpfs -o size="$1"m tmpfs "$2" && shift 2 && exec "$@"'
+    code = subprocess.run(["unshare", "-rm", "sh", "-c", mount_and_run, "sh", str(size_mb), str(folder), sys.executable,
+                           "-B", *sys.argv], env=os.environ | {SMALL_DISK: str(folder)}).returncode
+    shutil.rmtree(folder)
+    sys.exit(code)
+
+
 class KillStormTest(unittest.TestCase):
     def setUp(self):
         self.random = random.Random(SEED)
@@ -53,8 +85,27 @@ class KillStormTest(unittest.TestCase):
     def wait(self):
         time.sleep(self.random.uniform(0.1, LONGEST_S))  # the moment of a kill is the input of this test
 
+    def begin_run(self, place):
+        """One of some robot that is there, unless the station cannot now."""
+        with contextlib.suppress(ApiError, OSError):
+            robot_id = f"sim-{self.random.randint(1, ROBOTS)}"
+            Station(place.data).post("/api/v1/runs", {"robot_id": robot_id, "name": "storm"})
+
     def check(self, place, summary):
+        station = Station(place.data)
+        runs = station.get("/api/v1/runs?limit=1000")["runs"]
+        for run in runs:
+            if run["state"] == "open":
+                station.post(f"/api/v1/runs/{run['run_id']}/end")
+        wait_until(lambda: all(station.get(f"/api/v1/runs/{run['run_id']}/certificate")["final"] for run in runs), 120,
+                   "the certificates")
         self.assertEqual(place.stop_station(timeout_s=60), 0, place.log("station"))
+        verified = subprocess.run([BIN / "rheonaut", "verify", "--data", place.data, "--json"], capture_output=True,
+                                  text=True)
+        self.assertEqual(verified.returncode, 0, verified.stdout + verified.stderr)
+        findings = json.loads(verified.stdout)
+        self.assertEqual(findings["runs_verified"], len(runs))
+        self.assertGreater(len(runs), 0)
         faults, stored, lost = audit(place.data / "station.sqlite")
         self.assertEqual(faults[:10], [])
         self.assertEqual(summary["samples_unsettled"], 0, summary)
@@ -62,16 +113,40 @@ class KillStormTest(unittest.TestCase):
         self.assertGreaterEqual(stored + lost, summary["samples_made"] - summary["samples_held"], "nothing is hidden")
         self.assertGreaterEqual(stored, summary["samples_acknowledged"])
         print(f"seed {SEED}: {KILLS} times, {stored} samples stored, {lost} lost, {summary['samples_resent']} sent again,"
-              f" {summary['reconnects']} reconnections")
+              f" {summary['reconnects']} reconnections, {findings['runs_verified']} runs verified")
 
     def test_the_station_is_killed(self):
         with lab() as place:
             ports = place.start_station().endpoints
             self.robots = Robots(ports["robots"])
             for _ in range(KILLS):
+                self.begin_run(place)
                 self.wait()
                 place.kill_station()
                 place.start_station(http=ports["http"], robots=ports["robots"])
+            time.sleep(SETTLE_S)
+            self.check(place, self.robots.end())
+
+    @unittest.skipIf(SMALL_DISK not in os.environ, "needs a small disk: `unshare -rm` is not possible here")
+    def test_the_station_is_killed_while_the_disk_is_full(self):
+        filler = pathlib.Path(os.environ[SMALL_DISK]) / "filler"
+        with lab(os.environ[SMALL_DISK]) as place:
+            station = place.start_station()
+            ports = station.endpoints
+            self.robots = Robots(ports["robots"])
+            place.start_robot(station, "swimmer")
+            for _ in range(KILLS):
+                self.begin_run(place)
+                self.wait()
+                fill(filler)
+                self.wait()
+                place.kill_station()
+                fill(filler)  # what the station gave back when it died
+                place.start_unannounced(ports["http"], ports["robots"])
+                station = Station(place.data, endpoints=ports)
+                wait_until(lambda: stops_the_swimmer(station), 30, "a robot that is stopped on a full disk")
+                filler.unlink()
+                wait_until(lambda: station.get("/api/v1/recording")["state"] != "failing", 30, "recording again")
             time.sleep(SETTLE_S)
             self.check(place, self.robots.end())
 
@@ -80,6 +155,7 @@ class KillStormTest(unittest.TestCase):
             ports = place.start_station().endpoints
             for _ in range(KILLS):
                 self.robots = Robots(ports["robots"])
+                self.begin_run(place)
                 self.wait()
                 self.robots.kill()
             self.robots = Robots(ports["robots"])
@@ -96,6 +172,7 @@ class KillStormTest(unittest.TestCase):
             threading.Thread(target=proxy.stdout.read, daemon=True).start()  # or it would wait for its reader
             self.robots = Robots(address)
             for _ in range(KILLS):
+                self.begin_run(place)
                 self.wait()
                 word = self.random.choice([f"cut {self.random.randint(0, 400)}", "reset"])
                 proxy.stdin.write(word + "\n")
@@ -105,4 +182,5 @@ class KillStormTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
+    enter_small_disk()
     unittest.main()

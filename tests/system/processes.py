@@ -35,13 +35,17 @@ class Lab:
     def start_station(self, http="127.0.0.1:0", robots="127.0.0.1:0"):
         with contextlib.suppress(FileNotFoundError):
             (self.data / "endpoints.json").unlink()  # of a station that was killed
-        self.station_process = self._start("station", "rheonaut", "serve", "--data", self.data, "--http", http,
-                                           "--robots", robots)
+        self.start_unannounced(http, robots)
         try:
             return Station(self.data, timeout_s=60)
         except TimeoutError:
             print(self.log("station"))
             raise
+
+    def start_unannounced(self, http, robots):
+        """Does not wait for it: on a full disk the station cannot say where it is."""
+        self.station_process = self._start("station", "rheonaut", "serve", "--data", self.data, "--http", http,
+                                           "--robots", robots)
 
     def start_robot(self, station, robot_id="sim-1", *flags):
         return self._start(robot_id, "rheonaut-sim", "--station", station.endpoints["robots"], "--id", robot_id, *flags)
@@ -72,9 +76,9 @@ class Lab:
 
 
 @contextlib.contextmanager
-def lab():
-    """A Lab in a folder of its own. When the test fails, the logs are printed."""
-    with tempfile.TemporaryDirectory(prefix="rheonaut-") as folder:
+def lab(disk=None):
+    """A Lab in a folder of its own, on the disk that is mounted there. When the test fails, the logs are printed."""
+    with tempfile.TemporaryDirectory(prefix="rheonaut-", dir=disk) as folder:
         place = Lab(folder)
         try:
             yield place

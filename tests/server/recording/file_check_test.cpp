@@ -106,6 +106,30 @@ TEST_F(FileCheckTest, OurOwnFileWhoseTablesAreInItsLogIsOpened) {
   EXPECT_EQ(Database{path_}.store_id(), store_id);
 }
 
+TEST_F(FileCheckTest, AFirstPageThatIsHalfWrittenIsReadFromTheLog) {
+  std::uint64_t store_id = 0;
+  {
+    const Database database{theirs_};
+    store_id = database.store_id();
+    leave_at(theirs_, path_);
+  }
+  overwrite(0, std::string(512, '\x5a'));
+  EXPECT_EQ(Database{path_}.store_id(), store_id);
+
+  overwrite(0, std::string(512, '\x5a'));
+  fs::remove(beside(path_, "-wal"));
+  EXPECT_THAT(refusal(), HasSubstr("not an SQLite database"));
+}
+
+TEST_F(FileCheckTest, AFileThatWasJustBegunIsBegunAgain) {
+  std::ofstream{path_, std::ios::binary} << std::string(4096, '\x5a');
+  EXPECT_THAT(refusal(), HasSubstr("not an SQLite database"));
+  std::ofstream{beside(path_, "-journal"), std::ios::binary}
+      << std::string{"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7\0\0\0\0\0\0\0\1\0\0\0\0\0\0\2\0\0\0\x10\0", 28}
+      << std::string(512 - 28, '\0');
+  EXPECT_NE(Database{path_}.store_id(), 0U);
+}
+
 TEST_F(FileCheckTest, ATruncatedFileIsRefused) {
   {
     const Database database{path_};
