@@ -232,7 +232,7 @@ void Recorder::on_clock(const RobotState&, const ClockRecord& record) {
 
 void Recorder::on_in_force(const RobotState&, const InForceRecord& record) {
   const std::int64_t boot_key = key_of(record.boot_id);
-  if (boot_key == 0 || !room_for_record()) return;
+  if (boot_key == 0 || record.first_seq >= kMaxRecordedNumber || !room_for_record()) return;
   queue_.in_force.push_back({boot_key, record});
   wake();
 }
