@@ -34,7 +34,7 @@ RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThrea
       exports{options.path, recorder, exports_worker},
       disk_watch{clock, readers, options.path, space_limits(config)},
       backups{loop, clock, recorder, readers, disk_watch, backup_folder(options.path, config)},
-      retention{clock, recorder, readers, disk_watch, retention_policy(config)},
+      retention{clock, recorder, reader, disk_watch, retention_policy(config)},
       path_{options.path} {}
 
 void RecordingParts::connect(Station& station) {
