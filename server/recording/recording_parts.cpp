@@ -50,6 +50,7 @@ asio::awaitable<RestoredState> RecordingParts::open() {
   std::error_code ignored;
   std::filesystem::remove_all(exports_folder(), ignored);  // what a crash left
   co_await runs.load();
+  co_await retention.open();
   co_await disk_watch.look();
   co_return restored;
 }

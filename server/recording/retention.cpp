@@ -70,7 +70,14 @@ std::uint64_t shrink_step(SQLite::Database& database, const Clock& clock) {
 
 Retention::Retention(Clock& clock, Recorder& recorder, DatabaseReader& reader, const DiskWatch& disk_watch,
                      RetentionPolicy policy)
-    : clock_{clock}, recorder_{recorder}, reader_{reader}, disk_watch_{disk_watch}, policy_{policy} {}
+    : clock_{clock},
+      recorder_{recorder},
+      reader_{reader},
+      disk_watch_{disk_watch},
+      policy_{policy},
+      ages_{clock, policy.retention_days * kDayUs} {}
+
+asio::awaitable<void> Retention::open() { ages_.begin(co_await next_row()); }
 
 asio::awaitable<void> Retention::run() {
   for (;;) {
@@ -86,7 +93,8 @@ asio::awaitable<void> Retention::run() {
 asio::awaitable<void> Retention::pass() {
   if (recorder_.failing()) co_return;
   if (policy_.retention_days > 0) {
-    RetentionPlan plan{clock_.utc_us() - policy_.retention_days * kDayUs};
+    ages_.note(co_await next_row());
+    RetentionPlan plan{ages_.limit()};
     co_await purge(std::move(plan), 0);
   }
   if (policy_.max_database_bytes > 0) co_await purge_down_to_size();
@@ -164,6 +172,13 @@ asio::awaitable<Retention::Size> Retention::size() {
     return Size{pages * page, (pages - pragma(database.handle(), "freelist_count")) * page};
   };
   co_return co_await recorder_.on_disk(std::move(job));
+}
+
+asio::awaitable<std::int64_t> Retention::next_row() {
+  auto query = [](SQLite::Database& database) {
+    return database.execAndGet("SELECT value FROM meta WHERE name = 'next_row'").getInt64();
+  };
+  co_return co_await reader_.ask(std::move(query));
 }
 
 asio::awaitable<void> Retention::make_room_for_commits(std::int64_t took_us) {

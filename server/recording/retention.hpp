@@ -36,6 +36,9 @@ class Retention {
   Retention(Clock& clock, Recorder& recorder, DatabaseReader& reader, const DiskWatch& disk_watch,
             RetentionPolicy policy);
 
+  // Before robots arrive: what is stored now, an earlier start has written.
+  boost::asio::awaitable<void> open();
+
   // Looks every 30 s, until cancelled.
   boost::asio::awaitable<void> run();
   // Removes all that is to go now.
@@ -55,6 +58,7 @@ class Retention {
   void note_use(std::uint64_t used_bytes);  // after what could go has gone
   boost::asio::awaitable<void> shrink();
   boost::asio::awaitable<Size> size();
+  boost::asio::awaitable<std::int64_t> next_row();
   boost::asio::awaitable<void> make_room_for_commits(std::int64_t took_us);
 
   Clock& clock_;
@@ -62,6 +66,7 @@ class Retention {
   DatabaseReader& reader_;
   const DiskWatch& disk_watch_;
   RetentionPolicy policy_;
+  SampleAges ages_;
   RetentionCounters counters_;
 };
 

@@ -99,7 +99,7 @@ void RetentionPlan::read_first_segments(SQLite::Database& database) {
 }
 
 bool RetentionPlan::may_go(const StoredSegment& segment, const Part& part) const {
-  const bool is_old = !older_than_us_ || segment.received_at_us < *older_than_us_;
+  const bool is_old = !limit_ || limit_->covers(segment.last_row, segment.received_at_us);
   return is_old && segment.samples.next <= part.samples.next;
 }
 

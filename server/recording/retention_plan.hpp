@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "server/recording/interval_set.hpp"
+#include "server/recording/sample_ages.hpp"
 
 namespace server {
 
@@ -33,8 +34,8 @@ struct StoredSegment {
 
 class RetentionPlan {
  public:
-  // Without a time everything is old enough.
-  explicit RetentionPlan(std::optional<std::int64_t> older_than_us) : older_than_us_{older_than_us} {}
+  // Without a limit everything is old enough.
+  explicit RetentionPlan(std::optional<AgeLimit> limit) : limit_{limit} {}
 
   // Looks at some more boots; true: there are more.
   bool look(SQLite::Database& database);
@@ -72,7 +73,7 @@ class RetentionPlan {
   void read_first_segments(SQLite::Database& database);
   bool may_go(const StoredSegment& segment, const Part& part) const;
 
-  std::optional<std::int64_t> older_than_us_;
+  std::optional<AgeLimit> limit_;
   std::optional<std::int64_t> newest_run_;  // of the runs whose spans are in held_
   HeldSamples held_;                        // while looking; then what later runs hold
   std::int64_t boot_key_ = 0;               // of the last boot looked at

@@ -116,7 +116,7 @@ TEST_F(PurgeTest, AllBootsAreLookedAtAFewAtATime) {
   RetentionPlan plan{std::nullopt};
   EXPECT_TRUE(plan.look(database));
   EXPECT_FALSE(plan.look(database));
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   pass();
   EXPECT_EQ(samples(), 0);
   EXPECT_THAT(gaps(), ::testing::SizeIs(210));
@@ -125,7 +125,7 @@ TEST_F(PurgeTest, AllBootsAreLookedAtAFewAtATime) {
 TEST_F(PurgeTest, CommitsGoInBetween) {
   keep(7);
   record(200'000);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   tasks_->spawn("pass", recording_->retention.pass());
   int commits = 0;
   for (; counters().samples_purged < 199'000; ++commits) {
@@ -139,6 +139,21 @@ TEST_F(PurgeTest, CommitsGoInBetween) {
   SQLite::Database database = open_for_reading(path_);
   EXPECT_THAT(coverage_faults(database), IsEmpty());
   EXPECT_EQ(gaps(), Rows{"0|199999|retention"});
+}
+
+TEST(SampleAges, KeepANoteForEachHundredthOfTheAge) {
+  boost::asio::io_context loop;
+  VirtualClock clock{loop};
+  SampleAges ages{clock, microseconds{100h}.count()};
+  EXPECT_FALSE(ages.limit().covers(1, 0)) << "nothing is known yet";
+  ages.begin(1000);
+  EXPECT_FALSE(ages.limit().covers(1000, 0));
+  EXPECT_TRUE(ages.limit().covers(999, 0));
+  for (int hour = 1; hour <= 300; ++hour) {
+    clock.skip(1h);
+    ages.note(1000 + hour);
+    EXPECT_EQ(ages.limit().row, hour < 100 ? 0 : 900 + hour) << hour;
+  }
 }
 
 }  // namespace

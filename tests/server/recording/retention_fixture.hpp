@@ -23,6 +23,16 @@ class RetentionTest : public RecordingTest {
                .backup_dir = {}});
     connect(robot_);
   }
+  // What is recorded now grows this old; the station looks at it in between.
+  void age(microseconds by) {
+    clock_.skip(2h);
+    wait(recording_->retention.pass());
+    clock_.skip(by);
+  }
+  void start_again(std::uint32_t days) {
+    stop();
+    keep(days);
+  }
   // Samples that are on disk; the recorder has noted in the database that they are.
   void record(std::size_t count) {
     make(robot_, count, 25);
