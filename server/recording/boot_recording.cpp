@@ -52,6 +52,20 @@ void add_gap(std::vector<LostRange>& gaps, LostRange gap) {
   }
 }
 
+// What the station had refused is lost because of that, whatever the robot's reason is.
+void add_lost(std::vector<LostRange>& gaps, const LostRange& range, const IntervalSet& refused) {
+  LostRange part = range;
+  for (const Interval& missing : refused.missing(range.lost)) {
+    part.lost = missing;
+    add_gap(gaps, part);
+  }
+  part.cause = "queue_full";
+  for (const Interval& covered : refused.covered(range.lost)) {
+    part.lost = covered;
+    add_gap(gaps, part);
+  }
+}
+
 }  // namespace
 
 void BootRecording::load(StoredBoot stored) {
@@ -148,8 +162,7 @@ void BootRecording::refuse(const SampleBatch& batch) {
 void BootRecording::give_up_below(std::uint64_t oldest_seq, const char* cause, std::int64_t utc_us) {
   if (oldest_seq <= received_.first_hole()) return;
   for (const Interval& lost : received_.insert({0, oldest_seq})) {
-    for (const Interval& part : refused_.missing(lost)) add_gap(waiting_gaps_, {key_, part, cause, utc_us});
-    for (const Interval& part : refused_.covered(lost)) add_gap(waiting_gaps_, {key_, part, "queue_full", utc_us});
+    add_lost(waiting_gaps_, {key_, lost, cause, utc_us}, refused_);
   }
   next_seq_ = std::max(next_seq_, oldest_seq);
 }
@@ -163,12 +176,14 @@ bool BootRecording::append_event(std::uint64_t event_seq) {
 
 void BootRecording::refuse_event(std::uint64_t event_seq) {
   next_event_seq_ = std::max(next_event_seq_, event_seq + 1);
+  refused_events_.erase_below(received_events_.first_hole());
+  refused_events_.insert({event_seq, event_seq + 1});
 }
 
 void BootRecording::give_up_events_below(std::uint64_t oldest_event_seq, const char* cause, std::int64_t utc_us) {
   if (oldest_event_seq <= received_events_.first_hole()) return;
   for (const Interval& lost : received_events_.insert({0, oldest_event_seq})) {
-    add_gap(waiting_event_gaps_, {key_, lost, cause, utc_us});
+    add_lost(waiting_event_gaps_, {key_, lost, cause, utc_us}, refused_events_);
   }
 }
 

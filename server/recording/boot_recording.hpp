@@ -112,6 +112,7 @@ class BootRecording {
   IntervalSet taken_;
   IntervalSet refused_;
   IntervalSet received_events_;
+  IntervalSet refused_events_;
 
   std::vector<Segment> waiting_;
   std::size_t complete_ = 0;  // so many of them, up to the last complete one
