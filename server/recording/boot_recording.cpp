@@ -76,18 +76,23 @@ void BootRecording::load(StoredBoot stored) {
   durable_next_event_seq_ = received_events_.first_hole();
   next_seq_ = stored.next_seq;
   last_robot_time_us_ = stored.last_robot_time_us;
+  connected_at_us_ = stored.connected_at_us;
 }
 
 bool BootRecording::continues(std::uint64_t next_seq, std::uint64_t robot_time_us) const {
   return next_seq >= next_seq_ && robot_time_us >= last_robot_time_us_;
 }
 
-void BootRecording::connect(const AdmissionRequest& hello) {
+void BootRecording::connect(const AdmissionRequest& hello, std::int64_t restored_at_us) {
+  const std::int64_t booted_at_us = hello.received_at_us - static_cast<std::int64_t>(hello.robot_time_us);
+  const bool is_from_before = std::max(connected_at_us_, booted_at_us) < restored_at_us;
+  const char* cause = is_from_before ? "restore" : "ring_overrun";
+  connected_at_us_ = hello.received_at_us;
   next_seq_ = std::max(next_seq_, hello.next_seq);
   last_robot_time_us_ = std::max(last_robot_time_us_, hello.robot_time_us);
-  give_up_below(hello.oldest_seq, "ring_overrun", hello.received_at_us);
+  give_up_below(hello.oldest_seq, cause, hello.received_at_us);
   next_event_seq_ = std::max(next_event_seq_, hello.next_event_seq);
-  give_up_events_below(hello.oldest_event_seq, "ring_overrun", hello.received_at_us);
+  give_up_events_below(hello.oldest_event_seq, cause, hello.received_at_us);
   sample_hole_.reset();  // the robot now sends by itself what it holds
   event_hole_.reset();
 }

@@ -58,6 +58,7 @@ asio::awaitable<RestoredState> Recorder::open() {
     }
     BootStore boots{*database_};
     next_boot_key_ = boots.next_boot_key();
+    restored_at_us_ = database_->restored_at_us();
     return RestoredState{database_->store_id(), boots.robots(), pending_stops(*database_)};
   };
   co_return co_await disk_.run(std::move(job));
@@ -136,7 +137,7 @@ void Recorder::on_robot(const RobotState& robot) {
   boot.connected = robot.link == LinkState::connected && !boot.replaced;
   if (boot.connected && boot.hello) {
     const AdmissionRequest hello = *std::exchange(boot.hello, {});
-    boot.recording.connect(hello);
+    boot.recording.connect(hello, restored_at_us_);
     replace_others(robot.id, robot.boot_id);
     std::erase_if(starts_, [&](const WaitingStart& waiting) { return waiting.start.boot_key == boot.recording.key(); });
     starts_.push_back({{.robot_id = hello.robot_id,
