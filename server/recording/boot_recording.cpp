@@ -52,6 +52,20 @@ void add_gap(std::vector<LostRange>& gaps, LostRange gap) {
   }
 }
 
+// What the station had refused is lost because of that, whatever the robot's reason is.
+void add_lost(std::vector<LostRange>& gaps, const LostRange& range, const IntervalSet& refused) {
+  LostRange part = range;
+  for (const Interval& missing : refused.missing(range.lost)) {
+    part.lost = missing;
+    add_gap(gaps, part);
+  }
+  part.cause = "queue_full";
+  for (const Interval& covered : refused.covered(range.lost)) {
+    part.lost = covered;
+    add_gap(gaps, part);
+  }
+}
+
 }  // namespace
 
 void BootRecording::load(StoredBoot stored) {
@@ -62,18 +76,23 @@ void BootRecording::load(StoredBoot stored) {
   durable_next_event_seq_ = received_events_.first_hole();
   next_seq_ = stored.next_seq;
   last_robot_time_us_ = stored.last_robot_time_us;
+  connected_at_us_ = stored.connected_at_us;
 }
 
 bool BootRecording::continues(std::uint64_t next_seq, std::uint64_t robot_time_us) const {
   return next_seq >= next_seq_ && robot_time_us >= last_robot_time_us_;
 }
 
-void BootRecording::connect(const AdmissionRequest& hello) {
+void BootRecording::connect(const AdmissionRequest& hello, std::int64_t restored_at_us) {
+  const std::int64_t booted_at_us = hello.received_at_us - static_cast<std::int64_t>(hello.robot_time_us);
+  const bool is_from_before = std::max(connected_at_us_, booted_at_us) < restored_at_us;
+  const char* cause = is_from_before ? "restore" : "ring_overrun";
+  connected_at_us_ = hello.received_at_us;
   next_seq_ = std::max(next_seq_, hello.next_seq);
   last_robot_time_us_ = std::max(last_robot_time_us_, hello.robot_time_us);
-  give_up_below(hello.oldest_seq, "ring_overrun", hello.received_at_us);
+  give_up_below(hello.oldest_seq, cause, hello.received_at_us);
   next_event_seq_ = std::max(next_event_seq_, hello.next_event_seq);
-  give_up_events_below(hello.oldest_event_seq, "ring_overrun", hello.received_at_us);
+  give_up_events_below(hello.oldest_event_seq, cause, hello.received_at_us);
   sample_hole_.reset();  // the robot now sends by itself what it holds
   event_hole_.reset();
 }
@@ -148,8 +167,7 @@ void BootRecording::refuse(const SampleBatch& batch) {
 void BootRecording::give_up_below(std::uint64_t oldest_seq, const char* cause, std::int64_t utc_us) {
   if (oldest_seq <= received_.first_hole()) return;
   for (const Interval& lost : received_.insert({0, oldest_seq})) {
-    for (const Interval& part : refused_.missing(lost)) add_gap(waiting_gaps_, {key_, part, cause, utc_us});
-    for (const Interval& part : refused_.covered(lost)) add_gap(waiting_gaps_, {key_, part, "queue_full", utc_us});
+    add_lost(waiting_gaps_, {key_, lost, cause, utc_us}, refused_);
   }
   next_seq_ = std::max(next_seq_, oldest_seq);
 }
@@ -163,12 +181,14 @@ bool BootRecording::append_event(std::uint64_t event_seq) {
 
 void BootRecording::refuse_event(std::uint64_t event_seq) {
   next_event_seq_ = std::max(next_event_seq_, event_seq + 1);
+  refused_events_.erase_below(received_events_.first_hole());
+  refused_events_.insert({event_seq, event_seq + 1});
 }
 
 void BootRecording::give_up_events_below(std::uint64_t oldest_event_seq, const char* cause, std::int64_t utc_us) {
   if (oldest_event_seq <= received_events_.first_hole()) return;
   for (const Interval& lost : received_events_.insert({0, oldest_event_seq})) {
-    add_gap(waiting_event_gaps_, {key_, lost, cause, utc_us});
+    add_lost(waiting_event_gaps_, {key_, lost, cause, utc_us}, refused_events_);
   }
 }
 

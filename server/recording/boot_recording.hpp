@@ -41,8 +41,9 @@ class BootRecording {
 
   // A Hello with these numbers is of a boot that went on, not of another one with the same id.
   bool continues(std::uint64_t next_seq, std::uint64_t robot_time_us) const;
-  // The robot has connected, holding the samples [hello.oldest_seq, hello.next_seq).
-  void connect(const AdmissionRequest& hello);
+  // The robot has connected, holding the samples [hello.oldest_seq, hello.next_seq). What it held no more when it was
+  // first heard after a restore, in the same boot, was lost by that; restored_at_us is 0 when there was none.
+  void connect(const AdmissionRequest& hello, std::int64_t restored_at_us);
 
   // Samples of the batch that are not here yet.
   std::size_t count_new(const SampleBatch& batch) const;
@@ -102,6 +103,7 @@ class BootRecording {
   std::int64_t key_ = 0;
   std::uint64_t next_seq_ = 0;
   std::uint64_t last_robot_time_us_ = 0;
+  std::int64_t connected_at_us_ = 0;  // UTC, the latest time
 
   std::uint64_t next_event_seq_ = 0;       // every event below it was made
   std::uint64_t taken_robot_time_us_ = 0;  // of the newest taken sample
@@ -112,6 +114,7 @@ class BootRecording {
   IntervalSet taken_;
   IntervalSet refused_;
   IntervalSet received_events_;
+  IntervalSet refused_events_;
 
   std::vector<Segment> waiting_;
   std::size_t complete_ = 0;  // so many of them, up to the last complete one

@@ -224,8 +224,8 @@ StoredBoot BootStore::load(std::int64_t boot_key) {
   boot.key = boot_key;
   SQLite::Database& handle = database_.handle();
   SQLite::Statement query{handle,
-                          "SELECT announced_next_seq, last_robot_time_us, durable_next_seq, durable_next_event_seq"
-                          " FROM boot WHERE boot_key = ?"};
+                          "SELECT announced_next_seq, last_robot_time_us, durable_next_seq, durable_next_event_seq,"
+                          " coalesce(connected_at_us, 0) FROM boot WHERE boot_key = ?"};
   bind_all(query, boot_key);
   query.executeStep();
   const std::uint64_t next_seq = unsigned_id(query.getColumn(2));
@@ -243,6 +243,7 @@ StoredBoot BootStore::load(std::int64_t boot_key) {
                 boot_key, next_event_seq, boot.events);
   boot.next_seq = std::max(unsigned_id(query.getColumn(0)), boot.samples.end());
   boot.last_robot_time_us = unsigned_id(query.getColumn(1));
+  boot.connected_at_us = query.getColumn(4).getInt64();
   return boot;
 }
 
@@ -278,9 +279,10 @@ void BootStore::end(std::int64_t boot_key, std::int64_t noticed_at_us) {
   const StoredBoot boot = load(boot_key);
   SQLite::Statement add_gap{handle,
                             "INSERT INTO gap (boot_key, first_seq, last_seq, cause, noticed_at_us)"
-                            " VALUES (?, ?, ?, 'reboot', ?)"};
+                            " VALUES (?, ?, ?, ?, ?)"};
+  const char* cause = boot.connected_at_us < database_.restored_at_us() ? "restore" : "reboot";
   for (const Interval& lost : boot.samples.missing({0, boot.next_seq})) {
-    execute(add_gap, boot_key, lost.first, lost.next - 1, noticed_at_us);
+    execute(add_gap, boot_key, lost.first, lost.next - 1, cause, noticed_at_us);
   }
   SQLite::Statement mark{handle, "UPDATE boot SET ended_next_seq = ?1, durable_next_seq = ?1 WHERE boot_key = ?2"};
   execute(mark, boot.next_seq, boot_key);

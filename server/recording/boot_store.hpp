@@ -24,6 +24,7 @@ struct StoredBoot {
   IntervalSet events;
   std::uint64_t next_seq = 0;  // every sample below was made
   std::uint64_t last_robot_time_us = 0;
+  std::int64_t connected_at_us = 0;  // UTC, the latest time; 0: never
 };
 
 // A robot asks to be let in. `owner` is the robot that the recorder knows the boot of; without one the boot is looked
@@ -82,8 +83,8 @@ class BootStore {
   // Inside the caller's transaction: these boots are known from now on.
   void add(const std::vector<NewBoot>& boots);
 
-  // Inside the caller's transaction: ends the robot's other boots (what is missing of them is lost: `reboot`), and lets
-  // its open run go on in this one.
+  // Inside the caller's transaction: ends the robot's other boots (what is missing of them is lost: `reboot`, or
+  // `restore` if they have not been heard since), and lets its open run go on in this one.
   void start(const BootStart& start);
 
  private:

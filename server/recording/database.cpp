@@ -92,6 +92,7 @@ Database::Database(const std::filesystem::path& path) : handle_{open_checked(pat
   if (const auto problem = file_problem(path)) refuse(path, *problem);  // what the log held is in the file now
   migrate(path);
   store_id_ = unsigned_id(handle_.execAndGet("SELECT value FROM meta WHERE name = 'store_id'"));
+  restored_at_us_ = handle_.execAndGet("SELECT coalesce(max(value), 0) FROM meta WHERE name = 'restored_at_us'");
 }
 
 // What a kill has left in the write-ahead log can be read, but the disk may not hold it yet, and robots will be told

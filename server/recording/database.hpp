@@ -21,6 +21,9 @@ class Database {
   // Random, made with the file: a robot sees by it that it talks to another store.
   std::uint64_t store_id() const { return store_id_; }
 
+  // UTC when it was made of a backup; 0: it was not.
+  std::int64_t restored_at_us() const { return restored_at_us_; }
+
   // Moves the write-ahead log into the file and empties it.
   void checkpoint();
 
@@ -30,6 +33,7 @@ class Database {
 
   SQLite::Database handle_;
   std::uint64_t store_id_ = 0;
+  std::int64_t restored_at_us_ = 0;
 };
 
 // For queries, beside the writing handle; never blocks it. For one thread at a time: SQLite takes no lock for it.

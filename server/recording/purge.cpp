@@ -1,10 +1,13 @@
-// DELETE by row numbers and by the segments' index; one gap row for each piece that was whole.
+// DELETE by row numbers and by the segments' index; a slice's gap becomes one with that of the slice before it.
 #include "server/recording/purge.hpp"
 
 #include "server/recording/statement.hpp"
 
 namespace server {
 namespace {
+
+constexpr std::size_t kSegmentsASlice = 4;  // about 1 ms
+constexpr int kSlicesAStep = 25;
 
 class RetentionGaps {
  public:
@@ -38,23 +41,46 @@ class RetentionGaps {
   SQLite::Statement before_, after_, remove_, add_;
 };
 
+class Purge {
+ public:
+  explicit Purge(SQLite::Database& database)
+      : rows_{database, "DELETE FROM sample WHERE row BETWEEN ? AND ?"},
+        segment_{database, "DELETE FROM segment WHERE boot_key = ? AND first_seq = ?"},
+        gaps_{database} {}
+
+  // Segments of one boot, ascending.
+  void remove(const std::vector<StoredSegment>& segments, std::int64_t utc_us) {
+    Interval whole;
+    for (const StoredSegment& gone : segments) {
+      execute(rows_, gone.first_row, gone.last_row);
+      execute(segment_, gone.boot_key, gone.samples.first);
+      if (whole.next != gone.samples.first && whole.next > 0) gaps_.add(gone.boot_key, whole, utc_us);
+      whole = {whole.next == gone.samples.first ? whole.first : gone.samples.first, gone.samples.next};
+    }
+    if (whole.next > 0) gaps_.add(segments.back().boot_key, whole, utc_us);
+  }
+
+ private:
+  SQLite::Statement rows_, segment_;
+  RetentionGaps gaps_;
+};
+
 }  // namespace
 
-void purge(SQLite::Database& database, const std::vector<StoredSegment>& segments, std::int64_t utc_us) {
-  SQLite::Statement rows{database, "DELETE FROM sample WHERE row BETWEEN ? AND ?"};
-  SQLite::Statement segment{database, "DELETE FROM segment WHERE boot_key = ? AND first_seq = ?"};
-  RetentionGaps gaps{database};
-  Interval whole;
-  for (std::size_t i = 0; i < segments.size(); ++i) {
-    const StoredSegment& gone = segments[i];
-    execute(rows, gone.first_row, gone.last_row);
-    execute(segment, gone.boot_key, gone.samples.first);
-    const bool goes_on = i > 0 && segments[i - 1].boot_key == gone.boot_key && whole.next == gone.samples.first;
-    whole = {goes_on ? whole.first : gone.samples.first, gone.samples.next};
-    const bool next_goes_on = i + 1 < segments.size() && segments[i + 1].boot_key == gone.boot_key &&
-                              segments[i + 1].samples.first == whole.next;
-    if (!next_goes_on) gaps.add(gone.boot_key, whole, utc_us);
+std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const Clock& clock, std::int64_t utc_us) {
+  std::uint64_t removed = 0;
+  const std::int64_t end_us = clock.steady_us() + kStepTime.count();
+  SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
+  RetentionPlan::Step walk{plan, database};
+  Purge purge{database};
+  for (int slices = 0; slices < kSlicesAStep && !plan.empty(); ++slices) {
+    if (slices > 0 && clock.steady_us() >= end_us) break;
+    const std::vector<StoredSegment> going = walk.next(kSegmentsASlice);
+    purge.remove(going, utc_us);
+    for (const StoredSegment& segment : going) removed += segment.samples.next - segment.samples.first;
   }
+  transaction.commit();
+  return removed;
 }
 
 }  // namespace server

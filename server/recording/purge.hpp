@@ -1,19 +1,25 @@
 // Removes stored segments with their rows, and notes that they were there: each of their samples is in a gap of cause
 // `retention` afterwards, so that it is neither asked for again nor counted as lost.
 //
-// On the thread of the handle, inside a transaction of the caller.
+// On the disk thread.
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>
 
 #include <cstdint>
-#include <vector>
 
+#include "server/clock.hpp"
 #include "server/recording/retention_plan.hpp"
 
 namespace server {
 
-// A gap of cause `retention` that touches a new one becomes one with it; the others stay as they are.
-void purge(SQLite::Database& database, const std::vector<StoredSegment>& segments, std::int64_t utc_us);
+// After this no step of retention begins another slice of its work; a slice and the commit take far less than the rest
+// of the 50 ms that a step may take.
+inline constexpr microseconds kStepTime{10'000};
+
+// Returns how many samples it removed. One transaction: walks along the plan in slices of a few segments and looks at
+// the clock between them. A gap of cause `retention` that touches a new one becomes one with it; the others stay as
+// they are. When it throws, the database is as it was, and the plan must not be used any more.
+std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const Clock& clock, std::int64_t utc_us);
 
 }  // namespace server

@@ -57,6 +57,7 @@ asio::awaitable<RestoredState> Recorder::open() {
     }
     BootStore boots{*database_};
     next_boot_key_ = boots.next_boot_key();
+    restored_at_us_ = database_->restored_at_us();
     return RestoredState{database_->store_id(), boots.robots(), pending_stops(*database_)};
   };
   co_return co_await disk_.run(std::move(job));
@@ -133,7 +134,7 @@ void Recorder::on_robot(const RobotState& robot) {
   boot.connected = robot.link == LinkState::connected && !boot.replaced;
   if (boot.connected && boot.hello) {
     const AdmissionRequest hello = *std::exchange(boot.hello, {});
-    boot.recording.connect(hello);
+    boot.recording.connect(hello, restored_at_us_);
     replace_others(robot.id, robot.boot_id);
     std::erase_if(starts_, [&](const WaitingStart& waiting) { return waiting.start.boot_key == boot.recording.key(); });
     starts_.push_back({{.robot_id = hello.robot_id,
@@ -229,7 +230,7 @@ void Recorder::on_clock(const RobotState&, const ClockRecord& record) {
 
 void Recorder::on_in_force(const RobotState&, const InForceRecord& record) {
   const std::int64_t boot_key = key_of(record.boot_id);
-  if (boot_key == 0 || !room_for_record()) return;
+  if (boot_key == 0 || record.first_seq >= kMaxRecordedNumber || !room_for_record()) return;
   queue_.in_force.push_back({boot_key, record});
   wake();
 }

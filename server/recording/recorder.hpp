@@ -268,6 +268,7 @@ class Recorder final : public StationSink, public RobotArchive {
   std::unordered_map<std::int64_t, BootEntry*> by_key_;
   std::unordered_multimap<RobotId, BootEntry*> by_robot_;  // as by_key_, those that are loaded
   std::int64_t next_boot_key_ = 0;
+  std::int64_t restored_at_us_ = 0;  // UTC; 0: the database is not made of a backup
 
   // Boots that have something to write, or to ask for, so that nobody looks at all of them each 100 ms.
   std::deque<BootEntry*> due_;  // with a complete segment, or not connected

@@ -1,8 +1,8 @@
 // Removes what is too old or too much: samples that no run holds, the oldest first.
 //
-// Steps of one transaction on the disk thread, each of at most 50 ms: their size follows from what the last one took.
-// Commits go in between, and at least half of the disk thread's time is theirs. Removed pages are used again; the file
-// shrinks only while it is larger than it may be, or while there is little room on the disk.
+// What may go is found on a reader. It goes in steps of one transaction on the disk thread, each of which ends by the
+// clock, well before 50 ms. Commits go in between, and at least half of the disk thread's time is theirs. Removed pages
+// are used again; the file shrinks only while it is larger than it may be, or while there is little room on the disk.
 // Loop thread. What it is given outlives it.
 #pragma once
 
@@ -11,10 +11,10 @@
 #include <optional>
 
 #include "server/clock.hpp"
+#include "server/recording/database_reader.hpp"
 #include "server/recording/disk_watch.hpp"
 #include "server/recording/recorder.hpp"
 #include "server/recording/retention_plan.hpp"
-#include "server/worker.hpp"
 
 namespace server {
 
@@ -31,22 +31,13 @@ struct RetentionCounters {
   bool all_held = false;  // the database is larger than it may be, and runs hold all that is left
 };
 
-// How large a step may be, for it to take 50 ms at most.
-class StepSize {
- public:
-  StepSize(std::size_t begin, std::size_t end) : value_{begin}, end_{end} {}
-  std::size_t value() const { return value_; }
-  void note(std::int64_t took_us);
-
- private:
-  std::size_t value_;
-  std::size_t end_;
-};
-
 class Retention {
  public:
-  Retention(Clock& clock, Recorder& recorder, WorkerThread& readers, const DiskWatch& disk_watch,
+  Retention(Clock& clock, Recorder& recorder, DatabaseReader& reader, const DiskWatch& disk_watch,
             RetentionPolicy policy);
+
+  // Before robots arrive: what is stored now, an earlier start has written.
+  boost::asio::awaitable<void> open();
 
   // Looks every 30 s, until cancelled.
   boost::asio::awaitable<void> run();
@@ -61,22 +52,22 @@ class Retention {
     std::uint64_t file_bytes = 0;
     std::uint64_t used_bytes = 0;  // without the free pages in it
   };
-  boost::asio::awaitable<void> purge_older_than(std::int64_t utc_us, std::uint64_t until_used_bytes);
+  // False: the disk fails.
+  boost::asio::awaitable<bool> purge(RetentionPlan plan, std::uint64_t until_used_bytes);
   boost::asio::awaitable<void> purge_down_to_size();
   void note_use(std::uint64_t used_bytes);  // after what could go has gone
   boost::asio::awaitable<void> shrink();
   boost::asio::awaitable<Size> size();
-  boost::asio::awaitable<std::optional<std::int64_t>> oldest_us();
+  boost::asio::awaitable<std::int64_t> next_row();
   boost::asio::awaitable<void> make_room_for_commits(std::int64_t took_us);
 
   Clock& clock_;
   Recorder& recorder_;
-  WorkerThread& readers_;
+  DatabaseReader& reader_;
   const DiskWatch& disk_watch_;
   RetentionPolicy policy_;
+  SampleAges ages_;
   RetentionCounters counters_;
-  StepSize segments_{50, 500};
-  StepSize pages_{64, 1024};
 };
 
 }  // namespace server

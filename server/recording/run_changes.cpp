@@ -15,53 +15,6 @@ namespace {
 constexpr std::array<const char*, 8> kTextColumns{"name",          "fluid",   "pump_profile", "tube",
                                                   "operator_name", "profile", "notes",        "verdict"};
 
-// The boots' samples that the range names, ascending.
-Result<std::vector<BootSamples>> samples_in(SQLite::Database& database, const RobotId& robot_id,
-                                            const RecordedRange& range) {
-  if (const auto* time = std::get_if<TimeSpan>(&range)) {
-    auto found = samples_between(database, robot_id, time->from_us, time->to_us);
-    if (found.empty()) {
-      return fail(ErrorCode::invalid, fmt::format("nothing was recorded of robot '{}' in that time", robot_id),
-                  "nothing_recorded");
-    }
-    return found;
-  }
-  const auto& named = std::get<SeqSpan>(range);
-  std::optional<BootSamples> boot = samples_of_boot(database, robot_id, named.boot_id);
-  if (!boot) {
-    return fail(ErrorCode::not_found, fmt::format("robot '{}' has had no boot {}", robot_id, named.boot_id));
-  }
-  if (named.first_seq > named.last_seq || named.last_seq >= boot->samples.next) {
-    return fail(ErrorCode::invalid,
-                fmt::format("samples {} to {} are not in the boot's 0 to {}", named.first_seq, named.last_seq,
-                            static_cast<std::int64_t>(boot->samples.next) - 1),
-                "nothing_recorded");
-  }
-  boot->samples = {named.first_seq, named.last_seq + 1};
-  return std::vector{*boot};
-}
-
-// What is known of the robot where the run begins, and when that was.
-void describe(SQLite::Database& database, const std::vector<BootSamples>& boots, Run& run) {
-  const BootSamples& first = boots.front();
-  const BootSamples& last = boots.back();
-  SQLite::Statement boot{database, "SELECT firmware_version, first_seen_at_us FROM boot WHERE boot_key = ?"};
-  bind_all(boot, first.boot_key);
-  boot.executeStep();
-  run.firmware_version = boot.getColumn(0).getString();
-  run.started_at_us = boot.getColumn(1).getInt64();
-  SQLite::Statement segment{database,
-                            "SELECT controller_id FROM segment WHERE boot_key = ? AND first_seq <= ?"
-                            " ORDER BY first_seq DESC LIMIT 1"};
-  bind_all(segment, first.boot_key, first.samples.first);
-  if (segment.executeStep()) run.controller_id = segment.getColumn(0).getUInt();
-  if (const auto time = time_of(database, first.boot_key, first.samples.first)) run.started_at_us = time->utc_us;
-  run.ended_at_us = run.started_at_us;
-  if (const auto time = time_of(database, last.boot_key, last.samples.next - 1)) {
-    run.ended_at_us = std::max(run.started_at_us, time->utc_us);
-  }
-}
-
 Result<RunState> state_of(SQLite::Database& database, RunId id) {
   const std::optional<RunState> state = read_run_state(database, id);
   if (!state) return fail(ErrorCode::not_found, fmt::format("there is no run {}", id));
@@ -70,20 +23,25 @@ Result<RunState> state_of(SQLite::Database& database, RunId id) {
 
 }  // namespace
 
-Result<RunId> RunStore::add_afterwards(Run run, const RecordedRange& range) {
-  SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};  // nothing is purged meanwhile
-  const auto boots = samples_in(handle_, run.robot_id, range);
-  if (!boots) return std::unexpected{boots.error()};
+std::optional<RunId> RunStore::add_afterwards(Run run, const RecordedSamples& samples) {
+  SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
+  SQLite::Statement stored{handle_, "SELECT 1 FROM segment WHERE boot_key = ? LIMIT 1"};
   run.state = RunState::ended;
   run.made_afterwards = true;
-  describe(handle_, *boots, run);
+  run.firmware_version = samples.firmware_version;
+  run.controller_id = samples.controller_id;
+  run.started_at_us = samples.started_at_us;
+  run.ended_at_us = samples.ended_at_us;
   const RunId id = insert(run);
   SQLite::Statement add{handle_,
                         "INSERT INTO run_span (run_id, span, boot_key, first_seq, last_seq) VALUES (?, ?, ?, ?, ?)"};
-  for (std::size_t span = 0; span < boots->size(); ++span) {
-    const BootSamples& boot = (*boots)[span];
+  for (std::size_t span = 0; span < samples.boots.size(); ++span) {
+    const BootSamples& boot = samples.boots[span];
+    bind_all(stored, boot.boot_key);
+    if (samples.by_time && !stored.executeStep()) return std::nullopt;
     execute(add, id, static_cast<std::int64_t>(span), boot.boot_key, boot.samples.first, boot.samples.next - 1);
   }
+  stored.reset();
   transaction.commit();
   return id;
 }

@@ -1,26 +1,21 @@
-// Between time and samples: when a sample was made, and which samples of a robot were made in a stretch of time.
+// Between time and samples of a robot, over its boots: what a run made afterwards and a marker stand for.
 //
-// On the thread that owns the database handle; a few index look-ups for each boot, whatever its length. The time of a
-// sample that is not stored is counted on from the segment before it, in periods. UTC runs back where the station's
-// clock was set: a stretch then begins and ends at one of the crossings.
+// On the thread that owns the database handle; a few index look-ups for each boot, whatever its length.
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "server/recording/boot_times.hpp"
 #include "server/recording/interval_set.hpp"
 #include "server/recording/run_queries.hpp"
 #include "server/station/station_state.hpp"
 
 namespace server {
-
-struct SampleTime {
-  std::uint64_t robot_time_us = 0;
-  std::int64_t utc_us = 0;
-};
 
 // Empty when nothing of the boot is stored.
 std::optional<SampleTime> time_of(SQLite::Database& database, std::int64_t boot_key, std::uint64_t seq);
@@ -31,10 +26,6 @@ struct BootSamples {
   BootId boot_id = 0;
   Interval samples;
 };
-
-// What the robot made in this time, both ends included, boot by boot in their order; also what was lost of it.
-std::vector<BootSamples> samples_between(SQLite::Database& database, const RobotId& robot_id, std::int64_t from_us,
-                                         std::int64_t to_us);
 
 struct BootSample {
   std::int64_t boot_key = 0;
@@ -48,5 +39,36 @@ std::optional<BootSample> sample_at(SQLite::Database& database, const BootHeads&
 
 // All that a boot is known to have made; empty when the robot has no such boot.
 std::optional<BootSamples> samples_of_boot(SQLite::Database& database, const RobotId& robot_id, BootId boot_id);
+
+// What a range stands for, and what is known of the robot where it begins.
+struct RecordedSamples {
+  std::vector<BootSamples> boots;  // in their order; also what was lost
+  bool by_time = false;            // so something of each boot was stored when it was found
+  std::string firmware_version;
+  std::uint32_t controller_id = 0;
+  std::int64_t started_at_us = 0;  // UTC
+  std::int64_t ended_at_us = 0;
+};
+
+// Finds the samples of a range, some boots in each call, so that a reader can do it in short questions.
+class RangeSearch {
+ public:
+  RangeSearch(RobotId robot_id, RecordedRange range) : robot_id_{std::move(robot_id)}, range_{range} {}
+
+  // True: there is more to look at.
+  bool advance(SQLite::Database& database);
+  // After that. invalid when nothing was recorded there, not_found for a boot that the robot has not had.
+  Result<RecordedSamples> take() { return std::move(found_); }
+
+ private:
+  bool search_time(SQLite::Database& database, const TimeSpan& time);
+  void search_boot(SQLite::Database& database, const SeqSpan& named);
+  void describe(SQLite::Database& database);
+
+  RobotId robot_id_;
+  RecordedRange range_;
+  std::int64_t boot_key_ = 0;  // of the last boot looked at
+  Result<RecordedSamples> found_;
+};
 
 }  // namespace server

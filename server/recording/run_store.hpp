@@ -5,10 +5,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "server/recording/database.hpp"
 #include "server/recording/run_queries.hpp"
+#include "server/recording/run_spans.hpp"
 
 namespace server {
 
@@ -20,8 +22,9 @@ class RunStore {
   // there is one, is noted as in force in its spans, here and in end().
   Result<RunId> add(const Run& run, const std::string& station_document);
 
-  // The same of what is recorded: fills in its spans and times, and what is known of their robot.
-  Result<RunId> add_afterwards(Run run, const RecordedRange& range);
+  // The same of what is recorded, and was found before. Nothing when a boot of which samples were found has none any
+  // more: they have been purged meanwhile.
+  std::optional<RunId> add_afterwards(Run run, const RecordedSamples& samples);
 
   // Who changes it, and when.
   struct Author {

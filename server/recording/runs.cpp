@@ -203,11 +203,24 @@ asio::awaitable<Result<Run>> Runs::make_afterwards(RobotId robot_id, RunConditio
   run.robot_id = std::move(robot_id);
   run.conditions = std::move(conditions);
   run.made_by = std::move(made_by);
-  auto job = [run, range](Database& database) { return RunStore{database, {}}.add_afterwards(run, range); };
-  const Result<RunId> id = co_await recorder_.on_disk(std::move(job));
-  if (!id) co_return std::unexpected{id.error()};
+  std::optional<RunId> id;
+  while (!id) {  // again only when samples that were found have been purged before the run could hold them
+    const Result<RecordedSamples> samples = co_await samples_in(run.robot_id, range);
+    if (!samples) co_return std::unexpected{samples.error()};
+    auto job = [run, found = *samples](Database& database) {
+      return RunStore{database, {}}.add_afterwards(run, found);
+    };
+    id = co_await recorder_.on_disk(std::move(job));
+  }
   certifier_.add(*id);
   co_return co_await find(*id);
+}
+
+asio::awaitable<Result<RecordedSamples>> Runs::samples_in(RobotId robot_id, RecordedRange range) {
+  RangeSearch search{std::move(robot_id), range};
+  auto look = [&search](SQLite::Database& database) { return search.advance(database); };
+  for (bool more = true; more;) more = co_await reader_.ask(look);
+  co_return search.take();
 }
 
 asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, std::string actor) {

@@ -23,6 +23,7 @@ namespace server {
 class Certifier;
 class Recorder;
 class DatabaseReader;
+struct RecordedSamples;
 
 using RunId = std::int64_t;
 
@@ -167,6 +168,7 @@ class Runs final : public StationSink {
     std::uint32_t parameters_checksum = 0;
   };
 
+  boost::asio::awaitable<Result<RecordedSamples>> samples_in(RobotId robot_id, RecordedRange range);
   boost::asio::awaitable<Result<Run>> changed(RunId id, Result<void> outcome);
 
   // How far each robot's boot has come; what the database does not know yet of an open span.

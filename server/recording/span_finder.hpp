@@ -1,9 +1,8 @@
 // Finds the part of spans that lies in a window of time.
 //
-// A boot's UTC is its robot time plus an estimate that is stored with each segment, so the window's ends are looked for
-// by the segments, with a few index look-ups a span. Where the ends fall into a gap they are reckoned with the period
-// of the segment before it. The station's clock may have been set back within a boot: the window then ends at one of
-// the places that bear its time, and everything between its two ends belongs to it.
+// The ends are looked for with BootTimes. Where they fall into a gap they are reckoned with the period of the segment
+// before it. The station's clock may have been set back within a boot: the window then ends at one of the places that
+// bear its time, and everything between its two ends belongs to it.
 //
 // On the thread that owns the database handle.
 #pragma once

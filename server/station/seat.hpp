@@ -2,6 +2,8 @@
 #pragma once
 
 #include <limits>
+#include <set>
+#include <string>
 
 #include "server/station/in_force.hpp"
 #include "server/station/station.hpp"
@@ -28,6 +30,8 @@ struct Station::Seat {
   RobotPort* port = nullptr;    // null while disconnected
   std::map<CommandId, std::shared_ptr<PendingCommand>> commands;
   ParameterTable parameters;                  // of the connection
+  std::set<std::string> told_in_force;        // kinds that the robot has said in the connection
+  std::uint64_t next_sample_at_robot_us = 0;  // when the robot makes its sample next_seq, as far as it is known
   ClockSync clock_sync;                       // of the boot that is, or was last, connected
   ClockRecord clock_recorded;                 // the latest of that boot; boot_id 0: none yet
   std::int64_t utc_minus_steady_us = 0;       // at its latest exchange

@@ -128,6 +128,8 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   seat.port = &port;
   occupied_[&port] = &seat;
   seat.parameters = ParameterTable{};
+  seat.told_in_force.clear();
+  seat.next_sample_at_robot_us = hello.robot_time_us;
   seat.latch_known_at_robot_us = hello.robot_time_us;
   robot.link = LinkState::connected;
   robot.peer = peer;
@@ -239,6 +241,7 @@ void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) 
     }
     robot.sample = batch.samples.back();
     robot.next_seq = batch.next_seq();
+    seat->next_sample_at_robot_us = batch.first_robot_time_us + batch.samples.size() * telemetry.period_us;
     if (new_controller) publish(robot);
   }
   robot.oldest_seq = std::max(robot.oldest_seq, batch.oldest_seq);
@@ -319,18 +322,24 @@ void Station::record_clock(Seat& seat) {
 void Station::on_parameters(RobotPort& port, const protocol::ParameterPage& page) {
   Seat* seat = seat_of(port);
   if (seat == nullptr) return;
-  if (auto table = seat->parameters.add(page)) record_in_force(*seat->robot, "parameters", std::move(*table));
+  if (auto table = seat->parameters.add(page)) record_in_force(*seat, "parameters", std::move(*table));
 }
 
 void Station::on_controller(RobotPort& port, const protocol::Controller& controller) {
-  if (const Seat* seat = seat_of(port)) record_in_force(*seat->robot, "controller", controller_json(controller));
+  if (Seat* seat = seat_of(port)) record_in_force(*seat, "controller", controller_json(controller));
 }
 
-void Station::record_in_force(const RobotState& robot, std::string kind, std::string content) {
+// Samples that were made before it was said may still be on their way: they are counted on, in periods.
+void Station::record_in_force(Seat& seat, std::string kind, std::string content) {
+  const RobotState& robot = *seat.robot;
+  const std::uint32_t live_period_us = robot.context.period_us;
+  const std::uint64_t period_us = live_period_us != 0 ? live_period_us : std::max(robot.sample_period_us, 1U);
+  const std::uint64_t said_at_us = std::max(robot.latest_robot_time_us, seat.next_sample_at_robot_us);
   InForceRecord record;
   record.boot_id = robot.boot_id;
+  record.is_change = !seat.told_in_force.insert(kind).second;
   record.kind = std::move(kind);
-  record.first_seq = robot.next_seq;
+  record.first_seq = robot.next_seq + (said_at_us - seat.next_sample_at_robot_us + period_us - 1) / period_us;
   record.content = std::move(content);
   record.noticed_at_us = clock_.utc_us();
   for (StationSink* sink : sinks_) sink->on_in_force(robot, record);

@@ -100,7 +100,7 @@ class Station {
   void publish(const CommandRecord& record);
   void note(const RobotState& robot, std::string kind, std::string cause);
   void record_clock(Seat& seat);
-  void record_in_force(const RobotState& robot, std::string kind, std::string content);
+  void record_in_force(Seat& seat, std::string kind, std::string content);
 
   std::shared_ptr<PendingCommand> make_pending(const CommandRequest& request, const RobotState& robot);
   void restore_stop(const CommandRecord& record);

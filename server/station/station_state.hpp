@@ -108,8 +108,9 @@ struct ClockRecord {
 // What is in force on a robot from a sample of its boot on, until the next of its kind.
 struct InForceRecord {
   BootId boot_id = 0;
-  std::string kind;  // "parameters" or "controller"
-  std::uint64_t first_seq = 0;
+  std::string kind;                // "parameters" or "controller"
+  bool is_change = false;          // said later in a connection, and not to begin it
+  std::uint64_t first_seq = 0;     // the first sample made after it was said
   std::string content;             // JSON
   std::int64_t noticed_at_us = 0;  // UTC
 };

@@ -30,12 +30,14 @@ class RecordingSink final : public StationSink {
   void on_event(const RobotState&, const RobotEvent& event) override { events.push_back(event); }
   void on_command(const CommandRecord& record) override { commands.push_back(record); }
   void on_clock(const RobotState&, const ClockRecord& record) override { clocks.push_back(record); }
+  void on_in_force(const RobotState&, const InForceRecord& record) override { in_force.push_back(record); }
 
   std::vector<RobotState> robots;
   std::vector<SampleBatch> batches;
   std::vector<RobotEvent> events;
   std::vector<CommandRecord> commands;
   std::vector<ClockRecord> clocks;
+  std::vector<InForceRecord> in_force;
 };
 
 class TestRobot {

@@ -18,6 +18,7 @@ class AskingAgainTest : public RecordingTest {
     event.robot_id = robot.id;
     event.boot_id = robot.boot_id;
     event.event_seq = event_seq;
+    event.oldest_event_seq = robot.oldest_event_seq;
     event.kind = "detection";
     recorder_->on_event(RobotState{}, event);
   }
@@ -63,6 +64,36 @@ TEST_F(AskingAgainTest, EventsThatARebootTookAreListed) {
   connect(rebooted);
   flush();
   EXPECT_EQ(event_gaps(), (Rows{"nemo|1|2|reboot", "nemo|4|4|reboot"}));
+}
+
+// As samples are: the robot lost them, because the station had refused them.
+TEST_F(AskingAgainTest, RefusedEventsThatAreLostLaterAreOfTheFullQueue) {
+  RecorderOptions options;
+  options.max_queued_records = 2;
+  start(options);
+  connect(robot_);
+  for (std::uint64_t seq = 0; seq < 5; ++seq) send_event(robot_, seq);  // within one instant: 2 to 4 are refused
+  flush();
+  robot_.oldest_event_seq = 7;  // too late for these, and two more have never come
+  send_event(robot_, 7);
+  flush();
+  EXPECT_EQ(event_gaps(), (Rows{"nemo|2|4|queue_full", "nemo|5|6|ring_overrun"}));
+  EXPECT_EQ(durable_next_event_seq_, 8u);
+}
+
+TEST_F(AskingAgainTest, ARefusedEventThatCameAgainIsNotLost) {
+  RecorderOptions options;
+  options.max_queued_records = 2;
+  start(options);
+  connect(robot_);
+  for (std::uint64_t seq = 0; seq < 4; ++seq) send_event(robot_, seq);
+  flush();
+  send_event(robot_, 2);
+  robot_.oldest_event_seq = 4;
+  flush();
+  send_event(robot_, 4);
+  flush();
+  EXPECT_EQ(event_gaps(), Rows{"nemo|3|3|queue_full"});
 }
 
 TEST_F(AskingAgainTest, EventsThatTheRingLostBeforeAReconnectionAreListed) {

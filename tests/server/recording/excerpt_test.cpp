@@ -197,6 +197,30 @@ TEST_F(ExcerptTest, ATimeThatOccursOnceIsFoundAlthoughTheClockWasSetBack) {
   }
 }
 
+// There is one search from time to samples, also where the clock was set: a window and a run made afterwards agree.
+TEST_F(ExcerptTest, ARunMadeOfATimeHoldsWhatAWindowOfThatTimeShows) {
+  const auto numbers = [](const std::vector<StoredSample>& samples) {
+    std::vector<std::pair<BootId, std::uint64_t>> found;
+    for (const StoredSample& stored : samples) found.emplace_back(stored.boot_id, stored.seq);
+    return found;
+  };
+  const RunId all = record(13);
+  flush();
+  const std::vector<StoredSample> recorded = samples_of(all);
+  std::size_t found = 0;
+  for (int i = 0; i < 40; ++i) {
+    const std::int64_t from_us =
+        recorded[random_() % recorded.size()].utc_us - static_cast<std::int64_t>(random_() % 9);
+    const std::int64_t to_us = from_us + static_cast<std::int64_t>(random_() % 5'000'000);
+    const auto seen =
+        numbers(samples_of(wait(history_->segments(window(from_us, to_us + 1), {}, 10'000)).value()).samples);
+    const Result<Run> run = wait(runs_->make_afterwards(robot_.id, named("afterwards"), TimeSpan{from_us, to_us}, ""));
+    EXPECT_EQ(run ? numbers(samples_of(run->id)) : decltype(seen){}, seen) << from_us << " to " << to_us;
+    found += seen.size();
+  }
+  EXPECT_GT(found, 1000u);
+}
+
 TEST_F(ExcerptTest, SegmentsAreFoundByTheIndex) {
   start();
   for (const char* condition :

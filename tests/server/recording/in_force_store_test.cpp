@@ -12,9 +12,10 @@ class InForceStoreTest : public RecordingTest {
     connect(robot_);
   }
 
-  void say(const std::string& kind, const std::string& content, std::uint64_t first_seq) {
+  void say(const std::string& kind, const std::string& content, std::uint64_t first_seq, bool is_change = false) {
     recorder_->on_in_force(RobotState{}, {.boot_id = robot_.boot_id,
                                           .kind = kind,
+                                          .is_change = is_change,
                                           .first_seq = first_seq,
                                           .content = content,
                                           .noticed_at_us = clock_.utc_us()});
@@ -39,6 +40,19 @@ TEST_F(InForceStoreTest, ATextIsStoredOnceAndWhatIsToldAgainAddsNothing) {
                                           "controller|900|{\"kp\":1}", "parameters|0|{\"kp\":1}"};
   EXPECT_EQ(in_force(), expected);
   EXPECT_EQ(number("SELECT count(*) FROM document"), 3);
+}
+
+TEST_F(InForceStoreTest, WhatABootSaysFirstHoldsFromItsBeginning) {
+  say("controller", "{\"kp\":1}", 200);  // it had made 200 samples when it connected
+  say("controller", "{\"kp\":2}", 300, true);
+  say("parameters", "{}", 400, true);  // what was before has not been recorded
+  const std::vector<std::string> expected{"controller|0|{\"kp\":1}", "controller|300|{\"kp\":2}", "parameters|400|{}"};
+  EXPECT_EQ(in_force(), expected);
+}
+
+TEST_F(InForceStoreTest, ANumberThatCannotBeIsNotStored) {
+  say("controller", "{}", kMaxRecordedNumber, true);
+  EXPECT_TRUE(in_force().empty());
 }
 
 TEST_F(InForceStoreTest, OfABootThatIsNotRecordedNothingIsStored) {

@@ -91,6 +91,90 @@ TEST_F(RestoreTest, ARobotGoesOnWithTheRestoredStation) {
   EXPECT_TRUE(wait(runs_->create(robot_.id, named("after"))));
 }
 
+// The station recorded on after the backup, and acknowledged it: so the robots hold it no more.
+TEST_F(RestoreTest, WhatWasRecordedAfterTheBackupIsLostByTheRestore) {
+  record_and_back_up();
+  clock_.run_for(1s);
+  restore_database(from_, new_folder_, clock_.utc_us());
+  use_restored();
+  start();
+  robot_.next_seq = 5000;
+  robot_.oldest_seq = 4800;
+  robot_.next_event_seq = robot_.oldest_event_seq = 3;
+  connect(robot_);
+  send(robot_, 4800, 200);
+  TestRobot unknown;  // came after the backup
+  unknown.id = "dory";
+  unknown.boot_id = 7;
+  unknown.next_seq = 700;
+  unknown.oldest_seq = 500;
+  connect(unknown);
+  send(unknown, 500, 200);
+  flush();
+  EXPECT_EQ(rows("SELECT robot_id, first_seq, last_seq, cause FROM robot_gap"),
+            (std::vector<std::string>{"nemo|1000|4799|restore", "dory|0|499|restore"}));
+  EXPECT_EQ(rows("SELECT first_event_seq, last_event_seq, cause FROM event_gap"),
+            std::vector<std::string>{"0|2|restore"});
+}
+
+TEST_F(RestoreTest, WhatIsLostLaterIsNotLostByTheRestore) {
+  record_and_back_up();
+  clock_.run_for(1s);
+  restore_database(from_, new_folder_, clock_.utc_us());
+  use_restored();
+  start();
+  connect(robot_);
+  make(robot_, 100);
+  disconnect(robot_);
+  robot_.next_seq = robot_.oldest_seq = 2000;
+  connect(robot_);
+  make(robot_, 100);
+  flush();
+  stop();
+  start();
+  robot_.next_seq = robot_.oldest_seq = 3000;
+  connect(robot_);
+  make(robot_, 100);
+  clock_.run_for(100s);
+  TestRobot young;
+  young.id = "dory";
+  young.boot_id = 7;
+  young.next_seq = young.oldest_seq = 700;
+  connect(young);
+  make(young, 100);
+  flush();
+  EXPECT_EQ(rows("SELECT robot_id, first_seq, last_seq, cause FROM robot_gap"),
+            (std::vector<std::string>{"nemo|1100|1999|ring_overrun", "nemo|2100|2999|ring_overrun",
+                                      "dory|0|699|ring_overrun"}));
+}
+
+TEST_F(RestoreTest, WhatWasMissingOfABootThatHasEndedSinceIsLostByTheRestore) {
+  start();
+  connect(robot_);
+  make(robot_, 100);
+  robot_.next_seq = 120;  // 100 to 119 are late
+  make(robot_, 80);
+  flush();
+  EXPECT_TRUE(wait(recording_->backups.begin("b")));
+  EXPECT_TRUE(clock_.run_until([&] { return !recording_->backups.busy(); }, 60s));
+  stop();
+  clock_.run_for(1s);
+  restore_database(from_, new_folder_, clock_.utc_us());
+  use_restored();
+  start();
+  for (int boot = 0; boot < 2; ++boot) {
+    robot_.boot_id += 1;
+    robot_.next_seq = robot_.oldest_seq = 0;
+    connect(robot_);
+    make(robot_, 10);
+    robot_.next_seq += 5;
+    make(robot_, 10);
+    flush();
+  }
+  EXPECT_EQ(rows("SELECT boot_key, first_seq, last_seq, cause FROM gap"),
+            (std::vector<std::string>{"1|100|119|restore", "2|10|14|reboot"}));
+}
+
 TEST_F(RestoreTest, RefusesWhereThereIsADatabase) {
   record_and_back_up();
   std::ofstream{new_folder_ / "station.sqlite"} << "precious";

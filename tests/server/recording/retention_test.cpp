@@ -1,62 +1,18 @@
 // What is too old or too much goes, whole segments at a time; a run, and what is not durable, stays.
-#include "server/recording/retention.hpp"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "tests/server/recording/recording_test.hpp"
-#include "tests/server/recording/stored_runs.hpp"
+#include "tests/server/recording/retention_fixture.hpp"
 
 namespace server {
 namespace {
 
 using ::testing::IsEmpty;
-constexpr microseconds kDay = 24h;
-using Rows = std::vector<std::string>;
-
-class RetentionTest : public RecordingTest {
- protected:
-  void keep(std::uint32_t days, std::uint32_t megabytes = 0) {
-    start({}, {.retention_days = days,
-               .max_database_mb = megabytes,
-               .low_space_mb = 0,
-               .critical_space_mb = 0,
-               .backup_dir = {}});
-    connect(robot_);
-  }
-  // Samples that are on disk; the recorder has noted in the database that they are.
-  void record(std::size_t count) {
-    make(robot_, count, 25);
-    flush();
-  }
-  void set_durable(BootId boot_id, std::uint64_t next_seq) {
-    execute(fmt::format("UPDATE boot SET durable_next_seq = {} WHERE boot_id = {}", next_seq, signed_id_of(boot_id)));
-  }
-  void execute(const std::string& sql) {
-    wait(recorder_->on_disk([sql](Database& database) { return database.handle().exec(sql); }));
-  }
-  static std::int64_t signed_id_of(BootId boot_id) { return static_cast<std::int64_t>(boot_id); }
-  void pass() {
-    wait(recording_->retention.pass());
-    SQLite::Database database = open_for_reading(path_);
-    EXPECT_THAT(coverage_faults(database), IsEmpty());
-    EXPECT_EQ(rows("PRAGMA integrity_check"), Rows{"ok"});
-  }
-  std::map<std::int64_t, std::vector<std::string>> runs() {
-    SQLite::Database database = open_for_reading(path_);
-    return stored_runs(database);
-  }
-  Rows gaps() { return rows("SELECT first_seq, last_seq, cause FROM gap ORDER BY boot_key, first_seq"); }
-  std::int64_t samples() { return number("SELECT count(*) FROM sample"); }
-  const RetentionCounters& counters() const { return recording_->retention.counters(); }
-
-  TestRobot robot_;
-};
 
 TEST_F(RetentionTest, RemovesWhatIsOldAndListsItAsAGap) {
   keep(7);
   record(1000);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   record(500);
   pass();
   EXPECT_EQ(gaps(), Rows{"0|999|retention"});
@@ -66,10 +22,53 @@ TEST_F(RetentionTest, RemovesWhatIsOldAndListsItAsAGap) {
   EXPECT_EQ(recorder_->counters().samples_lost, 0U) << "what was removed was not lost";
 }
 
+TEST_F(RetentionTest, WhatAnEarlierStartStoredGoesByItsTimeOfArrival) {
+  keep(7);
+  record(1000);
+  stop();
+  clock_.step_utc(8 * kDay);
+  keep(7);
+  record(500);
+  pass();
+  EXPECT_EQ(gaps(), Rows{"0|999|retention"});
+}
+
+// The clock was wrong, e.g. on a machine without a battery, and then it was set.
+TEST_F(RetentionTest, AClockThatIsSetMakesNothingOld) {
+  keep(7);
+  record(1000);
+  start_again(7);
+  record(1000);
+  clock_.step_utc(400 * kDay);
+  record(1000);
+  pass();
+  EXPECT_EQ(samples(), 3000);
+  age(8 * kDay);
+  record(100);
+  pass();
+  EXPECT_EQ(gaps(), Rows{"0|2999|retention"}) << "in time they do get old";
+}
+
+TEST_F(RetentionTest, AClockThatWasFarAheadHoldsNothingBack) {
+  clock_.step_utc(400 * kDay);
+  keep(7);
+  record(1000);
+  stop();
+  clock_.step_utc(-400 * kDay);
+  keep(7);
+  record(500);
+  pass();
+  EXPECT_EQ(samples(), 1500);
+  age(8 * kDay);
+  record(500);
+  pass();
+  EXPECT_EQ(gaps(), Rows{"0|1499|retention"});
+}
+
 TEST_F(RetentionTest, WithoutAPolicyEverythingStays) {
   keep(0);
   record(1000);
-  clock_.step_utc(10'000 * kDay);
+  age(10'000 * kDay);
   pass();
   EXPECT_EQ(samples(), 1000);
 }
@@ -77,7 +76,7 @@ TEST_F(RetentionTest, WithoutAPolicyEverythingStays) {
 TEST_F(RetentionTest, WorksByItself) {
   keep(7);
   record(1000);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   record(500);
   clock_.run_for(40s);
   EXPECT_EQ(samples(), 500);
@@ -90,7 +89,7 @@ TEST_F(RetentionTest, ARunHoldsItsSamplesUntilItIsDiscarded) {
   record(300);
   ASSERT_TRUE(wait(runs_->end(run, "good")));
   record(450);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   record(500);
   const auto before = runs();
   ASSERT_EQ(before.at(run).size(), 301U);
@@ -106,7 +105,7 @@ TEST_F(RetentionTest, ARunHoldsItsSamplesUntilItIsDiscarded) {
 TEST_F(RetentionTest, ASegmentThatARunHoldsInPartStaysWhole) {
   keep(7);
   record(1000);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   record(500);
   execute(
       "INSERT INTO run (robot_id, name, fluid, pump_profile, tube, operator_name, notes, verdict, firmware_version,"
@@ -123,7 +122,7 @@ TEST_F(RetentionTest, AnOpenRunHoldsEverythingFromItsFirstSampleOn) {
   record(300);
   ASSERT_TRUE(wait(runs_->create(robot_.id, named("open"))));
   record(700);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   record(500);
   pass();
   EXPECT_EQ(gaps(), Rows{"0|299|retention"});
@@ -133,7 +132,7 @@ TEST_F(RetentionTest, NothingGoesThatIsNotDurableWithAllBeforeIt) {
   keep(7);
   record(1000);
   set_durable(robot_.boot_id, 450);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   pass();
   EXPECT_EQ(gaps(), Rows{"0|399|retention"});
 }
@@ -143,38 +142,17 @@ TEST_F(RetentionTest, GapsOfOtherCausesKeepTheirRows) {
   record(200);
   robot_.next_seq = robot_.oldest_seq = 250;  // its ring lost 50
   record(300);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   record(500);
   pass();
   EXPECT_EQ(gaps(), (Rows{"0|199|retention", "200|249|ring_overrun", "250|549|retention"}));
-}
-
-TEST_F(RetentionTest, StepsOfAnySizeRemoveTheSame) {
-  keep(7);
-  record(1000);
-  ASSERT_TRUE(wait(runs_->create(robot_.id, named("open"))));
-  SQLite::Database database = open_for_reading(path_);
-  const auto seqs = [&](std::size_t limit) {
-    std::vector<std::uint64_t> firsts;
-    PurgePosition position;
-    for (bool finished = false; !finished;) {
-      RetentionPlan plan{database};
-      for (const StoredSegment& segment : plan.next(position, clock_.utc_us() + 1, limit)) {
-        firsts.push_back(segment.samples.first);
-      }
-      finished = plan.finished();
-    }
-    return firsts;
-  };
-  EXPECT_EQ(seqs(1000).size(), 9U) << "the newest of a boot that goes on stays";
-  for (const std::size_t limit : {1U, 2U, 3U, 9U}) EXPECT_EQ(seqs(limit), seqs(1000)) << limit;
 }
 
 // A gap row stands for what was removed, so the boot reads the same to the robot.
 TEST_F(RetentionTest, ARobotThatComesBackAfterARestartIsToldWhatItWasToldBefore) {
   keep(7);
   record(1000);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   record(500);
   pass();
   ASSERT_EQ(durable_next_seq_, 1500U);
@@ -198,7 +176,7 @@ TEST_F(RetentionTest, ABootThatHasEndedGoesToItsLastSample) {
   robot_.next_seq = 0;
   connect(robot_);
   record(100);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   pass();
   EXPECT_EQ(gaps().front(), "0|999|retention");
   EXPECT_EQ(number("SELECT count(*) FROM segment"), 1) << "the newest one of the boot that goes on";
@@ -209,7 +187,7 @@ TEST_F(RetentionTest, ALatchIsKnownAfterTheRestartAlsoWhenAllIsOld) {
   keep(7);
   robot_.context.emergency_id = 4711;
   record(1000);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   pass();
   ASSERT_EQ(samples(), 100);
   stop();
@@ -222,7 +200,7 @@ TEST_F(RetentionTest, ATooLargeDatabaseLosesItsOldestAndShrinks) {
   keep(0, 2);
   for (int hour = 0; hour < 10; ++hour) {
     record(10'000);
-    clock_.step_utc(1h);
+    clock_.skip(1h);
   }
   ASSERT_GT(number("PRAGMA page_count") * 4096, 2'500'000);
   pass();
@@ -242,7 +220,7 @@ TEST_F(RetentionTest, TheOlderSamplesGoWhoseverTheyAre) {
   connect(other);
   make(other, 22'000, 25);
   flush();
-  clock_.step_utc(5h);
+  clock_.skip(5h);
   record(22'000);
   pass();
   EXPECT_EQ(rows("SELECT robot_id, first_seq, cause FROM robot_gap"), Rows{"dory|0|retention"});
@@ -257,29 +235,10 @@ TEST_F(RetentionTest, WhatRunsHoldStaysAlsoWhenItIsTooMuch) {
   EXPECT_TRUE(counters().all_held);
 }
 
-TEST_F(RetentionTest, CommitsGoInBetween) {
-  keep(7);
-  record(200'000);
-  clock_.step_utc(8 * kDay);
-  tasks_->spawn("pass", recording_->retention.pass());
-  int commits = 0;
-  for (; counters().samples_purged < 199'000; ++commits) {
-    record(100);
-    ASSERT_EQ(durable_next_seq_, 200'000U + static_cast<std::uint64_t>(commits + 1) * 100);
-    clock_.run_for(5ms);
-    ASSERT_LT(commits, 100);
-  }
-  EXPECT_GT(commits, 3);
-  clock_.run_for(1s);
-  SQLite::Database database = open_for_reading(path_);
-  EXPECT_THAT(coverage_faults(database), IsEmpty());
-  EXPECT_EQ(gaps(), Rows{"0|199999|retention"});
-}
-
 TEST_F(RetentionTest, WhileTheDiskFailsNothingIsRemoved) {
   keep(7);
   record(1000);
-  clock_.step_utc(8 * kDay);
+  age(8 * kDay);
   record(500);
   SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE};
   foreign.exec("BEGIN IMMEDIATE");
@@ -288,18 +247,6 @@ TEST_F(RetentionTest, WhileTheDiskFailsNothingIsRemoved) {
   foreign.exec("ROLLBACK");
   pass();
   EXPECT_EQ(samples(), 500);
-}
-
-TEST(StepSize, IsHalvedWhenAStepTookLongAndDoubledWhenItWasShort) {
-  StepSize size{50, 120};
-  size.note(26'000);
-  EXPECT_EQ(size.value(), 25U);
-  size.note(20'000);
-  EXPECT_EQ(size.value(), 25U);
-  for (int i = 0; i < 5; ++i) size.note(1000);
-  EXPECT_EQ(size.value(), 120U);
-  for (int i = 0; i < 20; ++i) size.note(1'000'000);
-  EXPECT_EQ(size.value(), 1U);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <random>
 
 #include "server/recording/run_spans.hpp"
+#include "server/recording/run_store.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
@@ -114,6 +115,47 @@ TEST_F(RunAfterwardsTest, MayBeginAndEndInAGap) {
   EXPECT_EQ(run->spans.at(0).first_seq, 120u);
   EXPECT_EQ(run->samples_stored, 20u);
   EXPECT_EQ(run->samples_lost, 30u);
+}
+
+// A robot that reboots often: no question is longer for it, and the disk thread has nothing to look for.
+TEST_F(RunAfterwardsTest, ManyBootsAreSearchedAFewAtATime) {
+  connect(robot_);
+  for (int boot = 0; boot < 40; ++boot) {
+    make(robot_, 10);
+    reboot();
+  }
+  flush();
+  SQLite::Database database = open_for_reading(path_);
+  RangeSearch search{robot_.id, TimeSpan{0, clock_.utc_us()}};
+  EXPECT_TRUE(search.advance(database));
+  EXPECT_FALSE(search.advance(database));
+  EXPECT_EQ(search.take()->boots.size(), 40u);
+  const Result<Run> run = made(TimeSpan{0, clock_.utc_us()});
+  ASSERT_TRUE(run.has_value()) << run.error().detail;
+  EXPECT_EQ(run->spans.size(), 40u);
+  EXPECT_EQ(run->samples_stored, 400u);
+}
+
+TEST_F(RunAfterwardsTest, ABootThatIsPurgedBeforeTheRunHoldsItIsNotOfTheRun) {
+  connect(robot_);
+  make(robot_, 100);
+  const std::int64_t from_us = utc_of(0);
+  reboot();
+  make(robot_, 50);
+  flush();
+  SQLite::Database database = open_for_reading(path_);
+  RangeSearch search{robot_.id, TimeSpan{from_us, clock_.utc_us()}};
+  ASSERT_FALSE(search.advance(database));
+  const RecordedSamples found = search.take().value();
+  ASSERT_EQ(found.boots.size(), 2u);
+  Run run;
+  run.robot_id = robot_.id;
+  const auto store = [run, found](Database& disk) { return RunStore{disk, {}}.add_afterwards(run, found); };
+  const auto purge = [](Database& disk) { return disk.handle().exec("DELETE FROM segment WHERE boot_key = 1"); };
+  wait(recorder_->on_disk(purge));
+  EXPECT_EQ(wait(recorder_->on_disk(store)), std::nullopt);
+  EXPECT_EQ(number("SELECT count(*) FROM run"), 0);
+  EXPECT_EQ(made(TimeSpan{from_us, clock_.utc_us()})->spans.size(), 1u);
 }
 
 TEST_F(RunAfterwardsTest, RefusesWhatWasNotRecorded) {

@@ -1,0 +1,160 @@
+// What may go goes in short steps, with commits in between; what has come to be held meanwhile stays.
+#include "server/recording/purge.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include "tests/server/recording/retention_fixture.hpp"
+
+namespace server {
+namespace {
+
+using ::testing::IsEmpty;
+
+class PurgeTest : public RetentionTest {};
+
+TEST_F(PurgeTest, SlicesOfAnySizeRemoveTheSame) {
+  keep(0);
+  record(1000);
+  ASSERT_TRUE(wait(runs_->create(robot_.id, named("open"))));
+  SQLite::Database database = open_for_reading(path_);
+  const auto seqs = [&](std::size_t limit) {
+    std::vector<std::uint64_t> firsts;
+    RetentionPlan plan = planned();
+    RetentionPlan::Step step{plan, database};
+    while (!plan.empty()) {
+      for (const StoredSegment& segment : step.next(limit)) firsts.push_back(segment.samples.first);
+    }
+    return firsts;
+  };
+  EXPECT_EQ(seqs(1000).size(), 9U) << "the newest of a boot that goes on stays";
+  for (const std::size_t limit : {1U, 2U, 3U, 9U}) EXPECT_EQ(seqs(limit), seqs(1000)) << limit;
+}
+
+// Each look at it takes a while.
+class TickingClock final : public Clock {
+ public:
+  explicit TickingClock(microseconds tick) : tick_us_{tick.count()} {}
+  std::int64_t steady_us() const override { return steady_us_ += tick_us_; }
+  std::int64_t utc_us() const override { return 0; }
+  boost::asio::awaitable<void> sleep_until(std::int64_t) override { co_return; }
+
+ private:
+  std::int64_t tick_us_;
+  mutable std::int64_t steady_us_ = 0;
+};
+
+// However slow the disk has become: it is seen after 400 samples.
+TEST_F(PurgeTest, AStepEndsByTheClock) {
+  keep(0);
+  record(20'000);
+  for (const auto& [tick, removed] : std::vector<std::pair<microseconds, std::uint64_t>>{
+           {1ms, 10 * 400}, {4ms, 3 * 400}, {10ms, 400}, {100ms, 400}}) {
+    RetentionPlan plan = planned();
+    auto step = [&](Database& database) { return purge_step(database.handle(), plan, TickingClock{tick}, 0); };
+    EXPECT_EQ(wait(recorder_->on_disk(step)), removed) << tick.count();
+  }
+  RetentionPlan plan = planned();
+  auto step = [&](Database& database) { return purge_step(database.handle(), plan, clock_, 0); };
+  EXPECT_LE(wait(recorder_->on_disk(step)), 10'000U) << "and no transaction is large on a fast one";
+  EXPECT_THAT(gaps(), ::testing::SizeIs(1));
+}
+
+TEST_F(PurgeTest, ARunMadeWhileAPurgeIsUnderWayHoldsItsSamples) {
+  keep(0);
+  record(2000);
+  RetentionPlan plan = planned();
+  const Result<Run> made =
+      wait(runs_->make_afterwards(robot_.id, named("in time"), SeqSpan{robot_.boot_id, 650, 849}, ""));
+  ASSERT_TRUE(made.has_value());
+  const auto before = runs();
+  carry_out(plan);
+  EXPECT_EQ(runs(), before);
+  EXPECT_EQ(gaps(), (Rows{"0|599|retention", "900|1899|retention"}));
+}
+
+TEST_F(PurgeTest, ARunThatComesToABootWhileAPurgeIsUnderWayHoldsIt) {
+  keep(0);
+  record(1000);
+  const RunId run = wait(runs_->create(robot_.id, named("open")))->id;
+  RetentionPlan plan = planned();
+  execute(fmt::format("UPDATE run_span SET first_seq = 300 WHERE run_id = {}", run));
+  carry_out(plan);
+  EXPECT_THAT(gaps(), IsEmpty());
+  pass();
+}
+
+// SAFETY: its newest segment tells whether the robot is latched.
+TEST_F(PurgeTest, ABootThatComesBackWhileAPurgeIsUnderWayKeepsItsNewestSegment) {
+  keep(0);
+  record(1000);
+  const TestRobot first = robot_;
+  disconnect(robot_);
+  robot_.boot_id += 1;
+  robot_.next_seq = 0;
+  connect(robot_);
+  record(100);
+  clock_.run_for(3s);  // until the recorder has forgotten the first one
+  RetentionPlan plan = planned();
+  connect(first);
+  wait(recorder_->flush_boots());
+  carry_out(plan);
+  EXPECT_EQ(number("SELECT max(last_seq) FROM segment WHERE boot_key = 1"), 999);
+}
+
+TEST_F(PurgeTest, AllBootsAreLookedAtAFewAtATime) {
+  keep(7);
+  for (int boot = 0; boot < 210; ++boot) {
+    make(robot_, 10);
+    disconnect(robot_);
+    robot_.boot_id += 1;
+    robot_.next_seq = 0;
+    connect(robot_);
+  }
+  flush();
+  SQLite::Database database = open_for_reading(path_);
+  RetentionPlan plan{std::nullopt};
+  EXPECT_TRUE(plan.look(database));
+  EXPECT_FALSE(plan.look(database));
+  age(8 * kDay);
+  pass();
+  EXPECT_EQ(samples(), 0);
+  EXPECT_THAT(gaps(), ::testing::SizeIs(210));
+}
+
+TEST_F(PurgeTest, CommitsGoInBetween) {
+  keep(7);
+  record(200'000);
+  age(8 * kDay);
+  tasks_->spawn("pass", recording_->retention.pass());
+  int commits = 0;
+  for (; counters().samples_purged < 199'000; ++commits) {
+    record(100);
+    ASSERT_EQ(durable_next_seq_, 200'000U + static_cast<std::uint64_t>(commits + 1) * 100);
+    clock_.run_for(5ms);
+    ASSERT_LT(commits, 100);
+  }
+  EXPECT_GT(commits, 3);
+  clock_.run_for(1s);
+  SQLite::Database database = open_for_reading(path_);
+  EXPECT_THAT(coverage_faults(database), IsEmpty());
+  EXPECT_EQ(gaps(), Rows{"0|199999|retention"});
+}
+
+TEST(SampleAges, KeepANoteForEachHundredthOfTheAge) {
+  boost::asio::io_context loop;
+  VirtualClock clock{loop};
+  SampleAges ages{clock, microseconds{100h}.count()};
+  EXPECT_FALSE(ages.limit().covers(1, 0)) << "nothing is known yet";
+  ages.begin(1000);
+  EXPECT_FALSE(ages.limit().covers(1000, 0));
+  EXPECT_TRUE(ages.limit().covers(999, 0));
+  for (int hour = 1; hour <= 300; ++hour) {
+    clock.skip(1h);
+    ages.note(1000 + hour);
+    EXPECT_EQ(ages.limit().row, hour < 100 ? 0 : 900 + hour) << hour;
+  }
+}
+
+}  // namespace
+}  // namespace server
