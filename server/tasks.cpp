@@ -16,12 +16,13 @@ namespace asio = boost::asio;
 
 namespace {
 
-// `co_await (a || b)` throws both failures in one when it is cancelled; the first of them tells what happened.
+// `co_await (a || b)` throws both failures in one when it is cancelled; the first of them tells what happened. Each may
+// be such a pair itself.
 std::exception_ptr first_of(std::exception_ptr failure) {
   try {
     std::rethrow_exception(failure);
   } catch (const asio::multiple_exceptions& both) {
-    return both.first_exception();
+    return first_of(both.first_exception());
   } catch (...) {
     return failure;
   }
