@@ -18,6 +18,7 @@
 
 #include "server/recording/database_reader.hpp"
 #include "server/recording/overview.hpp"
+#include "server/recording/recorder.hpp"
 #include "server/recording/runs.hpp"
 #include "server/recording/span_finder.hpp"
 #include "server/recording/span_reader.hpp"
@@ -59,8 +60,11 @@ class History {
   boost::asio::awaitable<Result<Absences>> gaps(Excerpt excerpt);
   boost::asio::awaitable<Result<Overview>> overview(Excerpt excerpt, OverviewQuery query);
 
-  // The spans of the excerpt, with what waits of them; from this index on.
-  boost::asio::awaitable<Result<std::vector<RecordedSpan>>> spans(Excerpt excerpt, std::uint32_t first_span = 0);
+  // The spans of the excerpt from the cursor's on, with what waits of them. Of the samples that wait only those after
+  // the cursor, and of those at least the first `limit`, but all for a window, whose ends they may hold.
+  boost::asio::awaitable<Result<std::vector<RecordedSpan>>> spans(Excerpt excerpt,
+                                                                  std::optional<SampleCursor> after = {},
+                                                                  std::size_t limit = Recorder::kAll);
 
   // Newest first, at most `limit` (1 to 1000).
   boost::asio::awaitable<std::vector<RobotEvent>> events(RobotId robot_id, std::size_t limit);
@@ -74,7 +78,7 @@ class History {
   DatabaseReader& reader() { return reader_; }
 
  private:
-  void add_waiting(RecordedSpan& span) const;
+  boost::asio::awaitable<void> add_waiting(RecordedSpan& span, Interval samples, std::size_t& limit) const;
 
   Recorder& recorder_;
   DatabaseReader reader_;
