@@ -104,24 +104,44 @@ asio::awaitable<Result<SamplePage>> History::samples(RunId run, std::optional<Sa
   co_return co_await reader_.run(std::move(job));
 }
 
-asio::awaitable<Result<Absences>> History::gaps(Excerpt excerpt) {
-  auto found = co_await spans(std::move(excerpt));
+asio::awaitable<Result<AbsencePage>> History::gaps(Excerpt excerpt, std::optional<SampleCursor> after,
+                                                   std::size_t limit) {
+  if (limit < 1 || limit > kMaxPageGaps) {
+    co_return fail(ErrorCode::invalid, fmt::format("limit is {}, allowed are 1 to {}", limit, kMaxPageGaps));
+  }
+  auto found = co_await spans(std::move(excerpt), after);
   if (!found) co_return std::unexpected{found.error()};
   const auto& spans = *found;
-  Absences absences;
-  auto query = [&spans](SQLite::Database& database) { return read_gaps(database, spans); };
-  absences.gaps = co_await reader_.ask(std::move(query));
+  auto query = [&spans, after, limit](SQLite::Database& database) { return read_gaps(database, spans, after, limit); };
+  GapPage gaps = co_await reader_.ask(std::move(query));
+  AbsencePage page{std::move(gaps.gaps), {}, gaps.next};
   for (const RecordedSpan& span : spans) {
-    std::uint64_t first_seq = std::max(span.samples.first, span.settled_next);
-    while (first_seq < span.made().next) {
-      auto slice = [&span, &first_seq](SQLite::Database& database) {
-        return read_missing(database, span, first_seq, kSliceSegments);
-      };
-      const auto missing = co_await reader_.ask(std::move(slice));
-      absences.missing.insert(absences.missing.end(), missing.begin(), missing.end());
-    }
+    if (page.next && span.span > page.next->span) break;
+    co_await add_missing(span, after, limit, page);
   }
-  co_return absences;
+  co_return page;
+}
+
+// What is missing of the span on this page. Where that is more than a page holds, the page ends there.
+asio::awaitable<void> History::add_missing(const RecordedSpan& span, const std::optional<SampleCursor>& after,
+                                           std::size_t limit, AbsencePage& page) {
+  Interval left{std::max(span.samples.first, span.settled_next), span.made().next};
+  if (after && after->span == span.span) left.first = std::max(left.first, after->seq + 1);
+  if (page.next && page.next->span == span.span) left.next = std::min(left.next, page.next->seq + 1);
+  while (left.first < left.next) {
+    auto slice = [&span, &left](SQLite::Database& database) {
+      return read_missing(database, span, left, kSliceSegments);
+    };
+    const auto missing = co_await reader_.ask(std::move(slice));
+    page.missing.insert(page.missing.end(), missing.begin(), missing.end());
+    if (page.missing.size() <= limit) continue;
+    page.missing.resize(limit);
+    page.next = SampleCursor{page.missing.back().span, page.missing.back().last_seq};
+    std::erase_if(page.gaps, [&next = *page.next](const Gap& gap) {
+      return gap.span > next.span || (gap.span == next.span && gap.first_seq > next.seq);
+    });
+    co_return;
+  }
 }
 
 asio::awaitable<Result<Overview>> History::overview(Excerpt excerpt, OverviewQuery query) {
@@ -129,7 +149,7 @@ asio::awaitable<Result<Overview>> History::overview(Excerpt excerpt, OverviewQue
   if (!found) co_return std::unexpected{found.error()};
   const auto& spans = *found;
   Overview overview;
-  auto gaps = [&spans](SQLite::Database& database) { return read_gaps(database, spans); };
+  auto gaps = [&spans](SQLite::Database& database) { return read_gaps(database, spans, {}, kMaxPageGaps); };
   overview.gaps = co_await reader_.ask(std::move(gaps));
   OverviewScan scan{spans, query};
   bool more = true;

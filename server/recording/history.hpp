@@ -36,17 +36,19 @@ struct Excerpt {
 inline Excerpt excerpt_of(RunId run) { return {.run = run, .robot_id = {}, .window = {}}; }
 
 // What is not there, in order of span and seq.
-struct Absences {
+struct AbsencePage {
   std::vector<Gap> gaps;
   std::vector<MissingRange> missing;
+  std::optional<SampleCursor> next;  // the last sample that the page tells of; empty: the end
 };
 
 struct Overview {
   OverviewColumns columns;
-  std::vector<Gap> gaps;
+  GapPage gaps;  // the first
 };
 
 inline constexpr std::size_t kMaxPageSamples = 10'000;
+inline constexpr std::size_t kMaxPageGaps = 10'000;
 
 class History {
  public:
@@ -57,7 +59,9 @@ class History {
   boost::asio::awaitable<Result<SegmentPage>> segments(Excerpt excerpt, std::optional<SampleCursor> after,
                                                        std::size_t limit, Channels channels = all_channels());
   boost::asio::awaitable<Result<SamplePage>> samples(RunId run, std::optional<SampleCursor> after, std::size_t limit);
-  boost::asio::awaitable<Result<Absences>> gaps(Excerpt excerpt);
+  // At most `limit` of each (1 to 10000), after the cursor.
+  boost::asio::awaitable<Result<AbsencePage>> gaps(Excerpt excerpt, std::optional<SampleCursor> after = {},
+                                                   std::size_t limit = kMaxPageGaps);
   boost::asio::awaitable<Result<Overview>> overview(Excerpt excerpt, OverviewQuery query);
 
   // The spans of the excerpt from the cursor's on, with what waits of them. Of the samples that wait only those after
@@ -79,6 +83,8 @@ class History {
 
  private:
   boost::asio::awaitable<void> add_waiting(RecordedSpan& span, Interval samples, std::size_t& limit) const;
+  boost::asio::awaitable<void> add_missing(const RecordedSpan& span, const std::optional<SampleCursor>& after,
+                                           std::size_t limit, AbsencePage& page);
 
   Recorder& recorder_;
   DatabaseReader reader_;
