@@ -71,14 +71,28 @@ void append_column(std::string& out, const char* name, const std::vector<Number>
   out += ']';
 }
 
+std::string next_text(const std::optional<SampleCursor>& next) {
+  return next ? '"' + cursor_text(*next) + '"' : "null";
+}
+
+// "gaps":[...]
+void append_gaps(std::string& out, const std::vector<Gap>& gaps) {
+  out += R"("gaps":[)";
+  for (const Gap& gap : gaps) {
+    if (out.back() != '[') out += ',';
+    out +=
+        fmt::format(R"({{"robot_id":{},"boot_id":"{}","first_seq":{},"last_seq":{},"cause":{},"noticed_at_us":{}}})",
+                    dump(gap.robot_id), gap.boot_id, gap.first_seq, gap.last_seq, dump(gap.cause), gap.noticed_at_us);
+  }
+  out += ']';
+}
+
 }  // namespace
 
 std::string page_text(const SegmentPage& page) {
   std::string out = R"({"samples":[)";
   for (const SpanSegment& part : page.segments) append_segment(out, part);
-  out += R"(],"next":)";
-  out += page.next ? '"' + cursor_text(*page.next) + '"' : "null";
-  out += '}';
+  out += R"(],"next":)" + next_text(page.next) + '}';
   return out;
 }
 
@@ -98,18 +112,23 @@ std::string overview_text(const Overview& overview, Channels channels) {
     append_column(out, "max", columns.max[channel]);
     out += '}';
   }
-  out += ",\"gaps\":" + dump(list_json("gaps", overview.gaps)["gaps"]) + '}';
+  out += ',';
+  append_gaps(out, overview.gaps.gaps);
+  out += R"(,"gaps_next":)" + next_text(overview.gaps.next) + '}';
   return out;
 }
 
-std::string absences_text(const Absences& absences) {
-  nlohmann::json body = list_json("gaps", absences.gaps);
-  body["missing"] = nlohmann::json::array();
-  for (const MissingRange& range : absences.missing) {
-    body["missing"].push_back(
-        {{"boot_id", std::to_string(range.boot_id)}, {"first_seq", range.first_seq}, {"last_seq", range.last_seq}});
+std::string absences_text(const AbsencePage& page) {
+  std::string out = "{";
+  append_gaps(out, page.gaps);
+  out += R"(,"missing":[)";
+  for (const MissingRange& range : page.missing) {
+    if (out.back() != '[') out += ',';
+    out += fmt::format(R"({{"boot_id":"{}","first_seq":{},"last_seq":{}}})", range.boot_id, range.first_seq,
+                       range.last_seq);
   }
-  return dump(body);
+  out += R"(],"next":)" + next_text(page.next) + '}';
+  return out;
 }
 
 }  // namespace server

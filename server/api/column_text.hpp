@@ -11,6 +11,6 @@ namespace server {
 
 std::string page_text(const SegmentPage& page);                          // SamplePage
 std::string overview_text(const Overview& overview, Channels channels);  // Overview
-std::string absences_text(const Absences& absences);                     // GapList
+std::string absences_text(const AbsencePage& page);                      // GapList
 
 }  // namespace server

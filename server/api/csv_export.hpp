@@ -11,6 +11,7 @@
 #include "server/api/http.hpp"
 #include "server/recording/csv_writer.hpp"
 #include "server/recording/history.hpp"
+#include "server/tasks.hpp"
 
 namespace server {
 
@@ -25,6 +26,22 @@ class CsvStream final : public BodyStream {
  private:
   History& exports_;
   CsvWriter writer_;
+};
+
+// Destroys what holds a file where the file was written: to close or to remove gigabytes takes long.
+class EndOnWorker {
+ public:
+  EndOnWorker(TaskGroup& tasks, DatabaseReader& reader) : tasks_{&tasks}, reader_{&reader} {}
+
+  template <class T>
+  void operator()(T* object) const {
+    auto end = [whole = std::unique_ptr<T>{object}]() mutable { whole.reset(); };
+    tasks_->spawn("end of an export", reader_->run(std::move(end)));
+  }
+
+ private:
+  TaskGroup* tasks_;
+  DatabaseReader* reader_;
 };
 
 // A file that is there for one answer: removed when this is destroyed.
@@ -42,15 +59,17 @@ class ExportFile {
   std::filesystem::path path_;
 };
 
+using ExportFilePtr = std::unique_ptr<ExportFile, EndOnWorker>;
+
 class FileStream final : public BodyStream {
  public:
-  FileStream(History& exports, std::unique_ptr<ExportFile> file) : exports_{exports}, file_{std::move(file)} {}
+  FileStream(History& exports, ExportFilePtr file) : exports_{exports}, file_{std::move(file)} {}
 
   boost::asio::awaitable<Result<std::optional<std::string>>> next() override;
 
  private:
   History& exports_;
-  std::unique_ptr<ExportFile> file_;
+  ExportFilePtr file_;
   std::uint64_t sent_bytes_ = 0;
 };
 

@@ -174,10 +174,4 @@ json to_json(const Run& run) {
   return out;
 }
 
-json to_json(const Gap& gap) {
-  return {{"robot_id", gap.robot_id},   {"boot_id", std::to_string(gap.boot_id)},
-          {"first_seq", gap.first_seq}, {"last_seq", gap.last_seq},
-          {"cause", gap.cause},         {"noticed_at_us", gap.noticed_at_us}};
-}
-
 }  // namespace server

@@ -70,7 +70,6 @@ std::optional<std::uint64_t> parse_id(const std::string& text);  // decimal, not
 bool is_robot_id(const std::string& text);
 
 nlohmann::json to_json(const Run& run);
-nlohmann::json to_json(const Gap& gap);
 
 // {"<name>": [ … ]}
 template <class Items>

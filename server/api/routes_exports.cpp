@@ -75,8 +75,9 @@ Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folde
   return file;
 }
 
-asio::awaitable<Result<std::unique_ptr<ExportFile>>> begin_file(ApiParts& parts, const ParsedExport& parsed,
-                                                                const char* ending) {
+EndOnWorker end_on_worker(ApiParts& parts) { return {parts.tasks, parts.recording.exports.reader()}; }
+
+asio::awaitable<Result<ExportFilePtr>> begin_file(ApiParts& parts, const ParsedExport& parsed, const char* ending) {
   if (auto may = parts.recording.disk_watch.may_begin("an export to a file"); !may) {
     co_return std::unexpected{may.error()};
   }
@@ -85,7 +86,9 @@ asio::awaitable<Result<std::unique_ptr<ExportFile>>> begin_file(ApiParts& parts,
               grid_us](SQLite::Database& database) {
     return make_file(folder, ending, most_samples(database, spans) * (1 + kUsualPeriodUs / grid_us));
   };
-  co_return co_await parts.recording.exports.reader().ask(std::move(job));
+  auto file = co_await parts.recording.exports.reader().ask(std::move(job));
+  if (!file) co_return std::unexpected{file.error()};
+  co_return ExportFilePtr{file->release(), end_on_worker(parts)};
 }
 
 // To its end, or until there is no room: nobody knows before how long the gaps of a grid are.
@@ -108,8 +111,9 @@ Answer export_mat(ApiParts& parts, Request request) {
   if (!parsed) co_return problem(parsed.error());
   auto file = co_await begin_file(parts, *parsed, ".mat");
   if (!file) co_return problem(file.error());
-  MatWriter writer{(*file)->path(), std::move(parsed->spans), parsed->query};
-  const Result<void> written = co_await write_in_slices(parts, writer);
+  const std::unique_ptr<MatWriter, EndOnWorker> writer{
+      new MatWriter{(*file)->path(), std::move(parsed->spans), parsed->query}, end_on_worker(parts)};
+  const Result<void> written = co_await write_in_slices(parts, *writer);
   if (!written) co_return problem(written.error());
   co_return attachment("application/x-matlab-data", parsed->query.run, ".mat",
                        std::make_unique<FileStream>(parts.recording.exports, std::move(*file)));
@@ -121,8 +125,10 @@ Answer export_sqlite(ApiParts& parts, Request request) {
   auto file = co_await begin_file(parts, *parsed, ".sqlite");
   if (!file) co_return problem(file.error());
   co_await parts.recording.exports.settle();  // events and commands that were heard
-  RunFile writer{(*file)->path(), reading_uri(parts.recording.path(), false), std::move(parsed->spans), parsed->query};
-  const Result<void> written = co_await write_in_slices(parts, writer);
+  const std::unique_ptr<RunFile, EndOnWorker> writer{
+      new RunFile{(*file)->path(), reading_uri(parts.recording.path(), false), std::move(parsed->spans), parsed->query},
+      end_on_worker(parts)};
+  const Result<void> written = co_await write_in_slices(parts, *writer);
   if (!written) co_return problem(written.error());
   co_return attachment("application/vnd.sqlite3", parsed->query.run, ".sqlite",
                        std::make_unique<FileStream>(parts.recording.exports, std::move(*file)));

@@ -22,9 +22,13 @@ Answer list_samples(ApiParts& parts, Request request, Excerpt excerpt) {
   co_return json_text_response(200, std::move(text));
 }
 
-Answer list_gaps(ApiParts& parts, Request, Excerpt excerpt) {
+Answer list_gaps(ApiParts& parts, Request request, Excerpt excerpt) {
+  const auto limit = query_number(request, "limit", 1, static_cast<std::int64_t>(kMaxPageGaps), kDefaultPage);
+  if (!limit) co_return problem(limit.error());
+  const auto after = query_cursor(request);
+  if (!after) co_return problem(after.error());
   History& history = parts.recording.history;
-  auto found = co_await history.gaps(std::move(excerpt));
+  auto found = co_await history.gaps(std::move(excerpt), *after, static_cast<std::size_t>(*limit));
   if (!found) co_return problem(found.error());
   auto job = [found = std::move(*found)] { return absences_text(found); };
   std::string text = co_await history.reader().run(std::move(job));
@@ -52,8 +56,8 @@ void add_sample_routes(Router& router, ApiParts& parts) {
   };
   add("/api/v1/runs/{run_id}/samples", {"after", "limit"}, run_excerpt, list_samples);
   add("/api/v1/robots/{robot_id}/samples", {"from_us", "to_us", "after", "limit"}, robot_excerpt, list_samples);
-  add("/api/v1/runs/{run_id}/gaps", {}, run_excerpt, list_gaps);
-  add("/api/v1/robots/{robot_id}/gaps", {"from_us", "to_us"}, robot_excerpt, list_gaps);
+  add("/api/v1/runs/{run_id}/gaps", {"after", "limit"}, run_excerpt, list_gaps);
+  add("/api/v1/robots/{robot_id}/gaps", {"from_us", "to_us", "after", "limit"}, robot_excerpt, list_gaps);
 }
 
 }  // namespace server

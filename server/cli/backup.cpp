@@ -36,17 +36,6 @@ void check(const Backup& wish) {
   if (!fs::is_directory(folder)) throw std::runtime_error{fmt::format("there is no folder '{}'", folder.string())};
 }
 
-// To another disk a file is copied, and becomes visible when it is whole there.
-void move_file(const fs::path& from, const fs::path& to) {
-  std::error_code other_disk;
-  fs::rename(from, to, other_disk);
-  if (!other_disk) return;
-  const Draft draft{fs::path{to}.concat(".part")};
-  fs::copy_file(from, draft.path());
-  finish_file(draft.path(), to);
-  fs::remove(from);
-}
-
 // The record of that name, as the station tells it now.
 nlohmann::json look(const StationClient& station, const std::string& name) {
   const StationAnswer answer = station.ask("GET", "/api/v1/backups");
@@ -90,7 +79,7 @@ int run(const Backup& wish, std::ostream& out) {
   if (const std::optional<FolderLock> lock = FolderLock::try_take(wish.data_dir)) {
     back_up_closed(wish.data_dir / "station.sqlite", wish.to);
   } else {
-    move_file(let_station_copy(StationClient{wish.data_dir}), wish.to);
+    move_finished(let_station_copy(StationClient{wish.data_dir}), wish.to);
   }
   fmt::print(out, "{}: {} bytes, verified\n", wish.to.string(), fs::file_size(wish.to));
   return 0;

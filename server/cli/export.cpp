@@ -1,4 +1,4 @@
-// Writes beside the wanted file, and renames it when it is whole.
+// Writes beside the wanted file, and gives it its name when it is whole and on disk.
 #include "server/cli/export.hpp"
 
 #include <fmt/format.h>
@@ -9,6 +9,7 @@
 
 #include "server/cli/options.hpp"
 #include "server/recording/csv_writer.hpp"
+#include "server/recording/finished_file.hpp"
 #include "server/recording/mat_writer.hpp"
 #include "server/recording/run_file.hpp"
 #include "server/recording/run_reader.hpp"
@@ -31,7 +32,7 @@ class PartFile {
   PartFile& operator=(const PartFile&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  void keep() { std::filesystem::rename(path_, wanted_); }
+  void keep() { finish_file(path_, wanted_); }
 
  private:
   void clear() const {

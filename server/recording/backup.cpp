@@ -35,7 +35,7 @@ bool is_name(const std::string& name) {
          std::ranges::all_of(name, fits);
 }
 
-fs::path part_of(const fs::path& path) { return fs::path{path}.concat(".part"); }
+std::string part_suffix(std::uint64_t store_id) { return fmt::format(".part-{:016x}", store_id); }
 
 struct CopyStep {
   std::string problem;
@@ -65,23 +65,23 @@ CopyStep make_step(std::unique_ptr<BackupCopy>& copy, const Clock& clock) {
   return step;
 }
 
-// Of a station that stopped meanwhile.
-void remove_parts(const fs::path& folder) {
+// What this station left when it stopped meanwhile.
+void remove_parts(const fs::path& folder, std::uint64_t store_id) {
   std::error_code ignored;
   for (const fs::directory_entry& entry : fs::directory_iterator{folder, ignored}) {
-    if (entry.path().filename().string().contains(".sqlite.part")) fs::remove(entry.path(), ignored);
+    if (entry.path().filename().string().contains(kSuffix + part_suffix(store_id))) fs::remove(entry.path(), ignored);
   }
 }
 
 // What can be told before it begins. Makes the folder, and room in it.
-Result<void> check_room(const fs::path& path, const fs::path& database) {
+Result<void> check_room(const fs::path& path, const fs::path& database, std::uint64_t store_id) {
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
   if (error) {
     return fail(ErrorCode::unavailable,
                 fmt::format("the folder '{}' cannot be made: {}", path.parent_path().string(), error.message()));
   }
-  remove_parts(path.parent_path());
+  remove_parts(path.parent_path(), store_id);
   if (fs::exists(path)) return fail(ErrorCode::conflict, fmt::format("'{}' is there already", path.string()));
   const std::uint64_t needed = file_bytes(database);
   const std::uint64_t free = free_bytes_of(path.parent_path());
@@ -125,6 +125,8 @@ Backups::Backups(asio::io_context& loop, Clock& clock, Recorder& recorder, Worke
 
 Backups::~Backups() = default;
 
+fs::path Backups::part_of(const fs::path& path) const { return fs::path{path}.concat(part_suffix(store_id_)); }
+
 asio::awaitable<Result<BackupRecord>> Backups::begin(std::string name) {
   if (!is_name(name)) {
     co_return fail(ErrorCode::invalid,
@@ -139,9 +141,9 @@ asio::awaitable<Result<BackupRecord>> Backups::begin(std::string name) {
   BackupRecord record;
   record.name = name;
   record.path = folder_ / (name + kSuffix);
-  auto check = [path = record.path, database = recorder_.path()]() -> Result<void> {
+  auto check = [path = record.path, database = recorder_.path(), store_id = store_id_]() -> Result<void> {
     try {
-      return check_room(path, database);
+      return check_room(path, database, store_id);
     } catch (const std::exception& error) {
       return fail(ErrorCode::unavailable, fmt::format("the folder of backups cannot be used: {}", error.what()));
     }
@@ -196,7 +198,7 @@ asio::awaitable<std::string> Backups::make(BackupRecord& record) {
     problem = co_await verify(record);
   }
   if (!problem.empty()) {
-    auto remove = [path = record.path] { remove_draft(part_of(path)); };
+    auto remove = [part = part_of(record.path)] { remove_draft(part); };
     co_await checker_.run(std::move(remove));
   }
   co_return problem;
@@ -258,10 +260,11 @@ asio::awaitable<std::string> Backups::verify(const BackupRecord& record) {
   auto checked = co_await (checker_.run(std::move(check)) || interrupt_when_cancelled(*copy));
   problem = std::get<0>(checked);
   if (!problem.empty()) co_return fmt::format("the copy is damaged: {}", problem);
-  auto finish = [&copy, path = record.path]() -> std::string {
+  auto finish = [&copy, path = record.path, part = part_of(record.path)]() -> std::string {
     try {
       copy.reset();
-      finish_file(part_of(path), path);
+      if (fs::exists(path)) return fmt::format("'{}' is there already", path.string());
+      finish_file(part, path);
       return {};
     } catch (const std::exception& error) {
       return error.what();

@@ -1,7 +1,8 @@
 // Backups of the live database: copied between commits, verified, and only then given their name.
 //
-//   begin("monday") → <folder>/monday.sqlite.part → integrity check, sync → <folder>/monday.sqlite
+//   begin("monday") → <folder>/monday.sqlite.part-<store_id> → integrity check, sync → <folder>/monday.sqlite
 //
+// Stations may have one folder in common: what is not whole bears the number of its store, and each removes its own.
 // One at a time. A backup that fails (its disk is full, the copy is damaged) leaves nothing but its record, and does
 // not touch the recording. Loop thread; copied on the disk thread, at most 30 ms between two commits; verified on a
 // thread of its own. Recorder, clock and watch outlive it; it ends before the recorder closes the database: close().
@@ -42,6 +43,9 @@ class Backups {
           const DiskWatch& disk_watch, std::filesystem::path folder);
   ~Backups();
 
+  // Of the recorder's database; before everything else.
+  void set_store_id(std::uint64_t store_id) { store_id_ = store_id; }
+
   // Makes those that were begun, until cancelled.
   boost::asio::awaitable<void> run();
 
@@ -66,6 +70,7 @@ class Backups {
   boost::asio::awaitable<std::string> verify(const BackupRecord& record);
   boost::asio::awaitable<void> interrupt_when_cancelled(SQLite::Database& database);
   BackupRecord* find(const std::string& name);
+  std::filesystem::path part_of(const std::filesystem::path& path) const;
 
   boost::asio::io_context& loop_;
   Clock& clock_;
@@ -73,6 +78,7 @@ class Backups {
   WorkerThread& readers_;
   const DiskWatch& disk_watch_;
   std::filesystem::path folder_;
+  std::uint64_t store_id_ = 0;
   std::unique_ptr<BackupCopy> copy_;   // used by one job at a time; by close() when none can be under way
   std::vector<BackupRecord> records_;  // of this program, the latest last; never more than kMaxRecords
   bool busy_ = false;                  // the latest is being made

@@ -81,21 +81,22 @@ std::string CsvWriter::header() const {
     if (query_.channels[channel]) out += fmt::format(",{}", text(static_cast<Channel>(channel)));
   }
   out += grid_ ? ",setpoint_m,gap\n"
-               : ",mode,sub_state,setpoint_m,disturbance_m,clock_uncertainty_us,received_at_us,position_sd_m,"
-                 "controller_id,emergency_id,flags,gap_before\n";
+               : ",mode,sub_state,setpoint_m,disturbance_m,clock_uncertainty_us,first_received_at_us,received_at_us,"
+                 "position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,gap_after\n";
   return out;
 }
 
-// What follows the channels, but for gap_before.
+// What follows the channels, but for gap_before and gap_after.
 std::string CsvWriter::shared_text(const Segment& segment) const {
   const SampleContext& context = segment.context;
   std::string out = fmt::format(",{},{},", protocol::text(context.mode), protocol::text(context.sub_state));
   append_float(out, context.setpoint_m.value_or(std::numeric_limits<float>::quiet_NaN()), "");
   out += ',';
   append_float(out, context.disturbance_m, "");
-  out += fmt::format(",{},{},", segment.clock_uncertainty_us, segment.received_at_us);
+  out += fmt::format(",{},{},{},", segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us);
   append_float(out, context.position_sd_m, "");
-  out += fmt::format(",{},{},{},", context.controller_id, context.emergency_id, context.flags);
+  out += fmt::format(",{},{},{},{},", context.controller_id, context.emergency_id,
+                     protocol::text(context.emergency_cause), context.flags);
   return out;
 }
 
@@ -118,6 +119,8 @@ void CsvWriter::append(std::string& out, const ExportSegment& exported) {
     }
     out += end;
     append_number(out, index == 0 ? exported.gap_before : 0);
+    out += ',';
+    append_number(out, index + 1 == segment.samples.size() ? exported.gap_after : 0);
     out += '\n';
   }
 }

@@ -1,12 +1,13 @@
 // A run as CSV: a header line with units in the names, then a line per sample, or per step of a uniform grid.
 //
 //   span,boot_id,seq,robot_time_us,utc,<channels>,mode,sub_state,setpoint_m,disturbance_m,clock_uncertainty_us,
-//   received_at_us,position_sd_m,controller_id,emergency_id,flags,gap_before
+//   first_received_at_us,received_at_us,position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,
+//   gap_after
 //   span,t_s,utc,<channels>,setpoint_m,gap                                                                (grid)
 //
 // Numbers are the shortest decimals that give the same binary32 back; what is no finite number is an empty field. utc
-// is RFC 3339. gap_before: samples missing right before this one. gap: 1 where there is no sample; t_s since the span's
-// first sample. On the thread that owns the database handle.
+// is RFC 3339. gap_before: samples missing right before this one; gap_after: after it, to the end of its span. gap: 1
+// where there is no sample; t_s since the span's first sample. On the thread that owns the database handle.
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>

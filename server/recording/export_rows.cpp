@@ -1,10 +1,21 @@
 // Steps through segments, and through the grid over them.
 #include "server/recording/export_rows.hpp"
 
+#include <algorithm>
+
 #include "server/recording/schema.hpp"
 #include "server/recording/statement.hpp"
 
 namespace server {
+namespace {
+
+constexpr std::uint64_t kLongestUs = std::uint64_t{1} << 61;  // whatever number a robot says it has reached
+
+std::uint64_t lasts_us(std::uint64_t samples, std::uint32_t period_us) {
+  return period_us == 0 ? 0 : std::min(samples, kLongestUs / period_us) * period_us;
+}
+
+}  // namespace
 
 std::uint64_t most_samples(SQLite::Database& database, const std::vector<RecordedSpan>& spans) {
   std::int64_t samples = 0;
@@ -19,35 +30,48 @@ std::uint64_t most_samples(SQLite::Database& database, const std::vector<Recorde
   return static_cast<std::uint64_t>(samples);
 }
 
-void SegmentRows::give(SegmentPage page) {
+void PagedSegments::give(SegmentPage page) {
+  if (next_ < page_.segments.size()) {
+    page.segments.insert(page.segments.begin(), std::move(page_.segments.back()));
+  }
   page_ = std::move(page);
   next_ = 0;
+}
+
+const SpanSegment* PagedSegments::first() const {
+  const std::size_t known = page_.next && !page_.segments.empty() ? page_.segments.size() - 1 : page_.segments.size();
+  return next_ < known ? &page_.segments[next_] : nullptr;
+}
+
+std::uint64_t PagedSegments::gap_after() const {
+  const SpanSegment& part = page_.segments[next_];
+  const bool goes_on = next_ + 1 < page_.segments.size() && page_.segments[next_ + 1].span == part.span;
+  return goes_on ? 0 : part.span_next_seq - std::min(part.span_next_seq, part.segment.next_seq());
 }
 
 std::optional<ExportSegment> SegmentRows::next() {
-  if (next_ == page_.segments.size()) return std::nullopt;
-  const SpanSegment& part = page_.segments[next_++];
-  if (span_ != part.span) next_seq_ = part.span_first_seq;
-  span_ = part.span;
-  const ExportSegment found{&part, part.segment.first_seq - next_seq_};
-  next_seq_ = part.segment.next_seq();
+  const SpanSegment* const part = segments_.first();
+  if (part == nullptr) return std::nullopt;
+  if (span_ != part->span) next_seq_ = part->span_first_seq;
+  span_ = part->span;
+  const ExportSegment found{part, part->segment.first_seq - next_seq_, segments_.gap_after()};
+  next_seq_ = part->segment.next_seq();
+  segments_.pass();
   return found;
 }
 
-void GridRows::give(SegmentPage page) {
-  page_ = std::move(page);
-  next_ = 0;
-}
-
 std::optional<GridRow> GridRows::next() {
-  for (; next_ < page_.segments.size(); ++next_) {
-    const SpanSegment& part = page_.segments[next_];
-    if (span_ != part.span) enter(part);
-    const Segment& segment = part.segment;
+  for (; const SpanSegment* const part = segments_.first(); segments_.pass()) {
+    if (span_ != part->span) enter(*part);
+    const Segment& segment = part->segment;
     const std::uint64_t time_us = begin_us_ + row_ * grid_us_;
-    if (time_us <= segment.robot_time_us(segment.samples.size() - 1)) {
-      GridRow row = time_us < segment.first_robot_time_us ? between(segment, time_us) : within(segment, time_us);
-      row.span = part.span;
+    const std::uint64_t last_us = segment.robot_time_us(segment.samples.size() - 1);
+    const std::uint64_t end_us = last_us + lasts_us(segments_.gap_after(), segment.context.period_us);
+    if (time_us <= end_us) {
+      GridRow row = time_us < segment.first_robot_time_us ? between(segment, time_us)
+                    : time_us <= last_us                  ? within(segment, time_us)
+                                                          : after(segment, time_us);
+      row.span = part->span;
       row.since_us = static_cast<std::int64_t>(time_us - begin_us_);
       ++row_;
       return row;
@@ -97,6 +121,17 @@ GridRow GridRows::within(const Segment& segment, std::uint64_t time_us) {
   GridRow row;
   row.utc_us = static_cast<std::int64_t>(time_us) + segment.utc_offset_us;
   row.sample = &segment.samples[index];
+  row.setpoint_m = segment.context.setpoint_m;
+  return row;
+}
+
+// After the last sample of the span.
+GridRow GridRows::after(const Segment& segment, std::uint64_t time_us) {
+  GridRow row;
+  row.utc_us = static_cast<std::int64_t>(time_us) + segment.utc_offset_us;
+  const std::size_t last = segment.samples.size() - 1;
+  if (2 * (time_us - segment.robot_time_us(last)) > segment.context.period_us) return row;
+  row.sample = &segment.samples[last];
   row.setpoint_m = segment.context.setpoint_m;
   return row;
 }

@@ -8,6 +8,14 @@ namespace server {
 // Syncs the file `part`, renames it to `path`, and syncs the folder. Throws std::system_error.
 void finish_file(const std::filesystem::path& part, const std::filesystem::path& path);
 
+// Moves a whole file; both folders are synced. To another disk it is copied, and is there under its name when it has
+// been read back from there. Throws std::system_error, or std::runtime_error when what is read is not what was written.
+void move_finished(const std::filesystem::path& from, const std::filesystem::path& to);
+// The copy of that, by itself.
+void copy_finished(const std::filesystem::path& from, const std::filesystem::path& to);
+// Whether the two files hold the same bytes, the second as the disk has it.
+bool holds_the_same(const std::filesystem::path& file, const std::filesystem::path& copy);
+
 // Removes a database that is not complete, with what SQLite has put beside it.
 void remove_draft(const std::filesystem::path& part);
 

@@ -4,8 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
 
-#include "server/recording/recorder.hpp"
 #include "server/recording/statement.hpp"
 #include "server/recording/stored_rows.hpp"
 
@@ -16,6 +17,7 @@ namespace {
 
 constexpr std::size_t kMaxListed = 1000;
 constexpr std::size_t kSliceSegments = 5'000;
+constexpr std::size_t kWaitingInATurn = 10'000;  // samples, in a turn of the loop
 
 std::int64_t clamped(std::size_t limit) {
   return static_cast<std::int64_t>(std::clamp<std::size_t>(limit, 1, kMaxListed));
@@ -43,14 +45,21 @@ History::History(std::filesystem::path database, Recorder& recorder, WorkerThrea
 
 asio::awaitable<void> History::settle() { co_await recorder_.flush_records(); }
 
-asio::awaitable<Result<std::vector<RecordedSpan>>> History::spans(Excerpt excerpt, std::uint32_t first_span) {
-  auto query = [excerpt, first_span](SQLite::Database& database) {
+asio::awaitable<Result<std::vector<RecordedSpan>>> History::spans(Excerpt excerpt, std::optional<SampleCursor> after,
+                                                                  std::size_t limit) {
+  if (excerpt.window) limit = Recorder::kAll;
+  auto query = [excerpt, first_span = after ? after->span : 0](SQLite::Database& database) {
     return read_excerpt(database, excerpt, first_span);
   };
   co_await recorder_.flush_boots();  // a reboot heard before this moves the open span first
   auto found = co_await reader_.ask(std::move(query));
   if (!found) co_return found;
-  for (RecordedSpan& span : *found) add_waiting(span);
+  for (RecordedSpan& span : *found) {
+    Interval samples = span.samples;
+    const bool resumed = after && after->span == span.span && !excerpt.window;
+    if (resumed) samples.first = std::max(samples.first, after->seq + 1);
+    co_await add_waiting(span, samples, limit);
+  }
   if (!excerpt.window) co_return found;
   auto cut = [spans = std::move(*found), window = *excerpt.window](SQLite::Database& database) mutable {
     return cut_to_window(database, std::move(spans), window);
@@ -58,10 +67,21 @@ asio::awaitable<Result<std::vector<RecordedSpan>>> History::spans(Excerpt excerp
   co_return co_await reader_.ask(std::move(cut));
 }
 
-void History::add_waiting(RecordedSpan& span) const {
+// In turns of the loop, since hours may wait. What is stored between two of them is in the database before it is asked.
+asio::awaitable<void> History::add_waiting(RecordedSpan& span, Interval samples, std::size_t& limit) const {
   span.made_next = std::max(span.made_next, std::min(span.samples.next, recorder_.next_seq(span.boot_id)));
-  span.waiting = recorder_.waiting(span.boot_id, span.samples);
-  span.waiting_gaps = recorder_.waiting_gaps(span.boot_id);
+  while (limit > 0) {
+    std::vector<Segment> some = recorder_.waiting(span.boot_id, samples, std::min(limit, kWaitingInATurn));
+    if (some.empty()) break;
+    samples.first = some.back().next_seq();
+    std::size_t copied = 0;
+    for (const Segment& segment : some) copied += segment.samples.size();
+    std::ranges::move(some, std::back_inserter(span.waiting));
+    limit -= std::min(limit, copied);
+    if (copied < kWaitingInATurn) break;  // that was all, or enough
+    co_await asio::post(recorder_.loop(), asio::use_awaitable);
+  }
+  span.waiting_gaps = recorder_.waiting_gaps(span.boot_id, span.samples);
 }
 
 asio::awaitable<Result<SegmentPage>> History::segments(Excerpt excerpt, std::optional<SampleCursor> after,
@@ -69,7 +89,7 @@ asio::awaitable<Result<SegmentPage>> History::segments(Excerpt excerpt, std::opt
   if (limit < 1 || limit > kMaxPageSamples) {
     co_return fail(ErrorCode::invalid, fmt::format("limit is {}, allowed are 1 to {}", limit, kMaxPageSamples));
   }
-  auto found = co_await spans(excerpt, after ? after->span : 0);
+  auto found = co_await spans(excerpt, after, limit + 1);  // one more tells whether this is the end
   if (!found) co_return std::unexpected{found.error()};
   auto query = [spans = std::move(*found), after, limit, channels](SQLite::Database& database) {
     return read_segments(database, spans, after, limit, channels);
@@ -84,24 +104,44 @@ asio::awaitable<Result<SamplePage>> History::samples(RunId run, std::optional<Sa
   co_return co_await reader_.run(std::move(job));
 }
 
-asio::awaitable<Result<Absences>> History::gaps(Excerpt excerpt) {
-  auto found = co_await spans(std::move(excerpt));
+asio::awaitable<Result<AbsencePage>> History::gaps(Excerpt excerpt, std::optional<SampleCursor> after,
+                                                   std::size_t limit) {
+  if (limit < 1 || limit > kMaxPageGaps) {
+    co_return fail(ErrorCode::invalid, fmt::format("limit is {}, allowed are 1 to {}", limit, kMaxPageGaps));
+  }
+  auto found = co_await spans(std::move(excerpt), after);
   if (!found) co_return std::unexpected{found.error()};
   const auto& spans = *found;
-  Absences absences;
-  auto query = [&spans](SQLite::Database& database) { return read_gaps(database, spans); };
-  absences.gaps = co_await reader_.ask(std::move(query));
+  auto query = [&spans, after, limit](SQLite::Database& database) { return read_gaps(database, spans, after, limit); };
+  GapPage gaps = co_await reader_.ask(std::move(query));
+  AbsencePage page{std::move(gaps.gaps), {}, gaps.next};
   for (const RecordedSpan& span : spans) {
-    std::uint64_t first_seq = std::max(span.samples.first, span.settled_next);
-    while (first_seq < span.made().next) {
-      auto slice = [&span, &first_seq](SQLite::Database& database) {
-        return read_missing(database, span, first_seq, kSliceSegments);
-      };
-      const auto missing = co_await reader_.ask(std::move(slice));
-      absences.missing.insert(absences.missing.end(), missing.begin(), missing.end());
-    }
+    if (page.next && span.span > page.next->span) break;
+    co_await add_missing(span, after, limit, page);
   }
-  co_return absences;
+  co_return page;
+}
+
+// What is missing of the span on this page. Where that is more than a page holds, the page ends there.
+asio::awaitable<void> History::add_missing(const RecordedSpan& span, const std::optional<SampleCursor>& after,
+                                           std::size_t limit, AbsencePage& page) {
+  Interval left{std::max(span.samples.first, span.settled_next), span.made().next};
+  if (after && after->span == span.span) left.first = std::max(left.first, after->seq + 1);
+  if (page.next && page.next->span == span.span) left.next = std::min(left.next, page.next->seq + 1);
+  while (left.first < left.next) {
+    auto slice = [&span, &left](SQLite::Database& database) {
+      return read_missing(database, span, left, kSliceSegments);
+    };
+    const auto missing = co_await reader_.ask(std::move(slice));
+    page.missing.insert(page.missing.end(), missing.begin(), missing.end());
+    if (page.missing.size() <= limit) continue;
+    page.missing.resize(limit);
+    page.next = SampleCursor{page.missing.back().span, page.missing.back().last_seq};
+    std::erase_if(page.gaps, [&next = *page.next](const Gap& gap) {
+      return gap.span > next.span || (gap.span == next.span && gap.first_seq > next.seq);
+    });
+    co_return;
+  }
 }
 
 asio::awaitable<Result<Overview>> History::overview(Excerpt excerpt, OverviewQuery query) {
@@ -109,7 +149,7 @@ asio::awaitable<Result<Overview>> History::overview(Excerpt excerpt, OverviewQue
   if (!found) co_return std::unexpected{found.error()};
   const auto& spans = *found;
   Overview overview;
-  auto gaps = [&spans](SQLite::Database& database) { return read_gaps(database, spans); };
+  auto gaps = [&spans](SQLite::Database& database) { return read_gaps(database, spans, {}, kMaxPageGaps); };
   overview.gaps = co_await reader_.ask(std::move(gaps));
   OverviewScan scan{spans, query};
   bool more = true;

@@ -18,6 +18,7 @@
 
 #include "server/recording/database_reader.hpp"
 #include "server/recording/overview.hpp"
+#include "server/recording/recorder.hpp"
 #include "server/recording/runs.hpp"
 #include "server/recording/span_finder.hpp"
 #include "server/recording/span_reader.hpp"
@@ -35,17 +36,19 @@ struct Excerpt {
 inline Excerpt excerpt_of(RunId run) { return {.run = run, .robot_id = {}, .window = {}}; }
 
 // What is not there, in order of span and seq.
-struct Absences {
+struct AbsencePage {
   std::vector<Gap> gaps;
   std::vector<MissingRange> missing;
+  std::optional<SampleCursor> next;  // the last sample that the page tells of; empty: the end
 };
 
 struct Overview {
   OverviewColumns columns;
-  std::vector<Gap> gaps;
+  GapPage gaps;  // the first
 };
 
 inline constexpr std::size_t kMaxPageSamples = 10'000;
+inline constexpr std::size_t kMaxPageGaps = 10'000;
 
 class History {
  public:
@@ -56,11 +59,16 @@ class History {
   boost::asio::awaitable<Result<SegmentPage>> segments(Excerpt excerpt, std::optional<SampleCursor> after,
                                                        std::size_t limit, Channels channels = all_channels());
   boost::asio::awaitable<Result<SamplePage>> samples(RunId run, std::optional<SampleCursor> after, std::size_t limit);
-  boost::asio::awaitable<Result<Absences>> gaps(Excerpt excerpt);
+  // At most `limit` of each (1 to 10000), after the cursor.
+  boost::asio::awaitable<Result<AbsencePage>> gaps(Excerpt excerpt, std::optional<SampleCursor> after = {},
+                                                   std::size_t limit = kMaxPageGaps);
   boost::asio::awaitable<Result<Overview>> overview(Excerpt excerpt, OverviewQuery query);
 
-  // The spans of the excerpt, with what waits of them; from this index on.
-  boost::asio::awaitable<Result<std::vector<RecordedSpan>>> spans(Excerpt excerpt, std::uint32_t first_span = 0);
+  // The spans of the excerpt from the cursor's on, with what waits of them. Of the samples that wait only those after
+  // the cursor, and of those at least the first `limit`, but all for a window, whose ends they may hold.
+  boost::asio::awaitable<Result<std::vector<RecordedSpan>>> spans(Excerpt excerpt,
+                                                                  std::optional<SampleCursor> after = {},
+                                                                  std::size_t limit = Recorder::kAll);
 
   // Newest first, at most `limit` (1 to 1000).
   boost::asio::awaitable<std::vector<RobotEvent>> events(RobotId robot_id, std::size_t limit);
@@ -74,7 +82,9 @@ class History {
   DatabaseReader& reader() { return reader_; }
 
  private:
-  void add_waiting(RecordedSpan& span) const;
+  boost::asio::awaitable<void> add_waiting(RecordedSpan& span, Interval samples, std::size_t& limit) const;
+  boost::asio::awaitable<void> add_missing(const RecordedSpan& span, const std::optional<SampleCursor>& after,
+                                           std::size_t limit, AbsencePage& page);
 
   Recorder& recorder_;
   DatabaseReader reader_;

@@ -116,6 +116,7 @@ void MatWriter::write_facts(SQLite::Database& database) {
   facts.emplace_back("boot_ids", boot_ids);
   facts.emplace_back("modes", names<protocol::Mode>(_rheonaut_Mode_MAX));
   facts.emplace_back("sub_states", names<protocol::SubState>(_rheonaut_SubState_MAX));
+  facts.emplace_back("emergency_causes", names<protocol::EmergencyCause>(_rheonaut_EmergencyCause_MAX));
   facts.emplace_back("grid_us", query_.grid_us ? std::to_string(*query_.grid_us) : "");
   write_struct(path_, facts);
 }
@@ -146,10 +147,13 @@ void MatWriter::add_columns() {
   add("controller_id", Type::uint32);
   add("emergency_id_high", Type::uint32);
   add("emergency_id_low", Type::uint32);
+  add("emergency_cause", Type::uint32);
   add("flags", Type::uint32);
   add("clock_uncertainty_us", Type::float64);
+  add("first_received_at_us", Type::float64);
   add("received_at_us", Type::float64);
   add("gap_before", Type::float64);
+  add("gap_after", Type::float64);
 }
 
 // Of the page at hand; true when there are more.
@@ -191,10 +195,13 @@ void MatWriter::push(const ExportSegment& exported) {
     put(context.controller_id);
     put(static_cast<std::uint32_t>(context.emergency_id >> 32));
     put(static_cast<std::uint32_t>(context.emergency_id & 0xffffffff));
+    put(static_cast<std::uint32_t>(context.emergency_cause));
     put(context.flags);
     put(static_cast<double>(segment.clock_uncertainty_us));
+    put(static_cast<double>(segment.first_received_at_us));
     put(static_cast<double>(segment.received_at_us));
     put(index == 0 ? static_cast<double>(exported.gap_before) : 0.0);
+    put(index + 1 == segment.samples.size() ? static_cast<double>(exported.gap_after) : 0.0);
   }
 }
 
@@ -211,17 +218,14 @@ void MatWriter::push(const GridRow& row) {
   put(std::uint32_t{row.sample == nullptr});
 }
 
-// A piece of one column; false when all are there, and on disk.
+// A piece of one column; false when all are there.
 bool MatWriter::copy_columns() {
   if (file_ < 0) file_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
   if (file_ < 0) fail_with(path_);
-  if (copied_ < columns_.size()) {
-    const bool more = columns_[copied_].copy_some(file_);
-    if (!more) ++copied_;
-    return true;
-  }
-  if (::fsync(file_) != 0) fail_with(path_);
-  return false;
+  if (copied_ == columns_.size()) return false;
+  const bool more = columns_[copied_].copy_some(file_);
+  if (!more) ++copied_;
+  return true;
 }
 
 }  // namespace server

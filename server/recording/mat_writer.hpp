@@ -1,10 +1,11 @@
 // A run as a MAT file of version 5, for MATLAB and Octave: a struct `info` with what is said of the run, and a column
 // vector for each quantity, named as in the CSV.
 //
-// Channels, setpoint_m, disturbance_m and position_sd_m are single and NaN where there is no number; times, seq and
-// gap_before are double, which holds them exactly; span, mode, sub_state, controller_id and flags are uint32, and
-// emergency_id is two of them (high, low), since no double holds it. mode and sub_state are the numbers of the
-// protocol, spelled out in info.modes and info.sub_states; info.boot_ids has the boots of the spans. On a grid: span,
+// Channels, setpoint_m, disturbance_m and position_sd_m are single and NaN where there is no number; times, seq,
+// gap_before and gap_after are double, which holds them exactly; span, mode, sub_state, controller_id, emergency_cause
+// and flags are uint32, and emergency_id is two of them (high, low), since no double holds it. mode, sub_state and
+// emergency_cause are the numbers of the protocol, spelled out in info.modes, info.sub_states and
+// info.emergency_causes; info.boot_ids has the boots of the spans. On a grid: span,
 // t_s, utc_us, the channels, setpoint_m and gap.
 //
 // On the thread that owns the database handle; no other thread may use matio meanwhile. Errors: invalid when a column
@@ -33,7 +34,7 @@ class MatWriter {
   MatWriter(const MatWriter&) = delete;
   MatWriter& operator=(const MatWriter&) = delete;
 
-  // Works on for at most 20 ms; false when the file is whole.
+  // Works on for at most 20 ms; false when the file is whole. It is not synced.
   Result<bool> advance(SQLite::Database& database);
 
  private:

@@ -24,6 +24,7 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <queue>
@@ -129,10 +130,12 @@ class Recorder final : public StationSink, public RobotArchive {
   std::uint64_t next_seq(BootId boot_id) const;
 
   // What was heard of a boot and is not durable yet, ascending, in the form in which it will be read back: its samples,
-  // cut to the range, and its gaps. A reader takes both before it asks the database; what it then finds in both it
-  // takes from there. Nothing is missing so, since what was durable before is in every later read transaction.
-  std::vector<Segment> waiting(BootId boot_id, Interval samples) const;
-  std::vector<LostRange> waiting_gaps(BootId boot_id) const;
+  // cut to the range, and its gaps in it. Of the samples those of the first segments that have `limit` together, since
+  // hours may wait. A reader takes both before it asks the database; what it then finds in both it takes from there.
+  // Nothing is missing so, since what was durable before is in every later read transaction.
+  static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+  std::vector<Segment> waiting(BootId boot_id, Interval samples, std::size_t limit = kAll) const;
+  std::vector<LostRange> waiting_gaps(BootId boot_id, Interval samples) const;
 
   boost::asio::io_context& loop() { return loop_; }
   const std::filesystem::path& path() const { return options_.path; }
@@ -140,6 +143,7 @@ class Recorder final : public StationSink, public RobotArchive {
   std::size_t queued_samples() const { return queued_samples_; }
   // The last commit failed: nothing becomes durable now.
   bool failing() const { return retry_at_us_ != 0; }
+  std::size_t flushes() const { return flushes_.size(); }  // who waits for a commit
   const WalState& wal() const { return checkpointer_.state(); }
   const std::string& problem() const { return problem_; }  // while it is failing: why, and what to do
 

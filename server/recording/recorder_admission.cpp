@@ -90,6 +90,9 @@ Admission Recorder::take_in(BootEntry& entry, AdmissionOutcome outcome, const Ad
     return refused(rheonaut_REFUSAL_REASON_STATION_BUSY, "another boot of this robot has just connected; try again");
   }
   if (!boot.recording.loaded()) {
+    if (outcome.boot.key == 0 && queue_.new_boots.size() >= options_.max_queued_records) {
+      return refused(rheonaut_REFUSAL_REASON_STATION_BUSY, "too many new boots wait for the disk; try again");
+    }
     add_boot(entry, std::move(outcome.boot), request);
   } else if (boot.recording.robot_id() != request.robot_id) {  // which was admitted meanwhile
     return reused(request, boot.recording.robot_id());

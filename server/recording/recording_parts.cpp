@@ -47,6 +47,7 @@ void RecordingParts::connect(Station& station) {
 
 asio::awaitable<RestoredState> RecordingParts::open() {
   RestoredState restored = co_await recorder.open();
+  backups.set_store_id(restored.store_id);
   std::error_code ignored;
   std::filesystem::remove_all(exports_folder(), ignored);  // what a crash left
   co_await runs.load();

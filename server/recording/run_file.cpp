@@ -1,11 +1,9 @@
 // The run's rows of other tables are copied by SQLite itself; samples come through the scanner.
 #include "server/recording/run_file.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <stdexcept>
+#include <iterator>
 
 #include "server/recording/schema.hpp"
 #include "server/recording/statement.hpp"
@@ -14,6 +12,7 @@ namespace server {
 namespace {
 
 constexpr std::size_t kSliceSamples = 2'500;
+constexpr std::size_t kSliceGaps = 5'000;
 
 constexpr const char* kTables = R"sql(
 CREATE TABLE sample (
@@ -40,7 +39,8 @@ CREATE TABLE sample (
   emergency_id TEXT NOT NULL,
   emergency_cause TEXT NOT NULL,
   flags INTEGER NOT NULL,
-  gap_before INTEGER NOT NULL              -- samples that are missing right before this one
+  gap_before INTEGER NOT NULL,             -- samples that are missing right before this one
+  gap_after INTEGER NOT NULL               -- and after it, to the end of its span
 );
 CREATE TABLE gap (
   boot_id TEXT NOT NULL,
@@ -51,26 +51,40 @@ CREATE TABLE gap (
 );
 )sql";
 
-// {0} is the run. A robot's events are those of its samples, whenever they came; events of the station itself, and
-// commands, are of the time between the run's beginning and its end.
-constexpr const char* kCopies = R"sql(
-CREATE TABLE run AS SELECT * FROM store.run WHERE run_id = {0};
-CREATE TABLE span AS SELECT span, printf('%llu', boot_id) AS boot_id, first_seq, last_seq, firmware_version
-  FROM store.run_span JOIN store.boot USING (boot_key) WHERE run_id = {0} ORDER BY span;
-CREATE TABLE event AS SELECT robot_event.* FROM store.run JOIN store.robot_event USING (robot_id)
-  WHERE run_id = {0} AND (EXISTS (SELECT 1 FROM span WHERE span.boot_id = robot_event.boot_id AND event_seq IS NOT NULL
-      AND sample_seq >= first_seq AND sample_seq <= coalesce(last_seq, 9223372036854775807))
-    OR (event_seq IS NULL AND received_at_us >= started_at_us
-      AND received_at_us <= coalesce(ended_at_us, 9223372036854775807)));
-CREATE TABLE command AS SELECT robot_command.* FROM store.run JOIN store.robot_command USING (robot_id)
-  WHERE run_id = {0} AND submitted_at_us >= started_at_us
-  AND submitted_at_us <= coalesce(run.ended_at_us, 9223372036854775807);
-CREATE TABLE marker AS SELECT * FROM store.run_marker WHERE run_id = {0};
-CREATE TABLE run_certificate AS SELECT * FROM store.run_certificate WHERE run_id = {0};
-CREATE TABLE in_force AS SELECT * FROM store.run_in_force WHERE run_id = {0};
-)sql";
+// Each is a slice, or a series of them: `piece` gives the key of the last row of the piece after {1}, NULL at the end,
+// and the piece is what `sql` copies between {1} and {2}. {0} is the run. A robot's events are those of its samples,
+// whenever they came; events of the station itself, and commands, are of the time between the run's beginning and its
+// end.
+struct Copy {
+  const char* sql;
+  const char* piece = nullptr;
+};
 
-constexpr const char* kInsert = "INSERT INTO sample VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
+constexpr Copy kCopies[] = {
+    {"CREATE TABLE run AS SELECT * FROM store.run WHERE run_id = {0}"},
+    {"CREATE TABLE span AS SELECT span, printf('%llu', boot_id) AS boot_id, first_seq, last_seq, firmware_version"
+     " FROM store.run_span JOIN store.boot USING (boot_key) WHERE run_id = {0} ORDER BY span"},
+    {"CREATE TABLE event AS SELECT * FROM store.robot_event LIMIT 0"},
+    {"INSERT INTO event SELECT robot_event.* FROM run JOIN store.robot_event USING (robot_id)"
+     " WHERE event_row > {1} AND event_row <= {2}"
+     " AND (EXISTS (SELECT 1 FROM span WHERE span.boot_id = robot_event.boot_id AND event_seq IS NOT NULL"
+     " AND sample_seq >= first_seq AND sample_seq <= coalesce(last_seq, 9223372036854775807))"
+     " OR (event_seq IS NULL AND received_at_us >= started_at_us"
+     " AND received_at_us <= coalesce(ended_at_us, 9223372036854775807)))",
+     "SELECT max(event_row) FROM (SELECT event_row FROM store.event WHERE robot_id = (SELECT robot_id FROM run)"
+     " AND event_row > {1} ORDER BY event_row LIMIT 1000)"},
+    {"CREATE TABLE command AS SELECT * FROM store.robot_command LIMIT 0"},
+    {"INSERT INTO command SELECT robot_command.* FROM run JOIN store.robot_command USING (robot_id)"
+     " WHERE submitted_at_us >= started_at_us AND submitted_at_us > {1} AND submitted_at_us <= {2}",
+     "SELECT max(submitted_at_us) FROM (SELECT submitted_at_us FROM run CROSS JOIN store.command AS made"
+     " WHERE made.robot_id = run.robot_id AND submitted_at_us > max({1}, started_at_us - 1)"
+     " AND submitted_at_us <= coalesce(run.ended_at_us, 9223372036854775807) ORDER BY submitted_at_us LIMIT 1000)"},
+    {"CREATE TABLE marker AS SELECT * FROM store.run_marker WHERE run_id = {0}"},
+    {"CREATE TABLE run_certificate AS SELECT * FROM store.run_certificate WHERE run_id = {0}"},
+    {"CREATE TABLE in_force AS SELECT * FROM store.run_in_force WHERE run_id = {0}"},
+};
+
+constexpr const char* kInsert = "INSERT INTO sample VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
 
 std::int64_t signed_seq(std::uint64_t seq) { return static_cast<std::int64_t>(seq); }
 
@@ -81,12 +95,58 @@ RunFile::RunFile(std::filesystem::path path, std::string store, std::vector<Reco
 
 bool RunFile::advance(SQLite::Database& database) {
   if (!file_) {
-    begin(database);
-    return true;
+    begin();
+  } else if (copied_ < std::size(kCopies)) {
+    copy_some();
+  } else if (!insert_) {
+    add_gaps(database);
+  } else {
+    return add_samples(database);
   }
+  return true;
+}
+
+void RunFile::begin() {
+  file_ = std::make_unique<SQLite::Database>(path_.string(),
+                                             SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE | SQLite::OPEN_URI);
+  file_->exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF");
+  file_->exec(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kApplicationId + 1, kRunFileVersion));
+  file_->exec(kTables);
+  SQLite::Statement attach{*file_, "ATTACH ? AS store"};
+  execute(attach, store_);
+}
+
+void RunFile::copy_some() {
+  const Copy& copy = kCopies[copied_];
+  std::int64_t last = 0;
+  if (copy.piece != nullptr) {
+    const SQLite::Column found = file_->execAndGet(fmt::format(fmt::runtime(copy.piece), query_.run, piece_after_));
+    last = found.isNull() ? 0 : found.getInt64();
+  }
+  if (copy.piece == nullptr || last != 0) {
+    file_->exec(fmt::format(fmt::runtime(copy.sql), query_.run, piece_after_, last));
+  }
+  piece_after_ = last;
+  if (last == 0) ++copied_;
+  if (copied_ == std::size(kCopies)) file_->exec("DETACH store; BEGIN");
+}
+
+void RunFile::add_gaps(SQLite::Database& database) {
+  SQLite::Statement insert{*file_, "INSERT INTO gap VALUES (?,?,?,?,?)"};
+  const GapPage page = read_gaps(database, spans_, gaps_after_, kSliceGaps);
+  for (const Gap& gap : page.gaps) {
+    execute(insert, std::to_string(gap.boot_id), gap.first_seq, gap.last_seq, gap.cause, gap.noticed_at_us);
+  }
+  gaps_after_ = page.next;
+  if (!gaps_after_) insert_ = std::make_unique<SQLite::Statement>(*file_, kInsert);
+}
+
+bool RunFile::add_samples(SQLite::Database& database) {
   while (const auto segment = segments_.next()) add(*segment);
   if (at_end_) {
-    finish();
+    insert_.reset();
+    file_->exec("COMMIT");
+    file_.reset();
     return false;
   }
   SegmentPage page = read_segments(database, spans_, after_, kSliceSamples, query_.channels);
@@ -94,30 +154,6 @@ bool RunFile::advance(SQLite::Database& database) {
   at_end_ = !after_;
   segments_.give(std::move(page));
   return true;
-}
-
-void RunFile::begin(SQLite::Database& database) {
-  file_ = std::make_unique<SQLite::Database>(path_.string(),
-                                             SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE | SQLite::OPEN_URI);
-  file_->exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF");
-  file_->exec(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kApplicationId + 1, kRunFileVersion));
-  file_->exec(kTables);
-  copy_tables();
-  file_->exec("BEGIN");
-  SQLite::Statement insert{*file_, "INSERT INTO gap VALUES (?,?,?,?,?)"};
-  for (const Gap& gap : read_gaps(database, spans_)) {
-    execute(insert, std::to_string(gap.boot_id), gap.first_seq, gap.last_seq, gap.cause, gap.noticed_at_us);
-  }
-  insert_ = std::make_unique<SQLite::Statement>(*file_, kInsert);
-}
-
-void RunFile::copy_tables() {
-  {
-    SQLite::Statement attach{*file_, "ATTACH ? AS store"};
-    execute(attach, store_);
-  }
-  file_->exec(fmt::format(kCopies, query_.run));
-  file_->exec("DETACH store");
 }
 
 void RunFile::add(const ExportSegment& exported) {
@@ -134,19 +170,9 @@ void RunFile::add(const ExportSegment& exported) {
             sample.position_m, sample.velocity_m_s, sample.acceleration_m_s2, sample.duty, sample.impedance_mv,
             sample.reference_m, protocol::text(context.mode), protocol::text(context.sub_state), context.setpoint_m,
             context.disturbance_m, context.position_sd_m, context.controller_id, emergency_id,
-            protocol::text(context.emergency_cause), context.flags, signed_seq(index == 0 ? exported.gap_before : 0));
+            protocol::text(context.emergency_cause), context.flags, signed_seq(index == 0 ? exported.gap_before : 0),
+            signed_seq(index + 1 == segment.samples.size() ? exported.gap_after : 0));
   }
-}
-
-void RunFile::finish() {
-  insert_.reset();
-  file_->exec("COMMIT");
-  file_.reset();
-  const int file = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) throw std::runtime_error{"cannot open " + path_.string()};
-  const int synced = ::fsync(file);
-  ::close(file);
-  if (synced != 0) throw std::runtime_error{"cannot sync " + path_.string()};
 }
 
 }  // namespace server

@@ -1,8 +1,8 @@
 // A run as a SQLite file of its own, with plain rows: for programs that read SQL, without segments and keys.
 //
 // Tables: run, span, sample, gap, event, command, marker, run_certificate, in_force; columns as in the station's views
-// (docs/database.md), ids above 2^63 as text. `sample` has a row per sample in order of span and seq, with gap_before.
-// Its application_id is the station's plus 1, so no station takes it for its database.
+// (docs/database.md), ids above 2^63 as text. `sample` has a row per sample in order of span and seq, with gap_before
+// and gap_after. Its application_id is the station's plus 1, so no station takes it for its database.
 //
 // On the thread that owns the database handle. Throws when the disk does not take it; what it wrote is no whole file
 // before advance() has returned false.
@@ -27,14 +27,15 @@ class RunFile {
   // `path` must not exist, or be empty. `store` is the station's database as a URI for ATTACH (run_reader).
   RunFile(std::filesystem::path path, std::string store, std::vector<RecordedSpan> spans, ExportQuery query);
 
-  // Works on for at most 20 ms; false when the file is whole and on disk.
+  // Works on for at most 20 ms; false when the file is whole. It is not synced.
   bool advance(SQLite::Database& database);
 
  private:
-  void begin(SQLite::Database& database);
-  void copy_tables();
+  void begin();
+  void copy_some();
+  void add_gaps(SQLite::Database& database);
+  bool add_samples(SQLite::Database& database);
   void add(const ExportSegment& segment);
-  void finish();
 
   std::filesystem::path path_;
   std::string store_;
@@ -42,6 +43,9 @@ class RunFile {
   ExportQuery query_;
   std::unique_ptr<SQLite::Database> file_;
   std::unique_ptr<SQLite::Statement> insert_;
+  std::size_t copied_ = 0;        // tables
+  std::int64_t piece_after_ = 0;  // of the table that is copied: where the next piece begins
+  std::optional<SampleCursor> gaps_after_;
   std::optional<SampleCursor> after_;
   bool at_end_ = false;
   SegmentRows segments_;

@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 #include <map>
 
 #include "server/recording/statement.hpp"
 
 namespace server {
 namespace {
+
+constexpr std::size_t kAllGaps = std::numeric_limits<std::int32_t>::max();
 
 // The waiting samples from first_seq on that are not among the stored segments.
 void add_waiting(const std::vector<Segment>& waiting, std::uint64_t first_seq, std::vector<Segment>& stored) {
@@ -46,26 +49,34 @@ std::vector<Segment> read_span_segments(SampleScanner& scanner, const RecordedSp
   return segments;
 }
 
-// Cut to the span, ascending. A gap that waited and has been stored since, perhaps with more samples, is taken from the
-// database.
-std::vector<Gap> read_span_gaps(SQLite::Statement& query, const RecordedSpan& span) {
+// From the last gap that begins at ?2 or before: gaps do not overlap.
+constexpr const char* kGaps =
+    "SELECT max(first_seq, ?2), min(last_seq, ?3), cause, noticed_at_us FROM gap WHERE boot_key = ?1"
+    " AND first_seq >= coalesce((SELECT max(first_seq) FROM gap WHERE boot_key = ?1 AND first_seq <= ?2), 0)"
+    " AND first_seq <= ?3 AND last_seq >= ?2 ORDER BY first_seq LIMIT ?4";
+
+// Cut to the range of the span, ascending; at most `limit`. A gap that waited and has been stored since, perhaps with
+// more samples, is taken from the database.
+std::vector<Gap> read_span_gaps(SQLite::Statement& query, const RecordedSpan& span, Interval range, std::size_t limit) {
   std::map<std::uint64_t, Gap> gaps;
-  const std::uint64_t last_seq = span.samples.next - 1;
+  const std::uint64_t last_seq = range.next - 1;
   const auto add = [&](std::uint64_t first, std::uint64_t last, std::string cause, std::int64_t noticed_at_us) {
-    gaps.try_emplace(first, Gap{span.robot_id, span.boot_id, first, last, std::move(cause), noticed_at_us});
+    gaps.try_emplace(first, Gap{span.span, span.robot_id, span.boot_id, first, last, std::move(cause), noticed_at_us});
   };
-  bind_all(query, span.boot_key, span.samples.first, last_seq);
+  bind_all(query, span.boot_key, range.first, last_seq, static_cast<std::int64_t>(limit));
   while (query.executeStep()) {
     add(unsigned_id(query.getColumn(0)), unsigned_id(query.getColumn(1)), query.getColumn(2).getString(),
         query.getColumn(3).getInt64());
   }
   for (const LostRange& gap : span.waiting_gaps) {
-    const std::uint64_t first = std::max(gap.lost.first, span.samples.first);
+    const std::uint64_t first = std::max(gap.lost.first, range.first);
     const std::uint64_t last = std::min(gap.lost.next - 1, last_seq);
     if (first <= last) add(first, last, gap.cause, gap.noticed_at_us);
   }
   std::vector<Gap> ascending;
-  for (auto& [first, gap] : gaps) ascending.push_back(std::move(gap));
+  for (auto gap = gaps.begin(); gap != gaps.end() && ascending.size() < limit; ++gap) {
+    ascending.push_back(std::move(gap->second));
+  }
   return ascending;
 }
 
@@ -151,7 +162,7 @@ SegmentPage read_segments(SQLite::Database& database, const std::vector<Recorded
     const std::uint64_t first_seq = resumed ? std::max(span.samples.first, after->seq + 1) : span.samples.first;
     for (Segment& segment : read_span_segments(scanner, span, first_seq, wanted)) {
       wanted -= segment.samples.size();
-      page.segments.push_back({span.span, span.boot_id, span.samples.first, std::move(segment)});
+      page.segments.push_back({span.span, span.boot_id, span.samples.first, span.made().next, std::move(segment)});
     }
     if (wanted == 0) break;
   }
@@ -174,36 +185,40 @@ SamplePage samples_of(const SegmentPage& page) {
   return samples;
 }
 
-std::vector<Gap> read_gaps(SQLite::Database& database, const std::vector<RecordedSpan>& spans) {
-  std::vector<Gap> gaps;
-  SQLite::Statement query{database,
-                          "SELECT max(first_seq, ?2), min(last_seq, ?3), cause, noticed_at_us FROM gap"
-                          " WHERE boot_key = ?1 AND first_seq <= ?3 AND last_seq >= ?2 ORDER BY first_seq"};
+GapPage read_gaps(SQLite::Database& database, const std::vector<RecordedSpan>& spans,
+                  const std::optional<SampleCursor>& after, std::size_t limit) {
+  GapPage page;
+  SQLite::Statement query{database, kGaps};
   for (const RecordedSpan& span : spans) {
-    if (span.samples.next > span.samples.first)
-      std::ranges::move(read_span_gaps(query, span), std::back_inserter(gaps));
+    if (after && span.span < after->span) continue;
+    Interval range = span.samples;
+    if (after && after->span == span.span) range.first = std::max(range.first, after->seq + 1);
+    if (range.next <= range.first) continue;
+    const std::size_t wanted = limit + 1 - page.gaps.size();  // one more tells whether this is the end
+    std::ranges::move(read_span_gaps(query, span, range, wanted), std::back_inserter(page.gaps));
+    if (page.gaps.size() > limit) break;
   }
-  return gaps;
+  if (page.gaps.size() <= limit) return page;
+  page.gaps.pop_back();
+  page.next = SampleCursor{page.gaps.back().span, page.gaps.back().last_seq};
+  return page;
 }
 
-std::vector<MissingRange> read_missing(SQLite::Database& database, const RecordedSpan& span, std::uint64_t& first_seq,
+std::vector<MissingRange> read_missing(SQLite::Database& database, const RecordedSpan& span, Interval& left,
                                        std::size_t segments) {
-  Interval range{first_seq, span.made().next};
-  if (range.next <= range.first) {
-    first_seq = range.next;
-    return {};
-  }
+  Interval range = left;
   const auto heads = read_heads(database, span.boot_key, range, {}, segments);
   if (heads.size() == segments) range.next = std::min(range.next, heads.back().next_seq);
   IntervalSet known;
   for (const SegmentHead& head : heads) known.insert({head.first_seq, head.next_seq});
   for (const Segment& segment : span.waiting) known.insert(segment.interval());
-  RecordedSpan part = span;
-  part.cut(range);
-  for (const Gap& gap : read_gaps(database, {part})) known.insert({gap.first_seq, gap.last_seq + 1});
-  first_seq = range.next;
+  SQLite::Statement query{database, kGaps};
+  for (const Gap& gap : read_span_gaps(query, span, range, kAllGaps)) known.insert({gap.first_seq, gap.last_seq + 1});
+  left.first = range.next;
   std::vector<MissingRange> missing;
-  for (const Interval& hole : known.missing(range)) missing.push_back({span.boot_id, hole.first, hole.next - 1});
+  for (const Interval& hole : known.missing(range)) {
+    missing.push_back({span.span, span.boot_id, hole.first, hole.next - 1});
+  }
   return missing;
 }
 

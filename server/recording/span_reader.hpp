@@ -33,7 +33,8 @@ struct SpanSegment {
   std::uint32_t span = 0;
   BootId boot_id = 0;
   std::uint64_t span_first_seq = 0;
-  Segment segment;  // cut to the span
+  std::uint64_t span_next_seq = 0;  // the end of what was made of the span
+  Segment segment;                  // cut to the span
 };
 
 struct SegmentPage {
@@ -42,6 +43,7 @@ struct SegmentPage {
 };
 
 struct Gap {
+  std::uint32_t span = 0;
   RobotId robot_id;
   BootId boot_id = 0;
   std::uint64_t first_seq = 0;
@@ -50,8 +52,14 @@ struct Gap {
   std::int64_t noticed_at_us = 0;
 };
 
+struct GapPage {
+  std::vector<Gap> gaps;
+  std::optional<SampleCursor> next;  // the end of the last of them; empty: there are no more
+};
+
 // Samples that are neither stored nor lost: still on their way, if the robot comes back with them.
 struct MissingRange {
+  std::uint32_t span = 0;
   BootId boot_id = 0;
   std::uint64_t first_seq = 0;
   std::uint64_t last_seq = 0;
@@ -90,12 +98,13 @@ SegmentPage read_segments(SQLite::Database& database, const std::vector<Recorded
 // Sample by sample.
 SamplePage samples_of(const SegmentPage& page);
 
-// Cut to the spans, in order of span and seq.
-std::vector<Gap> read_gaps(SQLite::Database& database, const std::vector<RecordedSpan>& spans);
+// Cut to the spans, in order of span and seq; at most `limit`, of the samples after the cursor.
+GapPage read_gaps(SQLite::Database& database, const std::vector<RecordedSpan>& spans,
+                  const std::optional<SampleCursor>& after, std::size_t limit);
 
-// What of the span from first_seq on is neither stored nor lost, as far as `segments` stored segments reach; first_seq
-// becomes where the next call goes on, and the end of what was made when there is no more.
-std::vector<MissingRange> read_missing(SQLite::Database& database, const RecordedSpan& span, std::uint64_t& first_seq,
+// What of these samples of the span, which were made, is neither stored nor lost, as far as `segments` stored segments
+// reach; `left` becomes what the next call goes on with.
+std::vector<MissingRange> read_missing(SQLite::Database& database, const RecordedSpan& span, Interval& left,
                                        std::size_t segments);
 
 }  // namespace server

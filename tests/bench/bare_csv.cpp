@@ -95,16 +95,18 @@ class Printer {
 };
 
 std::int64_t print_run(sqlite3* handle, std::int64_t run) {
-  Query segments{handle,
-                 "SELECT span, printf('%llu', boot_id), max(segment.first_seq, run_span.first_seq),"
-                 " min(segment.last_seq, coalesce(run_span.last_seq, 9223372036854775807)),"
-                 " segment.first_seq, first_row, first_robot_time_us, period_us, utc_offset_us, mode, sub_state,"
-                 " setpoint_m, disturbance_m, clock_uncertainty_us, received_at_us, position_sd_m, controller_id,"
-                 " emergency_id, flags FROM run_span CROSS JOIN boot CROSS JOIN segment WHERE run_id = ?"
-                 " AND boot.boot_key = run_span.boot_key AND segment.boot_key = run_span.boot_key"
-                 " AND segment.first_seq >= run_span.first_seq - 99"
-                 " AND segment.first_seq <= coalesce(run_span.last_seq, 9223372036854775807)"
-                 " ORDER BY span, segment.first_seq"};
+  Query segments{
+      handle,
+      "SELECT span, printf('%llu', boot_id), max(segment.first_seq, run_span.first_seq),"
+      " min(segment.last_seq, coalesce(run_span.last_seq, 9223372036854775807)),"
+      " segment.first_seq, first_row, first_robot_time_us, period_us, utc_offset_us, mode, sub_state,"
+      " setpoint_m, disturbance_m, clock_uncertainty_us, first_received_at_us, received_at_us, position_sd_m,"
+      " controller_id, emergency_id, emergency_cause, flags FROM run_span CROSS JOIN boot CROSS JOIN segment WHERE "
+      "run_id = ?"
+      " AND boot.boot_key = run_span.boot_key AND segment.boot_key = run_span.boot_key"
+      " AND segment.first_seq >= run_span.first_seq - 99"
+      " AND segment.first_seq <= coalesce(run_span.last_seq, 9223372036854775807)"
+      " ORDER BY span, segment.first_seq"};
   Query rows{handle,
              "SELECT position_m, velocity_m_s, acceleration_m_s2, duty, impedance_mv, reference_m FROM sample"
              " WHERE row BETWEEN ? AND ?"};
@@ -116,7 +118,7 @@ std::int64_t print_run(sqlite3* handle, std::int64_t run) {
     if (first_seq > last_seq) continue;
     const std::string beginning = segments.text(0) + ',' + segments.text(1) + ',';
     std::string end = "," + segments.text(9) + ',' + segments.text(10);
-    for (int column = 11; column <= 18; ++column) end += ',' + segments.text(column);
+    for (int column = 11; column <= 20; ++column) end += ',' + segments.text(column);
     const std::int64_t skipped = first_seq - segments.integer(4);
     const std::int64_t first_row = segments.integer(5) + skipped;
     std::int64_t robot_time_us = segments.integer(6) + skipped * segments.integer(7);
@@ -134,7 +136,7 @@ std::int64_t print_run(sqlite3* handle, std::int64_t run) {
         if (!rows.is_null(channel)) out.number(rows.real(channel));
       }
       out.text(end);
-      out.text(",0");
+      out.text(",0,0");
       out.end_line();
       ++printed;
     }

@@ -76,6 +76,7 @@ class CancelTest : public ApiTest {
     ASSERT_TRUE(condition());
   }
   std::uint64_t questions() { return recording.history.reader().questions(); }
+  std::uint64_t export_questions() { return recording.exports.reader().questions(); }
 
   void make_run() {
     connect_robot();
@@ -110,35 +111,77 @@ TEST_F(CancelTest, AQuestionWhoseClientHasGoneAsksNoFurther) {
   }
 }
 
-// The rest of an export is not read for nobody.
-TEST_F(CancelTest, AnExportWhoseClientHasGoneEnds) {
+// The rest of an export is not read for nobody, and what was written of its file is removed. The client leaves when the
+// export has begun and its next question waits for the worker; with nothing unread, so that no write of the station
+// fails before one that would succeed.
+TEST_F(CancelTest, AnExportWhoseClientHasGoneAsksNoFurther) {
   make_run();
   for (std::uint64_t seq = 25; seq < 10'000; seq += 25) make_samples(*robot, seq, 25);
-  const auto& exports_reader = recording.exports.reader();
-  std::uint64_t of_whole = exports_reader.questions();
-  ask("GET", "/api/v1/runs/1/samples.csv");
-  of_whole = exports_reader.questions() - of_whole;
-  ASSERT_GT(of_whole, 5u);
-  QuietClient client{api->port()};
-  const std::uint64_t before = exports_reader.questions();
-  client.send(head("GET /api/v1/runs/1/samples.csv"));
-  poll_until([&] { return exports_reader.questions() >= before + 2; });  // it has begun
-  client.leave();
-  clock.settle();
-  EXPECT_LT(exports_reader.questions() - before, of_whole);
+  for (const char* ending : {".csv", ".mat", ".sqlite"}) {
+    SCOPED_TRACE(ending);
+    const std::string target = std::string{"/api/v1/runs/1/samples"} + ending;
+    std::uint64_t of_whole = export_questions();
+    ask("GET", target);
+    of_whole = export_questions() - of_whole;
+    clock.settle();  // the worker removes the file
+    ASSERT_GT(of_whole, 5u);
+    for (const std::uint64_t begun : {std::uint64_t{1}, of_whole / 2}) {
+      QuietClient client{api->port()};
+      const std::uint64_t before = export_questions();
+      client.send(head("GET " + target));
+      poll_until([&] { return export_questions() >= before + begun; });
+      stop_working(exports);
+      poll_until([&] {
+        client.received();
+        return exports.jobs() == 2;  // the gate, and a question behind it
+      });
+      while (!client.received().empty()) continue;
+      const std::uint64_t asked = export_questions();
+      ASSERT_LT(asked - before, of_whole);
+      client.leave();
+      loop.poll();
+      go_on();
+      EXPECT_EQ(export_questions(), asked);
+      if (ending != std::string{".csv"}) EXPECT_TRUE(std::filesystem::is_empty(recording.exports_folder()));
+    }
+  }
 }
 
-TEST_F(CancelTest, AFileThatNobodyWaitsForIsRemoved) {
+// SAFETY: a stop is answered while the readers and an export are busy, and whoever is cancelled meanwhile does not
+// take it along.
+TEST_F(CancelTest, AStopIsAnsweredBesideQuestionsThatAreCancelled) {
   make_run();
-  for (const char* target : {"/api/v1/runs/1/samples.mat", "/api/v1/runs/1/samples.sqlite"}) {
-    QuietClient client{api->port()};
-    const std::uint64_t before = recording.exports.reader().questions();
-    client.send(head(std::string{"GET "} + target));
-    poll_until([&] { return recording.exports.reader().questions() >= before + 3; });  // it is being written
-    client.leave();
-    clock.settle();
-    EXPECT_TRUE(std::filesystem::is_empty(recording.exports_folder()));
-  }
+  const std::uint64_t asked_before = questions();
+  const std::uint64_t exported_before = export_questions();
+  QuietClient question{api->port()};
+  QuietClient file{api->port()};
+  QuietClient stop{api->port()};
+  std::promise<void> gate;
+  const std::shared_future<void> opened = gate.get_future().share();
+  for (WorkerThread* worker : {&readers, &exports}) tasks.spawn("gate", hold(*worker, opened));
+  question.send(head("GET /api/v1/runs/1/overview"));
+  file.send(head("GET /api/v1/runs/1/samples.mat"));
+  poll_until([&] { return questions() == asked_before + 1 && export_questions() == exported_before + 1; });
+  stop.send(head("POST /api/v1/robots/r1/emergency-stop"));
+  const auto stops = [this] {
+    auto sent = robot->commands();
+    std::erase_if(sent, [](const auto& one) { return one.which_action != rheonaut_Command_emergency_stop_tag; });
+    return sent;
+  };
+  poll_until([&] { return stops().size() == 1; });
+  question.leave();
+  file.leave();
+  robot->acknowledge(stops().front(), rheonaut_COMMAND_RESULT_ACCEPTED, 7);
+  std::string answer;
+  poll_until([&] {
+    answer += stop.received();
+    return answer.find("\r\n\r\n") != std::string::npos;
+  });
+  EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 ")) << answer;
+  gate.set_value();
+  clock.settle();
+  EXPECT_EQ(questions(), asked_before + 1);
+  EXPECT_EQ(export_questions(), exported_before + 1);
 }
 
 TEST_F(CancelTest, TheNextQuestionIsAnsweredAfterOneThatWasGivenUp) {

@@ -19,7 +19,8 @@ class ExportsTest : public ApiTest {
     }
     return {};
   }
-  std::ptrdiff_t left_behind() const {
+  std::ptrdiff_t left_behind() {
+    clock.settle();
     if (!std::filesystem::exists(recording.exports_folder())) return 0;
     return std::distance(std::filesystem::directory_iterator{recording.exports_folder()}, {});
   }
@@ -58,6 +59,19 @@ TEST_F(ExportsTest, WhatIsWrongIsRefusedBeforeAnythingIsSent) {
   EXPECT_EQ(ask("GET", "/api/v1/runs/1/samples.csv?grid_us=99").status, 400);
   EXPECT_EQ(ask("GET", "/api/v1/runs/1/samples.mat?channels=volume").status, 400);
   EXPECT_EQ(ask("GET", "/api/v1/runs/1/samples.sqlite?grid_us=1000").status, 400);
+  EXPECT_EQ(left_behind(), 0);
+}
+
+// To remove a file of gigabytes takes long: it is not done on the loop, but by the exports' worker.
+TEST_F(ExportsTest, TheFileIsRemovedByTheWorker) {
+  make_run();
+  ask("GET", "/api/v1/runs/1/samples.mat");
+  clock.settle();
+  {
+    const Answered answered = ask("GET", "/api/v1/runs/1/samples.mat");
+    EXPECT_EQ(exports.jobs(), 0);
+  }
+  EXPECT_FALSE(std::filesystem::is_empty(recording.exports_folder()));
   EXPECT_EQ(left_behind(), 0);
 }
 

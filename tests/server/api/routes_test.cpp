@@ -205,7 +205,10 @@ TEST_F(RoutesTest, ARunHoldsWhatWasMadeBetweenItsBeginAndItsEnd) {
   EXPECT_TRUE(csv.starts_with("span,boot_id,seq,robot_time_us,utc,position_m,velocity_m_s,"));
   EXPECT_NE(csv.find("\n0,77,5,"), std::string::npos) << csv;
   EXPECT_NE(csv.find("Z,14,0,0,0,0,0,manual,none,,0,"), std::string::npos) << csv;
-  EXPECT_EQ(ask("GET", path + "/gaps").parsed()["gaps"].size(), 0U);
+  EXPECT_EQ(ask("GET", path + "/gaps").parsed(),
+            (json{{"gaps", json::array()}, {"missing", json::array()}, {"next", nullptr}}));
+  EXPECT_EQ(ask("GET", path + "/gaps?limit=0").status, 400);
+  EXPECT_EQ(ask("GET", path + "/gaps?after=x").status, 400);
 }
 
 TEST_F(RoutesTest, ARunInManualHasNoSteps) {
@@ -271,8 +274,8 @@ TEST_F(RoutesTest, TheTextOfManySamplesIsNotMadeOnTheLoop) {
   EXPECT_EQ(page["samples"].size(), 10'000U);
   EXPECT_LT(json_us, parse_us / 4);
   const std::int64_t csv_us = longest_us("/api/v1/runs/1/samples.csv", text);
-  EXPECT_EQ(std::ranges::count(text, '\n'), 2001);
-  EXPECT_LT(csv_us, parse_us / 20);  // a fifth of the samples
+  EXPECT_NEAR(static_cast<double>(std::ranges::count(text, '\n')), 2001, 100);  // less the page's last segment
+  EXPECT_LT(csv_us, parse_us / 20);                                             // a fifth of the samples
 }
 
 TEST_F(RoutesTest, BadRunRequestsAreRefused) {

@@ -167,6 +167,32 @@ TEST_F(AdmissionTest, ADiskThatFailsStillAdmitsEnrolledRobots) {
   EXPECT_EQ(number("SELECT value FROM meta WHERE name = 'next_boot_key'"), 4);
 }
 
+// A robot that reboots again and again while the disk fails does not fill the memory.
+TEST_F(AdmissionTest, NewBootsThatWaitForTheDiskAreBounded) {
+  RecorderOptions options;
+  options.max_queued_records = 5;
+  start(options);
+  connect(robot_);
+  flush();
+  SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE};
+  foreign.exec("CREATE TRIGGER full BEFORE INSERT ON boot BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
+  TestRobot rebooted;
+  int admitted = 0;
+  for (rebooted.boot_id = 100; rebooted.boot_id < 150; ++rebooted.boot_id) {
+    const Admission admission = admit(rebooted);
+    admitted += admission.refusal == rheonaut_REFUSAL_REASON_NONE;
+    if (rebooted.boot_id == 100) clock_.run_for(2s);  // that one is in the commit that fails
+    if (rebooted.boot_id == 149) EXPECT_EQ(admission.refusal, rheonaut_REFUSAL_REASON_STATION_BUSY);
+  }
+  EXPECT_EQ(admitted, 6);
+  EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_NONE) << "a boot that is known";
+  foreign.exec("DROP TRIGGER full");
+  clock_.run_for(3s);
+  EXPECT_EQ(admit(rebooted).refusal, rheonaut_REFUSAL_REASON_NONE);
+  flush();
+  EXPECT_EQ(number("SELECT count(*) FROM boot"), 8);
+}
+
 TEST_F(AdmissionTest, ManyBootsShareACommit) {
   constexpr int kRobots = 200;
   start();

@@ -1,8 +1,10 @@
 // A backup of the live database is whole, verified, and never in the way of the recording.
 #include "server/recording/backup.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "server/recording/file_check.hpp"
@@ -131,7 +133,11 @@ TEST_F(BackupTest, TheFolderIsListedAfterARestart) {
   back_up("one");
   back_up("two");
   stop();
-  std::ofstream{folder_ / "backups" / "three.sqlite.part"} << "cut off";
+  const std::string part = fmt::format("three.sqlite.part-{:016x}", restored_.store_id);
+  const std::string foreign = fmt::format("three.sqlite.part-{:016x}", restored_.store_id + 1);
+  for (const std::string& name : {part, part + "-journal", foreign}) {
+    std::ofstream{folder_ / "backups" / name} << "cut off";
+  }
   begin();
   std::vector<std::string> names;
   for (const BackupRecord& record : wait(recording_->backups.list())) names.push_back(record.name);
@@ -139,7 +145,39 @@ TEST_F(BackupTest, TheFolderIsListedAfterARestart) {
   EXPECT_EQ(record_of("one").state, BackupState::done);
   EXPECT_GT(record_of("one").pages_total, 10U);
   back_up("three");
-  EXPECT_THAT(files(folder_ / "backups"), ::testing::UnorderedElementsAre("one.sqlite", "two.sqlite", "three.sqlite"));
+  // Another station is making the foreign one.
+  EXPECT_THAT(files(folder_ / "backups"),
+              ::testing::UnorderedElementsAre("one.sqlite", "two.sqlite", "three.sqlite", foreign));
+}
+
+// A station that begins a backup leaves that of another, which is being made, alone.
+TEST_F(BackupTest, StationsMayHaveOneFolder) {
+  const fs::path common = folder_ / "common";
+  fs::create_directories(common);
+  RecordingConfig config;
+  config.backup_dir = common;
+  begin(config);
+  for (int i = 0; i < 20; ++i) {
+    make(robot_, 20'000, 25);
+    flush();
+  }
+  ASSERT_TRUE(wait(recording_->backups.begin("monday")));
+  const auto is_part = [](const std::string& name) { return name.contains(".part-"); };
+  ASSERT_TRUE(clock_.run_until([&] { return std::ranges::any_of(files(common), is_part); }, 10s));
+
+  RecordingParts other{
+      loop_, clock_, disk_, readers_, exports_worker_, checkpoints_, RecorderOptions{folder_ / "other.sqlite"}, config};
+  clock_.add_worker(other.backups.checker());
+  wait(other.open());
+  other.spawn(*tasks_);
+  ASSERT_TRUE(recording_->backups.busy());
+  ASSERT_TRUE(wait(other.backups.begin("tuesday")));
+  ASSERT_TRUE(clock_.run_until([&] { return !recording_->backups.busy() && !other.backups.busy(); }, 600s));
+  EXPECT_EQ(record_of("monday").state, BackupState::done) << record_of("monday").problem;
+  EXPECT_THAT(files(common), ::testing::UnorderedElementsAre("monday.sqlite", "tuesday.sqlite"));
+  stop();
+  clock_.remove_worker(other.backups.checker());
+  other.close();
 }
 
 TEST_F(BackupTest, AFolderThatCannotBeMadeFailsTheBackupOnly) {

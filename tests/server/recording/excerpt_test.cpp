@@ -75,7 +75,7 @@ TEST_F(ExcerptTest, GapsAreCutToTheWindow) {
   make(robot_, 100);
   robot_.oldest_seq = robot_.next_seq = 200;
   make(robot_, 100);
-  const Absences cut = wait(history_->gaps(window(utc_of(150), utc_of(250)))).value();
+  const AbsencePage cut = wait(history_->gaps(window(utc_of(150), utc_of(250)))).value();
   ASSERT_EQ(cut.gaps.size(), 1u);
   EXPECT_EQ(cut.gaps[0].first_seq, 150u);
   EXPECT_EQ(cut.gaps[0].last_seq, 199u);
@@ -109,12 +109,49 @@ TEST_F(ExcerptTest, WhatIsNeitherStoredNorLostIsMissing) {
   EXPECT_EQ(missing(excerpt_of(run)), (Ranges{{80, 89}}));
 }
 
+// Pages of any size tell together what one page tells, each all of its part: no more than `limit` of either kind.
+TEST_F(ExcerptTest, GapsComeInPages) {
+  const RunId run = record(14);
+  std::size_t missing = 0;
+  for (const bool stored : {false, true}) {
+    SCOPED_TRACE(stored);
+    if (stored) flush();
+    for (const Excerpt& excerpt : {excerpt_of(run), window(utc_of(0), utc_of(1'000'000))}) {
+      const AbsencePage whole = wait(history_->gaps(excerpt)).value();
+      ASSERT_GT(whole.gaps.size(), 3u);
+      missing += whole.missing.size();
+      for (const std::size_t limit : {std::size_t{1}, std::size_t{2}, whole.gaps.size() - 1, whole.gaps.size()}) {
+        SCOPED_TRACE(limit);
+        AbsencePage together;
+        std::size_t pages = 0;
+        do {
+          const AbsencePage page = wait(history_->gaps(excerpt, together.next, limit)).value();
+          ASSERT_LE(page.gaps.size(), limit);
+          ASSERT_LE(page.missing.size(), limit);
+          std::ranges::copy(page.gaps, std::back_inserter(together.gaps));
+          std::ranges::copy(page.missing, std::back_inserter(together.missing));
+          together.next = page.next;
+          ASSERT_LE(++pages, whole.gaps.size() + whole.missing.size());
+        } while (together.next);
+        EXPECT_GE(pages, (whole.gaps.size() + limit - 1) / limit);
+        const auto place = [](const auto& one) { return std::tuple{one.span, one.first_seq, one.last_seq}; };
+        EXPECT_TRUE(std::ranges::equal(together.gaps, whole.gaps, {}, place, place));
+        EXPECT_TRUE(std::ranges::equal(together.missing, whole.missing, {}, place, place));
+      }
+    }
+  }
+  EXPECT_GT(missing, 1u);
+  EXPECT_EQ(wait(history_->gaps(excerpt_of(run), {}, 0)).error().code, ErrorCode::invalid);
+  EXPECT_EQ(wait(history_->gaps(excerpt_of(run), {}, kMaxPageGaps + 1)).error().code, ErrorCode::invalid);
+}
+
 // Each number up to the newest is in a sample, in a gap or missing, and only in one of them.
 TEST_F(ExcerptTest, SamplesGapsAndWhatIsMissingMakeTheWhole) {
   std::size_t missing = 0;
   for (const unsigned seed : {11U, 12U, 13U, 14U}) {
     const RunId run = record(seed);
-    const Absences absences = wait(history_->gaps(excerpt_of(run))).value();
+    const AbsencePage absences = wait(history_->gaps(excerpt_of(run))).value();
+    EXPECT_FALSE(absences.next.has_value());
     std::map<BootId, std::map<std::uint64_t, int>> times;
     for (const StoredSample& stored : samples_of(run)) ++times[stored.boot_id][stored.seq];
     for (const Gap& gap : absences.gaps) {
@@ -147,9 +184,9 @@ TEST_F(ExcerptTest, WhatIsMissingIsTheSameInSlicesOfAnySize) {
   for (const std::size_t segments : {1u, 3u, 10'000u}) {
     std::vector<std::uint64_t>& numbers = found.emplace_back();
     for (const RecordedSpan& span : spans) {
-      std::uint64_t first_seq = span.samples.first;
-      while (first_seq < span.made().next) {
-        for (const MissingRange& range : read_missing(database, span, first_seq, segments)) {
+      Interval left = span.made();
+      while (left.first < left.next) {
+        for (const MissingRange& range : read_missing(database, span, left, segments)) {
           numbers.insert(numbers.end(), {range.boot_id, range.first_seq, range.last_seq});
         }
       }

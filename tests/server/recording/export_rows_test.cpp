@@ -25,6 +25,32 @@ SpanSegment segment(std::uint32_t span, std::uint64_t first_seq, std::uint64_t f
 
 SegmentPage page(std::vector<SpanSegment> segments) { return {.segments = std::move(segments), .next = {}}; }
 
+// A page does not tell whether the span of its last segment goes on.
+TEST(SegmentRows, CountTheSamplesThatAreMissingAtTheEndOfASpan) {
+  const auto ending = [](SpanSegment part) {
+    part.span_next_seq = 30;
+    return part;
+  };
+  const auto more = [](std::vector<SpanSegment> segments) {
+    return SegmentPage{.segments = std::move(segments), .next = SampleCursor{}};
+  };
+  SegmentRows rows;
+  rows.give(more({ending(segment(0, 5, 0, 5)), ending(segment(0, 10, 0, 5))}));
+  EXPECT_EQ(rows.next()->gap_after, 0u);
+  EXPECT_FALSE(rows.next().has_value()) << "it is not known yet";
+  rows.give(more({ending(segment(0, 20, 0, 4))}));
+  EXPECT_EQ(rows.next()->part->segment.first_seq, 10u);
+  EXPECT_FALSE(rows.next().has_value());
+  rows.give(page({ending(segment(1, 5, 0, 25))}));
+  ExportSegment last = *rows.next();
+  EXPECT_EQ(last.gap_before, 5u);
+  EXPECT_EQ(last.gap_after, 6u);
+  last = *rows.next();
+  EXPECT_EQ(last.part->span, 1u);
+  EXPECT_EQ(last.gap_after, 0u);
+  EXPECT_FALSE(rows.next().has_value());
+}
+
 TEST(SegmentRows, CountTheSamplesThatAreMissingBeforeThem) {
   SegmentRows rows;
   rows.give(page({segment(0, 7, 0, 3), segment(0, 10, 0, 2)}));
@@ -68,6 +94,17 @@ TEST(GridRows, AreEmptyInAGapAndBeginAnewInEachSpan) {
   const GridRow row = *grid.next();
   EXPECT_EQ(row.since_us, 10'000);
   EXPECT_EQ(row.utc_us, 1'053'000);
+}
+
+TEST(GridRows, GoOnToTheEndOfTheSpan) {
+  auto part = segment(0, 5, 1000, 2);
+  part.span_next_seq = 10;
+  EXPECT_EQ(positions(10'000, {page({part})}), (std::vector<float>{5, 6, -1, -1, -1}));
+  EXPECT_EQ(positions(5'000, {page({part})}), (std::vector<float>{5, 5, 6, 6, -1, -1, -1, -1, -1}));
+  part.span_next_seq = std::uint64_t{1} << 62;  // as a robot may say
+  GridRows grid{3'600'000'000};
+  grid.give(page({part, segment(1, 5, 7, 2)}));
+  for (int row = 0; row < 1000; ++row) ASSERT_TRUE(grid.next().has_value());
 }
 
 TEST(GridRows, AreThoseOfASearchOverAllSamples) {

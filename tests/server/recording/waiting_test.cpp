@@ -30,7 +30,7 @@ class WaitingTest : public RecordingTest {
 
   std::vector<std::string> waiting_gaps(const TestRobot& robot) {
     std::vector<std::string> parts;
-    for (const LostRange& gap : recorder_->waiting_gaps(robot.boot_id)) {
+    for (const LostRange& gap : recorder_->waiting_gaps(robot.boot_id, kAll)) {
       parts.push_back(std::to_string(gap.lost.first) + "-" + std::to_string(gap.lost.next - 1) + " " + gap.cause);
     }
     return parts;
@@ -88,6 +88,58 @@ TEST_F(WaitingTest, WhatTheDiskDoesNotTakeGoesOnWaiting) {
   clock_.run_for(3s);
   EXPECT_EQ(waiting(robot_), Parts{});
   EXPECT_EQ(stored(robot_), 105);
+}
+
+// Hours may wait: a page asks for no more than it can hold.
+TEST_F(WaitingTest, APageGetsTheFirstOfWhatWaits) {
+  start();
+  connect(robot_);
+  const RunId run = wait(runs_->create(robot_.id, named("run")))->id;
+  flush();
+  SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE};
+  foreign.exec("BEGIN IMMEDIATE");
+  make(robot_, 30'000, 25);
+  ASSERT_TRUE(clock_.run_until([&] { return recorder_->failing(); }, 3s));
+  EXPECT_EQ(recorder_->waiting(robot_.boot_id, kAll, 150).back().next_seq(), 200u);
+  EXPECT_EQ(recorder_->waiting(robot_.boot_id, {1'050, 30'000}, 1).back().next_seq(), 1'100u);
+
+  const auto waiting_in = [](const std::vector<RecordedSpan>& spans) {
+    std::size_t samples = 0;
+    for (const Segment& segment : spans.at(0).waiting) samples += segment.samples.size();
+    return samples;
+  };
+  EXPECT_LE(waiting_in(wait(history_->spans(excerpt_of(run), SampleCursor{0, 999}, 500)).value()), 600u);
+  EXPECT_EQ(waiting_in(wait(history_->spans(excerpt_of(run))).value()), 30'000u);
+
+  std::uint64_t next_seq = 0;
+  std::optional<SampleCursor> after;
+  do {
+    const SamplePage page = wait(history_->samples(run, after, 7'001)).value();
+    for (const StoredSample& stored : page.samples) ASSERT_EQ(stored.seq, next_seq++);
+    after = page.next;
+    if (next_seq == 14'002) {  // the next pages join what is stored with what waits
+      foreign.exec("ROLLBACK");
+      clock_.run_for(2s);
+      make(robot_, 50);
+    }
+  } while (after);
+  EXPECT_EQ(next_seq, 30'050u);
+}
+
+// While the disk fails many ask, give up and go; nothing is kept of them.
+TEST_F(WaitingTest, WhoGaveUpWaitingForTheDiskIsForgotten) {
+  start();
+  connect(robot_);
+  flush();
+  SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE};
+  foreign.exec("BEGIN IMMEDIATE");
+  make(robot_, 100);
+  ASSERT_TRUE(clock_.run_until([&] { return recorder_->failing(); }, 3s));
+  for (int asked = 0; asked < 20; ++asked) EXPECT_FALSE(wait(recorder_->flush_records()));
+  EXPECT_LE(recorder_->flushes(), 1u);
+  foreign.exec("ROLLBACK");
+  clock_.run_for(3s);
+  EXPECT_EQ(recorder_->flushes(), 0u);
 }
 
 TEST_F(WaitingTest, GapsWaitToo) {

@@ -1,0 +1,272 @@
+// Reads exports back: a line per sample, equal wherever the same sample comes from.
+#pragma once
+
+#include <fmt/format.h>
+#include <matio.h>
+
+#include <bit>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "server/api/column_text.hpp"
+#include "server/recording/csv_writer.hpp"
+#include "server/recording/database.hpp"
+#include "server/recording/mat_writer.hpp"
+#include "server/recording/run_file.hpp"
+#include "server/recording/run_reader.hpp"
+#include "tests/server/recording/random_recording.hpp"
+
+namespace server {
+
+// As binary32, so that not a bit is lost; every NaN is the same.
+inline std::string bits(float value) {
+  return std::isnan(value) ? "none" : fmt::format("{:08x}", std::bit_cast<std::uint32_t>(value));
+}
+inline std::string bits_of(const std::string& text) {
+  return text.empty() ? "none" : bits(std::strtof(text.c_str(), nullptr));
+}
+
+using Lines = std::vector<std::string>;  // a sample each: whole numbers and words as text, floats as bits
+
+inline std::vector<std::string> split(const std::string& line, char separator) {
+  std::vector<std::string> fields;
+  std::istringstream in{line};
+  for (std::string field; std::getline(in, field, separator);) fields.push_back(field);
+  if (!line.empty() && line.back() == separator) fields.emplace_back();
+  return fields;
+}
+
+inline std::string joined(const std::vector<std::string>& fields) { return fmt::format("{}", fmt::join(fields, " ")); }
+
+class ExportTest : public RandomRecordingTest {
+ protected:
+  std::vector<RecordedSpan> spans_of(RunId run) {
+    auto spans = wait(recording_->exports.spans(excerpt_of(run))).value();
+    for (RecordedSpan& span : spans) span.cut(span.made());
+    return spans;
+  }
+
+  std::string csv(const ExportQuery& query) {
+    SQLite::Database database = open_for_reading(path_);
+    CsvWriter writer{spans_of(query.run), query};
+    std::string text;
+    while (const auto piece = writer.next(database)) text += *piece;
+    return text;
+  }
+
+  // By the history of the readers, with what waits.
+  Lines api_lines(RunId run) {
+    Lines lines;
+    std::optional<StoredSample> last;
+    const auto spans = spans_of(run);
+    for (const StoredSample& stored : samples_of(run)) {
+      const bool follows = last && last->span == stored.span;
+      const std::uint64_t expected = follows ? last->seq + 1 : spans.at(stored.span).samples.first;
+      if (last && !follows) lines.back() += after_text(spans.at(last->span), *last);
+      if (follows) lines.back() += " 0";
+      lines.push_back(line_of(stored, stored.seq - expected));
+      last = stored;
+    }
+    if (last) lines.back() += after_text(spans.at(last->span), *last);
+    return lines;
+  }
+  static std::string after_text(const RecordedSpan& span, const StoredSample& last) {
+    return fmt::format(" {}", span.made().next - last.seq - 1);
+  }
+
+  // Without gap_after.
+  static std::string line_of(const StoredSample& stored, std::uint64_t gap_before) {
+    std::vector<std::string> fields{
+        fmt::format("{} {} {} {} {}", stored.span, stored.boot_id, stored.seq, stored.robot_time_us, stored.utc_us)};
+    for (const auto member : kSampleMembers) fields.push_back(bits(stored.sample.*member));
+    fields.push_back(fmt::format("{} {}", protocol::text(stored.mode), protocol::text(stored.sub_state)));
+    fields.push_back(bits(stored.setpoint_m.value_or(NAN)));
+    fields.push_back(bits(stored.disturbance_m));
+    fields.push_back(
+        fmt::format("{} {} {}", stored.clock_uncertainty_us, stored.first_received_at_us, stored.received_at_us));
+    fields.push_back(bits(stored.position_sd_m));
+    fields.push_back(fmt::format("{} {} {} {} {}", stored.controller_id, stored.emergency_id,
+                                 protocol::text(stored.emergency_cause), stored.flags, gap_before));
+    return joined(fields);
+  }
+
+  Lines csv_lines(RunId run) {
+    std::istringstream in{csv({.run = run, .channels = all_channels(), .grid_us = {}})};
+    std::string line;
+    std::getline(in, line);
+    EXPECT_EQ(line,
+              "span,boot_id,seq,robot_time_us,utc,position_m,velocity_m_s,acceleration_m_s2,duty,impedance_mv,"
+              "reference_m,mode,sub_state,setpoint_m,disturbance_m,clock_uncertainty_us,first_received_at_us,"
+              "received_at_us,position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,gap_after");
+    Lines lines;
+    while (std::getline(in, line)) {
+      std::vector<std::string> fields = split(line, ',');
+      EXPECT_EQ(fields.size(), 25u) << line;
+      fields.at(4) = std::to_string(utc_us_of(fields.at(4)));
+      for (const std::size_t column : {5U, 6U, 7U, 8U, 9U, 10U, 13U, 14U, 18U})
+        fields.at(column) = bits_of(fields.at(column));
+      lines.push_back(joined(fields));
+    }
+    return lines;
+  }
+
+  // "2026-03-01T12:00:00.000001Z"
+  static std::int64_t utc_us_of(const std::string& text) {
+    std::tm time{};
+    EXPECT_NE(strptime(text.c_str(), "%Y-%m-%dT%H:%M:%S", &time), nullptr) << text;
+    EXPECT_EQ(text.size(), 27u) << text;
+    return timegm(&time) * 1'000'000 + std::stoll(text.substr(20, 6));
+  }
+
+  Lines rows_of(const std::filesystem::path& file, const std::string& table) {
+    SQLite::Database database{file.string(), SQLite::OPEN_READONLY};
+    SQLite::Statement query{
+        database,
+        "SELECT span, boot_id, seq, robot_time_us, utc_us, position_m, velocity_m_s, acceleration_m_s2, duty,"
+        " impedance_mv, reference_m, mode, sub_state, setpoint_m, disturbance_m, clock_uncertainty_us,"
+        " first_received_at_us, received_at_us, position_sd_m, controller_id, emergency_id, emergency_cause, flags"
+        " FROM " +
+            table};
+    Lines lines;
+    while (query.executeStep()) {
+      std::vector<std::string> fields;
+      for (int column = 0; column < 23; ++column) {
+        const auto value = query.getColumn(column);
+        const bool is_float = (column >= 5 && column <= 10) || column == 13 || column == 14 || column == 18;
+        const float number = value.isNull() ? NAN : static_cast<float>(value.getDouble());
+        fields.push_back(is_float ? bits(number) : value.getString());
+      }
+      lines.push_back(joined(fields));
+    }
+    return lines;
+  }
+
+  static Lines gaps_in(const std::filesystem::path& file) {
+    SQLite::Database database{file.string(), SQLite::OPEN_READONLY};
+    SQLite::Statement query{database, "SELECT gap_before || ' ' || gap_after FROM sample ORDER BY rowid"};
+    Lines lines;
+    while (query.executeStep()) lines.push_back(query.getColumn(0).getString());
+    return lines;
+  }
+
+  // The variables of a MAT file as matio reads them.
+  struct Variable {
+    std::vector<double> numbers;
+    std::vector<float> singles;
+  };
+  static std::map<std::string, Variable> variables_of(const std::filesystem::path& path) {
+    std::map<std::string, Variable> variables;
+    const std::unique_ptr<mat_t, int (*)(mat_t*)> file{Mat_Open(path.c_str(), MAT_ACC_RDONLY), Mat_Close};
+    EXPECT_NE(file, nullptr);
+    while (matvar_t* read = Mat_VarReadNext(file.get())) {
+      const std::unique_ptr<matvar_t, void (*)(matvar_t*)> variable{read, Mat_VarFree};
+      Variable& into = variables[variable->name];
+      if (variable->class_type == MAT_C_STRUCT) continue;
+      EXPECT_EQ(variable->rank, 2);
+      EXPECT_EQ(variable->dims[1], 1u);
+      for (std::size_t row = 0; row < variable->dims[0]; ++row) {
+        if (variable->class_type == MAT_C_DOUBLE) into.numbers.push_back(static_cast<double*>(variable->data)[row]);
+        if (variable->class_type == MAT_C_UINT32)
+          into.numbers.push_back(static_cast<std::uint32_t*>(variable->data)[row]);
+        if (variable->class_type == MAT_C_SINGLE) into.singles.push_back(static_cast<float*>(variable->data)[row]);
+      }
+    }
+    return variables;
+  }
+
+  std::filesystem::path mat(const ExportQuery& query) {
+    const auto file = folder_ / "run.mat";
+    SQLite::Database database = open_for_reading(path_);
+    MatWriter writer{file, spans_of(query.run), query};
+    while (writer.advance(database).value()) continue;
+    return file;
+  }
+
+  Lines mat_lines(RunId run) {
+    const auto variables = variables_of(mat({.run = run, .channels = all_channels(), .grid_us = {}}));
+    const auto spans = spans_of(run);
+    const auto number = [&](const char* name, std::size_t row) {
+      return static_cast<std::int64_t>(variables.at(name).numbers.at(row));
+    };
+    const auto single = [&](const char* name, std::size_t row) { return bits(variables.at(name).singles.at(row)); };
+    Lines lines;
+    for (std::size_t row = 0; row < variables.at("span").numbers.size(); ++row) {
+      const auto span = static_cast<std::size_t>(number("span", row));
+      const std::uint64_t emergency_id = static_cast<std::uint64_t>(number("emergency_id_high", row)) << 32 |
+                                         static_cast<std::uint64_t>(number("emergency_id_low", row));
+      std::vector<std::string> fields{fmt::format("{} {} {} {} {}", span, spans.at(span).boot_id, number("seq", row),
+                                                  number("robot_time_us", row), number("utc_us", row))};
+      for (std::size_t channel = 0; channel < kChannels; ++channel) {
+        fields.push_back(single(text(static_cast<Channel>(channel)), row));
+      }
+      fields.emplace_back(protocol::text(static_cast<protocol::Mode>(number("mode", row))));
+      fields.emplace_back(protocol::text(static_cast<protocol::SubState>(number("sub_state", row))));
+      fields.push_back(single("setpoint_m", row));
+      fields.push_back(single("disturbance_m", row));
+      fields.push_back(fmt::format("{} {} {}", number("clock_uncertainty_us", row), number("first_received_at_us", row),
+                                   number("received_at_us", row)));
+      fields.push_back(single("position_sd_m", row));
+      const auto cause = static_cast<protocol::EmergencyCause>(number("emergency_cause", row));
+      fields.push_back(fmt::format("{} {} {} {} {} {}", number("controller_id", row), emergency_id,
+                                   protocol::text(cause), number("flags", row), number("gap_before", row),
+                                   number("gap_after", row)));
+      lines.push_back(joined(fields));
+    }
+    return lines;
+  }
+
+  std::filesystem::path run_file(RunId run) {
+    const auto file = folder_ / "run.sqlite";
+    std::filesystem::remove(file);
+    SQLite::Database database = open_for_reading(path_);
+    RunFile writer{
+        file, reading_uri(path_, false), spans_of(run), {.run = run, .channels = all_channels(), .grid_us = {}}};
+    while (writer.advance(database)) continue;
+    return file;
+  }
+
+  Lines json_lines(RunId run) {
+    const SegmentPage page = wait(history_->segments(excerpt_of(run), {}, kMaxPageSamples)).value();
+    Lines lines;
+    const auto json = nlohmann::json::parse(page_text(page));
+    const auto number = [](const nlohmann::json& value) { return value.is_null() ? NAN : value.get<float>(); };
+    const auto word = [](const nlohmann::json& value) {
+      return value.is_null() ? "0" : value.is_string() ? value.get<std::string>() : value.dump();
+    };
+    for (const auto& sample : json["samples"]) {
+      std::vector<std::string> fields;
+      for (const char* name : {"span", "boot_id", "seq", "robot_time_us", "utc_us"})
+        fields.push_back(word(sample[name]));
+      for (std::size_t channel = 0; channel < kChannels; ++channel) {
+        fields.push_back(bits(number(sample[text(static_cast<Channel>(channel))])));
+      }
+      for (const char* name : {"mode", "sub_state"}) fields.push_back(word(sample[name]));
+      for (const char* name : {"setpoint_m", "disturbance_m"}) fields.push_back(bits(number(sample[name])));
+      for (const char* name : {"clock_uncertainty_us", "first_received_at_us", "received_at_us"})
+        fields.push_back(word(sample[name]));
+      fields.push_back(bits(number(sample["position_sd_m"])));
+      for (const char* name : {"controller_id", "emergency_id", "emergency_cause", "flags"})
+        fields.push_back(word(sample[name]));
+      lines.push_back(joined(fields));
+    }
+    EXPECT_EQ(json["next"], nullptr);
+    return lines;
+  }
+};
+
+// Without the last fields, gap_before and gap_after, which only exports have.
+inline Lines without_gaps(Lines lines) {
+  for (std::string& line : lines) {
+    for (int field = 0; field < 2; ++field) line.resize(line.rfind(' '));
+  }
+  return lines;
+}
+
+inline Lines gaps_of(const Lines& lines) {
+  Lines gaps;
+  for (const std::string& line : lines) gaps.push_back(line.substr(line.rfind(' ', line.rfind(' ') - 1) + 1));
+  return gaps;
+}
+
+}  // namespace server
