@@ -1,7 +1,6 @@
 // SQL that makes runs of what is recorded, and that changes what is said of them.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "server/recording/in_force_store.hpp"
