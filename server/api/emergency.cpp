@@ -41,31 +41,31 @@ class Awaited {
   bool taken_ = false;
 };
 
-asio::awaitable<void> stop_one(Station& station, RobotId robot_id, std::string actor,
-                               std::shared_ptr<Gathering> gathering) {
-  Awaited awaited{std::move(gathering), robot_id};
-  auto record = co_await stop_robot(station, std::move(robot_id), std::move(actor));
+asio::awaitable<void> stop_one(Station& station, StopRequest request, std::shared_ptr<Gathering> gathering) {
+  Awaited awaited{std::move(gathering), request.robot_id};
+  auto record = co_await stop_robot(station, std::move(request));
   if (record) awaited.take(std::move(*record));
 }
 
 }  // namespace
 
-asio::awaitable<Result<CommandRecord>> stop_robot(Station& station, RobotId robot_id, std::string actor) {
-  const RobotState* robot = station.find(robot_id);
+asio::awaitable<Result<CommandRecord>> stop_robot(Station& station, StopRequest request) {
+  const RobotState* robot = station.find(request.robot_id);
   const bool connected = robot != nullptr && robot->link == LinkState::connected;
   const microseconds patience = connected ? kStopPatience : microseconds{0};
-  co_return co_await station.emergency_stop(std::move(robot_id), std::move(actor), patience);
+  co_return co_await station.emergency_stop(std::move(request), patience);
 }
 
 asio::awaitable<StopsOfAll> stop_all_robots(asio::io_context& loop, TaskGroup& tasks, Station& station,
-                                            std::string actor) {
+                                            StopRequest request) {
   const auto gathering = std::make_shared<Gathering>(loop);
   std::vector<RobotId> ids;
   for (const auto& [id, robot] : station.robots()) ids.push_back(id);
   gathering->waiting = ids.size();
   for (const RobotId& id : ids) {
+    request.robot_id = id;
     const std::string name = "emergency stop of " + id;
-    tasks.spawn(name, contained(name, stop_one(station, id, actor, gathering)));
+    tasks.spawn(name, contained(name, stop_one(station, request, gathering)));
   }
   if (!ids.empty()) co_await gathering->all_ended.wait();
   co_return gathering->stops;

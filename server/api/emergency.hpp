@@ -13,7 +13,7 @@ namespace server {
 inline constexpr microseconds kStopPatience{1'500'000};
 
 // A robot that is not connected cannot answer: its stop is kept and the asker is told at once.
-boost::asio::awaitable<Result<CommandRecord>> stop_robot(Station& station, RobotId robot_id, std::string actor);
+boost::asio::awaitable<Result<CommandRecord>> stop_robot(Station& station, StopRequest request);
 
 struct StopsOfAll {
   std::vector<CommandRecord> records;
@@ -21,8 +21,8 @@ struct StopsOfAll {
 };
 
 // SAFETY: every robot's stop is on its way before the answer of any is waited for, and none that fails keeps the others
-// or the asker waiting.
+// or the asker waiting. The request's robot_id is not looked at.
 boost::asio::awaitable<StopsOfAll> stop_all_robots(boost::asio::io_context& loop, TaskGroup& tasks, Station& station,
-                                                   std::string actor);
+                                                   StopRequest request);
 
 }  // namespace server

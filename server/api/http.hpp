@@ -19,6 +19,7 @@ struct Request {
   std::string target;                          // as sent: path and query
   std::map<std::string, std::string> headers;  // names in lower case; repeated ones joined by ", " (cookies by "; ")
   std::string body;
+  std::int64_t received_us = 0;  // steady, when all of it had arrived
 
   std::string actor;                         // who asks; set by RequestGuard
   std::string path;                          // decoded; set by Router, as are the two below

@@ -166,6 +166,7 @@ asio::awaitable<Connection::Next> Connection::read_and_answer() {
   deadline_us_ = kNever;  // a route bounds its own waits
   const HttpRequest message = parser.release();
   Request request = plain_request(message);
+  request.received_us = clock_.steady_us();
   auto admitted = guard_.admit(request);
   if (!admitted) co_return co_await send(std::move(admitted.error()), message);
   if (!admitted->empty()) strangers_.remove(&stream_);

@@ -44,8 +44,10 @@ class Members {
 
 struct ParsedCommand {
   protocol::Command action;
-  std::string arguments;  // as JSON, without kind and life_ms
+  std::string arguments;  // as JSON, without what every command may have
   microseconds life{2'000'000};
+  std::optional<std::int64_t> stamp_us;      // of /live: the station's steady time, as the page last heard it
+  std::optional<std::int64_t> issued_at_us;  // UTC
 };
 
 // The body of POST …/commands, e.g. {"kind":"set_setpoint","setpoint_m":0.1,"life_ms":2000}.

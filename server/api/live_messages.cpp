@@ -18,12 +18,12 @@ namespace {
 // A renewal that waited longer is worth nothing: the lease it would extend has lapsed.
 constexpr microseconds kRenewalLife{protocol::kLeaseMs * 1000};
 
-asio::awaitable<void> stop_one(LiveParts& parts, RobotId robot_id, std::string actor) {
-  co_await stop_robot(parts.station, std::move(robot_id), std::move(actor));
+asio::awaitable<void> stop_one(LiveParts& parts, StopRequest request) {
+  co_await stop_robot(parts.station, std::move(request));
 }
 
-asio::awaitable<void> stop_all(LiveParts& parts, std::string actor) {
-  co_await stop_all_robots(parts.loop, parts.tasks, parts.station, std::move(actor));
+asio::awaitable<void> stop_all(LiveParts& parts, StopRequest request) {
+  co_await stop_all_robots(parts.loop, parts.tasks, parts.station, std::move(request));
 }
 
 asio::awaitable<void> renew(LiveParts& parts, CommandRequest request) {
@@ -39,14 +39,19 @@ Result<RobotId> known_robot(const Members& message, const LiveParts& parts) {
 }
 
 Result<void> on_emergency_stop(const Members& message, const std::string& actor, LiveParts& parts) {
-  // SAFETY: a stop is obeyed also when the message carries members that nobody knows.
+  StopRequest request;
+  request.actor = actor;
+  request.received_us = parts.clock.steady_us();
+  // SAFETY: a stop is obeyed also when the message carries members that nobody knows, or a key that is none.
+  if (const auto key = message.text("key", 1, 64); key && is_command_key(*key)) request.key = *key;
   if (message.has("robot_id") && message.object().at("robot_id").is_null()) {
-    parts.tasks.spawn("emergency stop", contained("emergency stop", stop_all(parts, actor)));
+    parts.tasks.spawn("emergency stop", contained("emergency stop", stop_all(parts, std::move(request))));
     return {};
   }
-  const auto robot_id = known_robot(message, parts);
+  auto robot_id = known_robot(message, parts);
   if (!robot_id) return std::unexpected{robot_id.error()};
-  parts.tasks.spawn("emergency stop", contained("emergency stop", stop_one(parts, *robot_id, actor)));
+  request.robot_id = std::move(*robot_id);
+  parts.tasks.spawn("emergency stop", contained("emergency stop", stop_one(parts, std::move(request))));
   return {};
 }
 

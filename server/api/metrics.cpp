@@ -1,4 +1,4 @@
-// One line of text a figure; no figure has labels, so there is nothing to quote.
+// One line of text a figure; labels are ours, so there is nothing to quote.
 #include "server/api/metrics.hpp"
 
 #include <fmt/format.h>
@@ -17,19 +17,41 @@ class Metrics {
   void gauge(std::string_view name, std::uint64_t value, std::string_view meaning) {
     add(name, "gauge", fmt::to_string(value), meaning);
   }
+  // In seconds, as Prometheus wants it.
+  void histogram(std::string_view name, std::string_view stage, const Histogram& times) {
+    constexpr double kUsPerS = 1e6;
+    const auto line = [&](std::string_view suffix, std::string_view bound, auto value) {
+      fmt::format_to(std::back_inserter(text_), "rheonaut_{}{}{{stage=\"{}\"{}}} {}\n", name, suffix, stage, bound,
+                     value);
+    };
+    std::uint64_t count = 0;
+    for (std::size_t at = 0; at < times.counts().size(); ++at) {
+      count += times.counts()[at];
+      const bool is_last = at == Histogram::kBoundsUs.size();
+      const std::string bound =
+          is_last ? "+Inf" : fmt::to_string(static_cast<double>(Histogram::kBoundsUs[at]) / kUsPerS);
+      line("_bucket", fmt::format(",le=\"{}\"", bound), count);
+    }
+    line("_sum", "", static_cast<double>(times.sum_us()) / kUsPerS);
+    line("_count", "", count);
+  }
+  void heading(std::string_view name, std::string_view type, std::string_view meaning) {
+    fmt::format_to(std::back_inserter(text_), "# HELP rheonaut_{0} {1}\n# TYPE rheonaut_{0} {2}\n", name, meaning,
+                   type);
+  }
   std::string text() && { return std::move(text_); }
 
  private:
   void add(std::string_view name, const char* type, const std::string& value, std::string_view meaning) {
-    fmt::format_to(std::back_inserter(text_), "# HELP rheonaut_{0} {1}\n# TYPE rheonaut_{0} {2}\nrheonaut_{0} {3}\n",
-                   name, meaning, type, value);
+    heading(name, type, meaning);
+    fmt::format_to(std::back_inserter(text_), "rheonaut_{} {}\n", name, value);
   }
   std::string text_;
 };
 
 }  // namespace
 
-std::string metrics_text(const RecordingParts& recording) {
+std::string metrics_text(const RecordingParts& recording, const StopTimes& stops) {
   const RecorderCounters& counters = recording.recorder.counters();
   const DiskUse& use = recording.disk_watch.use();
   const RetentionCounters& retention = recording.retention.counters();
@@ -53,6 +75,11 @@ std::string metrics_text(const RecordingParts& recording) {
   metrics.counter("batches_malformed_total", counters.batches_malformed, "Frames of samples that cannot be.");
   metrics.counter("commits_total", counters.commits, "Commits.");
   metrics.counter("commits_failed_total", counters.commits_failed, "Commits that failed and were tried again.");
+  constexpr const char* kStopTimes = "emergency_stop_seconds";
+  metrics.heading(kStopTimes, "histogram", "From the request to each stage of an emergency stop of a connected robot.");
+  metrics.histogram(kStopTimes, "sent", stops.sent);
+  metrics.histogram(kStopTimes, "acknowledged", stops.acknowledged);
+  metrics.histogram(kStopTimes, "duty_zero_seen", stops.verified);
   return std::move(metrics).text();
 }
 

@@ -8,9 +8,10 @@
 #include <string>
 
 #include "server/recording/recording_parts.hpp"
+#include "server/station/stop_times.hpp"
 
 namespace server {
 
-std::string metrics_text(const RecordingParts& recording);
+std::string metrics_text(const RecordingParts& recording, const StopTimes& stops);
 
 }  // namespace server

@@ -16,7 +16,7 @@ constexpr std::size_t kMaxTextBytes = 4000;
 constexpr std::int64_t kMaxLifeMs = protocol::kMaxCommandLifeUs / 1000;
 
 Result<void> read_set_mode(const Members& body, protocol::Command& action) {
-  if (auto known = body.only({"kind", "life_ms", "mode", "setpoint_m"}); !known) return known;
+  if (auto known = body.only({"mode", "setpoint_m"}); !known) return known;
   const auto mode = body.text("mode", 0, kMaxTextBytes);
   if (!mode) return std::unexpected{mode.error()};
   action.which_action = rheonaut_Command_set_mode_tag;
@@ -39,7 +39,7 @@ Result<void> read_set_mode(const Members& body, protocol::Command& action) {
 }
 
 Result<void> read_float(const Members& body, const char* name, float& into) {
-  if (auto known = body.only({"kind", "life_ms", name}); !known) return known;
+  if (auto known = body.only({name}); !known) return known;
   const auto value = body.number_as_float(name);
   if (!value) return std::unexpected{value.error()};
   into = *value;
@@ -65,7 +65,7 @@ Result<void> read_lease(const Members& body, std::uint32_t& lease_ms) {
 }
 
 Result<void> read_set_duty(const Members& body, protocol::Command& action) {
-  if (auto known = body.only({"kind", "life_ms", "duty", "lease_ms"}); !known) return known;
+  if (auto known = body.only({"duty", "lease_ms"}); !known) return known;
   const auto duty = body.number_as_float("duty");
   if (!duty) return std::unexpected{duty.error()};
   action.which_action = rheonaut_Command_set_duty_tag;
@@ -74,13 +74,13 @@ Result<void> read_set_duty(const Members& body, protocol::Command& action) {
 }
 
 Result<void> read_renew_lease(const Members& body, protocol::Command& action) {
-  if (auto known = body.only({"kind", "life_ms", "lease_ms"}); !known) return known;
+  if (auto known = body.only({"lease_ms"}); !known) return known;
   action.which_action = rheonaut_Command_renew_lease_tag;
   return read_lease(body, action.action.renew_lease.lease_ms);
 }
 
 Result<void> read_clear_emergency(const Members& body, protocol::Command& action) {
-  if (auto known = body.only({"kind", "life_ms", "emergency_id"}); !known) return known;
+  if (auto known = body.only({"emergency_id"}); !known) return known;
   const auto id = body.id("emergency_id");
   if (!id) return std::unexpected{id.error()};
   action.which_action = rheonaut_Command_clear_emergency_tag;
@@ -90,12 +90,12 @@ Result<void> read_clear_emergency(const Members& body, protocol::Command& action
 
 Result<void> read_zero_position(const Members& body, protocol::Command& action) {
   action.which_action = rheonaut_Command_zero_position_tag;
-  return body.only({"kind", "life_ms"});
+  return body.only({});
 }
 
 Result<void> read_ping(const Members& body, protocol::Command& action) {
   action.which_action = rheonaut_Command_ping_tag;
-  return body.only({"kind", "life_ms"});
+  return body.only({});
 }
 
 struct Kind {
@@ -144,6 +144,14 @@ Result<RecordedRange> read_range(const json& value) {
   return TimeSpan{*from_us, *to_us};
 }
 
+Result<void> read_time(const Members& body, const char* name, std::optional<std::int64_t>& into) {
+  if (!body.has(name)) return {};
+  const auto time_us = body.integer(name, 0, std::numeric_limits<std::int64_t>::max());
+  if (!time_us) return std::unexpected{time_us.error()};
+  into = *time_us;
+  return {};
+}
+
 }  // namespace
 
 Result<ParsedCommand> parse_command(const std::string& text) {
@@ -156,17 +164,23 @@ Result<ParsedCommand> parse_command(const std::string& text) {
     return fail(ErrorCode::invalid, fmt::format("unknown command kind '{}'", kind->substr(0, 40)), "unknown_kind");
   }
   ParsedCommand command;
-  command.action = rheonaut_Command_init_zero;
-  if (auto read = known->read(*body, command.action); !read) return std::unexpected{read.error()};
   if (body->has("life_ms")) {
     const auto life_ms = body->integer("life_ms", 1, kMaxLifeMs);
     if (!life_ms) return std::unexpected{life_ms.error()};
     command.life = std::chrono::milliseconds{*life_ms};
   }
+  if (auto read = read_time(*body, "stamp_us", command.stamp_us); !read) return std::unexpected{read.error()};
+  if (auto read = read_time(*body, "issued_at_us", command.issued_at_us); !read) return std::unexpected{read.error()};
+  if (command.stamp_us && command.issued_at_us) {
+    return fail(ErrorCode::bad_request, "stamp_us and issued_at_us say the same in two ways; send one of them",
+                "malformed");
+  }
   json arguments = body->object();
-  arguments.erase("kind");
-  arguments.erase("life_ms");
+  for (const char* of_all : {"kind", "life_ms", "stamp_us", "issued_at_us"}) arguments.erase(of_all);
   command.arguments = dump(arguments);
+  command.action = rheonaut_Command_init_zero;
+  const Members action{std::move(arguments)};
+  if (auto read = known->read(action, command.action); !read) return std::unexpected{read.error()};
   return command;
 }
 

@@ -32,7 +32,12 @@ Answer get_robot(ApiParts& parts, Request request) {
 Response command_response(const CommandRecord& record) {
   const json with_command{{"command", to_json(record)}};
   switch (record.state) {
-    case CommandState::acknowledged: return json_response(200, to_json(record));
+    case CommandState::acknowledged:
+    case CommandState::verified: return json_response(200, to_json(record));
+    case CommandState::superseded:
+      return problem(
+          {ErrorCode::conflict, fmt::format("{} was superseded: {}", record.kind, record.reason), "superseded"},
+          with_command);
     case CommandState::rejected:
       return problem(
           {ErrorCode::rejected, fmt::format("the robot refused {}: {}", record.kind, record.reason), record.reason},
@@ -51,12 +56,68 @@ Response command_response(const CommandRecord& record) {
                  with_command);
 }
 
+// The client's own name of a wish, in the header Idempotency-Key.
+Result<std::string> key_of(const Request& request) {
+  std::string key = request.header("idempotency-key");
+  if (key.empty() || is_command_key(key)) return key;
+  return fail(ErrorCode::bad_request, "Idempotency-Key must be 1 to 64 characters of A-Z a-z 0-9 . _ : -",
+              "malformed_key");
+}
+
+constexpr std::int64_t kClockToleranceUs = 1'000'000;  // of a script's clock ahead of ours
+
+// How long ago the command was issued, by what its sender says of that.
+Result<void> set_age(CommandRequest& command, const ParsedCommand& parsed, Clock& clock) {
+  std::int64_t age_us = 0;
+  if (parsed.stamp_us) {
+    command.life_from = "stamp";
+    age_us = clock.steady_us() - *parsed.stamp_us;
+    if (age_us < 0) return fail(ErrorCode::invalid, "stamp_us is none that /live has said", "out_of_range");
+  } else if (parsed.issued_at_us) {
+    command.life_from = "issued_at";
+    age_us = clock.utc_us() - *parsed.issued_at_us;
+    if (age_us < -kClockToleranceUs) {
+      return fail(ErrorCode::invalid,
+                  fmt::format("issued_at_us lies {} ms ahead of the station's clock; set one of the clocks right",
+                              -age_us / 1000),
+                  "out_of_range");
+    }
+  }
+  command.age = microseconds{std::max<std::int64_t>(age_us, 0)};
+  return {};
+}
+
 Answer submit_command(ApiParts& parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
   auto parsed = parse_command(request.body);
   if (!parsed) co_return problem(parsed.error());
-  CommandRequest command{id, parsed->action, std::move(parsed->arguments), request.actor, parsed->life};
+  auto key = key_of(request);
+  if (!key) co_return problem(key.error());
+  const auto wait = request.query.find("wait");
+  if (wait != request.query.end() && wait->second != "acknowledged" && wait->second != "verified") {
+    co_return problem(400, "wait must be acknowledged or verified", "out_of_range");
+  }
+  CommandRequest command;
+  command.robot_id = id;
+  command.action = parsed->action;
+  command.arguments = std::move(parsed->arguments);
+  command.actor = request.actor;
+  command.life = parsed->life;
+  command.key = std::move(*key);
+  command.received_us = request.received_us;
+  command.until_verified = wait != request.query.end() && wait->second == "verified";
+  if (auto aged = set_age(command, *parsed, parts.clock); !aged) co_return problem(aged.error());
+  if (!command.key.empty()) {
+    const CommandId command_id = command_id_of(id, command.actor, command.key);
+    if (!parts.station.remembers(command_id)) {  // asked before a restart, or long ago
+      const auto stored = co_await parts.recording.history.command(command_id);
+      const bool has_ended = stored && stored->ended_at_us != 0;
+      if (has_ended && stored->kind == protocol::kind(command.action) && stored->arguments == command.arguments) {
+        co_return command_response(*stored);
+      }
+    }
+  }
   const auto record = co_await parts.station.submit(std::move(command));
   if (!record) co_return problem(record.error());
   co_return command_response(*record);
@@ -64,10 +125,21 @@ Answer submit_command(ApiParts& parts, Request request) {
 
 // An acknowledged stop is in force and answered at once; one that is kept must outlive whatever happens after the
 // answer, so it is on disk first.
-int stop_status(const CommandRecord& record) { return record.state == CommandState::acknowledged ? 200 : 202; }
+int stop_status(const CommandRecord& record) { return was_accepted(record.state) ? 200 : 202; }
+
+// SAFETY: a key that is none does not keep a stop from being carried out.
+StopRequest stop_request(const Request& request) {
+  StopRequest stop;
+  stop.actor = request.actor;
+  stop.received_us = request.received_us;
+  if (auto key = key_of(request)) stop.key = std::move(*key);
+  return stop;
+}
 
 Answer emergency_stop(ApiParts& parts, Request request) {
-  const auto record = co_await stop_robot(parts.station, request.param.at("robot_id"), request.actor);
+  StopRequest stop = stop_request(request);
+  stop.robot_id = request.param.at("robot_id");
+  const auto record = co_await stop_robot(parts.station, std::move(stop));
   if (!record) co_return problem(record.error());
   const int status = stop_status(*record);
   if (status == 202) co_await parts.recording.history.settle();
@@ -75,7 +147,7 @@ Answer emergency_stop(ApiParts& parts, Request request) {
 }
 
 Answer emergency_stop_all(ApiParts& parts, Request request) {
-  const StopsOfAll stops = co_await stop_all_robots(parts.loop, parts.tasks, parts.station, request.actor);
+  const StopsOfAll stops = co_await stop_all_robots(parts.loop, parts.tasks, parts.station, stop_request(request));
   int status = 200;
   for (const CommandRecord& record : stops.records) status = std::max(status, stop_status(record));
   if (status == 202) co_await parts.recording.history.settle();
@@ -124,7 +196,7 @@ void add_robot_routes(Router& router, ApiParts& parts) {
   add("GET", "/api/v1/robots", {}, list_robots);
   add("GET", "/api/v1/robots/{robot_id}", {}, get_robot);
   add("GET", "/api/v1/robots/{robot_id}/commands", {"limit"}, list_commands);
-  add("POST", "/api/v1/robots/{robot_id}/commands", {}, submit_command);
+  add("POST", "/api/v1/robots/{robot_id}/commands", {"wait"}, submit_command);
   add("POST", "/api/v1/robots/{robot_id}/emergency-stop", {}, emergency_stop);
   add("GET", "/api/v1/robots/{robot_id}/events", {"limit"}, list_events);
   add("GET", "/api/v1/commands/{command_id}", {}, get_command);

@@ -329,6 +329,10 @@ bool RobotSession::send(const protocol::Command& command, std::int64_t deadline_
   return true;
 }
 
+bool RobotSession::withdraw(CommandId id) {
+  return std::erase_if(commands_, [id](const QueuedCommand& queued) { return queued.command.command_id == id; }) > 0;
+}
+
 void RobotSession::send_emergency_stop(const protocol::Command& command) {
   commands_.clear();  // SAFETY: a stop supersedes everything queued for this robot
   if (stops_.size() >= kMaxQueuedStops) stops_.pop_front();

@@ -36,6 +36,7 @@ class RobotSession final : public RobotPort {
 
   const RobotId& robot_id() const override { return robot_id_; }
   bool send(const protocol::Command& command, std::int64_t deadline_us) override;
+  bool withdraw(CommandId id) override;
   void send_emergency_stop(const protocol::Command& command) override;
   void acknowledge(std::uint64_t durable_next_seq, std::uint64_t durable_next_event_seq) override;
   void request_resend(std::uint64_t first_seq, std::uint64_t next_seq) override;

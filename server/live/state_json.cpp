@@ -114,6 +114,11 @@ json to_json(const CommandRecord& record) {
   out["ended_at_us"] = time_or_null(record.ended_at_us);
   out["effect_at_robot_us"] = time_or_null(static_cast<std::int64_t>(record.effect_at_robot_us));
   out["emergency_id"] = id_text(record.emergency_id);
+  const auto stage = [](std::int64_t after_us) { return after_us < 0 ? json(nullptr) : json(after_us); };
+  out["sent_after_us"] = stage(record.sent_after_us);
+  out["acknowledged_after_us"] = stage(record.acknowledged_after_us);
+  out["verified_after_us"] = stage(record.verified_after_us);
+  out["life_from"] = record.life_from.empty() ? json(nullptr) : json(record.life_from);
   return out;
 }
 

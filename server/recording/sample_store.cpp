@@ -28,7 +28,8 @@ constexpr const char* kInsertEvent =
     " position_m, value, emergency_id, command_id, received_at_us) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
 constexpr const char* kUpsertCommand =
     "INSERT OR REPLACE INTO command (command_id, robot_id, boot_id, kind, arguments, actor, state, reason,"
-    " submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us, emergency_id) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?)";
+    " submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us, emergency_id, sent_after_us, acknowledged_after_us,"
+    " verified_after_us, life_from) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,nullif(?,-1),nullif(?,-1),nullif(?,-1),?)";
 
 }  // namespace
 
@@ -112,7 +113,8 @@ void SampleStore::write_event(const StoredEvent& stored) {
 void SampleStore::write_command(const CommandRecord& command) {
   execute(upsert_command_, command.id, command.robot_id, command.boot_id, command.kind, command.arguments,
           command.actor, text(command.state), command.reason, command.submitted_at_us, command.sent_at_us,
-          command.ended_at_us, command.effect_at_robot_us, command.emergency_id);
+          command.ended_at_us, command.effect_at_robot_us, command.emergency_id, command.sent_after_us,
+          command.acknowledged_after_us, command.verified_after_us, command.life_from);
 }
 
 }  // namespace server

@@ -244,7 +244,7 @@ FROM command;
 }  // namespace
 
 std::span<const char* const> migrations() {
-  static const std::array<const char*, 2> migrations{kFirstSchema, kSecondSchema};
+  static const std::array migrations{kFirstSchema, kSecondSchema, kThirdSchema};
   return migrations;
 }
 

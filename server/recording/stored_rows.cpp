@@ -9,7 +9,7 @@ namespace server {
 namespace {
 
 CommandState command_state_from(const std::string& name) {
-  for (int value = 0; value <= static_cast<int>(CommandState::failed); ++value) {
+  for (int value = 0; value <= static_cast<int>(kLastCommandState); ++value) {
     if (name == text(static_cast<CommandState>(value))) return static_cast<CommandState>(value);
   }
   return CommandState::failed;
@@ -45,7 +45,9 @@ protocol::EmergencyCause emergency_cause_from(const std::string& text) {
 std::string select_commands(const char* condition) {
   return fmt::format(
       "SELECT command_id, robot_id, boot_id, kind, arguments, actor, state, reason, submitted_at_us, sent_at_us,"
-      " ended_at_us, effect_at_robot_us, emergency_id FROM command {}",
+      " ended_at_us, effect_at_robot_us, emergency_id, coalesce(sent_after_us, -1), coalesce(acknowledged_after_us, "
+      "-1),"
+      " coalesce(verified_after_us, -1), life_from FROM command {}",
       condition);
 }
 
@@ -64,6 +66,10 @@ CommandRecord command_from(SQLite::Statement& row) {
   command.ended_at_us = row.getColumn(10).getInt64();
   command.effect_at_robot_us = unsigned_id(row.getColumn(11));
   command.emergency_id = unsigned_id(row.getColumn(12));
+  command.sent_after_us = row.getColumn(13).getInt64();
+  command.acknowledged_after_us = row.getColumn(14).getInt64();
+  command.verified_after_us = row.getColumn(15).getInt64();
+  command.life_from = row.getColumn(16).getString();
   return command;
 }
 

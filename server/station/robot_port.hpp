@@ -19,6 +19,9 @@ class RobotPort {
   // the command was not taken.
   virtual bool send(const protocol::Command& command, std::int64_t deadline_us) = 0;
 
+  // Takes a queued command back; false when it has left.
+  virtual bool withdraw(CommandId id) = 0;
+
   // SAFETY: written ahead of everything that waits; drops the queued commands it supersedes. Never refused. When
   // the link takes it at once, its frame leaves within this call.
   virtual void send_emergency_stop(const protocol::Command& command) = 0;

@@ -1,6 +1,7 @@
 // One robot's place in the station: its port while it is connected, and its commands on their way.
 #pragma once
 
+#include <deque>
 #include <limits>
 #include <set>
 #include <string>
@@ -10,10 +11,10 @@
 
 namespace server {
 
-// A command from submission to its end; the submitter waits for `ended`. Shared by the seat and the submitter, since
-// either may go first.
+// A command from submission to its end; the submitter waits for its answer, or its end. Shared by the seat and the
+// submitter, since either may go first.
 struct Station::PendingCommand {
-  explicit PendingCommand(boost::asio::io_context& loop) : ended{loop} {}
+  explicit PendingCommand(boost::asio::io_context& loop) : answered{loop}, ended{loop} {}
 
   bool is_stop() const { return wire.which_action == rheonaut_Command_emergency_stop_tag; }
 
@@ -21,16 +22,22 @@ struct Station::PendingCommand {
   protocol::Command wire = rheonaut_Command_init_zero;
   std::int64_t deadline_us = std::numeric_limits<std::int64_t>::max();  // steady
   std::uint64_t number = 0;       // counts the commands of its seat: a stop of a higher number was asked for later
+  std::int64_t received_us = 0;   // steady, when the request arrived at the station
   std::int64_t handed_at_us = 0;  // a stop: when it was last given to the link
-  Signal ended;
+  std::uint64_t look_from_robot_us = 0;  // acknowledged: older telemetry shows nothing of it
+  bool has_key = false;                  // of the client
+  bool is_timed = false;                 // a stop that counts in Station::stop_times()
+  bool is_overtaken = false;             // acknowledged, and a later one that moves the motor too
+  Signal answered, ended;
 };
 
 struct Station::Seat {
-  RobotState* robot = nullptr;  // in Station::robots_
-  RobotPort* port = nullptr;    // null while disconnected
-  std::map<CommandId, std::shared_ptr<PendingCommand>> commands;
-  ParameterTable parameters;                  // of the connection
-  std::set<std::string> told_in_force;        // kinds that the robot has said in the connection
+  RobotState* robot = nullptr;                                    // in Station::robots_
+  RobotPort* port = nullptr;                                      // null while disconnected
+  std::map<CommandId, std::shared_ptr<PendingCommand>> commands;  // that no robot has answered
+  std::deque<std::shared_ptr<PendingCommand>> unseen;             // acknowledged, to be seen in telemetry; oldest first
+  ParameterTable parameters;                                      // of the connection
+  std::set<std::string> told_in_force;                            // kinds that the robot has said in the connection
   std::uint64_t next_sample_at_robot_us = 0;  // when the robot makes its sample next_seq, as far as it is known
   ClockSync clock_sync;                       // of the boot that is, or was last, connected
   ClockRecord clock_recorded;                 // the latest of that boot; boot_id 0: none yet
@@ -41,6 +48,7 @@ struct Station::Seat {
   // Stops that no robot has acknowledged; the newest, null when there is none, and how many there are.
   std::shared_ptr<PendingCommand> newest_stop() const;
   std::size_t stops() const;
+  std::shared_ptr<PendingCommand> on_its_way(CommandId id) const;  // of both; null when it is none of them
 };
 
 }  // namespace server

@@ -191,6 +191,7 @@ void Station::on_disconnected(RobotPort& port, const std::string& reason) {
     if (!pending->is_stop()) ended.push_back(id);  // SAFETY: a stop is kept until a robot acknowledges it
   }
   for (const CommandId id : ended) finish(*seat, id, CommandState::failed, "link_lost");
+  end_unseen(*seat, "link_lost");
   note(robot, "disconnected", reason);
   publish(robot);
 }
@@ -246,6 +247,7 @@ void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) 
   }
   robot.oldest_seq = std::max(robot.oldest_seq, batch.oldest_seq);
   for (StationSink* sink : sinks_) sink->on_samples(robot, batch);
+  if (!seat->unseen.empty()) look_for_commands(*seat, batch);
 }
 
 void Station::on_event(RobotPort& port, const protocol::Event& event) {

@@ -17,10 +17,12 @@
 #include "server/result.hpp"
 #include "server/station/clock_sync.hpp"
 #include "server/station/command_gate.hpp"
+#include "server/station/recent_commands.hpp"
 #include "server/station/robot_archive.hpp"
 #include "server/station/robot_port.hpp"
 #include "server/station/station_sink.hpp"
 #include "server/station/station_state.hpp"
+#include "server/station/stop_times.hpp"
 
 namespace server {
 
@@ -36,7 +38,19 @@ struct CommandRequest {
   protocol::Command action;
   std::string arguments = "{}";  // as JSON, for the record
   std::string actor;
-  microseconds life{2'000'000};  // at most 10 s
+  microseconds life{2'000'000};       // at most 10 s, from when it was issued
+  microseconds age{0};                // it was issued so long before it arrived
+  std::string life_from = "arrival";  // how that is known, see CommandRecord
+  std::string key;                    // of the client, new for each wish; a wish that comes again is not sent again
+  std::int64_t received_us = 0;       // steady, when it arrived at the station; 0: now
+  bool until_verified = false;        // wait for more than the robot's answer
+};
+
+struct StopRequest {
+  RobotId robot_id;
+  std::string actor;
+  std::string key;               // as above: one press may come by two ways
+  std::int64_t received_us = 0;  // as above
 };
 
 class Station {
@@ -53,15 +67,20 @@ class Station {
   const std::map<RobotId, RobotState>& robots() const { return robots_; }
   const RobotState* find(const RobotId& id) const;
 
-  // The one door. Checks the request, sends it and waits for its end (acknowledged, rejected, expired or failed), which
-  // comes at most `life` and a second later. An error means that nothing was sent.
+  // The one door. Checks the request, sends it and waits for the robot's answer (acknowledged, rejected, expired,
+  // superseded or failed), which comes at most `life` and 2 s later, or with `until_verified` for its end. The record
+  // goes on to verified by itself. An error means that nothing was sent.
   boost::asio::awaitable<Result<CommandRecord>> submit(CommandRequest request);
 
   // SAFETY: the frame is handed to the link before anything else is done; then as submit, but at most `patience`. When
   // the robot is not connected, or does not answer in time, the stop is kept and sent first when it comes back; the
   // record then says queued or sent.
-  boost::asio::awaitable<Result<CommandRecord>> emergency_stop(RobotId robot_id, std::string actor,
-                                                               microseconds patience);
+  boost::asio::awaitable<Result<CommandRecord>> emergency_stop(StopRequest request, microseconds patience);
+
+  // A command with a client's key that is on its way or has ended lately: what asks again need not be sent again.
+  bool remembers(CommandId id) const;
+
+  const StopTimes& stop_times() const { return stop_times_; }
 
   // --- called by robot sessions (link/) ---
 
@@ -103,12 +122,23 @@ class Station {
   void record_in_force(Seat& seat, std::string kind, std::string content);
 
   std::shared_ptr<PendingCommand> make_pending(const CommandRequest& request, const RobotState& robot);
-  void restore_stop(const CommandRecord& record);
+  Result<void> check_request(const CommandRequest& request, const Seat& seat) const;
+  Result<std::shared_ptr<PendingCommand>> same_wish(const CommandRequest& request, const Seat& seat);
+  boost::asio::awaitable<Result<CommandRecord>> follow(std::shared_ptr<PendingCommand> pending, bool until_verified,
+                                                       microseconds patience);
   void add_pending(Seat& seat, const std::shared_ptr<PendingCommand>& pending);
+  void supersede_queued(Seat& seat, const PendingCommand& newer);
+  void acknowledge(Seat& seat, CommandId id, std::string reason);
+  void finish(Seat& seat, CommandId id, CommandState state, std::string reason);
+  void end(PendingCommand& pending, CommandState state, std::string reason);
+  void expire_commands(Seat& seat);
+  void look_for_commands(Seat& seat, const SampleBatch& batch);
+  void end_unseen(Seat& seat, const char* reason);
+
+  void restore_stop(const CommandRecord& record);
+  std::shared_ptr<PendingCommand> stop_in_force(Seat& seat, const StopRequest& request);
   void hand_stop_to(Seat& seat, PendingCommand& stop);
   void repeat_stop(Seat& seat);
-  void finish(Seat& seat, CommandId id, CommandState state, std::string reason);
-  void expire_commands(Seat& seat);
   void settle_stops(Seat& seat, const PendingCommand& acknowledged, const protocol::CommandAck& ack);
 
   boost::asio::io_context& loop_;
@@ -120,6 +150,8 @@ class Station {
   std::unordered_map<const RobotPort*, Seat*> occupied_;  // seats, by who sits there
   SampleBatch batch_;                                     // of the frame that is being taken; kept for its memory
   std::vector<StationSink*> sinks_;
+  RecentCommands recent_;  // that had a key, and have ended
+  StopTimes stop_times_;
 };
 
 }  // namespace server

@@ -151,11 +151,17 @@ struct RobotState {
 enum class CommandState : std::uint8_t {
   queued,        // accepted by the station, not written yet
   sent,          // its frame was written
-  acknowledged,  // the robot accepted it
+  acknowledged,  // the robot accepted it; the last state of one that telemetry cannot show, or could not: `reason`
+  verified,      // telemetry has shown what it was to bring about
   rejected,      // the robot refused it: `reason`
   expired,       // its life ended before it took effect
-  failed,        // the link ended before an answer, or a newer command took its place: `reason`
+  failed,        // the link ended before an answer, or telemetry went on without showing it: `reason`
+  superseded,    // a newer command took its place before it was sent, or could be seen
 };
+inline constexpr auto kLastCommandState = CommandState::superseded;
+constexpr bool was_accepted(CommandState state) {  // by the robot
+  return state == CommandState::acknowledged || state == CommandState::verified;
+}
 const char* text(CommandState value);
 
 // One command from submission to its end. What is published is always a copy.
@@ -173,6 +179,13 @@ struct CommandRecord {
   std::int64_t ended_at_us = 0;
   std::uint64_t effect_at_robot_us = 0;
   std::uint64_t emergency_id = 0;  // the latch after it, as the robot says
+
+  // Steady time from the request's arrival at the station to each stage, so no clock that is set bends it; -1: not
+  // reached. A stop's are its latency: the frame left, the robot has obeyed, duty 0 was seen.
+  std::int64_t sent_after_us = -1;
+  std::int64_t acknowledged_after_us = -1;
+  std::int64_t verified_after_us = -1;
+  std::string life_from;  // its life counts from: "arrival", "stamp" (of /live), "issued_at"; empty for a stop
 };
 
 }  // namespace server

@@ -1,4 +1,5 @@
-// The least that can record robots: the yardstick of tests/bench/recording_bench. LONG: it is one file on purpose.
+// The least that can record robots and stop them: the yardstick of tests/bench/recording_bench and
+// tests/bench/stop_bench. LONG: it is one file on purpose.
 //
 //   bare_loop DATABASE         receives, and stores as the station does: the same tables, rows, settings and durability
 //   bare_loop --no-disk        receives and acknowledges, stores nothing
@@ -8,9 +9,12 @@
 // it allocates per frame. A second thread writes the full groups, one transaction per 100 ms, and says what is durable.
 // Each robot gets the acknowledgements, signs of life and clock probes that the station sends.
 //
-// It believes everything: no checks of values, no gaps, no duplicates, no reconnects, no commands, no second robot of a
-// name, no full queue, no failing disk. Prints its port; ends when its input does, with a line of JSON.
-#include <arpa/inet.h>
+// A request on its HTTP port, whatever it says, is a stop of the robot that it names between the fourth slash and the
+// fifth: the frame is sent in the same turn, and the robot's answer is the answer.
+//
+// It believes everything: no checks of values, no gaps, no duplicates, no reconnects, no other commands, no second
+// robot of a name, no full queue, no failing disk, no record of a stop. Prints its ports, robots' and HTTP; ends when
+// its input does, with a line of JSON.
 #include <netinet/tcp.h>
 #include <sqlite3.h>
 #include <sys/epoll.h>
@@ -34,8 +38,12 @@
 
 #include "protocol/frame.hpp"
 #include "server/recording/database.hpp"
+#include "tests/bench/bare_stops.hpp"
+#include "tests/bench/bare_wire.hpp"
 
 namespace {
+
+using bare::WireReader;
 
 constexpr std::size_t kChannels = 6;
 constexpr std::size_t kGroupSamples = 100;
@@ -80,47 +88,6 @@ struct Robot {
   std::unique_ptr<Group> group;
   std::array<std::uint8_t, protocol::kMaxFramedBytes> rest;  // of a frame that is not complete
   std::size_t rest_size = 0;
-};
-
-class WireReader {
- public:
-  WireReader(const std::uint8_t* first, const std::uint8_t* end) : at_(first), end_(end) {}
-  bool more() const { return at_ < end_; }
-  std::uint64_t varint() {
-    std::uint64_t value = 0;
-    for (unsigned shift = 0; at_ < end_ && shift < 64; shift += 7) {
-      const std::uint8_t byte = *at_++;
-      value |= std::uint64_t{byte & 0x7FU} << shift;
-      if (byte < 0x80) break;
-    }
-    return value;
-  }
-  template <class Number>
-  Number fixed() {
-    Number value{};
-    if (end_ - at_ >= static_cast<std::ptrdiff_t>(sizeof value)) std::memcpy(&value, at_, sizeof value);
-    skip(sizeof value);
-    return value;
-  }
-  WireReader message() {
-    const std::uint64_t size = varint();
-    const std::uint8_t* const first = at_;
-    skip(size);
-    return {first, at_};
-  }
-  const std::uint8_t* at() const { return at_; }
-  std::size_t size() const { return static_cast<std::size_t>(end_ - at_); }
-  void skip_value(unsigned wire_type) {
-    if (wire_type == 0) varint();
-    if (wire_type == 1) skip(8);
-    if (wire_type == 2) message();
-    if (wire_type == 5) skip(4);
-  }
-
- private:
-  void skip(std::uint64_t count) { at_ += std::min<std::uint64_t>(count, static_cast<std::uint64_t>(end_ - at_)); }
-  const std::uint8_t* at_;
-  const std::uint8_t* end_;
 };
 
 void read_telemetry(WireReader in, Telemetry& to) {
@@ -357,21 +324,13 @@ class BareLoop {
  public:
   BareLoop(std::unique_ptr<Disk> disk, bool decodes) : disk_{std::move(disk)}, decodes_{decodes} {
     robots_.reserve(30'000);
-    listener_ = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof address;
-    if (bind(listener_, reinterpret_cast<sockaddr*>(&address), size) != 0 || listen(listener_, 4096) != 0) {
-      throw std::runtime_error{"cannot listen on the loopback address"};
-    }
-    getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &size);
-    port_ = ntohs(address.sin_port);
     watch(listener_, kListener);
+    watch(desk_.listener(), kHttpListener);
     watch(STDIN_FILENO, kInput);
   }
 
-  std::uint16_t port() const { return port_; }
+  std::uint16_t port() const { return bare::port_of(listener_); }
+  std::uint16_t http_port() const { return bare::port_of(desk_.listener()); }
 
   void run() {
     std::array<epoll_event, 256> ready{};
@@ -382,6 +341,11 @@ class BareLoop {
         if (who == kInput) return;
         if (who == kListener) {
           accept_all();
+        } else if (who == kHttpListener) {
+          const int fd = desk_.accept_asker();
+          if (fd >= 0) watch(fd, kFirstAsker + static_cast<std::uint64_t>(fd));
+        } else if (who >= kFirstAsker) {
+          take_request(static_cast<int>(who - kFirstAsker));
         } else {
           read(who);
         }
@@ -400,6 +364,7 @@ class BareLoop {
 
  private:
   static constexpr std::uint64_t kListener = ~std::uint64_t{0}, kInput = kListener - 1;
+  static constexpr std::uint64_t kHttpListener = kListener - 2, kFirstAsker = std::uint64_t{1} << 40;
   static constexpr std::size_t kSweeps = 20;  // slices of robots, one each 10 ms
 
   void watch(int fd, std::uint64_t who) {
@@ -416,6 +381,27 @@ class BareLoop {
       Robot& robot = robots_.emplace_back();
       robot.fd = fd;
       watch(fd, robots_.size() - 1);
+    }
+  }
+
+  void take_request(int fd) {
+    const auto wish = desk_.read_wish(fd);
+    if (!wish) return;
+    const auto robot = std::find_if(robots_.begin(), robots_.end(),
+                                    [&wish](const Robot& one) { return one.fd >= 0 && one.id == *wish; });
+    if (robot == robots_.end()) return bare::StopDesk::answer(fd, "404 Not Found");
+    protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
+    frame.which_body = rheonaut_StationFrame_command_tag;
+    frame.body.command.command_id = desk_.new_stop(fd);
+    frame.body.command.which_action = rheonaut_Command_emergency_stop_tag;
+    send(*robot, frame);
+  }
+
+  void take_answer(WireReader ack) {
+    while (ack.more()) {
+      const std::uint64_t tag = ack.varint();
+      if (tag >> 3 == rheonaut_CommandAck_command_id_tag) return desk_.answer_stop(ack.fixed<std::uint64_t>());
+      ack.skip_value(tag & 7);
     }
   }
 
@@ -457,6 +443,8 @@ class BareLoop {
         take_samples(who, batch);
       } else if (tag >> 3 == rheonaut_RobotFrame_hello_tag) {
         welcome(who, in.message());
+      } else if (tag >> 3 == rheonaut_RobotFrame_command_ack_tag) {
+        take_answer(in.message());
       } else {
         in.skip_value(tag & 7);
       }
@@ -559,8 +547,8 @@ class BareLoop {
   std::unique_ptr<Disk> disk_;
   bool decodes_;
   int epoll_ = epoll_create1(0);
-  int listener_ = -1;
-  std::uint16_t port_ = 0;
+  int listener_ = bare::listen_on_loopback();
+  bare::StopDesk desk_;
   std::vector<Robot> robots_;
   std::array<std::uint8_t, 65536> input_{};
   std::vector<Durable> durable_;
@@ -581,7 +569,7 @@ int main(int argc, char** argv) try {
   const std::string what = argv[1];
   const bool keeps = !what.starts_with("--");
   BareLoop loop{keeps ? std::make_unique<Disk>(what) : nullptr, what != "--bytes"};
-  std::cout << loop.port() << std::endl;
+  std::cout << loop.port() << ' ' << loop.http_port() << std::endl;
   loop.run();
   loop.print_summary();
   return 0;

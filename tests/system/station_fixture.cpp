@@ -50,13 +50,13 @@ boost::asio::awaitable<void> SystemTest::submit(std::uint64_t id, protocol::Comm
   request.robot_id = "sim-1";
   request.action = action;
   request.actor = "test";
-  auto answered = is_stop ? station.emergency_stop("sim-1", "test", 1s) : station.submit(request);
+  auto answered = is_stop ? station.emergency_stop({"sim-1", "test", "", 0}, 1s) : station.submit(request);
   const Result<CommandRecord> result = co_await std::move(answered);
   if (!result) {
     answers_[id].text = result.error().reason;
     co_return;
   }
-  const bool is_done = result->state == CommandState::acknowledged;
+  const bool is_done = was_accepted(result->state);
   const std::string otherwise = result->reason.empty() ? text(result->state) : result->reason;
   answers_[id] = {is_done ? "accepted" : otherwise, result->emergency_id, result->effect_at_robot_us};
 }

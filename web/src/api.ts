@@ -46,7 +46,12 @@ const kReasons: Record<string, string> = {
   unsupported: 'This firmware does not have it.',
   not_connected: 'The robot is not connected.',
   expired: 'It arrived too late and was discarded.',
-  superseded_by_emergency_stop: 'An emergency stop took its place.',
+  superseded: 'Another command took its place.',
+  by_emergency_stop: 'An emergency stop took its place.',
+  by_an_emergency: 'An emergency took its place.',
+  by_a_newer_command: 'A newer command took its place.',
+  not_seen_in_telemetry: 'The robot accepted it, and telemetry does not show it.',
+  too_old_on_arrival: 'It arrived too late and was discarded.',
   stopped_by_another_stop: 'Another stop had stopped it already.',
   timed_out: 'The robot did not answer in time.',
   no_answer: 'The robot did not answer in time.',
@@ -75,10 +80,11 @@ export class Api {
   clear_emergency = (robot_id: string, emergency_id: string) =>
     this.command(robot_id, { kind: 'clear_emergency', emergency_id });
 
-  emergency_stop = async (robot_id: string) => [
-    await this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/emergency-stop`),
+  emergency_stop = async (robot_id: string, key: string) => [
+    await this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/emergency-stop`, undefined, key),
   ];
-  emergency_stop_all = async () => (await this.ask<{ commands: CommandRecord[] }>('POST', '/emergency-stop')).commands;
+  emergency_stop_all = async (key: string) =>
+    (await this.ask<{ commands: CommandRecord[] }>('POST', '/emergency-stop', undefined, key)).commands;
 
   station = () => this.ask<Station>('GET', '/station');
   open_run = async (robot_id: string) => {
@@ -99,9 +105,14 @@ export class Api {
     return this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/commands`, body);
   }
 
-  private async ask<Answer>(method: string, path: string, body?: object): Promise<Answer> {
-    const options: RequestInit = { method, signal: AbortSignal.timeout(kPatience_ms) };
-    if (body) Object.assign(options, { body: JSON.stringify(body), headers: { 'Content-Type': 'application/json' } });
+  private async ask<Answer>(method: string, path: string, body?: object, key?: string): Promise<Answer> {
+    const headers: Record<string, string> = {};
+    const options: RequestInit = { method, headers, signal: AbortSignal.timeout(kPatience_ms) };
+    if (key) headers['Idempotency-Key'] = key;
+    if (body) {
+      headers['Content-Type'] = 'application/json';
+      options.body = JSON.stringify(body);
+    }
     const answer = await this.fetch(`/api/v1${path}`, options).catch(() => {
       throw new ApiError('The station did not answer.', 0);
     });

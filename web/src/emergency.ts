@@ -15,9 +15,10 @@ export interface StopState {
   detail: string;
 }
 
+// `key` names the press, so that the station knows it again when it comes by the second way.
 export interface StopWays {
-  over_socket(robot_id: string | null): boolean;
-  over_http(robot_id: string | null): Promise<CommandRecord[]>;
+  over_socket(robot_id: string | null, key: string): boolean;
+  over_http(robot_id: string | null, key: string): Promise<CommandRecord[]>;
   now_ms(): number;
   on_change(state: StopState): void;
 }
@@ -33,9 +34,10 @@ export class EmergencyStop {
   async stop(robot_id: string | null): Promise<void> {
     const press = ++this.press;
     const pressed_at_ms = this.ways.now_ms();
+    const key = new_key();
     // SAFETY: both leave in this very call, before anything is drawn.
-    const by_socket = sent_without_throwing(() => this.ways.over_socket(robot_id));
-    const answer = this.ways.over_http(robot_id);
+    const by_socket = sent_without_throwing(() => this.ways.over_socket(robot_id, key));
+    const answer = this.ways.over_http(robot_id, key);
     const show = (phase: StopPhase, detail: string) => {
       if (press !== this.press) return; // a later press shows its own state
       const answered_after_ms = phase === 'sent' ? null : this.ways.now_ms() - pressed_at_ms;
@@ -59,12 +61,18 @@ export class EmergencyStop {
   }
 }
 
+// Random, also on a page without TLS, where the browser has no randomUUID.
+function new_key(): string {
+  const words = crypto.getRandomValues(new Uint32Array(4));
+  return Array.from(words, (word) => word.toString(16)).join('-');
+}
+
 // One word for the answers of all robots that were stopped: the worst decides.
 function judge(records: CommandRecord[]): [StopPhase, string] {
   if (records.length === 0) return ['failed', 'The station knows no robot.'];
   const kept = records.filter((record) => record.state === 'queued');
   const waiting = records.filter((record) => record.state === 'sent');
-  const others = records.filter((record) => !['queued', 'sent', 'acknowledged'].includes(record.state));
+  const others = records.filter((record) => !['queued', 'sent', 'acknowledged', 'verified'].includes(record.state));
   const names = (list: CommandRecord[]) => list.map((record) => record.robot_id).join(', ');
   if (others.length > 0) return ['failed', `${names(others)}: ${others[0]?.reason || others[0]?.state}`];
   if (kept.length > 0) return ['kept', names(kept)];

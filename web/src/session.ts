@@ -38,8 +38,9 @@ export class Session {
       () => this.on_phase(),
     );
     this.emergency = new EmergencyStop({
-      over_socket: (robot_id) => this.link.send({ type: 'emergency_stop', robot_id }),
-      over_http: (robot_id) => (robot_id === null ? this.api.emergency_stop_all() : this.api.emergency_stop(robot_id)),
+      over_socket: (robot_id, key) => this.link.send({ type: 'emergency_stop', robot_id, key }),
+      over_http: (robot_id, key) =>
+        robot_id === null ? this.api.emergency_stop_all(key) : this.api.emergency_stop(robot_id, key),
       now_ms: () => performance.now(),
       on_change: (state) => (this.stop_state.value = state),
     });

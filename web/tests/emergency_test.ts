@@ -8,14 +8,16 @@ import { settle } from './fakes';
 const record = (state: CommandRecord['state'], robot_id = 'rheo-1', reason = '') => ({ state, robot_id, reason }) as CommandRecord;
 
 function stop_with(over_http: () => Promise<CommandRecord[]>, over_socket: () => boolean = () => true) {
-  const world = { now_ms: 0, ways: [] as string[], states: [] as StopState[] };
+  const world = { now_ms: 0, ways: [] as string[], keys: [] as string[], states: [] as StopState[] };
   const emergency = new EmergencyStop({
-    over_socket: (robot_id) => {
+    over_socket: (robot_id, key) => {
       world.ways.push(`socket ${robot_id}`);
+      world.keys.push(key);
       return over_socket();
     },
-    over_http: (robot_id) => {
+    over_http: (robot_id, key) => {
       world.ways.push(`http ${robot_id}`);
+      world.keys.push(key);
       return over_http();
     },
     now_ms: () => world.now_ms,
@@ -29,6 +31,23 @@ test('leaves over both ways in the call that pressed it', () => {
   void emergency.stop('rheo-1');
   expect(world.ways).toEqual(['socket rheo-1', 'http rheo-1']);
   expect(emergency.state.phase).toBe('sent');
+});
+
+test('one press has one key on both ways, the next press another', () => {
+  const { emergency, world } = stop_with(() => new Promise(() => undefined));
+  void emergency.stop('rheo-1');
+  void emergency.stop('rheo-1');
+  const [first, second, third, fourth] = world.keys;
+  expect(first).toMatch(/^[A-Za-z0-9._:-]{1,64}$/);
+  expect(second).toBe(first);
+  expect(fourth).toBe(third);
+  expect(third).not.toBe(first);
+});
+
+test('a stop that telemetry has shown already is shown as stopped', async () => {
+  const { emergency } = stop_with(() => Promise.resolve([record('verified')]));
+  await emergency.stop('rheo-1');
+  expect(emergency.state.phase).toBe('stopped');
 });
 
 test('a broken socket does not keep it from the other way', async () => {

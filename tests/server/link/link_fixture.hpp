@@ -34,20 +34,30 @@ class LinkTest : public ::testing::Test {
   }
 
   // Submits without waiting for the end; the result appears in `results`.
-  void submit(protocol::Command action, microseconds life = 2s) {
+  static CommandRequest request_of(protocol::Command action, microseconds life = 2s) {
     CommandRequest request;
     request.robot_id = "r1";
     request.action = action;
     request.actor = "test";
     request.life = life;
-    tasks.spawn("submit", run_submit(request));
+    return request;
   }
-  void stop_robot(microseconds patience = 1s) { tasks.spawn("stop", run_stop(patience)); }
+  void submit(CommandRequest request) { tasks.spawn("submit", run_submit(std::move(request))); }
+  void submit(protocol::Command action, microseconds life = 2s) { submit(request_of(action, life)); }
+  void stop_robot(microseconds patience = 1s, std::string key = "") {
+    tasks.spawn("stop", run_stop({"r1", "test", std::move(key), 0}, patience));
+  }
 
   static protocol::Command set_duty(float duty) {
     protocol::Command command = rheonaut_Command_init_zero;
     command.which_action = rheonaut_Command_set_duty_tag;
     command.action.set_duty.duty = duty;
+    return command;
+  }
+  static protocol::Command set_setpoint(float setpoint_m) {
+    protocol::Command command = rheonaut_Command_init_zero;
+    command.which_action = rheonaut_Command_set_setpoint_tag;
+    command.action.set_setpoint.setpoint_m = setpoint_m;
     return command;
   }
   static protocol::Command clear_emergency(std::uint64_t emergency_id) {
@@ -76,8 +86,8 @@ class LinkTest : public ::testing::Test {
     auto result = co_await station.submit(std::move(request));
     results.push_back(std::move(result));
   }
-  boost::asio::awaitable<void> run_stop(microseconds patience) {
-    auto result = co_await station.emergency_stop("r1", "test", patience);
+  boost::asio::awaitable<void> run_stop(StopRequest request, microseconds patience) {
+    auto result = co_await station.emergency_stop(std::move(request), patience);
     results.push_back(std::move(result));
   }
 

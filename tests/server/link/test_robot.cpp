@@ -41,8 +41,8 @@ void TestRobot::send_bytes(std::vector<std::uint8_t> bytes) {
   tasks_.spawn("test robot writes", write(std::move(bytes)));
 }
 
-void TestRobot::send_samples(std::uint64_t first_seq, pb_size_t count, std::uint64_t robot_time_us,
-                             std::uint64_t emergency_id) {
+protocol::RobotFrame TestRobot::samples_frame(std::uint64_t first_seq, pb_size_t count, std::uint64_t robot_time_us,
+                                              std::uint64_t emergency_id) {
   protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
   frame.which_body = rheonaut_RobotFrame_telemetry_tag;
   protocol::Telemetry& batch = frame.body.telemetry;
@@ -54,7 +54,7 @@ void TestRobot::send_samples(std::uint64_t first_seq, pb_size_t count, std::uint
   batch.position_m_count = batch.velocity_m_s_count = batch.acceleration_m_s2_count = count;
   batch.duty_count = batch.impedance_mv_count = batch.reference_m_count = count;
   for (pb_size_t i = 0; i < count; ++i) batch.position_m[i] = static_cast<float>(first_seq + i);
-  send(frame);
+  return frame;
 }
 
 void TestRobot::acknowledge(const protocol::Command& command, protocol::CommandResult result,

@@ -46,11 +46,16 @@ class TestRobot {
             std::size_t capacity_bytes = 64 * 1024);
 
   static protocol::RobotFrame hello_frame(protocol::Mode mode = rheonaut_MODE_MANUAL);
+  // At rest, in manual or in this emergency.
+  static protocol::RobotFrame samples_frame(std::uint64_t first_seq, pb_size_t count, std::uint64_t robot_time_us,
+                                            std::uint64_t emergency_id);
 
   void send(protocol::RobotFrame frame);  // stamps robot_time_us when it is 0
   void send_bytes(std::vector<std::uint8_t> bytes);
   void say_hello() { send(hello_frame()); }
-  void send_samples(std::uint64_t first_seq, pb_size_t count, std::uint64_t robot_time_us, std::uint64_t emergency_id);
+  void send_samples(std::uint64_t first_seq, pb_size_t count, std::uint64_t robot_time_us, std::uint64_t emergency_id) {
+    send(samples_frame(first_seq, count, robot_time_us, emergency_id));
+  }
   void acknowledge(const protocol::Command& command, protocol::CommandResult result, std::uint64_t emergency_id = 0,
                    protocol::RejectReason reason = rheonaut_REJECT_REASON_NONE);
   void keep_talking();  // a heartbeat every 200 ms

@@ -36,8 +36,9 @@ function describe({ event, command, note }: LogLine): [tone: string, sort: strin
   if (command) {
     const refused = ['rejected', 'expired', 'failed'].includes(command.state);
     const alarm = command.kind === 'emergency_stop';
+    const off = alarm && command.verified_after_us !== null ? ` · motor off after ${(command.verified_after_us / 1000).toFixed(1)} ms` : '';
     const end = refused ? `${command.state}: ${sentence(command.reason)}` : command.state;
-    return [refused ? 'caution' : alarm ? 'alarm' : '', 'command', `${words(command.kind)}${arguments_text(command.arguments)} · ${end}`];
+    return [refused ? 'caution' : alarm ? 'alarm' : '', 'command', `${words(command.kind)}${arguments_text(command.arguments)} · ${end}${off}`];
   }
   if (event) {
     const alarm = event.kind === 'emergency';

@@ -1,0 +1,85 @@
+// One comparison a kind of command, over the samples that were made after its effect.
+#include "server/station/telemetry_verifier.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+namespace server {
+namespace {
+
+constexpr float kSameDuty = 0.001F;  // a duty is a float on its whole way
+
+// Made at or after the time.
+std::span<const Sample> samples_from(const SampleBatch& batch, std::uint64_t robot_time_us) {
+  const std::span<const Sample> all{batch.samples};
+  if (batch.first_robot_time_us >= robot_time_us) return all;
+  const std::uint64_t period_us = std::max<std::uint64_t>(batch.context.period_us, 1);
+  const std::uint64_t before = (robot_time_us - batch.first_robot_time_us + period_us - 1) / period_us;
+  return before >= all.size() ? std::span<const Sample>{} : all.subspan(before);
+}
+
+bool is_shown(const protocol::Command& command, std::uint64_t emergency_id, const SampleContext& context,
+              std::span<const Sample> samples) {
+  const auto has_duty = [samples](float duty) {
+    return std::ranges::any_of(samples, [duty](const Sample& one) { return std::abs(one.duty - duty) <= kSameDuty; });
+  };
+  const bool is_auto = context.mode == rheonaut_MODE_AUTO;
+  switch (command.which_action) {
+    case rheonaut_Command_set_mode_tag: {
+      const auto& wanted = command.action.set_mode;
+      return context.mode == wanted.mode && (!wanted.has_setpoint_m || context.setpoint_m == wanted.setpoint_m);
+    }
+    case rheonaut_Command_set_setpoint_tag:
+      return is_auto && context.setpoint_m == command.action.set_setpoint.setpoint_m;
+    case rheonaut_Command_set_duty_tag: return has_duty(command.action.set_duty.duty);
+    case rheonaut_Command_emergency_stop_tag: {
+      const bool is_off = std::ranges::any_of(samples, [](const Sample& one) { return one.duty == 0.0F; });
+      return context.emergency_id != 0 && is_off;
+    }
+    case rheonaut_Command_clear_emergency_tag: return context.emergency_id == emergency_id;
+    case rheonaut_Command_inject_disturbance_tag:
+      return context.disturbance_m == command.action.inject_disturbance.disturbance_m;
+    default: return false;
+  }
+}
+
+}  // namespace
+
+bool can_be_seen(const protocol::Command& command) {
+  switch (command.which_action) {
+    case rheonaut_Command_set_mode_tag:
+    case rheonaut_Command_set_setpoint_tag:
+    case rheonaut_Command_set_duty_tag:
+    case rheonaut_Command_emergency_stop_tag:
+    case rheonaut_Command_clear_emergency_tag:
+    case rheonaut_Command_inject_disturbance_tag: return true;
+    default: return false;
+  }
+}
+
+bool is_for_the_motor(const protocol::Command& command) {
+  switch (command.which_action) {
+    case rheonaut_Command_set_mode_tag:
+    case rheonaut_Command_set_setpoint_tag:
+    case rheonaut_Command_set_duty_tag:
+    case rheonaut_Command_set_duty_schedule_tag:
+    case rheonaut_Command_inject_disturbance_tag:
+    case rheonaut_Command_emergency_stop_tag:
+    case rheonaut_Command_clear_emergency_tag: return true;
+    default: return false;
+  }
+}
+
+Sight look_for(const protocol::Command& command, std::uint64_t effect_at_robot_us, std::uint64_t emergency_id,
+               const SampleBatch& batch) {
+  const std::span<const Sample> samples = samples_from(batch, effect_at_robot_us);
+  if (samples.empty()) return Sight::unseen;
+  if (is_shown(command, emergency_id, batch.context, samples)) return Sight::seen;
+  const bool is_stop = command.which_action == rheonaut_Command_emergency_stop_tag;
+  if (!is_stop && batch.context.emergency_id != emergency_id) return Sight::overtaken;
+  const std::uint64_t last_us = batch.first_robot_time_us + (batch.samples.size() - 1) * batch.context.period_us;
+  return last_us >= effect_at_robot_us + kVerifyWindowUs ? Sight::missed : Sight::unseen;
+}
+
+}  // namespace server

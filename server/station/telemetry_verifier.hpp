@@ -1,0 +1,29 @@
+// Whether telemetry shows what a command was to bring about. Pure.
+#pragma once
+
+#include "server/station/station_state.hpp"
+
+namespace server {
+
+// Telemetry of at most this much robot time after the effect must show it.
+inline constexpr std::uint64_t kVerifyWindowUs = 500'000;
+
+// False for what no sample can show: a lease, a ping, the position's zero, a schedule that has its own times.
+bool can_be_seen(const protocol::Command& command);
+
+// True when the robot's motor may run differently after it: another one of these takes its place.
+bool is_for_the_motor(const protocol::Command& command);
+
+enum class Sight : std::uint8_t {
+  unseen,    // the batch was made too early to tell, or shows something else within the window
+  seen,      //
+  missed,    // the window has passed
+  overtaken  // an emergency has taken the place of what was ordered
+};
+
+// What the batch says of a command that took effect at this time, and left this latch (emergency_id), as the robot
+// answered. A stop is seen in a sample with duty 0 of a robot that is latched.
+Sight look_for(const protocol::Command& command, std::uint64_t effect_at_robot_us, std::uint64_t emergency_id,
+               const SampleBatch& batch);
+
+}  // namespace server
