@@ -53,6 +53,7 @@ int serve(const Config& config) {
                 station, live,  recording, analysis};
 
   recording.spawn(tasks);
+  tasks.spawn("control", station.watch_control());
   tasks.spawn("live feed", live.run());
   tasks.spawn("robots", robots.run());
   tasks.spawn("api", api.run());

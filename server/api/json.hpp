@@ -13,6 +13,7 @@
 #include "server/live/state_json.hpp"
 #include "server/recording/history.hpp"
 #include "server/result.hpp"
+#include "server/station/station.hpp"
 
 namespace server {
 
@@ -52,6 +53,9 @@ struct ParsedCommand {
 
 // The body of POST …/commands, e.g. {"kind":"set_setpoint","setpoint_m":0.1,"life_ms":2000}.
 Result<ParsedCommand> parse_command(const std::string& body);
+
+// The body of POST …/control, e.g. {"action":"take","lease_ms":3000}; robot and actor are left empty.
+Result<ControlRequest> parse_control(const std::string& body);
 
 struct RunWish {
   RobotId robot_id;

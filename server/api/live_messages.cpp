@@ -55,6 +55,16 @@ Result<void> on_emergency_stop(const Members& message, const std::string& actor,
   return {};
 }
 
+// With the latest stamp it keeps what the page controls.
+Result<void> on_keep_alive(const Members& message, const std::string& actor, LiveParts& parts) {
+  if (auto known = message.only({"type", "stamp_us"}); !known) return known;
+  if (!message.has("stamp_us")) return {};
+  const auto stamp_us = message.integer("stamp_us", 0, INT64_MAX);
+  if (!stamp_us) return std::unexpected{stamp_us.error()};
+  parts.station.keep_control(actor, microseconds{parts.clock.steady_us() - *stamp_us});
+  return {};
+}
+
 Result<void> on_renew_lease(const Members& message, const std::string& actor, LiveParts& parts) {
   if (auto known = message.only({"type", "robot_id", "stamp_us"}); !known) return known;
   const auto robot_id = known_robot(message, parts);
@@ -80,9 +90,10 @@ Result<void> on_renew_lease(const Members& message, const std::string& actor, Li
 
 }  // namespace
 
-std::string welcome_message(const LiveParts& parts) {
+std::string welcome_message(const std::string& actor, const LiveParts& parts) {
   json message;
   message["type"] = "welcome";
+  message["actor"] = actor;
   message["version"] = parts.version;
   message["utc_us"] = parts.clock.utc_us();
   message["stamp_us"] = parts.clock.steady_us();
@@ -98,7 +109,7 @@ Result<void> on_page_message(const std::string& text, const std::string& actor, 
   if (!type) return std::unexpected{type.error()};
   if (*type == "emergency_stop") return on_emergency_stop(*message, actor, parts);
   if (*type == "renew_lease") return on_renew_lease(*message, actor, parts);
-  if (*type == "keep_alive") return message->only({"type"});
+  if (*type == "keep_alive") return on_keep_alive(*message, actor, parts);
   return fail(ErrorCode::invalid, fmt::format("unknown message type '{}'", *type), "unknown_type");
 }
 

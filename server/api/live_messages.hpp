@@ -26,7 +26,7 @@ struct LiveParts {
 inline constexpr std::int64_t kMaxStampAgeUs = 400'000;
 inline constexpr std::size_t kMaxRenewals = 256;
 
-std::string welcome_message(const LiveParts& parts);
+std::string welcome_message(const std::string& actor, const LiveParts& parts);
 
 // Acts on one message. Returns at once: a stop or a renewal goes on as a task, and what becomes of it is heard as
 // `command`. The error, if any, is for the page.

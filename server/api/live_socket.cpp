@@ -44,7 +44,7 @@ class LivePage {
     const auto [error] = co_await socket_.async_accept(upgrade, asio::as_tuple(asio::use_awaitable));
     if (error) co_return;
     parts_.live.add(queue_);
-    queue_.push(std::make_shared<const std::string>(welcome_message(parts_)), false);
+    queue_.push(std::make_shared<const std::string>(welcome_message(actor_, parts_)), false);
     co_await (read() || write() || watch());
   }
 

@@ -184,6 +184,44 @@ Result<ParsedCommand> parse_command(const std::string& text) {
   return command;
 }
 
+Result<ControlRequest> parse_control(const std::string& text) {
+  const auto body = Members::parse(text, {"action", "lease_ms", "reason"});
+  if (!body) return std::unexpected{body.error()};
+  const auto action = body->text("action", 1, kMaxNameBytes);
+  if (!action) return std::unexpected{action.error()};
+  constexpr std::pair<const char*, ControlAction> kActions[] = {{"take", ControlAction::take},
+                                                                {"force", ControlAction::force},
+                                                                {"release", ControlAction::release},
+                                                                {"request", ControlAction::request},
+                                                                {"hand_over", ControlAction::hand_over}};
+  const auto* known = std::ranges::find(kActions, *action, [](const auto& one) { return std::string{one.first}; });
+  if (known == std::end(kActions)) {
+    return fail(ErrorCode::invalid,
+                fmt::format("action = '{}' is none of take, force, release, request, hand_over", action->substr(0, 40)),
+                "out_of_range");
+  }
+  ControlRequest request;
+  request.action = known->second;
+  if (body->has("lease_ms")) {
+    if (request.action != ControlAction::take) {
+      return fail(ErrorCode::bad_request, "lease_ms goes with take only", "unknown_member");
+    }
+    const auto lease_ms = body->integer("lease_ms", 1, kLongestControl.count() / 1000);
+    if (!lease_ms) return std::unexpected{lease_ms.error()};
+    request.life = std::chrono::milliseconds{*lease_ms};
+  }
+  const bool is_forced = request.action == ControlAction::force;
+  if (!is_forced && body->has("reason")) {
+    return fail(ErrorCode::bad_request, "reason goes with force only", "unknown_member");
+  }
+  if (is_forced) {
+    auto reason = body->text("reason", 1, kMaxNameBytes);
+    if (!reason) return std::unexpected{reason.error()};
+    request.reason = std::move(*reason);
+  }
+  return request;
+}
+
 Result<RunWish> parse_run(const std::string& text) {
   const auto body = Members::parse(text, {"robot_id", "name", "fluid", "pump_profile", "mean_flow_m_s", "tube",
                                           "operator_name", "profile", "notes", "span"});

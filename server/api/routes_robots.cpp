@@ -123,6 +123,16 @@ Answer submit_command(ApiParts& parts, Request request) {
   co_return command_response(*record);
 }
 
+Answer change_control(ApiParts& parts, Request request) {
+  auto wish = parse_control(request.body);
+  if (!wish) co_return problem(wish.error());
+  wish->robot_id = request.param.at("robot_id");
+  wish->actor = request.actor;
+  const auto control = parts.station.control(*wish);
+  if (!control) co_return problem(control.error());
+  co_return json_response(200, {{"control", control->holder.empty() ? json(nullptr) : to_json(*control)}});
+}
+
 // An acknowledged stop is in force and answered at once; one that is kept must outlive whatever happens after the
 // answer, so it is on disk first.
 int stop_status(const CommandRecord& record) { return was_accepted(record.state) ? 200 : 202; }
@@ -197,6 +207,7 @@ void add_robot_routes(Router& router, ApiParts& parts) {
   add("GET", "/api/v1/robots/{robot_id}", {}, get_robot);
   add("GET", "/api/v1/robots/{robot_id}/commands", {"limit"}, list_commands);
   add("POST", "/api/v1/robots/{robot_id}/commands", {"wait"}, submit_command);
+  add("POST", "/api/v1/robots/{robot_id}/control", {}, change_control);
   add("POST", "/api/v1/robots/{robot_id}/emergency-stop", {}, emergency_stop);
   add("GET", "/api/v1/robots/{robot_id}/events", {"limit"}, list_events);
   add("GET", "/api/v1/commands/{command_id}", {}, get_command);

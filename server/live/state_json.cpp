@@ -63,6 +63,12 @@ json to_json(const Sample& sample) {
           {"reference_m", decimal(sample.reference_m)}};
 }
 
+json to_json(const ControlState& control) {
+  return {{"holder", control.holder},
+          {"taken_at_us", control.taken_at_us},
+          {"wished_by", control.wished_by.empty() ? json(nullptr) : json(control.wished_by)}};
+}
+
 json to_json(const RobotState& robot) {
   const SampleContext& context = robot.context;
   json out;
@@ -95,6 +101,7 @@ json to_json(const RobotState& robot) {
   out["status"] = robot.status ? status_json(*robot.status) : json(nullptr);
   out["clock"] = robot.clock.valid ? clock_json(robot) : json(nullptr);
   out["pending_stop"] = id_text(robot.pending_stop.value_or(0));
+  out["control"] = robot.control.holder.empty() ? json(nullptr) : to_json(robot.control);
   return out;
 }
 

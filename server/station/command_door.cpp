@@ -114,6 +114,8 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
     if (!same) co_return std::unexpected{same.error()};
     if (*same != nullptr) co_return co_await follow(*same, request.until_verified, patience);
   }
+  // SAFETY: whoever is not in control moves nothing, page, script or experiment.
+  if (auto held = use_control(request); !held) co_return std::unexpected{held.error()};
   if (auto checked = check_request(request, seat); !checked) co_return std::unexpected{checked.error()};
   const auto pending = make_pending(request, *seat.robot);
   // SAFETY: what was issued longer ago than its life is not sent, and is accounted for.

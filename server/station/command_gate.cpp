@@ -67,6 +67,11 @@ bool moves_the_motor(const protocol::Command& command) {
 
 }  // namespace
 
+bool needs_control(const protocol::Command& command) {
+  return command.which_action != rheonaut_Command_ping_tag &&
+         command.which_action != rheonaut_Command_get_parameters_tag;
+}
+
 Result<void> check_command(const protocol::Command& command, const RobotState& robot, const CommandLimits& limits) {
   if (auto values = check_values(command, limits); !values) return values;
   // SAFETY: the station latches too: no motion command passes until the emergency was cleared.

@@ -15,6 +15,9 @@ struct CommandLimits {
   double disturbance_max_m = 0.5;  // magnitude
 };
 
+// False for what commands nothing: whoever may command at all may send it.
+bool needs_control(const protocol::Command& command);
+
 // invalid for a value outside the limits, conflict when the robot's state forbids the command now. Judges nothing that
 // only the robot can know; the robot checks everything again.
 Result<void> check_command(const protocol::Command& command, const RobotState& robot, const CommandLimits& limits);

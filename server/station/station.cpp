@@ -43,7 +43,7 @@ constexpr std::int64_t kStationStepUs = 50'000;  // within a second; what NTP sl
 const char* text(LinkState value) { return value == LinkState::connected ? "connected" : "disconnected"; }
 
 Station::Station(boost::asio::io_context& loop, Clock& clock, CommandLimits limits, LinkTimes times)
-    : loop_{loop}, clock_{clock}, limits_{limits}, times_{times} {}
+    : loop_{loop}, clock_{clock}, limits_{limits}, times_{times}, authority_{clock} {}
 
 Station::~Station() = default;
 

@@ -15,6 +15,7 @@
 
 #include "server/clock.hpp"
 #include "server/result.hpp"
+#include "server/station/authority.hpp"
 #include "server/station/clock_sync.hpp"
 #include "server/station/command_gate.hpp"
 #include "server/station/recent_commands.hpp"
@@ -53,6 +54,16 @@ struct StopRequest {
   std::int64_t received_us = 0;  // as above
 };
 
+enum class ControlAction : std::uint8_t { take, force, release, request, hand_over };
+
+struct ControlRequest {
+  RobotId robot_id;
+  std::string actor;
+  ControlAction action = ControlAction::take;
+  microseconds life{kControlLife};  // take: without a sign of life; at most kLongestControl
+  std::string reason;               // force: why
+};
+
 class Station {
  public:
   Station(boost::asio::io_context& loop, Clock& clock, CommandLimits limits, LinkTimes times);
@@ -76,6 +87,12 @@ class Station {
   // the robot is not connected, or does not answer in time, the stop is kept and sent first when it comes back; the
   // record then says queued or sent.
   boost::asio::awaitable<Result<CommandRecord>> emergency_stop(StopRequest request, microseconds patience);
+
+  // Changes who holds control of a robot, see Authority.
+  Result<ControlState> control(const ControlRequest& request);
+  // A sign of life of an actor: what it controls stays its own. `age`: of what it has seen of the robots.
+  void keep_control(const std::string& actor, microseconds age);
+  boost::asio::awaitable<void> watch_control();  // says when control has ended, until cancelled
 
   // A command with a client's key that is on its way or has ended lately: what asks again need not be sent again.
   bool remembers(CommandId id) const;
@@ -118,10 +135,12 @@ class Station {
   void publish(const RobotState& robot);
   void publish(const CommandRecord& record);
   void note(const RobotState& robot, std::string kind, std::string cause);
+  void tell(const Authority::Change& change);
   void record_clock(Seat& seat);
   void record_in_force(Seat& seat, std::string kind, std::string content);
 
   std::shared_ptr<PendingCommand> make_pending(const CommandRequest& request, const RobotState& robot);
+  Result<void> use_control(const CommandRequest& request);
   Result<void> check_request(const CommandRequest& request, const Seat& seat) const;
   Result<std::shared_ptr<PendingCommand>> same_wish(const CommandRequest& request, const Seat& seat);
   boost::asio::awaitable<Result<CommandRecord>> follow(std::shared_ptr<PendingCommand> pending, bool until_verified,
@@ -150,6 +169,7 @@ class Station {
   std::unordered_map<const RobotPort*, Seat*> occupied_;  // seats, by who sits there
   SampleBatch batch_;                                     // of the frame that is being taken; kept for its memory
   std::vector<StationSink*> sinks_;
+  Authority authority_;
   RecentCommands recent_;  // that had a key, and have ended
   StopTimes stop_times_;
 };

@@ -115,6 +115,14 @@ struct InForceRecord {
   std::int64_t noticed_at_us = 0;  // UTC
 };
 
+// Who may command a robot now.
+struct ControlState {
+  std::string holder;            // an actor; empty: nobody, whoever commands takes it
+  std::int64_t taken_at_us = 0;  // UTC
+  std::string wished_by;         // who has asked the holder for it; empty: nobody
+  bool operator==(const ControlState&) const = default;
+};
+
 // All that is known of one robot now. Owned by Station; others get const access or a copy.
 struct RobotState {
   RobotId id;
@@ -142,6 +150,7 @@ struct RobotState {
   std::optional<protocol::Status> status;
   ClockEstimate clock;
 
+  ControlState control;
   std::optional<CommandId> pending_stop;  // an emergency stop that no robot has acknowledged yet
 
   // The station's own latch: no motion command passes while it is set.

@@ -25,7 +25,7 @@ const robot = (robot_id: string, seq: number): RobotState => ({
   durable_next_seq: seq - 12, latest_robot_time_us: seq * 10_000,
   status: { supply_mv: 3712, rssi_dbm: -58, free_memory_bytes: 31000, worst_tick_us: 2100, missed_ticks: 0,
     ring_fill: 34, imu_calibration: 3, bad_frames: 0, lost_samples: 0, lost_events: 0 },
-  clock: { offset_us: 0, uncertainty_us: 310, drift_ppm: 12, round_trip_us: 1840 }, pending_stop: null,
+  clock: { offset_us: 0, uncertainty_us: 310, drift_ppm: 12, round_trip_us: 1840 }, control: null, pending_stop: null,
 });
 
 // Position and duty of the experiment, roughly: to 0.1 m, pushed back by 0.05 m at 20 s, and again.
@@ -64,12 +64,12 @@ function open_socket(): Socket {
   setTimeout(() => {
     if (scene === 'signed_out') return (socket.onclose as (() => void) | null)?.();
     const robots = scene === 'empty' ? [] : [robot('rheo-1', 5600), robot('tank-b', 0)];
-    say({ type: 'welcome', version: '0.1.0', utc_us: Date.now() * 1000, stamp_us: 0, robots });
+    say({ type: 'welcome', actor: 'session:1', version: '0.1.0', utc_us: Date.now() * 1000, stamp_us: 0, robots });
     if (scene === 'empty') return setInterval(() => say({ type: 'stamp', stamp_us: 1 }), 100);
     session.store.set_runs([{ run_id: 7, robot_id: 'rheo-1', name: 'closed loop, 100 mm', started_at_us: (Date.now() - 31_000) * 1000, ended_at_us: null } as never]);
     const at_us = (ago_s: number) => (Date.now() - ago_s * 1000) * 1000;
     const command = (n: number, kind: string, values: object, state: 'acknowledged' | 'rejected', ago_s: number, reason = '') =>
-      say({ type: 'command', command: { command_id: String(n), robot_id: 'rheo-1', boot_id, kind, arguments: values as never, actor: 'session:1', state, reason, submitted_at_us: at_us(ago_s), sent_at_us: 0, ended_at_us: 0, effect_at_robot_us: 0, emergency_id } });
+      say({ type: 'command', command: { command_id: String(n), robot_id: 'rheo-1', boot_id, kind, arguments: values as never, actor: 'session:1', state, reason, submitted_at_us: at_us(ago_s), sent_at_us: 0, ended_at_us: 0, effect_at_robot_us: 0, emergency_id, sent_after_us: 210, acknowledged_after_us: 640, verified_after_us: null, life_from: 'stamp' } });
     const event = (n: number, kind: string, cause: string, ago_s: number) =>
       say({ type: 'event', event: { robot_id: 'rheo-1', boot_id, event_seq: n, robot_time_us: 0, sample_seq: 0, kind, cause, mode, sub_state: 'navigating', position_m: 0.0984, value: 0, emergency_id, command_id: null, received_at_us: at_us(ago_s) } });
     command(1, 'set_mode', { mode: 'auto', setpoint_m: 0.1 }, 'acknowledged', 48);

@@ -9,6 +9,8 @@ type Schemas = components['schemas'];
 export type RobotState = Schemas['Robot'];
 export type CommandRecord = Schemas['Command'];
 export type CommandBody = Schemas['CommandBody'];
+export type Control = Schemas['Control'];
+export type ControlBody = Schemas['ControlBody'];
 export type EventRecord = Schemas['Event'];
 export type RunRecord = Schemas['Run'];
 export type Station = Schemas['Station'];
@@ -69,7 +71,11 @@ export type Fetch = (path: string, options: RequestInit) => Promise<Response>;
 const kPatience_ms = 6000;
 
 export class Api {
-  constructor(private readonly fetch: Fetch) {}
+  // `stamp_us`: the latest of the live link; a command is worth as little as what its operator saw was old.
+  constructor(
+    private readonly fetch: Fetch,
+    private readonly stamp_us: () => number | null = () => null,
+  ) {}
 
   set_manual = (robot_id: string) => this.command(robot_id, { kind: 'set_mode', mode: 'manual' });
   set_auto = (robot_id: string, setpoint_m: number) =>
@@ -79,6 +85,9 @@ export class Api {
   zero_position = (robot_id: string) => this.command(robot_id, { kind: 'zero_position' });
   clear_emergency = (robot_id: string, emergency_id: string) =>
     this.command(robot_id, { kind: 'clear_emergency', emergency_id });
+
+  change_control = (robot_id: string, body: ControlBody) =>
+    this.ask<{ control: Control | null }>('POST', `/robots/${encodeURIComponent(robot_id)}/control`, body);
 
   emergency_stop = async (robot_id: string, key: string) => [
     await this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/emergency-stop`, undefined, key),
@@ -102,7 +111,9 @@ export class Api {
   }
 
   private command(robot_id: string, body: CommandBody): Promise<CommandRecord> {
-    return this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/commands`, body);
+    const stamp_us = this.stamp_us();
+    const stamped = stamp_us === null ? body : { ...body, stamp_us };
+    return this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/commands`, stamped);
   }
 
   private async ask<Answer>(method: string, path: string, body?: object, key?: string): Promise<Answer> {

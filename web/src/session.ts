@@ -7,10 +7,13 @@ import { EmergencyStop, kIdleStop } from './emergency';
 import { LiveLink, type LinkPhase, type Surroundings } from './live';
 import { kRefresh_ms, Store } from './store';
 
-const kKeepAlive_ms = 10_000; // the station drops a page that is silent for 30 s
+const kKeepAlive_ms = 1000; // what this page controls stays its own for 3 s
 
 export class Session {
-  readonly api = new Api((path, options) => fetch(path, options));
+  readonly api = new Api(
+    (path, options) => fetch(path, options),
+    () => this.link.stamp_us,
+  );
   readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => Date.now() });
   readonly station = signal<Station | null>(null);
   readonly phase = signal<LinkPhase>('connecting');
@@ -56,7 +59,7 @@ export class Session {
   start(): void {
     this.link.start();
     setInterval(() => this.refresh(), kRefresh_ms);
-    setInterval(() => this.link.send({ type: 'keep_alive' }), kKeepAlive_ms);
+    setInterval(() => this.keep_alive(), kKeepAlive_ms);
     addEventListener('online', () => this.link.hurry());
     document.addEventListener('visibilitychange', () => {
       if (document.hidden) this.hold.release();
@@ -94,6 +97,13 @@ export class Session {
     // A mode that takes no duty ended the hold; the hand has to press again.
     const held_id = this.hold.robot_id;
     if (held_id !== null && this.store.find(held_id)?.readout.peek().mode !== 'manual') this.hold.forget();
+  }
+
+  // Keeps the connection, and with a fresh stamp what this page controls.
+  private keep_alive(): void {
+    const { link } = this;
+    const fresh = link.stamp_is_fresh() && link.stamp_us !== null;
+    link.send(fresh ? { type: 'keep_alive', stamp_us: link.stamp_us! } : { type: 'keep_alive' });
   }
 
   private renew_lease(robot_id: string): boolean {

@@ -117,6 +117,7 @@ export class Robot {
 
 export class Store {
   readonly robots = signal<Robot[]>([]);
+  readonly actor = signal(''); // this page, as the station calls it
   readonly selected_id = signal<string | null>(null);
   readonly selected = computed(() => this.robots.value.find((r) => r.state.value.robot_id === this.selected_id.value) ?? null);
   readonly log = signal<LogLine[]>([]);
@@ -131,7 +132,10 @@ export class Store {
   hear(message: LiveMessage): void {
     switch (message.type) {
       case 'welcome':
-        batch(() => message.robots.forEach((state) => this.take_state(state)));
+        batch(() => {
+          this.actor.value = message.actor;
+          message.robots.forEach((state) => this.take_state(state));
+        });
         break;
       case 'robot':
         this.take_state(message.robot);

@@ -63,3 +63,22 @@ test('a refused setpoint tells the range that is allowed, in millimetres', async
   const { api } = api_that_answers(422, { title: 'Unprocessable', detail, reason: 'out_of_range' });
   expect((await failure(api.set_setpoint('rheo-1', 99.999))).message).toBe('Allowed is \u22121000 to 1000 mm.');
 });
+
+test('a command says the latest stamp that its operator has seen', async () => {
+  const bodies: unknown[] = [];
+  let stamp_us: number | null = null;
+  const api = new Api(
+    (_path, options) => {
+      bodies.push(JSON.parse(String(options.body)));
+      return Promise.resolve(new Response('{"state":"acknowledged"}'));
+    },
+    () => stamp_us,
+  );
+  await api.set_duty('rheo-1', 0.5);
+  stamp_us = 5484590256;
+  await api.set_duty('rheo-1', 0.5);
+  expect(bodies).toEqual([
+    { kind: 'set_duty', duty: 0.5 },
+    { kind: 'set_duty', duty: 0.5, stamp_us: 5484590256 },
+  ]);
+});

@@ -59,7 +59,7 @@ export class FakeSocket implements Socket {
     this.onmessage?.({ data: JSON.stringify(message) } as never);
   }
   welcome(): void {
-    this.say({ type: 'welcome', version: '0.1.0', utc_us: 0, stamp_us: 0, robots: [] });
+    this.say({ type: 'welcome', actor: 'session:1', version: '0.1.0', utc_us: 0, stamp_us: 0, robots: [] });
   }
   break(): void {
     this.readyState = 3;

@@ -10,7 +10,7 @@ const robot = (robot_id: string, change: Partial<RobotState> = {}) =>
 function store_with(...robots: RobotState[]) {
   const clock = { page: 0 };
   const store = new Store({ page_ms: () => clock.page, utc_ms: () => 1_700_000_000_000 });
-  store.hear({ type: 'welcome', version: '', utc_us: 0, stamp_us: 0, robots });
+  store.hear({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots });
   return { store, clock };
 }
 

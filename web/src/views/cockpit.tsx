@@ -1,6 +1,7 @@
 // The cockpit: one page with everything an operator watches and touches, and the stop always in reach.
 
 import { SignedOut } from './signed_out';
+import { ControlLine } from '../parts/control_line';
 import { AutoControl } from '../parts/auto_control';
 import { LinkPanel } from '../parts/link_panel';
 import { LogStrip } from '../parts/log_strip';
@@ -40,6 +41,7 @@ export function Cockpit({ session }: { session: Session }) {
       <section class="controls" aria-label="Controls">
         {robot && (
           <>
+            <ControlLine key={`control-${key}`} session={session} robot={robot} />
             <AutoControl key={`auto-${key}`} session={session} robot={robot} />
             <ManualControl key={`manual-${key}`} session={session} robot={robot} />
             <RunControl key={`run-${key}`} session={session} robot={robot} />

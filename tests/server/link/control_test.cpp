@@ -1,0 +1,92 @@
+// Control at the one door: whoever is not in control moves nothing, and everyone may stop.
+#include "tests/server/link/link_fixture.hpp"
+
+namespace server {
+namespace {
+
+class ControlTest : public LinkTest {
+ protected:
+  void submit_as(const std::string& actor, protocol::Command action) {
+    CommandRequest request = request_of(action);
+    request.actor = actor;
+    submit(std::move(request));
+    clock.settle();
+  }
+  Result<ControlState> control(const std::string& actor, ControlAction action) {
+    return station.control({"r1", actor, action, kControlLife, "a test"});
+  }
+};
+
+TEST_F(ControlTest, OnlyTheHoldersCommandsReachTheRobot) {
+  auto* robot = connect();
+  submit_as("session:1", set_duty(0.1F));
+  EXPECT_EQ(station.find("r1")->control.holder, "session:1");
+  submit_as("token:local", set_duty(0.2F));
+  ASSERT_EQ(results.size(), 1u);
+  EXPECT_EQ(results[0].error().reason, "not_in_control");
+  ASSERT_EQ(robot->commands().size(), 1u);
+  EXPECT_FLOAT_EQ(robot->commands()[0].action.set_duty.duty, 0.1F);
+}
+
+TEST_F(ControlTest, ARenewalOfAnotherKeepsNoMotorRunning) {
+  auto* robot = connect();
+  submit_as("session:1", set_duty(0.1F));
+  protocol::Command renewal = rheonaut_Command_init_zero;
+  renewal.which_action = rheonaut_Command_renew_lease_tag;
+  submit_as("session:2", renewal);
+  EXPECT_EQ(results.at(0).error().reason, "not_in_control");
+  EXPECT_EQ(robot->commands().size(), 1u);
+}
+
+TEST_F(ControlTest, EveryoneMayStop) {
+  auto* robot = connect();
+  submit_as("session:1", set_duty(0.1F));
+  StopRequest stop{"r1", "session:2", "", 0};
+  tasks.spawn("stop", [](Station& of, StopRequest request) -> boost::asio::awaitable<void> {
+    co_await of.emergency_stop(std::move(request), 1s);
+  }(station, stop));
+  clock.settle();
+  EXPECT_EQ(robot->commands().back().which_action, rheonaut_Command_emergency_stop_tag);
+}
+
+TEST_F(ControlTest, APageThatGoesSilentLosesControlAndItIsSaid) {
+  auto* robot = connect();
+  tasks.spawn("control", station.watch_control());
+  submit_as("session:1", set_duty(0.1F));
+  for (int i = 0; i < 5; ++i) {
+    clock.run_for(1s);
+    station.keep_control("session:1", 400ms);
+  }
+  EXPECT_EQ(station.find("r1")->control.holder, "session:1");
+  for (int i = 0; i < 4; ++i) {
+    clock.run_for(1s);
+    station.keep_control("session:1", 401ms);  // SAFETY: an echo of an old picture keeps nothing
+    station.keep_control("session:1", -1us);
+  }
+  EXPECT_EQ(station.find("r1")->control.holder, "");
+  EXPECT_EQ(sink.events.back().kind, "control_expired");
+  EXPECT_EQ(sink.robots.back().control.holder, "");
+  submit_as("session:2", set_duty(0.2F));
+  EXPECT_EQ(robot->commands().size(), 2u);
+}
+
+TEST_F(ControlTest, EachChangeIsAnEventOfTheRobot) {
+  connect();
+  ASSERT_TRUE(control("session:1", ControlAction::take));
+  EXPECT_EQ(sink.events.back().kind, "control_taken");
+  ASSERT_TRUE(control("session:2", ControlAction::request));
+  EXPECT_EQ(sink.robots.back().control.wished_by, "session:2");
+  ASSERT_TRUE(control("session:1", ControlAction::hand_over));
+  EXPECT_EQ(sink.robots.back().control.holder, "session:2");
+  ASSERT_TRUE(control("session:1", ControlAction::force));
+  EXPECT_EQ(sink.events.back().cause, "by session:1 from session:2: a test");
+  ASSERT_TRUE(control("session:1", ControlAction::release));
+  EXPECT_EQ(sink.robots.back().control.holder, "");
+}
+
+TEST_F(ControlTest, OfAnUnknownRobotThereIsNone) {
+  EXPECT_EQ(control("session:1", ControlAction::take).error().reason, "unknown_robot");
+}
+
+}  // namespace
+}  // namespace server
