@@ -4,6 +4,7 @@
 //   rheonaut.token, .sessions        written by the API
 //   endpoints.json                   {"http":"127.0.0.1:8080","robots":"127.0.0.1:7070","pid":123}, while it runs
 //   rheonaut.lock                    locked while it runs
+//   rheonaut.reserve                 1 MB of room for a start on a full disk
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -6,6 +6,8 @@
 
 #include <system_error>
 
+#include "server/recording/disk_reserve.hpp"
+
 namespace server {
 namespace asio = boost::asio;
 namespace fs = std::filesystem;
@@ -63,6 +65,7 @@ asio::awaitable<void> DiskWatch::look() {
     use.database_bytes = file_bytes(path);
     try {
       use.free_bytes = free_bytes(fs::absolute(path).parent_path());
+      keep_disk_reserve(path, use.free_bytes);
     } catch (const std::system_error& error) {
       spdlog::warn("the room on the disk cannot be told: {}", error.what());
     }

@@ -1,4 +1,5 @@
-// Watches the room on the database's disk: warns when it gets low, and lets nothing new begin when it is critical.
+// Watches the room on the database's disk: warns when it gets low, lets nothing new begin when it is critical, and
+// keeps the reserve for the next start (disk_reserve).
 //
 // Recording and commands go on whatever it says: only a commit that fails stops recording. It recovers by itself.
 // Loop thread; the disk is asked on the readers' thread. Clock and worker outlive it.

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "server/recording/disk_reserve.hpp"
 #include "server/recording/stored_rows.hpp"
 
 namespace server {
@@ -48,6 +49,9 @@ Recorder::~Recorder() = default;
 
 asio::awaitable<RestoredState> Recorder::open() {
   auto job = [this, utc_us = clock_.utc_us()] {
+    const std::filesystem::path folder = std::filesystem::absolute(options_.path).parent_path();
+    std::error_code not_told;  // then it counts as much
+    give_up_disk_reserve(options_.path, std::filesystem::space(folder, not_told).available);
     database_ = std::make_unique<Database>(options_.path);
     store_ = std::make_unique<SampleStore>(*database_);
     try {
@@ -55,6 +59,7 @@ asio::awaitable<RestoredState> Recorder::open() {
     } catch (const SQLite::Exception& error) {  // SAFETY: with a full disk, too, robots come in and can be stopped
       spdlog::warn("commands of an earlier start stay unfinished in the record: {}", error.what());
     }
+    keep_disk_reserve(options_.path, std::filesystem::space(folder, not_told).available);
     BootStore boots{*database_};
     next_boot_key_ = boots.next_boot_key();
     restored_at_us_ = database_->restored_at_us();

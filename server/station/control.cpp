@@ -11,16 +11,19 @@ namespace {
 constexpr microseconds kWatchInterval{200'000};
 constexpr microseconds kOldestSight{400'000};  // of what a page has seen, to keep control
 
-std::optional<Authority::Change> some(Authority::Change change) { return change; }
+Result<std::optional<Authority::Change>> some(Result<Authority::Change> change) {
+  if (!change) return std::unexpected{change.error()};
+  return std::optional{std::move(*change)};
+}
 
 Result<std::optional<Authority::Change>> change_control(Authority& authority, const ControlRequest& request) {
   const RobotId& robot = request.robot_id;
   switch (request.action) {
     case ControlAction::take: return authority.take(robot, request.actor, request.life);
     case ControlAction::force: return authority.take_by_force(robot, request.actor, request.reason);
-    case ControlAction::release: return authority.release(robot, request.actor).transform(some);
-    case ControlAction::request: return authority.request(robot, request.actor).transform(some);
-    case ControlAction::hand_over: return authority.hand_over(robot, request.actor).transform(some);
+    case ControlAction::release: return some(authority.release(robot, request.actor));
+    case ControlAction::request: return some(authority.request(robot, request.actor));
+    case ControlAction::hand_over: return some(authority.hand_over(robot, request.actor));
   }
   return std::nullopt;
 }

@@ -138,6 +138,7 @@ class KillStormTest(unittest.TestCase):
             for _ in range(KILLS):
                 self.begin_run(place)
                 self.wait()
+                wait_until((place.data / "rheonaut.reserve").exists, 30, "room that is held for the next start")
                 fill(filler)
                 self.wait()
                 place.kill_station()

@@ -83,10 +83,11 @@ asio::awaitable<void> ApiTest::answer(Request request, std::shared_ptr<std::opti
 }
 
 std::shared_ptr<std::optional<Answered>> ApiTest::begin(const std::string& method, const std::string& target,
-                                                        const json& body) {
+                                                        const json& body, std::map<std::string, std::string> headers) {
   Request request;
   request.method = method;
   request.target = target;
+  request.headers = std::move(headers);
   if (!body.is_null()) request.body = body.dump();
   request.actor = "token:local";
   auto into = std::make_shared<std::optional<Answered>>();

@@ -47,7 +47,8 @@ class ApiTest : public ::testing::Test {
   Answered ask(const std::string& method, const std::string& target, const json& body = nullptr);
   // The same in two steps, for what the robot must answer in between.
   std::shared_ptr<std::optional<Answered>> begin(const std::string& method, const std::string& target,
-                                                 const json& body = nullptr);
+                                                 const json& body = nullptr,
+                                                 std::map<std::string, std::string> headers = {});
   Answered end(const std::shared_ptr<std::optional<Answered>>& asked, microseconds limit = 10s);
 
   void make_samples(TestRobot& robot, std::uint64_t first_seq, pb_size_t count);
