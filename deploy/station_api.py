@@ -1,6 +1,7 @@
-"""Talks to a running station: where it listens, its token, and JSON over HTTP. Standard library only."""
+"""Talks to a running station: where it listens, its token, and JSON over HTTP or HTTPS. Standard library only."""
 import json
 import pathlib
+import ssl
 import time
 import urllib.error
 import urllib.request
@@ -28,6 +29,14 @@ def wait_until(condition, timeout_s, what):
         time.sleep(0.05)
 
 
+def trust(certificate):
+    """Trusts exactly this certificate, whatever the address by which the station is asked."""
+    context = ssl.create_default_context(cafile=certificate)
+    context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
+    context.check_hostname = False
+    return context
+
+
 class Station:
     """The API of the station that keeps its things in `data_dir`."""
 
@@ -39,16 +48,19 @@ class Station:
         self.endpoints = endpoints
         self.token = (self.data_dir / "rheonaut.token").read_text().strip()
         self.database = self.data_dir / "station.sqlite"
+        self.tls_certificate = endpoints.get("tls_certificate")  # none: plain HTTP
 
     def request(self, method, path, body=None, timeout_s=20):
         """The raw answer: (status, headers, bytes)."""
-        request = urllib.request.Request(f"http://{self.endpoints['http']}{path}", method=method)
+        scheme = "https" if self.tls_certificate else "http"
+        request = urllib.request.Request(f"{scheme}://{self.endpoints['http']}{path}", method=method)
         request.add_header("Authorization", f"Bearer {self.token}")
         if body is not None:
             request.add_header("Content-Type", "application/json")
             request.data = json.dumps(body).encode()
         try:
-            with urllib.request.urlopen(request, timeout=timeout_s) as answer:
+            context = trust(self.tls_certificate) if self.tls_certificate else None
+            with urllib.request.urlopen(request, timeout=timeout_s, context=context) as answer:
                 return answer.status, answer.headers, answer.read()
         except urllib.error.HTTPError as error:
             return error.code, error.headers, error.read()

@@ -5,10 +5,12 @@
 #include <fmt/ranges.h>
 
 #include <toml++/toml.h>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "server/endpoint.hpp"
 
@@ -108,6 +110,21 @@ class ConfigFile {
   std::set<std::string> known_;
 };
 
+constexpr std::array kTlsModes{TlsMode::automatic, TlsMode::on, TlsMode::off};
+
+void read_tls(ConfigFile& file, TlsConfig& tls) {
+  std::string mode = text(tls.mode), certificate, key;
+  file.take("tls", "mode", mode);
+  const auto found = std::ranges::find(kTlsModes, mode, [](TlsMode known) { return std::string{text(known)}; });
+  if (found == kTlsModes.end()) {
+    file.fail(*file.find("tls", "mode"), "tls", "mode", fmt::format("= '{}' must be one of auto, on, off", mode));
+  }
+  tls.mode = *found;
+  if (file.take("tls", "certificate", certificate)) tls.certificate = certificate;
+  if (file.take("tls", "key", key)) tls.key = key;
+  file.take("tls", "insecure", tls.insecure);
+}
+
 void read(ConfigFile& file, Config& config) {
   std::string data_dir;
   if (file.take("data", "dir", data_dir)) config.data_dir = data_dir;
@@ -130,6 +147,7 @@ void read(ConfigFile& file, Config& config) {
   file.take_count("recording", "critical_space_mb", 0, 100'000'000, recording.critical_space_mb);
   std::string backup_dir;
   if (file.take("recording", "backup_dir", backup_dir)) recording.backup_dir = backup_dir;
+  read_tls(file, config.tls);
   if (file.take("log", "level", config.log_level)) {
     constexpr std::array kLevels{"trace", "debug", "info", "warn", "error"};
     if (std::ranges::find(kLevels, config.log_level) == kLevels.end()) {
@@ -140,9 +158,29 @@ void read(ConfigFile& file, Config& config) {
   file.refuse_unknown_keys();
 }
 
+// SAFETY: whoever can listen on the way could read the token and drive the robots.
+void check_tls(const Config& config) {
+  const TlsConfig& tls = config.tls;
+  if (tls.certificate.empty() != tls.key.empty()) {
+    throw std::invalid_argument{"tls.certificate and tls.key belong together: give both, or neither"};
+  }
+  if (tls.mode == TlsMode::on && tls.insecure) {
+    throw std::invalid_argument{"tls.mode = 'on' and tls.insecure = true contradict each other: remove one of them"};
+  }
+  for (const auto& [option, listen] : {std::pair{"http.listen", config.http}, {"robots.listen", config.robots}}) {
+    if (!config.is_exposed(listen) || tls.insecure) continue;
+    throw std::invalid_argument{
+        fmt::format("{} = '{}' can be reached by other machines, and tls.mode is 'off': set it to 'auto' and make a "
+                    "certificate with `rheonaut certificate`, or accept with tls.insecure = true that everyone on the "
+                    "way can read and change what is sent",
+                    option, listen)};
+  }
+}
+
 void check(const Config& config) {
   parse_endpoint(config.http);
   parse_endpoint(config.robots);
+  check_tls(config);
   if (config.limits.setpoint_min_m >= config.limits.setpoint_max_m) {
     throw std::invalid_argument{fmt::format("limits.setpoint_min_m = {} must be below limits.setpoint_max_m = {}",
                                             config.limits.setpoint_min_m, config.limits.setpoint_max_m)};
@@ -160,6 +198,29 @@ void check(const Config& config) {
 }
 
 }  // namespace
+
+const char* text(TlsMode mode) {
+  switch (mode) {
+    case TlsMode::on: return "on";
+    case TlsMode::off: return "off";
+    default: return "auto";
+  }
+}
+
+std::filesystem::path Config::tls_certificate() const {
+  return tls.certificate.empty() ? data_dir / "tls" / "station.crt" : tls.certificate;
+}
+
+std::filesystem::path Config::tls_key() const { return tls.key.empty() ? data_dir / "tls" / "station.key" : tls.key; }
+
+bool Config::speaks_tls(const std::string& listen) const {
+  if (tls.mode != TlsMode::automatic) return tls.mode == TlsMode::on;
+  return !tls.insecure && !parse_endpoint(listen).address().is_loopback();
+}
+
+bool Config::is_exposed(const std::string& listen) const {
+  return !speaks_tls(listen) && !parse_endpoint(listen).address().is_loopback();
+}
 
 Config load_config(const ConfigFlags& flags) {
   Config config;

@@ -25,6 +25,20 @@ struct RecordingConfig {
   std::filesystem::path backup_dir;       // recording.backup_dir; empty: "backups" in the data folder
 };
 
+// Section [tls]. Beyond this machine's loopback, bytes travel in TLS or, where somebody said so, in plain sight.
+enum class TlsMode : std::uint8_t {
+  automatic,  // "auto": TLS on every address but loopback
+  on,         // on loopback, too
+  off,
+};
+
+struct TlsConfig {
+  TlsMode mode = TlsMode::automatic;  // tls.mode
+  std::filesystem::path certificate;  // tls.certificate, PEM with its chain; empty: of `rheonaut certificate`
+  std::filesystem::path key;          // tls.key, PEM; empty: as above
+  bool insecure = false;              // tls.insecure: plain TCP on an address that other machines reach
+};
+
 struct Config {
   std::filesystem::path data_dir = "rheonaut-data";  // data.dir, --data: database, token, endpoints
 
@@ -41,10 +55,20 @@ struct Config {
 
   RecordingConfig recording;
 
+  TlsConfig tls;
+
   std::string log_level = "info";  // log.level: trace, debug, info, warn, error
 
   std::filesystem::path database() const { return data_dir / "station.sqlite"; }
+  std::filesystem::path tls_certificate() const;
+  std::filesystem::path tls_key() const;
+  // Of `http` or `robots`: whether TLS is spoken there, and whether neither TLS nor loopback protects it.
+  bool speaks_tls(const std::string& listen) const;
+  bool is_exposed(const std::string& listen) const;
 };
+
+// "auto", "on", "off"
+const char* text(TlsMode mode);
 
 // What the command line gives; empty fields were not given.
 struct ConfigFlags {

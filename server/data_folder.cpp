@@ -60,12 +60,13 @@ DataFolder::~DataFolder() {
   std::filesystem::remove(endpoints(), ignored);
 }
 
-asio::awaitable<void> DataFolder::announce(Clock& clock, std::string http, std::string robots) {
-  const nlohmann::json content{{"http", http}, {"robots", robots}, {"pid", getpid()}};
+asio::awaitable<void> DataFolder::announce(Clock& clock, Announcement announcement) {
+  nlohmann::json content{{"http", announcement.http}, {"robots", announcement.robots}, {"pid", getpid()}};
+  if (!announcement.tls_certificate.empty()) content["tls_certificate"] = announcement.tls_certificate;
   for (bool warned = false; !write_endpoints(content.dump() + '\n'); warned = true) {
     if (!warned) {
       spdlog::warn("'{}' cannot be written, programs on this machine do not find the station at {} until there is room",
-                   endpoints().string(), http);
+                   endpoints().string(), announcement.http);
     }
     co_await clock.sleep_for(kAnnounceInterval);
   }

@@ -2,7 +2,9 @@
 //
 //   station.sqlite                   written by the recorder
 //   rheonaut.token, .sessions        written by the API
-//   endpoints.json                   {"http":"127.0.0.1:8080","robots":"127.0.0.1:7070","pid":123}, while it runs
+//   endpoints.json                   {"http":"127.0.0.1:8080","robots":"127.0.0.1:7070","pid":123}, while it runs; and
+//                                    "tls_certificate", the file to trust, when http is https
+//   tls/                             made by `rheonaut certificate`
 //   rheonaut.lock                    locked while it runs
 //   rheonaut.reserve                 1 MB of room for a start on a full disk
 #pragma once
@@ -31,6 +33,13 @@ class FolderLock {
   int file_ = -1;
 };
 
+// Where the running station is, for other programs of its user.
+struct Announcement {
+  std::string http;             // "127.0.0.1:8080"
+  std::string robots;           // "127.0.0.1:7070"
+  std::string tls_certificate;  // of http; empty: it is plain
+};
+
 class DataFolder {
  public:
   // Makes it (make_data_folder), and throws std::runtime_error that names it also when another station runs in it.
@@ -41,7 +50,7 @@ class DataFolder {
 
   // Writes endpoints.json, whole or not at all. SAFETY: a full disk keeps no robot from being stopped: it is tried
   // again until it is there.
-  boost::asio::awaitable<void> announce(Clock& clock, std::string http, std::string robots);
+  boost::asio::awaitable<void> announce(Clock& clock, Announcement announcement);
 
  private:
   bool write_endpoints(const std::string& content) const;

@@ -12,14 +12,13 @@
 #include "server/link/robot_listener.hpp"
 #include "server/live/live_feed.hpp"
 #include "server/log.hpp"
+#include "server/net/transport_security.hpp"
 #include "server/recording/recording_parts.hpp"
 #include "server/station_document.hpp"
 
-namespace {
-
 using namespace server;  // NOLINT: this file is the station, seen from outside
 
-int serve(const Config& config) {
+static int serve(const Config& config) {
   start_log(config.log_level);
   DataFolder folder{config.data_dir};
 
@@ -29,6 +28,7 @@ int serve(const Config& config) {
   WorkerThread disk{"disk"}, readers{"readers", 10}, exports{"exports", 10}, checkpoints{"checkpoints"};
   WorkerThread maths{"maths", 10};
   TaskGroup tasks{loop};
+  TransportSecurity security{clock, config};  // of both ports
 
   // Centre: the only owner of live state, and the only door for commands.
   Station station{loop, clock, config.limits, config.link};
@@ -44,13 +44,14 @@ int serve(const Config& config) {
   station.restore(restored.robots, restored.pending_stops);
 
   // In: robots arrive here; each session becomes the station's RobotPort.
+  const auto robot_port = parse_endpoint(config.robots);
   RobotListener robots{
-      loop, clock, tasks, station, recording.recorder, parse_endpoint(config.robots), config.robots_or_any_port};
+      loop, clock, tasks, station, recording.recorder, robot_port, config.robots_or_any_port, security.robots()};
 
   // People and scripts.
   AnalysisService analysis{recording.history, maths};
-  ApiServer api{loop,    tasks, clock,     api_options(config, restored.store_id, text(robots.endpoint())),
-                station, live,  recording, analysis};
+  const ApiOptions options = api_options(config, restored.store_id, text(robots.endpoint()), security);
+  ApiServer api{loop, tasks, clock, options, station, live, recording, analysis};
 
   recording.spawn(tasks);
   tasks.spawn("control", station.watch_control());
@@ -58,16 +59,15 @@ int serve(const Config& config) {
   tasks.spawn("robots", robots.run());
   tasks.spawn("api", api.run());
   tasks.spawn("signals", tasks.stop_on_signal());
-  tasks.spawn("announcement", folder.announce(clock, api.address(), text(robots.endpoint())));
-  spdlog::info("ready: page {}, robots {}, data {}", api.address(), text(robots.endpoint()), config.data_dir.string());
+  tasks.spawn("security", security.run());
+  tasks.spawn("announcement", folder.announce(clock, {api.address(), options.robots_address, security.to_trust()}));
+  spdlog::info("ready: page {}, robots {}, data {}", api.url(), options.robots_address, config.data_dir.string());
   api.print_login_url();
   loop.run();         // returns when every task has ended
   recording.close();  // every sample that was received is on disk
   spdlog::info("stopped");
   return tasks.exit_code();
 }
-
-}  // namespace
 
 int main(int argc, char** argv) try {
   std::signal(SIGPIPE, SIG_IGN);

@@ -47,7 +47,7 @@ StationAddress parse_station_address(const std::string& text, const std::string&
       std::stoi(port) < lowest_port) {
     throw std::invalid_argument(option + ": '" + port + "' is not a port");
   }
-  return {host, port};
+  return {host, port, nullptr};
 }
 
 asio::awaitable<void> pause(std::chrono::milliseconds duration) {

@@ -4,13 +4,17 @@
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <chrono>
+#include <memory>
 #include <string>
+
+#include "sim_robot/station_trust.hpp"
 
 namespace sim_robot {
 
 struct StationAddress {
   std::string host;
   std::string port;
+  std::shared_ptr<const StationTrust> trust{};  // null: plain TCP
 };
 // "host:port" or "[v6]:port"; throws std::invalid_argument that names the option.
 StationAddress parse_station_address(const std::string& text, const std::string& option = "--station",

@@ -1,6 +1,7 @@
 // The program rheonaut-sim: simulated robots that dial a station, scenarios, the prediction of an experiment, the
 // pump's profile, a bad network.
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <iostream>
 
 #include "sim_robot/flow_command.hpp"
@@ -32,6 +33,7 @@ The keys of a scenario and the HTTP control: docs/scenarios.md; fleets: docs/fle
 }  // namespace
 
 int main(int argc, char** argv) try {
+  std::signal(SIGPIPE, SIG_IGN);  // OpenSSL writes to sockets whose station is gone
   CLI::App app{"Simulated swimming robot: the firmware core in a simulated world, connected to a Rheonaut station."};
   app.footer(kExamples);
   app.require_subcommand(0, 1);

@@ -15,6 +15,7 @@ constexpr double kRecordedS = 30;
 ReplayCommand::ReplayCommand(CLI::App& app)
     : command_(app.add_subcommand("replay", "load test: many robots that send recorded telemetry as their own")) {
   command_->add_option("--station", station_, "ADDR:PORT of the station's robot door")->required();
+  add_tls(*command_, tls_);
   command_->add_option("--robots", options_.robots, "how many")->check(CLI::Range(1, kMostRobots))->required();
   command_->add_option("--id", options_.id_prefix, "the robots are ID-1 to ID-N")->capture_default_str();
   command_->add_option("--token", token_, "enrolment token, the same for all");
@@ -32,7 +33,7 @@ ReplayCommand::ReplayCommand(CLI::App& app)
 }
 
 int ReplayCommand::run() {
-  options_.station = parse_station_address(station_);
+  options_.station = station_address(station_, tls_);
   if (!std::isfinite(options_.duration_s)) throw std::invalid_argument("--duration-s: not a time");
   const Recording recording =
       frames_.empty() ? make_recording(kRecordedS, samples_per_frame_, seed_) : load_recording(frames_);

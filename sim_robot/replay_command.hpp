@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include "sim_robot/fleet_run.hpp"
+#include "sim_robot/tls_options.hpp"
 
 namespace sim_robot {
 
@@ -18,6 +19,7 @@ class ReplayCommand {
  private:
   CLI::App* command_;
   FleetOptions options_;
+  TlsOptions tls_;
   std::string station_, token_, frames_;
   double rate_ = 1;
   std::uint32_t samples_per_frame_ = 10;

@@ -66,7 +66,7 @@ StationAddress put_between(std::optional<Proxy>& network, asio::io_context& loop
   spawn(loop, network->run());
   say(control::join_text("dials ", station.host, ":", station.port, " through ", network->endpoint(),
                          " in this process, which does the faults of the link"));
-  return {"127.0.0.1", std::to_string(network->endpoint().port())};
+  return {"127.0.0.1", std::to_string(network->endpoint().port()), station.trust};
 }
 
 void stop_at_end(asio::io_context& loop, asio::signal_set& stop, asio::steady_timer& end, double duration_s) {
@@ -80,6 +80,7 @@ void stop_at_end(asio::io_context& loop, asio::signal_set& stop, asio::steady_ti
 
 RunCommand::RunCommand(CLI::App& app) {
   app.add_option("--station", station_, "ADDR:PORT of the station's robot door");
+  add_tls(app, tls_);
   app.add_option("--handshake-ms", handshake_ms_, "as TLS on the robot's board: it dials at rest, and ticks are missed")
       ->check(CLI::Range(0, 30'000))
       ->capture_default_str();
@@ -99,7 +100,7 @@ RunCommand::RunCommand(CLI::App& app) {
 int RunCommand::run() const {
   if (station_.empty()) throw CLI::RequiredError("--station");
   const Scenario scenario = scenario_of(robot_);
-  const StationAddress station = parse_station_address(station_);
+  const StationAddress station = station_address(station_, tls_);
   return robots_ > 0 ? run_many(scenario, station) : run_one(scenario, station);
 }
 

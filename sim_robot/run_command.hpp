@@ -5,6 +5,7 @@
 
 #include "sim_robot/robot_options.hpp"
 #include "sim_robot/station_connection.hpp"
+#include "sim_robot/tls_options.hpp"
 
 namespace sim_robot {
 
@@ -21,6 +22,7 @@ class RunCommand {
   int run_many(const Scenario& scenario, const StationAddress& station) const;
 
   RobotOptions robot_;
+  TlsOptions tls_;
   int handshake_ms_ = 0;
   std::string station_, faults_at_;
   bool faults_anywhere_ = false;

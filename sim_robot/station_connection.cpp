@@ -2,10 +2,7 @@
 #include "sim_robot/station_connection.hpp"
 
 #include <algorithm>
-#include <boost/asio/as_tuple.hpp>
-#include <boost/asio/buffer.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <chrono>
 #include <utility>
 
@@ -13,14 +10,12 @@ namespace sim_robot {
 namespace {
 
 namespace asio = boost::asio;
-using asio::ip::tcp;
 using namespace std::chrono_literals;
 
 constexpr auto kConnectTimeout = 1s;
 constexpr auto kAskAgain = 10ms;
 constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
 constexpr int kMostPauses = 4;                       // taken together, for a station that does not take it in
-constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
 }  // namespace
 
@@ -33,10 +28,10 @@ asio::awaitable<void> StationConnection::run() {
     while (!speaker_.may_dial()) co_await pause(kAskAgain);
     const int times_forgotten = times_forgotten_;
     was_welcome_ = false;
-    const bool reached = co_await reach();
-    if (!reached) {
+    const std::string failure = co_await socket_.reach(station_, kConnectTimeout);
+    if (!failure.empty()) {
       ++counts_.unreachable;
-      say("cannot reach the station at " + station_.host + ":" + station_.port + ", trying again");
+      say(failure + " at " + station_.host + ":" + station_.port + ", trying again");
     } else {
       const bool ready = co_await shake_hands();
       if (ready && times_forgotten == times_forgotten_) {
@@ -48,14 +43,6 @@ asio::awaitable<void> StationConnection::run() {
     std::uniform_int_distribution<int> pause_ms{kMinPauseMs, kMaxPauseMs};
     co_await pause(std::clamp(failures, 1, kMostPauses) * std::chrono::milliseconds(pause_ms(jitter_)));
   }
-}
-
-asio::awaitable<bool> StationConnection::reach() {
-  socket_ = tcp::socket{socket_.get_executor()};
-  const bool reached = co_await dial(socket_, station_, kConnectTimeout);
-  boost::system::error_code error;
-  if (reached) socket_.non_blocking(true, error);
-  co_return reached && !error;
 }
 
 asio::awaitable<bool> StationConnection::shake_hands() {
@@ -73,8 +60,8 @@ asio::awaitable<void> StationConnection::serve() {
   speaker_.on_opened();
   if (is_open_) flush();
   while (is_open_) {
-    const auto [error] = co_await socket_.async_wait(tcp::socket::wait_read, kNoThrow);
-    if (error) break;
+    const bool readable = co_await socket_.wait_readable();
+    if (!readable) break;
     while (is_open_ && !speaker_.is_listening()) co_await pause(kAskAgain);
     if (!is_open_) break;
     const bool keep = take_bytes();
@@ -87,7 +74,7 @@ asio::awaitable<void> StationConnection::serve() {
 bool StationConnection::take_bytes() {
   thread_local std::array<std::uint8_t, 4096> bytes;
   boost::system::error_code error;
-  const std::size_t size = socket_.read_some(asio::buffer(bytes), error);
+  const std::size_t size = socket_.read_some(bytes.data(), bytes.size(), error);
   if (error == asio::error::would_block) return true;
   if (error) return false;
   const bool keep = speaker_.on_bytes({bytes.data(), size});
@@ -123,15 +110,14 @@ void StationConnection::flush() {
 // True when all of it was taken; keeps the rest otherwise.
 bool StationConnection::write() {
   boost::system::error_code error;
-  frame_sent_ += socket_.write_some(asio::buffer(frame_.data() + frame_sent_, frame_size_ - frame_sent_), error);
+  frame_sent_ += socket_.write_some({frame_.data() + frame_sent_, frame_size_ - frame_sent_}, error);
   if (error && error != asio::error::would_block) close();
   return is_open_ && frame_sent_ == frame_size_;
 }
 
 // SAFETY: the silence may be the robot's own, after a stall; a stop that came meanwhile is read before the verdict.
 void StationConnection::close_as_silent() {
-  boost::system::error_code ignored;
-  if (!is_open_ || socket_.available(ignored) > 0) return;
+  if (!is_open_ || socket_.has_unread()) return;
   say("the station is silent");
   close();
 }
@@ -139,10 +125,9 @@ void StationConnection::close_as_silent() {
 // Also ends the read under way, as close() does.
 void StationConnection::forget() {
   ++times_forgotten_;
-  boost::system::error_code ignored;
-  socket_.cancel(ignored);
+  socket_.cancel();
   reset_forgotten();
-  if (is_open_) forgotten_.emplace(std::move(socket_));
+  if (is_open_) forgotten_.emplace(socket_.take());
   is_open_ = false;
 }
 
@@ -157,8 +142,7 @@ void StationConnection::close() {
   if (!is_open_) return;
   is_open_ = false;
   speaker_.on_closed();
-  boost::system::error_code ignored;
-  socket_.close(ignored);
+  socket_.close();
 }
 
 void StationConnection::say_how_it_ended() {

@@ -1,4 +1,5 @@
-// The robot's end of a TCP connection to a station: dials for ever, reads as bytes arrive, writes without waiting.
+// The robot's end of a connection to a station, TCP or TLS: dials for ever, reads as bytes arrive, writes without
+// waiting.
 //
 // What speaks over it is a Speaker: a simulated robot, or a recording that is replayed. What the socket does not take
 // at once of a frame stays here, the speaker is asked for no other until it is gone. After a failure it is dialled
@@ -21,6 +22,7 @@
 
 #include "protocol/frame.hpp"
 #include "sim_robot/dialling.hpp"
+#include "sim_robot/station_socket.hpp"
 
 namespace sim_robot {
 
@@ -85,7 +87,6 @@ class StationConnection {
 
  private:
   boost::asio::awaitable<bool> shake_hands();
-  boost::asio::awaitable<bool> reach();
   boost::asio::awaitable<void> serve();
   bool take_bytes();
   bool write();
@@ -98,7 +99,7 @@ class StationConnection {
   StationAddress station_;
   std::string name_;
   LinkLog log_;
-  boost::asio::ip::tcp::socket socket_;
+  StationSocket socket_;
   std::optional<boost::asio::ip::tcp::socket> forgotten_;
   int times_forgotten_ = 0;
   bool is_open_ = false;

@@ -10,7 +10,7 @@ constexpr robot_fw::esp8266::Secrets kSecrets{
     "wifi-name", "wifi-password",
     "192.0.2.1",  // the station: an address is better than a name, which has to be looked up first
     7070,
-    // The station's public key: openssl x509 -in station.crt -noout -pubkey
+    // The station's public key, as `rheonaut certificate` prints it
     R"(-----BEGIN PUBLIC KEY-----
 MFkwEwYHKoZIzj0CAQYIKoZIzj0DAQcDQgAENU6ZTCnv5rm42xjDv+mO8uYdCPnT
 Jdf9N2ln1Lt3/R4/JR0Yi2jrZj4yF5IjmmUyBj0DPF7c1QASa+F6q1hYyw==

@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <iterator>
 
 #include "server/endpoint.hpp"
 
@@ -13,16 +15,19 @@ namespace {
 std::vector<std::string> host_names(const ApiOptions& options) {
   std::vector<std::string> names = options.hosts;
   if (!options.endpoint.address().is_unspecified()) names.push_back(options.endpoint.address().to_string());
+  std::ranges::copy(options.security->names(), std::back_inserter(names));
   return names;
 }
 
 StationFacts facts_of(const ApiOptions& options, const Listener& listener, const Clock& clock) {
-  return {options.version, options.store_id, text(listener.endpoint()), options.robots_address, clock.steady_us()};
+  return {options.version,        options.store_id,  text(listener.endpoint()),
+          options.robots_address, clock.steady_us(), options.security};
 }
 
 }  // namespace
 
-ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string robots_address) {
+ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string robots_address,
+                       TransportSecurity& security) {
   ApiOptions options;
   options.endpoint = parse_endpoint(config.http);
   options.or_any_port = config.http_or_any_port;
@@ -31,6 +36,7 @@ ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string
   options.version = RHEONAUT_VERSION;
   options.store_id = store_id;
   options.robots_address = std::move(robots_address);
+  options.security = &security;
   return options;
 }
 
@@ -38,10 +44,10 @@ ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clo
                      Station& station, LiveFeed& live, RecordingParts& recording, AnalysisService& analysis)
     : listener_{loop, clock, options.endpoint, options.or_any_port},
       auth_{clock, options.data_dir},
-      guard_{auth_, host_names(options)},
+      guard_{auth_, host_names(options), options.security->http() != nullptr},
       parts_{loop, tasks, clock, station, live, recording, analysis, auth_, facts_of(options, listener_, clock)},
       live_{loop, tasks, clock, station, live, options.version},
-      server_{tasks, clock, listener_, guard_, router_, live_} {
+      server_{tasks, clock, listener_, guard_, router_, live_, options.security->http()} {
   add_routes(router_, parts_);
 }
 
@@ -52,10 +58,12 @@ void ApiServer::print_login_url() {
   std::fflush(stdout);
 }
 
-std::string ApiServer::login_url() {
+std::string ApiServer::url() const {
   auto endpoint = listener_.endpoint();
   if (endpoint.address().is_unspecified()) endpoint.address(boost::asio::ip::address_v4::loopback());
-  return server::login_url(text(endpoint), auth_.new_login_code());
+  return base_url(parts_.facts, text(endpoint));
 }
+
+std::string ApiServer::login_url() { return server::login_url(url(), auth_.new_login_code()); }
 
 }  // namespace server

@@ -20,10 +20,12 @@ struct ApiOptions {
   std::vector<std::string> hosts;           // further names for the Host header
   std::string version;
   std::uint64_t store_id = 0;
-  std::string robots_address;  // "127.0.0.1:7070", for people
+  std::string robots_address;             // "127.0.0.1:7070", for people
+  TransportSecurity* security = nullptr;  // must be given
 };
 
-ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string robots_address);
+ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string robots_address,
+                       TransportSecurity& security);
 
 class ApiServer {
  public:
@@ -35,6 +37,7 @@ class ApiServer {
 
   std::uint16_t port() const { return listener_.endpoint().port(); }
   std::string address() const;  // "127.0.0.1:8080"
+  std::string url() const;      // "https://127.0.0.1:8080", for a browser on this machine
   const Router& router() const { return router_; }
   std::string login_url();  // a link that lets one page in, for 10 minutes
   void print_login_url();   // on standard output, for the person at the console

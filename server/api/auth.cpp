@@ -1,17 +1,17 @@
 // Makes, keeps and compares secrets.
 #include "server/api/auth.hpp"
 
-#include <fcntl.h>
 #include <sodium.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <stdexcept>
+
+#include "server/private_file.hpp"
 
 namespace server {
 namespace {
@@ -39,21 +39,6 @@ bool is_secret(const std::string& text) {
 
 [[noreturn]] void cannot(const char* what, const fs::path& file) {
   throw std::runtime_error{std::string{"cannot "} + what + " " + file.string() + ": " + std::strerror(errno)};
-}
-
-// The whole file or nothing appears under its name, readable by its owner only from the first moment.
-void write_private(const fs::path& file, const std::string& content) {
-  const fs::path temporary = file.string() + ".new";
-  fs::remove(temporary);
-  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
-  if (descriptor < 0) cannot("create", temporary);
-  const bool written = ::write(descriptor, content.data(), content.size()) == static_cast<ssize_t>(content.size()) &&
-                       ::fsync(descriptor) == 0;
-  const int error = errno;
-  ::close(descriptor);
-  errno = error;
-  if (!written) cannot("write", temporary);
-  fs::rename(temporary, file);
 }
 
 std::string load_or_make_token(const fs::path& file) {

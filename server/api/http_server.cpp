@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <sys/socket.h>
 
 #include <algorithm>
 #include <boost/asio/as_tuple.hpp>
@@ -15,7 +14,6 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <cctype>
-#include <cerrno>
 #include <limits>
 #include <variant>
 
@@ -60,9 +58,9 @@ Request plain_request(const HttpRequest& message) {
 // One connection: requests and answers in turn, until it ends or asks for /live.
 class Connection {
  public:
-  Connection(HttpStream stream, Clock& clock, const RequestGuard& guard, const Router& router,
+  Connection(HttpStream stream, TlsGate* tls, Clock& clock, const RequestGuard& guard, const Router& router,
              std::list<HttpStream*>& strangers)
-      : stream_{std::move(stream)}, clock_{clock}, guard_{guard}, router_{router}, strangers_{strangers} {
+      : stream_{std::move(stream)}, tls_{tls}, clock_{clock}, guard_{guard}, router_{router}, strangers_{strangers} {
     strangers_.push_back(&stream_);
   }
   ~Connection() { strangers_.remove(&stream_); }
@@ -80,10 +78,10 @@ class Connection {
  private:
   enum class Next : std::uint8_t { another, end };
 
+  asio::awaitable<Next> secure();
   asio::awaitable<Next> read_and_answer();
   asio::awaitable<Next> refuse_unreadable(boost::system::error_code error);
   asio::awaitable<Response> answer(Request request);
-  asio::awaitable<void> peer_gone();
   template <class T>
   asio::awaitable<std::optional<T>> while_present(asio::awaitable<T> work);
   asio::awaitable<Next> send(Response response, const HttpRequest& to);
@@ -96,6 +94,7 @@ class Connection {
   void allow(microseconds duration) { deadline_us_ = clock_.steady_us() + duration.count(); }
 
   HttpStream stream_;
+  TlsGate* tls_;  // null: plain HTTP
   Clock& clock_;
   const RequestGuard& guard_;
   const Router& router_;
@@ -110,6 +109,8 @@ class Connection {
 asio::awaitable<void> Connection::talk() {
   allow(kRequestTime);
   try {
+    const Next begun = co_await secure();
+    if (begun == Next::end) co_return;
     for (;;) {
       const Next next = co_await read_and_answer();
       if (next == Next::end) co_return;
@@ -125,13 +126,26 @@ asio::awaitable<void> Connection::talk() {
 
 asio::awaitable<void> Connection::watch() {
   while (clock_.steady_us() < deadline_us_) co_await clock_.sleep_for(kWatchInterval);
-  boost::system::error_code ignored;
   if (request_has_begun_) {
-    stream_.non_blocking(true, ignored);
     const std::string late = "HTTP/1.1 408 Request Timeout\r\nConnection: close\r\nContent-Length: 0\r\n\r\n";
-    stream_.write_some(asio::buffer(late), ignored);
+    stream_.write_now(asio::buffer(late));
   }
-  stream_.shutdown(tcp::socket::shutdown_both, ignored);
+  stream_.end();
+}
+
+asio::awaitable<Connection::Next> Connection::secure() {
+  if (tls_ == nullptr) co_return Next::another;
+  const TlsGate::Outcome outcome = co_await tls_->secure(stream_, "http port");
+  if (outcome == TlsGate::Outcome::secure) co_return Next::another;
+  if (outcome == TlsGate::Outcome::not_tls) {
+    const std::string detail = "This port speaks TLS only: use https:// instead of http://.\n";
+    stream_.write_now(asio::buffer(
+        fmt::format("HTTP/1.1 400 Bad Request\r\nConnection: close\r\nContent-Type: text/plain\r\nContent-Length: "
+                    "{}\r\n\r\n{}",
+                    detail.size(), detail)));
+    co_await discard_rest();
+  }
+  co_return Next::end;
 }
 
 bool Connection::wants_live(const HttpRequest& message) const {
@@ -186,23 +200,11 @@ asio::awaitable<Connection::Next> Connection::read_and_answer() {
   co_return co_await send(std::move(*response), message);
 }
 
-// Returns when the client has closed its side, also only half of it. What it sends ahead hides its end; then only a
-// reset counts.
-asio::awaitable<void> Connection::peer_gone() {
-  for (;;) {
-    co_await stream_.async_wait(tcp::socket::wait_read, asio::use_awaitable);
-    char byte = 0;
-    const ssize_t size = ::recv(stream_.native_handle(), &byte, 1, MSG_PEEK | MSG_DONTWAIT);
-    if (size > 0) co_await stream_.async_wait(tcp::socket::wait_error, asio::use_awaitable);
-    if (size >= 0 || (errno != EAGAIN && errno != EINTR)) co_return;
-  }
-}
-
 // What the work gives, or nothing when the client goes first: the work is cancelled then, and has ended.
 template <class T>
 asio::awaitable<std::optional<T>> Connection::while_present(asio::awaitable<T> work) {
   try {
-    std::variant<T, std::monostate> first = co_await (std::move(work) || peer_gone());
+    std::variant<T, std::monostate> first = co_await (std::move(work) || stream_.peer_gone());
     if (first.index() == 0) co_return std::move(std::get<0>(first));
     co_return std::nullopt;
   } catch (const asio::multiple_exceptions&) {  // both were cancelled: the station stops, or the time is over
@@ -233,8 +235,7 @@ asio::awaitable<Connection::Next> Connection::refuse_unreadable(boost::system::e
 
 // Closing with unread bytes would reset the connection and could destroy the answer on its way.
 asio::awaitable<void> Connection::discard_rest() {
-  boost::system::error_code ignored;
-  stream_.shutdown(tcp::socket::shutdown_send, ignored);
+  stream_.end_sending();
   allow(kLingerTime);
   buffer_.clear();
   std::size_t discarded = 0;
@@ -261,7 +262,7 @@ asio::awaitable<Response> Connection::answer(Request request) {
 }
 
 template <class Message>
-void set_common_fields(Message& message, const Response& response, const HttpRequest& to) {
+void set_common_fields(Message& message, const Response& response, const HttpRequest& to, bool is_secure) {
   message.version(to.version());
   message.result(static_cast<unsigned>(response.status));
   message.reason(reason_phrase(response.status));
@@ -272,6 +273,10 @@ void set_common_fields(Message& message, const Response& response, const HttpReq
   message.set("Referrer-Policy", "no-referrer");
   message.set("Cross-Origin-Opener-Policy", "same-origin");
   message.set("Cross-Origin-Resource-Policy", "same-origin");
+  // Browsers keep it for the name with all its ports, and other programs of this machine are localhost, too.
+  if (is_secure && !to[http::field::host].starts_with("localhost")) {
+    message.set(http::field::strict_transport_security, "max-age=31536000");
+  }
   if (!response.content_type.empty()) message.set(http::field::content_type, response.content_type);
   for (const auto& [name, value] : response.headers) message.insert(name, value);
   message.keep_alive(to.keep_alive());
@@ -281,7 +286,7 @@ asio::awaitable<Connection::Next> Connection::send(Response response, const Http
   const bool head_only = to.method() == http::verb::head;
   if (response.stream != nullptr && !head_only) {
     http::response<http::empty_body> head;
-    set_common_fields(head, response, to);
+    set_common_fields(head, response, to, stream_.is_secure());
     if (to.version() >= 11) {
       head.chunked(true);
     } else {
@@ -290,7 +295,7 @@ asio::awaitable<Connection::Next> Connection::send(Response response, const Http
     co_return co_await send_stream(std::move(head), std::move(response.stream));
   }
   http::response<http::string_body> message;
-  set_common_fields(message, response, to);
+  set_common_fields(message, response, to, stream_.is_secure());
   if (response.status != 304 && response.stream == nullptr) message.content_length(response.body.size());
   if (!head_only) message.body() = std::move(response.body);
   co_return co_await send_body(std::move(message));
@@ -354,17 +359,17 @@ asio::awaitable<Result<std::optional<std::string>>> Connection::next_piece(BodyS
 }  // namespace
 
 HttpServer::HttpServer(TaskGroup& tasks, Clock& clock, Listener& listener, const RequestGuard& guard,
-                       const Router& router, LiveParts& live)
-    : tasks_{tasks}, clock_{clock}, listener_{listener}, guard_{guard}, router_{router}, live_{live} {}
+                       const Router& router, LiveParts& live, TlsGate* tls)
+    : tasks_{tasks}, clock_{clock}, listener_{listener}, guard_{guard}, router_{router}, live_{live}, tls_{tls} {}
 
 asio::awaitable<void> HttpServer::run() {
   return listener_.run([this](tcp::socket socket) { on_connection(std::move(socket)); });
 }
 
 void HttpServer::on_connection(tcp::socket socket) {
-  boost::system::error_code ignored;
-  socket.set_option(tcp::no_delay{true}, ignored);
   if (connections_ >= kMaxConnections && !make_room()) {
+    if (tls_ != nullptr) return;  // it would not understand
+    boost::system::error_code ignored;
     const std::string busy = "HTTP/1.1 503 Service Unavailable\r\nConnection: close\r\nContent-Length: 0\r\n\r\n";
     socket.non_blocking(true, ignored);
     socket.write_some(asio::buffer(busy), ignored);
@@ -375,15 +380,14 @@ void HttpServer::on_connection(tcp::socket socket) {
 
 bool HttpServer::make_room() {
   if (strangers_.empty()) return false;
-  boost::system::error_code ignored;
-  strangers_.front()->close(ignored);  // its connection ends with the next turn of the loop
+  strangers_.front()->end();  // its connection ends with the next turn of the loop
   strangers_.pop_front();
   return true;
 }
 
 asio::awaitable<void> HttpServer::serve(tcp::socket socket) {
   const Counted counted{connections_};
-  Connection connection{std::move(socket), clock_, guard_, router_, strangers_};
+  Connection connection{HttpStream{std::move(socket)}, tls_, clock_, guard_, router_, strangers_};
   co_await (connection.talk() || connection.watch());
   if (!connection.wants_live()) co_return;
   co_await contained("page of " + connection.actor(),

@@ -3,7 +3,8 @@
 // Limits: 256 connections (below), header 16 kB (431), body 64 kB (413), 10 s for a request to arrive (408), 60 s idle,
 // 30 s for a client to take a piece of the answer. Malformed HTTP is 400 and the end of the connection. An exception of
 // a route is logged and answered with 500. An upgrade at /live becomes a LivePage. A GET whose client has gone is
-// cancelled; a POST is always carried out.
+// cancelled; a POST is always carried out. In TLS the handshake is part of the first request's 10 s, and who speaks
+// plain HTTP is told so (400).
 //
 // SAFETY: silent connections must not lock out a stop. When all 256 are taken, a new one replaces the oldest stranger,
 // that is a connection which has sent no request with a valid credential; it is refused (503) when there is none.
@@ -20,6 +21,7 @@
 #include "server/api/request_guard.hpp"
 #include "server/api/router.hpp"
 #include "server/net/listener.hpp"
+#include "server/net/tls_gate.hpp"
 
 namespace server {
 
@@ -34,7 +36,7 @@ inline constexpr microseconds kLingerTime{std::chrono::seconds{2}};  // for a re
 class HttpServer {
  public:
   HttpServer(TaskGroup& tasks, Clock& clock, Listener& listener, const RequestGuard& guard, const Router& router,
-             LiveParts& live);
+             LiveParts& live, TlsGate* tls);  // null: plain HTTP
 
   boost::asio::awaitable<void> run();  // accepts until cancelled
 
@@ -51,6 +53,7 @@ class HttpServer {
   const RequestGuard& guard_;
   const Router& router_;
   LiveParts& live_;
+  TlsGate* tls_;
   std::size_t connections_ = 0;
   std::list<HttpStream*> strangers_;  // oldest first; each owned by its connection
 };

@@ -1,10 +1,10 @@
-// The one type of connection that HTTP and WebSocket are compiled for.
+// The one type of connection that HTTP and WebSocket are compiled for: plain or TLS.
 #pragma once
 
-#include <boost/asio/ip/tcp.hpp>
+#include "server/net/stream_socket.hpp"
 
 namespace server {
 
-using HttpStream = boost::asio::ip::tcp::socket;
+using HttpStream = StreamSocket;
 
 }  // namespace server

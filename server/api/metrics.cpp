@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iterator>
 #include <string_view>
 
@@ -49,9 +50,20 @@ class Metrics {
   std::string text_;
 };
 
+void add_security(Metrics& metrics, const TransportSecurity& security) {
+  metrics.gauge("exposed", security.is_exposed() ? 1 : 0, "1 while a port speaks plain TCP beyond this machine.");
+  const TlsGate* gate = security.gate();
+  if (gate == nullptr) return;
+  const auto not_after_s = std::max<std::int64_t>(gate->context().certificate.not_after_us / 1'000'000, 0);
+  metrics.gauge("tls_certificate_not_after_s", static_cast<std::uint64_t>(not_after_s), "End of its life, UTC.");
+  metrics.counter("tls_handshakes_total", gate->counters().handshakes, "Connections that are in TLS now, or were.");
+  metrics.counter("tls_resumed_total", gate->counters().resumed, "Of them, those that resumed a session.");
+  metrics.counter("tls_failed_total", gate->counters().failed, "Handshakes that failed.");
+}
+
 }  // namespace
 
-std::string metrics_text(const RecordingParts& recording, const StopTimes& stops) {
+std::string metrics_text(const RecordingParts& recording, const StopTimes& stops, const TransportSecurity& security) {
   const RecorderCounters& counters = recording.recorder.counters();
   const DiskUse& use = recording.disk_watch.use();
   const RetentionCounters& retention = recording.retention.counters();
@@ -80,6 +92,7 @@ std::string metrics_text(const RecordingParts& recording, const StopTimes& stops
   metrics.histogram(kStopTimes, "sent", stops.sent);
   metrics.histogram(kStopTimes, "acknowledged", stops.acknowledged);
   metrics.histogram(kStopTimes, "duty_zero_seen", stops.verified);
+  add_security(metrics, security);
   return std::move(metrics).text();
 }
 

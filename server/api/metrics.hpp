@@ -1,4 +1,4 @@
-// The recording's figures as Prometheus reads them: text format 0.0.4.
+// The figures of recording and TLS as Prometheus reads them: text format 0.0.4.
 //
 //   # HELP rheonaut_samples_written_total Samples that are durable.
 //   # TYPE rheonaut_samples_written_total counter
@@ -7,11 +7,12 @@
 
 #include <string>
 
+#include "server/net/transport_security.hpp"
 #include "server/recording/recording_parts.hpp"
 #include "server/station/stop_times.hpp"
 
 namespace server {
 
-std::string metrics_text(const RecordingParts& recording, const StopTimes& stops);
+std::string metrics_text(const RecordingParts& recording, const StopTimes& stops, const TransportSecurity& security);
 
 }  // namespace server

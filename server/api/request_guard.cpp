@@ -52,7 +52,8 @@ std::unexpected<Response> refuse(int status, const char* detail, const char* rea
 
 }  // namespace
 
-RequestGuard::RequestGuard(Auth& auth, std::vector<std::string> hosts) : auth_{auth}, hosts_{std::move(hosts)} {
+RequestGuard::RequestGuard(Auth& auth, std::vector<std::string> hosts, bool is_secure)
+    : auth_{auth}, hosts_{std::move(hosts)}, scheme_{is_secure ? "https://" : "http://"} {
   std::ranges::transform(hosts_, hosts_.begin(), lower);
 }
 
@@ -86,7 +87,7 @@ std::expected<std::string, Response> RequestGuard::admit(const Request& request)
   if (!path) return refuse(400, "the path is not acceptable", "malformed_path");
   const bool live = *path == "/live";
   const std::string origin = request.header("origin");
-  const bool same_origin = lower(origin) == "http://" + lower(host);
+  const bool same_origin = lower(origin) == scheme_ + lower(host);
   if (!origin.empty() && !same_origin && (live || changes_something(request))) {
     return refuse(403, "the request comes from a page of another origin", "wrong_origin");
   }

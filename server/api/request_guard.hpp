@@ -17,8 +17,9 @@ namespace server {
 
 class RequestGuard {
  public:
-  // `hosts` are names or addresses without port, besides localhost and the loopback addresses.
-  RequestGuard(Auth& auth, std::vector<std::string> hosts);
+  // `hosts` are names or addresses without port, besides localhost and the loopback addresses. The station's own page
+  // comes from https:// when the port is secure.
+  RequestGuard(Auth& auth, std::vector<std::string> hosts, bool is_secure = false);
 
   // Who asks (empty where nobody needs to say), or the refusal.
   std::expected<std::string, Response> admit(const Request& request) const;
@@ -34,6 +35,7 @@ class RequestGuard {
 
   Auth& auth_;
   std::vector<std::string> hosts_;
+  const char* scheme_;
 };
 
 }  // namespace server

@@ -13,6 +13,7 @@
 #include "server/api/query_params.hpp"
 #include "server/api/router.hpp"
 #include "server/live/live_feed.hpp"
+#include "server/net/transport_security.hpp"
 #include "server/recording/recording_parts.hpp"
 #include "server/station/station.hpp"
 #include "server/tasks.hpp"
@@ -24,7 +25,9 @@ struct StationFacts {
   std::uint64_t store_id = 0;
   std::string http_address;
   std::string robots_address;
-  std::int64_t started_at_us = 0;  // steady
+  std::int64_t started_at_us = 0;         // steady
+  TransportSecurity* security = nullptr;  // never null
+  bool is_secure() const { return security->http() != nullptr; }
 };
 
 // What the routes work with; everything outlives the router.
@@ -52,7 +55,8 @@ void add_export_routes(Router& router, ApiParts& parts);
 // Everything above, and the cockpit as fallback.
 void add_routes(Router& router, ApiParts& parts);
 
-std::string login_url(const std::string& address, const std::string& code);  // address: "127.0.0.1:8080"
+std::string base_url(const StationFacts& facts, const std::string& address);  // "https://127.0.0.1:8080"
+std::string login_url(const std::string& base_url, const std::string& code);
 Result<RunId> run_id_of(const Request& request);
 
 inline constexpr std::int64_t kDefaultLimit = 100;

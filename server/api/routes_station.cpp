@@ -14,7 +14,8 @@ Answer get_station(ApiParts& parts, Request) {
                                 {"utc_us", parts.clock.utc_us()},
                                 {"uptime_s", static_cast<double>(parts.clock.steady_us() - facts.started_at_us) / 1e6},
                                 {"http_address", facts.http_address},
-                                {"robots_address", facts.robots_address}});
+                                {"robots_address", facts.robots_address},
+                                {"security", facts.security->state()}});
 }
 
 Answer get_openapi(ApiParts&, Request request) { co_return asset_response(request, openapi_document()); }
@@ -22,7 +23,8 @@ Answer get_openapi(ApiParts&, Request request) { co_return asset_response(reques
 // A link that lets one page in. Its address is the one that was asked, which RequestGuard knows to be ours.
 Answer make_login_link(ApiParts& parts, Request request) {
   const std::string host = request.header("host");
-  const std::string url = login_url(host.empty() ? parts.facts.http_address : host, parts.auth.new_login_code());
+  const std::string url =
+      login_url(base_url(parts.facts, host.empty() ? parts.facts.http_address : host), parts.auth.new_login_code());
   co_return json_response(201, {{"url", url}, {"expires_at_us", parts.clock.utc_us() + kLoginCodeLife.count()}});
 }
 
@@ -41,8 +43,9 @@ Answer log_in(ApiParts& parts, Request request) {
   }
   Response response = html_response(303, "");
   response.headers.emplace_back("Location", "/");
-  response.headers.emplace_back("Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age={}",
-                                                          kSessionCookie, *session, kCookieLife.count() / 1'000'000));
+  response.headers.emplace_back(
+      "Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age={}{}", kSessionCookie, *session,
+                                kCookieLife.count() / 1'000'000, parts.facts.is_secure() ? "; Secure" : ""));
   co_return response;
 }
 
@@ -54,8 +57,12 @@ Answer live_without_upgrade(ApiParts&, Request) {
 
 }  // namespace
 
-std::string login_url(const std::string& address, const std::string& code) {
-  return fmt::format("http://{}/login?code={}", address, code);
+std::string base_url(const StationFacts& facts, const std::string& address) {
+  return fmt::format("{}://{}", facts.is_secure() ? "https" : "http", address);
+}
+
+std::string login_url(const std::string& base_url, const std::string& code) {
+  return fmt::format("{}/login?code={}", base_url, code);
 }
 
 void add_station_routes(Router& router, ApiParts& parts) {

@@ -20,6 +20,12 @@ void print_recording(const RecordingConfig& recording, std::ostream& out) {
              recording.critical_space_mb);
 }
 
+// What keeps others from reading and changing what is sent.
+std::string protection(const Config& config, const std::string& listen) {
+  if (config.speaks_tls(listen)) return "TLS with " + config.tls_certificate().string();
+  return config.is_exposed(listen) ? "PLAIN on a reachable address" : "plain on loopback";
+}
+
 }  // namespace
 
 int run(const CheckConfig& wish, std::ostream& out) {
@@ -27,6 +33,7 @@ int run(const CheckConfig& wish, std::ostream& out) {
   fmt::print(out, "data     {}\n", std::filesystem::absolute(config.data_dir).string());
   fmt::print(out, "http     {}{}\n", config.http, config.http_or_any_port ? " (or a free port)" : "");
   fmt::print(out, "robots   {}{}\n", config.robots, config.robots_or_any_port ? " (or a free port)" : "");
+  fmt::print(out, "tls      http {}, robots {}\n", protection(config, config.http), protection(config, config.robots));
   fmt::print(out, "limits   setpoint {} to {} m, duty {} to {}, disturbance {} m\n", config.limits.setpoint_min_m,
              config.limits.setpoint_max_m, config.limits.duty_min, config.limits.duty_max,
              config.limits.disturbance_max_m);

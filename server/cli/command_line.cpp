@@ -77,6 +77,7 @@ Wish parse_command_line(int argc, char** argv) {
   Wish wish;
   offer<Serve>(app, "serve", "Run the station until SIGINT or SIGTERM", wish);
   offer<CheckConfig>(app, "check-config", "Check a configuration and print what it means", wish);
+  offer<Certificate>(app, "certificate", "Make or renew the station's certificate for TLS", wish);
   offer<Backup>(app, "backup", "Copy a station's database, also while it runs, and verify the copy", wish);
   offer<Restore>(app, "restore", "Make a backup the database of a new data folder", wish);
   offer<Model>(app, "model", "Show the motion models, compute the hydrodynamic one, fit the motor", wish);

@@ -6,6 +6,7 @@
 
 #include "server/cli/backup.hpp"
 #include "server/cli/bode.hpp"
+#include "server/cli/certificate.hpp"
 #include "server/cli/discretise.hpp"
 #include "server/cli/export.hpp"
 #include "server/cli/identify.hpp"
@@ -32,8 +33,8 @@ struct Answered {
   int exit_code = 0;
 };
 
-using Wish = std::variant<Answered, Serve, CheckConfig, Backup, Restore, Verify, Export, Model, Bode, Step, Identify,
-                          Tune, Discretise, Predict>;
+using Wish = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
+                          Identify, Tune, Discretise, Predict>;
 
 Wish parse_command_line(int argc, char** argv);
 

@@ -1,5 +1,5 @@
 // Asks the station that runs in a data folder, over loopback and with its own token: for tools that must not write into
-// the database themselves.
+// the database themselves. In TLS only the station with the certificate that the folder announces gets the token.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
@@ -24,6 +24,7 @@ class StationClient {
 
  private:
   boost::asio::ip::tcp::endpoint endpoint_;
+  std::filesystem::path certificate_;  // empty: plain HTTP
   std::string token_;
 };
 

@@ -1,10 +1,11 @@
-// The port where robots dial in: each connection becomes a task of its own.
+// The port where robots dial in: each connection becomes a task of its own, behind its TLS handshake if there is one.
 //
 // Loop thread. Outlives the sessions it started.
 #pragma once
 
 #include "server/link/robot_session.hpp"
 #include "server/net/listener.hpp"
+#include "server/net/tls_gate.hpp"
 #include "server/tasks.hpp"
 
 namespace server {
@@ -15,7 +16,7 @@ class RobotListener {
   static constexpr int kMaxGreetings = 2048;    // of them, how many may not have been welcomed yet
 
   RobotListener(boost::asio::io_context& loop, Clock& clock, TaskGroup& tasks, Station& station, RobotArchive& archive,
-                const boost::asio::ip::tcp::endpoint& endpoint, bool or_any_port);
+                const boost::asio::ip::tcp::endpoint& endpoint, bool or_any_port, TlsGate* tls = nullptr);
 
   boost::asio::awaitable<void> run();
 
@@ -25,6 +26,9 @@ class RobotListener {
   boost::asio::ip::tcp::endpoint endpoint() const { return listener_.endpoint(); }
 
  private:
+  bool is_full(const std::string& peer) const;
+  void accept(StreamSocket socket);
+  boost::asio::awaitable<void> secure_session(StreamSocket socket);
   boost::asio::awaitable<void> session(std::unique_ptr<ByteStream> stream);
 
   boost::asio::io_context& loop_;
@@ -33,6 +37,7 @@ class RobotListener {
   Station& station_;
   RobotArchive& archive_;
   Listener listener_;
+  TlsGate* tls_;  // null: plain TCP
   int connections_ = 0;
   int greetings_ = 0;
 };

@@ -1,4 +1,4 @@
-// A connection as a stream of bytes: TCP, or two ends in memory for tests in virtual time.
+// A connection as a stream of bytes: TLS, TCP, or two ends in memory for tests in virtual time.
 //
 // Loop thread. One reader and one writer at a time. The owner keeps the stream until both have returned.
 #pragma once
@@ -13,6 +13,8 @@
 
 namespace server {
 
+class StreamSocket;
+
 class ByteStream {
  public:
   virtual ~ByteStream() = default;
@@ -20,8 +22,8 @@ class ByteStream {
   // At least one byte, or 0 when the stream has ended (closed by either side, reset, cancelled).
   virtual boost::asio::awaitable<std::size_t> read_some(boost::asio::mutable_buffer into) = 0;
 
-  // How many of the bytes the stream took without waiting: 0 also when it cannot say, or has ended. Not while a write()
-  // is under way.
+  // How many of the bytes the stream took without waiting: 0 also when it has ended. What it did not take must be what
+  // the next write begins with. Not while a write() is under way.
   virtual std::size_t write_now(boost::asio::const_buffer bytes) = 0;
 
   // All bytes; false when the stream ended before.
@@ -34,9 +36,10 @@ class ByteStream {
   virtual bool from_loopback() const = 0;
 };
 
-// Takes over a connected socket. Sets TCP_NODELAY, and a small TCP_NOTSENT_LOWAT so that next to nothing waits in the
-// kernel in front of an emergency stop.
-std::unique_ptr<ByteStream> make_tcp_stream(boost::asio::ip::tcp::socket socket);
+// Takes over a connected socket, in TLS when its handshake is done. Sets TCP_NODELAY, and a small TCP_NOTSENT_LOWAT so
+// that next to nothing waits in the kernel in front of an emergency stop.
+std::unique_ptr<ByteStream> make_stream(StreamSocket socket);
+std::unique_ptr<ByteStream> make_tcp_stream(boost::asio::ip::tcp::socket socket);  // plain
 
 // Two connected streams in memory, and the faults of the link between them.
 class MemoryLink {

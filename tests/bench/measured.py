@@ -27,11 +27,11 @@ def resident_mb(pid):
 
 
 @contextlib.contextmanager
-def station(programs, folder):
+def station(programs, folder, *flags):
     data = folder / "data"
     with open(folder / "station.log", "wb") as log:
         process = subprocess.Popen([programs / "rheonaut", "serve", "--data", data, "--http", "127.0.0.1:0", "--robots",
-                                    "127.0.0.1:0"], stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+                                    "127.0.0.1:0", *flags], stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
     try:
         while not (data / "endpoints.json").exists():
             if process.poll() is not None:

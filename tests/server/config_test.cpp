@@ -55,6 +55,10 @@ TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
   EXPECT_EQ(from_file.http_hosts, defaults.http_hosts);
   EXPECT_EQ(from_file.robots, defaults.robots);
   EXPECT_EQ(from_file.enrol_on_loopback, defaults.enrol_on_loopback);
+  EXPECT_EQ(from_file.tls.mode, defaults.tls.mode);
+  EXPECT_EQ(from_file.tls.certificate, defaults.tls.certificate);
+  EXPECT_EQ(from_file.tls.key, defaults.tls.key);
+  EXPECT_EQ(from_file.tls.insecure, defaults.tls.insecure);
   EXPECT_EQ(from_file.link.link_timeout_ms, defaults.link.link_timeout_ms);
   EXPECT_EQ(from_file.link.heartbeat_interval_ms, defaults.link.heartbeat_interval_ms);
   EXPECT_EQ(from_file.link.samples_per_frame, defaults.link.samples_per_frame);
@@ -117,6 +121,30 @@ TEST_F(ConfigTest, AMissingFileIsAMistake) {
   ConfigFlags flags;
   flags.file = "no/such/file.toml";
   EXPECT_THROW(load_config(flags), std::invalid_argument);
+}
+
+TEST_F(ConfigTest, TlsIsSpokenWhereOtherMachinesListenUnlessSomebodySaysOtherwise) {
+  const std::string listen = "[http]\nlisten = '192.0.2.1:8080'\n[robots]\nlisten = '[::1]:7070'\n[tls]\n";
+  const Config automatic = load_config(file(listen));
+  EXPECT_TRUE(automatic.speaks_tls(automatic.http) && !automatic.speaks_tls(automatic.robots));
+  EXPECT_FALSE(automatic.is_exposed(automatic.http) || automatic.is_exposed(automatic.robots));
+  const Config on = load_config(file(listen + "mode = 'on'"));
+  EXPECT_TRUE(on.speaks_tls(on.http) && on.speaks_tls(on.robots));
+  for (const char* plain : {"insecure = true", "mode = 'off'\ninsecure = true"}) {
+    const Config insecure = load_config(file(listen + plain));
+    EXPECT_FALSE(insecure.speaks_tls(insecure.http) || insecure.speaks_tls(insecure.robots));
+    EXPECT_TRUE(insecure.is_exposed(insecure.http) && !insecure.is_exposed(insecure.robots));
+  }
+}
+
+TEST_F(ConfigTest, PlainTcpBeyondLoopbackNeedsAClearWord) {
+  const std::string refused = mistake("[robots]\nlisten = '0.0.0.0:7070'\n[tls]\nmode = 'off'");
+  EXPECT_THAT(refused, HasSubstr("robots.listen = '0.0.0.0:7070'"));
+  EXPECT_THAT(refused, HasSubstr("rheonaut certificate"));
+  EXPECT_THAT(refused, HasSubstr("tls.insecure = true"));
+  EXPECT_THAT(mistake("[tls]\nmode = 'on'\ninsecure = true"), HasSubstr("contradict"));
+  EXPECT_THAT(mistake("[tls]\nmode = 'yes'"), HasSubstr("must be one of auto, on, off"));
+  EXPECT_THAT(mistake("[tls]\ncertificate = 'a.crt'"), HasSubstr("belong together"));
 }
 
 }  // namespace

@@ -32,20 +32,28 @@ class Lab:
         self.processes.append(process)
         return process
 
-    def start_station(self, http="127.0.0.1:0", robots="127.0.0.1:0"):
+    def start_station(self, http="127.0.0.1:0", robots="127.0.0.1:0", config=None):
         with contextlib.suppress(FileNotFoundError):
             (self.data / "endpoints.json").unlink()  # of a station that was killed
-        self.start_unannounced(http, robots)
+        self.start_unannounced(http, robots, config)
         try:
             return Station(self.data, timeout_s=60)
         except TimeoutError:
             print(self.log("station"))
             raise
 
-    def start_unannounced(self, http, robots):
-        """Does not wait for it: on a full disk the station cannot say where it is."""
+    def start_unannounced(self, http, robots, config=None):
+        """Does not wait for it: on a full disk the station cannot say where it is. `config` is TOML."""
+        flags = []
+        if config is not None:
+            (self.folder / "rheonaut.toml").write_text(config)
+            flags = ["--config", self.folder / "rheonaut.toml"]
         self.station_process = self._start("station", "rheonaut", "serve", "--data", self.data, "--http", http,
-                                           "--robots", robots)
+                                           "--robots", robots, *flags)
+
+    def tool(self, *arguments):
+        """`rheonaut …`, run to its end."""
+        return subprocess.run([str(BIN / "rheonaut"), *map(str, arguments)], capture_output=True, text=True, timeout=60)
 
     def start_robot(self, station, robot_id="sim-1", *flags):
         return self._start(robot_id, "rheonaut-sim", "--station", station.endpoints["robots"], "--id", robot_id, *flags)

@@ -48,6 +48,7 @@ ApiTest::ApiTest() {
   options.version = "0.1.0";
   options.store_id = 0xfedcba9876543210;
   options.robots_address = "127.0.0.1:7070";
+  options.security = &security;
   api = std::make_unique<ApiServer>(loop, tasks, clock, options, station, live, recording, analysis);
   recording.spawn(tasks);
   tasks.spawn("live feed", live.run());

@@ -66,6 +66,7 @@ class ApiTest : public ::testing::Test {
   AnalysisService analysis{recording.history, maths};
   LiveFeed live{clock};
   RobotListener robots{loop, clock, tasks, station, recorder, {boost::asio::ip::address_v4::loopback(), 0}, false};
+  TransportSecurity security{clock, Config{}};
   std::unique_ptr<ApiServer> api;
   std::unique_ptr<TestRobot> robot;
 

@@ -263,7 +263,7 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
   const RequestGuard guard{auth, {}};
   Router router;
   router.add({"GET", "/broken", {}, [](Request) -> Answer { throw std::runtime_error{"secret"}; }});
-  HttpServer server{tasks, clock, listener, guard, router, live};
+  HttpServer server{tasks, clock, listener, guard, router, live, nullptr};
   tasks.spawn("http", server.run());
   {
     RawClient client{clock, listener.endpoint().port()};
@@ -304,7 +304,7 @@ TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
   Auth auth{clock, folder.path()};
   const RequestGuard guard{auth, {}};
   const Router router;
-  HttpServer server{tasks, clock, listener, guard, router, live};
+  HttpServer server{tasks, clock, listener, guard, router, live, nullptr};
   tasks.spawn("http", server.run());
   const auto session = auth.log_in(auth.new_login_code());
   {

@@ -16,6 +16,16 @@ export function TopBar({ session }: { session: Session }) {
       </a>
       <span class="station quiet">{station.value ? `station ${station.value.version}` : ''}</span>
       <ConnectionState session={session} />
+      {station.value?.security.exposed && (
+        <strong class="exposed" role="alert" title="tls.insecure is set: docs/operations.md says how to set up TLS">
+          Not encrypted: anyone on this network can read along and drive
+        </strong>
+      )}
+      {station.value?.security.certificate?.expires_soon && (
+        <span class="lamp caution" title="rheonaut certificate --renew">
+          Certificate expires soon
+        </span>
+      )}
       <span class="recording" aria-live="polite">
         {store.runs.value.map((run) => (
           <span class="lamp recording-lamp" key={run.run_id}>

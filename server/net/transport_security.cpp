@@ -1,0 +1,159 @@
+// Decides per port, watches the certificate's files, reminds people.
+#include "server/net/transport_security.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace server {
+namespace fs = std::filesystem;
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr std::int64_t kDayUs = microseconds{std::chrono::days{1}}.count();
+
+// Changes when either file is written, replaced, or pointed elsewhere.
+std::string stamp_of(const fs::path& certificate, const fs::path& key) {
+  std::string stamp;
+  for (const fs::path& file : {certificate, key}) {
+    struct stat status{};
+    if (::stat(file.c_str(), &status) != 0) return "missing";
+    stamp += fmt::format("{}.{}:{}:{};", status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size, status.st_ino);
+  }
+  return stamp;
+}
+
+std::string exposed_ports(const Config& config) {
+  std::string ports;
+  if (config.is_exposed(config.http)) ports = "http.listen = " + config.http;
+  if (config.is_exposed(config.robots)) ports += (ports.empty() ? "" : ", ") + ("robots.listen = " + config.robots);
+  return ports;
+}
+
+std::shared_ptr<const TlsContext> load_first(const Config& config) {
+  const fs::path certificate = config.tls_certificate();
+  if (config.tls.certificate.empty() && !fs::exists(certificate)) {
+    throw std::runtime_error{fmt::format(
+        "a port is to speak TLS (http.listen = {}, robots.listen = {}) and there is no certificate '{}'. Make one: "
+        "rheonaut certificate --data {}; or name yours as tls.certificate and tls.key; or listen on 127.0.0.1; or "
+        "accept with tls.insecure = true that everyone on the way can read and change what is sent",
+        config.http, config.robots, certificate.string(), config.data_dir.string())};
+  }
+  return load_tls_context(certificate, config.tls_key());
+}
+
+void log_in_force(const TlsCertificate& certificate) {
+  spdlog::info("TLS: the certificate for {} is in force, sha256 pin {}", fmt::join(certificate.names, ", "),
+               certificate.pin);
+}
+
+}  // namespace
+
+TransportSecurity::TransportSecurity(Clock& clock, const Config& config)
+    : clock_{clock},
+      certificate_{config.tls_certificate()},
+      key_{config.tls_key()},
+      http_is_secure_{config.speaks_tls(config.http)},
+      robots_are_secure_{config.speaks_tls(config.robots)},
+      exposed_{exposed_ports(config)} {
+  if (http_is_secure_ || robots_are_secure_) {
+    tried_ = seen_ = stamp_of(certificate_, key_);
+    gate_.emplace(clock_, worker_, load_first(config));
+    log_in_force(gate_->context().certificate);
+  }
+  remind();
+}
+
+asio::awaitable<void> TransportSecurity::run() {
+  for (;;) {
+    co_await clock_.sleep_for(kCertificateLook);
+    if (gate_) co_await watch_files();
+    remind();
+  }
+}
+
+asio::awaitable<void> TransportSecurity::watch_files() {
+  auto job = [certificate = certificate_, key = key_, tried = tried_, seen = seen_] {
+    return look(certificate, key, tried, seen);
+  };
+  Look found = co_await worker_.run(std::move(job));
+  take(std::move(found));
+}
+
+// On the worker. Files that have changed since the last look may still be changing: a renewal writes two.
+TransportSecurity::Look TransportSecurity::look(const fs::path& certificate, const fs::path& key,
+                                                const std::string& tried, const std::string& seen) {
+  Look found;
+  found.stamp = stamp_of(certificate, key);
+  if (found.stamp == tried || found.stamp != seen) return found;
+  try {
+    found.context = load_tls_context(certificate, key);
+  } catch (const std::exception& error) {
+    found.problem = error.what();
+  }
+  return found;
+}
+
+void TransportSecurity::take(Look look) {
+  seen_ = look.stamp;
+  if (!look.problem.empty()) {
+    tried_ = look.stamp;
+    spdlog::error("TLS: the new certificate is not used, the one before stays in force: {}", look.problem);
+  } else if (look.context) {
+    tried_ = look.stamp;
+    gate_->use(std::move(look.context));
+    next_expiry_us_ = 0;
+    log_in_force(gate_->context().certificate);
+  }
+}
+
+void TransportSecurity::remind() {
+  const std::int64_t now_us = clock_.steady_us();
+  if (is_exposed() && now_us >= next_exposed_us_) {  // SAFETY: whoever runs this must not be able to overlook it
+    next_exposed_us_ = now_us + kExposedReminder.count();
+    spdlog::error(
+        "INSECURE: {} speaks plain TCP beyond this machine (tls.insecure = true): everyone on the way can read the "
+        "token and drive the robots",
+        exposed_);
+  }
+  if (!gate_ || now_us < next_expiry_us_) return;
+  next_expiry_us_ = now_us + kDayUs;
+  const std::int64_t left_us = gate_->context().certificate.not_after_us - clock_.utc_us();
+  if (left_us <= 0) {
+    spdlog::error("TLS: the certificate '{}' has expired; renew it: rheonaut certificate --renew",
+                  certificate_.string());
+  } else if (left_us < kExpiryWarning.count()) {
+    spdlog::warn("TLS: the certificate '{}' expires in {} days; renew it: rheonaut certificate --renew",
+                 certificate_.string(), left_us / kDayUs);
+  }
+}
+
+std::vector<std::string> TransportSecurity::names() const {
+  if (!gate_) return {};
+  return gate_->context().certificate.names;
+}
+
+std::string TransportSecurity::to_trust() const { return http_is_secure_ ? fs::absolute(certificate_).string() : ""; }
+
+nlohmann::json TransportSecurity::state() const {
+  const auto word = [](bool secure) { return secure ? "tls" : "plain"; };
+  nlohmann::json out{{"http", word(http_is_secure_)},
+                     {"robots", word(robots_are_secure_)},
+                     {"exposed", is_exposed()},
+                     {"certificate", nullptr}};
+  if (gate_) {
+    const TlsCertificate& certificate = gate_->context().certificate;
+    out["certificate"] = {{"names", certificate.names},
+                          {"pin_sha256", certificate.pin},
+                          {"not_after_us", certificate.not_after_us},
+                          {"expires_soon", certificate.not_after_us - clock_.utc_us() < kExpiryWarning.count()}};
+  }
+  return out;
+}
+
+}  // namespace server

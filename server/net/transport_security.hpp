@@ -1,0 +1,74 @@
+// What protects the two ports: which of them speaks TLS, with which certificate, and what people must be told of it.
+//
+// The certificate's files are looked at every two seconds. Once they have changed and then stood still for one look,
+// new connections get them; files that cannot be used are an error in the log, and the old ones stay in force. A
+// certificate that ends within 30 days is named in the log once a day, and a port that anybody on the way can read or
+// change once an hour. Loop thread; owns the worker that computes handshakes.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/clock.hpp"
+#include "server/config.hpp"
+#include "server/net/tls_gate.hpp"
+#include "server/worker.hpp"
+
+namespace server {
+
+inline constexpr microseconds kCertificateLook{std::chrono::seconds{2}};
+inline constexpr microseconds kExpiryWarning{std::chrono::days{30}};
+inline constexpr microseconds kExposedReminder{std::chrono::hours{1}};
+
+class TransportSecurity {
+ public:
+  // Reads the certificate when a port needs it. Throws std::runtime_error saying what is missing and how to make it.
+  TransportSecurity(Clock& clock, const Config& config);
+
+  // Null: plain TCP.
+  TlsGate* http() { return http_is_secure_ ? &*gate_ : nullptr; }
+  TlsGate* robots() { return robots_are_secure_ ? &*gate_ : nullptr; }
+
+  boost::asio::awaitable<void> run();  // watches and warns until cancelled
+
+  // Names that the certificate gives the station, for the Host header.
+  std::vector<std::string> names() const;
+  // As `security` of GET /api/v1/station: {"http": "tls", "robots": "plain", "exposed": false, "certificate": {…}|null}
+  nlohmann::json state() const;
+  // What programs on this machine need to trust the HTTP port; empty: it is plain.
+  std::string to_trust() const;
+
+  const WorkerThread& worker() const { return worker_; }
+  const TlsGate* gate() const { return gate_ ? &*gate_ : nullptr; }
+  bool is_exposed() const { return !exposed_.empty(); }
+
+ private:
+  // What one look at the files found.
+  struct Look {
+    std::string stamp;                          // differs when a file has changed
+    std::shared_ptr<const TlsContext> context;  // null: nothing new, or a problem
+    std::string problem;
+  };
+
+  static Look look(const std::filesystem::path& certificate, const std::filesystem::path& key, const std::string& tried,
+                   const std::string& seen);
+  boost::asio::awaitable<void> watch_files();
+  void take(Look look);
+  void remind();
+
+  Clock& clock_;
+  std::filesystem::path certificate_, key_;
+  bool http_is_secure_, robots_are_secure_;
+  std::string exposed_;  // the ports that are, for people
+  WorkerThread worker_{"handshakes", 10};
+  std::optional<TlsGate> gate_;
+  std::string tried_, seen_;  // stamps of the files
+  std::int64_t next_exposed_us_ = 0, next_expiry_us_ = 0;
+};
+
+}  // namespace server

@@ -1,0 +1,13 @@
+// Files that hold secrets: whole or not there, and readable by their owner only.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace server {
+
+// The whole file or nothing appears under its name, readable by its owner only from the first moment; what was there
+// before is replaced. Throws std::runtime_error that names the file.
+void write_private(const std::filesystem::path& file, const std::string& content);
+
+}  // namespace server

@@ -1,0 +1,281 @@
+"""TLS on both ports with real processes, as an independent client (openssl s_client, Python's ssl) sees it."""
+import base64
+import contextlib
+import json
+import os
+import re
+import socket
+import ssl
+import subprocess
+import time
+import unittest
+import urllib.error
+import urllib.request
+
+from processes import lab, wait_until
+from station_api import trust
+
+TLS_ON = '[tls]\nmode = "on"\n'
+
+
+def address(text):
+    host, port = text.rsplit(":", 1)
+    return host, int(port)
+
+
+def s_client(at, *flags, text=b""):
+    """What openssl s_client says of a connection, all of it."""
+    done = subprocess.run(["openssl", "s_client", "-connect", at, *flags], input=text, capture_output=True, timeout=30)
+    return (done.stdout + done.stderr).decode(errors="replace")
+
+
+def serial(at):
+    shown = s_client(at)
+    certificate = re.search(r"-----BEGIN CERTIFICATE-----.*?-----END CERTIFICATE-----", shown, re.S).group(0)
+    return subprocess.run(["openssl", "x509", "-noout", "-serial"], input=certificate, capture_output=True, text=True,
+                          check=True).stdout.strip()
+
+
+def answer_of(at, request):
+    """What the port says to these bytes, to the end."""
+    with socket.create_connection(address(at), timeout=10) as client:
+        client.sendall(request)
+        received = b""
+        with contextlib.suppress(ConnectionResetError):
+            while piece := client.recv(4096):
+                received += piece
+        return received.decode(errors="replace")
+
+
+def client_hello():
+    outgoing = ssl.MemoryBIO()
+    client = trust(None).wrap_bio(ssl.MemoryBIO(), outgoing, server_hostname="localhost")
+    with contextlib.suppress(ssl.SSLWantReadError):
+        client.do_handshake()
+    return outgoing.read()
+
+
+class TlsTest(unittest.TestCase):
+    def make_certificate(self, place, *flags):
+        """What the command printed; the pin stands in it."""
+        done = place.tool("certificate", "--data", place.data, *flags)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout
+
+    def secure_lab(self, place):
+        """(station, pin): both ports in TLS."""
+        pin = re.search(r"^pin +([0-9a-f]{64})$", self.make_certificate(place), re.M).group(1)
+        return place.start_station(config=TLS_ON), pin
+
+    def test_versions_ciphers_and_what_is_refused(self):
+        with lab() as place:
+            station, _ = self.secure_lab(place)
+            authority = str(place.data / "tls" / "lab-ca.crt")
+            for port in (station.endpoints["http"], station.endpoints["robots"]):
+                for version, name in (("-tls1_2", "TLSv1.2"), ("-tls1_3", "TLSv1.3")):
+                    with self.subTest(port=port, version=version):
+                        said = s_client(port, version, "-CAfile", authority, "-verify_return_error", "-verify_ip",
+                                        "127.0.0.1", "-brief")
+                        self.assertIn(f"Protocol version: {name}", said)
+                        self.assertIn("Verification: OK", said)
+                        self.assertRegex(said, r"Ciphersuite: \S*(GCM|CHACHA20)")
+                old = s_client(port, "-tls1_1", "-cipher", "DEFAULT@SECLEVEL=0", "-brief")
+                self.assertIn("alert protocol version", old)
+                for suite in ("ECDHE-ECDSA-AES128-SHA", "ECDHE-ECDSA-AES128-SHA256", "AES128-SHA", "ADH-AES128-SHA",
+                              "NULL-SHA"):
+                    with self.subTest(port=port, suite=suite):
+                        weak = s_client(port, "-tls1_2", "-cipher", suite + ":@SECLEVEL=0", "-brief")
+                        self.assertIn("alert handshake failure", weak)
+                again = s_client(port, "-tls1_2", text=b"R\n")
+                self.assertIn("no renegotiation", again)
+                self.assertIn("Compression: NONE", s_client(port, "-tls1_2", "-comp"))
+
+    def test_a_session_is_resumed(self):
+        with lab() as place:
+            station, _ = self.secure_lab(place)
+            kept = str(place.folder / "session.pem")
+            for flags in ((), ("-no_ticket",)):  # by ticket, and as the ESP8266 does it
+                self.assertIn("New, TLSv1.2", s_client(station.endpoints["robots"], "-tls1_2", *flags, "-sess_out", kept))
+                self.assertIn("Reused, TLSv1.2",
+                              s_client(station.endpoints["robots"], "-tls1_2", *flags, "-sess_in", kept))
+
+    def test_a_robot_resumes_its_session_after_a_lost_link(self):
+        with lab() as place:
+            station, pin = self.secure_lab(place)
+            robot = place.start_robot(station, "sim-1", "--tls-pin", pin)
+            station.wait_for_robot("sim-1")
+            robot.send_signal(19)  # SIGSTOP: it falls silent, and the station hangs up
+            try:
+                wait_until(lambda: station.robot("sim-1")["link"] == "disconnected", 10, "the link is held for lost")
+            finally:
+                robot.send_signal(18)  # SIGCONT
+            station.wait_for_robot("sim-1")
+            self.assertEqual(self.metric(station, "tls_resumed_total"), 1)
+
+    def test_short_records_for_a_robot_that_asks_for_them(self):
+        with lab() as place:
+            station, _ = self.secure_lab(place)
+            said = s_client(station.endpoints["robots"], "-tls1_2", "-maxfraglen", "512", "-tlsextdebug")
+            self.assertIn('TLS server extension "max fragment length"', said)
+
+    def test_plain_http_on_the_tls_port_is_told_to_use_https(self):
+        with lab() as place:
+            station, _ = self.secure_lab(place)
+            self.assertEqual(answer_of(station.endpoints["robots"], b"\x05hello"), "")
+            self.assertIn("robot port: no TLS with 127.0.0.1:", place.log("station"))
+            said = answer_of(station.endpoints["http"], b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            self.assertTrue(said.startswith("HTTP/1.1 400 "), said)
+            self.assertIn("https://", said)
+            self.assertEqual(station.get("/api/v1/station")["security"]["http"], "tls", "it lives on")
+
+    def test_a_robot_in_tls_is_stopped_at_once(self):
+        with lab() as place:
+            station, pin = self.secure_lab(place)
+            place.start_robot(station, "sim-1", "--tls-pin", pin)
+            place.start_robot(station, "sim-2", "--tls-ca", place.data / "tls" / "lab-ca.crt")
+            for robot_id in ("sim-1", "sim-2"):
+                station.wait_for_robot(robot_id)
+                station.command(robot_id, "set_mode", mode="auto", setpoint_m=0.5)
+                wait_until(lambda: station.robot(robot_id)["sample"]["duty"] > 0.5, 10, "the motor runs")
+                self.assertEqual(station.post(f"/api/v1/robots/{robot_id}/emergency-stop")["state"], "acknowledged")
+                wait_until(lambda: station.robot(robot_id)["sample"]["duty"] == 0, 10, "duty 0")
+                self.assertEqual(station.robot(robot_id)["mode"], "emergency")
+
+    def test_a_robot_does_not_talk_to_a_station_that_is_not_the_right_one(self):
+        with lab() as place, lab() as other:
+            station, pin = self.secure_lab(place)
+            self.make_certificate(other)
+            wrong = {"pinned": ("--tls-pin", "0" * 64), "authority": ("--tls-ca", other.data / "tls" / "lab-ca.crt")}
+            robots = [place.start_robot(station, robot_id, *flags, "--duration-s", "3")
+                      for robot_id, flags in wrong.items()]
+            plain = place.start_robot(station, "plain", "--duration-s", "3")
+            for robot in (*robots, plain):
+                self.assertEqual(robot.wait(timeout=30), 2, "no station has taken it in")
+            for robot_id in wrong:
+                self.assertIn("the station is not trusted", place.log(robot_id))
+            self.assertIn(pin, place.log("pinned"), "says which key it found")
+            self.assertEqual(station.robots(), [])
+            place.stop_station()
+            plain_station = place.start_station()
+            strict = place.start_robot(plain_station, "strict", "--tls-pin", pin, "--duration-s", "3")
+            self.assertEqual(strict.wait(timeout=30), 2, "no plain TCP for a robot that expects TLS")
+            self.assertEqual(plain_station.robots(), [])
+
+    def test_a_renewed_certificate_comes_into_force_without_dropping_a_robot(self):
+        with lab() as place:
+            station, pin = self.secure_lab(place)
+            place.start_robot(station, "sim-1", "--tls-pin", pin)
+            station.wait_for_robot("sim-1")
+            port = station.endpoints["robots"]
+            first = serial(port)
+            self.assertIn(f"pin      {pin}", self.make_certificate(place, "--renew"), "the key, and so the pin, stays")
+            wait_until(lambda: serial(port) != first, 20, "the new certificate")
+            second = serial(port)
+
+            certificate = place.data / "tls" / "station.crt"
+            good = certificate.read_bytes()
+            certificate.write_bytes(b"not a certificate")
+            wait_until(lambda: "the one before stays in force" in place.log("station"), 20, "the error in the log")
+            self.assertEqual(serial(port), second)
+            certificate.write_bytes(good)
+
+            self.make_certificate(place, "--renew", "--new-key")
+            wait_until(lambda: serial(port) != second, 20, "the certificate with the new key")
+            stranger = place.start_robot(station, "sim-2", "--tls-pin", pin, "--duration-s", "2")
+            self.assertEqual(stranger.wait(timeout=30), 2, "the old pin no longer holds")
+            seen = station.robot("sim-1")["next_seq"]
+            wait_until(lambda: station.robot("sim-1")["next_seq"] > seen + 100, 10, "the first robot goes on")
+            self.assertNotIn("connection lost", place.log("sim-1"))
+            self.assertEqual(place.log("sim-1").count("connected to"), 1)
+
+    def test_silent_clients_keep_nobody_out(self):
+        with lab() as place:
+            station, pin = self.secure_lab(place)
+            hello = client_hello()
+            with contextlib.ExitStack() as open_sockets:
+                for port in (station.endpoints["http"], station.endpoints["robots"]):
+                    for number in range(40):
+                        client = open_sockets.enter_context(socket.create_connection(address(port), timeout=10))
+                        if number % 2 == 0:
+                            client.sendall(hello)  # and never the rest
+                begun = time.monotonic()
+                self.assertEqual(station.get("/api/v1/station")["security"]["robots"], "tls")
+                self.assertLess(time.monotonic() - begun, 2, "a page is let in at once")
+                place.start_robot(station, "sim-1", "--tls-pin", pin)
+                station.wait_for_robot("sim-1", timeout_s=5)
+                # The time limit: 10 s after they came, they are gone.
+                wait_until(lambda: self.metric(station, "tls_failed_total") >= 80, 20, "all of them are let go")
+
+    def metric(self, station, name):
+        _, _, text = station.request("GET", "/metrics")
+        return int(re.search(rf"^rheonaut_{name} (\d+)$", text.decode(), re.M).group(1))
+
+    def test_pages_and_tools_over_https(self):
+        with lab() as place:
+            station, _ = self.secure_lab(place)
+            host, port = address(station.endpoints["http"])
+            self.assertIn(f"  https://{host}:{port}/login?code=", place.log("station"))
+            url = station.post("/api/v1/login-links")["url"]
+            self.assertTrue(url.startswith(f"https://{host}:{port}/login"), url)
+
+            class Stay(urllib.request.HTTPRedirectHandler):
+                def redirect_request(self, *_):
+                    return None
+            opener = urllib.request.build_opener(
+                Stay, urllib.request.HTTPSHandler(context=ssl.create_default_context(
+                    cafile=str(place.data / "tls" / "lab-ca.crt"))))
+            with self.assertRaises(urllib.error.HTTPError) as redirected:
+                opener.open(url)
+            cookie = redirected.exception.headers["Set-Cookie"]
+            self.assertIn("; Secure", cookie)
+            self.assertIn("max-age=", redirected.exception.headers["Strict-Transport-Security"])
+
+            def stop_all(origin):
+                request = urllib.request.Request(f"https://{host}:{port}/api/v1/emergency-stop", method="POST")
+                request.add_header("Cookie", cookie.split(";")[0])
+                request.add_header("Origin", origin)
+                try:
+                    return opener.open(request).status
+                except urllib.error.HTTPError as refused:
+                    return refused.code
+            self.assertLess(stop_all(f"https://{host}:{port}"), 300)
+            self.assertEqual(stop_all(f"http://{host}:{port}"), 403)
+
+            copied = place.tool("backup", "--data", place.data, "--to", place.folder / "copy.sqlite")
+            self.assertEqual(copied.returncode, 0, copied.stderr)
+            self.live_speaks(station)
+
+    def live_speaks(self, station):
+        """A WebSocket in TLS: the upgrade, and the welcome as its first message."""
+        with socket.create_connection(address(station.endpoints["http"]), timeout=10) as plain, \
+                trust(station.tls_certificate).wrap_socket(plain) as client:
+            key = base64.b64encode(os.urandom(16)).decode()
+            client.sendall((f"GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                            f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n"
+                            f"Authorization: Bearer {station.token}\r\n\r\n").encode())
+            received = b""
+            while b'"type":"welcome"' not in received:
+                received += client.recv(4096)
+            self.assertTrue(received.startswith(b"HTTP/1.1 101 "), received[:100])
+
+    def test_the_token_goes_to_no_other_program_on_the_port(self):
+        with lab() as place, lab() as other:
+            station, _ = self.secure_lab(place)
+            self.make_certificate(other)
+            endpoints = dict(station.endpoints, tls_certificate=str(other.data / "tls" / "station.crt"))
+            (place.data / "endpoints.json").write_text(json.dumps(endpoints))
+            copied = place.tool("backup", "--data", place.data, "--to", place.folder / "copy.sqlite")
+            self.assertEqual(copied.returncode, 1)
+            self.assertIn("its key is not that of", copied.stderr)
+
+    def test_an_address_that_others_reach_needs_tls_or_a_clear_word(self):
+        with lab() as place:
+            for flags in (("--http", "0.0.0.0:0"), ("--robots", "0.0.0.0:0"), ("--robots", "[::]:0")):
+                refused = place.tool("serve", "--data", place.data, *flags)
+                self.assertEqual(refused.returncode, 1)
+                self.assertRegex(refused.stderr, r"^rheonaut: [^\n]*rheonaut certificate[^\n]*tls\.insecure[^\n]*\n$")
+            self.assertFalse((place.data / "station.sqlite").exists(), "it has touched nothing")
+
+
+if __name__ == "__main__":
+    unittest.main()
