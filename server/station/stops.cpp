@@ -49,7 +49,7 @@ asio::awaitable<Result<CommandRecord>> Station::emergency_stop(StopRequest reque
 std::shared_ptr<Station::PendingCommand> Station::stop_in_force(Seat& seat, const StopRequest& request) {
   if (!request.key.empty()) {
     const CommandId id = command_id_of(request.robot_id, request.actor, request.key);
-    if (auto same = seat.on_its_way(id)) return same;
+    if (const auto unanswered = seat.commands.find(id); unanswered != seat.commands.end()) return unanswered->second;
     const auto* recent = recent_.find(id);
     const bool is_same_press =
         recent != nullptr && seat.robot->latched() && clock_.steady_us() - recent->answered_us < kSamePress.count();

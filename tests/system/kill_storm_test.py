@@ -23,7 +23,7 @@ from recording_audit import audit
 
 KILLS = int(os.environ.get("RHEONAUT_KILLS", "6"))
 SEED = int(os.environ.get("RHEONAUT_KILL_SEED", "1"))
-ROBOTS = 200
+ROBOTS = int(os.environ.get("RHEONAUT_STORM_ROBOTS", 200))
 LONGEST_S = 3  # between two kills
 SETTLE_S = 3
 SMALL_DISK = "RHEONAUT_SMALL_DISK"  # this program runs in its own mount namespace: the folder of the disk

@@ -44,8 +44,10 @@ TEST_F(LinkTest, ACommandThatWaitedLongerThanItsLifeIsNeverSent) {
   robot->say_hello();
   ASSERT_TRUE(clock.run_until([&] { return !robot->welcomes().empty(); }, 1s));
   robot->keep_talking();
-  robot->link.stall(true);  // the station's bytes pile up, and the robot's arrive late
-  for (int i = 0; i < 20; ++i) submit(set_duty(0.01F * static_cast<float>(i)), 300ms);
+  robot->link.stall(true);                              // the station's bytes pile up, and the robot's arrive late
+  protocol::Command ping = rheonaut_Command_init_zero;  // of which none supersedes another
+  ping.which_action = rheonaut_Command_ping_tag;
+  for (int i = 0; i < 20; ++i) submit(ping, 300ms);
   clock.run_for(600ms);
   robot->link.stall(false);
   ASSERT_TRUE(clock.run_until([&] { return results.size() == 20; }, 3s));

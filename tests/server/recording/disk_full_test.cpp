@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "server/recording/disk_reserve.hpp"
 #include "tests/server/recording/recording_test.hpp"
 #include "tests/server/recording/stored_runs.hpp"
 
@@ -113,6 +114,7 @@ TEST_F(DiskFullTest, ARestartOnAFullDiskHasAllThatWasAcknowledged) {
   unfinished.kind = "set_mode";
   recorder_->on_command(unfinished);
   wait(recorder_->flush_records());
+  fs::remove(disk_reserve_of(path_));  // the least that a start may find
   {
     const Filler filler{disk()};
     make(robot_, 5000, 25);
@@ -127,6 +129,21 @@ TEST_F(DiskFullTest, ARestartOnAFullDiskHasAllThatWasAcknowledged) {
   kill();
   start();
   EXPECT_GE(admit(robot_).durable_next_seq, acknowledged);
+  expect_whole();
+}
+
+TEST_F(DiskFullTest, ARestartOnAFullDiskUsesTheRoomThatWasKeptForIt) {
+  record(5000);
+  ASSERT_TRUE(fs::exists(disk_reserve_of(path_)));
+  {
+    const Filler filler{disk()};
+    kill();
+    start();
+    EXPECT_FALSE(fs::exists(disk_reserve_of(path_)));
+    EXPECT_GE(admit(robot_).durable_next_seq, durable_next_seq_);
+  }
+  clock_.run_for(6s);
+  EXPECT_TRUE(fs::exists(disk_reserve_of(path_))) << "kept again for the next start";
   expect_whole();
 }
 
