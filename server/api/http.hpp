@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/api/caller.hpp"
 #include "server/result.hpp"
 
 namespace server {
@@ -20,7 +21,9 @@ struct Request {
   std::map<std::string, std::string> headers;  // names in lower case; repeated ones joined by ", " (cookies by "; ")
   std::string body;
 
-  std::string actor;                         // who asks; set by RequestGuard
+  std::string peer;                          // the address it came from, without port
+  std::string actor;                         // who asks: caller.actor
+  Caller caller;                             // and what they may do; set by RequestGuard
   std::string path;                          // decoded; set by Router, as are the two below
   std::map<std::string, std::string> param;  // of the path, decoded
   std::map<std::string, std::string> query;  // decoded

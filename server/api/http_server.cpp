@@ -62,7 +62,12 @@ class Connection {
  public:
   Connection(HttpStream stream, Clock& clock, const RequestGuard& guard, const Router& router,
              std::list<HttpStream*>& strangers)
-      : stream_{std::move(stream)}, clock_{clock}, guard_{guard}, router_{router}, strangers_{strangers} {
+      : stream_{std::move(stream)},
+        peer_{address_of(stream_)},
+        clock_{clock},
+        guard_{guard},
+        router_{router},
+        strangers_{strangers} {
     strangers_.push_back(&stream_);
   }
   ~Connection() { strangers_.remove(&stream_); }
@@ -75,7 +80,7 @@ class Connection {
   bool wants_live() const { return upgrade_.has_value(); }
   HttpStream take_stream() { return std::move(stream_); }
   UpgradeRequest take_upgrade() { return std::move(*upgrade_); }
-  const std::string& actor() const { return actor_; }
+  const Caller& caller() const { return caller_; }
 
  private:
   enum class Next : std::uint8_t { another, end };
@@ -96,6 +101,7 @@ class Connection {
   void allow(microseconds duration) { deadline_us_ = clock_.steady_us() + duration.count(); }
 
   HttpStream stream_;
+  std::string peer_;  // its address; empty when it has gone already
   Clock& clock_;
   const RequestGuard& guard_;
   const Router& router_;
@@ -104,7 +110,7 @@ class Connection {
   std::int64_t deadline_us_ = kNever;
   bool request_has_begun_ = false;
   std::optional<UpgradeRequest> upgrade_;
-  std::string actor_;
+  Caller caller_;  // of the page
 };
 
 asio::awaitable<void> Connection::talk() {
@@ -168,13 +174,15 @@ asio::awaitable<Connection::Next> Connection::read_and_answer() {
   Request request = plain_request(message);
   auto admitted = guard_.admit(request);
   if (!admitted) co_return co_await send(std::move(admitted.error()), message);
-  if (!admitted->empty()) strangers_.remove(&stream_);
+  if (!admitted->actor.empty()) strangers_.remove(&stream_);
   if (wants_live(message)) {
     upgrade_.emplace(message.base());
-    actor_ = *admitted;
+    caller_ = std::move(*admitted);
     co_return Next::end;
   }
-  request.actor = std::move(*admitted);
+  request.caller = std::move(*admitted);
+  request.actor = request.caller.actor;
+  request.peer = peer_;
   // SAFETY: what changes something, above all a stop, is carried out though its client has hung up.
   if (request.method != "GET" && request.method != "HEAD") {
     Response response = co_await answer(std::move(request));
@@ -385,8 +393,8 @@ asio::awaitable<void> HttpServer::serve(tcp::socket socket) {
   Connection connection{std::move(socket), clock_, guard_, router_, strangers_};
   co_await (connection.talk() || connection.watch());
   if (!connection.wants_live()) co_return;
-  co_await contained("page of " + connection.actor(),
-                     serve_live(connection.take_stream(), connection.take_upgrade(), connection.actor(), live_));
+  co_await contained("page of " + connection.caller().actor,
+                     serve_live(connection.take_stream(), connection.take_upgrade(), connection.caller(), live_));
 }
 
 }  // namespace server

@@ -116,19 +116,19 @@ Answer get_command(ApiParts& parts, Request request) {
 }  // namespace
 
 void add_robot_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* method, const char* pattern, std::vector<std::string> query,
-                                     Answer (*answer)(ApiParts&, Request)) {
-    router.add({method, pattern, std::move(query),
+  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
+                                     std::vector<std::string> query, Answer (*answer)(ApiParts&, Request)) {
+    router.add({method, pattern, needs, std::move(query),
                 [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
   };
-  add("GET", "/api/v1/robots", {}, list_robots);
-  add("GET", "/api/v1/robots/{robot_id}", {}, get_robot);
-  add("GET", "/api/v1/robots/{robot_id}/commands", {"limit"}, list_commands);
-  add("POST", "/api/v1/robots/{robot_id}/commands", {}, submit_command);
-  add("POST", "/api/v1/robots/{robot_id}/emergency-stop", {}, emergency_stop);
-  add("GET", "/api/v1/robots/{robot_id}/events", {"limit"}, list_events);
-  add("GET", "/api/v1/commands/{command_id}", {}, get_command);
-  add("POST", "/api/v1/emergency-stop", {}, emergency_stop_all);
+  add("GET", "/api/v1/robots", Scope::read, {}, list_robots);
+  add("GET", "/api/v1/robots/{robot_id}", Scope::read, {}, get_robot);
+  add("GET", "/api/v1/robots/{robot_id}/commands", Scope::read, {"limit"}, list_commands);
+  add("POST", "/api/v1/robots/{robot_id}/commands", Scope::command, {}, submit_command);
+  add("POST", "/api/v1/robots/{robot_id}/emergency-stop", Scope::stop, {}, emergency_stop);
+  add("GET", "/api/v1/robots/{robot_id}/events", Scope::read, {"limit"}, list_events);
+  add("GET", "/api/v1/commands/{command_id}", Scope::read, {}, get_command);
+  add("POST", "/api/v1/emergency-stop", Scope::stop, {}, emergency_stop_all);
 }
 
 }  // namespace server

@@ -12,8 +12,11 @@
 #include "server/cli/model.hpp"
 #include "server/cli/predict.hpp"
 #include "server/cli/restore.hpp"
+#include "server/cli/robot.hpp"
 #include "server/cli/step.hpp"
+#include "server/cli/token.hpp"
 #include "server/cli/tune.hpp"
+#include "server/cli/user.hpp"
 #include "server/cli/verify.hpp"
 #include "server/config.hpp"
 
@@ -33,7 +36,7 @@ struct Answered {
 };
 
 using Wish = std::variant<Answered, Serve, CheckConfig, Backup, Restore, Verify, Export, Model, Bode, Step, Identify,
-                          Tune, Discretise, Predict>;
+                          Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand>;
 
 Wish parse_command_line(int argc, char** argv);
 

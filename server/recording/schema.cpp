@@ -244,7 +244,7 @@ FROM command;
 }  // namespace
 
 std::span<const char* const> migrations() {
-  static const std::array<const char*, 2> migrations{kFirstSchema, kSecondSchema};
+  static const std::array<const char*, 3> migrations{kFirstSchema, kSecondSchema, kFourthSchema};
   return migrations;
 }
 

@@ -12,8 +12,9 @@ namespace server {
 constexpr std::int32_t kApplicationId = 0x5268656f;  // "Rheo"
 constexpr std::int64_t kMaxSegmentSamples = 100;     // the views and queries look this far back for a segment's begin
 
-// SQL scripts, in order. The second one is in schema_2.cpp.
+// SQL scripts, in order, from the second one on in files of their own.
 std::span<const char* const> migrations();
 extern const char* const kSecondSchema;
+extern const char* const kFourthSchema;
 
 }  // namespace server

@@ -48,7 +48,9 @@ ApiTest::ApiTest() {
   options.version = "0.1.0";
   options.store_id = 0xfedcba9876543210;
   options.robots_address = "127.0.0.1:7070";
+  options.password_cost = kCheapPasswords;
   api = std::make_unique<ApiServer>(loop, tasks, clock, options, station, live, recording, analysis);
+  clock.add_worker(api->logins().worker());
   recording.spawn(tasks);
   tasks.spawn("live feed", live.run());
   tasks.spawn("api", api->run());
@@ -89,6 +91,8 @@ std::shared_ptr<std::optional<Answered>> ApiTest::begin(const std::string& metho
   request.target = target;
   if (!body.is_null()) request.body = body.dump();
   request.actor = "token:local";
+  request.peer = "127.0.0.1";
+  request.caller = Caller{"token:local", "", scopes, 0, std::make_shared<Standing>(loop)};
   auto into = std::make_shared<std::optional<Answered>>();
   tasks.spawn("ask", answer(std::move(request), into));
   clock.settle();
