@@ -43,12 +43,29 @@ ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string
 ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clock, const ApiOptions& options,
                      Station& station, LiveFeed& live, RecordingParts& recording, AnalysisService& analysis)
     : listener_{loop, clock, options.endpoint, options.or_any_port},
-      auth_{clock, options.data_dir},
+      accounts_{loop, clock, recording.recorder, options.data_dir},
+      auth_{loop, clock, accounts_, options.data_dir, options.store_id},
+      logins_{clock, accounts_, options.password_cost},
       guard_{auth_, host_names(options), options.security->http() != nullptr},
-      parts_{loop, tasks, clock, station, live, recording, analysis, auth_, facts_of(options, listener_, clock)},
+      parts_{loop,
+             tasks,
+             clock,
+             station,
+             live,
+             recording,
+             analysis,
+             auth_,
+             accounts_,
+             logins_,
+             facts_of(options, listener_, clock)},
       live_{loop, tasks, clock, station, live, options.version},
       server_{tasks, clock, listener_, guard_, router_, live_, options.security->http()} {
   add_routes(router_, parts_);
+}
+
+boost::asio::awaitable<void> ApiServer::run() {
+  parts_.tasks.spawn("accounts", accounts_.run());
+  co_await server_.run();
 }
 
 std::string ApiServer::address() const { return text(listener_.endpoint()); }

@@ -22,6 +22,7 @@ struct ApiOptions {
   std::uint64_t store_id = 0;
   std::string robots_address;             // "127.0.0.1:7070", for people
   TransportSecurity* security = nullptr;  // must be given
+  PasswordCost password_cost;
 };
 
 ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string robots_address,
@@ -33,7 +34,7 @@ class ApiServer {
   ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clock, const ApiOptions& options, Station& station,
             LiveFeed& live, RecordingParts& recording, AnalysisService& analysis);
 
-  boost::asio::awaitable<void> run() { return server_.run(); }
+  boost::asio::awaitable<void> run();
 
   std::uint16_t port() const { return listener_.endpoint().port(); }
   std::string address() const;  // "127.0.0.1:8080"
@@ -42,9 +43,14 @@ class ApiServer {
   std::string login_url();  // a link that lets one page in, for 10 minutes
   void print_login_url();   // on standard output, for the person at the console
 
+  Accounts& accounts() { return accounts_; }
+  const Logins& logins() const { return logins_; }
+
  private:
   Listener listener_;
+  Accounts accounts_;
   Auth auth_;
+  Logins logins_;
   RequestGuard guard_;
   ApiParts parts_;
   LiveParts live_;

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/api/caller.hpp"
 #include "server/result.hpp"
 
 namespace server {
@@ -21,7 +22,9 @@ struct Request {
   std::string body;
   std::int64_t received_us = 0;  // steady, when all of it had arrived
 
-  std::string actor;                         // who asks; set by RequestGuard
+  std::string peer;                          // the address it came from, without port
+  std::string actor;                         // who asks: caller.actor
+  Caller caller;                             // and what they may do; set by RequestGuard
   std::string path;                          // decoded; set by Router, as are the two below
   std::map<std::string, std::string> param;  // of the path, decoded
   std::map<std::string, std::string> query;  // decoded

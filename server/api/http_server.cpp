@@ -73,7 +73,7 @@ class Connection {
   bool wants_live() const { return upgrade_.has_value(); }
   HttpStream take_stream() { return std::move(stream_); }
   UpgradeRequest take_upgrade() { return std::move(*upgrade_); }
-  const std::string& actor() const { return actor_; }
+  const Caller& caller() const { return caller_; }
 
  private:
   enum class Next : std::uint8_t { another, end };
@@ -103,7 +103,7 @@ class Connection {
   std::int64_t deadline_us_ = kNever;
   bool request_has_begun_ = false;
   std::optional<UpgradeRequest> upgrade_;
-  std::string actor_;
+  Caller caller_;  // of the page
 };
 
 asio::awaitable<void> Connection::talk() {
@@ -183,13 +183,15 @@ asio::awaitable<Connection::Next> Connection::read_and_answer() {
   request.received_us = clock_.steady_us();
   auto admitted = guard_.admit(request);
   if (!admitted) co_return co_await send(std::move(admitted.error()), message);
-  if (!admitted->empty()) strangers_.remove(&stream_);
+  if (!admitted->actor.empty()) strangers_.remove(&stream_);
   if (wants_live(message)) {
     upgrade_.emplace(message.base());
-    actor_ = *admitted;
+    caller_ = std::move(*admitted);
     co_return Next::end;
   }
-  request.actor = std::move(*admitted);
+  request.caller = std::move(*admitted);
+  request.actor = request.caller.actor;
+  request.peer = address_of(stream_);
   // SAFETY: what changes something, above all a stop, is carried out though its client has hung up.
   if (request.method != "GET" && request.method != "HEAD") {
     Response response = co_await answer(std::move(request));
@@ -390,8 +392,8 @@ asio::awaitable<void> HttpServer::serve(tcp::socket socket) {
   Connection connection{HttpStream{std::move(socket)}, tls_, clock_, guard_, router_, strangers_};
   co_await (connection.talk() || connection.watch());
   if (!connection.wants_live()) co_return;
-  co_await contained("page of " + connection.actor(),
-                     serve_live(connection.take_stream(), connection.take_upgrade(), connection.actor(), live_));
+  co_await contained("page of " + connection.caller().actor,
+                     serve_live(connection.take_stream(), connection.take_upgrade(), connection.caller(), live_));
 }
 
 }  // namespace server

@@ -1,10 +1,15 @@
 // The one type of connection that HTTP and WebSocket are compiled for: plain or TLS.
 #pragma once
 
+#include <string>
+
 #include "server/net/stream_socket.hpp"
 
 namespace server {
 
 using HttpStream = StreamSocket;
+
+// Of the client, without its port.
+inline std::string address_of(const HttpStream& stream) { return stream.peer().substr(0, stream.peer().rfind(':')); }
 
 }  // namespace server

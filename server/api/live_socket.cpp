@@ -1,6 +1,7 @@
 // The WebSocket of one page.
 #include "server/api/live_socket.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <boost/asio/as_tuple.hpp>
@@ -24,8 +25,8 @@ constexpr std::int64_t kSilenceUs = 30'000'000;
 
 class LivePage {
  public:
-  LivePage(HttpStream stream, std::string actor, LiveParts& parts)
-      : socket_{std::move(stream)}, actor_{std::move(actor)}, parts_{parts}, queue_{parts.loop} {
+  LivePage(HttpStream stream, Caller caller, LiveParts& parts)
+      : socket_{std::move(stream)}, caller_{std::move(caller)}, parts_{parts}, queue_{parts.loop} {
     websocket::stream_base::timeout none;  // time is the injected clock's business
     none.handshake_timeout = none.idle_timeout = websocket::stream_base::none();
     none.keep_alive_pings = false;
@@ -44,19 +45,35 @@ class LivePage {
     const auto [error] = co_await socket_.async_accept(upgrade, asio::as_tuple(asio::use_awaitable));
     if (error) co_return;
     parts_.live.add(queue_);
-    queue_.push(std::make_shared<const std::string>(welcome_message(actor_, parts_)), false);
-    co_await (read() || write() || watch());
+    queue_.push(std::make_shared<const std::string>(welcome_message(caller_.actor, parts_)), false);
+    co_await (read() || write() || watch() || caller_.standing->wait_for_end());
+    if (caller_.standing->ended()) spdlog::info("the page of {} was signed out", caller_.actor);
   }
 
  private:
   // The boundary: a message that cannot be acted on ends neither the page nor the station.
   Result<void> act_on(const std::string& text) {
     try {
-      return on_page_message(text, actor_, parts_);
+      if (auto permitted = check_permission(text); !permitted) return permitted;
+      return on_page_message(text, caller_.actor, parts_);
     } catch (const std::exception& error) {
-      spdlog::error("a message of {}: {}", actor_, error.what());
+      spdlog::error("a message of {}: {}", caller_.actor, error.what());
       return fail(ErrorCode::internal, "the station could not act on this message; its log says why", "internal");
     }
+  }
+
+  // SAFETY: a stop needs no more than to see the robot; of a type that is not known here, command is needed.
+  Result<void> check_permission(const std::string& text) const {
+    const auto message = nlohmann::json::parse(text, nullptr, false);
+    const bool has_type = message.is_object() && message.contains("type") && message["type"].is_string();
+    if (!has_type) return {};  // refused for that
+    const auto type = message["type"].get<std::string>();
+    const Scope needed = type == "emergency_stop" ? Scope::stop : type == "keep_alive" ? Scope::read : Scope::command;
+    if (caller_.scopes.allow(needed)) return {};
+    return fail(ErrorCode::forbidden,
+                fmt::format("{} needs the role {}; {} has the role {}", type.substr(0, 40),
+                            server::text(least_role(needed)), caller_.actor, server::text(caller_.role())),
+                "not_permitted");
   }
 
   asio::awaitable<void> read() {
@@ -94,11 +111,11 @@ class LivePage {
     while (parts_.clock.steady_us() < heard_at_us_ + kSilenceUs) {
       co_await parts_.clock.sleep_until(heard_at_us_ + kSilenceUs);
     }
-    spdlog::info("the page of {} fell silent", actor_);
+    spdlog::info("the page of {} fell silent", caller_.actor);
   }
 
   websocket::stream<HttpStream> socket_;
-  std::string actor_;
+  Caller caller_;
   LiveParts& parts_;
   Subscriber queue_;
   std::int64_t heard_at_us_ = 0;
@@ -107,8 +124,8 @@ class LivePage {
 
 }  // namespace
 
-asio::awaitable<void> serve_live(HttpStream stream, UpgradeRequest upgrade, std::string actor, LiveParts& parts) {
-  LivePage page{std::move(stream), std::move(actor), parts};
+asio::awaitable<void> serve_live(HttpStream stream, UpgradeRequest upgrade, Caller caller, LiveParts& parts) {
+  LivePage page{std::move(stream), std::move(caller), parts};
   co_await page.run(std::move(upgrade));
 }
 

@@ -2,7 +2,8 @@
 //
 // One reader and one writer. The queue between feed and writer is bounded (Subscriber: oldest samples are dropped, and
 // the page hears so). A message of a page has at most 4 kB; a page that is silent for 30 s, pings unanswered, is let
-// go. Loop thread; the parts outlive the connection.
+// go. What the caller may not do is refused before anybody acts on it, and the page ends with the session or token that
+// it rests on. Loop thread; the parts outlive the connection.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -10,6 +11,7 @@
 #include <boost/beast/http/message.hpp>
 #include <string>
 
+#include "server/api/caller.hpp"
 #include "server/api/http_stream.hpp"
 #include "server/api/live_messages.hpp"
 
@@ -18,6 +20,6 @@ namespace server {
 using UpgradeRequest = boost::beast::http::request<boost::beast::http::empty_body>;
 
 // Ends when the page leaves or falls silent. Throws operation_aborted when cancelled.
-boost::asio::awaitable<void> serve_live(HttpStream stream, UpgradeRequest upgrade, std::string actor, LiveParts& parts);
+boost::asio::awaitable<void> serve_live(HttpStream stream, UpgradeRequest upgrade, Caller caller, LiveParts& parts);
 
 }  // namespace server

@@ -12,6 +12,8 @@ namespace asio = boost::asio;
 
 namespace {
 
+constexpr const char* kLoginPath = "/api/v1/login";
+
 std::string lower(std::string text) {
   std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return text;
@@ -50,6 +52,16 @@ std::unexpected<Response> refuse(int status, const char* detail, const char* rea
   return std::unexpected<Response>{std::move(response)};
 }
 
+// No body, or one of JSON: what a form of another page can send is neither.
+bool has_json_body(const Request& request) {
+  const std::string content_type = lower(request.header("content-type"));
+  return request.body.empty() || content_type.substr(0, content_type.find(';')) == "application/json";
+}
+
+std::unexpected<Response> refuse_body() {
+  return refuse(415, "the body must be application/json", "wrong_content_type");
+}
+
 }  // namespace
 
 RequestGuard::RequestGuard(Auth& auth, std::vector<std::string> hosts, bool is_secure)
@@ -70,14 +82,16 @@ std::optional<RequestGuard::Credential> RequestGuard::credential_of(const Reques
   if (!authorization.empty()) {  // a wrong token is not made good by a cookie
     constexpr std::size_t kSchemeLength = 7;
     if (lower(authorization.substr(0, kSchemeLength)) != "bearer ") return std::nullopt;
-    const auto actor = auth_.actor_of_token(authorization.substr(kSchemeLength));
-    return actor ? std::optional{Credential{*actor, false}} : std::nullopt;
+    auto caller = auth_.caller_of_token(authorization.substr(kSchemeLength));
+    return caller ? std::optional{Credential{std::move(*caller), false}} : std::nullopt;
   }
-  const auto actor = auth_.actor_of_session(cookie(request.header("cookie"), kSessionCookie));
-  return actor ? std::optional{Credential{*actor, true}} : std::nullopt;
+  const std::string cookies = request.header("cookie");
+  auto caller = auth_.caller_of_session(cookie(cookies, auth_.cookie_name()));
+  if (!caller) caller = auth_.caller_of_session(cookie(cookies, kOldSessionCookie));
+  return caller ? std::optional{Credential{std::move(*caller), true}} : std::nullopt;
 }
 
-std::expected<std::string, Response> RequestGuard::admit(const Request& request) const {
+std::expected<Caller, Response> RequestGuard::admit(const Request& request) const {
   const std::string host = request.header("host");
   if (!host_is_ours(host)) {
     return refuse(421, "this station does not answer to that Host; add the name to http.hosts in its configuration",
@@ -92,23 +106,26 @@ std::expected<std::string, Response> RequestGuard::admit(const Request& request)
     return refuse(403, "the request comes from a page of another origin", "wrong_origin");
   }
   const bool holds_data = live || *path == "/metrics" || path->starts_with("/api/");
-  if (!holds_data && !changes_something(request)) return std::string{};
+  if (!holds_data && !changes_something(request)) return Caller{};
+  if (request.method == "POST" && *path == kLoginPath) {
+    if (!has_json_body(request)) return refuse_body();
+    return Caller{};
+  }
 
-  const auto credential = credential_of(request);
+  auto credential = credential_of(request);
   if (!credential) {
-    return refuse(401, "open the link that the station printed, or send the token of rheonaut.token as Bearer",
-                  "no_credential");
+    return refuse(401, "sign in, open the link that the station printed, or send a token as Bearer", "no_credential");
   }
   if (credential->by_cookie && changes_something(request) && !same_origin &&
       (!origin.empty() || request.header("sec-fetch-site") != "same-origin")) {
     return refuse(403, "a request by cookie must say that it comes from the station's own page (Origin)",
                   "wrong_origin");
   }
-  const std::string content_type = lower(request.header("content-type"));
-  if (!request.body.empty() && content_type.substr(0, content_type.find(';')) != "application/json") {
-    return refuse(415, "the body must be application/json", "wrong_content_type");
+  if (!has_json_body(request)) return refuse_body();
+  if (live && !credential->caller.scopes.allow(Scope::read)) {
+    return std::unexpected{not_permitted(credential->caller, Scope::read)};
   }
-  return credential->actor;
+  return std::move(credential->caller);
 }
 
 }  // namespace server

@@ -2,8 +2,9 @@
 //
 // In this order: the Host header names this station (421; keeps out pages that point their own name at this machine);
 // a request that changes something, and /live, comes from the station's own page if from a page at all (403);
-// everything but /login and the files of the cockpit, which hold no data, has a credential (401); a request that
-// changes something and rests on the cookie says where it comes from (403); a body is JSON (415).
+// everything but signing in and the files of the cockpit, which hold no data, has a credential (401); a request that
+// changes something and rests on the cookie says where it comes from (403); a body is JSON (415). What the caller may
+// do is the routes' to say (Router), and of /live it is decided here: whoever opens it may see everything (403).
 #pragma once
 
 #include <expected>
@@ -21,12 +22,12 @@ class RequestGuard {
   // comes from https:// when the port is secure.
   RequestGuard(Auth& auth, std::vector<std::string> hosts, bool is_secure = false);
 
-  // Who asks (empty where nobody needs to say), or the refusal.
-  std::expected<std::string, Response> admit(const Request& request) const;
+  // Who asks (nobody where nobody needs to say), or the refusal.
+  std::expected<Caller, Response> admit(const Request& request) const;
 
  private:
   struct Credential {
-    std::string actor;
+    Caller caller;
     bool by_cookie = false;
   };
 

@@ -104,6 +104,17 @@ void Router::add(Route route) {
   routes_.push_back(std::move(route));
 }
 
+Response not_permitted(const Caller& caller, Scope needed) {
+  const char* role = text(least_role(needed));
+  std::string detail = fmt::format("this needs the role {} (a token: the scope {}); {} has the role {}", role,
+                                   text(needed), caller.actor, text(caller.role()));
+  if (caller.session == 0) {
+    detail = fmt::format("this needs the scope {} (a person: the role {}); {} has {}", text(needed), role, caller.actor,
+                         text(caller.scopes));
+  }
+  return problem(403, std::move(detail), "not_permitted", {{"needs", role}});
+}
+
 Answer Router::dispatch(Request request) const {
   const auto question_mark = request.target.find('?');
   const auto path = path_segments(request.target);
@@ -119,6 +130,7 @@ Answer Router::dispatch(Request request) const {
       allowed += (allowed.empty() ? "" : ", ") + route.method + (route.method == "GET" ? ", HEAD" : "");
       continue;
     }
+    if (!request.caller.scopes.allow(route.needs)) co_return not_permitted(request.caller, route.needs);
     for (std::size_t i = 0; i < path->size(); ++i) {
       const std::string& name = entry.segments[i];
       if (is_parameter(name)) request.param[name.substr(1, name.size() - 2)] = (*path)[i];

@@ -1,7 +1,8 @@
 // Finds the route of a request: method and path pattern to a coroutine that answers.
 //
-//   router.add({"GET", "/api/v1/runs/{run_id}/gaps", {}, list_gaps});
+//   router.add({"GET", "/api/v1/runs/{run_id}/gaps", Scope::read, {}, list_gaps});
 //
+// Whoever may not do what the route needs is refused with 403 before the route sees the request.
 // A path is split at '/', then decoded; a segment with a hidden '/', a control character or ".." is refused with 400,
 // an unknown or repeated query parameter too. An unknown path under /api/ is 404, a known one with another method 405
 // with Allow. HEAD is answered as GET (the server leaves the body out). Every other path goes to the fallback.
@@ -21,6 +22,7 @@ using Answer = boost::asio::awaitable<Response>;
 struct Route {
   std::string method;
   std::string pattern;             // "/api/v1/robots/{robot_id}"
+  Scope needs;                     // no default: every route says it
   std::vector<std::string> query;  // the parameters it knows
   std::function<Answer(Request)> answer;
 };
@@ -45,6 +47,9 @@ class Router {
   std::vector<Entry> entries_;
   std::function<Response(const Request&)> fallback_;
 };
+
+// 403 that says which role is needed.
+Response not_permitted(const Caller& caller, Scope needed);
 
 // The segments of the target's path, split and then decoded; empty when it is not acceptable.
 std::optional<std::vector<std::string>> path_segments(const std::string& target);

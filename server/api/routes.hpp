@@ -1,5 +1,5 @@
 // All routes of the API, grouped by noun: routes_station, routes_recording, routes_robots, routes_runs, routes_markers,
-// routes_samples, routes_overview, routes_exports.
+// routes_samples, routes_overview, routes_exports, routes_accounts.
 //
 // Held to openapi.yaml both ways by a test. Each answer is a coroutine that can be called without a server.
 #pragma once
@@ -10,6 +10,7 @@
 #include "server/analysis/analysis_service.hpp"
 #include "server/api/auth.hpp"
 #include "server/api/json.hpp"
+#include "server/api/logins.hpp"
 #include "server/api/query_params.hpp"
 #include "server/api/router.hpp"
 #include "server/live/live_feed.hpp"
@@ -40,6 +41,8 @@ struct ApiParts {
   RecordingParts& recording;
   AnalysisService& analysis;
   Auth& auth;
+  Accounts& accounts;
+  Logins& logins;
   StationFacts facts;
 };
 
@@ -51,6 +54,7 @@ void add_marker_routes(Router& router, ApiParts& parts);
 void add_sample_routes(Router& router, ApiParts& parts);
 void add_overview_routes(Router& router, ApiParts& parts);
 void add_export_routes(Router& router, ApiParts& parts);
+void add_account_routes(Router& router, ApiParts& parts);
 
 // Everything above, and the cockpit as fallback.
 void add_routes(Router& router, ApiParts& parts);

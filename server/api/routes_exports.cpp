@@ -139,7 +139,7 @@ Answer export_sqlite(ApiParts& parts, Request request) {
 void add_export_routes(Router& router, ApiParts& parts) {
   const auto add = [&router, &parts](const char* pattern, std::vector<std::string> query,
                                      Answer (*answer)(ApiParts&, Request)) {
-    router.add({"GET", pattern, std::move(query),
+    router.add({"GET", pattern, Scope::record, std::move(query),
                 [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
   };
   add("/api/v1/runs/{run_id}/samples.csv", {"channels", "grid_us"}, export_csv);

@@ -68,14 +68,14 @@ Answer list_markers_of_run(ApiParts& parts, Request request) {
 }  // namespace
 
 void add_marker_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* method, const char* pattern, std::vector<std::string> query,
-                                     Answer (*answer)(ApiParts&, Request)) {
-    router.add({method, pattern, std::move(query),
+  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
+                                     std::vector<std::string> query, Answer (*answer)(ApiParts&, Request)) {
+    router.add({method, pattern, needs, std::move(query),
                 [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
   };
-  add("POST", "/api/v1/robots/{robot_id}/markers", {}, add_marker);
-  add("GET", "/api/v1/robots/{robot_id}/markers", {"after", "limit"}, list_markers);
-  add("GET", "/api/v1/runs/{run_id}/markers", {}, list_markers_of_run);
+  add("POST", "/api/v1/robots/{robot_id}/markers", Scope::record, {}, add_marker);
+  add("GET", "/api/v1/robots/{robot_id}/markers", Scope::read, {"after", "limit"}, list_markers);
+  add("GET", "/api/v1/runs/{run_id}/markers", Scope::read, {}, list_markers_of_run);
 }
 
 }  // namespace server

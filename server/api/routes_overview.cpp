@@ -37,9 +37,10 @@ Answer overview_of_robot(ApiParts& parts, Request request) {
 
 void add_overview_routes(Router& router, ApiParts& parts) {
   const auto add = [&router, &parts](const char* pattern, Answer (*answer)(ApiParts&, Request)) {
-    router.add({"GET", pattern, {"from_us", "to_us", "points", "channels"}, [&parts, answer](Request request) {
-                  return answer(parts, std::move(request));
-                }});
+    router.add(
+        {"GET", pattern, Scope::read, {"from_us", "to_us", "points", "channels"}, [&parts, answer](Request request) {
+           return answer(parts, std::move(request));
+         }});
   };
   add("/api/v1/runs/{run_id}/overview", overview_of_run);
   add("/api/v1/robots/{robot_id}/overview", overview_of_robot);

@@ -91,13 +91,15 @@ Answer create_backup(ApiParts& parts, Request request) {
 }  // namespace
 
 void add_recording_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* method, const char* pattern, Answer (*answer)(ApiParts&, Request)) {
-    router.add({method, pattern, {}, [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
+                                     Answer (*answer)(ApiParts&, Request)) {
+    router.add(
+        {method, pattern, needs, {}, [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
   };
-  add("GET", "/metrics", get_metrics);
-  add("GET", "/api/v1/recording", get_recording);
-  add("GET", "/api/v1/backups", list_backups);
-  add("POST", "/api/v1/backups", create_backup);
+  add("GET", "/metrics", Scope::read, get_metrics);
+  add("GET", "/api/v1/recording", Scope::read, get_recording);
+  add("GET", "/api/v1/backups", Scope::read, list_backups);
+  add("POST", "/api/v1/backups", Scope::admin, create_backup);
 }
 
 }  // namespace server

@@ -128,6 +128,10 @@ Answer change_control(ApiParts& parts, Request request) {
   if (!wish) co_return problem(wish.error());
   wish->robot_id = request.param.at("robot_id");
   wish->actor = request.actor;
+  // SAFETY: nobody but an admin takes control out of another's hands.
+  if (wish->action == ControlAction::force && !request.caller.scopes.allow(Scope::admin)) {
+    co_return problem(403, "to take control by force needs the role admin", "not_permitted");
+  }
   const auto control = parts.station.control(*wish);
   if (!control) co_return problem(control.error());
   co_return json_response(200, {{"control", control->holder.empty() ? json(nullptr) : to_json(*control)}});
@@ -198,20 +202,20 @@ Answer get_command(ApiParts& parts, Request request) {
 }  // namespace
 
 void add_robot_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* method, const char* pattern, std::vector<std::string> query,
-                                     Answer (*answer)(ApiParts&, Request)) {
-    router.add({method, pattern, std::move(query),
+  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
+                                     std::vector<std::string> query, Answer (*answer)(ApiParts&, Request)) {
+    router.add({method, pattern, needs, std::move(query),
                 [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
   };
-  add("GET", "/api/v1/robots", {}, list_robots);
-  add("GET", "/api/v1/robots/{robot_id}", {}, get_robot);
-  add("GET", "/api/v1/robots/{robot_id}/commands", {"limit"}, list_commands);
-  add("POST", "/api/v1/robots/{robot_id}/commands", {"wait"}, submit_command);
-  add("POST", "/api/v1/robots/{robot_id}/control", {}, change_control);
-  add("POST", "/api/v1/robots/{robot_id}/emergency-stop", {}, emergency_stop);
-  add("GET", "/api/v1/robots/{robot_id}/events", {"limit"}, list_events);
-  add("GET", "/api/v1/commands/{command_id}", {}, get_command);
-  add("POST", "/api/v1/emergency-stop", {}, emergency_stop_all);
+  add("GET", "/api/v1/robots", Scope::read, {}, list_robots);
+  add("GET", "/api/v1/robots/{robot_id}", Scope::read, {}, get_robot);
+  add("GET", "/api/v1/robots/{robot_id}/commands", Scope::read, {"limit"}, list_commands);
+  add("POST", "/api/v1/robots/{robot_id}/commands", Scope::command, {"wait"}, submit_command);
+  add("POST", "/api/v1/robots/{robot_id}/control", Scope::command, {}, change_control);
+  add("POST", "/api/v1/robots/{robot_id}/emergency-stop", Scope::stop, {}, emergency_stop);
+  add("GET", "/api/v1/robots/{robot_id}/events", Scope::read, {"limit"}, list_events);
+  add("GET", "/api/v1/commands/{command_id}", Scope::read, {}, get_command);
+  add("POST", "/api/v1/emergency-stop", Scope::stop, {}, emergency_stop_all);
 }
 
 }  // namespace server

@@ -180,20 +180,20 @@ Result<RunId> run_id_of(const Request& request) {
 }
 
 void add_run_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* method, const char* pattern, std::vector<std::string> query,
-                                     Answer (*answer)(ApiParts&, Request)) {
-    router.add({method, pattern, std::move(query),
+  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
+                                     std::vector<std::string> query, Answer (*answer)(ApiParts&, Request)) {
+    router.add({method, pattern, needs, std::move(query),
                 [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
   };
-  add("GET", "/api/v1/runs", {"robot_id", "state", "before", "limit"}, list_runs);
-  add("POST", "/api/v1/runs", {}, create_run);
-  add("GET", "/api/v1/runs/{run_id}", {}, get_run);
-  add("POST", "/api/v1/runs/{run_id}/end", {}, end_run);
-  add("POST", "/api/v1/runs/{run_id}/annotate", {}, annotate_run);
-  add("POST", "/api/v1/runs/{run_id}/discard", {}, discard_run);
-  add("GET", "/api/v1/runs/{run_id}/certificate", {}, get_certificate);
-  add("GET", "/api/v1/runs/{run_id}/snapshot", {}, get_snapshot);
-  add("GET", "/api/v1/runs/{run_id}/step-metrics", {}, get_step_metrics);
+  add("GET", "/api/v1/runs", Scope::read, {"robot_id", "state", "before", "limit"}, list_runs);
+  add("POST", "/api/v1/runs", Scope::record, {}, create_run);
+  add("GET", "/api/v1/runs/{run_id}", Scope::read, {}, get_run);
+  add("POST", "/api/v1/runs/{run_id}/end", Scope::record, {}, end_run);
+  add("POST", "/api/v1/runs/{run_id}/annotate", Scope::record, {}, annotate_run);
+  add("POST", "/api/v1/runs/{run_id}/discard", Scope::record, {}, discard_run);
+  add("GET", "/api/v1/runs/{run_id}/certificate", Scope::read, {}, get_certificate);
+  add("GET", "/api/v1/runs/{run_id}/snapshot", Scope::read, {}, get_snapshot);
+  add("GET", "/api/v1/runs/{run_id}/step-metrics", Scope::read, {}, get_step_metrics);
 }
 
 }  // namespace server

@@ -50,7 +50,7 @@ Answer answer_excerpt(ApiParts& parts, Request request, ExcerptOf excerpt_of, Ex
 void add_sample_routes(Router& router, ApiParts& parts) {
   const auto add = [&router, &parts](const char* pattern, std::vector<std::string> query, ExcerptOf excerpt_of,
                                      ExcerptRoute answer) {
-    router.add({"GET", pattern, std::move(query), [&parts, excerpt_of, answer](Request request) {
+    router.add({"GET", pattern, Scope::read, std::move(query), [&parts, excerpt_of, answer](Request request) {
                   return answer_excerpt(parts, std::move(request), excerpt_of, answer);
                 }});
   };

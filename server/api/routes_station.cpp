@@ -20,7 +20,7 @@ Answer get_station(ApiParts& parts, Request) {
 
 Answer get_openapi(ApiParts&, Request request) { co_return asset_response(request, openapi_document()); }
 
-// A link that lets one page in. Its address is the one that was asked, which RequestGuard knows to be ours.
+// A link that lets one page in, as admin. Its address is the one that was asked, which RequestGuard knows to be ours.
 Answer make_login_link(ApiParts& parts, Request request) {
   const std::string host = request.header("host");
   const std::string url =
@@ -34,7 +34,7 @@ Answer log_in(ApiParts& parts, Request request) {
     response.headers.emplace_back("Allow", "GET");
     co_return response;
   }
-  const auto session = parts.auth.log_in(request.query["code"]);
+  const auto session = parts.auth.log_in(request.query["code"], request.peer, request.header("user-agent"));
   if (!session) {
     co_return html_response(
         401,
@@ -43,9 +43,7 @@ Answer log_in(ApiParts& parts, Request request) {
   }
   Response response = html_response(303, "");
   response.headers.emplace_back("Location", "/");
-  response.headers.emplace_back(
-      "Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age={}{}", kSessionCookie, *session,
-                                kCookieLife.count() / 1'000'000, parts.facts.is_secure() ? "; Secure" : ""));
+  response.headers.emplace_back("Set-Cookie", parts.auth.cookie(*session, parts.facts.is_secure()));
   co_return response;
 }
 
@@ -66,16 +64,16 @@ std::string login_url(const std::string& base_url, const std::string& code) {
 }
 
 void add_station_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* pattern, std::vector<std::string> query,
+  const auto add = [&router, &parts](const char* pattern, Scope needs, std::vector<std::string> query,
                                      Answer (*answer)(ApiParts&, Request)) {
-    router.add({"GET", pattern, std::move(query),
+    router.add({"GET", pattern, needs, std::move(query),
                 [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
   };
-  add("/login", {"code"}, log_in);
-  add("/live", {}, live_without_upgrade);
-  add("/api/v1/station", {}, get_station);
-  add("/api/v1/openapi.yaml", {}, get_openapi);
-  router.add({"POST", "/api/v1/login-links", {}, [&parts](Request request) {
+  add("/login", Scope::anyone, {"code"}, log_in);
+  add("/live", Scope::read, {}, live_without_upgrade);
+  add("/api/v1/station", Scope::read, {}, get_station);
+  add("/api/v1/openapi.yaml", Scope::read, {}, get_openapi);
+  router.add({"POST", "/api/v1/login-links", Scope::admin, {}, [&parts](Request request) {
                 return make_login_link(parts, std::move(request));
               }});
   router.set_fallback(page_response);
@@ -90,6 +88,7 @@ void add_routes(Router& router, ApiParts& parts) {
   add_sample_routes(router, parts);
   add_overview_routes(router, parts);
   add_export_routes(router, parts);
+  add_account_routes(router, parts);
 }
 
 }  // namespace server

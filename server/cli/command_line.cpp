@@ -80,6 +80,9 @@ Wish parse_command_line(int argc, char** argv) {
   offer<Certificate>(app, "certificate", "Make or renew the station's certificate for TLS", wish);
   offer<Backup>(app, "backup", "Copy a station's database, also while it runs, and verify the copy", wish);
   offer<Restore>(app, "restore", "Make a backup the database of a new data folder", wish);
+  offer<UserCommand>(app, "user", "Users of a station: add, list, change, remove", wish);
+  offer<TokenCommand>(app, "token", "API tokens of a station: create, list, revoke", wish);
+  offer<RobotCommand>(app, "robot", "Robots of a station: enroll, list, revoke", wish);
   offer<Model>(app, "model", "Show the motion models, compute the hydrodynamic one, fit the motor", wish);
   offer<Bode>(app, "bode", "Crossover, margins and frequency response of the open loop", wish);
   offer<Step>(app, "step", "Velocity and position after a step of duty, or any duty", wish);

@@ -13,8 +13,11 @@
 #include "server/cli/model.hpp"
 #include "server/cli/predict.hpp"
 #include "server/cli/restore.hpp"
+#include "server/cli/robot.hpp"
 #include "server/cli/step.hpp"
+#include "server/cli/token.hpp"
 #include "server/cli/tune.hpp"
+#include "server/cli/user.hpp"
 #include "server/cli/verify.hpp"
 #include "server/config.hpp"
 
@@ -34,7 +37,7 @@ struct Answered {
 };
 
 using Wish = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
-                          Identify, Tune, Discretise, Predict>;
+                          Identify, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand>;
 
 Wish parse_command_line(int argc, char** argv);
 

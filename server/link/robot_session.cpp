@@ -152,6 +152,7 @@ asio::awaitable<bool> RobotSession::admit(const protocol::Hello& hello) {
     co_return co_await refuse(rheonaut_REFUSAL_REASON_MALFORMED,
                               "robot_id must be 1 to 31 of [a-z0-9_-], boot_id not 0, and oldest_seq ≤ next_seq");
   }
+  claimed_id_ = id;
   const auto request = admission_request(hello, hello_robot_time_us_, *stream_, clock_.utc_us());
   auto seat = station_.may_connect(id, hello.boot_id);
   if (!seat) co_return co_await refuse(rheonaut_REFUSAL_REASON_ALREADY_CONNECTED, seat.error().detail);
@@ -187,6 +188,7 @@ protocol::StationFrame RobotSession::welcome(const Admission& admission) const {
 
 asio::awaitable<bool> RobotSession::refuse(protocol::RefusalReason reason, std::string detail) {
   spdlog::warn("robot port: refused {}: {}: {}", stream_->peer(), protocol::text(reason), detail);
+  station_.on_refused(claimed_id_, stream_->peer(), reason, detail);
   protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
   frame.which_body = rheonaut_StationFrame_welcome_tag;
   frame.body.welcome.protocol_version = protocol::kProtocolVersion;

@@ -77,7 +77,8 @@ class RobotSession final : public RobotPort {
   protocol::Bytes unread_;      // of input_
   protocol::RobotFrame frame_;  // the one that was decoded last
   std::uint64_t hello_robot_time_us_ = 0;
-  RobotId robot_id_;  // from the hello
+  RobotId claimed_id_;  // of a well-formed hello, whether the robot is admitted or not
+  RobotId robot_id_;    // from the hello
 
   Signal wake_writer_;  // something is ready that flush() could not write
   std::array<std::uint8_t, protocol::kMaxFramedBytes> output_{};

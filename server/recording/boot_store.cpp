@@ -3,30 +3,20 @@
 
 #include <SQLiteCpp/Savepoint.h>
 #include <fmt/format.h>
-#include <sodium.h>
 
 #include <algorithm>
-#include <array>
 
 #include "server/recording/statement.hpp"
+#include "server/secrets.hpp"
 
 namespace server {
 namespace {
 
-using TokenHash = std::array<unsigned char, crypto_generichash_BYTES>;
-
-// Robot tokens are 256 random bits, so a fast hash is enough.
-TokenHash hash_of(const std::string& token) {
-  TokenHash hash{};
-  crypto_generichash(hash.data(), hash.size(), reinterpret_cast<const unsigned char*>(token.data()), token.size(),
-                     nullptr, 0);
-  return hash;
-}
-
 bool matches(const SQLite::Column& stored, const std::string& token) {
-  const TokenHash hash = hash_of(token);
-  return static_cast<std::size_t>(stored.getBytes()) == hash.size() &&
-         sodium_memcmp(stored.getBlob(), hash.data(), hash.size()) == 0;
+  SecretHash hash{};
+  if (static_cast<std::size_t>(stored.getBytes()) != hash.size()) return false;
+  std::copy_n(static_cast<const unsigned char*>(stored.getBlob()), hash.size(), hash.begin());
+  return same(hash, hash_of(token));
 }
 
 Admission refusal(protocol::RefusalReason reason, std::string detail) {
@@ -38,7 +28,7 @@ Admission refusal(protocol::RefusalReason reason, std::string detail) {
 
 void set_token(SQLite::Statement& statement, int index, const std::string& token) {
   if (token.empty()) return statement.bind(index);
-  const TokenHash hash = hash_of(token);
+  const SecretHash hash = hash_of(token);
   statement.bind(index, hash.data(), static_cast<int>(hash.size()));
 }
 
@@ -57,6 +47,11 @@ Admission reused(const AdmissionRequest& request, const RobotId& owner) {
   return refusal(
       rheonaut_REFUSAL_REASON_BOOT_ID_REUSED,
       fmt::format("boot {} belongs to robot '{}'; a boot_id must be random, new in each boot", request.boot_id, owner));
+}
+
+Admission revoked(const RobotId& robot_id) {
+  return refusal(rheonaut_REFUSAL_REASON_WRONG_TOKEN,
+                 fmt::format("the token of robot '{}' was revoked; enrol the robot again", robot_id));
 }
 
 std::vector<RestoredRobot> BootStore::robots() {
@@ -171,14 +166,14 @@ Admission BootStore::check_robot(const AdmissionRequest& request, bool enrol_on_
                    fmt::format("robot '{}' brings no token; without one a robot is admitted from loopback only",
                                request.robot_id));
   }
-  SQLite::Statement known{database_.handle(), "SELECT token_hash FROM robot WHERE robot_id = ?"};
+  SQLite::Statement known{database_.handle(),
+                          "SELECT token_hash, revoked_at_us IS NOT NULL FROM robot WHERE robot_id = ?"};
   bind_all(known, request.robot_id);
   if (!known.executeStep()) {
     if (!may_enrol) {
       return refusal(rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT,
-                     fmt::format("robot '{}' is not enrolled; connect it once from loopback with enrol_on_loopback = "
-                                 "true",
-                                 request.robot_id));
+                     fmt::format("robot '{}' is not enrolled: rheonaut robot enroll {} gives it a token",
+                                 request.robot_id, request.robot_id));
     }
     SQLite::Statement add{database_.handle(),
                           "INSERT INTO robot (robot_id, enrolled_at_us, token_hash) VALUES (?, ?, ?)"};
@@ -188,6 +183,7 @@ Admission BootStore::check_robot(const AdmissionRequest& request, bool enrol_on_
     admission.newly_enrolled = true;
     return admission;
   }
+  if (known.getColumn(1).getInt() != 0) return revoked(request.robot_id);
   const SQLite::Column stored = known.getColumn(0);
   if (stored.isNull() ? request.token.empty() : matches(stored, request.token)) return admission;
   if (stored.isNull() && may_enrol) {  // enrolled without a token, brings one now: needed from here on

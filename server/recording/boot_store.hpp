@@ -65,6 +65,9 @@ struct BootStart {
 // The refusal of a boot_id that is another robot's.
 Admission reused(const AdmissionRequest& request, const RobotId& owner);
 
+// The refusal of a robot whose enrolment was revoked.
+Admission revoked(const RobotId& robot_id);
+
 class BootStore {
  public:
   explicit BootStore(Database& database) : database_{database} {}

@@ -28,6 +28,7 @@
 #include <memory>
 #include <optional>
 #include <queue>
+#include <set>
 #include <string>
 #include <type_traits>
 #include <unordered_map>
@@ -107,6 +108,9 @@ class Recorder final : public StationSink, public RobotArchive {
   void close();
 
   boost::asio::awaitable<Admission> admit(AdmissionRequest request) override;
+
+  // A robot whose enrolment was revoked is refused from this call on, also one that is being admitted.
+  void set_revoked(const RobotId& robot_id, bool revoked);
 
   void on_robot(const RobotState& robot) override;
   void on_samples(const RobotState& robot, const SampleBatch& batch) override;
@@ -267,6 +271,7 @@ class Recorder final : public StationSink, public RobotArchive {
 
   std::deque<std::shared_ptr<Asked>> asked_;  // as many as the robot port greets at most
   bool is_asking_ = false;
+  std::set<RobotId> revoked_;  // as in the database, or newer; all of them were enrolled
 
   Boots boots_;
   std::unordered_map<std::int64_t, BootEntry*> by_key_;

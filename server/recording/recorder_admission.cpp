@@ -78,10 +78,15 @@ Recorder::AskingTurn::~AskingTurn() {
   for (const auto& asked : recorder.asked_) asked->told.notify();
 }
 
+void Recorder::set_revoked(const RobotId& robot_id, bool revoked) {
+  revoked ? static_cast<void>(revoked_.insert(robot_id)) : static_cast<void>(revoked_.erase(robot_id));
+}
+
 Admission Recorder::take_in(BootEntry& entry, AdmissionOutcome outcome, const AdmissionRequest& request) {
   Boot& boot = entry.second;
   Admission& admission = outcome.admission;
   if (admission.refusal != rheonaut_REFUSAL_REASON_NONE) return admission;
+  if (revoked_.contains(request.robot_id)) return revoked(request.robot_id);  // since the disk was asked
   if (admission.newly_enrolled) {
     spdlog::info("robot '{}' enrolled from loopback {} a token", request.robot_id,
                  request.token.empty() ? "without" : "with");

@@ -51,6 +51,7 @@ RestoredStore mark(Database& database, std::int64_t utc_us) {
   SQLite::Statement set{handle, "INSERT OR REPLACE INTO meta (name, value) VALUES (?, ?)"};
   execute(set, "store_id", restored.store_id);
   execute(set, "restored_at_us", utc_us);
+  handle.exec("DELETE FROM page_session");  // of the time of the backup: whoever was signed out since stays so
   transaction.commit();
   restored.runs = handle.execAndGet("SELECT count(*) FROM run").getInt64();
   restored.samples = handle.execAndGet("SELECT coalesce(sum(last_seq - first_seq + 1), 0) FROM segment").getInt64();

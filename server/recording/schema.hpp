@@ -16,5 +16,6 @@ constexpr std::int64_t kMaxSegmentSamples = 100;     // the views and queries lo
 std::span<const char* const> migrations();
 extern const char* const kSecondSchema;
 extern const char* const kThirdSchema;
+extern const char* const kFourthSchema;
 
 }  // namespace server

@@ -44,6 +44,8 @@ struct Station::Seat {
   std::int64_t utc_minus_steady_us = 0;       // at its latest exchange
   std::uint64_t latch_known_at_robot_us = 0;  // older telemetry says nothing about the latch
   std::uint64_t last_number = 0;
+  std::int64_t refusal_told_at_us = 0;  // steady; 0: never
+  std::uint64_t refusals_untold = 0;    // since
 
   // Stops that no robot has acknowledged; the newest, null when there is none, and how many there are.
   std::shared_ptr<PendingCommand> newest_stop() const;

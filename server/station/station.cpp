@@ -36,6 +36,7 @@ void copy_samples(const protocol::Telemetry& telemetry, std::vector<Sample>& int
 }
 
 constexpr std::int64_t kClockRecordPeriodUs = 60'000'000;
+constexpr std::int64_t kRefusalPeriodUs = 10'000'000;
 constexpr std::int64_t kStationStepUs = 50'000;  // within a second; what NTP slews is far below
 
 }  // namespace
@@ -194,6 +195,28 @@ void Station::on_disconnected(RobotPort& port, const std::string& reason) {
   end_unseen(*seat, "link_lost");
   note(robot, "disconnected", reason);
   publish(robot);
+}
+
+void Station::on_refused(const RobotId& id, const std::string& peer, protocol::RefusalReason reason,
+                         const std::string& detail) {
+  const auto found = seats_.find(id);
+  if (found == seats_.end()) return;
+  Seat& seat = found->second;
+  const std::int64_t now_us = clock_.steady_us();
+  if (seat.refusal_told_at_us != 0 && now_us - seat.refusal_told_at_us < kRefusalPeriodUs) {
+    ++seat.refusals_untold;
+    return;
+  }
+  seat.refusal_told_at_us = now_us;
+  const std::uint64_t untold = std::exchange(seat.refusals_untold, 0);
+  const std::string more = untold == 0 ? "" : fmt::format(" ({} more since the last event)", untold);
+  note(*seat.robot, "connection_refused",
+       fmt::format("{} refused, {}: {}{}", peer, protocol::text(reason), detail, more));
+}
+
+void Station::end_connection(const RobotId& id, const std::string& reason) {
+  const auto seat = seats_.find(id);
+  if (seat != seats_.end() && seat->second.port != nullptr) seat->second.port->close(reason);
 }
 
 void Station::on_frame(RobotPort& port, std::uint64_t robot_time_us) {

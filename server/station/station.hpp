@@ -71,8 +71,8 @@ class Station {
 
   void add_sink(StationSink& sink);
 
-  // What the archive knows, before robots arrive: its robots, shown as disconnected and latched as they were, and the
-  // emergency stops of an earlier run of the station that no robot has acknowledged.
+  // What the archive knows, before those robots arrive: its robots, shown as disconnected and latched as they were, and
+  // the emergency stops of an earlier run of the station that no robot has acknowledged.
   void restore(const std::vector<RestoredRobot>& robots, const std::vector<CommandRecord>& pending_stops);
 
   const std::map<RobotId, RobotState>& robots() const { return robots_; }
@@ -108,6 +108,9 @@ class Station {
   void on_connected(RobotPort& port, const AdmissionRequest& hello, const protocol::Hello& details,
                     const Admission& admission, const std::string& peer);
   void on_disconnected(RobotPort& port, const std::string& reason);
+  // Somebody who calls itself this robot was not let in: an event, if the robot is known, at most one each 10 s.
+  void on_refused(const RobotId& id, const std::string& peer, protocol::RefusalReason reason,
+                  const std::string& detail);
   void on_frame(RobotPort& port, std::uint64_t robot_time_us);  // any frame: a sign of life
   void on_samples(RobotPort& port, const protocol::Telemetry& telemetry);
   void on_event(RobotPort& port, const protocol::Event& event);
@@ -117,6 +120,9 @@ class Station {
   void on_clock(RobotPort& port, const ClockExchange& exchange);
   void on_parameters(RobotPort& port, const protocol::ParameterPage& page);
   void on_controller(RobotPort& port, const protocol::Controller& controller);
+
+  // Ends the robot's connection, if there is one: its enrolment was revoked.
+  void end_connection(const RobotId& id, const std::string& reason);
 
   // --- called when a commit is done (wired by main) ---
 

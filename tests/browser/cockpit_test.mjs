@@ -1,13 +1,18 @@
 // Drives the cockpit in a real browser, from the login link to a station that was killed and came back.
 //
-//   cockpit_test.mjs [--screenshot PATH]     PATH gets a picture of the cockpit in the closed-loop experiment
+//   cockpit_test.mjs [--screenshot PATH] [--pictures FOLDER]
+//
+// PATH gets a picture of the cockpit in the closed-loop experiment, FOLDER some of signing in.
 import assert from 'node:assert/strict';
 import { mkdirSync } from 'node:fs';
+import { join } from 'node:path';
 import { Bench, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const at = process.argv.indexOf('--screenshot');
 const screenshot = at > 0 ? process.argv[at + 1] : null;
+const pictures_at = process.argv.indexOf('--pictures');
+const pictures = pictures_at > 0 ? process.argv[pictures_at + 1] : null;
 const bench = new Bench();
 const faults = []; // errors of the page itself
 let page;
@@ -19,6 +24,7 @@ const number = async (name) => Number((await text(`#numeral-${name} output`)).re
 const mode = () => page.locator('.annunciator').getAttribute('data-mode');
 const seen_mode = (wanted) => until(`the page shows ${wanted}`, async () => (await mode()) === wanted);
 const robot = () => bench.ask(`/robots/${kRobot}`);
+const picture = async (of, name) => pictures && of.screenshot({ path: join(pictures, `${name}.png`) });
 const fresh = () => until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0);
 
 // The samples of a second, as the station has them: the motor is off and the position is the same.
@@ -178,6 +184,52 @@ const steps = {
     await page.locator('#stop-line[data-phase=kept]').waitFor();
     bench.robot.process.kill('SIGCONT');
     await latched();
+  },
+
+  async 'an admin sees who has access, and signs another page out'() {
+    await bench.cli(['user', 'add', 'anna', '--role', 'viewer'], 'correct horse battery');
+    const other = await bench.open_page({ viewport: { width: 1280, height: 800 } });
+    await other.goto(bench.http);
+    await other.fill('#user', 'anna');
+    await other.fill('#password', 'wrong');
+    await other.click('#sign-in');
+    await other.getByText('The user or the password is wrong.').waitFor();
+    await picture(other, 'sign_in');
+    await other.fill('#password', 'correct horse battery');
+    await other.click('#sign-in');
+    await other.locator('.top-bar .lamp.good').waitFor();
+    assert.equal(await other.locator('#who').innerText(), 'anna viewer');
+    assert.equal(await other.locator('#send-setpoint').count(), 0, 'a viewer has no controls');
+    await other.locator('#emergency-stop').waitFor(); // and may stop
+    await other.click('#emergency-stop');
+    await other.locator('#stop-line[data-phase=stopped]').waitFor();
+    await picture(other, 'viewer');
+
+    await page.click('#show-access');
+    const mark = page.locator('[id^=session-]', { hasText: 'anna' });
+    await mark.waitFor();
+    await page.locator('#emergency-stop').waitFor(); // stays in reach
+    await picture(page, 'access');
+    await mark.locator('button').hover();
+    await page.mouse.down();
+    await other.getByText('Open the link that the station printed').waitFor();
+    await page.mouse.up();
+    await until('the list forgets it', async () => (await mark.count()) === 0);
+    await page.click('#show-access');
+    await page.locator('.annunciator h1').waitFor();
+    await other.close();
+  },
+
+  async 'signing out leaves the calm screen'() {
+    await page.click('#log-out');
+    await page.getByText('Open the link that the station printed').waitFor();
+    await bench.cli(['user', 'role', 'anna', 'operator']);
+    await page.fill('#user', 'anna');
+    await page.fill('#password', 'correct horse battery');
+    await page.press('#password', 'Enter');
+    await page.locator('.top-bar .lamp.good').waitFor();
+    await page.locator('#send-setpoint').waitFor(); // an operator has the controls
+    assert.equal(await page.locator('#show-access').count(), 0, 'and not the access of others');
   },
 
   async 'the page itself made no error'() {

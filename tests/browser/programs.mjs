@@ -74,6 +74,19 @@ export class Bench {
     this.robot = new Program('rheonaut-sim', '--station', this.endpoints.robots, '--id', id);
   }
 
+  // One `rheonaut` command about this station, and what it reads.
+  async cli(args, input = '') {
+    const tool = spawn(join(bin, 'rheonaut'), [...args, '--data', this.data], { stdio: ['pipe', 'ignore', 'inherit'] });
+    tool.stdin.end(`${input}\n`);
+    const [code] = await once(tool, 'exit');
+    if (code !== 0) throw new Error(`rheonaut ${args.join(' ')}: exit status ${code}`);
+  }
+
+  // Another page, of a browser of its own as far as cookies go.
+  async open_page(options) {
+    return (await this.browser.newContext(options)).newPage();
+  }
+
   async open_browser(options) {
     this.browser = await chromium.launch(kChromium);
     return (await this.browser.newContext(options)).newPage();

@@ -89,10 +89,10 @@ boost::asio::awaitable<Response> dispatch(const Router& router, Request request)
 
 void ask(const std::string& target) {
   Router router;
-  router.add({"GET", "/api/v1/runs", {"limit", "before", "robot_id"}, answer});
-  router.add({"POST", "/api/v1/runs", {}, answer});
-  router.add({"GET", "/api/v1/runs/{run_id}/samples", {"limit", "after"}, answer});
-  router.add({"GET", "/api/v1/runs/{run_id}/overview", {"from_us", "to_us", "channels"}, answer});
+  router.add({"GET", "/api/v1/runs", Scope::anyone, {"limit", "before", "robot_id"}, answer});
+  router.add({"POST", "/api/v1/runs", Scope::anyone, {}, answer});
+  router.add({"GET", "/api/v1/runs/{run_id}/samples", Scope::anyone, {"limit", "after"}, answer});
+  router.add({"GET", "/api/v1/runs/{run_id}/overview", Scope::anyone, {"from_us", "to_us", "channels"}, answer});
   router.set_fallback([](const Request& request) { return json_response(200, {{"page", request.path}}); });
   for (const char* method : {"GET", "HEAD", "POST"}) {
     boost::asio::io_context loop;

@@ -14,6 +14,11 @@ export type ControlBody = Schemas['ControlBody'];
 export type EventRecord = Schemas['Event'];
 export type RunRecord = Schemas['Run'];
 export type Station = Schemas['Station'];
+export type Me = Schemas['Me'];
+export type User = Schemas['User'];
+export type Token = Schemas['Token'];
+export type PageSession = Schemas['PageSession'];
+export type Enrolment = Schemas['Enrolment'];
 export type SamplesMessage = Schemas['LiveSamples'];
 export type LiveMessage = Schemas['LiveServerMessage'];
 export type ClientMessage = Schemas['LiveClientMessage'];
@@ -61,6 +66,9 @@ const kReasons: Record<string, string> = {
   unknown_robot: 'The station does not know this robot.',
   link_lost: 'The link to the robot broke before it answered.',
   other_boot: 'The robot restarted in between.',
+  not_permitted: 'Your role does not allow that.',
+  wrong_credentials: 'The user or the password is wrong.',
+  no_credential: 'This page is signed out.',
 };
 
 // An identifier of a refusal as a sentence.
@@ -105,6 +113,18 @@ export class Api {
     this.ask<RunRecord>('POST', '/runs', { robot_id, name, fluid });
   end_run = (run_id: number) => this.ask<RunRecord>('POST', `/runs/${run_id}/end`);
 
+  log_in = (user: string, password: string) => this.ask<Me>('POST', '/login', { user, password });
+  log_out = () => this.ask<object>('POST', '/logout');
+  me = () => this.ask<Me>('GET', '/me');
+  users = async () => (await this.ask<{ users: User[] }>('GET', '/users')).users;
+  remove_user = (name: string) => this.ask<object>('POST', `/users/${encodeURIComponent(name)}/remove`);
+  tokens = async () => (await this.ask<{ tokens: Token[] }>('GET', '/tokens')).tokens;
+  revoke_token = (name: string) => this.ask<Token>('POST', `/tokens/${encodeURIComponent(name)}/revoke`);
+  sessions = async () => (await this.ask<{ sessions: PageSession[] }>('GET', '/sessions')).sessions;
+  revoke_session = (session: number) => this.ask<object>('POST', `/sessions/${session}/revoke`);
+  enrolments = async () => (await this.ask<{ enrolments: Enrolment[] }>('GET', '/enrolments')).enrolments;
+  revoke_robot = (robot_id: string) => this.ask<Enrolment>('POST', `/enrolments/${encodeURIComponent(robot_id)}/revoke`);
+
   // True when the station answers that this page may not speak to it.
   async is_signed_out(): Promise<boolean> {
     return (await this.fetch('/api/v1/station', { method: 'GET' })).status === 401;
@@ -129,12 +149,13 @@ export class Api {
     });
     const content = (await answer.json().catch(() => null)) as unknown;
     if (answer.ok && content !== null) return content as Answer;
-    throw error_of(answer.status, content as Partial<Problem> | null);
+    throw error_of(answer.status, content as Partial<Problem> | null, Number(answer.headers?.get('Retry-After') ?? 0));
   }
 }
 
-function error_of(status: number, problem: Partial<Problem> | null): ApiError {
+function error_of(status: number, problem: Partial<Problem> | null, retry_after_s: number): ApiError {
   const reason = problem?.reason ?? '';
+  if (status === 429) return new ApiError(`Too many attempts. Try again in ${retry_after_s} s.`, status, reason);
   const known = allowed_range(problem?.detail ?? '') ?? kReasons[reason];
   const otherwise = problem?.detail || problem?.title || `The station answered ${status} without a reason.`;
   return new ApiError(known ?? otherwise, status, reason, known ? (problem?.detail ?? '') : '');

@@ -73,6 +73,11 @@ export class LiveLink {
     if (this.phase === 'waiting') this.connect();
   }
 
+  // A person has just signed in here.
+  sign_in(): void {
+    if (this.phase === 'signed_out') this.connect();
+  }
+
   // True when it left for the station; false says that this way is closed now.
   send(message: ClientMessage): boolean {
     if (this.socket?.readyState !== kOpenState) return false;

@@ -1,7 +1,7 @@
 // One running page: the store, the live link, the API and the controls that outlive a view, wired together.
 
 import { signal } from '@preact/signals';
-import { Api, type Station } from './api';
+import { Api, type Me, type Station } from './api';
 import { DutyHold } from './duty_hold';
 import { EmergencyStop, kIdleStop } from './emergency';
 import { LiveLink, type LinkPhase, type Surroundings } from './live';
@@ -16,6 +16,8 @@ export class Session {
   );
   readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => Date.now() });
   readonly station = signal<Station | null>(null);
+  readonly me = signal<Me | null>(null);
+  readonly shows_access = signal(false); // in place of the plots
   readonly phase = signal<LinkPhase>('connecting');
   readonly stop_state = signal(kIdleStop);
   readonly held = signal<{ robot_id: string | null; lapsed: boolean; error: string }>({ robot_id: null, lapsed: false, error: '' });
@@ -80,10 +82,23 @@ export class Session {
     void this.emergency.stop(null);
   };
 
+  // SAFETY: the link opens as soon as the password is right; nothing else is waited for.
+  log_in = async (user: string, password: string): Promise<void> => {
+    this.me.value = await this.api.log_in(user, password);
+    this.link.sign_in();
+  };
+
+  // The station ends the link, and the page finds itself signed out.
+  log_out = async (): Promise<void> => {
+    this.hold.release();
+    await this.api.log_out();
+  };
+
   // What /live does not tell: the station itself and the run that is open.
   private async load(): Promise<void> {
     try {
       this.station.value = await this.api.station();
+      this.me.value = await this.api.me();
       const robot_ids = this.store.robots.peek().map((robot) => robot.state.peek().robot_id);
       const runs = await Promise.all(robot_ids.map((robot_id) => this.api.open_run(robot_id)));
       this.store.set_runs(runs.filter((run) => run !== null));
@@ -116,6 +131,10 @@ export class Session {
     const before = this.phase.peek();
     const now = this.link.phase;
     this.phase.value = now;
+    if (now === 'signed_out') {
+      this.me.value = null;
+      this.shows_access.value = false;
+    }
     if (before === 'live') {
       this.hold.release();
       this.store.note('The live connection was lost.');

@@ -49,7 +49,9 @@ ApiTest::ApiTest() {
   options.store_id = 0xfedcba9876543210;
   options.robots_address = "127.0.0.1:7070";
   options.security = &security;
+  options.password_cost = kCheapPasswords;
   api = std::make_unique<ApiServer>(loop, tasks, clock, options, station, live, recording, analysis);
+  clock.add_worker(api->logins().worker());
   recording.spawn(tasks);
   tasks.spawn("live feed", live.run());
   tasks.spawn("api", api->run());
@@ -91,6 +93,8 @@ std::shared_ptr<std::optional<Answered>> ApiTest::begin(const std::string& metho
   request.headers = std::move(headers);
   if (!body.is_null()) request.body = body.dump();
   request.actor = "token:local";
+  request.peer = "127.0.0.1";
+  request.caller = Caller{"token:local", "", scopes, 0, std::make_shared<Standing>(loop)};
   auto into = std::make_shared<std::optional<Answered>>();
   tasks.spawn("ask", answer(std::move(request), into));
   clock.settle();

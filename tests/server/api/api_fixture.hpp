@@ -15,6 +15,9 @@ namespace server {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
+// A hash that takes no time; what it costs is no matter of these tests.
+inline constexpr PasswordCost kCheapPasswords{1, 8192};
+
 class TemporaryFolder {
  public:
   TemporaryFolder();
@@ -54,6 +57,7 @@ class ApiTest : public ::testing::Test {
   void make_samples(TestRobot& robot, std::uint64_t first_seq, pb_size_t count);
   std::string token() const;
 
+  Scopes scopes = Scopes::of(Role::admin);  // of who asks
   TemporaryFolder folder;
   boost::asio::io_context loop{1};
   WorkerThread disk{"disk"}, readers{"readers"}, exports{"exports"}, checkpoints{"checkpoints"}, maths{"maths"};

@@ -1,4 +1,5 @@
 // Token, login codes, sessions, and who is let in.
+#include <fmt/format.h>
 #include <sys/stat.h>
 
 #include <fstream>
@@ -8,8 +9,37 @@
 namespace server {
 namespace {
 
-class AuthTest : public ::testing::Test {
+constexpr std::uint64_t kStore = 0xfedcba9876543210;
+
+// Credentials over the database of a station: made again, they are those of a station that was started again.
+struct Credentials {
+  Credentials(boost::asio::io_context& loop, Clock& clock, Recorder& recorder, const std::filesystem::path& folder)
+      : accounts{loop, clock, recorder, folder}, auth{loop, clock, accounts, folder, kStore} {}
+  std::string log_in() { return *auth.log_in(auth.new_login_code(), "127.0.0.1", "a browser"); }
+  std::string actor(const std::string& session) {
+    const auto caller = auth.caller_of_session(session);
+    return caller ? caller->actor : "";
+  }
+
+  Accounts accounts;
+  Auth auth;
+};
+
+class AuthTest : public ApiTest {
  protected:
+  ~AuthTest() override {
+    tasks.stop();
+    clock.settle();
+  }
+  Credentials* start() {
+    started.push_back(std::make_unique<Credentials>(loop, clock, recorder, home.path()));
+    return started.back().get();
+  }
+  // Lets it store what there is to store, from now on.
+  void store(Credentials* station) {
+    tasks.spawn("accounts", station->accounts.run());
+    clock.settle();
+  }
   std::string token() const {
     std::ifstream in{file};
     std::string text;
@@ -23,29 +53,27 @@ class AuthTest : public ::testing::Test {
   }
   void write(const std::string& text) const { std::ofstream{file} << text << "\n"; }
 
-  TemporaryFolder folder;
-  std::filesystem::path file = folder.path() / "rheonaut.token";
-  boost::asio::io_context loop;
-  VirtualClock clock{loop};
+  TemporaryFolder home;
+  std::vector<std::unique_ptr<Credentials>> started;
+  std::filesystem::path file = home.path() / "rheonaut.token";
 };
 
 TEST_F(AuthTest, MakesATokenThatOnlyItsOwnerReads) {
-  const Auth auth{clock, folder.path()};
+  auto* const station = start();
   EXPECT_EQ(token().size(), 43U);  // 256 bits
   EXPECT_EQ(mode(), 0600U);
-  EXPECT_EQ(auth.actor_of_token(token()), "token:local");
-  EXPECT_FALSE(auth.actor_of_token(""));
-  EXPECT_FALSE(auth.actor_of_token(token() + "x"));
+  EXPECT_EQ(station->auth.caller_of_token(token())->actor, "token:local");
+  EXPECT_EQ(station->auth.caller_of_token(token())->role(), Role::admin);
+  EXPECT_FALSE(station->auth.caller_of_token(""));
+  EXPECT_FALSE(station->auth.caller_of_token(token() + "x"));
   EXPECT_FALSE(std::filesystem::exists(file.string() + ".new"));
 }
 
 TEST_F(AuthTest, KeepsAValidTokenAndProtectsIt) {
-  {
-    const Auth first{clock, folder.path()};
-  }
+  start();
   const std::string before = token();
   chmod(file.c_str(), 0644);
-  const Auth second{clock, folder.path()};
+  start();
   EXPECT_EQ(token(), before);
   EXPECT_EQ(mode(), 0600U);
 }
@@ -53,16 +81,17 @@ TEST_F(AuthTest, KeepsAValidTokenAndProtectsIt) {
 TEST_F(AuthTest, ReplacesWhatIsNoToken) {
   for (const char* text : {"", "short", "////////////////////////////////////////////////"}) {
     write(text);
-    const Auth auth{clock, folder.path()};
+    auto* const station = start();
     EXPECT_EQ(token().size(), 43U) << text;
-    EXPECT_TRUE(auth.actor_of_token(token()));
+    EXPECT_TRUE(station->auth.caller_of_token(token()));
     EXPECT_EQ(mode(), 0600U);
   }
 }
 
 TEST_F(AuthTest, SaysWhichFileItCannotWrite) {
+  Accounts accounts{loop, clock, recorder, home.path()};
   try {
-    const Auth auth{clock, folder.path() / "missing"};
+    const Auth auth{loop, clock, accounts, home.path() / "missing", kStore};
     FAIL();
   } catch (const std::exception& error) {
     EXPECT_NE(std::string{error.what()}.find("rheonaut.token"), std::string::npos) << error.what();
@@ -70,101 +99,123 @@ TEST_F(AuthTest, SaysWhichFileItCannotWrite) {
 }
 
 TEST_F(AuthTest, ACodeOpensOneSessionOnce) {
-  Auth auth{clock, folder.path()};
+  auto* const station = start();
+  Auth& auth = station->auth;
   const std::string code = auth.new_login_code();
-  EXPECT_FALSE(auth.log_in("guess"));
-  const auto session = auth.log_in(code);
+  EXPECT_FALSE(auth.log_in("guess", "", ""));
+  const auto session = auth.log_in(code, "", "");
   ASSERT_TRUE(session);
-  EXPECT_FALSE(auth.log_in(code));
-  EXPECT_EQ(auth.actor_of_session(*session), "session:1");
-  EXPECT_FALSE(auth.actor_of_session(code));
-  EXPECT_FALSE(auth.actor_of_token(*session));
+  EXPECT_FALSE(auth.log_in(code, "", ""));
+  EXPECT_EQ(station->actor(*session), "session:1");
+  EXPECT_EQ(auth.caller_of_session(*session)->role(), Role::admin);
+  EXPECT_FALSE(auth.caller_of_session(code));
+  EXPECT_FALSE(auth.caller_of_token(*session));
 }
 
-TEST_F(AuthTest, ASessionOutlivesTheStation) {
-  std::string session;
-  {
-    Auth auth{clock, folder.path()};
-    session = *auth.log_in(auth.new_login_code());
-  }
-  struct stat status{};
-  stat((folder.path() / "rheonaut.sessions").c_str(), &status);
-  EXPECT_EQ(status.st_mode & 0777U, 0600U);
-  {
-    Auth auth{clock, folder.path()};
-    EXPECT_EQ(auth.actor_of_session(session), "session:1");
-    EXPECT_EQ(auth.actor_of_session(*auth.log_in(auth.new_login_code())), "session:2");
-  }
-  clock.run_for(12h);
-  Auth late{clock, folder.path()};
-  EXPECT_FALSE(late.actor_of_session(session));
+TEST_F(AuthTest, ASessionOutlivesTheStationAndItsNumberIsNotGivenTwice) {
+  auto* first = start();
+  const std::string session = first->log_in();
+  const std::string other = first->log_in();
+  first->accounts.end_session(2);
+  store(first);
+  auto* second = start();
+  EXPECT_EQ(second->actor(session), "session:1");
+  EXPECT_EQ(second->actor(other), "");
+  EXPECT_EQ(second->actor(second->log_in()), "session:3");
+  clock.skip(12h);
+  EXPECT_EQ(start()->actor(session), "");
+}
+
+TEST_F(AuthTest, TheSessionsOfAnOlderStationAreTakenOverOnce) {
+  const std::filesystem::path old = home.path() / "rheonaut.sessions";
+  const std::string secret = random_secret();
+  std::string hex;
+  for (const unsigned char byte : hash_of(secret)) hex += fmt::format("{:02x}", byte);
+  const std::int64_t end_us = clock.utc_us() + 3'600'000'000;
+  std::ofstream{old} << "7 " << end_us << ' ' << hex << "\n8 " << end_us << " zz\n";
+  auto* station = start();
+  EXPECT_EQ(station->actor(secret), "session:7");
+  EXPECT_TRUE(std::filesystem::exists(old)) << "until it is stored";
+  store(station);
+  EXPECT_FALSE(std::filesystem::exists(old));
+  EXPECT_EQ(start()->actor(secret), "session:7");
 }
 
 TEST_F(AuthTest, ADamagedSessionFileLetsNobodyIn) {
-  std::ofstream{folder.path() / "rheonaut.sessions"} << "1 99999999999999999 zz\n2 99999999999999999\n";
-  Auth auth{clock, folder.path()};
-  EXPECT_FALSE(auth.actor_of_session(""));
+  std::ofstream{home.path() / "rheonaut.sessions"} << "1 99999999999999999 zz\n2 99999999999999999\n";
+  EXPECT_EQ(start()->actor(""), "");
 }
 
 TEST_F(AuthTest, CodesAndSessionsEndInTime) {
-  Auth auth{clock, folder.path()};
-  const std::string late = auth.new_login_code();
-  clock.run_for(10min);
-  EXPECT_FALSE(auth.log_in(late));
-  const auto session = auth.log_in(auth.new_login_code());
-  ASSERT_TRUE(session);
-  clock.run_for(12h);
-  EXPECT_FALSE(auth.actor_of_session(*session));
+  auto* const station = start();
+  const std::string late = station->auth.new_login_code();
+  clock.skip(10min);
+  EXPECT_FALSE(station->auth.log_in(late, "", ""));
+  const std::string session = station->log_in();
+  clock.skip(12h);
+  EXPECT_EQ(station->actor(session), "");
 }
 
-TEST_F(AuthTest, ASessionInUseIsRenewed) {
-  const auto saved = [this] {
-    std::ifstream in{folder.path() / "rheonaut.sessions"};
-    return std::string{std::istreambuf_iterator<char>{in}, {}};
+TEST_F(AuthTest, ASessionInUseIsRenewedAndStoredAtMostOnceAnHour) {
+  auto* station = start();
+  const std::string session = station->log_in();
+  store(station);
+  const auto stored_end_us = [this] {
+    return SQLite::Database{recorder.path().string()}.execAndGet("SELECT max(ends_at_us) FROM page_session").getInt64();
   };
-  std::string session;
-  {
-    Auth auth{clock, folder.path()};
-    session = *auth.log_in(auth.new_login_code());
-    const std::string first = saved();
-    clock.run_for(59min);
-    EXPECT_TRUE(auth.actor_of_session(session));
-    EXPECT_EQ(saved(), first) << "saved at most once an hour";
-    clock.run_for(12h - 1s);
-    EXPECT_TRUE(auth.actor_of_session(session));
-    EXPECT_NE(saved(), first);
-  }
-  clock.run_for(12h - 1s);
-  Auth restarted{clock, folder.path()};
-  EXPECT_TRUE(restarted.actor_of_session(session));
-  clock.run_for(12h);
-  EXPECT_FALSE(restarted.actor_of_session(session));
+  const std::int64_t first_us = stored_end_us();
+  clock.skip(59min);
+  EXPECT_NE(station->actor(session), "");
+  clock.settle();
+  EXPECT_EQ(stored_end_us(), first_us);
+  clock.skip(12h - 1s);
+  EXPECT_NE(station->actor(session), "");
+  clock.settle();
+  EXPECT_GT(stored_end_us(), first_us);
+  clock.skip(12h - 1s);
+  auto* restarted = start();
+  EXPECT_NE(restarted->actor(session), "");
+  clock.skip(12h);
+  EXPECT_EQ(restarted->actor(session), "");
 }
 
-TEST_F(AuthTest, ASessionThatCannotBeSavedIsRenewedAllTheSame) {
-  Auth auth{clock, folder.path()};
-  const auto session = auth.log_in(auth.new_login_code());
-  std::filesystem::remove_all(folder.path());
-  for (int i = 0; i < 4; ++i) {
-    clock.run_for(6h);
-    EXPECT_TRUE(auth.actor_of_session(*session));
+TEST_F(AuthTest, AnOpenPageUsesItsSession) {
+  auto* station = start();
+  const std::string session = station->log_in();
+  const auto page = station->auth.caller_of_session(session);  // as /live holds it
+  store(station);
+  for (int i = 0; i < 3; ++i) {
+    clock.skip(11h);
+    clock.run_for(2min);
   }
+  EXPECT_FALSE(page->standing->ended());
+  EXPECT_NE(station->actor(session), "");
 }
 
 TEST_F(AuthTest, ForgetsTheOldestWhenThereAreTooMany) {
-  Auth auth{clock, folder.path()};
+  auto* const station = start();
+  Auth& auth = station->auth;
   const std::string first_code = auth.new_login_code();
   for (std::size_t i = 0; i < kMaxLoginCodes; ++i) auth.new_login_code();
-  EXPECT_FALSE(auth.log_in(first_code));
-  const auto first = auth.log_in(auth.new_login_code());
-  for (std::size_t i = 0; i < kMaxSessions; ++i) auth.log_in(auth.new_login_code());
-  EXPECT_FALSE(auth.actor_of_session(*first));
+  EXPECT_FALSE(auth.log_in(first_code, "", ""));
+  const std::string first = station->log_in();
+  for (std::size_t i = 0; i < kMaxSessionsOfLinks; ++i) station->log_in();
+  EXPECT_EQ(station->actor(first), "");
+  EXPECT_EQ(station->accounts.sessions().size(), kMaxSessionsOfLinks);
+}
+
+TEST_F(AuthTest, EachStationHasACookieOfItsOwnName) {
+  auto* const station = start();
+  EXPECT_EQ(station->auth.cookie_name(), "rheonaut_session_fedcba9876543210");
+  EXPECT_EQ(
+      station->auth.cookie("x", false).find("rheonaut_session_fedcba9876543210=x; HttpOnly; SameSite=Strict; Path=/"),
+      0U);
+  const Auth other{loop, clock, station->accounts, home.path(), kStore + 1};
+  EXPECT_NE(other.cookie_name(), station->auth.cookie_name());
 }
 
 class RequestGuardTest : public AuthTest {
  protected:
-  RequestGuardTest() { session = *auth.log_in(auth.new_login_code()); }
-
   Request request(const std::string& method, const std::string& target) const {
     Request made;
     made.method = method;
@@ -179,7 +230,7 @@ class RequestGuardTest : public AuthTest {
   }
   Request with_cookie(const std::string& method, const std::string& target) const {
     Request made = request(method, target);
-    made.headers["cookie"] = "theme=dark; rheonaut_session=" + session;
+    made.headers["cookie"] = "theme=dark; rheonaut_session_fedcba9876543210=" + session;
     return made;
   }
   int status(const Request& asked) const {
@@ -187,24 +238,36 @@ class RequestGuardTest : public AuthTest {
     return admitted ? 200 : admitted.error().status;
   }
 
-  Auth auth{clock, folder.path()};
-  RequestGuard guard{auth, {"Station.Lab", "192.168.1.5"}};
-  std::string session;
+  Credentials* station = start();
+  RequestGuard guard{station->auth, {"Station.Lab", "192.168.1.5"}};
+  std::string session = station->log_in();
 };
 
 TEST_F(RequestGuardTest, NamesWhoAsks) {
-  EXPECT_EQ(guard.admit(with_token("GET", "/api/v1/robots")).value(), "token:local");
-  EXPECT_EQ(guard.admit(with_cookie("GET", "/api/v1/robots")).value(), "session:1");
-  EXPECT_EQ(guard.admit(request("GET", "/")).value(), "");
+  EXPECT_EQ(guard.admit(with_token("GET", "/api/v1/robots"))->actor, "token:local");
+  EXPECT_EQ(guard.admit(with_cookie("GET", "/api/v1/robots"))->actor, "session:1");
+  EXPECT_EQ(guard.admit(request("GET", "/"))->actor, "");
+}
+
+TEST_F(RequestGuardTest, TakesTheCookieOfAnOlderStationAndNotThatOfAnother) {
+  Request asked = request("GET", "/api/v1/robots");
+  asked.headers["cookie"] = "rheonaut_session=" + session;
+  EXPECT_EQ(status(asked), 200);
+  asked.headers["cookie"] = "rheonaut_session_fedcba9876543211=" + session;
+  EXPECT_EQ(status(asked), 401);
+  asked.headers["cookie"] = "rheonaut_session_fedcba9876543211=other; rheonaut_session_fedcba9876543210=" + session;
+  EXPECT_EQ(status(asked), 200);
 }
 
 TEST_F(RequestGuardTest, EverythingWithDataNeedsACredential) {
   for (const char* target : {"/api/v1/robots", "/api/v1/nothing", "/api/v1/openapi.yaml", "/live", "/%61pi/v1/robots",
-                             "/%6cive", "/api/v1/robots?x=/login"}) {
+                             "/%6cive", "/api/v1/robots?x=/login", "/api/v1/login", "/api/v1/login/x"}) {
     EXPECT_EQ(status(request("GET", target)), 401) << target;
   }
-  EXPECT_EQ(status(request("POST", "/api/v1/emergency-stop")), 401);
-  EXPECT_EQ(status(request("POST", "/")), 401);
+  for (const char* target : {"/api/v1/emergency-stop", "/", "/api/v1/login/x", "/api/v1/logout", "/login"}) {
+    EXPECT_EQ(status(request("POST", target)), 401) << target;
+  }
+  EXPECT_EQ(status(request("POST", "/api/v1/login")), 200);
   for (const char* target : {"/", "/login?code=x", "/assets/main.js"}) {
     EXPECT_EQ(status(request("GET", target)), 200) << target;
   }
@@ -229,11 +292,14 @@ TEST_F(RequestGuardTest, AnswersOnlyToItsOwnNames) {
   }
 }
 
-TEST_F(RequestGuardTest, RefusesOtherOriginsForChangesAndForLive) {
+TEST_F(RequestGuardTest, RefusesOtherOriginsForChangesForSigningInAndForLive) {
   for (const char* origin : {"http://evil.example", "null", "http://localhost:8081", "https://localhost:8080"}) {
     Request post = with_token("POST", "/api/v1/emergency-stop");
     post.headers["origin"] = origin;
     EXPECT_EQ(status(post), 403) << origin;
+    Request sign_in = request("POST", "/api/v1/login");
+    sign_in.headers["origin"] = origin;
+    EXPECT_EQ(status(sign_in), 403) << origin;
     Request live = with_cookie("GET", "/live");
     live.headers["origin"] = origin;
     EXPECT_EQ(status(live), 403) << origin;
@@ -258,16 +324,17 @@ TEST_F(RequestGuardTest, AChangeByCookieMustSayThatItComesFromTheStationsPage) {
 }
 
 TEST_F(RequestGuardTest, ABodyMustBeJson) {
-  Request post = with_token("POST", "/api/v1/runs");
-  post.body = "{}";
-  EXPECT_EQ(status(post), 415);
-  for (const char* type : {"application/json", "application/json; charset=utf-8", "Application/JSON"}) {
-    post.headers["content-type"] = type;
-    EXPECT_EQ(status(post), 200) << type;
-  }
-  for (const char* type : {"text/plain", "application/x-www-form-urlencoded", "application/jsonx"}) {
-    post.headers["content-type"] = type;
-    EXPECT_EQ(status(post), 415) << type;
+  for (Request post : {with_token("POST", "/api/v1/runs"), request("POST", "/api/v1/login")}) {
+    post.body = "{}";
+    EXPECT_EQ(status(post), 415);
+    for (const char* type : {"application/json", "application/json; charset=utf-8", "Application/JSON"}) {
+      post.headers["content-type"] = type;
+      EXPECT_EQ(status(post), 200) << type;
+    }
+    for (const char* type : {"text/plain", "application/x-www-form-urlencoded", "application/jsonx"}) {
+      post.headers["content-type"] = type;
+      EXPECT_EQ(status(post), 415) << type;
+    }
   }
 }
 

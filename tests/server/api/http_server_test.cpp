@@ -65,7 +65,7 @@ TEST_F(HttpServerTest, TheLoginLinkGivesACookieOnce) {
   EXPECT_TRUE(says(answer, "Location: /\r\n"));
   EXPECT_TRUE(says(answer, "; HttpOnly; SameSite=Strict; Path=/"));
   EXPECT_TRUE(talk(request).starts_with("HTTP/1.1 401"));
-  const auto begin = answer.find("rheonaut_session=");
+  const auto begin = answer.find("rheonaut_session_fedcba9876543210=");
   const std::string cookie = answer.substr(begin, answer.find(';', begin) - begin);
   const std::string with_cookie =
       talk("GET /api/v1/robots HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nCookie: " + cookie + "\r\n\r\n");
@@ -249,6 +249,20 @@ TEST_F(HttpServerTest, StopsWithConnectionsOpen) {
   EXPECT_TRUE(client.closed());
 }
 
+// Those of a station that has just been made.
+struct NewCredentials {
+  NewCredentials(boost::asio::io_context& loop, Clock& clock, const std::filesystem::path& folder)
+      : database{folder / "station.sqlite"},
+        recorder{loop, clock, disk, checkpoints, RecorderOptions{folder / "station.sqlite"}},
+        accounts{loop, clock, recorder, folder},
+        auth{loop, clock, accounts, folder, 1} {}
+  Database database;
+  WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
+  Recorder recorder;
+  Accounts accounts;
+  Auth auth;
+};
+
 // A server whose only route throws.
 TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
   TemporaryFolder folder;
@@ -259,10 +273,10 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
   LiveFeed feed{clock};
   LiveParts live{loop, tasks, clock, station, feed, "0"};
   Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
-  Auth auth{clock, folder.path()};
-  const RequestGuard guard{auth, {}};
+  NewCredentials credentials{loop, clock, folder.path()};
+  const RequestGuard guard{credentials.auth, {}};
   Router router;
-  router.add({"GET", "/broken", {}, [](Request) -> Answer { throw std::runtime_error{"secret"}; }});
+  router.add({"GET", "/broken", Scope::anyone, {}, [](Request) -> Answer { throw std::runtime_error{"secret"}; }});
   HttpServer server{tasks, clock, listener, guard, router, live, nullptr};
   tasks.spawn("http", server.run());
   {
@@ -301,19 +315,20 @@ TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
   LiveFeed feed{clock};
   LiveParts live{loop, tasks, broken, station, feed, "0"};
   Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
-  Auth auth{clock, folder.path()};
+  NewCredentials credentials{loop, clock, folder.path()};
+  Auth& auth = credentials.auth;
   const RequestGuard guard{auth, {}};
   const Router router;
   HttpServer server{tasks, clock, listener, guard, router, live, nullptr};
   tasks.spawn("http", server.run());
-  const auto session = auth.log_in(auth.new_login_code());
+  const auto session = auth.log_in(auth.new_login_code(), "", "");
   {
     RawClient client{clock, listener.endpoint().port()};
     client.send(
         "GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
-        "Cookie: rheonaut_session=" +
-        *session + "\r\n\r\n");
+        "Cookie: " +
+        auth.cookie_name() + "=" + *session + "\r\n\r\n");
     client.read_to_end();
     EXPECT_TRUE(client.closed());
   }

@@ -1,78 +1,8 @@
 // /live over a real socket, with WebSocket frames made by hand.
-#include "tests/server/api/api_fixture.hpp"
+#include "tests/server/api/live_page.hpp"
 
 namespace server {
 namespace {
-
-// A page: the handshake, then text frames.
-class Page {
- public:
-  Page(VirtualClock& clock, std::uint16_t port, const std::string& headers) : client_{clock, port} {
-    client_.send(
-        "GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n" +
-        headers + "\r\n");
-    answer = client_.read_until("\r\n\r\n");
-  }
-
-  bool open() const { return answer.starts_with("HTTP/1.1 101 "); }
-
-  void say(const json& message) { say_text(message.dump()); }
-  void say_text(const std::string& text) { send_frame('\x81', text); }
-
-  // The next message of this type; others are passed over, pings are answered when `answers_pings`.
-  json hear(const std::string& type) {
-    for (int i = 0; i < 1000; ++i) {
-      const auto text = next_message();
-      if (!text) return nullptr;
-      json message = json::parse(*text);
-      if (message["type"] == type) return message;
-    }
-    return nullptr;
-  }
-
-  bool closed() { return client_.closed(); }
-  RawClient& client() { return client_; }
-
-  std::string answer;
-  int pings = 0;
-  bool answers_pings = true;
-
- private:
-  void send_frame(char first, const std::string& payload) {
-    std::string frame{first};
-    if (payload.size() < 126) {
-      frame += static_cast<char>(0x80U | payload.size());
-    } else {
-      frame += '\xfe';
-      frame += static_cast<char>(payload.size() >> 8U);
-      frame += static_cast<char>(payload.size() & 0xffU);
-    }
-    client_.send(frame + std::string(4, '\0') + payload);  // a mask of zeros
-  }
-
-  std::optional<std::string> next_message() {
-    for (;;) {
-      const std::string head = client_.read_exactly(2);
-      if (head.size() < 2) return std::nullopt;
-      std::size_t size = static_cast<unsigned char>(head[1]) & 0x7fU;
-      if (size >= 126) {
-        std::size_t extended = 0;
-        for (const char c : client_.read_exactly(size == 126 ? 2 : 8)) {
-          extended = extended * 256 + static_cast<unsigned char>(c);
-        }
-        size = extended;
-      }
-      std::string payload = client_.read_exactly(size);
-      if (head[0] == '\x88') return std::nullopt;
-      if (head[0] != '\x89') return payload;
-      ++pings;
-      if (answers_pings) send_frame('\x8a', payload);
-    }
-  }
-
-  RawClient client_;
-};
 
 class LiveSocketTest : public ApiTest {
  protected:

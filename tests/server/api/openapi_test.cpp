@@ -9,6 +9,7 @@ namespace {
 
 struct Operation {
   std::set<std::string> query;
+  std::string scope;
 };
 using Operations = std::map<std::string, Operation>;  // by "GET /path"
 
@@ -32,6 +33,7 @@ Operations documented() {
       operation = (key == "get" ? "GET " : key == "post" ? "POST " : key + " ") + path;
       operations[operation];
     }
+    if (depth == 6 && key == "x-scope") operations[operation].scope = line.substr(line.find(':') + 2);
     if (depth < 8) continue;
     if (line.find("parameters/limit'") != std::string::npos) operations[operation].query.insert("limit");
     const auto name = line.find("{ name: ");
@@ -59,6 +61,14 @@ TEST_F(OpenapiTest, QueryParametersAreTheSame) {
     const std::string operation = route.method + " " + route.pattern;
     const std::set<std::string> known{route.query.begin(), route.query.end()};
     EXPECT_EQ(document.at(operation).query, known) << operation;
+  }
+}
+
+TEST_F(OpenapiTest, EveryRouteNeedsWhatTheDocumentSays) {
+  const Operations document = documented();
+  for (const Route& route : api->router().routes()) {
+    const std::string operation = route.method + " " + route.pattern;
+    EXPECT_EQ(document.at(operation).scope, text(route.needs)) << operation;
   }
 }
 

@@ -19,9 +19,9 @@ Answer echo(Request request) {
 class RouterTest : public ::testing::Test {
  protected:
   RouterTest() {
-    router_.add({"GET", "/api/v1/runs", {"limit", "after"}, echo});
-    router_.add({"POST", "/api/v1/runs", {}, echo});
-    router_.add({"GET", "/api/v1/runs/{run_id}/samples.csv", {}, echo});
+    router_.add({"GET", "/api/v1/runs", Scope::anyone, {"limit", "after"}, echo});
+    router_.add({"POST", "/api/v1/runs", Scope::anyone, {}, echo});
+    router_.add({"GET", "/api/v1/runs/{run_id}/samples.csv", Scope::anyone, {}, echo});
     router_.set_fallback([](const Request& request) {
       Response response;
       response.body = "page " + request.path;

@@ -238,6 +238,7 @@ boost::asio::awaitable<void> fetch(const Router& router, std::string target, std
   Request request;
   request.method = "GET";
   request.target = std::move(target);
+  request.caller.scopes = Scopes::of(Role::operator_);
   Response response = co_await router.dispatch(std::move(request));
   std::string text = std::move(response.body);
   if (response.stream != nullptr) {
@@ -271,7 +272,7 @@ TEST_F(RoutesTest, TheTextOfManySamplesIsNotMadeOnTheLoop) {
   const std::int64_t before_us = worked_us();
   const json page = json::parse(text);
   const std::int64_t parse_us = worked_us() - before_us;
-  EXPECT_EQ(page["samples"].size(), 10'000U);
+  ASSERT_EQ(page.at("samples").size(), 10'000U);
   EXPECT_LT(json_us, parse_us / 4);
   const std::int64_t csv_us = longest_us("/api/v1/runs/1/samples.csv", text);
   EXPECT_NEAR(static_cast<double>(std::ranges::count(text, '\n')), 2001, 100);  // less the page's last segment

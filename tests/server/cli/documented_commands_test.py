@@ -9,6 +9,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).parents[3]
 TOOLS = ("model", "bode", "step", "identify", "tune", "discretise", "predict")
+ACCOUNT_TOOLS = ("user", "token", "robot")
 
 
 def documented():
@@ -28,7 +29,7 @@ class DocumentedCommands(unittest.TestCase):
     def test_run_and_exit_as_written(self):
         commands = list(documented())
         self.assertGreaterEqual(len(commands), 15)
-        self.assertEqual({command.split()[1] for command, _ in commands}, set(TOOLS))
+        self.assertEqual({command.split()[1] for command, _ in commands}, {*TOOLS, *ACCOUNT_TOOLS})
         with tempfile.TemporaryDirectory() as folder:
             for command, status in commands:
                 with self.subTest(command=command):
@@ -45,6 +46,16 @@ class DocumentedCommands(unittest.TestCase):
                     shown = run(f"rheonaut {tool} --help", folder).stdout
                     example = re.search(r"^Example: (rheonaut .*)$", shown, re.M).group(1)
                     self.assertEqual(run(example, folder).returncode, 0, example)
+
+    def test_examples_of_account_tools_work(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for command in ("user add", "token create", "robot enroll", "user", "token", "robot"):
+                with self.subTest(command=command):
+                    shown = run(f"rheonaut {command} --help", folder).stdout
+                    example = re.search(r"^Example: (rheonaut .*)$", shown, re.M).group(1)
+                    done = run(f"{example} <<< 'correct horse battery'", folder)
+                    self.assertEqual((done.returncode, done.stderr), (0, ""), example)
+                    self.assertTrue(done.stdout)
 
     def test_errors_are_one_line(self):
         with tempfile.TemporaryDirectory() as folder:

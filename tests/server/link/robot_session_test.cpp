@@ -144,6 +144,66 @@ TEST_F(LinkTest, AnotherBootIsRefusedUntilTheFirstWasSilent) {
   EXPECT_EQ(station.find("r1")->boot_id, 78u);
 }
 
+// An event names both addresses, whichever of the two connections wins; a robot that dials again and again, refused
+// each time, makes one in ten seconds.
+TEST_F(LinkTest, ARefusedSecondConnectionIsAnEventThatNamesBoth) {
+  connect();
+  const std::string first_peer = station.find("r1")->peer;
+  const auto refusals = [this] {
+    std::vector<RobotEvent> found;
+    for (const RobotEvent& event : sink.events) {
+      if (event.kind == "connection_refused") found.push_back(event);
+    }
+    return found;
+  };
+  auto hello = TestRobot::hello_frame();
+  hello.body.hello.boot_id = 78;
+  const auto dial_again = [&] {
+    auto* second = dial();
+    second->send(hello);
+    return clock.run_until([&] { return second->closed; }, 1s);
+  };
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(dial_again());
+  ASSERT_EQ(refusals().size(), 1u);
+  const std::string cause = refusals()[0].cause;
+  EXPECT_TRUE(cause.starts_with("memory refused, already_connected: ")) << cause;
+  EXPECT_NE(cause.find("is connected from " + first_peer + " with boot 77"), std::string::npos) << cause;
+  EXPECT_EQ(refusals()[0].robot_id, "r1");
+  clock.run_for(10s);
+  ASSERT_TRUE(dial_again());
+  ASSERT_EQ(refusals().size(), 2u);
+  EXPECT_NE(refusals()[1].cause.find("(4 more since the last event)"), std::string::npos) << refusals()[1].cause;
+}
+
+TEST_F(LinkTest, ARefusedTokenIsAnEventOfARobotThatIsKnown) {
+  connect();
+  archive.answer.refusal = rheonaut_REFUSAL_REASON_WRONG_TOKEN;
+  archive.answer.detail = "the token of 'r1' is another one";
+  auto* impostor = dial();
+  impostor->say_hello();
+  ASSERT_TRUE(clock.run_until([&] { return impostor->closed; }, 1s));
+  ASSERT_EQ(sink.events.back().kind, "connection_refused");
+  EXPECT_NE(sink.events.back().cause.find("wrong_token: the token of 'r1' is another one"), std::string::npos);
+  const std::size_t before = sink.events.size();
+  auto* stranger = dial();
+  auto hello = TestRobot::hello_frame();
+  hello.body.hello.robot_id[1] = '9';
+  stranger->send(hello);
+  ASSERT_TRUE(clock.run_until([&] { return stranger->closed; }, 1s));
+  EXPECT_EQ(sink.events.size(), before) << "a stranger's name makes no record";
+  EXPECT_TRUE(connected());
+}
+
+TEST_F(LinkTest, TheStationEndsAConnectionWhoseEnrolmentIsRevoked) {
+  auto* robot = connect();
+  station.end_connection("r1", "its enrolment was revoked");
+  ASSERT_TRUE(clock.run_until([&] { return robot->closed; }, 1s));
+  EXPECT_FALSE(connected());
+  EXPECT_EQ(sink.events.back().kind, "disconnected");
+  EXPECT_EQ(sink.events.back().cause, "its enrolment was revoked");
+  station.end_connection("nobody", "x");
+}
+
 TEST_F(LinkTest, SamplesReachTheSinksWithTheirContext) {
   auto* robot = connect();
   robot->send_samples(0, 5, robot->robot_now_us(), 0);

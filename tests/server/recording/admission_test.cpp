@@ -1,7 +1,13 @@
 // Who may connect, and with which boot.
+#include <boost/asio/experimental/awaitable_operators.hpp>
+
+#include "server/recording/account_store.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
+namespace asio = boost::asio;
+using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
+
 namespace {
 
 class AdmissionTest : public RecordingTest {
@@ -88,6 +94,53 @@ TEST_F(AdmissionTest, ANewRobotsTokenIsNeededFromElsewhere) {
   EXPECT_TRUE(admit(robot_).newly_enrolled);
   EXPECT_EQ(admit_remote("secret").refusal, rheonaut_REFUSAL_REASON_NONE);
   EXPECT_EQ(admit_remote("guess").refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);
+}
+
+TEST_F(AdmissionTest, ARevokedRobotIsRefusedUntilItIsEnrolledAgain) {
+  start();
+  robot_.token = "secret";
+  admit(robot_);
+  const auto with_store = [this](auto change) {
+    auto job = [change](Database& database) {
+      AccountStore store{database.handle()};
+      return change(store);
+    };
+    return wait(recorder_->on_disk(std::move(job)));
+  };
+  ASSERT_TRUE(with_store([id = robot_.id](AccountStore& store) { return store.revoke_robot(id, "anna", 1); }));
+  stop();
+  start();  // from loopback, where strangers are enrolled
+  for (const char* token : {"secret", "", "another"}) {
+    robot_.token = token;
+    const Admission refused = admit(robot_);
+    EXPECT_EQ(refused.refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN) << token;
+    EXPECT_NE(refused.detail.find("was revoked"), std::string::npos) << refused.detail;
+  }
+  const auto enrol = [id = robot_.id](AccountStore& store) { return store.enrol(id, hash_of("new"), "anna", 2); };
+  ASSERT_TRUE(with_store(enrol));
+  robot_.token = "secret";
+  EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);
+  robot_.token = "new";
+  EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_NONE);
+  EXPECT_EQ(rows("SELECT enrolled_by, revoked_at_us FROM robot"), std::vector<std::string>{"anna|"});
+}
+
+TEST_F(AdmissionTest, ARobotThatIsRevokedWhileItIsAdmittedIsRefused) {
+  start();
+  admit(robot_);
+  const auto revoke = [](Recorder& recorder, RobotId id) -> asio::awaitable<bool> {
+    recorder.set_revoked(id, true);
+    co_return true;
+  };
+  const auto admit_and_revoke = [&revoke](Recorder& recorder, AdmissionRequest hello) -> asio::awaitable<Admission> {
+    const RobotId id = hello.robot_id;
+    const auto both = co_await (recorder.admit(std::move(hello)) && revoke(recorder, id));  // the disk is asked first
+    co_return std::get<0>(both);
+  };
+  const Admission late = wait(admit_and_revoke(*recorder_, hello_of(robot_)));
+  EXPECT_EQ(late.refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);
+  recorder_->set_revoked(robot_.id, false);
+  EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_NONE);
 }
 
 TEST_F(AdmissionTest, TellsTheStoreAndWhatIsDurable) {

@@ -83,7 +83,7 @@ void RecordingTest::kill() {
   tasks_.reset();
 }
 
-Admission RecordingTest::admit(const TestRobot& robot) {
+AdmissionRequest RecordingTest::hello_of(const TestRobot& robot) {
   AdmissionRequest request;
   request.robot_id = robot.id;
   request.token = robot.token;
@@ -97,8 +97,10 @@ Admission RecordingTest::admit(const TestRobot& robot) {
   request.oldest_event_seq = robot.oldest_event_seq;
   request.next_event_seq = robot.next_event_seq;
   request.received_at_us = clock_.utc_us();
-  return wait(recorder_->admit(request));
+  return request;
 }
+
+Admission RecordingTest::admit(const TestRobot& robot) { return wait(recorder_->admit(hello_of(robot))); }
 
 RobotState RecordingTest::state_of(const TestRobot& robot, LinkState link) const {
   RobotState state;

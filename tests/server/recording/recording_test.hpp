@@ -72,6 +72,7 @@ class RecordingTest : public ::testing::Test {
   // kill -9: what was not committed is gone.
   void kill();
 
+  AdmissionRequest hello_of(const TestRobot& robot);
   Admission admit(const TestRobot& robot);
   void connect(const TestRobot& robot);  // must be admitted
   void disconnect(const TestRobot& robot);

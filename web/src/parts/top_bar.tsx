@@ -33,10 +33,33 @@ export function TopBar({ session }: { session: Session }) {
           </span>
         ))}
       </span>
+      <WhoIsIn session={session} />
       <button type="button" class="stop-all" onClick={session.stop_all}>
         Stop all robots
       </button>
     </header>
+  );
+}
+
+function WhoIsIn({ session }: { session: Session }) {
+  const me = session.me.value;
+  if (!me) return null;
+  const { shows_access } = session;
+  const leave = () => session.log_out().catch((error: Error) => session.store.note(error.message));
+  return (
+    <span class="who">
+      <span id="who" title={me.actor}>
+        {me.user || 'by link'} <span class="quiet">{me.role}</span>
+      </span>
+      {me.role === 'admin' && (
+        <button type="button" id="show-access" aria-pressed={shows_access.value} onClick={() => (shows_access.value = !shows_access.value)}>
+          {shows_access.value ? 'Back to the plots' : 'Access'}
+        </button>
+      )}
+      <button type="button" id="log-out" onClick={() => void leave()}>
+        Sign out
+      </button>
+    </span>
   );
 }
 

@@ -1,5 +1,6 @@
 // The cockpit: one page with everything an operator watches and touches, and the stop always in reach.
 
+import { Access } from './access';
 import { SignedOut } from './signed_out';
 import { ControlLine } from '../parts/control_line';
 import { AutoControl } from '../parts/auto_control';
@@ -16,7 +17,8 @@ import { TopBar } from '../parts/top_bar';
 import type { Session } from '../session';
 
 export function Cockpit({ session }: { session: Session }) {
-  if (session.phase.value === 'signed_out') return <SignedOut />;
+  if (session.phase.value === 'signed_out') return <SignedOut session={session} />;
+  const may_command = session.me.value?.role !== 'viewer';
   const robot = session.store.selected.value;
   const key = session.store.selected_id.value; // controls begin anew with another robot
   return (
@@ -27,7 +29,9 @@ export function Cockpit({ session }: { session: Session }) {
         {robot && <LinkPanel robot={robot} />}
       </aside>
       <main class="scope" aria-label={robot ? `Robot ${key}` : 'No robot'}>
-        {robot ? (
+        {session.shows_access.value ? (
+          <Access session={session} />
+        ) : robot ? (
           <>
             <ModeAnnunciator robot={robot} />
             <Readouts robot={robot} />
@@ -39,7 +43,10 @@ export function Cockpit({ session }: { session: Session }) {
       </main>
       <StopPanel session={session} />
       <section class="controls" aria-label="Controls">
-        {robot && (
+        {robot && !may_command && (
+          <p class="viewer-note quiet">You may look and stop. Commands and runs need the role operator.</p>
+        )}
+        {robot && may_command && (
           <>
             <ControlLine key={`control-${key}`} session={session} robot={robot} />
             <AutoControl key={`auto-${key}`} session={session} robot={robot} />

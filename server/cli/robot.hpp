@@ -1,0 +1,29 @@
+// `rheonaut robot`: which robots may connect, each with a token of its own; with a running station and without one.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <iosfwd>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace server::cli {
+
+struct RobotCommand {
+  enum class Act : std::uint8_t { enroll, list, revoke };
+  Act act = Act::list;
+  std::filesystem::path data_dir = "rheonaut-data";
+  std::string robot_id;
+  bool json = false;
+};
+
+void add_options(CLI::App& command, RobotCommand& wish);
+
+// `enroll` prints the robot's token and where it belongs; nobody can read it again. Throws std::runtime_error saying
+// why nothing was changed.
+int run(const RobotCommand& wish, std::ostream& out);
+
+}  // namespace server::cli

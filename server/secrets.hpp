@@ -1,0 +1,46 @@
+// The station's secrets: how they are made, what is kept of them, and how they are compared.
+//
+// A secret is 256 random bits as base64url; of one that nobody can guess a plain hash (BLAKE2b-256) is kept. A password
+// can be guessed, so of it Argon2id is kept. What is compared is compared in constant time. Any thread; nothing here
+// throws but for want of random numbers or memory (std::runtime_error).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+
+namespace server {
+
+using SecretHash = std::array<unsigned char, 32>;
+
+std::string random_secret();  // 43 characters
+bool is_secret(const std::string& text);
+SecretHash hash_of(const std::string& secret);
+
+// In a time that does not depend on where they differ.
+bool same(const SecretHash& a, const SecretHash& b);
+
+// The entry whose `hash` is this one, or null. Every entry is compared, whichever it is.
+template <class Entries>
+auto find_secret(Entries& entries, const SecretHash& hash) -> decltype(&*entries.begin()) {
+  decltype(&*entries.begin()) found = nullptr;
+  for (auto& entry : entries) {
+    if (same(entry.hash, hash)) found = &entry;
+  }
+  return found;
+}
+
+inline constexpr std::size_t kMinPasswordBytes = 8;
+inline constexpr std::size_t kMaxPasswordBytes = 200;
+
+// Of Argon2id.
+struct PasswordCost {
+  unsigned long long passes = 2;
+  std::size_t memory_bytes = std::size_t{64} * 1024 * 1024;
+};
+
+// With a salt of its own; what it costs stands in it. Computes for a tenth of a second or so.
+std::string hash_password(const std::string& password, const PasswordCost& cost);
+bool is_password(const std::string& password, const std::string& hash);
+
+}  // namespace server

@@ -1,0 +1,169 @@
+// Users, tokens and enrolments: what is kept, what a restart finds, and what a disk that cannot be written spoils.
+#include <fstream>
+
+#include "server/recording/database.hpp"
+#include "tests/server/api/api_fixture.hpp"
+
+namespace server {
+namespace {
+
+class AccountsTest : public ApiTest {
+ protected:
+  int make_user(const std::string& name, const std::string& role = "operator") {
+    return ask("POST", "/api/v1/users", {{"name", name}, {"role", role}, {"password", "correct horse"}}).status;
+  }
+  json make_token(const std::string& name, const std::string& of = "read,stop") {
+    return ask("POST", "/api/v1/tokens", {{"name", name}, {"scopes", of}}).parsed();
+  }
+  // As after a restart.
+  Accounts stored() { return Accounts{loop, clock, recorder, folder.path()}; }
+  std::string everything_on_disk() const {
+    std::string all;
+    for (const char* name : {"station.sqlite", "station.sqlite-wal"}) {
+      std::ifstream in{folder.path() / name, std::ios::binary};
+      all.append(std::istreambuf_iterator<char>{in}, {});
+    }
+    return all;
+  }
+  SQLite::Database lock_disk() const {  // nobody else writes until it goes
+    SQLite::Database other{recorder.path().string(), SQLite::OPEN_READWRITE};
+    other.exec("BEGIN IMMEDIATE");
+    return other;
+  }
+};
+
+TEST_F(AccountsTest, UsersAreAddedListedChangedAndRemoved) {
+  EXPECT_EQ(make_user("anna"), 201);
+  EXPECT_EQ(make_user("anna"), 409);
+  for (const char* name : {"", "Anna", "an na", "a/b", "12345678901234567890123456789012"}) {
+    EXPECT_EQ(make_user(name), 422) << name;
+  }
+  EXPECT_EQ(make_user("otto", "boss"), 422);
+  EXPECT_EQ(ask("POST", "/api/v1/users", {{"name", "o"}, {"role", "viewer"}, {"password", "short"}}).status, 422);
+  const json users = ask("GET", "/api/v1/users").parsed()["users"];
+  ASSERT_EQ(users.size(), 1U);
+  EXPECT_EQ(users[0]["role"], "operator");
+  EXPECT_EQ(users[0]["made_by"], "token:local");
+  EXPECT_FALSE(users[0].contains("password_hash"));
+  EXPECT_EQ(ask("POST", "/api/v1/users/anna/change", {{"role", "admin"}}).parsed()["role"], "admin");
+  EXPECT_EQ(ask("POST", "/api/v1/users/nobody/change", {{"role", "admin"}}).status, 404);
+  EXPECT_EQ(stored().users().at("anna").role, Role::admin);
+  EXPECT_EQ(ask("POST", "/api/v1/users/anna/remove").status, 200);
+  EXPECT_EQ(ask("POST", "/api/v1/users/anna/remove").status, 404);
+  EXPECT_TRUE(stored().users().empty());
+}
+
+TEST_F(AccountsTest, ThereAreAtMostAHundredUsers) {
+  for (std::size_t i = 0; i < kMaxUsers; ++i) ASSERT_EQ(make_user("user" + std::to_string(i)), 201);
+  EXPECT_EQ(make_user("one-more"), 409);
+}
+
+TEST_F(AccountsTest, ATokenIsShownOnceAndStoredAsAHash) {
+  const json made = make_token("logger");
+  const std::string secret = made["secret"];
+  EXPECT_TRUE(is_secret(secret));
+  const Answered list = ask("GET", "/api/v1/tokens");
+  EXPECT_EQ(list.body.find(secret), std::string::npos);
+  EXPECT_EQ(list.parsed()["tokens"][0]["scopes"], "read,stop");
+  EXPECT_EQ(list.parsed()["tokens"][0]["last_used_at_us"], nullptr);
+  EXPECT_EQ(everything_on_disk().find(secret), std::string::npos);
+  EXPECT_NE(everything_on_disk().find("logger"), std::string::npos);
+
+  Accounts restarted = stored();
+  EXPECT_EQ(restarted.caller_of_token(secret)->actor, "token:logger");
+  EXPECT_EQ(api->accounts().caller_of_token(secret)->actor, "token:logger");
+  clock.run_for(2min);
+  EXPECT_EQ(stored().tokens().at(0).last_used_at_us / 60'000'000, (clock.utc_us() - 120'000'000) / 60'000'000);
+  EXPECT_EQ(ask("POST", "/api/v1/tokens/logger/revoke").status, 200);
+  EXPECT_FALSE(api->accounts().caller_of_token(secret));
+  EXPECT_FALSE(stored().caller_of_token(secret));
+  EXPECT_EQ(ask("POST", "/api/v1/tokens/nothing/revoke").status, 404);
+  EXPECT_EQ(make_token("logger")["status"], 409) << "the record of commands names it";
+  EXPECT_EQ(make_token("local")["status"], 422);
+  EXPECT_EQ(make_token("other", "root")["status"], 422);
+}
+
+// SAFETY: what a disk that cannot be written must not do.
+TEST_F(AccountsTest, AFailingDiskSignsNobodyOutAndNobodyIn) {
+  connect_robot();
+  ASSERT_EQ(make_user("anna"), 201);
+  const std::string token_secret = make_token("button", "stop")["secret"];
+  const std::string before = api->accounts().open_session("", "", "");
+  clock.settle();
+  {
+    const SQLite::Database lock = lock_disk();
+    const json credentials{{"user", "anna"}, {"password", "correct horse"}};
+    EXPECT_EQ(ask("POST", "/api/v1/login", credentials).status, 200) << "kept in memory until it can be stored";
+    EXPECT_TRUE(api->accounts().caller_of_session(before));
+    EXPECT_TRUE(api->accounts().caller_of_token(token_secret));
+    auto stopping = begin("POST", "/api/v1/robots/r1/emergency-stop");
+    ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));
+    robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_ACCEPTED, 9);
+    EXPECT_EQ(end(stopping).status, 200);
+    // What gives rights is not in force unless it is stored; what takes them away is, at once.
+    const Answered refused = ask("POST", "/api/v1/tokens", {{"name", "new"}, {"scopes", "admin"}});
+    EXPECT_EQ(refused.status, 503);
+    EXPECT_EQ(refused.parsed()["reason"], "not_stored");
+    EXPECT_EQ(api->accounts().tokens().size(), 1U);
+    const Answered revoked = ask("POST", "/api/v1/tokens/button/revoke");
+    EXPECT_EQ(revoked.status, 503);
+    EXPECT_NE(revoked.body.find("It is in force"), std::string::npos) << revoked.body;
+    EXPECT_FALSE(api->accounts().caller_of_token(token_secret));
+    EXPECT_EQ(stored().sessions().size(), 1U);
+  }
+  clock.run_for(6s);
+  EXPECT_EQ(stored().sessions().size(), 2U) << "stored as soon as it can be";
+}
+
+TEST_F(AccountsTest, ARobotIsEnrolledRevokedAndEnrolledAgain) {
+  const Answered made = ask("POST", "/api/v1/enrolments", {{"robot_id", "rheo-1"}});
+  ASSERT_EQ(made.status, 201) << made.body;
+  EXPECT_TRUE(is_secret(made.parsed()["secret"]));
+  EXPECT_EQ(made.parsed()["enrolled_by"], "token:local");
+  EXPECT_EQ(ask("POST", "/api/v1/enrolments", {{"robot_id", "rheo-1"}}).status, 409);
+  EXPECT_EQ(ask("POST", "/api/v1/enrolments", {{"robot_id", "Rheo 1"}}).status, 422);
+  EXPECT_EQ(ask("GET", "/api/v1/enrolments").parsed()["enrolments"][0]["has_token"], true);
+  const Answered revoked = ask("POST", "/api/v1/enrolments/rheo-1/revoke");
+  EXPECT_EQ(revoked.status, 200) << revoked.body;
+  EXPECT_EQ(revoked.parsed()["revoked_by"], "token:local");
+  EXPECT_EQ(ask("POST", "/api/v1/enrolments/nobody/revoke").status, 404);
+  const Answered again = ask("POST", "/api/v1/enrolments", {{"robot_id", "rheo-1"}});
+  EXPECT_EQ(again.status, 201);
+  EXPECT_EQ(again.parsed()["revoked_at_us"], nullptr);
+  EXPECT_NE(again.parsed()["secret"], made.parsed()["secret"]);
+}
+
+TEST_F(AccountsTest, RevokingEndsTheConnectionAndKeepsTheRobotOut) {
+  connect_robot();
+  ASSERT_EQ(ask("POST", "/api/v1/enrolments/r1/revoke").status, 200);
+  ASSERT_TRUE(clock.run_until([&] { return robot->closed; }, 1s));
+  EXPECT_EQ(ask("GET", "/api/v1/robots/r1").parsed()["link"], "disconnected");
+  TestRobot back{loop, clock, tasks, robots};
+  back.say_hello();
+  ASSERT_TRUE(clock.run_until([&] { return back.closed; }, 1s));
+  EXPECT_EQ(back.welcomes().at(0).refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);
+  const json events = ask("GET", "/api/v1/robots/r1/events").parsed()["events"];
+  EXPECT_EQ(events[0]["kind"], "connection_refused") << events[0];
+  EXPECT_NE(events[0]["cause"].get<std::string>().find("revoked"), std::string::npos);
+  EXPECT_EQ(ask("POST", "/api/v1/enrolments", {{"robot_id", "r1"}}).status, 201);
+}
+
+TEST_F(AccountsTest, NoExportOfARunHoldsAnyOfIt) {
+  connect_robot();
+  ASSERT_EQ(make_user("very-secret-user"), 201);
+  make_token("very-secret-token");
+  const json run = ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "x"}}).parsed();
+  make_samples(*robot, 0, 5);
+  clock.run_for(2s);
+  const std::string path = "/api/v1/runs/" + run["run_id"].dump() + "/samples.sqlite";
+  ASSERT_EQ(ask("POST", "/api/v1/runs/" + run["run_id"].dump() + "/end").status, 200);
+  const Answered file = ask("GET", path);
+  ASSERT_EQ(file.status, 200);
+  ASSERT_TRUE(file.body.starts_with("SQLite format 3"));
+  for (const char* word : {"very-secret", "api_token", "page_session", "password_hash", "token_hash", "argon2id"}) {
+    EXPECT_EQ(file.body.find(word), std::string::npos) << word;
+  }
+}
+
+}  // namespace
+}  // namespace server

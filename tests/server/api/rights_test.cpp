@@ -1,0 +1,121 @@
+// Every route under every role and scope: who may do what, and what they are told when they may not.
+#include <set>
+
+#include "tests/server/api/api_fixture.hpp"
+
+namespace server {
+namespace {
+
+class RightsTest : public ApiTest {
+ protected:
+  static std::string target_of(const std::string& pattern) {
+    std::string target;
+    for (std::size_t i = 0; i < pattern.size(); ++i) {
+      target += pattern[i] == '{' ? '1' : pattern[i];
+      if (pattern[i] == '{') i = pattern.find('}', i);
+    }
+    return target;
+  }
+  bool refused(const Route& route) {
+    const Answered answered = ask(route.method, target_of(route.pattern));
+    if (answered.status != 403) return false;
+    const json problem = answered.parsed();
+    EXPECT_EQ(problem["reason"], "not_permitted") << route.pattern;
+    EXPECT_EQ(problem["needs"], text(least_role(route.needs))) << route.pattern;
+    EXPECT_NE(problem["detail"].get<std::string>().find(text(least_role(route.needs))), std::string::npos);
+    return true;
+  }
+};
+
+TEST_F(RightsTest, EveryRouteIsOpenToTheRolesThatItsScopeNamesAndToNoOther) {
+  std::map<std::string, int> open;
+  for (const Role role : kRoles) {
+    scopes = Scopes::of(role);
+    for (const Route& route : api->router().routes()) {
+      const bool may = role >= least_role(route.needs);
+      EXPECT_EQ(refused(route), !may) << text(role) << ": " << route.method << " " << route.pattern;
+      open[text(role)] += may ? 1 : 0;
+    }
+  }
+  EXPECT_GE(open["viewer"], 25);
+  EXPECT_GT(open["operator"], open["viewer"]);
+  EXPECT_GT(open["admin"], open["operator"]);
+}
+
+TEST_F(RightsTest, WithoutACredentialOnlySigningInIsThere) {
+  scopes = {};
+  std::set<std::string> open;
+  for (const Route& route : api->router().routes()) {
+    if (!refused(route)) open.insert(route.method + " " + route.pattern);
+  }
+  EXPECT_EQ(open, (std::set<std::string>{"GET /login", "POST /api/v1/login"}));
+}
+
+// Written out, so that a route that changes its scope by accident is noticed here.
+TEST_F(RightsTest, AViewerChangesNothingButMayStop) {
+  std::set<std::string> changes;
+  for (const Route& route : api->router().routes()) {
+    if (route.method != "GET" && least_role(route.needs) == Role::viewer) changes.insert(route.pattern);
+  }
+  EXPECT_EQ(changes, (std::set<std::string>{"/api/v1/emergency-stop", "/api/v1/robots/{robot_id}/emergency-stop",
+                                            "/api/v1/login", "/api/v1/logout"}));
+  std::set<std::string> of_admins;
+  for (const Route& route : api->router().routes()) {
+    if (route.needs == Scope::admin) of_admins.insert(route.method + " " + route.pattern);
+  }
+  EXPECT_TRUE(of_admins.contains("POST /api/v1/login-links")) << "a link signs in as admin";
+  EXPECT_TRUE(of_admins.contains("POST /api/v1/backups"));
+  EXPECT_EQ(of_admins.size(), 14U);
+}
+
+TEST_F(RightsTest, EachScopeBringsAlongWhatItMust) {
+  const auto with = [](Scope scope) {
+    Scopes scopes;
+    return text(scopes.add(scope));
+  };
+  EXPECT_EQ(with(Scope::read), "read");
+  EXPECT_EQ(with(Scope::stop), "stop");
+  EXPECT_EQ(with(Scope::record), "read,record");
+  EXPECT_EQ(with(Scope::command), "read,stop,command") << "who may move a robot may stop it";
+  EXPECT_EQ(with(Scope::admin), "read,stop,record,command,admin");
+  for (const Role role : kRoles) {
+    EXPECT_TRUE(Scopes::of(role).allow(Scope::stop)) << text(role);
+    EXPECT_EQ(Scopes::of(role).role(), role);
+    EXPECT_EQ(parse_role(text(role)).value(), role);
+    EXPECT_EQ(parse_scopes(text(Scopes::of(role))).value(), Scopes::of(role));
+  }
+  for (const char* wrong : {"", "read,", "Read", "read stop", "anyone", "root"}) {
+    EXPECT_FALSE(parse_scopes(wrong)) << wrong;
+    EXPECT_FALSE(parse_role(wrong)) << wrong;
+  }
+}
+
+TEST_F(RightsTest, ATokenOfAUserIsBoundByTheUsersRole) {
+  Accounts& accounts = api->accounts();
+  std::optional<Result<User>> added;
+  std::optional<Result<NewToken>> made;
+  const auto make = [](Accounts& in, std::optional<Result<User>>& user,
+                       std::optional<Result<NewToken>>& token) -> boost::asio::awaitable<void> {
+    User anna;
+    anna.name = "anna";
+    anna.role = Role::operator_;
+    user = co_await in.add_user(anna);
+    Scopes all = Scopes::of(Role::admin);
+    TokenWish wish{"all", all, 0, "anna"};
+    token = co_await in.add_token(wish);
+  };
+  tasks.spawn("make", make(accounts, added, made));
+  ASSERT_TRUE(clock.run_until([&] { return made.has_value(); }, 10s));
+  ASSERT_TRUE(*made);
+  EXPECT_EQ(accounts.caller_of_token((*made)->secret)->role(), Role::operator_);
+  EXPECT_EQ(ask("POST", "/api/v1/users/anna/change", {{"role", "viewer"}}).status, 200);
+  EXPECT_EQ(accounts.caller_of_token((*made)->secret)->role(), Role::viewer);
+  EXPECT_EQ(ask("POST", "/api/v1/users/anna/change", {{"disabled", true}}).status, 200);
+  EXPECT_FALSE(accounts.caller_of_token((*made)->secret));
+  EXPECT_EQ(ask("POST", "/api/v1/users/anna/remove").status, 200);
+  EXPECT_FALSE(accounts.caller_of_token((*made)->secret));
+  EXPECT_NE(accounts.tokens().at(0).revoked_at_us, 0);
+}
+
+}  // namespace
+}  // namespace server
