@@ -18,15 +18,26 @@ std::int64_t SystemClock::utc_us() const {
   return std::chrono::duration_cast<microseconds>(now).count();
 }
 
-asio::awaitable<void> SystemClock::sleep_until(std::int64_t deadline_us) {
+asio::awaitable<void> SystemClock::sleep_until(std::int64_t deadline_us, Alarm* alarm) {
   asio::steady_timer timer{loop_, std::chrono::steady_clock::time_point{microseconds{deadline_us}}};
-  co_await timer.async_wait(asio::use_awaitable);
+  if (alarm == nullptr) {
+    co_await timer.async_wait(asio::use_awaitable);
+    co_return;
+  }
+  if (alarm->has_rung_) co_return;
+  alarm->timer_ = &timer;
+  boost::system::error_code error;
+  co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, error));
+  alarm->timer_ = nullptr;
+  if (error && !alarm->has_rung_) throw boost::system::system_error{asio::error::operation_aborted};
 }
 
 void Signal::notify() {
   ++notifications_;
   remembered_ = true;
   timer_.cancel();
+  if (alarms_ == nullptr) return;
+  for (Clock::Alarm* alarm : *alarms_) alarm->ring();
 }
 
 asio::awaitable<void> Signal::wait() {
@@ -38,6 +49,25 @@ asio::awaitable<void> Signal::wait() {
     if (cancelled != asio::cancellation_type::none) throw boost::system::system_error{asio::error::operation_aborted};
   }
   remembered_ = false;
+}
+
+asio::awaitable<bool> Signal::wait_until(Clock& clock, std::int64_t deadline_us) {
+  if (!remembered_) {
+    const std::uint64_t before = notifications_;
+    Clock::Alarm alarm;
+    struct Entry {  // leaves the list also when the coroutine is cancelled, or destroyed after the signal
+      std::shared_ptr<std::vector<Clock::Alarm*>> list;
+      Clock::Alarm* alarm;
+      ~Entry() { std::erase(*list, alarm); }
+    };
+    if (alarms_ == nullptr) alarms_ = std::make_shared<std::vector<Clock::Alarm*>>();
+    alarms_->push_back(&alarm);
+    const Entry entry{alarms_, &alarm};
+    co_await clock.sleep_until(deadline_us, &alarm);
+    if (!remembered_ && notifications_ == before) co_return false;
+  }
+  remembered_ = false;
+  co_return true;
 }
 
 }  // namespace server

@@ -9,6 +9,8 @@
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <cstdint>
+#include <memory>
+#include <vector>
 
 namespace server {
 
@@ -24,8 +26,25 @@ class Clock {
   virtual std::int64_t steady_us() const = 0;  // since an arbitrary start, never goes back
   virtual std::int64_t utc_us() const = 0;     // since 1970, may step
 
-  // Returns when steady_us() has reached the deadline. Throws operation_aborted when cancelled.
-  virtual boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us) = 0;
+  // What ends a sleep early; of one sleeper.
+  class Alarm {
+   public:
+    void ring() {
+      has_rung_ = true;
+      if (timer_ != nullptr) timer_->cancel();
+    }
+
+   private:
+    friend class SystemClock;
+    friend class VirtualClock;
+    bool has_rung_ = false;
+    boost::asio::steady_timer* timer_ = nullptr;  // while somebody sleeps
+  };
+
+  // Returns when steady_us() has reached the deadline, or when the alarm has rung. Throws operation_aborted when
+  // cancelled.
+  boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us) { return sleep_until(deadline_us, nullptr); }
+  virtual boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us, Alarm* alarm) = 0;
 
   boost::asio::awaitable<void> sleep_for(microseconds duration) { return sleep_until(steady_us() + duration.count()); }
 };
@@ -37,7 +56,8 @@ class SystemClock final : public Clock {
 
   std::int64_t steady_us() const override;
   std::int64_t utc_us() const override;
-  boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us) override;
+  using Clock::sleep_until;
+  boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us, Alarm* alarm) override;
 
  private:
   boost::asio::io_context& loop_;
@@ -51,9 +71,13 @@ class Signal {
 
   void notify();
   boost::asio::awaitable<void> wait();  // throws operation_aborted when cancelled
+  // The same until the clock's deadline at most; true when it was notified. It wakes in one step of the loop, where
+  // `wait() || sleep` takes several.
+  boost::asio::awaitable<bool> wait_until(Clock& clock, std::int64_t deadline_us);
 
  private:
   boost::asio::steady_timer timer_;
+  std::shared_ptr<std::vector<Clock::Alarm*>> alarms_;  // of those who wait until a deadline, and shared with them
   std::uint64_t notifications_ = 0;
   bool remembered_ = false;  // a notification that nobody has taken yet
 };

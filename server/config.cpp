@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -20,9 +22,9 @@ namespace {
 // Takes values out of a parsed file; what is left at the end is a key that nobody knows.
 class ConfigFile {
  public:
-  explicit ConfigFile(const std::filesystem::path& path) : path_{path.string()} {
+  ConfigFile(const std::string& text, std::string name) : path_{std::move(name)} {
     try {
-      table_ = toml::parse_file(path_);
+      table_ = toml::parse(text, path_);
     } catch (const toml::parse_error& error) {
       throw std::invalid_argument{
           fmt::format("{}:{}: {}", path_, error.source().begin.line, std::string{error.description()})};
@@ -75,22 +77,47 @@ class ConfigFile {
         throw std::invalid_argument{
             fmt::format("{}:{}: '{}' stands outside a section", path_, content.source().begin.line, section_name)};
       }
-      for (const auto& [key, value] : *content.as_table()) {
-        const std::string name = fmt::format("{}.{}", section_name, std::string{key.str()});
-        if (known_.contains(name)) continue;
-        throw std::invalid_argument{fmt::format("{}:{}: unknown option '{}'; known are {}", path_,
-                                                value.source().begin.line, name, fmt::join(known_, ", "))};
-      }
+      refuse_unknown_keys(section_name, *content.as_table());
     }
+  }
+
+  // Names of the tables in a section, as [section.name] makes them.
+  std::vector<std::string> tables_in(const char* section) {
+    std::vector<std::string> names;
+    const toml::table* content = table_[section].as_table();
+    if (content == nullptr) return names;
+    for (const auto& [key, value] : *content) {
+      if (!value.is_table()) continue;
+      names.emplace_back(key.str());
+      known_tables_.insert(fmt::format("{}.{}", section, key.str()));
+    }
+    return names;
   }
 
   [[noreturn]] void fail(const toml::node& node, const char* section, const char* key, const std::string& why) const {
     throw std::invalid_argument{fmt::format("{}:{}: {}.{} {}", path_, node.source().begin.line, section, key, why)};
   }
 
-  const toml::node* find(const char* section, const char* key) const { return table_[section][key].node(); }
+  // `section` may be a table within a section: "limits.water".
+  const toml::node* find(const std::string& section, const char* key) const {
+    const auto dot = section.find('.');
+    if (dot == std::string::npos) return table_[section][key].node();
+    return table_[section.substr(0, dot)][section.substr(dot + 1)][key].node();
+  }
 
  private:
+  void refuse_unknown_keys(const std::string& section, const toml::table& content) const {
+    for (const auto& [key, value] : content) {
+      const std::string name = fmt::format("{}.{}", section, std::string{key.str()});
+      if (value.is_table() && known_tables_.contains(name)) {
+        refuse_unknown_keys(name, *value.as_table());
+      } else if (!known_.contains(name)) {
+        throw std::invalid_argument{fmt::format("{}:{}: unknown option '{}'; known are {}", path_,
+                                                value.source().begin.line, name, fmt::join(known_, ", "))};
+      }
+    }
+  }
+
   template <class T>
   static std::optional<T> exact(const toml::node& node) {
     if constexpr (std::is_same_v<T, double>) {
@@ -107,7 +134,7 @@ class ConfigFile {
 
   std::string path_;
   toml::table table_;
-  std::set<std::string> known_;
+  std::set<std::string> known_, known_tables_;
 };
 
 constexpr std::array kTlsModes{TlsMode::automatic, TlsMode::on, TlsMode::off};
@@ -125,21 +152,44 @@ void read_tls(ConfigFile& file, TlsConfig& tls) {
   file.take("tls", "insecure", tls.insecure);
 }
 
+void read_limits(ConfigFile& file, const std::string& section, CommandLimits& limits) {
+  const char* name = section.c_str();
+  file.take_number(name, "setpoint_min_m", -100, 100, limits.setpoint_min_m);
+  file.take_number(name, "setpoint_max_m", -100, 100, limits.setpoint_max_m);
+  file.take_number(name, "setpoint_step_m", 0, 200, limits.setpoint_step_m);
+  file.take_number(name, "duty_min", -1, 0, limits.duty_min);
+  file.take_number(name, "duty_max", 0, 1, limits.duty_max);
+  file.take_number(name, "power_duty", 0, 1, limits.power_duty);
+  file.take_number(name, "power_s", 0, 3600, limits.power_s);
+  file.take_number(name, "disturbance_max_m", 0, 100, limits.disturbance_max_m);
+  if (limits.setpoint_min_m < limits.setpoint_max_m) return;
+  throw std::invalid_argument{fmt::format("{0}.setpoint_min_m = {1} must be below {0}.setpoint_max_m = {2}", section,
+                                          limits.setpoint_min_m, limits.setpoint_max_m)};
+}
+
+void read_places(ConfigFile& file, const char* section, PortPlaces& places) {
+  file.take_count(section, "max_connections", 16, 32'768, places.connections);
+  file.take_count(section, "max_connections_per_address", 1, 32'768, places.of_address);
+}
+
 void read(ConfigFile& file, Config& config) {
   std::string data_dir;
   if (file.take("data", "dir", data_dir)) config.data_dir = data_dir;
   if (file.take("http", "listen", config.http)) config.http_or_any_port = false;
   file.take_texts("http", "hosts", config.http_hosts);
+  read_places(file, "http", config.http_places);
   if (file.take("robots", "listen", config.robots)) config.robots_or_any_port = false;
   file.take("robots", "enrol_on_loopback", config.enrol_on_loopback);
+  read_places(file, "robots", config.robot_places);
   file.take_count("robots", "link_timeout_ms", 200, 5000, config.link.link_timeout_ms);
   file.take_count("robots", "heartbeat_interval_ms", 50, 2500, config.link.heartbeat_interval_ms);
   file.take_count("robots", "samples_per_frame", 0, protocol::kMaxSamplesPerFrame, config.link.samples_per_frame);
-  file.take_number("limits", "setpoint_min_m", -100, 100, config.limits.setpoint_min_m);
-  file.take_number("limits", "setpoint_max_m", -100, 100, config.limits.setpoint_max_m);
-  file.take_number("limits", "duty_min", -1, 0, config.limits.duty_min);
-  file.take_number("limits", "duty_max", 0, 1, config.limits.duty_max);
-  file.take_number("limits", "disturbance_max_m", 0, 100, config.limits.disturbance_max_m);
+  read_limits(file, "limits", config.envelope.anywhere);
+  for (const std::string& fluid : file.tables_in("limits")) {
+    CommandLimits& own = config.envelope.of_fluid[fluid];
+    own = config.envelope.anywhere;  // what it does not say
+    read_limits(file, "limits." + fluid, own);
+  }
   RecordingConfig& recording = config.recording;
   file.take_count("recording", "retention_days", 0, 36'500, recording.retention_days);
   file.take_count("recording", "max_database_mb", 0, 100'000'000, recording.max_database_mb);
@@ -148,6 +198,7 @@ void read(ConfigFile& file, Config& config) {
   std::string backup_dir;
   if (file.take("recording", "backup_dir", backup_dir)) recording.backup_dir = backup_dir;
   read_tls(file, config.tls);
+  file.take("station", "real_time", config.real_time);
   if (file.take("log", "level", config.log_level)) {
     constexpr std::array kLevels{"trace", "debug", "info", "warn", "error"};
     if (std::ranges::find(kLevels, config.log_level) == kLevels.end()) {
@@ -181,10 +232,6 @@ void check(const Config& config) {
   parse_endpoint(config.http);
   parse_endpoint(config.robots);
   check_tls(config);
-  if (config.limits.setpoint_min_m >= config.limits.setpoint_max_m) {
-    throw std::invalid_argument{fmt::format("limits.setpoint_min_m = {} must be below limits.setpoint_max_m = {}",
-                                            config.limits.setpoint_min_m, config.limits.setpoint_max_m)};
-  }
   if (config.recording.critical_space_mb > config.recording.low_space_mb) {
     throw std::invalid_argument{
         fmt::format("recording.critical_space_mb = {} must be at most recording.low_space_mb = {}",
@@ -222,13 +269,24 @@ bool Config::is_exposed(const std::string& listen) const {
   return !speaks_tls(listen) && !parse_endpoint(listen).address().is_loopback();
 }
 
+Config parse_config(const std::string& text, const std::string& name) {
+  Config config;
+  ConfigFile file{text, name};
+  read(file, config);
+  check(config);
+  return config;
+}
+
 Config load_config(const ConfigFlags& flags) {
   Config config;
   if (flags.file) {
     if (!std::filesystem::is_regular_file(*flags.file)) {
       throw std::invalid_argument{fmt::format("config file '{}' does not exist", flags.file->string())};
     }
-    ConfigFile file{*flags.file};
+    std::ifstream in{*flags.file, std::ios::binary};
+    const std::string text{std::istreambuf_iterator<char>{in}, {}};
+    if (!in) throw std::invalid_argument{fmt::format("config file '{}' cannot be read", flags.file->string())};
+    ConfigFile file{text, flags.file->string()};
     read(file, config);
   }
   if (flags.data_dir) config.data_dir = *flags.data_dir;

@@ -39,23 +39,33 @@ struct TlsConfig {
   bool insecure = false;              // tls.insecure: plain TCP on an address that other machines reach
 };
 
+// How many may be connected to a port at once. From one address of this machine three quarters of all may come.
+struct PortPlaces {
+  std::uint32_t connections;  // .max_connections
+  std::uint32_t of_address;   // .max_connections_per_address, of another machine
+};
+
 struct Config {
   std::filesystem::path data_dir = "rheonaut-data";  // data.dir, --data: database, token, endpoints
 
   std::string http = "127.0.0.1:8080";  // http.listen, --http
   bool http_or_any_port = true;         // only while the default stands: a taken port is replaced by a free one
   std::vector<std::string> http_hosts;  // http.hosts: further names by which pages may address the station
+  PortPlaces http_places{256, 64};      // http.max_connections, .max_connections_per_address
 
   std::string robots = "127.0.0.1:7070";  // robots.listen, --robots
   bool robots_or_any_port = true;         // as above
-  bool enrol_on_loopback = true;  // robots.enrol_on_loopback: accept a new robot that dials in from this machine
-  LinkTimes link;                 // robots.link_timeout_ms, .heartbeat_interval_ms, .samples_per_frame
+  bool enrol_on_loopback = true;        // robots.enrol_on_loopback: accept a new robot that dials in from this machine
+  PortPlaces robot_places{8192, 1024};  // robots.max_connections, .max_connections_per_address
+  LinkTimes link;                       // robots.link_timeout_ms, .heartbeat_interval_ms, .samples_per_frame
 
-  CommandLimits limits;  // limits.setpoint_min_m, .setpoint_max_m, .duty_min, .duty_max, …
+  Envelope envelope;  // limits.setpoint_min_m, .setpoint_max_m, …; of a fluid: limits.FLUID.setpoint_min_m, …
 
   RecordingConfig recording;
 
   TlsConfig tls;
+
+  bool real_time = true;  // station.real_time: the loop asks for real-time priority
 
   std::string log_level = "info";  // log.level: trace, debug, info, warn, error
 
@@ -81,5 +91,8 @@ struct ConfigFlags {
 // Reads the file (if one is given), then applies the flags, then checks every value. Throws std::invalid_argument that
 // says file, line, key, value and what to do.
 Config load_config(const ConfigFlags& flags);
+
+// The same of a file's text alone; `name` is what errors call it.
+Config parse_config(const std::string& text, const std::string& name);
 
 }  // namespace server

@@ -1,6 +1,7 @@
 // Parses and prints endpoints.
 #include "server/endpoint.hpp"
 
+#include <algorithm>
 #include <boost/asio/ip/address.hpp>
 #include <charconv>
 #include <sstream>
@@ -32,6 +33,17 @@ std::string text(const tcp::endpoint& endpoint) {
   std::ostringstream out;
   out << endpoint;
   return out.str();
+}
+
+std::string host_of(const std::string& peer) { return peer.substr(0, peer.rfind(':')); }
+
+std::string network_of(const std::string& address) {
+  boost::system::error_code error;
+  const auto parsed = asio::ip::make_address(address, error);
+  if (error || !parsed.is_v6() || parsed.to_v6().is_v4_mapped()) return address;
+  auto bytes = parsed.to_v6().to_bytes();
+  std::fill(bytes.begin() + 8, bytes.end(), static_cast<unsigned char>(0));
+  return asio::ip::address_v6{bytes}.to_string();
 }
 
 }  // namespace server

@@ -1,6 +1,7 @@
 // Sets up spdlog.
 #include "server/log.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -11,5 +12,7 @@ void start_log(const std::string& level) {
   spdlog::set_level(spdlog::level::from_str(level));
   spdlog::set_pattern("%Y-%m-%d %H:%M:%S.%e  %^%-7l%$  %v");
 }
+
+std::string and_before(std::uint64_t unsaid) { return unsaid == 0 ? "" : fmt::format(" (and {} before)", unsaid); }
 
 }  // namespace server

@@ -31,7 +31,7 @@ static int serve(const Config& config) {
   TransportSecurity security{clock, config};  // of both ports
 
   // Centre: the only owner of live state, and the only door for commands.
-  Station station{loop, clock, config.limits, config.link};
+  Station station{loop, clock, config.envelope, config.link};
 
   // Out: they hear the station and never call it back; what has become durable comes back through one function.
   const RecorderOptions recorder_options{config.database(), config.enrol_on_loopback};
@@ -63,8 +63,8 @@ static int serve(const Config& config) {
   tasks.spawn("announcement", folder.announce(clock, {api.address(), options.robots_address, security.to_trust()}));
   spdlog::info("ready: page {}, robots {}, data {}", api.url(), options.robots_address, config.data_dir.string());
   api.print_login_url();
-  loop.run();         // returns when every task has ended
-  recording.close();  // every sample that was received is on disk
+  tasks.run(config.real_time);  // returns when every task has ended
+  recording.close();            // every sample that was received is on disk
   spdlog::info("stopped");
   return tasks.exit_code();
 }

@@ -4,15 +4,26 @@
 #include <nlohmann/json.hpp>
 
 namespace server {
+namespace {
+
+nlohmann::json json_of(const CommandLimits& limits) {
+  return {{"setpoint_min_m", limits.setpoint_min_m},
+          {"setpoint_max_m", limits.setpoint_max_m},
+          {"setpoint_step_m", limits.setpoint_step_m},
+          {"duty_min", limits.duty_min},
+          {"duty_max", limits.duty_max},
+          {"power_duty", limits.power_duty},
+          {"power_s", limits.power_s},
+          {"disturbance_max_m", limits.disturbance_max_m}};
+}
+
+}  // namespace
 
 std::string station_document(const Config& config) {
   nlohmann::json out;
   out["version"] = RHEONAUT_VERSION;
-  out["limits"] = {{"setpoint_min_m", config.limits.setpoint_min_m},
-                   {"setpoint_max_m", config.limits.setpoint_max_m},
-                   {"duty_min", config.limits.duty_min},
-                   {"duty_max", config.limits.duty_max},
-                   {"disturbance_max_m", config.limits.disturbance_max_m}};
+  out["limits"] = json_of(config.envelope.anywhere);
+  for (const auto& [fluid, limits] : config.envelope.of_fluid) out["limits_of_fluid"][fluid] = json_of(limits);
   out["robots"] = {{"link_timeout_ms", config.link.link_timeout_ms},
                    {"heartbeat_interval_ms", config.link.heartbeat_interval_ms},
                    {"samples_per_frame", config.link.samples_per_frame}};

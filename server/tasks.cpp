@@ -1,6 +1,7 @@
 // Starts, names and stops the station's coroutines.
 #include "server/tasks.hpp"
 
+#include <sched.h>
 #include <spdlog/spdlog.h>
 
 #include <boost/asio/bind_cancellation_slot.hpp>
@@ -38,6 +39,18 @@ void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
     ended(name, failure);
   };
   asio::co_spawn(loop_, std::move(task), asio::bind_cancellation_slot(signal->slot(), std::move(on_end)));
+}
+
+void TaskGroup::run(bool in_real_time) {
+  if (in_real_time) {
+    sched_param lowest{};
+    lowest.sched_priority = sched_get_priority_min(SCHED_RR);
+    // What it starts, a tool of a shell say, is ordinary again.
+    const bool is_granted = sched_setscheduler(0, SCHED_RR | SCHED_RESET_ON_FORK, &lowest) == 0;
+    spdlog::info("the loop runs {}",
+                 is_granted ? "with real-time priority" : "without real-time priority: the system does not permit it");
+  }
+  loop_.run();
 }
 
 void TaskGroup::ended(const std::string& name, std::exception_ptr failure) {

@@ -216,6 +216,19 @@ def check_threads(source):
         yield source.line_of(match.start()), "no threads or locks here: send a job to a WorkerThread"
 
 
+SECRET = r"(?!\w*password_hash\b)\w*(?:secret|token|hash)"
+COMPARED_SECRETS = re.compile(rf"\b(?:mem|str)cmp\s*\(|\b{SECRET}\s*[!=]=(?!\s*nullptr)|"
+                              rf"[!=]=\s*(?:\w+(?:\.|->|::))*{SECRET}\b(?!\s*[.(>-])")
+
+
+def check_secrets(source):
+    """secret: secrets and their hashes are compared in constant time."""
+    if not source.is_cpp or source.parts[0] != "server" or source.name == "server/secrets.cpp":
+        return
+    for match in COMPARED_SECRETS.finditer(source.code):
+        yield source.line_of(match.start()), "compare with same() or find_secret() of server/secrets.hpp"
+
+
 def check_size(source):
     """size: files stay readable in one sitting."""
     count = len(source.lines)
@@ -280,7 +293,7 @@ def check_first_line(source):
         yield 1, "the opening comment is not a sentence"
 
 
-RULES = (check_includes, check_links, check_co_await, check_tasks, check_clock, check_threads, check_size, check_names,
+RULES = (check_includes, check_links, check_co_await, check_tasks, check_clock, check_threads, check_secrets, check_size, check_names,
          check_text, check_first_line)
 
 

@@ -5,13 +5,11 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <boost/asio/experimental/awaitable_operators.hpp>
 
 #include "server/recording/database.hpp"
 
 namespace server {
 namespace asio = boost::asio;
-using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
 
 namespace {
 
@@ -19,6 +17,10 @@ constexpr microseconds kSweepInterval{std::chrono::minutes{1}};
 constexpr microseconds kRetryInterval{std::chrono::seconds{5}};
 constexpr std::int64_t kUseSaveInterval = 60'000'000;
 constexpr std::int64_t kDayUs = 86'400'000'000;
+
+std::string actor_of(const std::string& user, std::uint64_t session) {
+  return user.empty() ? fmt::format("session:{}", session) : fmt::format("user:{}/session:{}", user, session);
+}
 
 // What was taken away stays away while the station runs, but the disk does not know it.
 Error not_stored(Error error) {
@@ -55,8 +57,8 @@ asio::awaitable<std::invoke_result_t<Job, AccountStore&>> Accounts::on_store(Job
       AccountStore store{database.handle()};
       return job(store);
     } catch (const SQLite::Exception& error) {
-      return fail(ErrorCode::unavailable, fmt::format("the station's disk cannot store it now: {}", error.what()),
-                  "not_stored");
+      spdlog::error("accounts: {}", error.what());
+      return fail(ErrorCode::unavailable, "the station's disk cannot store it now; its log says why", "not_stored");
     }
   };
   co_return co_await recorder_.on_disk(std::move(guarded));
@@ -69,7 +71,7 @@ asio::awaitable<void> Accounts::run() {
     const bool saved = !to_save || co_await save();
     if (saved && sessions_.revision() + token_uses_ != saved_revision_) continue;  // changed meanwhile
     if (saved) {
-      co_await (clock_.sleep_for(kSweepInterval) || changed_.wait());
+      co_await changed_.wait_until(clock_, clock_.steady_us() + kSweepInterval.count());
     } else {
       co_await clock_.sleep_for(kRetryInterval);
     }
@@ -110,7 +112,7 @@ Caller Accounts::caller(std::string actor, const std::string& user, Scopes scope
     const User* known = find_user(user);
     scopes = known != nullptr && !known->disabled ? scopes & Scopes::of(known->role) : Scopes{};
   }
-  return {std::move(actor), user, scopes, 0, std::move(standing)};
+  return {std::move(actor), user, scopes, 0, std::move(standing), {}};
 }
 
 std::optional<Caller> Accounts::caller_of_token(const std::string& secret) {
@@ -132,24 +134,42 @@ std::optional<Caller> Accounts::caller_of_session(const std::string& secret) {
   const Sessions::Open* session = sessions_.find(secret);
   if (sessions_.revision() != revision) changed_.notify();
   if (session == nullptr) return std::nullopt;
-  const std::string number = "session:" + std::to_string(session->number);
-  const std::string actor = session->user.empty() ? number : "user:" + session->user + "/" + number;
-  Caller found = caller(actor, session->user, Scopes::of(Role::admin), session->standing);
+  Caller found =
+      caller(actor_of(session->user, session->number), session->user, Scopes::of(Role::admin), session->standing);
   if (found.scopes.empty()) return std::nullopt;
   found.session = session->number;
   return found;
 }
 
 std::string Accounts::open_session(const std::string& user, const std::string& peer, const std::string& agent) {
+  const std::uint64_t number = sessions_.next_number();
   std::string secret = sessions_.add(user, peer, agent);
   changed_.notify();
+  note({actor_of(user, number), peer, clock_.utc_us()}, "account.signed_in", user, "{}", true);
   return secret;
 }
 
-bool Accounts::end_session(std::uint64_t number) {
+bool Accounts::end_session(std::uint64_t number, const Author& by) {
   const bool ended = sessions_.end(number);
   changed_.notify();
+  if (ended) note(by, "account.session_ended", std::to_string(number), "{}", false);
   return ended;
+}
+
+void Accounts::on_refused_sign_in(const std::string& user, const std::string& peer, const char* reason) {
+  const std::string known = find_user(user) == nullptr ? "" : user;
+  note({"", peer, clock_.utc_us()}, "account.sign_in_refused", known, fmt::format(R"({{"reason":"{}"}})", reason),
+       true);
+}
+
+void Accounts::note(Author by, const char* action, std::string subject, std::string detail, bool can_flood) {
+  AuditNote note;
+  note.by = std::move(by);
+  note.action = action;
+  note.subject = std::move(subject);
+  note.detail = std::move(detail);
+  note.can_flood = can_flood;
+  recorder_.on_audit(note);
 }
 
 const User* Accounts::find_user(const std::string& name) const {
@@ -157,9 +177,10 @@ const User* Accounts::find_user(const std::string& name) const {
   return user == users_.end() ? nullptr : &user->second;
 }
 
-asio::awaitable<Result<User>> Accounts::add_user(User user) {
-  user.made_at_us = clock_.utc_us();
-  auto job = [user](AccountStore& store) { return store.add_user(user); };
+asio::awaitable<Result<User>> Accounts::add_user(User user, Author by) {
+  user.made_at_us = by.at_us;
+  user.made_by = by.actor;
+  auto job = [user, by](AccountStore& store) { return store.add_user(user, by); };
   const auto added = co_await on_store(std::move(job));
   if (!added) co_return std::unexpected{added.error()};
   users_.insert_or_assign(user.name, user);
@@ -175,7 +196,7 @@ void Accounts::renew_standing(const std::string& user) {
   }
 }
 
-asio::awaitable<Result<User>> Accounts::change_user(std::string name, UserChange change) {
+asio::awaitable<Result<User>> Accounts::change_user(std::string name, UserChange change, Author by) {
   const auto known = users_.find(name);
   const bool ends_sessions = change.password_hash.has_value() || change.disabled.value_or(false);
   const bool takes_rights =
@@ -186,7 +207,7 @@ asio::awaitable<Result<User>> Accounts::change_user(std::string name, UserChange
     renew_standing(name);
     if (known->second.disabled) sessions_.end_of_user(name);
   }
-  auto job = [name, change](AccountStore& store) { return store.change_user(name, change); };
+  auto job = [name, change, by](AccountStore& store) { return store.change_user(name, change, by); };
   auto changed = co_await on_store(std::move(job));
   if (!changed) co_return std::unexpected{takes_rights ? not_stored(changed.error()) : changed.error()};
   users_.insert_or_assign(name, *changed);
@@ -196,15 +217,14 @@ asio::awaitable<Result<User>> Accounts::change_user(std::string name, UserChange
   co_return changed;
 }
 
-asio::awaitable<Result<void>> Accounts::remove_user(std::string name) {
-  const std::int64_t now_us = clock_.utc_us();
+asio::awaitable<Result<void>> Accounts::remove_user(std::string name, Author by) {
   users_.erase(name);
   sessions_.end_of_user(name);
   for (Token& token : tokens_) {
-    if (token.owner == name) end_token(token, now_us);
+    if (token.owner == name) end_token(token, by.at_us);
   }
   changed_.notify();
-  auto job = [name, now_us](AccountStore& store) { return store.remove_user(name, now_us); };
+  auto job = [name, by](AccountStore& store) { return store.remove_user(name, by); };
   const auto removed = co_await on_store(std::move(job));
   if (!removed) co_return std::unexpected{not_stored(removed.error())};
   co_return Result<void>{};
@@ -212,16 +232,16 @@ asio::awaitable<Result<void>> Accounts::remove_user(std::string name) {
 
 std::vector<ApiToken> Accounts::tokens() const { return {tokens_.begin(), tokens_.end()}; }
 
-asio::awaitable<Result<NewToken>> Accounts::add_token(TokenWish wish) {
+asio::awaitable<Result<NewToken>> Accounts::add_token(TokenWish wish, Author by) {
   NewToken made;
   made.secret = random_secret();
   made.token.name = wish.name;
   made.token.hash = hash_of(made.secret);
   made.token.scopes = wish.scopes;
   made.token.owner = wish.owner;
-  made.token.made_at_us = clock_.utc_us();
+  made.token.made_at_us = by.at_us;
   made.token.expires_at_us = wish.days == 0 ? 0 : made.token.made_at_us + wish.days * kDayUs;
-  auto job = [token = made.token](AccountStore& store) { return store.add_token(token); };
+  auto job = [token = made.token, by](AccountStore& store) { return store.add_token(token, by); };
   const auto added = co_await on_store(std::move(job));
   if (!added) co_return std::unexpected{added.error()};
   tokens_.push_back({made.token, std::make_shared<Standing>(loop_)});
@@ -233,12 +253,11 @@ void Accounts::end_token(Token& token, std::int64_t utc_us) {
   token.standing->end();
 }
 
-asio::awaitable<Result<ApiToken>> Accounts::revoke_token(std::string name) {
-  const std::int64_t now_us = clock_.utc_us();
+asio::awaitable<Result<ApiToken>> Accounts::revoke_token(std::string name, Author by) {
   for (Token& token : tokens_) {
-    if (token.name == name) end_token(token, now_us);
+    if (token.name == name) end_token(token, by.at_us);
   }
-  auto job = [name, now_us](AccountStore& store) { return store.revoke_token(name, now_us); };
+  auto job = [name, by](AccountStore& store) { return store.revoke_token(name, by); };
   const auto revoked = co_await on_store(std::move(job));
   if (!revoked) co_return std::unexpected{not_stored(revoked.error())};
   co_return revoked;
@@ -249,11 +268,11 @@ asio::awaitable<Result<std::vector<Enrolment>>> Accounts::enrolments() {
   co_return co_await on_store(std::move(job));
 }
 
-asio::awaitable<Result<NewEnrolment>> Accounts::enrol(std::string robot_id, std::string actor) {
+asio::awaitable<Result<NewEnrolment>> Accounts::enrol(std::string robot_id, Author by) {
   NewEnrolment made;
   made.secret = random_secret();
-  auto job = [robot_id, actor, hash = hash_of(made.secret), now_us = clock_.utc_us()](AccountStore& store) {
-    return store.enrol(robot_id, hash, actor, now_us);
+  auto job = [robot_id, by, hash = hash_of(made.secret)](AccountStore& store) {
+    return store.enrol(robot_id, hash, by);
   };
   auto enrolled = co_await on_store(std::move(job));
   if (!enrolled) co_return std::unexpected{enrolled.error()};
@@ -262,11 +281,9 @@ asio::awaitable<Result<NewEnrolment>> Accounts::enrol(std::string robot_id, std:
   co_return made;
 }
 
-asio::awaitable<Result<Enrolment>> Accounts::revoke_robot(std::string robot_id, std::string actor) {
+asio::awaitable<Result<Enrolment>> Accounts::revoke_robot(std::string robot_id, Author by) {
   recorder_.set_revoked(robot_id, true);
-  auto job = [robot_id, actor, now_us = clock_.utc_us()](AccountStore& store) {
-    return store.revoke_robot(robot_id, actor, now_us);
-  };
+  auto job = [robot_id, by](AccountStore& store) { return store.revoke_robot(robot_id, by); };
   const auto revoked = co_await on_store(std::move(job));
   if (revoked) co_return revoked;
   if (revoked.error().code == ErrorCode::not_found) recorder_.set_revoked(robot_id, false);

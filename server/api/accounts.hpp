@@ -53,24 +53,26 @@ class Accounts {
 
   // The secret of a new session, for its cookie.
   std::string open_session(const std::string& user, const std::string& peer, const std::string& agent);
-  bool end_session(std::uint64_t number);
+  bool end_session(std::uint64_t number, const Author& by);
+  // Of a user that there is the audit tells the name; what else was typed may be a password.
+  void on_refused_sign_in(const std::string& user, const std::string& peer, const char* reason);
   const std::list<Sessions::Open>& sessions() const { return sessions_.all(); }
 
   const User* find_user(const std::string& name) const;  // null: there is none
   const std::map<std::string, User>& users() const { return users_; }
-  // unavailable: the disk cannot be written now. Else what AccountStore says.
-  boost::asio::awaitable<Result<User>> add_user(User user);
-  boost::asio::awaitable<Result<User>> change_user(std::string name, UserChange change);
-  boost::asio::awaitable<Result<void>> remove_user(std::string name);
+  // unavailable: the disk cannot be written now. Else what AccountStore says. `by.at_us` is when it is done.
+  boost::asio::awaitable<Result<User>> add_user(User user, Author by);
+  boost::asio::awaitable<Result<User>> change_user(std::string name, UserChange change, Author by);
+  boost::asio::awaitable<Result<void>> remove_user(std::string name, Author by);
 
   std::vector<ApiToken> tokens() const;
-  boost::asio::awaitable<Result<NewToken>> add_token(TokenWish wish);
-  boost::asio::awaitable<Result<ApiToken>> revoke_token(std::string name);
+  boost::asio::awaitable<Result<NewToken>> add_token(TokenWish wish, Author by);
+  boost::asio::awaitable<Result<ApiToken>> revoke_token(std::string name, Author by);
 
   boost::asio::awaitable<Result<std::vector<Enrolment>>> enrolments();
-  boost::asio::awaitable<Result<NewEnrolment>> enrol(std::string robot_id, std::string actor);
+  boost::asio::awaitable<Result<NewEnrolment>> enrol(std::string robot_id, Author by);
   // It is refused from now on; whoever calls ends its connection.
-  boost::asio::awaitable<Result<Enrolment>> revoke_robot(std::string robot_id, std::string actor);
+  boost::asio::awaitable<Result<Enrolment>> revoke_robot(std::string robot_id, Author by);
 
  private:
   struct Token : ApiToken {
@@ -84,6 +86,7 @@ class Accounts {
   void sweep();
   void end_token(Token& token, std::int64_t utc_us);
   void renew_standing(const std::string& user);
+  void note(Author by, const char* action, std::string subject, std::string detail, bool can_flood);
 
   boost::asio::io_context& loop_;
   Clock& clock_;

@@ -46,7 +46,7 @@ ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clo
       accounts_{loop, clock, recording.recorder, options.data_dir},
       auth_{loop, clock, accounts_, options.data_dir, options.store_id},
       logins_{clock, accounts_, options.password_cost},
-      guard_{auth_, host_names(options), options.security->http() != nullptr},
+      guard_{auth_, host_names(options), options.security->http().tls != nullptr},
       parts_{loop,
              tasks,
              clock,
@@ -59,7 +59,7 @@ ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clo
              logins_,
              facts_of(options, listener_, clock)},
       live_{loop, tasks, clock, station, live, options.version},
-      server_{tasks, clock, listener_, guard_, router_, live_, options.security->http()} {
+      server_{tasks, clock, listener_, options.security->http(), guard_, router_, live_} {
   add_routes(router_, parts_);
 }
 

@@ -61,15 +61,17 @@ std::string Auth::new_login_code() {
 
 std::optional<std::string> Auth::log_in(const std::string& code, const std::string& peer, const std::string& agent) {
   const Code* found = find_secret(codes_, hash_of(code));
-  if (found == nullptr) return std::nullopt;
-  const bool in_time = found->ends_at_us > clock_.steady_us();
+  const bool in_time = found != nullptr && found->ends_at_us > clock_.steady_us();
   codes_.remove_if([found](const Code& each) { return &each == found; });
-  if (!in_time) return std::nullopt;
+  if (!in_time) {
+    accounts_.on_refused_sign_in("", peer, "bad_link");
+    return std::nullopt;
+  }
   return accounts_.open_session("", peer, agent);
 }
 
 std::optional<Caller> Auth::caller_of_token(const std::string& token) const {
-  if (same(hash_of(token), token_)) return Caller{"token:local", "", Scopes::of(Role::admin), 0, token_standing_};
+  if (same(hash_of(token), token_)) return Caller{"token:local", "", Scopes::of(Role::admin), 0, token_standing_, {}};
   return accounts_.caller_of_token(token);
 }
 

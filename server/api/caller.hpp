@@ -36,6 +36,7 @@ struct Caller {
   Scopes scopes;              // what it may do
   std::uint64_t session = 0;  // of a page; 0: a token
   std::shared_ptr<Standing> standing;  // null: nobody
+  std::string peer;                    // the address that the connection comes from
 
   Role role() const { return scopes.role(); }
 };

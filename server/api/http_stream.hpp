@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "server/endpoint.hpp"
 #include "server/net/stream_socket.hpp"
 
 namespace server {
@@ -10,6 +11,6 @@ namespace server {
 using HttpStream = StreamSocket;
 
 // Of the client, without its port.
-inline std::string address_of(const HttpStream& stream) { return stream.peer().substr(0, stream.peer().rfind(':')); }
+inline std::string address_of(const HttpStream& stream) { return host_of(stream.peer()); }
 
 }  // namespace server

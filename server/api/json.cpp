@@ -30,6 +30,22 @@ std::unexpected<Error> missing(const char* name) {
   return fail(ErrorCode::bad_request, fmt::format("{} is missing", name), "missing_member");
 }
 
+// Outside of texts. What is nested deeper would be written and destroyed by recursion as deep.
+bool is_nested_too_deep(const std::string& text) {
+  int depth = 0;
+  bool in_text = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '"') in_text = !in_text;
+    if (in_text && c == '\\') ++i;
+    if (in_text) continue;
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (depth > kMaxJsonDepth) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 int http_status(ErrorCode code) {
@@ -50,6 +66,10 @@ int http_status(ErrorCode code) {
 }
 
 Result<Members> Members::parse(const std::string& text, std::initializer_list<const char*> known) {
+  if (is_nested_too_deep(text)) {
+    return fail(ErrorCode::bad_request, fmt::format("the body is nested deeper than {} levels", kMaxJsonDepth),
+                "malformed_json");
+  }
   json value = json::parse(text, nullptr, false);
   if (value.is_discarded()) {
     return fail(ErrorCode::bad_request, "the body is not valid JSON (JSON has no NaN and no Infinity)",

@@ -17,13 +17,15 @@
 
 namespace server {
 
+inline constexpr int kMaxJsonDepth = 16;  // of what is sent to the station; nothing that it knows needs more than 3
+
 // The one table from ErrorCode to HTTP status.
 int http_status(ErrorCode code);
 
 // The members of one JSON object, taken one by one.
 class Members {
  public:
-  // Errors when the text is not one JSON object, or has a member that is not in `known`.
+  // Errors when the text is not one JSON object, is nested too deep, or has a member that is not in `known`.
   static Result<Members> parse(const std::string& text, std::initializer_list<const char*> known);
   explicit Members(nlohmann::json object) : object_{std::move(object)} {}
 

@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <set>
+
 #include "server/api/contained.hpp"
 #include "server/api/emergency.hpp"
 #include "server/api/http.hpp"
@@ -23,7 +26,7 @@ asio::awaitable<void> stop_one(LiveParts& parts, StopRequest request) {
 }
 
 asio::awaitable<void> stop_all(LiveParts& parts, StopRequest request) {
-  co_await stop_all_robots(parts.loop, parts.tasks, parts.station, std::move(request));
+  co_await stop_all_robots(parts.station, std::move(request));
 }
 
 asio::awaitable<void> renew(LiveParts& parts, CommandRequest request) {
@@ -38,9 +41,10 @@ Result<RobotId> known_robot(const Members& message, const LiveParts& parts) {
   return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", *id), "unknown_robot");
 }
 
-Result<void> on_emergency_stop(const Members& message, const std::string& actor, LiveParts& parts) {
+Result<void> on_emergency_stop(const Members& message, const Caller& caller, LiveParts& parts) {
   StopRequest request;
-  request.actor = actor;
+  request.actor = caller.actor;
+  request.peer = caller.peer;
   request.received_us = parts.clock.steady_us();
   // SAFETY: a stop is obeyed also when the message carries members that nobody knows, or a key that is none.
   if (const auto key = message.text("key", 1, 64); key && is_command_key(*key)) request.key = *key;
@@ -56,16 +60,16 @@ Result<void> on_emergency_stop(const Members& message, const std::string& actor,
 }
 
 // With the latest stamp it keeps what the page controls.
-Result<void> on_keep_alive(const Members& message, const std::string& actor, LiveParts& parts) {
+Result<void> on_keep_alive(const Members& message, const Caller& caller, LiveParts& parts) {
   if (auto known = message.only({"type", "stamp_us"}); !known) return known;
   if (!message.has("stamp_us")) return {};
   const auto stamp_us = message.integer("stamp_us", 0, INT64_MAX);
   if (!stamp_us) return std::unexpected{stamp_us.error()};
-  parts.station.keep_control(actor, microseconds{parts.clock.steady_us() - *stamp_us});
+  parts.station.keep_control(caller.actor, microseconds{parts.clock.steady_us() - *stamp_us});
   return {};
 }
 
-Result<void> on_renew_lease(const Members& message, const std::string& actor, LiveParts& parts) {
+Result<void> on_renew_lease(const Members& message, const Caller& caller, LiveParts& parts) {
   if (auto known = message.only({"type", "robot_id", "stamp_us"}); !known) return known;
   const auto robot_id = known_robot(message, parts);
   if (!robot_id) return std::unexpected{robot_id.error()};
@@ -82,9 +86,22 @@ Result<void> on_renew_lease(const Members& message, const std::string& actor, Li
   request.robot_id = *robot_id;
   request.action = rheonaut_Command_init_zero;
   request.action.which_action = rheonaut_Command_renew_lease_tag;
-  request.actor = actor;
+  request.actor = caller.actor;
+  request.peer = caller.peer;
   request.life = kRenewalLife - microseconds{age_us};
   parts.tasks.spawn("lease renewal", contained("lease renewal", renew(parts, std::move(request))));
+  return {};
+}
+
+// A robot that is not known may come yet.
+Result<void> on_watch(const Members& message, Subscriber& page) {
+  if (auto known = message.only({"type", "robots"}); !known) return known;
+  const json robots = message.has("robots") ? message.object().at("robots") : json();
+  const auto is_id = [](const json& id) { return id.is_string() && id.get_ref<const std::string&>().size() <= 31; };
+  if (!robots.is_array() || robots.size() > kMaxWatched || !std::ranges::all_of(robots, is_id)) {
+    return fail(ErrorCode::invalid, fmt::format("robots must be at most {} robot ids", kMaxWatched), "malformed");
+  }
+  page.watch(robots.get<std::set<RobotId>>());
   return {};
 }
 
@@ -102,14 +119,15 @@ std::string welcome_message(const std::string& actor, const LiveParts& parts) {
   return dump(message);
 }
 
-Result<void> on_page_message(const std::string& text, const std::string& actor, LiveParts& parts) {
+Result<void> on_page_message(const std::string& text, const Caller& caller, Subscriber& page, LiveParts& parts) {
   const auto message = Members::parse(text, {});
   if (!message) return std::unexpected{message.error()};
   const auto type = message->text("type", 1, 40);
   if (!type) return std::unexpected{type.error()};
-  if (*type == "emergency_stop") return on_emergency_stop(*message, actor, parts);
-  if (*type == "renew_lease") return on_renew_lease(*message, actor, parts);
-  if (*type == "keep_alive") return on_keep_alive(*message, actor, parts);
+  if (*type == "emergency_stop") return on_emergency_stop(*message, caller, parts);
+  if (*type == "renew_lease") return on_renew_lease(*message, caller, parts);
+  if (*type == "keep_alive") return on_keep_alive(*message, caller, parts);
+  if (*type == "watch") return on_watch(*message, page);
   return fail(ErrorCode::invalid, fmt::format("unknown message type '{}'", *type), "unknown_type");
 }
 

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 
+#include "server/api/caller.hpp"
 #include "server/live/live_feed.hpp"
 #include "server/result.hpp"
 #include "server/station/station.hpp"
@@ -20,17 +22,19 @@ struct LiveParts {
   Station& station;
   LiveFeed& live;
   std::string version;
-  std::size_t renewals = 0;  // on their way
+  std::size_t renewals = 0;                       // on their way
+  std::map<std::string, std::size_t> pages = {};  // that are open, of each user, token or link
 };
 
 inline constexpr std::int64_t kMaxStampAgeUs = 400'000;
 inline constexpr std::size_t kMaxRenewals = 256;
+inline constexpr std::size_t kMaxWatched = 64;  // robots, of a page
 
 std::string welcome_message(const std::string& actor, const LiveParts& parts);
 
 // Acts on one message. Returns at once: a stop or a renewal goes on as a task, and what becomes of it is heard as
 // `command`. The error, if any, is for the page.
-Result<void> on_page_message(const std::string& text, const std::string& actor, LiveParts& parts);
+Result<void> on_page_message(const std::string& text, const Caller& caller, Subscriber& page, LiveParts& parts);
 
 std::string problem_message(const Error& error);
 

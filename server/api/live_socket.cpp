@@ -10,6 +10,9 @@
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
+#include <limits>
+
+#include "server/api/json.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -22,6 +25,10 @@ namespace {
 constexpr std::size_t kMaxMessageBytes = 4096;
 constexpr std::int64_t kPingAfterUs = 10'000'000;
 constexpr std::int64_t kSilenceUs = 30'000'000;
+constexpr std::int64_t kWritingUs = 30'000'000;  // of one message
+constexpr std::int64_t kSecondUs = 1'000'000;
+constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max() / 2;
+constexpr int kMaxMessagesASecond = 500;  // a page that drives a robot says some 20
 
 class LivePage {
  public:
@@ -55,7 +62,7 @@ class LivePage {
   Result<void> act_on(const std::string& text) {
     try {
       if (auto permitted = check_permission(text); !permitted) return permitted;
-      return on_page_message(text, caller_.actor, parts_);
+      return on_page_message(text, caller_, queue_, parts_);
     } catch (const std::exception& error) {
       spdlog::error("a message of {}: {}", caller_.actor, error.what());
       return fail(ErrorCode::internal, "the station could not act on this message; its log says why", "internal");
@@ -64,14 +71,14 @@ class LivePage {
 
   // SAFETY: a stop needs no more than to see the robot; of a type that is not known here, command is needed.
   Result<void> check_permission(const std::string& text) const {
-    const auto message = nlohmann::json::parse(text, nullptr, false);
-    const bool has_type = message.is_object() && message.contains("type") && message["type"].is_string();
-    if (!has_type) return {};  // refused for that
-    const auto type = message["type"].get<std::string>();
-    const Scope needed = type == "emergency_stop" ? Scope::stop : type == "keep_alive" ? Scope::read : Scope::command;
+    const auto message = Members::parse(text, {});
+    const auto type = message ? message->text("type", 0, kMaxMessageBytes) : std::unexpected{message.error()};
+    if (!type) return {};  // refused for that
+    const bool is_reading = *type == "keep_alive" || *type == "watch";
+    const Scope needed = *type == "emergency_stop" ? Scope::stop : is_reading ? Scope::read : Scope::command;
     if (caller_.scopes.allow(needed)) return {};
     return fail(ErrorCode::forbidden,
-                fmt::format("{} needs the role {}; {} has the role {}", type.substr(0, 40),
+                fmt::format("{} needs the role {}; {} has the role {}", type->substr(0, 40),
                             server::text(least_role(needed)), caller_.actor, server::text(caller_.role())),
                 "not_permitted");
   }
@@ -82,36 +89,56 @@ class LivePage {
       const auto [error, size] = co_await socket_.async_read(buffer, asio::as_tuple(asio::use_awaitable));
       if (error) co_return;
       heard_at_us_ = parts_.clock.steady_us();
+      if (is_too_talkative()) co_await parts_.clock.sleep_until(second_began_us_ + kSecondUs);
       const auto understood = act_on(beast::buffers_to_string(buffer.data()));
       buffer.clear();
       if (!understood) {
+        parts_.station.note_refusal({caller_.actor, caller_.peer, parts_.clock.utc_us()}, "", "command", "{}",
+                                    understood.error());
         queue_.push(std::make_shared<const std::string>(problem_message(understood.error())), true);
       }
     }
+  }
+
+  // Each of its messages may become a task: it is heard a bounded number of times a second, and its own wait for that.
+  bool is_too_talkative() {
+    if (heard_at_us_ - second_began_us_ >= kSecondUs) {
+      second_began_us_ = heard_at_us_;
+      heard_in_second_ = 0;
+    }
+    return ++heard_in_second_ > kMaxMessagesASecond;
   }
 
   asio::awaitable<void> write() {
     for (;;) {
       co_await queue_.wait();
       for (LiveText message = queue_.pop(); message != nullptr; message = queue_.pop()) {
+        writing_since_us_ = parts_.clock.steady_us();
         const auto [error, size] =
             co_await socket_.async_write(asio::buffer(*message), asio::as_tuple(asio::use_awaitable));
+        writing_since_us_ = kNever;
         if (error) co_return;
       }
       const std::int64_t now_us = parts_.clock.steady_us();
       if (now_us - std::max(heard_at_us_, pinged_at_us_) < kPingAfterUs) continue;
       pinged_at_us_ = now_us;
       const websocket::ping_data empty;
+      writing_since_us_ = now_us;
       const auto [error] = co_await socket_.async_ping(empty, asio::as_tuple(asio::use_awaitable));
+      writing_since_us_ = kNever;
       if (error) co_return;
     }
   }
 
+  // A page that says things and reads nothing is as good as gone, and would keep its queue for ever.
   asio::awaitable<void> watch() {
-    while (parts_.clock.steady_us() < heard_at_us_ + kSilenceUs) {
-      co_await parts_.clock.sleep_until(heard_at_us_ + kSilenceUs);
+    for (;;) {
+      const std::int64_t now_us = parts_.clock.steady_us();
+      if (now_us - heard_at_us_ >= kSilenceUs) break;
+      if (now_us >= writing_since_us_ + kWritingUs) break;
+      co_await parts_.clock.sleep_until(std::min(heard_at_us_ + kSilenceUs, now_us + kSecondUs));
     }
-    spdlog::info("the page of {} fell silent", caller_.actor);
+    spdlog::info("the page of {} fell silent, or does not read", caller_.actor);
   }
 
   websocket::stream<HttpStream> socket_;
@@ -120,6 +147,9 @@ class LivePage {
   Subscriber queue_;
   std::int64_t heard_at_us_ = 0;
   std::int64_t pinged_at_us_ = 0;
+  std::int64_t writing_since_us_ = kNever;
+  std::int64_t second_began_us_ = 0;
+  int heard_in_second_ = 0;
 };
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <sodium.h>
 
 #include <algorithm>
-#include <boost/asio/ip/address.hpp>
 #include <cstring>
 #include <stdexcept>
 
@@ -53,15 +52,6 @@ void LoginThrottle::on_success(const std::string& user, const std::string& addre
   Place& place = addresses_[place_of(network_of(address))];
   place.failures = std::max(0, place.failures - 1);
   if (place.failures < kFreeOfAddress) place.next_us = 0;
-}
-
-std::string network_of(const std::string& address) {
-  boost::system::error_code error;
-  const auto parsed = boost::asio::ip::make_address(address, error);
-  if (error || !parsed.is_v6() || parsed.to_v6().is_v4_mapped()) return address;
-  auto bytes = parsed.to_v6().to_bytes();
-  std::fill(bytes.begin() + 8, bytes.end(), static_cast<unsigned char>(0));
-  return boost::asio::ip::address_v6{bytes}.to_string();
 }
 
 }  // namespace server

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "server/clock.hpp"
+#include "server/endpoint.hpp"
 
 namespace server {
 
@@ -53,8 +54,5 @@ class LoginThrottle {
   Places users_ = Places(kPlaces);
   Places addresses_ = Places(kPlaces);
 };
-
-// What counts as one address: an IPv6 network of 64 bits belongs to one customer.
-std::string network_of(const std::string& address);
 
 }  // namespace server

@@ -40,6 +40,7 @@ class Waiting {
 asio::awaitable<std::expected<std::string, LoginRefusal>> Logins::log_in(LoginAttempt attempt) {
   const microseconds wait = throttle_.wait(attempt.user, attempt.peer, clock_.steady_us());
   if (wait.count() > 0) {
+    accounts_.on_refused_sign_in(attempt.user, attempt.peer, "throttled");
     co_return refuse(ErrorCode::unavailable, "too many attempts have failed; wait before the next one", "throttled",
                      wait);
   }
@@ -55,6 +56,7 @@ asio::awaitable<std::expected<std::string, LoginRefusal>> Logins::log_in(LoginAt
   const bool right = co_await is_right(attempt);
   if (!right) {
     spdlog::warn("a sign-in from {} failed", attempt.peer);
+    accounts_.on_refused_sign_in(attempt.user, attempt.peer, "wrong_credentials");
     co_return refuse(ErrorCode::unauthorized, "the user or the password is wrong", "wrong_credentials",
                      microseconds{0});
   }

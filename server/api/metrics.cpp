@@ -50,7 +50,15 @@ class Metrics {
   std::string text_;
 };
 
+void add_door(Metrics& metrics, const std::string& port, const Door& door) {
+  metrics.gauge(port + "_connections", door.connections(), "Open now.");
+  metrics.counter(port + "_connections_refused_total", door.counters().refused, "No place was left for them.");
+  metrics.counter(port + "_connections_replaced_total", door.counters().replaced, "They gave way to others.");
+}
+
 void add_security(Metrics& metrics, const TransportSecurity& security) {
+  add_door(metrics, "http", security.http().door);
+  add_door(metrics, "robot", security.robots().door);
   metrics.gauge("exposed", security.is_exposed() ? 1 : 0, "1 while a port speaks plain TCP beyond this machine.");
   const TlsGate* gate = security.gate();
   if (gate == nullptr) return;

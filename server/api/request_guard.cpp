@@ -32,20 +32,6 @@ bool changes_something(const Request& request) {
   return request.method != "GET" && request.method != "HEAD" && request.method != "OPTIONS";
 }
 
-// The value of a cookie in "a=1; b=2".
-std::string cookie(const std::string& header, const std::string& name) {
-  std::size_t begin = 0;
-  while (begin < header.size()) {
-    const auto end = std::min(header.find(';', begin), header.size());
-    const auto first = header.find_first_not_of(' ', begin);
-    if (first < end && header.compare(first, name.size() + 1, name + "=") == 0) {
-      return header.substr(first + name.size() + 1, end - first - name.size() - 1);
-    }
-    begin = end + 1;
-  }
-  return {};
-}
-
 std::unexpected<Response> refuse(int status, const char* detail, const char* reason) {
   Response response = problem(status, detail, reason);
   if (status == 401) response.headers.emplace_back("WWW-Authenticate", "Bearer");
@@ -63,6 +49,19 @@ std::unexpected<Response> refuse_body() {
 }
 
 }  // namespace
+
+std::string cookie_value(const std::string& header, const std::string& name) {
+  std::size_t begin = 0;
+  while (begin < header.size()) {
+    const auto end = std::min(header.find(';', begin), header.size());
+    const auto first = header.find_first_not_of(' ', begin);
+    if (first < end && header.compare(first, name.size() + 1, name + "=") == 0) {
+      return header.substr(first + name.size() + 1, end - first - name.size() - 1);
+    }
+    begin = end + 1;
+  }
+  return {};
+}
 
 RequestGuard::RequestGuard(Auth& auth, std::vector<std::string> hosts, bool is_secure)
     : auth_{auth}, hosts_{std::move(hosts)}, scheme_{is_secure ? "https://" : "http://"} {
@@ -86,8 +85,8 @@ std::optional<RequestGuard::Credential> RequestGuard::credential_of(const Reques
     return caller ? std::optional{Credential{std::move(*caller), false}} : std::nullopt;
   }
   const std::string cookies = request.header("cookie");
-  auto caller = auth_.caller_of_session(cookie(cookies, auth_.cookie_name()));
-  if (!caller) caller = auth_.caller_of_session(cookie(cookies, kOldSessionCookie));
+  auto caller = auth_.caller_of_session(cookie_value(cookies, auth_.cookie_name()));
+  if (!caller) caller = auth_.caller_of_session(cookie_value(cookies, kOldSessionCookie));
   return caller ? std::optional{Credential{std::move(*caller), true}} : std::nullopt;
 }
 

@@ -39,4 +39,7 @@ class RequestGuard {
   const char* scheme_;
 };
 
+// Of the first cookie of this name in "a=1; b=2"; empty when there is none.
+std::string cookie_value(const std::string& header, const std::string& name);
+
 }  // namespace server

@@ -130,7 +130,10 @@ Answer Router::dispatch(Request request) const {
       allowed += (allowed.empty() ? "" : ", ") + route.method + (route.method == "GET" ? ", HEAD" : "");
       continue;
     }
-    if (!request.caller.scopes.allow(route.needs)) co_return not_permitted(request.caller, route.needs);
+    if (!request.caller.scopes.allow(route.needs)) {
+      if (on_refused_) on_refused_(request, route.needs);
+      co_return not_permitted(request.caller, route.needs);
+    }
     for (std::size_t i = 0; i < path->size(); ++i) {
       const std::string& name = entry.segments[i];
       if (is_parameter(name)) request.param[name.substr(1, name.size() - 2)] = (*path)[i];

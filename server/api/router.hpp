@@ -30,6 +30,8 @@ struct Route {
 class Router {
  public:
   void add(Route route);
+  // Hears of whoever is refused because of what they may not do.
+  void set_on_refused(std::function<void(const Request&, Scope)> on_refused) { on_refused_ = std::move(on_refused); }
   void set_fallback(std::function<Response(const Request&)> fallback) { fallback_ = std::move(fallback); }
 
   // A coroutine that throws passes its exception on.
@@ -45,6 +47,7 @@ class Router {
 
   std::vector<Route> routes_;
   std::vector<Entry> entries_;
+  std::function<void(const Request&, Scope)> on_refused_;
   std::function<Response(const Request&)> fallback_;
 };
 

@@ -1,5 +1,5 @@
 // All routes of the API, grouped by noun: routes_station, routes_recording, routes_robots, routes_runs, routes_markers,
-// routes_samples, routes_overview, routes_exports, routes_accounts.
+// routes_samples, routes_overview, routes_exports, routes_accounts, routes_audit.
 //
 // Held to openapi.yaml both ways by a test. Each answer is a coroutine that can be called without a server.
 #pragma once
@@ -28,7 +28,7 @@ struct StationFacts {
   std::string robots_address;
   std::int64_t started_at_us = 0;         // steady
   TransportSecurity* security = nullptr;  // never null
-  bool is_secure() const { return security->http() != nullptr; }
+  bool is_secure() const { return security->http().tls != nullptr; }
 };
 
 // What the routes work with; everything outlives the router.
@@ -55,6 +55,7 @@ void add_sample_routes(Router& router, ApiParts& parts);
 void add_overview_routes(Router& router, ApiParts& parts);
 void add_export_routes(Router& router, ApiParts& parts);
 void add_account_routes(Router& router, ApiParts& parts);
+void add_audit_routes(Router& router, ApiParts& parts);
 
 // Everything above, and the cockpit as fallback.
 void add_routes(Router& router, ApiParts& parts);
@@ -62,6 +63,11 @@ void add_routes(Router& router, ApiParts& parts);
 std::string base_url(const StationFacts& facts, const std::string& address);  // "https://127.0.0.1:8080"
 std::string login_url(const std::string& base_url, const std::string& code);
 Result<RunId> run_id_of(const Request& request);
+
+// Who asks, and now.
+inline Author author_of(const Request& request, const Clock& clock) {
+  return {request.actor, request.peer, clock.utc_us()};
+}
 
 inline constexpr std::int64_t kDefaultLimit = 100;
 inline constexpr std::int64_t kMaxLimit = 1000;

@@ -48,7 +48,7 @@ Answer log_out(ApiParts& parts, Request request) {
   if (request.caller.session == 0) {
     co_return problem(409, "a token has no session; revoke the token instead", "no_session");
   }
-  parts.accounts.end_session(request.caller.session);
+  parts.accounts.end_session(request.caller.session, author_of(request, parts.clock));
   Response response = json_response(200, json::object());
   response.headers.emplace_back("Set-Cookie", parts.auth.cookie("", parts.facts.is_secure()));
   co_return response;
@@ -85,8 +85,7 @@ Answer add_user(ApiParts& parts, Request request) {
   user.name = *name;
   user.role = *role;
   user.password_hash = std::move(*hash);
-  user.made_by = request.actor;
-  const auto added = co_await parts.accounts.add_user(std::move(user));
+  const auto added = co_await parts.accounts.add_user(std::move(user), author_of(request, parts.clock));
   if (!added) co_return problem(added.error());
   co_return json_response(201, to_json(*added));
 }
@@ -115,14 +114,14 @@ Answer change_user(ApiParts& parts, Request request) {
     change.password_hash = std::move(*hash);
   }
   const std::string name = request.param.at("user");
-  const auto changed = co_await parts.accounts.change_user(name, std::move(change));
+  const auto changed = co_await parts.accounts.change_user(name, std::move(change), author_of(request, parts.clock));
   if (!changed) co_return problem(changed.error());
   co_return json_response(200, to_json(*changed));
 }
 
 Answer remove_user(ApiParts& parts, Request request) {
   const std::string name = request.param.at("user");
-  const auto removed = co_await parts.accounts.remove_user(name);
+  const auto removed = co_await parts.accounts.remove_user(name, author_of(request, parts.clock));
   if (!removed) co_return problem(removed.error());
   co_return json_response(200, json::object());
 }
@@ -150,7 +149,7 @@ Answer add_token(ApiParts& parts, Request request) {
     if (!days) co_return problem(days.error());
     wish.days = *days;
   }
-  const auto made = co_await parts.accounts.add_token(std::move(wish));
+  const auto made = co_await parts.accounts.add_token(std::move(wish), author_of(request, parts.clock));
   if (!made) co_return problem(made.error());
   json answer = to_json(made->token);
   answer["secret"] = made->secret;
@@ -159,7 +158,7 @@ Answer add_token(ApiParts& parts, Request request) {
 
 Answer revoke_token(ApiParts& parts, Request request) {
   const std::string name = request.param.at("token");
-  const auto revoked = co_await parts.accounts.revoke_token(name);
+  const auto revoked = co_await parts.accounts.revoke_token(name, author_of(request, parts.clock));
   if (!revoked) co_return problem(revoked.error());
   co_return json_response(200, to_json(*revoked));
 }
@@ -178,7 +177,7 @@ Answer list_sessions(ApiParts& parts, Request request) {
 
 Answer revoke_session(ApiParts& parts, Request request) {
   const auto number = parse_id(request.param.at("session"));
-  if (!number || !parts.accounts.end_session(*number)) {
+  if (!number || !parts.accounts.end_session(*number, author_of(request, parts.clock))) {
     co_return problem(404, "there is no such session", "unknown_session");
   }
   co_return json_response(200, json::object());
@@ -200,7 +199,7 @@ Answer enrol_robot(ApiParts& parts, Request request) {
   if (!is_robot_id(*robot_id)) {
     co_return problem(422, "robot_id is not 1 to 31 characters of [a-z0-9_-]", "out_of_range");
   }
-  const auto made = co_await parts.accounts.enrol(*robot_id, request.actor);
+  const auto made = co_await parts.accounts.enrol(*robot_id, author_of(request, parts.clock));
   if (!made) co_return problem(made.error());
   if (parts.station.find(*robot_id) == nullptr) {
     parts.station.restore({RestoredRobot{*robot_id}}, {});  // people see it, and who else uses its name
@@ -215,7 +214,7 @@ Answer enrol_robot(ApiParts& parts, Request request) {
 Answer revoke_robot(ApiParts& parts, Request request) {
   const std::string robot_id = request.param.at("robot_id");
   parts.station.end_connection(robot_id, "its enrolment was revoked");
-  const auto revoked = co_await parts.accounts.revoke_robot(robot_id, request.actor);
+  const auto revoked = co_await parts.accounts.revoke_robot(robot_id, author_of(request, parts.clock));
   if (!revoked) co_return problem(revoked.error());
   co_return json_response(200, to_json(*revoked));
 }

@@ -87,13 +87,19 @@ Result<void> set_age(CommandRequest& command, const ParsedCommand& parsed, Clock
   return {};
 }
 
+// What never comes to the station's door, for it is none of its words.
+Response refused(ApiParts& parts, const Request& request, const char* what, const Error& error) {
+  parts.station.note_refusal(author_of(request, parts.clock), request.param.at("robot_id"), what, "{}", error);
+  return problem(error);
+}
+
 Answer submit_command(ApiParts& parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
   auto parsed = parse_command(request.body);
-  if (!parsed) co_return problem(parsed.error());
+  if (!parsed) co_return refused(parts, request, "command", parsed.error());
   auto key = key_of(request);
-  if (!key) co_return problem(key.error());
+  if (!key) co_return refused(parts, request, "command", key.error());
   const auto wait = request.query.find("wait");
   if (wait != request.query.end() && wait->second != "acknowledged" && wait->second != "verified") {
     co_return problem(400, "wait must be acknowledged or verified", "out_of_range");
@@ -103,11 +109,14 @@ Answer submit_command(ApiParts& parts, Request request) {
   command.action = parsed->action;
   command.arguments = std::move(parsed->arguments);
   command.actor = request.actor;
+  command.peer = request.peer;
   command.life = parsed->life;
   command.key = std::move(*key);
   command.received_us = request.received_us;
   command.until_verified = wait != request.query.end() && wait->second == "verified";
-  if (auto aged = set_age(command, *parsed, parts.clock); !aged) co_return problem(aged.error());
+  if (auto aged = set_age(command, *parsed, parts.clock); !aged) {
+    co_return refused(parts, request, "command", aged.error());
+  }
   if (!command.key.empty()) {
     const CommandId command_id = command_id_of(id, command.actor, command.key);
     if (!parts.station.remembers(command_id)) {  // asked before a restart, or long ago
@@ -125,12 +134,14 @@ Answer submit_command(ApiParts& parts, Request request) {
 
 Answer change_control(ApiParts& parts, Request request) {
   auto wish = parse_control(request.body);
-  if (!wish) co_return problem(wish.error());
+  if (!wish) co_return refused(parts, request, "control", wish.error());
   wish->robot_id = request.param.at("robot_id");
   wish->actor = request.actor;
+  wish->peer = request.peer;
   // SAFETY: nobody but an admin takes control out of another's hands.
   if (wish->action == ControlAction::force && !request.caller.scopes.allow(Scope::admin)) {
-    co_return problem(403, "to take control by force needs the role admin", "not_permitted");
+    const Error error{ErrorCode::forbidden, "to take control by force needs the role admin", "not_permitted"};
+    co_return refused(parts, request, "control", error);
   }
   const auto control = parts.station.control(*wish);
   if (!control) co_return problem(control.error());
@@ -145,6 +156,7 @@ int stop_status(const CommandRecord& record) { return was_accepted(record.state)
 StopRequest stop_request(const Request& request) {
   StopRequest stop;
   stop.actor = request.actor;
+  stop.peer = request.peer;
   stop.received_us = request.received_us;
   if (auto key = key_of(request)) stop.key = std::move(*key);
   return stop;
@@ -161,7 +173,7 @@ Answer emergency_stop(ApiParts& parts, Request request) {
 }
 
 Answer emergency_stop_all(ApiParts& parts, Request request) {
-  const StopsOfAll stops = co_await stop_all_robots(parts.loop, parts.tasks, parts.station, stop_request(request));
+  const StopsOfAll stops = co_await stop_all_robots(parts.station, stop_request(request));
   int status = 200;
   for (const CommandRecord& record : stops.records) status = std::max(status, stop_status(record));
   if (status == 202) co_await parts.recording.history.settle();

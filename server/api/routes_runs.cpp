@@ -38,8 +38,9 @@ Answer create_run(ApiParts& parts, Request request) {
     co_return problem(404, fmt::format("no robot '{}' is known", wish->robot_id), "unknown_robot");
   }
   Runs& runs = parts.recording.runs;
-  auto made = wish->range ? runs.make_afterwards(wish->robot_id, wish->conditions, *wish->range, request.actor)
-                          : runs.create(wish->robot_id, wish->conditions, request.actor);
+  const Author by = author_of(request, parts.clock);
+  auto made = wish->range ? runs.make_afterwards(wish->robot_id, wish->conditions, *wish->range, by)
+                          : runs.create(wish->robot_id, wish->conditions, by);
   const auto run = co_await std::move(made);
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
@@ -61,7 +62,7 @@ Answer end_run(ApiParts& parts, Request request) {
   if (!id) co_return problem(id.error());
   const auto verdict = parse_run_end(request.body);
   if (!verdict) co_return problem(verdict.error());
-  const auto run = co_await parts.recording.runs.end(*id, *verdict);
+  const auto run = co_await parts.recording.runs.end(*id, *verdict, author_of(request, parts.clock));
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
   co_return json_response(200, to_json(*run));
@@ -72,7 +73,7 @@ Answer annotate_run(ApiParts& parts, Request request) {
   if (!id) co_return problem(id.error());
   const auto annotation = parse_annotation(request.body);
   if (!annotation) co_return problem(annotation.error());
-  const auto run = co_await parts.recording.runs.annotate(*id, *annotation, request.actor);
+  const auto run = co_await parts.recording.runs.annotate(*id, *annotation, author_of(request, parts.clock));
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
   co_return json_response(200, to_json(*run));
@@ -83,7 +84,7 @@ Answer discard_run(ApiParts& parts, Request request) {
   if (!id) co_return problem(id.error());
   const auto reason = parse_discard(request.body);
   if (!reason) co_return problem(reason.error());
-  const auto run = co_await parts.recording.runs.discard(*id, *reason, request.actor);
+  const auto run = co_await parts.recording.runs.discard(*id, *reason, author_of(request, parts.clock));
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
   co_return json_response(200, to_json(*run));

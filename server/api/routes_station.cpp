@@ -25,6 +25,11 @@ Answer make_login_link(ApiParts& parts, Request request) {
   const std::string host = request.header("host");
   const std::string url =
       login_url(base_url(parts.facts, host.empty() ? parts.facts.http_address : host), parts.auth.new_login_code());
+  AuditNote note;
+  note.by = author_of(request, parts.clock);
+  note.action = "account.link_made";
+  note.can_flood = true;
+  parts.recording.recorder.on_audit(note);
   co_return json_response(201, {{"url", url}, {"expires_at_us", parts.clock.utc_us() + kLoginCodeLife.count()}});
 }
 
@@ -89,6 +94,7 @@ void add_routes(Router& router, ApiParts& parts) {
   add_overview_routes(router, parts);
   add_export_routes(router, parts);
   add_account_routes(router, parts);
+  add_audit_routes(router, parts);
 }
 
 }  // namespace server

@@ -6,11 +6,10 @@
 #include <termios.h>
 #include <unistd.h>
 
-#include <boost/asio/io_context.hpp>
 #include <iostream>
 #include <stdexcept>
 
-#include "server/clock.hpp"
+#include "server/cli/author.hpp"
 
 namespace server::cli {
 namespace fs = std::filesystem;
@@ -18,13 +17,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr const char* kActor = "cli";
 constexpr std::int64_t kDayUs = 86'400'000'000;
-
-std::int64_t utc_us() {
-  boost::asio::io_context loop;
-  return SystemClock{loop}.utc_us();
-}
 
 template <class T>
 T value_of(Result<T> result) {
@@ -104,7 +97,8 @@ void AccountDoor::add_user(const std::string& name, Role role, const std::string
   }
   value_of(check_name(name));
   value_of(check_password(password));
-  value_of(store().add_user({name, role, hash_password(password, {}), utc_us(), kActor, false}));
+  const Author by = command_line_author();
+  value_of(store().add_user({name, role, hash_password(password, {}), by.at_us, by.actor, false}, by));
 }
 
 void AccountDoor::change_user(const std::string& name, const UserChange& change, const json& body) {
@@ -112,7 +106,7 @@ void AccountDoor::change_user(const std::string& name, const UserChange& change,
   if (station_) {
     ask("POST", "/users/" + name + "/change", body);
   } else {
-    value_of(store().change_user(name, change));
+    value_of(store().change_user(name, change, command_line_author()));
   }
 }
 
@@ -136,7 +130,7 @@ void AccountDoor::remove_user(const std::string& name) {
   if (station_) {
     ask("POST", "/users/" + name + "/remove");
   } else {
-    value_of(store().remove_user(name, utc_us()));
+    value_of(store().remove_user(name, command_line_author()));
   }
 }
 
@@ -153,9 +147,10 @@ json AccountDoor::add_token(const std::string& name, Scopes scopes, std::int64_t
   token.name = name;
   token.hash = hash_of(secret);
   token.scopes = scopes;
-  token.made_at_us = utc_us();
+  const Author by = command_line_author();
+  token.made_at_us = by.at_us;
   token.expires_at_us = days == 0 ? 0 : token.made_at_us + days * kDayUs;
-  value_of(store().add_token(token));
+  value_of(store().add_token(token, by));
   json made = to_json(token);
   made["secret"] = secret;
   return made;
@@ -166,7 +161,7 @@ void AccountDoor::revoke_token(const std::string& name) {
   if (station_) {
     ask("POST", "/tokens/" + name + "/revoke");
   } else {
-    value_of(store().revoke_token(name, utc_us()));
+    value_of(store().revoke_token(name, command_line_author()));
   }
 }
 
@@ -177,7 +172,7 @@ json AccountDoor::enrolments() {
 json AccountDoor::enrol(const std::string& robot_id) {
   if (station_) return ask("POST", "/enrolments", {{"robot_id", robot_id}});
   const std::string secret = random_secret();
-  json made = to_json(value_of(store().enrol(robot_id, hash_of(secret), kActor, utc_us())));
+  json made = to_json(value_of(store().enrol(robot_id, hash_of(secret), command_line_author())));
   made["secret"] = secret;
   return made;
 }
@@ -186,7 +181,7 @@ void AccountDoor::revoke_robot(const std::string& robot_id) {
   if (station_) {
     ask("POST", "/enrolments/" + robot_id + "/revoke");
   } else {
-    value_of(store().revoke_robot(robot_id, kActor, utc_us()));
+    value_of(store().revoke_robot(robot_id, command_line_author()));
   }
 }
 

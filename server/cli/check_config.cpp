@@ -33,10 +33,18 @@ int run(const CheckConfig& wish, std::ostream& out) {
   fmt::print(out, "data     {}\n", std::filesystem::absolute(config.data_dir).string());
   fmt::print(out, "http     {}{}\n", config.http, config.http_or_any_port ? " (or a free port)" : "");
   fmt::print(out, "robots   {}{}\n", config.robots, config.robots_or_any_port ? " (or a free port)" : "");
+  fmt::print(out, "places   http {}, {} of an address; robots {}, {} of an address\n", config.http_places.connections,
+             config.http_places.of_address, config.robot_places.connections, config.robot_places.of_address);
   fmt::print(out, "tls      http {}, robots {}\n", protection(config, config.http), protection(config, config.robots));
-  fmt::print(out, "limits   setpoint {} to {} m, duty {} to {}, disturbance {} m\n", config.limits.setpoint_min_m,
-             config.limits.setpoint_max_m, config.limits.duty_min, config.limits.duty_max,
-             config.limits.disturbance_max_m);
+  const auto print_limits = [&out](const std::string& title, const CommandLimits& limits) {
+    fmt::print(out, "{}setpoint {} to {} m in steps of {} m, duty {} to {}, above {} for {} s, disturbance {} m\n",
+               title, limits.setpoint_min_m, limits.setpoint_max_m, limits.setpoint_step_m, limits.duty_min,
+               limits.duty_max, limits.power_duty, limits.power_s, limits.disturbance_max_m);
+  };
+  print_limits("limits   ", config.envelope.anywhere);
+  for (const auto& [fluid, limits] : config.envelope.of_fluid) {
+    print_limits(fmt::format("         in {}: ", one_line(fluid)), limits);
+  }
   print_recording(config.recording, out);
   fmt::print(out, "the configuration is valid\n");
   return 0;

@@ -5,11 +5,10 @@
 #include <fmt/ostream.h>
 
 #include <CLI/CLI.hpp>
-#include <boost/asio/io_context.hpp>
 #include <stdexcept>
 
+#include "server/cli/author.hpp"
 #include "server/cli/options.hpp"
-#include "server/clock.hpp"
 #include "server/data_folder.hpp"
 #include "server/recording/restore.hpp"
 
@@ -28,8 +27,7 @@ int run(const Restore& wish, std::ostream& out) {
   if (!lock) {
     throw std::runtime_error{fmt::format("a station runs in '{}'; stop it first", wish.data_dir.string())};
   }
-  boost::asio::io_context loop;
-  const RestoredStore restored = restore_database(wish.from, wish.data_dir, SystemClock{loop}.utc_us());
+  const RestoredStore restored = restore_database(wish.from, wish.data_dir, command_line_author());
   fmt::print(out, "{}: {} samples and {} runs, verified; {} of the runs were open and are interrupted\n",
              (wish.data_dir / "station.sqlite").string(), restored.samples, restored.runs, restored.runs_interrupted);
   return 0;

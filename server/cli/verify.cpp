@@ -9,6 +9,9 @@
 #include <limits>
 
 #include "server/cli/options.hpp"
+#include "server/recording/audit_check.hpp"
+#include "server/recording/database.hpp"
+#include "server/recording/run_file.hpp"
 #include "server/recording/run_reader.hpp"
 #include "server/recording/schema.hpp"
 #include "server/recording/store_check.hpp"
@@ -20,24 +23,35 @@ constexpr int kFaults = 1;
 constexpr int kUnreadable = 2;
 
 struct Verified {
-  StoreFindings findings;
+  std::optional<StoreFindings> store;
   bool integrity_checked = false;
+  std::optional<AuditFindings> audit;
+
+  std::vector<std::string> faults() const {
+    std::vector<std::string> all = store ? store->faults : std::vector<std::string>{};
+    if (audit) all.insert(all.end(), audit->faults.begin(), audit->faults.end());
+    return all;
+  }
 };
 
 // A run alone is not worth reading every page for; nor is it done unasked beside a station, whose log would grow.
 Result<Verified> verify_file(const std::filesystem::path& path, const Verify& wish) {
   Verified verified;
   auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
+    verified = {};
     const auto version = database.execAndGet("PRAGMA user_version").getInt64();
     if (version < static_cast<std::int64_t>(migrations().size())) {
-      return fail(ErrorCode::invalid, fmt::format("{} has schema version {}, which knows no certificates; a station "
-                                                  "brings it up to date when it opens it",
+      return fail(ErrorCode::invalid, fmt::format("{} has schema version {}, which this program cannot verify; a "
+                                                  "station brings it up to date when it opens it",
                                                   path.string(), version));
     }
+    if (!wish.run) verified.audit = check_audit(database, wish.expected);
+    if (wish.audit) return {};
     const StoreCheck check{wish.run, wish.integrity || (!wish.run && lock_is_free(path))};
     auto findings = check_store(database, check);
     if (!findings) return std::unexpected{findings.error()};
-    verified = {std::move(*findings), check.integrity};
+    verified.store = std::move(*findings);
+    verified.integrity_checked = check.integrity;
     return {};
   };
   auto done = read_store(path, read);
@@ -45,30 +59,78 @@ Result<Verified> verify_file(const std::filesystem::path& path, const Verify& wi
   return verified;
 }
 
+bool is_export(const std::filesystem::path& path) {
+  try {
+    SQLite::Database file{reading_uri(path, true),
+                          SQLite::OPEN_READONLY | SQLite::OPEN_URI};  // makes no files beside it
+    return file.execAndGet("PRAGMA application_id").getInt64() == kRunFileApplicationId;
+  } catch (const SQLite::Exception&) {  // whatever it is, reading it says so
+    return false;
+  }
+}
+
+Result<Verified> verify_export(const std::filesystem::path& path, const Verify& wish) {
+  if (!wish.audit) {
+    return fail(ErrorCode::invalid,
+                fmt::format("{} is the export of a run; --audit verifies the audit in it", path.string()));
+  }
+  try {
+    SQLite::Database file = open_for_reading(path);
+    if (file.execAndGet("PRAGMA user_version").getInt64() < kRunFileVersion) {
+      return fail(ErrorCode::invalid,
+                  fmt::format("{} was exported by an earlier version: no audit is in it", path.string()));
+    }
+    Verified verified;
+    verified.audit = check_exported_audit(file, wish.expected);
+    return verified;
+  } catch (const SQLite::Exception& error) {
+    return fail(ErrorCode::unavailable, fmt::format("cannot read {}: SQLite says '{}'", path.string(), error.what()));
+  }
+}
+
 void write_table(std::ostream& out, const Verified& verified, const Verify& wish) {
-  const StoreFindings& findings = verified.findings;
-  for (const std::string& fault : findings.faults) fmt::print(out, "fault: {}\n", one_line(fault));
-  fmt::print(out, "segments  {} with {} samples\n", findings.segments, findings.samples);
-  fmt::print(out, "runs      {} verified, {} with samples on their way, {} not certified yet\n", findings.runs_verified,
-             findings.runs_incomplete, findings.runs_uncertified);
-  if (!verified.integrity_checked && !wish.run) {
+  const std::vector<std::string> faults = verified.faults();
+  for (const std::string& fault : faults) fmt::print(out, "fault: {}\n", one_line(fault));
+  if (verified.store) {
+    const StoreFindings& findings = *verified.store;
+    fmt::print(out, "segments  {} with {} samples\n", findings.segments, findings.samples);
+    fmt::print(out, "runs      {} verified, {} with samples on their way, {} not certified yet\n",
+               findings.runs_verified, findings.runs_incomplete, findings.runs_uncertified);
+  }
+  if (verified.audit) {
+    const AuditFindings& findings = *verified.audit;
+    const std::string hidden = findings.hidden == 0 ? "" : fmt::format(" ({} as hashes only)", findings.hidden);
+    fmt::print(out, "audit     {} entries{}, {} commands agree with it\n", findings.entries, hidden, findings.commands);
+    fmt::print(out, "head      {}\n", findings.head.entry == 0 ? "-" : text(findings.head));
+  }
+  if (verified.store && !verified.integrity_checked && !wish.run) {
     fmt::print(out,
                "skipped   SQLite's integrity check, since a station runs: its log would grow meanwhile; "
                "--integrity makes it\n");
   }
-  fmt::print(out, "{}\n", findings.faults.empty() ? "no faults" : fmt::format("{} faults", findings.faults.size()));
+  fmt::print(out, "{}\n", faults.empty() ? "no faults" : fmt::format("{} faults", faults.size()));
 }
 
 nlohmann::ordered_json json_of(const Verified& verified) {
-  const StoreFindings& findings = verified.findings;
   nlohmann::ordered_json out;
-  out["faults"] = findings.faults;
-  out["segments"] = findings.segments;
-  out["samples"] = findings.samples;
-  out["runs_verified"] = findings.runs_verified;
-  out["runs_incomplete"] = findings.runs_incomplete;
-  out["runs_uncertified"] = findings.runs_uncertified;
-  out["integrity_checked"] = verified.integrity_checked;
+  out["faults"] = verified.faults();
+  if (verified.store) {
+    const StoreFindings& findings = *verified.store;
+    out["segments"] = findings.segments;
+    out["samples"] = findings.samples;
+    out["runs_verified"] = findings.runs_verified;
+    out["runs_incomplete"] = findings.runs_incomplete;
+    out["runs_uncertified"] = findings.runs_uncertified;
+    out["integrity_checked"] = verified.integrity_checked;
+  }
+  if (verified.audit) {
+    const AuditFindings& findings = *verified.audit;
+    out["audit_entries"] = findings.entries;
+    out["audit_hidden"] = findings.hidden;
+    out["audit_commands"] = findings.commands;
+    out["audit_head"] =
+        findings.head.entry == 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(text(findings.head));
+  }
   return out;
 }
 
@@ -80,16 +142,28 @@ void add_options(CLI::App& command, Verify& wish) {
   command.add_option("--file", wish.file, "This database, e.g. a backup, and not the folder's")
       ->check(named())
       ->excludes(data);
-  command.add_option("--run", wish.run, "Only this run: its samples and its certificate")
-      ->check(whole(1, std::numeric_limits<std::int64_t>::max()));
+  auto* run = command.add_option("--run", wish.run, "Only this run: its samples and its certificate")
+                  ->check(whole(1, std::numeric_limits<std::int64_t>::max()));
   command.add_flag("--integrity", wish.integrity,
                    "SQLite's own check of every page also while a station runs, whose log grows meanwhile");
+  auto* audit = command.add_flag("--audit", wish.audit, "Only the audit; --file may name the export of a run");
+  audit->excludes(run);
+  const auto expect = [&wish](const std::string& given) {
+    const auto head = parse_audit_head(given);
+    if (!head) throw CLI::ValidationError{"--expect", head.error().detail};
+    wish.expected = *head;
+  };
+  command
+      .add_option_function<std::string>("--expect", expect,
+                                        "ENTRY:HASH of the audit as it once was, from the log or an earlier verify")
+      ->excludes(run);
   add_json_flag(command, wish.form);
   command.footer("Example: rheonaut verify --data ~/lab");
 }
 
 int run(const Verify& wish, std::ostream& out) {
-  const auto verified = verify_file(wish.file.value_or(wish.data_dir / "station.sqlite"), wish);
+  const std::filesystem::path path = wish.file.value_or(wish.data_dir / "station.sqlite");
+  const auto verified = is_export(path) ? verify_export(path, wish) : verify_file(path, wish);
   if (!verified) {
     fmt::print(stderr, "rheonaut: {}\n", one_line(verified.error().detail));
     return kUnreadable;
@@ -99,7 +173,7 @@ int run(const Verify& wish, std::ostream& out) {
   } else {
     write_table(out, *verified, wish);
   }
-  return verified->findings.faults.empty() ? 0 : kFaults;
+  return verified->faults().empty() ? 0 : kFaults;
 }
 
 }  // namespace server::cli

@@ -1,4 +1,5 @@
-// `rheonaut verify`: whether a station's database is what it should be, and its certificates are true.
+// `rheonaut verify`: whether a station's database is what it should be, its certificates are true, and its audit is as
+// it was written.
 #pragma once
 
 #include <filesystem>
@@ -6,6 +7,7 @@
 #include <ostream>
 
 #include "server/cli/output.hpp"
+#include "server/recording/audit_chain.hpp"
 
 namespace CLI {
 class App;
@@ -18,6 +20,8 @@ struct Verify {
   std::optional<std::filesystem::path> file;  // this one, instead of the folder's
   std::optional<std::int64_t> run;            // only this one
   bool integrity = false;                     // SQLite's own check also beside a running station
+  bool audit = false;                         // only the audit, also of a run's export
+  std::optional<AuditHead> expected;          // an entry that was in it once
   OutputForm form;
 };
 

@@ -5,23 +5,23 @@
 
 #include <boost/asio/error.hpp>
 #include <boost/system/system_error.hpp>
-#include <optional>
 
-#include "server/counted.hpp"
+#include "server/endpoint.hpp"
 
 namespace server {
 namespace asio = boost::asio;
 
 RobotListener::RobotListener(asio::io_context& loop, Clock& clock, TaskGroup& tasks, Station& station,
                              RobotArchive& archive, const asio::ip::tcp::endpoint& endpoint, bool or_any_port,
-                             TlsGate* tls)
+                             Entrance& entrance)
     : loop_{loop},
       clock_{clock},
       tasks_{tasks},
       station_{station},
       archive_{archive},
       listener_{loop, clock, endpoint, or_any_port},
-      tls_{tls} {}
+      turns_{loop},
+      entrance_{entrance} {}
 
 asio::awaitable<void> RobotListener::run() {
   auto on_connection = [this](asio::ip::tcp::socket socket) { accept(StreamSocket{std::move(socket)}); };
@@ -29,44 +29,42 @@ asio::awaitable<void> RobotListener::run() {
 }
 
 void RobotListener::accept(StreamSocket socket) {
-  if (tls_ == nullptr) return serve(make_stream(std::move(socket)));
-  if (!is_full(socket.peer())) tasks_.spawn("robot session", secure_session(std::move(socket)));
+  if (entrance_.tls == nullptr) return serve(make_stream(std::move(socket)));
+  auto guest = entrance_.door.admit(host_of(socket.peer()), socket.from_loopback());
+  if (guest) tasks_.spawn("robot session", secure_session(std::move(socket), std::move(*guest)));
 }
 
 void RobotListener::serve(std::unique_ptr<ByteStream> stream) {
-  if (!is_full(stream->peer())) tasks_.spawn("robot session", session(std::move(stream)));
+  auto guest = entrance_.door.admit(host_of(stream->peer()), stream->from_loopback());
+  if (guest) tasks_.spawn("robot session", session(std::move(stream), std::move(*guest)));
 }
 
-bool RobotListener::is_full(const std::string& peer) const {
-  if (connections_ < kMaxConnections && greetings_ < kMaxGreetings) return false;
-  spdlog::warn("robot port: {} closed: {} connections are open, {} of them without a hello", peer, connections_,
-               greetings_);
-  return true;
-}
-
-asio::awaitable<void> RobotListener::secure_session(StreamSocket socket) {
-  std::optional<Counted<int>> connection{connections_}, greeting{greetings_};
-  const TlsGate::Outcome outcome = co_await tls_->secure(socket, "robot port");
+asio::awaitable<void> RobotListener::secure_session(StreamSocket socket, std::unique_ptr<Guest> guest) {
+  guest->on_end([&socket] { socket.end(); });
+  const TlsGate::Outcome outcome = co_await entrance_.tls->secure(socket, "robot port");
   if (outcome != TlsGate::Outcome::secure) co_return;
-  connection.reset();  // session() counts it
-  greeting.reset();
-  co_await session(make_stream(std::move(socket)));
+  co_await session(make_stream(std::move(socket)), std::move(guest));
 }
 
-asio::awaitable<void> RobotListener::session(std::unique_ptr<ByteStream> stream) {
+asio::awaitable<void> RobotListener::session(std::unique_ptr<ByteStream> stream, std::unique_ptr<Guest> guest) {
   const std::string peer = stream->peer();
-  const Counted connection{connections_};
-  std::optional<Counted<int>> greeting{greetings_};
-  RobotSession session{loop_, clock_, std::move(stream), station_, archive_};
+  RobotSession session{loop_, clock_, turns_, std::move(stream), station_, archive_};
+  guest->on_end([&session] { session.close("it gave way to another connection"); });
   try {
     const bool welcome = co_await session.greet();
-    greeting.reset();
-    if (welcome) co_await session.serve();
+    if (!welcome) co_return log_unwelcome(peer, session.why_unwelcome());
+    guest->becomes(Guest::busy);
+    co_await session.serve();
   } catch (const boost::system::system_error& error) {
     if (error.code() != asio::error::operation_aborted) spdlog::warn("robot session {}: {}", peer, error.what());
   } catch (const std::exception& error) {
     spdlog::error("robot session {}: {}", peer, error.what());
   }
+}
+
+void RobotListener::log_unwelcome(const std::string& peer, const std::string& why) {
+  const auto unsaid = lines_.next(clock_.steady_us());
+  if (unsaid) spdlog::warn("robot port: {} was not let in: {}{}", peer, why, and_before(*unsaid));
 }
 
 }  // namespace server

@@ -1,22 +1,21 @@
 // The port where robots dial in: each connection becomes a task of its own, behind its TLS handshake if there is one.
 //
-// Loop thread. Outlives the sessions it started.
+// A robot is a stranger to the door until its hello has been accepted; how many may be connected, and who gives way,
+// the door says (server/net/door.hpp). A welcomed robot never does. Who is refused is closed without a word. Loop
+// thread. Outlives the sessions it started.
 #pragma once
 
 #include "server/link/robot_session.hpp"
+#include "server/net/entrance.hpp"
 #include "server/net/listener.hpp"
-#include "server/net/tls_gate.hpp"
 #include "server/tasks.hpp"
 
 namespace server {
 
 class RobotListener {
  public:
-  static constexpr int kMaxConnections = 8192;  // a further one is closed at once
-  static constexpr int kMaxGreetings = 2048;    // of them, how many may not have been welcomed yet
-
   RobotListener(boost::asio::io_context& loop, Clock& clock, TaskGroup& tasks, Station& station, RobotArchive& archive,
-                const boost::asio::ip::tcp::endpoint& endpoint, bool or_any_port, TlsGate* tls = nullptr);
+                const boost::asio::ip::tcp::endpoint& endpoint, bool or_any_port, Entrance& entrance);
 
   boost::asio::awaitable<void> run();
 
@@ -26,10 +25,10 @@ class RobotListener {
   boost::asio::ip::tcp::endpoint endpoint() const { return listener_.endpoint(); }
 
  private:
-  bool is_full(const std::string& peer) const;
   void accept(StreamSocket socket);
-  boost::asio::awaitable<void> secure_session(StreamSocket socket);
-  boost::asio::awaitable<void> session(std::unique_ptr<ByteStream> stream);
+  boost::asio::awaitable<void> secure_session(StreamSocket socket, std::unique_ptr<Guest> guest);
+  boost::asio::awaitable<void> session(std::unique_ptr<ByteStream> stream, std::unique_ptr<Guest> guest);
+  void log_unwelcome(const std::string& peer, const std::string& why);
 
   boost::asio::io_context& loop_;
   Clock& clock_;
@@ -37,9 +36,9 @@ class RobotListener {
   Station& station_;
   RobotArchive& archive_;
   Listener listener_;
-  TlsGate* tls_;  // null: plain TCP
-  int connections_ = 0;
-  int greetings_ = 0;
+  Turns turns_;
+  Entrance& entrance_;
+  SparseLines lines_;
 };
 
 }  // namespace server

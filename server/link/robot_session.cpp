@@ -1,8 +1,6 @@
 // Serves one robot's connection.
 #include "server/link/robot_session.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cmath>
@@ -79,16 +77,20 @@ AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t r
 
 }  // namespace
 
-RobotSession::RobotSession(asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
-                           RobotArchive& archive)
-    : clock_{clock}, stream_{std::move(stream)}, station_{station}, archive_{archive}, wake_writer_{loop} {}
+RobotSession::RobotSession(asio::io_context& loop, Clock& clock, Turns& turns, std::unique_ptr<ByteStream> stream,
+                           Station& station, RobotArchive& archive)
+    : clock_{clock},
+      turns_{turns},
+      stream_{std::move(stream)},
+      station_{station},
+      archive_{archive},
+      wake_writer_{loop} {}
 
 asio::awaitable<bool> RobotSession::greet() {
   const auto hello = co_await (read_hello() || clock_.sleep_for(kHelloTimeout));
   const auto* received = std::get_if<0>(&hello);
   if (received == nullptr || !received->has_value()) {
-    spdlog::info("robot port: {} sent no valid hello{}", stream_->peer(),
-                 close_reason_.empty() ? "" : ": " + close_reason_);
+    if (close_reason_.empty()) close_reason_ = received == nullptr ? "no hello within 5 s" : "closed before its hello";
     co_return false;
   }
   co_return co_await admit(**received);
@@ -109,6 +111,7 @@ asio::awaitable<void> RobotSession::serve() {
 // False at the end of the connection.
 bool RobotSession::take_read(std::size_t size) {
   unread_ = {input_.data(), size};
+  if (size > 0) last_received_us_ = clock_.steady_us();
   return size > 0;
 }
 
@@ -119,7 +122,6 @@ bool RobotSession::next_frame_read() {
   if (state == protocol::FrameReader::State::oversize)
     close_reason_ = "a frame longer than 1024 bytes: not this protocol";
   if (state != protocol::FrameReader::State::complete) return false;
-  last_received_us_ = clock_.steady_us();
   if (protocol::decode_robot_frame(reader_.payload(), frame_)) return true;
   close_reason_ = "a frame that does not decode";
   return false;
@@ -187,7 +189,7 @@ protocol::StationFrame RobotSession::welcome(const Admission& admission) const {
 }
 
 asio::awaitable<bool> RobotSession::refuse(protocol::RefusalReason reason, std::string detail) {
-  spdlog::warn("robot port: refused {}: {}: {}", stream_->peer(), protocol::text(reason), detail);
+  close_reason_ = std::string{protocol::text(reason)} + ": " + detail;
   station_.on_refused(claimed_id_, stream_->peer(), reason, detail);
   protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
   frame.which_body = rheonaut_StationFrame_welcome_tag;
@@ -203,8 +205,10 @@ asio::awaitable<RobotSession::EndReason> RobotSession::read_frames() {
   for (;;) {
     while (close_reason_.empty() && next_frame_read()) on_frame(frame_);
     if (!close_reason_.empty()) co_return close_reason_;
+    if (durable_changed_) flush();
     const std::size_t size = co_await stream_->read_some(asio::buffer(input_));
     if (!take_read(size)) co_return "the robot closed the connection";
+    if (!turns_.take()) co_await turns_.wait(awaits_stop_answer_ ? Turns::Place::first : Turns::Place::last);
   }
 }
 
@@ -220,7 +224,10 @@ void RobotSession::on_frame(const protocol::RobotFrame& frame) {
     case rheonaut_RobotFrame_status_tag: station_.on_status(*this, frame.body.status); break;
     case rheonaut_RobotFrame_parameter_page_tag: station_.on_parameters(*this, frame.body.parameter_page); break;
     case rheonaut_RobotFrame_controller_tag: station_.on_controller(*this, frame.body.controller); break;
-    case rheonaut_RobotFrame_command_ack_tag: station_.on_command_ack(*this, frame.body.command_ack); break;
+    case rheonaut_RobotFrame_command_ack_tag:
+      awaits_stop_answer_ = false;
+      station_.on_command_ack(*this, frame.body.command_ack);
+      break;
     case rheonaut_RobotFrame_heartbeat_tag: on_heartbeat(frame); break;
     default: break;  // a message of a newer version
   }
@@ -279,6 +286,7 @@ std::optional<protocol::StationFrame> RobotSession::next_frame() {
   if (!stops_.empty()) {  // SAFETY: an emergency stop goes ahead of everything that waits
     frame.body.command = stops_.front();
     stops_.pop_front();
+    awaits_stop_answer_ = true;
     return frame;
   }
   while (!commands_.empty()) {
@@ -345,8 +353,7 @@ void RobotSession::send_emergency_stop(const protocol::Command& command) {
 void RobotSession::acknowledge(std::uint64_t durable_next_seq, std::uint64_t durable_next_event_seq) {
   durable_.durable_next_seq = durable_next_seq;
   durable_.durable_next_event_seq = durable_next_event_seq;
-  durable_changed_ = true;
-  flush();
+  durable_changed_ = true;  // said after the robot's next frame: a commit is of many robots, and holds the loop up else
 }
 
 void RobotSession::request_resend(std::uint64_t first_seq, std::uint64_t next_seq) {

@@ -13,6 +13,7 @@
 
 #include "protocol/frame.hpp"
 #include "server/clock.hpp"
+#include "server/link/turns.hpp"
 #include "server/net/byte_stream.hpp"
 #include "server/station/robot_archive.hpp"
 #include "server/station/robot_port.hpp"
@@ -26,12 +27,13 @@ class RobotSession final : public RobotPort {
   static constexpr std::size_t kMaxQueuedStops = 16;     // a further one takes the place of the oldest
   static constexpr std::chrono::seconds kHelloTimeout{5};
 
-  RobotSession(boost::asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
-               RobotArchive& archive);
+  RobotSession(boost::asio::io_context& loop, Clock& clock, Turns& turns, std::unique_ptr<ByteStream> stream,
+               Station& station, RobotArchive& archive);
   ~RobotSession() override { station_.on_disconnected(*this, "the station stops"); }  // also when it was never served
 
   // Hello to Welcome; false when the robot was refused or said nothing. Then serve() to the end of the connection.
   boost::asio::awaitable<bool> greet();
+  const std::string& why_unwelcome() const { return close_reason_; }  // after greet() was false
   boost::asio::awaitable<void> serve();
 
   const RobotId& robot_id() const override { return robot_id_; }
@@ -68,6 +70,7 @@ class RobotSession final : public RobotPort {
   protocol::StationFrame heartbeat();
 
   Clock& clock_;
+  Turns& turns_;
   std::unique_ptr<ByteStream> stream_;
   Station& station_;
   RobotArchive& archive_;
@@ -85,6 +88,7 @@ class RobotSession final : public RobotPort {
   protocol::Bytes unsent_;  // of output_: the rest of a frame that the stream did not take at once
   std::optional<protocol::StationFrame> welcome_;  // the first frame that is written
   std::deque<protocol::Command> stops_;            // SAFETY: always written first
+  bool awaits_stop_answer_ = false;                // a stop was written, and nothing has answered it
   std::deque<QueuedCommand> commands_;
   protocol::StationHeartbeat durable_ = rheonaut_StationHeartbeat_init_zero;
   bool durable_changed_ = false;

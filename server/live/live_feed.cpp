@@ -148,7 +148,12 @@ void LiveFeed::on_samples(const RobotState& robot, const SampleBatch& batch) {
   } else if (const auto waiting = changed_.find(robot.id); waiting != changed_.end()) {
     waiting->second = robot;
   }
-  publish(samples_message(batch), true);
+  LiveText message;  // written when the first has asked for it
+  for (Subscriber* subscriber : subscribers_) {
+    if (!subscriber->watches(robot.id)) continue;
+    if (message == nullptr) message = std::make_shared<const std::string>(samples_message(batch));
+    subscriber->push(message, true);
+  }
 }
 
 void LiveFeed::on_event(const RobotState&, const RobotEvent& event) {

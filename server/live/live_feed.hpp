@@ -10,6 +10,8 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -37,6 +39,10 @@ class Subscriber {
   boost::asio::awaitable<void> wait();  // until a message waits; throws operation_aborted when cancelled
   LiveText pop();                       // null when none waits
 
+  // Of whose samples it hears from now on; before the first call, of all.
+  void watch(std::set<RobotId> robots) { watched_ = std::move(robots); }
+  bool watches(const RobotId& robot) const { return !watched_ || watched_->contains(robot); }
+
   std::size_t size() const { return queue_.size() + states_.size(); }
 
  private:
@@ -61,6 +67,7 @@ class Subscriber {
   bool state_was_last_ = false;
   std::uint64_t pushed_ = 0;
   std::uint64_t dropped_ = 0;
+  std::optional<std::set<RobotId>> watched_;
   Signal arrived_;
 };
 

@@ -16,7 +16,6 @@ using namespace asio::experimental::awaitable_operators;  // NOLINT: operators o
 
 namespace {
 
-constexpr microseconds kLogInterval{std::chrono::seconds{1}};
 constexpr std::uint8_t kHandshakeRecord = 22;  // RFC 8446, 5.1: the first byte of each client
 
 }  // namespace
@@ -59,14 +58,8 @@ asio::awaitable<TlsGate::End> TlsGate::shake_hands(StreamSocket& socket) {
 }
 
 void TlsGate::log_failure(const std::string& peer, const char* port, const std::string& why) {
-  const std::int64_t now_us = clock_.steady_us();
-  if (now_us < next_line_us_) {
-    ++unsaid_;
-    return;
-  }
-  next_line_us_ = now_us + kLogInterval.count();
-  const std::string before = unsaid_ == 0 ? "" : fmt::format(" (and {} before)", std::exchange(unsaid_, 0));
-  spdlog::warn("{}: no TLS with {}: {}{}", port, peer, why, before);
+  const auto unsaid = lines_.next(clock_.steady_us());
+  if (unsaid) spdlog::warn("{}: no TLS with {}: {}{}", port, peer, why, and_before(*unsaid));
 }
 
 }  // namespace server

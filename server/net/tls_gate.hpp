@@ -15,6 +15,7 @@
 #include <string>
 
 #include "server/clock.hpp"
+#include "server/log.hpp"
 #include "server/net/stream_socket.hpp"
 #include "server/net/tls_context.hpp"
 #include "server/worker.hpp"
@@ -61,8 +62,7 @@ class TlsGate {
   WorkerThread& worker_;
   std::shared_ptr<const TlsContext> context_;
   TlsCounters counters_;
-  std::int64_t next_line_us_ = 0;
-  std::uint64_t unsaid_ = 0;  // failures since the last line
+  SparseLines lines_;
 };
 
 }  // namespace server

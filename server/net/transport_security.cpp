@@ -52,18 +52,30 @@ void log_in_force(const TlsCertificate& certificate) {
                certificate.pin);
 }
 
+// Behind one address of this machine there may be many: a proxy, a test, a fleet. A quarter is left for all others.
+DoorLimits limits(const PortPlaces& places, std::size_t strangers) {
+  return {places.connections, strangers, places.of_address, places.connections - places.connections / 4};
+}
+
+// Of a request it is known at once who makes it, of a robot after its hello.
+DoorLimits http_limits(const PortPlaces& places) { return limits(places, places.connections); }
+DoorLimits robot_limits(const PortPlaces& places) { return limits(places, std::max(places.connections / 4, 1U)); }
+
 }  // namespace
 
 TransportSecurity::TransportSecurity(Clock& clock, const Config& config)
     : clock_{clock},
       certificate_{config.tls_certificate()},
       key_{config.tls_key()},
-      http_is_secure_{config.speaks_tls(config.http)},
-      robots_are_secure_{config.speaks_tls(config.robots)},
-      exposed_{exposed_ports(config)} {
-  if (http_is_secure_ || robots_are_secure_) {
+      exposed_{exposed_ports(config)},
+      http_{{clock, "http port", http_limits(config.http_places)}, nullptr},
+      robots_{{clock, "robot port", robot_limits(config.robot_places)}, nullptr} {
+  const bool http_is_secure = config.speaks_tls(config.http), robots_are_secure = config.speaks_tls(config.robots);
+  if (http_is_secure || robots_are_secure) {
     tried_ = seen_ = stamp_of(certificate_, key_);
     gate_.emplace(clock_, worker_, load_first(config));
+    if (http_is_secure) http_.tls = &*gate_;
+    if (robots_are_secure) robots_.tls = &*gate_;
     log_in_force(gate_->context().certificate);
   }
   remind();
@@ -138,14 +150,14 @@ std::vector<std::string> TransportSecurity::names() const {
   return gate_->context().certificate.names;
 }
 
-std::string TransportSecurity::to_trust() const { return http_is_secure_ ? fs::absolute(certificate_).string() : ""; }
+std::string TransportSecurity::to_trust() const {
+  return http_.tls != nullptr ? fs::absolute(certificate_).string() : "";
+}
 
 nlohmann::json TransportSecurity::state() const {
-  const auto word = [](bool secure) { return secure ? "tls" : "plain"; };
-  nlohmann::json out{{"http", word(http_is_secure_)},
-                     {"robots", word(robots_are_secure_)},
-                     {"exposed", is_exposed()},
-                     {"certificate", nullptr}};
+  const auto word = [](const Entrance& port) { return port.tls != nullptr ? "tls" : "plain"; };
+  nlohmann::json out{
+      {"http", word(http_)}, {"robots", word(robots_)}, {"exposed", is_exposed()}, {"certificate", nullptr}};
   if (gate_) {
     const TlsCertificate& certificate = gate_->context().certificate;
     out["certificate"] = {{"names", certificate.names},

@@ -1,4 +1,5 @@
-// What protects the two ports: which of them speaks TLS, with which certificate, and what people must be told of it.
+// What protects the two ports: how many may be connected, which of them speaks TLS, with which certificate, and what
+// people must be told of it.
 //
 // The certificate's files are looked at every two seconds. Once they have changed and then stood still for one look,
 // new connections get them; files that cannot be used are an error in the log, and the old ones stay in force. A
@@ -16,7 +17,7 @@
 
 #include "server/clock.hpp"
 #include "server/config.hpp"
-#include "server/net/tls_gate.hpp"
+#include "server/net/entrance.hpp"
 #include "server/worker.hpp"
 
 namespace server {
@@ -30,9 +31,10 @@ class TransportSecurity {
   // Reads the certificate when a port needs it. Throws std::runtime_error saying what is missing and how to make it.
   TransportSecurity(Clock& clock, const Config& config);
 
-  // Null: plain TCP.
-  TlsGate* http() { return http_is_secure_ ? &*gate_ : nullptr; }
-  TlsGate* robots() { return robots_are_secure_ ? &*gate_ : nullptr; }
+  Entrance& http() { return http_; }
+  Entrance& robots() { return robots_; }
+  const Entrance& http() const { return http_; }
+  const Entrance& robots() const { return robots_; }
 
   boost::asio::awaitable<void> run();  // watches and warns until cancelled
 
@@ -63,10 +65,10 @@ class TransportSecurity {
 
   Clock& clock_;
   std::filesystem::path certificate_, key_;
-  bool http_is_secure_, robots_are_secure_;
   std::string exposed_;  // the ports that are, for people
   WorkerThread worker_{"handshakes", 10};
   std::optional<TlsGate> gate_;
+  Entrance http_, robots_;
   std::string tried_, seen_;  // stamps of the files
   std::int64_t next_exposed_us_ = 0, next_expiry_us_ = 0;
 };

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "server/recording/audit_chain.hpp"
 #include "server/recording/statement.hpp"
 
 namespace server {
@@ -98,7 +99,19 @@ std::optional<User> AccountStore::find_user(const std::string& name) {
   return query.executeStep() ? std::optional{read_user(query)} : std::nullopt;
 }
 
-Result<void> AccountStore::add_user(const User& user) {
+// In the transaction of what it tells of. A robot's is found with the robot's.
+void AccountStore::note(const Author& by, const char* action, const std::string& subject,
+                        const nlohmann::json& detail) {
+  AuditNote note;
+  note.by = by;
+  note.action = action;
+  const bool is_of_robot = note.action.starts_with("robot.");
+  (is_of_robot ? note.robot_id : note.subject) = subject;
+  note.detail = audit_detail(detail);
+  AuditChain{database_}.append(note);
+}
+
+Result<void> AccountStore::add_user(const User& user, const Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   if (find_user(user.name)) {
     return fail(ErrorCode::conflict, fmt::format("there is a user '{}' already", user.name), "name_taken");
@@ -109,11 +122,12 @@ Result<void> AccountStore::add_user(const User& user) {
   SQLite::Statement add{database_, fmt::format("INSERT INTO user ({}) VALUES (?, ?, ?, ?, ?, ?)", kUserColumns)};
   execute(add, user.name, text(user.role), user.password_hash, user.made_at_us, user.made_by,
           std::int64_t{user.disabled});
+  note(by, "account.user_added", user.name, {{"role", text(user.role)}});
   transaction.commit();
   return {};
 }
 
-Result<User> AccountStore::change_user(const std::string& name, const UserChange& change) {
+Result<User> AccountStore::change_user(const std::string& name, const UserChange& change, const Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   std::optional<User> user = find_user(name);
   if (!user) return unknown("user", name);
@@ -126,23 +140,27 @@ Result<User> AccountStore::change_user(const std::string& name, const UserChange
     SQLite::Statement end{database_, "DELETE FROM page_session WHERE user = ?"};
     execute(end, name);
   }
+  nlohmann::json detail{{"role", text(user->role)}, {"disabled", user->disabled}};
+  if (change.password_hash) detail["password"] = "changed";
+  note(by, "account.user_changed", name, detail);
   transaction.commit();
   return *user;
 }
 
-Result<void> AccountStore::remove_user(const std::string& name, std::int64_t utc_us) {
+Result<void> AccountStore::remove_user(const std::string& name, const Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement remove{database_, "DELETE FROM user WHERE name = ?"};
   if (execute(remove, name) == 0) return unknown("user", name);
   SQLite::Statement end{database_, "DELETE FROM page_session WHERE user = ?"};
   execute(end, name);
   SQLite::Statement revoke{database_, "UPDATE api_token SET revoked_at_us = ? WHERE owner = ? AND revoked_at_us = 0"};
-  execute(revoke, utc_us, name);
+  execute(revoke, by.at_us, name);
+  note(by, "account.user_removed", name, nlohmann::json::object());
   transaction.commit();
   return {};
 }
 
-Result<void> AccountStore::add_token(const ApiToken& token) {
+Result<void> AccountStore::add_token(const ApiToken& token, const Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement known{database_, "SELECT 1 FROM api_token WHERE name = ?"};
   bind_all(known, token.name);
@@ -170,17 +188,24 @@ Result<void> AccountStore::add_token(const ApiToken& token) {
                            "DELETE FROM api_token WHERE name IN (SELECT name FROM api_token WHERE revoked_at_us <> 0"
                            " ORDER BY revoked_at_us DESC LIMIT -1 OFFSET ?)"};
   execute(forget, static_cast<std::int64_t>(kMaxTokens));
+  note(by, "account.token_made", token.name,
+       {{"scopes", text(token.scopes)}, {"owner", token.owner}, {"expires_at_us", token.expires_at_us}});
   transaction.commit();
   return {};
 }
 
-Result<ApiToken> AccountStore::revoke_token(const std::string& name, std::int64_t utc_us) {
+Result<ApiToken> AccountStore::revoke_token(const std::string& name, const Author& by) {
+  SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement revoke{database_, "UPDATE api_token SET revoked_at_us = ?1 WHERE name = ?2 AND revoked_at_us = 0"};
-  execute(revoke, utc_us, name);
+  const bool was_good = execute(revoke, by.at_us, name) > 0;
   SQLite::Statement query{database_, fmt::format("SELECT {} FROM api_token WHERE name = ?", kTokenColumns)};
   bind_all(query, name);
   if (!query.executeStep()) return unknown("token", name);
-  return read_token(query);
+  ApiToken token = read_token(query);
+  query.reset();
+  if (was_good) note(by, "account.token_revoked", name, nlohmann::json::object());
+  transaction.commit();
+  return token;
 }
 
 void AccountStore::replace_sessions(const std::vector<PageSession>& sessions, std::uint64_t next_session,
@@ -219,8 +244,7 @@ std::optional<Enrolment> AccountStore::find_robot(const std::string& robot_id) {
   return query.executeStep() ? std::optional{read_enrolment(query)} : std::nullopt;
 }
 
-Result<Enrolment> AccountStore::enrol(const std::string& robot_id, const SecretHash& token, const std::string& actor,
-                                      std::int64_t utc_us) {
+Result<Enrolment> AccountStore::enrol(const std::string& robot_id, const SecretHash& token, const Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   const std::optional<Enrolment> known = find_robot(robot_id);
   if (known && known->has_token && known->revoked_at_us == 0) {
@@ -234,22 +258,25 @@ Result<Enrolment> AccountStore::enrol(const std::string& robot_id, const SecretH
                         " revoked_at_us = NULL, revoked_by = NULL"};
   add.bind(1, robot_id);
   bind_hash(add, 2, token);
-  add.bind(3, utc_us);
-  add.bind(4, actor);
+  add.bind(3, by.at_us);
+  add.bind(4, by.actor);
   add.exec();
+  note(by, "robot.enrolled", robot_id, {{"token", true}});
   const std::optional<Enrolment> enrolled = find_robot(robot_id);
   transaction.commit();
   return *enrolled;
 }
 
-Result<Enrolment> AccountStore::revoke_robot(const std::string& robot_id, const std::string& actor,
-                                             std::int64_t utc_us) {
+Result<Enrolment> AccountStore::revoke_robot(const std::string& robot_id, const Author& by) {
+  SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement revoke{database_,
                            "UPDATE robot SET revoked_at_us = ?, revoked_by = ?"
                            " WHERE robot_id = ? AND revoked_at_us IS NULL"};
-  execute(revoke, utc_us, actor, robot_id);
+  const bool was_good = execute(revoke, by.at_us, by.actor, robot_id) > 0;
   const std::optional<Enrolment> revoked = find_robot(robot_id);
   if (!revoked) return unknown("robot", robot_id);
+  if (was_good) note(by, "robot.revoked", robot_id, nlohmann::json::object());
+  transaction.commit();
   return *revoked;
 }
 

@@ -1,7 +1,8 @@
 // SQL of accounts: users, API tokens, sessions of pages, and the enrolment of robots.
 //
 // On the thread that owns the handle: a running station's disk thread, or a tool that holds the data folder's lock.
-// Each change is one transaction. A Result's error is for whoever asked; SQLite's own failures are exceptions.
+// Each change is one transaction, with its entry in the audit. A Result's error is for whoever asked; SQLite's own
+// failures are exceptions.
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "server/account.hpp"
+#include "server/audit_note.hpp"
 
 namespace server {
 
@@ -41,15 +43,15 @@ class AccountStore {
   StoredAccounts load();
 
   // conflict: there is one of that name, or there are kMaxUsers.
-  Result<void> add_user(const User& user);
+  Result<void> add_user(const User& user, const Author& by);
   // not_found. A new password, or a user who is disabled, ends the user's sessions.
-  Result<User> change_user(const std::string& name, const UserChange& change);
-  Result<void> remove_user(const std::string& name, std::int64_t utc_us);  // with sessions; tokens are revoked
+  Result<User> change_user(const std::string& name, const UserChange& change, const Author& by);
+  Result<void> remove_user(const std::string& name, const Author& by);  // with sessions; tokens are revoked
 
   // conflict: there was one of that name, or kMaxTokens are in use. The oldest of more than kMaxTokens that were
   // revoked is forgotten.
-  Result<void> add_token(const ApiToken& token);
-  Result<ApiToken> revoke_token(const std::string& name, std::int64_t utc_us);
+  Result<void> add_token(const ApiToken& token, const Author& by);
+  Result<ApiToken> revoke_token(const std::string& name, const Author& by);
 
   // Everything that is in `sessions` is stored then, and nothing else; the tokens were last used then.
   void replace_sessions(const std::vector<PageSession>& sessions, std::uint64_t next_session,
@@ -57,14 +59,14 @@ class AccountStore {
 
   std::vector<Enrolment> enrolments();  // by robot
   // A robot that is new, was revoked, or has no token: it needs this one from now on. conflict: it has another.
-  Result<Enrolment> enrol(const std::string& robot_id, const SecretHash& token, const std::string& actor,
-                          std::int64_t utc_us);
-  Result<Enrolment> revoke_robot(const std::string& robot_id, const std::string& actor, std::int64_t utc_us);
+  Result<Enrolment> enrol(const std::string& robot_id, const SecretHash& token, const Author& by);
+  Result<Enrolment> revoke_robot(const std::string& robot_id, const Author& by);
 
  private:
   std::optional<User> find_user(const std::string& name);
   std::optional<Enrolment> find_robot(const std::string& robot_id);
   std::size_t count(const char* sql);
+  void note(const Author& by, const char* action, const std::string& subject, const nlohmann::json& detail);
 
   SQLite::Database& database_;
 };

@@ -145,7 +145,8 @@ asio::awaitable<Result<BackupRecord>> Backups::begin(std::string name) {
     try {
       return check_room(path, database, store_id);
     } catch (const std::exception& error) {
-      return fail(ErrorCode::unavailable, fmt::format("the folder of backups cannot be used: {}", error.what()));
+      spdlog::error("backups: {}", error.what());
+      return fail(ErrorCode::unavailable, "the folder of backups cannot be used; the station's log says why");
     }
   };
   const Result<void> possible = co_await checker_.run(std::move(check));

@@ -3,9 +3,11 @@
 
 #include <SQLiteCpp/Savepoint.h>
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 
+#include "server/recording/audit_chain.hpp"
 #include "server/recording/statement.hpp"
 #include "server/secrets.hpp"
 
@@ -116,10 +118,10 @@ std::vector<AdmissionOutcome> BootStore::admit(const std::vector<AdmissionQuesti
     try {
       outcomes.push_back(admit_together({&question, 1}, enrol_on_loopback).front());
     } catch (const std::exception& error) {
-      outcomes.push_back(
-          {refusal(rheonaut_REFUSAL_REASON_STATION_BUSY,
-                   fmt::format("the station's database cannot be used now: {}; try again", error.what())),
-           {}});
+      spdlog::error("a robot cannot be admitted now: {}", error.what());
+      outcomes.push_back({refusal(rheonaut_REFUSAL_REASON_STATION_BUSY,
+                                  "the station's database cannot be used now; its log says why; try again"),
+                          {}});
     }
   }
   return outcomes;
@@ -180,6 +182,7 @@ Admission BootStore::check_robot(const AdmissionRequest& request, bool enrol_on_
     bind_all(add, request.robot_id, request.received_at_us);
     set_token(add, 3, request.token);
     add.exec();
+    note_enrolled(request);
     admission.newly_enrolled = true;
     return admission;
   }
@@ -191,11 +194,21 @@ Admission BootStore::check_robot(const AdmissionRequest& request, bool enrol_on_
     bind_all(add, request.robot_id);
     set_token(add, 2, request.token);
     add.exec();
+    note_enrolled(request);
     admission.newly_enrolled = true;
     return admission;
   }
   return refusal(rheonaut_REFUSAL_REASON_WRONG_TOKEN,
                  fmt::format("the token of robot '{}' is not the one it was enrolled with", request.robot_id));
+}
+
+void BootStore::note_enrolled(const AdmissionRequest& request) {
+  AuditNote note;
+  note.by = {"loopback", "", request.received_at_us};
+  note.robot_id = request.robot_id;
+  note.action = "robot.enrolled";
+  note.detail = request.token.empty() ? R"({"token":false})" : R"({"token":true})";
+  AuditChain{database_.handle()}.append(note);
 }
 
 void BootStore::add(const std::vector<NewBoot>& boots) {

@@ -94,6 +94,7 @@ class BootStore {
   std::vector<AdmissionOutcome> admit_together(std::span<const AdmissionQuestion> questions, bool enrol_on_loopback);
   AdmissionOutcome admit_one(const AdmissionQuestion& question, bool enrol_on_loopback);
   Admission check_robot(const AdmissionRequest& request, bool enrol_on_loopback);
+  void note_enrolled(const AdmissionRequest& request);
   std::uint64_t latch_of(const RobotId& robot_id);
   std::optional<std::uint64_t> last_emergency(std::int64_t boot_key);  // empty: nothing of it is stored
   StoredBoot load(std::int64_t boot_key);

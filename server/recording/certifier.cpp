@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <tuple>
 #include <utility>
 
@@ -14,7 +13,6 @@
 
 namespace server {
 namespace asio = boost::asio;
-using namespace asio::experimental::awaitable_operators;
 using namespace std::chrono_literals;
 
 namespace {
@@ -132,7 +130,7 @@ asio::awaitable<void> Certifier::wait_until_due() {
   std::int64_t due_us = pending_.begin()->second.due_us;
   for (const auto& [run, pending] : pending_) due_us = std::min(due_us, pending.due_us);
   if (due_us <= clock_.steady_us()) co_return;
-  co_await (added_.wait() || clock_.sleep_until(due_us));
+  co_await added_.wait_until(clock_, due_us);
 }
 
 asio::awaitable<void> Certifier::look_at(RunId run) {

@@ -185,6 +185,12 @@ asio::awaitable<std::vector<CommandRecord>> History::commands(RobotId robot_id, 
   co_return co_await reader_.ask(std::move(query));
 }
 
+asio::awaitable<AuditPage> History::audit(AuditFilter filter) {
+  auto query = [filter](SQLite::Database& database) { return read_audit(database, filter); };
+  co_await recorder_.flush_records();
+  co_return co_await reader_.ask(std::move(query));
+}
+
 asio::awaitable<Result<CommandRecord>> History::command(CommandId id) {
   auto query = [id](SQLite::Database& database) -> Result<CommandRecord> {
     SQLite::Statement row{database, select_commands("WHERE command_id = ?")};

@@ -16,6 +16,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "server/recording/audit_queries.hpp"
 #include "server/recording/database_reader.hpp"
 #include "server/recording/overview.hpp"
 #include "server/recording/recorder.hpp"
@@ -74,6 +75,8 @@ class History {
   boost::asio::awaitable<std::vector<RobotEvent>> events(RobotId robot_id, std::size_t limit);
   boost::asio::awaitable<std::vector<CommandRecord>> commands(RobotId robot_id, std::size_t limit);
   boost::asio::awaitable<Result<CommandRecord>> command(CommandId id);
+
+  boost::asio::awaitable<AuditPage> audit(AuditFilter filter);
 
   // Returns when every command and event that the recorder has heard is durable, or after 3 s when the disk fails.
   boost::asio::awaitable<void> settle();

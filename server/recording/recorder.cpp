@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cmath>
 #include <iterator>
 
@@ -14,7 +13,6 @@
 
 namespace server {
 namespace asio = boost::asio;
-using namespace asio::experimental::awaitable_operators;
 using namespace std::chrono_literals;
 
 namespace {
@@ -33,6 +31,13 @@ bool is_malformed(const SampleBatch& batch) {
   const bool finite = std::isfinite(context.disturbance_m) && std::isfinite(context.position_sd_m) &&
                       std::isfinite(context.setpoint_m.value_or(0));
   return batch.samples.empty() || !numbers || !finite;
+}
+
+AuditNote of_station(const char* action, std::int64_t utc_us) {
+  AuditNote note;
+  note.by = {"station", "", utc_us};
+  note.action = action;
+  return note;
 }
 
 }  // namespace
@@ -63,9 +68,14 @@ asio::awaitable<RestoredState> Recorder::open() {
     BootStore boots{*database_};
     next_boot_key_ = boots.next_boot_key();
     restored_at_us_ = database_->restored_at_us();
+    spdlog::info("audit: goes on from {}", text(audit_head(database_->handle())));
     return RestoredState{database_->store_id(), boots.robots(), pending_stops(*database_)};
   };
-  co_return co_await disk_.run(std::move(job));
+  RestoredState restored = co_await disk_.run(std::move(job));
+  AuditNote started = of_station("station.started", clock_.utc_us());
+  started.detail = fmt::format(R"({{"version":"{}","store_id":"{}"}})", RHEONAUT_VERSION, restored.store_id);
+  on_audit(started);
+  co_return restored;
 }
 
 asio::awaitable<void> Recorder::run() {
@@ -87,20 +97,21 @@ asio::awaitable<void> Recorder::wait_for_commit() {
     co_await clock_.sleep_until(retry_at_us_);
     co_return;
   }
-  if (boots_.empty() && queue_.empty() && flushes_.empty()) {
+  if (boots_.empty() && queue_.empty() && flushes_.empty() && !quota_.has_left_out()) {
     idle_ = true;
     co_await work_.wait();
     idle_ = false;
   }
   const std::int64_t regular_us = last_commit_us_ + kCommitInterval.count();
   while (flushes_.empty() && clock_.steady_us() < regular_us) {
-    co_await (clock_.sleep_until(regular_us) || flush_wanted_.wait());
+    co_await flush_wanted_.wait_until(clock_, regular_us);
   }
   last_commit_us_ = clock_.steady_us();
 }
 
-void Recorder::close() {
+void Recorder::close(const std::function<void(Database&, std::int64_t)>& last) {
   if (!store_) return;
+  tell_left_out(true);
   std::string problem;
   for (;;) {  // first a commit that failed, or was cancelled
     if (writing_.empty()) {
@@ -124,6 +135,13 @@ void Recorder::close() {
   }
   writing_ = {};
   store_.reset();
+  try {
+    if (last) last(*database_, clock_.utc_us());
+    const AuditHead head = append_audit(database_->handle(), of_station("station.stopped", clock_.utc_us()));
+    spdlog::info("audit: ends with {}", text(head));
+  } catch (const std::exception& error) {
+    spdlog::warn("the last words of the audit could not be written: {}", error.what());
+  }
   try {
     database_->checkpoint();
   } catch (const std::exception& error) {  // only the log stays longer: it is read at the next start
@@ -220,10 +238,27 @@ void Recorder::on_command(const CommandRecord& command) {
     return;
   }
   // SAFETY: a stop must be known after a restart, so it is recorded whatever waits.
-  if (command.kind != "emergency_stop" && !room_for_record()) return;
+  if (command.kind != "emergency_stop" && !room_for_record()) return quota_.leave_out("command");
   queued_commands_.emplace(command.id, queue_.commands.size());
   queue_.commands.push_back(command);
   wake();
+}
+
+void Recorder::on_audit(const AuditNote& note) {
+  wake();
+  if (note.can_flood && !quota_.take(note.action, clock_.steady_us())) return;
+  if (!room_for_record()) return quota_.leave_out(note.action);
+  queue_.audit.push_back(note);
+}
+
+// What has no entry is an entry, too: nobody can make the audit silent unseen.
+void Recorder::tell_left_out(bool at_once) {
+  for (const auto& [action, count] : quota_.tell(clock_.steady_us(), at_once)) {
+    AuditNote note = of_station("audit.left_out", clock_.utc_us());
+    note.subject = action;
+    note.detail = fmt::format(R"({{"count":{}}})", count);
+    queue_.audit.push_back(std::move(note));
+  }
 }
 
 void Recorder::on_clock(const RobotState&, const ClockRecord& record) {

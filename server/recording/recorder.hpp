@@ -36,6 +36,7 @@
 #include <vector>
 
 #include "server/clock.hpp"
+#include "server/recording/audit_quota.hpp"
 #include "server/recording/boot_recording.hpp"
 #include "server/recording/checkpointer.hpp"
 #include "server/station/robot_archive.hpp"
@@ -48,7 +49,7 @@ struct RecorderOptions {
   std::filesystem::path path;     // of the database
   bool enrol_on_loopback = true;  // a new robot that connects from this machine is enrolled
   std::size_t max_queued_samples = 2'000'000;
-  std::size_t max_queued_records = 100'000;   // events, commands, clock estimates, texts in force
+  std::size_t max_queued_records = 100'000;   // events, commands, audit, clock estimates, texts in force
   std::uint64_t checkpoint_bytes = 64 << 20;  // of the write-ahead log, from which on it is moved into the database
 };
 
@@ -104,8 +105,9 @@ class Recorder final : public StationSink, public RobotArchive {
   boost::asio::awaitable<bool> flush_records();  // events, commands and boots
   boost::asio::awaitable<bool> flush_boots();    // boots and the spans that they moved; nothing is written if none wait
 
-  // After the loop has ended: writes and commits everything left, or logs what could not be written. Does not throw.
-  void close();
+  // After the loop has ended: writes and commits everything left, or logs what could not be written; then `last` has
+  // the database to itself. Does not throw.
+  void close(const std::function<void(Database&, std::int64_t utc_us)>& last = {});
 
   boost::asio::awaitable<Admission> admit(AdmissionRequest request) override;
 
@@ -116,6 +118,8 @@ class Recorder final : public StationSink, public RobotArchive {
   void on_samples(const RobotState& robot, const SampleBatch& batch) override;
   void on_event(const RobotState& robot, const RobotEvent& event) override;
   void on_command(const CommandRecord& command) override;
+  // Written with the next commit; what can flood is bounded by an AuditQuota.
+  void on_audit(const AuditNote& note) override;
   void on_clock(const RobotState& robot, const ClockRecord& record) override;
   void on_in_force(const RobotState& robot, const InForceRecord& record) override;
 
@@ -251,9 +255,11 @@ class Recorder final : public StationSink, public RobotArchive {
   void replace_others(const RobotId& robot_id, BootId boot_id);
   void wake();
   std::size_t queued_records() const {
-    return queue_.events.size() + queue_.commands.size() + queue_.clocks.size() + queue_.in_force.size();
+    return queue_.events.size() + queue_.commands.size() + queue_.audit.size() + queue_.clocks.size() +
+           queue_.in_force.size();
   }
   bool room_for_record();
+  void tell_left_out(bool at_once);
   std::int64_t key_of(BootId boot_id) const;
 
   boost::asio::io_context& loop_;
@@ -295,6 +301,7 @@ class Recorder final : public StationSink, public RobotArchive {
   std::vector<BootEntry*> writing_boots_;                       // in the order of its progress
   std::unordered_map<CommandId, std::size_t> queued_commands_;  // where each waits in queue_.commands
   std::size_t queued_samples_ = 0;
+  AuditQuota quota_;
   RecorderCounters counters_;
   std::int64_t last_commit_us_ = 0;      // steady
   std::int64_t retry_at_us_ = 0;         // steady; 0 unless the last commit failed

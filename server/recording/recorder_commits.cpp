@@ -86,6 +86,7 @@ void Recorder::line_up_due() {
 }
 
 void Recorder::take() {
+  tell_left_out(false);
   line_up_due();
   writing_ = std::exchange(queue_, {});
   queued_commands_.clear();

@@ -1,14 +1,11 @@
 // What the recorder knows and the disk does not yet, and the ways to wait until it does.
 #include <algorithm>
-#include <boost/asio/experimental/awaitable_operators.hpp>
 #include <limits>
-#include <variant>
 
 #include "server/recording/recorder.hpp"
 
 namespace server {
 namespace asio = boost::asio;
-using namespace asio::experimental::awaitable_operators;
 using namespace std::chrono_literals;
 
 namespace {
@@ -95,9 +92,7 @@ asio::awaitable<bool> Recorder::flush_after(std::uint64_t segments) {
   flushes_.push_back({done, segments});
   flush_wanted_.notify();
   wake();
-  const std::variant<std::monostate, std::monostate> first =
-      co_await (done->wait() || clock_.sleep_for(kFlushPatience));
-  co_return first.index() == 0;
+  co_return co_await done->wait_until(clock_, clock_.steady_us() + kFlushPatience.count());
 }
 
 }  // namespace server

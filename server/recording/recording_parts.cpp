@@ -1,8 +1,6 @@
 // A part is a member, and a line in each function that concerns it.
 #include "server/recording/recording_parts.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <functional>
 
 #include "server/recording/run_store.hpp"
@@ -40,6 +38,7 @@ RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThrea
 void RecordingParts::connect(Station& station) {
   station.add_sink(recorder);
   station.add_sink(runs);
+  runs.set_on_fluid(std::bind_front(&Station::set_fluid, &station));
   recorder.set_on_durable(std::bind_front(&Station::on_durable, &station));
   recorder.set_on_missing(std::bind_front(&Station::request_resend, &station));
   recorder.set_on_missing_events(std::bind_front(&Station::request_event_resend, &station));
@@ -69,15 +68,9 @@ void RecordingParts::spawn(TaskGroup& tasks) {
 void RecordingParts::close() {
   backups.close();
   for (DatabaseReader* each : {&reader, &history.reader(), &exports.reader()}) each->close();
-  recorder.close();
-  if (!runs.any_open()) return;
-  try {
-    Database database{path_};
-    RunStore{database, {}}.interrupt();
-    database.checkpoint();
-  } catch (const std::exception& error) {  // the next start does it
-    spdlog::warn("the open runs could not be interrupted: {}", error.what());
-  }
+  recorder.close([this](Database& database, std::int64_t utc_us) {  // what fails is done by the next start
+    if (runs.any_open()) RunStore{database, {}}.interrupt(utc_us);
+  });
 }
 
 }  // namespace server

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <sodium.h>
 
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "server/recording/audit_chain.hpp"
 #include "server/recording/backup_copy.hpp"
 #include "server/recording/database.hpp"
 #include "server/recording/file_check.hpp"
@@ -42,16 +44,21 @@ void copy_database(const fs::path& from, const fs::path& to) {
   while (!copy.step(kPagesAtOnce)) continue;
 }
 
-RestoredStore mark(Database& database, std::int64_t utc_us) {
+RestoredStore mark(Database& database, const fs::path& from, const Author& by) {
   RestoredStore restored;
-  restored.runs_interrupted = static_cast<std::int64_t>(RunStore{database, {}}.interrupt());
+  restored.runs_interrupted = static_cast<std::int64_t>(RunStore{database, {}}.interrupt(by.at_us));
   SQLite::Database& handle = database.handle();
   SQLite::Transaction transaction{handle, SQLite::TransactionBehavior::IMMEDIATE};
   randombytes_buf(&restored.store_id, sizeof restored.store_id);
   SQLite::Statement set{handle, "INSERT OR REPLACE INTO meta (name, value) VALUES (?, ?)"};
   execute(set, "store_id", restored.store_id);
-  execute(set, "restored_at_us", utc_us);
+  execute(set, "restored_at_us", by.at_us);
   handle.exec("DELETE FROM page_session");  // of the time of the backup: whoever was signed out since stays so
+  AuditNote note;
+  note.by = by;
+  note.action = "store.restored";
+  note.detail = audit_detail({{"from", from.filename().string()}, {"store_id", std::to_string(restored.store_id)}});
+  AuditChain{handle}.append(note);
   transaction.commit();
   restored.runs = handle.execAndGet("SELECT count(*) FROM run").getInt64();
   restored.samples = handle.execAndGet("SELECT coalesce(sum(last_seq - first_seq + 1), 0) FROM segment").getInt64();
@@ -60,7 +67,7 @@ RestoredStore mark(Database& database, std::int64_t utc_us) {
 
 }  // namespace
 
-RestoredStore restore_database(const fs::path& from, const fs::path& folder, std::int64_t utc_us) {
+RestoredStore restore_database(const fs::path& from, const fs::path& folder, const Author& by) {
   const fs::path to = folder / "station.sqlite";
   check(from, to);
   const Draft draft{folder / "station.sqlite.part"};
@@ -76,7 +83,7 @@ RestoredStore restore_database(const fs::path& from, const fs::path& folder, std
   }
   {
     Database database{draft.path()};
-    restored = mark(database, utc_us);
+    restored = mark(database, from, by);
     database.checkpoint();
   }
   finish_file(draft.path(), to);

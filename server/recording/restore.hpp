@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "server/audit_note.hpp"
+
 namespace server {
 
 struct RestoredStore {
@@ -17,6 +19,6 @@ struct RestoredStore {
 // store_id and no open run, and visible only when it is whole. Throws std::runtime_error that says why not and what to
 // do: there is a database already, the backup is foreign, newer or damaged, there is no room.
 RestoredStore restore_database(const std::filesystem::path& from, const std::filesystem::path& folder,
-                               std::int64_t utc_us);
+                               const Author& by);
 
 }  // namespace server

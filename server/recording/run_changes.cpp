@@ -1,6 +1,7 @@
 // SQL that makes runs of what is recorded, and that changes what is said of them.
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "server/recording/in_force_store.hpp"
@@ -11,6 +12,7 @@
 namespace server {
 namespace {
 
+constexpr std::size_t kMaxToldBytes = 200;  // of a text that stands in run_note as a whole
 constexpr std::array<const char*, 8> kTextColumns{"name",          "fluid",   "pump_profile", "tube",
                                                   "operator_name", "profile", "notes",        "verdict"};
 
@@ -22,7 +24,7 @@ Result<RunState> state_of(SQLite::Database& database, RunId id) {
 
 }  // namespace
 
-std::optional<RunId> RunStore::add_afterwards(Run run, const RecordedSamples& samples) {
+std::optional<RunId> RunStore::add_afterwards(Run run, const RecordedSamples& samples, const Author& by) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement stored{handle_, "SELECT 1 FROM segment WHERE boot_key = ? LIMIT 1"};
   run.state = RunState::ended;
@@ -41,17 +43,19 @@ std::optional<RunId> RunStore::add_afterwards(Run run, const RecordedSamples& sa
     execute(add, id, static_cast<std::int64_t>(span), boot.boot_key, boot.samples.first, boot.samples.next - 1);
   }
   stored.reset();
+  tell(id, run.robot_id, "run.made", {{"name", run.conditions.name}, {"afterwards", true}}, by);
   transaction.commit();
   return id;
 }
 
-Result<void> RunStore::annotate(RunId id, const RunAnnotation& annotation, const Author& author) {
+Result<void> RunStore::annotate(RunId id, const RunAnnotation& annotation, const Author& by) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   const Result<RunState> state = state_of(handle_, id);
   if (!state) return std::unexpected{state.error()};
   if (*state == RunState::discarded) {
     return fail(ErrorCode::conflict, fmt::format("run {} was discarded", id));
   }
+  nlohmann::json changed = nlohmann::json::array();
   const auto change = [&](const std::string& column, const auto& after, const std::string& after_text) {
     SQLite::Statement before{handle_, fmt::format("SELECT {} FROM run WHERE run_id = ?", column)};
     bind_all(before, id);
@@ -61,7 +65,8 @@ Result<void> RunStore::annotate(RunId id, const RunAnnotation& annotation, const
     if (before_text == after_text) return;
     SQLite::Statement update{handle_, fmt::format("UPDATE run SET {} = ?2 WHERE run_id = ?1", column)};
     execute(update, id, after);
-    add_note(id, author, column, before_text, after_text);
+    add_note(id, by, column, before_text, after_text);
+    changed.push_back(column);
   };
   for (const char* column : kTextColumns) {
     if (const auto given = annotation.texts.find(column); given != annotation.texts.end()) {
@@ -72,11 +77,12 @@ Result<void> RunStore::annotate(RunId id, const RunAnnotation& annotation, const
     const std::optional<double>& flow = annotation.mean_flow_m_s;
     change("mean_flow_m_s", flow, flow ? fmt::format("{}", *flow) : "");
   }
+  if (!changed.empty()) tell(id, robot_of(handle_, id), "run.annotated", {{"changed", changed}}, by);
   transaction.commit();
   return {};
 }
 
-Result<void> RunStore::discard(RunId id, const std::string& reason, const Author& author) {
+Result<void> RunStore::discard(RunId id, const std::string& reason, const Author& by) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   const Result<RunState> state = state_of(handle_, id);
   if (!state) return std::unexpected{state.error()};
@@ -84,8 +90,9 @@ Result<void> RunStore::discard(RunId id, const std::string& reason, const Author
   if (*state == RunState::discarded) return fail(ErrorCode::conflict, fmt::format("run {} was discarded already", id));
   SQLite::Statement mark{handle_, "UPDATE run SET state = 'discarded' WHERE run_id = ?"};
   execute(mark, id);
-  add_note(id, author, "state", text(*state), "discarded");
-  add_note(id, author, "discard_reason", "", reason);
+  add_note(id, by, "state", text(*state), "discarded");
+  add_note(id, by, "discard_reason", "", reason);
+  tell(id, robot_of(handle_, id), "run.discarded", {{"reason", reason.substr(0, kMaxToldBytes)}}, by);
   transaction.commit();
   return {};
 }
@@ -94,7 +101,7 @@ void RunStore::add_note(RunId id, const Author& author, const std::string& field
                         const std::string& after) {
   SQLite::Statement add{
       handle_, "INSERT INTO run_note (run_id, made_at_us, actor, field, before, after) VALUES (?, ?, ?, ?, ?, ?)"};
-  execute(add, id, author.utc_us, author.actor, field, before, after);
+  execute(add, id, author.at_us, author.actor, field, before, after);
 }
 
 // In each span of the run, unless it was already.

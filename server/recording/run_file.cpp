@@ -42,6 +42,19 @@ CREATE TABLE sample (
   gap_before INTEGER NOT NULL,             -- samples that are missing right before this one
   gap_after INTEGER NOT NULL               -- and after it, to the end of its span
 );
+CREATE TABLE audit (                       -- docs/database.md
+  entry INTEGER PRIMARY KEY,
+  at_us INTEGER,                           -- this to salt: NULL in entries of other robots and of accounts
+  actor TEXT,
+  peer TEXT,
+  robot_id TEXT,
+  action TEXT,
+  subject TEXT,
+  detail TEXT,
+  salt BLOB,
+  content_hash BLOB NOT NULL,
+  hash BLOB NOT NULL
+);
 CREATE TABLE gap (
   boot_id TEXT NOT NULL,
   first_seq INTEGER NOT NULL,
@@ -54,11 +67,13 @@ CREATE TABLE gap (
 // Each is a slice, or a series of them: `piece` gives the key of the last row of the piece after {1}, NULL at the end,
 // and the piece is what `sql` copies between {1} and {2}. {0} is the run. A robot's events are those of its samples,
 // whenever they came; events of the station itself, and commands, are of the time between the run's beginning and its
-// end.
+// end. A database of a schema before `since` has none of it.
 struct Copy {
   const char* sql;
   const char* piece = nullptr;
+  std::int64_t since = 0;
 };
+constexpr std::int64_t kAuditSince = 5;
 
 constexpr Copy kCopies[] = {
     {"CREATE TABLE run AS SELECT * FROM store.run WHERE run_id = {0}"},
@@ -79,6 +94,21 @@ constexpr Copy kCopies[] = {
      "SELECT max(submitted_at_us) FROM (SELECT submitted_at_us FROM run CROSS JOIN store.command AS made"
      " WHERE made.robot_id = run.robot_id AND submitted_at_us > max({1}, started_at_us - 1)"
      " AND submitted_at_us <= coalesce(run.ended_at_us, 9223372036854775807) ORDER BY submitted_at_us LIMIT 1000)"},
+    // The chain from the run's beginning to its end, and the entry before.
+    {"CREATE TEMP TABLE edge AS SELECT (SELECT entry FROM store.audit WHERE at_us >= started_at_us ORDER BY at_us, "
+     "entry"
+     " LIMIT 1) AS first_entry, (SELECT entry FROM store.audit WHERE at_us <= coalesce(ended_at_us, "
+     "9223372036854775807)"
+     " ORDER BY at_us DESC, entry DESC LIMIT 1) AS last_entry FROM run",
+     nullptr, kAuditSince},
+    {"INSERT INTO main.audit SELECT entry, iif(shown, at_us, NULL), iif(shown, actor, NULL), iif(shown, peer, NULL),"
+     " iif(shown, robot_id, NULL), iif(shown, action, NULL), iif(shown, subject, NULL), iif(shown, detail, NULL),"
+     " iif(shown, salt, NULL), content_hash, hash FROM (SELECT made.*, made.robot_id = run.robot_id"
+     " OR (made.robot_id = '' AND (action GLOB 'station.*' OR action GLOB 'store.*' OR action GLOB 'audit.*')) AS shown"
+     " FROM store.audit AS made, main.run, edge WHERE entry > {1} AND entry <= {2} AND entry >= first_entry - 1)",
+     "SELECT max(entry) FROM (SELECT entry FROM edge CROSS JOIN store.audit"
+     " WHERE entry > {1} AND entry BETWEEN first_entry - 1 AND last_entry ORDER BY entry LIMIT 1000)",
+     kAuditSince},
     {"CREATE TABLE marker AS SELECT * FROM store.run_marker WHERE run_id = {0}"},
     {"CREATE TABLE run_certificate AS SELECT * FROM store.run_certificate WHERE run_id = {0}"},
     {"CREATE TABLE in_force AS SELECT * FROM store.run_in_force WHERE run_id = {0}"},
@@ -110,7 +140,8 @@ void RunFile::begin() {
   file_ = std::make_unique<SQLite::Database>(path_.string(),
                                              SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE | SQLite::OPEN_URI);
   file_->exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF");
-  file_->exec(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kApplicationId + 1, kRunFileVersion));
+  file_->exec(
+      fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kRunFileApplicationId, kRunFileVersion));
   file_->exec(kTables);
   SQLite::Statement attach{*file_, "ATTACH ? AS store"};
   execute(attach, store_);
@@ -119,11 +150,12 @@ void RunFile::begin() {
 void RunFile::copy_some() {
   const Copy& copy = kCopies[copied_];
   std::int64_t last = 0;
-  if (copy.piece != nullptr) {
+  const bool has_it = copy.since <= file_->execAndGet("PRAGMA store.user_version").getInt64();
+  if (has_it && copy.piece != nullptr) {
     const SQLite::Column found = file_->execAndGet(fmt::format(fmt::runtime(copy.piece), query_.run, piece_after_));
     last = found.isNull() ? 0 : found.getInt64();
   }
-  if (copy.piece == nullptr || last != 0) {
+  if (has_it && (copy.piece == nullptr || last != 0)) {
     file_->exec(fmt::format(fmt::runtime(copy.sql), query_.run, piece_after_, last));
   }
   piece_after_ = last;

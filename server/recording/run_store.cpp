@@ -4,13 +4,26 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
+#include "server/recording/audit_chain.hpp"
 #include "server/recording/run_spans.hpp"
 #include "server/recording/statement.hpp"
 
 namespace server {
+namespace {
 
-Result<RunId> RunStore::add(const Run& run, const std::string& station_document) {
+constexpr std::size_t kMaxToldBytes = 200;  // of a verdict, which stands in the run as a whole
+
+}  // namespace
+
+RobotId robot_of(SQLite::Database& database, RunId run) {
+  SQLite::Statement query{database, "SELECT robot_id FROM run WHERE run_id = ?"};
+  bind_all(query, run);
+  return query.executeStep() ? query.getColumn(0).getString() : RobotId{};
+}
+
+Result<RunId> RunStore::add(const Run& run, const std::string& station_document, const Author& by) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   const RunSpan& span = run.spans.front();
   SQLite::Statement boot{handle_, "SELECT boot_key FROM boot WHERE boot_id = ? AND ended_next_seq IS NULL"};
@@ -23,6 +36,7 @@ Result<RunId> RunStore::add(const Run& run, const std::string& station_document)
   execute(add_span, id, boot.getColumn(0).getInt64(), span.first_seq);
   boot.reset();
   put_in_force(id, station_document, run.started_at_us);
+  tell(id, run.robot_id, "run.made", {{"name", run.conditions.name}}, by);
   transaction.commit();
   return id;
 }
@@ -38,19 +52,20 @@ RunId RunStore::insert(const Run& run) {
   return handle_.getLastInsertRowid();
 }
 
-void RunStore::end(RunId id, const std::string& verdict, std::int64_t utc_us, const std::string& station_document) {
+void RunStore::end(RunId id, const std::string& verdict, const std::string& station_document, const Author& by) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   close_span(id);
   SQLite::Statement mark{
       handle_,
       "UPDATE run SET ended_at_us = ?2, state = 'ended', verdict = CASE ?3 WHEN '' THEN verdict ELSE ?3 END"
       " WHERE run_id = ?1"};
-  execute(mark, id, utc_us, verdict);
-  put_in_force(id, station_document, utc_us);  // in the spans that reboots have begun
+  execute(mark, id, by.at_us, verdict);
+  put_in_force(id, station_document, by.at_us);  // in the spans that reboots have begun
+  tell(id, robot_of(handle_, id), "run.ended", {{"verdict", verdict.substr(0, kMaxToldBytes)}}, by);
   transaction.commit();
 }
 
-std::size_t RunStore::interrupt() {
+std::size_t RunStore::interrupt(std::int64_t utc_us) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   std::vector<RunId> open;
   SQLite::Statement query{handle_, "SELECT run_id FROM run WHERE ended_at_us IS NULL"};
@@ -67,10 +82,22 @@ std::size_t RunStore::interrupt() {
       last = time_of(handle_, last_span.getColumn(0).getInt64(), unsigned_id(last_span.getColumn(1)));
     }
     execute(mark, id, last ? last->utc_us : 0);
+    tell(id, robot_of(handle_, id), "run.interrupted", nlohmann::json::object(), {"station", "", utc_us});
   }
   last_span.reset();
   transaction.commit();
   return open.size();
+}
+
+void RunStore::tell(RunId id, const RobotId& robot_id, const char* action, const nlohmann::json& detail,
+                    const Author& by) {
+  AuditNote note;
+  note.by = by;
+  note.robot_id = robot_id;
+  note.action = action;
+  note.subject = std::to_string(id);
+  note.detail = audit_detail(detail);
+  AuditChain{handle_}.append(note);
 }
 
 void RunStore::close_span(RunId id) {

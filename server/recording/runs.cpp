@@ -74,9 +74,9 @@ Runs::Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, Certifier& 
     : clock_{clock}, recorder_{recorder}, reader_{reader}, certifier_{certifier} {}
 
 asio::awaitable<void> Runs::load() {
-  auto job = [](Database& database) -> Result<std::size_t> {
+  auto job = [utc_us = clock_.utc_us()](Database& database) -> Result<std::size_t> {
     try {
-      return RunStore{database, {}}.interrupt();
+      return RunStore{database, {}}.interrupt(utc_us);
     } catch (const SQLite::Exception& error) {  // SAFETY: a full disk does not keep the station from starting
       return fail(ErrorCode::unavailable, error.what());
     }
@@ -97,7 +97,7 @@ asio::awaitable<void> Runs::finish_loading() {
   }
 }
 
-asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions conditions, std::string made_by) {
+asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions conditions, Author by) {
   const Result<void> valid = check(conditions);
   if (!valid) co_return std::unexpected{valid.error()};
   const auto found = robots_.find(robot_id);
@@ -112,13 +112,13 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
   const Robot& robot = found->second;
   Run run;
   run.robot_id = robot_id;
-  run.made_by = std::move(made_by);
+  run.made_by = by.actor;
   run.conditions = std::move(conditions);
   run.firmware_version = robot.firmware_version;
   run.controller_id = robot.controller_id;
   run.controller_checksum = robot.controller_checksum;
   run.parameters_checksum = robot.parameters_checksum;
-  run.started_at_us = clock_.utc_us();
+  run.started_at_us = by.at_us = clock_.utc_us();
   run.spans.push_back({.boot_id = robot.boot_id, .first_seq = recorder_.next_seq(robot.boot_id), .last_seq = {}});
 
   struct Creating {  // no second run of this robot meanwhile; forgotten unless the run was made
@@ -133,17 +133,18 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
   // The run is stored after the connection it begins in, so a later boot can follow it.
   const bool flushed = co_await recorder_.flush_records();
   if (!flushed) co_return std::unexpected{disk_fails()};
-  auto job = [run, document = station_document_](Database& database) {
-    return RunStore{database, {}}.add(run, document);
+  auto job = [run, document = station_document_, by](Database& database) {
+    return RunStore{database, {}}.add(run, document, by);
   };
   const Result<RunId> id = co_await recorder_.on_disk(std::move(job));
   if (!id) co_return std::unexpected{id.error()};
   open_runs_[robot_id] = *id;
+  on_fluid_(robot_id, run.conditions.fluid);
   run.id = *id;
   co_return run;
 }
 
-asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
+asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, Author by) {
   if (verdict.size() > kMaxTextBytes) {
     co_return fail(ErrorCode::invalid, fmt::format("a verdict has at most {} bytes", kMaxTextBytes));
   }
@@ -159,8 +160,10 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
   }
   const auto robot = robots_.find(open->first);
   const BootId boot_id = robot == robots_.end() ? 0 : robot->second.boot_id;
-  auto job = [id, verdict, utc_us = clock_.utc_us(), heads = std::move(heard), document = station_document_](
-                 Database& database) { RunStore{database, heads}.end(id, verdict, utc_us, document); };
+  by.at_us = clock_.utc_us();
+  auto job = [id, verdict, by, heads = std::move(heard), document = station_document_](Database& database) {
+    RunStore{database, heads}.end(id, verdict, document, by);
+  };
   struct Ending {  // by one request at a time; the run stays open when the job throws
     std::set<RunId>& ending;
     RunId id;
@@ -171,7 +174,11 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
     const Ending ending{ending_, id};
     co_await recorder_.on_disk(std::move(job));
   }
-  std::erase_if(open_runs_, [id](const auto& entry) { return entry.second == id; });
+  std::erase_if(open_runs_, [this, id](const auto& entry) {
+    if (entry.second != id) return false;
+    on_fluid_(entry.first, "");
+    return true;
+  });
 
   const std::int64_t deadline_us = clock_.steady_us() + kEndPatience.count();
   for (;;) {
@@ -187,7 +194,7 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict) {
 }
 
 asio::awaitable<Result<Run>> Runs::make_afterwards(RobotId robot_id, RunConditions conditions, RecordedRange range,
-                                                   std::string made_by) {
+                                                   Author by) {
   const Result<void> valid = check(conditions);
   if (!valid) co_return std::unexpected{valid.error()};
   if (const auto* time = std::get_if<TimeSpan>(&range)) {
@@ -202,13 +209,14 @@ asio::awaitable<Result<Run>> Runs::make_afterwards(RobotId robot_id, RunConditio
   Run run;
   run.robot_id = std::move(robot_id);
   run.conditions = std::move(conditions);
-  run.made_by = std::move(made_by);
+  run.made_by = by.actor;
+  by.at_us = clock_.utc_us();
   std::optional<RunId> id;
   while (!id) {  // again only when samples that were found have been purged before the run could hold them
     const Result<RecordedSamples> samples = co_await samples_in(run.robot_id, range);
     if (!samples) co_return std::unexpected{samples.error()};
-    auto job = [run, found = *samples](Database& database) {
-      return RunStore{database, {}}.add_afterwards(run, found);
+    auto job = [run, found = *samples, by](Database& database) {
+      return RunStore{database, {}}.add_afterwards(run, found, by);
     };
     id = co_await recorder_.on_disk(std::move(job));
   }
@@ -223,7 +231,7 @@ asio::awaitable<Result<RecordedSamples>> Runs::samples_in(RobotId robot_id, Reco
   co_return search.take();
 }
 
-asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, std::string actor) {
+asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, Author by) {
   RunConditions given;
   given.name = annotation.texts.contains("name") ? annotation.texts.at("name") : "unchanged";
   Result<void> outcome = check(given);
@@ -233,20 +241,22 @@ asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, 
   if (!outcome) co_return std::unexpected{outcome.error()};
   const bool flushed = co_await recorder_.flush_records();
   if (!flushed) co_return std::unexpected{disk_fails()};
-  auto job = [id, annotation, author = RunStore::Author{actor, clock_.utc_us()}](Database& database) {
-    return RunStore{database, {}}.annotate(id, annotation, author);
-  };
+  by.at_us = clock_.utc_us();
+  auto job = [id, annotation, by](Database& database) { return RunStore{database, {}}.annotate(id, annotation, by); };
   outcome = co_await recorder_.on_disk(std::move(job));
-  co_return co_await changed(id, std::move(outcome));
+  auto run = co_await changed(id, std::move(outcome));
+  if (run && open_runs_.contains(run->robot_id) && open_runs_.at(run->robot_id) == id) {
+    on_fluid_(run->robot_id, run->conditions.fluid);
+  }
+  co_return run;
 }
 
-asio::awaitable<Result<Run>> Runs::discard(RunId id, std::string reason, std::string actor) {
+asio::awaitable<Result<Run>> Runs::discard(RunId id, std::string reason, Author by) {
   if (reason.size() > kMaxTextBytes) co_return std::unexpected{text_too_long()};
   const bool flushed = co_await recorder_.flush_records();
   if (!flushed) co_return std::unexpected{disk_fails()};
-  auto job = [id, reason, author = RunStore::Author{actor, clock_.utc_us()}](Database& database) {
-    return RunStore{database, {}}.discard(id, reason, author);
-  };
+  by.at_us = clock_.utc_us();
+  auto job = [id, reason, by](Database& database) { return RunStore{database, {}}.discard(id, reason, by); };
   Result<void> outcome = co_await recorder_.on_disk(std::move(job));
   co_return co_await changed(id, std::move(outcome));
 }

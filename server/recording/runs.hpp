@@ -7,6 +7,7 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -14,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include "server/audit_note.hpp"
 #include "server/clock.hpp"
 #include "server/result.hpp"
 #include "server/station/station_sink.hpp"
@@ -128,28 +130,32 @@ class Runs final : public StationSink {
   // Some run is open: it is to be interrupted when the recorder has written all it heard.
   bool any_open() const { return !open_runs_.empty(); }
 
-  // create and end: unavailable while the disk cannot be written.
+  // Of an author the time is not looked at: it is now. create and end: unavailable while the disk cannot be written.
   // conflict when the robot has an open run, not_connected when it is not there, invalid for a bad name.
-  boost::asio::awaitable<Result<Run>> create(RobotId robot_id, RunConditions conditions, std::string made_by = {});
+  boost::asio::awaitable<Result<Run>> create(RobotId robot_id, RunConditions conditions, Author by = {});
 
   // A run of what was recorded already; it has ended. Its robot need not be there. invalid for a range without samples
   // or in the future, not_found for a robot or boot that is not known.
   boost::asio::awaitable<Result<Run>> make_afterwards(RobotId robot_id, RunConditions conditions, RecordedRange range,
-                                                      std::string made_by);
+                                                      Author by);
 
   // Changes what was said of the run; each change leaves a row in run_note. Its samples and their certificate have
   // nothing to do with it. conflict for a discarded run.
-  boost::asio::awaitable<Result<Run>> annotate(RunId id, RunAnnotation annotation, std::string actor);
+  boost::asio::awaitable<Result<Run>> annotate(RunId id, RunAnnotation annotation, Author by);
 
   // The run holds its samples no longer, and is not listed any more. conflict while it is open.
-  boost::asio::awaitable<Result<Run>> discard(RunId id, std::string reason, std::string actor);
+  boost::asio::awaitable<Result<Run>> discard(RunId id, std::string reason, Author by);
 
   // Of the station's configuration, as JSON: what each run keeps of it.
   void set_station_document(std::string json) { station_document_ = std::move(json); }
   boost::asio::awaitable<Result<RunSnapshot>> snapshot(RunId id);
 
+  // Hears which fluid a robot swims in, by its open run; empty: none is open, or it does not say.
+  using OnFluid = std::function<void(const RobotId& robot_id, const std::string& fluid)>;
+  void set_on_fluid(OnFluid on_fluid) { on_fluid_ = std::move(on_fluid); }
+
   // Ends the run with the latest sample received. Answers when that sample is durable or known lost, at most 3 s later.
-  boost::asio::awaitable<Result<Run>> end(RunId id, std::string verdict);
+  boost::asio::awaitable<Result<Run>> end(RunId id, std::string verdict, Author by = {});
 
   boost::asio::awaitable<Result<Run>> find(RunId id);
 
@@ -183,6 +189,7 @@ class Runs final : public StationSink {
   std::map<RobotId, RunId> open_runs_;  // 0: being created
   bool is_loaded_ = false;
   std::string station_document_;
+  OnFluid on_fluid_ = [](const RobotId&, const std::string&) {};
   std::set<RunId> ending_;  // of these, the ones whose end is being stored
 };
 

@@ -26,16 +26,12 @@ constexpr const char* kInsertEventGap =
 constexpr const char* kInsertEvent =
     "INSERT INTO event (robot_id, boot_key, event_seq, robot_time_us, sample_seq, kind, cause, mode, sub_state,"
     " position_m, value, emergency_id, command_id, received_at_us) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
-constexpr const char* kUpsertCommand =
-    "INSERT OR REPLACE INTO command (command_id, robot_id, boot_id, kind, arguments, actor, state, reason,"
-    " submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us, emergency_id, sent_after_us, acknowledged_after_us,"
-    " verified_after_us, life_from) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,nullif(?,-1),nullif(?,-1),nullif(?,-1),?)";
 
 }  // namespace
 
 bool WriteBatch::empty() const {
   return new_boots.empty() && segments.empty() && gaps.empty() && events.empty() && event_gaps.empty() &&
-         commands.empty() && clocks.empty() && in_force.empty() && boots.empty();
+         audit.empty() && commands.empty() && clocks.empty() && in_force.empty() && boots.empty();
 }
 
 SampleStore::SampleStore(Database& database)
@@ -47,7 +43,8 @@ SampleStore::SampleStore(Database& database)
       insert_gap_{database.handle(), kInsertGap},
       insert_event_{database.handle(), kInsertEvent},
       insert_event_gap_{database.handle(), kInsertEventGap},
-      upsert_command_{database.handle(), kUpsertCommand},
+      audit_{database.handle()},
+      commands_{database.handle()},
       advance_row_{database.handle(), "UPDATE meta SET value = ? WHERE name = 'next_row' AND value = ?"},
       advance_boot_{database.handle(),
                     "UPDATE boot SET durable_next_seq = ?, durable_next_event_seq = ?,"
@@ -75,7 +72,8 @@ void SampleStore::write(const WriteBatch& batch) {
   for (const LostRange& gap : batch.event_gaps) {
     execute(insert_event_gap_, gap.boot_key, gap.lost.first, gap.lost.next - 1, gap.cause, gap.noticed_at_us);
   }
-  for (const CommandRecord& command : batch.commands) write_command(command);
+  for (const AuditNote& note : batch.audit) audit_.append(note);
+  for (const CommandRecord& command : batch.commands) commands_.write(command, audit_);
   for (const auto& [boot_key, record] : batch.clocks) store_clock(database_.handle(), boot_key, record);
   for (const auto& [boot_key, record] : batch.in_force) store_in_force(database_.handle(), boot_key, record);
   for (const BootProgress& boot : batch.progress) {
@@ -108,13 +106,6 @@ void SampleStore::write_event(const StoredEvent& stored) {
   execute(insert_event_, event.robot_id, boot_key, event.event_seq, event.robot_time_us, event.sample_seq, event.kind,
           event.cause, protocol::text(event.mode), protocol::text(event.sub_state), event.position_m, event.value,
           event.emergency_id, event.command_id, event.received_at_us);
-}
-
-void SampleStore::write_command(const CommandRecord& command) {
-  execute(upsert_command_, command.id, command.robot_id, command.boot_id, command.kind, command.arguments,
-          command.actor, text(command.state), command.reason, command.submitted_at_us, command.sent_at_us,
-          command.ended_at_us, command.effect_at_robot_us, command.emergency_id, command.sent_after_us,
-          command.acknowledged_after_us, command.verified_after_us, command.life_from);
 }
 
 }  // namespace server

@@ -1,4 +1,5 @@
-// Writes what the recorder collected, one transaction at a time: samples with their segments, gaps, events, commands.
+// Writes what the recorder collected, one transaction at a time: samples with their segments, gaps, events, commands,
+// the audit.
 //
 // Disk thread only. Uses the Database, which outlives it. The recorder has already dropped every duplicate and cut the
 // samples into segments; the store numbers their rows and computes the extremes.
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "server/recording/boot_store.hpp"
+#include "server/recording/command_store.hpp"
 #include "server/recording/database.hpp"
 #include "server/recording/row_writer.hpp"
 #include "server/recording/segment.hpp"
@@ -37,6 +39,7 @@ struct WriteBatch {
   std::vector<LostRange> gaps;
   std::vector<StoredEvent> events;
   std::vector<LostRange> event_gaps;
+  std::vector<AuditNote> audit;         // in this order, and before those of the commands
   std::vector<CommandRecord> commands;  // each replaces what is stored of the same command
   std::vector<StoredClock> clocks;
   std::vector<StoredInForce> in_force;
@@ -62,7 +65,6 @@ class SampleStore {
  private:
   std::int64_t write_segment(const Segment& segment, std::int64_t first_row);  // returns the row after its last
   void write_event(const StoredEvent& stored);
-  void write_command(const CommandRecord& command);
 
   static constexpr std::uint64_t kLogPageBytes = 4096 + 24;
 
@@ -75,7 +77,8 @@ class SampleStore {
   SQLite::Statement insert_gap_;
   SQLite::Statement insert_event_;
   SQLite::Statement insert_event_gap_;
-  SQLite::Statement upsert_command_;
+  AuditChain audit_;
+  CommandStore commands_;
   SQLite::Statement advance_row_;
   SQLite::Statement advance_boot_;
 };

@@ -244,7 +244,7 @@ FROM command;
 }  // namespace
 
 std::span<const char* const> migrations() {
-  static const std::array migrations{kFirstSchema, kSecondSchema, kThirdSchema, kFourthSchema};
+  static const std::array migrations{kFirstSchema, kSecondSchema, kThirdSchema, kFourthSchema, kFifthSchema};
   return migrations;
 }
 

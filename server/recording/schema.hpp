@@ -17,5 +17,6 @@ std::span<const char* const> migrations();
 extern const char* const kSecondSchema;
 extern const char* const kThirdSchema;
 extern const char* const kFourthSchema;
+extern const char* const kFifthSchema;
 
 }  // namespace server

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "server/recording/command_store.hpp"
 #include "server/recording/statement.hpp"
 
 namespace server {
@@ -47,7 +48,7 @@ std::string select_commands(const char* condition) {
       "SELECT command_id, robot_id, boot_id, kind, arguments, actor, state, reason, submitted_at_us, sent_at_us,"
       " ended_at_us, effect_at_robot_us, emergency_id, coalesce(sent_after_us, -1), coalesce(acknowledged_after_us, "
       "-1),"
-      " coalesce(verified_after_us, -1), life_from FROM command {}",
+      " coalesce(verified_after_us, -1), life_from, peer, audit_entry FROM command {}",
       condition);
 }
 
@@ -70,6 +71,7 @@ CommandRecord command_from(SQLite::Statement& row) {
   command.acknowledged_after_us = row.getColumn(14).getInt64();
   command.verified_after_us = row.getColumn(15).getInt64();
   command.life_from = row.getColumn(16).getString();
+  command.peer = row.getColumn(17).getString();
   return command;
 }
 
@@ -109,11 +111,20 @@ std::vector<CommandRecord> pending_stops(Database& database) {
 }
 
 void fail_unfinished_commands(Database& database, std::int64_t utc_us) {
-  SQLite::Statement update{database.handle(),
-                           fmt::format("UPDATE command SET state = 'failed', reason = 'station_restarted',"
-                                       " ended_at_us = ? WHERE kind <> 'emergency_stop' AND {}",
-                                       kUnfinished)};
-  execute(update, utc_us);
+  SQLite::Transaction transaction{database.handle(), SQLite::TransactionBehavior::IMMEDIATE};
+  std::vector<CommandRecord> unfinished;
+  const std::string condition = fmt::format("WHERE kind <> 'emergency_stop' AND {}", kUnfinished);
+  SQLite::Statement query{database.handle(), select_commands(condition.c_str())};
+  while (query.executeStep()) unfinished.push_back(command_from(query));
+  CommandStore commands{database.handle()};
+  AuditChain audit{database.handle()};
+  for (CommandRecord& command : unfinished) {
+    command.state = CommandState::failed;
+    command.reason = "station_restarted";
+    command.ended_at_us = utc_us;
+    commands.write(command, audit);
+  }
+  transaction.commit();
 }
 
 }  // namespace server

@@ -23,6 +23,7 @@ protocol::EmergencyCause emergency_cause_from(const std::string& text);
 std::string select_commands(const char* condition);
 std::string select_events(const char* condition);
 CommandRecord command_from(SQLite::Statement& row);
+inline constexpr int kCommandAuditEntry = 18;  // its column; NULL: older than the audit
 RobotEvent event_from(SQLite::Statement& row);
 
 // Emergency stops that no robot has acknowledged, oldest first.

@@ -44,6 +44,12 @@ Result<Authority::Lease*> Authority::own_lease(const RobotId& robot, const std::
   return lease;
 }
 
+Result<void> Authority::may_use(const RobotId& robot, const std::string& actor) const {
+  const ControlState now = of(robot);
+  if (now.holder.empty() || now.holder == actor) return {};
+  return held_by(robot, now.holder);
+}
+
 Result<std::optional<Authority::Change>> Authority::use(const RobotId& robot, const std::string& actor) {
   Lease* lease = lease_of(robot);
   if (lease == nullptr || lease->holder != actor) return take(robot, actor, kControlLife);

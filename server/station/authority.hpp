@@ -35,6 +35,9 @@ class Authority {
   // Who holds control now; no holder: nobody.
   ControlState of(const RobotId& robot) const;
 
+  // Whether a command of the actor would be let through; conflict when another holds control.
+  Result<void> may_use(const RobotId& robot, const std::string& actor) const;
+
   // For a command of the actor: control is its own afterwards, at least for kControlLife. conflict when another holds
   // it.
   Result<std::optional<Change>> use(const RobotId& robot, const std::string& actor);

@@ -3,13 +3,11 @@
 
 #include <fmt/format.h>
 #include <algorithm>
-#include <boost/asio/experimental/awaitable_operators.hpp>
 
 #include "server/station/seat.hpp"
 
 namespace server {
 namespace asio = boost::asio;
-using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
 
 namespace {
 
@@ -55,6 +53,7 @@ std::shared_ptr<Station::PendingCommand> Station::make_pending(const CommandRequ
   record.kind = protocol::kind(request.action);
   record.arguments = request.arguments;
   record.actor = request.actor;
+  record.peer = request.peer;
   record.submitted_at_us = clock_.utc_us();
   if (!pending->is_stop()) {
     // The robot's clock is not known exactly; this reading is never ahead of it, so a life can only come out shorter.
@@ -76,7 +75,7 @@ Result<void> Station::check_request(const CommandRequest& request, const Seat& s
     return fail(ErrorCode::not_connected, fmt::format("robot '{}' is not connected", request.robot_id),
                 "not_connected");
   }
-  return check_command(request.action, *seat.robot, limits_);
+  return check_command(request.action, *seat.robot, envelope_);
 }
 
 bool Station::remembers(CommandId id) const { return recent_.find(id) != nullptr; }
@@ -101,22 +100,24 @@ Result<std::shared_ptr<Station::PendingCommand>> Station::same_wish(const Comman
 asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
   const auto seat_entry = seats_.find(request.robot_id);
   if (seat_entry == seats_.end()) {
-    co_return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", request.robot_id), "unknown_robot");
+    Error unknown{ErrorCode::not_found, fmt::format("no robot '{}' is known", request.robot_id), "unknown_robot"};
+    co_return refuse(request, std::move(unknown));
   }
   if (request.action.which_action == rheonaut_Command_emergency_stop_tag) {
-    StopRequest stop{request.robot_id, request.actor, request.key, request.received_us};
+    StopRequest stop{request.robot_id, request.actor, request.peer, request.key, request.received_us};
     co_return co_await emergency_stop(std::move(stop), request.life);
   }
   Seat& seat = seat_entry->second;
   const microseconds patience = request.life + (request.until_verified ? kSeenPatience : kPatience);
   if (!request.key.empty()) {
     const auto same = same_wish(request, seat);
-    if (!same) co_return std::unexpected{same.error()};
+    if (!same) co_return refuse(request, same.error());
     if (*same != nullptr) co_return co_await follow(*same, request.until_verified, patience);
   }
   // SAFETY: whoever is not in control moves nothing, page, script or experiment.
-  if (auto held = use_control(request); !held) co_return std::unexpected{held.error()};
-  if (auto checked = check_request(request, seat); !checked) co_return std::unexpected{checked.error()};
+  if (auto held = may_control(request); !held) co_return refuse(request, held.error());
+  if (auto checked = check_request(request, seat); !checked) co_return refuse(request, checked.error());
+  use_control(request);
   const auto pending = make_pending(request, *seat.robot);
   // SAFETY: what was issued longer ago than its life is not sent, and is accounted for.
   if (request.age >= request.life) {
@@ -125,12 +126,21 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
   }
   supersede_queued(seat, *pending);
   if (!seat.port->send(pending->wire, pending->deadline_us)) {
-    co_return fail(ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),
-                   "queue_full");
+    Error full{ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),
+               "queue_full"};
+    co_return refuse(request, std::move(full));
   }
   add_pending(seat, pending);
   publish(pending->record);
   co_return co_await follow(pending, request.until_verified, patience);
+}
+
+// Nothing is sent, and the audit hears of it.
+std::unexpected<Error> Station::refuse(const CommandRequest& request, Error error) {
+  const char* kind = protocol::kind(request.action);
+  note_refusal({request.actor, request.peer, clock_.utc_us()}, request.robot_id, "command",
+               fmt::format(R"({{"kind":"{}","arguments":{}}})", kind, request.arguments), error);
+  return std::unexpected{std::move(error)};
 }
 
 // What became of it, as far as that is known then.
@@ -140,7 +150,7 @@ asio::awaitable<Result<CommandRecord>> Station::follow(std::shared_ptr<PendingCo
   const bool is_on_its_way = record.state == CommandState::queued || record.state == CommandState::sent;
   const bool is_reached = until_verified ? record.ended_at_us != 0 : !is_on_its_way;
   Signal& reached = until_verified ? pending->ended : pending->answered;
-  if (!is_reached) co_await (reached.wait() || clock_.sleep_for(patience));
+  if (!is_reached) co_await reached.wait_until(clock_, clock_.steady_us() + patience.count());
   co_return record;
 }
 

@@ -1,6 +1,9 @@
 // The station's side of control: one door for what people ask, and what they are told of each change.
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+#include <string_view>
+
 #include "server/station/seat.hpp"
 
 namespace server {
@@ -10,6 +13,19 @@ namespace {
 
 constexpr microseconds kWatchInterval{200'000};
 constexpr microseconds kOldestSight{400'000};  // of what a page has seen, to keep control
+constexpr std::size_t kMaxToldBytes = 300;
+constexpr std::size_t kMaxNameBytes = 40;
+
+const char* text(ControlAction action) {
+  switch (action) {
+    case ControlAction::take: return "take";
+    case ControlAction::force: return "force";
+    case ControlAction::release: return "release";
+    case ControlAction::request: return "request";
+    case ControlAction::hand_over: return "hand_over";
+  }
+  return "take";
+}
 
 Result<std::optional<Authority::Change>> some(Result<Authority::Change> change) {
   if (!change) return std::unexpected{change.error()};
@@ -31,22 +47,28 @@ Result<std::optional<Authority::Change>> change_control(Authority& authority, co
 }  // namespace
 
 Result<ControlState> Station::control(const ControlRequest& request) {
-  if (!robots_.contains(request.robot_id)) {
-    return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", request.robot_id), "unknown_robot");
+  Result<std::optional<Authority::Change>> change =
+      fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", request.robot_id), "unknown_robot");
+  if (robots_.contains(request.robot_id)) change = change_control(authority_, request);
+  if (!change) {
+    note_refusal({request.actor, request.peer, clock_.utc_us()}, request.robot_id, "control",
+                 fmt::format(R"({{"wish":"{}"}})", text(request.action)), change.error());
+    return std::unexpected{change.error()};
   }
-  const auto change = change_control(authority_, request);
-  if (!change) return std::unexpected{change.error()};
-  if (*change) tell(**change);
+  if (*change) tell(**change, request.actor, request.peer);
   return authority_.of(request.robot_id);
 }
 
+Result<void> Station::may_control(const CommandRequest& request) const {
+  return needs_control(request.action) ? authority_.may_use(request.robot_id, request.actor) : Result<void>{};
+}
+
 // Nobody has it: who commands takes it.
-Result<void> Station::use_control(const CommandRequest& request) {
-  if (!needs_control(request.action)) return {};
-  const auto change = authority_.use(request.robot_id, request.actor);
-  if (!change) return std::unexpected{change.error()};
-  if (*change) tell(**change);
-  return {};
+void Station::use_control(const CommandRequest& request) {
+  if (!needs_control(request.action)) return;
+  if (const auto change = authority_.use(request.robot_id, request.actor); change && *change) {
+    tell(**change, request.actor, request.peer);
+  }
 }
 
 void Station::keep_control(const std::string& actor, microseconds age) {
@@ -57,15 +79,38 @@ void Station::keep_control(const std::string& actor, microseconds age) {
 asio::awaitable<void> Station::watch_control() {
   for (;;) {
     co_await clock_.sleep_for(kWatchInterval);
-    for (const Authority::Change& change : authority_.expire()) tell(change);
+    for (const Authority::Change& change : authority_.expire()) tell(change, "station", "");
   }
 }
 
-void Station::tell(const Authority::Change& change) {
+// Of what somebody else says only the beginning: it may be anything.
+void Station::note_refusal(Author by, const RobotId& robot_id, const char* what, std::string detail,
+                           const Error& error) {
+  nlohmann::json told = nlohmann::json::parse(detail, nullptr, false);
+  if (!told.is_object()) told = nlohmann::json::object();
+  told["problem"] = error.detail.substr(0, kMaxToldBytes);
+  if (!error.reason.empty()) told["reason"] = error.reason;
+  AuditNote note;
+  note.by = std::move(by);
+  note.robot_id = robots_.contains(robot_id) ? robot_id : "";
+  note.action = std::string{what} + ".refused";
+  note.subject = robot_id.substr(0, kMaxNameBytes);
+  note.detail = audit_detail(told);
+  note.can_flood = true;
+  for (StationSink* sink : sinks_) sink->on_audit(note);
+}
+
+void Station::tell(const Authority::Change& change, const std::string& actor, const std::string& peer) {
   const auto robot = robots_.find(change.robot_id);
   if (robot == robots_.end()) return;
   robot->second.control = authority_.of(change.robot_id);
   note(robot->second, change.kind, change.cause);
+  AuditNote audit;
+  audit.by = {actor, peer, clock_.utc_us()};
+  audit.robot_id = change.robot_id;
+  audit.action = "control." + change.kind.substr(std::string_view{"control_"}.size());
+  audit.detail = audit_detail({{"cause", change.cause}, {"holder", robot->second.control.holder}});
+  for (StationSink* sink : sinks_) sink->on_audit(audit);
   publish(robot->second);
 }
 

@@ -9,6 +9,7 @@
 #include <boost/asio/awaitable.hpp>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -39,6 +40,7 @@ struct CommandRequest {
   protocol::Command action;
   std::string arguments = "{}";  // as JSON, for the record
   std::string actor;
+  std::string peer;                   // the address that it came from
   microseconds life{2'000'000};       // at most 10 s, from when it was issued
   microseconds age{0};                // it was issued so long before it arrived
   std::string life_from = "arrival";  // how that is known, see CommandRecord
@@ -50,8 +52,14 @@ struct CommandRequest {
 struct StopRequest {
   RobotId robot_id;
   std::string actor;
+  std::string peer;              // as above
   std::string key;               // as above: one press may come by two ways
   std::int64_t received_us = 0;  // as above
+};
+
+struct StopsOfAll {
+  std::vector<CommandRecord> records;
+  std::vector<RobotId> failed;  // the station could not take their stop; its log says why
 };
 
 enum class ControlAction : std::uint8_t { take, force, release, request, hand_over };
@@ -59,6 +67,7 @@ enum class ControlAction : std::uint8_t { take, force, release, request, hand_ov
 struct ControlRequest {
   RobotId robot_id;
   std::string actor;
+  std::string peer;  // the address that it came from
   ControlAction action = ControlAction::take;
   microseconds life{kControlLife};  // take: without a sign of life; at most kLongestControl
   std::string reason;               // force: why
@@ -66,7 +75,7 @@ struct ControlRequest {
 
 class Station {
  public:
-  Station(boost::asio::io_context& loop, Clock& clock, CommandLimits limits, LinkTimes times);
+  Station(boost::asio::io_context& loop, Clock& clock, Envelope envelope, LinkTimes times);
   ~Station();
 
   void add_sink(StationSink& sink);
@@ -88,11 +97,20 @@ class Station {
   // record then says queued or sent.
   boost::asio::awaitable<Result<CommandRecord>> emergency_stop(StopRequest request, microseconds patience);
 
+  // SAFETY: the same for every robot: all frames are handed to their links before anything else is done, and a stop
+  // that fails keeps no other from being sent. At most `patience` for all of them. The request's robot_id is not looked
+  // at.
+  boost::asio::awaitable<StopsOfAll> stop_all(StopRequest request, microseconds patience);
+
   // Changes who holds control of a robot, see Authority.
   Result<ControlState> control(const ControlRequest& request);
   // A sign of life of an actor: what it controls stays its own. `age`: of what it has seen of the robots.
   void keep_control(const std::string& actor, microseconds age);
   boost::asio::awaitable<void> watch_control();  // says when control has ended, until cancelled
+
+  // Something that was refused before it came to one of the doors above: the audit hears of it. `what` is "command" or
+  // "control", `detail` what is known of the wish, as a JSON object.
+  void note_refusal(Author by, const RobotId& robot_id, const char* what, std::string detail, const Error& error);
 
   // A command with a client's key that is on its way or has ended lately: what asks again need not be sent again.
   bool remembers(CommandId id) const;
@@ -131,6 +149,10 @@ class Station {
   void request_resend(const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t next_seq);
   void request_event_resend(const RobotId& id, BootId boot_id);
 
+  // --- called when a run begins, ends or is annotated (wired by main) ---
+
+  void set_fluid(const RobotId& id, const std::string& fluid);  // empty: not known
+
  private:
   struct PendingCommand;
   struct Seat;  // a connected robot's port, and its commands on their way
@@ -141,12 +163,15 @@ class Station {
   void publish(const RobotState& robot);
   void publish(const CommandRecord& record);
   void note(const RobotState& robot, std::string kind, std::string cause);
-  void tell(const Authority::Change& change);
+  void tell(const Authority::Change& change, const std::string& actor, const std::string& peer);
+  std::unexpected<Error> refuse(const CommandRequest& request, Error error);
+  void count_power(RobotState& robot, const SampleBatch& batch) const;
   void record_clock(Seat& seat);
   void record_in_force(Seat& seat, std::string kind, std::string content);
 
   std::shared_ptr<PendingCommand> make_pending(const CommandRequest& request, const RobotState& robot);
-  Result<void> use_control(const CommandRequest& request);
+  Result<void> may_control(const CommandRequest& request) const;
+  void use_control(const CommandRequest& request);
   Result<void> check_request(const CommandRequest& request, const Seat& seat) const;
   Result<std::shared_ptr<PendingCommand>> same_wish(const CommandRequest& request, const Seat& seat);
   boost::asio::awaitable<Result<CommandRecord>> follow(std::shared_ptr<PendingCommand> pending, bool until_verified,
@@ -161,6 +186,8 @@ class Station {
   void end_unseen(Seat& seat, const char* reason);
 
   void restore_stop(const CommandRecord& record);
+  std::shared_ptr<PendingCommand> begin_stop(Seat& seat, const StopRequest& request);
+  void publish_held_back(std::vector<RobotId>& failed);
   std::shared_ptr<PendingCommand> stop_in_force(Seat& seat, const StopRequest& request);
   void hand_stop_to(Seat& seat, PendingCommand& stop);
   void repeat_stop(Seat& seat);
@@ -168,7 +195,7 @@ class Station {
 
   boost::asio::io_context& loop_;
   Clock& clock_;
-  CommandLimits limits_;
+  Envelope envelope_;
   LinkTimes times_;
   std::map<RobotId, RobotState> robots_;
   std::map<RobotId, Seat> seats_;                         // one for each robot, connected or not
@@ -178,6 +205,7 @@ class Station {
   Authority authority_;
   RecentCommands recent_;  // that had a key, and have ended
   StopTimes stop_times_;
+  std::optional<std::vector<CommandRecord>> held_back_;  // while all robots are being stopped
 };
 
 }  // namespace server

@@ -3,6 +3,7 @@
 // Called on the loop's thread. A sink returns at once, copies what it keeps, and never calls the station from inside.
 #pragma once
 
+#include "server/audit_note.hpp"
 #include "server/station/station_state.hpp"
 
 namespace server {
@@ -16,6 +17,7 @@ class StationSink {
   virtual void on_samples(const RobotState&, const SampleBatch&) {}
   virtual void on_event(const RobotState&, const RobotEvent&) {}
   virtual void on_command(const CommandRecord&) {}
+  virtual void on_audit(const AuditNote&) {}
   virtual void on_clock(const RobotState&, const ClockRecord&) {}
   virtual void on_in_force(const RobotState&, const InForceRecord&) {}
 };

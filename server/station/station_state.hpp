@@ -142,6 +142,8 @@ struct RobotState {
 
   SampleContext context;         // of the latest live batch (from Hello before the first)
   std::optional<Sample> sample;  // the latest
+  std::string fluid;             // that it swims in, by its open run; empty: not known
+  double at_power_s = 0;         // how long its motor has run above Envelope's power_duty, less the time it did not
   std::uint64_t next_seq = 0;    // after the latest sample received
   std::uint64_t oldest_seq = 0;
   std::uint64_t durable_next_seq = 0;
@@ -195,6 +197,7 @@ struct CommandRecord {
   std::int64_t acknowledged_after_us = -1;
   std::int64_t verified_after_us = -1;
   std::string life_from;  // its life counts from: "arrival", "stamp" (of /live), "issued_at"; empty for a stop
+  std::string peer;       // the address that it came from; empty: from the station itself
 };
 
 }  // namespace server

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <set>
 
 #include "server/station/seat.hpp"
 
@@ -18,30 +19,78 @@ constexpr std::size_t kMaxStops = 16;  // on their way to one robot; who asks fo
 }  // namespace
 
 asio::awaitable<Result<CommandRecord>> Station::emergency_stop(StopRequest request, microseconds patience) {
-  const auto seat_entry = seats_.find(request.robot_id);
-  if (seat_entry == seats_.end()) {
-    co_return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", request.robot_id), "unknown_robot");
+  const auto seat = seats_.find(request.robot_id);
+  if (seat == seats_.end()) {
+    Error error{ErrorCode::not_found, fmt::format("no robot '{}' is known", request.robot_id), "unknown_robot"};
+    note_refusal({request.actor, request.peer, clock_.utc_us()}, request.robot_id, "command",
+                 R"({"kind":"emergency_stop"})", error);
+    co_return std::unexpected{std::move(error)};
   }
-  Seat& seat = seat_entry->second;
-  auto stop = stop_in_force(seat, request);
-  if (stop == nullptr) {
-    CommandRequest wish;
-    wish.robot_id = request.robot_id;
-    wish.action.which_action = rheonaut_Command_emergency_stop_tag;
-    wish.actor = std::move(request.actor);
-    wish.received_us = request.received_us;
-    // SAFETY: a key that has been used is no reason not to stop again.
-    if (!recent_.find(command_id_of(wish.robot_id, wish.actor, request.key))) wish.key = std::move(request.key);
-    stop = make_pending(wish, *seat.robot);
-    stop->is_timed = seat.port != nullptr;
-    add_pending(seat, stop);
-    hand_stop_to(seat, *stop);  // SAFETY: the frame first, the record afterwards
-    spdlog::warn("emergency stop of robot '{}' by {}{}", wish.robot_id, stop->record.actor,
-                 seat.port == nullptr ? "; kept until it returns" : "");
-    if (stop->record.state == CommandState::queued) publish(stop->record);
-    publish(*seat.robot);
+  const auto stop = begin_stop(seat->second, request);
+  spdlog::warn("emergency stop of robot '{}' by {}{}", request.robot_id, request.actor,
+               seat->second.port == nullptr ? "; kept until it returns" : "");
+  co_return co_await follow(stop, false, patience);
+}
+
+asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds patience) {
+  const std::int64_t deadline_us = clock_.steady_us() + patience.count();
+  std::vector<std::pair<std::shared_ptr<PendingCommand>, bool>> stops;  // and whether the robot is there
+  StopsOfAll outcome;
+  held_back_.emplace();
+  for (auto& [id, seat] : seats_) {
+    request.robot_id = id;
+    try {
+      stops.emplace_back(begin_stop(seat, request), seat.port != nullptr);
+    } catch (const std::exception& error) {  // SAFETY: the others are stopped all the same
+      spdlog::error("emergency stop of robot '{}': {}", id, error.what());
+      outcome.failed.push_back(id);
+    }
   }
-  co_return co_await follow(std::move(stop), false, patience);
+  publish_held_back(outcome.failed);
+  spdlog::warn("emergency stop of all {} robots by {}", seats_.size(), request.actor);
+  for (const auto& [stop, is_connected] : stops) {
+    const microseconds left{is_connected ? std::max<std::int64_t>(deadline_us - clock_.steady_us(), 0) : 0};
+    if (left.count() > 0) co_await follow(stop, false, left);
+    const bool has_failed = std::ranges::find(outcome.failed, stop->record.robot_id) != outcome.failed.end();
+    if (!has_failed) outcome.records.push_back(stop->record);
+  }
+  co_return outcome;
+}
+
+// What was to be told of the stops while their frames were being written.
+void Station::publish_held_back(std::vector<RobotId>& failed) {
+  const std::vector<CommandRecord> records = std::move(held_back_).value();
+  held_back_.reset();
+  std::set<RobotId> told;
+  for (const CommandRecord& record : records) {
+    try {
+      publish(record);
+      if (told.insert(record.robot_id).second) publish(robots_.at(record.robot_id));
+    } catch (const std::exception& error) {
+      spdlog::error("emergency stop of robot '{}': {}", record.robot_id, error.what());
+      if (std::ranges::find(failed, record.robot_id) == failed.end()) failed.push_back(record.robot_id);
+    }
+  }
+}
+
+// Hands the stop to the link, or finds the one that is the answer already.
+std::shared_ptr<Station::PendingCommand> Station::begin_stop(Seat& seat, const StopRequest& request) {
+  if (auto same = stop_in_force(seat, request)) return same;
+  CommandRequest wish;
+  wish.robot_id = request.robot_id;
+  wish.action.which_action = rheonaut_Command_emergency_stop_tag;
+  wish.actor = request.actor;
+  wish.peer = request.peer;
+  wish.received_us = request.received_us;
+  // SAFETY: a key that has been used is no reason not to stop again.
+  if (!recent_.find(command_id_of(wish.robot_id, wish.actor, request.key))) wish.key = request.key;
+  const auto stop = make_pending(wish, *seat.robot);
+  stop->is_timed = seat.port != nullptr;
+  add_pending(seat, stop);
+  hand_stop_to(seat, *stop);  // SAFETY: the frame first, the record afterwards
+  if (stop->record.state == CommandState::queued) publish(stop->record);
+  if (!held_back_) publish(*seat.robot);
+  return stop;
 }
 
 // The stop that answers the request already; null when a new one is needed. SAFETY: only one that came with the same

@@ -4,9 +4,8 @@
 //
 // PATH gets a picture of the cockpit in the closed-loop experiment, FOLDER some of signing in.
 import assert from 'node:assert/strict';
-import { mkdirSync } from 'node:fs';
 import { join } from 'node:path';
-import { Bench, until } from './programs.mjs';
+import { Bench, run, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const at = process.argv.indexOf('--screenshot');
@@ -14,8 +13,14 @@ const screenshot = at > 0 ? process.argv[at + 1] : null;
 const pictures_at = process.argv.indexOf('--pictures');
 const pictures = pictures_at > 0 ? process.argv[pictures_at + 1] : null;
 const bench = new Bench();
-const faults = []; // errors of the page itself
+const faults = []; // errors of the pages themselves, and what their security policy has refused
 let page;
+
+function watch(of, into = faults) {
+  of.on('pageerror', (error) => into.push(error.message));
+  of.on('console', (message) => /Content.Security.Policy|violates/i.test(message.text()) && into.push(message.text()));
+  return of;
+}
 
 // ---- a small vocabulary
 
@@ -188,7 +193,7 @@ const steps = {
 
   async 'an admin sees who has access, and signs another page out'() {
     await bench.cli(['user', 'add', 'anna', '--role', 'viewer'], 'correct horse battery');
-    const other = await bench.open_page({ viewport: { width: 1280, height: 800 } });
+    const other = watch(await bench.open_page({ viewport: { width: 1280, height: 800 } }));
     await other.goto(bench.http);
     await other.fill('#user', 'anna');
     await other.fill('#password', 'wrong');
@@ -232,30 +237,33 @@ const steps = {
     assert.equal(await page.locator('#show-access').count(), 0, 'and not the access of others');
   },
 
-  async 'the page itself made no error'() {
+  async 'nothing that is smuggled into the page runs or leads elsewhere'() {
+    const refused = [];
+    const other = watch(await bench.open_page(), refused);
+    await other.goto(bench.http);
+    const ran = await other.evaluate(() => {
+      const add = (tag, set) => document.head.append(Object.assign(document.createElement(tag), set));
+      add('script', { textContent: 'window.smuggled = 1' });
+      add('style', { textContent: 'body { color: red }' });
+      add('script', { src: 'https://example.org/a.js' });
+      add('base', { href: 'https://example.org/' });
+      document.body.setAttribute('onclick', 'window.smuggled = 2');
+      document.body.click();
+      return [window.smuggled ?? null, getComputedStyle(document.body).color, document.baseURI.startsWith(location.origin)];
+    });
+    assert.equal(ran[0], null, 'no script');
+    assert.notEqual(ran[1], 'rgb(255, 0, 0)', 'no style');
+    assert.ok(ran[2], 'no other base');
+    await until('the browser says each time why', async () => refused.length >= 5);
+    await other.close();
+  },
+
+  async 'the page itself made no error, and its policy refused nothing'() {
     assert.deepEqual(faults, []);
   },
 };
 
-let failed = false;
-try {
-  await bench.start_station();
+await run(bench, steps, async () => {
   page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
-  page.on('pageerror', (error) => faults.push(error.message));
-  page.on('console', (message) => /Content.Security.Policy/i.test(message.text()) && faults.push(message.text()));
-  for (const [name, step] of Object.entries(steps)) {
-    const start_ms = performance.now();
-    await step();
-    console.log(`ok  ${name} (${Math.round(performance.now() - start_ms)} ms)`);
-  }
-} catch (error) {
-  failed = true;
-  console.error(error);
-  const out = new URL('out/', import.meta.url).pathname;
-  mkdirSync(out, { recursive: true });
-  await page?.screenshot({ path: `${out}failed.png` }).catch(() => undefined);
-  console.error(`station:\n${bench.station?.output}\nrobot:\n${bench.robot?.output}`);
-} finally {
-  await bench.close();
-}
-process.exit(failed ? 1 : 0);
+  watch(page);
+});

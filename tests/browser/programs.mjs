@@ -1,7 +1,7 @@
 // The real programs that the browser test drives: station, simulated robot and Chromium, each ended by its own id.
 import { spawn } from 'node:child_process';
 import { once } from 'node:events';
-import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -31,12 +31,15 @@ class Program {
 
   constructor(name, ...args) {
     this.name = name;
-    this.process = spawn(join(bin, name), args, { stdio: ['ignore', 'pipe', 'pipe'] });
+    this.process = spawn(join(bin, name), args, { stdio: ['pipe', 'pipe', 'pipe'] });
     this.process.on('error', (error) => (this.output += `${error}\n`));
     for (const stream of [this.process.stdout, this.process.stderr]) stream.on('data', (text) => (this.output += text));
   }
   get runs() {
     return this.process.exitCode === null && this.process.signalCode === null;
+  }
+  say(line) {
+    this.process.stdin.write(`${line}\n`);
   }
   async end(signal = 'SIGTERM') {
     if (!this.runs) return;
@@ -52,6 +55,7 @@ export class Bench {
   endpoints = null;
   station = null;
   robot = null;
+  proxy = null;
   browser = null;
 
   async start_station() {
@@ -72,6 +76,13 @@ export class Bench {
 
   start_robot(id) {
     this.robot = new Program('rheonaut-sim', '--station', this.endpoints.robots, '--id', id);
+  }
+
+  // The network between a page and the station: `rheonaut-sim proxy`, and the words it is told.
+  async start_proxy() {
+    this.proxy = new Program('rheonaut-sim', 'proxy', '--to', this.endpoints.http);
+    const address = await until('the proxy listens', () => /listening on (\S+)/.exec(this.proxy.output)?.[1]);
+    return `http://${address}`;
   }
 
   // One `rheonaut` command about this station, and what it reads.
@@ -103,10 +114,46 @@ export class Bench {
     return answer.json();
   }
 
+  // The same for what changes something: its status and its answer.
+  async post(path, body) {
+    const token = readFileSync(join(this.data, 'rheonaut.token'), 'utf8').trim();
+    const headers = { Authorization: `Bearer ${token}`, 'Content-Type': 'application/json' };
+    const answer = await fetch(`${this.http}/api/v1${path}`, { method: 'POST', headers, body: JSON.stringify(body) });
+    return { status: answer.status, answer: await answer.json() };
+  }
+
   async close() {
     await this.browser?.close();
+    await this.proxy?.end();
     await this.robot?.end();
     await this.station?.end();
     rmSync(this.data, { recursive: true, force: true });
   }
+}
+
+// Runs the steps in order, in a browser that `open` opens, and ends this program: 1 when one of them failed.
+export async function run(bench, steps, open) {
+  let failed = false;
+  try {
+    await bench.start_station();
+    await open();
+    for (const [name, step] of Object.entries(steps)) {
+      const start_ms = performance.now();
+      await step();
+      console.log(`ok  ${name} (${Math.round(performance.now() - start_ms)} ms)`);
+    }
+  } catch (error) {
+    failed = true;
+    console.error(error);
+    const out = new URL('out/', import.meta.url).pathname;
+    mkdirSync(out, { recursive: true });
+    const pages = bench.browser?.contexts().flatMap((context) => context.pages()) ?? [];
+    for (const [number, page] of pages.entries()) {
+      await page.screenshot({ path: `${out}failed_${number}.png` }).catch(() => undefined);
+    }
+    console.error(`station:\n${bench.station?.output}\nrobot:\n${bench.robot?.output}`);
+  } finally {
+    await bench.close();
+  }
+  process.exit(failed ? 1 : 0);
 }

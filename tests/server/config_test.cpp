@@ -55,6 +55,10 @@ TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
   EXPECT_EQ(from_file.http_hosts, defaults.http_hosts);
   EXPECT_EQ(from_file.robots, defaults.robots);
   EXPECT_EQ(from_file.enrol_on_loopback, defaults.enrol_on_loopback);
+  EXPECT_EQ(from_file.http_places.connections, defaults.http_places.connections);
+  EXPECT_EQ(from_file.http_places.of_address, defaults.http_places.of_address);
+  EXPECT_EQ(from_file.robot_places.connections, defaults.robot_places.connections);
+  EXPECT_EQ(from_file.robot_places.of_address, defaults.robot_places.of_address);
   EXPECT_EQ(from_file.tls.mode, defaults.tls.mode);
   EXPECT_EQ(from_file.tls.certificate, defaults.tls.certificate);
   EXPECT_EQ(from_file.tls.key, defaults.tls.key);
@@ -62,16 +66,14 @@ TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
   EXPECT_EQ(from_file.link.link_timeout_ms, defaults.link.link_timeout_ms);
   EXPECT_EQ(from_file.link.heartbeat_interval_ms, defaults.link.heartbeat_interval_ms);
   EXPECT_EQ(from_file.link.samples_per_frame, defaults.link.samples_per_frame);
-  EXPECT_EQ(from_file.limits.setpoint_min_m, defaults.limits.setpoint_min_m);
-  EXPECT_EQ(from_file.limits.setpoint_max_m, defaults.limits.setpoint_max_m);
-  EXPECT_EQ(from_file.limits.duty_min, defaults.limits.duty_min);
-  EXPECT_EQ(from_file.limits.duty_max, defaults.limits.duty_max);
-  EXPECT_EQ(from_file.limits.disturbance_max_m, defaults.limits.disturbance_max_m);
+  EXPECT_EQ(from_file.envelope.anywhere, defaults.envelope.anywhere);
+  EXPECT_TRUE(from_file.envelope.of_fluid.empty());
   EXPECT_EQ(from_file.recording.retention_days, defaults.recording.retention_days);
   EXPECT_EQ(from_file.recording.max_database_mb, defaults.recording.max_database_mb);
   EXPECT_EQ(from_file.recording.low_space_mb, defaults.recording.low_space_mb);
   EXPECT_EQ(from_file.recording.critical_space_mb, defaults.recording.critical_space_mb);
   EXPECT_EQ(from_file.recording.backup_dir, defaults.recording.backup_dir);
+  EXPECT_EQ(from_file.real_time, defaults.real_time);
   EXPECT_EQ(from_file.log_level, defaults.log_level);
 }
 
@@ -112,9 +114,23 @@ TEST_F(ConfigTest, MistakesNameFileLineOptionAndRemedy) {
   EXPECT_THAT(mistake("[recording]\nretention_days = -1\n"), HasSubstr("retention_days = -1 is outside 0 to 36500"));
   EXPECT_THAT(mistake("[recording]\ncritical_space_mb = 3000\n"), HasSubstr("must be at most recording.low_space_mb"));
   EXPECT_THAT(mistake("[http]\nlisten = \"here\"\n"), HasSubstr("'here' is not ADDR:PORT"));
+  EXPECT_THAT(mistake("[http]\nmax_connections = 15\n"), HasSubstr("http.max_connections = 15 is outside 16 to 32768"));
+  EXPECT_THAT(mistake("[robots]\nmax_connections_per_address = 0\n"),
+              HasSubstr("robots.max_connections_per_address = 0 is outside 1 to 32768"));
   EXPECT_THAT(mistake("[http]\nhosts = [1]\n"), HasSubstr("must be an array of texts"));
   EXPECT_THAT(mistake("[http\n"), HasSubstr("station.toml:1:"));
   EXPECT_THAT(mistake("level = 1\n"), HasSubstr("outside a section"));
+}
+
+TEST_F(ConfigTest, AFluidHasTheLimitsItNamesAndTheGeneralOnesElse) {
+  const Config config = load_config(file("[limits]\nduty_max = 0.8\n[limits.water]\nsetpoint_step_m = 0.05\n"));
+  EXPECT_EQ(config.envelope.in("water").setpoint_step_m, 0.05);
+  EXPECT_EQ(config.envelope.in("water").duty_max, 0.8);
+  EXPECT_EQ(config.envelope.in("blood").setpoint_step_m, CommandLimits{}.setpoint_step_m);
+  EXPECT_THAT(mistake("[limits.water]\nduty_mx = 1.0\n"), HasSubstr(":2: unknown option 'limits.water.duty_mx'"));
+  EXPECT_THAT(mistake("[limits.water]\nduty_max = 2.0\n"), HasSubstr("limits.water.duty_max = 2 is outside 0 to 1"));
+  EXPECT_THAT(mistake("[limits.water]\nsetpoint_min_m = 1.0\n"), HasSubstr("limits.water.setpoint_min_m = 1 must be"));
+  EXPECT_THAT(mistake("[data.water]\ndir = 'x'\n"), HasSubstr("unknown option 'data.water'"));
 }
 
 TEST_F(ConfigTest, AMissingFileIsAMistake) {

@@ -10,7 +10,8 @@
 namespace server {
 namespace asio = boost::asio;
 
-asio::awaitable<void> VirtualClock::sleep_until(std::int64_t deadline_us) {
+asio::awaitable<void> VirtualClock::sleep_until(std::int64_t deadline_us, Alarm* alarm) {
+  if (alarm != nullptr && alarm->has_rung_) co_return;
   bool due = deadline_us <= steady_us_;
   // A deadline in the past still lets others run once, as a real timer does.
   asio::steady_timer timer{loop_, due ? asio::steady_timer::time_point::min() : asio::steady_timer::time_point::max()};
@@ -20,9 +21,12 @@ asio::awaitable<void> VirtualClock::sleep_until(std::int64_t deadline_us) {
     ~Entry() { list->erase(place); }
   };
   const Entry entry{sleepers_, sleepers_->emplace(deadline_us, Sleeper{&timer, &due})};
+  if (alarm != nullptr) alarm->timer_ = &timer;
   boost::system::error_code error;
   co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, error));
-  if (!due) throw boost::system::system_error{asio::error::operation_aborted};
+  if (alarm != nullptr) alarm->timer_ = nullptr;
+  const bool is_awake = due || (alarm != nullptr && alarm->has_rung_);
+  if (!is_awake) throw boost::system::system_error{asio::error::operation_aborted};
 }
 
 void VirtualClock::settle() {

@@ -25,7 +25,8 @@ class VirtualClock final : public Clock {
 
   std::int64_t steady_us() const override { return steady_us_; }
   std::int64_t utc_us() const override { return utc_offset_us_ + steady_us_; }
-  boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us) override;
+  using Clock::sleep_until;
+  boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us, Alarm* alarm) override;
 
   // Time stands still while this worker has a job.
   void add_worker(const WorkerThread& worker) { workers_.push_back(&worker); }

@@ -86,5 +86,77 @@ TEST_F(VirtualClockTest, StoppingTheTasksEndsTheirSleepAndTheirRaces) {
   EXPECT_FALSE(clock_.advance_to_next());
 }
 
+class SignalTest : public VirtualClockTest {
+ protected:
+  asio::awaitable<void> wait_and_note(microseconds duration) {
+    const bool notified = co_await signal_.wait_until(clock_, clock_.steady_us() + duration.count());
+    outcomes_.push_back(notified);
+  }
+
+  Signal signal_{loop_};
+  std::vector<bool> outcomes_;
+};
+
+TEST_F(SignalTest, EndsAWaitAtOnceOrAtTheDeadline) {
+  const std::int64_t start_us = clock_.steady_us();
+  tasks_.spawn("waiter", wait_and_note(1h));
+  tasks_.spawn("impatient", wait_and_note(1s));
+  EXPECT_TRUE(clock_.run_until([&] { return outcomes_.size() == 1; }, 2s));
+  EXPECT_EQ(clock_.steady_us(), start_us + 1'000'000);
+  signal_.notify();
+  clock_.settle();
+  EXPECT_EQ(outcomes_, (std::vector{false, true}));
+  EXPECT_FALSE(clock_.advance_to_next()) << "nobody sleeps any more";
+}
+
+TEST_F(SignalTest, ANotificationBeforeTheWaitIsRemembered) {
+  signal_.notify();
+  tasks_.spawn("waiter", wait_and_note(1h));
+  tasks_.spawn("second", wait_and_note(1s));
+  clock_.settle();
+  EXPECT_EQ(outcomes_, std::vector{true}) << "once";
+  EXPECT_TRUE(clock_.run_until([&] { return outcomes_.size() == 2; }, 2s));
+  EXPECT_EQ(outcomes_, (std::vector{true, false}));
+}
+
+TEST_F(SignalTest, WakesAllWhoWait) {
+  for (int i = 0; i < 3; ++i) tasks_.spawn("waiter", wait_and_note(1h));
+  clock_.settle();
+  signal_.notify();
+  clock_.settle();
+  EXPECT_EQ(outcomes_, std::vector<bool>(3, true));
+}
+
+TEST_F(SignalTest, ACancelledWaitEndsTheTask) {
+  tasks_.spawn("waiter", wait_and_note(1h));
+  clock_.settle();
+  tasks_.stop();
+  clock_.settle();
+  EXPECT_TRUE(outcomes_.empty());
+  EXPECT_EQ(tasks_.exit_code(), 0);
+  EXPECT_FALSE(clock_.advance_to_next());
+}
+
+// The machine's clock, in real time: only order and outcome are looked at.
+TEST_F(SignalTest, WorksOnTheClockOfTheMachine) {
+  SystemClock machine{loop_};
+  std::vector<bool> outcomes;
+  auto wait = [](Signal& signal, Clock& clock, microseconds duration,
+                 std::vector<bool>& into) -> asio::awaitable<void> {
+    const bool notified = co_await signal.wait_until(clock, clock.steady_us() + duration.count());
+    into.push_back(notified);
+  };
+  tasks_.spawn("short", wait(signal_, machine, 1ms, outcomes));
+  loop_.run();
+  EXPECT_EQ(outcomes, std::vector{false});
+  loop_.restart();
+  tasks_.spawn("long", wait(signal_, machine, 1h, outcomes));
+  loop_.poll();
+  signal_.notify();
+  loop_.restart();
+  loop_.run();
+  EXPECT_EQ(outcomes, (std::vector{false, true}));
+}
+
 }  // namespace
 }  // namespace server

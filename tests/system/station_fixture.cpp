@@ -23,7 +23,7 @@ SystemTest::SystemTest() {
   run_first(loop, recording->open());
   recording->spawn(tasks);
   const boost::asio::ip::tcp::endpoint any_port{boost::asio::ip::address_v4::loopback(), 0};
-  listener = std::make_unique<RobotListener>(loop, clock, tasks, station, *recorder, any_port, false);
+  listener = std::make_unique<RobotListener>(loop, clock, tasks, station, *recorder, any_port, false, entrance);
 }
 
 SystemTest::~SystemTest() {
@@ -50,7 +50,7 @@ boost::asio::awaitable<void> SystemTest::submit(std::uint64_t id, protocol::Comm
   request.robot_id = "sim-1";
   request.action = action;
   request.actor = "test";
-  auto answered = is_stop ? station.emergency_stop({"sim-1", "test", "", 0}, 1s) : station.submit(request);
+  auto answered = is_stop ? station.emergency_stop({"sim-1", "test", "", "", 0}, 1s) : station.submit(request);
   const Result<CommandRecord> result = co_await std::move(answered);
   if (!result) {
     answers_[id].text = result.error().reason;

@@ -75,11 +75,12 @@ class SystemTest : public ::testing::Test, public sim_robot::StoryWords {
   WorkerThread disk{"disk"}, readers{"readers"}, exports{"exports"}, checkpoints{"checkpoints"};
   TaskGroup tasks{loop};
   Listener listener_of_events{*this};
-  Station station{loop, clock, CommandLimits{}, LinkTimes{}};
+  Station station{loop, clock, Envelope{}, LinkTimes{}};
   std::unique_ptr<RecordingParts> recording;
   Recorder* recorder = nullptr;  // of recording, as are the next two
   Runs* runs = nullptr;
   History* history = nullptr;
+  Entrance entrance{{clock, "robot port", DoorLimits{}}, nullptr};
   std::unique_ptr<RobotListener> listener;
   std::unique_ptr<VirtualRobot> robot;
 

@@ -1,12 +1,13 @@
 // One running page: the store, the live link, the API and the controls that outlive a view, wired together.
 
-import { signal } from '@preact/signals';
+import { effect, signal } from '@preact/signals';
 import { Api, type Me, type Station } from './api';
 import { DutyHold } from './duty_hold';
 import { EmergencyStop, kIdleStop } from './emergency';
 import { LiveLink, type LinkPhase, type Surroundings } from './live';
 import { kRefresh_ms, Store } from './store';
 
+const kMaxWatchedAtOnce = 8; // in a larger fleet samples come of the robots that were looked at last
 const kKeepAlive_ms = 1000; // what this page controls stays its own for 3 s
 
 export class Session {
@@ -58,8 +59,11 @@ export class Session {
     });
   }
 
+  private looked_at: string[] = []; // robots, the latest first
+
   start(): void {
     this.link.start();
+    effect(() => this.watch());
     setInterval(() => this.refresh(), kRefresh_ms);
     setInterval(() => this.keep_alive(), kKeepAlive_ms);
     addEventListener('online', () => this.link.hurry());
@@ -112,6 +116,18 @@ export class Session {
     // A mode that takes no duty ended the hold; the hand has to press again.
     const held_id = this.hold.robot_id;
     if (held_id !== null && this.store.find(held_id)?.readout.peek().mode !== 'manual') this.hold.forget();
+  }
+
+  // Asks for no more samples than a page can show; of all robots while they are few.
+  private watch(): void {
+    const selected_id = this.store.selected_id.value;
+    const is_fleet = this.store.robots.value.length > kMaxWatchedAtOnce;
+    const is_live = this.phase.value === 'live';
+    if (selected_id !== null) {
+      this.looked_at = [selected_id, ...this.looked_at.filter((id) => id !== selected_id)].slice(0, kMaxWatchedAtOnce);
+    }
+    if (!is_fleet || !is_live) return;
+    if (this.link.send({ type: 'watch', robots: this.looked_at })) this.store.watch(this.looked_at);
   }
 
   // Keeps the connection, and with a fresh stamp what this page controls.

@@ -8,6 +8,7 @@ import { SampleRing } from './samples';
 
 export const kRefresh_ms = 100;
 export const kStale_ms = 500; // no sample for so long: every numeral is marked
+export const kUnheard_ms = 2500; // of a robot whose samples are not asked for: its state comes once a second
 export const kLogLines = 50;
 
 // What the numerals show; null: never heard.
@@ -63,13 +64,27 @@ export class Robot {
   readonly readout = signal<Readout>(kEmptyReadout);
   private latest: SamplesMessage | null = null;
   private sampled_at_ms = -Infinity;
+  private told_at_ms: number; // of its state
+  private watched = true; // its samples are asked for
   private boot_id: string | null = null;
   private first_seq = 0;
   private next_seq = 0;
   private received = 0;
 
-  constructor(state: RobotState) {
+  constructor(state: RobotState, now_ms: number) {
     this.state = signal(state);
+    this.told_at_ms = now_ms;
+  }
+
+  take_state(state: RobotState, now_ms: number): void {
+    this.state.value = state;
+    this.told_at_ms = now_ms;
+  }
+
+  // What was not asked for is not missing afterwards.
+  watch(watched: boolean): void {
+    if (watched && !this.watched) this.boot_id = null;
+    this.watched = watched;
   }
 
   hear(message: SamplesMessage, now_ms: number): void {
@@ -89,6 +104,7 @@ export class Robot {
   }
 
   refresh(now_ms: number): void {
+    if (!this.watched) return this.refresh_from_state(now_ms);
     const sample_age_ms = now_ms - this.sampled_at_ms;
     const stale = sample_age_ms > kStale_ms;
     const { latest } = this;
@@ -111,6 +127,27 @@ export class Robot {
       stale,
       received: this.received,
       missing: this.next_seq - this.first_seq - this.received,
+    };
+  }
+
+  private refresh_from_state(now_ms: number): void {
+    const state = this.state.peek();
+    const { sample } = state;
+    this.readout.value = {
+      ...kEmptyReadout,
+      position_m: sample?.position_m ?? null,
+      position_sd_m: state.position_sd_m,
+      setpoint_m: state.setpoint_m,
+      reference_m: sample?.reference_m ?? null,
+      duty: sample?.duty ?? null,
+      velocity_m_s: sample?.velocity_m_s ?? null,
+      impedance_mv: sample?.impedance_mv ?? null,
+      disturbance_m: state.disturbance_m ?? 0,
+      mode: state.mode,
+      sub_state: state.sub_state,
+      emergency_id: state.emergency_id,
+      sample_age_ms: now_ms - this.told_at_ms,
+      stale: state.link !== 'connected' || now_ms - this.told_at_ms > kUnheard_ms,
     };
   }
 }
@@ -198,13 +235,18 @@ export class Store {
   private take_state(state: RobotState): void {
     const known = this.find(state.robot_id);
     if (known) {
-      known.state.value = state;
+      known.take_state(state, this.clocks.page_ms());
       this.select_by_itself();
       return;
     }
-    const robots = [...this.robots.peek(), new Robot(state)];
+    const robots = [...this.robots.peek(), new Robot(state, this.clocks.page_ms())];
     this.robots.value = robots.sort((a, b) => a.state.peek().robot_id.localeCompare(b.state.peek().robot_id));
     this.select_by_itself();
+  }
+
+  // Of whose samples are asked for.
+  watch(robot_ids: string[]): void {
+    for (const robot of this.robots.peek()) robot.watch(robot_ids.includes(robot.state.peek().robot_id));
   }
 
   select(robot_id: string): void {

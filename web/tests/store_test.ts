@@ -106,3 +106,29 @@ test('an open run is shown until it ends', () => {
   store.hear({ type: 'run', run: { ...run, ended_at_us: 5 } });
   expect(store.runs.value).toHaveLength(0);
 });
+
+test('a robot whose samples are not asked for shows its state, and is silent only when that stops coming', () => {
+  const sample = { position_m: 0.2, velocity_m_s: 0, acceleration_m_s2: 0, duty: 0.3, impedance_mv: 175, reference_m: 0.2 };
+  const { store, clock } = store_with(robot('rheo-1'), robot('rheo-2', { sample, mode: 'auto' }));
+  store.watch(['rheo-1']);
+  clock.page = 1500;
+  store.refresh();
+  expect(store.find('rheo-2')!.readout.value).toMatchObject({ position_m: 0.2, duty: 0.3, mode: 'auto', stale: false });
+  expect(store.find('rheo-1')!.readout.value.stale).toBe(true);
+  clock.page = 2600;
+  store.refresh();
+  expect(store.find('rheo-2')!.readout.value.stale).toBe(true);
+  store.hear({ type: 'robot', robot: robot('rheo-2', { sample, link: 'disconnected' }) });
+  store.refresh();
+  expect(store.find('rheo-2')!.readout.value.stale).toBe(true);
+});
+
+test('what was not asked for is not missing afterwards', () => {
+  const { store } = store_with(robot('rheo-1'));
+  store.hear(batch(0, 5));
+  store.watch([]);
+  store.watch(['rheo-1']);
+  store.hear(batch(500, 5));
+  store.refresh();
+  expect(store.find('rheo-1')!.readout.value).toMatchObject({ received: 5, missing: 0 });
+});

@@ -29,7 +29,7 @@ asio::awaitable<void> start(RecordingParts& recording, bool& started) {
 }
 }  // namespace
 
-ApiTest::ApiTest() {
+ApiTest::ApiTest(Config of_station) : config{std::move(of_station)} {
   clock.add_worker(disk);
   clock.add_worker(readers);
   clock.add_worker(checkpoints);
@@ -94,7 +94,7 @@ std::shared_ptr<std::optional<Answered>> ApiTest::begin(const std::string& metho
   if (!body.is_null()) request.body = body.dump();
   request.actor = "token:local";
   request.peer = "127.0.0.1";
-  request.caller = Caller{"token:local", "", scopes, 0, std::make_shared<Standing>(loop)};
+  request.caller = Caller{"token:local", "", scopes, 0, std::make_shared<Standing>(loop), "127.0.0.1"};
   auto into = std::make_shared<std::optional<Answered>>();
   tasks.spawn("ask", answer(std::move(request), into));
   clock.settle();
@@ -122,10 +122,14 @@ std::string ApiTest::token() const {
   return token;
 }
 
-RawClient::RawClient(VirtualClock& clock, std::uint16_t port) : clock_{clock} {
+RawClient::RawClient(VirtualClock& clock, std::uint16_t port, const char* from) : clock_{clock} {
   socket_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
+  ::inet_pton(AF_INET, from, &address.sin_addr);
+  if (::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    throw std::runtime_error{"cannot come from that address"};
+  }
   address.sin_port = htons(port);
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   if (::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
@@ -139,6 +143,7 @@ RawClient::~RawClient() { ::close(socket_); }
 
 bool RawClient::pump() {
   clock_.settle();
+  if (!reads) return true;
   pollfd readable{socket_, POLLIN, 0};
   ::poll(&readable, 1, 1);
   for (;;) {

@@ -40,7 +40,7 @@ struct Answered {
 
 class ApiTest : public ::testing::Test {
  public:
-  ApiTest();
+  explicit ApiTest(Config of_station = {});
   ~ApiTest() override;
 
  protected:
@@ -58,19 +58,21 @@ class ApiTest : public ::testing::Test {
   std::string token() const;
 
   Scopes scopes = Scopes::of(Role::admin);  // of who asks
+  Config config;                            // of the ports
   TemporaryFolder folder;
   boost::asio::io_context loop{1};
   WorkerThread disk{"disk"}, readers{"readers"}, exports{"exports"}, checkpoints{"checkpoints"}, maths{"maths"};
   VirtualClock clock{loop};
   TaskGroup tasks{loop};
-  Station station{loop, clock, CommandLimits{}, LinkTimes{}};
+  Station station{loop, clock, Envelope{}, LinkTimes{}};
   RecordingParts recording{
       loop, clock, disk, readers, exports, checkpoints, RecorderOptions{folder.path() / "station.sqlite"}};
   Recorder& recorder{recording.recorder};
   AnalysisService analysis{recording.history, maths};
   LiveFeed live{clock};
-  RobotListener robots{loop, clock, tasks, station, recorder, {boost::asio::ip::address_v4::loopback(), 0}, false};
-  TransportSecurity security{clock, Config{}};
+  TransportSecurity security{clock, config};
+  RobotListener robots{
+      loop, clock, tasks, station, recorder, {boost::asio::ip::address_v4::loopback(), 0}, false, security.robots()};
   std::unique_ptr<ApiServer> api;
   std::unique_ptr<TestRobot> robot;
 
@@ -81,7 +83,8 @@ class ApiTest : public ::testing::Test {
 // A client that sends raw bytes and lets the station run while it waits.
 class RawClient {
  public:
-  RawClient(VirtualClock& clock, std::uint16_t port);
+  // `from` is an address of this machine.
+  RawClient(VirtualClock& clock, std::uint16_t port, const char* from = "127.0.0.1");
   ~RawClient();
   RawClient(const RawClient&) = delete;
   RawClient& operator=(const RawClient&) = delete;
@@ -91,6 +94,8 @@ class RawClient {
   std::string read_to_end();                        // until the station closes
   std::string read_exactly(std::size_t count);      // or less at the end
   bool closed();                                    // the station has closed, and everything was read
+
+  bool reads = true;  // false: it takes nothing any more
 
  private:
   bool pump();  // lets the station run, takes what arrived; false after the end

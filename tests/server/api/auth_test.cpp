@@ -116,7 +116,7 @@ TEST_F(AuthTest, ASessionOutlivesTheStationAndItsNumberIsNotGivenTwice) {
   auto* first = start();
   const std::string session = first->log_in();
   const std::string other = first->log_in();
-  first->accounts.end_session(2);
+  first->accounts.end_session(2, {});
   store(first);
   auto* second = start();
   EXPECT_EQ(second->actor(session), "session:1");

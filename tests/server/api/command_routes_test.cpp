@@ -144,7 +144,7 @@ TEST_F(CommandRoutesTest, ControlIsTakenAndGivenBack) {
 
 TEST_F(CommandRoutesTest, WhoIsNotInControlIsToldWhoIs) {
   connect_robot();
-  ASSERT_TRUE(station.control({"r1", "session:7", ControlAction::take, kControlLife, ""}));
+  ASSERT_TRUE(station.control({"r1", "session:7", "", ControlAction::take, kControlLife, ""}));
   const Answered answered = ask("POST", kCommands, duty_);
   EXPECT_EQ(answered.status, 409);
   EXPECT_EQ(answered.parsed()["reason"], "not_in_control");

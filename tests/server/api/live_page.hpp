@@ -8,7 +8,8 @@ namespace server {
 // A page: the handshake, then text frames.
 class Page {
  public:
-  Page(VirtualClock& clock, std::uint16_t port, const std::string& headers) : client_{clock, port} {
+  Page(VirtualClock& clock, std::uint16_t port, const std::string& headers, const char* from = "127.0.0.1")
+      : client_{clock, port, from} {
     client_.send(
         "GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n" +

@@ -84,6 +84,25 @@ TEST_F(LiveSocketTest, RenewsALeaseWithAFreshStampOnly) {
   EXPECT_EQ(commands(rheonaut_Command_renew_lease_tag).size(), 1U);
 }
 
+TEST_F(LiveSocketTest, APageHearsTheSamplesOfTheRobotsItWatches) {
+  connect_robot();
+  const auto page = open_page();
+  page->say({{"type", "watch"}, {"robots", {"r2"}}});
+  clock.settle();
+  make_samples(*robot, 0, 5);
+  page->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
+  EXPECT_EQ(page->hear("command")["command"]["robot_id"], "r1") << "all else is told of every robot";
+  page->say({{"type", "watch"}, {"robots", {"r1", "r2"}}});
+  clock.settle();
+  make_samples(*robot, 5, 5);
+  EXPECT_EQ(page->hear("samples")["first_seq"], 5);
+  for (const json& robots :
+       {json("r1"), json{1}, json(std::vector<std::string>(65, "r1")), json{std::string(32, 'r')}}) {
+    page->say({{"type", "watch"}, {"robots", robots}});
+    EXPECT_EQ(page->hear("problem")["problem"]["reason"], "malformed");
+  }
+}
+
 TEST_F(LiveSocketTest, SaysWhatItDoesNotUnderstand) {
   connect_robot();
   const auto page = open_page();

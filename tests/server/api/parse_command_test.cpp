@@ -85,10 +85,19 @@ TEST(ParseCommand, RefusesWithMemberAndValue) {
   }
 }
 
-TEST(ParseCommand, SurvivesDeepNesting) {
-  const std::string deep = R"({"kind":)" + std::string(30000, '[') + std::string(30000, ']') + "}";
-  EXPECT_FALSE(parse_command(deep));
-  EXPECT_FALSE(parse_command(std::string(60000, '[')));
+TEST(ParseCommand, RefusesDeepNestingBeforeItIsParsed) {
+  const auto nested = [](int levels) {
+    return R"({"kind":)" + std::string(static_cast<std::size_t>(levels - 1), '[') +
+           std::string(static_cast<std::size_t>(levels - 1), ']') + "}";
+  };
+  const auto deep = parse_command(nested(kMaxJsonDepth + 1));
+  ASSERT_FALSE(deep);
+  EXPECT_EQ(deep.error().detail, "the body is nested deeper than 16 levels");
+  EXPECT_EQ(parse_command(nested(kMaxJsonDepth)).error().reason, "wrong_type");
+  EXPECT_EQ(parse_command(nested(30'000)).error().reason, "malformed_json");
+  EXPECT_EQ(parse_command(std::string(60'000, '[')).error().reason, "malformed_json");
+  // Brackets in a text are text.
+  EXPECT_TRUE(parse_marker(R"({"text":"[[[[[[[[[[[[[[[[[[[[\"[[{{"})"));
 }
 
 TEST(ParseRun, NeedsRobotAndNameAndKnowsItsMembers) {

@@ -77,5 +77,45 @@ TEST_F(VerifyTest, ChecksAFileThatIsNamed) {
   EXPECT_EQ(ask().exit_code, 1);
 }
 
+TEST_F(VerifyTest, WalksTheAuditAndTellsItsHead) {
+  record();
+  stop();
+  const ToolAnswer answer = ask("--audit --json");
+  EXPECT_EQ(answer.exit_code, 0) << answer.text;
+  EXPECT_EQ(answer.json()["faults"].size(), 0u);
+  EXPECT_FALSE(answer.json().contains("segments")) << "only the audit";
+  const std::string head = answer.json()["audit_head"];
+  EXPECT_TRUE(head.starts_with(answer.json()["audit_entries"].dump() + ":")) << head;
+  EXPECT_THAT(ask("--audit").text, HasSubstr("head      " + head));
+  EXPECT_THAT(ask().text, HasSubstr("head      " + head)) << "without options, too";
+  EXPECT_EQ(ask("--audit --expect " + head).exit_code, 0);
+  change("DROP TRIGGER audit_kept; DELETE FROM audit WHERE entry = (SELECT max(entry) FROM audit)");
+  EXPECT_EQ(ask("--audit").exit_code, 0) << "nothing says that there was more";
+  const ToolAnswer cut = ask("--expect " + head);
+  EXPECT_EQ(cut.exit_code, 1);
+  EXPECT_THAT(cut.text, HasSubstr("what came after was removed"));
+  change("DROP TRIGGER audit_unchanged; UPDATE audit SET peer = 'x' WHERE entry = 2");
+  EXPECT_THAT(ask().text, HasSubstr("fault: audit: entry 2 was changed"));
+  EXPECT_NE(ask("--audit --run 1").exit_code, 0);
+}
+
+TEST_F(VerifyTest, TheExportOfARunIsVerifiedByItsPartOfTheAudit) {
+  record();
+  stop();
+  ASSERT_EQ(cli::ask_tool(folder_, "export --run 1 --format sqlite --to @run.sqlite --data @.").exit_code, 0);
+  const auto verify = [this](const std::string& flags) {
+    return cli::ask_tool(folder_, "verify --file @run.sqlite" + flags);
+  };
+  const ToolAnswer answer = verify(" --audit --json");
+  EXPECT_EQ(answer.exit_code, 0) << answer.text << answer.error;
+  EXPECT_GE(answer.json()["audit_entries"], 2);
+  EXPECT_EQ(verify("").exit_code, 2) << "an export has nothing else to verify";
+  SQLite::Database file{(folder_ / "run.sqlite").string(), SQLite::OPEN_READWRITE};
+  file.exec("UPDATE audit SET subject = 'x' WHERE action = 'run.made'");
+  EXPECT_EQ(verify(" --audit").exit_code, 1);
+  file.exec("PRAGMA user_version = 1");
+  EXPECT_EQ(verify(" --audit").exit_code, 2) << "of a version without an audit";
+}
+
 }  // namespace
 }  // namespace server

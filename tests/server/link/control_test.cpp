@@ -13,7 +13,7 @@ class ControlTest : public LinkTest {
     clock.settle();
   }
   Result<ControlState> control(const std::string& actor, ControlAction action) {
-    return station.control({"r1", actor, action, kControlLife, "a test"});
+    return station.control({"r1", actor, "10.0.0.7", action, kControlLife, "a test"});
   }
 };
 
@@ -41,7 +41,7 @@ TEST_F(ControlTest, ARenewalOfAnotherKeepsNoMotorRunning) {
 TEST_F(ControlTest, EveryoneMayStop) {
   auto* robot = connect();
   submit_as("session:1", set_duty(0.1F));
-  StopRequest stop{"r1", "session:2", "", 0};
+  StopRequest stop{"r1", "session:2", "", "", 0};
   tasks.spawn("stop", [](Station& of, StopRequest request) -> boost::asio::awaitable<void> {
     co_await of.emergency_stop(std::move(request), 1s);
   }(station, stop));

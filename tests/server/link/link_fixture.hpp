@@ -45,7 +45,7 @@ class LinkTest : public ::testing::Test {
   void submit(CommandRequest request) { tasks.spawn("submit", run_submit(std::move(request))); }
   void submit(protocol::Command action, microseconds life = 2s) { submit(request_of(action, life)); }
   void stop_robot(microseconds patience = 1s, std::string key = "") {
-    tasks.spawn("stop", run_stop({"r1", "test", std::move(key), 0}, patience));
+    tasks.spawn("stop", run_stop({"r1", "test", "", std::move(key), 0}, patience));
   }
 
   static protocol::Command set_duty(float duty) {
@@ -75,10 +75,13 @@ class LinkTest : public ::testing::Test {
   boost::asio::io_context loop;
   VirtualClock clock{loop};
   TaskGroup tasks{loop};
-  Station station{loop, clock, CommandLimits{}, LinkTimes{}};
+  Station station{loop, clock, Envelope{}, LinkTimes{}};
   RecordingSink sink;
   FakeArchive archive;
-  RobotListener listener{loop, clock, tasks, station, archive, {boost::asio::ip::address_v4::loopback(), 0}, false};
+  static constexpr DoorLimits kPlaces{400, 100, 50, 300};
+  Entrance entrance{{clock, "robot port", kPlaces}, nullptr};
+  RobotListener listener{loop,  clock,   tasks, station, archive, {boost::asio::ip::address_v4::loopback(), 0},
+                         false, entrance};
   std::vector<Result<CommandRecord>> results;
 
  private:

@@ -315,14 +315,32 @@ TEST_F(LinkTest, AnAnswerToNoProbeOfOursDoesNotMoveTheClock) {
   EXPECT_FALSE(station.find("r1")->clock.valid);
 }
 
-TEST_F(LinkTest, ManySilentConnectionsAreBounded) {
-  for (int i = 0; i < RobotListener::kMaxGreetings; ++i) dial();
-  clock.settle();
-  auto* late = dial();
-  ASSERT_TRUE(clock.run_until([&] { return late->closed; }, 100ms));
+TEST_F(LinkTest, TheOldestSilentConnectionGivesWayAndARobotNever) {
+  auto* robot = connect();
+  std::vector<TestRobot*> silent;
+  for (std::size_t i = 0; i < kPlaces.strangers + 20; ++i) {
+    silent.push_back(dial());
+    clock.settle();
+  }
+  EXPECT_TRUE(silent[19]->closed);
+  EXPECT_FALSE(silent[20]->closed);
+  EXPECT_EQ(entrance.door.counters().replaced, 20U);
+  EXPECT_FALSE(robot->closed);
   clock.run_for(6s);  // the silent ones are gone
-  connect();
+  EXPECT_EQ(entrance.door.connections(), 1U);
   EXPECT_TRUE(connected());
+}
+
+TEST_F(LinkTest, ARobotGetsInThroughACrowdOfSilentConnectionsAndIsStopped) {
+  for (std::size_t i = 0; i < kPlaces.strangers; ++i) dial();
+  clock.settle();
+  auto* robot = connect();
+  for (int i = 0; i < 50; ++i) dial();
+  clock.settle();
+  ASSERT_TRUE(connected());
+  stop_robot();
+  clock.settle();
+  EXPECT_EQ(robot->commands().size(), 1U);
 }
 
 }  // namespace

@@ -258,7 +258,7 @@ TEST_F(LinkTest, AStopIsTimedFromItsRequestToDutyZeroInTelemetry) {
   auto* robot = connect();
   robot->link.stall(true);
   tasks.spawn("stop", [](Station& to, std::int64_t received_us) -> boost::asio::awaitable<void> {
-    StopRequest request{"r1", "test", "", received_us};
+    StopRequest request{"r1", "test", "", "", received_us};
     co_await to.emergency_stop(std::move(request), 1s);
   }(station, clock.steady_us() - 300));
   clock.run_for(2ms);

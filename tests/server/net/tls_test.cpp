@@ -83,7 +83,7 @@ class TlsTest : public ::testing::Test {
     return count;
   }
 
-  asio::awaitable<void> shake_hands() { outcome = co_await security->http()->secure(*served, "test port"); }
+  asio::awaitable<void> shake_hands() { outcome = co_await security->http().tls->secure(*served, "test port"); }
 
   Config config;
   asio::io_context loop{1};
@@ -319,7 +319,7 @@ TEST_F(TlsTest, PlainTcpBeyondThisMachineIsShoutedAtOnceAndEachHour) {
   config.tls.insecure = true;
   config.robots = "192.0.2.1:7070";
   TransportSecurity exposed{clock, config};
-  EXPECT_EQ(exposed.robots(), nullptr);
+  EXPECT_EQ(exposed.robots().tls, nullptr);
   EXPECT_TRUE(exposed.state()["exposed"].get<bool>());
   const std::string shout = "INSECURE: robots.listen = 192.0.2.1:7070";
   EXPECT_EQ(said(shout), 1);

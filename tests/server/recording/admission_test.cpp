@@ -107,7 +107,7 @@ TEST_F(AdmissionTest, ARevokedRobotIsRefusedUntilItIsEnrolledAgain) {
     };
     return wait(recorder_->on_disk(std::move(job)));
   };
-  ASSERT_TRUE(with_store([id = robot_.id](AccountStore& store) { return store.revoke_robot(id, "anna", 1); }));
+  ASSERT_TRUE(with_store([id = robot_.id](AccountStore& store) { return store.revoke_robot(id, {"anna", "", 1}); }));
   stop();
   start();  // from loopback, where strangers are enrolled
   for (const char* token : {"secret", "", "another"}) {
@@ -116,7 +116,7 @@ TEST_F(AdmissionTest, ARevokedRobotIsRefusedUntilItIsEnrolledAgain) {
     EXPECT_EQ(refused.refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN) << token;
     EXPECT_NE(refused.detail.find("was revoked"), std::string::npos) << refused.detail;
   }
-  const auto enrol = [id = robot_.id](AccountStore& store) { return store.enrol(id, hash_of("new"), "anna", 2); };
+  const auto enrol = [id = robot_.id](AccountStore& store) { return store.enrol(id, hash_of("new"), {"anna", "", 2}); };
   ASSERT_TRUE(with_store(enrol));
   robot_.token = "secret";
   EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);

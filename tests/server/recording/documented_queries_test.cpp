@@ -69,6 +69,10 @@ class DocumentedQueries : public RecordingTest {
     command.id = ~0ULL;
     command.robot_id = robot.id;
     recorder_->on_command(command);
+    AuditNote refused;
+    refused.action = "command.refused";
+    refused.detail = R"({"problem":"duty = 7 is outside -1 to 1"})";
+    recorder_->on_audit(refused);
     flush();
     ASSERT_TRUE(wait(recording_->markers.add({robot.id, "glucose in", "", std::nullopt, robot.boot_id})).has_value());
   }

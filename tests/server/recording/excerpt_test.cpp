@@ -251,7 +251,7 @@ TEST_F(ExcerptTest, ARunMadeOfATimeHoldsWhatAWindowOfThatTimeShows) {
     const std::int64_t to_us = from_us + static_cast<std::int64_t>(random_() % 5'000'000);
     const auto seen =
         numbers(samples_of(wait(history_->segments(window(from_us, to_us + 1), {}, 10'000)).value()).samples);
-    const Result<Run> run = wait(runs_->make_afterwards(robot_.id, named("afterwards"), TimeSpan{from_us, to_us}, ""));
+    const Result<Run> run = wait(runs_->make_afterwards(robot_.id, named("afterwards"), TimeSpan{from_us, to_us}, {}));
     EXPECT_EQ(run ? numbers(samples_of(run->id)) : decltype(seen){}, seen) << from_us << " to " << to_us;
     found += seen.size();
   }

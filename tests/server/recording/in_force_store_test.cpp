@@ -80,7 +80,7 @@ TEST_F(InForceStoreTest, ARunShowsWhatWasInForceInIt) {
   say("controller", "before", 0);
   say("controller", "at its begin", 40);
   make(robot_, 100);
-  const Run run = *wait(runs_->create("nemo", named("a run"), "test"));
+  const Run run = *wait(runs_->create("nemo", named("a run"), {"test", "", 0}));
   say("controller", "in it", 150);
   make(robot_, 100);
   flush();

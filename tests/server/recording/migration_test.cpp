@@ -2,6 +2,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "server/recording/audit_check.hpp"
 #include "server/recording/run_reader.hpp"
 #include "server/recording/schema.hpp"
 #include "tests/server/recording/recording_test.hpp"
@@ -102,6 +103,33 @@ TEST_F(MigrationTest, AStationGoesOnWhereVersion1Stopped) {
   EXPECT_EQ(first.state, RunState::ended);
   EXPECT_EQ(first.samples_stored, 190u);
   EXPECT_EQ(first.samples_lost, 10u);
+}
+
+// What was commanded before there was an audit has no entry; what has none and came later is a fault.
+TEST_F(MigrationTest, CommandsOfBeforeTheAuditAreCounted) {
+  make_version_1();
+  const auto faults = [this] {
+    SQLite::Database database = open_for_reading(path_);
+    return check_audit(database, {}).faults;
+  };
+  const auto add = [this](std::int64_t id, const char* state) {
+    SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE, 5000};
+    database.exec(
+        "INSERT INTO command (command_id, robot_id, boot_id, kind, arguments, actor, state, reason,"
+        " submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us, emergency_id) VALUES (" +
+        std::to_string(id) + ", 'nemo', 1, 'ping', '{}', 'token:local', '" + state + "', '', 1, 0, 0, 0, 0)");
+  };
+  const std::int64_t before = number("SELECT count(*) FROM command");
+  add(5, "acknowledged");
+  add(6, "sent");  // nobody follows it any more: its end is in the audit
+  start();
+  EXPECT_EQ(number("SELECT value FROM meta WHERE name = 'commands_before_audit'"), before + 1);
+  EXPECT_EQ(rows("SELECT command.state, audit.action FROM command JOIN audit ON audit_entry = entry"),
+            std::vector<std::string>{"failed|command.failed"});
+  stop();
+  EXPECT_EQ(faults(), std::vector<std::string>{});
+  add(7, "acknowledged");
+  EXPECT_EQ(faults().size(), 1u);
 }
 
 TEST_F(MigrationTest, ToolsReadVersion1WithoutChangingIt) {

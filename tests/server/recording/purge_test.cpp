@@ -37,7 +37,8 @@ class TickingClock final : public Clock {
   explicit TickingClock(microseconds tick) : tick_us_{tick.count()} {}
   std::int64_t steady_us() const override { return steady_us_ += tick_us_; }
   std::int64_t utc_us() const override { return 0; }
-  boost::asio::awaitable<void> sleep_until(std::int64_t) override { co_return; }
+  using Clock::sleep_until;
+  boost::asio::awaitable<void> sleep_until(std::int64_t, Alarm*) override { co_return; }
 
  private:
   std::int64_t tick_us_;
@@ -65,7 +66,7 @@ TEST_F(PurgeTest, ARunMadeWhileAPurgeIsUnderWayHoldsItsSamples) {
   record(2000);
   RetentionPlan plan = planned();
   const Result<Run> made =
-      wait(runs_->make_afterwards(robot_.id, named("in time"), SeqSpan{robot_.boot_id, 650, 849}, ""));
+      wait(runs_->make_afterwards(robot_.id, named("in time"), SeqSpan{robot_.boot_id, 650, 849}, {}));
   ASSERT_TRUE(made.has_value());
   const auto before = runs();
   carry_out(plan);

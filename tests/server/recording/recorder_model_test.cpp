@@ -226,7 +226,7 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
 
   // A run of the whole boot has a certificate that says what a recount of its stored samples says.
   void expect_certified(const TestRobot& robot, BootId boot_id, std::uint64_t next_seq) {
-    const auto run = wait(runs_->make_afterwards(robot.id, named("all"), SeqSpan{boot_id, 0, next_seq - 1}, ""));
+    const auto run = wait(runs_->make_afterwards(robot.id, named("all"), SeqSpan{boot_id, 0, next_seq - 1}, {}));
     ASSERT_TRUE(run.has_value()) << run.error().detail;
     const auto found = wait(recording_->certifier.find(run->id));
     ASSERT_TRUE(found && found->is_final);

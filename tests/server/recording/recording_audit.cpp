@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "server/recording/audit_check.hpp"
 #include "server/recording/statement.hpp"
 
 namespace server {
@@ -20,6 +21,7 @@ class Audit {
     for (const auto& [boot_id, boot] : truth_.boots) check_boot(boot_id, boot, complete);
     check_commands();
     check_records();
+    for (const std::string& broken : check_audit(database_, {}).faults) faults_.push_back(broken);
     return std::move(faults_);
   }
 

@@ -37,7 +37,7 @@ class RestoreTest : public RecordingTest {
 
   std::string refusal(const fs::path& from) {
     try {
-      restore_database(from, new_folder_, clock_.utc_us());
+      restore_database(from, new_folder_, {"cli:root", "", clock_.utc_us()});
       return "(it was restored)";
     } catch (const std::runtime_error& error) {
       return error.what();
@@ -54,7 +54,7 @@ class RestoreTest : public RecordingTest {
 
 TEST_F(RestoreTest, GivesTheSameRecordingUnderANewStoreId) {
   record_and_back_up();
-  const RestoredStore restored = restore_database(from_, new_folder_, 1234);
+  const RestoredStore restored = restore_database(from_, new_folder_, {"cli:root", "", 1234});
   EXPECT_EQ(restored.runs, 2);
   EXPECT_EQ(restored.samples, 1000);
   EXPECT_NE(restored.store_id, store_id_);
@@ -69,7 +69,7 @@ TEST_F(RestoreTest, GivesTheSameRecordingUnderANewStoreId) {
 
 TEST_F(RestoreTest, RunsThatWereOpenAreInterruptedAtTheirLastSample) {
   record_and_back_up();
-  EXPECT_EQ(restore_database(from_, new_folder_, 1234).runs_interrupted, 1);
+  EXPECT_EQ(restore_database(from_, new_folder_, {"cli:root", "", 1234}).runs_interrupted, 1);
   use_restored();
   EXPECT_EQ(rows("SELECT run_id, state, ended_at_us IS NULL, last_seq FROM run JOIN run_span USING (run_id)"),
             (std::vector<std::string>{"1|ended|0|399", "2|interrupted|0|999"}));
@@ -79,7 +79,7 @@ TEST_F(RestoreTest, RunsThatWereOpenAreInterruptedAtTheirLastSample) {
 
 TEST_F(RestoreTest, ARobotGoesOnWithTheRestoredStation) {
   record_and_back_up();
-  restore_database(from_, new_folder_, 1234);
+  restore_database(from_, new_folder_, {"cli:root", "", 1234});
   use_restored();
   start();
   EXPECT_NE(restored_.store_id, store_id_);
@@ -95,7 +95,7 @@ TEST_F(RestoreTest, ARobotGoesOnWithTheRestoredStation) {
 TEST_F(RestoreTest, WhatWasRecordedAfterTheBackupIsLostByTheRestore) {
   record_and_back_up();
   clock_.run_for(1s);
-  restore_database(from_, new_folder_, clock_.utc_us());
+  restore_database(from_, new_folder_, {"cli:root", "", clock_.utc_us()});
   use_restored();
   start();
   robot_.next_seq = 5000;
@@ -120,7 +120,7 @@ TEST_F(RestoreTest, WhatWasRecordedAfterTheBackupIsLostByTheRestore) {
 TEST_F(RestoreTest, WhatIsLostLaterIsNotLostByTheRestore) {
   record_and_back_up();
   clock_.run_for(1s);
-  restore_database(from_, new_folder_, clock_.utc_us());
+  restore_database(from_, new_folder_, {"cli:root", "", clock_.utc_us()});
   use_restored();
   start();
   connect(robot_);
@@ -159,7 +159,7 @@ TEST_F(RestoreTest, WhatWasMissingOfABootThatHasEndedSinceIsLostByTheRestore) {
   EXPECT_TRUE(clock_.run_until([&] { return !recording_->backups.busy(); }, 60s));
   stop();
   clock_.run_for(1s);
-  restore_database(from_, new_folder_, clock_.utc_us());
+  restore_database(from_, new_folder_, {"cli:root", "", clock_.utc_us()});
   use_restored();
   start();
   for (int boot = 0; boot < 2; ++boot) {
@@ -213,7 +213,7 @@ TEST_F(RestoreTest, TakesADatabaseWhoseLogIsBesideIt) {
   connect(robot_);
   make(robot_, 300);
   flush();
-  EXPECT_EQ(restore_database(path_, new_folder_, 1234).samples, 300);
+  EXPECT_EQ(restore_database(path_, new_folder_, {"cli:root", "", 1234}).samples, 300);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ class RunAfterwardsTest : public RecordingTest {
   }
   std::int64_t utc_of(std::uint64_t seq) const { return kOffset_us + static_cast<std::int64_t>(robot_.time_of(seq)); }
   Result<Run> made(RecordedRange range) {
-    return wait(runs_->make_afterwards(robot_.id, named("afterwards"), range, "token:local"));
+    return wait(runs_->make_afterwards(robot_.id, named("afterwards"), range, {"token:local", "", 0}));
   }
   void reboot() {
     disconnect(robot_);
@@ -150,7 +150,7 @@ TEST_F(RunAfterwardsTest, ABootThatIsPurgedBeforeTheRunHoldsItIsNotOfTheRun) {
   ASSERT_EQ(found.boots.size(), 2u);
   Run run;
   run.robot_id = robot_.id;
-  const auto store = [run, found](Database& disk) { return RunStore{disk, {}}.add_afterwards(run, found); };
+  const auto store = [run, found](Database& disk) { return RunStore{disk, {}}.add_afterwards(run, found, {}); };
   const auto purge = [](Database& disk) { return disk.handle().exec("DELETE FROM segment WHERE boot_key = 1"); };
   wait(recorder_->on_disk(purge));
   EXPECT_EQ(wait(recorder_->on_disk(store)), std::nullopt);
@@ -180,21 +180,21 @@ TEST_F(RunAfterwardsTest, EachAnnotationLeavesANote) {
   annotation.texts = {{"fluid", "water"}, {"notes", "a second look"}, {"name", "afterwards"}};
   annotation.has_mean_flow = true;
   annotation.mean_flow_m_s = 0.5;
-  const Result<Run> run = wait(runs_->annotate(id, annotation, "token:ana"));
+  const Result<Run> run = wait(runs_->annotate(id, annotation, {"token:ana", "", 0}));
   ASSERT_TRUE(run.has_value());
   EXPECT_EQ(run->conditions.fluid, "water");
   EXPECT_EQ(run->conditions.mean_flow_m_s, 0.5);
   annotation.mean_flow_m_s.reset();
   annotation.texts = {{"fluid", "oil"}};
-  EXPECT_EQ(wait(runs_->annotate(id, annotation, "token:bob"))->conditions.mean_flow_m_s, std::nullopt);
+  EXPECT_EQ(wait(runs_->annotate(id, annotation, {"token:bob", "", 0}))->conditions.mean_flow_m_s, std::nullopt);
   EXPECT_EQ(rows("SELECT actor, field, before, after FROM run_note ORDER BY note_id"),
             (std::vector<std::string>{"token:ana|fluid||water", "token:ana|notes||a second look",
                                       "token:ana|mean_flow_m_s||0.5", "token:bob|fluid|water|oil",
                                       "token:bob|mean_flow_m_s|0.5|"}));
   EXPECT_TRUE(certificate_of(id).agrees_with(before));
   annotation.texts = {{"name", ""}};
-  EXPECT_EQ(wait(runs_->annotate(id, annotation, "")).error().code, ErrorCode::invalid);
-  EXPECT_EQ(wait(runs_->annotate(99, {}, "")).error().code, ErrorCode::not_found);
+  EXPECT_EQ(wait(runs_->annotate(id, annotation, {})).error().code, ErrorCode::invalid);
+  EXPECT_EQ(wait(runs_->annotate(99, {}, {})).error().code, ErrorCode::not_found);
 }
 
 TEST_F(RunAfterwardsTest, ADiscardedRunIsListedOnlyWhenAskedFor) {
@@ -203,8 +203,8 @@ TEST_F(RunAfterwardsTest, ADiscardedRunIsListedOnlyWhenAskedFor) {
   const RunId kept = made(SeqSpan{robot_.boot_id, 0, 9})->id;
   const RunId dropped = made(SeqSpan{robot_.boot_id, 10, 19})->id;
   const RunId open = wait(runs_->create(robot_.id, named("open")))->id;
-  EXPECT_EQ(wait(runs_->discard(open, "no", "")).error().code, ErrorCode::conflict);
-  const Result<Run> run = wait(runs_->discard(dropped, "the pump was off", "token:ana"));
+  EXPECT_EQ(wait(runs_->discard(open, "no", {})).error().code, ErrorCode::conflict);
+  const Result<Run> run = wait(runs_->discard(dropped, "the pump was off", {"token:ana", "", 0}));
   ASSERT_TRUE(run.has_value());
   EXPECT_EQ(run->state, RunState::discarded);
   const auto ids = [this](std::optional<RunState> state) {
@@ -219,8 +219,8 @@ TEST_F(RunAfterwardsTest, ADiscardedRunIsListedOnlyWhenAskedFor) {
   EXPECT_EQ(
       rows("SELECT actor, field, before, after FROM run_note"),
       (std::vector<std::string>{"token:ana|state|ended|discarded", "token:ana|discard_reason||the pump was off"}));
-  EXPECT_EQ(wait(runs_->discard(dropped, "again", "")).error().code, ErrorCode::conflict);
-  EXPECT_EQ(wait(runs_->annotate(dropped, {}, "")).error().code, ErrorCode::conflict);
+  EXPECT_EQ(wait(runs_->discard(dropped, "again", {})).error().code, ErrorCode::conflict);
+  EXPECT_EQ(wait(runs_->annotate(dropped, {}, {})).error().code, ErrorCode::conflict);
 }
 
 TEST_F(RunAfterwardsTest, MarkersStandAtTheSampleOfTheirTime) {

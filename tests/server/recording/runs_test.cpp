@@ -14,7 +14,7 @@ class RunsTest : public RecordingTest {
     conditions.fluid = "water";
     conditions.mean_flow_m_s = 0.25;
     conditions.profile = "step";
-    const Result<Run> run = wait(runs_->create(robot_.id, conditions, "token:local"));
+    const Result<Run> run = wait(runs_->create(robot_.id, conditions, {"token:local", "", 0}));
     EXPECT_TRUE(run.has_value()) << run.error().detail;
     return run ? run->id : 0;
   }

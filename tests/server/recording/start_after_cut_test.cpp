@@ -32,7 +32,7 @@ class StartAfterCutTest : public ::testing::Test {
       Database database{path()};
       known = database.handle().execAndGet("SELECT count(*) FROM robot").getInt();
       while (!vfs_.has_failed()) {
-        database.handle().exec("INSERT INTO robot VALUES (hex(randomblob(8)), NULL, 0)");
+        database.handle().exec("INSERT INTO robot (robot_id, enrolled_at_us) VALUES (hex(randomblob(8)), 0)");
         ++known;
       }
     } catch (const SQLite::Exception&) {

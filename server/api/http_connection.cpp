@@ -1,0 +1,369 @@
+// Reads and writes HTTP/1.1 with Beast; the only unit besides live_socket.cpp that knows it.
+#include "server/api/http_connection.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/experimental/awaitable_operators.hpp>
+#include <boost/asio/multiple_exceptions.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+#include <cctype>
+#include <limits>
+#include <variant>
+
+#include "server/api/security_headers.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+namespace http = boost::beast::http;
+using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
+
+namespace {
+
+constexpr auto kNever = std::numeric_limits<std::int64_t>::max();
+constexpr microseconds kWatchInterval{std::chrono::seconds{1}};  // how exactly time-outs are kept
+constexpr std::size_t kReadBytes = 4096;
+constexpr std::size_t kMaxDiscardBytes = 1024 * 1024;
+
+// All but the body.
+template <class Message>
+Request plain_head(const Message& message) {
+  Request request;
+  request.method = message.method_string();
+  request.target = message.target();
+  for (const auto& field : message) {
+    std::string name = field.name_string();
+    std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::string& value = request.headers[name];
+    if (!value.empty()) value += name == "cookie" ? "; " : ", ";
+    value += field.value();
+  }
+  return request;
+}
+
+template <class Message>
+void set_common_fields(Message& message, const Response& response, const http::request<http::string_body>& to,
+                       bool is_secure) {
+  message.version(to.version());
+  message.result(static_cast<unsigned>(response.status));
+  message.reason(reason_phrase(response.status));
+  message.set(http::field::cache_control, "no-store");
+  if (!response.content_type.empty()) message.set(http::field::content_type, response.content_type);
+  for (const auto& [name, value] : response.headers) {
+    if (name == "Cache-Control") {
+      message.set(name, value);
+    } else {
+      message.insert(name, value);
+    }
+  }
+  for (const auto& [name, value] : security_headers(to[http::field::host], is_secure)) message.set(name, value);
+  message.keep_alive(to.keep_alive());
+}
+
+}  // namespace
+
+HttpConnection::HttpConnection(HttpStream stream, Guest& guest, TlsGate* tls, Clock& clock, const RequestGuard& guard,
+                               const Router& router, LiveParts& live)
+    : stream_{std::move(stream)},
+      guest_{guest},
+      tls_{tls},
+      clock_{clock},
+      guard_{guard},
+      router_{router},
+      live_{live},
+      deadline_us_{kNever} {
+  guest_.on_end([this] { stream_.end(); });
+}
+
+asio::awaitable<void> HttpConnection::talk() {
+  allow(kRequestTime);
+  try {
+    const Next begun = co_await secure();
+    if (begun == Next::end) co_return;
+    for (;;) {
+      const Next next = co_await read_and_answer();
+      if (next == Next::end) co_return;
+      allow(kIdleTime);
+    }
+  } catch (const boost::system::system_error& error) {
+    if (error.code() == asio::error::operation_aborted) throw;
+    spdlog::error("an http connection ended: {}", error.what());
+  } catch (const std::exception& error) {  // ends this connection, never the station
+    spdlog::error("an http connection ended: {}", error.what());
+  }
+}
+
+asio::awaitable<void> HttpConnection::watch() {
+  while (clock_.steady_us() < deadline_us_) co_await clock_.sleep_for(kWatchInterval);
+  if (request_has_begun_) {
+    const Response late = problem(408, "the request did not arrive within 10 s", "too_slow");
+    stream_.write_now(asio::buffer(last_answer(late, stream_.is_secure())));
+  }
+  stream_.end();
+}
+
+asio::awaitable<HttpConnection::Next> HttpConnection::secure() {
+  if (tls_ == nullptr) co_return Next::another;
+  const TlsGate::Outcome outcome = co_await tls_->secure(stream_, "http port");
+  if (outcome == TlsGate::Outcome::secure) co_return Next::another;
+  if (outcome == TlsGate::Outcome::not_tls) {
+    const Response plain =
+        problem(400, "this port speaks TLS only: use https:// instead of http://", "plain_http_on_tls_port");
+    stream_.write_now(asio::buffer(last_answer(plain, false)));
+    co_await discard_rest();
+  }
+  co_return Next::end;
+}
+
+bool HttpConnection::wants_live(const Message& message) const {
+  return path_of(message.target()) == "/live" && boost::beast::websocket::is_upgrade(message) && buffer_.size() == 0;
+}
+
+bool HttpConnection::begin_page(const Caller& caller) {
+  std::erase_if(live_.pages, [](const auto& of_one) { return of_one.second == 0; });
+  std::size_t& pages = live_.pages[caller.user.empty() ? caller.actor : caller.user];
+  if (pages >= kMaxPagesOfOne) return false;
+  page_.emplace(pages);
+  return true;
+}
+
+asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
+  if (buffer_.size() == 0) {
+    const auto [error, size] =
+        co_await stream_.async_read_some(buffer_.prepare(kReadBytes), asio::as_tuple(asio::use_awaitable));
+    if (error) co_return Next::end;
+    buffer_.commit(size);
+  }
+  allow(kRequestTime);
+  request_has_begun_ = true;
+  Parser parser;
+  parser.header_limit(kMaxHeaderBytes);
+  parser.body_limit(kMaxBodyBytes);
+  boost::system::error_code error;
+  buffer_.consume(parser.put(buffer_.data(), error));  // most come in one piece: no turn of the loop is spent on them
+  if (error == http::error::need_more) {
+    std::tie(error, std::ignore) =
+        co_await http::async_read_header(stream_, buffer_, parser, asio::as_tuple(asio::use_awaitable));
+  }
+  if (!error) {
+    auto refusal = refusal_of(parser);
+    if (refusal) co_return co_await refuse_unread(std::move(*refusal), parser.release());
+    error = co_await read_body(parser);
+  }
+  request_has_begun_ = false;
+  if (error) co_return co_await refuse_unreadable(error);
+  deadline_us_ = kNever;  // a route bounds its own waits
+  const Next next = co_await carry_out(parser.release());
+  if (next == Next::another) guest_.rest();
+  co_return next;
+}
+
+// What the header alone is refused for. The last word has carry_out(), which knows the body.
+std::optional<Response> HttpConnection::refusal_of(Parser& parser) const {
+  const Message& head = parser.get();
+  if (head.target().size() > kMaxTargetBytes) {
+    return problem(414, fmt::format("the target has more than {} bytes", kMaxTargetBytes), "too_large");
+  }
+  if (std::distance(head.begin(), head.end()) > static_cast<std::ptrdiff_t>(kMaxHeaderFields)) {
+    return problem(431, fmt::format("the header has more than {} fields", kMaxHeaderFields), "too_large");
+  }
+  if (parser.is_done()) return std::nullopt;  // there is no body
+  auto admitted = guard_.admit(plain_head(head));
+  if (!admitted) return std::move(admitted.error());
+  if (!admitted->actor.empty()) return std::nullopt;
+  parser.body_limit(kMaxLoginBodyBytes);
+  if (parser.content_length().value_or(0) <= kMaxLoginBodyBytes) return std::nullopt;
+  return problem(413, fmt::format("the body has more than {} bytes", kMaxLoginBodyBytes), "too_large");
+}
+
+asio::awaitable<boost::system::error_code> HttpConnection::read_body(Parser& parser) {
+  if (parser.is_done()) co_return boost::system::error_code{};
+  if (parser.get()[http::field::expect] == "100-continue") {
+    const std::string go_on = "HTTP/1.1 100 Continue\r\n\r\n";
+    co_await asio::async_write(stream_, asio::buffer(go_on), asio::as_tuple(asio::use_awaitable));
+  }
+  boost::system::error_code error;
+  parser.eager(true);
+  buffer_.consume(parser.put(buffer_.data(), error));
+  if (error == http::error::need_more || (!error && !parser.is_done())) {
+    std::tie(error, std::ignore) =
+        co_await http::async_read(stream_, buffer_, parser, asio::as_tuple(asio::use_awaitable));
+  }
+  co_return error;
+}
+
+asio::awaitable<HttpConnection::Next> HttpConnection::carry_out(Message message) {
+  Request request = plain_head(message);
+  request.body = message.body();
+  request.received_us = clock_.steady_us();
+  auto admitted = guard_.admit(request);
+  if (!admitted) co_return co_await send(std::move(admitted.error()), message);
+  admitted->peer = address_of(stream_);
+  if (!admitted->actor.empty()) guest_.becomes(Guest::busy);
+  if (wants_live(message)) {
+    if (!begin_page(*admitted)) {
+      Response refused = problem(429, fmt::format("{} has {} pages open; close some", admitted->actor, kMaxPagesOfOne),
+                                 "too_many_pages");
+      co_return co_await send(std::move(refused), message);
+    }
+    upgrade_.emplace(message.base());
+    caller_ = std::move(*admitted);
+    co_return Next::end;
+  }
+  request.caller = std::move(*admitted);
+  request.actor = request.caller.actor;
+  request.peer = request.caller.peer;
+  // SAFETY: what changes something, above all a stop, is carried out though its client has hung up.
+  if (request.method != "GET" && request.method != "HEAD") {
+    Response response = co_await answer(std::move(request));
+    co_return co_await send(std::move(response), message);
+  }
+  auto response = co_await while_present(answer(std::move(request)));
+  if (!response) co_return Next::end;
+  co_return co_await send(std::move(*response), message);
+}
+
+// What the work gives, or nothing when the client goes first: the work is cancelled then, and has ended.
+template <class T>
+asio::awaitable<std::optional<T>> HttpConnection::while_present(asio::awaitable<T> work) {
+  try {
+    std::variant<T, std::monostate> first = co_await (std::move(work) || stream_.peer_gone());
+    if (first.index() == 0) co_return std::move(std::get<0>(first));
+    co_return std::nullopt;
+  } catch (const asio::multiple_exceptions&) {  // both were cancelled: the station stops, or the time is over
+    throw boost::system::system_error{asio::error::operation_aborted};
+  }
+}
+
+// Says why, if the client spoke at all, and gives it the time to read that.
+asio::awaitable<HttpConnection::Next> HttpConnection::refuse_unreadable(boost::system::error_code error) {
+  static const auto& http_category = http::make_error_code(http::error::bad_method).category();
+  if (error.category() != http_category || error == http::error::end_of_stream ||
+      error == http::error::partial_message) {
+    co_return Next::end;
+  }
+  Response response = problem(400, "this is not HTTP/1.1: " + error.message(), "malformed_http");
+  if (error == http::error::header_limit) {
+    response = problem(431, fmt::format("the header has more than {} bytes", kMaxHeaderBytes), "too_large");
+  } else if (error == http::error::body_limit) {
+    response = problem(413, fmt::format("the body has more than {} bytes", kMaxBodyBytes), "too_large");
+  }
+  Message unreadable;
+  unreadable.version(11);
+  co_return co_await refuse_unread(std::move(response), std::move(unreadable));
+}
+
+asio::awaitable<HttpConnection::Next> HttpConnection::refuse_unread(Response response, Message message) {
+  request_has_begun_ = false;
+  message.keep_alive(false);
+  co_await send(std::move(response), message);
+  co_await discard_rest();
+  co_return Next::end;
+}
+
+// Closing with unread bytes would reset the connection and could destroy the answer on its way.
+asio::awaitable<void> HttpConnection::discard_rest() {
+  stream_.end_sending();
+  allow(kLingerTime);
+  buffer_.clear();
+  std::size_t discarded = 0;
+  while (discarded < kMaxDiscardBytes) {
+    const auto [error, size] =
+        co_await stream_.async_read_some(buffer_.prepare(kReadBytes), asio::as_tuple(asio::use_awaitable));
+    if (error) co_return;
+    discarded += size;
+  }
+}
+
+// The boundary: whatever a route throws ends here, and says nothing of the inside to the outside.
+asio::awaitable<Response> HttpConnection::answer(Request request) {
+  const std::string what = request.method + " " + request.target.substr(0, 200);
+  try {
+    co_return co_await router_.dispatch(std::move(request));
+  } catch (const boost::system::system_error& error) {
+    if (error.code() == asio::error::operation_aborted) throw;
+    spdlog::error("{}: {}", what, error.what());
+  } catch (const std::exception& error) {
+    spdlog::error("{}: {}", what, error.what());
+  }
+  co_return problem(500, "the station could not answer; its log says why", "internal");
+}
+
+asio::awaitable<HttpConnection::Next> HttpConnection::send(Response response, const Message& to) {
+  const bool head_only = to.method() == http::verb::head;
+  if (response.stream != nullptr && !head_only) {
+    AnswerHead head;
+    set_common_fields(head, response, to, stream_.is_secure());
+    if (to.version() >= 11) {
+      head.chunked(true);
+    } else {
+      head.keep_alive(false);
+    }
+    co_return co_await send_stream(std::move(head), std::move(response.stream));
+  }
+  TextAnswer message;
+  set_common_fields(message, response, to, stream_.is_secure());
+  if (response.status != 304 && response.stream == nullptr) message.content_length(response.body.size());
+  if (!head_only) message.body() = std::move(response.body);
+  co_return co_await send_body(std::move(message));
+}
+
+asio::awaitable<HttpConnection::Next> HttpConnection::send_body(TextAnswer message) {
+  allow(kWriteTime);
+  const auto [error, size] = co_await http::async_write(stream_, message, asio::as_tuple(asio::use_awaitable));
+  co_return error || !message.keep_alive() ? Next::end : Next::another;
+}
+
+asio::awaitable<HttpConnection::Next> HttpConnection::send_stream(AnswerHead head, std::unique_ptr<BodyStream> body) {
+  allow(kWriteTime);
+  http::response_serializer<http::empty_body> serializer{head};
+  const auto [head_error, head_size] =
+      co_await http::async_write_header(stream_, serializer, asio::as_tuple(asio::use_awaitable));
+  if (head_error) co_return Next::end;
+  const bool chunked = head.chunked();
+  for (;;) {
+    deadline_us_ = kNever;
+    const auto made = co_await while_present(next_piece(*body));
+    if (!made || !*made) co_return Next::end;  // the missing last chunk tells the client
+    const std::optional<std::string>& piece = **made;
+    if (!piece) break;
+    if (piece->empty()) continue;
+    allow(kWriteTime);
+    boost::system::error_code error;
+    const auto bytes = asio::buffer(*piece);
+    if (chunked) {
+      std::tie(error, std::ignore) =
+          co_await asio::async_write(stream_, http::make_chunk(bytes), asio::as_tuple(asio::use_awaitable));
+    } else {
+      std::tie(error, std::ignore) = co_await asio::async_write(stream_, bytes, asio::as_tuple(asio::use_awaitable));
+    }
+    if (error) co_return Next::end;
+  }
+  if (!chunked) co_return Next::end;
+  allow(kWriteTime);
+  const auto [error, size] =
+      co_await asio::async_write(stream_, http::make_chunk_last(), asio::as_tuple(asio::use_awaitable));
+  co_return error || !head.keep_alive() ? Next::end : Next::another;
+}
+
+asio::awaitable<Result<std::optional<std::string>>> HttpConnection::next_piece(BodyStream& body) {
+  std::string failure;
+  try {
+    auto piece = co_await body.next();
+    if (piece) co_return piece;
+    failure = piece.error().detail;
+  } catch (const boost::system::system_error& error) {
+    if (error.code() == asio::error::operation_aborted) throw;
+    failure = error.what();
+  } catch (const std::exception& error) {
+    failure = error.what();
+  }
+  spdlog::error("an answer was cut short: {}", failure);
+  co_return fail(ErrorCode::internal, failure);
+}
+
+}  // namespace server

@@ -1,0 +1,31 @@
+// What the audit is told of one act: who, from where, when, what, and what came of it.
+//
+// Plain values. Whoever acts on behalf of somebody is given an Author; what is done makes an AuditNote of it, and the
+// recorder, or the store that changes the database, appends it (recording/audit_chain).
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+namespace server {
+
+struct Author {
+  std::string actor;       // "user:anna/session:4", "token:ci", "station", "loopback", "cli:root"; empty: nobody said
+  std::string peer;        // the address it came from; empty: from no other machine, or not known
+  std::int64_t at_us = 0;  // UTC
+};
+
+struct AuditNote {
+  Author by;
+  std::string robot_id;       // empty: the station itself
+  std::string action;         // of a fixed set: docs/database.md
+  std::string subject;        // what it was done to: the id of a command or run, the name of a user or token
+  std::string detail = "{}";  // a JSON object
+  bool can_flood = false;     // anybody can cause any number of it: AuditQuota bounds how many are written
+};
+
+// As text for `detail`; what is not UTF-8 is replaced.
+std::string audit_detail(const nlohmann::json& detail);
+
+}  // namespace server

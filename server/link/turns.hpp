@@ -1,0 +1,43 @@
+// Whose turn it is to work at what a robot has sent: a few robots between two looks at all sockets, and who answers an
+// emergency stop before all others.
+//
+// Without it the loop would work off everything that has arrived from robots, often a millisecond and more, before it
+// looks at the request of a person, and again at each further step of that request. Loop thread; outlives those who
+// wait.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <cstdint>
+#include <deque>
+#include <functional>
+
+namespace server {
+
+class Turns {
+ public:
+  static constexpr int kAtOnce = 8;  // some 70 µs of work
+
+  enum class Place : std::uint8_t { last, first };
+
+  explicit Turns(boost::asio::io_context& loop) : loop_{loop} {}
+  Turns(const Turns&) = delete;
+  Turns& operator=(const Turns&) = delete;
+
+  // True: it is the caller's turn at once. False: wait() for it.
+  bool take();
+  boost::asio::awaitable<void> wait(Place place);
+
+  std::size_t waiting() const { return waiting_.size(); }
+
+ private:
+  void begin_round();
+  void next_round();
+
+  boost::asio::io_context& loop_;
+  std::deque<std::move_only_function<void()>> waiting_;  // at most one of each robot
+  int taken_ = 0;                                        // in this round
+  bool is_round_ = false;  // next_round() is under way, behind everything that is ready now
+};
+
+}  // namespace server

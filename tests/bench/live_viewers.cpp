@@ -1,0 +1,87 @@
+// Many pages that look at robots: WebSockets on /live, each watching one robot, read and thrown away.
+//
+//   live_viewers PORT TOKEN COUNT ROBOTS
+//
+// Viewer i watches robot sim-((i mod ROBOTS) + 1). Says "ready" when all are connected; ends with its standard input,
+// and prints how many bytes came. Exit status 1 when a viewer is refused or loses its connection.
+#include <arpa/inet.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+int connect_to(std::uint16_t port) {
+  const int fd = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(port);
+  if (connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
+    throw std::runtime_error{"no connection"};
+  return fd;
+}
+
+void send_all(int fd, const std::string& bytes) {
+  if (send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(bytes.size())) {
+    throw std::runtime_error{"cannot send"};
+  }
+}
+
+// A short text frame, as a client masks it: with zeros.
+std::string text_frame(const std::string& text) {
+  return std::string{'\x81', static_cast<char>(0x80U | text.size())} + std::string(4, '\0') + text;
+}
+
+int open_viewer(std::uint16_t port, const std::string& token, const std::string& robot) {
+  const int fd = connect_to(port);
+  send_all(fd,
+           "GET /live HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+           "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nAuthorization: Bearer " +
+               token + "\r\n\r\n");
+  std::string answer;
+  while (answer.find("\r\n\r\n") == std::string::npos) {
+    char byte = 0;
+    if (recv(fd, &byte, 1, 0) != 1) throw std::runtime_error{"no answer"};
+    answer += byte;
+  }
+  if (!answer.starts_with("HTTP/1.1 101")) throw std::runtime_error{answer};
+  send_all(fd, text_frame(R"({"type":"watch","robots":[")" + robot + "\"]}"));
+  return fd;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  if (argc != 5) throw std::runtime_error{"live_viewers PORT TOKEN COUNT ROBOTS"};
+  const auto port = static_cast<std::uint16_t>(std::stoi(argv[1]));
+  const int count = std::stoi(argv[3]), robots = std::stoi(argv[4]);
+  std::vector<pollfd> waited{{STDIN_FILENO, POLLIN, 0}};
+  for (int i = 0; i < count; ++i) {
+    const std::string robot = "sim-" + std::to_string(i % robots + 1);
+    waited.push_back({open_viewer(port, argv[2], robot), POLLIN, 0});
+  }
+  std::cout << "ready" << std::endl;
+  std::uint64_t bytes = 0;
+  std::array<char, 65536> buffer;
+  while (poll(waited.data(), waited.size(), -1) > 0 && waited[0].revents == 0) {
+    for (const pollfd& viewer : waited) {
+      if (viewer.revents == 0 || viewer.fd == STDIN_FILENO) continue;
+      const ssize_t got = recv(viewer.fd, buffer.data(), buffer.size(), 0);
+      if (got <= 0) throw std::runtime_error{"a viewer lost its connection"};
+      bytes += static_cast<std::uint64_t>(got);
+    }
+    usleep(5000);  // as a browser looks now and then
+  }
+  std::cout << bytes << std::endl;
+  return 0;
+} catch (const std::exception& error) {
+  std::cerr << "live_viewers: " << error.what() << '\n';
+  return 1;
+}

@@ -1,0 +1,186 @@
+// What goes wrong inside: the connection says that it did, the log says what, and the station goes on.
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <sstream>
+
+#include "server/api/http_connection.hpp"
+#include "server/api/http_server.hpp"
+#include "tests/server/api/api_fixture.hpp"
+
+namespace server {
+namespace {
+
+bool says(const std::string& answer, const std::string& part) { return answer.find(part) != std::string::npos; }
+
+// The log of one test.
+class Log {
+ public:
+  Log() {
+    spdlog::set_default_logger(
+        std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text_)));
+  }
+  ~Log() { spdlog::set_default_logger(before_); }
+  Log(const Log&) = delete;
+  Log& operator=(const Log&) = delete;
+  std::string text() const { return text_.str(); }
+
+ private:
+  std::ostringstream text_;
+  std::shared_ptr<spdlog::logger> before_ = spdlog::default_logger();
+};
+
+class HttpFailuresTest : public ApiTest {
+ protected:
+  std::string send(const std::string& method, const std::string& target, const std::string& body = "") {
+    RawClient client{clock, api->port()};
+    client.send(method + " " + target + " HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer " + token() +
+                "\r\nContent-Type: application/json\r\nConnection: close\r\nContent-Length: " +
+                std::to_string(body.size()) + "\r\n\r\n" + body);
+    return client.read_to_end();
+  }
+  void expect_no_internals(const std::string& answer) {
+    for (const std::string& word :
+         {folder.path().string(), std::string{"station.sqlite"}, std::string{"SQL"}, std::string{"no such table"},
+          std::string{"SELECT"}, std::string{"exception"}, std::string{".cpp"}, std::string{"std::"}, token()}) {
+      EXPECT_FALSE(says(answer, word)) << word << answer;
+    }
+  }
+  // From another program, as nobody should.
+  void spoil(const std::string& sql) {
+    SQLite::Database database{recorder.path().string(), SQLite::OPEN_READWRITE};
+    database.exec(sql);
+  }
+
+  Log log;
+};
+
+TEST_F(HttpFailuresTest, ADatabaseThatFailsIsToldWithoutItsWords) {
+  connect_robot();
+  ASSERT_EQ(ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}}).status, 201);
+  spoil("PRAGMA foreign_keys = OFF; ALTER TABLE run RENAME TO lost; ALTER TABLE user RENAME TO nobody");
+  const std::string runs = send("GET", "/api/v1/runs");
+  EXPECT_TRUE(runs.starts_with("HTTP/1.1 500 ")) << runs;
+  EXPECT_TRUE(says(runs, "\"reason\":\"internal\"") && says(runs, "its log says why")) << runs;
+  expect_no_internals(runs);
+  EXPECT_TRUE(says(log.text(), "GET /api/v1/runs: ") && says(log.text(), "no such table")) << log.text();
+  const std::string user = send("POST", "/api/v1/users", R"({"name":"anna","role":"viewer","password":"long enough"})");
+  EXPECT_TRUE(user.starts_with("HTTP/1.1 503 ")) << user;
+  expect_no_internals(user);
+}
+
+TEST_F(HttpFailuresTest, NoRefusalSpeaksOfTheInside) {
+  const std::pair<const char*, const char*> wrong[] = {{"GET", "/api/v1/runs/9"},
+                                                       {"GET", "/api/v1/runs/x"},
+                                                       {"GET", "/api/v1/robots/nobody"},
+                                                       {"GET", "/api/v1/runs?limit=x"},
+                                                       {"GET", "/%2e%2e/rheonaut.token"},
+                                                       {"GET", "/assets/nothing.js"},
+                                                       {"PUT", "/api/v1/runs"},
+                                                       {"POST", "/api/v1/runs"},
+                                                       {"POST", "/api/v1/backups"},
+                                                       {"GET", "/api/v1/runs/1/samples'"},
+                                                       {"GET", "/api/v1/runs/9/samples.mat"}};
+  for (const auto& [method, target] : wrong) {
+    const std::string answer = send(method, target, method == std::string{"POST"} ? "{\"x\"" : "");
+    EXPECT_TRUE(answer.starts_with("HTTP/1.1 4")) << answer;
+    expect_no_internals(answer);
+  }
+}
+
+// Those of a station that has just been made.
+struct NewCredentials {
+  NewCredentials(boost::asio::io_context& loop, Clock& clock, const std::filesystem::path& folder)
+      : database{folder / "station.sqlite"},
+        recorder{loop, clock, disk, checkpoints, RecorderOptions{folder / "station.sqlite"}},
+        accounts{loop, clock, recorder, folder},
+        auth{loop, clock, accounts, folder, 1} {}
+  Database database;
+  WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
+  Recorder recorder;
+  Accounts accounts;
+  Auth auth;
+};
+
+// A server whose only route throws.
+TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
+  TemporaryFolder folder;
+  boost::asio::io_context loop{1};
+  VirtualClock clock{loop};
+  TaskGroup tasks{loop};
+  Station station{loop, clock, Envelope{}, LinkTimes{}};
+  LiveFeed feed{clock};
+  LiveParts live{loop, tasks, clock, station, feed, "0"};
+  Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
+  NewCredentials credentials{loop, clock, folder.path()};
+  const RequestGuard guard{credentials.auth, {}};
+  Router router;
+  router.add({"GET", "/broken", Scope::anyone, {}, [](Request) -> Answer { throw std::runtime_error{"secret"}; }});
+  Entrance entrance{{clock, "http port", DoorLimits{}}, nullptr};
+  HttpServer server{tasks, clock, listener, entrance, guard, router, live};
+  tasks.spawn("http", server.run());
+  {
+    RawClient client{clock, listener.endpoint().port()};
+    client.send("GET /broken HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+    const std::string answer = client.read_to_end();
+    EXPECT_TRUE(answer.starts_with("HTTP/1.1 500 ")) << answer;
+    EXPECT_FALSE(says(answer, "secret"));
+  }
+  EXPECT_EQ(tasks.exit_code(), 0);
+  tasks.stop();
+  clock.settle();
+}
+
+// The station's clock, until it breaks.
+class BrokenClock final : public Clock {
+ public:
+  explicit BrokenClock(Clock& clock) : clock_{clock} {}
+  std::int64_t steady_us() const override { throw std::runtime_error{"the clock is broken"}; }
+  std::int64_t utc_us() const override { return clock_.utc_us(); }
+  using Clock::sleep_until;
+  boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us, Alarm* alarm) override {
+    return clock_.sleep_until(deadline_us, alarm);
+  }
+
+ private:
+  Clock& clock_;
+};
+
+TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
+  TemporaryFolder folder;
+  boost::asio::io_context loop{1};
+  VirtualClock clock{loop};
+  BrokenClock broken{clock};
+  TaskGroup tasks{loop};
+  Station station{loop, clock, Envelope{}, LinkTimes{}};
+  LiveFeed feed{clock};
+  LiveParts live{loop, tasks, broken, station, feed, "0"};
+  Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
+  NewCredentials credentials{loop, clock, folder.path()};
+  Auth& auth = credentials.auth;
+  const RequestGuard guard{auth, {}};
+  const Router router;
+  Entrance entrance{{clock, "http port", DoorLimits{}}, nullptr};
+  HttpServer server{tasks, clock, listener, entrance, guard, router, live};
+  tasks.spawn("http", server.run());
+  const auto session = auth.log_in(auth.new_login_code(), "", "");
+  {
+    RawClient client{clock, listener.endpoint().port()};
+    client.send(
+        "GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        "Cookie: " +
+        auth.cookie_name() + "=" + *session + "\r\n\r\n");
+    client.read_to_end();
+    EXPECT_TRUE(client.closed());
+  }
+  EXPECT_EQ(tasks.exit_code(), 0);
+  EXPECT_FALSE(tasks.stopping());
+  EXPECT_EQ(entrance.door.connections(), 0U);
+  tasks.stop();
+  clock.settle();
+}
+
+}  // namespace
+}  // namespace server

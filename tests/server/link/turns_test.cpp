@@ -1,0 +1,80 @@
+// Turns: a few at once, then everybody else who is ready; who answers a stop is first.
+#include "server/link/turns.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <boost/asio/post.hpp>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "server/tasks.hpp"
+
+namespace server {
+namespace {
+
+namespace asio = boost::asio;
+using ::testing::ElementsAre;
+
+class TurnsTest : public ::testing::Test {
+ protected:
+  asio::awaitable<void> work(std::string name, Turns::Place place = Turns::Place::last) {
+    if (!turns.take()) co_await turns.wait(place);
+    done.push_back(std::move(name));
+  }
+  void spawn(std::string name, Turns::Place place = Turns::Place::last) { tasks.spawn(name, work(name, place)); }
+
+  asio::io_context loop;
+  TaskGroup tasks{loop};
+  Turns turns{loop};
+  std::vector<std::string> done;
+};
+
+TEST_F(TurnsTest, AFewGoAtOnceAndTheOthersAfterWhoeverIsReadyThen) {
+  for (int i = 0; i < 2 * Turns::kAtOnce + 1; ++i) spawn("robot");
+  asio::post(loop, [this] { done.emplace_back("person"); });
+  loop.run();
+  ASSERT_EQ(done.size(), 2 * Turns::kAtOnce + 2u);
+  EXPECT_EQ(done[Turns::kAtOnce], "person") << "after the first few";
+  EXPECT_EQ(turns.waiting(), 0u);
+}
+
+// Each step of a person's request waits for one round at most, however many robots have sent something.
+TEST_F(TurnsTest, EachStepOfARequestWaitsForOneRoundAtMost) {
+  for (int i = 0; i < 10 * Turns::kAtOnce; ++i) spawn("robot");
+  std::vector<std::size_t> seen;
+  std::function<void()> step = [&] {
+    seen.push_back(done.size());
+    if (seen.size() < 4) asio::post(loop, step);
+  };
+  asio::post(loop, step);
+  loop.run();
+  ASSERT_EQ(seen.size(), 4u);
+  for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_LE(seen[i] - seen[i - 1], std::size_t{Turns::kAtOnce});
+}
+
+TEST_F(TurnsTest, WhoAnswersAStopWaitsBehindNoOther) {
+  for (int i = 0; i < Turns::kAtOnce; ++i) spawn("first round");
+  for (int i = 0; i < 20; ++i) spawn("robot");
+  spawn("stopped", Turns::Place::first);
+  loop.run();
+  EXPECT_EQ(done[Turns::kAtOnce], "stopped");
+}
+
+TEST_F(TurnsTest, WhoComesLaterDoesNotOvertake) {
+  for (int i = 0; i < Turns::kAtOnce; ++i) spawn("");
+  for (const char* name : {"a", "b", "c"}) spawn(name);
+  loop.run();
+  done.erase(done.begin(), done.begin() + Turns::kAtOnce);
+  EXPECT_THAT(done, ElementsAre("a", "b", "c"));
+}
+
+TEST_F(TurnsTest, WhoStillWaitsAtTheEndIsLetGo) {
+  for (int i = 0; i < 3 * Turns::kAtOnce; ++i) spawn("robot");
+  while (turns.waiting() == 0) loop.poll_one();
+  EXPECT_EQ(done.size(), 1u * Turns::kAtOnce) << "who waits is destroyed with the turns, before the loop";
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,152 @@
+// All robots are stopped at once: every frame first, and nobody's trouble is another's.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <stdexcept>
+
+#include "server/station/station.hpp"
+#include "server/tasks.hpp"
+#include "tests/server/virtual_clock.hpp"
+
+namespace server {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+// Notes what is handed to it, and takes it as written at once.
+class NotingPort final : public RobotPort {
+ public:
+  NotingPort(Station& station, RobotId id, std::vector<std::string>& notes)
+      : station_{station}, id_{std::move(id)}, notes_{notes} {}
+
+  const RobotId& robot_id() const override { return id_; }
+  bool send(const protocol::Command&, std::int64_t) override { return true; }
+  bool withdraw(CommandId) override { return false; }
+  void send_emergency_stop(const protocol::Command& command) override {
+    if (is_broken) throw std::runtime_error{"no memory"};
+    notes_.push_back("frame " + id_);
+    stop = command.command_id;
+    station_.on_command_sent(*this, command.command_id);
+  }
+  void acknowledge(std::uint64_t, std::uint64_t) override {}
+  void request_resend(std::uint64_t, std::uint64_t) override {}
+  void request_event_resend() override {}
+  void close(const std::string&) override {}
+
+  void obey() {
+    protocol::CommandAck ack = rheonaut_CommandAck_init_zero;
+    ack.command_id = stop;
+    ack.result = rheonaut_COMMAND_RESULT_ACCEPTED;
+    ack.emergency_id = 9;
+    station_.on_command_ack(*this, ack);
+  }
+
+  bool is_broken = false;
+  CommandId stop = 0;
+
+ private:
+  Station& station_;
+  RobotId id_;
+  std::vector<std::string>& notes_;
+};
+
+class NotingSink final : public StationSink {
+ public:
+  explicit NotingSink(std::vector<std::string>& notes) : notes_{notes} {}
+  void on_command(const CommandRecord& record) override {
+    notes_.push_back("record " + record.robot_id);
+    if (record.robot_id == broken) throw std::runtime_error{"no disk"};
+  }
+  RobotId broken;
+
+ private:
+  std::vector<std::string>& notes_;
+};
+
+class StopAllTest : public ::testing::Test {
+ protected:
+  StopAllTest() { station.add_sink(sink); }
+  ~StopAllTest() override {
+    tasks.stop();
+    clock.settle();
+  }
+
+  NotingPort& connect(const RobotId& id) {
+    ports.push_back(std::make_unique<NotingPort>(station, id, notes));
+    AdmissionRequest hello;
+    hello.robot_id = id;
+    hello.boot_id = 7;
+    station.on_connected(*ports.back(), hello, protocol::Hello(rheonaut_Hello_init_zero), Admission{}, "memory");
+    return *ports.back();
+  }
+
+  void stop_all(microseconds patience = 1s) {
+    auto task = [](StopAllTest& test, microseconds limit) -> boost::asio::awaitable<void> {
+      StopRequest request;
+      request.actor = "user:anna";
+      test.outcome = co_await test.station.stop_all(std::move(request), limit);
+    };
+    tasks.spawn("stop all", task(*this, patience));
+    clock.settle();
+  }
+
+  boost::asio::io_context loop;
+  VirtualClock clock{loop};
+  TaskGroup tasks{loop};
+  Station station{loop, clock, Envelope{}, LinkTimes{}};
+  std::vector<std::string> notes;
+  NotingSink sink{notes};
+  std::vector<std::unique_ptr<NotingPort>> ports;
+  std::optional<StopsOfAll> outcome;
+};
+
+TEST_F(StopAllTest, EveryFrameIsHandedOverBeforeAnythingIsToldOfAny) {
+  for (const char* id : {"a", "b", "c"}) connect(id);
+  stop_all();
+  EXPECT_THAT(notes, ElementsAre("frame a", "frame b", "frame c", "record a", "record b", "record c"));
+  EXPECT_FALSE(outcome.has_value()) << "it waits for their answers";
+  for (const auto& port : ports) port->obey();
+  ASSERT_TRUE(clock.run_until([this] { return outcome.has_value(); }, 10ms));
+  ASSERT_EQ(outcome->records.size(), 3u);
+  for (const CommandRecord& record : outcome->records) EXPECT_EQ(record.state, CommandState::acknowledged);
+  EXPECT_THAT(outcome->failed, IsEmpty());
+}
+
+TEST_F(StopAllTest, ItWaitsForAllTogetherNoLongerThanItsPatience) {
+  for (const char* id : {"a", "b", "c"}) connect(id);
+  stop_all(1s);
+  ports[1]->obey();
+  EXPECT_FALSE(clock.run_until([this] { return outcome.has_value(); }, 990ms));
+  ASSERT_TRUE(clock.run_until([this] { return outcome.has_value(); }, 20ms));
+  EXPECT_EQ(outcome->records[0].state, CommandState::sent);
+  EXPECT_EQ(outcome->records[1].state, CommandState::acknowledged);
+}
+
+TEST_F(StopAllTest, OneThatCannotBeStoppedKeepsNoOtherFromIt) {
+  connect("a").is_broken = true;
+  connect("b");
+  sink.broken = "c";
+  connect("c");
+  stop_all();
+  EXPECT_THAT(notes, ElementsAre("frame b", "frame c", "record b", "record c"));
+  sink.broken.clear();
+  for (std::size_t i : {1u, 2u}) ports[i]->obey();
+  ASSERT_TRUE(clock.run_until([this] { return outcome.has_value(); }, 10ms));
+  EXPECT_THAT(outcome->failed, ElementsAre("a", "c"));
+  ASSERT_EQ(outcome->records.size(), 1u);
+  EXPECT_EQ(outcome->records[0].robot_id, "b");
+}
+
+TEST_F(StopAllTest, ARobotThatIsAwayIsNotWaitedFor) {
+  connect("a");
+  station.on_disconnected(*ports[0], "gone");
+  stop_all(1s);
+  ASSERT_TRUE(outcome.has_value());
+  EXPECT_EQ(outcome->records[0].state, CommandState::queued);
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,113 @@
+"""Attacks on a real station by a program beside it: a robot is stopped all the while, over open and new connections."""
+import http.client
+import json
+import re
+import subprocess
+import sys
+import time
+import unittest
+
+from hostile_clients import ATTACKS
+from processes import ROOT, lab, wait_until
+
+STOP = "/api/v1/robots/sim-1/emergency-stop"
+LONGEST_S = 2.0  # of one stop here, in a build with sanitizers; tests/bench/stop_bench --hostile measures them
+
+
+class HostileTest(unittest.TestCase):
+    def setUp(self):
+        self.place = self.enterContext(lab())
+        self.station = self.place.start_station()
+        self.place.start_robot(self.station, "sim-1")
+        self.station.wait_for_robot("sim-1")
+        host, port = self.station.endpoints["http"].rsplit(":", 1)
+        self.operator = http.client.HTTPConnection(host, int(port), timeout=20)
+        self.addCleanup(self.operator.close)
+        self.stop_on_the_open_connection()
+
+    def attack(self, *names):
+        """Starts these, and waits until they are in full swing."""
+        program = [sys.executable, "-B", str(ROOT / "tests/system/hostile_clients.py"),
+                   self.station.endpoints["http"], self.station.endpoints["robots"], self.station.token, *names]
+        process = subprocess.Popen(program, stdout=subprocess.PIPE, text=True)
+
+        def end():
+            process.kill()
+            process.wait()
+            process.stdout.close()
+        self.addCleanup(end)
+        begun = {process.stdout.readline().strip() for _ in names}
+        self.assertEqual(begun, set(names))
+
+    def stop_on_the_open_connection(self):
+        headers = {"Authorization": f"Bearer {self.station.token}", "Content-Length": "0"}
+        self.operator.request("POST", STOP, headers=headers)
+        self.expect_stopped(json.loads(self.operator.getresponse().read()))
+
+    def stop_on_a_new_connection(self):
+        self.expect_stopped(self.station.post(STOP))
+
+    def expect_stopped(self, record):
+        self.assertIn(record["state"], ("acknowledged", "verified"), record)
+
+    def expect_stops(self, seconds):
+        end = time.monotonic() + seconds
+        slowest = 0
+        while time.monotonic() < end:
+            for stop in (self.stop_on_the_open_connection, self.stop_on_a_new_connection):
+                begun = time.monotonic()
+                stop()
+                slowest = max(slowest, time.monotonic() - begun)
+            time.sleep(0.1)
+        self.assertLess(slowest, LONGEST_S)
+        print(f"slowest stop {1000 * slowest:.0f} ms", file=sys.stderr)
+
+    def metric(self, name):
+        _, _, text = self.station.request("GET", "/metrics")
+        return int(re.search(rf"^rheonaut_{name} (\d+)$", text.decode(), re.M).group(1))
+
+    def test_slowloris(self):
+        self.attack("slowloris")
+        self.expect_stops(3)
+        self.assertGreaterEqual(self.metric("http_connections"), 100)
+        self.expect_stops(9)  # all of them are ended once, and come again
+        said = [line for line in self.place.log("station").splitlines() if "emergency stop" not in line]
+        self.assertLess(len(said), 40, "they fill no log")
+
+    def test_a_thousand_idle_connections_on_each_port(self):
+        self.attack("idle")
+        self.expect_stops(5)
+        self.assertLessEqual(self.metric("http_connections"), 256 + 64)
+        self.assertGreaterEqual(self.metric("http_connections_replaced_total"), 700)
+        self.place.start_robot(self.station, "sim-2")
+        self.station.wait_for_robot("sim-2")
+        wait_until(lambda: self.metric("robot_connections") >= 500, 10, "the robots' port holds them, too")
+
+    def test_bad_logins(self):
+        self.attack("logins")
+        self.expect_stops(5)
+
+    def test_oversized_and_deeply_nested_json(self):
+        self.attack("json")
+        self.expect_stops(5)
+
+    def test_giant_and_broken_frames(self):
+        self.attack("frames")
+        self.expect_stops(5)
+        lines = [line for line in self.place.log("station").splitlines() if "was not let in" in line]
+        self.assertTrue(lines)
+        self.assertLess(len(lines), 15, "one a second at most")
+
+    def test_pages_that_never_read(self):
+        self.attack("silent_pages")
+        self.expect_stops(5)
+
+    def test_everything_at_once(self):
+        self.attack(*ATTACKS)
+        self.expect_stops(10)
+        self.assertEqual(self.station.robot("sim-1")["link"], "connected")
+        self.assertEqual(self.place.stop_station(), 0, "and it ends in order")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,104 @@
+"""Nothing stale moves the robot: a network that stands still for 2 s, and 50 setpoints sent meanwhile. Real processes,
+the robot behind `rheonaut-sim proxy`."""
+import json
+import threading
+import unittest
+
+from processes import lab, wait_until
+from proxy_test import Running
+
+SETPOINTS = [round(0.2 + 0.005 * i, 3) for i in range(50)]
+PATIENT = "[robots]\nlink_timeout_ms = 5000\nheartbeat_interval_ms = 200\n"  # a stall of 2 s is no lost link
+
+
+class StalenessTest(unittest.TestCase):
+    def setUp(self):
+        self.place = self.enterContext(lab())
+
+    def start(self, config=None):
+        self.station = self.place.start_station(config=config)
+        self.proxy = Running("proxy", "--to", self.station.endpoints["robots"], "--seed", "1")
+        self.addCleanup(self.proxy.close)
+        port = self.proxy.port()
+        self.place._start("sim-1", "rheonaut-sim", "--station", f"127.0.0.1:{port}", "--id", "sim-1", "--sensor", "perfect")
+        self.station.wait_for_robot("sim-1")
+        self.station.command("sim-1", "set_mode", mode="auto", setpoint_m=0.1)
+        wait_until(lambda: self.robot()["setpoint_m"] == 0.1, 10, "the setpoint in telemetry")
+
+    def robot(self):
+        return self.station.robot("sim-1")
+
+    def stall_and_send(self, life_ms):
+        """50 setpoints within a stall of 2 s; what the station says of each at the end, in the order they were sent."""
+        self.proxy.say("outage 2")
+        self.assertIn("ok", self.proxy.line_with("ok"))
+        answers = [None] * len(SETPOINTS)
+
+        def send(number, setpoint_m):
+            body = {"kind": "set_setpoint", "setpoint_m": setpoint_m, "life_ms": life_ms}
+            status, _, content = self.station.request("POST", "/api/v1/robots/sim-1/commands?wait=verified", body,
+                                                      timeout_s=60)
+            answers[number] = (status, json.loads(content))
+
+        threads = []
+        over = threading.Event()
+        for number, setpoint_m in enumerate(SETPOINTS):
+            threads.append(threading.Thread(target=send, args=(number, setpoint_m)))
+            threads[-1].start()
+            over.wait(0.035)  # spread over the stall, as an operator's dragging finger would
+        for thread in threads:
+            thread.join(60)
+        self.assertNotIn(None, answers, "each is answered")
+        return answers
+
+    @staticmethod
+    def state_of(answer):
+        status, said = answer
+        return said["state"] if status == 200 else said.get("command", {}).get("state", said["reason"])
+
+    def setpoints_seen(self, run_id):
+        rows = self.station.get(f"/api/v1/runs/{run_id}/samples?limit=10000")["samples"]
+        seen = []
+        for row in rows:
+            if not seen or seen[-1] != row["setpoint_m"]:
+                seen.append(row["setpoint_m"])
+        return seen
+
+    def test_of_setpoints_that_are_still_worth_something_only_the_newest_acts(self):
+        self.start(PATIENT)
+        run_id = self.station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "stall"})["run_id"]
+        answers = self.stall_and_send(life_ms=10_000)
+        states = [self.state_of(answer) for answer in answers]
+        self.assertEqual(states[-1], "verified", answers[-1])
+        # "expired": the robot keeps the answers to the latest few only, so those came to nothing for want of one.
+        self.assertLessEqual(set(states[:-1]), {"superseded", "expired"}, states)
+        wait_until(lambda: self.robot()["setpoint_m"] == SETPOINTS[-1], 10, "the newest in telemetry")
+        self.station.post(f"/api/v1/runs/{run_id}/end")
+        self.assertEqual(self.setpoints_seen(run_id), [0.1, SETPOINTS[-1]])
+
+    def test_setpoints_older_than_their_life_never_act(self):
+        self.start(PATIENT)
+        run_id = self.station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "stall"})["run_id"]
+        states = [self.state_of(answer) for answer in self.stall_and_send(life_ms=200)]
+        self.assertLessEqual(set(states), {"expired", "superseded"}, states)
+        seen = self.robot()["next_seq"]
+        wait_until(lambda: self.robot()["next_seq"] > seen + 100, 20, "another second of samples")
+        self.station.post(f"/api/v1/runs/{run_id}/end")
+        self.assertEqual(self.setpoints_seen(run_id), [0.1])
+
+    def test_a_stall_beyond_the_time_out_is_a_lost_link_and_nothing_moves_after_it(self):
+        self.start()
+        answers = self.stall_and_send(life_ms=10_000)
+        self.station.wait_for_robot("sim-1", timeout_s=30)
+        states = [self.state_of(answer) for answer in answers]
+        # "superseded": by a newer one, before the link was held for lost.
+        self.assertLessEqual(set(states), {"failed", "not_connected", "superseded"}, states)
+        self.assertIn("not_connected", states, "the link was held for lost within the stall")
+        seen = self.robot()["next_seq"]
+        wait_until(lambda: self.robot()["next_seq"] > seen + 100, 20, "another second of samples")
+        robot = self.robot()
+        self.assertEqual((robot["mode"], robot["setpoint_m"], robot["sample"]["duty"]), ("manual", None, 0.0))
+
+
+if __name__ == "__main__":
+    unittest.main()
