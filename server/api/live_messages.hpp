@@ -11,6 +11,7 @@
 #include "server/result.hpp"
 #include "server/station/station.hpp"
 #include "server/tasks.hpp"
+#include "server/turns.hpp"
 
 namespace server {
 
@@ -24,6 +25,7 @@ struct LiveParts {
   std::string version;
   std::size_t renewals = 0;                       // on their way
   std::map<std::string, std::size_t> pages = {};  // that are open, of each user, token or link
+  Turns turns{loop};                              // of the pages that something is written to
 };
 
 inline constexpr std::int64_t kMaxStampAgeUs = 400'000;

@@ -13,11 +13,11 @@
 
 #include "protocol/frame.hpp"
 #include "server/clock.hpp"
-#include "server/link/turns.hpp"
 #include "server/net/byte_stream.hpp"
 #include "server/station/robot_archive.hpp"
 #include "server/station/robot_port.hpp"
 #include "server/station/station.hpp"
+#include "server/turns.hpp"
 
 namespace server {
 

@@ -96,7 +96,7 @@ asio::awaitable<void> LiveFeed::publish_changed() {
   std::size_t published = 0;
   RobotId passed;
   for (auto next = changed_.begin(); next != changed_.end(); next = changed_.upper_bound(passed)) {
-    publish_robot(next->second);
+    publish_robot(next->second, false);
     passed = next->first;
     changed_.erase(next);
     if (++published % kRobotsInATurn == 0) co_await asio::post(asio::use_awaitable);
@@ -121,9 +121,15 @@ bool LiveFeed::headline_changed(const RobotState& robot) {
   return true;
 }
 
-void LiveFeed::publish_robot(const RobotState& robot) {
-  const auto shared = std::make_shared<const std::string>(dump({{"type", "robot"}, {"robot", to_json(robot)}}));
-  for (Subscriber* subscriber : subscribers_) subscriber->push_state(robot.id, shared);
+void LiveFeed::publish_robot(const RobotState& robot, bool is_headline) {
+  LiveText message;  // written when the first is to hear it
+  for (Subscriber* subscriber : subscribers_) {
+    if (!is_headline && !subscriber->watches(robot.id)) continue;
+    if (message == nullptr) {
+      message = std::make_shared<const std::string>(dump({{"type", "robot"}, {"robot", to_json(robot)}}));
+    }
+    subscriber->push_state(robot.id, message);
+  }
 }
 
 void LiveFeed::publish_run(json run) {
@@ -137,14 +143,14 @@ void LiveFeed::on_robot(const RobotState& robot) {
     return;
   }
   changed_.erase(robot.id);
-  publish_robot(robot);
+  publish_robot(robot, true);
 }
 
 void LiveFeed::on_samples(const RobotState& robot, const SampleBatch& batch) {
   if (subscribers_.empty()) return;
   if (headline_changed(robot)) {
     changed_.erase(robot.id);
-    publish_robot(robot);
+    publish_robot(robot, true);
   } else if (const auto waiting = changed_.find(robot.id); waiting != changed_.end()) {
     waiting->second = robot;
   }

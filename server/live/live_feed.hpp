@@ -39,7 +39,7 @@ class Subscriber {
   boost::asio::awaitable<void> wait();  // until a message waits; throws operation_aborted when cancelled
   LiveText pop();                       // null when none waits
 
-  // Of whose samples it hears from now on; before the first call, of all.
+  // Of whose samples and small changes of state it hears from now on; before the first call, of all.
   void watch(std::set<RobotId> robots) { watched_ = std::move(robots); }
   bool watches(const RobotId& robot) const { return !watched_ || watched_->contains(robot); }
 
@@ -94,7 +94,7 @@ class LiveFeed final : public StationSink {
 
   boost::asio::awaitable<void> publish_changed();
   bool headline_changed(const RobotState& robot);
-  void publish_robot(const RobotState& robot);
+  void publish_robot(const RobotState& robot, bool is_headline);
   void publish(std::string message, bool droppable);
 
   Clock& clock_;

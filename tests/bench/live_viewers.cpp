@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <iostream>
 #include <stdexcept>
 #include <string>
@@ -70,7 +71,15 @@ int main(int argc, char** argv) try {
   std::cout << "ready" << std::endl;
   std::uint64_t bytes = 0;
   std::array<char, 65536> buffer;
-  while (poll(waited.data(), waited.size(), -1) > 0 && waited[0].revents == 0) {
+  auto said_at = std::chrono::steady_clock::now();
+  while (poll(waited.data(), waited.size(), 1000) >= 0 && waited[0].revents == 0) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - said_at > std::chrono::seconds{5}) {  // or the station would take them for dead
+      said_at = now;
+      for (const pollfd& viewer : waited) {
+        if (viewer.fd != STDIN_FILENO) send_all(viewer.fd, text_frame(R"({"type":"keep_alive"})"));
+      }
+    }
     for (const pollfd& viewer : waited) {
       if (viewer.revents == 0 || viewer.fd == STDIN_FILENO) continue;
       const ssize_t got = recv(viewer.fd, buffer.data(), buffer.size(), 0);

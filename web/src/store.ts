@@ -8,7 +8,6 @@ import { SampleRing } from './samples';
 
 export const kRefresh_ms = 100;
 export const kStale_ms = 500; // no sample for so long: every numeral is marked
-export const kUnheard_ms = 2500; // of a robot whose samples are not asked for: its state comes once a second
 export const kLogLines = 50;
 
 // What the numerals show; null: never heard.
@@ -64,21 +63,14 @@ export class Robot {
   readonly readout = signal<Readout>(kEmptyReadout);
   private latest: SamplesMessage | null = null;
   private sampled_at_ms = -Infinity;
-  private told_at_ms: number; // of its state
   private watched = true; // its samples are asked for
   private boot_id: string | null = null;
   private first_seq = 0;
   private next_seq = 0;
   private received = 0;
 
-  constructor(state: RobotState, now_ms: number) {
+  constructor(state: RobotState) {
     this.state = signal(state);
-    this.told_at_ms = now_ms;
-  }
-
-  take_state(state: RobotState, now_ms: number): void {
-    this.state.value = state;
-    this.told_at_ms = now_ms;
   }
 
   // What was not asked for is not missing afterwards.
@@ -104,7 +96,7 @@ export class Robot {
   }
 
   refresh(now_ms: number): void {
-    if (!this.watched) return this.refresh_from_state(now_ms);
+    if (!this.watched) return this.refresh_from_state();
     const sample_age_ms = now_ms - this.sampled_at_ms;
     const stale = sample_age_ms > kStale_ms;
     const { latest } = this;
@@ -130,25 +122,10 @@ export class Robot {
     };
   }
 
-  private refresh_from_state(now_ms: number): void {
-    const state = this.state.peek();
-    const { sample } = state;
-    this.readout.value = {
-      ...kEmptyReadout,
-      position_m: sample?.position_m ?? null,
-      position_sd_m: state.position_sd_m,
-      setpoint_m: state.setpoint_m,
-      reference_m: sample?.reference_m ?? null,
-      duty: sample?.duty ?? null,
-      velocity_m_s: sample?.velocity_m_s ?? null,
-      impedance_mv: sample?.impedance_mv ?? null,
-      disturbance_m: state.disturbance_m ?? 0,
-      mode: state.mode,
-      sub_state: state.sub_state,
-      emergency_id: state.emergency_id,
-      sample_age_ms: now_ms - this.told_at_ms,
-      stale: state.link !== 'connected' || now_ms - this.told_at_ms > kUnheard_ms,
-    };
+  // The station tells of its link, mode and emergency at once; numbers would be old.
+  private refresh_from_state(): void {
+    const { mode, sub_state, emergency_id, link } = this.state.peek();
+    this.readout.value = { ...kEmptyReadout, mode, sub_state, emergency_id, stale: link !== 'connected' };
   }
 }
 
@@ -235,11 +212,11 @@ export class Store {
   private take_state(state: RobotState): void {
     const known = this.find(state.robot_id);
     if (known) {
-      known.take_state(state, this.clocks.page_ms());
+      known.state.value = state;
       this.select_by_itself();
       return;
     }
-    const robots = [...this.robots.peek(), new Robot(state, this.clocks.page_ms())];
+    const robots = [...this.robots.peek(), new Robot(state)];
     this.robots.value = robots.sort((a, b) => a.state.peek().robot_id.localeCompare(b.state.peek().robot_id));
     this.select_by_itself();
   }

@@ -107,20 +107,16 @@ test('an open run is shown until it ends', () => {
   expect(store.runs.value).toHaveLength(0);
 });
 
-test('a robot whose samples are not asked for shows its state, and is silent only when that stops coming', () => {
-  const sample = { position_m: 0.2, velocity_m_s: 0, acceleration_m_s2: 0, duty: 0.3, impedance_mv: 175, reference_m: 0.2 };
-  const { store, clock } = store_with(robot('rheo-1'), robot('rheo-2', { sample, mode: 'auto' }));
+test('a robot whose samples are not asked for shows link and mode, and no old numbers', () => {
+  const { store, clock } = store_with(robot('rheo-1'), robot('rheo-2', { mode: 'auto' }));
   store.watch(['rheo-1']);
   clock.page = 1500;
   store.refresh();
-  expect(store.find('rheo-2')!.readout.value).toMatchObject({ position_m: 0.2, duty: 0.3, mode: 'auto', stale: false });
+  expect(store.find('rheo-2')!.readout.value).toMatchObject({ position_m: null, mode: 'auto', stale: false });
   expect(store.find('rheo-1')!.readout.value.stale).toBe(true);
-  clock.page = 2600;
+  store.hear({ type: 'robot', robot: robot('rheo-2', { mode: 'emergency', link: 'disconnected' }) });
   store.refresh();
-  expect(store.find('rheo-2')!.readout.value.stale).toBe(true);
-  store.hear({ type: 'robot', robot: robot('rheo-2', { sample, link: 'disconnected' }) });
-  store.refresh();
-  expect(store.find('rheo-2')!.readout.value.stale).toBe(true);
+  expect(store.find('rheo-2')!.readout.value).toMatchObject({ mode: 'emergency', stale: true });
 });
 
 test('what was not asked for is not missing afterwards', () => {

@@ -1,9 +1,8 @@
-// Whose turn it is to work at what a robot has sent: a few robots between two looks at all sockets, and who answers an
-// emergency stop before all others.
+// Whose turn it is, of many who have work of the same kind: of the robots that have sent something, and of the pages to
+// which something is to be written. A few between two looks at all sockets, and who answers an emergency stop first.
 //
-// Without it the loop would work off everything that has arrived from robots, often a millisecond and more, before it
-// looks at the request of a person, and again at each further step of that request. Loop thread; outlives those who
-// wait.
+// Without it the loop would work off all of them, often for milliseconds, before it looks at the request of a person,
+// and again at each further step of that request. Loop thread; outlives those who wait.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -35,7 +34,7 @@ class Turns {
   void next_round();
 
   boost::asio::io_context& loop_;
-  std::deque<std::move_only_function<void()>> waiting_;  // at most one of each robot
+  std::deque<std::move_only_function<void()>> waiting_;  // at most one of each
   int taken_ = 0;                                        // in this round
   bool is_round_ = false;  // next_round() is under way, behind everything that is ready now
 };

@@ -1,5 +1,5 @@
 // Turns: a few at once, then everybody else who is ready; who answers a stop is first.
-#include "server/link/turns.hpp"
+#include "server/turns.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

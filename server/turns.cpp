@@ -1,5 +1,5 @@
 // Rounds: each grants a few turns, and the next begins when the loop has looked at its sockets.
-#include "server/link/turns.hpp"
+#include "server/turns.hpp"
 
 #include <boost/asio/async_result.hpp>
 #include <boost/asio/post.hpp>
