@@ -117,13 +117,13 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
   // SAFETY: whoever is not in control moves nothing, page, script or experiment.
   if (auto held = may_control(request); !held) co_return refuse(request, held.error());
   if (auto checked = check_request(request, seat); !checked) co_return refuse(request, checked.error());
-  use_control(request);
   const auto pending = make_pending(request, *seat.robot);
   // SAFETY: what was issued longer ago than its life is not sent, and is accounted for.
   if (request.age >= request.life) {
     end(*pending, CommandState::expired, "too_old_on_arrival");
     co_return pending->record;
   }
+  use_control(request);  // SAFETY: what was refused, or came too late, takes no control
   supersede_queued(seat, *pending);
   if (!seat.port->send(pending->wire, pending->deadline_us)) {
     Error full{ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),

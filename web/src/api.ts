@@ -81,10 +81,11 @@ export type Fetch = (path: string, options: RequestInit) => Promise<Response>;
 const kPatience_ms = 6000;
 
 export class Api {
-  // `stamp_us`: the latest of the live link; a command is worth as little as what its operator saw was old.
+  // `stamp_us`: the latest of the live link, null while it is down; a command is worth as little as what its operator saw
+  // was old.
   constructor(
     private readonly fetch: Fetch,
-    private readonly stamp_us: () => number | null = () => null,
+    private readonly stamp_us?: () => number | null,
   ) {}
 
   set_manual = (robot_id: string) => this.command(robot_id, { kind: 'set_mode', mode: 'manual' });
@@ -132,10 +133,12 @@ export class Api {
     return (await this.fetch('/api/v1/station', { method: 'GET' })).status === 401;
   }
 
-  private command(robot_id: string, body: CommandBody): Promise<CommandRecord> {
-    const stamp_us = this.stamp_us();
-    const stamped = stamp_us === null ? body : { ...body, stamp_us };
-    return this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/commands`, stamped);
+  // SAFETY: without a live link nobody sees the robot, and the request could wait in the network for long: its life would
+  // count from its arrival. An emergency stop goes all the same.
+  private async command(robot_id: string, body: CommandBody): Promise<CommandRecord> {
+    const stamp_us = this.stamp_us?.();
+    if (stamp_us === null) throw new ApiError('The live connection is down: the command was not sent.', 0);
+    return this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/commands`, { ...body, stamp_us });
   }
 
   private async ask<Answer>(method: string, path: string, body?: object, key?: string): Promise<Answer> {

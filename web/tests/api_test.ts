@@ -64,21 +64,21 @@ test('a refused setpoint tells the range that is allowed, in millimetres', async
   expect((await failure(api.set_setpoint('rheo-1', 99.999))).message).toBe('Allowed is \u22121000 to 1000 mm.');
 });
 
-test('a command says the latest stamp that its operator has seen', async () => {
-  const bodies: unknown[] = [];
-  let stamp_us: number | null = null;
+test('a command says the latest stamp that its operator has seen, and is not sent without one', async () => {
+  const sent: [string, unknown][] = [];
+  let stamp_us: number | null = 5484590256;
   const api = new Api(
-    (_path, options) => {
-      bodies.push(JSON.parse(String(options.body)));
+    (path, options) => {
+      sent.push([path, options.body ? JSON.parse(String(options.body)) : null]);
       return Promise.resolve(new Response('{"state":"acknowledged"}'));
     },
     () => stamp_us,
   );
   await api.set_duty('rheo-1', 0.5);
-  stamp_us = 5484590256;
-  await api.set_duty('rheo-1', 0.5);
-  expect(bodies).toEqual([
-    { kind: 'set_duty', duty: 0.5 },
-    { kind: 'set_duty', duty: 0.5, stamp_us: 5484590256 },
-  ]);
+  expect(sent).toEqual([['/api/v1/robots/rheo-1/commands', { kind: 'set_duty', duty: 0.5, stamp_us: 5484590256 }]]);
+  stamp_us = null; // the live link is down
+  expect((await failure(api.set_setpoint('rheo-1', 0.1))).message).toContain('was not sent');
+  expect(sent).toHaveLength(1);
+  await api.emergency_stop('rheo-1', 'press-1');
+  expect(sent[1]?.[0]).toBe('/api/v1/robots/rheo-1/emergency-stop');
 });

@@ -28,6 +28,21 @@ TEST_F(ControlTest, OnlyTheHoldersCommandsReachTheRobot) {
   EXPECT_FLOAT_EQ(robot->commands()[0].action.set_duty.duty, 0.1F);
 }
 
+TEST_F(ControlTest, ACommandThatIsRefusedOrCameTooLateTakesNoControl) {
+  auto* robot = connect();
+  submit_as("session:1", set_duty(1.5F));
+  EXPECT_EQ(results.at(0).error().reason, "out_of_range");
+  EXPECT_EQ(station.find("r1")->control.holder, "");
+  CommandRequest late = request_of(set_duty(0));
+  late.actor = "session:1";
+  late.age = late.life;
+  submit(std::move(late));
+  clock.settle();
+  EXPECT_EQ(results.at(1)->state, CommandState::expired);
+  EXPECT_EQ(station.find("r1")->control.holder, "");
+  EXPECT_TRUE(robot->commands().empty());
+}
+
 TEST_F(ControlTest, ARenewalOfAnotherKeepsNoMotorRunning) {
   auto* robot = connect();
   submit_as("session:1", set_duty(0.1F));
