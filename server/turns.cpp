@@ -1,6 +1,7 @@
 // Rounds: each grants a few turns, and the next begins when the loop has looked at its sockets.
 #include "server/turns.hpp"
 
+#include <algorithm>
 #include <boost/asio/async_result.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
@@ -10,23 +11,26 @@ namespace server {
 namespace asio = boost::asio;
 
 bool Turns::take() {
-  if (taken_ >= kAtOnce || !waiting_.empty()) return false;
+  if (taken_ >= at_once_ || !waiting_.empty()) return false;
   ++taken_;
   begin_round();
   return true;
 }
 
-asio::awaitable<void> Turns::wait(Place place) {
-  auto begin = [this, place](auto on_turn) {
-    // SAFETY: what answers an emergency stop waits behind no other robot.
-    if (place == Place::first) {
-      waiting_.emplace_front(std::move(on_turn));
-    } else {
-      waiting_.emplace_back(std::move(on_turn));
-    }
+asio::awaitable<void> Turns::wait(const void* who) {
+  auto begin = [this, who](auto on_turn) {
+    waiting_.emplace_back(who, std::move(on_turn));
     begin_round();
   };
   return asio::async_initiate<const asio::use_awaitable_t<>, void()>(std::move(begin), asio::use_awaitable);
+}
+
+void Turns::hurry(const void* who) {
+  const auto found = std::ranges::find(waiting_, who, &Waiting::who);
+  if (found == waiting_.end()) return;
+  Waiting first = std::move(*found);
+  waiting_.erase(found);
+  waiting_.push_front(std::move(first));
 }
 
 void Turns::begin_round() {
@@ -37,9 +41,9 @@ void Turns::begin_round() {
 void Turns::next_round() {
   is_round_ = false;
   taken_ = 0;
-  while (taken_ < kAtOnce && !waiting_.empty()) {
+  while (taken_ < at_once_ && !waiting_.empty()) {
     ++taken_;
-    auto turn = std::move(waiting_.front());
+    auto turn = std::move(waiting_.front().on_turn);
     waiting_.pop_front();
     turn();
   }

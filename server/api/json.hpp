@@ -56,8 +56,13 @@ struct ParsedCommand {
 // The body of POST …/commands, e.g. {"kind":"set_setpoint","setpoint_m":0.1,"life_ms":2000}.
 Result<ParsedCommand> parse_command(const std::string& body);
 
-// The body of POST …/control, e.g. {"action":"take","lease_ms":3000}; robot and actor are left empty.
-Result<ControlRequest> parse_control(const std::string& body);
+struct ParsedControl {
+  ControlRequest request;                // robot and actor are left empty
+  std::optional<std::int64_t> stamp_us;  // as above; of take and force alone
+};
+
+// The body of POST …/control, e.g. {"action":"take","lease_ms":3000}.
+Result<ParsedControl> parse_control(const std::string& body);
 
 struct RunWish {
   RobotId robot_id;

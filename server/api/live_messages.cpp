@@ -77,7 +77,7 @@ Result<void> on_renew_lease(const Members& message, const Caller& caller, LivePa
   if (!stamp_us) return std::unexpected{stamp_us.error()};
   // SAFETY: what the page saw is too old, so its operator may be looking at a robot that has moved on.
   const std::int64_t age_us = parts.clock.steady_us() - *stamp_us;
-  if (age_us > kMaxStampAgeUs || age_us < 0) {
+  if (age_us > kOldestSight.count() || age_us < 0) {
     return fail(ErrorCode::conflict, fmt::format("the stamp is {} ms old; at most 400 renew a lease", age_us / 1000),
                 "stale");
   }
@@ -94,14 +94,18 @@ Result<void> on_renew_lease(const Members& message, const Caller& caller, LivePa
 }
 
 // A robot that is not known may come yet.
-Result<void> on_watch(const Members& message, Subscriber& page) {
+Result<void> on_watch(const Members& message, Subscriber& page, LiveParts& parts) {
   if (auto known = message.only({"type", "robots"}); !known) return known;
   const json robots = message.has("robots") ? message.object().at("robots") : json();
   const auto is_id = [](const json& id) { return id.is_string() && id.get_ref<const std::string&>().size() <= 31; };
   if (!robots.is_array() || robots.size() > kMaxWatched || !std::ranges::all_of(robots, is_id)) {
     return fail(ErrorCode::invalid, fmt::format("robots must be at most {} robot ids", kMaxWatched), "malformed");
   }
-  page.watch(robots.get<std::set<RobotId>>());
+  const auto watched = robots.get<std::set<RobotId>>();
+  parts.live.watch(page, watched);
+  for (const RobotId& id : watched) {  // told anew with the next stamp, since the page has not heard all of it
+    if (const RobotState* robot = parts.station.find(id)) parts.live.on_robot(*robot);
+  }
   return {};
 }
 
@@ -127,7 +131,7 @@ Result<void> on_page_message(const std::string& text, const Caller& caller, Subs
   if (*type == "emergency_stop") return on_emergency_stop(*message, caller, parts);
   if (*type == "renew_lease") return on_renew_lease(*message, caller, parts);
   if (*type == "keep_alive") return on_keep_alive(*message, caller, parts);
-  if (*type == "watch") return on_watch(*message, page);
+  if (*type == "watch") return on_watch(*message, page, parts);
   return fail(ErrorCode::invalid, fmt::format("unknown message type '{}'", *type), "unknown_type");
 }
 

@@ -113,7 +113,7 @@ class LivePage {
     for (;;) {
       co_await queue_.wait();
       for (LiveText message = queue_.pop(); message != nullptr; message = queue_.pop()) {
-        if (!parts_.turns.take()) co_await parts_.turns.wait(Turns::Place::last);
+        if (!parts_.turns.take()) co_await parts_.turns.wait();
         writing_since_us_ = parts_.clock.steady_us();
         const auto [error, size] =
             co_await socket_.async_write(asio::buffer(*message), asio::as_tuple(asio::use_awaitable));

@@ -184,8 +184,8 @@ Result<ParsedCommand> parse_command(const std::string& text) {
   return command;
 }
 
-Result<ControlRequest> parse_control(const std::string& text) {
-  const auto body = Members::parse(text, {"action", "lease_ms", "reason"});
+Result<ParsedControl> parse_control(const std::string& text) {
+  const auto body = Members::parse(text, {"action", "lease_ms", "reason", "stamp_us"});
   if (!body) return std::unexpected{body.error()};
   const auto action = body->text("action", 1, kMaxNameBytes);
   if (!action) return std::unexpected{action.error()};
@@ -200,8 +200,14 @@ Result<ControlRequest> parse_control(const std::string& text) {
                 fmt::format("action = '{}' is none of take, force, release, request, hand_over", action->substr(0, 40)),
                 "out_of_range");
   }
-  ControlRequest request;
+  ParsedControl control;
+  ControlRequest& request = control.request;
   request.action = known->second;
+  const bool is_forced = request.action == ControlAction::force;
+  if (body->has("stamp_us") && request.action != ControlAction::take && !is_forced) {
+    return fail(ErrorCode::bad_request, "stamp_us goes with take and force only", "unknown_member");
+  }
+  if (auto read = read_time(*body, "stamp_us", control.stamp_us); !read) return std::unexpected{read.error()};
   if (body->has("lease_ms")) {
     if (request.action != ControlAction::take) {
       return fail(ErrorCode::bad_request, "lease_ms goes with take only", "unknown_member");
@@ -210,7 +216,6 @@ Result<ControlRequest> parse_control(const std::string& text) {
     if (!lease_ms) return std::unexpected{lease_ms.error()};
     request.life = std::chrono::milliseconds{*lease_ms};
   }
-  const bool is_forced = request.action == ControlAction::force;
   if (!is_forced && body->has("reason")) {
     return fail(ErrorCode::bad_request, "reason goes with force only", "unknown_member");
   }
@@ -219,7 +224,7 @@ Result<ControlRequest> parse_control(const std::string& text) {
     if (!reason) return std::unexpected{reason.error()};
     request.reason = std::move(*reason);
   }
-  return request;
+  return control;
 }
 
 Result<RunWish> parse_run(const std::string& text) {

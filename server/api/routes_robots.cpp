@@ -66,13 +66,28 @@ Result<std::string> key_of(const Request& request) {
 
 constexpr std::int64_t kClockToleranceUs = 1'000'000;  // of a script's clock ahead of ours
 
+// SAFETY: what a page asks for is worth as little as what its operator saw was old, so a page says what that was. (Only
+// a script is near enough to the station for a life that counts from the arrival.)
+Result<void> check_stamp(const Caller& caller, const std::optional<std::int64_t>& stamp_us) {
+  if (caller.session == 0 || stamp_us) return {};
+  return fail(ErrorCode::invalid, "a page must send stamp_us, the latest stamp that it heard on /live",
+              "stamp_required");
+}
+
+Result<microseconds> age_of_stamp(std::int64_t stamp_us, Clock& clock) {
+  const std::int64_t age_us = clock.steady_us() - stamp_us;
+  if (age_us < 0) return fail(ErrorCode::invalid, "stamp_us is none that /live has said", "out_of_range");
+  return microseconds{age_us};
+}
+
 // How long ago the command was issued, by what its sender says of that.
 Result<void> set_age(CommandRequest& command, const ParsedCommand& parsed, Clock& clock) {
   std::int64_t age_us = 0;
   if (parsed.stamp_us) {
     command.life_from = "stamp";
-    age_us = clock.steady_us() - *parsed.stamp_us;
-    if (age_us < 0) return fail(ErrorCode::invalid, "stamp_us is none that /live has said", "out_of_range");
+    const auto age = age_of_stamp(*parsed.stamp_us, clock);
+    if (!age) return std::unexpected{age.error()};
+    age_us = age->count();
   } else if (parsed.issued_at_us) {
     command.life_from = "issued_at";
     age_us = clock.utc_us() - *parsed.issued_at_us;
@@ -114,6 +129,9 @@ Answer submit_command(ApiParts& parts, Request request) {
   command.key = std::move(*key);
   command.received_us = request.received_us;
   command.until_verified = wait != request.query.end() && wait->second == "verified";
+  if (auto fresh = check_stamp(request.caller, parsed->stamp_us); !fresh) {
+    co_return refused(parts, request, "command", fresh.error());
+  }
   if (auto aged = set_age(command, *parsed, parts.clock); !aged) {
     co_return refused(parts, request, "command", aged.error());
   }
@@ -132,18 +150,38 @@ Answer submit_command(ApiParts& parts, Request request) {
   co_return command_response(*record);
 }
 
+// What a page must say to begin to control, and may not ask for: it keeps control by signs of life.
+Result<void> check_sight(const Caller& caller, ParsedControl& parsed, Clock& clock) {
+  ControlRequest& wish = parsed.request;
+  if (wish.action != ControlAction::take && wish.action != ControlAction::force) return {};
+  if (auto said = check_stamp(caller, parsed.stamp_us); !said) return said;
+  if (caller.session != 0 && wish.life > kControlLife) {
+    return fail(ErrorCode::invalid, fmt::format("lease_ms of a page is at most {}", kControlLife.count() / 1000),
+                "out_of_range");
+  }
+  if (!parsed.stamp_us) return {};
+  const auto age = age_of_stamp(*parsed.stamp_us, clock);
+  if (!age) return std::unexpected{age.error()};
+  wish.age = *age;
+  return {};
+}
+
 Answer change_control(ApiParts& parts, Request request) {
-  auto wish = parse_control(request.body);
-  if (!wish) co_return refused(parts, request, "control", wish.error());
-  wish->robot_id = request.param.at("robot_id");
-  wish->actor = request.actor;
-  wish->peer = request.peer;
+  auto parsed = parse_control(request.body);
+  if (!parsed) co_return refused(parts, request, "control", parsed.error());
+  ControlRequest& wish = parsed->request;
+  wish.robot_id = request.param.at("robot_id");
+  wish.actor = request.actor;
+  wish.peer = request.peer;
   // SAFETY: nobody but an admin takes control out of another's hands.
-  if (wish->action == ControlAction::force && !request.caller.scopes.allow(Scope::admin)) {
+  if (wish.action == ControlAction::force && !request.caller.scopes.allow(Scope::admin)) {
     const Error error{ErrorCode::forbidden, "to take control by force needs the role admin", "not_permitted"};
     co_return refused(parts, request, "control", error);
   }
-  const auto control = parts.station.control(*wish);
+  if (auto seen = check_sight(request.caller, *parsed, parts.clock); !seen) {
+    co_return refused(parts, request, "control", seen.error());
+  }
+  const auto control = parts.station.control(wish);
   if (!control) co_return problem(control.error());
   co_return json_response(200, {{"control", control->holder.empty() ? json(nullptr) : to_json(*control)}});
 }

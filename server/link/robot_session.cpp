@@ -208,7 +208,8 @@ asio::awaitable<RobotSession::EndReason> RobotSession::read_frames() {
     if (durable_changed_) flush();
     const std::size_t size = co_await stream_->read_some(asio::buffer(input_));
     if (!take_read(size)) co_return "the robot closed the connection";
-    if (!turns_.take()) co_await turns_.wait(awaits_stop_answer_ ? Turns::Place::first : Turns::Place::last);
+    // SAFETY: what answers an emergency stop waits behind no other robot.
+    if (!turns_.take() && awaited_stop_ == 0) co_await turns_.wait(this);
   }
 }
 
@@ -225,7 +226,7 @@ void RobotSession::on_frame(const protocol::RobotFrame& frame) {
     case rheonaut_RobotFrame_parameter_page_tag: station_.on_parameters(*this, frame.body.parameter_page); break;
     case rheonaut_RobotFrame_controller_tag: station_.on_controller(*this, frame.body.controller); break;
     case rheonaut_RobotFrame_command_ack_tag:
-      awaits_stop_answer_ = false;
+      if (frame.body.command_ack.command_id == awaited_stop_) awaited_stop_ = 0;
       station_.on_command_ack(*this, frame.body.command_ack);
       break;
     case rheonaut_RobotFrame_heartbeat_tag: on_heartbeat(frame); break;
@@ -286,7 +287,8 @@ std::optional<protocol::StationFrame> RobotSession::next_frame() {
   if (!stops_.empty()) {  // SAFETY: an emergency stop goes ahead of everything that waits
     frame.body.command = stops_.front();
     stops_.pop_front();
-    awaits_stop_answer_ = true;
+    awaited_stop_ = frame.body.command.command_id;
+    turns_.hurry(this);  // what it sent before waits no longer either: the answer comes behind it
     return frame;
   }
   while (!commands_.empty()) {

@@ -88,7 +88,7 @@ class RobotSession final : public RobotPort {
   protocol::Bytes unsent_;  // of output_: the rest of a frame that the stream did not take at once
   std::optional<protocol::StationFrame> welcome_;  // the first frame that is written
   std::deque<protocol::Command> stops_;            // SAFETY: always written first
-  bool awaits_stop_answer_ = false;                // a stop was written, and nothing has answered it
+  CommandId awaited_stop_ = 0;                     // the last that was written and is not answered; 0: none
   std::deque<QueuedCommand> commands_;
   protocol::StationHeartbeat durable_ = rheonaut_StationHeartbeat_init_zero;
   bool durable_changed_ = false;

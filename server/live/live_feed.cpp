@@ -5,6 +5,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <chrono>
+#include <ranges>
 #include <utility>
 
 #include "server/live/state_json.hpp"
@@ -14,160 +15,241 @@ namespace asio = boost::asio;
 using nlohmann::json;
 
 namespace {
-constexpr std::chrono::milliseconds kStampInterval{100};
-constexpr std::size_t kRobotsInATurn = 16;  // of the loop; each takes some 20 us
-}  // namespace
+constexpr std::int64_t kStampIntervalUs = 100'000;
+constexpr std::size_t kRobotsAStamp = 200;  // that are told before it; the others after the next
+constexpr std::size_t kWorkInATurn = 60;    // of the loop, in messages put into queues
+constexpr std::size_t kWorkOfARobot = 12;   // to write its state
+constexpr std::int64_t kGatheredUs = 50'000;
+constexpr std::size_t kMaxLog = 64;  // events and commands in one message
 
-void Subscriber::push(LiveText message, bool droppable) {
-  queued_bytes_ += message->size();
-  queue_.push_back({++pushed_, std::move(message), droppable});
-  while (queue_.size() > kMaxMessages || (queued_bytes_ > kMaxBytes && queue_.size() > 1)) drop_one();
-  arrived_.notify();
+std::int64_t length_us(const SampleBatch& batch) {
+  return static_cast<std::int64_t>(batch.samples.size()) * batch.context.period_us;
 }
 
-void Subscriber::push_state(const RobotId& robot, LiveText message) {
-  const bool is_first = states_.insert_or_assign(robot, std::move(message)).second;
-  if (is_first) slots_.push_back({++pushed_, robot});
-  arrived_.notify();
+bool continues(const SampleBatch& before, const SampleBatch& next) {
+  return next.boot_id == before.boot_id && next.first_seq == before.next_seq() && next.context == before.context &&
+         next.first_robot_time_us == before.first_robot_time_us + static_cast<std::uint64_t>(length_us(before));
 }
 
-void Subscriber::drop_one() {
-  auto victim = std::ranges::find_if(queue_, [](const Entry& entry) { return entry.droppable; });
-  if (victim == queue_.end()) victim = queue_.begin();
-  queued_bytes_ -= victim->message->size();
-  queue_.erase(victim);
-  ++dropped_;
-}
-
-asio::awaitable<void> Subscriber::wait() {
-  while (size() == 0) co_await arrived_.wait();
-}
-
-// In order of arrival, but never two states on end while something else waits: the states of a large fleet would leave
-// a slow reader nothing else.
-bool Subscriber::state_is_next() const {
-  if (slots_.empty()) return false;
-  return queue_.empty() || (!state_was_last_ && slots_.front().number < queue_.front().number);
-}
-
-LiveText Subscriber::pop_state() {
-  const auto state = states_.find(slots_.front().robot);
-  LiveText message = std::move(state->second);
-  states_.erase(state);
-  slots_.pop_front();
-  return message;
-}
-
-LiveText Subscriber::pop() {
-  if (dropped_ > 0) {
-    const json notice{{"type", "dropped"}, {"count", std::exchange(dropped_, 0)}};
-    return std::make_shared<const std::string>(dump(notice));
+// A message to some: its text is written when the first is to hear it, and once for all.
+template <class Write>
+class Message {
+ public:
+  explicit Message(Write write) : write_{std::move(write)} {}
+  const LiveText& text() {
+    if (text_ == nullptr) text_ = std::make_shared<const std::string>(write_());
+    return text_;
   }
-  state_was_last_ = state_is_next();
-  if (state_was_last_) return pop_state();
-  if (queue_.empty()) return nullptr;
-  LiveText message = std::move(queue_.front().message);
-  queue_.pop_front();
-  queued_bytes_ -= message->size();
-  return message;
+  void push(const auto& to, bool droppable) {
+    for (Subscriber* one : to) one->push(text(), droppable);
+  }
+
+ private:
+  Write write_;
+  LiveText text_;
+};
+
+template <class Values>
+json list(const Values& values) {
+  json all = json::array();
+  for (const auto& value : values) all.push_back(to_json(value));
+  return all;
 }
+}  // namespace
 
 // While nobody listens nothing is kept up; whoever comes gets the state of the station first.
 void LiveFeed::add(Subscriber& subscriber) {
-  if (subscribers_.empty()) {
-    headlines_.clear();
+  if (!is_heard()) {
+    robots_.clear();
     changed_.clear();
+    events_.clear();
+    commands_.clear();
   }
-  subscribers_.push_back(&subscriber);
+  watch_all_.push_back(&subscriber);
+}
+
+void LiveFeed::remove(Subscriber& subscriber) {
+  if (std::erase(watch_all_, &subscriber) > 0) {
+    for (auto& [id, robot] : robots_) {
+      if (!is_watched(robot)) robot.gathered.reset();
+    }
+  }
+  const auto chose = choosy_.extract(&subscriber);
+  if (!chose) return;
+  for (const RobotId& id : chose.mapped()) {
+    const auto robot = robots_.find(id);
+    if (robot == robots_.end()) continue;
+    std::erase(robot->second.watchers, &subscriber);
+    if (!is_watched(robot->second)) robot->second.gathered.reset();
+    if (robot->second.watchers.empty() && !robot->second.headline) robots_.erase(robot);  // there may be no such robot
+  }
+}
+
+void LiveFeed::watch(Subscriber& subscriber, const std::set<RobotId>& robots) {
+  remove(subscriber);
+  choosy_.emplace(&subscriber, robots);
+  for (const RobotId& id : robots) robots_[id].watchers.push_back(&subscriber);
 }
 
 asio::awaitable<void> LiveFeed::run() {
-  for (;;) {
-    co_await clock_.sleep_for(kStampInterval);
-    if (subscribers_.empty()) continue;
+  for (std::int64_t due_us = clock_.steady_us();;) {
+    due_us = std::max(due_us + kStampIntervalUs, clock_.steady_us());
+    co_await clock_.sleep_until(due_us);
+    publish_late_samples();
     co_await publish_changed();
-    publish(dump({{"type", "stamp"}, {"stamp_us", clock_.steady_us()}}), true);
+    publish_log();
+    Message stamp{[&] { return dump({{"type", "stamp"}, {"stamp_us", clock_.steady_us()}}); }};
+    stamp.push(watch_all_, true);
+    stamp.push(std::views::keys(choosy_), true);
   }
 }
 
 // A few robots in each turn of the loop. Of those that change meanwhile, the ones that it has passed wait for the next
-// stamp.
+// stamp; so do the last of very many, for the stamp itself must not be late.
 asio::awaitable<void> LiveFeed::publish_changed() {
-  std::size_t published = 0;
-  RobotId passed;
-  for (auto next = changed_.begin(); next != changed_.end(); next = changed_.upper_bound(passed)) {
-    publish_robot(next->second, false);
-    passed = next->first;
-    changed_.erase(next);
-    if (++published % kRobotsInATurn == 0) co_await asio::post(asio::use_awaitable);
+  std::size_t work = 0;
+  std::vector<RobotId> due = std::exchange(changed_, {});
+  if (due.size() > kRobotsAStamp) {
+    changed_.assign(std::next(due.begin(), kRobotsAStamp), due.end());
+    due.resize(kRobotsAStamp);
+  }
+  for (const RobotId& id : due) {
+    const auto robot = robots_.find(id);
+    if (robot == robots_.end() || !robot->second.change) continue;
+    work += kWorkOfARobot + publish_robot(robot->second, *std::exchange(robot->second.change, std::nullopt));
+    if (work < kWorkInATurn) continue;
+    work = 0;
+    co_await asio::post(asio::use_awaitable);
   }
 }
 
-void LiveFeed::publish(std::string message, bool droppable) {
-  const auto shared = std::make_shared<const std::string>(std::move(message));
-  for (Subscriber* subscriber : subscribers_) subscriber->push(shared, droppable);
+LiveFeed::Headline LiveFeed::headline(const RobotState& robot) {
+  return {robot.link,
+          robot.boot_id,
+          robot.context.mode,
+          robot.context.sub_state,
+          robot.context.emergency_id,
+          robot.pending_stop.value_or(0)};
 }
 
-bool LiveFeed::headline_changed(const RobotState& robot) {
-  const Headline now{robot.link,
-                     robot.boot_id,
-                     robot.context.mode,
-                     robot.context.sub_state,
-                     robot.context.emergency_id,
-                     robot.pending_stop.value_or(0)};
-  Headline& before = headlines_[robot.id];
-  if (now == before) return false;
-  before = now;
-  return true;
-}
-
-void LiveFeed::publish_robot(const RobotState& robot, bool is_headline) {
-  LiveText message;  // written when the first is to hear it
-  for (Subscriber* subscriber : subscribers_) {
-    if (!is_headline && !subscriber->watches(robot.id)) continue;
-    if (message == nullptr) {
-      message = std::make_shared<const std::string>(dump({{"type", "robot"}, {"robot", to_json(robot)}}));
-    }
-    subscriber->push_state(robot.id, message);
+std::size_t LiveFeed::publish_robot(const Robot& robot, const Change& change) {
+  const RobotState& state = change.state;
+  Message message{[&] { return dump({{"type", "robot"}, {"robot", to_json(state)}}); }};
+  std::size_t told = 0;
+  const auto push = [&](Subscriber* to) {
+    to->push_state(state.id, message.text());
+    ++told;
+  };
+  if (change.to_watchers) {
+    std::ranges::for_each(watch_all_, push);
+    std::ranges::for_each(robot.watchers, push);
   }
+  if (!change.to_others) return told;
+  for (const auto& [one, watched] : choosy_) {
+    if (!watched.contains(state.id)) push(one);
+  }
+  return told;
 }
 
 void LiveFeed::publish_run(json run) {
-  if (!subscribers_.empty()) publish(dump({{"type", "run"}, {"run", std::move(run)}}), false);
+  Message message{[&] { return dump({{"type", "run"}, {"run", std::move(run)}}); }};
+  message.push(watch_all_, false);
+  message.push(std::views::keys(choosy_), false);
 }
 
-void LiveFeed::on_robot(const RobotState& robot) {
-  if (subscribers_.empty()) return;
-  if (!headline_changed(robot)) {
-    changed_.insert_or_assign(robot.id, robot);
-    return;
+// With the newest state.
+LiveFeed::Change& LiveFeed::change_of(Robot& robot, const RobotState& state) {
+  if (!robot.change) {
+    robot.change.emplace();
+    changed_.push_back(state.id);
   }
-  changed_.erase(robot.id);
-  publish_robot(robot, true);
+  robot.change->state = state;
+  return *robot.change;
 }
 
-void LiveFeed::on_samples(const RobotState& robot, const SampleBatch& batch) {
-  if (subscribers_.empty()) return;
-  if (headline_changed(robot)) {
-    changed_.erase(robot.id);
-    publish_robot(robot, true);
-  } else if (const auto waiting = changed_.find(robot.id); waiting != changed_.end()) {
-    waiting->second = robot;
+// Samples that were taken before a large change are told before it.
+void LiveFeed::on_headline(Robot& robot, const RobotState& state) {
+  robot.headline = headline(state);
+  publish_gathered(robot);
+  publish_robot(robot, {state, true, false});
+  Change& change = change_of(robot, state);
+  change.to_watchers = false;
+  change.to_others = true;
+}
+
+void LiveFeed::on_robot(const RobotState& state) {
+  if (!is_heard()) return;
+  Robot& robot = robots_[state.id];
+  if (robot.headline != headline(state)) {
+    on_headline(robot, state);
+  } else if (is_watched(robot) || robot.change) {
+    change_of(robot, state).to_watchers = true;
   }
-  LiveText message;  // written when the first has asked for it
-  for (Subscriber* subscriber : subscribers_) {
-    if (!subscriber->watches(robot.id)) continue;
-    if (message == nullptr) message = std::make_shared<const std::string>(samples_message(batch));
-    subscriber->push(message, true);
+}
+
+void LiveFeed::on_samples(const RobotState& state, const SampleBatch& batch) {
+  if (!is_heard()) return;
+  Robot& robot = robots_[state.id];
+  const bool is_headline = robot.headline != headline(state);
+  if (is_headline) {
+    on_headline(robot, state);
+  } else if (robot.change) {
+    robot.change->state = state;
+  }
+  if (!is_watched(robot)) return;
+  gather(robot, batch);
+  if (is_headline) publish_gathered(robot);
+}
+
+void LiveFeed::gather(Robot& robot, const SampleBatch& batch) {
+  if (robot.gathered && continues(*robot.gathered, batch)) {
+    auto& samples = robot.gathered->samples;
+    samples.insert(samples.end(), batch.samples.begin(), batch.samples.end());
+  } else {
+    publish_gathered(robot);
+    robot.gathered = batch;
+    robot.gathered_since_us = clock_.steady_us();
+  }
+  if (length_us(*robot.gathered) >= kGatheredUs) publish_gathered(robot);
+}
+
+void LiveFeed::publish_gathered(Robot& robot) {
+  if (!robot.gathered) return;
+  Message message{[&] { return samples_message(*robot.gathered); }};
+  message.push(watch_all_, true);
+  message.push(robot.watchers, true);
+  robot.gathered.reset();
+}
+
+// Those of robots that have said no more for as long as gathering takes.
+void LiveFeed::publish_late_samples() {
+  const std::int64_t now_us = clock_.steady_us();
+  for (auto& [id, robot] : robots_) {
+    if (robot.gathered && now_us - robot.gathered_since_us >= kGatheredUs) publish_gathered(robot);
   }
 }
 
 void LiveFeed::on_event(const RobotState&, const RobotEvent& event) {
-  if (!subscribers_.empty()) publish(dump({{"type", "event"}, {"event", to_json(event)}}), false);
+  Message{[&] { return dump({{"type", "event"}, {"event", to_json(event)}}); }}.push(watch_all_, false);
+  if (choosy_.empty()) return;
+  events_.push_back(event);
+  if (events_.size() == kMaxLog) publish_log();
 }
 
 void LiveFeed::on_command(const CommandRecord& record) {
-  if (!subscribers_.empty()) publish(dump({{"type", "command"}, {"command", to_json(record)}}), false);
+  Message{[&] { return dump({{"type", "command"}, {"command", to_json(record)}}); }}.push(watch_all_, false);
+  if (choosy_.empty()) return;
+  std::erase_if(commands_, [&](const CommandRecord& older) { return older.id == record.id; });
+  commands_.push_back(record);
+  if (commands_.size() == kMaxLog) publish_log();
+}
+
+void LiveFeed::publish_log() {
+  if (events_.empty() && commands_.empty()) return;
+  Message log{[&] { return dump({{"type", "log"}, {"events", list(events_)}, {"commands", list(commands_)}}); }};
+  log.push(std::views::keys(choosy_), false);
+  events_.clear();
+  commands_.clear();
 }
 
 }  // namespace server

@@ -20,6 +20,8 @@ namespace server {
 inline constexpr microseconds kControlLife{3'000'000};       // after the holder's last sign of life
 inline constexpr microseconds kLongestControl{600'000'000};  // that a script may ask for
 inline constexpr microseconds kWishLife{30'000'000};         // of a request for control
+inline constexpr microseconds kOldestSight{400'000};         // of what a page has seen, to take or keep anything
+inline bool is_fresh(microseconds age) { return age >= microseconds{0} && age <= kOldestSight; }
 
 class Authority {
  public:

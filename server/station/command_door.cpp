@@ -123,6 +123,7 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
     end(*pending, CommandState::expired, "too_old_on_arrival");
     co_return pending->record;
   }
+  if (auto seen = check_sight(request); !seen) co_return refuse(request, seen.error());
   use_control(request);  // SAFETY: what was refused, or came too late, takes no control
   supersede_queued(seat, *pending);
   if (!seat.port->send(pending->wire, pending->deadline_us)) {

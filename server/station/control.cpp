@@ -11,8 +11,8 @@ namespace asio = boost::asio;
 
 namespace {
 
+constexpr microseconds kMs{1000};
 constexpr microseconds kWatchInterval{200'000};
-constexpr microseconds kOldestSight{400'000};  // of what a page has seen, to keep control
 constexpr std::size_t kMaxToldBytes = 300;
 constexpr std::size_t kMaxNameBytes = 40;
 
@@ -27,6 +27,14 @@ const char* text(ControlAction action) {
   return "take";
 }
 
+bool is_of_old_picture(const CommandRequest& request) { return request.life_from == "stamp" && !is_fresh(request.age); }
+
+std::unexpected<Error> too_old(microseconds age, const char* what) {
+  return fail(ErrorCode::conflict,
+              fmt::format("what the page saw is {} ms old; at most {} {}", age / kMs, kOldestSight / kMs, what),
+              "stale");
+}
+
 Result<std::optional<Authority::Change>> some(Result<Authority::Change> change) {
   if (!change) return std::unexpected{change.error()};
   return std::optional{std::move(*change)};
@@ -34,6 +42,8 @@ Result<std::optional<Authority::Change>> some(Result<Authority::Change> change) 
 
 Result<std::optional<Authority::Change>> change_control(Authority& authority, const ControlRequest& request) {
   const RobotId& robot = request.robot_id;
+  // SAFETY: nobody takes control by an old picture; nor could they keep it by one.
+  if (!is_fresh(request.age)) return too_old(request.age, "take control");
   switch (request.action) {
     case ControlAction::take: return authority.take(robot, request.actor, request.life);
     case ControlAction::force: return authority.take_by_force(robot, request.actor, request.reason);
@@ -63,9 +73,18 @@ Result<void> Station::may_control(const CommandRequest& request) const {
   return needs_control(request.action) ? authority_.may_use(request.robot_id, request.actor) : Result<void>{};
 }
 
+// SAFETY: by an old picture nobody takes control, and nobody keeps a motor running. Who is in control may still say
+// something else to the robot, within the command's life.
+Result<void> Station::check_sight(const CommandRequest& request) const {
+  if (!needs_control(request.action) || !is_of_old_picture(request)) return {};
+  if (request.action.which_action == rheonaut_Command_renew_lease_tag) return too_old(request.age, "renew a lease");
+  if (authority_.of(request.robot_id).holder == request.actor) return {};
+  return too_old(request.age, "take control");
+}
+
 // Nobody has it: who commands takes it.
 void Station::use_control(const CommandRequest& request) {
-  if (!needs_control(request.action)) return;
+  if (!needs_control(request.action) || is_of_old_picture(request)) return;
   if (const auto change = authority_.use(request.robot_id, request.actor); change && *change) {
     tell(**change, request.actor, request.peer);
   }
@@ -73,7 +92,7 @@ void Station::use_control(const CommandRequest& request) {
 
 void Station::keep_control(const std::string& actor, microseconds age) {
   // SAFETY: who looks at an old picture does not keep control.
-  if (age >= microseconds{0} && age <= kOldestSight) authority_.keep_alive(actor);
+  if (is_fresh(age)) authority_.keep_alive(actor);
 }
 
 asio::awaitable<void> Station::watch_control() {

@@ -71,6 +71,7 @@ struct ControlRequest {
   ControlAction action = ControlAction::take;
   microseconds life{kControlLife};  // take: without a sign of life; at most kLongestControl
   std::string reason;               // force: why
+  microseconds age{0};              // take, force: of what its page saw; above kOldestSight it begins nothing
 };
 
 class Station {
@@ -171,6 +172,7 @@ class Station {
 
   std::shared_ptr<PendingCommand> make_pending(const CommandRequest& request, const RobotState& robot);
   Result<void> may_control(const CommandRequest& request) const;
+  Result<void> check_sight(const CommandRequest& request) const;
   void use_control(const CommandRequest& request);
   Result<void> check_request(const CommandRequest& request, const Seat& seat) const;
   Result<std::shared_ptr<PendingCommand>> same_wish(const CommandRequest& request, const Seat& seat);

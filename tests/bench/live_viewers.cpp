@@ -4,7 +4,6 @@
 //
 // Viewer i watches robot sim-((i mod ROBOTS) + 1). Says "ready" when all are connected; ends with its standard input,
 // and prints how many bytes came. Exit status 1 when a viewer is refused or loses its connection.
-#include <arpa/inet.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -16,24 +15,12 @@
 #include <string>
 #include <vector>
 
+#include "loopback.hpp"
+
+using bare::connect_to;
+using bare::send_all;
+
 namespace {
-
-int connect_to(std::uint16_t port) {
-  const int fd = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  address.sin_port = htons(port);
-  if (connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
-    throw std::runtime_error{"no connection"};
-  return fd;
-}
-
-void send_all(int fd, const std::string& bytes) {
-  if (send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(bytes.size())) {
-    throw std::runtime_error{"cannot send"};
-  }
-}
 
 // A short text frame, as a client masks it: with zeros.
 std::string text_frame(const std::string& text) {

@@ -4,8 +4,6 @@
 //   stop_client PORT PATH COUNT PAUSE_US [TOKEN]
 //
 // Prints one time a line, in nanoseconds. Exit status 1 when an answer is not 200.
-#include <arpa/inet.h>
-#include <netinet/tcp.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -17,20 +15,12 @@
 #include <thread>
 #include <vector>
 
-namespace {
+#include "loopback.hpp"
 
-int connect_to(std::uint16_t port) {
-  const int fd = socket(AF_INET, SOCK_STREAM, 0);
-  const int on = 1;
-  setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  address.sin_port = htons(port);
-  if (connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0)
-    throw std::runtime_error{"no connection"};
-  return fd;
-}
+using bare::connect_to;
+using bare::send_all;
+
+namespace {
 
 // Reads one answer to its end; false unless it is 200.
 bool read_answer(int fd) {
@@ -62,7 +52,7 @@ int main(int argc, char** argv) try {
   for (int left = std::stoi(argv[3]); left > 0; --left) {
     std::this_thread::sleep_for(std::chrono::microseconds{std::stoi(argv[4])});
     const auto began = std::chrono::steady_clock::now();
-    if (send(fd, request.data(), request.size(), MSG_NOSIGNAL) < 0) throw std::runtime_error{"cannot send"};
+    send_all(fd, request);
     if (!read_answer(fd)) throw std::runtime_error{"an answer that is not 200"};
     times_ns.push_back((std::chrono::steady_clock::now() - began).count());
   }

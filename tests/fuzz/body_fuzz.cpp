@@ -34,7 +34,9 @@ class BodyStation : public ApiTest {
       if (route.method != "GET") patterns_.push_back(route.pattern);
     }
     patterns_.push_back(kLive);
+    live.add(page_);
   }
+  ~BodyStation() override { live.remove(page_); }
 
   bool is_used_up() const { return changes_ >= kChangesOfAStation; }
 

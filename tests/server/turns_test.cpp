@@ -1,4 +1,4 @@
-// Turns: a few at once, then everybody else who is ready; who answers a stop is first.
+// Turns: a few at once, then everybody else who is ready.
 #include "server/turns.hpp"
 
 #include <gmock/gmock.h>
@@ -19,11 +19,15 @@ using ::testing::ElementsAre;
 
 class TurnsTest : public ::testing::Test {
  protected:
-  asio::awaitable<void> work(std::string name, Turns::Place place = Turns::Place::last) {
-    if (!turns.take()) co_await turns.wait(place);
+  asio::awaitable<void> work(std::string name) {
+    if (!turns.take()) co_await turns.wait();
     done.push_back(std::move(name));
   }
-  void spawn(std::string name, Turns::Place place = Turns::Place::last) { tasks.spawn(name, work(name, place)); }
+  asio::awaitable<void> wait(std::string name, const void* who) {
+    co_await turns.wait(who);
+    done.push_back(std::move(name));
+  }
+  void spawn(std::string name) { tasks.spawn(name, work(name)); }
 
   asio::io_context loop;
   TaskGroup tasks{loop};
@@ -54,11 +58,15 @@ TEST_F(TurnsTest, EachStepOfARequestWaitsForOneRoundAtMost) {
   for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_LE(seen[i] - seen[i - 1], std::size_t{Turns::kAtOnce});
 }
 
-TEST_F(TurnsTest, WhoAnswersAStopWaitsBehindNoOther) {
+TEST_F(TurnsTest, WhoIsHurriedWaitsBehindNoOther) {
   for (int i = 0; i < Turns::kAtOnce; ++i) spawn("first round");
   for (int i = 0; i < 20; ++i) spawn("robot");
-  spawn("stopped", Turns::Place::first);
+  const int stopped = 0;
+  tasks.spawn("stopped", wait("stopped", &stopped));
+  asio::post(loop, [&] { turns.hurry(&stopped); });
+  asio::post(loop, [&] { turns.hurry(&done); });  // nobody
   loop.run();
+  ASSERT_EQ(done.size(), Turns::kAtOnce + 21u);
   EXPECT_EQ(done[Turns::kAtOnce], "stopped");
 }
 

@@ -35,19 +35,34 @@ class Robots:
     def __init__(self, address, prefix="sim"):
         self.process = subprocess.Popen([BIN / "rheonaut-sim", "replay", "--station", address, "--robots", str(ROBOTS),
                                          "--id", prefix, "--json"], stdout=subprocess.PIPE, text=True)
-        for line in self.process.stdout:  # until all are in, once
-            if json.loads(line)["connected"] == ROBOTS:
-                return
-        raise AssertionError("the robots never were all connected")
+        self.last_line = ""
+        self.all_in = threading.Event()
+        self.listener = threading.Thread(target=self.listen)
+        self.listener.start()
+        if not self.all_in.wait(60):
+            self.kill()
+            raise AssertionError("the robots never were all connected")
+
+    def listen(self):
+        """To the end: a fleet whose lines nobody takes stands still once the pipe is full."""
+        for line in self.process.stdout:
+            self.last_line = line
+            if json.loads(line).get("connected") == ROBOTS:
+                self.all_in.set()
 
     def end(self):
         """Their summary, once everything made is acknowledged."""
         self.process.terminate()
-        return json.loads(self.process.communicate(timeout=60)[0].splitlines()[-1])
+        self.process.wait(timeout=60)
+        self.listener.join()
+        self.process.stdout.close()
+        return json.loads(self.last_line)
 
     def kill(self):
         self.process.kill()
-        self.process.communicate()
+        self.process.wait()
+        self.listener.join()
+        self.process.stdout.close()
 
 
 def stops_the_swimmer(station):

@@ -62,6 +62,7 @@ const kReasons: Record<string, string> = {
   not_seen_in_telemetry: 'The robot accepted it, and telemetry does not show it.',
   too_old_on_arrival: 'It arrived too late and was discarded.',
   stopped_by_a_later_stop: 'A later stop was answered first.',
+  stale: 'What this page showed was too old. Look again.',
   timed_out: 'The robot did not answer in time.',
   no_answer: 'The robot did not answer in time.',
   not_sent_in_time: 'It could not be sent in time and was discarded.',
@@ -97,8 +98,11 @@ export class Api {
   clear_emergency = (robot_id: string, emergency_id: string) =>
     this.command(robot_id, { kind: 'clear_emergency', emergency_id });
 
-  change_control = (robot_id: string, body: ControlBody) =>
-    this.ask<{ control: Control | null }>('POST', `/robots/${encodeURIComponent(robot_id)}/control`, body);
+  change_control = async (robot_id: string, body: ControlBody) => {
+    const begins = body.action === 'take' || body.action === 'force';
+    const said = begins ? { ...body, stamp_us: this.latest_stamp('control was not taken') } : body;
+    return this.ask<{ control: Control | null }>('POST', `/robots/${encodeURIComponent(robot_id)}/control`, said);
+  };
 
   emergency_stop = async (robot_id: string, key: string) => [
     await this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/emergency-stop`, undefined, key),
@@ -135,9 +139,14 @@ export class Api {
 
   // SAFETY: without a live link nobody sees the robot, and the request could wait in the network for long: its life would
   // count from its arrival. An emergency stop goes all the same.
-  private async command(robot_id: string, body: CommandBody): Promise<CommandRecord> {
+  private latest_stamp(otherwise: string): number | undefined {
     const stamp_us = this.stamp_us?.();
-    if (stamp_us === null) throw new ApiError('The live connection is down: the command was not sent.', 0);
+    if (stamp_us === null) throw new ApiError(`The live connection is down: ${otherwise}.`, 0);
+    return stamp_us;
+  }
+
+  private async command(robot_id: string, body: CommandBody): Promise<CommandRecord> {
+    const stamp_us = this.latest_stamp('the command was not sent');
     return this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/commands`, { ...body, stamp_us });
   }
 

@@ -163,6 +163,10 @@ export class Store {
       case 'command':
         this.write(line_of_command(message.command));
         break;
+      case 'log':
+        message.events.forEach((event) => this.write(line_of_event(event)));
+        message.commands.forEach((command) => this.write(line_of_command(command)));
+        break;
       case 'run':
         this.take_run(message.run);
         break;

@@ -76,8 +76,12 @@ test('a command says the latest stamp that its operator has seen, and is not sen
   );
   await api.set_duty('rheo-1', 0.5);
   expect(sent).toEqual([['/api/v1/robots/rheo-1/commands', { kind: 'set_duty', duty: 0.5, stamp_us: 5484590256 }]]);
+  await api.change_control('rheo-1', { action: 'take' });
+  await api.change_control('rheo-1', { action: 'release' });
+  expect(sent.splice(1).map(([, body]) => body)).toEqual([{ action: 'take', stamp_us }, { action: 'release' }]);
   stamp_us = null; // the live link is down
   expect((await failure(api.set_setpoint('rheo-1', 0.1))).message).toContain('was not sent');
+  expect((await failure(api.change_control('rheo-1', { action: 'take' }))).message).toContain('was not taken');
   expect(sent).toHaveLength(1);
   await api.emergency_stop('rheo-1', 'press-1');
   expect(sent[1]?.[0]).toBe('/api/v1/robots/rheo-1/emergency-stop');

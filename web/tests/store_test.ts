@@ -1,6 +1,6 @@
 // What the page knows: numerals, stale marks, the log, selection.
 import { expect, test } from 'vitest';
-import type { CommandRecord, RobotState } from '../src/api';
+import type { CommandRecord, EventRecord, RobotState } from '../src/api';
 import { kLogLines, Store } from '../src/store';
 import { batch } from './fakes';
 
@@ -89,6 +89,16 @@ test('the log keeps the last lines, newest first, and a command has one line tha
   expect(store.log.value).toHaveLength(kLogLines);
   expect(store.log.value[0]?.key).toBe(`command-${3 * kLogLines - 1}`);
   expect(store.log.value[1]?.command?.state).toBe('acknowledged');
+});
+
+test('a log tells events and commands together; of each command one line stays', () => {
+  const { store } = store_with(robot('rheo-1'));
+  const command = (n: number, state: CommandRecord['state']) => ({ command_id: String(n), robot_id: 'rheo-1', state, submitted_at_us: n }) as CommandRecord;
+  const event = { robot_id: 'rheo-1', boot_id: '7', event_seq: 3, kind: 'emergency', received_at_us: 9 } as EventRecord;
+  store.hear({ type: 'command', command: command(1, 'sent') });
+  store.hear({ type: 'log', events: [event], commands: [command(1, 'acknowledged'), command(2, 'sent')] });
+  store.refresh();
+  expect(store.log.value.map((line) => line.command?.state ?? line.event?.kind)).toEqual(['sent', 'acknowledged', 'emergency']);
 });
 
 test('dropped messages are said', () => {

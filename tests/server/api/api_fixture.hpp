@@ -58,6 +58,7 @@ class ApiTest : public ::testing::Test {
   std::string token() const;
 
   Scopes scopes = Scopes::of(Role::admin);  // of who asks
+  std::uint64_t session = 0;                // likewise: of a page
   Config config;                            // of the ports
   TemporaryFolder folder;
   boost::asio::io_context loop{1};

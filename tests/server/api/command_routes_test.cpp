@@ -93,6 +93,52 @@ TEST_F(CommandRoutesTest, TheLifeOfACommandCountsFromWhenItWasIssued) {
   EXPECT_EQ(ask("POST", kCommands, late).status, 422);
 }
 
+// SAFETY: a page's wish is worth as little as what its operator saw was old; only a stop needs to say nothing.
+TEST_F(CommandRoutesTest, APageSaysWhatItsOperatorSaw) {
+  connect_robot();
+  session = 1;
+  const std::string control = "/api/v1/robots/r1/control";
+  json by_clock = duty_;
+  by_clock["issued_at_us"] = clock.utc_us();
+  for (const json& blind : {duty_, by_clock}) {
+    const Answered answered = ask("POST", kCommands, blind);
+    EXPECT_EQ(answered.status, 422) << blind;
+    EXPECT_EQ(answered.parsed()["reason"], "stamp_required") << blind;
+  }
+  for (json wish : {json{{"action", "take"}}, json{{"action", "force"}, {"reason", "r"}}}) {
+    EXPECT_EQ(ask("POST", control, wish).parsed()["reason"], "stamp_required") << wish;
+    wish["stamp_us"] = clock.steady_us() - 400'001;
+    EXPECT_EQ(ask("POST", control, wish).parsed()["reason"], "stale") << wish;
+    wish["stamp_us"] = clock.steady_us() + 1;
+    EXPECT_EQ(ask("POST", control, wish).parsed()["reason"], "out_of_range") << wish;
+  }
+  EXPECT_EQ(ask("GET", "/api/v1/robots/r1").parsed()["control"], nullptr) << "what was refused took no control";
+  EXPECT_TRUE(robot->commands().empty());
+
+  json old = duty_;
+  old["stamp_us"] = clock.steady_us() - 400'001;
+  EXPECT_EQ(ask("POST", kCommands, old).parsed()["reason"], "stale") << "nor does an old command";
+  EXPECT_EQ(ask("GET", "/api/v1/robots/r1").parsed()["control"], nullptr);
+  EXPECT_EQ(ask("POST", control, {{"action", "take"}, {"lease_ms", 3001}, {"stamp_us", clock.steady_us()}}).status, 422)
+      << "a page shows that it is there";
+  EXPECT_TRUE(robot->commands().empty());
+
+  EXPECT_EQ(ask("POST", control, {{"action", "take"}, {"stamp_us", clock.steady_us() - 400'000}}).status, 200);
+  const json renewal{{"kind", "renew_lease"}, {"stamp_us", clock.steady_us() - 400'001}};
+  EXPECT_EQ(ask("POST", kCommands, renewal).parsed()["reason"], "stale");
+  EXPECT_TRUE(robot->commands().empty());
+  begin("POST", kCommands, old);
+  EXPECT_EQ(robot->commands().size(), 1U) << "who is in control may say something else within the command's life";
+  EXPECT_EQ(ask("POST", control, {{"action", "release"}, {"stamp_us", 1}}).status, 400);
+  EXPECT_EQ(ask("POST", control, {{"action", "release"}}).status, 200);
+  json seen = duty_;
+  seen["stamp_us"] = clock.steady_us();
+  begin("POST", kCommands, seen);
+  EXPECT_EQ(robot->commands().size(), 2U);
+  begin("POST", "/api/v1/robots/r1/emergency-stop");
+  EXPECT_EQ(robot->commands().size(), 3U);
+}
+
 TEST_F(CommandRoutesTest, WaitsUntilItIsVerifiedWhenAsked) {
   connect_robot();
   const auto asked = begin("POST", std::string{kCommands} + "?wait=verified", duty_);

@@ -14,8 +14,6 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
-LiveText message(const std::string& text) { return std::make_shared<const std::string>(text); }
-
 class LiveFeedTest : public ::testing::Test {
  public:
   LiveFeedTest() {
@@ -23,6 +21,7 @@ class LiveFeedTest : public ::testing::Test {
     robot.link = LinkState::connected;
     robot.boot_id = 0xfedcba9876543210;
     robot.context.mode = rheonaut_MODE_MANUAL;
+    robot.context.period_us = 25'000;
     live.add(listener);
     tasks.spawn("live feed", live.run());
   }
@@ -106,6 +105,177 @@ TEST_F(LiveFeedTest, WritesSamplesAsColumns) {
   EXPECT_EQ(samples["duty"], (json{-0.5, 0.0}));
   EXPECT_EQ(samples["setpoint_m"], nullptr);
   EXPECT_EQ(samples["backfill"], true);
+}
+
+// A page costs the same few messages a second, whether its robot sends each sample by itself or many at once.
+TEST_F(LiveFeedTest, GathersSamplesUntilTheyAreFiftyMilliseconds) {
+  live.on_robot(robot);
+  heard();
+  const auto one = [&](std::uint64_t seq) {
+    SampleBatch made = batch(seq);
+    made.first_robot_time_us = 25'000 * seq;
+    made.samples.resize(1);
+    return made;
+  };
+  live.on_samples(robot, one(0));
+  EXPECT_EQ(types(), Types{});
+  live.on_samples(robot, one(1));
+  const auto both = heard();
+  EXPECT_EQ(both.at(0)["first_seq"], 0);
+  EXPECT_EQ(both[0]["position_m"], (json{0.1, 0.1}));
+
+  live.on_samples(robot, one(2));
+  live.on_samples(robot, one(4));  // not the next
+  EXPECT_EQ(heard().at(0)["first_seq"], 2);
+  SampleBatch shifted = one(5);
+  shifted.first_robot_time_us += 1;
+  live.on_samples(robot, shifted);  // at another time than it seems
+  EXPECT_EQ(heard().at(0)["first_seq"], 4);
+  SampleBatch other = one(6);
+  other.first_robot_time_us += 1;
+  other.context.setpoint_m = 0.3F;
+  live.on_samples(robot, other);  // under other conditions
+  EXPECT_EQ(heard().at(0)["first_seq"], 5);
+  SampleBatch rebooted = other;
+  rebooted.boot_id = 1;
+  rebooted.first_seq = 7;
+  rebooted.first_robot_time_us += 25'000;
+  live.on_samples(robot, rebooted);  // of another boot
+  EXPECT_EQ(heard().at(0)["first_seq"], 6);
+
+  clock.run_for(200ms);  // and what no further sample follows
+  const auto late = heard();
+  EXPECT_EQ(late.at(0)["first_seq"], 7);
+  robot.context.emergency_id = 9;
+  live.on_samples(robot, one(8));
+  EXPECT_EQ(types(), (Types{"robot", "samples"})) << "at once";
+  live.on_samples(robot, one(9));
+  robot.context.emergency_id = 10;
+  live.on_robot(robot);
+  EXPECT_EQ(types(), (Types{"samples", "robot"})) << "in the order in which it happened";
+}
+
+TEST_F(LiveFeedTest, OfWhatItDoesNotWatchAPageHearsLargeChangesWithTheNextStamp) {
+  RobotState other = robot;
+  other.id = "r2";
+  live.on_robot(robot);
+  live.on_robot(other);
+  heard();
+  live.watch(listener, {"r1"});
+  robot.context.emergency_id = other.context.emergency_id = 9;
+  live.on_robot(robot);
+  live.on_robot(other);
+  EXPECT_EQ(types(), Types{"robot"}) << "of the one that it watches, at once";
+  other.durable_next_seq = 7;
+  live.on_robot(other);
+  live.on_samples(other, batch(0));
+  EXPECT_EQ(types(), Types{});
+  clock.run_for(100ms);
+  const auto told = heard();
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[0]["robot"]["emergency_id"], "9");
+  EXPECT_EQ(told[0]["robot"]["durable_next_seq"], 7);
+  other.durable_next_seq = 8;
+  live.on_robot(other);
+  clock.run_for(100ms);
+  EXPECT_EQ(types(), Types{"stamp"}) << "nothing of small changes";
+}
+
+// Nor is a change lost that falls between two wishes.
+TEST_F(LiveFeedTest, WhoBeginsToWatchBeforeTheStampHearsWhatChanged) {
+  live.watch(listener, {});
+  live.on_robot(robot);
+  live.watch(listener, {"r1"});
+  live.on_robot(robot);  // as the door does for each that is watched
+  clock.run_for(100ms);
+  EXPECT_EQ(types(), (Types{"robot", "stamp"}));
+}
+
+// However many robots change at once, the stamp is in time: it is what pages show that they are there by.
+TEST_F(LiveFeedTest, AStampIsInTimeWhenAVeryLargeFleetChanges) {
+  clock.settle();
+  live.watch(listener, {});
+  for (int i = 0; i < 500; ++i) {
+    robot.id = "fleet-" + std::to_string(i);
+    live.on_robot(robot);
+  }
+  std::vector<std::size_t> told;
+  for (int stamp = 0; stamp < 4; ++stamp) {
+    clock.run_for(100ms);
+    const auto all = heard();
+    const auto is_in_time = [&](const json& one) {
+      return one.value("stamp_us", std::int64_t{0}) == clock.steady_us();
+    };
+    EXPECT_EQ(std::ranges::count_if(all, is_in_time), 1);
+    told.push_back(all.size() - 1);
+  }
+  EXPECT_EQ(told, (std::vector<std::size_t>{200, 200, 100, 0}));
+}
+
+TEST_F(LiveFeedTest, SamplesOfALargeChangeDoNotWaitForMore) {
+  live.on_robot(robot);
+  SampleBatch one = batch(0);
+  one.samples.resize(1);
+  robot.context.mode = one.context.mode = rheonaut_MODE_AUTO;
+  heard();
+  live.on_samples(robot, one);
+  EXPECT_EQ(types(), (Types{"robot", "samples"}));
+}
+
+// A page would take what it did not watch for lost.
+TEST_F(LiveFeedTest, SamplesThatWereGatheredForWhoLeftAreForgotten) {
+  live.on_robot(robot);
+  SampleBatch one = batch(0);
+  one.samples.resize(1);
+  live.on_samples(robot, one);
+  live.watch(listener, {});
+  live.watch(listener, {"r1"});
+  heard();
+  live.on_samples(robot, batch(10));
+  const auto told = heard();
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0]["first_seq"], 10);
+}
+
+// Pages may name what they like: what they named is forgotten with them.
+TEST_F(LiveFeedTest, ARobotThatIsWatchedNeedNotBeKnown) {
+  for (int i = 0; i < 1000; ++i) live.watch(listener, {"nobody-" + std::to_string(i), "r1"});
+  live.on_robot(robot);
+  live.on_samples(robot, batch(0));
+  EXPECT_EQ(types(), (Types{"robot", "samples"}));
+  EXPECT_LE(live.robots(), 2U);
+  live.remove(listener);
+  live.on_samples(robot, batch(2));
+  EXPECT_EQ(types(), Types{});
+}
+
+TEST_F(LiveFeedTest, WhoSaidWhatItWatchesHearsOneLogWithEachStamp) {
+  Subscriber all{loop};
+  live.add(all);
+  live.watch(listener, {});
+  CommandRecord command;
+  command.robot_id = "r1";
+  for (const CommandId id : std::vector<CommandId>{1, 2, 1}) {
+    command.id = id;
+    live.on_command(command);
+  }
+  live.on_event(robot, {});
+  EXPECT_EQ(listener.size(), 0U);
+  EXPECT_EQ(all.size(), 4U);
+  clock.run_for(100ms);
+  const auto told = heard();
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[0]["type"], "log");
+  EXPECT_EQ(told[0]["events"].size(), 1U);
+  ASSERT_EQ(told[0]["commands"].size(), 2U) << "the newest record of each";
+  EXPECT_EQ(told[0]["commands"][1]["command_id"], "1");
+  EXPECT_EQ(all.size(), 5U) << "and the stamp; whoever watches all heard it already";
+  for (CommandId id = 1; id <= 64; ++id) {
+    command.id = id;
+    live.on_command(command);
+  }
+  EXPECT_EQ(types(), Types{"log"}) << "what is long enough waits for no stamp";
+  live.remove(all);
 }
 
 TEST_F(LiveFeedTest, WritesOneTextForAll) {
@@ -225,33 +395,6 @@ TEST_F(LiveFeedTest, WhatChangesBetweenTwoTurnsIsToldAfterwards) {
   ASSERT_EQ(told.size(), fleet.size() + 1);
   EXPECT_EQ(told.back()["robot_id"], fleet.front().id);
   EXPECT_EQ(told.back()["durable_next_seq"], 7);
-}
-
-// The states of a fleet leave a slow page something else to read.
-TEST(Subscriber, StatesAndTheRestTakeTurns) {
-  boost::asio::io_context loop;
-  Subscriber listener{loop};
-  for (int i = 0; i < 100; ++i) listener.push_state(std::to_string(i), message("state"));
-  for (int i = 0; i < 3; ++i) listener.push(message("samples"), true);
-  std::vector<std::string> first;
-  for (int i = 0; i < 6; ++i) first.push_back(*listener.pop());
-  EXPECT_EQ(std::ranges::count(first, "samples"), 3);
-  EXPECT_EQ(first.front(), "state");
-}
-
-TEST(Subscriber, HoldsAtMostAMegabyte) {
-  boost::asio::io_context loop;
-  Subscriber listener{loop};
-  for (int i = 0; i < 20; ++i) listener.push(message(std::string(100'000, 'x')), i % 2 == 0);
-  EXPECT_EQ(listener.size(), 10U);
-}
-
-TEST(Subscriber, DropsWhatIsOldestWhenThereAreNoSamples) {
-  boost::asio::io_context loop;
-  Subscriber listener{loop};
-  for (std::size_t i = 0; i <= Subscriber::kMaxMessages; ++i) listener.push(message(std::to_string(i)), false);
-  EXPECT_EQ(*listener.pop(), R"({"count":1,"type":"dropped"})");
-  EXPECT_EQ(*listener.pop(), "1");
 }
 
 }  // namespace

@@ -91,7 +91,10 @@ TEST_F(LiveSocketTest, APageHearsTheSamplesOfTheRobotsItWatches) {
   clock.settle();
   make_samples(*robot, 0, 5);
   page->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
-  EXPECT_EQ(page->hear("command")["command"]["robot_id"], "r1") << "all else is told of every robot";
+  clock.run_for(200ms);
+  const json log = page->hear("log");
+  ASSERT_EQ(log["commands"].size(), 1U) << log << ": with the next stamp, of every robot";
+  EXPECT_EQ(log["commands"][0]["robot_id"], "r1");
   page->say({{"type", "watch"}, {"robots", {"r1", "r2"}}});
   clock.settle();
   make_samples(*robot, 5, 5);
@@ -101,6 +104,20 @@ TEST_F(LiveSocketTest, APageHearsTheSamplesOfTheRobotsItWatches) {
     page->say({{"type", "watch"}, {"robots", robots}});
     EXPECT_EQ(page->hear("problem")["problem"]["reason"], "malformed");
   }
+}
+
+// What it was not told while it watched others it hears when it begins to watch.
+TEST_F(LiveSocketTest, APageHearsTheStateOfARobotThatItBeginsToWatch) {
+  connect_robot();
+  const auto page = open_page();
+  page->say({{"type", "watch"}, {"robots", json::array()}});
+  clock.settle();
+  ASSERT_TRUE(station.control({"r1", "session:7", "", ControlAction::take, kControlLife, "", microseconds{0}}));
+  clock.run_for(200ms);
+  page->hear("log");
+  page->say({{"type", "watch"}, {"robots", {"r1"}}});
+  clock.run_for(200ms);
+  EXPECT_EQ(page->hear("robot")["robot"]["control"]["holder"], "session:7");
 }
 
 TEST_F(LiveSocketTest, SaysWhatItDoesNotUnderstand) {

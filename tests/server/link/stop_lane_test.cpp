@@ -1,4 +1,8 @@
 // The emergency stop: ahead of everything, kept and repeated until a robot has obeyed, timed.
+#include <algorithm>
+#include <string>
+
+#include "server/turns.hpp"
 #include "tests/server/link/link_fixture.hpp"
 
 namespace server {
@@ -13,6 +17,32 @@ TEST_F(LinkTest, AnEmergencyStopGoesAheadOfWhatWaitsAndReplacesIt) {
   EXPECT_EQ(robot->commands()[0].which_action, rheonaut_Command_emergency_stop_tag);
   EXPECT_EQ(results.size(), 5u);
   for (const auto& result : results) EXPECT_EQ(result->state, CommandState::superseded);
+}
+
+// SAFETY: not behind the samples of a fleet, which arrived before it.
+TEST_F(LinkTest, TheAnswerToAStopWaitsForNoTurn) {
+  auto* robot = connect();
+  std::vector<TestRobot*> fleet;
+  for (int i = 0; i < 5 * Turns::kAtOnce; ++i) {
+    protocol::RobotFrame hello = TestRobot::hello_frame();
+    const std::string id = "fleet-" + std::to_string(i);
+    std::ranges::copy(id, hello.body.hello.robot_id);
+    fleet.push_back(dial());
+    fleet.back()->send(hello);
+  }
+  clock.settle();
+  stop_robot();
+  clock.settle();
+  protocol::Command other = robot->commands().at(0);
+  other.command_id += 1;
+  for (TestRobot* one : fleet) one->send_samples(0, 1, one->robot_now_us(), 0);
+  robot->acknowledge(other, rheonaut_COMMAND_RESULT_ACCEPTED, 0);  // of a command before it
+  robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_ACCEPTED, 9);
+  while (results.empty() && loop.poll_one() > 0) continue;
+  ASSERT_EQ(results.size(), 1u);
+  EXPECT_LE(sink.batches.size(), 2u * Turns::kAtOnce) << "a round until it is read, one until who asked is told";
+  clock.settle();
+  EXPECT_EQ(sink.batches.size(), fleet.size());
 }
 
 TEST_F(LinkTest, AStopLatchesTheStationUntilItIsCleared) {

@@ -1,0 +1,61 @@
+// The queue of one who watches: what it has not read yet, bounded however slow it is.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "server/clock.hpp"
+#include "server/station/station_state.hpp"
+
+namespace server {
+
+using LiveText = std::shared_ptr<const std::string>;
+
+// One listener's queue. Of each robot at most one state waits: a newer one takes the place of the older, so a state is
+// never dropped, and whoever is slow hears the newest. Of everything else at most kMaxMessages and kMaxBytes wait: when
+// it is full the oldest samples and stamps are dropped first, then the oldest of what is left, and the reader is told
+// how many by a `dropped` message.
+class Subscriber {
+ public:
+  static constexpr std::size_t kMaxMessages = 256;
+  static constexpr std::size_t kMaxBytes = 1024 * 1024;
+
+  explicit Subscriber(boost::asio::io_context& loop) : arrived_{loop} {}
+
+  void push(LiveText message, bool droppable);
+  void push_state(const RobotId& robot, LiveText message);
+  boost::asio::awaitable<void> wait();  // until a message waits; throws operation_aborted when cancelled
+  LiveText pop();                       // null when none waits
+
+  std::size_t size() const { return queue_.size() + states_.size(); }
+
+ private:
+  struct Entry {
+    std::uint64_t number = 0;  // in order of arrival
+    LiveText message;
+    bool droppable = false;
+  };
+  struct Slot {
+    std::uint64_t number = 0;
+    RobotId robot;
+  };
+
+  void drop_one();
+  bool state_is_next() const;
+  LiveText pop_state();
+
+  std::deque<Entry> queue_;  // but for states
+  std::size_t queued_bytes_ = 0;
+  std::deque<Slot> slots_;              // the robots whose states wait
+  std::map<RobotId, LiveText> states_;  // the newest of each
+  bool state_was_last_ = false;
+  std::uint64_t pushed_ = 0;
+  std::uint64_t dropped_ = 0;
+  Signal arrived_;
+};
+
+}  // namespace server
