@@ -181,7 +181,6 @@ TEST_F(LiveFeedTest, OfWhatItDoesNotWatchAPageHearsLargeChangesWithTheNextStamp)
   EXPECT_EQ(types(), Types{"stamp"}) << "nothing of small changes";
 }
 
-// Nor is a change lost that falls between two wishes.
 TEST_F(LiveFeedTest, WhoBeginsToWatchBeforeTheStampHearsWhatChanged) {
   live.watch(listener, {});
   live.on_robot(robot);
@@ -222,7 +221,6 @@ TEST_F(LiveFeedTest, SamplesOfALargeChangeDoNotWaitForMore) {
   EXPECT_EQ(types(), (Types{"robot", "samples"}));
 }
 
-// A page would take what it did not watch for lost.
 TEST_F(LiveFeedTest, SamplesThatWereGatheredForWhoLeftAreForgotten) {
   live.on_robot(robot);
   SampleBatch one = batch(0);
