@@ -10,7 +10,8 @@
 // Each robot gets the acknowledgements, signs of life and clock probes that the station sends.
 //
 // A request on its HTTP port, whatever it says, is a stop of the robot that it names between the fourth slash and the
-// fifth: the frame is sent in the same turn, and the robot's answer is the answer.
+// fifth: the frame is sent in the same turn, and the robot's answer is the answer. Pages get samples and stamps there,
+// as on the station's /live.
 //
 // It believes everything: no checks of values, no gaps, no duplicates, no reconnects, no other commands, no second
 // robot of a name, no full queue, no failing disk, no record of a stop. Prints its ports, robots' and HTTP; ends when
@@ -39,6 +40,7 @@
 #include "protocol/frame.hpp"
 #include "server/recording/database.hpp"
 #include "tests/bench/bare_stops.hpp"
+#include "tests/bench/bare_views.hpp"
 #include "tests/bench/bare_wire.hpp"
 
 namespace {
@@ -86,6 +88,7 @@ struct Robot {
   std::uint64_t boot_id = 0, heard_next_seq = 0, durable_next_seq = 0;
   std::int64_t heartbeat_due_us = 0, probe_due_us = 0;
   std::unique_ptr<Group> group;
+  bare::View* view = nullptr;
   std::array<std::uint8_t, protocol::kMaxFramedBytes> rest;  // of a frame that is not complete
   std::size_t rest_size = 0;
 };
@@ -385,10 +388,11 @@ class BareLoop {
   }
 
   void take_request(int fd) {
-    const auto wish = desk_.read_wish(fd);
-    if (!wish) return;
-    const auto robot = std::find_if(robots_.begin(), robots_.end(),
-                                    [&wish](const Robot& one) { return one.fd >= 0 && one.id == *wish; });
+    const std::string_view text = desk_.read(fd);
+    if (text.empty() || views_.take(fd, text)) return;
+    const auto robot = std::find_if(
+        robots_.begin(), robots_.end(),
+        [wish = bare::StopDesk::robot_of(text)](const Robot& one) { return one.fd >= 0 && one.id == wish; });
     if (robot == robots_.end()) return bare::StopDesk::answer(fd, "404 Not Found");
     protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
     frame.which_body = rheonaut_StationFrame_command_tag;
@@ -455,6 +459,7 @@ class BareLoop {
     Robot& robot = robots_[who];
     samples_ += batch.samples;
     robot.heard_next_seq = batch.first_seq + batch.samples;
+    if (robot.view != nullptr && !robot.view->pages.empty()) show(robot, batch);
     if (!disk_) return;
     const std::int64_t received_us = utc_us();
     for (std::size_t i = 0; i < batch.samples; ++i) {
@@ -480,6 +485,17 @@ class BareLoop {
     if (robot.group->count == kGroupSamples) close_group(robot);
   }
 
+  void show(const Robot& robot, const Telemetry& batch) {
+    for (std::size_t i = 0; i < batch.samples; ++i) {
+      for (std::size_t channel = 0; channel < kChannels; ++channel) {
+        float value = 0;
+        std::memcpy(&value, batch.columns[channel] + i * sizeof(float), sizeof value);
+        bare::ViewDesk::add(*robot.view, channel, value);
+      }
+      views_.sample_is_whole(*robot.view, robot.id, batch.first_seq + i);
+    }
+  }
+
   void close_group(Robot& robot) {
     if (robot.group) disk_->add(std::move(robot.group));
   }
@@ -497,6 +513,7 @@ class BareLoop {
         hello.skip_value(tag & 7);
       }
     }
+    robot.view = views_.view_of(robot.id);
     if (disk_) disk_->add_robot(who, robot);
     protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
     frame.which_body = rheonaut_StationFrame_welcome_tag;
@@ -510,6 +527,7 @@ class BareLoop {
   // What is durable goes out at once; a slice of the robots gets its signs of life.
   void sweep(std::int64_t now_us) {
     swept_us_ = now_us;
+    views_.stamp(now_us);
     durable_.clear();
     if (disk_) disk_->take_durable(durable_);
     for (const Durable& durable : durable_) {
@@ -549,6 +567,7 @@ class BareLoop {
   int epoll_ = epoll_create1(0);
   int listener_ = bare::listen_on_loopback();
   bare::StopDesk desk_;
+  bare::ViewDesk views_;
   std::vector<Robot> robots_;
   std::array<std::uint8_t, 65536> input_{};
   std::vector<Durable> durable_;

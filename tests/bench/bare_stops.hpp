@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -48,14 +47,15 @@ class StopDesk {
     return fd;
   }
 
-  // The robot to stop, as the path names it behind its fourth slash; empty at the end of the connection.
-  std::optional<std::string_view> read_wish(int fd) {
+  // What was sent; empty at the end of the connection.
+  std::string_view read(int fd) {
     const ssize_t got = recv(fd, input_.data(), input_.size(), 0);
-    if (got <= 0) {
-      close(fd);
-      return std::nullopt;
-    }
-    const std::string_view request{input_.data(), static_cast<std::size_t>(got)};
+    if (got <= 0) close(fd);
+    return {input_.data(), static_cast<std::size_t>(std::max<ssize_t>(got, 0))};
+  }
+
+  // The robot to stop, as the path names it behind its fourth slash.
+  static std::string_view robot_of(std::string_view request) {
     std::size_t begin = 0;
     for (int slash = 0; slash < 4; ++slash) begin = request.find('/', begin) + 1;
     return request.substr(begin, request.find('/', begin) - begin);
