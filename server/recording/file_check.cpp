@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -25,6 +26,7 @@ constexpr std::string_view kLogMagicBigEndian{"\x37\x7f\x06\x83", 4};  // of its
 constexpr std::size_t kHeadBytes = 108;          // the header, and the head of the first page's b-tree
 constexpr std::uint64_t kLogHeadBytes = 32;      // a write-ahead log that has no frame
 constexpr std::uint64_t kFirstPageBytes = 4096;  // of a database that we make
+constexpr std::size_t kMaxSectorBytes = 65'536;  // that a journal may be made for
 constexpr char kLeafOfTable = 13;
 
 class Bytes {
@@ -36,6 +38,7 @@ class Bytes {
     in.read(bytes_.data(), static_cast<std::streamsize>(count));
     bytes_.resize(static_cast<std::size_t>(in.gcount()));
   }
+  Bytes from(std::size_t offset) const { return Bytes{bytes_.substr(std::min(offset, bytes_.size()))}; }
   std::size_t size() const { return bytes_.size(); }
   bool begins_with(std::string_view mark) const { return bytes_.starts_with(mark); }
   char at(std::size_t offset) const { return bytes_.at(offset); }
@@ -46,6 +49,8 @@ class Bytes {
   }
 
  private:
+  explicit Bytes(std::string bytes) : bytes_{std::move(bytes)} {}
+
   std::string bytes_;
 };
 
@@ -56,14 +61,6 @@ std::uint64_t size_or_zero(const fs::path& path) {
 }
 
 fs::path beside(const fs::path& path, const char* suffix) { return fs::path{path}.concat(suffix); }
-
-// The power failed while a file was begun: one page at most was written, and the journal beside it says that the file
-// was empty before. SQLite empties it again.
-bool was_just_begun(const fs::path& path) {
-  const Bytes journal{beside(path, "-journal"), 28};
-  return size_or_zero(path) <= kFirstPageBytes && journal.size() == 28 && journal.begins_with(kJournalMagic) &&
-         journal.number(16, 4) == 0;
-}
 
 // A write-ahead log with a frame.
 bool has_log(const fs::path& path) {
@@ -80,6 +77,18 @@ std::optional<std::uint64_t> page_bytes(const Bytes& head) {
 // No mark of anybody, and no table. Ours is so until its first transaction, and as long as that is in the log only.
 bool is_blank(const Bytes& head) {
   return head.number(68, 4) == 0 && head.number(60, 4) == 0 && head.at(100) == kLeafOfTable && head.number(103, 2) == 0;
+}
+
+// The power failed while a file was begun: one page at most was written, and by the journal beside it the file was
+// empty before, or had that page without a mark or a table. SQLite brings that back.
+bool was_just_begun(const fs::path& path) {
+  if (size_or_zero(path) > kFirstPageBytes) return false;
+  const Bytes journal{beside(path, "-journal"), kMaxSectorBytes + 4 + kHeadBytes};
+  if (journal.size() < 28 || !journal.begins_with(kJournalMagic)) return false;
+  const std::uint32_t pages_before = journal.number(16, 4), sector = journal.number(20, 4);
+  if (pages_before != 1 || sector > kMaxSectorBytes) return pages_before == 0;
+  const Bytes record = journal.from(sector), page = journal.from(sector + 4);
+  return page.size() >= kHeadBytes && record.number(0, 4) == 1 && page.begins_with(kMagic) && is_blank(page);
 }
 
 // A rollback journal that would bring tables back: each has a page of its own beside the first one. Those of our own

@@ -88,6 +88,37 @@ TEST_F(FileCheckTest, AForeignFileWhoseTablesAreInItsLogStaysByteForByte) {
   EXPECT_EQ(content(beside(path_, "-wal")), log);
 }
 
+// Our own beginning has two steps on one page; the power may fail in the second, too. The same with anybody's mark in
+// the page as it was is somebody else's file.
+TEST_F(FileCheckTest, ATornFirstPageWithItsJournalIsOursOnlyIfItWasBlank) {
+  const auto number = [](std::uint32_t value) {
+    std::string bytes;
+    for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift & 0xFFU);
+    return bytes;
+  };
+  for (const bool is_theirs : {true, false}) {
+    fs::remove(theirs_);
+    {
+      SQLite::Database made{theirs_.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE};
+      made.exec("PRAGMA journal_mode = WAL; PRAGMA journal_mode = DELETE");
+      if (is_theirs) made.exec("PRAGMA application_id = 7");
+    }
+    const std::string page = content(theirs_);
+    ASSERT_EQ(page.size(), 4096U);
+    std::uint32_t sum = 7;  // the nonce
+    for (std::size_t i = page.size() - 200; i > 0 && i < page.size(); i -= 200)
+      sum += static_cast<unsigned char>(page[i]);
+    std::string journal = "\xd9\xd5\x05\xf9\x20\xa1\x63\xd7";
+    for (const std::uint32_t field : {1U, 7U, 1U, 512U, 4096U}) journal += number(field);
+    journal.resize(512);
+    journal += number(1) + page + number(sum);
+    std::ofstream{path_, std::ios::binary} << std::string(4096, 'x');
+    std::ofstream{beside(path_, "-journal"), std::ios::binary} << journal;
+    EXPECT_THAT(refusal(), HasSubstr(is_theirs ? "not an SQLite database" : "(it was opened)"));
+    if (is_theirs) EXPECT_EQ(content(beside(path_, "-journal")), journal) << "and nothing was changed";
+  }
+}
+
 TEST_F(FileCheckTest, AnEmptyFileWithSomebodysJournalIsRefused) {
   std::ofstream{path_}.flush();
   std::ofstream{beside(path_, "-journal"), std::ios::binary}
