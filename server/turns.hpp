@@ -1,6 +1,5 @@
-// Whose turn it is, of many who have work of the same kind: of the robots that have sent something, and of the pages to
-// which something is to be written. A few between two looks at all sockets. (Who answers an emergency stop waits for
-// none.)
+// Whose turn it is, of many who have work of the same kind: of the pages to which something is to be written. A few
+// between two looks at all sockets.
 //
 // Without it the loop would work off all of them, often for milliseconds, before it looks at the request of a person,
 // and again at each further step of that request. Loop thread; outlives those who wait.
@@ -15,17 +14,13 @@ namespace server {
 
 class Turns {
  public:
-  static constexpr int kAtOnce = 8;  // frames of robots: some 70 µs of work
-
-  explicit Turns(boost::asio::io_context& loop, int at_once = kAtOnce) : loop_{loop}, at_once_{at_once} {}
+  Turns(boost::asio::io_context& loop, int at_once) : loop_{loop}, at_once_{at_once} {}
   Turns(const Turns&) = delete;
   Turns& operator=(const Turns&) = delete;
 
   // True: it is the caller's turn at once. False: wait() for it.
   bool take();
-  boost::asio::awaitable<void> wait(const void* who = nullptr);
-  // If it waits, nobody is before it any more.
-  void hurry(const void* who);
+  boost::asio::awaitable<void> wait();
 
   std::size_t waiting() const { return waiting_.size(); }
 
@@ -35,13 +30,9 @@ class Turns {
 
   boost::asio::io_context& loop_;
   int at_once_;
-  struct Waiting {
-    const void* who;
-    std::move_only_function<void()> on_turn;
-  };
-  std::deque<Waiting> waiting_;  // at most one of each
-  int taken_ = 0;                // in this round
-  bool is_round_ = false;        // next_round() is under way, behind everything that is ready now
+  std::deque<std::move_only_function<void()>> waiting_;  // at most one of each
+  int taken_ = 0;                                        // in this round
+  bool is_round_ = false;  // next_round() is under way, behind everything that is ready now
 };
 
 }  // namespace server

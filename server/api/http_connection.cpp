@@ -101,7 +101,7 @@ asio::awaitable<void> HttpConnection::watch() {
   while (clock_.steady_us() < deadline_us_) co_await clock_.sleep_for(kWatchInterval);
   if (request_has_begun_) {
     const Response late = problem(408, "the request did not arrive within 10 s", "too_slow");
-    stream_.write_now(asio::buffer(last_answer(late, stream_.is_secure())));
+    stream_.wire().write(asio::buffer(last_answer(late, stream_.is_secure())));
   }
   stream_.end();
 }
@@ -113,7 +113,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::secure() {
   if (outcome == TlsGate::Outcome::not_tls) {
     const Response plain =
         problem(400, "this port speaks TLS only: use https:// instead of http://", "plain_http_on_tls_port");
-    stream_.write_now(asio::buffer(last_answer(plain, false)));
+    stream_.wire().write(asio::buffer(last_answer(plain, false)));
     co_await discard_rest();
   }
   co_return Next::end;
@@ -267,7 +267,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::refuse_unread(Response res
 
 // Closing with unread bytes would reset the connection and could destroy the answer on its way.
 asio::awaitable<void> HttpConnection::discard_rest() {
-  stream_.end_sending();
+  stream_.wire().end_sending();
   allow(kLingerTime);
   buffer_.clear();
   std::size_t discarded = 0;

@@ -21,7 +21,7 @@ void say_why(StreamSocket& stream, Door::Refusal refusal) {
     response = problem(429, "your address has as many connections as the station allows; close some", "busy");
   }
   response.headers.emplace_back("Retry-After", "5");
-  stream.write_now(asio::buffer(last_answer(response, false)));
+  stream.wire().write(asio::buffer(last_answer(response, false)));
 }
 
 }  // namespace

@@ -20,16 +20,18 @@ RobotListener::RobotListener(asio::io_context& loop, Clock& clock, TaskGroup& ta
       station_{station},
       archive_{archive},
       listener_{loop, clock, endpoint, or_any_port},
-      turns_{loop},
-      entrance_{entrance} {}
+      entrance_{entrance},
+      sockets_{loop, clock} {}
 
 asio::awaitable<void> RobotListener::run() {
+  tasks_.spawn("robots' sockets", sockets_.run());
+  tasks_.spawn("awaited robots' sockets", sockets_.run_awaited());
   auto on_connection = [this](asio::ip::tcp::socket socket) { accept(StreamSocket{std::move(socket)}); };
   co_await listener_.run(on_connection);
 }
 
 void RobotListener::accept(StreamSocket socket) {
-  if (entrance_.tls == nullptr) return serve(make_stream(std::move(socket)));
+  if (entrance_.tls == nullptr) return serve(make_stream(std::move(socket), sockets_));
   auto guest = entrance_.door.admit(host_of(socket.peer()), socket.from_loopback());
   if (guest) tasks_.spawn("robot session", secure_session(std::move(socket), std::move(*guest)));
 }
@@ -43,12 +45,12 @@ asio::awaitable<void> RobotListener::secure_session(StreamSocket socket, std::un
   guest->on_end([&socket] { socket.end(); });
   const TlsGate::Outcome outcome = co_await entrance_.tls->secure(socket, "robot port");
   if (outcome != TlsGate::Outcome::secure) co_return;
-  co_await session(make_stream(std::move(socket)), std::move(guest));
+  co_await session(make_stream(std::move(socket), sockets_), std::move(guest));
 }
 
 asio::awaitable<void> RobotListener::session(std::unique_ptr<ByteStream> stream, std::unique_ptr<Guest> guest) {
   const std::string peer = stream->peer();
-  RobotSession session{loop_, clock_, turns_, std::move(stream), station_, archive_};
+  RobotSession session{loop_, clock_, std::move(stream), station_, archive_, buffers_};
   guest->on_end([&session] { session.close("it gave way to another connection"); });
   try {
     const bool welcome = co_await session.greet();

@@ -8,6 +8,7 @@
 #include "server/link/robot_session.hpp"
 #include "server/net/entrance.hpp"
 #include "server/net/listener.hpp"
+#include "server/net/poll_set.hpp"
 #include "server/tasks.hpp"
 
 namespace server {
@@ -36,9 +37,10 @@ class RobotListener {
   Station& station_;
   RobotArchive& archive_;
   Listener listener_;
-  Turns turns_;
   Entrance& entrance_;
   SparseLines lines_;
+  ReadBuffers buffers_{};
+  PollSet sockets_;  // of the robots
 };
 
 }  // namespace server

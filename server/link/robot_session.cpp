@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <boost/asio/experimental/awaitable_operators.hpp>
-#include <cmath>
 #include <cstring>
 #include <utility>
+
+#include "server/link/frame_faults.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -14,8 +15,9 @@ using namespace asio::experimental::awaitable_operators;  // NOLINT: operators o
 namespace {
 
 constexpr std::int64_t kProbePeriodUs = 1'000'000;
-constexpr std::uint64_t kMaxNumber = std::uint64_t{1} << 62;  // of a sample or µs: beyond any boot, and safe to add to
-constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
+constexpr std::int64_t kEarlyUs = 20'000;  // a sign of life may leave before it is due, together with something else
+constexpr auto kClosedByRobot = "the robot closed the connection";
+constexpr std::int64_t kGridUs = 4'000;  // at whose multiples sessions wake, many at once
 
 template <std::size_t size>
 void copy_text(char (&to)[size], const std::string& from) {
@@ -27,33 +29,6 @@ void copy_text(char (&to)[size], const std::string& from) {
 bool is_robot_id(const std::string& id) {
   constexpr auto kAllowed = "abcdefghijklmnopqrstuvwxyz0123456789_-";
   return !id.empty() && id.find_first_not_of(kAllowed) == std::string::npos;
-}
-
-const char* fault_of(const protocol::Telemetry& batch) {
-  if (batch.first_seq > kMaxNumber || batch.oldest_seq > kMaxNumber) return "a sample number beyond 2^62";
-  if (batch.first_robot_time_us > kMaxNumber) return "a time beyond 2^62 µs";
-  if (batch.period_us == 0 || batch.period_us > kMaxPeriodUs) return "a sample period outside 1 µs to 10 s";
-  const bool finite = std::isfinite(batch.disturbance_m) && std::isfinite(batch.position_sd_m) &&
-                      (!batch.has_setpoint_m || std::isfinite(batch.setpoint_m));
-  return finite ? nullptr : "a setpoint, disturbance or standard deviation that is not a number";
-}
-
-// What in a frame cannot be, and would harm those who compute with it; null when all can.
-const char* fault_of(const protocol::RobotFrame& frame) {
-  if (frame.robot_time_us > kMaxNumber) return "a time beyond 2^62 µs";
-  switch (frame.which_body) {
-    case rheonaut_RobotFrame_hello_tag: return "a second hello on one connection";
-    case rheonaut_RobotFrame_telemetry_tag: return fault_of(frame.body.telemetry);
-    case rheonaut_RobotFrame_event_tag: {
-      const protocol::Event& event = frame.body.event;
-      const bool possible = event.event_seq <= kMaxNumber && event.oldest_event_seq <= kMaxNumber &&
-                            event.event_robot_time_us <= kMaxNumber && event.sample_seq <= kMaxNumber;
-      return possible ? nullptr : "an event with a number or time beyond 2^62";
-    }
-    case rheonaut_RobotFrame_heartbeat_tag:
-      return frame.body.heartbeat.echo_received_at_robot_us <= kMaxNumber ? nullptr : "a time beyond 2^62 µs";
-    default: return nullptr;
-  }
 }
 
 AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t robot_time_us, const ByteStream& stream,
@@ -77,23 +52,26 @@ AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t r
 
 }  // namespace
 
-RobotSession::RobotSession(asio::io_context& loop, Clock& clock, Turns& turns, std::unique_ptr<ByteStream> stream,
-                           Station& station, RobotArchive& archive)
+RobotSession::RobotSession(asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
+                           RobotArchive& archive, ReadBuffers& buffers)
     : clock_{clock},
-      turns_{turns},
       stream_{std::move(stream)},
       station_{station},
       archive_{archive},
+      buffers_{buffers},
+      reading_paused_{loop},
       wake_writer_{loop} {}
 
+// What has come with the hello waits until the robot is welcome.
 asio::awaitable<bool> RobotSession::greet() {
-  const auto hello = co_await (read_hello() || clock_.sleep_for(kHelloTimeout));
-  const auto* received = std::get_if<0>(&hello);
-  if (received == nullptr || !received->has_value()) {
-    if (close_reason_.empty()) close_reason_ = received == nullptr ? "no hello within 5 s" : "closed before its hello";
-    co_return false;
-  }
-  co_return co_await admit(**received);
+  const std::int64_t late_us = clock_.steady_us() + microseconds{kHelloTime}.count();
+  stream_->on_readable([this] { read(); });
+  const bool has_come = co_await reading_paused_.wait_until(clock_, late_us);
+  stream_->on_readable(nullptr);
+  if (failure_) std::rethrow_exception(failure_);
+  if (!has_come) close_reason_ = "no hello within 5 s";
+  if (close_reason_ == kClosedByRobot) close_reason_ = "closed before its hello";
+  co_return close_reason_.empty() && co_await admit(*hello_);
 }
 
 asio::awaitable<void> RobotSession::serve() {
@@ -104,40 +82,59 @@ asio::awaitable<void> RobotSession::serve() {
   } catch (const std::exception&) {  // all three were cancelled
     reason = "the station stops";
   }
+  stream_->on_readable(nullptr);
   stream_->close();
   station_.on_disconnected(*this, close_reason_.empty() ? reason : close_reason_);
 }
 
-// False at the end of the connection.
-bool RobotSession::take_read(std::size_t size) {
-  unread_ = {input_.data(), size};
-  if (size > 0) last_received_us_ = clock_.steady_us();
-  return size > 0;
+void RobotSession::read() {
+  const bool is_greeted = !hello_ || !robot_id_.empty();  // what comes between the hello and the welcome, waits
+  if (!is_greeted) return;
+  try {
+    if (!close_reason_.empty()) return reading_paused_.notify();
+    const ByteStream::Read got = stream_->read_now(asio::buffer(buffers_.input));
+    if (got.size > 0) last_received_us_ = clock_.steady_us();
+    work_off({buffers_.input.data(), got.size});
+    if (got.has_ended && close_reason_.empty()) close_reason_ = kClosedByRobot;
+    if (!close_reason_.empty()) reading_paused_.notify();
+  } catch (const std::exception&) {
+    failure_ = std::current_exception();
+    reading_paused_.notify();
+  }
 }
 
-// Decodes the next frame of what was read into frame_; false when there is none, or a fault (then close_reason_ is
-// set).
-bool RobotSession::next_frame_read() {
-  const auto state = reader_.push(unread_);
+void RobotSession::work_off(protocol::Bytes unread) {
+  while (close_reason_.empty() && decode_next_of(unread)) {
+    if (!hello_) {
+      after_hello_.assign(unread.begin(), unread.end());
+      return on_hello(buffers_.frame);
+    }
+    on_frame(buffers_.frame);
+  }
+  if (!close_reason_.empty()) return reading_paused_.notify();
+  if (last_received_us_ + kEarlyUs >= next_heartbeat_us_) heartbeat_wanted_ = true;
+  if (heartbeat_wanted_ && !robot_id_.empty()) flush();
+}
+
+// Into the buffer of a frame; false when there is none, or a fault (then close_reason_ is set).
+bool RobotSession::decode_next_of(protocol::Bytes& unread) {
+  const auto state = reader_.push(unread);
   if (state == protocol::FrameReader::State::oversize)
     close_reason_ = "a frame longer than 1024 bytes: not this protocol";
   if (state != protocol::FrameReader::State::complete) return false;
-  if (protocol::decode_robot_frame(reader_.payload(), frame_)) return true;
+  if (protocol::decode_robot_frame(reader_.payload(), buffers_.frame)) return true;
   close_reason_ = "a frame that does not decode";
   return false;
 }
 
-asio::awaitable<std::optional<protocol::Hello>> RobotSession::read_hello() {
-  while (!next_frame_read()) {
-    const bool goes_on = close_reason_.empty() && take_read(co_await stream_->read_some(asio::buffer(input_)));
-    if (!goes_on) co_return std::nullopt;
-  }
-  if (frame_.which_body != rheonaut_RobotFrame_hello_tag) {
+void RobotSession::on_hello(const protocol::RobotFrame& frame) {
+  if (frame.which_body == rheonaut_RobotFrame_hello_tag) {
+    hello_ = frame.body.hello;
+    hello_robot_time_us_ = frame.robot_time_us;
+  } else {
     close_reason_ = "the first frame is not a hello";
-    co_return std::nullopt;
   }
-  hello_robot_time_us_ = frame_.robot_time_us;
-  co_return frame_.body.hello;
+  reading_paused_.notify();
 }
 
 // Checks the hello, asks the archive, and takes the robot's seat or refuses it.
@@ -202,15 +199,12 @@ asio::awaitable<bool> RobotSession::refuse(protocol::RefusalReason reason, std::
 }
 
 asio::awaitable<RobotSession::EndReason> RobotSession::read_frames() {
-  for (;;) {
-    while (close_reason_.empty() && next_frame_read()) on_frame(frame_);
-    if (!close_reason_.empty()) co_return close_reason_;
-    if (durable_changed_) flush();
-    const std::size_t size = co_await stream_->read_some(asio::buffer(input_));
-    if (!take_read(size)) co_return "the robot closed the connection";
-    // SAFETY: what answers an emergency stop waits behind no other robot.
-    if (!turns_.take() && awaited_stop_ == 0) co_await turns_.wait(this);
-  }
+  const std::vector<std::uint8_t> first = std::move(after_hello_);
+  work_off({first.data(), first.size()});
+  stream_->on_readable([this] { read(); });
+  tell_what_is_awaited();
+  co_await reading_paused_.wait();
+  co_return failure_ ? "the station could not work at what it said" : close_reason_;
 }
 
 void RobotSession::on_frame(const protocol::RobotFrame& frame) {
@@ -227,6 +221,8 @@ void RobotSession::on_frame(const protocol::RobotFrame& frame) {
     case rheonaut_RobotFrame_controller_tag: station_.on_controller(*this, frame.body.controller); break;
     case rheonaut_RobotFrame_command_ack_tag:
       if (frame.body.command_ack.command_id == awaited_stop_) awaited_stop_ = 0;
+      if (frame.body.command_ack.command_id == awaited_command_) awaited_command_ = 0;
+      tell_what_is_awaited();
       station_.on_command_ack(*this, frame.body.command_ack);
       break;
     case rheonaut_RobotFrame_heartbeat_tag: on_heartbeat(frame); break;
@@ -238,6 +234,7 @@ void RobotSession::on_heartbeat(const protocol::RobotFrame& frame) {
   const protocol::Heartbeat& answer = frame.body.heartbeat;
   if (answer.echo_station_time_us == 0 || answer.echo_station_time_us != probe_us_) return;
   probe_us_ = 0;
+  tell_what_is_awaited();
   ClockExchange exchange;
   exchange.sent_at_us = static_cast<std::int64_t>(answer.echo_station_time_us);
   exchange.received_at_robot_us = static_cast<std::int64_t>(answer.echo_received_at_robot_us);
@@ -255,7 +252,7 @@ asio::awaitable<RobotSession::EndReason> RobotSession::write_frames() {
       continue;
     }
     const bool written = co_await stream_->write(asio::buffer(unsent_.first, unsent_.size));
-    if (!written) co_return "the robot closed the connection";
+    if (!written) co_return kClosedByRobot;
     unsent_ = {};
     writing_since_us_.reset();
   }
@@ -274,9 +271,15 @@ void RobotSession::flush() {
     if (frame->which_body == rheonaut_StationFrame_command_tag) {
       station_.on_command_sent(*this, frame->body.command.command_id);
     }
+    tell_what_is_awaited();
   }
   writing_since_us_ = clock_.steady_us();
   wake_writer_.notify();
+}
+
+// SAFETY: the answer to an emergency stop waits behind no other robot. Nor does that to a probe, which measures time.
+void RobotSession::tell_what_is_awaited() {
+  stream_->set_awaited(awaited_stop_ != 0 || awaited_command_ != 0 || probe_us_ != 0);
 }
 
 std::optional<protocol::StationFrame> RobotSession::next_frame() {
@@ -288,7 +291,6 @@ std::optional<protocol::StationFrame> RobotSession::next_frame() {
     frame.body.command = stops_.front();
     stops_.pop_front();
     awaited_stop_ = frame.body.command.command_id;
-    turns_.hurry(this);  // what it sent before waits no longer either: the answer comes behind it
     return frame;
   }
   while (!commands_.empty()) {
@@ -296,9 +298,10 @@ std::optional<protocol::StationFrame> RobotSession::next_frame() {
     commands_.pop_front();
     if (now_us >= next.deadline_us) continue;  // SAFETY: what waited longer than its life is never sent
     frame.body.command = next.command;
+    awaited_command_ = next.command.command_id;
     return frame;
   }
-  if (durable_changed_ || now_us >= next_heartbeat_us_) return heartbeat();
+  if (heartbeat_wanted_ || now_us >= next_heartbeat_us_) return heartbeat();
   return std::nullopt;
 }
 
@@ -314,7 +317,7 @@ protocol::StationFrame RobotSession::heartbeat() {
   }
   durable_.resend_first_seq = durable_.resend_next_seq = 0;
   durable_.resend_events = false;
-  durable_changed_ = false;
+  heartbeat_wanted_ = false;
   next_heartbeat_us_ = now_us + std::int64_t{station_.link_times().heartbeat_interval_ms} * 1000;
   return frame;
 }
@@ -330,7 +333,8 @@ asio::awaitable<RobotSession::EndReason> RobotSession::watch_link() {
     if (now_us >= next_heartbeat_us_) flush();
     const std::int64_t silent_since_us = std::min(last_received_us_, writing_since_us_.value_or(last_received_us_));
     const std::int64_t lost_us = silent_since_us + timeout_us;
-    co_await clock_.sleep_until(unsent_.empty() ? std::min(lost_us, next_heartbeat_us_) : lost_us);
+    const std::int64_t due_us = unsent_.empty() ? std::min(lost_us, next_heartbeat_us_) : lost_us;
+    co_await clock_.sleep_until((due_us + kGridUs - 1) / kGridUs * kGridUs);
   }
 }
 
@@ -355,19 +359,20 @@ void RobotSession::send_emergency_stop(const protocol::Command& command) {
 void RobotSession::acknowledge(std::uint64_t durable_next_seq, std::uint64_t durable_next_event_seq) {
   durable_.durable_next_seq = durable_next_seq;
   durable_.durable_next_event_seq = durable_next_event_seq;
-  durable_changed_ = true;  // said after the robot's next frame: a commit is of many robots, and holds the loop up else
+  heartbeat_wanted_ =
+      true;  // said after the robot's next frame: a commit is of many robots, and holds the loop up else
 }
 
 void RobotSession::request_resend(std::uint64_t first_seq, std::uint64_t next_seq) {
   durable_.resend_first_seq = first_seq;
   durable_.resend_next_seq = next_seq;
-  durable_changed_ = true;
+  heartbeat_wanted_ = true;
   flush();
 }
 
 void RobotSession::request_event_resend() {
   durable_.resend_events = true;
-  durable_changed_ = true;
+  heartbeat_wanted_ = true;
   flush();
 }
 

@@ -17,18 +17,23 @@
 #include "server/station/robot_archive.hpp"
 #include "server/station/robot_port.hpp"
 #include "server/station/station.hpp"
-#include "server/turns.hpp"
 
 namespace server {
+
+// Of all sessions, since each works off at once what it reads: memory that is in the processor's cache.
+struct ReadBuffers {
+  std::array<std::uint8_t, ByteStream::kReadBytes> input;
+  protocol::RobotFrame frame;
+};
 
 class RobotSession final : public RobotPort {
  public:
   static constexpr std::size_t kMaxQueuedCommands = 64;  // a further one is refused
   static constexpr std::size_t kMaxQueuedStops = 16;     // a further one takes the place of the oldest
-  static constexpr std::chrono::seconds kHelloTimeout{5};
+  static constexpr std::chrono::seconds kHelloTime{5};
 
-  RobotSession(boost::asio::io_context& loop, Clock& clock, Turns& turns, std::unique_ptr<ByteStream> stream,
-               Station& station, RobotArchive& archive);
+  RobotSession(boost::asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
+               RobotArchive& archive, ReadBuffers& buffers);
   ~RobotSession() override { station_.on_disconnected(*this, "the station stops"); }  // also when it was never served
 
   // Hello to Welcome; false when the robot was refused or said nothing. Then serve() to the end of the connection.
@@ -52,9 +57,10 @@ class RobotSession final : public RobotPort {
   };
   using EndReason = std::string;
 
-  bool take_read(std::size_t size);
-  bool next_frame_read();
-  boost::asio::awaitable<std::optional<protocol::Hello>> read_hello();
+  void read();
+  void work_off(protocol::Bytes unread);
+  bool decode_next_of(protocol::Bytes& unread);
+  void on_hello(const protocol::RobotFrame& frame);
   boost::asio::awaitable<bool> admit(const protocol::Hello& hello);
   protocol::StationFrame welcome(const Admission& admission) const;
   boost::asio::awaitable<bool> refuse(protocol::RefusalReason reason, std::string detail);
@@ -66,32 +72,34 @@ class RobotSession final : public RobotPort {
   void on_frame(const protocol::RobotFrame& frame);
   void on_heartbeat(const protocol::RobotFrame& frame);
   void flush();
+  void tell_what_is_awaited();
   std::optional<protocol::StationFrame> next_frame();
   protocol::StationFrame heartbeat();
 
   Clock& clock_;
-  Turns& turns_;
   std::unique_ptr<ByteStream> stream_;
   Station& station_;
   RobotArchive& archive_;
 
   protocol::FrameReader reader_;
-  std::array<std::uint8_t, 4096> input_{};
-  protocol::Bytes unread_;      // of input_
-  protocol::RobotFrame frame_;  // the one that was decoded last
+  ReadBuffers& buffers_;
+  std::vector<std::uint8_t> after_hello_;  // what came with it
+  std::exception_ptr failure_;             // of reading
+  std::optional<protocol::Hello> hello_;
   std::uint64_t hello_robot_time_us_ = 0;
   RobotId claimed_id_;  // of a well-formed hello, whether the robot is admitted or not
   RobotId robot_id_;    // from the hello
 
-  Signal wake_writer_;  // something is ready that flush() could not write
+  Signal reading_paused_;  // the hello has come, or a reason to close
+  Signal wake_writer_;     // something is ready that flush() could not write
   std::array<std::uint8_t, protocol::kMaxFramedBytes> output_{};
   protocol::Bytes unsent_;  // of output_: the rest of a frame that the stream did not take at once
-  std::optional<protocol::StationFrame> welcome_;  // the first frame that is written
-  std::deque<protocol::Command> stops_;            // SAFETY: always written first
-  CommandId awaited_stop_ = 0;                     // the last that was written and is not answered; 0: none
+  std::optional<protocol::StationFrame> welcome_;     // the first frame that is written
+  std::deque<protocol::Command> stops_;               // SAFETY: always written first
+  CommandId awaited_stop_ = 0, awaited_command_ = 0;  // the last that was written and is not answered; 0: none
   std::deque<QueuedCommand> commands_;
   protocol::StationHeartbeat durable_ = rheonaut_StationHeartbeat_init_zero;
-  bool durable_changed_ = false;
+  bool heartbeat_wanted_ = false;  // before it is due
   std::int64_t next_heartbeat_us_ = 0;
   std::int64_t next_probe_us_ = 0;
   std::uint64_t probe_us_ = 0;  // the stamp that waits for its answer; 0: none

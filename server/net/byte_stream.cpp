@@ -1,58 +1,93 @@
-// The stream over a socket.
+// The stream over a socket, which belongs to a PollSet instead of to the loop.
 #include "server/net/byte_stream.hpp"
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
-#include <boost/asio/as_tuple.hpp>
-#include <boost/asio/use_awaitable.hpp>
-#include <boost/asio/write.hpp>
+#include <boost/system/system_error.hpp>
 
+#include "server/net/poll_set.hpp"
 #include "server/net/stream_socket.hpp"
 
 namespace server {
 namespace {
 
 namespace asio = boost::asio;
-using asio::ip::tcp;
 
 constexpr int kMaxUnsentBytes = 4096;
+constexpr std::size_t kMaxRecordBytes = 16 * 1024;  // of TLS, RFC 8446, 5.1
+
+class Descriptor {
+ public:
+  explicit Descriptor(int descriptor) : descriptor_{descriptor} {}
+  ~Descriptor() { ::close(descriptor_); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
 
 class SocketStream final : public ByteStream {
  public:
-  explicit SocketStream(StreamSocket socket) : socket_{std::move(socket)} {
-    boost::system::error_code ignored;  // a peer that is gone already shows at the first read
-    using NotSentLowat = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
-    socket_.tcp().set_option(NotSentLowat{kMaxUnsentBytes}, ignored);
+  SocketStream(PollSet& set, std::string peer, bool from_loopback, std::pair<int, Wire> released)
+      : peer_{std::move(peer)},
+        from_loopback_{from_loopback},
+        descriptor_{released.first},
+        wire_{std::move(released.second)},
+        socket_{set, descriptor_.get()} {
+    ::setsockopt(descriptor_.get(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kMaxUnsentBytes, sizeof kMaxUnsentBytes);
   }
 
-  asio::awaitable<std::size_t> read_some(asio::mutable_buffer into) override {
-    const auto [error, size] = co_await socket_.async_read_some(into, asio::as_tuple(asio::use_awaitable));
-    co_return error ? 0 : size;
+  // In TLS whole records, as long as a further one has room: so OpenSSL keeps none back, of which no epoll would tell.
+  Read read_now(asio::mutable_buffer into) override {
+    Wire::Attempt last = wire_.read(into);
+    Read read{last.size, static_cast<bool>(last.error)};
+    while (wire_.is_secure() && last.size > 0 && into.size() - read.size >= kMaxRecordBytes) {
+      last = wire_.read(into + read.size);
+      read.size += last.size;  // an end is told of by the next read
+    }
+    return read;
   }
 
-  std::size_t write_now(asio::const_buffer bytes) override { return socket_.write_now(bytes); }
+  void on_readable(std::function<void()> call) override { socket_.watch(std::move(call)); }
+
+  std::size_t write_now(asio::const_buffer bytes) override { return wire_.write(bytes).size; }
 
   asio::awaitable<bool> write(asio::const_buffer bytes) override {
-    const auto [error, size] = co_await asio::async_write(socket_, bytes, asio::as_tuple(asio::use_awaitable));
-    co_return !error;
+    while (bytes.size() > 0) {
+      const Wire::Attempt last = wire_.write(bytes);
+      if (last.error) co_return false;
+      bytes += last.size;
+      if (last.wait != Wire::Wait::none) co_await socket_.writable();
+    }
+    co_return true;
   }
 
-  void close() override { socket_.end(); }
+  void set_awaited(bool awaited) override { socket_.set_awaited(awaited); }
 
-  std::string peer() const override { return socket_.peer(); }
-  bool from_loopback() const override { return socket_.from_loopback(); }
+  void close() override { ::shutdown(descriptor_.get(), SHUT_RDWR); }
+
+  std::string peer() const override { return peer_; }
+  bool from_loopback() const override { return from_loopback_; }
 
  private:
-  StreamSocket socket_;
+  std::string peer_;
+  bool from_loopback_;
+  Descriptor descriptor_;
+  Wire wire_;
+  PollSet::Socket socket_;
 };
 
 }  // namespace
 
-std::unique_ptr<ByteStream> make_stream(StreamSocket socket) {
-  return std::make_unique<SocketStream>(std::move(socket));
+std::unique_ptr<ByteStream> make_stream(StreamSocket socket, PollSet& set) {
+  std::string peer = socket.peer();
+  const bool from_loopback = socket.from_loopback();
+  return std::make_unique<SocketStream>(set, std::move(peer), from_loopback, std::move(socket).release());
 }
-
-std::unique_ptr<ByteStream> make_tcp_stream(tcp::socket socket) { return make_stream(StreamSocket{std::move(socket)}); }
 
 }  // namespace server

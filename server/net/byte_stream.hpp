@@ -1,26 +1,36 @@
 // A connection as a stream of bytes: TLS, TCP, or two ends in memory for tests in virtual time.
 //
-// Loop thread. One reader and one writer at a time. The owner keeps the stream until both have returned.
+// Loop thread. One writer at a time, and the owner keeps the stream until it has returned.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
 namespace server {
 
+class PollSet;
 class StreamSocket;
 
 class ByteStream {
  public:
   virtual ~ByteStream() = default;
 
-  // At least one byte, or 0 when the stream has ended (closed by either side, reset, cancelled).
-  virtual boost::asio::awaitable<std::size_t> read_some(boost::asio::mutable_buffer into) = 0;
+  // What is there, without waiting. Neither: nothing now. The buffer is of kReadBytes or more.
+  static constexpr std::size_t kReadBytes = 32 * 1024;
+  struct Read {
+    std::size_t size = 0;
+    bool has_ended = false;  // closed by either side, or reset
+  };
+  virtual Read read_now(boost::asio::mutable_buffer into) = 0;
+
+  // Called from the loop, again and again, while there is something to read or the stream has ended, until it is set
+  // to another function or to none. It does not throw, nor destroy the stream.
+  virtual void on_readable(std::function<void()> call) = 0;
 
   // How many of the bytes the stream took without waiting: 0 also when it has ended. What it did not take must be what
   // the next write begins with. Not while a write() is under way.
@@ -29,17 +39,19 @@ class ByteStream {
   // All bytes; false when the stream ended before.
   virtual boost::asio::awaitable<bool> write(boost::asio::const_buffer bytes) = 0;
 
-  // Ends both directions; pending reads and writes return.
+  // From now on, or no longer, what comes is read before what comes on other streams: an answer is expected.
+  virtual void set_awaited(bool awaited) = 0;
+
+  // Ends both directions; a pending write returns.
   virtual void close() = 0;
 
   virtual std::string peer() const = 0;
   virtual bool from_loopback() const = 0;
 };
 
-// Takes over a connected socket, in TLS when its handshake is done. Sets TCP_NODELAY, and a small TCP_NOTSENT_LOWAT so
-// that next to nothing waits in the kernel in front of an emergency stop.
-std::unique_ptr<ByteStream> make_stream(StreamSocket socket);
-std::unique_ptr<ByteStream> make_tcp_stream(boost::asio::ip::tcp::socket socket);  // plain
+// Takes over a connected socket, in TLS when its handshake is done; it is read and written when the set says so. Sets a
+// small TCP_NOTSENT_LOWAT so that next to nothing waits in the kernel in front of an emergency stop.
+std::unique_ptr<ByteStream> make_stream(StreamSocket socket, PollSet& set);
 
 // Two connected streams in memory, and the faults of the link between them.
 class MemoryLink {
@@ -52,8 +64,9 @@ class MemoryLink {
   std::unique_ptr<ByteStream> take_first();
   std::unique_ptr<ByteStream> take_second();
 
-  void cut();                // both ends see the end of the stream
-  void stall(bool stalled);  // half-open: bytes are accepted and not delivered until the stall ends
+  void cut();                      // both ends see the end of the stream
+  bool second_is_awaited() const;  // as its owner said last
+  void stall(bool stalled);        // half-open: bytes are accepted and not delivered until the stall ends
 
  private:
   struct Pipe;

@@ -1,6 +1,8 @@
 // The in-memory pair of streams.
 #include <algorithm>
+#include <boost/asio/post.hpp>
 #include <deque>
+#include <utility>
 
 #include "server/clock.hpp"
 #include "server/net/byte_stream.hpp"
@@ -9,44 +11,70 @@ namespace server {
 namespace asio = boost::asio;
 
 // One direction: a bounded queue of bytes, as a socket buffer is.
-struct MemoryLink::Pipe {
-  Pipe(asio::io_context& loop, std::size_t capacity) : capacity_bytes{capacity}, readable{loop}, writable{loop} {}
+struct MemoryLink::Pipe : std::enable_shared_from_this<MemoryLink::Pipe> {
+  Pipe(asio::io_context& of, std::size_t capacity) : loop{of}, capacity_bytes{capacity}, writable{of} {}
 
   bool fits(std::size_t size) const { return bytes.empty() || bytes.size() + size <= capacity_bytes; }
 
   void take(asio::const_buffer more) {
     const auto* first = static_cast<const std::uint8_t*>(more.data());
     bytes.insert(bytes.end(), first, first + more.size());
-    if (!stalled) readable.notify();
+    call_reader();
   }
 
   void close() {
     closed = true;
-    readable.notify();
+    call_reader();
     writable.notify();
   }
 
+  bool is_readable() const { return closed || (!bytes.empty() && !stalled); }
+
+  // As long as there is something to read.
+  void call_reader() {
+    if (!on_readable || !is_readable() || std::exchange(is_calling, true)) return;
+    auto call = [weak = weak_from_this()] {
+      const auto pipe = weak.lock();
+      if (pipe == nullptr) return;
+      pipe->is_calling = false;
+      const bool had_bytes = !pipe->bytes.empty();
+      if (pipe->on_readable && pipe->is_readable()) std::function{pipe->on_readable}();
+      if (had_bytes) pipe->call_reader();  // the rest, or the end behind them
+    };
+    asio::post(loop, std::move(call));
+  }
+
+  asio::io_context& loop;
   std::size_t capacity_bytes;
   std::deque<std::uint8_t> bytes;
-  Signal readable, writable;
+  std::function<void()> on_readable;
+  bool is_calling = false;
+  Signal writable;
   bool closed = false;
   bool stalled = false;
+  bool awaited = false;
 };
 
 class MemoryLink::End final : public ByteStream {
  public:
   End(std::shared_ptr<Pipe> in, std::shared_ptr<Pipe> out) : in_{std::move(in)}, out_{std::move(out)} {}
-  ~End() override { close(); }
+  ~End() override {
+    in_->on_readable = nullptr;
+    close();
+  }
 
-  asio::awaitable<std::size_t> read_some(asio::mutable_buffer into) override {
-    const auto in = in_;
-    while ((in->bytes.empty() || in->stalled) && !in->closed) co_await in->readable.wait();
-    if (in->stalled || in->bytes.empty()) co_return 0;
-    const auto count = std::min(in->bytes.size(), into.size());
-    std::copy_n(in->bytes.begin(), count, static_cast<std::uint8_t*>(into.data()));
-    in->bytes.erase(in->bytes.begin(), in->bytes.begin() + static_cast<std::ptrdiff_t>(count));
-    in->writable.notify();
-    co_return count;
+  Read read_now(asio::mutable_buffer into) override {
+    if (in_->stalled || in_->bytes.empty()) return {0, in_->closed};
+    const auto count = std::min(in_->bytes.size(), into.size());
+    std::copy_n(in_->bytes.begin(), count, static_cast<std::uint8_t*>(into.data()));
+    in_->bytes.erase(in_->bytes.begin(), in_->bytes.begin() + static_cast<std::ptrdiff_t>(count));
+    in_->writable.notify();
+    return {count, false};
+  }
+
+  void on_readable(std::function<void()> call) override {
+    in_->on_readable = std::move(call);
+    in_->call_reader();
   }
 
   std::size_t write_now(asio::const_buffer bytes) override {
@@ -62,6 +90,8 @@ class MemoryLink::End final : public ByteStream {
     out->take(bytes);
     co_return true;
   }
+
+  void set_awaited(bool awaited) override { in_->awaited = awaited; }
 
   void close() override {
     in_->close();
@@ -88,10 +118,12 @@ void MemoryLink::cut() {
   back_->close();
 }
 
+bool MemoryLink::second_is_awaited() const { return there_->awaited; }
+
 void MemoryLink::stall(bool stalled) {
   for (Pipe* pipe : {there_.get(), back_.get()}) {
     pipe->stalled = stalled;
-    if (!stalled) pipe->readable.notify();
+    pipe->call_reader();
   }
 }
 

@@ -1,10 +1,8 @@
 // A connected TCP socket, plain or with TLS over it: the one type that both ports read and write, and that HTTP and
 // WebSocket are compiled for (Beast's AsyncStream).
 //
-// OpenSSL reads and writes the socket itself, without waiting; who must wait, waits for the socket and tries again. So
-// bytes can be written at once, in TLS as in TCP. One reader and one writer at a time; what a write did not take must
-// be what the next one begins with. Loop thread, but for shake_hands_now(). It is moved only while nothing is under
-// way.
+// One reader and one writer at a time; what a write did not take must be what the next one begins with. Loop thread,
+// but for the wire's handshake. It is moved only while nothing is under way.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -17,7 +15,7 @@
 #include <string>
 #include <utility>
 
-#include "server/openssl.hpp"
+#include "server/net/wire.hpp"
 
 namespace server {
 
@@ -26,46 +24,26 @@ class StreamSocket {
   using executor_type = boost::asio::ip::tcp::socket::executor_type;
   using ErrorCode = boost::system::error_code;
 
-  enum class Wait : std::uint8_t { none, readable, writable };
-
-  // What came of an attempt: done (with its size or its error), or what to wait for before the next one.
-  struct Attempt {
-    std::size_t size = 0;
-    Wait wait = Wait::none;
-    ErrorCode error;
-  };
-  struct Handshake {
-    Wait wait = Wait::none;
-    std::string failure;  // in OpenSSL's words; empty: none
-  };
-
   explicit StreamSocket(boost::asio::ip::tcp::socket socket);  // takes it over, plain
 
   executor_type get_executor() { return socket_.get_executor(); }
   boost::asio::ip::tcp::socket& tcp() { return socket_; }
   const std::string& peer() const { return peer_; }  // "192.0.2.7:4711"
   bool from_loopback() const { return from_loopback_; }
-  bool is_secure() const { return tls_ != nullptr; }
-  bool was_resumed() const { return tls_ != nullptr && SSL_session_reused(tls_.get()) == 1; }
-
-  // Before the first byte is read or written: TLS as the server, then shake_hands_now() until it waits for nothing.
-  void begin_tls(SSL_CTX& context);
-  // On any thread, one at a time, while nothing else uses the socket but end(). Computes for up to milliseconds.
-  Handshake shake_hands_now();
+  bool is_secure() const { return wire_.is_secure(); }
+  Wire& wire() { return wire_; }  // while it shakes hands nothing else uses the socket but end()
 
   template <class Buffers, class Token>
   auto async_read_some(const Buffers& into, Token&& token);
   template <class Buffers, class Token>
   auto async_write_some(const Buffers& bytes, Token&& token);
 
-  // How many of the bytes were taken without waiting; 0 also when the stream has ended.
-  std::size_t write_now(boost::asio::const_buffer bytes);
-
   // Returns when the client has closed its side, also only half of it. What it sends ahead hides its end; then only a
   // reset counts.
   boost::asio::awaitable<void> peer_gone();
 
-  void end_sending();  // the peer reads the end after what was written
+  // Gives the descriptor away, which the loop then knows no longer, and the wire over it.
+  std::pair<int, Wire> release() &&;
   // Both directions; what is under way ends. The descriptor stays until the destructor: another thread may be using it.
   void end();
 
@@ -73,15 +51,14 @@ class StreamSocket {
   template <class Try>
   class Operation;
 
-  Attempt read_tls(boost::asio::mutable_buffer into);
-  Attempt write_tls(boost::asio::const_buffer bytes);
+  using Attempt = Wire::Attempt;
+
   template <class Buffers>
   Attempt write_gathered(const Buffers& bytes);
-  Attempt outcome(int result, std::size_t size);
   static boost::asio::mutable_buffer scratch();  // for what is written as one record; valid until the next call
 
   boost::asio::ip::tcp::socket socket_;
-  Openssl<SSL> tls_;
+  Wire wire_;
   std::string peer_;
   bool from_loopback_ = false;
 };
@@ -97,11 +74,11 @@ class StreamSocket::Operation {
     if (is_done_) return self.complete(last_.error, last_.size);
     if (error) return self.complete(error, 0);
     last_ = try_();
-    if (last_.wait != Wait::none) {
+    if (last_.wait != Wire::Wait::none) {
       has_waited_ = true;
       auto& socket = stream_.socket_;
-      const auto what = last_.wait == Wait::readable ? boost::asio::ip::tcp::socket::wait_read
-                                                     : boost::asio::ip::tcp::socket::wait_write;
+      const auto what = last_.wait == Wire::Wait::readable ? boost::asio::ip::tcp::socket::wait_read
+                                                           : boost::asio::ip::tcp::socket::wait_write;
       return socket.async_wait(what, std::move(self));
     }
     if (has_waited_) return self.complete(last_.error, last_.size);
@@ -122,9 +99,9 @@ StreamSocket::Attempt StreamSocket::write_gathered(const Buffers& bytes) {
   const boost::asio::const_buffer front = first == boost::asio::buffer_sequence_end(bytes)
                                               ? boost::asio::const_buffer{}
                                               : boost::asio::const_buffer{*first};
-  if (front.size() == boost::asio::buffer_size(bytes)) return write_tls(front);
+  if (front.size() == boost::asio::buffer_size(bytes)) return wire_.write(front);
   const boost::asio::mutable_buffer record = scratch();
-  return write_tls(boost::asio::buffer(record, boost::asio::buffer_copy(record, bytes)));
+  return wire_.write(boost::asio::buffer(record, boost::asio::buffer_copy(record, bytes)));
 }
 
 template <class Buffers, class Token>
@@ -135,7 +112,7 @@ auto StreamSocket::async_read_some(const Buffers& into, Token&& token) {
       auto at = boost::asio::buffer_sequence_begin(buffers);
       const auto end = boost::asio::buffer_sequence_end(buffers);
       while (at != end && boost::asio::mutable_buffer{*at}.size() == 0) ++at;
-      return at == end ? Attempt{} : read_tls(*at);
+      return at == end ? Attempt{} : wire_.read(*at);
     };
     Operation operation{*this, std::move(attempt)};
     return boost::asio::async_compose<decltype(on_end), void(ErrorCode, std::size_t)>(std::move(operation), on_end,
@@ -159,7 +136,7 @@ auto StreamSocket::async_write_some(const Buffers& bytes, Token&& token) {
 // Beast ends a WebSocket by these: the peer reads the end, then TCP is closed as Beast closes it; or at once.
 template <class OnEnd>
 void async_teardown(boost::beast::role_type role, StreamSocket& stream, OnEnd&& on_end) {
-  if (stream.is_secure()) stream.end_sending();
+  if (stream.is_secure()) stream.wire().end_sending();
   boost::beast::websocket::async_teardown(role, stream.tcp(), std::forward<OnEnd>(on_end));
 }
 inline void beast_close_socket(StreamSocket& stream) { stream.end(); }

@@ -35,7 +35,6 @@ void set_up(SSL_CTX* context) {
                                    SSL_OP_CIPHER_SERVER_PREFERENCE | SSL_OP_PRIORITIZE_CHACHA);
   SSL_CTX_set_mode(context,
                    SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER | SSL_MODE_RELEASE_BUFFERS);
-  SSL_CTX_set_read_ahead(context, 1);  // a record in one read
   constexpr unsigned char kSessionsOf[] = "rheonaut";
   require(SSL_CTX_set_session_id_context(context, kSessionsOf, sizeof kSessionsOf), "sessions");
   SSL_CTX_set_session_cache_mode(context, SSL_SESS_CACHE_SERVER);

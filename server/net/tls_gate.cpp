@@ -31,7 +31,7 @@ asio::awaitable<TlsGate::Outcome> TlsGate::secure(StreamSocket& socket, const ch
   }
   if (end.outcome == Outcome::secure) {
     ++counters_.handshakes;
-    if (socket.was_resumed()) ++counters_.resumed;
+    if (socket.wire().was_resumed()) ++counters_.resumed;
   } else {
     ++counters_.failed;
     log_failure(socket.peer(), port, end.failure);
@@ -41,18 +41,19 @@ asio::awaitable<TlsGate::Outcome> TlsGate::secure(StreamSocket& socket, const ch
 
 asio::awaitable<TlsGate::End> TlsGate::shake_hands(StreamSocket& socket) {
   co_await socket.tcp().async_wait(tcp::socket::wait_read, asio::use_awaitable);
+  Wire& wire = socket.wire();
   std::uint8_t first = 0;
   if (::recv(socket.tcp().native_handle(), &first, 1, MSG_PEEK | MSG_DONTWAIT) != 1) {
     co_return End{Outcome::failed, "closed before it began"};
   }
   if (first != kHandshakeRecord) co_return End{Outcome::not_tls, "the client does not speak TLS"};
-  socket.begin_tls(*context_->ssl);
+  wire.begin_tls(*context_->ssl);
   for (;;) {
-    auto step = [&socket] { return socket.shake_hands_now(); };
-    const StreamSocket::Handshake reached = co_await worker_.run(std::move(step));
+    auto step = [&wire] { return wire.shake_hands(); };
+    const Wire::Handshake reached = co_await worker_.run(std::move(step));
     if (!reached.failure.empty()) co_return End{Outcome::failed, reached.failure};
-    if (reached.wait == StreamSocket::Wait::none) co_return End{};
-    const auto what = reached.wait == StreamSocket::Wait::readable ? tcp::socket::wait_read : tcp::socket::wait_write;
+    if (reached.wait == Wire::Wait::none) co_return End{};
+    const auto what = reached.wait == Wire::Wait::readable ? tcp::socket::wait_read : tcp::socket::wait_write;
     co_await socket.tcp().async_wait(what, asio::use_awaitable);
   }
 }

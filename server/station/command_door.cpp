@@ -37,7 +37,7 @@ const char* text(CommandState value) {
   return "unknown";
 }
 
-std::shared_ptr<Station::PendingCommand> Station::make_pending(const CommandRequest& request, const RobotState& robot) {
+std::shared_ptr<PendingCommand> Station::make_pending(const CommandRequest& request, const RobotState& robot) {
   auto pending = std::make_shared<PendingCommand>(loop_);
   const std::int64_t now_us = clock_.steady_us();
   pending->received_us = request.received_us == 0 ? now_us : request.received_us;
@@ -81,7 +81,7 @@ Result<void> Station::check_request(const CommandRequest& request, const Seat& s
 bool Station::remembers(CommandId id) const { return recent_.find(id) != nullptr; }
 
 // A wish with a key that is on its way already, or was answered lately.
-Result<std::shared_ptr<Station::PendingCommand>> Station::same_wish(const CommandRequest& request, const Seat& seat) {
+Result<std::shared_ptr<PendingCommand>> Station::same_wish(const CommandRequest& request, const Seat& seat) {
   const CommandId id = command_id_of(request.robot_id, request.actor, request.key);
   std::shared_ptr<PendingCommand> same = seat.on_its_way(id);
   if (const auto* recent = recent_.find(id); same == nullptr && recent != nullptr) {

@@ -9,6 +9,8 @@
 
 namespace server {
 
+struct Seat;  // server/station/seat.hpp
+
 class RobotPort {
  public:
   virtual ~RobotPort() = default;
@@ -37,6 +39,10 @@ class RobotPort {
 
   // Ends the connection; the reason is logged.
   virtual void close(const std::string& reason) = 0;
+
+ private:
+  friend class Station;
+  Seat* seat_ = nullptr;  // the robot's place in the station, while this port has it
 };
 
 }  // namespace server

@@ -13,7 +13,7 @@ namespace server {
 
 // A command from submission to its end; the submitter waits for its answer, or its end. Shared by the seat and the
 // submitter, since either may go first.
-struct Station::PendingCommand {
+struct PendingCommand {
   explicit PendingCommand(boost::asio::io_context& loop) : answered{loop}, ended{loop} {}
 
   bool is_stop() const { return wire.which_action == rheonaut_Command_emergency_stop_tag; }
@@ -31,7 +31,7 @@ struct Station::PendingCommand {
   Signal answered, ended;
 };
 
-struct Station::Seat {
+struct Seat {
   RobotState* robot = nullptr;                                    // in Station::robots_
   RobotPort* port = nullptr;                                      // null while disconnected
   std::map<CommandId, std::shared_ptr<PendingCommand>> commands;  // that no robot has answered

@@ -62,12 +62,7 @@ const RobotState* Station::find(const RobotId& id) const {
   return robot == robots_.end() ? nullptr : &robot->second;
 }
 
-Station::Seat* Station::seat_of(const RobotPort& port) {
-  const auto seat = occupied_.find(&port);
-  return seat == occupied_.end() ? nullptr : seat->second;
-}
-
-Station::Seat& Station::add_seat(const RobotId& id) {
+Seat& Station::add_seat(const RobotId& id) {
   RobotState& robot = robots_[id];
   robot.id = id;
   Seat& seat = seats_[id];
@@ -118,7 +113,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   Seat& seat = add_seat(hello.robot_id);
   RobotState& robot = *seat.robot;
   if (RobotPort* previous = std::exchange(seat.port, nullptr); previous != nullptr) {
-    occupied_.erase(previous);
+    previous->seat_ = nullptr;
     previous->close(fmt::format("replaced by a connection from {}", peer));
     note(robot, "connection_replaced", fmt::format("{} takes the place of {}", peer, robot.peer));
   }
@@ -126,7 +121,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   const bool other_boot = robot.boot_id != hello.boot_id;
   if (other_boot) robot.sample.reset();  // at_power_s goes on: the motor has not cooled down
   seat.port = &port;
-  occupied_[&port] = &seat;
+  port.seat_ = &seat;
   seat.parameters = ParameterTable{};
   seat.told_in_force.clear();
   seat.next_sample_at_robot_us = hello.robot_time_us;
@@ -182,7 +177,7 @@ void Station::on_disconnected(RobotPort& port, const std::string& reason) {
   Seat* seat = seat_of(port);
   if (seat == nullptr) return;  // its place was taken
   seat->port = nullptr;
-  occupied_.erase(&port);
+  port.seat_ = nullptr;
   RobotState& robot = *seat->robot;
   robot.link = LinkState::disconnected;
   spdlog::info("robot '{}' disconnected: {}", robot.id, reason);

@@ -74,6 +74,8 @@ struct ControlRequest {
   microseconds age{0};              // take, force: of what its page saw; above kOldestSight it begins nothing
 };
 
+struct PendingCommand;
+
 class Station {
  public:
   Station(boost::asio::io_context& loop, Clock& clock, Envelope envelope, LinkTimes times);
@@ -155,10 +157,7 @@ class Station {
   void set_fluid(const RobotId& id, const std::string& fluid);  // empty: not known
 
  private:
-  struct PendingCommand;
-  struct Seat;  // a connected robot's port, and its commands on their way
-
-  Seat* seat_of(const RobotPort& port);  // null when the port's place was taken
+  static Seat* seat_of(const RobotPort& port) { return port.seat_; }  // null when the port's place was taken
   Seat& add_seat(const RobotId& id);
   std::int64_t robot_now_us(const RobotState& robot) const;
   void publish(const RobotState& robot);
@@ -200,9 +199,8 @@ class Station {
   Envelope envelope_;
   LinkTimes times_;
   std::map<RobotId, RobotState> robots_;
-  std::map<RobotId, Seat> seats_;                         // one for each robot, connected or not
-  std::unordered_map<const RobotPort*, Seat*> occupied_;  // seats, by who sits there
-  SampleBatch batch_;                                     // of the frame that is being taken; kept for its memory
+  std::map<RobotId, Seat> seats_;  // one for each robot, connected or not
+  SampleBatch batch_;              // of the frame that is being taken; kept for its memory
   std::vector<StationSink*> sinks_;
   Authority authority_;
   RecentCommands recent_;  // that had a key, and have ended

@@ -74,7 +74,7 @@ void Station::publish_held_back(std::vector<RobotId>& failed) {
 }
 
 // Hands the stop to the link, or finds the one that is the answer already.
-std::shared_ptr<Station::PendingCommand> Station::begin_stop(Seat& seat, const StopRequest& request) {
+std::shared_ptr<PendingCommand> Station::begin_stop(Seat& seat, const StopRequest& request) {
   if (auto same = stop_in_force(seat, request)) return same;
   CommandRequest wish;
   wish.robot_id = request.robot_id;
@@ -95,7 +95,7 @@ std::shared_ptr<Station::PendingCommand> Station::begin_stop(Seat& seat, const S
 
 // The stop that answers the request already; null when a new one is needed. SAFETY: only one that came with the same
 // key within 10 s and still latches the robot; or the newest, when the robot is away or has as many as it can be given.
-std::shared_ptr<Station::PendingCommand> Station::stop_in_force(Seat& seat, const StopRequest& request) {
+std::shared_ptr<PendingCommand> Station::stop_in_force(Seat& seat, const StopRequest& request) {
   if (!request.key.empty()) {
     const CommandId id = command_id_of(request.robot_id, request.actor, request.key);
     if (const auto unanswered = seat.commands.find(id); unanswered != seat.commands.end()) return unanswered->second;
@@ -112,7 +112,7 @@ std::shared_ptr<Station::PendingCommand> Station::stop_in_force(Seat& seat, cons
   return seat.port == nullptr || seat.stops() >= kMaxStops ? newest : nullptr;
 }
 
-std::shared_ptr<Station::PendingCommand> Station::Seat::newest_stop() const {
+std::shared_ptr<PendingCommand> Seat::newest_stop() const {
   std::shared_ptr<PendingCommand> newest;
   for (const auto& [id, pending] : commands) {
     if (pending->is_stop() && (newest == nullptr || pending->number > newest->number)) newest = pending;
@@ -120,13 +120,13 @@ std::shared_ptr<Station::PendingCommand> Station::Seat::newest_stop() const {
   return newest;
 }
 
-std::shared_ptr<Station::PendingCommand> Station::Seat::on_its_way(CommandId id) const {
+std::shared_ptr<PendingCommand> Seat::on_its_way(CommandId id) const {
   if (const auto sent = commands.find(id); sent != commands.end()) return sent->second;
   const auto seen = std::ranges::find(unseen, id, [](const auto& pending) { return pending->record.id; });
   return seen == unseen.end() ? nullptr : *seen;
 }
 
-std::size_t Station::Seat::stops() const {
+std::size_t Seat::stops() const {
   return static_cast<std::size_t>(
       std::ranges::count_if(commands, [](const auto& entry) { return entry.second->is_stop(); }));
 }

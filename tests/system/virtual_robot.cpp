@@ -3,6 +3,8 @@
 
 #include <array>
 
+#include "tests/server/stream_reader.hpp"
+
 namespace server {
 namespace asio = boost::asio;
 
@@ -65,7 +67,7 @@ void VirtualRobot::pump() {
 asio::awaitable<void> VirtualRobot::read(std::shared_ptr<Link> link) {
   std::array<std::uint8_t, 2048> bytes;
   for (;;) {
-    const std::size_t size = co_await link->stream->read_some(asio::buffer(bytes));
+    const std::size_t size = co_await read_some(loop_, *link->stream, asio::buffer(bytes));
     const bool goes_on = size > 0 && !link->ended && robot_.receive({bytes.data(), size}, now_us());
     if (!goes_on) break;
     pump();

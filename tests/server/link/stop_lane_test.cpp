@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <string>
 
-#include "server/turns.hpp"
 #include "tests/server/link/link_fixture.hpp"
 
 namespace server {
@@ -19,30 +18,29 @@ TEST_F(LinkTest, AnEmergencyStopGoesAheadOfWhatWaitsAndReplacesIt) {
   for (const auto& result : results) EXPECT_EQ(result->state, CommandState::superseded);
 }
 
-// SAFETY: not behind the samples of a fleet, which arrived before it.
-TEST_F(LinkTest, TheAnswerToAStopWaitsForNoTurn) {
+// SAFETY: not behind the samples of a fleet, nor in a pause; what that means PollSetTest shows.
+TEST_F(LinkTest, WhatARobotSendsIsAwaitedUntilItHasAnsweredAStop) {
   auto* robot = connect();
-  std::vector<TestRobot*> fleet;
-  for (int i = 0; i < 5 * Turns::kAtOnce; ++i) {
-    protocol::RobotFrame hello = TestRobot::hello_frame();
-    const std::string id = "fleet-" + std::to_string(i);
-    std::ranges::copy(id, hello.body.hello.robot_id);
-    fleet.push_back(dial());
-    fleet.back()->send(hello);
-  }
+  ASSERT_EQ(robot->heartbeats().size(), 1U);
+  EXPECT_TRUE(robot->link.second_is_awaited()) << "a probe of its clock, too";
+  protocol::RobotFrame answer = rheonaut_RobotFrame_init_zero;
+  answer.which_body = rheonaut_RobotFrame_heartbeat_tag;
+  answer.body.heartbeat.echo_station_time_us = robot->heartbeats()[0].station_time_us;
+  answer.body.heartbeat.echo_received_at_robot_us = robot->robot_now_us();
+  robot->send(answer);
   clock.settle();
+  EXPECT_FALSE(robot->link.second_is_awaited());
   stop_robot();
   clock.settle();
+  EXPECT_TRUE(robot->link.second_is_awaited());
   protocol::Command other = robot->commands().at(0);
   other.command_id += 1;
-  for (TestRobot* one : fleet) one->send_samples(0, 1, one->robot_now_us(), 0);
-  robot->acknowledge(other, rheonaut_COMMAND_RESULT_ACCEPTED, 0);  // of a command before it
-  robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_ACCEPTED, 9);
-  while (results.empty() && loop.poll_one() > 0) continue;
-  ASSERT_EQ(results.size(), 1u);
-  EXPECT_LE(sink.batches.size(), 2u * Turns::kAtOnce) << "a round until it is read, one until who asked is told";
+  robot->acknowledge(other, rheonaut_COMMAND_RESULT_ACCEPTED, 0);
   clock.settle();
-  EXPECT_EQ(sink.batches.size(), fleet.size());
+  EXPECT_TRUE(robot->link.second_is_awaited()) << "of another command";
+  robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_ACCEPTED, 9);
+  clock.settle();
+  EXPECT_FALSE(robot->link.second_is_awaited());
 }
 
 TEST_F(LinkTest, AStopLatchesTheStationUntilItIsCleared) {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "tests/server/stream_reader.hpp"
+
 namespace server {
 namespace asio = boost::asio;
 
@@ -10,6 +12,7 @@ TestRobot::TestRobot(asio::io_context& loop, Clock& clock, TaskGroup& tasks, Rob
                      std::size_t capacity_bytes)
     : link{loop, capacity_bytes},
       booted_at_us{clock.steady_us() - 5'000'000},
+      loop_{loop},
       clock_{clock},
       tasks_{tasks},
       stream_{link.take_first()} {
@@ -85,7 +88,7 @@ asio::awaitable<void> TestRobot::read() {
   protocol::FrameReader reader;
   std::array<std::uint8_t, 2048> bytes;
   while (reading) {
-    const std::size_t size = co_await stream_->read_some(asio::buffer(bytes));
+    const std::size_t size = co_await read_some(loop_, *stream_, asio::buffer(bytes));
     if (size == 0) break;
     protocol::Bytes input{bytes.data(), size};
     while (reader.push(input) == protocol::FrameReader::State::complete) {

@@ -78,6 +78,7 @@ class TestRobot {
   boost::asio::awaitable<void> write(std::vector<std::uint8_t> bytes);
   boost::asio::awaitable<void> talk();
 
+  boost::asio::io_context& loop_;
   Clock& clock_;
   TaskGroup& tasks_;
   std::unique_ptr<ByteStream> stream_;

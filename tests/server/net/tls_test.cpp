@@ -1,164 +1,12 @@
-// TLS of a port: handshakes with a time limit, writes that do not wait, certificates that come into force.
-#include <fcntl.h>
-#include <netinet/in.h>
-#include <openssl/err.h>
-#include <poll.h>
-#include <spdlog/sinks/ostream_sink.h>
-#include <sys/socket.h>
+// TLS of a port: handshakes with a time limit, certificates that come into force, warnings.
+#include <gmock/gmock.h>
 
-#include <boost/asio/as_tuple.hpp>
-#include <csignal>
-#include <fstream>
-#include <sstream>
-
-#include "server/cli/certificate.hpp"
-#include "server/net/byte_stream.hpp"
-#include "server/net/listener.hpp"
-#include "server/net/transport_security.hpp"
-#include "server/tasks.hpp"
-#include "tests/server/virtual_clock.hpp"
+#include "tests/server/net/tls_fixture.hpp"
 
 namespace server {
 namespace {
 
-namespace asio = boost::asio;
-namespace fs = std::filesystem;
-using asio::ip::tcp;
-using namespace std::chrono_literals;
 using ::testing::HasSubstr;
-
-constexpr int kPatience = 5000;  // times 1 ms of real time
-
-class TlsTest : public ::testing::Test {
- protected:
-  TlsTest() {
-    std::signal(SIGPIPE, SIG_IGN);
-    std::string name = (fs::temp_directory_path() / "rheonaut-tls-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error{"cannot make " + name};
-    config.data_dir = name;
-    config.tls.mode = TlsMode::on;
-    spdlog::set_default_logger(
-        std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
-    make_certificate({});
-  }
-  ~TlsTest() override {
-    tasks.stop();
-    clock.settle();
-    spdlog::set_default_logger(before);
-    fs::remove_all(config.data_dir);
-  }
-
-  void make_certificate(cli::Certificate wish) {
-    wish.data_dir = config.data_dir;
-    std::ostringstream ignored;
-    cli::run(wish, ignored);
-  }
-  void renew(bool new_key = false, int days = 825) {
-    cli::Certificate wish;
-    wish.renew = true;
-    wish.new_key = new_key;
-    wish.days = days;
-    make_certificate(wish);
-  }
-
-  TransportSecurity& start() {
-    security = std::make_unique<TransportSecurity>(clock, config);
-    clock.add_worker(security->worker());
-    tasks.spawn("security", security->run());
-    auto on_connection = [this](tcp::socket socket) {
-      served = std::make_unique<StreamSocket>(std::move(socket));
-      outcome.reset();
-      tasks.spawn("handshake", shake_hands());
-    };
-    tasks.spawn("listener", listener.run(on_connection));
-    clock.settle();
-    return *security;
-  }
-
-  // How often the log has it.
-  int said(const std::string& what) const {
-    const std::string text = log.str();
-    int count = 0;
-    for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
-    return count;
-  }
-
-  asio::awaitable<void> shake_hands() { outcome = co_await security->http().tls->secure(*served, "test port"); }
-
-  Config config;
-  asio::io_context loop{1};
-  VirtualClock clock{loop};
-  TaskGroup tasks{loop};
-  Listener listener{loop, clock, {asio::ip::address_v4::loopback(), 0}};
-  std::unique_ptr<TransportSecurity> security;
-  std::unique_ptr<StreamSocket> served;  // the last connection
-  std::optional<TlsGate::Outcome> outcome;
-  std::ostringstream log;
-  std::shared_ptr<spdlog::logger> before = spdlog::default_logger();
-};
-
-// Another program's end, which lets the station run while it waits.
-class Client {
- public:
-  Client(VirtualClock& clock, const tcp::endpoint& endpoint, int receive_bytes = 0) : clock_{clock} {
-    socket_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (receive_bytes > 0) ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_bytes, sizeof receive_bytes);
-    if (::connect(socket_, endpoint.data(), static_cast<socklen_t>(endpoint.size())) != 0) {
-      throw std::runtime_error{"cannot connect"};
-    }
-    ::fcntl(socket_, F_SETFL, O_NONBLOCK);
-    clock_.settle();
-  }
-  ~Client() { ::close(socket_); }
-  Client(const Client&) = delete;
-  Client& operator=(const Client&) = delete;
-
-  // One attempt of `step` after another, until it gives 1 or fails for good.
-  template <class Step>
-  bool until_done(Step step) {
-    for (int i = 0; i < kPatience; ++i) {
-      ERR_clear_error();
-      const int result = step();
-      if (result == 1) return true;
-      const int why = SSL_get_error(ssl_.get(), result);
-      if (why != SSL_ERROR_WANT_READ && why != SSL_ERROR_WANT_WRITE) return false;
-      clock_.settle();
-      pollfd ready{socket_, POLLIN, 0};
-      ::poll(&ready, 1, 1);
-    }
-    return false;
-  }
-
-  bool shake_hands() {
-    ssl_.reset(SSL_new(context_.get()));
-    SSL_set_fd(ssl_.get(), socket_);
-    SSL_set_connect_state(ssl_.get());
-    const bool done = until_done([this] { return SSL_do_handshake(ssl_.get()); });
-    clock_.settle();
-    return done;
-  }
-  std::string read(std::size_t count) {
-    std::string all;
-    while (all.size() < count) {
-      std::string piece(count - all.size(), '\0');
-      std::size_t size = 0;
-      if (!until_done([&] { return SSL_read_ex(ssl_.get(), piece.data(), piece.size(), &size); })) break;
-      all.append(piece, 0, size);
-    }
-    return all;
-  }
-  void send_plain(std::string_view bytes) {
-    ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
-    clock_.settle();
-  }
-  std::string pin() const { return describe(*SSL_get0_peer_certificate(ssl_.get())).pin; }
-
- private:
-  VirtualClock& clock_;
-  int socket_ = -1;
-  Openssl<SSL_CTX> context_{SSL_CTX_new(TLS_client_method())};
-  Openssl<SSL> ssl_;
-};
 
 TEST_F(TlsTest, AClientThatSaysNothingIsLetGoAfterTenSecondsAndHoldsNobodyUp) {
   start();
@@ -204,53 +52,13 @@ TEST_F(TlsTest, AtMostOneFailureASecondIsLogged) {
   EXPECT_EQ(security->gate()->counters().failed, 21U);
 }
 
-// What an emergency stop rests on: the frame is on its way when write_now() returns, without a turn of the loop.
-TEST_F(TlsTest, BytesLeaveAtOnce) {
-  start();
-  Client client{clock, listener.endpoint()};
-  ASSERT_TRUE(client.shake_hands());
-  ASSERT_EQ(outcome, TlsGate::Outcome::secure);
-  const auto stream = make_stream(std::move(*served));
-  EXPECT_EQ(stream->write_now(asio::buffer("stop", 4)), 4U);
-  EXPECT_EQ(client.read(4), "stop");
-}
-
-// A peer that does not read: what does not fit waits, and nothing is lost, doubled or out of order.
-TEST_F(TlsTest, WhatASocketDoesNotTakeIsWhatTheNextWriteBeginsWith) {
-  start();
-  Client client{clock, listener.endpoint(), 4096};
-  ASSERT_TRUE(client.shake_hands());
-  const auto stream = make_stream(std::move(*served));
-  std::string sent;
-  std::string rest;
-  for (int frame = 0; rest.empty() && frame < 100'000; ++frame) {
-    const std::string bytes = std::to_string(frame) + std::string(900, static_cast<char>('a' + frame % 26));
-    const std::size_t taken = stream->write_now(asio::buffer(bytes));
-    sent += bytes;
-    rest = bytes.substr(taken);
-  }
-  ASSERT_FALSE(rest.empty()) << "the socket never filled";
-  std::optional<bool> written;
-  const auto write = [](ByteStream& to, std::string bytes, std::optional<bool>& done) -> asio::awaitable<void> {
-    done = co_await to.write(asio::buffer(bytes));
-  };
-  tasks.spawn("write", write(*stream, rest, written));
-  clock.settle();
-  EXPECT_FALSE(written) << "it waits for room";
-  EXPECT_EQ(client.read(sent.size()), sent);
-  clock.settle();
-  EXPECT_EQ(written, true);
-  EXPECT_EQ(stream->write_now(asio::buffer("stop", 4)), 4U);
-  EXPECT_EQ(client.read(4), "stop");
-}
-
 TEST_F(TlsTest, ANewCertificateIsInForceForNewConnectionsWithinTwoLooks) {
   start();
   const std::string first = security->gate()->context().certificate.pin;
   Client old_client{clock, listener.endpoint()};
   ASSERT_TRUE(old_client.shake_hands());
   EXPECT_EQ(old_client.pin(), first);
-  auto stream = make_stream(std::move(*served));
+  auto stream = make_stream(std::move(*served), sockets);
 
   renew(true);
   clock.run_for(2 * kCertificateLook + 1ms);

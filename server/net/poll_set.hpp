@@ -1,0 +1,104 @@
+// Many sockets behind one descriptor of the loop: an epoll of their own, so that a fleet that talks wakes the loop 500
+// times a second at most, and takes a few microseconds of it at a time.
+//
+//   sockets ─┬─ epoll of all ──────── looked at every 2 ms at most ─── a few sockets, then everybody else's turn
+//            └─ epoll of the awaited ── looked at when something comes ── likewise
+//
+// In the second are sockets from which an answer is expected, and those to which somebody waits to write. Loop thread.
+// When the set is gone its sockets wait for nothing any more.
+#pragma once
+
+#include <sys/epoll.h>
+
+#include <array>
+#include <boost/asio/async_result.hpp>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/system/error_code.hpp>
+#include <cstdint>
+#include <functional>
+#include <unordered_set>
+
+#include "server/clock.hpp"
+
+namespace server {
+
+class PollSet {
+ public:
+  static constexpr int kAtOnce = 8;                         // sockets, between two looks of the loop at everything else
+  static constexpr std::chrono::microseconds kPause{2000};  // from one look at all sockets to the next
+
+  PollSet(boost::asio::io_context& loop, Clock& clock);
+  ~PollSet();  // whoever still waits is let go by the loop
+  PollSet(const PollSet&) = delete;
+  PollSet& operator=(const PollSet&) = delete;
+
+  // Look until cancelled. Without them nobody's wait ends.
+  boost::asio::awaitable<void> run();
+  boost::asio::awaitable<void> run_awaited();
+
+  class Socket;
+
+ private:
+  // One epoll.
+  struct Lane {
+    Lane();
+    ~Lane();
+    Lane(const Lane&) = delete;
+    Lane& operator=(const Lane&) = delete;
+    int epoll;
+    std::array<epoll_event, kAtOnce> ready{};  // of the present look
+    std::size_t ready_count = 0;
+  };
+
+  boost::asio::awaitable<void> wait(const Lane& lane);
+  boost::asio::awaitable<std::size_t> work_off(Lane& lane);
+  std::size_t look(Lane& lane);
+  void forget(const Socket& socket);
+
+  boost::asio::io_context& loop_;
+  Clock& clock_;
+  Lane all_, awaited_;
+  std::unordered_set<Socket*> sockets_;
+};
+
+// A descriptor in the set, which stays its owner's and outlives this. Nobody waits any more when it is destroyed.
+class PollSet::Socket {
+ public:
+  Socket(PollSet& set, int descriptor);
+  ~Socket();
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+
+  // Calls it in the socket's turn, again and again, while there is something to read or the connection has ended. It
+  // does not throw, nor destroy the socket. Null: no longer. Not from inside of the call. Throws bad_alloc.
+  void watch(std::function<void()> on_readable);
+
+  // Returns when there is room to write, or the connection has ended. One at a time. Throws operation_aborted when
+  // cancelled, no_memory when the system cannot watch it.
+  boost::asio::awaitable<void> writable();
+
+  // From now on, or no longer, what comes from it is read at once.
+  void set_awaited(bool awaited);
+
+ private:
+  friend class PollSet;
+  using Waiter = std::move_only_function<void(boost::system::error_code)>;
+
+  void end_wait(boost::system::error_code error);
+  void on_ready(std::uint32_t events);
+  bool update();
+  bool set_events(const Lane& lane, std::uint32_t& present, std::uint32_t wanted);
+
+  boost::asio::io_context& loop_;
+  PollSet* set_;  // null when it is gone
+  int descriptor_;
+  std::uint32_t in_all_ = 0, in_awaited_ = 0;  // the events that each epoll looks for; 0: it is not there
+  bool is_awaited_ = false;
+  std::function<void()> reader_;
+  Waiter writer_;
+};
+
+}  // namespace server
