@@ -13,6 +13,7 @@
 #include "server/live/live_feed.hpp"
 #include "server/log.hpp"
 #include "server/net/transport_security.hpp"
+#include "server/real_time.hpp"
 #include "server/recording/recording_parts.hpp"
 #include "server/station_document.hpp"
 
@@ -21,12 +22,11 @@ using namespace server;  // NOLINT: this file is the station, seen from outside
 static int serve(const Config& config) {
   start_log(config.log_level);
   DataFolder folder{config.data_dir};
-
   // The ground everything stands on; declared first, destroyed last.
   boost::asio::io_context loop{1};  // all sockets, all live state
   SystemClock clock{loop};
-  WorkerThread disk{"disk"}, readers{"readers", 10}, exports{"exports", 10}, checkpoints{"checkpoints"};
-  WorkerThread maths{"maths", 10};
+  WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
+  WorkerThread readers{"readers", 10}, exports{"exports", 10}, maths{"maths", 10};
   TaskGroup tasks{loop};
   TransportSecurity security{clock, config};  // of both ports
 
@@ -52,8 +52,8 @@ static int serve(const Config& config) {
   AnalysisService analysis{recording.history, maths};
   const ApiOptions options = api_options(config, restored.store_id, text(robots.endpoint()), security);
   ApiServer api{loop, tasks, clock, options, station, live, recording, analysis};
-
   recording.spawn(tasks);
+  if (config.real_time) tasks.spawn("the disk's priority", ask_for_real_time(disk));
   tasks.spawn("control", station.watch_control());
   tasks.spawn("live feed", live.run());
   tasks.spawn("robots", robots.run());

@@ -1,7 +1,6 @@
 // Starts, names and stops the station's coroutines.
 #include "server/tasks.hpp"
 
-#include <sched.h>
 #include <spdlog/spdlog.h>
 
 #include <boost/asio/bind_cancellation_slot.hpp>
@@ -11,6 +10,8 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/system/system_error.hpp>
 #include <csignal>
+
+#include "server/real_time.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -43,10 +44,7 @@ void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
 
 void TaskGroup::run(bool in_real_time) {
   if (in_real_time) {
-    sched_param lowest{};
-    lowest.sched_priority = sched_get_priority_min(SCHED_RR);
-    // What it starts, a tool of a shell say, is ordinary again.
-    const bool is_granted = sched_setscheduler(0, SCHED_RR | SCHED_RESET_ON_FORK, &lowest) == 0;
+    const bool is_granted = ask_for_real_time(Priority::loop);
     spdlog::info("the loop runs {}",
                  is_granted ? "with real-time priority" : "without real-time priority: the system does not permit it");
   }

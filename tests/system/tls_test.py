@@ -136,7 +136,8 @@ class TlsTest(unittest.TestCase):
                 station.wait_for_robot(robot_id)
                 station.command(robot_id, "set_mode", mode="auto", setpoint_m=0.5)
                 wait_until(lambda: station.robot(robot_id)["sample"]["duty"] > 0.5, 10, "the motor runs")
-                self.assertEqual(station.post(f"/api/v1/robots/{robot_id}/emergency-stop")["state"], "acknowledged")
+                state = station.post(f"/api/v1/robots/{robot_id}/emergency-stop")["state"]
+                self.assertIn(state, ("acknowledged", "verified"))  # telemetry may come with the answer
                 wait_until(lambda: station.robot(robot_id)["sample"]["duty"] == 0, 10, "duty 0")
                 self.assertEqual(station.robot(robot_id)["mode"], "emergency")
 
