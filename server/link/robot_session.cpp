@@ -222,8 +222,8 @@ void RobotSession::on_frame(const protocol::RobotFrame& frame) {
     case rheonaut_RobotFrame_command_ack_tag:
       if (frame.body.command_ack.command_id == awaited_stop_) awaited_stop_ = 0;
       if (frame.body.command_ack.command_id == awaited_command_) awaited_command_ = 0;
-      tell_what_is_awaited();
       station_.on_command_ack(*this, frame.body.command_ack);
+      tell_what_is_awaited();
       break;
     case rheonaut_RobotFrame_heartbeat_tag: on_heartbeat(frame); break;
     default: break;  // a message of a newer version

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <boost/asio/associated_cancellation_slot.hpp>
 #include <boost/asio/error.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/system/system_error.hpp>
 #include <cerrno>
@@ -31,21 +32,18 @@ PollSet::~PollSet() {
   }
 }
 
-// Returns when one of the lane's sockets is ready. Only while somebody waits here does the loop know of the lane: it
-// would wake for each packet otherwise.
-asio::awaitable<void> PollSet::wait(const Lane& lane) {
-  struct Loan {
-    asio::posix::stream_descriptor descriptor;
-    ~Loan() {
-      if (descriptor.is_open()) descriptor.release();
-    }
-  };
-  error_code error;
-  Loan loan{asio::posix::stream_descriptor{loop_}};
-  loan.descriptor.assign(lane.epoll, error);
-  if (error) co_return co_await clock_.sleep_for(kPause);  // for want of memory: then it is looked at anyway
-  co_await loan.descriptor.async_wait(asio::posix::descriptor_base::wait_read, asio::use_awaitable);
-}
+// As long as it lasts the loop knows of the lane, and wakes for each of its sockets that becomes ready.
+struct PollSet::Loan {
+  Loan(asio::io_context& loop, const Lane& lane) : descriptor{loop} { descriptor.assign(lane.epoll, error); }
+  ~Loan() {
+    if (descriptor.is_open()) descriptor.release();
+  }
+  Loan(const Loan&) = delete;
+  Loan& operator=(const Loan&) = delete;
+  auto ready() { return descriptor.async_wait(asio::posix::descriptor_base::wait_read, asio::use_awaitable); }
+  asio::posix::stream_descriptor descriptor;
+  error_code error;  // for want of memory
+};
 
 // When a look has found more than one there will be more after the pause: then nothing else needs to wake the loop.
 asio::awaitable<void> PollSet::run() {
@@ -55,13 +53,21 @@ asio::awaitable<void> PollSet::run() {
     const std::int64_t looked_at_us = clock_.steady_us();
     const std::size_t found = co_await work_off(all_);
     due_us = found > 0 ? looked_at_us + kPause.count() : 0;
-    if (found <= 1) co_await wait(all_);
+    if (found > 1) continue;
+    Loan loan{loop_, all_};
+    if (loan.error) {
+      co_await clock_.sleep_for(kPause);
+    } else {
+      co_await loan.ready();
+    }
   }
 }
 
 asio::awaitable<void> PollSet::run_awaited() {
+  Loan loan{loop_, awaited_};
+  if (loan.error) throw boost::system::system_error{loan.error, "cannot watch robots"};
   for (;;) {
-    co_await wait(awaited_);
+    co_await loan.ready();
     co_await work_off(awaited_);
   }
 }

@@ -14,7 +14,6 @@
 #include <boost/asio/async_result.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/system/error_code.hpp>
 #include <cstdint>
@@ -53,7 +52,8 @@ class PollSet {
     std::size_t ready_count = 0;
   };
 
-  boost::asio::awaitable<void> wait(const Lane& lane);
+  struct Loan;
+
   boost::asio::awaitable<std::size_t> work_off(Lane& lane);
   std::size_t look(Lane& lane);
   void forget(const Socket& socket);
