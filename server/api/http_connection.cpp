@@ -1,10 +1,11 @@
-// Reads and writes HTTP/1.1 with Beast; the only unit besides live_socket.cpp that knows it.
+// Reads HTTP/1.1 with Beast, and writes it with answer_head; the only unit besides live_socket.cpp that knows it.
 #include "server/api/http_connection.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/multiple_exceptions.hpp>
@@ -15,7 +16,7 @@
 #include <limits>
 #include <variant>
 
-#include "server/api/security_headers.hpp"
+#include "server/api/answer_head.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -43,25 +44,6 @@ Request plain_head(const Message& message) {
     value += field.value();
   }
   return request;
-}
-
-template <class Message>
-void set_common_fields(Message& message, const Response& response, const http::request<http::string_body>& to,
-                       bool is_secure) {
-  message.version(to.version());
-  message.result(static_cast<unsigned>(response.status));
-  message.reason(reason_phrase(response.status));
-  message.set(http::field::cache_control, "no-store");
-  if (!response.content_type.empty()) message.set(http::field::content_type, response.content_type);
-  for (const auto& [name, value] : response.headers) {
-    if (name == "Cache-Control") {
-      message.set(name, value);
-    } else {
-      message.insert(name, value);
-    }
-  }
-  for (const auto& [name, value] : security_headers(to[http::field::host], is_secure)) message.set(name, value);
-  message.keep_alive(to.keep_alive());
 }
 
 }  // namespace
@@ -294,41 +276,27 @@ asio::awaitable<Response> HttpConnection::answer(Request request) {
 }
 
 asio::awaitable<HttpConnection::Next> HttpConnection::send(Response response, const Message& to) {
-  const bool head_only = to.method() == http::verb::head;
-  if (response.stream != nullptr && !head_only) {
-    AnswerHead head;
-    set_common_fields(head, response, to, stream_.is_secure());
-    if (to.version() >= 11) {
-      head.chunked(true);
-    } else {
-      head.keep_alive(false);
-    }
-    co_return co_await send_stream(std::move(head), std::move(response.stream));
+  const bool has_body = to.method() != http::verb::head && may_have_body(response.status);
+  const bool is_framed = response.stream == nullptr || to.version() >= 11;  // else the connection's end is its end
+  const Framing framing{to.version(), to.keep_alive() && is_framed, stream_.is_secure(), to[http::field::host]};
+  const std::string head = answer_head(response, framing);
+  const std::array parts{asio::buffer(head), has_body ? asio::buffer(response.body) : asio::const_buffer{}};
+  allow(kWriteTime);
+  const auto [error, size] = co_await asio::async_write(stream_, parts, asio::as_tuple(asio::use_awaitable));
+  if (error) co_return Next::end;
+  if (response.stream != nullptr && has_body) {
+    const bool is_whole = co_await send_stream(*response.stream, is_framed);
+    if (!is_whole) co_return Next::end;
   }
-  TextAnswer message;
-  set_common_fields(message, response, to, stream_.is_secure());
-  if (response.status != 304 && response.stream == nullptr) message.content_length(response.body.size());
-  if (!head_only) message.body() = std::move(response.body);
-  co_return co_await send_body(std::move(message));
+  co_return framing.keep_alive ? Next::another : Next::end;
 }
 
-asio::awaitable<HttpConnection::Next> HttpConnection::send_body(TextAnswer message) {
-  allow(kWriteTime);
-  const auto [error, size] = co_await http::async_write(stream_, message, asio::as_tuple(asio::use_awaitable));
-  co_return error || !message.keep_alive() ? Next::end : Next::another;
-}
-
-asio::awaitable<HttpConnection::Next> HttpConnection::send_stream(AnswerHead head, std::unique_ptr<BodyStream> body) {
-  allow(kWriteTime);
-  http::response_serializer<http::empty_body> serializer{head};
-  const auto [head_error, head_size] =
-      co_await http::async_write_header(stream_, serializer, asio::as_tuple(asio::use_awaitable));
-  if (head_error) co_return Next::end;
-  const bool chunked = head.chunked();
+// False when it was cut short: the missing last chunk tells the client (HTTP/1.0 has no way to say so).
+asio::awaitable<bool> HttpConnection::send_stream(BodyStream& body, bool chunked) {
   for (;;) {
     deadline_us_ = kNever;
-    const auto made = co_await while_present(next_piece(*body));
-    if (!made || !*made) co_return Next::end;  // the missing last chunk tells the client
+    const auto made = co_await while_present(next_piece(body));
+    if (!made || !*made) co_return false;
     const std::optional<std::string>& piece = **made;
     if (!piece) break;
     if (piece->empty()) continue;
@@ -341,13 +309,13 @@ asio::awaitable<HttpConnection::Next> HttpConnection::send_stream(AnswerHead hea
     } else {
       std::tie(error, std::ignore) = co_await asio::async_write(stream_, bytes, asio::as_tuple(asio::use_awaitable));
     }
-    if (error) co_return Next::end;
+    if (error) co_return false;
   }
-  if (!chunked) co_return Next::end;
+  if (!chunked) co_return true;
   allow(kWriteTime);
   const auto [error, size] =
       co_await asio::async_write(stream_, http::make_chunk_last(), asio::as_tuple(asio::use_awaitable));
-  co_return error || !head.keep_alive() ? Next::end : Next::another;
+  co_return !error;
 }
 
 asio::awaitable<Result<std::optional<std::string>>> HttpConnection::next_piece(BodyStream& body) {

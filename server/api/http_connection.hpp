@@ -55,8 +55,6 @@ class HttpConnection {
  private:
   using Message = boost::beast::http::request<boost::beast::http::string_body>;
   using Parser = boost::beast::http::request_parser<boost::beast::http::string_body>;
-  using TextAnswer = boost::beast::http::response<boost::beast::http::string_body>;
-  using AnswerHead = boost::beast::http::response<boost::beast::http::empty_body>;
   enum class Next : std::uint8_t { another, end };
 
   boost::asio::awaitable<Next> secure();
@@ -70,8 +68,7 @@ class HttpConnection {
   template <class T>
   boost::asio::awaitable<std::optional<T>> while_present(boost::asio::awaitable<T> work);
   boost::asio::awaitable<Next> send(Response response, const Message& to);
-  boost::asio::awaitable<Next> send_body(TextAnswer message);
-  boost::asio::awaitable<Next> send_stream(AnswerHead head, std::unique_ptr<BodyStream> body);
+  boost::asio::awaitable<bool> send_stream(BodyStream& body, bool chunked);
   boost::asio::awaitable<Result<std::optional<std::string>>> next_piece(BodyStream& body);
   boost::asio::awaitable<void> discard_rest();
 

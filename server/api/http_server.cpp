@@ -3,9 +3,9 @@
 
 #include <boost/asio/experimental/awaitable_operators.hpp>
 
+#include "server/api/answer_head.hpp"
 #include "server/api/contained.hpp"
 #include "server/api/http_connection.hpp"
-#include "server/api/security_headers.hpp"
 
 namespace server {
 namespace asio = boost::asio;

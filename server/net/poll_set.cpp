@@ -11,6 +11,7 @@
 #include <boost/system/system_error.hpp>
 #include <cerrno>
 #include <new>
+#include <optional>
 #include <utility>
 
 namespace server {
@@ -32,7 +33,8 @@ PollSet::~PollSet() {
   }
 }
 
-// As long as it lasts the loop knows of the lane, and wakes for each of its sockets that becomes ready.
+// As long as it lasts the loop knows of the lane, and wakes for each of its sockets that becomes ready. Asio's own
+// epoll is edge-triggered; what is ready when a wait begins ends it all the same, since the wait itself registers anew.
 struct PollSet::Loan {
   Loan(asio::io_context& loop, const Lane& lane) : descriptor{loop} { descriptor.assign(lane.epoll, error); }
   ~Loan() {
@@ -45,20 +47,25 @@ struct PollSet::Loan {
   error_code error;  // for want of memory
 };
 
-// When a look has found more than one there will be more after the pause: then nothing else needs to wake the loop.
+// When a look has found more than one there will be more after the pause: nothing else needs to wake the loop then.
 asio::awaitable<void> PollSet::run() {
+  std::optional<Loan> loan;
   std::int64_t due_us = 0;
   for (;;) {
-    if (clock_.steady_us() < due_us) co_await clock_.sleep_until(due_us);
+    if (clock_.steady_us() < due_us) {
+      loan.reset();  // nobody is to be woken for what comes in the pause
+      co_await clock_.sleep_until(due_us);
+    }
     const std::int64_t looked_at_us = clock_.steady_us();
-    const std::size_t found = co_await work_off(all_);
+    const std::size_t found = co_await work_off(rest_);
     due_us = found > 0 ? looked_at_us + kPause.count() : 0;
     if (found > 1) continue;
-    Loan loan{loop_, all_};
-    if (loan.error) {
+    if (!loan) loan.emplace(loop_, rest_);
+    if (loan->error) {
+      loan.reset();
       co_await clock_.sleep_for(kPause);
     } else {
-      co_await loan.ready();
+      co_await loan->ready();
     }
   }
 }
@@ -94,7 +101,7 @@ std::size_t PollSet::look(Lane& lane) {
 }
 
 void PollSet::forget(const Socket& socket) {
-  for (Lane* lane : {&all_, &awaited_}) {
+  for (Lane* lane : {&rest_, &awaited_}) {
     for (epoll_event& event : lane->ready) {
       if (event.data.ptr == &socket) event.data.ptr = nullptr;
     }
@@ -131,7 +138,7 @@ asio::awaitable<void> PollSet::Socket::writable() {
 void PollSet::Socket::set_awaited(bool awaited) {
   if (awaited == is_awaited_) return;
   is_awaited_ = awaited;
-  update();  // if that fails, for want of memory, it is read with the others
+  update();  // if that fails, for want of memory, it is read where it was
 }
 
 void PollSet::Socket::end_wait(error_code error) {
@@ -147,12 +154,18 @@ void PollSet::Socket::on_ready(std::uint32_t events) {
   if (reader_ && (events & (EPOLLIN | kEnd)) != 0) reader_();
 }
 
-// Both epolls look for exactly what somebody waits for: whatever they tell of besides would be told again and again.
+// Both epolls look for exactly what somebody waits for: whatever they tell of besides would be told again and again. A
+// socket is read in one of them, since ready in both it would wake the loop twice; it leaves that one only when it is
+// in the other, so that for want of memory it is read in the wrong one rather than in none.
 bool PollSet::Socket::update() {
   if (set_ == nullptr) return !reader_ && !writer_;
   const std::uint32_t reading = reader_ ? EPOLLIN : 0, writing = writer_ ? EPOLLOUT : 0;
-  const bool is_set = set_events(set_->all_, in_all_, reading);
-  return set_events(set_->awaited_, in_awaited_, (is_awaited_ ? reading : 0U) | writing) && is_set;
+  if (is_awaited_) {
+    const bool is_set = set_events(set_->awaited_, in_awaited_, reading | writing);
+    return set_events(set_->rest_, in_rest_, is_set ? 0 : reading) && is_set;
+  }
+  const bool is_set = set_events(set_->rest_, in_rest_, reading);
+  return set_events(set_->awaited_, in_awaited_, (is_set ? 0 : in_awaited_ & reading) | writing) && is_set;
 }
 
 bool PollSet::Socket::set_events(const Lane& lane, std::uint32_t& present, std::uint32_t wanted) {

@@ -1,10 +1,10 @@
 // Many sockets behind one descriptor of the loop: an epoll of their own, so that a fleet that talks wakes the loop 500
 // times a second at most, and takes a few microseconds of it at a time.
 //
-//   sockets ─┬─ epoll of all ──────── looked at every 2 ms at most ─── a few sockets, then everybody else's turn
+//   sockets ─┬─ epoll of the rest ─── looked at every 2 ms at most ─── a few sockets, then everybody else's turn
 //            └─ epoll of the awaited ── looked at when something comes ── likewise
 //
-// In the second are sockets from which an answer is expected, and those to which somebody waits to write. Loop thread.
+// In the second are sockets from which an answer is expected, or to which somebody waits to write. Loop thread.
 // When the set is gone its sockets wait for nothing any more.
 #pragma once
 
@@ -27,7 +27,7 @@ namespace server {
 class PollSet {
  public:
   static constexpr int kAtOnce = 8;                         // sockets, between two looks of the loop at everything else
-  static constexpr std::chrono::microseconds kPause{2000};  // from one look at all sockets to the next
+  static constexpr std::chrono::microseconds kPause{2000};  // from one look at the rest to the next
 
   PollSet(boost::asio::io_context& loop, Clock& clock);
   ~PollSet();  // whoever still waits is let go by the loop
@@ -60,7 +60,7 @@ class PollSet {
 
   boost::asio::io_context& loop_;
   Clock& clock_;
-  Lane all_, awaited_;
+  Lane rest_, awaited_;
   std::unordered_set<Socket*> sockets_;
 };
 
@@ -95,7 +95,7 @@ class PollSet::Socket {
   boost::asio::io_context& loop_;
   PollSet* set_;  // null when it is gone
   int descriptor_;
-  std::uint32_t in_all_ = 0, in_awaited_ = 0;  // the events that each epoll looks for; 0: it is not there
+  std::uint32_t in_rest_ = 0, in_awaited_ = 0;  // the events that each epoll looks for; 0: it is not there
   bool is_awaited_ = false;
   std::function<void()> reader_;
   Waiter writer_;

@@ -75,6 +75,7 @@ void BootRecording::load(StoredBoot stored) {
   durable_next_seq_ = received_.first_hole();
   durable_next_event_seq_ = received_events_.first_hole();
   next_seq_ = stored.next_seq;
+  next_event_seq_ = stored.next_event_seq;
   last_robot_time_us_ = stored.last_robot_time_us;
   connected_at_us_ = stored.connected_at_us;
 }

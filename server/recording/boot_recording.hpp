@@ -89,6 +89,7 @@ class BootRecording {
 
   std::uint64_t next_seq() const { return next_seq_; }
   std::uint64_t next_event_seq() const { return next_event_seq_; }
+  std::int64_t connected_at_us() const { return connected_at_us_; }  // UTC, the latest time; 0: never
   std::uint64_t durable_next_seq() const { return durable_next_seq_; }
   std::uint64_t durable_next_event_seq() const { return durable_next_event_seq_; }
 

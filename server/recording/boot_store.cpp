@@ -215,11 +215,11 @@ void BootStore::add(const std::vector<NewBoot>& boots) {
   if (boots.empty()) return;
   SQLite::Statement add{database_.handle(),
                         "INSERT INTO boot (boot_key, boot_id, robot_id, reset_cause, firmware_version,"
-                        " sample_period_us, first_seen_at_us, announced_next_seq, last_robot_time_us)"
-                        " VALUES (?,?,?,?,?,?,?,?,?)"};
+                        " sample_period_us, first_seen_at_us, announced_next_seq, announced_next_event_seq,"
+                        " last_robot_time_us) VALUES (?,?,?,?,?,?,?,?,?,?)"};
   for (const auto& [boot_key, hello] : boots) {
     execute(add, boot_key, hello.boot_id, hello.robot_id, protocol::text(hello.reset_cause), hello.firmware_version,
-            hello.sample_period_us, hello.received_at_us, hello.next_seq, hello.robot_time_us);
+            hello.sample_period_us, hello.received_at_us, hello.next_seq, hello.next_event_seq, hello.robot_time_us);
   }
   SQLite::Statement advance{database_.handle(),
                             "INSERT INTO meta (name, value) VALUES ('next_boot_key', ?)"
@@ -234,7 +234,7 @@ StoredBoot BootStore::load(std::int64_t boot_key) {
   SQLite::Database& handle = database_.handle();
   SQLite::Statement query{handle,
                           "SELECT announced_next_seq, last_robot_time_us, durable_next_seq, durable_next_event_seq,"
-                          " coalesce(connected_at_us, 0) FROM boot WHERE boot_key = ?"};
+                          " coalesce(connected_at_us, 0), announced_next_event_seq FROM boot WHERE boot_key = ?"};
   bind_all(query, boot_key);
   query.executeStep();
   const std::uint64_t next_seq = unsigned_id(query.getColumn(2));
@@ -251,6 +251,7 @@ StoredBoot BootStore::load(std::int64_t boot_key) {
                 "SELECT first_event_seq, last_event_seq FROM event_gap WHERE boot_key = ? AND first_event_seq >= ?",
                 boot_key, next_event_seq, boot.events);
   boot.next_seq = std::max(unsigned_id(query.getColumn(0)), boot.samples.end());
+  boot.next_event_seq = std::max(unsigned_id(query.getColumn(5)), boot.events.end());
   boot.last_robot_time_us = unsigned_id(query.getColumn(1));
   boot.connected_at_us = query.getColumn(4).getInt64();
   return boot;
@@ -279,8 +280,10 @@ void BootStore::start(const BootStart& start) {
   SQLite::Statement update{
       handle,
       "UPDATE boot SET ended_next_seq = NULL, connected_at_us = ?, announced_next_seq = max(announced_next_seq, ?),"
+      " announced_next_event_seq = max(announced_next_event_seq, ?),"
       " last_robot_time_us = max(last_robot_time_us, ?) WHERE boot_key = ?"};
-  execute(update, start.noticed_at_us, start.announced_next_seq, start.robot_time_us, start.boot_key);
+  execute(update, start.noticed_at_us, start.announced_next_seq, start.announced_next_event_seq, start.robot_time_us,
+          start.boot_key);
 }
 
 void BootStore::end(std::int64_t boot_key, std::int64_t noticed_at_us) {
@@ -293,8 +296,16 @@ void BootStore::end(std::int64_t boot_key, std::int64_t noticed_at_us) {
   for (const Interval& lost : boot.samples.missing({0, boot.next_seq})) {
     execute(add_gap, boot_key, lost.first, lost.next - 1, cause, noticed_at_us);
   }
-  SQLite::Statement mark{handle, "UPDATE boot SET ended_next_seq = ?1, durable_next_seq = ?1 WHERE boot_key = ?2"};
-  execute(mark, boot.next_seq, boot_key);
+  SQLite::Statement add_event_gap{handle,
+                                  "INSERT INTO event_gap (boot_key, first_event_seq, last_event_seq, cause,"
+                                  " noticed_at_us) VALUES (?, ?, ?, ?, ?)"};
+  for (const Interval& lost : boot.events.missing({0, boot.next_event_seq})) {
+    execute(add_event_gap, boot_key, lost.first, lost.next - 1, cause, noticed_at_us);
+  }
+  SQLite::Statement mark{handle,
+                         "UPDATE boot SET ended_next_seq = ?1, durable_next_seq = ?1, durable_next_event_seq = ?2"
+                         " WHERE boot_key = ?3"};
+  execute(mark, boot.next_seq, boot.next_event_seq, boot_key);
   SQLite::Statement drop_empty{handle,
                                "DELETE FROM run_span WHERE boot_key = ? AND last_seq IS NULL AND first_seq >= ?"};
   execute(drop_empty, boot_key, boot.next_seq);

@@ -22,7 +22,8 @@ struct StoredBoot {
   std::int64_t key = 0;
   IntervalSet samples;  // stored or known lost
   IntervalSet events;
-  std::uint64_t next_seq = 0;  // every sample below was made
+  std::uint64_t next_seq = 0;        // every sample below was made
+  std::uint64_t next_event_seq = 0;  // every event below was made
   std::uint64_t last_robot_time_us = 0;
   std::int64_t connected_at_us = 0;  // UTC, the latest time; 0: never
 };
@@ -58,6 +59,7 @@ struct BootStart {
   RobotId robot_id;
   std::int64_t boot_key = 0;
   std::uint64_t announced_next_seq = 0;
+  std::uint64_t announced_next_event_seq = 0;
   std::uint64_t robot_time_us = 0;
   std::int64_t noticed_at_us = 0;  // UTC
 };

@@ -159,10 +159,13 @@ void Recorder::on_robot(const RobotState& robot) {
     const AdmissionRequest hello = *std::exchange(boot.hello, {});
     boot.recording.connect(hello, restored_at_us_);
     replace_others(robot.id, robot.boot_id);
-    std::erase_if(starts_, [&](const WaitingStart& waiting) { return waiting.start.boot_key == boot.recording.key(); });
+    boot.starts_waiting -= std::erase_if(
+        starts_, [&](const WaitingStart& waiting) { return waiting.start.boot_key == boot.recording.key(); });
+    ++boot.starts_waiting;
     starts_.push_back({{.robot_id = hello.robot_id,
                         .boot_key = boot.recording.key(),
                         .announced_next_seq = hello.next_seq,
+                        .announced_next_event_seq = hello.next_event_seq,
                         .robot_time_us = hello.robot_time_us,
                         .noticed_at_us = hello.received_at_us},
                        lined_up_});
@@ -171,17 +174,19 @@ void Recorder::on_robot(const RobotState& robot) {
   watch(*found);
 }
 
+// Those that have ever connected, as BootStore::start() ends them in the database.
 void Recorder::replace_others(const RobotId& robot_id, BootId boot_id) {
   const auto [begin, end] = by_robot_.equal_range(robot_id);
   for (auto of_robot = begin; of_robot != end; ++of_robot) {
     BootEntry& entry = *of_robot->second;
     Boot& other = entry.second;
-    if (entry.first == boot_id || !other.started) continue;
+    if (entry.first == boot_id || other.recording.connected_at_us() == 0) continue;
+    const char* cause = other.recording.connected_at_us() < restored_at_us_ ? "restore" : "reboot";
     other.connected = false;
     replaced_boots_ += other.replaced ? 0 : 1;
     other.replaced = true;
-    other.recording.give_up_below(other.recording.next_seq(), "reboot", clock_.utc_us());
-    other.recording.give_up_events_below(other.recording.next_event_seq(), "reboot", clock_.utc_us());
+    other.recording.give_up_below(other.recording.next_seq(), cause, clock_.utc_us());
+    other.recording.give_up_events_below(other.recording.next_event_seq(), cause, clock_.utc_us());
     line_up(entry, true);
     watch(entry);
   }

@@ -166,12 +166,13 @@ class Recorder final : public StationSink, public RobotArchive {
     std::int64_t last_used_us = 0;          // steady time of the last admission
     std::optional<AdmissionRequest> hello;  // admitted, and not connected since
 
-    bool is_due = false;       // is in due_
-    bool is_ageing = false;    // is in ageing_
-    bool has_records = false;  // is in with_records_
-    bool has_hole = false;     // is in with_holes_
-    bool is_written = false;   // is in writing_boots_
-    std::size_t in_line = 0;   // its segments in line_
+    bool is_due = false;             // is in due_
+    bool is_ageing = false;          // is in ageing_
+    bool has_records = false;        // is in with_records_
+    bool has_hole = false;           // is in with_holes_
+    bool is_written = false;         // is in writing_boots_
+    std::size_t in_line = 0;         // its segments in line_
+    std::size_t starts_waiting = 0;  // in starts_ or writing_.boots
   };
   using Boots = std::unordered_map<BootId, Boot>;  // an entry stays where it is
   using BootEntry = Boots::value_type;
@@ -250,6 +251,7 @@ class Recorder final : public StationSink, public RobotArchive {
   boost::asio::awaitable<void> ask_for_missing();
   void forget_unused();
   bool is_unused(const Boot& boot) const;
+  bool another_starts(const AdmissionRequest& request, std::int64_t since_us) const;
   Admission take_in(BootEntry& entry, AdmissionOutcome outcome, const AdmissionRequest& request);
   void add_boot(BootEntry& entry, StoredBoot stored, const AdmissionRequest& request);
   void replace_others(const RobotId& robot_id, BootId boot_id);

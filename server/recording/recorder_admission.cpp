@@ -17,6 +17,8 @@ namespace {
 constexpr microseconds kKeepUnused = 60s;  // a boot's bookkeeping, after its last admission
 constexpr microseconds kForgetInterval = 10s;
 
+constexpr auto kAnotherConnected = "another boot of this robot has just connected; try again";
+
 Admission refused(protocol::RefusalReason reason, std::string detail) {
   Admission admission;
   admission.refusal = reason;
@@ -39,11 +41,27 @@ asio::awaitable<Admission> Recorder::admit(AdmissionRequest request) {
   std::optional<RobotId> owner;
   if (entry.second.recording.loaded()) owner = entry.second.recording.robot_id();
   AdmissionQuestion question{request, std::move(owner)};
+  const std::int64_t asked_us = clock_.steady_us();
+  bool is_ending = another_starts(request, asked_us);
   AdmissionOutcome outcome = co_await ask(std::move(question));
-  Admission admission = take_in(entry, std::move(outcome), request);
+  is_ending = is_ending || another_starts(request, asked_us);
+  const bool is_stored = outcome.boot.key != 0;
+  Admission admission = is_stored && is_ending ? refused(rheonaut_REFUSAL_REASON_STATION_BUSY, kAnotherConnected)
+                                               : take_in(entry, std::move(outcome), request);
   const bool was_known = entry.second.recording.loaded() || entry.second.admissions > 1;
   forget_at_once_ = forget_at_once_ || !was_known;  // who is refused leaves nothing behind
   co_return admission;
+}
+
+// Another boot of this robot has connected, and that was not stored at that time: what was read of any other boot
+// since, may be what it was before it ended.
+bool Recorder::another_starts(const AdmissionRequest& request, std::int64_t since_us) const {
+  const auto [begin, end] = by_robot_.equal_range(request.robot_id);
+  return std::any_of(begin, end, [&](const auto& of_robot) {
+    const auto& [boot_id, boot] = *of_robot.second;
+    const bool has_just = boot.started && boot.last_used_us >= since_us;
+    return boot_id != request.boot_id && (boot.starts_waiting > 0 || has_just);
+  });
 }
 
 // Those who asked while the disk was busy are answered together: a thousand new robots are not a thousand commits. One
@@ -92,7 +110,7 @@ Admission Recorder::take_in(BootEntry& entry, AdmissionOutcome outcome, const Ad
                  request.token.empty() ? "without" : "with");
   }
   if (boot.replaced) {
-    return refused(rheonaut_REFUSAL_REASON_STATION_BUSY, "another boot of this robot has just connected; try again");
+    return refused(rheonaut_REFUSAL_REASON_STATION_BUSY, kAnotherConnected);
   }
   if (!boot.recording.loaded()) {
     if (outcome.boot.key == 0 && queue_.new_boots.size() >= options_.max_queued_records) {
@@ -135,7 +153,8 @@ void Recorder::add_boot(BootEntry& entry, StoredBoot stored, const AdmissionRequ
 bool Recorder::is_unused(const Boot& boot) const {
   const bool long_ago =
       boot.replaced || !boot.recording.loaded() || clock_.steady_us() - boot.last_used_us > kKeepUnused.count();
-  const bool is_listed = boot.is_due || boot.is_ageing || boot.has_records || boot.has_hole || boot.is_written;
+  const bool is_listed =
+      boot.is_due || boot.is_ageing || boot.has_records || boot.has_hole || boot.is_written || boot.starts_waiting > 0;
   return !boot.connected && boot.admissions == 0 && long_ago && !is_listed && boot.in_line == 0;
 }
 

@@ -141,6 +141,7 @@ asio::awaitable<void> Recorder::write() {
   retry_at_us_ = 0;
   problem_.clear();
   WriteBatch written = std::exchange(writing_, {});
+  for (const BootStart& start : written.boots) --by_key_.at(start.boot_key)->second.starts_waiting;
   count_written(written);
   co_await tell_durable(std::move(written.progress));
 }

@@ -18,5 +18,6 @@ extern const char* const kSecondSchema;
 extern const char* const kThirdSchema;
 extern const char* const kFourthSchema;
 extern const char* const kFifthSchema;
+extern const char* const kSixthSchema;
 
 }  // namespace server

@@ -340,6 +340,31 @@ TEST_F(HttpServerTest, CsvIsChunkedOrEndsWithTheConnection) {
       "GET /api/v1/runs/1/samples.csv HTTP/1.0\r\nHost: localhost\r\nAuthorization: Bearer " + token() + "\r\n\r\n");
   EXPECT_FALSE(says(plain, "Transfer-Encoding"));
   EXPECT_TRUE(says(plain.substr(plain.size() - 200), "Z,4999,0,0,0,0,0,manual,none,,0,"));
+  const std::string head_only = talk(head("HEAD /api/v1/runs/1/samples.csv", "Connection: close\r\n"));
+  EXPECT_TRUE(head_only.starts_with("HTTP/1.1 200 ")) << head_only;
+  EXPECT_TRUE(head_only.ends_with("\r\n\r\n")) << head_only;
+}
+
+// Whatever an answer has of a body, the next one begins where it ends.
+TEST_F(HttpServerTest, AnswersOfAllKindsFollowOneAnother) {
+  connect_robot();
+  ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "short"}});
+  make_samples(*robot, 0, 25);
+  const std::string file = get("/api/v1/openapi.yaml");
+  const auto begin = file.find("ETag: ") + 6;
+  const std::string etag = file.substr(begin, file.find("\r\n", begin) - begin);
+  RawClient client{clock, api->port()};
+  client.send(head("HEAD /api/v1/runs/1/samples.csv") + head("GET /api/v1/runs/1/samples.csv") +
+              head("GET /api/v1/openapi.yaml", "If-None-Match: " + etag + "\r\n") + head("GET /live") +
+              head("GET /api/v1/robots", "Connection: close\r\n"));
+  const std::string said = client.read_to_end();
+  std::vector<std::string> statuses;
+  for (auto at = said.find("HTTP/1.1 "); at != std::string::npos; at = said.find("HTTP/1.1 ", at + 1)) {
+    const bool after_the_one_before = at == 0 || said[at - 1] == '\n' || said[at - 1] == '}';
+    EXPECT_TRUE(after_the_one_before) << said.substr(at - 1, 40);
+    statuses.push_back(said.substr(at + 9, 3));
+  }
+  EXPECT_EQ(statuses, (std::vector<std::string>{"200", "200", "304", "426", "200"})) << said;
 }
 
 TEST_F(HttpServerTest, SilentConnectionsDoNotKeepAStopOut) {

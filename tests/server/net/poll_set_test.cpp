@@ -197,6 +197,24 @@ TEST_F(PollSetTest, WhoIsNoLongerAwaitedWaitsAgain) {
   EXPECT_TRUE(heard.empty());
 }
 
+// What had come before, unread.
+TEST_F(PollSetTest, WhatHasComeIsReadWhereverItsSocketGoes) {
+  add_lines(2);
+  all_say();
+  clock.settle();
+  heard.clear();
+  all_say();
+  lines[0]->socket().set_awaited(true);
+  clock.settle();
+  EXPECT_EQ(heard, std::vector<int>{0});
+  lines[0]->say('x');
+  lines[0]->socket().set_awaited(false);
+  clock.settle();
+  EXPECT_EQ(heard, std::vector<int>{0});
+  clock.run_for(PollSet::kPause);
+  EXPECT_EQ(heard.size(), 3U);
+}
+
 TEST_F(PollSetTest, AnEventThatNobodyWatchesDoesNotKeepTheLoopBusy) {
   add_lines(2);
   lines[0]->socket().set_awaited(true);

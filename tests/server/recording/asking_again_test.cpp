@@ -66,6 +66,82 @@ TEST_F(AskingAgainTest, EventsThatARebootTookAreListed) {
   EXPECT_EQ(event_gaps(), (Rows{"nemo|1|2|reboot", "nemo|4|4|reboot"}));
 }
 
+TEST_F(AskingAgainTest, EventsThatARebootTookWhileTheStationWasDownAreListed) {
+  robot_.next_event_seq = 5;
+  start();
+  connect(robot_);
+  send_event(robot_, 0);
+  send_event(robot_, 3);
+  flush();
+  stop();
+  start();
+  TestRobot rebooted = robot_;
+  rebooted.boot_id = 99;
+  rebooted.next_event_seq = 0;
+  connect(rebooted);
+  flush();
+  EXPECT_EQ(event_gaps(), (Rows{"nemo|1|2|reboot", "nemo|4|4|reboot"}));
+  EXPECT_EQ(rows("SELECT durable_next_event_seq FROM boot WHERE ended_next_seq IS NOT NULL"), Rows{"5"});
+}
+
+// A boot that the station has read from the disk again, without connecting with it, ends with the next one all the
+// same.
+TEST_F(AskingAgainTest, ABootThatWasReadAgainAndOvertakenEndsOnce) {
+  robot_.next_event_seq = 5;
+  start();
+  connect(robot_);
+  send(robot_, 10, 10);
+  robot_.next_seq = 20;
+  send_event(robot_, 0);
+  flush();
+  stop();
+  start();
+  ASSERT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_NONE);  // its connection was not to be
+  TestRobot second = robot_;
+  second.boot_id = 99;
+  second.next_seq = second.next_event_seq = 0;
+  connect(second);
+  EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_STATION_BUSY);
+  flush();
+  clock_.run_for(1s);
+  robot_.next_event_seq = 7;
+  connect(robot_);
+  for (std::uint64_t seq = 0; seq < 6; ++seq) send_event(robot_, seq);
+  send(robot_, 0, 20);
+  flush();
+  TestRobot third = second;
+  third.boot_id = 100;
+  connect(third);
+  flush();
+  EXPECT_FALSE(recorder_->failing()) << recorder_->problem();
+  EXPECT_EQ(event_gaps(), (Rows{"nemo|1|4|reboot", "nemo|6|6|reboot"}));
+  EXPECT_EQ(rows("SELECT event_seq FROM event WHERE event_seq IS NOT NULL ORDER BY event_row"), (Rows{"0", "5"}));
+  EXPECT_EQ(rows("SELECT first_seq, last_seq FROM gap ORDER BY first_seq"), Rows{"0|9"});
+  EXPECT_EQ(number("SELECT count(*) FROM sample"), 10);
+}
+
+// What the disk says of a boot while it ends there, may be what it was before.
+TEST_F(AskingAgainTest, ABootIsNotReadWhileAnotherOneTakesItsPlace) {
+  robot_.next_event_seq = 5;
+  start();
+  connect(robot_);
+  flush();
+  stop();
+  start();
+  TestRobot second = robot_;
+  second.boot_id = 99;
+  second.next_seq = second.next_event_seq = 0;
+  connect(second);
+  EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_STATION_BUSY);
+  flush();
+  clock_.run_for(1s);
+  connect(robot_);
+  for (std::uint64_t seq = 0; seq < 5; ++seq) send_event(robot_, seq);
+  flush();
+  EXPECT_EQ(event_gaps(), Rows{"nemo|0|4|reboot"});
+  EXPECT_EQ(number("SELECT count(*) FROM event WHERE event_seq IS NOT NULL"), 0);
+}
+
 // As samples are: the robot lost them, because the station had refused them.
 TEST_F(AskingAgainTest, RefusedEventsThatAreLostLaterAreOfTheFullQueue) {
   RecorderOptions options;
