@@ -11,7 +11,6 @@
 #include <boost/system/system_error.hpp>
 #include <cerrno>
 #include <new>
-#include <optional>
 #include <utility>
 
 namespace server {
@@ -47,26 +46,34 @@ struct PollSet::Loan {
   error_code error;  // for want of memory
 };
 
-// When a look has found more than one there will be more after the pause: nothing else needs to wake the loop then.
 asio::awaitable<void> PollSet::run() {
-  std::optional<Loan> loan;
-  std::int64_t due_us = 0;
   for (;;) {
-    if (clock_.steady_us() < due_us) {
-      loan.reset();  // nobody is to be woken for what comes in the pause
-      co_await clock_.sleep_until(due_us);
-    }
-    const std::int64_t looked_at_us = clock_.steady_us();
-    const std::size_t found = co_await work_off(rest_);
-    due_us = found > 0 ? looked_at_us + kPause.count() : 0;
-    if (found > 1) continue;
-    if (!loan) loan.emplace(loop_, rest_);
-    if (loan->error) {
-      loan.reset();
-      co_await clock_.sleep_for(kPause);
-    } else {
-      co_await loan->ready();
-    }
+    co_await look_when_woken();
+    co_await look_at_intervals();
+  }
+}
+
+// Until two have spoken within a pause. To lend the epoll takes as long as it has sockets, so it is not done often.
+asio::awaitable<void> PollSet::look_when_woken() {
+  Loan loan{loop_, all_};
+  if (loan.error) co_return;
+  for (std::int64_t heard_at_us = 0;;) {
+    co_await loan.ready();
+    const std::int64_t now_us = clock_.steady_us();
+    const std::size_t found = co_await work_off(all_);
+    if (found > 1 || (found == 1 && now_us - heard_at_us < kPause.count())) co_return;
+    if (found == 1) heard_at_us = now_us;
+  }
+}
+
+// Until it has been quiet for a while.
+asio::awaitable<void> PollSet::look_at_intervals() {
+  std::int64_t due_us = clock_.steady_us() + kPause.count();
+  for (int quiet_looks = 0; quiet_looks < kQuietLooks;) {
+    co_await clock_.sleep_until(due_us);
+    due_us = clock_.steady_us() + kPause.count();
+    const std::size_t found = co_await work_off(all_);
+    quiet_looks = found > 1 ? 0 : quiet_looks + 1;
   }
 }
 
@@ -101,7 +108,7 @@ std::size_t PollSet::look(Lane& lane) {
 }
 
 void PollSet::forget(const Socket& socket) {
-  for (Lane* lane : {&rest_, &awaited_}) {
+  for (Lane* lane : {&all_, &awaited_}) {
     for (epoll_event& event : lane->ready) {
       if (event.data.ptr == &socket) event.data.ptr = nullptr;
     }
@@ -138,7 +145,7 @@ asio::awaitable<void> PollSet::Socket::writable() {
 void PollSet::Socket::set_awaited(bool awaited) {
   if (awaited == is_awaited_) return;
   is_awaited_ = awaited;
-  update();  // if that fails, for want of memory, it is read where it was
+  update();
 }
 
 void PollSet::Socket::end_wait(error_code error) {
@@ -154,28 +161,28 @@ void PollSet::Socket::on_ready(std::uint32_t events) {
   if (reader_ && (events & (EPOLLIN | kEnd)) != 0) reader_();
 }
 
-// Both epolls look for exactly what somebody waits for: whatever they tell of besides would be told again and again. A
-// socket is read in one of them, since ready in both it would wake the loop twice; it leaves that one only when it is
-// in the other, so that for want of memory it is read in the wrong one rather than in none.
+// An awaited socket stays in the epoll of all, with an empty mask: ready in both it would wake the loop twice, and to
+// fill a mask cannot fail, so what is no longer awaited, or for want of memory never was, is read with the others.
+// Where nobody reads or waits to write it is in none: an epoll tells of the end of a connection whatever the mask,
+// again and again.
 bool PollSet::Socket::update() {
   if (set_ == nullptr) return !reader_ && !writer_;
   const std::uint32_t reading = reader_ ? EPOLLIN : 0, writing = writer_ ? EPOLLOUT : 0;
-  if (is_awaited_) {
-    const bool is_set = set_events(set_->awaited_, in_awaited_, reading | writing);
-    return set_events(set_->rest_, in_rest_, is_set ? 0 : reading) && is_set;
-  }
-  const bool is_set = set_events(set_->rest_, in_rest_, reading);
-  return set_events(set_->awaited_, in_awaited_, (is_set ? 0 : in_awaited_ & reading) | writing) && is_set;
+  const std::uint32_t at_once = (is_awaited_ ? reading : 0) | writing;
+  const bool is_set = set_events(set_->awaited_, in_awaited_, at_once != 0, at_once);
+  const bool is_read_there = is_awaited_ && is_set;
+  return set_events(set_->all_, in_all_, reading != 0, is_read_there ? 0 : reading) && is_set;
 }
 
-bool PollSet::Socket::set_events(const Lane& lane, std::uint32_t& present, std::uint32_t wanted) {
-  if (present == wanted) return true;
+bool PollSet::Socket::set_events(const Lane& lane, std::optional<std::uint32_t>& present, bool is_wanted,
+                                 std::uint32_t wanted) {
+  if (is_wanted ? present == wanted : !present) return true;
   epoll_event event{};
   event.events = wanted;
   event.data.ptr = this;
-  const int operation = present == 0 ? EPOLL_CTL_ADD : wanted == 0 ? EPOLL_CTL_DEL : EPOLL_CTL_MOD;
+  const int operation = !is_wanted ? EPOLL_CTL_DEL : present ? EPOLL_CTL_MOD : EPOLL_CTL_ADD;
   if (::epoll_ctl(lane.epoll, operation, descriptor_, &event) != 0) return false;
-  present = wanted;
+  present = is_wanted ? std::optional{wanted} : std::nullopt;
   return true;
 }
 

@@ -1,11 +1,12 @@
 // Many sockets behind one descriptor of the loop: an epoll of their own, so that a fleet that talks wakes the loop 500
 // times a second at most, and takes a few microseconds of it at a time.
 //
-//   sockets ─┬─ epoll of the rest ─── looked at every 2 ms at most ─── a few sockets, then everybody else's turn
+//   sockets ─┬─ epoll of all ──────── looked at every 2 ms ─────────── a few sockets, then everybody else's turn
 //            └─ epoll of the awaited ── looked at when something comes ── likewise
 //
-// In the second are sockets from which an answer is expected, or to which somebody waits to write. Loop thread.
-// When the set is gone its sockets wait for nothing any more.
+// The second is for sockets from which an answer is expected, and those to which somebody waits to write. When hardly
+// anybody speaks, the first is looked at when something comes, too. Loop thread. When the set is gone its sockets wait
+// for nothing any more.
 #pragma once
 
 #include <sys/epoll.h>
@@ -18,6 +19,7 @@
 #include <boost/system/error_code.hpp>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <unordered_set>
 
 #include "server/clock.hpp"
@@ -27,7 +29,8 @@ namespace server {
 class PollSet {
  public:
   static constexpr int kAtOnce = 8;                         // sockets, between two looks of the loop at everything else
-  static constexpr std::chrono::microseconds kPause{2000};  // from one look at the rest to the next
+  static constexpr std::chrono::microseconds kPause{2000};  // from one look at all sockets to the next
+  static constexpr int kQuietLooks = 5;                     // with one ready at most, until the loop is woken instead
 
   PollSet(boost::asio::io_context& loop, Clock& clock);
   ~PollSet();  // whoever still waits is let go by the loop
@@ -54,13 +57,15 @@ class PollSet {
 
   struct Loan;
 
+  boost::asio::awaitable<void> look_at_intervals();
+  boost::asio::awaitable<void> look_when_woken();
   boost::asio::awaitable<std::size_t> work_off(Lane& lane);
   std::size_t look(Lane& lane);
   void forget(const Socket& socket);
 
   boost::asio::io_context& loop_;
   Clock& clock_;
-  Lane rest_, awaited_;
+  Lane all_, awaited_;
   std::unordered_set<Socket*> sockets_;
 };
 
@@ -90,12 +95,12 @@ class PollSet::Socket {
   void end_wait(boost::system::error_code error);
   void on_ready(std::uint32_t events);
   bool update();
-  bool set_events(const Lane& lane, std::uint32_t& present, std::uint32_t wanted);
+  bool set_events(const Lane& lane, std::optional<std::uint32_t>& present, bool is_wanted, std::uint32_t wanted);
 
   boost::asio::io_context& loop_;
   PollSet* set_;  // null when it is gone
   int descriptor_;
-  std::uint32_t in_rest_ = 0, in_awaited_ = 0;  // the events that each epoll looks for; 0: it is not there
+  std::optional<std::uint32_t> in_all_, in_awaited_;  // the events that each epoll looks for, where it is there
   bool is_awaited_ = false;
   std::function<void()> reader_;
   Waiter writer_;

@@ -141,6 +141,26 @@ TEST_F(PollSetTest, AFleetIsLookedAtOncePerPause) {
   EXPECT_EQ(heard.size(), 7U) << "after a silence at once again";
 }
 
+TEST_F(PollSetTest, TwoWithinAPauseAreAFleetUntilItHasBeenQuiet) {
+  add_lines(2);
+  lines[0]->say('x');
+  clock.settle();
+  clock.run_for(1ms);
+  lines[1]->say('x');
+  clock.settle();
+  EXPECT_EQ(heard, (std::vector<int>{0, 1}));
+  for (std::size_t looks = 1; looks <= PollSet::kQuietLooks; ++looks) {
+    lines[0]->say('x');
+    clock.settle();
+    EXPECT_EQ(heard.size(), 1 + looks);
+    clock.run_for(PollSet::kPause);
+    EXPECT_EQ(heard.size(), 2 + looks);
+  }
+  lines[0]->say('x');
+  clock.settle();
+  EXPECT_EQ(heard.size(), 3U + PollSet::kQuietLooks);
+}
+
 TEST_F(PollSetTest, EverybodyElseHasATurnAfterAFew) {
   add_lines(10 * PollSet::kAtOnce);
   all_say();
