@@ -107,7 +107,7 @@ json to_json(const RobotState& robot) {
 }
 
 json to_json(const CommandRecord& record) {
-  json arguments = json::parse(record.arguments, nullptr, false);
+  json arguments = record.arguments.empty() ? json::object() : json::parse(record.arguments, nullptr, false);
   json out;
   out["command_id"] = std::to_string(record.id);
   out["robot_id"] = record.robot_id;

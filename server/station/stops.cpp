@@ -1,8 +1,9 @@
 // The lane of emergency stops: ahead of everything, kept until a robot has obeyed, repeated while it has not.
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <fmt/format.h>
 #include <algorithm>
+#include <boost/asio/post.hpp>
 #include <set>
 
 #include "server/station/seat.hpp"
@@ -27,9 +28,14 @@ asio::awaitable<Result<CommandRecord>> Station::emergency_stop(StopRequest reque
     co_return std::unexpected{std::move(error)};
   }
   const auto stop = begin_stop(seat->second, request);
-  spdlog::warn("emergency stop of robot '{}' by {}{}", request.robot_id, request.actor,
-               seat->second.port == nullptr ? "; kept until it returns" : "");
-  co_return co_await follow(stop, false, patience);
+  const bool is_connected = seat->second.port != nullptr;
+  auto outcome = co_await follow(stop, false, patience);
+  // The log can wait: it is written once the answer has gone.
+  asio::post(loop_, [request = std::move(request), record = *outcome, is_connected] {
+    const char* state = is_connected ? text(record.state) : "kept until it returns";
+    spdlog::warn("emergency stop of robot '{}' by {}: {}", request.robot_id, request.actor, state);
+  });
+  co_return outcome;
 }
 
 asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds patience) {
