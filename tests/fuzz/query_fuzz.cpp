@@ -13,6 +13,8 @@ namespace server {
 namespace {
 
 constexpr std::int64_t kMaximum = 10'000;
+constexpr std::int64_t kMinGridUs = 100;  // as routes_exports.cpp has it
+constexpr std::int64_t kMaxGridUs = 3'600'000'000;
 
 void require(bool condition) {
   if (!condition) std::abort();
@@ -68,6 +70,12 @@ Answer answer(Request request) {
   const auto before = query_number(request, "before", 1, std::numeric_limits<std::int64_t>::max(), 0);
   if (!before) co_return problem(before.error());
   require(*before >= 0);
+  const auto points = query_number(request, "points", 1, kMaximum, 2000);
+  if (!points) co_return problem(points.error());
+  require(*points >= 1 && *points <= kMaximum);
+  const auto grid_us = query_number(request, "grid_us", kMinGridUs, kMaxGridUs, 0);
+  if (!grid_us) co_return problem(grid_us.error());
+  require(*grid_us == 0 || (*grid_us >= kMinGridUs && *grid_us <= kMaxGridUs));
   if (request.param.contains("run_id")) {
     const auto run_id = run_id_of(request);
     if (!run_id) co_return problem(run_id.error());
@@ -92,7 +100,9 @@ void ask(const std::string& target) {
   router.add({"GET", "/api/v1/runs", Scope::anyone, {"limit", "before", "robot_id"}, answer});
   router.add({"POST", "/api/v1/runs", Scope::anyone, {}, answer});
   router.add({"GET", "/api/v1/runs/{run_id}/samples", Scope::anyone, {"limit", "after"}, answer});
-  router.add({"GET", "/api/v1/runs/{run_id}/overview", Scope::anyone, {"from_us", "to_us", "channels"}, answer});
+  router.add(
+      {"GET", "/api/v1/runs/{run_id}/overview", Scope::anyone, {"from_us", "to_us", "points", "channels"}, answer});
+  router.add({"GET", "/api/v1/runs/{run_id}/samples.csv", Scope::anyone, {"channels", "grid_us"}, answer});
   router.set_fallback([](const Request& request) { return json_response(200, {{"page", request.path}}); });
   for (const char* method : {"GET", "HEAD", "POST"}) {
     boost::asio::io_context loop;

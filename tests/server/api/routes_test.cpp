@@ -161,6 +161,24 @@ TEST_F(RoutesTest, StopAllReachesEveryRobotBeforeItWaitsForAny) {
   for (const char* id : {"a-silent-one", "r2"}) EXPECT_TRUE(station.find(id)->pending_stop) << id;
 }
 
+TEST_F(RoutesTest, WhatIsLostAndWhatHasNotComeIsListed) {
+  robot = std::make_unique<TestRobot>(loop, clock, tasks, robots);
+  protocol::RobotFrame hello = TestRobot::hello_frame();
+  hello.body.hello.oldest_seq = 10;
+  hello.body.hello.next_seq = 15;
+  robot->send(hello);
+  ASSERT_TRUE(clock.run_until([&] { return !robot->welcomes().empty(); }, 1s));
+  const json found = ask("GET", "/api/v1/robots/r1/gaps").parsed();
+  ASSERT_EQ(found["gaps"].size(), 1U) << found;
+  const json& gap = found["gaps"][0];
+  EXPECT_EQ(gap["boot_id"], "77");
+  EXPECT_EQ(gap["first_seq"], 0);
+  EXPECT_EQ(gap["last_seq"], 9);
+  EXPECT_EQ(gap["cause"], "ring_overrun");
+  EXPECT_EQ(found["missing"], json::array({{{"boot_id", "77"}, {"first_seq", 10}, {"last_seq", 14}}}));
+  EXPECT_EQ(found["next"], nullptr);
+}
+
 TEST_F(RoutesTest, ARunHoldsWhatWasMadeBetweenItsBeginAndItsEnd) {
   connect_robot();
   make_samples(*robot, 0, 5);

@@ -3,7 +3,9 @@
 #include <cstdio>
 #include <fstream>
 #include <sstream>
+#include <string>
 
+#include "server/recording/schema.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
@@ -25,6 +27,13 @@ std::vector<std::string> documented_queries() {
     }
   }
   return queries;
+}
+
+TEST(DatabaseDocument, NamesTheSchemasVersion) {
+  std::ifstream document{DATABASE_DOCUMENT};
+  const std::string text{std::istreambuf_iterator<char>{document}, {}};
+  const std::string version = "the schema's version, " + std::to_string(migrations().size()) + " at present";
+  EXPECT_NE(text.find(version), std::string::npos) << version;
 }
 
 class DocumentedQueries : public RecordingTest {
