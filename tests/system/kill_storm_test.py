@@ -12,6 +12,7 @@ import os
 import pathlib
 import random
 import shutil
+import sqlite3
 import subprocess
 import sys
 import threading
@@ -119,7 +120,8 @@ class KillStormTest(unittest.TestCase):
         wait_until(has_begun, 30, "a run of a robot that is there")
         self.runs_begun += 1
 
-    def check(self, place, summary):
+    def check(self, place, summary, causes=("ring_overrun",)):
+        """Of samples that are lost for one of these causes only."""
         station = Station(place.data)
         runs = station.get("/api/v1/runs?limit=1000")["runs"]
         for run in runs:
@@ -136,6 +138,8 @@ class KillStormTest(unittest.TestCase):
         self.assertEqual(len(runs), self.runs_begun)
         faults, stored, lost = audit(place.data / "station.sqlite")
         self.assertEqual(faults[:10], [])
+        with contextlib.closing(sqlite3.connect(place.data / "station.sqlite")) as database:
+            self.assertLessEqual({cause for cause, in database.execute("SELECT DISTINCT cause FROM gap")}, set(causes))
         self.assertEqual(summary["samples_unsettled"], 0, summary)
         self.assertLessEqual(lost, summary["samples_lost"], "what no ring gave up is not lost")
         self.assertGreaterEqual(stored + lost, summary["samples_made"] - summary["samples_held"], "nothing is hidden")
@@ -188,7 +192,7 @@ class KillStormTest(unittest.TestCase):
                 self.wait()
                 self.robots.kill()
             self.robots = Robots(ports["robots"])
-            self.check(place, self.robots.end())
+            self.check(place, self.robots.end(), ("ring_overrun", "reboot"))
 
     def test_the_link_is_cut_within_frames(self):
         with lab() as place:

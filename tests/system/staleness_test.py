@@ -91,8 +91,9 @@ class StalenessTest(unittest.TestCase):
         answers = self.stall_and_send(life_ms=10_000)
         self.station.wait_for_robot("sim-1", timeout_s=30)
         states = [self.state_of(answer) for answer in answers]
-        # "superseded": by a newer one, before the link was held for lost.
-        self.assertLessEqual(set(states), {"failed", "not_connected", "superseded"}, states)
+        # "superseded": by a newer one, before the link was held for lost. "rejected": by the robot, which is in manual
+        # when it comes back; that happens where the machine is slow, and the last ones are sent after the stall.
+        self.assertLessEqual(set(states), {"failed", "not_connected", "superseded", "rejected"}, states)
         self.assertIn("not_connected", states, "the link was held for lost within the stall")
         seen = self.robot()["next_seq"]
         wait_until(lambda: self.robot()["next_seq"] > seen + 100, 20, "another second of samples")
