@@ -4,8 +4,9 @@
 //   → the next commit begins the log anew, unless a reader stands in it
 //
 // When the log has grown by half again, a commit waits for a pass that is under way, and the disk thread waits for
-// readers that stand in the log (ours are gone after 250 ms). So it stays below twice checkpoint_bytes; only a foreign
-// program that holds a read transaction makes it longer, which is logged and counted.
+// readers that stand in the log (ours are gone after 250 ms). So it grows no further than by one more commit, and stays
+// below twice checkpoint_bytes; only a foreign program that holds a read transaction makes it longer, which is logged
+// and counted.
 //
 // Loop thread; the work is done on the two workers. Loop, clock and worker outlive it.
 #pragma once

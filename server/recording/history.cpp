@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::size_t kMaxListed = 1000;
 constexpr std::size_t kSliceSegments = 5'000;
+constexpr std::size_t kSliceBoots = 100;
 constexpr std::size_t kWaitingInATurn = 10'000;  // samples, in a turn of the loop
 
 std::int64_t clamped(std::size_t limit) {
@@ -61,10 +62,19 @@ asio::awaitable<Result<std::vector<RecordedSpan>>> History::spans(Excerpt excerp
     co_await add_waiting(span, samples, limit);
   }
   if (!excerpt.window) co_return found;
-  auto cut = [spans = std::move(*found), window = *excerpt.window](SQLite::Database& database) mutable {
-    return cut_to_window(database, std::move(spans), window);
-  };
-  co_return co_await reader_.ask(std::move(cut));
+  co_return co_await in_window(std::move(*found), *excerpt.window);
+}
+
+// In slices, since a robot may have thousands of boots.
+asio::awaitable<std::vector<RecordedSpan>> History::in_window(std::vector<RecordedSpan> spans, TimeWindow window) {
+  std::vector<RecordedSpan> found;
+  for (std::size_t begin = 0; begin < spans.size(); begin += kSliceBoots) {
+    const std::span slice{spans.data() + begin, std::min(kSliceBoots, spans.size() - begin)};
+    auto cut = [slice, window](SQLite::Database& database) { return cut_to_window(database, slice, window); };
+    std::vector<RecordedSpan> some = co_await reader_.ask(std::move(cut));
+    std::ranges::move(some, std::back_inserter(found));
+  }
+  co_return found;
 }
 
 // In turns of the loop, since hours may wait. What is stored between two of them is in the database before it is asked.

@@ -86,6 +86,7 @@ class History {
 
  private:
   boost::asio::awaitable<void> add_waiting(RecordedSpan& span, Interval samples, std::size_t& limit) const;
+  boost::asio::awaitable<std::vector<RecordedSpan>> in_window(std::vector<RecordedSpan> spans, TimeWindow window);
   boost::asio::awaitable<void> add_missing(const RecordedSpan& span, const std::optional<SampleCursor>& after,
                                            std::size_t limit, AbsencePage& page);
 

@@ -1,5 +1,11 @@
-// DELETE by row numbers and by the segments' index; a slice's gap becomes one with that of the slice before it.
+// DELETE by row numbers and by the segments' index; a slice's gap becomes one with that of the slice before it. Pages
+// by incremental vacuum.
 #include "server/recording/purge.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
 
 #include "server/recording/statement.hpp"
 
@@ -7,7 +13,9 @@ namespace server {
 namespace {
 
 constexpr std::size_t kSegmentsASlice = 4;  // about 1 ms
-constexpr int kSlicesAStep = 25;
+constexpr int kSegmentSlicesAStep = 25;
+constexpr int kPagesASlice = 16;
+constexpr int kPageSlicesAStep = 16;  // as many pages as they give back go to the write-ahead log, and others
 
 class RetentionGaps {
  public:
@@ -73,7 +81,7 @@ std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const 
   SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
   RetentionPlan::Step walk{plan, database};
   Purge purge{database};
-  for (int slices = 0; slices < kSlicesAStep && !plan.empty(); ++slices) {
+  for (int slices = 0; slices < kSegmentSlicesAStep && !plan.empty(); ++slices) {
     if (slices > 0 && clock.steady_us() >= end_us) break;
     const std::vector<StoredSegment> going = walk.next(kSegmentsASlice);
     purge.remove(going, utc_us);
@@ -81,6 +89,23 @@ std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const 
   }
   transaction.commit();
   return removed;
+}
+
+std::uint64_t shrink_step(SQLite::Database& database, const Clock& clock) {
+  const auto free_pages = [&database] {
+    return static_cast<std::uint64_t>(database.execAndGet("PRAGMA freelist_count").getInt64());
+  };
+  const std::int64_t end_us = clock.steady_us() + kStepTime.count();
+  SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
+  const std::uint64_t before = free_pages();
+  const std::string slice = fmt::format("PRAGMA incremental_vacuum({})", kPagesASlice);
+  for (int slices = 0; slices < kPageSlicesAStep; ++slices) {
+    if (slices > 0 && clock.steady_us() >= end_us) break;
+    database.exec(slice);
+  }
+  const std::uint64_t after = free_pages();
+  transaction.commit();
+  return before - std::min(before, after);
 }
 
 }  // namespace server

@@ -1,5 +1,5 @@
 // Removes stored segments with their rows, and notes that they were there: each of their samples is in a gap of cause
-// `retention` afterwards, so that it is neither asked for again nor counted as lost.
+// `retention` afterwards, so that it is neither asked for again nor counted as lost. Gives free pages back.
 //
 // On the disk thread.
 #pragma once
@@ -21,5 +21,9 @@ inline constexpr microseconds kStepTime{10'000};
 // the clock between them. A gap of cause `retention` that touches a new one becomes one with it; the others stay as
 // they are. When it throws, the database is as it was, and the plan must not be used any more.
 std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const Clock& clock, std::int64_t utc_us);
+
+// Makes the file shorter by free pages, in slices of a few, with a look at the clock between them. Returns how many; 0
+// when none is left. One transaction.
+std::uint64_t shrink_step(SQLite::Database& database, const Clock& clock);
 
 }  // namespace server

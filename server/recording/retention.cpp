@@ -21,8 +21,6 @@ constexpr microseconds kPauseWhenBehind = 1s;    // while commits are behind, or
 constexpr std::size_t kManyQueued = 500'000;     // samples
 constexpr std::uint64_t kLargeLog = 96'000'000;  // bytes
 constexpr std::int64_t kDayUs = 86'400'000'000;
-constexpr int kPagesASlice = 16;
-constexpr int kSlicesAStep = 16;  // as many pages go to the write-ahead log, and others with them
 // The database is made smaller from this part of its limit on, to that part: so that the file need not grow over it.
 constexpr std::uint64_t kBeginPercent = 95;
 constexpr std::uint64_t kEndPercent = 90;
@@ -49,21 +47,6 @@ Step measured(const Clock& clock, Work work) {
 
 std::uint64_t pragma(SQLite::Database& database, const char* name) {
   return static_cast<std::uint64_t>(database.execAndGet(fmt::format("PRAGMA {}", name)).getInt64());
-}
-
-// Returns how many pages it gave back.
-std::uint64_t shrink_step(SQLite::Database& database, const Clock& clock) {
-  const std::int64_t end_us = clock.steady_us() + kStepTime.count();
-  SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
-  const std::uint64_t before = pragma(database, "freelist_count");
-  const std::string slice = fmt::format("PRAGMA incremental_vacuum({})", kPagesASlice);
-  for (int slices = 0; slices < kSlicesAStep; ++slices) {
-    if (slices > 0 && clock.steady_us() >= end_us) break;
-    database.exec(slice);
-  }
-  const std::uint64_t after = pragma(database, "freelist_count");
-  transaction.commit();
-  return before - std::min(before, after);
 }
 
 }  // namespace

@@ -5,8 +5,7 @@
 
 namespace server {
 
-std::vector<RecordedSpan> cut_to_window(SQLite::Database& database, std::vector<RecordedSpan> spans,
-                                        TimeWindow window) {
+std::vector<RecordedSpan> cut_to_window(SQLite::Database& database, std::span<RecordedSpan> spans, TimeWindow window) {
   std::vector<RecordedSpan> found;
   BootTimes times{database};
   for (RecordedSpan& span : spans) {

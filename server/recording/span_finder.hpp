@@ -10,6 +10,7 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "server/recording/span_reader.hpp"
@@ -23,7 +24,7 @@ struct TimeWindow {
 };
 
 // Cuts the spans to the window and drops those that were not made within it. A span of which nothing is known but its
-// gaps has no time and is dropped, too.
-std::vector<RecordedSpan> cut_to_window(SQLite::Database& database, std::vector<RecordedSpan> spans, TimeWindow window);
+// gaps has no time and is dropped, too. What is found is moved out of `spans`.
+std::vector<RecordedSpan> cut_to_window(SQLite::Database& database, std::span<RecordedSpan> spans, TimeWindow window);
 
 }  // namespace server

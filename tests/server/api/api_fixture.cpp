@@ -27,9 +27,17 @@ asio::awaitable<void> start(RecordingParts& recording, bool& started) {
   co_await recording.open();
   started = true;
 }
+
+RecorderOptions in_folder(RecorderOptions options, const std::filesystem::path& folder) {
+  options.path = folder / "station.sqlite";
+  return options;
+}
+
 }  // namespace
 
-ApiTest::ApiTest(Config of_station) : config{std::move(of_station)} {
+ApiTest::ApiTest(Config of_station, RecorderOptions of_recorder)
+    : config{std::move(of_station)},
+      recording{loop, clock, disk, readers, exports, checkpoints, in_folder(std::move(of_recorder), folder.path())} {
   clock.add_worker(disk);
   clock.add_worker(readers);
   clock.add_worker(checkpoints);

@@ -40,7 +40,7 @@ struct Answered {
 
 class ApiTest : public ::testing::Test {
  public:
-  explicit ApiTest(Config of_station = {});
+  explicit ApiTest(Config of_station = {}, RecorderOptions of_recorder = {});  // the database's path is set here
   ~ApiTest() override;
 
  protected:
@@ -66,8 +66,7 @@ class ApiTest : public ::testing::Test {
   VirtualClock clock{loop};
   TaskGroup tasks{loop};
   Station station{loop, clock, Envelope{}, LinkTimes{}};
-  RecordingParts recording{
-      loop, clock, disk, readers, exports, checkpoints, RecorderOptions{folder.path() / "station.sqlite"}};
+  RecordingParts recording;
   Recorder& recorder{recording.recorder};
   AnalysisService analysis{recording.history, maths};
   LiveFeed live{clock};

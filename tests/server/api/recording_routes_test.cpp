@@ -78,6 +78,43 @@ TEST_F(RecordingRoutesTest, ALockedDatabaseIsFailingUntilItIsFree) {
   EXPECT_EQ(ask("GET", "/api/v1/recording").parsed()["state"], "recording");
 }
 
+class ShortLogTest : public ApiTest {
+ protected:
+  ShortLogTest() : ApiTest{{}, {.path = {}, .checkpoint_bytes = 1 << 17}} {}
+
+  void record(microseconds duration) {
+    for (microseconds passed{0}; passed < duration; passed += 100ms) {
+      make_samples(*robot, next_seq_, 10);
+      next_seq_ += 10;
+      clock.run_for(100ms);
+    }
+  }
+  double held_s() { return ask("GET", "/api/v1/recording").parsed()["wal_held_s"]; }
+  std::string metrics() { return ask("GET", "/metrics").body; }
+
+ private:
+  std::uint64_t next_seq_ = 0;
+};
+
+TEST_F(ShortLogTest, ALogThatAForeignProgramHoldsIsToldUntilItEnds) {
+  connect_robot();
+  record(5s);
+  EXPECT_EQ(held_s(), 0);
+  EXPECT_THAT(metrics(), HasSubstr("\nrheonaut_wal_held 0\n"));
+  {
+    SQLite::Database foreign{(folder.path() / "station.sqlite").string(), SQLite::OPEN_READONLY};
+    foreign.exec("BEGIN");
+    foreign.execAndGet("SELECT count(*) FROM robot").getInt();
+    record(40s);  // with some checkpoints that wait a second for it, in real time
+    EXPECT_GT(held_s(), 25);
+    EXPECT_LT(held_s(), 40);
+    EXPECT_THAT(metrics(), HasSubstr("\nrheonaut_wal_held 1\n"));
+  }
+  record(20s);
+  EXPECT_EQ(held_s(), 0);
+  EXPECT_THAT(metrics(), HasSubstr("\nrheonaut_wal_held 0\n"));
+}
+
 TEST_F(RecordingRoutesTest, MetricsAreTextWithHelpAndTypeAndNeedACredential) {
   connect_robot();
   make_samples(*robot, 0, 20);

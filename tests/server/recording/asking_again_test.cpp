@@ -22,6 +22,13 @@ class AskingAgainTest : public RecordingTest {
     event.kind = "detection";
     recorder_->on_event(RobotState{}, event);
   }
+  // It has made nothing yet.
+  TestRobot rebooted(BootId boot_id) const {
+    TestRobot robot = robot_;
+    robot.boot_id = boot_id;
+    robot.next_seq = robot.next_event_seq = 0;
+    return robot;
+  }
 
   TestRobot robot_;
 };
@@ -97,9 +104,7 @@ TEST_F(AskingAgainTest, ABootThatWasReadAgainAndOvertakenEndsOnce) {
   stop();
   start();
   ASSERT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_NONE);  // its connection was not to be
-  TestRobot second = robot_;
-  second.boot_id = 99;
-  second.next_seq = second.next_event_seq = 0;
+  const TestRobot second = rebooted(99);
   connect(second);
   EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_STATION_BUSY);
   flush();
@@ -109,9 +114,7 @@ TEST_F(AskingAgainTest, ABootThatWasReadAgainAndOvertakenEndsOnce) {
   for (std::uint64_t seq = 0; seq < 6; ++seq) send_event(robot_, seq);
   send(robot_, 0, 20);
   flush();
-  TestRobot third = second;
-  third.boot_id = 100;
-  connect(third);
+  connect(rebooted(100));
   flush();
   EXPECT_FALSE(recorder_->failing()) << recorder_->problem();
   EXPECT_EQ(event_gaps(), (Rows{"nemo|1|4|reboot", "nemo|6|6|reboot"}));
@@ -128,9 +131,7 @@ TEST_F(AskingAgainTest, ABootIsNotReadWhileAnotherOneTakesItsPlace) {
   flush();
   stop();
   start();
-  TestRobot second = robot_;
-  second.boot_id = 99;
-  second.next_seq = second.next_event_seq = 0;
+  const TestRobot second = rebooted(99);
   connect(second);
   EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_STATION_BUSY);
   flush();

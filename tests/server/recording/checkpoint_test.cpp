@@ -2,8 +2,13 @@
 #include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <random>
 #include <sstream>
 
+#include "server/api/csv_export.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
@@ -58,6 +63,35 @@ TEST_F(CheckpointTest, TheLogIsMovedBesideTheCommitsAndBeginsAnew) {
   EXPECT_EQ(rows("PRAGMA integrity_check"), std::vector<std::string>{"ok"});
 }
 
+// Commits wait from half again as much log on, so this is how far the last one may take it: below 128 MB.
+TEST_F(CheckpointTest, TheLargestCommitFitsBetweenHalfAgainAndTwiceTheLog) {
+  start();
+  std::mt19937 random{1};
+  std::vector<TestRobot> robots(1000);
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    robots[i].id = fmt::format("r{}", i);
+    robots[i].boot_id = i + 1;
+    connect(robots[i]);
+    make(robots[i], 1);
+  }
+  clock_.run_for(3s);
+  const std::uint64_t before = recorder_->wal().bytes;
+  for (TestRobot& robot : robots) {
+    SampleBatch batch = robot.batch(robot.next_seq, 200);
+    for (Sample& sample : batch.samples) {
+      for (float* channel : {&sample.position_m, &sample.velocity_m_s, &sample.acceleration_m_s2, &sample.impedance_mv,
+                             &sample.duty, &sample.reference_m}) {
+        *channel = std::uniform_real_distribution<float>{-1, 1}(random);
+      }
+    }
+    send(robot, batch);
+  }
+  flush();
+  EXPECT_GE(recorder_->counters().largest_commit_samples, 150'000U);
+  EXPECT_EQ(number("SELECT count(*) FROM sample"), 201'000);
+  EXPECT_LE(recorder_->wal().bytes - before, RecorderOptions{}.checkpoint_bytes / 2);
+}
+
 // As exports do: one read transaction follows another, each through many commits.
 TEST_F(CheckpointTest, ReadersWithoutAPauseDoNotMakeTheLogLong) {
   start(options_);
@@ -86,6 +120,43 @@ TEST_F(CheckpointTest, ReadersWithoutAPauseDoNotMakeTheLogLong) {
   while (exports.jobs() > 0) loop_.run_one();
   clock_.settle();
   EXPECT_GT(pages, 1);
+  EXPECT_EQ(durable_next_seq_, robot_.next_seq);
+}
+
+// A client takes a piece of a CSV, 2000 samples, every two minutes. A read transaction through all of it would hold
+// tens of MB of log.
+TEST_F(CheckpointTest, AnExportThatTakesAnHourDoesNotMakeTheLogLong) {
+  start(options_);
+  connect(robot_);
+  const RunId run = wait(runs_->create(robot_.id, named("to export")))->id;
+  for (int i = 0; i < 8; ++i) {
+    make(robot_, 8'000, 500);
+    clock_.run_for(1s);
+  }
+  wait(runs_->end(run, ""));
+  auto spans = wait(recording_->exports.spans(excerpt_of(run))).value();
+  CsvStream csv{recording_->exports, std::move(spans), {.run = run, .channels = all_channels(), .grid_us = {}}};
+  std::ptrdiff_t lines = 0;
+  bool ended = false;
+  const auto take = [&] {
+    const auto piece = wait(csv.next()).value();
+    ended = !piece;
+    if (piece) lines += std::ranges::count(*piece, '\n');
+  };
+  std::uint64_t longest = 0;
+  for (int second = 0; second < 3600; second += 5) {
+    if (second % 120 == 0) take();
+    make(robot_, 500, 500);
+    clock_.run_for(5s);
+    longest = std::max(longest, recorder_->wal().bytes);
+  }
+  EXPECT_FALSE(ended) << "it lasted through the hour";
+  EXPECT_LE(longest, 2 * kCheckpointBytes);
+  EXPECT_LE(log_bytes(), 2 * kCheckpointBytes);
+  EXPECT_GE(recorder_->wal().checkpoints, 20U);
+  EXPECT_EQ(warnings(), 0);
+  while (!ended) take();
+  EXPECT_EQ(lines, 64'001);  // and the header
   EXPECT_EQ(durable_next_seq_, robot_.next_seq);
 }
 

@@ -50,6 +50,34 @@ TEST_F(ExcerptTest, PagesOfAWindowHoldItsSamplesWhetherStoredOrNot) {
   }
 }
 
+TEST_F(ExcerptTest, ManyBootsAreCutAFewAtATime) {
+  start();
+  connect(robot_);
+  std::vector<BootId> boots;
+  std::int64_t middle_us = 0;
+  for (int boot = 0; boot < 210; ++boot) {
+    make(robot_, 10);
+    boots.push_back(robot_.boot_id);
+    if (boot == 150) middle_us = utc_of(0);
+    disconnect(robot_);
+    robot_.boot_id += 1;
+    robot_.next_seq = 0;
+    robot_.late_us += 10'000'000;
+    connect(robot_);
+  }
+  flush();
+  const auto boots_in = [&](std::int64_t from_us) {
+    std::vector<BootId> found;
+    const auto spans = wait(history_->spans(window(from_us, utc_of(0)))).value();
+    for (const RecordedSpan& span : spans) found.push_back(span.boot_id);
+    return found;
+  };
+  const std::uint64_t before = history_->reader().questions();
+  EXPECT_EQ(boots_in(kUtcOffsetUs), boots);
+  EXPECT_EQ(history_->reader().questions() - before, 4U) << "one for the list";
+  EXPECT_EQ(boots_in(middle_us), std::vector<BootId>(boots.begin() + 150, boots.end()));
+}
+
 TEST_F(ExcerptTest, AWindowOverSeveralBootsHoldsThemInOrder) {
   start();
   connect(robot_);

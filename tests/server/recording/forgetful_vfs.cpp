@@ -5,6 +5,13 @@
 #include <new>
 
 namespace server {
+namespace {
+
+std::string_view kind_of(std::string_view path) {
+  return path.ends_with("-wal") ? "log" : path.ends_with("-journal") ? "journal" : "database";
+}
+
+}  // namespace
 
 // What belongs to one sqlite3_file of ours. The real file lies behind it in the memory that SQLite gives.
 struct ForgetfulVfs::OpenFile {
@@ -103,6 +110,7 @@ int ForgetfulVfs::Shim::read(sqlite3_file* file, void* bytes, int count, sqlite3
 int ForgetfulVfs::Shim::write(sqlite3_file* file, const void* bytes, int count, sqlite3_int64 offset) {
   OpenFile& opened_file = opened(file);
   ForgetfulVfs& our = opened_file.vfs;
+  our.stand_still_if_held(opened_file);
   const std::scoped_lock lock{our.mutex_};
   if (our.has_failed_) return SQLITE_IOERR;
   if (opened_file.disk_file && our.refused_writes_ > 0) {
@@ -255,12 +263,34 @@ void ForgetfulVfs::refuse_writes(unsigned count) {
   refused_writes_ = count;
 }
 
+void ForgetfulVfs::hold_database_writes() {
+  const std::scoped_lock lock{mutex_};
+  holds_database_writes_ = true;
+}
+
+bool ForgetfulVfs::await_held_write(std::chrono::seconds limit) const {
+  std::unique_lock lock{mutex_};
+  return hold_changed_.wait_for(lock, limit, [this] { return holds_one_; });
+}
+
+void ForgetfulVfs::let_go() {
+  const std::scoped_lock lock{mutex_};
+  holds_database_writes_ = false;
+  hold_changed_.notify_all();
+}
+
+void ForgetfulVfs::stand_still_if_held(const OpenFile& file) {
+  std::unique_lock lock{mutex_};
+  if (!holds_database_writes_ || !file.disk_file || kind_of(file.path) != "database") return;
+  holds_one_ = true;
+  hold_changed_.notify_all();
+  hold_changed_.wait(lock, [this] { return !holds_database_writes_; });
+  holds_one_ = false;
+}
+
 bool ForgetfulVfs::count_call(const char* name, std::string_view path) {
   has_failed_ = ++calls_ == last_call_;
-  if (has_failed_) {
-    const char* file = path.ends_with("-wal") ? "log" : path.ends_with("-journal") ? "journal" : "database";
-    failed_call_ = std::string{name} + " of the " + file;
-  }
+  if (has_failed_) failed_call_ = std::string{name} + " of the " + std::string{kind_of(path)};
   return has_failed_;
 }
 

@@ -14,6 +14,8 @@
 
 #include <sqlite3.h>
 
+#include <chrono>
+#include <condition_variable>
 #include <memory>
 #include <mutex>
 
@@ -36,6 +38,11 @@ class ForgetfulVfs {
   // The next writes say SQLITE_FULL and have no effect.
   void refuse_writes(unsigned count);
 
+  // Whoever writes to a database, and not to its log, stands still until let_go().
+  void hold_database_writes();
+  bool await_held_write(std::chrono::seconds limit) const;  // until somebody does
+  void let_go();
+
   // After has_failed(), every connection closed. Without it, as after a `kill -9`, the files hold everything that was
   // written, but what was not synced is not durable yet.
   void lose_power(std::mt19937& random);
@@ -45,6 +52,7 @@ class ForgetfulVfs {
   struct OpenFile;
 
   bool count_call(const char* name, std::string_view path);  // true: it was the last
+  void stand_still_if_held(const OpenFile& file);
 
   mutable std::mutex mutex_;
   ForgetfulDisk disk_;
@@ -53,6 +61,9 @@ class ForgetfulVfs {
   std::uint64_t last_call_ = 0;
   bool count_barriers_ = true;
   unsigned refused_writes_ = 0;
+  bool holds_database_writes_ = false;
+  bool holds_one_ = false;
+  mutable std::condition_variable hold_changed_;
   bool has_failed_ = false;
   std::string failed_call_;
 

@@ -61,6 +61,30 @@ TEST_F(PurgeTest, AStepEndsByTheClock) {
   EXPECT_THAT(gaps(), ::testing::SizeIs(1));
 }
 
+TEST_F(PurgeTest, AStepThatGivesPagesBackEndsByTheClock) {
+  keep(0);
+  record(120'000);
+  RetentionPlan plan = planned();
+  carry_out(plan);
+  const std::int64_t free_before = number("PRAGMA freelist_count");
+  ASSERT_GT(free_before, 500);
+  const std::int64_t pages_before = number("PRAGMA page_count");
+  std::uint64_t all = 0;
+  for (const auto& [tick, expected] :
+       std::vector<std::pair<microseconds, std::uint64_t>>{{1ms, 10 * 16}, {4ms, 3 * 16}, {10ms, 16}, {100ms, 16}}) {
+    auto step = [&](Database& database) { return shrink_step(database.handle(), TickingClock{tick}); };
+    const std::uint64_t returned = wait(recorder_->on_disk(step));
+    EXPECT_EQ(returned, expected) << tick.count();
+    all += returned;
+  }
+  auto step = [&](Database& database) { return shrink_step(database.handle(), clock_); };
+  const std::uint64_t returned = wait(recorder_->on_disk(step));
+  EXPECT_EQ(returned, 256U) << "and no transaction is large on a fast one";
+  EXPECT_EQ(number("PRAGMA freelist_count"), free_before - static_cast<std::int64_t>(all + returned));
+  EXPECT_LE(number("PRAGMA page_count"), pages_before - static_cast<std::int64_t>(all + returned));
+  EXPECT_EQ(rows("PRAGMA integrity_check"), Rows{"ok"});
+}
+
 TEST_F(PurgeTest, ARunMadeWhileAPurgeIsUnderWayHoldsItsSamples) {
   keep(0);
   record(2000);
