@@ -244,8 +244,8 @@ FROM command;
 }  // namespace
 
 std::span<const char* const> migrations() {
-  static const std::array migrations{kFirstSchema,  kSecondSchema, kThirdSchema,
-                                     kFourthSchema, kFifthSchema,  kSixthSchema};
+  static const std::array migrations{kFirstSchema, kSecondSchema, kThirdSchema,  kFourthSchema,
+                                     kFifthSchema, kSixthSchema,  kSeventhSchema};
   return migrations;
 }
 

@@ -19,5 +19,6 @@ extern const char* const kThirdSchema;
 extern const char* const kFourthSchema;
 extern const char* const kFifthSchema;
 extern const char* const kSixthSchema;
+extern const char* const kSeventhSchema;
 
 }  // namespace server
