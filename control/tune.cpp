@@ -11,6 +11,14 @@
 namespace control {
 namespace {
 
+constexpr double kSameCrossover = 1e-6;  // relative
+
+bool is_ruled_elsewhere(const TunedController& design) {
+  const double asked = design.spec.gain_crossover_rad_s;
+  const double ruling = design.achieved.gain_crossover_rad_s.value_or(asked);
+  return std::abs(ruling / asked - 1) > kSameCrossover;
+}
+
 [[noreturn]] void refuse(const char* what, double value) { throw_invalid("tuning: ", what, ' ', value); }
 
 void check_plant(const FractionalModel& plant) {
@@ -81,7 +89,27 @@ std::string why_not_iso_damped(const TuningSpec& spec, double theta_deg, double 
   return text.str();
 }
 
+// The specification has a solution, but its numbers are not what the loop does.
+std::string why_not_sound(const TunedController& design) {
+  const auto& [kp, kd, mu] = design.controller;
+  const Margins& achieved = design.achieved;
+  std::ostringstream text;
+  text.precision(6);
+  text << "kp = " << kp << ", kd = " << kd << ", mu = " << mu << " meets it at " << design.spec.gain_crossover_rad_s
+       << " rad/s, but ";
+  if (!achieved.is_closed_loop_stable) text << "the closed loop is unstable";
+  if (is_ruled_elsewhere(design)) {
+    text << (achieved.is_closed_loop_stable ? "" : ": ") << "the gain is 1 also at " << *achieved.gain_crossover_rad_s
+         << " rad/s, where the phase margin is " << *achieved.phase_margin_deg << " degrees";
+  }
+  return text.str();
+}
+
 }  // namespace
+
+bool is_sound(const TunedController& design) {
+  return design.achieved.is_closed_loop_stable && !is_ruled_elsewhere(design);
+}
 
 TuningResult tune(const FractionalModel& plant, const TuningSpec& spec) {
   check_plant(plant);
@@ -91,13 +119,17 @@ TuningResult tune(const FractionalModel& plant, const TuningSpec& spec) {
   TuningResult result;
   result.theta_deg = demand.theta_rad * kDegPerRad;
   result.phase_fall = demand.phase_fall;
-  result.is_feasible = feasible_theta(spec.mu, demand.phase_fall).contains(demand.theta_rad);  // (5)
-  if (result.is_feasible) {
+  if (feasible_theta(spec.mu, demand.phase_fall).contains(demand.theta_rad)) {  // (5)
     const double mu = spec.mu ? *spec.mu : iso_damping_mu(demand);
-    result.tuned = tuned_controller(plant, spec, mu, name_of(spec));
+    TunedController design = tuned_controller(plant, spec, mu, name_of(spec));
+    result.is_feasible = is_sound(design);
+    if (!result.is_feasible) result.reason = why_not_sound(design);
+    (result.is_feasible ? result.tuned : result.refused) = std::move(design);
   } else {
     result.reason = spec.mu ? why_not_with_mu(spec, result.theta_deg)
                             : why_not_iso_damped(spec, result.theta_deg, result.phase_fall);
+  }
+  if (!result.is_feasible) {
     result.nearest = nearest_designs(plant, spec);
     result.relaxed = relaxed_designs(plant, spec);
   }

@@ -8,6 +8,9 @@
 //                                                                                     exactly then, and it is unique
 //   kp = 1/(|1 + kd (jω)^μ| |P(jω)|)                                            (6)
 //
+// (1) looks at one crossover. Its solution is given only if the closed loop is stable and no other crossover has a
+// smaller phase margin; otherwise it is refused with that reason, like a specification without a solution.
+//
 // The left side of (4) is the slope that the controller adds, R the slope that the plant takes away. With 1 < μ < 2 (4)
 // has a solution for every 0 < θ < 180°; such a controller amplifies noise more than a derivative, and is named so.
 // Accuracy: crossover 1e-9 relative, phase margin 1e-7 degrees, slope 1e-9; held by tune_test.cpp.
@@ -42,19 +45,24 @@ struct TunedController {
 struct TuningResult {
   bool is_feasible = false;
   std::optional<TunedController> tuned;
-  std::string reason;                    // if not feasible: one sentence that says why, with the numbers of (5)
-  double theta_deg = 0, phase_fall = 0;  // θ and R of (2)
+  std::string reason;                      // if not feasible: one sentence that says why, with its numbers
+  double theta_deg = 0, phase_fall = 0;    // θ and R of (2)
+  std::optional<TunedController> refused;  // solves (1), but its loop is unstable or another crossover rules it
   // If not feasible, what is: nearest keeps iso-damping or the fixed mu, and offers the nearest phase margin at this
-  // crossover and the nearest crossovers below and above for this phase margin; relaxed keeps crossover and margin.
+  // crossover and the nearest crossovers below and above for this phase margin, or else the nearest crossover with
+  // any phase margin; relaxed keeps crossover and margin. All of them are sound: see is_sound.
   std::vector<TunedController> nearest;
   std::vector<TunedController> relaxed;  // mu fixed; the flattest phase with mu up to 1; mu > 1, named so
 };
+
+// The closed loop is stable, and the crossover of the specification is the one with the smallest phase margin.
+bool is_sound(const TunedController& design);
 
 // The plant's gain must be positive.
 TuningResult tune(const FractionalModel& plant, const TuningSpec& spec);
 
 // Every phase margin that has an iso-damped solution at this crossover: the ends of the open interval, none if there
-// is none. It may reach below 0: such loops are unstable, and tune refuses them.
+// is none. Within it tune still refuses what is not sound; it may reach below 0, where every loop is unstable.
 struct PhaseMarginRange {
   double low_deg = 0, high_deg = 0;
 };

@@ -1,10 +1,9 @@
-// Walks out from the specification to where it becomes feasible, and lists the relaxed designs.
+// Walks out from the specification to where a sound design begins, and lists the relaxed designs.
 #include "control/tuning_alternatives.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <sstream>
 
 #include "control/tuning_equations.hpp"
 
@@ -13,62 +12,127 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kInsideDeg = 0.1, kInsideLogOmega = 1e-3;  // how far inside the feasible region an offer lies
+constexpr double kInsideDeg = 0.1, kInsideLogOmega = 1e-3;  // how far inside the region of sound designs an offer lies
 constexpr double kSearchStep = 0.02, kSearchWidth = 13.8;   // in ln ω; ln 1e6
+constexpr int kUnsoundSteps =
+    5;  // at a time where (5) holds: telling whether a design is sound takes a hundred times as long
+constexpr int kMargins = 60, kFewMargins = 12;  // tried in the range of a crossover
+constexpr int kHalvings = 10;                   // of a step, to find a border
 constexpr double kPracticalMu = 0.9;
 
-// Whether the specification would have a solution if its crossover were here.
-bool is_feasible_at(const PlantOnAxis& plant, const TuningSpec& spec, double log_omega) {
-  const TuningDemand demand = tuning_demand(plant, log_omega, spec.phase_margin_deg);
-  return feasible_theta(spec.mu, demand.phase_fall).contains(demand.theta_rad);
-}
+struct DegreeRange {
+  double low = 0, high = 0;
+};
 
-double mu_for(const TuningSpec& spec, const TuningDemand& demand) {
-  return spec.mu ? *spec.mu : iso_damping_mu(demand);
-}
+// Looks for sound designs near a specification.
+class Search {
+ public:
+  Search(const FractionalModel& plant, const TuningSpec& spec)
+      : plant_{plant}, on_axis_{plant, spec.is_velocity_loop}, spec_{spec} {}
 
-std::optional<TuningSpec> nearest_phase_margin(const PlantOnAxis& plant, TuningSpec spec) {
-  const TuningDemand demand = tuning_demand(plant, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
-  const ThetaRange theta = feasible_theta(spec.mu, demand.phase_fall);
-  const double at_theta_0_deg = spec.phase_margin_deg - demand.theta_rad * kDegPerRad;
-  const double low_deg = std::max(0.0, at_theta_0_deg + theta.low_rad * kDegPerRad);
-  const double high_deg = std::min(180.0, at_theta_0_deg + theta.high_rad * kDegPerRad);
-  if (low_deg >= high_deg) return std::nullopt;
-  const double inside_deg = std::min(kInsideDeg, (high_deg - low_deg) / 4);
-  spec.phase_margin_deg = std::clamp(spec.phase_margin_deg, low_deg + inside_deg, high_deg - inside_deg);
-  return spec;
-}
+  // At the specification's crossover, or another, the phase margin nearest to the one asked for. The ends of the range
+  // that (5) allows are known, so that a narrow one is not missed; within it `count` margins are tried.
+  std::optional<TunedController> nearest_margin(double omega_rad_s, int count, const std::string& name) const {
+    const auto range = margins_at(omega_rad_s);
+    if (!range) return std::nullopt;
+    const double asked = spec_.phase_margin_deg, step = (range->high - range->low) / count;
+    std::vector<double> margins{std::clamp(asked, range->low, range->high)};
+    for (int i = 0; i <= count; ++i) margins.push_back(range->low + i * step);
+    std::ranges::sort(margins, {}, [asked](double margin) { return std::pair{std::abs(margin - asked), margin}; });
+    const auto first =
+        std::ranges::find_if(margins, [&](double margin) { return design({omega_rad_s, margin}, name).has_value(); });
+    if (first == margins.end()) return std::nullopt;
+    if (first == margins.begin()) return design({omega_rad_s, *first}, name);
+    double sound = *first, outside = sound + std::copysign(step, asked - sound);
+    for (int halving = 0; halving < kHalvings; ++halving) {
+      const double middle = (sound + outside) / 2;
+      (design({omega_rad_s, middle}, name) ? sound : outside) = middle;
+    }
+    const double depth = std::min(kInsideDeg, std::abs(*first - sound));
+    auto inside = design({omega_rad_s, sound + std::copysign(depth, *first - sound)}, name);
+    return inside ? inside : design({omega_rad_s, *first}, name);
+  }
 
-// Walks one way along the axis until the specification is feasible, and back to just inside the border.
-std::optional<TuningSpec> nearest_crossover(const PlantOnAxis& plant, TuningSpec spec, double step) {
-  const double start = std::log(spec.gain_crossover_rad_s);
-  for (int i = 1; i * kSearchStep <= kSearchWidth; ++i) {
-    double inside = start + i * step, outside = inside - step;
-    if (std::abs(inside) > kLargestLogOmega) return std::nullopt;
-    if (!is_feasible_at(plant, spec, inside)) continue;
-    const double found = inside;
-    for (int halving = 0; halving < 45; ++halving) {
+  // Walks one way along the axis until there is a sound design for this phase margin, and back to just inside the
+  // border.
+  std::optional<TunedController> nearest_crossover(double step, const std::string& name) const {
+    const double start = std::log(spec_.gain_crossover_rad_s), margin = spec_.phase_margin_deg;
+    for (double log_omega = start + step, before = start; std::abs(log_omega - start) <= kSearchWidth;) {
+      if (std::abs(log_omega) > kLargestLogOmega) return std::nullopt;
+      const bool has_solution = mu_for({std::exp(log_omega), margin}).has_value();
+      if (has_solution && design({std::exp(log_omega), margin}, name)) {
+        return just_inside(log_omega, before, name);
+      }
+      before = log_omega;
+      log_omega += has_solution ? kUnsoundSteps * step : step;
+    }
+    return std::nullopt;
+  }
+
+  // The nearest crossover that has a sound design with any phase margin.
+  std::optional<TunedController> nearest_of_all(const std::string& name) const {
+    constexpr double kStep = kUnsoundSteps * kSearchStep;
+    const double start = std::log(spec_.gain_crossover_rad_s);
+    for (int i = 1; i * kStep <= kSearchWidth; ++i) {
+      for (const double log_omega : {start - i * kStep, start + i * kStep}) {
+        if (std::abs(log_omega) > kLargestLogOmega) continue;
+        if (auto found = nearest_margin(std::exp(log_omega), kFewMargins, name)) return found;
+      }
+    }
+    return std::nullopt;
+  }
+
+ private:
+  struct Target {
+    double gain_crossover_rad_s, phase_margin_deg;
+  };
+
+  // Of the equations' solution, if there is one.
+  std::optional<double> mu_for(const Target& target) const {
+    const TuningDemand demand = tuning_demand(on_axis_, std::log(target.gain_crossover_rad_s), target.phase_margin_deg);
+    if (!feasible_theta(spec_.mu, demand.phase_fall).contains(demand.theta_rad)) return std::nullopt;
+    return spec_.mu ? *spec_.mu : iso_damping_mu(demand);
+  }
+
+  // The sound design, if there is one.
+  std::optional<TunedController> design(const Target& target, const std::string& name) const {
+    const auto mu = mu_for(target);
+    if (!mu) return std::nullopt;
+    TuningSpec spec = spec_;
+    spec.gain_crossover_rad_s = target.gain_crossover_rad_s;
+    spec.phase_margin_deg = target.phase_margin_deg;
+    TunedController found = tuned_controller(plant_, spec, *mu, name);
+    return is_sound(found) ? std::optional{std::move(found)} : std::nullopt;
+  }
+
+  std::optional<TunedController> just_inside(double found, double outside, const std::string& name) const {
+    const double margin = spec_.phase_margin_deg;
+    double inside = found;
+    for (int halving = 0; halving < kHalvings; ++halving) {
       const double middle = (inside + outside) / 2;
-      (is_feasible_at(plant, spec, middle) ? inside : outside) = middle;
+      (design({std::exp(middle), margin}, name) ? inside : outside) = middle;
     }
     const double depth = std::min(kInsideLogOmega, std::abs(found - inside));
-    spec.gain_crossover_rad_s = std::exp(inside + std::copysign(depth, step));
-    return spec;
+    auto offer = design({std::exp(inside + std::copysign(depth, found - inside)), margin}, name);
+    return offer ? offer : design({std::exp(found), margin}, name);
   }
-  return std::nullopt;
-}
 
-// What else there is to know: the numbers of the specification are not the whole loop.
-std::string remark(const TuningSpec& spec, const Margins& achieved) {
-  std::ostringstream text;
-  text.precision(4);
-  const double crossover = achieved.gain_crossover_rad_s.value_or(spec.gain_crossover_rad_s);
-  if (std::abs(crossover / spec.gain_crossover_rad_s - 1) > 1e-6) {
-    text << "; the gain is 1 also at " << crossover << " rad/s, where the phase margin is less";
+  // The phase margins that (5) or the fixed mu allows at this crossover, a little less than that at either end.
+  std::optional<DegreeRange> margins_at(double omega_rad_s) const {
+    const TuningDemand demand = tuning_demand(on_axis_, std::log(omega_rad_s), 0);
+    const ThetaRange theta = feasible_theta(spec_.mu, demand.phase_fall);
+    const double at_theta_0_deg = -demand.theta_rad * kDegPerRad;
+    const double low = std::max(0.0, at_theta_0_deg + theta.low_rad * kDegPerRad);
+    const double high = std::min(180.0, at_theta_0_deg + theta.high_rad * kDegPerRad);
+    if (low >= high) return std::nullopt;
+    const double inside = std::min(kInsideDeg, (high - low) / 4);
+    return DegreeRange{low + inside, high - inside};
   }
-  if (!achieved.is_closed_loop_stable) text << "; the closed loop is unstable";
-  return text.str();
-}
+
+  const FractionalModel& plant_;
+  PlantOnAxis on_axis_;
+  const TuningSpec& spec_;
+};
 
 }  // namespace
 
@@ -76,23 +140,20 @@ TunedController tuned_controller(const FractionalModel& plant, const TuningSpec&
   const PlantOnAxis on_axis{plant, spec.is_velocity_loop};
   const TuningDemand demand = tuning_demand(on_axis, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
   const FopdController controller = controller_for(demand, mu);
-  Margins achieved = margins({plant, controller, spec.is_velocity_loop});
-  name += remark(spec, achieved);
-  return {std::move(name), spec, controller, std::move(achieved)};
+  return {std::move(name), spec, controller, margins({plant, controller, spec.is_velocity_loop})};
 }
 
 std::vector<TunedController> nearest_designs(const FractionalModel& plant, const TuningSpec& spec) {
-  const PlantOnAxis on_axis{plant, spec.is_velocity_loop};
+  const Search search{plant, spec};
   const std::string kept = spec.mu ? "same mu" : "iso-damped";
   std::vector<TunedController> designs;
-  const auto offer = [&](const std::optional<TuningSpec>& found, const std::string& name) {
-    if (!found) return;
-    const auto demand = tuning_demand(on_axis, std::log(found->gain_crossover_rad_s), found->phase_margin_deg);
-    designs.push_back(tuned_controller(plant, *found, mu_for(*found, demand), name));
+  const auto offer = [&designs](std::optional<TunedController> found) {
+    if (found) designs.push_back(std::move(*found));
   };
-  offer(nearest_phase_margin(on_axis, spec), kept + ", same crossover, nearest phase margin");
-  offer(nearest_crossover(on_axis, spec, -kSearchStep), kept + ", same phase margin, nearest crossover below");
-  offer(nearest_crossover(on_axis, spec, kSearchStep), kept + ", same phase margin, nearest crossover above");
+  offer(search.nearest_margin(spec.gain_crossover_rad_s, kMargins, kept + ", same crossover, nearest phase margin"));
+  offer(search.nearest_crossover(-kSearchStep, kept + ", same phase margin, nearest crossover below"));
+  offer(search.nearest_crossover(kSearchStep, kept + ", same phase margin, nearest crossover above"));
+  if (designs.empty()) offer(search.nearest_of_all(kept + ", nearest crossover with any phase margin"));
   return designs;
 }
 
@@ -103,15 +164,18 @@ std::vector<TunedController> relaxed_designs(const FractionalModel& plant, const
   const auto offer = [&](double mu, const std::string& name) {
     TuningSpec with_mu = spec;
     with_mu.mu = mu;
-    designs.push_back(tuned_controller(plant, with_mu, mu, name));
+    TunedController design = tuned_controller(plant, with_mu, mu, name);
+    if (is_sound(design)) designs.push_back(std::move(design));
   };
   if (demand.theta_rad < 0 || demand.theta_rad >= pi) return designs;
   if (demand.theta_rad < kPracticalMu * pi / 2 && spec.mu != kPracticalMu)
     offer(kPracticalMu, "iso-damping dropped, mu fixed at 0.9");
   const bool is_iso_damped = demand.phase_fall < largest_phase_fall(demand.theta_rad);
-  if (is_iso_damped) {
+  if (is_iso_damped && spec.mu) {
     offer(iso_damping_mu(demand), "mu left free: iso-damped");
-  } else if (demand.theta_rad < pi / 2) {
+  } else if (is_iso_damped) {
+    offer(1, "iso-damping dropped: the classical PD");
+  } else if (demand.theta_rad < pi / 2 && spec.mu != 1) {
     offer(1, "iso-damping dropped, flattest phase with mu up to 1: the classical PD");  // (4) rises with mu
   }
   if (!is_iso_damped && demand.theta_rad > 0) {

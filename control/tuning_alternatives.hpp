@@ -1,10 +1,10 @@
 // What to offer when a tuning specification has no solution: the nearest that has one, and designs that give up less
 // important wishes.
 //
-// Nearest crossovers are looked for within a factor of 1e6, in steps of 2 %, so that a band narrower than that may be
-// missed. What is offered lies a little inside the feasible region, where it really can be solved: 0.1 degrees or 0.1 %
-// of the frequency, or less where the region is narrow.
-// Errors: none; the arguments have been checked.
+// Only sound designs are offered (is_sound of tune.hpp). Nearest crossovers are looked for within a factor of 1e6, in
+// steps of 2 %, and margins in 60 steps of the range of a crossover, so that a band narrower than that may be missed.
+// What is offered lies a little inside the region of sound designs: 0.1 degrees or 0.1 % of the frequency, or less
+// where the region is narrow. Errors: none; the arguments have been checked.
 #pragma once
 
 #include "control/tune.hpp"

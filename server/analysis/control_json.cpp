@@ -214,6 +214,7 @@ OrderedJson json_of(const control::TuningResult& result) {
     out["reason"] = result.reason;
     const auto& offered = result.nearest.empty() ? result.relaxed : result.nearest;
     out["nearest"] = offered.empty() ? OrderedJson{} : json_of(offered.front());
+    out["refused"] = result.refused ? json_of(*result.refused) : OrderedJson{};
   }
   out["theta_deg"] = result.theta_deg;
   out["phase_fall"] = result.phase_fall;
