@@ -20,7 +20,7 @@ struct Request {
   std::string target;                          // as sent: path and query
   std::map<std::string, std::string> headers;  // names in lower case; repeated ones joined by ", " (cookies by "; ")
   std::string body;
-  std::int64_t received_us = 0;  // steady, when all of it had arrived
+  std::int64_t received_us = 0;  // steady, when all of it had arrived; of a stop, its head
 
   std::string peer;                          // the address it came from, without port
   std::string actor;                         // who asks: caller.actor

@@ -46,6 +46,23 @@ Request plain_head(const Message& message) {
   return request;
 }
 
+Response body_too_large(std::size_t limit) {
+  return problem(413, fmt::format("the body has more than {} bytes", limit), "too_large");
+}
+
+// What follows the header cannot be told: Beast takes a coding that it does not know for no body at all.
+bool has_unknown_length(const http::request_parser<http::string_body>& parser) {
+  return parser.get().count(http::field::transfer_encoding) > 0 && !parser.chunked();
+}
+
+// Whether the connection can go on behind a body that nobody needs. Told what became of its request, a client that
+// expects 100-continue may leave the body out; what follows may then be either.
+bool can_pass_over_body(const http::request_parser<http::string_body>& parser) {
+  const auto& head = parser.get();
+  if (!head.keep_alive() || head.version() < 11 || head.count(http::field::expect) > 0) return false;
+  return parser.content_length().value_or(0) <= kMaxBodyBytes;
+}
+
 }  // namespace
 
 HttpConnection::HttpConnection(HttpStream stream, Guest& guest, TlsGate* tls, Clock& clock, const RequestGuard& guard,
@@ -124,16 +141,19 @@ asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
   request_has_begun_ = true;
   Parser parser;
   parser.header_limit(kMaxHeaderBytes);
-  parser.body_limit(kMaxBodyBytes);
+  parser.body_limit(boost::none);  // is set when it is known whose body it is
   boost::system::error_code error;
   buffer_.consume(parser.put(buffer_.data(), error));  // most come in one piece: no turn of the loop is spent on them
   if (error == http::error::need_more) {
     std::tie(error, std::ignore) =
         co_await http::async_read_header(stream_, buffer_, parser, asio::as_tuple(asio::use_awaitable));
   }
+  if (!error && has_unknown_length(parser)) error = http::error::bad_transfer_encoding;
   if (!error) {
+    const Message& head = parser.get();
+    if (router_.is_stop(head.method_string(), head.target())) co_return co_await carry_out_stop(parser);
     auto refusal = refusal_of(parser);
-    if (refusal) co_return co_await refuse_unread(std::move(*refusal), parser.release());
+    if (refusal) co_return co_await send_and_close(std::move(*refusal), parser.release());
     error = co_await read_body(parser);
   }
   request_has_begun_ = false;
@@ -154,12 +174,14 @@ std::optional<Response> HttpConnection::refusal_of(Parser& parser) const {
     return problem(431, fmt::format("the header has more than {} fields", kMaxHeaderFields), "too_large");
   }
   if (parser.is_done()) return std::nullopt;  // there is no body
+  parser.body_limit(kMaxBodyBytes);
+  if (parser.content_length().value_or(0) > kMaxBodyBytes) return body_too_large(kMaxBodyBytes);
   auto admitted = guard_.admit(plain_head(head));
   if (!admitted) return std::move(admitted.error());
   if (!admitted->actor.empty()) return std::nullopt;
   parser.body_limit(kMaxLoginBodyBytes);
   if (parser.content_length().value_or(0) <= kMaxLoginBodyBytes) return std::nullopt;
-  return problem(413, fmt::format("the body has more than {} bytes", kMaxLoginBodyBytes), "too_large");
+  return body_too_large(kMaxLoginBodyBytes);
 }
 
 asio::awaitable<boost::system::error_code> HttpConnection::read_body(Parser& parser) {
@@ -184,21 +206,17 @@ asio::awaitable<HttpConnection::Next> HttpConnection::carry_out(Message message)
   request.received_us = clock_.steady_us();
   auto admitted = guard_.admit(request);
   if (!admitted) co_return co_await send(std::move(admitted.error()), message);
-  admitted->peer = address_of(stream_);
-  if (!admitted->actor.empty()) guest_.becomes(Guest::busy);
+  admit(request, std::move(*admitted));
   if (wants_live(message)) {
-    if (!begin_page(*admitted)) {
-      Response refused = problem(429, fmt::format("{} has {} pages open; close some", admitted->actor, kMaxPagesOfOne),
+    if (!begin_page(request.caller)) {
+      Response refused = problem(429, fmt::format("{} has {} pages open; close some", request.actor, kMaxPagesOfOne),
                                  "too_many_pages");
       co_return co_await send(std::move(refused), message);
     }
     upgrade_.emplace(message.base());
-    caller_ = std::move(*admitted);
+    caller_ = std::move(request.caller);
     co_return Next::end;
   }
-  request.caller = std::move(*admitted);
-  request.actor = request.caller.actor;
-  request.peer = request.caller.peer;
   // SAFETY: what changes something, above all a stop, is carried out though its client has hung up.
   if (request.method != "GET" && request.method != "HEAD") {
     Response response = co_await answer(std::move(request));
@@ -207,6 +225,39 @@ asio::awaitable<HttpConnection::Next> HttpConnection::carry_out(Message message)
   auto response = co_await while_present(answer(std::move(request)));
   if (!response) co_return Next::end;
   co_return co_await send(std::move(*response), message);
+}
+
+// SAFETY: a stop is carried out now, whatever comes with it; its body is looked at when it has been answered.
+asio::awaitable<HttpConnection::Next> HttpConnection::carry_out_stop(Parser& parser) {
+  request_has_begun_ = false;
+  deadline_us_ = kNever;
+  const Message& message = parser.get();
+  Request request = plain_head(message);
+  request.received_us = clock_.steady_us();
+  auto admitted = guard_.admit(request);
+  if (!admitted && parser.is_done()) co_return co_await send(std::move(admitted.error()), message);
+  if (!admitted) co_return co_await send_and_close(std::move(admitted.error()), parser.release());
+  admit(request, std::move(*admitted));
+  Response response = co_await answer(std::move(request));
+  const bool goes_on = parser.is_done() || can_pass_over_body(parser);
+  if (!goes_on) co_return co_await send_and_close(std::move(response), parser.release());
+  const Next next = co_await send(std::move(response), message);
+  if (next == Next::end) co_return next;
+  guest_.rest();
+  allow(kRequestTime);
+  parser.body_limit(kMaxBodyBytes);
+  const boost::system::error_code error = co_await read_body(parser);
+  if (!error) co_return Next::another;
+  co_await discard_rest();
+  co_return Next::end;
+}
+
+void HttpConnection::admit(Request& request, Caller caller) {
+  if (!caller.actor.empty()) guest_.becomes(Guest::busy);
+  request.caller = std::move(caller);
+  request.caller.peer = address_of(stream_);
+  request.actor = request.caller.actor;
+  request.peer = request.caller.peer;
 }
 
 // What the work gives, or nothing when the client goes first: the work is cancelled then, and has ended.
@@ -232,14 +283,14 @@ asio::awaitable<HttpConnection::Next> HttpConnection::refuse_unreadable(boost::s
   if (error == http::error::header_limit) {
     response = problem(431, fmt::format("the header has more than {} bytes", kMaxHeaderBytes), "too_large");
   } else if (error == http::error::body_limit) {
-    response = problem(413, fmt::format("the body has more than {} bytes", kMaxBodyBytes), "too_large");
+    response = body_too_large(kMaxBodyBytes);
   }
   Message unreadable;
   unreadable.version(11);
-  co_return co_await refuse_unread(std::move(response), std::move(unreadable));
+  co_return co_await send_and_close(std::move(response), std::move(unreadable));
 }
 
-asio::awaitable<HttpConnection::Next> HttpConnection::refuse_unread(Response response, Message message) {
+asio::awaitable<HttpConnection::Next> HttpConnection::send_and_close(Response response, Message message) {
   request_has_begun_ = false;
   message.keep_alive(false);
   co_await send(std::move(response), message);

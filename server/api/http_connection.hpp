@@ -7,6 +7,11 @@
 // whose client has gone is cancelled; a POST is always carried out. In TLS the handshake is part of the first request's
 // 10 s, and who speaks plain HTTP is told so (400). Each answer has the security headers, and is not cached unless it
 // says so itself. Loop thread. What it is given outlives it.
+//
+// SAFETY: an emergency stop is carried out when its head is complete. Of the head only Host, Origin and credential are
+// judged, and whether the length of the body is beyond doubt; the limits of target and fields do not hold. The body is
+// passed over after the answer; one that may be larger than 64 kB, or that the client may not send after all, ends the
+// connection, so that nothing of it is ever taken for a request.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -61,9 +66,11 @@ class HttpConnection {
   boost::asio::awaitable<Next> read_and_answer();
   boost::asio::awaitable<boost::system::error_code> read_body(Parser& parser);
   boost::asio::awaitable<Next> carry_out(Message message);
+  boost::asio::awaitable<Next> carry_out_stop(Parser& parser);
+  void admit(Request& request, Caller caller);
   std::optional<Response> refusal_of(Parser& parser) const;
   boost::asio::awaitable<Next> refuse_unreadable(boost::system::error_code error);
-  boost::asio::awaitable<Next> refuse_unread(Response response, Message message);
+  boost::asio::awaitable<Next> send_and_close(Response response, Message message);
   boost::asio::awaitable<Response> answer(Request request);
   template <class T>
   boost::asio::awaitable<std::optional<T>> while_present(boost::asio::awaitable<T> work);

@@ -29,13 +29,6 @@ std::vector<std::string> split(std::string_view text, char separator) {
 
 bool is_parameter(const std::string& segment) { return !segment.empty() && segment.front() == '{'; }
 
-bool matches(const std::vector<std::string>& pattern, const std::vector<std::string>& path) {
-  const auto same = [](const std::string& wanted, const std::string& given) {
-    return is_parameter(wanted) ? !given.empty() : wanted == given;
-  };
-  return std::ranges::equal(pattern, path, same);
-}
-
 Result<std::map<std::string, std::string>> parse_query(std::string_view text, const std::vector<std::string>& known) {
   std::map<std::string, std::string> query;
   if (text.empty()) return query;
@@ -115,6 +108,22 @@ Response not_permitted(const Caller& caller, Scope needed) {
   return problem(403, std::move(detail), "not_permitted", {{"needs", role}});
 }
 
+bool Router::matches(const Entry& entry, std::span<const std::string> path) const {
+  if (routes_[entry.route].is_stop && path.back().empty()) path = path.first(path.size() - 1);
+  const auto same = [](const std::string& wanted, const std::string& given) {
+    return is_parameter(wanted) ? !given.empty() : wanted == given;
+  };
+  return std::ranges::equal(entry.segments, path, same);
+}
+
+bool Router::is_stop(const std::string& method, const std::string& target) const {
+  const auto path = path_segments(target);
+  return path && std::ranges::any_of(entries_, [&](const Entry& entry) {
+           const Route& route = routes_[entry.route];
+           return route.is_stop && route.method == method && matches(entry, *path);
+         });
+}
+
 Answer Router::dispatch(Request request) const {
   const auto question_mark = request.target.find('?');
   const auto path = path_segments(request.target);
@@ -124,7 +133,7 @@ Answer Router::dispatch(Request request) const {
 
   std::string allowed;
   for (const Entry& entry : entries_) {
-    if (!matches(entry.segments, *path)) continue;
+    if (!matches(entry, *path)) continue;
     const Route& route = routes_[entry.route];
     if (route.method != method) {
       allowed += (allowed.empty() ? "" : ", ") + route.method + (route.method == "GET" ? ", HEAD" : "");
@@ -134,14 +143,15 @@ Answer Router::dispatch(Request request) const {
       if (on_refused_) on_refused_(request, route.needs);
       co_return not_permitted(request.caller, route.needs);
     }
-    for (std::size_t i = 0; i < path->size(); ++i) {
+    for (std::size_t i = 0; i < entry.segments.size(); ++i) {
       const std::string& name = entry.segments[i];
       if (is_parameter(name)) request.param[name.substr(1, name.size() - 2)] = (*path)[i];
     }
-    const std::string query = question_mark == std::string::npos ? "" : request.target.substr(question_mark + 1);
-    auto parsed = parse_query(query, route.query);
-    if (!parsed) co_return problem(parsed.error());
-    request.query = std::move(*parsed);
+    if (!route.is_stop && question_mark != std::string::npos) {
+      auto parsed = parse_query(std::string_view{request.target}.substr(question_mark + 1), route.query);
+      if (!parsed) co_return problem(parsed.error());
+      request.query = std::move(*parsed);
+    }
     co_return co_await route.answer(std::move(request));
   }
   if (!allowed.empty()) {

@@ -6,10 +6,12 @@
 // A path is split at '/', then decoded; a segment with a hidden '/', a control character or ".." is refused with 400,
 // an unknown or repeated query parameter too. An unknown path under /api/ is 404, a known one with another method 405
 // with Allow. HEAD is answered as GET (the server leaves the body out). Every other path goes to the fallback.
+// SAFETY: of a request to stop, neither the query nor one slash at the end of the path is judged.
 // Loop thread. Routes are added before the first request and outlive every request.
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,7 @@ struct Route {
   Scope needs;                     // no default: every route says it
   std::vector<std::string> query;  // the parameters it knows
   std::function<Answer(Request)> answer;
+  bool is_stop = false;  // SAFETY: an emergency stop, which is never refused for its form
 };
 
 class Router {
@@ -33,6 +36,9 @@ class Router {
   // Hears of whoever is refused because of what they may not do.
   void set_on_refused(std::function<void(const Request&, Scope)> on_refused) { on_refused_ = std::move(on_refused); }
   void set_fallback(std::function<Response(const Request&)> fallback) { fallback_ = std::move(fallback); }
+
+  // Whether the head alone, of this method and target, is reason enough to act.
+  bool is_stop(const std::string& method, const std::string& target) const;
 
   // A coroutine that throws passes its exception on.
   Answer dispatch(Request request) const;
@@ -44,6 +50,8 @@ class Router {
     std::vector<std::string> segments;
     std::size_t route = 0;
   };
+
+  bool matches(const Entry& entry, std::span<const std::string> path) const;
 
   std::vector<Route> routes_;
   std::vector<Entry> entries_;

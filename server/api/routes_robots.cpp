@@ -262,10 +262,19 @@ void add_robot_routes(Router& router, ApiParts& parts) {
   add("GET", "/api/v1/robots/{robot_id}/commands", Scope::read, {"limit"}, list_commands);
   add("POST", "/api/v1/robots/{robot_id}/commands", Scope::command, {"wait"}, submit_command);
   add("POST", "/api/v1/robots/{robot_id}/control", Scope::command, {}, change_control);
-  add("POST", "/api/v1/robots/{robot_id}/emergency-stop", Scope::stop, {}, emergency_stop);
   add("GET", "/api/v1/robots/{robot_id}/events", Scope::read, {"limit"}, list_events);
   add("GET", "/api/v1/commands/{command_id}", Scope::read, {}, get_command);
-  add("POST", "/api/v1/emergency-stop", Scope::stop, {}, emergency_stop_all);
+  const auto add_stop = [&router, &parts](const char* pattern, Answer (*answer)(ApiParts&, Request)) {
+    auto stop = [&parts, answer](Request request) { return answer(parts, std::move(request)); };
+    router.add({.method = "POST",
+                .pattern = pattern,
+                .needs = Scope::stop,
+                .query = {},
+                .answer = std::move(stop),
+                .is_stop = true});
+  };
+  add_stop("/api/v1/robots/{robot_id}/emergency-stop", emergency_stop);
+  add_stop("/api/v1/emergency-stop", emergency_stop_all);
 }
 
 }  // namespace server

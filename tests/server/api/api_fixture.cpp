@@ -4,6 +4,7 @@
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <sys/socket.h>
@@ -144,6 +145,8 @@ RawClient::RawClient(VirtualClock& clock, std::uint16_t port, const char* from) 
     throw std::runtime_error{"cannot connect"};
   }
   ::fcntl(socket_, F_SETFL, O_NONBLOCK);
+  const int at_once = 1;  // as clients do: what is sent second does not wait for the answer to the first
+  ::setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &at_once, sizeof at_once);
   clock_.settle();
 }
 

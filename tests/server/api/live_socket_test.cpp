@@ -56,6 +56,20 @@ TEST_F(LiveSocketTest, StopsOneRobotOrAll) {
   EXPECT_EQ(commands(rheonaut_Command_emergency_stop_tag).size(), 2U);
 }
 
+TEST_F(LiveSocketTest, AStopIsObeyedWhateverElseTheMessageSays) {
+  connect_robot();
+  const auto page = open_page();
+  std::size_t stops = 0;
+  for (const json& message :
+       {json{{"robot_id", "r1"}, {"why", json::array({1, 2})}}, json{{"robot_id", "r1"}, {"key", 7}},
+        json{{"robot_id", "r1"}, {"key", "no key at all"}}, json{{"robot_id", nullptr}, {"robots", "all"}}}) {
+    json stop = message;
+    stop["type"] = "emergency_stop";
+    page->say(stop);
+    EXPECT_EQ(commands(rheonaut_Command_emergency_stop_tag).size(), ++stops) << stop;
+  }
+}
+
 TEST_F(LiveSocketTest, AStopIsObeyedFromAPageThatDoesNotRead) {
   connect_robot();
   const auto page = open_page();
