@@ -159,7 +159,9 @@ json to_json(const Enrolment& enrolment) {
           {"enrolled_at_us", enrolment.enrolled_at_us},
           {"enrolled_by", enrolment.enrolled_by},
           {"revoked_at_us", time_or_null(enrolment.revoked_at_us)},
-          {"revoked_by", enrolment.revoked_by}};
+          {"revoked_by", enrolment.revoked_by},
+          {"retired_at_us", time_or_null(enrolment.retired_at_us)},
+          {"retired_by", enrolment.retired_by}};
 }
 
 }  // namespace server

@@ -98,6 +98,8 @@ struct Enrolment {
   std::string enrolled_by;  // the actor; "loopback": by itself
   std::int64_t revoked_at_us = 0;
   std::string revoked_by;
+  std::int64_t retired_at_us = 0;
+  std::string retired_by;
 };
 
 // Without anything that is secret. A time that is 0 is null.

@@ -290,4 +290,11 @@ asio::awaitable<Result<Enrolment>> Accounts::revoke_robot(std::string robot_id, 
   co_return std::unexpected{not_stored(revoked.error())};
 }
 
+asio::awaitable<Result<Enrolment>> Accounts::set_retired(std::string robot_id, bool retired, Author by) {
+  auto job = [robot_id, retired, by](AccountStore& store) { return store.set_retired(robot_id, retired, by); };
+  auto stored = co_await on_store(std::move(job));
+  if (!stored && !retired) co_return std::unexpected{not_stored(stored.error())};
+  co_return stored;
+}
+
 }  // namespace server

@@ -73,6 +73,8 @@ class Accounts {
   boost::asio::awaitable<Result<NewEnrolment>> enrol(std::string robot_id, Author by);
   // It is refused from now on; whoever calls ends its connection.
   boost::asio::awaitable<Result<Enrolment>> revoke_robot(std::string robot_id, Author by);
+  // Only stored: whoever calls notifies the station, of a robot that is put into use before, of a retired one after.
+  boost::asio::awaitable<Result<Enrolment>> set_retired(std::string robot_id, bool retired, Author by);
 
  private:
   struct Token : ApiToken {

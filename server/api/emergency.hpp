@@ -1,6 +1,8 @@
 // Emergency stops on behalf of people: one robot, or all of them at once.
 #pragma once
 
+#include <nlohmann/json.hpp>
+
 #include "server/station/station.hpp"
 
 namespace server {
@@ -12,5 +14,11 @@ inline constexpr microseconds kStopPatience{1'500'000};
 boost::asio::awaitable<Result<CommandRecord>> stop_robot(Station& station, StopRequest request);
 
 boost::asio::awaitable<StopsOfAll> stop_all_robots(Station& station, StopRequest request);
+
+// What became of the stop of all, as StopSummary in openapi.yaml: how many robots of each outcome, and the names of
+// those that did not acknowledge, the connected ones first. At most kMaxNamedRobots names, however many robots there
+// are.
+inline constexpr std::size_t kMaxNamedRobots = 100;
+nlohmann::ordered_json stop_summary(const Station& station, const StopsOfAll& stops);
 
 }  // namespace server

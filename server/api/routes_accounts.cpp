@@ -219,6 +219,23 @@ Answer revoke_robot(ApiParts& parts, Request request) {
   co_return json_response(200, to_json(*revoked));
 }
 
+// SAFETY: what takes a robot out of the stop of all is stored before it is in force; what brings it back is in force at
+// once.
+Answer retire_robot(ApiParts& parts, Request request) {
+  const auto body = Members::parse(request.body, {"retired"});
+  if (!body) co_return problem(body.error());
+  if (!body->has("retired")) co_return problem(400, "retired is missing", "missing_member");
+  const json& value = body->object().at("retired");
+  if (!value.is_boolean()) co_return problem(400, "retired is neither true nor false", "wrong_type");
+  const bool retired = value.get<bool>();
+  const std::string robot_id = request.param.at("robot_id");
+  if (!retired) parts.station.set_retired(robot_id, 0, request.actor);
+  const auto stored = co_await parts.accounts.set_retired(robot_id, retired, author_of(request, parts.clock));
+  if (!stored) co_return problem(stored.error());
+  parts.station.set_retired(robot_id, stored->retired_at_us, request.actor);
+  co_return json_response(200, to_json(*stored));
+}
+
 }  // namespace
 
 void add_account_routes(Router& router, ApiParts& parts) {
@@ -242,6 +259,7 @@ void add_account_routes(Router& router, ApiParts& parts) {
   add("GET", "/api/v1/enrolments", Scope::admin, list_enrolments);
   add("POST", "/api/v1/enrolments", Scope::admin, enrol_robot);
   add("POST", "/api/v1/enrolments/{robot_id}/revoke", Scope::admin, revoke_robot);
+  add("POST", "/api/v1/robots/{robot_id}/retire", Scope::admin, retire_robot);
 }
 
 }  // namespace server

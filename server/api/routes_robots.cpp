@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <ranges>
+
 #include "server/api/emergency.hpp"
 #include "server/api/routes.hpp"
 
@@ -215,12 +217,14 @@ Answer emergency_stop_all(ApiParts& parts, Request request) {
   int status = 200;
   for (const CommandRecord& record : stops.records) status = std::max(status, stop_status(record));
   if (status == 202) co_await parts.recording.history.settle();
-  json body = list_json("commands", stops.records);
+  nlohmann::ordered_json body;
+  body["summary"] = stop_summary(parts.station, stops);  // first, for people who read it
+  body["commands"] = list_json("commands", stops.records)["commands"];
   if (!stops.failed.empty()) {
-    co_return problem(500, fmt::format("the stop of {} failed; the log says why", fmt::join(stops.failed, ", ")),
-                      "internal", std::move(body));
+    const std::string named = fmt::format("{}", fmt::join(stops.failed | std::views::take(kMaxNamedRobots), ", "));
+    co_return problem(500, fmt::format("the stop of {} failed; the log says why", named), "internal", json(body));
   }
-  co_return json_response(status, body);
+  co_return json_text_response(status, body.dump());
 }
 
 Answer list_commands(ApiParts& parts, Request request) {

@@ -185,6 +185,14 @@ void AccountDoor::revoke_robot(const std::string& robot_id) {
   }
 }
 
+void AccountDoor::set_retired(const std::string& robot_id, bool retired) {
+  if (station_) {
+    ask("POST", "/robots/" + robot_id + "/retire", {{"retired", retired}});
+  } else {
+    value_of(store().set_retired(robot_id, retired, command_line_author()));
+  }
+}
+
 std::string read_password(const std::string& whose) {
   if (isatty(STDIN_FILENO) == 0) return read_line();
   std::string password = ask_silently("Password of " + whose);

@@ -35,6 +35,7 @@ class AccountDoor {
   nlohmann::json enrolments();
   nlohmann::json enrol(const std::string& robot_id);  // with its "secret"
   void revoke_robot(const std::string& robot_id);
+  void set_retired(const std::string& robot_id, bool retired);
 
  private:
   nlohmann::json ask(const std::string& method, const std::string& target, const nlohmann::json& body = nullptr) const;

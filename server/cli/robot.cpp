@@ -5,6 +5,7 @@
 #include <fmt/ostream.h>
 
 #include <CLI/CLI.hpp>
+#include <tuple>
 
 #include "server/cli/account_door.hpp"
 #include "server/cli/options.hpp"
@@ -39,9 +40,11 @@ int list(const nlohmann::json& robots, bool as_json, std::ostream& out) {
   if (robots.empty()) fmt::print(out, "No robot is enrolled\n");
   for (const auto& robot : robots) {
     const std::string revoked = time_text(robot.at("revoked_at_us"));
-    fmt::print(out, "{:<31}  {}  enrolled {} by {}{}\n", robot.at("robot_id").get<std::string>(),
+    const std::string retired = time_text(robot.at("retired_at_us"));
+    fmt::print(out, "{:<31}  {}  enrolled {} by {}{}{}\n", robot.at("robot_id").get<std::string>(),
                robot.at("has_token").get<bool>() ? "token   " : "no token", time_text(robot.at("enrolled_at_us")),
-               robot.at("enrolled_by").get<std::string>(), revoked.empty() ? "" : ", revoked " + revoked);
+               robot.at("enrolled_by").get<std::string>(), revoked.empty() ? "" : ", revoked " + revoked,
+               retired.empty() ? "" : ", retired " + retired);
   }
   return 0;
 }
@@ -72,10 +75,16 @@ void add_options(CLI::App& command, RobotCommand& wish) {
   enroll->footer("Example: rheonaut robot enroll rheo-1 --data lab");
   offer(command, wish, Act::list, "list", "List the robots that may or might connect")
       ->add_flag("--json", wish.json, "As JSON");
-  offer(command, wish, Act::revoke, "revoke", "Refuse a robot from now on, and end its connection")
-      ->add_option("robot_id", wish.robot_id, "The robot")
-      ->required()
-      ->check(robot_id());
+  constexpr std::tuple<Act, const char*, const char*> kOfOne[] = {
+      {Act::revoke, "revoke", "Refuse a robot from now on, and end its connection"},
+      {Act::retire, "retire", "Leave a robot out of the stop of all robots while it is not connected"},
+      {Act::unretire, "unretire", "Put a retired robot back into use"}};
+  for (const auto& [act, name, purpose] : kOfOne) {
+    offer(command, wish, act, name, purpose)
+        ->add_option("robot_id", wish.robot_id, "The robot")
+        ->required()
+        ->check(robot_id());
+  }
   command.footer("Example: rheonaut robot list --data lab");
 }
 
@@ -83,8 +92,13 @@ int run(const RobotCommand& wish, std::ostream& out) {
   if (wish.act == Act::enroll) return enroll(wish, out);
   AccountDoor door{wish.data_dir, AccountDoor::Missing::refuse};
   if (wish.act == Act::list) return list(door.enrolments(), wish.json, out);
-  door.revoke_robot(wish.robot_id);
-  fmt::print(out, "Robot {} was revoked\n", wish.robot_id);
+  if (wish.act == Act::revoke) {
+    door.revoke_robot(wish.robot_id);
+  } else {
+    door.set_retired(wish.robot_id, wish.act == Act::retire);
+  }
+  const char* done = wish.act == Act::revoke ? "revoked" : wish.act == Act::retire ? "retired" : "put back into use";
+  fmt::print(out, "Robot {} was {}\n", wish.robot_id, done);
   return 0;
 }
 

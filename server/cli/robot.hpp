@@ -1,4 +1,5 @@
-// `rheonaut robot`: which robots may connect, each with a token of its own; with a running station and without one.
+// `rheonaut robot`: which robots may connect, each with a token of its own, and which are out of use; with a running
+// station and without one.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,7 @@ class App;
 namespace server::cli {
 
 struct RobotCommand {
-  enum class Act : std::uint8_t { enroll, list, revoke };
+  enum class Act : std::uint8_t { enroll, list, revoke, retire, unretire };
   Act act = Act::list;
   std::filesystem::path data_dir = "rheonaut-data";
   std::string robot_id;

@@ -101,6 +101,7 @@ json to_json(const RobotState& robot) {
   out["status"] = robot.status ? status_json(*robot.status) : json(nullptr);
   out["clock"] = robot.clock.valid ? clock_json(robot) : json(nullptr);
   out["pending_stop"] = id_text(robot.pending_stop.value_or(0));
+  out["retired"] = robot.retired_at_us != 0;
   out["fluid"] = robot.fluid.empty() ? json(nullptr) : json(robot.fluid);
   out["control"] = robot.control.holder.empty() ? json(nullptr) : to_json(robot.control);
   return out;

@@ -52,11 +52,12 @@ PageSession read_session(SQLite::Statement& row) {
 
 constexpr const char* kRobotColumns =
     "robot_id, token_hash IS NOT NULL, enrolled_at_us, enrolled_by, coalesce(revoked_at_us, 0),"
-    " coalesce(revoked_by, '')";
+    " coalesce(revoked_by, ''), coalesce(retired_at_us, 0), coalesce(retired_by, '')";
 
 Enrolment read_enrolment(SQLite::Statement& row) {
   return {row.getColumn(0).getString(), row.getColumn(1).getInt() != 0, row.getColumn(2).getInt64(),
-          row.getColumn(3).getString(), row.getColumn(4).getInt64(),    row.getColumn(5).getString()};
+          row.getColumn(3).getString(), row.getColumn(4).getInt64(),    row.getColumn(5).getString(),
+          row.getColumn(6).getInt64(),  row.getColumn(7).getString()};
 }
 
 template <class Read>
@@ -278,6 +279,25 @@ Result<Enrolment> AccountStore::revoke_robot(const std::string& robot_id, const 
   if (was_good) note(by, "robot.revoked", robot_id, nlohmann::json::object());
   transaction.commit();
   return *revoked;
+}
+
+Result<Enrolment> AccountStore::set_retired(const std::string& robot_id, bool retired, const Author& by) {
+  SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
+  SQLite::Statement retire{database_,
+                           "UPDATE robot SET retired_at_us = ?2, retired_by = ?3"
+                           " WHERE robot_id = ?1 AND (retired_at_us IS NULL) = ?4"};
+  bind_all(retire, robot_id);
+  if (retired) {
+    retire.bind(2, by.at_us);
+    retire.bind(3, by.actor);
+  }
+  retire.bind(4, retired ? 1 : 0);
+  const bool is_change = retire.exec() > 0;
+  const std::optional<Enrolment> enrolment = find_robot(robot_id);
+  if (!enrolment) return unknown("robot", robot_id);
+  if (is_change) note(by, retired ? "robot.retired" : "robot.unretired", robot_id, nlohmann::json::object());
+  transaction.commit();
+  return *enrolment;
 }
 
 }  // namespace server

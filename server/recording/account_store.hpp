@@ -61,6 +61,8 @@ class AccountStore {
   // A robot that is new, was revoked, or has no token: it needs this one from now on. conflict: it has another.
   Result<Enrolment> enrol(const std::string& robot_id, const SecretHash& token, const Author& by);
   Result<Enrolment> revoke_robot(const std::string& robot_id, const Author& by);
+  // A robot that is out of use: it may still connect. not_found.
+  Result<Enrolment> set_retired(const std::string& robot_id, bool retired, const Author& by);
 
  private:
   std::optional<User> find_user(const std::string& name);

@@ -58,13 +58,17 @@ Admission revoked(const RobotId& robot_id) {
 
 std::vector<RestoredRobot> BootStore::robots() {
   std::vector<RestoredRobot> robots;
-  SQLite::Statement query{database_.handle(),
-                          "SELECT robot.robot_id, boot_id FROM robot LEFT JOIN boot ON boot_key ="
-                          " (SELECT max(boot_key) FROM boot WHERE boot.robot_id = robot.robot_id)"
-                          " ORDER BY robot.robot_id"};
+  SQLite::Statement query{
+      database_.handle(),
+      "SELECT robot.robot_id, boot_id, coalesce(retired_at_us, 0) FROM robot LEFT JOIN boot ON boot_key ="
+      " (SELECT max(boot_key) FROM boot WHERE boot.robot_id = robot.robot_id)"
+      " ORDER BY robot.robot_id"};
   while (query.executeStep()) {
     const RobotId robot_id = query.getColumn(0).getString();
-    robots.push_back({robot_id, unsigned_id(query.getColumn(1)), latch_of(robot_id)});
+    robots.push_back({.id = robot_id,
+                      .boot_id = unsigned_id(query.getColumn(1)),
+                      .emergency_id = latch_of(robot_id),
+                      .retired_at_us = query.getColumn(2).getInt64()});
   }
   return robots;
 }

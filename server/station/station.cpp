@@ -53,6 +53,7 @@ void Station::restore(const std::vector<RestoredRobot>& robots, const std::vecto
     RobotState& robot = *add_seat(restored.id).robot;
     robot.boot_id = restored.boot_id;
     robot.context.emergency_id = restored.emergency_id;  // SAFETY: the station's latch outlives the station
+    robot.retired_at_us = restored.retired_at_us;
   }
   for (const CommandRecord& record : pending_stops) restore_stop(record);
 }

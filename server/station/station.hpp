@@ -59,7 +59,8 @@ struct StopRequest {
 
 struct StopsOfAll {
   std::vector<CommandRecord> records;
-  std::vector<RobotId> failed;  // the station could not take their stop; its log says why
+  std::vector<RobotId> failed;    // the station could not take their stop; its log says why
+  std::vector<RobotId> left_out;  // retired and not connected
 };
 
 enum class ControlAction : std::uint8_t { take, force, release, request, hand_over };
@@ -102,7 +103,7 @@ class Station {
 
   // SAFETY: the same for every robot: all frames are handed to their links before anything else is done, and a stop
   // that fails keeps no other from being sent. At most `patience` for all of them. The request's robot_id is not looked
-  // at.
+  // at. Only a retired robot that is not connected is left out.
   boost::asio::awaitable<StopsOfAll> stop_all(StopRequest request, microseconds patience);
 
   // Changes who holds control of a robot, see Authority.
@@ -141,6 +142,9 @@ class Station {
   void on_clock(RobotPort& port, const ClockExchange& exchange);
   void on_parameters(RobotPort& port, const protocol::ParameterPage& page);
   void on_controller(RobotPort& port, const protocol::Controller& controller);
+
+  // An administrator has retired the robot, or put it back into use (0); the database has it, or is about to.
+  void set_retired(const RobotId& id, std::int64_t retired_at_us, const std::string& actor);
 
   // Ends the robot's connection, if there is one: its enrolment was revoked.
   void end_connection(const RobotId& id, const std::string& reason);
@@ -188,6 +192,7 @@ class Station {
 
   void restore_stop(const CommandRecord& record);
   std::shared_ptr<PendingCommand> begin_stop(Seat& seat, const StopRequest& request);
+  bool may_be_left_out(const Seat& seat) const;
   void publish_held_back(std::vector<RobotId>& failed);
   std::shared_ptr<PendingCommand> stop_in_force(Seat& seat, const StopRequest& request);
   void hand_stop_to(Seat& seat, PendingCommand& stop);

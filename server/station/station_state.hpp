@@ -154,6 +154,7 @@ struct RobotState {
 
   ControlState control;
   std::optional<CommandId> pending_stop;  // an emergency stop that no robot has acknowledged yet
+  std::int64_t retired_at_us = 0;         // UTC; 0: in use
 
   // The station's own latch: no motion command passes while it is set.
   bool latched() const { return pending_stop.has_value() || context.emergency_id != 0; }

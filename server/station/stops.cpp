@@ -16,6 +16,7 @@ namespace {
 constexpr microseconds kRepeatStop{1'000'000};
 constexpr microseconds kSamePress{10'000'000};
 constexpr std::size_t kMaxStops = 16;  // on their way to one robot; who asks for more waits for the newest of them
+constexpr microseconds kMayStillMove{60'000'000};  // twice the longest that a robot goes on without its link
 
 }  // namespace
 
@@ -44,6 +45,10 @@ asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds 
   StopsOfAll outcome;
   held_back_.emplace();
   for (auto& [id, seat] : seats_) {
+    if (may_be_left_out(seat)) {
+      outcome.left_out.push_back(id);
+      continue;
+    }
     request.robot_id = id;
     try {
       stops.emplace_back(begin_stop(seat, request), seat.port != nullptr);
@@ -53,7 +58,8 @@ asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds 
     }
   }
   publish_held_back(outcome.failed);
-  spdlog::warn("emergency stop of all {} robots by {}", seats_.size(), request.actor);
+  spdlog::warn("emergency stop of all {} robots by {}; {} retired ones are not connected and left out", stops.size(),
+               request.actor, outcome.left_out.size());
   for (const auto& [stop, is_connected] : stops) {
     const microseconds left{is_connected ? std::max<std::int64_t>(deadline_us - clock_.steady_us(), 0) : 0};
     if (left.count() > 0) co_await follow(stop, false, left);
@@ -61,6 +67,15 @@ asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds 
     if (!has_failed) outcome.records.push_back(stop->record);
   }
   co_return outcome;
+}
+
+// SAFETY: only a retired robot that is not connected. One that was heard after it had been retired is in use: without
+// its link it may move on for a while, so it is stopped like any other until that time is over.
+bool Station::may_be_left_out(const Seat& seat) const {
+  const RobotState& robot = *seat.robot;
+  if (robot.retired_at_us == 0 || seat.port != nullptr) return false;
+  const bool was_heard_since = robot.last_received_at_us > robot.retired_at_us;
+  return !was_heard_since || clock_.steady_us() - robot.last_received_steady_us > kMayStillMove.count();
 }
 
 // What was to be told of the stops while their frames were being written.

@@ -177,6 +177,20 @@ class AccountsTest(unittest.TestCase):
             place.start_robot(station, "rheo-1", "--token", made["secret"])
             station.wait_for_robot("rheo-1")
 
+    def test_a_robot_is_retired_with_and_without_a_station(self):
+        with lab() as place:
+            self.assertEqual(cli(place, "robot", "enroll", "rheo-1")[0], 0)
+            self.assertEqual(cli(place, "robot", "retire", "rheo-1")[1], "Robot rheo-1 was retired\n")
+            station = place.start_station()
+            self.assertTrue(station.robot("rheo-1")["retired"])
+            self.assertIn(", retired ", cli(place, "robot", "list")[1])
+            self.assertEqual(cli(place, "robot", "unretire", "rheo-1")[1], "Robot rheo-1 was put back into use\n")
+            self.assertFalse(station.robot("rheo-1")["retired"])
+            self.assertEqual(cli(place, "robot", "retire", "rheo-1")[0], 0)
+            self.assertTrue(station.robot("rheo-1")["retired"])
+            self.assertEqual(place.stop_station(), 0)
+            self.assertTrue(place.start_station().robot("rheo-1")["retired"], "a restart does not change it")
+
     def test_mistakes_are_told_in_a_line(self):
         with lab() as place:
             self.assertIn("there is no '", cli(place, "user", "list")[2])
@@ -199,7 +213,8 @@ class AccountsTest(unittest.TestCase):
                     self.assertIn(expected, err)
             self.assertEqual(cli(place, "user", "add", "anna", "--role", "viewer", text=PASSWORD)[0], 0)
             station = place.start_station()
-            for command in (("user", "remove", "otto"), ("token", "revoke", "x"), ("robot", "revoke", "r9")):
+            for command in (("user", "remove", "otto"), ("token", "revoke", "x"), ("robot", "revoke", "r9"),
+                            ("robot", "retire", "r9"), ("robot", "unretire", "r9")):
                 with self.subTest(command=command):
                     status, _, err = cli(place, *command)
                     self.assertEqual(status, 1)

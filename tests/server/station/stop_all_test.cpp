@@ -79,6 +79,7 @@ class StopAllTest : public ::testing::Test {
     AdmissionRequest hello;
     hello.robot_id = id;
     hello.boot_id = 7;
+    hello.received_at_us = clock.utc_us();
     station.on_connected(*ports.back(), hello, protocol::Hello(rheonaut_Hello_init_zero), Admission{}, "memory");
     return *ports.back();
   }
@@ -146,6 +147,42 @@ TEST_F(StopAllTest, ARobotThatIsAwayIsNotWaitedFor) {
   stop_all(1s);
   ASSERT_TRUE(outcome.has_value());
   EXPECT_EQ(outcome->records[0].state, CommandState::queued);
+}
+
+TEST_F(StopAllTest, OnlyARetiredRobotThatIsNotConnectedIsLeftOut) {
+  for (const char* id : {"away", "retired", "there"}) connect(id);
+  clock.run_for(1s);
+  for (std::size_t i : {0u, 1u}) station.on_disconnected(*ports[i], "gone");
+  clock.run_for(1s);
+  station.set_retired("retired", clock.utc_us(), "token:admin");
+  station.set_retired("there", clock.utc_us(), "token:admin");
+  stop_all();
+  ports[2]->obey();
+  ASSERT_TRUE(clock.run_until([this] { return outcome.has_value(); }, 10ms));
+  EXPECT_THAT(outcome->left_out, ElementsAre("retired"));
+  ASSERT_EQ(outcome->records.size(), 2u);
+  EXPECT_EQ(outcome->records[0].robot_id, "away");
+  EXPECT_EQ(outcome->records[1].robot_id, "there") << "retired, and connected";
+  EXPECT_FALSE(station.find("retired")->pending_stop);
+}
+
+TEST_F(StopAllTest, ARetiredRobotThatWasHeardAgainIsStoppedForAMinuteAfterItsLinkWasLost) {
+  station.restore({{.id = "a", .retired_at_us = clock.utc_us()}}, {});
+  clock.run_for(1s);
+  connect("a");
+  clock.run_for(1s);
+  station.on_disconnected(*ports[0], "gone");
+  clock.run_for(59s);
+  stop_all();
+  ASSERT_TRUE(outcome.has_value());
+  EXPECT_THAT(outcome->left_out, IsEmpty()) << "it may move on without its link";
+  EXPECT_EQ(outcome->records.at(0).state, CommandState::queued);
+  clock.run_for(2s);
+  stop_all();
+  EXPECT_THAT(outcome->left_out, ElementsAre("a"));
+  station.set_retired("a", 0, "token:admin");
+  stop_all();
+  EXPECT_THAT(outcome->left_out, IsEmpty());
 }
 
 }  // namespace
