@@ -47,18 +47,10 @@ ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clo
       auth_{loop, clock, accounts_, options.data_dir, options.store_id},
       logins_{clock, accounts_, options.password_cost},
       guard_{auth_, host_names(options), options.security->http().tls != nullptr},
-      parts_{loop,
-             tasks,
-             clock,
-             station,
-             live,
-             recording,
-             analysis,
-             auth_,
-             accounts_,
-             logins_,
-             facts_of(options, listener_, clock)},
-      live_{loop, tasks, clock, station, live, options.version},
+      texts_{loop, station},
+      parts_{loop,      tasks,    clock, station,   live,    texts_,
+             recording, analysis, auth_, accounts_, logins_, facts_of(options, listener_, clock)},
+      live_{loop, tasks, clock, station, live, texts_, options.version},
       server_{tasks, clock, listener_, options.security->http(), guard_, router_, live_} {
   add_routes(router_, parts_);
 }

@@ -52,6 +52,7 @@ class ApiServer {
   Auth auth_;
   Logins logins_;
   RequestGuard guard_;
+  RobotTexts texts_;
   ApiParts parts_;
   LiveParts live_;
   Router router_;

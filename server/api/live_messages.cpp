@@ -111,16 +111,16 @@ Result<void> on_watch(const Members& message, Subscriber& page, LiveParts& parts
 
 }  // namespace
 
-std::string welcome_message(const std::string& actor, const LiveParts& parts) {
+RobotDocument welcome_message(const std::string& actor, const LiveParts& parts) {
   json message;
   message["type"] = "welcome";
   message["actor"] = actor;
   message["version"] = parts.version;
   message["utc_us"] = parts.clock.utc_us();
   message["stamp_us"] = parts.clock.steady_us();
-  message["robots"] = json::array();
-  for (const auto& [id, robot] : parts.station.robots()) message["robots"].push_back(to_json(robot));
-  return dump(message);
+  std::string head = dump(message);
+  head.pop_back();  // the closing brace: the robots follow
+  return {parts.texts, head + R"(,"robots":[)", "]}"};
 }
 
 Result<void> on_page_message(const std::string& text, const Caller& caller, Subscriber& page, LiveParts& parts) {

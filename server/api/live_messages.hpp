@@ -8,6 +8,7 @@
 
 #include "server/api/caller.hpp"
 #include "server/live/live_feed.hpp"
+#include "server/live/robot_texts.hpp"
 #include "server/result.hpp"
 #include "server/station/station.hpp"
 #include "server/tasks.hpp"
@@ -22,6 +23,7 @@ struct LiveParts {
   Clock& clock;
   Station& station;
   LiveFeed& live;
+  RobotTexts& texts;
   std::string version;
   std::size_t renewals = 0;                       // on their way
   std::map<std::string, std::size_t> pages = {};  // that are open, of each user, token or link
@@ -31,7 +33,8 @@ struct LiveParts {
 inline constexpr std::size_t kMaxRenewals = 256;
 inline constexpr std::size_t kMaxWatched = 64;  // robots, of a page
 
-std::string welcome_message(const std::string& actor, const LiveParts& parts);
+// The first message of a page. Its stamp is of now: the states in it are as new or newer.
+RobotDocument welcome_message(const std::string& actor, const LiveParts& parts);
 
 // Acts on one message. Returns at once: a stop or a renewal goes on as a task, and what becomes of it is heard as
 // `command`. The error, if any, is for the page.

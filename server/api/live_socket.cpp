@@ -40,6 +40,7 @@ class LivePage {
     socket_.set_option(none);
     socket_.read_message_max(kMaxMessageBytes);
     socket_.text(true);
+    socket_.auto_fragment(false);  // what is long is written in pieces already
     heard_at_us_ = parts_.clock.steady_us();
     auto on_control = [this](websocket::frame_type, beast::string_view) { heard_at_us_ = parts_.clock.steady_us(); };
     socket_.control_callback(std::move(on_control));
@@ -51,8 +52,7 @@ class LivePage {
   asio::awaitable<void> run(UpgradeRequest upgrade) {
     const auto [error] = co_await socket_.async_accept(upgrade, asio::as_tuple(asio::use_awaitable));
     if (error) co_return;
-    parts_.live.add(queue_);
-    queue_.push(std::make_shared<const std::string>(welcome_message(caller_.actor, parts_)), false);
+    parts_.live.add(queue_);  // what changes while the welcome is written is told after it
     co_await (read() || write() || watch() || caller_.standing->wait_for_end());
     if (caller_.standing->ended()) spdlog::info("the page of {} was signed out", caller_.actor);
   }
@@ -109,7 +109,24 @@ class LivePage {
     return ++heard_in_second_ > kMaxMessagesASecond;
   }
 
+  // One message, in as many frames as it has pieces.
+  asio::awaitable<bool> write_welcome() {
+    RobotDocument welcome = welcome_message(caller_.actor, parts_);
+    while (!welcome.is_whole()) {
+      const std::string piece = co_await welcome.next();
+      queue_.forget_states(welcome.after(), welcome.last());
+      writing_since_us_ = parts_.clock.steady_us();
+      const auto [error, size] = co_await socket_.async_write_some(welcome.is_whole(), asio::buffer(piece),
+                                                                   asio::as_tuple(asio::use_awaitable));
+      writing_since_us_ = kNever;
+      if (error) co_return false;
+    }
+    co_return true;
+  }
+
   asio::awaitable<void> write() {
+    const bool is_welcomed = co_await write_welcome();
+    if (!is_welcomed) co_return;
     for (;;) {
       co_await queue_.wait();
       for (LiveText message = queue_.pop(); message != nullptr; message = queue_.pop()) {

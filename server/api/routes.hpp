@@ -14,6 +14,7 @@
 #include "server/api/query_params.hpp"
 #include "server/api/router.hpp"
 #include "server/live/live_feed.hpp"
+#include "server/live/robot_texts.hpp"
 #include "server/net/transport_security.hpp"
 #include "server/recording/recording_parts.hpp"
 #include "server/station/station.hpp"
@@ -38,6 +39,7 @@ struct ApiParts {
   Clock& clock;
   Station& station;
   LiveFeed& live;
+  RobotTexts& texts;
   RecordingParts& recording;
   AnalysisService& analysis;
   Auth& auth;

@@ -17,10 +17,30 @@ Response unknown_robot(const std::string& id) {
   return problem(404, fmt::format("no robot '{}' is known", id.substr(0, 40)), "unknown_robot");
 }
 
+// The robots that the first piece has no room for: each piece is made when the client has taken the one before.
+class RobotList final : public BodyStream {
+ public:
+  RobotList(std::string first, RobotDocument document) : first_{std::move(first)}, document_{std::move(document)} {}
+
+  asio::awaitable<Result<std::optional<std::string>>> next() override {
+    if (!first_.empty()) co_return std::optional{std::exchange(first_, {})};
+    if (document_.is_whole()) co_return std::optional<std::string>{};
+    std::string piece = co_await document_.next();
+    co_return std::optional{std::move(piece)};
+  }
+
+ private:
+  std::string first_;
+  RobotDocument document_;
+};
+
 Answer list_robots(ApiParts& parts, Request) {
-  json list = json::array();
-  for (const auto& [id, robot] : parts.station.robots()) list.push_back(to_json(robot));
-  co_return json_response(200, {{"robots", std::move(list)}});
+  RobotDocument document{parts.texts, R"({"robots":[)", "]}"};
+  std::string first = co_await document.next();
+  if (document.is_whole()) co_return json_text_response(200, std::move(first));
+  Response response = json_text_response(200, "");
+  response.stream = std::make_unique<RobotList>(std::move(first), std::move(document));
+  co_return response;
 }
 
 Answer get_robot(ApiParts& parts, Request request) {

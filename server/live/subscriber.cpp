@@ -23,6 +23,11 @@ void Subscriber::push_state(const RobotId& robot, LiveText message) {
   arrived_.notify();
 }
 
+void Subscriber::forget_states(const RobotId& after, const RobotId& last) {
+  std::erase_if(slots_, [&](const Slot& slot) { return after < slot.robot && slot.robot <= last; });
+  std::erase_if(states_, [&](const auto& state) { return after < state.first && state.first <= last; });
+}
+
 void Subscriber::drop_one() {
   auto victim = std::ranges::find_if(queue_, [](const Entry& entry) { return entry.droppable; });
   if (victim == queue_.end()) victim = queue_.begin();

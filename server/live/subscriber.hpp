@@ -28,6 +28,8 @@ class Subscriber {
 
   void push(LiveText message, bool droppable);
   void push_state(const RobotId& robot, LiveText message);
+  // Drops what waits of the robots whose ids follow the first of these, up to the second: a newer state was told.
+  void forget_states(const RobotId& after, const RobotId& last);
   boost::asio::awaitable<void> wait();  // until a message waits; throws operation_aborted when cancelled
   LiveText pop();                       // null when none waits
 

@@ -3,12 +3,22 @@
 // Plain values, copied freely. Enumerators are those of the protocol; protocol::text() gives their JSON spelling.
 #pragma once
 
+#include <array>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "protocol/messages.hpp"
+
+// In the namespace of the generated struct. Byte by byte, so that no field is forgotten and NaN equals NaN; padding, if
+// there is any, may make a difference where there is none.
+inline bool operator==(const rheonaut_Status& a, const rheonaut_Status& b) {
+  using Bytes = std::array<std::byte, sizeof a>;
+  return std::bit_cast<Bytes>(a) == std::bit_cast<Bytes>(b);
+}
 
 namespace server {
 
@@ -92,6 +102,7 @@ struct ClockEstimate {
 
   // Of offset_us, at this time of the robot.
   std::int64_t uncertainty_us(std::uint64_t robot_time_us) const;
+  bool operator==(const ClockEstimate&) const = default;
 };
 
 // A clock estimate as it is recorded: once a minute, and whenever it or the station's own time has jumped.
@@ -158,6 +169,7 @@ struct RobotState {
 
   // The station's own latch: no motion command passes while it is set.
   bool latched() const { return pending_stop.has_value() || context.emergency_id != 0; }
+  bool operator==(const RobotState&) const = default;
 };
 
 enum class CommandState : std::uint8_t {

@@ -111,7 +111,8 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
   TaskGroup tasks{loop};
   Station station{loop, clock, Envelope{}, LinkTimes{}};
   LiveFeed feed{clock};
-  LiveParts live{loop, tasks, clock, station, feed, "0"};
+  RobotTexts texts{loop, station};
+  LiveParts live{loop, tasks, clock, station, feed, texts, "0"};
   Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
   NewCredentials credentials{loop, clock, folder.path()};
   const RequestGuard guard{credentials.auth, {}};
@@ -155,7 +156,8 @@ TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
   TaskGroup tasks{loop};
   Station station{loop, clock, Envelope{}, LinkTimes{}};
   LiveFeed feed{clock};
-  LiveParts live{loop, tasks, broken, station, feed, "0"};
+  RobotTexts texts{loop, station};
+  LiveParts live{loop, tasks, broken, station, feed, texts, "0"};
   Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
   NewCredentials credentials{loop, clock, folder.path()};
   Auth& auth = credentials.auth;

@@ -1,6 +1,8 @@
 // A page on /live, with WebSocket frames made by hand.
 #pragma once
 
+#include <functional>
+
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -8,8 +10,12 @@ namespace server {
 // A page: the handshake, then text frames.
 class Page {
  public:
-  Page(VirtualClock& clock, std::uint16_t port, const std::string& headers, const char* from = "127.0.0.1")
+  // `meanwhile` is called once it is connected: what it begins happens while the page opens.
+  Page(
+      VirtualClock& clock, std::uint16_t port, const std::string& headers, const char* from = "127.0.0.1",
+      const std::function<void()>& meanwhile = [] {})
       : client_{clock, port, from} {
+    meanwhile();
     client_.send(
         "GET /live HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n" +
@@ -33,6 +39,12 @@ class Page {
     return nullptr;
   }
 
+  // The next message, of whatever type; null when none comes.
+  json next() {
+    const auto text = next_message();
+    return text ? json::parse(*text) : json();
+  }
+
   bool closed() { return client_.closed(); }
   RawClient& client() { return client_; }
 
@@ -54,6 +66,7 @@ class Page {
   }
 
   std::optional<std::string> next_message() {
+    std::string message;  // of several frames, perhaps
     for (;;) {
       const std::string head = client_.read_exactly(2);
       if (head.size() < 2) return std::nullopt;
@@ -65,11 +78,16 @@ class Page {
         }
         size = extended;
       }
-      std::string payload = client_.read_exactly(size);
+      const std::string payload = client_.read_exactly(size);
       if (head[0] == '\x88') return std::nullopt;
-      if (head[0] != '\x89') return payload;
-      ++pings;
-      if (answers_pings) send_frame('\x8a', payload);
+      if (head[0] == '\x89') {
+        ++pings;
+        if (answers_pings) send_frame('\x8a', payload);
+        continue;
+      }
+      message += payload;
+      const bool is_last_frame = (static_cast<unsigned char>(head[0]) & 0x80U) != 0;
+      if (is_last_frame) return message;
     }
   }
 

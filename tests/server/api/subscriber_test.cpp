@@ -39,5 +39,19 @@ TEST(Subscriber, DropsWhatIsOldestWhenThereAreNoSamples) {
   EXPECT_EQ(*listener.pop(), "1");
 }
 
+// Of robots that were told by another way, in order of their ids; a newer state of them waits again.
+TEST(Subscriber, ForgetsTheStatesOfARangeOfRobots) {
+  boost::asio::io_context loop;
+  Subscriber listener{loop};
+  for (const char* robot : {"d", "b", "a", "c"}) listener.push_state(robot, message(robot));
+  listener.push(message("event"), false);
+  listener.forget_states("a", "c");
+  listener.forget_states("x", "x");
+  listener.push_state("b", message("newer b"));
+  std::vector<std::string> all;
+  for (LiveText text = listener.pop(); text != nullptr; text = listener.pop()) all.push_back(*text);
+  EXPECT_EQ(all, (std::vector<std::string>{"d", "event", "a", "newer b"}));
+}
+
 }  // namespace
 }  // namespace server
