@@ -236,7 +236,18 @@ void LiveFeed::on_event(const RobotState&, const RobotEvent& event) {
   if (events_.size() == kMaxLog) publish_log();
 }
 
+// Of renewals only that they are refused now, and why: once, until one succeeds again.
+bool LiveFeed::is_news(const CommandRecord& record) {
+  if (record.kind != "renew_lease") return true;
+  std::string& refusal = robots_[record.robot_id].renewal_refusal;
+  if (was_accepted(record.state)) refusal.clear();
+  const bool is_refused = record.state == CommandState::rejected || record.state == CommandState::expired ||
+                          record.state == CommandState::failed;
+  return is_refused && std::exchange(refusal, record.reason) != record.reason;
+}
+
 void LiveFeed::on_command(const CommandRecord& record) {
+  if (!is_heard() || !is_news(record)) return;
   Message{[&] { return dump({{"type", "command"}, {"command", to_json(record)}}); }}.push(watch_all_, false);
   if (choosy_.empty()) return;
   std::erase_if(commands_, [&](const CommandRecord& older) { return older.id == record.id; });

@@ -24,7 +24,7 @@ namespace server {
 // Whoever watches a robot hears at once what changed of it, but for small changes of its state (with the next stamp)
 // and samples (50 ms of them at a time). Whoever said what it watches hears the rest with the next stamp only: the
 // large changes of the other robots, and one `log` of all events and commands. So a page costs the same few messages a
-// second however many robots there are.
+// second however many robots there are. A lease that was renewed, some ten times a second, is told to nobody.
 class LiveFeed final : public StationSink {
  public:
   explicit LiveFeed(Clock& clock) : clock_{clock} {}
@@ -63,6 +63,7 @@ class LiveFeed final : public StationSink {
     std::optional<Change> change;         // since the last stamp
     std::optional<SampleBatch> gathered;  // under 50 ms of samples
     std::int64_t gathered_since_us = 0;   // steady
+    std::string renewal_refusal;          // why its last lease was not renewed; empty: it was
   };
 
   static Headline headline(const RobotState& robot);
@@ -76,6 +77,7 @@ class LiveFeed final : public StationSink {
   void publish_gathered(Robot& robot);
   void publish_late_samples();
   void publish_log();
+  bool is_news(const CommandRecord& record);
 
   Clock& clock_;
   Subscribers watch_all_;

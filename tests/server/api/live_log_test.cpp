@@ -1,0 +1,64 @@
+// What of commands is told to those who watch.
+#include <gtest/gtest.h>
+
+#include "server/live/live_feed.hpp"
+#include "server/tasks.hpp"
+#include "tests/server/virtual_clock.hpp"
+
+namespace server {
+namespace {
+
+using namespace std::chrono_literals;
+using nlohmann::json;
+
+std::vector<json> messages_of(Subscriber& subscriber) {
+  std::vector<json> all;
+  for (LiveText text = subscriber.pop(); text != nullptr; text = subscriber.pop()) all.push_back(json::parse(*text));
+  return all;
+}
+
+// While somebody holds a duty its lease is renewed some ten times a second.
+TEST(LiveLog, OfLeasesThatAreRenewedNobodyHearsOnlyThatOneWasNot) {
+  boost::asio::io_context loop;
+  VirtualClock clock{loop};
+  TaskGroup tasks{loop};
+  LiveFeed live{clock};
+  tasks.spawn("live feed", live.run());
+  Subscriber listener{loop};
+  live.add(listener);
+  const auto heard = [&] { return messages_of(listener); };
+  Subscriber choosy{loop};
+  live.add(choosy);
+  live.watch(choosy, {"r1"});
+  CommandRecord renewal;
+  renewal.robot_id = "r1";
+  renewal.kind = "renew_lease";
+  const auto renew = [&](CommandState end, const char* reason) {
+    ++renewal.id;
+    for (const CommandState state : {CommandState::queued, CommandState::sent, end}) {
+      renewal.state = state;
+      renewal.reason = state == end ? reason : "";
+      live.on_command(renewal);
+    }
+  };
+  for (int i = 0; i < 100; ++i) renew(CommandState::acknowledged, "");
+  EXPECT_TRUE(heard().empty());
+  for (int i = 0; i < 10; ++i) renew(CommandState::rejected, "nothing_to_renew");
+  const auto told = heard();
+  ASSERT_EQ(told.size(), 1U) << "once";
+  EXPECT_EQ(told[0]["command"]["state"], "rejected");
+  renew(CommandState::failed, "link_lost");
+  EXPECT_EQ(heard().at(0)["command"]["reason"], "link_lost") << "for another reason";
+  renew(CommandState::acknowledged, "");
+  renew(CommandState::failed, "link_lost");
+  EXPECT_EQ(heard().size(), 1U) << "refused anew";
+  clock.run_for(100ms);
+  const auto logged = messages_of(choosy);
+  ASSERT_EQ(logged.at(0)["type"], "log");
+  EXPECT_EQ(logged[0]["commands"].size(), 3U);
+  tasks.stop();
+  clock.settle();
+}
+
+}  // namespace
+}  // namespace server
