@@ -140,6 +140,37 @@ std::vector<Run> list_runs(SQLite::Database& database, const BootHeads& heads, c
   return runs;
 }
 
+std::vector<InterruptedRun> read_interrupted(SQLite::Database& database, const std::vector<RunId>& ids) {
+  SQLite::Statement row{
+      database,
+      "SELECT robot_id, name, iif(EXISTS (SELECT 1 FROM run_span WHERE run_id = ?1), ended_at_us, NULL)"
+      " FROM run WHERE run_id = ?1"};
+  std::vector<InterruptedRun> runs;
+  for (const RunId id : ids) {
+    bind_all(row, id);
+    if (!row.executeStep()) continue;
+    InterruptedRun run{.id = id,
+                       .robot_id = row.getColumn(0).getString(),
+                       .name = row.getColumn(1).getString(),
+                       .last_sample_at_us = {}};
+    if (!row.getColumn(2).isNull()) run.last_sample_at_us = row.getColumn(2).getInt64();
+    runs.push_back(std::move(run));
+  }
+  return runs;
+}
+
+std::vector<RunId> interrupted_since_start(SQLite::Database& database) {
+  SQLite::Statement entries{database, "SELECT action, subject FROM audit ORDER BY entry DESC LIMIT 10000"};
+  std::vector<RunId> ids;
+  while (entries.executeStep()) {
+    const std::string action = entries.getColumn(0).getString();
+    if (action == "station.started") break;
+    if (action == "run.interrupted") ids.push_back(entries.getColumn(1).getInt64());
+  }
+  std::ranges::reverse(ids);
+  return ids;
+}
+
 std::optional<RunSnapshot> read_snapshot(SQLite::Database& database, RunId id) {
   SQLite::Statement run{database, fmt::format("SELECT {} FROM run WHERE run_id = ?", kRunColumns)};
   bind_all(run, id);

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "server/recording/runs.hpp"
@@ -21,6 +22,18 @@ using BootHeads = std::map<BootId, std::uint64_t>;
 std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, RunId id);
 std::optional<RunState> read_run_state(SQLite::Database& database, RunId id);
 std::vector<Run> list_runs(SQLite::Database& database, const BootHeads& heads, const RunFilter& filter);
+
+// A run that was open when the station stopped, or was killed.
+struct InterruptedRun {
+  RunId id = 0;
+  RobotId robot_id;
+  std::string name;
+  std::optional<std::int64_t> last_sample_at_us;  // UTC; empty: it has no sample
+};
+
+std::vector<InterruptedRun> read_interrupted(SQLite::Database& database, const std::vector<RunId>& ids);
+// Which were interrupted since the station started last, as the newest 10,000 entries of the audit say.
+std::vector<RunId> interrupted_since_start(SQLite::Database& database);
 
 std::optional<RunSnapshot> read_snapshot(SQLite::Database& database, RunId id);
 

@@ -65,7 +65,7 @@ void RunStore::end(RunId id, const std::string& verdict, const std::string& stat
   transaction.commit();
 }
 
-std::size_t RunStore::interrupt(std::int64_t utc_us) {
+std::vector<RunId> RunStore::interrupt(std::int64_t utc_us) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   std::vector<RunId> open;
   SQLite::Statement query{handle_, "SELECT run_id FROM run WHERE ended_at_us IS NULL"};
@@ -86,7 +86,7 @@ std::size_t RunStore::interrupt(std::int64_t utc_us) {
   }
   last_span.reset();
   transaction.commit();
-  return open.size();
+  return open;
 }
 
 void RunStore::tell(RunId id, const RobotId& robot_id, const char* action, const nlohmann::json& detail,

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/audit_note.hpp"
 #include "server/recording/database.hpp"
@@ -34,8 +35,8 @@ class RunStore {
   // Closes the open span at the newest sample (a span without samples is dropped) and the run.
   void end(RunId id, const std::string& verdict, const std::string& station_document, const Author& by);
 
-  // Closes every open run at the last sample known of its open span. Returns how many there were.
-  std::size_t interrupt(std::int64_t utc_us);
+  // Closes every open run at the last sample known of its open span. Returns which they were.
+  std::vector<RunId> interrupt(std::int64_t utc_us);
 
  private:
   RunId insert(const Run& run);

@@ -1,6 +1,7 @@
 // Checks on the loop, SQL on the disk thread and the readers'.
 #include "server/recording/runs.hpp"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -49,6 +50,33 @@ Error disk_fails() {
   return {ErrorCode::unavailable, "the disk cannot be written now; the station's log says why. Try again", ""};
 }
 
+// SAFETY: a full disk does not keep the station from starting.
+template <class Job>
+auto or_problem(Job job) {
+  return [job = std::move(job)](Database& database) -> Result<std::vector<InterruptedRun>> {
+    try {
+      return job(database);
+    } catch (const SQLite::Exception& error) {
+      return fail(ErrorCode::unavailable, error.what());
+    }
+  };
+}
+
+void report_interrupted(const Result<std::vector<InterruptedRun>>& interrupted) {
+  if (!interrupted) {
+    spdlog::warn("runs that were open cannot be interrupted now: {}; tried again", interrupted.error().detail);
+    return;
+  }
+  for (const InterruptedRun& run : *interrupted) {
+    const auto at_us = run.last_sample_at_us;
+    const std::string end = at_us ? fmt::format("at its last sample, {:%Y-%m-%d %H:%M:%S}.{:03} UTC",
+                                                fmt::gmtime(*at_us / 1'000'000), *at_us / 1000 % 1000)
+                                  : "without a sample";
+    spdlog::warn("run {} '{}' of robot '{}' was open when the station stopped: it is interrupted {}", run.id, run.name,
+                 run.robot_id, end);
+  }
+}
+
 Error no_such_run(RunId id) { return {ErrorCode::not_found, fmt::format("there is no run {}", id), ""}; }
 
 }  // namespace
@@ -74,26 +102,26 @@ Runs::Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, Certifier& 
     : clock_{clock}, recorder_{recorder}, reader_{reader}, certifier_{certifier} {}
 
 asio::awaitable<void> Runs::load() {
-  auto job = [utc_us = clock_.utc_us()](Database& database) -> Result<std::size_t> {
-    try {
-      return RunStore{database, {}}.interrupt(utc_us);
-    } catch (const SQLite::Exception& error) {  // SAFETY: a full disk does not keep the station from starting
-      return fail(ErrorCode::unavailable, error.what());
-    }
-  };
-  const Result<std::size_t> interrupted = co_await recorder_.on_disk(std::move(job));
+  auto by_stop = or_problem([](Database& database) {
+    return read_interrupted(database.handle(), interrupted_since_start(database.handle()));
+  });
+  report_interrupted(co_await recorder_.on_disk(std::move(by_stop)));
+  co_await interrupt_open();
+}
+
+asio::awaitable<void> Runs::interrupt_open() {
+  auto by_kill = or_problem([utc_us = clock_.utc_us()](Database& database) {
+    return read_interrupted(database.handle(), RunStore{database, {}}.interrupt(utc_us));
+  });
+  const auto interrupted = co_await recorder_.on_disk(std::move(by_kill));
   is_loaded_ = interrupted.has_value();
-  if (!is_loaded_) {
-    spdlog::warn("runs that were open cannot be interrupted now: {}; tried again", interrupted.error().detail);
-  } else if (*interrupted > 0) {
-    spdlog::warn("{} runs were open when the station stopped: they are interrupted", *interrupted);
-  }
+  report_interrupted(interrupted);
 }
 
 asio::awaitable<void> Runs::finish_loading() {
   while (!is_loaded_) {
     co_await clock_.sleep_for(kLoadInterval);
-    co_await load();
+    co_await interrupt_open();
   }
 }
 

@@ -122,7 +122,8 @@ class Runs final : public StationSink {
  public:
   Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, Certifier& certifier);
 
-  // Runs that were open when the station was killed are interrupted. Call before robots arrive.
+  // Runs that were open when the station was killed are interrupted; the log names them, and those that its last stop
+  // interrupted. Call before robots arrive.
   boost::asio::awaitable<void> load();
   // What load() could not do, because the disk could not be written: until it is done. No run begins before.
   boost::asio::awaitable<void> finish_loading();
@@ -174,6 +175,7 @@ class Runs final : public StationSink {
     std::uint32_t parameters_checksum = 0;
   };
 
+  boost::asio::awaitable<void> interrupt_open();
   boost::asio::awaitable<Result<RecordedSamples>> samples_in(RobotId robot_id, RecordedRange range);
   boost::asio::awaitable<Result<Run>> changed(RunId id, Result<void> outcome);
 
