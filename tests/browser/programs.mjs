@@ -45,6 +45,7 @@ class Program {
     if (!this.runs) return;
     const ended = once(this.process, 'exit');
     this.process.kill(signal);
+    this.process.kill('SIGCONT'); // one that a failed test has stopped ends as well
     await ended;
   }
 }
@@ -55,6 +56,7 @@ export class Bench {
   endpoints = null;
   station = null;
   robot = null;
+  fleet = null;
   proxy = null;
   browser = null;
 
@@ -76,6 +78,11 @@ export class Bench {
 
   start_robot(id) {
     this.robot = new Program('rheonaut-sim', '--station', this.endpoints.robots, '--id', id);
+  }
+
+  // Robots ID-1 to ID-SIZE in one process.
+  start_fleet(id, size) {
+    this.fleet = new Program('rheonaut-sim', '--station', this.endpoints.robots, '--id', id, '--robots', String(size));
   }
 
   // The network between a page and the station: `rheonaut-sim proxy`, and the words it is told.
@@ -126,6 +133,7 @@ export class Bench {
     await this.browser?.close();
     await this.proxy?.end();
     await this.robot?.end();
+    await this.fleet?.end();
     await this.station?.end();
     rmSync(this.data, { recursive: true, force: true });
   }

@@ -1,18 +1,19 @@
 // A made-up station inside the page: the cockpit with synthetic samples, for work on its looks. Never built into dist.
 //
-// ?scene=auto (the closed-loop experiment), manual, emergency, silent, empty, signed_out.
+// ?scene=auto (the closed-loop experiment), manual, emergency, fleet (621 robots), silent, empty, signed_out.
 
 import '../src/styles';
 import { render } from 'preact';
 import type { LiveMessage, RobotState } from '../src/api';
-import { listen_for_stop_key } from '../src/keys';
+import { keep_menus_shut, listen_for_stop_key } from '../src/keys';
 import type { Socket } from '../src/live';
 import { Session } from '../src/session';
+import { show_in_tab } from '../src/tab';
 import { Cockpit } from '../src/views/cockpit';
 
 const scene = new URLSearchParams(location.search).get('scene') ?? 'auto';
 const emergency_id = scene === 'emergency' ? '9371204588120447103' : null;
-const mode = scene === 'silent' ? 'auto' : (scene as RobotState['mode']);
+const mode = ['silent', 'fleet'].includes(scene) ? 'auto' : (scene as RobotState['mode']);
 const boot_id = '4403811029384756012';
 
 const robot = (robot_id: string, seq: number): RobotState => ({
@@ -20,7 +21,7 @@ const robot = (robot_id: string, seq: number): RobotState => ({
   last_received_at_us: 0, boot_id, reset_cause: 'power_on', firmware_version: '0.1.0', sample_period_us: 10_000,
   ring_capacity: 800, parameters_checksum: 1, controller_id: 1, controller_checksum: 1,
   mode: robot_id === 'rheo-1' ? mode : 'manual', sub_state: mode === 'auto' ? 'navigating' : 'none', setpoint_m: 0.1,
-  disturbance_m: 0, position_sd_m: 0.0008, emergency_id: robot_id === 'rheo-1' ? emergency_id : null,
+  disturbance_m: 0, position_sd_m: 0.0031, emergency_id: robot_id === 'rheo-1' ? emergency_id : null,
   emergency_cause: emergency_id ? 'operator' : 'none', flags: 0, sample: null, next_seq: seq, oldest_seq: 0,
   durable_next_seq: seq - 12, latest_robot_time_us: seq * 10_000,
   status: { supply_mv: 3712, rssi_dbm: -58, free_memory_bytes: 31000, worst_tick_us: 2100, missed_ticks: 0,
@@ -51,8 +52,8 @@ function samples(seq: number, size: number): LiveMessage {
   const commanded = scene !== 'manual' && seq > 800 && !(scene === 'emergency' && seq > 4400);
   return {
     type: 'samples', robot_id: 'rheo-1', boot_id, first_seq: seq, first_robot_time_us: seq * 10_000, period_us: 10_000,
-    mode, sub_state: mode === 'auto' ? 'navigating' : 'none', setpoint_m: commanded ? 0.1 : null, disturbance_m: 0,
-    position_sd_m: 0.0008, emergency_id, flags: 0, backfill: false, position_m: rows.map((row) => row[0]),
+    mode, sub_state: mode === 'auto' ? 'navigating' : 'none', setpoint_m: commanded ? 0.1 : null, disturbance_m: commanded && seq >= 2800 ? -0.05 : 0,
+    position_sd_m: 0.0031, emergency_id, flags: 0, backfill: false, position_m: rows.map((row) => row[0]),
     velocity_m_s: rows.map((row) => row[1]), acceleration_m_s2: rows.map(() => 0), duty: rows.map((row) => row[2]),
     impedance_mv: rows.map((row) => row[3]), reference_m: rows.map(() => (commanded ? 0.1 : 0)),
   };
@@ -64,9 +65,11 @@ function open_socket(): Socket {
   let seq = 0;
   setTimeout(() => {
     if (scene === 'signed_out') return (socket.onclose as (() => void) | null)?.();
-    const robots = scene === 'empty' ? [] : [robot('rheo-1', 5600), robot('tank-b', 0)];
+    const others = Array.from({ length: scene === 'fleet' ? 620 : 1 }, (_, n) => robot(n === 0 ? 'tank-b' : `tank-${n}`, 0));
+    const robots = scene === 'empty' ? [] : [robot('rheo-1', 5600), ...others];
     say({ type: 'welcome', actor: 'session:1', version: '0.1.0', utc_us: Date.now() * 1000, stamp_us: 0, robots });
     if (scene === 'empty') return setInterval(() => say({ type: 'stamp', stamp_us: 1 }), 100);
+    session.me.value = { actor: 'session:1', user: '', role: 'admin', scopes: 'admin' };
     session.store.set_runs([{ run_id: 7, robot_id: 'rheo-1', name: 'closed loop, 100 mm', started_at_us: (Date.now() - 31_000) * 1000, ended_at_us: null } as never]);
     const at_us = (ago_s: number) => (Date.now() - ago_s * 1000) * 1000;
     const command = (n: number, kind: string, values: object, state: 'acknowledged' | 'rejected', ago_s: number, reason = '') =>
@@ -91,5 +94,7 @@ function open_socket(): Socket {
 
 const session = new Session({ open_socket, is_signed_out: () => Promise.resolve(scene === 'signed_out') });
 listen_for_stop_key(window, session.stop_selected);
+keep_menus_shut(window);
 session.start();
+show_in_tab(document, session);
 render(<Cockpit session={session} />, document.getElementById('cockpit') as HTMLElement);

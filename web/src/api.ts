@@ -4,16 +4,18 @@
 
 import type { components } from './api_types';
 import { millimetres, percent } from './format';
+import { kReasons } from './reasons';
+import { outcome_of, type StopOutcome } from './stop_outcome';
 
 type Schemas = components['schemas'];
-export type RobotState = Schemas['Robot'];
+export type RobotState = Schemas['Robot'] & { retired?: boolean };
 export type CommandRecord = Schemas['Command'];
 export type CommandBody = Schemas['CommandBody'];
 export type Control = Schemas['Control'];
 export type ControlBody = Schemas['ControlBody'];
 export type EventRecord = Schemas['Event'];
 export type RunRecord = Schemas['Run'];
-export type Station = Schemas['Station'];
+export type Station = Schemas['Station'] & { fluids?: string[] };
 export type Me = Schemas['Me'];
 export type User = Schemas['User'];
 export type Token = Schemas['Token'];
@@ -24,6 +26,22 @@ export type LiveMessage = Schemas['LiveServerMessage'];
 export type ClientMessage = Schemas['LiveClientMessage'];
 type Problem = Schemas['Problem'];
 
+// What the station says of a stop of every robot; one of an older version says only what became of each command.
+export interface StopSummary {
+  robots: number; // the sum of the five below
+  acknowledged: number;
+  unanswered: number;
+  failed: number;
+  kept: number;
+  left_out: number;
+  not_acknowledged: { robot_id: string; outcome: 'failed' | 'unanswered' | 'kept' }[];
+  not_named: number;
+}
+interface StopOfAll {
+  summary?: StopSummary;
+  commands: CommandRecord[];
+}
+
 // A refusal or failure. `message` is a sentence for the operator; `reason` the station's identifier, "" when unknown.
 export class ApiError extends Error {
   constructor(
@@ -31,51 +49,11 @@ export class ApiError extends Error {
     readonly status: number, // 0: no answer at all
     readonly reason = '',
     readonly detail = '', // what the station says beyond the sentence
+    readonly content: unknown = null, // all that it answered
   ) {
     super(message);
   }
 }
-
-const kReasons: Record<string, string> = {
-  malformed: 'The command was malformed.',
-  not_finite: 'That is not a finite number.',
-  out_of_range: 'Outside the range that is allowed.',
-  step_too_large: 'The step is larger than is allowed.',
-  too_long_at_power: 'The motor has run at power for as long as is allowed.',
-  stop_pending: 'An emergency stop is still on its way to the robot. Clear it when it has arrived.',
-  wrong_mode: 'Not possible in this mode.',
-  latched: 'The emergency stop is latched. Clear it first.',
-  other_emergency: 'Another emergency is in force than the one you meant to clear. Look again.',
-  cause_stands: 'The cause of the emergency still stands.',
-  life_too_long: 'The command would have lived too long.',
-  nothing_to_renew: 'The duty had ended already.',
-  motor_on: 'Not while the motor runs.',
-  outward: 'Outside the position limit: only motion inward is accepted.',
-  busy: 'Too many commands wait.',
-  unsupported: 'This firmware does not have it.',
-  not_connected: 'The robot is not connected.',
-  expired: 'It arrived too late and was discarded.',
-  superseded: 'Another command took its place.',
-  by_emergency_stop: 'An emergency stop took its place.',
-  by_an_emergency: 'An emergency took its place.',
-  by_a_newer_command: 'A newer command took its place.',
-  not_seen_in_telemetry: 'The robot accepted it, and telemetry does not show it.',
-  too_old_on_arrival: 'It arrived too late and was discarded.',
-  stopped_by_a_later_stop: 'A later stop was answered first.',
-  stale: 'What this page showed was too old. Look again.',
-  timed_out: 'The robot did not answer in time.',
-  no_answer: 'The robot did not answer in time.',
-  not_sent_in_time: 'It could not be sent in time and was discarded.',
-  unknown_robot: 'The station does not know this robot.',
-  link_lost: 'The link to the robot broke before it answered.',
-  other_boot: 'The robot restarted in between.',
-  not_permitted: 'Your role does not allow that.',
-  wrong_credentials: 'The user or the password is wrong.',
-  no_credential: 'This page is signed out.',
-};
-
-// An identifier of a refusal as a sentence.
-export const sentence = (reason: string) => kReasons[reason] ?? reason.replaceAll('_', ' ');
 
 export type Fetch = (path: string, options: RequestInit) => Promise<Response>;
 
@@ -104,20 +82,26 @@ export class Api {
     return this.ask<{ control: Control | null }>('POST', `/robots/${encodeURIComponent(robot_id)}/control`, said);
   };
 
-  emergency_stop = async (robot_id: string, key: string) => [
-    await this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/emergency-stop`, undefined, key),
-  ];
-  emergency_stop_all = async (key: string) =>
-    (await this.ask<{ commands: CommandRecord[] }>('POST', '/emergency-stop', undefined, key)).commands;
+  emergency_stop = async (robot_id: string, key: string): Promise<StopOutcome> =>
+    outcome_of([await this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/emergency-stop`, undefined, key)]);
+
+  // A stop that failed for some robots is an error whose content says what became of all of them.
+  emergency_stop_all = async (key: string): Promise<StopOutcome> => {
+    const answer = await this.ask<StopOfAll>('POST', '/emergency-stop', undefined, key).catch((error: unknown) => {
+      const content = error instanceof ApiError ? (error.content as Partial<StopOfAll> | null) : null;
+      if (content?.summary) return { summary: content.summary, commands: content.commands ?? [] };
+      throw error;
+    });
+    const outcome = outcome_of(answer.commands);
+    return answer.summary ? { ...outcome, summary: answer.summary } : outcome;
+  };
 
   station = () => this.ask<Station>('GET', '/station');
-  open_run = async (robot_id: string) => {
-    const path = `/runs?robot_id=${encodeURIComponent(robot_id)}&limit=1`;
-    const { runs } = await this.ask<{ runs: RunRecord[] }>('GET', path);
-    return runs.find((run) => run.ended_at_us === null) ?? null;
-  };
+  open_runs = async () => (await this.ask<{ runs: RunRecord[] }>('GET', '/runs?state=open&limit=1000')).runs;
+  newest_run = async (robot_id: string) =>
+    (await this.ask<{ runs: RunRecord[] }>('GET', `/runs?robot_id=${encodeURIComponent(robot_id)}&limit=1`)).runs[0] ?? null;
   start_run = (robot_id: string, name: string, fluid: string) =>
-    this.ask<RunRecord>('POST', '/runs', { robot_id, name, fluid });
+    this.ask<RunRecord>('POST', '/runs', { robot_id, name, ...(fluid === '' ? {} : { fluid }) }); // '': not known
   end_run = (run_id: number) => this.ask<RunRecord>('POST', `/runs/${run_id}/end`);
 
   log_in = (user: string, password: string) => this.ask<Me>('POST', '/login', { user, password });
@@ -169,10 +153,10 @@ export class Api {
 
 function error_of(status: number, problem: Partial<Problem> | null, retry_after_s: number): ApiError {
   const reason = problem?.reason ?? '';
-  if (status === 429) return new ApiError(`Too many attempts. Try again in ${retry_after_s} s.`, status, reason);
+  if (status === 429) return new ApiError(`Too many attempts. Try again in ${retry_after_s} s.`, status, reason, '', problem);
   const known = allowed_range(problem?.detail ?? '') ?? kReasons[reason];
   const otherwise = problem?.detail || problem?.title || `The station answered ${status} without a reason.`;
-  return new ApiError(known ?? otherwise, status, reason, known ? (problem?.detail ?? '') : '');
+  return new ApiError(known ?? otherwise, status, reason, known ? (problem?.detail ?? '') : '', problem);
 }
 
 // "setpoint_m = 99 is outside -1 to 1" in the unit that the operator typed.

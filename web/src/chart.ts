@@ -13,7 +13,15 @@ export interface Trace {
   dash_px?: number[];
 }
 
+// A surface between two columns, drawn below all traces; the range does not follow it.
+export interface Band {
+  low: Column;
+  high: Column;
+  colour: string; // name of a CSS variable
+}
+
 export interface StripOptions {
+  band?: Band;
   traces: Trace[]; // the last one is drawn on top and is the main one
   label: (value: number) => string; // of the graticule, in the unit people read
   fixed_range?: [number, number];
@@ -70,10 +78,8 @@ export class StripChart {
     private readonly on_zoom: (from_s: number, to_s: number) => void,
     private readonly on_cursor: (index: number | null) => void,
   ) {
-    this.window = new PlotWindow(
-      capacity,
-      options.traces.map((trace) => trace.column),
-    );
+    const edges = options.band ? [options.band.low, options.band.high] : [];
+    this.window = new PlotWindow(capacity, [...edges, ...options.traces.map((trace) => trace.column)], edges.length);
     this.range = options.fixed_range ?? [-(options.least_span ?? 1) / 2, (options.least_span ?? 1) / 2];
     this.plot = this.build();
     this.observer = new ResizeObserver(() => this.fit());
@@ -111,10 +117,11 @@ export class StripChart {
   private build(): uPlot {
     const style = getComputedStyle(this.host);
     const colour = (name: string) => style.getPropertyValue(name).trim();
-    const { traces, show_time, label } = this.options;
+    const { band, traces, show_time, label } = this.options;
     const font = `11px ${colour('--numerals')}`;
     const grid = { stroke: colour('--graticule'), width: 1 };
     const axis = { stroke: colour('--muted'), font, grid, ticks: { show: false }, border: { show: false } };
+    const edges: Trace[] = band ? [band.low, band.high].map((column) => ({ column, colour: '', width_px: 0 })) : [];
     const options: uPlot.Options = {
       width: Math.max(this.host.clientWidth, 50),
       height: Math.max(this.host.clientHeight, 40),
@@ -135,14 +142,16 @@ export class StripChart {
         { ...axis, show: true, size: show_time ? 26 : 0, gap: 6, splits: () => this.time_splits(), values: show_time ? (_, at) => at.map(time_label) : () => [] },
         { ...axis, size: 58, gap: 8, splits: () => this.options.splits ?? range_splits(this.range), values: (_, at) => at.map(label) },
       ],
-      series: [{}, ...traces.map((trace, at) => this.series(trace, at, colour(trace.colour)))],
+      bands: band ? [{ series: [2, 1], fill: colour(band.colour) }] : [],
+      series: [{}, ...edges.map((edge, at) => this.series(edge, at, 'transparent')),
+               ...traces.map((trace, at) => this.series(trace, at + edges.length, colour(trace.colour)))],
       hooks: {
         setSelect: [(u) => this.selected(u)],
         setCursor: [(u) => this.on_cursor(u.cursor.left === undefined || u.cursor.left < 0 ? null : (u.cursor.idx ?? null))],
         draw: [(u) => this.draw_pen(u, colour('--plot'), colour(traces.at(-1)?.colour ?? '--ink'))],
       },
     };
-    return new uPlot(options, [[], ...traces.map(() => [])] as unknown as uPlot.AlignedData, this.host);
+    return new uPlot(options, [[], ...this.window.names.map(() => [])] as unknown as uPlot.AlignedData, this.host);
   }
 
   private series(trace: Trace, at: number, stroke: string): uPlot.Series {

@@ -1,29 +1,37 @@
 // The emergency stop of the page: both ways at once, so that neither a stalled socket nor a stalled request delays it.
 //
 // A stop is never refused, never asks back and never waits for another. What is shown: pressed, then stopped with the
-// time from press to answer, or kept for a robot that is away, or the failure in words.
+// time from press to answer, or kept for a robot that is away, or the failure in words. "The stop may not have arrived"
+// stands until telemetry that was heard after the press shows the latch; a page that is cut off hears none.
 
-import type { CommandRecord } from './api';
+import { is_complete, phase_of, type StopEvidence, type StopOutcome } from './stop_outcome';
 
-export type StopPhase = 'idle' | 'sent' | 'stopped' | 'kept' | 'unanswered' | 'failed';
+//   sent → stopped | kept | unanswered | failed      by the station's answer
+//   sent → late                                      no answer for a second
+//   late, unanswered, failed, kept → seen | kept     by telemetry
+//   stopped, seen → idle                             the latch is gone again
+export type StopPhase = 'idle' | 'sent' | 'late' | 'stopped' | 'seen' | 'kept' | 'unanswered' | 'failed';
 
 export interface StopState {
   phase: StopPhase;
   robot_id: string | null; // null: every robot
   pressed_at_ms: number;
   answered_after_ms: number | null;
-  detail: string;
+  outcome: StopOutcome | null; // that the station answered
+  problem: string; // why there is none
 }
 
 // `key` names the press, so that the station knows it again when it comes by the second way.
 export interface StopWays {
   over_socket(robot_id: string | null, key: string): boolean;
-  over_http(robot_id: string | null, key: string): Promise<CommandRecord[]>;
+  over_http(robot_id: string | null, key: string): Promise<StopOutcome>;
+  evidence(robot_id: string | null, since_ms: number): StopEvidence; // of what was heard since then
   now_ms(): number;
   on_change(state: StopState): void;
 }
 
-export const kIdleStop: StopState = { phase: 'idle', robot_id: null, pressed_at_ms: 0, answered_after_ms: null, detail: '' };
+export const kLate_ms = 1000;
+export const kIdleStop: StopState = { phase: 'idle', robot_id: null, pressed_at_ms: 0, answered_after_ms: null, outcome: null, problem: '' };
 
 export class EmergencyStop {
   state: StopState = kIdleStop;
@@ -38,26 +46,48 @@ export class EmergencyStop {
     // SAFETY: both leave in this very call, before anything is drawn.
     const by_socket = sent_without_throwing(() => this.ways.over_socket(robot_id, key));
     const answer = this.ways.over_http(robot_id, key);
-    const show = (phase: StopPhase, detail: string) => {
+    this.show({ ...kIdleStop, phase: 'sent', robot_id, pressed_at_ms });
+    const settle = (change: Partial<StopState>) => {
       if (press !== this.press) return; // a later press shows its own state
-      const answered_after_ms = phase === 'sent' ? null : this.ways.now_ms() - pressed_at_ms;
-      this.state = { phase, robot_id, pressed_at_ms, answered_after_ms, detail };
-      this.ways.on_change(this.state);
+      this.show({ ...kIdleStop, robot_id, pressed_at_ms, answered_after_ms: this.ways.now_ms() - pressed_at_ms, ...change });
+      this.look();
     };
-    show('sent', '');
     try {
-      show(...judge(await answer));
+      const outcome = await answer;
+      settle({ phase: phase_of(outcome), outcome });
     } catch (error) {
-      const detail = error instanceof Error ? error.message : String(error);
-      show('failed', by_socket ? `Sent over the live link; the second way failed: ${detail}` : detail);
+      const problem = error instanceof Error ? error.message : String(error);
+      settle({ phase: 'failed', problem: by_socket ? `Sent over the live link; the second way failed: ${problem}` : problem });
     }
   }
 
-  // The latch was cleared or another robot is looked at: the last stop is history.
+  // Called again and again: telemetry settles what no answer has settled, and shows when the latch is gone.
+  look(): void {
+    const { phase, robot_id, pressed_at_ms } = this.state;
+    if (phase === 'idle') return;
+    if (phase === 'sent') {
+      if (this.ways.now_ms() - pressed_at_ms >= kLate_ms) this.show({ ...this.state, phase: 'late' });
+      return;
+    }
+    const found = this.ways.evidence(robot_id, pressed_at_ms);
+    if (phase === 'stopped' || phase === 'seen') {
+      if (found.cleared > 0 && robot_id !== null) this.forget();
+      return;
+    }
+    if (!is_complete(found)) return;
+    const next = found.kept > 0 ? 'kept' : 'seen';
+    if (next !== phase) this.show({ ...this.state, phase: next });
+  }
+
+  // The latch was cleared: the last stop is history.
   forget(): void {
     this.press += 1;
-    this.state = kIdleStop;
-    this.ways.on_change(this.state);
+    this.show(kIdleStop);
+  }
+
+  private show(state: StopState): void {
+    this.state = state;
+    this.ways.on_change(state);
   }
 }
 
@@ -65,19 +95,6 @@ export class EmergencyStop {
 function new_key(): string {
   const words = crypto.getRandomValues(new Uint32Array(4));
   return Array.from(words, (word) => word.toString(16)).join('-');
-}
-
-// One word for the answers of all robots that were stopped: the worst decides.
-function judge(records: CommandRecord[]): [StopPhase, string] {
-  if (records.length === 0) return ['failed', 'The station knows no robot.'];
-  const kept = records.filter((record) => record.state === 'queued');
-  const waiting = records.filter((record) => record.state === 'sent');
-  const others = records.filter((record) => !['queued', 'sent', 'acknowledged', 'verified'].includes(record.state));
-  const names = (list: CommandRecord[]) => list.map((record) => record.robot_id).join(', ');
-  if (others.length > 0) return ['failed', `${names(others)}: ${others[0]?.reason || others[0]?.state}`];
-  if (kept.length > 0) return ['kept', names(kept)];
-  if (waiting.length > 0) return ['unanswered', names(waiting)];
-  return ['stopped', names(records)];
 }
 
 function sent_without_throwing(send: () => boolean): boolean {

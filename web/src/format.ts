@@ -16,6 +16,11 @@ function scaled(value: number | null | undefined, factor: number, decimals: numb
 }
 
 export const millimetres = (length_m: number | null | undefined, decimals = 1) => scaled(length_m, 1e3, decimals);
+// How many standard deviations stand behind each "±" of the page.
+export const kSpread_sd = 2;
+// Of an estimate, as "± 1.6".
+export const plus_minus = (sd_m: number | null | undefined) =>
+  `± ${millimetres(sd_m === null || sd_m === undefined ? null : kSpread_sd * sd_m)}`;
 export const millimetres_per_s = (velocity_m_s: number | null | undefined) => scaled(velocity_m_s, 1e3, 1);
 export const percent = (duty: number | null | undefined, decimals = 1) => scaled(duty, 100, decimals);
 export const millivolts = (value_mv: number | null | undefined) => scaled(value_mv, 1, 1);

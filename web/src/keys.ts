@@ -1,18 +1,68 @@
-// Keys that work everywhere on the page. Escape is the emergency stop, also inside an input field.
+// Keys that work everywhere on the page. Escape is the emergency stop, whatever has the focus and whatever is open.
+//
+// What opens on the page is drawn by the page itself: the first Escape would only close a native pop-up (select, datalist,
+// date, a list of earlier entries), and the page would never hear of it.
+
+import { useEffect } from 'preact/hooks';
 
 export interface KeyTarget {
   addEventListener(type: 'keydown', listener: (event: KeyboardEvent) => void, options: { capture: boolean }): void;
   removeEventListener(type: 'keydown', listener: (event: KeyboardEvent) => void, options: { capture: boolean }): void;
 }
 
-// Calls stop() on each press of Escape. It listens before anything else on the page can swallow the key; a key that is
-// held down counts once.
+// While an input method composes a word, a browser hides the name of the key.
+const kHidden = ['Process', 'Unidentified', 'Dead'];
+export const is_escape = (event: KeyboardEvent) =>
+  event.key === 'Escape' || (event.code === 'Escape' && kHidden.includes(event.key));
+
+// Calls stop() on each press of Escape. A key that is held down counts once.
+// SAFETY: it listens on the window, in the capture phase and before anything else, so nothing can swallow the key first.
 export function listen_for_stop_key(target: KeyTarget, stop: () => void): () => void {
   const listener = (event: KeyboardEvent) => {
-    if (event.key !== 'Escape') return;
-    event.preventDefault();
+    if (!is_escape(event)) return;
     if (!event.repeat) stop();
+    event.preventDefault();
   };
   target.addEventListener('keydown', listener, { capture: true });
   return () => target.removeEventListener('keydown', listener, { capture: true });
 }
+
+// Escape never only closes something: it has stopped the robot already when it comes here, and closes as well.
+export function useCloseOnEscape(is_open: boolean, close: () => void): void {
+  useEffect(() => {
+    if (!is_open) return undefined;
+    const listener = (event: KeyboardEvent) => is_escape(event) && close();
+    window.addEventListener('keydown', listener, { capture: true });
+    return () => window.removeEventListener('keydown', listener, { capture: true });
+  }, [is_open]);
+}
+
+// A menu of the browser is a native pop-up as well. With Shift it opens all the same, for whoever looks into the page; a
+// touch screen has no Escape, and its menus stay.
+export function keep_menus_shut(target: Pick<Window, 'addEventListener'>): void {
+  target.addEventListener('contextmenu', (event) => {
+    const is_touch = (event as PointerEvent).pointerType === 'touch';
+    if (!is_touch && !event.shiftKey) event.preventDefault();
+  });
+}
+
+// Of a button that stops. SAFETY: Space never stops; it belongs to "hold to run" and to text, and a button that was
+// clicked keeps the focus. Enter presses it, once however long it is held.
+export const stop_button_keys = {
+  onKeyDown: (event: KeyboardEvent) => {
+    if (event.key === ' ' || (event.key === 'Enter' && event.repeat)) event.preventDefault();
+  },
+  onKeyUp: (event: KeyboardEvent) => {
+    if (event.key === ' ') event.preventDefault();
+  },
+};
+
+// What the page says of its keys.
+export const kShortcuts: readonly { keys: string[]; what: string }[] = [
+  { keys: ['Esc'], what: 'Stops the robot that the red button names; without one, every robot. From every field, list and panel; what is open closes as well.' },
+  { keys: ['Space'], what: 'Never stops. It belongs to “Hold to run” and to text.' },
+  { keys: ['Enter'], what: 'Presses the button that has the focus, the stop as well; in a field it sends what was typed.' },
+  { keys: ['↑', '↓'], what: 'Choose in a list; letters search in it.' },
+  { keys: ['Shift', 'right click'], what: 'The browser’s own menu. While it is open the browser keeps Escape: press the red button.' },
+];
+export const kFullScreenNote = 'In full screen a browser keeps Escape for itself: the first press may only leave full screen. Press the red button there.';

@@ -36,6 +36,7 @@ export const kLongestDelay_ms = 2000;
 const kDelayGrowth = 1.6;
 const kJitter = 0.3; // of the delay, either way
 export const kFresh_ms = 400; // a stamp younger than this proves that the station hears and answers
+export const kCurrent_ms = 1000; // without a stamp for this long, nothing is claimed of the station's present
 export const kSignedOut_ms = 2000; // how often a signed-out page asks whether it still is
 const kOpenState = 1;
 
@@ -86,7 +87,16 @@ export class LiveLink {
   }
 
   stamp_is_fresh(): boolean {
-    return this.phase === 'live' && this.surroundings.now_ms() - this.stamp_at_ms < kFresh_ms;
+    return this.has_stamp_of(kFresh_ms);
+  }
+
+  // Whether what the page shows of control and recording still holds.
+  is_current(): boolean {
+    return this.has_stamp_of(kCurrent_ms);
+  }
+
+  private has_stamp_of(age_ms: number): boolean {
+    return this.phase === 'live' && this.surroundings.now_ms() - this.stamp_at_ms < age_ms;
   }
 
   private connect(): void {

@@ -6,10 +6,28 @@
 // first batch of a boot: the spacing of samples is the robot's, never that of their arrival.
 
 import type { SamplesMessage } from './api';
+import { kSpread_sd } from './format';
 
-export const kColumns = ['position_m', 'reference_m', 'setpoint_m', 'duty', 'impedance_mv', 'velocity_m_s'] as const;
+// position_m is what the controller sees, the disturbance included; estimate_m where the robot believes that it is, and
+// estimate_low_m and estimate_high_m lie two standard deviations below and above that.
+export const kColumns = [
+  'position_m',
+  'estimate_m',
+  'estimate_low_m',
+  'estimate_high_m',
+  'reference_m',
+  'setpoint_m',
+  'duty',
+  'impedance_mv',
+  'velocity_m_s',
+] as const;
 export type Column = (typeof kColumns)[number];
 
+// Where the robot believes that it is: what its controller sees, less the disturbance that was injected. null: not known.
+export function estimate_of(position_m: number | null | undefined, disturbance_m: number | null | undefined): number | null {
+  if (position_m === null || position_m === undefined || disturbance_m === null || disturbance_m === undefined) return null;
+  return position_m - disturbance_m;
+}
 
 // Consecutive samples further apart than this many periods are not joined by a line.
 const kGapPeriods = 1.5;
@@ -51,6 +69,7 @@ export class SampleRing {
       this.lead_s = -Infinity;
     }
     const first = this.base + batch.first_seq;
+    const spread_m = batch.position_sd_m === null ? NaN : kSpread_sd * batch.position_sd_m;
     for (let i = 0; i < size; ++i) {
       const index = first + i;
       if (index <= this.newest - this.capacity || index < 0) continue; // too old to be shown
@@ -58,7 +77,11 @@ export class SampleRing {
       if (this.slot_index[slot] !== index) this.received += 1;
       this.slot_index[slot] = index;
       this.time_s[slot] = (batch.first_robot_time_us + i * batch.period_us) / 1e6 + this.time_base_s;
+      const estimate_m = estimate_of(batch.position_m[i], batch.disturbance_m) ?? NaN;
       this.columns.position_m[slot] = batch.position_m[i] ?? NaN;
+      this.columns.estimate_m[slot] = estimate_m;
+      this.columns.estimate_low_m[slot] = estimate_m - spread_m;
+      this.columns.estimate_high_m[slot] = estimate_m + spread_m;
       // Without a setpoint there is nothing that the robot follows.
       this.columns.reference_m[slot] = batch.setpoint_m === null ? NaN : (batch.reference_m[i] ?? NaN);
       this.columns.setpoint_m[slot] = batch.setpoint_m ?? NaN;
@@ -108,12 +131,14 @@ export class PlotWindow {
   readonly gaps_s: [number, number][][];
   private readonly in_hole: boolean[]; // the sample before had no value
   size = 0;
-  low = 0; // over all columns
+  low = 0; // over all columns that are ranged
   high = 0;
 
+  // The first `unranged` columns do not count in low and high.
   constructor(
     capacity: number,
     readonly names: readonly Column[],
+    private readonly unranged = 0,
   ) {
     this.time_s = new Float64Array(capacity);
     this.values = names.map(() => new Float64Array(capacity));
@@ -155,7 +180,7 @@ export class PlotWindow {
       if (missing && !this.in_hole[c]) gaps.push([time_s, time_s]);
       this.in_hole[c] = missing;
       values[at] = missing ? (at > 0 ? (values[at - 1] as number) : 0) : value; // a missing one lies in a gap
-      if (missing) continue;
+      if (missing || c < this.unranged) continue;
       this.low = Math.min(this.low, value);
       this.high = Math.max(this.high, value);
     }

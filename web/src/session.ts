@@ -1,13 +1,15 @@
 // One running page: the store, the live link, the API and the controls that outlive a view, wired together.
 
-import { effect, signal } from '@preact/signals';
-import { Api, type Me, type Station } from './api';
+import { computed, effect, signal } from '@preact/signals';
+import { Api, type Me, type RunRecord, type Station } from './api';
 import { DutyHold } from './duty_hold';
 import { EmergencyStop, kIdleStop } from './emergency';
 import { LiveLink, type LinkPhase, type Surroundings } from './live';
+import { browser_shelf, ViewSettings } from './settings';
 import { kRefresh_ms, Store } from './store';
 
 const kMaxWatchedAtOnce = 8; // in a larger fleet samples come of the robots that were looked at last
+const kBuiltInFluids = ['non_newtonian', 'water'];
 const kKeepAlive_ms = 1000; // what this page controls stays its own for 3 s
 
 export class Session {
@@ -16,7 +18,10 @@ export class Session {
     () => this.link.stamp_us,
   );
   readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => Date.now() });
+  readonly settings = new ViewSettings(browser_shelf());
   readonly station = signal<Station | null>(null);
+  // That a run may name. A station that lists none takes what is built in.
+  readonly fluids = computed(() => this.station.value?.fluids ?? kBuiltInFluids);
   readonly me = signal<Me | null>(null);
   readonly shows_access = signal(false); // in place of the plots
   readonly phase = signal<LinkPhase>('connecting');
@@ -47,6 +52,7 @@ export class Session {
       over_socket: (robot_id, key) => this.link.send({ type: 'emergency_stop', robot_id, key }),
       over_http: (robot_id, key) =>
         robot_id === null ? this.api.emergency_stop_all(key) : this.api.emergency_stop(robot_id, key),
+      evidence: (robot_id, since_ms) => this.store.stop_evidence(robot_id, since_ms),
       now_ms: () => performance.now(),
       on_change: (state) => (this.stop_state.value = state),
     });
@@ -61,9 +67,16 @@ export class Session {
 
   private looked_at: string[] = []; // robots, the latest first
 
+  // The name under which a notice about a run is dismissed; run numbers begin anew with each store.
+  notice_of = (run: RunRecord): string => `run ${run.run_id} of ${this.station.value?.store_id ?? ''}`;
+
   start(): void {
     this.link.start();
     effect(() => this.watch());
+    effect(() => {
+      const robot_id = this.store.selected_id.value;
+      if (this.phase.peek() === 'live') void this.load_newest_run(robot_id).catch(() => undefined);
+    });
     setInterval(() => this.refresh(), kRefresh_ms);
     setInterval(() => this.keep_alive(), kKeepAlive_ms);
     addEventListener('online', () => this.link.hurry());
@@ -98,21 +111,28 @@ export class Session {
     await this.api.log_out();
   };
 
-  // What /live does not tell: the station itself and the run that is open.
+  // What /live does not tell: the station itself and the runs that are open.
   private async load(): Promise<void> {
     try {
       this.station.value = await this.api.station();
       this.me.value = await this.api.me();
-      const robot_ids = this.store.robots.peek().map((robot) => robot.state.peek().robot_id);
-      const runs = await Promise.all(robot_ids.map((robot_id) => this.api.open_run(robot_id)));
-      this.store.set_runs(runs.filter((run) => run !== null));
+      this.store.set_runs(await this.api.open_runs());
+      await this.load_newest_run(this.store.selected_id.peek());
     } catch (error) {
       this.store.note(error instanceof Error ? error.message : String(error));
     }
   }
 
+  // The newest run of a robot may be one that was interrupted.
+  private async load_newest_run(robot_id: string | null): Promise<void> {
+    const run = robot_id === null ? null : await this.api.newest_run(robot_id);
+    if (run) this.store.take_run(run);
+  }
+
   private refresh(): void {
+    this.store.is_current.value = this.link.is_current();
     this.store.refresh();
+    this.emergency.look();
     // A mode that takes no duty ended the hold; the hand has to press again.
     const held_id = this.hold.robot_id;
     if (held_id !== null && this.store.find(held_id)?.readout.peek().mode !== 'manual') this.hold.forget();
@@ -152,6 +172,8 @@ export class Session {
       this.shows_access.value = false;
     }
     if (before === 'live') {
+      this.store.is_current.value = false;
+      this.store.set_runs([]); // asked for anew when the station is back
       this.hold.release();
       this.store.note('The live connection was lost.');
     } else if (now === 'live') {

@@ -2,32 +2,13 @@
 //
 // One flow: /live message → Store.hear → rings and pending values → Store.refresh (10 Hz) → signals → views.
 
-import { batch, computed, signal, type Signal } from '@preact/signals';
-import type { CommandRecord, EventRecord, LiveMessage, RobotState, RunRecord, SamplesMessage } from './api';
-import { SampleRing } from './samples';
+import { batch, computed, signal } from '@preact/signals';
+import type { CommandRecord, EventRecord, LiveMessage, RobotState, RunRecord } from './api';
+import { Robot } from './robot';
+import type { StopEvidence } from './stop_outcome';
 
 export const kRefresh_ms = 100;
-export const kStale_ms = 500; // no sample for so long: every numeral is marked
 export const kLogLines = 50;
-
-// What the numerals show; null: never heard.
-export interface Readout {
-  position_m: number | null;
-  position_sd_m: number | null;
-  setpoint_m: number | null;
-  reference_m: number | null;
-  duty: number | null;
-  velocity_m_s: number | null;
-  impedance_mv: number | null;
-  disturbance_m: number;
-  mode: string;
-  sub_state: string;
-  emergency_id: string | null;
-  sample_age_ms: number;
-  stale: boolean;
-  received: number;
-  missing: number; // samples that this page has not got, since it first heard this boot
-}
 
 export interface LogLine {
   key: string;
@@ -36,107 +17,24 @@ export interface LogLine {
   event: EventRecord | null;
   command: CommandRecord | null;
   note: string | null; // of the page itself
-}
-
-const kEmptyReadout: Readout = {
-  position_m: null,
-  position_sd_m: null,
-  setpoint_m: null,
-  reference_m: null,
-  duty: null,
-  velocity_m_s: null,
-  impedance_mv: null,
-  disturbance_m: 0,
-  mode: '',
-  sub_state: '',
-  emergency_id: null,
-  sample_age_ms: Infinity,
-  stale: true,
-  received: 0,
-  missing: 0,
-};
-
-// One robot: its state as the station told it last, and what its samples say.
-export class Robot {
-  readonly ring = new SampleRing();
-  readonly state: Signal<RobotState>;
-  readonly readout = signal<Readout>(kEmptyReadout);
-  private latest: SamplesMessage | null = null;
-  private sampled_at_ms = -Infinity;
-  private watched = true; // its samples are asked for
-  private boot_id: string | null = null;
-  private first_seq = 0;
-  private next_seq = 0;
-  private received = 0;
-
-  constructor(state: RobotState) {
-    this.state = signal(state);
-  }
-
-  // What was not asked for is not missing afterwards.
-  watch(watched: boolean): void {
-    if (watched && !this.watched) this.boot_id = null;
-    this.watched = watched;
-  }
-
-  hear(message: SamplesMessage, now_ms: number): void {
-    const size = message.position_m.length;
-    if (message.boot_id !== this.boot_id) {
-      this.boot_id = message.boot_id;
-      this.first_seq = this.next_seq = message.first_seq;
-      this.received = 0;
-    }
-    const before = this.ring.received;
-    this.ring.append(message, now_ms / 1000);
-    if (message.first_seq >= this.first_seq) this.received += this.ring.received - before;
-    if (message.first_seq + size <= this.next_seq) return; // sent again: history, not news
-    this.next_seq = message.first_seq + size;
-    this.latest = message;
-    this.sampled_at_ms = now_ms;
-  }
-
-  refresh(now_ms: number): void {
-    if (!this.watched) return this.refresh_from_state();
-    const sample_age_ms = now_ms - this.sampled_at_ms;
-    const stale = sample_age_ms > kStale_ms;
-    const { latest } = this;
-    const state = this.state.peek();
-    const last = <T>(values: T[]): T | null => values[values.length - 1] ?? null;
-    this.readout.value = {
-      position_m: latest && last(latest.position_m),
-      position_sd_m: latest && latest.position_sd_m,
-      setpoint_m: latest ? latest.setpoint_m : null,
-      reference_m: latest && last(latest.reference_m),
-      duty: latest && last(latest.duty),
-      velocity_m_s: latest && last(latest.velocity_m_s),
-      impedance_mv: latest && last(latest.impedance_mv),
-      disturbance_m: latest?.disturbance_m ?? 0,
-      // What the station says of a robot that is silent is newer than its last sample.
-      mode: latest && !stale ? latest.mode : state.mode,
-      sub_state: latest && !stale ? latest.sub_state : state.sub_state,
-      emergency_id: latest && !stale ? latest.emergency_id : state.emergency_id,
-      sample_age_ms,
-      stale,
-      received: this.received,
-      missing: this.next_seq - this.first_seq - this.received,
-    };
-  }
-
-  // The station tells of its link, mode and emergency at once; numbers would be old.
-  private refresh_from_state(): void {
-    const { mode, sub_state, emergency_id, link } = this.state.peek();
-    this.readout.value = { ...kEmptyReadout, mode, sub_state, emergency_id, stale: link !== 'connected' };
-  }
+  position_sd_m: number | null; // of the position in an event, when it was heard
 }
 
 export class Store {
   readonly robots = signal<Robot[]>([]);
   readonly actor = signal(''); // this page, as the station calls it
   readonly selected_id = signal<string | null>(null);
-  readonly selected = computed(() => this.robots.value.find((r) => r.state.value.robot_id === this.selected_id.value) ?? null);
+  readonly selected = computed(() => {
+    void this.robots.value;
+    return this.by_id.get(this.selected_id.value ?? '') ?? null;
+  });
   readonly log = signal<LogLine[]>([]);
+  // The page hears the station. While it does not, it does not know who is in control, nor whether a run is open.
+  readonly is_current = signal(false);
   readonly runs = signal<RunRecord[]>([]); // that are open, at most one for each robot
+  readonly interrupted = signal<RunRecord[]>([]); // of each robot its newest run, if the station stopped in it
   readonly now_ms = signal(0); // page time, for ages
+  private readonly by_id = new Map<string, Robot>();
   private pending_log: LogLine[] = [];
   private notes = 0;
   private chosen = false; // a person selected a robot
@@ -148,23 +46,23 @@ export class Store {
       case 'welcome':
         batch(() => {
           this.actor.value = message.actor;
-          message.robots.forEach((state) => this.take_state(state));
+          this.take_states(message.robots);
         });
         break;
       case 'robot':
-        this.take_state(message.robot);
+        this.take_states([message.robot]);
         break;
       case 'samples':
         this.find(message.robot_id)?.hear(message, this.clocks.page_ms());
         break;
       case 'event':
-        this.write(line_of_event(message.event));
+        this.write(this.line_of_event(message.event));
         break;
       case 'command':
         this.write(line_of_command(message.command));
         break;
       case 'log':
-        message.events.forEach((event) => this.write(line_of_event(event)));
+        message.events.forEach((event) => this.write(this.line_of_event(event)));
         message.commands.forEach((command) => this.write(line_of_command(command)));
         break;
       case 'run':
@@ -185,7 +83,7 @@ export class Store {
   note(text: string): void {
     this.notes += 1;
     const at_ms = this.clocks.utc_ms();
-    this.write({ key: `note-${this.notes}`, at_ms, robot_id: '', event: null, command: null, note: text });
+    this.write({ key: `note-${this.notes}`, at_ms, robot_id: '', event: null, command: null, note: text, position_sd_m: null });
   }
 
   set_runs(open: RunRecord[]): void {
@@ -195,13 +93,27 @@ export class Store {
   take_run(run: RunRecord): void {
     const others = this.runs.peek().filter((other) => other.run_id !== run.run_id);
     this.runs.value = run.ended_at_us === null ? [...others, run] : others;
+    this.take_interruption(run);
+  }
+
+  // A run that the station's end has cut off stays known until its robot has a newer one.
+  private take_interruption(run: RunRecord): void {
+    const known = this.interrupted.peek().find((other) => other.robot_id === run.robot_id);
+    if (known && known.run_id >= run.run_id) return;
+    const others = this.interrupted.peek().filter((other) => other !== known);
+    if (run.state === 'interrupted') {
+      this.interrupted.value = [...others, run];
+      this.note(`The run “${run.name}” of ${run.robot_id} was interrupted: the station stopped while it was open.`);
+    } else if (known) {
+      this.interrupted.value = others;
+    }
   }
 
   refresh(): void {
     batch(() => {
       const now_ms = this.clocks.page_ms();
       this.now_ms.value = now_ms;
-      for (const robot of this.robots.peek()) robot.refresh(now_ms);
+      for (const robot of this.robots.peek()) robot.refresh(now_ms, this.is_current.peek());
       if (this.pending_log.length > 0) {
         this.log.value = merge_log(this.pending_log, this.log.peek());
         this.pending_log = [];
@@ -210,19 +122,33 @@ export class Store {
   }
 
   find(robot_id: string): Robot | undefined {
-    return this.robots.peek().find((robot) => robot.state.peek().robot_id === robot_id);
+    return this.by_id.get(robot_id);
   }
 
-  private take_state(state: RobotState): void {
-    const known = this.find(state.robot_id);
-    if (known) {
-      known.state.value = state;
-      this.select_by_itself();
-      return;
+  private take_states(states: RobotState[]): void {
+    const now_ms = this.clocks.page_ms();
+    const known_before = this.by_id.size;
+    for (const state of states) {
+      const known = this.by_id.get(state.robot_id);
+      if (known) known.take(state, now_ms);
+      else this.by_id.set(state.robot_id, new Robot(state, now_ms));
     }
-    const robots = [...this.robots.peek(), new Robot(state)];
-    this.robots.value = robots.sort((a, b) => a.state.peek().robot_id.localeCompare(b.state.peek().robot_id));
+    if (this.by_id.size > known_before) {
+      const ordered = [...this.by_id].sort(([a], [b]) => (a < b ? -1 : 1));
+      this.robots.value = ordered.map(([, robot]) => robot);
+    }
     this.select_by_itself();
+  }
+
+  // Of a stop of one robot or of every robot that the station stops: a retired one that is away is left out there.
+  stop_evidence(robot_id: string | null, since_ms: number): StopEvidence {
+    const found: StopEvidence = { latched: 0, cleared: 0, kept: 0, open: 0 };
+    for (const robot of this.robots.peek()) {
+      const state = robot.state.peek();
+      if (robot_id === null ? is_left_out(state) : state.robot_id !== robot_id) continue;
+      found[robot.stop_evidence(since_ms)] += 1;
+    }
+    return found;
   }
 
   // Of whose samples are asked for.
@@ -244,12 +170,26 @@ export class Store {
     this.selected_id.value = best?.state.peek().robot_id ?? null;
   }
 
+  private line_of_event(event: EventRecord): LogLine {
+    const key = `event-${event.robot_id}-${event.boot_id ?? ''}-${event.event_seq ?? ''}-${event.received_at_us}`;
+    const position_sd_m = this.find(event.robot_id)?.position_sd_m() ?? null;
+    return { key, at_ms: event.received_at_us / 1000, robot_id: event.robot_id, event, command: null, note: null, position_sd_m };
+  }
+
   private write(line: LogLine): void {
+    if (is_routine(line)) return;
     this.pending_log = this.pending_log.filter((other) => other.key !== line.key);
     this.pending_log.push(line);
     if (this.pending_log.length > kLogLines) this.pending_log.shift();
   }
 }
+
+// A held duty renews its lease several times a second; of these commands only one that failed is worth a line.
+const is_routine = ({ command }: LogLine) =>
+  command?.kind === 'renew_lease' && !['rejected', 'expired', 'failed'].includes(command.state);
+
+// Out of use, and not there: nothing of it is listed unless it is asked for, and the stop of all leaves it out.
+export const is_left_out = ({ retired, link }: RobotState) => retired === true && link !== 'connected';
 
 // Newest first; a command that went on replaces its own line in place; at most kLogLines.
 function merge_log(pending: LogLine[], log: LogLine[]): LogLine[] {
@@ -262,12 +202,7 @@ function merge_log(pending: LogLine[], log: LogLine[]): LogLine[] {
   return [...[...changed.values()].reverse(), ...kept].slice(0, kLogLines);
 }
 
-function line_of_event(event: EventRecord): LogLine {
-  const key = `event-${event.robot_id}-${event.boot_id ?? ''}-${event.event_seq ?? ''}-${event.received_at_us}`;
-  return { key, at_ms: event.received_at_us / 1000, robot_id: event.robot_id, event, command: null, note: null };
-}
-
 function line_of_command(command: CommandRecord): LogLine {
   const at_ms = command.submitted_at_us / 1000;
-  return { key: `command-${command.command_id}`, at_ms, robot_id: command.robot_id, event: null, command, note: null };
+  return { key: `command-${command.command_id}`, at_ms, robot_id: command.robot_id, event: null, command, note: null, position_sd_m: null };
 }

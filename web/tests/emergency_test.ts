@@ -1,14 +1,16 @@
 // The emergency stop and its key.
 import { expect, test } from 'vitest';
 import type { CommandRecord } from '../src/api';
-import { EmergencyStop, type StopState } from '../src/emergency';
-import { listen_for_stop_key } from '../src/keys';
+import { EmergencyStop, kLate_ms, type StopState } from '../src/emergency';
+import { kFullScreenNote, kShortcuts, listen_for_stop_key } from '../src/keys';
+import { outcome_of, type StopEvidence } from '../src/stop_outcome';
 import { settle } from './fakes';
 
 const record = (state: CommandRecord['state'], robot_id = 'rheo-1', reason = '') => ({ state, robot_id, reason }) as CommandRecord;
 
 function stop_with(over_http: () => Promise<CommandRecord[]>, over_socket: () => boolean = () => true) {
-  const world = { now_ms: 0, ways: [] as string[], keys: [] as string[], states: [] as StopState[] };
+  const heard: StopEvidence = { latched: 0, kept: 0, cleared: 0, open: 1 };
+  const world = { now_ms: 0, ways: [] as string[], keys: [] as string[], states: [] as StopState[], heard };
   const emergency = new EmergencyStop({
     over_socket: (robot_id, key) => {
       world.ways.push(`socket ${robot_id}`);
@@ -18,8 +20,9 @@ function stop_with(over_http: () => Promise<CommandRecord[]>, over_socket: () =>
     over_http: (robot_id, key) => {
       world.ways.push(`http ${robot_id}`);
       world.keys.push(key);
-      return over_http();
+      return over_http().then(outcome_of);
     },
+    evidence: () => world.heard,
     now_ms: () => world.now_ms,
     on_change: (state) => world.states.push(state),
   });
@@ -61,13 +64,13 @@ test('a broken socket does not keep it from the other way', async () => {
   const done = emergency.stop('rheo-1');
   world.now_ms = 1023;
   await done;
-  expect(emergency.state).toMatchObject({ phase: 'stopped', answered_after_ms: 23, detail: 'rheo-1' });
+  expect(emergency.state).toMatchObject({ phase: 'stopped', answered_after_ms: 23, robot_id: 'rheo-1' });
 });
 
 test('for a robot that is away it says that the stop is kept', async () => {
   const { emergency } = stop_with(() => Promise.resolve([record('acknowledged', 'a'), record('queued', 'b')]));
   await emergency.stop(null);
-  expect(emergency.state).toMatchObject({ phase: 'kept', detail: 'b' });
+  expect(emergency.state).toMatchObject({ phase: 'kept', outcome: { summary: { acknowledged: 1, kept: 1 } } });
 });
 
 test('a sent stop without an answer is not shown as stopped', async () => {
@@ -80,7 +83,7 @@ test('a failure is said, with what did work', async () => {
   const { emergency } = stop_with(() => Promise.reject(new Error('The station did not answer.')));
   await emergency.stop('rheo-1');
   expect(emergency.state.phase).toBe('failed');
-  expect(emergency.state.detail).toContain('over the live link');
+  expect(emergency.state.problem).toContain('over the live link');
 });
 
 test('a second press sends again, and the answer to the first is not shown over it', async () => {
@@ -92,6 +95,58 @@ test('a second press sends again, and the answer to the first is not shown over 
   answers[0]?.([record('acknowledged', 'a')]);
   await settle();
   expect(emergency.state).toMatchObject({ phase: 'sent', robot_id: 'b' });
+});
+
+test('without an answer for a second it says that the stop may not have arrived', () => {
+  const { emergency, world } = stop_with(() => new Promise(() => undefined));
+  void emergency.stop('rheo-1');
+  world.now_ms = kLate_ms - 1;
+  emergency.look();
+  expect(emergency.state.phase).toBe('sent');
+  world.now_ms = kLate_ms;
+  emergency.look();
+  expect(emergency.state.phase).toBe('late');
+});
+
+test('that it may not have arrived stands until telemetry shows the latch', async () => {
+  const { emergency, world } = stop_with(() => Promise.reject(new Error('The station did not answer.')));
+  await emergency.stop('rheo-1');
+  for (world.now_ms = 0; world.now_ms < 3_600_000; world.now_ms += 60_000) emergency.look();
+  expect(emergency.state.phase).toBe('failed');
+  world.heard = { latched: 1, kept: 0, cleared: 0, open: 0 };
+  emergency.look();
+  expect(emergency.state.phase).toBe('seen');
+});
+
+test('of every robot each must show its latch, or be away with the stop kept', async () => {
+  const { emergency, world } = stop_with(() => Promise.reject(new Error('The station did not answer.')));
+  await emergency.stop(null);
+  world.heard = { latched: 2, kept: 1, cleared: 0, open: 1 };
+  emergency.look();
+  expect(emergency.state.phase).toBe('failed');
+  world.heard = { latched: 3, kept: 1, cleared: 0, open: 0 };
+  emergency.look();
+  expect(emergency.state.phase).toBe('kept');
+  world.heard = { latched: 4, kept: 0, cleared: 0, open: 0 };
+  emergency.look();
+  expect(emergency.state.phase).toBe('seen');
+});
+
+test('a late failure of one way is not shown over a latch that was seen', async () => {
+  const { emergency, world } = stop_with(() => Promise.reject(new Error('The station did not answer.')));
+  world.heard = { latched: 1, kept: 0, cleared: 0, open: 0 };
+  await emergency.stop('rheo-1');
+  expect(emergency.state.phase).toBe('seen');
+});
+
+test('that a robot was stopped is no longer said when its latch is gone', async () => {
+  const { emergency, world } = stop_with(() => Promise.resolve([record('acknowledged')]));
+  await emergency.stop('rheo-1');
+  emergency.look();
+  expect(emergency.state.phase).toBe('stopped');
+  world.heard = { latched: 0, kept: 0, cleared: 1, open: 0 };
+  emergency.look();
+  expect(emergency.state.phase).toBe('idle');
 });
 
 function press(key: string, change: Partial<KeyboardEvent> = {}) {
@@ -114,6 +169,17 @@ test('Escape stops, also from inside a field, once however long it is held', () 
   expect(press('Escape').stops).toBe(1);
   expect(press('Escape', { target: { tagName: 'INPUT' } as never }).stops).toBe(1);
   expect(press('Escape', { repeat: true }).stops).toBe(0);
+});
+
+test('Escape stops while an input method composes a word and hides the name of the key', () => {
+  expect(press('Process', { code: 'Escape', isComposing: true }).stops).toBe(1);
+  expect(press('Process', { code: 'KeyA', isComposing: true }).stops).toBe(0);
+  expect(press('CapsLock', { code: 'Escape' }).stops).toBe(0); // the key means something else on this keyboard
+});
+
+test('the list of keys says that Space never stops, and who keeps Escape in full screen', () => {
+  expect(kShortcuts.find(({ keys }) => keys.includes('Space'))?.what).toMatch(/^Never stops/);
+  expect(kFullScreenNote).toMatch(/full screen/);
 });
 
 test('typing does not stop', () => {

@@ -47,3 +47,8 @@ test('ages and durations are one short word', () => {
   expect(format.duration(7_900)).toBe('0:07');
   expect(format.duration(3_723_000)).toBe('1:02:03');
 });
+
+test('the spread of an estimate is two standard deviations', () => {
+  expect(format.plus_minus(0.0031)).toBe('± 6.2');
+  expect(format.plus_minus(null)).toBe('± –');
+});

@@ -1,6 +1,6 @@
 // The live link: how it notices a dead connection, and how it comes back.
 import { expect, test } from 'vitest';
-import { kFirstDelay_ms, kLongestDelay_ms, kSignedOut_ms, kSilence_ms, LiveLink } from '../src/live';
+import { kCurrent_ms, kFirstDelay_ms, kLongestDelay_ms, kSignedOut_ms, kSilence_ms, LiveLink } from '../src/live';
 import { FakeSurroundings } from './fakes';
 
 function started(): { around: FakeSurroundings; link: LiveLink; heard: string[] } {
@@ -97,6 +97,19 @@ test('a stamp is fresh for 400 ms and only on the connection that brought it', a
   around.socket.break();
   expect(link.stamp_is_fresh()).toBe(false);
   expect(link.stamp_us).toBeNull();
+});
+
+test('what the page shows is current for a second after a stamp', async () => {
+  const { around, link } = started();
+  around.socket.welcome();
+  expect(link.is_current()).toBe(false);
+  around.socket.say({ type: 'stamp', stamp_us: 5 });
+  expect(link.is_current()).toBe(true);
+  await around.time.advance(kCurrent_ms);
+  expect(link.is_current()).toBe(false);
+  around.socket.say({ type: 'stamp', stamp_us: 6 });
+  around.socket.break();
+  expect(link.is_current()).toBe(false);
 });
 
 test('a message that is no JSON does not end the connection', () => {

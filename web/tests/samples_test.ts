@@ -91,3 +91,21 @@ test('the right edge moves evenly while batches arrive unevenly', () => {
   expect(ring.edge_s(11.5) - ring.edge_s(11.4)).toBeCloseTo(0.1, 9);
   expect(ring.time_s[99]).toBeLessThanOrEqual(ring.edge_s(10.95) + 0.005);
 });
+
+test('of a disturbance both positions are kept, and the spread lies around where the robot is', () => {
+  const ring = new SampleRing(64);
+  ring.append(batch(0, 5, { disturbance_m: -0.05, position_m: [0.1, 0.1, 0.1, 0.1, 0.1], position_sd_m: 0.003 }), 10);
+  const window = new PlotWindow(ring.capacity, ['estimate_low_m', 'estimate_high_m', 'position_m', 'estimate_m'], 2);
+  window.fill(ring, 10, 60);
+  expect(window.values.map((column) => Number(column[0]?.toFixed(9)))).toEqual([0.144, 0.156, 0.1, 0.15]);
+  expect([window.low, window.high].map((edge) => Number(edge.toFixed(9)))).toEqual([0.1, 0.15]); // the band is not ranged
+});
+
+test('a spread that is not known is not drawn, and the estimate is', () => {
+  const ring = new SampleRing(64);
+  ring.append(batch(0, 5, { position_sd_m: null }), 10);
+  const window = new PlotWindow(ring.capacity, ['estimate_low_m', 'estimate_m']);
+  window.fill(ring, 10, 60);
+  expect(window.gaps_s[0]).toHaveLength(1);
+  expect(window.gaps_s[1]).toHaveLength(0);
+});

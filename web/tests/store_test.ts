@@ -1,6 +1,6 @@
 // What the page knows: numerals, stale marks, the log, selection.
 import { expect, test } from 'vitest';
-import type { CommandRecord, EventRecord, RobotState } from '../src/api';
+import type { CommandRecord, EventRecord, RobotState, RunRecord } from '../src/api';
 import { kLogLines, Store } from '../src/store';
 import { batch } from './fakes';
 
@@ -20,7 +20,24 @@ test('numerals follow the last sample, at the refresh and not per sample', () =>
   store.hear(batch(0, 5));
   expect(one.readout.value.position_m).toBeNull();
   store.refresh();
-  expect(one.readout.value).toMatchObject({ position_m: 0.004, setpoint_m: 0.1, duty: 0.5, mode: 'auto', stale: false });
+  expect(one.readout.value).toMatchObject({ position_m: 0.004, estimate_m: 0.004, setpoint_m: 0.1, duty: 0.5, mode: 'auto', stale: false });
+});
+
+test('a disturbance moves what the controller sees away from where the robot is', () => {
+  const { store } = store_with(robot('rheo-1'));
+  store.hear(batch(100, 1, { disturbance_m: -0.05, position_m: [0.1] }));
+  store.refresh();
+  const { position_m, estimate_m, disturbance_m } = store.find('rheo-1')!.readout.value;
+  expect(position_m).toBeCloseTo(0.1, 12);
+  expect(estimate_m).toBeCloseTo(0.15, 12);
+  expect(disturbance_m).toBe(-0.05);
+});
+
+test('without a known disturbance nobody knows where the robot is', () => {
+  const { store } = store_with(robot('rheo-1'));
+  store.hear(batch(100, 1, { disturbance_m: null }));
+  store.refresh();
+  expect(store.find('rheo-1')!.readout.value).toMatchObject({ estimate_m: null, position_m: 0.1 });
 });
 
 test('no sample for over half a second marks every numeral stale and tells the age', () => {
@@ -119,10 +136,11 @@ test('an open run is shown until it ends', () => {
 
 test('a robot whose samples are not asked for shows link and mode, and no old numbers', () => {
   const { store, clock } = store_with(robot('rheo-1'), robot('rheo-2', { mode: 'auto' }));
+  store.is_current.value = true;
   store.watch(['rheo-1']);
   clock.page = 1500;
   store.refresh();
-  expect(store.find('rheo-2')!.readout.value).toMatchObject({ position_m: null, mode: 'auto', stale: false });
+  expect(store.find('rheo-2')!.readout.value).toMatchObject({ watched: false, position_m: null, estimate_m: null, mode: 'auto', stale: false });
   expect(store.find('rheo-1')!.readout.value.stale).toBe(true);
   store.hear({ type: 'robot', robot: robot('rheo-2', { mode: 'emergency', link: 'disconnected' }) });
   store.refresh();
@@ -137,4 +155,85 @@ test('what was not asked for is not missing afterwards', () => {
   store.hear(batch(500, 5));
   store.refresh();
   expect(store.find('rheo-1')!.readout.value).toMatchObject({ received: 5, missing: 0 });
+});
+
+test('what is known of a robot that is not watched is old while the page is cut off', () => {
+  const { store } = store_with(robot('rheo-1'));
+  store.watch([]);
+  store.is_current.value = true;
+  store.refresh();
+  expect(store.find('rheo-1')!.readout.value.stale).toBe(false);
+  store.is_current.value = false;
+  store.refresh();
+  expect(store.find('rheo-1')!.readout.value.stale).toBe(true);
+});
+
+test('renewals of a lease are no lines of the log, unless they fail', () => {
+  const { store } = store_with(robot('rheo-1'));
+  const renewal = (n: number, state: CommandRecord['state']) =>
+    ({ command_id: String(n), robot_id: 'rheo-1', kind: 'renew_lease', state, submitted_at_us: n }) as CommandRecord;
+  const states = ['queued', 'sent', 'acknowledged', 'verified', 'superseded'] as const;
+  states.forEach((state, n) => store.hear({ type: 'command', command: renewal(n, state) }));
+  store.hear({ type: 'log', events: [], commands: states.map((state, n) => renewal(10 + n, state)) });
+  store.refresh();
+  expect(store.log.value).toHaveLength(0);
+  store.hear({ type: 'command', command: renewal(20, 'rejected') });
+  store.refresh();
+  expect(store.log.value.map((line) => line.command?.state)).toEqual(['rejected']);
+});
+
+const run = (run_id: number, state: RunRecord['state']) =>
+  ({ run_id, robot_id: 'rheo-1', name: 'a', state, started_at_us: 1, ended_at_us: state === 'open' ? null : 2 }) as RunRecord;
+
+test('a run that was interrupted is known until its robot has a newer one, and is told once', () => {
+  const { store } = store_with(robot('rheo-1'));
+  store.take_run(run(7, 'interrupted'));
+  store.take_run(run(7, 'interrupted'));
+  store.refresh();
+  expect(store.interrupted.value.map((each) => each.run_id)).toEqual([7]);
+  expect(store.log.value).toHaveLength(1);
+  store.take_run(run(6, 'ended'));
+  expect(store.interrupted.value).toHaveLength(1);
+  store.take_run(run(8, 'open'));
+  expect(store.interrupted.value).toHaveLength(0);
+});
+
+test('a stop is shown by telemetry that was heard after it, and not by what a robot that is away was last', () => {
+  const { store, clock } = store_with(robot('rheo-1'));
+  const latched = { mode: 'emergency', emergency_id: '9' } as const;
+  clock.page = 100;
+  store.hear(batch(0, 5, latched));
+  expect(store.stop_evidence('rheo-1', 100)).toMatchObject({ latched: 0, open: 1 });
+  clock.page = 200;
+  store.hear({ type: 'robot', robot: robot('rheo-1', { ...latched, link: 'disconnected', pending_stop: null }) });
+  expect(store.stop_evidence('rheo-1', 100)).toMatchObject({ latched: 0, open: 1 });
+  store.hear({ type: 'robot', robot: robot('rheo-1', { ...latched, link: 'disconnected', pending_stop: '5' }) });
+  expect(store.stop_evidence('rheo-1', 100)).toMatchObject({ kept: 1, open: 0 });
+  clock.page = 300;
+  store.hear(batch(5, 5, latched));
+  expect(store.stop_evidence('rheo-1', 100)).toMatchObject({ latched: 1, open: 0 });
+});
+
+test('samples of before the latch that come after its news do not undo it; its end does', () => {
+  const { store, clock } = store_with(robot('rheo-1'));
+  clock.page = 100;
+  store.hear({ type: 'robot', robot: robot('rheo-1', { mode: 'emergency', emergency_id: '9' }) });
+  clock.page = 150;
+  store.hear(batch(0, 5));
+  expect(store.stop_evidence('rheo-1', 50)).toMatchObject({ latched: 1, cleared: 0 });
+  clock.page = 5000;
+  store.hear(batch(5, 5, { mode: 'manual' }));
+  expect(store.stop_evidence('rheo-1', 50)).toMatchObject({ latched: 0, cleared: 1 });
+});
+
+test('of a stop of every robot a retired one counts only while it is connected', () => {
+  const { store } = store_with(robot('a', { retired: true, link: 'disconnected' }), robot('b', { retired: true }), robot('c'));
+  expect(store.stop_evidence(null, 0).open).toBe(2);
+});
+
+test('621 robots are taken in order, in one welcome', () => {
+  const { store } = store_with(...Array.from({ length: 621 }, (_, n) => robot(`r-${(n * 7919) % 1000}`)));
+  const ids = store.robots.value.map((each) => each.state.value.robot_id);
+  expect(ids).toEqual([...ids].sort());
+  expect(ids).toHaveLength(621);
 });

@@ -3,7 +3,7 @@
 import { useSignal } from '@preact/signals';
 import { m_to_millimetres, millimetres, millimetres_to_m, parse_millimetres } from '../format';
 import type { Session } from '../session';
-import type { Robot } from '../store';
+import type { Robot } from '../robot';
 import { OutcomeLine, useAsking } from './request';
 
 const kSteps_mm = [-10, -1, 1, 10];

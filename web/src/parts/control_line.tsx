@@ -1,50 +1,45 @@
-// Who is in control of the robot, and the ways to take control, to ask for it and to give it.
+// Who is in control of the robot, for everybody who looks; for operators the ways to take, to ask for and to give it.
 
 import type { ControlBody } from '../api';
+import type { Robot } from '../robot';
 import type { Session } from '../session';
-import type { Robot } from '../store';
 import { OutcomeLine, useAsking } from './request';
 
 export function ControlLine({ session, robot }: { session: Session; robot: Robot }) {
   const asking = useAsking();
   const { robot_id, control } = robot.state.value;
   const me = session.store.actor.value;
-  const is_mine = control !== null && control.holder === me;
+  const is_current = session.store.is_current.value;
+  const is_mine = is_current && control !== null && control.holder === me;
+  const may_command = session.me.value?.role !== 'viewer';
   const change = (action: ControlBody['action'], what: string) =>
     void asking.ask(what, () => session.api.change_control(robot_id, { action }));
+  const key = (id: string, text: string, action: ControlBody['action'], what: string, is_asked = false) => (
+    <button type="button" id={id} disabled={!is_current || asking.pending || is_asked} onClick={() => change(action, what)}>
+      {text}
+    </button>
+  );
   return (
-    <div class={`control-line ${is_mine ? 'mine' : control ? 'other' : 'free'}`} id="control-line" data-holder={control?.holder ?? ''}>
-      <p>{who(control?.holder ?? null, is_mine, robot.readout.value.mode === 'auto')}</p>
-      {is_mine && control.wished_by !== null && (
+    <div class={`control-line ${is_mine ? 'mine' : control && is_current ? 'other' : 'free'}`} id="control-line" data-holder={is_current ? (control?.holder ?? '') : ''}>
+      <p>{is_current ? who(control?.holder ?? null, is_mine, may_command, robot.readout.value.mode === 'auto') : 'Cut off from the station: who controls the robot is not known.'}</p>
+      {may_command && is_mine && control?.wished_by && (
         <>
           <p class="wish">{control.wished_by} asks for control.</p>
-          <button type="button" id="hand-over" disabled={asking.pending} onClick={() => change('hand_over', 'Hand over')}>
-            Hand over
-          </button>
+          {key('hand-over', 'Hand over', 'hand_over', 'Hand over')}
         </>
       )}
-      {is_mine && (
-        <button type="button" id="release-control" disabled={asking.pending} onClick={() => change('release', 'Release')}>
-          Release
-        </button>
-      )}
-      {control === null && (
-        <button type="button" id="take-control" disabled={asking.pending} onClick={() => change('take', 'Take control')}>
-          Take control
-        </button>
-      )}
-      {control !== null && !is_mine && (
-        <button type="button" id="ask-for-control" disabled={asking.pending || control.wished_by === me} onClick={() => change('request', 'Ask')}>
-          {control.wished_by === me ? 'Asked' : 'Ask for control'}
-        </button>
-      )}
+      {may_command && is_mine && key('release-control', 'Release', 'release', 'Release')}
+      {may_command && is_current && control === null && key('take-control', 'Take control', 'take', 'Take control')}
+      {may_command && is_current && control !== null && !is_mine &&
+        key('ask-for-control', control.wished_by === me ? 'Asked' : 'Ask for control', 'request', 'Ask', control.wished_by === me)}
       <OutcomeLine asking={asking} />
     </div>
   );
 }
 
-function who(holder: string | null, is_mine: boolean, is_auto: boolean): string {
+function who(holder: string | null, is_mine: boolean, may_command: boolean, is_auto: boolean): string {
   if (is_mine) return 'You are in control.';
   if (holder !== null) return `${holder} is in control. You may watch, and stop.`;
-  return is_auto ? 'Unattended: in auto, and nobody is in control.' : 'Nobody is in control; your next command takes it.';
+  if (is_auto) return 'Unattended: in auto, and nobody is in control.';
+  return may_command ? 'Nobody is in control; your next command takes it.' : 'Nobody is in control. You may watch, and stop.';
 }

@@ -1,7 +1,7 @@
 // The quality of the link and the health of the robot, as a column of figures.
 
 import { count, milliseconds_of_us, percent, volts_of_mv } from '../format';
-import type { Robot } from '../store';
+import type { Robot } from '../robot';
 
 export function LinkPanel({ robot }: { robot: Robot }) {
   const state = robot.state.value;

@@ -1,7 +1,7 @@
 // The last events and commands, newest first.
 
-import { sentence } from '../api';
-import { clock_time, millimetres, percent, words } from '../format';
+import { clock_time, millimetres, percent, plus_minus, words } from '../format';
+import { sentence } from '../reasons';
 import type { Session } from '../session';
 import type { LogLine } from '../store';
 
@@ -32,7 +32,7 @@ function Line({ line }: { line: LogLine }) {
   );
 }
 
-function describe({ event, command, note }: LogLine): [tone: string, sort: string, text: string] {
+function describe({ event, command, note, position_sd_m }: LogLine): [tone: string, sort: string, text: string] {
   if (command) {
     const refused = ['rejected', 'expired', 'failed'].includes(command.state);
     const alarm = command.kind === 'emergency_stop';
@@ -44,7 +44,7 @@ function describe({ event, command, note }: LogLine): [tone: string, sort: strin
     const alarm = event.kind === 'emergency';
     const where = event.kind === 'mode_changed' ? ` to ${event.mode}` : event.kind === 'sub_state_changed' ? ` to ${event.sub_state}` : '';
     const cause = event.cause && event.cause !== 'none' ? ` · ${words(event.cause)}` : '';
-    const at = event.position_m !== null ? ` · at ${millimetres(event.position_m)} mm` : '';
+    const at = event.position_m !== null ? ` · controller at ${millimetres(event.position_m)} ${plus_minus(position_sd_m)} mm` : '';
     return [alarm ? 'alarm' : /lost|fault|limit|lapsed/.test(event.kind) ? 'caution' : '', 'event', words(event.kind) + where + cause + at];
   }
   return ['quiet', 'page', note ?? ''];

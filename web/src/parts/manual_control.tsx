@@ -3,7 +3,7 @@
 import { useSignal } from '@preact/signals';
 import { percent, percent_to_duty } from '../format';
 import type { Session } from '../session';
-import type { Robot } from '../store';
+import type { Robot } from '../robot';
 import { HeldButton } from './hold_button';
 import { OutcomeLine, useAsking } from './request';
 
@@ -42,7 +42,6 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
         min={-100}
         max={100}
         step={1}
-        list="duty-marks"
         value={duty_percent.value}
         onInput={(event) => {
           duty_percent.value = event.currentTarget.valueAsNumber;
@@ -50,11 +49,11 @@ export function ManualControl({ session, robot }: { session: Session; robot: Rob
         }}
         onDblClick={() => (duty_percent.value = 0)}
       />
-      <datalist id="duty-marks">
-        <option value={-100} />
-        <option value={0} />
-        <option value={100} />
-      </datalist>
+      <span class="duty-marks" aria-hidden="true">
+        <i />
+        <i />
+        <i />
+      </span>
       <div class="pair">
         <HeldButton
           id="hold-to-run"

@@ -1,9 +1,9 @@
 // Three lamps, as on a flight deck: manual, auto with its sub-state, emergency with its cause. One is lit.
 
 import { words } from '../format';
-import type { Robot } from '../store';
+import type { Robot } from '../robot';
 
-export function ModeAnnunciator({ robot }: { robot: Robot }) {
+export function ModeAnnunciator({ robot, is_current }: { robot: Robot; is_current: boolean }) {
   const { robot_id, link, emergency_cause, firmware_version } = robot.state.value;
   const { mode, sub_state, stale } = robot.readout.value;
   const cell = (name: string, title: string, detail: string) => (
@@ -17,7 +17,7 @@ export function ModeAnnunciator({ robot }: { robot: Robot }) {
     <div class={`annunciator ${stale ? 'stale' : ''}`} data-mode={mode}>
       <h1>
         {robot_id}
-        <small>{link === 'connected' ? `firmware ${firmware_version || '–'}` : 'not connected'}</small>
+        <small>{!is_current ? 'cut off' : link === 'connected' ? `firmware ${firmware_version || '–'}` : 'not connected'}</small>
       </h1>
       <div class="cells" aria-hidden="true">
         {cell('manual', 'Manual', '')}

@@ -1,4 +1,5 @@
-// The three strip charts of a robot: position with setpoint and reference, duty, impedance.
+// The three strip charts of a robot: position (with its ± as a band, and what the controller sees) beside setpoint and
+// reference, duty, impedance.
 //
 // They hold still while a pointer moves over them, and while zoomed (drag a stretch); a button goes back to live.
 
@@ -7,14 +8,16 @@ import { useEffect, useRef } from 'preact/hooks';
 import { ChartDeck, type DeckState, type StripOptions } from '../chart';
 import { millimetres, millivolts, percent } from '../format';
 import type { PlotWindow } from '../samples';
-import type { Robot } from '../store';
+import type { Robot } from '../robot';
 
 const kPosition: StripOptions = {
   traces: [
     { column: 'reference_m', colour: '--commanded-soft', width_px: 1.2 },
     { column: 'setpoint_m', colour: '--commanded', width_px: 1.4, dash_px: [7, 5] },
-    { column: 'position_m', colour: '--measured', width_px: 1.8 },
+    { column: 'position_m', colour: '--seen', width_px: 1.2 },
+    { column: 'estimate_m', colour: '--measured', width_px: 1.8 },
   ],
+  band: { low: 'estimate_low_m', high: 'estimate_high_m', colour: '--spread' },
   label: (value) => millimetres(value, 0),
   least_span: 0.08,
   show_time: false,
@@ -91,7 +94,8 @@ export function Plots({ robot }: { robot: Robot }) {
 
 const PositionKey = () => (
   <>
-    <span class="swatch measured">measured</span>
+    <span class="swatch measured">estimated ± 2 sd</span>
+    <span class="swatch seen">seen by controller</span>
     <span class="swatch commanded">setpoint</span>
     <span class="swatch reference">reference</span>
   </>
@@ -101,6 +105,13 @@ function cursor_text(options: StripOptions, index: number | null, window: PlotWi
   if (index === null || index >= window.size) return '';
   const unit = options === kPosition ? 'mm' : options === kDuty ? '%' : 'mV';
   const value = window.values.at(-1)?.[index];
-  const shown = options === kPosition ? millimetres(value) : options === kDuty ? percent(value) : millivolts(value);
+  const shown = options === kPosition ? position_text(index, window) : options === kDuty ? percent(value) : millivolts(value);
   return `${shown} ${unit} at \u2212${Math.abs(window.time_s[index] ?? 0).toFixed(2)} s`;
+}
+
+// The columns of kPosition: two edges of the band, then its traces.
+function position_text(index: number, window: PlotWindow): string {
+  const [high_m, seen_m, estimate_m] = [1, 4, 5].map((column) => window.values[column]?.[index] ?? NaN) as [number, number, number];
+  const seen = seen_m === estimate_m ? '' : `, seen ${millimetres(seen_m)},`;
+  return `${millimetres(estimate_m)} ± ${millimetres(high_m - estimate_m)}${seen}`;
 }

@@ -1,38 +1,51 @@
 // The large numerals, and a scale that shows position, reference and setpoint as one glance.
+//
+// Two positions stand side by side, always: where the robot believes that it is, and what its controller sees, which a
+// disturbance moves away from that. Each has its "±" and its own distance to the setpoint.
 
-import { age, millimetres, millimetres_per_s, millivolts, percent } from '../format';
-import type { Robot } from '../store';
+import { age, millimetres, millimetres_per_s, millivolts, percent, plus_minus } from '../format';
+import type { Robot } from '../robot';
 import { Tape } from './tape';
 
 export function Readouts({ robot }: { robot: Robot }) {
   const now = robot.readout.value;
-  const error_m = now.position_m !== null && now.setpoint_m !== null ? now.position_m - now.setpoint_m : null;
+  const silent = Number.isFinite(now.sample_age_ms) ? `no sample for ${age(now.sample_age_ms)}` : 'no sample yet';
   return (
     <section class={`readouts ${now.stale ? 'stale' : ''}`} aria-label="Measured now">
-      <Numeral name="Position" unit="mm" value={millimetres(now.position_m)} kind="main" id="position">
-        {now.stale
-          ? Number.isFinite(now.sample_age_ms) ? `no sample for ${age(now.sample_age_ms)}` : 'no sample yet'
-          : `± ${millimetres(now.position_sd_m)} standard deviation`}
+      <Numeral name="Position, estimated" unit="mm" value={millimetres(now.estimate_m)} kind="main" id="position">
+        <span>{plus_minus(now.position_sd_m)} mm (2 sd)</span>
+        {now.stale ? <span class="silent">{silent}</span> : <span>{off_by(now.estimate_m, now.setpoint_m)}</span>}
+      </Numeral>
+      <Numeral name="Controller sees" unit="mm" value={millimetres(now.position_m)} kind="seen" id="seen">
+        <span>{[plus_minus(now.position_sd_m), now.stale ? '' : off_by(now.position_m, now.setpoint_m)].filter(Boolean).join(', ')}</span>
+        <span class={now.disturbance_m ? 'disturbed' : ''} id="disturbance">
+          disturbance {millimetres(now.disturbance_m)} mm
+        </span>
       </Numeral>
       <Numeral name="Setpoint" unit="mm" value={millimetres(now.setpoint_m)} kind="setpoint" id="setpoint">
-        {error_m === null ? 'none in force' : `off by ${millimetres(error_m)}`}
+        {now.setpoint_m === null ? 'none in force' : ''}
       </Numeral>
       <Numeral name="Duty" unit="%" value={percent(now.duty)} kind="duty" id="duty">
         <DutyBar duty={now.duty} />
       </Numeral>
-      <Numeral name="Velocity" unit="mm/s" value={millimetres_per_s(now.velocity_m_s)} id="velocity" />
-      <Numeral name="Impedance" unit="mV" value={millivolts(now.impedance_mv)} id="impedance" />
+      <div class="numeral-pair">
+        <Numeral name="Velocity" unit="mm/s" value={millimetres_per_s(now.velocity_m_s)} kind="small" id="velocity" />
+        <Numeral name="Impedance" unit="mV" value={millivolts(now.impedance_mv)} kind="small" id="impedance" />
+      </div>
       <Tape robot={robot} />
     </section>
   );
 }
+
+const off_by = (position_m: number | null, setpoint_m: number | null) =>
+  position_m === null || setpoint_m === null ? '' : `off by ${millimetres(position_m - setpoint_m)}`;
 
 interface NumeralProps {
   name: string;
   unit: string;
   value: string;
   id: string;
-  kind?: 'main' | 'setpoint' | 'duty';
+  kind?: 'main' | 'seen' | 'setpoint' | 'duty' | 'small';
   children?: preact.ComponentChildren;
 }
 

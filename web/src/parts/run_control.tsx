@@ -1,26 +1,33 @@
 // A run: the name and fluid that a stretch of the recording is known by. Recording itself never stops.
 
 import { useSignal } from '@preact/signals';
-import { duration } from '../format';
+import type { RunRecord } from '../api';
+import { clock_time, duration } from '../format';
+import type { Robot } from '../robot';
 import type { Session } from '../session';
-import type { Robot } from '../store';
+import { Choice } from './choice';
 import { OutcomeLine, useAsking } from './request';
 
 export function RunControl({ session, robot }: { session: Session; robot: Robot }) {
+  const { store } = session;
   const { robot_id, link } = robot.state.value;
-  const name = useSignal('');
-  const fluid = useSignal('non_newtonian');
   const asking = useAsking();
-  const run = session.store.runs.value.find((other) => other.robot_id === robot_id);
+  const run = store.runs.value.find((other) => other.robot_id === robot_id);
+  const is_current = store.is_current.value;
 
-  const start = () =>
-    asking.ask('Run', async () => session.store.take_run(await session.api.start_run(robot_id, name.value.trim(), fluid.value)));
-  const end = (run_id: number) => asking.ask('End of run', async () => session.store.take_run(await session.api.end_run(run_id)));
+  const start = (name: string, fluid: string) =>
+    asking.ask('Run', async () => store.take_run(await session.api.start_run(robot_id, name, fluid)));
+  const end = (run_id: number) => asking.ask('End of run', async () => store.take_run(await session.api.end_run(run_id)));
 
   return (
-    <fieldset class={`control run ${run ? 'engaged' : ''}`}>
+    <fieldset class={`control run ${run && is_current ? 'engaged' : ''}`}>
       <legend>Run</legend>
-      {run ? (
+      <Interrupted session={session} robot_id={robot_id} />
+      {!is_current ? (
+        <p class="quiet" id="run-unknown">
+          Cut off from the station: whether a run is open is not known.
+        </p>
+      ) : run ? (
         <div class="pair">
           <p class="run-name">
             “{run.name}” <RunTime session={session} started_at_us={run.started_at_us} />
@@ -30,29 +37,68 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
           </button>
         </div>
       ) : (
-        <form
-          class="run-form"
-          onSubmit={(event) => {
-            event.preventDefault();
-            if (name.value.trim() === '') return asking.fail('Give the run a name.');
-            void start();
-          }}
-        >
-          <input aria-label="Name of the run" id="run-name" placeholder="Name" maxLength={200} value={name.value} onInput={(event) => (name.value = event.currentTarget.value)} />
-          <select aria-label="Fluid" id="run-fluid" value={fluid.value} onChange={(event) => (fluid.value = event.currentTarget.value)}>
-            <option value="non_newtonian">non-Newtonian</option>
-            <option value="water">water</option>
-            <option value="other">other</option>
-          </select>
-          <button type="submit" id="start-run" disabled={link !== 'connected' || asking.pending}>
-            Start run
-          </button>
-        </form>
+        <RunForm session={session} robot={robot} disabled={link !== 'connected' || asking.pending}
+                 on_start={(name, fluid) => (name === '' ? asking.fail('Give the run a name.') : void start(name, fluid))} />
       )}
       <OutcomeLine asking={asking} />
     </fieldset>
   );
 }
+
+interface RunFormProps {
+  session: Session;
+  robot: Robot;
+  disabled: boolean;
+  on_start(name: string, fluid: string): void;
+}
+
+function RunForm({ session, robot, disabled, on_start }: RunFormProps) {
+  const name = useSignal('');
+  const picked = useSignal<string | null>(null); // null: not touched yet
+  const fluids = session.fluids.value;
+  const fluid = picked.value ?? robot.state.value.fluid ?? '';
+  const options = [...fluids.map((each) => ({ value: each, text: fluid_text(each) })), { value: '', text: 'fluid not known' }];
+  return (
+    <form
+      class="run-form"
+      onSubmit={(event) => {
+        event.preventDefault();
+        on_start(name.value.trim(), fluid);
+      }}
+    >
+      {/* A browser offers earlier entries in a native list, which would keep the first Escape for itself. */}
+      <input aria-label="Name of the run" id="run-name" placeholder="Name" autoComplete="off" maxLength={200} value={name.value}
+             onInput={(event) => (name.value = event.currentTarget.value)} />
+      <Choice id="run-fluid" label="Fluid" options={options} value={fluid} on_choose={(next) => (picked.value = next)} />
+      <button type="submit" id="start-run" disabled={disabled}>
+        Start run
+      </button>
+    </form>
+  );
+}
+
+// The robot's newest run, when the station stopped in it: until it is dismissed, or a new one begins.
+function Interrupted({ session, robot_id }: { session: Session; robot_id: string }) {
+  const run = session.store.interrupted.value.find((other) => other.robot_id === robot_id);
+  if (!run || session.settings.dismissed.names.value.has(session.notice_of(run))) return null;
+  return (
+    <div class="interrupted" id="interrupted-run" role="status">
+      <p>
+        Run “{run.name}” was interrupted at {clock_time((run.ended_at_us ?? run.started_at_us) / 1000).slice(0, 8)}: the station stopped
+        while it was open. {lost(run)}
+      </p>
+      <button type="button" id="dismiss-interrupted" onClick={() => session.settings.dismissed.add(session.notice_of(run))}>
+        Dismiss
+      </button>
+    </div>
+  );
+}
+
+const lost = (run: RunRecord) =>
+  run.samples_lost > 0 ? `${run.samples_lost} of its samples are lost.` : 'Its samples until then are kept.';
+
+const kKnownFluids: Record<string, string> = { non_newtonian: 'non-Newtonian' };
+const fluid_text = (fluid: string) => kKnownFluids[fluid] ?? fluid;
 
 function RunTime({ session, started_at_us }: { session: Session; started_at_us: number }) {
   void session.store.now_ms.value; // ten times a second

@@ -2,15 +2,16 @@
 
 import { useRef } from 'preact/hooks';
 import { next_range, range_splits, round_step } from '../chart';
-import { m_to_millimetres } from '../format';
-import type { Robot } from '../store';
+import { kSpread_sd, m_to_millimetres } from '../format';
+import type { Robot } from '../robot';
 
 const kLeastSpan_m = 0.24;
 
 export function Tape({ robot }: { robot: Robot }) {
-  const { position_m, setpoint_m, reference_m } = robot.readout.value;
+  const { estimate_m, position_m, position_sd_m, setpoint_m, reference_m } = robot.readout.value;
   const range = useRef<[number, number]>([-0.02, 0.22]);
-  const shown = [position_m, setpoint_m].filter((value) => value !== null);
+  const spread_m = kSpread_sd * (position_sd_m ?? 0);
+  const shown = [estimate_m, position_m, setpoint_m].filter((value) => value !== null);
   const [low, high] = [Math.min(...shown, 0), Math.max(...shown, 0)];
   range.current = next_range(range.current, low, high, kLeastSpan_m);
   const [from, to] = range.current;
@@ -32,7 +33,11 @@ export function Tape({ robot }: { robot: Robot }) {
       </div>
       {reference_m !== null && setpoint_m !== null && <i class="reference" style={{ left: place(reference_m) }} />}
       {setpoint_m !== null && <i class="setpoint-bug" style={{ left: place(setpoint_m) }} />}
-      {position_m !== null && <i class="pointer" style={{ left: place(position_m) }} />}
+      {estimate_m !== null && spread_m > 0 && (
+        <u style={{ left: place(estimate_m - spread_m), right: `calc(100% - ${place(estimate_m + spread_m)})` }} />
+      )}
+      {position_m !== null && position_m !== estimate_m && <i class="seen" style={{ left: place(position_m) }} />}
+      {estimate_m !== null && <i class="pointer" style={{ left: place(estimate_m) }} />}
     </div>
   );
 }

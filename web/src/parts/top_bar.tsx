@@ -1,7 +1,9 @@
 // The top bar: whose page this is, whether it is live, what is being recorded, and the stop for every robot.
 
 import { age, duration } from '../format';
+import { stop_button_keys } from '../keys';
 import type { Session } from '../session';
+import { KeyList } from './key_list';
 
 export function TopBar({ session }: { session: Session }) {
   const { store, station } = session;
@@ -27,14 +29,16 @@ export function TopBar({ session }: { session: Session }) {
         </span>
       )}
       <span class="recording" aria-live="polite">
-        {store.runs.value.map((run) => (
+        {/* What may have ended meanwhile is not claimed. */}
+        {(store.is_current.value ? store.runs.value : []).map((run) => (
           <span class="lamp recording-lamp" key={run.run_id}>
             Run “{run.name}” <RunTime session={session} started_at_us={run.started_at_us} />
           </span>
         ))}
       </span>
       <WhoIsIn session={session} />
-      <button type="button" class="stop-all" onClick={session.stop_all}>
+      <KeyList />
+      <button type="button" class="stop-all" id="stop-all" title="Hidden ones as well" {...stop_button_keys} onClick={session.stop_all}>
         Stop all robots
       </button>
     </header>
@@ -70,6 +74,13 @@ function RunTime({ session, started_at_us }: { session: Session; started_at_us: 
 
 function ConnectionState({ session }: { session: Session }) {
   const phase = session.phase.value;
+  if (phase === 'live' && !session.store.is_current.value) {
+    return (
+      <span class="lamp caution" role="status">
+        No sign of the station
+      </span>
+    );
+  }
   if (phase === 'live') {
     return (
       <span class="lamp good" role="status">

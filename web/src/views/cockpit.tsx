@@ -33,7 +33,7 @@ export function Cockpit({ session }: { session: Session }) {
           <Access session={session} />
         ) : robot ? (
           <>
-            <ModeAnnunciator robot={robot} />
+            <ModeAnnunciator robot={robot} is_current={session.store.is_current.value} />
             <Readouts robot={robot} />
             <Plots robot={robot} />
           </>
@@ -41,20 +41,22 @@ export function Cockpit({ session }: { session: Session }) {
           <Waiting session={session} />
         )}
       </main>
-      <StopPanel session={session} />
-      <section class="controls" aria-label="Controls">
-        {robot && !may_command && (
-          <p class="viewer-note quiet">You may look and stop. Commands and runs need the role operator.</p>
-        )}
-        {robot && may_command && (
-          <>
-            <ControlLine key={`control-${key}`} session={session} robot={robot} />
-            <AutoControl key={`auto-${key}`} session={session} robot={robot} />
-            <ManualControl key={`manual-${key}`} session={session} robot={robot} />
-            <RunControl key={`run-${key}`} session={session} robot={robot} />
-          </>
-        )}
-      </section>
+      <div class="hands">
+        <StopPanel session={session} />
+        <section class="controls" aria-label="Controls">
+          {robot && <ControlLine key={`control-${key}`} session={session} robot={robot} />}
+          {robot && !may_command && (
+            <p class="viewer-note quiet">You may look and stop. Commands and runs need the role operator.</p>
+          )}
+          {robot && may_command && (
+            <>
+              <AutoControl key={`auto-${key}`} session={session} robot={robot} />
+              <ManualControl key={`manual-${key}`} session={session} robot={robot} />
+              <RunControl key={`run-${key}`} session={session} robot={robot} />
+            </>
+          )}
+        </section>
+      </div>
       <LogStrip session={session} />
     </div>
   );

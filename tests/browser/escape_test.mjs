@@ -1,0 +1,187 @@
+// Escape stops the robot whatever has the focus and whatever is open, once for each press; Space never does.
+import assert from 'node:assert/strict';
+import { Bench, run, until } from './programs.mjs';
+
+const kRobot = 'rheo-1';
+const bench = new Bench();
+let page;
+
+const mode = () => page.locator('.annunciator').getAttribute('data-mode');
+const seen_mode = (wanted) => until(`the page shows ${wanted}`, async () => (await mode()) === wanted);
+const robot = () => bench.ask(`/robots/${kRobot}`);
+const stops = async () =>
+  (await bench.ask(`/robots/${kRobot}/commands?limit=1000`)).commands.filter((command) => command.kind === 'emergency_stop').length;
+
+// One press of Escape is one stop, no more and no less.
+async function escape_stops(what, press = () => page.keyboard.press('Escape')) {
+  const before = await stops();
+  await press();
+  await until(`Escape stops with ${what}`, async () => (await stops()) > before, 3000);
+  const latch = (await robot()).emergency_id;
+  assert.notEqual(latch, null, what);
+  assert.equal(await stops(), before + 1, `${what}: one stop`);
+}
+
+async function clear_latch() {
+  await until('the page knows the latch', async () => (await page.locator('#latch').getAttribute('data-emergency-id')) === (await robot()).emergency_id);
+  await page.locator('#clear-emergency').hover();
+  await page.mouse.down();
+  await seen_mode('manual');
+  await page.mouse.up();
+}
+
+async function engage_auto() {
+  await page.fill('#setpoint-entry', '40');
+  await page.press('#setpoint-entry', 'Enter');
+  await seen_mode('auto');
+}
+
+// The controls that can have the focus now, each with a mark.
+const mark_controls = () =>
+  page.evaluate(() => {
+    const all = document.querySelectorAll('button, input, select, textarea, a[href], summary, [tabindex]');
+    const can = [...all].filter((each) => !each.disabled && each.checkVisibility());
+    return can.map((each, at) => {
+      each.dataset.probe = String(at);
+      return { at, name: each.id || each.getAttribute('aria-label') || each.textContent.trim().slice(0, 30) || each.className };
+    });
+  });
+
+const steps = {
+  async 'the page opens no list, menu or dialog of the browser'() {
+    await page.goto(await bench.login_link());
+    bench.start_robot(kRobot);
+    await page.locator('.annunciator h1').getByText(kRobot).waitFor();
+    await until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0);
+    const native = 'select, datalist, input[list], dialog, [popover], input[type=date], input[type=time], input[type=month], input[type=week], input[type=datetime-local], input[type=color], input[type=file]';
+    assert.equal(await page.locator(native).count(), 0);
+    const offering = await page.evaluate(() => [...document.querySelectorAll('input:not([type=range])')].filter((each) => each.autocomplete !== 'off').map((each) => each.id));
+    assert.deepEqual(offering, [], 'a browser would list earlier entries');
+    const kept_shut = await page.evaluate(() => new Promise((done) => {
+      addEventListener('contextmenu', (event) => done(event.defaultPrevented), { once: true });
+      document.querySelector('#run-name').dispatchEvent(new MouseEvent('contextmenu', { bubbles: true, cancelable: true }));
+    }));
+    assert.ok(kept_shut);
+  },
+
+  async 'Escape stops a robot that runs, from each control of auto and manual'() {
+    for (const id of ['setpoint-entry', 'run-name', 'duty-entry', 'run-fluid', 'to-manual', 'stop-all', 'show-keys']) {
+      await engage_auto();
+      await page.focus(`#${id}`);
+      await escape_stops(`${id} focused, in auto`);
+      await clear_latch();
+    }
+    const hold = page.locator('#hold-to-run');
+    await hold.hover();
+    await page.mouse.down();
+    await until('the duty runs', async () => (await robot()).sample.duty > 0.1);
+    await escape_stops('a duty held');
+    await page.mouse.up();
+    await until('the motor is off', async () => (await robot()).sample.duty === 0);
+  },
+
+  async 'and from every control that there is, while latched'() {
+    const controls = await mark_controls();
+    assert.ok(controls.length >= 15, `controls: ${controls.map((each) => each.name)}`);
+    for (const { at, name } of controls) {
+      const focused = await page.evaluate((probe) => {
+        const control = document.querySelector(`[data-probe="${probe}"]`);
+        control?.focus();
+        return document.activeElement === control;
+      }, at);
+      if (focused) await escape_stops(name);
+      else console.log(`    not focusable any more: ${name}`);
+    }
+  },
+
+  async 'the list of fluids stops at the first Escape, and closes as well'() {
+    const list = page.locator('#run-fluid-list');
+    await page.focus('#run-fluid');
+    await page.keyboard.press('ArrowDown');
+    await list.waitFor();
+    await escape_stops('the list of fluids open');
+    await list.waitFor({ state: 'hidden' });
+    assert.equal(await page.evaluate(() => document.activeElement.id), 'run-fluid', 'the focus stays');
+    await page.keyboard.press('w');
+    assert.equal(await page.locator('#run-fluid-list .at').innerText(), 'water');
+    await page.keyboard.press('Enter');
+    await list.waitFor({ state: 'hidden' });
+    assert.equal(await page.locator('#run-fluid').innerText(), 'water');
+    await page.click('#run-fluid');
+    await page.locator('#run-fluid-list [role=option]').first().click();
+    assert.equal(await page.locator('#run-fluid').innerText(), 'non-Newtonian');
+  },
+
+  async 'the list of keys stops and closes, and says what Space does and what full screen takes'() {
+    await page.click('#show-keys');
+    const list = page.locator('#key-list');
+    await list.waitFor();
+    const text = await list.innerText();
+    assert.match(text, /Space\s+Never stops/);
+    assert.match(text, /full screen/);
+    await escape_stops('the list of keys open');
+    await list.waitFor({ state: 'hidden' });
+  },
+
+  async 'Escape stops in the view of who has access'() {
+    await page.click('#show-access');
+    await page.locator('#access').waitFor();
+    await page.locator('#access button').first().focus();
+    await escape_stops('a guarded button of the access view');
+    await page.click('#show-access');
+    await page.locator('.annunciator h1').waitFor();
+  },
+
+  async 'nothing on a page can take the key first: details, dialog, text area, a listener that swallows it'() {
+    await page.evaluate(() => {
+      document.body.insertAdjacentHTML('beforeend', '<div id="added"><textarea></textarea><details open><summary>x</summary></details><dialog><input></dialog></div>');
+      for (const target of [window, document, document.body, document.querySelector('#added')]) {
+        target.addEventListener('keydown', (event) => event.stopImmediatePropagation(), true);
+      }
+    });
+    for (const where of ['textarea', 'summary']) {
+      await page.focus(`#added ${where}`);
+      await escape_stops(where);
+    }
+    await page.evaluate(() => document.querySelector('#added dialog').showModal());
+    await page.focus('#added dialog input');
+    await escape_stops('a modal dialog');
+    await page.reload();
+    await page.locator('.annunciator h1').getByText(kRobot).waitFor();
+  },
+
+  async 'a key that is held down is one stop'() {
+    await page.focus('#run-name');
+    await escape_stops('Escape held', async () => {
+      for (let i = 0; i < 20; ++i) await page.keyboard.down('Escape'); // each but the first repeats
+      await page.keyboard.up('Escape');
+    });
+    await clear_latch();
+  },
+
+  async 'Space never stops, not even on a button that stops; Enter does'() {
+    await engage_auto();
+    const before = await stops();
+    for (const id of ['emergency-stop', 'stop-all']) {
+      await page.focus(`#${id}`);
+      await page.keyboard.press(' ');
+      await page.keyboard.press('Space', { delay: 30 });
+    }
+    await page.focus('#run-name');
+    await page.keyboard.press(' ');
+    assert.equal(await page.inputValue('#run-name'), ' ', 'it belongs to text');
+    await page.evaluate(() => document.activeElement.blur());
+    await page.keyboard.press(' ');
+    const then = (await robot()).next_seq;
+    await until('another second', async () => (await robot()).next_seq >= then + 100);
+    assert.equal(await stops(), before);
+    assert.equal(await mode(), 'auto');
+    await page.focus('#emergency-stop');
+    await escape_stops('Enter on the button', () => page.keyboard.press('Enter'));
+    await seen_mode('emergency');
+  },
+};
+
+await run(bench, steps, async () => {
+  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+});

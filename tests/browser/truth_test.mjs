@@ -1,0 +1,209 @@
+// What the page shows is true: where a robot is that a disturbance moves, what is known while the station is silent, a
+// run that was interrupted, an emergency in a tab that nobody looks at, and plots that never cover a control.
+import assert from 'node:assert/strict';
+import { Bench, run, until } from './programs.mjs';
+
+const kRobot = 'rheo-1';
+const bench = new Bench();
+let page;
+
+const text = (selector) => page.locator(selector).first().innerText({ timeout: 5000 });
+const number = async (name) => Number((await text(`#numeral-${name} output`)).replace('\u2212', '-'));
+const mode = () => page.locator('.annunciator').getAttribute('data-mode');
+const seen_mode = (wanted) => until(`the page shows ${wanted}`, async () => (await mode()) === wanted, 15_000);
+const robot = () => bench.ask(`/robots/${kRobot}`);
+const command = (body) => bench.post(`/robots/${kRobot}/commands`, body);
+const live = async () => {
+  await page.locator('.top-bar .lamp.good').waitFor({ timeout: 15_000 });
+  await until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0, 15_000);
+};
+const phase = () => page.locator('#stop-line').getAttribute('data-phase');
+
+async function clear_latch() {
+  await until('the latch may be cleared', async () => (await page.locator('#clear-emergency').count()) > 0 && (await page.locator('#clear-emergency').isEnabled()), 15_000);
+  await page.locator('#clear-emergency').hover();
+  await page.mouse.down();
+  await seen_mode('manual');
+  await page.mouse.up();
+}
+
+async function start_run(name) {
+  await page.fill('#run-name', name);
+  await page.click('#start-run');
+  await page.locator('#end-run').waitFor();
+}
+
+const steps = {
+  async 'with a disturbance the page shows where the robot is, and what its controller sees'() {
+    await page.goto(await bench.login_link());
+    bench.start_robot(kRobot);
+    await page.locator('.annunciator h1').getByText(kRobot).waitFor();
+    await live();
+    assert.equal((await command({ kind: 'set_mode', mode: 'auto', setpoint_m: 0.1 })).status, 200);
+    await until('the robot is at 100 mm', async () => Math.abs((await number('position')) - 100) < 2, 15_000);
+    assert.equal(await text('#disturbance'), 'disturbance 0.0 mm');
+    const both = await page.evaluate(() => ['seen', 'position'].map((name) => document.querySelector(`#numeral-${name} output`).textContent));
+    assert.equal(both[0], both[1], 'without a disturbance it sees where it is');
+    assert.equal((await command({ kind: 'inject_disturbance', disturbance_m: -0.05 })).status, 200);
+    await until('the robot has moved to 150 mm', async () => Math.abs((await number('position')) - 150) < 2, 15_000);
+    assert.ok(Math.abs((await number('seen')) - 100) < 2);
+    assert.equal(await number('setpoint'), 100);
+    assert.equal(await text('#disturbance'), 'disturbance \u221250.0 mm');
+    const now = await robot();
+    assert.ok(Math.abs(now.sample.position_m - now.disturbance_m - 0.15) < 0.003, 'as the record has it');
+    assert.match(await text('#numeral-position .foot'), /off by (4[89]|5[01])\.\d/, 'off by what is true');
+    assert.match(await text('#numeral-seen .foot'), /off by \u2212?[01]\.\d/);
+  },
+
+  async 'wherever a position is shown it carries its ±'() {
+    const { position_sd_m } = await robot();
+    assert.ok(position_sd_m > 0);
+    const spread = /± \d+\.\d/;
+    assert.match(await text('#numeral-position .foot'), /± \d+\.\d mm \(2 sd\)/);
+    assert.match(await text('#numeral-seen .foot'), spread);
+    assert.match(await text('.robot-entry .figure'), /^1[45]\d\.\d ± \d+\.\d mm$/);
+    const shown_mm = Number(/± (\d+\.\d)/.exec(await text('#numeral-position .foot'))[1]);
+    assert.ok(Math.abs(shown_mm - 2000 * position_sd_m) < 0.3, `${shown_mm} is two of ${position_sd_m} m`);
+    for (const line of await page.locator('.log-strip .text').allInnerTexts()) {
+      if (/ at .* mm/.test(line)) assert.match(line, spread, line);
+    }
+    const disturbed_seq = (await robot()).next_seq;
+    await until('two seconds with the disturbance', async () => (await robot()).next_seq > disturbed_seq + 200);
+    const plot = await page.locator('.strip-0 .plot').boundingBox();
+    await page.mouse.move(plot.x + plot.width - 30, plot.y + plot.height / 2);
+    await until('the cursor says a position', async () => /mm at/.test(await text('.strip-0 .cursor')));
+    assert.match(await text('.strip-0 .cursor'), /^1\d\d\.\d ± \d+\.\d, seen \d+\.\d, mm at/);
+    await page.mouse.move(5, 5);
+  },
+
+  async 'nothing claims control or a recording while the page is cut off'() {
+    await page.click('#take-control');
+    await until('the page is in control', async () => (await text('#control-line')).includes('You are in control'));
+    await start_run('cut off');
+    await page.locator('.recording-lamp').waitFor();
+    bench.station.process.kill('SIGSTOP');
+    await until('the claims are gone', async () => (await page.locator('.recording-lamp').count()) === 0, 4000);
+    const shown = await page.locator('body').innerText();
+    assert.doesNotMatch(shown, /You are in control|is in control|Nobody is in control/);
+    assert.doesNotMatch(shown, /“cut off”/, 'no run is said to be open');
+    assert.equal(await page.locator('#control-line').getAttribute('data-holder'), '');
+    await page.locator('#run-unknown').waitFor();
+    assert.equal(await page.locator('.control.run.engaged').count(), 0);
+    assert.equal(await page.locator('.robot-entry .dot.good').count(), 0);
+  },
+
+  async 'a stop that may not have arrived is said for as long as the page is cut off'() {
+    await page.keyboard.press('Escape');
+    const started_ms = performance.now();
+    await until('it says so', async () => /may not have arrived/.test(await text('#stop-line')), 3000);
+    await until('both ways have failed', async () => (await phase()) === 'failed');
+    while (performance.now() - started_ms < 9000) {
+      assert.match(await text('#stop-line'), /may not have arrived/);
+      await page.waitForTimeout(250);
+    }
+  },
+
+  async 'and goes when telemetry shows the latch'() {
+    bench.station.process.kill('SIGCONT');
+    await until('the page sees the latch', async () => (await phase()) === 'seen', 20_000);
+    assert.equal(await mode(), 'emergency');
+    assert.equal((await robot()).sample.duty, 0);
+    await live();
+    await page.locator('.recording-lamp').waitFor(); // the run is open still
+    await clear_latch();
+    assert.equal(await phase(), 'idle');
+    await page.click('#end-run');
+  },
+
+  async 'a run that was interrupted is told until it is dismissed'() {
+    await start_run('doomed');
+    await bench.station.end('SIGKILL');
+    await bench.start_station();
+    await live();
+    const notice = page.locator('#interrupted-run');
+    await notice.waitFor();
+    assert.match(await notice.innerText(), /Run “doomed” was interrupted at \d\d:\d\d:\d\d/);
+    await until('the log says it', async () => (await text('.log-strip ol')).includes('“doomed”'));
+    assert.equal(await page.locator('.recording-lamp').count(), 0);
+    await page.reload();
+    await live();
+    await notice.waitFor();
+    await page.click('#dismiss-interrupted');
+    await notice.waitFor({ state: 'detached' });
+    await page.reload();
+    await live();
+    await page.locator('#start-run').waitFor();
+    await until('the newest run was asked for', () => page.evaluate(() => performance.getEntriesByType('resource').some((each) => each.name.includes('limit=1'))));
+    assert.equal(await notice.count(), 0, 'it stays dismissed');
+  },
+
+  async 'or until a new one begins'() {
+    await start_run('doomed as well');
+    await bench.station.end('SIGKILL');
+    await bench.start_station();
+    await live();
+    await page.locator('#interrupted-run').waitFor();
+    await start_run('the next');
+    await page.locator('#interrupted-run').waitFor({ state: 'detached' });
+    await page.click('#end-run');
+    await page.locator('#start-run').waitFor();
+    assert.equal(await page.locator('#interrupted-run').count(), 0);
+  },
+
+  async 'an emergency in a tab in the background shows in its title and icon'() {
+    const tab = () => page.evaluate(() => ({ title: document.title, icon: document.querySelector('link[rel=icon]').getAttribute('href') }));
+    assert.deepEqual(await tab(), { title: 'Rheonaut', icon: '/favicon.svg' });
+    const other = await page.context().newPage();
+    await other.bringToFront();
+    await bench.post(`/robots/${kRobot}/emergency-stop`, undefined);
+    await until('the title says it', async () => (await tab()).title === `EMERGENCY ${kRobot} · Rheonaut`);
+    const { icon } = await tab();
+    assert.equal(icon, '/favicon_emergency.svg');
+    const answer = await fetch(bench.http + icon);
+    assert.equal(answer.status, 200);
+    assert.match(answer.headers.get('content-type'), /svg/);
+    await other.close();
+    await page.bringToFront();
+    await clear_latch();
+    await until('and takes it back', async () => (await tab()).title === 'Rheonaut');
+  },
+
+  async 'shrinking or turning the window never draws a plot over a control'() {
+    const sizes = [[1440, 900], [1024, 768], [844, 390], [1440, 900], [390, 844], [844, 390], [1181, 640], [761, 701], [760, 1000], [1280, 500], [1000, 900]];
+    for (const [width, height] of sizes) {
+      await page.setViewportSize({ width, height });
+      await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))));
+      const found = await page.evaluate(covered);
+      assert.deepEqual(found, [], `at ${width} × ${height}`);
+    }
+    await page.setViewportSize({ width: 1440, height: 900 });
+  },
+};
+
+// In the page: what lies where it must not. A control that is scrolled out of sight is covered by nothing.
+function covered() {
+  const faults = [];
+  const areas = ['.top-bar', '.side', '.stop-panel', '.emergency-stop', '.controls', '.log-strip'];
+  for (const control of document.querySelectorAll(areas.map((area) => `${area} :is(button, input, h2, legend, p, li)`).join())) {
+    if (!control.checkVisibility()) continue;
+    const { left, top, width, height } = control.getBoundingClientRect();
+    for (const [x, y] of [[left + width / 2, top + height / 2], [left + 3, top + height / 2], [left + width - 3, top + height / 2]]) {
+      const hit = document.elementFromPoint(x, y);
+      if (hit?.closest('.plots, .readouts, .annunciator')) faults.push(`${control.id || control.textContent.slice(0, 20)} under ${hit.closest('section, div').className}`);
+    }
+  }
+  for (const canvas of document.querySelectorAll('.plots canvas')) {
+    const host = canvas.closest('.plot').getBoundingClientRect();
+    const scope = document.querySelector('.scope').getBoundingClientRect();
+    if (host.right > scope.right + 0.5 || host.left < scope.left - 0.5) faults.push(`a plot is ${host.width} px wide in ${scope.width}`);
+  }
+  const stop = document.querySelector('#emergency-stop').getBoundingClientRect();
+  const hit = document.elementFromPoint(stop.left + stop.width / 2, stop.top + stop.height / 2);
+  if (!hit?.closest('#emergency-stop')) faults.push('the stop is out of reach');
+  if (document.documentElement.scrollWidth > innerWidth + 1) faults.push(`the page is ${document.documentElement.scrollWidth} px wide`);
+  return faults;
+}
+
+await run(bench, steps, async () => {
+  page = await bench.open_browser({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+});

@@ -1,0 +1,178 @@
+// One robot as the page knows it: its state as the station told it last, and what its samples say.
+
+import { signal, type Signal } from '@preact/signals';
+import type { RobotState, SamplesMessage } from './api';
+import { estimate_of, SampleRing } from './samples';
+
+export const kStale_ms = 500; // no sample for so long: every numeral is marked
+
+const kSettle_ms = 500;
+
+// What the numerals show; null: never heard.
+export interface Readout {
+  watched: boolean; // its samples are asked for; of the others nothing is shown that changes with each sample
+  estimate_m: number | null; // where the robot believes that it is
+  position_m: number | null; // what its controller sees: the estimate plus the disturbance
+  position_sd_m: number | null;
+  setpoint_m: number | null;
+  reference_m: number | null;
+  duty: number | null;
+  velocity_m_s: number | null;
+  impedance_mv: number | null;
+  disturbance_m: number | null;
+  mode: string;
+  sub_state: string;
+  emergency_id: string | null;
+  sample_age_ms: number;
+  stale: boolean;
+  received: number;
+  missing: number; // samples that this page has not got, since it first heard this boot
+}
+
+const kEmptyReadout: Readout = {
+  watched: true,
+  estimate_m: null,
+  position_m: null,
+  position_sd_m: null,
+  setpoint_m: null,
+  reference_m: null,
+  duty: null,
+  velocity_m_s: null,
+  impedance_mv: null,
+  disturbance_m: null,
+  mode: '',
+  sub_state: '',
+  emergency_id: null,
+  sample_age_ms: Infinity,
+  stale: true,
+  received: 0,
+  missing: 0,
+};
+
+export class Robot {
+  private made_ring: SampleRing | null = null;
+  readonly state: Signal<RobotState>;
+  readonly readout = signal<Readout>(kEmptyReadout);
+  private latest: SamplesMessage | null = null;
+  private sampled_at_ms = -Infinity;
+  private watched = true; // its samples are asked for
+  private boot_id: string | null = null;
+  private first_seq = 0;
+  private next_seq = 0;
+  private received = 0;
+  private stated_at_ms: number; // when the station last told its state
+  private latched_at_ms = -Infinity; // when news last showed the latch
+  private is_latched = false; // by the latest news
+  private shown: { state: RobotState; is_current: boolean } | null = null; // of a robot that is not watched
+
+  constructor(state: RobotState, now_ms: number) {
+    this.state = signal(state);
+    this.stated_at_ms = now_ms;
+    this.note_latch(state.mode, state.link === 'connected', now_ms);
+  }
+
+  // Made when it is needed: a fleet of hundreds would fill the memory with empty rings.
+  get ring(): SampleRing {
+    return (this.made_ring ??= new SampleRing());
+  }
+
+  // In an emergency, or with a stop that is on its way. One that is retired and away no longer counts.
+  get is_alarming(): boolean {
+    const { mode, emergency_id, pending_stop, retired, link } = this.state.value;
+    if (retired && link !== 'connected') return false;
+    return mode === 'emergency' || emergency_id !== null || (pending_stop !== null && link === 'connected');
+  }
+
+  take(state: RobotState, now_ms: number): void {
+    this.state.value = state;
+    this.stated_at_ms = now_ms;
+    this.note_latch(state.mode, state.link === 'connected', now_ms);
+  }
+
+  // What was heard since then of a stop of this robot. A latch counts by telemetry, and by the state of a robot that is
+  // connected, which is made of telemetry; a robot that is away keeps the mode that it had.
+  stop_evidence(since_ms: number): 'latched' | 'cleared' | 'kept' | 'open' {
+    if (this.latched_at_ms > since_ms) return this.is_latched ? 'latched' : 'cleared';
+    const { link, pending_stop } = this.state.peek();
+    return link !== 'connected' && pending_stop !== null && this.stated_at_ms > since_ms ? 'kept' : 'open';
+  }
+
+  private note_latch(mode: string, is_news: boolean, now_ms: number): void {
+    if (!is_news) return;
+    const is_latched = mode === 'emergency';
+    // States come at once and samples some 50 ms later: what was made before the latch may be heard after it.
+    if (!is_latched && now_ms - this.latched_at_ms < kSettle_ms) return;
+    this.is_latched = is_latched;
+    if (is_latched) this.latched_at_ms = now_ms;
+  }
+
+  // What was not asked for is not missing afterwards.
+  watch(watched: boolean): void {
+    if (watched && !this.watched) this.boot_id = null;
+    this.watched = watched;
+  }
+
+  // Of the position that was heard last.
+  position_sd_m(): number | null {
+    return this.watched && this.latest ? this.latest.position_sd_m : this.state.peek().position_sd_m;
+  }
+
+  hear(message: SamplesMessage, now_ms: number): void {
+    const size = message.position_m.length;
+    if (message.boot_id !== this.boot_id) {
+      this.boot_id = message.boot_id;
+      this.first_seq = this.next_seq = message.first_seq;
+      this.received = 0;
+    }
+    const before = this.ring.received;
+    this.ring.append(message, now_ms / 1000);
+    if (message.first_seq >= this.first_seq) this.received += this.ring.received - before;
+    if (message.first_seq + size <= this.next_seq) return; // sent again: history, not news
+    this.next_seq = message.first_seq + size;
+    this.latest = message;
+    this.sampled_at_ms = now_ms;
+    this.note_latch(message.mode, true, now_ms);
+  }
+
+  // is_current: the page hears the station; what it knows of a robot is old otherwise.
+  refresh(now_ms: number, is_current: boolean): void {
+    if (!this.watched) return this.refresh_from_state(is_current);
+    this.shown = null;
+    const sample_age_ms = now_ms - this.sampled_at_ms;
+    const stale = sample_age_ms > kStale_ms;
+    const { latest } = this;
+    const state = this.state.peek();
+    const last = <T>(values: T[]): T | null => values[values.length - 1] ?? null;
+    const position_m = latest && last(latest.position_m);
+    this.readout.value = {
+      watched: true,
+      estimate_m: latest && estimate_of(position_m, latest.disturbance_m),
+      position_m,
+      position_sd_m: latest && latest.position_sd_m,
+      setpoint_m: latest ? latest.setpoint_m : null,
+      reference_m: latest && last(latest.reference_m),
+      duty: latest && last(latest.duty),
+      velocity_m_s: latest && last(latest.velocity_m_s),
+      impedance_mv: latest && last(latest.impedance_mv),
+      disturbance_m: latest && latest.disturbance_m,
+      // What the station says of a robot that is silent is newer than its last sample.
+      mode: latest && !stale ? latest.mode : state.mode,
+      sub_state: latest && !stale ? latest.sub_state : state.sub_state,
+      emergency_id: latest && !stale ? latest.emergency_id : state.emergency_id,
+      sample_age_ms,
+      stale,
+      received: this.received,
+      missing: this.next_seq - this.first_seq - this.received,
+    };
+  }
+
+  // The station tells of its link, mode and emergency at once; numbers would be old.
+  private refresh_from_state(is_current: boolean): void {
+    const state = this.state.peek();
+    if (this.shown?.state === state && this.shown.is_current === is_current) return;
+    this.shown = { state, is_current };
+    const { mode, sub_state, emergency_id, link } = state;
+    const stale = link !== 'connected' || !is_current;
+    this.readout.value = { ...kEmptyReadout, watched: false, mode, sub_state, emergency_id, stale };
+  }
+}
