@@ -8,8 +8,7 @@
 namespace sim_robot {
 namespace {
 
-constexpr std::uint64_t kConnectTimeoutUs = 1'000'000;
-constexpr std::uint64_t kMinPauseUs = 300'000, kMaxPauseUs = 900'000;  // between two attempts, as of RobotClient
+constexpr std::uint64_t kConnectTimeoutUs = std::chrono::microseconds(Redial::kConnectTimeout).count();
 
 }  // namespace
 
@@ -64,18 +63,18 @@ void ImpairedLink::dial() {
     case Phase::idle:
       // SAFETY: while the handshake blocks the loop nothing could stop a motor.
       if (handshake_s_ > 0 && !robot_.core().at_rest()) break;
-      if (!reachable) return pause_from(now_us() + kConnectTimeoutUs);
+      if (!reachable) return pause_for_at_least(kConnectTimeoutUs);
       phase_ = Phase::dialling;
       phase_ends_us_ = now_us() + microseconds(impairments_.up.delay_s + impairments_.down.delay_s);
       break;
     case Phase::dialling:
-      if (!reachable) return pause_from(now_us() + kConnectTimeoutUs);
+      if (!reachable) return pause_for_at_least(kConnectTimeoutUs);
       if (handshake_s_ <= 0) return open();
       if (!robot_.core().at_rest()) break;
       phase_ = Phase::handshake;
       robot_.block(handshake_s_);
       break;
-    case Phase::handshake: return reachable ? open() : pause_from(now_us());
+    case Phase::handshake: return reachable ? open() : pause_for_at_least(0);
   }
 }
 
@@ -113,8 +112,9 @@ void ImpairedLink::write() {
 void ImpairedLink::hang_up(bool says_so) {
   if (phase_ != Phase::open) return;
   if (says_so) connection_->up.close(now_us());
+  if (robot_.core().link_up()) redial_.welcomed();
   robot_.robot().link_closed(robot_.robot_clock_us());
-  pause_from(now_us());
+  pause_for_at_least(0);
 }
 
 // Bytes that reach a robot without this connection are answered with a reset.
@@ -124,9 +124,11 @@ void ImpairedLink::answer_the_dead() {
   if (connection_->down.pull(&ignored, 1, now_us()) > 0) connection_->station_is_open = false;
 }
 
-void ImpairedLink::pause_from(std::uint64_t at_us) {
+void ImpairedLink::pause_for_at_least(std::uint64_t duration_us) {
+  const bool ring_has_room = robot_.core().samples().fill() < robot_fw::TelemetryRing::kCapacity;
+  const std::chrono::microseconds pause = redial_.next(random_, ring_has_room);
   phase_ = Phase::idle;
-  phase_ends_us_ = at_us + std::uniform_int_distribution<std::uint64_t>{kMinPauseUs, kMaxPauseUs}(random_);
+  phase_ends_us_ = now_us() + std::max(duration_us, static_cast<std::uint64_t>(pause.count()));
 }
 
 std::size_t ImpairedLink::send(protocol::Bytes bytes) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "sim_robot/faulty_robot.hpp"
+#include "sim_robot/redial.hpp"
 #include "sim_robot/robot_life.hpp"
 
 namespace sim_robot {
@@ -68,13 +69,14 @@ class ImpairedLink final : public FaultyLink {
   void write();
   void hang_up(bool says_so);
   void answer_the_dead();
-  void pause_from(std::uint64_t at_us);
+  void pause_for_at_least(std::uint64_t duration_us);
 
   RobotLife& robot_;
   const LinkImpairments made_with_;
   LinkImpairments impairments_;
   const double handshake_s_;
   std::mt19937_64 random_;
+  Redial redial_;
   Phase phase_ = Phase::idle;
   std::uint64_t phase_ends_us_ = 0;  // when it dials, or when the connection is there
   std::optional<Connection> connection_;

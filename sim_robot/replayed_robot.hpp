@@ -56,6 +56,7 @@ class ReplayedRobot final : public FleetMember, private Speaker {
   bool is_welcome() const override { return phase_ == Phase::up; }
   protocol::RefusalReason refusal() const override { return refusal_; }
   std::string refusal_detail() const override { return {}; }
+  bool ring_has_room() const override { return !gap_grows_; }
 
   bool on_frame(const protocol::StationFrame& frame);
   bool on_welcome(const protocol::Welcome& welcome);

@@ -76,6 +76,8 @@ void RobotClient::follow_reboot() {
   oldest_after_gap_ = UINT64_MAX;
 }
 
+bool RobotClient::ring_has_room() const { return life_.core().samples().fill() < robot_fw::TelemetryRing::kCapacity; }
+
 // SAFETY: while a handshake blocks the loop nothing could stop a motor.
 bool RobotClient::may_dial() const { return !life_.is_blocked() && (handshake_ == 0ms || life_.core().at_rest()); }
 

@@ -61,6 +61,7 @@ class RobotClient final : public FleetMember, private Speaker {
   bool is_welcome() const override { return life_.core().link_up(); }
   protocol::RefusalReason refusal() const override { return life_.core().refusal(); }
   std::string refusal_detail() const override { return life_.core().refusal_detail(); }
+  bool ring_has_room() const override;
   bool may_dial() const override;
   bool is_listening() const override { return !life_.is_blocked(); }
   std::optional<std::chrono::milliseconds> begin_handshake() override;

@@ -12,10 +12,10 @@ namespace {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
 
-constexpr auto kConnectTimeout = 1s;
+using Clock = std::chrono::steady_clock;
+
 constexpr auto kAskAgain = 10ms;
-constexpr int kMinPauseMs = 300, kMaxPauseMs = 900;  // between two attempts
-constexpr int kMostPauses = 4;                       // taken together, for a station that does not take it in
+constexpr std::chrono::milliseconds kShortestPause{10};  // after an attempt that took long
 
 }  // namespace
 
@@ -24,11 +24,12 @@ StationConnection::StationConnection(asio::io_context& loop, Speaker& speaker, S
     : speaker_(speaker), station_(std::move(station)), name_(std::move(name)), log_(std::move(log)), socket_(loop) {}
 
 asio::awaitable<void> StationConnection::run() {
-  for (int failures = 0;;) {
+  for (;;) {
     while (!speaker_.may_dial()) co_await pause(kAskAgain);
     const int times_forgotten = times_forgotten_;
     was_welcome_ = false;
-    const std::string failure = co_await socket_.reach(station_, kConnectTimeout);
+    auto pause_from = Clock::now();
+    const std::string failure = co_await socket_.reach(station_, Redial::kConnectTimeout);
     if (!failure.empty()) {
       ++counts_.unreachable;
       say(failure + " at " + station_.host + ":" + station_.port + ", trying again");
@@ -38,10 +39,12 @@ asio::awaitable<void> StationConnection::run() {
         co_await serve();
         say_how_it_ended();
       }
+      pause_from = Clock::now();
     }
-    failures = was_welcome_ ? 0 : failures + 1;
-    std::uniform_int_distribution<int> pause_ms{kMinPauseMs, kMaxPauseMs};
-    co_await pause(std::clamp(failures, 1, kMostPauses) * std::chrono::milliseconds(pause_ms(jitter_)));
+    if (was_welcome_) redial_.welcomed();
+    const auto elapsed = std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - pause_from);
+    const auto left = redial_.next(jitter_, speaker_.ring_has_room()) - elapsed;
+    co_await pause(std::max(left, kShortestPause));
   }
 }
 

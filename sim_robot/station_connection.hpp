@@ -2,9 +2,8 @@
 // waiting.
 //
 // What speaks over it is a Speaker: a simulated robot, or a recording that is replayed. What the socket does not take
-// at once of a frame stays here, the speaker is asked for no other until it is gone. After a failure it is dialled
-// again 0.3 to 0.9 s later, at random, so that many do not come at once; up to four times as long while nobody takes it
-// in.
+// at once of a frame stays here, the speaker is asked for no other until it is gone. When it is dialled again after a
+// failure: see redial.hpp.
 // One buffer serves the reads of all connections of a thread. The loop and the speaker must outlive the connection.
 #pragma once
 
@@ -22,6 +21,7 @@
 
 #include "protocol/frame.hpp"
 #include "sim_robot/dialling.hpp"
+#include "sim_robot/redial.hpp"
 #include "sim_robot/station_socket.hpp"
 
 namespace sim_robot {
@@ -41,6 +41,8 @@ class Speaker {
   virtual bool is_welcome() const = 0;
   virtual protocol::RefusalReason refusal() const = 0;
   virtual std::string refusal_detail() const = 0;
+  // False once samples are lost while there is no connection: nothing is gained then by dialling often.
+  virtual bool ring_has_room() const = 0;
   // Whether to dial now; asked again every 10 ms.
   virtual bool may_dial() const { return true; }
   // Whether to read now what has arrived; asked again every 10 ms.
@@ -108,6 +110,7 @@ class StationConnection {
   std::string refusal_, last_line_;
   std::array<std::uint8_t, protocol::kMaxFramedBytes> frame_;  // under way
   std::size_t frame_size_ = 0, frame_sent_ = 0;
+  Redial redial_;
   std::minstd_rand jitter_{std::random_device{}()};
 };
 

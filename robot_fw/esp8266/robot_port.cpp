@@ -138,7 +138,8 @@ void RobotPort::use_rest() {
   const bool at_rest = robot_->at_rest() && motor_.is_off();
   if (at_rest && !storage_.write_pending()) robot_->storage_failed();
   const bool was_open = link_.state() == StationLink::State::open;
-  if (link_.step(at_rest)) {
+  const bool ring_has_room = robot_->samples().fill() < TelemetryRing::kCapacity;
+  if (link_.step(at_rest, ring_has_room)) {
     robot_->link_opened(clock_.now_us());
   } else if (was_open && link_.state() != StationLink::State::open) {
     robot_->link_closed(clock_.now_us());

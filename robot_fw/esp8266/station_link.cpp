@@ -27,8 +27,9 @@ constexpr std::uint16_t kCiphers[] = {
 };
 
 constexpr std::uint64_t kJoinUs = 15'000'000;
-constexpr std::uint32_t kFirstPauseMs = 1'000, kMaxDoublings = 3;
-constexpr unsigned kDialTimeoutMs = 15'000;  // connecting and handshake each
+constexpr std::uint32_t kShortestPauseMs = 100, kLongestPauseMs = 600, kMaxDoublings = 3;
+constexpr std::uint32_t kAnswerMs = 2'000;     // from the name of the station to a connection
+constexpr std::uint32_t kHandshakeMs = 8'000;  // 1 to 5 s of arithmetic
 // SAFETY: should a call that is not to wait do so after all, it gives up before the motor's interrupt does. The core
 // waits up to twice as long, and a turn of the loop may try three times: reading, pushing a record, looking for the
 // peer.
@@ -49,7 +50,8 @@ void StationLink::begin() {
   WiFi.setSleepMode(WIFI_NONE_SLEEP);  // a sleeping radio hears a stop 0.1 s late
 }
 
-bool StationLink::step(bool at_rest) {
+bool StationLink::step(bool at_rest, bool ring_has_room) {
+  ring_has_room_ = ring_has_room;
   if (!key_is_sound_) return false;  // nobody could be trusted
   if (state_ != State::off && state_ != State::joining && WiFi.status() != WL_CONNECTED) {
     close();
@@ -97,14 +99,22 @@ bool StationLink::dial() {
 }
 
 bool StationLink::handshake() {
-  stream_.setTimeout(kDialTimeoutMs);
   stream_.setKnownKey(&station_key_);
   stream_.setCiphers(kCiphers, sizeof(kCiphers) / sizeof(kCiphers[0]));
   stream_.setBufferSizes(static_cast<int>(kFragmentBytes), static_cast<int>(kFragmentBytes));
   stream_.setSession(&session_);
-  if (!stream_.connect(secrets_.station_host, secrets_.station_port)) return false;
+  if (!reach_station() || !stream_.shake_hands(secrets_.station_host, kHandshakeMs)) return false;
   // SAFETY: a station that did not agree on short records would overflow the buffer with one, maybe that of a stop.
   return stream_.getMFLNStatus() != 0;
+}
+
+bool StationLink::reach_station() {
+  const std::uint64_t began_us = clock_.now_us();
+  IPAddress address;
+  if (!WiFi.hostByName(secrets_.station_host, address, kAnswerMs)) return false;
+  const std::uint64_t waited_ms = (clock_.now_us() - began_us) / 1000;
+  return waited_ms < kAnswerMs &&
+         stream_.reach(address, secrets_.station_port, kAnswerMs - static_cast<std::uint32_t>(waited_ms));
 }
 
 void StationLink::close() {
@@ -115,11 +125,11 @@ void StationLink::close() {
 }
 
 void StationLink::pause_after_failure() {
-  const std::uint32_t pause_ms = kFirstPauseMs << (failures_ < kMaxDoublings ? failures_ : kMaxDoublings);
-  ++failures_;
-  // Spread by up to a half, so that robots that lost one station do not come back at once.
-  const std::uint32_t spread_ms = ESP.random() % (pause_ms / 2);
-  next_attempt_at_us_ = clock_.now_us() + (pause_ms + spread_ms) * 1000ULL;
+  if (ring_has_room_) failures_ = 0;
+  // Random, so that robots that lost one station do not come back at once.
+  const std::uint32_t once_ms = kShortestPauseMs + ESP.random() % (kLongestPauseMs - kShortestPauseMs);
+  next_attempt_at_us_ = clock_.now_us() + (once_ms << failures_) * 1000ULL;
+  if (!ring_has_room_ && failures_ < kMaxDoublings) ++failures_;
 }
 
 bool StationLink::alive() { return state_ == State::open && stream_.connected() != 0; }

@@ -16,6 +16,17 @@ constexpr std::size_t kRecordOverheadBytes = 29;
 
 class TlsStream final : public BearSSL::WiFiClientSecureCtx {
  public:
+  // The core's connect() does both under one time-out, which is too long for a station that is not there, or too short
+  // for the arithmetic of a handshake.
+  bool reach(const IPAddress& address, std::uint16_t port, std::uint32_t limit_ms) {
+    setTimeout(limit_ms);
+    return WiFiClient::connect(address, port) != 0;
+  }
+  bool shake_hands(const char* host, std::uint32_t limit_ms) {
+    setTimeout(limit_ms);
+    return _connectSSL(host);
+  }
+
   // What TCP takes at once. The override in the class below is another thing: it runs TLS, waits for TCP meanwhile, and
   // returns the room in TLS's own buffer.
   std::size_t tcp_room() {

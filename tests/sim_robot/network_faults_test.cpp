@@ -46,6 +46,19 @@ TEST_F(NetworkFaults, AnOutageOf3SecondsStopsTheMotorAfter1SecondAndLosesNoSampl
   expect_no_event("link_restored");
 }
 
+// The ring's 8 s, less the 0.2 s since the last acknowledgement and the 1 s until the robot tries again.
+TEST_F(NetworkFaults, AnOutageWithinTheRingLosesNothingWhenEverItBegins) {
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    begin_with({}, seed);
+    pass(1 + 0.01 * static_cast<double>(seed));
+    outage(6.7);
+    await(link_lost());
+    await(link_up(), {.limit_s = 8});
+    await(caught_up(), {.limit_s = 8});
+    expect_whole();
+  }
+}
+
 TEST_F(NetworkFaults, AnOutageOf12SecondsOverrunsTheRingAndTheLostAreCounted) {
   begin();
   pass(2);

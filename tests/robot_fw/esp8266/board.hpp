@@ -20,7 +20,9 @@ constexpr std::uint32_t kTurnUs = 250;  // of the loop
 
 class Board : public ::testing::Test {
  protected:
-  Board() {
+  Board() { new_chip(); }
+
+  void new_chip() {
     chip = Chip{};
     chip.imu_registers[0x00] = 0xA0;
     chip.analogue = 180;  // counts; the electrode in clear fluid

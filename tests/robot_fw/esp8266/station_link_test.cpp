@@ -41,11 +41,13 @@ TEST_F(Link, TimeoutsOfATurnAreShorterThanTheMotors) {
   EXPECT_LT(expected_us, kDeadManUs - kTickUs);
   chip.socket.takes = false;
   std::uint64_t longest_us = 0;
-  while (chip.now_us < 8'000'000 && port->link().state() == StationLink::State::open) {
+  const int dials = chip.socket.dials;
+  while (chip.now_us < 8'000'000 && port->link().state() == StationLink::State::open && chip.socket.dials == dials) {
     chip.pass(kTurnUs);
     const std::uint64_t before_us = chip.now_us;
     port->step();
-    if (port->link().state() == StationLink::State::open) longest_us = std::max(longest_us, chip.now_us - before_us);
+    const bool is_the_same = port->link().state() == StationLink::State::open && chip.socket.dials == dials;
+    if (is_the_same) longest_us = std::max(longest_us, chip.now_us - before_us);
   }
   EXPECT_GT(longest_us, 0U);
   EXPECT_LE(longest_us, expected_us);
@@ -79,13 +81,66 @@ TEST_F(Link, StationThatDoesNotAgreeOnShortRecordsIsLeft) {
   EXPECT_TRUE(chip.socket.writes.empty());
 }
 
-TEST_F(Link, PausesGrowAfterFailures) {
-  chip.socket.answers = false;
-  chip.socket.connect_takes_us = 0;
+// Whether the station refuses, or is not there at all: 6 s are less than the ring holds.
+TEST_F(Link, AttemptsFollowWithinASecondWhileTheRingHasRoom) {
+  for (const bool refuses : {true, false}) {
+    connect();
+    Socket& socket = chip.socket;
+    socket.attempt_began_us.clear();
+    socket.attempt_failed_us.clear();
+    socket.refuses = refuses;
+    socket.answers = refuses;
+    socket.connected = false;
+    run_ms(6'000);
+    ASSERT_GE(socket.attempt_failed_us.size(), 2U);
+    for (std::size_t i = 1; i < socket.attempt_began_us.size(); ++i) {
+      EXPECT_LE(socket.attempt_began_us[i] - socket.attempt_failed_us[i - 1], 1'000'000U) << "refuses: " << refuses;
+    }
+    EXPECT_LT(port->robot().samples().fill(), TelemetryRing::kCapacity);
+    new_chip();
+  }
+}
+
+TEST_F(Link, AttemptWithoutAnAnswerEndsAfterTwoSecondsWithTheMotorOff) {
+  for (const bool knows_name : {true, false}) {
+    connect();
+    Socket& socket = chip.socket;
+    socket.attempt_began_us.clear();
+    socket.attempt_failed_us.clear();
+    drive(0.5F);
+    chip.before_blocking = [this] { EXPECT_TRUE(port->motor().is_off()); };
+    socket.knows_name = knows_name;
+    socket.answers = false;
+    socket.connected = false;
+    run_ms(6'000);
+    ASSERT_GE(socket.attempt_failed_us.size(), 2U);
+    for (std::size_t i = 0; i < socket.attempt_failed_us.size(); ++i) {
+      EXPECT_LE(socket.attempt_failed_us[i] - socket.attempt_began_us[i], 2'000'000U) << "knows name: " << knows_name;
+    }
+    new_chip();
+  }
+}
+
+TEST_F(Link, HandshakeOfFiveSecondsIsWaitedForAndOneWithoutEndIsNot) {
+  chip.socket.handshake_takes_us = 5'000'000;
+  connect();
+  chip.socket.handshake_takes_us = 60'000'000;
+  chip.socket.connected = false;
+  run_ms(3'000);
+  ASSERT_GE(chip.socket.attempt_failed_us.size(), 1U);
+  EXPECT_LE(chip.socket.attempt_failed_us[0] - chip.socket.attempt_began_us[1], 8'000'000U);
+}
+
+TEST_F(Link, PausesGrowOnceTheRingIsFull) {
+  chip.socket.refuses = true;
   boot();
+  run_ms(20'000);
+  ASSERT_EQ(port->robot().samples().fill(), TelemetryRing::kCapacity);
+  const int dials = chip.socket.dials;
+  EXPECT_GE(dials, 15);
   run_ms(60'000);
-  EXPECT_GE(chip.socket.dials, 60 / 12);
-  EXPECT_LE(chip.socket.dials, 4 + 60 / 8);
+  EXPECT_LE(chip.socket.dials - dials, 60 / 1);
+  EXPECT_GE(chip.socket.dials - dials, 60 / 6);
 }
 
 TEST_F(Link, WithoutWifiItJoinsAgainAndAgain) {

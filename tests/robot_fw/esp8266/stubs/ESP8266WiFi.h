@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "IPAddress.h"
+
 enum wl_status_t { WL_CONNECTED = 3, WL_DISCONNECTED = 7 };
 enum WiFiMode_t { WIFI_STA = 1 };
 enum WiFiSleepType_t { WIFI_NONE_SLEEP = 0, WIFI_MODEM_SLEEP = 2 };
@@ -16,5 +18,6 @@ class WiFiClass {
   void begin(const char* name, const char* password);
   wl_status_t status();
   std::int32_t RSSI();
+  int hostByName(const char* name, IPAddress& address, std::uint32_t timeout_ms);
 };
 extern WiFiClass WiFi;

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <string>
 
+#include "IPAddress.h"
+
 constexpr std::uint16_t BR_TLS_ECDHE_RSA_WITH_AES_128_GCM_SHA256 = 0xC02F;
 constexpr std::uint16_t BR_TLS_ECDHE_ECDSA_WITH_AES_128_GCM_SHA256 = 0xC02B;
 constexpr std::uint16_t BR_TLS_ECDHE_RSA_WITH_CHACHA20_POLY1305_SHA256 = 0xCCA8;
@@ -13,6 +15,7 @@ constexpr std::uint16_t BR_TLS_ECDHE_ECDSA_WITH_CHACHA20_POLY1305_SHA256 = 0xCCA
 class WiFiClient {
  public:
   virtual ~WiFiClient() = default;
+  virtual int connect(IPAddress address, std::uint16_t port);  // TCP, within the time-out
   virtual int availableForWrite();  // TCP's room
   void setTimeout(unsigned long timeout_ms);
 
@@ -34,7 +37,6 @@ class Session {};
 
 class WiFiClientSecureCtx : public WiFiClient {
  public:
-  virtual int connect(const char* host, std::uint16_t port);
   virtual std::uint8_t connected();
   virtual int available();
   virtual int read(std::uint8_t* bytes, std::size_t size);
@@ -49,6 +51,9 @@ class WiFiClientSecureCtx : public WiFiClient {
   void setBufferSizes(int receive, int send);
   void setSession(Session* session);
   int getMFLNStatus();
+
+ protected:
+  bool _connectSSL(const char* host);  // the handshake, within the time-out
 
  private:
   // Hands the sealed record to TCP, all of it when it may wait, else as much as TCP takes. True when none is left.

@@ -170,6 +170,22 @@ void WiFiClass::begin(const char*, const char*) {
 }
 wl_status_t WiFiClass::status() { return chip.wifi_joined() ? WL_CONNECTED : WL_DISCONNECTED; }
 std::int32_t WiFiClass::RSSI() { return -60; }
+int WiFiClass::hostByName(const char*, IPAddress&, std::uint32_t timeout_ms) {
+  chip.socket.attempt_began_us.push_back(chip.now_us);
+  if (!chip.socket.knows_name) {
+    chip.blocks(timeout_ms * 1000);
+    chip.socket.attempt_failed_us.push_back(chip.now_us);
+  }
+  return chip.socket.knows_name;
+}
+
+int WiFiClient::connect(IPAddress, std::uint16_t) {
+  ++chip.socket.dials;
+  chip.blocks(chip.socket.answers ? 0 : chip.socket.timeout_ms * 1000);
+  const bool is_there = chip.socket.answers && !chip.socket.refuses;
+  if (!is_there) chip.socket.attempt_failed_us.push_back(chip.now_us);
+  return is_there;
+}
 
 int WiFiClient::availableForWrite() { return static_cast<int>(chip.socket.room); }
 void WiFiClient::setTimeout(unsigned long timeout_ms) { chip.socket.timeout_ms = timeout_ms; }
@@ -188,10 +204,11 @@ bool WiFiClientSecureCtx::run_engine(bool may_wait) {
   if (size > 0) chip.socket.sealed -= write_some(size);
   return chip.socket.sealed == 0;
 }
-int WiFiClientSecureCtx::connect(const char*, std::uint16_t) {
-  ++chip.socket.dials;
-  chip.blocks(chip.socket.connect_takes_us);
-  chip.socket.connected = chip.socket.answers;
+bool WiFiClientSecureCtx::_connectSSL(const char*) {
+  const std::uint64_t limit_us = chip.socket.timeout_ms * 1000;
+  chip.blocks(std::min(chip.socket.handshake_takes_us, limit_us));
+  chip.socket.connected = chip.socket.handshake_takes_us <= limit_us;
+  if (!chip.socket.connected) chip.socket.attempt_failed_us.push_back(chip.now_us);
   return chip.socket.connected;
 }
 std::uint8_t WiFiClientSecureCtx::connected() { return available() > 0 || chip.socket.connected; }

@@ -24,9 +24,11 @@ struct Pin {
 
 struct Socket {
   // What the network does.
-  bool answers = true;
+  bool answers = true;     // false: nobody is there, not even to refuse
+  bool refuses = false;    // at once: the machine is there, the station is not
+  bool knows_name = true;  // false: no answer to the question for the host's address either
   bool agrees_on_fragments = true;
-  std::uint64_t connect_takes_us = 3'000'000;
+  std::uint64_t handshake_takes_us = 3'000'000;
   std::size_t room = 1072;   // what TCP takes at once
   bool acknowledges = true;  // at once, so that the room stays
   bool takes = true;         // false: lwIP is out of memory or of places in its queue, whatever its room
@@ -39,6 +41,7 @@ struct Socket {
   int receive_bytes = 16'384, send_bytes = 512;
   int ciphers = 0;
   int dials = 0, closes = 0;
+  std::vector<std::uint64_t> attempt_began_us, attempt_failed_us;
   int waiting_flushes = 0;  // each waits for the peer's acknowledgement
   std::vector<std::vector<std::uint8_t>> writes;
   // Inside TLS.

@@ -1,0 +1,4 @@
+// Stub of an address: nothing looks into it.
+#pragma once
+
+class IPAddress {};
