@@ -1,0 +1,162 @@
+// What a station of schema version 6 recorded, certified, exported and audited stays as it was under the present
+// schema.
+#include <fmt/ranges.h>
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "server/cli/export.hpp"
+#include "server/recording/audit_check.hpp"
+#include "server/recording/schema.hpp"
+#include "server/recording/store_check.hpp"
+#include "tests/server/recording/recording_test.hpp"
+
+namespace server {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+std::string content_of(const fs::path& path) {
+  std::ostringstream text;
+  text << std::ifstream{path, std::ios::binary}.rdbuf();
+  return text.str();
+}
+
+std::string test_data(const std::string& name) { return content_of(fs::path{TEST_DATA_DIR} / "recording" / name); }
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in{text};
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
+void make_database(const fs::path& path, const std::string& dump) {
+  SQLite::Database database{path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE};
+  database.exec(test_data(dump));
+}
+
+class Version6Test : public RecordingTest {
+ protected:
+  void SetUp() override { make_database(path_, "version_6.sql"); }
+
+  void migrate() {
+    {
+      const Database database{path_};
+    }
+    ASSERT_EQ(number("PRAGMA user_version"), static_cast<std::int64_t>(migrations().size()));
+  }
+
+  // As `rheonaut verify --json` says it.
+  nlohmann::json verified() {
+    SQLite::Database database = open_for_reading(path_);
+    const StoreFindings store = check_store(database, {.run = {}, .integrity = true}).value();
+    const AuditFindings audit = check_audit(database, {});
+    std::vector<std::string> faults = store.faults;
+    faults.insert(faults.end(), audit.faults.begin(), audit.faults.end());
+    return {{"faults", faults},
+            {"segments", store.segments},
+            {"samples", store.samples},
+            {"runs_verified", store.runs_verified},
+            {"runs_incomplete", store.runs_incomplete},
+            {"runs_uncertified", store.runs_uncertified},
+            {"integrity_checked", true},
+            {"audit_entries", audit.entries},
+            {"audit_hidden", audit.hidden},
+            {"audit_commands", audit.commands},
+            {"audit_head", text(audit.head)}};
+  }
+
+  fs::path exported(cli::ExportFormat format) {
+    cli::Export wish;
+    wish.run = 1;
+    wish.format = format;
+    wish.to = folder_ / (std::string{"run_1."} + cli::text(format));
+    wish.data_dir = folder_;
+    std::ostringstream out;
+    EXPECT_EQ(cli::run(wish, out), 0);
+    return wish.to;
+  }
+};
+
+std::vector<std::string> column(SQLite::Database& database, const std::string& sql) {
+  std::vector<std::string> found;
+  SQLite::Statement query{database, sql};
+  while (query.executeStep()) found.push_back(query.getColumn(0).getString());
+  return found;
+}
+
+// What the columns `names` of a table hold, a line per row.
+std::vector<std::string> rows_of(SQLite::Database& database, const std::string& table,
+                                 const std::vector<std::string>& names) {
+  std::vector<std::string> quoted;
+  for (const std::string& name : names) quoted.push_back("quote(" + name + ")");
+  std::vector<std::string> rows =
+      column(database, fmt::format("SELECT {} FROM {}", fmt::join(quoted, " || '|' || "), table));
+  std::ranges::sort(rows);
+  return rows;
+}
+
+TEST_F(Version6Test, VerifyFindsWhatItFoundBefore) {
+  migrate();
+  EXPECT_EQ(verified(), nlohmann::json::parse(test_data("version_6_verify.json")));
+  EXPECT_EQ(rows("SELECT run_id, format, sha256 FROM run_certificate"),
+            std::vector<std::string>{"1|1|8a1128e51bce44795f52ea219c6bebc8fe9dc1252297d3cc2954b7a3bd69e154"});
+}
+
+TEST_F(Version6Test, TheExportsOfARunSayTheSame) {
+  migrate();
+  const std::vector<std::string> then = lines_of(test_data("version_6_run_1.csv"));
+  const std::vector<std::string> now = lines_of(content_of(exported(cli::ExportFormat::csv)));
+  ASSERT_EQ(now.size(), then.size());
+  ASSERT_EQ(now.size(), 172U);
+  for (std::size_t line = 0; line < now.size(); ++line) EXPECT_THAT(now[line], StartsWith(then[line]));
+
+  const fs::path earlier = folder_ / "earlier.sqlite";
+  make_database(earlier, "version_6_run_1.sql");
+  SQLite::Database before{earlier.string(), SQLite::OPEN_READONLY};
+  SQLite::Database after{exported(cli::ExportFormat::sqlite).string(), SQLite::OPEN_READONLY};
+  const std::vector<std::string> tables = column(before, "SELECT name FROM sqlite_master WHERE type = 'table'");
+  EXPECT_EQ(tables.size(), 10U);
+  for (const std::string& table : tables) {
+    SCOPED_TRACE(table);
+    const std::vector<std::string> names = column(before, "SELECT name FROM pragma_table_info('" + table + "')");
+    EXPECT_EQ(rows_of(after, table, names), rows_of(before, table, names));
+  }
+}
+
+TEST_F(Version6Test, TheAuditInAnExportOfThenIsWhole) {
+  const fs::path earlier = folder_ / "earlier.sqlite";
+  make_database(earlier, "version_6_run_1.sql");
+  SQLite::Database exported{earlier.string(), SQLite::OPEN_READONLY};
+  const AuditFindings audit = check_exported_audit(exported, {});
+  EXPECT_THAT(audit.faults, IsEmpty());
+  EXPECT_EQ(audit.entries, 8U);
+  EXPECT_EQ(text(audit.head), "11:1a6d83bd6530bf5e1cb5bc9704007110e095ed834ee905b84161eb8a82a4e6fa");
+}
+
+TEST_F(Version6Test, AStationGoesOnAndTheChainWithIt) {
+  start();
+  EXPECT_EQ(restored_.store_id, 14012994835199578285U);
+  EXPECT_EQ(wait(runs_->find(2))->state, RunState::interrupted);
+  TestRobot robot;
+  robot.boot_id = 4712;
+  connect(robot);
+  make(robot, 100);
+  clock_.run_for(5s);  // the run that was cut off gets its certificate
+  stop();
+  const nlohmann::json found = verified();
+  EXPECT_THAT(found["faults"], IsEmpty());
+  EXPECT_EQ(found["samples"], 332);
+  EXPECT_EQ(found["runs_verified"], 2);
+  EXPECT_EQ(rows("SELECT entry, lower(hex(hash)) FROM audit WHERE entry = 16"),
+            std::vector<std::string>{"16|e5bbe54ac3e6058e8193cca138ee726b7d88c7c01102f86036b053229a78b71e"});
+  EXPECT_GT(found["audit_entries"].get<int>(), 16);
+}
+
+}  // namespace
+}  // namespace server
