@@ -3,7 +3,7 @@
 
 A path in backquotes that begins with one of our folders must be a file or folder, with or without its suffix; `*` and
 `<noun>` match anything. A block of code that names a file, as "```cpp tests/sim_robot/story_examples_test.cpp", must
-stand in that file word for word. Prints `file:line: what is missing` and fails if anything is.
+stand in that file word for word. The station's own kinds of events are those of the table in docs/database.md. Prints `file:line: what is missing` and fails if anything is.
 """
 import pathlib
 import re
@@ -29,7 +29,25 @@ def misquotations(root, text):
             yield line, f"this code does not stand in {path}"
 
 
+def event_kinds(root):
+    """What is wrong with the table of the station's own kinds of events."""
+    document = root / "docs/database.md"
+    if not document.is_file():
+        return
+    section = re.search(r"^## Events$(.*?)^## ", document.read_text(encoding="utf-8"), re.M | re.S)
+    rows = re.findall(r"^\| (`[^|]+) \|", section.group(1), re.M) if section else []
+    listed = {kind for row in rows for kind in re.findall(r"`(\w+)`", row)}
+    made = set()
+    for source in (root / "server/station").glob("*.cpp"):
+        text = source.read_text(encoding="utf-8")
+        made |= set(re.findall(r"\bnote\([^;\"]*?,\s*\"(\w+)\"", text))
+        made |= set(re.findall(r"\brobot, \"(control_\w+)\"", text))
+    yield from (f"docs/database.md: no row for the event {kind} of the station" for kind in sorted(made - listed))
+    yield from (f"docs/database.md: the station makes no event {kind}" for kind in sorted(listed - made))
+
+
 def faults(root):
+    yield from event_kinds(root)
     documents = [*root.glob("*.md"), *root.glob("docs/**/*.md")]
     for document in sorted(documents):
         text = document.read_text(encoding="utf-8")

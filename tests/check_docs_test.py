@@ -30,6 +30,17 @@ class CheckDocs(unittest.TestCase):
                          ["README.md:1: there is no tests/b_test.cpp to quote"])
         self.assertEqual(found("```cpp\nint anything;\n```\n```proto set_duty\nwords\n```\n"), [])
 
+    def test_the_stations_events_have_rows(self):
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            for path, text in {"docs/database.md": "## Events\n\n| `gone`, `control_taken` | when |\n\n## End\n",
+                               "server/station/a.cpp": 'note(robot, "connected", words);\n'
+                                                       'return Change{robot, "control_taken", by};\n'}.items():
+                (root / path).parent.mkdir(parents=True)
+                (root / path).write_text(text)
+            self.assertEqual(list(faults(root)), ["docs/database.md: no row for the event connected of the station",
+                                                  "docs/database.md: the station makes no event gone"])
+
 
 if __name__ == "__main__":
     unittest.main()

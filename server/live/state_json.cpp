@@ -142,6 +142,8 @@ json to_json(const RobotEvent& event) {
   out["sample_seq"] = of_robot ? json(event.sample_seq) : json(nullptr);
   out["kind"] = event.kind;
   out["cause"] = event.cause;
+  out["emergency_cause"] = event.emergency_cause ? json(protocol::text(*event.emergency_cause)) : json(nullptr);
+  out["detail"] = event.detail;
   out["mode"] = mode_known ? json(protocol::text(event.mode)) : json(nullptr);
   out["sub_state"] = mode_known ? json(protocol::text(event.sub_state)) : json(nullptr);
   out["position_m"] = of_robot ? decimal(event.position_m) : json(nullptr);

@@ -25,7 +25,8 @@ constexpr const char* kInsertEventGap =
     "INSERT INTO event_gap (boot_key, first_event_seq, last_event_seq, cause, noticed_at_us) VALUES (?,?,?,?,?)";
 constexpr const char* kInsertEvent =
     "INSERT INTO event (robot_id, boot_key, event_seq, robot_time_us, sample_seq, kind, cause, mode, sub_state,"
-    " position_m, value, emergency_id, command_id, received_at_us) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
+    " position_m, value, emergency_id, command_id, received_at_us, emergency_cause, detail)"
+    " VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
 
 }  // namespace
 
@@ -103,9 +104,11 @@ std::int64_t SampleStore::write_segment(const Segment& segment, std::int64_t fir
 void SampleStore::write_event(const StoredEvent& stored) {
   const RobotEvent& event = stored.event;
   const auto boot_key = stored.boot_key == 0 ? std::nullopt : std::optional{stored.boot_key};
+  const auto emergency_cause = event.emergency_cause.transform(
+      [](protocol::EmergencyCause cause) { return std::string{protocol::text(cause)}; });
   execute(insert_event_, event.robot_id, boot_key, event.event_seq, event.robot_time_us, event.sample_seq, event.kind,
           event.cause, protocol::text(event.mode), protocol::text(event.sub_state), event.position_m, event.value,
-          event.emergency_id, event.command_id, event.received_at_us);
+          event.emergency_id, event.command_id, event.received_at_us, emergency_cause, event.detail);
 }
 
 }  // namespace server

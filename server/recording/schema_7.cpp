@@ -10,6 +10,19 @@ const char* const kSeventhSchema = R"sql(
 ALTER TABLE robot ADD COLUMN fluid TEXT NOT NULL DEFAULT '';  -- that it swims in, of the configuration's list; '': not known
 ALTER TABLE robot ADD COLUMN retired_at_us INTEGER;           -- NULL: in use
 ALTER TABLE robot ADD COLUMN retired_by TEXT;                 -- the actor
+
+-- Of the latch in force after the event. NULL: an earlier version stored it. That wrote the cause of the latch over
+-- `cause` in a robot's event, where there was a latch, and a sentence into `cause` of the station's own.
+ALTER TABLE event ADD COLUMN emergency_cause TEXT;
+ALTER TABLE event ADD COLUMN detail TEXT NOT NULL DEFAULT '';  -- for people; of the station's own
+
+DROP VIEW robot_event;
+CREATE VIEW robot_event AS
+SELECT event.event_row, event.robot_id, printf('%llu', boot.boot_id) AS boot_id, event.event_seq, event.robot_time_us,
+  event.sample_seq, event.kind, event.cause, event.mode, event.sub_state, event.position_m, event.value,
+  printf('%llu', event.emergency_id) AS emergency_id, printf('%llu', event.command_id) AS command_id,
+  event.received_at_us, event.emergency_cause, event.detail
+FROM event LEFT JOIN boot USING (boot_key);
 )sql";
 
 }  // namespace server

@@ -78,7 +78,8 @@ CommandRecord command_from(SQLite::Statement& row) {
 std::string select_events(const char* condition) {
   return fmt::format(
       "SELECT event.robot_id, boot.boot_id, event_seq, robot_time_us, sample_seq, kind, cause, mode, sub_state,"
-      " position_m, value, emergency_id, command_id, received_at_us FROM event LEFT JOIN boot USING (boot_key) {}",
+      " position_m, value, emergency_id, command_id, received_at_us, emergency_cause, detail FROM event LEFT JOIN boot "
+      "USING (boot_key) {}",
       condition);
 }
 
@@ -98,6 +99,8 @@ RobotEvent event_from(SQLite::Statement& row) {
   event.emergency_id = unsigned_id(row.getColumn(11));
   event.command_id = unsigned_id(row.getColumn(12));
   event.received_at_us = row.getColumn(13).getInt64();
+  if (!row.getColumn(14).isNull()) event.emergency_cause = emergency_cause_from(row.getColumn(14).getString());
+  event.detail = row.getColumn(15).getString();
   return event;
 }
 

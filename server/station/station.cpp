@@ -84,13 +84,16 @@ void Station::publish(const CommandRecord& record) {
   for (StationSink* sink : sinks_) sink->on_command(record);
 }
 
-// An event of the station itself about a robot.
-void Station::note(const RobotState& robot, std::string kind, std::string cause) {
+// An event of the station itself about a robot. Its kind has a row in docs/database.md.
+void Station::note(const RobotState& robot, std::string kind, std::string detail, std::string cause) {
   RobotEvent event;
   event.robot_id = robot.id;
   event.boot_id = robot.boot_id;
   event.kind = std::move(kind);
   event.cause = std::move(cause);
+  event.detail = std::move(detail);
+  event.emergency_id = robot.context.emergency_id;
+  event.emergency_cause = robot.context.emergency_cause;
   event.mode = robot.context.mode;
   event.sub_state = robot.context.sub_state;
   event.robot_time_us = robot.latest_robot_time_us;
@@ -205,8 +208,8 @@ void Station::on_refused(const RobotId& id, const std::string& peer, protocol::R
   seat.refusal_told_at_us = now_us;
   const std::uint64_t untold = std::exchange(seat.refusals_untold, 0);
   const std::string more = untold == 0 ? "" : fmt::format(" ({} more since the last event)", untold);
-  note(*seat.robot, "connection_refused",
-       fmt::format("{} refused, {}: {}{}", peer, protocol::text(reason), detail, more));
+  const char* cause = protocol::text(reason);
+  note(*seat.robot, "connection_refused", fmt::format("{} refused, {}: {}{}", peer, cause, detail, more), cause);
 }
 
 void Station::end_connection(const RobotId& id, const std::string& reason) {
@@ -297,8 +300,8 @@ void Station::on_event(RobotPort& port, const protocol::Event& event) {
   out.robot_time_us = event.event_robot_time_us;
   out.sample_seq = event.sample_seq;
   out.kind = protocol::text(event.kind);
-  out.cause = event.emergency_cause == rheonaut_EMERGENCY_CAUSE_NONE ? protocol::text(event.cause)
-                                                                     : protocol::text(event.emergency_cause);
+  out.cause = protocol::text(event.cause);
+  out.emergency_cause = event.emergency_cause;
   out.mode = event.mode;
   out.sub_state = event.sub_state;
   out.position_m = event.position_m;

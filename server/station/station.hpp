@@ -166,7 +166,7 @@ class Station {
   std::int64_t robot_now_us(const RobotState& robot) const;
   void publish(const RobotState& robot);
   void publish(const CommandRecord& record);
-  void note(const RobotState& robot, std::string kind, std::string cause);
+  void note(const RobotState& robot, std::string kind, std::string detail, std::string cause = "none");
   void tell(const Authority::Change& change, const std::string& actor, const std::string& peer);
   std::unexpected<Error> refuse(const CommandRequest& request, Error error);
   void count_power(RobotState& robot, const SampleBatch& batch) const;

@@ -75,8 +75,11 @@ struct RobotEvent {
   std::uint64_t oldest_event_seq = 0;
   std::uint64_t robot_time_us = 0;
   std::uint64_t sample_seq = 0;
-  std::string kind;   // the text of EventKind, or a station's own: "connected", "link_lost_by_station", …
-  std::string cause;  // the text of EventCause, or a sentence
+  std::string kind;            // the text of EventKind, or one of the station's own: docs/database.md lists them
+  std::string cause = "none";  // of the event itself: the text of EventCause, of the station's own see there
+  // Of the latch in force after the event. None: a version before schema 7 stored it in place of `cause`, when latched.
+  std::optional<protocol::EmergencyCause> emergency_cause;
+  std::string detail;  // for people; the station's own
   protocol::Mode mode = rheonaut_MODE_UNSPECIFIED;
   protocol::SubState sub_state = rheonaut_SUB_STATE_NONE;
   float position_m = 0;

@@ -156,7 +156,7 @@ class AccountsTest(unittest.TestCase):
             place.start_robot(station, "rheo-1", "--token", "x" * 43)
             refused = wait_until(lambda: [event for event in station.get("/api/v1/robots/rheo-1/events")["events"]
                                           if event["kind"] == "connection_refused"], 20, "an event of the wrong token")
-            self.assertIn("wrong_token", refused[0]["cause"])
+            self.assertIn("wrong_token", refused[0]["detail"])
             self.assertEqual(station.robot("rheo-1")["link"], "disconnected")
             place.processes[-1].terminate()
             place.processes[-1].wait()
@@ -166,7 +166,7 @@ class AccountsTest(unittest.TestCase):
             self.assertEqual(cli(place, "robot", "revoke", "rheo-1")[0], 0)
             wait_until(lambda: station.robot("rheo-1")["link"] == "disconnected", 20, "the connection ends")
             wait_until(lambda: [event for event in station.get("/api/v1/robots/rheo-1/events")["events"]
-                                if "was revoked" in event["cause"]], 40, "an event of the refusal")
+                                if "was revoked" in event["detail"]], 40, "an event of the refusal")
             self.assertIn("revoked", cli(place, "robot", "list")[1])
             self.assertEqual(station.robot("rheo-1")["link"], "disconnected")
 

@@ -144,7 +144,7 @@ TEST_F(AccountsTest, RevokingEndsTheConnectionAndKeepsTheRobotOut) {
   EXPECT_EQ(back.welcomes().at(0).refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);
   const json events = ask("GET", "/api/v1/robots/r1/events").parsed()["events"];
   EXPECT_EQ(events[0]["kind"], "connection_refused") << events[0];
-  EXPECT_NE(events[0]["cause"].get<std::string>().find("revoked"), std::string::npos);
+  EXPECT_NE(events[0]["detail"].get<std::string>().find("revoked"), std::string::npos);
   EXPECT_EQ(ask("POST", "/api/v1/enrolments", {{"robot_id", "r1"}}).status, 201);
 }
 

@@ -94,7 +94,7 @@ TEST_F(ControlTest, EachChangeIsAnEventOfTheRobot) {
   ASSERT_TRUE(control("session:1", ControlAction::hand_over));
   EXPECT_EQ(sink.robots.back().control.holder, "session:2");
   ASSERT_TRUE(control("session:1", ControlAction::force));
-  EXPECT_EQ(sink.events.back().cause, "by session:1 from session:2: a test");
+  EXPECT_EQ(sink.events.back().detail, "by session:1 from session:2: a test");
   ASSERT_TRUE(control("session:1", ControlAction::release));
   EXPECT_EQ(sink.robots.back().control.holder, "");
 }

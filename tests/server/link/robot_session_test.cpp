@@ -86,7 +86,7 @@ TEST_F(LinkTest, GarbageInMidConnectionEndsItWithAReason) {
   EXPECT_FALSE(connected());
   ASSERT_FALSE(sink.events.empty());
   EXPECT_EQ(sink.events.back().kind, "disconnected");
-  EXPECT_EQ(sink.events.back().cause, "a frame that does not decode");
+  EXPECT_EQ(sink.events.back().detail, "a frame that does not decode");
 }
 
 TEST_F(LinkTest, DeclaresAHalfOpenLinkLostAfterTheTimeout) {
@@ -97,7 +97,7 @@ TEST_F(LinkTest, DeclaresAHalfOpenLinkLostAfterTheTimeout) {
   const auto stalled_at_us = clock.steady_us();
   ASSERT_TRUE(clock.run_until([&] { return !connected(); }, 2s));
   EXPECT_LE(clock.steady_us() - stalled_at_us, 1'200'000);
-  EXPECT_EQ(sink.events.back().cause, "no frame within the link time-out");
+  EXPECT_EQ(sink.events.back().detail, "no frame within the link time-out");
 }
 
 TEST_F(LinkTest, DropsARobotThatTalksButDoesNotRead) {
@@ -107,7 +107,7 @@ TEST_F(LinkTest, DropsARobotThatTalksButDoesNotRead) {
   robot->keep_talking();
   robot->reading = false;
   ASSERT_TRUE(clock.run_until([&] { return !connected(); }, 10s));
-  EXPECT_EQ(sink.events.back().cause, "the robot does not read");
+  EXPECT_EQ(sink.events.back().detail, "the robot does not read");
 }
 
 TEST_F(LinkTest, SendsASignOfLifeEvery200ms) {
@@ -165,14 +165,14 @@ TEST_F(LinkTest, ARefusedSecondConnectionIsAnEventThatNamesBoth) {
   };
   for (int i = 0; i < 5; ++i) ASSERT_TRUE(dial_again());
   ASSERT_EQ(refusals().size(), 1u);
-  const std::string cause = refusals()[0].cause;
+  const std::string cause = refusals()[0].detail;
   EXPECT_TRUE(cause.starts_with("memory refused, already_connected: ")) << cause;
   EXPECT_NE(cause.find("is connected from " + first_peer + " with boot 77"), std::string::npos) << cause;
   EXPECT_EQ(refusals()[0].robot_id, "r1");
   clock.run_for(10s);
   ASSERT_TRUE(dial_again());
   ASSERT_EQ(refusals().size(), 2u);
-  EXPECT_NE(refusals()[1].cause.find("(4 more since the last event)"), std::string::npos) << refusals()[1].cause;
+  EXPECT_NE(refusals()[1].detail.find("(4 more since the last event)"), std::string::npos) << refusals()[1].detail;
 }
 
 TEST_F(LinkTest, ARefusedTokenIsAnEventOfARobotThatIsKnown) {
@@ -183,7 +183,7 @@ TEST_F(LinkTest, ARefusedTokenIsAnEventOfARobotThatIsKnown) {
   impostor->say_hello();
   ASSERT_TRUE(clock.run_until([&] { return impostor->closed; }, 1s));
   ASSERT_EQ(sink.events.back().kind, "connection_refused");
-  EXPECT_NE(sink.events.back().cause.find("wrong_token: the token of 'r1' is another one"), std::string::npos);
+  EXPECT_NE(sink.events.back().detail.find("wrong_token: the token of 'r1' is another one"), std::string::npos);
   const std::size_t before = sink.events.size();
   auto* stranger = dial();
   auto hello = TestRobot::hello_frame();
@@ -200,7 +200,7 @@ TEST_F(LinkTest, TheStationEndsAConnectionWhoseEnrolmentIsRevoked) {
   ASSERT_TRUE(clock.run_until([&] { return robot->closed; }, 1s));
   EXPECT_FALSE(connected());
   EXPECT_EQ(sink.events.back().kind, "disconnected");
-  EXPECT_EQ(sink.events.back().cause, "its enrolment was revoked");
+  EXPECT_EQ(sink.events.back().detail, "its enrolment was revoked");
   station.end_connection("nobody", "x");
 }
 

@@ -31,7 +31,11 @@ class MigrationTest : public RecordingTest {
          {"SELECT run_id, span, boot_id, seq, robot_time_us, utc_us, clock_uncertainty_us, received_at_us, position_m,"
           " velocity_m_s, acceleration_m_s2, duty, impedance_mv, reference_m, mode, sub_state, setpoint_m,"
           " disturbance_m, position_sd_m, controller_id, emergency_id, emergency_cause, flags FROM run_sample",
-          "SELECT * FROM run_gap", "SELECT * FROM robot_gap", "SELECT * FROM robot_boot", "SELECT * FROM robot_event",
+          "SELECT * FROM run_gap", "SELECT * FROM robot_gap",
+          "SELECT robot_id, boot_id, boot_key, reset_cause, firmware_version, sample_period_us, first_seen_at_us"
+          " FROM robot_boot",
+          "SELECT event_row, robot_id, boot_id, event_seq, robot_time_us, sample_seq, kind, cause, mode, sub_state,"
+          " position_m, value, emergency_id, command_id, received_at_us FROM robot_event",
           "SELECT run_id, robot_id, name, fluid, pump_profile, mean_flow_m_s, tube, operator_name, notes, verdict,"
           " firmware_version, controller_id, controller_checksum, parameters_checksum, started_at_us, ended_at_us"
           " FROM run"}) {

@@ -51,6 +51,27 @@ TEST_F(RecorderTest, StoresAFullGroupAtTheNextCommitAndAcknowledgesIt) {
             (Rows{"1|0.0", "100|0.0989999994635582"}));
 }
 
+TEST_F(RecorderTest, AnEventIsStoredWithItsCauseThatOfTheLatchAndItsDetail) {
+  start();
+  connect(robot_);
+  RobotEvent event;
+  event.robot_id = robot_.id;
+  event.boot_id = robot_.boot_id;
+  event.event_seq = 0;
+  event.kind = "link_lost";
+  event.cause = "link_loss";
+  event.emergency_cause = rheonaut_EMERGENCY_CAUSE_OPERATOR;
+  event.detail = "a sentence";
+  recorder_->on_event(state_of(robot_, LinkState::connected), event);
+  wait(recorder_->flush_records());
+  EXPECT_EQ(rows("SELECT kind, cause, emergency_cause, detail FROM robot_event"),
+            Rows{"link_lost|link_loss|operator|a sentence"});
+  const RobotEvent read = wait(history_->events(robot_.id, 1)).at(0);
+  EXPECT_EQ(read.cause, event.cause);
+  EXPECT_EQ(read.emergency_cause, event.emergency_cause);
+  EXPECT_EQ(read.detail, event.detail);
+}
+
 TEST_F(RecorderTest, StoresASmallGroupWhenItIsALittleOverASecondOld) {
   start();
   connect(robot_);

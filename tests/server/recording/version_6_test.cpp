@@ -3,7 +3,6 @@
 #include <fmt/ranges.h>
 #include <gmock/gmock.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -12,6 +11,7 @@
 #include "server/recording/schema.hpp"
 #include "server/recording/store_check.hpp"
 #include "tests/server/recording/recording_test.hpp"
+#include "tests/server/recording/schema_dump.hpp"
 
 namespace server {
 namespace {
@@ -20,24 +20,11 @@ namespace fs = std::filesystem;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-std::string content_of(const fs::path& path) {
-  std::ostringstream text;
-  text << std::ifstream{path, std::ios::binary}.rdbuf();
-  return text.str();
-}
-
-std::string test_data(const std::string& name) { return content_of(fs::path{TEST_DATA_DIR} / "recording" / name); }
-
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;
   std::istringstream in{text};
   for (std::string line; std::getline(in, line);) lines.push_back(line);
   return lines;
-}
-
-void make_database(const fs::path& path, const std::string& dump) {
-  SQLite::Database database{path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE};
-  database.exec(test_data(dump));
 }
 
 class Version6Test : public RecordingTest {
@@ -126,6 +113,20 @@ TEST_F(Version6Test, TheExportsOfARunSayTheSame) {
     SCOPED_TRACE(table);
     const std::vector<std::string> names = column(before, "SELECT name FROM pragma_table_info('" + table + "')");
     EXPECT_EQ(rows_of(after, table, names), rows_of(before, table, names));
+  }
+}
+
+// The cause of the latch was stored over that of each event: what it was is not known, and nobody makes it up.
+TEST_F(Version6Test, WhatWasOverwrittenStaysAndIsMarked) {
+  const std::vector<std::string> before = rows("SELECT kind, cause FROM event ORDER BY event_row");
+  migrate();
+  EXPECT_EQ(rows("SELECT kind, cause FROM event ORDER BY event_row"), before);
+  EXPECT_EQ(number("SELECT count(*) FROM robot_event WHERE emergency_cause IS NULL AND detail = ''"), 17);
+  start();
+  for (const RobotEvent& event : wait(history_->events("nemo", 100))) {
+    EXPECT_FALSE(event.emergency_cause.has_value());
+    if (event.kind == "link_lost") EXPECT_EQ(event.cause, "operator");
+    if (event.kind == "disconnected") EXPECT_NE(event.cause, "none");
   }
 }
 
