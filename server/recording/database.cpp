@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "server/recording/file_check.hpp"
+#include "server/recording/migration_copy.hpp"
 #include "server/recording/schema.hpp"
 #include "server/recording/statement.hpp"
 
@@ -86,11 +87,11 @@ SQLite::Database open_checked(const std::filesystem::path& path) {
 
 }  // namespace
 
-Database::Database(const std::filesystem::path& path) : handle_{open_checked(path)} {
+Database::Database(const std::filesystem::path& path, BeforeMigration before) : handle_{open_checked(path)} {
   if (sodium_init() < 0) throw std::runtime_error{"libsodium cannot be initialised: the system gives no random bytes"};
   settle();
   if (const auto problem = file_problem(path)) refuse(path, *problem);  // what the log held is in the file now
-  migrate(path);
+  migrate(path, before);
   store_id_ = unsigned_id(handle_.execAndGet("SELECT value FROM meta WHERE name = 'store_id'"));
   restored_at_us_ = handle_.execAndGet("SELECT coalesce(max(value), 0) FROM meta WHERE name = 'restored_at_us'");
 }
@@ -108,10 +109,13 @@ void Database::settle() {
   }
 }
 
-void Database::migrate(const std::filesystem::path& path) {
+void Database::migrate(const std::filesystem::path& path, BeforeMigration before) {
   const auto version = static_cast<std::size_t>(pragma(handle_, "user_version"));
   if (version == migrations().size()) return;
   ::chmod(path.c_str(), S_IRUSR | S_IWUSR);  // it holds token hashes
+  if (version > 0 && before == BeforeMigration::keep_copy) {
+    keep_copy_before_migration(handle_, path, static_cast<std::int64_t>(version));
+  }
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   for (const char* script : migrations().subspan(version)) handle_.exec(script);
   if (version == 0) {

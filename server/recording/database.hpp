@@ -11,10 +11,13 @@
 
 namespace server {
 
+enum class BeforeMigration : std::uint8_t { keep_copy, change_in_place };
+
 class Database {
  public:
-  // Creates the file if there is none.
-  explicit Database(const std::filesystem::path& path);
+  // Creates the file if there is none. One of an older schema is copied before it is changed (migration_copy.hpp),
+  // unless it is a copy itself.
+  explicit Database(const std::filesystem::path& path, BeforeMigration before = BeforeMigration::keep_copy);
 
   SQLite::Database& handle() { return handle_; }
 
@@ -29,7 +32,7 @@ class Database {
 
  private:
   void settle();
-  void migrate(const std::filesystem::path& path);
+  void migrate(const std::filesystem::path& path, BeforeMigration before);
 
   SQLite::Database handle_;
   std::uint64_t store_id_ = 0;

@@ -82,7 +82,7 @@ RestoredStore restore_database(const fs::path& from, const fs::path& folder, con
     refuse(from, fmt::format("SQLite says '{}'", error.what()));
   }
   {
-    Database database{draft.path()};
+    Database database{draft.path(), BeforeMigration::change_in_place};  // the backup is the copy
     restored = mark(database, from, by);
     database.checkpoint();
   }

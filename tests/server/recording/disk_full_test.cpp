@@ -11,6 +11,7 @@
 
 #include "server/recording/disk_reserve.hpp"
 #include "tests/server/recording/recording_test.hpp"
+#include "tests/server/recording/schema_dump.hpp"
 #include "tests/server/recording/stored_runs.hpp"
 
 namespace server {
@@ -173,6 +174,29 @@ TEST_F(DiskFullTest, WhereABackupCannotFitItDoesNotBegin) {
   const auto begun = wait(recording_->backups.begin("one"));
   ASSERT_FALSE(begun);
   EXPECT_EQ(begun.error().reason, "low_space");
+}
+
+TEST_F(DiskFullTest, ADatabaseOfAnOlderSchemaStaysAsItIsWhereACopyOfItDoesNotFit) {
+  kill();
+  fs::remove_all(folder_);
+  fs::create_directories(folder_);
+  make_database(path_, "version_6.sql");
+  {
+    const Filler filler{disk()};
+    try {
+      const Database database{path_};
+      ADD_FAILURE() << "it was migrated without a copy";
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(),
+                  HasSubstr("from schema 6 to the present one: a copy of it is kept first, which needs 1."));
+      EXPECT_THAT(error.what(), HasSubstr(" MB, and 0.0 MB are free in " + folder_.string()));
+      EXPECT_THAT(error.what(), HasSubstr("Make room there"));
+    }
+    EXPECT_EQ(number("PRAGMA user_version"), 6);
+    EXPECT_EQ(rows("PRAGMA integrity_check"), std::vector<std::string>{"ok"});
+  }
+  const Database database{path_};
+  EXPECT_TRUE(fs::exists(folder_ / "station.sqlite.schema-6"));
 }
 
 // Mounts the disks and makes the first of them the folder of temporary files.
