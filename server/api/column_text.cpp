@@ -20,9 +20,9 @@ std::string shared_text(const Segment& segment) {
   out += R"(,"setpoint_m":)";
   append_float(out, context.setpoint_m.value_or(NAN), "null");
   out += R"(,"disturbance_m":)";
-  append_float(out, context.disturbance_m, "null");
+  append_float(out, context.disturbance_m.value_or(NAN), "null");
   out += R"(,"position_sd_m":)";
-  append_float(out, context.position_sd_m, "null");
+  append_float(out, context.position_sd_m.value_or(NAN), "null");
   out += fmt::format(R"(,"controller_id":{},"emergency_id":)", context.controller_id);
   out += context.emergency_id == 0 ? "null" : fmt::format(R"("{}")", context.emergency_id);
   out += fmt::format(R"(,"emergency_cause":"{}","flags":{}}})", protocol::text(context.emergency_cause), context.flags);

@@ -71,7 +71,7 @@ void add_security(Metrics& metrics, const TransportSecurity& security) {
 
 }  // namespace
 
-std::string metrics_text(const RecordingParts& recording, const StopTimes& stops, const TransportSecurity& security) {
+std::string metrics_text(const RecordingParts& recording, const Station& station, const TransportSecurity& security) {
   const RecorderCounters& counters = recording.recorder.counters();
   const DiskUse& use = recording.disk_watch.use();
   const RetentionCounters& retention = recording.retention.counters();
@@ -93,8 +93,10 @@ std::string metrics_text(const RecordingParts& recording, const StopTimes& stops
   metrics.counter("samples_purged_total", retention.samples_purged, "Samples that retention removed.");
   metrics.counter("records_refused_total", counters.records_refused, "Events and commands not recorded.");
   metrics.counter("batches_malformed_total", counters.batches_malformed, "Frames of samples that cannot be.");
+  metrics.counter("invalid_values_total", station.invalid_values(), "Values of robots' frames that cannot be.");
   metrics.counter("commits_total", counters.commits, "Commits.");
   metrics.counter("commits_failed_total", counters.commits_failed, "Commits that failed and were tried again.");
+  const StopTimes& stops = station.stop_times();
   constexpr const char* kStopTimes = "emergency_stop_seconds";
   metrics.heading(kStopTimes, "histogram", "From the request to each stage of an emergency stop of a connected robot.");
   metrics.histogram(kStopTimes, "sent", stops.sent);

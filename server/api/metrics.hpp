@@ -9,10 +9,10 @@
 
 #include "server/net/transport_security.hpp"
 #include "server/recording/recording_parts.hpp"
-#include "server/station/stop_times.hpp"
+#include "server/station/station.hpp"
 
 namespace server {
 
-std::string metrics_text(const RecordingParts& recording, const StopTimes& stops, const TransportSecurity& security);
+std::string metrics_text(const RecordingParts& recording, const Station& station, const TransportSecurity& security);
 
 }  // namespace server

@@ -104,7 +104,13 @@ void RobotSession::read() {
 }
 
 void RobotSession::work_off(protocol::Bytes unread) {
-  while (close_reason_.empty() && decode_next_of(unread)) {
+  while (close_reason_.empty()) {
+    const Next next = decode_next_of(unread);
+    if (next == Next::none) break;
+    if (next == Next::undecodable) {
+      station_.on_invalid_values(*this, 1, "malformed", "a frame does not decode");
+      continue;
+    }
     if (!hello_) {
       after_hello_.assign(unread.begin(), unread.end());
       return on_hello(buffers_.frame);
@@ -116,15 +122,17 @@ void RobotSession::work_off(protocol::Bytes unread) {
   if (heartbeat_wanted_ && !robot_id_.empty()) flush();
 }
 
-// Into the buffer of a frame; false when there is none, or a fault (then close_reason_ is set).
-bool RobotSession::decode_next_of(protocol::Bytes& unread) {
+// Into the buffer of a frame; none also at a fault (then close_reason_ is set). What a robot that is welcome has sent and
+// does not decode is passed over: its length is known, and the robot would send it again over the next connection.
+RobotSession::Next RobotSession::decode_next_of(protocol::Bytes& unread) {
   const auto state = reader_.push(unread);
   if (state == protocol::FrameReader::State::oversize)
     close_reason_ = "a frame longer than 1024 bytes: not this protocol";
-  if (state != protocol::FrameReader::State::complete) return false;
-  if (protocol::decode_robot_frame(reader_.payload(), buffers_.frame)) return true;
+  if (state != protocol::FrameReader::State::complete) return Next::none;
+  if (protocol::decode_robot_frame(reader_.payload(), buffers_.frame)) return Next::frame;
+  if (!robot_id_.empty()) return Next::undecodable;
   close_reason_ = "a frame that does not decode";
-  return false;
+  return Next::none;
 }
 
 void RobotSession::on_hello(const protocol::RobotFrame& frame) {
@@ -207,12 +215,18 @@ asio::awaitable<RobotSession::EndReason> RobotSession::read_frames() {
   co_return failure_ ? "the station could not work at what it said" : close_reason_;
 }
 
-void RobotSession::on_frame(const protocol::RobotFrame& frame) {
-  if (const char* fault = fault_of(frame); fault != nullptr) {
-    close_reason_ = fault;
+void RobotSession::on_frame(protocol::RobotFrame& frame) {
+  if (frame.which_body == rheonaut_RobotFrame_hello_tag) {
+    close_reason_ = "a second hello on one connection";
     return;
   }
+  const FrameFaults faults = mend(frame);
   station_.on_frame(*this, frame.robot_time_us);
+  if (faults.count > 0) station_.on_invalid_values(*this, faults.count, faults.cause, faults.first);
+  if (faults.is_unusable) {
+    if (faults.has_number) give_up(frame);
+    return;
+  }
   switch (frame.which_body) {
     case rheonaut_RobotFrame_telemetry_tag: station_.on_samples(*this, frame.body.telemetry); break;
     case rheonaut_RobotFrame_event_tag: station_.on_event(*this, frame.body.event); break;
@@ -228,6 +242,12 @@ void RobotSession::on_frame(const protocol::RobotFrame& frame) {
     case rheonaut_RobotFrame_heartbeat_tag: on_heartbeat(frame); break;
     default: break;  // a message of a newer version
   }
+}
+
+// What cannot be recorded is lost for good, so that the robot need not send it for ever.
+void RobotSession::give_up(const protocol::RobotFrame& frame) {
+  if (frame.which_body == rheonaut_RobotFrame_event_tag) return station_.on_unusable_event(*this, frame.body.event);
+  station_.on_unusable_samples(*this, frame.body.telemetry);
 }
 
 void RobotSession::on_heartbeat(const protocol::RobotFrame& frame) {

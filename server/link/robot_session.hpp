@@ -59,7 +59,8 @@ class RobotSession final : public RobotPort {
 
   void read();
   void work_off(protocol::Bytes unread);
-  bool decode_next_of(protocol::Bytes& unread);
+  enum class Next : std::uint8_t { none, frame, undecodable };
+  Next decode_next_of(protocol::Bytes& unread);
   void on_hello(const protocol::RobotFrame& frame);
   boost::asio::awaitable<bool> admit(const protocol::Hello& hello);
   protocol::StationFrame welcome(const Admission& admission) const;
@@ -69,7 +70,8 @@ class RobotSession final : public RobotPort {
   boost::asio::awaitable<EndReason> write_frames();
   boost::asio::awaitable<EndReason> watch_link();
 
-  void on_frame(const protocol::RobotFrame& frame);
+  void on_frame(protocol::RobotFrame& frame);
+  void give_up(const protocol::RobotFrame& frame);
   void on_heartbeat(const protocol::RobotFrame& frame);
   void flush();
   void tell_what_is_awaited();

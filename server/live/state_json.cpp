@@ -25,6 +25,8 @@ json clock_json(const RobotState& robot) {
           {"round_trip_us", clock.round_trip_us}};
 }
 
+json decimal_or_null(const std::optional<float>& value) { return value ? decimal(*value) : json(nullptr); }
+
 void append(std::string& out, float value) {
   if (!std::isfinite(value)) {
     out += "null";
@@ -87,9 +89,9 @@ json to_json(const RobotState& robot) {
   out["controller_checksum"] = robot.controller_checksum;
   out["mode"] = protocol::text(context.mode);
   out["sub_state"] = protocol::text(context.sub_state);
-  out["setpoint_m"] = context.setpoint_m ? decimal(*context.setpoint_m) : json(nullptr);
-  out["disturbance_m"] = decimal(context.disturbance_m);
-  out["position_sd_m"] = decimal(context.position_sd_m);
+  out["setpoint_m"] = decimal_or_null(context.setpoint_m);
+  out["disturbance_m"] = decimal_or_null(context.disturbance_m);
+  out["position_sd_m"] = decimal_or_null(context.position_sd_m);
   out["emergency_id"] = id_text(context.emergency_id);
   out["emergency_cause"] = protocol::text(context.emergency_cause);
   out["flags"] = context.flags;
@@ -103,6 +105,7 @@ json to_json(const RobotState& robot) {
   out["pending_stop"] = id_text(robot.pending_stop.value_or(0));
   out["retired"] = robot.retired_at_us != 0;
   out["fluid"] = robot.fluid.empty() ? json(nullptr) : json(robot.fluid);
+  out["invalid_values"] = robot.invalid_values;
   out["control"] = robot.control.holder.empty() ? json(nullptr) : to_json(robot.control);
   return out;
 }
@@ -165,9 +168,9 @@ std::string samples_message(const SampleBatch& batch) {
   head["period_us"] = context.period_us;
   head["mode"] = protocol::text(context.mode);
   head["sub_state"] = protocol::text(context.sub_state);
-  head["setpoint_m"] = context.setpoint_m ? decimal(*context.setpoint_m) : json(nullptr);
-  head["disturbance_m"] = decimal(context.disturbance_m);
-  head["position_sd_m"] = decimal(context.position_sd_m);
+  head["setpoint_m"] = decimal_or_null(context.setpoint_m);
+  head["disturbance_m"] = decimal_or_null(context.disturbance_m);
+  head["position_sd_m"] = decimal_or_null(context.position_sd_m);
   head["emergency_id"] = id_text(context.emergency_id);
   head["flags"] = context.flags;
   head["backfill"] = (context.flags & rheonaut_TELEMETRY_FLAG_BACKFILL) != 0;

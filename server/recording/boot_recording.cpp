@@ -173,6 +173,18 @@ void BootRecording::give_up_below(std::uint64_t oldest_seq, const char* cause, s
   next_seq_ = std::max(next_seq_, oldest_seq);
 }
 
+void BootRecording::give_up(Interval samples, const char* cause, std::int64_t utc_us) {
+  for (const Interval& lost : received_.insert(samples)) add_gap(waiting_gaps_, {key_, lost, cause, utc_us});
+  next_seq_ = std::max(next_seq_, samples.next);
+}
+
+void BootRecording::give_up_event(std::uint64_t event_seq, const char* cause, std::int64_t utc_us) {
+  for (const Interval& lost : received_events_.insert({event_seq, event_seq + 1})) {
+    add_gap(waiting_event_gaps_, {key_, lost, cause, utc_us});
+  }
+  next_event_seq_ = std::max(next_event_seq_, event_seq + 1);
+}
+
 bool BootRecording::append_event(std::uint64_t event_seq) {
   const bool is_new = !received_events_.insert({event_seq, event_seq + 1}).empty();
   has_new_events_ = has_new_events_ || is_new;

@@ -53,6 +53,9 @@ class BootRecording {
   void refuse(const SampleBatch& batch);
   // The robot no longer holds what is missing below.
   void give_up_below(std::uint64_t oldest_seq, const char* cause, std::int64_t utc_us);
+  // These came and cannot be recorded.
+  void give_up(Interval samples, const char* cause, std::int64_t utc_us);
+  void give_up_event(std::uint64_t event_seq, const char* cause, std::int64_t utc_us);
   // False for an event that is here already.
   bool append_event(std::uint64_t event_seq);
   // There is no room: the event stays missing and is asked for again.

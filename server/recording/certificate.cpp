@@ -45,9 +45,9 @@ void write_sample(unsigned char* into, BootId boot_id, const Segment& segment, s
                             sample.impedance_mv, sample.reference_m}) {
     bytes.put_float(value);
   }
-  bytes.put_float(context.setpoint_m.value_or(std::numeric_limits<float>::quiet_NaN()));
-  bytes.put_float(context.disturbance_m);
-  bytes.put_float(context.position_sd_m);
+  for (const std::optional<float>& value : {context.setpoint_m, context.disturbance_m, context.position_sd_m}) {
+    bytes.put_float(value.value_or(std::numeric_limits<float>::quiet_NaN()));
+  }
   bytes.put(static_cast<std::uint8_t>(context.mode));
   bytes.put(static_cast<std::uint8_t>(context.sub_state));
   bytes.put(static_cast<std::uint8_t>(context.emergency_cause));

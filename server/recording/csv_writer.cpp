@@ -90,11 +90,12 @@ std::string CsvWriter::header() const {
 std::string CsvWriter::shared_text(const Segment& segment) const {
   const SampleContext& context = segment.context;
   std::string out = fmt::format(",{},{},", protocol::text(context.mode), protocol::text(context.sub_state));
-  append_float(out, context.setpoint_m.value_or(std::numeric_limits<float>::quiet_NaN()), "");
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  append_float(out, context.setpoint_m.value_or(kNone), "");
   out += ',';
-  append_float(out, context.disturbance_m, "");
+  append_float(out, context.disturbance_m.value_or(kNone), "");
   out += fmt::format(",{},{},{},", segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us);
-  append_float(out, context.position_sd_m, "");
+  append_float(out, context.position_sd_m.value_or(kNone), "");
   out += fmt::format(",{},{},{},{},", context.controller_id, context.emergency_id,
                      protocol::text(context.emergency_cause), context.flags);
   return out;

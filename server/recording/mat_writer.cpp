@@ -188,8 +188,8 @@ void MatWriter::push(const ExportSegment& exported) {
       if (query_.channels[channel]) put(segment.samples[index].*kSampleMembers[channel]);
     }
     put(context.setpoint_m.value_or(kNaN));
-    put(context.disturbance_m);
-    put(context.position_sd_m);
+    put(context.disturbance_m.value_or(kNaN));
+    put(context.position_sd_m.value_or(kNaN));
     put(static_cast<std::uint32_t>(context.mode));
     put(static_cast<std::uint32_t>(context.sub_state));
     put(context.controller_id);

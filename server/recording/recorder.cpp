@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 
 #include "server/recording/disk_reserve.hpp"
@@ -21,16 +20,12 @@ constexpr microseconds kCommitInterval = 100ms;
 constexpr microseconds kOverflowLogInterval = 10s;
 constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
 
-// What a table would refuse (NULL in a NOT NULL column) or no robot can mean. One such value in a commit would keep
-// everything behind it from being stored.
+// What no robot can mean. One such value in a commit might keep everything behind it from being stored.
 bool is_malformed(const SampleBatch& batch) {
-  const SampleContext& context = batch.context;
+  const std::uint32_t period_us = batch.context.period_us;
   const bool numbers = batch.first_seq < kMaxRecordedNumber && batch.oldest_seq < kMaxRecordedNumber &&
-                       batch.first_robot_time_us < kMaxRecordedNumber && context.period_us > 0 &&
-                       context.period_us <= kMaxPeriodUs;
-  const bool finite = std::isfinite(context.disturbance_m) && std::isfinite(context.position_sd_m) &&
-                      std::isfinite(context.setpoint_m.value_or(0));
-  return batch.samples.empty() || !numbers || !finite;
+                       batch.first_robot_time_us < kMaxRecordedNumber && period_us > 0 && period_us <= kMaxPeriodUs;
+  return batch.samples.empty() || !numbers;
 }
 
 AuditNote of_station(const char* action, std::int64_t utc_us) {
@@ -216,6 +211,27 @@ void Recorder::on_samples(const RobotState&, const SampleBatch& batch) {
   }
   recording.give_up_below(batch.oldest_seq, "ring_overrun", batch.received_at_us);
   watch(*found);
+}
+
+// Null unless samples of the boot are recorded now.
+Recorder::BootEntry* Recorder::recorded(BootId boot_id) {
+  const auto found = boots_.find(boot_id);
+  return found != boots_.end() && found->second.started && !found->second.replaced ? &*found : nullptr;
+}
+
+void Recorder::on_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) {
+  ++counters_.batches_malformed;
+  BootEntry* entry = recorded(robot.boot_id);
+  if (entry == nullptr || next_seq > kMaxRecordedNumber) return;
+  entry->second.recording.give_up({first_seq, next_seq}, "invalid", robot.last_received_at_us);
+  watch(*entry);
+}
+
+void Recorder::on_unusable_event(const RobotState& robot, std::uint64_t event_seq) {
+  BootEntry* entry = recorded(robot.boot_id);
+  if (entry == nullptr || event_seq >= kMaxRecordedNumber) return;
+  entry->second.recording.give_up_event(event_seq, "invalid", robot.last_received_at_us);
+  watch(*entry);
 }
 
 void Recorder::on_event(const RobotState&, const RobotEvent& event) {

@@ -116,6 +116,8 @@ class Recorder final : public StationSink, public RobotArchive {
 
   void on_robot(const RobotState& robot) override;
   void on_samples(const RobotState& robot, const SampleBatch& batch) override;
+  void on_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) override;
+  void on_unusable_event(const RobotState& robot, std::uint64_t event_seq) override;
   void on_event(const RobotState& robot, const RobotEvent& event) override;
   void on_command(const CommandRecord& command) override;
   // Written with the next commit; what can flood is bounded by an AuditQuota.
@@ -263,6 +265,7 @@ class Recorder final : public StationSink, public RobotArchive {
   bool room_for_record();
   void tell_left_out(bool at_once);
   std::int64_t key_of(BootId boot_id) const;
+  BootEntry* recorded(BootId boot_id);
 
   boost::asio::io_context& loop_;
   Clock& clock_;

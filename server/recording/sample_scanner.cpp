@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "server/recording/stored_rows.hpp"
@@ -60,6 +61,11 @@ std::uint64_t unsigned_at(sqlite3_stmt* row, int column) {
 float float_at(sqlite3_stmt* row, int column) {
   const double value = sqlite3_column_double(row, column);
   return value == 0 && sqlite3_column_type(row, column) == SQLITE_NULL ? kNaN : static_cast<float>(value);
+}
+
+std::optional<float> optional_at(sqlite3_stmt* row, int column) {
+  const bool is_null = sqlite3_column_type(row, column) == SQLITE_NULL;
+  return is_null ? std::nullopt : std::optional{static_cast<float>(sqlite3_column_double(row, column))};
 }
 
 template <class Named, class Parse>
@@ -158,10 +164,9 @@ std::int64_t SampleScanner::read_segment(Segment& into) {
   context.mode = enumerator_at(row, 9, mode_, mode_from);
   context.sub_state = enumerator_at(row, 10, sub_state_, sub_state_from);
   context.emergency_cause = enumerator_at(row, 11, emergency_cause_, emergency_cause_from);
-  const bool has_setpoint = sqlite3_column_type(row, 12) != SQLITE_NULL;
-  context.setpoint_m = has_setpoint ? std::optional{float_at(row, 12)} : std::nullopt;
-  context.disturbance_m = float_at(row, 13);
-  context.position_sd_m = float_at(row, 14);
+  context.setpoint_m = optional_at(row, 12);
+  context.disturbance_m = optional_at(row, 13);
+  context.position_sd_m = optional_at(row, 14);
   context.controller_id = static_cast<std::uint32_t>(unsigned_at(row, 15));
   context.emergency_id = unsigned_at(row, 16);
   context.flags = static_cast<std::uint32_t>(unsigned_at(row, 17));

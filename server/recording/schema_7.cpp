@@ -16,6 +16,13 @@ ALTER TABLE robot ADD COLUMN retired_by TEXT;                 -- the actor
 ALTER TABLE event ADD COLUMN emergency_cause TEXT;
 ALTER TABLE event ADD COLUMN detail TEXT NOT NULL DEFAULT '';  -- for people; of the station's own
 
+-- What a robot says once for many samples may be no finite number, as each channel may: NULL. SQLite's way to take a NOT
+-- NULL away without writing a row anew (its documentation of ALTER TABLE, "other kinds of table schema changes").
+PRAGMA writable_schema = ON;
+UPDATE sqlite_schema SET sql = replace(replace(sql, 'disturbance_m REAL NOT NULL', 'disturbance_m REAL'),
+  'position_sd_m REAL NOT NULL', 'position_sd_m REAL') WHERE type = 'table' AND name = 'segment';
+PRAGMA writable_schema = RESET;
+
 DROP VIEW robot_event;
 CREATE VIEW robot_event AS
 SELECT event.event_row, event.robot_id, printf('%llu', boot.boot_id) AS boot_id, event.event_seq, event.robot_time_us,

@@ -1,7 +1,11 @@
 // A segment's common values written out for one of its samples.
 #include "server/recording/stored_sample.hpp"
 
+#include <limits>
+
 namespace server {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 StoredSample stored_sample(const Segment& segment, std::size_t index, std::uint32_t span, BootId boot_id) {
   const SampleContext& context = segment.context;
@@ -18,8 +22,8 @@ StoredSample stored_sample(const Segment& segment, std::size_t index, std::uint3
           .mode = context.mode,
           .sub_state = context.sub_state,
           .setpoint_m = context.setpoint_m,
-          .disturbance_m = context.disturbance_m,
-          .position_sd_m = context.position_sd_m,
+          .disturbance_m = context.disturbance_m.value_or(kNaN),
+          .position_sd_m = context.position_sd_m.value_or(kNaN),
           .controller_id = context.controller_id,
           .emergency_id = context.emergency_id,
           .emergency_cause = context.emergency_cause,

@@ -23,7 +23,7 @@ struct StoredSample {
   protocol::Mode mode = rheonaut_MODE_UNSPECIFIED;
   protocol::SubState sub_state = rheonaut_SUB_STATE_NONE;
   std::optional<float> setpoint_m;
-  float disturbance_m = 0;
+  float disturbance_m = 0;  // this and the next: NaN where there is no finite number
   float position_sd_m = 0;
   std::uint32_t controller_id = 0;
   std::uint64_t emergency_id = 0;  // 0: not latched

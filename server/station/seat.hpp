@@ -46,6 +46,8 @@ struct Seat {
   std::uint64_t last_number = 0;
   std::int64_t refusal_told_at_us = 0;  // steady; 0: never
   std::uint64_t refusals_untold = 0;    // since
+  std::int64_t invalid_told_at_us = 0;  // likewise, of values that cannot be
+  std::uint64_t invalid_untold = 0;
 
   // Stops that no robot has acknowledged; the newest, null when there is none, and how many there are.
   std::shared_ptr<PendingCommand> newest_stop() const;

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 
 #include "server/station/seat.hpp"
@@ -12,14 +13,16 @@
 namespace server {
 namespace {
 
+std::optional<float> finite(float value) { return std::isfinite(value) ? std::optional{value} : std::nullopt; }
+
 SampleContext context_of(const protocol::Telemetry& telemetry) {
   SampleContext context;
   context.period_us = telemetry.period_us;
   context.mode = telemetry.mode;
   context.sub_state = telemetry.sub_state;
-  if (telemetry.has_setpoint_m) context.setpoint_m = telemetry.setpoint_m;
-  context.disturbance_m = telemetry.disturbance_m;
-  context.position_sd_m = telemetry.position_sd_m;
+  if (telemetry.has_setpoint_m) context.setpoint_m = finite(telemetry.setpoint_m);
+  context.disturbance_m = finite(telemetry.disturbance_m);
+  context.position_sd_m = finite(telemetry.position_sd_m);
   context.controller_id = telemetry.controller_id;
   context.emergency_id = telemetry.emergency_id;
   context.emergency_cause = telemetry.emergency_cause;
@@ -36,6 +39,7 @@ void copy_samples(const protocol::Telemetry& telemetry, std::vector<Sample>& int
 }
 
 constexpr std::int64_t kRefusalPeriodUs = 10'000'000;
+constexpr std::int64_t kInvalidPeriodUs = 10'000'000;
 
 }  // namespace
 
@@ -310,6 +314,37 @@ void Station::on_event(RobotPort& port, const protocol::Event& event) {
   out.command_id = event.command_id;
   out.received_at_us = robot.last_received_at_us;
   for (StationSink* sink : sinks_) sink->on_event(robot, out);
+}
+
+void Station::on_invalid_values(RobotPort& port, std::uint64_t count, const char* cause, const std::string& first) {
+  Seat* seat = seat_of(port);
+  if (seat == nullptr) return;
+  invalid_values_ += count;
+  seat->robot->invalid_values += count;
+  const std::int64_t now_us = clock_.steady_us();
+  if (seat->invalid_told_at_us != 0 && now_us - seat->invalid_told_at_us < kInvalidPeriodUs) {
+    seat->invalid_untold += count;
+    return;
+  }
+  seat->invalid_told_at_us = now_us;
+  const std::uint64_t more = std::exchange(seat->invalid_untold, 0) + count - 1;
+  std::string detail = first;
+  if (more > 0) detail += fmt::format(" ({} more since the last event)", more);
+  spdlog::warn("robot '{}' sends what cannot be: {}", seat->robot->id, detail);
+  note(*seat->robot, "invalid_value", std::move(detail), cause);
+}
+
+void Station::on_unusable_samples(RobotPort& port, const protocol::Telemetry& telemetry) {
+  const Seat* seat = seat_of(port);
+  if (seat == nullptr) return;
+  const std::uint64_t next_seq = telemetry.first_seq + telemetry.position_m_count;
+  for (StationSink* sink : sinks_) sink->on_unusable_samples(*seat->robot, telemetry.first_seq, next_seq);
+}
+
+void Station::on_unusable_event(RobotPort& port, const protocol::Event& event) {
+  const Seat* seat = seat_of(port);
+  if (seat == nullptr) return;
+  for (StationSink* sink : sinks_) sink->on_unusable_event(*seat->robot, event.event_seq);
 }
 
 void Station::on_status(RobotPort& port, const protocol::Status& status) {

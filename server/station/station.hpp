@@ -120,6 +120,7 @@ class Station {
   bool remembers(CommandId id) const;
 
   const StopTimes& stop_times() const { return stop_times_; }
+  std::uint64_t invalid_values() const { return invalid_values_; }  // of all robots, since the station started
 
   // --- called by robot sessions (link/) ---
 
@@ -136,6 +137,11 @@ class Station {
   void on_frame(RobotPort& port, std::uint64_t robot_time_us);  // any frame: a sign of life
   void on_samples(RobotPort& port, const protocol::Telemetry& telemetry);
   void on_event(RobotPort& port, const protocol::Event& event);
+  // Values of a frame that cannot be: counted, and an event of the first of them, at most one each 10 s.
+  void on_invalid_values(RobotPort& port, std::uint64_t count, const char* cause, const std::string& first);
+  // What came and cannot be recorded is lost for good: else the robot would send it again for ever.
+  void on_unusable_samples(RobotPort& port, const protocol::Telemetry& telemetry);
+  void on_unusable_event(RobotPort& port, const protocol::Event& event);
   void on_status(RobotPort& port, const protocol::Status& status);
   void on_command_ack(RobotPort& port, const protocol::CommandAck& ack);
   void on_command_sent(RobotPort& port, CommandId id);
@@ -210,6 +216,7 @@ class Station {
   Authority authority_;
   RecentCommands recent_;  // that had a key, and have ended
   StopTimes stop_times_;
+  std::uint64_t invalid_values_ = 0;
   std::optional<std::vector<CommandRecord>> held_back_;  // while all robots are being stopped
 };
 

@@ -15,6 +15,11 @@ class StationSink {
   // The robot's state changed otherwise than by samples: connected, lost, status, durable, clock.
   virtual void on_robot(const RobotState&) {}
   virtual void on_samples(const RobotState&, const SampleBatch&) {}
+  // Samples, or an event, that came and cannot be recorded: they are lost for good.
+  virtual void on_unusable_samples(const RobotState&, std::uint64_t first_seq, std::uint64_t next_seq) {
+    static_cast<void>(first_seq), static_cast<void>(next_seq);
+  }
+  virtual void on_unusable_event(const RobotState&, std::uint64_t event_seq) { static_cast<void>(event_seq); }
   virtual void on_event(const RobotState&, const RobotEvent&) {}
   virtual void on_command(const CommandRecord&) {}
   virtual void on_audit(const AuditNote&) {}

@@ -42,8 +42,8 @@ struct SampleContext {
   protocol::Mode mode = rheonaut_MODE_UNSPECIFIED;
   protocol::SubState sub_state = rheonaut_SUB_STATE_NONE;
   std::optional<float> setpoint_m;
-  float disturbance_m = 0;
-  float position_sd_m = 0;
+  std::optional<float> disturbance_m = 0.0F;  // as in setpoint_m and position_sd_m, none stands for no finite number
+  std::optional<float> position_sd_m = 0.0F;
   std::uint32_t controller_id = 0;
   std::uint64_t emergency_id = 0;  // 0: not latched
   protocol::EmergencyCause emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;
@@ -166,6 +166,7 @@ struct RobotState {
   std::optional<protocol::Status> status;
   ClockEstimate clock;
 
+  std::uint64_t invalid_values = 0;  // that its frames had since the station started: not finite, beyond all range
   ControlState control;
   std::optional<CommandId> pending_stop;  // an emergency stop that no robot has acknowledged yet
   std::int64_t retired_at_us = 0;         // UTC; 0: in use

@@ -25,7 +25,7 @@ class RunTools : public RecordingTest {
   void swim(std::size_t count, double duty) {
     SampleBatch batch = robot_.batch(robot_.next_seq, count);
     for (Sample& sample : batch.samples) {
-      sample.position_m = static_cast<float>(plant_.position_m()) + robot_.context.disturbance_m;
+      sample.position_m = static_cast<float>(plant_.position_m()) + robot_.context.disturbance_m.value_or(0);
       sample.velocity_m_s = static_cast<float>(plant_.velocity_m_s());
       sample.duty = static_cast<float>(duty);
       plant_.step(duty);

@@ -182,14 +182,21 @@ TEST_F(DiskFullTest, ADatabaseOfAnOlderSchemaStaysAsItIsWhereACopyOfItDoesNotFit
   fs::create_directories(folder_);
   make_database(path_, "version_6.sql");
   {
+    SQLite::Database as_a_station_leaves_it{path_.string(), SQLite::OPEN_READWRITE};
+    as_a_station_leaves_it.exec("PRAGMA journal_mode = WAL");
+  }
+  const fs::path kept = folder_ / "kept";
+  std::ofstream{kept, std::ios::binary} << std::string(500'000, 'x');
+  {
     const Filler filler{disk()};
+    fs::remove(kept);
     try {
       const Database database{path_};
       ADD_FAILURE() << "it was migrated without a copy";
     } catch (const std::runtime_error& error) {
       EXPECT_THAT(error.what(),
                   HasSubstr("from schema 6 to the present one: a copy of it is kept first, which needs 1."));
-      EXPECT_THAT(error.what(), HasSubstr(" MB, and 0.0 MB are free in " + folder_.string()));
+      EXPECT_THAT(error.what(), HasSubstr(" MB, and 0.5 MB are free in " + folder_.string()));
       EXPECT_THAT(error.what(), HasSubstr("Make room there"));
     }
     EXPECT_EQ(number("PRAGMA user_version"), 6);

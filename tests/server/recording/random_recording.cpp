@@ -23,6 +23,8 @@ SampleContext RandomRecordingTest::any_context() {
   if (random_() % 2 == 0) context.setpoint_m = static_cast<float>(random_() % 10) / 10;
   context.disturbance_m = static_cast<float>(random_() % 3) / 100;
   context.position_sd_m = static_cast<float>(random_() % 3) / 1000;
+  if (random_() % 8 == 0) context.disturbance_m.reset();
+  if (random_() % 8 == 0) context.position_sd_m.reset();
   context.controller_id = random_() % 2 == 0 ? 0xffffffffU : 3;
   context.emergency_id = random_() % 2 == 0 ? 0xfedcba9876543210 : 0;
   context.emergency_cause = random_() % 2 == 0 ? rheonaut_EMERGENCY_CAUSE_OPERATOR : rheonaut_EMERGENCY_CAUSE_NONE;

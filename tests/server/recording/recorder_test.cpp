@@ -558,25 +558,52 @@ TEST_F(RecorderTest, RestoresTheLatestBootAndTheLatchItWasIn) {
   EXPECT_EQ(restored().boot_id, 3u);
 }
 
-TEST_F(RecorderTest, IgnoresABatchWithAContextThatNoTableTakes) {
-  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+TEST_F(RecorderTest, IgnoresABatchWithATimeThatCannotBe) {
   start();
   connect(robot_);
-  std::vector<SampleBatch> malformed(6, robot_.batch(0, 5));
-  malformed[0].context.disturbance_m = kNan;
-  malformed[1].context.position_sd_m = kInfinity;
-  malformed[2].context.setpoint_m = kNan;
-  malformed[3].context.period_us = 0;
-  malformed[4].context.period_us = 10'000'001;
-  malformed[5].first_robot_time_us = 1ULL << 62;
+  std::vector<SampleBatch> malformed(3, robot_.batch(0, 5));
+  malformed[0].context.period_us = 0;
+  malformed[1].context.period_us = 10'000'001;
+  malformed[2].first_robot_time_us = 1ULL << 62;
   for (const SampleBatch& batch : malformed) send(robot_, batch);
-  EXPECT_EQ(recorder_->counters().batches_malformed, 6u);
+  EXPECT_EQ(recorder_->counters().batches_malformed, 3u);
   EXPECT_EQ(recorder_->queued_samples(), 0u);
   make(robot_, 10);
   flush();
   EXPECT_EQ(samples(), 10);
   stop();
+}
+
+TEST_F(RecorderTest, WhatARobotSaysThatIsNoFiniteNumberIsStoredAsNull) {
+  start();
+  connect(robot_);
+  robot_.context.disturbance_m.reset();
+  make(robot_, 5);
+  robot_.context.position_sd_m.reset();
+  make(robot_, 95);
+  EXPECT_TRUE(clock_.run_until([&] { return durable_next_seq_ == 100; }, 2s));
+  EXPECT_EQ(rows("SELECT first_seq, disturbance_m, position_sd_m FROM segment ORDER BY first_seq"),
+            (Rows{"0||0.0", "5||"}));
+}
+
+// The acknowledgement passes over what cannot be recorded, and the robot need not send it again.
+TEST_F(RecorderTest, WhatCannotBeRecordedIsAFinalGap) {
+  start();
+  connect(robot_);
+  make(robot_, 10);
+  RobotState state = state_of(robot_, LinkState::connected);
+  state.last_received_at_us = clock_.utc_us();
+  recorder_->on_unusable_samples(state, 10, 15);
+  recorder_->on_unusable_samples(state, 5, 12);  // again, with some that are stored
+  recorder_->on_unusable_event(state, 0);
+  robot_.next_seq = 15;
+  make(robot_, 85);
+  send_event(robot_, 1);
+  EXPECT_TRUE(clock_.run_until([&] { return durable_next_seq_ == 100 && durable_next_event_seq_ == 2; }, 3s));
+  EXPECT_EQ(gaps(), Rows{"10|14|invalid"});
+  EXPECT_EQ(rows("SELECT first_event_seq, last_event_seq, cause FROM event_gap"), Rows{"0|0|invalid"});
+  EXPECT_EQ(samples(), 95);
+  EXPECT_TRUE(missing_.empty());
 }
 
 TEST_F(RecorderTest, KeepsNoBookkeepingOfBootsThatAreGone) {

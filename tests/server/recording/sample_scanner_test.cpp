@@ -35,7 +35,7 @@ class SampleScannerTest : public RecordingTest {
     context.sub_state = random_() % 2 == 0 ? rheonaut_SUB_STATE_NAVIGATING : rheonaut_SUB_STATE_NONE;
     if (random_() % 2 == 0) context.setpoint_m = static_cast<float>(random_() % 10) / 10;
     context.disturbance_m = static_cast<float>(random_() % 3) / 100;
-    context.position_sd_m = 0.001F;
+    context.position_sd_m = random_() % 4 == 0 ? std::nullopt : std::optional{0.001F};
     context.controller_id = random_() % 2 == 0 ? 0xffffffffU : 3;
     context.emergency_id = random_() % 2 == 0 ? 0xfedcba9876543210 : 0;
     context.emergency_cause =
@@ -114,7 +114,7 @@ class SampleScannerTest : public RecordingTest {
         "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} ", segment.first_seq + index, segment.robot_time_us(index),
         segment.utc_offset_us, segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us,
         protocol::text(context.mode), protocol::text(context.sub_state), protocol::text(context.emergency_cause),
-        text_of(context.setpoint_m.value_or(kNaN)), text_of(context.disturbance_m), text_of(context.position_sd_m),
+        text_of(context.setpoint_m.value_or(kNaN)), text_of(context.disturbance_m.value_or(kNaN)), text_of(context.position_sd_m.value_or(kNaN)),
         context.controller_id, context.emergency_id, context.flags);
     for (const float value : {sample.position_m, sample.velocity_m_s, sample.acceleration_m_s2, sample.duty,
                               sample.impedance_mv, sample.reference_m}) {

@@ -1,0 +1,149 @@
+// A value that cannot be takes no robot off the air: it would send it again, and be taken off again.
+#include <limits>
+
+#include "server/link/frame_faults.hpp"
+#include "server/live/state_json.hpp"
+#include "tests/server/link/link_fixture.hpp"
+
+namespace server {
+namespace {
+
+constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr std::uint64_t kFar = std::uint64_t{1} << 63;
+
+struct UnusableSink final : StationSink {
+  void on_unusable_samples(const RobotState&, std::uint64_t first_seq, std::uint64_t next_seq) override {
+    samples.emplace_back(first_seq, next_seq);
+  }
+  void on_unusable_event(const RobotState&, std::uint64_t event_seq) override { events.push_back(event_seq); }
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> samples;
+  std::vector<std::uint64_t> events;
+};
+
+class InvalidValuesTest : public LinkTest {
+ protected:
+  InvalidValuesTest() { station.add_sink(unusable); }
+
+  static protocol::RobotFrame samples(std::uint64_t first_seq, auto change) {
+    protocol::RobotFrame frame = test::samples_frame(first_seq, 5, 6'000'000, 0);
+    change(frame);
+    return frame;
+  }
+  static protocol::RobotFrame event(auto change) {
+    protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
+    frame.which_body = rheonaut_RobotFrame_event_tag;
+    frame.body.event.event_seq = 7;
+    change(frame.body.event);
+    return frame;
+  }
+  std::vector<RobotEvent> told() const {
+    std::vector<RobotEvent> found;
+    for (const RobotEvent& event : sink.events) {
+      if (event.kind == "invalid_value") found.push_back(event);
+    }
+    return found;
+  }
+
+  using test = TestRobot;
+  UnusableSink unusable;
+};
+
+TEST_F(InvalidValuesTest, WhatIsNoFiniteNumberIsNothingAndTheSamplesAreKept) {
+  auto* robot = connect();
+  robot->send(samples(0, [](auto& frame) { frame.body.telemetry.disturbance_m = kNotANumber; }));
+  robot->send(samples(5, [](auto& frame) { frame.body.telemetry.position_sd_m = -kInfinity; }));
+  robot->send(samples(10, [](auto& frame) {
+    frame.body.telemetry.has_setpoint_m = true;
+    frame.body.telemetry.setpoint_m = kNotANumber;
+  }));
+  clock.run_for(2s);
+  EXPECT_FALSE(robot->closed);
+  ASSERT_EQ(sink.batches.size(), 3u);
+  EXPECT_EQ(sink.batches[0].context.disturbance_m, std::nullopt);
+  EXPECT_EQ(sink.batches[0].context.position_sd_m, 0.0F);
+  EXPECT_EQ(sink.batches[1].context.position_sd_m, std::nullopt);
+  EXPECT_EQ(sink.batches[2].context.setpoint_m, std::nullopt);
+  EXPECT_EQ(nlohmann::json::parse(samples_message(sink.batches[1]))["position_sd_m"], nullptr);
+  EXPECT_EQ(sink.batches[0].context, sink.batches[0].context) << "or each batch would begin a new segment";
+  EXPECT_TRUE(unusable.samples.empty());
+}
+
+TEST_F(InvalidValuesTest, TheyAreCountedAndToldOnceInTenSeconds) {
+  auto* robot = connect();
+  const auto send_broken = [&](std::uint64_t first_seq) {
+    robot->send(samples(first_seq, [](auto& frame) {
+      frame.body.telemetry.disturbance_m = kNotANumber;
+      frame.body.telemetry.position_sd_m = kNotANumber;
+    }));
+    clock.settle();
+  };
+  for (std::uint64_t i = 0; i < 20; ++i) send_broken(5 * i);
+  ASSERT_EQ(told().size(), 1u);
+  EXPECT_EQ(told()[0].cause, "not_finite");
+  EXPECT_EQ(told()[0].detail,
+            "disturbance_m is nan from sample 0 on; NULL is stored (1 more since the last event)");
+  EXPECT_EQ(station.find("r1")->invalid_values, 40u);
+  EXPECT_EQ(station.invalid_values(), 40u);
+  EXPECT_EQ(to_json(*station.find("r1"))["invalid_values"], 40);
+  clock.run_for(10s);
+  send_broken(100);
+  ASSERT_EQ(told().size(), 2u);
+  EXPECT_TRUE(told()[1].detail.ends_with("(39 more since the last event)")) << told()[1].detail;
+}
+
+TEST_F(InvalidValuesTest, SamplesWithoutATimeAreLostAndTheLinkGoesOn) {
+  auto* robot = connect();
+  robot->send(samples(0, [](auto& frame) { frame.body.telemetry.period_us = 0; }));
+  robot->send(samples(5, [](auto& frame) { frame.body.telemetry.period_us = 10'000'001; }));
+  robot->send(samples(10, [](auto& frame) { frame.body.telemetry.first_robot_time_us = kFar; }));
+  robot->send(samples(kFar, [](auto&) {}));  // nobody can say which these are
+  robot->send(samples(15, [](auto& frame) { frame.body.telemetry.oldest_seq = kFar; }));
+  clock.run_for(2s);
+  EXPECT_FALSE(robot->closed);
+  EXPECT_EQ(unusable.samples, (std::vector<std::pair<std::uint64_t, std::uint64_t>>{{0, 5}, {5, 10}, {10, 15}}));
+  ASSERT_EQ(sink.batches.size(), 1u);
+  EXPECT_EQ(sink.batches[0].first_seq, 15u);
+  EXPECT_EQ(sink.batches[0].oldest_seq, 0u);
+  EXPECT_EQ(station.find("r1")->invalid_values, 5u);
+}
+
+TEST_F(InvalidValuesTest, AnEventWithoutATimeIsLostAndTheLinkGoesOn) {
+  auto* robot = connect();
+  const std::size_t before = sink.events.size();
+  robot->send(event([](auto& of) { of.event_robot_time_us = kFar; }));
+  robot->send(event([](auto& of) { of.sample_seq = kFar; }));
+  robot->send(event([](auto& of) { of.event_seq = kFar; }));
+  robot->send(event([](auto& of) { of.oldest_event_seq = kFar; }));
+  clock.run_for(2s);
+  EXPECT_FALSE(robot->closed);
+  EXPECT_EQ(unusable.events, (std::vector<std::uint64_t>{7, 7}));
+  ASSERT_EQ(sink.events.size(), before + 2) << "invalid_value, and the one whose own values can be";
+  EXPECT_EQ(sink.events.back().event_seq, 7u);
+  EXPECT_EQ(sink.events.back().oldest_event_seq, 0u);
+}
+
+TEST_F(InvalidValuesTest, ATimeOfAFrameThatCannotBeIsASignOfLifeAndMovesNoClock) {
+  auto* robot = connect();
+  const std::uint64_t before_us = station.find("r1")->latest_robot_time_us;
+  robot->send(samples(0, [](auto& frame) { frame.robot_time_us = kFar; }));
+  clock.settle();
+  EXPECT_FALSE(robot->closed);
+  EXPECT_EQ(station.find("r1")->latest_robot_time_us, before_us);
+  EXPECT_EQ(sink.batches.size(), 1u);
+}
+
+TEST(FrameFaults, AHeartbeatWithATimeThatCannotBeAnswersNothing) {
+  protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
+  frame.which_body = rheonaut_RobotFrame_heartbeat_tag;
+  frame.body.heartbeat.echo_station_time_us = 5;
+  frame.body.heartbeat.echo_received_at_robot_us = kFar;
+  EXPECT_EQ(mend(frame).count, 1u);
+  EXPECT_EQ(frame.body.heartbeat.echo_station_time_us, 0u);
+  frame.body.heartbeat.echo_station_time_us = 5;
+  EXPECT_EQ(mend(frame).count, 0u);
+  EXPECT_EQ(frame.body.heartbeat.echo_station_time_us, 5u);
+}
+
+}  // namespace
+}  // namespace server
