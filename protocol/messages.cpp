@@ -171,6 +171,8 @@ const char* text(EventKind value) {
     case rheonaut_EVENT_KIND_MODEL_MISMATCH: return "model_mismatch";
     case rheonaut_EVENT_KIND_AUTO_LIMIT: return "auto_limit";
     case rheonaut_EVENT_KIND_TIME_STEP: return "time_step";
+    case rheonaut_EVENT_KIND_MODEL_MISMATCH_ENDED: return "model_mismatch_ended";
+    case rheonaut_EVENT_KIND_POSITION_UNCERTAIN: return "position_uncertain";
   }
   return "unknown";
 }
@@ -221,6 +223,7 @@ const char* text(RejectReason value) {
     case rheonaut_REJECT_REASON_CHECKSUM: return "checksum";
     case rheonaut_REJECT_REASON_UNKNOWN_PARAMETER: return "unknown_parameter";
     case rheonaut_REJECT_REASON_UNSUPPORTED: return "unsupported";
+    case rheonaut_REJECT_REASON_UNCERTAIN: return "uncertain";
   }
   return "unknown";
 }

@@ -23,6 +23,7 @@ constexpr float kUnsensedM_S2 = 0.02F;
 
 constexpr float kShapeCorrelationS = 0.1F;   // for so long an error of the model's shape keeps its sign
 constexpr float kRestingModelM_S = 0.0003F;  // below it the modelled velocity has died down
+constexpr float kStillM_S2 = 0.01F;          // below it nothing is felt but noise and bias
 constexpr float kDoubt = 0.6F;               // share of the doubtful way that is one sd
 
 constexpr float kPulseLeakPerS = 2;      // slower changes of velocity are no pulsation
@@ -59,25 +60,64 @@ void Estimator::set_parameters(const EstimatorParameters& parameters) {
   parameters_ = parameters;
   tuned_dt_s_ = steady_gain_m_s_ = 0;
   for (const float gain_m_s : parameters.model.gain_m_s) steady_gain_m_s_ += gain_m_s;
-  section_m_s_.fill(0);
-  model_m_s_ = gain_error_ = surprises_ = 0;
-  for (std::size_t i = 0; i < kStates; ++i) covariance_[gain][i] = covariance_[i][gain] = 0;
-  covariance_[gain][gain] = square(parameters.gain_error);
+  section_.fill(0);
+  model_m_s_ = surprises_ = 0;
+  strange_gains_ = 0;
+  mismatch_ = false;
+  restart_gains();
   covariance_[bias][bias] = std::max(covariance_[bias][bias], square(parameters.bias_m_s2));
+}
+
+// What was found of the gains is forgotten.
+void Estimator::restart_gains() {
+  gain_change_m_s_.fill(0);
+  for (std::size_t k = gain; k < kStates; ++k) {
+    for (std::size_t i = 0; i < kStates; ++i) covariance_[k][i] = covariance_[i][k] = 0;
+  }
+  reopen_gain(square(parameters_.gain_error));
+  if (parameters_.is_confirmed) return;
+  for (std::size_t k = gain; k < kStates; ++k)
+    covariance_[k][k] += square(parameters_.section_error * steady_gain_m_s_);
+}
+
+// All gains become unknown alike.
+void Estimator::reopen_gain(float relative_variance) {
+  const auto& gains = parameters_.model.gain_m_s;
+  for (std::size_t i = 0; i < kModelSections; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      covariance_[gain + i][gain + j] += gains[i] * gains[j] * relative_variance;
+      covariance_[gain + j][gain + i] = covariance_[gain + i][gain + j];
+    }
+  }
+}
+
+float Estimator::gain_error() const {
+  float sum_m_s = 0;
+  for (const float change_m_s : gain_change_m_s_) sum_m_s += change_m_s;
+  return steady_gain_m_s_ == 0 ? 0 : sum_m_s / steady_gain_m_s_;
+}
+
+float Estimator::gain_variance() const {
+  float sum = 0;
+  for (std::size_t i = gain; i < kStates; ++i) {
+    for (std::size_t j = gain; j < kStates; ++j) sum += covariance_[i][j];
+  }
+  return steady_gain_m_s_ == 0 ? 0 : std::max(sum, 0.0F) / square(steady_gain_m_s_);
 }
 
 void Estimator::start() {
   for (Vector& row : covariance_) row.fill(0);
   covariance_[velocity][velocity] = square(kStartVelocityM_S);
   covariance_[bias][bias] = square(parameters_.bias_m_s2);
-  covariance_[gain][gain] = square(parameters_.gain_error);
-  velocity_m_s_ = bias_m_s2_ = gain_error_ = drift_m_s_ = unexplained_m_s_ = 0;
+  restart_gains();
+  velocity_m_s_ = bias_m_s2_ = drift_m_s_ = unexplained_m_s_ = 0;
 }
 
 void Estimator::step(const EstimatorInputs& inputs) {
   if (!(inputs.dt_s > 0 && inputs.dt_s <= kMaxDtS)) return;
   tune_sections(inputs.dt_s);
-  integrate(inputs, advance_model(inputs.duty));
+  advance_model(inputs.duty);
+  integrate(inputs);
   if (++interval_.ticks < kTicksPerMeasurement) return;
   propagate_covariance();
   if (flow_m_s_ > 0) {
@@ -98,18 +138,17 @@ void Estimator::tune_sections(float dt_s) {
   }
 }
 
-// (1); the change of the model's velocity.
-float Estimator::advance_model(float duty) {
+// (1)
+void Estimator::advance_model(float duty) {
   duty_ = std::isfinite(duty) ? std::clamp(duty, -1.0F, 1.0F) : 0;
   if (std::fabs(duty_) < parameters_.dead_zone_duty) duty_ = 0;
   if (std::fabs(duty_) < parameters_.doubtful_duty) doubtful_m_ += steady_gain_m_s_ * duty_ * tuned_dt_s_;
-  const float before_m_s = model_m_s_;
   model_m_s_ = 0;
   for (std::size_t i = 0; i < kModelSections; ++i) {
-    section_m_s_[i] += section_share_[i] * (parameters_.model.gain_m_s[i] * duty_ - section_m_s_[i]);
-    model_m_s_ += section_m_s_[i];
+    section_change_[i] = section_share_[i] * (duty_ - section_[i]);
+    section_[i] += section_change_[i];
+    model_m_s_ += (parameters_.model.gain_m_s[i] + gain_change_m_s_[i]) * section_[i];
   }
-  return model_m_s_ - before_m_s;
 }
 
 bool Estimator::has_reading(const EstimatorInputs& inputs) {
@@ -120,24 +159,34 @@ bool Estimator::has_reading(const EstimatorInputs& inputs) {
 }
 
 // (2)
-void Estimator::integrate(const EstimatorInputs& inputs, float model_change_m_s) {
+void Estimator::integrate(const EstimatorInputs& inputs) {
   const float dt_s = inputs.dt_s;
-  const float explained_m_s = (1 + gain_error_) * model_change_m_s;
+  float explained_m_s = 0;
+  for (std::size_t i = 0; i < kModelSections; ++i) {
+    explained_m_s += (parameters_.model.gain_m_s[i] + gain_change_m_s_[i]) * section_change_[i];
+  }
   float change_m_s = explained_m_s;
   if (has_reading(inputs)) {
     acceleration_m_s2_ = kMS2PerCount * static_cast<float>(inputs.counts) - bias_m_s2_;
+    watch_stillness(acceleration_m_s2_, dt_s);
     change_m_s = dt_s * acceleration_m_s2_;  // of a reading 5 ms old in the mean: the middle of the tick
     interval_.sensed_s += dt_s;
     interval_.velocity_variance += square(parameters_.noise_m_s2 * dt_s) + square(kSlip * change_m_s);
     interval_.fastest_change_m_s2 = std::max(interval_.fastest_change_m_s2, std::fabs(acceleration_m_s2_));
   } else {
-    interval_.modelled_m_s += model_change_m_s;
+    for (std::size_t i = 0; i < kModelSections; ++i) interval_.modelled[i] += section_change_[i];
     interval_.velocity_variance += square(kUnsensedShare * explained_m_s) + square(kUnsensedM_S2 * dt_s);
   }
   position_m_ += dt_s * (velocity_m_s_ + 0.5F * change_m_s);
   velocity_m_s_ += change_m_s;
   interval_.duration_s += dt_s;
   watch_flow(change_m_s - explained_m_s, dt_s);
+}
+
+// Coasting, the robot feels the drag; at rest it feels the bias alone, which may not be known well yet.
+void Estimator::watch_stillness(float reading_m_s2, float dt_s) {
+  felt_m_s2_ += std::min(dt_s, 1.0F) * (reading_m_s2 - felt_m_s2_);
+  still_s_ = duty_ == 0 && std::fabs(felt_m_s2_) < kStillM_S2 ? still_s_ + dt_s : 0;
 }
 
 // A flow is what goes on pulsating through three windows; a move ends sooner, or its gain is found.
@@ -154,23 +203,35 @@ void Estimator::watch_flow(float unexplained_m_s, float dt_s) {
 
 // P → F P Fᵀ + Q, F - 1 having but the rows of position and velocity.
 void Estimator::propagate_covariance() {
-  const float t_s = interval_.duration_s, sensed_s = interval_.sensed_s, modelled_m_s = interval_.modelled_m_s;
+  const float t_s = interval_.duration_s, sensed_s = interval_.sensed_s;
   auto& p = covariance_;
   for (std::size_t j = 0; j < kStates; ++j) {
     p[position][j] += t_s * (p[velocity][j] - 0.5F * t_s * p[bias][j]);
-    p[velocity][j] += modelled_m_s * p[gain][j] - sensed_s * p[bias][j];
+    p[velocity][j] -= sensed_s * p[bias][j];
   }
   for (std::size_t i = 0; i < kStates; ++i) {
     p[i][position] += t_s * (p[i][velocity] - 0.5F * t_s * p[i][bias]);
-    p[i][velocity] += modelled_m_s * p[i][gain] - sensed_s * p[i][bias];
+    p[i][velocity] -= sensed_s * p[i][bias];
   }
+  if (sensed_s < t_s) propagate_modelled();
   const float came_in = interval_.velocity_variance;
   p[position][position] += came_in * square(t_s) * (1.0F / 3);
   p[position][velocity] += came_in * t_s * 0.5F;
   p[velocity][position] = p[position][velocity];
   p[velocity][velocity] += came_in;
   p[bias][bias] += square(parameters_.bias_walk_m_s2) * t_s;
-  p[gain][gain] += square(kGainWalk) * t_s;
+  reopen_gain(square(kGainWalk) * t_s);
+}
+
+// What the model's change stood in for, without readings.
+void Estimator::propagate_modelled() {
+  auto& p = covariance_;
+  for (std::size_t k = 0; k < kModelSections; ++k) {
+    for (std::size_t j = 0; j < kStates; ++j) p[velocity][j] += interval_.modelled[k] * p[gain + k][j];
+  }
+  for (std::size_t k = 0; k < kModelSections; ++k) {
+    for (std::size_t i = 0; i < kStates; ++i) p[i][velocity] += interval_.modelled[k] * p[i][gain + k];
+  }
 }
 
 void Estimator::let_drift_die_down() {
@@ -188,13 +249,12 @@ void Estimator::admit_drift() {
   if (!drift_admitted_) {
     drift_admitted_ = true;
     since_s = kUnseenFlowS;
-    gain_error_ = surprises_ = 0;  // what the gain has learned was the flow
-    for (std::size_t i = 0; i < kStates; ++i) p[gain][i] = p[i][gain] = 0;
-    p[gain][gain] = square(parameters_.gain_error);
+    surprises_ = 0;
+    restart_gains();  // what the gains have learned was the flow
   }
   const float missing = square(kDriftPerFlow * flow_m_s_) - p[drift][drift];
   if (missing <= 0) return;
-  const Vector along{since_s, 1, 0, 0, 1};
+  const Vector along{since_s, 1, 0, 1};
   for (std::size_t i = 0; i < kStates; ++i) {
     for (std::size_t j = 0; j < kStates; ++j) p[i][j] += along[i] * along[j] * missing;
   }
@@ -211,17 +271,24 @@ float Estimator::measurement_variance() const {
 // (3)
 void Estimator::compare_with_model() {
   auto& p = covariance_;
-  const float innovation = (1 + gain_error_) * model_m_s_ + drift_m_s_ - velocity_m_s_;
+  const float innovation = model_m_s_ + drift_m_s_ - velocity_m_s_;
   Vector ph{};  // P Hᵀ
-  for (std::size_t i = 0; i < kStates; ++i) ph[i] = p[i][velocity] - model_m_s_ * p[i][gain] - p[i][drift];
-  float variance = ph[velocity] - model_m_s_ * ph[gain] - ph[drift] + measurement_variance();
+  for (std::size_t i = 0; i < kStates; ++i) {
+    ph[i] = p[i][velocity] - p[i][drift];
+    for (std::size_t k = 0; k < kModelSections; ++k) ph[i] -= section_[k] * p[i][gain + k];
+  }
+  float variance = ph[velocity] - ph[drift] + measurement_variance();
+  for (std::size_t k = 0; k < kModelSections; ++k) variance -= section_[k] * ph[gain + k];
   const float surprise = surprise_ = square(innovation) / variance;
   const bool moving = std::fabs(model_m_s_) > kRestingModelM_S;
-  if (surprise > kSurprising && moving && flow_m_s_ == 0 && p[gain][gain] < 1) {  // the gain is quite another
-    const float reopened = std::min(square(innovation / model_m_s_), 4.0F);
-    p[gain][gain] += reopened;
-    ph[gain] -= model_m_s_ * reopened;
-    variance += square(model_m_s_) * reopened;
+  if (surprise > kSurprising && moving && flow_m_s_ == 0 && gain_variance() < 1) {  // the gain is quite another
+    float nominal_m_s = 0;
+    for (std::size_t k = 0; k < kModelSections; ++k) nominal_m_s += parameters_.model.gain_m_s[k] * section_[k];
+    const float reopened = std::min(square(innovation / nominal_m_s), 4.0F);
+    reopen_gain(reopened);
+    for (std::size_t k = 0; k < kModelSections; ++k)
+      ph[gain + k] -= parameters_.model.gain_m_s[k] * nominal_m_s * reopened;
+    variance += square(nominal_m_s) * reopened;
   }
   const float by_variance = 1 / variance;
   Vector gains{};
@@ -235,7 +302,7 @@ void Estimator::correct(const Vector& gains, const Vector& ph, float variance, f
   position_m_ += gains[position] * innovation;
   velocity_m_s_ += gains[velocity] * innovation;
   bias_m_s2_ += gains[bias] * innovation;
-  gain_error_ += gains[gain] * innovation;
+  for (std::size_t k = 0; k < kModelSections; ++k) gain_change_m_s_[k] += gains[gain + k] * innovation;
   drift_m_s_ += gains[drift] * innovation;
   auto& p = covariance_;
   for (std::size_t i = 0; i < kStates; ++i) {
@@ -249,18 +316,20 @@ void Estimator::correct(const Vector& gains, const Vector& ph, float variance, f
 void Estimator::watch_model(float surprise) {
   const float more = std::min(surprise, kGreatestSurprise) - kExpectedSurprise;
   surprises_ = std::clamp(surprises_ + more, 0.0F, 2 * kMismatchSurprises);
-  const float gain_sd = std::sqrt(std::max(covariance_[gain][gain], 0.0F));
-  const bool strange = std::fabs(gain_error_) - 2 * gain_sd > kStrangeGain;
+  const float gain_sd = std::sqrt(gain_variance());
+  const bool strange = std::fabs(gain_error()) - 2 * gain_sd > kStrangeGain;
   strange_gains_ = strange ? std::min(strange_gains_ + 1, kMismatchStrangeGains) : 0;
-  mismatch_ = surprises_ > kMismatchSurprises || strange_gains_ == kMismatchStrangeGains;
+  const bool begins = surprises_ > kMismatchSurprises || strange_gains_ == kMismatchStrangeGains;
+  const bool ends = surprises_ == 0 && !strange;
+  mismatch_ = mismatch_ ? !ends : begins;
 }
 
 void Estimator::guard() {
   bool sound = std::isfinite(position_m_) && std::isfinite(velocity_m_s_) && std::isfinite(bias_m_s2_) &&
-               std::isfinite(gain_error_) && std::isfinite(drift_m_s_);
+               std::isfinite(gain_error()) && std::isfinite(drift_m_s_);
   for (std::size_t i = 0; i < kStates; ++i) {
     sound = sound && std::isfinite(covariance_[i][i]);
-    covariance_[i][i] = std::max(covariance_[i][i], 1e-12F);
+    if (i < gain) covariance_[i][i] = std::max(covariance_[i][i], 1e-12F);
   }
   if (!sound) {
     start();
@@ -272,12 +341,13 @@ void Estimator::guard() {
 }
 
 void Estimator::add_to(Crc32& crc) const {
-  for (const float value : section_m_s_) crc.add_float(value);
+  for (const float value : section_) crc.add_float(value);
+  for (const float value : gain_change_m_s_) crc.add_float(value);
   for (const Vector& row : covariance_) {
     for (const float value : row) crc.add_float(value);
   }
-  for (const float value : {position_m_, velocity_m_s_, bias_m_s2_, gain_error_, drift_m_s_, position_sd_m_, flow_m_s_,
-                            model_m_s_, doubtful_m_, unexplained_m_s_, surprises_}) {
+  for (const float value : {position_m_, velocity_m_s_, bias_m_s2_, drift_m_s_, position_sd_m_, flow_m_s_, model_m_s_,
+                            doubtful_m_, unexplained_m_s_, surprises_}) {
     crc.add_float(value);
   }
 }

@@ -1,15 +1,19 @@
 // Where the robot is: a Kalman filter on accelerometer readings, aided by what a model makes of the motor's duty.
 //
-//   v_m = Σ y_i,  y_i' = (g_i u - y_i)/τ_i                         (1)   model: first-order sections, from (28) or (29)
+//   v_m = Σ (g_i + δ_i) y_i,  y_i' = (u - y_i)/τ_i                 (1)   model: first-order sections, from (28) or (29)
 //   p' = v,  v' = a - b                                            (2)   a = counts/100 m/s²; without a reading
-//                                                                        v' = (1 + γ) v_m'
-//   0 = v - (1 + γ) v_m - d + ε                                    (3)   a measurement in every fifth tick
-//   p → position, v → velocity, b → bias (random walk), γ → gain error (constant, sd `gain_error`), d → drift with a
+//                                                                        v' = v_m'
+//   0 = v - v_m - d + ε                                            (3)   a measurement in every fifth tick
+//   p → position, v → velocity, b → bias (random walk), δ_i → error of a section's gain (constant), d → drift with a
 //   pulsating flow (0 without one);  u → duty;  ε → `shape_error` · v_m, a reading's age times a, and a floor
 //
-// - The model's gain may be off by ±20 %: γ takes that up, and is known within a few percent once the robot has moved.
-//   A measurement beyond 3 sd reopens γ, so that it also finds the gain of another fluid; that is a model_mismatch, as
-//   are surprises that go on.
+// - The model's gain may be off by ±20 %: all δ_i alike (sd `gain_error` · g_i); that is known within a few percent
+// once
+//   the robot has moved. A measurement beyond 3 sd reopens it, so that it also finds the gain of another fluid; that is
+//   a model_mismatch, as are surprises that go on.
+// - A model that nobody has confirmed for this fluid may have another shape as well: each δ_i has an sd of its own,
+//   `section_error` · Σ g. The sections span 0.03 s to 15 s, so most of another fluid's shape is found while driving,
+//   and what is not known of it yet is in position_sd_m.
 // - With the motor off and v_m died down, (3) has a smaller floor: the zero-velocity update.
 // - Errors of (3) keep their sign for `correlation_s` and more. They are taken as white noise of the same area,
 //   variance · 2 correlation / interval.
@@ -18,12 +22,12 @@
 // - Motion under a duty below `doubtful_duty`, where the motor may stand still, is summed and counted in the standard
 //   deviation, without a change of the filter: a doubt in (3) would let the estimate wander in a closed loop.
 // - Velocity that pulsates unexplained for 3 s is a flow: it carries the robot by an unknown mean, with an sd 1.5 times
-//   the pulsation's rms, in v and d alike; γ starts afresh.
+//   the pulsation's rms, in v and d alike; δ starts afresh.
 // Cannot see: a steady drift with the fluid. With the motor off, 1 mm/s for 40 s is 40 mm, outside any position_sd_m.
 //             Nor a pulsating flow below 4 mm/s rms, 8 mm/s mean with the pump's profile.
 // Accuracy: ≤ 5 mm at 95 % 42 s after moves of 0.1 m, within 2 position_sd_m in ≥ 90 % of trials; the table is in
-//           docs/robot.md, held by estimator_study_test.cpp.
-// Cost:     25 multiplications a tick and 140 more, 2 divisions and 2 roots in every fifth; 328 bytes.
+//           docs/robot.md, held by estimator_study_test.cpp. In fluids that nobody told it: estimator_fluids_test.cpp.
+// Cost:     29 multiplications a tick and 500 more, 3 divisions and 2 roots in every fifth; 552 bytes.
 // Errors:   a duty that is not finite counts as 0, a tick of a length outside (0, 0.1] s is passed over; if a state is
 //           not finite nevertheless, the filter starts anew with a position_sd_m of 10 m.
 // Differs from the paper: it names an algorithm that is not known to us; this one takes its place.
@@ -57,7 +61,9 @@ struct EstimatorParameters {
   VelocityModel model = kFluidVelocityModel;
   float dead_zone_duty = 0;              // below it the motor stands still
   float doubtful_duty = 0.05F;           // below it the motor may stand still
-  float gain_error = 0.2F;               // of γ at the start
+  bool is_confirmed = false;             // the model is that of the fluid that the robot swims in
+  float gain_error = 0.2F;               // of all gains alike, relative, at the start
+  float section_error = 0.12F;           // of each gain by itself, relative to the steady gain, unless confirmed
   float shape_error = 0.03F;             // of the model's velocity, relative to it, whatever its gain
   float driven_velocity_m_s = 0.0004F;   // of the model's velocity, whatever it is
   float resting_velocity_m_s = 0.0001F;  // the same with the motor off
@@ -82,19 +88,22 @@ class Estimator {
   void step(const EstimatorInputs& inputs);
   // Position is 0 here, and known.
   void zero_position();
-  // From the next tick on; at_rest() must hold.
+  // From the next tick on; is_settled() must hold.
   void set_parameters(const EstimatorParameters& parameters);
 
   // The motor is off and the model's velocity has died down.
   bool at_rest() const;
+  // The same, or the motor has been off for 5 s in which the accelerometer felt nothing: whatever the parameters are,
+  // they can be changed then.
+  bool is_settled() const { return at_rest() || still_s_ >= kSettledS; }
 
   float position_m() const { return position_m_; }
   float velocity_m_s() const { return velocity_m_s_; }
   float acceleration_m_s2() const { return acceleration_m_s2_; }  // the last reading, less the bias
   float position_sd_m() const { return position_sd_m_; }
   float bias_m_s2() const { return bias_m_s2_; }
-  float model_gain() const { return 1 + gain_error_; }  // found, relative to the parameters'
-  float flow_m_s() const { return flow_m_s_; }          // rms of a pulsating flow; 0: none seen
+  float model_gain() const { return 1 + gain_error(); }  // found, relative to the parameters'
+  float flow_m_s() const { return flow_m_s_; }           // rms of a pulsating flow; 0: none seen
   // The model does not explain the motion: another fluid, or one that moves.
   bool model_mismatch() const { return mismatch_; }
   float surprise() const { return surprise_; }  // of the last measurement: innovation² by its variance
@@ -102,27 +111,34 @@ class Estimator {
   void add_to(Crc32& crc) const;  // its state
 
  private:
-  static constexpr std::size_t kStates = 5;
-  enum State : std::size_t { position, velocity, bias, gain, drift };
+  static constexpr float kSettledS = 5;
+  static constexpr std::size_t kStates = 4 + kModelSections;
+  enum State : std::size_t { position, velocity, bias, drift, gain };  // gain: the first section's
   using Vector = std::array<float, kStates>;
 
   // What happened since the covariance was last brought up to date.
   struct Interval {
     int ticks = 0;
     float duration_s = 0;
-    float sensed_s = 0;             // of it with a reading
-    float modelled_m_s = 0;         // change of v_m in the rest of it
-    float velocity_variance = 0;    // (m/s)², that came in
-    float fastest_change_m_s2 = 0;  // of the velocity
+    float sensed_s = 0;                            // of it with a reading
+    std::array<float, kModelSections> modelled{};  // change of the sections in the rest of it
+    float velocity_variance = 0;                   // (m/s)², that came in
+    float fastest_change_m_s2 = 0;                 // of the velocity
   };
 
   void start();
   void tune_sections(float dt_s);
-  float advance_model(float duty);
+  void advance_model(float duty);
+  float gain_error() const;     // of the model's steady gain, relative
+  float gain_variance() const;  // of that
+  void restart_gains();
+  void reopen_gain(float relative_variance);
+  void watch_stillness(float reading_m_s2, float dt_s);
   bool has_reading(const EstimatorInputs& inputs);
-  void integrate(const EstimatorInputs& inputs, float model_change_m_s);
+  void integrate(const EstimatorInputs& inputs);
   void watch_flow(float unexplained_m_s, float dt_s);
   void propagate_covariance();
+  void propagate_modelled();
   void let_drift_die_down();
   void admit_drift();
   float measurement_variance() const;
@@ -132,15 +148,19 @@ class Estimator {
   void guard();
 
   EstimatorParameters parameters_;
-  std::array<float, kModelSections> section_share_{};  // of its way to go, that a section goes in a tick
-  std::array<float, kModelSections> section_m_s_{};    // y
+  std::array<float, kModelSections> section_share_{};   // of its way to go, that a section goes in a tick
+  std::array<float, kModelSections> section_{};         // of a section with gain 1
+  std::array<float, kModelSections> section_change_{};  // of it, in this tick
   float tuned_dt_s_ = 0;
   float steady_gain_m_s_ = 0;  // of the model, per duty
   float duty_ = 0;
   float model_m_s_ = 0;   // v_m
+  float still_s_ = 0;     // for so long the motor is off and nothing is felt
+  float felt_m_s2_ = 0;   // the readings' mean over the last second, less the bias
   float doubtful_m_ = 0;  // travelled by the model under duties that are doubtful
 
-  float position_m_ = 0, velocity_m_s_ = 0, bias_m_s2_ = 0, gain_error_ = 0, drift_m_s_ = 0;
+  float position_m_ = 0, velocity_m_s_ = 0, bias_m_s2_ = 0, drift_m_s_ = 0;
+  std::array<float, kModelSections> gain_change_m_s_{};  // found, from the parameters'
   std::array<Vector, kStates> covariance_{};
   float position_sd_m_ = 0;
   Interval interval_;

@@ -19,7 +19,7 @@ float in_steps(float shown_m, float sd_m) {
 }  // namespace
 
 void MotionSense::step(const Inputs& inputs, float duty, float dt_s, float missed_s) {
-  fault_changed_ = mismatch_begins_ = false;
+  fault_changed_ = mismatch_changed_ = false;
   if (inputs.known_motion) {
     motion_ = *inputs.known_motion;
     known_position_m_ = motion_.position_m;
@@ -32,7 +32,7 @@ void MotionSense::step(const Inputs& inputs, float duty, float dt_s, float misse
   estimator_.step({inputs.acceleration_counts, inputs.acceleration_is_valid, duty, dt_s});
   fault_changed_ =
       watch_.step(kMS2PerCount * static_cast<float>(inputs.acceleration_counts), inputs.acceleration_is_valid);
-  mismatch_begins_ = estimator_.model_mismatch() && !mismatch_;
+  mismatch_changed_ = estimator_.model_mismatch() != mismatch_;
   mismatch_ = estimator_.model_mismatch();
   motion_ = {estimator_.position_m(), estimator_.velocity_m_s(), estimator_.acceleration_m_s2()};
   position_sd_m_ = in_steps(position_sd_m_, estimator_.position_sd_m());

@@ -23,10 +23,10 @@ class MotionSense {
   void step(const Inputs& inputs, float duty, float dt_s, float missed_s);
   // The position is 0 from here on. The motor is off.
   void zero_position();
-  // Takes effect in the next tick; at_rest() must hold.
+  // Takes effect in the next tick; is_settled() must hold.
   void set_parameters(const EstimatorParameters& parameters) { estimator_.set_parameters(parameters); }
 
-  bool at_rest() const { return estimator_.at_rest(); }
+  bool is_settled() const { return estimator_.is_settled(); }
   // A fault that a reset has not ended: it stands until readings say otherwise.
   void distrust() { watch_.distrust(); }
 
@@ -35,8 +35,9 @@ class MotionSense {
   // Of the accelerometer; whether that is news in this tick.
   SensorFault fault() const { return watch_.fault(); }
   bool fault_changed() const { return fault_changed_; }
-  // The model does not explain the motion, since this tick.
-  bool mismatch_begins() const { return mismatch_begins_; }
+  // The model does not explain the motion; whether that is news in this tick.
+  bool model_mismatch() const { return mismatch_; }
+  bool mismatch_changed() const { return mismatch_changed_; }
   float surprise() const { return estimator_.surprise(); }  // see there
 
   void add_to(Crc32& crc) const;  // its floats
@@ -45,7 +46,7 @@ class MotionSense {
   Estimator estimator_;
   SensorWatch watch_{kAccelerometerRules};
   bool fault_changed_ = false;
-  bool mismatch_ = false, mismatch_begins_ = false;
+  bool mismatch_ = false, mismatch_changed_ = false;
   Motion motion_;
   float known_position_m_ = 0;  // as the perfect sensor said
   float origin_m_ = 0;          // of the perfect sensor

@@ -51,6 +51,8 @@ constexpr std::array<ParameterSpec, kParameterCount> kTable{{
     {"acceleration_noise_m_s2", "m/s2", 0.001F, 1, kEstimator.noise_m_s2, kAtRest, kAny},
     {"acceleration_bias_m_s2", "m/s2", 0.0001F, 1, kEstimator.bias_m_s2, kAtRest, kAny},
     {"acceleration_bias_walk_m_s2", "m/s2", 0.00001F, 0.1F, kEstimator.bias_walk_m_s2, kAtRest, kAny},
+    {"model_section_error", "", 0.001F, 1, kEstimator.section_error, kAtRest, kAny},
+    {"model_confirmed", "", 0, 1, 0, kAtRest, kWhole},
 }};
 
 }  // namespace
@@ -68,6 +70,11 @@ bool Parameters::in_range(std::size_t index, float value) {
   const ParameterSpec& spec = kTable[index];
   const bool fits = std::isfinite(value) && value >= spec.minimum && value <= spec.maximum;
   return fits && (!spec.whole || std::trunc(value) == value);
+}
+
+bool Parameters::is_of_model(std::size_t index) {
+  return index >= static_cast<std::size_t>(ParameterId::model_gain_1_m_s) &&
+         index < static_cast<std::size_t>(ParameterId::dead_zone_duty);
 }
 
 void Parameters::set_defaults() {
@@ -101,6 +108,8 @@ EstimatorParameters Parameters::estimator() const {
   estimator.noise_m_s2 = (*this)[ParameterId::acceleration_noise_m_s2];
   estimator.bias_m_s2 = (*this)[ParameterId::acceleration_bias_m_s2];
   estimator.bias_walk_m_s2 = (*this)[ParameterId::acceleration_bias_walk_m_s2];
+  estimator.section_error = (*this)[ParameterId::model_section_error];
+  estimator.is_confirmed = (*this)[ParameterId::model_confirmed] == 1;
   return estimator;
 }
 

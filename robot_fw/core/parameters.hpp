@@ -45,8 +45,10 @@ enum class ParameterId : std::uint8_t {
   acceleration_noise_m_s2,
   acceleration_bias_m_s2,
   acceleration_bias_walk_m_s2,
+  model_section_error,
+  model_confirmed,  // 1: the model is that of the fluid that the robot swims in; 0 after each boot
 };
-constexpr std::size_t kParameterCount = static_cast<std::size_t>(ParameterId::acceleration_bias_walk_m_s2) + 1;
+constexpr std::size_t kParameterCount = static_cast<std::size_t>(ParameterId::model_confirmed) + 1;
 
 // What auto does when the link is lost; manual always stops.
 enum class LinkLossAction : std::uint8_t { stop, hold, go_on };
@@ -69,11 +71,14 @@ class Parameters {
   static std::optional<std::size_t> find(const char* name);
   // Finite, within the range of its row, and whole where that says so.
   static bool in_range(std::size_t index, float value);
+  // A gain or time constant of the estimator's model.
+  static bool is_of_model(std::size_t index);
 
   float operator[](ParameterId id) const { return values_[static_cast<std::size_t>(id)]; }
   float value(std::size_t index) const { return values_[index]; }
   // The value must be in_range().
   void set(std::size_t index, float value) { values_[index] = value; }
+  void set(ParameterId id, float value) { set(static_cast<std::size_t>(id), value); }
   void set_defaults();
 
   LinkLossAction link_loss_action() const;

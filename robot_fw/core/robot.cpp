@@ -68,6 +68,7 @@ Outputs Robot::step(const Inputs& inputs, float dt_s) {
     // SAFETY: a value that is not a number, or a clock that goes back, stops the robot; once, not in every tick.
     if (!safety_.latched()) emergency(rheonaut_EMERGENCY_CAUSE_INTERNAL_ERROR, rheonaut_EVENT_CAUSE_INTERNAL, 0);
   }
+  watch_certainty(wanted.limited);
   saturated_ = !safety_.latched() && safety_.permit(wanted.limited) != wanted.asked;
   duty_ = safety_.permit(slewed(wanted.limited, dt_s));  // SAFETY: nothing after this line touches the duty
   announce_controller();
@@ -176,6 +177,8 @@ BatchValues Robot::batch_values() const {
   if (link_.lost()) flags |= rheonaut_TELEMETRY_FLAG_LINK_LOSS;
   if (pilot_.lease_lapsed()) flags |= rheonaut_TELEMETRY_FLAG_LEASE_LAPSED;
   if (safety_.outside_limits()) flags |= rheonaut_TELEMETRY_FLAG_POSITION_LIMIT;
+  if (parameters_[ParameterId::model_confirmed] == 1) flags |= rheonaut_TELEMETRY_FLAG_MODEL_CONFIRMED;
+  if (motion_sense_.model_mismatch()) flags |= rheonaut_TELEMETRY_FLAG_MODEL_MISMATCH;
   if (!inputs_are_sound_ || sensor_fault_stands()) flags |= rheonaut_TELEMETRY_FLAG_SENSOR_FAULT;
   values.flags = static_cast<std::uint16_t>(flags);
   return values;

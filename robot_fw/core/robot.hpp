@@ -100,6 +100,7 @@ class Robot {
   bool sensor_fault_stands() const;
   void watch_link();
   void watch_limits(const Motion& measured, float dt_s);
+  void watch_certainty(float wanted_duty);
   void watch_impedance(const Motion& measured);
   void end_delivery(protocol::EventCause cause, std::uint64_t command_id);
   void watch_arrival(const Motion& measured);
@@ -122,6 +123,7 @@ class Robot {
   Verdict zero_position(std::uint64_t command_id);
   Verdict check_position(float position_m) const;
   Verdict check_setpoint(float setpoint_m) const;
+  Verdict check_certainty(float setpoint_m) const;
 
   // Parameters and controllers, in robot_settings.cpp.
   Verdict set_controller(const protocol::Controller& controller, std::uint64_t command_id);
@@ -182,7 +184,7 @@ class Robot {
 // What the ESP8266 has for all of it besides the ring and the bytes of a frame. A host's pointers and sizes take more;
 // its limit is there to notice growth in every build.
 static_assert(sizeof(Robot) - sizeof(TelemetryRing) - sizeof(protocol::FrameReader) <=
-                  (sizeof(void*) == 4 ? 4096 : 4224),
+                  (sizeof(void*) == 4 ? 4352 : 4480),
               "the robot outgrew its memory");
 
 }  // namespace robot_fw

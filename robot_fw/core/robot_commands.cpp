@@ -95,9 +95,18 @@ Verdict Robot::check_position(float position_m) const {
 
 Verdict Robot::check_setpoint(float setpoint_m) const {
   const Verdict verdict = check_position(setpoint_m);
-  if (!verdict.accepted() || position_limits().contain(setpoint_m)) return verdict;
+  if (!verdict.accepted()) return verdict;
+  if (position_limits().contain(setpoint_m)) return check_certainty(setpoint_m);
   // SAFETY: nothing sends the robot beyond its limits, and outside them only back in.
   return rejected(safety_.outside_limits() ? rheonaut_REJECT_REASON_OUTWARD : rheonaut_REJECT_REASON_OUT_OF_RANGE);
+}
+
+// SAFETY: nothing sends the robot nearer to a limit than its position is known.
+Verdict Robot::check_certainty(float setpoint_m) const {
+  const PositionLimits limits = position_limits();
+  const float margin_m = 2 * motion_sense_.position_sd_m();
+  const bool is_certain = setpoint_m <= limits.max_m - margin_m && setpoint_m >= limits.min_m + margin_m;
+  return is_certain ? kAccepted : rejected(rheonaut_REJECT_REASON_UNCERTAIN);
 }
 
 Verdict Robot::set_mode(const rheonaut_SetMode& order, std::uint64_t command_id) {
@@ -138,6 +147,7 @@ Verdict Robot::set_duty(const rheonaut_SetDuty& order) {
     return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
   }
   if (safety_.outward(order.duty)) return rejected(rheonaut_REJECT_REASON_OUTWARD);  // SAFETY: outside, only inward
+  if (safety_.uncertain(order.duty)) return rejected(rheonaut_REJECT_REASON_UNCERTAIN);
   pilot_.set_duty(order.duty, order.lease_ms, now_us_);
   return kAccepted;
 }
@@ -159,6 +169,9 @@ Verdict Robot::set_duty_schedule(const rheonaut_SetDutySchedule& order) {
   const bool leads_out =
       std::any_of(order.duty, order.duty + order.duty_count, [this](float duty) { return safety_.outward(duty); });
   if (leads_out) return rejected(rheonaut_REJECT_REASON_OUTWARD);  // SAFETY: outside, only inward
+  const bool is_uncertain =
+      std::any_of(order.duty, order.duty + order.duty_count, [this](float duty) { return safety_.uncertain(duty); });
+  if (is_uncertain) return rejected(rheonaut_REJECT_REASON_UNCERTAIN);
   pilot_.set_schedule(order, now_us_);
   return kAccepted;
 }

@@ -41,13 +41,18 @@ Verdict Robot::set_parameter(const rheonaut_SetParameter& order, std::uint64_t c
   if (Parameters::spec(*index).only_at_rest && motor_on()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
   const bool is_estimators = *index >= static_cast<std::size_t>(ParameterId::model_gain_1_m_s);
   // SAFETY: an estimator that starts anew while the robot coasts would take it to stand, and be sure of that.
-  if (is_estimators && !motion_sense_.at_rest()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
+  if (is_estimators && !motion_sense_.is_settled()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
   if (!outbox_.has_room_for_page()) return rejected(rheonaut_REJECT_REASON_BUSY);
   parameters_.set(*index, order.value);
+  // SAFETY: whoever changes the model says anew that it is the fluid's; one that is half of another is nobody's.
+  const bool takes_back = Parameters::is_of_model(*index) && parameters_[ParameterId::model_confirmed] == 1;
+  if (takes_back) parameters_.set(ParameterId::model_confirmed, 0);
   if (is_estimators) motion_sense_.set_parameters(parameters_.estimator());
   parameters_unsaved_ = true;
   note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, order.value, command_id);
   outbox_.ask_page({command_id, *index, 1});
+  constexpr auto kConfirmed = static_cast<std::uint32_t>(ParameterId::model_confirmed);
+  if (takes_back && outbox_.has_room_for_page()) outbox_.ask_page({0, kConfirmed, 1});  // else the flag alone says it
   return kAccepted;
 }
 
@@ -70,6 +75,7 @@ void Robot::load_settings() {
     note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_RESET, 0);  // to the defaults
   }
   parameters_ = parameters.value_or(Parameters{});
+  parameters_.set(ParameterId::model_confirmed, 0);  // SAFETY: it may swim in another fluid now
   motion_sense_.set_parameters(parameters_.estimator());
   const auto controller = load_controller(storage);
   // SAFETY: what was kept is judged like what comes over the link; this port may have another motor by now.

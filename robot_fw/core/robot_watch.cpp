@@ -32,8 +32,9 @@ void Robot::watch_sensors() {
     told_electrode_fault_ = electrode_fault();
     on_sensor_news(told_electrode_fault_, rheonaut_EVENT_CAUSE_IMPEDANCE, inputs_.impedance_mv);
   }
-  if (motion_sense_.mismatch_begins()) {
-    note(rheonaut_EVENT_KIND_MODEL_MISMATCH, rheonaut_EVENT_CAUSE_SENSOR, std::sqrt(motion_sense_.surprise()));
+  if (motion_sense_.mismatch_changed()) {
+    note(motion_sense_.model_mismatch() ? rheonaut_EVENT_KIND_MODEL_MISMATCH : rheonaut_EVENT_KIND_MODEL_MISMATCH_ENDED,
+         rheonaut_EVENT_CAUSE_SENSOR, std::sqrt(motion_sense_.surprise()));
   }
 }
 
@@ -85,11 +86,23 @@ void Robot::watch_limits(const Motion& measured, float dt_s) {
     // SAFETY: a robot that leaves its stretch of the vessel stops; a latch of another cause stays what it is.
     if (!safety_.latched()) emergency(rheonaut_EMERGENCY_CAUSE_POSITION_LIMIT, rheonaut_EVENT_CAUSE_LIMIT, 0);
   }
+  safety_.watch_certainty(position_m, 2 * motion_sense_.position_sd_m(), limits);
   const PowerLimit power{parameters_[ParameterId::power_limit_duty], parameters_[ParameterId::power_limit_s]};
   if (safety_.too_long_at_power(duty_, dt_s, power)) {
     note(rheonaut_EVENT_KIND_LIMIT_HIT, rheonaut_EVENT_CAUSE_LIMIT, power.time_s);
     emergency(rheonaut_EMERGENCY_CAUSE_TIME_AT_POWER, rheonaut_EVENT_CAUSE_LIMIT, 0);  // SAFETY: a motor gets hot
   }
+}
+
+// SAFETY: motion towards a limit that may have been reached already ends: manual at duty 0, once, so that somebody
+// looks. The way out is to bring the robot to a known place and zero_position, or to turn round.
+void Robot::watch_certainty(float wanted_duty) {
+  if (safety_.latched() || safety_.outward(wanted_duty) || !safety_.uncertain(wanted_duty)) return;
+  const bool was_auto = pilot_.is_auto();
+  stop_motion(rheonaut_EVENT_CAUSE_LIMIT);
+  note(rheonaut_EVENT_KIND_POSITION_UNCERTAIN, rheonaut_EVENT_CAUSE_LIMIT, 2 * motion_sense_.position_sd_m());
+  if (was_auto) note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_LIMIT, 0);
+  drop_timed_commands(rejected(rheonaut_REJECT_REASON_UNCERTAIN));
 }
 
 // Glucose on the way: the robot holds where it has found it until it has mixed.

@@ -61,6 +61,11 @@ bool Safety::leaves_limits(float position_m, const PositionLimits& limits) {
   return side_ != Side::inside && side_ != before;
 }
 
+void Safety::watch_certainty(float position_m, float margin_m, const PositionLimits& limits) {
+  uncertain_above_ = position_m + margin_m > limits.max_m;
+  uncertain_below_ = position_m - margin_m < limits.min_m;
+}
+
 bool Safety::outward(float duty) const {
   return (side_ == Side::above && duty > 0) || (side_ == Side::below && duty < 0);
 }
@@ -75,6 +80,7 @@ float Safety::permit(float wanted_duty) const {
   if (latched()) return 0;                          // SAFETY: emergency overrides every mode; it coasts
   if (!std::isfinite(wanted_duty)) return 0;        // SAFETY: no NaN reaches the motor
   if (outward(wanted_duty)) return 0;               // SAFETY: outside a limit only inward
+  if (uncertain(wanted_duty)) return 0;             // SAFETY: nor towards one that may have been reached already
   if (wanted_duty < range_.min) return range_.min;  // SAFETY: within the motor's range
   if (wanted_duty > range_.max) return range_.max;
   return wanted_duty;

@@ -41,8 +41,12 @@ class Safety {
 
   // Follows the position; says so in the tick in which it leaves the limits.
   bool leaves_limits(float position_m, const PositionLimits& limits);
+  // How well the position is known: says in which directions a limit is nearer than that. `margin_m`: 2 sd.
+  void watch_certainty(float position_m, float margin_m, const PositionLimits& limits);
   // Outside the limits, the duty that leads further out.
   bool outward(float duty) const;
+  // The duty that leads towards a limit which is nearer than the position is known.
+  bool uncertain(float duty) const { return (duty > 0 && uncertain_above_) || (duty < 0 && uncertain_below_); }
   bool outside_limits() const { return side_ != Side::inside; }
   // Counts the time at power, which goes down again as fast as it went up; says when it is too much.
   bool too_long_at_power(float duty, float dt_s, const PowerLimit& limit);
@@ -54,7 +58,8 @@ class Safety {
   bool has_sensor_cause() const { return has_sensor_cause_; }
   const DutyRange& range() const { return range_; }
 
-  // What the motor gets of the duty wanted: 0 when latched, not finite or outward, otherwise within the range.
+  // What the motor gets of the duty wanted: 0 when latched, not finite, outward or uncertain, otherwise within the
+  // range.
   float permit(float wanted_duty) const;
 
  private:
@@ -69,6 +74,7 @@ class Safety {
   protocol::EmergencyCause cause_ = rheonaut_EMERGENCY_CAUSE_NONE;
   bool has_sensor_cause_ = false;
   Side side_ = Side::inside;
+  bool uncertain_above_ = false, uncertain_below_ = false;
   float at_power_s_ = 0;
 };
 

@@ -15,10 +15,10 @@ import sys
 BUDGETS = (
     ("median_tick", "median tick", 16_000, "instructions"),
     ("worst_tick", "worst tick", 80_000, "instructions"),
-    ("core_bytes", "core state without ring and frame buffer", 4_096, "bytes"),
+    ("core_bytes", "core state without ring and frame buffer", 4_352, "bytes"),
     ("ring_bytes", "ring", 22 * 1024, "bytes"),
     ("stack_bytes", "stack, deepest", 2_048, "bytes"),
-    ("text_bytes", "text: core, protocol, nanopb", 40 * 1024, "bytes"),
+    ("text_bytes", "text: core, protocol, nanopb", 42 * 1024, "bytes"),
 )
 # Told beside them, without a limit of their own.
 TOLD = (

@@ -25,12 +25,13 @@ struct Outcome {
 };
 
 // The paper's Figure 7: 0.1 m, and -0.05 m on the measured position from 20 s on; judged at 42 s.
-Outcome figure_7(std::uint64_t seed) {
+Outcome figure_7(std::uint64_t seed, bool is_confirmed) {
   constexpr float kSetpointM = 0.1F, kDisturbanceM = -0.05F;
   SimulatedRobot robot{on_its_accelerometer(seed)};
   StationPeer station{robot};
   station.connect();
   station.run(2);
+  if (is_confirmed) station.send(set_parameter("model_confirmed", 1));
   station.send(set_auto(kSetpointM));
   station.run(2000);
   station.send(inject_disturbance(kDisturbanceM));
@@ -44,11 +45,23 @@ Outcome figure_7(std::uint64_t seed) {
 TEST(OnItsAccelerometer, TheRobotEndsFigure7Within5MmOfTheTrueTarget) {
   int within_5_mm = 0, within_2_sd = 0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const Outcome outcome = figure_7(seed);
+    const Outcome outcome = figure_7(seed, true);
     within_5_mm += std::abs(outcome.target_error_m) <= 0.005;
     within_2_sd += std::abs(outcome.estimate_error_m) <= 2 * outcome.position_sd_m;
   }
   EXPECT_GE(within_5_mm, 0.95 * kSeeds);
+  EXPECT_GE(within_2_sd, 0.9 * kSeeds);
+}
+
+// As it comes, the robot does not know that its model is the fluid's: less exact, and as honest.
+TEST(OnItsAccelerometer, WithAModelThatNobodyHasConfirmedItIsWithin10MmAndSaysHowWellItKnows) {
+  int within_10_mm = 0, within_2_sd = 0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const Outcome outcome = figure_7(seed, false);
+    within_10_mm += std::abs(outcome.target_error_m) <= 0.01;
+    within_2_sd += std::abs(outcome.estimate_error_m) <= 2 * outcome.position_sd_m;
+  }
+  EXPECT_GE(within_10_mm, 0.95 * kSeeds);
   EXPECT_GE(within_2_sd, 0.9 * kSeeds);
 }
 
@@ -126,11 +139,51 @@ TEST(OnItsAccelerometer, TheWatersParametersSetOverTheLinkServeInWater) {
         set_parameter(("model_time_constant_" + number + "_s").c_str(), kWaterVelocityModel.time_constant_s[i]));
     station.step();
   }
+  station.send(set_parameter("model_confirmed", 1));
+  station.step();
   for (const auto& ack : station.acks) EXPECT_EQ(ack.result, rheonaut_COMMAND_RESULT_ACCEPTED);
   station.send(set_auto(0.1F));
   station.run(4200);
   for (const auto& event : station.events) EXPECT_NE(event.kind, rheonaut_EVENT_KIND_MODEL_MISMATCH);
   EXPECT_NEAR(station.samples.rbegin()->second.position_m, robot.world().position_m(), 0.005);
+}
+
+// SAFETY: the robot does not go where it may be beyond a limit already.
+TEST_F(Estimate, ASetpointNearerToALimitThanThePositionIsKnownIsRefused) {
+  EXPECT_EQ(answer(set_parameter("position_limit_max_m", 0.2F)), "accepted");
+  EXPECT_EQ(answer(set_auto(0.19F)), "accepted");  // at the start the position is known
+  station.run(300);
+  order(set_manual());
+  const float margin_m = 2 * last().position_sd_m;
+  ASSERT_GT(margin_m, 0.004F);
+  EXPECT_EQ(answer(set_auto(0.2F - 0.9F * margin_m)), "uncertain");
+  EXPECT_EQ(mode(), "manual");
+  EXPECT_EQ(answer(set_auto(0.1F)), "accepted");
+  EXPECT_EQ(answer(set_setpoint(0.2F - 0.9F * margin_m)), "uncertain");
+}
+
+// SAFETY: motion that leads there ends, before the limit and its emergency, and turning round is allowed.
+TEST_F(Estimate, MotionTowardsALimitEndsWhereThePositionIsNoLongerKnownWellEnough) {
+  EXPECT_EQ(answer(set_parameter("position_limit_max_m", 0.2F)), "accepted");
+  order(set_duty(0.5F));
+  for (int i = 1; i < 1000 && core().duty() > 0; ++i) {
+    if (i % 20 == 0) station.send(renew_lease());
+    station.step();
+  }
+  EXPECT_EQ(mode(), "manual");
+  EXPECT_EQ(core().duty(), 0);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_POSITION_UNCERTAIN), 1);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_EMERGENCY), 0);
+  EXPECT_LT(last().position_m, 0.2F);
+  EXPECT_GE(last().position_m + 2 * last().position_sd_m, 0.2F);
+  EXPECT_LT(robot.world().position_m(), 0.2);
+  station.run(1000);
+  EXPECT_EQ(answer(set_duty(0.2F)), "uncertain");
+  EXPECT_EQ(answer(set_duty(-0.2F)), "accepted");
+  order(set_duty(0));
+  station.run(1000);
+  EXPECT_EQ(answer(zero_position()), "accepted");  // the way out: somebody has seen where it is
+  EXPECT_EQ(answer(set_duty(0.2F)), "accepted");
 }
 
 TEST_F(Estimate, ItsParametersAreRefusedWhileTheRobotCoasts) {

@@ -16,7 +16,7 @@ namespace robot_fw {
 
 struct EstimatorTrial {
   control::FractionalModel truth = control::kNonNewtonianModel;
-  EstimatorParameters estimator;
+  EstimatorParameters estimator{.is_confirmed = true};
   sim_robot::ImuParameters imu;
   double plant_gain = 1;      // of the truth
   double dead_zone_duty = 0;  // of the truth: below it the motor does not turn

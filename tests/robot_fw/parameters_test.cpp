@@ -66,7 +66,7 @@ TEST(ParameterTable, EveryIdNamesItsRow) {
 // Computed apart, with Python: binascii.crc32 over name.encode() + struct.pack("<f", value) of each row.
 TEST(ParameterTable, HasTheChecksumThatTheDocumentDefines) {
   const Parameters p;
-  EXPECT_EQ(p.checksum(), 0x6BB9790DU);
+  EXPECT_EQ(p.checksum(), 0x9A96941AU);
 }
 
 TEST_F(ParametersOverTheLink, ArePagedSixAtATime) {
@@ -128,6 +128,23 @@ TEST_F(ParametersOverTheLink, WhatShapesMotionStaysAsItIsWhileTheMotorIsOn) {
   EXPECT_EQ(set("duty_slew_per_s", 1), "accepted");
   order(set_duty(0.1F));
   EXPECT_EQ(set("duty_slew_per_s", 2), "motor_on");
+}
+
+TEST_F(ParametersOverTheLink, AChangeOfTheModelTakesItsConfirmationBack) {
+  EXPECT_EQ(last().flags & rheonaut_TELEMETRY_FLAG_MODEL_CONFIRMED, 0u);
+  EXPECT_EQ(set("model_confirmed", 1), "accepted");
+  station.run(2);
+  EXPECT_NE(last().flags & rheonaut_TELEMETRY_FLAG_MODEL_CONFIRMED, 0u);
+  EXPECT_EQ(set("model_gain_error", 0.1F), "accepted");  // says how well the model is known, and is no part of it
+  EXPECT_EQ(in_force("model_confirmed"), 1);
+  station.pages.clear();
+  EXPECT_EQ(set("model_time_constant_2_s", 0.07F), "accepted");
+  station.run(2);
+  EXPECT_EQ(last().flags & rheonaut_TELEMETRY_FLAG_MODEL_CONFIRMED, 0u);
+  EXPECT_EQ(station.pages.size(), 1u);  // the answer
+  const auto& unasked = station.table.back();
+  EXPECT_STREQ(unasked.parameters[0].name, "model_confirmed");
+  EXPECT_EQ(unasked.parameters[0].value, 0);
 }
 
 TEST_F(ParametersOverTheLink, WhatNamesAChoiceIsAWholeNumber) {

@@ -55,6 +55,20 @@ TEST_F(Settings, ComeBackAfterAReset) {
   EXPECT_EQ(boot.station.controllers[0].controller_id, 2u);
 }
 
+// SAFETY: after a reset the robot may swim in another fluid; the model is kept, and is assumed again.
+TEST_F(Settings, AModelIsOnlyAssumedAfterAReset) {
+  {
+    Boot boot{storage};
+    boot.order(set_parameter("model_gain_4_m_s", 0.001F));
+    boot.order(set_parameter("model_confirmed", 1));
+  }
+  Boot boot{storage};
+  boot.order(get_parameters(static_cast<std::uint32_t>(*Parameters::find("model_gain_4_m_s"))));
+  EXPECT_EQ(boot.station.pages[0].parameters[0].value, 0.001F);
+  boot.order(get_parameters(static_cast<std::uint32_t>(*Parameters::find("model_confirmed"))));
+  EXPECT_EQ(boot.station.pages[1].parameters[0].value, 0);
+}
+
 TEST_F(Settings, AfterAResetTheBuiltInControllerIsTheOneBefore) {
   Boot{storage}.order(set_controller(golden_biquads()));
   Boot boot{storage};
