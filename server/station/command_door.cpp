@@ -124,13 +124,13 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
     co_return pending->record;
   }
   if (auto seen = check_sight(request); !seen) co_return refuse(request, seen.error());
-  use_control(request);  // SAFETY: what was refused, or came too late, takes no control
   supersede_queued(seat, *pending);
   if (!seat.port->send(pending->wire, pending->deadline_us)) {
     Error full{ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),
                "queue_full"};
     co_return refuse(request, std::move(full));
   }
+  use_control(request);  // SAFETY: what was refused, also by a full queue, or came too late, takes no control
   add_pending(seat, pending);
   publish(pending->record);
   co_return co_await follow(pending, request.until_verified, patience);

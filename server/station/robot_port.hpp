@@ -18,7 +18,8 @@ class RobotPort {
   virtual const RobotId& robot_id() const = 0;
 
   // Queues a command, to be written before `deadline_us` (steady) or not at all. False when the bounded queue is full:
-  // the command was not taken.
+  // the command was not taken. SAFETY: never false right after a withdraw() that took one back, so that a command that
+  // is refused has not cost an older one.
   virtual bool send(const protocol::Command& command, std::int64_t deadline_us) = 0;
 
   // Takes a queued command back; false when it has left.

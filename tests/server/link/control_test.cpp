@@ -12,6 +12,28 @@ class ControlTest : public LinkTest {
     submit(std::move(request));
     clock.settle();
   }
+  // A robot whose link takes nothing any more, for now.
+  TestRobot* connect_and_stall() {
+    auto* robot = dial(64);
+    robot->say_hello();
+    EXPECT_TRUE(clock.run_until([&] { return !robot->welcomes().empty(); }, 1s));
+    robot->link.stall(true);
+    for (int i = 0; i < 4; ++i) submit_as("someone", ping());  // what still fits into the link
+    return robot;
+  }
+  void fill_queue() {
+    const std::size_t before = results.size();
+    for (std::size_t i = 0; i < RobotSession::kMaxQueuedCommands && results.size() == before; ++i) {
+      submit_as("someone", ping());
+    }
+    EXPECT_EQ(results.size(), before + 1);
+    EXPECT_EQ(results.back().error().reason, "queue_full");
+  }
+  static protocol::Command ping() {  // of which none supersedes another, and which needs no control
+    protocol::Command command = rheonaut_Command_init_zero;
+    command.which_action = rheonaut_Command_ping_tag;
+    return command;
+  }
   Result<ControlState> control(const std::string& actor, ControlAction action) {
     return station.control({"r1", actor, "10.0.0.7", action, kControlLife, "a test"});
   }
@@ -41,6 +63,42 @@ TEST_F(ControlTest, ACommandThatIsRefusedOrCameTooLateTakesNoControl) {
   EXPECT_EQ(results.at(1)->state, CommandState::expired);
   EXPECT_EQ(station.find("r1")->control.holder, "");
   EXPECT_TRUE(robot->commands().empty());
+}
+
+TEST_F(ControlTest, ACommandThatFindsTheQueueFullTakesNoControl) {
+  auto* robot = connect_and_stall();
+  fill_queue();
+  submit_as("session:1", set_duty(0.1F));
+  EXPECT_EQ(results.back().error().reason, "queue_full");
+  EXPECT_EQ(station.find("r1")->control.holder, "");
+  const auto takes = [](const RobotEvent& event) { return event.kind == "control_taken"; };
+  EXPECT_EQ(std::ranges::count_if(sink.events, takes), 0);
+  submit_as("session:2", set_duty(0.2F));
+  EXPECT_EQ(results.back().error().reason, "queue_full") << "and not that another is in control";
+  robot->link.stall(false);
+  clock.settle();
+  submit_as("session:2", set_duty(0.3F));
+  EXPECT_EQ(station.find("r1")->control.holder, "session:2");
+}
+
+TEST_F(ControlTest, ACommandThatFindsTheQueueFullHasCostNoOlderOne) {
+  auto* robot = connect_and_stall();
+  submit_as("session:1", set_duty(0.1F));
+  fill_queue();
+  const std::size_t refused = results.size();
+  submit_as("session:1", set_setpoint(0.1F));
+  ASSERT_EQ(results.size(), refused + 1);
+  EXPECT_EQ(results.back().error().reason, "queue_full");
+  submit_as("session:1", set_duty(0.2F));  // takes the place of the older duty
+  ASSERT_EQ(results.size(), refused + 2);
+  EXPECT_EQ(results.back()->state, CommandState::superseded);
+  robot->link.stall(false);
+  clock.settle();
+  std::vector<float> duties;
+  for (const auto& command : robot->commands()) {
+    if (command.which_action == rheonaut_Command_set_duty_tag) duties.push_back(command.action.set_duty.duty);
+  }
+  EXPECT_EQ(duties, std::vector<float>{0.2F});
 }
 
 TEST_F(ControlTest, ARenewalOfAnotherKeepsNoMotorRunning) {
