@@ -5,32 +5,14 @@
 
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/multiple_exceptions.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <boost/system/system_error.hpp>
 #include <csignal>
 
 #include "server/real_time.hpp"
 
 namespace server {
 namespace asio = boost::asio;
-
-namespace {
-
-// `co_await (a || b)` throws both failures in one when it is cancelled; the first of them tells what happened. Each may
-// be such a pair itself.
-std::exception_ptr first_of(std::exception_ptr failure) {
-  try {
-    std::rethrow_exception(failure);
-  } catch (const asio::multiple_exceptions& both) {
-    return first_of(both.first_exception());
-  } catch (...) {
-    return failure;
-  }
-}
-
-}  // namespace
 
 void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
   if (stopping_) return;
@@ -52,18 +34,12 @@ void TaskGroup::run(bool in_real_time) {
 }
 
 void TaskGroup::ended(const std::string& name, std::exception_ptr failure) {
-  try {
-    if (failure) std::rethrow_exception(first_of(failure));
-  } catch (const boost::system::system_error& error) {
-    if (error.code() == asio::error::operation_aborted) return;
-    spdlog::critical("{} failed: {}; stopping", name, error.what());
-    exit_code_ = 1;
-    stop();
-  } catch (const std::exception& error) {
-    spdlog::critical("{} failed: {}; stopping", name, error.what());
-    exit_code_ = 1;
-    stop();
-  }
+  if (!failure) return;
+  failure = first_of(failure);
+  if (is_cancellation(failure)) return;
+  spdlog::critical("{} failed: {}; stopping", name, text_of(failure));
+  exit_code_ = 1;
+  stop();
 }
 
 void TaskGroup::stop() {

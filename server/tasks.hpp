@@ -11,6 +11,8 @@
 #include <optional>
 #include <string>
 
+#include "server/exceptions.hpp"
+
 namespace server {
 
 class TaskGroup {
@@ -34,11 +36,15 @@ class TaskGroup {
   bool stopping() const { return stopping_; }
   int exit_code() const { return exit_code_; }
 
+  // What ended by an exception and was no task of its own to stop the group.
+  ExceptionLog& exceptions() { return exceptions_; }
+
  private:
   void ended(const std::string& name, std::exception_ptr failure);
 
   boost::asio::io_context& loop_;
   std::list<boost::asio::cancellation_signal> signals_;
+  ExceptionLog exceptions_;
   bool stopping_ = false;
   int exit_code_ = 0;
 };

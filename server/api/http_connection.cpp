@@ -46,6 +46,10 @@ Request plain_head(const Message& message) {
   return request;
 }
 
+std::string route_of(std::string_view method, std::string_view target) {
+  return fmt::format("{} {}", method, target.substr(0, 200));
+}
+
 Response body_too_large(std::size_t limit) {
   return problem(413, fmt::format("the body has more than {} bytes", limit), "too_large");
 }
@@ -79,20 +83,18 @@ HttpConnection::HttpConnection(HttpStream stream, Guest& guest, TlsGate* tls, Cl
 }
 
 asio::awaitable<void> HttpConnection::talk() {
+  co_await contained(live_.tasks.exceptions(), clock_, Ended::http_connection, "http connection of " + stream_.peer(),
+                     take_turns());
+}
+
+asio::awaitable<void> HttpConnection::take_turns() {
   allow(kRequestTime);
-  try {
-    const Next begun = co_await secure();
-    if (begun == Next::end) co_return;
-    for (;;) {
-      const Next next = co_await read_and_answer();
-      if (next == Next::end) co_return;
-      allow(kIdleTime);
-    }
-  } catch (const boost::system::system_error& error) {
-    if (error.code() == asio::error::operation_aborted) throw;
-    spdlog::error("an http connection ended: {}", error.what());
-  } catch (const std::exception& error) {  // ends this connection, never the station
-    spdlog::error("an http connection ended: {}", error.what());
+  const Next begun = co_await secure();
+  if (begun == Next::end) co_return;
+  for (;;) {
+    const Next next = co_await read_and_answer();
+    if (next == Next::end) co_return;
+    allow(kIdleTime);
   }
 }
 
@@ -314,15 +316,15 @@ asio::awaitable<void> HttpConnection::discard_rest() {
 
 // The boundary: whatever a route throws ends here, and says nothing of the inside to the outside.
 asio::awaitable<Response> HttpConnection::answer(Request request) {
-  const std::string what = request.method + " " + request.target.substr(0, 200);
+  const std::string route = route_of(request.method, request.target);
+  std::exception_ptr failure;
   try {
     co_return co_await router_.dispatch(std::move(request));
-  } catch (const boost::system::system_error& error) {
-    if (error.code() == asio::error::operation_aborted) throw;
-    spdlog::error("{}: {}", what, error.what());
-  } catch (const std::exception& error) {
-    spdlog::error("{}: {}", what, error.what());
+  } catch (...) {
+    failure = first_of(std::current_exception());
   }
+  if (is_cancellation(failure)) std::rethrow_exception(failure);
+  live_.tasks.exceptions().note(Ended::request, route, failure, clock_.steady_us());
   co_return problem(500, "the station could not answer; its log says why", "internal");
 }
 
@@ -336,17 +338,17 @@ asio::awaitable<HttpConnection::Next> HttpConnection::send(Response response, co
   const auto [error, size] = co_await asio::async_write(stream_, parts, asio::as_tuple(asio::use_awaitable));
   if (error) co_return Next::end;
   if (response.stream != nullptr && has_body) {
-    const bool is_whole = co_await send_stream(*response.stream, is_framed);
+    const bool is_whole = co_await send_stream(*response.stream, is_framed, route_of(to.method_string(), to.target()));
     if (!is_whole) co_return Next::end;
   }
   co_return framing.keep_alive ? Next::another : Next::end;
 }
 
 // False when it was cut short: the missing last chunk tells the client (HTTP/1.0 has no way to say so).
-asio::awaitable<bool> HttpConnection::send_stream(BodyStream& body, bool chunked) {
+asio::awaitable<bool> HttpConnection::send_stream(BodyStream& body, bool chunked, std::string route) {
   for (;;) {
     deadline_us_ = kNever;
-    const auto made = co_await while_present(next_piece(body));
+    const auto made = co_await while_present(next_piece(body, route));
     if (!made || !*made) co_return false;
     const std::optional<std::string>& piece = **made;
     if (!piece) break;
@@ -369,20 +371,19 @@ asio::awaitable<bool> HttpConnection::send_stream(BodyStream& body, bool chunked
   co_return !error;
 }
 
-asio::awaitable<Result<std::optional<std::string>>> HttpConnection::next_piece(BodyStream& body) {
-  std::string failure;
+asio::awaitable<Result<std::optional<std::string>>> HttpConnection::next_piece(BodyStream& body,
+                                                                               const std::string& route) {
+  std::exception_ptr failure;
   try {
     auto piece = co_await body.next();
-    if (piece) co_return piece;
-    failure = piece.error().detail;
-  } catch (const boost::system::system_error& error) {
-    if (error.code() == asio::error::operation_aborted) throw;
-    failure = error.what();
-  } catch (const std::exception& error) {
-    failure = error.what();
+    if (!piece) spdlog::error("{}: the answer was cut short: {}", route, piece.error().detail);
+    co_return piece;
+  } catch (...) {
+    failure = first_of(std::current_exception());
   }
-  spdlog::error("an answer was cut short: {}", failure);
-  co_return fail(ErrorCode::internal, failure);
+  if (is_cancellation(failure)) std::rethrow_exception(failure);
+  live_.tasks.exceptions().note(Ended::request, route + ": the answer was cut short", failure, clock_.steady_us());
+  co_return fail(ErrorCode::internal, text_of(failure));
 }
 
 }  // namespace server

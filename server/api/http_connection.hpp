@@ -62,6 +62,7 @@ class HttpConnection {
   using Parser = boost::beast::http::request_parser<boost::beast::http::string_body>;
   enum class Next : std::uint8_t { another, end };
 
+  boost::asio::awaitable<void> take_turns();
   boost::asio::awaitable<Next> secure();
   boost::asio::awaitable<Next> read_and_answer();
   boost::asio::awaitable<boost::system::error_code> read_body(Parser& parser);
@@ -75,8 +76,8 @@ class HttpConnection {
   template <class T>
   boost::asio::awaitable<std::optional<T>> while_present(boost::asio::awaitable<T> work);
   boost::asio::awaitable<Next> send(Response response, const Message& to);
-  boost::asio::awaitable<bool> send_stream(BodyStream& body, bool chunked);
-  boost::asio::awaitable<Result<std::optional<std::string>>> next_piece(BodyStream& body);
+  boost::asio::awaitable<bool> send_stream(BodyStream& body, bool chunked, std::string route);
+  boost::asio::awaitable<Result<std::optional<std::string>>> next_piece(BodyStream& body, const std::string& route);
   boost::asio::awaitable<void> discard_rest();
 
   bool wants_live(const Message& message) const;

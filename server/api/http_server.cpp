@@ -4,7 +4,6 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 
 #include "server/api/answer_head.hpp"
-#include "server/api/contained.hpp"
 #include "server/api/http_connection.hpp"
 
 namespace server {
@@ -43,7 +42,9 @@ asio::awaitable<void> HttpServer::run() {
 void HttpServer::on_connection(HttpStream stream) {
   auto guest = entrance_.door.admit(address_of(stream), stream.from_loopback());
   if (guest) {
-    tasks_.spawn("http connection", serve(std::move(stream), std::move(*guest)));
+    const std::string which = "http connection of " + stream.peer();
+    tasks_.spawn("http connection", contained(tasks_.exceptions(), clock_, Ended::http_connection, which,
+                                              serve(std::move(stream), std::move(*guest))));
   } else if (entrance_.tls == nullptr) {
     say_why(stream, guest.error());
   }
@@ -53,7 +54,7 @@ asio::awaitable<void> HttpServer::serve(HttpStream stream, std::unique_ptr<Guest
   HttpConnection connection{std::move(stream), *guest, entrance_.tls, clock_, guard_, router_, live_};
   co_await (connection.talk() || connection.watch());
   if (!connection.wants_live()) co_return;
-  co_await contained("page of " + connection.caller().actor,
+  co_await contained(tasks_.exceptions(), clock_, Ended::live_page, "page of " + connection.caller().actor,
                      serve_live(connection.take_stream(), connection.take_upgrade(), connection.caller(), live_));
 }
 

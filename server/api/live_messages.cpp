@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <set>
 
-#include "server/api/contained.hpp"
 #include "server/api/emergency.hpp"
 #include "server/api/http.hpp"
 #include "server/api/json.hpp"
@@ -34,6 +33,11 @@ asio::awaitable<void> renew(LiveParts& parts, CommandRequest request) {
   co_await parts.station.submit(std::move(request));
 }
 
+// What a message begins goes on by itself, and fails alone.
+void spawn(LiveParts& parts, const std::string& name, asio::awaitable<void> task) {
+  parts.tasks.spawn(name, contained(parts.tasks.exceptions(), parts.clock, Ended::request, name, std::move(task)));
+}
+
 Result<RobotId> known_robot(const Members& message, const LiveParts& parts) {
   auto id = message.text("robot_id", 0, 100);
   if (!id) return id;
@@ -49,13 +53,13 @@ Result<void> on_emergency_stop(const Members& message, const Caller& caller, Liv
   // SAFETY: a stop is obeyed also when the message carries members that nobody knows, or a key that is none.
   if (const auto key = message.text("key", 1, 64); key && is_command_key(*key)) request.key = *key;
   if (message.has("robot_id") && message.object().at("robot_id").is_null()) {
-    parts.tasks.spawn("emergency stop", contained("emergency stop", stop_all(parts, std::move(request))));
+    spawn(parts, "emergency stop of all robots", stop_all(parts, std::move(request)));
     return {};
   }
   auto robot_id = known_robot(message, parts);
   if (!robot_id) return std::unexpected{robot_id.error()};
   request.robot_id = std::move(*robot_id);
-  parts.tasks.spawn("emergency stop", contained("emergency stop", stop_one(parts, std::move(request))));
+  spawn(parts, "emergency stop of robot '" + request.robot_id + "'", stop_one(parts, std::move(request)));
   return {};
 }
 
@@ -89,7 +93,7 @@ Result<void> on_renew_lease(const Members& message, const Caller& caller, LivePa
   request.actor = caller.actor;
   request.peer = caller.peer;
   request.life = kRenewalLife - microseconds{age_us};
-  parts.tasks.spawn("lease renewal", contained("lease renewal", renew(parts, std::move(request))));
+  spawn(parts, "lease renewal of robot '" + *robot_id + "'", renew(parts, std::move(request)));
   return {};
 }
 

@@ -53,18 +53,25 @@ class LivePage {
     const auto [error] = co_await socket_.async_accept(upgrade, asio::as_tuple(asio::use_awaitable));
     if (error) co_return;
     parts_.live.add(queue_);  // what changes while the welcome is written is told after it
-    co_await (read() || write() || watch() || caller_.standing->wait_for_end());
+    co_await (part(read()) || part(write()) || part(watch()) || caller_.standing->wait_for_end());
     if (caller_.standing->ended()) spdlog::info("the page of {} was signed out", caller_.actor);
   }
 
  private:
+  // By an exception the page ends: its other parts do not go on without this one.
+  asio::awaitable<void> part(asio::awaitable<void> task) {
+    return contained(parts_.tasks.exceptions(), parts_.clock, Ended::live_page, "page of " + caller_.actor,
+                     std::move(task));
+  }
+
   // The boundary: a message that cannot be acted on ends neither the page nor the station.
   Result<void> act_on(const std::string& text) {
     try {
       if (auto permitted = check_permission(text); !permitted) return permitted;
       return on_page_message(text, caller_, queue_, parts_);
-    } catch (const std::exception& error) {
-      spdlog::error("a message of {}: {}", caller_.actor, error.what());
+    } catch (...) {
+      parts_.tasks.exceptions().note(Ended::request, "a message of " + caller_.actor + " on /live",
+                                     std::current_exception(), parts_.clock.steady_us());
       return fail(ErrorCode::internal, "the station could not act on this message; its log says why", "internal");
     }
   }

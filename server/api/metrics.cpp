@@ -36,6 +36,9 @@ class Metrics {
     line("_sum", "", static_cast<double>(times.sum_us()) / kUsPerS);
     line("_count", "", count);
   }
+  void labelled(std::string_view name, std::string_view label, std::string_view of, std::uint64_t value) {
+    fmt::format_to(std::back_inserter(text_), "rheonaut_{}{{{}=\"{}\"}} {}\n", name, label, of, value);
+  }
   void heading(std::string_view name, std::string_view type, std::string_view meaning) {
     fmt::format_to(std::back_inserter(text_), "# HELP rheonaut_{0} {1}\n# TYPE rheonaut_{0} {2}\n", name, meaning,
                    type);
@@ -69,9 +72,16 @@ void add_security(Metrics& metrics, const TransportSecurity& security) {
   metrics.counter("tls_failed_total", gate->counters().failed, "Handshakes that failed.");
 }
 
+void add_exceptions(Metrics& metrics, const ExceptionLog& exceptions) {
+  constexpr const char* kName = "exceptions_total";
+  metrics.heading(kName, "counter", "What ended by a fault of the station; its log says which.");
+  for (const Ended ended : kAllEnded) metrics.labelled(kName, "where", text(ended), exceptions.count(ended));
+}
+
 }  // namespace
 
-std::string metrics_text(const RecordingParts& recording, const Station& station, const TransportSecurity& security) {
+std::string metrics_text(const RecordingParts& recording, const Station& station, const TransportSecurity& security,
+                         const ExceptionLog& exceptions) {
   const RecorderCounters& counters = recording.recorder.counters();
   const DiskUse& use = recording.disk_watch.use();
   const RetentionCounters& retention = recording.retention.counters();
@@ -103,6 +113,7 @@ std::string metrics_text(const RecordingParts& recording, const Station& station
   metrics.histogram(kStopTimes, "acknowledged", stops.acknowledged);
   metrics.histogram(kStopTimes, "duty_zero_seen", stops.verified);
   add_security(metrics, security);
+  add_exceptions(metrics, exceptions);
   return std::move(metrics).text();
 }
 

@@ -1,4 +1,4 @@
-// The figures of recording and TLS as Prometheus reads them: text format 0.0.4.
+// The figures of recording, TLS and what failed as Prometheus reads them: text format 0.0.4.
 //
 //   # HELP rheonaut_samples_written_total Samples that are durable.
 //   # TYPE rheonaut_samples_written_total counter
@@ -7,12 +7,14 @@
 
 #include <string>
 
+#include "server/exceptions.hpp"
 #include "server/net/transport_security.hpp"
 #include "server/recording/recording_parts.hpp"
 #include "server/station/station.hpp"
 
 namespace server {
 
-std::string metrics_text(const RecordingParts& recording, const Station& station, const TransportSecurity& security);
+std::string metrics_text(const RecordingParts& recording, const Station& station, const TransportSecurity& security,
+                         const ExceptionLog& exceptions);
 
 }  // namespace server

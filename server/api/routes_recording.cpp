@@ -67,7 +67,7 @@ Answer get_recording(ApiParts& parts, Request) {
 Answer get_metrics(ApiParts& parts, Request) {
   Response response;
   response.content_type = "text/plain; version=0.0.4";
-  response.body = metrics_text(parts.recording, parts.station, *parts.facts.security);
+  response.body = metrics_text(parts.recording, parts.station, *parts.facts.security, parts.tasks.exceptions());
   co_return response;
 }
 

@@ -1,10 +1,8 @@
 // Starts a session for each robot that dials in.
 #include "server/link/robot_listener.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
-
-#include <boost/asio/error.hpp>
-#include <boost/system/system_error.hpp>
 
 #include "server/endpoint.hpp"
 
@@ -33,12 +31,18 @@ asio::awaitable<void> RobotListener::run() {
 void RobotListener::accept(StreamSocket socket) {
   if (entrance_.tls == nullptr) return serve(make_stream(std::move(socket), sockets_));
   auto guest = entrance_.door.admit(host_of(socket.peer()), socket.from_loopback());
-  if (guest) tasks_.spawn("robot session", secure_session(std::move(socket), std::move(*guest)));
+  if (!guest) return;
+  const std::string which = "robot session of " + socket.peer();
+  tasks_.spawn("robot session", contained(tasks_.exceptions(), clock_, Ended::robot_session, which,
+                                          secure_session(std::move(socket), std::move(*guest))));
 }
 
 void RobotListener::serve(std::unique_ptr<ByteStream> stream) {
   auto guest = entrance_.door.admit(host_of(stream->peer()), stream->from_loopback());
-  if (guest) tasks_.spawn("robot session", session(std::move(stream), std::move(*guest)));
+  if (!guest) return;
+  const std::string which = "robot session of " + stream->peer();
+  tasks_.spawn("robot session", contained(tasks_.exceptions(), clock_, Ended::robot_session, which,
+                                          session(std::move(stream), std::move(*guest))));
 }
 
 asio::awaitable<void> RobotListener::secure_session(StreamSocket socket, std::unique_ptr<Guest> guest) {
@@ -52,16 +56,11 @@ asio::awaitable<void> RobotListener::session(std::unique_ptr<ByteStream> stream,
   const std::string peer = stream->peer();
   RobotSession session{loop_, clock_, std::move(stream), station_, archive_, buffers_};
   guest->on_end([&session] { session.close("it gave way to another connection"); });
-  try {
-    const bool welcome = co_await session.greet();
-    if (!welcome) co_return log_unwelcome(peer, session.why_unwelcome());
-    guest->becomes(Guest::busy);
-    co_await session.serve();
-  } catch (const boost::system::system_error& error) {
-    if (error.code() != asio::error::operation_aborted) spdlog::warn("robot session {}: {}", peer, error.what());
-  } catch (const std::exception& error) {
-    spdlog::error("robot session {}: {}", peer, error.what());
-  }
+  const bool welcome = co_await session.greet();
+  if (!welcome) co_return log_unwelcome(peer, session.why_unwelcome());
+  guest->becomes(Guest::busy);
+  const std::string which = fmt::format("robot '{}', {}", session.robot_id(), peer);
+  co_await contained(tasks_.exceptions(), clock_, Ended::robot_session, which, session.serve());
 }
 
 void RobotListener::log_unwelcome(const std::string& peer, const std::string& why) {

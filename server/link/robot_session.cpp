@@ -1,11 +1,15 @@
 // Serves one robot's connection.
+// LONG: reading, writing and watching of one connection, which share its state and are understood together.
 #include "server/link/robot_session.hpp"
+
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <cstring>
 #include <utility>
 
+#include "server/exceptions.hpp"
 #include "server/link/frame_faults.hpp"
 
 namespace server {
@@ -17,6 +21,7 @@ namespace {
 constexpr std::int64_t kProbePeriodUs = 1'000'000;
 constexpr std::int64_t kEarlyUs = 20'000;  // a sign of life may leave before it is due, together with something else
 constexpr auto kClosedByRobot = "the robot closed the connection";
+constexpr auto kFault = "a fault of the station; its log says which";
 constexpr std::int64_t kGridUs = 4'000;  // at whose multiples sessions wake, many at once
 
 template <std::size_t size>
@@ -62,6 +67,15 @@ RobotSession::RobotSession(asio::io_context& loop, Clock& clock, std::unique_ptr
       reading_paused_{loop},
       wake_writer_{loop} {}
 
+// Also of one that was never served. What is to be said of its end may fail; the end itself does not.
+RobotSession::~RobotSession() {
+  try {
+    station_.on_disconnected(*this, "the station stops");
+  } catch (const std::exception& error) {
+    spdlog::error("robot '{}': {}", robot_id_, error.what());
+  }
+}
+
 // What has come with the hello waits until the robot is welcome.
 asio::awaitable<bool> RobotSession::greet() {
   const std::int64_t late_us = clock_.steady_us() + microseconds{kHelloTime}.count();
@@ -77,7 +91,7 @@ asio::awaitable<bool> RobotSession::greet() {
 asio::awaitable<void> RobotSession::serve() {
   std::string reason;
   try {
-    const auto ended = co_await (read_frames() || write_frames() || watch_link());
+    const auto ended = co_await (part(read_frames()) || part(write_frames()) || part(watch_link()));
     std::visit([&reason](const EndReason& end) { reason = end; }, ended);
   } catch (const std::exception&) {  // all three were cancelled
     reason = "the station stops";
@@ -85,6 +99,19 @@ asio::awaitable<void> RobotSession::serve() {
   stream_->on_readable(nullptr);
   stream_->close();
   station_.on_disconnected(*this, close_reason_.empty() ? reason : close_reason_);
+  if (failure_) std::rethrow_exception(failure_);
+}
+
+// By an exception the session ends: its other parts do not go on without this one.
+asio::awaitable<RobotSession::EndReason> RobotSession::part(asio::awaitable<EndReason> task) {
+  try {
+    co_return co_await std::move(task);
+  } catch (...) {
+    const std::exception_ptr failure = first_of(std::current_exception());
+    if (is_cancellation(failure)) std::rethrow_exception(failure);
+    failure_ = failure;
+  }
+  co_return kFault;
 }
 
 void RobotSession::read() {
@@ -97,7 +124,7 @@ void RobotSession::read() {
     work_off({buffers_.input.data(), got.size});
     if (got.has_ended && close_reason_.empty()) close_reason_ = kClosedByRobot;
     if (!close_reason_.empty()) reading_paused_.notify();
-  } catch (const std::exception&) {
+  } catch (...) {
     failure_ = std::current_exception();
     reading_paused_.notify();
   }
@@ -212,7 +239,7 @@ asio::awaitable<RobotSession::EndReason> RobotSession::read_frames() {
   stream_->on_readable([this] { read(); });
   tell_what_is_awaited();
   co_await reading_paused_.wait();
-  co_return failure_ ? "the station could not work at what it said" : close_reason_;
+  co_return failure_ ? kFault : close_reason_;
 }
 
 void RobotSession::on_frame(protocol::RobotFrame& frame) {

@@ -34,12 +34,12 @@ class RobotSession final : public RobotPort {
 
   RobotSession(boost::asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
                RobotArchive& archive, ReadBuffers& buffers);
-  ~RobotSession() override { station_.on_disconnected(*this, "the station stops"); }  // also when it was never served
+  ~RobotSession() override;
 
   // Hello to Welcome; false when the robot was refused or said nothing. Then serve() to the end of the connection.
   boost::asio::awaitable<bool> greet();
   const std::string& why_unwelcome() const { return close_reason_; }  // after greet() was false
-  boost::asio::awaitable<void> serve();
+  boost::asio::awaitable<void> serve();  // throws what the connection ended by, if that was an exception
 
   const RobotId& robot_id() const override { return robot_id_; }
   bool send(const protocol::Command& command, std::int64_t deadline_us) override;
@@ -66,6 +66,7 @@ class RobotSession final : public RobotPort {
   protocol::StationFrame welcome(const Admission& admission) const;
   boost::asio::awaitable<bool> refuse(protocol::RefusalReason reason, std::string detail);
 
+  boost::asio::awaitable<EndReason> part(boost::asio::awaitable<EndReason> task);
   boost::asio::awaitable<EndReason> read_frames();
   boost::asio::awaitable<EndReason> write_frames();
   boost::asio::awaitable<EndReason> watch_link();
@@ -86,7 +87,7 @@ class RobotSession final : public RobotPort {
   protocol::FrameReader reader_;
   ReadBuffers& buffers_;
   std::vector<std::uint8_t> after_hello_;  // what came with it
-  std::exception_ptr failure_;             // of reading
+  std::exception_ptr failure_;             // that ended a part of the session
   std::optional<protocol::Hello> hello_;
   std::uint64_t hello_robot_time_us_ = 0;
   RobotId claimed_id_;  // of a well-formed hello, whether the robot is admitted or not

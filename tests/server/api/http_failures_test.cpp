@@ -1,35 +1,15 @@
 // What goes wrong inside: the connection says that it did, the log says what, and the station goes on.
 #include <SQLiteCpp/SQLiteCpp.h>
-#include <spdlog/sinks/ostream_sink.h>
-#include <spdlog/spdlog.h>
-
-#include <sstream>
 
 #include "server/api/http_connection.hpp"
 #include "server/api/http_server.hpp"
-#include "tests/server/api/api_fixture.hpp"
+#include "tests/server/api/live_page.hpp"
+#include "tests/server/captured_log.hpp"
 
 namespace server {
 namespace {
 
 bool says(const std::string& answer, const std::string& part) { return answer.find(part) != std::string::npos; }
-
-// The log of one test.
-class Log {
- public:
-  Log() {
-    spdlog::set_default_logger(
-        std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text_)));
-  }
-  ~Log() { spdlog::set_default_logger(before_); }
-  Log(const Log&) = delete;
-  Log& operator=(const Log&) = delete;
-  std::string text() const { return text_.str(); }
-
- private:
-  std::ostringstream text_;
-  std::shared_ptr<spdlog::logger> before_ = spdlog::default_logger();
-};
 
 class HttpFailuresTest : public ApiTest {
  protected:
@@ -53,7 +33,7 @@ class HttpFailuresTest : public ApiTest {
     database.exec(sql);
   }
 
-  Log log;
+  CapturedLog log;
 };
 
 TEST_F(HttpFailuresTest, ADatabaseThatFailsIsToldWithoutItsWords) {
@@ -65,9 +45,34 @@ TEST_F(HttpFailuresTest, ADatabaseThatFailsIsToldWithoutItsWords) {
   EXPECT_TRUE(says(runs, "\"reason\":\"internal\"") && says(runs, "its log says why")) << runs;
   expect_no_internals(runs);
   EXPECT_TRUE(says(log.text(), "GET /api/v1/runs: ") && says(log.text(), "no such table")) << log.text();
+  EXPECT_TRUE(says(send("GET", "/metrics"), "rheonaut_exceptions_total{where=\"request\"} 1\n"));
   const std::string user = send("POST", "/api/v1/users", R"({"name":"anna","role":"viewer","password":"long enough"})");
   EXPECT_TRUE(user.starts_with("HTTP/1.1 503 ")) << user;
   expect_no_internals(user);
+}
+
+// A sink that fails, as nothing in the station should.
+class Thrower final : public StationSink {
+ public:
+  void on_command(const CommandRecord& record) override {
+    if (record.state == CommandState::acknowledged) throw std::runtime_error{"no room for a command"};
+  }
+};
+
+TEST_F(HttpFailuresTest, AStopThatFailsOnceItIsSentIsLoggedAndThePageGoesOn) {
+  connect_robot();
+  Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
+  Thrower thrower;
+  station.add_sink(thrower);
+  page.say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
+  ASSERT_EQ(robot->commands().size(), 1U);
+  robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_ACCEPTED, 7);
+  clock.settle();
+  EXPECT_TRUE(says(log.text(), "no room for a command")) << log.text();
+  EXPECT_EQ(tasks.exceptions().count(Ended::robot_session), 1U);
+  EXPECT_EQ(station.find("r1")->context.emergency_id, 7U);
+  EXPECT_FALSE(page.closed());
+  EXPECT_EQ(tasks.exit_code(), 0);
 }
 
 TEST_F(HttpFailuresTest, NoRefusalSpeaksOfTheInside) {
@@ -103,9 +108,23 @@ struct NewCredentials {
   Auth auth;
 };
 
-// A server whose only route throws.
+// A body that fails after its first piece.
+class CutStream final : public BodyStream {
+ public:
+  boost::asio::awaitable<Result<std::optional<std::string>>> next() override {
+    if (has_begun_) throw std::runtime_error{"secret"};
+    has_begun_ = true;
+    co_return std::optional<std::string>{"first"};
+  }
+
+ private:
+  bool has_begun_ = false;
+};
+
+// A server whose routes throw.
 TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
   TemporaryFolder folder;
+  const CapturedLog log;
   boost::asio::io_context loop{1};
   VirtualClock clock{loop};
   TaskGroup tasks{loop};
@@ -118,6 +137,11 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
   const RequestGuard guard{credentials.auth, {}};
   Router router;
   router.add({"GET", "/broken", Scope::anyone, {}, [](Request) -> Answer { throw std::runtime_error{"secret"}; }});
+  router.add({"GET", "/cut", Scope::anyone, {}, [](Request) -> Answer {
+                Response response;
+                response.stream = std::make_unique<CutStream>();
+                co_return response;
+              }});
   Entrance entrance{{clock, "http port", DoorLimits{}}, nullptr};
   HttpServer server{tasks, clock, listener, entrance, guard, router, live};
   tasks.spawn("http", server.run());
@@ -128,6 +152,16 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
     EXPECT_TRUE(answer.starts_with("HTTP/1.1 500 ")) << answer;
     EXPECT_FALSE(says(answer, "secret"));
   }
+  EXPECT_TRUE(log.has("GET /broken: secret")) << log.text();
+  EXPECT_EQ(tasks.exceptions().count(Ended::request), 1U);
+  {
+    RawClient client{clock, listener.endpoint().port()};
+    client.send("GET /cut HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    const std::string answer = client.read_to_end();
+    EXPECT_TRUE(says(answer, "first") && !answer.ends_with("0\r\n\r\n")) << answer;
+  }
+  clock.run_for(1s);
+  EXPECT_EQ(tasks.exceptions().count(Ended::request), 2U);
   EXPECT_EQ(tasks.exit_code(), 0);
   tasks.stop();
   clock.settle();
@@ -180,6 +214,7 @@ TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
   EXPECT_EQ(tasks.exit_code(), 0);
   EXPECT_FALSE(tasks.stopping());
   EXPECT_EQ(entrance.door.connections(), 0U);
+  EXPECT_EQ(tasks.exceptions().count(Ended::live_page), 1U);
   tasks.stop();
   clock.settle();
 }
