@@ -4,13 +4,15 @@
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <ctime>
 
 namespace server {
 namespace asio = boost::asio;
 
 std::int64_t SystemClock::steady_us() const {
-  const auto now = std::chrono::steady_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<microseconds>(now).count();
+  timespec now{};
+  clock_gettime(CLOCK_BOOTTIME, &now);  // std::chrono::steady_clock stands still in a suspend
+  return std::int64_t{now.tv_sec} * 1'000'000 + now.tv_nsec / 1000;
 }
 
 std::int64_t SystemClock::utc_us() const {
@@ -19,7 +21,7 @@ std::int64_t SystemClock::utc_us() const {
 }
 
 asio::awaitable<void> SystemClock::sleep_until(std::int64_t deadline_us, Alarm* alarm) {
-  asio::steady_timer timer{loop_, std::chrono::steady_clock::time_point{microseconds{deadline_us}}};
+  asio::steady_timer timer{loop_, microseconds{deadline_us - steady_us()}};
   if (alarm == nullptr) {
     co_await timer.async_wait(asio::use_awaitable);
     co_return;

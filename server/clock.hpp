@@ -12,6 +12,8 @@
 #include <memory>
 #include <vector>
 
+#include "server/loop_watch.hpp"
+
 namespace server {
 
 using std::chrono::microseconds;
@@ -23,8 +25,10 @@ class Clock {
   Clock(const Clock&) = delete;
   Clock& operator=(const Clock&) = delete;
 
-  virtual std::int64_t steady_us() const = 0;  // since an arbitrary start, never goes back
-  virtual std::int64_t utc_us() const = 0;     // since 1970, may step
+  // Since an arbitrary start, never goes back. SAFETY: goes on while the machine is suspended, so that nothing outlives
+  // its time in a sleeping laptop: no command, lease, stamp or link.
+  virtual std::int64_t steady_us() const = 0;
+  virtual std::int64_t utc_us() const = 0;  // since 1970, may step
 
   // What ends a sleep early; of one sleeper.
   class Alarm {
@@ -47,9 +51,15 @@ class Clock {
   virtual boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us, Alarm* alarm) = 0;
 
   boost::asio::awaitable<void> sleep_for(microseconds duration) { return sleep_until(steady_us() + duration.count()); }
+
+  // Whether the loop that runs by this clock has stood still.
+  LoopWatch& watch() { return watch_; }
+
+ private:
+  LoopWatch watch_;
 };
 
-// The clocks of the machine.
+// The clocks of the machine. Who sleeps through a suspend wakes late, by at most what was left to sleep when it began.
 class SystemClock final : public Clock {
  public:
   explicit SystemClock(boost::asio::io_context& loop) : loop_{loop} {}

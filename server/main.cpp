@@ -63,8 +63,8 @@ static int serve(const Config& config) {
   tasks.spawn("announcement", folder.announce(clock, {api.address(), options.robots_address, security.to_trust()}));
   spdlog::info("ready: page {}, robots {}, data {}", api.url(), options.robots_address, config.data_dir.string());
   api.print_login_url();
-  tasks.run(config.real_time);  // returns when every task has ended
-  recording.close();            // every sample that was received is on disk
+  tasks.run(clock, config.real_time);  // returns when every task has ended
+  recording.close();                   // every sample that was received is on disk
   spdlog::info("stopped");
   return tasks.exit_code();
 }

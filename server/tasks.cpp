@@ -7,12 +7,19 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <chrono>
 #include <csignal>
 
 #include "server/real_time.hpp"
 
 namespace server {
 namespace asio = boost::asio;
+
+namespace {
+
+constexpr std::chrono::milliseconds kPulse{50};  // a loop that has nothing to do shows so often that it runs
+
+}  // namespace
 
 void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
   if (stopping_) return;
@@ -24,13 +31,19 @@ void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
   asio::co_spawn(loop_, std::move(task), asio::bind_cancellation_slot(signal->slot(), std::move(on_end)));
 }
 
-void TaskGroup::run(bool in_real_time) {
+void TaskGroup::run(Clock& clock, bool in_real_time) {
   if (in_real_time) {
     const bool is_granted = ask_for_real_time(Priority::loop);
     spdlog::info("the loop runs {}",
                  is_granted ? "with real-time priority" : "without real-time priority: the system does not permit it");
   }
-  loop_.run();
+  while (!loop_.stopped()) {
+    if (loop_.poll_one() == 0) {
+      clock.watch().rest();
+      loop_.run_one_for(kPulse);
+    }
+    clock.watch().turn(clock.steady_us());
+  }
 }
 
 void TaskGroup::ended(const std::string& name, std::exception_ptr failure) {

@@ -21,6 +21,7 @@ struct Request {
   std::map<std::string, std::string> headers;  // names in lower case; repeated ones joined by ", " (cookies by "; ")
   std::string body;
   std::int64_t received_us = 0;  // steady, when all of it had arrived; of a stop, its head
+  microseconds unread{0};        // the loop stood still: it may have waited for so long before it was read
 
   std::string peer;                          // the address it came from, without port
   std::string actor;                         // who asks: caller.actor

@@ -134,10 +134,12 @@ bool HttpConnection::begin_page(const Caller& caller) {
 
 asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
   if (buffer_.size() == 0) {
+    unread_since_us_.reset();
     const auto [error, size] =
         co_await stream_.async_read_some(buffer_.prepare(kReadBytes), asio::as_tuple(asio::use_awaitable));
     if (error) co_return Next::end;
     buffer_.commit(size);
+    note_arrival();
   }
   allow(kRequestTime);
   request_has_begun_ = true;
@@ -157,6 +159,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
     auto refusal = refusal_of(parser);
     if (refusal) co_return co_await send_and_close(std::move(*refusal), parser.release());
     error = co_await read_body(parser);
+    note_arrival();
   }
   request_has_begun_ = false;
   if (error) co_return co_await refuse_unreadable(error);
@@ -164,6 +167,13 @@ asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
   const Next next = co_await carry_out(parser.release());
   if (next == Next::another) guest_.rest();
   co_return next;
+}
+
+// SAFETY: what came while the loop stood still is as old as its last turn before, and so is what came behind it.
+void HttpConnection::note_arrival() {
+  const std::int64_t now_us = clock_.steady_us();
+  const microseconds unread = clock_.watch().unread_for(now_us);
+  if (unread.count() > 0 && !unread_since_us_) unread_since_us_ = now_us - unread.count();
 }
 
 // What the header alone is refused for. The last word has carry_out(), which knows the body.
@@ -206,6 +216,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::carry_out(Message message)
   Request request = plain_head(message);
   request.body = message.body();
   request.received_us = clock_.steady_us();
+  if (unread_since_us_) request.unread = microseconds{request.received_us - *unread_since_us_};
   auto admitted = guard_.admit(request);
   if (!admitted) co_return co_await send(std::move(admitted.error()), message);
   admit(request, std::move(*admitted));

@@ -80,6 +80,7 @@ class HttpConnection {
   boost::asio::awaitable<Result<std::optional<std::string>>> next_piece(BodyStream& body, const std::string& route);
   boost::asio::awaitable<void> discard_rest();
 
+  void note_arrival();
   bool wants_live(const Message& message) const;
   bool begin_page(const Caller& caller);  // false: there are too many of one
   void allow(microseconds duration) { deadline_us_ = clock_.steady_us() + duration.count(); }
@@ -94,6 +95,7 @@ class HttpConnection {
   boost::beast::flat_buffer buffer_{kMaxHeaderBytes + kMaxBodyBytes};
   std::int64_t deadline_us_;
   bool request_has_begun_ = false;
+  std::optional<std::int64_t> unread_since_us_;  // what was read last may have waited so long; empty: it has not
   std::optional<UpgradeRequest> upgrade_;
   std::optional<Counted<std::size_t>> page_;  // among the pages of its caller
   Caller caller_;                             // of the page

@@ -102,9 +102,9 @@ Result<microseconds> age_of_stamp(std::int64_t stamp_us, Clock& clock) {
   return microseconds{age_us};
 }
 
-// How long ago the command was issued, by what its sender says of that.
+// How long ago the command was issued, by what its sender says of that, or else since it arrived.
 Result<void> set_age(CommandRequest& command, const ParsedCommand& parsed, Clock& clock) {
-  std::int64_t age_us = 0;
+  std::int64_t age_us = command.received_us == 0 ? 0 : clock.steady_us() - command.received_us;
   if (parsed.stamp_us) {
     command.life_from = "stamp";
     const auto age = age_of_stamp(*parsed.stamp_us, clock);
@@ -150,12 +150,10 @@ Answer submit_command(ApiParts& parts, Request request) {
   command.life = parsed->life;
   command.key = std::move(*key);
   command.received_us = request.received_us;
+  command.unread = request.unread;
   command.until_verified = wait != request.query.end() && wait->second == "verified";
   if (auto fresh = check_stamp(request.caller, parsed->stamp_us); !fresh) {
     co_return refused(parts, request, "command", fresh.error());
-  }
-  if (auto aged = set_age(command, *parsed, parts.clock); !aged) {
-    co_return refused(parts, request, "command", aged.error());
   }
   if (!command.key.empty()) {
     const CommandId command_id = command_id_of(id, command.actor, command.key);
@@ -167,15 +165,20 @@ Answer submit_command(ApiParts& parts, Request request) {
       }
     }
   }
+  if (auto aged = set_age(command, *parsed, parts.clock); !aged) {
+    co_return refused(parts, request, "command", aged.error());
+  }
   const auto record = co_await parts.station.submit(std::move(command));
   if (!record) co_return problem(record.error());
   co_return command_response(*record);
 }
 
 // What a page must say to begin to control, and may not ask for: it keeps control by signs of life.
-Result<void> check_sight(const Caller& caller, ParsedControl& parsed, Clock& clock) {
+Result<void> check_sight(const Request& request, ParsedControl& parsed, Clock& clock) {
+  const Caller& caller = request.caller;
   ControlRequest& wish = parsed.request;
   if (wish.action != ControlAction::take && wish.action != ControlAction::force) return {};
+  wish.age = request.unread;
   if (auto said = check_stamp(caller, parsed.stamp_us); !said) return said;
   if (caller.session != 0 && wish.life > kControlLife) {
     return fail(ErrorCode::invalid, fmt::format("lease_ms of a page is at most {}", kControlLife.count() / 1000),
@@ -184,7 +187,7 @@ Result<void> check_sight(const Caller& caller, ParsedControl& parsed, Clock& clo
   if (!parsed.stamp_us) return {};
   const auto age = age_of_stamp(*parsed.stamp_us, clock);
   if (!age) return std::unexpected{age.error()};
-  wish.age = *age;
+  wish.age = std::max(wish.age, *age);
   return {};
 }
 
@@ -200,7 +203,7 @@ Answer change_control(ApiParts& parts, Request request) {
     const Error error{ErrorCode::forbidden, "to take control by force needs the role admin", "not_permitted"};
     co_return refused(parts, request, "control", error);
   }
-  if (auto seen = check_sight(request.caller, *parsed, parts.clock); !seen) {
+  if (auto seen = check_sight(request, *parsed, parts.clock); !seen) {
     co_return refused(parts, request, "control", seen.error());
   }
   const auto control = parts.station.control(wish);

@@ -107,6 +107,8 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
     StopRequest stop{request.robot_id, request.actor, request.peer, request.key, request.received_us};
     co_return co_await emergency_stop(std::move(stop), request.life);
   }
+  // SAFETY: what moves, and waited while the station stood still, is as old as that.
+  if (moves_the_motor(request.action)) request.age = std::max(request.age, request.unread);
   Seat& seat = seat_entry->second;
   const microseconds patience = request.life + (request.until_verified ? kSeenPatience : kPatience);
   if (!request.key.empty()) {

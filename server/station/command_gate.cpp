@@ -92,6 +92,8 @@ Result<void> check_values(const protocol::Command& command, const RobotState& ro
   }
 }
 
+}  // namespace
+
 bool moves_the_motor(const protocol::Command& command) {
   switch (command.which_action) {
     case rheonaut_Command_set_mode_tag: return command.action.set_mode.mode == rheonaut_MODE_AUTO;
@@ -103,8 +105,6 @@ bool moves_the_motor(const protocol::Command& command) {
     default: return false;
   }
 }
-
-}  // namespace
 
 bool needs_control(const protocol::Command& command) {
   return command.which_action != rheonaut_Command_ping_tag &&

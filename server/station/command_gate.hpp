@@ -34,6 +34,8 @@ struct Envelope {
   }
 };
 
+bool moves_the_motor(const protocol::Command& command);
+
 // False for what commands nothing: whoever may command at all may send it.
 bool needs_control(const protocol::Command& command);
 

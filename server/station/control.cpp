@@ -27,12 +27,14 @@ const char* text(ControlAction action) {
   return "take";
 }
 
-bool is_of_old_picture(const CommandRequest& request) { return request.life_from == "stamp" && !is_fresh(request.age); }
+bool is_of_old_picture(const CommandRequest& request) {
+  const bool is_of_picture = request.life_from == "stamp" || request.unread.count() > 0;
+  return is_of_picture && !is_fresh(request.age);
+}
 
 std::unexpected<Error> too_old(microseconds age, const char* what) {
   return fail(ErrorCode::conflict,
-              fmt::format("what the page saw is {} ms old; at most {} {}", age / kMs, kOldestSight / kMs, what),
-              "stale");
+              fmt::format("what was seen is {} ms old; at most {} {}", age / kMs, kOldestSight / kMs, what), "stale");
 }
 
 Result<std::optional<Authority::Change>> some(Result<Authority::Change> change) {

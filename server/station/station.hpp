@@ -44,6 +44,7 @@ struct CommandRequest {
   microseconds life{2'000'000};       // at most 10 s, from when it was issued
   microseconds age{0};                // it was issued so long before it arrived
   std::string life_from = "arrival";  // how that is known, see CommandRecord
+  microseconds unread{0};             // the station stood still: it may have waited for so long before it was read
   std::string key;                    // of the client, new for each wish; a wish that comes again is not sent again
   std::int64_t received_us = 0;       // steady, when it arrived at the station; 0: now
   bool until_verified = false;        // wait for more than the robot's answer

@@ -34,7 +34,7 @@ void VirtualClock::settle() {
   for (;;) {
     loop_.restart();
     if (loop_.poll() > 0) continue;
-    if (std::ranges::none_of(workers_, busy)) return;
+    if (std::ranges::none_of(workers_, busy)) return watch().rest();
     loop_.restart();
     loop_.run_one();
   }
@@ -42,6 +42,8 @@ void VirtualClock::settle() {
 
 void VirtualClock::advance_to(std::int64_t steady_us) {
   steady_us_ = std::max(steady_us_, steady_us);
+  watch() = LoopWatch{};  // it was idle
+  watch().turn(steady_us_);
   for (auto& [deadline_us, sleeper] : *sleepers_) {
     if (deadline_us > steady_us_) return;
     *sleeper.due = true;

@@ -32,8 +32,11 @@ class VirtualClock final : public Clock {
   void add_worker(const WorkerThread& worker) { workers_.push_back(&worker); }
   void remove_worker(const WorkerThread& worker) { std::erase(workers_, &worker); }
 
-  // Time passes and nobody is awake: who sleeps wakes after it, once, as on a machine that was halted.
-  void skip(microseconds duration) { steady_us_ += duration.count(); }
+  // Time passes and nobody is awake: who sleeps wakes after it, once, as on a machine that was halted or suspended.
+  void skip(microseconds duration) {
+    watch().turn(steady_us_);
+    steady_us_ += duration.count();
+  }
 
   // Moves UTC, and only UTC, as when somebody sets the machine's clock.
   void step_utc(microseconds by) { utc_offset_us_ += by.count(); }

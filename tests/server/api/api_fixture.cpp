@@ -179,7 +179,7 @@ bool RawClient::send(std::string_view bytes) {
     if (errno != EAGAIN && errno != EWOULDBLOCK) return false;
     pump();
   }
-  pump();
+  if (!is_held) pump();
   return true;
 }
 

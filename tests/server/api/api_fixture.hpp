@@ -95,7 +95,8 @@ class RawClient {
   std::string read_exactly(std::size_t count);      // or less at the end
   bool closed();                                    // the station has closed, and everything was read
 
-  bool reads = true;  // false: it takes nothing any more
+  bool reads = true;     // false: it takes nothing any more
+  bool is_held = false;  // true: what is sent waits in the socket, since the station does not run
 
  private:
   bool pump();  // lets the station run, takes what arrived; false after the end

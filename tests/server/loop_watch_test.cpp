@@ -1,0 +1,57 @@
+// What a loop that stood still makes of what it then reads, and the clock that shows it.
+#include "server/loop_watch.hpp"
+
+#include <gtest/gtest.h>
+
+#include <ctime>
+
+#include "server/clock.hpp"
+
+namespace server {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(LoopWatch, WhatIsReadFirstAfterAStandstillIsAsOldAsTheTurnBefore) {
+  LoopWatch watch;
+  watch.turn(1'000'000);
+  EXPECT_EQ(watch.unread_for(4'000'000), 3s);
+  watch.turn(4'010'000);
+  EXPECT_EQ(watch.unread_for(4'020'000), 3'020ms) << "until all has been read";
+  watch.rest();
+  EXPECT_EQ(watch.unread_for(4'030'000), 0s);
+}
+
+TEST(LoopWatch, ABusyLoopHasNotStoodStill) {
+  LoopWatch watch;
+  EXPECT_EQ(watch.unread_for(1'000'000), 0s) << "the first turn there is";
+  for (int i = 1; i <= 10; ++i) EXPECT_EQ(watch.unread_for(1'000'000 + i * 200'000), 0s);
+  EXPECT_GT(watch.unread_for(3'200'001), 200ms);
+}
+
+TEST(LoopWatch, OfTwoStandstillsTheFirstCountsUntilAllHasBeenRead) {
+  LoopWatch watch;
+  watch.turn(1'000'000);
+  watch.turn(2'000'000);
+  EXPECT_EQ(watch.unread_for(4'000'000), 3s);
+  watch.rest();
+  EXPECT_EQ(watch.unread_for(5'000'000), 1s);
+}
+
+// Where the machine has never been suspended since it was started, both clocks of the system say the same.
+TEST(SystemClock, SteadyTimeGoesOnInASuspend) {
+  boost::asio::io_context loop{1};
+  const SystemClock clock{loop};
+  const auto since_boot_us = [] {
+    timespec now{};
+    clock_gettime(CLOCK_BOOTTIME, &now);
+    return now.tv_sec * 1'000'000 + now.tv_nsec / 1000;
+  };
+  const std::int64_t before_us = since_boot_us();
+  const std::int64_t at_us = clock.steady_us();
+  EXPECT_LE(before_us, at_us);
+  EXPECT_LE(at_us, since_boot_us());
+}
+
+}  // namespace
+}  // namespace server
