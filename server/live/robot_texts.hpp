@@ -5,7 +5,7 @@
 // are away, most of those that a station has seen in years, cost a comparison. Nothing is written that nobody reads. A
 // piece is a bounded piece of work, and each turn of the loop makes one, however many readers there are.
 //
-// Loop thread. The station outlives it; it outlives those who read.
+// Loop thread. The station outlives it; it outlives those who read. Why so: decision 0035.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -4,7 +4,6 @@
 //
 // Says "ready" when the first pages have opened; ends with its standard input, and prints how many opened, and the p50
 // and worst time of one in ms. Exit status 1 when a page is refused, is not told of ROBOTS robots, or none opened.
-#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -12,6 +11,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <iostream>
 #include <stdexcept>
 #include <string>
