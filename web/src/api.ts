@@ -15,12 +15,12 @@ export type Control = Schemas['Control'];
 export type ControlBody = Schemas['ControlBody'];
 export type EventRecord = Schemas['Event'];
 export type RunRecord = Schemas['Run'];
-export type Station = Schemas['Station'] & { fluids?: string[] };
+export type Station = Schemas['Station'];
 export type Me = Schemas['Me'];
 export type User = Schemas['User'];
 export type Token = Schemas['Token'];
 export type PageSession = Schemas['PageSession'];
-export type Enrolment = Schemas['Enrolment'];
+export type Enrolment = Schemas['Enrolment'] & { retired_at_us?: number | null; retired_by?: string };
 export type SamplesMessage = Schemas['LiveSamples'];
 export type LiveMessage = Schemas['LiveServerMessage'];
 export type ClientMessage = Schemas['LiveClientMessage'];
@@ -98,6 +98,16 @@ export class Api {
 
   station = () => this.ask<Station>('GET', '/station');
   open_runs = async () => (await this.ask<{ runs: RunRecord[] }>('GET', '/runs?state=open&limit=1000')).runs;
+  // null: the station has no list; then a fluid belongs to a run alone.
+  fluids = async (): Promise<string[] | null> => {
+    const list = await this.ask<{ fluids: { fluid: string }[] }>('GET', '/fluids').catch((error: unknown) => {
+      if (error instanceof ApiError && error.status === 404) return null;
+      throw error;
+    });
+    return list && list.fluids.map((each) => each.fluid);
+  };
+  set_fluid = (robot_id: string, fluid: string | null) =>
+    this.ask<object>('POST', `/robots/${encodeURIComponent(robot_id)}/fluid`, { fluid });
   newest_run = async (robot_id: string) =>
     (await this.ask<{ runs: RunRecord[] }>('GET', `/runs?robot_id=${encodeURIComponent(robot_id)}&limit=1`)).runs[0] ?? null;
   start_run = (robot_id: string, name: string, fluid: string) =>
@@ -114,6 +124,8 @@ export class Api {
   sessions = async () => (await this.ask<{ sessions: PageSession[] }>('GET', '/sessions')).sessions;
   revoke_session = (session: number) => this.ask<object>('POST', `/sessions/${session}/revoke`);
   enrolments = async () => (await this.ask<{ enrolments: Enrolment[] }>('GET', '/enrolments')).enrolments;
+  retire_robot = (robot_id: string, retired: boolean) =>
+    this.ask<Enrolment>('POST', `/robots/${encodeURIComponent(robot_id)}/retire`, { retired });
   revoke_robot = (robot_id: string) => this.ask<Enrolment>('POST', `/enrolments/${encodeURIComponent(robot_id)}/revoke`);
 
   // True when the station answers that this page may not speak to it.

@@ -1,6 +1,6 @@
 // One robot as the page knows it: its state as the station told it last, and what its samples say.
 
-import { signal, type Signal } from '@preact/signals';
+import { computed, signal, type Signal } from '@preact/signals';
 import type { RobotState, SamplesMessage } from './api';
 import { estimate_of, SampleRing } from './samples';
 
@@ -51,7 +51,18 @@ const kEmptyReadout: Readout = {
 
 export class Robot {
   private made_ring: SampleRing | null = null;
+  readonly robot_id: string;
   readonly state: Signal<RobotState>;
+  // What a list of hundreds depends on: each changes seldom, while the state changes ten times a second.
+  readonly is_away = computed(() => this.state.value.link !== 'connected');
+  // Out of use, and not there: it is listed only where it is asked for, and the stop of all leaves it out.
+  readonly is_left_out = computed(() => this.state.value.retired === true && this.is_away.value);
+  // In an emergency, or with a stop that is on its way.
+  readonly is_alarming = computed(() => {
+    const { mode, emergency_id, pending_stop } = this.state.value;
+    if (this.is_left_out.value) return false;
+    return mode === 'emergency' || emergency_id !== null || (pending_stop !== null && !this.is_away.value);
+  });
   readonly readout = signal<Readout>(kEmptyReadout);
   private latest: SamplesMessage | null = null;
   private sampled_at_ms = -Infinity;
@@ -66,6 +77,7 @@ export class Robot {
   private shown: { state: RobotState; is_current: boolean } | null = null; // of a robot that is not watched
 
   constructor(state: RobotState, now_ms: number) {
+    this.robot_id = state.robot_id;
     this.state = signal(state);
     this.stated_at_ms = now_ms;
     this.note_latch(state.mode, state.link === 'connected', now_ms);
@@ -74,13 +86,6 @@ export class Robot {
   // Made when it is needed: a fleet of hundreds would fill the memory with empty rings.
   get ring(): SampleRing {
     return (this.made_ring ??= new SampleRing());
-  }
-
-  // In an emergency, or with a stop that is on its way. One that is retired and away no longer counts.
-  get is_alarming(): boolean {
-    const { mode, emergency_id, pending_stop, retired, link } = this.state.value;
-    if (retired && link !== 'connected') return false;
-    return mode === 'emergency' || emergency_id !== null || (pending_stop !== null && link === 'connected');
   }
 
   take(state: RobotState, now_ms: number): void {

@@ -1,6 +1,6 @@
 // One running page: the store, the live link, the API and the controls that outlive a view, wired together.
 
-import { computed, effect, signal } from '@preact/signals';
+import { effect, signal } from '@preact/signals';
 import { Api, type Me, type RunRecord, type Station } from './api';
 import { DutyHold } from './duty_hold';
 import { EmergencyStop, kIdleStop } from './emergency';
@@ -9,7 +9,6 @@ import { browser_shelf, ViewSettings } from './settings';
 import { kRefresh_ms, Store } from './store';
 
 const kMaxWatchedAtOnce = 8; // in a larger fleet samples come of the robots that were looked at last
-const kBuiltInFluids = ['non_newtonian', 'water'];
 const kKeepAlive_ms = 1000; // what this page controls stays its own for 3 s
 
 export class Session {
@@ -20,8 +19,7 @@ export class Session {
   readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => Date.now() });
   readonly settings = new ViewSettings(browser_shelf());
   readonly station = signal<Station | null>(null);
-  // That a run may name. A station that lists none takes what is built in.
-  readonly fluids = computed(() => this.station.value?.fluids ?? kBuiltInFluids);
+  readonly fluids = signal<string[] | null>(null); // that a robot may be in; null: the station has no list of them
   readonly me = signal<Me | null>(null);
   readonly shows_access = signal(false); // in place of the plots
   readonly phase = signal<LinkPhase>('connecting');
@@ -116,6 +114,7 @@ export class Session {
     try {
       this.station.value = await this.api.station();
       this.me.value = await this.api.me();
+      this.fluids.value = await this.api.fluids();
       this.store.set_runs(await this.api.open_runs());
       await this.load_newest_run(this.store.selected_id.peek());
     } catch (error) {

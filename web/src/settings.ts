@@ -22,7 +22,9 @@ class KeptSet {
   }
 
   add(...names: string[]): void {
-    this.keep([...[...this.names.peek()].filter((name) => !names.includes(name)), ...names]);
+    const next = new Set(this.names.peek());
+    for (const name of names) next.delete(name); // the newest stand last
+    this.keep([...next, ...new Set(names)]);
   }
 
   remove(...names: string[]): void {

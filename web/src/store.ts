@@ -144,8 +144,7 @@ export class Store {
   stop_evidence(robot_id: string | null, since_ms: number): StopEvidence {
     const found: StopEvidence = { latched: 0, cleared: 0, kept: 0, open: 0 };
     for (const robot of this.robots.peek()) {
-      const state = robot.state.peek();
-      if (robot_id === null ? is_left_out(state) : state.robot_id !== robot_id) continue;
+      if (robot_id === null ? robot.is_left_out.peek() : robot.robot_id !== robot_id) continue;
       found[robot.stop_evidence(since_ms)] += 1;
     }
     return found;
@@ -187,9 +186,6 @@ export class Store {
 // A held duty renews its lease several times a second; of these commands only one that failed is worth a line.
 const is_routine = ({ command }: LogLine) =>
   command?.kind === 'renew_lease' && !['rejected', 'expired', 'failed'].includes(command.state);
-
-// Out of use, and not there: nothing of it is listed unless it is asked for, and the stop of all leaves it out.
-export const is_left_out = ({ retired, link }: RobotState) => retired === true && link !== 'connected';
 
 // Newest first; a command that went on replaces its own line in place; at most kLogLines.
 function merge_log(pending: LogLine[], log: LogLine[]): LogLine[] {

@@ -16,10 +16,8 @@ export function tab_title(alarms: string[], is_cut_off: boolean): string {
 export function alarms_of(session: Session): string[] {
   const hidden = session.settings.hidden_robots.names.value;
   return session.store.robots.value
-    .filter((robot) => robot.is_alarming)
-    .map((robot) => robot.state.value)
-    .filter(({ robot_id, link }) => link === 'connected' || !hidden.has(robot_id))
-    .map(({ robot_id }) => robot_id);
+    .filter((robot) => robot.is_alarming.value && !(robot.is_away.value && hidden.has(robot.robot_id)))
+    .map((robot) => robot.robot_id);
 }
 
 export function show_in_tab(page: Document, session: Session): void {

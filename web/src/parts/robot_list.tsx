@@ -7,22 +7,19 @@ import { useComputed, useSignal } from '@preact/signals';
 import { millimetres, plus_minus } from '../format';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
-import { is_left_out } from '../store';
 
 export function RobotList({ session }: { session: Session }) {
   const { store, settings } = session;
   const edits = useSignal(false);
-  const is_hidden = (robot: Robot) => {
-    const state = robot.state.value;
-    if (state.robot_id === store.selected_id.value) return false;
-    return settings.hidden_robots.names.value.has(state.robot_id) || is_left_out(state);
-  };
+  const is_hidden = (robot: Robot) =>
+    robot.robot_id !== store.selected_id.value &&
+    (settings.hidden_robots.names.value.has(robot.robot_id) || robot.is_left_out.value);
   const shown = useComputed(() => store.robots.value.filter((robot) => edits.value || !is_hidden(robot)));
   const hidden = useComputed(() => store.robots.value.filter(is_hidden).length);
-  const alarms = useComputed(() => store.robots.value.filter((robot) => is_hidden(robot) && robot.is_alarming).length);
+  const alarms = useComputed(() => store.robots.value.filter((robot) => is_hidden(robot) && robot.is_alarming.value).length);
   const hide_away = () => {
-    const away = store.robots.peek().map((robot) => robot.state.peek()).filter((state) => state.link !== 'connected');
-    settings.hidden_robots.add(...away.map((state) => state.robot_id));
+    const away = store.robots.peek().filter((robot) => robot.is_away.peek());
+    settings.hidden_robots.add(...away.map((robot) => robot.robot_id));
   };
   const button_text = edits.value ? 'Done' : hidden.value > 0 ? `${hidden.value} hidden` : 'Hide…';
   return (
@@ -43,9 +40,9 @@ export function RobotList({ session }: { session: Session }) {
       )}
       <ul>
         {shown.value.map((robot) => (
-          <li key={robot.state.peek().robot_id}>
+          <li key={robot.robot_id}>
             <RobotEntry session={session} robot={robot} />
-            {edits.value && <HideButton session={session} robot_id={robot.state.peek().robot_id} />}
+            {edits.value && <HideButton session={session} robot_id={robot.robot_id} />}
           </li>
         ))}
       </ul>

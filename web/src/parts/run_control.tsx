@@ -1,8 +1,9 @@
 // A run: the name and fluid that a stretch of the recording is known by. Recording itself never stops.
 
 import { useSignal } from '@preact/signals';
+import { useEffect } from 'preact/hooks';
 import type { RunRecord } from '../api';
-import { clock_time, duration } from '../format';
+import { clock_time, duration, words } from '../format';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
 import { Choice } from './choice';
@@ -17,6 +18,8 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
 
   const start = (name: string, fluid: string) =>
     asking.ask('Run', async () => store.take_run(await session.api.start_run(robot_id, name, fluid)));
+  const set_fluid = (fluid: string) =>
+    asking.ask('Fluid of the robot', () => session.api.set_fluid(robot_id, fluid === '' ? null : fluid));
   const end = (run_id: number) => asking.ask('End of run', async () => store.take_run(await session.api.end_run(run_id)));
 
   return (
@@ -31,6 +34,7 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
         <div class="pair">
           <p class="run-name">
             “{run.name}” <RunTime session={session} started_at_us={run.started_at_us} />
+            {run.fluid && <span class="quiet"> in {fluid_text(run.fluid)}</span>}
           </p>
           <button type="button" id="end-run" disabled={asking.pending} onClick={() => void end(run.run_id)}>
             End run
@@ -38,7 +42,8 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
         </div>
       ) : (
         <RunForm session={session} robot={robot} disabled={link !== 'connected' || asking.pending}
-                 on_start={(name, fluid) => (name === '' ? asking.fail('Give the run a name.') : void start(name, fluid))} />
+                 on_start={(name, fluid) => (name === '' ? asking.fail('Give the run a name.') : void start(name, fluid))}
+                 on_fluid={set_fluid} />
       )}
       <OutcomeLine asking={asking} />
     </fieldset>
@@ -50,14 +55,23 @@ interface RunFormProps {
   robot: Robot;
   disabled: boolean;
   on_start(name: string, fluid: string): void;
+  on_fluid(fluid: string): Promise<boolean>; // it belongs to the robot
 }
 
-function RunForm({ session, robot, disabled, on_start }: RunFormProps) {
+function RunForm({ session, robot, disabled, on_start, on_fluid }: RunFormProps) {
   const name = useSignal('');
-  const picked = useSignal<string | null>(null); // null: not touched yet
-  const fluids = session.fluids.value;
-  const fluid = picked.value ?? robot.state.value.fluid ?? '';
-  const options = [...fluids.map((each) => ({ value: each, text: fluid_text(each) })), { value: '', text: 'fluid not known' }];
+  const picked = useSignal<string | null>(null); // null: what the robot is in
+  const listed = session.fluids.value;
+  const known = robot.state.value.fluid ?? '';
+  const fluid = picked.value ?? known;
+  const names = [...new Set([...(listed ?? kBuiltInFluids), known])].filter((name) => name !== '');
+  const options = [...names.map((name) => ({ value: name, text: fluid_text(name) })), { value: '', text: 'fluid not known' }];
+  const pick = (next: string) => {
+    picked.value = next;
+    if (listed) void on_fluid(next).then((taken) => taken || (picked.value = null));
+  };
+  // Whoever named another one since: the robot is in that.
+  useEffect(() => void (picked.value = null), [known]);
   return (
     <form
       class="run-form"
@@ -69,7 +83,7 @@ function RunForm({ session, robot, disabled, on_start }: RunFormProps) {
       {/* A browser offers earlier entries in a native list, which would keep the first Escape for itself. */}
       <input aria-label="Name of the run" id="run-name" placeholder="Name" autoComplete="off" maxLength={200} value={name.value}
              onInput={(event) => (name.value = event.currentTarget.value)} />
-      <Choice id="run-fluid" label="Fluid" options={options} value={fluid} on_choose={(next) => (picked.value = next)} />
+      <Choice id="run-fluid" label="Fluid" options={options} value={fluid} on_choose={pick} />
       <button type="submit" id="start-run" disabled={disabled}>
         Start run
       </button>
@@ -97,8 +111,8 @@ function Interrupted({ session, robot_id }: { session: Session; robot_id: string
 const lost = (run: RunRecord) =>
   run.samples_lost > 0 ? `${run.samples_lost} of its samples are lost.` : 'Its samples until then are kept.';
 
-const kKnownFluids: Record<string, string> = { non_newtonian: 'non-Newtonian' };
-const fluid_text = (fluid: string) => kKnownFluids[fluid] ?? fluid;
+const kBuiltInFluids = ['non_newtonian', 'water'];
+const fluid_text = (fluid: string) => (fluid === 'non_newtonian' ? 'non-Newtonian' : words(fluid));
 
 function RunTime({ session, started_at_us }: { session: Session; started_at_us: number }) {
   void session.store.now_ms.value; // ten times a second

@@ -67,12 +67,25 @@ export function Access({ session }: { session: Session }) {
       <List title="Robots" empty={lists.value && robots.length === 0 ? 'None. Enrol one with: rheonaut robot enroll' : ''}>
         {robots.map((each) => (
           <Row key={each.robot_id} id={`robot-${each.robot_id}`} name={each.robot_id}
-               note={each.revoked_at_us === null ? `${each.has_token ? 'with a token' : 'without a token, from this machine only'}, enrolled by ${each.enrolled_by}` : `revoked ${when(each.revoked_at_us)} by ${each.revoked_by}`}
-               action={each.revoked_at_us === null ? 'Hold to revoke' : ''} on_end={() => end(() => api.revoke_robot(each.robot_id))} />
+               note={note_of(each)}
+               action={each.revoked_at_us === null ? 'Hold to revoke' : ''} on_end={() => end(() => api.revoke_robot(each.robot_id))}>
+            {each.retired_at_us !== undefined && (
+              <GuardedButton id={`retire-${each.robot_id}`} on_held={() => end(() => api.retire_robot(each.robot_id, each.retired_at_us === null))}>
+                {each.retired_at_us === null ? 'Hold to retire' : 'Hold to put back'}
+              </GuardedButton>
+            )}
+          </Row>
         ))}
       </List>
     </div>
   );
+}
+
+// Retired: the stop of all leaves it out while it is not connected; its recording stays.
+function note_of(robot: Enrolment): string {
+  const retired = robot.retired_at_us ? `; retired ${when(robot.retired_at_us)} by ${robot.retired_by}` : '';
+  if (robot.revoked_at_us !== null) return `revoked ${when(robot.revoked_at_us)} by ${robot.revoked_by}${retired}`;
+  return `${robot.has_token ? 'with a token' : 'without a token, from this machine only'}, enrolled by ${robot.enrolled_by}${retired}`;
 }
 
 function List({ title, empty, children }: { title: string; empty: string | false | null; children: ComponentChildren }) {
@@ -91,18 +104,22 @@ interface RowProps {
   title?: string;
   action: string; // "": there is none
   on_end(): void;
+  children?: ComponentChildren;
 }
 
-function Row({ id, name, note, title, action, on_end }: RowProps) {
+function Row({ id, name, note, title, action, on_end, children }: RowProps) {
   return (
     <li id={id} title={title}>
       <b>{name}</b>
       <span class="quiet">{note}</span>
-      {action && (
-        <GuardedButton id={`end-${id}`} disabled={false} on_held={on_end}>
-          {action}
-        </GuardedButton>
-      )}
+      <span class="ways">
+        {children}
+        {action && (
+          <GuardedButton id={`end-${id}`} on_held={on_end}>
+            {action}
+          </GuardedButton>
+        )}
+      </span>
     </li>
   );
 }
