@@ -10,6 +10,7 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -167,6 +168,29 @@ void read_limits(ConfigFile& file, const std::string& section, CommandLimits& li
                                           limits.setpoint_min_m, limits.setpoint_max_m)};
 }
 
+std::string name_of_fluid(ConfigFile& file, const char* section, const std::string& key) {
+  std::string name = fluid_name(key);
+  if (!name.empty()) return name;
+  file.fail(*file.find(section, key.c_str()), section, key.c_str(),
+            "must have a fluid's name of 1 to 40 bytes without control characters");
+}
+
+// Each [limits.NAME] and [fluids.NAME] lists a fluid.
+void read_envelope(ConfigFile& file, Envelope& envelope) {
+  CommandLimits anywhere;
+  read_limits(file, "limits", anywhere);
+  std::map<std::string, CommandLimits> of_fluid;
+  for (const std::string& key : file.tables_in("limits")) {
+    CommandLimits own = anywhere;  // what it does not say
+    read_limits(file, "limits." + key, own);
+    if (of_fluid.emplace(name_of_fluid(file, "limits", key), own).second) continue;
+    file.fail(*file.find("limits", key.c_str()), "limits", key.c_str(), "names a fluid that another section has named");
+  }
+  for (const std::string& key : file.tables_in("fluids"))
+    of_fluid.emplace(name_of_fluid(file, "fluids", key), anywhere);
+  envelope = Envelope{anywhere, std::move(of_fluid)};
+}
+
 void read_places(ConfigFile& file, const char* section, PortPlaces& places) {
   file.take_count(section, "max_connections", 16, 32'768, places.connections);
   file.take_count(section, "max_connections_per_address", 1, 32'768, places.of_address);
@@ -184,12 +208,7 @@ void read(ConfigFile& file, Config& config) {
   file.take_count("robots", "link_timeout_ms", 200, 5000, config.link.link_timeout_ms);
   file.take_count("robots", "heartbeat_interval_ms", 50, 2500, config.link.heartbeat_interval_ms);
   file.take_count("robots", "samples_per_frame", 0, protocol::kMaxSamplesPerFrame, config.link.samples_per_frame);
-  read_limits(file, "limits", config.envelope.anywhere);
-  for (const std::string& fluid : file.tables_in("limits")) {
-    CommandLimits& own = config.envelope.of_fluid[fluid];
-    own = config.envelope.anywhere;  // what it does not say
-    read_limits(file, "limits." + fluid, own);
-  }
+  read_envelope(file, config.envelope);
   RecordingConfig& recording = config.recording;
   file.take_count("recording", "retention_days", 0, 36'500, recording.retention_days);
   file.take_count("recording", "max_database_mb", 0, 100'000'000, recording.max_database_mb);

@@ -59,7 +59,8 @@ struct Config {
   PortPlaces robot_places{8192, 1024};  // robots.max_connections, .max_connections_per_address
   LinkTimes link;                       // robots.link_timeout_ms, .heartbeat_interval_ms, .samples_per_frame
 
-  Envelope envelope;  // limits.setpoint_min_m, .setpoint_max_m, …; of a fluid: limits.FLUID.setpoint_min_m, …
+  // limits.setpoint_min_m, .setpoint_max_m, …; of a fluid: limits.FLUID.setpoint_min_m, …; fluids.FLUID lists one, too
+  Envelope envelope{};
 
   RecordingConfig recording;
 

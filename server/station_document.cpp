@@ -4,9 +4,8 @@
 #include <nlohmann/json.hpp>
 
 namespace server {
-namespace {
 
-nlohmann::json json_of(const CommandLimits& limits) {
+nlohmann::json limits_json(const CommandLimits& limits) {
   return {{"setpoint_min_m", limits.setpoint_min_m},
           {"setpoint_max_m", limits.setpoint_max_m},
           {"setpoint_step_m", limits.setpoint_step_m},
@@ -17,13 +16,13 @@ nlohmann::json json_of(const CommandLimits& limits) {
           {"disturbance_max_m", limits.disturbance_max_m}};
 }
 
-}  // namespace
-
 std::string station_document(const Config& config) {
   nlohmann::json out;
   out["version"] = RHEONAUT_VERSION;
-  out["limits"] = json_of(config.envelope.anywhere);
-  for (const auto& [fluid, limits] : config.envelope.of_fluid) out["limits_of_fluid"][fluid] = json_of(limits);
+  const Envelope& envelope = config.envelope;
+  out["limits"] = limits_json(envelope.anywhere());
+  for (const auto& [fluid, limits] : envelope.of_fluid()) out["limits_of_fluid"][fluid] = limits_json(limits);
+  out["limits_where_fluid_unknown"] = limits_json(envelope.strictest());
   out["robots"] = {{"link_timeout_ms", config.link.link_timeout_ms},
                    {"heartbeat_interval_ms", config.link.heartbeat_interval_ms},
                    {"samples_per_frame", config.link.samples_per_frame}};

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "server/cli/command_line.hpp"
@@ -41,10 +42,13 @@ int run(const CheckConfig& wish, std::ostream& out) {
                title, limits.setpoint_min_m, limits.setpoint_max_m, limits.setpoint_step_m, limits.duty_min,
                limits.duty_max, limits.power_duty, limits.power_s, limits.disturbance_max_m);
   };
-  print_limits("limits   ", config.envelope.anywhere);
-  for (const auto& [fluid, limits] : config.envelope.of_fluid) {
-    print_limits(fmt::format("         in {}: ", one_line(fluid)), limits);
+  print_limits("limits   ", config.envelope.anywhere());
+  for (const auto& [fluid, limits] : config.envelope.of_fluid()) {
+    const bool is_built_in = std::ranges::find(Envelope::kBuiltInFluids, fluid) != Envelope::kBuiltInFluids.end();
+    print_limits(fmt::format("fluid    {}{}: ", one_line(fluid), is_built_in ? "" : " (of this configuration)"),
+                 limits);
   }
+  print_limits("fluid    not known: ", config.envelope.strictest());
   print_recording(config.recording, out);
   fmt::print(out, "the configuration is valid\n");
   return 0;

@@ -60,7 +60,7 @@ std::vector<RestoredRobot> BootStore::robots() {
   std::vector<RestoredRobot> robots;
   SQLite::Statement query{
       database_.handle(),
-      "SELECT robot.robot_id, boot_id, coalesce(retired_at_us, 0) FROM robot LEFT JOIN boot ON boot_key ="
+      "SELECT robot.robot_id, boot_id, coalesce(retired_at_us, 0), fluid FROM robot LEFT JOIN boot ON boot_key ="
       " (SELECT max(boot_key) FROM boot WHERE boot.robot_id = robot.robot_id)"
       " ORDER BY robot.robot_id"};
   while (query.executeStep()) {
@@ -68,7 +68,8 @@ std::vector<RestoredRobot> BootStore::robots() {
     robots.push_back({.id = robot_id,
                       .boot_id = unsigned_id(query.getColumn(1)),
                       .emergency_id = latch_of(robot_id),
-                      .retired_at_us = query.getColumn(2).getInt64()});
+                      .retired_at_us = query.getColumn(2).getInt64(),
+                      .fluid = query.getColumn(3).getString()});
   }
   return robots;
 }
@@ -288,6 +289,11 @@ void BootStore::start(const BootStart& start) {
       " last_robot_time_us = max(last_robot_time_us, ?) WHERE boot_key = ?"};
   execute(update, start.noticed_at_us, start.announced_next_seq, start.announced_next_event_seq, start.robot_time_us,
           start.boot_key);
+}
+
+void BootStore::set_fluid(const RobotId& robot_id, const std::string& fluid) {
+  SQLite::Statement update{database_.handle(), "UPDATE robot SET fluid = ? WHERE robot_id = ?"};
+  execute(update, fluid, robot_id);
 }
 
 void BootStore::end(std::int64_t boot_key, std::int64_t noticed_at_us) {

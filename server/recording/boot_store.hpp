@@ -88,6 +88,9 @@ class BootStore {
   // Inside the caller's transaction: these boots are known from now on.
   void add(const std::vector<NewBoot>& boots);
 
+  // Inside the caller's transaction: the fluid that the robot is in; empty: not known.
+  void set_fluid(const RobotId& robot_id, const std::string& fluid);
+
   // Inside the caller's transaction: ends the robot's other boots (what is missing of them is lost: `reboot`, or
   // `restore` if they have not been heard since), and lets its open run go on in this one.
   void start(const BootStart& start);

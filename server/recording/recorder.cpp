@@ -234,6 +234,12 @@ void Recorder::on_unusable_event(const RobotState& robot, std::uint64_t event_se
   watch(*entry);
 }
 
+// SAFETY: whatever waits, since its limits must hold after a restart. One entry for each robot at most.
+void Recorder::on_fluid(const RobotState& robot) {
+  queue_.fluids[robot.id] = robot.fluid;
+  wake();
+}
+
 void Recorder::on_event(const RobotState&, const RobotEvent& event) {
   const auto found = boots_.find(event.boot_id);
   const bool known = found != boots_.end() && found->second.started && !found->second.replaced;

@@ -115,6 +115,7 @@ class Recorder final : public StationSink, public RobotArchive {
   void set_revoked(const RobotId& robot_id, bool revoked);
 
   void on_robot(const RobotState& robot) override;
+  void on_fluid(const RobotState& robot) override;
   void on_samples(const RobotState& robot, const SampleBatch& batch) override;
   void on_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) override;
   void on_unusable_event(const RobotState& robot, std::uint64_t event_seq) override;

@@ -38,6 +38,7 @@ RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThrea
 void RecordingParts::connect(Station& station) {
   station.add_sink(recorder);
   station.add_sink(runs);
+  runs.set_envelope(station.envelope());
   runs.set_on_fluid(std::bind_front(&Station::set_fluid, &station));
   recorder.set_on_durable(std::bind_front(&Station::on_durable, &station));
   recorder.set_on_missing(std::bind_front(&Station::request_resend, &station));

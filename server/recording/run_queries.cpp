@@ -143,7 +143,7 @@ std::vector<Run> list_runs(SQLite::Database& database, const BootHeads& heads, c
 std::vector<InterruptedRun> read_interrupted(SQLite::Database& database, const std::vector<RunId>& ids) {
   SQLite::Statement row{
       database,
-      "SELECT robot_id, name, iif(EXISTS (SELECT 1 FROM run_span WHERE run_id = ?1), ended_at_us, NULL)"
+      "SELECT robot_id, name, iif(EXISTS (SELECT 1 FROM run_span WHERE run_id = ?1), ended_at_us, NULL), fluid"
       " FROM run WHERE run_id = ?1"};
   std::vector<InterruptedRun> runs;
   for (const RunId id : ids) {
@@ -152,6 +152,7 @@ std::vector<InterruptedRun> read_interrupted(SQLite::Database& database, const s
     InterruptedRun run{.id = id,
                        .robot_id = row.getColumn(0).getString(),
                        .name = row.getColumn(1).getString(),
+                       .fluid = row.getColumn(3).getString(),
                        .last_sample_at_us = {}};
     if (!row.getColumn(2).isNull()) run.last_sample_at_us = row.getColumn(2).getInt64();
     runs.push_back(std::move(run));

@@ -28,6 +28,7 @@ struct InterruptedRun {
   RunId id = 0;
   RobotId robot_id;
   std::string name;
+  std::string fluid;
   std::optional<std::int64_t> last_sample_at_us;  // UTC; empty: it has no sample
 };
 

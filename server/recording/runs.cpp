@@ -62,7 +62,17 @@ auto or_problem(Job job) {
   };
 }
 
-void report_interrupted(const Result<std::vector<InterruptedRun>>& interrupted) {
+// SAFETY: its text stays as it was written, and says nothing of limits: those of the robot's own fluid hold, or if that
+// is not known the strictest.
+void report_fluid(const InterruptedRun& run, const Envelope& envelope) {
+  if (run.fluid.empty() || envelope.listed(run.fluid)) return;
+  spdlog::warn(
+      "run {} of robot '{}' was open in the fluid '{}', which the configuration does not list: unless the fluid of the "
+      "robot is known otherwise, the strictest limits of all fluids hold for it until its fluid is named",
+      run.id, run.robot_id, run.fluid);
+}
+
+void report_interrupted(const Result<std::vector<InterruptedRun>>& interrupted, const Envelope& envelope) {
   if (!interrupted) {
     spdlog::warn("runs that were open cannot be interrupted now: {}; tried again", interrupted.error().detail);
     return;
@@ -74,6 +84,7 @@ void report_interrupted(const Result<std::vector<InterruptedRun>>& interrupted) 
                                   : "without a sample";
     spdlog::warn("run {} '{}' of robot '{}' was open when the station stopped: it is interrupted {}", run.id, run.name,
                  run.robot_id, end);
+    report_fluid(run, envelope);
   }
 }
 
@@ -105,7 +116,7 @@ asio::awaitable<void> Runs::load() {
   auto by_stop = or_problem([](Database& database) {
     return read_interrupted(database.handle(), interrupted_since_start(database.handle()));
   });
-  report_interrupted(co_await recorder_.on_disk(std::move(by_stop)));
+  report_interrupted(co_await recorder_.on_disk(std::move(by_stop)), envelope_);
   co_await interrupt_open();
 }
 
@@ -115,7 +126,7 @@ asio::awaitable<void> Runs::interrupt_open() {
   });
   const auto interrupted = co_await recorder_.on_disk(std::move(by_kill));
   is_loaded_ = interrupted.has_value();
-  report_interrupted(interrupted);
+  report_interrupted(interrupted, envelope_);
 }
 
 asio::awaitable<void> Runs::finish_loading() {
@@ -125,8 +136,17 @@ asio::awaitable<void> Runs::finish_loading() {
   }
 }
 
+// Makes of it the name as it is listed.
+Result<void> Runs::check_fluid(std::string& fluid) const {
+  Result<std::string> listed = envelope_.listed(fluid);
+  if (!listed) return std::unexpected{listed.error()};
+  fluid = std::move(*listed);
+  return {};
+}
+
 asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions conditions, Author by) {
-  const Result<void> valid = check(conditions);
+  Result<void> valid = check(conditions);
+  if (valid) valid = check_fluid(conditions.fluid);
   if (!valid) co_return std::unexpected{valid.error()};
   const auto found = robots_.find(robot_id);
   if (found == robots_.end() || !found->second.connected) {
@@ -138,6 +158,12 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
   }
   if (!is_loaded_) co_return std::unexpected{disk_fails()};
   const Robot& robot = found->second;
+  by.at_us = clock_.utc_us();
+  if (conditions.fluid.empty()) {
+    conditions.fluid = robot.fluid;
+  } else if (const auto named = on_fluid_(robot_id, conditions.fluid, by); !named) {
+    co_return std::unexpected{named.error()};
+  }
   Run run;
   run.robot_id = robot_id;
   run.made_by = by.actor;
@@ -146,7 +172,7 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
   run.controller_id = robot.controller_id;
   run.controller_checksum = robot.controller_checksum;
   run.parameters_checksum = robot.parameters_checksum;
-  run.started_at_us = by.at_us = clock_.utc_us();
+  run.started_at_us = by.at_us;
   run.spans.push_back({.boot_id = robot.boot_id, .first_seq = recorder_.next_seq(robot.boot_id), .last_seq = {}});
 
   struct Creating {  // no second run of this robot meanwhile; forgotten unless the run was made
@@ -167,7 +193,6 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
   const Result<RunId> id = co_await recorder_.on_disk(std::move(job));
   if (!id) co_return std::unexpected{id.error()};
   open_runs_[robot_id] = *id;
-  on_fluid_(robot_id, run.conditions.fluid);
   run.id = *id;
   co_return run;
 }
@@ -202,11 +227,7 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, Author by)
     const Ending ending{ending_, id};
     co_await recorder_.on_disk(std::move(job));
   }
-  std::erase_if(open_runs_, [this, id](const auto& entry) {
-    if (entry.second != id) return false;
-    on_fluid_(entry.first, "");
-    return true;
-  });
+  std::erase_if(open_runs_, [id](const auto& entry) { return entry.second == id; });
 
   const std::int64_t deadline_us = clock_.steady_us() + kEndPatience.count();
   for (;;) {
@@ -223,7 +244,8 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, Author by)
 
 asio::awaitable<Result<Run>> Runs::make_afterwards(RobotId robot_id, RunConditions conditions, RecordedRange range,
                                                    Author by) {
-  const Result<void> valid = check(conditions);
+  Result<void> valid = check(conditions);
+  if (valid) valid = check_fluid(conditions.fluid);
   if (!valid) co_return std::unexpected{valid.error()};
   if (const auto* time = std::get_if<TimeSpan>(&range)) {
     if (time->from_us > time->to_us) co_return fail(ErrorCode::invalid, "from_us is later than to_us", "out_of_range");
@@ -266,17 +288,19 @@ asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, 
   for (const auto& [field, value] : annotation.texts) {
     if (outcome && value.size() > kMaxTextBytes) outcome = std::unexpected{text_too_long()};
   }
+  by.at_us = clock_.utc_us();
+  if (const auto fluid = annotation.texts.find("fluid"); outcome && fluid != annotation.texts.end()) {
+    outcome = check_fluid(fluid->second);
+    const auto open = std::ranges::find(open_runs_, id, [](const auto& entry) { return entry.second; });
+    const bool is_of_robot = open != open_runs_.end() && id != 0 && !fluid->second.empty();
+    if (outcome && is_of_robot) outcome = on_fluid_(open->first, fluid->second, by);
+  }
   if (!outcome) co_return std::unexpected{outcome.error()};
   const bool flushed = co_await recorder_.flush_records();
   if (!flushed) co_return std::unexpected{disk_fails()};
-  by.at_us = clock_.utc_us();
   auto job = [id, annotation, by](Database& database) { return RunStore{database, {}}.annotate(id, annotation, by); };
   outcome = co_await recorder_.on_disk(std::move(job));
-  auto run = co_await changed(id, std::move(outcome));
-  if (run && open_runs_.contains(run->robot_id) && open_runs_.at(run->robot_id) == id) {
-    on_fluid_(run->robot_id, run->conditions.fluid);
-  }
-  co_return run;
+  co_return co_await changed(id, std::move(outcome));
 }
 
 asio::awaitable<Result<Run>> Runs::discard(RunId id, std::string reason, Author by) {
@@ -342,7 +366,8 @@ void Runs::on_robot(const RobotState& state) {
                        .firmware_version = state.firmware_version,
                        .controller_id = state.context.controller_id,
                        .controller_checksum = state.controller_checksum,
-                       .parameters_checksum = state.parameters_checksum};
+                       .parameters_checksum = state.parameters_checksum,
+                       .fluid = state.fluid};
 }
 
 }  // namespace server

@@ -18,6 +18,7 @@
 #include "server/audit_note.hpp"
 #include "server/clock.hpp"
 #include "server/result.hpp"
+#include "server/station/envelope.hpp"
 #include "server/station/station_sink.hpp"
 
 namespace server {
@@ -41,7 +42,7 @@ std::optional<RunState> run_state_from(const std::string& text);
 // What the experimenter says of a run; all optional but the name.
 struct RunConditions {
   std::string name;
-  std::string fluid;  // e.g. "non_newtonian", "water"
+  std::string fluid;  // as Envelope lists it, or as it was written before there was a list; empty: not known
   std::string pump_profile;
   std::optional<double> mean_flow_m_s;
   std::string tube;
@@ -132,7 +133,9 @@ class Runs final : public StationSink {
   bool any_open() const { return !open_runs_.empty(); }
 
   // Of an author the time is not looked at: it is now. create and end: unavailable while the disk cannot be written.
-  // conflict when the robot has an open run, not_connected when it is not there, invalid for a bad name.
+  // conflict when the robot has an open run, or somebody else is in control of it and the run names another fluid than
+  // it is in; not_connected when it is not there, invalid for a bad name or fluid. A run that names none is in the
+  // fluid that its robot is in.
   boost::asio::awaitable<Result<Run>> create(RobotId robot_id, RunConditions conditions, Author by = {});
 
   // A run of what was recorded already; it has ended. Its robot need not be there. invalid for a range without samples
@@ -151,8 +154,10 @@ class Runs final : public StationSink {
   void set_station_document(std::string json) { station_document_ = std::move(json); }
   boost::asio::awaitable<Result<RunSnapshot>> snapshot(RunId id);
 
-  // Hears which fluid a robot swims in, by its open run; empty: none is open, or it does not say.
-  using OnFluid = std::function<void(const RobotId& robot_id, const std::string& fluid)>;
+  // The fluids that runs may name. Others are refused as invalid; before this call those that are built in.
+  void set_envelope(Envelope envelope) { envelope_ = std::move(envelope); }
+  // An open run that names a fluid says by it that its robot is in this fluid. What is refused here refuses the run.
+  using OnFluid = std::function<Result<void>(const RobotId& robot_id, const std::string& fluid, const Author& by)>;
   void set_on_fluid(OnFluid on_fluid) { on_fluid_ = std::move(on_fluid); }
 
   // Ends the run with the latest sample received. Answers when that sample is durable or known lost, at most 3 s later.
@@ -173,9 +178,11 @@ class Runs final : public StationSink {
     std::uint32_t controller_id = 0;
     std::uint32_t controller_checksum = 0;
     std::uint32_t parameters_checksum = 0;
+    std::string fluid;
   };
 
   boost::asio::awaitable<void> interrupt_open();
+  Result<void> check_fluid(std::string& fluid) const;
   boost::asio::awaitable<Result<RecordedSamples>> samples_in(RobotId robot_id, RecordedRange range);
   boost::asio::awaitable<Result<Run>> changed(RunId id, Result<void> outcome);
 
@@ -191,7 +198,8 @@ class Runs final : public StationSink {
   std::map<RobotId, RunId> open_runs_;  // 0: being created
   bool is_loaded_ = false;
   std::string station_document_;
-  OnFluid on_fluid_ = [](const RobotId&, const std::string&) {};
+  Envelope envelope_;
+  OnFluid on_fluid_ = [](const RobotId&, const std::string&, const Author&) { return Result<void>{}; };
   std::set<RunId> ending_;  // of these, the ones whose end is being stored
 };
 

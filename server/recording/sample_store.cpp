@@ -32,7 +32,7 @@ constexpr const char* kInsertEvent =
 
 bool WriteBatch::empty() const {
   return new_boots.empty() && segments.empty() && gaps.empty() && events.empty() && event_gaps.empty() &&
-         audit.empty() && commands.empty() && clocks.empty() && in_force.empty() && boots.empty();
+         audit.empty() && commands.empty() && clocks.empty() && in_force.empty() && fluids.empty() && boots.empty();
 }
 
 SampleStore::SampleStore(Database& database)
@@ -77,6 +77,7 @@ void SampleStore::write(const WriteBatch& batch) {
   for (const CommandRecord& command : batch.commands) commands_.write(command, audit_);
   for (const auto& [boot_key, record] : batch.clocks) store_clock(database_.handle(), boot_key, record);
   for (const auto& [boot_key, record] : batch.in_force) store_in_force(database_.handle(), boot_key, record);
+  for (const auto& [robot_id, fluid] : batch.fluids) boots_.set_fluid(robot_id, fluid);
   for (const BootProgress& boot : batch.progress) {
     execute(advance_boot_, boot.durable_next_seq, boot.durable_next_event_seq, boot.last_robot_time_us, boot.boot_key);
   }

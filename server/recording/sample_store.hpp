@@ -6,6 +6,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "server/recording/boot_store.hpp"
@@ -43,8 +45,9 @@ struct WriteBatch {
   std::vector<CommandRecord> commands;  // each replaces what is stored of the same command
   std::vector<StoredClock> clocks;
   std::vector<StoredInForce> in_force;
-  std::vector<BootProgress> progress;  // of each boot that any of this belongs to
-  std::vector<BootStart> boots;        // applied last: they end the robots' earlier boots
+  std::map<RobotId, std::string> fluids;  // that robots are in from now on; empty: not known
+  std::vector<BootProgress> progress;     // of each boot that any of this belongs to
+  std::vector<BootStart> boots;           // applied last: they end the robots' earlier boots
 
   bool empty() const;
 };

@@ -112,9 +112,12 @@ bool needs_control(const protocol::Command& command) {
 }
 
 Result<void> check_command(const protocol::Command& command, const RobotState& robot, const Envelope& envelope) {
-  if (auto values = check_values(command, robot, envelope.in(robot.fluid)); !values) {
-    if (envelope.of_fluid.contains(robot.fluid))
-      values.error().detail += fmt::format(" (limits of the fluid '{}')", robot.fluid);
+  const CommandLimits& limits = envelope.in(robot.fluid);
+  if (auto values = check_values(command, robot, limits); !values) {
+    const std::string whose = envelope.is_listed(robot.fluid)
+                                  ? fmt::format(" (limits of the fluid '{}')", robot.fluid)
+                                  : " (the robot's fluid is not known, so the strictest limits of all fluids hold)";
+    if (limits != envelope.anywhere()) values.error().detail += whose;
     return values;
   }
   // SAFETY: the station latches too: no motion command passes until the emergency was cleared.

@@ -38,6 +38,7 @@ struct RestoredRobot {
   BootId boot_id = 0;              // its latest; 0: none is known
   std::uint64_t emergency_id = 0;  // the latch it was last known to be in; 0: none
   std::int64_t retired_at_us = 0;  // UTC; 0: in use
+  std::string fluid = {};          // that was named last; empty: none
 };
 
 class RobotArchive {

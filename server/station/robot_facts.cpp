@@ -1,7 +1,54 @@
-// What people say of a robot, which holds whether or not it is connected: that it is retired.
+// What people say of a robot, which holds whether or not it is connected: the fluid that it is in, and that it is
+// retired.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <nlohmann/json.hpp>
+
 #include "server/station/seat.hpp"
 
 namespace server {
+
+// SAFETY: a fluid brings its limits. While somebody is in control nobody else changes the limits that they command
+// under.
+Result<void> Station::set_fluid(const RobotId& id, const std::string& text, const Author& by) {
+  const auto found = robots_.find(id);
+  if (found == robots_.end()) {
+    return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", id), "unknown_robot");
+  }
+  const auto listed = envelope_.listed(text);
+  if (!listed) return std::unexpected{listed.error()};
+  const std::string& fluid = *listed;
+  RobotState& robot = found->second;
+  if (robot.fluid == fluid) return {};
+  if (auto permitted = authority_.may_use(id, by.actor); !permitted) {
+    permitted.error().detail += "; only who is in control changes the fluid";
+    note_refusal(by, id, "fluid", nlohmann::json{{"fluid", fluid}}.dump(), permitted.error());
+    return permitted;
+  }
+  AuditNote audit;
+  audit.by = by;
+  audit.robot_id = id;
+  audit.action = "robot.fluid_set";
+  audit.subject = fluid;
+  audit.detail = audit_detail({{"before", robot.fluid}});
+  robot.fluid = fluid;
+  for (StationSink* sink : sinks_) sink->on_fluid(robot);
+  for (StationSink* sink : sinks_) sink->on_audit(audit);
+  note(robot, "fluid_set", fmt::format("{} by {}", fluid.empty() ? "not known" : fluid, by.actor));
+  publish(robot);
+  return {};
+}
+
+// The configuration may have been changed since: a fluid that is no longer listed is not known.
+void Station::restore_fluid(RobotState& robot, const std::string& fluid) const {
+  robot.fluid = envelope_.is_listed(fluid) ? fluid : "";
+  if (robot.fluid == fluid) return;
+  spdlog::warn(
+      "robot '{}' is in the fluid '{}', which the configuration does not list: the strictest limits of all fluids hold "
+      "for it until its fluid is named",
+      robot.id, fluid);
+}
 
 void Station::set_retired(const RobotId& id, std::int64_t retired_at_us, const std::string& actor) {
   const auto found = robots_.find(id);

@@ -58,6 +58,7 @@ void Station::restore(const std::vector<RestoredRobot>& robots, const std::vecto
     robot.boot_id = restored.boot_id;
     robot.context.emergency_id = restored.emergency_id;  // SAFETY: the station's latch outlives the station
     robot.retired_at_us = restored.retired_at_us;
+    restore_fluid(robot, restored.fluid);
   }
   for (const CommandRecord& record : pending_stops) restore_stop(record);
 }
@@ -283,13 +284,6 @@ void Station::count_power(RobotState& robot, const SampleBatch& batch) const {
     const bool is_at_power = std::abs(sample.duty) > limits.power_duty;
     robot.at_power_s = std::max(robot.at_power_s + (is_at_power ? period_s : -period_s), 0.0);
   }
-}
-
-void Station::set_fluid(const RobotId& id, const std::string& fluid) {
-  const auto robot = robots_.find(id);
-  if (robot == robots_.end() || robot->second.fluid == fluid) return;
-  robot->second.fluid = fluid;
-  publish(robot->second);
 }
 
 void Station::on_event(RobotPort& port, const protocol::Event& event) {

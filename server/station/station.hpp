@@ -14,6 +14,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "server/audit_note.hpp"
 #include "server/clock.hpp"
 #include "server/result.hpp"
 #include "server/station/authority.hpp"
@@ -150,6 +151,14 @@ class Station {
   void on_parameters(RobotPort& port, const protocol::ParameterPage& page);
   void on_controller(RobotPort& port, const protocol::Controller& controller);
 
+  // The limits of commands, with the list of fluids.
+  const Envelope& envelope() const { return envelope_; }
+
+  // Says which fluid the robot is in, as Envelope lists it; empty: not known. The limits of that fluid hold from this
+  // call on, until another is named. not_found; invalid for a fluid that is not listed; conflict while somebody else is
+  // in control.
+  Result<void> set_fluid(const RobotId& id, const std::string& fluid, const Author& by);
+
   // An administrator has retired the robot, or put it back into use (0); the database has it, or is about to.
   void set_retired(const RobotId& id, std::int64_t retired_at_us, const std::string& actor);
 
@@ -162,10 +171,6 @@ class Station {
                   std::uint64_t durable_next_event_seq);
   void request_resend(const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t next_seq);
   void request_event_resend(const RobotId& id, BootId boot_id);
-
-  // --- called when a run begins, ends or is annotated (wired by main) ---
-
-  void set_fluid(const RobotId& id, const std::string& fluid);  // empty: not known
 
  private:
   static Seat* seat_of(const RobotPort& port) { return port.seat_; }  // null when the port's place was taken
@@ -197,6 +202,7 @@ class Station {
   void look_for_commands(Seat& seat, const SampleBatch& batch);
   void end_unseen(Seat& seat, const char* reason);
 
+  void restore_fluid(RobotState& robot, const std::string& fluid) const;
   void restore_stop(const CommandRecord& record);
   std::shared_ptr<PendingCommand> begin_stop(Seat& seat, const StopRequest& request);
   bool may_be_left_out(const Seat& seat) const;

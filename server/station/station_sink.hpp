@@ -14,6 +14,7 @@ class StationSink {
 
   // The robot's state changed otherwise than by samples: connected, lost, status, durable, clock.
   virtual void on_robot(const RobotState&) {}
+  virtual void on_fluid(const RobotState&) {}  // robot.fluid was named
   virtual void on_samples(const RobotState&, const SampleBatch&) {}
   // Samples, or an event, that came and cannot be recorded: they are lost for good.
   virtual void on_unusable_samples(const RobotState&, std::uint64_t first_seq, std::uint64_t next_seq) {

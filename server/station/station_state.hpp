@@ -156,7 +156,7 @@ struct RobotState {
 
   SampleContext context;         // of the latest live batch (from Hello before the first)
   std::optional<Sample> sample;  // the latest
-  std::string fluid;             // that it swims in, by its open run; empty: not known
+  std::string fluid;             // that it swims in, as Envelope lists it; empty: not known
   double at_power_s = 0;         // how long its motor has run above Envelope's power_duty, less the time it did not
   std::uint64_t next_seq = 0;    // after the latest sample received
   std::uint64_t oldest_seq = 0;

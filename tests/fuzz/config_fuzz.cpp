@@ -29,8 +29,11 @@ void expect_within_limits(const Config& config) {
   }
   require(config.link.heartbeat_interval_ms * 2 <= config.link.link_timeout_ms);
   require(config.link.link_timeout_ms <= 5000);
-  require_sane(config.envelope.anywhere);
-  for (const auto& [fluid, limits] : config.envelope.of_fluid) require_sane(limits);
+  require_sane(config.envelope.anywhere());
+  for (const auto& [fluid, limits] : config.envelope.of_fluid()) {
+    require_sane(limits);
+    require(fluid_name(fluid) == fluid);
+  }
   require(config.recording.critical_space_mb <= config.recording.low_space_mb);
   for (const std::string& listen : {config.http, config.robots}) {
     require(!config.is_exposed(listen) || config.tls.insecure);  // SAFETY: nobody is exposed by accident

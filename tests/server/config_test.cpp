@@ -10,6 +10,7 @@
 namespace server {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class ConfigTest : public ::testing::Test {
@@ -66,8 +67,8 @@ TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
   EXPECT_EQ(from_file.link.link_timeout_ms, defaults.link.link_timeout_ms);
   EXPECT_EQ(from_file.link.heartbeat_interval_ms, defaults.link.heartbeat_interval_ms);
   EXPECT_EQ(from_file.link.samples_per_frame, defaults.link.samples_per_frame);
-  EXPECT_EQ(from_file.envelope.anywhere, defaults.envelope.anywhere);
-  EXPECT_TRUE(from_file.envelope.of_fluid.empty());
+  EXPECT_EQ(from_file.envelope.anywhere(), defaults.envelope.anywhere());
+  EXPECT_EQ(from_file.envelope.of_fluid(), defaults.envelope.of_fluid());
   EXPECT_EQ(from_file.recording.retention_days, defaults.recording.retention_days);
   EXPECT_EQ(from_file.recording.max_database_mb, defaults.recording.max_database_mb);
   EXPECT_EQ(from_file.recording.low_space_mb, defaults.recording.low_space_mb);
@@ -126,11 +127,28 @@ TEST_F(ConfigTest, AFluidHasTheLimitsItNamesAndTheGeneralOnesElse) {
   const Config config = load_config(file("[limits]\nduty_max = 0.8\n[limits.water]\nsetpoint_step_m = 0.05\n"));
   EXPECT_EQ(config.envelope.in("water").setpoint_step_m, 0.05);
   EXPECT_EQ(config.envelope.in("water").duty_max, 0.8);
-  EXPECT_EQ(config.envelope.in("blood").setpoint_step_m, CommandLimits{}.setpoint_step_m);
+  EXPECT_EQ(config.envelope.in("non_newtonian").setpoint_step_m, CommandLimits{}.setpoint_step_m);
+  EXPECT_EQ(config.envelope.in("non_newtonian").duty_max, 0.8);
   EXPECT_THAT(mistake("[limits.water]\nduty_mx = 1.0\n"), HasSubstr(":2: unknown option 'limits.water.duty_mx'"));
   EXPECT_THAT(mistake("[limits.water]\nduty_max = 2.0\n"), HasSubstr("limits.water.duty_max = 2 is outside 0 to 1"));
   EXPECT_THAT(mistake("[limits.water]\nsetpoint_min_m = 1.0\n"), HasSubstr("limits.water.setpoint_min_m = 1 must be"));
   EXPECT_THAT(mistake("[data.water]\ndir = 'x'\n"), HasSubstr("unknown option 'data.water'"));
+}
+
+TEST_F(ConfigTest, EachSectionOfAFluidListsItWithoutRegardToCaseAndBlanks) {
+  const Config config = load_config(
+      file("[limits.Water]\nduty_max = 0.5\n[limits.\" Xanthan 0.5 % \"]\nduty_max = 0.6\n[fluids.Glycerine]\n"
+           "[fluids.WATER]\n"));
+  std::vector<std::string> fluids;
+  for (const auto& [fluid, limits] : config.envelope.of_fluid()) fluids.push_back(fluid);
+  EXPECT_THAT(fluids, ElementsAre("glycerine", "non_newtonian", "water", "xanthan 0.5 %"));
+  EXPECT_EQ(config.envelope.in("water").duty_max, 0.5) << "those of [limits.Water]";
+  EXPECT_EQ(config.envelope.in("glycerine"), config.envelope.anywhere());
+  EXPECT_EQ(config.envelope.in("").duty_max, 0.5) << "the strictest where it is not known";
+  EXPECT_THAT(mistake("[limits.Water]\n[limits.water]\n"), HasSubstr("names a fluid that another section has named"));
+  EXPECT_THAT(mistake("[limits.\" \"]\nduty_max = 0.5\n"), HasSubstr("must have a fluid's name of 1 to 40 bytes"));
+  EXPECT_THAT(mistake("[fluids.oil]\nduty_max = 0.5\n"), HasSubstr(":2: unknown option 'fluids.oil.duty_max'"));
+  EXPECT_THAT(mistake("[fluids]\noil = 1\n"), HasSubstr(":2: unknown option 'fluids.oil'"));
 }
 
 TEST_F(ConfigTest, AMissingFileIsAMistake) {

@@ -65,7 +65,7 @@ class ApiTest : public ::testing::Test {
   WorkerThread disk{"disk"}, readers{"readers"}, exports{"exports"}, checkpoints{"checkpoints"}, maths{"maths"};
   VirtualClock clock{loop};
   TaskGroup tasks{loop};
-  Station station{loop, clock, Envelope{}, LinkTimes{}};
+  Station station{loop, clock, config.envelope, LinkTimes{}};
   RecordingParts recording;
   Recorder& recorder{recording.recorder};
   AnalysisService analysis{recording.history, maths};

@@ -275,5 +275,25 @@ TEST_F(AdmissionTest, RefusesNumbersThatCannotBe) {
   EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_MALFORMED);
 }
 
+TEST_F(AdmissionTest, ARestartKnowsTheFluidOfARobot) {
+  start();
+  connect(robot_);
+  RobotState state = state_of(robot_, LinkState::connected);
+  for (const char* fluid : {"water", "non_newtonian"}) {
+    state.fluid = fluid;
+    recorder_->on_fluid(state);
+  }
+  EXPECT_TRUE(wait(recorder_->flush_records()));
+  kill();
+  start();
+  ASSERT_EQ(restored_.robots.size(), 1u);
+  EXPECT_EQ(restored_.robots[0].fluid, "non_newtonian") << "the latest";
+  state.fluid = "";
+  recorder_->on_fluid(state);
+  stop();
+  start();
+  EXPECT_EQ(restored_.robots.at(0).fluid, "");
+}
+
 }  // namespace
 }  // namespace server

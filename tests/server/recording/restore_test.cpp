@@ -27,6 +27,9 @@ class RestoreTest : public RecordingTest {
     make(robot_, 400);
     EXPECT_TRUE(wait(runs_->end(run, "good")));
     EXPECT_TRUE(wait(runs_->create(robot_.id, named("open"))));
+    RobotState in_water = state_of(robot_, LinkState::connected);
+    in_water.fluid = "water";
+    recorder_->on_fluid(in_water);
     make(robot_, 600);
     flush();
     EXPECT_TRUE(wait(recording_->backups.begin("b")));
@@ -75,6 +78,14 @@ TEST_F(RestoreTest, RunsThatWereOpenAreInterruptedAtTheirLastSample) {
             (std::vector<std::string>{"1|ended|0|399", "2|interrupted|0|999"}));
   EXPECT_EQ(number("SELECT ended_at_us FROM run WHERE run_id = 2"), number("SELECT max(received_at_us) FROM segment"));
   EXPECT_EQ(number("SELECT count(*) FROM run_sample WHERE run_id = 2"), 600);
+}
+
+TEST_F(RestoreTest, NoRobotIsTakenForBeingInTheFluidThatItWasInThen) {
+  record_and_back_up();
+  EXPECT_EQ(rows("SELECT fluid FROM robot"), std::vector<std::string>{"water"});
+  restore_database(from_, new_folder_, {"cli:root", "", 1234});
+  use_restored();
+  EXPECT_EQ(rows("SELECT fluid FROM robot"), std::vector<std::string>{""});
 }
 
 TEST_F(RestoreTest, ARobotGoesOnWithTheRestoredStation) {

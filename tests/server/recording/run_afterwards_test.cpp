@@ -185,11 +185,11 @@ TEST_F(RunAfterwardsTest, EachAnnotationLeavesANote) {
   EXPECT_EQ(run->conditions.fluid, "water");
   EXPECT_EQ(run->conditions.mean_flow_m_s, 0.5);
   annotation.mean_flow_m_s.reset();
-  annotation.texts = {{"fluid", "oil"}};
+  annotation.texts = {{"fluid", "non_newtonian"}};
   EXPECT_EQ(wait(runs_->annotate(id, annotation, {"token:bob", "", 0}))->conditions.mean_flow_m_s, std::nullopt);
   EXPECT_EQ(rows("SELECT actor, field, before, after FROM run_note ORDER BY note_id"),
             (std::vector<std::string>{"token:ana|fluid||water", "token:ana|notes||a second look",
-                                      "token:ana|mean_flow_m_s||0.5", "token:bob|fluid|water|oil",
+                                      "token:ana|mean_flow_m_s||0.5", "token:bob|fluid|water|non_newtonian",
                                       "token:bob|mean_flow_m_s|0.5|"}));
   EXPECT_TRUE(certificate_of(id).agrees_with(before));
   annotation.texts = {{"name", ""}};

@@ -19,9 +19,15 @@ class CommandGateTest : public ::testing::Test {
     robot.id = "nemo";
     robot.sample_period_us = 10'000;
     robot.sample = Sample{.position_m = 0.1F};
-    CommandLimits& water = envelope.of_fluid["water"];
+    robot.fluid = "non_newtonian";
+    CommandLimits water, oil;
     water.setpoint_step_m = 0.05;
     water.duty_max = 0.5;
+    oil.setpoint_min_m = 0;
+    oil.duty_max = 0.8;
+    oil.power_duty = 0.3;
+    oil.power_s = 10;
+    envelope = Envelope{{}, {{"water", water}, {"oil", oil}}};
   }
 
   static protocol::Command setpoint(float setpoint_m) {
@@ -81,7 +87,9 @@ TEST_F(CommandGateTest, ValuesOutsideTheirRangeAreRefusedWithTheLimit) {
 }
 
 TEST_F(CommandGateTest, AStepOfTheSetpointCountsFromTheSetpointInForceElseFromThePosition) {
-  envelope.anywhere.setpoint_step_m = 0.2;
+  CommandLimits limits;
+  limits.setpoint_step_m = 0.2;
+  envelope = Envelope{limits};
   EXPECT_EQ(refusal(setpoint(0.3F)), "") << "just the limit, from the position";
   EXPECT_THAT(refusal(automatic(0.31F)), HasSubstr("step_too_large: setpoint_m = 0.31"));
   EXPECT_THAT(refusal(automatic(0.31F)), HasSubstr("is 0.210 m from the position 0.100; a step is at most 0.2 m"));
@@ -119,8 +127,46 @@ TEST_F(CommandGateTest, AFluidHasItsOwnLimits) {
   robot.fluid = "water";
   EXPECT_THAT(refusal(automatic(0.2F)), HasSubstr("a step is at most 0.05 m (limits of the fluid 'water')"));
   EXPECT_THAT(refusal(duty(0.6F)), HasSubstr("is outside -1 to 0.5 (limits of the fluid 'water')"));
-  robot.fluid = "blood";
+  robot.fluid = "oil";
   EXPECT_EQ(refusal(duty(0.6F)), "");
+  EXPECT_THAT(refusal(duty(0.9F)), HasSubstr("is outside -1 to 0.8 (limits of the fluid 'oil')"));
+}
+
+TEST_F(CommandGateTest, WhereTheFluidIsNotKnownTheStrictestOfAllLimitsHold) {
+  for (const char* unknown : {"", "blood", "Water"}) {
+    robot.fluid = unknown;
+    EXPECT_THAT(refusal(duty(0.6F)),
+                HasSubstr("is outside -1 to 0.5 (the robot's fluid is not known, so the strictest limits"));
+    EXPECT_THAT(refusal(setpoint(-0.01F)), HasSubstr("is outside 0 to 1 (the robot's fluid")) << "of oil";
+    EXPECT_THAT(refusal(setpoint(0.2F)), HasSubstr("a step is at most 0.05 m (the robot's fluid")) << "of water";
+    robot.at_power_s = 20;
+    EXPECT_THAT(refusal(duty(0.4F)), HasSubstr("is above 0.3, where robot")) << "of oil";
+    robot.at_power_s = 0;
+    EXPECT_EQ(refusal(duty(0.4F)), "");
+  }
+}
+
+TEST(Envelope, TheLooserLimitsOfAFluidNeverHoldWhereItIsNotKnown) {
+  CommandLimits strict, loose;
+  strict.duty_max = 0.2;
+  strict.setpoint_max_m = 0.5;
+  const Envelope envelope{strict, {{"oil", loose}}};
+  EXPECT_EQ(envelope.strictest(), strict);
+  EXPECT_EQ(envelope.in("oil"), loose);
+  EXPECT_EQ(envelope.in("water"), strict) << "a built-in fluid without limits of its own";
+}
+
+TEST(Envelope, AnUnknownFluidIsRefusedWithTheList) {
+  const Envelope envelope{{}, {{"oil", {}}}};
+  EXPECT_EQ(envelope.listed(" Oil ").value(), "oil");
+  EXPECT_EQ(envelope.listed("NON_Newtonian").value(), "non_newtonian");
+  EXPECT_EQ(envelope.listed("").value(), "");
+  for (const char* wrong : {"watr", "non newtonian", " ", "\n", "0123456789012345678901234567890123456789x"}) {
+    const auto refused = envelope.listed(wrong);
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_EQ(refused.error().reason, "unknown_fluid");
+    EXPECT_THAT(refused.error().detail, HasSubstr("is none of non_newtonian, oil, water; a section [fluids.NAME]"));
+  }
 }
 
 TEST_F(CommandGateTest, NoMotionPassesALatchAndNoClearAStopOnItsWay) {

@@ -1,0 +1,87 @@
+"""A robot's fluid and its limits, with a real station: over kill -9, and with a configuration that has changed."""
+
+import json
+import sqlite3
+import unittest
+
+from processes import lab
+
+CONFIG = "[limits.Water]\nduty_max = 0.5\n[fluids.oil]\n"
+
+
+class FluidsTest(unittest.TestCase):
+    def post(self, station, path, body):
+        status, _, content = station.request("POST", path, body)
+        return status, json.loads(content)
+
+    def refused_duty(self, station):
+        """What the station says to a duty of 0.8; "" when the limits allow it."""
+        status, answer = self.post(station, "/api/v1/robots/sim-1/commands", {"kind": "set_duty", "duty": 0.8})
+        return answer["detail"] if status == 422 else ""
+
+    def fluid(self, station, fluid):
+        return self.post(station, "/api/v1/robots/sim-1/fluid", {"fluid": fluid})
+
+    def test_its_limits_hold_without_a_run_and_after_kill_9(self):
+        with lab() as place:
+            station = place.start_station(config=CONFIG)
+            place.start_robot(station)
+            station.wait_for_robot("sim-1")
+            self.assertIn("the robot's fluid is not known", self.refused_duty(station))
+            self.assertEqual(self.fluid(station, "oil")[0], 200)
+            self.assertEqual(self.refused_duty(station), "")
+            self.assertEqual(self.fluid(station, "WATER ")[1]["fluid"], "water")
+            place.kill_station()
+            station = place.start_station(robots=station.endpoints["robots"], config=CONFIG)
+            self.assertEqual(station.robot("sim-1")["fluid"], "water", "it was stored before the answer")
+            station.wait_for_robot("sim-1")
+            self.assertIn("limits of the fluid 'water'", self.refused_duty(station))
+
+    def test_a_fluid_that_is_no_longer_listed_is_not_known(self):
+        with lab() as place:
+            station = place.start_station(config=CONFIG)
+            place.start_robot(station)
+            station.wait_for_robot("sim-1")
+            self.assertEqual(self.fluid(station, "oil")[0], 200)
+            self.assertEqual(place.stop_station(), 0)
+            station = place.start_station(robots=station.endpoints["robots"], config=CONFIG.replace("oil", "honey"))
+            self.assertIsNone(station.robot("sim-1")["fluid"])
+            self.assertIn("robot 'sim-1' is in the fluid 'oil', which the configuration does not list", place.log("station"))
+            station.wait_for_robot("sim-1")
+            self.assertIn("the robot's fluid is not known", self.refused_duty(station))
+            status, answer = self.fluid(station, "oil")
+            self.assertEqual((status, answer["reason"]), (422, "unknown_fluid"))
+            self.assertIn("is none of honey, non_newtonian, water", answer["detail"])
+
+    def test_an_open_run_in_a_fluid_that_is_not_listed_gives_the_strictest_limits_and_a_warning(self):
+        with lab() as place:
+            station = place.start_station(config=CONFIG)
+            place.start_robot(station)
+            station.wait_for_robot("sim-1")
+            status, run = self.post(station, "/api/v1/runs", {"robot_id": "sim-1", "name": "before the list"})
+            self.assertEqual(status, 201)
+            place.kill_station()
+            with sqlite3.connect(place.data / "station.sqlite") as database:  # as an older station has left it
+                database.execute("UPDATE run SET fluid = 'Wasser, 20 Grad'")
+            database.close()
+            station = place.start_station(robots=station.endpoints["robots"], config=CONFIG)
+            self.assertIn(f"run {run['run_id']} of robot 'sim-1' was open in the fluid 'Wasser, 20 Grad'", place.log("station"))
+            self.assertEqual(station.get(f"/api/v1/runs/{run['run_id']}")["fluid"], "Wasser, 20 Grad", "it stays readable")
+            self.assertIsNone(station.robot("sim-1")["fluid"])
+            station.wait_for_robot("sim-1")
+            self.assertIn("the robot's fluid is not known", self.refused_duty(station))
+
+    def test_check_config_prints_the_limits_of_each_fluid(self):
+        with lab() as place:
+            path = place.folder / "rheonaut.toml"
+            path.write_text(CONFIG)
+            printed = place.tool("check-config", "--config", path).stdout
+            limits = "setpoint -1 to 1 m in steps of 2 m, duty -1 to {}, above 0.9 for 60 s, disturbance 0.5 m"
+            for line in (f"limits   {limits.format(1)}", f"fluid    non_newtonian: {limits.format(1)}",
+                         f"fluid    oil (of this configuration): {limits.format(1)}",
+                         f"fluid    water: {limits.format(0.5)}", f"fluid    not known: {limits.format(0.5)}"):
+                self.assertIn(line, printed.splitlines())
+
+
+if __name__ == "__main__":
+    unittest.main()
