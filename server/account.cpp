@@ -34,6 +34,7 @@ const char* text(Scope scope) {
     case Scope::record: return "record";
     case Scope::command: return "command";
     case Scope::admin: return "admin";
+    case Scope::look: return "read or stop";
   }
   return "";
 }
@@ -64,6 +65,7 @@ Scopes Scopes::of(Role role) {
 // SAFETY: whoever may move a robot may stop it, whatever the token was given.
 Scopes& Scopes::add(Scope scope) {
   bits_ |= bit(scope);
+  if (scope == Scope::read || scope == Scope::stop) add(Scope::look);
   if (scope == Scope::record) add(Scope::read);
   if (scope == Scope::command) add(Scope::read).add(Scope::stop);
   if (scope == Scope::admin) add(Scope::record).add(Scope::command);

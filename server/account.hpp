@@ -28,6 +28,7 @@ enum class Scope : std::uint8_t {
   record,   // and read
   command,  // and read and stop: who may move a robot may stop it
   admin,    // everything
+  look,     // what whoever stops must see: read and stop bring it along, no token has it by name
 };
 inline constexpr std::array kTokenScopes{Scope::read, Scope::stop, Scope::record, Scope::command, Scope::admin};
 

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <ranges>
 
 #include "server/api/emergency.hpp"
@@ -15,6 +17,34 @@ namespace {
 
 Response unknown_robot(const std::string& id) {
   return problem(404, fmt::format("no robot '{}' is known", id.substr(0, 40)), "unknown_robot");
+}
+
+// All of a robot, or for a token that may stop and not read what its stop is about and nothing else.
+json robot_json(const RobotState& robot, const Caller& caller) {
+  if (caller.scopes.allow(Scope::read)) return to_json(robot);
+  const SampleContext& context = robot.context;
+  return {{"robot_id", robot.id},
+          {"link", text(robot.link)},
+          {"mode", protocol::text(context.mode)},
+          {"emergency_id", id_text(context.emergency_id)},
+          {"emergency_cause", protocol::text(context.emergency_cause)},
+          {"pending_stop", id_text(robot.pending_stop.value_or(0))}};
+}
+
+// The same of all robots, some at a time: nobody else waits for it.
+Answer list_robots_to_stop(ApiParts& parts, Request request) {
+  constexpr std::size_t kInATurn = 32;
+  std::string text = R"({"robots":[)", last;
+  for (bool more = true; more;) {
+    auto robot = parts.station.robots().upper_bound(last);  // they may have changed since the last turn
+    for (std::size_t count = 0; count < kInATurn && robot != parts.station.robots().end(); ++count, ++robot) {
+      text += (last.empty() ? "" : ",") + dump(robot_json(robot->second, request.caller));
+      last = robot->first;
+    }
+    more = robot != parts.station.robots().end();
+    if (more) co_await asio::post(parts.loop, asio::use_awaitable);
+  }
+  co_return json_text_response(200, text + "]}");
 }
 
 // The robots that the first piece has no room for: each piece is made when the client has taken the one before.
@@ -34,7 +64,8 @@ class RobotList final : public BodyStream {
   RobotDocument document_;
 };
 
-Answer list_robots(ApiParts& parts, Request) {
+Answer list_robots(ApiParts& parts, Request request) {
+  if (!request.caller.scopes.allow(Scope::read)) co_return co_await list_robots_to_stop(parts, std::move(request));
   RobotDocument document{parts.texts, R"({"robots":[)", "]}"};
   std::string first = co_await document.next();
   if (document.is_whole()) co_return json_text_response(200, std::move(first));
@@ -47,7 +78,7 @@ Answer get_robot(ApiParts& parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   const RobotState* robot = parts.station.find(id);
   if (robot == nullptr) co_return unknown_robot(id);
-  co_return json_response(200, to_json(*robot));
+  co_return json_response(200, robot_json(*robot, request.caller));
 }
 
 // What became of a command that was sent.
@@ -268,11 +299,21 @@ Answer list_events(ApiParts& parts, Request request) {
   co_return json_response(200, list_json("events", events));
 }
 
+// A token that may stop and not read sees its own stops, and one that no robot has acknowledged yet: it may be the
+// answer to its own.
+bool may_see(const CommandRecord& command, const Request& request, const Station& station) {
+  if (request.caller.scopes.allow(Scope::read)) return true;
+  if (command.kind != "emergency_stop") return false;
+  const RobotState* robot = station.find(command.robot_id);
+  return command.actor == request.actor || (robot != nullptr && robot->pending_stop == command.id);
+}
+
 Answer get_command(ApiParts& parts, Request request) {
   const auto id = parse_id(request.param.at("command_id"));
   if (!id) co_return problem(400, "command_id is not a decimal number from 1", "out_of_range");
   const auto record = co_await parts.recording.history.command(*id);
   if (!record) co_return problem(record.error());
+  if (!may_see(*record, request, parts.station)) co_return not_permitted(request.caller, Scope::read);
   co_return json_response(200, to_json(*record));
 }
 
@@ -284,13 +325,13 @@ void add_robot_routes(Router& router, ApiParts& parts) {
     router.add({method, pattern, needs, std::move(query),
                 [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
   };
-  add("GET", "/api/v1/robots", Scope::read, {}, list_robots);
-  add("GET", "/api/v1/robots/{robot_id}", Scope::read, {}, get_robot);
+  add("GET", "/api/v1/robots", Scope::look, {}, list_robots);
+  add("GET", "/api/v1/robots/{robot_id}", Scope::look, {}, get_robot);
   add("GET", "/api/v1/robots/{robot_id}/commands", Scope::read, {"limit"}, list_commands);
   add("POST", "/api/v1/robots/{robot_id}/commands", Scope::command, {"wait"}, submit_command);
   add("POST", "/api/v1/robots/{robot_id}/control", Scope::command, {}, change_control);
   add("GET", "/api/v1/robots/{robot_id}/events", Scope::read, {"limit"}, list_events);
-  add("GET", "/api/v1/commands/{command_id}", Scope::read, {}, get_command);
+  add("GET", "/api/v1/commands/{command_id}", Scope::look, {}, get_command);
   const auto add_stop = [&router, &parts](const char* pattern, Answer (*answer)(ApiParts&, Request)) {
     auto stop = [&parts, answer](Request request) { return answer(parts, std::move(request)); };
     router.add({.method = "POST",

@@ -70,6 +70,71 @@ TEST_F(RightsTest, AViewerChangesNothingButMayStop) {
   EXPECT_EQ(of_admins.size(), 16U);
 }
 
+// Written out, as a red button has it.
+TEST_F(RightsTest, ATokenThatMayOnlyStopSeesWhatItsStopIsAboutAndNothingElse) {
+  connect_robot();
+  const auto stopping = begin("POST", "/api/v1/robots/r1/emergency-stop");
+  scopes = parse_scopes("stop").value();
+  std::set<std::string> open;
+  for (const Route& route : api->router().routes()) {
+    if (route.needs != Scope::anyone && !refused(route)) open.insert(route.method + " " + route.pattern);
+  }
+  EXPECT_EQ(open, (std::set<std::string>{"GET /api/v1/robots", "GET /api/v1/robots/{robot_id}",
+                                         "GET /api/v1/commands/{command_id}", "POST /api/v1/emergency-stop",
+                                         "POST /api/v1/robots/{robot_id}/emergency-stop"}));
+  const json robot_seen = ask("GET", "/api/v1/robots/r1").parsed();
+  std::set<std::string> members;
+  for (const auto& [member, value] : robot_seen.items()) members.insert(member);
+  EXPECT_EQ(members,
+            (std::set<std::string>{"robot_id", "link", "mode", "emergency_id", "emergency_cause", "pending_stop"}));
+  EXPECT_EQ(ask("GET", "/api/v1/robots").parsed()["robots"], json::array({robot_seen}));
+  EXPECT_EQ(robot_seen["link"], "connected");
+  EXPECT_TRUE(robot_seen["pending_stop"].is_string());
+}
+
+TEST_F(RightsTest, ATokenThatMayOnlyStopSeesWhatBecameOfItsStops) {
+  connect_robot();
+  const auto answer_last = [this](std::uint64_t emergency_id) {
+    robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, emergency_id);
+  };
+  const auto seen = [this](const std::string& id) { return ask("GET", "/api/v1/commands/" + id); };
+  const auto setting = begin("POST", "/api/v1/robots/r1/commands", {{"kind", "set_duty"}, {"duty", 0.1}});
+  answer_last(0);
+  const std::string duty = end(setting).parsed()["command_id"];
+  scopes = parse_scopes("stop").value();
+  const auto stopping = begin("POST", "/api/v1/robots/r1/emergency-stop");
+  const std::string pending = ask("GET", "/api/v1/robots/r1").parsed()["pending_stop"];
+  EXPECT_EQ(seen(pending).parsed()["state"], "sent");
+  answer_last(9);
+  EXPECT_EQ(end(stopping).status, 200);
+  EXPECT_EQ(seen(pending).parsed()["state"], "acknowledged");
+  EXPECT_EQ(ask("GET", "/api/v1/robots/r1").parsed()["emergency_id"], "9");
+  EXPECT_EQ(seen(duty).status, 403) << "no stop";
+
+  StopRequest of_another;
+  of_another.robot_id = "r1";
+  of_another.actor = "token:other";
+  const auto stop_as_another = [](Station& of, StopRequest request) -> boost::asio::awaitable<void> {
+    co_await of.emergency_stop(std::move(request), 1s);
+  };
+  tasks.spawn("another's stop", stop_as_another(station, of_another));
+  clock.settle();
+  const std::string others = ask("GET", "/api/v1/robots/r1").parsed()["pending_stop"];
+  EXPECT_EQ(seen(others).status, 200) << "it would be the answer to a stop of this token, too";
+  answer_last(10);
+  clock.settle();
+  EXPECT_EQ(seen(others).status, 403);
+  scopes = Scopes::of(Role::viewer);
+  EXPECT_EQ(seen(others).parsed()["actor"], "token:other");
+}
+
+TEST_F(RightsTest, AViewerSeesWhoIsInControl) {
+  connect_robot();
+  ASSERT_TRUE(station.control({"r1", "user:anna/session:4", "", ControlAction::take, 60s, ""}));
+  scopes = Scopes::of(Role::viewer);
+  EXPECT_EQ(ask("GET", "/api/v1/robots/r1").parsed()["control"]["holder"], "user:anna/session:4");
+}
+
 TEST_F(RightsTest, EachScopeBringsAlongWhatItMust) {
   const auto with = [](Scope scope) {
     Scopes scopes;
