@@ -203,7 +203,9 @@ void read(ConfigFile& file, Config& config) {
   file.take_texts("http", "hosts", config.http_hosts);
   read_places(file, "http", config.http_places);
   if (file.take("robots", "listen", config.robots)) config.robots_or_any_port = false;
-  file.take("robots", "enrol_on_loopback", config.enrol_on_loopback);
+  file.take("robots", "enrol_on_loopback", config.enrolment.allowed);
+  file.take_count("robots", "max_enrolled_on_loopback", 0, 100'000, config.enrolment.most_robots);
+  file.take_count("robots", "enrolments_per_minute", 1, 100'000, config.enrolment.most_a_minute);
   read_places(file, "robots", config.robot_places);
   file.take_count("robots", "link_timeout_ms", 200, 5000, config.link.link_timeout_ms);
   file.take_count("robots", "heartbeat_interval_ms", 50, 2500, config.link.heartbeat_interval_ms);

@@ -55,9 +55,9 @@ struct Config {
 
   std::string robots = "127.0.0.1:7070";  // robots.listen, --robots
   bool robots_or_any_port = true;         // as above
-  bool enrol_on_loopback = true;        // robots.enrol_on_loopback: accept a new robot that dials in from this machine
-  PortPlaces robot_places{8192, 1024};  // robots.max_connections, .max_connections_per_address
-  LinkTimes link;                       // robots.link_timeout_ms, .heartbeat_interval_ms, .samples_per_frame
+  LoopbackEnrolment enrolment;            // robots.enrol_on_loopback, .max_enrolled_on_loopback, .enrolments_per_minute
+  PortPlaces robot_places{8192, 1024};    // robots.max_connections, .max_connections_per_address
+  LinkTimes link;                         // robots.link_timeout_ms, .heartbeat_interval_ms, .samples_per_frame
 
   // limits.setpoint_min_m, .setpoint_max_m, …; of a fluid: limits.FLUID.setpoint_min_m, …; fluids.FLUID lists one, too
   Envelope envelope{};

@@ -34,7 +34,7 @@ static int serve(const Config& config) {
   Station station{loop, clock, config.envelope, config.link};
 
   // Out: they hear the station and never call it back; what has become durable comes back through one function.
-  const RecorderOptions recorder_options{config.database(), config.enrol_on_loopback};
+  const RecorderOptions recorder_options{config.database(), config.enrolment};
   RecordingParts recording{loop, clock, disk, readers, exports, checkpoints, recorder_options, config.recording};
   LiveFeed live{clock};
   recording.connect(station);

@@ -191,6 +191,7 @@ asio::awaitable<bool> RobotSession::admit(const protocol::Hello& hello) {
   auto seat = station_.may_connect(id, hello.boot_id);
   if (!seat) co_return co_await refuse(rheonaut_REFUSAL_REASON_ALREADY_CONNECTED, seat.error().detail);
   const Admission admission = co_await archive_.admit(request);
+  if (admission.enrolment_full) station_.on_enrolment_refused(id, stream_->peer(), admission.detail);
   if (admission.refusal != rheonaut_REFUSAL_REASON_NONE) co_return co_await refuse(admission.refusal, admission.detail);
   seat = station_.may_connect(id, hello.boot_id);  // another connection may have won while we asked
   if (!seat) co_return co_await refuse(rheonaut_REFUSAL_REASON_ALREADY_CONNECTED, seat.error().detail);

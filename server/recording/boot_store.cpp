@@ -113,15 +113,15 @@ std::int64_t BootStore::next_boot_key() {
 }
 
 std::vector<AdmissionOutcome> BootStore::admit(const std::vector<AdmissionQuestion>& questions,
-                                               bool enrol_on_loopback) {
+                                               const LoopbackEnrolment& enrolment) {
   try {
-    return admit_together(questions, enrol_on_loopback);
+    return admit_together(questions, enrolment);
   } catch (const std::exception&) {  // one that cannot be stored keeps no other out: each by itself
   }
   std::vector<AdmissionOutcome> outcomes;
   for (const AdmissionQuestion& question : questions) {
     try {
-      outcomes.push_back(admit_together({&question, 1}, enrol_on_loopback).front());
+      outcomes.push_back(admit_together({&question, 1}, enrolment).front());
     } catch (const std::exception& error) {
       spdlog::error("a robot cannot be admitted now: {}", error.what());
       outcomes.push_back({refusal(rheonaut_REFUSAL_REASON_STATION_BUSY,
@@ -133,23 +133,23 @@ std::vector<AdmissionOutcome> BootStore::admit(const std::vector<AdmissionQuesti
 }
 
 std::vector<AdmissionOutcome> BootStore::admit_together(std::span<const AdmissionQuestion> questions,
-                                                        bool enrol_on_loopback) {
+                                                        const LoopbackEnrolment& enrolment) {
   SQLite::Transaction transaction{database_.handle()};  // becomes a writing one only if a robot is new
   std::vector<AdmissionOutcome> outcomes;
   for (const AdmissionQuestion& question : questions) {
     SQLite::Savepoint savepoint{database_.handle(), "admission"};  // who is refused leaves nothing behind
-    outcomes.push_back(admit_one(question, enrol_on_loopback));
+    outcomes.push_back(admit_one(question, enrolment));
     if (outcomes.back().admission.refusal == rheonaut_REFUSAL_REASON_NONE) savepoint.release();
   }
   transaction.commit();
   return outcomes;
 }
 
-AdmissionOutcome BootStore::admit_one(const AdmissionQuestion& question, bool enrol_on_loopback) {
+AdmissionOutcome BootStore::admit_one(const AdmissionQuestion& question, const LoopbackEnrolment& enrolment) {
   const AdmissionRequest& request = question.request;
   std::optional<RobotId> owner = question.owner;
   AdmissionOutcome outcome;
-  outcome.admission = check_robot(request, enrol_on_loopback);
+  outcome.admission = check_robot(request, enrolment);
   outcome.admission.store_id = database_.store_id();
   if (outcome.admission.refusal != rheonaut_REFUSAL_REASON_NONE) return outcome;
 
@@ -165,9 +165,9 @@ AdmissionOutcome BootStore::admit_one(const AdmissionQuestion& question, bool en
   return outcome;
 }
 
-Admission BootStore::check_robot(const AdmissionRequest& request, bool enrol_on_loopback) {
+Admission BootStore::check_robot(const AdmissionRequest& request, const LoopbackEnrolment& enrolment) {
   Admission admission;
-  const bool may_enrol = enrol_on_loopback && request.from_loopback;
+  const bool may_enrol = enrolment.allowed && request.from_loopback;
   if (request.token.empty() && !request.from_loopback) {
     return refusal(rheonaut_REFUSAL_REASON_WRONG_TOKEN,
                    fmt::format("robot '{}' brings no token; without one a robot is admitted from loopback only",
@@ -182,6 +182,7 @@ Admission BootStore::check_robot(const AdmissionRequest& request, bool enrol_on_
                      fmt::format("robot '{}' is not enrolled: rheonaut robot enroll {} gives it a token",
                                  request.robot_id, request.robot_id));
     }
+    if (auto full = check_room(request, enrolment)) return std::move(*full);
     SQLite::Statement add{database_.handle(),
                           "INSERT INTO robot (robot_id, enrolled_at_us, token_hash) VALUES (?, ?, ?)"};
     bind_all(add, request.robot_id, request.received_at_us);
@@ -205,6 +206,30 @@ Admission BootStore::check_robot(const AdmissionRequest& request, bool enrol_on_
   }
   return refusal(rheonaut_REFUSAL_REASON_WRONG_TOKEN,
                  fmt::format("the token of robot '{}' is not the one it was enrolled with", request.robot_id));
+}
+
+// SAFETY: whatever runs on this machine cannot fill the lists of robots, and the stop of all, with names.
+std::optional<Admission> BootStore::check_room(const AdmissionRequest& request, const LoopbackEnrolment& enrolment) {
+  SQLite::Statement count{database_.handle(),
+                          "SELECT count(*), coalesce(sum(enrolled_at_us BETWEEN ?1 - 60000000 AND ?1), 0) FROM robot"
+                          " WHERE enrolled_by = 'loopback' AND revoked_at_us IS NULL"};
+  bind_all(count, request.received_at_us);
+  count.executeStep();
+  std::optional<Admission> refused;
+  if (unsigned_id(count.getColumn(0)) >= enrolment.most_robots) {
+    refused =
+        refusal(rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT,
+                fmt::format("only {} robots of this machine enrol themselves: rheonaut robot enroll {}, or make room "
+                            "with rheonaut robot revoke, or allow more by robots.max_enrolled_on_loopback",
+                            enrolment.most_robots, request.robot_id));
+  } else if (unsigned_id(count.getColumn(1)) >= enrolment.most_a_minute) {
+    refused = refusal(rheonaut_REFUSAL_REASON_STATION_BUSY,
+                      fmt::format("only {} robots of this machine enrol themselves a minute: try again later, or allow "
+                                  "more by robots.enrolments_per_minute",
+                                  enrolment.most_a_minute));
+  }
+  if (refused) refused->enrolment_full = true;
+  return refused;
 }
 
 void BootStore::note_enrolled(const AdmissionRequest& request) {

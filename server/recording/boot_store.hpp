@@ -83,7 +83,8 @@ class BootStore {
   // Checks robot and token of each, and whose boot it is; remembers new robots, durably and in one transaction, and
   // writes nothing else, so a full disk still admits robots that are enrolled. Does not throw: who cannot be answered
   // is refused as STATION_BUSY. One outcome for each question, in order.
-  std::vector<AdmissionOutcome> admit(const std::vector<AdmissionQuestion>& questions, bool enrol_on_loopback);
+  std::vector<AdmissionOutcome> admit(const std::vector<AdmissionQuestion>& questions,
+                                      const LoopbackEnrolment& enrolment);
 
   // Inside the caller's transaction: these boots are known from now on.
   void add(const std::vector<NewBoot>& boots);
@@ -96,9 +97,11 @@ class BootStore {
   void start(const BootStart& start);
 
  private:
-  std::vector<AdmissionOutcome> admit_together(std::span<const AdmissionQuestion> questions, bool enrol_on_loopback);
-  AdmissionOutcome admit_one(const AdmissionQuestion& question, bool enrol_on_loopback);
-  Admission check_robot(const AdmissionRequest& request, bool enrol_on_loopback);
+  std::vector<AdmissionOutcome> admit_together(std::span<const AdmissionQuestion> questions,
+                                               const LoopbackEnrolment& enrolment);
+  AdmissionOutcome admit_one(const AdmissionQuestion& question, const LoopbackEnrolment& enrolment);
+  Admission check_robot(const AdmissionRequest& request, const LoopbackEnrolment& enrolment);
+  std::optional<Admission> check_room(const AdmissionRequest& request, const LoopbackEnrolment& enrolment);
   void note_enrolled(const AdmissionRequest& request);
   std::uint64_t latch_of(const RobotId& robot_id);
   std::optional<std::uint64_t> last_emergency(std::int64_t boot_key);  // empty: nothing of it is stored

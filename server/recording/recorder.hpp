@@ -46,8 +46,8 @@
 namespace server {
 
 struct RecorderOptions {
-  std::filesystem::path path;     // of the database
-  bool enrol_on_loopback = true;  // a new robot that connects from this machine is enrolled
+  std::filesystem::path path;   // of the database
+  LoopbackEnrolment enrolment;  // a new robot that connects from this machine is enrolled
   std::size_t max_queued_samples = 2'000'000;
   std::size_t max_queued_records = 100'000;   // events, commands, audit, clock estimates, texts in force
   std::uint64_t checkpoint_bytes = 64 << 20;  // of the write-ahead log, from which on it is moved into the database

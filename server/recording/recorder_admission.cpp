@@ -78,7 +78,7 @@ asio::awaitable<AdmissionOutcome> Recorder::ask(AdmissionQuestion question) {
     const AskingTurn turn{*this};
     std::vector<AdmissionQuestion> questions;
     for (const auto& asked : asked_) questions.push_back(asked->question);
-    auto job = [questions = std::move(questions), enrol = options_.enrol_on_loopback](Database& database) {
+    auto job = [questions = std::move(questions), enrol = options_.enrolment](Database& database) {
       return BootStore{database}.admit(questions, enrol);
     };
     auto outcomes = co_await on_disk(std::move(job));

@@ -7,6 +7,13 @@
 
 namespace server {
 
+// Robots that nobody has enrolled and that dial in from this machine enrol themselves, within these bounds.
+struct LoopbackEnrolment {
+  bool allowed = true;
+  std::uint32_t most_robots = 64;  // enrolled so, and not revoked
+  std::uint32_t most_a_minute = 10;
+};
+
 struct AdmissionRequest {
   RobotId robot_id;
   std::string token;
@@ -27,6 +34,7 @@ struct Admission {
   protocol::RefusalReason refusal = rheonaut_REFUSAL_REASON_NONE;
   std::string detail;
   bool newly_enrolled = false;
+  bool enrolment_full = false;  // the refusal: LoopbackEnrolment allows no other now
   std::uint64_t store_id = 0;
   std::uint64_t durable_next_seq = 0;  // the first sample of this boot that is neither stored nor known lost
   std::uint64_t durable_next_event_seq = 0;

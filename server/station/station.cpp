@@ -217,6 +217,21 @@ void Station::on_refused(const RobotId& id, const std::string& peer, protocol::R
   note(*seat.robot, "connection_refused", fmt::format("{} refused, {}: {}{}", peer, cause, detail, more), cause);
 }
 
+void Station::on_enrolment_refused(const RobotId& id, const std::string& peer, const std::string& detail) {
+  const std::int64_t now_us = clock_.steady_us();
+  if (enrolment_told_at_us_ != 0 && now_us - enrolment_told_at_us_ < kRefusalPeriodUs) {
+    ++enrolments_untold_;
+    return;
+  }
+  enrolment_told_at_us_ = now_us;
+  const std::uint64_t untold = std::exchange(enrolments_untold_, 0);
+  const std::string more = untold == 0 ? "" : fmt::format(" ({} more since the last event)", untold);
+  spdlog::warn("robot '{}' from {} was not enrolled: {}{}", id, peer, detail, more);
+  RobotState unknown;
+  unknown.id = id;
+  note(unknown, "enrolment_refused", fmt::format("{}: {}{}", peer, detail, more));
+}
+
 void Station::end_connection(const RobotId& id, const std::string& reason) {
   const auto seat = seats_.find(id);
   if (seat != seats_.end() && seat->second.port != nullptr) seat->second.port->close(reason);

@@ -136,6 +136,9 @@ class Station {
   // Somebody who calls itself this robot was not let in: an event, if the robot is known, at most one each 10 s.
   void on_refused(const RobotId& id, const std::string& peer, protocol::RefusalReason reason,
                   const std::string& detail);
+  // A robot that is not known could not enrol itself: an event under its name, and a line of the log, at most one each
+  // 10 s whatever their names are.
+  void on_enrolment_refused(const RobotId& id, const std::string& peer, const std::string& detail);
   void on_frame(RobotPort& port, std::uint64_t robot_time_us);  // any frame: a sign of life
   void on_samples(RobotPort& port, const protocol::Telemetry& telemetry);
   void on_event(RobotPort& port, const protocol::Event& event);
@@ -224,6 +227,8 @@ class Station {
   RecentCommands recent_;  // that had a key, and have ended
   StopTimes stop_times_;
   std::uint64_t invalid_values_ = 0;
+  std::int64_t enrolment_told_at_us_ = 0;                // steady; 0: never
+  std::uint64_t enrolments_untold_ = 0;                  // since
   std::optional<std::vector<CommandRecord>> held_back_;  // while all robots are being stopped
 };
 

@@ -32,11 +32,14 @@ def forget_peak(pid):
 
 
 @contextlib.contextmanager
-def station(programs, folder, *flags):
+def station(programs, folder, config=""):
+    """That admits a whole fleet; `config` is TOML, of other sections than [robots]."""
     data = folder / "data"
+    fleet = pathlib.Path(__file__).resolve().parents[2] / "deploy" / "fleet.toml"
+    (folder / "station.toml").write_text(fleet.read_text() + config)
     with open(folder / "station.log", "wb") as log:
         process = subprocess.Popen([programs / "rheonaut", "serve", "--data", data, "--http", "127.0.0.1:0", "--robots",
-                                    "127.0.0.1:0", *flags], stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+                                    "127.0.0.1:0", "--config", folder / "station.toml"], stdout=log, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
     try:
         while not (data / "endpoints.json").exists():
             if process.poll() is not None:

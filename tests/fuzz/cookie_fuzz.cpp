@@ -41,7 +41,7 @@ struct Gatehouse {
   VirtualClock clock{loop};
   Database database{folder / "station.sqlite"};
   WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
-  Recorder recorder{loop, clock, disk, checkpoints, RecorderOptions{folder / "station.sqlite"}};
+  Recorder recorder{loop, clock, disk, checkpoints, RecorderOptions{folder / "station.sqlite", {}}};
   Accounts accounts{loop, clock, recorder, folder};
   Auth auth{loop, clock, accounts, folder, 1};
   RequestGuard guard{auth, {"station.lab"}};

@@ -55,7 +55,9 @@ TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
   EXPECT_EQ(from_file.http, defaults.http);
   EXPECT_EQ(from_file.http_hosts, defaults.http_hosts);
   EXPECT_EQ(from_file.robots, defaults.robots);
-  EXPECT_EQ(from_file.enrol_on_loopback, defaults.enrol_on_loopback);
+  EXPECT_EQ(from_file.enrolment.allowed, defaults.enrolment.allowed);
+  EXPECT_EQ(from_file.enrolment.most_robots, defaults.enrolment.most_robots);
+  EXPECT_EQ(from_file.enrolment.most_a_minute, defaults.enrolment.most_a_minute);
   EXPECT_EQ(from_file.http_places.connections, defaults.http_places.connections);
   EXPECT_EQ(from_file.http_places.of_address, defaults.http_places.of_address);
   EXPECT_EQ(from_file.robot_places.connections, defaults.robot_places.connections);
@@ -133,6 +135,17 @@ TEST_F(ConfigTest, AFluidHasTheLimitsItNamesAndTheGeneralOnesElse) {
   EXPECT_THAT(mistake("[limits.water]\nduty_max = 2.0\n"), HasSubstr("limits.water.duty_max = 2 is outside 0 to 1"));
   EXPECT_THAT(mistake("[limits.water]\nsetpoint_min_m = 1.0\n"), HasSubstr("limits.water.setpoint_min_m = 1 must be"));
   EXPECT_THAT(mistake("[data.water]\ndir = 'x'\n"), HasSubstr("unknown option 'data.water'"));
+}
+
+TEST_F(ConfigTest, AFleetMayEnrolItselfWhereTheConfigurationForLoadTestsSaysSo) {
+  EXPECT_EQ(Config{}.enrolment.most_robots, 64U);
+  EXPECT_EQ(Config{}.enrolment.most_a_minute, 10U);
+  ConfigFlags flags;
+  flags.file = std::filesystem::path{TEST_DATA_DIR} / "../../deploy/fleet.toml";
+  EXPECT_EQ(load_config(flags).enrolment.most_robots, 100'000U);
+  EXPECT_EQ(load_config(flags).enrolment.most_a_minute, 100'000U);
+  EXPECT_THAT(mistake("[robots]\nenrolments_per_minute = 0\n"), HasSubstr("enrolments_per_minute = 0 is outside 1 to"));
+  EXPECT_THAT(mistake("[robots]\nmax_enrolled_on_loopback = -1\n"), HasSubstr("_loopback = -1 is outside 0 to 100000"));
 }
 
 TEST_F(ConfigTest, EachSectionOfAFluidListsItWithoutRegardToCaseAndBlanks) {

@@ -19,7 +19,7 @@ import threading
 import time
 import unittest
 
-from processes import BIN, ApiError, Station, lab, wait_until
+from processes import BIN, FLEET, ApiError, Station, lab, wait_until
 from recording_audit import audit
 
 KILLS = int(os.environ.get("RHEONAUT_KILLS", "6"))
@@ -148,7 +148,7 @@ class KillStormTest(unittest.TestCase):
               f" {summary['reconnects']} reconnections, {findings['runs_verified']} runs verified")
 
     def test_the_station_is_killed(self):
-        with lab() as place:
+        with lab(config=FLEET) as place:
             ports = place.start_station().endpoints
             self.robots = Robots(ports["robots"])
             for _ in range(KILLS):
@@ -162,7 +162,7 @@ class KillStormTest(unittest.TestCase):
     @unittest.skipIf(SMALL_DISK not in os.environ, "needs a small disk: `unshare -rm` is not possible here")
     def test_the_station_is_killed_while_the_disk_is_full(self):
         filler = pathlib.Path(os.environ[SMALL_DISK]) / "filler"
-        with lab(os.environ[SMALL_DISK]) as place:
+        with lab(os.environ[SMALL_DISK], FLEET) as place:
             station = place.start_station()
             ports = station.endpoints
             self.robots = Robots(ports["robots"])
@@ -184,7 +184,7 @@ class KillStormTest(unittest.TestCase):
             self.check(place, self.robots.end())
 
     def test_the_robots_are_killed(self):
-        with lab() as place:
+        with lab(config=FLEET) as place:
             ports = place.start_station().endpoints
             for _ in range(KILLS):
                 self.robots = Robots(ports["robots"])
@@ -195,7 +195,7 @@ class KillStormTest(unittest.TestCase):
             self.check(place, self.robots.end(), ("ring_overrun", "reboot"))
 
     def test_the_link_is_cut_within_frames(self):
-        with lab() as place:
+        with lab(config=FLEET) as place:
             ports = place.start_station().endpoints
             proxy = subprocess.Popen([BIN / "rheonaut-sim", "proxy", "--to", ports["robots"], "--split", "700"],
                                      stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)

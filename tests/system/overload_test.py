@@ -14,7 +14,7 @@ import time
 import unittest
 
 from kill_storm_test import ROBOTS, Robots
-from processes import BIN, lab, wait_until
+from processes import BIN, FLEET, lab, wait_until
 from recording_audit import audit
 
 OVERLOAD_S = float(os.environ.get("RHEONAUT_OVERLOAD_S", "20"))
@@ -67,7 +67,7 @@ class Halted:
 
 class OverloadTest(unittest.TestCase):
     def test_what_is_sent_is_stored_or_counted_as_lost_at_twice_the_capacity(self):
-        with lab() as place:
+        with lab(config=FLEET) as place:
             station = place.start_station()
             robots = Robots(station.endpoints["robots"])
             self.addCleanup(lambda: robots.process.poll() is None and robots.kill())

@@ -13,13 +13,15 @@ sys.path.insert(0, str(ROOT / "deploy"))
 from station_api import ApiError, Station, wait_until  # noqa: E402, F401  (used by the tests)
 
 BIN = pathlib.Path(os.environ["RHEONAUT_BIN"])  # set by CTest
+FLEET = (ROOT / "deploy" / "fleet.toml").read_text()  # a station that lets a whole fleet enrol itself
 
 
 class Lab:
     """A data folder, and the processes that were started for it; all of them are gone at the end."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, config=None):
         self.folder = pathlib.Path(folder)
+        self.config = config
         self.data = self.folder / "data"
         self.processes = []
         self.station_process = None
@@ -43,8 +45,9 @@ class Lab:
             raise
 
     def start_unannounced(self, http, robots, config=None):
-        """Does not wait for it: on a full disk the station cannot say where it is. `config` is TOML."""
+        """Does not wait for it: on a full disk the station cannot say where it is. `config` is TOML, or else the lab's."""
         flags = []
+        config = self.config if config is None else config
         if config is not None:
             (self.folder / "rheonaut.toml").write_text(config)
             flags = ["--config", self.folder / "rheonaut.toml"]
@@ -84,10 +87,10 @@ class Lab:
 
 
 @contextlib.contextmanager
-def lab(disk=None):
+def lab(disk=None, config=None):
     """A Lab in a folder of its own, on the disk that is mounted there. When the test fails, the logs are printed."""
     with tempfile.TemporaryDirectory(prefix="rheonaut-", dir=disk) as folder:
-        place = Lab(folder)
+        place = Lab(folder, config)
         try:
             yield place
         except BaseException:

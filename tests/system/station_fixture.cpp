@@ -13,7 +13,7 @@ SystemTest::SystemTest() {
   clock.add_worker(exports);
   clock.add_worker(checkpoints);
   recording = std::make_unique<RecordingParts>(loop, clock, disk, readers, exports, checkpoints,
-                                               RecorderOptions{folder / "station.sqlite"});
+                                               RecorderOptions{folder / "station.sqlite", {}});
   clock.add_worker(recording->backups.checker());
   recorder = &recording->recorder;
   runs = &recording->runs;

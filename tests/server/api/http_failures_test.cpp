@@ -98,7 +98,7 @@ TEST_F(HttpFailuresTest, NoRefusalSpeaksOfTheInside) {
 struct NewCredentials {
   NewCredentials(boost::asio::io_context& loop, Clock& clock, const std::filesystem::path& folder)
       : database{folder / "station.sqlite"},
-        recorder{loop, clock, disk, checkpoints, RecorderOptions{folder / "station.sqlite"}},
+        recorder{loop, clock, disk, checkpoints, RecorderOptions{folder / "station.sqlite", {}}},
         accounts{loop, clock, recorder, folder},
         auth{loop, clock, accounts, folder, 1} {}
   Database database;

@@ -80,7 +80,7 @@ TEST_F(RecordingRoutesTest, ALockedDatabaseIsFailingUntilItIsFree) {
 
 class ShortLogTest : public ApiTest {
  protected:
-  ShortLogTest() : ApiTest{{}, {.path = {}, .checkpoint_bytes = 1 << 17}} {}
+  ShortLogTest() : ApiTest{{}, {.path = {}, .enrolment = {}, .checkpoint_bytes = 1 << 17}} {}
 
   void record(microseconds duration) {
     for (microseconds passed{0}; passed < duration; passed += 100ms) {

@@ -43,6 +43,29 @@ TEST_F(LinkTest, RefusesWhatTheArchiveRefuses) {
   EXPECT_STREQ(robot->welcomes()[0].detail, "the token of 'r1' is another one");
 }
 
+TEST_F(LinkTest, ARobotThatCannotEnrolItselfIsAnEventUnderItsNameAtMostOnceIn10S) {
+  archive.answer.refusal = rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT;
+  archive.answer.enrolment_full = true;
+  archive.answer.detail = "64 robots have enrolled themselves";
+  const auto ask = [this](char number) {
+    auto frame = TestRobot::hello_frame();
+    frame.body.hello.robot_id[1] = number;
+    auto* robot = dial();
+    robot->send(frame);
+    EXPECT_TRUE(clock.run_until([&] { return robot->closed; }, 1s));
+  };
+  for (const char number : {'2', '3', '4'}) ask(number);
+  ASSERT_EQ(sink.events.size(), 1u);
+  EXPECT_EQ(sink.events[0].kind, "enrolment_refused");
+  EXPECT_EQ(sink.events[0].robot_id, "r2");
+  EXPECT_NE(sink.events[0].detail.find("64 robots have enrolled themselves"), std::string::npos);
+  clock.run_for(11s);
+  ask('5');
+  ASSERT_EQ(sink.events.size(), 2u);
+  EXPECT_NE(sink.events[1].detail.find("(2 more since the last event)"), std::string::npos) << sink.events[1].detail;
+  EXPECT_EQ(station.find("r2"), nullptr) << "it is not listed";
+}
+
 TEST_F(LinkTest, RefusesAMalformedHello) {
   const auto spoil = [](auto change) {
     auto frame = TestRobot::hello_frame();

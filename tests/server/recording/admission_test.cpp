@@ -1,4 +1,6 @@
 // Who may connect, and with which boot.
+#include <gmock/gmock.h>
+
 #include <boost/asio/experimental/awaitable_operators.hpp>
 
 #include "server/recording/account_store.hpp"
@@ -10,9 +12,24 @@ using namespace asio::experimental::awaitable_operators;  // NOLINT: operators o
 
 namespace {
 
+using ::testing::HasSubstr;
+
 class AdmissionTest : public RecordingTest {
  protected:
   TestRobot robot_;
+
+  static TestRobot numbered(int number) {
+    TestRobot robot;
+    robot.id = "r" + std::to_string(number);
+    robot.boot_id = 1000 + static_cast<BootId>(number);
+    return robot;
+  }
+  // Of robots 1 to count, which ask one after the other.
+  int enrolled_of(int count) {
+    int enrolled = 0;
+    for (int i = 1; i <= count; ++i) enrolled += admit(numbered(i)).newly_enrolled ? 1 : 0;
+    return enrolled;
+  }
 
   // From elsewhere than loopback.
   Admission admit_remote(const std::string& token) {
@@ -67,7 +84,7 @@ TEST_F(AdmissionTest, FollowsTheTable) {
       stop();
     }
     RecorderOptions options;
-    options.enrol_on_loopback = entry.enrol_on_loopback;
+    options.enrolment.allowed = entry.enrol_on_loopback;
     start(options);
     robot.token = entry.token;
     robot.from_loopback = entry.from_loopback;
@@ -273,6 +290,48 @@ TEST_F(AdmissionTest, RefusesNumbersThatCannotBe) {
   start();
   robot_.oldest_seq = 5;  // but next_seq is 0
   EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_MALFORMED);
+}
+
+TEST_F(AdmissionTest, OnlySoManyRobotsEnrolThemselvesAMinute) {
+  most_a_minute_ = 3;
+  start();
+  EXPECT_EQ(enrolled_of(5), 3);
+  clock_.run_for(59s);
+  const Admission refused = admit(numbered(4));
+  EXPECT_EQ(refused.refusal, rheonaut_REFUSAL_REASON_STATION_BUSY);
+  EXPECT_TRUE(refused.enrolment_full);
+  EXPECT_THAT(refused.detail, HasSubstr("only 3 robots of this machine enrol themselves a minute: try again later"));
+  EXPECT_EQ(admit(numbered(2)).refusal, rheonaut_REFUSAL_REASON_NONE) << "one that is enrolled";
+  kill();
+  start();
+  EXPECT_EQ(admit(numbered(4)).refusal, rheonaut_REFUSAL_REASON_STATION_BUSY) << "a restart begins no new minute";
+  clock_.run_for(2s);
+  EXPECT_TRUE(admit(numbered(4)).newly_enrolled);
+}
+
+TEST_F(AdmissionTest, OnlySoManyRobotsEnrolThemselvesAtAll) {
+  most_robots_ = 64;
+  start();
+  EXPECT_EQ(enrolled_of(70), 64);
+  const Admission refused = admit(numbered(65));
+  EXPECT_EQ(refused.refusal, rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT);
+  EXPECT_TRUE(refused.enrolment_full);
+  EXPECT_THAT(refused.detail, HasSubstr("only 64 robots of this machine enrol themselves: rheonaut robot enroll r65"));
+  EXPECT_EQ(number("SELECT count(*) FROM robot"), 64);
+  const auto with_store = [this](auto change) {
+    auto job = [change](Database& database) {
+      AccountStore store{database.handle()};
+      return change(store);
+    };
+    return wait(recorder_->on_disk(std::move(job)));
+  };
+  ASSERT_TRUE(with_store([](AccountStore& store) { return store.enrol("r65", hash_of("a token"), {"anna", "", 1}); }));
+  TestRobot with_token = numbered(65);
+  with_token.token = "a token";
+  EXPECT_EQ(admit(with_token).refusal, rheonaut_REFUSAL_REASON_NONE) << "people enrol as many as they like";
+  ASSERT_TRUE(with_store([](AccountStore& store) { return store.revoke_robot("r1", {"anna", "", 1}); }));
+  EXPECT_TRUE(admit(numbered(66)).newly_enrolled) << "there is room again";
+  EXPECT_FALSE(admit(numbered(67)).newly_enrolled);
 }
 
 TEST_F(AdmissionTest, ARestartKnowsTheFluidOfARobot) {

@@ -166,7 +166,8 @@ TEST_F(BackupTest, StationsMayHaveOneFolder) {
   ASSERT_TRUE(clock_.run_until([&] { return std::ranges::any_of(files(common), is_part); }, 10s));
 
   RecordingParts other{
-      loop_, clock_, disk_, readers_, exports_worker_, checkpoints_, RecorderOptions{folder_ / "other.sqlite"}, config};
+      loop_, clock_, disk_, readers_, exports_worker_, checkpoints_, RecorderOptions{folder_ / "other.sqlite", {}},
+      config};
   clock_.add_worker(other.backups.checker());
   wait(other.open());
   other.spawn(*tasks_);

@@ -41,6 +41,8 @@ RecordingTest::~RecordingTest() {
 
 void RecordingTest::start(RecorderOptions options, const RecordingConfig& config) {
   options.path = path_;
+  options.enrolment.most_robots = most_robots_;
+  options.enrolment.most_a_minute = most_a_minute_;
   tasks_ = std::make_unique<TaskGroup>(loop_);
   recording_ =
       std::make_unique<RecordingParts>(loop_, clock_, disk_, readers_, exports_worker_, checkpoints_, options, config);

@@ -120,6 +120,8 @@ class RecordingTest : public ::testing::Test {
 
   std::filesystem::path folder_;
   std::filesystem::path path_;
+  std::uint32_t most_robots_ = 100'000;  // that may enrol themselves, in all and in a minute
+  std::uint32_t most_a_minute_ = 100'000;
   boost::asio::io_context loop_{1};
   WorkerThread disk_{"disk"};
   WorkerThread readers_{"readers"};
