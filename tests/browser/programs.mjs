@@ -7,6 +7,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 
 const bin = process.env.RHEONAUT_BIN ?? new URL('../../build/dev/bin', import.meta.url).pathname;
+const kFleetConfig = new URL('../../deploy/fleet.toml', import.meta.url).pathname; // a whole fleet may enrol itself
 const { chromium } = createRequire(new URL('../../web/package.json', import.meta.url))('playwright-core');
 
 const kChromium = {
@@ -63,7 +64,8 @@ export class Bench {
   async start_station() {
     const { http = '127.0.0.1:0', robots = '127.0.0.1:0' } = this.endpoints ?? {};
     const file = join(this.data, 'endpoints.json');
-    this.station = new Program('rheonaut', 'serve', '--data', this.data, '--http', http, '--robots', robots);
+    this.station = new Program('rheonaut', 'serve', '--data', this.data, '--http', http, '--robots', robots,
+                               '--config', kFleetConfig);
     const pid = this.station.process.pid;
     this.endpoints = await until('the station announces its endpoints', () => {
       if (!this.station.runs) throw new Error('the station ended');

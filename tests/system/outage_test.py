@@ -13,7 +13,7 @@ import threading
 import time
 import unittest
 
-from processes import BIN, Station, lab, wait_until
+from processes import BIN, FLEET, Station, lab, wait_until
 from recording_audit import audit
 
 ROBOTS = int(os.environ.get("RHEONAUT_STORM_ROBOTS", 100))
@@ -93,7 +93,7 @@ class OutageTest(unittest.TestCase):
         return dead_s, behind_s + died_at - asked_at + dead_s
 
     def test_six_seconds_without_a_station_cost_no_sample(self):
-        with lab() as place:
+        with lab(config=FLEET) as place:
             started_at = time.monotonic()
             self.ports = place.start_station().endpoints
             self.start_s = time.monotonic() - started_at
