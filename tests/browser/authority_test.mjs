@@ -1,7 +1,7 @@
 // Two people, one robot: who is in control, what the other may do, a tab that is killed, a script without a lease, and a
 // page whose network stands still while it drives.
 import assert from 'node:assert/strict';
-import { Bench, run, until } from './programs.mjs';
+import { Bench, clear_latch, run, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const kPassword = 'correct horse battery';
@@ -26,13 +26,6 @@ async function sign_in(page, at, user) {
 async function enter_setpoint(page, setpoint_mm) {
   await page.fill('#setpoint-entry', String(setpoint_mm));
   await page.press('#setpoint-entry', 'Enter');
-}
-
-async function clear_latch(page) {
-  await page.locator('#clear-emergency').hover();
-  await page.mouse.down();
-  await until('manual', async () => (await mode(page)) === 'manual');
-  await page.mouse.up();
 }
 
 const steps = {

@@ -5,7 +5,7 @@
 // PATH gets a picture of the cockpit in the closed-loop experiment, FOLDER some of signing in.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
-import { Bench, run, until } from './programs.mjs';
+import { Bench, clear_latch as hold_to_clear, run, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const at = process.argv.indexOf('--screenshot');
@@ -68,9 +68,7 @@ async function clear_latch() {
   await page.waitForTimeout(300); // let go too early: it is guarded
   await page.mouse.up();
   assert.equal(await mode(), 'emergency');
-  await page.mouse.down();
-  await seen_mode('manual');
-  await page.mouse.up();
+  await hold_to_clear(page);
 }
 
 // ---- what an operator does, in order

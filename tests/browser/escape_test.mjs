@@ -1,6 +1,6 @@
 // Escape stops the robot whatever has the focus and whatever is open, once for each press; Space never does.
 import assert from 'node:assert/strict';
-import { Bench, run, until } from './programs.mjs';
+import { Bench, clear_latch, run, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const bench = new Bench();
@@ -20,14 +20,6 @@ async function escape_stops(what, press = () => page.keyboard.press('Escape')) {
   const latch = (await robot()).emergency_id;
   assert.notEqual(latch, null, what);
   assert.equal(await stops(), before + 1, `${what}: one stop`);
-}
-
-async function clear_latch() {
-  await until('the page knows the latch', async () => (await page.locator('#latch').getAttribute('data-emergency-id')) === (await robot()).emergency_id);
-  await page.locator('#clear-emergency').hover();
-  await page.mouse.down();
-  await seen_mode('manual');
-  await page.mouse.up();
 }
 
 async function engage_auto() {
@@ -69,7 +61,7 @@ const steps = {
       await engage_auto();
       await page.focus(`#${id}`);
       await escape_stops(`${id} focused, in auto`);
-      await clear_latch();
+      await clear_latch(page);
     }
     const hold = page.locator('#hold-to-run');
     await hold.hover();
@@ -119,6 +111,14 @@ const steps = {
     const text = await list.innerText();
     assert.match(text, /Space\s+Never stops/);
     assert.match(text, /full screen/);
+    for (const [width, height] of [[1024, 768], [844, 390], [1440, 900]]) {
+      await page.setViewportSize({ width, height });
+      const over = await page.evaluate(() => {
+        const [panel, stop, all] = ['#key-list', '#emergency-stop', '#stop-all'].map((each) => document.querySelector(each).getBoundingClientRect());
+        return [stop, all].some((each) => panel.right > each.left && panel.bottom > each.top && panel.left < each.right && panel.top < each.bottom);
+      });
+      assert.ok(!over, `it never lies over a button that stops, at ${width} × ${height}`);
+    }
     await escape_stops('the list of keys open');
     await list.waitFor({ state: 'hidden' });
   },
@@ -156,7 +156,7 @@ const steps = {
       for (let i = 0; i < 20; ++i) await page.keyboard.down('Escape'); // each but the first repeats
       await page.keyboard.up('Escape');
     });
-    await clear_latch();
+    await clear_latch(page);
   },
 
   async 'Space never stops, not even on a button that stops; Enter does'() {

@@ -27,6 +27,23 @@ export async function until(what, probe, bound_ms = 10_000) {
   }
 }
 
+// Holds the button that clears the latch until the robot is in manual. A browser that draws without a graphics card may
+// stand still for so long that what it shows is no longer current; then the hold ends, as it must, and is begun again.
+export async function clear_latch(page) {
+  const button = page.locator('#clear-emergency');
+  const is_manual = async () => (await page.locator('.annunciator').getAttribute('data-mode')) === 'manual';
+  await page.locator('#latch').waitFor();
+  await until('the latch is cleared', async () => {
+    if (await is_manual()) return true;
+    if ((await button.count()) === 0 || !(await button.isEnabled())) return false;
+    await button.hover();
+    await page.mouse.down();
+    await until('manual', is_manual, 3000).catch(() => undefined);
+    await page.mouse.up();
+    return is_manual();
+  }, 30_000);
+}
+
 class Program {
   output = '';
 

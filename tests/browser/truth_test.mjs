@@ -1,7 +1,7 @@
 // What the page shows is true: where a robot is that a disturbance moves, what is known while the station is silent, a
 // run that was interrupted, an emergency in a tab that nobody looks at, and plots that never cover a control.
 import assert from 'node:assert/strict';
-import { Bench, run, until } from './programs.mjs';
+import { Bench, clear_latch, run, until } from './programs.mjs';
 
 const kRobot = 'rheo-1';
 const bench = new Bench();
@@ -10,7 +10,6 @@ let page;
 const text = (selector) => page.locator(selector).first().innerText({ timeout: 5000 });
 const number = async (name) => Number((await text(`#numeral-${name} output`)).replace('\u2212', '-'));
 const mode = () => page.locator('.annunciator').getAttribute('data-mode');
-const seen_mode = (wanted) => until(`the page shows ${wanted}`, async () => (await mode()) === wanted, 15_000);
 const robot = () => bench.ask(`/robots/${kRobot}`);
 const command = (body) => bench.post(`/robots/${kRobot}/commands`, body);
 const live = async () => {
@@ -18,14 +17,6 @@ const live = async () => {
   await until('samples arrive', async () => (await page.locator('.readouts.stale').count()) === 0, 15_000);
 };
 const phase = () => page.locator('#stop-line').getAttribute('data-phase');
-
-async function clear_latch() {
-  await until('the latch may be cleared', async () => (await page.locator('#clear-emergency').count()) > 0 && (await page.locator('#clear-emergency').isEnabled()), 15_000);
-  await page.locator('#clear-emergency').hover();
-  await page.mouse.down();
-  await seen_mode('manual');
-  await page.mouse.up();
-}
 
 async function start_run(name) {
   await page.fill('#run-name', name);
@@ -110,7 +101,7 @@ const steps = {
     assert.equal((await robot()).sample.duty, 0);
     await live();
     await page.locator('.recording-lamp').waitFor(); // the run is open still
-    await clear_latch();
+    await clear_latch(page);
     assert.equal(await phase(), 'idle');
     await page.click('#end-run');
   },
@@ -164,7 +155,7 @@ const steps = {
     assert.match(answer.headers.get('content-type'), /svg/);
     await other.close();
     await page.bringToFront();
-    await clear_latch();
+    await clear_latch(page);
     await until('and takes it back', async () => (await tab()).title === 'Rheonaut');
   },
 

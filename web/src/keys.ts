@@ -3,7 +3,7 @@
 // What opens on the page is drawn by the page itself: the first Escape would only close a native pop-up (select, datalist,
 // date, a list of earlier entries), and the page would never hear of it.
 
-import { useEffect } from 'preact/hooks';
+import { useLayoutEffect } from 'preact/hooks';
 
 export interface KeyTarget {
   addEventListener(type: 'keydown', listener: (event: KeyboardEvent) => void, options: { capture: boolean }): void;
@@ -28,13 +28,13 @@ export function listen_for_stop_key(target: KeyTarget, stop: () => void): () => 
 }
 
 // Escape never only closes something: it has stopped the robot already when it comes here, and closes as well.
-export function useCloseOnEscape(is_open: boolean, close: () => void): void {
-  useEffect(() => {
-    if (!is_open) return undefined;
+// It listens from the start: a list that has just opened is not painted yet when the key comes.
+export function useCloseOnEscape(close: () => void): void {
+  useLayoutEffect(() => {
     const listener = (event: KeyboardEvent) => is_escape(event) && close();
     window.addEventListener('keydown', listener, { capture: true });
     return () => window.removeEventListener('keydown', listener, { capture: true });
-  }, [is_open]);
+  }, []);
 }
 
 // A menu of the browser is a native pop-up as well. With Shift it opens all the same, for whoever looks into the page; a

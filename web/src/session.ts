@@ -63,6 +63,8 @@ export class Session {
     });
   }
 
+  private refreshed_at_ms = 0;
+  private let_pass = false;
   private looked_at: string[] = []; // robots, the latest first
 
   // The name under which a notice about a run is dismissed; run numbers begin anew with each store.
@@ -122,6 +124,15 @@ export class Session {
     }
   }
 
+  // A page that stood still (a machine under load) hears first what waits for it: one refresh is let pass, never two.
+  private judge_current(now_ms: number): void {
+    const stood_still = now_ms - this.refreshed_at_ms > 3 * kRefresh_ms && !this.let_pass;
+    const is_current = this.link.is_current();
+    this.refreshed_at_ms = now_ms;
+    this.let_pass = stood_still && !is_current;
+    if (!this.let_pass) this.store.is_current.value = is_current;
+  }
+
   // The newest run of a robot may be one that was interrupted.
   private async load_newest_run(robot_id: string | null): Promise<void> {
     const run = robot_id === null ? null : await this.api.newest_run(robot_id);
@@ -129,7 +140,7 @@ export class Session {
   }
 
   private refresh(): void {
-    this.store.is_current.value = this.link.is_current();
+    this.judge_current(performance.now());
     this.store.refresh();
     this.emergency.look();
     // A mode that takes no duty ended the hold; the hand has to press again.

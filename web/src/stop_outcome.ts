@@ -68,8 +68,8 @@ export function words_of_all({ summary, reason }: StopOutcome, answered_in: stri
   const parts = [
     failed > 0 && `${names(summary, 'failed', failed)}: the stop may not have arrived (${sentence(reason) || 'the station’s log says why'}). Press again, or cut the power.`,
     `Stopped ${acknowledged} of ${count(robots - left_out, 'robot')} in ${answered_in}.`,
-    unanswered > 0 && `${names(summary, 'unanswered', unanswered)}: sent, not answered yet; repeated until it is.`,
-    kept > 0 && `${names(summary, 'kept', kept)}: not connected; the stop is kept and sent first on return.`,
+    unanswered > 0 && `${names(summary, 'unanswered', unanswered)}: not answered yet; the stop is repeated.`,
+    kept > 0 && `${names(summary, 'kept', kept)}: not connected; kept, and sent first on return.`,
     left_out > 0 && `Left out: ${left_out} retired and not connected.`,
   ];
   return parts.filter(Boolean).join(' ');

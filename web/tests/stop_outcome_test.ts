@@ -18,7 +18,7 @@ test('what failed comes first, with its reason and what to do', () => {
   const outcome = outcome_of([record('a', 'acknowledged'), record('b', 'failed', 'link_lost'), record('c', 'sent')]);
   expect(phase_of(outcome)).toBe('failed');
   expect(words_of_all(outcome, '9 ms')).toMatch(/^b: the stop may not have arrived .*Press again/);
-  expect(words_of_all(outcome, '9 ms')).toContain('c: sent, not answered yet');
+  expect(words_of_all(outcome, '9 ms')).toContain('c: not answered yet');
 });
 
 test('the worst decides, and a stop of nobody is none', () => {

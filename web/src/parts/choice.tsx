@@ -79,7 +79,7 @@ export function Choice({ id, label, options, value, disabled = false, on_choose 
     at.value = next;
     open.value = true;
   };
-  useCloseOnEscape(open.value, close);
+  useCloseOnEscape(close);
   useEffect(() => {
     if (!open.value) return;
     list.current?.scrollIntoView({ block: 'nearest' });

@@ -8,7 +8,7 @@ export function KeyList() {
   const open = useSignal(false);
   const root = useRef<HTMLSpanElement>(null);
   const close = () => (open.value = false);
-  useCloseOnEscape(open.value, close);
+  useCloseOnEscape(close);
   useEffect(() => {
     const listener = (event: PointerEvent) => root.current?.contains(event.target as Node) || close();
     addEventListener('pointerdown', listener);

@@ -43,11 +43,12 @@ function describe({ event, command, note, position_sd_m }: LogLine): [tone: stri
   if (event) {
     const alarm = event.kind === 'emergency';
     const where = event.kind === 'mode_changed' ? ` to ${event.mode}` : event.kind === 'sub_state_changed' ? ` to ${event.sub_state}` : '';
+    const much = event.kind === 'disturbance' ? ` ${millimetres(event.value)} mm` : '';
     const of_latch = event.kind === 'emergency' ? event.emergency_cause : null;
     const cause = [of_latch ?? event.cause].filter((said) => said && said !== 'none').map((said) => ` · ${words(said)}`).join('');
     const detail = event.detail ? ` · ${event.detail}` : '';
     const at = event.position_m !== null ? ` · controller at ${millimetres(event.position_m)} ${plus_minus(position_sd_m)} mm` : '';
-    return [alarm ? 'alarm' : /lost|fault|limit|lapsed/.test(event.kind) ? 'caution' : '', 'event', words(event.kind) + where + cause + detail + at];
+    return [alarm ? 'alarm' : /lost|fault|limit|lapsed/.test(event.kind) ? 'caution' : '', 'event', words(event.kind) + much + where + cause + detail + at];
   }
   return ['quiet', 'page', note ?? ''];
 }

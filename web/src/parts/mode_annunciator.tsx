@@ -14,7 +14,7 @@ export function ModeAnnunciator({ robot, is_current }: { robot: Robot; is_curren
   );
   const spoken = `${robot_id}: ${mode} ${mode === 'auto' ? words(sub_state) : mode === 'emergency' ? words(emergency_cause) : ''}`;
   return (
-    <div class={`annunciator ${stale ? 'stale' : ''}`} data-mode={mode}>
+    <div class={`annunciator ${stale || !is_current ? 'stale' : ''}`} data-mode={mode}>
       <h1>
         {robot_id}
         <small>{!is_current ? 'cut off' : link === 'connected' ? `firmware ${firmware_version || '–'}` : 'not connected'}</small>
