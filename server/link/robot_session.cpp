@@ -131,13 +131,7 @@ void RobotSession::read() {
 }
 
 void RobotSession::work_off(protocol::Bytes unread) {
-  while (close_reason_.empty()) {
-    const Next next = decode_next_of(unread);
-    if (next == Next::none) break;
-    if (next == Next::undecodable) {
-      station_.on_invalid_values(*this, 1, "malformed", "a frame does not decode");
-      continue;
-    }
+  while (close_reason_.empty() && decode_next_of(unread)) {
     if (!hello_) {
       after_hello_.assign(unread.begin(), unread.end());
       return on_hello(buffers_.frame);
@@ -149,17 +143,20 @@ void RobotSession::work_off(protocol::Bytes unread) {
   if (heartbeat_wanted_ && !robot_id_.empty()) flush();
 }
 
-// Into the buffer of a frame; none also at a fault (then close_reason_ is set). What a robot that is welcome has sent and
-// does not decode is passed over: its length is known, and the robot would send it again over the next connection.
-RobotSession::Next RobotSession::decode_next_of(protocol::Bytes& unread) {
-  const auto state = reader_.push(unread);
-  if (state == protocol::FrameReader::State::oversize)
-    close_reason_ = "a frame longer than 1024 bytes: not this protocol";
-  if (state != protocol::FrameReader::State::complete) return Next::none;
-  if (protocol::decode_robot_frame(reader_.payload(), buffers_.frame)) return Next::frame;
-  if (!robot_id_.empty()) return Next::undecodable;
+// Into the buffer of a frame; false when there is none, or a fault (then close_reason_ is set). What a robot that is
+// welcome has sent and does not decode is passed over: the robot would send it again over the next connection.
+bool RobotSession::decode_next_of(protocol::Bytes& unread) {
+  for (;;) {
+    const auto state = reader_.push(unread);
+    if (state == protocol::FrameReader::State::oversize)
+      close_reason_ = "a frame longer than 1024 bytes: not this protocol";
+    if (state != protocol::FrameReader::State::complete) return false;
+    if (protocol::decode_robot_frame(reader_.payload(), buffers_.frame)) return true;
+    if (robot_id_.empty()) break;
+    station_.on_invalid_values(*this, 1, "malformed", "a frame does not decode");
+  }
   close_reason_ = "a frame that does not decode";
-  return Next::none;
+  return false;
 }
 
 void RobotSession::on_hello(const protocol::RobotFrame& frame) {
@@ -251,10 +248,7 @@ void RobotSession::on_frame(protocol::RobotFrame& frame) {
   const FrameFaults faults = mend(frame);
   station_.on_frame(*this, frame.robot_time_us);
   if (faults.count > 0) station_.on_invalid_values(*this, faults.count, faults.cause, faults.first);
-  if (faults.is_unusable) {
-    if (faults.has_number) give_up(frame);
-    return;
-  }
+  if (faults.is_unusable) return faults.has_number ? give_up(frame) : void();
   switch (frame.which_body) {
     case rheonaut_RobotFrame_telemetry_tag: station_.on_samples(*this, frame.body.telemetry); break;
     case rheonaut_RobotFrame_event_tag: station_.on_event(*this, frame.body.event); break;

@@ -59,8 +59,7 @@ class RobotSession final : public RobotPort {
 
   void read();
   void work_off(protocol::Bytes unread);
-  enum class Next : std::uint8_t { none, frame, undecodable };
-  Next decode_next_of(protocol::Bytes& unread);
+  bool decode_next_of(protocol::Bytes& unread);
   void on_hello(const protocol::RobotFrame& frame);
   boost::asio::awaitable<bool> admit(const protocol::Hello& hello);
   protocol::StationFrame welcome(const Admission& admission) const;

@@ -81,8 +81,7 @@ TEST_F(InvalidValuesTest, TheyAreCountedAndToldOnceInTenSeconds) {
   for (std::uint64_t i = 0; i < 20; ++i) send_broken(5 * i);
   ASSERT_EQ(told().size(), 1u);
   EXPECT_EQ(told()[0].cause, "not_finite");
-  EXPECT_EQ(told()[0].detail,
-            "disturbance_m is nan from sample 0 on; NULL is stored (1 more since the last event)");
+  EXPECT_EQ(told()[0].detail, "disturbance_m is nan from sample 0 on; NULL is stored (1 more since the last event)");
   EXPECT_EQ(station.find("r1")->invalid_values, 40u);
   EXPECT_EQ(station.invalid_values(), 40u);
   EXPECT_EQ(to_json(*station.find("r1"))["invalid_values"], 40);

@@ -253,13 +253,6 @@ TEST_F(LinkTest, SamplesSentAgainDoNotChangeTheLiveState) {
   EXPECT_EQ(station.find("r1")->sample->position_m, 104.0F);
 }
 
-TEST_F(LinkTest, ASampleNumberBeyondAllReasonEndsTheConnection) {
-  auto* robot = connect();
-  robot->send_samples(~std::uint64_t{0} - 2, 5, robot->robot_now_us(), 0);
-  EXPECT_TRUE(clock.run_until([&] { return robot->closed; }, 100ms));
-  EXPECT_TRUE(sink.batches.empty());
-}
-
 TEST_F(LinkTest, TellsTheRobotWhatIsDurableAndWhatToSendAgain) {
   auto* robot = connect();
   station.on_durable("r1", 77, 40, 2);
