@@ -6,6 +6,7 @@
 #include "server/api/json.hpp"
 #include "server/api/query_params.hpp"
 #include "server/number_text.hpp"
+#include "server/station/unknown_values.hpp"
 
 namespace server {
 namespace {
@@ -25,7 +26,8 @@ std::string shared_text(const Segment& segment) {
   append_float(out, context.position_sd_m.value_or(NAN), "null");
   out += fmt::format(R"(,"controller_id":{},"emergency_id":)", context.controller_id);
   out += context.emergency_id == 0 ? "null" : fmt::format(R"("{}")", context.emergency_id);
-  out += fmt::format(R"(,"emergency_cause":"{}","flags":{}}})", protocol::text(context.emergency_cause), context.flags);
+  out += fmt::format(R"(,"emergency_cause":"{}","flags":{},"unknown_values":{}}})",
+                     protocol::text(context.emergency_cause), context.flags, unknown_values(context).value_or("null"));
   return out;
 }
 

@@ -95,7 +95,7 @@ json to_json(const RunCertificate& found, RunId run) {
   json out;
   out["run_id"] = run;
   out["final"] = found.is_final;
-  out["format"] = kCertificateFormat;
+  out["format"] = certificate.format;
   out["samples_expected"] = certificate.samples_expected;
   out["samples_live"] = certificate.samples_live;
   out["samples_backfilled"] = certificate.samples_backfilled;

@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "server/station/unknown_values.hpp"
+
 namespace server {
 namespace {
 
@@ -26,6 +28,8 @@ json clock_json(const RobotState& robot) {
 }
 
 json decimal_or_null(const std::optional<float>& value) { return value ? decimal(*value) : json(nullptr); }
+
+json object_or_null(const std::optional<std::string>& text) { return text ? json::parse(*text) : json(nullptr); }
 
 void append(std::string& out, float value) {
   if (!std::isfinite(value)) {
@@ -106,6 +110,12 @@ json to_json(const RobotState& robot) {
   out["retired"] = robot.retired_at_us != 0;
   out["fluid"] = robot.fluid.empty() ? json(nullptr) : json(robot.fluid);
   out["invalid_values"] = robot.invalid_values;
+  out["unknown_values"] = object_or_null(UnknownValues{}
+                                             .add("reset_cause", robot.reset_cause)
+                                             .add("mode", context.mode)
+                                             .add("sub_state", context.sub_state)
+                                             .add("emergency_cause", context.emergency_cause)
+                                             .text());
   out["control"] = robot.control.holder.empty() ? json(nullptr) : to_json(robot.control);
   return out;
 }
@@ -147,6 +157,7 @@ json to_json(const RobotEvent& event) {
   out["cause"] = event.cause;
   out["emergency_cause"] = event.emergency_cause ? json(protocol::text(*event.emergency_cause)) : json(nullptr);
   out["detail"] = event.detail;
+  out["unknown_values"] = object_or_null(event.unknown_values);
   out["mode"] = mode_known ? json(protocol::text(event.mode)) : json(nullptr);
   out["sub_state"] = mode_known ? json(protocol::text(event.sub_state)) : json(nullptr);
   out["position_m"] = of_robot ? decimal(event.position_m) : json(nullptr);
@@ -173,6 +184,7 @@ std::string samples_message(const SampleBatch& batch) {
   head["position_sd_m"] = decimal_or_null(context.position_sd_m);
   head["emergency_id"] = id_text(context.emergency_id);
   head["flags"] = context.flags;
+  head["unknown_values"] = object_or_null(unknown_values(context));
   head["backfill"] = (context.flags & rheonaut_TELEMETRY_FLAG_BACKFILL) != 0;
   std::string out = dump(head);
   out.pop_back();  // the closing brace: the columns follow

@@ -10,6 +10,7 @@
 #include "server/recording/audit_chain.hpp"
 #include "server/recording/statement.hpp"
 #include "server/secrets.hpp"
+#include "server/station/unknown_values.hpp"
 
 namespace server {
 namespace {
@@ -246,10 +247,11 @@ void BootStore::add(const std::vector<NewBoot>& boots) {
   SQLite::Statement add{database_.handle(),
                         "INSERT INTO boot (boot_key, boot_id, robot_id, reset_cause, firmware_version,"
                         " sample_period_us, first_seen_at_us, announced_next_seq, announced_next_event_seq,"
-                        " last_robot_time_us) VALUES (?,?,?,?,?,?,?,?,?,?)"};
+                        " last_robot_time_us, unknown_values) VALUES (?,?,?,?,?,?,?,?,?,?,?)"};
   for (const auto& [boot_key, hello] : boots) {
     execute(add, boot_key, hello.boot_id, hello.robot_id, protocol::text(hello.reset_cause), hello.firmware_version,
-            hello.sample_period_us, hello.received_at_us, hello.next_seq, hello.next_event_seq, hello.robot_time_us);
+            hello.sample_period_us, hello.received_at_us, hello.next_seq, hello.next_event_seq, hello.robot_time_us,
+            UnknownValues{}.add("reset_cause", hello.reset_cause).text());
   }
   SQLite::Statement advance{database_.handle(),
                             "INSERT INTO meta (name, value) VALUES ('next_boot_key', ?)"

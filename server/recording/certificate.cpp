@@ -14,8 +14,9 @@
 namespace server {
 namespace {
 
-constexpr std::string_view kPreamble = "rheonaut-samples-1\n";
-constexpr std::size_t kSampleBytes = 96;
+constexpr std::size_t kMaxSampleBytes = 104;
+
+std::string_view preamble(int format) { return format == 1 ? "rheonaut-samples-1\n" : "rheonaut-samples-2\n"; }
 
 class ByteWriter {
  public:
@@ -25,13 +26,27 @@ class ByteWriter {
   void put(Integer value) {
     for (std::size_t byte = 0; byte < sizeof value; ++byte) *at_++ = static_cast<unsigned char>(value >> (8 * byte));
   }
+  template <class Enumerator>
+  void put_number(Enumerator value) {
+    put(static_cast<std::uint32_t>(value));
+  }
+  std::size_t bytes_since(const unsigned char* begin) const { return static_cast<std::size_t>(at_ - begin); }
   void put_float(float value) { put(std::isnan(value) ? 0x7fc00000U : std::bit_cast<std::uint32_t>(value)); }
 
  private:
   unsigned char* at_;
 };
 
-void write_sample(unsigned char* into, BootId boot_id, const Segment& segment, std::size_t index) {
+// Format 1 had a byte for each, and 0 for those that it did not know.
+void write_enumerators_1(ByteWriter& bytes, const SampleContext& context) {
+  bytes.put(static_cast<std::uint8_t>(context.mode));
+  bytes.put(static_cast<std::uint8_t>(context.sub_state));
+  bytes.put(static_cast<std::uint8_t>(context.emergency_cause));
+  bytes.put(std::uint8_t{0});
+}
+
+// How many bytes it wrote.
+std::size_t write_sample(unsigned char* into, int format, BootId boot_id, const Segment& segment, std::size_t index) {
   const Sample& sample = segment.samples[index];
   const SampleContext& context = segment.context;
   const std::uint64_t robot_time_us = segment.robot_time_us(index);
@@ -48,13 +63,17 @@ void write_sample(unsigned char* into, BootId boot_id, const Segment& segment, s
   for (const std::optional<float>& value : {context.setpoint_m, context.disturbance_m, context.position_sd_m}) {
     bytes.put_float(value.value_or(std::numeric_limits<float>::quiet_NaN()));
   }
-  bytes.put(static_cast<std::uint8_t>(context.mode));
-  bytes.put(static_cast<std::uint8_t>(context.sub_state));
-  bytes.put(static_cast<std::uint8_t>(context.emergency_cause));
-  bytes.put(std::uint8_t{0});
+  if (format == 1) {
+    write_enumerators_1(bytes, context);
+  } else {
+    bytes.put_number(context.mode);
+    bytes.put_number(context.sub_state);
+    bytes.put_number(context.emergency_cause);
+  }
   bytes.put(context.controller_id);
   bytes.put(context.flags);
   bytes.put(context.emergency_id);
+  return bytes.bytes_since(into);
 }
 
 }  // namespace
@@ -68,21 +87,21 @@ bool Certificate::agrees_with(const Certificate& other) const {
   return all(*this) == all(other);
 }
 
-SampleHash::SampleHash() {
+SampleHash::SampleHash(int format) : format_{format} {
+  const std::string_view begin = preamble(format);
   crypto_hash_sha256_init(&state_);
-  crypto_hash_sha256_update(&state_, reinterpret_cast<const unsigned char*>(kPreamble.data()), kPreamble.size());
+  crypto_hash_sha256_update(&state_, reinterpret_cast<const unsigned char*>(begin.data()), begin.size());
 }
 
 void SampleHash::add(BootId boot_id, const Segment& segment) {
-  std::array<unsigned char, 100 * kSampleBytes> bytes;
+  std::array<unsigned char, 100 * kMaxSampleBytes> bytes;
   std::size_t used = 0;
   for (std::size_t index = 0; index < segment.samples.size(); ++index) {
-    if (used == bytes.size()) {
+    if (used + kMaxSampleBytes > bytes.size()) {
       crypto_hash_sha256_update(&state_, bytes.data(), used);
       used = 0;
     }
-    write_sample(bytes.data() + used, boot_id, segment, index);
-    used += kSampleBytes;
+    used += write_sample(bytes.data() + used, format_, boot_id, segment, index);
   }
   crypto_hash_sha256_update(&state_, bytes.data(), used);
 }
@@ -138,7 +157,8 @@ void SampleTally::note_gap(std::uint64_t samples, std::int64_t us) {
   counts_.longest_gap_us = std::max(counts_.longest_gap_us, us);
 }
 
-Certification::Certification(std::vector<CertifiedSpan> spans) : spans_{std::move(spans)} {
+Certification::Certification(std::vector<CertifiedSpan> spans, int format)
+    : spans_{std::move(spans)}, format_{format}, hash_{format} {
   if (spans_.empty()) return;
   next_seq_ = spans_[0].samples.first;
   tally_.begin_span(spans_[0].samples, spans_[0].period_us);
@@ -158,6 +178,7 @@ Certification::Progress Certification::advance(SQLite::Database& database, std::
 
 Certificate Certification::certificate() const {
   Certificate certificate = tally_.counts();
+  certificate.format = format_;
   certificate.sha256 = hash_.text();
   return certificate;
 }

@@ -1,15 +1,17 @@
 // The completeness certificate of a run: what of it was expected, came, and is lost, and a SHA-256 over its samples.
 //
-//   hashed = "rheonaut-samples-1\n" sample*                                 in order of span and seq
+//   hashed = "rheonaut-samples-2\n" sample*                                 in order of span and seq
 //   sample = boot_id:u64 seq:u64 robot_time_us:u64 utc_us:i64 clock_uncertainty_us:i64
 //            position_m:f32 velocity_m_s:f32 acceleration_m_s2:f32 duty:f32 impedance_mv:f32 reference_m:f32
 //            setpoint_m:f32 disturbance_m:f32 position_sd_m:f32
-//            mode:u8 sub_state:u8 emergency_cause:u8 0:u8 controller_id:u32 flags:u32 emergency_id:u64    96 bytes
+//            mode:i32 sub_state:i32 emergency_cause:i32 controller_id:u32 flags:u32 emergency_id:u64     104 bytes
 //
-// Little-endian; f32 is binary32, a NaN and a setpoint that is not there are 0x7fc00000; enumerators are the numbers of
-// the robot's protocol. How samples are cut into segments and where their rows lie is not in it, so it is the same
-// after a backup, an export or a VACUUM; nor is what people said of the run, which they may change. docs/database.md
-// repeats this for whoever checks it with another program.
+// Little-endian; f32 is binary32, a NaN and a value that is not there are 0x7fc00000; enumerators are the numbers of
+// the robot's protocol, also those that this version does not know. Format 1, of runs that were certified before schema
+// 7, has "rheonaut-samples-1\n" and mode:u8 sub_state:u8 emergency_cause:u8 0:u8, 96 bytes. How samples are cut into
+// segments and where their rows lie is not in it, so it is the same after a backup, an export or a VACUUM; nor is what
+// people said of the run, which they may change. docs/database.md repeats this for whoever checks it with another
+// program.
 //
 // Pure, but for advance(), which are called on the thread that owns the database handle and end within a
 // page. A broken promise of the database (a row that is not there) is an exception.
@@ -29,9 +31,10 @@
 
 namespace server {
 
-inline constexpr int kCertificateFormat = 1;
+inline constexpr int kCertificateFormat = 2;  // of new ones; those of 1 are verified for ever
 
 struct Certificate {
+  int format = kCertificateFormat;
   std::uint64_t samples_expected = 0;
   std::uint64_t samples_live = 0;
   std::uint64_t samples_backfilled = 0;  // sent again, on request or after a reconnect
@@ -53,11 +56,12 @@ struct Certificate {
 
 class SampleHash {
  public:
-  SampleHash();
+  explicit SampleHash(int format);
   void add(BootId boot_id, const Segment& segment);
   std::string text() const;  // of all so far
 
  private:
+  int format_;
   crypto_hash_sha256_state state_;
 };
 
@@ -105,7 +109,7 @@ class Certification {
  public:
   enum class Progress : std::uint8_t { more, waiting, done };
 
-  explicit Certification(std::vector<CertifiedSpan> spans);
+  explicit Certification(std::vector<CertifiedSpan> spans, int format = kCertificateFormat);
 
   // Takes in at most about `max_samples` samples.
   Progress advance(SQLite::Database& database, std::uint64_t max_samples);
@@ -122,6 +126,7 @@ class Certification {
   std::size_t span_ = 0;
   std::uint64_t next_seq_ = 0;  // of that span
   SampleTally tally_;
+  int format_;
   SampleHash hash_;
 };
 

@@ -131,7 +131,7 @@ std::optional<Certificate> read_certificate(SQLite::Database& database, RunId ru
   SQLite::Statement row{database,
                         "SELECT samples_expected, samples_live, samples_backfilled, samples_lost, lost_by_cause,"
                         " longest_gap_samples, longest_gap_us, worst_clock_uncertainty_us, samples_without_clock,"
-                        " sha256, made_at_us FROM run_certificate WHERE run_id = ? AND format = ?"};
+                        " sha256, made_at_us, format FROM run_certificate WHERE run_id = ? AND format BETWEEN 1 AND ?"};
   bind_all(row, run, std::int64_t{kCertificateFormat});
   if (!row.executeStep()) return std::nullopt;
   Certificate certificate;
@@ -146,6 +146,7 @@ std::optional<Certificate> read_certificate(SQLite::Database& database, RunId ru
   certificate.samples_without_clock = unsigned_id(row.getColumn(8));
   certificate.sha256 = row.getColumn(9).getString();
   certificate.made_at_us = row.getColumn(10).getInt64();
+  certificate.format = row.getColumn(11).getInt();
   return certificate;
 }
 
@@ -153,7 +154,7 @@ void write_certificate(SQLite::Database& database, RunId run, const Certificate&
   SQLite::Statement add{database,
                         "INSERT OR REPLACE INTO run_certificate SELECT ?,?,?,?,?,?,?,?,?,?,?,?,?"
                         " WHERE EXISTS (SELECT 1 FROM run WHERE run_id = ?1 AND state IN ('ended', 'interrupted'))"};
-  execute(add, run, std::int64_t{kCertificateFormat}, certificate.samples_expected, certificate.samples_live,
+  execute(add, run, std::int64_t{certificate.format}, certificate.samples_expected, certificate.samples_live,
           certificate.samples_backfilled, certificate.samples_lost, json_of(certificate.lost_by_cause).dump(),
           certificate.longest_gap_samples, certificate.longest_gap_us, certificate.worst_clock_uncertainty_us,
           certificate.samples_without_clock, certificate.sha256, certificate.made_at_us);

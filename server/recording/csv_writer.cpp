@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "server/number_text.hpp"
+#include "server/station/unknown_values.hpp"
 
 namespace server {
 namespace {
@@ -20,6 +21,14 @@ void append_micros(std::string& out, std::int64_t micros) {
   char digits[6];
   for (std::size_t place = 6; place-- > 0; micros /= 10) digits[place] = static_cast<char>('0' + micros % 10);
   out.append(digits, 6);
+}
+
+// Empty for none.
+std::string quoted(const std::optional<std::string>& text) {
+  if (!text) return {};
+  std::string out = "\"";
+  for (const char c : *text) out += c == '"' ? "\"\"" : std::string{c};
+  return out + '"';
 }
 
 }  // namespace
@@ -82,11 +91,11 @@ std::string CsvWriter::header() const {
   }
   out += grid_ ? ",setpoint_m,gap\n"
                : ",mode,sub_state,setpoint_m,disturbance_m,clock_uncertainty_us,first_received_at_us,received_at_us,"
-                 "position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,gap_after\n";
+                 "position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,gap_after,unknown_values\n";
   return out;
 }
 
-// What follows the channels, but for gap_before and gap_after.
+// What follows the channels, up to gap_before.
 std::string CsvWriter::shared_text(const Segment& segment) const {
   const SampleContext& context = segment.context;
   std::string out = fmt::format(",{},{},", protocol::text(context.mode), protocol::text(context.sub_state));
@@ -105,6 +114,7 @@ void CsvWriter::append(std::string& out, const ExportSegment& exported) {
   const Segment& segment = exported.part->segment;
   const std::string beginning = fmt::format("{},{},", exported.part->span, exported.part->boot_id);
   const std::string end = shared_text(segment);
+  const std::string last = ',' + quoted(unknown_values(segment.context)) + '\n';
   for (std::size_t index = 0; index < segment.samples.size(); ++index) {
     const std::uint64_t robot_time_us = segment.robot_time_us(index);
     out += beginning;
@@ -122,7 +132,7 @@ void CsvWriter::append(std::string& out, const ExportSegment& exported) {
     append_number(out, index == 0 ? exported.gap_before : 0);
     out += ',';
     append_number(out, index + 1 == segment.samples.size() ? exported.gap_after : 0);
-    out += '\n';
+    out += last;
   }
 }
 

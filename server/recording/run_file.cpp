@@ -7,6 +7,7 @@
 
 #include "server/recording/schema.hpp"
 #include "server/recording/statement.hpp"
+#include "server/station/unknown_values.hpp"
 
 namespace server {
 namespace {
@@ -40,7 +41,8 @@ CREATE TABLE sample (
   emergency_cause TEXT NOT NULL,
   flags INTEGER NOT NULL,
   gap_before INTEGER NOT NULL,             -- samples that are missing right before this one
-  gap_after INTEGER NOT NULL               -- and after it, to the end of its span
+  gap_after INTEGER NOT NULL,              -- and after it, to the end of its span
+  unknown_values TEXT                      -- JSON: numbers of enumerators that are 'unknown'; NULL: there are none
 );
 CREATE TABLE audit (                       -- docs/database.md
   entry INTEGER PRIMARY KEY,
@@ -114,7 +116,7 @@ constexpr Copy kCopies[] = {
     {"CREATE TABLE in_force AS SELECT * FROM store.run_in_force WHERE run_id = {0}"},
 };
 
-constexpr const char* kInsert = "INSERT INTO sample VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
+constexpr const char* kInsert = "INSERT INTO sample VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
 
 std::int64_t signed_seq(std::uint64_t seq) { return static_cast<std::int64_t>(seq); }
 
@@ -193,6 +195,7 @@ void RunFile::add(const ExportSegment& exported) {
   const SampleContext& context = segment.context;
   const std::string boot_id = std::to_string(exported.part->boot_id);
   const std::string emergency_id = std::to_string(context.emergency_id);
+  const std::optional<std::string> unknown = unknown_values(context);
   for (std::size_t index = 0; index < segment.samples.size(); ++index) {
     const Sample& sample = segment.samples[index];
     const std::uint64_t robot_time_us = segment.robot_time_us(index);
@@ -203,7 +206,7 @@ void RunFile::add(const ExportSegment& exported) {
             sample.reference_m, protocol::text(context.mode), protocol::text(context.sub_state), context.setpoint_m,
             context.disturbance_m, context.position_sd_m, context.controller_id, emergency_id,
             protocol::text(context.emergency_cause), context.flags, signed_seq(index == 0 ? exported.gap_before : 0),
-            signed_seq(index + 1 == segment.samples.size() ? exported.gap_after : 0));
+            signed_seq(index + 1 == segment.samples.size() ? exported.gap_after : 0), unknown);
   }
 }
 

@@ -26,7 +26,8 @@ constexpr const char* kSegmentColumns =
     "SELECT first_seq, last_seq, first_row, first_robot_time_us, period_us,"
     " iif(first_received_at_us = 0, received_at_us, first_received_at_us), received_at_us, utc_offset_us,"
     " clock_uncertainty_us, mode, sub_state, emergency_cause, setpoint_m, disturbance_m, position_sd_m, controller_id,"
-    " emergency_id, flags";
+    " emergency_id, flags, ";
+constexpr std::int64_t kUnknownValuesSince = 7;  // version: the tools read older ones, too
 
 Channel channel(std::size_t index) { return static_cast<Channel>(index); }
 
@@ -108,7 +109,8 @@ Result<Channels> parse_channels(std::string_view text) {
 void FinalizeStatement::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 
 SampleScanner::SampleScanner(SQLite::Database& database, Channels channels) : database_{database}, channels_{channels} {
-  segments_ = prepare(database, std::string{kSegmentColumns} + kInRange);
+  const bool has_unknown = database.execAndGet("PRAGMA user_version").getInt64() >= kUnknownValuesSince;
+  segments_ = prepare(database, std::string{kSegmentColumns} + (has_unknown ? "unknown_values" : "NULL") + kInRange);
   std::string sql = "SELECT row";
   for (std::size_t index = 0; index < kChannels; ++index) {
     if (channels[index]) sql += fmt::format(", {}", text(channel(index)));
@@ -170,6 +172,8 @@ std::int64_t SampleScanner::read_segment(Segment& into) {
   context.controller_id = static_cast<std::uint32_t>(unsigned_at(row, 15));
   context.emergency_id = unsigned_at(row, 16);
   context.flags = static_cast<std::uint32_t>(unsigned_at(row, 17));
+  const auto* unknown = reinterpret_cast<const char*>(sqlite3_column_text(row, 18));
+  if (unknown != nullptr) set_unknown(context, unknown);
   return sqlite3_column_int64(row, 2) + static_cast<std::int64_t>(skipped);
 }
 

@@ -7,6 +7,7 @@
 
 #include "server/recording/in_force_store.hpp"
 #include "server/recording/statement.hpp"
+#include "server/station/unknown_values.hpp"
 
 namespace server {
 namespace {
@@ -17,16 +18,16 @@ constexpr const char* kInsertSegment =
     " disturbance_m, position_sd_m, controller_id, emergency_id, emergency_cause, flags, min_position_m, "
     "max_position_m,"
     " min_velocity_m_s, max_velocity_m_s, min_acceleration_m_s2, max_acceleration_m_s2, min_duty, max_duty,"
-    " min_impedance_mv, max_impedance_mv, min_reference_m, max_reference_m)"
-    " VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?, ?,?,?,?,?,?,?,?,?,?,?,?)";
+    " min_impedance_mv, max_impedance_mv, min_reference_m, max_reference_m, unknown_values)"
+    " VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?, ?,?,?,?,?,?,?,?,?,?,?,?, ?)";
 constexpr const char* kInsertGap =
     "INSERT INTO gap (boot_key, first_seq, last_seq, cause, noticed_at_us) VALUES (?,?,?,?,?)";
 constexpr const char* kInsertEventGap =
     "INSERT INTO event_gap (boot_key, first_event_seq, last_event_seq, cause, noticed_at_us) VALUES (?,?,?,?,?)";
 constexpr const char* kInsertEvent =
     "INSERT INTO event (robot_id, boot_key, event_seq, robot_time_us, sample_seq, kind, cause, mode, sub_state,"
-    " position_m, value, emergency_id, command_id, received_at_us, emergency_cause, detail)"
-    " VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
+    " position_m, value, emergency_id, command_id, received_at_us, emergency_cause, detail,"
+    " unknown_values) VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
 
 }  // namespace
 
@@ -98,7 +99,8 @@ std::int64_t SampleStore::write_segment(const Segment& segment, std::int64_t fir
           segment.utc_offset_us, segment.clock_uncertainty_us, protocol::text(context.mode),
           protocol::text(context.sub_state), context.setpoint_m, context.disturbance_m, context.position_sd_m,
           context.controller_id, context.emergency_id, protocol::text(context.emergency_cause), context.flags,  //
-          min[0], max[0], min[1], max[1], min[2], max[2], min[3], max[3], min[4], max[4], min[5], max[5]);
+          min[0], max[0], min[1], max[1], min[2], max[2], min[3], max[3], min[4], max[4], min[5], max[5],
+          unknown_values(context));
   return next_row;
 }
 
@@ -109,7 +111,8 @@ void SampleStore::write_event(const StoredEvent& stored) {
       [](protocol::EmergencyCause cause) { return std::string{protocol::text(cause)}; });
   execute(insert_event_, event.robot_id, boot_key, event.event_seq, event.robot_time_us, event.sample_seq, event.kind,
           event.cause, protocol::text(event.mode), protocol::text(event.sub_state), event.position_m, event.value,
-          event.emergency_id, event.command_id, event.received_at_us, emergency_cause, event.detail);
+          event.emergency_id, event.command_id, event.received_at_us, emergency_cause, event.detail,
+          event.unknown_values);
 }
 
 }  // namespace server

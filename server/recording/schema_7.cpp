@@ -23,12 +23,65 @@ UPDATE sqlite_schema SET sql = replace(replace(sql, 'disturbance_m REAL NOT NULL
   'position_sd_m REAL NOT NULL', 'position_sd_m REAL') WHERE type = 'table' AND name = 'segment';
 PRAGMA writable_schema = RESET;
 
+-- JSON: the numbers of enumerators that this version did not know, {"mode":17}, whose text is 'unknown'. NULL: it knew
+-- all, or an earlier version stored the row, which kept the text alone.
+ALTER TABLE boot ADD COLUMN unknown_values TEXT;     -- of reset_cause
+ALTER TABLE segment ADD COLUMN unknown_values TEXT;  -- of mode, sub_state, emergency_cause
+ALTER TABLE event ADD COLUMN unknown_values TEXT;    -- of kind, cause, mode, sub_state, emergency_cause
+
+-- As before, with one column more.
+DROP VIEW run_sample;
+CREATE VIEW run_sample AS
+SELECT
+  run_span.run_id,
+  run_span.span,
+  printf('%llu', boot.boot_id) AS boot_id,
+  segment.first_seq + sample.row - segment.first_row AS seq,
+  segment.first_robot_time_us + (sample.row - segment.first_row) * segment.period_us AS robot_time_us,
+  segment.first_robot_time_us + (sample.row - segment.first_row) * segment.period_us + segment.utc_offset_us AS utc_us,
+  segment.clock_uncertainty_us,
+  segment.received_at_us,
+  sample.position_m,
+  sample.velocity_m_s,
+  sample.acceleration_m_s2,
+  sample.duty,
+  sample.impedance_mv,
+  sample.reference_m,
+  segment.mode,
+  segment.sub_state,
+  segment.setpoint_m,
+  segment.disturbance_m,
+  segment.position_sd_m,
+  segment.controller_id,
+  printf('%llu', segment.emergency_id) AS emergency_id,
+  segment.emergency_cause,
+  segment.flags,
+  iif(segment.first_received_at_us = 0, segment.received_at_us, segment.first_received_at_us) AS first_received_at_us,
+  segment.flags & 1 AS backfilled,
+  segment.unknown_values
+FROM run_span
+CROSS JOIN boot
+CROSS JOIN segment
+CROSS JOIN sample
+WHERE boot.boot_key = run_span.boot_key
+  AND segment.boot_key = run_span.boot_key
+  AND segment.first_seq >= run_span.first_seq - 99
+  AND segment.first_seq <= coalesce(run_span.last_seq, 9223372036854775807)
+  AND sample.row >= segment.first_row + max(0, run_span.first_seq - segment.first_seq)
+  AND sample.row <= segment.last_row - max(0, segment.last_seq - coalesce(run_span.last_seq, 9223372036854775807));
+
+DROP VIEW robot_boot;
+CREATE VIEW robot_boot AS
+SELECT robot_id, printf('%llu', boot_id) AS boot_id, boot_key, reset_cause, firmware_version, sample_period_us,
+  first_seen_at_us, unknown_values
+FROM boot;
+
 DROP VIEW robot_event;
 CREATE VIEW robot_event AS
 SELECT event.event_row, event.robot_id, printf('%llu', boot.boot_id) AS boot_id, event.event_seq, event.robot_time_us,
   event.sample_seq, event.kind, event.cause, event.mode, event.sub_state, event.position_m, event.value,
   printf('%llu', event.emergency_id) AS emergency_id, printf('%llu', event.command_id) AS command_id,
-  event.received_at_us, event.emergency_cause, event.detail
+  event.received_at_us, event.emergency_cause, event.detail, event.unknown_values
 FROM event LEFT JOIN boot USING (boot_key);
 )sql";
 

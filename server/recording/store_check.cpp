@@ -270,7 +270,9 @@ void Checking::check_certificate(RunId run) {
     stored = read_certificate(database_, run);
     const std::optional<RunState> state = read_run_state(database_, run);
     if (!state || *state == RunState::open || *state == RunState::discarded) return;
-    if (!certification) certification.emplace(read_certified_spans(database_, run));
+    if (!certification) {
+      certification.emplace(read_certified_spans(database_, run), stored ? stored->format : kCertificateFormat);
+    }
     try {
       progress = certification->advance(database_, kPageSamples);
     } catch (const std::runtime_error& error) {  // a row is not there, or cannot be read

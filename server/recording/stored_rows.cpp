@@ -3,8 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "server/recording/command_store.hpp"
 #include "server/recording/statement.hpp"
+#include "server/station/unknown_values.hpp"
 
 namespace server {
 namespace {
@@ -16,31 +19,41 @@ CommandState command_state_from(const std::string& name) {
   return CommandState::failed;
 }
 
+template <class Enumerator>
+Enumerator enumerator_from(const std::string& text, int first, int last) {
+  for (int value = first; value <= last; ++value) {
+    if (text == protocol::text(static_cast<Enumerator>(value))) return static_cast<Enumerator>(value);
+  }
+  return static_cast<Enumerator>(text == "unknown" ? kNumberNotKept : 0);
+}
+
 constexpr const char* kUnfinished = "state IN ('queued', 'sent')";
 
 }  // namespace
 
 protocol::Mode mode_from(const std::string& text) {
-  for (int value = _rheonaut_Mode_MIN; value <= _rheonaut_Mode_MAX; ++value) {
-    if (text == protocol::text(static_cast<protocol::Mode>(value))) return static_cast<protocol::Mode>(value);
-  }
-  return rheonaut_MODE_UNSPECIFIED;
+  return enumerator_from<protocol::Mode>(text, _rheonaut_Mode_MIN, _rheonaut_Mode_MAX);
 }
 
 protocol::SubState sub_state_from(const std::string& text) {
-  for (int value = _rheonaut_SubState_MIN; value <= _rheonaut_SubState_MAX; ++value) {
-    if (text == protocol::text(static_cast<protocol::SubState>(value))) return static_cast<protocol::SubState>(value);
-  }
-  return rheonaut_SUB_STATE_NONE;
+  return enumerator_from<protocol::SubState>(text, _rheonaut_SubState_MIN, _rheonaut_SubState_MAX);
 }
 
 protocol::EmergencyCause emergency_cause_from(const std::string& text) {
-  for (int value = _rheonaut_EmergencyCause_MIN; value <= _rheonaut_EmergencyCause_MAX; ++value) {
-    if (text == protocol::text(static_cast<protocol::EmergencyCause>(value))) {
-      return static_cast<protocol::EmergencyCause>(value);
-    }
-  }
-  return rheonaut_EMERGENCY_CAUSE_NONE;
+  return enumerator_from<protocol::EmergencyCause>(text, _rheonaut_EmergencyCause_MIN, _rheonaut_EmergencyCause_MAX);
+}
+
+void set_unknown(SampleContext& context, const std::string& unknown_values) {
+  const auto numbers = nlohmann::json::parse(unknown_values, nullptr, false);
+  if (!numbers.is_object()) return;
+  const auto set = [&numbers]<class Enumerator>(const char* field, Enumerator& value) {
+    const auto number = numbers.find(field);
+    if (number == numbers.end() || !number->is_number_integer()) return;
+    value = static_cast<Enumerator>(number->get<std::int32_t>());
+  };
+  set("mode", context.mode);
+  set("sub_state", context.sub_state);
+  set("emergency_cause", context.emergency_cause);
 }
 
 std::string select_commands(const char* condition) {
@@ -78,7 +91,8 @@ CommandRecord command_from(SQLite::Statement& row) {
 std::string select_events(const char* condition) {
   return fmt::format(
       "SELECT event.robot_id, boot.boot_id, event_seq, robot_time_us, sample_seq, kind, cause, mode, sub_state,"
-      " position_m, value, emergency_id, command_id, received_at_us, emergency_cause, detail FROM event LEFT JOIN boot "
+      " position_m, value, emergency_id, command_id, received_at_us, emergency_cause, detail, event.unknown_values "
+      "FROM event LEFT JOIN boot "
       "USING (boot_key) {}",
       condition);
 }
@@ -92,14 +106,20 @@ RobotEvent event_from(SQLite::Statement& row) {
   event.sample_seq = unsigned_id(row.getColumn(4));
   event.kind = row.getColumn(5).getString();
   event.cause = row.getColumn(6).getString();
-  event.mode = mode_from(row.getColumn(7).getString());
-  event.sub_state = sub_state_from(row.getColumn(8).getString());
+  SampleContext context;
+  context.mode = mode_from(row.getColumn(7).getString());
+  context.sub_state = sub_state_from(row.getColumn(8).getString());
+  context.emergency_cause = emergency_cause_from(row.getColumn(14).getString());
+  if (!row.getColumn(16).isNull()) event.unknown_values = row.getColumn(16).getString();
+  if (event.unknown_values) set_unknown(context, *event.unknown_values);
+  event.mode = context.mode;
+  event.sub_state = context.sub_state;
   event.position_m = float_or_nan(row.getColumn(9));
   event.value = float_or_nan(row.getColumn(10));
   event.emergency_id = unsigned_id(row.getColumn(11));
   event.command_id = unsigned_id(row.getColumn(12));
   event.received_at_us = row.getColumn(13).getInt64();
-  if (!row.getColumn(14).isNull()) event.emergency_cause = emergency_cause_from(row.getColumn(14).getString());
+  if (!row.getColumn(14).isNull()) event.emergency_cause = context.emergency_cause;
   event.detail = row.getColumn(15).getString();
   return event;
 }

@@ -14,10 +14,12 @@
 
 namespace server {
 
-// The enumerator whose text() this is; the unspecified one for a text that this version does not know.
+// The enumerator whose text() this is; of "unknown" kNumberNotKept (unknown_values.hpp), of any other text 0.
 protocol::Mode mode_from(const std::string& text);
 protocol::SubState sub_state_from(const std::string& text);
 protocol::EmergencyCause emergency_cause_from(const std::string& text);
+// Puts the numbers of a column unknown_values in their place.
+void set_unknown(SampleContext& context, const std::string& unknown_values);
 
 // `condition` is SQL that follows SELECT … FROM; its `?` are bound by the caller.
 std::string select_commands(const char* condition);

@@ -5,6 +5,7 @@
 
 #include "server/station/seat.hpp"
 #include "server/station/telemetry_verifier.hpp"
+#include "server/station/unknown_values.hpp"
 
 namespace server {
 namespace {
@@ -52,9 +53,9 @@ void Station::on_command_ack(RobotPort& port, const protocol::CommandAck& ack) {
     case rheonaut_COMMAND_RESULT_DUPLICATE: acknowledge(*seat, record.id, "duplicate"); break;
     case rheonaut_COMMAND_RESULT_EXPIRED: finish(*seat, record.id, CommandState::expired, "expired"); break;
     case rheonaut_COMMAND_RESULT_REJECTED:
-      finish(*seat, record.id, CommandState::rejected, protocol::text(ack.reason));
+      finish(*seat, record.id, CommandState::rejected, text_or_number(ack.reason));
       break;
-    default: finish(*seat, record.id, CommandState::rejected, protocol::text(ack.result)); break;
+    default: finish(*seat, record.id, CommandState::rejected, text_or_number(ack.result)); break;
   }
   publish(*seat->robot);
 }

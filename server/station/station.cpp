@@ -9,6 +9,7 @@
 #include <cstdlib>
 
 #include "server/station/seat.hpp"
+#include "server/station/unknown_values.hpp"
 
 namespace server {
 namespace {
@@ -99,6 +100,7 @@ void Station::note(const RobotState& robot, std::string kind, std::string detail
   event.detail = std::move(detail);
   event.emergency_id = robot.context.emergency_id;
   event.emergency_cause = robot.context.emergency_cause;
+  event.unknown_values = unknown_values(robot.context);
   event.mode = robot.context.mode;
   event.sub_state = robot.context.sub_state;
   event.robot_time_us = robot.latest_robot_time_us;
@@ -315,6 +317,13 @@ void Station::on_event(RobotPort& port, const protocol::Event& event) {
   out.kind = protocol::text(event.kind);
   out.cause = protocol::text(event.cause);
   out.emergency_cause = event.emergency_cause;
+  out.unknown_values = UnknownValues{}
+                           .add("kind", event.kind)
+                           .add("cause", event.cause)
+                           .add("mode", event.mode)
+                           .add("sub_state", event.sub_state)
+                           .add("emergency_cause", event.emergency_cause)
+                           .text();
   out.mode = event.mode;
   out.sub_state = event.sub_state;
   out.position_m = event.position_m;

@@ -79,7 +79,8 @@ struct RobotEvent {
   std::string cause = "none";  // of the event itself: the text of EventCause, of the station's own see there
   // Of the latch in force after the event. None: a version before schema 7 stored it in place of `cause`, when latched.
   std::optional<protocol::EmergencyCause> emergency_cause;
-  std::string detail;  // for people; the station's own
+  std::string detail;                         // for people; the station's own
+  std::optional<std::string> unknown_values;  // see unknown_values.hpp; also of kind and cause, which are text here
   protocol::Mode mode = rheonaut_MODE_UNSPECIFIED;
   protocol::SubState sub_state = rheonaut_SUB_STATE_NONE;
   float position_m = 0;

@@ -26,7 +26,7 @@ TEST_F(RunRoutesTest, AnEndedRunHasACertificate) {
   ASSERT_EQ(answered.status, 200) << answered.body;
   const json certificate = answered.parsed();
   EXPECT_EQ(certificate["final"], true);
-  EXPECT_EQ(certificate["format"], 1);
+  EXPECT_EQ(certificate["format"], 2);
   EXPECT_EQ(certificate["samples_expected"], 10);
   EXPECT_EQ(certificate["samples_live"], 10);
   EXPECT_EQ(certificate["samples_missing"], 0);

@@ -78,8 +78,10 @@ TEST_F(CertificateTest, HashesTheDocumentedBytes) {
   robot_.context.controller_id = 7;
   robot_.context.emergency_id = 0xfedcba9876543210;
   robot_.context.position_sd_m = 0.25F;
+  robot_.context.disturbance_m.reset();
+  robot_.context.mode = static_cast<protocol::Mode>(300);  // of a newer firmware
   const RunId id = make_eventful_run();
-  std::string bytes = "rheonaut-samples-1\n";
+  std::string bytes = "rheonaut-samples-2\n";
   const auto put = [&bytes](std::uint64_t value, int size) {
     for (int byte = 0; byte < size; ++byte) bytes += static_cast<char>(value >> (8 * byte));
   };
@@ -101,15 +103,14 @@ TEST_F(CertificateTest, HashesTheDocumentedBytes) {
     put_float(one.setpoint_m.value_or(std::nanf("")));
     put_float(one.disturbance_m);
     put_float(one.position_sd_m);
-    put(static_cast<std::uint64_t>(one.mode), 1);
-    put(static_cast<std::uint64_t>(one.sub_state), 1);
-    put(static_cast<std::uint64_t>(one.emergency_cause), 1);
-    put(0, 1);
+    put(static_cast<std::uint64_t>(one.mode), 4);
+    put(static_cast<std::uint64_t>(one.sub_state), 4);
+    put(static_cast<std::uint64_t>(one.emergency_cause), 4);
     put(one.controller_id, 4);
     put(one.flags, 4);
     put(one.emergency_id, 8);
   }
-  ASSERT_EQ(bytes.size(), 19 + 300 * 96u);
+  ASSERT_EQ(bytes.size(), 19 + 300 * 104u);
   std::array<unsigned char, crypto_hash_sha256_BYTES> hash{};
   crypto_hash_sha256(hash.data(), reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
   std::string expected;
@@ -241,7 +242,7 @@ TEST_F(CertificateTest, AnEmptyRunHasOne) {
   const Certificate certificate = final_certificate(id);
   EXPECT_EQ(certificate.samples_expected, 0u);
   EXPECT_EQ(certificate.worst_clock_uncertainty_us, -1);
-  EXPECT_EQ(certificate.sha256, SampleHash{}.text());
+  EXPECT_EQ(certificate.sha256, SampleHash{kCertificateFormat}.text());
 }
 
 TEST_F(CertificateTest, CountsSamplesThatHaveNoClock) {

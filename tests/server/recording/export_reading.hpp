@@ -15,6 +15,7 @@
 #include "server/recording/mat_writer.hpp"
 #include "server/recording/run_file.hpp"
 #include "server/recording/run_reader.hpp"
+#include "server/station/unknown_values.hpp"
 #include "tests/server/recording/random_recording.hpp"
 
 namespace server {
@@ -86,8 +87,9 @@ class ExportTest : public RandomRecordingTest {
     fields.push_back(
         fmt::format("{} {} {}", stored.clock_uncertainty_us, stored.first_received_at_us, stored.received_at_us));
     fields.push_back(bits(stored.position_sd_m));
-    fields.push_back(fmt::format("{} {} {} {} {}", stored.controller_id, stored.emergency_id,
-                                 protocol::text(stored.emergency_cause), stored.flags, gap_before));
+    fields.push_back(fmt::format("{} {} {} {} {} {}", stored.controller_id, stored.emergency_id,
+                                 protocol::text(stored.emergency_cause), stored.flags,
+                                 unknown_values(stored).value_or("none"), gap_before));
     return joined(fields);
   }
 
@@ -98,14 +100,20 @@ class ExportTest : public RandomRecordingTest {
     EXPECT_EQ(line,
               "span,boot_id,seq,robot_time_us,utc,position_m,velocity_m_s,acceleration_m_s2,duty,impedance_mv,"
               "reference_m,mode,sub_state,setpoint_m,disturbance_m,clock_uncertainty_us,first_received_at_us,"
-              "received_at_us,position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,gap_after");
+              "received_at_us,position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,gap_after,"
+              "unknown_values");
     Lines lines;
     while (std::getline(in, line)) {
-      std::vector<std::string> fields = split(line, ',');
+      const std::size_t end = line.find(",\"{") != std::string::npos ? line.find(",\"{") : line.size() - 1;
+      std::string unknown = line.substr(end + 1);  // {""mode"":17} in quotation marks, or nothing
+      if (!unknown.empty()) unknown = unknown.substr(1, unknown.size() - 2);
+      for (std::size_t at; (at = unknown.find("\"\"")) != std::string::npos;) unknown.erase(at, 1);
+      std::vector<std::string> fields = split(line.substr(0, end), ',');
       EXPECT_EQ(fields.size(), 25u) << line;
       fields.at(4) = std::to_string(utc_us_of(fields.at(4)));
       for (const std::size_t column : {5U, 6U, 7U, 8U, 9U, 10U, 13U, 14U, 18U})
         fields.at(column) = bits_of(fields.at(column));
+      fields.insert(fields.end() - 2, unknown.empty() ? "none" : unknown);
       lines.push_back(joined(fields));
     }
     return lines;
@@ -125,13 +133,13 @@ class ExportTest : public RandomRecordingTest {
         database,
         "SELECT span, boot_id, seq, robot_time_us, utc_us, position_m, velocity_m_s, acceleration_m_s2, duty,"
         " impedance_mv, reference_m, mode, sub_state, setpoint_m, disturbance_m, clock_uncertainty_us,"
-        " first_received_at_us, received_at_us, position_sd_m, controller_id, emergency_id, emergency_cause, flags"
-        " FROM " +
+        " first_received_at_us, received_at_us, position_sd_m, controller_id, emergency_id, emergency_cause, flags,"
+        " coalesce(unknown_values, 'none') FROM " +
             table};
     Lines lines;
     while (query.executeStep()) {
       std::vector<std::string> fields;
-      for (int column = 0; column < 23; ++column) {
+      for (int column = 0; column < 24; ++column) {
         const auto value = query.getColumn(column);
         const bool is_float = (column >= 5 && column <= 10) || column == 13 || column == 14 || column == 18;
         const float number = value.isNull() ? NAN : static_cast<float>(value.getDouble());
@@ -208,9 +216,14 @@ class ExportTest : public RandomRecordingTest {
                                    number("received_at_us", row)));
       fields.push_back(single("position_sd_m", row));
       const auto cause = static_cast<protocol::EmergencyCause>(number("emergency_cause", row));
-      fields.push_back(fmt::format("{} {} {} {} {} {}", number("controller_id", row), emergency_id,
-                                   protocol::text(cause), number("flags", row), number("gap_before", row),
-                                   number("gap_after", row)));
+      const auto unknown = UnknownValues{}
+                               .add("mode", static_cast<protocol::Mode>(number("mode", row)))
+                               .add("sub_state", static_cast<protocol::SubState>(number("sub_state", row)))
+                               .add("emergency_cause", cause)
+                               .text();
+      fields.push_back(fmt::format("{} {} {} {} {} {} {}", number("controller_id", row), emergency_id,
+                                   protocol::text(cause), number("flags", row), unknown.value_or("none"),
+                                   number("gap_before", row), number("gap_after", row)));
       lines.push_back(joined(fields));
     }
     return lines;
@@ -224,6 +237,16 @@ class ExportTest : public RandomRecordingTest {
         file, reading_uri(path_, false), spans_of(run), {.run = run, .channels = all_channels(), .grid_us = {}}};
     while (writer.advance(database)) continue;
     return file;
+  }
+
+  static std::string in_order(const nlohmann::json& unknown) {
+    std::string text;
+    for (const char* field : {"mode", "sub_state", "emergency_cause"}) {
+      if (unknown.contains(field)) {
+        text += fmt::format("{}\"{}\":{}", text.empty() ? '{' : ',', field, unknown[field].get<std::int32_t>());
+      }
+    }
+    return text + '}';
   }
 
   Lines json_lines(RunId run) {
@@ -248,6 +271,8 @@ class ExportTest : public RandomRecordingTest {
       fields.push_back(bits(number(sample["position_sd_m"])));
       for (const char* name : {"controller_id", "emergency_id", "emergency_cause", "flags"})
         fields.push_back(word(sample[name]));
+      const nlohmann::json& unknown = sample["unknown_values"];
+      fields.push_back(unknown.is_null() ? "none" : in_order(unknown));
       lines.push_back(joined(fields));
     }
     EXPECT_EQ(json["next"], nullptr);

@@ -23,12 +23,15 @@ SampleContext RandomRecordingTest::any_context() {
   if (random_() % 2 == 0) context.setpoint_m = static_cast<float>(random_() % 10) / 10;
   context.disturbance_m = static_cast<float>(random_() % 3) / 100;
   context.position_sd_m = static_cast<float>(random_() % 3) / 1000;
-  if (random_() % 8 == 0) context.disturbance_m.reset();
-  if (random_() % 8 == 0) context.position_sd_m.reset();
   context.controller_id = random_() % 2 == 0 ? 0xffffffffU : 3;
   context.emergency_id = random_() % 2 == 0 ? 0xfedcba9876543210 : 0;
   context.emergency_cause = random_() % 2 == 0 ? rheonaut_EMERGENCY_CAUSE_OPERATOR : rheonaut_EMERGENCY_CAUSE_NONE;
   context.flags = random_() % 64;
+  if (context.flags % 5 == 0) context.disturbance_m.reset();  // no finite number
+  if (context.flags % 7 == 0) context.position_sd_m.reset();
+  if (context.flags % 3 == 0) context.mode = static_cast<protocol::Mode>(4 + 7 * context.flags);  // a newer firmware's
+  if (context.flags % 4 == 0) context.sub_state = static_cast<protocol::SubState>(0x7fffffff);
+  if (context.flags % 6 == 0) context.emergency_cause = static_cast<protocol::EmergencyCause>(200);
   return context;
 }
 

@@ -51,27 +51,6 @@ TEST_F(RecorderTest, StoresAFullGroupAtTheNextCommitAndAcknowledgesIt) {
             (Rows{"1|0.0", "100|0.0989999994635582"}));
 }
 
-TEST_F(RecorderTest, AnEventIsStoredWithItsCauseThatOfTheLatchAndItsDetail) {
-  start();
-  connect(robot_);
-  RobotEvent event;
-  event.robot_id = robot_.id;
-  event.boot_id = robot_.boot_id;
-  event.event_seq = 0;
-  event.kind = "link_lost";
-  event.cause = "link_loss";
-  event.emergency_cause = rheonaut_EMERGENCY_CAUSE_OPERATOR;
-  event.detail = "a sentence";
-  recorder_->on_event(state_of(robot_, LinkState::connected), event);
-  wait(recorder_->flush_records());
-  EXPECT_EQ(rows("SELECT kind, cause, emergency_cause, detail FROM robot_event"),
-            Rows{"link_lost|link_loss|operator|a sentence"});
-  const RobotEvent read = wait(history_->events(robot_.id, 1)).at(0);
-  EXPECT_EQ(read.cause, event.cause);
-  EXPECT_EQ(read.emergency_cause, event.emergency_cause);
-  EXPECT_EQ(read.detail, event.detail);
-}
-
 TEST_F(RecorderTest, StoresASmallGroupWhenItIsALittleOverASecondOld) {
   start();
   connect(robot_);
@@ -572,38 +551,6 @@ TEST_F(RecorderTest, IgnoresABatchWithATimeThatCannotBe) {
   flush();
   EXPECT_EQ(samples(), 10);
   stop();
-}
-
-TEST_F(RecorderTest, WhatARobotSaysThatIsNoFiniteNumberIsStoredAsNull) {
-  start();
-  connect(robot_);
-  robot_.context.disturbance_m.reset();
-  make(robot_, 5);
-  robot_.context.position_sd_m.reset();
-  make(robot_, 95);
-  EXPECT_TRUE(clock_.run_until([&] { return durable_next_seq_ == 100; }, 2s));
-  EXPECT_EQ(rows("SELECT first_seq, disturbance_m, position_sd_m FROM segment ORDER BY first_seq"),
-            (Rows{"0||0.0", "5||"}));
-}
-
-// The acknowledgement passes over what cannot be recorded, and the robot need not send it again.
-TEST_F(RecorderTest, WhatCannotBeRecordedIsAFinalGap) {
-  start();
-  connect(robot_);
-  make(robot_, 10);
-  RobotState state = state_of(robot_, LinkState::connected);
-  state.last_received_at_us = clock_.utc_us();
-  recorder_->on_unusable_samples(state, 10, 15);
-  recorder_->on_unusable_samples(state, 5, 12);  // again, with some that are stored
-  recorder_->on_unusable_event(state, 0);
-  robot_.next_seq = 15;
-  make(robot_, 85);
-  send_event(robot_, 1);
-  EXPECT_TRUE(clock_.run_until([&] { return durable_next_seq_ == 100 && durable_next_event_seq_ == 2; }, 3s));
-  EXPECT_EQ(gaps(), Rows{"10|14|invalid"});
-  EXPECT_EQ(rows("SELECT first_event_seq, last_event_seq, cause FROM event_gap"), Rows{"0|0|invalid"});
-  EXPECT_EQ(samples(), 95);
-  EXPECT_TRUE(missing_.empty());
 }
 
 TEST_F(RecorderTest, KeepsNoBookkeepingOfBootsThatAreGone) {

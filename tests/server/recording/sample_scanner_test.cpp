@@ -114,8 +114,8 @@ class SampleScannerTest : public RecordingTest {
         "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} ", segment.first_seq + index, segment.robot_time_us(index),
         segment.utc_offset_us, segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us,
         protocol::text(context.mode), protocol::text(context.sub_state), protocol::text(context.emergency_cause),
-        text_of(context.setpoint_m.value_or(kNaN)), text_of(context.disturbance_m.value_or(kNaN)), text_of(context.position_sd_m.value_or(kNaN)),
-        context.controller_id, context.emergency_id, context.flags);
+        text_of(context.setpoint_m.value_or(kNaN)), text_of(context.disturbance_m.value_or(kNaN)),
+        text_of(context.position_sd_m.value_or(kNaN)), context.controller_id, context.emergency_id, context.flags);
     for (const float value : {sample.position_m, sample.velocity_m_s, sample.acceleration_m_s2, sample.duty,
                               sample.impedance_mv, sample.reference_m}) {
       line += text_of(value) + " ";

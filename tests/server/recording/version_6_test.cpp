@@ -154,6 +154,8 @@ TEST_F(Version6Test, AStationGoesOnAndTheChainWithIt) {
   EXPECT_THAT(found["faults"], IsEmpty());
   EXPECT_EQ(found["samples"], 332);
   EXPECT_EQ(found["runs_verified"], 2);
+  EXPECT_EQ(rows("SELECT run_id, format FROM run_certificate ORDER BY run_id"),
+            (std::vector<std::string>{"1|1", "2|2"}));
   EXPECT_EQ(rows("SELECT entry, lower(hex(hash)) FROM audit WHERE entry = 16"),
             std::vector<std::string>{"16|e5bbe54ac3e6058e8193cca138ee726b7d88c7c01102f86036b053229a78b71e"});
   EXPECT_GT(found["audit_entries"].get<int>(), 16);
