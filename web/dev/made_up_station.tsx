@@ -27,7 +27,7 @@ const robot = (robot_id: string, seq: number): RobotState => ({
   status: { supply_mv: 3712, rssi_dbm: -58, free_memory_bytes: 31000, worst_tick_us: 2100, missed_ticks: 0,
     ring_fill: 34, imu_calibration: 3, bad_frames: 0, lost_samples: 0, lost_events: 0 },
   clock: { offset_us: 0, uncertainty_us: 310, drift_ppm: 12, round_trip_us: 1840 }, control: null, pending_stop: null,
-  fluid: null, retired: false,
+  fluid: null, retired: false, invalid_values: 0, unknown_values: null,
 });
 
 // Position and duty of the experiment, roughly: to 0.1 m, pushed back by 0.05 m at 20 s, and again.
@@ -53,7 +53,7 @@ function samples(seq: number, size: number): LiveMessage {
   return {
     type: 'samples', robot_id: 'rheo-1', boot_id, first_seq: seq, first_robot_time_us: seq * 10_000, period_us: 10_000,
     mode, sub_state: mode === 'auto' ? 'navigating' : 'none', setpoint_m: commanded ? 0.1 : null, disturbance_m: commanded && seq >= 2800 ? -0.05 : 0,
-    position_sd_m: 0.0031, emergency_id, flags: 0, backfill: false, position_m: rows.map((row) => row[0]),
+    position_sd_m: 0.0031, emergency_id, flags: 0, unknown_values: null, backfill: false, position_m: rows.map((row) => row[0]),
     velocity_m_s: rows.map((row) => row[1]), acceleration_m_s2: rows.map(() => 0), duty: rows.map((row) => row[2]),
     impedance_mv: rows.map((row) => row[3]), reference_m: rows.map(() => (commanded ? 0.1 : 0)),
   };
@@ -75,7 +75,7 @@ function open_socket(): Socket {
     const command = (n: number, kind: string, values: object, state: 'acknowledged' | 'rejected', ago_s: number, reason = '') =>
       say({ type: 'command', command: { command_id: String(n), robot_id: 'rheo-1', boot_id, kind, arguments: values as never, actor: 'session:1', state, reason, submitted_at_us: at_us(ago_s), sent_at_us: 0, ended_at_us: 0, effect_at_robot_us: 0, emergency_id, sent_after_us: 210, acknowledged_after_us: 640, verified_after_us: null, life_from: 'stamp' } });
     const event = (n: number, kind: string, cause: string, ago_s: number) =>
-      say({ type: 'event', event: { robot_id: 'rheo-1', boot_id, event_seq: n, robot_time_us: 0, sample_seq: 0, kind, cause, mode, sub_state: 'navigating', position_m: 0.0984, value: 0, emergency_id, command_id: null, received_at_us: at_us(ago_s) } });
+      say({ type: 'event', event: { robot_id: 'rheo-1', boot_id, event_seq: n, robot_time_us: 0, sample_seq: 0, kind, cause, emergency_cause: emergency_id ? 'operator' : 'none', detail: '', unknown_values: null, mode, sub_state: 'navigating', position_m: 0.0984, value: 0, emergency_id, command_id: null, received_at_us: at_us(ago_s) } });
     command(1, 'set_mode', { mode: 'auto', setpoint_m: 0.1 }, 'acknowledged', 48);
     event(1, 'mode_changed', 'command', 47.9);
     command(2, 'set_setpoint', { setpoint_m: 4 }, 'rejected', 35, 'out_of_range');

@@ -104,6 +104,7 @@ export function batch(first_seq: number, size: number, change: Partial<SamplesMe
     position_sd_m: 0.001,
     emergency_id: null,
     flags: 0,
+    unknown_values: null,
     backfill: false,
     position_m: column((i) => (first_seq + i) / 1000),
     velocity_m_s: column(() => 0),
