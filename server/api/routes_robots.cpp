@@ -102,6 +102,11 @@ Response command_response(const CommandRecord& record) {
       return problem({ErrorCode::timed_out, fmt::format("{} expired before it took effect", record.kind),
                       record.reason.empty() ? "expired" : record.reason},
                      with_command);
+    case CommandState::unknown:
+      return problem(
+          {ErrorCode::timed_out,
+           fmt::format("the robot did not answer {}; whether it has run is not known yet", record.kind), record.reason},
+          with_command);
     case CommandState::queued:
     case CommandState::sent: break;
   }

@@ -140,7 +140,7 @@ void RobotSession::work_off(protocol::Bytes unread) {
   }
   if (!close_reason_.empty()) return reading_paused_.notify();
   if (last_received_us_ + kEarlyUs >= next_heartbeat_us_) heartbeat_wanted_ = true;
-  if (heartbeat_wanted_ && !robot_id_.empty()) flush();
+  if ((heartbeat_wanted_ || !commands_.empty()) && !robot_id_.empty()) flush();
 }
 
 // Into the buffer of a frame; false when there is none, or a fault (then close_reason_ is set). What a robot that is
@@ -258,6 +258,7 @@ void RobotSession::on_frame(protocol::RobotFrame& frame) {
     case rheonaut_RobotFrame_command_ack_tag:
       if (frame.body.command_ack.command_id == awaited_stop_) awaited_stop_ = 0;
       if (frame.body.command_ack.command_id == awaited_command_) awaited_command_ = 0;
+      window_.answered(frame.body.command_ack.command_id);
       station_.on_command_ack(*this, frame.body.command_ack);
       tell_what_is_awaited();
       break;
@@ -337,8 +338,11 @@ std::optional<protocol::StationFrame> RobotSession::next_frame() {
   }
   while (!commands_.empty()) {
     const QueuedCommand next = commands_.front();
+    const bool is_too_old = now_us >= next.deadline_us;  // SAFETY: what waited longer than its life is never sent
+    if (!is_too_old && !window_.has_room(now_us)) break;
     commands_.pop_front();
-    if (now_us >= next.deadline_us) continue;  // SAFETY: what waited longer than its life is never sent
+    if (is_too_old) continue;
+    window_.written(next.command.command_id, next.deadline_us);
     frame.body.command = next.command;
     awaited_command_ = next.command.command_id;
     return frame;

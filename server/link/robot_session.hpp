@@ -13,6 +13,7 @@
 
 #include "protocol/frame.hpp"
 #include "server/clock.hpp"
+#include "server/link/command_window.hpp"
 #include "server/net/byte_stream.hpp"
 #include "server/station/robot_archive.hpp"
 #include "server/station/robot_port.hpp"
@@ -100,6 +101,7 @@ class RobotSession final : public RobotPort {
   std::deque<protocol::Command> stops_;               // SAFETY: always written first
   CommandId awaited_stop_ = 0, awaited_command_ = 0;  // the last that was written and is not answered; 0: none
   std::deque<QueuedCommand> commands_;
+  CommandWindow window_;  // SAFETY: of all but stops
   protocol::StationHeartbeat durable_ = rheonaut_StationHeartbeat_init_zero;
   bool heartbeat_wanted_ = false;  // before it is due
   std::int64_t next_heartbeat_us_ = 0;

@@ -142,7 +142,7 @@ void fail_unfinished_commands(Database& database, std::int64_t utc_us) {
   CommandStore commands{database.handle()};
   AuditChain audit{database.handle()};
   for (CommandRecord& command : unfinished) {
-    command.state = CommandState::failed;
+    command.state = command.state == CommandState::sent ? CommandState::unknown : CommandState::failed;
     command.reason = "station_restarted";
     command.ended_at_us = utc_us;
     commands.write(command, audit);

@@ -33,6 +33,7 @@ const char* text(CommandState value) {
     case CommandState::expired: return "expired";
     case CommandState::failed: return "failed";
     case CommandState::superseded: return "superseded";
+    case CommandState::unknown: break;
   }
   return "unknown";
 }

@@ -21,6 +21,7 @@ void Station::on_command_sent(RobotPort& port, CommandId id) {
   if (seat == nullptr) return;
   const auto pending = seat->commands.find(id);
   if (pending == seat->commands.end() || pending->second->record.state != CommandState::queued) return;
+  prepare_proof(*seat, *pending->second);
   pending->second->record.state = CommandState::sent;
   CommandRecord& record = pending->second->record;
   record.sent_at_us = clock_.utc_us();
@@ -33,8 +34,8 @@ void Station::on_command_ack(RobotPort& port, const protocol::CommandAck& ack) {
   Seat* seat = seat_of(port);
   if (seat == nullptr) return;
   const auto entry = seat->commands.find(ack.command_id);
-  if (entry == seat->commands.end()) return;  // ended already
-  const auto pending = entry->second;
+  const auto pending = entry == seat->commands.end() ? reopen(*seat, ack.command_id) : entry->second;
+  if (pending == nullptr) return;  // ended already
   CommandRecord& record = pending->record;
   record.effect_at_robot_us = ack.effect_at_robot_us;
   record.emergency_id = ack.emergency_id;
@@ -146,8 +147,8 @@ void Station::expire_commands(Seat& seat) {
     if (now_us >= pending->deadline_us + grace_us) expired.push_back(id);
   }
   for (const CommandId id : expired) {
-    const bool sent = seat.commands.at(id)->record.state == CommandState::sent;
-    finish(seat, id, CommandState::expired, sent ? "no_answer" : "not_sent_in_time");
+    const bool was_sent = seat.commands.at(id)->record.state == CommandState::sent;
+    was_sent ? end_without_answer(seat, id, "no_answer") : finish(seat, id, CommandState::expired, "not_sent_in_time");
   }
   while (!seat.unseen.empty() && now_us - seat.unseen.front()->received_us >= kSeenGrace.count()) {
     end(*seat.unseen.front(), CommandState::acknowledged, "no_telemetry");

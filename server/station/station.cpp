@@ -154,6 +154,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
     robot.clock = ClockEstimate{};
     seat.clock_sync = ClockSync{};
     seat.clock_recorded = ClockRecord{};
+    seat.unknown.clear();  // what the boot before knew of them is gone
   }
   robot.context.controller_id = details.controller_id;
   robot.context.mode = details.mode;
@@ -196,7 +197,10 @@ void Station::on_disconnected(RobotPort& port, const std::string& reason) {
   for (const auto& [id, pending] : seat->commands) {
     if (!pending->is_stop()) ended.push_back(id);  // SAFETY: a stop is kept until a robot acknowledges it
   }
-  for (const CommandId id : ended) finish(*seat, id, CommandState::failed, "link_lost");
+  for (const CommandId id : ended) {
+    const bool was_sent = seat->commands.at(id)->record.state == CommandState::sent;
+    was_sent ? end_without_answer(*seat, id, "link_lost") : finish(*seat, id, CommandState::failed, "link_lost");
+  }
   end_unseen(*seat, "link_lost");
   note(robot, "disconnected", reason);
   publish(robot);
@@ -292,6 +296,7 @@ void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) 
   robot.oldest_seq = std::max(robot.oldest_seq, batch.oldest_seq);
   for (StationSink* sink : sinks_) sink->on_samples(robot, batch);
   if (!seat->unseen.empty()) look_for_commands(*seat, batch);
+  if (!seat->commands.empty() || !seat->unknown.empty()) settle_by_samples(*seat, batch);
 }
 
 void Station::count_power(RobotState& robot, const SampleBatch& batch) const {
@@ -304,7 +309,7 @@ void Station::count_power(RobotState& robot, const SampleBatch& batch) const {
 }
 
 void Station::on_event(RobotPort& port, const protocol::Event& event) {
-  const Seat* seat = seat_of(port);
+  Seat* seat = seat_of(port);
   if (seat == nullptr) return;
   const RobotState& robot = *seat->robot;
   RobotEvent out;
@@ -332,6 +337,7 @@ void Station::on_event(RobotPort& port, const protocol::Event& event) {
   out.command_id = event.command_id;
   out.received_at_us = robot.last_received_at_us;
   for (StationSink* sink : sinks_) sink->on_event(robot, out);
+  settle_by_event(*seat, event);
 }
 
 void Station::on_invalid_values(RobotPort& port, std::uint64_t count, const char* cause, const std::string& first) {

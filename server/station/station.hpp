@@ -204,6 +204,11 @@ class Station {
   void expire_commands(Seat& seat);
   void look_for_commands(Seat& seat, const SampleBatch& batch);
   void end_unseen(Seat& seat, const char* reason);
+  void prepare_proof(Seat& seat, PendingCommand& pending);
+  void end_without_answer(Seat& seat, CommandId id, const char* reason);
+  static std::shared_ptr<PendingCommand> reopen(Seat& seat, CommandId id);
+  void settle_by_event(Seat& seat, const protocol::Event& event);
+  void settle_by_samples(Seat& seat, const SampleBatch& batch);
 
   void restore_fluid(RobotState& robot, const std::string& fluid) const;
   void restore_stop(const CommandRecord& record);

@@ -184,10 +184,11 @@ enum class CommandState : std::uint8_t {
   verified,      // telemetry has shown what it was to bring about
   rejected,      // the robot refused it: `reason`
   expired,       // its life ended before it took effect
-  failed,        // the link ended before an answer, or telemetry went on without showing it: `reason`
+  failed,        // the link ended before it was sent, or telemetry went on without showing it: `reason`
   superseded,    // a newer command took its place before it was sent, or could be seen
+  unknown,       // it was sent and no answer came; whether it has run may be known later
 };
-inline constexpr auto kLastCommandState = CommandState::superseded;
+inline constexpr auto kLastCommandState = CommandState::unknown;
 constexpr bool was_accepted(CommandState state) {  // by the robot
   return state == CommandState::acknowledged || state == CommandState::verified;
 }

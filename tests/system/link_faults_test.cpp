@@ -64,6 +64,43 @@ TEST_F(LinkFaultsTest, AnOutageLongerThanTheRingLeavesACountedGap) {
   expect(caught_up());  // the acknowledgement passes over the gap
 }
 
+// More reach the robot together than it can keep acknowledgements of.
+TEST_F(LinkFaultsTest, CommandsThatAStallHeldUpAllRunAndAreAllAcknowledged) {
+  begin();
+  pass(1);
+  robot->stall(true);
+  std::vector<sim_robot::Sent> sent;
+  for (int i = 0; i < 14; ++i) sent.push_back(send(sim_robot::ping()));
+  pass(0.8);
+  robot->stall(false);
+  for (const sim_robot::Sent& ping : sent) ping.expect_accepted({.limit_s = 1});
+  EXPECT_EQ(robot->core().commands_received(), 14u);
+}
+
+TEST_F(LinkFaultsTest, OfTheSetpointsThatAStallHeldUpTheRecordSaysWhichHaveRun) {
+  begin();
+  go_to(0.2);
+  const std::uint64_t before = robot->core().commands_received();
+  robot->stall(true);
+  std::vector<sim_robot::Sent> sent;
+  for (int i = 1; i <= 14; ++i) {
+    sent.push_back(send(sim_robot::set_setpoint(0.2F + 0.005F * static_cast<float>(i))));
+    pass(0.05);
+  }
+  robot->stall(false);
+  std::uint64_t has_run = 0;
+  for (const sim_robot::Sent& setpoint : sent) {
+    const std::string answer = setpoint.answer({.limit_s = 1}).text;
+    if (answer == "accepted") {
+      ++has_run;
+    } else {
+      EXPECT_EQ(answer, "by_a_newer_command") << "it was never sent";
+    }
+  }
+  EXPECT_EQ(has_run, robot->core().commands_received() - before);
+  EXPECT_EQ(sent.back().answer().text, "accepted");
+}
+
 TEST_F(LinkFaultsTest, LinkLossStopsTheMotorAndNothingMovesWhenItReturns) {
   begin();
   go_to(0.5);

@@ -70,17 +70,20 @@ class StalenessTest(unittest.TestCase):
         answers = self.stall_and_send(life_ms=10_000)
         states = [self.state_of(answer) for answer in answers]
         self.assertEqual(states[-1], "verified", answers[-1])
-        # "expired": the robot keeps the answers to the latest few only, so those came to nothing for want of one.
-        self.assertLessEqual(set(states[:-1]), {"superseded", "expired"}, states)
+        self.assertLessEqual(set(states[:-1]), {"superseded"}, states)
         wait_until(lambda: self.robot()["setpoint_m"] == SETPOINTS[-1], 10, "the newest in telemetry")
         self.station.post(f"/api/v1/runs/{run_id}/end")
-        self.assertEqual(self.setpoints_seen(run_id), [0.1, SETPOINTS[-1]])
+        # The newest is sent when those that went ahead of the stall are answered: the last of them may act for a tick.
+        seen = self.setpoints_seen(run_id)
+        self.assertEqual((seen[0], seen[-1]), (0.1, SETPOINTS[-1]), seen)
+        self.assertLessEqual(len(seen), 3, seen)
 
     def test_setpoints_older_than_their_life_never_act(self):
         self.start(PATIENT)
         run_id = self.station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "stall"})["run_id"]
         states = [self.state_of(answer) for answer in self.stall_and_send(life_ms=200)]
-        self.assertLessEqual(set(states), {"expired", "superseded"}, states)
+        # "unknown": sent before the stall showed, and answered after its caller had to be told something.
+        self.assertLessEqual(set(states), {"expired", "superseded", "unknown"}, states)
         seen = self.robot()["next_seq"]
         wait_until(lambda: self.robot()["next_seq"] > seen + 100, 20, "another second of samples")
         self.station.post(f"/api/v1/runs/{run_id}/end")
@@ -93,7 +96,7 @@ class StalenessTest(unittest.TestCase):
         states = [self.state_of(answer) for answer in answers]
         # "superseded": by a newer one, before the link was held for lost. "rejected": by the robot, which is in manual
         # when it comes back; that happens where the machine is slow, and the last ones are sent after the stall.
-        self.assertLessEqual(set(states), {"failed", "not_connected", "superseded", "rejected"}, states)
+        self.assertLessEqual(set(states), {"unknown", "failed", "not_connected", "superseded", "rejected"}, states)
         self.assertIn("not_connected", states, "the link was held for lost within the stall")
         seen = self.robot()["next_seq"]
         wait_until(lambda: self.robot()["next_seq"] > seen + 100, 20, "another second of samples")

@@ -88,7 +88,8 @@ TEST_F(RoutesTest, ACommandWithoutAnswerIs504) {
   connect_robot();
   const Answered answered = ask("POST", "/api/v1/robots/r1/commands", ping);
   EXPECT_EQ(answered.status, 504);
-  EXPECT_EQ(answered.parsed()["command"]["state"], "expired");
+  EXPECT_EQ(answered.parsed()["command"]["state"], "unknown");
+  EXPECT_EQ(answered.parsed()["reason"], "no_answer");
 }
 
 TEST_F(RoutesTest, ACommandForAnAbsentRobotIs409) {

@@ -129,7 +129,7 @@ TEST_F(MigrationTest, CommandsOfBeforeTheAuditAreCounted) {
   start();
   EXPECT_EQ(number("SELECT value FROM meta WHERE name = 'commands_before_audit'"), before + 1);
   EXPECT_EQ(rows("SELECT command.state, audit.action FROM command JOIN audit ON audit_entry = entry"),
-            std::vector<std::string>{"failed|command.failed"});
+            std::vector<std::string>{"unknown|command.unknown"});
   stop();
   EXPECT_EQ(faults(), std::vector<std::string>{});
   add(7, "acknowledged");

@@ -379,19 +379,21 @@ TEST_F(RecorderTest, HowFarABootIsDurableIsStoredWithIt) {
   EXPECT_EQ(stored(), Rows{"30|4"});
 }
 
-TEST_F(RecorderTest, RestoresPendingStopsAndFailsOtherCommands) {
+TEST_F(RecorderTest, RestoresPendingStopsAndEndsOtherCommands) {
   start();
   send_command(0xffffffffffffffff, "emergency_stop", CommandState::queued);
   send_command(0xffffffffffffffff, "emergency_stop", CommandState::sent);
   send_command(2, "emergency_stop", CommandState::acknowledged);
   send_command(3, "set_duty", CommandState::sent);
+  send_command(4, "set_duty", CommandState::queued);
   flush();
   kill();
   start();
   ASSERT_EQ(restored_.pending_stops.size(), 1u);
   EXPECT_EQ(restored_.pending_stops[0].id, 0xffffffffffffffff);
   EXPECT_EQ(restored_.pending_stops[0].state, CommandState::sent);
-  EXPECT_EQ(rows("SELECT state, reason FROM command WHERE command_id = 3"), Rows{"failed|station_restarted"});
+  EXPECT_EQ(rows("SELECT state, reason FROM command WHERE command_id = 3"), Rows{"unknown|station_restarted"});
+  EXPECT_EQ(rows("SELECT state, reason FROM command WHERE command_id = 4"), Rows{"failed|station_restarted"});
 }
 
 TEST_F(RecorderTest, IgnoresNumbersThatCannotBe) {

@@ -34,7 +34,7 @@ function Line({ line }: { line: LogLine }) {
 
 function describe({ event, command, note, position_sd_m }: LogLine): [tone: string, sort: string, text: string] {
   if (command) {
-    const refused = ['rejected', 'expired', 'failed'].includes(command.state);
+    const refused = ['rejected', 'expired', 'failed', 'unknown'].includes(command.state);
     const alarm = command.kind === 'emergency_stop';
     const off = alarm && command.verified_after_us !== null ? ` · motor off after ${(command.verified_after_us / 1000).toFixed(1)} ms` : '';
     const end = refused ? `${command.state}: ${sentence(command.reason)}` : command.state;

@@ -1,0 +1,106 @@
+// Commands whose answer did not come: their end is unknown until an event or a sample of the robot tells it.
+#include <algorithm>
+#include <utility>
+
+#include "server/station/seat.hpp"
+#include "server/station/telemetry_verifier.hpp"
+
+namespace server {
+namespace {
+
+constexpr std::size_t kMaxUnknown = 64;  // of a robot; the oldest stay unknown
+
+bool is_the_same(const CommandRecord& one, const CommandRecord& other) {
+  return one.kind == other.kind && one.arguments == other.arguments;
+}
+
+// What a robot comes to without a command, too: by a lease that lapses, a link that is lost, the end of auto.
+bool happens_by_itself(const protocol::Command& wire) {
+  switch (wire.which_action) {
+    case rheonaut_Command_set_mode_tag: return wire.action.set_mode.mode == rheonaut_MODE_MANUAL;
+    case rheonaut_Command_set_duty_tag: return wire.action.set_duty.duty == 0.0F;
+    case rheonaut_Command_inject_disturbance_tag: return wire.action.inject_disturbance.disturbance_m == 0.0F;
+    default: return false;
+  }
+}
+
+// Whether the robot's latest sample shows already what the command is to bring about.
+bool shows(const RobotState& robot, const protocol::Command& wire) {
+  SampleBatch latest;
+  latest.context = robot.context;
+  if (robot.sample) latest.samples.push_back(*robot.sample);
+  return look_for(wire, 0, 0, latest) == Sight::seen;
+}
+
+}  // namespace
+
+// Its effect proves that the command has run only if nothing else explains it: neither how the robot was before, nor
+// another command for the same.
+void Station::prepare_proof(Seat& seat, PendingCommand& pending) {
+  pending.look_from_robot_us = static_cast<std::uint64_t>(robot_now_us(*seat.robot));
+  pending.is_proved_by_samples =
+      can_be_seen(pending.wire) && !happens_by_itself(pending.wire) && !shows(*seat.robot, pending.wire);
+  const auto compare = [&pending](PendingCommand& other) {
+    if (&other == &pending || !is_the_same(other.record, pending.record)) return;
+    other.is_proved_by_samples = pending.is_proved_by_samples = false;
+  };
+  for (const auto& [id, other] : seat.commands) compare(*other);
+  for (const auto& other : seat.unknown) compare(*other);
+}
+
+// A command that was sent, when no answer is to be expected any more.
+void Station::end_without_answer(Seat& seat, CommandId id, const char* reason) {
+  const auto pending = seat.commands.at(id);
+  if (pending->seen_after_us >= 0) {
+    pending->record.verified_after_us = pending->seen_after_us;
+    return finish(seat, id, CommandState::verified, reason);
+  }
+  finish(seat, id, CommandState::unknown, reason);
+  if (seat.unknown.size() >= kMaxUnknown) seat.unknown.pop_front();
+  seat.unknown.push_back(pending);
+}
+
+// One whose end was unknown waits for its end again; null when it is not one of those.
+std::shared_ptr<PendingCommand> Station::reopen(Seat& seat, CommandId id) {
+  const auto found = std::ranges::find(seat.unknown, id, [](const auto& pending) { return pending->record.id; });
+  if (found == seat.unknown.end()) return nullptr;
+  const auto pending = *found;
+  seat.unknown.erase(found);
+  pending->record.state = CommandState::sent;
+  pending->record.ended_at_us = 0;
+  seat.commands.emplace(id, pending);
+  return pending;
+}
+
+// A robot sends an acknowledgement before the event of the same command: one that names a command without an answer
+// says that the answer is lost, and that the command has run.
+void Station::settle_by_event(Seat& seat, const protocol::Event& event) {
+  if (event.command_id == 0) return;
+  auto entry = seat.commands.find(event.command_id);
+  auto pending = entry == seat.commands.end() ? reopen(seat, event.command_id) : entry->second;
+  if (pending == nullptr || pending->is_stop() || pending->record.state != CommandState::sent) return;
+  pending->record.effect_at_robot_us = event.event_robot_time_us;
+  pending->record.emergency_id = event.emergency_id;
+  acknowledge(seat, event.command_id, "named_by_event");
+}
+
+void Station::settle_by_samples(Seat& seat, const SampleBatch& batch) {
+  const std::int64_t now_us = clock_.steady_us();
+  const auto is_seen = [&batch](const PendingCommand& pending) {
+    return pending.is_proved_by_samples && look_for(pending.wire, pending.look_from_robot_us, 0, batch) == Sight::seen;
+  };
+  for (const auto& [id, pending] : seat.commands) {
+    const bool is_unanswered = !pending->is_stop() && pending->record.state == CommandState::sent;
+    if (is_unanswered && pending->seen_after_us < 0 && is_seen(*pending)) {
+      pending->seen_after_us = now_us - pending->received_us;
+    }
+  }
+  std::erase_if(seat.unknown, [this, now_us, &is_seen](const std::shared_ptr<PendingCommand>& pending) {
+    if (!is_seen(*pending)) return false;
+    pending->record.verified_after_us = now_us - pending->received_us;
+    end(*pending, CommandState::verified, pending->record.reason);
+    return true;
+  });
+}
+
+}  // namespace server

@@ -1,0 +1,165 @@
+// Commands beyond what a robot can acknowledge wait; an answer that never comes is an unknown end, settled when it is
+// known.
+#include "tests/server/link/link_fixture.hpp"
+
+namespace server {
+namespace {
+
+class UnansweredTest : public LinkTest {
+ protected:
+  static protocol::Command ping() {
+    protocol::Command command = rheonaut_Command_init_zero;
+    command.which_action = rheonaut_Command_ping_tag;
+    return command;
+  }
+  void accept(TestRobot& robot, std::size_t which) {
+    robot.acknowledge(robot.commands().at(which), rheonaut_COMMAND_RESULT_ACCEPTED);
+    clock.settle();
+  }
+  // Sent, and its validity passes without a word about it.
+  CommandId unanswered(const protocol::Command& command) {
+    const std::size_t before = results.size();
+    submit(command, 500ms);
+    EXPECT_TRUE(clock.run_until([&] { return results.size() > before; }, 3s));
+    EXPECT_EQ(results.back()->state, CommandState::unknown);
+    return results.back()->id;
+  }
+  void show_duty(TestRobot& robot, float duty) {
+    auto frame = TestRobot::samples_frame(next_seq_++, 1, robot.robot_now_us(), 0);
+    frame.body.telemetry.duty[0] = duty;
+    robot.send(frame);
+    clock.settle();
+  }
+  void say_event(TestRobot& robot, CommandId id) {
+    protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
+    frame.which_body = rheonaut_RobotFrame_event_tag;
+    frame.body.event.kind = rheonaut_EVENT_KIND_SETPOINT_CHANGED;
+    frame.body.event.cause = rheonaut_EVENT_CAUSE_COMMAND;
+    frame.body.event.event_robot_time_us = robot.robot_now_us();
+    frame.body.event.command_id = id;
+    robot.send(frame);
+    clock.settle();
+  }
+  const CommandRecord& latest(CommandId id) const {
+    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &CommandRecord::id);
+  }
+
+ private:
+  std::uint64_t next_seq_ = 0;
+};
+
+TEST_F(UnansweredTest, NoMoreAreOnTheirWayThanTheRobotCanAcknowledge) {
+  auto* robot = connect();
+  for (int i = 0; i < 14; ++i) submit(ping());
+  clock.run_for(100ms);
+  EXPECT_EQ(robot->commands().size(), CommandWindow::kMost);
+  for (std::size_t i = 0; i < 14; ++i) {
+    accept(*robot, i);
+    EXPECT_EQ(robot->commands().size(), std::min<std::size_t>(i + 1 + CommandWindow::kMost, 14));
+  }
+  ASSERT_EQ(results.size(), 14u);
+  for (const auto& result : results) EXPECT_EQ(result->state, CommandState::acknowledged);
+}
+
+TEST_F(UnansweredTest, AStopWaitsForNoAnswer) {
+  auto* robot = connect();
+  for (int i = 0; i < 14; ++i) submit(ping());
+  clock.run_for(100ms);
+  stop_robot();
+  clock.settle();
+  ASSERT_EQ(robot->commands().size(), CommandWindow::kMost + 1);
+  EXPECT_EQ(robot->commands().back().which_action, pb_size_t{rheonaut_Command_emergency_stop_tag});
+}
+
+TEST_F(UnansweredTest, WhatWaitsForTheAnswersOfOthersKeepsItsValidity) {
+  auto* robot = connect();
+  for (int i = 0; i < 6; ++i) submit(ping(), 5s);
+  submit(ping(), 300ms);
+  clock.run_for(400ms);
+  ASSERT_EQ(results.size(), 1u);
+  EXPECT_EQ(results[0]->state, CommandState::expired);
+  EXPECT_EQ(results[0]->reason, "not_sent_in_time");
+  accept(*robot, 0);
+  EXPECT_EQ(robot->commands().size(), 6u) << "it is not sent late";
+}
+
+TEST_F(UnansweredTest, AnAnswerThatNeverComesHoldsItsPlaceNoLongerThanItMayCome) {
+  auto* robot = connect();
+  for (int i = 0; i < 6; ++i) submit(ping(), 500ms);
+  submit(ping(), 5s);
+  clock.run_for(1'400ms);
+  EXPECT_EQ(robot->commands().size(), 6u);
+  clock.run_for(400ms);
+  EXPECT_EQ(robot->commands().size(), 7u);
+}
+
+TEST_F(UnansweredTest, ALateAnswerSettlesIt) {
+  auto* robot = connect();
+  const CommandId id = unanswered(ping());
+  accept(*robot, 0);
+  EXPECT_EQ(latest(id).state, CommandState::acknowledged);
+  EXPECT_EQ(latest(id).reason, "");
+}
+
+TEST_F(UnansweredTest, AnEventThatNamesItSettlesIt) {
+  auto* robot = connect();
+  const CommandId id = unanswered(set_setpoint(0.1F));
+  say_event(*robot, id);
+  EXPECT_EQ(latest(id).state, CommandState::acknowledged);
+  EXPECT_EQ(latest(id).reason, "named_by_event");
+  EXPECT_EQ(latest(id).effect_at_robot_us, robot->robot_now_us());
+}
+
+TEST_F(UnansweredTest, AnEventWhoseAnswerWasDroppedSettlesItAtOnce) {
+  auto* robot = connect();
+  submit(set_setpoint(0.1F));
+  clock.settle();
+  say_event(*robot, robot->commands().at(0).command_id);
+  ASSERT_EQ(results.size(), 1u);
+  EXPECT_EQ(results[0]->state, CommandState::acknowledged);
+}
+
+TEST_F(UnansweredTest, SamplesThatNothingElseExplainsSettleIt) {
+  auto* robot = connect();
+  show_duty(*robot, 0);
+  const CommandId later = unanswered(set_duty(0.3F));
+  show_duty(*robot, 0.3F);
+  EXPECT_EQ(latest(later).state, CommandState::verified);
+  EXPECT_EQ(latest(later).reason, "no_answer");
+
+  submit(set_duty(0.4F), 500ms);
+  clock.run_for(100ms);
+  show_duty(*robot, 0.4F);
+  ASSERT_TRUE(clock.run_until([&] { return results.size() == 2; }, 3s));
+  EXPECT_EQ(results[1]->state, CommandState::verified) << "they came before its answer was given up";
+  EXPECT_EQ(results[1]->reason, "no_answer");
+}
+
+TEST_F(UnansweredTest, SamplesThatSomethingElseExplainsDoNot) {
+  auto* robot = connect();
+  show_duty(*robot, 0.2F);
+  const CommandId shown_before = unanswered(set_duty(0.2F));
+  const CommandId rest = unanswered(set_duty(0));
+  const CommandId first = unanswered(set_duty(0.3F)), second = unanswered(set_duty(0.3F));
+  for (const float duty : {0.2F, 0.0F, 0.3F}) show_duty(*robot, duty);
+  for (const CommandId id : {shown_before, rest, first, second}) {
+    EXPECT_EQ(latest(id).state, CommandState::unknown);
+  }
+}
+
+TEST_F(UnansweredTest, ALostLinkLeavesTheEndUnknownUntilTheRobotIsBack) {
+  auto* robot = connect();
+  submit(set_setpoint(0.1F));
+  clock.settle();
+  const CommandId id = robot->commands().at(0).command_id;
+  robot->link.cut();
+  clock.settle();
+  EXPECT_EQ(latest(id).state, CommandState::unknown);
+  EXPECT_EQ(latest(id).reason, "link_lost");
+  robot = connect();
+  say_event(*robot, id);
+  EXPECT_EQ(latest(id).state, CommandState::acknowledged);
+}
+
+}  // namespace
+}  // namespace server
