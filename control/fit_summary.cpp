@@ -37,7 +37,9 @@ void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const 
                           static_cast<Index>(free.size()));
   for (std::size_t c = 0; c < jacobians.size(); ++c) {
     const Index samples = jacobians[c].rows();
-    const double freedom = static_cast<double>(samples) - static_cast<double>(free.size()) / channels;
+    const SensorPath* path = search.sensor();
+    const Index counted = path ? path->weighed_samples() - path->bias_terms() : samples;
+    const double freedom = static_cast<double>(counted) - static_cast<double>(free.size()) / channels;
     const double scale = cost == Cost::least_squares
                              ? residuals[c].norm() / std::sqrt(freedom)
                              : absolute_error_scale(residuals[c], static_cast<int>(free.size()));
@@ -49,7 +51,9 @@ void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const 
   for (std::size_t i = 0; i < free.size(); ++i) {
     const auto row = static_cast<std::size_t>(free[i]);
     if (free[i] == kOffset) fit.offset_sigma_m = found.one_sigma[i];
-    if (free[i] == kDeadTime) fit.dead_time_sigma_s = found.one_sigma[i];
+    if (free[i] == kDeadTime || (free[i] == kSensorTime && fit.dead_time_s > 0)) {
+      fit.dead_time_sigma_s = found.one_sigma[i];
+    }
     if (row >= kParameters) continue;
     if (found.one_sigma[i]) fit.one_sigma[row] = *found.one_sigma[i] * unit[row];
     for (std::size_t j = 0; j < free.size(); ++j) {
@@ -66,11 +70,29 @@ void add_quality(const Eigen::VectorXd& residual, const std::vector<double>& mea
   fit.residual_sd = residual.norm() / std::sqrt(static_cast<double>(residual.size()));
 }
 
+std::optional<double>& p_value_of(Channel channel, Fit& fit) {
+  return channel == Channel::position   ? fit.position_whiteness_p_value
+         : channel == Channel::velocity ? fit.velocity_whiteness_p_value
+                                        : fit.acceleration_whiteness_p_value;
+}
+
+std::vector<double>& residual_of(Channel channel, Fit& fit) {
+  return channel == Channel::position   ? fit.position_residual_m
+         : channel == Channel::velocity ? fit.velocity_residual_m_s
+                                        : fit.acceleration_residual_m_s2;
+}
+
+const std::vector<double>& measured_of(Channel channel, const Recording& recording) {
+  return channel == Channel::position   ? recording.position_m
+         : channel == Channel::velocity ? recording.velocity_m_s
+                                        : recording.acceleration_m_s2;
+}
+
 void add_whiteness(const std::vector<Channel>& channels, const std::vector<Eigen::VectorXd>& residuals, Fit& fit) {
   fit.whiteness_p_value = 1;
   for (std::size_t c = 0; c < residuals.size(); ++c) {
     const double p = whiteness_p_value(residuals[c]);
-    (channels[c] == Channel::position ? fit.position_whiteness_p_value : fit.velocity_whiteness_p_value) = p;
+    p_value_of(channels[c], fit) = p;
     fit.whiteness_p_value = std::min(fit.whiteness_p_value, p);
   }
   fit.residuals_are_white = fit.whiteness_p_value >= kWhite;
@@ -85,6 +107,8 @@ Fit summary(OutputErrorSearch& search, const Recording& recording, Cost cost, St
   fit.model = found.point.model;
   fit.offset_m = found.point.offset_m;
   fit.dead_time_s = found.point.dead_time_s;
+  fit.sensor = search.sensor_fit(found.point);
+  if (fit.sensor && search.finds_dead_time()) fit.dead_time_s = search.sensor_lag_s(found.point);
   fit.end = found.end;
   fit.iterations = found.iterations;
   fit.starts = found.starts;
@@ -95,10 +119,8 @@ Fit summary(OutputErrorSearch& search, const Recording& recording, Cost cost, St
   std::vector<const std::vector<double>*> measured;
   const std::vector<Channel> channels = search.channels();
   for (std::size_t c = 0; c < residuals.size(); ++c) {
-    const bool is_position = channels[c] == Channel::position;
-    measured.push_back(is_position ? &recording.position_m : &recording.velocity_m_s);
-    auto& kept = is_position ? fit.position_residual_m : fit.velocity_residual_m_s;
-    kept.assign(residuals[c].begin(), residuals[c].end());
+    measured.push_back(&measured_of(channels[c], recording));
+    residual_of(channels[c], fit).assign(residuals[c].begin(), residuals[c].end());
     fit.sse += residuals[c].squaredNorm();
     fit.absolute_error += residuals[c].lpNorm<1>() * recording.dt_s;
   }

@@ -54,7 +54,8 @@ bool can_be_planned_with(const FractionalModel& m, const PlannedExperiment& plan
   const auto is_sd = [](double value) { return value >= 0 && std::isfinite(value); };
   return is_positive(m.kp) && is_positive(m.b2) && is_positive(m.b3) && m.b1 >= 0 && std::isfinite(m.b1) &&
          m.beta > 0 && m.beta <= 1 && m.alpha > m.beta && m.alpha <= 2 && is_sd(plan.position_sd_m) &&
-         is_sd(plan.velocity_sd_m_s) && plan.position_sd_m + plan.velocity_sd_m_s > 0;
+         is_sd(plan.velocity_sd_m_s) && is_sd(plan.acceleration_sd_m_s2) &&
+         plan.position_sd_m + plan.velocity_sd_m_s + plan.acceleration_sd_m_s2 > 0;
 }
 
 double standard_deviation(const std::vector<double>& residual) {
@@ -66,7 +67,7 @@ double standard_deviation(const std::vector<double>& residual) {
 // What a longer run with more changes would reach, with the residuals of this one.
 std::string better_experiment(const Recording& recording, const Fit& fit, bool fits_offset,
                               const std::vector<std::size_t>& parameters) {
-  if (!(fit.fit_percent >= kPoorFitPercent)) {
+  if (!describes_run(fit)) {
     return "the model does not describe the run, so that no better experiment can be computed from it";
   }
   PlannedExperiment plan;
@@ -75,6 +76,7 @@ std::string better_experiment(const Recording& recording, const Fit& fit, bool f
   plan.duty = prbs_duty(1, kPlanBitS, kPlanDurationS, plan.dt_s);
   plan.position_sd_m = standard_deviation(fit.position_residual_m);
   plan.velocity_sd_m_s = standard_deviation(fit.velocity_residual_m_s);
+  plan.acceleration_sd_m_s2 = standard_deviation(fit.acceleration_residual_m_s2);
   plan.fits_offset = fits_offset;
   if (!can_be_planned_with(fit.model, plan)) return "change the duty during a longer run";
   const ExpectedUncertainty expected = expected_uncertainty(fit.model, plan);
@@ -134,9 +136,9 @@ bool dead_time_is_at_its_limit(const Fit& fit, const IdentificationOptions& opti
 
 void add_at_bounds(const Fit& fit, const IdentificationOptions& options, std::vector<std::string>& warnings) {
   if (fit.structure != Structure::fractional) return;
-  const char* meaning =
-      dead_time_is_at_its_limit(fit, options) ? "probably because the dead time is at its limit; raise that first"
-      : fit.fit_percent < kPoorFitPercent     ? "the model does not describe the run, so this order means nothing"
+  const char* meaning = dead_time_is_at_its_limit(fit, options)
+                            ? "probably because the dead time is at its limit; raise that first"
+                        : !describes_run(fit) ? "the model does not describe the run, so this order means nothing"
                                               : "the data do not need this fractional order, or do not show it";
   const auto add = [&](const char* name, double order, double lower, double upper) {
     if (order > lower + kNearBound && order < upper - kNearBound) return;
@@ -158,6 +160,10 @@ void add_constant_duty(const Recording& recording, std::vector<std::string>& war
 }
 
 }  // namespace
+
+bool describes_run(const Fit& fit) {
+  return fit.fit_percent >= kPoorFitPercent || (fit.sensor && fit.residuals_are_white);
+}
 
 std::string structure_name(Structure structure) {
   return structure == Structure::fractional     ? "fractional"

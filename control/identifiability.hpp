@@ -21,6 +21,9 @@ std::vector<std::string> search_doubts(const Fit& fit, const IdentificationOptio
 std::vector<std::string> identifiability_warnings(const Recording& recording, const Fit& fit,
                                                   const IdentificationOptions& options);
 
+// A fit that is poor in percent describes the run nevertheless where only the accelerometer's white noise is left.
+bool describes_run(const Fit& fit);
+
 std::string structure_name(Structure structure);
 std::string end_words(SearchEnd end);  // "reached its time limit"
 

@@ -82,12 +82,15 @@ void check(const Recording& recording) {
   if (samples > kMostSamples) {
     refuse("duty has ", samples, " samples, more than ", kMostSamples, ": cut the run or sample it more slowly");
   }
-  if (recording.position_m.empty() && recording.velocity_m_s.empty()) {
-    refuse("position_m and velocity_m_s are both empty: give one of them");
+  const bool has_motion = !recording.position_m.empty() || !recording.velocity_m_s.empty();
+  if (has_motion == !recording.acceleration_m_s2.empty()) {
+    refuse(has_motion ? "acceleration_m_s2 is given beside position_m or velocity_m_s: give it alone, or not at all"
+                      : "position_m, velocity_m_s and acceleration_m_s2 are all empty: give one of them");
   }
   check_duty(recording.duty);
   check_output("position_m", recording.position_m, samples);
   check_output("velocity_m_s", recording.velocity_m_s, samples);
+  check_output("acceleration_m_s2", recording.acceleration_m_s2, samples);
 }
 
 void check(const IdentificationOptions& options, const Recording& recording) {
@@ -145,7 +148,8 @@ void add_verdict(const std::vector<Fit>& fits, std::vector<std::string>& warning
 }  // namespace
 
 Recording make_recording(std::span<const double> time_s, std::span<const double> duty,
-                         std::span<const double> position_m, std::span<const double> velocity_m_s) {
+                         std::span<const double> position_m, std::span<const double> velocity_m_s,
+                         std::span<const double> acceleration_m_s2) {
   const std::size_t samples = time_s.size();
   if (samples < kFewestSamples) refuse("time_s has ", samples, " samples: record at least ", kFewestSamples);
   check_column("time_s", time_s, samples);
@@ -163,7 +167,8 @@ Recording make_recording(std::span<const double> time_s, std::span<const double>
   Recording recording{dt_s,
                       {duty.begin(), duty.end()},
                       {position_m.begin(), position_m.end()},
-                      {velocity_m_s.begin(), velocity_m_s.end()}};
+                      {velocity_m_s.begin(), velocity_m_s.end()},
+                      {acceleration_m_s2.begin(), acceleration_m_s2.end()}};
   check(recording);
   return recording;
 }
@@ -175,6 +180,7 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   std::vector<Structure> structures{Structure::first_order, Structure::second_order, Structure::fractional};
   if (options.structure) structures = {*options.structure};
 
+  if (!recording.acceleration_m_s2.empty()) search.find_sensor(static_cast<int>(structures.size()) + 1);
   Identification result;
   int left = static_cast<int>(structures.size());
   for (const Structure structure : structures) {

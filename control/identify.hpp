@@ -8,6 +8,10 @@
 //   covariance = τ² (JᵀJ)⁻¹ at the optimum of (3), τ = 1/(2 f(0))       (6)   [koenker-bassett]; f: density of
 //   residuals
 //
+// Where the position is a robot's own estimate it contains the model that is built into the robot, and a fit would find
+// that one: then the acceleration is fitted, with the sensor's bias, lag and clock as further unknowns
+// (sensor_path.hpp).
+//
 // Structures: fractional (20); second_order, (19) with α = 2, β = 1; first_order, b1 = 0, β = 1. One is chosen by AIC.
 // The search starts from the Newtonian model (28), as the paper does, and from further points against local minima.
 // The simplest structure is searched first; each may use an equal part of the time that is left, so what the simple
@@ -31,18 +35,21 @@ namespace control {
 
 enum class Structure { fractional, second_order, first_order };
 
-// Uniformly sampled; duty[k] holds from sample k to sample k + 1. An empty channel was not recorded; one of the two
-// must be. Values are finite.
+// Uniformly sampled; duty[k] holds from sample k to sample k + 1. An empty channel was not recorded. Given are
+// position, velocity or both, if they were measured; or the acceleration alone, as a robot records it
+// (sensor_readings.hpp). Values are finite.
 struct Recording {
   double dt_s = 0.01;
   std::vector<double> duty;
   std::vector<double> position_m;
   std::vector<double> velocity_m_s;
+  std::vector<double> acceleration_m_s2 = {};
 };
 
 // From columns with times, which must be equally spaced within 1 % of a step.
 Recording make_recording(std::span<const double> time_s, std::span<const double> duty,
-                         std::span<const double> position_m, std::span<const double> velocity_m_s);
+                         std::span<const double> position_m, std::span<const double> velocity_m_s,
+                         std::span<const double> acceleration_m_s2 = {});
 
 enum class Cost { least_squares, absolute_error };
 enum class SearchEnd { converged, iteration_limit, time_limit, cancelled, not_finite };
@@ -70,6 +77,18 @@ struct IdentificationOptions {
 inline constexpr std::size_t kParameters = 5;  // ln-scaled inside; reported as kp, b1, b2, alpha, beta
 inline constexpr std::array<const char*, kParameters> kParameterNames{"kp", "b1", "b2", "alpha", "beta"};
 
+// What a fit of the acceleration found of the sensor.
+struct SensorFit {
+  bool readings_are_recovered = false;  // the robot's own bias is off the record, and with it its model
+  bool has_own_clock = false;           // else its samples keep step with the ticks
+  double period_s = 0;                  // of its samples, by the robot's clock
+  double time_constant_s = 0;           // of its low pass
+  double delay_s = 0;                   // of a reading, in the mean, the low pass aside
+  double bias_m_s2 = 0;                 // in the mean; of recovered readings but for a constant
+  double bias_range_m_s2 = 0;           // how far it wandered
+  std::size_t readings_left_out = 0;    // read twice, failed, or of uncertain age
+};
+
 // Absent parameters (b1 of first order, the orders of integer structures) have no sigma and correlation 0.
 struct Fit {
   Structure structure = Structure::fractional;
@@ -80,17 +99,19 @@ struct Fit {
   std::array<std::array<double, kParameters>, kParameters> correlation{};
   double sse = 0;             // sum of squared residuals, of both channels in their own units
   double absolute_error = 0;  // (3) as an integral over time
-  double fit_percent = 0;     // 100 (1 - |y - model|/|y - mean y|), of position if recorded, else of velocity
-  double residual_sd = 0;     // of the same channel
-  double aic = 0;             // Σ_channels n ln(sse/n) + 2 free_parameters; absolute error: 2 n ln(Σ|r|/n) for the sum
+  double fit_percent = 0;  // 100 (1 - |y - model|/|y - mean y|), of the first channel: position, velocity, acceleration
+  double residual_sd = 0;  // of the same channel
+  double aic = 0;          // Σ_channels n ln(sse/n) + 2 free_parameters; absolute error: 2 n ln(Σ|r|/n) for the sum
   int free_parameters = 0;  // of the model, and offset and dead time if they are fitted; the noise's sd is not counted
   bool residuals_are_white = false;
   double whiteness_p_value = 0;  // Ljung-Box, the smallest of the channels; white means at least 0.01
-  std::optional<double> position_whiteness_p_value, velocity_whiteness_p_value;
+  std::optional<double> position_whiteness_p_value, velocity_whiteness_p_value, acceleration_whiteness_p_value;
   SearchEnd end = SearchEnd::converged;
   // iterations: of the best start; starts: made, 0 if the structure was never searched; agree: with the best cost
   int iterations = 0, starts = 0, starts_that_agree = 0;
   std::vector<double> position_residual_m, velocity_residual_m_s;  // measured less model, empty if not recorded
+  std::vector<double> acceleration_residual_m_s2;                  // less the bias too; 0 for readings left out
+  std::optional<SensorFit> sensor;                                 // of a fit of the acceleration
 };
 
 struct Identification {
@@ -102,13 +123,14 @@ struct Identification {
 Identification identify(const Recording& recording, const IdentificationOptions& options);
 
 // What a planned experiment would tell: one-sigma of each parameter by (5), for white noise of these sizes (0: channel
-// not recorded).
+// not recorded). Of an acceleration bias, drift and lag are never known.
 struct PlannedExperiment {
   double dt_s = 0.01;
   std::vector<double> duty;
   double position_sd_m = 0;
   double velocity_sd_m_s = 0;
   bool fits_offset = false;
+  double acceleration_sd_m_s2 = 0;
 };
 
 struct ExpectedUncertainty {

@@ -102,7 +102,17 @@ void ModalRegressors::lay_rates(double longest_s, double shortest_s, double tole
   }
 }
 
+Complex ModalRegressors::scale(Complex rate) const {
+  switch (channel_) {
+    case Channel::position: return 1.0 / rate;
+    case Channel::velocity: return 1.0;
+    case Channel::acceleration: return rate;
+  }
+  return 0.0;
+}
+
 std::array<Complex, 2> ModalRegressors::taken_off(Complex rate) const {
+  if (channel_ == Channel::acceleration) return {0.0, 0.0};
   const Complex w = rate / turn_rate_, kappa = 1.0 / ((1.0 + w) * (1.0 + w) * (1.0 + w));
   if (channel_ == Channel::velocity) return {kappa, 0.0};
   return {kappa * (1.0 + 3.0 * w), kappa * rate};
@@ -113,10 +123,10 @@ Eigen::MatrixXd ModalRegressors::sampled_step_responses(const Eigen::VectorXd& t
   const Index fast = static_cast<Index>(log_rate_.size()) - slow_;
   Eigen::MatrixXd result(time_s.size(), 2 * fast);
   for (Index i = 0; i < fast; ++i) {
-    const Complex s = rate(slow_ + i), scale = channel_ == Channel::velocity ? 1.0 : 1.0 / s;
+    const Complex s = rate(slow_ + i), gain = scale(s);
     const auto [constant, linear] = taken_off(s);
     for (Index k = 0; k < time_s.size(); ++k) {
-      const Complex value = (std::exp(s * time_s[k]) - constant - linear * time_s[k]) * scale;
+      const Complex value = (std::exp(s * time_s[k]) - constant - linear * time_s[k]) * gain;
       result(k, i) = value.real();
       result(k, i + fast) = value.imag();
     }
@@ -150,7 +160,7 @@ void ModalRegressors::choose_columns(double longest_s, double shortest_s) {
   }
 }
 
-// (2) and (3) in powers of t; the last rows of the expansion are for the integrals of the duty.
+// (2), (3) and (5) in powers of t; the last rows of the expansion are for the integrals of the duty.
 void ModalRegressors::expand_slow_rates() {
   const Index rates = static_cast<Index>(log_rate_.size());
   for (Index i = 0; i < slow_; ++i) {
@@ -160,7 +170,7 @@ void ModalRegressors::expand_slow_rates() {
     Complex power = 1;
     Index first = 0;
     if (channel_ == Channel::position) coefficient[first++] = kappa * w * w * (3.0 + w) / s;
-    coefficient[first++] = less_kappa;
+    if (channel_ != Channel::acceleration) coefficient[first++] = less_kappa;
     for (Index l = first; l < kIntegrals; ++l) coefficient[l] = power *= s;
     expansion_.col(i).tail(kIntegrals) = coefficient.real();
     expansion_.col(i + rates).tail(kIntegrals) = coefficient.imag();
@@ -187,11 +197,11 @@ Eigen::MatrixXd ModalRegressors::stepped(const DelayedDuty& duty, int derivative
   for (Index j = 0; j < count && !(stop && stop()); ++j) {
     const auto [s, is_imaginary] = columns_[static_cast<std::size_t>(j)];
     const Complex turn = is_imaginary ? Complex{0, -1} : Complex{1, 0};  // so that the real part is what is wanted
-    const Complex scale = channel_ == Channel::velocity ? turn : turn / s;
+    const Complex value = turn * scale(s);
     const auto [constant, linear] = taken_off(s);
-    const double level_gain = ((derivative == 0 ? constant : linear) * scale).real();
-    const double area_gain = derivative == 0 ? (linear * scale).real() : 0;
-    const Complex gain = derivative == 0 ? scale : scale * s;
+    const double level_gain = ((derivative == 0 ? constant : linear) * value).real();
+    const double area_gain = derivative == 0 ? (linear * value).real() : 0;
+    const Complex gain = derivative == 0 ? value : value * s;
     auto column = result.col(j);
     column.noalias() = -level_gain * duty.integral.col(0) - area_gain * duty.integral.col(1);
     step_through(duty, s, [&](Index k, double real, double imaginary) {

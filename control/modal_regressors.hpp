@@ -3,6 +3,7 @@
 //   H(s) = H₁(s) + r/(s - p) + r̄/(s - p̄)                           (1)   the pole pair, if arg p < 0.942 π
 //   v(t) = Σ_i 2 Re[c_i (e^{s_i t} - κ_i)]                         (2)   step response of H₁: velocity
 //   x(t) = Σ_i 2 Re[c_i (e^{s_i t} - κ_i (1 + 3 s_i/a + s_i t))/s_i]    (3)   and its integral: position
+//   a(t) = Σ_i 2 Re[c_i s_i e^{s_i t}]                            (5)   and its slope: acceleration
 //   s_i = e^{y_i + iθ},  c_i = (δ/2πi) H₁(s_i),  κ_i = (1 + s_i/a)^-3   (4)
 //
 // (2) is the inverse Laplace integral of H₁/s on a ray of angle θ, by the trapezoid in y with step δ. What is taken
@@ -28,7 +29,7 @@ namespace control {
 // Asked between the columns of long records; what is computed after it said true is of no use.
 using Stop = std::function<bool()>;
 
-enum class Channel { position, velocity };
+enum class Channel { position, velocity, acceleration };
 
 inline constexpr Eigen::Index kIntegrals = 9;  // of the duty, from none on
 
@@ -72,7 +73,8 @@ class ModalRegressors {
   void choose_columns(double longest_s, double shortest_s);
   void expand_slow_rates();
   Eigen::MatrixXd sampled_step_responses(const Eigen::VectorXd& time_s) const;
-  std::array<Complex, 2> taken_off(Complex rate) const;  // from e^{st} in (2), (3): coefficients of 1 and t
+  Complex scale(Complex rate) const;                     // of e^{st}: 1/s, 1 or s
+  std::array<Complex, 2> taken_off(Complex rate) const;  // from e^{st} in (2), (3), (5): coefficients of 1 and t
 
   Channel channel_;
   double log_step_ = 0;

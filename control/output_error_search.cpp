@@ -27,6 +27,9 @@ double logistic(double x) { return std::clamp(1 / (1 + std::exp(-x)), kNearestTo
 
 double inside(double share) { return std::clamp(share, kNearestToBound, 1 - kNearestToBound); }
 
+constexpr double kEarliestSample = 4, kLatestSample = 2;  // A of sensor_path.hpp in ticks, before and after the tick
+constexpr double kLongestTimeConstant = 1;                // of the sensor, in ticks: more is the fluid
+
 double scale_of(const Eigen::VectorXd& values) { return std::sqrt((values.array() - values.mean()).square().mean()); }
 
 }  // namespace
@@ -90,6 +93,15 @@ OutputErrorSearch::OutputErrorSearch(const Recording& recording, const Identific
   };
   add(Channel::position, recording.position_m);
   add(Channel::velocity, recording.velocity_m_s);
+  if (!recording.acceleration_m_s2.empty()) {
+    auto path = std::make_unique<SensorPath>(sensor_readings(recording.acceleration_m_s2), dt_s_);
+    const Eigen::VectorXd readings = path->readings();
+    measured_.push_back({Channel::acceleration,
+                         OutputModel(Channel::acceleration, dt_s_, recording.duty, 0, kModelTolerance), readings,
+                         scale_of(readings), Eigen::VectorXd::Ones(samples_), std::move(path)});
+    sensor_start_.sensor = rough_timing();
+    return;
+  }
   if (options.longest_dead_time_s > 0) make_scan(recording);
 }
 
@@ -97,6 +109,12 @@ std::vector<int> OutputErrorSearch::free_parameters(Structure structure) const {
   std::vector<int> free = structure == Structure::fractional     ? std::vector<int>{0, 1, 2, 3, 4}
                           : structure == Structure::second_order ? std::vector<int>{0, 1, 2}
                                                                  : std::vector<int>{0, 2};
+  if (const SensorPath* path = sensor()) {
+    free.push_back(kSensorTime);
+    if (path->has_own_clock()) free.push_back(kSensorPeriod);
+    if (sensor_is_found_) free.push_back(kSensorTimeConstant);
+    return free;
+  }
   if (options_.fits_offset && measured_.front().channel == Channel::position) free.push_back(kOffset);
   if (options_.longest_dead_time_s > 0) free.push_back(kDeadTime);
   return free;
@@ -112,6 +130,11 @@ std::vector<Eigen::VectorXd> OutputErrorSearch::residuals(const SearchPoint& poi
   std::vector<Eigen::VectorXd> result;
   for (Measured& measured : measured_) {
     ++outputs_computed_;
+    if (measured.path) {
+      const Eigen::VectorXd output = measured.path->sampled(measured.model.output(point.model), point.sensor);
+      result.push_back(measured.path->weighed(measured.measured - output));  // (4)
+      continue;
+    }
     measured.model.set_delay(point.dead_time_s, stop_);
     const double offset_m = measured.channel == Channel::position ? point.offset_m : 0;
     result.emplace_back((measured.measured - measured.model.output(point.model)).array() - offset_m);
@@ -123,8 +146,10 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::jacobians(Structure structure, c
   const std::vector<int> free = free_parameters(structure);
   std::vector<Eigen::MatrixXd> result;
   for (Measured& measured : measured_) {
-    measured.model.set_delay(point.dead_time_s, stop_);
+    if (!measured.path) measured.model.set_delay(point.dead_time_s, stop_);
     const Eigen::MatrixXd of_model = measured.model.jacobian(point.model);
+    Eigen::MatrixXd of_sensor;
+    if (measured.path) of_sensor = measured.path->timing_slopes(measured.model.output(point.model), point.sensor);
     Eigen::MatrixXd slopes(samples_, static_cast<Index>(free.size()));
     for (Index j = 0; j < slopes.cols(); ++j) {
       const int parameter = free[static_cast<std::size_t>(j)];
@@ -132,8 +157,10 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::jacobians(Structure structure, c
         slopes.col(j).setConstant(measured.channel == Channel::position ? 1 : 0);
       } else if (parameter == kDeadTime) {
         slopes.col(j) = -measured.model.slope(point.model, stop_);
+      } else if (parameter >= kSensorTime) {
+        slopes.col(j) = measured.path->weighed(of_sensor.col(parameter - kSensorTime));
       } else {
-        slopes.col(j) = of_model.col(parameter);
+        slopes.col(j) = seen(measured, point, of_model.col(parameter));
       }
     }
     result.push_back(std::move(slopes));
@@ -141,17 +168,29 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::jacobians(Structure structure, c
   return result;
 }
 
+double OutputErrorSearch::earliest_sample_s() const { return -options_.longest_dead_time_s - kEarliestSample * dt_s_; }
+
+Eigen::VectorXd OutputErrorSearch::seen(const Measured& measured, const SearchPoint& point,
+                                        const Eigen::VectorXd& output) const {
+  return measured.path ? measured.path->weighed(measured.path->sampled(output, point.sensor)) : output;
+}
+
 Eigen::VectorXd OutputErrorSearch::coordinates(Structure structure, const SearchPoint& point) const {
   const double dead_time_share = inside(point.dead_time_s / options_.longest_dead_time_s);
   const FractionalModel& m = point.model;
-  Eigen::VectorXd all(7);
+  const SensorTiming& sensor = point.sensor;
+  const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
+  Eigen::VectorXd all(kSensorTimeConstant + 1);
   all << std::log(m.kp), std::log(m.b1), std::log(m.b2), logit(inside(m.alpha - 1)), logit(inside(m.beta)),
-      point.offset_m / offset_scale_m_, logit(dead_time_share);
+      point.offset_m / offset_scale_m_, logit(dead_time_share),
+      logit(inside((sensor.first_s - earliest_s) / sensor_span_s)), (sensor.period_s / dt_s_ - 1) * record_ticks(),
+      logit(inside(sensor.time_constant_s / (kLongestTimeConstant * dt_s_)));
   return all(free_parameters(structure));
 }
 
 SearchPoint OutputErrorSearch::point_at(Structure structure, const Eigen::VectorXd& x) const {
-  SearchPoint point{{1, 0, 1, 1, 2, 1}, 0, 0};
+  SearchPoint point{{1, 0, 1, 1, 2, 1}, 0, 0, sensor_start_.sensor};
+  const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
   const std::vector<int> free = free_parameters(structure);
   for (std::size_t j = 0; j < free.size(); ++j) {
     const double value = x[static_cast<Index>(j)];
@@ -162,6 +201,9 @@ SearchPoint OutputErrorSearch::point_at(Structure structure, const Eigen::Vector
       case 3: point.model.alpha = 1 + logistic(value); break;
       case 4: point.model.beta = logistic(value); break;
       case kOffset: point.offset_m = value * offset_scale_m_; break;
+      case kSensorTime: point.sensor.first_s = earliest_s + logistic(value) * sensor_span_s; break;
+      case kSensorPeriod: point.sensor.period_s = dt_s_ * (1 + value / record_ticks()); break;
+      case kSensorTimeConstant: point.sensor.time_constant_s = logistic(value) * kLongestTimeConstant * dt_s_; break;
       default: point.dead_time_s = logistic(value) * options_.longest_dead_time_s;
     }
   }
@@ -171,9 +213,14 @@ SearchPoint OutputErrorSearch::point_at(Structure structure, const Eigen::Vector
 Eigen::VectorXd OutputErrorSearch::coordinate_slopes(Structure structure, const SearchPoint& point) const {
   const FractionalModel& m = point.model;
   const double longest_s = options_.longest_dead_time_s;
-  Eigen::VectorXd all(7);
+  const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
+  const double time_share = (point.sensor.first_s - earliest_s) / sensor_span_s;
+  const double low_pass_share = point.sensor.time_constant_s / (kLongestTimeConstant * dt_s_);
+  Eigen::VectorXd all(kSensorTimeConstant + 1);
   all << 1, 1, 1, (m.alpha - 1) * (2 - m.alpha), m.beta * (1 - m.beta), offset_scale_m_,
-      longest_s > 0 ? point.dead_time_s * (1 - point.dead_time_s / longest_s) : 0;
+      longest_s > 0 ? point.dead_time_s * (1 - point.dead_time_s / longest_s) : 0,
+      sensor_span_s * time_share * (1 - time_share), dt_s_ / record_ticks(),
+      kLongestTimeConstant * dt_s_ * low_pass_share * (1 - low_pass_share);
   return all(free_parameters(structure));
 }
 
@@ -261,7 +308,7 @@ void OutputErrorSearch::run_starts(Structure structure, SearchResult& result) {
     if (limit_.is_reached()) break;
     SearchPoint point = start(structure, index);
     fit_gain(point);
-    if (options_.longest_dead_time_s > 0) fit_dead_time(point);
+    if (options_.longest_dead_time_s > 0 && !sensor()) fit_dead_time(point);
     if (limit_.is_reached()) break;
     const SearchEnd end = descend(structure, point, options_.iteration_limit, progress);
     if (limit_.end() && last_iterations_ == 0) break;

@@ -2,6 +2,7 @@
 //
 //   minimise Σ_channels Σ_k (y_k - output_k(q) - offset)²/σ²_channel            (1)   σ: re-estimated, for two channels
 //   minimise Σ_channels Σ_k |y_k - output_k(q) - offset|/σ_channel              (2)   reweighted least squares on (1)
+//   of the acceleration: y - output as a SensorPath reads it, its bias taken off                 (4)
 //   q = ln kp, ln b1, ln b2, ln((α - 1)/(2 - α)), ln(β/(1 - β)), offset, ln(τ/(longest - τ))         (3)   unbounded
 //
 // Eigen's Levenberg-Marquardt (MINPACK's lmder) with the exact Jacobian. Every start's gain is the best for its other
@@ -18,12 +19,14 @@
 #include "control/identify.hpp"
 #include "control/output_model.hpp"
 #include "control/search_limit.hpp"
+#include "control/sensor_path.hpp"
 
 namespace control {
 
 struct SearchPoint {
   FractionalModel model;
   double offset_m = 0, dead_time_s = 0;
+  SensorTiming sensor = {};
 };
 
 struct SearchResult {
@@ -33,7 +36,7 @@ struct SearchResult {
 };
 
 // What is free beside the model's own parameters follows the kParameters of these.
-enum FreeParameter : int { kOffset = kParameters, kDeadTime };
+enum FreeParameter : int { kOffset = kParameters, kDeadTime, kSensorTime, kSensorPeriod, kSensorTimeConstant };
 
 class OutputErrorSearch {
  public:
@@ -42,6 +45,13 @@ class OutputErrorSearch {
 
   // Within one of parts equal shares of the time that is left. With no time at all the result is the paper's start.
   SearchResult run(Structure structure, int parts = 1);
+
+  // Of a recorded acceleration, before the first run(): which sample each tick reads. Within one of parts equal shares.
+  void find_sensor(int parts);
+  std::optional<SensorFit> sensor_fit(const SearchPoint& point);  // none: no acceleration was recorded
+  double sensor_lag_s(const SearchPoint& point) const;            // dead time and all, its sampling aside
+  bool finds_dead_time() const { return options_.longest_dead_time_s > 0; }
+  const SensorPath* sensor() const { return measured_.front().path.get(); }
 
   SearchPoint start(Structure structure, int index) const;
   // The best gain, and offset if it is fitted; false, with a positive stand-in, if the best gain is not positive.
@@ -62,9 +72,19 @@ class OutputErrorSearch {
     Eigen::VectorXd measured;
     double sd;
     Eigen::VectorXd root_weight;
+    std::unique_ptr<SensorPath> path = nullptr;  // of an acceleration
   };
   struct Descent;  // what Eigen's solver calls
 
+  // The output, or a column of its slopes, as it is measured.
+  Eigen::VectorXd seen(const Measured& measured, const SearchPoint& point, const Eigen::VectorXd& output) const;
+  SensorTiming rough_timing() const;
+  double earliest_sample_s() const;
+  double record_ticks() const { return static_cast<double>(samples_); }
+  void find_delay(SearchPoint& point);
+  bool find_own_clock(SearchPoint& point);
+  bool descend_again(SearchPoint& point);
+  double sensor_sd(const SearchPoint& point);  // of a reading
   void run_starts(Structure structure, SearchResult& result);
   void fit_dead_time(SearchPoint& point);
   void make_scan(const Recording& recording);
@@ -81,6 +101,8 @@ class OutputErrorSearch {
   double dt_s_;
   Eigen::Index samples_;
   double offset_scale_m_ = 1;
+  bool sensor_is_found_ = false;
+  SearchPoint sensor_start_;  // what the search for it ended with
   int last_iterations_ = 0;
   double last_cost_ = 0;  // of the last descent, by its own weights
   long outputs_computed_ = 0;

@@ -44,8 +44,10 @@ Recording short_piece(const Recording& recording, double longest_dead_time_s) {
 
 }  // namespace
 
-// The Newtonian model first, a hair inside the bounds; then lags spread over what the record can show.
+// What the sensor was found with, if there is one; the Newtonian model, a hair inside the bounds; then lags spread over
+// what the record can show.
 SearchPoint OutputErrorSearch::start(Structure structure, int index) const {
+  if (sensor_is_found_ && structure == Structure::fractional && index-- == 0) return sensor_start_;
   FractionalModel model = normalised(kNewtonianModel);
   model.alpha = 1.98, model.beta = 0.98;
   if (index > 0) {
@@ -57,7 +59,7 @@ SearchPoint OutputErrorSearch::start(Structure structure, int index) const {
   }
   if (structure != Structure::fractional) model.alpha = 2, model.beta = 1;
   if (structure == Structure::first_order) model.b1 = 0;
-  return {model, 0, 0};
+  return {model, 0, 0, sensor_start_.sensor};
 }
 
 bool OutputErrorSearch::fit_gain(SearchPoint& point) {
@@ -69,9 +71,11 @@ bool OutputErrorSearch::fit_gain(SearchPoint& point) {
   for (Index c = 0; c < count; ++c) {
     Measured& measured = measured_[static_cast<std::size_t>(c)];
     ++outputs_computed_;
-    if (!measured.model.set_delay(point.dead_time_s, stop_)) return false;
-    columns.col(0).segment(c * samples_, samples_) = measured.model.output(point.model) / measured.sd;
-    target.segment(c * samples_, samples_) = measured.measured / measured.sd;
+    if (!measured.path && !measured.model.set_delay(point.dead_time_s, stop_)) return false;
+    columns.col(0).segment(c * samples_, samples_) =
+        seen(measured, point, measured.model.output(point.model)) / measured.sd;
+    const Eigen::VectorXd wanted = measured.path ? measured.path->weighed(measured.measured) : measured.measured;
+    target.segment(c * samples_, samples_) = wanted / measured.sd;
     if (has_offset && c == 0) columns.col(1).head(samples_).setConstant(1 / measured.sd);
   }
   const Eigen::VectorXd best = columns.colPivHouseholderQr().solve(target);

@@ -116,6 +116,10 @@ Eigen::MatrixXd OutputModel::weight_gradients(const FractionalModel& model, cons
 
 void OutputModel::add_pole_response(const PolePair& pair, Eigen::VectorXd& output) const {
   const Eigen::VectorXcd exponential = exponential_response(delayed_, pair.pole);
+  if (channel_ == Channel::acceleration) {
+    output += (2.0 * pair.residue * exponential).real();
+    return;
+  }
   const Complex gain = 2.0 * pair.residue / pair.pole, divisor = channel_ == Channel::velocity ? 1.0 : pair.pole;
   const Complex factor = gain / divisor;
   output += (factor * exponential).real() - factor.real() * delayed_.integral.col(0);
@@ -126,7 +130,7 @@ void OutputModel::add_pole_gradients(const PolePair& pair, Eigen::MatrixXd& jaco
   const Complex p = pair.pole, gain = 2.0 * pair.residue / p;
   const Eigen::VectorXcd exponential = exponential_response(delayed_, p);
   const Eigen::VectorXcd moved = exponential_response_slope(delayed_, p, exponential);
-  const bool is_position = channel_ == Channel::position;
+  const bool is_position = channel_ == Channel::position, is_acceleration = channel_ == Channel::acceleration;
   for (std::size_t q = 0; q < pair.pole_gradient.size(); ++q) {
     const Complex shift = pair.pole_gradient[q], gain_shift = (2.0 * pair.residue_gradient[q] - gain * shift) / p;
     Complex of_moved = gain * shift, of_exponential = gain_shift;
@@ -134,10 +138,14 @@ void OutputModel::add_pole_gradients(const PolePair& pair, Eigen::MatrixXd& jaco
       of_moved /= p;
       of_exponential = (gain_shift - gain * shift / p) / p;
     }
+    if (is_acceleration) {
+      of_moved *= p;
+      of_exponential = 2.0 * pair.residue_gradient[q];
+    }
     auto column = jacobian.col(static_cast<Index>(q));
     column += of_moved.real() * moved.real() - of_moved.imag() * moved.imag();
     column += of_exponential.real() * exponential.real() - of_exponential.imag() * exponential.imag();
-    column -= of_exponential.real() * delayed_.integral.col(0);
+    if (!is_acceleration) column -= of_exponential.real() * delayed_.integral.col(0);
     if (is_position) column -= gain_shift.real() * delayed_.integral.col(1);
   }
 }
@@ -163,6 +171,7 @@ Eigen::VectorXd OutputModel::slope(const FractionalModel& model, const Stop& sto
   if (!pair) return result;
   const Eigen::VectorXcd exponential = exponential_response(delayed_, pair->pole);
   const Complex gain = 2.0 * pair->residue / pair->pole;
+  if (channel_ == Channel::acceleration) return result + (gain * pair->pole * pair->pole * exponential).real();
   if (channel_ == Channel::velocity) return result + (gain * pair->pole * exponential).real();
   return result + (gain * exponential).real() - gain.real() * delayed_.integral.col(0);
 }

@@ -15,6 +15,7 @@ using Eigen::Index;
 
 constexpr double kModelTolerance = 1e-9;
 constexpr double kLargestDuty = 1e3;
+constexpr Index kSensorUnknowns = 3;  // of an acceleration: bias, drift, lag
 
 [[noreturn]] void refuse(const char* what, double value) { throw_invalid("planned experiment: ", what, ' ', value); }
 
@@ -38,7 +39,13 @@ void check(const PlannedExperiment& experiment) {
   if (!(velocity_sd_m_s >= 0 && std::isfinite(velocity_sd_m_s))) {
     refuse("velocity_sd_m_s must be ≥ 0, is", velocity_sd_m_s);
   }
-  if (position_sd_m == 0 && velocity_sd_m_s == 0) refuse("one of the two sd must be positive, both are", 0);
+  const double acceleration_sd_m_s2 = experiment.acceleration_sd_m_s2;
+  if (!(acceleration_sd_m_s2 >= 0 && std::isfinite(acceleration_sd_m_s2))) {
+    refuse("acceleration_sd_m_s2 must be ≥ 0, is", acceleration_sd_m_s2);
+  }
+  if (position_sd_m == 0 && velocity_sd_m_s == 0 && acceleration_sd_m_s2 == 0) {
+    refuse("one of the sd must be positive, all are", 0);
+  }
 }
 
 std::vector<Index> free_parameters(const FractionalModel& model) {
@@ -67,20 +74,29 @@ ExpectedUncertainty expected_uncertainty(const FractionalModel& given, const Pla
   const FractionalModel model = normalised(given);
   const std::vector<Index> free = free_parameters(model);
   const Index samples = static_cast<Index>(experiment.duty.size());
-  const Index columns = static_cast<Index>(free.size()) + (experiment.fits_offset ? 1 : 0);
+  const bool has_acceleration = experiment.acceleration_sd_m_s2 > 0;
+  const Index offset = static_cast<Index>(free.size()), sensor = offset + (experiment.fits_offset ? 1 : 0);
+  const Index columns = sensor + (has_acceleration ? kSensorUnknowns : 0);
   Eigen::MatrixXd jacobian(0, columns);
   const auto add = [&](Channel channel, double sd) {
     if (sd == 0) return;
     const OutputModel output(channel, experiment.dt_s, experiment.duty, 0, kModelTolerance);
     const Index row = jacobian.rows();
     jacobian.conservativeResize(row + samples, Eigen::NoChange);
+    jacobian.bottomRows(samples).setZero();
     jacobian.block(row, 0, samples, static_cast<Index>(free.size())) = output.jacobian(model)(Eigen::all, free) / sd;
     if (experiment.fits_offset) {
-      jacobian.col(columns - 1).tail(samples).setConstant(channel == Channel::position ? 1 / sd : 0);
+      jacobian.col(offset).tail(samples).setConstant(channel == Channel::position ? 1 / sd : 0);
+    }
+    if (channel == Channel::acceleration) {
+      jacobian.col(sensor).tail(samples).setConstant(1 / sd);
+      jacobian.col(sensor + 1).tail(samples).setLinSpaced(0, 1 / sd);
+      jacobian.col(sensor + 2).tail(samples) = output.slope(model) / sd;
     }
   };
   add(Channel::position, experiment.position_sd_m);
   add(Channel::velocity, experiment.velocity_sd_m_s);
+  add(Channel::acceleration, experiment.acceleration_sd_m_s2);
 
   const Uncertainty found = uncertainty(jacobian);
   const std::array<double, kParameters> unit{std::abs(model.kp), model.b1, model.b2, 1, 1};  // ln kp to kp, and so on

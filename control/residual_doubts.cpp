@@ -33,8 +33,10 @@ std::ostringstream three_digits() {
   return text;
 }
 
-void add_poor_fit(const ChannelResidual& channel, std::vector<std::string>& warnings) {
+void add_poor_fit(const ChannelResidual& channel, const Fit& fit, std::vector<std::string>& warnings) {
   if (channel.fit_percent >= kPoorFitPercent) return;
+  if (&channel.residual == &fit.acceleration_residual_m_s2 && describes_run(fit))
+    return;  // noise is larger than motion
   std::ostringstream text = three_digits();
   text << "the model explains only " << channel.fit_percent << " % of " << channel.name
        << ": it does not describe the run; look for a wrong sign or unit, columns that are shifted in time, "
@@ -98,11 +100,13 @@ std::vector<std::string> residual_doubts(const Recording& recording, const Ident
     if (percent < kFitOfRounding) channels.push_back({name, unit, residual, percent, p_value.value_or(1)});
   };
   take("position_m", "m", fit.position_residual_m, recording.position_m, fit.position_whiteness_p_value);
+  take("acceleration_m_s2", "m/s²", fit.acceleration_residual_m_s2, recording.acceleration_m_s2,
+       fit.acceleration_whiteness_p_value);
   take("velocity_m_s", "m/s", fit.velocity_residual_m_s, recording.velocity_m_s, fit.velocity_whiteness_p_value);
 
   std::vector<std::string> warnings;
   for (const ChannelResidual& channel : channels) add_outliers(channel, recording.dt_s, options.cost, warnings);
-  for (const ChannelResidual& channel : channels) add_poor_fit(channel, warnings);
+  for (const ChannelResidual& channel : channels) add_poor_fit(channel, fit, warnings);
   for (const ChannelResidual& channel : channels) add_mean(channel, warnings);
   for (const ChannelResidual& channel : channels) add_colour(channel, warnings);
   return warnings;

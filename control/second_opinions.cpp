@@ -24,8 +24,9 @@ constexpr double kRoughBeginning = 3;                     // times the size of t
 constexpr double kMotionSigmas = 5, kMotionShare = 0.01;  // of v0, and of the squares that it explains
 
 double lowest_percent(const Recording& recording, const Fit& fit) {
-  return std::min(fit_percent(fit.position_residual_m, recording.position_m),
-                  fit_percent(fit.velocity_residual_m_s, recording.velocity_m_s));
+  return std::min({fit_percent(fit.position_residual_m, recording.position_m),
+                   fit_percent(fit.velocity_residual_m_s, recording.velocity_m_s),
+                   fit_percent(fit.acceleration_residual_m_s2, recording.acceleration_m_s2)});
 }
 
 std::optional<Fit> fit_again(const OutputErrorSearch& search, const Recording& recording, IdentificationOptions options,
@@ -195,7 +196,7 @@ std::vector<std::string> second_opinions(OutputErrorSearch& search, const Record
   add_turned_sign(search, recording, options, fit, warnings);
   if (!warnings.empty()) return warnings;
   add_missing_offset(search, recording, options, fit, warnings);
-  add_initial_motion(search, recording, fit, warnings);
+  if (!fit.sensor) add_initial_motion(search, recording, fit, warnings);
   return warnings;
 }
 

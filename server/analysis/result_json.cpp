@@ -13,6 +13,17 @@ OrderedJson named(const Sigmas& sigmas) {
   return out;
 }
 
+OrderedJson json_of(const control::SensorFit& sensor) {
+  return {{"readings_are_recovered", sensor.readings_are_recovered},
+          {"has_own_clock", sensor.has_own_clock},
+          {"period_s", sensor.period_s},
+          {"time_constant_s", sensor.time_constant_s},
+          {"delay_s", sensor.delay_s},
+          {"bias_m_s2", sensor.bias_m_s2},
+          {"bias_range_m_s2", sensor.bias_range_m_s2},
+          {"readings_left_out", sensor.readings_left_out}};
+}
+
 OrderedJson json_of(const control::DiscretisationErrors& errors) {
   return {{"band_low_rad_s", errors.band_low_rad_s},
           {"band_high_rad_s", errors.band_high_rad_s},
@@ -73,6 +84,8 @@ OrderedJson json_of(const control::Fit& fit) {
           {"whiteness_p_value", fit.whiteness_p_value},
           {"position_whiteness_p_value", or_null(fit.position_whiteness_p_value)},
           {"velocity_whiteness_p_value", or_null(fit.velocity_whiteness_p_value)},
+          {"acceleration_whiteness_p_value", or_null(fit.acceleration_whiteness_p_value)},
+          {"sensor", fit.sensor ? json_of(*fit.sensor) : OrderedJson(nullptr)},
           {"correlation_of", control::kParameterNames},
           {"correlation", fit.correlation},
           {"end", text(fit.end)},

@@ -83,8 +83,22 @@ std::optional<std::string> gap_between(const Piece& piece, const StoredSample& b
                      skipped == 1 ? "period" : "periods", at_s);
 }
 
-std::optional<std::string> missing_in(const Piece& piece, const StoredSample& stored, const RunWindow& window) {
+double largest_position_sd_m(const Piece& piece) {
+  double largest_m = 0;
+  for (const StoredSample& stored : piece.samples) {
+    if (stored.position_sd_m > 0) largest_m = std::max(largest_m, static_cast<double>(stored.position_sd_m));
+  }
+  return largest_m;
+}
+
+std::optional<std::string> missing_in(const Piece& piece, const StoredSample& stored, const RunWindow& window,
+                                      bool is_estimate) {
   const Sample& sample = stored.sample;
+  if (is_estimate) {
+    if (std::isfinite(sample.duty) && std::isfinite(sample.acceleration_m_s2)) return std::nullopt;
+    return fmt::format("sample seq {} at {:.3f} s lacks a value (duty {}, acceleration_m_s2 {})", stored.seq,
+                       piece.seconds(stored), sample.duty, sample.acceleration_m_s2);
+  }
   const bool is_whole = std::isfinite(sample.position_m) && std::isfinite(stored.disturbance_m) &&
                         std::isfinite(sample.duty) && (!window.with_velocity || std::isfinite(sample.velocity_m_s));
   if (is_whole) return std::nullopt;
@@ -95,13 +109,13 @@ std::optional<std::string> missing_in(const Piece& piece, const StoredSample& st
 // Cuts the piece where it is not whole.
 class Cut {
  public:
-  Cut(const Piece& piece, const RunWindow& window, double dt_s) {
+  Cut(const Piece& piece, const RunWindow& window, double dt_s, bool is_estimate) {
     for (std::size_t i = 0; i < piece.samples.size(); ++i) {
       const StoredSample& stored = piece.samples[i];
       if (i > 0) {
         if (const auto gap = gap_between(piece, piece.samples[i - 1], stored, dt_s)) end_part(i, i, *gap);
       }
-      if (const auto missing = missing_in(piece, stored, window)) end_part(i, i + 1, *missing);
+      if (const auto missing = missing_in(piece, stored, window, is_estimate)) end_part(i, i + 1, *missing);
     }
     end_part(piece.samples.size(), 0, "");
     faults_.pop_back();
@@ -167,19 +181,35 @@ StepPoint step_point(const StoredSample& stored) {
   return point;
 }
 
+std::string channels_reason(double largest_position_sd_m) {
+  if (!(largest_position_sd_m > 0)) return "the position is known: position_sd_m is 0 throughout";
+  return fmt::format(
+      "position_m and velocity_m_s are the robot's own estimates (position_sd_m is up to {:.2g} m) and contain the "
+      "model "
+      "that is built into it, so the acceleration is fitted, with bias, lag and clock of the sensor as further "
+      "unknowns",
+      largest_position_sd_m);
+}
+
 Result<RunRecording> recording_of(std::span<const StoredSample> samples, const RunWindow& window) {
   const auto piece = select(samples, window);
   if (!piece) return std::unexpected{piece.error()};
   const auto& chosen = piece->samples;
   const double dt_s = usual_step_s(*piece);
-  const Cut cut{*piece, window, dt_s};
+  const double position_sd_m = largest_position_sd_m(*piece);
+  const bool is_estimate = position_sd_m > 0;
+  const Cut cut{*piece, window, dt_s, is_estimate};
   if (!cut.is_whole()) return cut.refusal(*piece);
-  RunRecording made;
+  RunRecording made{{}, channels_reason(position_sd_m), {}};
   control::Recording& recording = made.recording;
   recording.dt_s =
       (piece->seconds(chosen.back()) - piece->seconds(chosen.front())) / static_cast<double>(chosen.size() - 1);
   for (const StoredSample& stored : chosen) {
     recording.duty.push_back(static_cast<double>(stored.sample.duty));
+    if (is_estimate) {
+      recording.acceleration_m_s2.push_back(static_cast<double>(stored.sample.acceleration_m_s2));
+      continue;
+    }
     recording.position_m.push_back(static_cast<double>(stored.sample.position_m) -
                                    static_cast<double>(stored.disturbance_m));
     if (window.with_velocity) recording.velocity_m_s.push_back(static_cast<double>(stored.sample.velocity_m_s));

@@ -26,15 +26,20 @@ struct RunWindow {
   bool with_velocity = false;  // the robot's own estimate of it, which is no second measurement
 };
 
-// A piece of a run, and what a reader of its numbers must know about how it begins.
+// A piece of a run, and what a reader of its numbers must know about it.
 struct RunRecording {
   control::Recording recording;
+  std::string channels_reason;  // why these channels are fitted
   std::vector<std::string> warnings;
 };
 
-// position_m is what was measured: without the disturbance, which the robot adds to it.
-// invalid: several spans to choose from, too few samples, or gaps or missing values; the detail names each (samples
+// Where position_sd_m is above 0 anywhere, position and velocity are the robot's estimates, and the recording holds the
+// acceleration in their place. Else position_m is what was measured: without the disturbance, which the robot adds to
+// it. invalid: several spans to choose from, too few samples, or gaps or missing values; the detail names each (samples
 // that were lost told from periods that the robot skipped) and the longest windows without one, as flags.
+// In words; 0: the position is known.
+std::string channels_reason(double largest_position_sd_m);
+
 Result<RunRecording> recording_of(std::span<const StoredSample> samples, const RunWindow& window);
 
 }  // namespace server

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -83,26 +85,87 @@ control::FopdController read(const ControllerChoice& choice) {
 }
 
 CsvColumns read_csv(const std::string& file, std::initializer_list<const char*> required,
-                    std::initializer_list<const char*> optional) {
-  return parse_csv(read_text(file, kMaxCsvBytes), file, required, optional);
+                    std::initializer_list<const char*> optional, std::initializer_list<const char*> with_gaps) {
+  return parse_csv(read_text(file, kMaxCsvBytes), file, required, optional, with_gaps);
 }
 
-control::Recording read_recording(const std::string& file) {
-  CsvColumns columns = read_csv(file, {"duty"}, {"t_s", "robot_time_us", "position_m", "velocity_m_s"});
-  const bool has_seconds = columns.contains("t_s");
-  if (!has_seconds && !columns.contains("robot_time_us")) refuse(file, "has no column t_s (seconds)");
-  if (!columns.contains("position_m") && !columns.contains("velocity_m_s")) {
+namespace {
+
+constexpr const char* kPositionSd = "position_sd_m";
+
+std::vector<double> times_of(const std::string& file, CsvColumns& columns) {
+  if (columns.contains("t_s")) return columns["t_s"];
+  if (!columns.contains("robot_time_us")) refuse(file, "has no column t_s (seconds)");
+  std::vector<double> time_s = columns["robot_time_us"];
+  const double began_us = time_s.empty() ? 0 : time_s.front();
+  for (double& time : time_s) time = (time - began_us) / 1e6;
+  return time_s;
+}
+
+// The decimals of an export stand for binary32.
+void round_to_binary32(CsvColumns& columns) {
+  for (auto& [name, values] : columns) {
+    if (name == "t_s" || name == "robot_time_us") continue;
+    for (double& value : values) value = static_cast<double>(static_cast<float>(value));
+  }
+}
+
+void take_off_disturbance(CsvColumns& columns) {
+  const std::vector<double>& disturbance_m = columns["disturbance_m"];
+  std::vector<double>& position_m = columns["position_m"];
+  for (std::size_t k = 0; k < std::min(disturbance_m.size(), position_m.size()); ++k) {
+    if (std::isfinite(disturbance_m[k])) position_m[k] -= disturbance_m[k];
+  }
+}
+
+double largest_of(const std::vector<double>& values) {
+  double largest = 0;
+  for (const double value : values) {
+    if (value > largest) largest = value;
+  }
+  return largest;
+}
+
+// Leaves the columns that are fitted.
+std::string choose_channels(const std::string& file, CsvColumns& columns, bool with_velocity) {
+  if (!columns.contains(kPositionSd)) {
+    columns.erase("acceleration_m_s2");
+    return "the file has no column position_sd_m: what it holds is taken as measured";
+  }
+  round_to_binary32(columns);
+  const double position_sd_m = largest_of(columns[kPositionSd]);
+  if (position_sd_m > 0) {
+    if (!columns.contains("acceleration_m_s2")) {
+      refuse(file, fmt::format("{}; but there is no column acceleration_m_s2", channels_reason(position_sd_m)));
+    }
+    columns.erase("position_m");
+    columns.erase("velocity_m_s");
+  } else {
+    columns.erase("acceleration_m_s2");
+    if (!with_velocity && columns.contains("position_m")) columns.erase("velocity_m_s");
+    take_off_disturbance(columns);
+  }
+  return channels_reason(position_sd_m);
+}
+
+}  // namespace
+
+RunRecording read_recording(const std::string& file, bool with_velocity) {
+  CsvColumns columns = read_csv(file, {"duty"}, {"t_s", "robot_time_us", "position_m", "velocity_m_s"},
+                                {kPositionSd, "acceleration_m_s2", "disturbance_m"});
+  const std::vector<double> time_s = times_of(file, columns);
+  RunRecording made{{}, choose_channels(file, columns, with_velocity), {}};
+  const bool has_any = columns.contains("position_m") || columns.contains("velocity_m_s");
+  if (!has_any && !columns.contains("acceleration_m_s2")) {
     refuse(file, "has neither position_m nor velocity_m_s; one of them is needed");
   }
-  std::vector<double> time_s = columns[has_seconds ? "t_s" : "robot_time_us"];
-  if (!has_seconds) {
-    for (double& time : time_s) time *= 1e-6;
-  }
   try {
-    return control::make_recording(time_s, columns["duty"], columns["position_m"], columns["velocity_m_s"]);
+    made.recording = control::make_recording(time_s, columns["duty"], columns["position_m"], columns["velocity_m_s"],
+                                             columns["acceleration_m_s2"]);
   } catch (const std::invalid_argument& error) {
     refuse(file, error.what());
   }
+  return made;
 }
 
 }  // namespace server::cli

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace server::cli {
@@ -53,8 +54,8 @@ char separator_of(std::string_view heading) {
 class Reader {
  public:
   Reader(const std::string& source, std::initializer_list<const char*> required,
-         std::initializer_list<const char*> optional)
-      : source_{source}, required_{required}, optional_{optional} {}
+         std::initializer_list<const char*> optional, std::initializer_list<const char*> with_gaps)
+      : source_{source}, required_{required}, optional_{optional}, with_gaps_{with_gaps} {}
 
   void take(std::string_view line) {
     ++line_;
@@ -82,9 +83,13 @@ class Reader {
 
   std::string wanted() const { return fmt::format("{}", fmt::join(required_, ", ")); }
 
+  bool may_have_gaps(std::string_view name) const {
+    return std::ranges::any_of(with_gaps_, [name](const char* other) { return name == other; });
+  }
+
   bool wants(std::string_view name) const {
     const auto same = [name](const char* other) { return name == other; };
-    return std::ranges::any_of(required_, same) || std::ranges::any_of(optional_, same);
+    return std::ranges::any_of(required_, same) || std::ranges::any_of(optional_, same) || may_have_gaps(name);
   }
 
   void take_heading(std::string_view line) {
@@ -123,6 +128,7 @@ class Reader {
   }
 
   double number(std::string_view cell, const std::string& column) const {
+    if (cell.empty() && may_have_gaps(column)) return std::numeric_limits<double>::quiet_NaN();
     if (cell.starts_with('+')) cell.remove_prefix(1);
     double value = 0;
     const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
@@ -136,7 +142,7 @@ class Reader {
   }
 
   const std::string& source_;
-  std::vector<const char*> required_, optional_;
+  std::vector<const char*> required_, optional_, with_gaps_;
   std::size_t line_ = 0, rows_ = 0, headings_ = 0;
   bool has_heading_ = false;
   char separator_ = ',';
@@ -147,9 +153,9 @@ class Reader {
 }  // namespace
 
 CsvColumns parse_csv(std::string_view text, const std::string& source, std::initializer_list<const char*> required,
-                     std::initializer_list<const char*> optional) {
+                     std::initializer_list<const char*> optional, std::initializer_list<const char*> with_gaps) {
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  Reader reader{source, required, optional};
+  Reader reader{source, required, optional, with_gaps};
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
     reader.take(text.substr(begin, end - begin));

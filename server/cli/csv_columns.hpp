@@ -23,8 +23,10 @@ inline constexpr std::size_t kMaxCsvRows = 2'000'000;
 // By name; all have the same length.
 using CsvColumns = std::map<std::string, std::vector<double>, std::less<>>;
 
-// `source` names the text in messages. All of `required` are in the answer, and those of `optional` that there are.
+// `source` names the text in messages. All of `required` are in the answer, and those of `optional` and `with_gaps`
+// that there are. An empty cell is refused, but is NaN in a column of `with_gaps`.
 CsvColumns parse_csv(std::string_view text, const std::string& source, std::initializer_list<const char*> required,
-                     std::initializer_list<const char*> optional = {});
+                     std::initializer_list<const char*> optional = {},
+                     std::initializer_list<const char*> with_gaps = {});
 
 }  // namespace server::cli

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/motion_at_start.hpp"
@@ -38,10 +40,8 @@ void add_source(CLI::App& command, Identify& wish) {
       ->needs(run);
   command.add_option("--from-s", wish.window.from_s, "First second of the span to use")->check(finite())->needs(run);
   command.add_option("--to-s", wish.window.to_s, "Last second of the span to use")->check(finite())->needs(run);
-  command
-      .add_flag("--with-velocity", wish.window.with_velocity,
-                "Also fit the velocity that the robot estimated in the run")
-      ->needs(run);
+  command.add_flag("--with-velocity", wish.window.with_velocity,
+                   "Also fit the velocity that the robot recorded, where its position is known");
 }
 
 void add_search(CLI::App& command, control::IdentificationOptions& options) {
@@ -78,11 +78,21 @@ void add_plan(CLI::App& command, Identify& wish) {
   add("--plan-dt-s", plan.dt_s, "Sampling period")->check(positive());
   add("--plan-position-sd-m", plan.position_sd_m, "Noise of the position; 0: not recorded")->check(non_negative());
   add("--plan-velocity-sd-m-s", plan.velocity_sd_m_s, "Noise of the velocity; 0: not recorded")->check(non_negative());
+  add("--plan-acceleration-sd-m-s2", plan.acceleration_sd_m_s2, "Noise of the acceleration; 0: not recorded")
+      ->check(non_negative());
+}
+
+std::vector<std::string> channels_of(const control::Recording& recording) {
+  std::vector<std::string> names;
+  if (!recording.position_m.empty()) names.emplace_back("position_m");
+  if (!recording.velocity_m_s.empty()) names.emplace_back("velocity_m_s");
+  if (!recording.acceleration_m_s2.empty()) names.emplace_back("acceleration_m_s2");
+  return names;
 }
 
 RunRecording recording_for(const Identify& wish) {
   if (wish.csv) {
-    RunRecording given{read_recording(*wish.csv), {}};
+    RunRecording given = read_recording(*wish.csv, wish.window.with_velocity);
     if (auto moves = motion_at_start(given.recording)) given.warnings.push_back(*moves);
     return given;
   }
@@ -111,6 +121,17 @@ control::Identification search(const Identify& wish, const control::Recording& r
   return found;
 }
 
+void write_sensor(std::ostream& out, const control::SensorFit& sensor) {
+  const std::string clock =
+      sensor.has_own_clock ? fmt::format("a clock of its own, a sample each {} ms", fixed(1e3 * sensor.period_s, 4))
+                           : std::string{"in step with the ticks"};
+  fmt::print(out, "sensor: {}; readings {} ms late in the mean and by a low pass of {} ms; {} left out\n", clock,
+             fixed(1e3 * sensor.delay_s, 2), fixed(1e3 * sensor.time_constant_s, 2), sensor.readings_left_out);
+  fmt::print(out, "its bias wandered by {} m/s²; {}\n", cell(sensor.bias_range_m_s2, 2),
+             sensor.readings_are_recovered ? "its readings are recovered from the record, without the robot's own bias"
+                                           : "the robot's own bias is still in the record, and fitted as a bias");
+}
+
 void write_parameters(std::ostream& out, const Fit& fit) {
   Table table{{text(fit.structure), "value", "one sigma"}};
   const auto values = values_of(fit.model);
@@ -124,6 +145,7 @@ void write_parameters(std::ostream& out, const Fit& fit) {
   fmt::print(out, "residuals {} white (p = {}); {} after {} iterations; {} of {} starts agree\n",
              fit.residuals_are_white ? "look" : "are not", cell(fit.whiteness_p_value, 3), text(fit.end),
              fit.iterations, fit.starts_that_agree, fit.starts);
+  if (fit.sensor) write_sensor(out, *fit.sensor);
 }
 
 void write_compared(std::ostream& out, std::span<const Fit> compared) {
@@ -140,7 +162,9 @@ void write_compared(std::ostream& out, std::span<const Fit> compared) {
 }
 
 OrderedJson residuals_json(const Fit& fit) {
-  return {{"position_m", fit.position_residual_m}, {"velocity_m_s", fit.velocity_residual_m_s}};
+  return {{"position_m", fit.position_residual_m},
+          {"velocity_m_s", fit.velocity_residual_m_s},
+          {"acceleration_m_s2", fit.acceleration_residual_m_s2}};
 }
 
 }  // namespace
@@ -170,9 +194,12 @@ int run(const Identify& wish, std::ostream& out) {
   found.warnings.insert(found.warnings.end(), given.warnings.begin(), given.warnings.end());
   if (wish.form.is_json) {
     OrderedJson answer = json_of(found);
+    answer["channels"] = channels_of(given.recording);
+    answer["channels_reason"] = given.channels_reason;
     if (wish.with_residuals) answer["residuals"] = residuals_json(found.best);
     write_json(out, answer);
   } else {
+    fmt::print(out, "fitted: {}; {}\n\n", fmt::join(channels_of(given.recording), ", "), given.channels_reason);
     write_parameters(out, found.best);
     write_compared(out, found.compared);
     for (const std::string& warning : found.warnings) fmt::print(out, "\nwarning: {}\n", warning);

@@ -27,6 +27,7 @@ struct Plan {
   double dt_s = 0.01;
   double position_sd_m = 1.16e-3;
   double velocity_sd_m_s = 0;
+  double acceleration_sd_m_s2 = 0;
 };
 
 struct Identify {

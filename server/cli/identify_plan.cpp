@@ -25,6 +25,7 @@ control::PlannedExperiment experiment_of(const Plan& plan, bool fits_offset) {
                         : control::prbs_duty(plan.amplitude, plan.bit_s, plan.duration_s, plan.dt_s);
   experiment.position_sd_m = plan.position_sd_m;
   experiment.velocity_sd_m_s = plan.velocity_sd_m_s;
+  experiment.acceleration_sd_m_s2 = plan.acceleration_sd_m_s2;
   experiment.fits_offset = fits_offset;
   return experiment;
 }
@@ -50,9 +51,9 @@ int run_plan(const Identify& wish, std::ostream& out) {
     table.row({control::kParameterNames[i], cell(values[i]), sigma ? cell(*sigma, 3) : "cannot tell",
                sigma ? cell(100 * *sigma / std::abs(values[i]), 3) : "-"});
   }
-  fmt::print(out, "{} of {} s, amplitude {}, every {} s; noise sd {} m, {} m/s (0: not recorded)\n\n",
+  fmt::print(out, "{} of {} s, amplitude {}, every {} s; noise sd {} m, {} m/s, {} m/s² (0: not recorded)\n\n",
              text(wish.plan.duty), wish.plan.duration_s, wish.plan.amplitude, wish.plan.dt_s, wish.plan.position_sd_m,
-             wish.plan.velocity_sd_m_s);
+             wish.plan.velocity_sd_m_s, wish.plan.acceleration_sd_m_s2);
   table.write(out);
   return 0;
 }

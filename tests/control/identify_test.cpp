@@ -260,7 +260,8 @@ TEST(Identify, RefusesWhatItCannotUse) {
   EXPECT_THAT(changed([](Recording& r) { r.duty.assign(101, 0); }), HasSubstr("excites nothing"));
   EXPECT_THAT(changed([](Recording& r) { r.position_m.assign(101, 1.5); }), HasSubstr("position_m is 1.5 throughout"));
   EXPECT_THAT(changed([](Recording& r) { r.dt_s = 0; }), HasSubstr("dt_s must be positive, is 0"));
-  EXPECT_THAT(changed([](Recording& r) { r.position_m.clear(); }), HasSubstr("both empty"));
+  EXPECT_THAT(changed([](Recording& r) { r.position_m.clear(); }), HasSubstr("all empty"));
+  EXPECT_THAT(changed([](Recording& r) { r.acceleration_m_s2 = r.position_m; }), HasSubstr("give it alone"));
   IdentificationOptions options;
   options.longest_dead_time_s = 2;
   EXPECT_THAT(refusal(good, options), HasSubstr("longest_dead_time_s"));

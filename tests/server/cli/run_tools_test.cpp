@@ -1,8 +1,11 @@
 // Tools that read a recorded run: while the station records, with gaps and reboots, and without changing a byte.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <random>
 #include <set>
+#include <utility>
 
 #include "control/modal_plant.hpp"
 #include "server/recording/run_reader.hpp"
@@ -34,6 +37,44 @@ class RunTools : public RecordingTest {
     robot_.next_seq += count;
   }
 
+  // As swim(), on an accelerometer whose readings the robot's filter has taken its bias off.
+  void swim_on_the_accelerometer(std::size_t count, double duty) {
+    SampleBatch batch = robot_.batch(robot_.next_seq, count);
+    for (Sample& sample : batch.samples) {
+      const double reading_m_s2 = 0.01 * std::round((plant_.acceleration_m_s2() + noise_(random_)) / 0.01);
+      sample.acceleration_m_s2 = static_cast<float>(reading_m_s2 - 0.0031);
+      sample.position_m = static_cast<float>(0.5 * plant_.position_m());  // as a robot of another fluid believes
+      sample.velocity_m_s = static_cast<float>(0.5 * plant_.velocity_m_s());
+      sample.duty = static_cast<float>(duty);
+      plant_.step(duty);
+    }
+    send(robot_, batch);
+    robot_.next_seq += count;
+  }
+
+  // What an export has of the columns that matter here.
+  void write_csv(RunId run) {
+    const auto samples = read_run(path_, run, 10000);
+    ASSERT_TRUE(samples) << samples.error().detail;
+    std::ofstream out{folder_ / "run.csv"};
+    out << "robot_time_us,position_m,velocity_m_s,acceleration_m_s2,duty,disturbance_m,position_sd_m\n";
+    for (const StoredSample& stored : *samples) {
+      const Sample& s = stored.sample;
+      out << fmt::format("{},{},{},{},{},{},{}\n", stored.robot_time_us, s.position_m, s.velocity_m_s,
+                         s.acceleration_m_s2, s.duty, stored.disturbance_m, stored.position_sd_m);
+    }
+  }
+
+  // Both without the text that differs.
+  std::pair<nlohmann::json, nlohmann::json> from_run_and_csv(RunId run) {
+    write_csv(run);
+    const ToolAnswer of_run = ask("identify --run 1 --structure second_order --json");
+    const ToolAnswer of_csv = cli::ask_tool(folder_, "identify --csv @run.csv --structure second_order --json");
+    EXPECT_EQ(of_run.exit_code, 0) << of_run.error;
+    EXPECT_EQ(of_csv.exit_code, 0) << of_csv.error;
+    return {of_run.json(), of_csv.json()};
+  }
+
   RunId begin() {
     start();
     connect(robot_);
@@ -42,6 +83,8 @@ class RunTools : public RecordingTest {
 
   TestRobot robot_;
   control::ModalPlant plant_{control::kNonNewtonianModel, 0.01};
+  std::mt19937 random_{11};
+  std::normal_distribution<double> noise_{0, 0.012};
 };
 
 TEST_F(RunTools, ReadsTheSamplesWhileTheStationRecords) {
@@ -71,6 +114,33 @@ TEST_F(RunTools, IdentifyFindsTheModelWithoutTheDisturbance) {
   const ToolAnswer answer = ask("identify --run 1 --structure fractional --json");
   ASSERT_EQ(answer.exit_code, 0) << answer.error;
   EXPECT_NEAR(answer.json()["parameters"]["kp"], 0.1, 1e-3);
+}
+
+TEST_F(RunTools, IdentifyFitsTheAccelerationWhereThePositionIsAnEstimate) {
+  const RunId run = begin();
+  robot_.context.position_sd_m = 0.004F;
+  for (const double duty : {0.0, 0.4, -0.5, 0.6, -0.6, 0.3}) swim_on_the_accelerometer(100, duty);
+  flush();
+  const auto [of_run, of_csv] = from_run_and_csv(run);
+  EXPECT_EQ(of_run, of_csv);
+  EXPECT_EQ(of_run["channels"], nlohmann::json{"acceleration_m_s2"});
+  EXPECT_THAT(of_run["channels_reason"].get<std::string>(), AllOf(HasSubstr("estimates"), HasSubstr("0.004 m")));
+  EXPECT_TRUE(of_run["sensor"]["readings_are_recovered"].get<bool>());
+  EXPECT_NEAR(of_run["parameters"]["kp"].get<double>(), 0.1, 0.005);  // half of it by the position
+  const ToolAnswer text = ask("identify --run 1 --structure second_order");
+  EXPECT_THAT(text.text, AllOf(HasSubstr("fitted: acceleration_m_s2; position_m and velocity_m_s are the robot's own"),
+                               HasSubstr("sensor: ")));
+}
+
+TEST_F(RunTools, IdentifyFitsAKnownPositionAloneFromRunAndCsvAlike) {
+  const RunId run = begin();
+  swim(200, 0.3);
+  robot_.context.disturbance_m = -0.05F;
+  swim(200, -0.5);
+  flush();
+  const auto [of_run, of_csv] = from_run_and_csv(run);
+  EXPECT_EQ(of_run, of_csv);
+  EXPECT_EQ(of_run["channels"], nlohmann::json{"position_m"});
 }
 
 TEST_F(RunTools, IdentifyRefusesAGapAndSaysWhereItIs) {

@@ -1,0 +1,48 @@
+// One trial of identification: a simulated robot with the default sensor in a fluid, its telemetry, and what the fit of
+// its acceleration comes to.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "control/identify.hpp"
+
+namespace sim_robot {
+
+struct IdentificationTrial {
+  control::FractionalModel fluid;
+  bool believes_in_water = false;  // the model that is built into the robot: else that of (29)
+  std::vector<double> duty = {};   // a value for each tick
+  double dead_time_s = 0;          // of the fluid
+};
+
+// The fluids of the study: none is (29), which is what the robot believes in.
+inline constexpr std::array<control::FractionalModel, 5> kStudyFluids{{
+    {0.1, 0.0045, 0.15, 1, 1.75, 0.85},
+    {0.08, 0.0035, 0.07, 1, 1.6, 0.75},
+    {0.13, 0.009, 0.16, 1, 1.9, 0.95},
+    {0.1, 0.0034, 0.1765, 1, 1.5, 0.65},
+    {0.09, 0.0085, 0.066, 1, 1.85, 0.7},
+}};
+
+// ±0.6 in bits of 0.5 s for 60 s.
+std::vector<double> study_duty();
+
+// What the station records of the trial: the duty as it was driven, and the acceleration.
+control::Recording record(const IdentificationTrial& trial, std::uint64_t seed);
+
+struct TrialFit {
+  control::Fit fit;
+  double worst_response = 0;        // relative error of the velocity after a step, at 0.1, 1 and 5 s
+  double worst_sigmas = 0;          // of the parameters' errors, in their own sigmas
+  double worst_sigma_by_bound = 0;  // of the sigmas, by the Cramér-Rao bound of the true fluid and the true noise
+};
+
+// The structure is taken as known, the search begins at the paper's start alone.
+TrialFit fit_of(const control::Recording& recording, const control::FractionalModel& fluid);
+
+// Of one model's velocity after a step to another's, the worst at 0.1, 1 and 5 s.
+double worst_response_error(const control::FractionalModel& model, const control::FractionalModel& truth);
+
+}  // namespace sim_robot

@@ -1,0 +1,47 @@
+// From the telemetry of a robot that only has its accelerometer, identification finds the fluid and not the belief.
+#include <gtest/gtest.h>
+
+#include "tests/sim_robot/identification_trial.hpp"
+
+namespace sim_robot {
+namespace {
+
+const control::FractionalModel kFluid = kStudyFluids[1];
+
+// tests/bench/identification_study.cpp runs all fluids and 40 seeds.
+class IdentifyAcceleration : public ::testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(IdentifyAcceleration, FindsAFluidThatTheRobotDoesNotBelieveInWithSigmasThatHold) {
+  const TrialFit found = fit_of(record({.fluid = kFluid, .duty = study_duty()}, GetParam()), kFluid);
+  EXPECT_LE(found.worst_response, 0.02);
+  EXPECT_LE(found.worst_sigmas, 3);
+  EXPECT_LE(found.worst_sigma_by_bound, 2);
+  EXPECT_GT(found.fit.whiteness_p_value, 0.001);
+  ASSERT_TRUE(found.fit.sensor);
+  EXPECT_TRUE(found.fit.sensor->readings_are_recovered);
+  EXPECT_TRUE(found.fit.sensor->has_own_clock);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, IdentifyAcceleration, ::testing::Range<std::uint64_t>(1, 11));
+
+TEST(IdentifyBelief, TwoRobotsThatBelieveInDifferentFluidsFindTheSame) {
+  const auto found = [](bool believes_in_water) {
+    return fit_of(record({kFluid, believes_in_water, study_duty()}, 3), kFluid).fit.model;
+  };
+  EXPECT_LE(worst_response_error(found(true), found(false)), 0.01);
+}
+
+TEST(IdentifyBelief, ADeadTimeOfTheFluidIsFound) {
+  const auto duty = control::prbs_duty(0.6, 0.5, 20, 0.01);
+  const control::Recording recording = record({.fluid = kFluid, .duty = duty, .dead_time_s = 0.07}, 2);
+  control::IdentificationOptions options;
+  options.structure = control::Structure::fractional;
+  options.further_starts = 0;
+  options.longest_dead_time_s = 0.2;
+  const control::Fit fit = control::identify(recording, options).best;
+  EXPECT_NEAR(fit.dead_time_s, 0.07, 0.002);
+  EXPECT_LE(worst_response_error(fit.model, kFluid), 0.03);
+}
+
+}  // namespace
+}  // namespace sim_robot
