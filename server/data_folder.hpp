@@ -1,6 +1,7 @@
 // The folder of everything one station keeps: made when missing, locked against a second station, announced when ready.
 //
 //   station.sqlite                   written by the recorder
+//   station.head.json                what the database held some seconds ago (recording/store_head)
 //   rheonaut.token, .sessions        written by the API
 //   endpoints.json                   {"http":"127.0.0.1:8080","robots":"127.0.0.1:7070","pid":123}, while it runs; and
 //                                    "tls_certificate", the file to trust, when http is https

@@ -31,7 +31,9 @@ void EventRing::push(const protocol::Event& event) {
 }
 
 void EventRing::acknowledge(std::uint64_t next_event_seq) {
-  if (next_event_seq <= next_seq_) oldest_seq_ = std::max(oldest_seq_, next_event_seq);
+  if (next_event_seq > next_seq_) return;
+  acknowledged_next_seq_ = std::max(acknowledged_next_seq_, next_event_seq);
+  oldest_seq_ = std::max(oldest_seq_, next_event_seq);
 }
 
 protocol::Event EventRing::at(std::uint64_t event_seq) const {

@@ -21,6 +21,8 @@ class EventRing {
 
   std::uint64_t oldest_seq() const { return oldest_seq_; }
   std::uint64_t next_seq() const { return next_seq_; }
+  // The highest number that acknowledge() took.
+  std::uint64_t acknowledged_next_seq() const { return acknowledged_next_seq_; }
   std::uint32_t lost() const { return lost_; }
 
  private:
@@ -44,6 +46,7 @@ class EventRing {
   std::array<Record, kCapacity> records_{};
   std::uint64_t oldest_seq_ = 0;
   std::uint64_t next_seq_ = 0;
+  std::uint64_t acknowledged_next_seq_ = 0;
   std::uint32_t lost_ = 0;
 };
 

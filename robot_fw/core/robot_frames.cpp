@@ -190,6 +190,8 @@ void Robot::fill_hello(protocol::Hello& hello) const {
   hello.next_seq = samples_.next_seq();
   hello.oldest_event_seq = events_.oldest_seq();
   hello.next_event_seq = events_.next_seq();
+  hello.acknowledged_next_seq = samples_.acknowledged_next_seq();
+  hello.acknowledged_next_event_seq = events_.acknowledged_next_seq();
   hello.parameters_checksum = parameters_.checksum();
   hello.controller_id = controllers_.in_force().controller_id;
   hello.controller_checksum = controllers_.in_force().checksum;

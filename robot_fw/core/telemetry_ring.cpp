@@ -54,7 +54,9 @@ bool TelemetryRing::push(const Sample& sample, const BatchValues& values, bool s
 }
 
 void TelemetryRing::acknowledge(std::uint64_t next_seq) {
-  if (next_seq > oldest_seq_ && next_seq <= next_seq_) forget_below(next_seq);
+  if (next_seq > next_seq_) return;
+  acknowledged_next_seq_ = std::max(acknowledged_next_seq_, next_seq);
+  if (next_seq > oldest_seq_) forget_below(next_seq);
 }
 
 void TelemetryRing::forget_below(std::uint64_t seq) {

@@ -69,6 +69,8 @@ class TelemetryRing {
 
   std::uint64_t oldest_seq() const { return oldest_seq_; }
   std::uint64_t next_seq() const { return next_seq_; }
+  // The highest number that acknowledge() took.
+  std::uint64_t acknowledged_next_seq() const { return acknowledged_next_seq_; }
   std::uint32_t fill() const { return static_cast<std::uint32_t>(next_seq_ - oldest_seq_); }
   std::uint32_t lost() const { return lost_; }
 
@@ -92,7 +94,7 @@ class TelemetryRing {
   std::bitset<kCapacity> saturated_;
   std::array<Segment, kMaxSegments> segments_{};
   std::uint64_t oldest_segment_ = 0, next_segment_ = 0;  // numbers, as of samples
-  std::uint64_t oldest_seq_ = 0, next_seq_ = 0;
+  std::uint64_t oldest_seq_ = 0, next_seq_ = 0, acknowledged_next_seq_ = 0;
   std::uint32_t lost_ = 0;
 };
 

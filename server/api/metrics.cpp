@@ -95,6 +95,8 @@ std::string metrics_text(const RecordingParts& recording, const Station& station
   metrics.gauge("wal_bytes", wal.bytes, "In use in the write-ahead log.");
   metrics.gauge("wal_held", wal.held_since_us == 0 ? 0 : 1,
                 "1 while another program keeps the log from beginning anew.");
+  metrics.gauge("store_losses", recording.head_watch.losses().size(),
+                "Times that the database was behind its head, and nobody has acknowledged it.");
   metrics.counter("checkpoints_total", wal.checkpoints, "Passes that moved the log into the database.");
   metrics.counter("samples_written_total", counters.samples_written, "Samples that became durable.");
   metrics.counter("samples_duplicate_total", counters.samples_duplicate, "Samples that were received again.");

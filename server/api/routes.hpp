@@ -66,6 +66,7 @@ void add_routes(Router& router, ApiParts& parts);
 std::string base_url(const StationFacts& facts, const std::string& address);  // "https://127.0.0.1:8080"
 std::string login_url(const std::string& base_url, const std::string& code);
 Result<RunId> run_id_of(const Request& request);
+nlohmann::json losses_json(const std::vector<StoreLoss>& losses);
 
 // Who asks, and now.
 inline Author author_of(const Request& request, const Clock& clock) {

@@ -33,6 +33,8 @@ json to_json(const Retention& retention) {
           {"all_held", retention.counters().all_held}};
 }
 
+json to_json(const StoreLoss& loss) { return {{"noticed_at_us", loss.noticed_at_us}, {"problem", loss.problem}}; }
+
 json to_json(const BackupRecord& backup) {
   return {{"name", backup.name},
           {"state", text(backup.state)},
@@ -60,8 +62,16 @@ Answer get_recording(ApiParts& parts, Request) {
             {"database_bytes", use.database_bytes},
             {"wal_bytes", wal.bytes},
             {"wal_held_s", wal.held_since_us == 0 ? 0 : static_cast<double>(held_us) / 1e6},
+            {"losses", losses_json(recording.head_watch.losses())},
             {"counters", to_json(recording.recorder.counters())},
             {"retention", to_json(recording.retention)}});
+}
+
+Answer acknowledge_losses(ApiParts& parts, Request request) {
+  const Author by = author_of(request, parts.clock);
+  const auto done = co_await parts.recording.head_watch.acknowledge(by);
+  if (!done) co_return problem(done.error());
+  co_return json_response(200, json::object());
 }
 
 Answer get_metrics(ApiParts& parts, Request) {
@@ -90,6 +100,12 @@ Answer create_backup(ApiParts& parts, Request request) {
 
 }  // namespace
 
+json losses_json(const std::vector<StoreLoss>& losses) {
+  json list = json::array();
+  for (const StoreLoss& loss : losses) list.push_back(to_json(loss));
+  return list;
+}
+
 void add_recording_routes(Router& router, ApiParts& parts) {
   const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
                                      Answer (*answer)(ApiParts&, Request)) {
@@ -98,6 +114,7 @@ void add_recording_routes(Router& router, ApiParts& parts) {
   };
   add("GET", "/metrics", Scope::read, get_metrics);
   add("GET", "/api/v1/recording", Scope::read, get_recording);
+  add("POST", "/api/v1/recording/losses/acknowledge", Scope::admin, acknowledge_losses);
   add("GET", "/api/v1/backups", Scope::read, list_backups);
   add("POST", "/api/v1/backups", Scope::admin, create_backup);
 }

@@ -15,7 +15,8 @@ Answer get_station(ApiParts& parts, Request) {
                                 {"uptime_s", static_cast<double>(parts.clock.steady_us() - facts.started_at_us) / 1e6},
                                 {"http_address", facts.http_address},
                                 {"robots_address", facts.robots_address},
-                                {"security", facts.security->state()}});
+                                {"security", facts.security->state()},
+                                {"losses", losses_json(parts.recording.head_watch.losses())}});
 }
 
 Answer get_openapi(ApiParts&, Request request) { co_return asset_response(request, openapi_document()); }

@@ -15,6 +15,7 @@
 #include "server/recording/run_reader.hpp"
 #include "server/recording/schema.hpp"
 #include "server/recording/store_check.hpp"
+#include "server/recording/store_head.hpp"
 
 namespace server::cli {
 namespace {
@@ -23,16 +24,28 @@ constexpr int kFaults = 1;
 constexpr int kUnreadable = 2;
 
 struct Verified {
+  std::vector<std::string> losses;  // what the head file beside the database names and the database has not
   std::optional<StoreFindings> store;
   bool integrity_checked = false;
   std::optional<AuditFindings> audit;
 
   std::vector<std::string> faults() const {
-    std::vector<std::string> all = store ? store->faults : std::vector<std::string>{};
+    std::vector<std::string> all = losses;
+    if (store) all.insert(all.end(), store->faults.begin(), store->faults.end());
     if (audit) all.insert(all.end(), audit->faults.begin(), audit->faults.end());
     return all;
   }
 };
+
+// The head file is read first, for beside a station that runs the database moves on.
+std::vector<std::string> find_losses(SQLite::Database& database, const Result<std::optional<HeadFile>>& head) {
+  if (!head) return {head.error().detail};
+  if (!*head) return {};
+  std::vector<std::string> losses;
+  for (const StoreLoss& loss : (*head)->losses) losses.push_back("not acknowledged: " + loss.problem);
+  if (auto loss = find_loss(database, **head)) losses.push_back(std::move(*loss));
+  return losses;
+}
 
 // A run alone is not worth reading every page for; nor is it done unasked beside a station, whose log would grow.
 Result<Verified> verify_file(const std::filesystem::path& path, const Verify& wish) {
@@ -45,7 +58,10 @@ Result<Verified> verify_file(const std::filesystem::path& path, const Verify& wi
                                                   "station brings it up to date when it opens it",
                                                   path.string(), version));
     }
-    if (!wish.run) verified.audit = check_audit(database, wish.expected);
+    if (!wish.run) {
+      verified.losses = find_losses(database, load_head_file(path));
+      verified.audit = check_audit(database, wish.expected);
+    }
     if (wish.audit) return {};
     const StoreCheck check{wish.run, wish.integrity || (!wish.run && lock_is_free(path))};
     auto findings = check_store(database, check);

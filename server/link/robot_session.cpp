@@ -51,6 +51,8 @@ AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t r
   request.next_seq = hello.next_seq;
   request.oldest_event_seq = hello.oldest_event_seq;
   request.next_event_seq = hello.next_event_seq;
+  request.acknowledged_next_seq = hello.acknowledged_next_seq;
+  request.acknowledged_next_event_seq = hello.acknowledged_next_event_seq;
   request.received_at_us = utc_us;
   return request;
 }

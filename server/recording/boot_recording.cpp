@@ -88,11 +88,15 @@ void BootRecording::connect(const AdmissionRequest& hello, std::int64_t restored
   const std::int64_t booted_at_us = hello.received_at_us - static_cast<std::int64_t>(hello.robot_time_us);
   const bool is_from_before = std::max(connected_at_us_, booted_at_us) < restored_at_us;
   const char* cause = is_from_before ? "restore" : "ring_overrun";
+  const char* acknowledged_cause = is_from_before ? "restore" : "acknowledged_earlier";
   connected_at_us_ = hello.received_at_us;
   next_seq_ = std::max(next_seq_, hello.next_seq);
   last_robot_time_us_ = std::max(last_robot_time_us_, hello.robot_time_us);
+  give_up_below(std::min(hello.acknowledged_next_seq, hello.oldest_seq), acknowledged_cause, hello.received_at_us);
   give_up_below(hello.oldest_seq, cause, hello.received_at_us);
   next_event_seq_ = std::max(next_event_seq_, hello.next_event_seq);
+  give_up_events_below(std::min(hello.acknowledged_next_event_seq, hello.oldest_event_seq), acknowledged_cause,
+                       hello.received_at_us);
   give_up_events_below(hello.oldest_event_seq, cause, hello.received_at_us);
   sample_hole_.reset();  // the robot now sends by itself what it holds
   event_hole_.reset();

@@ -42,7 +42,8 @@ class BootRecording {
   // A Hello with these numbers is of a boot that went on, not of another one with the same id.
   bool continues(std::uint64_t next_seq, std::uint64_t robot_time_us) const;
   // The robot has connected, holding the samples [hello.oldest_seq, hello.next_seq). What it held no more when it was
-  // first heard after a restore, in the same boot, was lost by that; restored_at_us is 0 when there was none.
+  // first heard after a restore, in the same boot, was lost by that; restored_at_us is 0 when there was none. What else
+  // is missing and was acknowledged to it, another store had, or this one before it lost commits.
   void connect(const AdmissionRequest& hello, std::int64_t restored_at_us);
 
   // Samples of the batch that are not here yet.

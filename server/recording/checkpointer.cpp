@@ -46,28 +46,56 @@ CheckpointOutcome checkpoint(SQLite::Database& database, CheckpointMode mode) {
 }
 
 Checkpointer::Checkpointer(asio::io_context& loop, Clock& clock, WorkerThread& worker, std::filesystem::path path,
-                           std::uint64_t checkpoint_bytes)
+                           std::uint64_t checkpoint_bytes, microseconds interval)
     : clock_{clock},
       worker_{worker},
       path_{std::move(path)},
       checkpoint_bytes_{checkpoint_bytes},
+      interval_{interval},
       pass_wanted_{loop},
-      pass_ended_{loop} {}
+      pass_ended_{loop},
+      committed_{loop} {}
 
 asio::awaitable<void> Checkpointer::run() {
   for (;;) {
-    co_await pass_wanted_.wait();
+    co_await wait_until_due();
+    is_passing_ = true;
+    const std::uint64_t commits = commits_;
+    next_pass_us_ = clock_.steady_us() + interval_.count();
     auto pass = [path = path_] { return make_pass(path); };
     const CheckpointOutcome outcome = co_await worker_.run(std::move(pass));
     note(outcome);
+    const bool moved_all = !outcome.is_busy && outcome.problem.empty() && outcome.moved_frames >= outcome.log_frames;
+    if (moved_all) passed_commits_ = commits;
     is_passing_ = false;
-    was_passed_ = true;
+    was_passed_ = state_.bytes >= checkpoint_bytes_;
     ++state_.checkpoints;
     pass_ended_.notify();
   }
 }
 
-void Checkpointer::on_log(std::uint64_t bytes) {
+// is_passing_: on_log() wants one because of the length.
+asio::awaitable<void> Checkpointer::wait_until_due() {
+  while (!is_passing_ && !(has_new() && clock_.steady_us() >= next_pass_us_)) {
+    if (has_new()) {
+      co_await pass_wanted_.wait_until(clock_, next_pass_us_);
+    } else {
+      co_await pass_wanted_.wait();
+    }
+  }
+}
+
+void Checkpointer::pass_at_once() {
+  next_pass_us_ = 0;
+  pass_wanted_.notify();
+}
+
+void Checkpointer::on_log(const LogUse& use) {
+  const std::uint64_t bytes = use.bytes;
+  const bool had_new = has_new();
+  if (use.commits > commits_) committed_.notify();
+  commits_ = use.commits;
+  if (!had_new && has_new()) pass_wanted_.notify();
   if (bytes < state_.bytes) {  // it has begun anew
     if (state_.held_since_us != 0) spdlog::info("the write-ahead log of {} has begun anew", path_.string());
     was_passed_ = false;

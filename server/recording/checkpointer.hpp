@@ -3,6 +3,10 @@
 //   log ≥ checkpoint_bytes → a pass on a thread and handle of its own → the disk thread finishes between two commits
 //   → the next commit begins the log anew, unless a reader stands in it
 //
+// A shorter log is moved by a pass at the first commit, with the first samples, and whenever the latest pass is
+// `interval` ago and something was committed since: so who loses the log loses seconds, and never the schema
+// (database.cpp). What such a pass leaves waits for the next one.
+//
 // When the log has grown by half again, a commit waits for a pass that is under way, and the disk thread waits for
 // readers that stand in the log (ours are gone after 250 ms). So it grows no further than by one more commit, and stays
 // below twice checkpoint_bytes; only a foreign program that holds a read transaction makes it longer, which is logged
@@ -20,6 +24,7 @@
 #include <string>
 
 #include "server/clock.hpp"
+#include "server/recording/sample_store.hpp"
 #include "server/worker.hpp"
 
 namespace server {
@@ -50,13 +55,18 @@ CheckpointOutcome checkpoint(SQLite::Database& database, CheckpointMode mode);
 class Checkpointer {
  public:
   Checkpointer(boost::asio::io_context& loop, Clock& clock, WorkerThread& worker, std::filesystem::path path,
-               std::uint64_t checkpoint_bytes);
+               std::uint64_t checkpoint_bytes, microseconds interval);
 
   // Makes the passes, until cancelled.
   boost::asio::awaitable<void> run();
 
   // After work of the disk thread: so long is the log.
-  void on_log(std::uint64_t bytes);
+  void on_log(const LogUse& use);
+  // Returns when something was committed since it returned last; at once if something was before the first time. For
+  // one coroutine.
+  boost::asio::awaitable<void> next_commit() { return committed_.wait(); }
+  // What was committed is worth a pass, however short the log is and whenever the latest one was.
+  void pass_at_once();
   // Before a commit.
   boost::asio::awaitable<void> wait_for_room();
   // Little is left to move, or a pass has left it: the disk thread is to do it now, and to say what came of it.
@@ -67,6 +77,8 @@ class Checkpointer {
   const WalState& state() const { return state_; }
 
  private:
+  boost::asio::awaitable<void> wait_until_due();
+  bool has_new() const { return commits_ > passed_commits_; }
   void note(const CheckpointOutcome& outcome);
   bool is_long() const { return state_.bytes >= checkpoint_bytes_ + checkpoint_bytes_ / 2; }
   void watch();
@@ -75,10 +87,15 @@ class Checkpointer {
   WorkerThread& worker_;
   std::filesystem::path path_;
   std::uint64_t checkpoint_bytes_;
+  microseconds interval_;
   Signal pass_wanted_;
   Signal pass_ended_;
+  Signal committed_;
 
   WalState state_;
+  std::uint64_t commits_ = 0;         // so many have gone into the log
+  std::uint64_t passed_commits_ = 0;  // are in the database, too, and maybe more
+  std::int64_t next_pass_us_ = 0;     // steady; of a log that is short
   bool is_passing_ = false;
   bool was_passed_ = false;           // since the log began, and something of it may be left
   std::uint64_t moved_bytes_ = 0;     // of this log, into the database

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <sodium.h>
+#include <spdlog/spdlog.h>
 #include <sqlite3.h>
 #include <sys/stat.h>
 
@@ -55,6 +56,9 @@ void keep_log(SQLite::Database& database, bool keep) {
 
 SQLite::Database open_checked(const std::filesystem::path& path) {
   if (const auto problem = file_problem(path)) refuse(path, *problem);
+  if (const auto kept = set_aside_orphaned_log(path)) {
+    spdlog::error("{} is gone, and its write-ahead log is there: the log is kept as {}", path.string(), kept->string());
+  }
   try {
     SQLite::Database database{path.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE | SQLite::OPEN_NOMUTEX,
                               kBusyTimeoutMs};
@@ -92,6 +96,7 @@ Database::Database(const std::filesystem::path& path, BeforeMigration before) : 
   settle();
   if (const auto problem = file_problem(path)) refuse(path, *problem);  // what the log held is in the file now
   migrate(path, before);
+  settle();  // the schema and the store's identity are in the file, whatever becomes of its log
   store_id_ = unsigned_id(handle_.execAndGet("SELECT value FROM meta WHERE name = 'store_id'"));
   restored_at_us_ = handle_.execAndGet("SELECT coalesce(max(value), 0) FROM meta WHERE name = 'restored_at_us'");
 }

@@ -147,6 +147,14 @@ std::optional<std::string> file_problem(const fs::path& path) {
   return problem_of_size(head, *page, path);
 }
 
+std::optional<fs::path> set_aside_orphaned_log(const fs::path& path) {
+  if (size_or_zero(path) > 0 || !has_log(path)) return std::nullopt;
+  fs::path kept = beside(path, "-wal.orphaned");
+  for (int number = 2; fs::exists(kept); ++number) kept = beside(path, "-wal.orphaned-").concat(std::to_string(number));
+  fs::rename(beside(path, "-wal"), kept);
+  return kept;
+}
+
 bool means_damage(const std::exception& error) {
   const int code = code_of(error);
   return code == SQLITE_CORRUPT || code == SQLITE_NOTADB;

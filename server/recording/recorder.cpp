@@ -43,7 +43,7 @@ Recorder::Recorder(asio::io_context& loop, Clock& clock, WorkerThread& disk, Wor
       clock_{clock},
       disk_{disk},
       options_{std::move(options)},
-      checkpointer_{loop, clock, checkpoints, options_.path, options_.checkpoint_bytes} {}
+      checkpointer_{loop, clock, checkpoints, options_.path, options_.checkpoint_bytes, options_.checkpoint_interval} {}
 
 Recorder::~Recorder() = default;
 

@@ -51,6 +51,8 @@ struct RecorderOptions {
   std::size_t max_queued_samples = 2'000'000;
   std::size_t max_queued_records = 100'000;   // events, commands, audit, clock estimates, texts in force
   std::uint64_t checkpoint_bytes = 64 << 20;  // of the write-ahead log, from which on it is moved into the database
+  microseconds checkpoint_interval = std::chrono::seconds{10};  // after which a shorter one is moved, too
+  microseconds head_interval = std::chrono::seconds{2};         // between two looks whether the head has changed
 };
 
 // What the station must know again after a restart.
@@ -98,6 +100,9 @@ class Recorder final : public StationSink, public RobotArchive {
   // Moves the write-ahead log into the database meanwhile, until cancelled.
   boost::asio::awaitable<void> run_checkpoints() { return checkpointer_.run(); }
 
+  // Returns after a commit (Checkpointer::next_commit).
+  boost::asio::awaitable<void> next_commit() { return checkpointer_.next_commit(); }
+
   // Return true when what they name, as far as it was heard, is durable, and false after 3 s if it is not yet. Need
   // run(). Those of samples cut segments short; whoever only reads samples joins waiting() instead.
   boost::asio::awaitable<bool> flush();          // everything: the segments of every robot are cut
@@ -131,7 +136,7 @@ class Recorder final : public StationSink, public RobotArchive {
   boost::asio::awaitable<std::invoke_result_t<Job, Database&>> on_disk(Job job) {
     LogReport report{checkpointer_};
     auto with_database = [this, &report, job = std::move(job)]() mutable {
-      const LogReport::Reading reading{report.bytes, *store_};
+      const LogReport::Reading reading{report.use, *store_};
       return job(*database_);
     };
     co_return co_await disk_.run(std::move(with_database));
@@ -218,19 +223,19 @@ class Recorder final : public StationSink, public RobotArchive {
   struct LogReport {
     explicit LogReport(Checkpointer& to) : checkpointer{to} {}
     ~LogReport() {
-      if (bytes) checkpointer.on_log(*bytes);  // else it was cancelled before it began
+      if (use) checkpointer.on_log(*use);  // else it was cancelled before it began
     }
     LogReport(const LogReport&) = delete;
     LogReport& operator=(const LogReport&) = delete;
 
     struct Reading {  // on the disk thread
-      std::optional<std::uint64_t>& bytes;
+      std::optional<LogUse>& use;
       const SampleStore& store;
-      ~Reading() { bytes = store.log_bytes(); }
+      ~Reading() { use = store.log_use(); }
     };
 
     Checkpointer& checkpointer;
-    std::optional<std::uint64_t> bytes;
+    std::optional<LogUse> use;
   };
 
   boost::asio::awaitable<AdmissionOutcome> ask(AdmissionQuestion question);

@@ -142,7 +142,9 @@ asio::awaitable<void> Recorder::write() {
   problem_.clear();
   WriteBatch written = std::exchange(writing_, {});
   for (const BootStart& start : written.boots) --by_key_.at(start.boot_key)->second.starts_waiting;
+  const bool had_samples = counters_.samples_written > 0;
   count_written(written);
+  if (!had_samples && counters_.samples_written > 0) checkpointer_.pass_at_once();
   co_await tell_durable(std::move(written.progress));
 }
 

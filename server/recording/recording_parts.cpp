@@ -24,6 +24,7 @@ RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThrea
                                WorkerThread& exports_worker, WorkerThread& checkpoints, const RecorderOptions& options,
                                const RecordingConfig& config)
     : recorder{loop, clock, disk, checkpoints, options},
+      head_watch{clock, recorder, checkpoints, options.head_interval},
       reader{options.path, readers},
       certifier{clock, recorder, reader},
       runs{clock, recorder, reader, certifier},
@@ -47,6 +48,7 @@ void RecordingParts::connect(Station& station) {
 
 asio::awaitable<RestoredState> RecordingParts::open() {
   RestoredState restored = co_await recorder.open();
+  co_await head_watch.open();
   backups.set_store_id(restored.store_id);
   std::error_code ignored;
   std::filesystem::remove_all(exports_folder(), ignored);  // what a crash left
@@ -59,6 +61,7 @@ asio::awaitable<RestoredState> RecordingParts::open() {
 void RecordingParts::spawn(TaskGroup& tasks) {
   tasks.spawn("recorder", recorder.run());
   tasks.spawn("checkpoints", recorder.run_checkpoints());
+  tasks.spawn("head of the database", head_watch.run());
   tasks.spawn("certifier", certifier.run());
   tasks.spawn("interrupted runs", runs.finish_loading());
   tasks.spawn("disk watch", disk_watch.run());
@@ -72,6 +75,7 @@ void RecordingParts::close() {
   recorder.close([this](Database& database, std::int64_t utc_us) {  // what fails is done by the next start
     if (runs.any_open()) RunStore{database, {}}.interrupt(utc_us);
   });
+  head_watch.close();
 }
 
 }  // namespace server

@@ -13,6 +13,7 @@
 #include "server/recording/certifier.hpp"
 #include "server/recording/database_reader.hpp"
 #include "server/recording/disk_watch.hpp"
+#include "server/recording/head_watch.hpp"
 #include "server/recording/history.hpp"
 #include "server/recording/markers.hpp"
 #include "server/recording/recorder.hpp"
@@ -46,6 +47,7 @@ struct RecordingParts {
   void close();
 
   Recorder recorder;
+  HeadWatch head_watch;
   DatabaseReader reader;
   Certifier certifier;
   Runs runs;

@@ -15,6 +15,7 @@
 #include "server/recording/run_store.hpp"
 #include "server/recording/schema.hpp"
 #include "server/recording/statement.hpp"
+#include "server/recording/store_head.hpp"
 
 namespace server {
 namespace fs = std::filesystem;
@@ -73,6 +74,7 @@ RestoredStore restore_database(const fs::path& from, const fs::path& folder, con
   check(from, to);
   const Draft draft{folder / "station.sqlite.part"};
   RestoredStore restored;
+  HeadFile head;
   try {
     copy_database(from, draft.path());
     SQLite::Database written{draft.path().string(), SQLite::OPEN_READWRITE};
@@ -86,7 +88,9 @@ RestoredStore restore_database(const fs::path& from, const fs::path& folder, con
     Database database{draft.path(), BeforeMigration::change_in_place};  // the backup is the copy
     restored = mark(database, from, by);
     database.checkpoint();
+    head = {read_store_head(database.handle()), by.at_us, {}};
   }
+  save_head_file(to, head);  // in place of that of a database that was moved away
   finish_file(draft.path(), to);
   return restored;
 }

@@ -16,8 +16,9 @@ struct RestoredStore {
 };
 
 // Copies the database `from` to station.sqlite in the folder: verified, brought to the present schema, with a new
-// store_id and no open run, and visible only when it is whole. Throws std::runtime_error that says why not and what to
-// do: there is a database already, the backup is foreign, newer or damaged, there is no room.
+// store_id, no open run and its own head file (store_head), and visible only when it is whole. Throws
+// std::runtime_error that says why not and what to do: there is a database already, the backup is foreign, newer or
+// damaged, there is no room.
 RestoredStore restore_database(const std::filesystem::path& from, const std::filesystem::path& folder,
                                const Author& by);
 

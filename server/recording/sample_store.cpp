@@ -12,6 +12,7 @@
 namespace server {
 namespace {
 
+constexpr std::uint64_t kLogPageBytes = 4096 + 24;  // a page and its header
 constexpr const char* kInsertSegment =
     "INSERT INTO segment (boot_key, first_seq, last_seq, first_row, last_row, first_robot_time_us, period_us,"
     " first_received_at_us, received_at_us, utc_offset_us, clock_uncertainty_us, mode, sub_state, setpoint_m,"
@@ -50,12 +51,17 @@ SampleStore::SampleStore(Database& database)
       advance_row_{database.handle(), "UPDATE meta SET value = ? WHERE name = 'next_row' AND value = ?"},
       advance_boot_{database.handle(),
                     "UPDATE boot SET durable_next_seq = ?, durable_next_event_seq = ?,"
-                    " last_robot_time_us = max(last_robot_time_us, ?) WHERE boot_key = ?"} {
-  const auto on_commit = [](void* pages, sqlite3*, const char*, int log_pages) {
-    *static_cast<std::uint64_t*>(pages) = static_cast<std::uint64_t>(log_pages);
+                    " last_robot_time_us = max(last_robot_time_us, ?) WHERE boot_key = ?"},
+      count_commit_{database.handle(),
+                    "INSERT INTO meta (name, value) VALUES ('commits', 1)"
+                    " ON CONFLICT (name) DO UPDATE SET value = value + 1"} {
+  const auto on_commit = [](void* use, sqlite3*, const char*, int log_pages) {
+    auto& log = *static_cast<LogUse*>(use);
+    log.bytes = static_cast<std::uint64_t>(log_pages) * kLogPageBytes;
+    ++log.commits;
     return SQLITE_OK;
   };
-  sqlite3_wal_hook(database.handle().getHandle(), on_commit, &log_pages_);
+  sqlite3_wal_hook(database.handle().getHandle(), on_commit, &log_);
 }
 
 SampleStore::~SampleStore() { sqlite3_wal_hook(database_.handle().getHandle(), nullptr, nullptr); }
@@ -86,6 +92,7 @@ void SampleStore::write(const WriteBatch& batch) {
   if (next_row != next_row_ && execute(advance_row_, next_row, next_row_) != 1) {
     throw std::runtime_error{"another program writes into the station's database; stop it"};
   }
+  execute(count_commit_);
   transaction.commit();
   next_row_ = next_row;
 }

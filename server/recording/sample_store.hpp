@@ -52,6 +52,11 @@ struct WriteBatch {
   bool empty() const;
 };
 
+struct LogUse {
+  std::uint64_t bytes = 0;    // its length
+  std::uint64_t commits = 0;  // of this handle, since it was opened
+};
+
 class SampleStore {
  public:
   explicit SampleStore(Database& database);
@@ -62,17 +67,15 @@ class SampleStore {
   // Durable when it returns. Throws when it cannot be (disk full): nothing of the batch is stored then.
   void write(const WriteBatch& batch);
 
-  // The length of the write-ahead log after the latest commit of this handle.
-  std::uint64_t log_bytes() const { return log_pages_ * kLogPageBytes; }
+  // The write-ahead log after the latest commit of this handle.
+  LogUse log_use() const { return log_; }
 
  private:
   std::int64_t write_segment(const Segment& segment, std::int64_t first_row);  // returns the row after its last
   void write_event(const StoredEvent& stored);
 
-  static constexpr std::uint64_t kLogPageBytes = 4096 + 24;
-
   Database& database_;
-  std::uint64_t log_pages_ = 0;
+  LogUse log_;
   BootStore boots_;
   std::int64_t next_row_ = 0;
   RowWriter rows_;
@@ -84,6 +87,7 @@ class SampleStore {
   CommandStore commands_;
   SQLite::Statement advance_row_;
   SQLite::Statement advance_boot_;
+  SQLite::Statement count_commit_;
 };
 
 }  // namespace server

@@ -27,6 +27,8 @@ struct AdmissionRequest {
   std::uint64_t next_seq = 0;
   std::uint64_t oldest_event_seq = 0;
   std::uint64_t next_event_seq = 0;
+  std::uint64_t acknowledged_next_seq = 0;  // by any station; 0: the robot does not say
+  std::uint64_t acknowledged_next_event_seq = 0;
   std::int64_t received_at_us = 0;  // UTC
 };
 

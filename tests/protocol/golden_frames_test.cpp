@@ -132,6 +132,7 @@ void build_hello(Built& built) {
   set_text(hello.robot_id, "abcdefghijklmnopqrstuvwxyz_0123");
   set_text(hello.token, "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef0123456");
   hello.boot_id = hello.oldest_seq = hello.next_seq = hello.oldest_event_seq = hello.next_event_seq = kMax64;
+  hello.acknowledged_next_seq = hello.acknowledged_next_event_seq = kMax64;
   hello.reset_cause = rheonaut_RESET_CAUSE_WATCHDOG;
   set_text(hello.firmware_version, "12.34.56-rc7+build.1234");
   hello.sample_period_us = hello.ring_capacity = hello.parameters_checksum = kMax32;

@@ -191,6 +191,25 @@ TEST_F(Telemetry, EventsThatNobodyKeptAreCountedAsLost) {
   EXPECT_EQ(last_status().lost_events, last_event.oldest_event_seq - durable);
 }
 
+TEST_F(Telemetry, HelloSaysHowFarTheBootWasAcknowledgedWhateverTheRingDroppedSince) {
+  EXPECT_EQ(station.hello->acknowledged_next_seq, 0u);
+  const std::uint64_t acknowledged = next_seq() - 10;
+  const std::uint64_t events = station.events.back().event_seq + 1;
+  station.keeps_samples = false;
+  protocol::StationHeartbeat heartbeat = rheonaut_StationHeartbeat_init_zero;
+  heartbeat.durable_next_seq = acknowledged;
+  heartbeat.durable_next_event_seq = events;
+  station.send_heartbeat(heartbeat);
+  heartbeat.durable_next_seq = heartbeat.durable_next_event_seq = 1'000'000;  // never made: ignored
+  station.send_heartbeat(heartbeat);
+  station.disconnect();
+  station.run(1000);
+  station.connect();
+  EXPECT_EQ(station.hello->acknowledged_next_seq, acknowledged);
+  EXPECT_EQ(station.hello->acknowledged_next_event_seq, events);
+  EXPECT_GT(station.hello->oldest_seq, acknowledged);
+}
+
 TEST_F(Telemetry, AStalledTransportDelaysNothingButItself) {
   for (int i = 0; i < 300; ++i) {  // nobody listens
     robot.step();

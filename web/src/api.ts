@@ -97,6 +97,7 @@ export class Api {
   };
 
   station = () => this.ask<Station>('GET', '/station');
+  acknowledge_losses = () => this.ask<object>('POST', '/recording/losses/acknowledge');
   open_runs = async () => (await this.ask<{ runs: RunRecord[] }>('GET', '/runs?state=open&limit=1000')).runs;
   // null: the station has no list; then a fluid belongs to a run alone.
   fluids = async (): Promise<string[] | null> => {

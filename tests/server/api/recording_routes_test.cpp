@@ -39,6 +39,35 @@ TEST_F(RecordingRoutesTest, TellsWhatWasRecordedAndHowMuchRoomThereIs) {
   EXPECT_EQ(health["retention"]["all_held"], false);
 }
 
+TEST_F(RecordingRoutesTest, ALossIsReportedUntilAnAdminAcknowledgesIt) {
+  EXPECT_EQ(ask("GET", "/api/v1/recording").parsed()["losses"], json::array());
+  const auto database = folder.path() / "station.sqlite";
+  HeadFile head = **load_head_file(database);
+  head.head.commits += 1000;
+  save_head_file(database, head);
+  bool compared = false;
+  const auto compare = [](HeadWatch& watch, bool& done) -> boost::asio::awaitable<void> {
+    co_await watch.open();
+    done = true;
+  };
+  tasks.spawn("a start", compare(recording.head_watch, compared));
+  ASSERT_TRUE(clock.run_until([&] { return compared; }, 10s));
+  for (const char* document : {"/api/v1/recording", "/api/v1/station"}) {
+    const json losses = ask("GET", document).parsed()["losses"];
+    ASSERT_EQ(losses.size(), 1U) << document;
+    EXPECT_THAT(losses[0]["problem"].get<std::string>(), HasSubstr("the database has lost commits"));
+    EXPECT_EQ(losses[0]["noticed_at_us"], clock.utc_us());
+  }
+  EXPECT_THAT(ask("GET", "/metrics").body, HasSubstr("rheonaut_store_losses 1\n"));
+  EXPECT_EQ(ask("GET", "/api/v1/recording").parsed()["state"], "recording");
+  scopes = Scopes::of(Role::operator_);
+  EXPECT_EQ(ask("POST", "/api/v1/recording/losses/acknowledge").status, 403);
+  scopes = Scopes::of(Role::admin);
+  EXPECT_EQ(ask("POST", "/api/v1/recording/losses/acknowledge").status, 200);
+  EXPECT_EQ(ask("GET", "/api/v1/station").parsed()["losses"], json::array());
+  EXPECT_THAT(ask("GET", "/metrics").body, HasSubstr("rheonaut_store_losses 0\n"));
+}
+
 TEST_F(RecordingRoutesTest, WithoutRoomNoRunBeginsAndCommandsLive) {
   set_free_bytes(1'000'000);
   connect_robot();

@@ -67,6 +67,29 @@ TEST_F(VerifyTest, ADatabaseThatIsNotThereOrForeignOrOldIsToldApart) {
   EXPECT_EQ(ask().exit_code, 2);
 }
 
+TEST_F(VerifyTest, ADatabaseThatLostItsLogIsAFault) {
+  TestRobot robot;
+  start();
+  connect(robot);
+  make_slowly(robot, 500);
+  EXPECT_EQ(ask().exit_code, 0) << "beside the station";
+  std::filesystem::copy_file(path_, folder_ / "without_log.sqlite");
+  kill();
+  std::filesystem::rename(folder_ / "without_log.sqlite", path_);
+  const ToolAnswer lost = ask();
+  EXPECT_EQ(lost.exit_code, 1);
+  EXPECT_THAT(lost.text, HasSubstr("fault: the database has lost commits"));
+  EXPECT_EQ(ask("--run 1").exit_code, 2) << "a run alone is not the whole store: there is none";
+  start();
+  EXPECT_THAT(ask("--audit").text, HasSubstr("fault: not acknowledged: the database has lost commits"));
+  EXPECT_EQ(ask("--json").json()["faults"].size(), 1U);
+  ASSERT_TRUE(wait(recording_->head_watch.acknowledge({"user:anna", "", 1})));
+  EXPECT_EQ(ask().exit_code, 0);
+  stop();
+  std::ofstream{folder_ / "station.head.json"} << "no head";
+  EXPECT_THAT(ask().text, HasSubstr("cannot be told"));
+}
+
 TEST_F(VerifyTest, ChecksAFileThatIsNamed) {
   record();
   stop();

@@ -22,6 +22,17 @@ TEST_F(LinkTest, WelcomesARobotAndTellsItWhatIsDurable) {
   EXPECT_TRUE(archive.requests[0].from_loopback);
 }
 
+TEST_F(LinkTest, TheArchiveLearnsHowFarTheBootWasAcknowledgedByAnyStation) {
+  auto* robot = dial();
+  auto hello = TestRobot::hello_frame();
+  hello.body.hello.acknowledged_next_seq = 7;
+  hello.body.hello.acknowledged_next_event_seq = 3;
+  robot->send(hello);
+  ASSERT_TRUE(clock.run_until([&] { return !archive.requests.empty(); }, 1s));
+  EXPECT_EQ(archive.requests[0].acknowledged_next_seq, 7U);
+  EXPECT_EQ(archive.requests[0].acknowledged_next_event_seq, 3U);
+}
+
 TEST_F(LinkTest, RefusesAnotherProtocolVersionWithTheReason) {
   auto* robot = dial();
   auto hello = TestRobot::hello_frame();

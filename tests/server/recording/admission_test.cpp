@@ -286,6 +286,44 @@ TEST_F(AdmissionTest, ManyBootsShareACommit) {
   EXPECT_EQ(number("SELECT count(*) FROM boot WHERE connected_at_us IS NOT NULL"), kRobots);
 }
 
+// Another store told the robot so, or this one before it lost it; what came after was overwritten in the ring.
+TEST_F(AdmissionTest, WhatARobotNoLongerHasIsToldApart) {
+  start();
+  robot_.next_seq = 900;
+  robot_.oldest_seq = 150;
+  robot_.acknowledged_next_seq = 100;
+  robot_.next_event_seq = 20;
+  robot_.oldest_event_seq = 8;
+  robot_.acknowledged_next_event_seq = 8;
+  connect(robot_);
+  TestRobot silent;  // an older firmware
+  silent.id = "dory";
+  silent.boot_id = 7;
+  silent.next_seq = 900;
+  silent.oldest_seq = 150;
+  connect(silent);
+  flush();
+  using Rows = std::vector<std::string>;
+  EXPECT_EQ(rows("SELECT robot_id, first_seq, last_seq, cause FROM robot_gap ORDER BY robot_id DESC, first_seq"),
+            (Rows{"nemo|0|99|acknowledged_earlier", "nemo|100|149|ring_overrun", "dory|0|149|ring_overrun"}));
+  EXPECT_EQ(rows("SELECT first_event_seq, last_event_seq, cause FROM event_gap"), Rows{"0|7|acknowledged_earlier"});
+}
+
+TEST_F(AdmissionTest, WhatThisStoreHoldsIsNoGapHoweverFarItWasAcknowledged) {
+  start();
+  connect(robot_);
+  make(robot_, 500);
+  flush();
+  disconnect(robot_);
+  robot_.acknowledged_next_seq = robot_.oldest_seq = 500;
+  robot_.acknowledged_next_event_seq = ~0ULL;  // nonsense
+  connect(robot_);
+  make(robot_, 100);
+  flush();
+  EXPECT_EQ(number("SELECT count(*) FROM gap"), 0);
+  EXPECT_EQ(number("SELECT count(*) FROM event_gap"), 0);
+}
+
 TEST_F(AdmissionTest, RefusesNumbersThatCannotBe) {
   start();
   robot_.oldest_seq = 5;  // but next_seq is 0

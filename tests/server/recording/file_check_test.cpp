@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "server/recording/schema.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
@@ -45,6 +46,20 @@ class FileCheckTest : public RecordingTest {
     std::fstream file{path_, std::ios::binary | std::ios::in | std::ios::out};
     file.seekp(static_cast<std::streamoff>(offset));
     file << bytes;
+  }
+
+  // A station that was killed while it made the schema: all of it is in the log. Returns its identity.
+  std::uint64_t leave_begun() {
+    constexpr std::uint64_t kStoreId = 4711;
+    SQLite::Database made{theirs_.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE};
+    made.exec("PRAGMA page_size = 4096; PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL");
+    made.exec("PRAGMA wal_autocheckpoint = 0; BEGIN");
+    for (const char* script : migrations()) made.exec(script);
+    made.exec(fmt::format("INSERT INTO meta (name, value) VALUES ('store_id', {}), ('next_row', 1)", kStoreId));
+    made.exec(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}; COMMIT", kApplicationId,
+                          migrations().size()));
+    leave_at(theirs_, path_);
+    return kStoreId;
   }
 
   const fs::path theirs_ = folder_ / "theirs.sqlite";
@@ -127,23 +142,13 @@ TEST_F(FileCheckTest, AnEmptyFileWithSomebodysJournalIsRefused) {
 }
 
 TEST_F(FileCheckTest, OurOwnFileWhoseTablesAreInItsLogIsOpened) {
-  std::uint64_t store_id = 0;
-  {
-    const Database database{theirs_};
-    store_id = database.store_id();
-    leave_at(theirs_, path_);
-  }
+  const std::uint64_t store_id = leave_begun();
   ASSERT_GT(content(beside(path_, "-wal")).size(), 4096U);
   EXPECT_EQ(Database{path_}.store_id(), store_id);
 }
 
 TEST_F(FileCheckTest, AFirstPageThatIsHalfWrittenIsReadFromTheLog) {
-  std::uint64_t store_id = 0;
-  {
-    const Database database{theirs_};
-    store_id = database.store_id();
-    leave_at(theirs_, path_);
-  }
+  const std::uint64_t store_id = leave_begun();
   overwrite(0, std::string(512, '\x5a'));
   EXPECT_EQ(Database{path_}.store_id(), store_id);
 

@@ -15,7 +15,9 @@ class HeldCheckpointTest : public RecordingTest {
     options.checkpoint_bytes = kCheckpointBytes;
     start(options);
     connect(robot_);
-    clock_.remove_worker(checkpoints_);  // time goes on beside a pass
+    clock_.run_for(1s);
+    passes_ = recorder_->wal().checkpoints;  // of the start
+    clock_.remove_worker(checkpoints_);      // time goes on beside a pass
     vfs_.hold_database_writes();
     for (int i = 0; i < 30 && recorder_->wal().bytes < kCheckpointBytes; ++i) make_some();
     ASSERT_TRUE(vfs_.await_held_write(10s));
@@ -40,6 +42,7 @@ class HeldCheckpointTest : public RecordingTest {
   ForgetfulVfs vfs_;
   TestRobot robot_;
   bool was_let_go_ = false;
+  std::uint64_t passes_ = 0;
 };
 
 TEST_F(HeldCheckpointTest, CommitsGoOnBesideIt) {
@@ -47,7 +50,7 @@ TEST_F(HeldCheckpointTest, CommitsGoOnBesideIt) {
     make_some();
     EXPECT_EQ(durable_next_seq_, robot_.next_seq);
   }
-  EXPECT_EQ(recorder_->wal().checkpoints, 0U);
+  EXPECT_EQ(recorder_->wal().checkpoints, passes_);
   EXPECT_LT(recorder_->wal().bytes, kCheckpointBytes * 3 / 2);
 }
 
@@ -56,12 +59,12 @@ TEST_F(HeldCheckpointTest, ALogThatHasGrownByHalfWaitsForItAndLosesNothing) {
   EXPECT_LT(recorder_->wal().bytes, kCheckpointBytes * 3 / 2 + 100'000) << "and one commit";
   EXPECT_LT(durable_next_seq_, robot_.next_seq);
   EXPECT_EQ(recorder_->queued_samples(), robot_.next_seq - durable_next_seq_);
-  EXPECT_EQ(recorder_->wal().checkpoints, 0U);
+  EXPECT_EQ(recorder_->wal().checkpoints, passes_);
   let_go();
   clock_.run_for(3s);
   EXPECT_EQ(durable_next_seq_, robot_.next_seq);
   make_some();
-  EXPECT_GE(recorder_->wal().checkpoints, 1U);
+  EXPECT_GT(recorder_->wal().checkpoints, passes_);
   EXPECT_LT(recorder_->wal().bytes, kCheckpointBytes) << "it began anew";
   EXPECT_EQ(number("SELECT count(*) FROM sample"), static_cast<std::int64_t>(robot_.next_seq));
 }

@@ -98,6 +98,8 @@ AdmissionRequest RecordingTest::hello_of(const TestRobot& robot) {
   request.next_seq = robot.next_seq;
   request.oldest_event_seq = robot.oldest_event_seq;
   request.next_event_seq = robot.next_event_seq;
+  request.acknowledged_next_seq = robot.acknowledged_next_seq;
+  request.acknowledged_next_event_seq = robot.acknowledged_next_event_seq;
   request.received_at_us = clock_.utc_us();
   return request;
 }

@@ -41,6 +41,8 @@ struct TestRobot {
   std::uint64_t oldest_seq = 0;  // the oldest still held
   std::uint64_t oldest_event_seq = 0;
   std::uint64_t next_event_seq = 0;
+  std::uint64_t acknowledged_next_seq = 0;  // 0: it does not say
+  std::uint64_t acknowledged_next_event_seq = 0;
   std::string token;
   bool from_loopback = true;
   SampleContext context = manual_at_100_hz();

@@ -62,7 +62,8 @@ TEST_F(RestoreTest, GivesTheSameRecordingUnderANewStoreId) {
   EXPECT_EQ(restored.samples, 1000);
   EXPECT_NE(restored.store_id, store_id_);
   use_restored();
-  EXPECT_EQ(std::distance(fs::directory_iterator{new_folder_}, {}), 1) << "nothing beside the database";
+  EXPECT_TRUE(fs::exists(new_folder_ / "station.head.json"));
+  EXPECT_EQ(std::distance(fs::directory_iterator{new_folder_}, {}), 2) << "nothing else beside the database";
   EXPECT_EQ(rows("PRAGMA integrity_check"), std::vector<std::string>{"ok"});
   EXPECT_EQ(number("SELECT value FROM meta WHERE name = 'restored_at_us'"), 1234);
   EXPECT_EQ(rows("SELECT seq, position_m FROM run_sample WHERE run_id = 1 AND seq IN (0, 399)"),

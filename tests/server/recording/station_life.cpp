@@ -61,7 +61,9 @@ void StationLife::live_until_cut() {
 void StationLife::begin() {
   RecorderOptions options;
   options.checkpoint_bytes = (5 + pick(60)) * 4096;
+  options.head_interval = 100ms;
   start(options);
+  for (const StoreLoss& loss : recording_->head_watch.losses()) note({loss.problem}, "at the next start");
   recorder_->set_on_durable([this](const RobotId&, BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event) {
     acknowledge(boot_id, next_seq, next_event);
   });

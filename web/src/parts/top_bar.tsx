@@ -4,6 +4,7 @@ import { age, duration } from '../format';
 import { stop_button_keys } from '../keys';
 import type { Session } from '../session';
 import { KeyList } from './key_list';
+import { LossBanner } from './loss_banner';
 
 export function TopBar({ session }: { session: Session }) {
   const { store, station } = session;
@@ -23,6 +24,7 @@ export function TopBar({ session }: { session: Session }) {
           Not encrypted: anyone on this network can read along and drive
         </strong>
       )}
+      <LossBanner session={session} />
       {station.value?.security.certificate?.expires_soon && (
         <span class="lamp caution" title="rheonaut certificate --renew">
           Certificate expires soon
