@@ -56,7 +56,8 @@ void Station::set_retired(const RobotId& id, std::int64_t retired_at_us, const s
   RobotState& robot = found->second;
   const bool was_retired = robot.retired_at_us != 0;
   robot.retired_at_us = retired_at_us;
-  if (was_retired != (retired_at_us != 0)) note(robot, was_retired ? "unretired" : "retired", "by " + actor);
+  if (was_retired && retired_at_us == 0) note(robot, "unretired", "by " + actor);
+  if (!was_retired) note(robot, "retired", "by " + actor);
   publish(robot);
 }
 

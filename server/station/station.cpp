@@ -1,4 +1,5 @@
 // Live state: robots come and go, samples and events pass through to the sinks.
+// LONG: what the sessions report is in one place; the doors for people and scripts are in files of their own.
 #include "server/station/station.hpp"
 
 #include <spdlog/spdlog.h>
