@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <chrono>
 #include <csignal>
+#include <fstream>
 #include <iostream>
 #include <memory>
 
@@ -49,6 +52,31 @@ bool breaks_the_link(const Scenario& scenario) {
                              [](const TimedFault& timed) { return !why_not(timed.fault.kind, false).empty(); });
 }
 
+// Where the robot really is, each tick, for who compares it with the estimate while it runs.
+class TruthFile {
+ public:
+  explicit TruthFile(const std::string& path) : out_(path) {
+    if (!out_) throw std::invalid_argument("--truth: '" + path + "' cannot be written");
+    out_.precision(9);
+    out_ << "robot_time_us,true_position_m" << std::endl;
+  }
+
+  asio::awaitable<void> run(const RobotClient& client) {
+    asio::steady_timer timer{co_await asio::this_coro::executor};
+    for (std::uint64_t written_us = 0;;) {
+      timer.expires_after(std::chrono::microseconds(SimulatedRobot::kPeriodUs));
+      co_await timer.async_wait(asio::use_awaitable);
+      const std::uint64_t now_us = client.robot().robot_time_us();
+      if (now_us == written_us) continue;
+      written_us = now_us;
+      out_ << now_us << ',' << client.robot().world().position_m() << std::endl;
+    }
+  }
+
+ private:
+  std::ofstream out_;
+};
+
 // Of what a proxy says, that the station is not there, once; the time line says the faults.
 LinkLog only_unreachable() {
   return [was_said = std::make_shared<bool>(false)](const std::string& line) {  // one for all connections
@@ -89,10 +117,12 @@ RunCommand::RunCommand(CLI::App& app) {
   app.add_option("--faults", faults_at_, "ADDR:PORT to take faults at over HTTP while it runs; port 0: any")
       ->type_name("ADDR:PORT");
   app.add_flag("--faults-anywhere", faults_anywhere_, "allow an address beyond this machine; there is no password");
+  app.add_option("--truth", truth_to_, "write the true position of each tick to this file, as CSV")->type_name("FILE");
   add_robot(app, robot_);
   auto* robots = app.add_option("--robots", robots_, "a fleet of so many in this process, ID-1 to ID-N, with a summary")
                      ->check(CLI::Range(1, kMostRobots))
                      ->excludes("--faults")
+                     ->excludes("--truth")
                      ->excludes("--boot-id");
   app.add_flag("--json", json_, "a fleet's rates and summary as JSON lines")->needs(robots);
 }
@@ -135,6 +165,8 @@ int RunCommand::run_one(const Scenario& scenario, const StationAddress& station)
     say(control::join_text("faults at http://", server->address(), "/faults"));
     spawn(loop, server->run());
   }
+  std::optional<TruthFile> truth;
+  if (!truth_to_.empty()) spawn(loop, truth.emplace(truth_to_).run(client));
   announce(scenario, network.has_value(), say);
   spawn(loop, client.run());
   asio::signal_set stop{loop, SIGINT, SIGTERM};

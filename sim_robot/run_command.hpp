@@ -24,7 +24,7 @@ class RunCommand {
   RobotOptions robot_;
   TlsOptions tls_;
   int handshake_ms_ = 0;
-  std::string station_, faults_at_;
+  std::string station_, faults_at_, truth_to_;
   bool faults_anywhere_ = false;
   int robots_ = 0;  // 0: one, without a fleet's summary
   bool json_ = false;

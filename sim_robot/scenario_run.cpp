@@ -33,7 +33,15 @@ void ScenarioRun::run() {
 
 void ScenarioRun::step() {
   if (lab_.station.link_is_up()) follow_script();
+  const auto boot = static_cast<std::size_t>(life().boots());
+  true_position_m_.emplace(std::pair{boot, robot().robot_time_us()}, robot().world().position_m());
   lab_.step();
+}
+
+// A fast clock may tick twice in a step: then that of the second one.
+double ScenarioRun::true_position_m(std::size_t boot, std::uint64_t robot_time_us) const {
+  const auto found = true_position_m_.lower_bound({boot, robot_time_us});
+  return found == true_position_m_.end() ? robot().world().position_m() : found->second;
 }
 
 void ScenarioRun::follow_script() {

@@ -7,6 +7,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "sim_robot/lab.hpp"
@@ -27,6 +29,8 @@ class ScenarioRun {
   const SimulatedRobot& robot() const { return lab_.robot.robot(); }
   const LinkedPeer& station() const { return lab_.station; }
   const FaultTimeline& faults() const { return lab_.faults; }
+  // Where the robot was when it made a sample, from where it was made itself; boots count from 1.
+  double true_position_m(std::size_t boot, std::uint64_t robot_time_us) const;
   // Every frame of the robot that has arrived so far, as it was on the wire.
   std::vector<std::uint8_t> bytes() const;
 
@@ -38,7 +42,8 @@ class ScenarioRun {
 
   const Scenario scenario_;
   Lab lab_;
-  std::size_t next_step_ = 0;  // of the script
+  std::map<std::pair<std::size_t, std::uint64_t>, double> true_position_m_;  // by boot and robot time, at each step
+  std::size_t next_step_ = 0;                                                // of the script
   float duty_ = 0;
   double duty_until_s_ = 0;  // while a lease is renewed
   int ticks_to_renewal_ = 0;

@@ -178,6 +178,7 @@ StepPoint step_point(const StoredSample& stored) {
   point.disturbance_m = stored.disturbance_m;
   point.setpoint_m = stored.setpoint_m.value_or(0);
   point.steered = stored.mode == rheonaut_MODE_AUTO && stored.setpoint_m.has_value();
+  point.position_sd_m = stored.position_sd_m;
   return point;
 }
 

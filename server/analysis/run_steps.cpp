@@ -1,6 +1,7 @@
 // Cuts a recording into steps.
 #include "server/analysis/run_steps.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -32,6 +33,7 @@ class Cutter {
       time_s_.push_back(seconds(point));
       position_m_.push_back(static_cast<double>(point.position_m));
       step_.last_seq = point.seq;
+      step_.position_sd_m = std::max(step_.position_sd_m, static_cast<double>(point.position_sd_m));
     }
     before_ = point;
   }

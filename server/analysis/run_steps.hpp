@@ -21,7 +21,8 @@ struct StepPoint {
   float position_m = 0;
   float disturbance_m = 0;
   float setpoint_m = 0;
-  bool steered = false;  // in auto mode with a setpoint
+  bool steered = false;     // in auto mode with a setpoint
+  float position_sd_m = 0;  // of an estimated position; 0: known
 };
 
 enum class StepCause : std::uint8_t { setpoint, disturbance };
@@ -36,6 +37,7 @@ struct MeasuredStep {
   double start_m = 0;
   double target_m = 0;
   double band_m = 0;
+  double position_sd_m = 0;  // the largest in the step: every position in `metrics` is uncertain by ± 2 of it
   control::StepMetrics metrics;
 };
 

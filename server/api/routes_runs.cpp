@@ -152,6 +152,7 @@ json to_json(const MeasuredStep& step) {
   out["start_m"] = decimal(static_cast<float>(step.start_m));
   out["target_m"] = decimal(static_cast<float>(step.target_m));
   out["band_m"] = step.band_m;
+  out["position_sd_m"] = decimal(static_cast<float>(step.position_sd_m));
   out["settling_s"] = or_null(step.metrics.settling_s);
   out["overshoot_percent"] = step.metrics.overshoot_percent;
   out["peak_m"] = step.metrics.peak_m;

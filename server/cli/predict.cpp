@@ -56,15 +56,23 @@ Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experime
 }
 
 OrderedJson json_of(const MeasuredStep& step) {
-  OrderedJson out = {{"cause", text(step.cause)}, {"span", step.span},         {"at_s", step.at_s},
-                     {"start_m", step.start_m},   {"target_m", step.target_m}, {"band_m", step.band_m}};
+  OrderedJson out = {{"cause", text(step.cause)},
+                     {"span", step.span},
+                     {"at_s", step.at_s},
+                     {"start_m", step.start_m},
+                     {"target_m", step.target_m},
+                     {"band_m", step.band_m},
+                     {"position_sd_m", step.position_sd_m}};
   out.update(server::json_of(step.metrics));
   return out;
 }
 
-void add_row(Table& table, const std::string& name, double at_s, const control::StepMetrics& m) {
+// Of an estimated position with its ± 2 sd.
+void add_row(Table& table, const std::string& name, double at_s, const control::StepMetrics& m,
+             double position_sd_m = 0) {
+  const std::string within = position_sd_m > 0 ? " ± " + fixed(2e3 * position_sd_m, 1) : "";
   table.row({name, cell(at_s, 5), m.settling_s ? cell(*m.settling_s, 4) : "never", fixed(m.overshoot_percent, 2),
-             cell(m.rise_10_90_s, 4), fixed(1e3 * m.steady_state_error_m, 3)});
+             cell(m.rise_10_90_s, 4), fixed(1e3 * m.steady_state_error_m, 3) + within});
 }
 
 void write_table(std::ostream& out, const control::ClosedLoopExperiment& experiment,
@@ -77,7 +85,7 @@ void write_table(std::ostream& out, const control::ClosedLoopExperiment& experim
   }
   for (const MeasuredStep& step : measured.steps) {
     add_row(table, fmt::format("{} {:.4g} to {:.4g} m, measured", text(step.cause), step.start_m, step.target_m),
-            step.at_s, step.metrics);
+            step.at_s, step.metrics, step.position_sd_m);
   }
   table.write(out);
   if (prediction.is_diverging) {

@@ -1,8 +1,9 @@
 """The paper's closed-loop experiment over the real TCP link, with real processes: 40 s of real time."""
+import concurrent.futures
 import unittest
 
 import processes  # puts deploy/ on the path
-from experiment import faults, perform, predict
+from experiment import Truth, faults, perform, predict
 from processes import lab
 
 
@@ -10,14 +11,24 @@ class ExperimentTest(unittest.TestCase):
     def test_the_measured_experiment_meets_its_bounds_and_the_prediction(self):
         with lab() as place:
             station = place.start_station()
-            place.start_robot(station, "sim-1", "--sensor", "perfect")
-            station.wait_for_robot("sim-1")
-            run, measures = perform(station, "sim-1")
-            self.assertEqual(faults(run, measures), [])
+            truth = Truth(place.folder / "truth.csv")
+            place.start_robot(station, "sim-1", "--seed", "23", "--truth", truth.path)
+            # What steers by the true position beside it says what the loop does without the sensor's errors.
+            place.start_robot(station, "known-1", "--sensor", "perfect")
+            for name in ("sim-1", "known-1"):
+                station.wait_for_robot(name)
+            with concurrent.futures.ThreadPoolExecutor() as both:
+                estimated = both.submit(perform, station, "sim-1", truth=truth)
+                known = both.submit(perform, station, "known-1")
+                run, measures, true = estimated.result()
+                _, known_measures, _ = known.result()
+            self.assertEqual(faults(run, measures, true), [])
             self.assertGreaterEqual(run["samples_stored"], 4000)
+            self.assertGreater(measures["position_sd_m"], 0)
+            self.assertEqual(known_measures["position_sd_m"], 0)
             predicted = predict(processes.BIN / "rheonaut-sim", -1)
-            self.assertAlmostEqual(measures["settling_s"], predicted["settling_s"], delta=0.0101)
-            self.assertAlmostEqual(measures["overshoot_percent"], predicted["overshoot_percent"], delta=0.05)
+            self.assertAlmostEqual(known_measures["settling_s"], predicted["settling_s"], delta=0.0101)
+            self.assertAlmostEqual(known_measures["overshoot_percent"], predicted["overshoot_percent"], delta=0.05)
 
     def test_a_one_way_motor_keeps_its_overshoot(self):
         predicted = predict(processes.BIN / "rheonaut-sim", 0)

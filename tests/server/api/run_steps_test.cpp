@@ -25,18 +25,34 @@ class RunStepsTest : public ::testing::Test {
     for (int i = 0; i < samples; ++i) add(0, false);
   }
   void add(float setpoint_m, bool steered) {
-    points.push_back({span, next_seq, 7'000'000 + next_seq * 10'000, position_m_, disturbance_m_, setpoint_m, steered});
+    points.push_back({span, next_seq, 7'000'000 + next_seq * 10'000, position_m_, disturbance_m_, setpoint_m, steered,
+                      position_sd_m});
     ++next_seq;
   }
 
   std::vector<StepPoint> points;
   std::uint32_t span = 0;
   std::uint64_t next_seq = 0;
+  float position_sd_m = 0;
 
  private:
   float position_m_ = 0;
   float disturbance_m_ = 0;
 };
+
+TEST_F(RunStepsTest, SaysHowUncertainAnEstimatedPositionWas) {
+  rest(50);
+  position_sd_m = 0.001F;
+  steer(0.1F, 0, 500);
+  position_sd_m = 0.003F;
+  steer(0.1F, 0, 500);
+  position_sd_m = 0.002F;
+  steer(0.2F, 0, 1000);
+  const auto steps = measure_steps(points);
+  ASSERT_EQ(steps.size(), 2U);
+  EXPECT_FLOAT_EQ(static_cast<float>(steps[0].position_sd_m), 0.003F);
+  EXPECT_FLOAT_EQ(static_cast<float>(steps[1].position_sd_m), 0.002F);
+}
 
 TEST_F(RunStepsTest, MeasuresSetpointsAndDisturbances) {
   rest(50);
