@@ -97,6 +97,7 @@ def follow(station, robot_id, start_robot_us, until_s, truth=None):
 
 def perform(station, robot_id, fluid="non_newtonian", truth=None):
     """Runs the experiment; returns (run, measures, true measures or None)."""
+    station.command(robot_id, "set_parameter", name="model_confirmed", value=1)
     zeroed = station.command(robot_id, "zero_position")
     if truth:
         truth.zeroed_us = zeroed["effect_at_robot_us"]
@@ -185,7 +186,7 @@ def main():
     station.wait_for_robot(options.robot)
     say(f"robot '{options.robot}': auto mode, setpoint {1e3 * SETPOINT_M:.0f} mm; at {DISTURBANCE_AT_S:.0f} s the "
         f"measured position is shifted by {1e3 * DISTURBANCE_M:.0f} mm; {DURATION_S:.0f} s in all")
-    say("model: the one that the firmware has built in, of the fluid (29), in which this robot swims; none was sent")
+    say("model: told the robot that its built-in one, of the fluid (29), is that of the fluid it swims in (model_confirmed = 1)")
     run, measures, true = perform(station, options.robot, truth=Truth(options.truth))
     gains_m_s, time_constants_s = model_of(station, run["run_id"])
     say("\n  the robot's model: gains " + ", ".join(f"{gain:.3g}" for gain in gains_m_s) + " m/s, time constants " +

@@ -56,6 +56,9 @@ struct ParsedCommand {
 // The body of POST …/commands, e.g. {"kind":"set_setpoint","setpoint_m":0.1,"life_ms":2000}.
 Result<ParsedCommand> parse_command(const std::string& body);
 
+// Of the robot's parameters, those that bound its motion: only an admin changes them, and says that they mean it.
+bool bounds_motion(const std::string& parameter);
+
 struct ParsedControl {
   ControlRequest request;                // robot and actor are left empty
   std::optional<std::int64_t> stamp_us;  // as above; of take and force alone

@@ -88,6 +88,27 @@ Result<void> read_clear_emergency(const Members& body, protocol::Command& action
   return {};
 }
 
+// SAFETY: what bounds motion is not changed by the way: see bounds_motion.
+Result<void> read_set_parameter(const Members& body, protocol::Command& action) {
+  if (auto known = body.only({"name", "value", "confirm"}); !known) return known;
+  action.which_action = rheonaut_Command_set_parameter_tag;
+  auto& set_parameter = action.action.set_parameter;
+  const auto name = body.text("name", 1, sizeof set_parameter.name - 1);
+  if (!name) return std::unexpected{name.error()};
+  const auto value = body.number_as_float("value");
+  if (!value) return std::unexpected{value.error()};
+  name->copy(set_parameter.name, sizeof set_parameter.name - 1);
+  set_parameter.value = *value;
+  if (!bounds_motion(*name)) {
+    if (!body.has("confirm")) return {};
+    return fail(ErrorCode::bad_request, "confirm goes only with parameters that bound motion", "unknown_member");
+  }
+  if (body.has("confirm") && body.object().at("confirm") == json(true)) return {};
+  return fail(ErrorCode::invalid,
+              fmt::format("the parameter {} bounds motion; send \"confirm\": true to change it all the same", *name),
+              "confirm_required");
+}
+
 Result<void> read_zero_position(const Members& body, protocol::Command& action) {
   action.which_action = rheonaut_Command_zero_position_tag;
   return body.only({});
@@ -109,6 +130,7 @@ constexpr Kind kKinds[] = {
     {"renew_lease", read_renew_lease},
     {"clear_emergency", read_clear_emergency},
     {"inject_disturbance", read_inject_disturbance},
+    {"set_parameter", read_set_parameter},
     {"zero_position", read_zero_position},
     {"ping", read_ping},
 };
@@ -153,6 +175,13 @@ Result<void> read_time(const Members& body, const char* name, std::optional<std:
 }
 
 }  // namespace
+
+bool bounds_motion(const std::string& parameter) {
+  constexpr const char* kBounds[] = {"auto_limit_s",         "setpoint_limit_m",     "link_timeout_ms",
+                                     "position_limit_min_m", "position_limit_max_m", "power_limit_duty",
+                                     "power_limit_s",        "link_loss_action",     "link_loss_limit_s"};
+  return std::ranges::find(kBounds, parameter) != std::end(kBounds);
+}
 
 Result<ParsedCommand> parse_command(const std::string& text) {
   const auto body = Members::parse(text, {});

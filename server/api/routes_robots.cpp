@@ -166,11 +166,23 @@ Response refused(ApiParts& parts, const Request& request, const char* what, cons
   return problem(error);
 }
 
+// SAFETY: the limits of a robot's motion are changed by admins alone.
+Result<void> may_set_parameter(const Caller& caller, const protocol::Command& action) {
+  if (action.which_action != rheonaut_Command_set_parameter_tag) return {};
+  const std::string name = action.action.set_parameter.name;
+  if (!bounds_motion(name) || caller.scopes.allow(Scope::admin)) return {};
+  return fail(ErrorCode::forbidden,
+              fmt::format("the parameter {} bounds motion; to change it needs the role admin", name), "not_permitted");
+}
+
 Answer submit_command(ApiParts& parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
   auto parsed = parse_command(request.body);
   if (!parsed) co_return refused(parts, request, "command", parsed.error());
+  if (auto may = may_set_parameter(request.caller, parsed->action); !may) {
+    co_return refused(parts, request, "command", may.error());
+  }
   auto key = key_of(request);
   if (!key) co_return refused(parts, request, "command", key.error());
   const auto wait = request.query.find("wait");

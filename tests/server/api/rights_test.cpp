@@ -70,6 +70,31 @@ TEST_F(RightsTest, AViewerChangesNothingButMayStop) {
   EXPECT_EQ(of_admins.size(), 16U);
 }
 
+TEST_F(RightsTest, OnlyAnAdminChangesWhatBoundsTheMotionOfARobot) {
+  connect_robot();
+  const auto set = [this](const char* name, json confirm) {
+    json body{{"kind", "set_parameter"}, {"name", name}, {"value", 0.2}};
+    if (!confirm.is_null()) body["confirm"] = std::move(confirm);
+    return begin("POST", "/api/v1/robots/r1/commands", body);
+  };
+  scopes = parse_scopes("command").value();
+  const auto refused = end(set("position_limit_max_m", true));
+  EXPECT_EQ(refused.status, 403);
+  EXPECT_TRUE(robot->commands().empty());
+  const auto of_operators = set("model_gain_error", nullptr);
+  ASSERT_EQ(robot->commands().size(), 1U);
+  EXPECT_STREQ(robot->commands().back().action.set_parameter.name, "model_gain_error");
+  EXPECT_EQ(robot->commands().back().action.set_parameter.value, 0.2F);
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, 0);
+  EXPECT_EQ(end(of_operators).status, 200);
+  scopes = parse_scopes("admin").value();
+  EXPECT_EQ(end(set("position_limit_max_m", nullptr)).status, 422);
+  const auto of_admins = set("position_limit_max_m", true);
+  ASSERT_EQ(robot->commands().size(), 2U);
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, 0);
+  EXPECT_EQ(end(of_admins).status, 200);
+}
+
 // Written out, as a red button has it.
 TEST_F(RightsTest, ATokenThatMayOnlyStopSeesWhatItsStopIsAboutAndNothingElse) {
   connect_robot();
