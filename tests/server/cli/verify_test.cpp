@@ -113,6 +113,8 @@ TEST_F(VerifyTest, WalksTheAuditAndTellsItsHead) {
   EXPECT_THAT(ask().text, HasSubstr("head      " + head)) << "without options, too";
   EXPECT_EQ(ask("--audit --expect " + head).exit_code, 0);
   change("DROP TRIGGER audit_kept; DELETE FROM audit WHERE entry = (SELECT max(entry) FROM audit)");
+  EXPECT_THAT(ask("--audit").text, HasSubstr("fault: the database has lost commits")) << "the head beside it says so";
+  std::filesystem::remove(folder_ / "station.head.json");
   EXPECT_EQ(ask("--audit").exit_code, 0) << "nothing says that there was more";
   const ToolAnswer cut = ask("--expect " + head);
   EXPECT_EQ(cut.exit_code, 1);
