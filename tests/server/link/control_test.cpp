@@ -29,6 +29,14 @@ class ControlTest : public LinkTest {
     EXPECT_EQ(results.size(), before + 1);
     EXPECT_EQ(results.back().error().reason, "queue_full");
   }
+  // The robot takes all that waits, and answers it.
+  void drain(TestRobot& robot) {
+    robot.link.stall(false);
+    clock.settle();
+    for (std::size_t answered = 0; answered < robot.commands().size(); clock.settle()) {
+      robot.acknowledge(robot.commands()[answered++], rheonaut_COMMAND_RESULT_ACCEPTED);
+    }
+  }
   static protocol::Command ping() {  // of which none supersedes another, and which needs no control
     protocol::Command command = rheonaut_Command_init_zero;
     command.which_action = rheonaut_Command_ping_tag;
@@ -75,8 +83,7 @@ TEST_F(ControlTest, ACommandThatFindsTheQueueFullTakesNoControl) {
   EXPECT_EQ(std::ranges::count_if(sink.events, takes), 0);
   submit_as("session:2", set_duty(0.2F));
   EXPECT_EQ(results.back().error().reason, "queue_full") << "and not that another is in control";
-  robot->link.stall(false);
-  clock.settle();
+  drain(*robot);
   submit_as("session:2", set_duty(0.3F));
   EXPECT_EQ(station.find("r1")->control.holder, "session:2");
 }
@@ -92,8 +99,7 @@ TEST_F(ControlTest, ACommandThatFindsTheQueueFullHasCostNoOlderOne) {
   submit_as("session:1", set_duty(0.2F));  // takes the place of the older duty
   ASSERT_EQ(results.size(), refused + 2);
   EXPECT_EQ(results.back()->state, CommandState::superseded);
-  robot->link.stall(false);
-  clock.settle();
+  drain(*robot);
   std::vector<float> duties;
   for (const auto& command : robot->commands()) {
     if (command.which_action == rheonaut_Command_set_duty_tag) duties.push_back(command.action.set_duty.duty);
