@@ -126,7 +126,7 @@ TEST_F(RunTools, IdentifyFitsTheAccelerationWhereThePositionIsAnEstimate) {
   EXPECT_EQ(of_run["channels"], nlohmann::json{"acceleration_m_s2"});
   EXPECT_THAT(of_run["channels_reason"].get<std::string>(), AllOf(HasSubstr("estimates"), HasSubstr("0.004 m")));
   EXPECT_TRUE(of_run["sensor"]["readings_are_recovered"].get<bool>());
-  EXPECT_NEAR(of_run["parameters"]["kp"].get<double>(), 0.1, 0.005);  // half of it by the position
+  EXPECT_NEAR(of_run["parameters"]["kp"].get<double>(), 0.1, 0.01);  // half of it by the position
   const ToolAnswer text = ask("identify --run 1 --structure second_order");
   EXPECT_THAT(text.text, AllOf(HasSubstr("fitted: acceleration_m_s2; position_m and velocity_m_s are the robot's own"),
                                HasSubstr("sensor: ")));
