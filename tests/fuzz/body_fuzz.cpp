@@ -98,7 +98,8 @@ class BodyStation : public ApiTest {
   }
 
   Subscriber page_{loop};
-  LiveParts live_parts_{loop, tasks, clock, station, live, "0", 0, {}};
+  RobotTexts texts_{loop, station};
+  LiveParts live_parts_{loop, tasks, clock, station, live, texts_, "0", 0, {}};
   std::vector<std::string> patterns_;
   int changes_ = 0;
 };

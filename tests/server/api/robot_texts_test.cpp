@@ -77,7 +77,7 @@ TEST_F(RobotTextsTest, ATextIsWrittenAgainWhenItsStateHasChangedAndThenOnly) {
   read_all();
   read_all();
   EXPECT_EQ(texts.written(), 50U);
-  station.set_fluid(name_of(20), "water");
+  ASSERT_TRUE(station.set_fluid(name_of(20), "water", {"token:local", "", 0}));
   station.on_durable(name_of(30), 31, 4711, 0);  // which no sink hears
   const json list = json::parse(read_all());
   EXPECT_EQ(texts.written(), 52U);
