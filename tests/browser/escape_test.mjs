@@ -99,9 +99,11 @@ const steps = {
     await page.keyboard.press('Enter');
     await list.waitFor({ state: 'hidden' });
     assert.equal(await page.locator('#run-fluid').innerText(), 'water');
+    await page.waitForFunction(async () => (await (await fetch('/api/v1/robots/rheo-1')).json()).fluid === 'water');
     await page.click('#run-fluid');
     await page.locator('#run-fluid-list [role=option]').first().click();
-    assert.equal(await page.locator('#run-fluid').innerText(), 'non-Newtonian');
+    await page.waitForFunction(() => document.querySelector('#run-fluid').innerText === 'non-Newtonian');
+    await page.waitForFunction(async () => (await (await fetch('/api/v1/robots/rheo-1')).json()).fluid === 'non_newtonian');
   },
 
   async 'the list of keys stops and closes, and says what Space does and what full screen takes'() {

@@ -50,6 +50,8 @@ class FaultySensor : public ::testing::Test {
   // 20 s after an offset has come over a robot that holds at 0.1 m.
   bool is_honest_with_an_offset(double offset_m_s2, std::uint64_t seed) {
     start(seed);
+    station->send(set_parameter("model_confirmed", 1));
+    station->run(2);
     station->send(set_auto(0.1F));
     station->run(500);
     robot->world().set_fault(Sensor::accelerometer, {SensorFaultKind::offset, offset_m_s2});

@@ -141,7 +141,8 @@ class Audit {
         continue;
       }
       const std::string stored = query.getColumn(0).getString();
-      bool is_possible = stored == text(CommandState::failed) && !command.is_stop;  // by a restart
+      const bool is_by_restart = stored == text(CommandState::failed) || stored == text(CommandState::unknown);
+      bool is_possible = is_by_restart && !command.is_stop;
       for (CommandState state = *command.flushed; state <= command.latest; state = next(state)) {
         is_possible = is_possible || stored == text(state);
       }
