@@ -7,6 +7,15 @@ import { estimate_of, SampleRing } from './samples';
 export const kStale_ms = 500; // no sample for so long: every numeral is marked
 
 const kSettle_ms = 500;
+const kModelConfirmed = 64; // of flags
+const kModelMismatch = 128;
+
+// Whether the estimator's model is that of the fluid; empty where the position is no estimate.
+export function model_of(flags: number, position_sd_m: number | null): string {
+  if (position_sd_m === 0) return '';
+  if (flags & kModelMismatch) return 'model does not fit';
+  return flags & kModelConfirmed ? 'model confirmed' : 'model assumed';
+}
 
 // What the numerals show; null: never heard.
 export interface Readout {
@@ -14,6 +23,7 @@ export interface Readout {
   estimate_m: number | null; // where the robot believes that it is
   position_m: number | null; // what its controller sees: the estimate plus the disturbance
   position_sd_m: number | null;
+  model: string; // what the estimate's "±" rests on: see model_of
   setpoint_m: number | null;
   reference_m: number | null;
   duty: number | null;
@@ -34,6 +44,7 @@ const kEmptyReadout: Readout = {
   estimate_m: null,
   position_m: null,
   position_sd_m: null,
+  model: '',
   setpoint_m: null,
   reference_m: null,
   duty: null,
@@ -154,6 +165,7 @@ export class Robot {
       estimate_m: latest && estimate_of(position_m, latest.disturbance_m),
       position_m,
       position_sd_m: latest && latest.position_sd_m,
+      model: latest ? model_of(latest.flags, latest.position_sd_m) : '',
       setpoint_m: latest ? latest.setpoint_m : null,
       reference_m: latest && last(latest.reference_m),
       duty: latest && last(latest.duty),
