@@ -27,7 +27,7 @@
 //             Nor a pulsating flow below 4 mm/s rms, 8 mm/s mean with the pump's profile.
 // Accuracy: ≤ 5 mm at 95 % 42 s after moves of 0.1 m, within 2 position_sd_m in ≥ 90 % of trials; the table is in
 //           docs/robot.md, held by estimator_study_test.cpp. In fluids that nobody told it: estimator_fluids_test.cpp.
-// Cost:     29 multiplications a tick and 500 more, 3 divisions and 2 roots in every fifth; 552 bytes.
+// Cost:     544 bytes; in instructions of the chip: docs/robot.md.
 // Errors:   a duty that is not finite counts as 0, a tick of a length outside (0, 0.1] s is passed over; if a state is
 //           not finite nevertheless, the filter starts anew with a position_sd_m of 10 m.
 // Differs from the paper: it names an algorithm that is not known to us; this one takes its place.
