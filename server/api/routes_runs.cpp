@@ -29,6 +29,20 @@ Answer list_runs(ApiParts& parts, Request request) {
   co_return json_response(200, list_json("runs", runs));
 }
 
+// SAFETY: whoever names the fluid that the robot is in decides which limits hold: that is a command.
+Result<void> may_name_fluid(const ApiParts& parts, const Request& request, const RobotId& robot_id,
+                            const std::string& fluid) {
+  if (fluid.empty() || request.caller.scopes.allow(Scope::command)) return {};
+  const RobotState* robot = parts.station.find(robot_id);
+  const auto listed = parts.station.envelope().listed(fluid);
+  if (robot == nullptr || !listed || robot->fluid == *listed) return {};  // refused later, or the same
+  return fail(ErrorCode::forbidden,
+              fmt::format("to say that robot '{}' is in '{}' changes its limits, which needs the scope command; name "
+                          "the fluid that it is in, or none",
+                          robot_id, *listed),
+              "not_permitted");
+}
+
 Answer create_run(ApiParts& parts, Request request) {
   const auto wish = parse_run(request.body);
   if (!wish) co_return problem(wish.error());
@@ -36,6 +50,10 @@ Answer create_run(ApiParts& parts, Request request) {
   if (!room) co_return problem(room.error());
   if (parts.station.find(wish->robot_id) == nullptr) {
     co_return problem(404, fmt::format("no robot '{}' is known", wish->robot_id), "unknown_robot");
+  }
+  if (!wish->range) {
+    const auto named = may_name_fluid(parts, request, wish->robot_id, wish->conditions.fluid);
+    if (!named) co_return problem(named.error());
   }
   Runs& runs = parts.recording.runs;
   const Author by = author_of(request, parts.clock);
@@ -73,6 +91,13 @@ Answer annotate_run(ApiParts& parts, Request request) {
   if (!id) co_return problem(id.error());
   const auto annotation = parse_annotation(request.body);
   if (!annotation) co_return problem(annotation.error());
+  if (const auto fluid = annotation->texts.find("fluid"); fluid != annotation->texts.end()) {
+    const auto before = co_await parts.recording.runs.find(*id);
+    if (!before) co_return problem(before.error());
+    const bool is_open = before->state == RunState::open;
+    const auto named = is_open ? may_name_fluid(parts, request, before->robot_id, fluid->second) : Result<void>{};
+    if (!named) co_return problem(named.error());
+  }
   const auto run = co_await parts.recording.runs.annotate(*id, *annotation, author_of(request, parts.clock));
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace server {
@@ -16,10 +17,17 @@ void add(FrameFaults& faults, const char* cause, std::string words) {
   faults.first = std::move(words);
 }
 
-// True when the number is beyond 2^62.
-bool is_too_large(FrameFaults& faults, const char* field, std::uint64_t value) {
-  if (value <= kMaxNumber) return false;
-  add(faults, "out_of_range", fmt::format("{} is {}, which is beyond 2^62", field, value));
+// True when the oldest number that a robot says it still has is above one that it sends: then it says nothing.
+bool is_above_its_own(FrameFaults& faults, const char* field, std::uint64_t oldest, std::uint64_t own) {
+  if (oldest <= own) return false;
+  add(faults, "out_of_range", fmt::format("{} is {}, above {}, which the robot has just sent", field, oldest, own));
+  return true;
+}
+
+// True when the number is beyond what it can be.
+bool is_too_large(FrameFaults& faults, const char* field, std::uint64_t value, std::uint64_t most) {
+  if (value <= most) return false;
+  add(faults, "out_of_range", fmt::format("{} is {}, it can be at most {}", field, value, most));
   return true;
 }
 
@@ -28,14 +36,15 @@ void check_finite(FrameFaults& faults, const char* field, float value, std::uint
   add(faults, "not_finite", fmt::format("{} is {} from sample {} on; NULL is stored", field, value, seq));
 }
 
-void mend(protocol::Telemetry& batch, FrameFaults& faults) {
-  if (is_too_large(faults, "oldest_seq", batch.oldest_seq)) batch.oldest_seq = 0;
-  if (is_too_large(faults, "first_seq", batch.first_seq)) {
+void mend(protocol::Telemetry& batch, const FrameReach& reach, FrameFaults& faults) {
+  if (is_too_large(faults, "first_seq", batch.first_seq, reach.seq)) {
     faults.is_unusable = true;
     faults.has_number = false;
     return;
   }
-  if (is_too_large(faults, "first_robot_time_us", batch.first_robot_time_us)) faults.is_unusable = true;
+  if (is_above_its_own(faults, "oldest_seq", batch.oldest_seq, batch.first_seq)) batch.oldest_seq = 0;
+  if (is_too_large(faults, "first_robot_time_us", batch.first_robot_time_us, reach.robot_time_us))
+    faults.is_unusable = true;
   if (batch.period_us == 0 || batch.period_us > kMaxPeriodUs) {
     add(faults, "out_of_range",
         fmt::format("period_us is {} from sample {} on, it must be 1 to {}", batch.period_us, batch.first_seq,
@@ -47,26 +56,40 @@ void mend(protocol::Telemetry& batch, FrameFaults& faults) {
   check_finite(faults, "position_sd_m", batch.position_sd_m, batch.first_seq);
 }
 
-void mend(protocol::Event& event, FrameFaults& faults) {
-  if (is_too_large(faults, "oldest_event_seq", event.oldest_event_seq)) event.oldest_event_seq = 0;
-  if (is_too_large(faults, "event_seq", event.event_seq)) faults.has_number = false;
-  const bool has_time = !is_too_large(faults, "event_robot_time_us", event.event_robot_time_us);
-  const bool has_sample = !is_too_large(faults, "sample_seq", event.sample_seq);
+void mend(protocol::Event& event, const FrameReach& reach, FrameFaults& faults) {
+  if (is_too_large(faults, "event_seq", event.event_seq, reach.event_seq)) faults.has_number = false;
+  if (is_above_its_own(faults, "oldest_event_seq", event.oldest_event_seq, event.event_seq)) event.oldest_event_seq = 0;
+  const bool has_time = !is_too_large(faults, "event_robot_time_us", event.event_robot_time_us, reach.robot_time_us);
+  const bool has_sample = !is_too_large(faults, "sample_seq", event.sample_seq, reach.seq);
   faults.is_unusable = !faults.has_number || !has_time || !has_sample;
 }
 
 }  // namespace
 
-FrameFaults mend(protocol::RobotFrame& frame) {
+FrameReach FrameReach::after(const protocol::Hello& hello, std::uint64_t robot_time_us) {
+  return {hello.next_seq + kSeqLeap, hello.next_event_seq + kSeqLeap, robot_time_us + kTimeLeapUs};
+}
+
+void FrameReach::advance(const protocol::RobotFrame& frame) {
+  robot_time_us = std::max(robot_time_us, frame.robot_time_us + kTimeLeapUs);
+  if (frame.which_body == rheonaut_RobotFrame_telemetry_tag) {
+    seq = std::max(seq, frame.body.telemetry.first_seq + kSeqLeap);
+  } else if (frame.which_body == rheonaut_RobotFrame_event_tag) {
+    event_seq = std::max(event_seq, frame.body.event.event_seq + kSeqLeap);
+  }
+}
+
+FrameFaults mend(protocol::RobotFrame& frame, const FrameReach& reach) {
   FrameFaults faults;
-  const bool has_no_time = is_too_large(faults, "robot_time_us", frame.robot_time_us);
+  const bool has_no_time = is_too_large(faults, "robot_time_us", frame.robot_time_us, reach.robot_time_us);
   if (has_no_time) frame.robot_time_us = 0;
   switch (frame.which_body) {
-    case rheonaut_RobotFrame_telemetry_tag: mend(frame.body.telemetry, faults); break;
-    case rheonaut_RobotFrame_event_tag: mend(frame.body.event, faults); break;
+    case rheonaut_RobotFrame_telemetry_tag: mend(frame.body.telemetry, reach, faults); break;
+    case rheonaut_RobotFrame_event_tag: mend(frame.body.event, reach, faults); break;
     case rheonaut_RobotFrame_heartbeat_tag: {
       protocol::Heartbeat& answer = frame.body.heartbeat;
-      const bool is_no_time = is_too_large(faults, "echo_received_at_robot_us", answer.echo_received_at_robot_us);
+      const bool is_no_time =
+          is_too_large(faults, "echo_received_at_robot_us", answer.echo_received_at_robot_us, reach.robot_time_us);
       if (has_no_time || is_no_time) answer = rheonaut_Heartbeat_init_zero;  // a sign of life, and no answer
       break;
     }

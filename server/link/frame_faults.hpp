@@ -13,6 +13,21 @@ namespace server {
 
 constexpr std::uint64_t kMaxNumber = std::uint64_t{1} << 62;  // of a sample or µs: beyond any boot, and safe to add to
 
+// How far the numbers of a robot's next frame can have come. A robot counts without leaps, so one that is far ahead of
+// all before it cannot be: if it were taken, every true one after it would look old.
+struct FrameReach {
+  static constexpr std::uint64_t kSeqLeap = 1'000'000;         // beyond what any outage within a connection makes
+  static constexpr std::uint64_t kTimeLeapUs = 3'600'000'000;  // likewise
+
+  std::uint64_t seq = kMaxNumber;
+  std::uint64_t event_seq = kMaxNumber;
+  std::uint64_t robot_time_us = kMaxNumber;
+
+  // Of the frames after a hello or after this frame, which was mended.
+  static FrameReach after(const protocol::Hello& hello, std::uint64_t robot_time_us);
+  void advance(const protocol::RobotFrame& frame);
+};
+
 struct FrameFaults {
   std::uint64_t count = 0;   // values that cannot be; 0: all can
   const char* cause = "";    // of the first: not_finite, out_of_range
@@ -22,6 +37,6 @@ struct FrameFaults {
 };
 
 // Finds them. A number or time that cannot be and is not needed becomes 0, which says nothing.
-FrameFaults mend(protocol::RobotFrame& frame);
+FrameFaults mend(protocol::RobotFrame& frame, const FrameReach& reach);
 
 }  // namespace server

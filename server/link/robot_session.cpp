@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "server/exceptions.hpp"
-#include "server/link/frame_faults.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -155,6 +154,7 @@ bool RobotSession::decode_next_of(protocol::Bytes& unread) {
     if (state != protocol::FrameReader::State::complete) return false;
     if (protocol::decode_robot_frame(reader_.payload(), buffers_.frame)) return true;
     if (robot_id_.empty()) break;
+    station_.on_frame(*this, 0);  // SAFETY: a sign of life: what a stop's repetition and the ends of commands wait for
     station_.on_invalid_values(*this, 1, "malformed", "a frame does not decode");
   }
   close_reason_ = "a frame that does not decode";
@@ -196,6 +196,7 @@ asio::awaitable<bool> RobotSession::admit(const protocol::Hello& hello) {
   if (!seat) co_return co_await refuse(rheonaut_REFUSAL_REASON_ALREADY_CONNECTED, seat.error().detail);
 
   robot_id_ = id;
+  reach_ = FrameReach::after(hello, hello_robot_time_us_);
   welcome_ = welcome(admission);
   durable_.durable_next_seq = admission.durable_next_seq;
   durable_.durable_next_event_seq = admission.durable_next_event_seq;
@@ -247,13 +248,17 @@ void RobotSession::on_frame(protocol::RobotFrame& frame) {
     close_reason_ = "a second hello on one connection";
     return;
   }
-  const FrameFaults faults = mend(frame);
+  const FrameFaults faults = mend(frame, reach_);
+  if (!faults.is_unusable) reach_.advance(frame);
   station_.on_frame(*this, frame.robot_time_us);
   if (faults.count > 0) station_.on_invalid_values(*this, faults.count, faults.cause, faults.first);
   if (faults.is_unusable) return faults.has_number ? give_up(frame) : void();
   switch (frame.which_body) {
     case rheonaut_RobotFrame_telemetry_tag: station_.on_samples(*this, frame.body.telemetry); break;
-    case rheonaut_RobotFrame_event_tag: station_.on_event(*this, frame.body.event); break;
+    case rheonaut_RobotFrame_event_tag:
+      window_.answered(frame.body.event.command_id);  // the answer came before the event of its command, or never will
+      station_.on_event(*this, frame.body.event);
+      break;
     case rheonaut_RobotFrame_status_tag: station_.on_status(*this, frame.body.status); break;
     case rheonaut_RobotFrame_parameter_page_tag: station_.on_parameters(*this, frame.body.parameter_page); break;
     case rheonaut_RobotFrame_controller_tag: station_.on_controller(*this, frame.body.controller); break;

@@ -14,6 +14,7 @@
 #include "protocol/frame.hpp"
 #include "server/clock.hpp"
 #include "server/link/command_window.hpp"
+#include "server/link/frame_faults.hpp"
 #include "server/net/byte_stream.hpp"
 #include "server/station/robot_archive.hpp"
 #include "server/station/robot_port.hpp"
@@ -92,6 +93,7 @@ class RobotSession final : public RobotPort {
   std::uint64_t hello_robot_time_us_ = 0;
   RobotId claimed_id_;  // of a well-formed hello, whether the robot is admitted or not
   RobotId robot_id_;    // from the hello
+  FrameReach reach_;    // of the next frame
 
   Signal reading_paused_;  // the hello has come, or a reason to close
   Signal wake_writer_;     // something is ready that flush() could not write

@@ -60,15 +60,15 @@ struct HeadWatch::Opened {
 HeadWatch::Opened HeadWatch::compare(Database& database, const std::filesystem::path& path, std::int64_t utc_us) {
   Opened opened;
   const auto before = load_head_file(path);
-  if (!before) spdlog::warn("{}", before.error().detail);
   if (before && *before) opened.file = **before;
+  if (!before) opened.loss = before.error().detail;
   try {
     if (before && *before) opened.loss = find_loss(database.handle(), opened.file);
     opened.file.head = read_store_head(database.handle());
     opened.file.at_us = utc_us;
-  } catch (const SQLite::Exception& error) {
-    opened.problem = error.what();
-    return opened;
+  } catch (const SQLite::Exception& error) {  // a file that is damaged in places; the head of before is written over
+    opened.loss = fmt::format("whether commits are lost since {} of them cannot be told: {}", opened.file.head.commits,
+                              error.what());
   }
   if (before && !*before && opened.file.head.commits > 0) {
     spdlog::warn("{} is not there: whether {} has lost commits cannot be told", head_file_of(path).string(),

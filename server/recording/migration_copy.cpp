@@ -77,6 +77,7 @@ void keep_copy_before_migration(SQLite::Database& database, const fs::path& path
     if (is_copy_of_state(target, state, version)) return;  // an earlier start was cut off before it had migrated
     target = fs::path{path}.concat(fmt::format(".schema-{}.{}", version, number));
   }
+  remove_draft(fs::path{target}.concat(".part"));  // of an earlier start that was cut off: its room is needed
   check_room(database, path, version);
   spdlog::info("{} has schema {}, which an earlier version wrote: it is copied before it is changed", path.string(),
                version);

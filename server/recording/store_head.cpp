@@ -65,6 +65,11 @@ AuditHash hash_of_entry(SQLite::Database& database, std::int64_t entry) {
   return hash;
 }
 
+std::unexpected<Error> unusable(const fs::path& head, const fs::path& database, const std::string& why) {
+  return fail(ErrorCode::invalid, fmt::format("{} cannot be used ({}): whether {} has lost commits cannot be told",
+                                              head.string(), why, database.filename().string()));
+}
+
 }  // namespace
 
 fs::path head_file_of(const fs::path& database) { return fs::path{database}.replace_extension(".head.json"); }
@@ -79,9 +84,10 @@ Result<std::optional<HeadFile>> load_head_file(const fs::path& database) {
     std::ifstream in{path, std::ios::binary};
     if (!in) throw std::runtime_error{"it cannot be opened"};
     return parse({std::istreambuf_iterator<char>{in}, {}});
+  } catch (const json::exception&) {  // its words quote the file, whatever that holds
+    return unusable(path, database, "it is not as the station writes it");
   } catch (const std::exception& error) {
-    return fail(ErrorCode::invalid, fmt::format("{} cannot be used ({}): whether {} has lost commits cannot be told",
-                                                path.string(), error.what(), database.filename().string()));
+    return unusable(path, database, error.what());
   }
 }
 

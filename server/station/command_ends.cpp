@@ -75,7 +75,10 @@ void Station::acknowledge(Seat& seat, CommandId id, std::string reason) {
   // What was answered before, now again, says no time.
   const bool has_time = record.effect_at_robot_us != 0;
   pending->look_from_robot_us = has_time ? record.effect_at_robot_us : seat.robot->latest_robot_time_us;
-  if (!can_be_seen(pending->wire)) {
+  // What took effect before this connection may be shown by samples that come after the live ones: their silence says
+  // nothing.
+  const bool is_of_earlier_connection = pending->look_from_robot_us < seat.connected_at_robot_us;
+  if (!can_be_seen(pending->wire) || is_of_earlier_connection) {
     return end(*pending, CommandState::acknowledged, std::move(reason));
   }
   record.state = CommandState::acknowledged;

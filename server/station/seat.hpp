@@ -25,11 +25,12 @@ struct PendingCommand {
   std::int64_t received_us = 0;     // steady, when the request arrived at the station
   std::int64_t handed_at_us = 0;    // a stop: when it was last given to the link
   std::int64_t seen_after_us = -1;  // sent: from received_us until samples proved that it has run; -1: they did not
-  std::uint64_t look_from_robot_us = 0;  // sent, acknowledged: older telemetry shows nothing of it
-  bool has_key = false;                  // of the client
-  bool is_timed = false;                 // a stop that counts in Station::stop_times()
-  bool is_overtaken = false;             // acknowledged, and a later one that moves the motor too
-  bool is_proved_by_samples = false;     // sent: samples that show its effect prove that it has run
+  std::uint64_t look_from_robot_us = 0;   // sent, acknowledged: older telemetry shows nothing of it
+  std::uint64_t look_until_robot_us = 0;  // sent: nor does telemetry from here on
+  bool has_key = false;                   // of the client
+  bool is_timed = false;                  // a stop that counts in Station::stop_times()
+  bool is_overtaken = false;              // acknowledged, and a later one that moves the motor too
+  bool is_proved_by_samples = false;      // sent: samples that show its effect prove that it has run
   Signal answered, ended;
 };
 
@@ -41,6 +42,7 @@ struct Seat {
   std::deque<std::shared_ptr<PendingCommand>> unknown;            // of this boot, ended in this state; oldest first
   ParameterTable parameters;                                      // of the connection
   std::set<std::string> told_in_force;                            // kinds that the robot has said in the connection
+  std::uint64_t connected_at_robot_us = 0;                        // by its hello
   std::uint64_t next_sample_at_robot_us = 0;  // when the robot makes its sample next_seq, as far as it is known
   ClockSync clock_sync;                       // of the boot that is, or was last, connected
   ClockRecord clock_recorded;                 // the latest of that boot; boot_id 0: none yet

@@ -136,7 +136,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   port.seat_ = &seat;
   seat.parameters = ParameterTable{};
   seat.told_in_force.clear();
-  seat.next_sample_at_robot_us = hello.robot_time_us;
+  seat.connected_at_robot_us = seat.next_sample_at_robot_us = hello.robot_time_us;
   seat.latch_known_at_robot_us = hello.robot_time_us;
   robot.link = LinkState::connected;
   robot.peer = peer;

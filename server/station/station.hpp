@@ -222,6 +222,7 @@ class Station {
 
   boost::asio::io_context& loop_;
   Clock& clock_;
+  const std::int64_t started_us_ = clock_.steady_us();
   Envelope envelope_;
   LinkTimes times_;
   std::map<RobotId, RobotState> robots_;

@@ -69,13 +69,13 @@ asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds 
   co_return outcome;
 }
 
-// SAFETY: only a retired robot that is not connected. One that was heard after it had been retired is in use: without
-// its link it may move on for a while, so it is stopped like any other until that time is over.
+// SAFETY: only a retired robot that is not connected, and cannot move any more: without its link it may go on for a
+// while. What it did before this station started is not known, so one that may come back from there is stopped, too.
 bool Station::may_be_left_out(const Seat& seat) const {
   const RobotState& robot = *seat.robot;
   if (robot.retired_at_us == 0 || seat.port != nullptr) return false;
-  const bool was_heard_since = robot.last_received_at_us > robot.retired_at_us;
-  return !was_heard_since || clock_.steady_us() - robot.last_received_steady_us > kMayStillMove.count();
+  const std::int64_t heard_us = std::max(robot.last_received_steady_us, started_us_);
+  return clock_.steady_us() - heard_us > kMayStillMove.count();
 }
 
 // What was to be told of the stops while their frames were being written.

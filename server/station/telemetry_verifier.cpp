@@ -10,13 +10,17 @@ namespace {
 
 constexpr float kSameDuty = 0.001F;  // a duty is a float on its whole way
 
-// Made at or after the time.
-std::span<const Sample> samples_from(const SampleBatch& batch, std::uint64_t robot_time_us) {
-  const std::span<const Sample> all{batch.samples};
-  if (batch.first_robot_time_us >= robot_time_us) return all;
+// How many of the batch were made before the time.
+std::size_t samples_before(const SampleBatch& batch, std::uint64_t robot_time_us) {
+  if (batch.first_robot_time_us >= robot_time_us) return 0;
   const std::uint64_t period_us = std::max<std::uint64_t>(batch.context.period_us, 1);
   const std::uint64_t before = (robot_time_us - batch.first_robot_time_us + period_us - 1) / period_us;
-  return before >= all.size() ? std::span<const Sample>{} : all.subspan(before);
+  return std::min<std::uint64_t>(before, batch.samples.size());
+}
+
+// Made at or after the time.
+std::span<const Sample> samples_from(const SampleBatch& batch, std::uint64_t robot_time_us) {
+  return std::span<const Sample>{batch.samples}.subspan(samples_before(batch, robot_time_us));
 }
 
 bool is_shown(const protocol::Command& command, std::uint64_t emergency_id, const SampleContext& context,
@@ -32,7 +36,7 @@ bool is_shown(const protocol::Command& command, std::uint64_t emergency_id, cons
     }
     case rheonaut_Command_set_setpoint_tag:
       return is_auto && context.setpoint_m == command.action.set_setpoint.setpoint_m;
-    case rheonaut_Command_set_duty_tag: return has_duty(command.action.set_duty.duty);
+    case rheonaut_Command_set_duty_tag: return !is_auto && has_duty(command.action.set_duty.duty);
     case rheonaut_Command_emergency_stop_tag: {
       const bool is_off = std::ranges::any_of(samples, [](const Sample& one) { return one.duty == 0.0F; });
       return context.emergency_id != 0 && is_off;
@@ -45,6 +49,13 @@ bool is_shown(const protocol::Command& command, std::uint64_t emergency_id, cons
 }
 
 }  // namespace
+
+bool is_shown_between(const protocol::Command& command, std::uint64_t from_robot_us, std::uint64_t until_robot_us,
+                      const SampleBatch& batch) {
+  const std::size_t first = samples_before(batch, from_robot_us), end = samples_before(batch, until_robot_us);
+  if (first >= end) return false;
+  return is_shown(command, 0, batch.context, std::span<const Sample>{batch.samples}.subspan(first, end - first));
+}
 
 bool can_be_seen(const protocol::Command& command) {
   switch (command.which_action) {

@@ -14,6 +14,10 @@ bool can_be_seen(const protocol::Command& command);
 // True when the robot's motor may run differently after it: another one of these takes its place.
 bool is_for_the_motor(const protocol::Command& command);
 
+// Whether a sample of [from, until) shows what the command was to bring about.
+bool is_shown_between(const protocol::Command& command, std::uint64_t from_robot_us, std::uint64_t until_robot_us,
+                      const SampleBatch& batch);
+
 enum class Sight : std::uint8_t {
   unseen,    // the batch was made too early to tell, or shows something else within the window
   seen,      //

@@ -1,5 +1,6 @@
 // Commands whose answer did not come: their end is unknown until an event or a sample of the robot tells it.
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "server/station/seat.hpp"
@@ -10,8 +11,10 @@ namespace {
 
 constexpr std::size_t kMaxUnknown = 64;  // of a robot; the oldest stay unknown
 
-bool is_the_same(const CommandRecord& one, const CommandRecord& other) {
-  return one.kind == other.kind && one.arguments == other.arguments;
+// When it can have taken effect, and samples have shown it, at the latest.
+std::uint64_t shown_until_us(const PendingCommand& pending) {
+  if (pending.is_stop()) return std::numeric_limits<std::uint64_t>::max();
+  return pending.wire.valid_until_robot_us + kVerifyWindowUs;
 }
 
 // What a robot comes to without a command, too: by a lease that lapses, a link that is lost, the end of auto.
@@ -35,14 +38,20 @@ bool shows(const RobotState& robot, const protocol::Command& wire) {
 }  // namespace
 
 // Its effect proves that the command has run only if nothing else explains it: neither how the robot was before, nor
-// another command for the same.
+// another command for the motor, sent before it or after it; and only while it can have taken effect.
 void Station::prepare_proof(Seat& seat, PendingCommand& pending) {
-  pending.look_from_robot_us = static_cast<std::uint64_t>(robot_now_us(*seat.robot));
+  const auto now_us = static_cast<std::uint64_t>(robot_now_us(*seat.robot));
+  pending.look_from_robot_us = now_us;
+  pending.look_until_robot_us = shown_until_us(pending);
   pending.is_proved_by_samples =
       can_be_seen(pending.wire) && !happens_by_itself(pending.wire) && !shows(*seat.robot, pending.wire);
-  const auto compare = [&pending](PendingCommand& other) {
-    if (&other == &pending || !is_the_same(other.record, pending.record)) return;
-    other.is_proved_by_samples = pending.is_proved_by_samples = false;
+  if (!is_for_the_motor(pending.wire)) return;
+  if (!seat.unseen.empty()) pending.is_proved_by_samples = false;
+  const auto compare = [&pending, now_us](PendingCommand& other) {
+    const bool was_sent = other.record.state != CommandState::queued;
+    if (&other == &pending || !was_sent || !is_for_the_motor(other.wire)) return;
+    if (shown_until_us(other) > now_us) pending.is_proved_by_samples = false;
+    other.look_until_robot_us = std::min(other.look_until_robot_us, now_us);
   };
   for (const auto& [id, other] : seat.commands) compare(*other);
   for (const auto& other : seat.unknown) compare(*other);
@@ -87,7 +96,8 @@ void Station::settle_by_event(Seat& seat, const protocol::Event& event) {
 void Station::settle_by_samples(Seat& seat, const SampleBatch& batch) {
   const std::int64_t now_us = clock_.steady_us();
   const auto is_seen = [&batch](const PendingCommand& pending) {
-    return pending.is_proved_by_samples && look_for(pending.wire, pending.look_from_robot_us, 0, batch) == Sight::seen;
+    return pending.is_proved_by_samples &&
+           is_shown_between(pending.wire, pending.look_from_robot_us, pending.look_until_robot_us, batch);
   };
   for (const auto& [id, pending] : seat.commands) {
     const bool is_unanswered = !pending->is_stop() && pending->record.state == CommandState::sent;

@@ -75,6 +75,23 @@ TEST_F(FluidsTest, OneThatIsNotListedIsRefusedWithTheList) {
   EXPECT_EQ(robot_fluid(), nullptr);
 }
 
+TEST_F(FluidsTest, ARunThatNamesAnotherNeedsTheRightToCommand) {
+  ASSERT_EQ(ask("POST", kFluid, {{"fluid", "water"}}).status, 200);
+  scopes = Scopes{}.add(Scope::record);
+  const Answered refused = begin_run("oil");
+  EXPECT_EQ(refused.status, 403) << refused.body;
+  EXPECT_EQ(refused.parsed()["reason"], "not_permitted");
+  EXPECT_EQ(robot_fluid(), "water");
+  const Answered run = begin_run(" Water");
+  ASSERT_EQ(run.status, 201) << run.body;
+  const std::string path = "/api/v1/runs/" + run.parsed()["run_id"].dump();
+  EXPECT_EQ(ask("POST", path + "/annotate", {{"fluid", "oil"}}).status, 403);
+  EXPECT_EQ(robot_fluid(), "water");
+  end_run(run);
+  EXPECT_EQ(ask("POST", path + "/annotate", {{"fluid", "oil"}}).status, 200) << "it has ended: no limit hangs on it";
+  EXPECT_EQ(robot_fluid(), "water");
+}
+
 TEST_F(FluidsTest, ARunThatNamesOneSaysItOfTheRobotAndTheEndOfTheRunChangesNothing) {
   const Answered run = begin_run("Oil");
   ASSERT_EQ(run.status, 201) << run.body;

@@ -132,15 +132,52 @@ TEST_F(InvalidValuesTest, ATimeOfAFrameThatCannotBeIsASignOfLifeAndMovesNoClock)
   EXPECT_EQ(sink.batches.size(), 1u);
 }
 
+TEST_F(InvalidValuesTest, ANumberFarBeyondAllBeforeItMakesNoTrueOneOld) {
+  auto* robot = connect();
+  constexpr std::uint64_t kLeap = std::uint64_t{1} << 40;
+  robot->send(samples(kLeap, [](auto&) {}));
+  robot->send(samples(0, [](auto& frame) { frame.body.telemetry.oldest_seq = kLeap; }));
+  robot->send(event([](auto& of) { of.event_seq = kLeap; }));
+  robot->send(event([](auto& of) { of.oldest_event_seq = kLeap; }));
+  robot->send(samples(5, [](auto& frame) { frame.robot_time_us = kLeap; }));
+  clock.settle();
+  EXPECT_EQ(station.find("r1")->invalid_values, 5u);
+  ASSERT_EQ(sink.batches.size(), 2u);
+  EXPECT_EQ(sink.batches[0].oldest_seq, 0u);
+  EXPECT_EQ(sink.events.back().oldest_event_seq, 0u);
+  EXPECT_TRUE(unusable.events.empty()) << "nobody can say which it was";
+  EXPECT_LT(station.find("r1")->latest_robot_time_us, kLeap);
+  robot->send(samples(10, [](auto& frame) { frame.body.telemetry.emergency_id = 7; }));
+  clock.settle();
+  EXPECT_TRUE(station.find("r1")->latched()) << "what is true is live";
+}
+
+TEST_F(InvalidValuesTest, OfARobotWhoseFramesDoNotDecodeAStopIsRepeatedAndCommandsEnd) {
+  auto* robot = dial();
+  robot->say_hello();
+  ASSERT_TRUE(clock.run_until([&] { return !robot->welcomes().empty(); }, 1s));
+  submit(set_duty(0.3F), 500ms);
+  clock.settle();
+  stop_robot();
+  for (int i = 0; i < 60; ++i) {
+    robot->send_bytes({2, 0xff, 0xff});
+    clock.run_for(50ms);
+  }
+  EXPECT_TRUE(connected());
+  EXPECT_GE(robot->commands().size(), 4u) << "the duty, and a stop each second";
+  ASSERT_FALSE(results.empty());
+  EXPECT_TRUE(std::ranges::any_of(results, [](const auto& one) { return one->state == CommandState::unknown; }));
+}
+
 TEST(FrameFaults, AHeartbeatWithATimeThatCannotBeAnswersNothing) {
   protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
   frame.which_body = rheonaut_RobotFrame_heartbeat_tag;
   frame.body.heartbeat.echo_station_time_us = 5;
   frame.body.heartbeat.echo_received_at_robot_us = kFar;
-  EXPECT_EQ(mend(frame).count, 1u);
+  EXPECT_EQ(mend(frame, {}).count, 1u);
   EXPECT_EQ(frame.body.heartbeat.echo_station_time_us, 0u);
   frame.body.heartbeat.echo_station_time_us = 5;
-  EXPECT_EQ(mend(frame).count, 0u);
+  EXPECT_EQ(mend(frame, {}).count, 0u);
   EXPECT_EQ(frame.body.heartbeat.echo_station_time_us, 5u);
 }
 

@@ -24,18 +24,21 @@ class UnansweredTest : public LinkTest {
     EXPECT_EQ(results.back()->state, CommandState::unknown);
     return results.back()->id;
   }
-  void show_duty(TestRobot& robot, float duty) {
-    auto frame = TestRobot::samples_frame(next_seq_++, 1, robot.robot_now_us(), 0);
+  // A sample that was made so long ago.
+  void show_duty(TestRobot& robot, float duty, microseconds age = {}, protocol::Mode mode = rheonaut_MODE_MANUAL) {
+    const auto made_us = robot.robot_now_us() - static_cast<std::uint64_t>(age.count());
+    auto frame = TestRobot::samples_frame(next_seq_++, 1, made_us, 0);
     frame.body.telemetry.duty[0] = duty;
+    frame.body.telemetry.mode = mode;
     robot.send(frame);
     clock.settle();
   }
-  void say_event(TestRobot& robot, CommandId id) {
+  void say_event(TestRobot& robot, CommandId id, microseconds age = {}) {
     protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
     frame.which_body = rheonaut_RobotFrame_event_tag;
     frame.body.event.kind = rheonaut_EVENT_KIND_SETPOINT_CHANGED;
     frame.body.event.cause = rheonaut_EVENT_CAUSE_COMMAND;
-    frame.body.event.event_robot_time_us = robot.robot_now_us();
+    frame.body.event.event_robot_time_us = robot.robot_now_us() - static_cast<std::uint64_t>(age.count());
     frame.body.event.command_id = id;
     robot.send(frame);
     clock.settle();
@@ -123,7 +126,7 @@ TEST_F(UnansweredTest, SamplesThatNothingElseExplainsSettleIt) {
   auto* robot = connect();
   show_duty(*robot, 0);
   const CommandId later = unanswered(set_duty(0.3F));
-  show_duty(*robot, 0.3F);
+  show_duty(*robot, 0.3F, 1s);
   EXPECT_EQ(latest(later).state, CommandState::verified);
   EXPECT_EQ(latest(later).reason, "no_answer");
 
@@ -145,6 +148,57 @@ TEST_F(UnansweredTest, SamplesThatSomethingElseExplainsDoNot) {
   for (const CommandId id : {shown_before, rest, first, second}) {
     EXPECT_EQ(latest(id).state, CommandState::unknown);
   }
+}
+
+TEST_F(UnansweredTest, SamplesOfALaterTimeOrOfAnotherModeProveNothing) {
+  auto* robot = connect();
+  show_duty(*robot, 0);
+  const CommandId id = unanswered(set_duty(0.3F));
+  show_duty(*robot, 0.3F, 1s, rheonaut_MODE_AUTO);
+  show_duty(*robot, 0.3F, 100ms);
+  clock.run_for(20s);
+  show_duty(*robot, 0.3F);
+  EXPECT_EQ(latest(id).state, CommandState::unknown);
+}
+
+TEST_F(UnansweredTest, SamplesThatAnotherCommandExplainsProveNothing) {
+  auto* robot = connect();
+  show_duty(*robot, 0);
+  submit(set_duty(0.3F), 500ms);
+  clock.run_for(10ms);
+  auto with_lease = set_duty(0.3F);
+  with_lease.action.set_duty.lease_ms = 500;
+  submit(with_lease, 500ms);
+  clock.run_for(10ms);
+  show_duty(*robot, 0.3F);
+  ASSERT_TRUE(clock.run_until([&] { return results.size() == 2; }, 3s));
+  for (const auto& result : results) EXPECT_EQ(result->state, CommandState::unknown);
+}
+
+TEST_F(UnansweredTest, WhatTookEffectBeforeTheLinkWasLostIsNotMissedInLiveSamplesAfterIt) {
+  auto* robot = connect();
+  submit(set_setpoint(0.1F));
+  clock.settle();
+  const CommandId id = robot->commands().at(0).command_id;
+  robot->link.cut();
+  clock.run_for(2s);
+  robot = connect();
+  say_event(*robot, id, 2s);
+  show_duty(*robot, 0);
+  clock.run_for(1s);
+  show_duty(*robot, 0);
+  EXPECT_EQ(latest(id).state, CommandState::acknowledged) << latest(id).reason;
+}
+
+TEST_F(UnansweredTest, OneThatAnEventNamesHoldsNoPlace) {
+  auto* robot = connect();
+  for (int i = 0; i < 6; ++i) submit(ping(), 10s);
+  clock.settle();
+  submit(ping(), 1s);
+  clock.settle();
+  ASSERT_EQ(robot->commands().size(), 6u);
+  say_event(*robot, robot->commands().at(0).command_id);
+  EXPECT_EQ(robot->commands().size(), 7u);
 }
 
 TEST_F(UnansweredTest, ALostLinkLeavesTheEndUnknownUntilTheRobotIsBack) {

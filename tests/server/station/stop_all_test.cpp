@@ -153,9 +153,9 @@ TEST_F(StopAllTest, OnlyARetiredRobotThatIsNotConnectedIsLeftOut) {
   for (const char* id : {"away", "retired", "there"}) connect(id);
   clock.run_for(1s);
   for (std::size_t i : {0u, 1u}) station.on_disconnected(*ports[i], "gone");
-  clock.run_for(1s);
   station.set_retired("retired", clock.utc_us(), "token:admin");
   station.set_retired("there", clock.utc_us(), "token:admin");
+  clock.run_for(61s);
   stop_all();
   ports[2]->obey();
   ASSERT_TRUE(clock.run_until([this] { return outcome.has_value(); }, 10ms));
@@ -164,6 +164,15 @@ TEST_F(StopAllTest, OnlyARetiredRobotThatIsNotConnectedIsLeftOut) {
   EXPECT_EQ(outcome->records[0].robot_id, "away");
   EXPECT_EQ(outcome->records[1].robot_id, "there") << "retired, and connected";
   EXPECT_FALSE(station.find("retired")->pending_stop);
+}
+
+TEST_F(StopAllTest, ARetiredRobotThatMayDriveSinceBeforeTheStationStartedIsStopped) {
+  station.restore({{.id = "a", .retired_at_us = clock.utc_us()}}, {});
+  clock.run_for(1s);
+  stop_all();
+  ASSERT_TRUE(outcome.has_value());
+  EXPECT_THAT(outcome->left_out, IsEmpty());
+  EXPECT_EQ(outcome->records.at(0).state, CommandState::queued) << "it is stopped when it comes back";
 }
 
 TEST_F(StopAllTest, ARetiredRobotThatWasHeardAgainIsStoppedForAMinuteAfterItsLinkWasLost) {
