@@ -258,6 +258,7 @@ const char* kind(const Command& command) {
     case rheonaut_Command_inject_disturbance_tag: return "inject_disturbance";
     case rheonaut_Command_zero_position_tag: return "zero_position";
     case rheonaut_Command_ping_tag: return "ping";
+    case rheonaut_Command_drop_timed_tag: return "drop_timed";
     default: return "unknown";
   }
 }

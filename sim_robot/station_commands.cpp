@@ -58,6 +58,14 @@ protocol::Command zero_position() { return command_of(rheonaut_Command_zero_posi
 
 protocol::Command ping() { return command_of(rheonaut_Command_ping_tag); }
 
+protocol::Command drop_timed() { return command_of(rheonaut_Command_drop_timed_tag); }
+
+protocol::Command timed(protocol::Command command, std::uint64_t execute_at_robot_us) {
+  command.has_execute_at_robot_us = true;
+  command.execute_at_robot_us = execute_at_robot_us;
+  return command;
+}
+
 protocol::Command set_controller(const protocol::Controller& controller) {
   protocol::Command command = command_of(rheonaut_Command_set_controller_tag);
   command.action.set_controller = controller;

@@ -17,6 +17,8 @@ protocol::Command clear_emergency(std::uint64_t emergency_id);
 protocol::Command inject_disturbance(float disturbance_m);
 protocol::Command zero_position();
 protocol::Command ping();
+protocol::Command drop_timed();
+protocol::Command timed(protocol::Command command, std::uint64_t execute_at_robot_us);
 protocol::Command set_controller(const protocol::Controller& controller);
 protocol::Command restore_controller();
 protocol::Command set_parameter(const char* name, float value);

@@ -27,7 +27,7 @@ bool CommandGate::remember(std::uint64_t command_id) {
   return true;
 }
 
-bool TimedCommands::hold(const protocol::Command& command) {
+bool TimedCommands::hold(const protocol::Command& command, std::uint64_t now_us) {
   const auto free = std::find(size_bytes_.begin(), size_bytes_.end(), 0);
   if (free == size_bytes_.end()) return false;
   const auto index = static_cast<std::size_t>(free - size_bytes_.begin());
@@ -36,6 +36,13 @@ bool TimedCommands::hold(const protocol::Command& command) {
   if (size == 0) return false;
   size_bytes_[index] = static_cast<std::uint16_t>(size);
   held_[index] = {command.execute_at_robot_us, command.command_id};
+  lease_until_us_ = now_us + std::uint64_t{protocol::kLeaseMs} * 1000;
+  return true;
+}
+
+bool TimedCommands::renew_lease(std::uint32_t lease_ms, std::uint64_t now_us) {
+  if (size_bytes_[0] == 0 || lease_lapsed(now_us)) return false;  // SAFETY: what has lapsed stays lapsed
+  lease_until_us_ = now_us + std::uint64_t{lease_ms == 0 ? protocol::kLeaseMs : lease_ms} * 1000;
   return true;
 }
 

@@ -17,6 +17,7 @@ struct Verdict {
 };
 
 constexpr Verdict kAccepted{};
+constexpr Verdict kTimedExpired{rheonaut_COMMAND_RESULT_EXPIRED};  // of a timed command that nobody waits for any more
 constexpr Verdict rejected(protocol::RejectReason reason) { return {rheonaut_COMMAND_RESULT_REJECTED, reason}; }
 
 // Lets each command through once, for this boot, within its life. Says nothing about modes.
@@ -36,13 +37,18 @@ class CommandGate {
 };
 
 // Commands admitted with a time still to come, encoded one behind the other in the order in which they came.
+//
+// SAFETY: they wait under a lease, in every mode: whoever sent them must show that they are still there.
 class TimedCommands {
  public:
   static constexpr std::size_t kMaxCommands = 4;
   static constexpr std::size_t kMaxBytes = 496;  // of all; a schedule of 64 entries with ticks below 2 million fits
 
-  // False when there is no room for it.
-  bool hold(const protocol::Command& command);
+  // False when there is no room for it. Its sender is there: the lease of all that wait begins anew.
+  bool hold(const protocol::Command& command, std::uint64_t now_us);
+  // Extends that lease; false when nothing waits, or when it has lapsed.
+  bool renew_lease(std::uint32_t lease_ms, std::uint64_t now_us);
+  bool lease_lapsed(std::uint64_t now_us) const { return size_bytes_[0] > 0 && now_us >= lease_until_us_; }
   // Takes out the earliest one due at `now_us`, of several for the same time the one that came first.
   std::optional<protocol::Command> take_due(std::uint64_t now_us);
   // Drops one and says its id; empty when none is left.
@@ -60,6 +66,7 @@ class TimedCommands {
   std::array<Held, kMaxCommands> held_{};
   std::array<std::uint16_t, kMaxCommands> size_bytes_{};  // of each; 0 behind the last
   std::array<std::uint8_t, kMaxBytes> bytes_{};
+  std::uint64_t lease_until_us_ = 0;  // while something waits
 };
 
 }  // namespace robot_fw

@@ -11,7 +11,6 @@ struct Row {
 
 constexpr auto kRuns = rheonaut_REJECT_REASON_NONE;
 constexpr auto kWrongMode = rheonaut_REJECT_REASON_WRONG_MODE;
-constexpr auto kNothingRuns = rheonaut_REJECT_REASON_NOTHING_TO_RENEW;
 constexpr auto kNotLatched = rheonaut_REJECT_REASON_OTHER_EMERGENCY;
 constexpr auto kLatched = rheonaut_REJECT_REASON_LATCHED;
 
@@ -23,7 +22,7 @@ constexpr Row kTable[] = {
     {rheonaut_Command_set_setpoint_tag,          kWrongMode,  kRuns,        kLatched},
     {rheonaut_Command_set_duty_tag,              kRuns,       kWrongMode,   kLatched},
     {rheonaut_Command_set_duty_schedule_tag,     kRuns,       kWrongMode,   kLatched},
-    {rheonaut_Command_renew_lease_tag,           kRuns,       kNothingRuns, kLatched},
+    {rheonaut_Command_renew_lease_tag,           kRuns,       kRuns,        kLatched},
     {rheonaut_Command_emergency_stop_tag,        kRuns,       kRuns,        kRuns},
     {rheonaut_Command_clear_emergency_tag,       kNotLatched, kNotLatched,  kRuns},
     {rheonaut_Command_inject_disturbance_tag,    kWrongMode,  kRuns,        kLatched},
@@ -33,6 +32,7 @@ constexpr Row kTable[] = {
     {rheonaut_Command_set_parameter_tag,         kRuns,       kRuns,        kRuns},
     {rheonaut_Command_get_parameters_tag,        kRuns,       kRuns,        kRuns},
     {rheonaut_Command_ping_tag,                  kRuns,       kRuns,        kRuns},
+    {rheonaut_Command_drop_timed_tag,            kRuns,       kRuns,        kRuns},
 };
 // clang-format on
 

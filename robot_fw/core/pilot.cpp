@@ -100,7 +100,7 @@ void Pilot::set_schedule(const rheonaut_SetDutySchedule& schedule, std::uint64_t
 }
 
 bool Pilot::renew_lease(std::uint32_t lease_ms, std::uint64_t now_us) {
-  if (lease_until_us_ == 0 || now_us >= lease_until_us_) return false;  // SAFETY: what has lapsed stays lapsed
+  if (lease_until_us_ == 0 || lease_lapses(now_us)) return false;  // SAFETY: what has lapsed stays lapsed
   lease_until_us_ = lease_end_us(lease_ms, now_us);
   return true;
 }
@@ -112,7 +112,7 @@ Pilot::Lapse Pilot::tick(std::uint64_t now_us) {
     return delivering() && now_us >= delivery_until_us_ ? Lapse::delivery_limit : Lapse::none;
   }
   if (!motion_ordered()) return Lapse::none;
-  if (now_us >= lease_until_us_) {
+  if (lease_lapses(now_us)) {
     end_motion();  // SAFETY: a manual duty or schedule that nobody renews ends
     lease_lapsed_ = true;
     return Lapse::lease;

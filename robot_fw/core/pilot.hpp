@@ -30,6 +30,8 @@ class Pilot {
   void set_schedule(const rheonaut_SetDutySchedule& schedule, std::uint64_t now_us);
   // Extends a duty or schedule that still runs; false when there is none.
   bool renew_lease(std::uint32_t lease_ms, std::uint64_t now_us);
+  // Whether the lease of a duty or schedule has run out, as tick() will say.
+  bool lease_lapses(std::uint64_t now_us) const { return lease_until_us_ != 0 && now_us >= lease_until_us_; }
 
   // In auto: holds `position_m` in place of the setpoint, for at most `limit_s`.
   void start_delivery(float position_m, float limit_s, std::uint64_t now_us);

@@ -107,6 +107,8 @@ float Robot::watch_clock(std::uint64_t robot_time_us, float dt_s) {
 }
 
 void Robot::run_due_commands() {
+  // SAFETY: nothing acts for somebody who is no longer there; also when a running duty was not renewed.
+  if (timed_.lease_lapsed(now_us_) || pilot_.lease_lapses(now_us_)) drop_timed_commands(kTimedExpired);
   while (const auto command = timed_.take_due(now_us_)) run_timed_command(*command);
 }
 

@@ -12,17 +12,28 @@ bool runs_when_latched(const protocol::Command& command) {
   return refusal_in(rheonaut_MODE_EMERGENCY, command.which_action) == rheonaut_REJECT_REASON_NONE;
 }
 
+// SAFETY: whoever stops the motor at once means what waits, too.
+bool is_abort(const protocol::Command& command) {
+  return command.which_action == rheonaut_Command_set_duty_tag && command.action.set_duty.duty == 0 &&
+         !command.has_execute_at_robot_us;
+}
+
 }  // namespace
 
 void Robot::on_command(const protocol::Command& command) {
   const Verdict verdict = gate_.admit(command, now_us_);
   if (!verdict.accepted()) return answer(command.command_id, verdict);
   const bool later = command.has_execute_at_robot_us && command.execute_at_robot_us > now_us_;
-  if (!later) return answer(command.command_id, execute(command));
+  if (!later) {
+    const Verdict done = execute(command);
+    answer(command.command_id, done);
+    if (done.accepted() && is_abort(command)) drop_timed_commands(kTimedExpired);
+    return;
+  }
   if (safety_.latched() && !runs_when_latched(command)) {
     return answer(command.command_id, rejected(rheonaut_REJECT_REASON_LATCHED));
   }
-  if (!timed_.hold(command)) return answer(command.command_id, rejected(rheonaut_REJECT_REASON_BUSY));
+  if (!timed_.hold(command, now_us_)) return answer(command.command_id, rejected(rheonaut_REJECT_REASON_BUSY));
   outbox_.ack(ack_for(command.command_id, kAccepted, command.execute_at_robot_us));
 }
 
@@ -77,6 +88,7 @@ Verdict Robot::execute(const protocol::Command& command) {
       return inject_disturbance(command.action.inject_disturbance.disturbance_m, id);
     case rheonaut_Command_zero_position_tag: return zero_position(id);
     case rheonaut_Command_ping_tag: return kAccepted;
+    case rheonaut_Command_drop_timed_tag: drop_timed_commands(kTimedExpired); return kAccepted;
     case rheonaut_Command_set_controller_tag: return set_controller(command.action.set_controller, id);
     case rheonaut_Command_restore_controller_tag: return restore_controller(id);
     case rheonaut_Command_set_parameter_tag: return set_parameter(command.action.set_parameter, id);
@@ -154,8 +166,9 @@ Verdict Robot::set_duty(const rheonaut_SetDuty& order) {
 
 Verdict Robot::renew_lease(const rheonaut_RenewLease& order) {
   if (order.lease_ms > protocol::kLeaseMs) return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
-  const bool renewed = pilot_.renew_lease(order.lease_ms, now_us_);
-  return renewed ? kAccepted : rejected(rheonaut_REJECT_REASON_NOTHING_TO_RENEW);
+  const bool duty_renewed = pilot_.renew_lease(order.lease_ms, now_us_);
+  const bool timed_renewed = timed_.renew_lease(order.lease_ms, now_us_);
+  return duty_renewed || timed_renewed ? kAccepted : rejected(rheonaut_REJECT_REASON_NOTHING_TO_RENEW);
 }
 
 Verdict Robot::set_duty_schedule(const rheonaut_SetDutySchedule& order) {

@@ -56,7 +56,7 @@ bool Robot::sensor_fault_stands() const {
 void Robot::watch_link() {
   if (!link_.goes_lost(now_us_)) return;
   note(rheonaut_EVENT_KIND_LINK_LOST, rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
-  drop_timed_commands({rheonaut_COMMAND_RESULT_EXPIRED});
+  drop_timed_commands(kTimedExpired);
   const LinkLossAction action = parameters_.link_loss_action();
   if (!pilot_.is_auto() || action == LinkLossAction::stop) {
     const bool was_auto = pilot_.is_auto();

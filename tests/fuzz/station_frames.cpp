@@ -91,7 +91,9 @@ void fill_action(ByteSource& source, std::uint8_t choice, const KnownOfRobot& ro
     case 14:
       is(rheonaut_Command_inject_disturbance_tag);
       return void(action.inject_disturbance.disturbance_m = source.value());
-    default: return is(choice & 0x80 ? rheonaut_Command_ping_tag : rheonaut_Command_zero_position_tag);
+    default:
+      if (choice & 0x40) return is(rheonaut_Command_drop_timed_tag);
+      return is(choice & 0x80 ? rheonaut_Command_ping_tag : rheonaut_Command_zero_position_tag);
   }
 }
 

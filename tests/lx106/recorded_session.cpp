@@ -198,7 +198,7 @@ struct Expectations {
   }
 };
 
-// The longest message there is, due half a second later: from 0.25 to -0.25 within the lease.
+// The longest message there is, due half a second later, for which its lease is renewed: from 0.25 to -0.25.
 protocol::Command longest_schedule() {
   protocol::Command command = rheonaut_Command_init_zero;
   command.has_execute_at_robot_us = true;
@@ -228,8 +228,10 @@ void manual_duty(Session& session, Expectations& expect) {
   expect.that(session.accepted(duty) && session.accepted(lease), "a manual duty with a lease renewed");
   expect.that(session.has_event(rheonaut_EVENT_KIND_LEASE_LAPSED), "a lease that lapses");
   const auto schedule = session.send(longest_schedule());
-  session.run(90);
-  session.send(sim_robot::renew_lease());  // it lasts longer than one
+  session.run(40);
+  session.send(sim_robot::renew_lease());  // it waits longer than one
+  session.run(50);
+  session.send(sim_robot::renew_lease());  // and lasts longer than one
   session.run(60);
   expect.that(session.accepted(schedule), "a schedule of 64 duties, held for its time");
   expect.that(session.has_event(rheonaut_EVENT_KIND_DUTY_SCHEDULE_ENDED), "the end of the schedule");

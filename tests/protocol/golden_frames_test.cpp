@@ -448,6 +448,7 @@ void build_other_commands(Built& built) {
   built["inject_disturbance"] = framed(frame);
   built["zero_position"] = framed(command(rheonaut_Command_zero_position_tag, 14));
   built["ping"] = framed(command(rheonaut_Command_ping_tag, 15));
+  built["drop_timed"] = framed(command(rheonaut_Command_drop_timed_tag, 17));
   built["command_without_action"] = framed(command(0, 16));
 }
 

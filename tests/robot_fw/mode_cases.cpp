@@ -199,6 +199,7 @@ const std::vector<CommandCase> kCommandCases{
     {"set_parameter, one for rest", [](const BareCore&) { return sim_robot::set_parameter("power_limit_s", 7); }},
     {"get_parameters", [](const BareCore&) { return sim_robot::get_parameters(0); }},
     {"ping", [](const BareCore&) { return sim_robot::ping(); }},
+    {"drop_timed", [](const BareCore&) { return sim_robot::drop_timed(); }},
     {"an unknown action", [](const BareCore&) { return BareCore::command_of(0); }},
 };
 

@@ -239,14 +239,14 @@ TEST(ModeTable, HasAStateOfThePageForEveryColumn) {
 }
 
 TEST(ModeTable, KnowsEveryActionOfTheProtocolInEveryMode) {
-  for (pb_size_t action = rheonaut_Command_set_mode_tag; action <= rheonaut_Command_ping_tag; ++action) {
+  for (pb_size_t action = rheonaut_Command_set_mode_tag; action <= rheonaut_Command_drop_timed_tag; ++action) {
     bool tried = false;
     const BareCore core;
     for (const CommandCase& each : kCommandCases) tried = tried || each.command(core).which_action == action;
     EXPECT_TRUE(tried) << action;
   }
   for (const auto mode : {rheonaut_MODE_MANUAL, rheonaut_MODE_AUTO, rheonaut_MODE_EMERGENCY}) {
-    EXPECT_EQ(refusal_in(mode, rheonaut_Command_ping_tag + 1), rheonaut_REJECT_REASON_UNSUPPORTED);
+    EXPECT_EQ(refusal_in(mode, rheonaut_Command_drop_timed_tag + 1), rheonaut_REJECT_REASON_UNSUPPORTED);
   }
 }
 
