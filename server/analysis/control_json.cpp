@@ -84,6 +84,9 @@ Result<T> checked(const T& value) {
   }
 }
 
+// The double that is written as the float is: 0.1, not 0.10000000149011612. It is the same float again.
+double as_written(float value) { return std::stod(fmt::format("{}", value)); }
+
 OrderedJson complex_json(control::Complex value) { return {{"real", value.real()}, {"imaginary", value.imag()}}; }
 
 }  // namespace
@@ -222,6 +225,15 @@ OrderedJson json_of(const control::TuningResult& result) {
   for (const auto& tuned : result.nearest) out["nearest_all"].push_back(json_of(tuned));
   out["relaxed"] = OrderedJson::array();
   for (const auto& tuned : result.relaxed) out["relaxed"].push_back(json_of(tuned));
+  return out;
+}
+
+OrderedJson json_of(const control::EstimatorModel& model) {
+  if (!model.is_met) return {{"refused", model.reason}, {"fit_error", model.fit_error}};
+  OrderedJson out = {{"model_gain_m_s", OrderedJson::array()}, {"model_time_constant_s", OrderedJson::array()}};
+  for (const float gain_m_s : model.sections.gain_m_s) out["model_gain_m_s"].push_back(as_written(gain_m_s));
+  for (const float time_s : model.sections.time_constant_s) out["model_time_constant_s"].push_back(as_written(time_s));
+  out["fit_error"] = model.fit_error;
   return out;
 }
 

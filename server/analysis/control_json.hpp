@@ -11,6 +11,7 @@
 
 #include "control/closed_loop.hpp"
 #include "control/discretise.hpp"
+#include "control/estimator_model.hpp"
 #include "control/identify.hpp"
 #include "control/margins.hpp"
 #include "control/motor_fit.hpp"
@@ -40,6 +41,7 @@ OrderedJson json_of(const control::Margins& margins);
 OrderedJson json_of(std::span<const control::BodePoint> points);  // one array per column
 OrderedJson json_of(const control::TunedController& tuned);
 OrderedJson json_of(const control::TuningResult& result);
+OrderedJson json_of(const control::EstimatorModel& model);  // without parameters if it is refused
 OrderedJson json_of(const control::Fit& fit);
 OrderedJson json_of(const control::Identification& identification);
 OrderedJson json_of(const control::ExpectedUncertainty& uncertainty);

@@ -87,6 +87,7 @@ Wish parse_command_line(int argc, char** argv) {
   offer<Bode>(app, "bode", "Crossover, margins and frequency response of the open loop", wish);
   offer<Step>(app, "step", "Velocity and position after a step of duty, or any duty", wish);
   offer<Identify>(app, "identify", "Find the model that fits a recording; plan an experiment", wish);
+  offer<EstimatorQuestion>(app, "estimator", "Turn a plant into the model of the robot's estimator", wish);
   offer<Tune>(app, "tune", "Find the controller for a crossover and a phase margin", wish);
   offer<Discretise>(app, "discretise", "Turn the controller into coefficients for the robot", wish);
   offer<Export>(app, "export", "Write a recorded run as a file: CSV, MAT or SQLite", wish);

@@ -8,6 +8,7 @@
 #include "server/cli/bode.hpp"
 #include "server/cli/certificate.hpp"
 #include "server/cli/discretise.hpp"
+#include "server/cli/estimator.hpp"
 #include "server/cli/export.hpp"
 #include "server/cli/identify.hpp"
 #include "server/cli/model.hpp"
@@ -36,8 +37,9 @@ struct Answered {
   int exit_code = 0;
 };
 
-using Wish = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
-                          Identify, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand>;
+using Wish =
+    std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
+                 Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand>;
 
 Wish parse_command_line(int argc, char** argv);
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "control/estimator_model.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/motion_at_start.hpp"
 #include "server/cli/options.hpp"
@@ -161,6 +162,23 @@ void write_compared(std::ostream& out, std::span<const Fit> compared) {
   table.write(out);
 }
 
+// None of a search that found no finite model.
+std::optional<control::EstimatorModel> estimator_of(const Fit& fit) {
+  if (!std::isfinite(fit.sse)) return std::nullopt;
+  return control::estimator_model(fit.model);
+}
+
+void write_estimator(std::ostream& out, const control::EstimatorModel& model) {
+  if (model.is_met) {
+    fmt::print(out,
+               "the robot's estimator can use it, with a fit error of {} % (rheonaut estimator says with which "
+               "parameters)\n",
+               fixed(100 * model.fit_error, 3));
+  } else {
+    fmt::print(out, "the robot's estimator cannot use it: {}\n", model.reason);
+  }
+}
+
 OrderedJson residuals_json(const Fit& fit) {
   return {{"position_m", fit.position_residual_m},
           {"velocity_m_s", fit.velocity_residual_m_s},
@@ -192,8 +210,10 @@ int run(const Identify& wish, std::ostream& out) {
   for (const std::string& warning : given.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
   control::Identification found = search(wish, given.recording);
   found.warnings.insert(found.warnings.end(), given.warnings.begin(), given.warnings.end());
+  const std::optional<control::EstimatorModel> estimator = estimator_of(found.best);
   if (wish.form.is_json) {
     OrderedJson answer = json_of(found);
+    answer["estimator"] = estimator ? json_of(*estimator) : OrderedJson{};
     answer["channels"] = channels_of(given.recording);
     answer["channels_reason"] = given.channels_reason;
     if (wish.with_residuals) answer["residuals"] = residuals_json(found.best);
@@ -201,6 +221,7 @@ int run(const Identify& wish, std::ostream& out) {
   } else {
     fmt::print(out, "fitted: {}; {}\n\n", fmt::join(channels_of(given.recording), ", "), given.channels_reason);
     write_parameters(out, found.best);
+    if (estimator) write_estimator(out, *estimator);
     write_compared(out, found.compared);
     for (const std::string& warning : found.warnings) fmt::print(out, "\nwarning: {}\n", warning);
   }

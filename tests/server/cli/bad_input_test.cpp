@@ -167,7 +167,7 @@ TEST_F(BadInput, FlagsOutOfRange) {
 }
 
 TEST_F(BadInput, EveryCommandHelpsWithAnExample) {
-  for (const char* name : {"model", "bode", "step", "identify", "tune", "discretise", "predict"}) {
+  for (const char* name : {"model", "bode", "step", "identify", "estimator", "tune", "discretise", "predict"}) {
     const Answer answer = ask(std::string{name} + " --help");
     EXPECT_EQ(answer.exit_code, 0);
     EXPECT_THAT(answer.text, HasSubstr(std::string{"Example: rheonaut "} + name));

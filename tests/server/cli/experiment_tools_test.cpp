@@ -124,6 +124,26 @@ TEST_F(Identifying, FindsTheModelOfACleanRecordingWhichIsThenAPlant) {
   EXPECT_NEAR(again["velocity_m_s"][0], 0.0298827143987, 1e-8);
 }
 
+TEST_F(Identifying, SaysWhetherTheRobotsEstimatorCanUseIt) {
+  save("run.csv", ask("step --duty 0.3 --every-s 0.01 --until-s 5 --csv").text);
+  const std::string identify = "identify --csv @run.csv --structure fractional";
+  const Answer answer = ask(identify + " --json");
+  const auto told = answer.json()["estimator"];
+  EXPECT_EQ(told["model_gain_m_s"].size(), 4u);
+  EXPECT_EQ(told["model_time_constant_s"].size(), 4u);
+  EXPECT_LT(told["fit_error"], 0.002);
+  save("m.json", answer.text);
+  EXPECT_EQ(ask("bode --plant @m.json").exit_code, 0);
+  EXPECT_EQ(ask("estimator --plant @m.json --json").json()["model_gain_m_s"], told["model_gain_m_s"]);
+  EXPECT_THAT(ask(identify).text, HasSubstr("the robot's estimator can use it, with a fit error of 0.1"));
+
+  save("swing.json", R"({"kp":0.1,"b1":0.005682,"b2":0.05,"alpha":1.95,"beta":0.8682})");
+  save("swing.csv", ask("step --plant @swing.json --every-s 0.01 --until-s 5 --csv").text);
+  const auto refused = ask("identify --csv @swing.csv --structure fractional --json").json()["estimator"];
+  EXPECT_THAT(refused["refused"].get<std::string>(), HasSubstr("overshoots"));
+  EXPECT_FALSE(refused.contains("model_gain_m_s"));
+}
+
 TEST_F(Identifying, WarnsOfACsvThatBeginsInMotion) {
   std::istringstream whole{ask("step --duty 0.3 --every-s 0.01 --until-s 5 --csv").text};
   std::string late, line;

@@ -112,6 +112,39 @@ TEST_F(LoopTools, ATuningIsAControllerFile) {
   EXPECT_THAT(ask("bode --controller @none.json").error, HasSubstr("not feasible"));
 }
 
+TEST_F(LoopTools, EstimatorGivesTheRobotsParametersOfAPlant) {
+  const Answer answer = ask("estimator --plant newtonian --json");
+  ASSERT_EQ(answer.exit_code, 0) << answer.error;
+  const auto json = answer.json();
+  EXPECT_EQ(json.size(), 4u);
+  ASSERT_EQ(json["model_gain_m_s"].size(), 4u);
+  ASSERT_EQ(json["model_time_constant_s"].size(), 4u);
+  double steady_gain_m_s = 0;
+  for (const auto& gain_m_s : json["model_gain_m_s"]) steady_gain_m_s += gain_m_s.get<double>();
+  EXPECT_NEAR(steady_gain_m_s, 232 / 667.1, 1e-5);
+  EXPECT_LT(json["fit_error"], 2e-5);
+  save("again.json", json["plant"].dump());
+  EXPECT_EQ(ask("estimator --plant @again.json --json").text, answer.text);
+
+  const Answer table = ask("estimator");
+  EXPECT_EQ(table.exit_code, 0);
+  EXPECT_THAT(table.text, HasSubstr("model_time_constant_4_s"));
+  EXPECT_THAT(table.text, HasSubstr("the robot can use this model"));
+}
+
+TEST_F(LoopTools, EstimatorRefusesAPlantThatSwings) {
+  save("swing.json", R"({"kp":0.1,"b1":0.005682,"b2":0.05,"alpha":1.95,"beta":0.8682})");
+  const Answer answer = ask("estimator --plant @swing.json --json");
+  EXPECT_EQ(answer.exit_code, 3);
+  EXPECT_THAT(answer.json()["refused"].get<std::string>(), HasSubstr("overshoots"));
+  EXPECT_GT(answer.json()["fit_error"], 0.005);
+  EXPECT_TRUE(answer.json().contains("plant"));
+  EXPECT_FALSE(answer.json().contains("model_gain_m_s"));
+  const Answer table = ask("estimator --plant @swing.json");
+  EXPECT_EQ(table.exit_code, 3);
+  EXPECT_THAT(table.text, HasSubstr("the robot cannot use a model of this plant: four first-order sections"));
+}
+
 TEST_F(LoopTools, ModelShowsThePresetsAndTheDerivedNumerator) {
   const Answer table = ask("model");
   ASSERT_EQ(table.exit_code, 0) << table.error;

@@ -1,0 +1,129 @@
+// Prints how well the robot knows its position in fluids whose model it was told: fluid_study [FLUIDS] [SEEDS]; or in
+// how many fluids four sections make a model: fluid_study models.
+//
+// Figure 7's loop on the estimate, default sensor, the model of control/estimator_model, confirmed. Fluids are drawn as
+// in tests/control/fluid_family.hpp until so many have a model; those that have none are counted.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "control/estimator_model.hpp"
+#include "control/time_response.hpp"
+#include "tests/control/fluid_family.hpp"
+#include "tests/robot_fw/estimator_trial.hpp"
+
+namespace {
+
+struct Tally {
+  int trials = 0, ends_within = 0, ends_within_10_mm = 0, sds_to_7_mm = 0, fluids = 0, fluids_within = 0;
+  double seconds_within = 0, largest_error_m = 0, largest_sd_m = 0;
+
+  void add(const Tally& other) {
+    trials += other.trials;
+    ends_within += other.ends_within;
+    ends_within_10_mm += other.ends_within_10_mm;
+    sds_to_7_mm += other.sds_to_7_mm;
+    seconds_within += other.seconds_within;
+    largest_error_m = std::max(largest_error_m, other.largest_error_m);
+    largest_sd_m = std::max(largest_sd_m, other.largest_sd_m);
+    ++fluids;
+    if (other.ends_within == other.trials) ++fluids_within;
+  }
+};
+
+Tally study(const control::FractionalModel& fluid, const control::EstimatorModel& model, int seeds) {
+  robot_fw::EstimatorTrial trial;
+  trial.truth = fluid;
+  trial.estimator.model = {model.sections.gain_m_s, model.sections.time_constant_s};
+  trial.closed_loop = true;
+  trial.disturbance_m = -0.05;
+  Tally tally;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const auto result = robot_fw::run_trial(trial, static_cast<std::uint64_t>(seed));
+    const double error_m = std::abs(result.estimate_error_m);
+    ++tally.trials;
+    tally.seconds_within += result.share_within;
+    if (error_m <= 2 * result.position_sd_m) ++tally.ends_within;
+    if (error_m <= 0.01) ++tally.ends_within_10_mm;
+    if (result.position_sd_m <= 0.007) ++tally.sds_to_7_mm;
+    tally.largest_error_m = std::max(tally.largest_error_m, error_m);
+    tally.largest_sd_m = std::max(tally.largest_sd_m, result.position_sd_m);
+  }
+  return tally;
+}
+
+void print(const char* name, const Tally& tally) {
+  std::printf(
+      "%s: %d of %d fluids within 2 sd at the end of every trial, %.1f %% of seconds, %.1f %% of ends; "
+      "at most 10 mm off in %.1f %%, sd at most 7 mm in %.1f %% (largest %.1f mm, sd %.1f mm)\n",
+      name, tally.fluids_within, tally.fluids, 100 * tally.seconds_within / std::max(tally.trials, 1),
+      100.0 * tally.ends_within / std::max(tally.trials, 1),
+      100.0 * tally.ends_within_10_mm / std::max(tally.trials, 1),
+      100.0 * tally.sds_to_7_mm / std::max(tally.trials, 1), 1e3 * tally.largest_error_m, 1e3 * tally.largest_sd_m);
+}
+
+double overshoot(const control::FractionalModel& fluid) {
+  std::vector<double> time_s;
+  for (double time = 0.01; time < 60; time *= 1.02) time_s.push_back(time);
+  const auto response = control::step_response(fluid, fluid.b3 / fluid.kp, time_s).velocity_m_s;
+  return *std::ranges::max_element(response) - 1;
+}
+
+void print_models(const char* name, const std::vector<control::FractionalModel>& fluids) {
+  std::vector<double> errors;
+  int swinging = 0, swinging_met = 0;
+  for (const control::FractionalModel& fluid : fluids) {
+    errors.push_back(control::estimator_model(fluid).fit_error);
+    if (overshoot(fluid) <= 0.01) continue;
+    ++swinging;
+    if (errors.back() <= control::kLargestFitError) ++swinging_met;
+  }
+  std::ranges::sort(errors);
+  const auto to = [&errors](double error) { return std::ranges::upper_bound(errors, error) - errors.begin(); };
+  std::printf(
+      "%s: %zu fluids; fit error to 0.2 %% in %td, to 0.5 %% in %td, median %.2f %%, worst %.0f %%; "
+      "%d overshoot by more than 1 %%, %d of them are met\n",
+      name, errors.size(), to(0.002), to(control::kLargestFitError), 100 * errors[errors.size() / 2],
+      100 * errors.back(), swinging, swinging_met);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc > 1 && std::strcmp(argv[1], "models") == 0) {
+    print_models("drawn", control::fluid_family(1000, 1));
+    print_models("ends and middles", control::fluid_family_corners());
+    return 0;
+  }
+  const int fluids = argc > 1 ? std::atoi(argv[1]) : 20, seeds = argc > 2 ? std::atoi(argv[2]) : 10;
+  if (fluids < 1 || seeds < 1) return std::fprintf(stderr, "fluid_study: give positive numbers\n"), 2;
+  constexpr double kJerky = 1.55;  // orders below it begin to move so suddenly that the simulated sensor misses it
+  Tally all, smooth, jerky;
+  int drawn = 0;
+  std::printf(
+      "| b1, b2 of (29) times | alpha | beta | fit error %% | seconds within 2 sd %% | ends within 2 sd | "
+      "largest error mm | largest sd mm |\n|---|---|---|---|---|---|---|---|\n");
+  for (const control::FractionalModel& fluid : control::fluid_family(4 * fluids + 20, 7)) {
+    if (all.fluids == fluids) break;
+    ++drawn;
+    const control::EstimatorModel model = control::estimator_model(fluid);
+    if (!model.is_met) continue;
+    const Tally tally = study(fluid, model, seeds);
+    const auto& middle = control::kNonNewtonianModel;
+    std::printf("| %.2f, %.2f | %.2f | %.2f | %.2f | %.0f | %d of %d | %.1f | %.1f |\n", fluid.b1 / middle.b1,
+                fluid.b2 / middle.b2, fluid.alpha, fluid.beta, 100 * model.fit_error,
+                100 * tally.seconds_within / seeds, tally.ends_within, seeds, 1e3 * tally.largest_error_m,
+                1e3 * tally.largest_sd_m);
+    std::fflush(stdout);
+    all.add(tally);
+    (fluid.alpha < kJerky ? jerky : smooth).add(tally);
+  }
+  std::printf("\n%d fluids drawn, %d without a model\n", drawn, drawn - all.fluids);
+  print("all", all);
+  print("alpha from 1.55", smooth);
+  print("alpha below 1.55", jerky);
+  return 0;
+}
