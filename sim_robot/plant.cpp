@@ -1,4 +1,4 @@
-// Integrates the nonlinear model, and chooses between it and the linear ones.
+// Integrates the nonlinear model, and chooses between the models.
 #include "sim_robot/plant.hpp"
 
 #include <cmath>
@@ -9,10 +9,11 @@
 namespace sim_robot {
 namespace {
 
-using Motion = std::variant<control::ModalPlant, NonlinearPlant>;
+using Motion = std::variant<control::ModalPlant, NonlinearPlant, ShearThinningPlant>;
 
 Motion motion_of(const PlantParameters& parameters, double dt_s) {
   if (parameters.kind == PlantKind::linear) return control::ModalPlant{parameters.model, dt_s};
+  if (parameters.kind == PlantKind::shear_thinning) return ShearThinningPlant{parameters.shear_thinning, dt_s};
   return NonlinearPlant{parameters.hydrodynamics, dt_s};
 }
 
@@ -23,6 +24,7 @@ void check(const PlantParameters& parameters) {
   if (!(dead_time_s >= 0 && dead_time_s <= 10))
     control::throw_invalid("dead_time_s is ", dead_time_s, ", allowed is 0 to 10");
   if (parameters.kind == PlantKind::linear) return control::check(parameters.model);
+  if (parameters.kind == PlantKind::shear_thinning) return check(parameters.shear_thinning);
   control::hydrodynamic_model(parameters.hydrodynamics);  // refuses what cannot be
 }
 
@@ -30,7 +32,9 @@ PlantParameters fluid(const std::string& name) {
   if (name == "non_newtonian") return {.model = control::kNonNewtonianModel};
   if (name == "water") return {.model = control::kNewtonianModel};
   if (name == "water_nonlinear") return {.kind = PlantKind::nonlinear};
-  control::throw_invalid("there is no fluid '", name, "'; there are non_newtonian, water and water_nonlinear");
+  if (name == "shear_thinning") return {.kind = PlantKind::shear_thinning};
+  control::throw_invalid("there is no fluid '", name,
+                         "'; there are non_newtonian, water, water_nonlinear and shear_thinning");
 }
 
 NonlinearPlant::NonlinearPlant(const control::HydrodynamicParameters& p, double dt_s, int steps)

@@ -1,12 +1,13 @@
 // The body in the fluid: what the motor's duty makes of position, velocity and acceleration, relative to the fluid.
 //
-// Linear, any model of control::FractionalModel, exact between ticks; or the nonlinear one of the paper's Section 3.1:
+// Linear, any model of control::FractionalModel, exact between ticks; one that thins under shear
+// (shear_thinning_plant.hpp); or the nonlinear one of the paper's Section 3.1:
 //   Tm ω' = km u - ω                                                     (1)   (17): the propeller
 //   M v' = Ct ρ A r² ω|ω| - X|u|u v|v| - Xu v                            (2)   (1), (14), (15), (16); M with added mass
 //   x' = v                                                               (3)
 // with the values of control::HydrodynamicParameters. Duty backwards turns the thrust around. (28) is (2) linearised,
 // with an empirical gain: see docs/simulator.md for how far the two are apart.
-// Either may answer the duty a dead time late, in whole ticks.
+// Each may answer the duty a dead time late, in whole ticks.
 // Accuracy: (1) exact, (2) and (3) by Runge-Kutta of 4th order in 4 steps a tick: within 1e-5 m/s of 100 times as many
 //           steps, held by plant_test.cpp.
 // Errors:   throws std::invalid_argument quoting the bad value.
@@ -17,21 +18,24 @@
 #include <vector>
 
 #include "control/modal_plant.hpp"
+#include "sim_robot/shear_thinning_plant.hpp"
 
 namespace sim_robot {
 
-enum class PlantKind { linear, nonlinear };
+enum class PlantKind { linear, nonlinear, shear_thinning };
 
 struct PlantParameters {
   PlantKind kind = PlantKind::linear;
   control::FractionalModel model = control::kNonNewtonianModel;  // of the linear one
   control::HydrodynamicParameters hydrodynamics{};               // of the nonlinear one
+  ShearThinningParameters shear_thinning{};                      // of the one that thins
   double dead_time_s = 0;                                        // from the duty to its first effect; at most 10
 };
 
 void check(const PlantParameters& parameters);
 
-// The fluids of the paper by name: `non_newtonian` (fabric softener, (29)), `water` ((28)), `water_nonlinear` (2).
+// The fluids by name: of the paper `non_newtonian` (fabric softener, (29)), `water` ((28)), `water_nonlinear` (2); and
+// `shear_thinning`.
 // Throws std::invalid_argument naming those that there are.
 PlantParameters fluid(const std::string& name);
 
@@ -65,7 +69,7 @@ class Plant {
   double velocity_m_s() const { return velocity_m_s_; }
   double acceleration_m_s2() const { return acceleration_m_s2_; }
 
-  // See ModalPlant; the other has nothing of the kind.
+  // See ModalPlant; the others have nothing of the kind.
   void prefetch() const {
     if (const auto* modal = std::get_if<control::ModalPlant>(&motion_)) modal->prefetch();
   }
@@ -73,7 +77,7 @@ class Plant {
  private:
   double delayed(double duty);
 
-  std::variant<control::ModalPlant, NonlinearPlant> motion_;
+  std::variant<control::ModalPlant, NonlinearPlant, ShearThinningPlant> motion_;
   std::vector<double> duties_;  // of the dead time, as a ring
   std::size_t oldest_ = 0;
   double position_m_ = 0, velocity_m_s_ = 0, acceleration_m_s2_ = 0;

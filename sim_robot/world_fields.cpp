@@ -8,7 +8,7 @@
 namespace sim_robot {
 namespace {
 
-constexpr std::array<const char*, 3> kFluids{"non_newtonian", "water", "water_nonlinear"};
+constexpr std::array<const char*, 4> kFluids{"non_newtonian", "water", "water_nonlinear", "shear_thinning"};
 constexpr std::array<const char*, 2> kBatteries{"steady", "cr123a"};
 constexpr std::array<const char*, 2> kAccelerometers{"bno055", "perfect"};
 constexpr std::array<const char*, 2> kElectrodes{"perfect", "ds550"};
@@ -18,7 +18,7 @@ constexpr Range kTimes{0, kForEver};
 
 void fluid_fields(Fields& fields, PlantParameters& plant) {
   std::size_t index = 0;
-  fields.choice("preset", index, kFluids, "(29), (28), or the nonlinear model of Section 3.1");
+  fields.choice("preset", index, kFluids, "(29), (28), the nonlinear model of Section 3.1, or drag as speed^0.6");
   plant = fluid(kFluids[index]);
   if (plant.kind == PlantKind::linear) {
     control::FractionalModel& model = plant.model;

@@ -8,10 +8,10 @@
 namespace sim_robot {
 
 void add_fluid(CLI::App& app, WorldOptions& options) {
-  auto* fluid =
-      app.add_option("--fluid", options.fluid, "non_newtonian (29), water (28), water_nonlinear (Section 3.1)")
-          ->check(CLI::IsMember({"non_newtonian", "water", "water_nonlinear"}))
-          ->default_str("non_newtonian");
+  auto* fluid = app.add_option("--fluid", options.fluid,
+                               "non_newtonian (29), water (28), water_nonlinear (Section 3.1), shear_thinning")
+                    ->check(CLI::IsMember({"non_newtonian", "water", "water_nonlinear", "shear_thinning"}))
+                    ->default_str("non_newtonian");
   app.add_option("--model", options.model_file, "model file, or what `rheonaut identify --json` printed")
       ->excludes(fluid);
 }

@@ -65,16 +65,16 @@ struct Second {
   bool is_within() const { return std::abs(error_m) <= 2 * sd_m; }
 };
 
-sim_robot::World world_of(const control::FractionalModel& truth, std::uint64_t seed) {
+sim_robot::World world_of(const sim_robot::PlantParameters& truth, std::uint64_t seed) {
   sim_robot::WorldConfig config;
-  config.plant.model = truth;
+  config.plant = truth;
   config.imu = sim_robot::ImuParameters{};
   config.seed = seed;
   return sim_robot::World{config};
 }
 
 // Every full second. Without a manual duty: the paper's Figure 7, its loop closed on the estimate.
-std::vector<Second> seconds_of(const control::FractionalModel& truth, const EstimatorParameters& parameters,
+std::vector<Second> seconds_of(const sim_robot::PlantParameters& truth, const EstimatorParameters& parameters,
                                std::optional<float> manual_duty, std::uint64_t seed) {
   sim_robot::World world = world_of(truth, seed);
   Estimator estimator{parameters};
@@ -100,7 +100,7 @@ std::vector<Second> seconds_of(const std::vector<Fluid>& fluids, std::optional<f
   std::vector<Second> all;
   for (const Fluid& fluid : fluids) {
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-      const auto seconds = seconds_of(fluid.model, EstimatorParameters{}, manual_duty, seed);
+      const auto seconds = seconds_of({.model = fluid.model}, EstimatorParameters{}, manual_duty, seed);
       all.insert(all.end(), seconds.begin(), seconds.end());
     }
   }
@@ -145,13 +145,28 @@ TEST(EstimatorFluids, ThePositionIsWithinTwoStandardDeviationsWhenAllNumbersDiff
   }
 }
 
+// Of no linear fluid at all: the drag goes with the speed to the power of 0.6, and lags.
+TEST(EstimatorFluids, ThePositionIsWithinTwoStandardDeviationsInAFluidThatThinsUnderShear) {
+  const sim_robot::PlantParameters thinning = sim_robot::fluid("shear_thinning");
+  for (const std::optional<float> duty : {std::optional<float>{}, {0.1F}, {0.3F}, {0.8F}}) {
+    std::vector<Second> seconds;
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      const auto more = seconds_of(thinning, EstimatorParameters{}, duty, seed);
+      seconds.insert(seconds.end(), more.begin(), more.end());
+    }
+    EXPECT_GE(share_within(seconds), 0.9) << duty.value_or(0);
+    EXPECT_LE(median_sd_m(seconds), 2.5 * rms_error_m(seconds)) << duty.value_or(0);
+  }
+}
+
 // 4.2 mm and 5.3 mm were the medians of the estimator that knew no other shape than its model's.
 TEST(EstimatorFluids, AConfirmedModelIsAsSureAsEver) {
   EstimatorParameters parameters;
   parameters.is_confirmed = true;
   const auto sd_at_end_m = [&parameters](const control::FractionalModel& truth) {
     std::vector<Second> ends;
-    for (std::uint64_t seed = 1; seed <= 9; ++seed) ends.push_back(seconds_of(truth, parameters, {}, seed).back());
+    for (std::uint64_t seed = 1; seed <= 9; ++seed)
+      ends.push_back(seconds_of({.model = truth}, parameters, {}, seed).back());
     EXPECT_GE(share_within(ends), 0.8);
     return median_sd_m(ends);
   };
@@ -163,7 +178,7 @@ TEST(EstimatorFluids, AConfirmedModelIsAsSureAsEver) {
 TEST(EstimatorFluids, AMismatchEndsWithTheRightModel) {
   EstimatorParameters parameters;
   parameters.is_confirmed = true;
-  sim_robot::World world = world_of(control::kNewtonianModel, 1);
+  sim_robot::World world = world_of({.model = control::kNewtonianModel}, 1);
   Estimator estimator{parameters};
   const auto drive_and_rest = [&] {
     bool was_mismatched = false;
@@ -192,7 +207,7 @@ TEST(EstimatorFluids, NoParametersKeepTheEstimatorFromSettling) {
       EstimatorParameters parameters;
       parameters.model.gain_m_s.fill(gain_m_s);
       parameters.model.time_constant_s.fill(time_constant_s);
-      sim_robot::World world = world_of(control::kNonNewtonianModel, 3);
+      sim_robot::World world = world_of({.model = control::kNonNewtonianModel}, 3);
       Estimator estimator{parameters};
       for (int tick = 0; tick < 4000; ++tick) {
         const float duty = tick < 100 ? 1 : 0;

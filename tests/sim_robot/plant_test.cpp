@@ -116,7 +116,7 @@ TEST(NonlinearPlant, HasThePolesOf28AtItsWorkingPoint) {
 }
 
 TEST(Plant, ADeadTimeIsTheSameMotionSoMuchLater) {
-  for (const PlantKind kind : {PlantKind::linear, PlantKind::nonlinear}) {
+  for (const PlantKind kind : {PlantKind::linear, PlantKind::nonlinear, PlantKind::shear_thinning}) {
     Plant prompt{{.kind = kind}, kTickS}, late{{.kind = kind, .dead_time_s = 0.053}, kTickS};
     for (int k = 0; k < 5; ++k) late.step(kDuty);
     EXPECT_EQ(late.position_m(), 0);
