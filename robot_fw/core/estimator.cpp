@@ -142,6 +142,7 @@ void Estimator::tune_sections(float dt_s) {
 void Estimator::advance_model(float duty) {
   duty_ = std::isfinite(duty) ? std::clamp(duty, -1.0F, 1.0F) : 0;
   if (std::fabs(duty_) < parameters_.dead_zone_duty) duty_ = 0;
+  if (duty_ != 0) still_s_ = 0;  // SAFETY: also without readings, the motor has ended what was felt before
   if (std::fabs(duty_) < parameters_.doubtful_duty) doubtful_m_ += steady_gain_m_s_ * duty_ * tuned_dt_s_;
   model_m_s_ = 0;
   for (std::size_t i = 0; i < kModelSections; ++i) {

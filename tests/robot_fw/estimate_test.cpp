@@ -198,6 +198,18 @@ TEST_F(Estimate, ItsParametersAreRefusedWhileTheRobotCoasts) {
   EXPECT_LE(std::abs(last().position_m - static_cast<float>(robot.world().position_m())), 2 * last().position_sd_m);
 }
 
+// SAFETY: the estimator would take the coasting robot to stand, and be sure of that.
+TEST_F(Estimate, ItsParametersAreRefusedWhileTheRobotCoastsWithoutReadings) {
+  station.run(600);  // at rest, and felt to be
+  robot.world().set_fault(Sensor::accelerometer, {.kind = SensorFaultKind::missing});
+  station.step();
+  EXPECT_EQ(answer(set_parameter("model_confirmed", 1)), "accepted");
+  order(set_duty(1));
+  station.run(45);
+  order(set_duty(0));
+  EXPECT_EQ(answer(set_parameter("model_gain_error", 0.2F)), "motor_on");
+}
+
 TEST(OnItsAccelerometer, ARobotThatWasResetMayBeCoastingAndSaysSo) {
   for (const auto [cause, sd_m] :
        {std::pair{rheonaut_RESET_CAUSE_POWER_ON, 0.0F}, std::pair{rheonaut_RESET_CAUSE_SOFTWARE, 0.025F},

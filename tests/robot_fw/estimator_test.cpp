@@ -152,6 +152,15 @@ TEST_F(EstimatorTest, StartsAnewAndUnsureWhenItsParametersAreNotFinite) {
   EXPECT_EQ(broken.position_sd_m(), 10);
 }
 
+// SAFETY: stillness that was felt before the motor ran says nothing of what follows, also when no readings come.
+TEST_F(EstimatorTest, IsNotSettledByAStillnessFromBeforeTheMotorRan) {
+  rest(6);
+  drive_unsensed(1, 2);
+  drive_unsensed(0, 0.01);
+  EXPECT_FALSE(estimator.at_rest());
+  EXPECT_FALSE(estimator.is_settled());
+}
+
 TEST_F(EstimatorTest, IsSmall) { EXPECT_LE(sizeof(Estimator), 560u); }
 
 }  // namespace
