@@ -55,7 +55,7 @@ class Outbox {
   void ack_stop(const protocol::CommandAck& ack);
   // There must be room for it.
   void ask_page(const PageRequest& page) { pages_[page_count_++] = page; }
-  bool has_room_for_page() const { return page_count_ < kMaxPages; }
+  bool has_room_for_pages(std::size_t pages) const { return page_count_ + pages <= kMaxPages; }
   void controller_changed() { controller_due_ = true; }
   void echo(std::uint64_t station_time_us, std::uint64_t received_at_us);
   // Once per tick, after the sample was made; `urgent` sends it, and all before it, at once.

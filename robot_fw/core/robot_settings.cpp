@@ -42,23 +42,23 @@ Verdict Robot::set_parameter(const rheonaut_SetParameter& order, std::uint64_t c
   const bool is_estimators = *index >= static_cast<std::size_t>(ParameterId::model_gain_1_m_s);
   // SAFETY: an estimator that starts anew while the robot coasts would take it to stand, and be sure of that.
   if (is_estimators && !motion_sense_.is_settled()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
-  if (!outbox_.has_room_for_page()) return rejected(rheonaut_REJECT_REASON_BUSY);
-  parameters_.set(*index, order.value);
   // SAFETY: whoever changes the model says anew that it is the fluid's; one that is half of another is nobody's.
   const bool takes_back = Parameters::is_of_model(*index) && parameters_[ParameterId::model_confirmed] == 1;
+  if (!outbox_.has_room_for_pages(takes_back ? 2 : 1)) return rejected(rheonaut_REJECT_REASON_BUSY);
+  parameters_.set(*index, order.value);
   if (takes_back) parameters_.set(ParameterId::model_confirmed, 0);
   if (is_estimators) motion_sense_.set_parameters(parameters_.estimator());
   parameters_unsaved_ = true;
   note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, order.value, command_id);
   outbox_.ask_page({command_id, *index, 1});
   constexpr auto kConfirmed = static_cast<std::uint32_t>(ParameterId::model_confirmed);
-  if (takes_back && outbox_.has_room_for_page()) outbox_.ask_page({0, kConfirmed, 1});  // else the flag alone says it
+  if (takes_back) outbox_.ask_page({0, kConfirmed, 1});
   return kAccepted;
 }
 
 Verdict Robot::get_parameters(std::uint32_t first_index, std::uint64_t command_id) {
   if (first_index >= kParameterCount) return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
-  if (!outbox_.has_room_for_page()) return rejected(rheonaut_REJECT_REASON_BUSY);
+  if (!outbox_.has_room_for_pages(1)) return rejected(rheonaut_REJECT_REASON_BUSY);
   outbox_.ask_page({command_id, first_index, std::min(PageRequest::kMost, kParameterCount - first_index)});
   return kAccepted;
 }

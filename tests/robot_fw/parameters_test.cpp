@@ -147,6 +147,26 @@ TEST_F(ParametersOverTheLink, AChangeOfTheModelTakesItsConfirmationBack) {
   EXPECT_EQ(unasked.parameters[0].value, 0);
 }
 
+// The station knows of each change: one that takes the confirmation back is two pages, or none.
+TEST_F(ParametersOverTheLink, AChangeThatTakesTheConfirmationBackIsBusyWithoutRoomForBothPages) {
+  EXPECT_EQ(set("model_confirmed", 1), "accepted");
+  const auto pages_before = station.table.size();
+  for (int i = 0; i < 3; ++i) station.send(set_parameter("auto_limit_s", 30));
+  const auto change = station.send(set_parameter("model_gain_1_m_s", 0.1F));
+  station.step();
+  EXPECT_EQ(result(*station.ack_of(change)), "busy");
+  EXPECT_EQ(in_force("model_confirmed"), 1);
+  EXPECT_NE(in_force("model_gain_1_m_s"), 0.1F);
+
+  for (int i = 0; i < 2; ++i) station.send(set_parameter("auto_limit_s", 30));
+  const auto again = station.send(set_parameter("model_gain_1_m_s", 0.1F));
+  station.step();
+  EXPECT_EQ(result(*station.ack_of(again)), "accepted");
+  ASSERT_EQ(station.table.size(), pages_before + 1);
+  EXPECT_STREQ(station.table.back().parameters[0].name, "model_confirmed");
+  EXPECT_EQ(station.table.back().parameters[0].value, 0);
+}
+
 TEST_F(ParametersOverTheLink, WhatNamesAChoiceIsAWholeNumber) {
   EXPECT_EQ(set("link_loss_action", 0.5F), "out_of_range");
   EXPECT_EQ(set("link_loss_action", 2), "accepted");
