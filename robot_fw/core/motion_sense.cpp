@@ -41,7 +41,7 @@ void MotionSense::step(const Inputs& inputs, float duty, float dt_s, float misse
 void MotionSense::zero_position() {
   estimator_.zero_position();
   origin_m_ = known_position_m_;
-  motion_.position_m = 0;
+  motion_.position_m = position_sd_m_ = 0;
 }
 
 void MotionSense::add_to(Crc32& crc) const {

@@ -211,6 +211,8 @@ Verdict Robot::zero_position(std::uint64_t command_id) {
   const float before_m = motion_sense_.motion().position_m;
   if (!std::isfinite(before_m)) return rejected(rheonaut_REJECT_REASON_NOT_FINITE);
   motion_sense_.zero_position();
+  safety_.leaves_limits(0, position_limits());  // what is ordered next need not wait for the next tick
+  safety_.watch_certainty(0, 0, position_limits());
   note(rheonaut_EVENT_KIND_POSITION_ZEROED, rheonaut_EVENT_CAUSE_COMMAND, before_m, command_id);
   return kAccepted;
 }

@@ -97,6 +97,41 @@ TEST_F(Estimate, ZeroPositionMakesThePositionKnown) {
   EXPECT_LE(last().position_sd_m, 0.0002F);
 }
 
+// The way out is open at once, not only from the next tick on.
+TEST_F(Estimate, AfterZeroPositionADutyTowardsALimitIsAcceptedWithinTheSameTick) {
+  EXPECT_EQ(answer(set_parameter("position_limit_max_m", 0.2F)), "accepted");
+  order(set_duty(0.5F));
+  for (int i = 1; i < 1000 && core().duty() > 0; ++i) {
+    if (i % 20 == 0) station.send(renew_lease());
+    station.step();
+  }
+  ASSERT_EQ(events_of(rheonaut_EVENT_KIND_POSITION_UNCERTAIN), 1);
+  station.run(1000);
+  const auto refused = station.send(set_duty(0.2F));
+  const auto zeroed = station.send(zero_position());
+  const auto accepted = station.send(set_duty(0.2F));
+  station.step();
+  EXPECT_EQ(result(*station.ack_of(refused)), "uncertain");
+  EXPECT_EQ(result(*station.ack_of(zeroed)), "accepted");
+  EXPECT_EQ(result(*station.ack_of(accepted)), "accepted");
+  EXPECT_EQ(core().duty(), 0.2F);
+}
+
+TEST_F(Estimate, AfterZeroPositionASetpointNearALimitIsAcceptedWithinTheSameTick) {
+  EXPECT_EQ(answer(set_parameter("position_limit_max_m", 0.5F)), "accepted");
+  order(set_auto(0.1F));
+  station.run(1000);
+  order(set_manual());
+  station.run(1000);
+  const float near_m = 0.5F - last().position_sd_m;
+  EXPECT_EQ(answer(set_auto(near_m)), "uncertain");
+  const auto zeroed = station.send(zero_position());
+  const auto accepted = station.send(set_auto(near_m));
+  station.step();
+  EXPECT_EQ(result(*station.ack_of(zeroed)), "accepted");
+  EXPECT_EQ(result(*station.ack_of(accepted)), "accepted");
+}
+
 TEST_F(Estimate, FollowsTheMotorThroughMissedTicks) {
   order(set_duty(0.5F));
   station.run(20);

@@ -71,6 +71,18 @@ TEST_F(Limits, HoldOnTheNegativeSideToo) {
   EXPECT_EQ(answer(set_duty(0.1F)), "accepted");
 }
 
+TEST_F(Limits, AfterZeroPositionOutsideADutyIsAcceptedWithinTheSameTick) {
+  leave_by(0.05F);
+  clear();
+  const auto refused = station.send(set_duty(0.1F));
+  station.send(zero_position());
+  const auto accepted = station.send(set_duty(0.1F));
+  station.step();
+  EXPECT_EQ(result(*station.ack_of(refused)), "outward");
+  EXPECT_EQ(result(*station.ack_of(accepted)), "accepted");
+  EXPECT_EQ(core().duty(), 0.1F);
+}
+
 TEST_F(Limits, BackInsideTheyWatchAgain) {
   leave_by(0.05F);
   clear();
