@@ -29,7 +29,7 @@
 //           docs/robot.md, held by estimator_study_test.cpp. In fluids that nobody told it: estimator_fluids_test.cpp.
 // Cost:     544 bytes; in instructions of the chip: docs/robot.md.
 // Errors:   a duty that is not finite counts as 0, a tick of a length outside (0, 0.1] s is passed over; if a state is
-//           not finite nevertheless, the filter starts anew with a position_sd_m of 10 m.
+//           not finite nevertheless, or rounding spoils the covariance, it starts anew: position_sd_m 10 m.
 // Differs from the paper: it names an algorithm that is not known to us; this one takes its place.
 #pragma once
 
@@ -142,10 +142,10 @@ class Estimator {
   void let_drift_die_down();
   void admit_drift();
   float measurement_variance() const;
-  void compare_with_model();
+  bool compare_with_model();  // false: the covariance is none any more
   void correct(const Vector& gains, const Vector& ph, float variance, float innovation);
   void watch_model(float surprise);
-  void guard();
+  void guard(bool sound);
 
   EstimatorParameters parameters_;
   std::array<float, kModelSections> section_share_{};   // of its way to go, that a section goes in a tick
