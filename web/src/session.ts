@@ -13,7 +13,7 @@ const kKeepAlive_ms = 1000; // what this page controls stays its own for 3 s
 
 export class Session {
   readonly api = new Api(
-    (path, options) => fetch(path, options),
+    (path, options) => this.ask(path, options),
     () => this.link.stamp_us,
   );
   readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => Date.now() });
@@ -88,8 +88,15 @@ export class Session {
     addEventListener('pagehide', () => this.hold.release());
   }
 
+  // Whatever is sent to a robot goes to the one that is selected, which stays so.
+  private ask(path: string, options: RequestInit): Promise<Response> {
+    if (options.method === 'POST' && path.startsWith('/api/v1/robots/')) this.store.keep_selected();
+    return fetch(path, options);
+  }
+
   // Stops the robot that is looked at; without one, every robot.
   stop_selected = (): void => {
+    this.store.keep_selected();
     this.hold.forget();
     void this.emergency.stop(this.store.selected_id.peek());
   };

@@ -37,7 +37,7 @@ export class Store {
   private readonly by_id = new Map<string, Robot>();
   private pending_log: LogLine[] = [];
   private notes = 0;
-  private chosen = false; // a person selected a robot
+  private chosen = false; // the selection stays: by a person, or because what is selected was there
 
   constructor(private readonly clocks: { page_ms(): number; utc_ms(): number }) {}
 
@@ -160,13 +160,19 @@ export class Store {
     this.selected_id.value = robot_id;
   }
 
-  // Until a person chooses, the page shows a connected robot rather than one that is away.
+  // Whoever orders something of the robot that is selected has chosen it.
+  keep_selected(): void {
+    this.chosen ||= this.selected_id.peek() !== null;
+  }
+
+  // Until a person chooses, the page shows a connected robot rather than one that was never there.
+  // SAFETY: one that was connected stays selected when its link breaks: Escape is meant for it, not for another one.
   private select_by_itself(): void {
-    const selected = this.selected.peek();
-    if (this.chosen || selected?.state.peek().link === 'connected') return;
+    if (this.chosen) return;
     const robots = this.robots.peek();
-    const best = robots.find((robot) => robot.state.peek().link === 'connected') ?? selected ?? robots[0];
-    this.selected_id.value = best?.state.peek().robot_id ?? null;
+    const best = robots.find((robot) => !robot.is_away.peek()) ?? this.selected.peek() ?? robots[0];
+    this.selected_id.value = best?.robot_id ?? null;
+    this.chosen = best !== undefined && !best.is_away.peek();
   }
 
   private line_of_event(event: EventRecord): LogLine {

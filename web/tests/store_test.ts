@@ -92,6 +92,32 @@ test('what a person selected stays, whoever connects', () => {
   expect(store.robots.value).toHaveLength(2);
 });
 
+// SAFETY: Escape stops what is selected.
+test('a robot that was connected stays selected when its link breaks, whoever else is there', () => {
+  const { store } = store_with(robot('a'), robot('b'));
+  store.hear({ type: 'robot', robot: robot('a', { link: 'disconnected' }) });
+  expect(store.selected_id.value).toBe('a');
+  store.hear({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots: [robot('a', { link: 'disconnected' }), robot('b')] });
+  expect(store.selected_id.value).toBe('a');
+});
+
+test('until a robot is connected the selection looks for one', () => {
+  const { store } = store_with(robot('a', { link: 'disconnected' }), robot('b', { link: 'disconnected' }));
+  expect(store.selected_id.value).toBe('a');
+  store.hear({ type: 'robot', robot: robot('b') });
+  expect(store.selected_id.value).toBe('b');
+  store.hear({ type: 'robot', robot: robot('a') });
+  store.hear({ type: 'robot', robot: robot('b', { link: 'disconnected' }) });
+  expect(store.selected_id.value).toBe('b');
+});
+
+test('a robot that was sent something stays selected, also one that was never connected', () => {
+  const { store } = store_with(robot('a', { link: 'disconnected' }));
+  store.keep_selected();
+  store.hear({ type: 'robot', robot: robot('b') });
+  expect(store.selected_id.value).toBe('a');
+});
+
 test('the log keeps the last lines, newest first, and a command has one line that changes', () => {
   const { store } = store_with(robot('rheo-1'));
   const command = (n: number, state: CommandRecord['state']) =>

@@ -1,0 +1,36 @@
+// What the session does with what a page sends.
+import { afterEach, expect, test, vi } from 'vitest';
+import type { RobotState } from '../src/api';
+import { Session } from '../src/session';
+
+afterEach(() => vi.unstubAllGlobals());
+
+const robot = (robot_id: string, link: RobotState['link']) => ({ robot_id, link, mode: 'manual', emergency_id: null, pending_stop: null }) as RobotState;
+
+function session_beside(away: RobotState) {
+  vi.stubGlobal('fetch', () => Promise.reject(new Error('no network here')));
+  const session = new Session({ open_socket: () => ({}) as never });
+  session.store.hear({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots: [away] });
+  return session;
+}
+
+// SAFETY: Escape stops what is selected.
+test('a robot that was stopped, or sent anything, stays selected when another one connects', async () => {
+  const acts: ((session: Session) => unknown)[] = [
+    (session) => session.stop_selected(),
+    (session) => session.api.set_fluid('a', 'water').catch(() => undefined),
+  ];
+  for (const act of acts) {
+    const session = session_beside(robot('a', 'disconnected'));
+    await act(session);
+    session.store.hear({ type: 'robot', robot: robot('b', 'connected') });
+    expect(session.store.selected_id.value).toBe('a');
+  }
+});
+
+test('what a page asks chooses no robot', async () => {
+  const session = session_beside(robot('a', 'disconnected'));
+  await session.api.newest_run('a').catch(() => undefined);
+  session.store.hear({ type: 'robot', robot: robot('b', 'connected') });
+  expect(session.store.selected_id.value).toBe('b');
+});
