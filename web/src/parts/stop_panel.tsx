@@ -111,7 +111,8 @@ function Latch({ session, robot }: { session: Session; robot: Robot }) {
       {known_id !== null && pending_stop === null && (
         <>
           <WhoMayClear session={session} robot={robot} />
-          <GuardedButton id="clear-emergency" disabled={!may_clear(session, robot) || asking.pending} on_held={() => void clear(known_id)}>
+          {/* SAFETY: of another emergency it is another button: a hold that began before it clears nothing. */}
+          <GuardedButton key={known_id} id="clear-emergency" disabled={!may_clear(session, robot) || asking.pending} on_held={() => void clear(known_id)}>
             Hold 1 s to clear {known_id.slice(-6).padStart(7, '…')}
           </GuardedButton>
         </>
