@@ -60,6 +60,20 @@ const kEmptyReadout: Readout = {
   missing: 0,
 };
 
+const kSameMoment_us = 200_000; // an event comes ahead of the samples of its time
+
+const end_of_samples = ({ boot_id, first_robot_time_us, period_us, position_m, position_sd_m }: SamplesMessage) => ({
+  boot_id,
+  robot_time_us: first_robot_time_us + (position_m.length - 1) * period_us,
+  position_sd_m,
+});
+
+const end_of_state = ({ boot_id, latest_robot_time_us, position_sd_m }: RobotState) => ({
+  boot_id,
+  robot_time_us: latest_robot_time_us,
+  position_sd_m,
+});
+
 export class Robot {
   private made_ring: SampleRing | null = null;
   readonly robot_id: string;
@@ -128,9 +142,11 @@ export class Robot {
     this.watched = watched;
   }
 
-  // Of the position that was heard last.
-  position_sd_m(): number | null {
-    return this.watched && this.latest ? this.latest.position_sd_m : this.state.peek().position_sd_m;
+  // Of the position at that moment; null: what the page heard last is of another one.
+  position_sd_m_at(boot_id: string | null, robot_time_us: number | null): number | null {
+    const heard = this.watched && this.latest ? end_of_samples(this.latest) : end_of_state(this.state.peek());
+    if (robot_time_us === null || boot_id === null || boot_id !== heard.boot_id) return null;
+    return Math.abs(robot_time_us - heard.robot_time_us) <= kSameMoment_us ? heard.position_sd_m : null;
   }
 
   hear(message: SamplesMessage, now_ms: number): void {

@@ -17,7 +17,7 @@ export interface LogLine {
   event: EventRecord | null;
   command: CommandRecord | null;
   note: string | null; // of the page itself
-  position_sd_m: number | null; // of the position in an event, when it was heard
+  position_sd_m: number | null; // of the position in an event; null: not known for its moment
 }
 
 export class Store {
@@ -177,7 +177,9 @@ export class Store {
 
   private line_of_event(event: EventRecord): LogLine {
     const key = `event-${event.robot_id}-${event.boot_id ?? ''}-${event.event_seq ?? ''}-${event.received_at_us}`;
-    const position_sd_m = this.find(event.robot_id)?.position_sd_m() ?? null;
+    const { kind, boot_id, robot_time_us } = event;
+    const heard_sd_m = this.find(event.robot_id)?.position_sd_m_at(boot_id, robot_time_us) ?? null;
+    const position_sd_m = kind === 'position_zeroed' ? null : heard_sd_m; // that was of the place before
     return { key, at_ms: event.received_at_us / 1000, robot_id: event.robot_id, event, command: null, note: null, position_sd_m };
   }
 

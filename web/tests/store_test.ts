@@ -118,6 +118,26 @@ test('a robot that was sent something stays selected, also one that was never co
   expect(store.selected_id.value).toBe('a');
 });
 
+const event_at = (robot_time_us: number, change: Partial<EventRecord> = {}) =>
+  ({ robot_id: 'rheo-1', boot_id: '11', event_seq: robot_time_us, robot_time_us, kind: 'mode_changed', position_m: 0.1, received_at_us: 9, ...change }) as EventRecord;
+
+test('the position of an event has the ± of its own moment, or none', () => {
+  const { store } = store_with(robot('rheo-1', { boot_id: '11', latest_robot_time_us: 0, position_sd_m: 0.02 }));
+  const sd_of = (event: EventRecord) => {
+    store.hear({ type: 'event', event });
+    store.refresh();
+    return store.log.value[0]?.position_sd_m;
+  };
+  expect(sd_of(event_at(100_000))).toBe(0.02); // of the state, before samples come
+  store.hear(batch(1000, 5, { position_sd_m: 0.03 })); // to 10.04 s
+  expect(sd_of(event_at(10_100_000))).toBe(0.03);
+  expect(sd_of(event_at(4_000_000))).toBeNull();
+  expect(sd_of(event_at(10_050_000, { boot_id: '10' }))).toBeNull();
+  expect(sd_of(event_at(10_060_000, { kind: 'position_zeroed', position_m: 0 }))).toBeNull();
+  store.hear(batch(1005, 5, { position_sd_m: 0 })); // a perfect sensor
+  expect(sd_of(event_at(10_110_000))).toBe(0);
+});
+
 test('the log keeps the last lines, newest first, and a command has one line that changes', () => {
   const { store } = store_with(robot('rheo-1'));
   const command = (n: number, state: CommandRecord['state']) =>

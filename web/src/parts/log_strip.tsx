@@ -32,7 +32,7 @@ function Line({ line }: { line: LogLine }) {
   );
 }
 
-function describe({ event, command, note, position_sd_m }: LogLine): [tone: string, sort: string, text: string] {
+export function describe({ event, command, note, position_sd_m }: LogLine): [tone: string, sort: string, text: string] {
   if (command) {
     const refused = ['rejected', 'expired', 'failed', 'unknown'].includes(command.state);
     const alarm = command.kind === 'emergency_stop';
@@ -47,7 +47,8 @@ function describe({ event, command, note, position_sd_m }: LogLine): [tone: stri
     const of_latch = event.kind === 'emergency' ? event.emergency_cause : null;
     const cause = [of_latch ?? event.cause].filter((said) => said && said !== 'none').map((said) => ` · ${words(said)}`).join('');
     const detail = event.detail ? ` · ${event.detail}` : '';
-    const at = event.position_m !== null ? ` · controller at ${millimetres(event.position_m)} ${plus_minus(position_sd_m)} mm` : '';
+    const spread = position_sd_m === null ? '' : ` ${plus_minus(position_sd_m)}`;
+    const at = event.position_m !== null ? ` · controller at ${millimetres(event.position_m)}${spread} mm` : '';
     return [alarm ? 'alarm' : /lost|fault|limit|lapsed/.test(event.kind) ? 'caution' : '', 'event', words(event.kind) + much + where + cause + detail + at];
   }
   return ['quiet', 'page', note ?? ''];

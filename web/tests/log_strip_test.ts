@@ -1,0 +1,20 @@
+// How a line of the log reads.
+import { expect, test } from 'vitest';
+import type { EventRecord } from '../src/api';
+import { describe } from '../src/parts/log_strip';
+
+const line = (event: Partial<EventRecord>, position_sd_m: number | null = null) =>
+  describe({
+    key: '',
+    at_ms: 0,
+    robot_id: 'rheo-1',
+    event: { cause: 'none', emergency_cause: null, detail: '', position_m: null, value: null, ...event } as EventRecord,
+    command: null,
+    note: null,
+    position_sd_m,
+  });
+
+test('a position has a ± only where one is known', () => {
+  expect(line({ kind: 'mode_changed', mode: 'manual', position_m: 0.1 }, 0.002)[2]).toContain('controller at 100.0 ± 4.0 mm');
+  expect(line({ kind: 'position_zeroed', position_m: 0 })[2]).toContain('controller at 0.0 mm');
+});
