@@ -39,5 +39,11 @@ export const kReasons: Record<string, string> = {
   no_credential: 'This page is signed out.',
 };
 
+// What helps after an event that ends motion for a reason that nobody sees.
+export const kWaysOut: Record<string, string> = {
+  position_uncertain:
+    'A position limit is nearer than the position is known. Turn round, or bring the robot to a known place and press “Zero position”.',
+};
+
 // An identifier of a refusal as a sentence.
 export const sentence = (reason: string) => kReasons[reason] ?? reason.replaceAll('_', ' ');

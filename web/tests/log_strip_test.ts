@@ -1,4 +1,4 @@
-// How a line of the log reads.
+// How a line of the log reads, and which ones stand out.
 import { expect, test } from 'vitest';
 import type { EventRecord } from '../src/api';
 import { describe } from '../src/parts/log_strip';
@@ -13,6 +13,17 @@ const line = (event: Partial<EventRecord>, position_sd_m: number | null = null) 
     note: null,
     position_sd_m,
   });
+
+test('a position that is not known well enough stands out, and names the way out as its button does', () => {
+  const [tone, , text] = line({ kind: 'position_uncertain', cause: 'limit' });
+  expect(tone).toBe('caution');
+  expect(text).toContain('“Zero position”');
+});
+
+test('a model that does not fit stands out; its end does not', () => {
+  expect(line({ kind: 'model_mismatch' })[0]).toBe('caution');
+  expect(line({ kind: 'model_mismatch_ended' })[0]).toBe('');
+});
 
 test('a position has a ± only where one is known', () => {
   expect(line({ kind: 'mode_changed', mode: 'manual', position_m: 0.1 }, 0.002)[2]).toContain('controller at 100.0 ± 4.0 mm');

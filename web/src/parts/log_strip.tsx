@@ -1,7 +1,7 @@
 // The last events and commands, newest first.
 
 import { clock_time, millimetres, percent, plus_minus, words } from '../format';
-import { sentence } from '../reasons';
+import { kWaysOut, sentence } from '../reasons';
 import type { Session } from '../session';
 import type { LogLine } from '../store';
 
@@ -49,7 +49,9 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
     const detail = event.detail ? ` · ${event.detail}` : '';
     const spread = position_sd_m === null ? '' : ` ${plus_minus(position_sd_m)}`;
     const at = event.position_m !== null ? ` · controller at ${millimetres(event.position_m)}${spread} mm` : '';
-    return [alarm ? 'alarm' : /lost|fault|limit|lapsed/.test(event.kind) ? 'caution' : '', 'event', words(event.kind) + much + where + cause + detail + at];
+    const way_out = kWaysOut[event.kind] ? ` · ${kWaysOut[event.kind]}` : '';
+    const caution = /lost|fault|limit|lapsed|uncertain|mismatch$/.test(event.kind);
+    return [alarm ? 'alarm' : caution ? 'caution' : '', 'event', words(event.kind) + much + where + cause + detail + at + way_out];
   }
   return ['quiet', 'page', note ?? ''];
 }
