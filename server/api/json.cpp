@@ -135,6 +135,14 @@ Result<std::int64_t> Members::integer(const char* name, std::int64_t minimum, st
   return value.get<std::int64_t>();
 }
 
+Result<void> Members::time(const char* name, std::optional<std::int64_t>& into) const {
+  if (!has(name)) return {};
+  const auto time_us = integer(name, 0, std::numeric_limits<std::int64_t>::max());
+  if (!time_us) return std::unexpected{time_us.error()};
+  into = *time_us;
+  return {};
+}
+
 Result<std::uint64_t> Members::id(const char* name) const {
   if (!has(name)) return missing(name);
   const json& value = object_.at(name);

@@ -13,6 +13,7 @@
 #include "server/live/state_json.hpp"
 #include "server/recording/history.hpp"
 #include "server/result.hpp"
+#include "server/station/in_force.hpp"
 #include "server/station/station.hpp"
 
 namespace server {
@@ -38,6 +39,7 @@ class Members {
   Result<float> number_as_float(const char* name) const;
   Result<std::int64_t> integer(const char* name, std::int64_t minimum, std::int64_t maximum) const;
   Result<std::uint64_t> id(const char* name) const;
+  Result<void> time(const char* name, std::optional<std::int64_t>& into) const;  // left out: none
 
   const nlohmann::json& object() const { return object_; }
 
@@ -51,13 +53,12 @@ struct ParsedCommand {
   microseconds life{2'000'000};
   std::optional<std::int64_t> stamp_us;      // of /live: the station's steady time, as the page last heard it
   std::optional<std::int64_t> issued_at_us;  // UTC
+  bool is_confirmed = false;                 // its sender says that motion may be bounded otherwise
 };
 
 // The body of POST …/commands, e.g. {"kind":"set_setpoint","setpoint_m":0.1,"life_ms":2000}.
-Result<ParsedCommand> parse_command(const std::string& body);
-
-// Of the robot's parameters, those that bound its motion: only an admin changes them, and says that they mean it.
-bool bounds_motion(const std::string& parameter);
+// `in_force`: the robot's controller, from which a new one has what its body leaves out; null: not known.
+Result<ParsedCommand> parse_command(const std::string& body, const protocol::Controller* in_force = nullptr);
 
 struct ParsedControl {
   ControlRequest request;                // robot and actor are left empty

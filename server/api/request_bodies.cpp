@@ -1,4 +1,4 @@
-// Reads the bodies of requests: commands, runs, markers.
+// Reads the bodies of requests: control, runs, markers.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,127 +13,6 @@ using nlohmann::json;
 
 constexpr std::size_t kMaxNameBytes = 200;
 constexpr std::size_t kMaxTextBytes = 4000;
-constexpr std::int64_t kMaxLifeMs = protocol::kMaxCommandLifeUs / 1000;
-
-Result<void> read_set_mode(const Members& body, protocol::Command& action) {
-  if (auto known = body.only({"mode", "setpoint_m"}); !known) return known;
-  const auto mode = body.text("mode", 0, kMaxTextBytes);
-  if (!mode) return std::unexpected{mode.error()};
-  action.which_action = rheonaut_Command_set_mode_tag;
-  auto& set_mode = action.action.set_mode;
-  if (*mode == "manual") {
-    set_mode.mode = rheonaut_MODE_MANUAL;
-    if (!body.has("setpoint_m")) return {};
-    return fail(ErrorCode::bad_request, "setpoint_m is not known here: mode manual takes none", "unknown_member");
-  }
-  if (*mode != "auto") {
-    return fail(ErrorCode::invalid, fmt::format("mode = '{}' is neither manual nor auto", mode->substr(0, 40)),
-                "out_of_range");
-  }
-  const auto setpoint_m = body.number_as_float("setpoint_m");
-  if (!setpoint_m) return std::unexpected{setpoint_m.error()};
-  set_mode.mode = rheonaut_MODE_AUTO;
-  set_mode.has_setpoint_m = true;
-  set_mode.setpoint_m = *setpoint_m;
-  return {};
-}
-
-Result<void> read_float(const Members& body, const char* name, float& into) {
-  if (auto known = body.only({name}); !known) return known;
-  const auto value = body.number_as_float(name);
-  if (!value) return std::unexpected{value.error()};
-  into = *value;
-  return {};
-}
-
-Result<void> read_set_setpoint(const Members& body, protocol::Command& action) {
-  action.which_action = rheonaut_Command_set_setpoint_tag;
-  return read_float(body, "setpoint_m", action.action.set_setpoint.setpoint_m);
-}
-
-Result<void> read_inject_disturbance(const Members& body, protocol::Command& action) {
-  action.which_action = rheonaut_Command_inject_disturbance_tag;
-  return read_float(body, "disturbance_m", action.action.inject_disturbance.disturbance_m);
-}
-
-Result<void> read_lease(const Members& body, std::uint32_t& lease_ms) {
-  if (!body.has("lease_ms")) return {};
-  const auto value = body.integer("lease_ms", 1, protocol::kLeaseMs);
-  if (!value) return std::unexpected{value.error()};
-  lease_ms = static_cast<std::uint32_t>(*value);
-  return {};
-}
-
-Result<void> read_set_duty(const Members& body, protocol::Command& action) {
-  if (auto known = body.only({"duty", "lease_ms"}); !known) return known;
-  const auto duty = body.number_as_float("duty");
-  if (!duty) return std::unexpected{duty.error()};
-  action.which_action = rheonaut_Command_set_duty_tag;
-  action.action.set_duty.duty = *duty;
-  return read_lease(body, action.action.set_duty.lease_ms);
-}
-
-Result<void> read_renew_lease(const Members& body, protocol::Command& action) {
-  if (auto known = body.only({"lease_ms"}); !known) return known;
-  action.which_action = rheonaut_Command_renew_lease_tag;
-  return read_lease(body, action.action.renew_lease.lease_ms);
-}
-
-Result<void> read_clear_emergency(const Members& body, protocol::Command& action) {
-  if (auto known = body.only({"emergency_id"}); !known) return known;
-  const auto id = body.id("emergency_id");
-  if (!id) return std::unexpected{id.error()};
-  action.which_action = rheonaut_Command_clear_emergency_tag;
-  action.action.clear_emergency.emergency_id = *id;
-  return {};
-}
-
-// SAFETY: what bounds motion is not changed by the way: see bounds_motion.
-Result<void> read_set_parameter(const Members& body, protocol::Command& action) {
-  if (auto known = body.only({"name", "value", "confirm"}); !known) return known;
-  action.which_action = rheonaut_Command_set_parameter_tag;
-  auto& set_parameter = action.action.set_parameter;
-  const auto name = body.text("name", 1, sizeof set_parameter.name - 1);
-  if (!name) return std::unexpected{name.error()};
-  const auto value = body.number_as_float("value");
-  if (!value) return std::unexpected{value.error()};
-  name->copy(set_parameter.name, sizeof set_parameter.name - 1);
-  set_parameter.value = *value;
-  if (!bounds_motion(*name)) {
-    if (!body.has("confirm")) return {};
-    return fail(ErrorCode::bad_request, "confirm goes only with parameters that bound motion", "unknown_member");
-  }
-  if (body.has("confirm") && body.object().at("confirm") == json(true)) return {};
-  return fail(ErrorCode::invalid,
-              fmt::format("the parameter {} bounds motion; send \"confirm\": true to change it all the same", *name),
-              "confirm_required");
-}
-
-Result<void> read_zero_position(const Members& body, protocol::Command& action) {
-  action.which_action = rheonaut_Command_zero_position_tag;
-  return body.only({});
-}
-
-Result<void> read_ping(const Members& body, protocol::Command& action) {
-  action.which_action = rheonaut_Command_ping_tag;
-  return body.only({});
-}
-
-struct Kind {
-  const char* name;
-  Result<void> (*read)(const Members& body, protocol::Command& action);
-};
-constexpr Kind kKinds[] = {
-    {"set_mode", read_set_mode},
-    {"set_setpoint", read_set_setpoint},
-    {"set_duty", read_set_duty},
-    {"renew_lease", read_renew_lease},
-    {"clear_emergency", read_clear_emergency},
-    {"inject_disturbance", read_inject_disturbance},
-    {"set_parameter", read_set_parameter},
-    {"zero_position", read_zero_position},
-    {"ping", read_ping},
-};
 
 Result<void> read_text(const Members& body, const char* name, std::string& into) {
   if (!body.has(name)) return {};
@@ -166,52 +45,7 @@ Result<RecordedRange> read_range(const json& value) {
   return TimeSpan{*from_us, *to_us};
 }
 
-Result<void> read_time(const Members& body, const char* name, std::optional<std::int64_t>& into) {
-  if (!body.has(name)) return {};
-  const auto time_us = body.integer(name, 0, std::numeric_limits<std::int64_t>::max());
-  if (!time_us) return std::unexpected{time_us.error()};
-  into = *time_us;
-  return {};
-}
-
 }  // namespace
-
-bool bounds_motion(const std::string& parameter) {
-  constexpr const char* kBounds[] = {"auto_limit_s",         "setpoint_limit_m",     "link_timeout_ms",
-                                     "position_limit_min_m", "position_limit_max_m", "power_limit_duty",
-                                     "power_limit_s",        "link_loss_action",     "link_loss_limit_s"};
-  return std::ranges::find(kBounds, parameter) != std::end(kBounds);
-}
-
-Result<ParsedCommand> parse_command(const std::string& text) {
-  const auto body = Members::parse(text, {});
-  if (!body) return std::unexpected{body.error()};
-  const auto kind = body->text("kind", 0, kMaxTextBytes);
-  if (!kind) return std::unexpected{kind.error()};
-  const auto* known = std::ranges::find_if(kKinds, [&kind](const Kind& one) { return *kind == one.name; });
-  if (known == std::end(kKinds)) {
-    return fail(ErrorCode::invalid, fmt::format("unknown command kind '{}'", kind->substr(0, 40)), "unknown_kind");
-  }
-  ParsedCommand command;
-  if (body->has("life_ms")) {
-    const auto life_ms = body->integer("life_ms", 1, kMaxLifeMs);
-    if (!life_ms) return std::unexpected{life_ms.error()};
-    command.life = std::chrono::milliseconds{*life_ms};
-  }
-  if (auto read = read_time(*body, "stamp_us", command.stamp_us); !read) return std::unexpected{read.error()};
-  if (auto read = read_time(*body, "issued_at_us", command.issued_at_us); !read) return std::unexpected{read.error()};
-  if (command.stamp_us && command.issued_at_us) {
-    return fail(ErrorCode::bad_request, "stamp_us and issued_at_us say the same in two ways; send one of them",
-                "malformed");
-  }
-  json arguments = body->object();
-  for (const char* of_all : {"kind", "life_ms", "stamp_us", "issued_at_us"}) arguments.erase(of_all);
-  command.arguments = dump(arguments);
-  command.action = rheonaut_Command_init_zero;
-  const Members action{std::move(arguments)};
-  if (auto read = known->read(action, command.action); !read) return std::unexpected{read.error()};
-  return command;
-}
 
 Result<ParsedControl> parse_control(const std::string& text) {
   const auto body = Members::parse(text, {"action", "lease_ms", "reason", "stamp_us"});
@@ -236,7 +70,7 @@ Result<ParsedControl> parse_control(const std::string& text) {
   if (body->has("stamp_us") && request.action != ControlAction::take && !is_forced) {
     return fail(ErrorCode::bad_request, "stamp_us goes with take and force only", "unknown_member");
   }
-  if (auto read = read_time(*body, "stamp_us", control.stamp_us); !read) return std::unexpected{read.error()};
+  if (auto read = body->time("stamp_us", control.stamp_us); !read) return std::unexpected{read.error()};
   if (body->has("lease_ms")) {
     if (request.action != ControlAction::take) {
       return fail(ErrorCode::bad_request, "lease_ms goes with take only", "unknown_member");

@@ -166,21 +166,56 @@ Response refused(ApiParts& parts, const Request& request, const char* what, cons
   return problem(error);
 }
 
-// SAFETY: the limits of a robot's motion are changed by admins alone.
-Result<void> may_set_parameter(const Caller& caller, const protocol::Command& action) {
-  if (action.which_action != rheonaut_Command_set_parameter_tag) return {};
-  const std::string name = action.action.set_parameter.name;
-  if (!bounds_motion(name) || caller.scopes.allow(Scope::admin)) return {};
-  return fail(ErrorCode::forbidden,
-              fmt::format("the parameter {} bounds motion; to change it needs the role admin", name), "not_permitted");
+// Whether the controller that comes into force has more of the motor than the one in force; also when that is not
+// known.
+bool widens_duty(const protocol::Controller* next, const protocol::Controller* in_force) {
+  if (next == nullptr || in_force == nullptr) return true;
+  return next->duty_min < in_force->duty_min || next->duty_max > in_force->duty_max;
+}
+
+// What of a robot's motion the command bounds otherwise, in words; empty: nothing.
+std::string bounded_by(const ParsedCommand& command, const RobotSettings* known) {
+  const protocol::Command& action = command.action;
+  const bool is_current = known != nullptr && known->is_controller_current;
+  const protocol::Controller* in_force = is_current ? &*known->controller : nullptr;
+  switch (action.which_action) {
+    case rheonaut_Command_set_parameter_tag: {
+      const std::string name = action.action.set_parameter.name;
+      return bounds_motion(name) ? fmt::format("the parameter {} bounds motion", name) : "";
+    }
+    case rheonaut_Command_set_controller_tag:
+      if (!widens_duty(&action.action.set_controller, in_force)) return "";
+      return in_force == nullptr ? "the duty range of the controller in force is not known"
+                                 : fmt::format("its duty range is wider than {} to {}, that of the controller in force",
+                                               in_force->duty_min, in_force->duty_max);
+    case rheonaut_Command_restore_controller_tag: {
+      const bool knows_former = is_current && known->controller_before.has_value();
+      if (!widens_duty(knows_former ? &*known->controller_before : nullptr, in_force)) return "";
+      return "the controller that comes back may have a wider duty range than the one in force";
+    }
+    default: return "";
+  }
+}
+
+// SAFETY: the limits of a robot's motion are changed by admins alone, and never by the way.
+Result<void> may_bound_motion(const Caller& caller, const ParsedCommand& command, const RobotSettings* known) {
+  const std::string what = bounded_by(command, known);
+  if (what.empty()) return {};
+  if (!caller.scopes.allow(Scope::admin)) {
+    return fail(ErrorCode::forbidden, what + "; to change it needs the role admin", "not_permitted");
+  }
+  if (command.is_confirmed) return {};
+  return fail(ErrorCode::invalid, what + "; send \"confirm\": true to change it all the same", "confirm_required");
 }
 
 Answer submit_command(ApiParts& parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
-  auto parsed = parse_command(request.body);
+  const RobotSettings* settings = parts.station.settings(id);
+  const bool has_controller = settings != nullptr && settings->is_controller_current;
+  auto parsed = parse_command(request.body, has_controller ? &*settings->controller : nullptr);
   if (!parsed) co_return refused(parts, request, "command", parsed.error());
-  if (auto may = may_set_parameter(request.caller, parsed->action); !may) {
+  if (auto may = may_bound_motion(request.caller, *parsed, settings); !may) {
     co_return refused(parts, request, "command", may.error());
   }
   auto key = key_of(request);

@@ -75,6 +75,13 @@ json to_json(const ControlState& control) {
           {"wished_by", control.wished_by.empty() ? json(nullptr) : json(control.wished_by)}};
 }
 
+json to_json(const ChangedLimit& limit) {
+  return {{"name", limit.name},
+          {"unit", limit.unit},
+          {"value", decimal(limit.value)},
+          {"default", decimal(limit.default_value)}};
+}
+
 json to_json(const RobotState& robot) {
   const SampleContext& context = robot.context;
   json out;
@@ -109,6 +116,8 @@ json to_json(const RobotState& robot) {
   out["pending_stop"] = id_text(robot.pending_stop.value_or(0));
   out["retired"] = robot.retired_at_us != 0;
   out["fluid"] = robot.fluid.empty() ? json(nullptr) : json(robot.fluid);
+  out["changed_limits"] = json::array();
+  for (const ChangedLimit& limit : robot.changed_limits) out["changed_limits"].push_back(to_json(limit));
   out["invalid_values"] = robot.invalid_values;
   out["unknown_values"] = object_or_null(UnknownValues{}
                                              .add("reset_cause", robot.reset_cause)

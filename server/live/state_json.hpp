@@ -15,6 +15,7 @@ nlohmann::json to_json(const RobotState& robot);
 nlohmann::json to_json(const Sample& sample);
 nlohmann::json to_json(const CommandRecord& record);
 nlohmann::json to_json(const ControlState& control);
+nlohmann::json to_json(const ChangedLimit& limit);
 nlohmann::json to_json(const RobotEvent& event);
 
 // The message `samples` of /live as text. Its columns are written without a JSON tree, since it is made often.

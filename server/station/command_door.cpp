@@ -21,6 +21,19 @@ CommandId random_id() {
   return id;
 }
 
+// A robot refuses what would come after the command's life.
+Result<void> check_time(const PendingCommand& pending, const RobotState& robot) {
+  const protocol::Command& wire = pending.wire;
+  if (!wire.has_execute_at_robot_us || wire.execute_at_robot_us <= wire.valid_until_robot_us) return {};
+  return fail(
+      ErrorCode::invalid,
+      fmt::format("execute_at_robot_us = {} lies {} ms after the end of the command's life, which is counted in "
+                  "the time of robot '{}', now at least {}; life_ms must reach it",
+                  wire.execute_at_robot_us, (wire.execute_at_robot_us - wire.valid_until_robot_us) / 1000 + 1, robot.id,
+                  robot.latest_robot_time_us),
+      "out_of_range");
+}
+
 }  // namespace
 
 const char* text(CommandState value) {
@@ -127,13 +140,21 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
     co_return pending->record;
   }
   if (auto seen = check_sight(request); !seen) co_return refuse(request, seen.error());
+  if (auto reached = check_time(*pending, *seat.robot); !reached) co_return refuse(request, reached.error());
   supersede_queued(seat, *pending);
-  if (!seat.port->send(pending->wire, pending->deadline_us)) {
+  // SAFETY: what waits on the robot for whoever was in control before is dropped ahead of this command, or it is not
+  // sent.
+  const bool is_clear = !needs_control(request.action) || drop_timed_of_former(seat);
+  if (!is_clear || !seat.port->send(pending->wire, pending->deadline_us)) {
     Error full{ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),
                "queue_full"};
     co_return refuse(request, std::move(full));
   }
   use_control(request);  // SAFETY: what was refused, also by a full queue, or came too late, takes no control
+  if (pending->wire.has_execute_at_robot_us) {
+    seat.timed_by = request.actor;
+    seat.timed_until_robot_us = std::max(seat.timed_until_robot_us, pending->wire.execute_at_robot_us);
+  }
   add_pending(seat, pending);
   publish(pending->record);
   co_return co_await follow(pending, request.until_verified, patience);
@@ -168,9 +189,10 @@ void Station::add_pending(Seat& seat, const std::shared_ptr<PendingCommand>& pen
 void Station::supersede_queued(Seat& seat, const PendingCommand& newer) {
   const auto kind = newer.wire.which_action;
   if (kind != rheonaut_Command_set_setpoint_tag && kind != rheonaut_Command_set_duty_tag) return;
+  if (newer.wire.has_execute_at_robot_us) return;  // each at its time
   std::vector<CommandId> older;
   for (const auto& [id, pending] : seat.commands) {
-    const bool waits = pending->record.state == CommandState::queued;
+    const bool waits = pending->record.state == CommandState::queued && !pending->wire.has_execute_at_robot_us;
     if (waits && pending->wire.which_action == kind && seat.port->withdraw(id)) older.push_back(id);
   }
   for (const CommandId id : older) finish(seat, id, CommandState::superseded, "by_a_newer_command");

@@ -1,6 +1,7 @@
 // How commands end: answered by the robot, seen in telemetry, expired, overtaken.
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "server/station/seat.hpp"
@@ -11,7 +12,7 @@ namespace server {
 namespace {
 
 constexpr microseconds kAckGrace{1'000'000};   // an answer may come this much after the life ended
-constexpr microseconds kSeenGrace{5'000'000};  // telemetry may come so much after the answer
+constexpr microseconds kSeenGrace{5'000'000};  // what shows the effect may come so much after it
 constexpr std::size_t kMaxUnseen = 64;
 
 }  // namespace
@@ -35,7 +36,7 @@ void Station::on_command_ack(RobotPort& port, const protocol::CommandAck& ack) {
   if (seat == nullptr) return;
   const auto entry = seat->commands.find(ack.command_id);
   const auto pending = entry == seat->commands.end() ? reopen(*seat, ack.command_id) : entry->second;
-  if (pending == nullptr) return;  // ended already
+  if (pending == nullptr) return end_dropped(*seat, ack);
   CommandRecord& record = pending->record;
   record.effect_at_robot_us = ack.effect_at_robot_us;
   record.emergency_id = ack.emergency_id;
@@ -69,27 +70,36 @@ void Station::acknowledge(Seat& seat, CommandId id, std::string reason) {
   CommandRecord& record = pending->record;
   record.acknowledged_after_us = clock_.steady_us() - pending->received_us;
   if (pending->is_timed) stop_times_.acknowledged.add(record.acknowledged_after_us);
-  if (is_for_the_motor(pending->wire)) {
-    for (const auto& older : seat.unseen) older->is_overtaken = older->is_overtaken || is_for_the_motor(older->wire);
-  }
+  if (id == seat.drop_timed_id) seat.drop_timed_id = 0;
   // What was answered before, now again, says no time.
   const bool has_time = record.effect_at_robot_us != 0;
   pending->look_from_robot_us = has_time ? record.effect_at_robot_us : seat.robot->latest_robot_time_us;
+  if (is_for_the_motor(pending->wire)) {
+    for (const auto& other : seat.unseen) {  // a timed one may come later than one that was acknowledged after it
+      PendingCommand& earlier = other->look_from_robot_us <= pending->look_from_robot_us ? *other : *pending;
+      earlier.is_overtaken = earlier.is_overtaken || is_for_the_motor(earlier.wire);
+    }
+  }
   // What took effect before this connection may be shown by samples that come after the live ones: their silence says
   // nothing.
   const bool is_of_earlier_connection = pending->look_from_robot_us < seat.connected_at_robot_us;
-  if (!can_be_seen(pending->wire) || is_of_earlier_connection) {
+  const bool has_to_be_read = is_read_back(pending->wire);
+  const bool can_be_verified = has_to_be_read || can_be_seen(pending->wire);
+  if (!can_be_verified || is_of_earlier_connection) {
     return end(*pending, CommandState::acknowledged, std::move(reason));
   }
+  const std::int64_t waits_us = static_cast<std::int64_t>(pending->look_from_robot_us) - robot_now_us(*seat.robot);
+  pending->seen_until_us = std::max(pending->received_us, clock_.steady_us() + waits_us) + kSeenGrace.count();
   record.state = CommandState::acknowledged;
   record.reason = std::move(reason);
   if (pending->has_key) recent_.put(record, clock_.steady_us());
   publish(record);
-  if (seat.unseen.size() >= kMaxUnseen) {
-    end(*seat.unseen.front(), CommandState::acknowledged, "not_looked_for");
-    seat.unseen.pop_front();
+  auto& waiting = has_to_be_read ? seat.unread : seat.unseen;
+  if (waiting.size() >= kMaxUnseen) {
+    end(*waiting.front(), CommandState::acknowledged, "not_looked_for");
+    waiting.pop_front();
   }
-  seat.unseen.push_back(pending);
+  waiting.push_back(pending);
   pending->answered.notify();
 }
 
@@ -136,12 +146,43 @@ void Station::look_for_commands(Seat& seat, const SampleBatch& batch) {
   });
 }
 
+// What the robot says is in force: the commands that have waited for it.
+void Station::settle_read_back(Seat& seat, const std::function<Sight(const protocol::Command&)>& sight_of) {
+  std::erase_if(seat.unread, [this, &sight_of](const std::shared_ptr<PendingCommand>& pending) {
+    CommandRecord& record = pending->record;
+    const Sight sight = sight_of(pending->wire);
+    if (sight == Sight::unseen) return false;
+    if (sight == Sight::seen) {
+      record.verified_after_us = clock_.steady_us() - pending->received_us;
+      end(*pending, CommandState::verified, record.reason);
+    } else {
+      spdlog::error("robot '{}' says after {} {} what it was not told", record.robot_id, record.kind, record.arguments);
+      end(*pending, CommandState::failed, "read_back_differs");
+    }
+    return true;
+  });
+}
+
+// A timed command that was acknowledged when it was taken in, and of which nothing came.
+void Station::end_dropped(Seat& seat, const protocol::CommandAck& ack) {
+  const auto found = std::ranges::find(seat.unseen, ack.command_id, [](const auto& one) { return one->record.id; });
+  if (found == seat.unseen.end() || !(*found)->wire.has_execute_at_robot_us) return;
+  const bool was_rejected = ack.result == rheonaut_COMMAND_RESULT_REJECTED;
+  if (!was_rejected && ack.result != rheonaut_COMMAND_RESULT_EXPIRED) return;
+  const auto pending = *found;
+  seat.unseen.erase(found);
+  end(*pending, was_rejected ? CommandState::rejected : CommandState::expired,
+      was_rejected ? text_or_number(ack.reason) : "expired");
+}
+
 void Station::end_unseen(Seat& seat, const char* reason) {
-  for (const auto& pending : std::exchange(seat.unseen, {})) end(*pending, CommandState::acknowledged, reason);
+  for (auto* waiting : {&seat.unseen, &seat.unread}) {
+    for (const auto& pending : std::exchange(*waiting, {})) end(*pending, CommandState::acknowledged, reason);
+  }
 }
 
 void Station::expire_commands(Seat& seat) {
-  if (seat.commands.empty() && seat.unseen.empty()) return;
+  if (seat.commands.empty() && seat.unseen.empty() && seat.unread.empty()) return;
   const std::int64_t now_us = clock_.steady_us();
   std::vector<CommandId> expired;
   for (const auto& [id, pending] : seat.commands) {
@@ -153,10 +194,15 @@ void Station::expire_commands(Seat& seat) {
     const bool was_sent = seat.commands.at(id)->record.state == CommandState::sent;
     was_sent ? end_without_answer(seat, id, "no_answer") : finish(seat, id, CommandState::expired, "not_sent_in_time");
   }
-  while (!seat.unseen.empty() && now_us - seat.unseen.front()->received_us >= kSeenGrace.count()) {
-    end(*seat.unseen.front(), CommandState::acknowledged, "no_telemetry");
-    seat.unseen.pop_front();
-  }
+  const auto give_up = [this, now_us](auto& waiting, const char* reason) {
+    std::erase_if(waiting, [this, now_us, reason](const std::shared_ptr<PendingCommand>& pending) {
+      if (now_us < pending->seen_until_us) return false;
+      end(*pending, CommandState::acknowledged, reason);
+      return true;
+    });
+  };
+  give_up(seat.unseen, "no_telemetry");
+  give_up(seat.unread, "no_read_back");
 }
 
 }  // namespace server

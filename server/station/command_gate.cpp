@@ -85,6 +85,11 @@ Result<void> check_values(const protocol::Command& command, const RobotState& ro
       return checked && robot.sample ? check_power(robot.sample->duty, 0, robot, limits) : checked;
     }
     case rheonaut_Command_set_duty_schedule_tag: return check_schedule(command.action.set_duty_schedule, robot, limits);
+    case rheonaut_Command_set_controller_tag: {
+      const auto& controller = command.action.set_controller;
+      auto checked = within("duty_min", controller.duty_min, limits.duty_min, 0);
+      return checked ? within("duty_max", controller.duty_max, 0, limits.duty_max) : checked;
+    }
     case rheonaut_Command_inject_disturbance_tag:
       return within("disturbance_m", command.action.inject_disturbance.disturbance_m, -limits.disturbance_max_m,
                     limits.disturbance_max_m);

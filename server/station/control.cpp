@@ -15,6 +15,7 @@ constexpr microseconds kMs{1000};
 constexpr microseconds kWatchInterval{200'000};
 constexpr std::size_t kMaxToldBytes = 300;
 constexpr std::size_t kMaxNameBytes = 40;
+constexpr std::uint64_t kDueGraceUs = 200'000;  // after its time a timed command has run or is dropped
 
 const char* text(ControlAction action) {
   switch (action) {
@@ -58,7 +59,38 @@ Result<std::optional<Authority::Change>> change_control(Authority& authority, co
 
 }  // namespace
 
+// SAFETY: nothing that waits on the robot outlives the control of whoever sent it. Sent before anything of whoever
+// comes next, on a link that keeps the order. False: there is no room for it on the link, so nobody else's command may
+// follow.
+bool Station::drop_timed_of_former(Seat& seat) {
+  RobotState& robot = *seat.robot;
+  const bool may_wait = !seat.timed_by.empty() && robot.latest_robot_time_us <= seat.timed_until_robot_us + kDueGraceUs;
+  const bool is_left = may_wait && authority_.of(robot.id).holder != seat.timed_by;
+  const bool is_lost = seat.drop_timed_id != 0 && !seat.commands.contains(seat.drop_timed_id);
+  if ((!is_left && !is_lost) || seat.port == nullptr) return true;
+  std::vector<CommandId> unsent;
+  for (const auto& [id, pending] : seat.commands) {
+    const bool is_timed = pending->wire.has_execute_at_robot_us && pending->record.state == CommandState::queued;
+    if (is_timed && seat.port->withdraw(id)) unsent.push_back(id);
+  }
+  for (const CommandId id : unsent) finish(seat, id, CommandState::superseded, "control_ended");
+  CommandRequest request;
+  request.robot_id = robot.id;
+  request.action.which_action = rheonaut_Command_drop_timed_tag;
+  request.actor = "station:control";
+  request.life = microseconds{protocol::kMaxCommandLifeUs};
+  const auto drop = make_pending(request, robot);
+  if (!seat.port->send(drop->wire, drop->deadline_us)) return false;
+  seat.timed_by.clear();
+  seat.timed_until_robot_us = 0;
+  seat.drop_timed_id = drop->record.id;
+  add_pending(seat, drop);
+  publish(drop->record);
+  return true;
+}
+
 Result<ControlState> Station::control(const ControlRequest& request) {
+  if (const auto seat = seats_.find(request.robot_id); seat != seats_.end()) drop_timed_of_former(seat->second);
   Result<std::optional<Authority::Change>> change =
       fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", request.robot_id), "unknown_robot");
   if (robots_.contains(request.robot_id)) change = change_control(authority_, request);
@@ -125,6 +157,7 @@ void Station::tell(const Authority::Change& change, const std::string& actor, co
   const auto robot = robots_.find(change.robot_id);
   if (robot == robots_.end()) return;
   robot->second.control = authority_.of(change.robot_id);
+  drop_timed_of_former(seats_.at(change.robot_id));
   note(robot->second, change.kind, change.cause);
   AuditNote audit;
   audit.by = {actor, peer, clock_.utc_us()};

@@ -27,6 +27,7 @@ struct PendingCommand {
   std::int64_t seen_after_us = -1;  // sent: from received_us until samples proved that it has run; -1: they did not
   std::uint64_t look_from_robot_us = 0;   // sent, acknowledged: older telemetry shows nothing of it
   std::uint64_t look_until_robot_us = 0;  // sent: nor does telemetry from here on
+  std::int64_t seen_until_us = 0;         // steady; acknowledged: then it is no longer looked for
   bool has_key = false;                   // of the client
   bool is_timed = false;                  // a stop that counts in Station::stop_times()
   bool is_overtaken = false;              // acknowledged, and a later one that moves the motor too
@@ -39,8 +40,9 @@ struct Seat {
   RobotPort* port = nullptr;                                      // null while disconnected
   std::map<CommandId, std::shared_ptr<PendingCommand>> commands;  // that no robot has answered
   std::deque<std::shared_ptr<PendingCommand>> unseen;             // acknowledged, to be seen in telemetry; oldest first
+  std::deque<std::shared_ptr<PendingCommand>> unread;             // acknowledged, to be read back; oldest first
   std::deque<std::shared_ptr<PendingCommand>> unknown;            // of this boot, ended in this state; oldest first
-  ParameterTable parameters;                                      // of the connection
+  RobotSettings settings;                                         // as the robot said last
   std::set<std::string> told_in_force;                            // kinds that the robot has said in the connection
   std::uint64_t connected_at_robot_us = 0;                        // by its hello
   std::uint64_t next_sample_at_robot_us = 0;  // when the robot makes its sample next_seq, as far as it is known
@@ -53,6 +55,10 @@ struct Seat {
   std::uint64_t refusals_untold = 0;    // since
   std::int64_t invalid_told_at_us = 0;  // likewise, of values that cannot be
   std::uint64_t invalid_untold = 0;
+  // Timed commands that may wait on the robot: whose they are (empty: nobody's), and until when one of them may.
+  std::string timed_by;
+  std::uint64_t timed_until_robot_us = 0;
+  CommandId drop_timed_id = 0;  // that drops them, until it is acknowledged; 0: none
 
   // Stops that no robot has acknowledged; the newest, null when there is none, and how many there are.
   std::shared_ptr<PendingCommand> newest_stop() const;

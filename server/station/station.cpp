@@ -65,6 +65,11 @@ void Station::restore(const std::vector<RestoredRobot>& robots, const std::vecto
   for (const CommandRecord& record : pending_stops) restore_stop(record);
 }
 
+const RobotSettings* Station::settings(const RobotId& id) const {
+  const auto seat = seats_.find(id);
+  return seat == seats_.end() ? nullptr : &seat->second.settings;
+}
+
 const RobotState* Station::find(const RobotId& id) const {
   const auto robot = robots_.find(id);
   return robot == robots_.end() ? nullptr : &robot->second;
@@ -134,7 +139,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   if (other_boot) robot.sample.reset();  // at_power_s goes on: the motor has not cooled down
   seat.port = &port;
   port.seat_ = &seat;
-  seat.parameters = ParameterTable{};
+  seat.settings.begin_again();
   seat.told_in_force.clear();
   seat.connected_at_robot_us = seat.next_sample_at_robot_us = hello.robot_time_us;
   seat.latch_known_at_robot_us = hello.robot_time_us;
@@ -156,6 +161,8 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
     seat.clock_sync = ClockSync{};
     seat.clock_recorded = ClockRecord{};
     seat.unknown.clear();  // what the boot before knew of them is gone
+    seat.timed_by.clear();
+    seat.timed_until_robot_us = seat.drop_timed_id = 0;
   }
   robot.context.controller_id = details.controller_id;
   robot.context.mode = details.mode;
@@ -182,6 +189,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
     hand_stop_to(seat, *relatch);
     if (relatch->record.state == CommandState::queued) publish(relatch->record);
   }
+  drop_timed_of_former(seat);
   note(robot, "connected", fmt::format("from {}", peer));
   publish(robot);
 }

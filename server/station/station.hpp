@@ -7,6 +7,7 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -20,6 +21,7 @@
 #include "server/station/authority.hpp"
 #include "server/station/clock_sync.hpp"
 #include "server/station/command_gate.hpp"
+#include "server/station/in_force.hpp"
 #include "server/station/recent_commands.hpp"
 #include "server/station/robot_archive.hpp"
 #include "server/station/robot_port.hpp"
@@ -78,6 +80,7 @@ struct ControlRequest {
 };
 
 struct PendingCommand;
+enum class Sight : std::uint8_t;  // telemetry_verifier.hpp
 
 class Station {
  public:
@@ -92,6 +95,8 @@ class Station {
 
   const std::map<RobotId, RobotState>& robots() const { return robots_; }
   const RobotState* find(const RobotId& id) const;
+  // What the robot has said last of its parameters and controller; null for a robot that is not known.
+  const RobotSettings* settings(const RobotId& id) const;
 
   // The one door. Checks the request, sends it and waits for the robot's answer (acknowledged, rejected, expired,
   // superseded or failed), which comes at most `life` and 2 s later, or with `until_verified` for its end. The record
@@ -192,6 +197,7 @@ class Station {
   Result<void> may_control(const CommandRequest& request) const;
   Result<void> check_sight(const CommandRequest& request) const;
   void use_control(const CommandRequest& request);
+  bool drop_timed_of_former(Seat& seat);
   Result<void> check_request(const CommandRequest& request, const Seat& seat) const;
   Result<std::shared_ptr<PendingCommand>> same_wish(const CommandRequest& request, const Seat& seat);
   boost::asio::awaitable<Result<CommandRecord>> follow(std::shared_ptr<PendingCommand> pending, bool until_verified,
@@ -204,6 +210,8 @@ class Station {
   void expire_commands(Seat& seat);
   void look_for_commands(Seat& seat, const SampleBatch& batch);
   void end_unseen(Seat& seat, const char* reason);
+  void settle_read_back(Seat& seat, const std::function<Sight(const protocol::Command&)>& sight_of);
+  void end_dropped(Seat& seat, const protocol::CommandAck& ack);
   void prepare_proof(Seat& seat, PendingCommand& pending);
   void end_without_answer(Seat& seat, CommandId id, const char* reason);
   static std::shared_ptr<PendingCommand> reopen(Seat& seat, CommandId id);

@@ -138,6 +138,13 @@ struct ControlState {
   bool operator==(const ControlState&) const = default;
 };
 
+// A parameter that bounds the robot's motion and is not at its default.
+struct ChangedLimit {
+  std::string name, unit;
+  float value = 0, default_value = 0;
+  bool operator==(const ChangedLimit&) const = default;
+};
+
 // All that is known of one robot now. Owned by Station; others get const access or a copy.
 struct RobotState {
   RobotId id;
@@ -167,6 +174,7 @@ struct RobotState {
   std::optional<protocol::Status> status;
   ClockEstimate clock;
 
+  std::vector<ChangedLimit> changed_limits;  // as the robot said last
   std::uint64_t invalid_values = 0;  // that its frames had since the station started: not finite, beyond all range
   ControlState control;
   std::optional<CommandId> pending_stop;  // an emergency stop that no robot has acknowledged yet

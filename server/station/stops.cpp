@@ -143,8 +143,11 @@ std::shared_ptr<PendingCommand> Seat::newest_stop() const {
 
 std::shared_ptr<PendingCommand> Seat::on_its_way(CommandId id) const {
   if (const auto sent = commands.find(id); sent != commands.end()) return sent->second;
-  const auto seen = std::ranges::find(unseen, id, [](const auto& pending) { return pending->record.id; });
-  return seen == unseen.end() ? nullptr : *seen;
+  for (const auto* acknowledged : {&unseen, &unread}) {
+    const auto found = std::ranges::find(*acknowledged, id, [](const auto& pending) { return pending->record.id; });
+    if (found != acknowledged->end()) return *found;
+  }
+  return nullptr;
 }
 
 std::size_t Seat::stops() const {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <span>
 
+#include "server/station/in_force.hpp"
+
 namespace server {
 namespace {
 
@@ -23,6 +25,21 @@ std::span<const Sample> samples_from(const SampleBatch& batch, std::uint64_t rob
   return std::span<const Sample>{batch.samples}.subspan(samples_before(batch, robot_time_us));
 }
 
+// The first entry of a schedule that moves the motor; the last when none does.
+std::size_t first_move(const rheonaut_SetDutySchedule& schedule) {
+  std::size_t first = 0;
+  while (first + 1 < schedule.duty_count && schedule.duty[first] == 0.0F) ++first;
+  return first;
+}
+
+// A schedule is seen by its first motion, which comes at a tick of its own.
+std::uint64_t visible_from_us(const protocol::Command& command, std::uint64_t effect_at_robot_us,
+                              std::uint32_t period_us) {
+  if (command.which_action != rheonaut_Command_set_duty_schedule_tag) return effect_at_robot_us;
+  const auto& schedule = command.action.set_duty_schedule;
+  return effect_at_robot_us + std::uint64_t{schedule.tick[first_move(schedule)]} * period_us;
+}
+
 bool is_shown(const protocol::Command& command, std::uint64_t emergency_id, const SampleContext& context,
               std::span<const Sample> samples) {
   const auto has_duty = [samples](float duty) {
@@ -37,6 +54,10 @@ bool is_shown(const protocol::Command& command, std::uint64_t emergency_id, cons
     case rheonaut_Command_set_setpoint_tag:
       return is_auto && context.setpoint_m == command.action.set_setpoint.setpoint_m;
     case rheonaut_Command_set_duty_tag: return !is_auto && has_duty(command.action.set_duty.duty);
+    case rheonaut_Command_set_duty_schedule_tag: {
+      const auto& schedule = command.action.set_duty_schedule;
+      return has_duty(schedule.duty[first_move(schedule)]);
+    }
     case rheonaut_Command_emergency_stop_tag: {
       const bool is_off = std::ranges::any_of(samples, [](const Sample& one) { return one.duty == 0.0F; });
       return context.emergency_id != 0 && is_off;
@@ -62,11 +83,44 @@ bool can_be_seen(const protocol::Command& command) {
     case rheonaut_Command_set_mode_tag:
     case rheonaut_Command_set_setpoint_tag:
     case rheonaut_Command_set_duty_tag:
+    case rheonaut_Command_set_duty_schedule_tag:
     case rheonaut_Command_emergency_stop_tag:
     case rheonaut_Command_clear_emergency_tag:
     case rheonaut_Command_inject_disturbance_tag: return true;
     default: return false;
   }
+}
+
+bool is_read_back(const protocol::Command& command) {
+  switch (command.which_action) {
+    case rheonaut_Command_set_parameter_tag:
+    case rheonaut_Command_get_parameters_tag:
+    case rheonaut_Command_set_controller_tag:
+    case rheonaut_Command_restore_controller_tag: return true;
+    default: return false;
+  }
+}
+
+Sight read_back(const protocol::Command& command, const protocol::ParameterPage& page) {
+  if (page.command_id == 0 || page.command_id != command.command_id) return Sight::unseen;
+  if (command.which_action == rheonaut_Command_get_parameters_tag) {
+    const bool is_asked_for = page.first_index == command.action.get_parameters.first_index;
+    return is_asked_for && page.parameters_count > 0 ? Sight::seen : Sight::missed;
+  }
+  if (command.which_action != rheonaut_Command_set_parameter_tag) return Sight::unseen;
+  const auto& wanted = command.action.set_parameter;
+  const auto* const end = page.parameters + page.parameters_count;
+  const auto* const found =
+      std::find_if(page.parameters, end, [&wanted](const auto& one) { return std::string{one.name} == wanted.name; });
+  return found != end && is_same(found->value, wanted.value) ? Sight::seen : Sight::missed;
+}
+
+Sight read_back(const protocol::Command& command, const protocol::Controller& controller) {
+  if (command.which_action == rheonaut_Command_restore_controller_tag) return Sight::seen;
+  if (command.which_action != rheonaut_Command_set_controller_tag) return Sight::unseen;
+  const protocol::Controller& wanted = command.action.set_controller;
+  if (controller.controller_id != wanted.controller_id) return Sight::unseen;  // the one before it still is in force
+  return is_same(controller, wanted) ? Sight::seen : Sight::missed;
 }
 
 bool is_for_the_motor(const protocol::Command& command) {
@@ -84,13 +138,14 @@ bool is_for_the_motor(const protocol::Command& command) {
 
 Sight look_for(const protocol::Command& command, std::uint64_t effect_at_robot_us, std::uint64_t emergency_id,
                const SampleBatch& batch) {
-  const std::span<const Sample> samples = samples_from(batch, effect_at_robot_us);
+  const std::uint64_t from_us = visible_from_us(command, effect_at_robot_us, batch.context.period_us);
+  const std::span<const Sample> samples = samples_from(batch, from_us);
   if (samples.empty()) return Sight::unseen;
   if (is_shown(command, emergency_id, batch.context, samples)) return Sight::seen;
   const bool is_stop = command.which_action == rheonaut_Command_emergency_stop_tag;
   if (!is_stop && batch.context.emergency_id != emergency_id) return Sight::overtaken;
   const std::uint64_t last_us = batch.first_robot_time_us + (batch.samples.size() - 1) * batch.context.period_us;
-  return last_us >= effect_at_robot_us + kVerifyWindowUs ? Sight::missed : Sight::unseen;
+  return last_us >= from_us + kVerifyWindowUs ? Sight::missed : Sight::unseen;
 }
 
 }  // namespace server

@@ -8,8 +8,11 @@ namespace server {
 // Telemetry of at most this much robot time after the effect must show it.
 inline constexpr std::uint64_t kVerifyWindowUs = 500'000;
 
-// False for what no sample can show: a lease, a ping, the position's zero, a schedule that has its own times.
+// False for what no sample can show: a lease, a ping, the position's zero, what is read back.
 bool can_be_seen(const protocol::Command& command);
+
+// True for what the robot itself says after it: a page of parameters, the controller in force.
+bool is_read_back(const protocol::Command& command);
 
 // True when the robot's motor may run differently after it: another one of these takes its place.
 bool is_for_the_motor(const protocol::Command& command);
@@ -29,5 +32,10 @@ enum class Sight : std::uint8_t {
 // answered. A stop is seen in a sample with duty 0 of a robot that is latched.
 Sight look_for(const protocol::Command& command, std::uint64_t effect_at_robot_us, std::uint64_t emergency_id,
                const SampleBatch& batch);
+
+// What a page of parameters, or the controller that the robot says is in force, says of a command that it has accepted:
+// seen when everything is as it was sent, bit for bit; missed when it answers the command and is different.
+Sight read_back(const protocol::Command& command, const protocol::ParameterPage& page);
+Sight read_back(const protocol::Command& command, const protocol::Controller& controller);
 
 }  // namespace server

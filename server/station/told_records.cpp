@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/station/seat.hpp"
+#include "server/station/telemetry_verifier.hpp"
 
 namespace server {
 namespace {
@@ -57,11 +58,24 @@ void Station::record_clock(Seat& seat) {
 void Station::on_parameters(RobotPort& port, const protocol::ParameterPage& page) {
   Seat* seat = seat_of(port);
   if (seat == nullptr) return;
-  if (auto table = seat->parameters.add(page)) record_in_force(*seat, "parameters", std::move(*table));
+  RobotSettings& settings = seat->settings;
+  if (auto table = settings.parameters.add(page)) {
+    record_in_force(*seat, "parameters", std::move(*table));
+    settings.parameters_at_us = clock_.utc_us();
+    if (auto changed = settings.parameters.changed_limits(); changed != seat->robot->changed_limits) {
+      seat->robot->changed_limits = std::move(changed);
+      publish(*seat->robot);
+    }
+  }
+  settle_read_back(*seat, [&page](const protocol::Command& command) { return read_back(command, page); });
 }
 
 void Station::on_controller(RobotPort& port, const protocol::Controller& controller) {
-  if (Seat* seat = seat_of(port)) record_in_force(*seat, "controller", controller_json(controller));
+  Seat* seat = seat_of(port);
+  if (seat == nullptr) return;
+  seat->settings.add(controller, clock_.utc_us());
+  record_in_force(*seat, "controller", controller_json(controller));
+  settle_read_back(*seat, [&controller](const protocol::Command& command) { return read_back(command, controller); });
 }
 
 // Samples that were made before it was said may still be on their way: they are counted on, in periods.

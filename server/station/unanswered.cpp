@@ -22,6 +22,7 @@ bool happens_by_itself(const protocol::Command& wire) {
   switch (wire.which_action) {
     case rheonaut_Command_set_mode_tag: return wire.action.set_mode.mode == rheonaut_MODE_MANUAL;
     case rheonaut_Command_set_duty_tag: return wire.action.set_duty.duty == 0.0F;
+    case rheonaut_Command_set_duty_schedule_tag: return true;  // its first duty may be that of anything else
     case rheonaut_Command_inject_disturbance_tag: return wire.action.inject_disturbance.disturbance_m == 0.0F;
     default: return false;
   }
@@ -42,6 +43,9 @@ bool shows(const RobotState& robot, const protocol::Command& wire) {
 void Station::prepare_proof(Seat& seat, PendingCommand& pending) {
   const auto now_us = static_cast<std::uint64_t>(robot_now_us(*seat.robot));
   pending.look_from_robot_us = now_us;
+  if (pending.wire.has_execute_at_robot_us) {
+    pending.look_from_robot_us = std::max(now_us, pending.wire.execute_at_robot_us);
+  }
   pending.look_until_robot_us = shown_until_us(pending);
   pending.is_proved_by_samples =
       can_be_seen(pending.wire) && !happens_by_itself(pending.wire) && !shows(*seat.robot, pending.wire);

@@ -17,6 +17,16 @@ export function model_of(flags: number, position_sd_m: number | null): string {
   return flags & kModelConfirmed ? 'model confirmed' : 'model assumed';
 }
 
+// The parameters that bound motion and are not at their default, in one line; empty when there is none.
+export function changed_limits_of(state: Pick<RobotState, 'changed_limits'>): string {
+  const number = (value: number | null) => (value === null ? '—' : `${value}`);
+  const limits = (state.changed_limits ?? []).map((limit) => {
+    const unit = limit.unit ? ` ${limit.unit}` : '';
+    return `${limit.name} ${number(limit.value)}${unit} (default ${number(limit.default)}${unit})`;
+  });
+  return limits.length === 0 ? '' : `Changed limits: ${limits.join(', ')}`;
+}
+
 // What the numerals show; null: never heard.
 export interface Readout {
   watched: boolean; // its samples are asked for; of the others nothing is shown that changes with each sample

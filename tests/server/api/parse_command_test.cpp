@@ -22,6 +22,13 @@ TEST(ParseCommand, UnderstandsEveryKind) {
       {R"({"kind":"set_parameter","name":"model_confirmed","value":1})", rheonaut_Command_set_parameter_tag},
       {R"({"kind":"set_parameter","name":"position_limit_max_m","value":0.2,"confirm":true})",
        rheonaut_Command_set_parameter_tag},
+      {R"({"kind":"get_parameters"})", rheonaut_Command_get_parameters_tag},
+      {R"({"kind":"get_parameters","first_index":6})", rheonaut_Command_get_parameters_tag},
+      {R"({"kind":"set_duty_schedule","schedule":[{"tick":0,"duty":0.1},{"tick":50,"duty":0}]})",
+       rheonaut_Command_set_duty_schedule_tag},
+      {R"({"kind":"set_controller","controller":{"period_us":10000,"kp":1,"direct":1},"duty_min":0,"duty_max":1})",
+       rheonaut_Command_set_controller_tag},
+      {R"({"kind":"restore_controller","confirm":true})", rheonaut_Command_restore_controller_tag},
       {R"({"kind":"zero_position"})", rheonaut_Command_zero_position_tag},
       {R"({"kind":"ping"})", rheonaut_Command_ping_tag},
   };
@@ -40,6 +47,11 @@ TEST(ParseCommand, CarriesTheValues) {
   EXPECT_EQ(command->action.action.set_mode.setpoint_m, 0.1F);
   EXPECT_EQ(command->life, std::chrono::milliseconds{500});
   EXPECT_EQ(command->arguments, R"({"mode":"auto","setpoint_m":0.1})");
+  const auto timed = parse_command(R"({"kind":"set_duty","duty":0.1,"execute_at_robot_us":5000000})");
+  ASSERT_TRUE(timed);
+  EXPECT_TRUE(timed->action.has_execute_at_robot_us);
+  EXPECT_EQ(timed->action.execute_at_robot_us, 5'000'000U);
+  EXPECT_EQ(timed->arguments, R"({"duty":0.1,"execute_at_robot_us":5000000})");
   const auto clear = parse_command(R"({"kind":"clear_emergency","emergency_id":"18446744073709551615"})");
   ASSERT_TRUE(clear);
   EXPECT_EQ(clear->action.action.clear_emergency.emergency_id, UINT64_MAX);
@@ -60,7 +72,19 @@ TEST(ParseCommand, RefusesWithMemberAndValue) {
       {R"({"kind":7})", 400, "kind = 7 is not a string"},
       {R"({"kind":"dance"})", 422, "unknown command kind 'dance'"},
       {R"({"kind":"emergency_stop"})", 422, "unknown command kind 'emergency_stop'"},
-      {R"({"kind":"set_duty_schedule"})", 422, "unknown command kind"},
+      {R"({"kind":"set_duty_schedule"})", 400, "schedule is missing"},
+      {R"({"kind":"set_duty_schedule","schedule":[]})", 422, "has 0 entries"},
+      {R"({"kind":"set_duty_schedule","schedule":[{"tick":0,"duty":0.1}]})", 422, "the last duty of a schedule is 0"},
+      {R"({"kind":"set_duty_schedule","schedule":[{"tick":5,"duty":0.1},{"tick":5,"duty":0}]})", 422,
+       "tick = 5 is outside 6"},
+      {R"({"kind":"set_duty_schedule","schedule":[{"tick":0,"duty":0,"lease":1}]})", 400, "\"lease\" is not known"},
+      {R"({"kind":"drop_timed"})", 422, "unknown command kind"},
+      {R"({"kind":"ping","execute_at_robot_us":1})", 400, "ping takes no execute_at_robot_us"},
+      {R"({"kind":"set_controller","controller":{},"execute_at_robot_us":1})", 400, "takes no execute_at_robot_us"},
+      {R"({"kind":"set_duty","duty":0.1,"execute_at_robot_us":-1})", 422, "execute_at_robot_us = -1"},
+      {R"({"kind":"get_parameters","first_index":256})", 422, "first_index = 256"},
+      {R"({"kind":"set_controller"})", 400, "controller is missing"},
+      {R"({"kind":"restore_controller","confirm":false})", 422, "confirm is true or left out"},
       {R"({"kind":"set_parameter","name":"","value":1})", 422, "name"},
       {R"({"kind":"set_parameter","name":"a_name_that_is_one_too_long_0123","value":1})", 422, "name"},
       {R"({"kind":"set_parameter","name":"model_confirmed"})", 400, "value is missing"},

@@ -86,7 +86,7 @@ TEST(TelemetryVerifier, AClearIsSeenWhenTheLatchIsGone) {
 
 TEST(TelemetryVerifier, KindsThatNoSampleShowsAreKnown) {
   for (const int tag : {rheonaut_Command_renew_lease_tag, rheonaut_Command_ping_tag, rheonaut_Command_zero_position_tag,
-                        rheonaut_Command_set_duty_schedule_tag}) {
+                        rheonaut_Command_drop_timed_tag}) {
     EXPECT_FALSE(can_be_seen(command_of(static_cast<pb_size_t>(tag))));
     EXPECT_EQ(look_for(command_of(static_cast<pb_size_t>(tag)), kEffectUs, 0, batch_at(kEffectUs, 1)), Sight::unseen);
   }

@@ -1,7 +1,7 @@
 // The quality of the link and the health of the robot, as a column of figures.
 
 import { count, milliseconds_of_us, percent, volts_of_mv } from '../format';
-import type { Robot } from '../robot';
+import { changed_limits_of, type Robot } from '../robot';
 
 export function LinkPanel({ robot }: { robot: Robot }) {
   const state = robot.state.value;
@@ -22,6 +22,7 @@ export function LinkPanel({ robot }: { robot: Robot }) {
         <Figure name="Not yet on disk" unit="" value={count(lag)} tone={lag > 200 ? 'caution' : ''} title="Samples received but not yet durable" />
       </dl>
       <h2>Robot</h2>
+      {changed_limits_of(state) && <p id="changed-limits">{changed_limits_of(state)}</p>}
       <dl>
         <Figure name="Buffer" unit="%" value={percent(fill, 0)} tone={(fill ?? 0) > 0.8 ? 'caution' : ''} title="Fill of the robot's ring of samples" />
         <Figure name="Supply" unit="V" value={volts_of_mv(status?.supply_mv)} />

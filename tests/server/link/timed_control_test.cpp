@@ -1,0 +1,224 @@
+// Commands that wait on the robot for their time: their ends, and that they outlive nobody's control.
+#include "server/link/robot_session.hpp"
+#include "tests/server/link/link_fixture.hpp"
+
+namespace server {
+namespace {
+
+class TimedControlTest : public LinkTest {
+ protected:
+  std::uint64_t in_ms(std::uint64_t ms) const { return robot->robot_now_us() + ms * 1000; }
+  CommandRequest timed(protocol::Command command, std::uint64_t at_us, const char* actor) const {
+    command.has_execute_at_robot_us = true;
+    command.execute_at_robot_us = at_us;
+    CommandRequest request = request_of(command, 8s);
+    request.actor = actor;
+    request.until_verified = true;
+    return request;
+  }
+  protocol::Command take_in(CommandRequest request) {
+    submit(std::move(request));
+    clock.settle();
+    const protocol::Command sent = robot->commands().back();
+    protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
+    frame.which_body = rheonaut_RobotFrame_command_ack_tag;
+    frame.body.command_ack.command_id = sent.command_id;
+    frame.body.command_ack.result = rheonaut_COMMAND_RESULT_ACCEPTED;
+    frame.body.command_ack.effect_at_robot_us = sent.execute_at_robot_us;
+    robot->send(frame);
+    clock.settle();
+    return sent;
+  }
+  std::vector<const char*> kinds() const {
+    std::vector<const char*> found;
+    for (const auto& command : robot->commands()) found.push_back(protocol::kind(command));
+    return found;
+  }
+  std::size_t drops() const {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(kinds(), [](const char* kind) { return kind == std::string{"drop_timed"}; }));
+  }
+  void control(ControlAction action, const char* actor) {
+    EXPECT_TRUE(station.control({"r1", actor, "", action, kControlLife, "because"}));
+    clock.settle();
+  }
+  void accept_last() {
+    robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED);
+    clock.settle();
+  }
+
+  TestRobot* robot = connect();
+};
+
+TEST_F(TimedControlTest, IsLookedForFromItsTimeOn) {
+  const std::uint64_t at_us = in_ms(6000);
+  take_in(timed(set_duty(0.25F), at_us, "a"));
+  clock.run_for(5900ms);
+  EXPECT_TRUE(results.empty()) << "longer than what runs at once may take";
+  auto frame = TestRobot::samples_frame(0, 1, at_us, 0);
+  frame.body.telemetry.duty[0] = 0.25F;
+  robot->send(frame);
+  clock.settle();
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(results[0]->state, CommandState::verified);
+}
+
+TEST_F(TimedControlTest, EndsAsTheRobotSaysWhenItDropsIt) {
+  const auto first = take_in(timed(set_duty(0.25F), in_ms(3000), "a"));
+  const auto second = take_in(timed(set_duty(0.5F), in_ms(4000), "a"));
+  robot->acknowledge(first, rheonaut_COMMAND_RESULT_EXPIRED);
+  robot->acknowledge(second, rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_LATCHED);
+  clock.settle();
+  ASSERT_EQ(results.size(), 2U);
+  EXPECT_EQ(results[0]->state, CommandState::expired);
+  EXPECT_EQ(results[1]->state, CommandState::rejected);
+  EXPECT_EQ(results[1]->reason, "latched");
+}
+
+TEST_F(TimedControlTest, IsRefusedForATimeAfterTheLifeOfTheCommand) {
+  submit(timed(set_duty(0.25F), in_ms(8100), "a"));
+  clock.settle();
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(results[0].error().reason, "out_of_range");
+  EXPECT_TRUE(robot->commands().empty());
+  EXPECT_TRUE(station.find("r1")->control.holder.empty()) << "what is refused takes no control";
+}
+
+TEST_F(TimedControlTest, AScheduleIsSeenByItsFirstMotion) {
+  protocol::Command schedule = rheonaut_Command_init_zero;
+  schedule.which_action = rheonaut_Command_set_duty_schedule_tag;
+  auto& entries = schedule.action.set_duty_schedule;
+  entries.tick_count = entries.duty_count = 3;
+  entries.tick[1] = 100;
+  entries.tick[2] = 120;
+  entries.duty[1] = 0.3F;
+  const std::uint64_t at_us = in_ms(500);
+  take_in(timed(schedule, at_us, "a"));
+  robot->send_samples(0, 5, at_us, 0);
+  robot->send_samples(5, 5, at_us + 600'000, 0);
+  clock.settle();
+  EXPECT_TRUE(results.empty()) << "it begins with a second of 0";
+  auto frame = TestRobot::samples_frame(10, 1, at_us + 1'000'000, 0);
+  frame.body.telemetry.duty[0] = 0.3F;
+  robot->send(frame);
+  clock.settle();
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(results[0]->state, CommandState::verified);
+}
+
+// SAFETY: each way in which control ends.
+TEST_F(TimedControlTest, IsDroppedWhenControlIsReleasedForcedHandedOverOrExpires) {
+  take_in(timed(set_duty(0.25F), in_ms(2000), "a"));
+  control(ControlAction::release, "a");
+  EXPECT_EQ(drops(), 1U);
+  accept_last();
+
+  take_in(timed(set_duty(0.25F), in_ms(2000), "a"));
+  control(ControlAction::force, "b");
+  EXPECT_EQ(drops(), 2U);
+  accept_last();
+
+  take_in(timed(set_duty(0.25F), in_ms(2000), "b"));
+  control(ControlAction::request, "a");
+  EXPECT_EQ(drops(), 2U) << "who asks for control changes nothing";
+  control(ControlAction::hand_over, "b");
+  EXPECT_EQ(drops(), 3U);
+  accept_last();
+
+  tasks.spawn("watch", station.watch_control());
+  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  clock.run_for(2900ms);
+  EXPECT_EQ(drops(), 3U);
+  clock.run_for(500ms);
+  EXPECT_EQ(drops(), 4U);
+  EXPECT_EQ(sink.commands.back().actor, "station:control");
+}
+
+TEST_F(TimedControlTest, IsNotDroppedWhenNoneMayWaitAnyMore) {
+  take_in(timed(set_duty(0.25F), in_ms(500), "a"));
+  clock.run_for(1s);
+  control(ControlAction::release, "a");
+  EXPECT_EQ(drops(), 0U);
+}
+
+// Nobody has noticed yet that control has run out; the next holder's first command comes all the same.
+TEST_F(TimedControlTest, IsDroppedAheadOfTheNextHoldersFirstCommand) {
+  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  clock.run_for(3100ms);
+  CommandRequest next = request_of(set_duty(0.5F));
+  next.actor = "b";
+  submit(std::move(next));
+  clock.settle();
+  const auto sent = robot->commands();
+  ASSERT_EQ(sent.size(), 3U);
+  EXPECT_EQ(sent[1].which_action, rheonaut_Command_drop_timed_tag);
+  EXPECT_EQ(sent[2].action.set_duty.duty, 0.5F);
+}
+
+// SAFETY: nobody's command passes the one that drops what waits.
+TEST_F(TimedControlTest, IsDroppedBeforeAnythingElseAlsoWhenTheLinkWasFull) {
+  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  protocol::Command ping = rheonaut_Command_init_zero;
+  ping.which_action = rheonaut_Command_ping_tag;
+  for (std::size_t i = 0; i < CommandWindow::kMost + RobotSession::kMaxQueuedCommands; ++i) {
+    submit(ping, 8s);
+    clock.settle();
+  }
+  control(ControlAction::force, "b");
+  CommandRequest next = request_of(set_duty(0.5F), 8s);
+  next.actor = "b";
+  std::size_t refused = 0, answered = 1;
+  const auto is_next = [](const protocol::Command& one) {
+    return one.which_action == rheonaut_Command_set_duty_tag && one.action.set_duty.duty == 0.5F;
+  };
+  while (std::ranges::none_of(robot->commands(), is_next) && answered < 200) {
+    const std::size_t before = results.size();
+    if (drops() == 0 || refused < 3) submit(next);
+    clock.settle();
+    if (results.size() > before && !results.back() && results.back().error().reason == "queue_full") ++refused;
+    if (answered < robot->commands().size()) {
+      robot->acknowledge(robot->commands()[answered++], rheonaut_COMMAND_RESULT_ACCEPTED);
+    }
+    clock.settle();
+  }
+  EXPECT_GE(refused, 2U) << "with no room at all, and with room for the drop alone";
+  const auto sent = robot->commands();
+  const auto drop =
+      std::ranges::find(sent, pb_size_t{rheonaut_Command_drop_timed_tag}, &protocol::Command::which_action);
+  EXPECT_LT(drop - sent.begin(), std::ranges::find_if(sent, is_next) - sent.begin());
+  EXPECT_EQ(drops(), 1U);
+}
+
+TEST_F(TimedControlTest, OfTheSameActorIsDroppedToWhenControlHadEndedInBetween) {
+  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  clock.run_for(3100ms);
+  control(ControlAction::take, "a");
+  EXPECT_EQ(drops(), 1U);
+}
+
+TEST_F(TimedControlTest, IsDroppedFirstOnTheNextConnectionWhenTheLinkWasCut) {
+  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  control(ControlAction::release, "a");
+  ASSERT_EQ(drops(), 1U) << "and the link is cut before the answer";
+  robot->link.cut();
+  clock.settle();
+  const std::int64_t booted_at_us = robot->booted_at_us;
+  robot = dial();
+  robot->booted_at_us = booted_at_us;
+  robot->say_hello();
+  ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));
+  EXPECT_EQ(robot->commands()[0].which_action, rheonaut_Command_drop_timed_tag);
+}
+
+TEST_F(TimedControlTest, LeavesThoseThatTheHolderStillControls) {
+  take_in(timed(set_duty(0.25F), in_ms(2000), "a"));
+  control(ControlAction::take, "a");
+  CommandRequest more = request_of(set_duty(0.1F));
+  more.actor = "a";
+  submit(std::move(more));
+  clock.settle();
+  EXPECT_EQ(drops(), 0U);
+}
+
+}  // namespace
+}  // namespace server
