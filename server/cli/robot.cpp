@@ -85,10 +85,12 @@ void add_options(CLI::App& command, RobotCommand& wish) {
         ->required()
         ->check(robot_id());
   }
+  add_options(command, wish.settings);
   command.footer("Example: rheonaut robot list --data lab");
 }
 
 int run(const RobotCommand& wish, std::ostream& out) {
+  if (wish.settings.of != RobotSettingsCommand::Of::nothing) return run(wish.settings, out);
   if (wish.act == Act::enroll) return enroll(wish, out);
   AccountDoor door{wish.data_dir, AccountDoor::Missing::refuse};
   if (wish.act == Act::list) return list(door.enrolments(), wish.json, out);

@@ -7,6 +7,8 @@
 #include <iosfwd>
 #include <string>
 
+#include "server/cli/robot_settings.hpp"
+
 namespace CLI {
 class App;
 }
@@ -19,6 +21,7 @@ struct RobotCommand {
   std::filesystem::path data_dir = "rheonaut-data";
   std::string robot_id;
   bool json = false;
+  RobotSettingsCommand settings;  // if of is not nothing, this is what is wanted
 };
 
 void add_options(CLI::App& command, RobotCommand& wish);

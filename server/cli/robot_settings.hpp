@@ -1,0 +1,39 @@
+// `rheonaut robot parameters` and `rheonaut robot controller`: what is in force on a robot, and to change it, through
+// the station that runs in the data folder.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <iosfwd>
+#include <optional>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace server::cli {
+
+struct RobotSettingsCommand {
+  enum class Of : std::uint8_t { nothing, parameters, controller };
+  Of of = Of::nothing;
+  std::filesystem::path data_dir = "rheonaut-data";
+  std::string robot_id;
+  std::string set;  // NAME=VALUE, or the file of a controller; empty: nothing is set
+  bool read_anew = false;
+  bool restore = false;
+  bool confirm = false;
+  std::optional<double> duty_min, duty_max;
+  std::string derivative_on;  // empty: as in the controller in force
+  bool json = false;
+};
+
+// Adds both as subcommands.
+void add_options(CLI::App& robot, RobotSettingsCommand& wish);
+
+// 0, or kNotVerified when the robot accepted a change and has not said it back. Throws std::runtime_error saying why
+// nothing was changed, or that the robot says something else than it was sent.
+inline constexpr int kNotVerified = 5;
+int run(const RobotSettingsCommand& wish, std::ostream& out);
+
+}  // namespace server::cli
