@@ -96,9 +96,8 @@ OutputErrorSearch::OutputErrorSearch(const Recording& recording, const Identific
   if (!recording.acceleration_m_s2.empty()) {
     auto path = std::make_unique<SensorPath>(sensor_readings(recording.acceleration_m_s2), dt_s_);
     const Eigen::VectorXd readings = path->readings();
-    measured_.push_back({Channel::acceleration,
-                         OutputModel(Channel::acceleration, dt_s_, recording.duty, 0, kModelTolerance), readings,
-                         scale_of(readings), Eigen::VectorXd::Ones(samples_), std::move(path)});
+    measured_.push_back({Channel::acceleration, OutputModel::with_means(dt_s_, recording.duty, kModelTolerance),
+                         readings, scale_of(readings), Eigen::VectorXd::Ones(samples_), std::move(path)});
     sensor_start_.sensor = rough_timing();
     return;
   }

@@ -27,6 +27,14 @@ Terms terms(const FractionalModel& model, Complex log_s) {
 // A rate that falls on the pole would give 0/0; what is left of H there is smooth, so a near value will do.
 Complex beside(Complex s, Complex pole) { return std::abs(s - pole) > 1e-6 * std::abs(pole) ? s : s * (1 + 2e-6); }
 
+Eigen::MatrixXd before_means(const Eigen::MatrixXd& acceleration, const Eigen::MatrixXd& velocity, double dt_s) {
+  const Index samples = acceleration.rows();
+  Eigen::MatrixXd both = Eigen::MatrixXd::Zero(2 * samples, acceleration.cols());
+  both.topRows(samples) = acceleration;
+  both.bottomRows(samples - 1) = (velocity.bottomRows(samples - 1) - velocity.topRows(samples - 1)) / dt_s;
+  return both;
+}
+
 }  // namespace
 
 OutputModel::OutputModel(Channel channel, double dt_s, std::vector<double> duty, double longest_dead_time_s,
@@ -150,14 +158,30 @@ void OutputModel::add_pole_gradients(const PolePair& pair, Eigen::MatrixXd& jaco
   }
 }
 
+OutputModel OutputModel::with_means(double dt_s, const std::vector<double>& duty, double tolerance) {
+  OutputModel model{Channel::acceleration, dt_s, duty, 0, tolerance};
+  model.velocity_ = std::make_unique<OutputModel>(Channel::velocity, dt_s, duty, 0, tolerance);
+  return model;
+}
+
 Eigen::VectorXd OutputModel::output(const FractionalModel& model) const {
+  if (!velocity_) return own_output(model);
+  return before_means(own_output(model), velocity_->own_output(model), dt_s_);
+}
+
+Eigen::MatrixXd OutputModel::jacobian(const FractionalModel& model) const {
+  if (!velocity_) return own_jacobian(model);
+  return before_means(own_jacobian(model), velocity_->own_jacobian(model), dt_s_);
+}
+
+Eigen::VectorXd OutputModel::own_output(const FractionalModel& model) const {
   const std::optional<PolePair> pair = explicit_pole(model);
   Eigen::VectorXd result = responses_ * (regressors_.expansion() * weights(model, pair));  // (1)
   if (pair) add_pole_response(*pair, result);                                              // (2)
   return result;
 }
 
-Eigen::MatrixXd OutputModel::jacobian(const FractionalModel& model) const {
+Eigen::MatrixXd OutputModel::own_jacobian(const FractionalModel& model) const {
   const std::optional<PolePair> pair = explicit_pole(model);
   Eigen::MatrixXd result = responses_ * (regressors_.expansion() * weight_gradients(model, pair));
   if (pair) add_pole_gradients(*pair, result);

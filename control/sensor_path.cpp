@@ -75,11 +75,16 @@ void SensorPath::leave_out_failed_reads(const Eigen::VectorXd& expected_m_s2, do
 
 void SensorPath::set_weights() { weighed_knots_.compute(weight_.asDiagonal() * knots_); }
 
-Eigen::VectorXd SensorPath::filtered(const Eigen::VectorXd& a, double time_constant_s) const {
+Eigen::VectorXd SensorPath::filtered(const Eigen::VectorXd& motion_m_s2, double time_constant_s) const {
+  const auto a = motion_m_s2.head(samples()), mean = motion_m_s2.tail(samples());
   if (!(time_constant_s > kSmallestShare * dt_s_)) return a;
   const double turns = dt_s_ / time_constant_s, decay = std::exp(-turns), late = 1 - (1 - decay) / turns;
-  Eigen::VectorXd f = Eigen::VectorXd::Zero(a.size());
-  for (Index k = 1; k < a.size(); ++k) f[k] = decay * f[k - 1] + (1 - decay) * a[k - 1] + late * (a[k] - a[k - 1]);
+  const double bend = 6 * (turns - 2 + (turns + 2) * decay) / (turns * turns);  // of 6 s (1 - s), s from 0 to 1
+  Eigen::VectorXd f = Eigen::VectorXd::Zero(samples());
+  for (Index k = 1; k < samples(); ++k) {
+    f[k] =
+        decay * f[k - 1] + (1 - decay) * a[k - 1] + late * (a[k] - a[k - 1]) + bend * (mean[k] - (a[k] + a[k - 1]) / 2);
+  }
   return f;
 }
 
@@ -94,8 +99,8 @@ double SensorPath::place(Index tick, const SensorTiming& timing) const {
   return (timing.first_s + timing.period_s * number_[tick]) / dt_s_ - static_cast<double>(delay_ticks_);
 }
 
-Eigen::VectorXd SensorPath::sampled(const Eigen::VectorXd& acceleration_m_s2, const SensorTiming& timing) const {
-  const Eigen::VectorXd f = filtered(acceleration_m_s2, timing.time_constant_s);
+Eigen::VectorXd SensorPath::sampled(const Eigen::VectorXd& motion_m_s2, const SensorTiming& timing) const {
+  const Eigen::VectorXd f = filtered(motion_m_s2, timing.time_constant_s);
   Eigen::VectorXd result(samples());
   for (Index k = 0; k < samples(); ++k) {
     const double at = place(k, timing);
@@ -105,8 +110,8 @@ Eigen::VectorXd SensorPath::sampled(const Eigen::VectorXd& acceleration_m_s2, co
   return result;
 }
 
-Eigen::MatrixXd SensorPath::timing_slopes(const Eigen::VectorXd& a, const SensorTiming& timing) const {
-  const Eigen::VectorXd f = filtered(a, timing.time_constant_s);
+Eigen::MatrixXd SensorPath::timing_slopes(const Eigen::VectorXd& motion_m_s2, const SensorTiming& timing) const {
+  const Eigen::VectorXd f = filtered(motion_m_s2, timing.time_constant_s);
   Eigen::MatrixXd slopes(samples(), 3);
   for (Index k = 0; k < samples(); ++k) {
     const double at = place(k, timing);
@@ -116,7 +121,7 @@ Eigen::MatrixXd SensorPath::timing_slopes(const Eigen::VectorXd& a, const Sensor
   }
   SensorTiming slower = timing;
   slower.time_constant_s += kDifferenceShare * dt_s_;
-  slopes.col(2) = (sampled(a, slower) - sampled(a, timing)) / (kDifferenceShare * dt_s_);
+  slopes.col(2) = (sampled(motion_m_s2, slower) - sampled(motion_m_s2, timing)) / (kDifferenceShare * dt_s_);
   return slopes;
 }
 

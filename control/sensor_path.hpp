@@ -1,6 +1,6 @@
 // From a model's acceleration at the ticks to the readings of an accelerometer that has a clock of its own.
 //
-//   τ f' = a - f,  a linear between ticks                             (1)   the sensor's low pass
+//   τ f' = a - f,  a a parabola between ticks, of the tick's mean     (1)   the sensor's low pass
 //   r_k = f(A + P j_k) + bias(t_k) + noise,  f linear between ticks   (2)   the sample that tick k reads
 //   j_k = floor((t_k - W)/P')                                         (3)   the latest that there is then
 //   bias(t): linear between knots that are equally spaced             (4)
@@ -10,8 +10,14 @@
 // change which sample a tick reads, in jumps. A sensor whose samples keep step with the ticks has P = P' = dt. The bias
 // is not a parameter: weighed() takes the best one off. Readings without weight: the same sample read again; one whose
 // sample is uncertain, W being known to `guard_s` only; one that repeats the last although the model moves on by more
-// than 3 sd, which is a failed read. Shapes:   one value per tick. Accuracy: (1) and (2) are exact for what they say; a
-// real acceleration is not linear within a tick. Errors:   none thrown.
+// than 3 sd, which is a failed read.
+//
+// A motion is what OutputModel::with_means gives: a at the ticks, and behind it its mean over the tick before each.
+// The means count where a robot begins to move as v ~ t^α: a straight line from tick to tick misses 1 - α/2 of what v
+// gains in the first.
+// Shapes:   one value per tick, two of a motion.
+// Accuracy: (1) and (2) are exact for what they say; a real acceleration is no parabola within a tick.
+// Errors:   none thrown.
 #pragma once
 
 #include <Eigen/Core>
@@ -54,10 +60,10 @@ class SensorPath {
   Eigen::Index bias_terms() const { return knots_.cols(); }
   Eigen::Index weighed_samples() const { return static_cast<Eigen::Index>((weight_.array() > 0).count()); }
 
-  Eigen::VectorXd delayed(const Eigen::VectorXd& values) const;                                      // by the dead time
-  Eigen::VectorXd filtered(const Eigen::VectorXd& acceleration_m_s2, double time_constant_s) const;  // (1)
-  Eigen::VectorXd sampled(const Eigen::VectorXd& acceleration_m_s2, const SensorTiming& timing) const;  // (1), (2)
-  Eigen::MatrixXd timing_slopes(const Eigen::VectorXd& acceleration_m_s2, const SensorTiming& timing) const;  // A, P, τ
+  Eigen::VectorXd delayed(const Eigen::VectorXd& values) const;                                   // by the dead time
+  Eigen::VectorXd filtered(const Eigen::VectorXd& motion_m_s2, double time_constant_s) const;     // (1)
+  Eigen::VectorXd sampled(const Eigen::VectorXd& motion_m_s2, const SensorTiming& timing) const;  // (1), (2)
+  Eigen::MatrixXd timing_slopes(const Eigen::VectorXd& motion_m_s2, const SensorTiming& timing) const;  // A, P, τ
   // Less the bias (4) that suits it best, and 0 where the reading has no weight.
   Eigen::VectorXd weighed(const Eigen::VectorXd& values) const;
   Eigen::VectorXd bias(const Eigen::VectorXd& residual_m_s2) const;  // the best one, at every tick

@@ -42,6 +42,7 @@ Imu::Imu(const ImuParameters& parameters, std::uint64_t seed)
   const double turns = 2 * std::numbers::pi * parameters.bandwidth_hz * kTickS;
   filter_decay_ = std::exp(-turns);
   filter_late_share_ = 1 - (1 - filter_decay_) / turns;
+  filter_bend_share_ = 6 * (turns - 2 + (turns + 2) * filter_decay_) / (turns * turns);
   sample_period_s_ = kTickS * (1 + parameters.clock_error * (2 * noise_.uniform() - 1));
   until_sample_s_ = sample_period_s_ * noise_.uniform();
   drift_m_s3_ = noise_.uniform() < 0.5 ? -parameters.drift_m_s3 : parameters.drift_m_s3;
@@ -55,11 +56,12 @@ Imu::Imu(const ImuParameters& parameters, std::uint64_t seed)
   counts_ = sample(0);
 }
 
-void Imu::accelerate(double acceleration_m_s2) {
+void Imu::accelerate(double acceleration_m_s2, double mean_m_s2) {
   wander_m_s2_ = wander_decay_ * wander_m_s2_ + wander_step_m_s2_ * noise_.normal();  // (3)
   drift_m_s2_ += drift_m_s3_ * kTickS;
   const double filtered_m_s2 = filter_decay_ * filtered_m_s2_ + (1 - filter_decay_) * acceleration_m_s2_ +
-                               filter_late_share_ * (acceleration_m_s2 - acceleration_m_s2_);  // (4)
+                               filter_late_share_ * (acceleration_m_s2 - acceleration_m_s2_) +
+                               filter_bend_share_ * (mean_m_s2 - (acceleration_m_s2 + acceleration_m_s2_) / 2);  // (4)
   while (until_sample_s_ <= kTickS) {
     counts_ = sample(std::lerp(filtered_m_s2_, filtered_m_s2, until_sample_s_ / kTickS));
     until_sample_s_ += sample_period_s_;

@@ -47,8 +47,12 @@ class Imu {
 
   Imu(const ImuParameters& parameters, std::uint64_t seed);
 
-  // Time passes up to the next tick, at whose end the acceleration is `acceleration_m_s2`; linear in between.
-  void accelerate(double acceleration_m_s2);
+  // Time passes up to the next tick, at whose end the acceleration is `acceleration_m_s2`. In between it is a parabola
+  // with this mean, so that the readings add up to the velocity, or a straight line.
+  void accelerate(double acceleration_m_s2, double mean_m_s2);
+  void accelerate(double acceleration_m_s2) {
+    accelerate(acceleration_m_s2, (acceleration_m_s2_ + acceleration_m_s2) / 2);
+  }
   ImuReading read();
 
   void set_fault(const SensorFault& fault) { fault_ = fault; }
@@ -62,7 +66,8 @@ class Imu {
   Noise noise_;
   double noise_m_s2_;                        // sd of a sample
   double wander_decay_, wander_step_m_s2_;   // of (3), in a tick
-  double filter_decay_, filter_late_share_;  // of (4): e^{-2πB dt}, and 1 - (1 - e^{-2πB dt})/(2πB dt)
+  double filter_decay_, filter_late_share_;  // of (4): e^{-x} and 1 - (1 - e^{-x})/x, x = 2πB dt
+  double filter_bend_share_;                 // and 6 (x - 2 + (x + 2) e^{-x})/x²
   double missed_read_probability_;
   double sample_period_s_, drift_m_s3_;
   double residual_m_s2_ = 0, wander_m_s2_ = 0, drift_m_s2_ = 0;

@@ -50,7 +50,7 @@ void World::step(double duty) {
   }
   glucose_.step();
   electrode_.step();
-  if (imu_) imu_->accelerate(acceleration_m_s2_);
+  if (imu_) imu_->accelerate(acceleration_m_s2_, (velocity_m_s_ - velocity_before_m_s) / kTickS);
 }
 
 void World::carry() {

@@ -117,6 +117,16 @@ TEST(Imu, SmoothsFastMotionAndLosesNoVelocity) {
   EXPECT_NEAR(0.01 * sum, 0.5, 0.01);
 }
 
+TEST(Imu, FeelsTheMeanOfATickAndNotOnlyItsEnds) {
+  Imu imu{silent(), 1};
+  double sum = 0;
+  for (int k = 0; k < 20; ++k) {
+    imu.accelerate(0, k == 0 ? 1 : 0);
+    sum += imu.read().counts / Imu::kCountsPerMS2;
+  }
+  EXPECT_NEAR(sum, 0.81, 0.03);  // the rest is lost between two samples
+}
+
 TEST(Imu, IsStuckAtItsLastReadingUntilTheFaultEnds) {
   Imu imu{{}, 1};
   for (int k = 0; k < 10; ++k) imu.accelerate(1);
