@@ -14,7 +14,7 @@
 // Reach:    sections have real poles. Plants that overshoot by a percent or more cannot be met by four of them,
 // whatever
 //           the search does: is_met is false then, and `reason` says so. With b1, b2 of (29) halved to doubled, orders
-//           1.4 to 1.95 and 0.6 to 0.98, two plants in three are met (docs/control.md).
+//           1.4 to 1.95 and 0.6 to 0.98, three plants in five are met (docs/control.md).
 // Errors:   throws std::invalid_argument as check() does. No fit that is good enough is a result.
 #pragma once
 

@@ -55,11 +55,11 @@ Tally study(const control::FractionalModel& fluid, const control::EstimatorModel
   return tally;
 }
 
-void print(const char* name, const Tally& tally) {
+void print(const Tally& tally) {
   std::printf(
-      "%s: %d of %d fluids within 2 sd at the end of every trial, %.1f %% of seconds, %.1f %% of ends; "
+      "%d of %d fluids within 2 sd at the end of every trial, %.1f %% of seconds, %.1f %% of ends; "
       "at most 10 mm off in %.1f %%, sd at most 7 mm in %.1f %% (largest %.1f mm, sd %.1f mm)\n",
-      name, tally.fluids_within, tally.fluids, 100 * tally.seconds_within / std::max(tally.trials, 1),
+      tally.fluids_within, tally.fluids, 100 * tally.seconds_within / std::max(tally.trials, 1),
       100.0 * tally.ends_within / std::max(tally.trials, 1),
       100.0 * tally.ends_within_10_mm / std::max(tally.trials, 1),
       100.0 * tally.sds_to_7_mm / std::max(tally.trials, 1), 1e3 * tally.largest_error_m, 1e3 * tally.largest_sd_m);
@@ -100,8 +100,7 @@ int main(int argc, char** argv) {
   }
   const int fluids = argc > 1 ? std::atoi(argv[1]) : 20, seeds = argc > 2 ? std::atoi(argv[2]) : 10;
   if (fluids < 1 || seeds < 1) return std::fprintf(stderr, "fluid_study: give positive numbers\n"), 2;
-  constexpr double kJerky = 1.55;  // orders below it begin to move so suddenly that the simulated sensor misses it
-  Tally all, smooth, jerky;
+  Tally all;
   int drawn = 0;
   std::printf(
       "| b1, b2 of (29) times | alpha | beta | fit error %% | seconds within 2 sd %% | ends within 2 sd | "
@@ -119,11 +118,8 @@ int main(int argc, char** argv) {
                 1e3 * tally.largest_sd_m);
     std::fflush(stdout);
     all.add(tally);
-    (fluid.alpha < kJerky ? jerky : smooth).add(tally);
   }
   std::printf("\n%d fluids drawn, %d without a model\n", drawn, drawn - all.fluids);
-  print("all", all);
-  print("alpha from 1.55", smooth);
-  print("alpha below 1.55", jerky);
+  print(all);
   return 0;
 }

@@ -137,9 +137,9 @@ TEST_F(Identifying, SaysWhetherTheRobotsEstimatorCanUseIt) {
   EXPECT_EQ(ask("estimator --plant @m.json --json").json()["model_gain_m_s"], told["model_gain_m_s"]);
   EXPECT_THAT(ask(identify).text, HasSubstr("the robot's estimator can use it, with a fit error of 0.1"));
 
-  save("swing.json", R"({"kp":0.1,"b1":0.005682,"b2":0.05,"alpha":1.95,"beta":0.8682})");
-  save("swing.csv", ask("step --plant @swing.json --every-s 0.01 --until-s 5 --csv").text);
-  const auto refused = ask("identify --csv @swing.csv --structure fractional --json").json()["estimator"];
+  save("swing.json", R"({"kp":0.1,"b1":0.01,"b2":0.05,"alpha":2,"beta":1})");
+  save("swing.csv", ask("step --plant @swing.json --every-s 0.01 --until-s 3 --csv").text);
+  const auto refused = ask("identify --csv @swing.csv --structure second_order --json").json()["estimator"];
   EXPECT_THAT(refused["refused"].get<std::string>(), HasSubstr("overshoots"));
   EXPECT_FALSE(refused.contains("model_gain_m_s"));
 }
