@@ -29,11 +29,12 @@ RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThrea
       certifier{clock, recorder, reader},
       runs{clock, recorder, reader, certifier},
       markers{clock, recorder, reader},
+      references{clock, recorder, reader},
       history{options.path, recorder, readers},
       exports{options.path, recorder, exports_worker},
       disk_watch{clock, readers, options.path, space_limits(config)},
       backups{loop, clock, recorder, readers, disk_watch, backup_folder(options.path, config)},
-      retention{clock, recorder, reader, disk_watch, retention_policy(config)},
+      retention{clock, recorder, reader, disk_watch, references, retention_policy(config)},
       path_{options.path} {}
 
 void RecordingParts::connect(Station& station) {
@@ -53,6 +54,7 @@ asio::awaitable<RestoredState> RecordingParts::open() {
   std::error_code ignored;
   std::filesystem::remove_all(exports_folder(), ignored);  // what a crash left
   co_await runs.load();
+  co_await references.open();
   co_await retention.open();
   co_await disk_watch.look();
   co_return restored;

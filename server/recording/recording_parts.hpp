@@ -16,6 +16,7 @@
 #include "server/recording/head_watch.hpp"
 #include "server/recording/history.hpp"
 #include "server/recording/markers.hpp"
+#include "server/recording/outside_references.hpp"
 #include "server/recording/recorder.hpp"
 #include "server/recording/retention.hpp"
 #include "server/recording/runs.hpp"
@@ -52,6 +53,7 @@ struct RecordingParts {
   Certifier certifier;
   Runs runs;
   Markers markers;
+  OutsideReferences references;
   History history;
   History exports;  // the same on a worker of its own, so that no page waits behind an export
   DiskWatch disk_watch;

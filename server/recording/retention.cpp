@@ -52,11 +52,12 @@ std::uint64_t pragma(SQLite::Database& database, const char* name) {
 }  // namespace
 
 Retention::Retention(Clock& clock, Recorder& recorder, DatabaseReader& reader, const DiskWatch& disk_watch,
-                     RetentionPolicy policy)
+                     OutsideReferences& references, RetentionPolicy policy)
     : clock_{clock},
       recorder_{recorder},
       reader_{reader},
       disk_watch_{disk_watch},
+      references_{references},
       policy_{policy},
       ages_{clock, policy.retention_days * kDayUs} {}
 
@@ -75,6 +76,7 @@ asio::awaitable<void> Retention::run() {
 
 asio::awaitable<void> Retention::pass() {
   if (recorder_.failing()) co_return;
+  co_await references_.sweep();
   if (policy_.retention_days > 0) {
     ages_.note(co_await next_row());
     RetentionPlan plan{ages_.limit()};

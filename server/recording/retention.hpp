@@ -1,4 +1,5 @@
-// Removes what is too old or too much: samples that no run holds, the oldest first.
+// Removes what is too old or too much: samples that no run holds, the oldest first. Positions that were measured from
+// outside go as soon as their run is discarded, or they are replaced.
 //
 // What may go is found on a reader. It goes in steps of one transaction on the disk thread, each of which ends by the
 // clock, well before 50 ms. Commits go in between, and at least half of the disk thread's time is theirs. Removed pages
@@ -13,6 +14,7 @@
 #include "server/clock.hpp"
 #include "server/recording/database_reader.hpp"
 #include "server/recording/disk_watch.hpp"
+#include "server/recording/outside_references.hpp"
 #include "server/recording/recorder.hpp"
 #include "server/recording/retention_plan.hpp"
 
@@ -34,7 +36,7 @@ struct RetentionCounters {
 class Retention {
  public:
   Retention(Clock& clock, Recorder& recorder, DatabaseReader& reader, const DiskWatch& disk_watch,
-            RetentionPolicy policy);
+            OutsideReferences& references, RetentionPolicy policy);
 
   // Before robots arrive: what is stored now, an earlier start has written.
   boost::asio::awaitable<void> open();
@@ -65,6 +67,7 @@ class Retention {
   Recorder& recorder_;
   DatabaseReader& reader_;
   const DiskWatch& disk_watch_;
+  OutsideReferences& references_;
   RetentionPolicy policy_;
   SampleAges ages_;
   RetentionCounters counters_;

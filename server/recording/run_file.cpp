@@ -76,6 +76,7 @@ struct Copy {
   std::int64_t since = 0;
 };
 constexpr std::int64_t kAuditSince = 5;
+constexpr std::int64_t kReferenceSince = 7;
 
 constexpr Copy kCopies[] = {
     {"CREATE TABLE run AS SELECT * FROM store.run WHERE run_id = {0}"},
@@ -114,6 +115,18 @@ constexpr Copy kCopies[] = {
     {"CREATE TABLE marker AS SELECT * FROM store.run_marker WHERE run_id = {0}"},
     {"CREATE TABLE run_certificate AS SELECT * FROM store.run_certificate WHERE run_id = {0}"},
     {"CREATE TABLE in_force AS SELECT * FROM store.run_in_force WHERE run_id = {0}"},
+    {"CREATE TABLE outside_reference AS SELECT * FROM store.outside_reference WHERE run_id = {0}"
+     " AND completed_at_us IS NOT NULL AND removed_at_us IS NULL",
+     nullptr, kReferenceSince},
+    {"CREATE TABLE outside_position (robot_time_us INTEGER PRIMARY KEY, position_m REAL, position_sd_m REAL)", nullptr,
+     kReferenceSince},
+    {"INSERT INTO main.outside_position SELECT robot_time_us, position_m, position_sd_m FROM store.outside_position"
+     " WHERE reference_id = (SELECT reference_id FROM main.outside_reference)"
+     " AND (robot_time_us > {1} OR {1} = 0) AND robot_time_us <= {2}",
+     "SELECT max(robot_time_us) FROM (SELECT robot_time_us FROM store.outside_position WHERE reference_id ="
+     " (SELECT reference_id FROM main.outside_reference) AND (robot_time_us > {1} OR {1} = 0)"
+     " ORDER BY robot_time_us LIMIT 5000)",
+     kReferenceSince},
 };
 
 constexpr const char* kInsert = "INSERT INTO sample VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";

@@ -1,5 +1,5 @@
-// SQL of the seventh migration: fluids and retired robots, causes of events of their own, and what a robot says that
-// this station does not know or cannot compute with.
+// SQL of the seventh migration: fluids and retired robots, causes of events of their own, what a robot says that this
+// station does not know or cannot compute with, and positions that were measured from outside.
 //
 // It adds columns and tables only: no row is rewritten.
 #include "server/recording/schema.hpp"
@@ -83,6 +83,43 @@ SELECT event.event_row, event.robot_id, printf('%llu', boot.boot_id) AS boot_id,
   printf('%llu', event.emergency_id) AS emergency_id, printf('%llu', event.command_id) AS command_id,
   event.received_at_us, event.emergency_cause, event.detail, event.unknown_values
 FROM event LEFT JOIN boot USING (boot_key);
+
+-- A run's position as it was measured from outside (a camera, marks on a ruler), beside what the robot recorded: no digest
+-- contains it. A run has one in use at most; those that were removed or replaced stay listed, without their positions.
+CREATE TABLE outside_reference (
+  reference_id INTEGER PRIMARY KEY,
+  run_id INTEGER NOT NULL REFERENCES run,
+  span INTEGER NOT NULL,           -- of the run: the positions are on the robot time of its boot
+  source TEXT NOT NULL,            -- a name, e.g. of the file
+  sha256 TEXT NOT NULL,            -- of the text that was imported
+  clock_method TEXT NOT NULL,      -- offset, utc, marker, correlation
+  clock_offset_s REAL NOT NULL,    -- the text's t_s + this = seconds since the first sample of the span
+  clock_sd_s REAL,                 -- NULL: not known
+  correlation REAL,                -- of both motions, by the method correlation, as the next
+  motion_ratio REAL,               -- it moves so many times what the robot's own record does
+  zero_is_kept INTEGER NOT NULL,   -- 0: zero_offset_m was estimated from the robot's own record
+  zero_offset_m REAL NOT NULL,     -- was added to the text's positions
+  zero_sd_m REAL,                  -- NULL: not known
+  samples INTEGER NOT NULL,
+  samples_left_out INTEGER NOT NULL,  -- of the text: before or after the span
+  actor TEXT NOT NULL,
+  made_at_us INTEGER NOT NULL,
+  completed_at_us INTEGER,         -- NULL: not all of its positions are there
+  removed_at_us INTEGER,           -- NULL: in use, if it is complete
+  removed_by TEXT,
+  removed_reason TEXT
+);
+CREATE INDEX outside_reference_by_run ON outside_reference(run_id);
+CREATE UNIQUE INDEX outside_reference_in_use ON outside_reference(run_id)
+  WHERE completed_at_us IS NOT NULL AND removed_at_us IS NULL;
+
+CREATE TABLE outside_position (
+  reference_id INTEGER NOT NULL REFERENCES outside_reference,
+  robot_time_us INTEGER NOT NULL,
+  position_m REAL NOT NULL,        -- with zero_offset_m in it
+  position_sd_m REAL NOT NULL,
+  PRIMARY KEY (reference_id, robot_time_us)
+) WITHOUT ROWID;
 )sql";
 
 }  // namespace server

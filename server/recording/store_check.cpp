@@ -293,7 +293,7 @@ void Checking::check_certificate(RunId run) {
 
 void Checking::check_references() {
   for (const char* table : {"boot", "event", "event_gap", "run", "run_span", "run_note", "run_certificate", "marker",
-                            "in_force", "clock_estimate"}) {
+                            "in_force", "clock_estimate", "outside_reference", "outside_position"}) {
     SQLite::Statement check{database_, fmt::format("PRAGMA foreign_key_check({})", table)};
     while (check.executeStep()) {
       fault("a row of {} names a {} that is not there", table, check.getColumn(2).getString());

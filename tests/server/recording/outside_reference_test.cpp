@@ -1,0 +1,120 @@
+// References in the database: written in pieces, replaced, and deleted with their run.
+#include "server/recording/outside_reference.hpp"
+
+#include <gmock/gmock.h>
+
+#include "server/recording/store_check.hpp"
+#include "tests/server/recording/retention_fixture.hpp"
+
+namespace server {
+namespace {
+
+using ::testing::IsEmpty;
+
+class OutsideReferenceTest : public RetentionTest {
+ protected:
+  RunId make_run() {
+    keep(0);
+    const RunId run = wait(runs_->create(robot_.id, named("swim"))).value().id;
+    record(100);
+    wait(runs_->end(run, ""));
+    return run;
+  }
+  static OutsideReference reference_of(RunId run, const std::string& source = "camera.csv") {
+    OutsideReference reference;
+    reference.run = run;
+    reference.source = source;
+    reference.clock = ReferenceClock::correlation;
+    reference.clock_offset_s = 1.5;
+    reference.clock_sd_s = 0.002;
+    reference.correlation = 0.998;
+    reference.actor = "token:ana";
+    reference.made_at_us = 7;
+    return reference;
+  }
+  static OutsidePositions positions(std::size_t count) {
+    OutsidePositions made;
+    for (std::size_t i = 0; i < count; ++i) {
+      made.robot_time_us.push_back(1000 * i);
+      made.position_m.push_back(0.5);
+      made.position_sd_m.push_back(0.001);
+    }
+    return made;
+  }
+  Result<OutsideReference> import(const OutsideReference& reference, std::size_t count,
+                                  const std::string& reason = "") {
+    return wait(recording_->references.import(reference, positions(count), reason, {"token:ana", "", 8}));
+  }
+  std::vector<std::string> faults() {
+    SQLite::Database database = open_for_reading(path_);
+    return check_store(database, {.run = {}, .integrity = true}).value().faults;
+  }
+};
+
+TEST_F(OutsideReferenceTest, IsThereAsAWholeAndInOrder) {
+  const RunId run = make_run();
+  const std::size_t count = 2 * kReferenceSlice + 7;
+  const auto made = import(reference_of(run), count);
+  ASSERT_TRUE(made) << made.error().detail;
+  EXPECT_EQ(made->clock, ReferenceClock::correlation);
+  EXPECT_EQ(made->clock_sd_s, 0.002);
+  EXPECT_EQ(made->motion_ratio, std::nullopt);
+  const OutsidePositions read = wait(recording_->references.positions(made->id, {}, count + 1));
+  ASSERT_EQ(read.size(), count);
+  EXPECT_EQ(read.robot_time_us.back(), 1000 * (count - 1));
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+TEST_F(OutsideReferenceTest, ReplacingDeletesThePositionsOfTheOneBeforeAndKeepsItsRow) {
+  const RunId run = make_run();
+  ASSERT_TRUE(import(reference_of(run), 5000));
+  EXPECT_EQ(import(reference_of(run, "second.csv"), 3).error().reason, "has_reference");
+  EXPECT_EQ(number("SELECT count(*) FROM outside_position"), 5000);
+  ASSERT_TRUE(import(reference_of(run, "second.csv"), 3, "a better camera"));
+  EXPECT_EQ(number("SELECT count(*) FROM outside_position"), 3);
+  EXPECT_EQ(rows("SELECT source, removed_by, removed_reason FROM outside_reference ORDER BY reference_id"),
+            (Rows{"camera.csv|token:ana|a better camera", "second.csv||"}));
+}
+
+TEST_F(OutsideReferenceTest, GoesWithItsRun) {
+  const RunId run = make_run();
+  ASSERT_TRUE(import(reference_of(run), 5000));
+  pass();
+  EXPECT_EQ(number("SELECT count(*) FROM outside_position"), 5000);  // the run holds it
+  wait(runs_->discard(run, "loose tube", {}));
+  EXPECT_EQ(wait(recording_->references.find(run)).error().code, ErrorCode::not_found);
+  pass();
+  EXPECT_EQ(number("SELECT count(*) FROM outside_position"), 0);
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+// The station was killed between two pieces.
+TEST_F(OutsideReferenceTest, WhatWasNotFinishedIsNeverInUse) {
+  const RunId run = make_run();
+  wait(recorder_->on_disk([run](Database& database) {
+    const auto id = begin_reference(database.handle(), reference_of(run), "");
+    add_positions(database.handle(), *id, positions(10), 0, 10);
+    return true;
+  }));
+  EXPECT_EQ(wait(recording_->references.find(run)).error().reason, "no_reference");
+  kill();
+  keep(0);
+  pass();
+  EXPECT_EQ(number("SELECT count(*) FROM outside_position"), 0);
+  EXPECT_EQ(wait(recording_->references.find(run)).error().reason, "no_reference");
+  ASSERT_TRUE(import(reference_of(run), 10));
+}
+
+TEST_F(OutsideReferenceTest, VerifyNamesPositionsOfNoReference) {
+  const RunId run = make_run();
+  ASSERT_TRUE(import(reference_of(run), 10));
+  stop();
+  {
+    SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE};
+    database.exec("PRAGMA foreign_keys = OFF; DELETE FROM outside_reference");
+  }
+  EXPECT_THAT(faults(), ::testing::Contains("a row of outside_position names a outside_reference that is not there"));
+}
+
+}  // namespace
+}  // namespace server
