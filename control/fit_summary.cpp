@@ -54,6 +54,7 @@ void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const 
     if (free[i] == kDeadTime || (free[i] == kSensorTime && fit.dead_time_s > 0)) {
       fit.dead_time_sigma_s = found.one_sigma[i];
     }
+    if (free[i] == kPositionClock) fit.position_clock_sigma_s = found.one_sigma[i];
     if (row >= kParameters) continue;
     if (found.one_sigma[i]) fit.one_sigma[row] = *found.one_sigma[i] * unit[row];
     for (std::size_t j = 0; j < free.size(); ++j) {
@@ -107,6 +108,7 @@ Fit summary(OutputErrorSearch& search, const Recording& recording, Cost cost, St
   fit.model = found.point.model;
   fit.offset_m = found.point.offset_m;
   fit.dead_time_s = found.point.dead_time_s;
+  fit.position_clock_s = found.point.position_clock_s;
   fit.sensor = search.sensor_fit(found.point);
   if (fit.sensor && search.finds_dead_time()) fit.dead_time_s = search.sensor_lag_s(found.point);
   fit.end = found.end;

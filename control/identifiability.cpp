@@ -75,6 +75,10 @@ std::string better_experiment(const Recording& recording, const Fit& fit, bool f
   if (plan.dt_s > kPlanBitS) return "a duty that changes often, sampled faster than every 0.2 s, would tell more";
   plan.duty = prbs_duty(1, kPlanBitS, kPlanDurationS, plan.dt_s);
   plan.position_sd_m = standard_deviation(fit.position_residual_m);
+  if (!recording.position_time_s.empty()) {  // fewer values than samples tell less
+    plan.position_sd_m *=
+        std::sqrt(static_cast<double>(recording.duty.size()) / static_cast<double>(recording.position_time_s.size()));
+  }
   plan.velocity_sd_m_s = standard_deviation(fit.velocity_residual_m_s);
   plan.acceleration_sd_m_s2 = standard_deviation(fit.acceleration_residual_m_s2);
   plan.fits_offset = fits_offset;

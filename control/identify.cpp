@@ -71,6 +71,29 @@ void check_duty(const std::vector<double>& duty) {
   }
 }
 
+void check_own_times(const Recording& recording) {
+  const std::vector<double>& time_s = recording.position_time_s;
+  if (recording.position_m.empty() || !recording.velocity_m_s.empty()) {
+    refuse("position_time_s belongs to a position_m that was measured alone");
+  }
+  if (time_s.size() != recording.position_m.size()) {
+    refuse("position_m has ", recording.position_m.size(), " values, position_time_s has ", time_s.size(),
+           ": give one per time");
+  }
+  if (time_s.size() < kFewestSamples) {
+    refuse("position_time_s has ", time_s.size(), " times: measure at least ", kFewestSamples, " positions");
+  }
+  const double end_s = recording.dt_s * static_cast<double>(recording.duty.size() - 1);
+  for (std::size_t k = 0; k < time_s.size(); ++k) {
+    if (!(time_s[k] >= 0 && time_s[k] <= end_s)) {
+      refuse("position_time_s[", k, "] is ", time_s[k], ": it must lie in the record, from 0 to ", end_s, " s");
+    }
+    if (k > 0 && !(time_s[k] > time_s[k - 1])) {
+      refuse("position_time_s[", k, "] is ", time_s[k], ", not after the one before: times must ascend");
+    }
+  }
+}
+
 void check(const Recording& recording) {
   const std::size_t samples = recording.duty.size();
   if (!(recording.dt_s > 0)) refuse("dt_s must be positive, is ", recording.dt_s);
@@ -88,7 +111,9 @@ void check(const Recording& recording) {
                       : "position_m, velocity_m_s and acceleration_m_s2 are all empty: give one of them");
   }
   check_duty(recording.duty);
-  check_output("position_m", recording.position_m, samples);
+  if (!recording.position_time_s.empty()) check_own_times(recording);
+  const std::size_t positions = recording.position_time_s.empty() ? samples : recording.position_time_s.size();
+  check_output("position_m", recording.position_m, positions);
   check_output("velocity_m_s", recording.velocity_m_s, samples);
   check_output("acceleration_m_s2", recording.acceleration_m_s2, samples);
 }

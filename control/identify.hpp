@@ -12,6 +12,10 @@
 // that one: then the acceleration is fitted, with the sensor's bias, lag and clock as further unknowns
 // (sensor_path.hpp).
 //
+// A position that was measured from outside has times of its own (position_time_s), and its clock may be off: then y of
+// (1) is the model's position at those times plus a shift, which is a further unknown. Nothing that was measured is
+// resampled, so sigmas count what was measured (position_times.hpp).
+//
 // Structures: fractional (20); second_order, (19) with α = 2, β = 1; first_order, b1 = 0, β = 1. One is chosen by AIC.
 // The search starts from the Newtonian model (28), as the paper does, and from further points against local minima.
 // The simplest structure is searched first; each may use an equal part of the time that is left, so what the simple
@@ -44,6 +48,9 @@ struct Recording {
   std::vector<double> position_m;
   std::vector<double> velocity_m_s;
   std::vector<double> acceleration_m_s2 = {};
+  // Of a position that was measured alone and not at the samples: seconds since the first sample, ascending, within the
+  // record. Empty: position_m has one value per sample.
+  std::vector<double> position_time_s = {};
 };
 
 // From columns with times, which must be equally spaced within 1 % of a step.
@@ -72,6 +79,9 @@ struct IdentificationOptions {
   int iteration_limit = 200;                         // per start
   double time_limit_s = 60;                          // in all
   std::function<bool(const Progress&)> on_progress;  // return false to cancel
+
+  // The clock of a position with times of its own may be off. Not beside a dead time, which is the same to the model.
+  bool fits_position_clock = true;
 };
 
 inline constexpr std::size_t kParameters = 5;  // ln-scaled inside; reported as kp, b1, b2, alpha, beta
@@ -95,6 +105,8 @@ struct Fit {
   FractionalModel model;  // b3 = 1
   double offset_m = 0, dead_time_s = 0;
   std::optional<double> offset_sigma_m, dead_time_sigma_s;
+  double position_clock_s = 0;  // what the times of the position lack, with its sigma if it was fitted
+  std::optional<double> position_clock_sigma_s;
   std::array<std::optional<double>, kParameters> one_sigma;
   std::array<std::array<double, kParameters>, kParameters> correlation{};
   double sse = 0;             // sum of squared residuals, of both channels in their own units

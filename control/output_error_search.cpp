@@ -27,8 +27,9 @@ double logistic(double x) { return std::clamp(1 / (1 + std::exp(-x)), kNearestTo
 
 double inside(double share) { return std::clamp(share, kNearestToBound, 1 - kNearestToBound); }
 
-constexpr double kEarliestSample = 4, kLatestSample = 2;  // A of sensor_path.hpp in ticks, before and after the tick
-constexpr double kLongestTimeConstant = 1;                // of the sensor, in ticks: more is the fluid
+constexpr double kEarliestSample = 4, kLatestSample = 2;   // A of sensor_path.hpp in ticks, before and after the tick
+constexpr double kLongestTimeConstant = 1;                 // of the sensor, in ticks: more is the fluid
+constexpr double kClockScaleS = 0.01, kLargestClock = 50;  // of a position's clock: half a second at most
 
 double scale_of(const Eigen::VectorXd& values) { return std::sqrt((values.array() - values.mean()).square().mean()); }
 
@@ -50,9 +51,9 @@ struct OutputErrorSearch::Descent {
     const auto parts = search.residuals(point);
     if (search.limit_.is_reached()) return -1;
     Index row = 0;
-    for (std::size_t c = 0; c < parts.size(); ++c, row += search.samples_) {
+    for (std::size_t c = 0; c < parts.size(); ++c, row += search.rows_) {
       const Measured& measured = search.measured_[c];
-      residual.segment(row, search.samples_) = parts[c].cwiseProduct(measured.root_weight) / measured.sd;
+      residual.segment(row, search.rows_) = parts[c].cwiseProduct(measured.root_weight) / measured.sd;
     }
     if (!residual.allFinite()) residual.setConstant(1e100);
     return 0;
@@ -65,16 +66,16 @@ struct OutputErrorSearch::Descent {
     if (search.limit_.is_reached()) return -1;
     const Eigen::VectorXd chain = search.coordinate_slopes(structure, point);
     Index row = 0;
-    for (std::size_t c = 0; c < parts.size(); ++c, row += search.samples_) {
+    for (std::size_t c = 0; c < parts.size(); ++c, row += search.rows_) {
       const Measured& measured = search.measured_[c];
-      slopes.middleRows(row, search.samples_) =
+      slopes.middleRows(row, search.rows_) =
           (measured.root_weight / -measured.sd).asDiagonal() * parts[c] * chain.asDiagonal();
     }
     is_not_finite = !slopes.allFinite();
     return is_not_finite ? -1 : 0;
   }
 
-  Index values() const { return search.samples_ * static_cast<Index>(search.measured_.size()); }
+  Index values() const { return search.rows_ * static_cast<Index>(search.measured_.size()); }
 };
 
 OutputErrorSearch::OutputErrorSearch(const Recording& recording, const IdentificationOptions& options,
@@ -82,14 +83,18 @@ OutputErrorSearch::OutputErrorSearch(const Recording& recording, const Identific
     : options_(options),
       dt_s_(recording.dt_s),
       samples_(static_cast<Index>(recording.duty.size())),
+      rows_(recording.position_time_s.empty() ? samples_ : static_cast<Index>(recording.position_time_s.size())),
       limit_(options.time_limit_s, options.on_progress, std::move(clock)) {
   const auto add = [&](Channel channel, const std::vector<double>& values) {
     if (values.empty()) return;
-    const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(values.data(), samples_);
+    const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(values.data(), rows_);
     measured_.push_back({channel,
                          OutputModel(channel, dt_s_, recording.duty, options.longest_dead_time_s, kModelTolerance),
-                         measured, scale_of(measured), Eigen::VectorXd::Ones(samples_)});
+                         measured, scale_of(measured), Eigen::VectorXd::Ones(rows_)});
     if (channel == Channel::position) offset_scale_m_ = measured_.back().sd;
+    if (!recording.position_time_s.empty()) {
+      measured_.back().times = std::make_unique<PositionTimes>(recording.position_time_s, dt_s_);
+    }
   };
   add(Channel::position, recording.position_m);
   add(Channel::velocity, recording.velocity_m_s);
@@ -101,7 +106,7 @@ OutputErrorSearch::OutputErrorSearch(const Recording& recording, const Identific
     sensor_start_.sensor = rough_timing();
     return;
   }
-  if (options.longest_dead_time_s > 0) make_scan(recording);
+  if (options.longest_dead_time_s > 0 && recording.position_time_s.empty()) make_scan(recording);
 }
 
 std::vector<int> OutputErrorSearch::free_parameters(Structure structure) const {
@@ -116,6 +121,8 @@ std::vector<int> OutputErrorSearch::free_parameters(Structure structure) const {
   }
   if (options_.fits_offset && measured_.front().channel == Channel::position) free.push_back(kOffset);
   if (options_.longest_dead_time_s > 0) free.push_back(kDeadTime);
+  const bool has_clock = measured_.front().times != nullptr && options_.fits_position_clock;
+  if (has_clock && !(options_.longest_dead_time_s > 0)) free.push_back(kPositionClock);
   return free;
 }
 
@@ -136,7 +143,8 @@ std::vector<Eigen::VectorXd> OutputErrorSearch::residuals(const SearchPoint& poi
     }
     measured.model.set_delay(point.dead_time_s, stop_);
     const double offset_m = measured.channel == Channel::position ? point.offset_m : 0;
-    result.emplace_back((measured.measured - measured.model.output(point.model)).array() - offset_m);
+    const Eigen::VectorXd output = seen(measured, point, measured.model.output(point.model));
+    result.emplace_back((measured.measured - output).array() - offset_m);
   }
   return result;
 }
@@ -149,13 +157,15 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::jacobians(Structure structure, c
     const Eigen::MatrixXd of_model = measured.model.jacobian(point.model);
     Eigen::MatrixXd of_sensor;
     if (measured.path) of_sensor = measured.path->timing_slopes(measured.model.output(point.model), point.sensor);
-    Eigen::MatrixXd slopes(samples_, static_cast<Index>(free.size()));
+    Eigen::MatrixXd slopes(rows_, static_cast<Index>(free.size()));
     for (Index j = 0; j < slopes.cols(); ++j) {
       const int parameter = free[static_cast<std::size_t>(j)];
       if (parameter == kOffset) {
         slopes.col(j).setConstant(measured.channel == Channel::position ? 1 : 0);
       } else if (parameter == kDeadTime) {
-        slopes.col(j) = -measured.model.slope(point.model, stop_);
+        slopes.col(j) = -seen(measured, point, measured.model.slope(point.model, stop_));
+      } else if (parameter == kPositionClock) {
+        slopes.col(j) = measured.times->slope(measured.model.output(point.model), point.position_clock_s);
       } else if (parameter >= kSensorTime) {
         slopes.col(j) = measured.path->weighed(of_sensor.col(parameter - kSensorTime));
       } else {
@@ -171,6 +181,7 @@ double OutputErrorSearch::earliest_sample_s() const { return -options_.longest_d
 
 Eigen::VectorXd OutputErrorSearch::seen(const Measured& measured, const SearchPoint& point,
                                         const Eigen::VectorXd& output) const {
+  if (measured.times) return measured.times->read(output, point.position_clock_s);
   return measured.path ? measured.path->weighed(measured.path->sampled(output, point.sensor)) : output;
 }
 
@@ -179,11 +190,11 @@ Eigen::VectorXd OutputErrorSearch::coordinates(Structure structure, const Search
   const FractionalModel& m = point.model;
   const SensorTiming& sensor = point.sensor;
   const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
-  Eigen::VectorXd all(kSensorTimeConstant + 1);
+  Eigen::VectorXd all(kPositionClock + 1);
   all << std::log(m.kp), std::log(m.b1), std::log(m.b2), logit(inside(m.alpha - 1)), logit(inside(m.beta)),
       point.offset_m / offset_scale_m_, logit(dead_time_share),
       logit(inside((sensor.first_s - earliest_s) / sensor_span_s)), (sensor.period_s / dt_s_ - 1) * record_ticks(),
-      logit(inside(sensor.time_constant_s / (kLongestTimeConstant * dt_s_)));
+      logit(inside(sensor.time_constant_s / (kLongestTimeConstant * dt_s_))), point.position_clock_s / kClockScaleS;
   return all(free_parameters(structure));
 }
 
@@ -202,6 +213,9 @@ SearchPoint OutputErrorSearch::point_at(Structure structure, const Eigen::Vector
       case kOffset: point.offset_m = value * offset_scale_m_; break;
       case kSensorTime: point.sensor.first_s = earliest_s + logistic(value) * sensor_span_s; break;
       case kSensorPeriod: point.sensor.period_s = dt_s_ * (1 + value / record_ticks()); break;
+      case kPositionClock:
+        point.position_clock_s = std::clamp(value, -kLargestClock, kLargestClock) * kClockScaleS;
+        break;
       case kSensorTimeConstant: point.sensor.time_constant_s = logistic(value) * kLongestTimeConstant * dt_s_; break;
       default: point.dead_time_s = logistic(value) * options_.longest_dead_time_s;
     }
@@ -215,11 +229,11 @@ Eigen::VectorXd OutputErrorSearch::coordinate_slopes(Structure structure, const 
   const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
   const double time_share = (point.sensor.first_s - earliest_s) / sensor_span_s;
   const double low_pass_share = point.sensor.time_constant_s / (kLongestTimeConstant * dt_s_);
-  Eigen::VectorXd all(kSensorTimeConstant + 1);
+  Eigen::VectorXd all(kPositionClock + 1);
   all << 1, 1, 1, (m.alpha - 1) * (2 - m.alpha), m.beta * (1 - m.beta), offset_scale_m_,
       longest_s > 0 ? point.dead_time_s * (1 - point.dead_time_s / longest_s) : 0,
       sensor_span_s * time_share * (1 - time_share), dt_s_ / record_ticks(),
-      kLongestTimeConstant * dt_s_ * low_pass_share * (1 - low_pass_share);
+      kLongestTimeConstant * dt_s_ * low_pass_share * (1 - low_pass_share), kClockScaleS;
   return all(free_parameters(structure));
 }
 
@@ -263,7 +277,7 @@ SearchEnd OutputErrorSearch::descend(Structure structure, SearchPoint& point, in
     last_iterations_ = ++progress.iteration;
     progress.sse = 0;
     for (std::size_t c = 0; c < measured_.size(); ++c) {
-      const auto part = solver.fvec.segment(static_cast<Index>(c) * samples_, samples_);
+      const auto part = solver.fvec.segment(static_cast<Index>(c) * rows_, rows_);
       progress.sse += measured_[c].sd * measured_[c].sd * part.squaredNorm();
     }
     limit_.report(progress);
@@ -299,7 +313,7 @@ SearchResult OutputErrorSearch::run(Structure structure, int parts) {
 void OutputErrorSearch::run_starts(Structure structure, SearchResult& result) {
   std::vector<double> costs;
   const int starts = 1 + options_.further_starts;
-  const double rounding = kRoundingShare * kRoundingShare * static_cast<double>(samples_);
+  const double rounding = kRoundingShare * kRoundingShare * static_cast<double>(rows_);
   double best = std::numeric_limits<double>::infinity();
   for (int index = 0; index < starts; ++index) {
     const Progress progress{structure, index, starts, 0, 0};
@@ -331,7 +345,7 @@ void OutputErrorSearch::refine_channel_weights(Structure structure, SearchResult
     if (limit_.is_reached()) return;
     for (std::size_t c = 0; c < parts.size(); ++c) {
       const double floor = 1e-13 * scale_of(measured_[c].measured);
-      measured_[c].sd = std::max(floor, parts[c].norm() / std::sqrt(static_cast<double>(samples_)));
+      measured_[c].sd = std::max(floor, parts[c].norm() / std::sqrt(static_cast<double>(rows_)));
     }
     result.end = descend(structure, result.point, options_.iteration_limit,
                          {structure, result.starts - 1, result.starts, result.iterations, 0});

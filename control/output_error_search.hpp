@@ -3,6 +3,7 @@
 //   minimise Σ_channels Σ_k (y_k - output_k(q) - offset)²/σ²_channel            (1)   σ: re-estimated, for two channels
 //   minimise Σ_channels Σ_k |y_k - output_k(q) - offset|/σ_channel              (2)   reweighted least squares on (1)
 //   of the acceleration: y - output as a SensorPath reads it, its bias taken off                 (4)
+//   of a position with times of its own: y - output at these times plus a shift - offset           (5)
 //   q = ln kp, ln b1, ln b2, ln((α - 1)/(2 - α)), ln(β/(1 - β)), offset, ln(τ/(longest - τ))         (3)   unbounded
 //
 // Eigen's Levenberg-Marquardt (MINPACK's lmder) with the exact Jacobian. Every start's gain is the best for its other
@@ -18,6 +19,7 @@
 
 #include "control/identify.hpp"
 #include "control/output_model.hpp"
+#include "control/position_times.hpp"
 #include "control/search_limit.hpp"
 #include "control/sensor_path.hpp"
 
@@ -27,6 +29,7 @@ struct SearchPoint {
   FractionalModel model;
   double offset_m = 0, dead_time_s = 0;
   SensorTiming sensor = {};
+  double position_clock_s = 0;  // the shift of (5)
 };
 
 struct SearchResult {
@@ -36,7 +39,14 @@ struct SearchResult {
 };
 
 // What is free beside the model's own parameters follows the kParameters of these.
-enum FreeParameter : int { kOffset = kParameters, kDeadTime, kSensorTime, kSensorPeriod, kSensorTimeConstant };
+enum FreeParameter : int {
+  kOffset = kParameters,
+  kDeadTime,
+  kSensorTime,
+  kSensorPeriod,
+  kSensorTimeConstant,
+  kPositionClock
+};
 
 class OutputErrorSearch {
  public:
@@ -72,7 +82,8 @@ class OutputErrorSearch {
     Eigen::VectorXd measured;
     double sd;
     Eigen::VectorXd root_weight;
-    std::unique_ptr<SensorPath> path = nullptr;  // of an acceleration
+    std::unique_ptr<SensorPath> path = nullptr;      // of an acceleration
+    std::unique_ptr<PositionTimes> times = nullptr;  // of a position that has its own
   };
   struct Descent;  // what Eigen's solver calls
 
@@ -100,6 +111,7 @@ class OutputErrorSearch {
   IdentificationOptions options_;
   double dt_s_;
   Eigen::Index samples_;
+  Eigen::Index rows_;  // measured values of each channel: samples_, or of a position with times of its own their number
   double offset_scale_m_ = 1;
   bool sensor_is_found_ = false;
   SearchPoint sensor_start_;  // what the search for it ended with

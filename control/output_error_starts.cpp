@@ -66,17 +66,16 @@ bool OutputErrorSearch::fit_gain(SearchPoint& point) {
   point.model.kp = 1;
   const bool has_offset = options_.fits_offset && measured_.front().channel == Channel::position;
   const Index count = static_cast<Index>(measured_.size());
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(samples_ * count, has_offset ? 2 : 1);
-  Eigen::VectorXd target(samples_ * count);
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(rows_ * count, has_offset ? 2 : 1);
+  Eigen::VectorXd target(rows_ * count);
   for (Index c = 0; c < count; ++c) {
     Measured& measured = measured_[static_cast<std::size_t>(c)];
     ++outputs_computed_;
     if (!measured.path && !measured.model.set_delay(point.dead_time_s, stop_)) return false;
-    columns.col(0).segment(c * samples_, samples_) =
-        seen(measured, point, measured.model.output(point.model)) / measured.sd;
+    columns.col(0).segment(c * rows_, rows_) = seen(measured, point, measured.model.output(point.model)) / measured.sd;
     const Eigen::VectorXd wanted = measured.path ? measured.path->weighed(measured.measured) : measured.measured;
-    target.segment(c * samples_, samples_) = wanted / measured.sd;
-    if (has_offset && c == 0) columns.col(1).head(samples_).setConstant(1 / measured.sd);
+    target.segment(c * rows_, rows_) = wanted / measured.sd;
+    if (has_offset && c == 0) columns.col(1).head(rows_).setConstant(1 / measured.sd);
   }
   const Eigen::VectorXd best = columns.colPivHouseholderQr().solve(target);
   const double fallback = target.norm() / columns.col(0).norm();

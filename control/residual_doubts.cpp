@@ -44,7 +44,13 @@ void add_poor_fit(const ChannelResidual& channel, const Fit& fit, std::vector<st
   warnings.push_back(text.str());
 }
 
-void add_outliers(const ChannelResidual& channel, double dt_s, Cost cost, std::vector<std::string>& warnings) {
+// When the sample was measured.
+double time_of(const Recording& recording, std::size_t k) {
+  return recording.position_time_s.empty() ? recording.dt_s * static_cast<double>(k) : recording.position_time_s[k];
+}
+
+void add_outliers(const ChannelResidual& channel, const Recording& recording, Cost cost,
+                  std::vector<std::string>& warnings) {
   const double middle = median(channel.residual);
   std::vector<double> size;
   for (const double r : channel.residual) size.push_back(std::abs(r - middle));
@@ -55,7 +61,8 @@ void add_outliers(const ChannelResidual& channel, double dt_s, Cost cost, std::v
   const auto first = std::ranges::find_if(size, [&](double s) { return s > limit; }) - size.begin();
   std::ostringstream text = three_digits();
   text << count << " of the " << size.size() << " values of " << channel.name << " lie beyond 6 robust sd (" << limit
-       << ' ' << channel.unit << ") of the model, the first at " << dt_s * static_cast<double>(first) << " s: "
+       << ' ' << channel.unit << ") of the model, the first at " << time_of(recording, static_cast<std::size_t>(first))
+       << " s: "
        << (cost == Cost::least_squares ? "they draw the fit to them; repair them, or use the absolute error cost"
                                        : "they weigh little in the absolute error cost, but look at them");
   warnings.push_back(text.str());
@@ -105,7 +112,7 @@ std::vector<std::string> residual_doubts(const Recording& recording, const Ident
   take("velocity_m_s", "m/s", fit.velocity_residual_m_s, recording.velocity_m_s, fit.velocity_whiteness_p_value);
 
   std::vector<std::string> warnings;
-  for (const ChannelResidual& channel : channels) add_outliers(channel, recording.dt_s, options.cost, warnings);
+  for (const ChannelResidual& channel : channels) add_outliers(channel, recording, options.cost, warnings);
   for (const ChannelResidual& channel : channels) add_poor_fit(channel, fit, warnings);
   for (const ChannelResidual& channel : channels) add_mean(channel, warnings);
   for (const ChannelResidual& channel : channels) add_colour(channel, warnings);

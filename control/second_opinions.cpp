@@ -196,7 +196,7 @@ std::vector<std::string> second_opinions(OutputErrorSearch& search, const Record
   add_turned_sign(search, recording, options, fit, warnings);
   if (!warnings.empty()) return warnings;
   add_missing_offset(search, recording, options, fit, warnings);
-  if (!fit.sensor) add_initial_motion(search, recording, fit, warnings);
+  if (!fit.sensor && recording.position_time_s.empty()) add_initial_motion(search, recording, fit, warnings);
   return warnings;
 }
 
