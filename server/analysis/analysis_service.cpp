@@ -9,11 +9,13 @@ namespace asio = boost::asio;
 namespace {
 
 constexpr std::size_t kPage = 5000;
+constexpr std::size_t kPositionsPage = 10'000;
 
 }  // namespace
 
-asio::awaitable<Result<std::vector<StepPoint>>> AnalysisService::points(RunId run) {
-  std::vector<StepPoint> points;
+template <class Point>
+asio::awaitable<Result<std::vector<Point>>> AnalysisService::gather(RunId run, Point (*of)(const StoredSample&)) {
+  std::vector<Point> points;
   std::optional<SampleCursor> after;
   do {
     const auto page = co_await history_.samples(run, after, kPage);
@@ -22,16 +24,55 @@ asio::awaitable<Result<std::vector<StepPoint>>> AnalysisService::points(RunId ru
       co_return fail(ErrorCode::invalid, fmt::format("the run has more than {} samples", kMaxAnalysedSamples),
                      "run_too_long");
     }
-    for (const StoredSample& sample : page->samples) points.push_back(step_point(sample));
+    for (const StoredSample& sample : page->samples) points.push_back(of(sample));
     after = page->next;
   } while (after);
   co_return points;
 }
 
-asio::awaitable<Result<std::vector<MeasuredStep>>> AnalysisService::steps(RunId run) {
-  auto gathered = co_await points(run);
+asio::awaitable<std::optional<StoredReference>> AnalysisService::reference_of(RunId run) {
+  auto find = [run](SQLite::Database& database) { return find_reference(database, run); };
+  auto found = co_await history_.reader().ask(std::move(find));
+  if (!found) co_return std::nullopt;
+  StoredReference stored{std::move(*found), {}};
+  OutsidePositions& all = stored.positions;
+  for (std::size_t read = kPositionsPage; read == kPositionsPage;) {
+    const auto after_us = all.size() == 0 ? std::nullopt : std::optional{all.robot_time_us.back()};
+    auto ask = [id = stored.reference.id, after_us](SQLite::Database& database) {
+      return read_positions(database, id, after_us, kPositionsPage);
+    };
+    const OutsidePositions page = co_await history_.reader().ask(std::move(ask));
+    read = page.size();
+    all.robot_time_us.insert(all.robot_time_us.end(), page.robot_time_us.begin(), page.robot_time_us.end());
+    all.position_m.insert(all.position_m.end(), page.position_m.begin(), page.position_m.end());
+    all.position_sd_m.insert(all.position_sd_m.end(), page.position_sd_m.begin(), page.position_sd_m.end());
+  }
+  co_return stored;
+}
+
+asio::awaitable<Result<RunMeasures>> AnalysisService::measures(RunId run) {
+  auto gathered = co_await gather(run, step_point);
   if (!gathered) co_return std::unexpected{gathered.error()};
-  auto job = [points = std::move(*gathered)] { return measure_steps(points); };
+  auto reference = co_await reference_of(run);
+  auto job = [points = std::move(*gathered), reference = std::move(reference)] {
+    RunMeasures measures;
+    measures.steps = measure_steps(points, reference ? &*reference : nullptr);
+    if (reference) {
+      measures.reference = reference->reference;
+      measures.estimate_error = estimate_error(points, *reference);
+    }
+    return measures;
+  };
+  co_return co_await maths_.run(std::move(job));
+}
+
+asio::awaitable<Result<PlacedReference>> AnalysisService::place(RunId run, ReferenceRequest request,
+                                                                std::optional<MarkerPlace> marker) {
+  auto gathered = co_await gather(run, own_position);
+  if (!gathered) co_return std::unexpected{gathered.error()};
+  auto job = [own = std::move(*gathered), request = std::move(request), marker] {
+    return place_reference(request, own, marker);
+  };
   co_return co_await maths_.run(std::move(job));
 }
 

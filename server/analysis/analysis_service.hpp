@@ -4,8 +4,10 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
+#include <utility>
 #include <vector>
 
+#include "server/analysis/reference_import.hpp"
 #include "server/analysis/run_recording.hpp"
 #include "server/analysis/run_steps.hpp"
 #include "server/recording/history.hpp"
@@ -14,15 +16,35 @@
 
 namespace server {
 
+// Steps by the outside reference where there is one, and how far the robot's own position was from it.
+struct RunMeasures {
+  std::vector<MeasuredStep> steps;
+  std::optional<OutsideReference> reference;
+  std::optional<EstimateError> estimate_error;  // over all of the reference
+};
+
 class AnalysisService {
  public:
   AnalysisService(History& history, WorkerThread& maths) : history_{history}, maths_{maths} {}
 
   // The run's steps in order; invalid when the run has more samples than kMaxAnalysedSamples.
-  boost::asio::awaitable<Result<std::vector<MeasuredStep>>> steps(RunId run);
+  boost::asio::awaitable<Result<RunMeasures>> measures(RunId run);
+
+  // Puts an outside record onto the clock of the run; errors of place_reference, and as above.
+  boost::asio::awaitable<Result<PlacedReference>> place(RunId run, ReferenceRequest request,
+                                                        std::optional<MarkerPlace> marker);
+
+  // Runs job() on the same worker: for text that is too long for the loop.
+  template <class Job>
+  boost::asio::awaitable<std::invoke_result_t<Job>> compute(Job job) {
+    co_return co_await maths_.run(std::move(job));
+  }
 
  private:
-  boost::asio::awaitable<Result<std::vector<StepPoint>>> points(RunId run);
+  boost::asio::awaitable<std::optional<StoredReference>> reference_of(RunId run);
+  // Of every sample of the run, what `of` makes of it.
+  template <class Point>
+  boost::asio::awaitable<Result<std::vector<Point>>> gather(RunId run, Point (*of)(const StoredSample&));
 
   History& history_;
   WorkerThread& maths_;

@@ -9,6 +9,44 @@ namespace server {
 namespace {
 
 constexpr double kBandOfStep = 0.02;
+constexpr double kLongestPauseS = 0.25;  // in a reference: a longer one hides too much of a step
+constexpr double kLongestStepS = 0.1;    // between samples of the robot, to compare in between
+constexpr std::size_t kFewestPositions = 10;
+
+// Compares the robot's own position with the reference, in the order of time.
+class Comparison {
+ public:
+  void add(double error_m, double own_sd_m, double outside_sd_m) {
+    squares_ += error_m * error_m;
+    result_.worst_m = std::max(result_.worst_m, std::abs(error_m));
+    within_ += std::abs(error_m) <= 2 * std::hypot(own_sd_m, outside_sd_m) ? 1U : 0U;
+    ++result_.samples;
+  }
+  std::optional<EstimateError> end() {
+    if (result_.samples == 0) return std::nullopt;
+    const auto count = static_cast<double>(result_.samples);
+    result_.rms_m = std::sqrt(squares_ / count);
+    result_.within_2_sd = static_cast<double>(within_) / count;
+    return result_;
+  }
+
+ private:
+  EstimateError result_;
+  double squares_ = 0;
+  std::size_t within_ = 0;
+};
+
+// What the robot believed at this time, between two samples: where it is, without the disturbance.
+void compare(const StepPoint& before, const StepPoint& after, std::uint64_t at_us, double outside_m,
+             double outside_sd_m, Comparison& into) {
+  const double step_s = static_cast<double>(after.robot_time_us - before.robot_time_us) * 1e-6;
+  const double share = step_s > 0 ? static_cast<double>(at_us - before.robot_time_us) * 1e-6 / step_s : 0;
+  const double first_m = static_cast<double>(before.position_m - before.disturbance_m);
+  const double second_m = static_cast<double>(after.position_m - after.disturbance_m);
+  const double own_m = std::lerp(first_m, second_m, share), own_sd_m = static_cast<double>(after.position_sd_m);
+  if (step_s > kLongestStepS || !std::isfinite(own_m) || !std::isfinite(own_sd_m)) return;
+  into.add(own_m - outside_m, own_sd_m, outside_sd_m);
+}
 
 bool usable(const StepPoint& point) { return point.steered && std::isfinite(point.position_m); }
 
@@ -22,6 +60,8 @@ std::optional<StepCause> step_at(const StepPoint& before, const StepPoint& point
 
 class Cutter {
  public:
+  explicit Cutter(const StoredReference* reference) : reference_{reference} {}
+
   void take(const StepPoint& point) {
     if (points_ == 0 || before_.span != point.span) span_began_us_ = point.robot_time_us;
     ++points_;
@@ -30,6 +70,7 @@ class Cutter {
     } else {
       const auto cause = step_at(before_, point);
       if (cause) begin(*cause, point);
+      points_of_step_.push_back(point);
       time_s_.push_back(seconds(point));
       position_m_.push_back(static_cast<double>(point.position_m));
       step_.last_seq = point.seq;
@@ -69,18 +110,89 @@ class Cutter {
       experiment.target_m = step_.target_m;
       experiment.band_m = step_.band_m;
       step_.metrics = control::measure_step(time_s_, position_m_, experiment);
+      if (reference_ != nullptr && reference_->reference.span == step_.span) measure_from_outside();
       steps_.push_back(step_);
     }
     time_s_.clear();
     position_m_.clear();
+    points_of_step_.clear();
   }
 
+  // The reference in the step, if it covers it without a pause: what it measured takes the place of the estimate.
+  void measure_from_outside() {
+    const OutsidePositions& outside = reference_->positions;
+    const std::uint64_t begin_us = points_of_step_.front().robot_time_us;
+    const std::uint64_t end_us = points_of_step_.back().robot_time_us;
+    const auto first = std::ranges::lower_bound(outside.robot_time_us, begin_us) - outside.robot_time_us.begin();
+    const auto last = std::ranges::upper_bound(outside.robot_time_us, end_us) - outside.robot_time_us.begin();
+    const auto from = static_cast<std::size_t>(first), to = static_cast<std::size_t>(last);
+    if (to < from + kFewestPositions) return;
+    const auto pause_s = [](std::uint64_t a, std::uint64_t b) { return static_cast<double>(b - a) * 1e-6; };
+    bool is_covered = pause_s(begin_us, outside.robot_time_us[from]) <= kLongestPauseS &&
+                      pause_s(outside.robot_time_us[to - 1], end_us) <= kLongestPauseS;
+    for (std::size_t i = from + 1; i < to && is_covered; ++i) {
+      is_covered = pause_s(outside.robot_time_us[i - 1], outside.robot_time_us[i]) <= kLongestPauseS;
+    }
+    if (is_covered) take_reference(from, to);
+  }
+
+  void take_reference(std::size_t from, std::size_t to) {
+    const OutsidePositions& outside = reference_->positions;
+    const double disturbance_m = static_cast<double>(points_of_step_.front().disturbance_m);
+    std::vector<double> time_s, position_m;
+    double squares_m2 = 0, sd_m = 0;
+    Comparison comparison;
+    std::size_t after = 1;
+    for (std::size_t i = from; i < to; ++i) {
+      const std::uint64_t at_us = outside.robot_time_us[i];
+      time_s.push_back(static_cast<double>(at_us - span_began_us_) * 1e-6);
+      position_m.push_back(outside.position_m[i] + disturbance_m);
+      squares_m2 += outside.position_sd_m[i] * outside.position_sd_m[i];
+      sd_m = std::max(sd_m, outside.position_sd_m[i]);
+      while (after < points_of_step_.size() && points_of_step_[after].robot_time_us < at_us) ++after;
+      if (after == points_of_step_.size()) continue;
+      compare(points_of_step_[after - 1], points_of_step_[after], at_us, outside.position_m[i],
+              outside.position_sd_m[i], comparison);
+    }
+    control::StepExperiment experiment;
+    experiment.step_at_s = time_s.front();
+    experiment.start_m = start_from_outside(from) + disturbance_m;
+    experiment.target_m = step_.target_m;
+    experiment.band_m = step_.band_m;
+    experiment.noise_sd_m = std::sqrt(squares_m2 / static_cast<double>(to - from));
+    if (experiment.start_m == experiment.target_m) return;
+    step_.metrics = control::measure_step(time_s, position_m, experiment);
+    const double late_s = time_s.front() - step_.at_s;  // the first of them comes after the step
+    if (step_.metrics.settling_s) *step_.metrics.settling_s += late_s;
+    step_.metrics.peak_time_s += late_s;
+    step_.start_m = experiment.start_m;
+    step_.position_sd_m = sd_m;
+    step_.is_from_outside = true;
+    step_.estimate_error = comparison.end();
+  }
+
+  // Where the robot was when the step began: the mean of a few positions before it, in which noise is less, if it rests
+  // there; else the first one after it.
+  double start_from_outside(std::size_t from) const {
+    const OutsidePositions& outside = reference_->positions;
+    const std::uint64_t begin_us = points_of_step_.front().robot_time_us;
+    constexpr std::uint64_t kRestUs = 200'000;
+    double sum_m = 0;
+    std::size_t count = 0;
+    for (std::size_t i = from; i > 0 && outside.robot_time_us[i - 1] + kRestUs >= begin_us; --i, ++count) {
+      sum_m += outside.position_m[i - 1];
+    }
+    return count == 0 ? outside.position_m[from] : sum_m / static_cast<double>(count);
+  }
+
+  const StoredReference* reference_;
   StepPoint before_;
   std::uint64_t points_ = 0;
   std::uint64_t span_began_us_ = 0;
   double band_m_ = 0;
   MeasuredStep step_;
   std::vector<double> time_s_, position_m_;
+  std::vector<StepPoint> points_of_step_;
   std::vector<MeasuredStep> steps_;
 };
 
@@ -88,10 +200,26 @@ class Cutter {
 
 const char* text(StepCause value) { return value == StepCause::setpoint ? "setpoint" : "disturbance"; }
 
-std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points) {
-  Cutter cutter;
+std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points, const StoredReference* reference) {
+  Cutter cutter{reference};
   for (const StepPoint& point : points) cutter.take(point);
   return cutter.end();
+}
+
+std::optional<EstimateError> estimate_error(const std::vector<StepPoint>& points, const StoredReference& reference) {
+  const OutsidePositions& outside = reference.positions;
+  Comparison comparison;
+  std::size_t next = 0;
+  for (std::size_t k = 1; k < points.size(); ++k) {
+    const StepPoint &before = points[k - 1], &after = points[k];
+    if (after.span != reference.reference.span || before.span != after.span) continue;
+    while (next < outside.size() && outside.robot_time_us[next] < before.robot_time_us) ++next;
+    for (; next < outside.size() && outside.robot_time_us[next] < after.robot_time_us; ++next) {
+      compare(before, after, outside.robot_time_us[next], outside.position_m[next], outside.position_sd_m[next],
+              comparison);
+    }
+  }
+  return comparison.end();
 }
 
 }  // namespace server

@@ -3,13 +3,17 @@
 // A step begins with the first sample that carries a new setpoint_m or disturbance_m, and ends with the next step, with
 // auto mode, or with the recording's span. It starts from the position of its first sample. The settling band is ±2 %
 // of the latest change of setpoint, for disturbances too (as the paper's table reads).
+// Where the position was measured from outside throughout a step, the step is measured by that (with the disturbance,
+// which the robot's controller sees on top of it), and the robot's own position is compared with it.
 // Pure and slow for long runs: call it on a worker.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "control/step_metrics.hpp"
+#include "server/recording/outside_reference.hpp"
 
 namespace server {
 
@@ -25,6 +29,14 @@ struct StepPoint {
   float position_sd_m = 0;  // of an estimated position; 0: known
 };
 
+// How far the robot's own position is from the one that was measured from outside.
+struct EstimateError {
+  double rms_m = 0;
+  double worst_m = 0;      // the largest, in size
+  double within_2_sd = 0;  // share of the positions at which it is no more than two standard deviations, of both
+  std::size_t samples = 0;
+};
+
 enum class StepCause : std::uint8_t { setpoint, disturbance };
 const char* text(StepCause value);
 
@@ -37,11 +49,17 @@ struct MeasuredStep {
   double start_m = 0;
   double target_m = 0;
   double band_m = 0;
-  double position_sd_m = 0;  // the largest in the step: every position in `metrics` is uncertain by ± 2 of it
+  double position_sd_m = 0;      // the largest in the step: every position in `metrics` is uncertain by ± 2 of it
+  bool is_from_outside = false;  // positions, metrics and position_sd_m are those of the outside reference
+  std::optional<EstimateError> estimate_error;  // then
   control::StepMetrics metrics;
 };
 
 // Points in order of span and seq. A step that goes nowhere is left out; a position that is not finite ends a step.
-std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points);
+std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points,
+                                        const StoredReference* reference = nullptr);
+
+// Over all of the reference; none where the two have no time in common.
+std::optional<EstimateError> estimate_error(const std::vector<StepPoint>& points, const StoredReference& reference);
 
 }  // namespace server

@@ -1,4 +1,5 @@
 // Reads HTTP/1.1 with Beast, and writes it with answer_head; the only unit besides live_socket.cpp that knows it.
+// LONG: the turns of a connection, and every way in which they end, stand in one place.
 #include "server/api/http_connection.hpp"
 
 #include <fmt/format.h>
@@ -101,7 +102,7 @@ asio::awaitable<void> HttpConnection::take_turns() {
 asio::awaitable<void> HttpConnection::watch() {
   while (clock_.steady_us() < deadline_us_) co_await clock_.sleep_for(kWatchInterval);
   if (request_has_begun_) {
-    const Response late = problem(408, "the request did not arrive within 10 s", "too_slow");
+    const Response late = problem(408, "the request did not arrive in time", "too_slow");
     stream_.wire().write(asio::buffer(last_answer(late, stream_.is_secure())));
   }
   stream_.end();
@@ -177,7 +178,7 @@ void HttpConnection::note_arrival() {
 }
 
 // What the header alone is refused for. The last word has carry_out(), which knows the body.
-std::optional<Response> HttpConnection::refusal_of(Parser& parser) const {
+std::optional<Response> HttpConnection::refusal_of(Parser& parser) {
   const Message& head = parser.get();
   if (head.target().size() > kMaxTargetBytes) {
     return problem(414, fmt::format("the target has more than {} bytes", kMaxTargetBytes), "too_large");
@@ -187,10 +188,21 @@ std::optional<Response> HttpConnection::refusal_of(Parser& parser) const {
   }
   if (parser.is_done()) return std::nullopt;  // there is no body
   parser.body_limit(kMaxBodyBytes);
-  if (parser.content_length().value_or(0) > kMaxBodyBytes) return body_too_large(kMaxBodyBytes);
+  const std::uint64_t length = parser.content_length().value_or(0);
+  const std::size_t limit = router_.max_body_bytes(head.method_string(), head.target());
+  if (length > limit) return body_too_large(limit);
   auto admitted = guard_.admit(plain_head(head));
   if (!admitted) return std::move(admitted.error());
-  if (!admitted->actor.empty()) return std::nullopt;
+  if (!admitted->actor.empty()) {
+    if (length <= kMaxBodyBytes) return std::nullopt;
+    admitted->peer = address_of(stream_);
+    const std::optional<Scope> lacking = router_.scope_lacking(head.method_string(), head.target(), *admitted);
+    if (lacking) return not_permitted(*admitted, *lacking);
+    parser.body_limit(limit);
+    parser.get().body().reserve(length);
+    allow(kLongBodyTime);
+    return std::nullopt;
+  }
   parser.body_limit(kMaxLoginBodyBytes);
   if (parser.content_length().value_or(0) <= kMaxLoginBodyBytes) return std::nullopt;
   return body_too_large(kMaxLoginBodyBytes);
@@ -214,7 +226,7 @@ asio::awaitable<boost::system::error_code> HttpConnection::read_body(Parser& par
 
 asio::awaitable<HttpConnection::Next> HttpConnection::carry_out(Message message) {
   Request request = plain_head(message);
-  request.body = message.body();
+  request.body = std::move(message.body());
   request.received_us = clock_.steady_us();
   if (unread_since_us_) request.unread = microseconds{request.received_us - *unread_since_us_};
   auto admitted = guard_.admit(request);

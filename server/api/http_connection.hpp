@@ -1,8 +1,9 @@
 // One connection of the HTTP port: its handshake, then requests and answers in turn, until it ends or asks for /live.
 //
-// Limits of a request: target 8 kB (414), header 16 kB and 100 fields (431), body 64 kB, of signing in 4 kB (413). The
-// header is judged before the body is read, so nobody sends one who may not (401, 403, …). 10 s for a request to arrive
-// as a whole, however it drips (408), 60 s idle between two, 30 s for the client to take a piece of the answer.
+// Limits of a request: target 8 kB (414), header 16 kB and 100 fields (431), body 64 kB or what its route allows to who
+// may use it, of signing in 4 kB (413). The header is judged before the body is read, so nobody sends one who may not
+// (401, 403, …). 10 s for a request to arrive as a whole, however it drips, and a minute where its body is over 64 kB
+// (408), 60 s idle between two, 30 s for the client to take a piece of the answer.
 // Malformed HTTP is 400 and the end of the connection. An exception of a route is logged and answered with 500. A GET
 // whose client has gone is cancelled; a POST is always carried out. In TLS the handshake is part of the first request's
 // 10 s, and who speaks plain HTTP is told so (400). Each answer has the security headers, and is not cached unless it
@@ -34,10 +35,10 @@ namespace server {
 inline constexpr std::size_t kMaxHeaderBytes = 16 * 1024;
 inline constexpr std::size_t kMaxTargetBytes = 8 * 1024;
 inline constexpr std::size_t kMaxHeaderFields = 100;
-inline constexpr std::size_t kMaxBodyBytes = 64 * 1024;
 inline constexpr std::size_t kMaxLoginBodyBytes = 4 * 1024;  // of strangers
 inline constexpr std::size_t kMaxPagesOfOne = 32;            // on /live, of one user, token or link
 inline constexpr microseconds kRequestTime{std::chrono::seconds{10}};
+inline constexpr microseconds kLongBodyTime{std::chrono::seconds{60}};
 inline constexpr microseconds kIdleTime{std::chrono::seconds{60}};
 inline constexpr microseconds kWriteTime{std::chrono::seconds{30}};
 inline constexpr microseconds kLingerTime{std::chrono::seconds{2}};  // for a refused client to read why
@@ -69,7 +70,7 @@ class HttpConnection {
   boost::asio::awaitable<Next> carry_out(Message message);
   boost::asio::awaitable<Next> carry_out_stop(Parser& parser);
   void admit(Request& request, Caller caller);
-  std::optional<Response> refusal_of(Parser& parser) const;
+  std::optional<Response> refusal_of(Parser& parser);
   boost::asio::awaitable<Next> refuse_unreadable(boost::system::error_code error);
   boost::asio::awaitable<Next> send_and_close(Response response, Message message);
   boost::asio::awaitable<Response> answer(Request request);

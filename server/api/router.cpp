@@ -124,6 +124,36 @@ bool Router::is_stop(const std::string& method, const std::string& target) const
          });
 }
 
+const Route* Router::find(const std::string& method, const std::string& target) const {
+  const auto path = path_segments(target);
+  if (!path) return nullptr;
+  for (const Entry& entry : entries_) {
+    const Route& route = routes_[entry.route];
+    if (route.method == method && matches(entry, *path)) return &route;
+  }
+  return nullptr;
+}
+
+std::size_t Router::max_body_bytes(const std::string& method, const std::string& target) const {
+  const Route* route = find(method, target);
+  return route == nullptr ? kMaxBodyBytes : route->max_body_bytes;
+}
+
+std::optional<Scope> Router::scope_lacking(const std::string& method, const std::string& target,
+                                           const Caller& caller) const {
+  const Route* route = find(method, target);
+  if (route == nullptr || caller.scopes.allow(route->needs)) return std::nullopt;
+  Request head;
+  head.method = method;
+  head.target = target;
+  head.path = path_of(target).value_or("");
+  head.caller = caller;
+  head.actor = caller.actor;
+  head.peer = caller.peer;
+  if (on_refused_) on_refused_(head, route->needs);
+  return route->needs;
+}
+
 Answer Router::dispatch(Request request) const {
   const auto question_mark = request.target.find('?');
   const auto path = path_segments(request.target);

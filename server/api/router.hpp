@@ -11,6 +11,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,6 +22,8 @@ namespace server {
 
 using Answer = boost::asio::awaitable<Response>;
 
+inline constexpr std::size_t kMaxBodyBytes = 64 * 1024;  // of a request, where a route says nothing else
+
 struct Route {
   std::string method;
   std::string pattern;             // "/api/v1/robots/{robot_id}"
@@ -28,6 +31,7 @@ struct Route {
   std::vector<std::string> query;  // the parameters it knows
   std::function<Answer(Request)> answer;
   bool is_stop = false;  // SAFETY: an emergency stop, which is never refused for its form
+  std::size_t max_body_bytes = kMaxBodyBytes;
 };
 
 class Router {
@@ -39,6 +43,11 @@ class Router {
 
   // Whether the head alone, of this method and target, is reason enough to act.
   bool is_stop(const std::string& method, const std::string& target) const;
+
+  // How long a body may be for it.
+  std::size_t max_body_bytes(const std::string& method, const std::string& target) const;
+  // What the caller would need for it and has not, before a long body is read; on_refused has heard of it then.
+  std::optional<Scope> scope_lacking(const std::string& method, const std::string& target, const Caller& caller) const;
 
   // A coroutine that throws passes its exception on.
   Answer dispatch(Request request) const;
@@ -52,6 +61,7 @@ class Router {
   };
 
   bool matches(const Entry& entry, std::span<const std::string> path) const;
+  const Route* find(const std::string& method, const std::string& target) const;
 
   std::vector<Route> routes_;
   std::vector<Entry> entries_;

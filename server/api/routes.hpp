@@ -1,6 +1,6 @@
 // All routes of the API, grouped by noun: routes_station, routes_recording, routes_robots, routes_in_force,
-// routes_fluids, routes_runs, routes_markers, routes_samples, routes_overview, routes_exports, routes_accounts,
-// routes_audit.
+// routes_fluids, routes_runs, routes_markers, routes_references, routes_samples, routes_overview, routes_exports,
+// routes_accounts, routes_audit.
 //
 // Held to openapi.yaml both ways by a test. Each answer is a coroutine that can be called without a server.
 #pragma once
@@ -56,6 +56,7 @@ void add_in_force_routes(Router& router, ApiParts& parts);
 void add_fluid_routes(Router& router, ApiParts& parts);
 void add_run_routes(Router& router, ApiParts& parts);
 void add_marker_routes(Router& router, ApiParts& parts);
+void add_reference_routes(Router& router, ApiParts& parts);
 void add_sample_routes(Router& router, ApiParts& parts);
 void add_overview_routes(Router& router, ApiParts& parts);
 void add_export_routes(Router& router, ApiParts& parts);
@@ -68,6 +69,7 @@ void add_routes(Router& router, ApiParts& parts);
 std::string base_url(const StationFacts& facts, const std::string& address);  // "https://127.0.0.1:8080"
 std::string login_url(const std::string& base_url, const std::string& code);
 Result<RunId> run_id_of(const Request& request);
+nlohmann::json to_json(const OutsideReference& reference);
 nlohmann::json losses_json(const std::vector<StoreLoss>& losses);
 
 // Who asks, and now.

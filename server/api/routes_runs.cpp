@@ -167,6 +167,19 @@ Answer get_snapshot(ApiParts& parts, Request request) {
 
 json or_null(std::optional<double> value) { return value ? json(*value) : json(nullptr); }
 
+json to_json(const std::optional<EstimateError>& error) {
+  if (!error) return nullptr;
+  return {{"rms_m", error->rms_m},
+          {"worst_m", error->worst_m},
+          {"within_2_sd", error->within_2_sd},
+          {"samples", error->samples}};
+}
+
+const char* position_source(const MeasuredStep& step) {
+  if (step.is_from_outside) return "outside";
+  return step.position_sd_m > 0 ? "estimate" : "known";
+}
+
 json to_json(const MeasuredStep& step) {
   json out;
   out["cause"] = text(step.cause);
@@ -177,7 +190,9 @@ json to_json(const MeasuredStep& step) {
   out["start_m"] = decimal(static_cast<float>(step.start_m));
   out["target_m"] = decimal(static_cast<float>(step.target_m));
   out["band_m"] = step.band_m;
+  out["position_source"] = position_source(step);
   out["position_sd_m"] = decimal(static_cast<float>(step.position_sd_m));
+  out["estimate_error"] = to_json(step.estimate_error);
   out["settling_s"] = or_null(step.metrics.settling_s);
   out["overshoot_percent"] = step.metrics.overshoot_percent;
   out["peak_m"] = step.metrics.peak_m;
@@ -189,11 +204,14 @@ json to_json(const MeasuredStep& step) {
 Answer get_step_metrics(ApiParts& parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
-  const auto steps = co_await parts.analysis.steps(*id);
-  if (!steps) co_return problem(steps.error());
+  const auto measures = co_await parts.analysis.measures(*id);
+  if (!measures) co_return problem(measures.error());
   json list = json::array();
-  for (const MeasuredStep& step : *steps) list.push_back(to_json(step));
-  co_return json_response(200, {{"steps", std::move(list)}});
+  for (const MeasuredStep& step : measures->steps) list.push_back(to_json(step));
+  json out{{"steps", std::move(list)}};
+  out["reference"] = measures->reference ? to_json(*measures->reference) : json(nullptr);
+  out["estimate_error"] = to_json(measures->estimate_error);
+  co_return json_response(200, out);
 }
 
 }  // namespace

@@ -93,6 +93,7 @@ void add_routes(Router& router, ApiParts& parts) {
   add_fluid_routes(router, parts);
   add_run_routes(router, parts);
   add_marker_routes(router, parts);
+  add_reference_routes(router, parts);
   add_sample_routes(router, parts);
   add_overview_routes(router, parts);
   add_export_routes(router, parts);

@@ -91,6 +91,8 @@ Wish parse_command_line(int argc, char** argv) {
   offer<Tune>(app, "tune", "Find the controller for a crossover and a phase margin", wish);
   offer<Discretise>(app, "discretise", "Turn the controller into coefficients for the robot", wish);
   offer<Export>(app, "export", "Write a recorded run as a file: CSV, MAT or SQLite", wish);
+  offer<ReferenceCommand>(app, "reference", "A run's position as it was measured from outside: import, show, remove",
+                          wish);
   offer<Predict>(app, "predict", "Predict a closed-loop experiment, beside a recorded one", wish);
   offer<Verify>(app, "verify", "Check a station's database and the certificates of its runs", wish);
   try {

@@ -13,6 +13,7 @@
 #include "server/cli/identify.hpp"
 #include "server/cli/model.hpp"
 #include "server/cli/predict.hpp"
+#include "server/cli/reference.hpp"
 #include "server/cli/restore.hpp"
 #include "server/cli/robot.hpp"
 #include "server/cli/step.hpp"
@@ -39,7 +40,8 @@ struct Answered {
 
 using Wish =
     std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
-                 Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand>;
+                 Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
+                 ReferenceCommand>;
 
 Wish parse_command_line(int argc, char** argv);
 

@@ -8,8 +8,8 @@
 
 #include "control/identify.hpp"
 #include "control/transfer_function.hpp"
+#include "server/analysis/csv_columns.hpp"
 #include "server/analysis/run_recording.hpp"
-#include "server/cli/csv_columns.hpp"
 
 namespace CLI {
 class App;

@@ -102,5 +102,74 @@ TEST_F(RunStepsTest, NothingSteeredIsNoStep) {
   EXPECT_TRUE(measure_steps(points).empty());
 }
 
+// A camera saw the same run: the robot believed in 3 mm too much.
+class StepsFromOutside : public RunStepsTest {
+ protected:
+  StepsFromOutside() {
+    position_sd_m = 0.002F;
+    rest(100);
+    steer(0.1F, 0, 1000);
+    steer(0.1F, -0.05F, 1000);
+    watch(7'000'000, 7'000'000 + 2100 * 10'000);
+  }
+  void watch(std::uint64_t from_us, std::uint64_t to_us) {
+    reference.positions = {};
+    for (std::uint64_t at_us = from_us; at_us < to_us; at_us += 30'000) {
+      const StepPoint& point = points.at((at_us - 7'000'000) / 10'000);
+      reference.positions.robot_time_us.push_back(at_us);
+      reference.positions.position_m.push_back(static_cast<double>(point.position_m - point.disturbance_m) - 0.003);
+      reference.positions.position_sd_m.push_back(0.0002);
+    }
+  }
+
+  StoredReference reference;
+};
+
+TEST_F(StepsFromOutside, AreMeasuredByTheTruePositionAndSayHowWrongTheRobotWas) {
+  const auto steps = measure_steps(points, &reference);
+  ASSERT_EQ(steps.size(), 2U);
+  for (const MeasuredStep& step : steps) {
+    EXPECT_TRUE(step.is_from_outside);
+    EXPECT_NEAR(step.position_sd_m, 0.0002, 1e-9);
+    EXPECT_NEAR(step.metrics.steady_state_error_m, 0.003, 1e-4);
+    EXPECT_FALSE(step.metrics.settling_s);  // it stays 3 mm off, and the band is 2 mm
+    ASSERT_TRUE(step.estimate_error);
+    EXPECT_NEAR(step.estimate_error->rms_m, 0.003, 4e-4);
+    EXPECT_GE(step.estimate_error->worst_m, 0.003 - 1e-6);
+    EXPECT_GT(step.estimate_error->within_2_sd, 0.95);  // ± 4 mm
+    EXPECT_GT(step.estimate_error->samples, 290U);
+  }
+  EXPECT_NEAR(steps[0].start_m, -0.003, 1e-6);
+  EXPECT_NEAR(steps[1].start_m, 0.1 - 0.05 - 0.003, 1e-4);
+  const auto whole = estimate_error(points, reference);
+  ASSERT_TRUE(whole);
+  EXPECT_EQ(whole->samples, reference.positions.size());
+  for (StepPoint& point : points) point.position_sd_m = 0.0005F;
+  EXPECT_LT(estimate_error(points, reference)->within_2_sd, 0.05);  // now it claims ± 1 mm
+}
+
+TEST_F(StepsFromOutside, SettlingIsTheTruePositionsOwn) {
+  for (double& position_m : reference.positions.position_m) position_m += 0.003;
+  const auto steps = measure_steps(points, &reference);
+  EXPECT_NEAR(*steps[0].metrics.settling_s, 0.38, 0.1);
+  EXPECT_NEAR(steps[0].metrics.steady_state_error_m, 0, 1e-4);
+}
+
+TEST_F(StepsFromOutside, AStepThatWasNotSeenThroughoutStaysAnEstimate) {
+  watch(7'000'000 + 500 * 10'000, 7'000'000 + 2100 * 10'000);
+  auto steps = measure_steps(points, &reference);
+  EXPECT_FALSE(steps[0].is_from_outside);
+  EXPECT_FALSE(steps[0].estimate_error);
+  EXPECT_NEAR(steps[0].position_sd_m, 0.002, 1e-6);
+  EXPECT_TRUE(steps[1].is_from_outside);
+  reference.reference.span = 1;
+  EXPECT_FALSE(measure_steps(points, &reference)[1].is_from_outside);
+  EXPECT_FALSE(estimate_error(points, reference));
+  reference.reference.span = 0;
+  auto& times = reference.positions.robot_time_us;
+  for (std::size_t i = 400; i < times.size(); ++i) times[i] += 300'000;  // a pause
+  EXPECT_FALSE(measure_steps(points, &reference)[1].is_from_outside);
+}
+
 }  // namespace
 }  // namespace server

@@ -1,5 +1,5 @@
 // A line at a time; numbers by from_chars, so that no locale matters.
-#include "server/cli/csv_columns.hpp"
+#include "server/analysis/csv_columns.hpp"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace server::cli {
+namespace server {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
@@ -164,4 +164,4 @@ CsvColumns parse_csv(std::string_view text, const std::string& source, std::init
   return reader.end();
 }
 
-}  // namespace server::cli
+}  // namespace server

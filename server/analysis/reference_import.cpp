@@ -1,0 +1,301 @@
+// Reads the text, finds clock and zero, and keeps what lies in the span.
+#include "server/analysis/reference_import.hpp"
+
+#include <fmt/format.h>
+#include <sodium.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "server/analysis/csv_columns.hpp"
+
+namespace server {
+namespace {
+
+constexpr std::size_t kFewestPositions = 10;
+constexpr double kLeastOwnSdM = 1e-4;  // weights do not grow beyond it
+constexpr double kLargestPositionM = 1e6, kLargestTimeS = 1e10;
+constexpr double kLongestGapS = 0.1;  // in the robot's own record
+
+struct Given {
+  std::vector<double> time_s, position_m, sd_m;
+};
+
+// The line of a row of numbers, as csv_columns counts them.
+std::size_t line_of_row(std::string_view text, std::size_t row) {
+  std::size_t line = 0, rows = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string_view content = text.substr(begin, end - begin);
+    ++line;
+    begin = end + 1;
+    const auto first = content.find_first_not_of(" \t\r\xEF\xBB\xBF");
+    if (first == std::string_view::npos || content[first] == '#') continue;
+    if (rows++ == row + 1) break;  // the first is the heading
+  }
+  return line;
+}
+
+std::optional<std::string> fault_of_row(const Given& given, std::size_t row) {
+  const double time_s = given.time_s[row], position_m = given.position_m[row], sd_m = given.sd_m[row];
+  if (row > 0 && !(time_s > given.time_s[row - 1])) {
+    return fmt::format("t_s {} is not after {}, the one before: times must ascend", time_s, given.time_s[row - 1]);
+  }
+  if (std::abs(time_s) > kLargestTimeS) return fmt::format("t_s {} is beyond {}: give seconds", time_s, kLargestTimeS);
+  if (std::abs(position_m) > kLargestPositionM) {
+    return fmt::format("position_m {} is beyond {}: give metres", position_m, kLargestPositionM);
+  }
+  if (!(sd_m > 0)) return fmt::format("position_sd_m {} is not positive", sd_m);
+  return std::nullopt;
+}
+
+Result<Given> read_given(const ReferenceRequest& request) {
+  Given given;
+  try {
+    CsvColumns columns = parse_csv(request.csv, request.source, {"t_s", "position_m"}, {"position_sd_m"});
+    given.time_s = std::move(columns.at("t_s"));
+    given.position_m = std::move(columns.at("position_m"));
+    if (const auto sd = columns.find("position_sd_m"); sd != columns.end()) given.sd_m = std::move(sd->second);
+  } catch (const std::runtime_error& error) {
+    return fail(ErrorCode::invalid, error.what(), "malformed_csv");
+  }
+  if (given.time_s.size() > kMaxReferenceRows) {
+    return fail(ErrorCode::invalid, fmt::format("{} has more than {} rows", request.source, kMaxReferenceRows),
+                "too_large");
+  }
+  if (given.sd_m.empty() && !request.sd_m) {
+    return fail(ErrorCode::invalid,
+                fmt::format("{} has no column position_sd_m: say how exact its positions are, with sd_m (--sd-mm)",
+                            request.source),
+                "no_sd");
+  }
+  if (given.sd_m.empty()) given.sd_m.assign(given.time_s.size(), *request.sd_m);
+  for (std::size_t row = 0; row < given.time_s.size(); ++row) {
+    const auto fault = fault_of_row(given, row);
+    if (!fault) continue;
+    return fail(ErrorCode::invalid,
+                fmt::format("{} line {}: {}", request.source, line_of_row(request.csv, row), *fault), "malformed_csv");
+  }
+  return given;
+}
+
+// The samples of the span that have a position, in seconds since the first of all of the span.
+struct OwnRecord {
+  std::uint32_t span = 0;
+  std::uint64_t first_us = 0, last_us = 0;
+  std::vector<double> time_s, position_m, sd_m;
+  std::optional<std::int64_t> utc_offset_us;  // of the sample whose clock is known best, as its half-width
+  std::int64_t utc_uncertainty_us = 0;
+
+  double seconds(std::uint64_t robot_time_us) const {
+    return (static_cast<double>(robot_time_us) - static_cast<double>(first_us)) * 1e-6;
+  }
+};
+
+Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::optional<std::uint32_t> wanted) {
+  if (own.empty()) return fail(ErrorCode::invalid, "the run has no samples");
+  if (!wanted && own.front().span != own.back().span) {
+    return fail(ErrorCode::invalid,
+                fmt::format("the robot rebooted during the run, which has spans {} to {}; choose one", own.front().span,
+                            own.back().span),
+                "several_spans");
+  }
+  OwnRecord record;
+  record.span = wanted.value_or(own.front().span);
+  bool has_begun = false;
+  for (const OwnPosition& sample : own) {
+    if (sample.span != record.span) continue;
+    if (!has_begun) record.first_us = sample.robot_time_us;
+    has_begun = true;
+    record.last_us = sample.robot_time_us;
+    const bool is_better = !record.utc_offset_us || sample.clock_uncertainty_us < record.utc_uncertainty_us;
+    if (sample.clock_uncertainty_us >= 0 && is_better) {
+      record.utc_offset_us = sample.utc_us - static_cast<std::int64_t>(sample.robot_time_us);
+      record.utc_uncertainty_us = sample.clock_uncertainty_us;
+    }
+    const double time_s = record.seconds(sample.robot_time_us);
+    if (!std::isfinite(sample.position_m) || (!record.time_s.empty() && !(time_s > record.time_s.back()))) continue;
+    record.time_s.push_back(time_s);
+    record.position_m.push_back(static_cast<double>(sample.position_m));
+    record.sd_m.push_back(static_cast<double>(sample.position_sd_m));
+  }
+  if (!has_begun) return fail(ErrorCode::invalid, fmt::format("the run has no samples in span {}", record.span));
+  return record;
+}
+
+Result<void> find_clock(const ReferenceClockRequest& asked, const Given& given, const OwnRecord& own,
+                        std::optional<MarkerPlace> marker, OutsideReference& into) {
+  into.clock = asked.method;
+  into.clock_sd_s = asked.sd_s;
+  switch (asked.method) {
+    case ReferenceClock::offset: into.clock_offset_s = asked.offset_s; return {};
+    case ReferenceClock::utc: {
+      if (!own.utc_offset_us) {
+        return fail(ErrorCode::invalid,
+                    "the station had no estimate of the robot's clock in this span, so UTC does not "
+                    "help; align the clock by correlation",
+                    "no_clock");
+      }
+      const std::int64_t zero_us = asked.zero_at_us - *own.utc_offset_us;  // in robot time
+      into.clock_offset_s = static_cast<double>(zero_us - static_cast<std::int64_t>(own.first_us)) * 1e-6;
+      const double half_width_s = static_cast<double>(own.utc_uncertainty_us) * 1e-6;
+      into.clock_sd_s = std::hypot(asked.sd_s.value_or(0), half_width_s / std::sqrt(3.0));
+      return {};
+    }
+    case ReferenceClock::marker:
+      if (!marker || marker->span != own.span) {
+        return fail(ErrorCode::invalid, fmt::format("the marker does not stand in span {}", own.span));
+      }
+      into.clock_offset_s = own.seconds(marker->robot_time_us) - asked.at_s;
+      return {};
+    case ReferenceClock::correlation: break;
+  }
+  const control::ClockAlignment found =
+      control::align_clocks({given.time_s, given.position_m}, {own.time_s, own.position_m}, asked.search);
+  if (!found.refusal.empty()) {
+    return fail(ErrorCode::invalid,
+                fmt::format("the clock cannot be found by correlation: {}; give a marker, an offset, or the range in "
+                            "which the offset lies",
+                            found.refusal),
+                "no_correlation");
+  }
+  into.clock_offset_s = found.offset_s;
+  into.clock_sd_s = found.offset_sd_s;
+  into.correlation = found.correlation;
+  into.motion_ratio = found.motion_ratio;
+  return {};
+}
+
+// Of the given rows that lie in the span, on its clock.
+Given rows_in_span(const Given& given, const OwnRecord& own, double offset_s) {
+  Given inside;
+  const double last_s = own.seconds(own.last_us);
+  for (std::size_t row = 0; row < given.time_s.size(); ++row) {
+    const double time_s = given.time_s[row] + offset_s;
+    if (!(time_s >= 0 && time_s <= last_s)) continue;
+    inside.time_s.push_back(time_s);
+    inside.position_m.push_back(given.position_m[row]);
+    inside.sd_m.push_back(given.sd_m[row]);
+  }
+  return inside;
+}
+
+// The mean of own less outside position, weighed by how sure the robot is; none where the two have no time in common.
+Result<void> find_zero(const Given& inside, const OwnRecord& own, OutsideReference& into) {
+  double sum_m = 0, weights = 0, surest_m = std::numeric_limits<double>::infinity(), outside_variance_m2 = 0;
+  std::size_t used = 0;
+  for (std::size_t row = 0; row < inside.time_s.size(); ++row) {
+    const auto after = std::ranges::lower_bound(own.time_s, inside.time_s[row]);
+    if (after == own.time_s.end()) continue;
+    const auto k = static_cast<std::size_t>(after - own.time_s.begin());
+    const std::size_t before = k == 0 ? 0 : k - 1;
+    const double step_s = own.time_s[k] - own.time_s[before];
+    if (step_s > kLongestGapS || !std::isfinite(own.sd_m[k])) continue;
+    const double share = step_s > 0 ? (inside.time_s[row] - own.time_s[before]) / step_s : 1;
+    const double own_m = std::lerp(own.position_m[before], own.position_m[k], share);
+    const double own_sd_m = std::max(own.sd_m[k], kLeastOwnSdM), weight = 1 / (own_sd_m * own_sd_m);
+    sum_m += weight * (own_m - inside.position_m[row]);
+    weights += weight;
+    surest_m = std::min(surest_m, own.sd_m[k]);
+    outside_variance_m2 += inside.sd_m[row] * inside.sd_m[row];
+    ++used;
+  }
+  if (used < kFewestPositions) {
+    return fail(ErrorCode::invalid,
+                fmt::format("only {} positions fall on samples of the robot's own record, so the zero cannot be found; "
+                            "keep the zero (--keep-zero) if it is the robot's",
+                            used),
+                "no_zero");
+  }
+  into.zero_offset_m = sum_m / weights;
+  into.zero_sd_m = std::hypot(surest_m, std::sqrt(outside_variance_m2) / static_cast<double>(used));
+  return {};
+}
+
+std::string sha256_of(const std::string& text) {
+  unsigned char hash[crypto_hash_sha256_BYTES];
+  crypto_hash_sha256(hash, reinterpret_cast<const unsigned char*>(text.data()), text.size());
+  std::string hexadecimal;
+  for (const unsigned char byte : hash) hexadecimal += fmt::format("{:02x}", byte);
+  return hexadecimal;
+}
+
+std::string plus_minus(std::optional<double> sd, double scale, const char* unit) {
+  return sd ? fmt::format(" ± {:.2g} {} (2 sd)", 2 * scale * *sd, unit) : std::string{" (how exact is not known)"};
+}
+
+}  // namespace
+
+OwnPosition own_position(const StoredSample& stored) {
+  return {stored.span,
+          stored.robot_time_us,
+          stored.utc_us,
+          stored.clock_uncertainty_us,
+          stored.sample.position_m - stored.disturbance_m,
+          stored.position_sd_m};
+}
+
+Result<PlacedReference> place_reference(const ReferenceRequest& request, std::span<const OwnPosition> samples,
+                                        std::optional<MarkerPlace> marker) {
+  const auto given = read_given(request);
+  if (!given) return std::unexpected{given.error()};
+  const auto own = own_record(samples, request.span ? request.span
+                                       : marker     ? std::optional{marker->span}
+                                                    : std::nullopt);
+  if (!own) return std::unexpected{own.error()};
+  PlacedReference placed;
+  OutsideReference& made = placed.reference;
+  made.span = own->span;
+  made.source = request.source;
+  made.sha256 = sha256_of(request.csv);
+  if (const auto found = find_clock(request.clock, *given, *own, marker, made); !found) {
+    return std::unexpected{found.error()};
+  }
+  const Given inside = rows_in_span(*given, *own, made.clock_offset_s);
+  if (inside.time_s.size() < kFewestPositions) {
+    return fail(
+        ErrorCode::invalid,
+        fmt::format("{} of {} rows lie in span {} of the run, from 0 to {:.3f} s, with a clock offset of {:.3f} "
+                    "s; at least {} are needed",
+                    inside.time_s.size(), given->time_s.size(), own->span, own->seconds(own->last_us),
+                    made.clock_offset_s, kFewestPositions),
+        "not_in_run");
+  }
+  made.zero_is_kept = request.keeps_zero;
+  if (!request.keeps_zero) {
+    if (const auto found = find_zero(inside, *own, made); !found) return std::unexpected{found.error()};
+  }
+  for (std::size_t row = 0; row < inside.time_s.size(); ++row) {
+    const std::uint64_t at_us = own->first_us + static_cast<std::uint64_t>(std::llround(1e6 * inside.time_s[row]));
+    OutsidePositions& positions = placed.positions;
+    if (positions.size() > 0 && positions.robot_time_us.back() >= at_us) {
+      return fail(ErrorCode::invalid, "two rows lie less than a microsecond apart", "malformed_csv");
+    }
+    positions.robot_time_us.push_back(at_us);
+    positions.position_m.push_back(inside.position_m[row] + made.zero_offset_m);
+    positions.position_sd_m.push_back(inside.sd_m[row]);
+  }
+  made.samples = placed.positions.size();
+  made.samples_left_out = given->time_s.size() - made.samples;
+  return placed;
+}
+
+std::string clock_in_words(const OutsideReference& reference) {
+  std::string how = fmt::format("clock by {}", text(reference.clock));
+  if (reference.correlation) {
+    how += fmt::format(" with the robot's own motion ({:.4f}; it moves {:.3f} times what that says)",
+                       *reference.correlation, reference.motion_ratio.value_or(1));
+  }
+  return fmt::format("{}: its t_s plus {:.4f} s{} is the time since the first sample of span {}", how,
+                     reference.clock_offset_s, plus_minus(reference.clock_sd_s, 1e3, "ms"), reference.span);
+}
+
+std::string zero_in_words(const OutsideReference& reference) {
+  if (reference.zero_is_kept) return "zero kept as it was given";
+  return fmt::format("zero by the robot's own record: {:.4f} m{} were added to each position", reference.zero_offset_m,
+                     plus_minus(reference.zero_sd_m, 1e3, "mm"));
+}
+
+}  // namespace server
