@@ -78,6 +78,8 @@ OrderedJson json_of(const control::Fit& fit) {
           {"offset_sigma_m", or_null(fit.offset_sigma_m)},
           {"dead_time_s", fit.dead_time_s},
           {"dead_time_sigma_s", or_null(fit.dead_time_sigma_s)},
+          {"position_clock_s", fit.position_clock_s},
+          {"position_clock_sigma_s", or_null(fit.position_clock_sigma_s)},
           {"aic", fit.aic},
           {"free_parameters", fit.free_parameters},
           {"residuals_are_white", fit.residuals_are_white},

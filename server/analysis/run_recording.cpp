@@ -15,6 +15,7 @@ namespace {
 constexpr std::size_t kFewestSamples = 10;
 constexpr std::size_t kMostFaults = 5, kMostWindows = 3;  // in a message
 constexpr double kTimeToRest_s = 5;
+constexpr std::size_t kFewestPositions = 20;  // from outside
 
 struct Piece {
   std::uint64_t span_began_us = 0;
@@ -91,10 +92,17 @@ double largest_position_sd_m(const Piece& piece) {
   return largest_m;
 }
 
+// Where the motion of the piece is had from.
+enum class Motion : std::uint8_t { outside, acceleration, position };
+
 std::optional<std::string> missing_in(const Piece& piece, const StoredSample& stored, const RunWindow& window,
-                                      bool is_estimate) {
+                                      Motion motion) {
   const Sample& sample = stored.sample;
-  if (is_estimate) {
+  if (motion == Motion::outside) {
+    if (std::isfinite(sample.duty)) return std::nullopt;
+    return fmt::format("sample seq {} at {:.3f} s lacks its duty", stored.seq, piece.seconds(stored));
+  }
+  if (motion == Motion::acceleration) {
     if (std::isfinite(sample.duty) && std::isfinite(sample.acceleration_m_s2)) return std::nullopt;
     return fmt::format("sample seq {} at {:.3f} s lacks a value (duty {}, acceleration_m_s2 {})", stored.seq,
                        piece.seconds(stored), sample.duty, sample.acceleration_m_s2);
@@ -109,13 +117,13 @@ std::optional<std::string> missing_in(const Piece& piece, const StoredSample& st
 // Cuts the piece where it is not whole.
 class Cut {
  public:
-  Cut(const Piece& piece, const RunWindow& window, double dt_s, bool is_estimate) {
+  Cut(const Piece& piece, const RunWindow& window, double dt_s, Motion motion) {
     for (std::size_t i = 0; i < piece.samples.size(); ++i) {
       const StoredSample& stored = piece.samples[i];
       if (i > 0) {
         if (const auto gap = gap_between(piece, piece.samples[i - 1], stored, dt_s)) end_part(i, i, *gap);
       }
-      if (const auto missing = missing_in(piece, stored, window, is_estimate)) end_part(i, i + 1, *missing);
+      if (const auto missing = missing_in(piece, stored, window, motion)) end_part(i, i + 1, *missing);
     }
     end_part(piece.samples.size(), 0, "");
     faults_.pop_back();
@@ -158,6 +166,54 @@ class Cut {
   std::vector<std::string> faults_;
 };
 
+// What of a reference lies in a piece, in seconds since its first sample.
+struct OutsidePart {
+  std::vector<double> time_s, position_m;
+  double sd_m = 0;  // root of the mean square
+
+  bool is_enough() const { return time_s.size() >= kFewestPositions; }
+  std::string in_words(const StoredReference& from) const {
+    const OutsideReference& reference = from.reference;
+    const double rate_hz = static_cast<double>(time_s.size() - 1) / (time_s.back() - time_s.front());
+    const std::string clock_sd =
+        reference.clock_sd_s ? fmt::format(" ± {:.2g} ms", 2e3 * *reference.clock_sd_s) : std::string{};
+    return fmt::format(
+        "position measured from outside ({}), {:.3g} Hz, ± {:.2g} mm, clock by {}{}: fitted at its own times, with "
+        "zero "
+        "and what is left of the clock's error as further unknowns; the robot's own record gives the duty only",
+        reference.source, rate_hz, 2e3 * sd_m, text(reference.clock), clock_sd);
+  }
+};
+
+OutsidePart outside_part(const Piece& piece, const StoredReference& stored) {
+  OutsidePart part;
+  if (stored.reference.span != piece.samples.front().span) return part;
+  const std::uint64_t first_us = piece.samples.front().robot_time_us, last_us = piece.samples.back().robot_time_us;
+  double squares_m2 = 0;
+  for (std::size_t i = 0; i < stored.positions.size(); ++i) {
+    const std::uint64_t at_us = stored.positions.robot_time_us[i];
+    if (at_us < first_us || at_us >= last_us) continue;
+    part.time_s.push_back(static_cast<double>(at_us - first_us) * 1e-6);
+    part.position_m.push_back(stored.positions.position_m[i]);
+    squares_m2 += stored.positions.position_sd_m[i] * stored.positions.position_sd_m[i];
+  }
+  if (!part.time_s.empty()) part.sd_m = std::sqrt(squares_m2 / static_cast<double>(part.time_s.size()));
+  return part;
+}
+
+// As if the samples had been made when the positions were measured: to look at how it begins.
+control::Recording as_seen(const control::Recording& recording) {
+  control::Recording seen;
+  const std::vector<double>& time_s = recording.position_time_s;
+  seen.dt_s = (time_s.back() - time_s.front()) / static_cast<double>(time_s.size() - 1);
+  seen.position_m = recording.position_m;
+  for (const double at_s : time_s) {
+    const auto tick = static_cast<std::size_t>(at_s / recording.dt_s);
+    seen.duty.push_back(recording.duty[std::min(tick, recording.duty.size() - 1)]);
+  }
+  return seen;
+}
+
 std::optional<std::string> driven_before(const Piece& piece) {
   if (!piece.driven_at_s) return std::nullopt;
   const double begins_s = piece.seconds(piece.samples.front());
@@ -192,14 +248,32 @@ std::string channels_reason(double largest_position_sd_m) {
       largest_position_sd_m);
 }
 
-Result<RunRecording> recording_of(std::span<const StoredSample> samples, const RunWindow& window) {
+const char* text(ChannelChoice value) {
+  switch (value) {
+    case ChannelChoice::best: return "best";
+    case ChannelChoice::outside: return "outside";
+    case ChannelChoice::robot: return "robot";
+  }
+  return "";
+}
+
+Result<RunRecording> recording_of(std::span<const StoredSample> samples, const RunWindow& window,
+                                  const StoredReference* reference, ChannelChoice choice) {
   const auto piece = select(samples, window);
   if (!piece) return std::unexpected{piece.error()};
   const auto& chosen = piece->samples;
   const double dt_s = usual_step_s(*piece);
   const double position_sd_m = largest_position_sd_m(*piece);
-  const bool is_estimate = position_sd_m > 0;
-  const Cut cut{*piece, window, dt_s, is_estimate};
+  const OutsidePart outside =
+      choice == ChannelChoice::robot || reference == nullptr ? OutsidePart{} : outside_part(*piece, *reference);
+  if (choice == ChannelChoice::outside && !outside.is_enough()) {
+    return fail(ErrorCode::invalid, fmt::format("the window has {} positions from outside; at least {} are needed",
+                                                outside.time_s.size(), kFewestPositions));
+  }
+  const Motion motion = outside.is_enough() ? Motion::outside
+                        : position_sd_m > 0 ? Motion::acceleration
+                                            : Motion::position;
+  const Cut cut{*piece, window, dt_s, motion};
   if (!cut.is_whole()) return cut.refusal(*piece);
   RunRecording made{{}, channels_reason(position_sd_m), {}};
   control::Recording& recording = made.recording;
@@ -207,7 +281,8 @@ Result<RunRecording> recording_of(std::span<const StoredSample> samples, const R
       (piece->seconds(chosen.back()) - piece->seconds(chosen.front())) / static_cast<double>(chosen.size() - 1);
   for (const StoredSample& stored : chosen) {
     recording.duty.push_back(static_cast<double>(stored.sample.duty));
-    if (is_estimate) {
+    if (motion == Motion::outside) continue;
+    if (motion == Motion::acceleration) {
       recording.acceleration_m_s2.push_back(static_cast<double>(stored.sample.acceleration_m_s2));
       continue;
     }
@@ -215,9 +290,15 @@ Result<RunRecording> recording_of(std::span<const StoredSample> samples, const R
                                    static_cast<double>(stored.disturbance_m));
     if (window.with_velocity) recording.velocity_m_s.push_back(static_cast<double>(stored.sample.velocity_m_s));
   }
+  if (motion == Motion::outside) {
+    recording.position_time_s = outside.time_s;
+    recording.position_m = outside.position_m;
+    made.channels_reason = outside.in_words(*reference);
+    made.position_sd_m = outside.sd_m;
+  }
   if (const auto warning = driven_before(*piece)) {
     made.warnings.push_back(*warning);
-  } else if (const auto moves = motion_at_start(recording)) {
+  } else if (const auto moves = motion_at_start(motion == Motion::outside ? as_seen(recording) : recording)) {
     made.warnings.push_back(*moves);
   }
   return made;

@@ -9,6 +9,7 @@
 
 #include "control/identify.hpp"
 #include "server/analysis/run_steps.hpp"
+#include "server/recording/outside_reference.hpp"
 #include "server/recording/stored_sample.hpp"
 #include "server/result.hpp"
 
@@ -26,20 +27,33 @@ struct RunWindow {
   bool with_velocity = false;  // the robot's own estimate of it, which is no second measurement
 };
 
+// From where motion is taken.
+enum class ChannelChoice : std::uint8_t {
+  best,     // a position from outside where the run has one, else the robot's own record
+  outside,  // the position from outside, or a refusal
+  robot,    // the robot's own record
+};
+const char* text(ChannelChoice value);
+
 // A piece of a run, and what a reader of its numbers must know about it.
 struct RunRecording {
   control::Recording recording;
   std::string channels_reason;  // why these channels are fitted
   std::vector<std::string> warnings;
+  double position_sd_m = 0;  // of a position from outside, as its importer said; else 0
 };
 
-// Where position_sd_m is above 0 anywhere, position and velocity are the robot's estimates, and the recording holds the
-// acceleration in their place. Else position_m is what was measured: without the disturbance, which the robot adds to
-// it. invalid: several spans to choose from, too few samples, or gaps or missing values; the detail names each (samples
-// that were lost told from periods that the robot skipped) and the longest windows without one, as flags.
 // In words; 0: the position is known.
 std::string channels_reason(double largest_position_sd_m);
 
-Result<RunRecording> recording_of(std::span<const StoredSample> samples, const RunWindow& window);
+// A position that was measured from outside, where `reference` has one of the window, is fitted as it was measured, at
+// its own times: it contains no model, and no disturbance. Else, where position_sd_m is above 0 anywhere, position and
+// velocity are the robot's estimates, and the recording holds the acceleration in their place. Else position_m is what
+// was measured: without the disturbance, which the robot adds to it. invalid: several spans to choose from, too few
+// samples, or gaps or missing values; the detail names each (samples that were lost told from periods that the robot
+// skipped) and the longest windows without one, as flags.
+Result<RunRecording> recording_of(std::span<const StoredSample> samples, const RunWindow& window,
+                                  const StoredReference* reference = nullptr,
+                                  ChannelChoice choice = ChannelChoice::best);
 
 }  // namespace server

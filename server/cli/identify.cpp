@@ -41,6 +41,10 @@ void add_source(CLI::App& command, Identify& wish) {
       ->needs(run);
   command.add_option("--from-s", wish.window.from_s, "First second of the span to use")->check(finite())->needs(run);
   command.add_option("--to-s", wish.window.to_s, "Last second of the span to use")->check(finite())->needs(run);
+  add_word(command, "--channels", wish.channels,
+           std::array{ChannelChoice::best, ChannelChoice::outside, ChannelChoice::robot},
+           "best, outside or robot: whether a position from outside is fitted (default: best, where the run has one)")
+      ->needs(run);
   command.add_flag("--with-velocity", wish.window.with_velocity,
                    "Also fit the velocity that the robot recorded, where its position is known");
 }
@@ -101,7 +105,8 @@ RunRecording recording_for(const Identify& wish) {
     throw std::runtime_error{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
   }
   const std::vector<StoredSample> samples = read_samples(wish.run);
-  auto recording = recording_of(samples, wish.window);
+  const std::optional<StoredReference> reference = read_reference(wish.run);
+  auto recording = recording_of(samples, wish.window, reference ? &*reference : nullptr, wish.channels);
   if (!recording) throw std::runtime_error{fmt::format("run {}: {}", *wish.run.run, recording.error().detail)};
   return std::move(*recording);
 }
@@ -133,6 +138,23 @@ void write_sensor(std::ostream& out, const control::SensorFit& sensor) {
                                            : "the robot's own bias is still in the record, and fitted as a bias");
 }
 
+constexpr double kLargerThanSaid = 1.5;  // residuals, in sd of the reference
+
+// What a position from outside adds to the doubts.
+void add_outside_doubts(const RunRecording& given, const Identify& wish, control::Identification& found) {
+  if (!(given.position_sd_m > 0)) return;
+  const double residual_sd_m = found.best.residual_sd;
+  if (residual_sd_m > kLargerThanSaid * given.position_sd_m) {
+    found.warnings.push_back(fmt::format(
+        "the residuals, {:.2g} mm, are larger than the position from outside is said to be exact, {:.2g} mm: "
+        "its clock, its scale or the model is not right",
+        1e3 * residual_sd_m, 1e3 * given.position_sd_m));
+  }
+  if (wish.options.longest_dead_time_s > 0) {
+    found.warnings.emplace_back("the dead time contains what is left of the error of the outside position's clock");
+  }
+}
+
 void write_parameters(std::ostream& out, const Fit& fit) {
   Table table{{text(fit.structure), "value", "one sigma"}};
   const auto values = values_of(fit.model);
@@ -147,6 +169,10 @@ void write_parameters(std::ostream& out, const Fit& fit) {
              fit.residuals_are_white ? "look" : "are not", cell(fit.whiteness_p_value, 3), text(fit.end),
              fit.iterations, fit.starts_that_agree, fit.starts);
   if (fit.sensor) write_sensor(out, *fit.sensor);
+  if (fit.position_clock_sigma_s) {
+    fmt::print(out, "clock of the position from outside: {} ms late, one sigma {} ms\n",
+               fixed(1e3 * fit.position_clock_s, 2), cell(1e3 * *fit.position_clock_sigma_s, 2));
+  }
 }
 
 void write_compared(std::ostream& out, std::span<const Fit> compared) {
@@ -210,6 +236,7 @@ int run(const Identify& wish, std::ostream& out) {
   for (const std::string& warning : given.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
   control::Identification found = search(wish, given.recording);
   found.warnings.insert(found.warnings.end(), given.warnings.begin(), given.warnings.end());
+  add_outside_doubts(given, wish, found);
   const std::optional<control::EstimatorModel> estimator = estimator_of(found.best);
   if (wish.form.is_json) {
     OrderedJson answer = json_of(found);

@@ -34,6 +34,7 @@ struct Identify {
   std::optional<std::string> csv;
   RunChoice run;
   RunWindow window;
+  ChannelChoice channels = ChannelChoice::best;
   control::IdentificationOptions options;
   bool with_residuals = false;
   Plan plan;

@@ -26,4 +26,20 @@ std::vector<StoredSample> read_samples(const RunChoice& choice) {
   return std::move(*samples);
 }
 
+std::optional<StoredReference> read_reference(const RunChoice& choice) {
+  std::optional<StoredReference> stored;
+  auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
+    stored.reset();
+    auto found = find_reference(database, choice.run.value());
+    if (!found) return {};
+    const std::size_t samples = found->samples;
+    const std::int64_t id = found->id;
+    stored = StoredReference{std::move(*found), read_positions(database, id, {}, samples)};
+    return {};
+  };
+  const auto done = read_store(choice.data_dir / "station.sqlite", read);
+  if (!done) throw std::runtime_error{done.error().detail};
+  return stored;
+}
+
 }  // namespace server::cli

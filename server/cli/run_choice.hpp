@@ -22,5 +22,6 @@ void add_options(CLI::App& command, RunChoice& choice);
 
 // Throws std::runtime_error saying what is wrong; never creates or changes anything.
 std::vector<StoredSample> read_samples(const RunChoice& choice);
+std::optional<StoredReference> read_reference(const RunChoice& choice);  // none: the run has none
 
 }  // namespace server::cli

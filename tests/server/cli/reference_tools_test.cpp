@@ -1,0 +1,123 @@
+// A position from outside, from the command line without a station: imported, shown, fitted, taken away.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <random>
+
+#include "control/modal_plant.hpp"
+#include "tests/server/cli/tool_test.hpp"
+#include "tests/server/recording/recording_test.hpp"
+
+namespace server {
+namespace {
+
+using cli::ToolAnswer;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+// A robot that believes it swims half as far as it does, and a camera at 30 Hz that sees it.
+class ReferenceTools : public RecordingTest {
+ protected:
+  ReferenceTools() {
+    start();
+    connect(robot_);
+    robot_.context.position_sd_m = 0.004F;
+    const RunId run = wait(runs_->create(robot_.id, named("swim"))).value().id;
+    for (const double duty : {0.0, 0.4, -0.5, 0.6, -0.6, 0.3, -0.3, 0.5, -0.4}) swim(100, duty);
+    wait(runs_->end(run, ""));
+    stop();
+    camera(-3.4567);
+  }
+
+  ToolAnswer ask(const std::string& command) { return cli::ask_tool(folder_, command + " --data @."); }
+
+  void swim(std::size_t count, double duty) {
+    SampleBatch batch = robot_.batch(robot_.next_seq, count);
+    for (Sample& sample : batch.samples) {
+      truth_m_.push_back(plant_.position_m());
+      sample.position_m = static_cast<float>(0.5 * plant_.position_m());
+      sample.acceleration_m_s2 =
+          static_cast<float>(0.01 * std::round(100 * (plant_.acceleration_m_s2() + noise_(random_))));
+      sample.duty = static_cast<float>(duty);
+      plant_.step(duty);
+    }
+    send(robot_, batch);
+    robot_.next_seq += count;
+  }
+
+  // Its times plus clock_s are those of the run.
+  void camera(double clock_s) {
+    std::ofstream out{folder_ / "camera.csv"};
+    out << "t_s,position_m\n";
+    for (double at_s = 0.02; at_s < 8.9; at_s += 1.0 / 30) {
+      const auto k = static_cast<std::size_t>(at_s / 0.01);
+      const double seen_m = std::lerp(truth_m_[k], truth_m_[k + 1], at_s / 0.01 - static_cast<double>(k));
+      out << fmt::format("{:.6f},{:.6f}\n", at_s - clock_s, 1.25 + seen_m + 0.04 * noise_(random_));
+    }
+  }
+
+  TestRobot robot_;
+  control::ModalPlant plant_{control::kNonNewtonianModel, 0.01};
+  std::vector<double> truth_m_;
+  std::mt19937 random_{11};
+  std::normal_distribution<double> noise_{0, 0.012};
+};
+
+TEST_F(ReferenceTools, ImportFindsTheClockAndIdentifyPrefersWhatWasMeasured) {
+  const ToolAnswer made = ask("reference import --run 1 --csv @camera.csv --sd-mm 0.5");
+  ASSERT_EQ(made.exit_code, 0) << made.error;
+  EXPECT_THAT(made.text, AllOf(HasSubstr("positions of camera.csv"), HasSubstr("clock by correlation"),
+                               HasSubstr("plus -3.45"), HasSubstr("zero by the robot's own record")));
+  EXPECT_EQ(ask("reference show --run 1").text, made.text);
+
+  const ToolAnswer fitted = ask("identify --run 1 --structure second_order");
+  EXPECT_THAT(fitted.text,
+              StartsWith("fitted: position_m; position measured from outside (camera.csv), 30 Hz, ± 1 mm, clock by "
+                         "correlation"));
+  EXPECT_THAT(fitted.text, HasSubstr("clock of the position from outside: "));
+  const auto json = ask("identify --run 1 --structure second_order --json").json();
+  EXPECT_NEAR(json["parameters"]["kp"].get<double>(), 0.1, 0.01);  // half of it by what the robot believes
+  EXPECT_EQ(json["channels"], nlohmann::json{"position_m"});
+  EXPECT_TRUE(json["position_clock_sigma_s"].is_number());
+  EXPECT_THAT(ask("identify --run 1 --structure second_order --channels robot").text,
+              StartsWith("fitted: acceleration_m_s2"));
+}
+
+TEST_F(ReferenceTools, AGivenClockIsTakenAtItsWord) {
+  ASSERT_EQ(
+      ask("reference import --run 1 --csv @camera.csv --sd-mm 0.5 --offset-s -3.4567 --clock-sd-s 0.01").exit_code, 0);
+  EXPECT_THAT(ask("reference show --run 1").text, HasSubstr("clock by offset: its t_s plus -3.4567 s ± 20 ms"));
+}
+
+TEST_F(ReferenceTools, IsReplacedRemovedAndExported) {
+  const std::string import = "reference import --run 1 --csv @camera.csv --sd-mm 0.5 --offset-s -3.4567";
+  ASSERT_EQ(ask(import).exit_code, 0);
+  EXPECT_THAT(ask(import).error, HasSubstr("give a reason to replace it"));
+  EXPECT_EQ(ask(import + " --reason again").exit_code, 0);
+  const std::string csv = ask("reference export --run 1").text;
+  EXPECT_THAT(csv, StartsWith("# camera.csv of run 1, span 0\nrobot_time_us,position_m,position_sd_m\n"));
+  EXPECT_EQ(std::ranges::count(csv, '\n'), 2 + 267);
+  ASSERT_EQ(ask("export --run 1 --format sqlite --to @run.sqlite").exit_code, 0);
+  SQLite::Database file{(folder_ / "run.sqlite").string()};
+  EXPECT_EQ(file.execAndGet("SELECT count(*) FROM outside_position").getInt(), 267);
+  EXPECT_EQ(file.execAndGet("SELECT source FROM outside_reference").getString(), "camera.csv");
+  ASSERT_EQ(ask("reference remove --run 1 --reason wrong").exit_code, 0);
+  EXPECT_THAT(ask("reference show --run 1").error, HasSubstr("run 1 has no reference"));
+  EXPECT_THAT(ask("identify --run 1 --channels outside").error, HasSubstr("0 positions from outside"));
+  EXPECT_EQ(ask("verify --audit").exit_code, 0);
+}
+
+TEST_F(ReferenceTools, WhatIsWrongIsOneLine) {
+  EXPECT_THAT(ask("reference import --run 1 --csv @none.csv --sd-mm 1").error, HasSubstr("cannot read"));
+  EXPECT_THAT(ask("reference import --run 7 --csv @camera.csv --sd-mm 1").error, HasSubstr("there is no run 7"));
+  EXPECT_THAT(ask("reference import --run 1 --csv @camera.csv").error, HasSubstr("--sd-mm"));
+  EXPECT_THAT(ask("reference import --run 1 --csv @camera.csv --sd-mm 1 --marker flash --at-s 1").error,
+              HasSubstr("run 1 has no marker 'flash'"));
+  EXPECT_GT(ask("reference import --run 1 --csv @camera.csv --marker flash").exit_code, 100);
+  EXPECT_GT(ask("reference import --run 1 --csv @camera.csv --offset-s 1 --utc-s 1").exit_code, 100);
+}
+
+}  // namespace
+}  // namespace server
