@@ -38,10 +38,9 @@ struct Answered {
   int exit_code = 0;
 };
 
-using Wish =
-    std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
-                 Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
-                 ReferenceCommand>;
+using Wish = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
+                          Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand,
+                          RobotCommand, ReferenceCommand>;
 
 Wish parse_command_line(int argc, char** argv);
 
