@@ -34,6 +34,9 @@ void Station::on_command_sent(RobotPort& port, CommandId id) {
 void Station::on_command_ack(RobotPort& port, const protocol::CommandAck& ack) {
   Seat* seat = seat_of(port);
   if (seat == nullptr) return;
+  // One that came too late is sent again; a firmware that does not know the command will not know it then.
+  const bool is_late = ack.result == rheonaut_COMMAND_RESULT_EXPIRED;
+  if (ack.command_id == seat->drop_timed_id && !is_late) seat->drop_timed_id = 0;
   const auto entry = seat->commands.find(ack.command_id);
   const auto pending = entry == seat->commands.end() ? reopen(*seat, ack.command_id) : entry->second;
   if (pending == nullptr) return end_dropped(*seat, ack);
@@ -70,7 +73,6 @@ void Station::acknowledge(Seat& seat, CommandId id, std::string reason) {
   CommandRecord& record = pending->record;
   record.acknowledged_after_us = clock_.steady_us() - pending->received_us;
   if (pending->is_timed) stop_times_.acknowledged.add(record.acknowledged_after_us);
-  if (id == seat.drop_timed_id) seat.drop_timed_id = 0;
   // What was answered before, now again, says no time.
   const bool has_time = record.effect_at_robot_us != 0;
   pending->look_from_robot_us = has_time ? record.effect_at_robot_us : seat.robot->latest_robot_time_us;

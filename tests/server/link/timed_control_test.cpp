@@ -210,6 +210,26 @@ TEST_F(TimedControlTest, IsDroppedFirstOnTheNextConnectionWhenTheLinkWasCut) {
   EXPECT_EQ(robot->commands()[0].which_action, rheonaut_Command_drop_timed_tag);
 }
 
+TEST_F(TimedControlTest, IsDroppedAgainWhenThatCameTooLateButNotForAFirmwareThatDoesNotKnowIt) {
+  const auto submit_as_b = [this] {
+    CommandRequest next = request_of(set_duty(0.5F));
+    next.actor = "b";
+    submit(std::move(next));
+    clock.settle();
+  };
+  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  control(ControlAction::force, "b");
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_EXPIRED);
+  clock.settle();
+  submit_as_b();
+  EXPECT_EQ(drops(), 2U);
+  EXPECT_EQ(kinds().back(), std::string{"set_duty"});
+  robot->acknowledge(robot->commands()[2], rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_MALFORMED);
+  clock.settle();
+  submit_as_b();
+  EXPECT_EQ(drops(), 2U);
+}
+
 TEST_F(TimedControlTest, LeavesThoseThatTheHolderStillControls) {
   take_in(timed(set_duty(0.25F), in_ms(2000), "a"));
   control(ControlAction::take, "a");
