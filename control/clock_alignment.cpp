@@ -24,6 +24,7 @@ constexpr double kLeastOverlap = 0.5;    // of the motion of one of the two
 constexpr double kLeastCorrelation = 0.8;
 constexpr double kMainLobe = 4, kRival = 2;  // times the share of the motion that the best offset leaves unexplained
 constexpr double kMainLobeFloor = 0.05, kRivalFloor = 0.01;
+constexpr double kWidestPlateauS = 2;
 constexpr double kBlockS = 2;  // of (4)
 constexpr double kFewestBlocks = 8;
 constexpr double kLeastSdS = 1e-4;  // recorded times are right to this
@@ -188,6 +189,15 @@ std::optional<std::size_t> rival_of(const Correlogram& found, std::size_t best) 
   return std::nullopt;
 }
 
+// How far from end to end the offsets around the best one lie that explain the motion nearly as well as it does.
+double plateau_s(const Correlogram& found, std::size_t best) {
+  const double most = kRival * unexplained(found.rho[best]) + kRivalFloor;
+  std::size_t low = best, high = best;
+  while (low > 0 && unexplained(found.rho[low - 1]) < most) --low;
+  while (high + 1 < found.rho.size() && unexplained(found.rho[high + 1]) < most) ++high;
+  return kGridS * static_cast<double>(high - low);
+}
+
 // The pairs of (3): each time with the first one at least a window later, unless that is far later.
 struct Pair {
   double from_s = 0, to_s = 0, step_m = 0;
@@ -305,6 +315,10 @@ ClockAlignment align_clocks(PositionRecord outside, PositionRecord own, OffsetRa
     return refused(join_text("two offsets fit nearly as well, ", rounded(found.offset_s(best)), " s (correlation ",
                              rounded(found.rho[best]), ") and ", rounded(found.offset_s(*rival)), " s (",
                              rounded(found.rho[*rival]), "): the motion repeats itself"));
+  }
+  if (const double width_s = plateau_s(found, best); width_s > kWidestPlateauS) {
+    return refused(join_text("offsets over ", rounded(width_s), " s fit nearly alike around ",
+                             rounded(found.offset_s(best)), " s: the speed changes too little"));
   }
   OffsetFit fit{outside, own};
   if (!fit.run(found.offset_s(best))) {

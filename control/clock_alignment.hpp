@@ -10,9 +10,10 @@
 // zero of either position, and hardly the slow drift of a position that is dead reckoning. (2) is looked at on a grid
 // of 20 ms over all offsets at which the two overlap enough, by FFT; (3) then starts at its maximum, at the times at
 // which the outside position was measured: no record is resampled.
-// Refused, in words: too little motion, ρ below 0.8, another offset that fits nearly as well (a motion that repeats).
+// Refused, in words: too little motion, ρ below 0.8, another offset that fits nearly as well (a motion that repeats),
+// or all of them over 2 s (a speed that does not change).
 // Shapes:   times ascend; positions have one element per time and are finite. A pause over 0.25 s is a gap.
-// Accuracy: within 3 offset_sd_s of a known offset at 25, 30 and 60 Hz with noise, held by clock_alignment_test.cpp.
+// Accuracy: within 3 offset_sd_s of a known offset at 25, 30 and 60 Hz with noise (clock_alignment_test.cpp).
 //           The two clocks are taken to run at one rate: 50 ppm are 3 ms over a minute.
 // Errors:   throws std::invalid_argument for shapes that do not fit; all else is a refusal in the result.
 #pragma once

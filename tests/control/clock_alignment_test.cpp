@@ -134,6 +134,19 @@ TEST(ClockAlignment, RefusesAMotionThatRepeatsUnlessTheRangeLeavesOneOffset) {
   EXPECT_NEAR(near.offset_s, 2, 3 * near.offset_sd_s);
 }
 
+// A speed that does not change looks alike at every offset.
+TEST(ClockAlignment, RefusesAnEvenSpeed) {
+  Record robot;
+  for (int k = 0; k < 3000; ++k) {
+    robot.time_s.push_back(kTickS * k);
+    robot.position_m.push_back(0.001 * k);
+  }
+  for (const double noise_sd_m : {1e-9, 0.0005}) {
+    const ClockAlignment found = align_clocks(watch(robot, {.noise_sd_m = noise_sd_m, .to_s = 29}, 1), robot);
+    EXPECT_THAT(found.refusal, HasSubstr("the speed changes too little")) << noise_sd_m;
+  }
+}
+
 TEST(ClockAlignment, RefusesRecordsThatAreTooShortAndTimesThatDoNotAscend) {
   const Record robot = prbs_swim();
   EXPECT_THAT(align_clocks(watch(robot, {.to_s = 0.9}, 1), robot).refusal, HasSubstr("more than 1 s"));
