@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <sstream>
 #include <tuple>
 #include <utility>
 
+#include "control/amplitude_doubt.hpp"
 #include "control/fit_summary.hpp"
 #include "control/identifiability.hpp"
 #include "control/invalid_argument.hpp"
@@ -207,18 +209,22 @@ Identification identify(const Recording& recording, const IdentificationOptions&
 
   if (!recording.acceleration_m_s2.empty()) search.find_sensor(static_cast<int>(structures.size()) + 1);
   Identification result;
+  std::map<Structure, SearchPoint> points;
   int left = static_cast<int>(structures.size());
   for (const Structure structure : structures) {
     const SearchResult found = search.run(structure, left--);
+    points[structure] = found.point;
     result.compared.push_back(summary(search, recording, options.cost, structure, found));
   }
   put_best_first(result.compared);
   result.best = result.compared.front();
+  result.amplitude = amplitude_evidence(search, recording, result.best, points[result.best.structure]);
   std::vector<std::string>& warnings = result.warnings;
   const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings)); };
   add(search_doubts(result.best, options));  // causes first, then what follows from them
   add(untried_structures(result.compared));
   add(second_opinions(search, recording, options, result.best));
+  add(amplitude_doubts(result.amplitude, recording));
   add(residual_doubts(recording, options, result.best));
   add(identifiability_warnings(recording, result.best, options));
   add_verdict(result.compared, warnings);

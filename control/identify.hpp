@@ -126,10 +126,17 @@ struct Fit {
   std::optional<SensorFit> sensor;                                 // of a fit of the acceleration
 };
 
+// Of parameters that change with amplitude: amplitude_doubt.hpp.
+struct AmplitudeEvidence {
+  double share = 0;  // of the squares of the residuals, that they explain
+  double f = 0;      // about 1 where nothing changes
+};
+
 struct Identification {
   Fit best;
-  std::vector<Fit> compared;          // one per structure: the best, then by AIC; unfinished and untried ones last
-  std::vector<std::string> warnings;  // in words, with numbers and what to do
+  std::vector<Fit> compared;  // one per structure: the best, then by AIC; unfinished and untried ones last
+  std::optional<AmplitudeEvidence> amplitude;  // of the best; none: nothing to compare
+  std::vector<std::string> warnings;           // in words, with numbers and what to do
 };
 
 Identification identify(const Recording& recording, const IdentificationOptions& options);

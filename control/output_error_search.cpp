@@ -12,7 +12,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kModelTolerance = 1e-14;
 constexpr double kNearestToBound = 1e-9;  // of the orders and the dead time, as a share of their interval
 constexpr double kLargestLog = 60;        // of the gain and the coefficients, against their start in the search
 constexpr double kRoundingShare = 1e-9;   // residuals below this share of the signal are equal

@@ -25,6 +25,8 @@
 
 namespace control {
 
+inline constexpr double kModelTolerance = 1e-14;  // of the outputs
+
 struct SearchPoint {
   FractionalModel model;
   double offset_m = 0, dead_time_s = 0;
@@ -74,6 +76,11 @@ class OutputErrorSearch {
   std::vector<Eigen::VectorXd> residuals(const SearchPoint& point);
   // Of the outputs with respect to ln kp, ln b1, ln b2, alpha, beta, offset, dead time, as far as they are free.
   std::vector<Eigen::MatrixXd> jacobians(Structure structure, const SearchPoint& point);
+  // By the model's five parameters, as they are measured, if the duty had been this one; and the model's velocity.
+  std::vector<Eigen::MatrixXd> model_slopes(const std::vector<double>& duty, const SearchPoint& point) const;
+  std::vector<double> model_velocity_m_s(const SearchPoint& point);
+  // The output as it is measured, so many samples late: a column each.
+  std::vector<Eigen::MatrixXd> late_outputs(const std::vector<Eigen::Index>& samples, const SearchPoint& point);
 
  private:
   struct Measured {

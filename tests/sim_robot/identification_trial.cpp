@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "control/time_response.hpp"
 #include "sim_robot/imu.hpp"
 #include "sim_robot/station_peer.hpp"
+#include "sim_robot/tick.hpp"
 
 namespace sim_robot {
 namespace {
@@ -14,11 +16,14 @@ namespace {
 constexpr int kRestTicks = 50, kTicksToTell = 2 * robot_fw::kModelSections;
 constexpr std::size_t kTicksPerCommand = 25;  // a duty ends 0.5 s after its command
 
+PlantParameters plant_of(const IdentificationTrial& trial) {
+  return {.kind = trial.kind, .model = trial.fluid, .dead_time_s = trial.dead_time_s};
+}
+
 SimulatedRobotConfig config_of(const IdentificationTrial& trial, std::uint64_t seed) {
   SimulatedRobotConfig config;
   config.boot_id = 1;
-  config.world.plant.model = trial.fluid;
-  config.world.plant.dead_time_s = trial.dead_time_s;
+  config.world.plant = plant_of(trial);
   config.world.imu.emplace();
   config.world.seed = seed;
   return config;
@@ -72,6 +77,37 @@ control::Recording record(const IdentificationTrial& trial, std::uint64_t seed) 
     recording.acceleration_m_s2.push_back(static_cast<double>(sample->second.acceleration_m_s2));
   }
   return recording;
+}
+
+control::Recording record_position(const IdentificationTrial& trial, double sd_m, std::uint64_t seed) {
+  Plant plant{plant_of(trial), kTickS};
+  std::mt19937_64 random{seed};
+  std::normal_distribution noise{0.0, sd_m};
+  control::Recording recording;
+  recording.dt_s = kTickS;
+  recording.duty = trial.duty;
+  for (const double duty : trial.duty) {
+    recording.position_m.push_back(plant.position_m() + noise(random));
+    plant.step(duty);
+  }
+  return recording;
+}
+
+std::vector<double> steps_duty() {
+  std::vector<double> duty;
+  for (const double step : {0.2, 0.5, 0.8}) {
+    duty.insert(duty.end(), 500, step);
+    duty.insert(duty.end(), 500, 0.0);
+  }
+  return duty;
+}
+
+std::vector<double> levels_duty(std::uint64_t seed) {
+  constexpr std::array<double, 6> kLevels{-0.8, -0.5, -0.2, 0.2, 0.5, 0.8};
+  std::mt19937_64 random{seed};
+  std::vector<double> duty;
+  for (int bit = 0; bit < 120; ++bit) duty.insert(duty.end(), 50, kLevels[random() % kLevels.size()]);
+  return duty;
 }
 
 double worst_response_error(const control::FractionalModel& model, const control::FractionalModel& truth) {

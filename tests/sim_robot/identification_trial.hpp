@@ -7,14 +7,16 @@
 #include <vector>
 
 #include "control/identify.hpp"
+#include "sim_robot/plant.hpp"
 
 namespace sim_robot {
 
 struct IdentificationTrial {
   control::FractionalModel fluid;
-  bool believes_in_water = false;  // the model that is built into the robot: else that of (29)
-  std::vector<double> duty = {};   // a value for each tick
-  double dead_time_s = 0;          // of the fluid
+  bool believes_in_water = false;      // the model that is built into the robot: else that of (29)
+  std::vector<double> duty = {};       // a value for each tick
+  double dead_time_s = 0;              // of the fluid
+  PlantKind kind = PlantKind::linear;  // else another takes the fluid's place
 };
 
 // The fluids of the study: none is (29), which is what the robot believes in.
@@ -31,6 +33,13 @@ std::vector<double> study_duty();
 
 // What the station records of the trial: the duty as it was driven, and the acceleration.
 control::Recording record(const IdentificationTrial& trial, std::uint64_t seed);
+
+// The same with the true position and a measuring device's white noise, and no robot.
+control::Recording record_position(const IdentificationTrial& trial, double sd_m, std::uint64_t seed);
+
+// Steps of 5 s at duty 0.2, 0.5 and 0.8 with 5 s of rest behind each; and one of ±0.2, ±0.5, ±0.8 every 0.5 s for 60 s.
+std::vector<double> steps_duty();
+std::vector<double> levels_duty(std::uint64_t seed);
 
 struct TrialFit {
   control::Fit fit;
