@@ -148,17 +148,30 @@ std::string choose_channels(const std::string& file, CsvColumns& columns, bool w
   return channels_reason(position_sd_m);
 }
 
+void refuse_gaps(const std::string& file, const CsvColumns& columns) {
+  for (const char* name : {"position_m", "velocity_m_s", "acceleration_m_s2"}) {
+    const auto column = columns.find(name);
+    if (column == columns.end()) continue;
+    const std::vector<double>& values = column->second;
+    const auto gap = std::ranges::find_if(values, [](double value) { return std::isnan(value); });
+    if (gap == values.end()) continue;
+    refuse(file, fmt::format("value {} of column {} is empty; a column that is fitted needs every value",
+                             gap - values.begin() + 1, name));
+  }
+}
+
 }  // namespace
 
 RunRecording read_recording(const std::string& file, bool with_velocity) {
-  CsvColumns columns = read_csv(file, {"duty"}, {"t_s", "robot_time_us", "position_m", "velocity_m_s"},
-                                {kPositionSd, "acceleration_m_s2", "disturbance_m"});
+  CsvColumns columns = read_csv(file, {"duty"}, {"t_s", "robot_time_us"},
+                                {"position_m", "velocity_m_s", kPositionSd, "acceleration_m_s2", "disturbance_m"});
   const std::vector<double> time_s = times_of(file, columns);
   RunRecording made{{}, choose_channels(file, columns, with_velocity), {}};
   const bool has_any = columns.contains("position_m") || columns.contains("velocity_m_s");
   if (!has_any && !columns.contains("acceleration_m_s2")) {
     refuse(file, "has neither position_m nor velocity_m_s; one of them is needed");
   }
+  refuse_gaps(file, columns);
   try {
     made.recording = control::make_recording(time_s, columns["duty"], columns["position_m"], columns["velocity_m_s"],
                                              columns["acceleration_m_s2"]);

@@ -87,6 +87,7 @@ TEST_F(BadInput, CsvFiles) {
   EXPECT_THAT(csv("t_s,duty,position_m\n0,0,0\n# remark\n0.1,x,0\n"), HasSubstr("line 4: 'x' in column duty"));
   EXPECT_THAT(csv("t_s,duty,position_m\n0,0\n"), HasSubstr("line 2"));
   EXPECT_THAT(csv("t_s,duty,position_m\n0,0,nan\n"), HasSubstr("'nan'"));
+  EXPECT_THAT(csv("t_s,duty,position_m\n0,0,0\n0.1,0,\n"), HasSubstr("value 2 of column position_m is empty"));
   EXPECT_THAT(csv("t_s,duty,duty,position_m\n"), HasSubstr("twice"));
 }
 

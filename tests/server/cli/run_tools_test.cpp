@@ -33,6 +33,7 @@ class RunTools : public RecordingTest {
       sample.duty = static_cast<float>(duty);
       plant_.step(duty);
     }
+    if (lacks_a_velocity_) batch.samples.front().velocity_m_s = std::nanf("");
     send(robot_, batch);
     robot_.next_seq += count;
   }
@@ -48,6 +49,7 @@ class RunTools : public RecordingTest {
       sample.duty = static_cast<float>(duty);
       plant_.step(duty);
     }
+    if (lacks_a_velocity_) batch.samples.front().position_m = batch.samples.front().velocity_m_s = std::nanf("");
     send(robot_, batch);
     robot_.next_seq += count;
   }
@@ -60,7 +62,8 @@ class RunTools : public RecordingTest {
     out << "robot_time_us,position_m,velocity_m_s,acceleration_m_s2,duty,disturbance_m,position_sd_m\n";
     for (const StoredSample& stored : *samples) {
       const Sample& s = stored.sample;
-      out << fmt::format("{},{},{},{},{},{},{}\n", stored.robot_time_us, s.position_m, s.velocity_m_s,
+      const auto cell = [](float value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string{}; };
+      out << fmt::format("{},{},{},{},{},{},{}\n", stored.robot_time_us, cell(s.position_m), cell(s.velocity_m_s),
                          s.acceleration_m_s2, s.duty, stored.disturbance_m, stored.position_sd_m);
     }
   }
@@ -82,6 +85,7 @@ class RunTools : public RecordingTest {
   }
 
   TestRobot robot_;
+  bool lacks_a_velocity_ = false;  // the first of each batch; on the accelerometer, a position too
   control::ModalPlant plant_{control::kNonNewtonianModel, 0.01};
   std::mt19937 random_{11};
   std::normal_distribution<double> noise_{0, 0.012};
@@ -141,6 +145,29 @@ TEST_F(RunTools, IdentifyFitsAKnownPositionAloneFromRunAndCsvAlike) {
   const auto [of_run, of_csv] = from_run_and_csv(run);
   EXPECT_EQ(of_run, of_csv);
   EXPECT_EQ(of_run["channels"], nlohmann::json{"position_m"});
+}
+
+TEST_F(RunTools, IdentifyNeedsOnlyTheValuesThatItFitsFromRunAndCsvAlike) {
+  const RunId run = begin();
+  lacks_a_velocity_ = true;
+  for (const double duty : {0.3, -0.5}) swim(150, duty);
+  flush();
+  const auto [of_run, of_csv] = from_run_and_csv(run);
+  EXPECT_EQ(of_run, of_csv);
+  EXPECT_EQ(of_run["channels"], nlohmann::json{"position_m"});
+  EXPECT_THAT(cli::ask_tool(folder_, "identify --csv @run.csv --with-velocity").error,
+              HasSubstr("value 1 of column velocity_m_s is empty"));
+}
+
+TEST_F(RunTools, IdentifyNeedsNoEstimateWhereItFitsTheAcceleration) {
+  const RunId run = begin();
+  robot_.context.position_sd_m = 0.004F;
+  lacks_a_velocity_ = true;
+  for (const double duty : {0.4, -0.5, 0.6}) swim_on_the_accelerometer(100, duty);
+  flush();
+  const auto [of_run, of_csv] = from_run_and_csv(run);
+  EXPECT_EQ(of_run, of_csv);
+  EXPECT_EQ(of_run["channels"], nlohmann::json{"acceleration_m_s2"});
 }
 
 TEST_F(RunTools, IdentifyRefusesAGapAndSaysWhereItIs) {
