@@ -83,9 +83,12 @@ double peak_speed_m_s(std::span<const double> position_m, double dt_s) {
 
 }  // namespace
 
-std::optional<std::string> motion_at_start(const control::Recording& recording) {
+std::optional<std::string> motion_at_start(const control::Recording& recording,
+                                           std::span<const double> recorded_velocity_m_s) {
   const bool has_position = !recording.position_m.empty();
-  const std::span<const double> channel{has_position ? recording.position_m : recording.velocity_m_s};
+  const bool is_measured = recording.acceleration_m_s2.empty();
+  const std::span<const double> velocity_m_s = is_measured ? recording.velocity_m_s : recorded_velocity_m_s;
+  const std::span<const double> channel = has_position ? recording.position_m : velocity_m_s;
   if (channel.size() < 2 * kSamples) return std::nullopt;
   const auto first = channel.first(kSamples);
   const bool coasts = std::ranges::all_of(std::span{recording.duty}.first(kSamples), [](double u) { return u == 0; });

@@ -279,7 +279,9 @@ Result<RunRecording> recording_of(std::span<const StoredSample> samples, const R
   control::Recording& recording = made.recording;
   recording.dt_s =
       (piece->seconds(chosen.back()) - piece->seconds(chosen.front())) / static_cast<double>(chosen.size() - 1);
+  std::vector<double> recorded_m_s;
   for (const StoredSample& stored : chosen) {
+    recorded_m_s.push_back(static_cast<double>(stored.sample.velocity_m_s));
     recording.duty.push_back(static_cast<double>(stored.sample.duty));
     if (motion == Motion::outside) continue;
     if (motion == Motion::acceleration) {
@@ -298,7 +300,8 @@ Result<RunRecording> recording_of(std::span<const StoredSample> samples, const R
   }
   if (const auto warning = driven_before(*piece)) {
     made.warnings.push_back(*warning);
-  } else if (const auto moves = motion_at_start(motion == Motion::outside ? as_seen(recording) : recording)) {
+  } else if (const auto moves =
+                 motion_at_start(motion == Motion::outside ? as_seen(recording) : recording, recorded_m_s)) {
     made.warnings.push_back(*moves);
   }
   return made;

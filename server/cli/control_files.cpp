@@ -12,8 +12,10 @@
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <utility>
 
 #include "server/analysis/control_json.hpp"
+#include "server/analysis/motion_at_start.hpp"
 #include "server/cli/options.hpp"
 
 namespace server::cli {
@@ -132,7 +134,6 @@ std::string choose_channels(const std::string& file, CsvColumns& columns, bool w
     columns.erase("acceleration_m_s2");
     return "the file has no column position_sd_m: what it holds is taken as measured";
   }
-  round_to_binary32(columns);
   const double position_sd_m = largest_of(columns[kPositionSd]);
   if (position_sd_m > 0) {
     if (!columns.contains("acceleration_m_s2")) {
@@ -166,6 +167,9 @@ RunRecording read_recording(const std::string& file, bool with_velocity) {
   CsvColumns columns = read_csv(file, {"duty"}, {"t_s", "robot_time_us"},
                                 {"position_m", "velocity_m_s", kPositionSd, "acceleration_m_s2", "disturbance_m"});
   const std::vector<double> time_s = times_of(file, columns);
+  if (columns.contains(kPositionSd)) round_to_binary32(columns);
+  const auto velocity = columns.find("velocity_m_s");
+  const auto recorded_m_s = velocity == columns.end() ? std::vector<double>{} : velocity->second;
   RunRecording made{{}, choose_channels(file, columns, with_velocity), {}};
   const bool has_any = columns.contains("position_m") || columns.contains("velocity_m_s");
   if (!has_any && !columns.contains("acceleration_m_s2")) {
@@ -178,6 +182,7 @@ RunRecording read_recording(const std::string& file, bool with_velocity) {
   } catch (const std::invalid_argument& error) {
     refuse(file, error.what());
   }
+  if (auto moves = motion_at_start(made.recording, recorded_m_s)) made.warnings.push_back(std::move(*moves));
   return made;
 }
 

@@ -15,7 +15,6 @@
 
 #include "control/estimator_model.hpp"
 #include "server/analysis/control_json.hpp"
-#include "server/analysis/motion_at_start.hpp"
 #include "server/cli/options.hpp"
 
 namespace server::cli {
@@ -96,11 +95,7 @@ std::vector<std::string> channels_of(const control::Recording& recording) {
 }
 
 RunRecording recording_for(const Identify& wish) {
-  if (wish.csv) {
-    RunRecording given = read_recording(*wish.csv, wish.window.with_velocity);
-    if (auto moves = motion_at_start(given.recording)) given.warnings.push_back(*moves);
-    return given;
-  }
+  if (wish.csv) return read_recording(*wish.csv, wish.window.with_velocity);
   if (!wish.run.run) {
     throw std::runtime_error{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
   }

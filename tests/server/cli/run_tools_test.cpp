@@ -131,6 +131,7 @@ TEST_F(RunTools, IdentifyFitsTheAccelerationWhereThePositionIsAnEstimate) {
   EXPECT_THAT(of_run["channels_reason"].get<std::string>(), AllOf(HasSubstr("estimates"), HasSubstr("0.004 m")));
   EXPECT_TRUE(of_run["sensor"]["readings_are_recovered"].get<bool>());
   EXPECT_NEAR(of_run["parameters"]["kp"].get<double>(), 0.1, 0.01);  // half of it by the position
+  EXPECT_THAT(of_run["warnings"].dump(), Not(HasSubstr("in motion")));
   const ToolAnswer text = ask("identify --run 1 --structure second_order");
   EXPECT_THAT(text.text, AllOf(HasSubstr("fitted: acceleration_m_s2; position_m and velocity_m_s are the robot's own"),
                                HasSubstr("sensor: ")));
@@ -215,6 +216,17 @@ TEST_F(RunTools, IdentifyWarnsOfAWindowThatBeginsInMotion) {
   EXPECT_THAT(moving.json()["warnings"].back().get<std::string>(), HasSubstr("assumes rest"));
   EXPECT_EQ(ask("identify --run 1 --from-s 8.5 --structure first_order").error, "");
   EXPECT_EQ(ask("identify --run 1 --structure first_order").error, "");
+}
+
+TEST_F(RunTools, IdentifyWarnsOfAnEstimatedRunThatBeginsInMotion) {
+  for (int tick = 0; tick < 200; ++tick) plant_.step(0.4);
+  const RunId run = begin();
+  robot_.context.position_sd_m = 0.004F;
+  for (const double duty : {0.4, -0.5, 0.6}) swim_on_the_accelerometer(100, duty);
+  flush();
+  const auto [of_run, of_csv] = from_run_and_csv(run);
+  EXPECT_THAT(of_run["warnings"].back().get<std::string>(), HasSubstr("begins in motion, at about 0.0"));
+  EXPECT_EQ(of_run["warnings"], of_csv["warnings"]);
 }
 
 TEST_F(RunTools, ReadingADatabaseAtRestLeavesNothingBeside) {
