@@ -60,6 +60,8 @@ void OutputErrorSearch::find_sensor(int parts) {
     if (!has_clock || !(gain > kClearlyBetter)) {
       path.set_in_step();
       rough.point = in_step;
+      path.leave_out_failed_reads(path.sampled(measured_.front().model.output(in_step.model), in_step.sensor),
+                                  sd_in_step);
     }
     sensor_start_ = rough.point;
   }
