@@ -222,6 +222,7 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   std::vector<std::string>& warnings = result.warnings;
   const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings)); };
   add(search_doubts(result.best, options));  // causes first, then what follows from them
+  add(sensor_doubts(search));
   add(untried_structures(result.compared));
   add(second_opinions(search, recording, options, result.best));
   add(amplitude_doubts(result.amplitude, recording));

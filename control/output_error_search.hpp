@@ -60,6 +60,7 @@ class OutputErrorSearch {
 
   // Of a recorded acceleration, before the first run(): which sample each tick reads. Within one of parts equal shares.
   void find_sensor(int parts);
+  std::optional<SearchEnd> sensor_search_end() const { return sensor_search_end_; }  // what cut it off; none: nothing
   std::optional<SensorFit> sensor_fit(const SearchPoint& point);  // none: no acceleration was recorded
   double sensor_lag_s(const SearchPoint& point) const;            // dead time and all, its sampling aside
   bool finds_dead_time() const { return options_.longest_dead_time_s > 0; }
@@ -121,6 +122,7 @@ class OutputErrorSearch {
   Eigen::Index rows_;  // measured values of each channel: samples_, or of a position with times of its own their number
   double offset_scale_m_ = 1;
   bool sensor_is_found_ = false;
+  std::optional<SearchEnd> sensor_search_end_;
   SearchPoint sensor_start_;  // what the search for it ended with
   int last_iterations_ = 0;
   double last_cost_ = 0;  // of the last descent, by its own weights

@@ -189,6 +189,13 @@ void add_initial_motion(OutputErrorSearch& search, const Recording& recording, c
 
 }  // namespace
 
+std::vector<std::string> sensor_doubts(const OutputErrorSearch& search) {
+  if (search.sensor_search_end() != SearchEnd::time_limit) return {};
+  return {
+      "the search for the sensor's timing reached its share of the time limit: its samples are taken to keep step "
+      "with the ticks, which they may not do, and the parameters make up for it; raise the limit"};
+}
+
 std::vector<std::string> second_opinions(OutputErrorSearch& search, const Recording& recording,
                                          const IdentificationOptions& options, const Fit& fit) {
   std::vector<std::string> warnings;

@@ -20,4 +20,7 @@ namespace control {
 std::vector<std::string> second_opinions(OutputErrorSearch& search, const Recording& recording,
                                          const IdentificationOptions& options, const Fit& fit);
 
+// That the search for the sensor of an acceleration was cut off, which the fits that follow do not show.
+std::vector<std::string> sensor_doubts(const OutputErrorSearch& search);
+
 }  // namespace control

@@ -53,6 +53,7 @@ std::vector<Piece> pieces_that_tell(const ClockEvidence& e) {
       weight += std::pow(slope / e.dt_s / e.sd_m_s2, 2);
     }
     if (weight < least) continue;
+    if (e.is_stopped()) return {};
     double best = std::numeric_limits<double>::infinity(), age = 0;
     for (double tried = kLeastAge; tried <= kMostAge; tried += kAgeStep) {
       const double found = squares(e, first, tried);
@@ -120,6 +121,7 @@ std::optional<SensorClock> find_clock(const ClockEvidence& e, double time_consta
   SensorClock clock{{0, e.dt_s, time_constant_s}, {0, e.dt_s}};
   double best = 0;
   for (double error = -kClockError; error <= kClockError; error += e.dt_s / duration_s / 8) {
+    if (e.is_stopped()) return std::nullopt;
     const double period_s = e.dt_s * (1 + error);
     const std::complex<double> sum = agreement(pieces, period_s);
     if (std::abs(sum) <= best) continue;
@@ -133,6 +135,7 @@ std::optional<SensorClock> find_clock(const ClockEvidence& e, double time_consta
   const OrderCost cost(e, clock.timing);
   double lowest = std::numeric_limits<double>::infinity();
   for (double shift = -0.6; shift <= 0.6; shift += 0.05) {
+    if (e.is_stopped()) return std::nullopt;
     const ReadOrder tried{clock.timing.first_s + lag_s + shift * e.dt_s, clock.timing.period_s};
     const double found = cost(tried);
     if (found < lowest) lowest = found, clock.order = tried;
@@ -153,12 +156,14 @@ ReadOrder find_order(const ClockEvidence& e, const SensorTiming& timing, const R
   };
   double lowest = std::numeric_limits<double>::infinity(), best_s = 0;
   for (double shift_s = -range_s; shift_s <= range_s; shift_s += step_s) {
+    if (e.is_stopped()) return at(best_s, 0);
     const double found = cost(at(shift_s, 0));
     if (found < lowest) lowest = found, best_s = shift_s;
   }
   ReadOrder best = at(best_s, 0);
   for (int p = -kPeriods; p <= kPeriods; ++p) {
     for (int m = -kMoments; m <= kMoments; ++m) {
+      if (e.is_stopped()) return best;
       const ReadOrder tried = at(best_s + m * step_s, p * finer_s);
       const double found = cost(tried);
       if (found < lowest) lowest = found, best = tried;

@@ -65,6 +65,7 @@ void OutputErrorSearch::find_sensor(int parts) {
     }
     sensor_start_ = rough.point;
   }
+  sensor_search_end_ = limit_.end();
   stop_ = {};
 }
 
@@ -99,7 +100,7 @@ bool OutputErrorSearch::find_own_clock(SearchPoint& point) {
     const Eigen::VectorXd rest = measured.measured - path.sampled(output, point.sensor);
     const Eigen::VectorXd readings = measured.measured - path.bias(rest);
     const double sd = sensor_sd(point);
-    const ClockEvidence evidence{dt_s_, expected, readings, path.is_repeated(), sd};
+    const ClockEvidence evidence{dt_s_, expected, readings, path.is_repeated(), sd, stop_};
     if (round == 0) {
       const auto clock = find_clock(evidence, point.sensor.time_constant_s);
       if (!clock) return false;
@@ -108,6 +109,7 @@ bool OutputErrorSearch::find_own_clock(SearchPoint& point) {
     }
     if (std::abs(point.sensor.period_s / dt_s_ - 1) * record_ticks() < kInStep) return false;
     order = find_order(evidence, point.sensor, order, kRounds[round].range * dt_s_);
+    if (limit_.end()) return false;
     const bool is_new = path.set_order(order, kRounds[round].guard * dt_s_);
     path.leave_out_failed_reads(path.sampled(output, point.sensor), sd);
     if (!is_new && round >= kRoundsAtLeast) break;

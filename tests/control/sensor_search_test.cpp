@@ -57,5 +57,49 @@ TEST(SensorSearch, FailedReadsHaveNoWeightInStepWithTheTicks) {
   EXPECT_LT(std::abs(fit.model.b2 - kFluid.b2), 3 * *fit.one_sigma[2]);
 }
 
+TEST(SensorSearch, SaysThatItsTimeRanOut) {
+  const Recording run = acceleration_run(6, 0.01, 0);
+  IdentificationOptions options = one_start();
+  options.time_limit_s = 1;
+  for (const double look_s : {0.05, 0.002, 0.0}) {  // each look at the clock takes so long
+    double now_s = 0, takes_s = look_s;
+    OutputErrorSearch search(run, options, [&] { return now_s += takes_s; });
+    search.find_sensor(4);
+    takes_s = 0;  // the search for the model has all the time
+    const SearchResult found = search.run(Structure::second_order);
+    EXPECT_EQ(found.end, SearchEnd::converged);
+    const auto is_named = Contains(HasSubstr("the search for the sensor's timing reached its share of the time limit"));
+    if (look_s > 0) {
+      EXPECT_THAT(sensor_doubts(search), is_named) << look_s;
+    } else {
+      EXPECT_THAT(sensor_doubts(search), Not(is_named));
+    }
+  }
+}
+
+TEST(SensorClock, IsAskedToStopBetweenItsSteps) {
+  Eigen::VectorXd expected_m_s2(400);
+  for (Eigen::Index k = 0; k < expected_m_s2.size(); ++k) expected_m_s2[k] = std::sin(0.9 * static_cast<double>(k));
+  const std::vector<bool> is_repeated(400);
+  int looks = 0, last_look = 1000000;
+  const Stop stop = [&] { return ++looks >= last_look; };
+  const ClockEvidence evidence{kPeriodS, expected_m_s2, expected_m_s2, is_repeated, 0.01, stop};
+  const auto clock = find_clock(evidence, 0);
+  ASSERT_TRUE(clock);
+  const int all_looks = looks;
+  EXPECT_GT(all_looks, 40);
+  for (const int last : {1, 30, all_looks}) {
+    looks = 0, last_look = last;
+    EXPECT_FALSE(find_clock(evidence, 0));
+    EXPECT_EQ(looks, last);
+  }
+  looks = 0, last_look = 1;
+  const ReadOrder order = find_order(evidence, clock->timing, clock->order, 1e-3);
+  EXPECT_EQ(order.first_available_s, clock->order.first_available_s);
+  looks = 0, last_look = 300;
+  find_order(evidence, clock->timing, clock->order, 1e-3);
+  EXPECT_EQ(looks, 300);
+}
+
 }  // namespace
 }  // namespace control
