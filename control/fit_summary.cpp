@@ -14,11 +14,16 @@ using Eigen::Index;
 constexpr double kSmallestResidualShare = 1e-9;  // of the signal; what is less is rounding and no reason to choose
 constexpr double kWhite = 0.01;
 
-double akaike(Cost cost, const std::vector<Eigen::VectorXd>& residuals,
+// Without those of readings that have no weight, which are 0 and no measurement.
+Eigen::VectorXd with_weight(const OutputErrorSearch& search, const Eigen::VectorXd& residual) {
+  return search.sensor() ? search.sensor()->with_weight(residual) : residual;
+}
+
+double akaike(const OutputErrorSearch& search, Cost cost, const std::vector<Eigen::VectorXd>& residuals,
               const std::vector<const std::vector<double>*>& measured, int free_parameters) {
   double sum = 2.0 * free_parameters;
   for (std::size_t c = 0; c < residuals.size(); ++c) {
-    const double n = static_cast<double>(residuals[c].size());
+    const double n = static_cast<double>(with_weight(search, residuals[c]).size());
     const Eigen::Map<const Eigen::VectorXd> y(measured[c]->data(), residuals[c].size());
     const double floor = kSmallestResidualShare * std::sqrt((y.array() - y.mean()).square().mean());
     const double sd = std::max(floor, residuals[c].norm() / std::sqrt(n));
@@ -42,7 +47,7 @@ void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const 
     const double freedom = static_cast<double>(counted) - static_cast<double>(free.size()) / channels;
     const double scale = cost == Cost::least_squares
                              ? residuals[c].norm() / std::sqrt(freedom)
-                             : absolute_error_scale(residuals[c], static_cast<int>(free.size()));
+                             : absolute_error_scale(with_weight(search, residuals[c]), static_cast<int>(free.size()));
     const double sd = std::max(1e-200, scale);
     stacked.middleRows(static_cast<Index>(c) * samples, samples) = jacobians[c] / sd;
   }
@@ -128,7 +133,7 @@ Fit summary(OutputErrorSearch& search, const Recording& recording, Cost cost, St
   }
   add_quality(residuals.front(), *measured.front(), fit);
   add_whiteness(channels, residuals, fit);
-  fit.aic = akaike(cost, residuals, measured, fit.free_parameters);
+  fit.aic = akaike(search, cost, residuals, measured, fit.free_parameters);
   if (found.starts > 0) add_uncertainty(search, found.point, residuals, cost, fit);
   return fit;
 }

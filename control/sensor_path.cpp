@@ -130,6 +130,15 @@ Eigen::VectorXd SensorPath::weighed(const Eigen::VectorXd& values) const {
   return given - weight_.cwiseProduct(knots_ * weighed_knots_.solve(given));
 }
 
+Eigen::VectorXd SensorPath::with_weight(const Eigen::VectorXd& values) const {
+  Eigen::VectorXd kept(weighed_samples());
+  Index count = 0;
+  for (Index k = 0; k < samples(); ++k) {
+    if (weight_[k] > 0) kept[count++] = values[k];
+  }
+  return kept;
+}
+
 Eigen::VectorXd SensorPath::bias(const Eigen::VectorXd& residual_m_s2) const {
   return knots_ * weighed_knots_.solve(weight_.cwiseProduct(residual_m_s2));
 }

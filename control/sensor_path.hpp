@@ -66,6 +66,7 @@ class SensorPath {
   Eigen::MatrixXd timing_slopes(const Eigen::VectorXd& motion_m_s2, const SensorTiming& timing) const;  // A, P, τ
   // Less the bias (4) that suits it best, and 0 where the reading has no weight.
   Eigen::VectorXd weighed(const Eigen::VectorXd& values) const;
+  Eigen::VectorXd with_weight(const Eigen::VectorXd& values) const;  // only those of readings that have some
   Eigen::VectorXd bias(const Eigen::VectorXd& residual_m_s2) const;  // the best one, at every tick
 
  private:

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "control/fit_summary.hpp"
 #include "control/output_error_search.hpp"
 #include "control/second_opinions.hpp"
 #include "control/sensor_clock.hpp"
@@ -99,6 +100,27 @@ TEST(SensorClock, IsAskedToStopBetweenItsSteps) {
   looks = 0, last_look = 300;
   find_order(evidence, clock->timing, clock->order, 1e-3);
   EXPECT_EQ(looks, 300);
+}
+
+Fit fit_with_sigmas_by_the_absolute_error(const Recording& run) {
+  OutputErrorSearch search(run, one_start());
+  search.find_sensor(2);
+  return summary(search, run, Cost::absolute_error, Structure::second_order, search.run(Structure::second_order));
+}
+
+TEST(SensorSearch, ReadingsThatCountForNothingDoNotMakeAFitSurer) {
+  const Fit whole = fit_with_sigmas_by_the_absolute_error(acceleration_run(12, 2e-3, 0));
+  const Fit fit = fit_with_sigmas_by_the_absolute_error(acceleration_run(12, 2e-3, 0.6, 0.1));
+  const std::vector<double>& residual = fit.acceleration_residual_m_s2;
+  const double samples = static_cast<double>(residual.size());
+  const double counted = samples - static_cast<double>(fit.sensor->readings_left_out);
+  ASSERT_LT(counted, 0.97 * samples);
+  for (const std::size_t parameter : {0U, 1U, 2U}) {
+    EXPECT_GT(*fit.one_sigma[parameter], 0.95 * *whole.one_sigma[parameter]) << kParameterNames[parameter];
+  }
+  double sum = 0;
+  for (const double r : residual) sum += std::abs(r);
+  EXPECT_NEAR(fit.aic, 2 * counted * std::log(sum / counted) + 2 * fit.free_parameters, 1e-6);
 }
 
 }  // namespace
