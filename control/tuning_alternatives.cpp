@@ -18,6 +18,7 @@ constexpr int kUnsoundSteps =
     5;  // at a time where (5) holds: telling whether a design is sound takes a hundred times as long
 constexpr int kMargins = 60, kFewMargins = 12;  // tried in the range of a crossover
 constexpr int kHalvings = 10;                   // of a step, to find a border
+constexpr double kNearestToEnd = 1e-6;          // of a range whose ends do not belong to it
 constexpr double kPracticalMu = 0.9;
 
 struct DegreeRange {
@@ -82,6 +83,27 @@ class Search {
     return std::nullopt;
   }
 
+  // At the specification's crossover, where (5) holds in `open`. A border lies on its sound side.
+  std::vector<PhaseMarginRange> sound_margins(const DegreeRange& open) const {
+    const double width = open.high - open.low, asked = spec_.phase_margin_deg;
+    std::vector<double> margins{open.low + kNearestToEnd * width, open.high - kNearestToEnd * width};
+    for (int i = 1; i < kMargins; ++i) margins.push_back(open.low + i * width / kMargins);
+    if (open.low < asked && asked < open.high) margins.push_back(asked);
+    std::ranges::sort(margins);
+    std::vector<PhaseMarginRange> found;
+    std::optional<double> last;
+    bool was_sound = false;
+    for (const double margin : margins) {
+      const bool is_sound_here = is_sound_at(margin);
+      if (is_sound_here && !was_sound) found.push_back({last ? border(margin, *last) : open.low, margin});
+      if (!is_sound_here && was_sound) found.back().high_deg = border(*last, margin);
+      was_sound = is_sound_here;
+      last = margin;
+    }
+    if (was_sound) found.back().high_deg = open.high;
+    return found;
+  }
+
  private:
   struct Target {
     double gain_crossover_rad_s, phase_margin_deg;
@@ -103,6 +125,16 @@ class Search {
     spec.phase_margin_deg = target.phase_margin_deg;
     TunedController found = tuned_controller(plant_, spec, *mu, name);
     return is_sound(found) ? std::optional{std::move(found)} : std::nullopt;
+  }
+
+  bool is_sound_at(double margin_deg) const { return design({spec_.gain_crossover_rad_s, margin_deg}, "").has_value(); }
+
+  double border(double sound, double outside) const {
+    for (int halving = 0; halving < kHalvings; ++halving) {
+      const double middle = (sound + outside) / 2;
+      (is_sound_at(middle) ? sound : outside) = middle;
+    }
+    return sound;
   }
 
   std::optional<TunedController> just_inside(double found, double outside, const std::string& name) const {
@@ -141,6 +173,16 @@ TunedController tuned_controller(const FractionalModel& plant, const TuningSpec&
   const TuningDemand demand = tuning_demand(on_axis, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
   const FopdController controller = controller_for(demand, mu);
   return {std::move(name), spec, controller, margins({plant, controller, spec.is_velocity_loop})};
+}
+
+std::vector<PhaseMarginRange> sound_phase_margins(const FractionalModel& plant, const TuningSpec& spec) {
+  const auto solved = feasible_phase_margins(plant, spec.gain_crossover_rad_s, spec.is_velocity_loop);
+  if (!solved) return {};
+  const DegreeRange open{std::max(0.0, solved->low_deg), std::min(180.0, solved->high_deg)};
+  if (open.low >= open.high) return {};
+  TuningSpec iso_damped = spec;
+  iso_damped.mu.reset();
+  return Search{plant, iso_damped}.sound_margins(open);
 }
 
 std::vector<TunedController> nearest_designs(const FractionalModel& plant, const TuningSpec& spec) {

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "control/tuning_alternatives.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/optional_json.hpp"
 #include "server/cli/discretise.hpp"
@@ -47,19 +48,30 @@ void write_offers(std::ostream& out, const char* title, std::span<const control:
   table.write(out);
 }
 
-void write_range(std::ostream& out, const Tune& wish, const std::optional<control::PhaseMarginRange>& range) {
-  if (range) {
-    fmt::print(out, "\niso-damped phase margins at {} rad/s: {:.2f} to {:.2f} deg\n", wish.spec.gain_crossover_rad_s,
-               range->low_deg, range->high_deg);
-  } else {
-    fmt::print(out, "\nno phase margin can be iso-damped at {} rad/s\n", wish.spec.gain_crossover_rad_s);
+using Ranges = std::vector<control::PhaseMarginRange>;
+
+void write_ranges(std::ostream& out, const Tune& wish, const Ranges& ranges) {
+  if (ranges.empty()) {
+    fmt::print(out, "\nno phase margin has a sound iso-damped design at {} rad/s\n", wish.spec.gain_crossover_rad_s);
+    return;
   }
+  std::vector<std::string> words;
+  for (const auto& range : ranges) words.push_back(fmt::format("{:.2f} to {:.2f}", range.low_deg, range.high_deg));
+  fmt::print(out, "\niso-damped phase margins at {} rad/s: {} deg\n", wish.spec.gain_crossover_rad_s,
+             fmt::join(words, ", "));
+}
+
+OrderedJson ends_of(const Ranges& ranges) {
+  if (ranges.empty()) return nullptr;
+  OrderedJson ends = OrderedJson::array();
+  for (const auto& range : ranges) ends.insert(ends.end(), {range.low_deg, range.high_deg});
+  return ends;
 }
 
 OrderedJson answer_of(const Tune& wish, const control::FractionalModel& plant, const control::TuningResult& result,
-                      const std::optional<control::PhaseMarginRange>& range) {
+                      const Ranges& ranges) {
   OrderedJson answer = json_of(result);
-  answer["feasible_phase_margins_deg"] = range ? OrderedJson{range->low_deg, range->high_deg} : OrderedJson(nullptr);
+  answer["feasible_phase_margins_deg"] = ends_of(ranges);
   answer["asked"] = {{"crossover_rad_s", wish.spec.gain_crossover_rad_s},
                      {"phase_margin_deg", wish.spec.phase_margin_deg},
                      {"mu", or_null(wish.spec.mu)},
@@ -92,16 +104,16 @@ void add_options(CLI::App& command, Tune& wish) {
 int run(const Tune& wish, std::ostream& out) {
   const control::FractionalModel plant = read(wish.plant);
   const control::TuningResult result = control::tune(plant, wish.spec);
-  const auto range = control::feasible_phase_margins(plant, wish.spec.gain_crossover_rad_s, wish.spec.is_velocity_loop);
+  const Ranges ranges = control::sound_phase_margins(plant, wish.spec);
   if (wish.form.is_json) {
-    write_json(out, answer_of(wish, plant, result, range));
+    write_json(out, answer_of(wish, plant, result, ranges));
   } else if (result.tuned) {
     write_asked_and_achieved(out, wish, *result.tuned);
-    write_range(out, wish, range);
+    write_ranges(out, wish, ranges);
     if (wish.with_robustness) write_robustness(out, robustness_of(plant, result.tuned->controller));
   } else {
     fmt::print(out, "not feasible: {}\n", result.reason);
-    write_range(out, wish, range);
+    write_ranges(out, wish, ranges);
     write_offers(out, "nearest", result.nearest);
     write_offers(out, "relaxed", result.relaxed);
   }

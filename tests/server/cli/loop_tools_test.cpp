@@ -105,6 +105,20 @@ TEST_F(LoopTools, TuneTableShowsAskedBesideAchieved) {
   EXPECT_THAT(answer.text, HasSubstr("kp = 49.41"));
 }
 
+TEST_F(LoopTools, TuneCallsNoMarginFeasibleThatItRefuses) {
+  save("resonant.json", R"({"kp":0.4,"b1":0.01,"b2":0.02,"b3":1,"alpha":1.9,"beta":0.5})");
+  const auto json = ask("tune --plant @resonant.json --crossover-rad-s 5 --phase-margin-deg 100 --json").json();
+  EXPECT_THAT(json["reason"].get<std::string>(), HasSubstr("unstable"));
+  const auto& ends = json["feasible_phase_margins_deg"];
+  for (std::size_t i = 0; i + 1 < ends.size(); i += 2) {
+    EXPECT_FALSE(ends[i].get<double>() < 100 && 100 < ends[i + 1].get<double>()) << ends;
+  }
+  const auto granted = ask("tune --crossover-rad-s 5 --phase-margin-deg 91 --json").json();
+  EXPECT_EQ(granted["feasible_phase_margins_deg"].size(), 2u);
+  EXPECT_THAT(ask("tune --crossover-rad-s 5 --phase-margin-deg 91").text,
+              HasSubstr("iso-damped phase margins at 5 rad/s: "));
+}
+
 TEST_F(LoopTools, ATuningIsAControllerFile) {
   save("c.json", ask("tune --crossover-rad-s 5 --phase-margin-deg 91 --json").text);
   EXPECT_NEAR(ask("bode --controller @c.json --json").json()["phase_margin_deg"], 91, 1e-7);
