@@ -15,6 +15,7 @@
 #include "server/net/transport_security.hpp"
 #include "server/real_time.hpp"
 #include "server/recording/recording_parts.hpp"
+#include "server/station/model_sender.hpp"
 #include "server/station_document.hpp"
 
 using namespace server;  // NOLINT: this file is the station, seen from outside
@@ -29,7 +30,6 @@ static int serve(const Config& config) {
   WorkerThread readers{"readers", 10}, exports{"exports", 10}, maths{"maths", 10};
   TaskGroup tasks{loop};
   TransportSecurity security{clock, config};  // of both ports
-
   // Centre: the only owner of live state, and the only door for commands.
   Station station{loop, clock, config.envelope, config.link};
 
@@ -42,11 +42,11 @@ static int serve(const Config& config) {
   station.add_sink(live);
   const RestoredState restored = run_first(loop, recording.open());
   station.restore(restored.robots, restored.pending_stops);
-
-  // In: robots arrive here; each session becomes the station's RobotPort.
+  // In: robots arrive here; each session becomes the station's RobotPort. Robots are sent the model of their fluid.
   const auto robot_port = parse_endpoint(config.robots);
   RobotListener robots{
       loop, clock, tasks, station, recording.recorder, robot_port, config.robots_or_any_port, security.robots()};
+  ModelSender models{loop, tasks, clock, station, recording.fluid_models.in_force()};
 
   // People and scripts.
   AnalysisService analysis{recording.history, maths};

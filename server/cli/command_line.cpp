@@ -83,6 +83,7 @@ Wish parse_command_line(int argc, char** argv) {
   offer<UserCommand>(app, "user", "Users of a station: add, list, change, remove", wish);
   offer<TokenCommand>(app, "token", "API tokens of a station: create, list, revoke", wish);
   offer<RobotCommand>(app, "robot", "Robots of a station: enroll, list, revoke", wish);
+  offer<FluidCommand>(app, "fluid", "Fluids of a station and their models: list, model, remove-model", wish);
   offer<Model>(app, "model", "Show the motion models, compute the hydrodynamic one, fit the motor", wish);
   offer<Bode>(app, "bode", "Crossover, margins and frequency response of the open loop", wish);
   offer<Step>(app, "step", "Velocity and position after a step of duty, or any duty", wish);

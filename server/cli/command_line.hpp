@@ -10,6 +10,7 @@
 #include "server/cli/discretise.hpp"
 #include "server/cli/estimator.hpp"
 #include "server/cli/export.hpp"
+#include "server/cli/fluid.hpp"
 #include "server/cli/identify.hpp"
 #include "server/cli/model.hpp"
 #include "server/cli/predict.hpp"
@@ -40,7 +41,7 @@ struct Answered {
 
 using Wish = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
                           Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand,
-                          RobotCommand, ReferenceCommand>;
+                          RobotCommand, FluidCommand, ReferenceCommand>;
 
 Wish parse_command_line(int argc, char** argv);
 

@@ -82,6 +82,14 @@ json to_json(const ChangedLimit& limit) {
           {"default", decimal(limit.default_value)}};
 }
 
+json to_json(const RobotModel& model) {
+  return {{"state", text(model.state)},
+          {"fluid", model.fluid.empty() ? json(nullptr) : json(model.fluid)},
+          {"reason", model.reason},
+          {"fit_error", model.fit_error ? json(*model.fit_error) : json(nullptr)},
+          {"set_at_us", time_or_null(model.set_at_us)}};
+}
+
 json to_json(const RobotState& robot) {
   const SampleContext& context = robot.context;
   json out;
@@ -118,6 +126,7 @@ json to_json(const RobotState& robot) {
   out["fluid"] = robot.fluid.empty() ? json(nullptr) : json(robot.fluid);
   out["changed_limits"] = json::array();
   for (const ChangedLimit& limit : robot.changed_limits) out["changed_limits"].push_back(to_json(limit));
+  out["model"] = to_json(robot.model);
   out["invalid_values"] = robot.invalid_values;
   out["unknown_values"] = object_or_null(UnknownValues{}
                                              .add("reset_cause", robot.reset_cause)

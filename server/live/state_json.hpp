@@ -11,6 +11,7 @@
 
 namespace server {
 
+nlohmann::json to_json(const RobotModel& model);
 nlohmann::json to_json(const RobotState& robot);
 nlohmann::json to_json(const Sample& sample);
 nlohmann::json to_json(const CommandRecord& record);

@@ -30,6 +30,7 @@ RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThrea
       runs{clock, recorder, reader, certifier},
       markers{clock, recorder, reader},
       references{clock, recorder, reader},
+      fluid_models{clock, recorder},
       history{options.path, recorder, readers},
       exports{options.path, recorder, exports_worker},
       disk_watch{clock, readers, options.path, space_limits(config)},
@@ -55,6 +56,7 @@ asio::awaitable<RestoredState> RecordingParts::open() {
   std::filesystem::remove_all(exports_folder(), ignored);  // what a crash left
   co_await runs.load();
   co_await references.open();
+  co_await fluid_models.load();
   co_await retention.open();
   co_await disk_watch.look();
   co_return restored;

@@ -13,6 +13,7 @@
 #include "server/recording/certifier.hpp"
 #include "server/recording/database_reader.hpp"
 #include "server/recording/disk_watch.hpp"
+#include "server/recording/fluid_models.hpp"
 #include "server/recording/head_watch.hpp"
 #include "server/recording/history.hpp"
 #include "server/recording/markers.hpp"
@@ -54,6 +55,7 @@ struct RecordingParts {
   Runs runs;
   Markers markers;
   OutsideReferences references;
+  FluidModels fluid_models;
   History history;
   History exports;  // the same on a worker of its own, so that no page waits behind an export
   DiskWatch disk_watch;

@@ -1,5 +1,5 @@
-// SQL of the seventh migration: fluids and retired robots, causes of events of their own, what a robot says that this
-// station does not know or cannot compute with, and positions that were measured from outside.
+// SQL of the seventh migration: fluids and their models, retired robots, causes of events of their own, what a robot says
+// that this station does not know or cannot compute with, and positions that were measured from outside.
 //
 // It adds columns and tables only: no row is rewritten.
 #include "server/recording/schema.hpp"
@@ -10,6 +10,25 @@ const char* const kSeventhSchema = R"sql(
 ALTER TABLE robot ADD COLUMN fluid TEXT NOT NULL DEFAULT '';  -- that it swims in, of the configuration's list; '': not known
 ALTER TABLE robot ADD COLUMN retired_at_us INTEGER;           -- NULL: in use
 ALTER TABLE robot ADD COLUMN retired_by TEXT;                 -- the actor
+
+-- The models that robots in a fluid are told: velocity = sum of gain / (1 + time constant s) of four sections. The newest
+-- row of a fluid is in force; one whose numbers are NULL says that the fluid has none. Each number is a float32, exactly.
+CREATE TABLE fluid_model (
+  model_row INTEGER PRIMARY KEY,
+  fluid TEXT NOT NULL,
+  set_at_us INTEGER NOT NULL,
+  set_by TEXT NOT NULL,  -- the actor
+  gain_1_m_s REAL,
+  gain_2_m_s REAL,
+  gain_3_m_s REAL,
+  gain_4_m_s REAL,
+  time_constant_1_s REAL,
+  time_constant_2_s REAL,
+  time_constant_3_s REAL,
+  time_constant_4_s REAL,
+  fit_error REAL,        -- a share of the final velocity
+  document TEXT          -- JSON: the plant that it was fitted to, and what else came with it
+);
 
 -- Of the latch in force after the event. NULL: an earlier version stored it. That wrote the cause of the latch over
 -- `cause` in a robot's event, where there was a latch, and a sentence into `cause` of the station's own.

@@ -28,6 +28,11 @@ class ParameterTable {
   bool is_current() const { return !told_.empty(); }
   // Of the parameters that bound motion, those that differ from their default.
   std::vector<ChangedLimit> changed_limits() const;
+  // The latest that was said of one of them; none yet.
+  std::optional<float> value(const std::string& name) const {
+    const auto found = parameters_.find(name);
+    return found == parameters_.end() ? std::nullopt : std::optional{found->second.value};
+  }
 
  private:
   static constexpr std::uint32_t kMost = 256;  // parameters of a robot

@@ -1,5 +1,5 @@
-// What people say of a robot, which holds whether or not it is connected: the fluid that it is in, and that it is
-// retired.
+// What is known of a robot otherwise than by what it sends: the fluid that it is in, whose model it has, and that
+// it is retired.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -20,7 +20,11 @@ Result<void> Station::set_fluid(const RobotId& id, const std::string& text, cons
   if (!listed) return std::unexpected{listed.error()};
   const std::string& fluid = *listed;
   RobotState& robot = found->second;
-  if (robot.fluid == fluid) return {};
+  if (robot.fluid == fluid) {
+    // SAFETY: who may not command the robot sends it no model either.
+    if (authority_.may_use(id, by.actor)) on_fluid_named_(robot, by);
+    return {};
+  }
   if (auto permitted = authority_.may_use(id, by.actor); !permitted) {
     permitted.error().detail += "; only who is in control changes the fluid";
     note_refusal(by, id, "fluid", nlohmann::json{{"fluid", fluid}}.dump(), permitted.error());
@@ -37,7 +41,34 @@ Result<void> Station::set_fluid(const RobotId& id, const std::string& text, cons
   for (StationSink* sink : sinks_) sink->on_audit(audit);
   note(robot, "fluid_set", fmt::format("{} by {}", fluid.empty() ? "not known" : fluid, by.actor));
   publish(robot);
+  on_fluid_named_(robot, by);
   return {};
+}
+
+void Station::set_model(const RobotId& id, RobotModel model) {
+  const auto found = robots_.find(id);
+  if (found == robots_.end() || found->second.model == model) return;
+  found->second.model = std::move(model);
+  publish(found->second);
+}
+
+void Station::note_model(const RobotId& id, const char* kind, const std::string& detail) {
+  if (const auto found = robots_.find(id); found != robots_.end()) note(found->second, kind, detail);
+}
+
+std::optional<float> Station::parameter_in_force(const RobotId& id, const std::string& name) const {
+  const auto seat = seats_.find(id);
+  return seat == seats_.end() ? std::nullopt : seat->second.parameters.value(name);
+}
+
+const char* text(ModelState value) {
+  switch (value) {
+    case ModelState::assumed: return "assumed";
+    case ModelState::sending: return "sending";
+    case ModelState::confirmed: return "confirmed";
+    case ModelState::failed: break;
+  }
+  return "failed";
 }
 
 // The configuration may have been changed since: a fluid that is no longer listed is not known.

@@ -182,6 +182,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   } else if (was_latched && other_boot && details.emergency_id == 0) {
     CommandRequest request;
     request.robot_id = robot.id;
+    request.action = rheonaut_Command_init_zero;
     request.action.which_action = rheonaut_Command_emergency_stop_tag;
     request.actor = "station:latch";
     const auto relatch = make_pending(request, robot);

@@ -167,6 +167,17 @@ class Station {
   // in control.
   Result<void> set_fluid(const RobotId& id, const std::string& fluid, const Author& by);
 
+  // Called at the end of each set_fluid() by somebody who may command the robot, also when it names the same fluid.
+  using OnFluidNamed = std::function<void(const RobotState&, const Author&)>;
+  void set_on_fluid_named(OnFluidNamed on_fluid_named) { on_fluid_named_ = std::move(on_fluid_named); }
+
+  // What has become of the model of the robot's fluid, and an event of that.
+  void set_model(const RobotId& id, RobotModel model);
+  void note_model(const RobotId& id, const char* kind, const std::string& detail);
+
+  // The value of a parameter that the robot has said in this connection; none while it has not.
+  std::optional<float> parameter_in_force(const RobotId& id, const std::string& name) const;
+
   // An administrator has retired the robot, or put it back into use (0); the database has it, or is about to.
   void set_retired(const RobotId& id, std::int64_t retired_at_us, const std::string& actor);
 
@@ -237,6 +248,7 @@ class Station {
   std::map<RobotId, Seat> seats_;  // one for each robot, connected or not
   SampleBatch batch_;              // of the frame that is being taken; kept for its memory
   std::vector<StationSink*> sinks_;
+  OnFluidNamed on_fluid_named_ = [](const RobotState&, const Author&) {};
   Authority authority_;
   RecentCommands recent_;  // that had a key, and have ended
   StopTimes stop_times_;

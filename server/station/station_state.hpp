@@ -145,6 +145,24 @@ struct ChangedLimit {
   bool operator==(const ChangedLimit&) const = default;
 };
 
+// The model in a robot's estimator, and whether the station has sent it: station/model_sender.
+enum class ModelState : std::uint8_t {
+  assumed,    // the robot's own word: nobody has said that its model is that of its fluid
+  sending,    // on its way
+  confirmed,  // the robot says so
+  failed,     // it could not be sent, or one of another fluid not be taken back: `reason`
+};
+const char* text(ModelState value);
+
+struct RobotModel {
+  ModelState state = ModelState::assumed;
+  std::string fluid;                // whose model is confirmed, or was to be; empty: of none that the station knows
+  std::string reason;               // for people; may be empty
+  std::optional<double> fit_error;  // of that model, a share of the final velocity
+  std::int64_t set_at_us = 0;       // UTC, when that model was given to the station; 0: none
+  bool operator==(const RobotModel&) const = default;
+};
+
 // All that is known of one robot now. Owned by Station; others get const access or a copy.
 struct RobotState {
   RobotId id;
@@ -165,6 +183,7 @@ struct RobotState {
   SampleContext context;         // of the latest live batch (from Hello before the first)
   std::optional<Sample> sample;  // the latest
   std::string fluid;             // that it swims in, as Envelope lists it; empty: not known
+  RobotModel model;              // of its fluid, in its estimator
   double at_power_s = 0;         // how long its motor has run above Envelope's power_duty, less the time it did not
   std::uint64_t next_seq = 0;    // after the latest sample received
   std::uint64_t oldest_seq = 0;

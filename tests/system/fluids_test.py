@@ -2,6 +2,7 @@
 
 import json
 import sqlite3
+import time
 import unittest
 
 from processes import lab
@@ -81,6 +82,41 @@ class FluidsTest(unittest.TestCase):
                          f"fluid    oil (of this configuration): {limits.format(1)}",
                          f"fluid    water: {limits.format(0.5)}", f"fluid    not known: {limits.format(0.5)}"):
                 self.assertIn(line, printed.splitlines())
+
+    def test_a_model_is_given_by_the_tool_sent_to_the_robot_and_known_after_kill_9(self):
+        model = {"model_gain_m_s": [0.1, -0.33333334, 0, 0.01], "model_time_constant_s": [0.03, 0.5, 3, 15],
+                 "fit_error": 0.0021, "plant": {"kp": 0.13}}
+        with lab() as place:
+            station = place.start_station(config=CONFIG)
+            file = place.data / "model.json"
+            file.write_text(json.dumps(model))
+            done = place.tool("fluid", "model", " OIL", file, "--data", place.data)
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            self.assertEqual(done.stdout, "The fluid oil has this model from now on\n")
+            file.write_text(json.dumps(model | {"fit_error": 0.02}))
+            bad = place.tool("fluid", "model", "water", file, "--data", place.data)
+            self.assertEqual(bad.returncode, 1)
+            self.assertIn("the station refused: fit_error = 2 %", bad.stderr)
+            place.start_robot(station)
+            station.wait_for_robot("sim-1")
+            sent = self.fluid(station, "oil")[1]["model"]
+            self.assertEqual((sent["state"], sent["fluid"], sent["fit_error"]), ("confirmed", "oil", 0.0021), sent)
+            place.kill_station()
+            station = place.start_station(robots=station.endpoints["robots"], config=CONFIG)
+            station.wait_for_robot("sim-1")
+            listed = place.tool("fluid", "list", "--data", place.data).stdout
+            self.assertRegex(listed, r"oil +model with a fit error of 0.21 %, set 20.* by token:local")
+            self.assertRegex(listed, r"water +no model")
+            for _ in range(100):
+                sent = station.robot("sim-1")["model"]
+                if sent["state"] == "confirmed":
+                    break
+                time.sleep(0.05)
+            self.assertEqual((sent["state"], sent["fluid"]), ("confirmed", "oil"), "the robot holds it, bit for bit")
+            done = place.tool("fluid", "remove-model", "oil", "--data", place.data)
+            self.assertIn("The fluid oil has no model any more", done.stdout)
+            self.assertIn("before their fluid is named again: sim-1", done.stdout)
+            self.assertEqual(self.fluid(station, "oil")[1]["model"]["state"], "assumed")
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ SystemTest::SystemTest() {
   station.add_sink(listener_of_events);
   run_first(loop, recording->open());
   recording->spawn(tasks);
+  models = std::make_unique<ModelSender>(loop, tasks, clock, station, recording->fluid_models.in_force());
   const boost::asio::ip::tcp::endpoint any_port{boost::asio::ip::address_v4::loopback(), 0};
   listener = std::make_unique<RobotListener>(loop, clock, tasks, station, *recorder, any_port, false, entrance);
 }

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "server/recording/recording_parts.hpp"
+#include "server/station/model_sender.hpp"
 #include "server/tasks.hpp"
 #include "sim_robot/story_words.hpp"
 #include "tests/system/virtual_robot.hpp"
@@ -77,6 +78,7 @@ class SystemTest : public ::testing::Test, public sim_robot::StoryWords {
   Listener listener_of_events{*this};
   Station station{loop, clock, Envelope{}, LinkTimes{}};
   std::unique_ptr<RecordingParts> recording;
+  std::unique_ptr<ModelSender> models;
   Recorder* recorder = nullptr;  // of recording, as are the next two
   Runs* runs = nullptr;
   History* history = nullptr;

@@ -27,7 +27,8 @@ const robot = (robot_id: string, seq: number): RobotState => ({
   status: { supply_mv: 3712, rssi_dbm: -58, free_memory_bytes: 31000, worst_tick_us: 2100, missed_ticks: 0,
     ring_fill: 34, imu_calibration: 3, bad_frames: 0, lost_samples: 0, lost_events: 0 },
   clock: { offset_us: 0, uncertainty_us: 310, drift_ppm: 12, round_trip_us: 1840 }, control: null, pending_stop: null,
-  fluid: null, retired: false, changed_limits: [], invalid_values: 0, unknown_values: null,
+  fluid: null, model: { state: 'assumed', fluid: null, reason: '', fit_error: null, set_at_us: null },
+  retired: false, changed_limits: [], invalid_values: 0, unknown_values: null,
 });
 
 // Position and duty of the experiment, roughly: to 0.1 m, pushed back by 0.05 m at 20 s, and again.

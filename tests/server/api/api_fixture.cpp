@@ -50,6 +50,7 @@ ApiTest::ApiTest(Config of_station, RecorderOptions of_recorder)
   bool started = false;
   tasks.spawn("start", start(recording, started));
   EXPECT_TRUE(clock.run_until([&] { return started; }, 10s));
+  models = std::make_unique<ModelSender>(loop, tasks, clock, station, recording.fluid_models.in_force());
   ApiOptions options;
   options.endpoint = {asio::ip::address_v4::loopback(), 0};
   options.data_dir = folder.path();

@@ -8,6 +8,7 @@
 
 #include "server/api/api_server.hpp"
 #include "server/recording/recording_parts.hpp"
+#include "server/station/model_sender.hpp"
 #include "tests/server/link/test_robot.hpp"
 
 namespace server {
@@ -67,6 +68,7 @@ class ApiTest : public ::testing::Test {
   TaskGroup tasks{loop};
   Station station{loop, clock, config.envelope, LinkTimes{}};
   RecordingParts recording;
+  std::unique_ptr<ModelSender> models;
   Recorder& recorder{recording.recorder};
   AnalysisService analysis{recording.history, maths};
   LiveFeed live{clock};

@@ -1,0 +1,29 @@
+// `rheonaut fluid`: the fluids of a running station, and the models that are sent to robots in them.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <iosfwd>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace server::cli {
+
+struct FluidCommand {
+  enum class Act : std::uint8_t { list, model, remove_model };
+  Act act = Act::list;
+  std::filesystem::path data_dir = "rheonaut-data";
+  std::string fluid;
+  std::filesystem::path file;  // the model, as `rheonaut estimator --json` writes it; "-": standard input
+  bool json = false;
+};
+
+void add_options(CLI::App& command, FluidCommand& options);
+
+// Asks the station that runs in the folder. Throws std::runtime_error saying why nothing was changed.
+int run(const FluidCommand& options, std::ostream& out);
+
+}  // namespace server::cli
