@@ -58,7 +58,7 @@ void Station::note_model(const RobotId& id, const char* kind, const std::string&
 
 std::optional<float> Station::parameter_in_force(const RobotId& id, const std::string& name) const {
   const auto seat = seats_.find(id);
-  return seat == seats_.end() ? std::nullopt : seat->second.parameters.value(name);
+  return seat == seats_.end() ? std::nullopt : seat->second.settings.parameters.value(name);
 }
 
 const char* text(ModelState value) {

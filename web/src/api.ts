@@ -8,6 +8,8 @@ import { kReasons } from './reasons';
 import { outcome_of, type StopOutcome } from './stop_outcome';
 
 type Schemas = components['schemas'];
+export type Fluid = Schemas['Fluid'];
+export type RobotModel = Schemas['RobotModel'];
 export type RobotState = Schemas['Robot'] & { retired?: boolean };
 export type CommandRecord = Schemas['Command'];
 export type CommandBody = Schemas['CommandBody'];
@@ -100,12 +102,12 @@ export class Api {
   acknowledge_losses = () => this.ask<object>('POST', '/recording/losses/acknowledge');
   open_runs = async () => (await this.ask<{ runs: RunRecord[] }>('GET', '/runs?state=open&limit=1000')).runs;
   // null: the station has no list; then a fluid belongs to a run alone.
-  fluids = async (): Promise<string[] | null> => {
-    const list = await this.ask<{ fluids: { fluid: string }[] }>('GET', '/fluids').catch((error: unknown) => {
+  fluids = async (): Promise<Fluid[] | null> => {
+    const list = await this.ask<{ fluids: Fluid[] }>('GET', '/fluids').catch((error: unknown) => {
       if (error instanceof ApiError && error.status === 404) return null;
       throw error;
     });
-    return list && list.fluids.map((each) => each.fluid);
+    return list && list.fluids;
   };
   set_fluid = (robot_id: string, fluid: string | null) =>
     this.ask<object>('POST', `/robots/${encodeURIComponent(robot_id)}/fluid`, { fluid });

@@ -68,4 +68,5 @@ export function clock_time(utc_ms: number): string {
 }
 
 // An identifier of the protocol as words: "sensor_out_of_range" becomes "sensor out of range".
+export const fluid_text = (fluid: string) => (fluid === 'non_newtonian' ? 'non-Newtonian' : words(fluid));
 export const words = (identifier: string) => identifier.replaceAll('_', ' ');

@@ -1,7 +1,8 @@
 // One robot as the page knows it: its state as the station told it last, and what its samples say.
 
 import { computed, signal, type Signal } from '@preact/signals';
-import type { RobotState, SamplesMessage } from './api';
+import type { RobotModel, RobotState, SamplesMessage } from './api';
+import { fluid_text } from './format';
 import { estimate_of, SampleRing } from './samples';
 
 export const kStale_ms = 500; // no sample for so long: every numeral is marked
@@ -10,11 +11,18 @@ const kSettle_ms = 500;
 const kModelConfirmed = 64; // of flags
 const kModelMismatch = 128;
 
-// Whether the estimator's model is that of the fluid; empty where the position is no estimate.
-export function model_of(flags: number, position_sd_m: number | null): string {
+// Whose model the estimator has, and whether it is that of the fluid; empty where the position is no estimate. `told`:
+// what the station has told the robot.
+export function model_of(flags: number, position_sd_m: number | null, told?: RobotModel): string {
   if (position_sd_m === 0) return '';
-  if (flags & kModelMismatch) return 'model does not fit';
-  return flags & kModelConfirmed ? 'model confirmed' : 'model assumed';
+  const is_confirmed = (flags & kModelConfirmed) !== 0;
+  const fluid = told?.fluid ? fluid_text(told.fluid) : '';
+  const named = fluid && told?.state === 'confirmed' && is_confirmed ? `model of ${fluid}` : 'model';
+  if (flags & kModelMismatch) return `${named} does not fit`;
+  if (is_confirmed && told?.state === 'failed') return 'model confirmed for another fluid';
+  if (is_confirmed) return named === 'model' ? 'model confirmed' : `${named}, confirmed`;
+  if (fluid && told?.state === 'sending') return `model of ${fluid} being sent`;
+  return fluid && told?.state === 'failed' ? `model of ${fluid} could not be sent` : 'model assumed';
 }
 
 // The parameters that bound motion and are not at their default, in one line; empty when there is none.
@@ -191,7 +199,7 @@ export class Robot {
       estimate_m: latest && estimate_of(position_m, latest.disturbance_m),
       position_m,
       position_sd_m: latest && latest.position_sd_m,
-      model: latest ? model_of(latest.flags, latest.position_sd_m) : '',
+      model: latest ? model_of(latest.flags, latest.position_sd_m, state.model) : '',
       setpoint_m: latest ? latest.setpoint_m : null,
       reference_m: latest && last(latest.reference_m),
       duty: latest && last(latest.duty),

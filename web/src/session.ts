@@ -1,7 +1,7 @@
 // One running page: the store, the live link, the API and the controls that outlive a view, wired together.
 
 import { effect, signal } from '@preact/signals';
-import { Api, type Me, type RunRecord, type Station } from './api';
+import { Api, type Fluid, type Me, type RunRecord, type Station } from './api';
 import { DutyHold } from './duty_hold';
 import { EmergencyStop, kIdleStop } from './emergency';
 import { LiveLink, type LinkPhase, type Surroundings } from './live';
@@ -19,7 +19,7 @@ export class Session {
   readonly store = new Store({ page_ms: () => performance.now(), utc_ms: () => Date.now() });
   readonly settings = new ViewSettings(browser_shelf());
   readonly station = signal<Station | null>(null);
-  readonly fluids = signal<string[] | null>(null); // that a robot may be in; null: the station has no list of them
+  readonly fluids = signal<Fluid[] | null>(null); // that a robot may be in; null: the station has no list of them
   readonly me = signal<Me | null>(null);
   readonly shows_access = signal(false); // in place of the plots
   readonly phase = signal<LinkPhase>('connecting');

@@ -1,5 +1,7 @@
 // What the page says of the model behind a position's "±", and of limits that were changed.
 import { expect, test } from 'vitest';
+import type { RobotModel } from '../src/api';
+import { model_notice } from '../src/parts/model_line';
 import { changed_limits_of, model_of } from '../src/robot';
 
 test('an estimate says whether its model is assumed, confirmed or does not fit; a known position has none', () => {
@@ -18,4 +20,33 @@ test('limits that are not at their default stand in one line, and nothing where 
   expect(changed_limits_of({ changed_limits: [far, action] })).toBe(
     'Changed limits: position_limit_max_m 0.2 m (default 100 m), link_loss_action 2 (default 0)',
   );
+});
+
+const told = (state: RobotModel['state'], fluid: string | null = null, reason = ''): RobotModel => ({
+  state,
+  fluid,
+  reason,
+  fit_error: fluid === null ? null : 0.0021,
+  set_at_us: fluid === null ? null : 1,
+});
+
+test('it names the fluid whose model the station has told, and whether that holds', () => {
+  expect(model_of(64, 0.004, told('confirmed', 'water'))).toBe('model of water, confirmed');
+  expect(model_of(64 | 128, 0.004, told('confirmed', 'water'))).toBe('model of water does not fit');
+  expect(model_of(64, 0.004, told('confirmed'))).toBe('model confirmed');
+  expect(model_of(0, 0.004, told('sending', 'non_newtonian'))).toBe('model of non-Newtonian being sent');
+  expect(model_of(0, 0.004, told('failed', 'water', 'the motor is on'))).toBe('model of water could not be sent');
+  expect(model_of(64, 0.004, told('failed', null, 'x'))).toBe('model confirmed for another fluid');
+  expect(model_of(0, 0.004, told('confirmed', 'water'))).toBe('model assumed'); // telemetry has the last word
+});
+
+test('beside the fluid stands what became of its model, and nothing where there is none', () => {
+  expect(model_notice(told('assumed'), 'water', false)).toBe('');
+  expect(model_notice(told('assumed'), 'water', true)).toBe('The model of water is not in force.');
+  expect(model_notice(told('assumed', null, 'the robot has booted: name its fluid again'), 'water', true)).toBe(
+    'The model of water is not in force: the robot has booted: name its fluid again.',
+  );
+  expect(model_notice(told('failed', 'water', 'the motor is on'), 'water', true)).toBe('The model of water could not be sent: the motor is on.');
+  expect(model_notice(told('confirmed', 'water'), 'water', true)).toBe('The model of water is in force, fit error 0.21 %.');
+  expect(model_notice(told('sending'), null, false)).toBe('The confirmation of the model before is being taken back.');
 });

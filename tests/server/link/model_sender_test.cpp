@@ -1,5 +1,7 @@
 // What is sent to a robot of its fluid: which commands, in which order, and what becomes of it when something goes
 // wrong.
+// LONG: the hand-made robot that keeps parameters, and a test for each way in which a confirmation could outlive its
+// fluid.
 #include "server/station/model_sender.hpp"
 
 #include <gmock/gmock.h>

@@ -3,10 +3,11 @@
 import { useSignal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
 import type { RunRecord } from '../api';
-import { clock_time, duration, words } from '../format';
+import { clock_time, duration, fluid_text } from '../format';
 import type { Robot } from '../robot';
 import type { Session } from '../session';
 import { Choice } from './choice';
+import { ModelLine } from './model_line';
 import { OutcomeLine, useAsking } from './request';
 
 export function RunControl({ session, robot }: { session: Session; robot: Robot }) {
@@ -45,6 +46,7 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
                  on_start={(name, fluid) => (name === '' ? asking.fail('Give the run a name.') : void start(name, fluid))}
                  on_fluid={set_fluid} />
       )}
+      {is_current && <ModelLine session={session} robot={robot} pending={asking.pending} on_send={set_fluid} />}
       <OutcomeLine asking={asking} />
     </fieldset>
   );
@@ -64,7 +66,7 @@ function RunForm({ session, robot, disabled, on_start, on_fluid }: RunFormProps)
   const listed = session.fluids.value;
   const known = robot.state.value.fluid ?? '';
   const fluid = picked.value ?? known;
-  const names = [...new Set([...(listed ?? kBuiltInFluids), known])].filter((name) => name !== '');
+  const names = [...new Set([...(listed?.map((each) => each.fluid) ?? kBuiltInFluids), known])].filter((name) => name !== '');
   const options = [...names.map((name) => ({ value: name, text: fluid_text(name) })), { value: '', text: 'fluid not known' }];
   const pick = (next: string) => {
     picked.value = next;
@@ -112,7 +114,6 @@ const lost = (run: RunRecord) =>
   run.samples_lost > 0 ? `${run.samples_lost} of its samples are lost.` : 'Its samples until then are kept.';
 
 const kBuiltInFluids = ['non_newtonian', 'water'];
-const fluid_text = (fluid: string) => (fluid === 'non_newtonian' ? 'non-Newtonian' : words(fluid));
 
 function RunTime({ session, started_at_us }: { session: Session; started_at_us: number }) {
   void session.store.now_ms.value; // ten times a second
