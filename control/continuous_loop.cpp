@@ -131,6 +131,10 @@ Loop checked(const FractionalModel& plant, const FopdController& controller) {
   check(plant);
   check(controller);
   if (!(plant.kp > 0)) throw_invalid("continuous loop: the plant's kp must be positive, is ", plant.kp);
+  if (plant.dead_time_s > 0) {
+    throw_invalid("continuous loop: the plant must have no dead time, has ", plant.dead_time_s,
+                  " s; predict_closed_loop takes one");
+  }
   if (controller.kd > 0 && controller.mu > plant_order(plant) - kLeastExcess) {
     throw_invalid("continuous loop: mu must be at most ", plant_order(plant) - kLeastExcess,
                   " with this plant, or the loop follows at once, is ", controller.mu);

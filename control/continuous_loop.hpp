@@ -17,7 +17,8 @@
 //           reference for (28) is itself off, by up to 1.7e-5: presumably its contour leaves out the loop's poles.
 //           There, the test holds that two different rays agree to 1e-12.
 // Errors:   throws std::invalid_argument quoting the bad value, or saying that the loop is unstable. μ must be
-//           0.25 below n, or T hardly falls off and the loop would follow at once.
+//           0.25 below n, or T hardly falls off and the loop would follow at once. A plant with a dead time is refused:
+//           Q then has zeros without end.
 #pragma once
 
 #include <optional>

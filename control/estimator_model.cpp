@@ -266,7 +266,8 @@ double fit_error_of(const EstimatorSections& sections, const Target& target, dou
   return largest;
 }
 
-std::string reason_of(double fit_error, double final_velocity_m_s, const Target& target) {
+std::string reason_of(const FractionalModel& plant, double fit_error, const Target& target) {
+  const double final_velocity_m_s = plant.kp / plant.b3;
   if (std::abs(final_velocity_m_s) > kLargestParameterM_S) {
     return join_text("the plant's final velocity is ", final_velocity_m_s,
                      " m/s per duty, and the robot's gains end at ", kLargestParameterM_S, " m/s");
@@ -277,7 +278,8 @@ std::string reason_of(double fit_error, double final_velocity_m_s, const Target&
                    100 * kLargestFitError, " %",
                    overshoot > kOvershoots ? join_text("; the plant overshoots by ", std::round(1e3 * overshoot) / 10,
                                                        " %, which sections without oscillation follow badly")
-                                           : std::string{});
+                                           : std::string{},
+                   plant.dead_time_s > 0 ? "; the plant has a dead time, and sections have none" : "");
 }
 
 }  // namespace
@@ -305,7 +307,7 @@ EstimatorModel estimator_model(const FractionalModel& plant) {
     if (error < model.fit_error) model.sections = found, model.fit_error = error;
   }
   model.is_met = model.fit_error <= kLargestFitError;
-  if (!model.is_met) model.reason = reason_of(model.fit_error, final_velocity_m_s, compared);
+  if (!model.is_met) model.reason = reason_of(plant, model.fit_error, compared);
   return model;
 }
 

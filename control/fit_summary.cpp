@@ -56,7 +56,7 @@ void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const 
   for (std::size_t i = 0; i < free.size(); ++i) {
     const auto row = static_cast<std::size_t>(free[i]);
     if (free[i] == kOffset) fit.offset_sigma_m = found.one_sigma[i];
-    if (free[i] == kDeadTime || (free[i] == kSensorTime && fit.dead_time_s > 0)) {
+    if (free[i] == kDeadTime || (free[i] == kSensorTime && fit.model.dead_time_s > 0)) {
       fit.dead_time_sigma_s = found.one_sigma[i];
     }
     if (free[i] == kPositionClock) fit.position_clock_sigma_s = found.one_sigma[i];
@@ -112,10 +112,9 @@ Fit summary(OutputErrorSearch& search, const Recording& recording, Cost cost, St
   fit.structure = structure;
   fit.model = found.point.model;
   fit.offset_m = found.point.offset_m;
-  fit.dead_time_s = found.point.dead_time_s;
   fit.position_clock_s = found.point.position_clock_s;
   fit.sensor = search.sensor_fit(found.point);
-  if (fit.sensor && search.finds_dead_time()) fit.dead_time_s = search.sensor_lag_s(found.point);
+  if (fit.sensor && search.finds_dead_time()) fit.model.dead_time_s = search.sensor_lag_s(found.point);
   fit.end = found.end;
   fit.iterations = found.iterations;
   fit.starts = found.starts;

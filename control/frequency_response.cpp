@@ -26,17 +26,25 @@ PlantOnAxis::PlantOnAxis(const FractionalModel& model, bool is_velocity_loop)
       beta_direction_{direction(model.beta)},
       log_gain_{std::log(std::abs(model.kp))},
       integrators_{is_velocity_loop ? 0.0 : 1.0},
-      phase_at_0_rad_{-integrators_ * pi / 2 - (model.kp < 0 ? pi : 0)} {}
+      phase_at_0_rad_{-integrators_ * pi / 2 - (model.kp < 0 ? pi : 0)},
+      dead_time_s_{model.dead_time_s} {}
 
 AxisPoint PlantOnAxis::at(double log_omega) const {
   const Complex first = model_.b1 == 0 ? Complex{} : model_.b1 * std::exp(model_.alpha * log_omega) * alpha_direction_;
   const Complex second = model_.b2 * std::exp(model_.beta * log_omega) * beta_direction_;
   const Complex d = first + second + model_.b3;
   const Complex integrated = integrators_ == 0 ? d : d * Complex{0, std::exp(log_omega)};
-  return {model_.kp * std::conj(integrated) / std::norm(integrated),               // (1)
-          log_gain_ - std::log(std::norm(d)) / 2 - integrators_ * log_omega,       //
-          phase_at_0_rad_ - std::arg(d),                                           //
-          -integrators_ - ratio(model_.alpha * first + model_.beta * second, d)};  // (3)
+  AxisPoint point{model_.kp * std::conj(integrated) / std::norm(integrated),               // (1)
+                  log_gain_ - std::log(std::norm(d)) / 2 - integrators_ * log_omega,       //
+                  phase_at_0_rad_ - std::arg(d),                                           //
+                  -integrators_ - ratio(model_.alpha * first + model_.beta * second, d)};  // (3)
+  if (dead_time_s_ > 0) {
+    const double lag_rad = dead_time_s_ * std::exp(log_omega);  // (1a)
+    point.value *= std::polar(1.0, -lag_rad);
+    point.phase_rad -= lag_rad;
+    point.log_slope -= Complex{0, lag_rad};
+  }
+  return point;
 }
 
 ControllerOnAxis::ControllerOnAxis(const FopdController& controller)

@@ -1,13 +1,14 @@
 // The plant, the controller and their product along the positive imaginary axis, each with its logarithmic slope.
 //
 //   P(jω) = kp/(D(jω) jω)  for position,  kp/D(jω)  for velocity    (1)   [birs2021] (20), (22)
+//           times e^{-jωT} with a dead time: phase -ωT, slope -ωT  (1a)
 //   C(jω) = kp (1 + kd (jω)^μ)                                     (2)   [birs2021] (23)
 //   d ln F/d ln ω = d ln|F|/d ln ω + i d arg F/d ln ω              (3)   analytic; slopes of a product add
 //
 // The frequency is given as ln ω: models of milliseconds and of hours are then alike. The phases are unwrapped: D and
-// C never leave the upper half plane. A negative plant gain counts as -180 degrees.
-// Accuracy: a few units of rounding while |ln ω| ≤ kLargestLogOmega.
-// Errors:   none; the arguments have been checked.
+// C never leave the upper half plane, and the dead time's phase is a number. A negative plant gain counts as -180
+// degrees. Accuracy: a few units of rounding while |ln ω| ≤ kLargestLogOmega. Errors:   none; the arguments have been
+// checked.
 #pragma once
 
 #include <numbers>
@@ -38,7 +39,7 @@ class PlantOnAxis {
  private:
   FractionalModel model_;
   Complex alpha_direction_, beta_direction_;  // j^α, j^β
-  double log_gain_, integrators_, phase_at_0_rad_;
+  double log_gain_, integrators_, phase_at_0_rad_, dead_time_s_;
 };
 
 // (2)

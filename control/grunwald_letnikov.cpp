@@ -31,6 +31,7 @@ std::vector<double> coefficients(const FractionalModel& model, double dt_s, std:
 std::vector<double> grunwald_letnikov_velocity(const FractionalModel& model, double dt_s, std::span<const double> duty,
                                                std::size_t terms) {
   check(model);
+  if (model.dead_time_s > 0) refuse("the model must have no dead time, has", model.dead_time_s);
   if (!(dt_s > 0 && std::isfinite(dt_s))) refuse("dt_s must be positive, is", dt_s);
   if (duty.size() > kMostSamples) {
     throw_invalid("Grünwald-Letnikov: at most ", kMostSamples, " samples, there are ", duty.size(),

@@ -5,7 +5,8 @@
 //
 // Accuracy: of (29) at 10 ms, 4 % at 0.1 s, 2e-4 at 1 s. Cost grows with the square of the number of samples unless
 // terms is limited; then the steady velocity is wrong for ever.
-// Errors: throws std::invalid_argument quoting the bad value, and for more than 200 000 samples.
+// Errors: throws std::invalid_argument quoting the bad value, for a model with a dead time, and for more than 200 000
+// samples.
 #pragma once
 
 #include <span>

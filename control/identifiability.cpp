@@ -135,7 +135,7 @@ void add_correlated(const Fit& fit, std::vector<std::string>& warnings) {
 }
 
 bool dead_time_is_at_its_limit(const Fit& fit, const IdentificationOptions& options) {
-  return options.longest_dead_time_s > 0 && fit.dead_time_s > kDeadTimeAtLimit * options.longest_dead_time_s;
+  return options.longest_dead_time_s > 0 && fit.model.dead_time_s > kDeadTimeAtLimit * options.longest_dead_time_s;
 }
 
 void add_at_bounds(const Fit& fit, const IdentificationOptions& options, std::vector<std::string>& warnings) {
@@ -201,7 +201,7 @@ std::vector<std::string> search_doubts(const Fit& fit, const IdentificationOptio
                                  ": the parameters are the best so far, not the optimum; raise the limit"));
   }
   if (dead_time_is_at_its_limit(fit, options)) {
-    warnings.push_back(join_text("the dead time, ", fit.dead_time_s, " s, lies at the longest that was allowed, ",
+    warnings.push_back(join_text("the dead time, ", fit.model.dead_time_s, " s, lies at the longest that was allowed, ",
                                  options.longest_dead_time_s,
                                  " s: the other parameters make up for what it lacks; allow a longer one"));
   }

@@ -102,8 +102,8 @@ struct SensorFit {
 // Absent parameters (b1 of first order, the orders of integer structures) have no sigma and correlation 0.
 struct Fit {
   Structure structure = Structure::fractional;
-  FractionalModel model;  // b3 = 1
-  double offset_m = 0, dead_time_s = 0;
+  FractionalModel model;  // b3 = 1; its dead time is 0 unless one was looked for
+  double offset_m = 0;
   std::optional<double> offset_sigma_m, dead_time_sigma_s;
   double position_clock_s = 0;  // what the times of the position lack, with its sigma if it was fitted
   std::optional<double> position_clock_sigma_s;
@@ -141,8 +141,8 @@ struct Identification {
 
 Identification identify(const Recording& recording, const IdentificationOptions& options);
 
-// What a planned experiment would tell: one-sigma of each parameter by (5), for white noise of these sizes (0: channel
-// not recorded). Of an acceleration bias, drift and lag are never known.
+// What a planned experiment would tell, the model's dead time being known: one-sigma of each parameter by (5), for
+// white noise of these sizes (0: channel not recorded). Of an acceleration bias, drift and lag are never known.
 struct PlannedExperiment {
   double dt_s = 0.01;
   std::vector<double> duty;

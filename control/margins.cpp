@@ -1,4 +1,4 @@
-// Scans for crossovers and peaks, and polishes them.
+// Finds crossovers and peaks among the samples of the loop, and polishes them.
 #include "control/margins.hpp"
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 
 #include "control/frequency_response.hpp"
 #include "control/invalid_argument.hpp"
+#include "control/loop_scan.hpp"
 
 namespace control {
 namespace {
@@ -14,34 +15,13 @@ namespace {
 using std::numbers::pi;
 
 constexpr double kDbPerNeper = 20 / std::numbers::ln10;
-constexpr double kScanStep = 0.2;        // in ln ω; a power law has no feature narrower than about 1
-constexpr double kAsymptoteStep = 0.6;   // far from every break
-constexpr double kResonanceStep = 0.06;  // near where D or C may resonate
-constexpr double kResonanceReach = 2;
-constexpr double kBeyond = 9.2;     // ln 1e4: how far the scan goes past the outermost break
-constexpr double kAsymptote = 2.1;  // ln 8: |L| is that near to its asymptote past the breaks, or nearer
-constexpr double kSlightest = -14;  // ln 1e-6: changes of |L| that are not worth a longer scan
 constexpr int kPeaksPolished = 3;
+constexpr double kListedLogGain = -2.3;  // ln 0.1: phase crossovers that a dead time makes below it are not listed
 
 void check_frequency(double omega_rad_s) {
   if (omega_rad_s > 0 && std::isfinite(omega_rad_s)) return;
   throw_invalid("frequency must be positive and finite, is ", omega_rad_s, " rad/s");
 }
-
-class LoopOnAxis {
- public:
-  explicit LoopOnAxis(const OpenLoop& loop) : plant_{loop.plant, loop.is_velocity_loop}, controller_{loop.controller} {}
-  AxisPoint at(double log_omega) const { return plant_.at(log_omega) * controller_.at(log_omega); }
-
- private:
-  PlantOnAxis plant_;
-  ControllerOnAxis controller_;
-};
-
-struct Sample {
-  double log_omega = 0;
-  AxisPoint loop;
-};
 
 // One real quantity along the axis, with its slope in ln ω.
 struct ValueAndSlope {
@@ -49,88 +29,6 @@ struct ValueAndSlope {
 };
 
 ValueAndSlope log_gain(const AxisPoint& point) { return {point.log_magnitude, point.log_slope.real()}; }
-ValueAndSlope phase_above_minus_pi(const AxisPoint& point) { return {point.phase_rad + pi, point.log_slope.imag()}; }
-
-// How |L| ends on the right: |L| → e^log_gain · ω^slope.
-struct Asymptote {
-  double log_gain = 0, slope = 0;
-};
-
-double log_dc_gain(const OpenLoop& loop) {
-  return std::log(std::abs(loop.plant.kp) * loop.controller.kp / loop.plant.b3);
-}
-
-Asymptote right_asymptote(const OpenLoop& loop) {
-  const auto& [kp, b1, b2, b3, alpha, beta] = loop.plant;
-  const auto& [controller_kp, kd, mu] = loop.controller;
-  const double order = (b1 > 0 ? alpha : beta) + (loop.is_velocity_loop ? 0 : 1);
-  return {std::log(std::abs(kp) * controller_kp * (kd > 0 ? kd : 1) / (b1 > 0 ? b1 : b2)), (kd > 0 ? mu : 0) - order};
-}
-
-struct LogRange {
-  double low = 0, high = 0;
-  void include(double log_omega) { low = std::min(low, log_omega), high = std::max(high, log_omega); }
-};
-
-// The frequencies at which two terms of D or of C are equal: between and near them |L| bends.
-LogRange range_of_breaks(const OpenLoop& loop) {
-  const auto& [kp, b1, b2, b3, alpha, beta] = loop.plant;
-  LogRange range{std::log(b3 / b2) / beta, std::log(b3 / b2) / beta};
-  if (b1 > 0) range.include(std::log(b2 / b1) / (alpha - beta));
-  if (b1 > 0) range.include(std::log(b3 / b1) / alpha);
-  if (loop.controller.kd > 0) range.include(-std::log(loop.controller.kd) / loop.controller.mu);
-  return range;
-}
-
-// From below the lowest to above the highest frequency where anything happens: the asymptotes may reach 1 far away.
-LogRange range_to_scan(const OpenLoop& loop, LogRange range) {
-  const double beta = loop.plant.beta, dc = log_dc_gain(loop);
-  const auto& [kp, kd, mu] = loop.controller;
-  const double lowest_break = range.low;
-  if (!loop.is_velocity_loop) {
-    range.include(dc);  // |L| ≈ K/ω on the left
-  } else if (dc != 0) {
-    range.include(lowest_break +
-                  std::min(0.0, std::log(std::abs(dc))) / std::min(beta, mu));  // leaves K ≈ 1 that far down
-  }
-  if (loop.is_velocity_loop && kd > 0 && mu != beta) {
-    const double turn = std::log(kd * loop.plant.b3 / loop.plant.b2) / (beta - mu);  // leaves K up, and turns down
-    if (std::log(kd) + mu * turn > kSlightest) range.include(turn);
-  }
-  const Asymptote right = right_asymptote(loop);
-  if (right.slope != 0) range.include(-right.log_gain / right.slope + kAsymptote / std::abs(right.slope));
-  return {std::clamp(range.low - kBeyond, -kLargestLogOmega, kLargestLogOmega - 1),
-          std::clamp(range.high + kBeyond, 1 - kLargestLogOmega, kLargestLogOmega)};
-}
-
-// Where D (alpha near 2, b2 small) and C (mu above 1) may have sharp turns; 0 rad/s where they cannot.
-struct Resonances {
-  double plant = -HUGE_VAL, controller = -HUGE_VAL;
-};
-
-Resonances possible_resonances(const OpenLoop& loop) {
-  Resonances result;
-  if (loop.plant.b1 > 0) result.plant = std::log(loop.plant.b3 / loop.plant.b1) / loop.plant.alpha;
-  const auto& [kp, kd, mu] = loop.controller;
-  if (kd > 0 && mu > 1) result.controller = -std::log(kd) / mu;
-  return result;
-}
-
-std::vector<Sample> scan(const OpenLoop& loop, const LoopOnAxis& on_axis) {
-  const LogRange breaks = range_of_breaks(loop), range = range_to_scan(loop, breaks);
-  const Resonances resonances = possible_resonances(loop);
-  const auto step_at = [&](double log_omega) {
-    const double away = std::min(std::abs(log_omega - resonances.plant), std::abs(log_omega - resonances.controller));
-    if (away < kResonanceReach) return kResonanceStep;
-    return log_omega > breaks.low - kBeyond && log_omega < breaks.high + kBeyond ? kScanStep : kAsymptoteStep;
-  };
-  std::vector<Sample> samples;
-  for (double log_omega = range.low; log_omega < range.high; log_omega += step_at(log_omega)) {
-    samples.push_back({log_omega, on_axis.at(log_omega)});
-  }
-  samples.push_back({range.high, on_axis.at(range.high)});
-  return samples;
-}
 
 // The root between two points where the signs differ: Newton's method, halving instead where that would leave them.
 template <class Function>
@@ -160,24 +58,52 @@ double extremum_between(double low, double high, const Function& f) {
   return (low + high) / 2;
 }
 
-// Every ln ω where the quantity is 0. Between two samples of one sign it may come to 0 and turn back: the slopes tell.
-std::vector<double> zeros(const LoopOnAxis& loop, const std::vector<Sample>& samples,
-                          ValueAndSlope (*quantity)(const AxisPoint&)) {
+// Every ln ω between two samples where the quantity is 0. Between two of one sign it may come to 0 and turn back: the
+// slopes tell.
+template <class Quantity>
+void add_zeros(const LoopOnAxis& loop, const Sample& left, const Sample& right, const Quantity& quantity,
+               std::vector<double>& found) {
   const auto f = [&](double log_omega) { return quantity(loop.at(log_omega)); };
+  const ValueAndSlope a = quantity(left.loop), b = quantity(right.loop);
+  if (a.value == 0) {
+    found.push_back(left.log_omega);
+  } else if (a.value * b.value < 0) {
+    found.push_back(root_between(left.log_omega, right.log_omega, f));
+  } else if (a.value * a.slope < 0 && b.value * b.slope > 0) {
+    const double turn = extremum_between(left.log_omega, right.log_omega, f);
+    if (f(turn).value * a.value >= 0) return;
+    found.push_back(root_between(left.log_omega, turn, f));
+    found.push_back(root_between(turn, right.log_omega, f));
+  }
+}
+
+std::vector<double> find_gain_crossovers(const LoopOnAxis& loop, const std::vector<Sample>& samples) {
+  std::vector<double> found;
+  for (std::size_t i = 0; i + 1 < samples.size(); ++i) add_zeros(loop, samples[i], samples[i + 1], log_gain, found);
+  return found;
+}
+
+// How often L has gone round, and so past the axis on the left, by this phase; falls by 1 for each odd multiple of -π.
+double sheet(double phase_rad) { return std::floor((phase_rad + pi) / (2 * pi)); }
+
+// Where the phase is an odd multiple of -π. Beyond kMostTurnsRad the samples do not follow the turns: none from there.
+std::vector<double> find_phase_crossovers(const OpenLoop& loop, const LoopOnAxis& on_axis,
+                                          const std::vector<Sample>& samples) {
   std::vector<double> found;
   for (std::size_t i = 0; i + 1 < samples.size(); ++i) {
-    const double left = samples[i].log_omega, right = samples[i + 1].log_omega;
-    const ValueAndSlope a = quantity(samples[i].loop), b = quantity(samples[i + 1].loop);
-    if (a.value == 0) {
-      found.push_back(left);
-    } else if (a.value * b.value < 0) {
-      found.push_back(root_between(left, right, f));
-    } else if (a.value * a.slope < 0 && b.value * b.slope > 0) {
-      const double turn = extremum_between(left, right, f);
-      if (f(turn).value * a.value >= 0) continue;
-      found.push_back(root_between(left, turn, f));
-      found.push_back(root_between(turn, right, f));
+    const Sample &left = samples[i], &right = samples[i + 1];
+    const double lag_rad = loop.plant.dead_time_s * (std::exp(right.log_omega) - std::exp(left.log_omega));
+    if (lag_rad > 2 * kTurnStepRad) continue;
+    const double first = std::round(left.loop.phase_rad / (2 * pi) - 0.5);
+    const double last = std::round(right.loop.phase_rad / (2 * pi) - 0.5);
+    const std::size_t before = found.size();
+    for (double turn = std::min(first, last); turn <= std::max(first, last); ++turn) {
+      const auto above = [turn](const AxisPoint& point) {
+        return ValueAndSlope{point.phase_rad - (2 * turn + 1) * pi, point.log_slope.imag()};
+      };
+      add_zeros(on_axis, left, right, above, found);
     }
+    std::sort(found.begin() + static_cast<std::ptrdiff_t>(before), found.end());
   }
   return found;
 }
@@ -235,7 +161,8 @@ double left_limit(const OpenLoop& loop) {
 double right_limit(const OpenLoop& loop) {
   const Asymptote right = right_asymptote(loop);
   if (right.slope != 0) return right.slope > 0 ? HUGE_VAL : 0;
-  return std::copysign(std::exp(right.log_gain), loop.plant.kp);
+  const double limit = std::exp(right.log_gain);
+  return loop.plant.dead_time_s > 0 ? -limit : std::copysign(limit, loop.plant.kp);  // -1 is the worst of its turns
 }
 
 // (5). The crossovers join the samples: peaks sharper than the scan stand near them.
@@ -249,16 +176,50 @@ void find_peaks(Margins& result, const OpenLoop& loop, const LoopOnAxis& on_axis
     if (s_limit > s.value) s = {s_limit, log_omega};
     if (t_limit > t.value) t = {t_limit, log_omega};
   };
+  if (loop.plant.dead_time_s > 0) {
+    for (const Sample& sample : samples) {
+      const bool turns = loop.plant.dead_time_s * std::exp(sample.log_omega) > kMostTurnsRad;
+      if (turns) include(-std::exp(sample.loop.log_magnitude), sample.log_omega);
+    }
+  }
   include(left_limit(loop), samples.front().log_omega);
   include(right_limit(loop), samples.back().log_omega);
   result.ms = s.value, result.ms_at_rad_s = std::exp(s.log_omega);
   result.mt = t.value, result.mt_at_rad_s = std::exp(t.log_omega);
 }
 
+// The plant is stable, so 1 + L has no zero on the right exactly if L does not go round -1: where |L| > 1 it passes the
+// axis on the left of -1 as often up as down. Where that begins and ends are the gain crossovers, so (6) needs the
+// phases there and no others, however often a dead time turns L. A negative gain adds one passage at ω = 0, which
+// nothing balances; so does, without end, a dead time where |L| does not fall below 1.
+bool is_stable(const OpenLoop& loop, const LoopOnAxis& on_axis, const std::vector<Sample>& samples,
+               std::span<const double> crossovers) {
+  const AxisPoint &first = samples.front().loop, &last = samples.back().loop;
+  const bool passes_at_0 = loop.plant.kp < 0 && (!loop.is_velocity_loop || log_dc_gain(loop) > 0);
+  const Asymptote right = right_asymptote(loop);
+  const bool turns_for_ever = right.slope > 0 || (right.slope == 0 && right.log_gain >= 0);
+  if (passes_at_0 || (loop.plant.dead_time_s > 0 && turns_for_ever)) return false;
+  double rounds = (first.log_magnitude > 0 ? sheet(first.phase_rad) : 0) -
+                  (last.log_magnitude > 0 ? sheet(last.phase_rad) : 0);  // (6)
+  for (const double log_omega : crossovers) {
+    const AxisPoint point = on_axis.at(log_omega);
+    const double slope = point.log_slope.real();
+    if (slope != 0) rounds += slope > 0 ? sheet(point.phase_rad) : -sheet(point.phase_rad);
+  }
+  return rounds == 0;
+}
+
+// The phase margin: 180 degrees and the phase. In a stable loop L may have gone round on its way there, where |L| < 1;
+// then from the nearest of the odd multiples of -180 degrees.
+double margin_deg_at(const AxisPoint& point, bool is_stable) {
+  const double margin_deg = 180 + point.phase_rad * kDegPerRad;
+  return is_stable && margin_deg <= -180 ? std::remainder(margin_deg, 360) : margin_deg;
+}
+
 void describe_gain_crossovers(Margins& result, const LoopOnAxis& loop, std::span<const double> crossovers) {
   for (const double log_omega : crossovers) {
     const AxisPoint point = loop.at(log_omega);
-    const double omega_rad_s = std::exp(log_omega), margin_deg = 180 + point.phase_rad * kDegPerRad;
+    const double omega_rad_s = std::exp(log_omega), margin_deg = margin_deg_at(point, result.is_closed_loop_stable);
     result.gain_crossovers_rad_s.push_back(omega_rad_s);
     if (result.phase_margin_deg && *result.phase_margin_deg <= margin_deg) continue;
     result.gain_crossover_rad_s = omega_rad_s;
@@ -267,22 +228,19 @@ void describe_gain_crossovers(Margins& result, const LoopOnAxis& loop, std::span
   }
 }
 
-// The plant is stable, so 1 + L has no zero on the right exactly if L does not go round -1: as often up as down
-// through the axis on the left of it. A negative gain adds one passage at ω = 0, which nothing balances.
+// Without a dead time all are listed; with one, of those at small |L| only the first if there is no other.
 void describe_phase_crossovers(Margins& result, const OpenLoop& loop, const LoopOnAxis& on_axis,
                                std::span<const double> crossovers) {
-  int rounds = 0;
   for (const double log_omega : crossovers) {
-    const AxisPoint point = on_axis.at(log_omega);
-    const double margin_db = -point.log_magnitude * kDbPerNeper;
-    result.phase_crossovers_rad_s.push_back(std::exp(log_omega));
-    if (margin_db < 0) rounds += point.log_slope.imag() < 0 ? 1 : -1;
+    const double log_gain = on_axis.at(log_omega).log_magnitude, margin_db = -log_gain * kDbPerNeper;
+    const bool is_listed = loop.plant.dead_time_s == 0 || log_gain > kListedLogGain;
+    if (is_listed || result.phase_crossovers_rad_s.empty()) {
+      result.phase_crossovers_rad_s.push_back(std::exp(log_omega));
+    }
     if (!result.gain_margin_db || std::abs(margin_db) < std::abs(*result.gain_margin_db)) {
       result.gain_margin_db = margin_db;
     }
   }
-  const bool passes_at_0 = loop.plant.kp < 0 && (!loop.is_velocity_loop || log_dc_gain(loop) > 0);
-  result.is_closed_loop_stable = rounds == 0 && !passes_at_0;
 }
 
 }  // namespace
@@ -339,9 +297,10 @@ Margins margins(const OpenLoop& loop) {
   check(loop);
   const LoopOnAxis on_axis{loop};
   const std::vector<Sample> samples = scan(loop, on_axis);
-  std::vector<double> crossovers = zeros(on_axis, samples, log_gain);
-  const std::vector<double> phase_crossovers = zeros(on_axis, samples, phase_above_minus_pi);
+  std::vector<double> crossovers = find_gain_crossovers(on_axis, samples);
+  const std::vector<double> phase_crossovers = find_phase_crossovers(loop, on_axis, samples);
   Margins result;
+  result.is_closed_loop_stable = is_stable(loop, on_axis, samples, crossovers);
   describe_gain_crossovers(result, on_axis, crossovers);
   describe_phase_crossovers(result, loop, on_axis, phase_crossovers);
   crossovers.insert(crossovers.end(), phase_crossovers.begin(), phase_crossovers.end());

@@ -2,13 +2,14 @@
 //
 //   L(jω) = C(jω) H(jω)/(jω)                      (1)   position loop, [birs2021] (22), (23)
 //   L(jω) = C(jω) H(jω)                           (2)   velocity loop
-//   arg L = -π/2 + arg C - arg D                  (3)   unwrapped: both arguments are continuous in ω, since D and C
-//                                                       stay in one half plane along the imaginary axis
+//   arg L = -π/2 + arg C - arg D - ωT             (3)   unwrapped: both arguments are continuous in ω, since D and C
+//                                                       stay in one half plane along the imaginary axis; T: dead time
 //   phase slope = d arg L/dω                      (4)   0 at the crossover is iso-damping, [birs2021] (26); analytic
 //   Ms = sup |1/(1 + L)|,  Mt = sup |L/(1 + L)|   (5)   over all ω, the limits at 0 and ∞ included
+//   Σ ±floor((arg L + π)/2π) = 0                  (6)   stable: over the ends of all ranges with |L| > 1, + where one
+//                                                       begins, - where it ends; Nyquist's criterion
 //
-// The frequencies worth searching follow from where the terms of D and C are equal and from the asymptotes of |L|, so
-// that time constants of milliseconds and of hours are alike.
+// The frequencies searched are those of loop_scan.hpp.
 // Accuracy: crossovers 1e-12 relative; magnitude and phase 1e-10 dB and degrees; held by margins_test.cpp.
 // Errors:   throws std::invalid_argument quoting the bad value.
 // Differs from the paper: no.
@@ -47,9 +48,11 @@ std::vector<BodePoint> bode(const OpenLoop& loop, std::span<const double> omega_
 std::vector<double> log_spaced(double first_rad_s, double last_rad_s, int count);
 
 struct Margins {
-  std::vector<double> gain_crossovers_rad_s;   // every ω with |L| = 1, ascending
-  std::vector<double> phase_crossovers_rad_s;  // every ω with arg L = -π, ascending
-  // At the crossover with the smallest phase margin; none if |L| never is 1.
+  std::vector<double> gain_crossovers_rad_s;  // every ω with |L| = 1, ascending
+  // Every ω with arg L = -π, ascending; with a dead time also of -3π, -5π, …, those with |L| above 0.1, or the first.
+  std::vector<double> phase_crossovers_rad_s;
+  // At the crossover with the smallest phase margin; none if |L| never is 1. Where a dead time has turned the L of a
+  // stable loop by more than once, from the nearest odd multiple of -π.
   std::optional<double> gain_crossover_rad_s;
   std::optional<double> phase_margin_deg;
   std::optional<double> phase_slope_deg_per_rad_s;

@@ -3,6 +3,9 @@
 //   v = Σ_i 2 Re[y_i] + c u,  y_i' = s_i y_i + w_i u                 (1)   modal_form.hpp: H as modes s_i, w_i
 //   y_i → e^{s_i dt} y_i + w_i (e^{s_i dt} - 1)/s_i u                (2)   over one step of constant duty u
 //   x = ∫v dt = Σ_i 2 Re[y_i/s_i] - Σ_i 2 Re[w_i/s_i] ∫u dt          (3)   (1) divided by s_i and summed
+//   With a dead time (2) becomes (4): a part f of the step under the earlier duty, the rest under the later one, see
+//   delay_line.hpp.
+//   y_i → e^{s_i dt} y_i + w_i (e^{s_i dt} - e^{s_i (1-f) dt})/s_i u_earlier + w_i (e^{s_i (1-f) dt} - 1)/s_i u_later
 //
 // Modes that settle within one step have no state: y = -w u/s, which makes c and its part of (3). Thus (3) makes the
 // position one more weighted sum of the same states, and keeps it consistent with the velocity for days.
@@ -19,6 +22,7 @@
 #include <memory>
 #include <vector>
 
+#include "control/delay_line.hpp"
 #include "control/plant_models.hpp"
 
 namespace control {
@@ -27,12 +31,12 @@ class ModalPlant {
  public:
   ModalPlant(const FractionalModel& model, double dt_s);
 
-  // Advances by dt_s under a constant duty.
+  // Advances by dt_s; the duty is constant over it, and acts the model's dead time later.
   void step(double duty);
 
   double position_m() const { return position_m_; }
   double velocity_m_s() const { return velocity_m_s_; }
-  double acceleration_m_s2() const;  // at the end of the last step, under its duty
+  double acceleration_m_s2() const;  // at the end of the last step, under the duty that acts then
 
   void reset();
   // Asks for the memory of a step ahead of it.
@@ -47,8 +51,11 @@ class ModalPlant {
   };
   struct Block {
     Lanes decay_re{}, decay_im{};        // y after dt, per y
-    Lanes input_re{}, input_im{};        // y after dt, per u
+    Lanes input_re{}, input_im{};        // y after dt, per u; with a dead time per u_later of (4)
     Lanes position_re{}, position_im{};  // 1/s of (3)
+  };
+  struct Earlier {
+    Lanes input_re{}, input_im{};  // y after dt, per u_earlier of (4)
   };
   struct Slope {
     Lanes rate_re{}, rate_im{};  // s
@@ -60,6 +67,7 @@ class ModalPlant {
     FractionalModel model;
     double dt_s;
     std::vector<Block> blocks;
+    std::vector<Earlier> earlier;    // of the same modes; none where the dead time is a whole number of steps
     std::vector<Slope> slopes;       // for the acceleration, of the same modes
     double velocity_at_once = 0;     // c, m/s per duty
     double position_at_once = 0;     // -Σ 2 Re[w/s²] of the modes in c, m per duty
@@ -67,10 +75,14 @@ class ModalPlant {
   };
   static std::shared_ptr<const Modes> modes_of(const FractionalModel& model, double dt_s);
 
+  template <bool has_earlier>
+  void advance(HeldDuty duty);
+
   std::shared_ptr<const Modes> modes_;
   std::vector<State> states_;
-  double travel_s_ = 0;  // ∫u dt
-  double duty_ = 0;
+  DelayLine delay_;
+  double travel_s_ = 0;  // ∫u dt of what has acted
+  double duty_ = 0;      // that acts at the end of the last step
   double position_m_ = 0;
   double velocity_m_s_ = 0;
 };

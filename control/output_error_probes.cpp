@@ -13,7 +13,7 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::model_slopes(const std::vector<d
   for (const Measured& measured : measured_) {
     const double longest_s = measured.path ? 0 : options_.longest_dead_time_s;
     OutputModel model(measured.channel, dt_s_, duty, longest_s, kModelTolerance);
-    if (!measured.path) model.set_delay(point.dead_time_s);
+    if (!measured.path) model.set_delay(point.model.dead_time_s);
     Eigen::MatrixXd slopes = model.jacobian(point.model);
     for (Index j = 0; j < slopes.cols(); ++j) slopes.col(j) = seen(measured, point, slopes.col(j)).eval();
     result.push_back(std::move(slopes));
@@ -24,7 +24,7 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::model_slopes(const std::vector<d
 // Of the first channel's output, by differences or sums.
 std::vector<double> OutputErrorSearch::model_velocity_m_s(const SearchPoint& point) {
   Measured& measured = measured_.front();
-  if (!measured.path) measured.model.set_delay(point.dead_time_s);
+  if (!measured.path) measured.model.set_delay(point.model.dead_time_s);
   const Eigen::VectorXd output = measured.model.output(point.model);
   std::vector<double> velocity_m_s(output.begin(), output.end());
   for (Index k = 1; k < samples_; ++k) {
@@ -40,7 +40,7 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::late_outputs(const std::vector<I
                                                              const SearchPoint& point) {
   std::vector<Eigen::MatrixXd> result;
   for (Measured& measured : measured_) {
-    if (!measured.path) measured.model.set_delay(point.dead_time_s);
+    if (!measured.path) measured.model.set_delay(point.model.dead_time_s);
     const Eigen::VectorXd output = measured.model.output(point.model);
     Eigen::MatrixXd late(samples_, static_cast<Index>(samples.size()));
     for (Index j = 0; j < late.cols(); ++j) {

@@ -140,7 +140,7 @@ std::vector<Eigen::VectorXd> OutputErrorSearch::residuals(const SearchPoint& poi
       result.push_back(measured.path->weighed(measured.measured - output));  // (4)
       continue;
     }
-    measured.model.set_delay(point.dead_time_s, stop_);
+    measured.model.set_delay(point.model.dead_time_s, stop_);
     const double offset_m = measured.channel == Channel::position ? point.offset_m : 0;
     const Eigen::VectorXd output = seen(measured, point, measured.model.output(point.model));
     result.emplace_back((measured.measured - output).array() - offset_m);
@@ -152,7 +152,7 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::jacobians(Structure structure, c
   const std::vector<int> free = free_parameters(structure);
   std::vector<Eigen::MatrixXd> result;
   for (Measured& measured : measured_) {
-    if (!measured.path) measured.model.set_delay(point.dead_time_s, stop_);
+    if (!measured.path) measured.model.set_delay(point.model.dead_time_s, stop_);
     const Eigen::MatrixXd of_model = measured.model.jacobian(point.model);
     Eigen::MatrixXd of_sensor;
     if (measured.path) of_sensor = measured.path->timing_slopes(measured.model.output(point.model), point.sensor);
@@ -185,7 +185,7 @@ Eigen::VectorXd OutputErrorSearch::seen(const Measured& measured, const SearchPo
 }
 
 Eigen::VectorXd OutputErrorSearch::coordinates(Structure structure, const SearchPoint& point) const {
-  const double dead_time_share = inside(point.dead_time_s / options_.longest_dead_time_s);
+  const double dead_time_share = inside(point.model.dead_time_s / options_.longest_dead_time_s);
   const FractionalModel& m = point.model;
   const SensorTiming& sensor = point.sensor;
   const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
@@ -198,7 +198,7 @@ Eigen::VectorXd OutputErrorSearch::coordinates(Structure structure, const Search
 }
 
 SearchPoint OutputErrorSearch::point_at(Structure structure, const Eigen::VectorXd& x) const {
-  SearchPoint point{{1, 0, 1, 1, 2, 1}, 0, 0, sensor_start_.sensor};
+  SearchPoint point{{1, 0, 1, 1, 2, 1}, 0, sensor_start_.sensor};
   const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
   const std::vector<int> free = free_parameters(structure);
   for (std::size_t j = 0; j < free.size(); ++j) {
@@ -216,7 +216,7 @@ SearchPoint OutputErrorSearch::point_at(Structure structure, const Eigen::Vector
         point.position_clock_s = std::clamp(value, -kLargestClock, kLargestClock) * kClockScaleS;
         break;
       case kSensorTimeConstant: point.sensor.time_constant_s = logistic(value) * kLongestTimeConstant * dt_s_; break;
-      default: point.dead_time_s = logistic(value) * options_.longest_dead_time_s;
+      default: point.model.dead_time_s = logistic(value) * options_.longest_dead_time_s;
     }
   }
   return point;
@@ -230,7 +230,7 @@ Eigen::VectorXd OutputErrorSearch::coordinate_slopes(Structure structure, const 
   const double low_pass_share = point.sensor.time_constant_s / (kLongestTimeConstant * dt_s_);
   Eigen::VectorXd all(kPositionClock + 1);
   all << 1, 1, 1, (m.alpha - 1) * (2 - m.alpha), m.beta * (1 - m.beta), offset_scale_m_,
-      longest_s > 0 ? point.dead_time_s * (1 - point.dead_time_s / longest_s) : 0,
+      longest_s > 0 ? point.model.dead_time_s * (1 - point.model.dead_time_s / longest_s) : 0,
       sensor_span_s * time_share * (1 - time_share), dt_s_ / record_ticks(),
       kLongestTimeConstant * dt_s_ * low_pass_share * (1 - low_pass_share), kClockScaleS;
   return all(free_parameters(structure));

@@ -29,7 +29,7 @@ inline constexpr double kModelTolerance = 1e-14;  // of the outputs
 
 struct SearchPoint {
   FractionalModel model;
-  double offset_m = 0, dead_time_s = 0;
+  double offset_m = 0;
   SensorTiming sensor = {};
   double position_clock_s = 0;  // the shift of (5)
 };

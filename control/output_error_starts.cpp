@@ -59,7 +59,7 @@ SearchPoint OutputErrorSearch::start(Structure structure, int index) const {
   }
   if (structure != Structure::fractional) model.alpha = 2, model.beta = 1;
   if (structure == Structure::first_order) model.b1 = 0;
-  return {model, 0, 0, sensor_start_.sensor};
+  return {model, 0, sensor_start_.sensor};
 }
 
 bool OutputErrorSearch::fit_gain(SearchPoint& point) {
@@ -71,7 +71,7 @@ bool OutputErrorSearch::fit_gain(SearchPoint& point) {
   for (Index c = 0; c < count; ++c) {
     Measured& measured = measured_[static_cast<std::size_t>(c)];
     ++outputs_computed_;
-    if (!measured.path && !measured.model.set_delay(point.dead_time_s, stop_)) return false;
+    if (!measured.path && !measured.model.set_delay(point.model.dead_time_s, stop_)) return false;
     columns.col(0).segment(c * rows_, rows_) = seen(measured, point, measured.model.output(point.model)) / measured.sd;
     const Eigen::VectorXd wanted = measured.path ? measured.path->weighed(measured.measured) : measured.measured;
     target.segment(c * rows_, rows_) = wanted / measured.sd;
@@ -91,7 +91,7 @@ void OutputErrorSearch::fit_dead_time(SearchPoint& point) {
   for (const double share : {0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95}) {
     if (limit_.is_reached()) return;
     SearchPoint candidate = point;
-    candidate.dead_time_s = share * options_.longest_dead_time_s;
+    candidate.model.dead_time_s = share * options_.longest_dead_time_s;
     scan.fit_gain(candidate);
     const double found = scan.cost(candidate);
     if (share == 0.02 || found < lowest) best = candidate, lowest = found;

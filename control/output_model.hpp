@@ -4,6 +4,7 @@
 //   pole pair: 2 Re[(r/p) (e^{pt} - 1)], dp/dq = -(∂D/∂q)/D'(p), r = kp/D'(p)                (2)
 //   G: see modal_regressors.hpp
 // Parameters q are ln kp, ln b1, ln b2, alpha, beta, in this order.
+// The dead time is that of set_delay, whatever a model says: the search asks for many models with the same delay.
 // Shapes:   output has one element per duty, jacobian is samples × 5; with means, as many rows again behind them: the
 //           velocity's change since the sample before, by dt_s, which is the mean of the acceleration.
 // Errors:   none thrown; a model so extreme that its output is no number gives one that is none either.

@@ -80,7 +80,8 @@ ExpectedUncertainty expected_uncertainty(const FractionalModel& given, const Pla
   Eigen::MatrixXd jacobian(0, columns);
   const auto add = [&](Channel channel, double sd) {
     if (sd == 0) return;
-    const OutputModel output(channel, experiment.dt_s, experiment.duty, 0, kModelTolerance);
+    OutputModel output(channel, experiment.dt_s, experiment.duty, model.dead_time_s, kModelTolerance);
+    output.set_delay(model.dead_time_s);
     const Index row = jacobian.rows();
     jacobian.conservativeResize(row + samples, Eigen::NoChange);
     jacobian.bottomRows(samples).setZero();

@@ -26,10 +26,13 @@ void check(const FractionalModel& model) {
   check_positive("model: b3 must be positive, is", model.b3);
   if (!(model.beta > 0 && model.beta <= 1)) refuse("model: beta must lie in (0, 1], is", model.beta);
   if (!(model.alpha > model.beta && model.alpha <= 2)) refuse("model: alpha must lie in (beta, 2], is", model.alpha);
+  if (!(model.dead_time_s >= 0 && std::isfinite(model.dead_time_s))) {
+    refuse("model: dead_time_s must be 0 or positive, is", model.dead_time_s);
+  }
 }
 
 FractionalModel normalised(const FractionalModel& model) {
-  return {model.kp / model.b3, model.b1 / model.b3, model.b2 / model.b3, 1, model.alpha, model.beta};
+  return {model.kp / model.b3, model.b1 / model.b3, model.b2 / model.b3, 1, model.alpha, model.beta, model.dead_time_s};
 }
 
 void check(const MotorModel& model) {

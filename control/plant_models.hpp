@@ -2,6 +2,7 @@
 //
 //   H(s) = kp / (b1 s^α + b2 s^β + b3)                     (1)   velocity, m/s per duty: [birs2021] (20), (28), (29);
 //                                                                position, m per duty: H(s)/s, (22)
+//   with a dead time T: H(s) e^{-sT}                              (1a)  the duty acts so much later; not in the paper
 //   H_motor(s) = km / (Tm s + 1)                           (2)   propeller rate, rad/s per duty: (17), (27)
 //   M = m + (4/3) β ρ π · π d²/4                           (3)   mass and added mass: (13), read so that it gives (28)
 //   D = 2 u0 X|u|u + Xu,  X|u|u = ρ Cd Af/2,  Xu = ρ V Af Cd     (4)   (14), (15)
@@ -17,7 +18,8 @@
 namespace control {
 
 // (1). 0 < beta < alpha ≤ 2 and beta ≤ 1; b1 ≥ 0, b2, b3 > 0: all of these models are stable. With b1 = 0 the first
-// term is absent, alpha has no effect, and beta = 1 makes a first-order lag.
+// term is absent, alpha has no effect, and beta = 1 makes a first-order lag. dead_time_s ≥ 0 is T of (1a): whatever
+// takes a model takes it into account, or throws where it cannot.
 struct FractionalModel {
   double kp = 0.1;
   double b1 = 0.005682;
@@ -25,6 +27,7 @@ struct FractionalModel {
   double b3 = 1.0;
   double alpha = 1.7263;
   double beta = 0.8682;
+  double dead_time_s = 0;
 
   bool operator==(const FractionalModel&) const = default;
 };

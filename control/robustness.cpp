@@ -71,12 +71,14 @@ RobustnessRow predict_row(const std::string& name, const FractionalModel& plant,
 }  // namespace
 
 RobustnessTable robustness(const FractionalModel& plant, const Discretisation& controller) {
+  FractionalModel water = kNewtonianModel;
+  water.dead_time_s = plant.dead_time_s;  // of the robot, not of the fluid
   RobustnessTable table;
   for (const double duty_min : {-1.0, 0.0}) {
     table.rows.push_back(predict_row("gain -30 %", scaled(plant, 0.7), duty_min, controller));
     table.rows.push_back(predict_row("as modelled", plant, duty_min, controller));
     table.rows.push_back(predict_row("gain +30 %", scaled(plant, 1.3), duty_min, controller));
-    table.rows.push_back(predict_row("water (28)", kNewtonianModel, duty_min, controller));
+    table.rows.push_back(predict_row("water (28)", water, duty_min, controller));
   }
   table.duty_sd_per_noise_sd = noise_to_duty(plant, controller);
   return table;

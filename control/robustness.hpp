@@ -27,7 +27,8 @@ struct RobustnessRow {
 };
 
 struct RobustnessTable {
-  std::vector<RobustnessRow> rows;  // gains 0.7, 1, 1.3 of the plant and the Newtonian model, each at [-1,1] and [0,1]
+  // Gains 0.7, 1, 1.3 of the plant, and the Newtonian model with the plant's dead time, each at [-1, 1] and [0, 1].
+  std::vector<RobustnessRow> rows;
   // Closed loop at rest, for noise small enough never to be clipped, 1/m. None if that loop is not stable.
   std::optional<double> duty_sd_per_noise_sd;
 };

@@ -89,7 +89,7 @@ struct Stacked {
 };
 
 Stacked stacked(OutputErrorSearch& search, const Recording& recording, const Fit& fit) {
-  const SearchPoint point{fit.model, fit.offset_m, fit.dead_time_s};
+  const SearchPoint point{fit.model, fit.offset_m};
   const auto residuals = search.residuals(point);
   const auto jacobians = search.jacobians(fit.structure, point);
   const Index samples = static_cast<Index>(recording.duty.size()), rows = samples * std::ssize(residuals);

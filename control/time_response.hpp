@@ -2,6 +2,7 @@
 //
 //   v(t) = L⁻¹[H(s)/s](t),  x(t) = L⁻¹[H(s)/s²](t)      (1)   step of duty 1 at t = 0, from rest
 //   by Talbot's contour in the form of Weideman, s(φ) = (N/t)(0.5017 φ cot(0.6407 φ) - 0.6122 + 0.2645 iφ)   (2)
+//   u(t - T) in place of u(t)                             (3)   with a dead time T of the model
 //
 // A pole pair that the contour for a long t would leave outside is taken off H first and added as an exponential, so
 // that lightly damped models are right at all times too. A sampled duty advances the exponentials of modal_form.hpp.

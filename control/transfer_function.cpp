@@ -29,7 +29,7 @@ Complex denominator_slope(const FractionalModel& model, Complex log_s) {
 }
 
 Complex velocity_transfer(const FractionalModel& model, Complex s) {
-  return model.kp / denominator(model, std::log(s));
+  return model.kp / denominator(model, std::log(s)) * std::exp(-s * model.dead_time_s);
 }
 
 Complex controller_transfer(const FopdController& controller, Complex s) {

@@ -1,6 +1,6 @@
 // Evaluates the plant and the fractional PD controller anywhere in the plane cut along the negative real axis.
 //
-//   D(s) = b1 s^α + b2 s^β + b3                (1)   H = kp/D: [birs2021] (20)
+//   D(s) = b1 s^α + b2 s^β + b3                (1)   H = kp/D e^{-sT}: [birs2021] (20), with the dead time
 //   C(s) = kp (1 + kd s^μ)                     (2)   [birs2021] (23), (30); duty per m
 //
 // Arguments are ln s = ln|s| + i arg s, so that no magnitude overflows before it must and the sheet is explicit.

@@ -15,10 +15,9 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::array<std::string_view, 6> kNumbers{"kp", "b1", "b2", "b3", "alpha", "beta"};
+constexpr std::array<std::string_view, 7> kNumbers{"kp", "b1", "b2", "b3", "alpha", "beta", "dead_time_s"};
 // What the tools add to a model, and what people do.
-constexpr std::array<std::string_view, 6> kPassedOver{"name",        "comment",     "description",
-                                                      "dc_gain_m_s", "poles_rad_s", "dead_time_s"};
+constexpr std::array<std::string_view, 5> kPassedOver{"name", "comment", "description", "dc_gain_m_s", "poles_rad_s"};
 
 const Json& model_in(const Json& given) {
   if (!given.is_object()) control::throw_invalid("model: ", given.dump(), " is not an object with kp, b1, b2, …");
@@ -39,8 +38,19 @@ void refuse_unknown(const Json& model) {
   for (const auto& [key, value] : model.items()) {
     if (std::ranges::find(kNumbers, key) != kNumbers.end()) continue;
     if (std::ranges::find(kPassedOver, key) != kPassedOver.end()) continue;
-    control::throw_invalid("model: there is no '", key, "'; it has kp, b1, b2, b3, alpha, beta");
+    control::throw_invalid("model: there is no '", key, "'; it has kp, b1, b2, b3, alpha, beta, dead_time_s");
   }
+}
+
+// In the model, or beside it, where an identification says it again.
+double dead_time_s(const Json& given, const Json& model) {
+  if (!model.contains("dead_time_s")) return given.contains("dead_time_s") ? number(given, "dead_time_s") : 0;
+  const double in_model_s = number(model, "dead_time_s");
+  const double beside_s = given.contains("dead_time_s") ? number(given, "dead_time_s") : in_model_s;
+  if (beside_s != in_model_s) {
+    control::throw_invalid("model: 'dead_time_s' is ", in_model_s, " in it and ", beside_s, " beside it; leave one");
+  }
+  return in_model_s;
 }
 
 }  // namespace
@@ -54,7 +64,7 @@ PlantParameters parse_model(const std::string& json) {
   read.model = {number(model, "kp"),    number(model, "b1"),
                 number(model, "b2"),    model.contains("b3") ? number(model, "b3") : 1,
                 number(model, "alpha"), number(model, "beta")};
-  if (given.contains("dead_time_s")) read.dead_time_s = number(given, "dead_time_s");
+  read.dead_time_s = dead_time_s(given, model);
   check(read);
   return read;
 }

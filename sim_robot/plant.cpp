@@ -2,7 +2,6 @@
 #include "sim_robot/plant.hpp"
 
 #include <cmath>
-#include <utility>
 
 #include "control/invalid_argument.hpp"
 
@@ -11,8 +10,14 @@ namespace {
 
 using Motion = std::variant<control::ModalPlant, NonlinearPlant, ShearThinningPlant>;
 
+control::FractionalModel linear_model(const PlantParameters& parameters) {
+  control::FractionalModel model = parameters.model;
+  model.dead_time_s += parameters.dead_time_s;
+  return model;
+}
+
 Motion motion_of(const PlantParameters& parameters, double dt_s) {
-  if (parameters.kind == PlantKind::linear) return control::ModalPlant{parameters.model, dt_s};
+  if (parameters.kind == PlantKind::linear) return control::ModalPlant{linear_model(parameters), dt_s};
   if (parameters.kind == PlantKind::shear_thinning) return ShearThinningPlant{parameters.shear_thinning, dt_s};
   return NonlinearPlant{parameters.hydrodynamics, dt_s};
 }
@@ -20,10 +25,11 @@ Motion motion_of(const PlantParameters& parameters, double dt_s) {
 }  // namespace
 
 void check(const PlantParameters& parameters) {
-  const double dead_time_s = parameters.dead_time_s;
-  if (!(dead_time_s >= 0 && dead_time_s <= 10))
+  const bool is_linear = parameters.kind == PlantKind::linear;
+  const double dead_time_s = parameters.dead_time_s + (is_linear ? parameters.model.dead_time_s : 0);
+  if (!(parameters.dead_time_s >= 0 && dead_time_s <= 10))
     control::throw_invalid("dead_time_s is ", dead_time_s, ", allowed is 0 to 10");
-  if (parameters.kind == PlantKind::linear) return control::check(parameters.model);
+  if (is_linear) return control::check(parameters.model);
   if (parameters.kind == PlantKind::shear_thinning) return check(parameters.shear_thinning);
   control::hydrodynamic_model(parameters.hydrodynamics);  // refuses what cannot be
 }
@@ -73,13 +79,10 @@ void NonlinearPlant::step(double duty) {
 
 Plant::Plant(const PlantParameters& parameters, double dt_s)
     : motion_(motion_of(parameters, dt_s)),
-      duties_(static_cast<std::size_t>(std::lround(parameters.dead_time_s / dt_s)), 0.0) {}
+      delay_(parameters.kind == PlantKind::linear ? 0 : dt_s * std::round(parameters.dead_time_s / dt_s), dt_s) {}
 
 double Plant::delayed(double duty) {
-  if (duties_.empty()) return duty;
-  const double due = std::exchange(duties_[oldest_], duty);
-  oldest_ = (oldest_ + 1) % duties_.size();
-  return due;
+  return delay_.push(duty).later;  // the linear one holds it back itself
 }
 
 void Plant::step(double duty) {

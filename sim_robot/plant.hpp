@@ -7,7 +7,7 @@
 //   x' = v                                                               (3)
 // with the values of control::HydrodynamicParameters. Duty backwards turns the thrust around. (28) is (2) linearised,
 // with an empirical gain: see docs/simulator.md for how far the two are apart.
-// Each may answer the duty a dead time late, in whole ticks.
+// Each may answer the duty a dead time late: the linear one exactly, the others in whole ticks.
 // Accuracy: (1) exact, (2) and (3) by Runge-Kutta of 4th order in 4 steps a tick: within 1e-5 m/s of 100 times as many
 //           steps, held by plant_test.cpp.
 // Errors:   throws std::invalid_argument quoting the bad value.
@@ -15,8 +15,8 @@
 
 #include <string>
 #include <variant>
-#include <vector>
 
+#include "control/delay_line.hpp"
 #include "control/modal_plant.hpp"
 #include "sim_robot/shear_thinning_plant.hpp"
 
@@ -29,7 +29,7 @@ struct PlantParameters {
   control::FractionalModel model = control::kNonNewtonianModel;  // of the linear one
   control::HydrodynamicParameters hydrodynamics{};               // of the nonlinear one
   ShearThinningParameters shear_thinning{};                      // of the one that thins
-  double dead_time_s = 0;                                        // from the duty to its first effect; at most 10
+  double dead_time_s = 0;  // from the duty to its first effect, beside the model's own; at most 10
 };
 
 void check(const PlantParameters& parameters);
@@ -78,8 +78,7 @@ class Plant {
   double delayed(double duty);
 
   std::variant<control::ModalPlant, NonlinearPlant, ShearThinningPlant> motion_;
-  std::vector<double> duties_;  // of the dead time, as a ring
-  std::size_t oldest_ = 0;
+  control::DelayLine delay_;  // of what is not linear
   double position_m_ = 0, velocity_m_s_ = 0, acceleration_m_s2_ = 0;
 };
 

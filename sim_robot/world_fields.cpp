@@ -30,7 +30,7 @@ void fluid_fields(Fields& fields, PlantParameters& plant) {
     fields.number("alpha", model.alpha, {0, 2}, "order, above beta");
     fields.number("beta", model.beta, {0, 2}, "order");
   }
-  fields.number("dead_time_s", plant.dead_time_s, {0, 10}, "from the duty to its first effect, in whole ticks");
+  fields.number("dead_time_s", plant.dead_time_s, {0, 10}, "from the duty to its first effect");
   fields.must([&plant] {
     check(plant);
     const Plant made{plant, kTickS};  // not every model has a modal form

@@ -87,18 +87,31 @@ Result<T> checked(const T& value) {
 // The double that is written as the float is: 0.1, not 0.10000000149011612. It is the same float again.
 double as_written(float value) { return std::stod(fmt::format("{}", value)); }
 
+// What an identification found stands beside its parameters, too; that of earlier versions stands only there.
+Result<void> read_dead_time_of_fit(const json& fit, bool is_in_parameters, control::FractionalModel& model) {
+  double beside_s = model.dead_time_s;
+  if (auto read = read_numbers(fit, "fit", {{"dead_time_s", &beside_s, false}}); !read) return read;
+  if (is_in_parameters && beside_s != model.dead_time_s) {
+    return fail(ErrorCode::invalid, fmt::format("\"dead_time_s\" is {} in \"parameters\" and {} beside them; leave one",
+                                                model.dead_time_s, beside_s));
+  }
+  model.dead_time_s = beside_s;
+  return {};
+}
+
 OrderedJson complex_json(control::Complex value) { return {{"real", value.real()}, {"imaginary", value.imag()}}; }
 
 }  // namespace
 
 Result<control::FractionalModel> model_from(const json& given) {
-  const json& value = given.is_object() && given.contains("parameters") ? given.at("parameters") : given;
+  const bool is_of_a_fit = given.is_object() && given.contains("parameters");
+  const json& value = is_of_a_fit ? given.at("parameters") : given;
   if (!value.is_object()) {
     return not_an_object(value, "model",
                          R"({"kp":0.1,"b1":0.005682,"b2":0.11031,"b3":1,"alpha":1.7263,"beta":0.8682})");
   }
   control::FractionalModel model;
-  if (auto known = only(value, "model", {"kp", "b1", "b2", "b3", "alpha", "beta"}); !known) {
+  if (auto known = only(value, "model", {"kp", "b1", "b2", "b3", "alpha", "beta", "dead_time_s"}); !known) {
     return std::unexpected{known.error()};
   }
   model.b3 = 1;
@@ -108,8 +121,14 @@ Result<control::FractionalModel> model_from(const json& given) {
                             {"b2", &model.b2},
                             {"b3", &model.b3, false},
                             {"alpha", &model.alpha},
-                            {"beta", &model.beta}});
+                            {"beta", &model.beta},
+                            {"dead_time_s", &model.dead_time_s, false}});
   if (!read) return std::unexpected{read.error()};
+  if (is_of_a_fit) {
+    if (auto found = read_dead_time_of_fit(given, value.contains("dead_time_s"), model); !found) {
+      return std::unexpected{found.error()};
+    }
+  }
   return checked(model);
 }
 
@@ -128,8 +147,13 @@ Result<control::FopdController> controller_from(const json& value) {
 }
 
 OrderedJson json_of(const control::FractionalModel& model) {
-  return {{"kp", model.kp}, {"b1", model.b1},       {"b2", model.b2},
-          {"b3", model.b3}, {"alpha", model.alpha}, {"beta", model.beta}};
+  return {{"kp", model.kp},
+          {"b1", model.b1},
+          {"b2", model.b2},
+          {"b3", model.b3},
+          {"alpha", model.alpha},
+          {"beta", model.beta},
+          {"dead_time_s", model.dead_time_s}};
 }
 
 OrderedJson json_of(const control::FopdController& controller) {

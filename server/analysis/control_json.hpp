@@ -1,9 +1,9 @@
 // Models, controllers and what control/ computes of them, as JSON: one spelling for files, command line and API.
 //
 // Keys are the names of the fields in control/, with their units. A number that is not finite or not there is null.
-// Reading is strict: a model has kp, b1, b2, alpha, beta and perhaps b3, a controller kp, kd, mu; beside them only
-// name, comment and description may stand. What our own commands print can be read back: a model from `parameters`, a
-// controller from what has `feasible`.
+// Reading is strict: a model has kp, b1, b2, alpha, beta and perhaps b3 and dead_time_s, a controller kp, kd, mu;
+// beside them only name, comment and description may stand. What our own commands print can be read back: a model from
+// `parameters`, a controller from what has `feasible`.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -76,7 +76,7 @@ OrderedJson json_of(const control::Fit& fit) {
           {"absolute_error", fit.absolute_error},
           {"offset_m", fit.offset_m},
           {"offset_sigma_m", or_null(fit.offset_sigma_m)},
-          {"dead_time_s", fit.dead_time_s},
+          {"dead_time_s", fit.model.dead_time_s},
           {"dead_time_sigma_s", or_null(fit.dead_time_sigma_s)},
           {"position_clock_s", fit.position_clock_s},
           {"position_clock_sigma_s", or_null(fit.position_clock_sigma_s)},

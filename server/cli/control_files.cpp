@@ -63,8 +63,9 @@ T value_of(const std::string& file, const Result<T>& result) {
 void add_option(CLI::App& command, PlantChoice& choice) {
   command
       .add_option("--plant", choice.file,
-                  "Model file {\"kp\":...,\"b1\":...,\"b2\":...,\"b3\":...,\"alpha\":...,\"beta\":...}, or "
-                  "newtonian or non_newtonian (default: non_newtonian, the paper's (29))")
+                  "Model file {\"kp\":...,\"b1\":...,\"b2\":...,\"b3\":...,\"alpha\":...,\"beta\":...} with perhaps a "
+                  "\"dead_time_s\", what identify --json printed, or newtonian or non_newtonian (default: "
+                  "non_newtonian, the paper's (29))")
       ->check(named());
 }
 

@@ -159,7 +159,7 @@ void write_parameters(std::ostream& out, const Fit& fit) {
   }
   table.write(out);
   fmt::print(out, "fit {} %, residual sd {}, sse {}; offset {} m, dead time {} s\n", fixed(fit.fit_percent, 3),
-             cell(fit.residual_sd, 4), cell(fit.sse), cell(fit.offset_m, 4), cell(fit.dead_time_s, 4));
+             cell(fit.residual_sd, 4), cell(fit.sse), cell(fit.offset_m, 4), cell(fit.model.dead_time_s, 4));
   fmt::print(out, "residuals {} white (p = {}); {} after {} iterations; {} of {} starts agree\n",
              fit.residuals_are_white ? "look" : "are not", cell(fit.whiteness_p_value, 3), text(fit.end),
              fit.iterations, fit.starts_that_agree, fit.starts);

@@ -78,7 +78,7 @@ TEST(IdentifyCoverage, FindsDeadTimeAndOffsetTogether) {
   const Fit fit = identify(run, options).best;
   ASSERT_TRUE(fit.dead_time_sigma_s && fit.offset_sigma_m);
   EXPECT_EQ(fit.free_parameters, 7);
-  EXPECT_NEAR(fit.dead_time_s, 0.0871, 4 * *fit.dead_time_sigma_s);
+  EXPECT_NEAR(fit.model.dead_time_s, 0.0871, 4 * *fit.dead_time_sigma_s);
   EXPECT_NEAR(fit.offset_m, 0.4, 4 * *fit.offset_sigma_m);
   EXPECT_NEAR(fit.model.b2, 0.11031, 4 * *fit.one_sigma[2]);
 }

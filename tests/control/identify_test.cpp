@@ -155,8 +155,8 @@ TEST(Identify, FindsTheDeadTimeBetweenSamples) {
     options.longest_dead_time_s = 0.2;
     const Fit fit = identify(recording, options).best;
     ASSERT_TRUE(fit.dead_time_sigma_s);
-    EXPECT_NEAR(fit.dead_time_s, dead_time_s, 4 * *fit.dead_time_sigma_s);
-    EXPECT_NEAR(fit.dead_time_s, dead_time_s, 1e-3);
+    EXPECT_NEAR(fit.model.dead_time_s, dead_time_s, 4 * *fit.dead_time_sigma_s);
+    EXPECT_NEAR(fit.model.dead_time_s, dead_time_s, 1e-3);
     EXPECT_NEAR(fit.residual_sd, 1e-6, 2e-7);
   }
 }

@@ -215,7 +215,7 @@ TEST(Margins, ALoopThatNeverReachesOneHasNoCrossover) {
 
 TEST(Margins, DoNotDependOnTheUnitOfTime) {
   for (const double scale_s : {1e-6, 1e-3, 3600.0, 1e8}) {
-    const auto& [kp, b1, b2, b3, alpha, beta] = kNonNewtonianModel;
+    const auto& [kp, b1, b2, b3, alpha, beta, dead_time_s] = kNonNewtonianModel;
     OpenLoop loop = kPositionLoop;
     loop.plant = {kp / scale_s, b1 * std::pow(scale_s, alpha), b2 * std::pow(scale_s, beta), b3, alpha, beta};
     loop.controller.kd *= std::pow(scale_s, loop.controller.mu);

@@ -7,6 +7,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "control/closed_loop.hpp"
+#include "control/discretise.hpp"
+
 namespace sim_robot {
 namespace {
 
@@ -49,6 +52,25 @@ TEST(Experiment, WithoutReverseThrustAnOvershootStays) {
   EXPECT_FALSE(result.disturbance.settling_s.has_value());
   EXPECT_NEAR(result.step.overshoot_percent, 3.29, 0.2);
   EXPECT_NEAR(result.step.steady_state_error_m, -0.00329, 1e-4);
+}
+
+// The same controller and plant, with the duty held back: the robot does what the mathematics predicts.
+TEST(Experiment, FollowsThePredictionOfAPlantWithADeadTime) {
+  for (const double dead_time_s : {0.04, 0.053}) {
+    SimulatedRobotConfig config;
+    config.world.plant.dead_time_s = dead_time_s;
+    const ExperimentResult result = run_experiment(config);
+    control::ClosedLoopExperiment experiment;
+    experiment.plant.dead_time_s = dead_time_s;
+    experiment.controller = control::discretise(control::kPaperController, {}).sections;
+    const control::ClosedLoopPrediction predicted = control::predict_closed_loop(experiment);
+    ASSERT_EQ(result.position_m.size(), predicted.measured_m.size());
+    for (std::size_t k = 0; k < result.position_m.size(); ++k) {
+      ASSERT_NEAR(result.position_m[k], predicted.measured_m[k], 1e-4) << dead_time_s << " at sample " << k;
+    }
+    EXPECT_NEAR(result.step.overshoot_percent, predicted.step.overshoot_percent, 0.05);
+    EXPECT_GT(result.step.overshoot_percent, 2);
+  }
 }
 
 // Water is 3.5 times as fast, and shows more of the controller's gain at DC, which the robot's has exact.

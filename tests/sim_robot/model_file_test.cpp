@@ -49,6 +49,13 @@ TEST(ModelFile, TakesTheDeadTimeThatIdentifyFound) {
   EXPECT_EQ(parse_model(identified + R"(,"dead_time_s":0.03})").dead_time_s, 0.03);
   EXPECT_EQ(parse_model(identified + "}").dead_time_s, 0);
   EXPECT_EQ(refusal(identified + R"(,"dead_time_s":-1})"), "dead_time_s is -1, allowed is 0 to 10");
+  std::string inside = kNumbers;
+  inside.insert(inside.size() - 1, R"(,"dead_time_s":0.07)");
+  EXPECT_EQ(parse_model(inside).dead_time_s, 0.07);
+  EXPECT_EQ(parse_model(R"({"model":)" + inside + "}").dead_time_s, 0.07);
+  EXPECT_EQ(parse_model(R"({"parameters":)" + inside + R"(,"dead_time_s":0.07})").dead_time_s, 0.07);
+  EXPECT_EQ(refusal(R"({"parameters":)" + inside + R"(,"dead_time_s":0.03})"),
+            "model: 'dead_time_s' is 0.07 in it and 0.03 beside it; leave one");
 }
 
 TEST(ModelFile, SaysWhatIsWrong) {
@@ -56,7 +63,7 @@ TEST(ModelFile, SaysWhatIsWrong) {
   EXPECT_EQ(refusal("[1]"), "model: [1] is not an object with kp, b1, b2, …");
   EXPECT_EQ(refusal(R"({"kp":1})"), "model: 'b1' is missing");
   EXPECT_EQ(refusal(R"({"kp":"1"})"), "model: 'kp' must be a number, is \"1\"");
-  EXPECT_EQ(refusal(R"({"gain":1})"), "model: there is no 'gain'; it has kp, b1, b2, b3, alpha, beta");
+  EXPECT_EQ(refusal(R"({"gain":1})"), "model: there is no 'gain'; it has kp, b1, b2, b3, alpha, beta, dead_time_s");
   EXPECT_NE(refusal(R"({"kp":1,"b1":1,"b2":1,"alpha":0.5,"beta":0.9})"), "");  // alpha below beta
 }
 

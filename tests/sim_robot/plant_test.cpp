@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "control/time_response.hpp"
 #include "sim_robot/world.hpp"
 
 namespace sim_robot {
@@ -117,7 +118,7 @@ TEST(NonlinearPlant, HasThePolesOf28AtItsWorkingPoint) {
 
 TEST(Plant, ADeadTimeIsTheSameMotionSoMuchLater) {
   for (const PlantKind kind : {PlantKind::linear, PlantKind::nonlinear, PlantKind::shear_thinning}) {
-    Plant prompt{{.kind = kind}, kTickS}, late{{.kind = kind, .dead_time_s = 0.053}, kTickS};
+    Plant prompt{{.kind = kind}, kTickS}, late{{.kind = kind, .dead_time_s = 0.05}, kTickS};
     for (int k = 0; k < 5; ++k) late.step(kDuty);
     EXPECT_EQ(late.position_m(), 0);
     for (int k = 0; k < 200; ++k) {
@@ -127,6 +128,47 @@ TEST(Plant, ADeadTimeIsTheSameMotionSoMuchLater) {
     }
   }
   EXPECT_THROW(check(PlantParameters{.dead_time_s = -0.01}), std::invalid_argument);
+}
+
+TEST(Plant, TheDeadTimeOfItsModelAddsToItsOwn) {
+  PlantParameters both{.dead_time_s = 0.02};
+  both.model.dead_time_s = 0.03;
+  Plant plant{both, kTickS}, same{{.dead_time_s = 0.05}, kTickS};
+  for (int k = 0; k < 100; ++k) {
+    plant.step(kDuty);
+    same.step(kDuty);
+    ASSERT_EQ(plant.position_m(), same.position_m()) << k;
+  }
+  EXPECT_GT(plant.position_m(), 0);
+  both.model.dead_time_s = 10;
+  EXPECT_THROW(check(both), std::invalid_argument);
+}
+
+TEST(Plant, ADeadTimeThatEndsWithinATickIsExact) {
+  control::FractionalModel model = control::kNonNewtonianModel;
+  model.dead_time_s = 0.0537;
+  Plant plant{{.dead_time_s = 0.0537}, kTickS};
+  std::vector<double> time_s{0}, duty, position_m{0};
+  for (int k = 0; k < 300; ++k) {
+    duty.push_back(k % 40 < 20 ? 1 : -0.5);
+    time_s.push_back(kTickS * (k + 1));
+    plant.step(duty.back());
+    position_m.push_back(plant.position_m());
+  }
+  duty.push_back(0);
+  const auto expected = control::sampled_response(model, time_s, duty).position_m;
+  for (std::size_t k = 0; k < position_m.size(); ++k) ASSERT_NEAR(position_m[k], expected[k], 1e-7) << k;
+}
+
+TEST(Plant, TheNonlinearOneRoundsADeadTimeToWholeTicks) {
+  Plant plant{{.kind = PlantKind::nonlinear, .dead_time_s = 0.053}, kTickS};
+  Plant rounded{{.kind = PlantKind::nonlinear, .dead_time_s = 0.05}, kTickS};
+  for (int k = 0; k < 100; ++k) {
+    plant.step(kDuty);
+    rounded.step(kDuty);
+    ASSERT_EQ(plant.position_m(), rounded.position_m()) << k;
+  }
+  EXPECT_GT(plant.position_m(), 0);
 }
 
 TEST(NonlinearPlant, ServesInTheWorldAsOneOfTheFluids) {

@@ -59,12 +59,12 @@ class IdentifiedPlant(unittest.TestCase):
         rows = csv.DictReader(io.StringIO(self.run_program("rheonaut-sim", "play", "step.toml", "--model", "model.json")))
         return {round((float(row["t_s"]) - STEP_AT_S) / PERIOD_S): float(row["position_m"]) for row in rows}
 
-    def expect_the_models_own_step(self, dead_time_s=0):
+    def expect_the_models_own_step(self):
         times = ",".join(map(str, TIMES_S))
         answer = self.run_program("rheonaut", "step", "--plant", "model.json", "--duty", str(DUTY), "--times", times, "--json")
         simulated = self.simulated_positions()
         for time_s, expected_m in zip(TIMES_S, json.loads(answer)["position_m"], strict=True):
-            position_m = simulated[round((time_s + dead_time_s) / PERIOD_S)]
+            position_m = simulated[round(time_s / PERIOD_S)]
             self.assertAlmostEqual(position_m, expected_m, delta=2e-6 * expected_m, msg=f"at {time_s} s")
 
     def test_every_structure_moves_as_its_model(self):
@@ -87,7 +87,8 @@ class IdentifiedPlant(unittest.TestCase):
         column, values = next(each for each in golden_responses() if each[0] == "position_m")
         found = self.identify(column, [0.0] * 8 + values[:-8], "--structure", "fractional", "--dead-time-s", "0.2")
         self.assertAlmostEqual(found["dead_time_s"], 0.08, delta=0.005)
-        self.expect_the_models_own_step(dead_time_s=0.08)
+        self.assertEqual(found["parameters"]["dead_time_s"], found["dead_time_s"])
+        self.expect_the_models_own_step()
 
     def test_what_the_simulator_recorded_gives_its_fluid_back(self):
         recording = self.run_program("rheonaut-sim", "play", "figure_5", "--sensor", "perfect")

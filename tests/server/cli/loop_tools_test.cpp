@@ -1,4 +1,5 @@
 // The fixed forms of model, bode, step and tune, with the numbers of the paper's plant and controller.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -64,6 +65,49 @@ TEST_F(LoopTools, StepTakesEquallySpacedTimesAndAnyDuty) {
   EXPECT_NEAR(json["velocity_m_s"][1], 0, 1e-15);
   EXPECT_NEAR(json["position_m"][2], 0.0265317661481, 1e-9);
   EXPECT_THAT(ask("step").text, HasSubstr("velocity (m/s)"));
+}
+
+constexpr const char* kPromptPlant = R"("kp":0.1504,"b1":0.00898,"b2":0.11031,"b3":1,"alpha":1.7263,"beta":0.8682)";
+
+std::string late_model() { return fmt::format(R"({{{},"dead_time_s":0.07}})", kPromptPlant); }
+
+// A model file, what identify prints, and what it printed before parameters held the dead time.
+TEST_F(LoopTools, TheDeadTimeOfAPlantFileCountsWhereverItStands) {
+  save("prompt.json", fmt::format("{{{}}}", kPromptPlant));
+  EXPECT_NEAR(ask("bode --plant @prompt.json --json").json()["phase_margin_deg"], 48.2, 0.05);
+  for (const std::string& text : {late_model(), fmt::format(R"({{"parameters":{},"dead_time_s":0.07}})", late_model()),
+                                  fmt::format(R"({{"parameters":{{{}}},"dead_time_s":0.07,"sse":1}})", kPromptPlant)}) {
+    save("late.json", text);
+    const auto json = ask("bode --plant @late.json --json").json();
+    EXPECT_NEAR(json["phase_margin_deg"], 12.8, 0.05) << text;
+    EXPECT_EQ(json["plant"]["dead_time_s"], 0.07) << text;
+  }
+}
+
+TEST_F(LoopTools, TwoDeadTimesInOneFileAreRefused) {
+  save("late.json", fmt::format(R"({{"parameters":{},"dead_time_s":0.03}})", late_model()));
+  EXPECT_THAT(ask("bode --plant @late.json").error, HasSubstr("0.07 in \"parameters\" and 0.03 beside"));
+  save("late.json", fmt::format(R"({{{},"dead_time_s":-1}})", kPromptPlant));
+  EXPECT_THAT(ask("bode --plant @late.json").error, HasSubstr("dead_time_s must be 0 or positive, is -1"));
+}
+
+TEST_F(LoopTools, EveryToolTakesTheDeadTimeOfThePlant) {
+  save("prompt.json", fmt::format("{{{}}}", kPromptPlant));
+  save("late.json", late_model());
+  const auto prompt_step = ask("step --plant @prompt.json --times 0.1,1 --json").json();
+  const auto late_step = ask("step --plant @late.json --times 0.07,0.17,1.07 --json").json();
+  EXPECT_EQ(late_step["position_m"][0], 0);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_NEAR(late_step["position_m"][i + 1].get<double>(), prompt_step["position_m"][i].get<double>(), 1e-12);
+  }
+  const auto late_tune =
+      ask("tune --plant @late.json --crossover-rad-s 2 --phase-margin-deg 75 --mu 0.9 --json").json();
+  const auto prompt_tune =
+      ask("tune --plant @prompt.json --crossover-rad-s 2 --phase-margin-deg 75 --mu 0.9 --json").json();
+  EXPECT_NEAR(late_tune["theta_deg"].get<double>() - prompt_tune["theta_deg"].get<double>(), 2 * 0.07 * 180 / M_PI,
+              1e-9);
+  EXPECT_GT(ask("predict --plant @late.json --json").json()["step"]["overshoot_percent"].get<double>(),
+            8 + ask("predict --plant @prompt.json --json").json()["step"]["overshoot_percent"].get<double>());
 }
 
 TEST_F(LoopTools, TuneMeetsWhatIsAsked) {
