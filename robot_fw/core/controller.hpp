@@ -1,6 +1,7 @@
-// The fractional PD controller of the paper, executed as parallel first- and second-order sections.
+// Fractional PD controllers, executed as parallel first- and second-order sections; and the two that are built in.
 //
 //   C(s) = 65.0028 (1 + 0.0305 s^0.6524)                                   (30) of the paper
+//   C(s) = 29.9712 (1 + 0.105235 s^0.945500)                               (4)   for a motor without reverse
 //   u = direct · e + Σ residue_i · x_i + Σ y_j                                 (1)
 //       x_i[k+1] = pole_i · x_i[k] + e[k]
 //       y_j = b0 · w_j[k-1] + b1 · w_j[k-2],   w_j[k] = e[k] - a1 · w_j[k-1] - a2 · w_j[k-2]
@@ -12,9 +13,13 @@
 // The states are driven by the error (or, in (3), the position) alone. The limited duty is never written back: with
 // some coefficients that locks the motor for ever, and without an integrator there is nothing to wind up. In (3) a
 // change of the setpoint acts through kp alone. C - kp has no gain at DC, so that y_0 changes nothing but that the
-// sections start as if the robot had always been there. Accuracy: the sections are the order 5 fit of (30), with (2) at
-// most 1.2 % and 0.25 deg off below 30 rad/s. Differs from the paper: `direct` is corrected so that (2) holds exactly;
-// the fit alone has C(1) = 65.59.
+// sections start as if the robot had always been there.
+// Accuracy: the sections are the order 5 fits of (30) by the direct method with a = 0.5, with (2) at most 1.2 % and
+// 0.25 deg off below 30 rad/s, and of (4) with a = 0, 1.1 % and 0.4 deg off up to 6 rad/s. Differs from the paper:
+// `direct` is corrected so that (2) holds exactly; the fit of (30) alone has C(1) = 65.59. (4) is not in the paper: it
+// is tuned to 3 rad/s and 90 degrees, iso-damped, so that the robot hardly overshoots, from where it could not come
+// back (docs/control.md). With a = 0 all residues are negative: the duty after a step of the error never changes its
+// sign.
 #pragma once
 
 #include <array>
@@ -64,6 +69,23 @@ constexpr ControllerSections kPaperController{1,
                                                0.822226735F, -1.00519276F,   //
                                                0.970840994F, -0.0781306414F},
                                               5};
+
+// (4), as `rheonaut tune --crossover-rad-s 3 --phase-margin-deg 90` and `discretise --method direct --a 0` make it.
+constexpr ControllerSections kOneWayController{1000,  // apart from those that people number from 2 on
+                                               0,
+                                               29.971237F,
+                                               275.274536F,
+                                               {0.00472445041F, -216.798706F,  //
+                                                0.276149809F, -12.4680691F,    //
+                                                0.64420408F, -2.42204237F,     //
+                                                0.880512714F, -0.313556492F,   //
+                                                0.976423144F, -0.0193156041F},
+                                               5};
+
+// What a robot has until it is given another: duty_min is that of its motor.
+constexpr const ControllerSections& built_in_controller(float duty_min) {
+  return duty_min < 0 ? kPaperController : kOneWayController;
+}
 
 // The direct term for which (2) holds; not finite where some section has no DC gain.
 float corrected_direct(const ControllerSections& sections);

@@ -27,7 +27,8 @@ Robot::Robot(const RobotConfig& config)
     : config_(config),
       motion_sense_(parameters_.estimator(), config.reset_cause == rheonaut_RESET_CAUSE_POWER_ON ? 0.0F : kCoastingSdM),
       electrode_(kElectrodeRules),
-      controllers_(adapted(kPaperController, {config.duty_min, config.duty_max}, config.sample_period_us)),
+      controllers_(
+          adapted(built_in_controller(config.duty_min), {config.duty_min, config.duty_max}, config.sample_period_us)),
       safety_({config.duty_min, config.duty_max}, config.boot_id),
       gate_(config.boot_id) {
   note(rheonaut_EVENT_KIND_BOOT, rheonaut_EVENT_CAUSE_RESET, 0);

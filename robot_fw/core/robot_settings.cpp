@@ -81,7 +81,8 @@ void Robot::load_settings() {
   // SAFETY: what was kept is judged like what comes over the link; this port may have another motor by now.
   if (!controller || fault_of(*controller, safety_.range(), config_.sample_period_us) != rheonaut_REJECT_REASON_NONE) {
     if (is_kept(storage, StorageKey::controller)) {
-      note(rheonaut_EVENT_KIND_CONTROLLER_CHANGED, rheonaut_EVENT_CAUSE_RESET, 1);  // to the built-in one
+      note(rheonaut_EVENT_KIND_CONTROLLER_CHANGED, rheonaut_EVENT_CAUSE_RESET,
+           static_cast<float>(controllers_.in_force().controller_id));  // the built-in one
     }
     return;
   }

@@ -3,12 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "control/discretise.hpp"
+#include "control/tune.hpp"
 #include "tests/robot_fw/controllers.hpp"
 
 namespace robot_fw {
@@ -58,6 +61,52 @@ TEST(Controller, FollowsTheGoldenRecurrenceButForItsDcGain) {
     const auto got = static_cast<double>(controller.step(static_cast<float>(error_m), 0).asked);
     ASSERT_NEAR(got, duty - excess * error_m, 2e-5) << "sample " << k;
   }
+}
+
+// Made by our own tools, so that anybody can make it again.
+TEST(OneWayController, IsWhatTuneAndDiscretiseMakeOf3RadPerSAnd90Degrees) {
+  const control::TuningResult tuned = control::tune(control::kNonNewtonianModel, {3, 90});
+  ASSERT_TRUE(tuned.is_feasible);
+  control::DiscretisationOptions options;
+  options.a = 0;
+  control::ParallelSections made = control::discretise(tuned.tuned->controller, options).sections;
+  EXPECT_FLOAT_EQ(kOneWayController.kp, static_cast<float>(tuned.tuned->controller.kp));
+  ASSERT_EQ(kOneWayController.count, made.first_order.size());
+  ASSERT_TRUE(made.second_order.empty());
+  std::ranges::sort(made.first_order, {}, &control::FirstOrderSection::pole);
+  double direct = made.direct;  // r/(1 - p/z) is r + rp/(z - p), which is how the robot runs it
+  for (std::size_t i = 0; i < kOneWayController.count; ++i) {
+    const auto& [pole, residue] = made.first_order[i];
+    direct += residue;
+    EXPECT_FLOAT_EQ(kOneWayController.pole(i), static_cast<float>(pole));
+    EXPECT_FLOAT_EQ(kOneWayController.residue(i), static_cast<float>(residue * pole));
+  }
+  EXPECT_FLOAT_EQ(kOneWayController.direct, static_cast<float>(direct));
+}
+
+TEST(OneWayController, IsBuiltInWhereTheMotorHasNoReverse) {
+  EXPECT_EQ(&built_in_controller(0), &kOneWayController);
+  EXPECT_EQ(&built_in_controller(-1), &kPaperController);
+  EXPECT_EQ(&built_in_controller(-0.1F), &kPaperController);
+}
+
+// A setpoint behind the robot never gives the motor a tick forwards.
+TEST(OneWayController, AnswersAStepOfTheErrorWithoutChangingItsSign) {
+  Controller controller{kOneWayController};
+  float before = controller.step(-0.1F, 0).asked;
+  for (int k = 0; k < 1000; ++k) {
+    const float duty = controller.step(-0.1F, 0).asked;
+    ASSERT_LT(duty, 0) << k;
+    ASSERT_GE(duty, before - 1e-5F) << k;
+    before = duty;
+  }
+}
+
+TEST(OneWayController, HasADcGainOfExactlyKp) {
+  Controller controller{kOneWayController};
+  float duty = 0;
+  for (int k = 0; k < 2000; ++k) duty = controller.step(0.1F, 0).asked;
+  EXPECT_NEAR(duty, 2.9971237F, 1e-4F);
 }
 
 TEST(Controller, HasADcGainOfExactlyKp) {

@@ -146,5 +146,31 @@ TEST(OneWayMotorController, IsAdaptedAndRefusesOneWithReverse) {
   EXPECT_EQ(station.ack_of(id)->reason, rheonaut_REJECT_REASON_OUT_OF_RANGE);
 }
 
+// Another built-in one in place of the paper's: a change, and the way back to it, are as with any motor.
+TEST(OneWayMotorController, IsTheBuiltInOneAndTheWayBackLeadsToIt) {
+  SimulatedRobotConfig config;
+  config.duty = {0, 1};
+  SimulatedRobot robot{config};
+  StationPeer station{robot};
+  station.connect();
+  station.run(6);
+  protocol::Controller built_in;
+  write_controller(adapted(kOneWayController, {0, 1}, 10'000), 10'000, built_in);
+  EXPECT_EQ(station.hello->controller_id, kOneWayController.controller_id);
+  EXPECT_EQ(station.hello->controller_checksum, checksum_of(built_in));
+  EXPECT_EQ(built_in.duty_min, 0);
+  protocol::Controller other = scaled_controller(7, 0.5F);
+  other.duty_min = 0;
+  station.send(set_controller(with_checksum(other)));
+  station.run(6);
+  EXPECT_EQ(station.samples.rbegin()->second.controller_id, 7u);
+  station.send(restore_controller());
+  station.run(6);
+  EXPECT_EQ(station.samples.rbegin()->second.controller_id, kOneWayController.controller_id);
+  ASSERT_FALSE(station.controllers.empty());
+  EXPECT_EQ(station.controllers.back().checksum, checksum_of(built_in));
+  EXPECT_EQ(station.controllers.back().kp, kOneWayController.kp);
+}
+
 }  // namespace
 }  // namespace robot_fw

@@ -9,6 +9,7 @@
 
 #include "control/closed_loop.hpp"
 #include "control/discretise.hpp"
+#include "sim_robot/station_peer.hpp"
 
 namespace sim_robot {
 namespace {
@@ -43,15 +44,40 @@ TEST(Experiment, FollowsTheReferenceWithReverseThrust) {
   EXPECT_NEAR(result.step.steady_state_error_m, 0, 1e-5);
 }
 
-TEST(Experiment, WithoutReverseThrustAnOvershootStays) {
+// The built-in controller of such a robot is another one. With the paper's an overshoot of 3.29 mm would stay for ever:
+// control/robustness_test.
+TEST(Experiment, WithoutReverseThrustHardlyAnyOvershootStays) {
   SimulatedRobotConfig config;
   config.duty = {0, 1};
   const ExperimentResult result = run_experiment(config);
-  expect_trajectory(result, golden_case("Eq(29)", "0..1"));
-  EXPECT_FALSE(result.step.settling_s.has_value());
-  EXPECT_FALSE(result.disturbance.settling_s.has_value());
-  EXPECT_NEAR(result.step.overshoot_percent, 3.29, 0.2);
-  EXPECT_NEAR(result.step.steady_state_error_m, -0.00329, 1e-4);
+  EXPECT_NEAR(result.step.overshoot_percent, 0.71, 0.02);
+  EXPECT_NEAR(result.step.steady_state_error_m, -0.00071, 2e-5);
+  EXPECT_NEAR(result.step.settling_s.value(), 1.77, 0.02);
+  EXPECT_NEAR(result.disturbance.overshoot_percent, 0.84, 0.02);
+  EXPECT_NEAR(result.disturbance.steady_state_error_m, -0.00042, 2e-5);
+  EXPECT_NEAR(result.disturbance.settling_s.value(), 1.24, 0.02);
+}
+
+// Steered by the estimate, what is left is the estimate's error and not the controller's.
+TEST(Experiment, WithoutReverseThrustTheDefaultSensorEndsNearTheSetpoint) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    SimulatedRobotConfig config;
+    config.duty = {0, 1};
+    config.boot_id = seed;
+    config.world.imu.emplace();
+    config.world.seed = seed;
+    SimulatedRobot robot{config};
+    StationPeer station{robot};
+    station.connect();
+    station.run(100);
+    station.send(set_parameter("model_confirmed", 1));
+    station.run(2);
+    station.send(set_auto(0.1F));
+    station.run(1000);
+    EXPECT_NEAR(robot.world().position_m(), 0.1, 0.01) << seed;
+    EXPECT_NEAR(station.samples.rbegin()->second.position_m, 0.1, 0.005) << seed;
+    EXPECT_NEAR(robot.world().velocity_m_s(), 0, 1e-3) << seed;
+  }
 }
 
 // The same controller and plant, with the duty held back: the robot does what the mathematics predicts.
@@ -85,14 +111,16 @@ TEST(Experiment, FollowsTheReferenceInWater) {
   EXPECT_NEAR(*result.step.settling_s, 0.84, 0.05);
 }
 
-TEST(Experiment, InWaterWithoutReverseThrustTwoCentimetresStay) {
+// With the paper's controller two centimetres would stay.
+TEST(Experiment, InWaterWithoutReverseThrustNothingStays) {
   SimulatedRobotConfig config;
   config.world.plant = fluid("water");
   config.duty = {0, 1};
   const ExperimentResult result = run_experiment(config);
-  expect_trajectory(result, golden_case("Eq(28)/s", "0..1"), kWaterToleranceM);
-  EXPECT_NEAR(result.step.overshoot_percent, 20.5, 0.5);
-  EXPECT_FALSE(result.step.settling_s.has_value());
+  EXPECT_NEAR(result.step.overshoot_percent, 0, 0.005);
+  EXPECT_NEAR(result.step.steady_state_error_m, 0, 1e-5);
+  EXPECT_NEAR(result.step.settling_s.value(), 0.74, 0.02);
+  EXPECT_NEAR(result.disturbance.overshoot_percent, 0, 0.005);
 }
 
 TEST(Experiment, IsTheSameEveryTime) { EXPECT_EQ(run_experiment({}).duty, run_experiment({}).duty); }

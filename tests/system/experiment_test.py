@@ -30,11 +30,11 @@ class ExperimentTest(unittest.TestCase):
             self.assertAlmostEqual(known_measures["settling_s"], predicted["settling_s"], delta=0.0101)
             self.assertAlmostEqual(known_measures["overshoot_percent"], predicted["overshoot_percent"], delta=0.05)
 
-    def test_a_one_way_motor_keeps_its_overshoot(self):
+    def test_a_one_way_motor_has_a_controller_that_hardly_overshoots(self):
         predicted = predict(processes.BIN / "rheonaut-sim", 0)
-        self.assertIsNone(predicted["settling_s"])
-        self.assertAlmostEqual(predicted["overshoot_percent"], 3.29, delta=0.2)
-        self.assertAlmostEqual(predicted["disturbance_steady_state_error_m"], -0.0028, delta=0.0002)
+        self.assertAlmostEqual(predicted["settling_s"], 1.77, delta=0.02)
+        self.assertAlmostEqual(predicted["overshoot_percent"], 0.71, delta=0.02)
+        self.assertAlmostEqual(predicted["disturbance_steady_state_error_m"], -0.00042, delta=0.00002)
 
 
 if __name__ == "__main__":

@@ -229,6 +229,22 @@ TEST_F(Port, AddsAsMuchMemoryToTheCoreAsTheTableSays) {
   EXPECT_LE(sizeof(RobotPort) - sizeof(Robot) - sizeof(StationLink), 1'900U);
 }
 
+TEST_F(Port, ComesUpWithTheControllerForItsMotor) {
+  const auto built_in_with = [this](std::int8_t direction_pin) {
+    Settings settings;
+    settings.motor.direction_pin = direction_pin;
+    chip.reset(4);
+    connect(settings);
+    std::uint32_t controller_id = 0;
+    for (const protocol::RobotFrame& frame : heard()) {
+      if (frame.which_body == rheonaut_RobotFrame_hello_tag) controller_id = frame.body.hello.controller_id;
+    }
+    return controller_id;
+  };
+  EXPECT_EQ(built_in_with(kNoPin), kOneWayController.controller_id);
+  EXPECT_EQ(built_in_with(13), kPaperController.controller_id);
+}
+
 TEST_F(Port, DirectionPinAllowsNegativeDuties) {
   Settings settings;
   settings.motor.direction_pin = 13;
