@@ -1,5 +1,5 @@
-// SQL of the seventh migration: fluids and their models, retired robots, causes of events of their own, what a robot says
-// that this station does not know or cannot compute with, and positions that were measured from outside.
+// SQL of the seventh migration: fluids and their models, retired robots, causes of events of their own, what a robot
+// says that this station does not know or cannot compute with, and positions that were measured from outside.
 //
 // It adds columns and tables only: no row is rewritten.
 #include "server/recording/schema.hpp"

@@ -57,6 +57,14 @@ TEST(EstimatorModel, IsExactForIntegerOrdersWithNoMoreSectionsThanPoles) {
   EXPECT_NEAR(first_order.sections.time_constant_s[0], 0.5, 1e-4);
 }
 
+TEST(EstimatorModel, RefusesADeadTimeThatSectionsCannotFollow) {
+  FractionalModel late = kNonNewtonianModel;
+  late.dead_time_s = 0.07;
+  const EstimatorModel model = estimator_model(late);
+  EXPECT_FALSE(model.is_met);
+  EXPECT_NE(model.reason.find("dead time"), std::string::npos) << model.reason;
+}
+
 TEST(EstimatorModel, WhatIsMetIsMetAtOtherTimesTooAndInFloat32) {
   int met = 0;
   for (const FractionalModel& fluid : fluid_family(8, 7)) {
