@@ -79,7 +79,7 @@ std::vector<MatrixXd> other_models(OutputErrorSearch& search, const Recording& r
     if (!path->has_own_clock()) all.push_back(ages(all[0], search.free_parameters(Structure::fractional), window));
   } else {
     all.push_back(stacked(search.late_outputs(delays(samples), point), sd));
-    all.push_back(motions(samples, std::ssize(sd)));
+    all.push_back(motions(all[0].rows() / std::ssize(sd), std::ssize(sd)));
   }
   return all;
 }

@@ -11,11 +11,13 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::model_slopes(const std::vector<d
                                                              const SearchPoint& point) const {
   std::vector<Eigen::MatrixXd> result;
   for (const Measured& measured : measured_) {
-    const double longest_s = measured.path ? 0 : options_.longest_dead_time_s;
-    OutputModel model(measured.channel, dt_s_, duty, longest_s, kModelTolerance);
+    OutputModel model = measured.path
+                            ? OutputModel::with_means(dt_s_, duty, kModelTolerance)
+                            : OutputModel(measured.channel, dt_s_, duty, options_.longest_dead_time_s, kModelTolerance);
     if (!measured.path) model.set_delay(point.model.dead_time_s);
-    Eigen::MatrixXd slopes = model.jacobian(point.model);
-    for (Index j = 0; j < slopes.cols(); ++j) slopes.col(j) = seen(measured, point, slopes.col(j)).eval();
+    const Eigen::MatrixXd of_model = model.jacobian(point.model);
+    Eigen::MatrixXd slopes(rows_, of_model.cols());
+    for (Index j = 0; j < slopes.cols(); ++j) slopes.col(j) = seen(measured, point, of_model.col(j));
     result.push_back(std::move(slopes));
   }
   return result;
@@ -26,12 +28,11 @@ std::vector<double> OutputErrorSearch::model_velocity_m_s(const SearchPoint& poi
   Measured& measured = measured_.front();
   if (!measured.path) measured.model.set_delay(point.model.dead_time_s);
   const Eigen::VectorXd output = measured.model.output(point.model);
-  std::vector<double> velocity_m_s(output.begin(), output.end());
+  std::vector<double> velocity_m_s(output.begin(), output.begin() + samples_);
   for (Index k = 1; k < samples_; ++k) {
     double& v = velocity_m_s[static_cast<std::size_t>(k)];
     if (measured.channel == Channel::position) v = (output[k] - output[k - 1]) / dt_s_;
-    if (measured.channel == Channel::acceleration)
-      v = velocity_m_s[static_cast<std::size_t>(k - 1)] + dt_s_ * output[k];
+    if (measured.path) v = velocity_m_s[static_cast<std::size_t>(k - 1)] + dt_s_ * output[samples_ + k];  // a mean
   }
   return velocity_m_s;
 }
@@ -42,11 +43,13 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::late_outputs(const std::vector<I
   for (Measured& measured : measured_) {
     if (!measured.path) measured.model.set_delay(point.model.dead_time_s);
     const Eigen::VectorXd output = measured.model.output(point.model);
-    Eigen::MatrixXd late(samples_, static_cast<Index>(samples.size()));
+    Eigen::MatrixXd late(rows_, static_cast<Index>(samples.size()));
     for (Index j = 0; j < late.cols(); ++j) {
       const Index by = std::min(samples[static_cast<std::size_t>(j)], samples_);
-      Eigen::VectorXd column = Eigen::VectorXd::Zero(samples_);
-      column.tail(samples_ - by) = output.head(samples_ - by);
+      Eigen::VectorXd column = Eigen::VectorXd::Zero(output.size());
+      for (Index first = 0; first < output.size(); first += samples_) {  // the ticks; the means behind them, if any
+        column.segment(first + by, samples_ - by) = output.segment(first, samples_ - by);
+      }
       late.col(j) = seen(measured, point, column);
     }
     result.push_back(std::move(late));

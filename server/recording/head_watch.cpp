@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <sqlite3.h>
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -66,7 +67,9 @@ HeadWatch::Opened HeadWatch::compare(Database& database, const std::filesystem::
     if (before && *before) opened.loss = find_loss(database.handle(), opened.file);
     opened.file.head = read_store_head(database.handle());
     opened.file.at_us = utc_us;
-  } catch (const SQLite::Exception& error) {  // a file that is damaged in places; the head of before is written over
+  } catch (const SQLite::Exception& error) {
+    opened.problem = error.what();
+    if (error.getErrorCode() != SQLITE_CORRUPT) return opened;
     opened.loss = fmt::format("whether commits are lost since {} of them cannot be told: {}", opened.file.head.commits,
                               error.what());
   }
