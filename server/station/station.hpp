@@ -40,7 +40,7 @@ struct LinkTimes {
 // A wish to command a robot. `action` has its action member set; the station fills id, boot and validity.
 struct CommandRequest {
   RobotId robot_id;
-  protocol::Command action;
+  protocol::Command action = rheonaut_Command_init_zero;
   std::string arguments = "{}";  // as JSON, for the record
   std::string actor;
   std::string peer;                   // the address that it came from

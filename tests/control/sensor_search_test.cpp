@@ -27,7 +27,7 @@ constexpr FractionalModel kFluid{0.1, 0.006, 0.11, 1, 2, 1};
 Recording acceleration_run(double duration_s, double noise_m_s2, double failed_share, double moves_by_m_s2 = 0) {
   Recording run{kPeriodS, prbs_duty(0.6, 0.2, duration_s, kPeriodS), {}, {}};
   const std::vector<double> exact = output_of(kFluid, Channel::acceleration, kPeriodS, run.duty);
-  const Eigen::VectorXd felt_m_s2 = Eigen::Map<const Eigen::VectorXd>(exact.data(), std::ssize(exact));
+  const Eigen::VectorXd felt_m_s2 = OutputModel::with_means(kPeriodS, run.duty, 1e-9).output(kFluid);
   const SensorPath path({exact, std::vector<bool>(exact.size()), false}, kPeriodS);
   const Eigen::VectorXd readings = path.sampled(felt_m_s2, {-0.75 * kPeriodS, kPeriodS, 0.25 * kPeriodS});
   run.acceleration_m_s2.assign(readings.begin(), readings.end());
