@@ -95,9 +95,22 @@ def follow(station, robot_id, start_robot_us, until_s, truth=None):
         time.sleep(min(0.1, max(0.005, until_s - elapsed_s)))
 
 
+def tell_model(station, robot_id, rheonaut, fluid="non_newtonian"):
+    """Gives the station the model of the fluid, and has it sent to the robot, read back and confirmed; the model."""
+    asked = subprocess.run([rheonaut, "estimator", "--plant", fluid, "--json"], check=True, capture_output=True, text=True)
+    model = json.loads(asked.stdout)
+    station.post(f"/api/v1/fluids/{fluid}/model", model)
+    station.post(f"/api/v1/robots/{robot_id}/fluid", {"fluid": fluid})
+    def state():
+        return station.robot(robot_id)["model"]
+    wait_until(lambda: state()["state"] not in ("sending", "assumed"), 30, "the model on the robot")
+    if state()["state"] != "confirmed":
+        raise RuntimeError(f"the robot has no confirmed model: {state()['reason']}")
+    return model
+
+
 def perform(station, robot_id, fluid="non_newtonian", truth=None):
     """Runs the experiment; returns (run, measures, true measures or None)."""
-    station.command(robot_id, "set_parameter", name="model_confirmed", value=1)
     zeroed = station.command(robot_id, "zero_position")
     if truth:
         truth.zeroed_us = zeroed["effect_at_robot_us"]
@@ -167,18 +180,11 @@ def faults(run, measures, true):
     return found
 
 
-def model_of(station, run_id):
-    """What the robot says its model of the fluid is: (gains in m/s, time constants in s)."""
-    in_force = station.get(f"/api/v1/runs/{run_id}/snapshot")["in_force"]
-    table = next(entry["content"] for entry in in_force if entry["kind"] == "parameters")
-    return ([table[f"model_gain_{i}_m_s"]["value"] for i in range(1, 5)],
-            [table[f"model_time_constant_{i}_s"]["value"] for i in range(1, 5)])
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", required=True, help="data folder of the running station")
     parser.add_argument("--robot", default="sim-1")
+    parser.add_argument("--rheonaut", required=True, help="path of rheonaut")
     parser.add_argument("--sim", required=True, help="path of rheonaut-sim")
     parser.add_argument("--truth", required=True, help="file that `rheonaut-sim --truth` writes")
     options = parser.parse_args()
@@ -186,11 +192,12 @@ def main():
     station.wait_for_robot(options.robot)
     say(f"robot '{options.robot}': auto mode, setpoint {1e3 * SETPOINT_M:.0f} mm; at {DISTURBANCE_AT_S:.0f} s the "
         f"measured position is shifted by {1e3 * DISTURBANCE_M:.0f} mm; {DURATION_S:.0f} s in all")
-    say("model: told the robot that its built-in one, of the fluid (29), is that of the fluid it swims in (model_confirmed = 1)")
+    model = tell_model(station, options.robot, options.rheonaut)
+    say("model of the fluid (29), sent to the robot, read back and confirmed: gains " +
+        ", ".join(f"{gain:.3g}" for gain in model["model_gain_m_s"]) + " m/s, time constants " +
+        ", ".join(f"{constant:.3g}" for constant in model["model_time_constant_s"]) +
+        f" s, fit error {100 * model['fit_error']:.2f} %")
     run, measures, true = perform(station, options.robot, truth=Truth(options.truth))
-    gains_m_s, time_constants_s = model_of(station, run["run_id"])
-    say("\n  the robot's model: gains " + ", ".join(f"{gain:.3g}" for gain in gains_m_s) + " m/s, time constants " +
-        ", ".join(f"{constant:.3g}" for constant in time_constants_s) + " s")
     print_table([("true, as the simulator says", true),
                  ("by the robot's estimate, ± 2 sd", measures),
                  ("predicted on the true position", predict(options.sim, -1)),
