@@ -38,6 +38,8 @@ std::size_t line_of_row(std::string_view text, std::size_t row) {
   return line;
 }
 
+constexpr double kLeastRatio = 0.2, kMostRatio = 5;  // of both motions; a robot with a wrong model is off by two
+
 std::optional<std::string> fault_of_row(const Given& given, std::size_t row) {
   const double time_s = given.time_s[row], position_m = given.position_m[row], sd_m = given.sd_m[row];
   if (row > 0 && !(time_s > given.time_s[row - 1])) {
@@ -52,6 +54,10 @@ std::optional<std::string> fault_of_row(const Given& given, std::size_t row) {
 }
 
 Result<Given> read_given(const ReferenceRequest& request) {
+  const auto is_control = [](unsigned char c) { return c < 0x20 || c == 0x7f; };
+  if (std::ranges::any_of(request.source, is_control)) {
+    return fail(ErrorCode::invalid, "source has control characters: it is a name, in one line", "out_of_range");
+  }
   Given given;
   try {
     CsvColumns columns = parse_csv(request.csv, request.source, {"t_s", "position_m"}, {"position_sd_m"});
@@ -88,11 +94,18 @@ struct OwnRecord {
   std::vector<double> time_s, position_m, sd_m;
   std::optional<std::int64_t> utc_offset_us;  // of the sample whose clock is known best, as its half-width
   std::int64_t utc_uncertainty_us = 0;
+  std::int64_t utc_offset_least_us = 0, utc_offset_most_us = 0;  // of all: the robot's clock drifts
 
   double seconds(std::uint64_t robot_time_us) const {
     return (static_cast<double>(robot_time_us) - static_cast<double>(first_us)) * 1e-6;
   }
 };
+
+// A standard deviation that falls to less than half from one sample to the next, and what comes with it.
+bool is_zeroed_between(const OwnPosition& before, const OwnPosition& after) {
+  constexpr float kSureM = 0.0005F;  // below it, where a zero is hardly a step
+  return before.position_sd_m > kSureM && after.position_sd_m < before.position_sd_m / 2;
+}
 
 Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::optional<std::uint32_t> wanted) {
   if (own.empty()) return fail(ErrorCode::invalid, "the run has no samples");
@@ -105,11 +118,26 @@ Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::optional<std
   OwnRecord record;
   record.span = wanted.value_or(own.front().span);
   bool has_begun = false;
+  const OwnPosition* before = nullptr;
   for (const OwnPosition& sample : own) {
     if (sample.span != record.span) continue;
+    if (before != nullptr && is_zeroed_between(*before, sample)) {
+      return fail(ErrorCode::invalid,
+                  fmt::format("the robot's position was set to 0 (zero_position) {:.2f} s after the span began, so no "
+                              "one zero holds for all of it: make runs of what lies before and after",
+                              record.seconds(sample.robot_time_us)),
+                  "zeroed");
+    }
+    before = &sample;
     if (!has_begun) record.first_us = sample.robot_time_us;
     has_begun = true;
     record.last_us = sample.robot_time_us;
+    if (sample.clock_uncertainty_us >= 0) {
+      const std::int64_t offset_us = sample.utc_us - static_cast<std::int64_t>(sample.robot_time_us);
+      const bool is_first = !record.utc_offset_us;
+      record.utc_offset_least_us = is_first ? offset_us : std::min(record.utc_offset_least_us, offset_us);
+      record.utc_offset_most_us = is_first ? offset_us : std::max(record.utc_offset_most_us, offset_us);
+    }
     const bool is_better = !record.utc_offset_us || sample.clock_uncertainty_us < record.utc_uncertainty_us;
     if (sample.clock_uncertainty_us >= 0 && is_better) {
       record.utc_offset_us = sample.utc_us - static_cast<std::int64_t>(sample.robot_time_us);
@@ -141,7 +169,8 @@ Result<void> find_clock(const ReferenceClockRequest& asked, const Given& given, 
       const std::int64_t zero_us = asked.zero_at_us - *own.utc_offset_us;  // in robot time
       into.clock_offset_s = static_cast<double>(zero_us - static_cast<std::int64_t>(own.first_us)) * 1e-6;
       const double half_width_s = static_cast<double>(own.utc_uncertainty_us) * 1e-6;
-      into.clock_sd_s = std::hypot(asked.sd_s.value_or(0), half_width_s / std::sqrt(3.0));
+      const double drift_s = static_cast<double>(own.utc_offset_most_us - own.utc_offset_least_us) * 1e-6;
+      into.clock_sd_s = std::hypot(asked.sd_s.value_or(0), half_width_s / std::sqrt(3.0), drift_s / std::sqrt(12.0));
       return {};
     }
     case ReferenceClock::marker:
@@ -160,6 +189,12 @@ Result<void> find_clock(const ReferenceClockRequest& asked, const Given& given, 
                             "which the offset lies",
                             found.refusal),
                 "no_correlation");
+  }
+  if (found.motion_ratio < kLeastRatio || found.motion_ratio > kMostRatio) {
+    return fail(ErrorCode::invalid,
+                fmt::format("it moves {:.4g} times what the robot's own record does: are its positions in metres?",
+                            found.motion_ratio),
+                "out_of_range");
   }
   into.clock_offset_s = found.offset_s;
   into.clock_sd_s = found.offset_sd_s;

@@ -148,7 +148,7 @@ class Cutter {
       time_s.push_back(static_cast<double>(at_us - span_began_us_) * 1e-6);
       position_m.push_back(outside.position_m[i] + disturbance_m);
       squares_m2 += outside.position_sd_m[i] * outside.position_sd_m[i];
-      sd_m = std::max(sd_m, outside.position_sd_m[i]);
+      sd_m = std::max(sd_m, std::hypot(outside.position_sd_m[i], reference_->reference.zero_sd_m.value_or(0)));
       while (after < points_of_step_.size() && points_of_step_[after].robot_time_us < at_us) ++after;
       if (after == points_of_step_.size()) continue;
       compare(points_of_step_[after - 1], points_of_step_[after], at_us, outside.position_m[i],

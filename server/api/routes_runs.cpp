@@ -29,13 +29,15 @@ Answer list_runs(ApiParts& parts, Request request) {
   co_return json_response(200, list_json("runs", runs));
 }
 
-// SAFETY: whoever names the fluid that the robot is in decides which limits hold: that is a command.
-Result<void> may_name_fluid(const ApiParts& parts, const Request& request, const RobotId& robot_id,
+// SAFETY: whoever names the fluid that the robot is in decides which limits hold, and which model it is sent: that is a
+// command. False for somebody who may not, and names the fluid that it is in: then nothing is to be said of the robot.
+Result<bool> may_name_fluid(const ApiParts& parts, const Request& request, const RobotId& robot_id,
                             const std::string& fluid) {
-  if (fluid.empty() || request.caller.scopes.allow(Scope::command)) return {};
+  if (fluid.empty() || request.caller.scopes.allow(Scope::command)) return true;
   const RobotState* robot = parts.station.find(robot_id);
   const auto listed = parts.station.envelope().listed(fluid);
-  if (robot == nullptr || !listed || robot->fluid == *listed) return {};  // refused later, or the same
+  if (robot == nullptr || !listed) return true;  // refused later
+  if (robot->fluid == *listed) return false;
   return fail(ErrorCode::forbidden,
               fmt::format("to say that robot '{}' is in '{}' changes its limits, which needs the scope command; name "
                           "the fluid that it is in, or none",
@@ -44,7 +46,7 @@ Result<void> may_name_fluid(const ApiParts& parts, const Request& request, const
 }
 
 Answer create_run(ApiParts& parts, Request request) {
-  const auto wish = parse_run(request.body);
+  auto wish = parse_run(request.body);
   if (!wish) co_return problem(wish.error());
   const Result<void> room = parts.recording.disk_watch.may_begin("a run");
   if (!room) co_return problem(room.error());
@@ -54,6 +56,7 @@ Answer create_run(ApiParts& parts, Request request) {
   if (!wish->range) {
     const auto named = may_name_fluid(parts, request, wish->robot_id, wish->conditions.fluid);
     if (!named) co_return problem(named.error());
+    if (!*named) wish->conditions.fluid.clear();  // the run takes the robot's
   }
   Runs& runs = parts.recording.runs;
   const Author by = author_of(request, parts.clock);
@@ -89,14 +92,15 @@ Answer end_run(ApiParts& parts, Request request) {
 Answer annotate_run(ApiParts& parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
-  const auto annotation = parse_annotation(request.body);
+  auto annotation = parse_annotation(request.body);
   if (!annotation) co_return problem(annotation.error());
   if (const auto fluid = annotation->texts.find("fluid"); fluid != annotation->texts.end()) {
     const auto before = co_await parts.recording.runs.find(*id);
     if (!before) co_return problem(before.error());
     const bool is_open = before->state == RunState::open;
-    const auto named = is_open ? may_name_fluid(parts, request, before->robot_id, fluid->second) : Result<void>{};
+    const auto named = is_open ? may_name_fluid(parts, request, before->robot_id, fluid->second) : Result<bool>{true};
     if (!named) co_return problem(named.error());
+    if (!*named) annotation->texts.erase(fluid);  // it is the run's already
   }
   const auto run = co_await parts.recording.runs.annotate(*id, *annotation, author_of(request, parts.clock));
   if (!run) co_return problem(run.error());

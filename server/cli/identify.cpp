@@ -136,6 +136,8 @@ void write_sensor(std::ostream& out, const control::SensorFit& sensor) {
 constexpr double kLargerThanSaid = 1.5;  // residuals, in sd of the reference
 
 // What a position from outside adds to the doubts.
+constexpr double kSuspiciousClockS = 0.005;
+
 void add_outside_doubts(const RunRecording& given, const Identify& wish, control::Identification& found) {
   if (!(given.position_sd_m > 0)) return;
   const double residual_sd_m = found.best.residual_sd;
@@ -144,6 +146,15 @@ void add_outside_doubts(const RunRecording& given, const Identify& wish, control
         "the residuals, {:.2g} mm, are larger than the position from outside is said to be exact, {:.2g} mm: "
         "its clock, its scale or the model is not right",
         1e3 * residual_sd_m, 1e3 * given.position_sd_m));
+  }
+  // A dead time of the plant and an error of the camera's clock look the same.
+  const control::Fit& best = found.best;
+  const double clock_sigma_s = best.position_clock_sigma_s.value_or(0);
+  if (std::abs(best.position_clock_s) > std::max(kSuspiciousClockS, 3 * clock_sigma_s)) {
+    found.warnings.push_back(fmt::format(
+        "the outside position's clock came out {:.0f} ms off: if it is not, that is a dead time of the plant; search "
+        "with --dead-time-s",
+        1e3 * best.position_clock_s));
   }
   if (wish.options.longest_dead_time_s > 0) {
     found.warnings.emplace_back("the dead time contains what is left of the error of the outside position's clock");

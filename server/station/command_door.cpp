@@ -150,7 +150,8 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
                "queue_full"};
     co_return refuse(request, std::move(full));
   }
-  use_control(request);  // SAFETY: what was refused, also by a full queue, or came too late, takes no control
+  if (request.takes_control)
+    use_control(request);  // SAFETY: what was refused, also by a full queue, or came too late, takes no control
   if (pending->wire.has_execute_at_robot_us) {
     seat.timed_by = request.actor;
     seat.timed_until_robot_us = std::max(seat.timed_until_robot_us, pending->wire.execute_at_robot_us);

@@ -78,8 +78,12 @@ void Station::acknowledge(Seat& seat, CommandId id, std::string reason) {
   pending->look_from_robot_us = has_time ? record.effect_at_robot_us : seat.robot->latest_robot_time_us;
   if (is_for_the_motor(pending->wire)) {
     for (const auto& other : seat.unseen) {  // a timed one may come later than one that was acknowledged after it
-      PendingCommand& earlier = other->look_from_robot_us <= pending->look_from_robot_us ? *other : *pending;
-      earlier.is_overtaken = earlier.is_overtaken || is_for_the_motor(earlier.wire);
+      const bool is_older = other->look_from_robot_us <= pending->look_from_robot_us;
+      PendingCommand &earlier = is_older ? *other : *pending, &later = is_older ? *pending : *other;
+      // SAFETY: nothing that waits excuses a stop, or what should have been seen before it acts.
+      const bool is_in_time = later.look_from_robot_us <= earlier.look_from_robot_us + kVerifyWindowUs;
+      const bool is_excused = is_for_the_motor(earlier.wire) && is_in_time && (!earlier.is_stop() || is_older);
+      earlier.is_overtaken = earlier.is_overtaken || is_excused;
     }
   }
   // What took effect before this connection may be shown by samples that come after the live ones: their silence says

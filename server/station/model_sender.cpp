@@ -1,4 +1,5 @@
 // One coroutine for each robot that something is sent to; run() for what robots report by themselves.
+// LONG: what is sent, and what robots report of it, share each robot's state and are understood together.
 #include "server/station/model_sender.hpp"
 
 #include <fmt/format.h>
@@ -39,6 +40,7 @@ CommandRequest set_parameter(const RobotId& id, const Author& by, const std::str
   request.robot_id = id;
   request.actor = by.actor;
   request.peer = by.peer;
+  request.takes_control = false;  // SAFETY: who named the fluid may be gone by now
   request.action = rheonaut_Command_init_zero;
   request.action.which_action = rheonaut_Command_set_parameter_tag;
   auto& parameter = request.action.action.set_parameter;
@@ -289,6 +291,15 @@ bool ModelSender::holds(const RobotId& id, const FluidModel& model) const {
   return true;
 }
 
+// What the robot has said so far speaks against it.
+bool ModelSender::holds_another(const RobotId& id, const FluidModel& model) const {
+  for (const auto& [name, value] : parameters_of(model)) {
+    const std::optional<float> in_force = station_.parameter_in_force(id, name);
+    if (in_force && !same_bits(*in_force, value)) return true;
+  }
+  return false;
+}
+
 // A sink never calls the station: run() does.
 void ModelSender::on_robot(const RobotState& robot) {
   const auto found = places_.find(robot.id);
@@ -312,6 +323,12 @@ void ModelSender::on_samples(const RobotState& robot, const SampleBatch& batch) 
   place.was_seen_to_rise = place.flag.has_value();
   place.flag = flag;
   place.heard_first_us = clock_.steady_us();
+  changed_.insert(robot.id);
+  wake_.notify();
+}
+
+void ModelSender::on_in_force(const RobotState& robot, const InForceRecord& record) {
+  if (record.kind != "parameters" || !places_.contains(robot.id)) return;
   changed_.insert(robot.id);
   wake_.notify();
 }
@@ -347,7 +364,11 @@ void ModelSender::follow(const RobotState& robot, Place& place) {
   }
   if (place.owes) return settle_debt(robot, place);
   const bool is_taken_for_confirmed = robot.model.state == ModelState::confirmed;
-  if (*place.flag && !is_taken_for_confirmed) return judge_unseen(robot, place);
+  // The flag may have fallen and risen between two samples, or while the robot was away.
+  const std::optional<FluidModel>& sent = place.naming.model;
+  const bool is_another =
+      is_taken_for_confirmed && !robot.model.fluid.empty() && sent && holds_another(robot.id, *sent);
+  if (*place.flag && (!is_taken_for_confirmed || is_another)) return judge_unseen(robot, place);
   if (!*place.flag && is_taken_for_confirmed) {
     station_.set_model(
         robot.id, model_state(ModelState::assumed, "", {}, "the robot has taken it back: a parameter was changed"));

@@ -46,6 +46,7 @@ class ModelSender final : public StationSink {
 
   void on_robot(const RobotState& robot) override;
   void on_samples(const RobotState& robot, const SampleBatch& batch) override;
+  void on_in_force(const RobotState& robot, const InForceRecord& record) override;
 
  private:
   // What somebody has said of a robot's fluid.
@@ -84,6 +85,7 @@ class ModelSender final : public StationSink {
   boost::asio::awaitable<Outcome> wait_for_rest(RobotId id, Naming naming, std::int64_t deadline_us);
   Outcome still_wanted(const RobotId& id, const Naming& naming) const;
   bool holds(const RobotId& id, const FluidModel& model) const;
+  bool holds_another(const RobotId& id, const FluidModel& model) const;
   void conclude(const RobotId& id, const Naming& naming, const Outcome& outcome);
   void conclude_failure(const RobotId& id, const Naming& naming, const Error& error);
   void follow(const RobotState& robot, Place& place);

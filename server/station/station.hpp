@@ -51,6 +51,7 @@ struct CommandRequest {
   std::string key;                    // of the client, new for each wish; a wish that comes again is not sent again
   std::int64_t received_us = 0;       // steady, when it arrived at the station; 0: now
   bool until_verified = false;        // wait for more than the robot's answer
+  bool takes_control = true;          // of a robot that nobody controls
 };
 
 struct StopRequest {

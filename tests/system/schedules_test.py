@@ -22,12 +22,14 @@ class SchedulesTest(unittest.TestCase):
         self.station.wait_for_robot("sim-1")
 
     def drive(self):
-        """Begins the schedule and renews its lease; when that was renewed last, in the robot's time. On a machine so busy
-        that the lease lapses meanwhile, begins again."""
+        """Begins the schedule, and renews its lease until telemetry shows the motion and once more; when that was, in the
+        robot's time. On a machine so busy that the lease lapses meanwhile, begins again."""
         while True:
             try:
                 self.station.command("sim-1", "set_duty_schedule", schedule=SCHEDULE)
-                return [self.station.command("sim-1", "renew_lease")["effect_at_robot_us"] for _ in range(5)][-1]
+                while self.station.robot("sim-1")["sample"]["duty"] != DUTY:
+                    self.station.command("sim-1", "renew_lease")
+                return self.station.command("sim-1", "renew_lease")["effect_at_robot_us"]
             except ApiError as error:
                 self.assertIn(error.reason, ("nothing_to_renew", "timed_out", "expired"), error.problem)
 

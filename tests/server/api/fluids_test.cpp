@@ -82,8 +82,19 @@ TEST_F(FluidsTest, ARunThatNamesAnotherNeedsTheRightToCommand) {
   EXPECT_EQ(refused.status, 403) << refused.body;
   EXPECT_EQ(refused.parsed()["reason"], "not_permitted");
   EXPECT_EQ(robot_fluid(), "water");
+  const json model{{"model_gain_m_s", {0.1, 0, 0, 0}},
+                   {"model_time_constant_s", {0.1, 1, 1, 1}},
+                   {"fit_error", 0.001},
+                   {"plant", {{"kp", 0.1}}}};
+  scopes = Scopes::of(Role::operator_);
+  ASSERT_LT(ask("POST", "/api/v1/fluids/water/model", model).status, 300);
+  scopes = Scopes{}.add(Scope::record);
+  const std::size_t commands = robot->commands().size();
   const Answered run = begin_run(" Water");
   ASSERT_EQ(run.status, 201) << run.body;
+  EXPECT_EQ(run.parsed()["fluid"], "water");
+  clock.run_for(2s);
+  EXPECT_EQ(robot->commands().size(), commands) << "nor does it send the robot anything";
   const std::string path = "/api/v1/runs/" + run.parsed()["run_id"].dump();
   EXPECT_EQ(ask("POST", path + "/annotate", {{"fluid", "oil"}}).status, 403);
   EXPECT_EQ(robot_fluid(), "water");

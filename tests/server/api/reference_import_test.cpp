@@ -69,6 +69,31 @@ class ReferenceImportTest : public ::testing::Test {
   std::optional<MarkerPlace> marker;
 };
 
+TEST_F(ReferenceImportTest, ASpanInWhichTheRobotWasZeroedIsRefused) {
+  see(0, 0);
+  for (std::size_t k = 1500; k < own.size(); ++k) {
+    own[k].position_m -= 0.1F;
+    own[k].position_sd_m = 0;
+  }
+  EXPECT_EQ(refusal().reason, "zeroed");
+  EXPECT_THAT(refusal().detail, HasSubstr("15.00 s"));
+}
+
+TEST_F(ReferenceImportTest, PositionsInMillimetresAreRefusedByTheMotion) {
+  request.clock.method = ReferenceClock::correlation;
+  request.csv = "t_s,position_m\n";
+  for (double at_s = 0.1; at_s < 29.9; at_s += 1.0 / 30) {
+    request.csv += fmt::format("{:.6f},{:.6f}\n", at_s, 1000 * truth_m(at_s));
+  }
+  EXPECT_THAT(refusal().detail, HasSubstr("metres"));
+}
+
+TEST_F(ReferenceImportTest, ANameOfSeveralLinesIsRefused) {
+  see(0, 0);
+  request.source = "camera\n0,9,0.001";
+  EXPECT_EQ(refusal().reason, "out_of_range");
+}
+
 TEST_F(ReferenceImportTest, AnOffsetIsAddedAndTheZeroIsTheRobots) {
   see(-3, 0.7);
   request.clock.offset_s = -3;

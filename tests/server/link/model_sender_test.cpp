@@ -383,6 +383,30 @@ TEST_F(ModelSenderTest, WhatTheRobotTakesBackByItselfIsAssumed) {
   EXPECT_EQ(model().fluid, "") << "of no fluid that the station knows";
 }
 
+TEST_F(ModelSenderTest, TakesNoControlForWhoeverNamedTheFluid) {
+  begin();
+  is_coasting = true;
+  name_fluid("water", "user:anna");
+  live(3s);
+  EXPECT_GT(refused, 0);
+  EXPECT_EQ(station.find("r1")->control.holder, "");
+  is_coasting = false;
+  live(5s);
+  EXPECT_EQ(model().state, ModelState::confirmed);
+  EXPECT_EQ(station.find("r1")->control.holder, "");
+}
+
+TEST_F(ModelSenderTest, OtherBitsUnderAFlagThatNoSampleShowedFallingAreNoLongerTheFluidsModel) {
+  begin();
+  name_fluid("water");
+  live(3s);
+  ASSERT_EQ(model(), (RobotModel{ModelState::confirmed, "water", "", 0.002, some_model().set_at_us}));
+  held["model_gain_1_m_s"] = 0.3F;  // and confirmed again, before the next sample
+  say("model_gain_1_m_s", 0.3F);
+  live(500ms);
+  EXPECT_NE(model().fluid, "water");
+}
+
 TEST_F(ModelSenderTest, AfterARestartOfTheStationAConfirmationStandsForTheModelOfTheNamedFluidAlone) {
   for (const auto& [name, value] : parameters_of(some_model())) held[name] = value;
   held["model_confirmed"] = 1;

@@ -63,6 +63,24 @@ TEST_F(TimedControlTest, IsLookedForFromItsTimeOn) {
   EXPECT_EQ(results[0]->state, CommandState::verified);
 }
 
+TEST_F(TimedControlTest, ExcusesNoStopThatTheMotorRunsOnAfter) {
+  take_in(timed(set_duty(0.25F), in_ms(5000), "a"));
+  stop_robot(8s);
+  clock.settle();
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, 7);
+  clock.settle();
+  for (std::uint64_t seq = 0; seq < 200; seq += 5) {
+    auto frame = TestRobot::samples_frame(seq, 5, robot->robot_now_us(), 7);
+    for (float& duty : frame.body.telemetry.duty) duty = 0.5F;
+    robot->send(frame);
+    clock.run_for(50ms);
+  }
+  const auto stop = std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), std::string{"emergency_stop"},
+                                      &CommandRecord::kind);
+  ASSERT_NE(stop, sink.commands.rend());
+  EXPECT_EQ(stop->state, CommandState::failed) << stop->reason;
+}
+
 TEST_F(TimedControlTest, EndsAsTheRobotSaysWhenItDropsIt) {
   const auto first = take_in(timed(set_duty(0.25F), in_ms(3000), "a"));
   const auto second = take_in(timed(set_duty(0.5F), in_ms(4000), "a"));
