@@ -94,7 +94,7 @@ struct OwnRecord {
   std::vector<double> time_s, position_m, sd_m;
   std::optional<std::int64_t> utc_offset_us;  // of the sample whose clock is known best, as its half-width
   std::int64_t utc_uncertainty_us = 0;
-  std::int64_t utc_offset_least_us = 0, utc_offset_most_us = 0;  // of all: the robot's clock drifts
+  std::int64_t utc_drift_us = 0;  // how far others are from it, beyond their own half-width
 
   double seconds(std::uint64_t robot_time_us) const {
     return (static_cast<double>(robot_time_us) - static_cast<double>(first_us)) * 1e-6;
@@ -132,12 +132,6 @@ Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::optional<std
     if (!has_begun) record.first_us = sample.robot_time_us;
     has_begun = true;
     record.last_us = sample.robot_time_us;
-    if (sample.clock_uncertainty_us >= 0) {
-      const std::int64_t offset_us = sample.utc_us - static_cast<std::int64_t>(sample.robot_time_us);
-      const bool is_first = !record.utc_offset_us;
-      record.utc_offset_least_us = is_first ? offset_us : std::min(record.utc_offset_least_us, offset_us);
-      record.utc_offset_most_us = is_first ? offset_us : std::max(record.utc_offset_most_us, offset_us);
-    }
     const bool is_better = !record.utc_offset_us || sample.clock_uncertainty_us < record.utc_uncertainty_us;
     if (sample.clock_uncertainty_us >= 0 && is_better) {
       record.utc_offset_us = sample.utc_us - static_cast<std::int64_t>(sample.robot_time_us);
@@ -150,6 +144,12 @@ Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::optional<std
     record.sd_m.push_back(static_cast<double>(sample.position_sd_m));
   }
   if (!has_begun) return fail(ErrorCode::invalid, fmt::format("the run has no samples in span {}", record.span));
+  for (const OwnPosition& sample : own) {
+    if (sample.span != record.span || sample.clock_uncertainty_us < 0) continue;
+    const std::int64_t offset_us = sample.utc_us - static_cast<std::int64_t>(sample.robot_time_us);
+    const std::int64_t beyond_us = std::abs(offset_us - *record.utc_offset_us) - sample.clock_uncertainty_us;
+    record.utc_drift_us = std::max(record.utc_drift_us, beyond_us);
+  }
   return record;
 }
 
@@ -169,8 +169,8 @@ Result<void> find_clock(const ReferenceClockRequest& asked, const Given& given, 
       const std::int64_t zero_us = asked.zero_at_us - *own.utc_offset_us;  // in robot time
       into.clock_offset_s = static_cast<double>(zero_us - static_cast<std::int64_t>(own.first_us)) * 1e-6;
       const double half_width_s = static_cast<double>(own.utc_uncertainty_us) * 1e-6;
-      const double drift_s = static_cast<double>(own.utc_offset_most_us - own.utc_offset_least_us) * 1e-6;
-      into.clock_sd_s = std::hypot(asked.sd_s.value_or(0), half_width_s / std::sqrt(3.0), drift_s / std::sqrt(12.0));
+      const double drift_s = static_cast<double>(own.utc_drift_us) * 1e-6;
+      into.clock_sd_s = std::hypot(asked.sd_s.value_or(0), half_width_s / std::sqrt(3.0), drift_s / std::sqrt(3.0));
       return {};
     }
     case ReferenceClock::marker:

@@ -150,6 +150,8 @@ TEST_F(ReferenceImportTest, UtcGoesByTheClockThatTheStationKnew) {
   const PlacedReference placed = place();
   EXPECT_NEAR(placed.reference.clock_offset_s, -1.25, 1e-9);
   EXPECT_NEAR(placed.reference.clock_sd_s.value(), 600e-6 / std::sqrt(3.0), 1e-9);
+  for (std::size_t k = 0; k < own.size(); ++k) own[k].utc_us += static_cast<std::int64_t>(2 * k);  // 200 ppm
+  EXPECT_GT(place().reference.clock_sd_s.value(), 0.003) << "one offset does not hold from end to end";
   for (OwnPosition& sample : own) sample.clock_uncertainty_us = -1;
   EXPECT_EQ(refusal().reason, "no_clock");
 }
