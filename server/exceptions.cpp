@@ -24,9 +24,17 @@ const char* text(Ended value) {
 void ExceptionLog::note(Ended ended, const std::string& which, const std::exception_ptr& failure, std::int64_t now_us) {
   Kind& kind = kinds_[static_cast<std::size_t>(ended)];
   ++kind.count;
-  if (const auto unsaid = kind.lines.next(now_us)) {
-    spdlog::error("{}: {}{}", which, text_of(failure), and_before(*unsaid));
+  const std::string line = which + ": " + text_of(failure);
+  if (const auto unsaid = lines_of(kind, line, now_us).next(now_us)) spdlog::error("{}{}", line, and_before(*unsaid));
+}
+
+// Lines that were not said for a second make room for others; what they left unsaid is in the count.
+SparseLines& ExceptionLog::lines_of(Kind& kind, const std::string& line, std::int64_t now_us) {
+  if (const auto known = kind.lines.find(line); known != kind.lines.end()) return known->second;
+  if (kind.lines.size() == kMostNames) {
+    std::erase_if(kind.lines, [now_us](const auto& entry) { return entry.second.is_due(now_us); });
   }
+  return kind.lines.size() < kMostNames ? kind.lines[line] : kind.others;
 }
 
 asio::awaitable<void> contained(ExceptionLog& log, const Clock& clock, Ended ended, std::string which,

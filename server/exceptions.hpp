@@ -1,14 +1,15 @@
 // Exceptions that end something smaller than the station: logged with their text and what they ended, and counted.
 //
 // A robot's session, a connection, a request and a page end alone by what they throw. A cause may lie outside and come
-// again as often as somebody likes, so each kind has one line a second in the log. The counts are in /metrics. Loop
-// thread.
+// again as often as somebody likes, so the log has one line a second of each name and text, and at most
+// kMostNames of them in a second; then one a second of all others of the kind. The counts are in /metrics. Loop thread.
 #pragma once
 
 #include <array>
 #include <boost/asio/awaitable.hpp>
 #include <cstdint>
 #include <exception>
+#include <map>
 #include <string>
 
 #include "server/clock.hpp"
@@ -29,10 +30,13 @@ class ExceptionLog {
   std::uint64_t count(Ended ended) const { return kinds_[static_cast<std::size_t>(ended)].count; }
 
  private:
+  static constexpr std::size_t kMostNames = 32;
   struct Kind {
     std::uint64_t count = 0;
-    SparseLines lines;
+    std::map<std::string, SparseLines> lines;  // by what the line says
+    SparseLines others;
   };
+  SparseLines& lines_of(Kind& kind, const std::string& line, std::int64_t now_us);
   std::array<Kind, kAllEnded.size()> kinds_;
 };
 

@@ -23,6 +23,7 @@ class SparseLines {
     next_us_ = now_us + 1'000'000;
     return std::exchange(unsaid_, 0);
   }
+  bool is_due(std::int64_t now_us) const { return now_us >= next_us_; }
 
  private:
   std::int64_t next_us_ = 0;

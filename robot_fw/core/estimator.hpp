@@ -64,7 +64,7 @@ struct EstimatorParameters {
   bool is_confirmed = false;             // the model is that of the fluid that the robot swims in
   float gain_error = 0.2F;               // of all gains alike, relative, at the start
   float section_error = 0.12F;           // of each gain by itself, relative to the steady gain, unless confirmed
-  float shape_error = 0.03F;             // of the model's velocity, relative to it, whatever its gain
+  float shape_error = 0.05F;             // of the model's velocity, relative to it, whatever its gain
   float driven_velocity_m_s = 0.0004F;   // of the model's velocity, whatever it is
   float resting_velocity_m_s = 0.0001F;  // the same with the motor off
   float correlation_s = 0.5F;            // of these two; not an sd

@@ -242,7 +242,7 @@ bool LiveFeed::is_news(const CommandRecord& record) {
   std::string& refusal = robots_[record.robot_id].renewal_refusal;
   if (was_accepted(record.state)) refusal.clear();
   const bool is_refused = record.state == CommandState::rejected || record.state == CommandState::expired ||
-                          record.state == CommandState::failed;
+                          record.state == CommandState::failed || record.state == CommandState::unknown;
   return is_refused && std::exchange(refusal, record.reason) != record.reason;
 }
 

@@ -1,5 +1,9 @@
 // The whole robot on its accelerometer, as it runs on the board: what it does, and what its telemetry says of it.
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "tests/robot_fw/driven_robot.hpp"
 
@@ -219,6 +223,101 @@ TEST_F(Estimate, MotionTowardsALimitEndsWhereThePositionIsNoLongerKnownWellEnoug
   station.run(1000);
   EXPECT_EQ(answer(zero_position()), "accepted");  // the way out: somebody has seen where it is
   EXPECT_EQ(answer(set_duty(0.2F)), "accepted");
+}
+
+// SAFETY: the loop steers outward as well as somebody's duty does, and what waits would go on with it.
+TEST_F(Estimate, InAutoMotionTowardsALimitEndsAsWellAndWhatWaitsIsDropped) {
+  EXPECT_EQ(answer(set_parameter("position_limit_max_m", 0.2F)), "accepted");
+  EXPECT_EQ(answer(set_auto(0.19F)), "accepted");
+  const std::uint64_t later = station.send(timed(set_setpoint(-0.1F), robot.robot_time_us() + 2'000'000));
+  for (int i = 0; i < 800 && mode() == "auto"; ++i) {
+    if (i % 20 == 1) station.send(renew_lease());  // what waits lives by it
+    station.step();
+  }
+  ASSERT_EQ(mode(), "manual");
+  EXPECT_EQ(core().duty(), 0);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_POSITION_UNCERTAIN), 1);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_MODE_CHANGED), 2);  // to auto, and back
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_EMERGENCY), 0);
+  EXPECT_LT(robot.world().position_m(), 0.2);
+  station.run(2);
+  EXPECT_EQ(result(*station.ack_of(later)), "uncertain");
+}
+
+// The flag is set from the event of its beginning to that of its end.
+TEST(OnItsAccelerometer, AMismatchIsInTelemetryFromItsBeginningToItsEnd) {
+  SimulatedRobotConfig config = on_its_accelerometer(1);
+  config.world.plant = {.model = control::kNewtonianModel};
+  SimulatedRobot robot{config};
+  StationPeer station{robot};
+  station.welcome.samples_per_frame = 1;
+  station.connect();
+  station.run(2);
+  station.send(set_parameter("model_confirmed", 1));
+  const auto is_flagged = [&] {
+    return (station.samples.rbegin()->second.flags & rheonaut_TELEMETRY_FLAG_MODEL_MISMATCH) != 0;
+  };
+  const auto events_of = [&](protocol::EventKind kind) {
+    return std::ranges::count(station.events, kind, &protocol::Event::kind);
+  };
+  station.run(100);
+  EXPECT_FALSE(is_flagged());
+  for (int i = 0; i < 15; ++i) {
+    station.send(set_duty(0.3F));
+    station.run(20);
+  }
+  EXPECT_TRUE(is_flagged());
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_MODEL_MISMATCH), 1);
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_MODEL_MISMATCH_ENDED), 0);
+  station.run(1000);
+  station.send(set_parameter("model_gain_error", 0.15F));  // another model is another chance
+  station.run(5);
+  EXPECT_FALSE(is_flagged());
+  EXPECT_EQ(events_of(rheonaut_EVENT_KIND_MODEL_MISMATCH_ENDED), 1);
+}
+
+// What nobody would set, but the table allows, and a short drive: the robot still takes better parameters afterwards.
+TEST(OnItsAccelerometer, NoParametersLockThemselves) {
+  const std::vector<std::vector<float>> gains{{10, -9.9F, -9.9F, 9.9F}, {10, 10, 10, 10}, {-10, 10, -10, 10}};
+  const std::vector<std::vector<float>> time_constants{{1000, 0.001F, 1000, 0.001F}, {0.001F, 0.1F, 10, 1000}};
+  const std::vector<std::vector<std::pair<const char*, float>>> others{
+      {{"dead_zone_duty", 0.5F}, {"doubtful_duty", 0.5F}, {"model_gain_error", 1}, {"model_shape_error", 1}},
+      {{"acceleration_noise_m_s2", 1}, {"acceleration_bias_m_s2", 1}, {"acceleration_bias_walk_m_s2", 0.1F}},
+      {{"acceleration_noise_m_s2", 0.001F},
+       {"model_gain_error", 0.01F},
+       {"model_shape_error", 0.001F},
+       {"driven_velocity_sd_m_s", 1e-5F},
+       {"resting_velocity_sd_m_s", 1e-5F},
+       {"velocity_correlation_s", 10}}};
+  std::uint64_t seed = 1;
+  for (const auto& gain : gains) {
+    for (const auto& time_constant : time_constants) {
+      for (const auto& other : others) {
+        SimulatedRobot robot{on_its_accelerometer(seed++)};
+        StationPeer station{robot};
+        station.connect();
+        station.run(2);
+        const auto answer = [&](const char* name, float value) {
+          const std::uint64_t id = station.send(set_parameter(name, value));
+          station.run(3);
+          const auto ack = station.ack_of(id);
+          return ack && ack->result == rheonaut_COMMAND_RESULT_ACCEPTED;
+        };
+        for (const auto& [name, value] : other) EXPECT_TRUE(answer(name, value)) << name;
+        for (std::size_t i = 0; i < gain.size(); ++i) {
+          const std::string n = std::to_string(i + 1);
+          EXPECT_TRUE(answer(("model_gain_" + n + "_m_s").c_str(), gain[i]));
+          EXPECT_TRUE(answer(("model_time_constant_" + n + "_s").c_str(), time_constant[i]));
+        }
+        for (int i = 0; i < 5; ++i) {
+          station.send(set_duty(0.8F));
+          station.run(20);
+        }
+        station.run(4000);
+        EXPECT_TRUE(answer("model_gain_1_m_s", 0.1F)) << gain[1] << ' ' << time_constant[0] << ' ' << other[0].first;
+      }
+    }
+  }
 }
 
 TEST_F(Estimate, ItsParametersAreRefusedWhileTheRobotCoasts) {

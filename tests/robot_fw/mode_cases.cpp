@@ -50,6 +50,7 @@ void run_schedule(BareCore& core) {
 void drive_outside(BareCore& core) {
   set(core, "model_confirmed", 1);  // the position is known so well that the robot coasts beyond the limit
   set(core, "model_gain_error", 0.01F);
+  set(core, "model_shape_error", 0.03F);
   sim_robot::Plant plant{sim_robot::PlantParameters{}, 0.01};
   const auto swim = [&](int ticks) {
     for (int i = 0; i < ticks; ++i) {

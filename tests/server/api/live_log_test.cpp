@@ -52,10 +52,12 @@ TEST(LiveLog, OfLeasesThatAreRenewedNobodyHearsOnlyThatOneWasNot) {
   renew(CommandState::acknowledged, "");
   renew(CommandState::failed, "link_lost");
   EXPECT_EQ(heard().size(), 1U) << "refused anew";
+  renew(CommandState::unknown, "no_answer");
+  EXPECT_EQ(heard().at(0)["command"]["state"], "unknown") << "it may not have been renewed";
   clock.run_for(100ms);
   const auto logged = messages_of(choosy);
   ASSERT_EQ(logged.at(0)["type"], "log");
-  EXPECT_EQ(logged[0]["commands"].size(), 3U);
+  EXPECT_EQ(logged[0]["commands"].size(), 4U);
   tasks.stop();
   clock.settle();
 }

@@ -99,6 +99,37 @@ TEST_F(SessionExceptionTest, ComesInOneLineASecondAndCountsAll) {
   EXPECT_TRUE(log.has("no room for a sample (and 19 before)")) << log.text();
 }
 
+TEST_F(SessionExceptionTest, OfTwoWithinASecondBothNamesAndBothTextsAreLogged) {
+  ExceptionLog exceptions;
+  const auto note = [&](const std::string& which, const char* text) {
+    exceptions.note(Ended::request, which, std::make_exception_ptr(std::runtime_error{text}), clock.steady_us());
+  };
+  note("GET /api/v1/runs", "disk full");
+  note("GET /api/v1/robots", "disk full");
+  note("GET /api/v1/robots", "no such table");
+  EXPECT_EQ(log.lines_with("GET /api/v1/runs: disk full"), 1U) << log.text();
+  EXPECT_EQ(log.lines_with("GET /api/v1/robots: disk full"), 1U) << log.text();
+  EXPECT_EQ(log.lines_with("GET /api/v1/robots: no such table"), 1U) << log.text();
+}
+
+// Whoever can choose the text fills neither the log nor the memory.
+TEST_F(SessionExceptionTest, OfThousandsOfNamesFewAreLogged) {
+  ExceptionLog exceptions;
+  const auto flood = [&](const std::string& word) {
+    for (int i = 0; i < 5000; ++i) {
+      exceptions.note(Ended::request, word + std::to_string(i), std::make_exception_ptr(std::runtime_error{"no"}),
+                      clock.steady_us());
+    }
+  };
+  flood("first ");
+  EXPECT_LE(log.lines_with("first "), 33U);
+  EXPECT_EQ(exceptions.count(Ended::request), 5000U);
+  clock.run_for(1s);
+  flood("second ");
+  EXPECT_GE(log.lines_with("second "), 2U) << "those of before have made room";
+  EXPECT_LE(log.lines_with("second "), 33U);
+}
+
 TEST_F(SessionExceptionTest, ThatTheStationStopsIsNone) {
   connect();
   tasks.stop();
