@@ -1,0 +1,37 @@
+// The column of figures of a robot: what stands above them of limits that were changed.
+import { h, render } from 'preact';
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+import type { RobotState } from '../src/api';
+import { LinkPanel } from '../src/parts/link_panel';
+import { Store } from '../src/store';
+import { fake_document, FakeNode } from './fake_dom';
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  vi.stubGlobal('document', fake_document);
+});
+afterEach(() => {
+  vi.unstubAllGlobals();
+  vi.useRealTimers();
+});
+
+const robot_with = (changed_limits: RobotState['changed_limits']) =>
+  ({ robot_id: 'a', link: 'connected', mode: 'manual', changed_limits, next_seq: 0, durable_next_seq: 0, control: null }) as RobotState;
+
+test('a limit that differs from its default is shown until it is restored', async () => {
+  const store = new Store({ page_ms: () => 0, utc_ms: () => 0 });
+  store.hear({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots: [robot_with([])] });
+  store.refresh();
+  const page = new FakeNode(1, 'body');
+  render(h(LinkPanel, { robot: store.robots.value[0]! }), page as unknown as Element);
+  const tell = async (limits: RobotState['changed_limits']) => {
+    store.hear({ type: 'robot', robot: robot_with(limits) });
+    store.refresh();
+    await vi.advanceTimersByTimeAsync(100);
+  };
+  expect(page.find('changed-limits')).toBeNull();
+  await tell([{ name: 'position_limit_max_m', unit: 'm', value: 0.2, default: 100 }]);
+  expect(page.find('changed-limits')!.text).toBe('Changed limits: position_limit_max_m 0.2 m (default 100 m)');
+  await tell([]);
+  expect(page.find('changed-limits')).toBeNull();
+});
