@@ -1,14 +1,34 @@
-"""A schedule in mid-run whose owner, station or link is gone: the motor is at 0 within 500 ms of the robot's time. Real
-processes; judged by what the robot recorded, which arrives when it is back."""
+"""A schedule in mid-run whose owner, station or link is gone, or whose owner's token or session has ended: the motor is
+at 0 within 500 ms of the robot's time. Real processes; judged by what the robot recorded, which arrives when it is back."""
 import subprocess
+import time
 import unittest
+from concurrent.futures import ThreadPoolExecutor
 
-from processes import BIN, ApiError, lab, wait_until
+from accounts_test import PASSWORD, Page
+from processes import BIN, ApiError, Station, lab, wait_until
 
 PATH = "/api/v1/robots/sim-1"
 DUTY = 0.25
 SCHEDULE = [{"tick": 0, "duty": DUTY}, {"tick": 3000, "duty": 0}]  # half a minute
 LEASE_US, TICK_US = 500_000, 10_000
+# Reasons on a machine so busy that the lease lapses, or that a request is old when it arrives.
+LAPSED = ("nothing_to_renew", "timed_out", "expired", "stale")
+
+
+class PageOwner:
+    """A page that is signed in commands as a script does."""
+
+    def __init__(self, page):
+        self.page = page
+
+    def command(self, robot_id, kind, **arguments):
+        stamp_us = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1000  # the station's clock, as /live tells it to pages
+        body = {"kind": kind, "stamp_us": stamp_us, **arguments}
+        status, answer = self.page.ask("POST", f"/api/v1/robots/{robot_id}/commands", body)
+        if status >= 400:
+            raise ApiError(status, answer)
+        return answer
 
 
 class SchedulesTest(unittest.TestCase):
@@ -21,17 +41,19 @@ class SchedulesTest(unittest.TestCase):
         self.place._start("sim-1", "rheonaut-sim", *flags)
         self.station.wait_for_robot("sim-1")
 
-    def drive(self):
+    def drive(self, owner=None):
         """Begins the schedule, and renews its lease until telemetry shows the motion and once more; when that was, in the
-        robot's time. On a machine so busy that the lease lapses meanwhile, begins again."""
+        robot's time. On a machine so busy that the lease lapses meanwhile, begins again. By default with the station's
+        own token."""
+        owner = owner or self.station
         while True:
             try:
-                self.station.command("sim-1", "set_duty_schedule", schedule=SCHEDULE)
+                owner.command("sim-1", "set_duty_schedule", schedule=SCHEDULE)
                 while self.station.robot("sim-1")["sample"]["duty"] != DUTY:
-                    self.station.command("sim-1", "renew_lease")
-                return self.station.command("sim-1", "renew_lease")["effect_at_robot_us"]
+                    owner.command("sim-1", "renew_lease")
+                return owner.command("sim-1", "renew_lease")["effect_at_robot_us"]
             except ApiError as error:
-                self.assertIn(error.reason, ("nothing_to_renew", "timed_out", "expired"), error.problem)
+                self.assertIn(error.reason, LAPSED, error.problem)
 
     def samples_until(self, robot_time_us):
         """Every sample of the robot, once all of them have come that were made until then: live ones come before older ones
@@ -54,9 +76,43 @@ class SchedulesTest(unittest.TestCase):
         last_us = max(row["robot_time_us"] for row in moving)
         self.assertLessEqual(last_us, renewed_us + LEASE_US + TICK_US)
 
+    def renew_until_refused(self, owner, renewed_us):
+        """Goes on renewing until the station no longer knows the owner; when the last renewal was that it carried out."""
+        ends_s = time.monotonic() + 20
+        while True:
+            self.assertLess(time.monotonic(), ends_s, "the station still obeys the owner")
+            try:
+                renewed_us = owner.command("sim-1", "renew_lease")["effect_at_robot_us"]
+            except ApiError as error:
+                if error.status == 401:
+                    return renewed_us
+                self.assertIn(error.reason, LAPSED, error.problem)
+
+    def expect_stopped_by(self, end, owner):
+        """`end` ends what the owner acts by, in the middle of the schedule and of its renewals."""
+        renewed_us = self.drive(owner)
+        with ThreadPoolExecutor(1) as other:
+            renewing = other.submit(self.renew_until_refused, owner, renewed_us)
+            end()
+            self.expect_stopped(renewing.result())
+
     def test_the_owner_is_gone(self):
         self.start_robot()
         self.expect_stopped(self.drive())
+
+    def test_the_owners_token_is_revoked(self):
+        self.start_robot()
+        owner = Station(self.station.data_dir)
+        owner.token = self.station.post("/api/v1/tokens", {"name": "owner", "scopes": "command"})["secret"]
+        self.expect_stopped_by(lambda: self.station.post("/api/v1/tokens/owner/revoke"), owner)
+
+    def test_the_owner_signs_out(self):
+        self.start_robot()
+        self.station.post("/api/v1/users", {"name": "anna", "role": "operator", "password": PASSWORD})
+        page = Page(self.station)
+        self.assertEqual(page.log_in("anna")[0], 200)
+        tab = Page(self.station, page.cookie)  # signs out in one tab while the other drives
+        self.expect_stopped_by(lambda: self.assertEqual(tab.ask("POST", "/api/v1/logout")[0], 200), PageOwner(page))
 
     def test_the_station_is_killed(self):
         self.start_robot()
@@ -100,7 +156,7 @@ class SchedulesTest(unittest.TestCase):
                 try:
                     self.station.command("sim-1", "renew_lease")
                 except ApiError as error:
-                    self.assertIn(error.reason, ("nothing_to_renew", "timed_out", "expired"), error.problem)
+                    self.assertIn(error.reason, LAPSED, error.problem)
             if self.station.get(path)["state"] != "expired":  # as on a machine so busy that the lease lapsed
                 break
         self.assertEqual(self.station.get(path)["state"], "verified")
