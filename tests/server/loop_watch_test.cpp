@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <ctime>
+#include <filesystem>
+#include <string>
 
 #include "server/clock.hpp"
 
@@ -38,7 +41,8 @@ TEST(LoopWatch, OfTwoStandstillsTheFirstCountsUntilAllHasBeenRead) {
   EXPECT_EQ(watch.unread_for(5'000'000), 1s);
 }
 
-// Where the machine has never been suspended since it was started, both clocks of the system say the same.
+// Where the machine has never been suspended since it was started, both clocks of the system say the same; then only
+// the run by the next test can fail.
 TEST(SystemClock, SteadyTimeGoesOnInASuspend) {
   boost::asio::io_context loop{1};
   const SystemClock clock{loop};
@@ -51,6 +55,16 @@ TEST(SystemClock, SteadyTimeGoesOnInASuspend) {
   const std::int64_t at_us = clock.steady_us();
   EXPECT_LE(before_us, at_us);
   EXPECT_LE(at_us, since_boot_us());
+}
+
+// In a time namespace CLOCK_BOOTTIME is a day ahead of CLOCK_MONOTONIC, as after a suspend of a day.
+TEST(SystemClock, SteadyTimeHasGoneOnInASuspendOfADay) {
+  const std::string after_a_day = "unshare --map-root-user --fork --time --boottime 86400 ";
+  if (std::system((after_a_day + "true 2>/dev/null").c_str()) != 0) {
+    GTEST_SKIP() << "unshare --time is not possible here: no clock that has seen a suspend";
+  }
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
+  EXPECT_EQ(std::system((after_a_day + program + " --gtest_filter=SystemClock.SteadyTimeGoesOnInASuspend").c_str()), 0);
 }
 
 }  // namespace
