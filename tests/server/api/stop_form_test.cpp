@@ -98,6 +98,21 @@ TEST_F(StopFormTest, ManyHeaderFieldsAreIgnored) {
   expect_stop(post(kStop, bearer() + fields));
 }
 
+// The size of a head is bounded also when it asks for a stop (docs/api.md).
+TEST_F(StopFormTest, AHeadOf15kBIsObeyedAndOneOfMoreThan16kBRefusedInWords) {
+  const auto head_of = [this](std::size_t bytes) {
+    const std::size_t others = post(kStop, bearer() + "X-Long: \r\n").size();
+    return post(kStop, bearer() + "X-Long: " + std::string(bytes - others, 'x') + "\r\n");
+  };
+  expect_stop(head_of(15 * 1024));
+  RawClient client{clock, api->port()};
+  client.send(head_of(kMaxHeaderBytes + 1024));
+  const std::string answer = client.read_until("bytes");
+  EXPECT_TRUE(answer.starts_with("HTTP/1.1 431 ")) << answer;
+  EXPECT_TRUE(answer.ends_with("the header has more than 16384 bytes")) << answer;
+  EXPECT_EQ(stops(), 1U);
+}
+
 TEST_F(StopFormTest, ActsBeforeTheBodyHasArrived) {
   RawClient client{clock, api->port()};
   expect_stop(client, post(kStop, bearer() + "Content-Length: 10\r\n"));
