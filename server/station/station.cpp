@@ -96,7 +96,8 @@ void Station::publish(const CommandRecord& record) {
   for (StationSink* sink : sinks_) sink->on_command(record);
 }
 
-// An event of the station itself about a robot. Its kind has a row in docs/database.md.
+// An event of the station itself about a robot. Its kind has a row in docs/database.md: tests/check_docs.py compares
+// the table with the literals of the calls.
 void Station::note(const RobotState& robot, std::string kind, std::string detail, std::string cause) {
   RobotEvent event;
   event.robot_id = robot.id;
