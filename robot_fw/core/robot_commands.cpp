@@ -33,6 +33,8 @@ void Robot::on_command(const protocol::Command& command) {
   if (safety_.latched() && !runs_when_latched(command)) {
     return answer(command.command_id, rejected(rheonaut_REJECT_REASON_LATCHED));
   }
+  // SAFETY: what lapsed since the last tick stays lapsed; a new one would begin its lease anew.
+  if (timed_.lease_lapsed(now_us_)) drop_timed_commands(kTimedExpired);
   if (!timed_.hold(command, now_us_)) return answer(command.command_id, rejected(rheonaut_REJECT_REASON_BUSY));
   outbox_.ack(ack_for(command.command_id, kAccepted, command.execute_at_robot_us));
 }

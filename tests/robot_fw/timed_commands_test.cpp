@@ -1,4 +1,5 @@
 // Timed commands keep their order and their content in the room there is for them.
+#include "tests/robot_fw/bare_core.hpp"
 #include "tests/robot_fw/controllers.hpp"
 #include "tests/robot_fw/driven_robot.hpp"
 
@@ -257,6 +258,29 @@ TEST_F(Waiting, ARunningScheduleEndsWithStopAbortModeAndLink) {
   EXPECT_EQ(core().duty(), 0);
   station.attentive = true;
   expect_at_rest();
+}
+
+TEST(WaitingBetweenTicks, WhatLapsedIsNotRevivedByANewOneThatComesBeforeTheTick) {
+  BareCore core;
+  core.renews = false;
+  core.run(2);
+  const auto wait_for = [&core](float duty, std::uint64_t id, std::uint64_t after_us) {
+    protocol::Command command = timed(sim_robot::set_duty(duty), id, core.now_us + after_us);
+    core.order(command);
+    return std::ranges::count(core.acks, rheonaut_COMMAND_RESULT_EXPIRED, &protocol::CommandAck::result);
+  };
+  constexpr std::uint64_t kAfterTickUs = 5'000, kLeaseUs = protocol::kLeaseMs * 1'000;
+  core.now_us += kAfterTickUs;
+  EXPECT_EQ(wait_for(0.5F, 1, kLeaseUs + 100'000), 0);
+  core.now_us -= kAfterTickUs;
+  core.run(protocol::kLeaseMs / 10);  // the last tick that is within the lease
+  core.now_us += kAfterTickUs + 1'000;
+  EXPECT_EQ(wait_for(0.2F, 2, 200'000), 1) << "the first, not the second";
+  core.now_us -= kAfterTickUs + 1'000;
+  core.run(15);
+  EXPECT_EQ(core.robot.duty(), 0) << "the first is due";
+  core.run(8);
+  EXPECT_EQ(core.robot.duty(), 0.2F);
 }
 
 }  // namespace
