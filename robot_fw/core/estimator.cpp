@@ -13,6 +13,7 @@ constexpr int kStuckReadings = 25;            // equal ones in a row: with the n
 constexpr float kStartVelocityM_S = 0.0005F;  // sd
 constexpr float kGainWalk = 0.003F;           // sd of the gain's change in 1 s
 constexpr float kLostM = 10;                  // sd of the position after a restart
+constexpr float kLostM_S = 0.5F;              // of the velocity then; water's model reaches 0.35 m/s
 
 // Of a reading: sd of its age, and of the velocity that repeated and skipped ones cost, relative to a tick's change.
 constexpr float kAgeS = 0.004F;
@@ -351,6 +352,7 @@ void Estimator::guard(bool sound) {
     start();
     if (!std::isfinite(position_m_)) position_m_ = 0;
     covariance_[position][position] = square(kLostM);
+    covariance_[velocity][velocity] = square(kLostM_S);  // SAFETY: it may be moving
     surprises_ = 0;
   }
   position_sd_m_ = std::sqrt(covariance_[position][position] + square(kDoubt * doubtful_m_));

@@ -29,7 +29,8 @@
 //           docs/robot.md, held by estimator_study_test.cpp. In fluids that nobody told it: estimator_fluids_test.cpp.
 // Cost:     544 bytes; in instructions of the chip: docs/robot.md.
 // Errors:   a duty that is not finite counts as 0, a tick of a length outside (0, 0.1] s is passed over; if a state is
-//           not finite nevertheless, or rounding spoils the covariance, it starts anew: position_sd_m 10 m.
+//           not finite nevertheless, or rounding spoils the covariance, it starts anew: position_sd_m 10 m, and any
+//           velocity.
 // Differs from the paper: it names an algorithm that is not known to us; this one takes its place.
 #pragma once
 

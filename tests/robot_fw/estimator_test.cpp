@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 
 #include "control/modal_plant.hpp"
 
@@ -195,6 +196,30 @@ TEST_F(EstimatorTest, IsNeverCertainBecauseTheGainsOfItsModelCancel) {
       }
     }
   }
+}
+
+// SAFETY: who starts anew in motion does not take it for rest, nor the model for one that moves nothing.
+TEST_F(EstimatorTest, FindsItsVelocityWhenItStartsAnewInMotion) {
+  EstimatorParameters parameters{.is_confirmed = true};
+  parameters.model = {{10, -9.9F, -9.9F, 9.9F}, {0.05F, 0.052F, 0.7F, 0.75F}};
+  Estimator driven{parameters};
+  std::array<float, kModelSections> section{};
+  float true_m_s = 0;
+  const auto tick = [&](float duty) {
+    const float before_m_s = std::exchange(true_m_s, 0);
+    for (std::size_t i = 0; i < kModelSections; ++i) {
+      section[i] += (1 - std::exp(-kTickS / parameters.model.time_constant_s[i])) * (duty - section[i]);
+      true_m_s += parameters.model.gain_m_s[i] * section[i];
+    }
+    const float counts = 100 * (true_m_s - before_m_s) / kTickS;
+    driven.step({static_cast<std::int16_t>(std::lround(counts) + noise(random)), true, duty, kTickS});
+  };
+  int ticks = 0;
+  for (; driven.position_sd_m() < 1 && ticks < 6000; ++ticks) tick(ticks / 200 % 2 == 0 ? 0.6F : 0);
+  ASSERT_EQ(driven.velocity_m_s(), 0) << "it has started anew";
+  ASSERT_GT(std::fabs(true_m_s), 0.01F);
+  for (int k = 0; k < 5; ++k) tick(0.6F);
+  EXPECT_NEAR(driven.velocity_m_s(), true_m_s, 0.001F);
 }
 
 TEST_F(EstimatorTest, NeverStartsAnewWithTheModelsOfWaterAndFluid) {
