@@ -38,12 +38,12 @@ bool is_copy_of_state(const fs::path& copy, const std::string& state, std::int64
   }
 }
 
-void check_room(SQLite::Database& database, const fs::path& path, std::int64_t version) {
+void check_room(SQLite::Database& database, const fs::path& path, std::int64_t version, FreeBytes free_bytes_in) {
   const auto pragma = [&](const char* sql) { return database.execAndGet(sql).getInt64(); };
   const auto bytes = static_cast<std::uint64_t>(pragma("PRAGMA page_count") * pragma("PRAGMA page_size"));
   const std::uint64_t needed = bytes + kDiskReserveBytes;  // the rest is for the migration itself
   const fs::path folder = fs::absolute(path).parent_path();
-  const std::uint64_t free_bytes = fs::space(folder).available;
+  const std::uint64_t free_bytes = free_bytes_in(folder);
   if (free_bytes >= needed) return;
   throw std::runtime_error{
       fmt::format("cannot bring {} from schema {} to the present one: a copy of it is kept first, which needs {:.1f} "
@@ -70,7 +70,10 @@ void copy_to(SQLite::Database& database, const fs::path& target) {
 
 }  // namespace
 
-void keep_copy_before_migration(SQLite::Database& database, const fs::path& path, std::int64_t version) {
+std::uint64_t available_bytes(const fs::path& folder) { return fs::space(folder).available; }
+
+void keep_copy_before_migration(SQLite::Database& database, const fs::path& path, std::int64_t version,
+                                FreeBytes free_bytes) {
   const std::string state = state_of(database, version);
   fs::path target = fs::path{path}.concat(fmt::format(".schema-{}", version));
   for (int number = 2; fs::exists(target); ++number) {
@@ -78,7 +81,7 @@ void keep_copy_before_migration(SQLite::Database& database, const fs::path& path
     target = fs::path{path}.concat(fmt::format(".schema-{}.{}", version, number));
   }
   remove_draft(fs::path{target}.concat(".part"));  // of an earlier start that was cut off: its room is needed
-  check_room(database, path, version);
+  check_room(database, path, version, free_bytes);
   spdlog::info("{} has schema {}, which an earlier version wrote: it is copied before it is changed", path.string(),
                version);
   copy_to(database, target);

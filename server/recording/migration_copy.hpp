@@ -13,7 +13,11 @@ namespace server {
 
 // `database` is the open file at `path`. The copy is there whole or not at all, and on disk when this returns; a copy
 // that is there already is never overwritten: one of this very state will do, beside another one it gets a number.
-// Throws std::runtime_error that says how much room there is and is needed, when it is too little.
-void keep_copy_before_migration(SQLite::Database& database, const std::filesystem::path& path, std::int64_t version);
+// Throws std::runtime_error that says how much room there is and is needed, when it is too little. `free_bytes` tells
+// how much room a folder has.
+using FreeBytes = std::uint64_t (*)(const std::filesystem::path& folder);
+std::uint64_t available_bytes(const std::filesystem::path& folder);
+void keep_copy_before_migration(SQLite::Database& database, const std::filesystem::path& path, std::int64_t version,
+                                FreeBytes free_bytes = available_bytes);
 
 }  // namespace server

@@ -116,6 +116,16 @@ TEST_F(MigrationCopyTest, AStartThatWasCutOffLeavesAUsableDatabaseAndOneCopy) {
   EXPECT_FALSE(fs::exists(folder_ / "station.sqlite.schema-6.2"));
 }
 
+TEST_F(MigrationCopyTest, ACopyThatWasCutOffMakesRoomBeforeTheRoomIsLookedAt) {
+  std::ofstream{folder_ / "station.sqlite.schema-6.part"} << "of a start that was cut off while it copied";
+  SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE};
+  const auto full_with_it = [](const fs::path& folder) -> std::uint64_t {
+    return fs::exists(folder / "station.sqlite.schema-6.part") ? 0 : 1'000'000'000'000;
+  };
+  keep_copy_before_migration(database, path_, 6, full_with_it);
+  EXPECT_THAT(files(), ElementsAre("station.sqlite", "station.sqlite.schema-6"));
+}
+
 TEST_F(MigrationCopyTest, ACopyThatIsThereStaysAndTheNextHasANumber) {
   {
     const Database database{path_};
