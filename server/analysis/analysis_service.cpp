@@ -30,10 +30,10 @@ asio::awaitable<Result<std::vector<Point>>> AnalysisService::gather(RunId run, P
   co_return points;
 }
 
-asio::awaitable<std::optional<StoredReference>> AnalysisService::reference_of(RunId run) {
+asio::awaitable<Result<std::optional<StoredReference>>> AnalysisService::reference_of(RunId run) {
   auto find = [run](SQLite::Database& database) { return find_reference(database, run); };
   auto found = co_await history_.reader().ask(std::move(find));
-  if (!found) co_return std::nullopt;
+  if (!found) co_return std::optional<StoredReference>{};
   StoredReference stored{std::move(*found), {}};
   OutsidePositions& all = stored.positions;
   for (std::size_t read = kPositionsPage; read == kPositionsPage;) {
@@ -47,14 +47,16 @@ asio::awaitable<std::optional<StoredReference>> AnalysisService::reference_of(Ru
     all.position_m.insert(all.position_m.end(), page.position_m.begin(), page.position_m.end());
     all.position_sd_m.insert(all.position_sd_m.end(), page.position_sd_m.begin(), page.position_sd_m.end());
   }
+  if (all.size() != stored.reference.samples) co_return std::unexpected{changed_while_read(run)};
   co_return stored;
 }
 
 asio::awaitable<Result<RunMeasures>> AnalysisService::measures(RunId run) {
   auto gathered = co_await gather(run, step_point);
   if (!gathered) co_return std::unexpected{gathered.error()};
-  auto reference = co_await reference_of(run);
-  auto job = [points = std::move(*gathered), reference = std::move(reference)] {
+  auto found = co_await reference_of(run);
+  if (!found) co_return std::unexpected{found.error()};
+  auto job = [points = std::move(*gathered), reference = std::move(*found)] {
     RunMeasures measures;
     measures.steps = measure_steps(points, reference ? &*reference : nullptr);
     if (reference) {

@@ -41,7 +41,8 @@ class AnalysisService {
   }
 
  private:
-  boost::asio::awaitable<std::optional<StoredReference>> reference_of(RunId run);
+  // conflict: it was replaced or removed meanwhile.
+  boost::asio::awaitable<Result<std::optional<StoredReference>>> reference_of(RunId run);
   // Of every sample of the run, what `of` makes of it.
   template <class Point>
   boost::asio::awaitable<Result<std::vector<Point>>> gather(RunId run, Point (*of)(const StoredSample&));

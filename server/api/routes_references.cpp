@@ -187,13 +187,12 @@ Answer list_positions(ApiParts& parts, Request request) {
   if (!after) co_return problem(after.error());
   const auto limit = query_number(request, "limit", 1, kMaxPagePositions, kMaxPagePositions);
   if (!limit) co_return problem(limit.error());
-  const auto found = co_await parts.recording.references.find(*run);
-  if (!found) co_return problem(found.error());
   const auto after_us = *after < 0 ? std::nullopt : std::optional{static_cast<std::uint64_t>(*after)};
-  const auto positions =
-      co_await parts.recording.references.positions(found->id, after_us, static_cast<std::size_t>(*limit));
+  const auto found = co_await parts.recording.references.page(*run, after_us, static_cast<std::size_t>(*limit));
+  if (!found) co_return problem(found.error());
+  const OutsidePositions& positions = found->positions;
   const bool is_full = positions.size() == static_cast<std::size_t>(*limit);
-  co_return json_response(200, {{"span", found->span},
+  co_return json_response(200, {{"span", found->reference.span},
                                 {"robot_time_us", positions.robot_time_us},
                                 {"position_m", positions.position_m},
                                 {"position_sd_m", positions.position_sd_m},

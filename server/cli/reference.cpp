@@ -167,20 +167,12 @@ OutsideReference import_closed(const ReferenceCommand& wish, const ReferenceRequ
   return value_of(store_reference(database.handle(), placed.reference, placed.positions, request.reason, by));
 }
 
-struct Stored {
-  OutsideReference reference;
-  OutsidePositions positions;  // if they are asked for
-};
-
-Stored read_stored(const ReferenceCommand& wish, bool with_positions) {
-  Stored stored;
+StoredReference read_stored(const ReferenceCommand& wish, bool with_positions) {
+  StoredReference stored;
   auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
-    auto found = find_reference(database, wish.run);
+    auto found = read_reference(database, wish.run, {}, with_positions ? kMaxReferenceRows : 0);
     if (!found) return fail(ErrorCode::not_found, fmt::format("run {} has no reference", wish.run));
-    stored = {std::move(*found), {}};
-    if (with_positions) {
-      stored.positions = read_positions(database, stored.reference.id, {}, kMaxReferenceRows);
-    }
+    stored = std::move(*found);
     return {};
   };
   value_of(read_store(wish.data_dir / "station.sqlite", read));
@@ -217,7 +209,7 @@ void remove_one(const ReferenceCommand& wish, std::ostream& out) {
 }
 
 void export_csv(const ReferenceCommand& wish, std::ostream& out) {
-  const Stored stored = read_stored(wish, true);
+  const StoredReference stored = read_stored(wish, true);
   const OutsidePositions& positions = stored.positions;
   fmt::print(out, "# {} of run {}, span {}\nrobot_time_us,position_m,position_sd_m\n", stored.reference.source,
              stored.reference.run, stored.reference.span);

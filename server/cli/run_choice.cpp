@@ -29,12 +29,7 @@ std::vector<StoredSample> read_samples(const RunChoice& choice) {
 std::optional<StoredReference> read_reference(const RunChoice& choice) {
   std::optional<StoredReference> stored;
   auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
-    stored.reset();
-    auto found = find_reference(database, choice.run.value());
-    if (!found) return {};
-    const std::size_t samples = found->samples;
-    const std::int64_t id = found->id;
-    stored = StoredReference{std::move(*found), read_positions(database, id, {}, samples)};
+    stored = server::read_reference(database, choice.run.value());
     return {};
   };
   const auto done = read_store(choice.data_dir / "station.sqlite", read);

@@ -115,6 +115,21 @@ OutsidePositions read_positions(SQLite::Database& database, std::int64_t referen
   return positions;
 }
 
+std::optional<StoredReference> read_reference(SQLite::Database& database, RunId run,
+                                              std::optional<std::uint64_t> after_us, std::size_t limit) {
+  const SQLite::Transaction one_moment{database};
+  auto found = find_reference(database, run);
+  if (!found) return std::nullopt;
+  OutsidePositions positions = read_positions(database, found->id, after_us, limit);
+  return StoredReference{std::move(*found), std::move(positions)};
+}
+
+Error changed_while_read(RunId run) {
+  return {ErrorCode::conflict,
+          fmt::format("the reference of run {} was replaced or removed while it was read; ask again", run),
+          "reference_changed"};
+}
+
 Result<void> check_may_import(SQLite::Database& database, RunId run, const std::string& reason) {
   const std::optional<RunState> state = read_run_state(database, run);
   if (!state) return fail(ErrorCode::not_found, fmt::format("there is no run {}", run));

@@ -11,6 +11,7 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -63,6 +64,12 @@ std::optional<OutsideReference> find_reference(SQLite::Database& database, RunId
 // Its positions after this robot time (none: from the first on), at most `limit`.
 OutsidePositions read_positions(SQLite::Database& database, std::int64_t reference,
                                 std::optional<std::uint64_t> after_us, std::size_t limit);
+// Both, of one moment: positions of one that is replaced or removed meanwhile are all there.
+std::optional<StoredReference> read_reference(SQLite::Database& database, RunId run,
+                                              std::optional<std::uint64_t> after_us = {},
+                                              std::size_t limit = std::numeric_limits<std::int64_t>::max());
+// Of one whose positions were read in pieces, and are fewer than it has.
+Error changed_while_read(RunId run);
 
 // not_found: no such run. conflict: it is open or discarded, or has a reference and no reason is given to replace it.
 Result<void> check_may_import(SQLite::Database& database, RunId run, const std::string& reason);

@@ -40,20 +40,19 @@ asio::awaitable<void> OutsideReferences::open() {
 }
 
 asio::awaitable<Result<OutsideReference>> OutsideReferences::find(RunId run) {
-  auto query = [run](SQLite::Database& database) -> Result<OutsideReference> {
-    if (!read_run_state(database, run)) return fail(ErrorCode::not_found, fmt::format("there is no run {}", run));
-    auto found = find_reference(database, run);
-    if (found) return std::move(*found);
-    return fail(ErrorCode::not_found, fmt::format("run {} has no reference", run), "no_reference");
-  };
-  co_return co_await reader_.ask(std::move(query));
+  const std::optional<std::uint64_t> from_the_first;
+  auto found = co_await page(run, from_the_first, 0);
+  if (!found) co_return std::unexpected{found.error()};
+  co_return std::move(found->reference);
 }
 
-asio::awaitable<OutsidePositions> OutsideReferences::positions(std::int64_t reference,
-                                                               std::optional<std::uint64_t> after_us,
-                                                               std::size_t limit) {
-  auto query = [reference, after_us, limit](SQLite::Database& database) {
-    return read_positions(database, reference, after_us, limit);
+asio::awaitable<Result<StoredReference>> OutsideReferences::page(RunId run, std::optional<std::uint64_t> after_us,
+                                                                 std::size_t limit) {
+  auto query = [run, after_us, limit](SQLite::Database& database) -> Result<StoredReference> {
+    if (!read_run_state(database, run)) return fail(ErrorCode::not_found, fmt::format("there is no run {}", run));
+    auto found = read_reference(database, run, after_us, limit);
+    if (found) return std::move(*found);
+    return fail(ErrorCode::not_found, fmt::format("run {} has no reference", run), "no_reference");
   };
   co_return co_await reader_.ask(std::move(query));
 }

@@ -24,8 +24,9 @@ class OutsideReferences {
 
   // not_found: no such run, or (reason no_reference) none of it.
   boost::asio::awaitable<Result<OutsideReference>> find(RunId run);
-  boost::asio::awaitable<OutsidePositions> positions(std::int64_t reference, std::optional<std::uint64_t> after_us,
-                                                     std::size_t limit);
+  // The same with a page of its positions, of one moment.
+  boost::asio::awaitable<Result<StoredReference>> page(RunId run, std::optional<std::uint64_t> after_us,
+                                                       std::size_t limit);
 
   // Whether an import could begin now: errors as below.
   boost::asio::awaitable<Result<void>> check(RunId run, std::string reason);

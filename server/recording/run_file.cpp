@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <iterator>
+#include <stdexcept>
 
 #include "server/recording/schema.hpp"
 #include "server/recording/statement.hpp"
@@ -129,6 +130,9 @@ constexpr Copy kCopies[] = {
      kReferenceSince},
 };
 
+constexpr std::size_t kReferenceCopies = 3;  // the last ones
+constexpr int kMostReferenceTries = 5;
+
 constexpr const char* kInsert = "INSERT INTO sample VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
 
 std::int64_t signed_seq(std::uint64_t seq) { return static_cast<std::int64_t>(seq); }
@@ -175,7 +179,27 @@ void RunFile::copy_some() {
   }
   piece_after_ = last;
   if (last == 0) ++copied_;
-  if (copied_ == std::size(kCopies)) file_->exec("DETACH store; BEGIN");
+  if (copied_ < std::size(kCopies)) return;
+  if (has_it && !reference_is_whole()) return copy_reference_again();
+  file_->exec("DETACH store; BEGIN");
+}
+
+bool RunFile::reference_is_whole() {
+  return file_
+             ->execAndGet(
+                 "SELECT coalesce((SELECT samples FROM main.outside_reference), 0)"
+                 " = (SELECT count(*) FROM main.outside_position)")
+             .getInt() != 0;
+}
+
+// It was replaced or removed between two pieces.
+void RunFile::copy_reference_again() {
+  if (++reference_tries_ == kMostReferenceTries) {
+    throw std::runtime_error{
+        fmt::format("the reference of run {} lacks positions; remove it, or export again", query_.run)};
+  }
+  file_->exec("DROP TABLE main.outside_position; DROP TABLE main.outside_reference");
+  copied_ = std::size(kCopies) - kReferenceCopies;
 }
 
 void RunFile::add_gaps(SQLite::Database& database) {

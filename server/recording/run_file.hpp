@@ -37,6 +37,8 @@ class RunFile {
  private:
   void begin();
   void copy_some();
+  bool reference_is_whole();
+  void copy_reference_again();
   void add_gaps(SQLite::Database& database);
   bool add_samples(SQLite::Database& database);
   void add(const ExportSegment& segment);
@@ -47,7 +49,8 @@ class RunFile {
   ExportQuery query_;
   std::unique_ptr<SQLite::Database> file_;
   std::unique_ptr<SQLite::Statement> insert_;
-  std::size_t copied_ = 0;        // tables
+  std::size_t copied_ = 0;  // tables
+  int reference_tries_ = 0;
   std::int64_t piece_after_ = 0;  // of the table that is copied: where the next piece begins
   std::optional<SampleCursor> gaps_after_;
   std::optional<SampleCursor> after_;

@@ -145,6 +145,21 @@ TEST_F(ReferenceRoutesTest, WhatIsMalformedIsRefusedByName) {
   EXPECT_EQ(ask("GET", kPath).status, 404);
 }
 
+// Positions are read in pieces, and those of a reference that is removed are deleted in pieces.
+TEST_F(ReferenceRoutesTest, StepsAreNotMeasuredByAReferenceThatIsNoLongerWhole) {
+  record();
+  ASSERT_EQ(import(body()).status, 201);
+  ASSERT_EQ(ask("GET", "/api/v1/runs/1/step-metrics").status, 200);
+  {
+    SQLite::Database database{(folder.path() / "station.sqlite").string(), SQLite::OPEN_READWRITE};
+    database.exec(
+        "DELETE FROM outside_position WHERE robot_time_us < (SELECT avg(robot_time_us) FROM outside_position)");
+  }
+  const Answered answer = ask("GET", "/api/v1/runs/1/step-metrics");
+  EXPECT_EQ(answer.status, 409);
+  EXPECT_EQ(answer.parsed()["reason"], "reference_changed");
+}
+
 // Whoever may import sends up to 16 MB here; anybody else, and every other route, keeps to 64 kB.
 TEST_F(ReferenceRoutesTest, OnlyThisRouteTakesALongBody) {
   record();

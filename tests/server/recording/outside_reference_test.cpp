@@ -2,7 +2,10 @@
 #include "server/recording/outside_reference.hpp"
 
 #include <gmock/gmock.h>
+#include <sqlite3.h>
 
+#include "server/recording/run_file.hpp"
+#include "server/recording/run_reader.hpp"
 #include "server/recording/store_check.hpp"
 #include "tests/server/recording/retention_fixture.hpp"
 
@@ -43,7 +46,9 @@ class OutsideReferenceTest : public RetentionTest {
   }
   Result<OutsideReference> import(const OutsideReference& reference, std::size_t count,
                                   const std::string& reason = "") {
-    return wait(recording_->references.import(reference, positions(count), reason, {"token:ana", "", 8}));
+    OutsideReference counted = reference;
+    counted.samples = count;
+    return wait(recording_->references.import(std::move(counted), positions(count), reason, {"token:ana", "", 8}));
   }
   std::vector<std::string> faults() {
     SQLite::Database database = open_for_reading(path_);
@@ -59,7 +64,7 @@ TEST_F(OutsideReferenceTest, IsThereAsAWholeAndInOrder) {
   EXPECT_EQ(made->clock, ReferenceClock::correlation);
   EXPECT_EQ(made->clock_sd_s, 0.002);
   EXPECT_EQ(made->motion_ratio, std::nullopt);
-  const OutsidePositions read = wait(recording_->references.positions(made->id, {}, count + 1));
+  const OutsidePositions read = wait(recording_->references.page(run, {}, count + 1))->positions;
   ASSERT_EQ(read.size(), count);
   EXPECT_EQ(read.robot_time_us.back(), 1000 * (count - 1));
   EXPECT_THAT(faults(), IsEmpty());
@@ -74,6 +79,64 @@ TEST_F(OutsideReferenceTest, ReplacingDeletesThePositionsOfTheOneBeforeAndKeepsI
   EXPECT_EQ(number("SELECT count(*) FROM outside_position"), 3);
   EXPECT_EQ(rows("SELECT source, removed_by, removed_reason FROM outside_reference ORDER BY reference_id"),
             (Rows{"camera.csv|token:ana|a better camera", "second.csv||"}));
+}
+
+// Another connection removes it while a reading one has come so far, by each count of SQLite's steps.
+TEST_F(OutsideReferenceTest, WhatIsReadWhileItIsRemovedIsWholeOrNothing) {
+  const RunId run = make_run();
+  ASSERT_TRUE(import(reference_of(run), 30));
+  SQLite::Database reader = open_for_reading(path_), writer{path_.string(), SQLite::OPEN_READWRITE};
+  struct Removal {
+    SQLite::Database& database;
+    int steps_left;
+    void remove(bool is_removed) {
+      database.exec(is_removed
+                        ? "BEGIN; UPDATE outside_reference SET removed_at_us = 9; CREATE TEMP TABLE kept AS SELECT"
+                          " * FROM outside_position; DELETE FROM outside_position; COMMIT"
+                        : "BEGIN; UPDATE outside_reference SET removed_at_us = NULL; INSERT INTO outside_position"
+                          " SELECT * FROM kept; DROP TABLE kept; COMMIT");
+    }
+    static int on_step(void* self) {
+      Removal& removal = *static_cast<Removal*>(self);
+      if (--removal.steps_left == 0) removal.remove(true);
+      return 0;
+    }
+  };
+  int found = 0, not_found = 0;
+  for (int steps = 1; not_found + found < 1000; ++steps) {
+    Removal removal{writer, steps};
+    sqlite3_progress_handler(reader.getHandle(), 1, Removal::on_step, &removal);
+    const auto read = read_reference(reader, run);
+    sqlite3_progress_handler(reader.getHandle(), 0, nullptr, nullptr);
+    ++(read ? found : not_found);
+    if (read) ASSERT_EQ(read->positions.size(), 30U) << "removed after " << steps << " steps";
+    if (removal.steps_left > 0) break;  // it was read before that
+    removal.remove(false);
+  }
+  EXPECT_GT(found, 30);
+  EXPECT_GT(not_found, 0);
+}
+
+TEST_F(OutsideReferenceTest, AnExportDuringWhichItIsReplacedHasOneOfTheTwo) {
+  const RunId run = make_run();
+  ASSERT_TRUE(import(reference_of(run), 12'000));  // three pieces
+  SQLite::Database database = open_for_reading(path_);
+  const auto file = folder_ / "run.sqlite";
+  RunFile writer{file,
+                 reading_uri(path_, false),
+                 read_spans(database, run, 0),
+                 {.run = run, .channels = all_channels(), .grid_us = {}}};
+  const auto copied = [&file](const char* sql) {
+    SQLite::Database made{file.string(), SQLite::OPEN_READONLY};
+    return made.tableExists("outside_position") ? made.execAndGet(sql).getInt64() : 0;
+  };
+  do {
+    ASSERT_TRUE(writer.advance(database));
+  } while (copied("SELECT count(*) FROM outside_position") == 0);
+  ASSERT_TRUE(import(reference_of(run, "second.csv"), 70, "a better camera"));
+  while (writer.advance(database)) continue;
+  EXPECT_EQ(copied("SELECT count(*) FROM outside_position"), 70);
+  EXPECT_EQ(copied("SELECT samples FROM outside_reference WHERE source = 'second.csv'"), 70);
 }
 
 TEST_F(OutsideReferenceTest, GoesWithItsRun) {
