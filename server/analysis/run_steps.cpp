@@ -50,6 +50,41 @@ void compare(const StepPoint& before, const StepPoint& after, std::uint64_t at_u
 
 bool usable(const StepPoint& point) { return point.steered && std::isfinite(point.position_m); }
 
+struct PositionAt {
+  double position_m = 0, sd_m = 0;
+};
+
+// Where a line through the positions from `first` to before `last`, weighed by their sds, passes at this time. Its sd
+// grows by what the positions scatter more about the line than they are said to.
+PositionAt on_line(const OutsidePositions& outside, std::size_t first, std::size_t last, std::uint64_t at_us) {
+  const auto after_s = [&](std::size_t i) {
+    return (static_cast<double>(outside.robot_time_us[i]) - static_cast<double>(at_us)) * 1e-6;
+  };
+  const auto weight = [&](std::size_t i) { return 1 / (outside.position_sd_m[i] * outside.position_sd_m[i]); };
+  double weights = 0, mean_s = 0, mean_m = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    weights += weight(i);
+    mean_s += weight(i) * after_s(i);
+    mean_m += weight(i) * outside.position_m[i];
+  }
+  mean_s /= weights, mean_m /= weights;
+  double spread_s2 = 0, slope_m_s = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    spread_s2 += weight(i) * (after_s(i) - mean_s) * (after_s(i) - mean_s);
+    slope_m_s += weight(i) * (after_s(i) - mean_s) * (outside.position_m[i] - mean_m);
+  }
+  if (last - first < 2) return {mean_m, std::sqrt(1 / weights)};
+  slope_m_s /= spread_s2;
+  double chi_square = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    const double residual_m = outside.position_m[i] - mean_m - slope_m_s * (after_s(i) - mean_s);
+    chi_square += weight(i) * residual_m * residual_m;
+  }
+  const double freedom = std::max(1.0, static_cast<double>(last - first) - 2);
+  const double variance_m2 = (1 / weights + mean_s * mean_s / spread_s2) * std::max(1.0, chi_square / freedom);
+  return {mean_m - slope_m_s * mean_s, std::sqrt(variance_m2)};
+}
+
 // Why a step begins with `point`, given the point before it.
 std::optional<StepCause> step_at(const StepPoint& before, const StepPoint& point) {
   const bool continues = usable(before) && before.span == point.span && before.robot_time_us < point.robot_time_us;
@@ -148,7 +183,7 @@ class Cutter {
       time_s.push_back(static_cast<double>(at_us - span_began_us_) * 1e-6);
       position_m.push_back(outside.position_m[i] + disturbance_m);
       squares_m2 += outside.position_sd_m[i] * outside.position_sd_m[i];
-      sd_m = std::max(sd_m, std::hypot(outside.position_sd_m[i], reference_->reference.zero_sd_m.value_or(0)));
+      sd_m = std::max(sd_m, outside.position_sd_m[i]);
       while (after < points_of_step_.size() && points_of_step_[after].robot_time_us < at_us) ++after;
       if (after == points_of_step_.size()) continue;
       compare(points_of_step_[after - 1], points_of_step_[after], at_us, outside.position_m[i],
@@ -156,7 +191,8 @@ class Cutter {
     }
     control::StepExperiment experiment;
     experiment.step_at_s = time_s.front();
-    experiment.start_m = start_from_outside(from) + disturbance_m;
+    const PositionAt start = start_from_outside(from);
+    experiment.start_m = start.position_m + disturbance_m;
     experiment.target_m = step_.target_m;
     experiment.band_m = step_.band_m;
     experiment.noise_sd_m = std::sqrt(squares_m2 / static_cast<double>(to - from));
@@ -166,23 +202,21 @@ class Cutter {
     if (step_.metrics.settling_s) *step_.metrics.settling_s += late_s;
     step_.metrics.peak_time_s += late_s;
     step_.start_m = experiment.start_m;
-    step_.position_sd_m = sd_m;
+    step_.position_sd_m = std::hypot(std::max(sd_m, start.sd_m), reference_->reference.zero_sd_m.value_or(0));
     step_.is_from_outside = true;
     step_.estimate_error = comparison.end();
   }
 
-  // Where the robot was when the step began: the mean of a few positions before it, in which noise is less, if it rests
-  // there; else the first one after it.
-  double start_from_outside(std::size_t from) const {
+  // Where the robot was when the step began, also in motion: on the line through the positions shortly before it, and
+  // the first one after it where those are too few.
+  PositionAt start_from_outside(std::size_t from) const {
     const OutsidePositions& outside = reference_->positions;
     const std::uint64_t begin_us = points_of_step_.front().robot_time_us;
-    constexpr std::uint64_t kRestUs = 200'000;
-    double sum_m = 0;
-    std::size_t count = 0;
-    for (std::size_t i = from; i > 0 && outside.robot_time_us[i - 1] + kRestUs >= begin_us; --i, ++count) {
-      sum_m += outside.position_m[i - 1];
-    }
-    return count == 0 ? outside.position_m[from] : sum_m / static_cast<double>(count);
+    constexpr std::uint64_t kShortlyUs = 200'000;
+    constexpr std::size_t kFewestOfLine = 3;
+    std::size_t first = from;
+    while (first > 0 && outside.robot_time_us[first - 1] + kShortlyUs >= begin_us) --first;
+    return on_line(outside, first, from - first < kFewestOfLine ? from + 1 : from, begin_us);
   }
 
   const StoredReference* reference_;

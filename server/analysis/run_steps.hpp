@@ -4,8 +4,9 @@
 // auto mode, or with the recording's span. It starts from the position of its first sample. The settling band is ±2 %
 // of the latest change of setpoint, for disturbances too (as the paper's table reads).
 // Where the position was measured from outside throughout a step, the step is measured by that (with the disturbance,
-// which the robot's controller sees on top of it), and the robot's own position is compared with it.
-// Pure and slow for long runs: call it on a worker.
+// which the robot's controller sees on top of it), and the robot's own position is compared with it. It then starts
+// from where a line through the outside positions of the 200 ms before it passes at its first sample. Pure and slow for
+// long runs: call it on a worker.
 #pragma once
 
 #include <cstdint>
@@ -49,7 +50,8 @@ struct MeasuredStep {
   double start_m = 0;
   double target_m = 0;
   double band_m = 0;
-  double position_sd_m = 0;      // the largest in the step: every position in `metrics` is uncertain by ± 2 of it
+  double position_sd_m = 0;  // the largest in the step, start_m's and the zero's counted: every position in `metrics`
+                             // is uncertain by ± 2 of it
   bool is_from_outside = false;  // positions, metrics and position_sd_m are those of the outside reference
   std::optional<EstimateError> estimate_error;  // then
   control::StepMetrics metrics;

@@ -155,6 +155,55 @@ TEST_F(StepsFromOutside, SettlingIsTheTruePositionsOwn) {
   EXPECT_NEAR(steps[0].metrics.steady_state_error_m, 0, 1e-4);
 }
 
+TEST_F(StepsFromOutside, AStepThatBeginsInMotionStartsWhereTheRobotIsThen) {
+  points.clear();
+  next_seq = 0;
+  constexpr double kVelocityM_S = 0.1, kStepAtS = 3.005;  // between two positions of the camera
+  const auto true_m = [=](double at_s) {
+    const double after_s = std::max(0.0, at_s - kStepAtS);
+    return -0.2 + kVelocityM_S * std::min(at_s, kStepAtS) + 0.1 * (1 - std::exp(-after_s / 0.3));
+  };
+  for (int k = 0; k < 1000; ++k) {
+    const double at_s = 0.01 * k;
+    points.push_back({0, next_seq++, 7'000'000 + static_cast<std::uint64_t>(k) * 10'000,
+                      static_cast<float>(true_m(at_s)), 0, at_s < kStepAtS ? 0.3F : 0.2005F, true, position_sd_m});
+  }
+  reference.positions = {};
+  for (double at_s = 0.004; at_s < 9.9; at_s += 1.0 / 30) {
+    reference.positions.robot_time_us.push_back(7'000'000 + static_cast<std::uint64_t>(1e6 * at_s));
+    reference.positions.position_m.push_back(true_m(at_s));
+    reference.positions.position_sd_m.push_back(0.0002);
+  }
+  const auto steps = measure_steps(points, &reference);
+  ASSERT_EQ(steps.size(), 2U);
+  ASSERT_TRUE(steps[1].is_from_outside);
+  EXPECT_NEAR(steps[1].start_m, true_m(3.01), 0.002) << "the mean of the 200 ms before is 10 mm behind";
+  EXPECT_NEAR(steps[1].position_sd_m, 0.0002, 0.0001);
+  auto& times = reference.positions.robot_time_us;
+  std::size_t kept = 0;  // a slower camera: 5 positions a second
+  for (std::size_t i = 2; i < times.size(); i += 6, ++kept) {
+    times[kept] = times[i];
+    reference.positions.position_m[kept] = reference.positions.position_m[i];
+  }
+  times.resize(kept);
+  reference.positions.position_m.resize(kept);
+  reference.positions.position_sd_m.resize(kept);
+  EXPECT_NEAR(measure_steps(points, &reference)[1].start_m, true_m(3.01), 0.01);
+}
+
+TEST_F(StepsFromOutside, AStartAmongPositionsThatScatterIsAsUncertainAsThey) {
+  for (std::size_t i = 0; i < reference.positions.size(); i += 2) reference.positions.position_m[i] += 0.004;
+  const auto steps = measure_steps(points, &reference);
+  EXPECT_GT(steps[0].position_sd_m, 0.001) << "said to be exact to 0.2 mm";
+}
+
+TEST_F(StepsFromOutside, TheUncertaintyOfTheZeroCounts) {
+  reference.reference.zero_sd_m = 0.0015;
+  for (const MeasuredStep& step : measure_steps(points, &reference)) {
+    EXPECT_NEAR(step.position_sd_m, std::hypot(0.0002, 0.0015), 1e-9);
+  }
+}
+
 TEST_F(StepsFromOutside, AStepThatWasNotSeenThroughoutStaysAnEstimate) {
   watch(7'000'000 + 500 * 10'000, 7'000'000 + 2100 * 10'000);
   auto steps = measure_steps(points, &reference);
