@@ -39,6 +39,18 @@ std::size_t line_of_row(std::string_view text, std::size_t row) {
 }
 
 constexpr double kLeastRatio = 0.2, kMostRatio = 5;  // of both motions; a robot with a wrong model is off by two
+// Without a clock by correlation a robot may have missed much of its motion, but not all but a 30th of over 2 m.
+constexpr double kMostSpanRatio = 30, kSuspiciousSpanM = 2, kLeastOwnSpanM = 0.001;
+constexpr double kOutlierShare = 0.01;  // of the positions, at each end, that a span leaves out
+constexpr double kMillimetreRatio = 300;
+
+// What to do about positions that move so many times what the robot's own record does.
+std::string unit_advice(double ratio) {
+  if (ratio < kMostSpanRatio) return "are its positions in metres?";
+  const bool is_mm = ratio >= kMillimetreRatio;
+  return fmt::format("they look like {}; give metres: divide position_m (and position_sd_m, if it has one) by {}",
+                     is_mm ? "millimetres" : "centimetres", is_mm ? 1000 : 100);
+}
 
 std::optional<std::string> fault_of_row(const Given& given, std::size_t row) {
   const double time_s = given.time_s[row], position_m = given.position_m[row], sd_m = given.sd_m[row];
@@ -192,8 +204,8 @@ Result<void> find_clock(const ReferenceClockRequest& asked, const Given& given, 
   }
   if (found.motion_ratio < kLeastRatio || found.motion_ratio > kMostRatio) {
     return fail(ErrorCode::invalid,
-                fmt::format("it moves {:.4g} times what the robot's own record does: are its positions in metres?",
-                            found.motion_ratio),
+                fmt::format("it moves {:.4g} times what the robot's own record does: {}", found.motion_ratio,
+                            unit_advice(found.motion_ratio)),
                 "out_of_range");
   }
   into.clock_offset_s = found.offset_s;
@@ -217,23 +229,58 @@ Given rows_in_span(const Given& given, const OwnRecord& own, double offset_s) {
   return inside;
 }
 
+struct OwnAt {
+  double position_m = 0, sd_m = 0;
+};
+
+// Between two samples; none beyond the record, in a gap, or where the robot does not know.
+std::optional<OwnAt> own_at(const OwnRecord& own, double time_s) {
+  const auto after = std::ranges::lower_bound(own.time_s, time_s);
+  if (after == own.time_s.end()) return std::nullopt;
+  const auto k = static_cast<std::size_t>(after - own.time_s.begin());
+  const std::size_t before = k == 0 ? 0 : k - 1;
+  const double step_s = own.time_s[k] - own.time_s[before];
+  if (step_s > kLongestGapS || !std::isfinite(own.sd_m[k])) return std::nullopt;
+  const double share = step_s > 0 ? (time_s - own.time_s[before]) / step_s : 1;
+  return OwnAt{std::lerp(own.position_m[before], own.position_m[k], share), own.sd_m[k]};
+}
+
+double span_of(std::vector<double> positions_m) {
+  std::ranges::sort(positions_m);
+  const auto left_out = static_cast<std::size_t>(kOutlierShare * static_cast<double>(positions_m.size()));
+  return positions_m[positions_m.size() - 1 - left_out] - positions_m[left_out];
+}
+
+// Positions that cannot be in metres, whatever the clock came from.
+Result<void> check_unit(const Given& inside, const OwnRecord& own) {
+  std::vector<double> outside_m, own_m;
+  for (std::size_t row = 0; row < inside.time_s.size(); ++row) {
+    const auto at = own_at(own, inside.time_s[row]);
+    if (!at) continue;
+    outside_m.push_back(inside.position_m[row]);
+    own_m.push_back(at->position_m);
+  }
+  if (outside_m.size() < kFewestPositions) return {};
+  const double outside_span_m = span_of(std::move(outside_m)), own_span_m = span_of(std::move(own_m));
+  const double ratio = outside_span_m / own_span_m;
+  if (outside_span_m < kSuspiciousSpanM || own_span_m < kLeastOwnSpanM || ratio < kMostSpanRatio) return {};
+  return fail(ErrorCode::invalid,
+              fmt::format("its positions range over {:.4g} m, those of the robot's own record over {:.4g} m: {}",
+                          outside_span_m, own_span_m, unit_advice(ratio)),
+              "out_of_range");
+}
+
 // The mean of own less outside position, weighed by how sure the robot is; none where the two have no time in common.
 Result<void> find_zero(const Given& inside, const OwnRecord& own, OutsideReference& into) {
   double sum_m = 0, weights = 0, surest_m = std::numeric_limits<double>::infinity(), outside_variance_m2 = 0;
   std::size_t used = 0;
   for (std::size_t row = 0; row < inside.time_s.size(); ++row) {
-    const auto after = std::ranges::lower_bound(own.time_s, inside.time_s[row]);
-    if (after == own.time_s.end()) continue;
-    const auto k = static_cast<std::size_t>(after - own.time_s.begin());
-    const std::size_t before = k == 0 ? 0 : k - 1;
-    const double step_s = own.time_s[k] - own.time_s[before];
-    if (step_s > kLongestGapS || !std::isfinite(own.sd_m[k])) continue;
-    const double share = step_s > 0 ? (inside.time_s[row] - own.time_s[before]) / step_s : 1;
-    const double own_m = std::lerp(own.position_m[before], own.position_m[k], share);
-    const double own_sd_m = std::max(own.sd_m[k], kLeastOwnSdM), weight = 1 / (own_sd_m * own_sd_m);
-    sum_m += weight * (own_m - inside.position_m[row]);
+    const auto at = own_at(own, inside.time_s[row]);
+    if (!at) continue;
+    const double own_sd_m = std::max(at->sd_m, kLeastOwnSdM), weight = 1 / (own_sd_m * own_sd_m);
+    sum_m += weight * (at->position_m - inside.position_m[row]);
     weights += weight;
-    surest_m = std::min(surest_m, own.sd_m[k]);
+    surest_m = std::min(surest_m, at->sd_m);
     outside_variance_m2 += inside.sd_m[row] * inside.sd_m[row];
     ++used;
   }
@@ -298,6 +345,7 @@ Result<PlacedReference> place_reference(const ReferenceRequest& request, std::sp
                     made.clock_offset_s, kFewestPositions),
         "not_in_run");
   }
+  if (const auto metres = check_unit(inside, *own); !metres) return std::unexpected{metres.error()};
   made.zero_is_kept = request.keeps_zero;
   if (!request.keeps_zero) {
     if (const auto found = find_zero(inside, *own, made); !found) return std::unexpected{found.error()};

@@ -62,7 +62,7 @@ struct PlacedReference {
 };
 
 // `marker` belongs to the method of that name. invalid: what cannot be used, with the line of the text, or why the
-// clock cannot be found and what to do.
+// clock cannot be found and what to do, or that positions over 2 m are not in metres by the robot's own record.
 Result<PlacedReference> place_reference(const ReferenceRequest& request, std::span<const OwnPosition> own,
                                         std::optional<MarkerPlace> marker);
 

@@ -79,13 +79,36 @@ TEST_F(ReferenceImportTest, ASpanInWhichTheRobotWasZeroedIsRefused) {
   EXPECT_THAT(refusal().detail, HasSubstr("15.00 s"));
 }
 
-TEST_F(ReferenceImportTest, PositionsInMillimetresAreRefusedByTheMotion) {
-  request.clock.method = ReferenceClock::correlation;
-  request.csv = "t_s,position_m\n";
-  for (double at_s = 0.1; at_s < 29.9; at_s += 1.0 / 30) {
-    request.csv += fmt::format("{:.6f},{:.6f}\n", at_s, 1000 * truth_m(at_s));
+TEST_F(ReferenceImportTest, MillimetresAndCentimetresAreRefusedWhateverTheClockComesFrom) {
+  const auto see_scaled = [this](double scale) {
+    request.csv = "t_s,position_m\n";
+    for (double at_s = 0.1; at_s < 29.9; at_s += 1.0 / 30) {
+      request.csv += fmt::format("{:.6f},{:.6f}\n", at_s, scale * truth_m(at_s));
+    }
+  };
+  request.clock.zero_at_us = 1'767'225'600'000'000;
+  marker = MarkerPlace{0, 5'000'000};
+  for (const auto method :
+       {ReferenceClock::offset, ReferenceClock::utc, ReferenceClock::marker, ReferenceClock::correlation}) {
+    request.clock.method = method;
+    for (const bool keeps_zero : {false, true}) {
+      request.keeps_zero = keeps_zero;
+      see_scaled(1);
+      EXPECT_EQ(refusal().detail, "") << text(method);
+      see_scaled(1000);
+      EXPECT_EQ(refusal().reason, "out_of_range") << text(method);
+      EXPECT_THAT(refusal().detail, HasSubstr("millimetres; give metres: divide position_m")) << text(method);
+      see_scaled(100);
+      EXPECT_THAT(refusal().detail, HasSubstr("centimetres")) << text(method);
+    }
   }
-  EXPECT_THAT(refusal().detail, HasSubstr("metres"));
+}
+
+// What carries the robot along unseen makes no other unit.
+TEST_F(ReferenceImportTest, ARobotThatMissedMostOfItsMotionHasAReferenceAllTheSame) {
+  see(0, 0);
+  for (OwnPosition& sample : own) sample.position_m *= 0.02F;
+  EXPECT_EQ(refusal().detail, "");
 }
 
 TEST_F(ReferenceImportTest, ANameOfSeveralLinesIsRefused) {
