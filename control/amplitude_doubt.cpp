@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 #include "control/residual_doubts.hpp"
 
@@ -79,7 +80,11 @@ std::vector<MatrixXd> other_models(OutputErrorSearch& search, const Recording& r
     if (!path->has_own_clock()) all.push_back(ages(all[0], search.free_parameters(Structure::fractional), window));
   } else {
     all.push_back(stacked(search.late_outputs(delays(samples), point), sd));
-    all.push_back(motions(all[0].rows() / std::ssize(sd), std::ssize(sd)));
+    MatrixXd moved = motions(all[0].rows() / std::ssize(sd), std::ssize(sd));
+    if (const PositionTimes* times = search.position_times()) {
+      for (Index j = 0; j < moved.cols(); ++j) moved.col(j) = times->weighed(moved.col(j));
+    }
+    all.push_back(std::move(moved));
   }
   return all;
 }

@@ -96,6 +96,17 @@ void check_own_times(const Recording& recording) {
   }
 }
 
+void check_own_sds(const Recording& recording) {
+  const std::vector<double>& sd_m = recording.position_sd_m;
+  if (sd_m.size() != recording.position_time_s.size()) {
+    refuse("position_sd_m has ", sd_m.size(), " values, position_time_s has ", recording.position_time_s.size(),
+           ": give one per time, or none");
+  }
+  for (std::size_t k = 0; k < sd_m.size(); ++k) {
+    if (!(sd_m[k] > 0 && std::isfinite(sd_m[k]))) refuse("position_sd_m[", k, "] is ", sd_m[k], ", not positive");
+  }
+}
+
 void check(const Recording& recording) {
   const std::size_t samples = recording.duty.size();
   if (!(recording.dt_s > 0)) refuse("dt_s must be positive, is ", recording.dt_s);
@@ -114,6 +125,7 @@ void check(const Recording& recording) {
   }
   check_duty(recording.duty);
   if (!recording.position_time_s.empty()) check_own_times(recording);
+  if (!recording.position_sd_m.empty()) check_own_sds(recording);
   const std::size_t positions = recording.position_time_s.empty() ? samples : recording.position_time_s.size();
   check_output("position_m", recording.position_m, positions);
   check_output("velocity_m_s", recording.velocity_m_s, samples);

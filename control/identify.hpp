@@ -14,7 +14,8 @@
 //
 // A position that was measured from outside has times of its own (position_time_s), and its clock may be off: then y of
 // (1) is the model's position at those times plus a shift, which is a further unknown. Nothing that was measured is
-// resampled, so sigmas count what was measured (position_times.hpp).
+// resampled, so sigmas count what was measured (position_times.hpp). Where its positions are not all as exact, each
+// residual of (2) and (3) is divided by its own sd, relative to the others'; how large they are is found all the same.
 //
 // Structures: fractional (20); second_order, (19) with α = 2, β = 1; first_order, b1 = 0, β = 1. One is chosen by AIC.
 // The search starts from the Newtonian model (28), as the paper does, and from further points against local minima.
@@ -51,6 +52,7 @@ struct Recording {
   // Of a position that was measured alone and not at the samples: seconds since the first sample, ascending, within the
   // record. Empty: position_m has one value per sample.
   std::vector<double> position_time_s = {};
+  std::vector<double> position_sd_m = {};  // of each of them; empty: all alike
 };
 
 // From columns with times, which must be equally spaced within 1 % of a step.
@@ -121,9 +123,11 @@ struct Fit {
   SearchEnd end = SearchEnd::converged;
   // iterations: of the best start; starts: made, 0 if the structure was never searched; agree: with the best cost
   int iterations = 0, starts = 0, starts_that_agree = 0;
-  std::vector<double> position_residual_m, velocity_residual_m_s;  // measured less model, empty if not recorded
-  std::vector<double> acceleration_residual_m_s2;                  // less the bias too; 0 for readings left out
-  std::optional<SensorFit> sensor;                                 // of a fit of the acceleration
+  // Measured less model, empty if not recorded. Of positions with sds of their own: weighed by (1) of
+  // position_weight.hpp, as in sse and what follows from it.
+  std::vector<double> position_residual_m, velocity_residual_m_s;
+  std::vector<double> acceleration_residual_m_s2;  // less the bias too; 0 for readings left out
+  std::optional<SensorFit> sensor;                 // of a fit of the acceleration
 };
 
 // Of parameters that change with amplitude: amplitude_doubt.hpp.

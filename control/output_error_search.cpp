@@ -92,7 +92,9 @@ OutputErrorSearch::OutputErrorSearch(const Recording& recording, const Identific
                          measured, scale_of(measured), Eigen::VectorXd::Ones(rows_)});
     if (channel == Channel::position) offset_scale_m_ = measured_.back().sd;
     if (!recording.position_time_s.empty()) {
-      measured_.back().times = std::make_unique<PositionTimes>(recording.position_time_s, dt_s_);
+      measured_.back().times =
+          std::make_unique<PositionTimes>(recording.position_time_s, dt_s_, recording.position_sd_m);
+      measured_.back().measured = measured_.back().times->weighed(measured);
     }
   };
   add(Channel::position, recording.position_m);
@@ -141,9 +143,8 @@ std::vector<Eigen::VectorXd> OutputErrorSearch::residuals(const SearchPoint& poi
       continue;
     }
     measured.model.set_delay(point.model.dead_time_s, stop_);
-    const double offset_m = measured.channel == Channel::position ? point.offset_m : 0;
     const Eigen::VectorXd output = seen(measured, point, measured.model.output(point.model));
-    result.emplace_back((measured.measured - output).array() - offset_m);
+    result.emplace_back(measured.measured - output - point.offset_m * seen_offset(measured));
   }
   return result;
 }
@@ -160,11 +161,12 @@ std::vector<Eigen::MatrixXd> OutputErrorSearch::jacobians(Structure structure, c
     for (Index j = 0; j < slopes.cols(); ++j) {
       const int parameter = free[static_cast<std::size_t>(j)];
       if (parameter == kOffset) {
-        slopes.col(j).setConstant(measured.channel == Channel::position ? 1 : 0);
+        slopes.col(j) = seen_offset(measured);
       } else if (parameter == kDeadTime) {
         slopes.col(j) = -seen(measured, point, measured.model.slope(point.model, stop_));
       } else if (parameter == kPositionClock) {
-        slopes.col(j) = measured.times->slope(measured.model.output(point.model), point.position_clock_s);
+        const Eigen::VectorXd output = measured.model.output(point.model);
+        slopes.col(j) = measured.times->weighed(measured.times->slope(output, point.position_clock_s));
       } else if (parameter >= kSensorTime) {
         slopes.col(j) = measured.path->weighed(of_sensor.col(parameter - kSensorTime));
       } else {
@@ -180,8 +182,13 @@ double OutputErrorSearch::earliest_sample_s() const { return -options_.longest_d
 
 Eigen::VectorXd OutputErrorSearch::seen(const Measured& measured, const SearchPoint& point,
                                         const Eigen::VectorXd& output) const {
-  if (measured.times) return measured.times->read(output, point.position_clock_s);
+  if (measured.times) return measured.times->weighed(measured.times->read(output, point.position_clock_s));
   return measured.path ? measured.path->weighed(measured.path->sampled(output, point.sensor)) : output;
+}
+
+Eigen::VectorXd OutputErrorSearch::seen_offset(const Measured& measured) const {
+  const Eigen::VectorXd offset = Eigen::VectorXd::Constant(rows_, measured.channel == Channel::position ? 1 : 0);
+  return measured.times ? measured.times->weighed(offset) : offset;
 }
 
 Eigen::VectorXd OutputErrorSearch::coordinates(Structure structure, const SearchPoint& point) const {

@@ -3,7 +3,8 @@
 //   minimise Σ_channels Σ_k (y_k - output_k(q) - offset)²/σ²_channel            (1)   σ: re-estimated, for two channels
 //   minimise Σ_channels Σ_k |y_k - output_k(q) - offset|/σ_channel              (2)   reweighted least squares on (1)
 //   of the acceleration: y - output as a SensorPath reads it, its bias taken off                 (4)
-//   of a position with times of its own: y - output at these times plus a shift - offset           (5)
+//   of a position with times of its own: y - output at these times plus a shift - offset           (5)   weighed by
+//   (1) of position_weight.hpp
 //   q = ln kp, ln b1, ln b2, ln((α - 1)/(2 - α)), ln(β/(1 - β)), offset, ln(τ/(longest - τ))         (3)   unbounded
 //
 // Eigen's Levenberg-Marquardt (MINPACK's lmder) with the exact Jacobian. Every start's gain is the best for its other
@@ -65,6 +66,7 @@ class OutputErrorSearch {
   double sensor_lag_s(const SearchPoint& point) const;            // dead time and all, its sampling aside
   bool finds_dead_time() const { return options_.longest_dead_time_s > 0; }
   const SensorPath* sensor() const { return measured_.front().path.get(); }
+  const PositionTimes* position_times() const { return measured_.front().times.get(); }
 
   SearchPoint start(Structure structure, int index) const;
   // The best gain, and offset if it is fitted; false, with a positive stand-in, if the best gain is not positive.
@@ -87,7 +89,7 @@ class OutputErrorSearch {
   struct Measured {
     Channel channel;
     OutputModel model;
-    Eigen::VectorXd measured;
+    Eigen::VectorXd measured;  // weighed, of a position with sds of its own
     double sd;
     Eigen::VectorXd root_weight;
     std::unique_ptr<SensorPath> path = nullptr;      // of an acceleration
@@ -97,6 +99,7 @@ class OutputErrorSearch {
 
   // The output, or a column of its slopes, as it is measured.
   Eigen::VectorXd seen(const Measured& measured, const SearchPoint& point, const Eigen::VectorXd& output) const;
+  Eigen::VectorXd seen_offset(const Measured& measured) const;  // of 1 m
   SensorTiming rough_timing() const;
   double earliest_sample_s() const;
   double record_ticks() const { return static_cast<double>(samples_); }

@@ -75,7 +75,7 @@ bool OutputErrorSearch::fit_gain(SearchPoint& point) {
     columns.col(0).segment(c * rows_, rows_) = seen(measured, point, measured.model.output(point.model)) / measured.sd;
     const Eigen::VectorXd wanted = measured.path ? measured.path->weighed(measured.measured) : measured.measured;
     target.segment(c * rows_, rows_) = wanted / measured.sd;
-    if (has_offset && c == 0) columns.col(1).head(rows_).setConstant(1 / measured.sd);
+    if (has_offset && c == 0) columns.col(1).head(rows_) = seen_offset(measured) / measured.sd;
   }
   const Eigen::VectorXd best = columns.colPivHouseholderQr().solve(target);
   const double fallback = target.norm() / columns.col(0).norm();

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "control/position_weight.hpp"
 
 namespace control {
 namespace {
@@ -32,6 +35,14 @@ double cubic_slope(const double* y, double u) {
 }
 
 }  // namespace
+
+PositionTimes::PositionTimes(std::vector<double> time_s, double dt_s, const std::vector<double>& sd_m)
+    : time_s_(std::move(time_s)), dt_s_(dt_s), weight_(Eigen::VectorXd::Ones(size())) {
+  if (sd_m.empty()) return;
+  weight_ = sd_of_mean_weight(sd_m) * Eigen::Map<const Eigen::VectorXd>(sd_m.data(), size()).cwiseInverse();
+}
+
+Eigen::VectorXd PositionTimes::weighed(const Eigen::VectorXd& values) const { return values.cwiseProduct(weight_); }
 
 Eigen::VectorXd PositionTimes::read(const Eigen::VectorXd& at_ticks, double shift_s) const {
   const Index last = at_ticks.size() - 1;

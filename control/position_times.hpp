@@ -14,16 +14,19 @@ namespace control {
 
 class PositionTimes {
  public:
-  PositionTimes(std::vector<double> time_s, double dt_s) : time_s_(std::move(time_s)), dt_s_(dt_s) {}
+  // Without sd_m all positions weigh the same.
+  PositionTimes(std::vector<double> time_s, double dt_s, const std::vector<double>& sd_m = {});
 
   Eigen::Index size() const { return static_cast<Eigen::Index>(time_s_.size()); }
   // At each time plus shift_s; its derivative with respect to shift_s.
   Eigen::VectorXd read(const Eigen::VectorXd& at_ticks, double shift_s) const;
   Eigen::VectorXd slope(const Eigen::VectorXd& at_ticks, double shift_s) const;
+  Eigen::VectorXd weighed(const Eigen::VectorXd& values) const;  // by (1) of position_weight.hpp
 
  private:
   std::vector<double> time_s_;
   double dt_s_;
+  Eigen::VectorXd weight_;
 };
 
 }  // namespace control

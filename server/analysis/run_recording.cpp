@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "control/position_weight.hpp"
 #include "server/analysis/motion_at_start.hpp"
 
 namespace server {
@@ -168,8 +169,7 @@ class Cut {
 
 // What of a reference lies in a piece, in seconds since its first sample.
 struct OutsidePart {
-  std::vector<double> time_s, position_m;
-  double sd_m = 0;  // root of the mean square
+  std::vector<double> time_s, position_m, sd_m;
 
   bool is_enough() const { return time_s.size() >= kFewestPositions; }
   std::string in_words(const StoredReference& from) const {
@@ -178,10 +178,14 @@ struct OutsidePart {
     const std::string clock_sd =
         reference.clock_sd_s ? fmt::format(" ± {:.2g} ms", 2e3 * *reference.clock_sd_s) : std::string{};
     return fmt::format(
-        "position measured from outside ({}), {:.3g} Hz, ± {:.2g} mm, clock by {}{}: fitted at its own times, with "
-        "zero "
+        "position measured from outside ({}), {:.3g} Hz, {}, clock by {}{}: fitted at its own times, with zero "
         "and what is left of the clock's error as further unknowns; the robot's own record gives the duty only",
-        reference.source, rate_hz, 2e3 * sd_m, text(reference.clock), clock_sd);
+        reference.source, rate_hz, exactness(), text(reference.clock), clock_sd);
+  }
+  std::string exactness() const {
+    const auto [least_m, most_m] = std::ranges::minmax(sd_m);
+    if (least_m == most_m) return fmt::format("± {:.2g} mm", 2e3 * most_m);
+    return fmt::format("± {:.2g} to {:.2g} mm (each weighs by its own)", 2e3 * least_m, 2e3 * most_m);
   }
 };
 
@@ -189,15 +193,13 @@ OutsidePart outside_part(const Piece& piece, const StoredReference& stored) {
   OutsidePart part;
   if (stored.reference.span != piece.samples.front().span) return part;
   const std::uint64_t first_us = piece.samples.front().robot_time_us, last_us = piece.samples.back().robot_time_us;
-  double squares_m2 = 0;
   for (std::size_t i = 0; i < stored.positions.size(); ++i) {
     const std::uint64_t at_us = stored.positions.robot_time_us[i];
     if (at_us < first_us || at_us >= last_us) continue;
     part.time_s.push_back(static_cast<double>(at_us - first_us) * 1e-6);
     part.position_m.push_back(stored.positions.position_m[i]);
-    squares_m2 += stored.positions.position_sd_m[i] * stored.positions.position_sd_m[i];
+    part.sd_m.push_back(stored.positions.position_sd_m[i]);
   }
-  if (!part.time_s.empty()) part.sd_m = std::sqrt(squares_m2 / static_cast<double>(part.time_s.size()));
   return part;
 }
 
@@ -295,8 +297,9 @@ Result<RunRecording> recording_of(std::span<const StoredSample> samples, const R
   if (motion == Motion::outside) {
     recording.position_time_s = outside.time_s;
     recording.position_m = outside.position_m;
+    recording.position_sd_m = outside.sd_m;
     made.channels_reason = outside.in_words(*reference);
-    made.position_sd_m = outside.sd_m;
+    made.position_sd_m = control::sd_of_mean_weight(outside.sd_m);
   }
   if (const auto warning = driven_before(*piece)) {
     made.warnings.push_back(*warning);

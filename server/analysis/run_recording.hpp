@@ -40,7 +40,7 @@ struct RunRecording {
   control::Recording recording;
   std::string channels_reason;  // why these channels are fitted
   std::vector<std::string> warnings;
-  double position_sd_m = 0;  // of a position from outside, as its importer said; else 0
+  double position_sd_m = 0;  // of the mean weight of positions from outside, as their importer said; else 0
 };
 
 // In words; 0: the position is known.

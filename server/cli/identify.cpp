@@ -161,6 +161,18 @@ void add_outside_doubts(const RunRecording& given, const Identify& wish, control
   }
 }
 
+// Of positions from outside, by the sds that their importer gave them.
+struct ChiSquare {
+  double value = 0, degrees_of_freedom = 0;
+};
+
+std::optional<ChiSquare> chi_square_of(const RunRecording& given, const Fit& fit) {
+  const auto positions = static_cast<double>(fit.position_residual_m.size());
+  if (!(given.position_sd_m > 0) || !std::isfinite(fit.residual_sd)) return std::nullopt;
+  const double relative_sd = fit.residual_sd / given.position_sd_m;
+  return ChiSquare{positions * relative_sd * relative_sd, positions - fit.free_parameters};
+}
+
 void write_parameters(std::ostream& out, const Fit& fit) {
   Table table{{text(fit.structure), "value", "one sigma"}};
   const auto values = values_of(fit.model);
@@ -211,8 +223,12 @@ void write_estimator(std::ostream& out, const control::EstimatorModel& model) {
   }
 }
 
-OrderedJson residuals_json(const Fit& fit) {
-  return {{"position_m", fit.position_residual_m},
+// In metres, also of positions that are weighed in the fit.
+OrderedJson residuals_json(const Fit& fit, const RunRecording& given) {
+  std::vector<double> position_m = fit.position_residual_m;
+  const std::vector<double>& sd_m = given.recording.position_sd_m;
+  for (std::size_t i = 0; i < sd_m.size(); ++i) position_m[i] *= sd_m[i] / given.position_sd_m;
+  return {{"position_m", position_m},
           {"velocity_m_s", fit.velocity_residual_m_s},
           {"acceleration_m_s2", fit.acceleration_residual_m_s2}};
 }
@@ -249,11 +265,19 @@ int run(const Identify& wish, std::ostream& out) {
     answer["estimator"] = estimator ? json_of(*estimator) : OrderedJson{};
     answer["channels"] = channels_of(given.recording);
     answer["channels_reason"] = given.channels_reason;
-    if (wish.with_residuals) answer["residuals"] = residuals_json(found.best);
+    if (const auto chi_square = chi_square_of(given, found.best)) {
+      answer["position_chi_square"] = chi_square->value;
+      answer["position_degrees_of_freedom"] = chi_square->degrees_of_freedom;
+    }
+    if (wish.with_residuals) answer["residuals"] = residuals_json(found.best, given);
     write_json(out, answer);
   } else {
     fmt::print(out, "fitted: {}; {}\n\n", fmt::join(channels_of(given.recording), ", "), given.channels_reason);
     write_parameters(out, found.best);
+    if (const auto chi_square = chi_square_of(given, found.best)) {
+      fmt::print(out, "chi-square of the position from outside: {} with {} degrees of freedom\n",
+                 fixed(chi_square->value, 1), chi_square->degrees_of_freedom);
+    }
     if (estimator) write_estimator(out, *estimator);
     write_compared(out, found.compared);
     for (const std::string& warning : found.warnings) fmt::print(out, "\nwarning: {}\n", warning);

@@ -9,6 +9,7 @@
 #include "control/identify.hpp"
 #include "control/modal_plant.hpp"
 #include "control/position_times.hpp"
+#include "control/position_weight.hpp"
 
 namespace control {
 namespace {
@@ -94,6 +95,60 @@ TEST(ReferenceFit, ABelievedClockIsNoUnknown) {
   EXPECT_GE(believed.sse, free.sse);
 }
 
+// Every third position is 40 times as uncertain as the others, as where a marker was half hidden.
+TEST(ReferenceFit, PositionsWeighByTheirOwnSds) {
+  const FractionalModel plant = normalised(kNonNewtonianModel);
+  constexpr double kSure = 0.0003, kUnsure = 0.012;
+  IdentificationOptions options;
+  options.structure = Structure::second_order;  // parameters of which the run is sure
+  options.further_starts = 0;
+  FractionalModel second_order = plant;
+  second_order.alpha = 2, second_order.beta = 1;
+  double squares = 0, chi_square_per_value = 0;
+  int parameters = 0;
+  constexpr unsigned kSeeds = 2;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    Recording recording = watched(second_order, {.noise_sd_m = kSure}, seed);
+    std::mt19937 random{100 + seed};
+    std::normal_distribution<double> noise{0, kUnsure};
+    for (std::size_t k = 0; k < recording.position_m.size(); ++k) {
+      const bool is_unsure = k % 3 == 0;
+      recording.position_sd_m.push_back(is_unsure ? std::hypot(kSure, kUnsure) : kSure);
+      if (is_unsure) recording.position_m[k] += noise(random);
+    }
+    const double mean_sd_m = sd_of_mean_weight(recording.position_sd_m);
+    EXPECT_NEAR(mean_sd_m, kSure * std::sqrt(1.5), 1e-6);
+    const Identification found = identify(recording, options);
+    const Fit& fit = found.best;
+    ASSERT_EQ(fit.end, SearchEnd::converged);
+    EXPECT_TRUE(fit.residuals_are_white) << "weighed, all are alike";
+    EXPECT_TRUE(found.warnings.empty()) << found.warnings.front();
+    chi_square_per_value += fit.residual_sd * fit.residual_sd / (mean_sd_m * mean_sd_m) / kSeeds;
+    recording.position_sd_m.clear();
+    const Fit unweighed = identify(recording, options).best;
+    for (const std::size_t i : {std::size_t{0}, std::size_t{1}, std::size_t{2}}) {
+      EXPECT_LT(10 * fit.one_sigma[i].value(), unweighed.one_sigma[i].value()) << kParameterNames[i];
+      const double sigmas = (values(fit.model)[i] - values(second_order)[i]) / fit.one_sigma[i].value();
+      squares += sigmas * sigmas;
+      ++parameters;
+    }
+  }
+  EXPECT_LT(squares / parameters, 3) << "the sigmas are honest";
+  EXPECT_NEAR(chi_square_per_value, 1, 0.07);
+}
+
+TEST(ReferenceFit, EqualSdsChangeNothing) {
+  Recording recording = watched(kNonNewtonianModel, {}, 2);
+  IdentificationOptions options;
+  options.structure = Structure::second_order;
+  options.further_starts = 0;
+  const Fit without = identify(recording, options).best;
+  recording.position_sd_m.assign(recording.position_m.size(), 0.004);
+  const Fit with = identify(recording, options).best;
+  EXPECT_NEAR(with.model.kp, without.model.kp, 1e-9 * without.model.kp);
+  EXPECT_NEAR(with.residual_sd, without.residual_sd, 1e-9 * without.residual_sd);
+}
+
 TEST(ReferenceFit, ReadsThePositionBetweenTheTicks) {
   const std::vector<double> duty = prbs_duty(1, 0.5, 10, kTickS);
   const std::vector<double> fine_m = fine_positions(kNonNewtonianModel, duty);
@@ -129,6 +184,8 @@ TEST(ReferenceFit, RefusesTimesThatCannotBe) {
   EXPECT_THAT(refused([](Recording& r) { r.position_time_s.back() = 40.5; }), HasSubstr("must lie in the record"));
   EXPECT_THAT(refused([](Recording& r) { r.position_m.pop_back(); }), HasSubstr("one per time"));
   EXPECT_THAT(refused([](Recording& r) { r.velocity_m_s = r.duty; }), HasSubstr("measured alone"));
+  EXPECT_THAT(refused([](Recording& r) { r.position_sd_m = {0.001}; }), HasSubstr("position_sd_m has 1 values"));
+  EXPECT_THAT(refused([](Recording& r) { r.position_sd_m.assign(r.position_m.size(), 0); }), HasSubstr("not positive"));
 }
 
 }  // namespace

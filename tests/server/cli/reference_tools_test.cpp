@@ -15,6 +15,7 @@ namespace {
 using cli::ToolAnswer;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 // A robot that believes it swims half as far as it does, and a camera at 30 Hz that sees it.
@@ -89,6 +90,43 @@ TEST_F(ReferenceTools, AGivenClockIsTakenAtItsWord) {
   ASSERT_EQ(
       ask("reference import --run 1 --csv @camera.csv --sd-mm 0.5 --offset-s -3.4567 --clock-sd-s 0.01").exit_code, 0);
   EXPECT_THAT(ask("reference show --run 1").text, HasSubstr("clock by offset: its t_s plus -3.4567 s ± 20 ms"));
+}
+
+TEST_F(ReferenceTools, IdentifyWeighsEachPositionByItsOwnSdAndSaysWhatTheyCameTo) {
+  std::ifstream in{folder_ / "camera.csv"};
+  std::ofstream out{folder_ / "unequal.csv"};
+  std::string line;
+  std::getline(in, line);
+  out << line << ",position_sd_m\n";
+  for (int row = 0; std::getline(in, line); ++row) {
+    if (row % 4 != 0) {
+      out << line << ",0.0005\n";
+      continue;
+    }
+    const auto comma = line.find(',');  // 20 mm off, and said to be
+    out << fmt::format("{},{:.6f},0.02\n", line.substr(0, comma),
+                       std::stod(line.substr(comma + 1)) + (row % 8 == 0 ? 0.02 : -0.02));
+  }
+  out.close();
+  ASSERT_EQ(ask("reference import --run 1 --csv @unequal.csv --offset-s -3.4567").exit_code, 0);
+  const std::string fit = "identify --run 1 --structure second_order";
+  EXPECT_THAT(ask(fit).text, AllOf(HasSubstr("± 1 to 40 mm (each weighs by its own)"),
+                                   HasSubstr("chi-square of the position from outside: ")));
+  const auto json = ask(fit + " --json --residuals").json();
+  EXPECT_NEAR(json["parameters"]["kp"].get<double>(), 0.1, 0.01);
+  EXPECT_EQ(json["position_degrees_of_freedom"], 267 - 5);
+  EXPECT_NEAR(json["position_chi_square"].get<double>(), 262, 80);
+  EXPECT_NEAR(std::abs(json["residuals"]["position_m"][0].get<double>()), 0.02, 0.003) << "in metres, as measured";
+}
+
+// A dead time of the plant would look the same.
+TEST_F(ReferenceTools, IdentifyDoubtsACameraClockThatCameOutOff) {
+  const std::string import = "reference import --run 1 --csv @camera.csv --sd-mm 0.5 --reason again --offset-s ";
+  const std::string doubt = "search with --dead-time-s";
+  ASSERT_EQ(ask(import + "-3.5067").exit_code, 0);
+  EXPECT_THAT(ask("identify --run 1 --structure first_order").text,
+              AllOf(HasSubstr("the outside position's clock came out 43 ms off"), HasSubstr(doubt)));
+  EXPECT_THAT(ask("identify --run 1 --structure first_order --channels robot").text, Not(HasSubstr(doubt)));
 }
 
 TEST_F(ReferenceTools, IsReplacedRemovedAndExported) {
