@@ -24,13 +24,16 @@ TemporaryFolder::TemporaryFolder() {
 TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
 
 namespace {
-asio::awaitable<void> start(RecordingParts& recording, bool& started) {
-  co_await recording.open();
+asio::awaitable<void> start(RecordingParts& recording, Station& station, bool& started) {
+  const RestoredState restored = co_await recording.open();
+  station.restore(restored.robots, restored.pending_stops);
   started = true;
 }
 
 RecorderOptions in_folder(RecorderOptions options, const std::filesystem::path& folder) {
-  options.path = folder / "station.sqlite";
+  const std::filesystem::path own = folder / "station.sqlite";
+  if (!options.path.empty()) std::filesystem::copy_file(options.path, own);
+  options.path = own;
   return options;
 }
 
@@ -48,7 +51,7 @@ ApiTest::ApiTest(Config of_station, RecorderOptions of_recorder)
   recording.connect(station);
   station.add_sink(live);
   bool started = false;
-  tasks.spawn("start", start(recording, started));
+  tasks.spawn("start", start(recording, station, started));
   EXPECT_TRUE(clock.run_until([&] { return started; }, 10s));
   models = std::make_unique<ModelSender>(loop, tasks, clock, station, recording.fluid_models.in_force());
   ApiOptions options;

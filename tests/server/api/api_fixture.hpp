@@ -41,7 +41,8 @@ struct Answered {
 
 class ApiTest : public ::testing::Test {
  public:
-  explicit ApiTest(Config of_station = {}, RecorderOptions of_recorder = {});  // the database's path is set here
+  // The database is in `folder`: a new one, or a copy of the one that `of_recorder` names.
+  explicit ApiTest(Config of_station = {}, RecorderOptions of_recorder = {});
   ~ApiTest() override;
 
  protected:

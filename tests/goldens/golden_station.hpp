@@ -1,0 +1,66 @@
+// A station whose database, clock and random bytes are given, with robots that say what they are told to.
+//
+//   GoldenStation station{path_of_a_database};
+//   station.live_text();                            // what pages heard so far
+//   station.finish();                               // SIGTERM
+//
+// Everything that it writes and says is the same in every run.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "server/api/live_messages.hpp"
+#include "tests/server/api/api_fixture.hpp"
+
+namespace server {
+
+// From the clock of the tests to a day on which the database of schema version 6 is of the past.
+inline constexpr microseconds kStoryAfter = std::chrono::hours{527 * 24};
+
+class GoldenStation final : public ApiTest {
+ public:
+  explicit GoldenStation(const std::filesystem::path& database);
+  ~GoldenStation() override;
+
+  // Welcomed, and alive from then on; the robot has booted so long ago.
+  TestRobot& dial(const protocol::RobotFrame& hello, microseconds booted_ago = 5s);
+  void pass(microseconds duration);  // pages read meanwhile what they are told
+  void send(TestRobot& from, const protocol::RobotFrame& frame, microseconds then = 0s);
+  std::int64_t utc_us() const { return clock.utc_us(); }
+  void step_utc(microseconds by) { clock.step_utc(by); }
+
+  using ApiTest::ask;
+  // The newest command of this kind is answered before the request is. Gives the answer to the request.
+  using Reply = std::function<void(const protocol::Command&)>;
+  Answered command(TestRobot& to, const std::string& path, const json& body, const Reply& reply);
+
+  // What a page is told when it opens, and when it says what cannot be acted on.
+  std::string welcome();
+  std::string problem_of(const std::string& message);
+  std::string dropped_message();  // what a page hears first that has read too slowly
+  // Message by message, a line each: of a page that watches all, and of one that watches some robots; what they heard
+  // while `is_kept`.
+  bool is_kept = false;
+  const std::string& heard_by_all() const { return heard_by_all_; }
+  const std::string& heard_by_watcher() const { return heard_by_watcher_; }
+  void watch(const std::set<RobotId>& robots) { live.watch(watcher_, robots); }
+
+  void finish();  // every sample is on disk, open runs are interrupted
+  std::filesystem::path database() const { return folder.path() / "station.sqlite"; }
+  std::filesystem::path data_folder() const { return folder.path(); }
+
+ private:
+  void TestBody() override {}
+  void read_pages();
+  void read_page(Subscriber& page, std::string& into) const;
+
+  RobotTexts texts_{loop, station};
+  LiveParts parts_{loop, tasks, clock, station, live, texts_, "0.1.0"};
+  Subscriber all_{loop}, watcher_{loop};
+  std::string heard_by_all_, heard_by_watcher_;
+  std::vector<std::unique_ptr<TestRobot>> robots_;
+  bool is_finished_ = false;
+};
+
+}  // namespace server
