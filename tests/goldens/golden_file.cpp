@@ -21,11 +21,14 @@ std::string read_file(const std::filesystem::path& path) {
   return text.str();
 }
 
+// Text to the end of its line; of other bytes all but ASCII in hexadecimal.
 std::string quoted(const std::string& text, std::size_t from) {
+  const bool is_text = text.find('\0') == std::string::npos;
   std::string shown;
   for (const char c : text.substr(std::min(from, text.size()), kShownBytes)) {
     const auto byte = static_cast<unsigned char>(c);
-    const bool is_plain = byte >= 0x20 && byte != 0x7f;
+    if (is_text && c == '\n') break;
+    const bool is_plain = byte >= 0x20 && (byte < 0x7f || (is_text && byte > 0x7f));
     shown += is_plain ? std::string{c} : fmt::format("\\x{:02x}", byte);
   }
   return from >= text.size() ? "(the end)" : shown;

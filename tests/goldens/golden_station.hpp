@@ -15,8 +15,9 @@
 
 namespace server {
 
-// From the clock of the tests to a day on which the database of schema version 6 is of the past.
-inline constexpr microseconds kStoryAfter = std::chrono::hours{527 * 24};
+// From the clock of the tests to a day on which the database of schema version 6 is of the past, at 03:06:00 UTC: hour,
+// minute and second begin with a zero.
+inline constexpr microseconds kStoryAfter = std::chrono::hours{527 * 24 + 12} - 41s;
 
 class GoldenStation final : public ApiTest {
  public:

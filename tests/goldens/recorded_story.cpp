@@ -352,7 +352,7 @@ class SecondAct : public Act {
 // Between the acts: a restore is noted, and retention removed what r2 had lost at first.
 void change_between(const std::filesystem::path& path) {
   SQLite::Database database{path.string(), SQLite::OPEN_READWRITE};
-  database.exec("INSERT INTO meta (name, value) VALUES ('restored_at_us', 1795535800000000)");
+  database.exec("INSERT INTO meta (name, value) VALUES ('restored_at_us', 1795578959000000)");
   database.exec(
       "UPDATE gap SET cause = 'retention' WHERE cause = 'ring_overrun' AND boot_key IN"
       " (SELECT boot_key FROM boot WHERE robot_id = 'r2')");
