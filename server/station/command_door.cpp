@@ -80,7 +80,8 @@ std::shared_ptr<PendingCommand> Station::make_pending(const CommandRequest& requ
 }
 
 // What speaks against the wish; nothing is sent then.
-Result<void> Station::check_request(const CommandRequest& request, const Seat& seat) const {
+Result<void> Station::check_request(const CommandRequest& request, const protocol::Command& wire,
+                                    const Seat& seat) const {
   if (request.life <= microseconds{0} || request.life > kMaxLife) {
     return fail(ErrorCode::invalid, fmt::format("life = {} ms is outside 1 to 10000", request.life.count() / 1000),
                 "out_of_range");
@@ -89,7 +90,7 @@ Result<void> Station::check_request(const CommandRequest& request, const Seat& s
     return fail(ErrorCode::not_connected, fmt::format("robot '{}' is not connected", request.robot_id),
                 "not_connected");
   }
-  return check_command(request.action, *seat.robot, envelope_);
+  return check_command(wire, *seat.robot, envelope_, seat.orders_ahead());
 }
 
 bool Station::remembers(CommandId id) const { return recent_.find(id) != nullptr; }
@@ -132,8 +133,11 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
   }
   // SAFETY: whoever is not in control moves nothing, page, script or experiment.
   if (auto held = may_control(request); !held) co_return refuse(request, held.error());
-  if (auto checked = check_request(request, seat); !checked) co_return refuse(request, checked.error());
+  // SAFETY: what waits on the robot for whoever was in control before is dropped ahead of this command, or it is not
+  // sent.
+  const bool is_clear = !needs_control(request.action) || drop_timed(seat);
   const auto pending = make_pending(request, *seat.robot);
+  if (auto checked = check_request(request, pending->wire, seat); !checked) co_return refuse(request, checked.error());
   // SAFETY: what was issued longer ago than its life is not sent, and is accounted for.
   if (request.age >= request.life) {
     end(*pending, CommandState::expired, "too_old_on_arrival");
@@ -142,9 +146,6 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
   if (auto seen = check_sight(request); !seen) co_return refuse(request, seen.error());
   if (auto reached = check_time(*pending, *seat.robot); !reached) co_return refuse(request, reached.error());
   supersede_queued(seat, *pending);
-  // SAFETY: what waits on the robot for whoever was in control before is dropped ahead of this command, or it is not
-  // sent.
-  const bool is_clear = !needs_control(request.action) || drop_timed_of_former(seat);
   if (!is_clear || !seat.port->send(pending->wire, pending->deadline_us)) {
     Error full{ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),
                "queue_full"};

@@ -56,7 +56,7 @@ void Station::on_command_ack(RobotPort& port, const protocol::CommandAck& ack) {
     case rheonaut_COMMAND_RESULT_ACCEPTED: acknowledge(*seat, record.id, ""); break;
     // It was sent before, by a station that has restarted since: the client's key has made it the same command.
     case rheonaut_COMMAND_RESULT_DUPLICATE: acknowledge(*seat, record.id, "duplicate"); break;
-    case rheonaut_COMMAND_RESULT_EXPIRED: finish(*seat, record.id, CommandState::expired, "expired"); break;
+    case rheonaut_COMMAND_RESULT_EXPIRED: finish(*seat, record.id, CommandState::expired, pending->expiry()); break;
     case rheonaut_COMMAND_RESULT_REJECTED:
       finish(*seat, record.id, CommandState::rejected, text_or_number(ack.reason));
       break;
@@ -178,7 +178,7 @@ void Station::end_dropped(Seat& seat, const protocol::CommandAck& ack) {
   const auto pending = *found;
   seat.unseen.erase(found);
   end(*pending, was_rejected ? CommandState::rejected : CommandState::expired,
-      was_rejected ? text_or_number(ack.reason) : "expired");
+      was_rejected ? text_or_number(ack.reason) : pending->expiry());
 }
 
 void Station::end_unseen(Seat& seat, const char* reason) {

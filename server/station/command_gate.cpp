@@ -14,50 +14,40 @@ Result<void> within(const char* name, double value, double minimum, double maxim
               "out_of_range");
 }
 
-// Without a setpoint in force the step is counted from where the robot is, as far as that is known.
-Result<void> check_setpoint(double setpoint_m, const RobotState& robot, const CommandLimits& limits) {
-  auto in_range = within("setpoint_m", setpoint_m, limits.setpoint_min_m, limits.setpoint_max_m);
-  if (!in_range) return in_range;
-  const bool is_steered = robot.context.mode == rheonaut_MODE_AUTO && robot.context.setpoint_m;
-  if (!is_steered && !robot.sample) return {};
-  const double from_m = is_steered ? *robot.context.setpoint_m : robot.sample->position_m;
-  const double step_m = std::abs(setpoint_m - from_m);
-  // Setpoints are floats on the way: a step of just the limit is one.
-  if (!std::isfinite(step_m) || step_m <= limits.setpoint_step_m + 1e-6) return {};
-  return fail(ErrorCode::invalid,
-              fmt::format("setpoint_m = {} is {:.3f} m from {} {:.3f}; a step is at most {} m", setpoint_m, step_m,
-                          is_steered ? "the setpoint" : "the position", from_m, limits.setpoint_step_m),
-              "step_too_large");
-}
-
-// SAFETY: the motor runs at power no longer than the limit, also when each command alone is within it.
-Result<void> check_power(double duty, double lasts_s, const RobotState& robot, const CommandLimits& limits) {
+// SAFETY: the motor runs at power no longer than the limit, also when each command alone is within it. What waits for
+// its time counts too, ahead_s.
+Result<void> check_power(double duty, double lasts_s, double ahead_s, const RobotState& robot,
+                         const CommandLimits& limits) {
   const bool is_at_power = std::abs(duty) > limits.power_duty;
-  if (!is_at_power || robot.at_power_s + lasts_s <= limits.power_s) return {};
+  if (!is_at_power || robot.at_power_s + ahead_s + lasts_s <= limits.power_s) return {};
+  const std::string waits =
+      ahead_s == 0 ? "" : fmt::format(", and what waits for its time asks for {:.1f} s more", ahead_s);
   return fail(ErrorCode::conflict,
-              fmt::format("duty = {} is above {}, where robot '{}' has run for {:.1f} s; the limit is {} s, and the "
+              fmt::format("duty = {} is above {}, where robot '{}' has run for {:.1f} s{}; the limit is {} s, and the "
                           "time goes down again below that duty",
-                          duty, limits.power_duty, robot.id, robot.at_power_s, limits.power_s),
+                          duty, limits.power_duty, robot.id, robot.at_power_s, waits, limits.power_s),
               "too_long_at_power");
 }
 
 // The schedule's own time at power counts, too. Its last duty ends it.
-Result<void> check_schedule(const rheonaut_SetDutySchedule& schedule, const RobotState& robot,
+Result<void> check_schedule(const protocol::Command& command, double ahead_s, const RobotState& robot,
                             const CommandLimits& limits) {
-  const double tick_s = robot.sample_period_us / 1e6;
-  double at_power_s = 0, highest = 0;
+  const auto& schedule = command.action.set_duty_schedule;
+  double highest = 0;
   for (pb_size_t i = 0; i < schedule.duty_count; ++i) {
     const double duty = schedule.duty[i];
     if (auto checked = within("duty", duty, limits.duty_min, limits.duty_max); !checked) return checked;
-    const bool has_end = i + 1 < std::min(schedule.duty_count, schedule.tick_count);
-    if (std::abs(duty) <= limits.power_duty || !has_end) continue;
-    at_power_s += (static_cast<double>(schedule.tick[i + 1]) - schedule.tick[i]) * tick_s;
-    highest = std::max(highest, std::abs(duty));
+    if (i + 1 < schedule.duty_count) highest = std::max(highest, std::abs(duty));
   }
-  return check_power(highest, at_power_s, robot, limits);
+  return check_power(highest, at_power_s(command, robot.sample_period_us, limits), ahead_s, robot, limits);
 }
 
-Result<void> check_values(const protocol::Command& command, const RobotState& robot, const CommandLimits& limits) {
+Result<void> check_values(const protocol::Command& command, const OrdersAhead& ahead, const RobotState& robot,
+                          const CommandLimits& limits) {
+  const double ahead_s = at_power_ahead_s(ahead, robot.sample_period_us, limits);
+  const auto in_range = [&limits](double setpoint_m) {
+    return within("setpoint_m", setpoint_m, limits.setpoint_min_m, limits.setpoint_max_m);
+  };
   switch (command.which_action) {
     case rheonaut_Command_set_mode_tag: {
       const auto& mode = command.action.set_mode;
@@ -67,24 +57,23 @@ Result<void> check_values(const protocol::Command& command, const RobotState& ro
       if (mode.mode == rheonaut_MODE_MANUAL && mode.has_setpoint_m) {
         return fail(ErrorCode::invalid, "mode manual takes no setpoint_m", "malformed");
       }
-      if (mode.mode == rheonaut_MODE_AUTO) return check_setpoint(mode.setpoint_m, robot, limits);
+      if (mode.mode == rheonaut_MODE_AUTO) return in_range(mode.setpoint_m);
       if (mode.mode == rheonaut_MODE_MANUAL) return {};
       return fail(ErrorCode::invalid, "mode must be manual or auto; emergency is entered by an emergency stop",
                   "malformed");
     }
-    case rheonaut_Command_set_setpoint_tag:
-      return check_setpoint(command.action.set_setpoint.setpoint_m, robot, limits);
+    case rheonaut_Command_set_setpoint_tag: return in_range(command.action.set_setpoint.setpoint_m);
     case rheonaut_Command_set_duty_tag: {
       const double duty = command.action.set_duty.duty;
       auto checked = within("lease_ms", command.action.set_duty.lease_ms, 0, protocol::kLeaseMs);
       if (checked) checked = within("duty", duty, limits.duty_min, limits.duty_max);
-      return checked ? check_power(duty, 0, robot, limits) : checked;
+      return checked ? check_power(duty, 0, ahead_s, robot, limits) : checked;
     }
     case rheonaut_Command_renew_lease_tag: {
       auto checked = within("lease_ms", command.action.renew_lease.lease_ms, 0, protocol::kLeaseMs);
-      return checked && robot.sample ? check_power(robot.sample->duty, 0, robot, limits) : checked;
+      return checked && robot.sample ? check_power(robot.sample->duty, 0, 0, robot, limits) : checked;
     }
-    case rheonaut_Command_set_duty_schedule_tag: return check_schedule(command.action.set_duty_schedule, robot, limits);
+    case rheonaut_Command_set_duty_schedule_tag: return check_schedule(command, ahead_s, robot, limits);
     case rheonaut_Command_set_controller_tag: {
       const auto& controller = command.action.set_controller;
       auto checked = within("duty_min", controller.duty_min, limits.duty_min, 0);
@@ -116,9 +105,12 @@ bool needs_control(const protocol::Command& command) {
          command.which_action != rheonaut_Command_get_parameters_tag;
 }
 
-Result<void> check_command(const protocol::Command& command, const RobotState& robot, const Envelope& envelope) {
+Result<void> check_command(const protocol::Command& command, const RobotState& robot, const Envelope& envelope,
+                           const OrdersAhead& ahead) {
   const CommandLimits& limits = envelope.in(robot.fluid);
-  if (auto values = check_values(command, robot, limits); !values) {
+  auto values = check_values(command, ahead, robot, limits);
+  if (values) values = check_steps(command, ahead, robot, limits);
+  if (!values) {
     const std::string whose = envelope.is_listed(robot.fluid)
                                   ? fmt::format(" (limits of the fluid '{}')", robot.fluid)
                                   : " (the robot's fluid is not known, so the strictest limits of all fluids hold)";

@@ -3,6 +3,7 @@
 
 #include "server/result.hpp"
 #include "server/station/envelope.hpp"
+#include "server/station/orders_ahead.hpp"
 #include "server/station/station_state.hpp"
 
 namespace server {
@@ -12,8 +13,9 @@ bool moves_the_motor(const protocol::Command& command);
 // False for what commands nothing: whoever may command at all may send it.
 bool needs_control(const protocol::Command& command);
 
-// invalid for a value outside the limits, conflict when the robot's state forbids the command now. Judges nothing that
-// only the robot can know; the robot checks everything again.
-Result<void> check_command(const protocol::Command& command, const RobotState& robot, const Envelope& envelope);
+// invalid for a value outside the limits, conflict when the robot's state forbids the command now. `ahead`: what is on
+// its way to the robot, or waits there. Judges nothing that only the robot can know; the robot checks everything again.
+Result<void> check_command(const protocol::Command& command, const RobotState& robot, const Envelope& envelope,
+                           const OrdersAhead& ahead);
 
 }  // namespace server

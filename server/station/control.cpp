@@ -59,21 +59,17 @@ Result<std::optional<Authority::Change>> change_control(Authority& authority, co
 
 }  // namespace
 
-// SAFETY: nothing that waits on the robot outlives the control of whoever sent it. Sent before anything of whoever
-// comes next, on a link that keeps the order. False: there is no room for it on the link, so nobody else's command may
-// follow.
-bool Station::drop_timed_of_former(Seat& seat) {
+// SAFETY: nothing that waits on the robot outlives the control of whoever sent it, nor the limits that it was held to.
+// Sent before anything that comes next, on a link that keeps the order. False: there is no room for it on the link, so
+// no command may follow.
+bool Station::drop_timed(Seat& seat) {
   RobotState& robot = *seat.robot;
   const bool may_wait = !seat.timed_by.empty() && robot.latest_robot_time_us <= seat.timed_until_robot_us + kDueGraceUs;
-  const bool is_left = may_wait && authority_.of(robot.id).holder != seat.timed_by;
+  if (!may_wait) seat.drop_timed_because = nullptr;
+  if (may_wait && authority_.of(robot.id).holder != seat.timed_by) seat.drop_timed_because = "control_ended";
   const bool is_lost = seat.drop_timed_id != 0 && !seat.commands.contains(seat.drop_timed_id);
-  if ((!is_left && !is_lost) || seat.port == nullptr) return true;
-  std::vector<CommandId> unsent;
-  for (const auto& [id, pending] : seat.commands) {
-    const bool is_timed = pending->wire.has_execute_at_robot_us && pending->record.state == CommandState::queued;
-    if (is_timed && seat.port->withdraw(id)) unsent.push_back(id);
-  }
-  for (const CommandId id : unsent) finish(seat, id, CommandState::superseded, "control_ended");
+  if ((seat.drop_timed_because == nullptr && !is_lost) || seat.port == nullptr) return true;
+  if (seat.drop_timed_because != nullptr) end_timed(seat, seat.drop_timed_because);
   CommandRequest request;
   request.robot_id = robot.id;
   request.action.which_action = rheonaut_Command_drop_timed_tag;
@@ -83,14 +79,31 @@ bool Station::drop_timed_of_former(Seat& seat) {
   if (!seat.port->send(drop->wire, drop->deadline_us)) return false;
   seat.timed_by.clear();
   seat.timed_until_robot_us = 0;
+  seat.drop_timed_because = nullptr;
   seat.drop_timed_id = drop->record.id;
   add_pending(seat, drop);
   publish(drop->record);
   return true;
 }
 
+// What was not sent ends; what was sent ends when the robot says that it has dropped it.
+void Station::end_timed(Seat& seat, const char* reason) {
+  std::vector<CommandId> unsent;
+  for (const auto& [id, pending] : seat.commands) {
+    if (!pending->wire.has_execute_at_robot_us) continue;
+    pending->dropped_because = reason;
+    if (pending->record.state == CommandState::queued && seat.port->withdraw(id)) unsent.push_back(id);
+  }
+  for (const CommandId id : unsent) finish(seat, id, CommandState::superseded, reason);
+  for (const auto* sent : {&seat.unseen, &seat.unknown}) {
+    for (const auto& pending : *sent) {
+      if (pending->wire.has_execute_at_robot_us) pending->dropped_because = reason;
+    }
+  }
+}
+
 Result<ControlState> Station::control(const ControlRequest& request) {
-  if (const auto seat = seats_.find(request.robot_id); seat != seats_.end()) drop_timed_of_former(seat->second);
+  if (const auto seat = seats_.find(request.robot_id); seat != seats_.end()) drop_timed(seat->second);
   Result<std::optional<Authority::Change>> change =
       fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", request.robot_id), "unknown_robot");
   if (robots_.contains(request.robot_id)) change = change_control(authority_, request);
@@ -157,7 +170,7 @@ void Station::tell(const Authority::Change& change, const std::string& actor, co
   const auto robot = robots_.find(change.robot_id);
   if (robot == robots_.end()) return;
   robot->second.control = authority_.of(change.robot_id);
-  drop_timed_of_former(seats_.at(change.robot_id));
+  drop_timed(seats_.at(change.robot_id));
   note(robot->second, change.kind, change.cause);
   AuditNote audit;
   audit.by = {actor, peer, clock_.utc_us()};

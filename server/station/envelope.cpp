@@ -27,6 +27,10 @@ CommandLimits stricter(const CommandLimits& a, const CommandLimits& b) {
 
 }  // namespace
 
+bool is_narrower_than(const CommandLimits& limits, const CommandLimits& others) {
+  return stricter(limits, others) != others;
+}
+
 std::string fluid_name(std::string_view text) {
   constexpr std::string_view kBlanks = " \t\r\n";
   const auto first = text.find_first_not_of(kBlanks);

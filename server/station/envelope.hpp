@@ -26,6 +26,9 @@ struct CommandLimits {
   bool operator==(const CommandLimits&) const = default;
 };
 
+// In any of its quantities.
+bool is_narrower_than(const CommandLimits& limits, const CommandLimits& others);
+
 // As fluids are compared: " Water " is "water". Empty when it is none: nothing but blanks, over 40 bytes, or with
 // control characters.
 std::string fluid_name(std::string_view text);

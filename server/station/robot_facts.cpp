@@ -36,7 +36,13 @@ Result<void> Station::set_fluid(const RobotId& id, const std::string& text, cons
   audit.action = "robot.fluid_set";
   audit.subject = fluid;
   audit.detail = audit_detail({{"before", robot.fluid}});
+  // SAFETY: what waits was held to the limits of before, and outlives none that is narrower.
+  const bool is_narrower = is_narrower_than(envelope_.in(fluid), envelope_.in(robot.fluid));
   robot.fluid = fluid;
+  if (Seat& seat = seats_.at(id); is_narrower) {
+    seat.drop_timed_because = "limits_changed";
+    drop_timed(seat);
+  }
   for (StationSink* sink : sinks_) sink->on_fluid(robot);
   for (StationSink* sink : sinks_) sink->on_audit(audit);
   note(robot, "fluid_set", fmt::format("{} by {}", fluid.empty() ? "not known" : fluid, by.actor));

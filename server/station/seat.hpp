@@ -17,6 +17,7 @@ struct PendingCommand {
   explicit PendingCommand(boost::asio::io_context& loop) : answered{loop}, ended{loop} {}
 
   bool is_stop() const { return wire.which_action == rheonaut_Command_emergency_stop_tag; }
+  const char* expiry() const { return dropped_because == nullptr ? "expired" : dropped_because; }
 
   CommandRecord record;
   protocol::Command wire = rheonaut_Command_init_zero;
@@ -32,6 +33,7 @@ struct PendingCommand {
   bool is_timed = false;                  // a stop that counts in Station::stop_times()
   bool is_overtaken = false;              // acknowledged, and a later one that moves the motor too
   bool is_proved_by_samples = false;      // sent: samples that show its effect prove that it has run
+  const char* dropped_because = nullptr;  // timed: why the station has it dropped; null: it does not
   Signal answered, ended;
 };
 
@@ -58,12 +60,15 @@ struct Seat {
   // Timed commands that may wait on the robot: whose they are (empty: nobody's), and until when one of them may.
   std::string timed_by;
   std::uint64_t timed_until_robot_us = 0;
-  CommandId drop_timed_id = 0;  // that drops them, until it is acknowledged; 0: none
+  const char* drop_timed_because = nullptr;  // why they have to be dropped; null: they need not
+  CommandId drop_timed_id = 0;               // that drops them, until it is acknowledged; 0: none
 
   // Stops that no robot has acknowledged; the newest, null when there is none, and how many there are.
   std::shared_ptr<PendingCommand> newest_stop() const;
   std::size_t stops() const;
   std::shared_ptr<PendingCommand> on_its_way(CommandId id) const;  // of both; null when it is none of them
+  // What telemetry does not show yet, but what is being dropped. Points into the commands of this seat.
+  OrdersAhead orders_ahead() const;
 };
 
 }  // namespace server

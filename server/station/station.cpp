@@ -164,6 +164,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
     seat.unknown.clear();  // what the boot before knew of them is gone
     seat.timed_by.clear();
     seat.timed_until_robot_us = seat.drop_timed_id = 0;
+    seat.drop_timed_because = nullptr;
   }
   robot.context.controller_id = details.controller_id;
   robot.context.mode = details.mode;
@@ -191,7 +192,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
     hand_stop_to(seat, *relatch);
     if (relatch->record.state == CommandState::queued) publish(relatch->record);
   }
-  drop_timed_of_former(seat);
+  drop_timed(seat);
   note(robot, "connected", fmt::format("from {}", peer));
   publish(robot);
 }

@@ -209,8 +209,9 @@ class Station {
   Result<void> may_control(const CommandRequest& request) const;
   Result<void> check_sight(const CommandRequest& request) const;
   void use_control(const CommandRequest& request);
-  bool drop_timed_of_former(Seat& seat);
-  Result<void> check_request(const CommandRequest& request, const Seat& seat) const;
+  bool drop_timed(Seat& seat);
+  void end_timed(Seat& seat, const char* reason);
+  Result<void> check_request(const CommandRequest& request, const protocol::Command& wire, const Seat& seat) const;
   Result<std::shared_ptr<PendingCommand>> same_wish(const CommandRequest& request, const Seat& seat);
   boost::asio::awaitable<Result<CommandRecord>> follow(std::shared_ptr<PendingCommand> pending, bool until_verified,
                                                        microseconds patience);

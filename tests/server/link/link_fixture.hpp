@@ -11,7 +11,9 @@ using namespace std::chrono_literals;
 
 class LinkTest : public ::testing::Test {
  public:
-  LinkTest() { station.add_sink(sink); }
+  explicit LinkTest(const Envelope& envelope = Envelope{}) : station{loop, clock, envelope, LinkTimes{}} {
+    station.add_sink(sink);
+  }
   ~LinkTest() override {
     tasks.stop();
     clock.settle();
@@ -75,7 +77,7 @@ class LinkTest : public ::testing::Test {
   boost::asio::io_context loop;
   VirtualClock clock{loop};
   TaskGroup tasks{loop};
-  Station station{loop, clock, Envelope{}, LinkTimes{}};
+  Station station;
   RecordingSink sink;
   FakeArchive archive;
   static constexpr DoorLimits kPlaces{400, 100, 50, 300};

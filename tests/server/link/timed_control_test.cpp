@@ -1,54 +1,11 @@
 // Commands that wait on the robot for their time: their ends, and that they outlive nobody's control.
 #include "server/link/robot_session.hpp"
-#include "tests/server/link/link_fixture.hpp"
+#include "tests/server/link/timed_fixture.hpp"
 
 namespace server {
 namespace {
 
-class TimedControlTest : public LinkTest {
- protected:
-  std::uint64_t in_ms(std::uint64_t ms) const { return robot->robot_now_us() + ms * 1000; }
-  CommandRequest timed(protocol::Command command, std::uint64_t at_us, const char* actor) const {
-    command.has_execute_at_robot_us = true;
-    command.execute_at_robot_us = at_us;
-    CommandRequest request = request_of(command, 8s);
-    request.actor = actor;
-    request.until_verified = true;
-    return request;
-  }
-  protocol::Command take_in(CommandRequest request) {
-    submit(std::move(request));
-    clock.settle();
-    const protocol::Command sent = robot->commands().back();
-    protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
-    frame.which_body = rheonaut_RobotFrame_command_ack_tag;
-    frame.body.command_ack.command_id = sent.command_id;
-    frame.body.command_ack.result = rheonaut_COMMAND_RESULT_ACCEPTED;
-    frame.body.command_ack.effect_at_robot_us = sent.execute_at_robot_us;
-    robot->send(frame);
-    clock.settle();
-    return sent;
-  }
-  std::vector<const char*> kinds() const {
-    std::vector<const char*> found;
-    for (const auto& command : robot->commands()) found.push_back(protocol::kind(command));
-    return found;
-  }
-  std::size_t drops() const {
-    return static_cast<std::size_t>(
-        std::ranges::count_if(kinds(), [](const char* kind) { return kind == std::string{"drop_timed"}; }));
-  }
-  void control(ControlAction action, const char* actor) {
-    EXPECT_TRUE(station.control({"r1", actor, "", action, kControlLife, "because"}));
-    clock.settle();
-  }
-  void accept_last() {
-    robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED);
-    clock.settle();
-  }
-
-  TestRobot* robot = connect();
-};
+using TimedControlTest = TimedTest;
 
 TEST_F(TimedControlTest, IsLookedForFromItsTimeOn) {
   const std::uint64_t at_us = in_ms(6000);

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <deque>
 #include <limits>
 
 namespace server {
@@ -68,12 +69,13 @@ class CommandGateTest : public ::testing::Test {
 
   // What speaks against the command: its reason and its sentence; empty when nothing does.
   std::string refusal(const protocol::Command& command) const {
-    const auto checked = check_command(command, robot, envelope);
+    const auto checked = check_command(command, robot, envelope, ahead);
     return checked ? "" : checked.error().reason + ": " + checked.error().detail;
   }
 
   Envelope envelope;
   RobotState robot;
+  OrdersAhead ahead;
 };
 
 TEST_F(CommandGateTest, ValuesOutsideTheirRangeAreRefusedWithTheLimit) {
@@ -101,6 +103,91 @@ TEST_F(CommandGateTest, AStepOfTheSetpointCountsFromTheSetpointInForceElseFromTh
   EXPECT_EQ(refusal(automatic(0.2F)), "") << "a setpoint of an auto mode that has ended is in force no more";
   robot.sample.reset();
   EXPECT_EQ(refusal(automatic(0.9F)), "") << "nothing is known of where it is";
+}
+
+// Of 0.2 m, with 0.1 in force; times count in seconds from now, the robot's 100 s.
+class StepsTest : public CommandGateTest {
+ protected:
+  StepsTest() {
+    CommandLimits limits;
+    limits.setpoint_step_m = 0.2;
+    envelope = Envelope{limits};
+    robot.context.mode = rheonaut_MODE_AUTO;
+    robot.context.setpoint_m = 0.1F;
+    robot.latest_robot_time_us = at_us(0);
+  }
+  static std::uint64_t at_us(double after_s) { return static_cast<std::uint64_t>((100 + after_s) * 1e6); }
+  static protocol::Command in(double after_s, protocol::Command command, double life_s = 8) {
+    command.has_execute_at_robot_us = after_s > 0;
+    command.execute_at_robot_us = at_us(after_s);
+    command.valid_until_robot_us = at_us(life_s);
+    return command;
+  }
+  static protocol::Command now(protocol::Command command, double life_s = 1) { return in(0, command, life_s); }
+  void held(const protocol::Command& command) {
+    const std::uint64_t time_us = command.execute_at_robot_us;
+    ahead.push_back({&commands.emplace_back(command), time_us, time_us, true});
+  }
+  void on_its_way(const protocol::Command& command) {
+    ahead.push_back(unanswered_order(commands.emplace_back(command), at_us(0)));
+  }
+
+ private:
+  std::deque<protocol::Command> commands;
+};
+
+TEST_F(StepsTest, ASetpointNowKeepsAStepFromTheNextThatWaits) {
+  held(in(5, setpoint(0.3F)));
+  held(in(6, setpoint(0.5F)));
+  EXPECT_EQ(refusal(now(setpoint(0.1F))), "") << "that of 0.5 comes after that of 0.3";
+  EXPECT_THAT(refusal(now(setpoint(-0.1F))),
+              HasSubstr("step_too_large: setpoint_m = -0.1 is 0.400 m from the setpoint 0.300 that waits for "
+                        "execute_at_robot_us = 105000000; a step is at most 0.2 m; what waits is dropped by set_mode"));
+  EXPECT_THAT(refusal(now(automatic(-0.1F))), HasSubstr("step_too_large")) << "in auto with a setpoint, too";
+}
+
+TEST_F(StepsTest, ASetpointThatIsToWaitFitsBetweenThoseBeforeAndAfterIt) {
+  held(in(2, automatic(0.3F)));
+  held(in(6, setpoint(0.1F)));
+  EXPECT_EQ(refusal(in(4, setpoint(0.25F), 5)), "");
+  EXPECT_THAT(refusal(in(4, setpoint(0.4F), 5)), HasSubstr("0.300 m from the setpoint 0.100 that waits"));
+  EXPECT_THAT(refusal(in(4, setpoint(0.05F), 5)), HasSubstr("0.250 m from the setpoint 0.300 that waits"));
+  EXPECT_THAT(refusal(in(1, setpoint(0.4F), 1.5)), HasSubstr("from the setpoint 0.100; a step")) << "from that in force";
+  EXPECT_EQ(refusal(in(7, setpoint(-0.1F))), "") << "two steps from those at 2 s";
+}
+
+TEST_F(StepsTest, WhatMayComeLateKeepsAStepFromAllThatItMayMeet) {
+  held(in(2, setpoint(0.2F)));
+  held(in(5, setpoint(0.35F)));
+  EXPECT_EQ(refusal(now(setpoint(0.05F), 1)), "");
+  EXPECT_THAT(refusal(now(setpoint(0.05F), 3)), HasSubstr("from the setpoint 0.350 that waits"))
+      << "it may come after 2 s";
+}
+
+TEST_F(StepsTest, WhatTheRobotHasNotAcknowledgedMayComeOrNot) {
+  on_its_way(in(2, setpoint(0.3F)));
+  EXPECT_THAT(refusal(in(4, setpoint(0.5F))), HasSubstr("from the setpoint 0.100; a step"));
+  EXPECT_THAT(refusal(in(4, setpoint(0.05F))), HasSubstr("from the setpoint 0.300 that waits"));
+  on_its_way(now(setpoint(0)));
+  EXPECT_THAT(refusal(now(setpoint(0.25F))), HasSubstr("from the setpoint 0.000 on its way; a step is at most 0.2 m ("))
+      << "no way out is told, for it waits for nothing";
+}
+
+TEST_F(CommandGateTest, WhatWaitsCountsForTheTimeAtPower) {
+  auto waiting = schedule({{0, 1}, {4000, 0}});
+  auto duty_waiting = duty(1);
+  duty_waiting.action.set_duty.lease_ms = 400;
+  duty_waiting.has_execute_at_robot_us = waiting.has_execute_at_robot_us = true;
+  ahead = {{&waiting, 1, 1, true}, {&duty_waiting, 2, 2, true}};
+  EXPECT_EQ(refusal(schedule({{0, 1}, {1960, 0}})), "") << "40 s, 0.4 s and 19.6 s";
+  EXPECT_THAT(refusal(schedule({{0, 1}, {1961, 0}})),
+              HasSubstr("too_long_at_power: duty = 1 is above 0.9, where robot 'nemo' has run for 0.0 s, and what waits "
+                        "for its time asks for 40.4 s more; the limit is 60 s"));
+  robot.at_power_s = 19.7;
+  EXPECT_THAT(refusal(duty(1)), HasSubstr("too_long_at_power"));
+  EXPECT_EQ(refusal(duty(0.5F)), "");
+  robot.sample->duty = 1;
+  EXPECT_EQ(refusal(renewal()), "") << "what runs is held to what has run";
 }
 
 TEST_F(CommandGateTest, TheMotorIsNotCommandedBeyondItsTimeAtPower) {
@@ -154,6 +241,17 @@ TEST(Envelope, TheLooserLimitsOfAFluidNeverHoldWhereItIsNotKnown) {
   EXPECT_EQ(envelope.strictest(), strict);
   EXPECT_EQ(envelope.in("oil"), loose);
   EXPECT_EQ(envelope.in("water"), strict) << "a built-in fluid without limits of its own";
+}
+
+TEST(Envelope, LimitsAreNarrowerInAnyOfTheirQuantities) {
+  CommandLimits limits, others;
+  EXPECT_FALSE(is_narrower_than(limits, others));
+  limits.duty_max = 0.5;
+  limits.power_s = 100;
+  EXPECT_TRUE(is_narrower_than(limits, others));
+  EXPECT_TRUE(is_narrower_than(others, limits));
+  limits.duty_max = 1;
+  EXPECT_FALSE(is_narrower_than(limits, others));
 }
 
 TEST(Envelope, AnUnknownFluidIsRefusedWithTheList) {

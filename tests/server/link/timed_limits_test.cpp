@@ -1,0 +1,134 @@
+// The limits of commands that wait on the robot for their time: steps between them, and the fluid.
+#include <gmock/gmock.h>
+
+#include "tests/server/link/timed_fixture.hpp"
+
+namespace server {
+namespace {
+
+using ::testing::HasSubstr;
+
+// Steps of 0.25 m, in auto at 0; in water a duty of 0.5 at most.
+class TimedLimitsTest : public TimedTest {
+ protected:
+  TimedLimitsTest() : TimedTest{envelope()} {
+    EXPECT_TRUE(station.set_fluid("r1", "non_newtonian", {"a", "", 0}));
+    show_setpoint(0);
+  }
+  static Envelope envelope() {
+    CommandLimits limits, water;
+    limits.setpoint_step_m = water.setpoint_step_m = 0.25;
+    water.duty_max = 0.5;
+    return Envelope{limits, {{"water", water}}};
+  }
+  void show_setpoint(float setpoint_m) {
+    auto frame = TestRobot::samples_frame(next_seq_++, 1, robot->robot_now_us(), 0);
+    frame.body.telemetry.mode = rheonaut_MODE_AUTO;
+    frame.body.telemetry.has_setpoint_m = true;
+    frame.body.telemetry.setpoint_m = setpoint_m;
+    robot->send(frame);
+    clock.settle();
+  }
+  CommandRequest now(protocol::Command command, microseconds life = 1s) const {
+    CommandRequest request = request_of(command, life);
+    request.actor = "a";
+    return request;
+  }
+  // What speaks against it; empty when it is sent.
+  std::string refusal(CommandRequest request) {
+    const std::size_t before = results.size();
+    submit(std::move(request));
+    clock.settle();
+    return results.size() == before ? "" : results.back().error().reason + ": " + results.back().error().detail;
+  }
+
+ private:
+  std::uint64_t next_seq_ = 0;
+};
+
+TEST_F(TimedLimitsTest, ASetpointNowIsNotMoreThanAStepFromOneThatWaits) {
+  take_in(timed(set_setpoint(0.25F), in_ms(5000), "a"));
+  EXPECT_THAT(refusal(now(set_setpoint(-0.25F))), HasSubstr("step_too_large"));
+  EXPECT_EQ(refusal(now(set_setpoint(0))), "");
+}
+
+TEST_F(TimedLimitsTest, AStaircaseIsTakenInStepByStep) {
+  take_in(timed(set_setpoint(0.25F), in_ms(1000), "a"));
+  take_in(timed(set_setpoint(0.5F), in_ms(2000), "a"));
+  EXPECT_EQ(refusal(timed(set_setpoint(0.75F), in_ms(3000), "a")), "");
+  EXPECT_THAT(refusal(timed(set_setpoint(1), in_ms(4000), "a")), HasSubstr("from the setpoint 0.500 that waits"))
+      << "the step before it is not acknowledged";
+}
+
+TEST_F(TimedLimitsTest, OneOnItsWayCountsUntilTelemetryShowsWhatIsInForce) {
+  EXPECT_EQ(refusal(now(set_setpoint(0.25F), 8s)), "");
+  EXPECT_THAT(refusal(now(set_setpoint(-0.25F))), HasSubstr("from the setpoint 0.250 on its way"));
+  accept_last();
+  results.clear();
+  EXPECT_THAT(refusal(now(set_setpoint(-0.25F))), HasSubstr("step_too_large")) << "acknowledged, and not seen yet";
+  clock.run_for(50ms);
+  show_setpoint(0.25F);
+  EXPECT_THAT(refusal(now(set_setpoint(-0.25F))), HasSubstr("from the setpoint 0.250; a step is"));
+  EXPECT_EQ(refusal(now(set_setpoint(0))), "");
+}
+
+TEST_F(TimedLimitsTest, OneWithoutAnAnswerCountsUntilTelemetryComesFromAfterItsLife) {
+  EXPECT_EQ(refusal(now(set_setpoint(0.25F), 500ms)), "");
+  ASSERT_TRUE(clock.run_until([&] { return !results.empty(); }, 3s));
+  EXPECT_EQ(results[0]->state, CommandState::unknown);
+  EXPECT_THAT(refusal(now(set_setpoint(-0.25F))), HasSubstr("from the setpoint 0.250 on its way"));
+  show_setpoint(0);
+  EXPECT_EQ(refusal(now(set_setpoint(-0.25F))), "");
+}
+
+TEST_F(TimedLimitsTest, OfAFormerHolderHindersNobody) {
+  take_in(timed(set_setpoint(0.25F), in_ms(7000), "a"));
+  clock.run_for(3100ms);
+  CommandRequest next = now(set_setpoint(-0.25F));
+  next.actor = "b";
+  EXPECT_EQ(refusal(next), "");
+  EXPECT_EQ(drops(), 1U);
+}
+
+TEST_F(TimedLimitsTest, ItIsDroppedWhenTheLimitsOfTheFluidBecomeNarrower) {
+  const auto sent = take_in(timed(set_duty(0.8F), in_ms(5000), "a"));
+  ASSERT_TRUE(station.set_fluid("r1", "water", {"a", "", 0}));
+  clock.settle();
+  EXPECT_EQ(drops(), 1U);
+  robot->acknowledge(sent, rheonaut_COMMAND_RESULT_EXPIRED);
+  accept_last();
+  EXPECT_EQ(latest(sent.command_id).state, CommandState::expired);
+  EXPECT_EQ(latest(sent.command_id).reason, "limits_changed");
+
+  take_in(timed(set_duty(0.5F), in_ms(3000), "a"));
+  ASSERT_TRUE(station.set_fluid("r1", "non_newtonian", {"a", "", 0}));
+  clock.settle();
+  EXPECT_EQ(drops(), 1U) << "the limits have become wider";
+  ASSERT_TRUE(station.set_fluid("r1", "", {"a", "", 0}));
+  clock.settle();
+  EXPECT_EQ(drops(), 2U) << "the strictest hold";
+}
+
+TEST_F(TimedLimitsTest, ItIsDroppedLaterWhenTheLinkWasFullAndNothingIsRenewedBefore) {
+  take_in(timed(set_duty(0.8F), in_ms(7000), "a"));
+  protocol::Command ping = rheonaut_Command_init_zero;
+  ping.which_action = rheonaut_Command_ping_tag;
+  for (std::size_t i = 0; i < CommandWindow::kMost + RobotSession::kMaxQueuedCommands; ++i) submit(ping, 5s);
+  clock.settle();
+  ASSERT_TRUE(station.set_fluid("r1", "water", {"a", "", 0}));
+  protocol::Command renewal = rheonaut_Command_init_zero;
+  renewal.which_action = rheonaut_Command_renew_lease_tag;
+  EXPECT_THAT(refusal(now(renewal)), HasSubstr("queue_full"));
+  for (std::size_t i = 1; i < robot->commands().size(); ++i) {
+    robot->acknowledge(robot->commands()[i], rheonaut_COMMAND_RESULT_ACCEPTED);
+    clock.settle();
+    if (i == 5) submit(now(renewal));
+  }
+  const auto sent = kinds();
+  const auto drop = std::ranges::find(sent, std::string{"drop_timed"}) - sent.begin();
+  EXPECT_LT(drop, std::ranges::find(sent, std::string{"renew_lease"}) - sent.begin());
+  EXPECT_EQ(drops(), 1U);
+}
+
+}  // namespace
+}  // namespace server
