@@ -177,13 +177,18 @@ void Station::end_dropped(Seat& seat, const protocol::CommandAck& ack) {
   if (!was_rejected && ack.result != rheonaut_COMMAND_RESULT_EXPIRED) return;
   const auto pending = *found;
   seat.unseen.erase(found);
+  if (pending->dropped_because == nullptr && setpoint_of(pending->wire)) seat.has_lost_a_step = true;
   end(*pending, was_rejected ? CommandState::rejected : CommandState::expired,
       was_rejected ? text_or_number(ack.reason) : pending->expiry());
 }
 
 void Station::end_unseen(Seat& seat, const char* reason) {
   for (auto* waiting : {&seat.unseen, &seat.unread}) {
-    for (const auto& pending : std::exchange(*waiting, {})) end(*pending, CommandState::acknowledged, reason);
+    for (const auto& pending : std::exchange(*waiting, {})) {
+      const bool may_be_dropped = pending->wire.has_execute_at_robot_us;  // of which the robot tells when it is back
+      end(*pending, may_be_dropped ? CommandState::unknown : CommandState::acknowledged, reason);
+      if (may_be_dropped) seat.keep_unknown(pending);
+    }
   }
 }
 

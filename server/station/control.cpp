@@ -1,6 +1,7 @@
 // The station's side of control: one door for what people ask, and what they are told of each change.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
@@ -26,6 +27,12 @@ const char* text(ControlAction action) {
     case ControlAction::hand_over: return "hand_over";
   }
   return "take";
+}
+
+bool has_timed_setpoint(const Seat& seat) {
+  return std::ranges::any_of(seat.orders_ahead(), [](const OrderAhead& order) {
+    return order.command->has_execute_at_robot_us && setpoint_of(*order.command);
+  });
 }
 
 bool is_of_old_picture(const CommandRequest& request) {
@@ -66,6 +73,8 @@ bool Station::drop_timed(Seat& seat) {
   RobotState& robot = *seat.robot;
   const bool may_wait = !seat.timed_by.empty() && robot.latest_robot_time_us <= seat.timed_until_robot_us + kDueGraceUs;
   if (!may_wait) seat.drop_timed_because = nullptr;
+  const bool has_lost_a_step = std::exchange(seat.has_lost_a_step, false);
+  if (may_wait && has_lost_a_step && has_timed_setpoint(seat)) seat.drop_timed_because = "step_before_dropped";
   if (may_wait && authority_.of(robot.id).holder != seat.timed_by) seat.drop_timed_because = "control_ended";
   const bool is_lost = seat.drop_timed_id != 0 && !seat.commands.contains(seat.drop_timed_id);
   if ((seat.drop_timed_because == nullptr && !is_lost) || seat.port == nullptr) return true;

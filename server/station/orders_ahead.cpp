@@ -15,13 +15,6 @@ namespace {
 constexpr auto kWayOut =
     "; what waits is dropped by set_mode manual, by the release of control, or when it is not renewed for 500 ms";
 
-std::optional<double> setpoint_of(const protocol::Command& command) {
-  if (command.which_action == rheonaut_Command_set_setpoint_tag) return command.action.set_setpoint.setpoint_m;
-  const bool is_auto =
-      command.which_action == rheonaut_Command_set_mode_tag && command.action.set_mode.mode == rheonaut_MODE_AUTO;
-  return is_auto ? std::optional<double>{command.action.set_mode.setpoint_m} : std::nullopt;
-}
-
 // Setpoints are floats on the way: a step of just the limit is one.
 bool is_too_large(double step_m, const CommandLimits& limits) {
   return std::isfinite(step_m) && step_m > limits.setpoint_step_m + 1e-6;
@@ -29,10 +22,11 @@ bool is_too_large(double step_m, const CommandLimits& limits) {
 
 std::unexpected<Error> too_large(double setpoint_m, double from_m, const std::string& from, const char* way_out,
                                  const CommandLimits& limits) {
-  return fail(ErrorCode::invalid,
-              fmt::format("setpoint_m = {} is {:.3f} m from {}; a step is at most {} m{}", setpoint_m,
-                          std::abs(setpoint_m - from_m), from, limits.setpoint_step_m, way_out),
-              "step_too_large");
+  return fail(
+      ErrorCode::invalid,
+      fmt::format("setpoint_m = {} is {:.3f} m from {}; a step is at most {} m{}", static_cast<float>(setpoint_m),
+                  std::abs(setpoint_m - from_m), from, limits.setpoint_step_m, way_out),
+      "step_too_large");
 }
 
 bool has_held_between(const OrdersAhead& ahead, std::uint64_t after_us, std::uint64_t before_us) {
@@ -58,6 +52,13 @@ std::string described(double setpoint_m, const OrderAhead& order) {
 }
 
 }  // namespace
+
+std::optional<double> setpoint_of(const protocol::Command& command) {
+  if (command.which_action == rheonaut_Command_set_setpoint_tag) return command.action.set_setpoint.setpoint_m;
+  const bool is_auto =
+      command.which_action == rheonaut_Command_set_mode_tag && command.action.set_mode.mode == rheonaut_MODE_AUTO;
+  return is_auto ? std::optional<double>{command.action.set_mode.setpoint_m} : std::nullopt;
+}
 
 OrderAhead unanswered_order(const protocol::Command& command, std::uint64_t robot_now_us) {
   OrderAhead order{&command, robot_now_us};
@@ -98,7 +99,8 @@ double at_power_s(const protocol::Command& command, std::uint32_t tick_us, const
   const auto& schedule = command.action.set_duty_schedule;
   double sum_s = 0;  // the last duty ends it
   for (pb_size_t i = 0; i + 1 < std::min(schedule.duty_count, schedule.tick_count); ++i) {
-    if (is_at_power(schedule.duty[i])) sum_s += (static_cast<double>(schedule.tick[i + 1]) - schedule.tick[i]) * tick_us;
+    if (is_at_power(schedule.duty[i]))
+      sum_s += (static_cast<double>(schedule.tick[i + 1]) - schedule.tick[i]) * tick_us;
   }
   return sum_s / 1e6;
 }

@@ -19,6 +19,8 @@ struct OrderAhead {
 };
 using OrdersAhead = std::vector<OrderAhead>;
 
+std::optional<double> setpoint_of(const protocol::Command& command);
+
 // When the command acts that the robot has not acknowledged: from its time on, or from now, until the end of its life.
 OrderAhead unanswered_order(const protocol::Command& command, std::uint64_t robot_now_us);
 

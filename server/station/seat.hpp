@@ -61,12 +61,14 @@ struct Seat {
   std::string timed_by;
   std::uint64_t timed_until_robot_us = 0;
   const char* drop_timed_because = nullptr;  // why they have to be dropped; null: they need not
-  CommandId drop_timed_id = 0;               // that drops them, until it is acknowledged; 0: none
+  bool has_lost_a_step = false;  // the robot dropped a setpoint of its own accord: another may have built on it
+  CommandId drop_timed_id = 0;   // that drops them, until it is acknowledged; 0: none
 
   // Stops that no robot has acknowledged; the newest, null when there is none, and how many there are.
   std::shared_ptr<PendingCommand> newest_stop() const;
   std::size_t stops() const;
   std::shared_ptr<PendingCommand> on_its_way(CommandId id) const;  // of both; null when it is none of them
+  void keep_unknown(std::shared_ptr<PendingCommand> ended);        // which has ended so
   // What telemetry does not show yet, but what is being dropped. Points into the commands of this seat.
   OrdersAhead orders_ahead() const;
 };

@@ -164,7 +164,6 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
     seat.unknown.clear();  // what the boot before knew of them is gone
     seat.timed_by.clear();
     seat.timed_until_robot_us = seat.drop_timed_id = 0;
-    seat.drop_timed_because = nullptr;
   }
   robot.context.controller_id = details.controller_id;
   robot.context.mode = details.mode;
@@ -192,6 +191,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
     hand_stop_to(seat, *relatch);
     if (relatch->record.state == CommandState::queued) publish(relatch->record);
   }
+  seat.drop_timed_because = "link_lost";  // as the robot drops it when it notices
   drop_timed(seat);
   note(robot, "connected", fmt::format("from {}", peer));
   publish(robot);
@@ -308,6 +308,8 @@ void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) 
   robot.oldest_seq = std::max(robot.oldest_seq, batch.oldest_seq);
   for (StationSink* sink : sinks_) sink->on_samples(robot, batch);
   if (!seat->unseen.empty()) look_for_commands(*seat, batch);
+  // SAFETY: by now every acknowledgement has come of what the robot dropped together; what is left was judged wrongly.
+  if (seat->has_lost_a_step) drop_timed(*seat);
   if (!seat->commands.empty() || !seat->unknown.empty()) settle_by_samples(*seat, batch);
 }
 

@@ -58,7 +58,9 @@ void Station::prepare_proof(Seat& seat, PendingCommand& pending) {
     other.look_until_robot_us = std::min(other.look_until_robot_us, now_us);
   };
   for (const auto& [id, other] : seat.commands) compare(*other);
-  for (const auto& other : seat.unknown) compare(*other);
+  for (const auto* others : {&seat.unknown, &seat.unseen}) {
+    for (const auto& other : *others) compare(*other);
+  }
 }
 
 // A command that was sent, when no answer is to be expected any more.
@@ -69,8 +71,12 @@ void Station::end_without_answer(Seat& seat, CommandId id, const char* reason) {
     return finish(seat, id, CommandState::verified, reason);
   }
   finish(seat, id, CommandState::unknown, reason);
-  if (seat.unknown.size() >= kMaxUnknown) seat.unknown.pop_front();
-  seat.unknown.push_back(pending);
+  seat.keep_unknown(pending);
+}
+
+void Seat::keep_unknown(std::shared_ptr<PendingCommand> ended) {
+  if (unknown.size() >= kMaxUnknown) unknown.pop_front();
+  unknown.push_back(std::move(ended));
 }
 
 // One whose end was unknown waits for its end again; null when it is not one of those.

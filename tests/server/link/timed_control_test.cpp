@@ -133,10 +133,8 @@ TEST_F(TimedControlTest, IsDroppedAheadOfTheNextHoldersFirstCommand) {
 // SAFETY: nobody's command passes the one that drops what waits.
 TEST_F(TimedControlTest, IsDroppedBeforeAnythingElseAlsoWhenTheLinkWasFull) {
   take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
-  protocol::Command ping = rheonaut_Command_init_zero;
-  ping.which_action = rheonaut_Command_ping_tag;
   for (std::size_t i = 0; i < CommandWindow::kMost + RobotSession::kMaxQueuedCommands; ++i) {
-    submit(ping, 8s);
+    submit(ping(), 8s);
     clock.settle();
   }
   control(ControlAction::force, "b");
@@ -175,13 +173,7 @@ TEST_F(TimedControlTest, IsDroppedFirstOnTheNextConnectionWhenTheLinkWasCut) {
   take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
   control(ControlAction::release, "a");
   ASSERT_EQ(drops(), 1U) << "and the link is cut before the answer";
-  robot->link.cut();
-  clock.settle();
-  const std::int64_t booted_at_us = robot->booted_at_us;
-  robot = dial();
-  robot->booted_at_us = booted_at_us;
-  robot->say_hello();
-  ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));
+  come_back();
   EXPECT_EQ(robot->commands()[0].which_action, rheonaut_Command_drop_timed_tag);
 }
 
@@ -203,6 +195,46 @@ TEST_F(TimedControlTest, IsDroppedAgainWhenThatCameTooLateButNotForAFirmwareThat
   clock.settle();
   submit_as_b();
   EXPECT_EQ(drops(), 2U);
+}
+
+TEST_F(TimedControlTest, OfALostLinkEndsAsTheRobotSaysWhenItIsBack) {
+  const auto sent = take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  come_back();
+  EXPECT_EQ(latest(sent.command_id).state, CommandState::unknown);
+  EXPECT_EQ(latest(sent.command_id).reason, "link_lost");
+  ASSERT_EQ(robot->commands().size(), 1U);
+  EXPECT_EQ(robot->commands()[0].which_action, rheonaut_Command_drop_timed_tag) << "nor does it outlive the link";
+  robot->acknowledge(sent, rheonaut_COMMAND_RESULT_EXPIRED);
+  accept_last();
+  EXPECT_EQ(latest(sent.command_id).state, CommandState::expired);
+  EXPECT_EQ(latest(sent.command_id).reason, "link_lost");
+}
+
+// The robot came back before it noticed, and it ran before it could be dropped.
+TEST_F(TimedControlTest, OfALostLinkIsVerifiedBySamplesThatNothingElseExplains) {
+  const auto show_duty_at = [this](std::uint64_t seq, std::uint64_t at_us, float duty) {
+    auto frame = TestRobot::samples_frame(seq, 1, at_us, 0);
+    frame.body.telemetry.duty[0] = duty;
+    robot->send(frame);
+    clock.settle();
+  };
+  show_duty_at(0, in_ms(0), 0);
+  const std::uint64_t at_us = in_ms(1000);
+  const auto alone = take_in(timed(set_duty(0.25F), at_us, "a"));
+  come_back();
+  clock.run_for(1s);
+  show_duty_at(1, at_us, 0.25F);
+  EXPECT_EQ(latest(alone.command_id).state, CommandState::verified);
+
+  clock.run_for(10s);
+  show_duty_at(2, in_ms(0), 0);
+  const std::uint64_t next_us = in_ms(1000);
+  const auto first = take_in(timed(set_duty(0.25F), next_us, "a"));
+  take_in(timed(set_duty(0.25F), in_ms(500), "a"));
+  come_back();
+  clock.run_for(1s);
+  show_duty_at(3, next_us, 0.25F);
+  EXPECT_EQ(latest(first.command_id).state, CommandState::unknown) << "the other one may have brought it about";
 }
 
 TEST_F(TimedControlTest, LeavesThoseThatTheHolderStillControls) {

@@ -44,6 +44,22 @@ class TimedTest : public LinkTest {
     EXPECT_TRUE(station.control({"r1", actor, "", action, kControlLife, "because"}));
     clock.settle();
   }
+  static protocol::Command ping() {
+    protocol::Command command = rheonaut_Command_init_zero;
+    command.which_action = rheonaut_Command_ping_tag;
+    return command;
+  }
+  // The same boot, over a new connection.
+  void come_back() {
+    robot->link.cut();
+    clock.settle();
+    const std::int64_t booted_at_us = robot->booted_at_us;
+    robot = dial();
+    robot->booted_at_us = booted_at_us;
+    robot->say_hello();
+    ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));
+    robot->keep_talking();
+  }
   const CommandRecord& latest(CommandId id) const {
     return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &CommandRecord::id);
   }

@@ -1,6 +1,7 @@
 // The limits of commands that wait on the robot for their time: steps between them, and the fluid.
 #include <gmock/gmock.h>
 
+#include "server/link/robot_session.hpp"
 #include "tests/server/link/timed_fixture.hpp"
 
 namespace server {
@@ -61,6 +62,7 @@ TEST_F(TimedLimitsTest, AStaircaseIsTakenInStepByStep) {
 }
 
 TEST_F(TimedLimitsTest, OneOnItsWayCountsUntilTelemetryShowsWhatIsInForce) {
+  clock.run_for(20ms);
   EXPECT_EQ(refusal(now(set_setpoint(0.25F), 8s)), "");
   EXPECT_THAT(refusal(now(set_setpoint(-0.25F))), HasSubstr("from the setpoint 0.250 on its way"));
   accept_last();
@@ -111,10 +113,10 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheLimitsOfTheFluidBecomeNarrower) {
 
 TEST_F(TimedLimitsTest, ItIsDroppedLaterWhenTheLinkWasFullAndNothingIsRenewedBefore) {
   take_in(timed(set_duty(0.8F), in_ms(7000), "a"));
-  protocol::Command ping = rheonaut_Command_init_zero;
-  ping.which_action = rheonaut_Command_ping_tag;
-  for (std::size_t i = 0; i < CommandWindow::kMost + RobotSession::kMaxQueuedCommands; ++i) submit(ping, 5s);
-  clock.settle();
+  for (std::size_t i = 0; i < CommandWindow::kMost + RobotSession::kMaxQueuedCommands; ++i) {
+    submit(ping(), 5s);
+    clock.settle();
+  }
   ASSERT_TRUE(station.set_fluid("r1", "water", {"a", "", 0}));
   protocol::Command renewal = rheonaut_Command_init_zero;
   renewal.which_action = rheonaut_Command_renew_lease_tag;
@@ -128,6 +130,27 @@ TEST_F(TimedLimitsTest, ItIsDroppedLaterWhenTheLinkWasFullAndNothingIsRenewedBef
   const auto drop = std::ranges::find(sent, std::string{"drop_timed"}) - sent.begin();
   EXPECT_LT(drop, std::ranges::find(sent, std::string{"renew_lease"}) - sent.begin());
   EXPECT_EQ(drops(), 1U);
+}
+
+// The robot refuses one by itself; whatever was a step from it is more than that from what is in force.
+TEST_F(TimedLimitsTest, ItIsDroppedWhenTheSetpointBeforeItWas) {
+  const auto first = take_in(timed(set_setpoint(0.25F), in_ms(1000), "a"));
+  const auto second = take_in(timed(set_setpoint(0.5F), in_ms(2000), "a"));
+  clock.run_for(1s);
+  robot->acknowledge(first, rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_UNCERTAIN);
+  show_setpoint(0);
+  EXPECT_EQ(drops(), 1U);
+  robot->acknowledge(second, rheonaut_COMMAND_RESULT_EXPIRED);
+  accept_last();
+  EXPECT_EQ(latest(second.command_id).reason, "step_before_dropped");
+}
+
+TEST_F(TimedLimitsTest, NothingIsDroppedAgainThatTheRobotDroppedTogether) {
+  const auto first = take_in(timed(set_setpoint(0.25F), in_ms(1000), "a"));
+  const auto second = take_in(timed(set_setpoint(0.5F), in_ms(2000), "a"));
+  for (const auto& command : {first, second}) robot->acknowledge(command, rheonaut_COMMAND_RESULT_EXPIRED);
+  show_setpoint(0);
+  EXPECT_EQ(drops(), 0U);
 }
 
 }  // namespace
