@@ -1,10 +1,14 @@
-// The commands that were written to a robot and are not answered: never more than it can acknowledge.
+// The acknowledgements that a robot may owe: never more than it can keep.
 //
 // A robot keeps 8 acknowledgements that it could not send yet. Two places are for an emergency stop and its repetition,
-// which ask nobody and are not counted here. Pure.
+// which ask nobody and are not counted here. A command takes a place from when it is written until it is answered. One
+// that waits on the robot for its time may be answered twice, the second time when it is dropped, and all that wait are
+// dropped together: it takes two places, and after its first answer one until its time has passed. Pure.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "server/station/station_state.hpp"
@@ -17,21 +21,43 @@ class CommandWindow {
   // An answer that has not come so long after the end of the command's validity never comes, and holds its place no
   // longer.
   static constexpr std::int64_t kAnswerGraceUs = 1'000'000;
+  static constexpr std::uint64_t kDueGraceUs = 200'000;  // so long after its time a command has run or is dropped
 
-  bool has_room(std::int64_t now_us) {
+  bool has_room(const protocol::Command& command, std::int64_t now_us) {
     std::erase_if(written_, [now_us](const Written& one) { return now_us >= one.deadline_us + kAnswerGraceUs; });
-    return written_.size() < kMost;
+    std::size_t taken = places(command);
+    for (const Written& one : written_) taken += one.places;
+    return taken <= kMost;
   }
-  void written(CommandId id, std::int64_t deadline_us) { written_.push_back({id, deadline_us}); }
-  void answered(CommandId id) {
+  void written(const protocol::Command& command, std::int64_t deadline_us) {
+    written_.push_back({command.command_id, deadline_us, places(command)});
+  }
+  void answered(const protocol::CommandAck& ack) {
+    const auto found = std::ranges::find(written_, ack.command_id, &Written::id);
+    if (found == written_.end()) return;
+    const bool may_be_dropped = found->places == 2 && ack.result == rheonaut_COMMAND_RESULT_ACCEPTED;
+    if (!may_be_dropped) return ended(ack.command_id);
+    found->places = 1;
+    found->due_robot_us = ack.effect_at_robot_us;
+  }
+  void ended(CommandId id) {
     std::erase_if(written_, [id](const Written& one) { return one.id == id; });
+  }
+  // By a frame that robots send after every acknowledgement that is due.
+  void robot_time_is(std::uint64_t robot_time_us) {
+    std::erase_if(written_,
+                  [robot_time_us](const Written& one) { return robot_time_us > one.due_robot_us + kDueGraceUs; });
   }
 
  private:
   struct Written {
     CommandId id;
     std::int64_t deadline_us;
+    std::size_t places;
+    std::uint64_t due_robot_us = std::numeric_limits<std::uint64_t>::max() - kDueGraceUs;  // once it waits there
   };
+  static std::size_t places(const protocol::Command& command) { return command.has_execute_at_robot_us ? 2 : 1; }
+
   std::vector<Written> written_;
 };
 

@@ -253,10 +253,11 @@ void RobotSession::on_frame(protocol::RobotFrame& frame) {
   station_.on_frame(*this, frame.robot_time_us);
   if (faults.count > 0) station_.on_invalid_values(*this, faults.count, faults.cause, faults.first);
   if (faults.is_unusable) return faults.has_number ? give_up(frame) : void();
+  if (frame.which_body != rheonaut_RobotFrame_command_ack_tag) window_.robot_time_is(frame.robot_time_us);
   switch (frame.which_body) {
     case rheonaut_RobotFrame_telemetry_tag: station_.on_samples(*this, frame.body.telemetry); break;
     case rheonaut_RobotFrame_event_tag:
-      window_.answered(frame.body.event.command_id);  // the answer came before the event of its command, or never will
+      window_.ended(frame.body.event.command_id);  // the answer came before the event of its command, or never will
       station_.on_event(*this, frame.body.event);
       break;
     case rheonaut_RobotFrame_status_tag: station_.on_status(*this, frame.body.status); break;
@@ -265,7 +266,7 @@ void RobotSession::on_frame(protocol::RobotFrame& frame) {
     case rheonaut_RobotFrame_command_ack_tag:
       if (frame.body.command_ack.command_id == awaited_stop_) awaited_stop_ = 0;
       if (frame.body.command_ack.command_id == awaited_command_) awaited_command_ = 0;
-      window_.answered(frame.body.command_ack.command_id);
+      window_.answered(frame.body.command_ack);
       station_.on_command_ack(*this, frame.body.command_ack);
       tell_what_is_awaited();
       break;
@@ -346,10 +347,10 @@ std::optional<protocol::StationFrame> RobotSession::next_frame() {
   while (!commands_.empty()) {
     const QueuedCommand next = commands_.front();
     const bool is_too_old = now_us >= next.deadline_us;  // SAFETY: what waited longer than its life is never sent
-    if (!is_too_old && !window_.has_room(now_us)) break;
+    if (!is_too_old && !window_.has_room(next.command, now_us)) break;
     commands_.pop_front();
     if (is_too_old) continue;
-    window_.written(next.command.command_id, next.deadline_us);
+    window_.written(next.command, next.deadline_us);
     frame.body.command = next.command;
     awaited_command_ = next.command.command_id;
     return frame;

@@ -237,6 +237,31 @@ TEST_F(TimedControlTest, OfALostLinkIsVerifiedBySamplesThatNothingElseExplains) 
   EXPECT_EQ(latest(first.command_id).state, CommandState::unknown) << "the other one may have brought it about";
 }
 
+// Its acknowledgement of a drop finds room on the robot, whatever else is on its way.
+TEST_F(TimedControlTest, KeepsAPlaceOfTheAcknowledgementsUntilItsEnd) {
+  std::vector<protocol::Command> waiting;
+  for (int i = 0; i < 4; ++i) waiting.push_back(take_in(timed(set_duty(0.25F), in_ms(5000), "a")));
+  for (int i = 0; i < 6; ++i) submit(ping(), 8s);
+  clock.settle();
+  EXPECT_EQ(robot->commands().size(), 4U + 2U);
+  robot->acknowledge(waiting[0], rheonaut_COMMAND_RESULT_EXPIRED);
+  clock.settle();
+  EXPECT_EQ(robot->commands().size(), 4U + 3U);
+  clock.run_for(5000ms);
+  EXPECT_EQ(robot->commands().size(), 4U + 3U);
+  clock.run_for(500ms);
+  EXPECT_EQ(robot->commands().size(), 4U + 6U) << "their time has passed, and no word came of them";
+}
+
+TEST_F(TimedControlTest, TakesTwoPlacesUntilTheRobotHasTakenItIn) {
+  for (int i = 0; i < 4; ++i) submit(timed(set_duty(0.25F), in_ms(5000), "a"));
+  clock.settle();
+  ASSERT_EQ(robot->commands().size(), 3U);
+  robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_BUSY);
+  clock.settle();
+  EXPECT_EQ(robot->commands().size(), 4U);
+}
+
 TEST_F(TimedControlTest, LeavesThoseThatTheHolderStillControls) {
   take_in(timed(set_duty(0.25F), in_ms(2000), "a"));
   control(ControlAction::take, "a");
