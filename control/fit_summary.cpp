@@ -70,10 +70,12 @@ void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const 
   }
 }
 
-void add_quality(const Eigen::VectorXd& residual, const std::vector<double>& measured, Fit& fit) {
+void add_quality(const OutputErrorSearch& search, const Eigen::VectorXd& residual, const std::vector<double>& measured,
+                 Fit& fit) {
   const Eigen::Map<const Eigen::VectorXd> y(measured.data(), residual.size());
   fit.fit_percent = 100 * (1 - residual.norm() / (y.array() - y.mean()).matrix().norm());
-  fit.residual_sd = residual.norm() / std::sqrt(static_cast<double>(residual.size()));
+  const Eigen::VectorXd counted = with_weight(search, residual);
+  fit.residual_sd = counted.norm() / std::sqrt(static_cast<double>(counted.size()));
 }
 
 std::optional<double>& p_value_of(Channel channel, Fit& fit) {
@@ -130,7 +132,7 @@ Fit summary(OutputErrorSearch& search, const Recording& recording, Cost cost, St
     fit.sse += residuals[c].squaredNorm();
     fit.absolute_error += residuals[c].lpNorm<1>() * recording.dt_s;
   }
-  add_quality(residuals.front(), *measured.front(), fit);
+  add_quality(search, residuals.front(), *measured.front(), fit);
   add_whiteness(channels, residuals, fit);
   fit.aic = akaike(search, cost, residuals, measured, fit.free_parameters);
   if (found.starts > 0) add_uncertainty(search, found.point, residuals, cost, fit);

@@ -80,7 +80,7 @@ std::string better_experiment(const Recording& recording, const Fit& fit, bool f
         std::sqrt(static_cast<double>(recording.duty.size()) / static_cast<double>(recording.position_time_s.size()));
   }
   plan.velocity_sd_m_s = standard_deviation(fit.velocity_residual_m_s);
-  plan.acceleration_sd_m_s2 = standard_deviation(fit.acceleration_residual_m_s2);
+  plan.acceleration_sd_m_s2 = fit.sensor ? fit.residual_sd : 0;
   plan.fits_offset = fits_offset;
   if (!can_be_planned_with(fit.model, plan)) return "change the duty during a longer run";
   const ExpectedUncertainty expected = expected_uncertainty(fit.model, plan);

@@ -114,7 +114,7 @@ struct Fit {
   double sse = 0;             // sum of squared residuals, of both channels in their own units
   double absolute_error = 0;  // (3) as an integral over time
   double fit_percent = 0;  // 100 (1 - |y - model|/|y - mean y|), of the first channel: position, velocity, acceleration
-  double residual_sd = 0;  // of the same channel
+  double residual_sd = 0;  // of the same channel, over the values that count
   double aic = 0;          // Σ_channels n ln(sse/n) + 2 free_parameters; absolute error: 2 n ln(Σ|r|/n) for the sum
   int free_parameters = 0;  // of the model, and offset and dead time if they are fitted; the noise's sd is not counted
   bool residuals_are_white = false;

@@ -118,8 +118,9 @@ TEST(SensorSearch, ReadingsThatCountForNothingDoNotMakeAFitSurer) {
   for (const std::size_t parameter : {0U, 1U, 2U}) {
     EXPECT_GT(*fit.one_sigma[parameter], 0.95 * *whole.one_sigma[parameter]) << kParameterNames[parameter];
   }
-  double sum = 0;
-  for (const double r : residual) sum += std::abs(r);
+  double sum = 0, squares = 0;
+  for (const double r : residual) sum += std::abs(r), squares += r * r;
+  EXPECT_NEAR(fit.residual_sd, std::sqrt(squares / counted), 1e-12);
   EXPECT_NEAR(fit.aic, 2 * counted * std::log(sum / counted) + 2 * fit.free_parameters, 1e-6);
 }
 
