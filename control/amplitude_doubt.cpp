@@ -145,10 +145,12 @@ std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, c
     sd.push_back(std::max(1e-200, residual.norm()));
     residual_columns.emplace_back(residual);
   }
-  const std::vector<double> velocity_m_s = search.model_velocity_m_s(point);
+  const std::vector<double> velocity_m_s = search.model_velocity_m_s(point);  // late by the dead time already
+  SearchPoint prompt = point;
+  prompt.model.dead_time_s = 0;
   const MatrixXd linear = side_by_side(other_models(search, recording, point, sd));
   const MatrixXd changing = side_by_side({stacked(search.model_slopes(turned_to_squares(recording.duty), point), sd),
-                                          stacked(search.model_slopes(turned_to_squares(velocity_m_s), point), sd)});
+                                          stacked(search.model_slopes(turned_to_squares(velocity_m_s), prompt), sd)});
   if (!linear.allFinite() || !changing.allFinite()) return std::nullopt;
 
   const Qr by_linear = directions(linear, 1e-9);

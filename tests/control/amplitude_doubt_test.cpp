@@ -1,0 +1,48 @@
+// What of a run's residuals is put down to amplitude: a drag behind a dead time, too.
+#include "control/amplitude_doubt.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "recorded_runs.hpp"
+
+namespace control {
+namespace {
+
+constexpr double kPeriodS = 0.01;
+constexpr FractionalModel kFluid{0.1, 0.0045, 0.15, 1, 1.75, 0.85};
+
+// The velocity of a fluid with a little drag that grows with the square of the speed, to the first order in it.
+Recording dragged_run(double dead_time_s) {
+  constexpr double kDrag = 30, kNoiseM_S = 1e-6;
+  Recording run{kPeriodS, prbs_duty(0.6, 0.4, 20, kPeriodS), {}, {}};
+  std::vector<double> drag = output_of(kFluid, Channel::velocity, kPeriodS, run.duty);
+  for (double& velocity : drag) velocity *= kDrag * std::abs(velocity);
+  run.velocity_m_s = output_of(kFluid, Channel::velocity, kPeriodS, run.duty, dead_time_s);
+  const std::vector<double> slower = output_of(kFluid, Channel::velocity, kPeriodS, drag, dead_time_s);
+  for (std::size_t k = 0; k < slower.size(); ++k) run.velocity_m_s[k] -= slower[k];
+  add_noise(run.velocity_m_s, kNoiseM_S, 3);
+  return run;
+}
+
+// Of the true fluid, as if it had been found.
+AmplitudeEvidence evidence_of(const Recording& run, double dead_time_s) {
+  IdentificationOptions options;
+  options.longest_dead_time_s = 1;
+  OutputErrorSearch search(run, options);
+  SearchPoint point{kFluid};
+  point.model.dead_time_s = dead_time_s;
+  Fit fit;
+  fit.model = point.model;
+  return amplitude_evidence(search, run, fit, point).value();
+}
+
+TEST(AmplitudeDoubt, ADragThatFollowsTheSpeedIsSeenBehindADeadTime) {
+  const AmplitudeEvidence prompt = evidence_of(dragged_run(0), 0), late = evidence_of(dragged_run(0.3), 0.3);
+  EXPECT_GT(prompt.share, 0.99);
+  EXPECT_GT(late.share, 0.99);
+}
+
+}  // namespace
+}  // namespace control
