@@ -166,17 +166,24 @@ std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, c
                            explained / rest.squaredNorm() * freedom / static_cast<double>(by_changing.rank())};
 }
 
-std::vector<std::string> amplitude_doubts(const std::optional<AmplitudeEvidence>& evidence,
-                                          const Recording& recording) {
+std::vector<std::string> amplitude_doubts(const std::optional<AmplitudeEvidence>& evidence, const Recording& recording,
+                                          bool order_is_forced) {
   if (!evidence || !(evidence->f > kDoubtfulF && evidence->share >= kDoubtfulShare)) return {};
   double largest = 0;
   for (const double duty : recording.duty) largest = std::max(largest, std::abs(duty));
   std::ostringstream text;
   text.precision(3);
-  text << "the parameters change with amplitude: ones that follow duty and speed explain " << 100 * evidence->share
-       << " % of what the model leaves (F = " << evidence->f << ", above " << kDoubtfulF
-       << "): no linear model holds from rest to duty " << largest
-       << "; fit runs of one amplitude each, and use a fit near its amplitude only";
+  text << (order_is_forced ? "the parameters seem to change with amplitude, which they need not: "
+                           : "the parameters change with amplitude: ")
+       << "ones that follow duty and speed explain " << 100 * evidence->share
+       << " % of what the model leaves (F = " << evidence->f << ", above " << kDoubtfulF << "): ";
+  if (order_is_forced) {
+    text << "the likelier reason is that its order was forced and is too low; identify without --structure, and see "
+            "whether this doubt remains";
+  } else {
+    text << "no linear model holds from rest to duty " << largest
+         << "; fit runs of one amplitude each, and use a fit near its amplitude only";
+  }
   return {text.str()};
 }
 

@@ -27,6 +27,8 @@ namespace control {
 std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, const Recording& recording,
                                                     const Fit& fit, const SearchPoint& point);
 
-std::vector<std::string> amplitude_doubts(const std::optional<AmplitudeEvidence>& evidence, const Recording& recording);
+// order_is_forced: the structure was given, and it is not the fractional one.
+std::vector<std::string> amplitude_doubts(const std::optional<AmplitudeEvidence>& evidence, const Recording& recording,
+                                          bool order_is_forced);
 
 }  // namespace control

@@ -237,7 +237,8 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   add(sensor_doubts(search));
   add(untried_structures(result.compared));
   add(second_opinions(search, recording, options, result.best));
-  add(amplitude_doubts(result.amplitude, recording));
+  const bool order_is_forced = options.structure && *options.structure != Structure::fractional;
+  add(amplitude_doubts(result.amplitude, recording, order_is_forced));
   add(residual_doubts(recording, options, result.best));
   add(identifiability_warnings(recording, result.best, options));
   add_verdict(result.compared, warnings);

@@ -1,6 +1,7 @@
-// What of a run's residuals is put down to amplitude: a drag behind a dead time, too.
+// What of a run's residuals is put down to amplitude: a drag behind a dead time is, an order that was forced is not.
 #include "control/amplitude_doubt.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +10,11 @@
 
 namespace control {
 namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
 
 constexpr double kPeriodS = 0.01;
 constexpr FractionalModel kFluid{0.1, 0.0045, 0.15, 1, 1.75, 0.85};
@@ -42,6 +48,23 @@ TEST(AmplitudeDoubt, ADragThatFollowsTheSpeedIsSeenBehindADeadTime) {
   const AmplitudeEvidence prompt = evidence_of(dragged_run(0), 0), late = evidence_of(dragged_run(0.3), 0.3);
   EXPECT_GT(prompt.share, 0.99);
   EXPECT_GT(late.share, 0.99);
+}
+
+// A fluid of four terms whose acceleration is fitted by two.
+TEST(AmplitudeDoubt, AnOrderThatWasForcedIsNamedAsTheLikelierReason) {
+  Recording run{kPeriodS, prbs_duty(0.6, 0.5, 12, kPeriodS), {}, {}};
+  run.acceleration_m_s2 = output_of({0.13, 0.009, 0.16, 1, 1.9, 0.95}, Channel::acceleration, kPeriodS, run.duty);
+  add_noise(run.acceleration_m_s2, 0.01, 5);
+  IdentificationOptions options;
+  options.further_starts = 0;
+  options.structure = Structure::first_order;
+  const auto claim = StartsWith("the parameters change with amplitude: ");
+  const Identification forced = identify(run, options);
+  EXPECT_THAT(forced.warnings, Not(Contains(claim)));
+  EXPECT_THAT(forced.warnings, Contains(HasSubstr("the likelier reason is that its order was forced")));
+  options.structure = Structure::fractional;
+  const Identification whole = identify(run, options);
+  EXPECT_THAT(whole.warnings, Not(Contains(HasSubstr("with amplitude"))));
 }
 
 }  // namespace
