@@ -137,6 +137,7 @@ std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, c
   const bool is_rounding = fit.fit_percent >= kFitOfRounding;
   if (is_rounding || (fit.end != SearchEnd::converged && fit.end != SearchEnd::iteration_limit) || search.limit().end())
     return std::nullopt;
+  if (fit.sensor && fit.sensor->delay_is_at_limit) return std::nullopt;  // what it lacks follows the steps of the duty
   const SensorPath* path = search.sensor();
   const std::vector<VectorXd> residuals = search.residuals(point);
   std::vector<double> sd;

@@ -113,10 +113,10 @@ Fit summary(OutputErrorSearch& search, const Recording& recording, Cost cost, St
   Fit fit;
   fit.structure = structure;
   fit.model = found.point.model;
+  fit.model.dead_time_s = search.dead_time_s(found.point);
   fit.offset_m = found.point.offset_m;
   fit.position_clock_s = found.point.position_clock_s;
   fit.sensor = search.sensor_fit(found.point);
-  if (fit.sensor && search.finds_dead_time()) fit.model.dead_time_s = search.sensor_lag_s(found.point);
   fit.end = found.end;
   fit.iterations = found.iterations;
   fit.starts = found.starts;

@@ -138,6 +138,12 @@ void check(const IdentificationOptions& options, const Recording& recording) {
   if (!(longest_s >= 0 && longest_s <= half_s)) {
     refuse("longest_dead_time_s must be from 0 to half the record, ", half_s, ", is ", longest_s);
   }
+  if (options.sensor_lag_s && recording.acceleration_m_s2.empty()) {
+    refuse("sensor_lag_s belongs to an acceleration, and none is fitted: leave it away");
+  }
+  if (options.sensor_lag_s && !(*options.sensor_lag_s >= 0 && *options.sensor_lag_s <= half_s)) {
+    refuse("sensor_lag_s must be from 0 to half the record, ", half_s, ", is ", *options.sensor_lag_s);
+  }
   if (!(options.time_limit_s > 0)) refuse("time_limit_s must be positive, is ", options.time_limit_s);
   if (options.iteration_limit < 1) refuse("iteration_limit must be at least 1, is ", options.iteration_limit);
   if (options.further_starts < 0 || options.further_starts > 1000) {
@@ -235,6 +241,7 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(warnings)); };
   add(search_doubts(result.best, options));  // causes first, then what follows from them
   add(sensor_doubts(search));
+  add(lag_doubts(recording, options, result.best));
   add(untried_structures(result.compared));
   add(second_opinions(search, recording, options, result.best));
   const bool order_is_forced = options.structure && *options.structure != Structure::fractional;

@@ -84,6 +84,10 @@ struct IdentificationOptions {
 
   // The clock of a position with times of its own may be off. Not beside a dead time, which is the same to the model.
   bool fits_position_clock = true;
+
+  // Of an accelerometer's readings, beyond their sampling and their low pass. What comes later than that is the plant's
+  // dead time; the record alone cannot tell one from the other.
+  std::optional<double> sensor_lag_s;
 };
 
 inline constexpr std::size_t kParameters = 5;  // ln-scaled inside; reported as kp, b1, b2, alpha, beta
@@ -96,6 +100,7 @@ struct SensorFit {
   double period_s = 0;                  // of its samples, by the robot's clock
   double time_constant_s = 0;           // of its low pass
   double delay_s = 0;                   // of a reading, in the mean, the low pass aside
+  bool delay_is_at_limit = false;       // of what was searched
   double bias_m_s2 = 0;                 // in the mean; of recovered readings but for a constant
   double bias_range_m_s2 = 0;           // how far it wandered
   std::size_t readings_left_out = 0;    // read twice, failed, or of uncertain age

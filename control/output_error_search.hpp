@@ -64,7 +64,7 @@ class OutputErrorSearch {
   std::optional<SearchEnd> sensor_search_end() const { return sensor_search_end_; }  // what cut it off; none: nothing
   std::optional<SensorFit> sensor_fit(const SearchPoint& point);  // none: no acceleration was recorded
   double sensor_lag_s(const SearchPoint& point) const;            // dead time and all, its sampling aside
-  bool finds_dead_time() const { return options_.longest_dead_time_s > 0; }
+  double dead_time_s(const SearchPoint& point) const;
   const SensorPath* sensor() const { return measured_.front().path.get(); }
   const PositionTimes* position_times() const { return measured_.front().times.get(); }
 

@@ -10,6 +10,7 @@
 
 #include "control/fit_statistics.hpp"
 #include "control/fit_summary.hpp"
+#include "control/invalid_argument.hpp"
 #include "control/residual_doubts.hpp"
 
 namespace control {
@@ -21,6 +22,7 @@ constexpr double kLookForSignPercent = 80;  // below this fit
 constexpr double kClearlyLowerAic = 10;
 constexpr std::ptrdiff_t kFewest = 20;                    // samples of the beginning
 constexpr double kRoughBeginning = 3;                     // times the size of the other residuals, by the medians
+constexpr double kNoticeableLagS = 0.002;                 // twice what the age of the samples is known to
 constexpr double kMotionSigmas = 5, kMotionShare = 0.01;  // of v0, and of the squares that it explains
 
 double lowest_percent(const Recording& recording, const Fit& fit) {
@@ -194,6 +196,36 @@ std::vector<std::string> sensor_doubts(const OutputErrorSearch& search) {
   return {
       "the search for the sensor's timing reached its share of the time limit: its samples are taken to keep step "
       "with the ticks, which they may not do, and the parameters make up for it; raise the limit"};
+}
+
+std::vector<std::string> lag_doubts(const Recording& recording, const IdentificationOptions& options, const Fit& fit) {
+  if (!fit.sensor || fit.starts == 0) return {};
+  const SensorFit& sensor = *fit.sensor;
+  const bool finds_dead_time = options.longest_dead_time_s > 0;
+  if (sensor.delay_is_at_limit && !finds_dead_time) {
+    return {join_text("the sensor's readings came out ", 1e3 * sensor.delay_s,
+                      " ms late, the most that is searched for without a dead time: the other parameters make up for "
+                      "what it lacks; search for a dead time (--dead-time-s)")};
+  }
+  // How old samples in step with the ticks are is not known: up to a period.
+  const double late_s = sensor.delay_s - options.sensor_lag_s.value_or(0), half_period_s = recording.dt_s / 2;
+  const double at_least_s = late_s - (sensor.has_own_clock ? half_period_s : 2 * half_period_s);
+  const double at_most_s = late_s - (sensor.has_own_clock ? half_period_s : 0);
+  if (!(at_least_s > kNoticeableLagS)) return {};
+  std::ostringstream text;
+  text.precision(3);
+  if (!options.sensor_lag_s) {
+    text << "a dead time of up to " << 1e3 * at_most_s << " ms cannot be told from the age of the sensor's readings: "
+         << (finds_dead_time ? 1e3 * fit.model.dead_time_s : 1e3 * at_most_s) << " ms were attributed to the "
+         << (finds_dead_time ? "plant; give the sensor's own lag (--sensor-lag-s), if it is known"
+                             : "readings, none to the plant; if the sensor is not so late, search for the dead time "
+                               "(--dead-time-s)");
+    return {text.str()};
+  }
+  if (finds_dead_time) return {};
+  text << "the readings come up to " << 1e3 * at_most_s << " ms later than the sensor's own lag explains: that is a "
+       << "dead time, and the model has none; search for it (--dead-time-s)";
+  return {text.str()};
 }
 
 std::vector<std::string> second_opinions(OutputErrorSearch& search, const Recording& recording,

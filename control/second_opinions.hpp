@@ -23,4 +23,8 @@ std::vector<std::string> second_opinions(OutputErrorSearch& search, const Record
 // That the search for the sensor of an acceleration was cut off, which the fits that follow do not show.
 std::vector<std::string> sensor_doubts(const OutputErrorSearch& search);
 
+// Of an acceleration: how much of the age of its readings may be the plant's dead time, which looks the same, and to
+// which of the two it was attributed.
+std::vector<std::string> lag_doubts(const Recording& recording, const IdentificationOptions& options, const Fit& fit);
+
 }  // namespace control

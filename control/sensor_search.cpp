@@ -13,8 +13,9 @@ using Eigen::Index;
 constexpr double kRoughAge = 0.75, kRoughTimeConstant = 0.25;  // in ticks: half a sample period and a low pass
 constexpr double kDelaysTried = 200;
 constexpr double kClearlyBetter =
-    30;                          // in twice the log likelihood, for a clock of three unknowns that was scanned for
-constexpr double kInStep = 0.1;  // ticks that the clock runs ahead or behind in the whole record
+    30;                              // in twice the log likelihood, for a clock of three unknowns that was scanned for
+constexpr double kNearLimit = 0.01;  // ticks
+constexpr double kInStep = 0.1;      // ticks that the clock runs ahead or behind in the whole record
 // Of each round, in ticks: how far the order of the samples is sought, and how near to a change readings do not count.
 struct Round {
   double range, guard;
@@ -125,6 +126,13 @@ double OutputErrorSearch::sensor_lag_s(const SearchPoint& point) const {
   return std::max(0.0, delay_s - age_s);
 }
 
+// Of a recorded acceleration it is what the sensor's own lag, if that is known, does not explain.
+double OutputErrorSearch::dead_time_s(const SearchPoint& point) const {
+  if (!sensor()) return point.model.dead_time_s;
+  if (!(options_.longest_dead_time_s > 0)) return 0;
+  return std::max(0.0, sensor_lag_s(point) - options_.sensor_lag_s.value_or(0));
+}
+
 std::optional<SensorFit> OutputErrorSearch::sensor_fit(const SearchPoint& point) {
   const SensorPath* path = sensor();
   if (!path) return std::nullopt;
@@ -137,6 +145,7 @@ std::optional<SensorFit> OutputErrorSearch::sensor_fit(const SearchPoint& point)
   fit.period_s = point.sensor.period_s;
   fit.time_constant_s = point.sensor.time_constant_s;
   fit.delay_s = sensor_lag_s(point) + dt_s_ / 2;
+  fit.delay_is_at_limit = point.sensor.first_s < earliest_sample_s() + kNearLimit * dt_s_;
   fit.bias_m_s2 = bias_m_s2.mean();
   fit.bias_range_m_s2 = bias_m_s2.maxCoeff() - bias_m_s2.minCoeff();
   fit.readings_left_out = static_cast<std::size_t>(samples_ - path->weighed_samples());

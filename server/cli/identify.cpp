@@ -60,6 +60,11 @@ void add_search(CLI::App& command, control::IdentificationOptions& options) {
                    "Whether the initial position is fitted too (default: it is, where position is recorded)");
   command.add_option("--dead-time-s", options.longest_dead_time_s, "Find a dead time up to this (default: 0, none)")
       ->check(non_negative());
+  command
+      .add_option("--sensor-lag-s", options.sensor_lag_s,
+                  "Of a fitted acceleration: the sensor's own lag, beyond sampling and low pass; what comes later is "
+                  "a dead time (default: not known)")
+      ->check(non_negative());
   command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 60)")->check(positive());
 }
 
@@ -244,7 +249,8 @@ void add_options(CLI::App& command, Identify& wish) {
   add_plan(command, wish);
   add_option(command, wish.plant);
   command.get_option("--plant")->needs("--plan")->group("Planning");
-  for (const char* searching : {"--structure", "--cost", "--dead-time-s", "--time-limit-s", "--residuals"}) {
+  for (const char* searching :
+       {"--structure", "--cost", "--dead-time-s", "--sensor-lag-s", "--time-limit-s", "--residuals"}) {
     command.get_option("--plan")->excludes(searching);
   }
   command.footer(

@@ -15,21 +15,24 @@
 namespace control {
 namespace {
 
+using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::Not;
+using testing::StartsWith;
 
 constexpr double kPeriodS = 0.01;
 constexpr FractionalModel kFluid{0.1, 0.006, 0.11, 1, 2, 1};
 
-// Each tick reads a sample 0.75 ticks old, after a low pass. Of the reads at which the acceleration moves by more than
-// `moves_by_m_s2` a share fails, and repeats the last one.
-Recording acceleration_run(double duration_s, double noise_m_s2, double failed_share, double moves_by_m_s2 = 0) {
+// Each tick reads a sample 0.75 ticks old, after a low pass and `late_s`, a lag of the sensor or a dead time. Of the
+// reads at which the acceleration moves by more than `moves_by_m_s2` a share fails, and repeats the last one.
+Recording acceleration_run(double duration_s, double noise_m_s2, double failed_share, double moves_by_m_s2 = 0,
+                           double late_s = 0) {
   Recording run{kPeriodS, prbs_duty(0.6, 0.2, duration_s, kPeriodS), {}, {}};
   const std::vector<double> exact = output_of(kFluid, Channel::acceleration, kPeriodS, run.duty);
   const Eigen::VectorXd felt_m_s2 = OutputModel::with_means(kPeriodS, run.duty, 1e-9).output(kFluid);
   const SensorPath path({exact, std::vector<bool>(exact.size()), false}, kPeriodS);
-  const Eigen::VectorXd readings = path.sampled(felt_m_s2, {-0.75 * kPeriodS, kPeriodS, 0.25 * kPeriodS});
+  const Eigen::VectorXd readings = path.sampled(felt_m_s2, {-0.75 * kPeriodS - late_s, kPeriodS, 0.25 * kPeriodS});
   run.acceleration_m_s2.assign(readings.begin(), readings.end());
   add_noise(run.acceleration_m_s2, noise_m_s2, 5);
   std::mt19937 random{7};
@@ -56,6 +59,59 @@ TEST(SensorSearch, FailedReadsHaveNoWeightInStepWithTheTicks) {
   EXPECT_LT(std::abs(fit.model.kp - kFluid.kp), 3 * *fit.one_sigma[0]);
   EXPECT_LT(std::abs(fit.model.b1 - kFluid.b1), 3 * *fit.one_sigma[1]);
   EXPECT_LT(std::abs(fit.model.b2 - kFluid.b2), 3 * *fit.one_sigma[2]);
+}
+
+Identification identified(double late_s, double longest_dead_time_s, std::optional<double> sensor_lag_s) {
+  IdentificationOptions options = one_start();
+  options.longest_dead_time_s = longest_dead_time_s;
+  options.sensor_lag_s = sensor_lag_s;
+  return identify(acceleration_run(6, 0.002, 0, 0, late_s), options);
+}
+
+// What the readings come later is a lag of the sensor or a dead time; the record shows the sum.
+TEST(SensorSearch, SaysHowMuchDeadTimeTheAgeOfTheReadingsMayHide) {
+  const auto is_said = Contains(AllOf(StartsWith("a dead time of up to 37."),
+                                      HasSubstr(" ms cannot be told from the age of the sensor's readings: 37."),
+                                      HasSubstr(" ms were attributed to the readings, none to the plant")));
+  const Identification hidden = identified(0.03, 0, std::nullopt);
+  EXPECT_THAT(hidden.warnings, is_said);
+  EXPECT_EQ(hidden.best.model.dead_time_s, 0);
+  EXPECT_NEAR(hidden.best.sensor->delay_s, 0.0375, 5e-4);
+
+  const auto any = Contains(HasSubstr("dead time"));
+  EXPECT_THAT(identified(0, 0, std::nullopt).warnings, Not(any));
+  EXPECT_THAT(identified(0.03, 0, 0.03).warnings, Not(any));
+  EXPECT_THAT(identified(0.03, 0, 0.01).warnings,
+              Contains(HasSubstr("ms later than the sensor's own lag explains: that is a dead time")));
+}
+
+TEST(SensorSearch, ADeadTimeIsWhatTheSensorsOwnLagDoesNotExplain) {
+  const Identification unknown = identified(0.03, 0.2, std::nullopt);
+  EXPECT_NEAR(unknown.best.model.dead_time_s, 0.03, 0.003);
+  EXPECT_THAT(unknown.warnings, Contains(HasSubstr("ms were attributed to the plant; give the sensor's own lag")));
+  const Identification known = identified(0.03, 0.2, 0.01);
+  EXPECT_NEAR(known.best.model.dead_time_s, 0.02, 0.003);
+  EXPECT_THAT(known.warnings, Not(Contains(HasSubstr("cannot be told"))));
+}
+
+TEST(SensorSearch, ADeadTimeBeyondWhatTheReadingsMayHideIsNamedAndFound) {
+  const Identification at_limit = identified(0.12, 0, std::nullopt);
+  EXPECT_TRUE(at_limit.best.sensor->delay_is_at_limit);
+  EXPECT_THAT(at_limit.warnings, Contains(HasSubstr("the most that is searched for without a dead time")));
+  EXPECT_THAT(at_limit.warnings, Not(Contains(HasSubstr("with amplitude"))));
+  EXPECT_FALSE(at_limit.amplitude);
+  const Identification found = identified(0.12, 0.3, std::nullopt);
+  EXPECT_NEAR(found.best.model.dead_time_s, 0.12, 0.003);
+  EXPECT_FALSE(found.best.sensor->delay_is_at_limit);
+}
+
+TEST(SensorSearch, ALagOfTheSensorNeedsASensor) {
+  const std::vector<double> duty = prbs_duty(0.6, 0.2, 4, kPeriodS);
+  IdentificationOptions options;
+  options.sensor_lag_s = 0.01;
+  EXPECT_THROW(identify(position_run(kFluid, duty, 1e-4, 1), options), std::invalid_argument);
+  options.sensor_lag_s = -0.01;
+  EXPECT_THROW(identify(acceleration_run(4, 0.01, 0), options), std::invalid_argument);
 }
 
 TEST(SensorSearch, SaysThatItsTimeRanOut) {
