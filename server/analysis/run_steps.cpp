@@ -234,6 +234,11 @@ class Cutter {
 
 const char* text(StepCause value) { return value == StepCause::setpoint ? "setpoint" : "disturbance"; }
 
+const char* position_source(const MeasuredStep& step) {
+  if (step.is_from_outside) return "outside";
+  return step.position_sd_m > 0 ? "estimate" : "known";
+}
+
 std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points, const StoredReference* reference) {
   Cutter cutter{reference};
   for (const StepPoint& point : points) cutter.take(point);

@@ -57,6 +57,8 @@ struct MeasuredStep {
   control::StepMetrics metrics;
 };
 
+const char* position_source(const MeasuredStep& step);  // "outside", "estimate" or "known"
+
 // Points in order of span and seq. A step that goes nowhere is left out; a position that is not finite ends a step.
 std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points,
                                         const StoredReference* reference = nullptr);

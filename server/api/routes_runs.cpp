@@ -179,11 +179,6 @@ json to_json(const std::optional<EstimateError>& error) {
           {"samples", error->samples}};
 }
 
-const char* position_source(const MeasuredStep& step) {
-  if (step.is_from_outside) return "outside";
-  return step.position_sd_m > 0 ? "estimate" : "known";
-}
-
 json to_json(const MeasuredStep& step) {
   json out;
   out["cause"] = text(step.cause);

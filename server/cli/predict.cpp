@@ -21,7 +21,24 @@ constexpr long long kLargestSeed = (1LL << 53) - 1;  // what JSON holds exactly
 struct Measured {
   std::vector<MeasuredStep> steps;
   double began_at_s = 0;
+  std::string position_source;  // in words
 };
+
+// From where the positions of the steps are had.
+std::string source_in_words(std::span<const MeasuredStep> steps, const std::optional<StoredReference>& reference) {
+  const double largest_sd_m = std::ranges::max(steps, {}, &MeasuredStep::position_sd_m).position_sd_m;
+  const std::string own = largest_sd_m > 0
+                              ? fmt::format("the robot's own estimate (position_sd_m is up to {:.2g} m)", largest_sd_m)
+                              : std::string{"the position is known: position_sd_m is 0 throughout"};
+  if (!reference) return own;
+  const auto outside = std::ranges::count(steps, true, &MeasuredStep::is_from_outside);
+  if (outside == 0) return own + "; the position from outside covers no step without a pause";
+  const std::string measured =
+      fmt::format("position measured from outside ({}), ± {:.2g} mm", reference->reference.source, 2e3 * largest_sd_m);
+  if (outside == std::ssize(steps)) return measured;
+  return fmt::format("{}, in {} of {} steps; the robot's own record in the others, which it does not cover", measured,
+                     outside, steps.size());
+}
 
 double time_of(std::span<const StepPoint> points, std::uint32_t span, std::uint64_t seq) {
   const auto is_of_span = [span](const StepPoint& point) { return point.span == span; };
@@ -34,13 +51,16 @@ double time_of(std::span<const StepPoint> points, std::uint32_t span, std::uint6
 Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experiment) {
   std::vector<StepPoint> points;
   for (const StoredSample& stored : read_samples(choice)) points.push_back(step_point(stored));
-  Measured measured{measure_steps(points)};
+  const std::optional<StoredReference> reference = read_reference(choice);
+  Measured measured;
+  measured.steps = measure_steps(points, reference ? &*reference : nullptr);
   const auto& steps = measured.steps;
   const auto first = std::ranges::find(steps, StepCause::setpoint, &MeasuredStep::cause);
   if (first == steps.end()) {
     throw std::runtime_error{fmt::format("run {} has no step of setpoint in auto mode to compare with", *choice.run)};
   }
   measured.began_at_s = first->at_s;
+  measured.position_source = source_in_words(steps, reference);
   experiment.setpoint_m = first->target_m - first->start_m;
   experiment.duration_s = time_of(points, first->span, first->last_seq) - first->at_s;
   experiment.disturbance_at_s = 2 * experiment.duration_s;
@@ -55,6 +75,14 @@ Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experime
   return measured;
 }
 
+OrderedJson json_of(const std::optional<EstimateError>& error) {
+  if (!error) return nullptr;
+  return {{"rms_m", error->rms_m},
+          {"worst_m", error->worst_m},
+          {"within_2_sd", error->within_2_sd},
+          {"samples", error->samples}};
+}
+
 OrderedJson json_of(const MeasuredStep& step) {
   OrderedJson out = {{"cause", text(step.cause)},
                      {"span", step.span},
@@ -62,7 +90,9 @@ OrderedJson json_of(const MeasuredStep& step) {
                      {"start_m", step.start_m},
                      {"target_m", step.target_m},
                      {"band_m", step.band_m},
-                     {"position_sd_m", step.position_sd_m}};
+                     {"position_source", position_source(step)},
+                     {"position_sd_m", step.position_sd_m},
+                     {"estimate_error", json_of(step.estimate_error)}};
   out.update(server::json_of(step.metrics));
   return out;
 }
@@ -77,6 +107,7 @@ void add_row(Table& table, const std::string& name, double at_s, const control::
 
 void write_table(std::ostream& out, const control::ClosedLoopExperiment& experiment,
                  const control::ClosedLoopPrediction& prediction, const Measured& measured) {
+  if (!measured.steps.empty()) fmt::print(out, "compared with: {}\n\n", measured.position_source);
   Table table{{"step", "at (s)", "settling (s)", "overshoot (%)", "rise 10-90 % (s)", "error at the end (mm)"}};
   add_row(table, fmt::format("to {:g} m, predicted", experiment.setpoint_m), measured.began_at_s, prediction.step);
   if (experiment.disturbance_at_s < experiment.duration_s) {
@@ -84,7 +115,9 @@ void write_table(std::ostream& out, const control::ClosedLoopExperiment& experim
             measured.began_at_s + experiment.disturbance_at_s, prediction.disturbance);
   }
   for (const MeasuredStep& step : measured.steps) {
-    add_row(table, fmt::format("{} {:.4g} to {:.4g} m, measured", text(step.cause), step.start_m, step.target_m),
+    add_row(table,
+            fmt::format("{} {:.4g} to {:.4g} m, measured{}", text(step.cause), step.start_m, step.target_m,
+                        step.is_from_outside ? " from outside" : ""),
             step.at_s, step.metrics, step.position_sd_m);
   }
   table.write(out);
@@ -130,6 +163,7 @@ OrderedJson answer_of(const control::ClosedLoopExperiment& experiment, const con
       {"setpoint_m", experiment.setpoint_m},       {"duration_s", experiment.duration_s},
       {"disturbance_m", experiment.disturbance_m}, {"disturbance_at_s", experiment.disturbance_at_s},
       {"duty_min", experiment.duty_min},           {"duty_max", experiment.duty_max}};
+  answer["compared_with"] = measured.steps.empty() ? OrderedJson{} : OrderedJson(measured.position_source);
   answer["measured_steps"] = OrderedJson::array();
   for (const MeasuredStep& step : measured.steps) answer["measured_steps"].push_back(json_of(step));
   answer["plant"] = server::json_of(experiment.plant);

@@ -26,7 +26,10 @@ class ReferenceTools : public RecordingTest {
     connect(robot_);
     robot_.context.position_sd_m = 0.004F;
     const RunId run = wait(runs_->create(robot_.id, named("swim"))).value().id;
-    for (const double duty : {0.0, 0.4, -0.5, 0.6, -0.6, 0.3, -0.3, 0.5, -0.4}) swim(100, duty);
+    for (const double duty : {0.0, 0.4, -0.5, 0.6, -0.6, 0.3}) swim(100, duty);
+    robot_.context.mode = rheonaut_MODE_AUTO;
+    robot_.context.setpoint_m = 0.2F;
+    for (const double duty : {-0.3, 0.5, -0.4}) swim(100, duty);
     wait(runs_->end(run, ""));
     stop();
     camera(-3.4567);
@@ -84,6 +87,27 @@ TEST_F(ReferenceTools, ImportFindsTheClockAndIdentifyPrefersWhatWasMeasured) {
   EXPECT_TRUE(json["position_clock_sigma_s"].is_number());
   EXPECT_THAT(ask("identify --run 1 --structure second_order --channels robot").text,
               StartsWith("fitted: acceleration_m_s2"));
+}
+
+TEST_F(ReferenceTools, PredictComparesWithWhatWasMeasured) {
+  const ToolAnswer own = ask("predict --run 1");
+  EXPECT_THAT(own.text, StartsWith("compared with: the robot's own estimate (position_sd_m is up to 0.004 m)\n"));
+  const double own_step_m = ask("predict --run 1 --json").json()["experiment"]["setpoint_m"].get<double>();
+  EXPECT_NEAR(own_step_m, 0.2 - 0.5 * truth_m_[600], 1e-6);
+  ASSERT_EQ(ask("reference import --run 1 --csv @camera.csv --sd-mm 0.5 --offset-s -3.4567 --keep-zero").exit_code, 0);
+  const ToolAnswer answer = ask("predict --run 1");
+  EXPECT_THAT(answer.text, AllOf(StartsWith("compared with: position measured from outside (camera.csv), ± 1 mm\n"),
+                                 HasSubstr(" to 0.2 m, measured from outside")));
+  const auto json = ask("predict --run 1 --json").json();
+  EXPECT_EQ(json["compared_with"], "position measured from outside (camera.csv), ± 1 mm");
+  const auto& step = json["measured_steps"][0];
+  EXPECT_EQ(step["position_source"], "outside");
+  EXPECT_GT(step["estimate_error"]["samples"].get<int>(), 50);
+  const double seen_m = 1.25 + truth_m_[600];
+  EXPECT_NEAR(step["start_m"].get<double>(), seen_m, 0.005);
+  EXPECT_NEAR(json["experiment"]["setpoint_m"].get<double>(), 0.2 - seen_m, 0.005);
+  EXPECT_THAT(ask("predict --run 1 --csv").text,
+              HasSubstr(fmt::format("{}", json["reference_m"].back().get<double>())));
 }
 
 TEST_F(ReferenceTools, AGivenClockIsTakenAtItsWord) {
