@@ -137,6 +137,21 @@ TEST_F(RunTools, IdentifyFitsTheAccelerationWhereThePositionIsAnEstimate) {
                                HasSubstr("sensor: ")));
 }
 
+TEST_F(RunTools, IdentifySaysHowMuchDeadTimeTheSensorsReadingsMayHide) {
+  control::FractionalModel late = control::kNonNewtonianModel;
+  late.dead_time_s = 0.03;
+  plant_ = control::ModalPlant{late, 0.01};
+  begin();
+  robot_.context.position_sd_m = 0.004F;
+  for (const double duty : {0.0, 0.4, -0.5, 0.6, -0.6, 0.3}) swim_on_the_accelerometer(100, duty);
+  flush();
+  const std::string ask_it = "identify --run 1 --structure second_order ";
+  const std::string doubt = "ms cannot be told from the age of the sensor's readings";
+  EXPECT_THAT(ask(ask_it).text, HasSubstr(doubt));
+  EXPECT_THAT(ask(ask_it + "--json").json()["warnings"].dump(), HasSubstr(doubt));
+  EXPECT_THAT(ask(ask_it + "--sensor-lag-s 0.03").text, Not(HasSubstr(doubt)));
+}
+
 TEST_F(RunTools, IdentifyFitsAKnownPositionAloneFromRunAndCsvAlike) {
   const RunId run = begin();
   swim(200, 0.3);
