@@ -15,6 +15,17 @@ constexpr microseconds kAckGrace{1'000'000};   // an answer may come this much a
 constexpr microseconds kSeenGrace{5'000'000};  // what shows the effect may come so much after it
 constexpr std::size_t kMaxUnseen = 64;
 
+// Whether a command need not be seen in telemetry since a later one has taken its place.
+bool is_excused_by(const PendingCommand& earlier, const PendingCommand& later, std::uint32_t period_us) {
+  // SAFETY: a robot that was stopped moves only after a clear, so nothing else excuses a stop; not even a command that
+  // was acknowledged for a time after it, which the stop has dropped.
+  const bool ends_a_stop = later.is_stop() || later.wire.which_action == rheonaut_Command_clear_emergency_tag;
+  if (earlier.is_stop() && !ends_a_stop) return false;
+  // SAFETY: nothing excuses what should have been seen before it acts.
+  const std::uint64_t visible_us = visible_from_us(earlier.wire, earlier.look_from_robot_us, period_us);
+  return is_for_the_motor(earlier.wire) && later.look_from_robot_us <= visible_us + kVerifyWindowUs;
+}
+
 }  // namespace
 
 void Station::on_command_sent(RobotPort& port, CommandId id) {
@@ -80,10 +91,7 @@ void Station::acknowledge(Seat& seat, CommandId id, std::string reason) {
     for (const auto& other : seat.unseen) {  // a timed one may come later than one that was acknowledged after it
       const bool is_older = other->look_from_robot_us <= pending->look_from_robot_us;
       PendingCommand &earlier = is_older ? *other : *pending, &later = is_older ? *pending : *other;
-      // SAFETY: nothing that waits excuses a stop, or what should have been seen before it acts.
-      const bool is_in_time = later.look_from_robot_us <= earlier.look_from_robot_us + kVerifyWindowUs;
-      const bool is_excused = is_for_the_motor(earlier.wire) && is_in_time && (!earlier.is_stop() || is_older);
-      earlier.is_overtaken = earlier.is_overtaken || is_excused;
+      earlier.is_overtaken = earlier.is_overtaken || is_excused_by(earlier, later, seat.robot->context.period_us);
     }
   }
   // What took effect before this connection may be shown by samples that come after the live ones: their silence says

@@ -32,14 +32,6 @@ std::size_t first_move(const rheonaut_SetDutySchedule& schedule) {
   return first;
 }
 
-// A schedule is seen by its first motion, which comes at a tick of its own.
-std::uint64_t visible_from_us(const protocol::Command& command, std::uint64_t effect_at_robot_us,
-                              std::uint32_t period_us) {
-  if (command.which_action != rheonaut_Command_set_duty_schedule_tag) return effect_at_robot_us;
-  const auto& schedule = command.action.set_duty_schedule;
-  return effect_at_robot_us + std::uint64_t{schedule.tick[first_move(schedule)]} * period_us;
-}
-
 bool is_shown(const protocol::Command& command, std::uint64_t emergency_id, const SampleContext& context,
               std::span<const Sample> samples) {
   const auto has_duty = [samples](float duty) {
@@ -70,6 +62,13 @@ bool is_shown(const protocol::Command& command, std::uint64_t emergency_id, cons
 }
 
 }  // namespace
+
+std::uint64_t visible_from_us(const protocol::Command& command, std::uint64_t effect_at_robot_us,
+                              std::uint32_t period_us) {
+  if (command.which_action != rheonaut_Command_set_duty_schedule_tag) return effect_at_robot_us;
+  const auto& schedule = command.action.set_duty_schedule;
+  return effect_at_robot_us + std::uint64_t{schedule.tick[first_move(schedule)]} * period_us;
+}
 
 bool is_shown_between(const protocol::Command& command, std::uint64_t from_robot_us, std::uint64_t until_robot_us,
                       const SampleBatch& batch) {

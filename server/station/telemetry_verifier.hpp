@@ -17,6 +17,10 @@ bool is_read_back(const protocol::Command& command);
 // True when the robot's motor may run differently after it: another one of these takes its place.
 bool is_for_the_motor(const protocol::Command& command);
 
+// From when on samples can show it. A schedule is seen by its first motion, which comes at a tick of its own.
+std::uint64_t visible_from_us(const protocol::Command& command, std::uint64_t effect_at_robot_us,
+                              std::uint32_t period_us);
+
 // Whether a sample of [from, until) shows what the command was to bring about.
 bool is_shown_between(const protocol::Command& command, std::uint64_t from_robot_us, std::uint64_t until_robot_us,
                       const SampleBatch& batch);
