@@ -63,10 +63,12 @@ class ModelSender final : public StationSink {
     BootId boot_id = 0;            // that the next are about
     std::optional<bool> flag;      // telemetry says that the model is confirmed; none yet
     bool was_seen_to_rise = false;
-    bool at_work = false;             // a task sends the robot something
-    bool owes = false;                // a confirmation is to be taken back
-    std::int64_t next_try_us = 0;     // steady
-    std::int64_t heard_first_us = 0;  // steady: when the flag was first known
+    bool at_work = false;               // a task sends the robot something
+    bool owes = false;                  // a confirmation is to be taken back
+    std::int64_t next_try_us = 0;       // steady
+    std::int64_t heard_first_us = 0;    // steady: when the flag was first known
+    std::uint64_t page_before_seq = 0;  // the first sample made after the newest page of parameters
+    std::int64_t page_came_us = 0;      // steady
   };
   using Outcome = Result<void>;
 
@@ -89,6 +91,7 @@ class ModelSender final : public StationSink {
   void conclude(const RobotId& id, const Naming& naming, const Outcome& outcome);
   void conclude_failure(const RobotId& id, const Naming& naming, const Error& error);
   void follow(const RobotState& robot, Place& place);
+  bool is_flag_older_than_page(const RobotState& robot, const Place& place) const;
   void judge_unseen(const RobotState& robot, Place& place);
   void settle_debt(const RobotState& robot, Place& place);
 

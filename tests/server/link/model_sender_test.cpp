@@ -102,6 +102,21 @@ class ModelSenderTest : public LinkTest {
     say(name, held[name]);
   }
 
+  // By somebody's command.
+  void change(const std::string& name, float value) {
+    held[name] = value;
+    held["model_confirmed"] = 0;
+    say(name, value);
+  }
+
+  // In the same boot, after the link was cut.
+  void come_back() {
+    robot->link.cut();
+    clock.run_for(1s);
+    ASSERT_FALSE(connected());
+    begin(77, seq);
+  }
+
   void name_fluid(const std::string& fluid, const std::string& actor = "token:local") {
     ASSERT_TRUE(station.set_fluid("r1", fluid, {actor, "", clock.utc_us()}));
   }
@@ -405,6 +420,85 @@ TEST_F(ModelSenderTest, OtherBitsUnderAFlagThatNoSampleShowedFallingAreNoLongerT
   say("model_gain_1_m_s", 0.3F);
   live(500ms);
   EXPECT_NE(model().fluid, "water");
+}
+
+// A page comes before the sample that shows what the change has done to the confirmation.
+TEST_F(ModelSenderTest, AChangedParameterIsNoConfirmationBySomebodyElse) {
+  begin();
+  name_fluid("water");
+  live(3s);
+  change("model_gain_3_m_s", 0.3F);
+  clock.settle();
+  EXPECT_EQ(model().state, ModelState::assumed) << "the link may break now";
+  live(2s);
+  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_THAT(model().reason, HasSubstr("a parameter was changed"));
+  const auto is_of_no_fluid = [](const RobotState& one) {
+    return one.model.state == ModelState::confirmed && one.model.fluid.empty();
+  };
+  EXPECT_EQ(std::count_if(sink.robots.begin(), sink.robots.end(), is_of_no_fluid), 0);
+}
+
+TEST_F(ModelSenderTest, AParameterThatIsChangedAfterTheLinkReturnedEndsTheConfirmation) {
+  begin();
+  name_fluid("water");
+  live(3s);
+  come_back();
+  EXPECT_EQ(model().fluid, "water");
+  change("model_gain_1_m_s", 0.3F);
+  live(2s);
+  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().fluid, "");
+}
+
+// SAFETY's test: the same, and confirmed again while the link was cut. Nothing is sent while another is in control.
+TEST_F(ModelSenderTest, OtherBitsOfARobotThatReturnsConfirmedAreNotTheFluidsModel) {
+  begin();
+  name_fluid("water");
+  live(3s);
+  ASSERT_TRUE(station.control({"r1", "session:1", "", ControlAction::take, 20s, ""}));
+  held["model_gain_1_m_s"] = 0.3F;
+  come_back();
+  live(2s);
+  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().reason, "what was confirmed before is not taken back yet");
+  EXPECT_EQ(held["model_confirmed"], 1);
+  live(30s);
+  EXPECT_EQ(held["model_confirmed"], 0);
+  EXPECT_EQ(model().state, ModelState::assumed);
+}
+
+// SAFETY's test: while the sender waits for rest, somebody else may change what it has sent.
+TEST_F(ModelSenderTest, WhatIsChangedWhileTheConfirmationWaitsIsNotConfirmed) {
+  for (const auto& [name, value] : parameters_of(some_model())) held[name] = value;
+  begin();
+  is_coasting = true;
+  name_fluid("water");
+  live(300ms);
+  ASSERT_EQ(refused, 1) << "the confirmation";
+  is_coasting = false;
+  change("model_gain_1_m_s", 0.3F);
+  live(5s);
+  EXPECT_THAT(sent, Not(Contains("model_confirmed")));
+  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_THAT(model().reason, HasSubstr("somebody else changed one"));
+}
+
+// SAFETY's test: no sample shows the flag falling.
+TEST_F(ModelSenderTest, OtherBitsUnderAConfirmationThatTheStationOnlyJudgedAreTakenBack) {
+  for (const auto& [name, value] : parameters_of(some_model())) held[name] = value;
+  held["model_confirmed"] = 1;
+  station.restore({{.id = "r1", .boot_id = 77, .fluid = "water"}}, {});
+  begin();
+  live(2s);
+  ASSERT_EQ(model().fluid, "water");
+  held["model_gain_1_m_s"] = 0.3F;
+  say("model_gain_1_m_s", 0.3F);
+  live(500ms);
+  EXPECT_EQ(model().fluid, "");
+  live(10s);
+  EXPECT_EQ(held["model_confirmed"], 0);
+  EXPECT_EQ(model().state, ModelState::assumed);
 }
 
 TEST_F(ModelSenderTest, AfterARestartOfTheStationAConfirmationStandsForTheModelOfTheNamedFluidAlone) {
