@@ -222,7 +222,8 @@ class Station {
   void expire_commands(Seat& seat);
   void look_for_commands(Seat& seat, const SampleBatch& batch);
   void end_unseen(Seat& seat, const char* reason);
-  void settle_read_back(Seat& seat, const std::function<Sight(const protocol::Command&)>& sight_of);
+  void settle_read_back(Seat& seat, const std::vector<std::shared_ptr<PendingCommand>>& sent,
+                        const std::vector<Sight>& sights);
   void end_dropped(Seat& seat, const protocol::CommandAck& ack);
   void prepare_proof(Seat& seat, PendingCommand& pending);
   void end_without_answer(Seat& seat, CommandId id, const char* reason);

@@ -5,14 +5,20 @@
 #include <cstdlib>
 #include <utility>
 
+#include "server/station/read_back.hpp"
 #include "server/station/seat.hpp"
-#include "server/station/telemetry_verifier.hpp"
 
 namespace server {
 namespace {
 
 constexpr std::int64_t kClockRecordPeriodUs = 60'000'000;
 constexpr std::int64_t kStationStepUs = 50'000;  // within a second; what NTP slews is far below
+
+std::vector<const protocol::Command*> commands_of(const std::vector<std::shared_ptr<PendingCommand>>& sent) {
+  std::vector<const protocol::Command*> commands;
+  for (const auto& pending : sent) commands.push_back(&pending->wire);
+  return commands;
+}
 
 }  // namespace
 
@@ -67,7 +73,8 @@ void Station::on_parameters(RobotPort& port, const protocol::ParameterPage& page
       publish(*seat->robot);
     }
   }
-  settle_read_back(*seat, [&page](const protocol::Command& command) { return read_back(command, page); });
+  const auto sent = seat->to_be_read_back();
+  settle_read_back(*seat, sent, read_back(commands_of(sent), page));
 }
 
 void Station::on_controller(RobotPort& port, const protocol::Controller& controller) {
@@ -75,7 +82,8 @@ void Station::on_controller(RobotPort& port, const protocol::Controller& control
   if (seat == nullptr) return;
   seat->settings.add(controller, clock_.utc_us());
   record_in_force(*seat, "controller", controller_json(controller));
-  settle_read_back(*seat, [&controller](const protocol::Command& command) { return read_back(command, controller); });
+  const auto sent = seat->to_be_read_back();
+  settle_read_back(*seat, sent, read_back(commands_of(sent), controller));
 }
 
 // Samples that were made before it was said may still be on their way: they are counted on, in periods.

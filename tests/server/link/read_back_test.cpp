@@ -94,6 +94,36 @@ TEST_F(ReadBackTest, AParameterIsVerifiedByThePageThatAnswersItBitForBit) {
   EXPECT_EQ(end(), "failed read_back_differs");
 }
 
+// A robot writes each page when it sends it: of two in one burst both pages hold the value of the second.
+TEST_F(ReadBackTest, AParameterThatANewerCommandHasSetAgainIsSuperseded) {
+  const auto first = accepted(set_parameter("duty_slew_per_s", 1));
+  const auto second = accepted(set_parameter("duty_slew_per_s", 2));
+  say_page(first, 0, "duty_slew_per_s", 2);
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(end(), "superseded by_a_newer_command");
+  say_page(second, 0, "duty_slew_per_s", 2);
+  EXPECT_EQ(end(), "verified ");
+}
+
+TEST_F(ReadBackTest, AParameterThatNoNewerCommandHasSetSoDiffers) {
+  accepted(set_parameter("duty_slew_per_s", 2));
+  const auto one = accepted(set_parameter("duty_slew_per_s", 1));
+  accepted(set_parameter("another", 2));
+  say_page(one, 0, "duty_slew_per_s", 2);
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(end(), "failed read_back_differs") << "an older one, and one of another name";
+}
+
+// The acknowledgement of the second may be lost.
+TEST_F(ReadBackTest, AParameterIsSupersededByOneWithoutAnAnswerToo) {
+  const auto first = accepted(set_parameter("duty_slew_per_s", 1));
+  submit(set_parameter("duty_slew_per_s", 2));
+  clock.settle();
+  say_page(first, 0, "duty_slew_per_s", 2);
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(end(), "superseded by_a_newer_command");
+}
+
 TEST_F(ReadBackTest, APageIsVerifiedByItsFirstIndex) {
   protocol::Command page = command_of(rheonaut_Command_get_parameters_tag);
   page.action.get_parameters.first_index = 6;
