@@ -91,7 +91,8 @@ void Station::acknowledge(Seat& seat, CommandId id, std::string reason) {
   // nothing.
   const bool is_of_earlier_connection = pending->look_from_robot_us < seat.connected_at_robot_us;
   const bool has_to_be_read = is_read_back(pending->wire);
-  const bool can_be_verified = has_to_be_read || can_be_seen(pending->wire);
+  // A robot reports nothing anew of what it has answered before.
+  const bool can_be_verified = has_to_be_read ? has_time : can_be_seen(pending->wire);
   if (!can_be_verified || is_of_earlier_connection) {
     return end(*pending, CommandState::acknowledged, std::move(reason));
   }
@@ -155,7 +156,6 @@ void Station::look_for_commands(Seat& seat, const SampleBatch& batch) {
 
 std::vector<std::shared_ptr<PendingCommand>> Seat::to_be_read_back() const {
   std::vector<std::shared_ptr<PendingCommand>> sent{unread.begin(), unread.end()};
-  if (sent.empty()) return sent;
   for (const auto& [id, pending] : commands) {
     if (pending->record.state == CommandState::sent && is_read_back(pending->wire)) sent.push_back(pending);
   }

@@ -1,8 +1,9 @@
-// Parameters by the page that answers each command; controllers by their coefficients.
+// Parameters by the page that answers each command; controllers by what each command makes of the two that a robot has.
 #include "server/station/read_back.hpp"
 
 #include <algorithm>
 #include <string_view>
+#include <utility>
 
 namespace server {
 namespace {
@@ -35,12 +36,62 @@ Sight sight_of(const protocol::Command& command, SentCommands newer, const proto
   return is_ordered_by_one(newer, *found) ? Sight::overtaken : Sight::missed;
 }
 
-Sight sight_of(const protocol::Command& command, const protocol::Controller& controller) {
-  if (command.which_action == rheonaut_Command_restore_controller_tag) return Sight::seen;
-  if (command.which_action != rheonaut_Command_set_controller_tag) return Sight::unseen;
-  const protocol::Controller& wanted = command.action.set_controller;
-  if (controller.controller_id != wanted.controller_id) return Sight::unseen;  // the one before it still is in force
-  return is_same(controller, wanted) ? Sight::seen : Sight::missed;
+bool is_restore(const protocol::Command& command) {
+  return command.which_action == rheonaut_Command_restore_controller_tag;
+}
+
+bool changes_controller(const protocol::Command& command) {
+  return is_restore(command) || command.which_action == rheonaut_Command_set_controller_tag;
+}
+
+// What a robot runs, and what its restore_controller swaps it with; none: not known.
+struct Controllers {
+  std::optional<protocol::Controller> newest, former;
+};
+
+bool is_newest(const Controllers& controllers, const protocol::Controller& one) {
+  return controllers.newest && is_same(*controllers.newest, one);
+}
+
+// After each of the commands. In auto a controller comes into force 1 s after its command, and a second command within
+// that second takes the place of the first; at rest the first is what the second leaves behind.
+std::vector<Controllers> after_each(SentCommands sent, const RobotSettings& known) {
+  Controllers now;
+  if (known.is_controller_current) now = {known.controller, known.controller_before};
+  bool may_be_waiting = false;
+  std::vector<Controllers> all;
+  for (const protocol::Command* command : sent) {
+    if (is_restore(*command)) {
+      std::swap(now.newest, now.former);
+    } else if (changes_controller(*command)) {
+      now = {command->action.set_controller, may_be_waiting ? std::nullopt : now.newest};
+    }
+    may_be_waiting = may_be_waiting || changes_controller(*command);
+    all.push_back(now);
+  }
+  return all;
+}
+
+// The newest command that has brought the controller that is reported.
+std::optional<std::size_t> bringer(SentCommands sent, const std::vector<Controllers>& after, const RobotSettings& known,
+                                   const protocol::Controller& reported) {
+  for (std::size_t i = sent.size(); i-- > 0;) {
+    if (changes_controller(*sent[i]) && is_newest(after[i], reported)) return i;
+  }
+  if (!known.is_controller_current) return std::nullopt;  // the report after Welcome, which no command has brought
+  for (std::size_t i = sent.size(); i-- > 0;) {
+    if (is_restore(*sent[i]) && !after[i].newest) return i;
+  }
+  return std::nullopt;
+}
+
+// Of a controller that none of the commands has brought.
+Sight sight_of_another(const protocol::Command& command, const RobotSettings& known,
+                       const protocol::Controller& reported) {
+  const bool is_still_the_same = !known.is_controller_current || is_same(*known.controller, reported);
+  if (is_still_the_same || !changes_controller(command)) return Sight::unseen;
+  const bool is_its_own = is_restore(command) || command.action.set_controller.controller_id == reported.controller_id;
+  return is_its_own ? Sight::missed : Sight::unseen;
 }
 
 }  // namespace
@@ -61,10 +112,29 @@ std::vector<Sight> read_back(SentCommands sent, const protocol::ParameterPage& p
   return sights;
 }
 
-std::vector<Sight> read_back(SentCommands sent, const protocol::Controller& controller) {
-  std::vector<Sight> sights;
-  for (const protocol::Command* command : sent) sights.push_back(sight_of(*command, controller));
-  return sights;
+ControllerReading read_back(SentCommands sent, const RobotSettings& known, const protocol::Controller& reported) {
+  const std::vector<Controllers> after = after_each(sent, known);
+  const std::optional<std::size_t> brought_by = bringer(sent, after, known, reported);
+  ControllerReading reading;
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    if (!brought_by) {
+      reading.sights.push_back(sight_of_another(*sent[i], known, reported));
+    } else if (i > *brought_by || !changes_controller(*sent[i])) {
+      reading.sights.push_back(Sight::unseen);
+    } else {
+      const bool is_seen = i == *brought_by || is_newest(after[i], reported);
+      reading.sights.push_back(is_seen ? Sight::seen : Sight::overtaken);
+    }
+  }
+  const bool is_unexplained_change =
+      known.is_controller_current && !is_same(*known.controller, reported) &&
+      std::ranges::none_of(sent, [](const auto* command) { return changes_controller(*command); });
+  if (brought_by) {
+    reading.former = after[*brought_by].former;
+  } else if (is_unexplained_change) {
+    reading.former = known.controller;
+  }
+  return reading;
 }
 
 }  // namespace server

@@ -4,6 +4,7 @@
 // them first.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,7 +23,15 @@ using SentCommands = std::span<const protocol::Command* const>;
 // bit; overtaken when it holds what a newer one has ordered instead; missed when it holds anything else.
 std::vector<Sight> read_back(SentCommands sent, const protocol::ParameterPage& page);
 
-// The same of the controller that the robot reports to be in force.
-std::vector<Sight> read_back(SentCommands sent, const protocol::Controller& controller);
+struct ControllerReading {
+  std::vector<Sight> sights;                   // of each command
+  std::optional<protocol::Controller> former;  // that restore_controller brings back now; none: not known
+};
+
+// What the controller that the robot reports to be in force says of each of them, and of the one behind it, given what
+// was known before: seen when it is the one that the command brings, bit for bit; overtaken when a newer command has
+// brought it; missed when it is neither, nor the one that was in force. What a restore brings and the station has not
+// seen go is any that no other command has ordered.
+ControllerReading read_back(SentCommands sent, const RobotSettings& known, const protocol::Controller& reported);
 
 }  // namespace server

@@ -65,8 +65,8 @@ struct Seat {
   std::shared_ptr<PendingCommand> newest_stop() const;
   std::size_t stops() const;
   std::shared_ptr<PendingCommand> on_its_way(CommandId id) const;  // of both; null when it is none of them
-  // While one is unread: all that are read back and that the robot may have run, also without an answer yet; in the
-  // order in which they were sent.
+  // Those that are read back and that the robot may have run, also without an answer yet; in the order in which they
+  // were sent.
   std::vector<std::shared_ptr<PendingCommand>> to_be_read_back() const;
 };
 

@@ -80,10 +80,11 @@ void Station::on_parameters(RobotPort& port, const protocol::ParameterPage& page
 void Station::on_controller(RobotPort& port, const protocol::Controller& controller) {
   Seat* seat = seat_of(port);
   if (seat == nullptr) return;
-  seat->settings.add(controller, clock_.utc_us());
-  record_in_force(*seat, "controller", controller_json(controller));
   const auto sent = seat->to_be_read_back();
-  settle_read_back(*seat, sent, read_back(commands_of(sent), controller));
+  ControllerReading reading = read_back(commands_of(sent), seat->settings, controller);
+  seat->settings.add(controller, std::move(reading.former), clock_.utc_us());
+  record_in_force(*seat, "controller", controller_json(controller));
+  settle_read_back(*seat, sent, reading.sights);
 }
 
 // Samples that were made before it was said may still be on their way: they are counted on, in periods.
