@@ -144,48 +144,84 @@ Result<void> may_bound_motion(const Caller& caller, const ParsedCommand& command
   return fail(ErrorCode::invalid, what + "; send \"confirm\": true to change it all the same", "confirm_required");
 }
 
+// SAFETY: nobody's credential outlives a wait: what has ended meanwhile, or has other rights now, commands nothing.
+Result<void> still_stands(const Caller& caller) {
+  if (caller.standing == nullptr || !caller.standing->ended()) return {};
+  return fail(
+      ErrorCode::forbidden,
+      fmt::format("the credential of {} was revoked, has expired or has other rights now; sign in, or send it again",
+                  caller.actor),
+      "not_permitted");
+}
+
+// What the caller may not send now. It is judged when nothing is waited for any more.
+Result<void> may_send_now(const Request& request, const ParsedCommand& parsed, const RobotSettings* settings) {
+  if (auto fresh = check_stamp(request.caller, parsed.stamp_us); !fresh) return fresh;
+  return may_bound_motion(request.caller, parsed, settings);
+}
+
+// The station then knows a command of this id that ended before a restart, or long ago.
+asio::awaitable<void> recall(ApiParts& parts, RobotId robot_id, CommandId id) {
+  if (parts.station.known_command(robot_id, id) != nullptr) co_return;
+  const auto stored = co_await parts.recording.history.command(id);
+  if (stored && stored->ended_at_us != 0) parts.station.remember(*stored);
+}
+
+// A set_controller has from it what its body leaves out. The first of a key has it from the controller in force; the
+// repeat from the controller that was sent then, so that it is the same command whatever is in force by now.
+std::optional<protocol::Controller> controller_to_complete_from(const CommandRecord* first,
+                                                                const RobotSettings* settings) {
+  if (first != nullptr && first->kind == "set_controller") {
+    json sent = json::parse(first->arguments);
+    sent["kind"] = first->kind;
+    const auto parsed = parse_command(dump(sent));
+    return parsed ? std::optional{parsed->action.action.set_controller} : std::nullopt;
+  }
+  const bool is_known = settings != nullptr && settings->is_controller_current;
+  return is_known ? settings->controller : std::nullopt;
+}
+
+CommandRequest request_of(const Request& request, ParsedCommand& parsed, std::string key) {
+  CommandRequest command;
+  command.robot_id = request.param.at("robot_id");
+  command.action = parsed.action;
+  command.arguments = std::move(parsed.arguments);
+  command.actor = request.actor;
+  command.peer = request.peer;
+  command.life = parsed.life;
+  command.key = std::move(key);
+  command.received_us = request.received_us;
+  command.unread = request.unread;
+  return command;
+}
+
 Answer submit_command(ApiParts& parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
-  const RobotSettings* settings = parts.station.settings(id);
-  const bool has_controller = settings != nullptr && settings->is_controller_current;
-  auto parsed = parse_command(request.body, has_controller ? &*settings->controller : nullptr);
-  if (!parsed) co_return refused(parts, request, "command", parsed.error());
-  if (auto may = may_bound_motion(request.caller, *parsed, settings); !may) {
-    co_return refused(parts, request, "command", may.error());
-  }
   auto key = key_of(request);
   if (!key) co_return refused(parts, request, "command", key.error());
   const auto wait = request.query.find("wait");
   if (wait != request.query.end() && wait->second != "acknowledged" && wait->second != "verified") {
     co_return problem(400, "wait must be acknowledged or verified", "out_of_range");
   }
-  CommandRequest command;
-  command.robot_id = id;
-  command.action = parsed->action;
-  command.arguments = std::move(parsed->arguments);
-  command.actor = request.actor;
-  command.peer = request.peer;
-  command.life = parsed->life;
-  command.key = std::move(*key);
-  command.received_us = request.received_us;
-  command.unread = request.unread;
+  const CommandId key_id = command_id_of(id, request.actor, *key);
+  if (!key->empty()) co_await recall(parts, id, key_id);
+
+  if (auto stands = still_stands(request.caller); !stands) co_return refused(parts, request, "command", stands.error());
+  const RobotSettings* settings = parts.station.settings(id);
+  const CommandRecord* first = key->empty() ? nullptr : parts.station.known_command(id, key_id);
+  const auto complete_from = controller_to_complete_from(first, settings);
+  auto parsed = parse_command(request.body, complete_from ? &*complete_from : nullptr);
+  if (!parsed) co_return refused(parts, request, "command", parsed.error());
+  CommandRequest command = request_of(request, *parsed, std::move(*key));
   command.until_verified = wait != request.query.end() && wait->second == "verified";
-  if (auto fresh = check_stamp(request.caller, parsed->stamp_us); !fresh) {
-    co_return refused(parts, request, "command", fresh.error());
-  }
-  if (!command.key.empty()) {
-    const CommandId command_id = command_id_of(id, command.actor, command.key);
-    if (!parts.station.remembers(command_id)) {  // asked before a restart, or long ago
-      const auto stored = co_await parts.recording.history.command(command_id);
-      const bool has_ended = stored && stored->ended_at_us != 0;
-      if (has_ended && stored->kind == protocol::kind(command.action) && stored->arguments == command.arguments) {
-        co_return command_response(*stored);
-      }
+  if (first == nullptr) {  // a repeat is answered as the first was, and sends nothing
+    if (auto may = may_send_now(request, *parsed, settings); !may) {
+      co_return refused(parts, request, "command", may.error());
     }
-  }
-  if (auto aged = set_age(command, *parsed, parts.clock); !aged) {
-    co_return refused(parts, request, "command", aged.error());
+    if (auto aged = set_age(command, *parsed, parts.clock); !aged) {
+      co_return refused(parts, request, "command", aged.error());
+    }
   }
   const auto record = co_await parts.station.submit(std::move(command));
   if (!record) co_return problem(record.error());
