@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/station/read_back.hpp"
 #include "server/station/seat.hpp"
 #include "server/station/telemetry_verifier.hpp"
 #include "server/station/unknown_values.hpp"
@@ -98,7 +99,8 @@ void Station::acknowledge(Seat& seat, CommandId id, std::string reason) {
   // nothing.
   const bool is_of_earlier_connection = pending->look_from_robot_us < seat.connected_at_robot_us;
   const bool has_to_be_read = is_read_back(pending->wire);
-  const bool can_be_verified = has_to_be_read || can_be_seen(pending->wire);
+  // A robot reports nothing anew of what it has answered before.
+  const bool can_be_verified = has_to_be_read ? has_time : can_be_seen(pending->wire);
   if (!can_be_verified || is_of_earlier_connection) {
     return end(*pending, CommandState::acknowledged, std::move(reason));
   }
@@ -160,21 +162,32 @@ void Station::look_for_commands(Seat& seat, const SampleBatch& batch) {
   });
 }
 
-// What the robot says is in force: the commands that have waited for it.
-void Station::settle_read_back(Seat& seat, const std::function<Sight(const protocol::Command&)>& sight_of) {
-  std::erase_if(seat.unread, [this, &sight_of](const std::shared_ptr<PendingCommand>& pending) {
-    CommandRecord& record = pending->record;
-    const Sight sight = sight_of(pending->wire);
-    if (sight == Sight::unseen) return false;
-    if (sight == Sight::seen) {
-      record.verified_after_us = clock_.steady_us() - pending->received_us;
-      end(*pending, CommandState::verified, record.reason);
+std::vector<std::shared_ptr<PendingCommand>> Seat::to_be_read_back() const {
+  std::vector<std::shared_ptr<PendingCommand>> sent{unread.begin(), unread.end()};
+  for (const auto& [id, pending] : commands) {
+    if (pending->record.state == CommandState::sent && is_read_back(pending->wire)) sent.push_back(pending);
+  }
+  std::ranges::sort(sent, {}, &PendingCommand::number);
+  return sent;
+}
+
+// What the robot says is in force ends the commands that have waited for it; an answer that is still to come does not.
+void Station::settle_read_back(Seat& seat, const std::vector<std::shared_ptr<PendingCommand>>& sent,
+                               const std::vector<Sight>& sights) {
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    PendingCommand& pending = *sent[i];
+    CommandRecord& record = pending.record;
+    if (sights[i] == Sight::unseen || std::erase(seat.unread, sent[i]) == 0) continue;
+    if (sights[i] == Sight::seen) {
+      record.verified_after_us = clock_.steady_us() - pending.received_us;
+      end(pending, CommandState::verified, record.reason);
+    } else if (sights[i] == Sight::overtaken) {
+      end(pending, CommandState::superseded, "by_a_newer_command");
     } else {
       spdlog::error("robot '{}' says after {} {} what it was not told", record.robot_id, record.kind, record.arguments);
-      end(*pending, CommandState::failed, "read_back_differs");
+      end(pending, CommandState::failed, "read_back_differs");
     }
-    return true;
-  });
+  }
 }
 
 // A timed command that was acknowledged when it was taken in, and of which nothing came.

@@ -125,18 +125,35 @@ void ModelSender::begin(const RobotId& id, Place& place) {
 asio::awaitable<void> ModelSender::work(RobotId id) {
   for (;;) {
     const Naming naming = places_[id].naming;
-    Outcome outcome;
-    if (naming.model) {
-      outcome = co_await send_model(id, naming);
-    } else {
-      outcome = co_await take_back(id, naming);
-    }
+    Outcome outcome = fail(ErrorCode::internal, "a fault of the station; its log says which", "internal");
+    auto sending = carry_out(id, naming, outcome);
+    co_await alone(id, std::move(sending));
     Place& place = places_[id];
     if (place.naming.number != naming.number) continue;  // somebody has named another since
     place.at_work = false;
-    conclude(id, naming, outcome);
+    auto finishing = finish(id, naming, outcome);
+    co_await alone(id, std::move(finishing));
     co_return;
   }
+}
+
+asio::awaitable<void> ModelSender::alone(RobotId id, asio::awaitable<void> task) {
+  return contained(tasks_.exceptions(), clock_, Ended::model, fmt::format("the model of robot '{}'", id),
+                   std::move(task));
+}
+
+// The outcome stays as it is when this fails inside.
+asio::awaitable<void> ModelSender::carry_out(RobotId id, Naming naming, Outcome& outcome) {
+  if (naming.model) {
+    outcome = co_await send_model(id, naming);
+  } else {
+    outcome = co_await take_back(id, naming);
+  }
+}
+
+asio::awaitable<void> ModelSender::finish(RobotId id, Naming naming, Outcome outcome) {
+  conclude(id, naming, outcome);
+  co_return;
 }
 
 void ModelSender::conclude(const RobotId& id, const Naming& naming, const Outcome& outcome) {
@@ -347,10 +364,16 @@ asio::awaitable<void> ModelSender::run() {
     std::set<RobotId> robots = std::exchange(changed_, {});
     robots.insert(open_.begin(), open_.end());
     for (const RobotId& id : robots) {
-      const RobotState* robot = station_.find(id);
-      if (robot != nullptr) follow(*robot, places_[id]);
+      auto looking = look_at(id);
+      co_await alone(id, std::move(looking));
     }
   }
+}
+
+asio::awaitable<void> ModelSender::look_at(RobotId id) {
+  const RobotState* robot = station_.find(id);
+  if (robot != nullptr) follow(*robot, places_[id]);
+  co_return;
 }
 
 // Compares what the robot reports now with what is known of it.

@@ -15,7 +15,8 @@
 // that this station has not seen being made (it was restarted meanwhile, or the robot comes from another), unless the
 // robot's parameters are the model of the fluid that is named for it.
 //
-// Loop thread. A task for each robot that something is sent to, and one for all. Everything it is given outlives its
+// Loop thread. A task for each robot that something is sent to, and one for all; what fails inside for one robot is
+// logged and counted, makes its model `failed`, and stops neither task. Everything it is given outlives its
 // tasks.
 #pragma once
 
@@ -78,6 +79,10 @@ class ModelSender final : public StationSink {
   RobotModel only_assumed(const std::string& fluid) const;
   void begin(const RobotId& id, Place& place);
   boost::asio::awaitable<void> work(RobotId id);
+  boost::asio::awaitable<void> alone(RobotId id, boost::asio::awaitable<void> task);
+  boost::asio::awaitable<void> carry_out(RobotId id, Naming naming, Outcome& outcome);
+  boost::asio::awaitable<void> finish(RobotId id, Naming naming, Outcome outcome);
+  boost::asio::awaitable<void> look_at(RobotId id);
   boost::asio::awaitable<Outcome> send_model(RobotId id, Naming naming);
   boost::asio::awaitable<Outcome> take_back(RobotId id, Naming naming);
   boost::asio::awaitable<Outcome> set(RobotId id, Naming naming, std::string name, float value,

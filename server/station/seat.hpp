@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "server/station/in_force.hpp"
 #include "server/station/station.hpp"
@@ -64,6 +65,9 @@ struct Seat {
   std::shared_ptr<PendingCommand> newest_stop() const;
   std::size_t stops() const;
   std::shared_ptr<PendingCommand> on_its_way(CommandId id) const;  // of both; null when it is none of them
+  // Those that are read back and that the robot may have run, also without an answer yet; in the order in which they
+  // were sent.
+  std::vector<std::shared_ptr<PendingCommand>> to_be_read_back() const;
 };
 
 }  // namespace server

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <span>
 
-#include "server/station/in_force.hpp"
-
 namespace server {
 namespace {
 
@@ -88,38 +86,6 @@ bool can_be_seen(const protocol::Command& command) {
     case rheonaut_Command_inject_disturbance_tag: return true;
     default: return false;
   }
-}
-
-bool is_read_back(const protocol::Command& command) {
-  switch (command.which_action) {
-    case rheonaut_Command_set_parameter_tag:
-    case rheonaut_Command_get_parameters_tag:
-    case rheonaut_Command_set_controller_tag:
-    case rheonaut_Command_restore_controller_tag: return true;
-    default: return false;
-  }
-}
-
-Sight read_back(const protocol::Command& command, const protocol::ParameterPage& page) {
-  if (page.command_id == 0 || page.command_id != command.command_id) return Sight::unseen;
-  if (command.which_action == rheonaut_Command_get_parameters_tag) {
-    const bool is_asked_for = page.first_index == command.action.get_parameters.first_index;
-    return is_asked_for && page.parameters_count > 0 ? Sight::seen : Sight::missed;
-  }
-  if (command.which_action != rheonaut_Command_set_parameter_tag) return Sight::unseen;
-  const auto& wanted = command.action.set_parameter;
-  const auto* const end = page.parameters + page.parameters_count;
-  const auto* const found =
-      std::find_if(page.parameters, end, [&wanted](const auto& one) { return std::string{one.name} == wanted.name; });
-  return found != end && is_same(found->value, wanted.value) ? Sight::seen : Sight::missed;
-}
-
-Sight read_back(const protocol::Command& command, const protocol::Controller& controller) {
-  if (command.which_action == rheonaut_Command_restore_controller_tag) return Sight::seen;
-  if (command.which_action != rheonaut_Command_set_controller_tag) return Sight::unseen;
-  const protocol::Controller& wanted = command.action.set_controller;
-  if (controller.controller_id != wanted.controller_id) return Sight::unseen;  // the one before it still is in force
-  return is_same(controller, wanted) ? Sight::seen : Sight::missed;
 }
 
 bool is_for_the_motor(const protocol::Command& command) {

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <map>
 
+#include "tests/server/captured_log.hpp"
 #include "tests/server/link/link_fixture.hpp"
 
 namespace server {
@@ -30,6 +31,21 @@ FluidModel some_model(float first_gain = 0.25F) {
   model.set_at_us = 1'700'000'000'000'000;
   return model;
 }
+
+// A sink that fails once, as nothing in the station should.
+class FailsOnce final : public StationSink {
+ public:
+  void on_command(const CommandRecord& record) override {
+    if (record.state == CommandState::queued && std::exchange(at_command, false)) fail();
+  }
+  void on_robot(const RobotState& robot) override {
+    if (robot.model.state == ModelState::confirmed && std::exchange(at_confirmed, false)) fail();
+  }
+  bool at_command = false, at_confirmed = false;
+
+ private:
+  static void fail() { throw std::runtime_error{"no room for it"}; }
+};
 
 // Keeps parameters as the firmware does, and tells of them; its word is in `held`.
 class ModelSenderTest : public LinkTest {
@@ -524,6 +540,58 @@ TEST_F(ModelSenderTest, AConfirmationThatTheStationHasNotSeenBeingMadeIsTakenBac
   EXPECT_EQ(held["model_confirmed"], 0);
   EXPECT_EQ(sink.commands.back().actor, "station:model");
   EXPECT_EQ(model().state, ModelState::assumed);
+}
+
+class FailingModelTest : public ModelSenderTest {
+ protected:
+  FailingModelTest() { station.add_sink(failing); }
+  void expect_contained() {
+    EXPECT_EQ(tasks.exceptions().count(Ended::model), 1U);
+    EXPECT_TRUE(log.has("the model of robot 'r1': no room for it")) << log.text();
+    EXPECT_EQ(tasks.exit_code(), 0);
+    EXPECT_FALSE(tasks.stopping());
+  }
+
+  CapturedLog log;
+  FailsOnce failing;
+};
+
+TEST_F(FailingModelTest, AFaultWhileTheModelIsSentFailsThatModelAlone) {
+  begin();
+  failing.at_command = true;
+  name_fluid("water");
+  live(1s);
+  expect_contained();
+  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().reason, "a fault of the station; its log says which");
+  EXPECT_THAT(events(), ElementsAre("model_not_confirmed"));
+  name_fluid("water");
+  live(5s);
+  EXPECT_EQ(model().state, ModelState::confirmed) << model().reason;
+}
+
+TEST_F(FailingModelTest, AFaultAtItsEndStopsNothing) {
+  begin();
+  failing.at_confirmed = true;
+  name_fluid("water");
+  live(5s);
+  expect_contained();
+  name_fluid("");
+  live(5s);
+  EXPECT_EQ(model().state, ModelState::assumed) << "it goes on with the next fluid";
+}
+
+TEST_F(FailingModelTest, AFaultWhileWhatTheRobotReportsIsFollowedStopsNothing) {
+  for (const auto& [name, value] : parameters_of(some_model())) held[name] = value;
+  held["model_confirmed"] = 1;
+  station.restore({{.id = "r1", .boot_id = 77, .fluid = "water"}}, {});
+  failing.at_confirmed = true;
+  begin();
+  live(2s);
+  expect_contained();
+  held["model_confirmed"] = 0;
+  live(1s);
+  EXPECT_EQ(model().state, ModelState::assumed) << "it goes on to follow";
 }
 
 }  // namespace
