@@ -17,6 +17,7 @@ const char* text(Ended value) {
     case Ended::http_connection: return "http_connection";
     case Ended::request: return "request";
     case Ended::live_page: return "live_page";
+    case Ended::model: return "model";
   }
   return "unknown";
 }

@@ -1,8 +1,9 @@
 // Exceptions that end something smaller than the station: logged with their text and what they ended, and counted.
 //
-// A robot's session, a connection, a request and a page end alone by what they throw. A cause may lie outside and come
-// again as often as somebody likes, so the log has one line a second of each name and text, and at most
-// kMostNames of them in a second; then one a second of all others of the kind. The counts are in /metrics. Loop thread.
+// A robot's session, a connection, a request, a page and the sending of a model end alone by what they throw. A cause
+// may lie outside and come again as often as somebody likes, so the log has one line a second of each name and text,
+// and at most kMostNames of them in a second; then one a second of all others of the kind. The counts are in /metrics.
+// Loop thread.
 #pragma once
 
 #include <array>
@@ -17,9 +18,11 @@
 
 namespace server {
 
-// What was ended. `request` is one of HTTP, or a message of a page on /live.
-enum class Ended : std::uint8_t { robot_session, http_connection, request, live_page };
-inline constexpr std::array kAllEnded{Ended::robot_session, Ended::http_connection, Ended::request, Ended::live_page};
+// What was ended. `request` is one of HTTP, or a message of a page on /live; `model` the sending of a fluid's model to
+// one robot.
+enum class Ended : std::uint8_t { robot_session, http_connection, request, live_page, model };
+inline constexpr std::array kAllEnded{Ended::robot_session, Ended::http_connection, Ended::request, Ended::live_page,
+                                      Ended::model};
 const char* text(Ended value);
 
 class ExceptionLog {

@@ -72,8 +72,10 @@ asio::awaitable<Result<PlacedReference>> AnalysisService::place(RunId run, Refer
                                                                 std::optional<MarkerPlace> marker) {
   auto gathered = co_await gather(run, own_position);
   if (!gathered) co_return std::unexpected{gathered.error()};
-  auto job = [own = std::move(*gathered), request = std::move(request), marker] {
-    return place_reference(request, own, marker);
+  auto find = [run](SQLite::Database& database) { return find_zeroings(database, run); };
+  auto zeroings = co_await history_.reader().ask(std::move(find));
+  auto job = [own = std::move(*gathered), zeroings = std::move(zeroings), request = std::move(request), marker] {
+    return place_reference(request, own, zeroings, marker);
   };
   co_return co_await maths_.run(std::move(job));
 }

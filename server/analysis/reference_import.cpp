@@ -113,13 +113,22 @@ struct OwnRecord {
   }
 };
 
-// A standard deviation that falls to less than half from one sample to the next, and what comes with it.
+// A standard deviation that falls to less than half from one sample to the next: a zeroing whose event was lost.
 bool is_zeroed_between(const OwnPosition& before, const OwnPosition& after) {
-  constexpr float kSureM = 0.0005F;  // below it, where a zero is hardly a step
+  constexpr float kSureM = 0.0005F;  // below it, the sd of a robot that knows its position says nothing
   return before.position_sd_m > kSureM && after.position_sd_m < before.position_sd_m / 2;
 }
 
-Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::optional<std::uint32_t> wanted) {
+Error zeroed_at(double at_s) {
+  return {ErrorCode::invalid,
+          fmt::format("the robot's position was set to 0 (zero_position) {:.2f} s after the span began, so no one zero "
+                      "holds for all of it: make runs of what lies before and after",
+                      at_s),
+          "zeroed"};
+}
+
+Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::span<const Zeroing> zeroings,
+                             std::optional<std::uint32_t> wanted) {
   if (own.empty()) return fail(ErrorCode::invalid, "the run has no samples");
   if (!wanted && own.front().span != own.back().span) {
     return fail(ErrorCode::invalid,
@@ -134,11 +143,7 @@ Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::optional<std
   for (const OwnPosition& sample : own) {
     if (sample.span != record.span) continue;
     if (before != nullptr && is_zeroed_between(*before, sample)) {
-      return fail(ErrorCode::invalid,
-                  fmt::format("the robot's position was set to 0 (zero_position) {:.2f} s after the span began, so no "
-                              "one zero holds for all of it: make runs of what lies before and after",
-                              record.seconds(sample.robot_time_us)),
-                  "zeroed");
+      return std::unexpected{zeroed_at(record.seconds(sample.robot_time_us))};
     }
     before = &sample;
     if (!has_begun) record.first_us = sample.robot_time_us;
@@ -156,6 +161,12 @@ Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::optional<std
     record.sd_m.push_back(static_cast<double>(sample.position_sd_m));
   }
   if (!has_begun) return fail(ErrorCode::invalid, fmt::format("the run has no samples in span {}", record.span));
+  for (const Zeroing& zeroing : zeroings) {
+    const bool is_within = zeroing.robot_time_us > record.first_us && zeroing.robot_time_us <= record.last_us;
+    if (zeroing.span == record.span && is_within) {
+      return std::unexpected{zeroed_at(record.seconds(zeroing.robot_time_us))};
+    }
+  }
   for (const OwnPosition& sample : own) {
     if (sample.span != record.span || sample.clock_uncertainty_us < 0) continue;
     const std::int64_t offset_us = sample.utc_us - static_cast<std::int64_t>(sample.robot_time_us);
@@ -320,12 +331,13 @@ OwnPosition own_position(const StoredSample& stored) {
 }
 
 Result<PlacedReference> place_reference(const ReferenceRequest& request, std::span<const OwnPosition> samples,
-                                        std::optional<MarkerPlace> marker) {
+                                        std::span<const Zeroing> zeroings, std::optional<MarkerPlace> marker) {
   const auto given = read_given(request);
   if (!given) return std::unexpected{given.error()};
-  const auto own = own_record(samples, request.span ? request.span
-                                       : marker     ? std::optional{marker->span}
-                                                    : std::nullopt);
+  const auto own = own_record(samples, zeroings,
+                              request.span ? request.span
+                              : marker     ? std::optional{marker->span}
+                                           : std::nullopt);
   if (!own) return std::unexpected{own.error()};
   PlacedReference placed;
   OutsideReference& made = placed.reference;

@@ -61,10 +61,11 @@ struct PlacedReference {
   OutsidePositions positions;
 };
 
-// `marker` belongs to the method of that name. invalid: what cannot be used, with the line of the text, or why the
-// clock cannot be found and what to do, or that positions over 2 m are not in metres by the robot's own record.
+// `marker` belongs to the method of that name; `zeroings` are those of the run's boots. invalid: what cannot be used,
+// with the line of the text, or why the clock cannot be found and what to do, or that positions over 2 m are not in
+// metres by the robot's own record.
 Result<PlacedReference> place_reference(const ReferenceRequest& request, std::span<const OwnPosition> own,
-                                        std::optional<MarkerPlace> marker);
+                                        std::span<const Zeroing> zeroings, std::optional<MarkerPlace> marker);
 
 // What was done, in words: "clock by correlation (0.998) with the robot's own motion: ...".
 std::string clock_in_words(const OutsideReference& reference);

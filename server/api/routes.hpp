@@ -1,6 +1,6 @@
-// All routes of the API, grouped by noun: routes_station, routes_recording, routes_robots, routes_in_force,
-// routes_fluids, routes_runs, routes_markers, routes_references, routes_samples, routes_overview, routes_exports,
-// routes_accounts, routes_audit.
+// All routes of the API, grouped by noun: routes_station, routes_recording, routes_robots, routes_commands,
+// routes_in_force, routes_fluids, routes_runs, routes_markers, routes_references, routes_samples, routes_overview,
+// routes_exports, routes_accounts, routes_audit.
 //
 // Held to openapi.yaml both ways by a test. Each answer is a coroutine that can be called without a server.
 #pragma once
@@ -52,6 +52,7 @@ struct ApiParts {
 void add_station_routes(Router& router, ApiParts& parts);
 void add_recording_routes(Router& router, ApiParts& parts);
 void add_robot_routes(Router& router, ApiParts& parts);
+void add_command_routes(Router& router, ApiParts& parts);
 void add_in_force_routes(Router& router, ApiParts& parts);
 void add_fluid_routes(Router& router, ApiParts& parts);
 void add_run_routes(Router& router, ApiParts& parts);

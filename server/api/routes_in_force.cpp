@@ -30,7 +30,7 @@ Answer get_parameters(ApiParts& parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   const RobotSettings* known = parts.station.settings(id);
   if (known == nullptr) co_return problem(unknown_robot(id).error());
-  json table = json::array();
+  json table;  // null: nothing is known, which is not the same as a robot without parameters
   for (const auto& [name, parameter] : known->parameters.last_known()) table.push_back(parameter_json(parameter));
   co_return json_response(200, {{"robot_id", id},
                                 {"is_current", is_connected(parts.station, id) && known->parameters.is_current()},

@@ -100,7 +100,7 @@ Answer annotate_run(ApiParts& parts, Request request) {
     const bool is_open = before->state == RunState::open;
     const auto named = is_open ? may_name_fluid(parts, request, before->robot_id, fluid->second) : Result<bool>{true};
     if (!named) co_return problem(named.error());
-    if (!*named) annotation->texts.erase(fluid);  // it is the run's already
+    annotation->names_fluid_of_robot = *named;
   }
   const auto run = co_await parts.recording.runs.annotate(*id, *annotation, author_of(request, parts.clock));
   if (!run) co_return problem(run.error());

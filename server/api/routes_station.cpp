@@ -89,6 +89,7 @@ void add_routes(Router& router, ApiParts& parts) {
   add_station_routes(router, parts);
   add_recording_routes(router, parts);
   add_robot_routes(router, parts);
+  add_command_routes(router, parts);
   add_in_force_routes(router, parts);
   add_fluid_routes(router, parts);
   add_run_routes(router, parts);

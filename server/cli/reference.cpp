@@ -159,7 +159,8 @@ OutsideReference import_closed(const ReferenceCommand& wish, const ReferenceRequ
   for (const StoredSample& stored : value_of(read_run(path, wish.run, kMaxAnalysedSamples))) {
     own.push_back(own_position(stored));
   }
-  PlacedReference placed = value_of(place_reference(request, own, marker));
+  const std::vector<Zeroing> zeroings = find_zeroings(database.handle(), wish.run);
+  PlacedReference placed = value_of(place_reference(request, own, zeroings, marker));
   const Author by = command_line_author();
   placed.reference.run = wish.run;
   placed.reference.actor = by.actor;

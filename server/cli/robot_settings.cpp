@@ -69,6 +69,10 @@ int list_parameters(const Robot& robot, bool as_json, std::ostream& out) {
     fmt::print(out, "{}\n", known.dump(2));
     return 0;
   }
+  if (known.at("parameters").is_null()) {
+    fmt::print(out, "Not known: the robot has not reported its parameters since the station started\n");
+    return 0;
+  }
   say_if_old(known, out);
   Table table{{"parameter", "value", "unit", "minimum", "maximum", "default", ""}};
   for (const json& one : known.at("parameters")) {
@@ -112,12 +116,12 @@ int show_controller(const Robot& robot, bool as_json, std::ostream& out) {
     fmt::print(out, "{}\n", known.dump(2));
     return 0;
   }
-  say_if_old(known, out);
   const json& controller = known.at("controller");
   if (controller.is_null()) {
-    fmt::print(out, "The robot has not said which controller it runs\n");
+    fmt::print(out, "Not known: the robot has not reported its controller since the station started\n");
     return 0;
   }
+  say_if_old(known, out);
   Table table{{"", ""}};
   for (const auto& [name, value] : controller.items()) table.row({name, value.dump()});
   table.write(out);

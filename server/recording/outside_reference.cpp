@@ -266,4 +266,14 @@ Result<MarkerPlace> find_marker(SQLite::Database& database, RunId run, std::opti
   return MarkerPlace{found.span, time->robot_time_us};
 }
 
+std::vector<Zeroing> find_zeroings(SQLite::Database& database, RunId run) {
+  SQLite::Statement query{database,
+                          "SELECT span, robot_time_us FROM run_span JOIN event USING (boot_key)"
+                          " WHERE run_id = ? AND event_seq IS NOT NULL AND kind = 'position_zeroed'"};
+  bind_all(query, run);
+  std::vector<Zeroing> found;
+  while (query.executeStep()) found.push_back({query.getColumn(0).getUInt(), unsigned_id(query.getColumn(1))});
+  return found;
+}
+
 }  // namespace server

@@ -102,4 +102,12 @@ struct MarkerPlace {
 Result<MarkerPlace> find_marker(SQLite::Database& database, RunId run, std::optional<std::int64_t> marker_id,
                                 const std::string& marker_text);
 
+// Where the robot set its position to 0 (zero_position) during a boot of the run, as its events say; perhaps before or
+// after the run's samples.
+struct Zeroing {
+  std::uint32_t span = 0;
+  std::uint64_t robot_time_us = 0;
+};
+std::vector<Zeroing> find_zeroings(SQLite::Database& database, RunId run);
+
 }  // namespace server

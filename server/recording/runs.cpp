@@ -292,7 +292,8 @@ asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, 
   if (const auto fluid = annotation.texts.find("fluid"); outcome && fluid != annotation.texts.end()) {
     outcome = check_fluid(fluid->second);
     const auto open = std::ranges::find(open_runs_, id, [](const auto& entry) { return entry.second; });
-    const bool is_of_robot = open != open_runs_.end() && id != 0 && !fluid->second.empty();
+    const bool is_open = open != open_runs_.end() && id != 0;
+    const bool is_of_robot = is_open && annotation.names_fluid_of_robot && !fluid->second.empty();
     if (outcome && is_of_robot) outcome = on_fluid_(open->first, fluid->second, by);
   }
   if (!outcome) co_return std::unexpected{outcome.error()};

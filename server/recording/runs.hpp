@@ -57,6 +57,7 @@ struct RunAnnotation {
   std::map<std::string, std::string> texts;
   bool has_mean_flow = false;
   std::optional<double> mean_flow_m_s;
+  bool names_fluid_of_robot = true;  // the fluid of an open run is its robot's, too
 };
 
 // Samples of a robot that were recorded already.

@@ -93,7 +93,13 @@ Result<void> Station::check_request(const CommandRequest& request, const protoco
   return check_command(wire, *seat.robot, envelope_, seat.orders_ahead());
 }
 
-bool Station::remembers(CommandId id) const { return recent_.find(id) != nullptr; }
+const CommandRecord* Station::known_command(const RobotId& robot_id, CommandId id) const {
+  const auto seat = seats_.find(robot_id);
+  const auto pending = seat == seats_.end() ? nullptr : seat->second.on_its_way(id);
+  if (pending != nullptr) return &pending->record;
+  const auto* recent = recent_.find(id);
+  return recent == nullptr ? nullptr : &recent->record;
+}
 
 // A wish with a key that is on its way already, or was answered lately.
 Result<std::shared_ptr<PendingCommand>> Station::same_wish(const CommandRequest& request, const Seat& seat) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/station/read_back.hpp"
 #include "server/station/seat.hpp"
 #include "server/station/telemetry_verifier.hpp"
 #include "server/station/unknown_values.hpp"
@@ -14,6 +15,17 @@ namespace {
 constexpr microseconds kAckGrace{1'000'000};   // an answer may come this much after the life ended
 constexpr microseconds kSeenGrace{5'000'000};  // what shows the effect may come so much after it
 constexpr std::size_t kMaxUnseen = 64;
+
+// Whether a command need not be seen in telemetry since a later one has taken its place.
+bool is_excused_by(const PendingCommand& earlier, const PendingCommand& later, std::uint32_t period_us) {
+  // SAFETY: a robot that was stopped moves only after a clear, so nothing else excuses a stop; not even a command that
+  // was acknowledged for a time after it, which the stop has dropped.
+  const bool ends_a_stop = later.is_stop() || later.wire.which_action == rheonaut_Command_clear_emergency_tag;
+  if (earlier.is_stop() && !ends_a_stop) return false;
+  // SAFETY: nothing excuses what should have been seen before it acts.
+  const std::uint64_t visible_us = visible_from_us(earlier.wire, earlier.look_from_robot_us, period_us);
+  return is_for_the_motor(earlier.wire) && later.look_from_robot_us <= visible_us + kVerifyWindowUs;
+}
 
 }  // namespace
 
@@ -80,17 +92,15 @@ void Station::acknowledge(Seat& seat, CommandId id, std::string reason) {
     for (const auto& other : seat.unseen) {  // a timed one may come later than one that was acknowledged after it
       const bool is_older = other->look_from_robot_us <= pending->look_from_robot_us;
       PendingCommand &earlier = is_older ? *other : *pending, &later = is_older ? *pending : *other;
-      // SAFETY: nothing that waits excuses a stop, or what should have been seen before it acts.
-      const bool is_in_time = later.look_from_robot_us <= earlier.look_from_robot_us + kVerifyWindowUs;
-      const bool is_excused = is_for_the_motor(earlier.wire) && is_in_time && (!earlier.is_stop() || is_older);
-      earlier.is_overtaken = earlier.is_overtaken || is_excused;
+      earlier.is_overtaken = earlier.is_overtaken || is_excused_by(earlier, later, seat.robot->context.period_us);
     }
   }
   // What took effect before this connection may be shown by samples that come after the live ones: their silence says
   // nothing.
   const bool is_of_earlier_connection = pending->look_from_robot_us < seat.connected_at_robot_us;
   const bool has_to_be_read = is_read_back(pending->wire);
-  const bool can_be_verified = has_to_be_read || can_be_seen(pending->wire);
+  // A robot reports nothing anew of what it has answered before.
+  const bool can_be_verified = has_to_be_read ? has_time : can_be_seen(pending->wire);
   if (!can_be_verified || is_of_earlier_connection) {
     return end(*pending, CommandState::acknowledged, std::move(reason));
   }
@@ -152,21 +162,32 @@ void Station::look_for_commands(Seat& seat, const SampleBatch& batch) {
   });
 }
 
-// What the robot says is in force: the commands that have waited for it.
-void Station::settle_read_back(Seat& seat, const std::function<Sight(const protocol::Command&)>& sight_of) {
-  std::erase_if(seat.unread, [this, &sight_of](const std::shared_ptr<PendingCommand>& pending) {
-    CommandRecord& record = pending->record;
-    const Sight sight = sight_of(pending->wire);
-    if (sight == Sight::unseen) return false;
-    if (sight == Sight::seen) {
-      record.verified_after_us = clock_.steady_us() - pending->received_us;
-      end(*pending, CommandState::verified, record.reason);
+std::vector<std::shared_ptr<PendingCommand>> Seat::to_be_read_back() const {
+  std::vector<std::shared_ptr<PendingCommand>> sent{unread.begin(), unread.end()};
+  for (const auto& [id, pending] : commands) {
+    if (pending->record.state == CommandState::sent && is_read_back(pending->wire)) sent.push_back(pending);
+  }
+  std::ranges::sort(sent, {}, &PendingCommand::number);
+  return sent;
+}
+
+// What the robot says is in force ends the commands that have waited for it; an answer that is still to come does not.
+void Station::settle_read_back(Seat& seat, const std::vector<std::shared_ptr<PendingCommand>>& sent,
+                               const std::vector<Sight>& sights) {
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    PendingCommand& pending = *sent[i];
+    CommandRecord& record = pending.record;
+    if (sights[i] == Sight::unseen || std::erase(seat.unread, sent[i]) == 0) continue;
+    if (sights[i] == Sight::seen) {
+      record.verified_after_us = clock_.steady_us() - pending.received_us;
+      end(pending, CommandState::verified, record.reason);
+    } else if (sights[i] == Sight::overtaken) {
+      end(pending, CommandState::superseded, "by_a_newer_command");
     } else {
       spdlog::error("robot '{}' says after {} {} what it was not told", record.robot_id, record.kind, record.arguments);
-      end(*pending, CommandState::failed, "read_back_differs");
+      end(pending, CommandState::failed, "read_back_differs");
     }
-    return true;
-  });
+  }
 }
 
 // A timed command that was acknowledged when it was taken in, and of which nothing came.

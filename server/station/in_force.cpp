@@ -90,11 +90,9 @@ void RobotSettings::begin_again() {
   controller_before.reset();
 }
 
-// The robot's restore swaps the two; when it says the same again (a change turned back before it came into force), what
-// is behind it now is not known here.
-void RobotSettings::add(const protocol::Controller& told, std::int64_t at_us) {
-  const bool is_change = is_controller_current && controller && !is_same(*controller, told);
-  controller_before = is_change ? controller : std::nullopt;
+void RobotSettings::add(const protocol::Controller& told, std::optional<protocol::Controller> former,
+                        std::int64_t at_us) {
+  controller_before = std::move(former);
   controller = told;
   controller_at_us = at_us;
   is_controller_current = true;

@@ -56,7 +56,8 @@ struct RobotSettings {
   std::optional<protocol::Controller> controller_before;
 
   void begin_again();
-  void add(const protocol::Controller& told, std::int64_t at_us);
+  // `former`: what restore_controller brings back now; none: not known.
+  void add(const protocol::Controller& told, std::optional<protocol::Controller> former, std::int64_t at_us);
 };
 
 // Coefficients as they were sent, in the order of the message.

@@ -125,18 +125,35 @@ void ModelSender::begin(const RobotId& id, Place& place) {
 asio::awaitable<void> ModelSender::work(RobotId id) {
   for (;;) {
     const Naming naming = places_[id].naming;
-    Outcome outcome;
-    if (naming.model) {
-      outcome = co_await send_model(id, naming);
-    } else {
-      outcome = co_await take_back(id, naming);
-    }
+    Outcome outcome = fail(ErrorCode::internal, "a fault of the station; its log says which", "internal");
+    auto sending = carry_out(id, naming, outcome);
+    co_await alone(id, std::move(sending));
     Place& place = places_[id];
     if (place.naming.number != naming.number) continue;  // somebody has named another since
     place.at_work = false;
-    conclude(id, naming, outcome);
+    auto finishing = finish(id, naming, outcome);
+    co_await alone(id, std::move(finishing));
     co_return;
   }
+}
+
+asio::awaitable<void> ModelSender::alone(RobotId id, asio::awaitable<void> task) {
+  return contained(tasks_.exceptions(), clock_, Ended::model, fmt::format("the model of robot '{}'", id),
+                   std::move(task));
+}
+
+// The outcome stays as it is when this fails inside.
+asio::awaitable<void> ModelSender::carry_out(RobotId id, Naming naming, Outcome& outcome) {
+  if (naming.model) {
+    outcome = co_await send_model(id, naming);
+  } else {
+    outcome = co_await take_back(id, naming);
+  }
+}
+
+asio::awaitable<void> ModelSender::finish(RobotId id, Naming naming, Outcome outcome) {
+  conclude(id, naming, outcome);
+  co_return;
 }
 
 void ModelSender::conclude(const RobotId& id, const Naming& naming, const Outcome& outcome) {
@@ -186,11 +203,6 @@ asio::awaitable<ModelSender::Outcome> ModelSender::send_model(RobotId id, Naming
     Outcome done = co_await set(id, naming, name, value, deadline_us);
     if (!done) co_return done;
   }
-  // SAFETY: what the robot reports counts, not what it was sent.
-  if (!holds(id, *naming.model)) {
-    co_return fail(ErrorCode::conflict, "the robot's parameters are not the model's: somebody else changed one",
-                   "differs");
-  }
   Outcome confirmed = co_await set(id, naming, kConfirmed, 1, deadline_us);
   if (confirmed) confirmed = co_await wait_for_flag(id, true);
   if (confirmed && !holds(id, *naming.model)) {
@@ -212,6 +224,11 @@ asio::awaitable<ModelSender::Outcome> ModelSender::set(RobotId id, Naming naming
   for (;;) {
     const Outcome rests = co_await wait_for_rest(id, naming, deadline_us);
     if (!rests) co_return rests;
+    // SAFETY: what the robot reports counts, not what it was sent; each time, since it may change during a wait.
+    if (name == kConfirmed && value == 1 && !holds(id, *naming.model)) {
+      co_return fail(ErrorCode::conflict, "the robot's parameters are not the model's: somebody else changed one",
+                     "differs");
+    }
     CommandRequest request = set_parameter(id, naming.by, name, value);
     const Result<CommandRecord> record = co_await station_.submit(std::move(request));
     if (const Outcome wanted = still_wanted(id, naming); !wanted) co_return wanted;
@@ -319,6 +336,7 @@ void ModelSender::on_samples(const RobotState& robot, const SampleBatch& batch) 
   if (place.boot_id != robot.boot_id) {
     place.boot_id = robot.boot_id;
     place.flag.reset();
+    place.page_before_seq = 0;
   }
   place.was_seen_to_rise = place.flag.has_value();
   place.flag = flag;
@@ -328,7 +346,10 @@ void ModelSender::on_samples(const RobotState& robot, const SampleBatch& batch) 
 }
 
 void ModelSender::on_in_force(const RobotState& robot, const InForceRecord& record) {
-  if (record.kind != "parameters" || !places_.contains(robot.id)) return;
+  const auto found = places_.find(robot.id);
+  if (record.kind != "parameters" || found == places_.end()) return;
+  found->second.page_before_seq = record.first_seq;
+  found->second.page_came_us = clock_.steady_us();
   changed_.insert(robot.id);
   wake_.notify();
 }
@@ -343,10 +364,16 @@ asio::awaitable<void> ModelSender::run() {
     std::set<RobotId> robots = std::exchange(changed_, {});
     robots.insert(open_.begin(), open_.end());
     for (const RobotId& id : robots) {
-      const RobotState* robot = station_.find(id);
-      if (robot != nullptr) follow(*robot, places_[id]);
+      auto looking = look_at(id);
+      co_await alone(id, std::move(looking));
     }
   }
+}
+
+asio::awaitable<void> ModelSender::look_at(RobotId id) {
+  const RobotState* robot = station_.find(id);
+  if (robot != nullptr) follow(*robot, places_[id]);
+  co_return;
 }
 
 // Compares what the robot reports now with what is known of it.
@@ -368,11 +395,19 @@ void ModelSender::follow(const RobotState& robot, Place& place) {
   const std::optional<FluidModel>& sent = place.naming.model;
   const bool is_another =
       is_taken_for_confirmed && !robot.model.fluid.empty() && sent && holds_another(robot.id, *sent);
-  if (*place.flag && (!is_taken_for_confirmed || is_another)) return judge_unseen(robot, place);
-  if (!*place.flag && is_taken_for_confirmed) {
-    station_.set_model(
+  const bool is_flag_old = is_flag_older_than_page(robot, place);
+  if (is_flag_old) open_.insert(robot.id);
+  if (is_taken_for_confirmed && (!*place.flag || (is_another && is_flag_old))) {
+    return station_.set_model(
         robot.id, model_state(ModelState::assumed, "", {}, "the robot has taken it back: a parameter was changed"));
   }
+  if (*place.flag && !is_flag_old && (!is_taken_for_confirmed || is_another)) judge_unseen(robot, place);
+}
+
+// The page of a changed parameter comes before the sample that shows what the change has done to the confirmation.
+bool ModelSender::is_flag_older_than_page(const RobotState& robot, const Place& place) const {
+  const bool is_waited_for = clock_.steady_us() < place.page_came_us + kJudgePatience.count();
+  return robot.next_seq <= place.page_before_seq && is_waited_for;
 }
 
 // A confirmation that did not come from here.
@@ -380,6 +415,8 @@ void ModelSender::judge_unseen(const RobotState& robot, Place& place) {
   const FluidModel* model = models_.find(robot.fluid);
   if (model != nullptr && holds(robot.id, *model)) {
     place.naming.boot_id = robot.boot_id;
+    place.naming.fluid = robot.fluid;
+    place.naming.model = *model;  // SAFETY: other bits under the flag are noticed by it
     return station_.set_model(robot.id, model_state(ModelState::confirmed, robot.fluid, *model, ""));
   }
   if (place.was_seen_to_rise) {  // somebody has commanded it
@@ -393,6 +430,8 @@ void ModelSender::judge_unseen(const RobotState& robot, Place& place) {
   place.naming = {place.naming.number + 1, {"station:model", "", 0}, robot.boot_id, robot.fluid, std::nullopt};
   place.owes = true;
   place.next_try_us = 0;
+  station_.set_model(robot.id,
+                     model_state(ModelState::failed, "", {}, "what was confirmed before is not taken back yet"));
 }
 
 // SAFETY: nobody's hands are taken from the robot for it: it waits for rest, and until nobody else is in control.

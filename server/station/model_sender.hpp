@@ -15,7 +15,8 @@
 // that this station has not seen being made (it was restarted meanwhile, or the robot comes from another), unless the
 // robot's parameters are the model of the fluid that is named for it.
 //
-// Loop thread. A task for each robot that something is sent to, and one for all. Everything it is given outlives its
+// Loop thread. A task for each robot that something is sent to, and one for all; what fails inside for one robot is
+// logged and counted, makes its model `failed`, and stops neither task. Everything it is given outlives its
 // tasks.
 #pragma once
 
@@ -63,10 +64,12 @@ class ModelSender final : public StationSink {
     BootId boot_id = 0;            // that the next are about
     std::optional<bool> flag;      // telemetry says that the model is confirmed; none yet
     bool was_seen_to_rise = false;
-    bool at_work = false;             // a task sends the robot something
-    bool owes = false;                // a confirmation is to be taken back
-    std::int64_t next_try_us = 0;     // steady
-    std::int64_t heard_first_us = 0;  // steady: when the flag was first known
+    bool at_work = false;               // a task sends the robot something
+    bool owes = false;                  // a confirmation is to be taken back
+    std::int64_t next_try_us = 0;       // steady
+    std::int64_t heard_first_us = 0;    // steady: when the flag was first known
+    std::uint64_t page_before_seq = 0;  // the first sample made after the newest page of parameters
+    std::int64_t page_came_us = 0;      // steady
   };
   using Outcome = Result<void>;
 
@@ -76,6 +79,10 @@ class ModelSender final : public StationSink {
   RobotModel only_assumed(const std::string& fluid) const;
   void begin(const RobotId& id, Place& place);
   boost::asio::awaitable<void> work(RobotId id);
+  boost::asio::awaitable<void> alone(RobotId id, boost::asio::awaitable<void> task);
+  boost::asio::awaitable<void> carry_out(RobotId id, Naming naming, Outcome& outcome);
+  boost::asio::awaitable<void> finish(RobotId id, Naming naming, Outcome outcome);
+  boost::asio::awaitable<void> look_at(RobotId id);
   boost::asio::awaitable<Outcome> send_model(RobotId id, Naming naming);
   boost::asio::awaitable<Outcome> take_back(RobotId id, Naming naming);
   boost::asio::awaitable<Outcome> set(RobotId id, Naming naming, std::string name, float value,
@@ -89,6 +96,7 @@ class ModelSender final : public StationSink {
   void conclude(const RobotId& id, const Naming& naming, const Outcome& outcome);
   void conclude_failure(const RobotId& id, const Naming& naming, const Error& error);
   void follow(const RobotState& robot, Place& place);
+  bool is_flag_older_than_page(const RobotState& robot, const Place& place) const;
   void judge_unseen(const RobotState& robot, Place& place);
   void settle_debt(const RobotState& robot, Place& place);
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "server/station/in_force.hpp"
 #include "server/station/station.hpp"
@@ -71,6 +72,9 @@ struct Seat {
   void keep_unknown(std::shared_ptr<PendingCommand> ended);        // which has ended so
   // What telemetry does not show yet, but what is being dropped. Points into the commands of this seat.
   OrdersAhead orders_ahead() const;
+  // Those that are read back and that the robot may have run, also without an answer yet; in the order in which they
+  // were sent.
+  std::vector<std::shared_ptr<PendingCommand>> to_be_read_back() const;
 };
 
 }  // namespace server

@@ -124,8 +124,10 @@ class Station {
   // "control", `detail` what is known of the wish, as a JSON object.
   void note_refusal(Author by, const RobotId& robot_id, const char* what, std::string detail, const Error& error);
 
-  // A command with a client's key that is on its way or has ended lately: what asks again need not be sent again.
-  bool remembers(CommandId id) const;
+  // The command of a client's key that is on its way, or has ended lately; null when there is none.
+  const CommandRecord* known_command(const RobotId& robot_id, CommandId id) const;
+  // One that ended before a restart, or long ago: who asks for it again gets this record, and nothing is sent.
+  void remember(const CommandRecord& ended) { recent_.put(ended, clock_.steady_us()); }
 
   const StopTimes& stop_times() const { return stop_times_; }
   std::uint64_t invalid_values() const { return invalid_values_; }  // of all robots, since the station started
@@ -223,7 +225,8 @@ class Station {
   void expire_commands(Seat& seat);
   void look_for_commands(Seat& seat, const SampleBatch& batch);
   void end_unseen(Seat& seat, const char* reason);
-  void settle_read_back(Seat& seat, const std::function<Sight(const protocol::Command&)>& sight_of);
+  void settle_read_back(Seat& seat, const std::vector<std::shared_ptr<PendingCommand>>& sent,
+                        const std::vector<Sight>& sights);
   void end_dropped(Seat& seat, const protocol::CommandAck& ack);
   void prepare_proof(Seat& seat, PendingCommand& pending);
   void end_without_answer(Seat& seat, CommandId id, const char* reason);

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <span>
 
-#include "server/station/in_force.hpp"
-
 namespace server {
 namespace {
 
@@ -30,14 +28,6 @@ std::size_t first_move(const rheonaut_SetDutySchedule& schedule) {
   std::size_t first = 0;
   while (first + 1 < schedule.duty_count && schedule.duty[first] == 0.0F) ++first;
   return first;
-}
-
-// A schedule is seen by its first motion, which comes at a tick of its own.
-std::uint64_t visible_from_us(const protocol::Command& command, std::uint64_t effect_at_robot_us,
-                              std::uint32_t period_us) {
-  if (command.which_action != rheonaut_Command_set_duty_schedule_tag) return effect_at_robot_us;
-  const auto& schedule = command.action.set_duty_schedule;
-  return effect_at_robot_us + std::uint64_t{schedule.tick[first_move(schedule)]} * period_us;
 }
 
 bool is_shown(const protocol::Command& command, std::uint64_t emergency_id, const SampleContext& context,
@@ -71,6 +61,13 @@ bool is_shown(const protocol::Command& command, std::uint64_t emergency_id, cons
 
 }  // namespace
 
+std::uint64_t visible_from_us(const protocol::Command& command, std::uint64_t effect_at_robot_us,
+                              std::uint32_t period_us) {
+  if (command.which_action != rheonaut_Command_set_duty_schedule_tag) return effect_at_robot_us;
+  const auto& schedule = command.action.set_duty_schedule;
+  return effect_at_robot_us + std::uint64_t{schedule.tick[first_move(schedule)]} * period_us;
+}
+
 bool is_shown_between(const protocol::Command& command, std::uint64_t from_robot_us, std::uint64_t until_robot_us,
                       const SampleBatch& batch) {
   const std::size_t first = samples_before(batch, from_robot_us), end = samples_before(batch, until_robot_us);
@@ -89,38 +86,6 @@ bool can_be_seen(const protocol::Command& command) {
     case rheonaut_Command_inject_disturbance_tag: return true;
     default: return false;
   }
-}
-
-bool is_read_back(const protocol::Command& command) {
-  switch (command.which_action) {
-    case rheonaut_Command_set_parameter_tag:
-    case rheonaut_Command_get_parameters_tag:
-    case rheonaut_Command_set_controller_tag:
-    case rheonaut_Command_restore_controller_tag: return true;
-    default: return false;
-  }
-}
-
-Sight read_back(const protocol::Command& command, const protocol::ParameterPage& page) {
-  if (page.command_id == 0 || page.command_id != command.command_id) return Sight::unseen;
-  if (command.which_action == rheonaut_Command_get_parameters_tag) {
-    const bool is_asked_for = page.first_index == command.action.get_parameters.first_index;
-    return is_asked_for && page.parameters_count > 0 ? Sight::seen : Sight::missed;
-  }
-  if (command.which_action != rheonaut_Command_set_parameter_tag) return Sight::unseen;
-  const auto& wanted = command.action.set_parameter;
-  const auto* const end = page.parameters + page.parameters_count;
-  const auto* const found =
-      std::find_if(page.parameters, end, [&wanted](const auto& one) { return std::string{one.name} == wanted.name; });
-  return found != end && is_same(found->value, wanted.value) ? Sight::seen : Sight::missed;
-}
-
-Sight read_back(const protocol::Command& command, const protocol::Controller& controller) {
-  if (command.which_action == rheonaut_Command_restore_controller_tag) return Sight::seen;
-  if (command.which_action != rheonaut_Command_set_controller_tag) return Sight::unseen;
-  const protocol::Controller& wanted = command.action.set_controller;
-  if (controller.controller_id != wanted.controller_id) return Sight::unseen;  // the one before it still is in force
-  return is_same(controller, wanted) ? Sight::seen : Sight::missed;
 }
 
 bool is_for_the_motor(const protocol::Command& command) {

@@ -5,14 +5,20 @@
 #include <cstdlib>
 #include <utility>
 
+#include "server/station/read_back.hpp"
 #include "server/station/seat.hpp"
-#include "server/station/telemetry_verifier.hpp"
 
 namespace server {
 namespace {
 
 constexpr std::int64_t kClockRecordPeriodUs = 60'000'000;
 constexpr std::int64_t kStationStepUs = 50'000;  // within a second; what NTP slews is far below
+
+std::vector<const protocol::Command*> commands_of(const std::vector<std::shared_ptr<PendingCommand>>& sent) {
+  std::vector<const protocol::Command*> commands;
+  for (const auto& pending : sent) commands.push_back(&pending->wire);
+  return commands;
+}
 
 }  // namespace
 
@@ -67,15 +73,18 @@ void Station::on_parameters(RobotPort& port, const protocol::ParameterPage& page
       publish(*seat->robot);
     }
   }
-  settle_read_back(*seat, [&page](const protocol::Command& command) { return read_back(command, page); });
+  const auto sent = seat->to_be_read_back();
+  settle_read_back(*seat, sent, read_back(commands_of(sent), page));
 }
 
 void Station::on_controller(RobotPort& port, const protocol::Controller& controller) {
   Seat* seat = seat_of(port);
   if (seat == nullptr) return;
-  seat->settings.add(controller, clock_.utc_us());
+  const auto sent = seat->to_be_read_back();
+  ControllerReading reading = read_back(commands_of(sent), seat->settings, controller);
+  seat->settings.add(controller, std::move(reading.former), clock_.utc_us());
   record_in_force(*seat, "controller", controller_json(controller));
-  settle_read_back(*seat, [&controller](const protocol::Command& command) { return read_back(command, controller); });
+  settle_read_back(*seat, sent, reading.sights);
 }
 
 // Samples that were made before it was said may still be on their way: they are counted on, in periods.

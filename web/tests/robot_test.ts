@@ -36,6 +36,9 @@ test('it names the fluid whose model the station has told, and whether that hold
   expect(model_of(64, 0.004, told('confirmed'))).toBe('model confirmed');
   expect(model_of(0, 0.004, told('sending', 'non_newtonian'))).toBe('model of non-Newtonian being sent');
   expect(model_of(0, 0.004, told('failed', 'water', 'the motor is on'))).toBe('model of water could not be sent');
+  // A former model of water, or the one that is being confirmed.
+  expect(model_of(64, 0.004, told('sending', 'water'))).toBe('model of water being sent');
+  expect(model_of(64, 0.004, told('sending', null))).toBe('model confirmed for another fluid');
   expect(model_of(64, 0.004, told('failed', null, 'x'))).toBe('model confirmed for another fluid');
   expect(model_of(0, 0.004, told('confirmed', 'water'))).toBe('model assumed'); // telemetry has the last word
 });

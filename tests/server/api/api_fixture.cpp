@@ -107,7 +107,7 @@ std::shared_ptr<std::optional<Answered>> ApiTest::begin(const std::string& metho
   if (!body.is_null()) request.body = body.dump();
   request.actor = "token:local";
   request.peer = "127.0.0.1";
-  request.caller = Caller{"token:local", "", scopes, session, std::make_shared<Standing>(loop), "127.0.0.1"};
+  request.caller = Caller{"token:local", "", scopes, session, standing, "127.0.0.1"};
   auto into = std::make_shared<std::optional<Answered>>();
   tasks.spawn("ask", answer(std::move(request), into));
   clock.settle();

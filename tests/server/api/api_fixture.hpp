@@ -64,6 +64,7 @@ class ApiTest : public ::testing::Test {
   Config config;                            // of the ports
   TemporaryFolder folder;
   boost::asio::io_context loop{1};
+  std::shared_ptr<Standing> standing = std::make_shared<Standing>(loop);  // of who asks
   WorkerThread disk{"disk"}, readers{"readers"}, exports{"exports"}, checkpoints{"checkpoints"}, maths{"maths"};
   VirtualClock clock{loop};
   TaskGroup tasks{loop};

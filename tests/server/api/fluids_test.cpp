@@ -103,6 +103,26 @@ TEST_F(FluidsTest, ARunThatNamesAnotherNeedsTheRightToCommand) {
   EXPECT_EQ(robot_fluid(), "water");
 }
 
+TEST_F(FluidsTest, AnOpenRunIsPutRightByWhoMayNotCommandWithNothingSaidOfTheRobot) {
+  const Answered run = begin_run("water");
+  ASSERT_EQ(run.status, 201) << run.body;
+  ASSERT_EQ(ask("POST", kFluid, {{"fluid", "oil"}}).status, 200);
+  const json model{{"model_gain_m_s", {0.1, 0, 0, 0}},
+                   {"model_time_constant_s", {0.1, 1, 1, 1}},
+                   {"fit_error", 0.001},
+                   {"plant", {{"kp", 0.1}}}};
+  ASSERT_LT(ask("POST", "/api/v1/fluids/oil/model", model).status, 300);
+  scopes = Scopes{}.add(Scope::record);
+  const std::size_t commands = robot->commands().size();
+  const std::string path = "/api/v1/runs/" + run.parsed()["run_id"].dump();
+  const Answered annotated = ask("POST", path + "/annotate", {{"fluid", " Oil"}});
+  EXPECT_EQ(annotated.status, 200) << annotated.body;
+  EXPECT_EQ(annotated.parsed()["fluid"], "oil");
+  EXPECT_EQ(ask("GET", path).parsed()["fluid"], "oil");
+  clock.run_for(2s);
+  EXPECT_EQ(robot->commands().size(), commands) << "the robot is sent no model";
+}
+
 TEST_F(FluidsTest, ARunThatNamesOneSaysItOfTheRobotAndTheEndOfTheRunChangesNothing) {
   const Answered run = begin_run("Oil");
   ASSERT_EQ(run.status, 201) << run.body;

@@ -1,6 +1,9 @@
 // Parameters and controllers over the routes: what is in force, who may change it, and what must be confirmed.
 #include <cstring>
+#include <functional>
+#include <semaphore>
 
+#include "server/station/recent_commands.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -29,7 +32,7 @@ class InForceRoutesTest : public ApiTest {
     robot->send(frame);
     clock.settle();
   }
-  void say_controller(float duty_min, float duty_max) {
+  void send_controller(float duty_min, float duty_max) {
     protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
     frame.which_body = rheonaut_RobotFrame_controller_tag;
     auto& controller = frame.body.controller;
@@ -39,6 +42,9 @@ class InForceRoutesTest : public ApiTest {
     controller.duty_min = duty_min;
     controller.duty_max = duty_max;
     robot->send(frame);
+  }
+  void say_controller(float duty_min, float duty_max) {
+    send_controller(duty_min, duty_max);
     clock.settle();
   }
   static json with_range(double duty_min, double duty_max, bool confirm = false) {
@@ -48,6 +54,36 @@ class InForceRoutesTest : public ApiTest {
               {"duty_max", duty_max}};
     if (confirm) body["confirm"] = true;
     return body;
+  }
+  // The robot accepts it; the record.
+  json accepted(const json& body, const char* key) {
+    const auto asked = begin("POST", kCommands, body, {{"idempotency-key", key}});
+    robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED);
+    const Answered answered = end(asked);
+    EXPECT_EQ(answered.status, 200) << answered.body;
+    return answered.parsed();
+  }
+  Answered again(const json& body, const char* key) {
+    return end(begin("POST", kCommands, body, {{"idempotency-key", key}}));
+  }
+  // The same while something happens at the next controller that the robot reports: the request waits for it.
+  Answered overtaken(const json& body, std::function<void()> happens) {
+    std::binary_semaphore has_happened{0};
+    then_.happens = [&] {
+      happens();
+      has_happened.release();
+    };
+    auto reading = [](WorkerThread& worker, std::binary_semaphore& until) -> boost::asio::awaitable<void> {
+      auto job = [&until] {
+        until.acquire();
+        return true;
+      };
+      co_await worker.run(std::move(job));
+    };
+    station.add_sink(then_);
+    tasks.spawn("the database is busy", reading(readers, has_happened));
+    send_controller(0, 0.5F);
+    return again(body, "while-it-waited");
   }
   // "sent", or the reason of the refusal.
   std::string outcome(const json& body) {
@@ -60,15 +96,21 @@ class InForceRoutesTest : public ApiTest {
   }
 
  private:
+  struct AtController final : StationSink {
+    void on_in_force(const RobotState&, const InForceRecord&) override { happens(); }
+    std::function<void()> happens;
+  };
+
   std::uint32_t id_ = 1;
+  AtController then_;
 };
 
 TEST_F(InForceRoutesTest, TheTableSaysWhatIsChangedAndWhatBoundsMotionAndWhetherItIsCurrent) {
   EXPECT_EQ(ask("GET", kParameters).status, 404);
   connect_robot();
   json answer = ask("GET", kParameters).parsed();
-  EXPECT_EQ(answer,
-            (json{{"robot_id", "r1"}, {"is_current", false}, {"told_at_us", nullptr}, {"parameters", json::array()}}));
+  EXPECT_EQ(answer, (json{{"robot_id", "r1"}, {"is_current", false}, {"told_at_us", nullptr}, {"parameters", nullptr}}))
+      << "nothing is known, which is no table without parameters";
   say_parameters();
   scopes = Scopes{}.add(Scope::read);
   answer = ask("GET", kParameters).parsed();
@@ -98,7 +140,8 @@ TEST_F(InForceRoutesTest, TheTableSaysWhatIsChangedAndWhatBoundsMotionAndWhether
 TEST_F(InForceRoutesTest, TheControllerIsShownAsTheRobotSaysIt) {
   EXPECT_EQ(ask("GET", kController).status, 404);
   connect_robot();
-  EXPECT_EQ(ask("GET", kController).parsed()["controller"], nullptr);
+  EXPECT_EQ(ask("GET", kController).parsed(),
+            (json{{"robot_id", "r1"}, {"is_current", false}, {"told_at_us", nullptr}, {"controller", nullptr}}));
   say_controller(0, 0.5F);
   json answer = ask("GET", kController).parsed();
   EXPECT_EQ(answer["is_current"], true);
@@ -179,6 +222,79 @@ TEST_F(InForceRoutesTest, AControllerThatIsSentAgainUnderItsKeyIsTheSameCommand)
   const json record = end(again).parsed();
   EXPECT_EQ(robot->commands().size(), 1U);
   EXPECT_EQ(record["arguments"]["controller"]["checksum"], robot->commands()[0].action.set_controller.checksum);
+}
+
+TEST_F(InForceRoutesTest, ARepeatIsAnsweredAsTheFirstWhateverIsInForceByNow) {
+  connect_robot();
+  say_controller(-1, 1);
+  json set = with_range(-1, 1);
+  set.erase("duty_min");
+  set.erase("duty_max");
+  const json restore{{"kind", "restore_controller"}};
+  const json bound{{"kind", "set_parameter"}, {"name", "position_limit_max_m"}, {"value", 0.2}, {"confirm", true}};
+  say_controller(-1, 1);
+  scopes = Scopes::of(Role::operator_);
+  const json restore_first = accepted(restore, "restore");
+  scopes = Scopes::of(Role::admin);
+  const json set_first = accepted(set, "set"), bound_first = accepted(bound, "bound");
+  scopes = Scopes::of(Role::operator_);
+  const std::size_t sent = robot->commands().size();
+
+  const auto expect_the_first_answers = [&](const char* when) {
+    EXPECT_EQ(again(set, "set").parsed()["command_id"], set_first["command_id"]) << when;
+    EXPECT_EQ(again(bound, "bound").parsed()["command_id"], bound_first["command_id"]) << when;
+    const json restored = again(restore, "restore").parsed();  // a problem, once another controller was reported
+    EXPECT_EQ(restored.value("command", restored)["command_id"], restore_first["command_id"]) << when;
+    EXPECT_EQ(again(with_range(-1, 0.5), "set").parsed()["reason"], "key_reused") << when;
+    EXPECT_EQ(robot->commands().size(), sent) << when;
+  };
+  expect_the_first_answers("at once");
+  say_controller(0, 0.25F);
+  EXPECT_EQ(outcome(restore), "not_permitted");
+  expect_the_first_answers("under a narrower controller");
+  robot->link.cut();
+  clock.settle();
+  expect_the_first_answers("while the robot is away");
+}
+
+// The memory of another station: only the database knows the command.
+TEST_F(InForceRoutesTest, ARepeatIsAnsweredAsTheFirstOverARestartToo) {
+  connect_robot();
+  say_controller(-1, 1);
+  json set = with_range(-1, 1);
+  set.erase("duty_min");
+  set.erase("duty_max");
+  CommandRecord old;
+  old.id = command_id_of("r1", "token:local", "old");
+  old.robot_id = "r1";
+  old.kind = "set_controller";
+  old.arguments = accepted(set, "new")["arguments"].dump();
+  old.state = CommandState::verified;
+  old.submitted_at_us = old.ended_at_us = clock.utc_us();
+  recorder.on_command(old);
+  clock.run_for(1s);
+  say_controller(0, 0.25F);
+  const Answered answered = again(set, "old");
+  EXPECT_EQ(answered.parsed()["state"], "verified") << answered.body;
+  EXPECT_EQ(again(with_range(-1, 0.5), "old").parsed()["reason"], "key_reused");
+  EXPECT_EQ(robot->commands().size(), 1U);
+}
+
+// SAFETY's test: while a request waits for the database, everything may change.
+TEST_F(InForceRoutesTest, WhatMayBoundMotionIsJudgedAfterTheWait) {
+  connect_robot();
+  say_controller(-1, 1);
+  scopes = Scopes::of(Role::operator_);
+  EXPECT_EQ(overtaken(with_range(-1, 1), [] {}).parsed()["reason"], "not_permitted");
+  EXPECT_TRUE(robot->commands().empty());
+}
+
+TEST_F(InForceRoutesTest, WhoseCredentialEndsDuringTheWaitCommandsNothing) {
+  connect_robot();
+  const Answered answered = overtaken({{"kind", "ping"}}, [this] { standing->end(); });
+  EXPECT_EQ(answered.status, 403) << answered.body;
+  EXPECT_EQ(answered.parsed()["reason"], "not_permitted");
+  EXPECT_TRUE(robot->commands().empty());
 }
 
 TEST_F(InForceRoutesTest, ControllersAndSchedulesAreHeldToTheLimits) {

@@ -46,12 +46,12 @@ class ReferenceImportTest : public ::testing::Test {
     }
   }
   PlacedReference place() {
-    auto placed = place_reference(request, own, marker);
+    auto placed = place_reference(request, own, zeroings, marker);
     if (!placed) throw std::runtime_error{placed.error().detail};
     return std::move(*placed);
   }
   Error refusal() {
-    const auto placed = place_reference(request, own, marker);
+    const auto placed = place_reference(request, own, zeroings, marker);
     return placed ? Error{} : placed.error();
   }
   // How far the worst position is from the truth.
@@ -65,6 +65,7 @@ class ReferenceImportTest : public ::testing::Test {
   }
 
   std::vector<OwnPosition> own;
+  std::vector<Zeroing> zeroings;
   ReferenceRequest request;
   std::optional<MarkerPlace> marker;
 };
@@ -75,6 +76,17 @@ TEST_F(ReferenceImportTest, ASpanInWhichTheRobotWasZeroedIsRefused) {
     own[k].position_m -= 0.1F;
     own[k].position_sd_m = 0;
   }
+  EXPECT_EQ(refusal().reason, "zeroed");
+  EXPECT_THAT(refusal().detail, HasSubstr("15.00 s"));
+}
+
+// Its standard deviation shows no zeroing of a robot that knows its position.
+TEST_F(ReferenceImportTest, ASpanWithAnEventOfAZeroingIsRefusedHoweverSureTheRobotIs) {
+  see(0, 0);
+  for (OwnPosition& sample : own) sample.position_sd_m = 0;
+  zeroings = {{0, 5'000'000}, {0, 35'000'001}, {1, 20'000'000}};  // before, after, and of another boot
+  EXPECT_EQ(refusal().detail, "");
+  zeroings.push_back({0, 20'000'000});
   EXPECT_EQ(refusal().reason, "zeroed");
   EXPECT_THAT(refusal().detail, HasSubstr("15.00 s"));
 }

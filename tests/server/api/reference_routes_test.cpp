@@ -16,14 +16,24 @@ class ReferenceRoutesTest : public ApiTest {
   static constexpr const char* kPath = "/api/v1/runs/1/reference";
 
   // Run 1 has samples 0 to 499, whose positions are the robot's.
-  void record() {
+  void record(std::optional<std::uint64_t> zeroed_at_seq = {}) {
     connect_robot();
     ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}});
     for (std::uint64_t seq = 0; seq < 500; seq += 25) {
+      if (seq == zeroed_at_seq) report_zeroing();
       make_samples(*robot, seq, 25);
       clock.run_for(250ms);
     }
     ASSERT_EQ(ask("POST", "/api/v1/runs/1/end").status, 200);
+  }
+  void report_zeroing() {
+    protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
+    frame.which_body = rheonaut_RobotFrame_event_tag;
+    frame.body.event.kind = rheonaut_EVENT_KIND_POSITION_ZEROED;
+    frame.body.event.cause = rheonaut_EVENT_CAUSE_COMMAND;
+    frame.body.event.mode = rheonaut_MODE_MANUAL;
+    frame.body.event.event_robot_time_us = robot->robot_now_us();
+    robot->send(frame);
   }
   static json body(int rows = 100) {
     std::string csv = "t_s,position_m\n";
@@ -65,6 +75,14 @@ TEST_F(ReferenceRoutesTest, IsStoredBesideTheRunAndShown) {
   EXPECT_EQ(positions["robot_time_us"][0].get<std::int64_t>(),
             samples["samples"][0]["robot_time_us"].get<std::int64_t>() + 10'000);
   EXPECT_EQ(ask("GET", "/api/v1/runs/1/certificate").parsed(), certificate);  // the digest is of the run alone
+}
+
+TEST_F(ReferenceRoutesTest, ARunInWhichTheRobotSaysThatItWasZeroedTakesNone) {
+  record(250);
+  const Answered refused = import(body());
+  EXPECT_EQ(refused.status, 422) << refused.body;
+  EXPECT_EQ(refused.parsed()["reason"], "zeroed");
+  EXPECT_THAT(refused.parsed()["detail"].get<std::string>(), HasSubstr("2.50 s"));
 }
 
 TEST_F(ReferenceRoutesTest, IsReplacedAndRemovedWithAReason) {

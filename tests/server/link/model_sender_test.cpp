@@ -10,6 +10,7 @@
 #include <cstring>
 #include <map>
 
+#include "tests/server/captured_log.hpp"
 #include "tests/server/link/link_fixture.hpp"
 
 namespace server {
@@ -30,6 +31,21 @@ FluidModel some_model(float first_gain = 0.25F) {
   model.set_at_us = 1'700'000'000'000'000;
   return model;
 }
+
+// A sink that fails once, as nothing in the station should.
+class FailsOnce final : public StationSink {
+ public:
+  void on_command(const CommandRecord& record) override {
+    if (record.state == CommandState::queued && std::exchange(at_command, false)) fail();
+  }
+  void on_robot(const RobotState& robot) override {
+    if (robot.model.state == ModelState::confirmed && std::exchange(at_confirmed, false)) fail();
+  }
+  bool at_command = false, at_confirmed = false;
+
+ private:
+  static void fail() { throw std::runtime_error{"no room for it"}; }
+};
 
 // Keeps parameters as the firmware does, and tells of them; its word is in `held`.
 class ModelSenderTest : public LinkTest {
@@ -100,6 +116,21 @@ class ModelSenderTest : public LinkTest {
     if (name == "model_confirmed" && breaks_after_confirming) return robot->link.cut();
     robot->acknowledge(command, rheonaut_COMMAND_RESULT_ACCEPTED);
     say(name, held[name]);
+  }
+
+  // By somebody's command.
+  void change(const std::string& name, float value) {
+    held[name] = value;
+    held["model_confirmed"] = 0;
+    say(name, value);
+  }
+
+  // In the same boot, after the link was cut.
+  void come_back() {
+    robot->link.cut();
+    clock.run_for(1s);
+    ASSERT_FALSE(connected());
+    begin(77, seq);
   }
 
   void name_fluid(const std::string& fluid, const std::string& actor = "token:local") {
@@ -407,6 +438,85 @@ TEST_F(ModelSenderTest, OtherBitsUnderAFlagThatNoSampleShowedFallingAreNoLongerT
   EXPECT_NE(model().fluid, "water");
 }
 
+// A page comes before the sample that shows what the change has done to the confirmation.
+TEST_F(ModelSenderTest, AChangedParameterIsNoConfirmationBySomebodyElse) {
+  begin();
+  name_fluid("water");
+  live(3s);
+  change("model_gain_3_m_s", 0.3F);
+  clock.settle();
+  EXPECT_EQ(model().state, ModelState::assumed) << "the link may break now";
+  live(2s);
+  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_THAT(model().reason, HasSubstr("a parameter was changed"));
+  const auto is_of_no_fluid = [](const RobotState& one) {
+    return one.model.state == ModelState::confirmed && one.model.fluid.empty();
+  };
+  EXPECT_EQ(std::count_if(sink.robots.begin(), sink.robots.end(), is_of_no_fluid), 0);
+}
+
+TEST_F(ModelSenderTest, AParameterThatIsChangedAfterTheLinkReturnedEndsTheConfirmation) {
+  begin();
+  name_fluid("water");
+  live(3s);
+  come_back();
+  EXPECT_EQ(model().fluid, "water");
+  change("model_gain_1_m_s", 0.3F);
+  live(2s);
+  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().fluid, "");
+}
+
+// SAFETY's test: the same, and confirmed again while the link was cut. Nothing is sent while another is in control.
+TEST_F(ModelSenderTest, OtherBitsOfARobotThatReturnsConfirmedAreNotTheFluidsModel) {
+  begin();
+  name_fluid("water");
+  live(3s);
+  ASSERT_TRUE(station.control({"r1", "session:1", "", ControlAction::take, 20s, ""}));
+  held["model_gain_1_m_s"] = 0.3F;
+  come_back();
+  live(2s);
+  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().reason, "what was confirmed before is not taken back yet");
+  EXPECT_EQ(held["model_confirmed"], 1);
+  live(30s);
+  EXPECT_EQ(held["model_confirmed"], 0);
+  EXPECT_EQ(model().state, ModelState::assumed);
+}
+
+// SAFETY's test: while the sender waits for rest, somebody else may change what it has sent.
+TEST_F(ModelSenderTest, WhatIsChangedWhileTheConfirmationWaitsIsNotConfirmed) {
+  for (const auto& [name, value] : parameters_of(some_model())) held[name] = value;
+  begin();
+  is_coasting = true;
+  name_fluid("water");
+  live(300ms);
+  ASSERT_EQ(refused, 1) << "the confirmation";
+  is_coasting = false;
+  change("model_gain_1_m_s", 0.3F);
+  live(5s);
+  EXPECT_THAT(sent, Not(Contains("model_confirmed")));
+  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_THAT(model().reason, HasSubstr("somebody else changed one"));
+}
+
+// SAFETY's test: no sample shows the flag falling.
+TEST_F(ModelSenderTest, OtherBitsUnderAConfirmationThatTheStationOnlyJudgedAreTakenBack) {
+  for (const auto& [name, value] : parameters_of(some_model())) held[name] = value;
+  held["model_confirmed"] = 1;
+  station.restore({{.id = "r1", .boot_id = 77, .fluid = "water"}}, {});
+  begin();
+  live(2s);
+  ASSERT_EQ(model().fluid, "water");
+  held["model_gain_1_m_s"] = 0.3F;
+  say("model_gain_1_m_s", 0.3F);
+  live(500ms);
+  EXPECT_EQ(model().fluid, "");
+  live(10s);
+  EXPECT_EQ(held["model_confirmed"], 0);
+  EXPECT_EQ(model().state, ModelState::assumed);
+}
+
 TEST_F(ModelSenderTest, AfterARestartOfTheStationAConfirmationStandsForTheModelOfTheNamedFluidAlone) {
   for (const auto& [name, value] : parameters_of(some_model())) held[name] = value;
   held["model_confirmed"] = 1;
@@ -430,6 +540,58 @@ TEST_F(ModelSenderTest, AConfirmationThatTheStationHasNotSeenBeingMadeIsTakenBac
   EXPECT_EQ(held["model_confirmed"], 0);
   EXPECT_EQ(sink.commands.back().actor, "station:model");
   EXPECT_EQ(model().state, ModelState::assumed);
+}
+
+class FailingModelTest : public ModelSenderTest {
+ protected:
+  FailingModelTest() { station.add_sink(failing); }
+  void expect_contained() {
+    EXPECT_EQ(tasks.exceptions().count(Ended::model), 1U);
+    EXPECT_TRUE(log.has("the model of robot 'r1': no room for it")) << log.text();
+    EXPECT_EQ(tasks.exit_code(), 0);
+    EXPECT_FALSE(tasks.stopping());
+  }
+
+  CapturedLog log;
+  FailsOnce failing;
+};
+
+TEST_F(FailingModelTest, AFaultWhileTheModelIsSentFailsThatModelAlone) {
+  begin();
+  failing.at_command = true;
+  name_fluid("water");
+  live(1s);
+  expect_contained();
+  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().reason, "a fault of the station; its log says which");
+  EXPECT_THAT(events(), ElementsAre("model_not_confirmed"));
+  name_fluid("water");
+  live(5s);
+  EXPECT_EQ(model().state, ModelState::confirmed) << model().reason;
+}
+
+TEST_F(FailingModelTest, AFaultAtItsEndStopsNothing) {
+  begin();
+  failing.at_confirmed = true;
+  name_fluid("water");
+  live(5s);
+  expect_contained();
+  name_fluid("");
+  live(5s);
+  EXPECT_EQ(model().state, ModelState::assumed) << "it goes on with the next fluid";
+}
+
+TEST_F(FailingModelTest, AFaultWhileWhatTheRobotReportsIsFollowedStopsNothing) {
+  for (const auto& [name, value] : parameters_of(some_model())) held[name] = value;
+  held["model_confirmed"] = 1;
+  station.restore({{.id = "r1", .boot_id = 77, .fluid = "water"}}, {});
+  failing.at_confirmed = true;
+  begin();
+  live(2s);
+  expect_contained();
+  held["model_confirmed"] = 0;
+  live(1s);
+  EXPECT_EQ(model().state, ModelState::assumed) << "it goes on to follow";
 }
 
 }  // namespace

@@ -67,7 +67,16 @@ class ReadBackTest : public LinkTest {
     clock.settle();
     return sent.command_id;
   }
-  std::string end() const { return text(results.back()->state) + std::string{" "} + results.back()->reason; }
+  std::string end() const { return end(results.size() - 1); }
+  std::string end(std::size_t which) const {
+    return text(results.at(which)->state) + std::string{" "} + results.at(which)->reason;
+  }
+  static protocol::Controller with_gain(std::uint32_t id, float kp) {
+    protocol::Controller out = controller(id);
+    out.kp = kp;
+    return out;
+  }
+  const std::optional<protocol::Controller>& former() { return station.settings("r1")->controller_before; }
 
   TestRobot* robot = connect();
 };
@@ -92,6 +101,36 @@ TEST_F(ReadBackTest, AParameterIsVerifiedByThePageThatAnswersItBitForBit) {
   id = accepted(set_parameter("duty_slew_per_s", value));
   say_page(id, 0, "another", value);
   EXPECT_EQ(end(), "failed read_back_differs");
+}
+
+// A robot writes each page when it sends it: of two in one burst both pages hold the value of the second.
+TEST_F(ReadBackTest, AParameterThatANewerCommandHasSetAgainIsSuperseded) {
+  const auto first = accepted(set_parameter("duty_slew_per_s", 1));
+  const auto second = accepted(set_parameter("duty_slew_per_s", 2));
+  say_page(first, 0, "duty_slew_per_s", 2);
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(end(), "superseded by_a_newer_command");
+  say_page(second, 0, "duty_slew_per_s", 2);
+  EXPECT_EQ(end(), "verified ");
+}
+
+TEST_F(ReadBackTest, AParameterThatNoNewerCommandHasSetSoDiffers) {
+  accepted(set_parameter("duty_slew_per_s", 2));
+  const auto one = accepted(set_parameter("duty_slew_per_s", 1));
+  accepted(set_parameter("another", 2));
+  say_page(one, 0, "duty_slew_per_s", 2);
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(end(), "failed read_back_differs") << "an older one, and one of another name";
+}
+
+// The acknowledgement of the second may be lost.
+TEST_F(ReadBackTest, AParameterIsSupersededByOneWithoutAnAnswerToo) {
+  const auto first = accepted(set_parameter("duty_slew_per_s", 1));
+  submit(set_parameter("duty_slew_per_s", 2));
+  clock.settle();
+  say_page(first, 0, "duty_slew_per_s", 2);
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(end(), "superseded by_a_newer_command");
 }
 
 TEST_F(ReadBackTest, APageIsVerifiedByItsFirstIndex) {
@@ -126,7 +165,116 @@ TEST_F(ReadBackTest, AControllerIsVerifiedWhenItComesIntoForceAndIsTheSameThroug
   EXPECT_TRUE(differs([](auto& other) { other.biquad_a2_count = 1; }));
 }
 
-TEST_F(ReadBackTest, ARestoreIsVerifiedByTheControllerThatIsAnnouncedAfterIt) {
+// A robot at rest says once for both which controller is in force.
+TEST_F(ReadBackTest, AControllerThatANewerCommandHasReplacedIsSupersededAlsoUnderOneId) {
+  say(with_gain(7, 1));
+  accepted(set_controller(with_gain(7, 2)));
+  accepted(set_controller(with_gain(7, 3)));
+  accepted(set_controller(with_gain(8, 4)));
+  say(with_gain(8, 4));
+  ASSERT_EQ(results.size(), 3U);
+  EXPECT_EQ(end(0), "superseded by_a_newer_command");
+  EXPECT_EQ(end(1), "superseded by_a_newer_command");
+  EXPECT_EQ(end(2), "verified ");
+
+  accepted(set_controller(with_gain(7, 5)));
+  accepted(set_controller(with_gain(7, 6)));
+  say(with_gain(7, 7));
+  EXPECT_EQ(end(3), "failed read_back_differs") << "none of them has ordered it";
+  EXPECT_EQ(end(4), "failed read_back_differs");
+}
+
+TEST_F(ReadBackTest, AControllerOfTheSameIdThatStillIsInForceIsNoDifference) {
+  say(with_gain(7, 1));
+  accepted(set_controller(with_gain(7, 2)));
+  say(with_gain(7, 1));
+  EXPECT_TRUE(results.empty());
+  say(with_gain(7, 2));
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(end(), "verified ");
+}
+
+TEST_F(ReadBackTest, ARestoreIsVerifiedByTheControllerThatWasInForceBefore) {
+  say(controller(1));
+  accepted(set_controller(controller(2)));
+  say(controller(2));
+  accepted(command_of(rheonaut_Command_restore_controller_tag));
+  say(controller(2));
+  EXPECT_EQ(results.size(), 1U) << "in auto it stays for a while";
+  say(controller(1));
+  ASSERT_EQ(results.size(), 2U);
+  EXPECT_EQ(end(), "verified ");
+  ASSERT_TRUE(former());
+  EXPECT_EQ(former()->controller_id, 2U) << "it swaps the two";
+  accepted(command_of(rheonaut_Command_restore_controller_tag));
+  say(controller(3));
+  EXPECT_EQ(end(), "failed read_back_differs");
+}
+
+TEST_F(ReadBackTest, TheControllerOfAnotherCommandVerifiesNoRestore) {
+  say(controller(1));
+  accepted(command_of(rheonaut_Command_restore_controller_tag));  // of what the station has not seen go
+  accepted(set_controller(controller(5)));
+  say(controller(5));
+  ASSERT_EQ(results.size(), 2U);
+  EXPECT_EQ(end(0), "superseded by_a_newer_command");
+  EXPECT_EQ(end(1), "verified ");
+
+  accepted(set_controller(controller(6)));
+  accepted(command_of(rheonaut_Command_restore_controller_tag));
+  say(controller(6));
+  ASSERT_EQ(results.size(), 3U);
+  EXPECT_EQ(end(2), "verified ");
+  say(controller(5));
+  ASSERT_EQ(results.size(), 4U);
+  EXPECT_EQ(end(3), "verified ");
+}
+
+TEST_F(ReadBackTest, AChangeThatARestoreHasTurnedBackIsSuperseded) {
+  say(controller(1));
+  accepted(set_controller(controller(2)));
+  accepted(command_of(rheonaut_Command_restore_controller_tag));
+  say(controller(1));
+  ASSERT_EQ(results.size(), 2U);
+  EXPECT_EQ(end(0), "superseded by_a_newer_command");
+  EXPECT_EQ(end(1), "verified ");
+}
+
+// It comes after each Welcome, whatever was commanded since.
+TEST_F(ReadBackTest, TheControllerThatIsReportedUnaskedVerifiesNoRestore) {
+  accepted(command_of(rheonaut_Command_restore_controller_tag));
+  say(controller(1));
+  EXPECT_TRUE(results.empty());
+  say(controller(2));
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(end(), "verified ");
+}
+
+// SAFETY's test: at rest the robot now restores the second, in auto the first; a wider one needs an admin.
+TEST_F(ReadBackTest, AfterTwoControllersInOneBurstItIsNotKnownWhatARestoreBringsBack) {
+  say(controller(1));
+  accepted(set_controller(controller(2)));
+  accepted(set_controller(controller(3)));
+  say(controller(3));
+  EXPECT_FALSE(former());
+}
+
+TEST_F(ReadBackTest, WhatTheRobotHasAnsweredBeforeIsNotWaitedFor) {
+  CommandRequest request = request_of(set_controller(controller(7)));
+  request.until_verified = true;
+  submit(std::move(request));
+  clock.settle();
+  protocol::RobotFrame answer = rheonaut_RobotFrame_init_zero;
+  answer.which_body = rheonaut_RobotFrame_command_ack_tag;
+  answer.body.command_ack.command_id = robot->commands().back().command_id;
+  answer.body.command_ack.result = rheonaut_COMMAND_RESULT_DUPLICATE;
+  robot->send(answer);
+  clock.settle();
+  ASSERT_EQ(results.size(), 1U);
+  EXPECT_EQ(end(), "acknowledged duplicate");
+}
+
+TEST_F(ReadBackTest, ARestoreOfWhatTheStationHasNotSeenIsVerifiedByTheControllerThatIsReportedAfterIt) {
   say(controller(1));
   accepted(command_of(rheonaut_Command_restore_controller_tag));
   EXPECT_TRUE(results.empty());

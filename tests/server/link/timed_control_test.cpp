@@ -26,16 +26,36 @@ TEST_F(TimedControlTest, ExcusesNoStopThatTheMotorRunsOnAfter) {
   clock.settle();
   robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, 7);
   clock.settle();
-  for (std::uint64_t seq = 0; seq < 200; seq += 5) {
-    auto frame = TestRobot::samples_frame(seq, 5, robot->robot_now_us(), 7);
-    for (float& duty : frame.body.telemetry.duty) duty = 0.5F;
-    robot->send(frame);
-    clock.run_for(50ms);
-  }
-  const auto stop = std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), std::string{"emergency_stop"},
-                                      &CommandRecord::kind);
-  ASSERT_NE(stop, sink.commands.rend());
-  EXPECT_EQ(stop->state, CommandState::failed) << stop->reason;
+  show_that_the_motor_runs_on();
+  EXPECT_EQ(latest_of_kind("emergency_stop").state, CommandState::failed) << latest_of_kind("emergency_stop").reason;
+}
+
+// The robot puts a stop's answer ahead of all others, also of a command that it has taken in before.
+TEST_F(TimedControlTest, ExcusesNoStopWhoseAnswerPassesItsOwn) {
+  const auto waiting = send_out(timed(set_duty(0.25F), in_ms(300), "a"));
+  stop_robot(8s);
+  clock.settle();
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, 7);
+  accept_for_its_time(waiting);
+  robot->acknowledge(waiting, rheonaut_COMMAND_RESULT_REJECTED, 7, rheonaut_REJECT_REASON_LATCHED);
+  clock.settle();
+  EXPECT_EQ(latest_of_kind("set_duty").state, CommandState::rejected);
+  show_that_the_motor_runs_on();
+  EXPECT_EQ(latest_of_kind("emergency_stop").state, CommandState::failed) << latest_of_kind("emergency_stop").reason;
+}
+
+TEST_F(TimedControlTest, AStopIsExcusedByAClearOfItsLatch) {
+  stop_robot(8s);
+  clock.settle();
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, 7);
+  clock.settle();
+  submit(clear_emergency(7));
+  clock.settle();
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, 0);
+  clock.settle();
+  show_that_the_motor_runs_on();
+  EXPECT_EQ(latest_of_kind("emergency_stop").state, CommandState::superseded)
+      << latest_of_kind("emergency_stop").reason;
 }
 
 TEST_F(TimedControlTest, EndsAsTheRobotSaysWhenItDropsIt) {
@@ -59,16 +79,32 @@ TEST_F(TimedControlTest, IsRefusedForATimeAfterTheLifeOfTheCommand) {
   EXPECT_TRUE(station.find("r1")->control.holder.empty()) << "what is refused takes no control";
 }
 
-TEST_F(TimedControlTest, AScheduleIsSeenByItsFirstMotion) {
-  protocol::Command schedule = rheonaut_Command_init_zero;
-  schedule.which_action = rheonaut_Command_set_duty_schedule_tag;
-  auto& entries = schedule.action.set_duty_schedule;
-  entries.tick_count = entries.duty_count = 3;
-  entries.tick[1] = 100;
-  entries.tick[2] = 120;
-  entries.duty[1] = 0.3F;
+TEST_F(TimedControlTest, AScheduleThatIsReplacedBeforeItsFirstMotionIsSuperseded) {
+  robot->send_samples(0, 5, in_ms(0), 0);
   const std::uint64_t at_us = in_ms(500);
-  take_in(timed(schedule, at_us, "a"));
+  take_in(timed(moves_after_a_second(), at_us, "a"));
+  take_in(timed(set_duty(0), at_us + 700'000, "a"));
+  for (std::uint64_t seq = 5; seq < 250; seq += 5) robot->send_samples(seq, 5, at_us + seq * 10'000, 0);
+  clock.settle();
+  EXPECT_EQ(latest_of_kind("set_duty").state, CommandState::verified);
+  EXPECT_EQ(latest_of_kind("set_duty_schedule").state, CommandState::superseded)
+      << latest_of_kind("set_duty_schedule").reason;
+}
+
+TEST_F(TimedControlTest, AScheduleThatShouldHaveMovedBeforeTheNextCommandFails) {
+  robot->send_samples(0, 5, in_ms(0), 0);
+  const std::uint64_t at_us = in_ms(500);
+  take_in(timed(moves_after_a_second(), at_us, "a"));
+  take_in(timed(set_duty(0), at_us + 1'600'000, "a"));
+  for (std::uint64_t seq = 5; seq < 250; seq += 5) robot->send_samples(seq, 5, at_us + seq * 10'000, 0);
+  clock.settle();
+  EXPECT_EQ(latest_of_kind("set_duty_schedule").state, CommandState::failed)
+      << latest_of_kind("set_duty_schedule").reason;
+}
+
+TEST_F(TimedControlTest, AScheduleIsSeenByItsFirstMotion) {
+  const std::uint64_t at_us = in_ms(500);
+  take_in(timed(moves_after_a_second(), at_us, "a"));
   robot->send_samples(0, 5, at_us, 0);
   robot->send_samples(5, 5, at_us + 600'000, 0);
   clock.settle();

@@ -18,10 +18,12 @@ class TimedTest : public LinkTest {
     request.until_verified = true;
     return request;
   }
-  protocol::Command take_in(CommandRequest request) {
+  protocol::Command send_out(CommandRequest request) {
     submit(std::move(request));
     clock.settle();
-    const protocol::Command sent = robot->commands().back();
+    return robot->commands().back();
+  }
+  void accept_for_its_time(const protocol::Command& sent) {
     protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
     frame.which_body = rheonaut_RobotFrame_command_ack_tag;
     frame.body.command_ack.command_id = sent.command_id;
@@ -29,7 +31,33 @@ class TimedTest : public LinkTest {
     frame.body.command_ack.effect_at_robot_us = sent.execute_at_robot_us;
     robot->send(frame);
     clock.settle();
+  }
+  protocol::Command take_in(CommandRequest request) {
+    const protocol::Command sent = send_out(std::move(request));
+    accept_for_its_time(sent);
     return sent;
+  }
+  static protocol::Command moves_after_a_second() {
+    protocol::Command schedule = rheonaut_Command_init_zero;
+    schedule.which_action = rheonaut_Command_set_duty_schedule_tag;
+    auto& entries = schedule.action.set_duty_schedule;
+    entries.tick_count = entries.duty_count = 3;
+    entries.tick[1] = 100;
+    entries.tick[2] = 120;
+    entries.duty[1] = 0.3F;
+    return schedule;
+  }
+  // Of a robot that is latched, and whose motor runs all the same.
+  void show_that_the_motor_runs_on() {
+    for (std::uint64_t seq = 0; seq < 200; seq += 5) {
+      auto frame = TestRobot::samples_frame(seq, 5, robot->robot_now_us(), 7);
+      for (float& duty : frame.body.telemetry.duty) duty = 0.5F;
+      robot->send(frame);
+      clock.run_for(50ms);
+    }
+  }
+  const CommandRecord& latest_of_kind(const std::string& kind) const {
+    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), kind, &CommandRecord::kind);
   }
   std::vector<const char*> kinds() const {
     std::vector<const char*> found;
