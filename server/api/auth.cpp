@@ -85,4 +85,13 @@ std::string Auth::cookie(const std::string& secret, bool is_secure) const {
                      is_secure ? "; Secure" : "");
 }
 
+Result<void> still_stands(const Caller& caller) {
+  if (caller.standing == nullptr || !caller.standing->ended()) return {};
+  return fail(
+      ErrorCode::forbidden,
+      fmt::format("the credential of {} was revoked, has expired or has other rights now; sign in, or send it again",
+                  caller.actor),
+      "not_permitted");
+}
+
 }  // namespace server

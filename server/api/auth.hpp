@@ -54,4 +54,7 @@ class Auth {
   std::list<Code> codes_;                     // oldest first
 };
 
+// SAFETY: nobody's credential outlives a wait: what has ended meanwhile, or has other rights now, commands nothing.
+Result<void> still_stands(const Caller& caller);
+
 }  // namespace server

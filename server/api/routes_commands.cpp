@@ -4,6 +4,7 @@
 
 #include <ranges>
 
+#include "server/api/auth.hpp"
 #include "server/api/emergency.hpp"
 #include "server/api/routes.hpp"
 
@@ -142,16 +143,6 @@ Result<void> may_bound_motion(const Caller& caller, const ParsedCommand& command
   }
   if (command.is_confirmed) return {};
   return fail(ErrorCode::invalid, what + "; send \"confirm\": true to change it all the same", "confirm_required");
-}
-
-// SAFETY: nobody's credential outlives a wait: what has ended meanwhile, or has other rights now, commands nothing.
-Result<void> still_stands(const Caller& caller) {
-  if (caller.standing == nullptr || !caller.standing->ended()) return {};
-  return fail(
-      ErrorCode::forbidden,
-      fmt::format("the credential of {} was revoked, has expired or has other rights now; sign in, or send it again",
-                  caller.actor),
-      "not_permitted");
 }
 
 // What the caller may not send now. It is judged when nothing is waited for any more.

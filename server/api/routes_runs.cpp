@@ -1,6 +1,7 @@
 // Runs: begin, end, make afterwards, annotate, discard, list, certify, measure.
 #include <fmt/format.h>
 
+#include "server/api/auth.hpp"
 #include "server/api/routes.hpp"
 
 namespace server {
@@ -97,6 +98,7 @@ Answer annotate_run(ApiParts& parts, Request request) {
   if (const auto fluid = annotation->texts.find("fluid"); fluid != annotation->texts.end()) {
     const auto before = co_await parts.recording.runs.find(*id);
     if (!before) co_return problem(before.error());
+    if (auto stands = still_stands(request.caller); !stands) co_return problem(stands.error());
     const bool is_open = before->state == RunState::open;
     const auto named = is_open ? may_name_fluid(parts, request, before->robot_id, fluid->second) : Result<bool>{true};
     if (!named) co_return problem(named.error());

@@ -9,6 +9,9 @@
 
 namespace server {
 
+// SAFETY: of a command that is known from the database only. A stop of then is no answer to a press of now.
+inline constexpr std::int64_t kLongAgoUs = -3'600'000'000;
+
 class RecentCommands {
  public:
   static constexpr std::size_t kMaxCommands = 1000;

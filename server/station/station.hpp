@@ -127,7 +127,7 @@ class Station {
   // The command of a client's key that is on its way, or has ended lately; null when there is none.
   const CommandRecord* known_command(const RobotId& robot_id, CommandId id) const;
   // One that ended before a restart, or long ago: who asks for it again gets this record, and nothing is sent.
-  void remember(const CommandRecord& ended) { recent_.put(ended, clock_.steady_us()); }
+  void remember(const CommandRecord& ended) { recent_.put(ended, kLongAgoUs); }
 
   const StopTimes& stop_times() const { return stop_times_; }
   std::uint64_t invalid_values() const { return invalid_values_; }  // of all robots, since the station started

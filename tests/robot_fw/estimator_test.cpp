@@ -200,7 +200,7 @@ TEST_F(EstimatorTest, IsNeverCertainBecauseTheGainsOfItsModelCancel) {
 
 // SAFETY: who starts anew in motion does not take it for rest, nor the model for one that moves nothing.
 TEST_F(EstimatorTest, FindsItsVelocityWhenItStartsAnewInMotion) {
-  EstimatorParameters parameters{.is_confirmed = true};
+  EstimatorParameters parameters{.is_confirmed = true, .shape_error = 0.03F};
   parameters.model = {{10, -9.9F, -9.9F, 9.9F}, {0.05F, 0.052F, 0.7F, 0.75F}};
   Estimator driven{parameters};
   std::array<float, kModelSections> section{};

@@ -66,6 +66,25 @@ TEST_F(CommandRoutesTest, AStopIsCarriedOutWhateverItsKey) {
   EXPECT_EQ(end(asked).status, 200);
 }
 
+// SAFETY: a key that the database alone remembers is that of no press of now.
+TEST_F(CommandRoutesTest, AStopOfAnEarlierLifeIsNoAnswerToAStopOfNow) {
+  connect_robot();
+  CommandRecord old;
+  old.id = command_id_of("r1", "token:local", "press-1");
+  old.robot_id = "r1";
+  old.kind = "emergency_stop";
+  old.arguments = "{}";
+  old.state = CommandState::verified;
+  old.submitted_at_us = old.ended_at_us = clock.utc_us();
+  recorder.on_command(old);
+  clock.run_for(1s);
+  robot->send(TestRobot::samples_frame(0, 5, robot->robot_now_us(), 7));  // latched, by something else
+  clock.settle();
+  EXPECT_EQ(end(begin_with_key(kCommands, duty_, "press-1")).parsed()["reason"], "key_reused");
+  begin_with_key("/api/v1/robots/r1/emergency-stop", nullptr, "press-1");
+  EXPECT_EQ(robot->commands().size(), 1U);
+}
+
 TEST_F(CommandRoutesTest, TheLifeOfACommandCountsFromWhenItWasIssued) {
   connect_robot();
   json late = duty_;

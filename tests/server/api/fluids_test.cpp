@@ -1,6 +1,9 @@
 // Fluids over HTTP: their list, which one a robot is in, and runs that name one.
 #include <gmock/gmock.h>
 
+#include <functional>
+#include <semaphore>
+
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -121,6 +124,30 @@ TEST_F(FluidsTest, AnOpenRunIsPutRightByWhoMayNotCommandWithNothingSaidOfTheRobo
   EXPECT_EQ(ask("GET", path).parsed()["fluid"], "oil");
   clock.run_for(2s);
   EXPECT_EQ(robot->commands().size(), commands) << "the robot is sent no model";
+}
+
+// SAFETY: a fluid brings its limits.
+TEST_F(FluidsTest, WhoseCredentialEndsWhileTheRunIsReadNamesNoFluid) {
+  const Answered run = begin_run("water");
+  std::binary_semaphore has_ended{0};
+  const auto reading = [](WorkerThread& worker, std::binary_semaphore& until) -> boost::asio::awaitable<void> {
+    auto job = [&until] {
+      until.acquire();
+      return true;
+    };
+    co_await worker.run(std::move(job));
+  };
+  tasks.spawn("the database is busy", reading(readers, has_ended));
+  const std::string path = "/api/v1/runs/" + run.parsed()["run_id"].dump() + "/annotate";
+  std::function<void(int)> end_after = [&](int turns) {  // of the loop: the request has begun to wait by then
+    if (turns > 0) return boost::asio::post(loop, [&end_after, turns] { end_after(turns - 1); });
+    standing->end();
+    has_ended.release();
+  };
+  end_after(100);
+  const auto annotated = begin("POST", path, {{"fluid", "oil"}});
+  EXPECT_EQ(end(annotated).status, 403);
+  EXPECT_EQ(robot_fluid(), "water");
 }
 
 TEST_F(FluidsTest, ARunThatNamesOneSaysItOfTheRobotAndTheEndOfTheRunChangesNothing) {
