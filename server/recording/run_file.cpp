@@ -116,8 +116,10 @@ constexpr Copy kCopies[] = {
     {"CREATE TABLE marker AS SELECT * FROM store.run_marker WHERE run_id = {0}"},
     {"CREATE TABLE run_certificate AS SELECT * FROM store.run_certificate WHERE run_id = {0}"},
     {"CREATE TABLE in_force AS SELECT * FROM store.run_in_force WHERE run_id = {0}"},
+    // A discarded run has none: its positions go at once.
     {"CREATE TABLE outside_reference AS SELECT * FROM store.outside_reference WHERE run_id = {0}"
-     " AND completed_at_us IS NOT NULL AND removed_at_us IS NULL",
+     " AND completed_at_us IS NOT NULL AND removed_at_us IS NULL"
+     " AND (SELECT state FROM main.run) <> 'discarded'",
      nullptr, kReferenceSince},
     {"CREATE TABLE outside_position (robot_time_us INTEGER PRIMARY KEY, position_m REAL, position_sd_m REAL)", nullptr,
      kReferenceSince},

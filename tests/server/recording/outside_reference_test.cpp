@@ -151,6 +151,23 @@ TEST_F(OutsideReferenceTest, GoesWithItsRun) {
   EXPECT_THAT(faults(), IsEmpty());
 }
 
+TEST_F(OutsideReferenceTest, ADiscardedRunIsExportedWithoutItsReference) {
+  const RunId run = make_run();
+  ASSERT_TRUE(import(reference_of(run), 5000));
+  wait(runs_->discard(run, "loose tube", {}));
+  pass();
+  SQLite::Database database = open_for_reading(path_);
+  const auto file = folder_ / "run.sqlite";
+  RunFile writer{file,
+                 reading_uri(path_, false),
+                 read_spans(database, run, 0),
+                 {.run = run, .channels = all_channels(), .grid_us = {}}};
+  while (writer.advance(database)) continue;
+  SQLite::Database made{file.string(), SQLite::OPEN_READONLY};
+  EXPECT_EQ(made.execAndGet("SELECT count(*) FROM sample").getInt(), 100);
+  EXPECT_EQ(made.execAndGet("SELECT count(*) FROM outside_reference").getInt(), 0);
+}
+
 // The station was killed between two pieces.
 TEST_F(OutsideReferenceTest, WhatWasNotFinishedIsNeverInUse) {
   const RunId run = make_run();
