@@ -152,14 +152,15 @@ void add_outside_doubts(const RunRecording& given, const Identify& wish, control
         "its clock, its scale or the model is not right",
         1e3 * residual_sd_m, 1e3 * given.position_sd_m));
   }
-  // A dead time of the plant and an error of the camera's clock look the same.
+  // A dead time of the plant and a camera's clock that is ahead look the same: positions come late after the duty.
   const control::Fit& best = found.best;
   const double clock_sigma_s = best.position_clock_sigma_s.value_or(0);
   if (std::abs(best.position_clock_s) > std::max(kSuspiciousClockS, 3 * clock_sigma_s)) {
     found.warnings.push_back(fmt::format(
-        "the outside position's clock came out {:.0f} ms off: if it is not, that is a dead time of the plant; search "
-        "with --dead-time-s",
-        1e3 * best.position_clock_s));
+        "the outside position's clock came out {:.0f} ms off: {}", 1e3 * best.position_clock_s,
+        best.position_clock_s < 0
+            ? "if it is not, that is a dead time of the plant; search with --dead-time-s"
+            : "the positions come before the duty that moves the robot, as no plant does; correct the clock's offset"));
   }
   if (wish.options.longest_dead_time_s > 0) {
     found.warnings.emplace_back("the dead time contains what is left of the error of the outside position's clock");
