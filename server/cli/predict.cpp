@@ -24,20 +24,29 @@ struct Measured {
   std::string position_source;  // in words
 };
 
+double largest_sd_m(std::span<const MeasuredStep> steps, bool is_from_outside) {
+  double largest_m = 0;
+  for (const MeasuredStep& step : steps) {
+    if (step.is_from_outside == is_from_outside) largest_m = std::max(largest_m, step.position_sd_m);
+  }
+  return largest_m;
+}
+
 // From where the positions of the steps are had.
 std::string source_in_words(std::span<const MeasuredStep> steps, const std::optional<StoredReference>& reference) {
-  const double largest_sd_m = std::ranges::max(steps, {}, &MeasuredStep::position_sd_m).position_sd_m;
-  const std::string own = largest_sd_m > 0
-                              ? fmt::format("the robot's own estimate (position_sd_m is up to {:.2g} m)", largest_sd_m)
+  const double own_sd_m = largest_sd_m(steps, false);
+  const std::string own = own_sd_m > 0
+                              ? fmt::format("the robot's own estimate (position_sd_m is up to {:.2g} m)", own_sd_m)
                               : std::string{"the position is known: position_sd_m is 0 throughout"};
   if (!reference) return own;
   const auto outside = std::ranges::count(steps, true, &MeasuredStep::is_from_outside);
-  if (outside == 0) return own + "; the position from outside covers no step without a pause";
-  const std::string measured =
-      fmt::format("position measured from outside ({}), ± {:.2g} mm", reference->reference.source, 2e3 * largest_sd_m);
+  if (outside == 0) {
+    return own + "; the position from outside has no step with 10 positions and no pause over 0.25 s";
+  }
+  const std::string measured = fmt::format("position measured from outside ({}), ± {:.2g} mm",
+                                           reference->reference.source, 2e3 * largest_sd_m(steps, true));
   if (outside == std::ssize(steps)) return measured;
-  return fmt::format("{}, in {} of {} steps; the robot's own record in the others, which it does not cover", measured,
-                     outside, steps.size());
+  return fmt::format("{}, in {} of {} steps; in the others {}", measured, outside, steps.size(), own);
 }
 
 double time_of(std::span<const StepPoint> points, std::uint32_t span, std::uint64_t seq) {
@@ -62,6 +71,7 @@ Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experime
   measured.began_at_s = first->at_s;
   measured.position_source = source_in_words(steps, reference);
   experiment.setpoint_m = first->target_m - first->start_m;
+  experiment.settling_band_m = first->band_m;  // of the robot's own step, also where the start is the true one
   experiment.duration_s = time_of(points, first->span, first->last_seq) - first->at_s;
   experiment.disturbance_at_s = 2 * experiment.duration_s;
   const auto next = first + 1;
@@ -163,6 +173,7 @@ OrderedJson answer_of(const control::ClosedLoopExperiment& experiment, const con
       {"setpoint_m", experiment.setpoint_m},       {"duration_s", experiment.duration_s},
       {"disturbance_m", experiment.disturbance_m}, {"disturbance_at_s", experiment.disturbance_at_s},
       {"duty_min", experiment.duty_min},           {"duty_max", experiment.duty_max}};
+  if (experiment.settling_band_m > 0) answer["experiment"]["settling_band_m"] = experiment.settling_band_m;
   answer["compared_with"] = measured.steps.empty() ? OrderedJson{} : OrderedJson(measured.position_source);
   answer["measured_steps"] = OrderedJson::array();
   for (const MeasuredStep& step : measured.steps) answer["measured_steps"].push_back(json_of(step));

@@ -21,7 +21,7 @@ using ::testing::StartsWith;
 // A robot that believes it swims half as far as it does, and a camera at 30 Hz that sees it.
 class ReferenceTools : public RecordingTest {
  protected:
-  ReferenceTools() {
+  explicit ReferenceTools(bool has_second_step = false) {
     start();
     connect(robot_);
     robot_.context.position_sd_m = 0.004F;
@@ -30,6 +30,11 @@ class ReferenceTools : public RecordingTest {
     robot_.context.mode = rheonaut_MODE_AUTO;
     robot_.context.setpoint_m = 0.2F;
     for (const double duty : {-0.3, 0.5, -0.4}) swim(100, duty);
+    if (has_second_step) {
+      robot_.context.position_sd_m = 0.05F;
+      robot_.context.setpoint_m = 0.1F;
+      swim(100, 0.2);
+    }
     wait(runs_->end(run, ""));
     stop();
     camera(-3.4567);
@@ -52,10 +57,10 @@ class ReferenceTools : public RecordingTest {
   }
 
   // Its times plus clock_s are those of the run.
-  void camera(double clock_s) {
+  void camera(double clock_s, double to_s = 8.9) {
     std::ofstream out{folder_ / "camera.csv"};
     out << "t_s,position_m\n";
-    for (double at_s = 0.02; at_s < 8.9; at_s += 1.0 / 30) {
+    for (double at_s = 0.02; at_s < to_s; at_s += 1.0 / 30) {
       const auto k = static_cast<std::size_t>(at_s / 0.01);
       const double seen_m = std::lerp(truth_m_[k], truth_m_[k + 1], at_s / 0.01 - static_cast<double>(k));
       out << fmt::format("{:.6f},{:.6f}\n", at_s - clock_s, 1.25 + seen_m + 0.04 * noise_(random_));
@@ -108,6 +113,32 @@ TEST_F(ReferenceTools, PredictComparesWithWhatWasMeasured) {
   EXPECT_NEAR(json["experiment"]["setpoint_m"].get<double>(), 0.2 - seen_m, 0.005);
   EXPECT_THAT(ask("predict --run 1 --csv").text,
               HasSubstr(fmt::format("{}", json["reference_m"].back().get<double>())));
+}
+
+TEST_F(ReferenceTools, PredictSaysWhenTheReferenceMeasuredNoStep) {
+  camera(-3.4567, 5);
+  ASSERT_EQ(ask("reference import --run 1 --csv @camera.csv --sd-mm 0.5 --offset-s -3.4567").exit_code, 0);
+  EXPECT_THAT(ask("predict --run 1").text,
+              HasSubstr("; the position from outside has no step with 10 positions and no pause over 0.25 s\n"));
+}
+
+TEST_F(ReferenceTools, PredictSettlesInTheBandOfTheMeasuredStep) {
+  ASSERT_EQ(ask("reference import --run 1 --csv @camera.csv --sd-mm 0.5 --offset-s -3.4567 --keep-zero").exit_code, 0);
+  const auto json = ask("predict --run 1 --json").json();
+  EXPECT_EQ(json["experiment"].value("settling_band_m", 0.0), json["measured_steps"][0]["band_m"]);
+}
+
+// The camera saw the first step only.
+class TwoStepTools : public ReferenceTools {
+ protected:
+  TwoStepTools() : ReferenceTools(true) {}
+};
+
+TEST_F(TwoStepTools, PredictSaysOfBothSourcesHowExactTheyAre) {
+  ASSERT_EQ(ask("reference import --run 1 --csv @camera.csv --sd-mm 0.5 --offset-s -3.4567 --keep-zero").exit_code, 0);
+  EXPECT_THAT(ask("predict --run 1").text,
+              StartsWith("compared with: position measured from outside (camera.csv), ± 1 mm, in 1 of 2 steps; in the "
+                         "others the robot's own estimate (position_sd_m is up to 0.05 m)\n"));
 }
 
 TEST_F(ReferenceTools, AGivenClockIsTakenAtItsWord) {
