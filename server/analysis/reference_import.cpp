@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "server/analysis/csv_columns.hpp"
+#include "server/analysis/reference_unit.hpp"
 
 namespace server {
 namespace {
@@ -17,6 +18,7 @@ namespace {
 constexpr std::size_t kFewestPositions = 10;
 constexpr double kLeastOwnSdM = 1e-4;  // weights do not grow beyond it
 constexpr double kLargestPositionM = 1e6, kLargestTimeS = 1e10;
+constexpr double kLeastSdM = 1e-7;    // what is given to be surer weighs down all the others
 constexpr double kLongestGapS = 0.1;  // in the robot's own record
 
 struct Given {
@@ -39,18 +41,6 @@ std::size_t line_of_row(std::string_view text, std::size_t row) {
 }
 
 constexpr double kLeastRatio = 0.2, kMostRatio = 5;  // of both motions; a robot with a wrong model is off by two
-// Without a clock by correlation a robot may have missed much of its motion, but not all but a 30th of over 2 m.
-constexpr double kMostSpanRatio = 30, kSuspiciousSpanM = 2, kLeastOwnSpanM = 0.001;
-constexpr double kOutlierShare = 0.01;  // of the positions, at each end, that a span leaves out
-constexpr double kMillimetreRatio = 300;
-
-// What to do about positions that move so many times what the robot's own record does.
-std::string unit_advice(double ratio) {
-  if (ratio < kMostSpanRatio) return "are its positions in metres?";
-  const bool is_mm = ratio >= kMillimetreRatio;
-  return fmt::format("they look like {}; give metres: divide position_m (and position_sd_m, if it has one) by {}",
-                     is_mm ? "millimetres" : "centimetres", is_mm ? 1000 : 100);
-}
 
 std::optional<std::string> fault_of_row(const Given& given, std::size_t row) {
   const double time_s = given.time_s[row], position_m = given.position_m[row], sd_m = given.sd_m[row];
@@ -61,7 +51,9 @@ std::optional<std::string> fault_of_row(const Given& given, std::size_t row) {
   if (std::abs(position_m) > kLargestPositionM) {
     return fmt::format("position_m {} is beyond {}: give metres", position_m, kLargestPositionM);
   }
-  if (!(sd_m > 0)) return fmt::format("position_sd_m {} is not positive", sd_m);
+  if (!(sd_m >= kLeastSdM && sd_m <= kLargestPositionM)) {
+    return fmt::format("position_sd_m {} is not from {:g} to {:g} m", sd_m, kLeastSdM, kLargestPositionM);
+  }
   return std::nullopt;
 }
 
@@ -256,29 +248,17 @@ std::optional<OwnAt> own_at(const OwnRecord& own, double time_s) {
   return OwnAt{std::lerp(own.position_m[before], own.position_m[k], share), own.sd_m[k]};
 }
 
-double span_of(std::vector<double> positions_m) {
-  std::ranges::sort(positions_m);
-  const auto left_out = static_cast<std::size_t>(kOutlierShare * static_cast<double>(positions_m.size()));
-  return positions_m[positions_m.size() - 1 - left_out] - positions_m[left_out];
-}
-
-// Positions that cannot be in metres, whatever the clock came from.
 Result<void> check_unit(const Given& inside, const OwnRecord& own) {
-  std::vector<double> outside_m, own_m;
+  std::vector<double> time_s, outside_m, own_m;
   for (std::size_t row = 0; row < inside.time_s.size(); ++row) {
     const auto at = own_at(own, inside.time_s[row]);
     if (!at) continue;
+    time_s.push_back(inside.time_s[row]);
     outside_m.push_back(inside.position_m[row]);
     own_m.push_back(at->position_m);
   }
-  if (outside_m.size() < kFewestPositions) return {};
-  const double outside_span_m = span_of(std::move(outside_m)), own_span_m = span_of(std::move(own_m));
-  const double ratio = outside_span_m / own_span_m;
-  if (outside_span_m < kSuspiciousSpanM || own_span_m < kLeastOwnSpanM || ratio < kMostSpanRatio) return {};
-  return fail(ErrorCode::invalid,
-              fmt::format("its positions range over {:.4g} m, those of the robot's own record over {:.4g} m: {}",
-                          outside_span_m, own_span_m, unit_advice(ratio)),
-              "out_of_range");
+  if (time_s.size() < kFewestPositions) return {};
+  return check_metres(time_s, std::move(outside_m), std::move(own_m));
 }
 
 // The mean of own less outside position, weighed by how sure the robot is; none where the two have no time in common.

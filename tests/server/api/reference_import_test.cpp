@@ -109,7 +109,8 @@ TEST_F(ReferenceImportTest, MillimetresAndCentimetresAreRefusedWhateverTheClockC
       EXPECT_EQ(refusal().detail, "") << text(method);
       see_scaled(1000);
       EXPECT_EQ(refusal().reason, "out_of_range") << text(method);
-      EXPECT_THAT(refusal().detail, HasSubstr("millimetres; give metres: divide position_m")) << text(method);
+      EXPECT_THAT(refusal().detail, HasSubstr("they look like millimetres; if they are, divide position_m"))
+          << text(method);
       see_scaled(100);
       EXPECT_THAT(refusal().detail, HasSubstr("centimetres")) << text(method);
     }
@@ -121,6 +122,32 @@ TEST_F(ReferenceImportTest, ARobotThatMissedMostOfItsMotionHasAReferenceAllTheSa
   see(0, 0);
   for (OwnPosition& sample : own) sample.position_m *= 0.02F;
   EXPECT_EQ(refusal().detail, "");
+}
+
+// A pump's flow, of which a robot feels nothing, as it holds a believed position.
+TEST_F(ReferenceImportTest, ASteadyFlowOfMetresMakesNoOtherUnit) {
+  for (OwnPosition& sample : own) sample.position_m *= 0.25F;
+  request.csv = "t_s,position_m\n";
+  for (double at_s = 0.1; at_s < 29.9; at_s += 1.0 / 30) {
+    request.csv += fmt::format("{:.6f},{:.6f}\n", at_s, truth_m(at_s) + 0.1 * at_s);
+  }
+  request.clock.zero_at_us = 1'767'225'600'000'000;
+  marker = MarkerPlace{0, 5'000'000};
+  for (const auto method : {ReferenceClock::offset, ReferenceClock::utc, ReferenceClock::marker}) {
+    request.clock.method = method;
+    EXPECT_EQ(refusal().detail, "") << text(method);
+  }
+  request.clock.method = ReferenceClock::correlation;
+  EXPECT_EQ(refusal().reason, "no_correlation") << "the motions differ too much to find the clock, whatever the unit";
+}
+
+TEST_F(ReferenceImportTest, AnSdThatNoPositionHasIsRefusedWithItsLine) {
+  for (const char* sd_m : {"0", "1e-160", "9e-8", "2e6"}) {
+    request.csv = "t_s,position_m,position_sd_m\n";
+    for (int k = 0; k < 20; ++k) request.csv += fmt::format("{},{},{}\n", k, 0.01 * k, k == 3 ? sd_m : "0.001");
+    EXPECT_EQ(refusal().reason, "malformed_csv") << sd_m;
+    EXPECT_THAT(refusal().detail, StartsWith("camera.csv line 5: position_sd_m ")) << sd_m;
+  }
 }
 
 TEST_F(ReferenceImportTest, ANameOfSeveralLinesIsRefused) {
@@ -220,7 +247,7 @@ TEST_F(ReferenceImportTest, WhatIsWrongIsToldWithItsLine) {
   request.csv = "t_s,position_m\n0,0.1\n\n0.1,0.1\n0.1,0.2\n";
   EXPECT_EQ(refusal().detail, "camera.csv line 5: t_s 0.1 is not after 0.1, the one before: times must ascend");
   request.csv = "t_s,position_m,position_sd_m\n0,0.1,0.001\n0.1,0.1,0\n";
-  EXPECT_EQ(refusal().detail, "camera.csv line 3: position_sd_m 0 is not positive");
+  EXPECT_EQ(refusal().detail, "camera.csv line 3: position_sd_m 0 is not from 1e-07 to 1e+06 m");
   request.csv = "t_s,y\n0,0.1\n";
   EXPECT_THAT(refusal().detail, HasSubstr("column position_m is missing"));
   request.csv = "t_s,position_m\n0,0.1\n";

@@ -1,0 +1,21 @@
+// Doubts the unit of positions from outside that move far more than the robot's own record does.
+//
+// Without a clock by correlation a robot may have missed much of its motion, but not all but a 30th of over 2 m: that
+// looks like centimetres or millimetres. A flow carries a robot along unseen, as when it holds a position that it
+// believes: so a straight line in time is taken off both motions first.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/result.hpp"
+
+namespace server {
+
+// What to do about positions that move so many times what the robot's own record does.
+std::string unit_advice(double ratio);
+
+// Both motions at the same, ascending times.
+Result<void> check_metres(const std::vector<double>& time_s, std::vector<double> outside_m, std::vector<double> own_m);
+
+}  // namespace server
