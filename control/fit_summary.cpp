@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "control/fit_statistics.hpp"
+#include "control/residual_doubts.hpp"
 
 namespace control {
 namespace {
@@ -71,9 +72,8 @@ void add_uncertainty(OutputErrorSearch& search, const SearchPoint& point, const 
 }
 
 void add_quality(const OutputErrorSearch& search, const Eigen::VectorXd& residual, const std::vector<double>& measured,
-                 Fit& fit) {
-  const Eigen::Map<const Eigen::VectorXd> y(measured.data(), residual.size());
-  fit.fit_percent = 100 * (1 - residual.norm() / (y.array() - y.mean()).matrix().norm());
+                 const std::vector<double>& sd_m, Fit& fit) {
+  fit.fit_percent = fit_percent({residual.begin(), residual.end()}, measured, sd_m);
   const Eigen::VectorXd counted = with_weight(search, residual);
   fit.residual_sd = counted.norm() / std::sqrt(static_cast<double>(counted.size()));
 }
@@ -132,7 +132,7 @@ Fit summary(OutputErrorSearch& search, const Recording& recording, Cost cost, St
     fit.sse += residuals[c].squaredNorm();
     fit.absolute_error += residuals[c].lpNorm<1>() * recording.dt_s;
   }
-  add_quality(search, residuals.front(), *measured.front(), fit);
+  add_quality(search, residuals.front(), *measured.front(), recording.position_sd_m, fit);
   add_whiteness(channels, residuals, fit);
   fit.aic = akaike(search, cost, residuals, measured, fit.free_parameters);
   if (found.starts > 0) add_uncertainty(search, found.point, residuals, cost, fit);

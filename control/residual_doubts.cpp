@@ -8,6 +8,7 @@
 
 #include "control/fit_statistics.hpp"
 #include "control/identifiability.hpp"
+#include "control/position_weight.hpp"
 
 namespace control {
 namespace {
@@ -90,11 +91,15 @@ void add_colour(const ChannelResidual& channel, std::vector<std::string>& warnin
 
 }  // namespace
 
-double fit_percent(const std::vector<double>& residual, const std::vector<double>& measured) {
+double fit_percent(const std::vector<double>& residual, const std::vector<double>& measured,
+                   const std::vector<double>& sd_m) {
   if (residual.empty()) return std::numeric_limits<double>::infinity();
   const auto n = static_cast<Index>(residual.size());
   const Eigen::Map<const Eigen::VectorXd> r(residual.data(), n), y(measured.data(), n);
-  return 100 * (1 - r.norm() / (y.array() - y.mean()).matrix().norm());
+  Eigen::ArrayXd weight = Eigen::ArrayXd::Ones(n);
+  if (!sd_m.empty()) weight = sd_of_mean_weight(sd_m) / Eigen::Map<const Eigen::ArrayXd>(sd_m.data(), n);
+  const double mean = (weight.square() * y.array()).sum() / weight.square().sum();
+  return 100 * (1 - r.norm() / (weight * (y.array() - mean)).matrix().norm());
 }
 
 std::vector<std::string> residual_doubts(const Recording& recording, const IdentificationOptions& options,
@@ -102,11 +107,14 @@ std::vector<std::string> residual_doubts(const Recording& recording, const Ident
   if (fit.end != SearchEnd::converged && fit.end != SearchEnd::iteration_limit) return {};  // not the model's doing
   std::vector<ChannelResidual> channels;
   const auto take = [&](const char* name, const char* unit, const std::vector<double>& residual,
-                        const std::vector<double>& measured, std::optional<double> p_value) {
-    const double percent = fit_percent(residual, measured);
+                        const std::vector<double>& measured, std::optional<double> p_value,
+                        const std::vector<double>& sd_m = {}) {
+    const double percent = fit_percent(residual, measured, sd_m);
     if (percent < kFitOfRounding) channels.push_back({name, unit, residual, percent, p_value.value_or(1)});
   };
-  take("position_m", "m", fit.position_residual_m, recording.position_m, fit.position_whiteness_p_value);
+  const char* position_unit = recording.position_sd_m.empty() ? "m" : "m as weighed by position_sd_m";
+  take("position_m", position_unit, fit.position_residual_m, recording.position_m, fit.position_whiteness_p_value,
+       recording.position_sd_m);
   take("acceleration_m_s2", "m/s²", fit.acceleration_residual_m_s2, recording.acceleration_m_s2,
        fit.acceleration_whiteness_p_value);
   take("velocity_m_s", "m/s", fit.velocity_residual_m_s, recording.velocity_m_s, fit.velocity_whiteness_p_value);

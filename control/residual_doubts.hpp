@@ -17,7 +17,9 @@ namespace control {
 std::vector<std::string> residual_doubts(const Recording& recording, const IdentificationOptions& options,
                                          const Fit& fit);
 
-// 100 (1 - |residual|/|measured - mean|); infinite for a recording without residuals.
-double fit_percent(const std::vector<double>& residual, const std::vector<double>& measured);
+// 100 (1 - |residual|/|measured - mean|); infinite for a recording without residuals. Where the residuals are weighed
+// by the sds of positions, so are the measured values and their mean.
+double fit_percent(const std::vector<double>& residual, const std::vector<double>& measured,
+                   const std::vector<double>& sd_m = {});
 
 }  // namespace control

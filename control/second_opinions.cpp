@@ -26,7 +26,7 @@ constexpr double kNoticeableLagS = 0.002;                 // twice what the age 
 constexpr double kMotionSigmas = 5, kMotionShare = 0.01;  // of v0, and of the squares that it explains
 
 double lowest_percent(const Recording& recording, const Fit& fit) {
-  return std::min({fit_percent(fit.position_residual_m, recording.position_m),
+  return std::min({fit_percent(fit.position_residual_m, recording.position_m, recording.position_sd_m),
                    fit_percent(fit.velocity_residual_m_s, recording.velocity_m_s),
                    fit_percent(fit.acceleration_residual_m_s2, recording.acceleration_m_s2)});
 }

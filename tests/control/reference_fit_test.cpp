@@ -137,6 +137,37 @@ TEST(ReferenceFit, PositionsWeighByTheirOwnSds) {
   EXPECT_NEAR(chi_square_per_value, 1, 0.07);
 }
 
+// A tenth of the positions is of a lost marker, metres off, and known to be: they hide no model that explains nothing.
+TEST(ReferenceFit, APoorFitIsNamedHoweverFarUnsurePositionsLieApart) {
+  Recording recording = watched(normalised(kNonNewtonianModel), {}, 3);
+  std::mt19937 random{5};
+  std::normal_distribution<double> noise{0, 2};
+  for (std::size_t k = 0; k < recording.position_m.size(); ++k) {
+    recording.position_sd_m.push_back(k % 10 == 0 ? 2 : 0.0005);
+    if (k % 10 == 0) recording.position_m[k] += noise(random);
+  }
+  IdentificationOptions options;
+  options.structure = Structure::first_order;
+  options.further_starts = 0;
+  EXPECT_GT(identify(recording, options).best.fit_percent, 80);
+  for (double& duty : recording.duty) duty = -duty;
+  const Identification turned = identify(recording, options);
+  EXPECT_LT(turned.best.fit_percent, 50);
+  using ::testing::HasSubstr;
+  EXPECT_THAT(turned.warnings, ::testing::Contains(HasSubstr("turn one sign")));
+}
+
+TEST(ReferenceFit, ADoubtAboutWeighedPositionsSaysThatTheyAre) {
+  Recording recording = watched(normalised(kNonNewtonianModel), {}, 3);
+  recording.position_sd_m.assign(recording.position_m.size(), 0.0005);
+  recording.position_m[500] += 0.1;
+  IdentificationOptions options;
+  options.structure = Structure::first_order;
+  options.further_starts = 0;
+  EXPECT_THAT(identify(recording, options).warnings,
+              ::testing::Contains(::testing::HasSubstr(" m as weighed by position_sd_m) of the model")));
+}
+
 TEST(ReferenceFit, EqualSdsChangeNothing) {
   Recording recording = watched(kNonNewtonianModel, {}, 2);
   IdentificationOptions options;
