@@ -105,6 +105,16 @@ TEST(SensorSearch, ADeadTimeBeyondWhatTheReadingsMayHideIsNamedAndFound) {
   EXPECT_FALSE(found.best.sensor->delay_is_at_limit);
 }
 
+TEST(SensorSearch, DoubtsALagOfTheSensorThatTheReadingsDoNotHave) {
+  const auto is_said = Contains(HasSubstr("less than the sensor's own lag that was given"));
+  for (const double sensor_lag_s : {0.06, 2.0}) {
+    for (const double longest_dead_time_s : {0.0, 0.2}) {
+      EXPECT_THAT(identified(0.03, longest_dead_time_s, sensor_lag_s).warnings, is_said) << sensor_lag_s;
+    }
+  }
+  EXPECT_THAT(identified(0.03, 0.2, 0.03).warnings, Not(is_said));
+}
+
 TEST(SensorSearch, ALagOfTheSensorNeedsASensor) {
   const std::vector<double> duty = prbs_duty(0.6, 0.2, 4, kPeriodS);
   IdentificationOptions options;
