@@ -168,8 +168,9 @@ Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::span<const Z
   return record;
 }
 
-Result<void> find_clock(const ReferenceClockRequest& asked, const Given& given, const OwnRecord& own,
+Result<void> find_clock(const ReferenceRequest& request, const Given& given, const OwnRecord& own,
                         std::optional<MarkerPlace> marker, OutsideReference& into) {
+  const ReferenceClockRequest& asked = request.clock;
   into.clock = asked.method;
   into.clock_sd_s = asked.sd_s;
   switch (asked.method) {
@@ -205,7 +206,7 @@ Result<void> find_clock(const ReferenceClockRequest& asked, const Given& given, 
                             found.refusal),
                 "no_correlation");
   }
-  if (found.motion_ratio < kLeastRatio || found.motion_ratio > kMostRatio) {
+  if (!request.is_in_metres && (found.motion_ratio < kLeastRatio || found.motion_ratio > kMostRatio)) {
     return fail(ErrorCode::invalid,
                 fmt::format("it moves {:.4g} times what the robot's own record does: {}", found.motion_ratio,
                             unit_advice(found.motion_ratio)),
@@ -324,7 +325,7 @@ Result<PlacedReference> place_reference(const ReferenceRequest& request, std::sp
   made.span = own->span;
   made.source = request.source;
   made.sha256 = sha256_of(request.csv);
-  if (const auto found = find_clock(request.clock, *given, *own, marker, made); !found) {
+  if (const auto found = find_clock(request, *given, *own, marker, made); !found) {
     return std::unexpected{found.error()};
   }
   const Given inside = rows_in_span(*given, *own, made.clock_offset_s);
@@ -337,7 +338,9 @@ Result<PlacedReference> place_reference(const ReferenceRequest& request, std::sp
                     made.clock_offset_s, kFewestPositions),
         "not_in_run");
   }
-  if (const auto metres = check_unit(inside, *own); !metres) return std::unexpected{metres.error()};
+  if (!request.is_in_metres) {
+    if (const auto metres = check_unit(inside, *own); !metres) return std::unexpected{metres.error()};
+  }
   made.zero_is_kept = request.keeps_zero;
   if (!request.keeps_zero) {
     if (const auto found = find_zero(inside, *own, made); !found) return std::unexpected{found.error()};

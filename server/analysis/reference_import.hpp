@@ -41,6 +41,7 @@ struct ReferenceRequest {
   ReferenceClockRequest clock;
   std::optional<std::uint32_t> span;  // none: the run's only one
   bool keeps_zero = false;
+  bool is_in_metres = false;   // whatever its positions look like
   std::optional<double> sd_m;  // of every position, where the text has no column position_sd_m
   std::string reason;          // to replace another one
 };

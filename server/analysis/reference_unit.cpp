@@ -38,10 +38,12 @@ double span_of(std::vector<double> positions_m) {
 }  // namespace
 
 std::string unit_advice(double ratio) {
-  if (ratio < kMostSpanRatio) return "are its positions in metres?";
+  if (ratio < kMostSpanRatio) return "are its positions in metres? If they are, say so (metres, --metres)";
   const bool is_mm = ratio >= kMillimetreRatio;
-  return fmt::format("they look like {}; if they are, divide position_m (and position_sd_m, if it has one) by {}",
-                     is_mm ? "millimetres" : "centimetres", is_mm ? 1000 : 100);
+  return fmt::format(
+      "they look like {}; if they are, divide position_m (and position_sd_m, if it has one) by {}; if they are metres, "
+      "say so (metres, --metres)",
+      is_mm ? "millimetres" : "centimetres", is_mm ? 1000 : 100);
 }
 
 Result<void> check_metres(const std::vector<double>& time_s, std::vector<double> outside_m, std::vector<double> own_m) {

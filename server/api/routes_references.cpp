@@ -99,8 +99,16 @@ Result<ReferenceClockRequest> parse_clock(const json& given) {
   return clock;
 }
 
+// False where it is missing.
+Result<bool> flag(const Members& body, const char* name) {
+  if (!body.has(name)) return false;
+  const json& value = body.object().at(name);
+  if (value.is_boolean()) return value.get<bool>();
+  return fail(ErrorCode::bad_request, fmt::format("{} must be true or false", name), "wrong_type");
+}
+
 Result<ReferenceRequest> parse_reference(const std::string& text) {
-  auto body = Members::parse(text, {"csv", "source", "clock", "span", "keep_zero", "sd_m", "reason"});
+  auto body = Members::parse(text, {"csv", "source", "clock", "span", "keep_zero", "metres", "sd_m", "reason"});
   if (!body) return std::unexpected{body.error()};
   ReferenceRequest request;
   auto csv = body->text("csv", 1, kMaxReferenceBytes);
@@ -118,11 +126,11 @@ Result<ReferenceRequest> parse_reference(const std::string& text) {
     if (!span) return std::unexpected{span.error()};
     request.span = static_cast<std::uint32_t>(*span);
   }
-  if (body->has("keep_zero")) {
-    const json& keep = body->object().at("keep_zero");
-    if (!keep.is_boolean()) return fail(ErrorCode::bad_request, "keep_zero must be true or false", "wrong_type");
-    request.keeps_zero = keep.get<bool>();
-  }
+  const auto keeps_zero = flag(*body, "keep_zero"), is_in_metres = flag(*body, "metres");
+  if (!keeps_zero) return std::unexpected{keeps_zero.error()};
+  if (!is_in_metres) return std::unexpected{is_in_metres.error()};
+  request.keeps_zero = *keeps_zero;
+  request.is_in_metres = *is_in_metres;
   const auto sd_m = number_within(*body, "sd_m", 1e-7, 1);
   if (!sd_m) return std::unexpected{sd_m.error()};
   request.sd_m = *sd_m;

@@ -108,6 +108,7 @@ ReferenceRequest request_of(const ReferenceCommand& wish) {
   request.clock = clock_of(wish);
   request.span = wish.span;
   request.keeps_zero = wish.keeps_zero;
+  request.is_in_metres = wish.is_in_metres;
   if (wish.sd_mm) request.sd_m = *wish.sd_mm / 1e3;
   request.reason = wish.reason;
   return request;
@@ -131,7 +132,8 @@ json json_of(const ReferenceRequest& request) {
   json out{{"csv", request.csv},
            {"source", request.source},
            {"clock", json_of(request.clock)},
-           {"keep_zero", request.keeps_zero}};
+           {"keep_zero", request.keeps_zero},
+           {"metres", request.is_in_metres}};
   if (request.span) out["span"] = *request.span;
   if (request.sd_m) out["sd_m"] = *request.sd_m;
   if (!request.reason.empty()) out["reason"] = request.reason;
@@ -233,6 +235,7 @@ void add_options(CLI::App& command, ReferenceCommand& wish) {
   importing->add_option("--span", wish.span, "Which span of the run, if the robot rebooted during it")
       ->check(whole(0, std::numeric_limits<std::uint32_t>::max()));
   importing->add_flag("--keep-zero", wish.keeps_zero, "Its zero is the robot's (default: estimated from the run)");
+  importing->add_flag("--metres", wish.is_in_metres, "Its positions are in metres, also where they do not look so");
   importing->add_option("--reason", wish.reason, "Why another reference of the run is replaced")->check(named());
   importing->footer(
       "Without --offset-s, --utc-s or --marker the clock is found by correlation with the robot's own motion.\n"

@@ -26,7 +26,7 @@ struct ReferenceCommand {
   std::optional<double> sd_mm, offset_s, utc_s, at_s, clock_sd_s, search_from_s, search_to_s;
   std::string marker;  // its number, or its text
   std::optional<std::uint32_t> span;
-  bool keeps_zero = false;
+  bool keeps_zero = false, is_in_metres = false;
   std::string reason;
 };
 

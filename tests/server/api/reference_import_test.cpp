@@ -113,6 +113,9 @@ TEST_F(ReferenceImportTest, MillimetresAndCentimetresAreRefusedWhateverTheClockC
           << text(method);
       see_scaled(100);
       EXPECT_THAT(refusal().detail, HasSubstr("centimetres")) << text(method);
+      request.is_in_metres = true;
+      EXPECT_EQ(refusal().detail, "") << text(method);
+      request.is_in_metres = false;
     }
   }
 }

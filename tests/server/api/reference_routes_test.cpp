@@ -149,6 +149,7 @@ TEST_F(ReferenceRoutesTest, WhatIsMalformedIsRefusedByName) {
   EXPECT_THAT(import(with("csv", "t_s,position_m\n0,x\n")).body, HasSubstr("line 2"));
   EXPECT_EQ(import(with("sd_m", 0)).status, 422);
   EXPECT_EQ(import(with("keep_zero", 1)).status, 400);
+  EXPECT_EQ(import(with("metres", "yes")).status, 400);
   EXPECT_EQ(import(with("colour", 1)).status, 400);
   EXPECT_EQ(import(clock_of("offset")).status, 400);
   EXPECT_EQ(import(clock_of({{"method", "sundial"}})).status, 422);

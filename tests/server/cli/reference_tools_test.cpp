@@ -141,6 +141,23 @@ TEST_F(TwoStepTools, PredictSaysOfBothSourcesHowExactTheyAre) {
                          "others the robot's own estimate (position_sd_m is up to 0.05 m)\n"));
 }
 
+// A hundred times what it should be.
+TEST_F(ReferenceTools, PositionsThatLookLikeCentimetresNeedTheWordThatTheyAreNot) {
+  std::ifstream in{folder_ / "camera.csv"};
+  std::ofstream out{folder_ / "far.csv"};
+  std::string line;
+  std::getline(in, line);
+  out << line << '\n';
+  while (std::getline(in, line)) {
+    const auto comma = line.find(',');
+    out << fmt::format("{},{:.6f}\n", line.substr(0, comma), 100 * std::stod(line.substr(comma + 1)));
+  }
+  out.close();
+  const std::string import = "reference import --run 1 --csv @far.csv --sd-mm 50 --offset-s -3.4567";
+  EXPECT_THAT(ask(import).error, AllOf(HasSubstr("they look like centimetres"), HasSubstr("--metres")));
+  EXPECT_EQ(ask(import + " --metres").exit_code, 0);
+}
+
 TEST_F(ReferenceTools, AGivenClockIsTakenAtItsWord) {
   ASSERT_EQ(
       ask("reference import --run 1 --csv @camera.csv --sd-mm 0.5 --offset-s -3.4567 --clock-sd-s 0.01").exit_code, 0);
