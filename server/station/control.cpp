@@ -29,6 +29,14 @@ const char* text(ControlAction action) {
   return "take";
 }
 
+// Nobody loses by it that it still comes, whoever is in control, and someone may by its absence.
+bool only_ends_motion(const protocol::Command& command) {
+  if (command.which_action == rheonaut_Command_set_mode_tag) {
+    return command.action.set_mode.mode == rheonaut_MODE_MANUAL;
+  }
+  return command.which_action == rheonaut_Command_set_duty_tag && command.action.set_duty.duty == 0.0F;
+}
+
 bool has_timed_setpoint(const Seat& seat) {
   return std::ranges::any_of(seat.orders_ahead(), [](const OrderAhead& order) {
     return order.command->has_execute_at_robot_us && setpoint_of(*order.command);
@@ -71,11 +79,15 @@ Result<std::optional<Authority::Change>> change_control(Authority& authority, co
 // no command may follow.
 bool Station::drop_timed(Seat& seat) {
   RobotState& robot = *seat.robot;
+  const std::string holder = authority_.of(robot.id).holder;
+  withdraw_queued(seat, "control_ended", [&holder](const PendingCommand& pending) {
+    return pending.record.actor != holder && (pending.is_by_holder || !holder.empty());
+  });
   const bool may_wait = !seat.timed_by.empty() && robot.latest_robot_time_us <= seat.timed_until_robot_us + kDueGraceUs;
   if (!may_wait) seat.drop_timed_because = nullptr;
   const bool has_lost_a_step = std::exchange(seat.has_lost_a_step, false);
   if (may_wait && has_lost_a_step && has_timed_setpoint(seat)) seat.drop_timed_because = "step_before_dropped";
-  if (may_wait && authority_.of(robot.id).holder != seat.timed_by) seat.drop_timed_because = "control_ended";
+  if (may_wait && holder != seat.timed_by) seat.drop_timed_because = "control_ended";
   const bool is_lost = seat.drop_timed_id != 0 && !seat.commands.contains(seat.drop_timed_id);
   if ((seat.drop_timed_because == nullptr && !is_lost) || seat.port == nullptr) return true;
   if (seat.drop_timed_because != nullptr) end_timed(seat, seat.drop_timed_because);
@@ -93,6 +105,20 @@ bool Station::drop_timed(Seat& seat) {
   add_pending(seat, drop);
   publish(drop->record);
   return true;
+}
+
+// SAFETY: what still waits for the link is not sent once it may no longer be, timed or not; but it may end a motion.
+void Station::withdraw_queued(Seat& seat, const char* reason,
+                              const std::function<bool(const PendingCommand&)>& is_meant) {
+  if (seat.port == nullptr) return;
+  std::vector<CommandId> withdrawn;
+  for (const auto& [id, pending] : seat.commands) {
+    const bool is_bound = !pending->is_stop() && needs_control(pending->wire) && !only_ends_motion(pending->wire) &&
+                          pending->wire.which_action != rheonaut_Command_drop_timed_tag;
+    const bool is_queued = pending->record.state == CommandState::queued;
+    if (is_bound && is_queued && is_meant(*pending) && seat.port->withdraw(id)) withdrawn.push_back(id);
+  }
+  for (const CommandId id : withdrawn) finish(seat, id, CommandState::superseded, reason);
 }
 
 // What was not sent ends; what was sent ends when the robot says that it has dropped it.

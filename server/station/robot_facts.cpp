@@ -40,6 +40,7 @@ Result<void> Station::set_fluid(const RobotId& id, const std::string& text, cons
   const bool is_narrower = is_narrower_than(envelope_.in(fluid), envelope_.in(robot.fluid));
   robot.fluid = fluid;
   if (Seat& seat = seats_.at(id); is_narrower) {
+    withdraw_queued(seat, "limits_changed", [](const PendingCommand&) { return true; });
     seat.drop_timed_because = "limits_changed";
     drop_timed(seat);
   }

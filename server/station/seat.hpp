@@ -31,6 +31,7 @@ struct PendingCommand {
   std::uint64_t look_until_robot_us = 0;  // sent: nor does telemetry from here on
   std::int64_t seen_until_us = 0;         // steady; acknowledged: then it is no longer looked for
   bool has_key = false;                   // of the client
+  bool is_by_holder = false;              // its actor was in control when the station accepted it
   bool is_timed = false;                  // a stop that counts in Station::stop_times()
   bool is_overtaken = false;              // acknowledged, and a later one that moves the motor too
   bool is_proved_by_samples = false;      // sent: samples that show its effect prove that it has run

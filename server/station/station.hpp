@@ -213,6 +213,7 @@ class Station {
   void use_control(const CommandRequest& request);
   bool drop_timed(Seat& seat);
   void end_timed(Seat& seat, const char* reason);
+  void withdraw_queued(Seat& seat, const char* reason, const std::function<bool(const PendingCommand&)>& is_meant);
   Result<void> check_request(const CommandRequest& request, const protocol::Command& wire, const Seat& seat) const;
   Result<std::shared_ptr<PendingCommand>> same_wish(const CommandRequest& request, const Seat& seat);
   boost::asio::awaitable<Result<CommandRecord>> follow(std::shared_ptr<PendingCommand> pending, bool until_verified,

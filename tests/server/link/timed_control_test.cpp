@@ -298,6 +298,56 @@ TEST_F(TimedControlTest, TakesTwoPlacesUntilTheRobotHasTakenItIn) {
   EXPECT_EQ(robot->commands().size(), 4U);
 }
 
+// SAFETY: timed or not, what waits for the link is sent for nobody who is no longer in control.
+TEST_F(TimedControlTest, WhatTheLinkHasNotTakenEndsWithControlWhetherTimedOrNot) {
+  fill_window();
+  const auto submit_of_a = [this](const protocol::Command& command) {
+    CommandRequest request = request_of(command, 10s);
+    request.actor = "a";
+    submit(std::move(request));
+    clock.settle();
+  };
+  protocol::Command set_manual = rheonaut_Command_init_zero;
+  set_manual.which_action = rheonaut_Command_set_mode_tag;
+  set_manual.action.set_mode.mode = rheonaut_MODE_MANUAL;
+  submit_of_a(set_duty(0.8F));
+  submit_of_a(moves_after_a_second());
+  submit_of_a(set_manual);
+  submit(timed(set_duty(0.25F), in_ms(100), "a"));
+  clock.run_for(1s);
+  control(ControlAction::force, "b");
+  for (const char* kind : {"set_duty", "set_duty_schedule"}) {
+    EXPECT_EQ(latest_of_kind(kind).state, CommandState::superseded) << kind;
+    EXPECT_EQ(latest_of_kind(kind).reason, "control_ended") << kind;
+  }
+  CommandRequest next = request_of(set_duty(0.5F), 5s);
+  next.actor = "b";
+  submit(std::move(next));
+  clock.settle();
+  answer_all();
+  const auto sent = kinds();
+  ASSERT_EQ(sent.size(), CommandWindow::kMost + 2U);
+  EXPECT_EQ(sent[CommandWindow::kMost], std::string{"set_mode"}) << "what only ends a motion is sent";
+  EXPECT_EQ(robot->commands().back().action.set_duty.duty, 0.5F);
+}
+
+TEST_F(TimedControlTest, WhatTheLinkHasNotTakenEndsWhenControlIsReleasedButNotWhenItIsTaken) {
+  fill_window();
+  CommandRequest of_nobody = request_of(moves_after_a_second(), 9s);
+  of_nobody.actor = "a";
+  of_nobody.takes_control = false;
+  submit(of_nobody);
+  clock.settle();
+  control(ControlAction::take, "a");
+  EXPECT_EQ(latest_of_kind("set_duty_schedule").state, CommandState::queued);
+  CommandRequest held = request_of(set_duty(0.5F), 9s);
+  held.actor = "a";
+  submit(held);
+  clock.settle();
+  control(ControlAction::release, "a");
+  EXPECT_EQ(latest_of_kind("set_duty").reason, "control_ended");
+}
+
 TEST_F(TimedControlTest, LeavesThoseThatTheHolderStillControls) {
   take_in(timed(set_duty(0.25F), in_ms(2000), "a"));
   control(ControlAction::take, "a");

@@ -1,6 +1,7 @@
 // Words of tests about commands that wait on the robot for their time.
 #pragma once
 
+#include "server/link/command_window.hpp"
 #include "tests/server/link/link_fixture.hpp"
 
 namespace server {
@@ -76,6 +77,17 @@ class TimedTest : public LinkTest {
     protocol::Command command = rheonaut_Command_init_zero;
     command.which_action = rheonaut_Command_ping_tag;
     return command;
+  }
+  // What comes now waits in the station, until the robot answers.
+  void fill_window() {
+    for (std::size_t i = 0; i < CommandWindow::kMost; ++i) submit(ping(), 9s);
+    clock.settle();
+  }
+  void answer_all() {
+    for (std::size_t i = 0; i < robot->commands().size(); ++i) {
+      robot->acknowledge(robot->commands()[i], rheonaut_COMMAND_RESULT_ACCEPTED);
+      clock.settle();
+    }
   }
   // The same boot, over a new connection.
   void come_back() {

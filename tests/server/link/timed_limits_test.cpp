@@ -111,6 +111,20 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheLimitsOfTheFluidBecomeNarrower) {
   EXPECT_EQ(drops(), 2U) << "the strictest hold";
 }
 
+TEST_F(TimedLimitsTest, WhatTheLinkHasNotTakenIsNotSentWhenTheLimitsBecomeNarrower) {
+  fill_window();
+  submit(now(set_duty(0.8F), 9s));
+  clock.settle();
+  ASSERT_TRUE(station.set_fluid("r1", "water", {"a", "", 0}));
+  clock.settle();
+  EXPECT_EQ(latest_of_kind("set_duty").state, CommandState::superseded);
+  EXPECT_EQ(latest_of_kind("set_duty").reason, "limits_changed");
+  submit(now(set_duty(0.5F), 9s));
+  ASSERT_TRUE(station.set_fluid("r1", "non_newtonian", {"a", "", 0}));
+  answer_all();
+  EXPECT_EQ(robot->commands().back().action.set_duty.duty, 0.5F) << "the limits have become wider";
+}
+
 TEST_F(TimedLimitsTest, ItIsDroppedLaterWhenTheLinkWasFullAndNothingIsRenewedBefore) {
   take_in(timed(set_duty(0.8F), in_ms(7000), "a"));
   for (std::size_t i = 0; i < CommandWindow::kMost + RobotSession::kMaxQueuedCommands; ++i) {
