@@ -90,7 +90,17 @@ Result<void> Station::check_request(const CommandRequest& request, const protoco
     return fail(ErrorCode::not_connected, fmt::format("robot '{}' is not connected", request.robot_id),
                 "not_connected");
   }
-  return check_command(wire, *seat.robot, envelope_, seat.orders_ahead());
+  // SAFETY: which setpoint is in force, or where the robot has come to, no hello says.
+  const bool is_shown = seat.next_sample_at_robot_us != seat.connected_at_robot_us;
+  const bool is_compared = seat.robot->context.mode == rheonaut_MODE_AUTO || seat.robot->sample;
+  if (setpoint_of(wire) && is_compared && !is_shown) {
+    return fail(ErrorCode::invalid,
+                fmt::format("robot '{}' has just connected, and what a step counts from is not known before its next "
+                            "telemetry",
+                            request.robot_id),
+                "step_too_large");
+  }
+  return check_command(wire, *seat.robot, envelope_, seat.orders_ahead(&wire));
 }
 
 const CommandRecord* Station::known_command(const RobotId& robot_id, CommandId id) const {
@@ -194,15 +204,18 @@ void Station::add_pending(Seat& seat, const std::shared_ptr<PendingCommand>& pen
   if (pending->is_stop()) seat.robot->pending_stop = pending->record.id;
 }
 
-// SAFETY: of the setpoints, and of the duties, that wait for the link only the newest is sent.
+bool is_superseded_by(const PendingCommand& older, const protocol::Command& newer) {
+  const auto kind = newer.which_action;
+  if (kind != rheonaut_Command_set_setpoint_tag && kind != rheonaut_Command_set_duty_tag) return false;
+  if (newer.has_execute_at_robot_us || older.wire.has_execute_at_robot_us) return false;  // each at its time
+  return older.record.state == CommandState::queued && older.wire.which_action == kind;
+}
+
+// SAFETY: an older setpoint, or duty, does not follow the newer one.
 void Station::supersede_queued(Seat& seat, const PendingCommand& newer) {
-  const auto kind = newer.wire.which_action;
-  if (kind != rheonaut_Command_set_setpoint_tag && kind != rheonaut_Command_set_duty_tag) return;
-  if (newer.wire.has_execute_at_robot_us) return;  // each at its time
   std::vector<CommandId> older;
   for (const auto& [id, pending] : seat.commands) {
-    const bool waits = pending->record.state == CommandState::queued && !pending->wire.has_execute_at_robot_us;
-    if (waits && pending->wire.which_action == kind && seat.port->withdraw(id)) older.push_back(id);
+    if (is_superseded_by(*pending, newer.wire) && seat.port->withdraw(id)) older.push_back(id);
   }
   for (const CommandId id : older) finish(seat, id, CommandState::superseded, "by_a_newer_command");
 }

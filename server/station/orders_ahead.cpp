@@ -12,6 +12,8 @@
 namespace server {
 namespace {
 
+// The lease of what waits, and what the station may know too late of the robot's time.
+constexpr std::uint64_t kDroppedAheadUs = protocol::kLeaseMs * 1000 + 200'000;
 constexpr auto kWayOut =
     "; what waits is dropped by set_mode manual, by the release of control, or when it is not renewed for 500 ms";
 
@@ -113,21 +115,46 @@ double at_power_ahead_s(const OrdersAhead& ahead, std::uint32_t tick_us, const C
   return sum_s;
 }
 
+// SAFETY: what is to be dropped may act before the drop arrives. Only the lease that all that wait have in common ends
+// it for certain, unless something that extends the lease is on its way, too.
+bool Seat::is_dropped_in_time(const PendingCommand& pending, std::uint64_t at_robot_us) const {
+  if (pending.dropped_because == nullptr) return false;
+  const bool is_renewed = std::ranges::any_of(commands, [](const auto& entry) {
+    const protocol::Command& wire = entry.second->wire;
+    return wire.which_action == rheonaut_Command_renew_lease_tag || wire.has_execute_at_robot_us;
+  });
+  return !is_renewed && at_robot_us > robot->latest_robot_time_us + kDroppedAheadUs;
+}
+
 // What has no answer has acted, if ever, by the end of its life; what has one at the time that the answer says.
-OrdersAhead Seat::orders_ahead() const {
+OrdersAhead Seat::orders_ahead(const protocol::Command* newer) const {
   OrdersAhead ahead;
   const std::uint64_t now_us = robot->latest_robot_time_us;
   const auto add = [this, &ahead](const PendingCommand& pending, OrderAhead order) {
     const bool is_shown = order.until_robot_us + robot->sample_period_us <= next_sample_at_robot_us;
-    if (!is_shown && pending.dropped_because == nullptr) ahead.push_back(order);
+    if (!is_shown && !is_dropped_in_time(pending, order.from_robot_us)) ahead.push_back(order);
   };
-  for (const auto& [id, pending] : commands) add(*pending, unanswered_order(pending->wire, now_us));
+  for (const auto& [id, pending] : commands) {
+    const bool is_taken_back = newer != nullptr && is_superseded_by(*pending, *newer);
+    if (!is_taken_back) add(*pending, unanswered_order(pending->wire, now_us));
+  }
   for (const auto& pending : unknown) add(*pending, unanswered_order(pending->wire, now_us));
   for (const auto& pending : unseen) {
     const std::uint64_t at_us = pending->look_from_robot_us;
-    add(*pending, {&pending->wire, at_us, at_us, at_us > now_us});
+    add(*pending, {&pending->wire, at_us, at_us, at_us > now_us && pending->dropped_because == nullptr});
   }
   return ahead;
+}
+
+bool Seat::begins_too_far_away(const CommandLimits& limits) const {
+  if (timed_by.empty() || robot->context.mode == rheonaut_MODE_AUTO || !robot->sample) return false;
+  OrdersAhead setpoints = orders_ahead();
+  std::erase_if(setpoints, [](const OrderAhead& order) {
+    return !order.command->has_execute_at_robot_us || !setpoint_of(*order.command);
+  });
+  const auto first = std::ranges::min_element(setpoints, {}, &OrderAhead::from_robot_us);
+  if (first == setpoints.end()) return false;
+  return is_too_large(std::abs(*setpoint_of(*first->command) - robot->sample->position_m), limits);
 }
 
 }  // namespace server

@@ -39,6 +39,9 @@ struct PendingCommand {
   Signal answered, ended;
 };
 
+// Of the setpoints, and of the duties, that wait for the link only the newest is sent.
+bool is_superseded_by(const PendingCommand& older, const protocol::Command& newer);
+
 struct Seat {
   RobotState* robot = nullptr;                                    // in Station::robots_
   RobotPort* port = nullptr;                                      // null while disconnected
@@ -71,8 +74,12 @@ struct Seat {
   std::size_t stops() const;
   std::shared_ptr<PendingCommand> on_its_way(CommandId id) const;  // of both; null when it is none of them
   void keep_unknown(std::shared_ptr<PendingCommand> ended);        // which has ended so
-  // What telemetry does not show yet, but what is being dropped. Points into the commands of this seat.
-  OrdersAhead orders_ahead() const;
+  // What telemetry does not show yet, but what the robot drops before its time, and what `newer`, when there is one,
+  // would take back. Points into the commands of this seat.
+  OrdersAhead orders_ahead(const protocol::Command* newer = nullptr) const;
+  bool is_dropped_in_time(const PendingCommand& pending, std::uint64_t at_robot_us) const;
+  // Whether the first setpoint that waits for its time is no longer within a step of where the robot has been driven.
+  bool begins_too_far_away(const CommandLimits& limits) const;
   // Those that are read back and that the robot may have run, also without an answer yet; in the order in which they
   // were sent.
   std::vector<std::shared_ptr<PendingCommand>> to_be_read_back() const;

@@ -309,7 +309,8 @@ void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) 
   for (StationSink* sink : sinks_) sink->on_samples(robot, batch);
   if (!seat->unseen.empty()) look_for_commands(*seat, batch);
   // SAFETY: by now every acknowledgement has come of what the robot dropped together; what is left was judged wrongly.
-  if (seat->has_lost_a_step) drop_timed(*seat);
+  if (seat->begins_too_far_away(envelope_.in(robot.fluid))) seat->drop_timed_because = "step_too_large";
+  if (seat->has_lost_a_step || seat->drop_timed_because != nullptr) drop_timed(*seat);
   if (!seat->commands.empty() || !seat->unknown.empty()) settle_by_samples(*seat, batch);
 }
 

@@ -30,6 +30,12 @@ class TimedLimitsTest : public TimedTest {
     robot->send(frame);
     clock.settle();
   }
+  void show_position(float position_m) {  // in manual
+    auto frame = TestRobot::samples_frame(next_seq_++, 1, robot->robot_now_us(), 0);
+    frame.body.telemetry.position_m[0] = position_m;
+    robot->send(frame);
+    clock.settle();
+  }
   CommandRequest now(protocol::Command command, microseconds life = 1s) const {
     CommandRequest request = request_of(command, life);
     request.actor = "a";
@@ -141,8 +147,10 @@ TEST_F(TimedLimitsTest, ItIsDroppedLaterWhenTheLinkWasFullAndNothingIsRenewedBef
     if (i == 5) submit(now(renewal));
   }
   const auto sent = kinds();
-  const auto drop = std::ranges::find(sent, std::string{"drop_timed"}) - sent.begin();
-  EXPECT_LT(drop, std::ranges::find(sent, std::string{"renew_lease"}) - sent.begin());
+  const auto drop = std::ranges::find(sent, std::string{"drop_timed"});
+  const auto renewed = std::ranges::find(sent, std::string{"renew_lease"});
+  ASSERT_NE(renewed, sent.end());
+  EXPECT_LT(drop - sent.begin(), renewed - sent.begin());
   EXPECT_EQ(drops(), 1U);
 }
 
@@ -157,6 +165,93 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheSetpointBeforeItWas) {
   robot->acknowledge(second, rheonaut_COMMAND_RESULT_EXPIRED);
   accept_last();
   EXPECT_EQ(latest(second.command_id).reason, "step_before_dropped");
+}
+
+TEST_F(TimedLimitsTest, ADropThatFoundNoRoomIsSentAsSoonAsThereIsSome) {
+  const auto first = take_in(timed(set_setpoint(0.25F), in_ms(1000), "a"));
+  take_in(timed(set_setpoint(0.5F), in_ms(2000), "a"));
+  for (std::size_t i = 0; i < CommandWindow::kMost + RobotSession::kMaxQueuedCommands; ++i) {
+    submit(ping(), 9s);
+    clock.settle();
+  }
+  clock.run_for(1s);
+  robot->acknowledge(first, rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_UNCERTAIN);
+  show_setpoint(0);
+  answer_all();
+  EXPECT_EQ(drops(), 0U) << "the queue was full";
+  show_setpoint(0);
+  EXPECT_EQ(drops(), 1U);
+}
+
+TEST_F(TimedLimitsTest, WhatIsToBeDroppedCountsWhereItMayHaveActedBefore) {
+  take_in(timed(set_setpoint(0.25F), in_ms(500), "a"));
+  take_in(timed(set_setpoint(0), in_ms(3000), "a"));
+  clock.run_for(510ms);
+  control(ControlAction::force, "b");
+  ASSERT_EQ(drops(), 1U);
+  CommandRequest next = now(set_setpoint(-0.25F));
+  next.actor = "b";
+  EXPECT_THAT(refusal(next), HasSubstr("from the setpoint 0.250 that waits")) << "its time has come";
+  show_setpoint(0);
+  EXPECT_EQ(refusal(next), "") << "telemetry of after that time shows that it has not acted";
+}
+
+TEST_F(TimedLimitsTest, WhatIsToBeDroppedCountsWhileTheLeaseMayBeExtended) {
+  take_in(timed(set_setpoint(0.25F), in_ms(3000), "a"));
+  protocol::Command renewal = rheonaut_Command_init_zero;
+  renewal.which_action = rheonaut_Command_renew_lease_tag;
+  submit(now(renewal));
+  clock.settle();
+  control(ControlAction::force, "b");
+  CommandRequest next = now(set_setpoint(-0.25F));
+  next.actor = "b";
+  EXPECT_THAT(refusal(next), HasSubstr("step_too_large"));
+  robot->acknowledge(robot->commands()[1], rheonaut_COMMAND_RESULT_ACCEPTED);
+  clock.settle();
+  EXPECT_EQ(refusal(next), "");
+}
+
+TEST_F(TimedLimitsTest, AfterAReconnectNoSetpointIsJudgedByWhatWasInForceBefore) {
+  take_in(timed(set_setpoint(0.25F), in_ms(100), "a"));
+  robot->link.cut();
+  clock.run_for(200ms);
+  come_back();
+  EXPECT_THAT(refusal(now(set_setpoint(-0.25F))), HasSubstr("not known before its next telemetry"));
+  show_setpoint(0.25F);
+  EXPECT_THAT(refusal(now(set_setpoint(-0.25F))), HasSubstr("from the setpoint 0.250"));
+  EXPECT_EQ(refusal(now(set_setpoint(0))), "");
+}
+
+TEST_F(TimedLimitsTest, OneThatANewerOneTakesBackDoesNotHinderIt) {
+  fill_window();
+  EXPECT_EQ(refusal(now(set_setpoint(0.25F), 9s)), "");
+  submit(now(set_setpoint(-0.25F), 9s));
+  answer_all();
+  EXPECT_EQ(robot->commands().back().action.set_setpoint.setpoint_m, -0.25F);
+  EXPECT_EQ(robot->commands().size(), CommandWindow::kMost + 1U);
+}
+
+// Driven in manual until the time of set_mode auto comes.
+TEST_F(TimedLimitsTest, ItIsDroppedWhenTheRobotHasBeenDrivenMoreThanAStepAway) {
+  show_position(0);
+  protocol::Command automatic = rheonaut_Command_init_zero;
+  automatic.which_action = rheonaut_Command_set_mode_tag;
+  automatic.action.set_mode.mode = rheonaut_MODE_AUTO;
+  automatic.action.set_mode.has_setpoint_m = true;
+  automatic.action.set_mode.setpoint_m = 0.2F;
+  const auto first = take_in(timed(automatic, in_ms(5000), "a"));
+  take_in(timed(set_setpoint(0.4F), in_ms(6000), "a"));
+  clock.run_for(1s);
+  show_position(-0.05F);
+  EXPECT_EQ(drops(), 0U) << "just the limit; and only the first counts from the position";
+  show_position(-0.06F);
+  EXPECT_EQ(drops(), 1U);
+  robot->acknowledge(first, rheonaut_COMMAND_RESULT_EXPIRED);
+  accept_last();
+  EXPECT_EQ(latest(first.command_id).state, CommandState::expired);
+  EXPECT_EQ(latest(first.command_id).reason, "step_too_large");
+  show_position(-0.07F);
+  EXPECT_EQ(drops(), 1U) << "nothing waits any more";
 }
 
 TEST_F(TimedLimitsTest, NothingIsDroppedAgainThatTheRobotDroppedTogether) {
