@@ -21,7 +21,6 @@ class CommandWindow {
   // An answer that has not come so long after the end of the command's validity never comes, and holds its place no
   // longer.
   static constexpr std::int64_t kAnswerGraceUs = 1'000'000;
-  static constexpr std::uint64_t kDueGraceUs = 200'000;  // so long after its time a command has run or is dropped
 
   bool has_room(const protocol::Command& command, std::int64_t now_us) {
     std::erase_if(written_, [now_us](const Written& one) { return now_us >= one.deadline_us + kAnswerGraceUs; });
@@ -43,10 +42,12 @@ class CommandWindow {
   void ended(CommandId id) {
     std::erase_if(written_, [id](const Written& one) { return one.id == id; });
   }
-  // By a frame that robots send after every acknowledgement that is due.
-  void robot_time_is(std::uint64_t robot_time_us) {
-    std::erase_if(written_,
-                  [robot_time_us](const Written& one) { return robot_time_us > one.due_robot_us + kDueGraceUs; });
+  // By a frame that robots send after every acknowledgement that is due. Two ticks after its time a command has run, or
+  // was dropped.
+  void robot_time_is(std::uint64_t robot_time_us, std::uint32_t tick_us) {
+    std::erase_if(written_, [robot_time_us, tick_us](const Written& one) {
+      return robot_time_us > one.due_robot_us && robot_time_us - one.due_robot_us > std::uint64_t{2} * tick_us;
+    });
   }
 
  private:
@@ -54,7 +55,7 @@ class CommandWindow {
     CommandId id;
     std::int64_t deadline_us;
     std::size_t places;
-    std::uint64_t due_robot_us = std::numeric_limits<std::uint64_t>::max() - kDueGraceUs;  // once it waits there
+    std::uint64_t due_robot_us = std::numeric_limits<std::uint64_t>::max();  // once it waits there
   };
   static std::size_t places(const protocol::Command& command) { return command.has_execute_at_robot_us ? 2 : 1; }
 

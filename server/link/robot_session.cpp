@@ -253,7 +253,9 @@ void RobotSession::on_frame(protocol::RobotFrame& frame) {
   station_.on_frame(*this, frame.robot_time_us);
   if (faults.count > 0) station_.on_invalid_values(*this, faults.count, faults.cause, faults.first);
   if (faults.is_unusable) return faults.has_number ? give_up(frame) : void();
-  if (frame.which_body != rheonaut_RobotFrame_command_ack_tag) window_.robot_time_is(frame.robot_time_us);
+  if (frame.which_body != rheonaut_RobotFrame_command_ack_tag) {
+    window_.robot_time_is(frame.robot_time_us, hello_->sample_period_us);
+  }
   switch (frame.which_body) {
     case rheonaut_RobotFrame_telemetry_tag: station_.on_samples(*this, frame.body.telemetry); break;
     case rheonaut_RobotFrame_event_tag:

@@ -49,6 +49,8 @@ void Station::on_command_ack(RobotPort& port, const protocol::CommandAck& ack) {
   // One that came too late is sent again; a firmware that does not know the command will not know it then.
   const bool is_late = ack.result == rheonaut_COMMAND_RESULT_EXPIRED;
   if (ack.command_id == seat->drop_timed_id && !is_late) seat->drop_timed_id = 0;
+  const bool is_refused = ack.result == rheonaut_COMMAND_RESULT_REJECTED || is_late;
+  if (is_refused) seat->drop_schedule(ack.command_id);
   const auto entry = seat->commands.find(ack.command_id);
   const auto pending = entry == seat->commands.end() ? reopen(*seat, ack.command_id) : entry->second;
   if (pending == nullptr) return end_dropped(*seat, ack);
@@ -88,6 +90,7 @@ void Station::acknowledge(Seat& seat, CommandId id, std::string reason) {
   // What was answered before, now again, says no time.
   const bool has_time = record.effect_at_robot_us != 0;
   pending->look_from_robot_us = has_time ? record.effect_at_robot_us : seat.robot->latest_robot_time_us;
+  seat.note_accepted(pending);
   if (is_for_the_motor(pending->wire)) {
     for (const auto& other : seat.unseen) {  // a timed one may come later than one that was acknowledged after it
       const bool is_older = other->look_from_robot_us <= pending->look_from_robot_us;

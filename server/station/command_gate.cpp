@@ -15,13 +15,13 @@ Result<void> within(const char* name, double value, double minimum, double maxim
 }
 
 // SAFETY: the motor runs at power no longer than the limit, also when each command alone is within it. What waits for
-// its time counts too, ahead_s.
+// its time or still runs counts too, ahead_s.
 Result<void> check_power(double duty, double lasts_s, double ahead_s, const RobotState& robot,
                          const CommandLimits& limits) {
   const bool is_at_power = std::abs(duty) > limits.power_duty;
   if (!is_at_power || robot.at_power_s + ahead_s + lasts_s <= limits.power_s) return {};
   const std::string waits =
-      ahead_s == 0 ? "" : fmt::format(", and what waits for its time asks for {:.1f} s more", ahead_s);
+      ahead_s == 0 ? "" : fmt::format(", and what runs or waits for its time asks for {:.1f} s more", ahead_s);
   return fail(ErrorCode::conflict,
               fmt::format("duty = {} is above {}, where robot '{}' has run for {:.1f} s{}; the limit is {} s, and the "
                           "time goes down again below that duty",
@@ -40,6 +40,19 @@ Result<void> check_schedule(const protocol::Command& command, double ahead_s, co
     if (i + 1 < schedule.duty_count) highest = std::max(highest, std::abs(duty));
   }
   return check_power(highest, at_power_s(command, robot.sample_period_us, limits), ahead_s, robot, limits);
+}
+
+// SAFETY: what runs or waits is extended only while it fits in the time at power. What has begun may be counted twice
+// for a tick or two.
+Result<void> check_renewal(double ahead_s, const RobotState& robot, const CommandLimits& limits) {
+  const double twice_s = 2e-6 * robot.sample_period_us;
+  if (ahead_s <= twice_s || robot.at_power_s + ahead_s <= limits.power_s + twice_s) return {};
+  return fail(
+      ErrorCode::conflict,
+      fmt::format("robot '{}' has run for {:.1f} s above a duty of {}, and what runs or waits for its time asks "
+                  "for {:.1f} s more; the limit is {} s",
+                  robot.id, robot.at_power_s, limits.power_duty, ahead_s, limits.power_s),
+      "too_long_at_power");
 }
 
 Result<void> check_values(const protocol::Command& command, const OrdersAhead& ahead, const RobotState& robot,
@@ -71,7 +84,8 @@ Result<void> check_values(const protocol::Command& command, const OrdersAhead& a
     }
     case rheonaut_Command_renew_lease_tag: {
       auto checked = within("lease_ms", command.action.renew_lease.lease_ms, 0, protocol::kLeaseMs);
-      return checked && robot.sample ? check_power(robot.sample->duty, 0, 0, robot, limits) : checked;
+      if (checked && robot.sample) checked = check_power(robot.sample->duty, 0, 0, robot, limits);
+      return checked ? check_renewal(ahead_s, robot, limits) : checked;
     }
     case rheonaut_Command_set_duty_schedule_tag: return check_schedule(command, ahead_s, robot, limits);
     case rheonaut_Command_set_controller_tag: {

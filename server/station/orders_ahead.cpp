@@ -14,8 +14,13 @@ namespace {
 
 // The lease of what waits, and what the station may know too late of the robot's time.
 constexpr std::uint64_t kDroppedAheadUs = protocol::kLeaseMs * 1000 + 200'000;
+constexpr std::size_t kMaxSchedules = 64;
 constexpr auto kWayOut =
     "; what waits is dropped by set_mode manual, by the release of control, or when it is not renewed for 500 ms";
+
+bool is_schedule(const protocol::Command& command) {
+  return command.which_action == rheonaut_Command_set_duty_schedule_tag;
+}
 
 // Setpoints are floats on the way: a step of just the limit is one.
 bool is_too_large(double step_m, const CommandLimits& limits) {
@@ -90,27 +95,36 @@ Result<void> check_steps(const protocol::Command& command, const OrdersAhead& ah
   return {};
 }
 
-double at_power_s(const protocol::Command& command, std::uint32_t tick_us, const CommandLimits& limits) {
+std::uint64_t schedule_length_us(const protocol::Command& command, std::uint32_t tick_us) {
+  if (!is_schedule(command) || command.action.set_duty_schedule.tick_count == 0) return 0;
+  const auto& schedule = command.action.set_duty_schedule;
+  return std::uint64_t{schedule.tick[schedule.tick_count - 1]} * tick_us;
+}
+
+double at_power_s(const protocol::Command& command, std::uint32_t tick_us, const CommandLimits& limits,
+                  std::uint64_t sampled_us) {
   const auto is_at_power = [&limits](double duty) { return std::abs(duty) > limits.power_duty; };
   if (command.which_action == rheonaut_Command_set_duty_tag) {
     const auto& order = command.action.set_duty;
     const std::uint32_t lease_ms = order.lease_ms == 0 ? protocol::kLeaseMs : order.lease_ms;
     return is_at_power(order.duty) ? lease_ms / 1e3 : 0;
   }
-  if (command.which_action != rheonaut_Command_set_duty_schedule_tag) return 0;
+  if (!is_schedule(command)) return 0;
   const auto& schedule = command.action.set_duty_schedule;
-  double sum_s = 0;  // the last duty ends it
+  std::uint64_t sum_us = 0;  // the last duty ends it
   for (pb_size_t i = 0; i + 1 < std::min(schedule.duty_count, schedule.tick_count); ++i) {
-    if (is_at_power(schedule.duty[i]))
-      sum_s += (static_cast<double>(schedule.tick[i + 1]) - schedule.tick[i]) * tick_us;
+    const std::uint64_t from_us = std::max(std::uint64_t{schedule.tick[i]} * tick_us, sampled_us);
+    const std::uint64_t until_us = std::uint64_t{schedule.tick[i + 1]} * tick_us;
+    if (is_at_power(schedule.duty[i]) && from_us < until_us) sum_us += until_us - from_us;
   }
-  return sum_s / 1e6;
+  return static_cast<double>(sum_us) / 1e6;
 }
 
 double at_power_ahead_s(const OrdersAhead& ahead, std::uint32_t tick_us, const CommandLimits& limits) {
   double sum_s = 0;
   for (const OrderAhead& order : ahead) {
-    if (order.command->has_execute_at_robot_us) sum_s += at_power_s(*order.command, tick_us, limits);
+    if (!order.command->has_execute_at_robot_us && !is_schedule(*order.command)) continue;
+    sum_s += at_power_s(*order.command, tick_us, limits, order.sampled_us);
   }
   return sum_s;
 }
@@ -126,24 +140,79 @@ bool Seat::is_dropped_in_time(const PendingCommand& pending, std::uint64_t at_ro
   return !is_renewed && at_robot_us > robot->latest_robot_time_us + kDroppedAheadUs;
 }
 
+namespace {
+
+bool is_accepted_schedule(const PendingCommand& pending) {  // which stands in Seat::schedules until it has ended
+  return is_schedule(pending.wire) && pending.record.acknowledged_after_us >= 0;
+}
+
+}  // namespace
+
 // What has no answer has acted, if ever, by the end of its life; what has one at the time that the answer says.
 OrdersAhead Seat::orders_ahead(const protocol::Command* newer) const {
   OrdersAhead ahead;
   const std::uint64_t now_us = robot->latest_robot_time_us;
+  const std::uint32_t tick_us = robot->sample_period_us;
   const auto add = [this, &ahead](const PendingCommand& pending, OrderAhead order) {
     const bool is_shown = order.until_robot_us + robot->sample_period_us <= next_sample_at_robot_us;
     if (!is_shown && !is_dropped_in_time(pending, order.from_robot_us)) ahead.push_back(order);
   };
+  const auto add_unanswered = [&add, now_us, tick_us](const PendingCommand& pending) {
+    OrderAhead order = unanswered_order(pending.wire, now_us);
+    order.until_robot_us += schedule_length_us(pending.wire, tick_us);
+    add(pending, order);
+  };
+  for (const AcceptedSchedule& one : schedules) {
+    const std::uint64_t from_us = one.pending->look_from_robot_us;
+    const std::uint64_t sampled_us = next_sample_at_robot_us - std::min(from_us, next_sample_at_robot_us);
+    add(*one.pending, {&one.pending->wire, from_us, one.until_robot_us, false, sampled_us});
+  }
   for (const auto& [id, pending] : commands) {
     const bool is_taken_back = newer != nullptr && is_superseded_by(*pending, *newer);
-    if (!is_taken_back) add(*pending, unanswered_order(pending->wire, now_us));
+    if (!is_taken_back) add_unanswered(*pending);
   }
-  for (const auto& pending : unknown) add(*pending, unanswered_order(pending->wire, now_us));
+  for (const auto& pending : unknown) {
+    if (!is_accepted_schedule(*pending)) add_unanswered(*pending);
+  }
   for (const auto& pending : unseen) {
+    if (is_accepted_schedule(*pending)) continue;
     const std::uint64_t at_us = pending->look_from_robot_us;
     add(*pending, {&pending->wire, at_us, at_us, at_us > now_us && pending->dropped_because == nullptr});
   }
   return ahead;
+}
+
+void Seat::note_accepted(const std::shared_ptr<PendingCommand>& accepted) {
+  const protocol::Command& wire = accepted->wire;
+  const bool is_for_now = !wire.has_execute_at_robot_us && accepted->record.effect_at_robot_us != 0;
+  const bool ends_schedule = wire.which_action == rheonaut_Command_set_duty_tag ||
+                             wire.which_action == rheonaut_Command_set_mode_tag || is_schedule(wire);
+  if (is_for_now && ends_schedule) end_schedules(accepted->look_from_robot_us);
+  if (!is_schedule(wire)) return;
+  drop_schedule(accepted->record.id);
+  if (schedules.size() >= kMaxSchedules) schedules.pop_front();
+  const std::uint64_t length_us = schedule_length_us(wire, robot->sample_period_us);
+  schedules.push_back({accepted, accepted->look_from_robot_us + length_us});
+}
+
+void Seat::end_schedules(std::uint64_t at_robot_us) {
+  std::erase_if(schedules,
+                [at_robot_us](const AcceptedSchedule& one) { return one.pending->look_from_robot_us < at_robot_us; });
+}
+
+void Seat::note_event(const protocol::Event& event) {
+  switch (event.kind) {
+    case rheonaut_EVENT_KIND_MODE_CHANGED:
+    case rheonaut_EVENT_KIND_EMERGENCY:
+    case rheonaut_EVENT_KIND_LINK_LOST:
+    case rheonaut_EVENT_KIND_LEASE_LAPSED:
+    case rheonaut_EVENT_KIND_DUTY_SCHEDULE_ENDED: return end_schedules(event.event_robot_time_us);
+    default: return;
+  }
+}
+
+void Seat::drop_schedule(CommandId id) {
+  std::erase_if(schedules, [id](const AcceptedSchedule& one) { return one.pending->record.id == id; });
 }
 
 bool Seat::begins_too_far_away(const CommandLimits& limits) const {

@@ -16,6 +16,7 @@ struct OrderAhead {
   const protocol::Command* command = nullptr;
   std::uint64_t from_robot_us = 0, until_robot_us = 0;  // it acts between these times, or never
   bool is_held = false;  // the robot has acknowledged it, and its time, which is from_robot_us, is still to come
+  std::uint64_t sampled_us = 0;  // of a schedule that runs: samples show it so far, and until_robot_us is its end
 };
 using OrdersAhead = std::vector<OrderAhead>;
 
@@ -30,11 +31,15 @@ OrderAhead unanswered_order(const protocol::Command& command, std::uint64_t robo
 Result<void> check_steps(const protocol::Command& command, const OrdersAhead& ahead, const RobotState& robot,
                          const CommandLimits& limits);
 
-// How long the motor runs at power by this command alone: a duty for its lease, a schedule for the entries above the
-// limit.
-double at_power_s(const protocol::Command& command, std::uint32_t tick_us, const CommandLimits& limits);
+// From its effect on; 0 for anything but a schedule.
+std::uint64_t schedule_length_us(const protocol::Command& command, std::uint32_t tick_us);
 
-// The same, of all that is to act at a time of its own.
+// How long the motor runs at power by this command alone: a duty for its lease, a schedule for the entries above the
+// limit that come after `sampled_us` of it.
+double at_power_s(const protocol::Command& command, std::uint32_t tick_us, const CommandLimits& limits,
+                  std::uint64_t sampled_us = 0);
+
+// The same, of all that is to act at a time of its own, and of every schedule, as far as it is still to run.
 double at_power_ahead_s(const OrdersAhead& ahead, std::uint32_t tick_us, const CommandLimits& limits);
 
 }  // namespace server

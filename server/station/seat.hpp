@@ -42,6 +42,12 @@ struct PendingCommand {
 // Of the setpoints, and of the duties, that wait for the link only the newest is sent.
 bool is_superseded_by(const PendingCommand& older, const protocol::Command& newer);
 
+// A schedule that the robot has accepted, at the time look_from_robot_us, until it has ended.
+struct AcceptedSchedule {
+  std::shared_ptr<PendingCommand> pending;
+  std::uint64_t until_robot_us = 0;
+};
+
 struct Seat {
   RobotState* robot = nullptr;                                    // in Station::robots_
   RobotPort* port = nullptr;                                      // null while disconnected
@@ -49,6 +55,7 @@ struct Seat {
   std::deque<std::shared_ptr<PendingCommand>> unseen;             // acknowledged, to be seen in telemetry; oldest first
   std::deque<std::shared_ptr<PendingCommand>> unread;             // acknowledged, to be read back; oldest first
   std::deque<std::shared_ptr<PendingCommand>> unknown;            // of this boot, ended in this state; oldest first
+  std::deque<AcceptedSchedule> schedules;                         // for the time at power; oldest first
   RobotSettings settings;                                         // as the robot said last
   std::set<std::string> told_in_force;                            // kinds that the robot has said in the connection
   std::uint64_t connected_at_robot_us = 0;                        // by its hello
@@ -77,6 +84,12 @@ struct Seat {
   // What telemetry does not show yet, but what the robot drops before its time, and what `newer`, when there is one,
   // would take back. Points into the commands of this seat.
   OrdersAhead orders_ahead(const protocol::Command* newer = nullptr) const;
+  // What begins and ends the schedules: an acknowledgement, an event, a drop. Those that have begun before the time
+  // end.
+  void note_accepted(const std::shared_ptr<PendingCommand>& accepted);
+  void note_event(const protocol::Event& event);
+  void end_schedules(std::uint64_t at_robot_us);
+  void drop_schedule(CommandId id);
   bool is_dropped_in_time(const PendingCommand& pending, std::uint64_t at_robot_us) const;
   // Whether the first setpoint that waits for its time is no longer within a step of where the robot has been driven.
   bool begins_too_far_away(const CommandLimits& limits) const;

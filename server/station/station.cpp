@@ -161,6 +161,7 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
     robot.clock = ClockEstimate{};
     seat.clock_sync = ClockSync{};
     seat.clock_recorded = ClockRecord{};
+    seat.schedules.clear();
     seat.unknown.clear();  // what the boot before knew of them is gone
     seat.timed_by.clear();
     seat.timed_until_robot_us = seat.drop_timed_id = 0;
@@ -303,6 +304,8 @@ void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) 
     count_power(robot, batch);
     robot.next_seq = batch.next_seq();
     seat->next_sample_at_robot_us = batch.first_robot_time_us + batch.samples.size() * telemetry.period_us;
+    std::erase_if(seat->schedules,
+                  [seat](const AcceptedSchedule& one) { return one.until_robot_us <= seat->next_sample_at_robot_us; });
     if (new_controller) publish(robot);
   }
   robot.oldest_seq = std::max(robot.oldest_seq, batch.oldest_seq);
@@ -352,6 +355,7 @@ void Station::on_event(RobotPort& port, const protocol::Event& event) {
   out.command_id = event.command_id;
   out.received_at_us = robot.last_received_at_us;
   for (StationSink* sink : sinks_) sink->on_event(robot, out);
+  seat->note_event(event);
   settle_by_event(*seat, event);
 }
 

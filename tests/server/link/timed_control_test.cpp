@@ -289,6 +289,24 @@ TEST_F(TimedControlTest, KeepsAPlaceOfTheAcknowledgementsUntilItsEnd) {
   EXPECT_EQ(robot->commands().size(), 4U + 6U) << "their time has passed, and no word came of them";
 }
 
+TEST_F(TimedControlTest, FreesItsPlaceTwoTicksAfterItsTime) {
+  const std::uint64_t at_us = in_ms(500);
+  for (int i = 0; i < 4; ++i) take_in(timed(set_duty(0.25F), at_us, "a"));
+  for (int i = 0; i < 6; ++i) submit(ping(), 8s);
+  clock.settle();
+  ASSERT_EQ(robot->commands().size(), 4U + 2U);
+  clock.run_for(525ms);
+  auto frame = TestRobot::samples_frame(0, 1, at_us, 0);
+  frame.robot_time_us = at_us + 20'000;
+  robot->send(frame);
+  clock.settle();
+  EXPECT_EQ(robot->commands().size(), 4U + 2U);
+  frame.robot_time_us = at_us + 20'001;
+  robot->send(frame);
+  clock.settle();
+  EXPECT_EQ(robot->commands().size(), 4U + 6U);
+}
+
 TEST_F(TimedControlTest, TakesTwoPlacesUntilTheRobotHasTakenItIn) {
   for (int i = 0; i < 4; ++i) submit(timed(set_duty(0.25F), in_ms(5000), "a"));
   clock.settle();

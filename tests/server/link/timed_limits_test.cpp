@@ -9,7 +9,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Steps of 0.25 m, in auto at 0; in water a duty of 0.5 at most.
+// Steps of 0.25 m, in auto at 0; in water a duty of 0.5 at most, in oil 10 s at power.
 class TimedLimitsTest : public TimedTest {
  protected:
   TimedLimitsTest() : TimedTest{envelope()} {
@@ -17,16 +17,42 @@ class TimedLimitsTest : public TimedTest {
     show_setpoint(0);
   }
   static Envelope envelope() {
-    CommandLimits limits, water;
+    CommandLimits limits, water, oil;
     limits.setpoint_step_m = water.setpoint_step_m = 0.25;
     water.duty_max = 0.5;
-    return Envelope{limits, {{"water", water}}};
+    oil.power_s = 10;
+    return Envelope{limits, {{"water", water}, {"oil", oil}}};
   }
   void show_setpoint(float setpoint_m) {
     auto frame = TestRobot::samples_frame(next_seq_++, 1, robot->robot_now_us(), 0);
     frame.body.telemetry.mode = rheonaut_MODE_AUTO;
     frame.body.telemetry.has_setpoint_m = true;
     frame.body.telemetry.setpoint_m = setpoint_m;
+    robot->send(frame);
+    clock.settle();
+  }
+  static protocol::Command at_power(std::uint32_t lasts_s) {
+    protocol::Command command = rheonaut_Command_init_zero;
+    command.which_action = rheonaut_Command_set_duty_schedule_tag;
+    auto& schedule = command.action.set_duty_schedule;
+    schedule.tick_count = schedule.duty_count = 2;
+    schedule.tick[1] = lasts_s * 100;
+    schedule.duty[0] = 1;
+    return command;
+  }
+  void show_a_second_at_power(std::uint64_t from_us) {
+    for (std::uint64_t shown = 0; shown < 100; shown += 5, next_seq_ += 5) {
+      auto frame = TestRobot::samples_frame(next_seq_, 5, from_us + shown * 10'000, 0);
+      for (float& duty : frame.body.telemetry.duty) duty = 1;
+      robot->send(frame);
+      clock.settle();
+    }
+  }
+  void tell(protocol::EventKind kind) {
+    protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
+    frame.which_body = rheonaut_RobotFrame_event_tag;
+    frame.body.event.kind = kind;
+    frame.body.event.event_robot_time_us = robot->robot_now_us();
     robot->send(frame);
     clock.settle();
   }
@@ -252,6 +278,50 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheRobotHasBeenDrivenMoreThanAStepAway) {
   EXPECT_EQ(latest(first.command_id).reason, "step_too_large");
   show_position(-0.07F);
   EXPECT_EQ(drops(), 1U) << "nothing waits any more";
+}
+
+TEST_F(TimedLimitsTest, AScheduleThatRunsCountsForTheTimeAtPowerUntilItEnds) {
+  ASSERT_TRUE(station.set_fluid("r1", "oil", {"a", "", 0}));
+  const auto next = [this] { return timed(at_power(2), in_ms(5000), "a"); };
+  EXPECT_EQ(refusal(now(at_power(9))), "");
+  EXPECT_THAT(refusal(next()), HasSubstr("asks for 9.0 s more")) << "it may run";
+  accept_last();
+  EXPECT_THAT(refusal(next()), HasSubstr("asks for 9.0 s more"));
+  clock.run_for(20ms);
+  tell(rheonaut_EVENT_KIND_SETPOINT_CHANGED);
+  EXPECT_THAT(refusal(next()), HasSubstr("too_long_at_power"));
+  tell(rheonaut_EVENT_KIND_LEASE_LAPSED);
+  EXPECT_EQ(refusal(next()), "");
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_BUSY);
+  clock.settle();
+
+  EXPECT_EQ(refusal(now(at_power(9))), "");
+  accept_last();
+  clock.run_for(20ms);
+  EXPECT_EQ(refusal(now(set_duty(0))), "");
+  accept_last();
+  EXPECT_EQ(refusal(next()), "") << "a command for now has ended it";
+}
+
+TEST_F(TimedLimitsTest, AScheduleThatHasBegunAtItsTimeCountsByWhatIsLeft) {
+  ASSERT_TRUE(station.set_fluid("r1", "oil", {"a", "", 0}));
+  const auto sent = take_in(timed(at_power(9), in_ms(100), "a"));
+  EXPECT_THAT(refusal(timed(at_power(2), in_ms(5000), "a")), HasSubstr("asks for 9.0 s more"));
+  clock.run_for(1100ms);
+  show_a_second_at_power(sent.execute_at_robot_us);
+  EXPECT_EQ(latest(sent.command_id).state, CommandState::verified);
+  EXPECT_THAT(refusal(timed(at_power(2), in_ms(5000), "a")), HasSubstr("run for 1.0 s, and what runs or waits for its "
+                                                                       "time asks for 8.0 s more"));
+  EXPECT_EQ(refusal(timed(at_power(1), in_ms(5000), "a")), "");
+}
+
+TEST_F(TimedLimitsTest, ADroppedScheduleCountsNoMore) {
+  ASSERT_TRUE(station.set_fluid("r1", "oil", {"a", "", 0}));
+  const auto sent = take_in(timed(at_power(9), in_ms(5000), "a"));
+  EXPECT_THAT(refusal(now(at_power(2))), HasSubstr("too_long_at_power"));
+  robot->acknowledge(sent, rheonaut_COMMAND_RESULT_EXPIRED);
+  clock.settle();
+  EXPECT_EQ(refusal(now(at_power(2))), "");
 }
 
 TEST_F(TimedLimitsTest, NothingIsDroppedAgainThatTheRobotDroppedTogether) {

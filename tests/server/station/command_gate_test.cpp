@@ -184,13 +184,26 @@ TEST_F(CommandGateTest, WhatWaitsCountsForTheTimeAtPower) {
   EXPECT_EQ(refusal(schedule({{0, 1}, {1960, 0}})), "") << "40 s, 0.4 s and 19.6 s";
   EXPECT_THAT(
       refusal(schedule({{0, 1}, {1961, 0}})),
-      HasSubstr("too_long_at_power: duty = 1 is above 0.9, where robot 'nemo' has run for 0.0 s, and what waits "
-                "for its time asks for 40.4 s more; the limit is 60 s"));
+      HasSubstr("too_long_at_power: duty = 1 is above 0.9, where robot 'nemo' has run for 0.0 s, and what runs or "
+                "waits for its time asks for 40.4 s more; the limit is 60 s"));
   robot.at_power_s = 19.7;
   EXPECT_THAT(refusal(duty(1)), HasSubstr("too_long_at_power"));
   EXPECT_EQ(refusal(duty(0.5F)), "");
+  EXPECT_THAT(
+      refusal(renewal()),
+      HasSubstr("too_long_at_power: robot 'nemo' has run for 19.7 s above a duty of 0.9, and what runs or waits"));
+  robot.at_power_s = 19.6;
   robot.sample->duty = 1;
-  EXPECT_EQ(refusal(renewal()), "") << "what runs is held to what has run";
+  EXPECT_EQ(refusal(renewal()), "");
+}
+
+TEST_F(CommandGateTest, WhatRunsCountsForTheTimeAtPowerAsFarAsItIsNotSampled) {
+  auto running = schedule({{0, 1}, {4000, 0.5F}, {5000, 1}, {6000, 0}});
+  ahead = {{&running, 1, 60'000'001, false, 39'000'000}};
+  robot.at_power_s = 39;
+  EXPECT_EQ(refusal(renewal()), "");
+  EXPECT_EQ(refusal(schedule({{0, 1}, {1000, 0}})), "") << "39 s, 1 s and 10 s, and 10 s";
+  EXPECT_THAT(refusal(schedule({{0, 1}, {1001, 0}})), HasSubstr("asks for 11.0 s more"));
 }
 
 TEST_F(CommandGateTest, TheMotorIsNotCommandedBeyondItsTimeAtPower) {
