@@ -55,6 +55,12 @@ Result<void> check_renewal(double ahead_s, const RobotState& robot, const Comman
       "too_long_at_power");
 }
 
+// SAFETY: a duty that runs since the limits were wider is not kept running. Duties are floats on the way.
+Result<void> check_running_duty(const RobotState& robot, const CommandLimits& limits) {
+  if (robot.context.mode != rheonaut_MODE_MANUAL) return {};
+  return within("the running duty", robot.sample->duty, limits.duty_min - 1e-6, limits.duty_max + 1e-6);
+}
+
 Result<void> check_values(const protocol::Command& command, const OrdersAhead& ahead, const RobotState& robot,
                           const CommandLimits& limits) {
   const double ahead_s = at_power_ahead_s(ahead, robot.sample_period_us, limits);
@@ -84,6 +90,7 @@ Result<void> check_values(const protocol::Command& command, const OrdersAhead& a
     }
     case rheonaut_Command_renew_lease_tag: {
       auto checked = within("lease_ms", command.action.renew_lease.lease_ms, 0, protocol::kLeaseMs);
+      if (checked && robot.sample) checked = check_running_duty(robot, limits);
       if (checked && robot.sample) checked = check_power(robot.sample->duty, 0, 0, robot, limits);
       return checked ? check_renewal(ahead_s, robot, limits) : checked;
     }

@@ -235,6 +235,17 @@ TEST_F(CommandGateTest, AFluidHasItsOwnLimits) {
   EXPECT_THAT(refusal(duty(0.9F)), HasSubstr("is outside -1 to 0.8 (limits of the fluid 'oil')"));
 }
 
+TEST_F(CommandGateTest, ADutyBeyondTheLimitsOfAFluidThatWasNamedSinceIsNotRenewed) {
+  robot.context.mode = rheonaut_MODE_MANUAL;
+  robot.sample = Sample{.duty = 0.8F};
+  robot.fluid = "oil";
+  EXPECT_EQ(refusal(renewal()), "");
+  robot.fluid = "water";
+  EXPECT_THAT(refusal(renewal()), HasSubstr("out_of_range"));
+  robot.context.mode = rheonaut_MODE_AUTO;
+  EXPECT_EQ(refusal(renewal()), "") << "there its controller has the range";
+}
+
 TEST_F(CommandGateTest, WhereTheFluidIsNotKnownTheStrictestOfAllLimitsHold) {
   for (const char* unknown : {"", "blood", "Water"}) {
     robot.fluid = unknown;
