@@ -169,7 +169,7 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
   }
   if (request.takes_control)
     use_control(request);  // SAFETY: what was refused, also by a full queue, or came too late, takes no control
-  pending->is_by_holder = authority_.of(request.robot_id).holder == request.actor;
+  pending->is_by_holder = request.takes_control && authority_.of(request.robot_id).holder == request.actor;
   if (pending->wire.has_execute_at_robot_us) {
     seat.timed_by = request.actor;
     seat.timed_until_robot_us = std::max(seat.timed_until_robot_us, pending->wire.execute_at_robot_us);

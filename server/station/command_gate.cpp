@@ -61,6 +61,22 @@ Result<void> check_running_duty(const RobotState& robot, const CommandLimits& li
   return within("the running duty", robot.sample->duty, limits.duty_min - 1e-6, limits.duty_max + 1e-6);
 }
 
+// SAFETY: nor is a schedule that was accepted under wider ones, as far as it is still to run.
+Result<void> check_running_schedules(const OrdersAhead& ahead, const RobotState& robot, const CommandLimits& limits) {
+  for (const OrderAhead& order : ahead) {
+    if (order.command->which_action != rheonaut_Command_set_duty_schedule_tag) continue;
+    const auto& schedule = order.command->action.set_duty_schedule;
+    for (pb_size_t i = 0; i < schedule.duty_count; ++i) {
+      const bool is_last = i + 1 >= std::min(schedule.duty_count, schedule.tick_count);
+      const bool is_over = !is_last && std::uint64_t{schedule.tick[i + 1]} * robot.sample_period_us <= order.sampled_us;
+      if (is_over) continue;
+      auto checked = within("a duty of the schedule that runs", schedule.duty[i], limits.duty_min, limits.duty_max);
+      if (!checked) return checked;
+    }
+  }
+  return {};
+}
+
 Result<void> check_values(const protocol::Command& command, const OrdersAhead& ahead, const RobotState& robot,
                           const CommandLimits& limits) {
   const double ahead_s = at_power_ahead_s(ahead, robot.sample_period_us, limits);
@@ -91,6 +107,7 @@ Result<void> check_values(const protocol::Command& command, const OrdersAhead& a
     case rheonaut_Command_renew_lease_tag: {
       auto checked = within("lease_ms", command.action.renew_lease.lease_ms, 0, protocol::kLeaseMs);
       if (checked && robot.sample) checked = check_running_duty(robot, limits);
+      if (checked) checked = check_running_schedules(ahead, robot, limits);
       if (checked && robot.sample) checked = check_power(robot.sample->duty, 0, 0, robot, limits);
       return checked ? check_renewal(ahead_s, robot, limits) : checked;
     }

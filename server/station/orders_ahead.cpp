@@ -148,6 +148,13 @@ bool is_accepted_schedule(const PendingCommand& pending) {  // which stands in S
 
 }  // namespace
 
+// The link keeps the order: what was sent before a command that the robot has accepted came before it, or never came.
+bool Seat::is_over(const PendingCommand& unanswered) const {
+  const protocol::Command& wire = unanswered.wire;
+  if (wire.has_execute_at_robot_us) return setpoint_of(wire) && unanswered.number < timed_dropped_by;
+  return is_schedule(wire) && unanswered.number < schedules_ended_by;
+}
+
 // What has no answer has acted, if ever, by the end of its life; what has one at the time that the answer says.
 OrdersAhead Seat::orders_ahead(const protocol::Command* newer) const {
   OrdersAhead ahead;
@@ -172,7 +179,7 @@ OrdersAhead Seat::orders_ahead(const protocol::Command* newer) const {
     if (!is_taken_back) add_unanswered(*pending);
   }
   for (const auto& pending : unknown) {
-    if (!is_accepted_schedule(*pending)) add_unanswered(*pending);
+    if (!is_accepted_schedule(*pending) && !is_over(*pending)) add_unanswered(*pending);
   }
   for (const auto& pending : unseen) {
     if (is_accepted_schedule(*pending)) continue;
@@ -187,7 +194,13 @@ void Seat::note_accepted(const std::shared_ptr<PendingCommand>& accepted) {
   const bool is_for_now = !wire.has_execute_at_robot_us && accepted->record.effect_at_robot_us != 0;
   const bool ends_schedule = wire.which_action == rheonaut_Command_set_duty_tag ||
                              wire.which_action == rheonaut_Command_set_mode_tag || is_schedule(wire);
-  if (is_for_now && ends_schedule) end_schedules(accepted->look_from_robot_us);
+  if (is_for_now && ends_schedule) {
+    schedules_ended_by = std::max(schedules_ended_by, accepted->number);
+    end_schedules(accepted->look_from_robot_us + 1);  // also one that the robot has read together with it
+  }
+  if (wire.which_action == rheonaut_Command_drop_timed_tag) {
+    timed_dropped_by = std::max(timed_dropped_by, accepted->number);
+  }
   if (!is_schedule(wire)) return;
   drop_schedule(accepted->record.id);
   if (schedules.size() >= kMaxSchedules) schedules.pop_front();
@@ -206,6 +219,7 @@ void Seat::note_event(const protocol::Event& event) {
     case rheonaut_EVENT_KIND_EMERGENCY:
     case rheonaut_EVENT_KIND_LINK_LOST:
     case rheonaut_EVENT_KIND_LEASE_LAPSED:
+    case rheonaut_EVENT_KIND_POSITION_UNCERTAIN:
     case rheonaut_EVENT_KIND_DUTY_SCHEDULE_ENDED: return end_schedules(event.event_robot_time_us);
     default: return;
   }

@@ -31,7 +31,7 @@ struct PendingCommand {
   std::uint64_t look_until_robot_us = 0;  // sent: nor does telemetry from here on
   std::int64_t seen_until_us = 0;         // steady; acknowledged: then it is no longer looked for
   bool has_key = false;                   // of the client
-  bool is_by_holder = false;              // its actor was in control when the station accepted it
+  bool is_by_holder = false;              // it was sent by right of control, which its actor had
   bool is_timed = false;                  // a stop that counts in Station::stop_times()
   bool is_overtaken = false;              // acknowledged, and a later one that moves the motor too
   bool is_proved_by_samples = false;      // sent: samples that show its effect prove that it has run
@@ -65,9 +65,10 @@ struct Seat {
   std::int64_t utc_minus_steady_us = 0;       // at its latest exchange
   std::uint64_t latch_known_at_robot_us = 0;  // older telemetry says nothing about the latch
   std::uint64_t last_number = 0;
-  std::int64_t refusal_told_at_us = 0;  // steady; 0: never
-  std::uint64_t refusals_untold = 0;    // since
-  std::int64_t invalid_told_at_us = 0;  // likewise, of values that cannot be
+  std::uint64_t schedules_ended_by = 0, timed_dropped_by = 0;  // numbers of the newest accepted that do so
+  std::int64_t refusal_told_at_us = 0;                         // steady; 0: never
+  std::uint64_t refusals_untold = 0;                           // since
+  std::int64_t invalid_told_at_us = 0;                         // likewise, of values that cannot be
   std::uint64_t invalid_untold = 0;
   // Timed commands that may wait on the robot: whose they are (empty: nobody's), and until when one of them may.
   std::string timed_by;
@@ -84,6 +85,7 @@ struct Seat {
   // What telemetry does not show yet, but what the robot drops before its time, and what `newer`, when there is one,
   // would take back. Points into the commands of this seat.
   OrdersAhead orders_ahead(const protocol::Command* newer = nullptr) const;
+  bool is_over(const PendingCommand& unanswered) const;
   // What begins and ends the schedules: an acknowledgement, an event, a drop. Those that have begun before the time
   // end.
   void note_accepted(const std::shared_ptr<PendingCommand>& accepted);

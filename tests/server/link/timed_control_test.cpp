@@ -362,8 +362,16 @@ TEST_F(TimedControlTest, WhatTheLinkHasNotTakenEndsWhenControlIsReleasedButNotWh
   held.actor = "a";
   submit(held);
   clock.settle();
+  protocol::Command parameter = rheonaut_Command_init_zero;
+  parameter.which_action = rheonaut_Command_set_parameter_tag;
+  CommandRequest without_control = request_of(parameter, 9s);  // as the sender of models does it
+  without_control.actor = "a";
+  without_control.takes_control = false;
+  submit(without_control);
+  clock.settle();
   control(ControlAction::release, "a");
   EXPECT_EQ(latest_of_kind("set_duty").reason, "control_ended");
+  EXPECT_EQ(latest_of_kind("set_parameter").state, CommandState::queued) << "it was not sent by right of control";
 }
 
 TEST_F(TimedControlTest, LeavesThoseThatTheHolderStillControls) {

@@ -303,6 +303,42 @@ TEST_F(TimedLimitsTest, AScheduleThatRunsCountsForTheTimeAtPowerUntilItEnds) {
   EXPECT_EQ(refusal(next()), "") << "a command for now has ended it";
 }
 
+TEST_F(TimedLimitsTest, AScheduleEndsWithWhatTheRobotReadsTogetherWithItAndWhereThePositionIsUncertain) {
+  ASSERT_TRUE(station.set_fluid("r1", "oil", {"a", "", 0}));
+  const auto next = [this] { return timed(at_power(2), in_ms(5000), "a"); };
+  EXPECT_EQ(refusal(now(at_power(9))), "");
+  EXPECT_EQ(refusal(now(set_duty(0))), "");
+  const auto sent = robot->commands();
+  robot->acknowledge(sent[sent.size() - 2], rheonaut_COMMAND_RESULT_ACCEPTED);
+  robot->acknowledge(sent[sent.size() - 1], rheonaut_COMMAND_RESULT_ACCEPTED);
+  clock.settle();
+  EXPECT_EQ(refusal(next()), "");
+  robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_BUSY);
+  clock.settle();
+
+  EXPECT_EQ(refusal(now(at_power(9))), "");
+  accept_last();
+  clock.run_for(20ms);
+  EXPECT_THAT(refusal(next()), HasSubstr("too_long_at_power"));
+  tell(rheonaut_EVENT_KIND_POSITION_UNCERTAIN);
+  EXPECT_EQ(refusal(next()), "");
+}
+
+// Whether it has run is not known, and nothing may ever say so: a command after it ends it.
+TEST_F(TimedLimitsTest, AScheduleWithoutAnAnswerCountsUntilALaterDutyIsAccepted) {
+  ASSERT_TRUE(station.set_fluid("r1", "oil", {"a", "", 0}));
+  const auto next = [this] { return timed(at_power(2), in_ms(5000), "a"); };
+  EXPECT_EQ(refusal(now(at_power(9))), "");
+  const CommandId id = robot->commands().back().command_id;
+  clock.run_until([&] { return latest(id).state == CommandState::unknown; }, 10s);
+  EXPECT_EQ(latest(id).state, CommandState::unknown);
+  EXPECT_THAT(refusal(next()), HasSubstr("too_long_at_power"));
+  EXPECT_EQ(refusal(now(set_duty(0))), "");
+  EXPECT_THAT(refusal(next()), HasSubstr("too_long_at_power")) << "not before the answer";
+  accept_last();
+  EXPECT_EQ(refusal(next()), "");
+}
+
 TEST_F(TimedLimitsTest, AScheduleThatHasBegunAtItsTimeCountsByWhatIsLeft) {
   ASSERT_TRUE(station.set_fluid("r1", "oil", {"a", "", 0}));
   const auto sent = take_in(timed(at_power(9), in_ms(100), "a"));

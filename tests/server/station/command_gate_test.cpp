@@ -246,6 +246,19 @@ TEST_F(CommandGateTest, ADutyBeyondTheLimitsOfAFluidThatWasNamedSinceIsNotRenewe
   EXPECT_EQ(refusal(renewal()), "") << "there its controller has the range";
 }
 
+TEST_F(CommandGateTest, AScheduleBeyondTheLimitsOfAFluidThatWasNamedSinceIsNotRenewed) {
+  robot.context.mode = rheonaut_MODE_MANUAL;
+  robot.sample = Sample{.duty = 0.1F};
+  auto running = schedule({{0, 0.8F}, {1000, 0.1F}, {2000, 0.6F}, {3000, 0}});
+  ahead = {{&running, 1, 30'000'001, false, 10'000'000}};
+  robot.fluid = "oil";
+  EXPECT_EQ(refusal(renewal()), "");
+  robot.fluid = "water";
+  EXPECT_THAT(refusal(renewal()), HasSubstr("0.6"));
+  ahead[0].sampled_us = 30'000'000;
+  EXPECT_EQ(refusal(renewal()), "") << "what lies behind it does not count";
+}
+
 TEST_F(CommandGateTest, WhereTheFluidIsNotKnownTheStrictestOfAllLimitsHold) {
   for (const char* unknown : {"", "blood", "Water"}) {
     robot.fluid = unknown;
