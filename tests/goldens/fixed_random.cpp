@@ -4,6 +4,7 @@
 #include <sodium.h>
 
 #include <cstdint>
+#include <stdexcept>
 
 namespace server {
 namespace {
@@ -36,6 +37,7 @@ randombytes_implementation fixed{name, draw_word, nullptr, nullptr, fill, nullpt
 }  // namespace
 
 void fix_random_bytes() {
+  if (sodium_init() < 0) throw std::runtime_error{"libsodium does not start"};  // which draws, too, the first time
   drawn = 0;
   randombytes_set_implementation(&fixed);
 }
