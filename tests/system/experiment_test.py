@@ -25,7 +25,9 @@ class ExperimentTest(unittest.TestCase):
                 run, measures, true = estimated.result()
                 _, known_measures, _ = known.result()
             self.assertEqual(faults(run, measures, true), [])
-            self.assertGreaterEqual(run["samples_stored"], 4000)
+            # A busy machine makes the robot miss ticks, which it counts; its status comes once a second.
+            processes.wait_until(lambda: run["samples_stored"] + station.robot("sim-1")["status"]["missed_ticks"] >= 4000,
+                                 5, "every sample due is stored or was missed by the robot")
             self.assertGreater(measures["position_sd_m"], 0)
             self.assertEqual(known_measures["position_sd_m"], 0)
             predicted = predict(processes.BIN / "rheonaut-sim", -1)
