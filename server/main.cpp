@@ -7,16 +7,16 @@
 #include "server/analysis/analysis_service.hpp"
 #include "server/api/api_server.hpp"
 #include "server/cli/command_line.hpp"
-#include "server/data_folder.hpp"
-#include "server/endpoint.hpp"
+#include "server/config/data_folder.hpp"
+#include "server/config/endpoint.hpp"
+#include "server/config/station_document.hpp"
 #include "server/link/robot_listener.hpp"
 #include "server/live/live_feed.hpp"
-#include "server/log.hpp"
 #include "server/net/transport_security.hpp"
-#include "server/real_time.hpp"
-#include "server/recording/recording_parts.hpp"
+#include "server/runtime/log.hpp"
+#include "server/runtime/real_time.hpp"
 #include "server/station/model_sender.hpp"
-#include "server/station_document.hpp"
+#include "server/storage/recording_parts.hpp"
 
 using namespace server;  // NOLINT: this file is the station, seen from outside
 

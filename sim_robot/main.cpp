@@ -4,13 +4,13 @@
 #include <csignal>
 #include <iostream>
 
-#include "sim_robot/flow_command.hpp"
-#include "sim_robot/play_command.hpp"
-#include "sim_robot/predict_command.hpp"
-#include "sim_robot/proxy_command.hpp"
-#include "sim_robot/replay_command.hpp"
-#include "sim_robot/run_command.hpp"
-#include "sim_robot/scenarios_command.hpp"
+#include "sim_robot/cli/flow_command.hpp"
+#include "sim_robot/cli/play_command.hpp"
+#include "sim_robot/cli/predict_command.hpp"
+#include "sim_robot/cli/proxy_command.hpp"
+#include "sim_robot/cli/replay_command.hpp"
+#include "sim_robot/cli/run_command.hpp"
+#include "sim_robot/cli/scenarios_command.hpp"
 
 namespace {
 

@@ -4,5 +4,5 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/precompiled.hpp"
-#include "server/recording/recording_parts.hpp"
+#include "server/runtime/precompiled.hpp"
+#include "server/storage/recording_parts.hpp"

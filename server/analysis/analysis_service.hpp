@@ -10,9 +10,9 @@
 #include "server/analysis/reference_import.hpp"
 #include "server/analysis/run_recording.hpp"
 #include "server/analysis/run_steps.hpp"
-#include "server/recording/history.hpp"
-#include "server/result.hpp"
-#include "server/worker.hpp"
+#include "server/runtime/result.hpp"
+#include "server/runtime/worker.hpp"
+#include "server/storage/query/history.hpp"
 
 namespace server {
 

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "control/modal_form.hpp"
+#include "control/models/modal_form.hpp"
 #include "server/analysis/optional_json.hpp"
 
 namespace server {

@@ -9,15 +9,15 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "control/closed_loop.hpp"
-#include "control/discretise.hpp"
-#include "control/estimator_model.hpp"
-#include "control/identify.hpp"
-#include "control/margins.hpp"
-#include "control/motor_fit.hpp"
-#include "control/robustness.hpp"
-#include "control/tune.hpp"
-#include "server/result.hpp"
+#include "control/discretisation/discretise.hpp"
+#include "control/discretisation/estimator_model.hpp"
+#include "control/identification/identify.hpp"
+#include "control/responses/closed_loop.hpp"
+#include "control/responses/margins.hpp"
+#include "control/search/motor_fit.hpp"
+#include "control/tuning/robustness.hpp"
+#include "control/tuning/tune.hpp"
+#include "server/runtime/result.hpp"
 
 namespace server {
 

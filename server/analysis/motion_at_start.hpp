@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "control/identify.hpp"
+#include "control/identification/identify.hpp"
 
 namespace server {
 

@@ -2,10 +2,10 @@
 //
 // The text is CSV with the columns t_s (ascending), position_m and, if it has one, position_sd_m. The clock is given by
 // an offset, by the UTC of t_s = 0, by the time that a marker of the run has in the text, or found by correlation with
-// the robot's own motion (control/clock_alignment). Where the zero is not kept it is the one with which the outside
-// position agrees with the robot's own, each weighed by 1/position_sd_m²: the robot's own record decides where zero is,
-// above all while it is sure of its position, and an error that it has from the first sample on stays unseen. Rows
-// before or after the span are left out and counted. Pure and slow for long runs: call it on a worker.
+// the robot's own motion (control/sensor/clock_alignment). Where the zero is not kept it is the one with which the
+// outside position agrees with the robot's own, each weighed by 1/position_sd_m²: the robot's own record decides where
+// zero is, above all while it is sure of its position, and an error that it has from the first sample on stays unseen.
+// Rows before or after the span are left out and counted. Pure and slow for long runs: call it on a worker.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +14,10 @@
 #include <string>
 #include <vector>
 
-#include "control/clock_alignment.hpp"
-#include "server/recording/outside_reference.hpp"
-#include "server/recording/stored_sample.hpp"
-#include "server/result.hpp"
+#include "control/sensor/clock_alignment.hpp"
+#include "server/runtime/result.hpp"
+#include "server/storage/runs/outside_reference.hpp"
+#include "server/storage/samples/stored_sample.hpp"
 
 namespace server {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/result.hpp"
+#include "server/runtime/result.hpp"
 
 namespace server {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "control/position_weight.hpp"
+#include "control/sensor/position_weight.hpp"
 #include "server/analysis/motion_at_start.hpp"
 
 namespace server {

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "control/identify.hpp"
+#include "control/identification/identify.hpp"
 #include "server/analysis/run_steps.hpp"
-#include "server/recording/outside_reference.hpp"
-#include "server/recording/stored_sample.hpp"
-#include "server/result.hpp"
+#include "server/runtime/result.hpp"
+#include "server/storage/runs/outside_reference.hpp"
+#include "server/storage/samples/stored_sample.hpp"
 
 namespace server {
 

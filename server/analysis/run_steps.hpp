@@ -13,8 +13,8 @@
 #include <optional>
 #include <vector>
 
-#include "control/step_metrics.hpp"
-#include "server/recording/outside_reference.hpp"
+#include "control/responses/step_metrics.hpp"
+#include "server/storage/runs/outside_reference.hpp"
 
 namespace server {
 

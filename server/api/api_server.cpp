@@ -7,7 +7,8 @@
 #include <cstdio>
 #include <iterator>
 
-#include "server/endpoint.hpp"
+#include "server/api/live_socket.hpp"
+#include "server/config/endpoint.hpp"
 
 namespace server {
 namespace {
@@ -51,7 +52,11 @@ ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clo
       parts_{loop,      tasks,    clock, station,   live,    texts_,
              recording, analysis, auth_, accounts_, logins_, facts_of(options, listener_, clock)},
       live_{loop, tasks, clock, station, live, texts_, options.version},
-      server_{tasks, clock, listener_, options.security->http(), guard_, router_, live_} {
+      upgrades_{"/live",
+                [this](HttpStream stream, UpgradeRequest upgrade, Caller caller) {
+                  return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live_);
+                }},
+      server_{tasks, clock, listener_, options.security->http(), guard_, router_, upgrades_} {
   add_routes(router_, parts_);
 }
 

@@ -7,9 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "server/api/http_server.hpp"
-#include "server/api/routes.hpp"
-#include "server/config.hpp"
+#include "server/api/live_messages.hpp"
+#include "server/api/routes/routes.hpp"
+#include "server/config/config.hpp"
+#include "server/http/http_server.hpp"
 
 namespace server {
 
@@ -55,6 +56,7 @@ class ApiServer {
   RobotTexts texts_;
   ApiParts parts_;
   LiveParts live_;
+  Upgrades upgrades_;
   Router router_;
   HttpServer server_;
 };

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <set>
 
-#include "server/api/emergency.hpp"
-#include "server/api/http.hpp"
-#include "server/api/json.hpp"
-#include "server/counted.hpp"
+#include "server/api/bodies/json.hpp"
+#include "server/api/routes/emergency.hpp"
+#include "server/http/http.hpp"
+#include "server/runtime/counted.hpp"
 
 namespace server {
 namespace asio = boost::asio;

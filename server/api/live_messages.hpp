@@ -6,13 +6,13 @@
 #include <optional>
 #include <string>
 
-#include "server/api/caller.hpp"
+#include "server/identity/caller.hpp"
 #include "server/live/live_feed.hpp"
 #include "server/live/robot_texts.hpp"
-#include "server/result.hpp"
+#include "server/runtime/result.hpp"
+#include "server/runtime/tasks.hpp"
+#include "server/runtime/turns.hpp"
 #include "server/station/station.hpp"
-#include "server/tasks.hpp"
-#include "server/turns.hpp"
 
 namespace server {
 
@@ -25,9 +25,8 @@ struct LiveParts {
   LiveFeed& live;
   RobotTexts& texts;
   std::string version;
-  std::size_t renewals = 0;                       // on their way
-  std::map<std::string, std::size_t> pages = {};  // that are open, of each user, token or link
-  Turns turns{loop, 3};                           // of the pages that something is written to: some 70 µs of work
+  std::size_t renewals = 0;  // on their way
+  Turns turns{loop, 3};      // of the pages that something is written to: some 70 µs of work
 };
 
 inline constexpr std::size_t kMaxRenewals = 256;

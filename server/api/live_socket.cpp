@@ -12,7 +12,7 @@
 #include <boost/beast/websocket.hpp>
 #include <limits>
 
-#include "server/api/json.hpp"
+#include "server/api/bodies/json.hpp"
 
 namespace server {
 namespace asio = boost::asio;

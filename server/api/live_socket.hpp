@@ -8,17 +8,13 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
-#include <boost/beast/http/empty_body.hpp>
-#include <boost/beast/http/message.hpp>
 #include <string>
 
-#include "server/api/caller.hpp"
-#include "server/api/http_stream.hpp"
 #include "server/api/live_messages.hpp"
+#include "server/http/upgrade.hpp"
+#include "server/identity/caller.hpp"
 
 namespace server {
-
-using UpgradeRequest = boost::beast::http::request<boost::beast::http::empty_body>;
 
 // Ends when the page leaves or falls silent. Throws operation_aborted when cancelled.
 boost::asio::awaitable<void> serve_live(HttpStream stream, UpgradeRequest upgrade, Caller caller, LiveParts& parts);

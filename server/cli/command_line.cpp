@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "server/cli/options.hpp"
+#include "server/cli/terminal/options.hpp"
 
 #ifndef RHEONAUT_VERSION
 #error "RHEONAUT_VERSION comes from CMake"

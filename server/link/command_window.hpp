@@ -11,7 +11,7 @@
 #include <limits>
 #include <vector>
 
-#include "server/station/station_state.hpp"
+#include "server/station/state/station_state.hpp"
 
 namespace server {
 

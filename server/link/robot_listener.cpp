@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "server/endpoint.hpp"
+#include "server/config/endpoint.hpp"
 
 namespace server {
 namespace asio = boost::asio;

@@ -9,7 +9,7 @@
 #include "server/net/entrance.hpp"
 #include "server/net/listener.hpp"
 #include "server/net/poll_set.hpp"
-#include "server/tasks.hpp"
+#include "server/runtime/tasks.hpp"
 
 namespace server {
 

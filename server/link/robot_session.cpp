@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-#include "server/exceptions.hpp"
+#include "server/runtime/exceptions.hpp"
 
 namespace server {
 namespace asio = boost::asio;

@@ -12,12 +12,12 @@
 #include <string>
 
 #include "protocol/frame.hpp"
-#include "server/clock.hpp"
 #include "server/link/command_window.hpp"
 #include "server/link/frame_faults.hpp"
 #include "server/net/byte_stream.hpp"
-#include "server/station/robot_archive.hpp"
-#include "server/station/robot_port.hpp"
+#include "server/runtime/clock.hpp"
+#include "server/station/state/robot_archive.hpp"
+#include "server/station/state/robot_port.hpp"
 #include "server/station/station.hpp"
 
 namespace server {

@@ -15,9 +15,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "server/clock.hpp"
 #include "server/live/subscriber.hpp"
-#include "server/station/station_sink.hpp"
+#include "server/runtime/clock.hpp"
+#include "server/station/state/station_sink.hpp"
 
 namespace server {
 

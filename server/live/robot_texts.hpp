@@ -12,8 +12,8 @@
 #include <string>
 #include <unordered_map>
 
+#include "server/runtime/turns.hpp"
 #include "server/station/station.hpp"
-#include "server/turns.hpp"
 
 namespace server {
 

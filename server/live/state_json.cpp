@@ -4,7 +4,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "server/station/unknown_values.hpp"
+#include "server/station/state/unknown_values.hpp"
 
 namespace server {
 namespace {
@@ -57,8 +57,6 @@ void append_column(std::string& out, const char* name, const std::vector<Sample>
 json id_text(std::uint64_t id) { return id == 0 ? json(nullptr) : json(std::to_string(id)); }
 
 json time_or_null(std::int64_t time_us) { return time_us == 0 ? json(nullptr) : json(time_us); }
-
-std::string dump(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
 
 json to_json(const Sample& sample) {
   return {{"position_m", decimal(sample.position_m)},

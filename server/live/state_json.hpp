@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "server/decimal.hpp"
-#include "server/station/station_state.hpp"
+#include "base/json_text.hpp"
+#include "server/station/state/station_state.hpp"
 
 namespace server {
 
@@ -25,8 +25,5 @@ std::string samples_message(const SampleBatch& batch);
 // null for 0.
 nlohmann::json id_text(std::uint64_t id);
 nlohmann::json time_or_null(std::int64_t time_us);
-
-// The text of a JSON value; bytes that are not UTF-8 are replaced.
-std::string dump(const nlohmann::json& value);
 
 }  // namespace server

@@ -8,8 +8,8 @@
 #include <memory>
 #include <string>
 
-#include "server/clock.hpp"
-#include "server/station/station_state.hpp"
+#include "server/runtime/clock.hpp"
+#include "server/station/state/station_state.hpp"
 
 namespace server {
 

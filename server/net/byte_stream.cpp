@@ -9,7 +9,7 @@
 #include <boost/system/system_error.hpp>
 
 #include "server/net/poll_set.hpp"
-#include "server/net/stream_socket.hpp"
+#include "server/tls/stream_socket.hpp"
 
 namespace server {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include "server/endpoint.hpp"
+#include "server/config/endpoint.hpp"
 
 namespace server {
 namespace {

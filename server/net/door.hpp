@@ -22,8 +22,8 @@
 #include <memory>
 #include <string>
 
-#include "server/clock.hpp"
-#include "server/log.hpp"
+#include "server/runtime/clock.hpp"
+#include "server/runtime/log.hpp"
 
 namespace server {
 

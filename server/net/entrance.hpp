@@ -2,7 +2,7 @@
 #pragma once
 
 #include "server/net/door.hpp"
-#include "server/net/tls_gate.hpp"
+#include "server/tls/tls_gate.hpp"
 
 namespace server {
 

@@ -9,7 +9,7 @@
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
-#include "server/endpoint.hpp"
+#include "server/config/endpoint.hpp"
 
 namespace server {
 namespace asio = boost::asio;

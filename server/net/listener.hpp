@@ -7,7 +7,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <functional>
 
-#include "server/clock.hpp"
+#include "server/runtime/clock.hpp"
 
 namespace server {
 

@@ -4,8 +4,8 @@
 #include <deque>
 #include <utility>
 
-#include "server/clock.hpp"
 #include "server/net/byte_stream.hpp"
+#include "server/runtime/clock.hpp"
 
 namespace server {
 namespace asio = boost::asio;

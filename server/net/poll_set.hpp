@@ -22,7 +22,7 @@
 #include <optional>
 #include <unordered_set>
 
-#include "server/clock.hpp"
+#include "server/runtime/clock.hpp"
 
 namespace server {
 

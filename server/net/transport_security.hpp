@@ -15,10 +15,10 @@
 #include <string>
 #include <vector>
 
-#include "server/clock.hpp"
-#include "server/config.hpp"
+#include "server/config/config.hpp"
 #include "server/net/entrance.hpp"
-#include "server/worker.hpp"
+#include "server/runtime/clock.hpp"
+#include "server/runtime/worker.hpp"
 
 namespace server {
 

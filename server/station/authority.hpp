@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "server/clock.hpp"
-#include "server/result.hpp"
-#include "server/station/station_state.hpp"
+#include "server/runtime/clock.hpp"
+#include "server/runtime/result.hpp"
+#include "server/station/state/station_state.hpp"
 
 namespace server {
 

@@ -6,8 +6,8 @@
 
 #include "server/station/read_back.hpp"
 #include "server/station/seat.hpp"
+#include "server/station/state/unknown_values.hpp"
 #include "server/station/telemetry_verifier.hpp"
-#include "server/station/unknown_values.hpp"
 
 namespace server {
 namespace {

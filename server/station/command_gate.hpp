@@ -1,10 +1,10 @@
 // The checks that every command passes before it is sent: envelope and preconditions. Pure.
 #pragma once
 
-#include "server/result.hpp"
-#include "server/station/envelope.hpp"
+#include "server/config/envelope.hpp"
+#include "server/runtime/result.hpp"
 #include "server/station/orders_ahead.hpp"
-#include "server/station/station_state.hpp"
+#include "server/station/state/station_state.hpp"
 
 namespace server {
 

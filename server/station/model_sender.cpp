@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "server/decimal.hpp"
+#include "base/json_text.hpp"
 
 namespace server {
 namespace asio = boost::asio;

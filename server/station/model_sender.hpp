@@ -28,11 +28,11 @@
 #include <string>
 #include <unordered_map>
 
-#include "server/clock.hpp"
-#include "server/result.hpp"
-#include "server/station/fluid_model.hpp"
+#include "server/runtime/clock.hpp"
+#include "server/runtime/result.hpp"
+#include "server/runtime/tasks.hpp"
+#include "server/station/state/fluid_model.hpp"
 #include "server/station/station.hpp"
-#include "server/tasks.hpp"
 
 namespace server {
 

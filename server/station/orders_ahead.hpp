@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "server/result.hpp"
-#include "server/station/envelope.hpp"
-#include "server/station/station_state.hpp"
+#include "server/config/envelope.hpp"
+#include "server/runtime/result.hpp"
+#include "server/station/state/station_state.hpp"
 
 namespace server {
 

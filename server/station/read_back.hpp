@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "server/station/in_force.hpp"
+#include "server/station/state/in_force.hpp"
 #include "server/station/telemetry_verifier.hpp"
 
 namespace server {

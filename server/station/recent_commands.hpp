@@ -5,7 +5,7 @@
 #include <deque>
 #include <unordered_map>
 
-#include "server/station/station_state.hpp"
+#include "server/station/state/station_state.hpp"
 
 namespace server {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/station/in_force.hpp"
+#include "server/station/state/in_force.hpp"
 #include "server/station/station.hpp"
 
 namespace server {

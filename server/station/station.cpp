@@ -10,7 +10,7 @@
 #include <cstdlib>
 
 #include "server/station/seat.hpp"
-#include "server/station/unknown_values.hpp"
+#include "server/station/state/unknown_values.hpp"
 
 namespace server {
 namespace {

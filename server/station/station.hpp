@@ -15,27 +15,22 @@
 #include <unordered_map>
 #include <vector>
 
-#include "server/audit_note.hpp"
-#include "server/clock.hpp"
-#include "server/result.hpp"
+#include "server/config/link_settings.hpp"
+#include "server/runtime/clock.hpp"
+#include "server/runtime/result.hpp"
 #include "server/station/authority.hpp"
-#include "server/station/clock_sync.hpp"
 #include "server/station/command_gate.hpp"
-#include "server/station/in_force.hpp"
 #include "server/station/recent_commands.hpp"
-#include "server/station/robot_archive.hpp"
-#include "server/station/robot_port.hpp"
-#include "server/station/station_sink.hpp"
-#include "server/station/station_state.hpp"
-#include "server/station/stop_times.hpp"
+#include "server/station/state/audit_note.hpp"
+#include "server/station/state/clock_sync.hpp"
+#include "server/station/state/in_force.hpp"
+#include "server/station/state/robot_archive.hpp"
+#include "server/station/state/robot_port.hpp"
+#include "server/station/state/station_sink.hpp"
+#include "server/station/state/station_state.hpp"
+#include "server/station/state/stop_times.hpp"
 
 namespace server {
-
-struct LinkTimes {
-  std::uint32_t link_timeout_ms = protocol::kDefaultLinkTimeoutMs;
-  std::uint32_t heartbeat_interval_ms = protocol::kDefaultHeartbeatIntervalMs;
-  std::uint32_t samples_per_frame = 0;  // 0: as each robot has it
-};
 
 // A wish to command a robot. `action` has its action member set; the station fills id, boot and validity.
 struct CommandRequest {

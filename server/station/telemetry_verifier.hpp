@@ -1,7 +1,7 @@
 // Whether telemetry shows what a command was to bring about. Pure.
 #pragma once
 
-#include "server/station/station_state.hpp"
+#include "server/station/state/station_state.hpp"
 
 namespace server {
 

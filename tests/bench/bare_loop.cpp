@@ -38,7 +38,7 @@
 #include <vector>
 
 #include "protocol/frame.hpp"
-#include "server/recording/database.hpp"
+#include "server/storage/database/database.hpp"
 #include "tests/bench/bare_stops.hpp"
 #include "tests/bench/bare_views.hpp"
 #include "tests/bench/bare_wire.hpp"

@@ -9,13 +9,13 @@
 #include <random>
 #include <vector>
 
-#include "control/discretise.hpp"
-#include "control/identify.hpp"
-#include "control/margins.hpp"
-#include "control/modal_form.hpp"
-#include "control/modal_plant.hpp"
-#include "control/time_response.hpp"
-#include "control/tune.hpp"
+#include "control/discretisation/discretise.hpp"
+#include "control/identification/identify.hpp"
+#include "control/models/modal_form.hpp"
+#include "control/models/modal_plant.hpp"
+#include "control/responses/margins.hpp"
+#include "control/responses/time_response.hpp"
+#include "control/tuning/tune.hpp"
 
 namespace control {
 namespace {

@@ -1,8 +1,8 @@
 // Prints how well the robot knows its position in fluids whose model it was told: fluid_study [FLUIDS] [SEEDS]; or in
 // how many fluids four sections make a model: fluid_study models.
 //
-// Figure 7's loop on the estimate, default sensor, the model of control/estimator_model, confirmed. Fluids are drawn as
-// in tests/control/fluid_family.hpp until so many have a model; those that have none are counted.
+// Figure 7's loop on the estimate, default sensor, the model of control/discretisation/estimator_model, confirmed.
+// Fluids are drawn as in tests/control/fluid_family.hpp until so many have a model; those that have none are counted.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,8 +10,8 @@
 #include <cstring>
 #include <vector>
 
-#include "control/estimator_model.hpp"
-#include "control/time_response.hpp"
+#include "control/discretisation/estimator_model.hpp"
+#include "control/responses/time_response.hpp"
 #include "tests/control/fluid_family.hpp"
 #include "tests/robot_fw/estimator_trial.hpp"
 

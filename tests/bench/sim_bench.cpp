@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "sim_robot/replay.hpp"
-#include "sim_robot/simulated_robot.hpp"
+#include "sim_robot/fleet/replay.hpp"
+#include "sim_robot/robot/simulated_robot.hpp"
 
 namespace sim_robot {
 namespace {

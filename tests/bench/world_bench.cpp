@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "sim_robot/simulated_robot.hpp"
+#include "sim_robot/robot/simulated_robot.hpp"
 
 namespace sim_robot {
 namespace {

@@ -1,5 +1,5 @@
 // What of a run's residuals is put down to amplitude: a drag behind a dead time is, an order that was forced is not.
-#include "control/amplitude_doubt.hpp"
+#include "control/identification/amplitude_doubt.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

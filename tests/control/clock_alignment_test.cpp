@@ -1,5 +1,5 @@
 // Two records of one motion, on clocks that differ by a known time.
-#include "control/clock_alignment.hpp"
+#include "control/sensor/clock_alignment.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "control/identify.hpp"
-#include "control/modal_plant.hpp"
+#include "control/identification/identify.hpp"
+#include "control/models/modal_plant.hpp"
 
 namespace control {
 namespace {

@@ -1,5 +1,5 @@
 // Predicted experiments agree with the reference trajectories, and respond to profile and noise as they should.
-#include "control/closed_loop.hpp"
+#include "control/responses/closed_loop.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "control/modal_plant.hpp"
+#include "control/models/modal_plant.hpp"
 
 namespace control {
 namespace {

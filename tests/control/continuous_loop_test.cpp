@@ -1,5 +1,5 @@
 // The ideal closed loop agrees with the reference inversions.
-#include "control/continuous_loop.hpp"
+#include "control/responses/continuous_loop.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "control/plant_models.hpp"
-#include "control/polynomial_roots.hpp"
+#include "control/models/plant_models.hpp"
+#include "control/responses/polynomial_roots.hpp"
 #include "model_samples.hpp"
 
 namespace control {

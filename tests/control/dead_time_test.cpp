@@ -8,16 +8,16 @@
 #include <random>
 #include <stdexcept>
 
-#include "control/closed_loop.hpp"
-#include "control/continuous_loop.hpp"
-#include "control/delay_line.hpp"
-#include "control/frequency_response.hpp"
-#include "control/grunwald_letnikov.hpp"
-#include "control/identify.hpp"
-#include "control/modal_plant.hpp"
-#include "control/robustness.hpp"
-#include "control/time_response.hpp"
-#include "control/tune.hpp"
+#include "control/identification/identify.hpp"
+#include "control/models/delay_line.hpp"
+#include "control/models/grunwald_letnikov.hpp"
+#include "control/models/modal_plant.hpp"
+#include "control/responses/closed_loop.hpp"
+#include "control/responses/continuous_loop.hpp"
+#include "control/responses/frequency_response.hpp"
+#include "control/responses/time_response.hpp"
+#include "control/tuning/robustness.hpp"
+#include "control/tuning/tune.hpp"
 
 namespace control {
 namespace {

@@ -1,5 +1,5 @@
 // Which plants four sections can follow, how well, and what is said of those that they cannot.
-#include "control/estimator_model.hpp"
+#include "control/discretisation/estimator_model.hpp"
 
 #include <gmock/gmock.h>
 
@@ -8,7 +8,7 @@
 #include <numeric>
 #include <vector>
 
-#include "control/time_response.hpp"
+#include "control/responses/time_response.hpp"
 #include "tests/control/fluid_family.hpp"
 
 namespace control {

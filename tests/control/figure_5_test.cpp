@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "control/identify.hpp"
+#include "control/identification/identify.hpp"
 #include "recorded_runs.hpp"
 
 namespace control {

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "control/tune.hpp"
+#include "control/tuning/tune.hpp"
 
 namespace control {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "control/closed_loop.hpp"
-#include "control/discretise.hpp"
+#include "control/discretisation/discretise.hpp"
+#include "control/responses/closed_loop.hpp"
 
 namespace control {
 

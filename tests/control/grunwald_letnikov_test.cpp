@@ -1,5 +1,5 @@
 // The scheme gives the reference values of the scheme, and comes nearer to the true response with smaller steps.
-#include "control/grunwald_letnikov.hpp"
+#include "control/models/grunwald_letnikov.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "control/time_response.hpp"
+#include "control/responses/time_response.hpp"
 
 namespace control {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <numbers>
 
-#include "control/fit_statistics.hpp"
+#include "control/search/fit_statistics.hpp"
 #include "recorded_runs.hpp"
 
 namespace control {

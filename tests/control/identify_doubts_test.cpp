@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "control/fit_statistics.hpp"
-#include "control/identify.hpp"
+#include "control/identification/identify.hpp"
+#include "control/search/fit_statistics.hpp"
 #include "recorded_runs.hpp"
 
 namespace control {

@@ -1,5 +1,5 @@
 // Identification meets the reference optima and says what a run cannot tell.
-#include "control/identify.hpp"
+#include "control/identification/identify.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Frequency responses and margins agree with the reference.
-#include "control/margins.hpp"
+#include "control/responses/margins.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "control/frequency_response.hpp"
+#include "control/responses/frequency_response.hpp"
 
 namespace control {
 namespace {

@@ -1,5 +1,5 @@
 // The sum of exponentials is as accurate as it was asked to be, for any model.
-#include "control/modal_form.hpp"
+#include "control/models/modal_form.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "control/time_response.hpp"
+#include "control/responses/time_response.hpp"
 #include "model_samples.hpp"
 
 namespace control {

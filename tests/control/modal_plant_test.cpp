@@ -1,5 +1,5 @@
 // The simulated motion agrees with the reference responses, at any step size.
-#include "control/modal_plant.hpp"
+#include "control/models/modal_plant.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "control/time_response.hpp"
+#include "control/responses/time_response.hpp"
 #include "model_samples.hpp"
 
 namespace control {

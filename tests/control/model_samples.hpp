@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "control/plant_models.hpp"
+#include "control/models/plant_models.hpp"
 
 namespace control {
 

@@ -1,5 +1,5 @@
 // The motor is found in its own response.
-#include "control/motor_fit.hpp"
+#include "control/search/motor_fit.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
 // The output of a model from fixed rates agrees with other ways to compute it, and so do its derivatives.
-#include "control/output_model.hpp"
+#include "control/search/output_model.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "control/modal_form.hpp"
+#include "control/models/modal_form.hpp"
 
 namespace control {
 namespace {

@@ -1,5 +1,5 @@
 // The hydrodynamic model meets the one that the paper prints, where it can.
-#include "control/plant_models.hpp"
+#include "control/models/plant_models.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -5,9 +5,9 @@
 #include <random>
 #include <vector>
 
-#include "control/identify.hpp"
-#include "control/modal_form.hpp"
-#include "control/output_model.hpp"
+#include "control/identification/identify.hpp"
+#include "control/models/modal_form.hpp"
+#include "control/search/output_model.hpp"
 
 namespace control {
 

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <random>
 
-#include "control/identify.hpp"
-#include "control/modal_plant.hpp"
-#include "control/position_times.hpp"
-#include "control/position_weight.hpp"
+#include "control/identification/identify.hpp"
+#include "control/models/modal_plant.hpp"
+#include "control/sensor/position_times.hpp"
+#include "control/sensor/position_weight.hpp"
 
 namespace control {
 namespace {

@@ -1,5 +1,5 @@
 // A limited reference keeps its limits and arrives exactly.
-#include "control/reference_profile.hpp"
+#include "control/models/reference_profile.hpp"
 
 #include <gtest/gtest.h>
 

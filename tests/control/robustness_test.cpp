@@ -1,5 +1,5 @@
 // The robustness table says of the paper's controller what is known of it.
-#include "control/robustness.hpp"
+#include "control/tuning/robustness.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
 // A search ends on time in virtual time: every look at the clock takes a tick.
-#include "control/search_limit.hpp"
+#include "control/search/search_limit.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "control/output_error_search.hpp"
+#include "control/search/output_error_search.hpp"
 #include "recorded_runs.hpp"
 
 namespace control {

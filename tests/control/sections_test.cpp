@@ -1,5 +1,5 @@
 // Parallel sections are the same controller as the transfer function they come from.
-#include "control/sections.hpp"
+#include "control/responses/sections.hpp"
 
 #include <gtest/gtest.h>
 

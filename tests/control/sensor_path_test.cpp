@@ -1,11 +1,11 @@
 // An accelerometer's low pass between ticks, where the robot begins to move.
-#include "control/sensor_path.hpp"
+#include "control/sensor/sensor_path.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "control/output_model.hpp"
+#include "control/search/output_model.hpp"
 
 namespace control {
 namespace {

@@ -1,5 +1,5 @@
 // The record of an acceleration, less a bias that the robot's filter moves in every fifth tick.
-#include "control/sensor_readings.hpp"
+#include "control/sensor/sensor_readings.hpp"
 
 #include <gtest/gtest.h>
 

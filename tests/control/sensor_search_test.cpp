@@ -6,10 +6,10 @@
 #include <cmath>
 #include <random>
 
-#include "control/fit_summary.hpp"
-#include "control/output_error_search.hpp"
-#include "control/second_opinions.hpp"
-#include "control/sensor_clock.hpp"
+#include "control/identification/fit_summary.hpp"
+#include "control/identification/second_opinions.hpp"
+#include "control/search/output_error_search.hpp"
+#include "control/sensor/sensor_clock.hpp"
 #include "recorded_runs.hpp"
 
 namespace control {

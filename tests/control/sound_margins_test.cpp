@@ -5,7 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "control/tuning_alternatives.hpp"
+#include "control/tuning/tune.hpp"
+#include "control/tuning/tuning_alternatives.hpp"
 
 namespace control {
 namespace {

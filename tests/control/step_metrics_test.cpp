@@ -1,5 +1,5 @@
 // The measures of a step response follow the conventions of the reference closed-loop table.
-#include "control/step_metrics.hpp"
+#include "control/responses/step_metrics.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "control/modal_plant.hpp"
+#include "control/models/modal_plant.hpp"
 
 namespace control {
 namespace {

@@ -1,5 +1,5 @@
 // The plant and the controller are what their formulas say, on every sheet, and bad controllers are refused.
-#include "control/transfer_function.hpp"
+#include "control/models/transfer_function.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

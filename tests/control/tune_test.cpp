@@ -1,5 +1,5 @@
 // Tuned controllers meet what was asked for, or say why none can.
-#include "control/tune.hpp"
+#include "control/tuning/tune.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

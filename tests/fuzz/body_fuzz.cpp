@@ -99,7 +99,7 @@ class BodyStation : public ApiTest {
 
   Subscriber page_{loop};
   RobotTexts texts_{loop, station};
-  LiveParts live_parts_{loop, tasks, clock, station, live, texts_, "0", 0, {}};
+  LiveParts live_parts_{loop, tasks, clock, station, live, texts_, "0"};
   std::vector<std::string> patterns_;
   int changes_ = 0;
 };

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "server/config.hpp"
-#include "server/station_document.hpp"
+#include "server/config/config.hpp"
+#include "server/config/station_document.hpp"
 
 namespace server {
 namespace {

@@ -11,8 +11,8 @@
 #include <sstream>
 #include <string_view>
 
-#include "server/api/request_guard.hpp"
-#include "server/api/router.hpp"
+#include "server/http/request_guard.hpp"
+#include "server/http/router.hpp"
 #include "tests/server/virtual_clock.hpp"
 
 namespace server {

@@ -6,8 +6,8 @@
 #include <limits>
 #include <string_view>
 
-#include "server/api/routes.hpp"
-#include "server/tasks.hpp"
+#include "server/api/routes/routes.hpp"
+#include "server/runtime/tasks.hpp"
 
 namespace server {
 namespace {

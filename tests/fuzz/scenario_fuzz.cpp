@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "sim_robot/scenario_run.hpp"
+#include "sim_robot/lab/scenario_run.hpp"
 
 namespace sim_robot {
 namespace {

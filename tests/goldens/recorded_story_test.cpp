@@ -1,7 +1,7 @@
 // What a station writes of the story, what pages hear of it, and a database in which nothing happened.
 #include "tests/goldens/recorded_story.hpp"
 
-#include "server/recording/database.hpp"
+#include "server/storage/database/database.hpp"
 #include "tests/goldens/database_text.hpp"
 #include "tests/goldens/golden_file.hpp"
 #include "tests/server/api/api_fixture.hpp"

@@ -2,7 +2,7 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <fmt/format.h>
 
-#include "server/recording/certificate.hpp"
+#include "server/storage/runs/certificate.hpp"
 #include "tests/goldens/answers.hpp"
 #include "tests/goldens/database_text.hpp"
 #include "tests/goldens/golden_file.hpp"

@@ -8,8 +8,8 @@
 #include <set>
 
 #include "robot_fw/lx106/replay.hpp"
-#include "sim_robot/station_peer.hpp"
-#include "sim_robot/world.hpp"
+#include "sim_robot/lab/station_peer.hpp"
+#include "sim_robot/world/world.hpp"
 #include "tests/lx106/send_turn.hpp"
 #include "tests/robot_fw/controllers.hpp"
 

@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "control/discretise.hpp"
-#include "control/tune.hpp"
+#include "control/discretisation/discretise.hpp"
+#include "control/tuning/tune.hpp"
 #include "tests/robot_fw/controllers.hpp"
 
 namespace robot_fw {

@@ -1,5 +1,5 @@
 // Glucose on the way: where the robot holds, for how long, and when it looks for more. And where it holds alone.
-#include "sim_robot/station_peer.hpp"
+#include "sim_robot/lab/station_peer.hpp"
 #include "tests/robot_fw/bare_core.hpp"
 
 namespace robot_fw {

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "sim_robot/station_peer.hpp"
+#include "sim_robot/lab/station_peer.hpp"
 
 namespace robot_fw {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "robot_fw/core/controller.hpp"
-#include "sim_robot/world.hpp"
+#include "sim_robot/world/world.hpp"
 #include "tests/robot_fw/estimator_trial.hpp"
 
 namespace robot_fw {

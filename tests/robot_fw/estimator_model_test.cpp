@@ -1,5 +1,5 @@
 // The models that control/ makes of plants, on the robot: stepped as they were fitted, and good for the position.
-#include "control/estimator_model.hpp"
+#include "control/discretisation/estimator_model.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "control/time_response.hpp"
+#include "control/responses/time_response.hpp"
 #include "robot_fw/core/parameters.hpp"
 #include "tests/control/fluid_family.hpp"
 #include "tests/robot_fw/estimator_trial.hpp"

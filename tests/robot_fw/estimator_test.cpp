@@ -9,7 +9,7 @@
 #include <random>
 #include <utility>
 
-#include "control/modal_plant.hpp"
+#include "control/models/modal_plant.hpp"
 
 namespace robot_fw {
 namespace {

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "robot_fw/core/controller.hpp"
-#include "sim_robot/world.hpp"
+#include "sim_robot/world/world.hpp"
 
 namespace robot_fw {
 namespace {

@@ -1,16 +1,16 @@
 // One trial of the estimator: a robot in a fluid, its sensor, its motor, and what the estimate comes to.
 //
 // The duty comes from the paper's controller, on the estimate or, `closed_loop` false, on the true position.
-// With a mean flow U, the robot is in a tube without end in which sim_robot/pump makes the fluid pulsate.
+// With a mean flow U, the robot is in a tube without end in which sim_robot/world/pump makes the fluid pulsate.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "control/plant_models.hpp"
+#include "control/models/plant_models.hpp"
 #include "robot_fw/core/estimator.hpp"
 #include "robot_fw/core/safety.hpp"
-#include "sim_robot/imu.hpp"
+#include "sim_robot/world/imu.hpp"
 
 namespace robot_fw {
 

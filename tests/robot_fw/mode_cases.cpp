@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "sim_robot/plant.hpp"
+#include "sim_robot/world/plant.hpp"
 #include "tests/robot_fw/controllers.hpp"
 
 namespace robot_fw {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "robot_fw/core/mode_table.hpp"
-#include "sim_robot/station_peer.hpp"
+#include "sim_robot/lab/station_peer.hpp"
 #include "tests/robot_fw/bare_core.hpp"
 #include "tests/robot_fw/mode_page.hpp"
 

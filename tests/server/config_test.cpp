@@ -1,5 +1,5 @@
 // The configuration: precedence, the documented file, and what is said about mistakes.
-#include "server/config.hpp"
+#include "server/config/config.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

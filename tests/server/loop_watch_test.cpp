@@ -1,5 +1,5 @@
 // What a loop that stood still makes of what it then reads, and the clock that shows it.
-#include "server/loop_watch.hpp"
+#include "server/runtime/loop_watch.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <string>
 
-#include "server/clock.hpp"
+#include "server/runtime/clock.hpp"
 
 namespace server {
 namespace {

@@ -1,12 +1,12 @@
 // Priorities of the station's threads, where the system permits them.
-#include "server/real_time.hpp"
+#include "server/runtime/real_time.hpp"
 
 #include <gtest/gtest.h>
 #include <sched.h>
 
 #include <thread>
 
-#include "server/tasks.hpp"
+#include "server/runtime/tasks.hpp"
 
 namespace server {
 namespace {

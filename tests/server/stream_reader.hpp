@@ -1,8 +1,8 @@
 // How a coroutine of a test reads a stream.
 #pragma once
 
-#include "server/clock.hpp"
 #include "server/net/byte_stream.hpp"
+#include "server/runtime/clock.hpp"
 
 namespace server {
 

@@ -1,5 +1,5 @@
 // Turns: a few at once, then everybody else who is ready.
-#include "server/turns.hpp"
+#include "server/runtime/turns.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "server/tasks.hpp"
+#include "server/runtime/tasks.hpp"
 
 namespace server {
 namespace {

@@ -14,8 +14,8 @@
 #include <memory>
 #include <vector>
 
-#include "server/clock.hpp"
-#include "server/worker.hpp"
+#include "server/runtime/clock.hpp"
+#include "server/runtime/worker.hpp"
 
 namespace server {
 

@@ -6,7 +6,7 @@
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <thread>
 
-#include "server/tasks.hpp"
+#include "server/runtime/tasks.hpp"
 
 namespace server {
 namespace {

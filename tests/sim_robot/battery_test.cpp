@@ -1,11 +1,11 @@
 // The battery sags under load, recovers, runs down, and takes the motor's effect with it.
-#include "sim_robot/battery.hpp"
+#include "sim_robot/world/battery.hpp"
 
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 
-#include "sim_robot/world.hpp"
+#include "sim_robot/world/world.hpp"
 
 namespace sim_robot {
 namespace {

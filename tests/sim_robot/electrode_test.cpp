@@ -1,5 +1,5 @@
 // The electrode adds noise, offset and drift to the truth, and fails as it is told.
-#include "sim_robot/electrode.hpp"
+#include "sim_robot/world/electrode.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The robot closes its loop as the reference does: the golden experiment, in virtual time, through the protocol.
-#include "sim_robot/experiment.hpp"
+#include "sim_robot/lab/experiment.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "control/closed_loop.hpp"
-#include "control/discretise.hpp"
-#include "sim_robot/station_peer.hpp"
+#include "control/discretisation/discretise.hpp"
+#include "control/responses/closed_loop.hpp"
+#include "sim_robot/lab/station_peer.hpp"
 
 namespace sim_robot {
 namespace {

@@ -1,7 +1,7 @@
 // The faults of link and robot by time line, in virtual time: what the robot makes of them, and how they end.
 #include <gmock/gmock.h>
 
-#include "sim_robot/lab.hpp"
+#include "sim_robot/lab/lab.hpp"
 #include "tests/sim_robot/link_story.hpp"
 
 namespace sim_robot {

@@ -1,5 +1,5 @@
 // The HTTP control over real sockets: faults in, what is in force out, and everything that is refused.
-#include "sim_robot/fault_server.hpp"
+#include "sim_robot/client/fault_server.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 #include <boost/asio/write.hpp>
 #include <nlohmann/json.hpp>
 
-#include "sim_robot/impaired_link.hpp"
+#include "sim_robot/lab/impaired_link.hpp"
 
 namespace sim_robot {
 namespace {

@@ -1,11 +1,11 @@
 // Faults from JSON, and what a time line makes of them.
-#include "sim_robot/fault.hpp"
+#include "sim_robot/faults/fault.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "sim_robot/fault_timeline.hpp"
-#include "sim_robot/microseconds.hpp"
+#include "sim_robot/scenario/fault_timeline.hpp"
+#include "sim_robot/world/microseconds.hpp"
 
 namespace sim_robot {
 namespace {

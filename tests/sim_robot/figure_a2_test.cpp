@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "sim_robot/station_peer.hpp"
-#include "sim_robot/story.hpp"
+#include "sim_robot/lab/station_peer.hpp"
+#include "tests/sim_robot/story.hpp"
 
 namespace sim_robot {
 namespace {

@@ -1,5 +1,5 @@
 // Fleets over real TCP connections: every sample is accounted for, whatever happens to the station.
-#include "sim_robot/fleet.hpp"
+#include "sim_robot/fleet/fleet.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,10 @@
 #include <stdexcept>
 #include <thread>
 
-#include "sim_robot/fleet_report.hpp"
-#include "sim_robot/replayed_robot.hpp"
-#include "sim_robot/robot_client.hpp"
-#include "sim_robot/station_peer.hpp"
+#include "sim_robot/client/robot_client.hpp"
+#include "sim_robot/fleet/fleet_report.hpp"
+#include "sim_robot/fleet/replayed_robot.hpp"
+#include "sim_robot/lab/station_peer.hpp"
 #include "tests/sim_robot/telemetry_sink.hpp"
 
 namespace sim_robot {

@@ -1,12 +1,12 @@
 // Patches lie where they were poured, mix without loss, fade, and change the impedance as Figure A2 shows.
-#include "sim_robot/glucose.hpp"
+#include "sim_robot/world/glucose.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <stdexcept>
 
-#include "sim_robot/tick.hpp"
+#include "sim_robot/world/tick.hpp"
 
 namespace sim_robot {
 namespace {

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <random>
 
-#include "control/time_response.hpp"
-#include "sim_robot/imu.hpp"
-#include "sim_robot/station_peer.hpp"
-#include "sim_robot/tick.hpp"
+#include "control/responses/time_response.hpp"
+#include "sim_robot/lab/station_peer.hpp"
+#include "sim_robot/world/imu.hpp"
+#include "sim_robot/world/tick.hpp"
 
 namespace sim_robot {
 namespace {

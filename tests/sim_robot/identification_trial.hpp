@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "control/identify.hpp"
-#include "sim_robot/plant.hpp"
+#include "control/identification/identify.hpp"
+#include "sim_robot/world/plant.hpp"
 
 namespace sim_robot {
 

@@ -1,7 +1,7 @@
 // From the telemetry of a robot that only has its accelerometer, identification finds the fluid and not the belief.
 #include <gtest/gtest.h>
 
-#include "control/margins.hpp"
+#include "control/responses/margins.hpp"
 #include "tests/sim_robot/identification_trial.hpp"
 
 namespace sim_robot {

@@ -1,5 +1,5 @@
 // One impaired direction: when its bytes arrive, that each of them does, once and in order, and what it holds.
-#include "sim_robot/impairment.hpp"
+#include "sim_robot/network/impairment.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The simulated accelerometer has the faults that its header states.
-#include "sim_robot/imu.hpp"
+#include "sim_robot/world/imu.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The histogram of lateness against a sorted list.
-#include "sim_robot/lateness.hpp"
+#include "sim_robot/client/lateness.hpp"
 
 #include <gtest/gtest.h>
 

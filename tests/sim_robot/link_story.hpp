@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
-#include "sim_robot/fault_timeline.hpp"
-#include "sim_robot/linked_peer.hpp"
-#include "sim_robot/station_commands.hpp"
+#include "sim_robot/lab/linked_peer.hpp"
+#include "sim_robot/lab/station_commands.hpp"
+#include "sim_robot/scenario/fault_timeline.hpp"
 
 namespace sim_robot {
 

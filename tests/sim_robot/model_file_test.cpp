@@ -1,5 +1,5 @@
 // Models come as the tools print them, and nothing that is not a model gets in.
-#include "sim_robot/model_file.hpp"
+#include "sim_robot/scenario/model_file.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // The motor stands still in its dead zone, lags as its time constant says, and weakens with the supply.
-#include "sim_robot/motor.hpp"
+#include "sim_robot/world/motor.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <stdexcept>
 
-#include "sim_robot/tick.hpp"
+#include "sim_robot/world/tick.hpp"
 
 namespace sim_robot {
 namespace {

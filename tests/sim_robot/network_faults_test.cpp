@@ -1,7 +1,7 @@
 // What each fault of the network makes of the robot and of the least of a station, as docs/network_faults.md says.
 #include <gtest/gtest.h>
 
-#include "sim_robot/story.hpp"
+#include "tests/sim_robot/story.hpp"
 
 namespace sim_robot {
 namespace {

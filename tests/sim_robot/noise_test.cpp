@@ -1,5 +1,5 @@
 // The random numbers have the moments and the tails that they should, and are the same for ever.
-#include "sim_robot/noise.hpp"
+#include "sim_robot/world/noise.hpp"
 
 #include <gtest/gtest.h>
 

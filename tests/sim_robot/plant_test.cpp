@@ -1,6 +1,6 @@
 // The fluids move the robot as the golden responses say, through the whole world, and the nonlinear one as its
 // equations.
-#include "sim_robot/plant.hpp"
+#include "sim_robot/world/plant.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "control/time_response.hpp"
-#include "sim_robot/world.hpp"
+#include "control/responses/time_response.hpp"
+#include "sim_robot/world/world.hpp"
 
 namespace sim_robot {
 namespace {

@@ -9,7 +9,7 @@
 #include <memory>
 #include <optional>
 
-#include "sim_robot/proxy.hpp"
+#include "sim_robot/proxy/proxy.hpp"
 
 namespace sim_robot {
 

@@ -1,5 +1,5 @@
 // The pump's profile is the golden one, its mean is what is set, and the walls smooth it as their time constant says.
-#include "sim_robot/pump.hpp"
+#include "sim_robot/world/pump.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "sim_robot/tick.hpp"
+#include "sim_robot/world/tick.hpp"
 
 namespace sim_robot {
 namespace {

@@ -1,5 +1,5 @@
 // How often a robot dials a station that does not answer.
-#include "sim_robot/redial.hpp"
+#include "sim_robot/network/redial.hpp"
 
 #include <gtest/gtest.h>
 

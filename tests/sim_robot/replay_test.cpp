@@ -1,5 +1,5 @@
 // Frames of a recording, sent as those of another robot: they decode, follow each other, and hold what was recorded.
-#include "sim_robot/replay.hpp"
+#include "sim_robot/fleet/replay.hpp"
 
 #include <gtest/gtest.h>
 

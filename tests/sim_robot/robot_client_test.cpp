@@ -1,5 +1,5 @@
 // The simulated robot over a real TCP connection: it dials, obeys, survives losses, and never waits for the network.
-#include "sim_robot/robot_client.hpp"
+#include "sim_robot/client/robot_client.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "sim_robot/station_peer.hpp"
+#include "sim_robot/lab/station_peer.hpp"
 
 namespace sim_robot {
 namespace {

@@ -1,7 +1,7 @@
 // Reboots, brown-outs and clocks that lie: what outlives them, and what the station sees.
 #include <gtest/gtest.h>
 
-#include "sim_robot/story.hpp"
+#include "tests/sim_robot/story.hpp"
 
 namespace sim_robot {
 namespace {

@@ -1,12 +1,12 @@
 // The shipped scenarios do what their figures say, and the same scenario gives the same bytes.
-#include "sim_robot/scenario_run.hpp"
+#include "sim_robot/lab/scenario_run.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <set>
 
-#include "control/step_metrics.hpp"
+#include "control/responses/step_metrics.hpp"
 
 namespace sim_robot {
 namespace {

@@ -1,5 +1,5 @@
 // Scenario files: what they set, and errors that name file, line, column, key, value and what is allowed.
-#include "sim_robot/scenario.hpp"
+#include "sim_robot/scenario/scenario.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "sim_robot/scenario_tables.hpp"
+#include "sim_robot/scenario/scenario_tables.hpp"
 
 namespace sim_robot {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "sim_robot/station_peer.hpp"
+#include "sim_robot/lab/station_peer.hpp"
 
 namespace sim_robot {
 namespace {

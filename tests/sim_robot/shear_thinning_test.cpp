@@ -1,12 +1,12 @@
 // The fluid that thins under shear is no linear one: its speed grows faster than the duty, and it lags.
-#include "sim_robot/shear_thinning_plant.hpp"
+#include "sim_robot/world/shear_thinning_plant.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <stdexcept>
 
-#include "sim_robot/world.hpp"
+#include "sim_robot/world/world.hpp"
 
 namespace sim_robot {
 namespace {

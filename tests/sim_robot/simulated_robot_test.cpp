@@ -1,9 +1,9 @@
 // Ticks that come late, a little or after a stall: what the core, the plant and the station see of it.
-#include "sim_robot/simulated_robot.hpp"
+#include "sim_robot/robot/simulated_robot.hpp"
 
 #include <gtest/gtest.h>
 
-#include "sim_robot/station_peer.hpp"
+#include "sim_robot/lab/station_peer.hpp"
 
 namespace sim_robot {
 namespace {

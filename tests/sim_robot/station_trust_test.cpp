@@ -1,6 +1,6 @@
 // What rheonaut-sim says of a pin or an authority that cannot be used. That the wrong station is refused, and the right
 // one is not, shows tests/system/tls_test.py with a real one.
-#include "sim_robot/station_trust.hpp"
+#include "sim_robot/client/station_trust.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

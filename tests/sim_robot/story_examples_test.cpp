@@ -1,7 +1,7 @@
 // The examples of docs/test_stories.md, which quotes them from here word for word.
 #include <gtest/gtest.h>
 
-#include "sim_robot/story.hpp"
+#include "tests/sim_robot/story.hpp"
 
 namespace sim_robot {
 namespace {

@@ -1,5 +1,5 @@
 // The words of a story: what they wait for, how fast, and what they say when it does not come.
-#include "sim_robot/story.hpp"
+#include "tests/sim_robot/story.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // The same flow rate passes every cross-section, carries the robot, and is felt only where it changes.
-#include "sim_robot/vessel.hpp"
+#include "sim_robot/world/vessel.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "sim_robot/world.hpp"
+#include "sim_robot/world/world.hpp"
 
 namespace sim_robot {
 namespace {

@@ -1,12 +1,12 @@
 // The world as a whole: what it is by default, that a seed repeats it, and what it refuses.
-#include "sim_robot/world.hpp"
+#include "sim_robot/world/world.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <stdexcept>
 
-#include "control/modal_plant.hpp"
+#include "control/models/modal_plant.hpp"
 
 namespace sim_robot {
 namespace {

@@ -2,7 +2,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "control/step_metrics.hpp"
+#include "control/responses/step_metrics.hpp"
 #include "tests/system/station_fixture.hpp"
 
 namespace server {

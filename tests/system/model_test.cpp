@@ -2,7 +2,7 @@
 #include <bit>
 
 #include "robot_fw/core/parameters.hpp"
-#include "server/station/fluid_model.hpp"
+#include "server/station/state/fluid_model.hpp"
 #include "tests/system/station_fixture.hpp"
 
 namespace server {

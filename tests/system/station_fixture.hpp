@@ -1,6 +1,6 @@
 // A whole station with its recorder, and a simulated robot, in one process and in virtual time.
 //
-// Tests are told in the words of sim_robot/story_words.hpp. Here "accepted" is what the station makes of it
+// Tests are told in the words of tests/sim_robot/story_words.hpp. Here "accepted" is what the station makes of it
 // (acknowledged), a refusal may be its own, and a link that is not connected counts as lost.
 #pragma once
 
@@ -9,10 +9,10 @@
 #include <filesystem>
 #include <set>
 
-#include "server/recording/recording_parts.hpp"
+#include "server/runtime/tasks.hpp"
 #include "server/station/model_sender.hpp"
-#include "server/tasks.hpp"
-#include "sim_robot/story_words.hpp"
+#include "server/storage/recording_parts.hpp"
+#include "tests/sim_robot/story_words.hpp"
 #include "tests/system/virtual_robot.hpp"
 
 namespace server {

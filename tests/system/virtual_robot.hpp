@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "server/link/robot_listener.hpp"
-#include "sim_robot/simulated_robot.hpp"
+#include "sim_robot/robot/simulated_robot.hpp"
 #include "tests/server/virtual_clock.hpp"
 
 namespace server {

@@ -9,7 +9,7 @@
 #include "chip.hpp"
 #include "protocol/frame.hpp"
 #include "robot_fw/esp8266/robot_port.hpp"
-#include "sim_robot/station_commands.hpp"
+#include "sim_robot/lab/station_commands.hpp"
 
 namespace robot_fw::esp8266 {
 

@@ -1,7 +1,7 @@
 // Users, tokens and enrolments: what is kept, what a restart finds, and what a disk that cannot be written spoils.
 #include <fstream>
 
-#include "server/recording/database.hpp"
+#include "server/storage/database/database.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {

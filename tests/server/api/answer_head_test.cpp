@@ -1,5 +1,5 @@
 // How the head of an answer is framed, and what it tells a browser.
-#include "server/api/answer_head.hpp"
+#include "server/http/answer_head.hpp"
 
 #include <gtest/gtest.h>
 

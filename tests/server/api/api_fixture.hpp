@@ -7,8 +7,8 @@
 #include <string>
 
 #include "server/api/api_server.hpp"
-#include "server/recording/recording_parts.hpp"
 #include "server/station/model_sender.hpp"
+#include "server/storage/recording_parts.hpp"
 #include "tests/server/link/test_robot.hpp"
 
 namespace server {

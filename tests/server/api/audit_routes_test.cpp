@@ -1,8 +1,8 @@
 // Who did what, when and from where, as the route tells it: of commands, refusals, control, sign-ins and accounts.
 #include <gmock/gmock.h>
 
-#include "server/recording/audit_check.hpp"
-#include "server/recording/database.hpp"
+#include "server/storage/database/database.hpp"
+#include "server/storage/upkeep/audit_check.hpp"
 #include "tests/server/api/live_page.hpp"
 
 namespace server {

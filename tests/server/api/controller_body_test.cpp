@@ -1,14 +1,14 @@
 // Controllers of the library and of the robot as bodies: the same coefficients on the wire, or a sentence that says
 // what is wrong.
-#include "server/api/controller_body.hpp"
+#include "server/api/bodies/controller_body.hpp"
 
 #include <gtest/gtest.h>
 
 #include <complex>
 
-#include "control/discretise.hpp"
+#include "control/discretisation/discretise.hpp"
 #include "server/analysis/control_json.hpp"
-#include "server/station/in_force.hpp"
+#include "server/station/state/in_force.hpp"
 
 namespace server {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "server/api/fluid_model_body.hpp"
+#include "server/api/bodies/fluid_model_body.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {

@@ -1,5 +1,5 @@
 // Slow and hostile clients of the HTTP port: what becomes of them, and that a robot is stopped all the while.
-#include "server/api/http_connection.hpp"
+#include "server/http/http_connection.hpp"
 #include "tests/server/api/live_page.hpp"
 
 namespace server {

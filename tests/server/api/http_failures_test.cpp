@@ -1,8 +1,9 @@
 // What goes wrong inside: the connection says that it did, the log says what, and the station goes on.
 #include <SQLiteCpp/SQLiteCpp.h>
 
-#include "server/api/http_connection.hpp"
-#include "server/api/http_server.hpp"
+#include "server/api/live_socket.hpp"
+#include "server/http/http_connection.hpp"
+#include "server/http/http_server.hpp"
 #include "tests/server/api/live_page.hpp"
 #include "tests/server/captured_log.hpp"
 
@@ -132,6 +133,9 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
   LiveFeed feed{clock};
   RobotTexts texts{loop, station};
   LiveParts live{loop, tasks, clock, station, feed, texts, "0"};
+  Upgrades upgrades{"/live", [&](HttpStream stream, UpgradeRequest upgrade, Caller caller) {
+                      return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live);
+                    }};
   Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
   NewCredentials credentials{loop, clock, folder.path()};
   const RequestGuard guard{credentials.auth, {}};
@@ -143,7 +147,7 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
                 co_return response;
               }});
   Entrance entrance{{clock, "http port", DoorLimits{}}, nullptr};
-  HttpServer server{tasks, clock, listener, entrance, guard, router, live};
+  HttpServer server{tasks, clock, listener, entrance, guard, router, upgrades};
   tasks.spawn("http", server.run());
   {
     RawClient client{clock, listener.endpoint().port()};
@@ -192,13 +196,16 @@ TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
   LiveFeed feed{clock};
   RobotTexts texts{loop, station};
   LiveParts live{loop, tasks, broken, station, feed, texts, "0"};
+  Upgrades upgrades{"/live", [&](HttpStream stream, UpgradeRequest upgrade, Caller caller) {
+                      return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live);
+                    }};
   Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
   NewCredentials credentials{loop, clock, folder.path()};
   Auth& auth = credentials.auth;
   const RequestGuard guard{auth, {}};
   const Router router;
   Entrance entrance{{clock, "http port", DoorLimits{}}, nullptr};
-  HttpServer server{tasks, clock, listener, entrance, guard, router, live};
+  HttpServer server{tasks, clock, listener, entrance, guard, router, upgrades};
   tasks.spawn("http", server.run());
   const auto session = auth.log_in(auth.new_login_code(), "", "");
   {

@@ -1,5 +1,5 @@
 // HTTP over real loopback sockets: good manners, and every kind of bad ones.
-#include "server/api/http_connection.hpp"
+#include "server/http/http_connection.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {

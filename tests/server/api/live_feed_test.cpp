@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "server/tasks.hpp"
+#include "server/runtime/tasks.hpp"
 #include "tests/server/virtual_clock.hpp"
 
 namespace server {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "server/live/live_feed.hpp"
-#include "server/tasks.hpp"
+#include "server/runtime/tasks.hpp"
 #include "tests/server/virtual_clock.hpp"
 
 namespace server {

@@ -1,5 +1,5 @@
 // Signing in with a password, and whoever tries to guess one.
-#include "server/api/login_throttle.hpp"
+#include "server/identity/login_throttle.hpp"
 
 #include "tests/server/api/api_fixture.hpp"
 

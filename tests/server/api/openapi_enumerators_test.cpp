@@ -7,13 +7,13 @@
 #include <sstream>
 #include <string>
 
-#include "server/account.hpp"
 #include "server/analysis/run_steps.hpp"
-#include "server/recording/backup.hpp"
-#include "server/recording/disk_watch.hpp"
-#include "server/recording/outside_reference.hpp"
-#include "server/recording/runs.hpp"
-#include "server/station/station_state.hpp"
+#include "server/identity/account.hpp"
+#include "server/station/state/station_state.hpp"
+#include "server/storage/runs/outside_reference.hpp"
+#include "server/storage/runs/run.hpp"
+#include "server/storage/upkeep/backup.hpp"
+#include "server/storage/upkeep/disk_watch.hpp"
 
 namespace server {
 namespace {

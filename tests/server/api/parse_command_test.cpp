@@ -1,7 +1,8 @@
 // Bodies of commands: what is understood, and the sentence for what is not.
 #include <gtest/gtest.h>
 
-#include "server/api/json.hpp"
+#include "server/api/bodies/json.hpp"
+#include "server/http/http.hpp"
 
 namespace server {
 namespace {

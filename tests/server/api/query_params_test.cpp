@@ -1,5 +1,5 @@
 // Query parameters are taken as they are meant, or refused by name.
-#include "server/api/query_params.hpp"
+#include "server/api/bodies/query_params.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 // Paths, methods and queries.
-#include "server/api/router.hpp"
+#include "server/http/router.hpp"
 
 #include <gtest/gtest.h>
 
-#include "server/tasks.hpp"
+#include "server/runtime/tasks.hpp"
 
 namespace server {
 namespace {

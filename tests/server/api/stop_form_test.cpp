@@ -1,6 +1,6 @@
 // An emergency stop over a real socket, in every form that a program may give it: only who asks, and from where, is
 // judged.
-#include "server/api/http_connection.hpp"
+#include "server/http/http_connection.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {

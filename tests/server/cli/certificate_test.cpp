@@ -1,7 +1,7 @@
 // `rheonaut certificate`: what it makes, what it never overwrites, and what a renewal keeps.
 #include <gmock/gmock.h>
 
-#include "server/tls_certificate.hpp"
+#include "server/tls/tls_certificate.hpp"
 #include "tests/server/cli/tool_test.hpp"
 
 namespace server::cli {

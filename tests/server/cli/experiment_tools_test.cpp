@@ -6,7 +6,7 @@
 #include <numeric>
 #include <sstream>
 
-#include "server/cli/output.hpp"
+#include "server/cli/terminal/output.hpp"
 #include "tests/server/cli/tool_test.hpp"
 
 namespace server::cli {

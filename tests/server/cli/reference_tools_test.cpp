@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "control/modal_plant.hpp"
+#include "control/models/modal_plant.hpp"
 #include "tests/server/cli/tool_test.hpp"
 #include "tests/server/recording/recording_test.hpp"
 

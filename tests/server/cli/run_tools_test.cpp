@@ -7,8 +7,8 @@
 #include <set>
 #include <utility>
 
-#include "control/modal_plant.hpp"
-#include "server/recording/run_reader.hpp"
+#include "control/models/modal_plant.hpp"
+#include "server/storage/query/run_reader.hpp"
 #include "tests/server/cli/tool_test.hpp"
 #include "tests/server/recording/recording_test.hpp"
 

@@ -1,7 +1,7 @@
 // What verify answers, and that it changes nothing.
 #include <gmock/gmock.h>
 
-#include "server/recording/schema.hpp"
+#include "server/storage/database/schema.hpp"
 #include "tests/server/cli/tool_test.hpp"
 #include "tests/server/recording/recording_test.hpp"
 

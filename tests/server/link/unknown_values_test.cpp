@@ -1,6 +1,6 @@
 // What a newer firmware says and this version does not know stays what it is: its text is "unknown", its number is
 // kept.
-#include "server/station/unknown_values.hpp"
+#include "server/station/state/unknown_values.hpp"
 
 #include "server/live/state_json.hpp"
 #include "tests/server/link/link_fixture.hpp"

@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "server/tasks.hpp"
+#include "server/runtime/tasks.hpp"
 #include "tests/server/virtual_clock.hpp"
 
 namespace server {

@@ -15,12 +15,12 @@
 #include <fstream>
 #include <sstream>
 
-#include "server/cli/certificate.hpp"
+#include "server/cli/data/certificate.hpp"
 #include "server/net/byte_stream.hpp"
 #include "server/net/listener.hpp"
 #include "server/net/poll_set.hpp"
 #include "server/net/transport_security.hpp"
-#include "server/tasks.hpp"
+#include "server/runtime/tasks.hpp"
 #include "tests/server/virtual_clock.hpp"
 
 namespace server {

@@ -3,7 +3,7 @@
 
 #include <boost/asio/experimental/awaitable_operators.hpp>
 
-#include "server/recording/account_store.hpp"
+#include "server/identity/account_store.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

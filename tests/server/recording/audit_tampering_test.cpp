@@ -7,8 +7,8 @@
 #include <random>
 #include <regex>
 
-#include "server/recording/audit_check.hpp"
-#include "server/recording/statement.hpp"
+#include "server/storage/database/statement.hpp"
+#include "server/storage/upkeep/audit_check.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

@@ -1,6 +1,6 @@
 // What is done leaves an entry in the chain, with what was done or not at all; and nobody can fill the disk with
 // entries.
-#include "server/recording/audit_check.hpp"
+#include "server/storage/upkeep/audit_check.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -9,10 +9,10 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "server/recording/account_store.hpp"
-#include "server/recording/audit_queries.hpp"
-#include "server/recording/run_file.hpp"
-#include "server/recording/run_reader.hpp"
+#include "server/identity/account_store.hpp"
+#include "server/storage/audit/audit_queries.hpp"
+#include "server/storage/export/run_file.hpp"
+#include "server/storage/query/run_reader.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

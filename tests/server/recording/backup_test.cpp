@@ -1,5 +1,5 @@
 // A backup of the live database is whole, verified, and never in the way of the recording.
-#include "server/recording/backup.hpp"
+#include "server/storage/upkeep/backup.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <fstream>
 
-#include "server/recording/file_check.hpp"
+#include "server/storage/database/file_check.hpp"
 #include "tests/server/recording/recording_test.hpp"
 #include "tests/server/recording/stored_runs.hpp"
 

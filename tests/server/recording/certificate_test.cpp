@@ -1,12 +1,12 @@
 // The certificate says of a run exactly what a naive recount of its samples says.
-#include "server/recording/certificate.hpp"
+#include "server/storage/runs/certificate.hpp"
 
 #include <array>
 #include <bit>
 #include <cmath>
 #include <map>
 
-#include "server/recording/statement.hpp"
+#include "server/storage/database/statement.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

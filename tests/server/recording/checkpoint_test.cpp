@@ -8,7 +8,7 @@
 #include <random>
 #include <sstream>
 
-#include "server/api/csv_export.hpp"
+#include "server/api/routes/csv_export.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

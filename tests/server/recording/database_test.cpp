@@ -1,5 +1,5 @@
 // What is not ours is refused and left alone; the views are answered by index and row number.
-#include "server/recording/database.hpp"
+#include "server/storage/database/database.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -8,8 +8,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "server/data_folder.hpp"
-#include "server/recording/schema.hpp"
+#include "server/config/data_folder.hpp"
+#include "server/storage/database/schema.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

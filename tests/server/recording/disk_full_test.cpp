@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "server/recording/disk_reserve.hpp"
+#include "server/storage/database/disk_reserve.hpp"
 #include "tests/server/recording/recording_test.hpp"
 #include "tests/server/recording/schema_dump.hpp"
 #include "tests/server/recording/stored_runs.hpp"

@@ -1,5 +1,5 @@
 // The file that holds room for the next start.
-#include "server/recording/disk_reserve.hpp"
+#include "server/storage/database/disk_reserve.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -1,5 +1,5 @@
 // Little room on the disk: a warning, then nothing new, and by itself all well again.
-#include "server/recording/disk_watch.hpp"
+#include "server/storage/upkeep/disk_watch.hpp"
 
 #include <gmock/gmock.h>
 

@@ -5,7 +5,7 @@
 #include <sstream>
 #include <string>
 
-#include "server/recording/schema.hpp"
+#include "server/storage/database/schema.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

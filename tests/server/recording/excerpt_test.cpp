@@ -1,7 +1,7 @@
 // What a robot recorded in a window of time, and what of it is missing.
 #include <algorithm>
 
-#include "server/recording/span_finder.hpp"
+#include "server/storage/query/span_finder.hpp"
 #include "tests/server/recording/random_recording.hpp"
 
 namespace server {

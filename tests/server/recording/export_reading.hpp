@@ -9,13 +9,13 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "server/api/column_text.hpp"
-#include "server/recording/csv_writer.hpp"
-#include "server/recording/database.hpp"
-#include "server/recording/mat_writer.hpp"
-#include "server/recording/run_file.hpp"
-#include "server/recording/run_reader.hpp"
-#include "server/station/unknown_values.hpp"
+#include "server/api/bodies/column_text.hpp"
+#include "server/station/state/unknown_values.hpp"
+#include "server/storage/database/database.hpp"
+#include "server/storage/export/csv_writer.hpp"
+#include "server/storage/export/mat_writer.hpp"
+#include "server/storage/export/run_file.hpp"
+#include "server/storage/query/run_reader.hpp"
 #include "tests/server/recording/random_recording.hpp"
 
 namespace server {

@@ -1,5 +1,5 @@
 // Rows of an export count what is missing before them, and a grid takes the nearest sample or none.
-#include "server/recording/export_rows.hpp"
+#include "server/storage/export/export_rows.hpp"
 
 #include <gtest/gtest.h>
 

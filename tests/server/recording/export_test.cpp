@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <fstream>
 
-#include "server/cli/export.hpp"
-#include "server/recording/schema.hpp"
+#include "server/cli/data/export.hpp"
+#include "server/storage/database/schema.hpp"
 
 namespace server {
 namespace {

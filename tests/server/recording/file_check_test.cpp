@@ -1,5 +1,5 @@
 // What is not ours, or not whole, is told from its bytes and stays as it is; damage at run time says what to do.
-#include "server/recording/file_check.hpp"
+#include "server/storage/database/file_check.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -7,7 +7,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "server/recording/schema.hpp"
+#include "server/storage/database/schema.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

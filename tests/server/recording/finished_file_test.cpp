@@ -1,5 +1,5 @@
 // A file that is moved to another disk is there whole, or the first one stays.
-#include "server/recording/finished_file.hpp"
+#include "server/storage/database/finished_file.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Models of fluids on disk: the newest is in force, over restarts, with every number as it was given.
-#include "server/recording/fluid_models.hpp"
+#include "server/storage/runs/fluid_models.hpp"
 
 #include <gmock/gmock.h>
 

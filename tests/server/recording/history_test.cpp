@@ -1,5 +1,5 @@
 // Pages of samples, gaps, events and commands give back what was recorded.
-#include "server/recording/history.hpp"
+#include "server/storage/query/history.hpp"
 
 #include "tests/server/recording/recording_test.hpp"
 

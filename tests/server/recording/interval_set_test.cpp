@@ -1,5 +1,5 @@
 // The set of intervals behaves as a set of numbers.
-#include "server/recording/interval_set.hpp"
+#include "server/storage/samples/interval_set.hpp"
 
 #include <gtest/gtest.h>
 

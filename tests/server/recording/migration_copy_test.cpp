@@ -1,5 +1,5 @@
 // Before a database of an older schema is changed it is copied: whole, once, and never over another copy.
-#include "server/recording/migration_copy.hpp"
+#include "server/storage/database/migration_copy.hpp"
 
 #include <gmock/gmock.h>
 #include <sys/wait.h>
@@ -7,9 +7,9 @@
 
 #include <set>
 
-#include "server/audit_note.hpp"
-#include "server/recording/restore.hpp"
-#include "server/recording/schema.hpp"
+#include "server/station/state/audit_note.hpp"
+#include "server/storage/database/schema.hpp"
+#include "server/storage/upkeep/restore.hpp"
 #include "tests/server/recording/recording_test.hpp"
 #include "tests/server/recording/schema_dump.hpp"
 

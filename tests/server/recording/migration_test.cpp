@@ -2,9 +2,9 @@
 #include <fstream>
 #include <sstream>
 
-#include "server/recording/audit_check.hpp"
-#include "server/recording/run_reader.hpp"
-#include "server/recording/schema.hpp"
+#include "server/storage/database/schema.hpp"
+#include "server/storage/query/run_reader.hpp"
+#include "server/storage/upkeep/audit_check.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

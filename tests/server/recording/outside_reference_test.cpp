@@ -1,12 +1,12 @@
 // References in the database: written in pieces, replaced, and deleted with their run.
-#include "server/recording/outside_reference.hpp"
+#include "server/storage/runs/outside_reference.hpp"
 
 #include <gmock/gmock.h>
 #include <sqlite3.h>
 
-#include "server/recording/run_file.hpp"
-#include "server/recording/run_reader.hpp"
-#include "server/recording/store_check.hpp"
+#include "server/storage/export/run_file.hpp"
+#include "server/storage/query/run_reader.hpp"
+#include "server/storage/upkeep/store_check.hpp"
 #include "tests/server/recording/retention_fixture.hpp"
 
 namespace server {

@@ -1,6 +1,6 @@
 // Overviews say what the samples say: the same extremes as a walk over every sample, with nothing twice and nothing
 // left out.
-#include "server/recording/overview.hpp"
+#include "server/storage/query/overview.hpp"
 
 #include <algorithm>
 #include <cmath>

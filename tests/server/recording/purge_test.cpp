@@ -1,5 +1,5 @@
 // What may go goes in short steps, with commits in between; what has come to be held meanwhile stays.
-#include "server/recording/purge.hpp"
+#include "server/storage/upkeep/purge.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

@@ -4,9 +4,9 @@
 #include <random>
 #include <set>
 
-#include "server/recording/sample_scanner.hpp"
-#include "server/recording/statement.hpp"
-#include "server/recording/store_check.hpp"
+#include "server/storage/database/statement.hpp"
+#include "server/storage/samples/sample_scanner.hpp"
+#include "server/storage/upkeep/store_check.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

@@ -1,6 +1,6 @@
 // Every sample that is acknowledged is stored once, in its place; what is lost is listed.
 // LONG: one rule each of one class, in one vocabulary.
-#include "server/recording/recorder.hpp"
+#include "server/storage/ingest/recorder.hpp"
 
 #include <limits>
 

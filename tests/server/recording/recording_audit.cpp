@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include "server/recording/audit_check.hpp"
-#include "server/recording/statement.hpp"
+#include "server/storage/database/statement.hpp"
+#include "server/storage/upkeep/audit_check.hpp"
 
 namespace server {
 namespace {

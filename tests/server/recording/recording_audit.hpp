@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "server/recording/interval_set.hpp"
-#include "server/station/station_state.hpp"
+#include "server/station/state/station_state.hpp"
+#include "server/storage/samples/interval_set.hpp"
 
 namespace server {
 

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "server/recording/recording_parts.hpp"
-#include "server/tasks.hpp"
+#include "server/runtime/tasks.hpp"
+#include "server/storage/recording_parts.hpp"
 #include "tests/server/virtual_clock.hpp"
 
 namespace server {

@@ -1,11 +1,11 @@
 // A backup becomes a station's database again: verified, marked as another store, with no run left open.
-#include "server/recording/restore.hpp"
+#include "server/storage/upkeep/restore.hpp"
 
 #include <gmock/gmock.h>
 
 #include <fstream>
 
-#include "server/recording/schema.hpp"
+#include "server/storage/database/schema.hpp"
 #include "tests/server/recording/recording_test.hpp"
 #include "tests/server/recording/stored_runs.hpp"
 

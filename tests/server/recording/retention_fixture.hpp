@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "server/recording/purge.hpp"
+#include "server/storage/upkeep/purge.hpp"
 #include "tests/server/recording/recording_test.hpp"
 #include "tests/server/recording/stored_runs.hpp"
 

@@ -2,8 +2,8 @@
 // noted in a recording, is kept with who said it.
 #include <random>
 
-#include "server/recording/run_spans.hpp"
-#include "server/recording/run_store.hpp"
+#include "server/storage/runs/run_spans.hpp"
+#include "server/storage/runs/run_store.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

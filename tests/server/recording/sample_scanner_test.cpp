@@ -1,5 +1,5 @@
 // A scan gives what a plain query over segments and rows gives, for random recordings, ranges and channels.
-#include "server/recording/sample_scanner.hpp"
+#include "server/storage/samples/sample_scanner.hpp"
 
 #include <fmt/format.h>
 

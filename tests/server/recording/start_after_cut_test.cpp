@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "server/recording/database.hpp"
+#include "server/storage/database/database.hpp"
 #include "tests/server/recording/forgetful_vfs.hpp"
 
 namespace server {

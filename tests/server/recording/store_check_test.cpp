@@ -1,5 +1,5 @@
 // What verify finds: nothing in a good database, and each kind of damage by name.
-#include "server/recording/store_check.hpp"
+#include "server/storage/upkeep/store_check.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,14 +1,14 @@
 // A write-ahead log that is removed or cut, a database that began anew and an older copy in its place are noticed, and
 // what they cost is seconds.
-#include "server/recording/store_head.hpp"
+#include "server/storage/upkeep/store_head.hpp"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <fstream>
 
-#include "server/recording/restore.hpp"
-#include "server/recording/schema.hpp"
+#include "server/storage/database/schema.hpp"
+#include "server/storage/upkeep/restore.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {

@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include "server/recording/interval_set.hpp"
-#include "server/recording/statement.hpp"
+#include "server/storage/database/statement.hpp"
+#include "server/storage/samples/interval_set.hpp"
 
 namespace server {
 namespace {

@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "server/cli/export.hpp"
-#include "server/recording/audit_check.hpp"
-#include "server/recording/schema.hpp"
-#include "server/recording/store_check.hpp"
+#include "server/cli/data/export.hpp"
+#include "server/storage/database/schema.hpp"
+#include "server/storage/upkeep/audit_check.hpp"
+#include "server/storage/upkeep/store_check.hpp"
 #include "tests/server/recording/recording_test.hpp"
 #include "tests/server/recording/schema_dump.hpp"
 

@@ -1,5 +1,5 @@
 // The estimate of a robot's clock, against robots whose clock is known.
-#include "server/station/clock_sync.hpp"
+#include "server/station/state/clock_sync.hpp"
 
 #include <gtest/gtest.h>
 

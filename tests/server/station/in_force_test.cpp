@@ -1,5 +1,5 @@
 // The table of parameters put together from pages, whatever the pages say.
-#include "server/station/in_force.hpp"
+#include "server/station/state/in_force.hpp"
 
 #include <gtest/gtest.h>
 

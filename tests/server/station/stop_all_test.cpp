@@ -5,8 +5,8 @@
 #include <memory>
 #include <stdexcept>
 
+#include "server/runtime/tasks.hpp"
 #include "server/station/station.hpp"
-#include "server/tasks.hpp"
 #include "tests/server/virtual_clock.hpp"
 
 namespace server {

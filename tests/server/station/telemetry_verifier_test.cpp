@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/station/stop_times.hpp"
+#include "server/station/state/stop_times.hpp"
 
 namespace server {
 namespace {

@@ -1,0 +1,22 @@
+// By way of the shortest text.
+#include "base/json_text.hpp"
+
+#include <charconv>
+#include <cmath>
+
+namespace server {
+
+nlohmann::json decimal(float value) {
+  if (!std::isfinite(value)) return nullptr;
+  char digits[32];
+  const auto written = std::to_chars(digits, digits + sizeof digits, value);
+  double shortest = 0;
+  std::from_chars(digits, written.ptr, shortest);
+  return shortest;
+}
+
+std::string dump(const nlohmann::json& value) {
+  return value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace server

@@ -1,0 +1,15 @@
+// JSON as text: floats as short decimals, and strings that need not be UTF-8.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace server {
+
+// A float as the shortest decimal that gives the same float back: 0.1, not 0.10000000149011612. null unless finite.
+nlohmann::json decimal(float value);
+
+// The text of a JSON value; bytes that are not UTF-8 are replaced.
+std::string dump(const nlohmann::json& value);
+
+}  // namespace server

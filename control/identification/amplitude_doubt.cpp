@@ -1,0 +1,191 @@
+// Projects the residuals on what other parameters and another amplitude could make of them.
+#include "control/identification/amplitude_doubt.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "control/identification/residual_doubts.hpp"
+
+namespace control {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kDoubtfulF = 60, kDoubtfulShare = 0.1;
+constexpr double kFitOfRounding = 100 - 1e-6;  // percent
+constexpr double kWindowS = 1;                 // a clock that is off by 0.5 % drifts by half a sample
+constexpr Index kMostWindows = 60;
+constexpr double kShortestLag = 2;   // samples
+constexpr double kDependent = 1e-3;  // of a direction, what others cannot make of it, relative
+
+// Columns of all channels, one below the other, in units of the channel's residual.
+MatrixXd stacked(const std::vector<MatrixXd>& parts, const std::vector<double>& sd) {
+  const Index samples = parts.front().rows();
+  MatrixXd all(samples * std::ssize(parts), parts.front().cols());
+  for (std::size_t c = 0; c < parts.size(); ++c) {
+    all.middleRows(static_cast<Index>(c) * samples, samples) = parts[c] / sd[c];
+  }
+  return all;
+}
+
+// From one sample to a quarter of the record, ever further apart.
+std::vector<Index> delays(Index samples) {
+  std::vector<Index> all;
+  for (Index delay = 1; delay <= samples / 4; delay += (delay + 1) / 2) all.push_back(delay);
+  return all;
+}
+
+// An age of the readings that is another one in each window, where the sensor's clock was not found: a step here and a
+// larger one there would seem to differ else.
+MatrixXd ages(const MatrixXd& slopes, const std::vector<int>& free, Index window) {
+  const auto at = std::ranges::find(free, static_cast<int>(kSensorTime)) - free.begin();
+  const VectorXd slope = slopes.col(at);
+  const Index samples = slope.size();
+  MatrixXd all = MatrixXd::Zero(samples, (samples + window - 1) / window);
+  for (Index k = 0; k < samples; ++k) all(k, k / window) = slope[k];
+  return all;
+}
+
+// What the duty did not cause: an offset and a drift of each channel, and what a motion before the run leaves, at
+// several lags.
+MatrixXd motions(Index samples, Index channels) {
+  std::vector<VectorXd> shapes{VectorXd::Ones(samples), VectorXd::LinSpaced(samples, -1, 1)};
+  const Eigen::ArrayXd tick = Eigen::ArrayXd::LinSpaced(samples, 0, static_cast<double>(samples - 1));
+  for (double lag = static_cast<double>(samples) / 4; lag > kShortestLag; lag /= 3) {
+    shapes.emplace_back((-tick / lag).exp().matrix());
+  }
+  const Index count = std::ssize(shapes);
+  MatrixXd all = MatrixXd::Zero(samples * channels, count * channels);
+  for (Index c = 0; c < channels; ++c) {
+    for (Index j = 0; j < count; ++j) {
+      all.block(c * samples, c * count + j, samples, 1) = shapes[static_cast<std::size_t>(j)];
+    }
+  }
+  return all;
+}
+
+// What other linear models would add to the output, and another reading of the sensor.
+std::vector<MatrixXd> other_models(OutputErrorSearch& search, const Recording& recording, const SearchPoint& point,
+                                   const std::vector<double>& sd) {
+  std::vector<MatrixXd> all{stacked(search.jacobians(Structure::fractional, point), sd)};
+  const auto samples = static_cast<Index>(recording.duty.size());
+  if (const SensorPath* path = search.sensor()) {
+    const auto ticks_in_window = static_cast<Index>(std::ceil(kWindowS / recording.dt_s));
+    const Index window = std::max(ticks_in_window, samples / kMostWindows + 1);
+    if (!path->has_own_clock()) all.push_back(ages(all[0], search.free_parameters(Structure::fractional), window));
+  } else {
+    all.push_back(stacked(search.late_outputs(delays(samples), point), sd));
+    MatrixXd moved = motions(all[0].rows() / std::ssize(sd), std::ssize(sd));
+    if (const PositionTimes* times = search.position_times()) {
+      for (Index j = 0; j < moved.cols(); ++j) moved.col(j) = times->weighed(moved.col(j));
+    }
+    all.push_back(std::move(moved));
+  }
+  return all;
+}
+
+std::vector<double> turned_to_squares(std::vector<double> values) {
+  double largest = 0;
+  for (const double value : values) largest = std::max(largest, std::abs(value));
+  if (largest > 0) {
+    for (double& value : values) value *= std::abs(value) / largest;
+  }
+  return values;
+}
+
+MatrixXd side_by_side(const std::vector<MatrixXd>& blocks) {
+  Index columns = 0;
+  for (const MatrixXd& block : blocks) columns += block.cols();
+  MatrixXd all(blocks.front().rows(), columns);
+  columns = 0;
+  for (const MatrixXd& block : blocks) {
+    all.middleCols(columns, block.cols()) = block;
+    columns += block.cols();
+  }
+  for (Index j = 0; j < columns; ++j) {
+    const double norm = all.col(j).norm();
+    if (norm > 0) all.col(j) /= norm;
+  }
+  return all;
+}
+
+using Qr = Eigen::ColPivHouseholderQR<MatrixXd>;
+
+Qr directions(const MatrixXd& columns, double threshold) {
+  Qr qr;
+  qr.setThreshold(threshold);
+  qr.compute(columns);
+  return qr;
+}
+
+// The part of each column that the directions cannot make.
+MatrixXd beyond(const Qr& qr, const MatrixXd& columns) {
+  MatrixXd turned = qr.householderQ().transpose() * columns;
+  turned.topRows(qr.rank()).setZero();
+  return qr.householderQ() * turned;
+}
+
+}  // namespace
+
+std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, const Recording& recording,
+                                                    const Fit& fit, const SearchPoint& point) {
+  const bool is_rounding = fit.fit_percent >= kFitOfRounding;
+  if (is_rounding || (fit.end != SearchEnd::converged && fit.end != SearchEnd::iteration_limit) || search.limit().end())
+    return std::nullopt;
+  if (fit.sensor && fit.sensor->delay_is_at_limit) return std::nullopt;  // what it lacks follows the steps of the duty
+  const SensorPath* path = search.sensor();
+  const std::vector<VectorXd> residuals = search.residuals(point);
+  std::vector<double> sd;
+  std::vector<MatrixXd> residual_columns;
+  for (const VectorXd& residual : residuals) {
+    sd.push_back(std::max(1e-200, residual.norm()));
+    residual_columns.emplace_back(residual);
+  }
+  const std::vector<double> velocity_m_s = search.model_velocity_m_s(point);  // late by the dead time already
+  SearchPoint prompt = point;
+  prompt.model.dead_time_s = 0;
+  const MatrixXd linear = side_by_side(other_models(search, recording, point, sd));
+  const MatrixXd changing = side_by_side({stacked(search.model_slopes(turned_to_squares(recording.duty), point), sd),
+                                          stacked(search.model_slopes(turned_to_squares(velocity_m_s), prompt), sd)});
+  if (!linear.allFinite() || !changing.allFinite()) return std::nullopt;
+
+  const Qr by_linear = directions(linear, 1e-9);
+  const VectorXd residual = beyond(by_linear, stacked(residual_columns, sd));
+  const Qr by_changing = directions(beyond(by_linear, changing), kDependent);
+  if (by_changing.rank() == 0 || by_changing.maxPivot() < kDependent) return std::nullopt;
+  const VectorXd rest = beyond(by_changing, residual);
+  const Index values = path ? path->weighed_samples() - path->bias_terms() : residual.size();
+  const double explained = residual.squaredNorm() - rest.squaredNorm();
+  const double freedom = static_cast<double>(values - by_linear.rank() - by_changing.rank());
+  if (!(freedom > 0)) return std::nullopt;
+  return AmplitudeEvidence{explained / residual.squaredNorm(),
+                           explained / rest.squaredNorm() * freedom / static_cast<double>(by_changing.rank())};
+}
+
+std::vector<std::string> amplitude_doubts(const std::optional<AmplitudeEvidence>& evidence, const Recording& recording,
+                                          bool order_is_forced) {
+  if (!evidence || !(evidence->f > kDoubtfulF && evidence->share >= kDoubtfulShare)) return {};
+  double largest = 0;
+  for (const double duty : recording.duty) largest = std::max(largest, std::abs(duty));
+  std::ostringstream text;
+  text.precision(3);
+  text << (order_is_forced ? "the parameters seem to change with amplitude, which they need not: "
+                           : "the parameters change with amplitude: ")
+       << "ones that follow duty and speed explain " << 100 * evidence->share
+       << " % of what the model leaves (F = " << evidence->f << ", above " << kDoubtfulF << "): ";
+  if (order_is_forced) {
+    text << "the likelier reason is that its order was forced and is too low; identify without --structure, and see "
+            "whether this doubt remains";
+  } else {
+    text << "no linear model holds from rest to duty " << largest
+         << "; fit runs of one amplitude each, and use a fit near its amplitude only";
+  }
+  return {text.str()};
+}
+
+}  // namespace control

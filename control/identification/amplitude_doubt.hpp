@@ -1,0 +1,34 @@
+// Asks a run whether its parameters change with amplitude: then no linear model holds for all of it.
+//
+//   r = J a + E c + noise                                              (1)   r: residuals of the fit
+//   J: slopes of the output by all parameters, and the columns below    what another linear model could explain
+//   E: the same slopes by the model's parameters for the duties u|u| and v|v| in place of u            (2)
+//   share = (|r - J a|² - |r - J a - E c|²)/|r - J a|²                 (3)   least squares, each over its own unknowns
+//   F = share/(1 - share) · (n - rank J - rank E)/rank E               (4)   about 1 where nothing changes
+//
+// A parameter q that is q0 + q1 |u| adds q1 ∂model/∂q for the duty u|u| to the output, and a drag that is not in
+// proportion to the speed adds the model's response to v|v|, in lowest order: a score test, without a second search.
+// u|u| tells nothing if the duty only has one size, v|v| nothing if the speed hardly changes.
+// Not amplitude: what J has besides (an output of the model that comes later, offset, drift and motion before the run
+// in position and velocity; readings of another age in each second, if the sensor's clock was not found). Doubtful is F
+// above 60 with a share of at least 10 %: figures over fluids and seeds are in docs/control.md. Errors: none thrown.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "control/search/fit.hpp"
+#include "control/search/output_error_search.hpp"
+
+namespace control {
+
+// None: the residuals are rounding, or there is nothing to compare.
+std::optional<AmplitudeEvidence> amplitude_evidence(OutputErrorSearch& search, const Recording& recording,
+                                                    const Fit& fit, const SearchPoint& point);
+
+// order_is_forced: the structure was given, and it is not the fractional one.
+std::vector<std::string> amplitude_doubts(const std::optional<AmplitudeEvidence>& evidence, const Recording& recording,
+                                          bool order_is_forced);
+
+}  // namespace control

@@ -1,0 +1,30 @@
+// Says in words what a fit does not tell, and what to do about it.
+//
+// Doubtful is: one sigma of b1 or b2 above half of it, of kp above a tenth, of alpha or beta above 0.1; a correlation
+// above 0.99; a parameter at its bound; starts that disagree; a duty that never changes; a search that did not end.
+// A better experiment is named only if it would halve one of the doubtful sigmas, by a model that describes the run.
+// Errors: none thrown.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "control/search/fit.hpp"
+
+namespace control {
+
+inline constexpr double kPoorFitPercent = 50;
+
+// How the search ended, and whether a limit of its own decided the result.
+std::vector<std::string> search_doubts(const Fit& fit, const IdentificationOptions& options);
+
+std::vector<std::string> identifiability_warnings(const Recording& recording, const Fit& fit,
+                                                  const IdentificationOptions& options);
+
+// A fit that is poor in percent describes the run nevertheless where only the accelerometer's white noise is left.
+bool describes_run(const Fit& fit);
+
+std::string structure_name(Structure structure);
+std::string end_words(SearchEnd end);  // "reached its time limit"
+
+}  // namespace control

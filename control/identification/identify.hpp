@@ -1,0 +1,56 @@
+// Identifies a motion model from a recorded run, and says what the run cannot tell.
+//
+//   y(t) = model(duty; kp, b1, b2, α, β) + offset,  b3 = 1              (1)   [birs2021] (20); one scale is redundant
+//   least squares: Σ (y - model)²/σ_channel²                            (2)   output error
+//   absolute error: Σ |y - model|                                       (3)   [birs2021] (21), read literally
+//   0 < kp, b1, b2;  1 < α < 2;  0 < β < 1                              (4)   [birs2021] 3.2
+//   covariance = σ² (JᵀJ)⁻¹ at the optimum of (2)                       (5)   Cramér-Rao: what no estimator can beat
+//   covariance = τ² (JᵀJ)⁻¹ at the optimum of (3), τ = 1/(2 f(0))       (6)   [koenker-bassett]; f: density of
+//   residuals
+//
+// Where the position is a robot's own estimate it contains the model that is built into the robot, and a fit would find
+// that one: then the acceleration is fitted, with the sensor's bias, lag and clock as further unknowns
+// (sensor_path.hpp).
+//
+// A position that was measured from outside has times of its own (position_time_s), and its clock may be off: then y of
+// (1) is the model's position at those times plus a shift, which is a further unknown. Nothing that was measured is
+// resampled, so sigmas count what was measured (position_times.hpp). Where its positions are not all as exact, each
+// residual of (2) and (3) is divided by its own sd, relative to the others'; how large they are is found all the same.
+//
+// Structures: fractional (20); second_order, (19) with α = 2, β = 1; first_order, b1 = 0, β = 1. One is chosen by AIC.
+// The search starts from the Newtonian model (28), as the paper does, and from further points against local minima.
+// The simplest structure is searched first; each may use an equal part of the time that is left, so what the simple
+// ones leave is the fractional one's. The AIC of a search that was cut off is only an upper bound: such a fit can be
+// the best, but is not taken to be worse than another, and a warning names it.
+// Errors: throws std::invalid_argument quoting the bad value for data that cannot be used. Not having converged, having
+// been cancelled, having run out of time or of finite numbers is a field of the result.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "control/identification/planned_experiment.hpp"
+#include "control/search/fit.hpp"
+
+namespace control {
+
+// From columns with times, which must be equally spaced within 1 % of a step.
+Recording make_recording(std::span<const double> time_s, std::span<const double> duty,
+                         std::span<const double> position_m, std::span<const double> velocity_m_s,
+                         std::span<const double> acceleration_m_s2 = {});
+
+struct Identification {
+  Fit best;
+  std::vector<Fit> compared;  // one per structure: the best, then by AIC; unfinished and untried ones last
+  std::optional<AmplitudeEvidence> amplitude;  // of the best; none: nothing to compare
+  std::vector<std::string> warnings;           // in words, with numbers and what to do
+};
+
+Identification identify(const Recording& recording, const IdentificationOptions& options);
+
+}  // namespace control

@@ -1,0 +1,140 @@
+// Predicts what a planned experiment would tell, and makes duties for it.
+#include "control/identification/planned_experiment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "base/invalid_argument.hpp"
+#include "control/search/fit_statistics.hpp"
+#include "control/search/output_model.hpp"
+
+namespace control {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kModelTolerance = 1e-9;
+constexpr double kLargestDuty = 1e3;
+constexpr Index kSensorUnknowns = 3;  // of an acceleration: bias, drift, lag
+
+[[noreturn]] void refuse(const char* what, double value) { throw_invalid("planned experiment: ", what, ' ', value); }
+
+void check(const PlannedExperiment& experiment) {
+  if (!(experiment.dt_s >= 1e-6 && experiment.dt_s <= 1e4))
+    refuse("dt_s must be from 1e-6 to 1e4, is", experiment.dt_s);
+  if (experiment.duty.size() < 20) {
+    refuse("duty must have at least 20 samples, has", static_cast<double>(experiment.duty.size()));
+  }
+  for (const double duty : experiment.duty) {
+    if (!(std::abs(duty) <= kLargestDuty)) refuse("duty must be finite and at most 1000 in size, has", duty);
+  }
+  if (experiment.duty.size() > kMostSamples) {
+    refuse("duty must have at most 200000 samples, has", static_cast<double>(experiment.duty.size()));
+  }
+  if (std::ranges::all_of(experiment.duty, [](double duty) { return duty == 0; })) {
+    refuse("duty must not be zero throughout, which moves nothing; its first value is", experiment.duty.front());
+  }
+  const double position_sd_m = experiment.position_sd_m, velocity_sd_m_s = experiment.velocity_sd_m_s;
+  if (!(position_sd_m >= 0 && std::isfinite(position_sd_m))) refuse("position_sd_m must be ≥ 0, is", position_sd_m);
+  if (!(velocity_sd_m_s >= 0 && std::isfinite(velocity_sd_m_s))) {
+    refuse("velocity_sd_m_s must be ≥ 0, is", velocity_sd_m_s);
+  }
+  const double acceleration_sd_m_s2 = experiment.acceleration_sd_m_s2;
+  if (!(acceleration_sd_m_s2 >= 0 && std::isfinite(acceleration_sd_m_s2))) {
+    refuse("acceleration_sd_m_s2 must be ≥ 0, is", acceleration_sd_m_s2);
+  }
+  if (position_sd_m == 0 && velocity_sd_m_s == 0 && acceleration_sd_m_s2 == 0) {
+    refuse("one of the sd must be positive, all are", 0);
+  }
+}
+
+std::vector<Index> free_parameters(const FractionalModel& model) {
+  if (model.b1 == 0) return model.beta == 1 ? std::vector<Index>{0, 2} : std::vector<Index>{0, 2, 4};
+  if (model.alpha == 2 && model.beta == 1) return {0, 1, 2};
+  return {0, 1, 2, 3, 4};
+}
+
+void check_amplitude(double amplitude) {
+  if (!(std::abs(amplitude) <= kLargestDuty)) refuse("amplitude must be finite and at most 1000, is", amplitude);
+}
+
+Index sample_count(double duration_s, double dt_s) {
+  if (!(dt_s > 0 && std::isfinite(dt_s))) refuse("dt_s must be positive, is", dt_s);
+  if (!(duration_s >= dt_s && std::round(duration_s / dt_s) < static_cast<double>(kMostSamples))) {
+    refuse("duration_s must be between 1 and 199999 steps, is", duration_s);
+  }
+  return 1 + static_cast<Index>(std::lround(duration_s / dt_s));
+}
+
+}  // namespace
+
+ExpectedUncertainty expected_uncertainty(const FractionalModel& given, const PlannedExperiment& experiment) {
+  check(given);
+  check(experiment);
+  const FractionalModel model = normalised(given);
+  const std::vector<Index> free = free_parameters(model);
+  const Index samples = static_cast<Index>(experiment.duty.size());
+  const bool has_acceleration = experiment.acceleration_sd_m_s2 > 0;
+  const Index offset = static_cast<Index>(free.size()), sensor = offset + (experiment.fits_offset ? 1 : 0);
+  const Index columns = sensor + (has_acceleration ? kSensorUnknowns : 0);
+  Eigen::MatrixXd jacobian(0, columns);
+  const auto add = [&](Channel channel, double sd) {
+    if (sd == 0) return;
+    OutputModel output(channel, experiment.dt_s, experiment.duty, model.dead_time_s, kModelTolerance);
+    output.set_delay(model.dead_time_s);
+    const Index row = jacobian.rows();
+    jacobian.conservativeResize(row + samples, Eigen::NoChange);
+    jacobian.bottomRows(samples).setZero();
+    jacobian.block(row, 0, samples, static_cast<Index>(free.size())) = output.jacobian(model)(Eigen::all, free) / sd;
+    if (experiment.fits_offset) {
+      jacobian.col(offset).tail(samples).setConstant(channel == Channel::position ? 1 / sd : 0);
+    }
+    if (channel == Channel::acceleration) {
+      jacobian.col(sensor).tail(samples).setConstant(1 / sd);
+      jacobian.col(sensor + 1).tail(samples).setLinSpaced(0, 1 / sd);
+      jacobian.col(sensor + 2).tail(samples) = output.slope(model) / sd;
+    }
+  };
+  add(Channel::position, experiment.position_sd_m);
+  add(Channel::velocity, experiment.velocity_sd_m_s);
+  add(Channel::acceleration, experiment.acceleration_sd_m_s2);
+
+  const Uncertainty found = uncertainty(jacobian);
+  const std::array<double, kParameters> unit{std::abs(model.kp), model.b1, model.b2, 1, 1};  // ln kp to kp, and so on
+  ExpectedUncertainty result;
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    const auto row = static_cast<std::size_t>(free[i]);
+    if (found.one_sigma[i]) result.one_sigma[row] = *found.one_sigma[i] * unit[row];
+    for (std::size_t j = 0; j < free.size(); ++j) {
+      result.correlation[row][static_cast<std::size_t>(free[j])] =
+          found.correlation(static_cast<Index>(i), static_cast<Index>(j));
+    }
+  }
+  return result;
+}
+
+std::vector<double> step_duty(double amplitude, double duration_s, double dt_s) {
+  check_amplitude(amplitude);
+  return std::vector<double>(static_cast<std::size_t>(sample_count(duration_s, dt_s)), amplitude);
+}
+
+// The bits of a 16-bit shift register with taps 16, 14, 13, 11, which repeat after 65535.
+std::vector<double> prbs_duty(double amplitude, double bit_s, double duration_s, double dt_s) {
+  check_amplitude(amplitude);
+  if (!(bit_s >= dt_s)) refuse("bit_s must be at least dt_s, is", bit_s);
+  const auto count = static_cast<std::size_t>(sample_count(duration_s, dt_s));
+  std::vector<double> duty(count);
+  std::uint32_t bits = 0xACE1;
+  double bit_end_s = bit_s;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (static_cast<double>(k) * dt_s > bit_end_s - 1e-6 * dt_s) {
+      bits = (bits >> 1) | (((bits ^ (bits >> 2) ^ (bits >> 3) ^ (bits >> 5)) & 1) << 15);
+      bit_end_s += bit_s;
+    }
+    duty[k] = (bits & 1) != 0 ? amplitude : -amplitude;
+  }
+  return duty;
+}
+
+}  // namespace control

@@ -1,0 +1,36 @@
+// What a planned experiment would tell of a model's parameters, and duties for such plans.
+//
+// (5) is that of identify.hpp. Errors: throws std::invalid_argument quoting the bad value.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "control/search/fit.hpp"
+
+namespace control {
+
+// What a planned experiment would tell, the model's dead time being known: one-sigma of each parameter by (5), for
+// white noise of these sizes (0: channel not recorded). Of an acceleration bias, drift and lag are never known.
+struct PlannedExperiment {
+  double dt_s = 0.01;
+  std::vector<double> duty;
+  double position_sd_m = 0;
+  double velocity_sd_m_s = 0;
+  bool fits_offset = false;
+  double acceleration_sd_m_s2 = 0;
+};
+
+struct ExpectedUncertainty {
+  std::array<std::optional<double>, kParameters> one_sigma;  // none: this experiment cannot tell at all
+  std::array<std::array<double, kParameters>, kParameters> correlation{};
+};
+
+ExpectedUncertainty expected_uncertainty(const FractionalModel& model, const PlannedExperiment& experiment);
+
+// Duties for such plans: a step, and a pseudo-random binary sequence of ±amplitude.
+std::vector<double> step_duty(double amplitude, double duration_s, double dt_s);
+std::vector<double> prbs_duty(double amplitude, double bit_s, double duration_s, double dt_s);
+
+}  // namespace control

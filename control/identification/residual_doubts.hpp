@@ -1,0 +1,25 @@
+// Says in words what the residuals of a fit give away: a model that does not describe the run, outliers, a bias,
+// colour.
+//
+// Doubtful is: a fit below 50 %; a residual beyond 6 robust sd, 1.4826 times the median size; a mean beyond 4 of its
+// own sigmas, by the number of independent samples; a Ljung-Box p below 0.01 in any channel. Residuals of the size of
+// rounding are not looked at.
+// Errors: none thrown.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "control/search/fit.hpp"
+
+namespace control {
+
+std::vector<std::string> residual_doubts(const Recording& recording, const IdentificationOptions& options,
+                                         const Fit& fit);
+
+// 100 (1 - |residual|/|measured - mean|); infinite for a recording without residuals. Where the residuals are weighed
+// by the sds of positions, so are the measured values and their mean.
+double fit_percent(const std::vector<double>& residual, const std::vector<double>& measured,
+                   const std::vector<double>& sd_m = {});
+
+}  // namespace control

@@ -1,0 +1,247 @@
+// Fits the run again with a sign turned or with the offset, and looks for a motion that the duty did not cause.
+#include "control/identification/second_opinions.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+#include "base/invalid_argument.hpp"
+#include "control/identification/fit_summary.hpp"
+#include "control/identification/residual_doubts.hpp"
+#include "control/search/fit_statistics.hpp"
+
+namespace control {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kLookForSignPercent = 80;  // below this fit
+constexpr double kClearlyLowerAic = 10;
+constexpr std::ptrdiff_t kFewest = 20;                    // samples of the beginning
+constexpr double kRoughBeginning = 3;                     // times the size of the other residuals, by the medians
+constexpr double kNoticeableLagS = 0.002;                 // twice what the age of the samples is known to
+constexpr double kMotionSigmas = 5, kMotionShare = 0.01;  // of v0, and of the squares that it explains
+
+double lowest_percent(const Recording& recording, const Fit& fit) {
+  return std::min({fit_percent(fit.position_residual_m, recording.position_m, recording.position_sd_m),
+                   fit_percent(fit.velocity_residual_m_s, recording.velocity_m_s),
+                   fit_percent(fit.acceleration_residual_m_s2, recording.acceleration_m_s2)});
+}
+
+std::optional<Fit> fit_again(const OutputErrorSearch& search, const Recording& recording, IdentificationOptions options,
+                             Structure structure) {
+  options.further_starts = 0;
+  options.time_limit_s = search.limit().left_s();
+  if (!(options.time_limit_s > 0)) return std::nullopt;
+  OutputErrorSearch other(recording, options);
+  const SearchResult found = other.run(structure);
+  if (found.end != SearchEnd::converged) return std::nullopt;
+  return summary(other, recording, options.cost, structure, found);
+}
+
+void add_turned_sign(const OutputErrorSearch& search, const Recording& recording, const IdentificationOptions& options,
+                     const Fit& fit, std::vector<std::string>& warnings) {
+  const double percent = lowest_percent(recording, fit);
+  if (!(percent < kLookForSignPercent)) return;
+  const bool has_both = !recording.position_m.empty() && !recording.velocity_m_s.empty();
+  std::vector<std::pair<std::string, Recording>> turned{{"the duty (or of all that was measured)", recording}};
+  for (double& duty : turned[0].second.duty) duty = -duty;
+  if (has_both) {
+    turned.insert(turned.end(), {{"position_m", recording}, {"velocity_m_s", recording}});
+    for (double& x : turned[1].second.position_m) x = -x;
+    for (double& v : turned[2].second.velocity_m_s) v = -v;
+  }
+  for (const auto& [name, other] : turned) {
+    const auto found = fit_again(search, other, options, fit.structure);
+    if (!found) continue;
+    const double better = lowest_percent(other, *found);
+    if (!(100 - better < (100 - percent) / 2)) continue;
+    std::ostringstream text;
+    text.precision(3);
+    text << "with the sign of " << name << " turned round the model explains " << better << " % instead of " << percent
+         << " %: the best gain is negative, and motion must follow the duty; turn one sign";
+    warnings.push_back(text.str());
+    return;
+  }
+}
+
+void add_missing_offset(const OutputErrorSearch& search, const Recording& recording, IdentificationOptions options,
+                        const Fit& fit, std::vector<std::string>& warnings) {
+  if (options.fits_offset || recording.position_m.empty()) return;
+  options.fits_offset = true;
+  const auto with_offset = fit_again(search, recording, options, fit.structure);
+  if (!with_offset || !(with_offset->aic < fit.aic - kClearlyLowerAic)) return;
+  std::ostringstream text;
+  text.precision(3);
+  text << "position_m begins at " << with_offset->offset_m
+       << " m, and this offset is not fitted: the parameters make up for it; fitting it lowers the residual sd from "
+       << fit.residual_sd << " to " << with_offset->residual_sd << " m, so fit the offset too (fits_offset)";
+  warnings.push_back(text.str());
+}
+
+// Residuals and slopes of all channels, in units of the channel's sd.
+struct Stacked {
+  Eigen::VectorXd residual;
+  Eigen::MatrixXd slopes;
+  std::vector<Channel> channels;
+  std::vector<double> sd;
+};
+
+Stacked stacked(OutputErrorSearch& search, const Recording& recording, const Fit& fit) {
+  const SearchPoint point{fit.model, fit.offset_m};
+  const auto residuals = search.residuals(point);
+  const auto jacobians = search.jacobians(fit.structure, point);
+  const Index samples = static_cast<Index>(recording.duty.size()), rows = samples * std::ssize(residuals);
+  Stacked all{Eigen::VectorXd(rows), Eigen::MatrixXd(rows, jacobians.front().cols()), search.channels(), {}};
+  for (std::size_t c = 0; c < residuals.size(); ++c) {
+    const Index row = static_cast<Index>(c) * samples;
+    all.sd.push_back(std::max(1e-200, residuals[c].norm() / std::sqrt(static_cast<double>(samples))));
+    all.residual.segment(row, samples) = residuals[c] / all.sd[c];
+    all.slopes.middleRows(row, samples) = jacobians[c] / all.sd[c];
+  }
+  return all;
+}
+
+// To an initial velocity of 1 m/s.
+Eigen::VectorXd response_to_motion(const Stacked& all, double dt_s, double lag_s) {
+  const Index samples = all.residual.size() / std::ssize(all.channels);
+  const Eigen::ArrayXd decay =
+      (Eigen::ArrayXd::LinSpaced(samples, 0, static_cast<double>(samples - 1)) * (-dt_s / lag_s)).exp();
+  Eigen::VectorXd response(all.residual.size());
+  for (std::size_t c = 0; c < all.channels.size(); ++c) {
+    auto part = response.segment(static_cast<Index>(c) * samples, samples);
+    if (all.channels[c] == Channel::position) {
+      part = lag_s * (1 - decay) / all.sd[c];
+    } else {
+      part = decay / all.sd[c];
+    }
+  }
+  return response;
+}
+
+struct InitialMotion {
+  double velocity_m_s = 0, sigmas = 0, share = 0;
+};
+
+InitialMotion motion_with_lag(const Stacked& all, const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr, double dt_s,
+                              double lag_s) {
+  const Eigen::VectorXd motion = response_to_motion(all, dt_s, lag_s);
+  const Eigen::VectorXd own = motion - all.slopes * qr.solve(motion);
+  const double size = own.squaredNorm();
+  if (!(size > 1e-8 * motion.squaredNorm())) return {};
+  const double velocity_m_s = own.dot(all.residual) / size;
+  const Eigen::VectorXd rest = all.residual - velocity_m_s * own;
+  const Index samples = all.residual.size() / std::ssize(all.channels);
+  double per_independent_one = 1;
+  for (Index row = 0; row < rest.size(); row += samples) {
+    per_independent_one = std::max(per_independent_one, samples_per_independent_one(rest.segment(row, samples)));
+  }
+  const double sd = std::sqrt(rest.squaredNorm() / static_cast<double>(rest.size()) * per_independent_one / size);
+  return {velocity_m_s, std::abs(velocity_m_s) / std::max(1e-300, sd),
+          1 - rest.squaredNorm() / all.residual.squaredNorm()};
+}
+
+// What a flexible model has bent itself to, (1) no longer shows; but its first samples then fit worse than the rest.
+void add_rough_beginning(const Recording& recording, const Fit& fit, std::vector<std::string>& warnings) {
+  const auto& residual = recording.position_m.empty() ? fit.velocity_residual_m_s : fit.position_residual_m;
+  std::vector<double> size(residual.size());
+  std::ranges::transform(residual, size.begin(), [](double r) { return std::abs(r); });
+  const double in_a_second = std::min(1 / recording.dt_s, static_cast<double>(size.size()) / 4);
+  for (const std::ptrdiff_t first : {kFewest, static_cast<std::ptrdiff_t>(in_a_second)}) {
+    if (first < kFewest || 2 * first > std::ssize(size)) continue;
+    const double ratio = median({size.begin(), size.begin() + first}) / median({size.begin() + first, size.end()});
+    if (!(ratio > kRoughBeginning) || !std::isfinite(ratio)) continue;
+    std::ostringstream text;
+    text.precision(2);
+    text << "the first " << recording.dt_s * static_cast<double>(first) << " s fit " << ratio
+         << " times worse than the rest: the run seems to begin in motion, or shows fast terms that the model lacks; "
+            "begin the record at rest";
+    warnings.push_back(text.str());
+    return;
+  }
+}
+
+void add_initial_motion(OutputErrorSearch& search, const Recording& recording, const Fit& fit,
+                        std::vector<std::string>& warnings) {
+  if (!(lowest_percent(recording, fit) < 100 - 1e-6)) return;  // rounding
+  Stacked all = stacked(search, recording, fit);
+  const Eigen::VectorXd scale = all.slopes.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
+  all.slopes *= scale.asDiagonal();
+  if (!all.slopes.allFinite() || !all.residual.allFinite()) return;
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(all.slopes);
+  const double longest_s = recording.dt_s * static_cast<double>(recording.duty.size()) / 4;
+  InitialMotion best;
+  for (double lag_s = longest_s; lag_s > 2 * recording.dt_s; lag_s /= 3) {
+    const InitialMotion found = motion_with_lag(all, qr, recording.dt_s, lag_s);
+    if (found.sigmas > best.sigmas) best = found;
+  }
+  if (!(best.sigmas > kMotionSigmas && best.share > kMotionShare)) {
+    add_rough_beginning(recording, fit, warnings);
+    return;
+  }
+  std::ostringstream text;
+  text.precision(2);
+  text << "the run seems to begin in motion, at about " << best.velocity_m_s << " m/s (" << best.sigmas
+       << " sigmas): the model is at rest before the first sample; begin the record at rest";
+  warnings.push_back(text.str());
+}
+
+}  // namespace
+
+std::vector<std::string> sensor_doubts(const OutputErrorSearch& search) {
+  if (search.sensor_search_end() != SearchEnd::time_limit) return {};
+  return {
+      "the search for the sensor's timing reached its share of the time limit: its samples are taken to keep step "
+      "with the ticks, which they may not do, and the parameters make up for it; raise the limit"};
+}
+
+std::vector<std::string> lag_doubts(const Recording& recording, const IdentificationOptions& options, const Fit& fit) {
+  if (!fit.sensor || fit.starts == 0) return {};
+  const SensorFit& sensor = *fit.sensor;
+  const bool finds_dead_time = options.longest_dead_time_s > 0;
+  if (sensor.delay_is_at_limit && !finds_dead_time) {
+    return {join_text("the sensor's readings came out ", 1e3 * sensor.delay_s,
+                      " ms late, the most that is searched for without a dead time: the other parameters make up for "
+                      "what it lacks; search for a dead time (--dead-time-s)")};
+  }
+  // How old samples in step with the ticks are is not known: up to a period.
+  const double late_s = sensor.delay_s - options.sensor_lag_s.value_or(0), half_period_s = recording.dt_s / 2;
+  const double at_least_s = late_s - (sensor.has_own_clock ? half_period_s : 2 * half_period_s);
+  const double at_most_s = late_s - (sensor.has_own_clock ? half_period_s : 0);
+  if (options.sensor_lag_s && at_most_s < -kNoticeableLagS) {
+    return {join_text("the sensor's readings come ", 1e3 * (at_most_s + *options.sensor_lag_s),
+                      " ms late at most, less than the sensor's own lag that was given, ", 1e3 * *options.sensor_lag_s,
+                      " ms, which hides any dead time: give the lag that it has, in seconds (--sensor-lag-s)")};
+  }
+  if (!(at_least_s > kNoticeableLagS)) return {};
+  std::ostringstream text;
+  text.precision(3);
+  if (!options.sensor_lag_s) {
+    text << "a dead time of up to " << 1e3 * at_most_s << " ms cannot be told from the age of the sensor's readings: "
+         << (finds_dead_time ? 1e3 * fit.model.dead_time_s : 1e3 * at_most_s) << " ms were attributed to the "
+         << (finds_dead_time ? "plant; give the sensor's own lag (--sensor-lag-s), if it is known"
+                             : "readings, none to the plant; if the sensor is not so late, search for the dead time "
+                               "(--dead-time-s)");
+    return {text.str()};
+  }
+  if (finds_dead_time) return {};
+  text << "the readings come up to " << 1e3 * at_most_s << " ms later than the sensor's own lag explains: that is a "
+       << "dead time, and the model has none; search for it (--dead-time-s)";
+  return {text.str()};
+}
+
+std::vector<std::string> second_opinions(OutputErrorSearch& search, const Recording& recording,
+                                         const IdentificationOptions& options, const Fit& fit) {
+  std::vector<std::string> warnings;
+  if (fit.end != SearchEnd::converged || search.limit().end()) return warnings;
+  add_turned_sign(search, recording, options, fit, warnings);
+  if (!warnings.empty()) return warnings;
+  add_missing_offset(search, recording, options, fit, warnings);
+  if (!fit.sensor && recording.position_time_s.empty()) add_initial_motion(search, recording, fit, warnings);
+  return warnings;
+}
+
+}  // namespace control

@@ -1,0 +1,30 @@
+// Tries other ways to explain a run than the fit that was found, and says in words which of them do better.
+//
+//   a sign turned round: if the fit is poor, and the turned one leaves less than half as much
+//   an offset, if it was not to be fitted: AIC lower by more than 10
+//   a run that begins in motion: v0 e^{-t/T} added to the model by one linear step, for the best of some T        (1)
+// (1) is the change of least squares with all parameters free, so a part of v0 that they can imitate does not count.
+// or first samples, 20 or one second of them, that fit three times worse than the rest.
+// Each costs one search at most, within the time that is left; none is tried when the search was cut off.
+// Errors: none thrown.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "control/search/fit.hpp"
+#include "control/search/output_error_search.hpp"
+
+namespace control {
+
+std::vector<std::string> second_opinions(OutputErrorSearch& search, const Recording& recording,
+                                         const IdentificationOptions& options, const Fit& fit);
+
+// That the search for the sensor of an acceleration was cut off, which the fits that follow do not show.
+std::vector<std::string> sensor_doubts(const OutputErrorSearch& search);
+
+// Of an acceleration: how much of the age of its readings may be the plant's dead time, which looks the same, and to
+// which of the two it was attributed.
+std::vector<std::string> lag_doubts(const Recording& recording, const IdentificationOptions& options, const Fit& fit);
+
+}  // namespace control

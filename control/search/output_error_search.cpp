@@ -1,0 +1,393 @@
+// Descends from each start, and weighs channels and residuals anew where the cost asks for it.
+#include "control/search/output_error_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <unsupported/Eigen/NonLinearOptimization>
+#include <utility>
+
+namespace control {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kNearestToBound = 1e-9;  // of the orders and the dead time, as a share of their interval
+constexpr double kLargestLog = 60;        // of the gain and the coefficients, against their start in the search
+constexpr double kRoundingShare = 1e-9;   // residuals below this share of the signal are equal
+constexpr double kAgreement = 1e-6;       // of costs
+constexpr int kWeightRounds = 3;          // of two channels
+constexpr int kReweightings = 200;        // of the absolute error
+constexpr int kIterationsPerReweighting = 3;
+
+double logit(double share) { return std::log(share / (1 - share)); }
+
+double logistic(double x) { return std::clamp(1 / (1 + std::exp(-x)), kNearestToBound, 1 - kNearestToBound); }
+
+double inside(double share) { return std::clamp(share, kNearestToBound, 1 - kNearestToBound); }
+
+constexpr double kEarliestSample = 4, kLatestSample = 2;   // A of sensor_path.hpp in ticks, before and after the tick
+constexpr double kLongestTimeConstant = 1;                 // of the sensor, in ticks: more is the fluid
+constexpr double kClockScaleS = 0.01, kLargestClock = 50;  // of a position's clock: half a second at most
+
+double scale_of(const Eigen::VectorXd& values) { return std::sqrt((values.array() - values.mean()).square().mean()); }
+
+}  // namespace
+
+struct OutputErrorSearch::Descent {
+  using Scalar = double;
+  OutputErrorSearch& search;
+  Structure structure;
+
+  bool is_not_finite = false;
+
+  // Negative: the solver stops.
+  int operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual) const {
+    if (search.limit_.is_reached()) return -1;
+    residual.setConstant(1e100);  // refused by the solver
+    if (!x.allFinite() || std::abs(x[0]) > 700) return 0;
+    const SearchPoint point = search.point_at(structure, x);
+    const auto parts = search.residuals(point);
+    if (search.limit_.is_reached()) return -1;
+    Index row = 0;
+    for (std::size_t c = 0; c < parts.size(); ++c, row += search.rows_) {
+      const Measured& measured = search.measured_[c];
+      residual.segment(row, search.rows_) = parts[c].cwiseProduct(measured.root_weight) / measured.sd;
+    }
+    if (!residual.allFinite()) residual.setConstant(1e100);
+    return 0;
+  }
+
+  int df(const Eigen::VectorXd& x, Eigen::MatrixXd& slopes) {
+    if (search.limit_.is_reached()) return -1;
+    const SearchPoint point = search.point_at(structure, x);
+    const auto parts = search.jacobians(structure, point);
+    if (search.limit_.is_reached()) return -1;
+    const Eigen::VectorXd chain = search.coordinate_slopes(structure, point);
+    Index row = 0;
+    for (std::size_t c = 0; c < parts.size(); ++c, row += search.rows_) {
+      const Measured& measured = search.measured_[c];
+      slopes.middleRows(row, search.rows_) =
+          (measured.root_weight / -measured.sd).asDiagonal() * parts[c] * chain.asDiagonal();
+    }
+    is_not_finite = !slopes.allFinite();
+    return is_not_finite ? -1 : 0;
+  }
+
+  Index values() const { return search.rows_ * static_cast<Index>(search.measured_.size()); }
+};
+
+OutputErrorSearch::OutputErrorSearch(const Recording& recording, const IdentificationOptions& options,
+                                     SearchLimit::Clock clock)
+    : options_(options),
+      dt_s_(recording.dt_s),
+      samples_(static_cast<Index>(recording.duty.size())),
+      rows_(recording.position_time_s.empty() ? samples_ : static_cast<Index>(recording.position_time_s.size())),
+      limit_(options.time_limit_s, options.on_progress, std::move(clock)) {
+  const auto add = [&](Channel channel, const std::vector<double>& values) {
+    if (values.empty()) return;
+    const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(values.data(), rows_);
+    measured_.push_back({channel,
+                         OutputModel(channel, dt_s_, recording.duty, options.longest_dead_time_s, kModelTolerance),
+                         measured, scale_of(measured), Eigen::VectorXd::Ones(rows_)});
+    if (channel == Channel::position) offset_scale_m_ = measured_.back().sd;
+    if (!recording.position_time_s.empty()) {
+      measured_.back().times =
+          std::make_unique<PositionTimes>(recording.position_time_s, dt_s_, recording.position_sd_m);
+      measured_.back().measured = measured_.back().times->weighed(measured);
+    }
+  };
+  add(Channel::position, recording.position_m);
+  add(Channel::velocity, recording.velocity_m_s);
+  if (!recording.acceleration_m_s2.empty()) {
+    auto path = std::make_unique<SensorPath>(sensor_readings(recording.acceleration_m_s2), dt_s_);
+    const Eigen::VectorXd readings = path->readings();
+    measured_.push_back({Channel::acceleration, OutputModel::with_means(dt_s_, recording.duty, kModelTolerance),
+                         readings, scale_of(readings), Eigen::VectorXd::Ones(samples_), std::move(path)});
+    sensor_start_.sensor = rough_timing();
+    return;
+  }
+  if (options.longest_dead_time_s > 0 && recording.position_time_s.empty()) make_scan(recording);
+}
+
+std::vector<int> OutputErrorSearch::free_parameters(Structure structure) const {
+  std::vector<int> free = structure == Structure::fractional     ? std::vector<int>{0, 1, 2, 3, 4}
+                          : structure == Structure::second_order ? std::vector<int>{0, 1, 2}
+                                                                 : std::vector<int>{0, 2};
+  if (const SensorPath* path = sensor()) {
+    free.push_back(kSensorTime);
+    if (path->has_own_clock()) free.push_back(kSensorPeriod);
+    if (sensor_is_found_) free.push_back(kSensorTimeConstant);
+    return free;
+  }
+  if (options_.fits_offset && measured_.front().channel == Channel::position) free.push_back(kOffset);
+  if (options_.longest_dead_time_s > 0) free.push_back(kDeadTime);
+  const bool has_clock = measured_.front().times != nullptr && options_.fits_position_clock;
+  if (has_clock && !(options_.longest_dead_time_s > 0)) free.push_back(kPositionClock);
+  return free;
+}
+
+std::vector<Channel> OutputErrorSearch::channels() const {
+  std::vector<Channel> result;
+  for (const Measured& measured : measured_) result.push_back(measured.channel);
+  return result;
+}
+
+std::vector<Eigen::VectorXd> OutputErrorSearch::residuals(const SearchPoint& point) {
+  std::vector<Eigen::VectorXd> result;
+  for (Measured& measured : measured_) {
+    ++outputs_computed_;
+    if (measured.path) {
+      const Eigen::VectorXd output = measured.path->sampled(measured.model.output(point.model), point.sensor);
+      result.push_back(measured.path->weighed(measured.measured - output));  // (4)
+      continue;
+    }
+    measured.model.set_delay(point.model.dead_time_s, stop_);
+    const Eigen::VectorXd output = seen(measured, point, measured.model.output(point.model));
+    result.emplace_back(measured.measured - output - point.offset_m * seen_offset(measured));
+  }
+  return result;
+}
+
+std::vector<Eigen::MatrixXd> OutputErrorSearch::jacobians(Structure structure, const SearchPoint& point) {
+  const std::vector<int> free = free_parameters(structure);
+  std::vector<Eigen::MatrixXd> result;
+  for (Measured& measured : measured_) {
+    if (!measured.path) measured.model.set_delay(point.model.dead_time_s, stop_);
+    const Eigen::MatrixXd of_model = measured.model.jacobian(point.model);
+    Eigen::MatrixXd of_sensor;
+    if (measured.path) of_sensor = measured.path->timing_slopes(measured.model.output(point.model), point.sensor);
+    Eigen::MatrixXd slopes(rows_, static_cast<Index>(free.size()));
+    for (Index j = 0; j < slopes.cols(); ++j) {
+      const int parameter = free[static_cast<std::size_t>(j)];
+      if (parameter == kOffset) {
+        slopes.col(j) = seen_offset(measured);
+      } else if (parameter == kDeadTime) {
+        slopes.col(j) = -seen(measured, point, measured.model.slope(point.model, stop_));
+      } else if (parameter == kPositionClock) {
+        const Eigen::VectorXd output = measured.model.output(point.model);
+        slopes.col(j) = measured.times->weighed(measured.times->slope(output, point.position_clock_s));
+      } else if (parameter >= kSensorTime) {
+        slopes.col(j) = measured.path->weighed(of_sensor.col(parameter - kSensorTime));
+      } else {
+        slopes.col(j) = seen(measured, point, of_model.col(parameter));
+      }
+    }
+    result.push_back(std::move(slopes));
+  }
+  return result;
+}
+
+double OutputErrorSearch::earliest_sample_s() const { return -options_.longest_dead_time_s - kEarliestSample * dt_s_; }
+
+Eigen::VectorXd OutputErrorSearch::seen(const Measured& measured, const SearchPoint& point,
+                                        const Eigen::VectorXd& output) const {
+  if (measured.times) return measured.times->weighed(measured.times->read(output, point.position_clock_s));
+  return measured.path ? measured.path->weighed(measured.path->sampled(output, point.sensor)) : output;
+}
+
+Eigen::VectorXd OutputErrorSearch::seen_offset(const Measured& measured) const {
+  const Eigen::VectorXd offset = Eigen::VectorXd::Constant(rows_, measured.channel == Channel::position ? 1 : 0);
+  return measured.times ? measured.times->weighed(offset) : offset;
+}
+
+Eigen::VectorXd OutputErrorSearch::coordinates(Structure structure, const SearchPoint& point) const {
+  const double dead_time_share = inside(point.model.dead_time_s / options_.longest_dead_time_s);
+  const FractionalModel& m = point.model;
+  const SensorTiming& sensor = point.sensor;
+  const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
+  Eigen::VectorXd all(kPositionClock + 1);
+  all << std::log(m.kp), std::log(m.b1), std::log(m.b2), logit(inside(m.alpha - 1)), logit(inside(m.beta)),
+      point.offset_m / offset_scale_m_, logit(dead_time_share),
+      logit(inside((sensor.first_s - earliest_s) / sensor_span_s)), (sensor.period_s / dt_s_ - 1) * record_ticks(),
+      logit(inside(sensor.time_constant_s / (kLongestTimeConstant * dt_s_))), point.position_clock_s / kClockScaleS;
+  return all(free_parameters(structure));
+}
+
+SearchPoint OutputErrorSearch::point_at(Structure structure, const Eigen::VectorXd& x) const {
+  SearchPoint point{{1, 0, 1, 1, 2, 1}, 0, sensor_start_.sensor};
+  const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
+  const std::vector<int> free = free_parameters(structure);
+  for (std::size_t j = 0; j < free.size(); ++j) {
+    const double value = x[static_cast<Index>(j)];
+    switch (free[j]) {
+      case 0: point.model.kp = std::exp(value); break;
+      case 1: point.model.b1 = std::exp(std::clamp(value, -kLargestLog, kLargestLog)); break;
+      case 2: point.model.b2 = std::exp(std::clamp(value, -kLargestLog, kLargestLog)); break;
+      case 3: point.model.alpha = 1 + logistic(value); break;
+      case 4: point.model.beta = logistic(value); break;
+      case kOffset: point.offset_m = value * offset_scale_m_; break;
+      case kSensorTime: point.sensor.first_s = earliest_s + logistic(value) * sensor_span_s; break;
+      case kSensorPeriod: point.sensor.period_s = dt_s_ * (1 + value / record_ticks()); break;
+      case kPositionClock:
+        point.position_clock_s = std::clamp(value, -kLargestClock, kLargestClock) * kClockScaleS;
+        break;
+      case kSensorTimeConstant: point.sensor.time_constant_s = logistic(value) * kLongestTimeConstant * dt_s_; break;
+      default: point.model.dead_time_s = logistic(value) * options_.longest_dead_time_s;
+    }
+  }
+  return point;
+}
+
+Eigen::VectorXd OutputErrorSearch::coordinate_slopes(Structure structure, const SearchPoint& point) const {
+  const FractionalModel& m = point.model;
+  const double longest_s = options_.longest_dead_time_s;
+  const double earliest_s = earliest_sample_s(), sensor_span_s = kLatestSample * dt_s_ - earliest_s;
+  const double time_share = (point.sensor.first_s - earliest_s) / sensor_span_s;
+  const double low_pass_share = point.sensor.time_constant_s / (kLongestTimeConstant * dt_s_);
+  Eigen::VectorXd all(kPositionClock + 1);
+  all << 1, 1, 1, (m.alpha - 1) * (2 - m.alpha), m.beta * (1 - m.beta), offset_scale_m_,
+      longest_s > 0 ? point.model.dead_time_s * (1 - point.model.dead_time_s / longest_s) : 0,
+      sensor_span_s * time_share * (1 - time_share), dt_s_ / record_ticks(),
+      kLongestTimeConstant * dt_s_ * low_pass_share * (1 - low_pass_share), kClockScaleS;
+  return all(free_parameters(structure));
+}
+
+double OutputErrorSearch::cost(const SearchPoint& point) {
+  const auto parts = residuals(point);
+  double sum = 0;
+  for (std::size_t c = 0; c < parts.size(); ++c) sum += (parts[c] / measured_[c].sd).squaredNorm();
+  return sum;
+}
+
+double OutputErrorSearch::absolute_cost(const SearchPoint& point) {
+  const auto parts = residuals(point);
+  double sum = 0;
+  for (std::size_t c = 0; c < parts.size(); ++c) sum += (parts[c] / measured_[c].sd).lpNorm<1>();
+  return sum;
+}
+
+SearchEnd OutputErrorSearch::descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress) {
+  using Status = Eigen::LevenbergMarquardtSpace::Status;
+  Eigen::VectorXd x = coordinates(structure, point);
+  Descent descent{*this, structure};
+  Eigen::LevenbergMarquardt<Descent> solver(descent);
+  solver.parameters.ftol = 1e-10;
+  solver.parameters.xtol = 1e-11;
+  solver.parameters.maxfev = 20 * (iteration_limit + 1);
+  solver.useExternalScaling = true;  // the coordinates are of order 1, and their scale must not follow the valley
+  solver.diag.setOnes(x.size());
+  solver.parameters.factor = 1;
+  last_iterations_ = progress.iteration;
+  last_cost_ = std::numeric_limits<double>::infinity();
+  Status status = solver.minimizeInit(x);
+  if (status == Status::UserAsked) return limit_.end().value_or(SearchEnd::not_finite);
+  SearchEnd end = SearchEnd::converged;
+  for (int i = 0; status == Status::NotStarted || status == Status::Running; ++i) {
+    if (i >= iteration_limit) {
+      end = SearchEnd::iteration_limit;
+      break;
+    }
+    status = solver.minimizeOneStep(x);
+    if (status == Status::UserAsked && limit_.end()) break;
+    last_iterations_ = ++progress.iteration;
+    progress.sse = 0;
+    for (std::size_t c = 0; c < measured_.size(); ++c) {
+      const auto part = solver.fvec.segment(static_cast<Index>(c) * rows_, rows_);
+      progress.sse += measured_[c].sd * measured_[c].sd * part.squaredNorm();
+    }
+    limit_.report(progress);
+    if (limit_.is_reached()) break;
+  }
+  if (descent.is_not_finite) end = SearchEnd::not_finite;
+  if (limit_.end()) end = *limit_.end();
+  if (x.allFinite()) point = point_at(structure, x);
+  last_cost_ = solver.fvec.squaredNorm();
+  return end;
+}
+
+SearchResult OutputErrorSearch::run(Structure structure, int parts) {
+  for (Measured& measured : measured_) {
+    measured.sd = scale_of(measured.measured);
+    measured.root_weight.setOnes();
+  }
+  SearchResult result;
+  limit_.begin_share(parts);
+  stop_ = [this] { return limit_.is_reached(); };
+  run_starts(structure, result);
+  if (!limit_.end() && measured_.size() > 1) refine_channel_weights(structure, result);
+  if (!limit_.end() && options_.cost == Cost::absolute_error) refine_absolute_error(structure, result);
+  stop_ = {};
+  if (limit_.end()) result.end = *limit_.end();
+  if (result.starts == 0) {
+    result.point = start(structure, 0);
+    fit_gain(result.point);
+  }
+  return result;
+}
+
+void OutputErrorSearch::run_starts(Structure structure, SearchResult& result) {
+  std::vector<double> costs;
+  const int starts = 1 + options_.further_starts;
+  const double rounding = kRoundingShare * kRoundingShare * static_cast<double>(rows_);
+  double best = std::numeric_limits<double>::infinity();
+  for (int index = 0; index < starts; ++index) {
+    const Progress progress{structure, index, starts, 0, 0};
+    limit_.begin(progress);
+    if (limit_.is_reached()) break;
+    SearchPoint point = start(structure, index);
+    fit_gain(point);
+    if (options_.longest_dead_time_s > 0 && !sensor()) fit_dead_time(point);
+    if (limit_.is_reached()) break;
+    const SearchEnd end = descend(structure, point, options_.iteration_limit, progress);
+    if (limit_.end() && last_iterations_ == 0) break;
+    if (costs.empty() || last_cost_ < best) {
+      best = std::min(best, last_cost_);
+      result.point = point;
+      result.end = end;
+      result.iterations = last_iterations_;
+    }
+    costs.push_back(last_cost_);
+    if (limit_.end()) break;
+  }
+  result.starts = static_cast<int>(costs.size());
+  result.starts_that_agree = static_cast<int>(std::count_if(
+      costs.begin(), costs.end(), [&](double found) { return found <= best * (1 + kAgreement) + rounding; }));
+}
+
+void OutputErrorSearch::refine_channel_weights(Structure structure, SearchResult& result) {
+  for (int round = 0; round < kWeightRounds; ++round) {
+    const auto parts = residuals(result.point);
+    if (limit_.is_reached()) return;
+    for (std::size_t c = 0; c < parts.size(); ++c) {
+      const double floor = 1e-13 * scale_of(measured_[c].measured);
+      measured_[c].sd = std::max(floor, parts[c].norm() / std::sqrt(static_cast<double>(rows_)));
+    }
+    result.end = descend(structure, result.point, options_.iteration_limit,
+                         {structure, result.starts - 1, result.starts, result.iterations, 0});
+    result.iterations = last_iterations_;
+    if (limit_.end()) return;
+  }
+}
+
+// Weights 1/|r| make the squares of (1) the absolute values of (2); each round must lower (2), or is the last.
+void OutputErrorSearch::refine_absolute_error(Structure structure, SearchResult& result) {
+  double lowest = absolute_cost(result.point);
+  if (limit_.is_reached()) return;
+  result.end = SearchEnd::iteration_limit;
+  SearchPoint point = result.point;
+  int small_gains = 0;
+  for (int round = 0; round < kReweightings; ++round) {
+    const auto parts = residuals(point);
+    if (limit_.is_reached()) return;
+    for (std::size_t c = 0; c < parts.size(); ++c) {
+      const double floor = std::max(1e-6 * parts[c].cwiseAbs().mean(), 1e-14 * measured_[c].sd);
+      measured_[c].root_weight = (parts[c].cwiseAbs().cwiseMax(floor) / measured_[c].sd).cwiseSqrt().cwiseInverse();
+    }
+    const SearchEnd end = descend(structure, point, kIterationsPerReweighting,
+                                  {structure, result.starts - 1, result.starts, result.iterations, 0});
+    result.iterations = last_iterations_;
+    if (end == SearchEnd::not_finite) result.end = end;
+    if (limit_.end() || end == SearchEnd::not_finite) return;
+    const double found = absolute_cost(point);
+    if (limit_.is_reached()) return;
+    small_gains = found > lowest * (1 - 1e-8) ? small_gains + 1 : 0;
+    if (found < lowest) lowest = found, result.point = point;
+    if (small_gains == 3) {
+      result.end = SearchEnd::converged;
+      return;
+    }
+  }
+}
+
+}  // namespace control

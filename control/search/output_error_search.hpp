@@ -1,0 +1,139 @@
+// Searches the parameters whose output is nearest to a recording.
+//
+//   minimise Σ_channels Σ_k (y_k - output_k(q) - offset)²/σ²_channel            (1)   σ: re-estimated, for two channels
+//   minimise Σ_channels Σ_k |y_k - output_k(q) - offset|/σ_channel              (2)   reweighted least squares on (1)
+//   of the acceleration: y - output as a SensorPath reads it, its bias taken off                 (4)
+//   of a position with times of its own: y - output at these times plus a shift - offset           (5)   weighed by
+//   (1) of position_weight.hpp
+//   q = ln kp, ln b1, ln b2, ln((α - 1)/(2 - α)), ln(β/(1 - β)), offset, ln(τ/(longest - τ))         (3)   unbounded
+//
+// Eigen's Levenberg-Marquardt (MINPACK's lmder) with the exact Jacobian. Every start's gain is the best for its other
+// parameters, which are the Newtonian model's for the first: so the units of the output do not matter.
+// The dead time's start is scanned for on a short piece of the record. The limits are asked for between all steps, and
+// inside those that are long; a start that was cut off before its first iteration does not count.
+// Errors: none thrown; how a search ended is in the result.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "control/search/fit.hpp"
+#include "control/search/output_model.hpp"
+#include "control/search/search_limit.hpp"
+#include "control/sensor/position_times.hpp"
+#include "control/sensor/sensor_path.hpp"
+
+namespace control {
+
+inline constexpr double kModelTolerance = 1e-14;  // of the outputs
+
+struct SearchPoint {
+  FractionalModel model;
+  double offset_m = 0;
+  SensorTiming sensor = {};
+  double position_clock_s = 0;  // the shift of (5)
+};
+
+struct SearchResult {
+  SearchPoint point;
+  SearchEnd end = SearchEnd::converged;
+  int iterations = 0, starts = 0, starts_that_agree = 0;
+};
+
+// What is free beside the model's own parameters follows the kParameters of these.
+enum FreeParameter : int {
+  kOffset = kParameters,
+  kDeadTime,
+  kSensorTime,
+  kSensorPeriod,
+  kSensorTimeConstant,
+  kPositionClock
+};
+
+class OutputErrorSearch {
+ public:
+  OutputErrorSearch(const Recording& recording, const IdentificationOptions& options,
+                    SearchLimit::Clock clock = steady_now_s);
+
+  // Within one of parts equal shares of the time that is left. With no time at all the result is the paper's start.
+  SearchResult run(Structure structure, int parts = 1);
+
+  // Of a recorded acceleration, before the first run(): which sample each tick reads. Within one of parts equal shares.
+  void find_sensor(int parts);
+  std::optional<SearchEnd> sensor_search_end() const { return sensor_search_end_; }  // what cut it off; none: nothing
+  std::optional<SensorFit> sensor_fit(const SearchPoint& point);  // none: no acceleration was recorded
+  double sensor_lag_s(const SearchPoint& point) const;            // dead time and all, its sampling aside
+  double dead_time_s(const SearchPoint& point) const;
+  const SensorPath* sensor() const { return measured_.front().path.get(); }
+  const PositionTimes* position_times() const { return measured_.front().times.get(); }
+
+  SearchPoint start(Structure structure, int index) const;
+  // The best gain, and offset if it is fitted; false, with a positive stand-in, if the best gain is not positive.
+  bool fit_gain(SearchPoint& point);
+  std::vector<int> free_parameters(Structure structure) const;
+  std::vector<Channel> channels() const;
+  const SearchLimit& limit() const { return limit_; }
+  long outputs_computed() const { return outputs_computed_; }  // of one channel each
+  // One per channel, measured less output, in its own unit.
+  std::vector<Eigen::VectorXd> residuals(const SearchPoint& point);
+  // Of the outputs with respect to ln kp, ln b1, ln b2, alpha, beta, offset, dead time, as far as they are free.
+  std::vector<Eigen::MatrixXd> jacobians(Structure structure, const SearchPoint& point);
+  // By the model's five parameters, as they are measured, if the duty had been this one; and the model's velocity.
+  std::vector<Eigen::MatrixXd> model_slopes(const std::vector<double>& duty, const SearchPoint& point) const;
+  std::vector<double> model_velocity_m_s(const SearchPoint& point);
+  // The output as it is measured, so many samples late: a column each.
+  std::vector<Eigen::MatrixXd> late_outputs(const std::vector<Eigen::Index>& samples, const SearchPoint& point);
+
+ private:
+  struct Measured {
+    Channel channel;
+    OutputModel model;
+    Eigen::VectorXd measured;  // weighed, of a position with sds of its own
+    double sd;
+    Eigen::VectorXd root_weight;
+    std::unique_ptr<SensorPath> path = nullptr;      // of an acceleration
+    std::unique_ptr<PositionTimes> times = nullptr;  // of a position that has its own
+  };
+  struct Descent;  // what Eigen's solver calls
+
+  // The output, or a column of its slopes, as it is measured.
+  Eigen::VectorXd seen(const Measured& measured, const SearchPoint& point, const Eigen::VectorXd& output) const;
+  Eigen::VectorXd seen_offset(const Measured& measured) const;  // of 1 m
+  SensorTiming rough_timing() const;
+  double earliest_sample_s() const;
+  double record_ticks() const { return static_cast<double>(samples_); }
+  void find_delay(SearchPoint& point);
+  bool find_own_clock(SearchPoint& point);
+  bool descend_again(SearchPoint& point);
+  double sensor_sd(const SearchPoint& point);  // of a reading
+  void run_starts(Structure structure, SearchResult& result);
+  void fit_dead_time(SearchPoint& point);
+  void make_scan(const Recording& recording);
+  SearchEnd descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress);
+  void refine_channel_weights(Structure structure, SearchResult& result);
+  void refine_absolute_error(Structure structure, SearchResult& result);
+  double cost(const SearchPoint& point);                                             // (1)
+  double absolute_cost(const SearchPoint& point);                                    // (2)
+  Eigen::VectorXd coordinates(Structure structure, const SearchPoint& point) const;  // (3)
+  SearchPoint point_at(Structure structure, const Eigen::VectorXd& x) const;
+  Eigen::VectorXd coordinate_slopes(Structure structure, const SearchPoint& point) const;
+
+  IdentificationOptions options_;
+  double dt_s_;
+  Eigen::Index samples_;
+  Eigen::Index rows_;  // measured values of each channel: samples_, or of a position with times of its own their number
+  double offset_scale_m_ = 1;
+  bool sensor_is_found_ = false;
+  std::optional<SearchEnd> sensor_search_end_;
+  SearchPoint sensor_start_;  // what the search for it ended with
+  int last_iterations_ = 0;
+  double last_cost_ = 0;  // of the last descent, by its own weights
+  long outputs_computed_ = 0;
+  SearchLimit limit_;
+  Stop stop_;  // asks the limit while a search runs; empty else, so that what was found can be looked at
+  std::vector<Measured> measured_;
+  std::unique_ptr<OutputErrorSearch> scan_;  // of a short piece, for the dead time; none if the record is short
+};
+
+}  // namespace control

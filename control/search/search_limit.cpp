@@ -1,0 +1,51 @@
+// Compares the clock with the share's end, and tells the watcher when it has been silent for long.
+#include "control/search/search_limit.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace control {
+
+double steady_now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+SearchLimit::SearchLimit(double limit_s, std::function<bool(const Progress&)> on_progress, Clock clock)
+    : on_progress_(std::move(on_progress)),
+      clock_(std::move(clock)),
+      deadline_s_(clock_() + std::clamp(limit_s, 0.0, 1e6)),
+      share_end_s_(deadline_s_),
+      last_told_s_(clock_()) {}
+
+void SearchLimit::begin_share(int parts) {
+  if (end_ == SearchEnd::cancelled) return;
+  end_.reset();
+  const double now_s = clock_();
+  share_end_s_ = now_s + std::max(0.0, deadline_s_ - now_s) / std::max(1, parts);
+}
+
+void SearchLimit::report(const Progress& progress) {
+  progress_ = progress;
+  if (end_ != SearchEnd::cancelled) ask_watcher(clock_());
+}
+
+bool SearchLimit::is_reached() {
+  if (end_) return true;
+  const double now_s = clock_();
+  if (now_s >= share_end_s_) {
+    end_ = SearchEnd::time_limit;
+  } else if (now_s - last_told_s_ >= kMostSilenceS) {
+    ask_watcher(now_s);
+  }
+  return end_.has_value();
+}
+
+double SearchLimit::left_s() const { return end_ == SearchEnd::cancelled ? 0 : std::max(0.0, deadline_s_ - clock_()); }
+
+void SearchLimit::ask_watcher(double now_s) {
+  last_told_s_ = now_s;
+  if (on_progress_ && !on_progress_(progress_)) end_ = SearchEnd::cancelled;
+}
+
+}  // namespace control

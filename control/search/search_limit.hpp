@@ -1,0 +1,41 @@
+// Ends a search on time, or when the one who watches it says so; it is asked inside long steps too.
+//
+// Once reached it stays reached: by the time limit until the next share begins, by cancelling for ever. The watcher
+// hears of every iteration, and at least each kMostSilenceS while the search asks.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "control/search/fit.hpp"
+
+namespace control {
+
+class SearchLimit {
+ public:
+  using Clock = std::function<double()>;  // seconds from any origin
+  static constexpr double kMostSilenceS = 0.1;
+
+  SearchLimit(double limit_s, std::function<bool(const Progress&)> on_progress, Clock clock);
+
+  void begin_share(int parts);  // what follows may use one of so many equal parts of the time that is left
+  void begin(const Progress& progress) { progress_ = progress; }
+  void report(const Progress& progress);  // the watcher hears it at once
+  bool is_reached();
+  std::optional<SearchEnd> end() const { return end_; }
+  double left_s() const;  // of the whole limit
+
+ private:
+  void ask_watcher(double now_s);
+
+  std::function<bool(const Progress&)> on_progress_;
+  Clock clock_;
+  double deadline_s_, share_end_s_, last_told_s_;
+  Progress progress_;
+  std::optional<SearchEnd> end_;
+};
+
+// Of std::chrono::steady_clock.
+double steady_now_s();
+
+}  // namespace control

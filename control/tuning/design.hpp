@@ -1,0 +1,32 @@
+// A tuning specification, and a controller that meets one, with what it achieves.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "control/responses/margins.hpp"
+
+namespace control {
+
+struct TuningSpec {
+  double gain_crossover_rad_s = 5;
+  double phase_margin_deg = 91;             // in (0, 180)
+  std::optional<double> mu = std::nullopt;  // in (0, 2); fixed: iso-damping is dropped, and (3), (6) alone are met
+  bool is_velocity_loop = false;
+};
+
+// A specification that has a solution, and the controller for it.
+struct TunedController {
+  std::string name;  // in words: what was kept and what was given up, and what else is to be known of it
+  TuningSpec spec;   // tuning to this returns this controller
+  FopdController controller;
+  Margins achieved;  // computed from the controller's own numbers
+};
+
+// The closed loop is stable, and the crossover of the specification is the one with the smallest phase margin.
+bool is_sound(const TunedController& design);
+
+// Another crossover than that of the specification has the smallest phase margin.
+bool is_ruled_elsewhere(const TunedController& design);
+
+}  // namespace control

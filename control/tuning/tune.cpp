@@ -1,0 +1,117 @@
+// The closed form, its condition, and what to offer instead.
+#include "control/tuning/tune.hpp"
+
+#include <cmath>
+#include <sstream>
+
+#include "base/invalid_argument.hpp"
+#include "control/tuning/feasible_margins.hpp"
+#include "control/tuning/tuning_alternatives.hpp"
+#include "control/tuning/tuning_equations.hpp"
+
+namespace control {
+namespace {
+
+[[noreturn]] void refuse(const char* what, double value) { throw_invalid("tuning: ", what, ' ', value); }
+
+void check(const TuningSpec& spec) {
+  check_crossover(spec.gain_crossover_rad_s);
+  if (!(spec.phase_margin_deg > 0 && spec.phase_margin_deg < 180)) {
+    refuse("phase_margin_deg must lie in (0, 180), is", spec.phase_margin_deg);
+  }
+  if (spec.mu && !(*spec.mu > 0 && *spec.mu < 2)) refuse("mu must lie in (0, 2), is", *spec.mu);
+}
+
+std::string name_of(const TuningSpec& spec) {
+  if (!spec.mu) return "as asked: iso-damped";
+  if (*spec.mu <= 1) return "as asked: mu fixed, iso-damping dropped";
+  return "as asked: mu fixed, above 1: amplifies noise more than a derivative, not in the paper; iso-damping dropped";
+}
+
+std::string no_phase_to_add(const TuningSpec& spec, double theta_deg) {
+  std::ostringstream text;
+  text.precision(6);
+  const double plant_deg = spec.phase_margin_deg - theta_deg;
+  text << "the plant with a plain gain has a phase margin of " << plant_deg << " degrees at "
+       << spec.gain_crossover_rad_s << " rad/s, " << (theta_deg < 0 ? "more than" : "just") << " the "
+       << spec.phase_margin_deg << " asked for, and a fractional PD can only add phase (theta = " << theta_deg
+       << " degrees)";
+  return text.str();
+}
+
+std::string why_not_with_mu(const TuningSpec& spec, double theta_deg) {
+  if (theta_deg < 0) return no_phase_to_add(spec, theta_deg);
+  std::ostringstream text;
+  text.precision(6);
+  text << "the controller would have to add theta = " << theta_deg << " degrees of phase at "
+       << spec.gain_crossover_rad_s << " rad/s, and with mu = " << *spec.mu << " it adds less than " << *spec.mu * 90
+       << "; ";
+  if (theta_deg < 180) {
+    text << "a mu above " << theta_deg / 90 << " would do";
+  } else {
+    text << "no mu below 2 would do";
+  }
+  return text.str();
+}
+
+std::string why_not_iso_damped(const TuningSpec& spec, double theta_deg, double phase_fall) {
+  if (theta_deg <= 0) return no_phase_to_add(spec, theta_deg);
+  std::ostringstream text;
+  text.precision(6);
+  if (theta_deg >= 90) {
+    text << "the controller would have to add theta = " << theta_deg << " degrees of phase at "
+         << spec.gain_crossover_rad_s << " rad/s, and a fractional PD with mu up to 1 adds less than 90";
+    return text.str();
+  }
+  const double bound = largest_phase_fall(theta_deg / kDegPerRad);
+  text << "at " << spec.gain_crossover_rad_s << " rad/s the phase of the plant falls by R = " << phase_fall
+       << " rad per unit of ln omega, and a fractional PD with mu up to 1 that adds theta = " << theta_deg
+       << " degrees can make up for less than sin(2 theta)/2 = " << bound;
+  if (phase_fall >= 0.5) text << " (and never for more than 0.5, so no phase margin is iso-damped at this crossover)";
+  return text.str();
+}
+
+// The specification has a solution, but its numbers are not what the loop does.
+std::string why_not_sound(const TunedController& design) {
+  const auto& [kp, kd, mu] = design.controller;
+  const Margins& achieved = design.achieved;
+  std::ostringstream text;
+  text.precision(6);
+  text << "kp = " << kp << ", kd = " << kd << ", mu = " << mu << " meets it at " << design.spec.gain_crossover_rad_s
+       << " rad/s, but ";
+  if (!achieved.is_closed_loop_stable) text << "the closed loop is unstable";
+  if (is_ruled_elsewhere(design)) {
+    text << (achieved.is_closed_loop_stable ? "" : ": ") << "the gain is 1 also at " << *achieved.gain_crossover_rad_s
+         << " rad/s, where the phase margin is " << *achieved.phase_margin_deg << " degrees";
+  }
+  return text.str();
+}
+
+}  // namespace
+
+TuningResult tune(const FractionalModel& plant, const TuningSpec& spec) {
+  check_tuned_plant(plant);
+  check(spec);
+  const PlantOnAxis on_axis{plant, spec.is_velocity_loop};
+  const TuningDemand demand = tuning_demand(on_axis, std::log(spec.gain_crossover_rad_s), spec.phase_margin_deg);
+  TuningResult result;
+  result.theta_deg = demand.theta_rad * kDegPerRad;
+  result.phase_fall = demand.phase_fall;
+  if (feasible_theta(spec.mu, demand.phase_fall).contains(demand.theta_rad)) {  // (5)
+    const double mu = spec.mu ? *spec.mu : iso_damping_mu(demand);
+    TunedController design = tuned_controller(plant, spec, mu, name_of(spec));
+    result.is_feasible = is_sound(design);
+    if (!result.is_feasible) result.reason = why_not_sound(design);
+    (result.is_feasible ? result.tuned : result.refused) = std::move(design);
+  } else {
+    result.reason = spec.mu ? why_not_with_mu(spec, result.theta_deg)
+                            : why_not_iso_damped(spec, result.theta_deg, result.phase_fall);
+  }
+  if (!result.is_feasible) {
+    result.nearest = nearest_designs(plant, spec);
+    result.relaxed = relaxed_designs(plant, spec);
+  }
+  return result;
+}
+
+}  // namespace control

@@ -1,0 +1,136 @@
+// JSON by std::to_chars; what a segment's samples share is written once.
+#include "server/api/bodies/column_text.hpp"
+
+#include <fmt/format.h>
+
+#include "base/number_text.hpp"
+#include "server/api/bodies/json.hpp"
+#include "server/api/bodies/query_params.hpp"
+#include "server/station/state/unknown_values.hpp"
+
+namespace server {
+namespace {
+
+// What a sample's object ends with.
+std::string shared_text(const Segment& segment) {
+  const SampleContext& context = segment.context;
+  std::string out = fmt::format(
+      R"(,"clock_uncertainty_us":{},"first_received_at_us":{},"received_at_us":{},"mode":"{}","sub_state":"{}")",
+      segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us, protocol::text(context.mode),
+      protocol::text(context.sub_state));
+  out += R"(,"setpoint_m":)";
+  append_float(out, context.setpoint_m.value_or(NAN), "null");
+  out += R"(,"disturbance_m":)";
+  append_float(out, context.disturbance_m.value_or(NAN), "null");
+  out += R"(,"position_sd_m":)";
+  append_float(out, context.position_sd_m.value_or(NAN), "null");
+  out += fmt::format(R"(,"controller_id":{},"emergency_id":)", context.controller_id);
+  out += context.emergency_id == 0 ? "null" : fmt::format(R"("{}")", context.emergency_id);
+  out += fmt::format(R"(,"emergency_cause":"{}","flags":{},"unknown_values":{}}})",
+                     protocol::text(context.emergency_cause), context.flags, unknown_values(context).value_or("null"));
+  return out;
+}
+
+void append_segment(std::string& out, const SpanSegment& part) {
+  const Segment& segment = part.segment;
+  const std::string beginning = fmt::format(R"({{"span":{},"boot_id":"{}","seq":)", part.span, part.boot_id);
+  const std::string end = shared_text(segment);
+  for (std::size_t index = 0; index < segment.samples.size(); ++index) {
+    if (out.back() != '[') out += ',';
+    out += beginning;
+    append_number(out, segment.first_seq + index);
+    const std::uint64_t robot_time_us = segment.robot_time_us(index);
+    out += R"(,"robot_time_us":)";
+    append_number(out, robot_time_us);
+    out += R"(,"utc_us":)";
+    append_number(out, static_cast<std::int64_t>(robot_time_us) + segment.utc_offset_us);
+    for (std::size_t channel = 0; channel < kChannels; ++channel) {
+      out += ",\"";
+      out += text(static_cast<Channel>(channel));
+      out += "\":";
+      append_float(out, segment.samples[index].*kSampleMembers[channel], "null");
+    }
+    out += end;
+  }
+}
+
+void append(std::string& out, float value) { append_float(out, value, "null"); }
+template <std::integral Number>
+void append(std::string& out, Number value) {
+  append_number(out, value);
+}
+
+// "name":[1,2,3]
+template <class Number>
+void append_column(std::string& out, const char* name, const std::vector<Number>& values) {
+  out += '"';
+  out += name;
+  out += "\":[";
+  for (const Number value : values) {
+    if (out.back() != '[') out += ',';
+    append(out, value);
+  }
+  out += ']';
+}
+
+std::string next_text(const std::optional<SampleCursor>& next) {
+  return next ? '"' + cursor_text(*next) + '"' : "null";
+}
+
+// "gaps":[...]
+void append_gaps(std::string& out, const std::vector<Gap>& gaps) {
+  out += R"("gaps":[)";
+  for (const Gap& gap : gaps) {
+    if (out.back() != '[') out += ',';
+    out +=
+        fmt::format(R"({{"robot_id":{},"boot_id":"{}","first_seq":{},"last_seq":{},"cause":{},"noticed_at_us":{}}})",
+                    dump(gap.robot_id), gap.boot_id, gap.first_seq, gap.last_seq, dump(gap.cause), gap.noticed_at_us);
+  }
+  out += ']';
+}
+
+}  // namespace
+
+std::string page_text(const SegmentPage& page) {
+  std::string out = R"({"samples":[)";
+  for (const SpanSegment& part : page.segments) append_segment(out, part);
+  out += R"(],"next":)" + next_text(page.next) + '}';
+  return out;
+}
+
+std::string overview_text(const Overview& overview, Channels channels) {
+  const OverviewColumns& columns = overview.columns;
+  std::string out = columns.from_segments ? R"({"source":"segments",)" : R"({"source":"rows",)";
+  append_column(out, "first_utc_us", columns.first_utc_us);
+  out += ',';
+  append_column(out, "last_utc_us", columns.last_utc_us);
+  out += ',';
+  append_column(out, "samples", columns.samples);
+  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    if (!channels[channel]) continue;
+    out += fmt::format(R"(,"{}":{{)", text(static_cast<Channel>(channel)));
+    append_column(out, "min", columns.min[channel]);
+    out += ',';
+    append_column(out, "max", columns.max[channel]);
+    out += '}';
+  }
+  out += ',';
+  append_gaps(out, overview.gaps.gaps);
+  out += R"(,"gaps_next":)" + next_text(overview.gaps.next) + '}';
+  return out;
+}
+
+std::string absences_text(const AbsencePage& page) {
+  std::string out = "{";
+  append_gaps(out, page.gaps);
+  out += R"(,"missing":[)";
+  for (const MissingRange& range : page.missing) {
+    if (out.back() != '[') out += ',';
+    out += fmt::format(R"({{"boot_id":"{}","first_seq":{},"last_seq":{}}})", range.boot_id, range.first_seq,
+                       range.last_seq);
+  }
+  out += R"(],"next":)" + next_text(page.next) + '}';
+  return out;
+}
+
+}  // namespace server

@@ -1,0 +1,118 @@
+// A model's JSON, checked member by member.
+#include "server/api/bodies/fluid_model_body.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <optional>
+
+#include "base/json_text.hpp"
+#include "server/api/bodies/json.hpp"
+
+namespace server {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxDocumentBytes = 16'384;
+constexpr const char* kTexts[] = {"name", "comment", "description"};
+
+// Each is a float32 on its way to the robot: what is checked is what is sent.
+Result<FluidModel::Numbers> numbers(const Members& body, const char* name, float minimum, float maximum) {
+  const auto wrong = [name] {
+    return fail(ErrorCode::bad_request, fmt::format("{} must be a list of {} numbers", name, kFluidModelSections),
+                "wrong_type");
+  };
+  if (!body.has(name)) return fail(ErrorCode::bad_request, fmt::format("{} is missing", name), "missing_member");
+  const json& list = body.object().at(name);
+  if (!list.is_array() || list.size() != kFluidModelSections) return wrong();
+  FluidModel::Numbers out{};
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (!list[i].is_number()) return wrong();
+    out[i] = static_cast<float>(list[i].get<double>()) + 0.0F;  // never -0, which the database would not keep
+    if (std::isfinite(out[i]) && out[i] >= minimum && out[i] <= maximum) continue;
+    return fail(ErrorCode::invalid,
+                fmt::format("{}[{}] = {} is outside {} to {}, the range of the robot's parameter", name, i,
+                            list[i].dump(), minimum, maximum),
+                "out_of_range");
+  }
+  return out;
+}
+
+Result<double> fit_error_in(const Members& body) {
+  const auto fit_error = body.number("fit_error");
+  if (!fit_error) return fit_error;
+  if (!(*fit_error >= 0)) {
+    return fail(ErrorCode::invalid, fmt::format("fit_error = {} is negative", *fit_error), "out_of_range");
+  }
+  if (*fit_error > kMaxModelFitError) {
+    return fail(ErrorCode::invalid,
+                fmt::format("fit_error = {:.2g} %: a model that is off by more than {} % of the final velocity makes a "
+                            "robot surer of its position than it may be; fit it again, or leave the robots without one",
+                            *fit_error * 100, kMaxModelFitError * 100),
+                "fit_too_bad");
+  }
+  return fit_error;
+}
+
+Result<std::string> document_in(const Members& body) {
+  json document = json::object();
+  for (const char* name : kTexts) {
+    if (!body.has(name)) continue;
+    const auto text = body.text(name, 0, kMaxDocumentBytes);
+    if (!text) return text;
+    document[name] = *text;
+  }
+  if (body.has("plant")) {
+    const json& plant = body.object().at("plant");
+    if (!plant.is_object()) return fail(ErrorCode::bad_request, "plant must be an object", "wrong_type");
+    document["plant"] = plant;
+  }
+  std::string text = dump(document);
+  if (text.size() <= kMaxDocumentBytes) return text;
+  return fail(
+      ErrorCode::invalid,
+      fmt::format("plant and texts have {} bytes together, at most {} are kept", text.size(), kMaxDocumentBytes),
+      "out_of_range");
+}
+
+json list_of(const FluidModel::Numbers& numbers) {
+  json list = json::array();
+  for (const float number : numbers) list.push_back(decimal(number));
+  return list;
+}
+
+}  // namespace
+
+Result<FluidModel> parse_fluid_model(const std::string& text) {
+  const auto body = Members::parse(
+      text, {"model_gain_m_s", "model_time_constant_s", "fit_error", "plant", "name", "comment", "description"});
+  if (!body) return std::unexpected{body.error()};
+  FluidModel model;
+  const auto gain = numbers(*body, "model_gain_m_s", -kMaxModelGain_m_s, kMaxModelGain_m_s);
+  if (!gain) return std::unexpected{gain.error()};
+  const auto time_constant = numbers(*body, "model_time_constant_s", kMinModelTimeConstant_s, kMaxModelTimeConstant_s);
+  if (!time_constant) return std::unexpected{time_constant.error()};
+  const auto fit_error = fit_error_in(*body);
+  if (!fit_error) return std::unexpected{fit_error.error()};
+  auto document = document_in(*body);
+  if (!document) return std::unexpected{document.error()};
+  model.gain_m_s = *gain;
+  model.time_constant_s = *time_constant;
+  model.fit_error = *fit_error;
+  model.document = std::move(*document);
+  return model;
+}
+
+json to_json(const FluidModel& model) {
+  json out = json::parse(model.document, nullptr, false);
+  if (!out.is_object()) out = json::object();
+  out["model_gain_m_s"] = list_of(model.gain_m_s);
+  out["model_time_constant_s"] = list_of(model.time_constant_s);
+  out["fit_error"] = model.fit_error;
+  out["set_by"] = model.set_by;
+  out["set_at_us"] = model.set_at_us;
+  return out;
+}
+
+}  // namespace server

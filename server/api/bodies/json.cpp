@@ -1,0 +1,188 @@
+// The table from error codes to statuses; the strict reading of a JSON object; runs and gaps as JSON.
+#include "server/api/bodies/json.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+namespace server {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr std::size_t kMaxQuoted = 60;
+
+std::string quote(const json& value) {
+  std::string text = dump(value);
+  if (text.size() > kMaxQuoted) text = text.substr(0, kMaxQuoted) + "…";
+  return text;
+}
+
+std::unexpected<Error> wrong_type(const char* name, const char* wanted, const json& value) {
+  return fail(ErrorCode::bad_request, fmt::format("{} = {} is not {}", name, quote(value), wanted), "wrong_type");
+}
+
+std::unexpected<Error> missing(const char* name) {
+  return fail(ErrorCode::bad_request, fmt::format("{} is missing", name), "missing_member");
+}
+
+// Outside of texts. What is nested deeper would be written and destroyed by recursion as deep.
+bool is_nested_too_deep(const std::string& text) {
+  int depth = 0;
+  bool in_text = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '"') in_text = !in_text;
+    if (in_text && c == '\\') ++i;
+    if (in_text) continue;
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (depth > kMaxJsonDepth) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Result<Members> Members::parse(const std::string& text, std::initializer_list<const char*> known) {
+  if (is_nested_too_deep(text)) {
+    return fail(ErrorCode::bad_request, fmt::format("the body is nested deeper than {} levels", kMaxJsonDepth),
+                "malformed_json");
+  }
+  json value = json::parse(text, nullptr, false);
+  if (value.is_discarded()) {
+    return fail(ErrorCode::bad_request, "the body is not valid JSON (JSON has no NaN and no Infinity)",
+                "malformed_json");
+  }
+  if (!value.is_object()) return fail(ErrorCode::bad_request, "the body is not a JSON object", "malformed_json");
+  Members members{std::move(value)};
+  if (known.size() > 0) {
+    if (auto checked = members.only(known); !checked) return std::unexpected{checked.error()};
+  }
+  return members;
+}
+
+Result<void> Members::only(std::initializer_list<const char*> known) const {
+  for (const auto& [name, value] : object_.items()) {
+    const auto same = [&name](const char* other) { return name == other; };
+    if (std::ranges::none_of(known, same)) {
+      return fail(ErrorCode::bad_request, fmt::format("{} is not known here", quote(name)), "unknown_member");
+    }
+  }
+  return {};
+}
+
+Result<std::string> Members::text(const char* name, std::size_t min_length, std::size_t max_length) const {
+  if (!has(name)) return missing(name);
+  const json& value = object_.at(name);
+  if (!value.is_string()) return wrong_type(name, "a string", value);
+  auto text = value.get<std::string>();
+  if (text.size() < min_length || text.size() > max_length) {
+    return fail(ErrorCode::invalid,
+                fmt::format("{} has {} bytes, allowed are {} to {}", name, text.size(), min_length, max_length),
+                "out_of_range");
+  }
+  return text;
+}
+
+Result<double> Members::number(const char* name) const {
+  if (!has(name)) return missing(name);
+  const json& value = object_.at(name);
+  if (!value.is_number()) return wrong_type(name, "a number", value);
+  return value.get<double>();
+}
+
+Result<float> Members::number_as_float(const char* name) const {
+  const auto value = number(name);
+  if (!value) return std::unexpected{value.error()};
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  if (std::abs(*value) > kLargest) {
+    return fail(ErrorCode::invalid, fmt::format("{} = {} is beyond ±{}", name, *value, kLargest), "out_of_range");
+  }
+  return static_cast<float>(*value);
+}
+
+Result<std::int64_t> Members::integer(const char* name, std::int64_t minimum, std::int64_t maximum) const {
+  if (!has(name)) return missing(name);
+  const json& value = object_.at(name);
+  if (!value.is_number_integer()) return wrong_type(name, "an integer", value);
+  const bool beyond = value.is_number_unsigned() && value.get<std::uint64_t>() > std::uint64_t{INT64_MAX};
+  if (beyond || value.get<std::int64_t>() < minimum || value.get<std::int64_t>() > maximum) {
+    return fail(ErrorCode::invalid, fmt::format("{} = {} is outside {} to {}", name, quote(value), minimum, maximum),
+                "out_of_range");
+  }
+  return value.get<std::int64_t>();
+}
+
+Result<void> Members::time(const char* name, std::optional<std::int64_t>& into) const {
+  if (!has(name)) return {};
+  const auto time_us = integer(name, 0, std::numeric_limits<std::int64_t>::max());
+  if (!time_us) return std::unexpected{time_us.error()};
+  into = *time_us;
+  return {};
+}
+
+Result<std::uint64_t> Members::id(const char* name) const {
+  if (!has(name)) return missing(name);
+  const json& value = object_.at(name);
+  const auto id = value.is_string() ? parse_id(value.get<std::string>()) : std::nullopt;
+  if (!id) return wrong_type(name, "a string with a number from 1 to 18446744073709551615", value);
+  return *id;
+}
+
+std::optional<std::uint64_t> parse_id(const std::string& text) {
+  std::uint64_t id = 0;
+  const char* end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, id);
+  if (error != std::errc{} || rest != end || id == 0) return std::nullopt;
+  return id;
+}
+
+bool is_robot_id(const std::string& text) {
+  const auto allowed = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-'; };
+  return !text.empty() && text.size() <= 31 && std::ranges::all_of(text, allowed);
+}
+
+json to_json(const Run& run) {
+  json spans = json::array();
+  for (const RunSpan& span : run.spans) {
+    json one;
+    one["boot_id"] = std::to_string(span.boot_id);
+    one["first_seq"] = span.first_seq;
+    one["last_seq"] = span.last_seq ? json(*span.last_seq) : json(nullptr);
+    spans.push_back(std::move(one));
+  }
+  const RunConditions& conditions = run.conditions;
+  json out;
+  out["run_id"] = run.id;
+  out["robot_id"] = run.robot_id;
+  out["state"] = text(run.state);
+  out["made_afterwards"] = run.made_afterwards;
+  out["made_by"] = run.made_by;
+  out["name"] = conditions.name;
+  out["fluid"] = conditions.fluid;
+  out["pump_profile"] = conditions.pump_profile;
+  out["mean_flow_m_s"] = conditions.mean_flow_m_s ? json(*conditions.mean_flow_m_s) : json(nullptr);
+  out["tube"] = conditions.tube;
+  out["operator_name"] = conditions.operator_name;
+  out["profile"] = conditions.profile;
+  out["notes"] = conditions.notes;
+  out["verdict"] = conditions.verdict;
+  out["firmware_version"] = run.firmware_version;
+  out["controller_id"] = run.controller_id;
+  out["controller_checksum"] = run.controller_checksum;
+  out["parameters_checksum"] = run.parameters_checksum;
+  out["started_at_us"] = run.started_at_us;
+  out["ended_at_us"] = run.ended_at_us ? json(*run.ended_at_us) : json(nullptr);
+  out["spans"] = std::move(spans);
+  out["samples_expected"] = run.samples_expected;
+  out["samples_stored"] = run.samples_stored;
+  out["samples_lost"] = run.samples_lost;
+  return out;
+}
+
+}  // namespace server

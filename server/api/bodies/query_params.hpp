@@ -1,0 +1,39 @@
+// Query parameters of the routes as values: numbers within limits, cursors, channels, windows of time.
+//
+// Each gives bad_request with the name and the value of a parameter that is not acceptable. Pure.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "server/http/http.hpp"
+#include "server/runtime/result.hpp"
+#include "server/storage/query/history.hpp"
+
+namespace server {
+
+// A number within limits; `fallback` when it is not given.
+Result<std::int64_t> query_number(const Request& request, const std::string& name, std::int64_t minimum,
+                                  std::int64_t maximum, std::int64_t fallback);
+
+// A cursor is "span-seq"; opaque to its users.
+std::string cursor_text(const SampleCursor& cursor);
+std::optional<SampleCursor> parse_cursor(const std::string& text);
+// `after`; none when it is not given.
+Result<std::optional<SampleCursor>> query_cursor(const Request& request);
+
+// `channels`: names with commas between them, each once; all when it is not given.
+Result<Channels> query_channels(const Request& request);
+
+// `from_us` and `to_us`, UTC, the second above the first; none when neither is given.
+Result<std::optional<TimeWindow>> query_window(const Request& request);
+
+inline constexpr std::int64_t kMaxRunId = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
+Result<RunId> run_id_of(const Request& request);                  // of the path
+
+// What the path's run_id or robot_id and the window name.
+Result<Excerpt> run_excerpt(const Request& request);
+Result<Excerpt> robot_excerpt(const Request& request);
+
+}  // namespace server

@@ -1,0 +1,175 @@
+// Reads the bodies of requests: control, runs, markers.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "server/api/bodies/json.hpp"
+
+namespace server {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxNameBytes = 200;
+constexpr std::size_t kMaxTextBytes = 4000;
+
+Result<void> read_text(const Members& body, const char* name, std::string& into) {
+  if (!body.has(name)) return {};
+  auto value = body.text(name, 0, kMaxTextBytes);
+  if (!value) return std::unexpected{value.error()};
+  into = std::move(*value);
+  return {};
+}
+
+constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
+
+Result<RecordedRange> read_range(const json& value) {
+  if (!value.is_object()) return fail(ErrorCode::bad_request, "span is not an object", "wrong_type");
+  const Members span{value};
+  if (span.has("boot_id")) {
+    if (auto known = span.only({"boot_id", "first_seq", "last_seq"}); !known) return std::unexpected{known.error()};
+    const auto boot_id = span.id("boot_id");
+    if (!boot_id) return std::unexpected{boot_id.error()};
+    const auto first = span.integer("first_seq", 0, kLargest - 1);
+    if (!first) return std::unexpected{first.error()};
+    const auto last = span.integer("last_seq", *first, kLargest - 1);
+    if (!last) return std::unexpected{last.error()};
+    return SeqSpan{*boot_id, static_cast<std::uint64_t>(*first), static_cast<std::uint64_t>(*last)};
+  }
+  if (auto known = span.only({"from_us", "to_us"}); !known) return std::unexpected{known.error()};
+  const auto from_us = span.integer("from_us", 0, kLargest - 1);
+  if (!from_us) return std::unexpected{from_us.error()};
+  const auto to_us = span.integer("to_us", *from_us, kLargest - 1);
+  if (!to_us) return std::unexpected{to_us.error()};
+  return TimeSpan{*from_us, *to_us};
+}
+
+}  // namespace
+
+Result<ParsedControl> parse_control(const std::string& text) {
+  const auto body = Members::parse(text, {"action", "lease_ms", "reason", "stamp_us"});
+  if (!body) return std::unexpected{body.error()};
+  const auto action = body->text("action", 1, kMaxNameBytes);
+  if (!action) return std::unexpected{action.error()};
+  constexpr std::pair<const char*, ControlAction> kActions[] = {{"take", ControlAction::take},
+                                                                {"force", ControlAction::force},
+                                                                {"release", ControlAction::release},
+                                                                {"request", ControlAction::request},
+                                                                {"hand_over", ControlAction::hand_over}};
+  const auto* known = std::ranges::find(kActions, *action, [](const auto& one) { return std::string{one.first}; });
+  if (known == std::end(kActions)) {
+    return fail(ErrorCode::invalid,
+                fmt::format("action = '{}' is none of take, force, release, request, hand_over", action->substr(0, 40)),
+                "out_of_range");
+  }
+  ParsedControl control;
+  ControlRequest& request = control.request;
+  request.action = known->second;
+  const bool is_forced = request.action == ControlAction::force;
+  if (body->has("stamp_us") && request.action != ControlAction::take && !is_forced) {
+    return fail(ErrorCode::bad_request, "stamp_us goes with take and force only", "unknown_member");
+  }
+  if (auto read = body->time("stamp_us", control.stamp_us); !read) return std::unexpected{read.error()};
+  if (body->has("lease_ms")) {
+    if (request.action != ControlAction::take) {
+      return fail(ErrorCode::bad_request, "lease_ms goes with take only", "unknown_member");
+    }
+    const auto lease_ms = body->integer("lease_ms", 1, kLongestControl.count() / 1000);
+    if (!lease_ms) return std::unexpected{lease_ms.error()};
+    request.life = std::chrono::milliseconds{*lease_ms};
+  }
+  if (!is_forced && body->has("reason")) {
+    return fail(ErrorCode::bad_request, "reason goes with force only", "unknown_member");
+  }
+  if (is_forced) {
+    auto reason = body->text("reason", 1, kMaxNameBytes);
+    if (!reason) return std::unexpected{reason.error()};
+    request.reason = std::move(*reason);
+  }
+  return control;
+}
+
+Result<RunWish> parse_run(const std::string& text) {
+  const auto body = Members::parse(text, {"robot_id", "name", "fluid", "pump_profile", "mean_flow_m_s", "tube",
+                                          "operator_name", "profile", "notes", "span"});
+  if (!body) return std::unexpected{body.error()};
+  RunWish wish;
+  const auto robot_id = body->text("robot_id", 0, kMaxTextBytes);
+  if (!robot_id) return std::unexpected{robot_id.error()};
+  if (!is_robot_id(*robot_id)) {
+    return fail(ErrorCode::invalid, "robot_id is not 1 to 31 characters of [a-z0-9_-]", "out_of_range");
+  }
+  wish.robot_id = *robot_id;
+  const auto name = body->text("name", 1, kMaxNameBytes);
+  if (!name) return std::unexpected{name.error()};
+  RunConditions& conditions = wish.conditions;
+  conditions.name = *name;
+  if (body->has("mean_flow_m_s")) {
+    const auto flow = body->number("mean_flow_m_s");
+    if (!flow) return std::unexpected{flow.error()};
+    conditions.mean_flow_m_s = *flow;
+  }
+  const std::pair<const char*, std::string*> texts[] = {
+      {"fluid", &conditions.fluid},     {"pump_profile", &conditions.pump_profile},
+      {"tube", &conditions.tube},       {"operator_name", &conditions.operator_name},
+      {"profile", &conditions.profile}, {"notes", &conditions.notes}};
+  for (const auto& [member, into] : texts) {
+    if (auto read = read_text(*body, member, *into); !read) return std::unexpected{read.error()};
+  }
+  if (!body->has("span")) return wish;
+  auto range = read_range(body->object().at("span"));
+  if (!range) return std::unexpected{range.error()};
+  wish.range = *range;
+  return wish;
+}
+
+Result<std::string> parse_run_end(const std::string& text) {
+  std::string verdict;
+  if (text.empty()) return verdict;
+  const auto body = Members::parse(text, {"verdict"});
+  if (!body) return std::unexpected{body.error()};
+  if (auto read = read_text(*body, "verdict", verdict); !read) return std::unexpected{read.error()};
+  return verdict;
+}
+
+Result<RunAnnotation> parse_annotation(const std::string& text) {
+  const auto body = Members::parse(
+      text, {"name", "fluid", "pump_profile", "mean_flow_m_s", "tube", "operator_name", "profile", "notes", "verdict"});
+  if (!body) return std::unexpected{body.error()};
+  RunAnnotation annotation;
+  for (const auto& [member, value] : body->object().items()) {
+    if (member == "mean_flow_m_s") continue;
+    const bool is_name = member == "name";
+    const auto given = body->text(member.c_str(), is_name ? 1 : 0, is_name ? kMaxNameBytes : kMaxTextBytes);
+    if (!given) return std::unexpected{given.error()};
+    annotation.texts[member] = *given;
+  }
+  annotation.has_mean_flow = body->has("mean_flow_m_s");
+  if (!annotation.has_mean_flow || body->object().at("mean_flow_m_s").is_null()) return annotation;
+  const auto flow = body->number("mean_flow_m_s");
+  if (!flow) return std::unexpected{flow.error()};
+  annotation.mean_flow_m_s = *flow;
+  return annotation;
+}
+
+Result<std::string> parse_discard(const std::string& text) {
+  const auto body = Members::parse(text, {"reason"});
+  if (!body) return std::unexpected{body.error()};
+  return body->text("reason", 1, kMaxTextBytes);
+}
+
+Result<MarkerBody> parse_marker(const std::string& text) {
+  const auto body = Members::parse(text, {"text", "at_us"});
+  if (!body) return std::unexpected{body.error()};
+  const auto said = body->text("text", 1, kMaxTextBytes);
+  if (!said) return std::unexpected{said.error()};
+  MarkerBody marker{*said, {}};
+  if (!body->has("at_us")) return marker;
+  const auto at_us = body->integer("at_us", 0, kLargest - 1);
+  if (!at_us) return std::unexpected{at_us.error()};
+  marker.at_us = *at_us;
+  return marker;
+}
+
+}  // namespace server

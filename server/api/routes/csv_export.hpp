@@ -1,0 +1,76 @@
+// A run as the body of an answer: CSV line by line as it is read, other formats from a file that is made first.
+//
+// Loop thread; the work is done on the exports' worker in slices of 20 ms, and no faster than the client takes it, so
+// that memory does not grow with the run and whoever leaves stops the work.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "server/http/http.hpp"
+#include "server/runtime/tasks.hpp"
+#include "server/storage/export/csv_writer.hpp"
+#include "server/storage/query/history.hpp"
+
+namespace server {
+
+class CsvStream final : public BodyStream {
+ public:
+  // `exports` is the history on the exports' worker.
+  CsvStream(History& exports, std::vector<RecordedSpan> spans, const ExportQuery& query)
+      : exports_{exports}, writer_{std::move(spans), query} {}
+
+  boost::asio::awaitable<Result<std::optional<std::string>>> next() override;
+
+ private:
+  History& exports_;
+  CsvWriter writer_;
+};
+
+// Destroys what holds a file where the file was written: to close or to remove gigabytes takes long.
+class EndOnWorker {
+ public:
+  EndOnWorker(TaskGroup& tasks, DatabaseReader& reader) : tasks_{&tasks}, reader_{&reader} {}
+
+  template <class T>
+  void operator()(T* object) const {
+    auto end = [whole = std::unique_ptr<T>{object}]() mutable { whole.reset(); };
+    tasks_->spawn("end of an export", reader_->run(std::move(end)));
+  }
+
+ private:
+  TaskGroup* tasks_;
+  DatabaseReader* reader_;
+};
+
+// A file that is there for one answer: removed when this is destroyed.
+class ExportFile {
+ public:
+  // In this folder, which is made if need be; the name ends with this. Throws when it cannot be made.
+  ExportFile(const std::filesystem::path& folder, const std::string& ending);
+  ~ExportFile();
+  ExportFile(const ExportFile&) = delete;
+  ExportFile& operator=(const ExportFile&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+using ExportFilePtr = std::unique_ptr<ExportFile, EndOnWorker>;
+
+class FileStream final : public BodyStream {
+ public:
+  FileStream(History& exports, ExportFilePtr file) : exports_{exports}, file_{std::move(file)} {}
+
+  boost::asio::awaitable<Result<std::optional<std::string>>> next() override;
+
+ private:
+  History& exports_;
+  ExportFilePtr file_;
+  std::uint64_t sent_bytes_ = 0;
+};
+
+}  // namespace server

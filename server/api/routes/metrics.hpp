@@ -1,0 +1,20 @@
+// The figures of recording, TLS and what failed as Prometheus reads them: text format 0.0.4.
+//
+//   # HELP rheonaut_samples_written_total Samples that are durable.
+//   # TYPE rheonaut_samples_written_total counter
+//   rheonaut_samples_written_total 4711
+#pragma once
+
+#include <string>
+
+#include "server/net/transport_security.hpp"
+#include "server/runtime/exceptions.hpp"
+#include "server/station/station.hpp"
+#include "server/storage/recording_parts.hpp"
+
+namespace server {
+
+std::string metrics_text(const RecordingParts& recording, const Station& station, const TransportSecurity& security,
+                         const ExceptionLog& exceptions);
+
+}  // namespace server

@@ -1,0 +1,84 @@
+// The audit: who did what, when, from where, and what came of it.
+#include "server/api/routes/routes.hpp"
+#include "server/storage/audit/audit_queries.hpp"
+
+namespace server {
+using nlohmann::json;
+
+namespace {
+
+constexpr std::size_t kMaxWordBytes = 100;
+constexpr std::int64_t kMaxNumber = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
+
+json to_json(const AuditEntry& entry) {
+  const AuditNote& note = entry.note;
+  json out;
+  out["entry"] = entry.entry;
+  out["at_us"] = note.by.at_us;
+  out["actor"] = note.by.actor;
+  out["peer"] = note.by.peer;
+  out["robot_id"] = note.robot_id;
+  out["action"] = note.action;
+  out["subject"] = note.subject;
+  out["detail"] = json::parse(note.detail, nullptr, false);
+  if (out["detail"].is_discarded()) out["detail"] = note.detail;
+  out["hash"] = text(entry.hash);
+  return out;
+}
+
+std::optional<std::string> word_of(const Request& request, const char* name) {
+  const auto given = request.query.find(name);
+  return given == request.query.end() ? std::nullopt : std::optional{given->second.substr(0, kMaxWordBytes)};
+}
+
+Result<AuditFilter> filter_of(const Request& request) {
+  AuditFilter filter;
+  filter.robot_id = word_of(request, "robot_id");
+  filter.actor = word_of(request, "actor");
+  filter.action = word_of(request, "action");
+  for (const auto& [name, bound] : {std::pair{"from_us", &filter.from_us}, std::pair{"to_us", &filter.to_us}}) {
+    if (!request.query.contains(name)) continue;
+    const auto time_us = query_number(request, name, 0, kMaxNumber, 0);
+    if (!time_us) return std::unexpected{time_us.error()};
+    *bound = *time_us;
+  }
+  const auto before = query_number(request, "before", 1, kMaxNumber, 0);
+  if (!before) return std::unexpected{before.error()};
+  filter.before = *before;
+  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  if (!limit) return std::unexpected{limit.error()};
+  filter.limit = static_cast<std::size_t>(*limit);
+  return filter;
+}
+
+Answer list_audit(ApiParts& parts, Request request) {
+  const auto filter = filter_of(request);
+  if (!filter) co_return problem(filter.error());
+  const AuditPage page = co_await parts.recording.history.audit(*filter);
+  json body{{"entries", json::array()}};
+  for (const AuditEntry& entry : page.entries) body["entries"].push_back(to_json(entry));
+  body["next_before"] = page.next == 0 ? json(nullptr) : json(page.next);
+  body["head"] = page.head.entry == 0 ? json(nullptr) : json(text(page.head));
+  co_return json_response(200, body);
+}
+
+}  // namespace
+
+void add_audit_routes(Router& router, ApiParts& parts) {
+  router.add({"GET",
+              "/api/v1/audit",
+              Scope::admin,
+              {"robot_id", "actor", "action", "from_us", "to_us", "before", "limit"},
+              [&parts](Request request) { return list_audit(parts, std::move(request)); }});
+  router.set_on_refused([&parts](const Request& request, Scope needed) {
+    AuditNote note;
+    note.by = author_of(request, parts.clock);
+    note.action = "request.refused";
+    note.subject = request.path.substr(0, kMaxWordBytes);
+    note.detail = audit_detail({{"method", request.method}, {"needs", text(needed)}});
+    note.can_flood = true;
+    parts.recording.recorder.on_audit(note);
+  });
+}
+
+}  // namespace server

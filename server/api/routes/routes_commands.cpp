@@ -1,0 +1,351 @@
+// What is sent to robots: commands, control and emergency stops.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <ranges>
+
+#include "server/api/routes/emergency.hpp"
+#include "server/api/routes/routes.hpp"
+#include "server/identity/auth.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+using nlohmann::json;
+
+namespace {
+
+Response unknown_robot(const std::string& id) {
+  return problem(404, fmt::format("no robot '{}' is known", id.substr(0, 40)), "unknown_robot");
+}
+
+// What became of a command that was sent.
+Response command_response(const CommandRecord& record) {
+  const json with_command{{"command", to_json(record)}};
+  switch (record.state) {
+    case CommandState::acknowledged:
+    case CommandState::verified: return json_response(200, to_json(record));
+    case CommandState::superseded:
+      return problem(
+          {ErrorCode::conflict, fmt::format("{} was superseded: {}", record.kind, record.reason), "superseded"},
+          with_command);
+    case CommandState::rejected:
+      return problem(
+          {ErrorCode::rejected, fmt::format("the robot refused {}: {}", record.kind, record.reason), record.reason},
+          with_command);
+    case CommandState::failed:
+      return problem({ErrorCode::conflict, fmt::format("{} failed: {}", record.kind, record.reason), record.reason},
+                     with_command);
+    case CommandState::expired:
+      return problem({ErrorCode::timed_out, fmt::format("{} expired before it took effect", record.kind),
+                      record.reason.empty() ? "expired" : record.reason},
+                     with_command);
+    case CommandState::unknown:
+      return problem(
+          {ErrorCode::timed_out,
+           fmt::format("the robot did not answer {}; whether it has run is not known yet", record.kind), record.reason},
+          with_command);
+    case CommandState::queued:
+    case CommandState::sent: break;
+  }
+  return problem({ErrorCode::timed_out, fmt::format("the robot did not answer {} in time", record.kind), "timed_out"},
+                 with_command);
+}
+
+// The client's own name of a wish, in the header Idempotency-Key.
+Result<std::string> key_of(const Request& request) {
+  std::string key = request.header("idempotency-key");
+  if (key.empty() || is_command_key(key)) return key;
+  return fail(ErrorCode::bad_request, "Idempotency-Key must be 1 to 64 characters of A-Z a-z 0-9 . _ : -",
+              "malformed_key");
+}
+
+constexpr std::int64_t kClockToleranceUs = 1'000'000;  // of a script's clock ahead of ours
+
+// SAFETY: what a page asks for is worth as little as what its operator saw was old, so a page says what that was. (Only
+// a script is near enough to the station for a life that counts from the arrival.)
+Result<void> check_stamp(const Caller& caller, const std::optional<std::int64_t>& stamp_us) {
+  if (caller.session == 0 || stamp_us) return {};
+  return fail(ErrorCode::invalid, "a page must send stamp_us, the latest stamp that it heard on /live",
+              "stamp_required");
+}
+
+Result<microseconds> age_of_stamp(std::int64_t stamp_us, Clock& clock) {
+  const std::int64_t age_us = clock.steady_us() - stamp_us;
+  if (age_us < 0) return fail(ErrorCode::invalid, "stamp_us is none that /live has said", "out_of_range");
+  return microseconds{age_us};
+}
+
+// How long ago the command was issued, by what its sender says of that, or else since it arrived.
+Result<void> set_age(CommandRequest& command, const ParsedCommand& parsed, Clock& clock) {
+  std::int64_t age_us = command.received_us == 0 ? 0 : clock.steady_us() - command.received_us;
+  if (parsed.stamp_us) {
+    command.life_from = "stamp";
+    const auto age = age_of_stamp(*parsed.stamp_us, clock);
+    if (!age) return std::unexpected{age.error()};
+    age_us = age->count();
+  } else if (parsed.issued_at_us) {
+    command.life_from = "issued_at";
+    age_us = clock.utc_us() - *parsed.issued_at_us;
+    if (age_us < -kClockToleranceUs) {
+      return fail(ErrorCode::invalid,
+                  fmt::format("issued_at_us lies {} ms ahead of the station's clock; set one of the clocks right",
+                              -age_us / 1000),
+                  "out_of_range");
+    }
+  }
+  command.age = microseconds{std::max<std::int64_t>(age_us, 0)};
+  return {};
+}
+
+// What never comes to the station's door, for it is none of its words.
+Response refused(ApiParts& parts, const Request& request, const char* what, const Error& error) {
+  parts.station.note_refusal(author_of(request, parts.clock), request.param.at("robot_id"), what, "{}", error);
+  return problem(error);
+}
+
+// Whether the controller that comes into force has more of the motor than the one in force; also when that is not
+// known.
+bool widens_duty(const protocol::Controller* next, const protocol::Controller* in_force) {
+  if (next == nullptr || in_force == nullptr) return true;
+  return next->duty_min < in_force->duty_min || next->duty_max > in_force->duty_max;
+}
+
+// What of a robot's motion the command bounds otherwise, in words; empty: nothing.
+std::string bounded_by(const ParsedCommand& command, const RobotSettings* known) {
+  const protocol::Command& action = command.action;
+  const bool is_current = known != nullptr && known->is_controller_current;
+  const protocol::Controller* in_force = is_current ? &*known->controller : nullptr;
+  switch (action.which_action) {
+    case rheonaut_Command_set_parameter_tag: {
+      const std::string name = action.action.set_parameter.name;
+      return bounds_motion(name) ? fmt::format("the parameter {} bounds motion", name) : "";
+    }
+    case rheonaut_Command_set_controller_tag:
+      if (!widens_duty(&action.action.set_controller, in_force)) return "";
+      return in_force == nullptr ? "the duty range of the controller in force is not known"
+                                 : fmt::format("its duty range is wider than {} to {}, that of the controller in force",
+                                               in_force->duty_min, in_force->duty_max);
+    case rheonaut_Command_restore_controller_tag: {
+      const bool knows_former = is_current && known->controller_before.has_value();
+      if (!widens_duty(knows_former ? &*known->controller_before : nullptr, in_force)) return "";
+      return "the controller that comes back may have a wider duty range than the one in force";
+    }
+    default: return "";
+  }
+}
+
+// SAFETY: the limits of a robot's motion are changed by admins alone, and never by the way.
+Result<void> may_bound_motion(const Caller& caller, const ParsedCommand& command, const RobotSettings* known) {
+  const std::string what = bounded_by(command, known);
+  if (what.empty()) return {};
+  if (!caller.scopes.allow(Scope::admin)) {
+    return fail(ErrorCode::forbidden, what + "; to change it needs the role admin", "not_permitted");
+  }
+  if (command.is_confirmed) return {};
+  return fail(ErrorCode::invalid, what + "; send \"confirm\": true to change it all the same", "confirm_required");
+}
+
+// What the caller may not send now. It is judged when nothing is waited for any more.
+Result<void> may_send_now(const Request& request, const ParsedCommand& parsed, const RobotSettings* settings) {
+  if (auto fresh = check_stamp(request.caller, parsed.stamp_us); !fresh) return fresh;
+  return may_bound_motion(request.caller, parsed, settings);
+}
+
+// The station then knows a command of this id that ended before a restart, or long ago.
+asio::awaitable<void> recall(ApiParts& parts, RobotId robot_id, CommandId id) {
+  if (parts.station.known_command(robot_id, id) != nullptr) co_return;
+  const auto stored = co_await parts.recording.history.command(id);
+  if (stored && stored->ended_at_us != 0) parts.station.remember(*stored);
+}
+
+// A set_controller has from it what its body leaves out. The first of a key has it from the controller in force; the
+// repeat from the controller that was sent then, so that it is the same command whatever is in force by now.
+std::optional<protocol::Controller> controller_to_complete_from(const CommandRecord* first,
+                                                                const RobotSettings* settings) {
+  if (first != nullptr && first->kind == "set_controller") {
+    json sent = json::parse(first->arguments);
+    sent["kind"] = first->kind;
+    const auto parsed = parse_command(dump(sent));
+    return parsed ? std::optional{parsed->action.action.set_controller} : std::nullopt;
+  }
+  const bool is_known = settings != nullptr && settings->is_controller_current;
+  return is_known ? settings->controller : std::nullopt;
+}
+
+CommandRequest request_of(const Request& request, ParsedCommand& parsed, std::string key) {
+  CommandRequest command;
+  command.robot_id = request.param.at("robot_id");
+  command.action = parsed.action;
+  command.arguments = std::move(parsed.arguments);
+  command.actor = request.actor;
+  command.peer = request.peer;
+  command.life = parsed.life;
+  command.key = std::move(key);
+  command.received_us = request.received_us;
+  command.unread = request.unread;
+  return command;
+}
+
+Answer submit_command(ApiParts& parts, Request request) {
+  const std::string& id = request.param.at("robot_id");
+  if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
+  auto key = key_of(request);
+  if (!key) co_return refused(parts, request, "command", key.error());
+  const auto wait = request.query.find("wait");
+  if (wait != request.query.end() && wait->second != "acknowledged" && wait->second != "verified") {
+    co_return problem(400, "wait must be acknowledged or verified", "out_of_range");
+  }
+  const CommandId key_id = command_id_of(id, request.actor, *key);
+  if (!key->empty()) co_await recall(parts, id, key_id);
+
+  if (auto stands = still_stands(request.caller); !stands) co_return refused(parts, request, "command", stands.error());
+  const RobotSettings* settings = parts.station.settings(id);
+  const CommandRecord* first = key->empty() ? nullptr : parts.station.known_command(id, key_id);
+  const auto complete_from = controller_to_complete_from(first, settings);
+  auto parsed = parse_command(request.body, complete_from ? &*complete_from : nullptr);
+  if (!parsed) co_return refused(parts, request, "command", parsed.error());
+  CommandRequest command = request_of(request, *parsed, std::move(*key));
+  command.until_verified = wait != request.query.end() && wait->second == "verified";
+  if (first == nullptr) {  // a repeat is answered as the first was, and sends nothing
+    if (auto may = may_send_now(request, *parsed, settings); !may) {
+      co_return refused(parts, request, "command", may.error());
+    }
+    if (auto aged = set_age(command, *parsed, parts.clock); !aged) {
+      co_return refused(parts, request, "command", aged.error());
+    }
+  }
+  const auto record = co_await parts.station.submit(std::move(command));
+  if (!record) co_return problem(record.error());
+  co_return command_response(*record);
+}
+
+// What a page must say to begin to control, and may not ask for: it keeps control by signs of life.
+Result<void> check_sight(const Request& request, ParsedControl& parsed, Clock& clock) {
+  const Caller& caller = request.caller;
+  ControlRequest& wish = parsed.request;
+  if (wish.action != ControlAction::take && wish.action != ControlAction::force) return {};
+  wish.age = request.unread;
+  if (auto said = check_stamp(caller, parsed.stamp_us); !said) return said;
+  if (caller.session != 0 && wish.life > kControlLife) {
+    return fail(ErrorCode::invalid, fmt::format("lease_ms of a page is at most {}", kControlLife.count() / 1000),
+                "out_of_range");
+  }
+  if (!parsed.stamp_us) return {};
+  const auto age = age_of_stamp(*parsed.stamp_us, clock);
+  if (!age) return std::unexpected{age.error()};
+  wish.age = std::max(wish.age, *age);
+  return {};
+}
+
+Answer change_control(ApiParts& parts, Request request) {
+  auto parsed = parse_control(request.body);
+  if (!parsed) co_return refused(parts, request, "control", parsed.error());
+  ControlRequest& wish = parsed->request;
+  wish.robot_id = request.param.at("robot_id");
+  wish.actor = request.actor;
+  wish.peer = request.peer;
+  // SAFETY: nobody but an admin takes control out of another's hands.
+  if (wish.action == ControlAction::force && !request.caller.scopes.allow(Scope::admin)) {
+    const Error error{ErrorCode::forbidden, "to take control by force needs the role admin", "not_permitted"};
+    co_return refused(parts, request, "control", error);
+  }
+  if (auto seen = check_sight(request, *parsed, parts.clock); !seen) {
+    co_return refused(parts, request, "control", seen.error());
+  }
+  const auto control = parts.station.control(wish);
+  if (!control) co_return problem(control.error());
+  co_return json_response(200, {{"control", control->holder.empty() ? json(nullptr) : to_json(*control)}});
+}
+
+// An acknowledged stop is in force and answered at once; one that is kept must outlive whatever happens after the
+// answer, so it is on disk first.
+int stop_status(const CommandRecord& record) { return was_accepted(record.state) ? 200 : 202; }
+
+// SAFETY: a key that is none does not keep a stop from being carried out.
+StopRequest stop_request(const Request& request) {
+  StopRequest stop;
+  stop.actor = request.actor;
+  stop.peer = request.peer;
+  stop.received_us = request.received_us;
+  if (auto key = key_of(request)) stop.key = std::move(*key);
+  return stop;
+}
+
+Answer emergency_stop(ApiParts& parts, Request request) {
+  StopRequest stop = stop_request(request);
+  stop.robot_id = request.param.at("robot_id");
+  const auto record = co_await stop_robot(parts.station, std::move(stop));
+  if (!record) co_return problem(record.error());
+  const int status = stop_status(*record);
+  if (status == 202) co_await parts.recording.history.settle();
+  co_return json_response(status, to_json(*record));
+}
+
+Answer emergency_stop_all(ApiParts& parts, Request request) {
+  const StopsOfAll stops = co_await stop_all_robots(parts.station, stop_request(request));
+  int status = 200;
+  for (const CommandRecord& record : stops.records) status = std::max(status, stop_status(record));
+  if (status == 202) co_await parts.recording.history.settle();
+  nlohmann::ordered_json body;
+  body["summary"] = stop_summary(parts.station, stops);  // first, for people who read it
+  body["commands"] = list_json("commands", stops.records)["commands"];
+  if (!stops.failed.empty()) {
+    const std::string named = fmt::format("{}", fmt::join(stops.failed | std::views::take(kMaxNamedRobots), ", "));
+    co_return problem(500, fmt::format("the stop of {} failed; the log says why", named), "internal", json(body));
+  }
+  co_return json_text_response(status, body.dump());
+}
+
+Answer list_commands(ApiParts& parts, Request request) {
+  const std::string& id = request.param.at("robot_id");
+  if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
+  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  if (!limit) co_return problem(limit.error());
+  const auto records = co_await parts.recording.history.commands(id, static_cast<std::size_t>(*limit));
+  co_return json_response(200, list_json("commands", records));
+}
+
+// A token that may stop and not read sees its own stops, and one that no robot has acknowledged yet: it may be the
+// answer to its own.
+bool may_see(const CommandRecord& command, const Request& request, const Station& station) {
+  if (request.caller.scopes.allow(Scope::read)) return true;
+  if (command.kind != "emergency_stop") return false;
+  const RobotState* robot = station.find(command.robot_id);
+  return command.actor == request.actor || (robot != nullptr && robot->pending_stop == command.id);
+}
+
+Answer get_command(ApiParts& parts, Request request) {
+  const auto id = parse_id(request.param.at("command_id"));
+  if (!id) co_return problem(400, "command_id is not a decimal number from 1", "out_of_range");
+  const auto record = co_await parts.recording.history.command(*id);
+  if (!record) co_return problem(record.error());
+  if (!may_see(*record, request, parts.station)) co_return not_permitted(request.caller, Scope::read);
+  co_return json_response(200, to_json(*record));
+}
+
+}  // namespace
+
+void add_command_routes(Router& router, ApiParts& parts) {
+  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
+                                     std::vector<std::string> query, Answer (*answer)(ApiParts&, Request)) {
+    router.add({method, pattern, needs, std::move(query),
+                [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+  };
+  add("GET", "/api/v1/robots/{robot_id}/commands", Scope::read, {"limit"}, list_commands);
+  add("POST", "/api/v1/robots/{robot_id}/commands", Scope::command, {"wait"}, submit_command);
+  add("POST", "/api/v1/robots/{robot_id}/control", Scope::command, {}, change_control);
+  add("GET", "/api/v1/commands/{command_id}", Scope::look, {}, get_command);
+  const auto add_stop = [&router, &parts](const char* pattern, Answer (*answer)(ApiParts&, Request)) {
+    auto stop = [&parts, answer](Request request) { return answer(parts, std::move(request)); };
+    router.add({.method = "POST",
+                .pattern = pattern,
+                .needs = Scope::stop,
+                .query = {},
+                .answer = std::move(stop),
+                .is_stop = true});
+  };
+  add_stop("/api/v1/robots/{robot_id}/emergency-stop", emergency_stop);
+  add_stop("/api/v1/emergency-stop", emergency_stop_all);
+}
+
+}  // namespace server

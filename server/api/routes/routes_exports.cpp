@@ -1,0 +1,150 @@
+// A run to take away: as CSV, as a MAT file, as a SQLite file.
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "server/api/routes/csv_export.hpp"
+#include "server/api/routes/routes.hpp"
+#include "server/storage/export/mat_writer.hpp"
+#include "server/storage/export/run_file.hpp"
+#include "server/storage/query/run_reader.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr std::int64_t kMinGridUs = 100;
+constexpr std::int64_t kMaxGridUs = 3'600'000'000;
+constexpr std::uint64_t kUsualPeriodUs = 10'000;
+constexpr std::uint64_t kSampleBytes = 200;                  // at most, in any format's file
+constexpr std::uint64_t kSpareBytes = 512ULL * 1024 * 1024;  // that the recording goes on with
+
+struct ParsedExport {
+  ExportQuery query;
+  std::vector<RecordedSpan> spans;  // as far as they were made when the export began
+};
+
+asio::awaitable<Result<ParsedExport>> parse_export(ApiParts& parts, Request request) {
+  ParsedExport parsed;
+  const auto run = run_id_of(request);
+  if (!run) co_return std::unexpected{run.error()};
+  const auto channels = query_channels(request);
+  if (!channels) co_return std::unexpected{channels.error()};
+  const auto grid_us = query_number(request, "grid_us", kMinGridUs, kMaxGridUs, 0);
+  if (!grid_us) co_return std::unexpected{grid_us.error()};
+  parsed.query = {.run = *run, .channels = *channels, .grid_us = {}};
+  if (*grid_us != 0) parsed.query.grid_us = *grid_us;
+  auto spans = co_await parts.recording.exports.spans(excerpt_of(*run));
+  if (!spans) co_return std::unexpected{spans.error()};
+  for (RecordedSpan& span : *spans) span.cut(span.made());
+  parsed.spans = std::move(*spans);
+  co_return parsed;
+}
+
+Response attachment(const char* content_type, RunId run, const char* ending, std::unique_ptr<BodyStream> stream) {
+  Response response;
+  response.content_type = content_type;
+  response.headers.emplace_back("Cache-Control", "no-store");
+  response.headers.emplace_back("Content-Disposition", fmt::format("attachment; filename=\"run-{}{}\"", run, ending));
+  response.stream = std::move(stream);
+  return response;
+}
+
+Answer export_csv(ApiParts& parts, Request request) {
+  auto parsed = co_await parse_export(parts, std::move(request));
+  if (!parsed) co_return problem(parsed.error());
+  const RunId run = parsed->query.run;
+  co_return attachment("text/csv; charset=utf-8", run, ".csv",
+                       std::make_unique<CsvStream>(parts.recording.exports, std::move(parsed->spans), parsed->query));
+}
+
+// Makes the empty file, if there is room for what comes into it.
+Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folder, const char* ending,
+                                              std::uint64_t samples) {
+  auto file = std::make_unique<ExportFile>(folder, ending);
+  const std::uint64_t free_bytes = free_bytes_of(folder);
+  const std::uint64_t wanted = 2 * samples * kSampleBytes + kSpareBytes;
+  if (free_bytes < wanted) {
+    return fail(ErrorCode::unavailable,
+                fmt::format("the export needs up to {} MB on the station's disk, {} MB are free; export CSV, which "
+                            "needs none",
+                            wanted / 1'000'000, free_bytes / 1'000'000),
+                "low_space");
+  }
+  return file;
+}
+
+EndOnWorker end_on_worker(ApiParts& parts) { return {parts.tasks, parts.recording.exports.reader()}; }
+
+asio::awaitable<Result<ExportFilePtr>> begin_file(ApiParts& parts, const ParsedExport& parsed, const char* ending) {
+  if (auto may = parts.recording.disk_watch.may_begin("an export to a file"); !may) {
+    co_return std::unexpected{may.error()};
+  }
+  const auto grid_us = static_cast<std::uint64_t>(parsed.query.grid_us.value_or(kMaxGridUs));
+  auto job = [folder = parts.recording.exports_folder(), ending, spans = parsed.spans,
+              grid_us](SQLite::Database& database) {
+    return make_file(folder, ending, most_samples(database, spans) * (1 + kUsualPeriodUs / grid_us));
+  };
+  auto file = co_await parts.recording.exports.reader().ask(std::move(job));
+  if (!file) co_return std::unexpected{file.error()};
+  co_return ExportFilePtr{file->release(), end_on_worker(parts)};
+}
+
+// To its end, or until there is no room: nobody knows before how long the gaps of a grid are.
+template <class Writer>
+asio::awaitable<Result<void>> write_in_slices(ApiParts& parts, Writer& writer) {
+  for (Result<bool> more = true; *more;) {
+    auto slice = [&writer, folder = parts.recording.exports_folder()](SQLite::Database& database) -> Result<bool> {
+      if (free_bytes_of(folder) >= kSpareBytes) return writer.advance(database);
+      return fail(ErrorCode::unavailable, "the export would fill the station's disk; export CSV, which needs no room",
+                  "low_space");
+    };
+    more = co_await parts.recording.exports.reader().ask(std::move(slice));
+    if (!more) co_return std::unexpected{more.error()};
+  }
+  co_return Result<void>{};
+}
+
+Answer export_mat(ApiParts& parts, Request request) {
+  auto parsed = co_await parse_export(parts, std::move(request));
+  if (!parsed) co_return problem(parsed.error());
+  auto file = co_await begin_file(parts, *parsed, ".mat");
+  if (!file) co_return problem(file.error());
+  const std::unique_ptr<MatWriter, EndOnWorker> writer{
+      new MatWriter{(*file)->path(), std::move(parsed->spans), parsed->query}, end_on_worker(parts)};
+  const Result<void> written = co_await write_in_slices(parts, *writer);
+  if (!written) co_return problem(written.error());
+  co_return attachment("application/x-matlab-data", parsed->query.run, ".mat",
+                       std::make_unique<FileStream>(parts.recording.exports, std::move(*file)));
+}
+
+Answer export_sqlite(ApiParts& parts, Request request) {
+  auto parsed = co_await parse_export(parts, std::move(request));
+  if (!parsed) co_return problem(parsed.error());
+  auto file = co_await begin_file(parts, *parsed, ".sqlite");
+  if (!file) co_return problem(file.error());
+  co_await parts.recording.exports.settle();  // events and commands that were heard
+  const std::unique_ptr<RunFile, EndOnWorker> writer{
+      new RunFile{(*file)->path(), reading_uri(parts.recording.path(), false), std::move(parsed->spans), parsed->query},
+      end_on_worker(parts)};
+  const Result<void> written = co_await write_in_slices(parts, *writer);
+  if (!written) co_return problem(written.error());
+  co_return attachment("application/vnd.sqlite3", parsed->query.run, ".sqlite",
+                       std::make_unique<FileStream>(parts.recording.exports, std::move(*file)));
+}
+
+}  // namespace
+
+void add_export_routes(Router& router, ApiParts& parts) {
+  const auto add = [&router, &parts](const char* pattern, std::vector<std::string> query,
+                                     Answer (*answer)(ApiParts&, Request)) {
+    router.add({"GET", pattern, Scope::record, std::move(query),
+                [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+  };
+  add("/api/v1/runs/{run_id}/samples.csv", {"channels", "grid_us"}, export_csv);
+  add("/api/v1/runs/{run_id}/samples.mat", {"channels", "grid_us"}, export_mat);
+  add("/api/v1/runs/{run_id}/samples.sqlite", {}, export_sqlite);
+}
+
+}  // namespace server

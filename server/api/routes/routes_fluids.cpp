@@ -1,0 +1,119 @@
+// The fluids that robots may be in, with their limits and models, and which one a robot is in.
+#include <algorithm>
+
+#include "server/api/bodies/fluid_model_body.hpp"
+#include "server/api/routes/routes.hpp"
+#include "server/config/station_document.hpp"
+
+namespace server {
+using nlohmann::json;
+
+namespace {
+
+constexpr std::size_t kMaxFluidBytes = 200;  // of what somebody sends; a listed name is shorter
+constexpr microseconds kSendingPatience{3'000'000};
+constexpr microseconds kSendingLook{50'000};
+
+json model_json(ApiParts& parts, const std::string& fluid) {
+  const FluidModel* model = parts.recording.fluid_models.in_force().find(fluid);
+  return model == nullptr ? json(nullptr) : to_json(*model);
+}
+
+Answer list_fluids(ApiParts& parts, Request) {
+  const Envelope& envelope = parts.station.envelope();
+  json list = json::array();
+  for (const auto& [fluid, limits] : envelope.of_fluid()) {
+    const bool is_built_in = std::ranges::find(Envelope::kBuiltInFluids, fluid) != Envelope::kBuiltInFluids.end();
+    list.push_back({{"fluid", fluid},
+                    {"built_in", is_built_in},
+                    {"limits", limits_json(limits)},
+                    {"model", model_json(parts, fluid)}});
+  }
+  co_return json_response(200, {{"fluids", std::move(list)},
+                                {"limits", limits_json(envelope.anywhere())},
+                                {"limits_where_unknown", limits_json(envelope.strictest())}});
+}
+
+// null: not known.
+Result<std::string> parse_fluid(const std::string& text, const Envelope& envelope) {
+  const auto body = Members::parse(text, {"fluid"});
+  if (!body) return std::unexpected{body.error()};
+  if (body->has("fluid") && body->object().at("fluid").is_null()) return std::string{};
+  const auto fluid = body->text("fluid", 1, kMaxFluidBytes);
+  if (!fluid) return fluid;
+  return envelope.listed(*fluid);
+}
+
+// What has become of the fluid's model on the robot, when that is known in time.
+boost::asio::awaitable<json> model_sent(ApiParts& parts, std::string id) {
+  const std::int64_t deadline_us = parts.clock.steady_us() + kSendingPatience.count();
+  while (parts.station.find(id)->model.state == ModelState::sending && parts.clock.steady_us() < deadline_us) {
+    co_await parts.clock.sleep_for(kSendingLook);
+  }
+  co_return to_json(parts.station.find(id)->model);
+}
+
+// Answered when it is on disk: a restart must not bring looser limits back.
+Answer set_fluid(ApiParts& parts, Request request) {
+  const std::string& id = request.param.at("robot_id");
+  const Envelope& envelope = parts.station.envelope();
+  const auto fluid = parse_fluid(request.body, envelope);
+  if (!fluid) co_return problem(fluid.error());
+  const auto set = parts.station.set_fluid(id, *fluid, author_of(request, parts.clock));
+  if (!set) co_return problem(set.error());
+  const bool stored = co_await parts.recording.recorder.flush_records();
+  if (!stored) {
+    co_return problem(503, "the fluid is in force and could not be stored yet; the station's log says why",
+                      "not_stored");
+  }
+  json model = co_await model_sent(parts, id);
+  co_return json_response(200, {{"fluid", fluid->empty() ? json(nullptr) : json(*fluid)},
+                                {"limits", limits_json(envelope.in(*fluid))},
+                                {"model", std::move(model)}});
+}
+
+// The robots that are in this fluid: nothing is sent to them by itself.
+json robots_in(const Station& station, const std::string& fluid) {
+  json robots = json::array();
+  for (const auto& [id, robot] : station.robots()) {
+    if (robot.fluid == fluid) robots.push_back(id);
+  }
+  return robots;
+}
+
+Answer set_model(ApiParts& parts, Request request) {
+  const auto fluid = parts.station.envelope().listed(request.param.at("fluid"));
+  if (!fluid) co_return problem(fluid.error());
+  auto model = parse_fluid_model(request.body);
+  if (!model) co_return problem(model.error());
+  const auto set =
+      co_await parts.recording.fluid_models.set(*fluid, std::move(*model), author_of(request, parts.clock));
+  if (!set) co_return problem(set.error());
+  co_return json_response(
+      200, {{"fluid", *fluid}, {"model", to_json(*set)}, {"robots_not_updated", robots_in(parts.station, *fluid)}});
+}
+
+Answer remove_model(ApiParts& parts, Request request) {
+  const auto fluid = parts.station.envelope().listed(request.param.at("fluid"));
+  if (!fluid) co_return problem(fluid.error());
+  const auto removed = co_await parts.recording.fluid_models.remove(*fluid, author_of(request, parts.clock));
+  if (!removed) co_return problem(removed.error());
+  co_return json_response(
+      200, {{"fluid", *fluid}, {"model", nullptr}, {"robots_not_updated", robots_in(parts.station, *fluid)}});
+}
+
+}  // namespace
+
+void add_fluid_routes(Router& router, ApiParts& parts) {
+  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
+                                     Answer (*answer)(ApiParts&, Request)) {
+    router.add(
+        {method, pattern, needs, {}, [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+  };
+  add("GET", "/api/v1/fluids", Scope::read, list_fluids);
+  add("POST", "/api/v1/fluids/{fluid}/model", Scope::command, set_model);
+  add("POST", "/api/v1/fluids/{fluid}/model/remove", Scope::command, remove_model);
+  add("POST", "/api/v1/robots/{robot_id}/fluid", Scope::command, set_fluid);
+}
+
+}  // namespace server

@@ -1,0 +1,64 @@
+// What a robot says is in force: its parameters and its controller.
+#include "server/api/routes/routes.hpp"
+
+namespace server {
+using nlohmann::json;
+
+namespace {
+
+std::unexpected<Error> unknown_robot(const std::string& id) {
+  return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", id), "unknown_robot");
+}
+
+bool is_connected(const Station& station, const std::string& id) {
+  const RobotState* robot = station.find(id);
+  return robot != nullptr && robot->link == LinkState::connected;
+}
+
+json parameter_json(const rheonaut_Parameter& parameter) {
+  return {{"name", parameter.name},
+          {"unit", parameter.unit},
+          {"value", decimal(parameter.value)},
+          {"minimum", decimal(parameter.minimum)},
+          {"maximum", decimal(parameter.maximum)},
+          {"default", decimal(parameter.default_value)},
+          {"changed", !is_same(parameter.value, parameter.default_value)},
+          {"bounds_motion", bounds_motion(parameter.name)}};
+}
+
+Answer get_parameters(ApiParts& parts, Request request) {
+  const std::string& id = request.param.at("robot_id");
+  const RobotSettings* known = parts.station.settings(id);
+  if (known == nullptr) co_return problem(unknown_robot(id).error());
+  json table;  // null: nothing is known, which is not the same as a robot without parameters
+  for (const auto& [name, parameter] : known->parameters.last_known()) table.push_back(parameter_json(parameter));
+  co_return json_response(200, {{"robot_id", id},
+                                {"is_current", is_connected(parts.station, id) && known->parameters.is_current()},
+                                {"told_at_us", time_or_null(known->parameters_at_us)},
+                                {"parameters", std::move(table)}});
+}
+
+Answer get_controller(ApiParts& parts, Request request) {
+  const std::string& id = request.param.at("robot_id");
+  const RobotSettings* known = parts.station.settings(id);
+  if (known == nullptr) co_return problem(unknown_robot(id).error());
+  const json controller = known->controller ? json::parse(controller_json(*known->controller)) : json(nullptr);
+  co_return json_response(200, {{"robot_id", id},
+                                {"is_current", is_connected(parts.station, id) && known->is_controller_current},
+                                {"told_at_us", time_or_null(known->controller_at_us)},
+                                {"controller", controller}});
+}
+
+}  // namespace
+
+void add_in_force_routes(Router& router, ApiParts& parts) {
+  const auto add = [&router, &parts](const char* pattern, Answer (*answer)(ApiParts&, Request)) {
+    router.add({"GET", pattern, Scope::read, {}, [&parts, answer](Request request) {
+                  return answer(parts, std::move(request));
+                }});
+  };
+  add("/api/v1/robots/{robot_id}/parameters", get_parameters);
+  add("/api/v1/robots/{robot_id}/controller", get_controller);
+}
+
+}  // namespace server

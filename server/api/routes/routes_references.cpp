@@ -1,0 +1,248 @@
+// Positions of a run that were measured from outside: imported, shown, removed.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "server/api/routes/routes.hpp"
+
+namespace server {
+using nlohmann::json;
+
+namespace {
+
+constexpr std::int64_t kMaxId = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
+constexpr std::int64_t kMaxPagePositions = 10'000;
+constexpr std::size_t kMaxNameBytes = 200;
+constexpr std::size_t kMaxReasonBytes = 4000;
+constexpr double kLargestS = 1e10;
+
+json or_null(std::optional<double> value) { return value ? json(*value) : json(nullptr); }
+
+// Of a member that may be left out: none then.
+Result<std::optional<double>> number_within(const Members& body, const char* name, double low, double high) {
+  if (!body.has(name)) return std::nullopt;
+  const auto value = body.number(name);
+  if (!value) return std::unexpected{value.error()};
+  if (*value >= low && *value <= high) return *value;
+  return fail(ErrorCode::invalid, fmt::format("{} must be from {} to {}, is {}", name, low, high, *value),
+              "out_of_range");
+}
+
+Result<double> needed_number(const Members& body, const char* name, double low, double high) {
+  const auto value = number_within(body, name, low, high);
+  if (!value) return std::unexpected{value.error()};
+  if (*value) return **value;
+  return fail(ErrorCode::bad_request, fmt::format("{} is missing", name), "missing_member");
+}
+
+Result<void> parse_marker_clock(const Members& body, ReferenceClockRequest& clock) {
+  const auto at_s = needed_number(body, "at_s", -kLargestS, kLargestS);
+  if (!at_s) return std::unexpected{at_s.error()};
+  clock.at_s = *at_s;
+  if (body.has("marker_id")) {
+    const auto id = body.integer("marker_id", 1, kMaxId);
+    if (!id) return std::unexpected{id.error()};
+    clock.marker_id = *id;
+    return {};
+  }
+  const auto said = body.text("marker_text", 1, kMaxReasonBytes);
+  if (!said) return std::unexpected{said.error()};
+  clock.marker_text = *said;
+  return {};
+}
+
+Result<void> parse_search(const Members& body, ReferenceClockRequest& clock) {
+  const auto from_s = number_within(body, "from_s", -kLargestS, kLargestS);
+  if (!from_s) return std::unexpected{from_s.error()};
+  const auto to_s = number_within(body, "to_s", -kLargestS, kLargestS);
+  if (!to_s) return std::unexpected{to_s.error()};
+  clock.search.from_s = from_s->value_or(clock.search.from_s);
+  clock.search.to_s = to_s->value_or(clock.search.to_s);
+  if (clock.search.from_s < clock.search.to_s) return {};
+  return fail(ErrorCode::invalid, "from_s must be below to_s", "out_of_range");
+}
+
+Result<ReferenceClockRequest> parse_clock(const json& given) {
+  if (!given.is_object()) return fail(ErrorCode::bad_request, "clock must be an object", "wrong_type");
+  const Members body{given};
+  const auto method = body.text("method", 1, 20);
+  if (!method) return std::unexpected{method.error()};
+  ReferenceClockRequest clock;
+  const auto only = [&](std::initializer_list<const char*> known) { return body.only(known); };
+  Result<void> read;
+  if (*method == text(ReferenceClock::offset)) {
+    clock.method = ReferenceClock::offset;
+    read = only({"method", "sd_s", "offset_s"});
+    const auto offset_s = needed_number(body, "offset_s", -kLargestS, kLargestS);
+    if (read && !offset_s) read = std::unexpected{offset_s.error()};
+    clock.offset_s = offset_s.value_or(0);
+  } else if (*method == text(ReferenceClock::utc)) {
+    clock.method = ReferenceClock::utc;
+    read = only({"method", "sd_s", "zero_at_us"});
+    const auto zero_at_us = body.integer("zero_at_us", 0, kMaxId);
+    if (read && !zero_at_us) read = std::unexpected{zero_at_us.error()};
+    clock.zero_at_us = zero_at_us.value_or(0);
+  } else if (*method == text(ReferenceClock::marker)) {
+    clock.method = ReferenceClock::marker;
+    read = only({"method", "sd_s", "marker_id", "marker_text", "at_s"});
+    if (read) read = parse_marker_clock(body, clock);
+  } else if (*method == text(ReferenceClock::correlation)) {
+    read = only({"method", "from_s", "to_s"});
+    if (read) read = parse_search(body, clock);
+  } else {
+    return fail(ErrorCode::invalid, "clock.method is none of offset, utc, marker and correlation", "out_of_range");
+  }
+  if (!read) return std::unexpected{read.error()};
+  const auto sd_s = number_within(body, "sd_s", 0, 1000);
+  if (!sd_s) return std::unexpected{sd_s.error()};
+  clock.sd_s = *sd_s;
+  return clock;
+}
+
+// False where it is missing.
+Result<bool> flag(const Members& body, const char* name) {
+  if (!body.has(name)) return false;
+  const json& value = body.object().at(name);
+  if (value.is_boolean()) return value.get<bool>();
+  return fail(ErrorCode::bad_request, fmt::format("{} must be true or false", name), "wrong_type");
+}
+
+Result<ReferenceRequest> parse_reference(const std::string& text) {
+  auto body = Members::parse(text, {"csv", "source", "clock", "span", "keep_zero", "metres", "sd_m", "reason"});
+  if (!body) return std::unexpected{body.error()};
+  ReferenceRequest request;
+  auto csv = body->text("csv", 1, kMaxReferenceBytes);
+  if (!csv) return std::unexpected{csv.error()};
+  request.csv = std::move(*csv);
+  const auto source = body->text("source", 1, kMaxNameBytes);
+  if (!source) return std::unexpected{source.error()};
+  request.source = *source;
+  if (!body->has("clock")) return fail(ErrorCode::bad_request, "clock is missing", "missing_member");
+  auto clock = parse_clock(body->object().at("clock"));
+  if (!clock) return std::unexpected{clock.error()};
+  request.clock = std::move(*clock);
+  if (body->has("span")) {
+    const auto span = body->integer("span", 0, 1'000'000);
+    if (!span) return std::unexpected{span.error()};
+    request.span = static_cast<std::uint32_t>(*span);
+  }
+  const auto keeps_zero = flag(*body, "keep_zero"), is_in_metres = flag(*body, "metres");
+  if (!keeps_zero) return std::unexpected{keeps_zero.error()};
+  if (!is_in_metres) return std::unexpected{is_in_metres.error()};
+  request.keeps_zero = *keeps_zero;
+  request.is_in_metres = *is_in_metres;
+  const auto sd_m = number_within(*body, "sd_m", 1e-7, 1);
+  if (!sd_m) return std::unexpected{sd_m.error()};
+  request.sd_m = *sd_m;
+  if (!body->has("reason")) return request;
+  const auto reason = body->text("reason", 1, kMaxReasonBytes);
+  if (!reason) return std::unexpected{reason.error()};
+  request.reason = *reason;
+  return request;
+}
+
+Answer import_reference(ApiParts& parts, Request request) {
+  const auto run = run_id_of(request);
+  if (!run) co_return problem(run.error());
+  const Author by = author_of(request, parts.clock);
+  auto parse = [body = std::move(request.body)] { return parse_reference(body); };
+  auto wanted = co_await parts.analysis.compute(std::move(parse));
+  if (!wanted) co_return problem(wanted.error());
+  OutsideReferences& references = parts.recording.references;
+  const std::string reason = wanted->reason;
+  const Result<void> may = co_await references.check(*run, reason);
+  if (!may) co_return problem(may.error());
+  std::optional<MarkerPlace> marker;
+  if (wanted->clock.method == ReferenceClock::marker) {
+    const auto found = co_await references.marker(*run, wanted->clock.marker_id, wanted->clock.marker_text);
+    if (!found) co_return problem(found.error());
+    marker = *found;
+  }
+  auto placed = co_await parts.analysis.place(*run, std::move(*wanted), marker);
+  if (!placed) co_return problem(placed.error());
+  placed->reference.run = *run;
+  placed->reference.actor = by.actor;
+  placed->reference.made_at_us = by.at_us;
+  const auto made = co_await references.import(std::move(placed->reference), std::move(placed->positions), reason, by);
+  if (!made) co_return problem(made.error());
+  Response response = json_response(201, to_json(*made));
+  response.headers.emplace_back("Location", fmt::format("/api/v1/runs/{}/reference", *run));
+  co_return response;
+}
+
+Answer get_reference(ApiParts& parts, Request request) {
+  const auto run = run_id_of(request);
+  if (!run) co_return problem(run.error());
+  const auto found = co_await parts.recording.references.find(*run);
+  if (!found) co_return problem(found.error());
+  co_return json_response(200, to_json(*found));
+}
+
+Answer remove_reference(ApiParts& parts, Request request) {
+  const auto run = run_id_of(request);
+  if (!run) co_return problem(run.error());
+  const auto reason = parse_discard(request.body);
+  if (!reason) co_return problem(reason.error());
+  const auto removed = co_await parts.recording.references.remove(*run, *reason, author_of(request, parts.clock));
+  if (!removed) co_return problem(removed.error());
+  co_return json_response(200, to_json(*removed));
+}
+
+Answer list_positions(ApiParts& parts, Request request) {
+  const auto run = run_id_of(request);
+  if (!run) co_return problem(run.error());
+  const auto after = query_number(request, "after", 0, kMaxId, -1);
+  if (!after) co_return problem(after.error());
+  const auto limit = query_number(request, "limit", 1, kMaxPagePositions, kMaxPagePositions);
+  if (!limit) co_return problem(limit.error());
+  const auto after_us = *after < 0 ? std::nullopt : std::optional{static_cast<std::uint64_t>(*after)};
+  const auto found = co_await parts.recording.references.page(*run, after_us, static_cast<std::size_t>(*limit));
+  if (!found) co_return problem(found.error());
+  const OutsidePositions& positions = found->positions;
+  const bool is_full = positions.size() == static_cast<std::size_t>(*limit);
+  co_return json_response(200, {{"span", found->reference.span},
+                                {"robot_time_us", positions.robot_time_us},
+                                {"position_m", positions.position_m},
+                                {"position_sd_m", positions.position_sd_m},
+                                {"next", is_full ? json(positions.robot_time_us.back()) : json(nullptr)}});
+}
+
+}  // namespace
+
+json to_json(const OutsideReference& reference) {
+  json out;
+  out["run_id"] = reference.run;
+  out["span"] = reference.span;
+  out["source"] = reference.source;
+  out["sha256"] = reference.sha256;
+  out["clock_method"] = text(reference.clock);
+  out["clock_offset_s"] = reference.clock_offset_s;
+  out["clock_sd_s"] = or_null(reference.clock_sd_s);
+  out["correlation"] = or_null(reference.correlation);
+  out["motion_ratio"] = or_null(reference.motion_ratio);
+  out["zero_is_kept"] = reference.zero_is_kept;
+  out["zero_offset_m"] = reference.zero_offset_m;
+  out["zero_sd_m"] = or_null(reference.zero_sd_m);
+  out["samples"] = reference.samples;
+  out["samples_left_out"] = reference.samples_left_out;
+  out["actor"] = reference.actor;
+  out["made_at_us"] = reference.made_at_us;
+  out["in_words"] = clock_in_words(reference) + "; " + zero_in_words(reference);
+  return out;
+}
+
+void add_reference_routes(Router& router, ApiParts& parts) {
+  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
+                                     std::vector<std::string> query, Answer (*answer)(ApiParts&, Request),
+                                     std::size_t max_body_bytes = kMaxBodyBytes) {
+    router.add({method, pattern, needs, std::move(query),
+                [&parts, answer](Request request) { return answer(parts, std::move(request)); }, false,
+                max_body_bytes});
+  };
+  add("POST", "/api/v1/runs/{run_id}/reference", Scope::record, {}, import_reference, kMaxReferenceBytes);
+  add("GET", "/api/v1/runs/{run_id}/reference", Scope::read, {}, get_reference);
+  add("POST", "/api/v1/runs/{run_id}/reference/remove", Scope::record, {}, remove_reference);
+  add("GET", "/api/v1/runs/{run_id}/reference/positions", Scope::read, {"after", "limit"}, list_positions);
+}
+
+}  // namespace server

@@ -1,0 +1,235 @@
+// Runs: begin, end, make afterwards, annotate, discard, list, certify, measure.
+#include <fmt/format.h>
+
+#include "server/api/routes/routes.hpp"
+#include "server/identity/auth.hpp"
+
+namespace server {
+using nlohmann::json;
+
+namespace {
+
+Answer list_runs(ApiParts& parts, Request request) {
+  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  if (!limit) co_return problem(limit.error());
+  const auto before = query_number(request, "before", 1, kMaxRunId, 0);
+  if (!before) co_return problem(before.error());
+  RunFilter filter;
+  filter.before = *before;
+  filter.limit = static_cast<std::size_t>(*limit);
+  if (const auto given = request.query.find("robot_id"); given != request.query.end()) filter.robot_id = given->second;
+  if (const auto given = request.query.find("state"); given != request.query.end()) {
+    filter.state = run_state_from(given->second);
+    if (!filter.state) {
+      co_return problem(400, "state is none of open, ended, interrupted and discarded", "out_of_range");
+    }
+  }
+  const auto runs = co_await parts.recording.runs.list(std::move(filter));
+  co_return json_response(200, list_json("runs", runs));
+}
+
+// SAFETY: whoever names the fluid that the robot is in decides which limits hold, and which model it is sent: that is a
+// command. False for somebody who may not, and names the fluid that it is in: then nothing is to be said of the robot.
+Result<bool> may_name_fluid(const ApiParts& parts, const Request& request, const RobotId& robot_id,
+                            const std::string& fluid) {
+  if (fluid.empty() || request.caller.scopes.allow(Scope::command)) return true;
+  const RobotState* robot = parts.station.find(robot_id);
+  const auto listed = parts.station.envelope().listed(fluid);
+  if (robot == nullptr || !listed) return true;  // refused later
+  if (robot->fluid == *listed) return false;
+  return fail(ErrorCode::forbidden,
+              fmt::format("to say that robot '{}' is in '{}' changes its limits, which needs the scope command; name "
+                          "the fluid that it is in, or none",
+                          robot_id, *listed),
+              "not_permitted");
+}
+
+Answer create_run(ApiParts& parts, Request request) {
+  auto wish = parse_run(request.body);
+  if (!wish) co_return problem(wish.error());
+  const Result<void> room = parts.recording.disk_watch.may_begin("a run");
+  if (!room) co_return problem(room.error());
+  if (parts.station.find(wish->robot_id) == nullptr) {
+    co_return problem(404, fmt::format("no robot '{}' is known", wish->robot_id), "unknown_robot");
+  }
+  if (!wish->range) {
+    const auto named = may_name_fluid(parts, request, wish->robot_id, wish->conditions.fluid);
+    if (!named) co_return problem(named.error());
+    if (!*named) wish->conditions.fluid.clear();  // the run takes the robot's
+  }
+  Runs& runs = parts.recording.runs;
+  const Author by = author_of(request, parts.clock);
+  auto made = wish->range ? runs.make_afterwards(wish->robot_id, wish->conditions, *wish->range, by)
+                          : runs.create(wish->robot_id, wish->conditions, by);
+  const auto run = co_await std::move(made);
+  if (!run) co_return problem(run.error());
+  parts.live.publish_run(to_json(*run));
+  Response response = json_response(201, to_json(*run));
+  response.headers.emplace_back("Location", fmt::format("/api/v1/runs/{}", run->id));
+  co_return response;
+}
+
+Answer get_run(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  const auto run = co_await parts.recording.runs.find(*id);
+  if (!run) co_return problem(run.error());
+  co_return json_response(200, to_json(*run));
+}
+
+Answer end_run(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  const auto verdict = parse_run_end(request.body);
+  if (!verdict) co_return problem(verdict.error());
+  const auto run = co_await parts.recording.runs.end(*id, *verdict, author_of(request, parts.clock));
+  if (!run) co_return problem(run.error());
+  parts.live.publish_run(to_json(*run));
+  co_return json_response(200, to_json(*run));
+}
+
+Answer annotate_run(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  auto annotation = parse_annotation(request.body);
+  if (!annotation) co_return problem(annotation.error());
+  if (const auto fluid = annotation->texts.find("fluid"); fluid != annotation->texts.end()) {
+    const auto before = co_await parts.recording.runs.find(*id);
+    if (!before) co_return problem(before.error());
+    if (auto stands = still_stands(request.caller); !stands) co_return problem(stands.error());
+    const bool is_open = before->state == RunState::open;
+    const auto named = is_open ? may_name_fluid(parts, request, before->robot_id, fluid->second) : Result<bool>{true};
+    if (!named) co_return problem(named.error());
+    annotation->names_fluid_of_robot = *named;
+  }
+  const auto run = co_await parts.recording.runs.annotate(*id, *annotation, author_of(request, parts.clock));
+  if (!run) co_return problem(run.error());
+  parts.live.publish_run(to_json(*run));
+  co_return json_response(200, to_json(*run));
+}
+
+Answer discard_run(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  const auto reason = parse_discard(request.body);
+  if (!reason) co_return problem(reason.error());
+  const auto run = co_await parts.recording.runs.discard(*id, *reason, author_of(request, parts.clock));
+  if (!run) co_return problem(run.error());
+  parts.live.publish_run(to_json(*run));
+  co_return json_response(200, to_json(*run));
+}
+
+json to_json(const RunCertificate& found, RunId run) {
+  const Certificate& certificate = found.certificate;
+  json out;
+  out["run_id"] = run;
+  out["final"] = found.is_final;
+  out["format"] = certificate.format;
+  out["samples_expected"] = certificate.samples_expected;
+  out["samples_live"] = certificate.samples_live;
+  out["samples_backfilled"] = certificate.samples_backfilled;
+  out["samples_lost"] = certificate.samples_lost;
+  out["samples_missing"] = certificate.samples_missing();
+  out["lost_by_cause"] = certificate.lost_by_cause;
+  out["longest_gap_samples"] = certificate.longest_gap_samples;
+  out["longest_gap_us"] = certificate.longest_gap_us;
+  out["worst_clock_uncertainty_us"] = certificate.worst_clock_uncertainty_us;
+  out["samples_without_clock"] = certificate.samples_without_clock;
+  out["sha256"] = found.is_final ? json(certificate.sha256) : json(nullptr);
+  out["made_at_us"] = certificate.made_at_us;
+  return out;
+}
+
+Answer get_certificate(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  const auto certificate = co_await parts.recording.certifier.find(*id);
+  if (!certificate) co_return problem(certificate.error());
+  co_return json_response(200, to_json(*certificate, *id));
+}
+
+Answer get_snapshot(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  const auto snapshot = co_await parts.recording.runs.snapshot(*id);
+  if (!snapshot) co_return problem(snapshot.error());
+  json in_force = json::array();
+  for (const InForce& document : snapshot->in_force) {
+    in_force.push_back({{"kind", document.kind},
+                        {"span", document.span},
+                        {"first_seq", document.first_seq},
+                        {"content", json::parse(document.content, nullptr, false)}});
+  }
+  json out;
+  out["firmware_version"] = snapshot->firmware_version;
+  out["controller_id"] = snapshot->controller_id;
+  out["controller_checksum"] = snapshot->controller_checksum;
+  out["parameters_checksum"] = snapshot->parameters_checksum;
+  out["in_force"] = std::move(in_force);
+  co_return json_response(200, out);
+}
+
+json or_null(std::optional<double> value) { return value ? json(*value) : json(nullptr); }
+
+json to_json(const std::optional<EstimateError>& error) {
+  if (!error) return nullptr;
+  return {{"rms_m", error->rms_m},
+          {"worst_m", error->worst_m},
+          {"within_2_sd", error->within_2_sd},
+          {"samples", error->samples}};
+}
+
+json to_json(const MeasuredStep& step) {
+  json out;
+  out["cause"] = text(step.cause);
+  out["span"] = step.span;
+  out["first_seq"] = step.first_seq;
+  out["last_seq"] = step.last_seq;
+  out["at_s"] = step.at_s;
+  out["start_m"] = decimal(static_cast<float>(step.start_m));
+  out["target_m"] = decimal(static_cast<float>(step.target_m));
+  out["band_m"] = step.band_m;
+  out["position_source"] = position_source(step);
+  out["position_sd_m"] = decimal(static_cast<float>(step.position_sd_m));
+  out["estimate_error"] = to_json(step.estimate_error);
+  out["settling_s"] = or_null(step.metrics.settling_s);
+  out["overshoot_percent"] = step.metrics.overshoot_percent;
+  out["peak_m"] = step.metrics.peak_m;
+  out["rise_10_90_s"] = or_null(step.metrics.rise_10_90_s);
+  out["steady_state_error_m"] = step.metrics.steady_state_error_m;
+  return out;
+}
+
+Answer get_step_metrics(ApiParts& parts, Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return problem(id.error());
+  const auto measures = co_await parts.analysis.measures(*id);
+  if (!measures) co_return problem(measures.error());
+  json list = json::array();
+  for (const MeasuredStep& step : measures->steps) list.push_back(to_json(step));
+  json out{{"steps", std::move(list)}};
+  out["reference"] = measures->reference ? to_json(*measures->reference) : json(nullptr);
+  out["estimate_error"] = to_json(measures->estimate_error);
+  co_return json_response(200, out);
+}
+
+}  // namespace
+
+void add_run_routes(Router& router, ApiParts& parts) {
+  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
+                                     std::vector<std::string> query, Answer (*answer)(ApiParts&, Request)) {
+    router.add({method, pattern, needs, std::move(query),
+                [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+  };
+  add("GET", "/api/v1/runs", Scope::read, {"robot_id", "state", "before", "limit"}, list_runs);
+  add("POST", "/api/v1/runs", Scope::record, {}, create_run);
+  add("GET", "/api/v1/runs/{run_id}", Scope::read, {}, get_run);
+  add("POST", "/api/v1/runs/{run_id}/end", Scope::record, {}, end_run);
+  add("POST", "/api/v1/runs/{run_id}/annotate", Scope::record, {}, annotate_run);
+  add("POST", "/api/v1/runs/{run_id}/discard", Scope::record, {}, discard_run);
+  add("GET", "/api/v1/runs/{run_id}/certificate", Scope::read, {}, get_certificate);
+  add("GET", "/api/v1/runs/{run_id}/snapshot", Scope::read, {}, get_snapshot);
+  add("GET", "/api/v1/runs/{run_id}/step-metrics", Scope::read, {}, get_step_metrics);
+}
+
+}  // namespace server

@@ -1,0 +1,208 @@
+// Each function twice: a request, or a transaction.
+#include "server/cli/accounts/account_door.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <iostream>
+#include <stdexcept>
+
+#include "server/cli/accounts/author.hpp"
+
+namespace server::cli {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+constexpr std::int64_t kDayUs = 86'400'000'000;
+
+template <class T>
+T value_of(Result<T> result) {
+  if (!result) throw std::runtime_error{result.error().detail};
+  if constexpr (!std::is_void_v<T>) return std::move(*result);
+}
+
+template <class Items>
+json list_of(const Items& items) {
+  json list = json::array();
+  for (const auto& item : items) list.push_back(to_json(item));
+  return list;
+}
+
+// Shows nothing of what is typed, until it ends.
+class Silence {
+ public:
+  Silence() {
+    tcgetattr(STDIN_FILENO, &before_);
+    termios silent = before_;
+    silent.c_lflag &= ~static_cast<tcflag_t>(ECHO);
+    tcsetattr(STDIN_FILENO, TCSAFLUSH, &silent);
+  }
+  ~Silence() { tcsetattr(STDIN_FILENO, TCSAFLUSH, &before_); }
+  Silence(const Silence&) = delete;
+  Silence& operator=(const Silence&) = delete;
+
+ private:
+  termios before_{};
+};
+
+std::string read_line() {
+  std::string line;
+  if (!std::getline(std::cin, line)) throw std::runtime_error{"no password was given on standard input"};
+  if (line.ends_with('\r')) line.pop_back();
+  return line;
+}
+
+std::string ask_silently(const std::string& question) {
+  const Silence silence;  // before the question: what is typed early is not shown either
+  fmt::print(stderr, "{}: ", question);
+  std::string line = read_line();
+  fmt::print(stderr, "\n");
+  return line;
+}
+
+}  // namespace
+
+AccountDoor::AccountDoor(const fs::path& data_dir, Missing missing) {
+  const fs::path database = data_dir / "station.sqlite";
+  if (missing == Missing::make) {
+    make_data_folder(data_dir);
+  } else if (!fs::exists(database)) {
+    throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
+  }
+  if (auto lock = FolderLock::try_take(data_dir)) {
+    lock_.emplace(std::move(*lock));
+    database_ = std::make_unique<Database>(database);
+  } else {
+    station_.emplace(data_dir);
+  }
+}
+
+json AccountDoor::ask(const std::string& method, const std::string& target, const json& body) const {
+  const StationAnswer answer = station_->ask(method, "/api/v1" + target, body);
+  constexpr int kFirstProblem = 300;
+  if (answer.status < kFirstProblem) return answer.body;
+  throw std::runtime_error{answer.body.value("detail", fmt::format("the station answers {}", answer.status))};
+}
+
+json AccountDoor::users() { return station_ ? ask("GET", "/users").at("users") : list_of(store().load().users); }
+
+void AccountDoor::add_user(const std::string& name, Role role, const std::string& password) {
+  if (station_) {
+    ask("POST", "/users", {{"name", name}, {"role", text(role)}, {"password", password}});
+    return;
+  }
+  value_of(check_name(name));
+  value_of(check_password(password));
+  const Author by = command_line_author();
+  value_of(store().add_user({name, role, hash_password(password, {}), by.at_us, by.actor, false}, by));
+}
+
+void AccountDoor::change_user(const std::string& name, const UserChange& change, const json& body) {
+  value_of(check_name(name));
+  if (station_) {
+    ask("POST", "/users/" + name + "/change", body);
+  } else {
+    value_of(store().change_user(name, change, command_line_author()));
+  }
+}
+
+void AccountDoor::set_role(const std::string& name, Role role) {
+  change_user(name, {role, {}, {}}, {{"role", text(role)}});
+}
+
+void AccountDoor::set_password(const std::string& name, const std::string& password) {
+  value_of(check_password(password));
+  UserChange change;
+  if (!station_) change.password_hash = hash_password(password, {});
+  change_user(name, change, {{"password", password}});
+}
+
+void AccountDoor::set_disabled(const std::string& name, bool disabled) {
+  change_user(name, {{}, {}, disabled}, {{"disabled", disabled}});
+}
+
+void AccountDoor::remove_user(const std::string& name) {
+  value_of(check_name(name));
+  if (station_) {
+    ask("POST", "/users/" + name + "/remove");
+  } else {
+    value_of(store().remove_user(name, command_line_author()));
+  }
+}
+
+json AccountDoor::tokens() { return station_ ? ask("GET", "/tokens").at("tokens") : list_of(store().load().tokens); }
+
+json AccountDoor::add_token(const std::string& name, Scopes scopes, std::int64_t days) {
+  json body{{"name", name}, {"scopes", text(scopes)}};
+  if (days != 0) body["days"] = days;
+  if (station_) return ask("POST", "/tokens", body);
+  value_of(check_name(name));
+  if (name == "local") throw std::runtime_error{"local is the name of the station's own token"};
+  const std::string secret = random_secret();
+  ApiToken token;
+  token.name = name;
+  token.hash = hash_of(secret);
+  token.scopes = scopes;
+  const Author by = command_line_author();
+  token.made_at_us = by.at_us;
+  token.expires_at_us = days == 0 ? 0 : token.made_at_us + days * kDayUs;
+  value_of(store().add_token(token, by));
+  json made = to_json(token);
+  made["secret"] = secret;
+  return made;
+}
+
+void AccountDoor::revoke_token(const std::string& name) {
+  value_of(check_name(name));
+  if (station_) {
+    ask("POST", "/tokens/" + name + "/revoke");
+  } else {
+    value_of(store().revoke_token(name, command_line_author()));
+  }
+}
+
+json AccountDoor::enrolments() {
+  return station_ ? ask("GET", "/enrolments").at("enrolments") : list_of(store().enrolments());
+}
+
+json AccountDoor::enrol(const std::string& robot_id) {
+  if (station_) return ask("POST", "/enrolments", {{"robot_id", robot_id}});
+  const std::string secret = random_secret();
+  json made = to_json(value_of(store().enrol(robot_id, hash_of(secret), command_line_author())));
+  made["secret"] = secret;
+  return made;
+}
+
+void AccountDoor::revoke_robot(const std::string& robot_id) {
+  if (station_) {
+    ask("POST", "/enrolments/" + robot_id + "/revoke");
+  } else {
+    value_of(store().revoke_robot(robot_id, command_line_author()));
+  }
+}
+
+void AccountDoor::set_retired(const std::string& robot_id, bool retired) {
+  if (station_) {
+    ask("POST", "/robots/" + robot_id + "/retire", {{"retired", retired}});
+  } else {
+    value_of(store().set_retired(robot_id, retired, command_line_author()));
+  }
+}
+
+std::string read_password(const std::string& whose) {
+  if (isatty(STDIN_FILENO) == 0) return read_line();
+  std::string password = ask_silently("Password of " + whose);
+  if (ask_silently("The same again") != password) throw std::runtime_error{"the two passwords differ"};
+  return password;
+}
+
+std::string time_text(const json& at_us) {
+  if (at_us.is_null()) return {};
+  return fmt::format("{:%Y-%m-%d %H:%M}", fmt::gmtime(static_cast<std::time_t>(at_us.get<std::int64_t>() / 1'000'000)));
+}
+
+}  // namespace server::cli

@@ -1,0 +1,116 @@
+// One subcommand an act, each one request to the station.
+#include "server/cli/accounts/fluid.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <fmt/ranges.h>
+
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <stdexcept>
+#include <vector>
+
+#include "server/cli/accounts/account_door.hpp"
+#include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/options.hpp"
+
+namespace server::cli {
+namespace {
+
+using nlohmann::json;
+using Act = FluidCommand::Act;
+
+constexpr int kDone = 200;
+
+CLI::App* offer(CLI::App& command, FluidCommand& options, Act act, const char* name, const char* purpose) {
+  CLI::App* sub = command.add_subcommand(name, purpose);
+  sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->callback([&options, act] { options.act = act; });
+  return sub;
+}
+
+json ask(const FluidCommand& options, const std::string& method, const std::string& target,
+         const json& body = nullptr) {
+  const StationAnswer answer = StationClient{options.data_dir}.ask(method, target, body);
+  if (answer.status == kDone) return answer.body;
+  throw std::runtime_error{fmt::format("the station refused: {}", answer.body.value("detail", "no reason"))};
+}
+
+// A name of the list may have any character.
+std::string path_of_model(const std::string& fluid) {
+  std::string encoded;
+  for (const char c : fluid) encoded += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  return "/api/v1/fluids/" + encoded + "/model";
+}
+
+json read_model(const std::filesystem::path& file) {
+  std::ifstream from_file;
+  if (file != "-") from_file.open(file);
+  std::istream& in = file == "-" ? std::cin : from_file;
+  if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file.string())};
+  const std::string text{std::istreambuf_iterator<char>{in}, {}};
+  json model = json::parse(text, nullptr, false);
+  if (model.is_object()) return model;
+  throw std::runtime_error{
+      fmt::format("'{}' is not a JSON object, as `rheonaut estimator --json` writes it", file.string())};
+}
+
+int list(const FluidCommand& options, std::ostream& out) {
+  const json fluids = ask(options, "GET", "/api/v1/fluids").at("fluids");
+  if (options.json) fmt::print(out, "{}\n", fluids.dump(2));
+  for (const json& fluid : options.json ? json::array() : fluids) {
+    const json& model = fluid.at("model");
+    const std::string words =
+        model.is_null()
+            ? "no model"
+            : fmt::format("model with a fit error of {:.2g} %, set {} by {}", 100 * model.at("fit_error").get<double>(),
+                          time_text(model.at("set_at_us")), model.at("set_by").get<std::string>());
+    fmt::print(out, "{:<20}  {}\n", fluid.at("fluid").get<std::string>(), words);
+  }
+  return 0;
+}
+
+int change(const FluidCommand& options, std::ostream& out) {
+  const bool removes = options.act == Act::remove_model;
+  const std::string path = path_of_model(options.fluid);
+  const json answer = removes ? ask(options, "POST", path + "/remove", json::object())
+                              : ask(options, "POST", path, read_model(options.file));
+  if (options.json) {
+    fmt::print(out, "{}\n", answer.dump(2));
+    return 0;
+  }
+  fmt::print(out, "The fluid {} has {}\n", answer.at("fluid").get<std::string>(),
+             removes ? "no model any more" : "this model from now on");
+  const auto robots = answer.at("robots_not_updated").get<std::vector<std::string>>();
+  if (!robots.empty()) {
+    fmt::print(out, "Not sent to the robots in it before their fluid is named again: {}\n", fmt::join(robots, ", "));
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, FluidCommand& options) {
+  command.require_subcommand(1);
+  offer(command, options, Act::list, "list", "List the fluids that robots may be in, and which have a model")
+      ->add_flag("--json", options.json, "As JSON");
+  auto* model = offer(command, options, Act::model, "model", "Give a fluid the model that is sent to robots in it");
+  model->add_option("fluid", options.fluid, "The fluid, as `rheonaut fluid list` names it")->required()->check(named());
+  model->add_option("file", options.file, "The model, from `rheonaut estimator --json`; -: standard input")
+      ->required()
+      ->check(named());
+  model->add_flag("--json", options.json, "As JSON");
+  model->footer("Example: rheonaut fluid model water model.json --data lab");
+  auto* remove = offer(command, options, Act::remove_model, "remove-model", "Take a fluid's model away");
+  remove->add_option("fluid", options.fluid, "The fluid")->required()->check(named());
+  remove->add_flag("--json", options.json, "As JSON");
+  command.footer("Example: rheonaut fluid list --data lab");
+}
+
+int run(const FluidCommand& options, std::ostream& out) {
+  return options.act == Act::list ? list(options, out) : change(options, out);
+}
+
+}  // namespace server::cli

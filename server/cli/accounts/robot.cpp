@@ -1,0 +1,107 @@
+// One subcommand an act.
+#include "server/cli/accounts/robot.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+
+#include <CLI/CLI.hpp>
+#include <tuple>
+
+#include "server/cli/accounts/account_door.hpp"
+#include "server/cli/terminal/options.hpp"
+
+namespace server::cli {
+namespace {
+
+using Act = RobotCommand::Act;
+
+CLI::App* offer(CLI::App& command, RobotCommand& wish, Act act, const char* name, const char* purpose) {
+  CLI::App* sub = command.add_subcommand(name, purpose);
+  sub->add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->callback([&wish, act] { wish.act = act; });
+  return sub;
+}
+
+CLI::Validator robot_id() {
+  const auto refuse = [](std::string& id) -> std::string {
+    constexpr std::size_t kMaxBytes = 31;
+    constexpr auto kAllowed = "abcdefghijklmnopqrstuvwxyz0123456789_-";
+    if (!id.empty() && id.size() <= kMaxBytes && id.find_first_not_of(kAllowed) == std::string::npos) return {};
+    return fmt::format("must be 1 to {} characters of [a-z0-9_-], is '{}'", kMaxBytes, id);
+  };
+  return CLI::Validator{refuse, ""};
+}
+
+int list(const nlohmann::json& robots, bool as_json, std::ostream& out) {
+  if (as_json) {
+    fmt::print(out, "{}\n", robots.dump(2));
+    return 0;
+  }
+  if (robots.empty()) fmt::print(out, "No robot is enrolled\n");
+  for (const auto& robot : robots) {
+    const std::string revoked = time_text(robot.at("revoked_at_us"));
+    const std::string retired = time_text(robot.at("retired_at_us"));
+    fmt::print(out, "{:<31}  {}  enrolled {} by {}{}{}\n", robot.at("robot_id").get<std::string>(),
+               robot.at("has_token").get<bool>() ? "token   " : "no token", time_text(robot.at("enrolled_at_us")),
+               robot.at("enrolled_by").get<std::string>(), revoked.empty() ? "" : ", revoked " + revoked,
+               retired.empty() ? "" : ", retired " + retired);
+  }
+  return 0;
+}
+
+int enroll(const RobotCommand& wish, std::ostream& out) {
+  const nlohmann::json made = AccountDoor{wish.data_dir, AccountDoor::Missing::make}.enrol(wish.robot_id);
+  if (wish.json) {
+    fmt::print(out, "{}\n", made.dump(2));
+    return 0;
+  }
+  const auto token = made.at("secret").get<std::string>();
+  fmt::print(out,
+             "Robot {0} is enrolled. Its token, which is shown only now:\n\n  {1}\n\n"
+             "Firmware: the first two values of kSecrets in robot_fw/esp8266/secrets.hpp\n"
+             "  \"{0}\",\n  \"{1}\",\n"
+             "Simulated robot: rheonaut-sim --id {0} --token {1}\n",
+             wish.robot_id, token);
+  return 0;
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, RobotCommand& wish) {
+  command.require_subcommand(1);
+  auto* enroll = offer(command, wish, Act::enroll, "enroll", "Give a robot a token and print it: it is shown only now");
+  enroll->add_option("robot_id", wish.robot_id, "1 to 31 characters of [a-z0-9_-]")->required()->check(robot_id());
+  enroll->add_flag("--json", wish.json, "As JSON");
+  enroll->footer("Example: rheonaut robot enroll rheo-1 --data lab");
+  offer(command, wish, Act::list, "list", "List the robots that may or might connect")
+      ->add_flag("--json", wish.json, "As JSON");
+  constexpr std::tuple<Act, const char*, const char*> kOfOne[] = {
+      {Act::revoke, "revoke", "Refuse a robot from now on, and end its connection"},
+      {Act::retire, "retire", "Leave a robot out of the stop of all robots while it is not connected"},
+      {Act::unretire, "unretire", "Put a retired robot back into use"}};
+  for (const auto& [act, name, purpose] : kOfOne) {
+    offer(command, wish, act, name, purpose)
+        ->add_option("robot_id", wish.robot_id, "The robot")
+        ->required()
+        ->check(robot_id());
+  }
+  add_options(command, wish.settings);
+  command.footer("Example: rheonaut robot list --data lab");
+}
+
+int run(const RobotCommand& wish, std::ostream& out) {
+  if (wish.settings.of != RobotSettingsCommand::Of::nothing) return run(wish.settings, out);
+  if (wish.act == Act::enroll) return enroll(wish, out);
+  AccountDoor door{wish.data_dir, AccountDoor::Missing::refuse};
+  if (wish.act == Act::list) return list(door.enrolments(), wish.json, out);
+  if (wish.act == Act::revoke) {
+    door.revoke_robot(wish.robot_id);
+  } else {
+    door.set_retired(wish.robot_id, wish.act == Act::retire);
+  }
+  const char* done = wish.act == Act::revoke ? "revoked" : wish.act == Act::retire ? "retired" : "put back into use";
+  fmt::print(out, "Robot {} was {}\n", wish.robot_id, done);
+  return 0;
+}
+
+}  // namespace server::cli

@@ -1,0 +1,33 @@
+// `rheonaut robot`: which robots may connect, each with a token of its own, and which are out of use; with a running
+// station and without one.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <iosfwd>
+#include <string>
+
+#include "server/cli/accounts/robot_settings.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace server::cli {
+
+struct RobotCommand {
+  enum class Act : std::uint8_t { enroll, list, revoke, retire, unretire };
+  Act act = Act::list;
+  std::filesystem::path data_dir = "rheonaut-data";
+  std::string robot_id;
+  bool json = false;
+  RobotSettingsCommand settings;  // if of is not nothing, this is what is wanted
+};
+
+void add_options(CLI::App& command, RobotCommand& wish);
+
+// `enroll` prints the robot's token and where it belongs; nobody can read it again. Throws std::runtime_error saying
+// why nothing was changed.
+int run(const RobotCommand& wish, std::ostream& out);
+
+}  // namespace server::cli

@@ -1,0 +1,213 @@
+// Each change is one request that waits until the station has read the robot's answer back.
+#include "server/cli/accounts/robot_settings.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <fstream>
+#include <stdexcept>
+
+#include "server/analysis/control_json.hpp"
+#include "server/cli/accounts/station_client.hpp"
+#include "server/cli/design/discretise.hpp"
+#include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/output.hpp"
+
+namespace server::cli {
+namespace {
+
+using nlohmann::json;
+using Of = RobotSettingsCommand::Of;
+
+constexpr std::size_t kPageParameters = 6;
+
+class Robot {
+ public:
+  explicit Robot(const RobotSettingsCommand& wish)
+      : station_{wish.data_dir}, path_{"/api/v1/robots/" + wish.robot_id} {}
+
+  json get(const char* what) const { return checked(station_.ask("GET", path_ + what)); }
+  json command(const json& body) const {
+    return checked(station_.ask("POST", path_ + "/commands?wait=verified", body));
+  }
+
+ private:
+  static json checked(const StationAnswer& answer) {
+    constexpr int kFirstProblem = 300;
+    if (answer.status < kFirstProblem) return answer.body;
+    throw std::runtime_error{answer.body.value("detail", fmt::format("the station answers {}", answer.status))};
+  }
+
+  StationClient station_;
+  std::string path_;
+};
+
+// What became of a change: the exit status.
+int tell(const json& record, const std::string& what, bool as_json, std::ostream& out) {
+  const bool is_verified = record.at("state") == "verified";
+  if (as_json) {
+    fmt::print(out, "{}\n", record.dump(2));
+  } else if (is_verified) {
+    fmt::print(out, "{}: verified, the robot says it back bit for bit\n", what);
+  } else {
+    fmt::print(out, "{}: accepted by the robot, but not verified ({})\n", what, record.at("reason").get<std::string>());
+  }
+  return is_verified ? 0 : kNotVerified;
+}
+
+std::string number(const json& value) { return value.is_null() ? "-" : value.dump(); }
+
+void say_if_old(const json& known, std::ostream& out) {
+  if (!known.at("is_current").get<bool>()) fmt::print(out, "Not current: what the robot said last\n");
+}
+
+int list_parameters(const Robot& robot, bool as_json, std::ostream& out) {
+  const json known = robot.get("/parameters");
+  if (as_json) {
+    fmt::print(out, "{}\n", known.dump(2));
+    return 0;
+  }
+  if (known.at("parameters").is_null()) {
+    fmt::print(out, "Not known: the robot has not reported its parameters since the station started\n");
+    return 0;
+  }
+  say_if_old(known, out);
+  Table table{{"parameter", "value", "unit", "minimum", "maximum", "default", ""}};
+  for (const json& one : known.at("parameters")) {
+    const bool changed = one.at("changed").get<bool>(), bounds = one.at("bounds_motion").get<bool>();
+    const char* remark = changed ? (bounds ? "changed, bounds motion" : "changed") : (bounds ? "bounds motion" : "");
+    table.row({one.at("name").get<std::string>(), number(one.at("value")), one.at("unit").get<std::string>(),
+               number(one.at("minimum")), number(one.at("maximum")), number(one.at("default")), remark});
+  }
+  table.write(out);
+  return 0;
+}
+
+int set_parameter(const Robot& robot, const RobotSettingsCommand& wish, std::ostream& out) {
+  const auto sign = wish.set.find('=');
+  double value = 0;
+  const char* const end = wish.set.data() + wish.set.size();
+  const auto read = sign == std::string::npos ? std::from_chars_result{end, std::errc::invalid_argument}
+                                              : std::from_chars(wish.set.data() + sign + 1, end, value);
+  if (sign == 0 || read.ec != std::errc{} || read.ptr != end) {
+    throw std::runtime_error{fmt::format("--set '{}' is not NAME=VALUE, such as duty_slew_per_s=5", wish.set)};
+  }
+  json body{{"kind", "set_parameter"}, {"name", wish.set.substr(0, sign)}, {"value", value}};
+  if (wish.confirm) body["confirm"] = true;
+  return tell(robot.command(body), fmt::format("{} = {}", wish.set.substr(0, sign), value), wish.json, out);
+}
+
+// The station keeps what each page says.
+int read_parameters(const Robot& robot, const RobotSettingsCommand& wish, std::ostream& out) {
+  std::size_t count = 1;
+  for (std::size_t first = 0; first < count; first += kPageParameters) {
+    const json record = robot.command({{"kind", "get_parameters"}, {"first_index", first}});
+    if (record.at("state") != "verified") return tell(record, "reading parameters", wish.json, out);
+    count = robot.get("/parameters").at("parameters").size();
+  }
+  return list_parameters(robot, wish.json, out);
+}
+
+int show_controller(const Robot& robot, bool as_json, std::ostream& out) {
+  const json known = robot.get("/controller");
+  if (as_json) {
+    fmt::print(out, "{}\n", known.dump(2));
+    return 0;
+  }
+  const json& controller = known.at("controller");
+  if (controller.is_null()) {
+    fmt::print(out, "Not known: the robot has not reported its controller since the station started\n");
+    return 0;
+  }
+  say_if_old(known, out);
+  Table table{{"", ""}};
+  for (const auto& [name, value] : controller.items()) table.row({name, value.dump()});
+  table.write(out);
+  return 0;
+}
+
+// What discretise printed; anything else is a controller in continuous time, which is discretised here.
+json sections_in(const std::string& file, const Robot& robot) {
+  std::ifstream in{file};
+  if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file)};
+  const json given = json::parse(in, nullptr, false);
+  const auto told_by_robot = [&given] { return given.is_object() && given.contains("period_us"); };
+  if (given.is_object() && given.contains("sections")) {
+    json needed;
+    for (const char* name : {"period_s", "dc_gain", "sections"}) {
+      if (given.contains(name)) needed[name] = given[name];
+    }
+    return needed;
+  }
+  if (given.is_object() && given.contains("controller") && given.contains("told_at_us")) return given["controller"];
+  if (told_by_robot()) return given;
+  Sampling sampling;
+  const json in_force = robot.get("/controller").at("controller");
+  constexpr double kUsPerS = 1e6;
+  if (!in_force.is_null()) sampling.period_s = in_force.at("period_us").get<double>() / kUsPerS;
+  const auto chosen = discretised(read(ControllerChoice{file}), sampling).chosen;
+  const json made = json::parse(json_of(chosen).dump());
+  return {{"period_s", made["period_s"]}, {"dc_gain", made["dc_gain"]}, {"sections", made["sections"]}};
+}
+
+int set_controller(const Robot& robot, const RobotSettingsCommand& wish, std::ostream& out) {
+  json body{{"kind", "set_controller"}, {"controller", sections_in(wish.set, robot)}};
+  if (wish.duty_min) body["duty_min"] = *wish.duty_min;
+  if (wish.duty_max) body["duty_max"] = *wish.duty_max;
+  if (!wish.derivative_on.empty()) body["derivative_on"] = wish.derivative_on;
+  if (wish.confirm) body["confirm"] = true;
+  const json record = robot.command(body);
+  const json& id = record.at("arguments").at("controller").at("controller_id");
+  return tell(record, fmt::format("controller {}", id.dump()), wish.json, out);
+}
+
+int restore_controller(const Robot& robot, const RobotSettingsCommand& wish, std::ostream& out) {
+  json body{{"kind", "restore_controller"}};
+  if (wish.confirm) body["confirm"] = true;
+  return tell(robot.command(body), "the controller before", wish.json, out);
+}
+
+CLI::App* offer(CLI::App& robot, RobotSettingsCommand& wish, Of of, const char* name, const char* purpose) {
+  CLI::App* sub = robot.add_subcommand(name, purpose);
+  sub->add_option("robot_id", wish.robot_id, "The robot")->required();
+  sub->add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->add_flag("--confirm", wish.confirm, "Of a change that bounds motion otherwise: it is meant");
+  sub->add_flag("--json", wish.json, "As JSON");
+  sub->callback([&wish, of] { wish.of = of; });
+  return sub;
+}
+
+}  // namespace
+
+void add_options(CLI::App& robot, RobotSettingsCommand& wish) {
+  CLI::App* parameters = offer(robot, wish, Of::parameters, "parameters", "List a robot's parameters, or set one");
+  CLI::Option* set =
+      parameters->add_option("--set", wish.set, "NAME=VALUE: set this one and wait until it is verified");
+  parameters->add_flag("--read", wish.read_anew, "Ask the robot for all of them again, then list them")->excludes(set);
+  parameters->footer("Example: rheonaut robot parameters sim-1 --set duty_slew_per_s=5 --data lab");
+  CLI::App* controller = offer(robot, wish, Of::controller, "controller", "Show a robot's controller, or set one");
+  CLI::Option* file = controller->add_option(
+      "--set", wish.set, "What discretise --json printed, or a controller as of tune, which is discretised first");
+  controller->add_flag("--restore", wish.restore, "Back to the controller before the last change")->excludes(file);
+  controller->add_option("--duty-min", wish.duty_min, "With --set (default: as the controller in force)")
+      ->check(from_to(-1, 0));
+  controller->add_option("--duty-max", wish.duty_max, "With --set (default: as the controller in force)")
+      ->check(from_to(0, 1));
+  controller->add_option("--derivative-on", wish.derivative_on, "error or measurement (default: as in force)")
+      ->check(CLI::IsMember({"error", "measurement"}));
+  controller->footer("Example: rheonaut robot controller sim-1 --set c.json --data lab");
+}
+
+int run(const RobotSettingsCommand& wish, std::ostream& out) {
+  const Robot robot{wish};
+  if (wish.of == Of::parameters) {
+    if (!wish.set.empty()) return set_parameter(robot, wish, out);
+    return wish.read_anew ? read_parameters(robot, wish, out) : list_parameters(robot, wish.json, out);
+  }
+  if (wish.restore) return restore_controller(robot, wish, out);
+  return wish.set.empty() ? show_controller(robot, wish.json, out) : set_controller(robot, wish, out);
+}
+
+}  // namespace server::cli

@@ -1,0 +1,84 @@
+// One subcommand an act.
+#include "server/cli/accounts/token.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+
+#include <CLI/CLI.hpp>
+
+#include "server/cli/accounts/account_door.hpp"
+#include "server/cli/terminal/options.hpp"
+
+namespace server::cli {
+namespace {
+
+using Act = TokenCommand::Act;
+
+CLI::App* offer(CLI::App& command, TokenCommand& wish, Act act, const char* name, const char* purpose) {
+  CLI::App* sub = command.add_subcommand(name, purpose);
+  sub->add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->callback([&wish, act] { wish.act = act; });
+  return sub;
+}
+
+int list(const nlohmann::json& tokens, bool as_json, std::ostream& out) {
+  if (as_json) {
+    fmt::print(out, "{}\n", tokens.dump(2));
+    return 0;
+  }
+  if (tokens.empty()) fmt::print(out, "There are no API tokens\n");
+  for (const auto& token : tokens) {
+    const std::string used = time_text(token.at("last_used_at_us"));
+    const std::string expires = time_text(token.at("expires_at_us"));
+    const std::string revoked = time_text(token.at("revoked_at_us"));
+    fmt::print(out, "{:<31}  {}  made {}, used {}{}{}\n", token.at("name").get<std::string>(),
+               token.at("scopes").get<std::string>(), time_text(token.at("made_at_us")), used.empty() ? "never" : used,
+               expires.empty() ? "" : ", until " + expires, revoked.empty() ? "" : ", revoked " + revoked);
+  }
+  return 0;
+}
+
+int create(const TokenCommand& wish, std::ostream& out) {
+  const auto scopes = parse_scopes(wish.scopes);
+  if (!scopes) throw std::runtime_error{scopes.error().detail};
+  const nlohmann::json made =
+      AccountDoor{wish.data_dir, AccountDoor::Missing::make}.add_token(wish.name, *scopes, wish.days);
+  if (wish.json) {
+    fmt::print(out, "{}\n", made.dump(2));
+  } else {
+    fmt::print(out, "{}\n", made.at("secret").get<std::string>());
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, TokenCommand& wish) {
+  command.require_subcommand(1);
+  auto* create = offer(command, wish, Act::create, "create", "Make a token and print it: it is shown only now");
+  create->add_option("name", wish.name, "What it is called: 1 to 31 characters of [a-z0-9._-]")
+      ->required()
+      ->check(named());
+  create->add_option("--scopes", wish.scopes, "Of read, stop, record, command, admin (default: read,stop)")
+      ->check(named());
+  create->add_option("--days", wish.days, "After so many it runs out (default: it does not)")->check(whole(1, 3650));
+  create->add_flag("--json", wish.json, "As JSON");
+  create->footer("Example: rheonaut token create logger --scopes read,record --days 30 --data lab");
+  offer(command, wish, Act::list, "list", "List the tokens")->add_flag("--json", wish.json, "As JSON");
+  offer(command, wish, Act::revoke, "revoke", "End a token at once")
+      ->add_option("name", wish.name, "What it is called")
+      ->required()
+      ->check(named());
+  command.footer("Example: rheonaut token list --data lab");
+}
+
+int run(const TokenCommand& wish, std::ostream& out) {
+  if (wish.act == Act::create) return create(wish, out);
+  AccountDoor door{wish.data_dir, AccountDoor::Missing::refuse};
+  if (wish.act == Act::list) return list(door.tokens(), wish.json, out);
+  door.revoke_token(wish.name);
+  fmt::print(out, "Token {} was revoked\n", wish.name);
+  return 0;
+}
+
+}  // namespace server::cli

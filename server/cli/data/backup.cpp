@@ -1,0 +1,88 @@
+// Copies by itself when it gets the folder's lock; else the station copies, and the file is moved to its place.
+#include "server/cli/data/backup.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <boost/asio/io_context.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/options.hpp"
+#include "server/config/data_folder.hpp"
+#include "server/runtime/clock.hpp"
+#include "server/runtime/tasks.hpp"
+#include "server/storage/database/backup_copy.hpp"
+#include "server/storage/database/finished_file.hpp"
+
+namespace server::cli {
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr microseconds kLook = 200ms;
+constexpr int kAccepted = 202;
+
+void check(const Backup& wish) {
+  const fs::path database = wish.data_dir / "station.sqlite";
+  if (!fs::exists(database)) throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
+  if (fs::exists(wish.to)) throw std::runtime_error{fmt::format("'{}' is there already", wish.to.string())};
+  const fs::path folder = fs::absolute(wish.to).parent_path();
+  if (!fs::is_directory(folder)) throw std::runtime_error{fmt::format("there is no folder '{}'", folder.string())};
+}
+
+// The record of that name, as the station tells it now.
+nlohmann::json look(const StationClient& station, const std::string& name) {
+  const StationAnswer answer = station.ask("GET", "/api/v1/backups");
+  for (const auto& backup : answer.body.value("backups", nlohmann::json::array())) {
+    if (backup.at("name") == name) return backup;
+  }
+  throw std::runtime_error{fmt::format("the station no longer knows backup '{}'", name)};
+}
+
+// Where the station has put it.
+fs::path let_station_copy(const StationClient& station) {
+  boost::asio::io_context loop;
+  SystemClock clock{loop};
+  const std::string name = fmt::format("cli-{}-{}", clock.utc_us() / 1'000'000, getpid());
+  const StationAnswer begun = station.ask("POST", "/api/v1/backups", {{"name", name}});
+  if (begun.status != kAccepted) {
+    throw std::runtime_error{fmt::format("the station makes no backup: {}", begun.body.value("detail", "no reason"))};
+  }
+  for (;;) {
+    const nlohmann::json backup = look(station, name);
+    const auto state = backup.at("state").get<std::string>();
+    if (state == "done") return backup.at("path").get<std::string>();
+    if (state == "failed") {
+      throw std::runtime_error{fmt::format("the station made no backup: {}", backup.at("problem").get<std::string>())};
+    }
+    run_first(loop, clock.sleep_for(kLook));
+  }
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, Backup& wish) {
+  command.add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  command.add_option("--to", wish.to, "The file to make; there is none of that name yet")->check(named())->required();
+  command.footer("Example: rheonaut backup --data ~/lab --to /mnt/other-disk/lab-monday.sqlite");
+}
+
+int run(const Backup& wish, std::ostream& out) {
+  check(wish);
+  umask(077);
+  if (const std::optional<FolderLock> lock = FolderLock::try_take(wish.data_dir)) {
+    back_up_closed(wish.data_dir / "station.sqlite", wish.to);
+  } else {
+    move_finished(let_station_copy(StationClient{wish.data_dir}), wish.to);
+  }
+  fmt::print(out, "{}: {} bytes, verified\n", wish.to.string(), fs::file_size(wish.to));
+  return 0;
+}
+
+}  // namespace server::cli

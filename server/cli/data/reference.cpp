@@ -1,0 +1,264 @@
+// One subcommand an act.
+#include "server/cli/data/reference.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "server/analysis/run_recording.hpp"
+#include "server/cli/accounts/author.hpp"
+#include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/options.hpp"
+#include "server/config/data_folder.hpp"
+#include "server/storage/database/database.hpp"
+#include "server/storage/query/run_reader.hpp"
+
+namespace server::cli {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+using Act = ReferenceCommand::Act;
+
+constexpr int kFirstProblem = 300;
+
+template <class T>
+T value_of(Result<T> result) {
+  if (!result) throw std::runtime_error{result.error().detail};
+  if constexpr (!std::is_void_v<T>) return std::move(*result);
+}
+
+CLI::App* offer(CLI::App& command, ReferenceCommand& wish, Act act, const char* name, const char* purpose) {
+  CLI::App* sub = command.add_subcommand(name, purpose);
+  sub->add_option("--run", wish.run, "A recorded run by its number")
+      ->required()
+      ->check(whole(1, std::numeric_limits<RunId>::max()));
+  sub->add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->callback([&wish, act] { wish.act = act; });
+  return sub;
+}
+
+void add_clock_options(CLI::App& sub, ReferenceCommand& wish) {
+  auto* offset = sub.add_option("--offset-s", wish.offset_s,
+                                "Clock: t_s plus this is the time since the first sample of the run's span");
+  auto* utc = sub.add_option("--utc-s", wish.utc_s, "Clock: UTC (Unix time) of t_s = 0; 0 where t_s is Unix time");
+  auto* marker = sub.add_option("--marker", wish.marker, "Clock: a marker of the run, by number or text, and --at-s");
+  auto* at = sub.add_option("--at-s", wish.at_s, "The t_s of that marker")->needs(marker);
+  marker->needs(at)->check(named());
+  auto* sd = sub.add_option("--clock-sd-s", wish.clock_sd_s, "How exact that clock is (one sigma)");
+  sd->check(non_negative());
+  auto* from = sub.add_option("--search-from-s", wish.search_from_s, "By correlation: the least offset to look at");
+  auto* to = sub.add_option("--search-to-s", wish.search_to_s, "By correlation: the largest offset to look at");
+  offset->check(finite())->excludes(utc)->excludes(marker);
+  utc->check(non_negative())->excludes(marker);
+  for (auto* search : {from, to}) {
+    search->check(finite())->excludes(offset)->excludes(utc)->excludes(marker)->excludes(sd);
+  }
+  at->check(finite());
+}
+
+std::string text_of_file(const std::string& file) {
+  std::ifstream in{file, std::ios::binary};
+  if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file)};
+  std::string text{std::istreambuf_iterator<char>{in}, {}};
+  if (text.size() > kMaxReferenceBytes) {
+    throw std::runtime_error{fmt::format("'{}' has {} bytes, allowed are {}", file, text.size(), kMaxReferenceBytes)};
+  }
+  return text;
+}
+
+ReferenceClockRequest clock_of(const ReferenceCommand& wish) {
+  ReferenceClockRequest clock;
+  clock.sd_s = wish.clock_sd_s;
+  if (wish.offset_s) {
+    clock.method = ReferenceClock::offset;
+    clock.offset_s = *wish.offset_s;
+  } else if (wish.utc_s) {
+    clock.method = ReferenceClock::utc;
+    clock.zero_at_us = std::llround(*wish.utc_s * 1e6);
+  } else if (!wish.marker.empty()) {
+    clock.method = ReferenceClock::marker;
+    clock.at_s = wish.at_s.value_or(0);
+    std::int64_t id = 0;
+    const char* end = wish.marker.data() + wish.marker.size();
+    const auto read = std::from_chars(wish.marker.data(), end, id);
+    if (read.ec == std::errc{} && read.ptr == end) clock.marker_id = id;
+    clock.marker_text = wish.marker;
+  } else {
+    if (wish.clock_sd_s) throw std::runtime_error{"--clock-sd-s belongs to --offset-s, --utc-s or --marker"};
+    clock.search.from_s = wish.search_from_s.value_or(clock.search.from_s);
+    clock.search.to_s = wish.search_to_s.value_or(clock.search.to_s);
+  }
+  return clock;
+}
+
+ReferenceRequest request_of(const ReferenceCommand& wish) {
+  ReferenceRequest request;
+  request.csv = text_of_file(wish.csv_file);
+  request.source = fs::path{wish.csv_file}.filename().string();
+  request.clock = clock_of(wish);
+  request.span = wish.span;
+  request.keeps_zero = wish.keeps_zero;
+  request.is_in_metres = wish.is_in_metres;
+  if (wish.sd_mm) request.sd_m = *wish.sd_mm / 1e3;
+  request.reason = wish.reason;
+  return request;
+}
+
+json json_of(const ReferenceClockRequest& clock) {
+  json out{{"method", text(clock.method)}};
+  if (clock.sd_s) out["sd_s"] = *clock.sd_s;
+  if (clock.method == ReferenceClock::offset) out["offset_s"] = clock.offset_s;
+  if (clock.method == ReferenceClock::utc) out["zero_at_us"] = clock.zero_at_us;
+  if (clock.method == ReferenceClock::marker) {
+    out["at_s"] = clock.at_s;
+    clock.marker_id ? out["marker_id"] = *clock.marker_id : out["marker_text"] = clock.marker_text;
+  }
+  if (std::isfinite(clock.search.from_s)) out["from_s"] = clock.search.from_s;
+  if (std::isfinite(clock.search.to_s)) out["to_s"] = clock.search.to_s;
+  return out;
+}
+
+json json_of(const ReferenceRequest& request) {
+  json out{{"csv", request.csv},
+           {"source", request.source},
+           {"clock", json_of(request.clock)},
+           {"keep_zero", request.keeps_zero},
+           {"metres", request.is_in_metres}};
+  if (request.span) out["span"] = *request.span;
+  if (request.sd_m) out["sd_m"] = *request.sd_m;
+  if (!request.reason.empty()) out["reason"] = request.reason;
+  return out;
+}
+
+json ask_station(const ReferenceCommand& wish, const std::string& path, const json& body) {
+  const StationAnswer answer =
+      StationClient{wish.data_dir}.ask("POST", fmt::format("/api/v1/runs/{}/reference{}", wish.run, path), body);
+  if (answer.status < kFirstProblem) return answer.body;
+  throw std::runtime_error{answer.body.value("detail", fmt::format("the station answers {}", answer.status))};
+}
+
+// In the database, which is closed: nobody else writes.
+OutsideReference import_closed(const ReferenceCommand& wish, const ReferenceRequest& request) {
+  const fs::path path = wish.data_dir / "station.sqlite";
+  Database database{path};
+  value_of(check_may_import(database.handle(), wish.run, request.reason));
+  std::optional<MarkerPlace> marker;
+  const ReferenceClockRequest& clock = request.clock;
+  if (clock.method == ReferenceClock::marker) {
+    marker = value_of(find_marker(database.handle(), wish.run, clock.marker_id, clock.marker_text));
+  }
+  std::vector<OwnPosition> own;
+  for (const StoredSample& stored : value_of(read_run(path, wish.run, kMaxAnalysedSamples))) {
+    own.push_back(own_position(stored));
+  }
+  const std::vector<Zeroing> zeroings = find_zeroings(database.handle(), wish.run);
+  PlacedReference placed = value_of(place_reference(request, own, zeroings, marker));
+  const Author by = command_line_author();
+  placed.reference.run = wish.run;
+  placed.reference.actor = by.actor;
+  placed.reference.made_at_us = by.at_us;
+  return value_of(store_reference(database.handle(), placed.reference, placed.positions, request.reason, by));
+}
+
+StoredReference read_stored(const ReferenceCommand& wish, bool with_positions) {
+  StoredReference stored;
+  auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
+    auto found = read_reference(database, wish.run, {}, with_positions ? kMaxReferenceRows : 0);
+    if (!found) return fail(ErrorCode::not_found, fmt::format("run {} has no reference", wish.run));
+    stored = std::move(*found);
+    return {};
+  };
+  value_of(read_store(wish.data_dir / "station.sqlite", read));
+  return stored;
+}
+
+void write(const OutsideReference& reference, std::ostream& out) {
+  fmt::print(out, "run {}: {} positions of {}{}\n{}\n{}\n", reference.run, reference.samples, reference.source,
+             reference.samples_left_out == 0
+                 ? std::string{}
+                 : fmt::format(", {} before or after the run left out", reference.samples_left_out),
+             clock_in_words(reference), zero_in_words(reference));
+}
+
+void import_one(const ReferenceCommand& wish, std::ostream& out) {
+  const ReferenceRequest request = request_of(wish);
+  if (const auto lock = FolderLock::try_take(wish.data_dir)) {
+    write(import_closed(wish, request), out);
+    return;
+  }
+  ask_station(wish, "", json_of(request));
+  write(read_stored(wish, false).reference, out);
+}
+
+void remove_one(const ReferenceCommand& wish, std::ostream& out) {
+  if (const auto lock = FolderLock::try_take(wish.data_dir)) {
+    Database database{wish.data_dir / "station.sqlite"};
+    value_of(remove_reference(database.handle(), wish.run, wish.reason, command_line_author()));
+    while (delete_some_positions(database.handle())) continue;
+  } else {
+    ask_station(wish, "/remove", {{"reason", wish.reason}});
+  }
+  fmt::print(out, "run {} has no reference any more\n", wish.run);
+}
+
+void export_csv(const ReferenceCommand& wish, std::ostream& out) {
+  const StoredReference stored = read_stored(wish, true);
+  const OutsidePositions& positions = stored.positions;
+  fmt::print(out, "# {} of run {}, span {}\nrobot_time_us,position_m,position_sd_m\n", stored.reference.source,
+             stored.reference.run, stored.reference.span);
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    fmt::print(out, "{},{},{}\n", positions.robot_time_us[i], positions.position_m[i], positions.position_sd_m[i]);
+  }
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, ReferenceCommand& wish) {
+  command.require_subcommand(1);
+  auto* importing = offer(command, wish, Act::import, "import", "Put a position measured from outside beside a run");
+  importing->add_option("--csv", wish.csv_file, "Its columns: t_s, position_m and, if it has one, position_sd_m")
+      ->required()
+      ->check(named());
+  importing->add_option("--sd-mm", wish.sd_mm, "How exact each position is (one sigma), without a column position_sd_m")
+      ->check(from_to(1e-4, 1000));
+  add_clock_options(*importing, wish);
+  importing->add_option("--span", wish.span, "Which span of the run, if the robot rebooted during it")
+      ->check(whole(0, std::numeric_limits<std::uint32_t>::max()));
+  importing->add_flag("--keep-zero", wish.keeps_zero, "Its zero is the robot's (default: estimated from the run)");
+  importing->add_flag("--metres", wish.is_in_metres, "Its positions are in metres, also where they do not look so");
+  importing->add_option("--reason", wish.reason, "Why another reference of the run is replaced")->check(named());
+  importing->footer(
+      "Without --offset-s, --utc-s or --marker the clock is found by correlation with the robot's own motion.\n"
+      "Example: rheonaut reference import --run 1 --csv camera.csv --sd-mm 0.5 --data lab");
+  offer(command, wish, Act::show, "show", "Say what was imported, and how its clock and zero were found");
+  offer(command, wish, Act::export_positions, "export", "Write its positions as CSV, on the robot's clock");
+  offer(command, wish, Act::remove, "remove", "Remove it")
+      ->add_option("--reason", wish.reason, "Why")
+      ->required()
+      ->check(named());
+  command.footer("Example: rheonaut reference show --run 1 --data lab");
+}
+
+int run(const ReferenceCommand& wish, std::ostream& out) {
+  const fs::path database = wish.data_dir / "station.sqlite";
+  if (!fs::exists(database)) throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
+  switch (wish.act) {
+    case Act::import: import_one(wish, out); break;
+    case Act::show: write(read_stored(wish, false).reference, out); break;
+    case Act::export_positions: export_csv(wish, out); break;
+    case Act::remove: remove_one(wish, out); break;
+  }
+  return 0;
+}
+
+}  // namespace server::cli

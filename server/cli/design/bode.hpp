@@ -1,0 +1,27 @@
+// `rheonaut bode`: crossover, margins and frequency response of the open loop.
+#pragma once
+
+#include <optional>
+
+#include "control/responses/margins.hpp"
+#include "server/cli/design/control_files.hpp"
+#include "server/cli/terminal/output.hpp"
+
+namespace server::cli {
+
+struct Bode {
+  PlantChoice plant;
+  ControllerChoice controller;
+  bool is_velocity_loop = false;
+  std::optional<double> from_rad_s, to_rad_s;  // of the response; none: 0.1 to 1000
+  std::optional<int> points;
+  OutputForm form;
+};
+
+void add_options(CLI::App& command, Bode& wish);
+int run(const Bode& wish, std::ostream& out);
+
+// Lines of name, value and unit; also for what a tuning achieved.
+void write_margins(std::ostream& out, const control::Margins& margins);
+
+}  // namespace server::cli

@@ -1,0 +1,190 @@
+// Reads whole files, of bounded size.
+#include "server/cli/design/control_files.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <utility>
+
+#include "server/analysis/control_json.hpp"
+#include "server/analysis/motion_at_start.hpp"
+#include "server/cli/terminal/options.hpp"
+
+namespace server::cli {
+namespace {
+
+constexpr std::size_t kMaxJsonBytes = 1 << 20;
+constexpr std::size_t kMaxCsvBytes = 512 << 20;
+
+[[noreturn]] void refuse(const std::string& file, const std::string& why) {
+  throw std::runtime_error{fmt::format("{}: {}", file, why)};
+}
+
+std::string read_text(const std::string& file, std::size_t max_bytes) {
+  if (std::filesystem::is_directory(file)) refuse(file, "is a folder; give a file");
+  std::ifstream stream{file, std::ios::binary};
+  if (!stream) refuse(file, fmt::format("cannot be read: {}", std::strerror(errno)));
+  std::string text;
+  for (std::array<char, 65536> block{}; stream.read(block.data(), block.size()) || stream.gcount() > 0;) {
+    text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
+    if (text.size() > max_bytes) refuse(file, fmt::format("has more than {} bytes", max_bytes));
+  }
+  if (stream.bad()) refuse(file, fmt::format("cannot be read: {}", std::strerror(errno)));
+  return text;
+}
+
+// nlohmann's messages begin with its own name in brackets and say line and column.
+nlohmann::json read_json(const std::string& file) {
+  try {
+    return nlohmann::json::parse(read_text(file, kMaxJsonBytes));
+  } catch (const nlohmann::json::exception& error) {
+    const std::string what = error.what();
+    const std::size_t bracket = what.find("] ");
+    refuse(file, fmt::format("is not JSON: {}", bracket == std::string::npos ? what : what.substr(bracket + 2)));
+  }
+}
+
+template <class T>
+T value_of(const std::string& file, const Result<T>& result) {
+  if (!result) refuse(file, result.error().detail);
+  return *result;
+}
+
+}  // namespace
+
+void add_option(CLI::App& command, PlantChoice& choice) {
+  command
+      .add_option("--plant", choice.file,
+                  "Model file {\"kp\":...,\"b1\":...,\"b2\":...,\"b3\":...,\"alpha\":...,\"beta\":...} with perhaps a "
+                  "\"dead_time_s\", what identify --json printed, or newtonian or non_newtonian (default: "
+                  "non_newtonian, the paper's (29))")
+      ->check(named());
+}
+
+void add_option(CLI::App& command, ControllerChoice& choice) {
+  command
+      .add_option("--controller", choice.file,
+                  "Controller file {\"kp\":...,\"kd\":...,\"mu\":...} (default: the paper's (30))")
+      ->check(named());
+}
+
+control::FractionalModel read(const PlantChoice& choice) {
+  if (!choice.file || *choice.file == "non_newtonian") return control::kNonNewtonianModel;
+  if (*choice.file == "newtonian") return control::kNewtonianModel;
+  return value_of(*choice.file, model_from(read_json(*choice.file)));
+}
+
+control::FopdController read(const ControllerChoice& choice) {
+  if (!choice.file) return control::kPaperController;
+  return value_of(*choice.file, controller_from(read_json(*choice.file)));
+}
+
+CsvColumns read_csv(const std::string& file, std::initializer_list<const char*> required,
+                    std::initializer_list<const char*> optional, std::initializer_list<const char*> with_gaps) {
+  return parse_csv(read_text(file, kMaxCsvBytes), file, required, optional, with_gaps);
+}
+
+namespace {
+
+constexpr const char* kPositionSd = "position_sd_m";
+
+std::vector<double> times_of(const std::string& file, CsvColumns& columns) {
+  if (columns.contains("t_s")) return columns["t_s"];
+  if (!columns.contains("robot_time_us")) refuse(file, "has no column t_s (seconds)");
+  std::vector<double> time_s = columns["robot_time_us"];
+  const double began_us = time_s.empty() ? 0 : time_s.front();
+  for (double& time : time_s) time = (time - began_us) / 1e6;
+  return time_s;
+}
+
+// The decimals of an export stand for binary32.
+void round_to_binary32(CsvColumns& columns) {
+  for (auto& [name, values] : columns) {
+    if (name == "t_s" || name == "robot_time_us") continue;
+    for (double& value : values) value = static_cast<double>(static_cast<float>(value));
+  }
+}
+
+void take_off_disturbance(CsvColumns& columns) {
+  const std::vector<double>& disturbance_m = columns["disturbance_m"];
+  std::vector<double>& position_m = columns["position_m"];
+  for (std::size_t k = 0; k < std::min(disturbance_m.size(), position_m.size()); ++k) {
+    if (std::isfinite(disturbance_m[k])) position_m[k] -= disturbance_m[k];
+  }
+}
+
+double largest_of(const std::vector<double>& values) {
+  double largest = 0;
+  for (const double value : values) {
+    if (value > largest) largest = value;
+  }
+  return largest;
+}
+
+// Leaves the columns that are fitted.
+std::string choose_channels(const std::string& file, CsvColumns& columns, bool with_velocity) {
+  if (!columns.contains(kPositionSd)) {
+    columns.erase("acceleration_m_s2");
+    return "the file has no column position_sd_m: what it holds is taken as measured";
+  }
+  const double position_sd_m = largest_of(columns[kPositionSd]);
+  if (position_sd_m > 0) {
+    if (!columns.contains("acceleration_m_s2")) {
+      refuse(file, fmt::format("{}; but there is no column acceleration_m_s2", channels_reason(position_sd_m)));
+    }
+    columns.erase("position_m");
+    columns.erase("velocity_m_s");
+  } else {
+    columns.erase("acceleration_m_s2");
+    if (!with_velocity && columns.contains("position_m")) columns.erase("velocity_m_s");
+    take_off_disturbance(columns);
+  }
+  return channels_reason(position_sd_m);
+}
+
+void refuse_gaps(const std::string& file, const CsvColumns& columns) {
+  for (const char* name : {"position_m", "velocity_m_s", "acceleration_m_s2"}) {
+    const auto column = columns.find(name);
+    if (column == columns.end()) continue;
+    const std::vector<double>& values = column->second;
+    const auto gap = std::ranges::find_if(values, [](double value) { return std::isnan(value); });
+    if (gap == values.end()) continue;
+    refuse(file, fmt::format("value {} of column {} is empty; a column that is fitted needs every value",
+                             gap - values.begin() + 1, name));
+  }
+}
+
+}  // namespace
+
+RunRecording read_recording(const std::string& file, bool with_velocity) {
+  CsvColumns columns = read_csv(file, {"duty"}, {"t_s", "robot_time_us"},
+                                {"position_m", "velocity_m_s", kPositionSd, "acceleration_m_s2", "disturbance_m"});
+  const std::vector<double> time_s = times_of(file, columns);
+  if (columns.contains(kPositionSd)) round_to_binary32(columns);
+  const auto velocity = columns.find("velocity_m_s");
+  const auto recorded_m_s = velocity == columns.end() ? std::vector<double>{} : velocity->second;
+  RunRecording made{{}, choose_channels(file, columns, with_velocity), {}};
+  const bool has_any = columns.contains("position_m") || columns.contains("velocity_m_s");
+  if (!has_any && !columns.contains("acceleration_m_s2")) {
+    refuse(file, "has neither position_m nor velocity_m_s; one of them is needed");
+  }
+  refuse_gaps(file, columns);
+  try {
+    made.recording = control::make_recording(time_s, columns["duty"], columns["position_m"], columns["velocity_m_s"],
+                                             columns["acceleration_m_s2"]);
+  } catch (const std::invalid_argument& error) {
+    refuse(file, error.what());
+  }
+  if (auto moves = motion_at_start(made.recording, recorded_m_s)) made.warnings.push_back(std::move(*moves));
+  return made;
+}
+
+}  // namespace server::cli

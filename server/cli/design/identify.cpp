@@ -1,0 +1,300 @@
+// `rheonaut identify`.
+#include "server/cli/design/identify.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "control/discretisation/estimator_model.hpp"
+#include "server/analysis/control_json.hpp"
+#include "server/cli/terminal/options.hpp"
+
+namespace server::cli {
+namespace {
+
+using control::Fit;
+using control::kParameterNames;
+using control::kParameters;
+
+std::array<double, kParameters> values_of(const control::FractionalModel& model) {
+  return {model.kp, model.b1, model.b2, model.alpha, model.beta};
+}
+
+void add_source(CLI::App& command, Identify& wish) {
+  auto* csv = command.add_option("--csv", wish.csv,
+                                 "Recording with columns t_s (equally spaced), duty, and position_m or velocity_m_s");
+  csv->check(named());
+  add_options(command, wish.run);
+  auto* run = command.get_option("--run");
+  run->excludes(csv);
+  command.add_option("--span", wish.window.span, "Which span of the run, if the robot rebooted during it")
+      ->check(whole(0, std::numeric_limits<std::uint32_t>::max()))
+      ->needs(run);
+  command.add_option("--from-s", wish.window.from_s, "First second of the span to use")->check(finite())->needs(run);
+  command.add_option("--to-s", wish.window.to_s, "Last second of the span to use")->check(finite())->needs(run);
+  add_word(command, "--channels", wish.channels,
+           std::array{ChannelChoice::best, ChannelChoice::outside, ChannelChoice::robot},
+           "best, outside or robot: whether a position from outside is fitted (default: best, where the run has one)")
+      ->needs(run);
+  command.add_flag("--with-velocity", wish.window.with_velocity,
+                   "Also fit the velocity that the robot recorded, where its position is known");
+}
+
+void add_search(CLI::App& command, control::IdentificationOptions& options) {
+  using control::Cost;
+  using control::Structure;
+  add_word(command, "--structure", options.structure,
+           std::array{Structure::first_order, Structure::second_order, Structure::fractional},
+           "first_order, second_order or fractional (default: all three, the best by AIC)");
+  add_word(command, "--cost", options.cost, std::array{Cost::least_squares, Cost::absolute_error},
+           "least_squares or absolute_error (default: least_squares)");
+  command.add_flag("--offset,!--no-offset", options.fits_offset,
+                   "Whether the initial position is fitted too (default: it is, where position is recorded)");
+  command.add_option("--dead-time-s", options.longest_dead_time_s, "Find a dead time up to this (default: 0, none)")
+      ->check(non_negative());
+  command
+      .add_option("--sensor-lag-s", options.sensor_lag_s,
+                  "Of a fitted acceleration: the sensor's own lag, beyond sampling and low pass; what comes later is "
+                  "a dead time (default: not known)")
+      ->check(non_negative());
+  command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 60)")->check(positive());
+}
+
+void add_plan(CLI::App& command, Identify& wish) {
+  Plan& plan = wish.plan;
+  auto* flag = command.add_flag("--plan", plan.is_wanted, "No recording: what an experiment would tell about --plant");
+  flag->excludes(command.get_option("--csv"))->excludes(command.get_option("--run"))->group("Planning");
+  const auto add = [&command, flag](const char* name, auto& value, const char* meaning) {
+    return command.add_option(name, value, fmt::format("{} (default: {})", meaning, value))
+        ->needs(flag)
+        ->group("Planning");
+  };
+  add_word(command, "--plan-duty", plan.duty, std::array{PlannedDuty::prbs, PlannedDuty::step},
+           "prbs or step (default: prbs)")
+      ->needs(flag)
+      ->group("Planning");
+  add("--plan-amplitude", plan.amplitude, "Of the duty")->check(from_to(-1, 1));
+  add("--plan-duration-s", plan.duration_s, "Length")->check(positive());
+  add("--plan-bit-s", plan.bit_s, "Length of a bit of the prbs")->check(positive());
+  add("--plan-dt-s", plan.dt_s, "Sampling period")->check(positive());
+  add("--plan-position-sd-m", plan.position_sd_m, "Noise of the position; 0: not recorded")->check(non_negative());
+  add("--plan-velocity-sd-m-s", plan.velocity_sd_m_s, "Noise of the velocity; 0: not recorded")->check(non_negative());
+  add("--plan-acceleration-sd-m-s2", plan.acceleration_sd_m_s2, "Noise of the acceleration; 0: not recorded")
+      ->check(non_negative());
+}
+
+std::vector<std::string> channels_of(const control::Recording& recording) {
+  std::vector<std::string> names;
+  if (!recording.position_m.empty()) names.emplace_back("position_m");
+  if (!recording.velocity_m_s.empty()) names.emplace_back("velocity_m_s");
+  if (!recording.acceleration_m_s2.empty()) names.emplace_back("acceleration_m_s2");
+  return names;
+}
+
+RunRecording recording_for(const Identify& wish) {
+  if (wish.csv) return read_recording(*wish.csv, wish.window.with_velocity);
+  if (!wish.run.run) {
+    throw std::runtime_error{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
+  }
+  const std::vector<StoredSample> samples = read_samples(wish.run);
+  const std::optional<StoredReference> reference = read_reference(wish.run);
+  auto recording = recording_of(samples, wish.window, reference ? &*reference : nullptr, wish.channels);
+  if (!recording) throw std::runtime_error{fmt::format("run {}: {}", *wish.run.run, recording.error().detail)};
+  return std::move(*recording);
+}
+
+bool show_progress(const control::Progress& progress) {
+  fmt::print(stderr, "\r{}: start {} of {}, iteration {}, sse {:.6g}   ", text(progress.structure), progress.start + 1,
+             progress.starts, progress.iteration, progress.sse);
+  std::fflush(stderr);
+  return true;
+}
+
+control::Identification search(const Identify& wish, const control::Recording& recording) {
+  control::IdentificationOptions options = wish.options;
+  const bool is_watched = ::isatty(STDERR_FILENO) != 0;
+  if (is_watched) options.on_progress = show_progress;
+  control::Identification found = control::identify(recording, options);
+  if (is_watched) fmt::print(stderr, "\r\x1b[K");
+  return found;
+}
+
+void write_sensor(std::ostream& out, const control::SensorFit& sensor) {
+  const std::string clock =
+      sensor.has_own_clock ? fmt::format("a clock of its own, a sample each {} ms", fixed(1e3 * sensor.period_s, 4))
+                           : std::string{"in step with the ticks"};
+  fmt::print(out, "sensor: {}; readings {} ms late in the mean and by a low pass of {} ms; {} left out\n", clock,
+             fixed(1e3 * sensor.delay_s, 2), fixed(1e3 * sensor.time_constant_s, 2), sensor.readings_left_out);
+  fmt::print(out, "its bias wandered by {} m/s²; {}\n", cell(sensor.bias_range_m_s2, 2),
+             sensor.readings_are_recovered ? "its readings are recovered from the record, without the robot's own bias"
+                                           : "the robot's own bias is still in the record, and fitted as a bias");
+}
+
+constexpr double kLargerThanSaid = 1.5;  // residuals, in sd of the reference
+
+// What a position from outside adds to the doubts.
+constexpr double kSuspiciousClockS = 0.005;
+
+void add_outside_doubts(const RunRecording& given, const Identify& wish, control::Identification& found) {
+  if (!(given.position_sd_m > 0)) return;
+  const double residual_sd_m = found.best.residual_sd;
+  if (residual_sd_m > kLargerThanSaid * given.position_sd_m) {
+    found.warnings.push_back(fmt::format(
+        "the residuals, {:.2g} mm, are larger than the position from outside is said to be exact, {:.2g} mm: "
+        "its clock, its scale or the model is not right",
+        1e3 * residual_sd_m, 1e3 * given.position_sd_m));
+  }
+  // A dead time of the plant and a camera's clock that is ahead look the same: positions come late after the duty.
+  const control::Fit& best = found.best;
+  const double clock_sigma_s = best.position_clock_sigma_s.value_or(0);
+  if (std::abs(best.position_clock_s) > std::max(kSuspiciousClockS, 3 * clock_sigma_s)) {
+    found.warnings.push_back(fmt::format(
+        "the outside position's clock came out {:.0f} ms off: {}", 1e3 * best.position_clock_s,
+        best.position_clock_s < 0
+            ? "if it is not, that is a dead time of the plant; search with --dead-time-s"
+            : "the positions come before the duty that moves the robot, as no plant does; correct the clock's offset"));
+  }
+  if (wish.options.longest_dead_time_s > 0) {
+    found.warnings.emplace_back("the dead time contains what is left of the error of the outside position's clock");
+  }
+}
+
+// Of positions from outside, by the sds that their importer gave them.
+struct ChiSquare {
+  double value = 0, degrees_of_freedom = 0;
+};
+
+std::optional<ChiSquare> chi_square_of(const RunRecording& given, const Fit& fit) {
+  const auto positions = static_cast<double>(fit.position_residual_m.size());
+  if (!(given.position_sd_m > 0) || !std::isfinite(fit.residual_sd)) return std::nullopt;
+  const double relative_sd = fit.residual_sd / given.position_sd_m;
+  return ChiSquare{positions * relative_sd * relative_sd, positions - fit.free_parameters};
+}
+
+void write_parameters(std::ostream& out, const Fit& fit) {
+  Table table{{text(fit.structure), "value", "one sigma"}};
+  const auto values = values_of(fit.model);
+  for (std::size_t i = 0; i < kParameters; ++i) {
+    if (i == 1 && fit.model.b1 == 0) continue;
+    table.row({kParameterNames[i], cell(values[i], 8), cell(fit.one_sigma[i], 3)});
+  }
+  table.write(out);
+  fmt::print(out, "fit {} %, residual sd {}, sse {}; offset {} m, dead time {} s\n", fixed(fit.fit_percent, 3),
+             cell(fit.residual_sd, 4), cell(fit.sse), cell(fit.offset_m, 4), cell(fit.model.dead_time_s, 4));
+  fmt::print(out, "residuals {} white (p = {}); {} after {} iterations; {} of {} starts agree\n",
+             fit.residuals_are_white ? "look" : "are not", cell(fit.whiteness_p_value, 3), text(fit.end),
+             fit.iterations, fit.starts_that_agree, fit.starts);
+  if (fit.sensor) write_sensor(out, *fit.sensor);
+  if (fit.position_clock_sigma_s) {
+    fmt::print(out, "clock of the position from outside: {} ms late, one sigma {} ms\n",
+               fixed(1e3 * fit.position_clock_s, 2), cell(1e3 * *fit.position_clock_sigma_s, 2));
+  }
+}
+
+void write_compared(std::ostream& out, std::span<const Fit> compared) {
+  if (compared.size() < 2) return;
+  Table table{{"structure", "AIC", "fit (%)", "sse", "free", "kp", "b1", "b2", "alpha", "beta"}};
+  for (const Fit& fit : compared) {
+    std::vector<std::string> row{text(fit.structure), fixed(fit.aic, 1), fixed(fit.fit_percent, 3), cell(fit.sse),
+                                 fmt::format("{}", fit.free_parameters)};
+    for (const double value : values_of(fit.model)) row.push_back(cell(value, 5));
+    table.row(std::move(row));
+  }
+  out << '\n';
+  table.write(out);
+}
+
+// None of a search that found no finite model.
+std::optional<control::EstimatorModel> estimator_of(const Fit& fit) {
+  if (!std::isfinite(fit.sse)) return std::nullopt;
+  return control::estimator_model(fit.model);
+}
+
+void write_estimator(std::ostream& out, const control::EstimatorModel& model) {
+  if (model.is_met) {
+    fmt::print(out,
+               "the robot's estimator can use it, with a fit error of {} % (rheonaut estimator says with which "
+               "parameters)\n",
+               fixed(100 * model.fit_error, 3));
+  } else {
+    fmt::print(out, "the robot's estimator cannot use it: {}\n", model.reason);
+  }
+}
+
+// In metres, also of positions that are weighed in the fit.
+OrderedJson residuals_json(const Fit& fit, const RunRecording& given) {
+  std::vector<double> position_m = fit.position_residual_m;
+  const std::vector<double>& sd_m = given.recording.position_sd_m;
+  for (std::size_t i = 0; i < sd_m.size(); ++i) position_m[i] *= sd_m[i] / given.position_sd_m;
+  return {{"position_m", position_m},
+          {"velocity_m_s", fit.velocity_residual_m_s},
+          {"acceleration_m_s2", fit.acceleration_residual_m_s2}};
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, Identify& wish) {
+  add_source(command, wish);
+  add_search(command, wish.options);
+  command.add_flag("--residuals", wish.with_residuals, "With --json: also the residuals, measured less model");
+  add_json_flag(command, wish.form);
+  command.get_option("--residuals")->needs("--json");
+  add_plan(command, wish);
+  add_option(command, wish.plant);
+  command.get_option("--plant")->needs("--plan")->group("Planning");
+  for (const char* searching :
+       {"--structure", "--cost", "--dead-time-s", "--sensor-lag-s", "--time-limit-s", "--residuals"}) {
+    command.get_option("--plan")->excludes(searching);
+  }
+  command.footer(
+      "Exit status 4: the search did not converge; the best that was found is printed.\n"
+      "Example: rheonaut identify --csv run.csv --structure fractional");
+}
+
+int run(const Identify& wish, std::ostream& out) {
+  if (wish.plan.is_wanted) return run_plan(wish, out);
+  const RunRecording given = recording_for(wish);
+  for (const std::string& warning : given.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
+  control::Identification found = search(wish, given.recording);
+  found.warnings.insert(found.warnings.end(), given.warnings.begin(), given.warnings.end());
+  add_outside_doubts(given, wish, found);
+  const std::optional<control::EstimatorModel> estimator = estimator_of(found.best);
+  if (wish.form.is_json) {
+    OrderedJson answer = json_of(found);
+    answer["estimator"] = estimator ? json_of(*estimator) : OrderedJson{};
+    answer["channels"] = channels_of(given.recording);
+    answer["channels_reason"] = given.channels_reason;
+    if (const auto chi_square = chi_square_of(given, found.best)) {
+      answer["position_chi_square"] = chi_square->value;
+      answer["position_degrees_of_freedom"] = chi_square->degrees_of_freedom;
+    }
+    if (wish.with_residuals) answer["residuals"] = residuals_json(found.best, given);
+    write_json(out, answer);
+  } else {
+    fmt::print(out, "fitted: {}; {}\n\n", fmt::join(channels_of(given.recording), ", "), given.channels_reason);
+    write_parameters(out, found.best);
+    if (const auto chi_square = chi_square_of(given, found.best)) {
+      fmt::print(out, "chi-square of the position from outside: {} with {} degrees of freedom\n",
+                 fixed(chi_square->value, 1), chi_square->degrees_of_freedom);
+    }
+    if (estimator) write_estimator(out, *estimator);
+    write_compared(out, found.compared);
+    for (const std::string& warning : found.warnings) fmt::print(out, "\nwarning: {}\n", warning);
+  }
+  if (!std::isfinite(found.best.sse)) {
+    fmt::print(stderr,
+               "rheonaut: no model fits this recording with finite numbers; are its units and columns right?\n");
+    return kNotConverged;
+  }
+  return found.best.end == control::SearchEnd::converged ? 0 : kNotConverged;
+}
+
+}  // namespace server::cli

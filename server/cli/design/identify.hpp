@@ -1,0 +1,53 @@
+// `rheonaut identify`: a model from a recording, and what a planned experiment would tell.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "control/identification/identify.hpp"
+#include "server/cli/design/control_files.hpp"
+#include "server/cli/design/run_choice.hpp"
+#include "server/cli/terminal/output.hpp"
+
+namespace server::cli {
+
+inline constexpr int kNotConverged = 4;  // exit status
+
+enum class PlannedDuty : std::uint8_t { prbs, step };
+const char* text(PlannedDuty value);
+
+// The duty of an experiment that has not been made.
+struct Plan {
+  bool is_wanted = false;
+  PlannedDuty duty = PlannedDuty::prbs;
+  double amplitude = 1;
+  double duration_s = 60;
+  double bit_s = 0.2;
+  double dt_s = 0.01;
+  double position_sd_m = 1.16e-3;
+  double velocity_sd_m_s = 0;
+  double acceleration_sd_m_s2 = 0;
+};
+
+struct Identify {
+  std::optional<std::string> csv;
+  RunChoice run;
+  RunWindow window;
+  ChannelChoice channels = ChannelChoice::best;
+  control::IdentificationOptions options;
+  bool with_residuals = false;
+  Plan plan;
+  PlantChoice plant;  // of the plan
+  OutputForm form;
+};
+
+void add_options(CLI::App& command, Identify& wish);
+
+// 0, or kNotConverged: then the best that was found stands in the answer.
+int run(const Identify& wish, std::ostream& out);
+
+// Of the plan alone.
+int run_plan(const Identify& wish, std::ostream& out);
+
+}  // namespace server::cli

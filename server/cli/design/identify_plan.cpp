@@ -1,0 +1,61 @@
+// `rheonaut identify --plan`: how well an experiment would tell the parameters.
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+
+#include <CLI/CLI.hpp>
+#include <stdexcept>
+
+#include "server/analysis/control_json.hpp"
+#include "server/cli/design/identify.hpp"
+
+namespace server::cli {
+namespace {
+
+constexpr double kMaxSamples = 200'000;
+
+control::PlannedExperiment experiment_of(const Plan& plan, bool fits_offset) {
+  if (!(plan.duration_s / plan.dt_s <= kMaxSamples)) {
+    throw std::invalid_argument{fmt::format("--plan-duration-s {} at --plan-dt-s {} has more than {} samples",
+                                            plan.duration_s, plan.dt_s, kMaxSamples)};
+  }
+  control::PlannedExperiment experiment;
+  experiment.dt_s = plan.dt_s;
+  experiment.duty = plan.duty == PlannedDuty::step
+                        ? control::step_duty(plan.amplitude, plan.duration_s, plan.dt_s)
+                        : control::prbs_duty(plan.amplitude, plan.bit_s, plan.duration_s, plan.dt_s);
+  experiment.position_sd_m = plan.position_sd_m;
+  experiment.velocity_sd_m_s = plan.velocity_sd_m_s;
+  experiment.acceleration_sd_m_s2 = plan.acceleration_sd_m_s2;
+  experiment.fits_offset = fits_offset;
+  return experiment;
+}
+
+}  // namespace
+
+const char* text(PlannedDuty value) { return value == PlannedDuty::step ? "step" : "prbs"; }
+
+int run_plan(const Identify& wish, std::ostream& out) {
+  const control::FractionalModel plant = read(wish.plant);
+  const auto expected = control::expected_uncertainty(plant, experiment_of(wish.plan, wish.options.fits_offset));
+  if (wish.form.is_json) {
+    OrderedJson answer = json_of(expected);
+    answer["plant"] = json_of(plant);
+    write_json(out, answer);
+    return 0;
+  }
+  const control::FractionalModel model = control::normalised(plant);
+  const std::array<double, control::kParameters> values{model.kp, model.b1, model.b2, model.alpha, model.beta};
+  Table table{{"parameter", "value", "one sigma", "relative (%)"}};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto& sigma = expected.one_sigma[i];
+    table.row({control::kParameterNames[i], cell(values[i]), sigma ? cell(*sigma, 3) : "cannot tell",
+               sigma ? cell(100 * *sigma / std::abs(values[i]), 3) : "-"});
+  }
+  fmt::print(out, "{} of {} s, amplitude {}, every {} s; noise sd {} m, {} m/s, {} m/s² (0: not recorded)\n\n",
+             text(wish.plan.duty), wish.plan.duration_s, wish.plan.amplitude, wish.plan.dt_s, wish.plan.position_sd_m,
+             wish.plan.velocity_sd_m_s, wish.plan.acceleration_sd_m_s2);
+  table.write(out);
+  return 0;
+}
+
+}  // namespace server::cli

@@ -1,0 +1,229 @@
+// `rheonaut predict`.
+#include "server/cli/design/predict.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+
+#include "server/analysis/control_json.hpp"
+#include "server/analysis/run_steps.hpp"
+#include "server/cli/design/robustness_table.hpp"
+#include "server/cli/terminal/options.hpp"
+
+namespace server::cli {
+namespace {
+
+constexpr long long kLargestSeed = (1LL << 53) - 1;  // what JSON holds exactly
+
+// What a run did, and when the experiment that is predicted began in it.
+struct Measured {
+  std::vector<MeasuredStep> steps;
+  double began_at_s = 0;
+  std::string position_source;  // in words
+};
+
+double largest_sd_m(std::span<const MeasuredStep> steps, bool is_from_outside) {
+  double largest_m = 0;
+  for (const MeasuredStep& step : steps) {
+    if (step.is_from_outside == is_from_outside) largest_m = std::max(largest_m, step.position_sd_m);
+  }
+  return largest_m;
+}
+
+// From where the positions of the steps are had.
+std::string source_in_words(std::span<const MeasuredStep> steps, const std::optional<StoredReference>& reference) {
+  const double own_sd_m = largest_sd_m(steps, false);
+  const std::string own = own_sd_m > 0
+                              ? fmt::format("the robot's own estimate (position_sd_m is up to {:.2g} m)", own_sd_m)
+                              : std::string{"the position is known: position_sd_m is 0 throughout"};
+  if (!reference) return own;
+  const auto outside = std::ranges::count(steps, true, &MeasuredStep::is_from_outside);
+  if (outside == 0) {
+    return own + "; the position from outside has no step with 10 positions and no pause over 0.25 s";
+  }
+  const std::string measured = fmt::format("position measured from outside ({}), ± {:.2g} mm",
+                                           reference->reference.source, 2e3 * largest_sd_m(steps, true));
+  if (outside == std::ssize(steps)) return measured;
+  return fmt::format("{}, in {} of {} steps; in the others {}", measured, outside, steps.size(), own);
+}
+
+double time_of(std::span<const StepPoint> points, std::uint32_t span, std::uint64_t seq) {
+  const auto is_of_span = [span](const StepPoint& point) { return point.span == span; };
+  const auto first = std::ranges::find_if(points, is_of_span);
+  const auto at = std::ranges::find_if(first, points.end(), [seq](const StepPoint& point) { return point.seq == seq; });
+  return static_cast<double>(at->robot_time_us - first->robot_time_us) * 1e-6;
+}
+
+// Makes the experiment the run's first step of setpoint, with the disturbance that follows it.
+Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experiment) {
+  std::vector<StepPoint> points;
+  for (const StoredSample& stored : read_samples(choice)) points.push_back(step_point(stored));
+  const std::optional<StoredReference> reference = read_reference(choice);
+  Measured measured;
+  measured.steps = measure_steps(points, reference ? &*reference : nullptr);
+  const auto& steps = measured.steps;
+  const auto first = std::ranges::find(steps, StepCause::setpoint, &MeasuredStep::cause);
+  if (first == steps.end()) {
+    throw std::runtime_error{fmt::format("run {} has no step of setpoint in auto mode to compare with", *choice.run)};
+  }
+  measured.began_at_s = first->at_s;
+  measured.position_source = source_in_words(steps, reference);
+  experiment.setpoint_m = first->target_m - first->start_m;
+  experiment.settling_band_m = first->band_m;  // of the robot's own step, also where the start is the true one
+  experiment.duration_s = time_of(points, first->span, first->last_seq) - first->at_s;
+  experiment.disturbance_at_s = 2 * experiment.duration_s;
+  const auto next = first + 1;
+  if (next != steps.end() && next->cause == StepCause::disturbance && next->span == first->span) {
+    const auto at = std::ranges::find_if(
+        points, [&](const StepPoint& point) { return point.span == next->span && point.seq == next->first_seq; });
+    experiment.disturbance_m = static_cast<double>(at->disturbance_m) - static_cast<double>((at - 1)->disturbance_m);
+    experiment.disturbance_at_s = next->at_s - first->at_s;
+    experiment.duration_s = time_of(points, next->span, next->last_seq) - first->at_s;
+  }
+  return measured;
+}
+
+OrderedJson json_of(const std::optional<EstimateError>& error) {
+  if (!error) return nullptr;
+  return {{"rms_m", error->rms_m},
+          {"worst_m", error->worst_m},
+          {"within_2_sd", error->within_2_sd},
+          {"samples", error->samples}};
+}
+
+OrderedJson json_of(const MeasuredStep& step) {
+  OrderedJson out = {{"cause", text(step.cause)},
+                     {"span", step.span},
+                     {"at_s", step.at_s},
+                     {"start_m", step.start_m},
+                     {"target_m", step.target_m},
+                     {"band_m", step.band_m},
+                     {"position_source", position_source(step)},
+                     {"position_sd_m", step.position_sd_m},
+                     {"estimate_error", json_of(step.estimate_error)}};
+  out.update(server::json_of(step.metrics));
+  return out;
+}
+
+// Of an estimated position with its ± 2 sd.
+void add_row(Table& table, const std::string& name, double at_s, const control::StepMetrics& m,
+             double position_sd_m = 0) {
+  const std::string within = position_sd_m > 0 ? " ± " + fixed(2e3 * position_sd_m, 1) : "";
+  table.row({name, cell(at_s, 5), m.settling_s ? cell(*m.settling_s, 4) : "never", fixed(m.overshoot_percent, 2),
+             cell(m.rise_10_90_s, 4), fixed(1e3 * m.steady_state_error_m, 3) + within});
+}
+
+void write_table(std::ostream& out, const control::ClosedLoopExperiment& experiment,
+                 const control::ClosedLoopPrediction& prediction, const Measured& measured) {
+  if (!measured.steps.empty()) fmt::print(out, "compared with: {}\n\n", measured.position_source);
+  Table table{{"step", "at (s)", "settling (s)", "overshoot (%)", "rise 10-90 % (s)", "error at the end (mm)"}};
+  add_row(table, fmt::format("to {:g} m, predicted", experiment.setpoint_m), measured.began_at_s, prediction.step);
+  if (experiment.disturbance_at_s < experiment.duration_s) {
+    add_row(table, fmt::format("disturbance {:g} m, predicted", experiment.disturbance_m),
+            measured.began_at_s + experiment.disturbance_at_s, prediction.disturbance);
+  }
+  for (const MeasuredStep& step : measured.steps) {
+    add_row(table,
+            fmt::format("{} {:.4g} to {:.4g} m, measured{}", text(step.cause), step.start_m, step.target_m,
+                        step.is_from_outside ? " from outside" : ""),
+            step.at_s, step.metrics, step.position_sd_m);
+  }
+  table.write(out);
+  if (prediction.is_diverging) {
+    fmt::print(out, "the predicted loop diverges: it is {:.3g} m off after {:.4g} s, where the prediction ends\n",
+               prediction.measured_m.back(), prediction.time_s.back());
+  }
+  fmt::print(out, "predicted duty: clipped in {} % of the samples, sd at rest {}\n",
+             fixed(100 * prediction.clipped_fraction, 2), cell(prediction.duty_sd_at_rest, 4));
+}
+
+void write_samples(std::ostream& out, const control::ClosedLoopPrediction& p) {
+  write_csv(out, {{"t_s", p.time_s},
+                  {"position_m", p.position_m},
+                  {"velocity_m_s", p.velocity_m_s},
+                  {"measured_m", p.measured_m},
+                  {"duty", p.duty},
+                  {"reference_m", p.reference_m}});
+}
+
+void add_world(CLI::App& command, control::ClosedLoopExperiment& e) {
+  const auto add = [&command](const char* flag, auto& value, const char* meaning) {
+    return command.add_option(flag, value, fmt::format("{} (default: {})", meaning, value));
+  };
+  add("--setpoint-m", e.setpoint_m, "The step")->check(finite());
+  add("--duration-s", e.duration_s, "Length of the experiment")->check(positive());
+  add("--disturbance-m", e.disturbance_m, "Offset of the measured position")->check(finite());
+  add("--disturbance-at-s", e.disturbance_at_s, "When it begins; beyond the duration for none")->check(non_negative());
+  add("--duty-min", e.duty_min, "Lowest duty; 0 for a motor without reverse")->check(from_to(-1, 1));
+  add("--duty-max", e.duty_max, "Highest duty")->check(from_to(-1, 1));
+  add("--profile-velocity-m-s", e.profile_velocity_m_s, "Limit of the reference's velocity; 0 for a plain step")
+      ->check(non_negative());
+  add("--profile-acceleration-m-s2", e.profile_acceleration_m_s2, "Limit of the reference's acceleration")
+      ->check(non_negative());
+  add("--noise-sd-m", e.noise_sd_m, "White noise on the measured position")->check(non_negative());
+  add("--seed", e.noise_seed, "Of the noise")->check(whole(0, kLargestSeed));
+}
+
+OrderedJson answer_of(const control::ClosedLoopExperiment& experiment, const control::DiscretisationChoice& controller,
+                      const control::ClosedLoopPrediction& prediction, const Measured& measured) {
+  OrderedJson answer = server::json_of(prediction);
+  answer["experiment"] = {
+      {"setpoint_m", experiment.setpoint_m},       {"duration_s", experiment.duration_s},
+      {"disturbance_m", experiment.disturbance_m}, {"disturbance_at_s", experiment.disturbance_at_s},
+      {"duty_min", experiment.duty_min},           {"duty_max", experiment.duty_max}};
+  if (experiment.settling_band_m > 0) answer["experiment"]["settling_band_m"] = experiment.settling_band_m;
+  answer["compared_with"] = measured.steps.empty() ? OrderedJson{} : OrderedJson(measured.position_source);
+  answer["measured_steps"] = OrderedJson::array();
+  for (const MeasuredStep& step : measured.steps) answer["measured_steps"].push_back(json_of(step));
+  answer["plant"] = server::json_of(experiment.plant);
+  answer["sections"] = server::json_of(experiment.controller);
+  answer["period_s"] = experiment.period_s;
+  answer["method"] = text(controller.chosen.options.method);
+  return answer;
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, Predict& wish) {
+  add_option(command, wish.plant);
+  add_option(command, wish.controller);
+  add_options(command, wish.sampling);
+  add_world(command, wish.experiment);
+  add_options(command, wish.run);
+  for (const char* flag : {"--setpoint-m", "--duration-s", "--disturbance-m", "--disturbance-at-s"}) {
+    command.get_option("--run")->excludes(flag);
+  }
+  command.add_flag("--robustness", wish.with_robustness, "Also for other gains, the other fluid, a one-way motor");
+  add_json_and_csv_flags(command, wish.form);
+  command.footer(
+      "With --run, the experiment is the run's first step of setpoint and the disturbance after it, and what the run\n"
+      "did stands beside the prediction.\n"
+      "Example: rheonaut predict --setpoint-m 0.1 --duration-s 40 --disturbance-m -0.05 --disturbance-at-s 20");
+}
+
+int run(const Predict& wish, std::ostream& out) {
+  const control::DiscretisationChoice controller = discretised(read(wish.controller), wish.sampling);
+  control::ClosedLoopExperiment experiment = wish.experiment;
+  const Measured measured = wish.run.run ? follow(wish.run, experiment) : Measured{};
+  experiment.plant = read(wish.plant);
+  experiment.controller = controller.chosen.sections;
+  experiment.period_s = wish.sampling.period_s;
+  const control::ClosedLoopPrediction prediction = control::predict_closed_loop(experiment);
+  if (wish.form.is_csv) {
+    write_samples(out, prediction);
+  } else if (wish.form.is_json) {
+    OrderedJson answer = answer_of(experiment, controller, prediction, measured);
+    if (wish.with_robustness) {
+      answer["robustness"] = server::json_of(control::robustness(experiment.plant, controller.chosen));
+    }
+    write_json(out, answer);
+  } else {
+    write_table(out, experiment, prediction, measured);
+    if (wish.with_robustness) write_robustness(out, control::robustness(experiment.plant, controller.chosen));
+  }
+  return 0;
+}
+
+}  // namespace server::cli

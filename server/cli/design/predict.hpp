@@ -1,0 +1,27 @@
+// `rheonaut predict`: what a closed-loop experiment will do, beside what a recorded one did.
+#pragma once
+
+#include <optional>
+
+#include "control/responses/closed_loop.hpp"
+#include "server/cli/design/control_files.hpp"
+#include "server/cli/design/discretise.hpp"
+#include "server/cli/design/run_choice.hpp"
+#include "server/cli/terminal/output.hpp"
+
+namespace server::cli {
+
+struct Predict {
+  PlantChoice plant;
+  ControllerChoice controller;
+  Sampling sampling;
+  control::ClosedLoopExperiment experiment;  // plant and controller are filled in by run
+  RunChoice run;                             // whose first step, and disturbance, are then the experiment
+  bool with_robustness = false;
+  OutputForm form;
+};
+
+void add_options(CLI::App& command, Predict& wish);
+int run(const Predict& wish, std::ostream& out);
+
+}  // namespace server::cli

@@ -1,0 +1,40 @@
+// Flags, and the reading itself.
+#include "server/cli/design/run_choice.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <limits>
+#include <stdexcept>
+
+#include "server/cli/terminal/options.hpp"
+#include "server/storage/query/run_reader.hpp"
+
+namespace server::cli {
+
+void add_options(CLI::App& command, RunChoice& choice) {
+  auto* run = command.add_option("--run", choice.run, "A recorded run by its number");
+  run->check(whole(1, std::numeric_limits<RunId>::max()));
+  command.add_option("--data", choice.data_dir, "Folder of the station that recorded it (default: rheonaut-data)")
+      ->check(named())
+      ->needs(run);
+}
+
+std::vector<StoredSample> read_samples(const RunChoice& choice) {
+  auto samples = read_run(choice.data_dir / "station.sqlite", choice.run.value(), kMaxAnalysedSamples);
+  if (!samples) throw std::runtime_error{samples.error().detail};
+  return std::move(*samples);
+}
+
+std::optional<StoredReference> read_reference(const RunChoice& choice) {
+  std::optional<StoredReference> stored;
+  auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
+    stored = server::read_reference(database, choice.run.value());
+    return {};
+  };
+  const auto done = read_store(choice.data_dir / "station.sqlite", read);
+  if (!done) throw std::runtime_error{done.error().detail};
+  return stored;
+}
+
+}  // namespace server::cli

@@ -1,0 +1,26 @@
+// `rheonaut tune`: a fractional PD controller for a crossover and a phase margin.
+#pragma once
+
+#include <optional>
+
+#include "control/tuning/tune.hpp"
+#include "server/cli/design/control_files.hpp"
+#include "server/cli/terminal/output.hpp"
+
+namespace server::cli {
+
+inline constexpr int kInfeasible = 3;  // exit status
+
+struct Tune {
+  PlantChoice plant;
+  control::TuningSpec spec;
+  bool with_robustness = false;
+  OutputForm form;
+};
+
+void add_options(CLI::App& command, Tune& wish);
+
+// 0, or kInfeasible when nothing meets the specification.
+int run(const Tune& wish, std::ostream& out);
+
+}  // namespace server::cli

@@ -1,0 +1,68 @@
+// The folder of everything one station keeps: made when missing, locked against a second station, announced when ready.
+//
+//   station.sqlite                   written by the recorder
+//   station.head.json                what the database held some seconds ago (recording/store_head)
+//   rheonaut.token, .sessions        written by the API
+//   endpoints.json                   {"http":"127.0.0.1:8080","robots":"127.0.0.1:7070","pid":123}, while it runs; and
+//                                    "tls_certificate", the file to trust, when http is https
+//   tls/                             made by `rheonaut certificate`
+//   rheonaut.lock                    locked while it runs
+//   rheonaut.reserve                 1 MB of room for a start on a full disk
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "server/runtime/clock.hpp"
+
+namespace server {
+
+// Whoever holds it is the only program that writes into a data folder.
+class FolderLock {
+ public:
+  // None when another program holds it. The folder is there. Throws std::runtime_error when it cannot be asked.
+  static std::optional<FolderLock> try_take(const std::filesystem::path& folder);
+  FolderLock(FolderLock&& other) noexcept : file_{std::exchange(other.file_, -1)} {}
+  FolderLock& operator=(FolderLock&&) = delete;
+  ~FolderLock();
+
+ private:
+  explicit FolderLock(int file) : file_{file} {}
+  int file_ = -1;
+};
+
+// Where the running station is, for other programs of its user.
+struct Announcement {
+  std::string http;             // "127.0.0.1:8080"
+  std::string robots;           // "127.0.0.1:7070"
+  std::string tls_certificate;  // of http; empty: it is plain
+};
+
+class DataFolder {
+ public:
+  // Makes it (make_data_folder), and throws std::runtime_error that names it also when another station runs in it.
+  explicit DataFolder(std::filesystem::path path);
+  ~DataFolder();  // removes endpoints.json
+  DataFolder(const DataFolder&) = delete;
+  DataFolder& operator=(const DataFolder&) = delete;
+
+  // Writes endpoints.json, whole or not at all. SAFETY: a full disk keeps no robot from being stopped: it is tried
+  // again until it is there.
+  boost::asio::awaitable<void> announce(Clock& clock, Announcement announcement);
+
+ private:
+  bool write_endpoints(const std::string& content) const;
+  std::filesystem::path endpoints() const { return path_ / "endpoints.json"; }
+
+  std::filesystem::path path_;
+  FolderLock lock_;
+};
+
+// Takes from everyone else the rights on whatever the program makes from now on, and makes the folder when it is
+// missing. Throws std::runtime_error that names it.
+void make_data_folder(const std::filesystem::path& path);
+
+}  // namespace server

@@ -1,0 +1,17 @@
+// The configuration that bears on what a robot does, as JSON: what a run keeps of its station.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "server/config/config.hpp"
+
+namespace server {
+
+// Equal for equal configurations; its version is the program's.
+std::string station_document(const Config& config);
+
+// By their names in the configuration.
+nlohmann::json limits_json(const CommandLimits& limits);
+
+}  // namespace server

@@ -1,0 +1,62 @@
+// Accepts connections and turns them into tasks.
+#include "server/http/http_server.hpp"
+
+#include <boost/asio/experimental/awaitable_operators.hpp>
+
+#include "server/http/answer_head.hpp"
+#include "server/http/http_connection.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
+
+namespace {
+
+// In the middle of a handshake nobody would understand it.
+void say_why(StreamSocket& stream, Door::Refusal refusal) {
+  Response response = problem(503, "all connections of the station are taken; try again", "busy");
+  if (refusal == Door::Refusal::address_has_its_share) {
+    response = problem(429, "your address has as many connections as the station allows; close some", "busy");
+  }
+  response.headers.emplace_back("Retry-After", "5");
+  stream.wire().write(asio::buffer(last_answer(response, false)));
+}
+
+}  // namespace
+
+HttpServer::HttpServer(TaskGroup& tasks, Clock& clock, Listener& listener, Entrance& entrance,
+                       const RequestGuard& guard, const Router& router, Upgrades& upgrades)
+    : tasks_{tasks},
+      clock_{clock},
+      listener_{listener},
+      entrance_{entrance},
+      guard_{guard},
+      router_{router},
+      upgrades_{upgrades} {}
+
+asio::awaitable<void> HttpServer::run() {
+  return listener_.run([this](tcp::socket socket) { on_connection(HttpStream{std::move(socket)}); });
+}
+
+void HttpServer::on_connection(HttpStream stream) {
+  auto guest = entrance_.door.admit(address_of(stream), stream.from_loopback());
+  if (guest) {
+    const std::string which = "http connection of " + stream.peer();
+    tasks_.spawn("http connection", contained(tasks_.exceptions(), clock_, Ended::http_connection, which,
+                                              serve(std::move(stream), std::move(*guest))));
+  } else if (entrance_.tls == nullptr) {
+    say_why(stream, guest.error());
+  }
+}
+
+asio::awaitable<void> HttpServer::serve(HttpStream stream, std::unique_ptr<Guest> guest) {
+  HttpConnection connection{std::move(stream), *guest,    entrance_.tls,      clock_, guard_,
+                            router_,           upgrades_, tasks_.exceptions()};
+  co_await (connection.talk() || connection.watch());
+  if (!connection.wants_upgrade()) co_return;
+  co_await contained(tasks_.exceptions(), clock_, Ended::live_page, "page of " + connection.caller().actor,
+                     upgrades_.serve(connection.take_stream(), connection.take_upgrade(), connection.caller()));
+}
+
+}  // namespace server

@@ -1,0 +1,16 @@
+// The one type of connection that HTTP and WebSocket are compiled for: plain or TLS.
+#pragma once
+
+#include <string>
+
+#include "server/config/endpoint.hpp"
+#include "server/tls/stream_socket.hpp"
+
+namespace server {
+
+using HttpStream = StreamSocket;
+
+// Of the client, without its port.
+inline std::string address_of(const HttpStream& stream) { return host_of(stream.peer()); }
+
+}  // namespace server

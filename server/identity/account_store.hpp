@@ -1,0 +1,76 @@
+// SQL of accounts: users, API tokens, sessions of pages, and the enrolment of robots.
+//
+// On the thread that owns the handle: a running station's disk thread, or a tool that holds the data folder's lock.
+// Each change is one transaction, with its entry in the audit. A Result's error is for whoever asked; SQLite's own
+// failures are exceptions.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/identity/account.hpp"
+#include "server/station/state/audit_note.hpp"
+
+namespace server {
+
+inline constexpr std::size_t kMaxUsers = 100;
+inline constexpr std::size_t kMaxTokens = 200;
+
+// What a station keeps in memory.
+struct StoredAccounts {
+  std::vector<User> users;            // by name
+  std::vector<ApiToken> tokens;       // by name
+  std::vector<PageSession> sessions;  // by number
+  std::uint64_t next_session = 1;
+  std::vector<std::string> revoked_robots;
+};
+
+// What of a user changes; empty: it stays.
+struct UserChange {
+  std::optional<Role> role;
+  std::optional<std::string> password_hash;
+  std::optional<bool> disabled;
+};
+
+class AccountStore {
+ public:
+  explicit AccountStore(SQLite::Database& database) : database_{database} {}
+
+  StoredAccounts load();
+
+  // conflict: there is one of that name, or there are kMaxUsers.
+  Result<void> add_user(const User& user, const Author& by);
+  // not_found. A new password, or a user who is disabled, ends the user's sessions.
+  Result<User> change_user(const std::string& name, const UserChange& change, const Author& by);
+  Result<void> remove_user(const std::string& name, const Author& by);  // with sessions; tokens are revoked
+
+  // conflict: there was one of that name, or kMaxTokens are in use. The oldest of more than kMaxTokens that were
+  // revoked is forgotten.
+  Result<void> add_token(const ApiToken& token, const Author& by);
+  Result<ApiToken> revoke_token(const std::string& name, const Author& by);
+
+  // Everything that is in `sessions` is stored then, and nothing else; the tokens were last used then.
+  void replace_sessions(const std::vector<PageSession>& sessions, std::uint64_t next_session,
+                        const std::vector<ApiToken>& used_tokens);
+
+  std::vector<Enrolment> enrolments();  // by robot
+  // A robot that is new, was revoked, or has no token: it needs this one from now on. conflict: it has another.
+  Result<Enrolment> enrol(const std::string& robot_id, const SecretHash& token, const Author& by);
+  Result<Enrolment> revoke_robot(const std::string& robot_id, const Author& by);
+  // A robot that is out of use: it may still connect. not_found.
+  Result<Enrolment> set_retired(const std::string& robot_id, bool retired, const Author& by);
+
+ private:
+  std::optional<User> find_user(const std::string& name);
+  std::optional<Enrolment> find_robot(const std::string& robot_id);
+  std::size_t count(const char* sql);
+  void note(const Author& by, const char* action, const std::string& subject, const nlohmann::json& detail);
+
+  SQLite::Database& database_;
+};
+
+}  // namespace server

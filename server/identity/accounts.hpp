@@ -1,0 +1,106 @@
+// Users, API tokens and sessions of pages: in memory for those who ask, in the database for the next start.
+//
+// Looking somebody up is synchronous and touches no disk. What gives rights is stored before it is in force; what takes
+// rights away is in force at once, and then stored. SAFETY: a full or failing disk refuses nobody who is signed in:
+// sessions, and when tokens were last used, are written behind, and again until it works.
+// Loop thread; SQL on the recorder's disk thread. Everything it is given outlives it.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <filesystem>
+#include <list>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/identity/account_store.hpp"
+#include "server/identity/sessions.hpp"
+#include "server/storage/ingest/recorder.hpp"
+
+namespace server {
+
+inline constexpr std::int64_t kMaxTokenDays = 3650;
+
+struct TokenWish {
+  std::string name;
+  Scopes scopes;
+  std::int64_t days = 0;  // 0: it does not run out
+  std::string owner;
+};
+
+struct NewToken {
+  ApiToken token;
+  std::string secret;  // nobody can read it again
+};
+
+struct NewEnrolment {
+  Enrolment enrolment;
+  std::string secret;
+};
+
+class Accounts {
+ public:
+  // Reads the database, which is open, and takes over the sessions of an older station's `rheonaut.sessions`. Throws
+  // when the database cannot be read.
+  Accounts(boost::asio::io_context& loop, Clock& clock, Recorder& recorder, const std::filesystem::path& data_dir);
+
+  // Writes what is to be written and ends what has run out, until cancelled.
+  boost::asio::awaitable<void> run();
+
+  std::optional<Caller> caller_of_token(const std::string& secret);
+  std::optional<Caller> caller_of_session(const std::string& secret);  // which is renewed
+
+  // The secret of a new session, for its cookie.
+  std::string open_session(const std::string& user, const std::string& peer, const std::string& agent);
+  bool end_session(std::uint64_t number, const Author& by);
+  // Of a user that there is the audit tells the name; what else was typed may be a password.
+  void on_refused_sign_in(const std::string& user, const std::string& peer, const char* reason);
+  const std::list<Sessions::Open>& sessions() const { return sessions_.all(); }
+
+  const User* find_user(const std::string& name) const;  // null: there is none
+  const std::map<std::string, User>& users() const { return users_; }
+  // unavailable: the disk cannot be written now. Else what AccountStore says. `by.at_us` is when it is done.
+  boost::asio::awaitable<Result<User>> add_user(User user, Author by);
+  boost::asio::awaitable<Result<User>> change_user(std::string name, UserChange change, Author by);
+  boost::asio::awaitable<Result<void>> remove_user(std::string name, Author by);
+
+  std::vector<ApiToken> tokens() const;
+  boost::asio::awaitable<Result<NewToken>> add_token(TokenWish wish, Author by);
+  boost::asio::awaitable<Result<ApiToken>> revoke_token(std::string name, Author by);
+
+  boost::asio::awaitable<Result<std::vector<Enrolment>>> enrolments();
+  boost::asio::awaitable<Result<NewEnrolment>> enrol(std::string robot_id, Author by);
+  // It is refused from now on; whoever calls ends its connection.
+  boost::asio::awaitable<Result<Enrolment>> revoke_robot(std::string robot_id, Author by);
+  // Only stored: whoever calls notifies the station, of a robot that is put into use before, of a retired one after.
+  boost::asio::awaitable<Result<Enrolment>> set_retired(std::string robot_id, bool retired, Author by);
+
+ private:
+  struct Token : ApiToken {
+    std::shared_ptr<Standing> standing;
+  };
+
+  Caller caller(std::string actor, const std::string& user, Scopes scopes, std::shared_ptr<Standing> standing) const;
+  template <class Job>
+  boost::asio::awaitable<std::invoke_result_t<Job, AccountStore&>> on_store(Job job);
+  boost::asio::awaitable<bool> save();
+  void sweep();
+  void end_token(Token& token, std::int64_t utc_us);
+  void renew_standing(const std::string& user);
+  void note(Author by, const char* action, std::string subject, std::string detail, bool can_flood);
+
+  boost::asio::io_context& loop_;
+  Clock& clock_;
+  Recorder& recorder_;
+  std::filesystem::path old_sessions_file_;
+  std::map<std::string, User> users_;
+  std::list<Token> tokens_;
+  Sessions sessions_;
+  std::uint64_t token_uses_ = 0;  // grows with what is worth to be stored of tokens
+  std::uint64_t saved_revision_ = 0;
+  bool save_failed_ = false;
+  Signal changed_;
+};
+
+}  // namespace server

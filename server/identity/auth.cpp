@@ -1,0 +1,97 @@
+// Makes, keeps and compares the station's own secrets.
+#include "server/identity/auth.hpp"
+
+#include <fmt/format.h>
+#include <sodium.h>
+#include <spdlog/spdlog.h>
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+
+#include "server/runtime/private_file.hpp"
+
+namespace server {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void cannot(const char* what, const fs::path& file) {
+  throw std::runtime_error{std::string{"cannot "} + what + " " + file.string() + ": " + std::strerror(errno)};
+}
+
+std::string load_or_make_token(const fs::path& file) {
+  std::string token;
+  std::ifstream in{file};
+  std::getline(in, token);
+  if (is_secret(token)) {
+    struct stat status{};
+    if (::stat(file.c_str(), &status) != 0) cannot("look at", file);
+    if ((status.st_mode & 077U) != 0) {
+      spdlog::warn("{} was readable by others (mode {:o}); now it is not", file.string(), status.st_mode & 0777U);
+      if (::chmod(file.c_str(), 0600) != 0) cannot("protect", file);
+    }
+    return token;
+  }
+  if (fs::exists(file)) spdlog::warn("{} held no valid token; a new one was made", file.string());
+  token = random_secret();
+  write_private(file, token + "\n");
+  return token;
+}
+
+}  // namespace
+
+Auth::Auth(boost::asio::io_context& loop, Clock& clock, Accounts& accounts, const fs::path& data_dir,
+           std::uint64_t store_id)
+    : clock_{clock},
+      accounts_{accounts},
+      cookie_name_{fmt::format("{}_{:016x}", kOldSessionCookie, store_id)},
+      token_{hash_of(load_or_make_token(data_dir / "rheonaut.token"))},
+      token_standing_{std::make_shared<Standing>(loop)} {}
+
+std::string Auth::new_login_code() {
+  std::erase_if(codes_, [now_us = clock_.steady_us()](const Code& code) { return code.ends_at_us <= now_us; });
+  if (codes_.size() >= kMaxLoginCodes) codes_.pop_front();
+  std::string code = random_secret();
+  codes_.push_back({hash_of(code), clock_.steady_us() + kLoginCodeLife.count()});
+  return code;
+}
+
+std::optional<std::string> Auth::log_in(const std::string& code, const std::string& peer, const std::string& agent) {
+  const Code* found = find_secret(codes_, hash_of(code));
+  const bool in_time = found != nullptr && found->ends_at_us > clock_.steady_us();
+  codes_.remove_if([found](const Code& each) { return &each == found; });
+  if (!in_time) {
+    accounts_.on_refused_sign_in("", peer, "bad_link");
+    return std::nullopt;
+  }
+  return accounts_.open_session("", peer, agent);
+}
+
+std::optional<Caller> Auth::caller_of_token(const std::string& token) const {
+  if (same(hash_of(token), token_)) return Caller{"token:local", "", Scopes::of(Role::admin), 0, token_standing_, {}};
+  return accounts_.caller_of_token(token);
+}
+
+std::optional<Caller> Auth::caller_of_session(const std::string& secret) const {
+  return accounts_.caller_of_session(secret);
+}
+
+std::string Auth::cookie(const std::string& secret, bool is_secure) const {
+  const auto life_s = secret.empty() ? 0 : kCookieLife.count() / 1'000'000;
+  return fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age={}{}", cookie_name_, secret, life_s,
+                     is_secure ? "; Secure" : "");
+}
+
+Result<void> still_stands(const Caller& caller) {
+  if (caller.standing == nullptr || !caller.standing->ended()) return {};
+  return fail(
+      ErrorCode::forbidden,
+      fmt::format("the credential of {} was revoked, has expired or has other rights now; sign in, or send it again",
+                  caller.actor),
+      "not_permitted");
+}
+
+}  // namespace server

@@ -1,0 +1,44 @@
+// Who asks: what a request or an open page may do, and whether that still holds.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "server/identity/account.hpp"
+#include "server/runtime/clock.hpp"
+
+namespace server {
+
+// Of a credential, shared by whoever rests on it: ended when it is revoked, has run out, or its role has changed.
+// Loop thread.
+class Standing {
+ public:
+  explicit Standing(boost::asio::io_context& loop) : changed_{loop} {}
+
+  void end() {
+    ended_ = true;
+    changed_.notify();
+  }
+  bool ended() const { return ended_; }
+  boost::asio::awaitable<void> wait_for_end() {
+    while (!ended_) co_await changed_.wait();
+  }
+
+ private:
+  bool ended_ = false;
+  Signal changed_;
+};
+
+struct Caller {
+  std::string actor;          // "token:local", "token:ci", "session:3", "user:anna/session:4"; empty: nobody said
+  std::string user;           // empty: by the station's own token, or a one-time link
+  Scopes scopes;              // what it may do
+  std::uint64_t session = 0;  // of a page; 0: a token
+  std::shared_ptr<Standing> standing;  // null: nobody
+  std::string peer;                    // the address that the connection comes from
+
+  Role role() const { return scopes.role(); }
+};
+
+}  // namespace server

@@ -1,0 +1,58 @@
+// Exceptions that end something smaller than the station: logged with their text and what they ended, and counted.
+//
+// A robot's session, a connection, a request, a page and the sending of a model end alone by what they throw. A cause
+// may lie outside and come again as often as somebody likes, so the log has one line a second of each name and text,
+// and at most kMostNames of them in a second; then one a second of all others of the kind. The counts are in /metrics.
+// Loop thread.
+#pragma once
+
+#include <array>
+#include <boost/asio/awaitable.hpp>
+#include <cstdint>
+#include <exception>
+#include <map>
+#include <string>
+
+#include "server/runtime/clock.hpp"
+#include "server/runtime/log.hpp"
+
+namespace server {
+
+// What was ended. `request` is one of HTTP, or a message of a page on /live; `model` the sending of a fluid's model to
+// one robot.
+enum class Ended : std::uint8_t { robot_session, http_connection, request, live_page, model };
+inline constexpr std::array kAllEnded{Ended::robot_session, Ended::http_connection, Ended::request, Ended::live_page,
+                                      Ended::model};
+const char* text(Ended value);
+
+class ExceptionLog {
+ public:
+  // `which` names the robot, the route or the page. `now_us` is steady.
+  void note(Ended ended, const std::string& which, const std::exception_ptr& failure, std::int64_t now_us);
+
+  std::uint64_t count(Ended ended) const { return kinds_[static_cast<std::size_t>(ended)].count; }
+
+ private:
+  static constexpr std::size_t kMostNames = 32;
+  struct Kind {
+    std::uint64_t count = 0;
+    std::map<std::string, SparseLines> lines;  // by what the line says
+    SparseLines others;
+  };
+  SparseLines& lines_of(Kind& kind, const std::string& line, std::int64_t now_us);
+  std::array<Kind, kAllEnded.size()> kinds_;
+};
+
+// A task whose failure is its own: what it throws is noted and ends it alone, never the station. Throws
+// operation_aborted when cancelled, and nothing else.
+boost::asio::awaitable<void> contained(ExceptionLog& log, const Clock& clock, Ended ended, std::string which,
+                                       boost::asio::awaitable<void> task);
+
+// `co_await (a || b)` throws both failures in one when it is cancelled; the first of them tells what happened. Each may
+// be such a pair itself.
+std::exception_ptr first_of(std::exception_ptr failure);
+
+bool is_cancellation(const std::exception_ptr& failure);
+std::string text_of(const std::exception_ptr& failure);
+
+}  // namespace server

@@ -1,0 +1,73 @@
+// Starts, names and stops the station's coroutines.
+#include "server/runtime/tasks.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <chrono>
+#include <csignal>
+
+#include "server/runtime/real_time.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr std::chrono::milliseconds kPulse{50};  // a loop that has nothing to do shows so often that it runs
+
+}  // namespace
+
+void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
+  if (stopping_) return;
+  const auto signal = signals_.emplace(signals_.end());
+  auto on_end = [this, signal, name = std::move(name)](std::exception_ptr failure) {
+    signals_.erase(signal);
+    ended(name, failure);
+  };
+  asio::co_spawn(loop_, std::move(task), asio::bind_cancellation_slot(signal->slot(), std::move(on_end)));
+}
+
+void TaskGroup::run(Clock& clock, bool in_real_time) {
+  if (in_real_time) {
+    const bool is_granted = ask_for_real_time(Priority::loop);
+    spdlog::info("the loop runs {}",
+                 is_granted ? "with real-time priority" : "without real-time priority: the system does not permit it");
+  }
+  while (!loop_.stopped()) {
+    if (loop_.poll_one() == 0) {
+      clock.watch().rest();
+      loop_.run_one_for(kPulse);
+    }
+    clock.watch().turn(clock.steady_us());
+  }
+}
+
+void TaskGroup::ended(const std::string& name, std::exception_ptr failure) {
+  if (!failure) return;
+  failure = first_of(failure);
+  if (is_cancellation(failure)) return;
+  spdlog::critical("{} failed: {}; stopping", name, text_of(failure));
+  exit_code_ = 1;
+  stop();
+}
+
+void TaskGroup::stop() {
+  stopping_ = true;
+  for (auto signal = signals_.begin(); signal != signals_.end();) {
+    const auto current = signal++;  // emitting may end the task, which erases its signal
+    current->emit(asio::cancellation_type::terminal);
+  }
+}
+
+asio::awaitable<void> TaskGroup::stop_on_signal() {
+  asio::signal_set signals{loop_, SIGINT, SIGTERM};
+  const int number = co_await signals.async_wait(asio::use_awaitable);
+  spdlog::info("stopping on {}", number == SIGINT ? "SIGINT" : "SIGTERM");
+  stop();
+}
+
+}  // namespace server

@@ -1,0 +1,57 @@
+// A thread for blocking work: a job goes in as a value and its result comes back to the loop as a value.
+//
+//   auto job = [path] { return count_rows(path); };   // named, owns copies of all it uses
+//   const int rows = co_await disk.run(std::move(job));
+//
+// An exception of the job is rethrown in the waiting coroutine. Cancelling the coroutine does not cancel the job: the
+// wait ends when the job ends, so a job must be short or watch a stop token of its own. The worker outlives the loop's
+// run(); its destructor joins the thread. Declare it after the loop:
+// its thread may touch the loop for a moment after a result has arrived.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "server/runtime/counted.hpp"
+
+namespace server {
+
+class WorkerThread {
+ public:
+  // `niceness` is added to the thread's nice value (0 to 19).
+  explicit WorkerThread(std::string name, int niceness = 0);
+  ~WorkerThread();
+  WorkerThread(const WorkerThread&) = delete;
+  WorkerThread& operator=(const WorkerThread&) = delete;
+
+  // Call from the loop's thread.
+  template <class Job>
+  boost::asio::awaitable<std::invoke_result_t<Job>> run(Job job) {
+    const Counted pending{jobs_};
+    using Value = std::invoke_result_t<Job>;
+    const boost::asio::cancellation_slot not_cancellable;
+    co_return co_await boost::asio::co_spawn(
+        pool_, invoke<Value, Job>(std::move(job)),
+        boost::asio::bind_cancellation_slot(not_cancellable, boost::asio::use_awaitable));
+  }
+
+  // Jobs that were started and whose result has not reached its coroutine. Loop thread only.
+  int jobs() const { return jobs_; }
+
+ private:
+  template <class Value, class Job>
+  static boost::asio::awaitable<Value> invoke(Job job) {
+    co_return job();
+  }
+
+  int jobs_ = 0;
+  boost::asio::thread_pool pool_{1};
+};
+
+}  // namespace server

@@ -1,0 +1,120 @@
+// Pages put together, messages written out.
+#include "server/station/state/in_force.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "base/json_text.hpp"
+
+namespace server {
+namespace {
+
+using nlohmann::json;
+
+template <std::size_t size>
+json numbers(const float (&values)[size], std::size_t count) {
+  json list = json::array();
+  for (std::size_t i = 0; i < std::min(count, size); ++i) list.push_back(decimal(values[i]));
+  return list;
+}
+
+template <std::size_t size>
+bool same_list(const float (&a)[size], std::size_t a_count, const float (&b)[size], std::size_t b_count) {
+  const auto same = [](float one, float other) { return is_same(one, other); };
+  return a_count == b_count && std::equal(a, a + std::min(a_count, size), b, same);
+}
+
+}  // namespace
+
+std::optional<std::string> ParameterTable::add(const protocol::ParameterPage& page) {
+  if (page.total > kMost) return std::nullopt;
+  for (std::size_t i = 0; i < page.parameters_count; ++i) {
+    const rheonaut_Parameter& parameter = page.parameters[i];
+    if (parameters_.size() < kMost || parameters_.contains(parameter.name)) parameters_[parameter.name] = parameter;
+  }
+  if (parameters_.empty() || parameters_.size() != page.total) return std::nullopt;
+  json table = json::object();
+  for (const auto& [name, parameter] : parameters_) {
+    table[name] = {{"value", decimal(parameter.value)},
+                   {"unit", parameter.unit},
+                   {"minimum", decimal(parameter.minimum)},
+                   {"maximum", decimal(parameter.maximum)},
+                   {"default", decimal(parameter.default_value)}};
+  }
+  std::string text = table.dump(-1, ' ', false, json::error_handler_t::replace);
+  if (text == told_) return std::nullopt;
+  told_ = std::move(text);
+  last_known_ = parameters_;
+  return told_;
+}
+
+void ParameterTable::begin_again() {
+  parameters_.clear();
+  told_.clear();
+}
+
+std::vector<ChangedLimit> ParameterTable::changed_limits() const {
+  std::vector<ChangedLimit> changed;
+  for (const auto& [name, parameter] : last_known_) {
+    if (!bounds_motion(name) || is_same(parameter.value, parameter.default_value)) continue;
+    changed.push_back({name, parameter.unit, parameter.value, parameter.default_value});
+  }
+  return changed;
+}
+
+bool bounds_motion(const std::string& parameter) {
+  constexpr const char* kBounds[] = {"auto_limit_s",         "setpoint_limit_m",     "link_timeout_ms",
+                                     "position_limit_min_m", "position_limit_max_m", "power_limit_duty",
+                                     "power_limit_s",        "link_loss_action",     "link_loss_limit_s"};
+  return std::ranges::find(kBounds, parameter) != std::end(kBounds);
+}
+
+bool is_same(float a, float b) { return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b); }
+
+bool is_same(const protocol::Controller& a, const protocol::Controller& b) {
+  const bool alike = a.controller_id == b.controller_id && a.checksum == b.checksum && a.period_us == b.period_us &&
+                     a.derivative_on == b.derivative_on && is_same(a.kp, b.kp) && is_same(a.direct, b.direct) &&
+                     is_same(a.duty_min, b.duty_min) && is_same(a.duty_max, b.duty_max);
+  return alike && same_list(a.pole, a.pole_count, b.pole, b.pole_count) &&
+         same_list(a.residue, a.residue_count, b.residue, b.residue_count) &&
+         same_list(a.biquad_b0, a.biquad_b0_count, b.biquad_b0, b.biquad_b0_count) &&
+         same_list(a.biquad_b1, a.biquad_b1_count, b.biquad_b1, b.biquad_b1_count) &&
+         same_list(a.biquad_a1, a.biquad_a1_count, b.biquad_a1, b.biquad_a1_count) &&
+         same_list(a.biquad_a2, a.biquad_a2_count, b.biquad_a2, b.biquad_a2_count);
+}
+
+void RobotSettings::begin_again() {
+  parameters.begin_again();
+  is_controller_current = false;
+  controller_before.reset();
+}
+
+void RobotSettings::add(const protocol::Controller& told, std::optional<protocol::Controller> former,
+                        std::int64_t at_us) {
+  controller_before = std::move(former);
+  controller = told;
+  controller_at_us = at_us;
+  is_controller_current = true;
+}
+
+std::string controller_json(const protocol::Controller& controller) {
+  const json out{
+      {"controller_id", controller.controller_id},
+      {"checksum", controller.checksum},
+      {"period_us", controller.period_us},
+      {"kp", decimal(controller.kp)},
+      {"direct", decimal(controller.direct)},
+      {"pole", numbers(controller.pole, controller.pole_count)},
+      {"residue", numbers(controller.residue, controller.residue_count)},
+      {"biquad_b0", numbers(controller.biquad_b0, controller.biquad_b0_count)},
+      {"biquad_b1", numbers(controller.biquad_b1, controller.biquad_b1_count)},
+      {"biquad_a1", numbers(controller.biquad_a1, controller.biquad_a1_count)},
+      {"biquad_a2", numbers(controller.biquad_a2, controller.biquad_a2_count)},
+      {"duty_min", decimal(controller.duty_min)},
+      {"duty_max", decimal(controller.duty_max)},
+      {"derivative_on", controller.derivative_on == rheonaut_DERIVATIVE_ON_MEASUREMENT ? "measurement" : "error"}};
+  return out.dump();
+}
+
+}  // namespace server

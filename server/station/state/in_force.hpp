@@ -1,0 +1,66 @@
+// What a robot says is in force: its parameters and its controller, as JSON for the record.
+//
+// A robot sends both after each Welcome, and what changed after each change. Loop thread; one for each connection.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/station/state/station_state.hpp"
+
+namespace server {
+
+// Of the robot's parameters, those that bound its motion: only an admin changes them, and says that they mean it.
+bool bounds_motion(const std::string& parameter);
+
+class ParameterTable {
+ public:
+  // Takes a page. The whole table as JSON, {"name": {"value", "unit", "minimum", "maximum", "default"}}, once every
+  // parameter is known and one of them has changed; nothing before. A page that cannot be is passed over.
+  std::optional<std::string> add(const protocol::ParameterPage& page);
+
+  // A new connection: what was known stays known, and is current again when the robot has told the whole table.
+  void begin_again();
+  // The table as it was last whole; empty when it never was.
+  const std::map<std::string, rheonaut_Parameter>& last_known() const { return last_known_; }
+  bool is_current() const { return !told_.empty(); }
+  // Of the parameters that bound motion, those that differ from their default.
+  std::vector<ChangedLimit> changed_limits() const;
+  // The latest that was said of one of them; none yet.
+  std::optional<float> value(const std::string& name) const {
+    const auto found = parameters_.find(name);
+    return found == parameters_.end() ? std::nullopt : std::optional{found->second.value};
+  }
+
+ private:
+  static constexpr std::uint32_t kMost = 256;  // parameters of a robot
+
+  std::map<std::string, rheonaut_Parameter> parameters_, last_known_;
+  std::string told_;  // of this connection
+};
+
+// Whether they are the same bit for bit.
+bool is_same(float a, float b);
+bool is_same(const protocol::Controller& a, const protocol::Controller& b);
+
+// What a robot has said last.
+struct RobotSettings {
+  ParameterTable parameters;
+  std::int64_t parameters_at_us = 0;  // UTC, when the table was last told; 0: never
+  std::optional<protocol::Controller> controller;
+  std::int64_t controller_at_us = 0;
+  bool is_controller_current = false;  // said in this connection
+  // What restore_controller brings back: none when the station has not seen it, as after a new connection.
+  std::optional<protocol::Controller> controller_before;
+
+  void begin_again();
+  // `former`: what restore_controller brings back now; none: not known.
+  void add(const protocol::Controller& told, std::optional<protocol::Controller> former, std::int64_t at_us);
+};
+
+// Coefficients as they were sent, in the order of the message.
+std::string controller_json(const protocol::Controller& controller);
+
+}  // namespace server

@@ -1,0 +1,31 @@
+// What hears the station: the recorder, the live feed, the runs.
+//
+// Called on the loop's thread. A sink returns at once, copies what it keeps, and never calls the station from inside.
+#pragma once
+
+#include "server/station/state/audit_note.hpp"
+#include "server/station/state/station_state.hpp"
+
+namespace server {
+
+class StationSink {
+ public:
+  virtual ~StationSink() = default;
+
+  // The robot's state changed otherwise than by samples: connected, lost, status, durable, clock.
+  virtual void on_robot(const RobotState&) {}
+  virtual void on_fluid(const RobotState&) {}  // robot.fluid was named
+  virtual void on_samples(const RobotState&, const SampleBatch&) {}
+  // Samples, or an event, that came and cannot be recorded: they are lost for good.
+  virtual void on_unusable_samples(const RobotState&, std::uint64_t first_seq, std::uint64_t next_seq) {
+    static_cast<void>(first_seq), static_cast<void>(next_seq);
+  }
+  virtual void on_unusable_event(const RobotState&, std::uint64_t event_seq) { static_cast<void>(event_seq); }
+  virtual void on_event(const RobotState&, const RobotEvent&) {}
+  virtual void on_command(const CommandRecord&) {}
+  virtual void on_audit(const AuditNote&) {}
+  virtual void on_clock(const RobotState&, const ClockRecord&) {}
+  virtual void on_in_force(const RobotState&, const InForceRecord&) {}
+};
+
+}  // namespace server

@@ -1,0 +1,66 @@
+// How many entries of the audit strangers and broken scripts can cause: of each action that anybody can cause any
+// number of, a burst and then one each 10 s. The rest is counted, and the count is an entry, at most one each 10 s.
+//
+// Plain bookkeeping; times are the caller's, steady. The actions are of a fixed set, so it is small.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/runtime/clock.hpp"
+
+namespace server {
+
+class AuditQuota {
+ public:
+  static constexpr std::int64_t kBurst = 100;
+  static constexpr microseconds kOneEach{10'000'000};
+
+  // False: it is not to be written, and was counted.
+  bool take(const std::string& action, std::int64_t now_us) {
+    Allowance& allowance = allowances_.try_emplace(action, Allowance{.left = kBurst, .since_us = now_us}).first->second;
+    const std::int64_t more = (now_us - allowance.since_us) / kOneEach.count();
+    allowance.since_us += more * kOneEach.count();
+    allowance.left = std::min(allowance.left + more, kBurst);
+    const bool is_allowed = allowance.left > 0;
+    is_allowed ? static_cast<void>(--allowance.left) : leave_out(action);
+    return is_allowed;
+  }
+
+  // It was not written for another reason: the queue was full.
+  void leave_out(const std::string& action) { ++left_out_[action].count; }
+
+  bool has_left_out() const {
+    return std::ranges::any_of(left_out_, [](const auto& entry) { return entry.second.count > 0; });
+  }
+
+  // What was left out since it was told last; of each action each 10 s, or now.
+  std::vector<std::pair<std::string, std::uint64_t>> tell(std::int64_t now_us, bool at_once) {
+    std::vector<std::pair<std::string, std::uint64_t>> told;
+    for (auto& [action, left] : left_out_) {
+      const bool is_due = at_once || left.told_us == 0 || now_us - left.told_us >= kOneEach.count();
+      if (left.count == 0 || !is_due) continue;
+      left.told_us = now_us;
+      told.emplace_back(action, std::exchange(left.count, 0));
+    }
+    return told;
+  }
+
+ private:
+  struct Allowance {
+    std::int64_t left = 0;
+    std::int64_t since_us = 0;
+  };
+  struct LeftOut {
+    std::uint64_t count = 0;
+    std::int64_t told_us = 0;  // 0: never
+  };
+  std::map<std::string, Allowance> allowances_;
+  std::map<std::string, LeftOut> left_out_;
+};
+
+}  // namespace server

@@ -1,0 +1,158 @@
+// Lines by std::to_chars; what a segment's samples share is formatted once.
+#include "server/storage/export/csv_writer.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <limits>
+
+#include "base/number_text.hpp"
+#include "server/station/state/unknown_values.hpp"
+
+namespace server {
+namespace {
+
+constexpr std::size_t kPageSamples = 2'000;
+constexpr std::size_t kPieceBytes = 384 * 1024;  // of a grid, whose gaps may be long
+constexpr std::int64_t kSecondUs = 1'000'000;
+
+// Six digits: 000001.
+void append_micros(std::string& out, std::int64_t micros) {
+  char digits[6];
+  for (std::size_t place = 6; place-- > 0; micros /= 10) digits[place] = static_cast<char>('0' + micros % 10);
+  out.append(digits, 6);
+}
+
+// Empty for none.
+std::string quoted(const std::optional<std::string>& text) {
+  if (!text) return {};
+  std::string out = "\"";
+  for (const char c : *text) out += c == '"' ? "\"\"" : std::string{c};
+  return out + '"';
+}
+
+}  // namespace
+
+void UtcText::append(std::string& out, std::int64_t utc_us) {
+  const std::int64_t second = (utc_us >= 0 ? utc_us : utc_us - kSecondUs + 1) / kSecondUs;
+  if (second != second_ || beginning_.empty()) {
+    const std::chrono::sys_seconds time{std::chrono::seconds{second}};
+    const auto day = std::chrono::floor<std::chrono::days>(time);
+    const std::chrono::year_month_day date{day};
+    const std::chrono::hh_mm_ss clock{time - day};
+    beginning_ = fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.", static_cast<int>(date.year()),
+                             static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
+                             clock.hours().count(), clock.minutes().count(), clock.seconds().count());
+    second_ = second;
+  }
+  out += beginning_;
+  append_micros(out, utc_us - second * kSecondUs);
+  out += 'Z';
+}
+
+CsvWriter::CsvWriter(std::vector<RecordedSpan> spans, ExportQuery query) : spans_{std::move(spans)}, query_{query} {
+  if (query.grid_us) grid_.emplace(*query.grid_us);
+}
+
+std::optional<std::string> CsvWriter::next(SQLite::Database& database) {
+  std::string out = begun_ ? "" : header();
+  begun_ = true;
+  out.reserve(kPieceBytes + kPieceBytes / 4);
+  append_rows(out);
+  if (out.size() >= kPieceBytes) return out;
+  if (at_end_) return out.empty() ? std::nullopt : std::optional{std::move(out)};
+  SegmentPage page = read_segments(database, spans_, after_, kPageSamples, query_.channels);
+  after_ = page.next;
+  at_end_ = !after_;
+  grid_ ? grid_->give(std::move(page)) : segments_.give(std::move(page));
+  append_rows(out);
+  return out;  // empty where the steps of the grid are longer than a page
+}
+
+// Of the page at hand.
+void CsvWriter::append_rows(std::string& out) {
+  while (out.size() < kPieceBytes) {
+    if (grid_) {
+      const auto row = grid_->next();
+      if (!row) return;
+      append(out, *row);
+    } else {
+      const auto segment = segments_.next();
+      if (!segment) return;
+      append(out, *segment);
+    }
+  }
+}
+
+std::string CsvWriter::header() const {
+  std::string out = grid_ ? "span,t_s,utc" : "span,boot_id,seq,robot_time_us,utc";
+  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    if (query_.channels[channel]) out += fmt::format(",{}", text(static_cast<Channel>(channel)));
+  }
+  out += grid_ ? ",setpoint_m,gap\n"
+               : ",mode,sub_state,setpoint_m,disturbance_m,clock_uncertainty_us,first_received_at_us,received_at_us,"
+                 "position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,gap_after,unknown_values\n";
+  return out;
+}
+
+// What follows the channels, up to gap_before.
+std::string CsvWriter::shared_text(const Segment& segment) const {
+  const SampleContext& context = segment.context;
+  std::string out = fmt::format(",{},{},", protocol::text(context.mode), protocol::text(context.sub_state));
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  append_float(out, context.setpoint_m.value_or(kNone), "");
+  out += ',';
+  append_float(out, context.disturbance_m.value_or(kNone), "");
+  out += fmt::format(",{},{},{},", segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us);
+  append_float(out, context.position_sd_m.value_or(kNone), "");
+  out += fmt::format(",{},{},{},{},", context.controller_id, context.emergency_id,
+                     protocol::text(context.emergency_cause), context.flags);
+  return out;
+}
+
+void CsvWriter::append(std::string& out, const ExportSegment& exported) {
+  const Segment& segment = exported.part->segment;
+  const std::string beginning = fmt::format("{},{},", exported.part->span, exported.part->boot_id);
+  const std::string end = shared_text(segment);
+  const std::string last = ',' + quoted(unknown_values(segment.context)) + '\n';
+  for (std::size_t index = 0; index < segment.samples.size(); ++index) {
+    const std::uint64_t robot_time_us = segment.robot_time_us(index);
+    out += beginning;
+    append_number(out, segment.first_seq + index);
+    out += ',';
+    append_number(out, robot_time_us);
+    out += ',';
+    utc_.append(out, static_cast<std::int64_t>(robot_time_us) + segment.utc_offset_us);
+    for (std::size_t channel = 0; channel < kChannels; ++channel) {
+      if (!query_.channels[channel]) continue;
+      out += ',';
+      append_float(out, segment.samples[index].*kSampleMembers[channel], "");
+    }
+    out += end;
+    append_number(out, index == 0 ? exported.gap_before : 0);
+    out += ',';
+    append_number(out, index + 1 == segment.samples.size() ? exported.gap_after : 0);
+    out += last;
+  }
+}
+
+void CsvWriter::append(std::string& out, const GridRow& row) {
+  append_number(out, row.span);
+  out += ',';
+  append_number(out, row.since_us / kSecondUs);
+  out += '.';
+  append_micros(out, row.since_us % kSecondUs);
+  out += ',';
+  utc_.append(out, row.utc_us);
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    if (!query_.channels[channel]) continue;
+    out += ',';
+    append_float(out, row.sample != nullptr ? row.sample->*kSampleMembers[channel] : none, "");
+  }
+  out += ',';
+  append_float(out, row.sample != nullptr ? row.setpoint_m.value_or(none) : none, "");
+  out += row.sample != nullptr ? ",0\n" : ",1\n";
+}
+
+}  // namespace server

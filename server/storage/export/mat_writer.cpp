@@ -1,0 +1,231 @@
+// matio writes `info`; the columns are appended to its file.
+#include "server/storage/export/mat_writer.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <matio.h>
+#include <unistd.h>
+
+#include <boost/locale/encoding_utf.hpp>
+#include <cerrno>
+#include <limits>
+#include <memory>
+#include <system_error>
+
+#include "server/storage/database/statement.hpp"
+
+namespace server {
+namespace {
+
+constexpr std::size_t kPageSamples = 10'000;
+constexpr std::size_t kMaxGridRows = 50'000;  // at a time; a gap may be long
+constexpr std::uint64_t kMaxColumnBytes = (std::uint64_t{1} << 31) - 1024;
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+using Facts = std::vector<std::pair<std::string, std::string>>;
+
+// Everything that the table says of the run, whatever columns its version has.
+void add_facts(SQLite::Database& database, const char* table, const char* prefix, RunId run, Facts& facts) {
+  SQLite::Statement query{database, fmt::format("SELECT * FROM {} WHERE run_id = ?", table)};
+  bind_all(query, run);
+  if (!query.executeStep()) return;
+  for (int column = 0; column < query.getColumnCount(); ++column) {
+    facts.emplace_back(fmt::format("{}{}", prefix, query.getColumnName(column)), query.getColumn(column).getString());
+  }
+}
+
+template <class Enumerator>
+std::string names(int last) {
+  std::string out;
+  for (int value = 0; value <= last; ++value) {
+    out += fmt::format("{}{} {}", value == 0 ? "" : ", ", value, protocol::text(static_cast<Enumerator>(value)));
+  }
+  return out;
+}
+
+// A character is two bytes there, whatever its place in the alphabets.
+matvar_t* text_variable(const std::string& text) {
+  std::u16string wide = boost::locale::conv::utf_to_utf<char16_t>(text);
+  std::size_t dimensions[2] = {wide.empty() ? 0U : 1U, wide.size()};
+  return Mat_VarCreate(nullptr, MAT_C_CHAR, MAT_T_UTF16, 2, dimensions, wide.data(), 0);
+}
+
+[[noreturn]] void fail_with(const std::filesystem::path& path) {
+  throw std::system_error{errno == 0 ? EIO : errno, std::generic_category(), "cannot write " + path.string()};
+}
+
+void write_struct(const std::filesystem::path& path, const Facts& facts) {
+  const std::unique_ptr<mat_t, int (*)(mat_t*)> file{Mat_CreateVer(path.c_str(), nullptr, MAT_FT_MAT5), Mat_Close};
+  if (!file) fail_with(path);
+  std::vector<const char*> fields;
+  for (const auto& [name, value] : facts) fields.push_back(name.c_str());
+  std::size_t dimensions[2] = {1, 1};
+  const std::unique_ptr<matvar_t, void (*)(matvar_t*)> info{
+      Mat_VarCreateStruct("info", 2, dimensions, fields.data(), static_cast<unsigned>(fields.size())), Mat_VarFree};
+  if (!info) fail_with(path);
+  for (const auto& [name, value] : facts) {
+    Mat_VarSetStructFieldByName(info.get(), name.c_str(), 0, text_variable(value));
+  }
+  if (Mat_VarWrite(file.get(), info.get(), MAT_COMPRESSION_NONE) != 0) fail_with(path);
+}
+
+}  // namespace
+
+MatWriter::MatWriter(std::filesystem::path path, std::vector<RecordedSpan> spans, ExportQuery query)
+    : path_{std::move(path)}, spans_{std::move(spans)}, query_{query} {
+  if (query.grid_us) grid_.emplace(*query.grid_us);
+}
+
+MatWriter::~MatWriter() {
+  if (file_ >= 0) ::close(file_);
+}
+
+Result<bool> MatWriter::advance(SQLite::Database& database) {
+  if (!begun_) {
+    write_facts(database);
+    add_columns();
+    begun_ = true;
+    return true;
+  }
+  const bool more_of_page = push_rows();
+  for (const MatColumn& column : columns_) {
+    if (column.size_bytes() < kMaxColumnBytes) continue;
+    return fail(
+        ErrorCode::invalid,
+        fmt::format("{} has more than {} bytes, which MAT version 5 does not hold; export a shorter run, or CSV",
+                    column.name(), kMaxColumnBytes),
+        "run_too_long");
+  }
+  if (more_of_page) return true;
+  if (at_end_) return copy_columns();
+  SegmentPage page = read_segments(database, spans_, after_, kPageSamples, query_.channels);
+  after_ = page.next;
+  at_end_ = !after_;
+  grid_ ? grid_->give(std::move(page)) : segments_.give(std::move(page));
+  return true;
+}
+
+void MatWriter::write_facts(SQLite::Database& database) {
+  Facts facts;
+  add_facts(database, "run", "", query_.run, facts);
+  add_facts(database, "run_certificate", "certificate_", query_.run, facts);
+  std::string boot_ids;
+  for (const RecordedSpan& span : spans_) {
+    boot_ids += fmt::format("{}{} {}", boot_ids.empty() ? "" : ", ", span.span, span.boot_id);
+  }
+  facts.emplace_back("boot_ids", boot_ids);
+  facts.emplace_back("modes", names<protocol::Mode>(_rheonaut_Mode_MAX));
+  facts.emplace_back("sub_states", names<protocol::SubState>(_rheonaut_SubState_MAX));
+  facts.emplace_back("emergency_causes", names<protocol::EmergencyCause>(_rheonaut_EmergencyCause_MAX));
+  facts.emplace_back("grid_us", query_.grid_us ? std::to_string(*query_.grid_us) : "");
+  write_struct(path_, facts);
+}
+
+void MatWriter::add_columns() {
+  using Type = MatColumn::Type;
+  const auto add = [this](const char* name, Type type) { columns_.emplace_back(name, type, path_.parent_path()); };
+  add("span", Type::uint32);
+  if (grid_) {
+    add("t_s", Type::float64);
+  } else {
+    add("seq", Type::float64);
+    add("robot_time_us", Type::float64);
+  }
+  add("utc_us", Type::float64);
+  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    if (query_.channels[channel]) add(text(static_cast<Channel>(channel)), Type::float32);
+  }
+  add("setpoint_m", Type::float32);
+  if (grid_) {
+    add("gap", Type::uint32);
+    return;
+  }
+  add("disturbance_m", Type::float32);
+  add("position_sd_m", Type::float32);
+  add("mode", Type::uint32);
+  add("sub_state", Type::uint32);
+  add("controller_id", Type::uint32);
+  add("emergency_id_high", Type::uint32);
+  add("emergency_id_low", Type::uint32);
+  add("emergency_cause", Type::uint32);
+  add("flags", Type::uint32);
+  add("clock_uncertainty_us", Type::float64);
+  add("first_received_at_us", Type::float64);
+  add("received_at_us", Type::float64);
+  add("gap_before", Type::float64);
+  add("gap_after", Type::float64);
+}
+
+// Of the page at hand; true when there are more.
+bool MatWriter::push_rows() {
+  for (std::size_t rows = 0; rows < kMaxGridRows; ++rows) {
+    if (grid_) {
+      const auto row = grid_->next();
+      if (!row) return false;
+      push(*row);
+    } else {
+      const auto segment = segments_.next();
+      if (!segment) return false;
+      push(*segment);
+    }
+  }
+  return true;
+}
+
+// In the order of add_columns(), and in its types.
+void MatWriter::push(const ExportSegment& exported) {
+  const Segment& segment = exported.part->segment;
+  const SampleContext& context = segment.context;
+  for (std::size_t index = 0; index < segment.samples.size(); ++index) {
+    auto column = columns_.begin();
+    const auto put = [&column](auto value) { (column++)->push(value); };
+    const std::uint64_t robot_time_us = segment.robot_time_us(index);
+    put(exported.part->span);
+    put(static_cast<double>(segment.first_seq + index));
+    put(static_cast<double>(robot_time_us));
+    put(static_cast<double>(static_cast<std::int64_t>(robot_time_us) + segment.utc_offset_us));
+    for (std::size_t channel = 0; channel < kChannels; ++channel) {
+      if (query_.channels[channel]) put(segment.samples[index].*kSampleMembers[channel]);
+    }
+    put(context.setpoint_m.value_or(kNaN));
+    put(context.disturbance_m.value_or(kNaN));
+    put(context.position_sd_m.value_or(kNaN));
+    put(static_cast<std::uint32_t>(context.mode));
+    put(static_cast<std::uint32_t>(context.sub_state));
+    put(context.controller_id);
+    put(static_cast<std::uint32_t>(context.emergency_id >> 32));
+    put(static_cast<std::uint32_t>(context.emergency_id & 0xffffffff));
+    put(static_cast<std::uint32_t>(context.emergency_cause));
+    put(context.flags);
+    put(static_cast<double>(segment.clock_uncertainty_us));
+    put(static_cast<double>(segment.first_received_at_us));
+    put(static_cast<double>(segment.received_at_us));
+    put(index == 0 ? static_cast<double>(exported.gap_before) : 0.0);
+    put(index + 1 == segment.samples.size() ? static_cast<double>(exported.gap_after) : 0.0);
+  }
+}
+
+void MatWriter::push(const GridRow& row) {
+  auto column = columns_.begin();
+  const auto put = [&column](auto value) { (column++)->push(value); };
+  put(row.span);
+  put(static_cast<double>(row.since_us) / 1e6);
+  put(static_cast<double>(row.utc_us));
+  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    if (query_.channels[channel]) put(row.sample != nullptr ? row.sample->*kSampleMembers[channel] : kNaN);
+  }
+  put(row.sample != nullptr ? row.setpoint_m.value_or(kNaN) : kNaN);
+  put(std::uint32_t{row.sample == nullptr});
+}
+
+// A piece of one column; false when all are there.
+bool MatWriter::copy_columns() {
+  if (file_ < 0) file_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (file_ < 0) fail_with(path_);
+  if (copied_ == columns_.size()) return false;
+  const bool more = columns_[copied_].copy_some(file_);
+  if (!more) ++copied_;
+  return true;
+}
+
+}  // namespace server

@@ -1,0 +1,61 @@
+// A run as a MAT file of version 5, for MATLAB and Octave: a struct `info` with what is said of the run, and a column
+// vector for each quantity, named as in the CSV.
+//
+// Channels, setpoint_m, disturbance_m and position_sd_m are single and NaN where there is no number; times, seq,
+// gap_before and gap_after are double, which holds them exactly; span, mode, sub_state, controller_id, emergency_cause
+// and flags are uint32, and emergency_id is two of them (high, low), since no double holds it. mode, sub_state and
+// emergency_cause are the numbers of the protocol, also those that this version does not know, spelled out in
+// info.modes, info.sub_states and info.emergency_causes; info.boot_ids has the boots of the spans. On a grid: span,
+// t_s, utc_us, the channels, setpoint_m and gap.
+//
+// On the thread that owns the database handle; no other thread may use matio meanwhile. Errors: invalid when a column
+// would have more than 2 GiB, which the format does not hold. Throws when the disk does not take it.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/runtime/result.hpp"
+#include "server/storage/export/export_rows.hpp"
+#include "server/storage/export/mat_column.hpp"
+
+namespace server {
+
+class MatWriter {
+ public:
+  // Columns grow beside the file.
+  MatWriter(std::filesystem::path path, std::vector<RecordedSpan> spans, ExportQuery query);
+  ~MatWriter();
+  MatWriter(const MatWriter&) = delete;
+  MatWriter& operator=(const MatWriter&) = delete;
+
+  // Works on for at most 20 ms; false when the file is whole. It is not synced.
+  Result<bool> advance(SQLite::Database& database);
+
+ private:
+  void add_columns();
+  void write_facts(SQLite::Database& database);
+  void push(const ExportSegment& segment);
+  void push(const GridRow& row);
+  bool push_rows();
+  bool copy_columns();
+
+  std::filesystem::path path_;
+  std::vector<RecordedSpan> spans_;
+  ExportQuery query_;
+  std::vector<MatColumn> columns_;  // in the order in which they are pushed
+  std::optional<SampleCursor> after_;
+  bool begun_ = false;
+  bool at_end_ = false;
+  SegmentRows segments_;
+  std::optional<GridRows> grid_;
+  std::size_t copied_ = 0;  // columns
+  int file_ = -1;
+};
+
+}  // namespace server

@@ -1,0 +1,61 @@
+// A run as a SQLite file of its own, with plain rows: for programs that read SQL, without segments and keys.
+//
+// Tables: run, span, sample, gap, event, command, audit, marker, run_certificate, in_force, outside_reference,
+// outside_position; columns as in the station's views (docs/database.md), ids above 2^63 as text. `sample` has a row
+// per sample in order of span and seq, with gap_before and gap_after. `audit` has the entries from the run's beginning
+// to its end without a hole, so that the chain can be verified; of other robots and of accounts only the hashes. Its
+// application_id is the station's plus 1, so no station takes it for its database.
+//
+// On the thread that owns the database handle. Throws when the disk does not take it; what it wrote is no whole file
+// before advance() has returned false.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/storage/database/schema.hpp"
+#include "server/storage/export/export_rows.hpp"
+
+namespace server {
+
+inline constexpr std::int64_t kRunFileApplicationId = kApplicationId + 1;
+inline constexpr std::int64_t kRunFileVersion = 2;  // its user_version
+
+class RunFile {
+ public:
+  // `path` must not exist, or be empty. `store` is the station's database as a URI for ATTACH (run_reader).
+  RunFile(std::filesystem::path path, std::string store, std::vector<RecordedSpan> spans, ExportQuery query);
+
+  // Works on for at most 20 ms; false when the file is whole. It is not synced.
+  bool advance(SQLite::Database& database);
+
+ private:
+  void begin();
+  void copy_some();
+  bool reference_is_whole();
+  void copy_reference_again();
+  void add_gaps(SQLite::Database& database);
+  bool add_samples(SQLite::Database& database);
+  void add(const ExportSegment& segment);
+
+  std::filesystem::path path_;
+  std::string store_;
+  std::vector<RecordedSpan> spans_;
+  ExportQuery query_;
+  std::unique_ptr<SQLite::Database> file_;
+  std::unique_ptr<SQLite::Statement> insert_;
+  std::size_t copied_ = 0;  // tables
+  int reference_tries_ = 0;
+  std::int64_t piece_after_ = 0;  // of the table that is copied: where the next piece begins
+  std::optional<SampleCursor> gaps_after_;
+  std::optional<SampleCursor> after_;
+  bool at_end_ = false;
+  SegmentRows segments_;
+};
+
+}  // namespace server

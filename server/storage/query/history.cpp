@@ -1,0 +1,215 @@
+// Read-only SQL: each query is one statement or a few, and ends within a page.
+#include "server/storage/query/history.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include "server/storage/database/statement.hpp"
+#include "server/storage/samples/stored_rows.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr std::size_t kMaxListed = 1000;
+constexpr std::size_t kSliceSegments = 5'000;
+constexpr std::size_t kSliceBoots = 100;
+constexpr std::size_t kWaitingInATurn = 10'000;  // samples, in a turn of the loop
+
+std::int64_t clamped(std::size_t limit) {
+  return static_cast<std::int64_t>(std::clamp<std::size_t>(limit, 1, kMaxListed));
+}
+
+// As the database has them, without what waits.
+Result<std::vector<RecordedSpan>> read_excerpt(SQLite::Database& database, const Excerpt& excerpt,
+                                               std::uint32_t first_span) {
+  if (excerpt.run) {
+    if (run_exists(database, *excerpt.run)) return read_spans(database, *excerpt.run, first_span);
+    return fail(ErrorCode::not_found, fmt::format("there is no run {}", *excerpt.run));
+  }
+  if (!robot_exists(database, excerpt.robot_id)) {
+    return fail(ErrorCode::not_found, fmt::format("there is no robot {}", excerpt.robot_id));
+  }
+  auto boots = read_boots(database, excerpt.robot_id);
+  std::erase_if(boots, [first_span](const RecordedSpan& span) { return span.span < first_span; });
+  return boots;
+}
+
+}  // namespace
+
+History::History(std::filesystem::path database, Recorder& recorder, WorkerThread& readers)
+    : recorder_{recorder}, reader_{std::move(database), readers} {}
+
+asio::awaitable<void> History::settle() { co_await recorder_.flush_records(); }
+
+asio::awaitable<Result<std::vector<RecordedSpan>>> History::spans(Excerpt excerpt, std::optional<SampleCursor> after,
+                                                                  std::size_t limit) {
+  if (excerpt.window) limit = Recorder::kAll;
+  auto query = [excerpt, first_span = after ? after->span : 0](SQLite::Database& database) {
+    return read_excerpt(database, excerpt, first_span);
+  };
+  co_await recorder_.flush_boots();  // a reboot heard before this moves the open span first
+  auto found = co_await reader_.ask(std::move(query));
+  if (!found) co_return found;
+  for (RecordedSpan& span : *found) {
+    Interval samples = span.samples;
+    const bool resumed = after && after->span == span.span && !excerpt.window;
+    if (resumed) samples.first = std::max(samples.first, after->seq + 1);
+    co_await add_waiting(span, samples, limit);
+  }
+  if (!excerpt.window) co_return found;
+  co_return co_await in_window(std::move(*found), *excerpt.window);
+}
+
+// In slices, since a robot may have thousands of boots.
+asio::awaitable<std::vector<RecordedSpan>> History::in_window(std::vector<RecordedSpan> spans, TimeWindow window) {
+  std::vector<RecordedSpan> found;
+  for (std::size_t begin = 0; begin < spans.size(); begin += kSliceBoots) {
+    const std::span slice{spans.data() + begin, std::min(kSliceBoots, spans.size() - begin)};
+    auto cut = [slice, window](SQLite::Database& database) { return cut_to_window(database, slice, window); };
+    std::vector<RecordedSpan> some = co_await reader_.ask(std::move(cut));
+    std::ranges::move(some, std::back_inserter(found));
+  }
+  co_return found;
+}
+
+// In turns of the loop, since hours may wait. What is stored between two of them is in the database before it is asked.
+asio::awaitable<void> History::add_waiting(RecordedSpan& span, Interval samples, std::size_t& limit) const {
+  span.made_next = std::max(span.made_next, std::min(span.samples.next, recorder_.next_seq(span.boot_id)));
+  while (limit > 0) {
+    std::vector<Segment> some = recorder_.waiting(span.boot_id, samples, std::min(limit, kWaitingInATurn));
+    if (some.empty()) break;
+    samples.first = some.back().next_seq();
+    std::size_t copied = 0;
+    for (const Segment& segment : some) copied += segment.samples.size();
+    std::ranges::move(some, std::back_inserter(span.waiting));
+    limit -= std::min(limit, copied);
+    if (copied < kWaitingInATurn) break;  // that was all, or enough
+    co_await asio::post(recorder_.loop(), asio::use_awaitable);
+  }
+  span.waiting_gaps = recorder_.waiting_gaps(span.boot_id, span.samples);
+}
+
+asio::awaitable<Result<SegmentPage>> History::segments(Excerpt excerpt, std::optional<SampleCursor> after,
+                                                       std::size_t limit, Channels channels) {
+  if (limit < 1 || limit > kMaxPageSamples) {
+    co_return fail(ErrorCode::invalid, fmt::format("limit is {}, allowed are 1 to {}", limit, kMaxPageSamples));
+  }
+  auto found = co_await spans(excerpt, after, limit + 1);  // one more tells whether this is the end
+  if (!found) co_return std::unexpected{found.error()};
+  auto query = [spans = std::move(*found), after, limit, channels](SQLite::Database& database) {
+    return read_segments(database, spans, after, limit, channels);
+  };
+  co_return co_await reader_.ask(std::move(query));
+}
+
+asio::awaitable<Result<SamplePage>> History::samples(RunId run, std::optional<SampleCursor> after, std::size_t limit) {
+  auto page = co_await segments(excerpt_of(run), after, limit);
+  if (!page) co_return std::unexpected{page.error()};
+  auto job = [page = std::move(*page)] { return samples_of(page); };
+  co_return co_await reader_.run(std::move(job));
+}
+
+asio::awaitable<Result<AbsencePage>> History::gaps(Excerpt excerpt, std::optional<SampleCursor> after,
+                                                   std::size_t limit) {
+  if (limit < 1 || limit > kMaxPageGaps) {
+    co_return fail(ErrorCode::invalid, fmt::format("limit is {}, allowed are 1 to {}", limit, kMaxPageGaps));
+  }
+  auto found = co_await spans(std::move(excerpt), after);
+  if (!found) co_return std::unexpected{found.error()};
+  const auto& spans = *found;
+  auto query = [&spans, after, limit](SQLite::Database& database) { return read_gaps(database, spans, after, limit); };
+  GapPage gaps = co_await reader_.ask(std::move(query));
+  AbsencePage page{std::move(gaps.gaps), {}, gaps.next};
+  for (const RecordedSpan& span : spans) {
+    if (page.next && span.span > page.next->span) break;
+    co_await add_missing(span, after, limit, page);
+  }
+  co_return page;
+}
+
+// What is missing of the span on this page. Where that is more than a page holds, the page ends there.
+asio::awaitable<void> History::add_missing(const RecordedSpan& span, const std::optional<SampleCursor>& after,
+                                           std::size_t limit, AbsencePage& page) {
+  Interval left{std::max(span.samples.first, span.settled_next), span.made().next};
+  if (after && after->span == span.span) left.first = std::max(left.first, after->seq + 1);
+  if (page.next && page.next->span == span.span) left.next = std::min(left.next, page.next->seq + 1);
+  while (left.first < left.next) {
+    auto slice = [&span, &left](SQLite::Database& database) {
+      return read_missing(database, span, left, kSliceSegments);
+    };
+    const auto missing = co_await reader_.ask(std::move(slice));
+    page.missing.insert(page.missing.end(), missing.begin(), missing.end());
+    if (page.missing.size() <= limit) continue;
+    page.missing.resize(limit);
+    page.next = SampleCursor{page.missing.back().span, page.missing.back().last_seq};
+    std::erase_if(page.gaps, [&next = *page.next](const Gap& gap) {
+      return gap.span > next.span || (gap.span == next.span && gap.first_seq > next.seq);
+    });
+    co_return;
+  }
+}
+
+asio::awaitable<Result<Overview>> History::overview(Excerpt excerpt, OverviewQuery query) {
+  auto found = co_await spans(std::move(excerpt));
+  if (!found) co_return std::unexpected{found.error()};
+  const auto& spans = *found;
+  Overview overview;
+  auto gaps = [&spans](SQLite::Database& database) { return read_gaps(database, spans, {}, kMaxPageGaps); };
+  overview.gaps = co_await reader_.ask(std::move(gaps));
+  OverviewScan scan{spans, query};
+  bool more = true;
+  while (more) {
+    auto slice = [&scan](SQLite::Database& database) { return scan.advance(database); };
+    more = co_await reader_.ask(std::move(slice));
+  }
+  overview.columns = scan.take();
+  co_return overview;
+}
+
+asio::awaitable<std::vector<RobotEvent>> History::events(RobotId robot_id, std::size_t limit) {
+  auto query = [robot_id, limit](SQLite::Database& database) {
+    std::vector<RobotEvent> events;
+    SQLite::Statement rows{database, select_events("WHERE event.robot_id = ? ORDER BY event_row DESC LIMIT ?")};
+    bind_all(rows, robot_id, clamped(limit));
+    while (rows.executeStep()) events.push_back(event_from(rows));
+    return events;
+  };
+  co_await recorder_.flush_records();
+  co_return co_await reader_.ask(std::move(query));
+}
+
+asio::awaitable<std::vector<CommandRecord>> History::commands(RobotId robot_id, std::size_t limit) {
+  auto query = [robot_id, limit](SQLite::Database& database) {
+    std::vector<CommandRecord> commands;
+    SQLite::Statement rows{database, select_commands("WHERE robot_id = ? ORDER BY submitted_at_us DESC LIMIT ?")};
+    bind_all(rows, robot_id, clamped(limit));
+    while (rows.executeStep()) commands.push_back(command_from(rows));
+    return commands;
+  };
+  co_await recorder_.flush_records();
+  co_return co_await reader_.ask(std::move(query));
+}
+
+asio::awaitable<AuditPage> History::audit(AuditFilter filter) {
+  auto query = [filter](SQLite::Database& database) { return read_audit(database, filter); };
+  co_await recorder_.flush_records();
+  co_return co_await reader_.ask(std::move(query));
+}
+
+asio::awaitable<Result<CommandRecord>> History::command(CommandId id) {
+  auto query = [id](SQLite::Database& database) -> Result<CommandRecord> {
+    SQLite::Statement row{database, select_commands("WHERE command_id = ?")};
+    bind_all(row, id);
+    if (!row.executeStep()) return fail(ErrorCode::not_found, fmt::format("there is no command {}", id));
+    return command_from(row);
+  };
+  co_await recorder_.flush_records();
+  co_return co_await reader_.ask(std::move(query));
+}
+
+}  // namespace server

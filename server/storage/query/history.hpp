@@ -1,0 +1,97 @@
+// What was recorded, for people and programs: samples, overviews and gaps of an excerpt; events, commands.
+//
+// Loop thread; the queries run on a worker with a read-only connection, in slices of at most 20 ms, so no read
+// transaction lives long, nobody waits behind a long question, and a coroutine that is cancelled asks no further.
+// An answer holds everything up to its question. Samples and gaps that are not stored yet are joined from the
+// recorder's memory, so that a page which polls neither writes nor cuts a segment short. Queries of events and commands
+// let the recorder commit those first; while the disk fails they answer after 3 s, with what is stored.
+// Needs a running Recorder, which has opened the database; recorder and worker outlive it.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "server/runtime/result.hpp"
+#include "server/storage/audit/audit_queries.hpp"
+#include "server/storage/database/database_reader.hpp"
+#include "server/storage/ingest/recorder.hpp"
+#include "server/storage/query/overview.hpp"
+#include "server/storage/query/span_finder.hpp"
+#include "server/storage/query/span_reader.hpp"
+#include "server/storage/runs/run.hpp"
+
+namespace server {
+
+// A run or all that a robot recorded; or what of it lies in a window of time.
+struct Excerpt {
+  std::optional<RunId> run;
+  RobotId robot_id;  // when there is no run
+  std::optional<TimeWindow> window;
+};
+
+inline Excerpt excerpt_of(RunId run) { return {.run = run, .robot_id = {}, .window = {}}; }
+
+// What is not there, in order of span and seq.
+struct AbsencePage {
+  std::vector<Gap> gaps;
+  std::vector<MissingRange> missing;
+  std::optional<SampleCursor> next;  // the last sample that the page tells of; empty: the end
+};
+
+struct Overview {
+  OverviewColumns columns;
+  GapPage gaps;  // the first
+};
+
+inline constexpr std::size_t kMaxPageSamples = 10'000;
+inline constexpr std::size_t kMaxPageGaps = 10'000;
+
+class History {
+ public:
+  History(std::filesystem::path database, Recorder& recorder, WorkerThread& readers);
+
+  // not_found: there is no such run or robot, in all of these.
+  // At most `limit` samples (1 to 10000), in order of span and seq, after the cursor.
+  boost::asio::awaitable<Result<SegmentPage>> segments(Excerpt excerpt, std::optional<SampleCursor> after,
+                                                       std::size_t limit, Channels channels = all_channels());
+  boost::asio::awaitable<Result<SamplePage>> samples(RunId run, std::optional<SampleCursor> after, std::size_t limit);
+  // At most `limit` of each (1 to 10000), after the cursor.
+  boost::asio::awaitable<Result<AbsencePage>> gaps(Excerpt excerpt, std::optional<SampleCursor> after = {},
+                                                   std::size_t limit = kMaxPageGaps);
+  boost::asio::awaitable<Result<Overview>> overview(Excerpt excerpt, OverviewQuery query);
+
+  // The spans of the excerpt from the cursor's on, with what waits of them. Of the samples that wait only those after
+  // the cursor, and of those at least the first `limit`, but all for a window, whose ends they may hold.
+  boost::asio::awaitable<Result<std::vector<RecordedSpan>>> spans(Excerpt excerpt,
+                                                                  std::optional<SampleCursor> after = {},
+                                                                  std::size_t limit = Recorder::kAll);
+
+  // Newest first, at most `limit` (1 to 1000).
+  boost::asio::awaitable<std::vector<RobotEvent>> events(RobotId robot_id, std::size_t limit);
+  boost::asio::awaitable<std::vector<CommandRecord>> commands(RobotId robot_id, std::size_t limit);
+  boost::asio::awaitable<Result<CommandRecord>> command(CommandId id);
+
+  boost::asio::awaitable<AuditPage> audit(AuditFilter filter);
+
+  // Returns when every command and event that the recorder has heard is durable, or after 3 s when the disk fails.
+  boost::asio::awaitable<void> settle();
+
+  // For questions of one's own, and for text that is made of what a question gave.
+  DatabaseReader& reader() { return reader_; }
+
+ private:
+  boost::asio::awaitable<void> add_waiting(RecordedSpan& span, Interval samples, std::size_t& limit) const;
+  boost::asio::awaitable<std::vector<RecordedSpan>> in_window(std::vector<RecordedSpan> spans, TimeWindow window);
+  boost::asio::awaitable<void> add_missing(const RecordedSpan& span, const std::optional<SampleCursor>& after,
+                                           std::size_t limit, AbsencePage& page);
+
+  Recorder& recorder_;
+  DatabaseReader reader_;
+};
+
+}  // namespace server

@@ -1,0 +1,164 @@
+// One query over the view run_sample.
+#include "server/storage/query/run_reader.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cctype>
+#include <cerrno>
+#include <charconv>
+
+#include "server/storage/database/database.hpp"
+#include "server/storage/database/schema.hpp"
+#include "server/storage/database/statement.hpp"
+#include "server/storage/samples/stored_rows.hpp"
+
+namespace server {
+namespace {
+
+// The view gives the samples of a run in order of span and seq, without sorting. That of schema version 1, which a
+// station has not opened since, knows no time of the first receipt: the same as the last one's then.
+constexpr const char* kQuery =
+    "SELECT span, boot_id, seq, robot_time_us, utc_us, received_at_us, position_m, velocity_m_s, acceleration_m_s2,"
+    " duty, impedance_mv, reference_m, mode, sub_state, setpoint_m, disturbance_m, position_sd_m, controller_id,"
+    " emergency_id, emergency_cause, flags, clock_uncertainty_us, {} FROM run_sample WHERE run_id = ? LIMIT ?";
+
+std::uint64_t id_from(const std::string& text) {  // decimal text: it may exceed int64
+  std::uint64_t id = 0;
+  std::from_chars(text.data(), text.data() + text.size(), id);
+  return id;
+}
+
+StoredSample sample_from(SQLite::Statement& row) {
+  StoredSample stored;
+  stored.span = row.getColumn(0).getUInt();
+  stored.boot_id = id_from(row.getColumn(1).getString());
+  stored.seq = unsigned_id(row.getColumn(2));
+  stored.robot_time_us = unsigned_id(row.getColumn(3));
+  stored.utc_us = row.getColumn(4).getInt64();
+  stored.received_at_us = row.getColumn(5).getInt64();
+  stored.sample.position_m = float_or_nan(row.getColumn(6));
+  stored.sample.velocity_m_s = float_or_nan(row.getColumn(7));
+  stored.sample.acceleration_m_s2 = float_or_nan(row.getColumn(8));
+  stored.sample.duty = float_or_nan(row.getColumn(9));
+  stored.sample.impedance_mv = float_or_nan(row.getColumn(10));
+  stored.sample.reference_m = float_or_nan(row.getColumn(11));
+  stored.mode = mode_from(row.getColumn(12).getString());
+  stored.sub_state = sub_state_from(row.getColumn(13).getString());
+  stored.setpoint_m = optional_float(row.getColumn(14));
+  stored.disturbance_m = float_or_nan(row.getColumn(15));
+  stored.position_sd_m = float_or_nan(row.getColumn(16));
+  stored.controller_id = row.getColumn(17).getUInt();
+  stored.emergency_id = id_from(row.getColumn(18).getString());
+  stored.emergency_cause = emergency_cause_from(row.getColumn(19).getString());
+  stored.flags = row.getColumn(20).getUInt();
+  stored.clock_uncertainty_us = row.getColumn(21).getInt64();
+  stored.first_received_at_us = row.getColumn(22).getInt64();
+  return stored;
+}
+
+Result<void> check_ours(SQLite::Database& database, const std::filesystem::path& path) {
+  const auto application_id = database.execAndGet("PRAGMA application_id").getInt64();
+  const auto version = database.execAndGet("PRAGMA user_version").getInt64();
+  if (application_id != kApplicationId) {
+    return fail(ErrorCode::invalid,
+                fmt::format("{} is not a database of Rheonaut (application_id {:#x})", path.string(), application_id));
+  }
+  if (version < 1 || version > static_cast<std::int64_t>(migrations().size())) {
+    return fail(ErrorCode::invalid, fmt::format("{} has schema version {}, this program knows 1 to {}", path.string(),
+                                                version, migrations().size()));
+  }
+  return {};
+}
+
+Result<std::vector<StoredSample>> query_run(SQLite::Database& database, RunId run, std::size_t limit) {
+  SQLite::Statement exists{database, "SELECT 1 FROM run WHERE run_id = ?"};
+  bind_all(exists, run);
+  if (!exists.executeStep()) {
+    SQLite::Statement range{database, "SELECT count(*), min(run_id), max(run_id) FROM run"};
+    range.executeStep();
+    return fail(ErrorCode::not_found, range.getColumn(0).getInt64() == 0
+                                          ? fmt::format("there is no run {}: the database holds no runs", run)
+                                          : fmt::format("there is no run {}: the database holds runs {} to {}", run,
+                                                        range.getColumn(1).getInt64(), range.getColumn(2).getInt64()));
+  }
+  std::vector<StoredSample> samples;
+  const bool is_first_version = database.execAndGet("PRAGMA user_version").getInt64() == 1;
+  SQLite::Statement rows{database, fmt::format(kQuery, is_first_version ? "received_at_us" : "first_received_at_us")};
+  bind_all(rows, run, static_cast<std::int64_t>(limit + 1));
+  while (rows.executeStep()) samples.push_back(sample_from(rows));
+  if (samples.size() > limit) {
+    return fail(ErrorCode::invalid, fmt::format("run {} has more than {} samples", run, limit), "run_too_long");
+  }
+  return samples;
+}
+
+}  // namespace
+
+bool lock_is_free(const std::filesystem::path& database) {
+  const auto lock_path = database.parent_path() / "rheonaut.lock";
+  const int lock = ::open(lock_path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (lock < 0) return errno == ENOENT;
+  const bool is_free = ::flock(lock, LOCK_SH | LOCK_NB) == 0;
+  ::close(lock);
+  return is_free;
+}
+
+namespace {
+
+bool is_at_rest(const std::filesystem::path& path) {
+  return !std::filesystem::exists(path.string() + "-wal") && lock_is_free(path);
+}
+
+// As a URI, which alone can say that the file does not change: then SQLite makes no files beside it.
+SQLite::Database open_at_rest(const std::filesystem::path& path) {
+  return SQLite::Database{reading_uri(path, true), SQLite::OPEN_READONLY | SQLite::OPEN_URI};
+}
+
+}  // namespace
+
+std::string reading_uri(const std::filesystem::path& path, bool at_rest) {
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(path).string()) {
+    const bool is_plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || std::string_view{"/._-"}.contains(c);
+    uri += is_plain ? std::string{c} : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return uri + (at_rest ? "?immutable=1" : "?mode=ro");
+}
+
+Result<void> read_store(const std::filesystem::path& path, const ReadStore& read) {
+  if (!std::filesystem::exists(path)) {
+    return fail(ErrorCode::not_found, fmt::format("there is no {}; --data names the station's folder", path.string()));
+  }
+  const auto checked = [&](SQLite::Database database, bool at_rest) {
+    auto ours = check_ours(database, path);
+    return ours ? read(database, reading_uri(path, at_rest)) : ours;
+  };
+  try {
+    if (is_at_rest(path)) {
+      const auto written = std::filesystem::last_write_time(path);
+      auto done = checked(open_at_rest(path), true);
+      if (is_at_rest(path) && std::filesystem::last_write_time(path) == written) return done;
+    }
+    return checked(open_for_reading(path), false);  // also when a station has begun meanwhile
+  } catch (const SQLite::Exception& error) {
+    return fail(ErrorCode::unavailable, fmt::format("cannot read {}: SQLite says '{}'", path.string(), error.what()));
+  }
+}
+
+Result<std::vector<StoredSample>> read_run(const std::filesystem::path& path, RunId run, std::size_t limit) {
+  std::vector<StoredSample> samples;
+  auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
+    auto found = query_run(database, run, limit);
+    if (!found) return std::unexpected{found.error()};
+    samples = std::move(*found);
+    return {};
+  };
+  auto done = read_store(path, read);
+  if (!done) return std::unexpected{done.error()};
+  return samples;
+}
+
+}  // namespace server

@@ -1,0 +1,85 @@
+// A part is a member, and a line in each function that concerns it.
+#include "server/storage/recording_parts.hpp"
+
+#include <functional>
+
+#include "server/storage/runs/run_store.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+
+namespace {
+
+std::filesystem::path backup_folder(const std::filesystem::path& database, const RecordingConfig& config) {
+  return std::filesystem::absolute(config.backup_dir.empty() ? database.parent_path() / "backups" : config.backup_dir);
+}
+
+RetentionPolicy retention_policy(const RecordingConfig& config) {
+  return {config.retention_days, config.max_database_mb * std::uint64_t{1'000'000}};
+}
+
+}  // namespace
+
+RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
+                               WorkerThread& exports_worker, WorkerThread& checkpoints, const RecorderOptions& options,
+                               const RecordingConfig& config)
+    : recorder{loop, clock, disk, checkpoints, options},
+      head_watch{clock, recorder, checkpoints, options.head_interval},
+      reader{options.path, readers},
+      certifier{clock, recorder, reader},
+      runs{clock, recorder, reader, certifier},
+      markers{clock, recorder, reader},
+      references{clock, recorder, reader},
+      fluid_models{clock, recorder},
+      history{options.path, recorder, readers},
+      exports{options.path, recorder, exports_worker},
+      disk_watch{clock, readers, options.path, space_limits(config)},
+      backups{loop, clock, recorder, readers, disk_watch, backup_folder(options.path, config)},
+      retention{clock, recorder, reader, disk_watch, references, retention_policy(config)},
+      path_{options.path} {}
+
+void RecordingParts::connect(Station& station) {
+  station.add_sink(recorder);
+  station.add_sink(runs);
+  runs.set_envelope(station.envelope());
+  runs.set_on_fluid(std::bind_front(&Station::set_fluid, &station));
+  recorder.set_on_durable(std::bind_front(&Station::on_durable, &station));
+  recorder.set_on_missing(std::bind_front(&Station::request_resend, &station));
+  recorder.set_on_missing_events(std::bind_front(&Station::request_event_resend, &station));
+}
+
+asio::awaitable<RestoredState> RecordingParts::open() {
+  RestoredState restored = co_await recorder.open();
+  co_await head_watch.open();
+  backups.set_store_id(restored.store_id);
+  std::error_code ignored;
+  std::filesystem::remove_all(exports_folder(), ignored);  // what a crash left
+  co_await runs.load();
+  co_await references.open();
+  co_await fluid_models.load();
+  co_await retention.open();
+  co_await disk_watch.look();
+  co_return restored;
+}
+
+void RecordingParts::spawn(TaskGroup& tasks) {
+  tasks.spawn("recorder", recorder.run());
+  tasks.spawn("checkpoints", recorder.run_checkpoints());
+  tasks.spawn("head of the database", head_watch.run());
+  tasks.spawn("certifier", certifier.run());
+  tasks.spawn("interrupted runs", runs.finish_loading());
+  tasks.spawn("disk watch", disk_watch.run());
+  tasks.spawn("backups", backups.run());
+  tasks.spawn("retention", retention.run());
+}
+
+void RecordingParts::close() {
+  backups.close();
+  for (DatabaseReader* each : {&reader, &history.reader(), &exports.reader()}) each->close();
+  recorder.close([this](Database& database, std::int64_t utc_us) {  // what fails is done by the next start
+    if (runs.any_open()) RunStore{database, {}}.interrupt(utc_us);
+  });
+  head_watch.close();
+}
+
+}  // namespace server

@@ -1,0 +1,190 @@
+// Counting, and the bytes that are hashed.
+#include "server/storage/runs/certificate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string_view>
+#include <tuple>
+
+namespace server {
+namespace {
+
+constexpr std::size_t kMaxSampleBytes = 104;
+
+std::string_view preamble(int format) { return format == 1 ? "rheonaut-samples-1\n" : "rheonaut-samples-2\n"; }
+
+class ByteWriter {
+ public:
+  explicit ByteWriter(unsigned char* into) : at_{into} {}
+
+  template <class Integer>
+  void put(Integer value) {
+    for (std::size_t byte = 0; byte < sizeof value; ++byte) *at_++ = static_cast<unsigned char>(value >> (8 * byte));
+  }
+  template <class Enumerator>
+  void put_number(Enumerator value) {
+    put(static_cast<std::uint32_t>(value));
+  }
+  std::size_t bytes_since(const unsigned char* begin) const { return static_cast<std::size_t>(at_ - begin); }
+  void put_float(float value) { put(std::isnan(value) ? 0x7fc00000U : std::bit_cast<std::uint32_t>(value)); }
+
+ private:
+  unsigned char* at_;
+};
+
+// Format 1 had a byte for each, and 0 for those that it did not know.
+void write_enumerators_1(ByteWriter& bytes, const SampleContext& context) {
+  bytes.put(static_cast<std::uint8_t>(context.mode));
+  bytes.put(static_cast<std::uint8_t>(context.sub_state));
+  bytes.put(static_cast<std::uint8_t>(context.emergency_cause));
+  bytes.put(std::uint8_t{0});
+}
+
+// How many bytes it wrote.
+std::size_t write_sample(unsigned char* into, int format, BootId boot_id, const Segment& segment, std::size_t index) {
+  const Sample& sample = segment.samples[index];
+  const SampleContext& context = segment.context;
+  const std::uint64_t robot_time_us = segment.robot_time_us(index);
+  ByteWriter bytes{into};
+  bytes.put(boot_id);
+  bytes.put(segment.first_seq + index);
+  bytes.put(robot_time_us);
+  bytes.put(robot_time_us + std::bit_cast<std::uint64_t>(segment.utc_offset_us));
+  bytes.put(std::bit_cast<std::uint64_t>(segment.clock_uncertainty_us));
+  for (const float value : {sample.position_m, sample.velocity_m_s, sample.acceleration_m_s2, sample.duty,
+                            sample.impedance_mv, sample.reference_m}) {
+    bytes.put_float(value);
+  }
+  for (const std::optional<float>& value : {context.setpoint_m, context.disturbance_m, context.position_sd_m}) {
+    bytes.put_float(value.value_or(std::numeric_limits<float>::quiet_NaN()));
+  }
+  if (format == 1) {
+    write_enumerators_1(bytes, context);
+  } else {
+    bytes.put_number(context.mode);
+    bytes.put_number(context.sub_state);
+    bytes.put_number(context.emergency_cause);
+  }
+  bytes.put(context.controller_id);
+  bytes.put(context.flags);
+  bytes.put(context.emergency_id);
+  return bytes.bytes_since(into);
+}
+
+}  // namespace
+
+bool Certificate::agrees_with(const Certificate& other) const {
+  const auto all = [](const Certificate& one) {
+    return std::tie(one.samples_expected, one.samples_live, one.samples_backfilled, one.samples_lost, one.lost_by_cause,
+                    one.longest_gap_samples, one.longest_gap_us, one.worst_clock_uncertainty_us,
+                    one.samples_without_clock, one.sha256);
+  };
+  return all(*this) == all(other);
+}
+
+SampleHash::SampleHash(int format) : format_{format} {
+  const std::string_view begin = preamble(format);
+  crypto_hash_sha256_init(&state_);
+  crypto_hash_sha256_update(&state_, reinterpret_cast<const unsigned char*>(begin.data()), begin.size());
+}
+
+void SampleHash::add(BootId boot_id, const Segment& segment) {
+  std::array<unsigned char, 100 * kMaxSampleBytes> bytes;
+  std::size_t used = 0;
+  for (std::size_t index = 0; index < segment.samples.size(); ++index) {
+    if (used + kMaxSampleBytes > bytes.size()) {
+      crypto_hash_sha256_update(&state_, bytes.data(), used);
+      used = 0;
+    }
+    used += write_sample(bytes.data() + used, format_, boot_id, segment, index);
+  }
+  crypto_hash_sha256_update(&state_, bytes.data(), used);
+}
+
+std::string SampleHash::text() const {
+  crypto_hash_sha256_state state = state_;  // so that more may follow
+  std::array<unsigned char, crypto_hash_sha256_BYTES> hash{};
+  crypto_hash_sha256_final(&state, hash.data());
+  std::string text(2 * hash.size() + 1, '\0');
+  sodium_bin2hex(text.data(), text.size(), hash.data(), hash.size());
+  text.pop_back();
+  return text;
+}
+
+void SampleTally::begin_span(Interval samples, std::uint32_t period_us) {
+  span_ = samples;
+  next_seq_ = samples.first;
+  period_us_ = period_us;
+  has_sample_ = false;
+  counts_.samples_expected += samples.next - samples.first;
+}
+
+void SampleTally::add(const Stretch& stretch) {
+  const std::uint64_t samples = stretch.samples.next - stretch.samples.first;
+  const auto robot_time_us = static_cast<std::int64_t>(stretch.first_robot_time_us);
+  const bool is_backfill = (stretch.flags & rheonaut_TELEMETRY_FLAG_BACKFILL) != 0;
+  period_us_ = stretch.period_us;
+  if (stretch.samples.first > next_seq_) {
+    const std::uint64_t missing = stretch.samples.first - next_seq_;
+    note_gap(missing, has_sample_ ? robot_time_us - next_robot_time_us_
+                                  : static_cast<std::int64_t>(missing * stretch.period_us));
+  }
+  (is_backfill ? counts_.samples_backfilled : counts_.samples_live) += samples;
+  if (stretch.clock_uncertainty_us < 0) counts_.samples_without_clock += samples;
+  counts_.worst_clock_uncertainty_us = std::max(counts_.worst_clock_uncertainty_us, stretch.clock_uncertainty_us);
+  next_seq_ = stretch.samples.next;
+  next_robot_time_us_ = robot_time_us + static_cast<std::int64_t>(samples * stretch.period_us);
+  has_sample_ = true;
+}
+
+void SampleTally::add_lost(Interval samples, const std::string& cause) {
+  counts_.samples_lost += samples.next - samples.first;
+  counts_.lost_by_cause[cause] += samples.next - samples.first;
+}
+
+void SampleTally::end_span() {
+  if (next_seq_ >= span_.next) return;
+  note_gap(span_.next - next_seq_, static_cast<std::int64_t>((span_.next - next_seq_) * period_us_));
+}
+
+void SampleTally::note_gap(std::uint64_t samples, std::int64_t us) {
+  counts_.longest_gap_samples = std::max(counts_.longest_gap_samples, samples);
+  counts_.longest_gap_us = std::max(counts_.longest_gap_us, us);
+}
+
+Certification::Certification(std::vector<CertifiedSpan> spans, int format)
+    : spans_{std::move(spans)}, format_{format}, hash_{format} {
+  if (spans_.empty()) return;
+  next_seq_ = spans_[0].samples.first;
+  tally_.begin_span(spans_[0].samples, spans_[0].period_us);
+}
+
+Certification::Progress Certification::advance(SQLite::Database& database, std::uint64_t max_samples) {
+  while (span_ < spans_.size()) {
+    const Progress progress = advance_span(database, max_samples);
+    if (progress != Progress::done) return progress;
+    tally_.end_span();
+    if (++span_ == spans_.size()) break;
+    next_seq_ = spans_[span_].samples.first;
+    tally_.begin_span(spans_[span_].samples, spans_[span_].period_us);
+  }
+  return Progress::done;
+}
+
+Certificate Certification::certificate() const {
+  Certificate certificate = tally_.counts();
+  certificate.format = format_;
+  certificate.sha256 = hash_.text();
+  return certificate;
+}
+
+std::string Certification::place() const {
+  return span_ < spans_.size() ? fmt::format("sample {} of boot {}", next_seq_, spans_[span_].boot_id) : "nothing";
+}
+
+}  // namespace server

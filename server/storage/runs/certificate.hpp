@@ -1,0 +1,156 @@
+// The completeness certificate of a run: what of it was expected, came, and is lost, and a SHA-256 over its samples.
+//
+//   hashed = "rheonaut-samples-2\n" sample*                                 in order of span and seq
+//   sample = boot_id:u64 seq:u64 robot_time_us:u64 utc_us:i64 clock_uncertainty_us:i64
+//            position_m:f32 velocity_m_s:f32 acceleration_m_s2:f32 duty:f32 impedance_mv:f32 reference_m:f32
+//            setpoint_m:f32 disturbance_m:f32 position_sd_m:f32
+//            mode:i32 sub_state:i32 emergency_cause:i32 controller_id:u32 flags:u32 emergency_id:u64     104 bytes
+//
+// Little-endian; f32 is binary32, a NaN and a value that is not there are 0x7fc00000; enumerators are the numbers of
+// the robot's protocol, also those that this version does not know. Format 1, of runs that were certified before schema
+// 7, has "rheonaut-samples-1\n" and mode:u8 sub_state:u8 emergency_cause:u8 0:u8, 96 bytes. How samples are cut into
+// segments and where their rows lie is not in it, so it is the same after a backup, an export or a VACUUM; nor is what
+// people said of the run, which they may change. docs/database.md repeats this for whoever checks it with another
+// program.
+//
+// Pure, but for advance(), which are called on the thread that owns the database handle and end within a
+// page. A broken promise of the database (a row that is not there) is an exception.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <sodium.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/storage/runs/run.hpp"
+#include "server/storage/samples/segment.hpp"
+
+namespace server {
+
+inline constexpr int kCertificateFormat = 2;  // of new ones; those of 1 are verified for ever
+
+struct Certificate {
+  int format = kCertificateFormat;
+  std::uint64_t samples_expected = 0;
+  std::uint64_t samples_live = 0;
+  std::uint64_t samples_backfilled = 0;  // sent again, on request or after a reconnect
+  std::uint64_t samples_lost = 0;
+  std::map<std::string, std::uint64_t> lost_by_cause;
+  std::uint64_t longest_gap_samples = 0;         // the longest stretch of a span without a sample
+  std::int64_t longest_gap_us = 0;               // the same in robot time, which also counts periods that it skipped
+  std::int64_t worst_clock_uncertainty_us = -1;  // -1: no sample has an estimate
+  std::uint64_t samples_without_clock = 0;
+  std::string sha256;  // in lower-case hexadecimal
+  std::int64_t made_at_us = 0;
+
+  std::uint64_t samples_missing() const {  // still on their way
+    return samples_expected - samples_live - samples_backfilled - samples_lost;
+  }
+  // Says the same of the samples; when it was made does not count.
+  bool agrees_with(const Certificate& other) const;
+};
+
+class SampleHash {
+ public:
+  explicit SampleHash(int format);
+  void add(BootId boot_id, const Segment& segment);
+  std::string text() const;  // of all so far
+
+ private:
+  int format_;
+  crypto_hash_sha256_state state_;
+};
+
+// Counts a run, span by span.
+class SampleTally {
+ public:
+  // The period is that of the boot, for the time of a span that has no sample.
+  void begin_span(Interval samples, std::uint32_t period_us);
+  // Stored samples of the span, ascending.
+  struct Stretch {
+    Interval samples;
+    std::uint64_t first_robot_time_us = 0;
+    std::uint32_t period_us = 0;
+    std::uint32_t flags = 0;
+    std::int64_t clock_uncertainty_us = -1;
+  };
+  void add(const Stretch& stretch);
+  void add_lost(Interval samples, const std::string& cause);
+  void end_span();
+
+  const Certificate& counts() const { return counts_; }
+
+ private:
+  void note_gap(std::uint64_t samples, std::int64_t us);
+
+  Certificate counts_;
+  Interval span_;
+  std::uint64_t next_seq_ = 0;           // of the span: above the last stored sample
+  std::int64_t next_robot_time_us_ = 0;  // at which that one is due
+  std::uint32_t period_us_ = 0;
+  bool has_sample_ = false;
+};
+
+// One span of a closed run.
+struct CertifiedSpan {
+  std::int64_t boot_key = 0;
+  BootId boot_id = 0;
+  Interval samples;
+  std::uint32_t period_us = 0;
+};
+std::vector<CertifiedSpan> read_certified_spans(SQLite::Database& database, RunId run);
+
+// A certificate in the making: goes over the samples once, in pages, and stops where one is still on its way.
+class Certification {
+ public:
+  enum class Progress : std::uint8_t { more, waiting, done };
+
+  explicit Certification(std::vector<CertifiedSpan> spans, int format = kCertificateFormat);
+
+  // Takes in at most about `max_samples` samples.
+  Progress advance(SQLite::Database& database, std::uint64_t max_samples);
+
+  // What has been taken in.
+  Certificate certificate() const;
+  // The sample that comes next, for messages.
+  std::string place() const;
+
+ private:
+  Progress advance_span(SQLite::Database& database, std::uint64_t& max_samples);
+
+  std::vector<CertifiedSpan> spans_;
+  std::size_t span_ = 0;
+  std::uint64_t next_seq_ = 0;  // of that span
+  SampleTally tally_;
+  int format_;
+  SampleHash hash_;
+};
+
+// The counts of a run whose samples are not all there, from the heads of its segments; the hash is empty.
+class HeadTally {
+ public:
+  explicit HeadTally(std::vector<CertifiedSpan> spans = {}) : spans_{std::move(spans)} {}
+
+  // Takes in a page; false at the end.
+  bool advance(SQLite::Database& database);
+
+  const Certificate& counts() const { return tally_.counts(); }
+
+ private:
+  std::vector<CertifiedSpan> spans_;
+  std::size_t span_ = 0;
+  std::uint64_t next_seq_ = 0;  // of that span, once it has begun
+  bool has_begun_ = false;
+  SampleTally tally_;
+};
+
+std::optional<Certificate> read_certificate(SQLite::Database& database, RunId run);
+
+// Does nothing when the run has been discarded meanwhile.
+void write_certificate(SQLite::Database& database, RunId run, const Certificate& certificate);
+
+}  // namespace server

@@ -1,0 +1,163 @@
+// What of a certificate is read from the database and written into it.
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "server/storage/database/statement.hpp"
+#include "server/storage/runs/certificate.hpp"
+#include "server/storage/samples/sample_scanner.hpp"
+
+namespace server {
+namespace {
+
+constexpr std::uint64_t kTalliedSamples = 1'000'000;  // whose heads are read at once
+
+struct Lost {
+  Interval samples;
+  std::string cause;
+};
+
+// Cut to the range, ascending.
+std::vector<Lost> read_lost(SQLite::Database& database, std::int64_t boot_key, Interval range) {
+  std::vector<Lost> lost;
+  SQLite::Statement query{database,
+                          "SELECT max(first_seq, ?2), min(last_seq, ?3), cause FROM gap"
+                          " WHERE boot_key = ?1 AND first_seq <= ?3 AND last_seq >= ?2 ORDER BY first_seq"};
+  bind_all(query, boot_key, range.first, range.next - 1);
+  while (query.executeStep()) {
+    lost.push_back(
+        {{unsigned_id(query.getColumn(0)), unsigned_id(query.getColumn(1)) + 1}, query.getColumn(2).getString()});
+  }
+  return lost;
+}
+
+SampleTally::Stretch stretch(const Segment& segment) {
+  return {.samples = segment.interval(),
+          .first_robot_time_us = segment.first_robot_time_us,
+          .period_us = segment.context.period_us,
+          .flags = segment.context.flags,
+          .clock_uncertainty_us = segment.clock_uncertainty_us};
+}
+
+SampleTally::Stretch stretch(const SegmentHead& head, Interval range) {
+  const std::uint64_t first = std::max(head.first_seq, range.first);
+  return {.samples = {first, std::min(head.next_seq, range.next)},
+          .first_robot_time_us = head.first_robot_time_us + (first - head.first_seq) * head.period_us,
+          .period_us = head.period_us,
+          .flags = head.flags,
+          .clock_uncertainty_us = head.clock_uncertainty_us};
+}
+
+nlohmann::json json_of(const std::map<std::string, std::uint64_t>& lost_by_cause) {
+  nlohmann::json out = nlohmann::json::object();
+  for (const auto& [cause, samples] : lost_by_cause) out[cause] = samples;
+  return out;
+}
+
+std::map<std::string, std::uint64_t> causes_from(const std::string& text) {
+  std::map<std::string, std::uint64_t> causes;
+  const nlohmann::json object = nlohmann::json::parse(text, nullptr, false);
+  if (!object.is_object()) return causes;
+  for (const auto& [cause, samples] : object.items()) {
+    if (samples.is_number_unsigned()) causes[cause] = samples.get<std::uint64_t>();
+  }
+  return causes;
+}
+
+}  // namespace
+
+Certification::Progress Certification::advance_span(SQLite::Database& database, std::uint64_t& max_samples) {
+  const CertifiedSpan& span = spans_[span_];
+  const Interval rest{next_seq_, span.samples.next};
+  if (rest.first >= rest.next) return Progress::done;
+  const std::vector<Lost> lost = read_lost(database, span.boot_key, rest);
+  auto gap = lost.begin();
+  const auto pass_lost = [&] {
+    for (; gap != lost.end() && gap->samples.first <= next_seq_; ++gap) {
+      tally_.add_lost(gap->samples, gap->cause);
+      next_seq_ = std::max(next_seq_, gap->samples.next);
+    }
+  };
+  SampleScanner scanner{database, all_channels()};
+  scanner.begin(span.boot_key, rest);
+  Segment segment;
+  pass_lost();
+  while (scanner.next(segment)) {
+    if (segment.first_seq > next_seq_) return Progress::waiting;
+    tally_.add(stretch(segment));
+    hash_.add(span.boot_id, segment);
+    next_seq_ = segment.next_seq();
+    pass_lost();
+    max_samples -= std::min<std::uint64_t>(max_samples, segment.samples.size());
+    if (max_samples == 0) return Progress::more;
+  }
+  return next_seq_ >= span.samples.next ? Progress::done : Progress::waiting;
+}
+
+std::vector<CertifiedSpan> read_certified_spans(SQLite::Database& database, RunId run) {
+  std::vector<CertifiedSpan> spans;
+  SQLite::Statement query{database,
+                          "SELECT boot_key, boot_id, first_seq, last_seq, sample_period_us"
+                          " FROM run_span JOIN boot USING (boot_key)"
+                          " WHERE run_id = ? AND last_seq IS NOT NULL ORDER BY span"};
+  bind_all(query, run);
+  while (query.executeStep()) {
+    spans.push_back({query.getColumn(0).getInt64(),
+                     unsigned_id(query.getColumn(1)),
+                     {unsigned_id(query.getColumn(2)), unsigned_id(query.getColumn(3)) + 1},
+                     query.getColumn(4).getUInt()});
+  }
+  return spans;
+}
+
+bool HeadTally::advance(SQLite::Database& database) {
+  if (span_ == spans_.size()) return false;
+  const CertifiedSpan& span = spans_[span_];
+  if (!has_begun_) {
+    tally_.begin_span(span.samples, span.period_us);
+    for (const Lost& lost : read_lost(database, span.boot_key, span.samples)) tally_.add_lost(lost.samples, lost.cause);
+    next_seq_ = span.samples.first;
+    has_begun_ = true;
+  }
+  const Interval page{next_seq_, std::min(next_seq_ + kTalliedSamples, span.samples.next)};
+  for (const SegmentHead& head : read_heads(database, span.boot_key, page, {})) tally_.add(stretch(head, page));
+  next_seq_ = page.next;
+  if (next_seq_ < span.samples.next) return true;
+  tally_.end_span();
+  has_begun_ = false;
+  return ++span_ < spans_.size();
+}
+
+std::optional<Certificate> read_certificate(SQLite::Database& database, RunId run) {
+  SQLite::Statement row{database,
+                        "SELECT samples_expected, samples_live, samples_backfilled, samples_lost, lost_by_cause,"
+                        " longest_gap_samples, longest_gap_us, worst_clock_uncertainty_us, samples_without_clock,"
+                        " sha256, made_at_us, format FROM run_certificate WHERE run_id = ? AND format BETWEEN 1 AND ?"};
+  bind_all(row, run, std::int64_t{kCertificateFormat});
+  if (!row.executeStep()) return std::nullopt;
+  Certificate certificate;
+  certificate.samples_expected = unsigned_id(row.getColumn(0));
+  certificate.samples_live = unsigned_id(row.getColumn(1));
+  certificate.samples_backfilled = unsigned_id(row.getColumn(2));
+  certificate.samples_lost = unsigned_id(row.getColumn(3));
+  certificate.lost_by_cause = causes_from(row.getColumn(4).getString());
+  certificate.longest_gap_samples = unsigned_id(row.getColumn(5));
+  certificate.longest_gap_us = row.getColumn(6).getInt64();
+  certificate.worst_clock_uncertainty_us = row.getColumn(7).getInt64();
+  certificate.samples_without_clock = unsigned_id(row.getColumn(8));
+  certificate.sha256 = row.getColumn(9).getString();
+  certificate.made_at_us = row.getColumn(10).getInt64();
+  certificate.format = row.getColumn(11).getInt();
+  return certificate;
+}
+
+void write_certificate(SQLite::Database& database, RunId run, const Certificate& certificate) {
+  SQLite::Statement add{database,
+                        "INSERT OR REPLACE INTO run_certificate SELECT ?,?,?,?,?,?,?,?,?,?,?,?,?"
+                        " WHERE EXISTS (SELECT 1 FROM run WHERE run_id = ?1 AND state IN ('ended', 'interrupted'))"};
+  execute(add, run, std::int64_t{certificate.format}, certificate.samples_expected, certificate.samples_live,
+          certificate.samples_backfilled, certificate.samples_lost, json_of(certificate.lost_by_cause).dump(),
+          certificate.longest_gap_samples, certificate.longest_gap_us, certificate.worst_clock_uncertainty_us,
+          certificate.samples_without_clock, certificate.sha256, certificate.made_at_us);
+}
+
+}  // namespace server

@@ -1,0 +1,184 @@
+// One run at a time, page by page.
+#include "server/storage/runs/certifier.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+#include "server/storage/database/statement.hpp"
+#include "server/storage/runs/run_queries.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr std::uint64_t kPageSamples = 20'000;
+constexpr microseconds kFirstDelay = 250ms;
+constexpr microseconds kLongestDelay = 60s;
+constexpr microseconds kFindPatience = 3s;
+constexpr microseconds kFindLook = 20ms;
+
+// A page of a certificate, or why there can be none.
+struct Page {
+  Certification certification{{}};
+  Certification::Progress progress = Certification::Progress::more;
+  std::string problem;
+};
+
+Page next_page(SQLite::Database& database, RunId run, std::optional<Certification> begun) {
+  Page page;
+  try {
+    const SQLite::Transaction moment{database};
+    page.certification = begun ? std::move(*begun) : Certification{read_certified_spans(database, run)};
+    page.progress = page.certification.advance(database, kPageSamples);
+  } catch (const std::exception& error) {  // the file is damaged or the disk fails: the station goes on without
+    page.problem = error.what();
+  }
+  return page;
+}
+
+// Runs that ended before the last stop of the station, or under a version that made no certificates.
+std::vector<RunId> uncertified_runs(SQLite::Database& database) {
+  std::vector<RunId> runs;
+  try {
+    SQLite::Statement rows{database,
+                           "SELECT run_id FROM run WHERE state IN ('ended', 'interrupted')"
+                           " AND NOT EXISTS (SELECT 1 FROM run_certificate WHERE run_id = run.run_id)"};
+    while (rows.executeStep()) runs.push_back(rows.getColumn(0).getInt64());
+  } catch (const SQLite::Exception& error) {
+    spdlog::error("runs without a certificate cannot be looked for: {}", error.what());
+  }
+  return runs;
+}
+
+}  // namespace
+
+Certifier::Certifier(Clock& clock, Recorder& recorder, DatabaseReader& reader)
+    : clock_{clock}, recorder_{recorder}, reader_{reader}, added_{recorder.loop()} {}
+
+asio::awaitable<void> Certifier::run() {
+  const std::vector<RunId> runs = co_await reader_.ask(uncertified_runs);
+  for (const RunId run : runs) add(run);
+  for (;;) {
+    co_await wait_until_due();
+    const auto due = std::ranges::min_element(pending_, {}, [](const auto& entry) { return entry.second.due_us; });
+    if (due == pending_.end() || due->second.due_us > clock_.steady_us()) continue;
+    co_await look_at(due->first);
+  }
+}
+
+void Certifier::add(RunId run) {
+  Pending& pending = pending_[run];
+  pending.due_us = clock_.steady_us();
+  pending.delay_us = kFirstDelay.count();
+  added_.notify();
+}
+
+asio::awaitable<Result<RunCertificate>> Certifier::find(RunId run) {
+  auto query = [run](SQLite::Database& database) { return read_run_state(database, run); };
+  const std::optional<RunState> state = co_await reader_.ask(std::move(query));
+  if (!state) co_return fail(ErrorCode::not_found, fmt::format("there is no run {}", run));
+  if (*state == RunState::open) {
+    co_return fail(ErrorCode::conflict, fmt::format("run {} is open; a certificate is made when it has ended", run));
+  }
+  std::optional<Certificate> made = co_await stored(run);
+  if (!made && *state == RunState::discarded) {
+    co_return fail(ErrorCode::conflict, fmt::format("run {} was discarded before it had a certificate", run));
+  }
+  if (!made) {
+    add(run);
+    const std::uint64_t looks = pending_[run].looks;
+    const std::int64_t deadline_us = clock_.steady_us() + kFindPatience.count();
+    const auto is_looked_at = [&] {
+      const auto entry = pending_.find(run);
+      return entry == pending_.end() || entry->second.looks > looks;
+    };
+    while (!is_looked_at() && clock_.steady_us() < deadline_us) co_await clock_.sleep_for(kFindLook);
+    made = co_await stored(run);
+  }
+  if (made) co_return RunCertificate{std::move(*made), true};
+  Certificate counts = co_await count(run);
+  counts.made_at_us = clock_.utc_us();
+  co_return RunCertificate{std::move(counts), false};
+}
+
+asio::awaitable<Certificate> Certifier::count(RunId run) {
+  auto begin = [run](SQLite::Database& database) { return HeadTally{read_certified_spans(database, run)}; };
+  HeadTally tally = co_await reader_.ask(std::move(begin));
+  bool has_more = true;
+  while (has_more) {
+    auto page = [tally = std::move(tally)](SQLite::Database& database) mutable {
+      const SQLite::Transaction moment{database};
+      const bool more = tally.advance(database);
+      return std::pair{more, std::move(tally)};
+    };
+    std::tie(has_more, tally) = co_await reader_.ask(std::move(page));
+  }
+  co_return tally.counts();
+}
+
+asio::awaitable<void> Certifier::wait_until_due() {
+  if (pending_.empty()) {
+    co_await added_.wait();
+    co_return;
+  }
+  std::int64_t due_us = pending_.begin()->second.due_us;
+  for (const auto& [run, pending] : pending_) due_us = std::min(due_us, pending.due_us);
+  if (due_us <= clock_.steady_us()) co_return;
+  co_await added_.wait_until(clock_, due_us);
+}
+
+asio::awaitable<void> Certifier::look_at(RunId run) {
+  std::optional<Certification> begun = std::exchange(pending_[run].begun, std::nullopt);
+  Page page;
+  do {
+    auto query = [run, begun = std::move(begun)](SQLite::Database& database) mutable {
+      return next_page(database, run, std::move(begun));
+    };
+    page = co_await reader_.ask(std::move(query));
+    begun = std::move(page.certification);
+  } while (page.problem.empty() && page.progress == Certification::Progress::more);
+
+  if (page.problem.empty() && page.progress == Certification::Progress::done) {
+    Certificate certificate = begun->certificate();
+    certificate.made_at_us = clock_.utc_us();
+    const bool is_stored = co_await store(run, std::move(certificate));
+    if (is_stored) {
+      pending_.erase(run);
+      co_return;
+    }
+  }
+  Pending& pending = pending_[run];
+  ++pending.looks;
+  if (page.problem.empty()) {
+    pending.begun = std::move(begun);
+  } else if (pending.looks == 1) {
+    spdlog::error("run {} gets no certificate: {}", run, page.problem);
+  }
+  pending.due_us = clock_.steady_us() + pending.delay_us;
+  pending.delay_us = std::min(2 * pending.delay_us, kLongestDelay.count());
+}
+
+asio::awaitable<bool> Certifier::store(RunId run, Certificate certificate) {
+  auto job = [run, certificate = std::move(certificate)](Database& database) {
+    try {
+      write_certificate(database.handle(), run, certificate);
+      return true;
+    } catch (const SQLite::Exception&) {  // the disk is full or locked; the recorder says so
+      return false;
+    }
+  };
+  co_return co_await recorder_.on_disk(std::move(job));
+}
+
+asio::awaitable<std::optional<Certificate>> Certifier::stored(RunId run) {
+  auto query = [run](SQLite::Database& database) { return read_certificate(database, run); };
+  co_return co_await reader_.ask(std::move(query));
+}
+
+}  // namespace server

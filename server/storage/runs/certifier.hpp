@@ -1,0 +1,63 @@
+// Gives every run that has ended its certificate, as soon as each of its samples is stored or known lost.
+//
+// Loop thread. The samples are read once, in pages, on the readers' thread; the certificate is written on the disk
+// thread. A run whose robot still holds samples is looked at again after a while, at first often, at last each minute.
+// While the disk cannot be written nothing is certified. Needs run(); recorder and reader outlive it.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "server/runtime/clock.hpp"
+#include "server/runtime/result.hpp"
+#include "server/storage/database/database_reader.hpp"
+#include "server/storage/ingest/recorder.hpp"
+#include "server/storage/runs/certificate.hpp"
+
+namespace server {
+
+struct RunCertificate {
+  Certificate certificate;
+  bool is_final = false;  // no: samples are on their way, the counts are those of now, and there is no hash
+};
+
+class Certifier {
+ public:
+  Certifier(Clock& clock, Recorder& recorder, DatabaseReader& reader);
+
+  // Until cancelled.
+  boost::asio::awaitable<void> run();
+
+  // The run has ended.
+  void add(RunId run);
+
+  // Waits up to 3 s for a certificate that is only not made yet. not_found for an unknown run, conflict for an open one
+  // and for one that was discarded without a certificate.
+  boost::asio::awaitable<Result<RunCertificate>> find(RunId run);
+
+ private:
+  struct Pending {
+    std::optional<Certification> begun;
+    std::int64_t due_us = 0;    // steady
+    std::int64_t delay_us = 0;  // until it is looked at again
+    std::uint64_t looks = 0;    // that have ended
+  };
+
+  boost::asio::awaitable<void> wait_until_due();
+  boost::asio::awaitable<void> look_at(RunId run);
+  boost::asio::awaitable<bool> store(RunId run, Certificate certificate);
+  boost::asio::awaitable<std::optional<Certificate>> stored(RunId run);
+  boost::asio::awaitable<Certificate> count(RunId run);
+
+  Clock& clock_;
+  Recorder& recorder_;
+  DatabaseReader& reader_;
+  Signal added_;
+  std::map<RunId, Pending> pending_;
+};
+
+}  // namespace server

@@ -1,0 +1,114 @@
+// SQL of the models of fluids: one row for each change.
+#include "server/storage/runs/fluid_models.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "server/storage/audit/audit_chain.hpp"
+#include "server/storage/database/database.hpp"
+#include "server/storage/database/statement.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr const char* kColumns =
+    "fluid, set_at_us, set_by, gain_1_m_s, gain_2_m_s, gain_3_m_s, gain_4_m_s, time_constant_1_s, time_constant_2_s,"
+    " time_constant_3_s, time_constant_4_s, fit_error, document";
+constexpr int kFirstGain = 3;  // in that order, as are the next
+constexpr int kFirstTimeConstant = kFirstGain + static_cast<int>(kFluidModelSections);
+constexpr int kFitError = kFirstTimeConstant + static_cast<int>(kFluidModelSections);
+
+using Named = std::pair<std::string, FluidModel>;
+
+// The newest row of each fluid, unless it says that the fluid has none.
+std::vector<Named> read_in_force(SQLite::Database& database) {
+  std::vector<Named> models;
+  SQLite::Statement rows{database, fmt::format("SELECT {} FROM fluid_model WHERE model_row IN"
+                                               " (SELECT max(model_row) FROM fluid_model GROUP BY fluid)"
+                                               " AND gain_1_m_s IS NOT NULL ORDER BY fluid",
+                                               kColumns)};
+  while (rows.executeStep()) {
+    auto& [fluid, model] = models.emplace_back();
+    fluid = rows.getColumn(0).getString();
+    model.set_at_us = rows.getColumn(1).getInt64();
+    model.set_by = rows.getColumn(2).getString();
+    for (std::size_t i = 0; i < kFluidModelSections; ++i) {
+      const int column = static_cast<int>(i);
+      model.gain_m_s[i] = float_or_nan(rows.getColumn(kFirstGain + column));
+      model.time_constant_s[i] = float_or_nan(rows.getColumn(kFirstTimeConstant + column));
+    }
+    model.fit_error = rows.getColumn(kFitError).getDouble();
+    model.document = rows.getColumn(kFitError + 1).getString();
+  }
+  return models;
+}
+
+// Null: the fluid has none from now on.
+void append(SQLite::Database& database, const std::string& fluid, const FluidModel* model, const Author& by) {
+  SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
+  SQLite::Statement add{
+      database, fmt::format("INSERT INTO fluid_model ({}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", kColumns)};
+  bind_all(add, fluid, by.at_us, by.actor);
+  if (model != nullptr) {
+    int index = kFirstGain;
+    for (const auto& [name, value] : parameters_of(*model)) bind_value(add, ++index, value);
+    bind_value(add, ++index, model->fit_error);
+    bind_value(add, ++index, model->document);
+  }
+  add.exec();
+  AuditNote note;
+  note.by = by;
+  note.action = model != nullptr ? "fluid.model_set" : "fluid.model_removed";
+  note.subject = fluid;
+  if (model != nullptr) note.detail = audit_detail({{"fit_error", model->fit_error}});
+  AuditChain{database}.append(note);
+  transaction.commit();
+}
+
+// An error for whoever asked: a disk that is full does not end the station.
+Result<void> stored(Database& database, const std::string& fluid, const FluidModel* model, const Author& by) {
+  try {
+    append(database.handle(), fluid, model, by);
+    return {};
+  } catch (const SQLite::Exception& error) {
+    return fail(ErrorCode::unavailable, fmt::format("the model could not be stored: {}; try again", error.what()),
+                "not_stored");
+  }
+}
+
+}  // namespace
+
+asio::awaitable<void> FluidModels::load() {
+  auto job = [](Database& database) { return read_in_force(database.handle()); };
+  std::vector<Named> models = co_await recorder_.on_disk(std::move(job));
+  for (auto& [fluid, model] : models) list_.put(fluid, std::move(model));
+}
+
+asio::awaitable<Result<FluidModel>> FluidModels::set(std::string fluid, FluidModel model, Author by) {
+  by.at_us = clock_.utc_us();
+  model.set_by = by.actor;
+  model.set_at_us = by.at_us;
+  auto job = [fluid, model, by](Database& database) { return stored(database, fluid, &model, by); };
+  const Result<void> done = co_await recorder_.on_disk(std::move(job));
+  if (!done) co_return std::unexpected{done.error()};
+  list_.put(fluid, model);
+  co_return model;
+}
+
+asio::awaitable<Result<void>> FluidModels::remove(std::string fluid, Author by) {
+  if (list_.find(fluid) == nullptr) {
+    co_return fail(ErrorCode::not_found, fmt::format("the fluid '{}' has no model", fluid), "no_model");
+  }
+  by.at_us = clock_.utc_us();
+  auto job = [fluid, by](Database& database) { return stored(database, fluid, nullptr, by); };
+  const Result<void> done = co_await recorder_.on_disk(std::move(job));
+  if (done) list_.remove(fluid);
+  co_return done;
+}
+
+}  // namespace server

@@ -1,0 +1,40 @@
+// The models of fluids in the database, and in memory those that are in force.
+//
+// A model is a row that stays; the newest of a fluid is in force, and one without numbers says that the fluid has none.
+// Loop thread; SQL on the disk thread. Clock and recorder outlive it.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <string>
+
+#include "server/runtime/clock.hpp"
+#include "server/runtime/result.hpp"
+#include "server/station/state/audit_note.hpp"
+#include "server/station/state/fluid_model.hpp"
+#include "server/storage/ingest/recorder.hpp"
+
+namespace server {
+
+class FluidModels {
+ public:
+  FluidModels(Clock& clock, Recorder& recorder) : clock_{clock}, recorder_{recorder} {}
+
+  // Reads those in force; before everything else.
+  boost::asio::awaitable<void> load();
+
+  const FluidModelList& in_force() const { return list_; }
+
+  // In force when it is on disk, with its entry in the audit; author and time are set here. The model is a checked one,
+  // the fluid a listed one. unavailable when the disk cannot be written.
+  boost::asio::awaitable<Result<FluidModel>> set(std::string fluid, FluidModel model, Author by);
+
+  // The fluid has no model from then on. not_found when it has none.
+  boost::asio::awaitable<Result<void>> remove(std::string fluid, Author by);
+
+ private:
+  Clock& clock_;
+  Recorder& recorder_;
+  FluidModelList list_;
+};
+
+}  // namespace server

@@ -1,0 +1,60 @@
+// Markers: what somebody noted at a sample of a robot's recording. They belong to the recording, so a run shows those
+// in its spans, and one made afterwards has them, too.
+//
+// Loop thread; SQL on the disk thread and the readers'.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/runtime/clock.hpp"
+#include "server/runtime/result.hpp"
+#include "server/storage/database/database_reader.hpp"
+#include "server/storage/ingest/recorder.hpp"
+#include "server/storage/runs/run.hpp"
+
+namespace server {
+
+struct Marker {
+  std::int64_t id = 0;
+  BootId boot_id = 0;
+  std::uint64_t seq = 0;
+  std::optional<std::uint64_t> robot_time_us;  // both of the sample; empty while nothing of its boot is stored
+  std::optional<std::int64_t> utc_us;
+  std::string text;
+  std::string actor;
+  std::int64_t made_at_us = 0;  // UTC
+};
+
+struct MarkerWish {
+  RobotId robot_id;
+  std::string text;  // 1 to 4000 bytes
+  std::string actor;
+  std::optional<std::int64_t> at_us;  // UTC: the sample then, or the last one before
+  BootId boot_id = 0;  // of the robot's present connection, 0 when there is none: its newest sample is now
+};
+
+class Markers {
+ public:
+  Markers(Clock& clock, Recorder& recorder, DatabaseReader& reader)
+      : clock_{clock}, recorder_{recorder}, reader_{reader} {}
+
+  // not_connected for a marker now of a robot that is not there; invalid for a time that is in the future or has no
+  // sample, or for a bad text.
+  boost::asio::awaitable<Result<Marker>> add(MarkerWish wish);
+
+  // In the order in which they were made, at most `limit` (1 to 1000) after the marker `after` (0: from the first).
+  boost::asio::awaitable<std::vector<Marker>> of_robot(RobotId robot_id, std::int64_t after, std::size_t limit);
+  // In order of span and seq.
+  boost::asio::awaitable<Result<std::vector<Marker>>> of_run(RunId run);
+
+ private:
+  Clock& clock_;
+  Recorder& recorder_;
+  DatabaseReader& reader_;
+};
+
+}  // namespace server

@@ -1,0 +1,206 @@
+// SQL of runs, for readers.
+#include "server/storage/runs/run_queries.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "server/storage/database/statement.hpp"
+
+namespace server {
+
+const char* const kRunColumns =
+    "run_id, robot_id, name, fluid, pump_profile, mean_flow_m_s, tube, operator_name, notes, verdict,"
+    " firmware_version, controller_id, controller_checksum, parameters_checksum, started_at_us, ended_at_us, state,"
+    " made_afterwards, made_by, profile";
+
+namespace {
+
+Run run_from(SQLite::Statement& row) {
+  Run run;
+  run.id = row.getColumn(0).getInt64();
+  run.robot_id = row.getColumn(1).getString();
+  run.conditions.name = row.getColumn(2).getString();
+  run.conditions.fluid = row.getColumn(3).getString();
+  run.conditions.pump_profile = row.getColumn(4).getString();
+  if (!row.getColumn(5).isNull()) run.conditions.mean_flow_m_s = row.getColumn(5).getDouble();
+  run.conditions.tube = row.getColumn(6).getString();
+  run.conditions.operator_name = row.getColumn(7).getString();
+  run.conditions.notes = row.getColumn(8).getString();
+  run.conditions.verdict = row.getColumn(9).getString();
+  run.firmware_version = row.getColumn(10).getString();
+  run.controller_id = row.getColumn(11).getUInt();
+  run.controller_checksum = row.getColumn(12).getUInt();
+  run.parameters_checksum = row.getColumn(13).getUInt();
+  run.started_at_us = row.getColumn(14).getInt64();
+  if (!row.getColumn(15).isNull()) run.ended_at_us = row.getColumn(15).getInt64();
+  run.state = run_state_from(row.getColumn(16).getString()).value_or(RunState::open);
+  run.made_afterwards = row.getColumn(17).getInt() != 0;
+  run.made_by = row.getColumn(18).getString();
+  run.conditions.profile = row.getColumn(19).getString();
+  return run;
+}
+
+// Fills in spans and counts, run by run.
+class RunReading {
+ public:
+  RunReading(SQLite::Database& database, const BootHeads& heads) : database_{database}, heads_{heads} {}
+
+  void complete(Run& run) {
+    const bool is_certified = read_certificate(run);
+    bind_all(spans_, run.id);
+    while (spans_.executeStep()) {
+      const std::int64_t boot_key = spans_.getColumn(0).getInt64();
+      RunSpan span{
+          .boot_id = unsigned_id(spans_.getColumn(1)), .first_seq = unsigned_id(spans_.getColumn(2)), .last_seq = {}};
+      if (!spans_.getColumn(3).isNull()) span.last_seq = unsigned_id(spans_.getColumn(3));
+      run.spans.push_back(span);
+      if (!is_certified) count(run, span, boot_key, unsigned_id(spans_.getColumn(4)));
+    }
+  }
+
+ private:
+  bool read_certificate(Run& run) {
+    bind_all(certificate_, run.id);
+    if (!certificate_.executeStep()) return false;
+    run.samples_expected = unsigned_id(certificate_.getColumn(0));
+    run.samples_stored = unsigned_id(certificate_.getColumn(1));
+    run.samples_lost = unsigned_id(certificate_.getColumn(2));
+    return true;
+  }
+
+  // Below `settled` every sample is stored or lost, so there only the gaps are read.
+  void count(Run& run, const RunSpan& span, std::int64_t boot_key, std::uint64_t settled) {
+    const std::uint64_t next =
+        span.last_seq ? *span.last_seq + 1 : known_next_seq(database_, heads_, boot_key, span.boot_id);
+    if (next <= span.first_seq) return;
+    settled = std::clamp(settled, span.first_seq, next);
+    const std::uint64_t lost = sum(lost_, boot_key, span.first_seq, next - 1);
+    run.samples_expected += next - span.first_seq;
+    run.samples_lost += lost;
+    if (settled > span.first_seq) {
+      run.samples_stored += settled - span.first_seq - sum(lost_, boot_key, span.first_seq, settled - 1);
+    }
+    if (settled < next) run.samples_stored += sum(stored_, boot_key, settled, next - 1);
+  }
+
+  static std::uint64_t sum(SQLite::Statement& query, std::int64_t boot_key, std::uint64_t first, std::uint64_t last) {
+    bind_all(query, boot_key, first, last);
+    query.executeStep();
+    return unsigned_id(query.getColumn(0));
+  }
+
+  SQLite::Database& database_;
+  const BootHeads& heads_;
+  SQLite::Statement certificate_{database_,
+                                 "SELECT samples_expected, samples_live + samples_backfilled, samples_lost"
+                                 " FROM run_certificate WHERE run_id = ?"};
+  SQLite::Statement spans_{database_,
+                           "SELECT boot_key, boot_id, first_seq, last_seq, durable_next_seq"
+                           " FROM run_span JOIN boot USING (boot_key) WHERE run_id = ? ORDER BY span"};
+  SQLite::Statement stored_{database_,
+                            "SELECT coalesce(sum(min(last_seq, ?3) - max(first_seq, ?2) + 1), 0) FROM segment"
+                            " WHERE boot_key = ?1 AND first_seq BETWEEN ?2 - 99 AND ?3 AND last_seq >= ?2"};
+  SQLite::Statement lost_{database_,
+                          "SELECT coalesce(sum(min(last_seq, ?3) - max(first_seq, ?2) + 1), 0) FROM gap"
+                          " WHERE boot_key = ?1 AND first_seq <= ?3 AND last_seq >= ?2"};
+};
+
+}  // namespace
+
+std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, RunId id) {
+  SQLite::Statement query{database, fmt::format("SELECT {} FROM run WHERE run_id = ?", kRunColumns)};
+  bind_all(query, id);
+  if (!query.executeStep()) return std::nullopt;
+  Run run = run_from(query);
+  RunReading{database, heads}.complete(run);
+  return run;
+}
+
+std::optional<RunState> read_run_state(SQLite::Database& database, RunId id) {
+  SQLite::Statement query{database, "SELECT state FROM run WHERE run_id = ?"};
+  bind_all(query, id);
+  if (!query.executeStep()) return std::nullopt;
+  return run_state_from(query.getColumn(0).getString());
+}
+
+std::vector<Run> list_runs(SQLite::Database& database, const BootHeads& heads, const RunFilter& filter) {
+  SQLite::Statement query{database, fmt::format("SELECT {} FROM run WHERE (?1 IS NULL OR robot_id = ?1)"
+                                                " AND (?2 = 0 OR run_id < ?2)"
+                                                " AND iif(?3 IS NULL, state <> 'discarded', state = ?3)"
+                                                " ORDER BY run_id DESC LIMIT ?4",
+                                                kRunColumns)};
+  std::optional<std::string> state;
+  if (filter.state) state = text(*filter.state);
+  bind_all(query, filter.robot_id, filter.before, state, static_cast<std::int64_t>(filter.limit));
+  std::vector<Run> runs;
+  while (query.executeStep()) runs.push_back(run_from(query));
+  RunReading reading{database, heads};
+  for (Run& run : runs) reading.complete(run);
+  return runs;
+}
+
+std::vector<InterruptedRun> read_interrupted(SQLite::Database& database, const std::vector<RunId>& ids) {
+  SQLite::Statement row{
+      database,
+      "SELECT robot_id, name, iif(EXISTS (SELECT 1 FROM run_span WHERE run_id = ?1), ended_at_us, NULL), fluid"
+      " FROM run WHERE run_id = ?1"};
+  std::vector<InterruptedRun> runs;
+  for (const RunId id : ids) {
+    bind_all(row, id);
+    if (!row.executeStep()) continue;
+    InterruptedRun run{.id = id,
+                       .robot_id = row.getColumn(0).getString(),
+                       .name = row.getColumn(1).getString(),
+                       .fluid = row.getColumn(3).getString(),
+                       .last_sample_at_us = {}};
+    if (!row.getColumn(2).isNull()) run.last_sample_at_us = row.getColumn(2).getInt64();
+    runs.push_back(std::move(run));
+  }
+  return runs;
+}
+
+std::vector<RunId> interrupted_since_start(SQLite::Database& database) {
+  SQLite::Statement entries{database, "SELECT action, subject FROM audit ORDER BY entry DESC LIMIT 10000"};
+  std::vector<RunId> ids;
+  while (entries.executeStep()) {
+    const std::string action = entries.getColumn(0).getString();
+    if (action == "station.started") break;
+    if (action == "run.interrupted") ids.push_back(entries.getColumn(1).getInt64());
+  }
+  std::ranges::reverse(ids);
+  return ids;
+}
+
+std::optional<RunSnapshot> read_snapshot(SQLite::Database& database, RunId id) {
+  SQLite::Statement run{database, fmt::format("SELECT {} FROM run WHERE run_id = ?", kRunColumns)};
+  bind_all(run, id);
+  if (!run.executeStep()) return std::nullopt;
+  const Run found = run_from(run);
+  RunSnapshot snapshot{
+      found.firmware_version, found.controller_id, found.controller_checksum, found.parameters_checksum, {}};
+  SQLite::Statement rows{database,
+                         "SELECT span, kind, first_seq, content FROM run_in_force WHERE run_id = ? ORDER BY 1, 2, 3"};
+  bind_all(rows, id);
+  while (rows.executeStep()) {
+    snapshot.in_force.push_back({rows.getColumn(0).getUInt(), rows.getColumn(1).getString(),
+                                 unsigned_id(rows.getColumn(2)), rows.getColumn(3).getString()});
+  }
+  return snapshot;
+}
+
+std::uint64_t known_next_seq(SQLite::Database& database, const BootHeads& heads, std::int64_t boot_key,
+                             BootId boot_id) {
+  SQLite::Statement query{
+      database,
+      "SELECT max(announced_next_seq,"
+      " coalesce((SELECT last_seq + 1 FROM segment WHERE boot_key = ?1 ORDER BY first_seq DESC LIMIT 1), 0),"
+      " coalesce((SELECT last_seq + 1 FROM gap WHERE boot_key = ?1 ORDER BY first_seq DESC LIMIT 1), 0))"
+      " FROM boot WHERE boot_key = ?1"};
+  bind_all(query, boot_key);
+  query.executeStep();
+  const auto head = heads.find(boot_id);
+  return std::max(unsigned_id(query.getColumn(0)), head == heads.end() ? 0 : head->second);
+}
+
+}  // namespace server

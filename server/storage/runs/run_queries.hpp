@@ -1,0 +1,47 @@
+// Runs as they are stored, with the counts of their samples.
+//
+// On the thread that owns the database handle; reads only. The counts of a run that has a certificate are the
+// certificate's, so a list of ended runs reads no segment; those of any other run are summed over its segments.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/storage/runs/run.hpp"
+
+namespace server {
+
+// One above the newest sample of each boot in use, as the recorder knows it.
+using BootHeads = std::map<BootId, std::uint64_t>;
+
+std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, RunId id);
+std::optional<RunState> read_run_state(SQLite::Database& database, RunId id);
+std::vector<Run> list_runs(SQLite::Database& database, const BootHeads& heads, const RunFilter& filter);
+
+// A run that was open when the station stopped, or was killed.
+struct InterruptedRun {
+  RunId id = 0;
+  RobotId robot_id;
+  std::string name;
+  std::string fluid;
+  std::optional<std::int64_t> last_sample_at_us;  // UTC; empty: it has no sample
+};
+
+std::vector<InterruptedRun> read_interrupted(SQLite::Database& database, const std::vector<RunId>& ids);
+// Which were interrupted since the station started last, as the newest 10,000 entries of the audit say.
+std::vector<RunId> interrupted_since_start(SQLite::Database& database);
+
+std::optional<RunSnapshot> read_snapshot(SQLite::Database& database, RunId id);
+
+// One above the newest sample that the boot is known to have made.
+std::uint64_t known_next_seq(SQLite::Database& database, const BootHeads& heads, std::int64_t boot_key, BootId boot_id);
+
+// The columns of `run`, in the order in which a row of it is read.
+extern const char* const kRunColumns;
+
+}  // namespace server

@@ -1,0 +1,56 @@
+// What changes runs in the database: begin, end, interrupt, make afterwards, annotate, discard.
+//
+// Disk thread only; each call is one transaction, with its entries in the audit. Uses the Database, which outlives it.
+// An open run has exactly one open span; BootStore::start moves it to a new boot.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/runtime/result.hpp"
+#include "server/station/state/audit_note.hpp"
+#include "server/storage/database/database.hpp"
+#include "server/storage/runs/run_queries.hpp"
+#include "server/storage/runs/run_spans.hpp"
+
+namespace server {
+
+class RunStore {
+ public:
+  RunStore(Database& database, BootHeads heads) : handle_{database.handle()}, heads_{std::move(heads)} {}
+
+  // Stores a run with its one open span. not_connected when that boot has ended meanwhile. The station's document, if
+  // there is one, is noted as in force in its spans, here and in end().
+  Result<RunId> add(const Run& run, const std::string& station_document, const Author& by);
+
+  // The same of what is recorded, and was found before. Nothing when a boot of which samples were found has none any
+  // more: they have been purged meanwhile.
+  std::optional<RunId> add_afterwards(Run run, const RecordedSamples& samples, const Author& by);
+
+  // Both: not_found, and conflict for a discarded (annotate) or open (discard) run.
+  Result<void> annotate(RunId id, const RunAnnotation& annotation, const Author& by);
+  Result<void> discard(RunId id, const std::string& reason, const Author& by);
+
+  // Closes the open span at the newest sample (a span without samples is dropped) and the run.
+  void end(RunId id, const std::string& verdict, const std::string& station_document, const Author& by);
+
+  // Closes every open run at the last sample known of its open span. Returns which they were.
+  std::vector<RunId> interrupt(std::int64_t utc_us);
+
+ private:
+  RunId insert(const Run& run);
+  void tell(RunId id, const RobotId& robot_id, const char* action, const nlohmann::json& detail, const Author& by);
+  void add_note(RunId id, const Author& author, const std::string& field, const std::string& before,
+                const std::string& after);
+  void put_in_force(RunId id, const std::string& station_document, std::int64_t utc_us);
+  void close_span(RunId id);
+
+  SQLite::Database& handle_;
+  BootHeads heads_;
+};
+
+RobotId robot_of(SQLite::Database& database, RunId run);  // empty: there is no such run
+
+}  // namespace server

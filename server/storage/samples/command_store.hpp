@@ -1,0 +1,27 @@
+// A command's row, and with each state of it that is stored an entry of the audit, which says the same.
+//
+// On the thread that owns the handle, in the caller's transaction. Throws SQLite::Exception.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include "server/station/state/station_state.hpp"
+#include "server/storage/audit/audit_chain.hpp"
+
+namespace server {
+
+// "command." and the state; the detail says what was asked for and when each stage was reached.
+AuditNote audit_note_of(const CommandRecord& command);
+
+class CommandStore {
+ public:
+  explicit CommandStore(SQLite::Database& database);
+
+  // Replaces what is stored of the same command.
+  void write(const CommandRecord& command, AuditChain& audit);
+
+ private:
+  SQLite::Statement upsert_;
+};
+
+}  // namespace server

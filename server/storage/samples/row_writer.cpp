@@ -1,0 +1,83 @@
+// Two prepared statements, one of many rows and one of a single row; the extremes are found on the way.
+#include "server/storage/samples/row_writer.hpp"
+
+#include <sqlite3.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+namespace server {
+namespace {
+
+constexpr const char* kInsertSamples =
+    "INSERT INTO sample (row, position_m, velocity_m_s, acceleration_m_s2, duty, impedance_mv, reference_m) VALUES ";
+constexpr const char* kOneRow = "(?,?,?,?,?,?,?)";
+
+std::array<float, kChannels> channels_of(const Sample& sample) {
+  return {sample.position_m, sample.velocity_m_s, sample.acceleration_m_s2,
+          sample.duty,       sample.impedance_mv, sample.reference_m};
+}
+
+}  // namespace
+
+RowWriter::RowWriter(SQLite::Database& database)
+    : database_{database}, insert_block_{prepare(kBlockRows)}, insert_one_{prepare(1)} {}
+
+RawStatement RowWriter::prepare(std::size_t rows) {
+  std::string sql = kInsertSamples;
+  for (std::size_t row = 0; row < rows; ++row) sql.append(row > 0 ? "," : "").append(kOneRow);
+  sqlite3_stmt* statement = nullptr;
+  const int result =
+      sqlite3_prepare_v3(database_.getHandle(), sql.c_str(), -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
+  if (result != SQLITE_OK) throw SQLite::Exception{database_.getHandle(), result};
+  return RawStatement{statement};
+}
+
+Extremes RowWriter::write(const std::vector<Sample>& samples, std::int64_t first_row) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  Extremes extremes;
+  extremes.min.fill(kInfinity);
+  extremes.max.fill(-kInfinity);
+  std::int64_t row = first_row;
+  for (const Sample& sample : samples) {
+    if (waiting_ == kBlockRows) {
+      insert(insert_block_.get(), block_);
+      waiting_ = 0;
+    }
+    block_[waiting_] = {.row = row++, .values = channels_of(sample)};
+    for (std::size_t channel = 0; channel < kChannels; ++channel) {
+      const float value = block_[waiting_].values[channel];
+      if (!std::isfinite(value)) continue;
+      extremes.min[channel] = std::fmin(extremes.min[channel], value);
+      extremes.max[channel] = std::fmax(extremes.max[channel], value);
+    }
+    ++waiting_;
+  }
+  return extremes;
+}
+
+void RowWriter::finish() {
+  for (std::size_t at = 0; at < waiting_; ++at) insert(insert_one_.get(), {&block_[at], 1});
+  waiting_ = 0;
+}
+
+void RowWriter::insert(sqlite3_stmt* statement, std::span<const Row> rows) {
+  int index = 0;
+  for (const Row& row : rows) {
+    sqlite3_bind_int64(statement, ++index, row.row);
+    for (const float value : row.values) {
+      ++index;
+      if (std::isfinite(value)) {
+        sqlite3_bind_double(statement, index, static_cast<double>(value));
+      } else {
+        sqlite3_bind_null(statement, index);
+      }
+    }
+  }
+  const int result = sqlite3_step(statement);
+  sqlite3_reset(statement);  // gives the same result again
+  if (result != SQLITE_DONE) throw SQLite::Exception{database_.getHandle(), result};
+}
+
+}  // namespace server

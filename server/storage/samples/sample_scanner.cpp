@@ -1,0 +1,239 @@
+// Two statements: the segments by index, and the rows by number. Rows of segments that follow one another in the file
+// are stepped through as one range.
+#include "server/storage/samples/sample_scanner.hpp"
+
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+
+#include "server/storage/samples/stored_rows.hpp"
+
+namespace server {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+// A segment that holds the first sample of the range begins at most 99 before it.
+constexpr const char* kInRange =
+    " FROM segment WHERE boot_key = ?1 AND first_seq >= ?2 - 99 AND first_seq <= ?3 AND last_seq >= ?2"
+    " ORDER BY first_seq";
+
+constexpr const char* kSegmentColumns =
+    "SELECT first_seq, last_seq, first_row, first_robot_time_us, period_us,"
+    " iif(first_received_at_us = 0, received_at_us, first_received_at_us), received_at_us, utc_offset_us,"
+    " clock_uncertainty_us, mode, sub_state, emergency_cause, setpoint_m, disturbance_m, position_sd_m, controller_id,"
+    " emergency_id, flags, ";
+constexpr std::int64_t kUnknownValuesSince = 7;  // version: the tools read older ones, too
+
+Channel channel(std::size_t index) { return static_cast<Channel>(index); }
+
+// The largest seq of the range that SQLite can hold.
+std::int64_t last_of(Interval samples) {
+  constexpr std::uint64_t kLargest = std::numeric_limits<std::int64_t>::max();
+  return static_cast<std::int64_t>(std::min(samples.next - 1, kLargest));
+}
+
+[[noreturn]] void fail_with(SQLite::Database& database) { throw SQLite::Exception{database.getHandle()}; }
+
+RawStatement prepare(SQLite::Database& database, const std::string& sql) {
+  sqlite3_stmt* statement = nullptr;
+  const int result =
+      sqlite3_prepare_v3(database.getHandle(), sql.c_str(), -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
+  if (result != SQLITE_OK) fail_with(database);
+  return RawStatement{statement};
+}
+
+void bind_range(sqlite3_stmt* statement, std::int64_t boot_key, Interval samples) {
+  sqlite3_bind_int64(statement, 1, boot_key);
+  sqlite3_bind_int64(statement, 2, static_cast<std::int64_t>(samples.first));
+  sqlite3_bind_int64(statement, 3, last_of(samples));
+}
+
+// SQLite keeps integers signed: what was stored as two's complement comes back so.
+std::uint64_t unsigned_at(sqlite3_stmt* row, int column) {
+  return static_cast<std::uint64_t>(sqlite3_column_int64(row, column));
+}
+
+// NULL reads as 0, so only a 0 is looked at twice.
+float float_at(sqlite3_stmt* row, int column) {
+  const double value = sqlite3_column_double(row, column);
+  return value == 0 && sqlite3_column_type(row, column) == SQLITE_NULL ? kNaN : static_cast<float>(value);
+}
+
+std::optional<float> optional_at(sqlite3_stmt* row, int column) {
+  const bool is_null = sqlite3_column_type(row, column) == SQLITE_NULL;
+  return is_null ? std::nullopt : std::optional{static_cast<float>(sqlite3_column_double(row, column))};
+}
+
+template <class Named, class Parse>
+auto enumerator_at(sqlite3_stmt* row, int column, Named& last, Parse parse) {
+  const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
+  if (text != nullptr && last.name != text) {
+    last.name = text;
+    last.value = parse(last.name);
+  }
+  return last.value;
+}
+
+}  // namespace
+
+const char* text(Channel value) {
+  constexpr std::array<const char*, kChannels> kNames{"position_m", "velocity_m_s", "acceleration_m_s2",
+                                                      "duty",       "impedance_mv", "reference_m"};
+  return kNames[static_cast<std::size_t>(value)];
+}
+
+Result<Channels> parse_channels(std::string_view text) {
+  Channels channels;
+  for (bool more = true; more;) {
+    const std::size_t comma = text.find(',');
+    const std::string_view name = text.substr(0, comma);
+    std::size_t index = 0;
+    while (index < kChannels && name != server::text(channel(index))) ++index;
+    if (index == kChannels || channels[index]) {
+      const char* problem = index == kChannels ? "is no channel" : "is given twice";
+      return fail(ErrorCode::bad_request, fmt::format("channels: '{}' {}", name.substr(0, 40), problem),
+                  "out_of_range");
+    }
+    channels.set(index);
+    more = comma != std::string_view::npos;
+    if (more) text.remove_prefix(comma + 1);
+  }
+  return channels;
+}
+
+void FinalizeStatement::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+
+SampleScanner::SampleScanner(SQLite::Database& database, Channels channels) : database_{database}, channels_{channels} {
+  const bool has_unknown = database.execAndGet("PRAGMA user_version").getInt64() >= kUnknownValuesSince;
+  segments_ = prepare(database, std::string{kSegmentColumns} + (has_unknown ? "unknown_values" : "NULL") + kInRange);
+  std::string sql = "SELECT row";
+  for (std::size_t index = 0; index < kChannels; ++index) {
+    if (channels[index]) sql += fmt::format(", {}", text(channel(index)));
+  }
+  rows_ = prepare(database, sql + " FROM sample WHERE row >= ?1 ORDER BY row");
+}
+
+void SampleScanner::begin(std::int64_t boot_key, Interval samples) {
+  end();
+  boot_key_ = boot_key;
+  range_ = samples;
+  if (samples.next <= samples.first) return;
+  bind_range(segments_.get(), boot_key, samples);
+  scanning_ = true;
+}
+
+bool SampleScanner::next(Segment& into) {
+  if (!scanning_) return false;
+  const int result = sqlite3_step(segments_.get());
+  if (result == SQLITE_DONE) {
+    end();
+    return false;
+  }
+  if (result != SQLITE_ROW) fail_with(database_);
+  const std::int64_t first_row = read_segment(into);
+  read_rows(first_row, into);
+  return true;
+}
+
+void SampleScanner::end() {
+  sqlite3_reset(segments_.get());
+  sqlite3_reset(rows_.get());
+  next_row_ = 0;
+  scanning_ = false;
+}
+
+std::int64_t SampleScanner::read_segment(Segment& into) {
+  sqlite3_stmt* row = segments_.get();
+  const std::uint64_t first_seq = unsigned_at(row, 0);
+  const std::uint64_t first = std::max(first_seq, range_.first);
+  const std::uint64_t next = std::min(unsigned_at(row, 1) + 1, range_.next);
+  const std::uint64_t skipped = first - first_seq;
+  SampleContext& context = into.context;
+  into.boot_key = boot_key_;
+  into.first_seq = first;
+  into.samples.resize(next - first);
+  context.period_us = static_cast<std::uint32_t>(unsigned_at(row, 4));
+  into.first_robot_time_us = unsigned_at(row, 3) + skipped * context.period_us;
+  into.first_received_at_us = sqlite3_column_int64(row, 5);
+  into.received_at_us = sqlite3_column_int64(row, 6);
+  into.utc_offset_us = sqlite3_column_int64(row, 7);
+  into.clock_uncertainty_us = sqlite3_column_int64(row, 8);
+  context.mode = enumerator_at(row, 9, mode_, mode_from);
+  context.sub_state = enumerator_at(row, 10, sub_state_, sub_state_from);
+  context.emergency_cause = enumerator_at(row, 11, emergency_cause_, emergency_cause_from);
+  context.setpoint_m = optional_at(row, 12);
+  context.disturbance_m = optional_at(row, 13);
+  context.position_sd_m = optional_at(row, 14);
+  context.controller_id = static_cast<std::uint32_t>(unsigned_at(row, 15));
+  context.emergency_id = unsigned_at(row, 16);
+  context.flags = static_cast<std::uint32_t>(unsigned_at(row, 17));
+  const auto* unknown = reinterpret_cast<const char*>(sqlite3_column_text(row, 18));
+  if (unknown != nullptr) set_unknown(context, unknown);
+  return sqlite3_column_int64(row, 2) + static_cast<std::int64_t>(skipped);
+}
+
+void SampleScanner::read_rows(std::int64_t first_row, Segment& into) {
+  sqlite3_stmt* row = rows_.get();
+  if (next_row_ != first_row) seek(first_row);
+  for (Sample& sample : into.samples) {
+    const int result = sqlite3_step(row);
+    if (result != SQLITE_ROW && result != SQLITE_DONE) fail_with(database_);
+    if (result == SQLITE_DONE || sqlite3_column_int64(row, 0) != next_row_) {
+      throw std::runtime_error{
+          fmt::format("row {} of the segment at sample {} of boot key {} is missing: the database "
+                      "is damaged",
+                      next_row_, into.first_seq, into.boot_key)};
+    }
+    ++next_row_;
+    int column = 0;
+    for (std::size_t index = 0; index < kChannels; ++index) {
+      sample.*kSampleMembers[index] = channels_[index] ? float_at(row, ++column) : kNaN;
+    }
+  }
+}
+
+void SampleScanner::seek(std::int64_t row) {
+  sqlite3_reset(rows_.get());
+  sqlite3_bind_int64(rows_.get(), 1, row);
+  next_row_ = row;
+}
+
+std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boot_key, Interval samples,
+                                    Channels channels, std::size_t limit) {
+  std::vector<SegmentHead> heads;
+  if (samples.next <= samples.first) return heads;
+  std::string sql =
+      "SELECT first_seq, last_seq, first_robot_time_us, period_us, utc_offset_us, clock_uncertainty_us, flags";
+  for (std::size_t index = 0; index < kChannels; ++index) {
+    if (channels[index]) sql += fmt::format(", min_{0}, max_{0}", text(channel(index)));
+  }
+  const RawStatement statement = prepare(database, sql + kInRange + " LIMIT ?4");
+  sqlite3_stmt* row = statement.get();
+  bind_range(row, boot_key, samples);
+  sqlite3_bind_int64(row, 4, static_cast<std::int64_t>(limit));
+  int result = SQLITE_ROW;
+  while ((result = sqlite3_step(row)) == SQLITE_ROW) {
+    SegmentHead& head = heads.emplace_back();
+    head.first_seq = unsigned_at(row, 0);
+    head.next_seq = unsigned_at(row, 1) + 1;
+    head.first_robot_time_us = unsigned_at(row, 2);
+    head.period_us = static_cast<std::uint32_t>(unsigned_at(row, 3));
+    head.utc_offset_us = sqlite3_column_int64(row, 4);
+    head.clock_uncertainty_us = sqlite3_column_int64(row, 5);
+    head.flags = static_cast<std::uint32_t>(unsigned_at(row, 6));
+    int column = 6;
+    for (std::size_t index = 0; index < kChannels; ++index) {
+      head.min[index] = channels[index] ? float_at(row, ++column) : kNaN;
+      head.max[index] = channels[index] ? float_at(row, ++column) : kNaN;
+    }
+  }
+  if (result != SQLITE_DONE) fail_with(database);
+  return heads;
+}
+
+}  // namespace server

@@ -1,0 +1,106 @@
+// Reads the stored samples of a boot a segment at a time, and the heads of its segments: under every query, export and
+// check that reads many samples.
+//
+// On the thread that owns the database handle: a reader's, or the disk thread. Prepares its statements once and keeps
+// them; no text is parsed per row. Needs the present version of the schema. Between begin() and the end of the samples
+// (or end()) it holds a read transaction on the handle, so whoever stops early says so with end().
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <array>
+#include <bitset>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/runtime/result.hpp"
+#include "server/storage/samples/segment.hpp"
+
+struct sqlite3_stmt;
+
+namespace server {
+
+// In the order of the columns of `sample` and of the members of Sample.
+enum class Channel : std::uint8_t { position_m, velocity_m_s, acceleration_m_s2, duty, impedance_mv, reference_m };
+constexpr std::size_t kChannels = 6;
+using Channels = std::bitset<kChannels>;
+inline Channels all_channels() { return Channels{}.set(); }
+
+// By Channel.
+inline constexpr std::array<float Sample::*, kChannels> kSampleMembers{
+    &Sample::position_m, &Sample::velocity_m_s, &Sample::acceleration_m_s2,
+    &Sample::duty,       &Sample::impedance_mv, &Sample::reference_m};
+
+const char* text(Channel value);
+
+// "position_m,duty": names with commas between them, each once; bad_request says which one is not.
+Result<Channels> parse_channels(std::string_view text);
+
+struct FinalizeStatement {
+  void operator()(sqlite3_stmt* statement) const;
+};
+using RawStatement = std::unique_ptr<sqlite3_stmt, FinalizeStatement>;
+
+class SampleScanner {
+ public:
+  // Channels that are not asked for are NaN.
+  SampleScanner(SQLite::Database& database, Channels channels);
+
+  // The stored samples of the boot in the range, ascending. Also in the middle of an earlier scan, which it ends.
+  void begin(std::int64_t boot_key, Interval samples);
+
+  // The next segment, cut to the range; false at the end. Throws when a row is missing: the database is damaged.
+  bool next(Segment& into);
+
+  // Lets go of the read transaction.
+  void end();
+
+ private:
+  // The enumerator of a text, which is looked up only when the text is another one than last time.
+  template <class Value>
+  struct Named {
+    std::string name = "?";  // no enumerator's
+    Value value{};
+  };
+
+  std::int64_t read_segment(
+      Segment& into);  // returns its first row; the samples' number is right, their values are not
+  void read_rows(std::int64_t first_row, Segment& into);
+  void seek(std::int64_t row);
+
+  SQLite::Database& database_;
+  Channels channels_;
+  RawStatement segments_;
+  RawStatement rows_;
+  Interval range_;
+  std::int64_t boot_key_ = 0;
+  std::int64_t next_row_ = 0;  // that rows_ gives at its next step; 0: it must seek
+  bool scanning_ = false;
+  Named<protocol::Mode> mode_;
+  Named<protocol::SubState> sub_state_;
+  Named<protocol::EmergencyCause> emergency_cause_;
+};
+
+// What is known of a segment without its rows.
+struct SegmentHead {
+  std::uint64_t first_seq = 0;
+  std::uint64_t next_seq = 0;
+  std::uint64_t first_robot_time_us = 0;
+  std::uint32_t period_us = 0;
+  std::int64_t utc_offset_us = 0;
+  std::int64_t clock_uncertainty_us = -1;
+  std::array<float, kChannels> min{};  // by Channel; NaN: no finite value, or not asked for
+  std::array<float, kChannels> max{};
+  std::uint32_t flags = 0;  // TelemetryFlag
+};
+
+// The heads of the segments that have a sample in the range, ascending and not cut to it; the first `limit` of them.
+std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boot_key, Interval samples,
+                                    Channels channels, std::size_t limit = std::numeric_limits<std::int32_t>::max());
+
+}  // namespace server

@@ -1,0 +1,43 @@
+// Cutting of segments, and what SQLite makes of a number.
+#include "server/storage/samples/segment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace server {
+namespace {
+
+// SQLite stores NaN as NULL and -0.0 as 0.0; the store writes an infinity as NULL, too.
+float as_stored(float value) { return std::isfinite(value) ? value + 0.0F : std::numeric_limits<float>::quiet_NaN(); }
+
+}  // namespace
+
+Segment part_of(const Segment& segment, Interval range) {
+  const std::uint64_t first = std::max(segment.first_seq, range.first);
+  const std::uint64_t next = std::min(segment.next_seq(), range.next);
+  const std::uint64_t skipped = first - segment.first_seq;
+  const auto begin = segment.samples.begin() + static_cast<std::ptrdiff_t>(skipped);
+  Segment part;
+  part.boot_key = segment.boot_key;
+  part.first_seq = first;
+  part.first_robot_time_us = segment.robot_time_us(skipped);
+  part.context = segment.context;
+  part.samples.assign(begin, begin + static_cast<std::ptrdiff_t>(next - first));
+  part.first_received_at_us = segment.first_received_at_us;
+  part.received_at_us = segment.received_at_us;
+  part.utc_offset_us = segment.utc_offset_us;
+  part.clock_uncertainty_us = segment.clock_uncertainty_us;
+  return part;
+}
+
+Sample as_stored(const Sample& sample) {
+  return {.position_m = as_stored(sample.position_m),
+          .velocity_m_s = as_stored(sample.velocity_m_s),
+          .acceleration_m_s2 = as_stored(sample.acceleration_m_s2),
+          .duty = as_stored(sample.duty),
+          .impedance_mv = as_stored(sample.impedance_mv),
+          .reference_m = as_stored(sample.reference_m)};
+}
+
+}  // namespace server

@@ -1,0 +1,153 @@
+// Column lists stand beside the functions that read them.
+#include "server/storage/samples/stored_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "server/station/state/unknown_values.hpp"
+#include "server/storage/database/statement.hpp"
+#include "server/storage/samples/command_store.hpp"
+
+namespace server {
+namespace {
+
+CommandState command_state_from(const std::string& name) {
+  for (int value = 0; value <= static_cast<int>(kLastCommandState); ++value) {
+    if (name == text(static_cast<CommandState>(value))) return static_cast<CommandState>(value);
+  }
+  return CommandState::failed;
+}
+
+template <class Enumerator>
+Enumerator enumerator_from(const std::string& text, int first, int last) {
+  for (int value = first; value <= last; ++value) {
+    if (text == protocol::text(static_cast<Enumerator>(value))) return static_cast<Enumerator>(value);
+  }
+  return static_cast<Enumerator>(text == "unknown" ? kNumberNotKept : 0);
+}
+
+constexpr const char* kUnfinished = "state IN ('queued', 'sent')";
+
+}  // namespace
+
+protocol::Mode mode_from(const std::string& text) {
+  return enumerator_from<protocol::Mode>(text, _rheonaut_Mode_MIN, _rheonaut_Mode_MAX);
+}
+
+protocol::SubState sub_state_from(const std::string& text) {
+  return enumerator_from<protocol::SubState>(text, _rheonaut_SubState_MIN, _rheonaut_SubState_MAX);
+}
+
+protocol::EmergencyCause emergency_cause_from(const std::string& text) {
+  return enumerator_from<protocol::EmergencyCause>(text, _rheonaut_EmergencyCause_MIN, _rheonaut_EmergencyCause_MAX);
+}
+
+void set_unknown(SampleContext& context, const std::string& unknown_values) {
+  const auto numbers = nlohmann::json::parse(unknown_values, nullptr, false);
+  if (!numbers.is_object()) return;
+  const auto set = [&numbers]<class Enumerator>(const char* field, Enumerator& value) {
+    const auto number = numbers.find(field);
+    if (number == numbers.end() || !number->is_number_integer()) return;
+    value = static_cast<Enumerator>(number->get<std::int32_t>());
+  };
+  set("mode", context.mode);
+  set("sub_state", context.sub_state);
+  set("emergency_cause", context.emergency_cause);
+}
+
+std::string select_commands(const char* condition) {
+  return fmt::format(
+      "SELECT command_id, robot_id, boot_id, kind, arguments, actor, state, reason, submitted_at_us, sent_at_us,"
+      " ended_at_us, effect_at_robot_us, emergency_id, coalesce(sent_after_us, -1), coalesce(acknowledged_after_us, "
+      "-1),"
+      " coalesce(verified_after_us, -1), life_from, peer, audit_entry FROM command {}",
+      condition);
+}
+
+CommandRecord command_from(SQLite::Statement& row) {
+  CommandRecord command;
+  command.id = unsigned_id(row.getColumn(0));
+  command.robot_id = row.getColumn(1).getString();
+  command.boot_id = unsigned_id(row.getColumn(2));
+  command.kind = row.getColumn(3).getString();
+  command.arguments = row.getColumn(4).getString();
+  command.actor = row.getColumn(5).getString();
+  command.state = command_state_from(row.getColumn(6).getString());
+  command.reason = row.getColumn(7).getString();
+  command.submitted_at_us = row.getColumn(8).getInt64();
+  command.sent_at_us = row.getColumn(9).getInt64();
+  command.ended_at_us = row.getColumn(10).getInt64();
+  command.effect_at_robot_us = unsigned_id(row.getColumn(11));
+  command.emergency_id = unsigned_id(row.getColumn(12));
+  command.sent_after_us = row.getColumn(13).getInt64();
+  command.acknowledged_after_us = row.getColumn(14).getInt64();
+  command.verified_after_us = row.getColumn(15).getInt64();
+  command.life_from = row.getColumn(16).getString();
+  command.peer = row.getColumn(17).getString();
+  return command;
+}
+
+std::string select_events(const char* condition) {
+  return fmt::format(
+      "SELECT event.robot_id, boot.boot_id, event_seq, robot_time_us, sample_seq, kind, cause, mode, sub_state,"
+      " position_m, value, emergency_id, command_id, received_at_us, emergency_cause, detail, event.unknown_values "
+      "FROM event LEFT JOIN boot "
+      "USING (boot_key) {}",
+      condition);
+}
+
+RobotEvent event_from(SQLite::Statement& row) {
+  RobotEvent event;
+  event.robot_id = row.getColumn(0).getString();
+  event.boot_id = unsigned_id(row.getColumn(1));
+  if (!row.getColumn(2).isNull()) event.event_seq = unsigned_id(row.getColumn(2));
+  event.robot_time_us = unsigned_id(row.getColumn(3));
+  event.sample_seq = unsigned_id(row.getColumn(4));
+  event.kind = row.getColumn(5).getString();
+  event.cause = row.getColumn(6).getString();
+  SampleContext context;
+  context.mode = mode_from(row.getColumn(7).getString());
+  context.sub_state = sub_state_from(row.getColumn(8).getString());
+  context.emergency_cause = emergency_cause_from(row.getColumn(14).getString());
+  if (!row.getColumn(16).isNull()) event.unknown_values = row.getColumn(16).getString();
+  if (event.unknown_values) set_unknown(context, *event.unknown_values);
+  event.mode = context.mode;
+  event.sub_state = context.sub_state;
+  event.position_m = float_or_nan(row.getColumn(9));
+  event.value = float_or_nan(row.getColumn(10));
+  event.emergency_id = unsigned_id(row.getColumn(11));
+  event.command_id = unsigned_id(row.getColumn(12));
+  event.received_at_us = row.getColumn(13).getInt64();
+  if (!row.getColumn(14).isNull()) event.emergency_cause = context.emergency_cause;
+  event.detail = row.getColumn(15).getString();
+  return event;
+}
+
+std::vector<CommandRecord> pending_stops(Database& database) {
+  std::vector<CommandRecord> stops;
+  const std::string condition =
+      fmt::format("WHERE kind = 'emergency_stop' AND {} ORDER BY submitted_at_us", kUnfinished);
+  SQLite::Statement query{database.handle(), select_commands(condition.c_str())};
+  while (query.executeStep()) stops.push_back(command_from(query));
+  return stops;
+}
+
+void fail_unfinished_commands(Database& database, std::int64_t utc_us) {
+  SQLite::Transaction transaction{database.handle(), SQLite::TransactionBehavior::IMMEDIATE};
+  std::vector<CommandRecord> unfinished;
+  const std::string condition = fmt::format("WHERE kind <> 'emergency_stop' AND {}", kUnfinished);
+  SQLite::Statement query{database.handle(), select_commands(condition.c_str())};
+  while (query.executeStep()) unfinished.push_back(command_from(query));
+  CommandStore commands{database.handle()};
+  AuditChain audit{database.handle()};
+  for (CommandRecord& command : unfinished) {
+    command.state = command.state == CommandState::sent ? CommandState::unknown : CommandState::failed;
+    command.reason = "station_restarted";
+    command.ended_at_us = utc_us;
+    commands.write(command, audit);
+  }
+  transaction.commit();
+}
+
+}  // namespace server

@@ -1,0 +1,37 @@
+// From stored rows back to the station's values, and the queries over commands and events that give them.
+//
+// On the thread that owns the handle.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/station/state/station_state.hpp"
+#include "server/storage/database/database.hpp"
+
+namespace server {
+
+// The enumerator whose text() this is; of "unknown" kNumberNotKept (unknown_values.hpp), of any other text 0.
+protocol::Mode mode_from(const std::string& text);
+protocol::SubState sub_state_from(const std::string& text);
+protocol::EmergencyCause emergency_cause_from(const std::string& text);
+// Puts the numbers of a column unknown_values in their place.
+void set_unknown(SampleContext& context, const std::string& unknown_values);
+
+// `condition` is SQL that follows SELECT … FROM; its `?` are bound by the caller.
+std::string select_commands(const char* condition);
+std::string select_events(const char* condition);
+CommandRecord command_from(SQLite::Statement& row);
+inline constexpr int kCommandAuditEntry = 18;  // its column; NULL: older than the audit
+RobotEvent event_from(SQLite::Statement& row);
+
+// Emergency stops that no robot has acknowledged, oldest first.
+std::vector<CommandRecord> pending_stops(Database& database);
+
+// Commands other than emergency stops that were on their way when the station stopped: nobody follows them any more.
+void fail_unfinished_commands(Database& database, std::int64_t utc_us);
+
+}  // namespace server

@@ -1,0 +1,111 @@
+// DELETE by row numbers and by the segments' index; a slice's gap becomes one with that of the slice before it. Pages
+// by incremental vacuum.
+#include "server/storage/upkeep/purge.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+
+#include "server/storage/database/statement.hpp"
+
+namespace server {
+namespace {
+
+constexpr std::size_t kSegmentsASlice = 4;  // about 1 ms
+constexpr int kSegmentSlicesAStep = 25;
+constexpr int kPagesASlice = 16;
+constexpr int kPageSlicesAStep = 16;  // as many pages as they give back go to the write-ahead log, and others
+
+class RetentionGaps {
+ public:
+  explicit RetentionGaps(SQLite::Database& database)
+      : before_{database,
+                "SELECT first_seq FROM gap WHERE boot_key = ?1 AND cause = 'retention' AND last_seq = ?2 - 1"
+                " AND first_seq = (SELECT max(first_seq) FROM gap WHERE boot_key = ?1 AND first_seq < ?2)"},
+        after_{database, "SELECT last_seq FROM gap WHERE boot_key = ? AND first_seq = ? AND cause = 'retention'"},
+        remove_{database, "DELETE FROM gap WHERE boot_key = ? AND first_seq = ?"},
+        add_{database,
+             "INSERT INTO gap (boot_key, first_seq, last_seq, cause, noticed_at_us) VALUES (?, ?, ?, 'retention', ?)"} {
+  }
+
+  void add(std::int64_t boot_key, Interval purged, std::int64_t utc_us) {
+    bind_all(after_, boot_key, purged.next);
+    if (after_.executeStep()) {
+      execute(remove_, boot_key, purged.next);
+      purged.next = unsigned_id(after_.getColumn(0)) + 1;
+    }
+    bind_all(before_, boot_key, purged.first);
+    if (before_.executeStep()) {
+      purged.first = unsigned_id(before_.getColumn(0));
+      execute(remove_, boot_key, purged.first);
+    }
+    after_.reset();
+    before_.reset();
+    execute(add_, boot_key, purged.first, purged.next - 1, utc_us);
+  }
+
+ private:
+  SQLite::Statement before_, after_, remove_, add_;
+};
+
+class Purge {
+ public:
+  explicit Purge(SQLite::Database& database)
+      : rows_{database, "DELETE FROM sample WHERE row BETWEEN ? AND ?"},
+        segment_{database, "DELETE FROM segment WHERE boot_key = ? AND first_seq = ?"},
+        gaps_{database} {}
+
+  // Segments of one boot, ascending.
+  void remove(const std::vector<StoredSegment>& segments, std::int64_t utc_us) {
+    Interval whole;
+    for (const StoredSegment& gone : segments) {
+      execute(rows_, gone.first_row, gone.last_row);
+      execute(segment_, gone.boot_key, gone.samples.first);
+      if (whole.next != gone.samples.first && whole.next > 0) gaps_.add(gone.boot_key, whole, utc_us);
+      whole = {whole.next == gone.samples.first ? whole.first : gone.samples.first, gone.samples.next};
+    }
+    if (whole.next > 0) gaps_.add(segments.back().boot_key, whole, utc_us);
+  }
+
+ private:
+  SQLite::Statement rows_, segment_;
+  RetentionGaps gaps_;
+};
+
+}  // namespace
+
+std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const Clock& clock, std::int64_t utc_us) {
+  std::uint64_t removed = 0;
+  const std::int64_t end_us = clock.steady_us() + kStepTime.count();
+  SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
+  RetentionPlan::Step walk{plan, database};
+  Purge purge{database};
+  for (int slices = 0; slices < kSegmentSlicesAStep && !plan.empty(); ++slices) {
+    if (slices > 0 && clock.steady_us() >= end_us) break;
+    const std::vector<StoredSegment> going = walk.next(kSegmentsASlice);
+    purge.remove(going, utc_us);
+    for (const StoredSegment& segment : going) removed += segment.samples.next - segment.samples.first;
+  }
+  transaction.commit();
+  return removed;
+}
+
+std::uint64_t shrink_step(SQLite::Database& database, const Clock& clock) {
+  const auto free_pages = [&database] {
+    return static_cast<std::uint64_t>(database.execAndGet("PRAGMA freelist_count").getInt64());
+  };
+  const std::int64_t end_us = clock.steady_us() + kStepTime.count();
+  SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
+  const std::uint64_t before = free_pages();
+  const std::string slice = fmt::format("PRAGMA incremental_vacuum({})", kPagesASlice);
+  for (int slices = 0; slices < kPageSlicesAStep; ++slices) {
+    if (slices > 0 && clock.steady_us() >= end_us) break;
+    database.exec(slice);
+  }
+  const std::uint64_t after = free_pages();
+  transaction.commit();
+  return before - std::min(before, after);
+}
+
+}  // namespace server

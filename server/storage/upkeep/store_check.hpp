@@ -1,0 +1,38 @@
+// Whether a database keeps what docs/database.md promises, and whether each certificate is still true.
+//
+// Reads only, in short transactions, so it works beside a running station without holding its log. On the thread that
+// owns the handle, which is in no transaction. Of the present schema version.
+#pragma once
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/runtime/result.hpp"
+#include "server/storage/runs/run.hpp"
+
+namespace server {
+
+struct StoreCheck {
+  std::optional<RunId> run;  // only this one, with the samples of its spans
+  // Also let SQLite check every page, in one long read transaction, and compare the extremes of each segment with its
+  // samples.
+  bool integrity = false;
+};
+
+struct StoreFindings {
+  std::vector<std::string> faults;  // a line each; empty: the database is as it should be
+  std::uint64_t segments = 0;
+  std::uint64_t samples = 0;
+  std::uint64_t runs_verified = 0;     // their certificates were recomputed and agree
+  std::uint64_t runs_incomplete = 0;   // have ended; samples are still on their way
+  std::uint64_t runs_uncertified = 0;  // complete, and the station has not made the certificate yet
+};
+
+// not_found when there is no such run.
+Result<StoreFindings> check_store(SQLite::Database& database, const StoreCheck& wish);
+
+}  // namespace server

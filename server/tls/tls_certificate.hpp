@@ -1,0 +1,29 @@
+// What a certificate for TLS says: whom it names, until when, and the key that clients may pin.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "server/tls/openssl.hpp"
+
+namespace server {
+
+struct TlsCertificate {
+  std::vector<std::string> names;  // of the subjectAltName: DNS names and IP addresses
+  std::int64_t not_before_us = 0;  // UTC
+  std::int64_t not_after_us = 0;   // UTC
+  std::string pin;                 // SHA-256 of the SubjectPublicKeyInfo in DER, 64 hexadecimal digits
+  std::string public_key_pem;      // what the firmware pins
+};
+
+// The first certificate in a PEM file, or the key. Throw std::runtime_error that names the file.
+Openssl<X509> load_certificate(const std::filesystem::path& file);
+Openssl<EVP_PKEY> load_key(const std::filesystem::path& file);
+
+TlsCertificate describe(X509& certificate);
+std::string pin_of(EVP_PKEY& key);
+std::string public_key_pem(EVP_PKEY& key);
+
+}  // namespace server

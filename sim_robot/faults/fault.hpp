@@ -1,0 +1,108 @@
+// Everything that can be made to go wrong with a simulated robot while it runs: by time line, over HTTP, or by a test.
+//
+// One struct for all kinds; fields() says which of its members a kind has, with names, units, ranges and defaults.
+// TOML, JSON and docs/scenarios.md follow from it. A fault on a target replaces the one that is in force there. Errors:
+// throws std::invalid_argument that says what is wrong, which value it has, and what is allowed.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "base/fields.hpp"
+#include "protocol/messages.hpp"
+#include "sim_robot/faults/faulty_robot.hpp"
+#include "sim_robot/world/glucose.hpp"
+#include "sim_robot/world/pump.hpp"
+#include "sim_robot/world/sensor_fault.hpp"
+
+namespace sim_robot {
+
+struct WorldConfig;
+
+// In the order of fault_types().
+enum class FaultKind {
+  accelerometer_stuck,
+  accelerometer_noisy,
+  accelerometer_offset,
+  accelerometer_missing,
+  electrode_stuck,
+  electrode_noisy,
+  electrode_offset,
+  electrode_missing,
+  mean_flow,
+  pour_glucose,
+  link_outage,
+  link_half_open,
+  link_cut,
+  link_reset,
+  link_delay,
+  link_throttle,
+  link_loss,
+  link_split,
+  reboot,
+  block,
+  clock_drift,
+  clock_jump,
+};
+
+enum class FaultTarget { accelerometer, electrode, pump, glucose, link, delay, rate, loss, split, robot, clock };
+
+struct FaultType {
+  const char* name;  // as in FaultKind
+  FaultTarget target;
+  bool lasts;  // has for_s and is in force for so long; otherwise it happens at once and is over
+  const char* what;
+};
+
+std::span<const FaultType> fault_types();
+const FaultType& type_of(FaultKind kind);
+
+struct Fault {
+  FaultKind kind = FaultKind::accelerometer_stuck;
+  double for_s = kForEver;  // of those that last; for ever: until it is withdrawn
+
+  double magnitude = kMustBeGiven;  // sensors: m/s² or mV; sd of the noise, or the offset
+  double mean_flow_m3_s = kMustBeGiven;
+  GlucosePatch patch{.position_m = kMustBeGiven};  // poured at once; its for_s says when it is removed
+
+  Direction direction = Direction::both;
+  bool then_reset = false;        // an outage ends with the end of the connections
+  std::uint64_t after_bytes = 0;  // a cut: so many of those under way still arrive
+  double delay_s = kMustBeGiven, jitter_s = 0;
+  double bytes_per_s = kMustBeGiven;
+  double loss_probability = kMustBeGiven, retransmit_s = 0.2;
+  std::uint64_t split_bytes = 1;
+
+  protocol::ResetCause cause = rheonaut_RESET_CAUSE_SOFTWARE;
+  double off_for_s = 0.5;
+  bool keeps_latch = true, keeps_storage = true;
+  double drift_ppm = kMustBeGiven;
+  double jump_s = kMustBeGiven;
+};
+
+// The members that its kind has, without the kind itself.
+void fields(Fields& fields, Fault& fault);
+// Kind and members: the key `fault` first.
+void fields_with_kind(Fields& fields, Fault& fault);
+
+// Throws what is wrong with its values, or what the world lacks for it.
+void check(const Fault& fault, const WorldConfig& world);
+
+// Empty when a run with, or without, a network of its own can do it; otherwise why not.
+std::string why_not(FaultKind kind, bool has_network);
+// The same for this robot; throws what why_not() says, too.
+void check(const Fault& fault, const FaultyRobot& robot);
+// From the robot's next tick on. Throws as check() does.
+void apply(const Fault& fault, const FaultyRobot& robot);
+// Ends one that lasts: its target is as it was when robot and link were made.
+void end(const Fault& fault, const FaultyRobot& robot);
+// Whether robot or link, which were told its for_s, end it when that is over.
+bool ends_by_itself(FaultKind kind);
+
+// {"fault":"electrode_offset","offset_mv":40,"for_s":5}
+Fault parse_fault_json(std::string_view json);
+
+}  // namespace sim_robot

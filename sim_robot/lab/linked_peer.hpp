@@ -1,0 +1,50 @@
+// The least of a station at the far end of an impaired link: it accepts, welcomes, keeps the time and declares silence.
+//
+// As StationPeer, but it knows of the robot only what has arrived. Its own rules are the protocol's: a heartbeat every
+// 200 ms, a link lost after 1 s of silence whatever the connection says, commands that live from the last robot time
+// heard plus the time since.
+#pragma once
+
+#include "sim_robot/lab/heard_robot.hpp"
+#include "sim_robot/lab/impaired_link.hpp"
+
+namespace sim_robot {
+
+class LinkedPeer : public HeardRobot {
+ public:
+  static constexpr std::uint64_t kHeartbeatUs = 200'000;
+  static constexpr std::uint64_t kLinkTimeoutUs = 1'000'000;
+
+  explicit LinkedPeer(ImpairedLink& link) : link_(link) {}
+
+  // Each step is one of the link, then serve().
+  void step();
+  // What has arrived, then what is due.
+  void serve();
+  void run(double for_s);
+
+  // Adds id, boot and life where they are 0, says it on the open connection, and returns the id. It is lost with it.
+  std::uint64_t send(protocol::Command command);
+
+  bool is_connected() const { return connected_; }
+  bool link_is_up() const { return welcomed_ && !link_is_lost(); }
+  bool link_is_lost() const { return heard_at_us_ && link_.now_us() > *heard_at_us_ + kLinkTimeoutUs; }
+  std::uint64_t silence_us() const { return link_.now_us() - heard_at_us_.value_or(0); }
+  std::uint64_t robot_time_us() const;  // a lower bound, as the station computes it
+
+ private:
+  void accept();
+  void read();
+  void speak();
+  void say(const protocol::StationFrame& frame);
+  void flush();
+
+  ImpairedLink& link_;
+  int connections_ = 0;
+  bool connected_ = false, welcomed_ = false;
+  std::optional<std::uint64_t> heard_at_us_;
+  std::uint64_t heartbeat_at_us_ = 0;  // they acknowledge samples, so commands take none's place
+  std::vector<std::uint8_t> unsent_;
+};
+
+}  // namespace sim_robot

@@ -1,0 +1,39 @@
+// The least of a station, in the same process and in virtual time: it welcomes, acknowledges, commands and listens.
+//
+// What the prediction and the tests drive a robot with; linked_peer has a network in between. The station proper is in
+// server/.
+#pragma once
+
+#include "sim_robot/lab/heard_robot.hpp"
+#include "sim_robot/lab/station_commands.hpp"
+#include "sim_robot/robot/simulated_robot.hpp"
+
+namespace sim_robot {
+
+class StationPeer : public HeardRobot {
+ public:
+  explicit StationPeer(SimulatedRobot& robot) : robot_(robot) {}
+
+  // Opens a connection, takes the Hello and answers it; what is stored already is what was heard.
+  void connect();
+  void disconnect();
+
+  // Ticks: each is a step of the robot, then reading what it sends, then, when `attentive`, a heartbeat that
+  // acknowledges it.
+  void run(int ticks);
+  void step();
+  // Everything the robot has to send now.
+  void listen();
+
+  // Adds id, boot and life where they are 0, sends, and returns the id.
+  std::uint64_t send(protocol::Command command);
+  // False when the robot wants the connection closed.
+  bool send(const protocol::StationFrame& frame);
+  bool send_heartbeat(protocol::StationHeartbeat heartbeat);
+
+ private:
+  SimulatedRobot& robot_;
+  bool connected_ = false;
+};
+
+}  // namespace sim_robot
