@@ -9,6 +9,7 @@
 
 #include "server/api/live_socket.hpp"
 #include "server/config/endpoint.hpp"
+#include "server/storage/recording_parts.hpp"
 
 namespace server {
 namespace {
@@ -43,25 +44,46 @@ ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string
 
 ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clock, const ApiOptions& options,
                      Station& station, LiveFeed& live, RecordingParts& recording, AnalysisService& analysis)
-    : listener_{loop, clock, options.endpoint, options.or_any_port},
+    : tasks_{tasks},
+      clock_{clock},
+      listener_{loop, clock, options.endpoint, options.or_any_port},
       accounts_{loop, clock, recording.recorder, options.data_dir},
       auth_{loop, clock, accounts_, options.data_dir, options.store_id},
       logins_{clock, accounts_, options.password_cost},
       guard_{auth_, host_names(options), options.security->http().tls != nullptr},
       texts_{loop, station},
-      parts_{loop,      tasks,    clock, station,   live,    texts_,
-             recording, analysis, auth_, accounts_, logins_, facts_of(options, listener_, clock)},
+      facts_{facts_of(options, listener_, clock)},
       live_{loop, tasks, clock, station, live, texts_, options.version},
       upgrades_{"/live",
                 [this](HttpStream stream, UpgradeRequest upgrade, Caller caller) {
                   return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live_);
                 }},
       server_{tasks, clock, listener_, options.security->http(), guard_, router_, upgrades_} {
-  add_routes(router_, parts_);
+  add_routes(loop, station, live, recording, analysis);
+}
+
+void ApiServer::add_routes(boost::asio::io_context& loop, Station& station, LiveFeed& live, RecordingParts& recording,
+                           AnalysisService& analysis) {
+  History& history = recording.history;
+  add_station_routes(router_, {auth_, clock_, recording.head_watch, recording.recorder, facts_});
+  add_recording_routes(router_, {clock_, recording, station, *facts_.security, tasks_.exceptions()});
+  add_robot_routes(router_, {loop, history, station, texts_});
+  add_command_routes(router_, {clock_, history, station});
+  add_in_force_routes(router_, {station});
+  add_fluid_routes(router_, {clock_, recording.fluid_models, recording.recorder, station});
+  add_run_routes(router_, {analysis, recording.certifier, clock_, recording.disk_watch, live, recording.runs, station});
+  add_marker_routes(router_, {recording.markers, station});
+  add_reference_routes(router_, {analysis, clock_, recording.references});
+  add_sample_routes(router_, {history});
+  add_overview_routes(router_, {history});
+  add_export_routes(router_,
+                    {tasks_, recording.exports, recording.disk_watch, recording.path(), recording.exports_folder()});
+  add_account_routes(router_, {accounts_, auth_, logins_, clock_, station, facts_});
+  add_audit_routes(router_, {clock_, history, recording.recorder});
 }
 
 boost::asio::awaitable<void> ApiServer::run() {
-  parts_.tasks.spawn("accounts", accounts_.run());
+  tasks_.spawn("accounts", accounts_.run());
   co_await server_.run();
 }
 
@@ -75,7 +97,7 @@ void ApiServer::print_login_url() {
 std::string ApiServer::url() const {
   auto endpoint = listener_.endpoint();
   if (endpoint.address().is_unspecified()) endpoint.address(boost::asio::ip::address_v4::loopback());
-  return base_url(parts_.facts, text(endpoint));
+  return base_url(facts_, text(endpoint));
 }
 
 std::string ApiServer::login_url() { return server::login_url(url(), auth_.new_login_code()); }

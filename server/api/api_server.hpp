@@ -11,6 +11,10 @@
 #include "server/api/routes/routes.hpp"
 #include "server/config/config.hpp"
 #include "server/http/http_server.hpp"
+#include "server/identity/auth.hpp"
+#include "server/identity/logins.hpp"
+#include "server/live/robot_texts.hpp"
+#include "server/net/transport_security.hpp"
 
 namespace server {
 
@@ -48,13 +52,18 @@ class ApiServer {
   const Logins& logins() const { return logins_; }
 
  private:
+  void add_routes(boost::asio::io_context& loop, Station& station, LiveFeed& live, RecordingParts& recording,
+                  AnalysisService& analysis);
+
+  TaskGroup& tasks_;
+  Clock& clock_;
   Listener listener_;
   Accounts accounts_;
   Auth auth_;
   Logins logins_;
   RequestGuard guard_;
   RobotTexts texts_;
-  ApiParts parts_;
+  StationFacts facts_;
   LiveParts live_;
   Upgrades upgrades_;
   Router router_;

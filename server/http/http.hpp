@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/http/target.hpp"
 #include "server/identity/caller.hpp"
 #include "server/runtime/result.hpp"
 
@@ -17,7 +18,7 @@ namespace server {
 
 struct Request {
   std::string method;                          // "GET", "POST", …
-  std::string target;                          // as sent: path and query
+  Target target;                               // as sent: path and query
   std::map<std::string, std::string> headers;  // names in lower case; repeated ones joined by ", " (cookies by "; ")
   std::string body;
   std::int64_t received_us = 0;  // steady, when all of it had arrived; of a stop, its head

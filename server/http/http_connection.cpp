@@ -36,7 +36,7 @@ template <class Message>
 Request plain_head(const Message& message) {
   Request request;
   request.method = message.method_string();
-  request.target = message.target();
+  request.target = Target{std::string{message.target()}};
   for (const auto& field : message) {
     std::string name = field.name_string();
     std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -121,9 +121,8 @@ asio::awaitable<HttpConnection::Next> HttpConnection::secure() {
   co_return Next::end;
 }
 
-bool HttpConnection::wants_upgrade(const Message& message) const {
-  return path_of(message.target()) == upgrades_.path && boost::beast::websocket::is_upgrade(message) &&
-         buffer_.size() == 0;
+bool HttpConnection::wants_upgrade(const Request& request, const Message& message) const {
+  return request.target.path() == upgrades_.path && boost::beast::websocket::is_upgrade(message) && buffer_.size() == 0;
 }
 
 bool HttpConnection::begin_page(const Caller& caller) {
@@ -148,6 +147,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
   Parser parser;
   parser.header_limit(kMaxHeaderBytes);
   parser.body_limit(boost::none);  // is set when it is known whose body it is
+  Request head;
   boost::system::error_code error;
   buffer_.consume(parser.put(buffer_.data(), error));  // most come in one piece: no turn of the loop is spent on them
   if (error == http::error::need_more) {
@@ -156,9 +156,9 @@ asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
   }
   if (!error && has_unknown_length(parser)) error = http::error::bad_transfer_encoding;
   if (!error) {
-    const Message& head = parser.get();
-    if (router_.is_stop(head.method_string(), head.target())) co_return co_await carry_out_stop(parser);
-    auto refusal = refusal_of(parser);
+    head = plain_head(parser.get());
+    if (router_.is_stop(head.method, head.target)) co_return co_await carry_out_stop(parser, std::move(head));
+    auto refusal = refusal_of(parser, head);
     if (refusal) co_return co_await send_and_close(std::move(*refusal), parser.release());
     error = co_await read_body(parser);
     note_arrival();
@@ -166,7 +166,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
   request_has_begun_ = false;
   if (error) co_return co_await refuse_unreadable(error);
   deadline_us_ = kNever;  // a route bounds its own waits
-  const Next next = co_await carry_out(parser.release());
+  const Next next = co_await carry_out(std::move(head), parser.release());
   if (next == Next::another) guest_.rest();
   co_return next;
 }
@@ -179,25 +179,25 @@ void HttpConnection::note_arrival() {
 }
 
 // What the header alone is refused for. The last word has carry_out(), which knows the body.
-std::optional<Response> HttpConnection::refusal_of(Parser& parser) {
-  const Message& head = parser.get();
-  if (head.target().size() > kMaxTargetBytes) {
+std::optional<Response> HttpConnection::refusal_of(Parser& parser, const Request& head) {
+  const Message& message = parser.get();
+  if (head.target.text().size() > kMaxTargetBytes) {
     return problem(414, fmt::format("the target has more than {} bytes", kMaxTargetBytes), "too_large");
   }
-  if (std::distance(head.begin(), head.end()) > static_cast<std::ptrdiff_t>(kMaxHeaderFields)) {
+  if (std::distance(message.begin(), message.end()) > static_cast<std::ptrdiff_t>(kMaxHeaderFields)) {
     return problem(431, fmt::format("the header has more than {} fields", kMaxHeaderFields), "too_large");
   }
   if (parser.is_done()) return std::nullopt;  // there is no body
   parser.body_limit(kMaxBodyBytes);
   const std::uint64_t length = parser.content_length().value_or(0);
-  const std::size_t limit = router_.max_body_bytes(head.method_string(), head.target());
+  const std::size_t limit = router_.max_body_bytes(head.method, head.target);
   if (length > limit) return body_too_large(limit);
-  auto admitted = guard_.admit(plain_head(head));
+  auto admitted = guard_.admit(head);
   if (!admitted) return std::move(admitted.error());
   if (!admitted->actor.empty()) {
     if (length <= kMaxBodyBytes) return std::nullopt;
     admitted->peer = address_of(stream_);
-    const std::optional<Scope> lacking = router_.scope_lacking(head.method_string(), head.target(), *admitted);
+    const std::optional<Scope> lacking = router_.scope_lacking(head.method, head.target, *admitted);
     if (lacking) return not_permitted(*admitted, *lacking);
     parser.body_limit(limit);
     parser.get().body().reserve(length);
@@ -225,15 +225,14 @@ asio::awaitable<boost::system::error_code> HttpConnection::read_body(Parser& par
   co_return error;
 }
 
-asio::awaitable<HttpConnection::Next> HttpConnection::carry_out(Message message) {
-  Request request = plain_head(message);
+asio::awaitable<HttpConnection::Next> HttpConnection::carry_out(Request request, Message message) {
   request.body = std::move(message.body());
   request.received_us = clock_.steady_us();
   if (unread_since_us_) request.unread = microseconds{request.received_us - *unread_since_us_};
   auto admitted = guard_.admit(request);
   if (!admitted) co_return co_await send(std::move(admitted.error()), message);
   admit(request, std::move(*admitted));
-  if (wants_upgrade(message)) {
+  if (wants_upgrade(request, message)) {
     if (!begin_page(request.caller)) {
       Response refused = problem(429, fmt::format("{} has {} pages open; close some", request.actor, kMaxPagesOfOne),
                                  "too_many_pages");
@@ -254,11 +253,10 @@ asio::awaitable<HttpConnection::Next> HttpConnection::carry_out(Message message)
 }
 
 // SAFETY: a stop is carried out now, whatever comes with it; its body is looked at when it has been answered.
-asio::awaitable<HttpConnection::Next> HttpConnection::carry_out_stop(Parser& parser) {
+asio::awaitable<HttpConnection::Next> HttpConnection::carry_out_stop(Parser& parser, Request request) {
   request_has_begun_ = false;
   deadline_us_ = kNever;
   const Message& message = parser.get();
-  Request request = plain_head(message);
   request.received_us = clock_.steady_us();
   auto admitted = guard_.admit(request);
   if (!admitted && parser.is_done()) co_return co_await send(std::move(admitted.error()), message);
@@ -340,7 +338,7 @@ asio::awaitable<void> HttpConnection::discard_rest() {
 
 // The boundary: whatever a route throws ends here, and says nothing of the inside to the outside.
 asio::awaitable<Response> HttpConnection::answer(Request request) {
-  const std::string route = route_of(request.method, request.target);
+  const std::string route = route_of(request.method, request.target.text());
   std::exception_ptr failure;
   try {
     co_return co_await router_.dispatch(std::move(request));

@@ -68,10 +68,10 @@ class HttpConnection {
   boost::asio::awaitable<Next> secure();
   boost::asio::awaitable<Next> read_and_answer();
   boost::asio::awaitable<boost::system::error_code> read_body(Parser& parser);
-  boost::asio::awaitable<Next> carry_out(Message message);
-  boost::asio::awaitable<Next> carry_out_stop(Parser& parser);
+  boost::asio::awaitable<Next> carry_out(Request request, Message message);
+  boost::asio::awaitable<Next> carry_out_stop(Parser& parser, Request request);
   void admit(Request& request, Caller caller);
-  std::optional<Response> refusal_of(Parser& parser);
+  std::optional<Response> refusal_of(Parser& parser, const Request& head);
   boost::asio::awaitable<Next> refuse_unreadable(boost::system::error_code error);
   boost::asio::awaitable<Next> send_and_close(Response response, Message message);
   boost::asio::awaitable<Response> answer(Request request);
@@ -83,7 +83,7 @@ class HttpConnection {
   boost::asio::awaitable<void> discard_rest();
 
   void note_arrival();
-  bool wants_upgrade(const Message& message) const;
+  bool wants_upgrade(const Request& request, const Message& message) const;
   bool begin_page(const Caller& caller);  // false: there are too many of one
   void allow(microseconds duration) { deadline_us_ = clock_.steady_us() + duration.count(); }
 

@@ -96,17 +96,17 @@ std::expected<Caller, Response> RequestGuard::admit(const Request& request) cons
     return refuse(421, "this station does not answer to that Host; add the name to http.hosts in its configuration",
                   "wrong_host");
   }
-  const auto path = path_of(request.target);
-  if (!path) return refuse(400, "the path is not acceptable", "malformed_path");
-  const bool live = *path == "/live";
+  const std::string& path = request.target.path();
+  if (!request.target.is_acceptable()) return refuse(400, "the path is not acceptable", "malformed_path");
+  const bool live = path == "/live";
   const std::string origin = request.header("origin");
   const bool same_origin = lower(origin) == scheme_ + lower(host);
   if (!origin.empty() && !same_origin && (live || changes_something(request))) {
     return refuse(403, "the request comes from a page of another origin", "wrong_origin");
   }
-  const bool holds_data = live || *path == "/metrics" || path->starts_with("/api/");
+  const bool holds_data = live || path == "/metrics" || path.starts_with("/api/");
   if (!holds_data && !changes_something(request)) return Caller{};
-  if (request.method == "POST" && *path == kLoginPath) {
+  if (request.method == "POST" && path == kLoginPath) {
     if (!has_json_body(request)) return refuse_body();
     return Caller{};
   }

@@ -10,23 +10,6 @@ namespace asio = boost::asio;
 
 namespace {
 
-int hex_value(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
-
-std::vector<std::string> split(std::string_view text, char separator) {
-  std::vector<std::string> parts;
-  for (;;) {
-    const auto end = text.find(separator);
-    parts.emplace_back(text.substr(0, end));
-    if (end == std::string_view::npos) return parts;
-    text.remove_prefix(end + 1);
-  }
-}
-
 bool is_parameter(const std::string& segment) { return !segment.empty() && segment.front() == '{'; }
 
 Result<std::map<std::string, std::string>> parse_query(std::string_view text, const std::vector<std::string>& known) {
@@ -50,48 +33,6 @@ Result<std::map<std::string, std::string>> parse_query(std::string_view text, co
 
 }  // namespace
 
-std::optional<std::string> percent_decode(std::string_view text, bool plus_is_space) {
-  std::string out;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    char c = text[i];
-    if (c == '+' && plus_is_space) {
-      c = ' ';
-    } else if (c == '%') {
-      if (i + 2 >= text.size()) return std::nullopt;
-      const int high = hex_value(text[i + 1]);
-      const int low = hex_value(text[i + 2]);
-      if (high < 0 || low < 0) return std::nullopt;
-      c = static_cast<char>(high * 16 + low);
-      i += 2;
-    }
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) return std::nullopt;
-    out += c;
-  }
-  return out;
-}
-
-std::optional<std::vector<std::string>> path_segments(const std::string& target) {
-  const std::string_view path = std::string_view{target}.substr(0, target.find('?'));
-  if (path.empty() || path.front() != '/') return std::nullopt;
-  auto segments = split(path.substr(1), '/');
-  for (std::string& segment : segments) {
-    auto decoded = percent_decode(segment, false);
-    if (!decoded || *decoded == ".." || *decoded == "." || decoded->find_first_of("/\\") != std::string::npos) {
-      return std::nullopt;
-    }
-    segment = std::move(*decoded);
-  }
-  return segments;
-}
-
-std::optional<std::string> path_of(const std::string& target) {
-  const auto segments = path_segments(target);
-  if (!segments) return std::nullopt;
-  std::string path;
-  for (const std::string& segment : *segments) path += "/" + segment;
-  return path;
-}
-
 void Router::add(Route route) {
   entries_.push_back({split(std::string_view{route.pattern}.substr(1), '/'), routes_.size()});
   routes_.push_back(std::move(route));
@@ -108,7 +49,9 @@ Response not_permitted(const Caller& caller, Scope needed) {
   return problem(403, std::move(detail), "not_permitted", {{"needs", role}});
 }
 
-bool Router::matches(const Entry& entry, std::span<const std::string> path) const {
+bool Router::matches(const Entry& entry, const Target& target) const {
+  if (!target.is_acceptable()) return false;
+  std::span<const std::string> path = target.segments();
   if (routes_[entry.route].is_stop && path.back().empty()) path = path.first(path.size() - 1);
   const auto same = [](const std::string& wanted, const std::string& given) {
     return is_parameter(wanted) ? !given.empty() : wanted == given;
@@ -116,37 +59,34 @@ bool Router::matches(const Entry& entry, std::span<const std::string> path) cons
   return std::ranges::equal(entry.segments, path, same);
 }
 
-bool Router::is_stop(const std::string& method, const std::string& target) const {
-  const auto path = path_segments(target);
-  return path && std::ranges::any_of(entries_, [&](const Entry& entry) {
-           const Route& route = routes_[entry.route];
-           return route.is_stop && route.method == method && matches(entry, *path);
-         });
+bool Router::is_stop(const std::string& method, const Target& target) const {
+  return std::ranges::any_of(entries_, [&](const Entry& entry) {
+    const Route& route = routes_[entry.route];
+    return route.is_stop && route.method == method && matches(entry, target);
+  });
 }
 
-const Route* Router::find(const std::string& method, const std::string& target) const {
-  const auto path = path_segments(target);
-  if (!path) return nullptr;
+const Route* Router::find(const std::string& method, const Target& target) const {
   for (const Entry& entry : entries_) {
     const Route& route = routes_[entry.route];
-    if (route.method == method && matches(entry, *path)) return &route;
+    if (route.method == method && matches(entry, target)) return &route;
   }
   return nullptr;
 }
 
-std::size_t Router::max_body_bytes(const std::string& method, const std::string& target) const {
+std::size_t Router::max_body_bytes(const std::string& method, const Target& target) const {
   const Route* route = find(method, target);
   return route == nullptr ? kMaxBodyBytes : route->max_body_bytes;
 }
 
-std::optional<Scope> Router::scope_lacking(const std::string& method, const std::string& target,
+std::optional<Scope> Router::scope_lacking(const std::string& method, const Target& target,
                                            const Caller& caller) const {
   const Route* route = find(method, target);
   if (route == nullptr || caller.scopes.allow(route->needs)) return std::nullopt;
   Request head;
   head.method = method;
   head.target = target;
-  head.path = path_of(target).value_or("");
+  head.path = target.path();
   head.caller = caller;
   head.actor = caller.actor;
   head.peer = caller.peer;
@@ -155,15 +95,13 @@ std::optional<Scope> Router::scope_lacking(const std::string& method, const std:
 }
 
 Answer Router::dispatch(Request request) const {
-  const auto question_mark = request.target.find('?');
-  const auto path = path_segments(request.target);
-  if (!path) co_return problem(400, "the path is not acceptable", "malformed_path");
-  request.path = *path_of(request.target);
+  if (!request.target.is_acceptable()) co_return problem(400, "the path is not acceptable", "malformed_path");
+  request.path = request.target.path();
   const std::string method = request.method == "HEAD" ? "GET" : request.method;
 
   std::string allowed;
   for (const Entry& entry : entries_) {
-    if (!matches(entry, *path)) continue;
+    if (!matches(entry, request.target)) continue;
     const Route& route = routes_[entry.route];
     if (route.method != method) {
       allowed += (allowed.empty() ? "" : ", ") + route.method + (route.method == "GET" ? ", HEAD" : "");
@@ -175,10 +113,10 @@ Answer Router::dispatch(Request request) const {
     }
     for (std::size_t i = 0; i < entry.segments.size(); ++i) {
       const std::string& name = entry.segments[i];
-      if (is_parameter(name)) request.param[name.substr(1, name.size() - 2)] = (*path)[i];
+      if (is_parameter(name)) request.param[name.substr(1, name.size() - 2)] = request.target.segments()[i];
     }
-    if (!route.is_stop && question_mark != std::string::npos) {
-      auto parsed = parse_query(std::string_view{request.target}.substr(question_mark + 1), route.query);
+    if (!route.is_stop) {
+      auto parsed = parse_query(request.target.query(), route.query);
       if (!parsed) co_return problem(parsed.error());
       request.query = std::move(*parsed);
     }
@@ -189,7 +127,7 @@ Answer Router::dispatch(Request request) const {
     response.headers.emplace_back("Allow", allowed);
     co_return response;
   }
-  if (fallback_ && path->front() != "api") co_return fallback_(request);
+  if (fallback_ && request.target.segments().front() != "api") co_return fallback_(request);
   co_return problem(404, "there is nothing at this path", "unknown_path");
 }
 

@@ -42,12 +42,12 @@ class Router {
   void set_fallback(std::function<Response(const Request&)> fallback) { fallback_ = std::move(fallback); }
 
   // Whether the head alone, of this method and target, is reason enough to act.
-  bool is_stop(const std::string& method, const std::string& target) const;
+  bool is_stop(const std::string& method, const Target& target) const;
 
   // How long a body may be for it.
-  std::size_t max_body_bytes(const std::string& method, const std::string& target) const;
+  std::size_t max_body_bytes(const std::string& method, const Target& target) const;
   // What the caller would need for it and has not, before a long body is read; on_refused has heard of it then.
-  std::optional<Scope> scope_lacking(const std::string& method, const std::string& target, const Caller& caller) const;
+  std::optional<Scope> scope_lacking(const std::string& method, const Target& target, const Caller& caller) const;
 
   // A coroutine that throws passes its exception on.
   Answer dispatch(Request request) const;
@@ -60,8 +60,8 @@ class Router {
     std::size_t route = 0;
   };
 
-  bool matches(const Entry& entry, std::span<const std::string> path) const;
-  const Route* find(const std::string& method, const std::string& target) const;
+  bool matches(const Entry& entry, const Target& target) const;
+  const Route* find(const std::string& method, const Target& target) const;
 
   std::vector<Route> routes_;
   std::vector<Entry> entries_;
@@ -71,14 +71,5 @@ class Router {
 
 // 403 that says which role is needed.
 Response not_permitted(const Caller& caller, Scope needed);
-
-// The segments of the target's path, split and then decoded; empty when it is not acceptable.
-std::optional<std::vector<std::string>> path_segments(const std::string& target);
-
-// The same as one text. Whoever judges a request by its path uses this, never the target.
-std::optional<std::string> path_of(const std::string& target);
-
-// "%41" to "A"; empty when the text is not a valid encoding, or decodes to a control character.
-std::optional<std::string> percent_decode(std::string_view text, bool plus_is_space);
 
 }  // namespace server

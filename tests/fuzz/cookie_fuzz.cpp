@@ -67,7 +67,9 @@ Request request_of(const std::string& text, const Gatehouse& house) {
   std::istringstream lines{text};
   Request request;
   std::getline(lines, request.method);
-  std::getline(lines, request.target);
+  std::string target;
+  std::getline(lines, target);
+  request.target = std::move(target);
   for (std::string line; std::getline(lines, line);) {
     const auto colon = std::min(line.find(':'), line.size());
     const std::string value = line.substr(std::min(colon + 1, line.size()));
@@ -91,11 +93,11 @@ void knock(const std::string& text) {
     require(nlohmann::json::accept(admitted.error().body));
     return;
   }
-  const auto path = path_of(request.target);
-  require(path.has_value());
+  const std::string& path = request.target.path();
+  require(request.target.is_acceptable());
   if (admitted->actor.empty()) {
-    const bool holds_data = path->starts_with("/api/") || *path == "/live" || *path == "/metrics";
-    require(!holds_data || (request.method == "POST" && *path == "/api/v1/login"));
+    const bool holds_data = path.starts_with("/api/") || path == "/live" || path == "/metrics";
+    require(!holds_data || (request.method == "POST" && path == "/api/v1/login"));
     return;
   }
   const std::string authorization = request.header("authorization");

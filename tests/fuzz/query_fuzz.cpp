@@ -6,6 +6,7 @@
 #include <limits>
 #include <string_view>
 
+#include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/runtime/tasks.hpp"
 
@@ -44,11 +45,10 @@ void decode(std::string_view text) {
 }
 
 // A segment never hides a way to another folder.
-void read_path(const std::string& target) {
-  const auto segments = path_segments(target);
-  require(segments.has_value() == path_of(target).has_value());
-  if (!segments) return;
-  for (const std::string& segment : *segments) {
+void read_path(const std::string& text) {
+  const Target target{text};
+  require(target.is_acceptable() == !target.path().empty());
+  for (const std::string& segment : target.segments()) {
     require(segment != "." && segment != ".." && segment.find_first_of("/\\") == std::string::npos);
     require(!has_control_character(segment));
   }

@@ -3,7 +3,11 @@
 // A secret stands in one answer only, that of the request which made it.
 #include <fmt/format.h>
 
+#include "server/api/bodies/json.hpp"
 #include "server/api/routes/routes.hpp"
+#include "server/identity/auth.hpp"
+#include "server/identity/logins.hpp"
+#include "server/station/station.hpp"
 
 namespace server {
 using nlohmann::json;
@@ -27,7 +31,7 @@ json me_json(const std::string& user, const std::string& actor, Scopes scopes) {
   return {{"actor", actor}, {"user", user}, {"role", text(scopes.role())}, {"scopes", text(scopes)}};
 }
 
-Answer log_in(ApiParts& parts, Request request) {
+Answer log_in(AccountRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"user", "password"});
   if (!body) co_return problem(body.error());
   const auto user = body->text("user", 0, kMaxWordBytes);
@@ -44,7 +48,7 @@ Answer log_in(ApiParts& parts, Request request) {
   co_return response;
 }
 
-Answer log_out(ApiParts& parts, Request request) {
+Answer log_out(AccountRoutes parts, Request request) {
   if (request.caller.session == 0) {
     co_return problem(409, "a token has no session; revoke the token instead", "no_session");
   }
@@ -54,20 +58,20 @@ Answer log_out(ApiParts& parts, Request request) {
   co_return response;
 }
 
-Answer get_me(ApiParts&, Request request) {
+Answer get_me(AccountRoutes, Request request) {
   const Caller& caller = request.caller;
   co_return json_response(200, me_json(caller.user, caller.actor, caller.scopes));
 }
 
 // ---- users
 
-Answer list_users(ApiParts& parts, Request) {
+Answer list_users(AccountRoutes parts, Request) {
   json list = json::array();
   for (const auto& [name, user] : parts.accounts.users()) list.push_back(to_json(user));
   co_return json_response(200, {{"users", std::move(list)}});
 }
 
-Answer add_user(ApiParts& parts, Request request) {
+Answer add_user(AccountRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"name", "role", "password"});
   if (!body) co_return problem(body.error());
   const auto name = body->text("name", 0, kMaxWordBytes);
@@ -90,7 +94,7 @@ Answer add_user(ApiParts& parts, Request request) {
   co_return json_response(201, to_json(*added));
 }
 
-Answer change_user(ApiParts& parts, Request request) {
+Answer change_user(AccountRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"role", "password", "disabled"});
   if (!body) co_return problem(body.error());
   UserChange change;
@@ -119,7 +123,7 @@ Answer change_user(ApiParts& parts, Request request) {
   co_return json_response(200, to_json(*changed));
 }
 
-Answer remove_user(ApiParts& parts, Request request) {
+Answer remove_user(AccountRoutes parts, Request request) {
   const std::string name = request.param.at("user");
   const auto removed = co_await parts.accounts.remove_user(name, author_of(request, parts.clock));
   if (!removed) co_return problem(removed.error());
@@ -128,11 +132,11 @@ Answer remove_user(ApiParts& parts, Request request) {
 
 // ---- API tokens
 
-Answer list_tokens(ApiParts& parts, Request) {
+Answer list_tokens(AccountRoutes parts, Request) {
   co_return json_response(200, list_json("tokens", parts.accounts.tokens()));
 }
 
-Answer add_token(ApiParts& parts, Request request) {
+Answer add_token(AccountRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"name", "scopes", "days"});
   if (!body) co_return problem(body.error());
   const auto name = body->text("name", 0, kMaxWordBytes);
@@ -156,7 +160,7 @@ Answer add_token(ApiParts& parts, Request request) {
   co_return json_response(201, answer);
 }
 
-Answer revoke_token(ApiParts& parts, Request request) {
+Answer revoke_token(AccountRoutes parts, Request request) {
   const std::string name = request.param.at("token");
   const auto revoked = co_await parts.accounts.revoke_token(name, author_of(request, parts.clock));
   if (!revoked) co_return problem(revoked.error());
@@ -165,7 +169,7 @@ Answer revoke_token(ApiParts& parts, Request request) {
 
 // ---- sessions of pages
 
-Answer list_sessions(ApiParts& parts, Request request) {
+Answer list_sessions(AccountRoutes parts, Request request) {
   json list = json::array();
   for (const Sessions::Open& session : parts.accounts.sessions()) {
     json entry = to_json(static_cast<const PageSession&>(session));
@@ -175,7 +179,7 @@ Answer list_sessions(ApiParts& parts, Request request) {
   co_return json_response(200, {{"sessions", std::move(list)}});
 }
 
-Answer revoke_session(ApiParts& parts, Request request) {
+Answer revoke_session(AccountRoutes parts, Request request) {
   const auto number = parse_id(request.param.at("session"));
   if (!number || !parts.accounts.end_session(*number, author_of(request, parts.clock))) {
     co_return problem(404, "there is no such session", "unknown_session");
@@ -185,13 +189,13 @@ Answer revoke_session(ApiParts& parts, Request request) {
 
 // ---- robots
 
-Answer list_enrolments(ApiParts& parts, Request) {
+Answer list_enrolments(AccountRoutes parts, Request) {
   const auto enrolments = co_await parts.accounts.enrolments();
   if (!enrolments) co_return problem(enrolments.error());
   co_return json_response(200, list_json("enrolments", *enrolments));
 }
 
-Answer enrol_robot(ApiParts& parts, Request request) {
+Answer enrol_robot(AccountRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"robot_id"});
   if (!body) co_return problem(body.error());
   const auto robot_id = body->text("robot_id", 0, kMaxWordBytes);
@@ -211,7 +215,7 @@ Answer enrol_robot(ApiParts& parts, Request request) {
 }
 
 // The connection ends whether or not the disk can store why; one that is being admitted is refused by the recorder.
-Answer revoke_robot(ApiParts& parts, Request request) {
+Answer revoke_robot(AccountRoutes parts, Request request) {
   const std::string robot_id = request.param.at("robot_id");
   parts.station.end_connection(robot_id, "its enrolment was revoked");
   const auto revoked = co_await parts.accounts.revoke_robot(robot_id, author_of(request, parts.clock));
@@ -221,7 +225,7 @@ Answer revoke_robot(ApiParts& parts, Request request) {
 
 // SAFETY: what takes a robot out of the stop of all is stored before it is in force; what brings it back is in force at
 // once.
-Answer retire_robot(ApiParts& parts, Request request) {
+Answer retire_robot(AccountRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"retired"});
   if (!body) co_return problem(body.error());
   if (!body->has("retired")) co_return problem(400, "retired is missing", "missing_member");
@@ -238,11 +242,10 @@ Answer retire_robot(ApiParts& parts, Request request) {
 
 }  // namespace
 
-void add_account_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
-                                     Answer (*answer)(ApiParts&, Request)) {
-    router.add(
-        {method, pattern, needs, {}, [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+void add_account_routes(Router& router, AccountRoutes parts) {
+  const auto add = [&router, parts](const char* method, const char* pattern, Scope needs,
+                                    Answer (*answer)(AccountRoutes, Request)) {
+    router.add({method, pattern, needs, {}, with(parts, answer)});
   };
   add("POST", "/api/v1/login", Scope::anyone, log_in);
   add("POST", "/api/v1/logout", Scope::read, log_out);

@@ -1,6 +1,9 @@
 // The audit: who did what, when, from where, and what came of it.
+#include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/storage/audit/audit_queries.hpp"
+#include "server/storage/ingest/recorder.hpp"
+#include "server/storage/query/history.hpp"
 
 namespace server {
 using nlohmann::json;
@@ -51,10 +54,10 @@ Result<AuditFilter> filter_of(const Request& request) {
   return filter;
 }
 
-Answer list_audit(ApiParts& parts, Request request) {
+Answer list_audit(AuditRoutes parts, Request request) {
   const auto filter = filter_of(request);
   if (!filter) co_return problem(filter.error());
-  const AuditPage page = co_await parts.recording.history.audit(*filter);
+  const AuditPage page = co_await parts.history.audit(*filter);
   json body{{"entries", json::array()}};
   for (const AuditEntry& entry : page.entries) body["entries"].push_back(to_json(entry));
   body["next_before"] = page.next == 0 ? json(nullptr) : json(page.next);
@@ -64,20 +67,20 @@ Answer list_audit(ApiParts& parts, Request request) {
 
 }  // namespace
 
-void add_audit_routes(Router& router, ApiParts& parts) {
+void add_audit_routes(Router& router, AuditRoutes parts) {
   router.add({"GET",
               "/api/v1/audit",
               Scope::admin,
               {"robot_id", "actor", "action", "from_us", "to_us", "before", "limit"},
-              [&parts](Request request) { return list_audit(parts, std::move(request)); }});
-  router.set_on_refused([&parts](const Request& request, Scope needed) {
+              with(parts, list_audit)});
+  router.set_on_refused([parts](const Request& request, Scope needed) {
     AuditNote note;
     note.by = author_of(request, parts.clock);
     note.action = "request.refused";
     note.subject = request.path.substr(0, kMaxWordBytes);
     note.detail = audit_detail({{"method", request.method}, {"needs", text(needed)}});
     note.can_flood = true;
-    parts.recording.recorder.on_audit(note);
+    parts.recorder.on_audit(note);
   });
 }
 

@@ -4,9 +4,13 @@
 
 #include <ranges>
 
+#include "server/api/bodies/json.hpp"
+#include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/emergency.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/identity/auth.hpp"
+#include "server/station/station.hpp"
+#include "server/storage/query/history.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -98,7 +102,7 @@ Result<void> set_age(CommandRequest& command, const ParsedCommand& parsed, Clock
 }
 
 // What never comes to the station's door, for it is none of its words.
-Response refused(ApiParts& parts, const Request& request, const char* what, const Error& error) {
+Response refused(CommandRoutes parts, const Request& request, const char* what, const Error& error) {
   parts.station.note_refusal(author_of(request, parts.clock), request.param.at("robot_id"), what, "{}", error);
   return problem(error);
 }
@@ -152,9 +156,9 @@ Result<void> may_send_now(const Request& request, const ParsedCommand& parsed, c
 }
 
 // The station then knows a command of this id that ended before a restart, or long ago.
-asio::awaitable<void> recall(ApiParts& parts, RobotId robot_id, CommandId id) {
+asio::awaitable<void> recall(CommandRoutes parts, RobotId robot_id, CommandId id) {
   if (parts.station.known_command(robot_id, id) != nullptr) co_return;
-  const auto stored = co_await parts.recording.history.command(id);
+  const auto stored = co_await parts.history.command(id);
   if (stored && stored->ended_at_us != 0) parts.station.remember(*stored);
 }
 
@@ -186,7 +190,7 @@ CommandRequest request_of(const Request& request, ParsedCommand& parsed, std::st
   return command;
 }
 
-Answer submit_command(ApiParts& parts, Request request) {
+Answer submit_command(CommandRoutes parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
   auto key = key_of(request);
@@ -237,7 +241,7 @@ Result<void> check_sight(const Request& request, ParsedControl& parsed, Clock& c
   return {};
 }
 
-Answer change_control(ApiParts& parts, Request request) {
+Answer change_control(CommandRoutes parts, Request request) {
   auto parsed = parse_control(request.body);
   if (!parsed) co_return refused(parts, request, "control", parsed.error());
   ControlRequest& wish = parsed->request;
@@ -271,21 +275,21 @@ StopRequest stop_request(const Request& request) {
   return stop;
 }
 
-Answer emergency_stop(ApiParts& parts, Request request) {
+Answer emergency_stop(CommandRoutes parts, Request request) {
   StopRequest stop = stop_request(request);
   stop.robot_id = request.param.at("robot_id");
   const auto record = co_await stop_robot(parts.station, std::move(stop));
   if (!record) co_return problem(record.error());
   const int status = stop_status(*record);
-  if (status == 202) co_await parts.recording.history.settle();
+  if (status == 202) co_await parts.history.settle();
   co_return json_response(status, to_json(*record));
 }
 
-Answer emergency_stop_all(ApiParts& parts, Request request) {
+Answer emergency_stop_all(CommandRoutes parts, Request request) {
   const StopsOfAll stops = co_await stop_all_robots(parts.station, stop_request(request));
   int status = 200;
   for (const CommandRecord& record : stops.records) status = std::max(status, stop_status(record));
-  if (status == 202) co_await parts.recording.history.settle();
+  if (status == 202) co_await parts.history.settle();
   nlohmann::ordered_json body;
   body["summary"] = stop_summary(parts.station, stops);  // first, for people who read it
   body["commands"] = list_json("commands", stops.records)["commands"];
@@ -296,12 +300,12 @@ Answer emergency_stop_all(ApiParts& parts, Request request) {
   co_return json_text_response(status, body.dump());
 }
 
-Answer list_commands(ApiParts& parts, Request request) {
+Answer list_commands(CommandRoutes parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
   const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
   if (!limit) co_return problem(limit.error());
-  const auto records = co_await parts.recording.history.commands(id, static_cast<std::size_t>(*limit));
+  const auto records = co_await parts.history.commands(id, static_cast<std::size_t>(*limit));
   co_return json_response(200, list_json("commands", records));
 }
 
@@ -314,10 +318,10 @@ bool may_see(const CommandRecord& command, const Request& request, const Station
   return command.actor == request.actor || (robot != nullptr && robot->pending_stop == command.id);
 }
 
-Answer get_command(ApiParts& parts, Request request) {
+Answer get_command(CommandRoutes parts, Request request) {
   const auto id = parse_id(request.param.at("command_id"));
   if (!id) co_return problem(400, "command_id is not a decimal number from 1", "out_of_range");
-  const auto record = co_await parts.recording.history.command(*id);
+  const auto record = co_await parts.history.command(*id);
   if (!record) co_return problem(record.error());
   if (!may_see(*record, request, parts.station)) co_return not_permitted(request.caller, Scope::read);
   co_return json_response(200, to_json(*record));
@@ -325,18 +329,17 @@ Answer get_command(ApiParts& parts, Request request) {
 
 }  // namespace
 
-void add_command_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
-                                     std::vector<std::string> query, Answer (*answer)(ApiParts&, Request)) {
-    router.add({method, pattern, needs, std::move(query),
-                [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+void add_command_routes(Router& router, CommandRoutes parts) {
+  const auto add = [&router, parts](const char* method, const char* pattern, Scope needs,
+                                    std::vector<std::string> query, Answer (*answer)(CommandRoutes, Request)) {
+    router.add({method, pattern, needs, std::move(query), with(parts, answer)});
   };
   add("GET", "/api/v1/robots/{robot_id}/commands", Scope::read, {"limit"}, list_commands);
   add("POST", "/api/v1/robots/{robot_id}/commands", Scope::command, {"wait"}, submit_command);
   add("POST", "/api/v1/robots/{robot_id}/control", Scope::command, {}, change_control);
   add("GET", "/api/v1/commands/{command_id}", Scope::look, {}, get_command);
-  const auto add_stop = [&router, &parts](const char* pattern, Answer (*answer)(ApiParts&, Request)) {
-    auto stop = [&parts, answer](Request request) { return answer(parts, std::move(request)); };
+  const auto add_stop = [&router, parts](const char* pattern, Answer (*answer)(CommandRoutes, Request)) {
+    auto stop = with(parts, answer);
     router.add({.method = "POST",
                 .pattern = pattern,
                 .needs = Scope::stop,

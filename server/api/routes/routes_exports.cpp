@@ -3,11 +3,14 @@
 
 #include <filesystem>
 
+#include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/csv_export.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/storage/export/mat_writer.hpp"
 #include "server/storage/export/run_file.hpp"
+#include "server/storage/query/history.hpp"
 #include "server/storage/query/run_reader.hpp"
+#include "server/storage/upkeep/disk_watch.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -25,7 +28,7 @@ struct ParsedExport {
   std::vector<RecordedSpan> spans;  // as far as they were made when the export began
 };
 
-asio::awaitable<Result<ParsedExport>> parse_export(ApiParts& parts, Request request) {
+asio::awaitable<Result<ParsedExport>> parse_export(ExportRoutes parts, Request request) {
   ParsedExport parsed;
   const auto run = run_id_of(request);
   if (!run) co_return std::unexpected{run.error()};
@@ -35,7 +38,7 @@ asio::awaitable<Result<ParsedExport>> parse_export(ApiParts& parts, Request requ
   if (!grid_us) co_return std::unexpected{grid_us.error()};
   parsed.query = {.run = *run, .channels = *channels, .grid_us = {}};
   if (*grid_us != 0) parsed.query.grid_us = *grid_us;
-  auto spans = co_await parts.recording.exports.spans(excerpt_of(*run));
+  auto spans = co_await parts.history.spans(excerpt_of(*run));
   if (!spans) co_return std::unexpected{spans.error()};
   for (RecordedSpan& span : *spans) span.cut(span.made());
   parsed.spans = std::move(*spans);
@@ -51,12 +54,12 @@ Response attachment(const char* content_type, RunId run, const char* ending, std
   return response;
 }
 
-Answer export_csv(ApiParts& parts, Request request) {
+Answer export_csv(ExportRoutes parts, Request request) {
   auto parsed = co_await parse_export(parts, std::move(request));
   if (!parsed) co_return problem(parsed.error());
   const RunId run = parsed->query.run;
   co_return attachment("text/csv; charset=utf-8", run, ".csv",
-                       std::make_unique<CsvStream>(parts.recording.exports, std::move(parsed->spans), parsed->query));
+                       std::make_unique<CsvStream>(parts.history, std::move(parsed->spans), parsed->query));
 }
 
 // Makes the empty file, if there is room for what comes into it.
@@ -75,38 +78,37 @@ Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folde
   return file;
 }
 
-EndOnWorker end_on_worker(ApiParts& parts) { return {parts.tasks, parts.recording.exports.reader()}; }
+EndOnWorker end_on_worker(ExportRoutes parts) { return {parts.tasks, parts.history.reader()}; }
 
-asio::awaitable<Result<ExportFilePtr>> begin_file(ApiParts& parts, const ParsedExport& parsed, const char* ending) {
-  if (auto may = parts.recording.disk_watch.may_begin("an export to a file"); !may) {
+asio::awaitable<Result<ExportFilePtr>> begin_file(ExportRoutes parts, const ParsedExport& parsed, const char* ending) {
+  if (auto may = parts.disk_watch.may_begin("an export to a file"); !may) {
     co_return std::unexpected{may.error()};
   }
   const auto grid_us = static_cast<std::uint64_t>(parsed.query.grid_us.value_or(kMaxGridUs));
-  auto job = [folder = parts.recording.exports_folder(), ending, spans = parsed.spans,
-              grid_us](SQLite::Database& database) {
+  auto job = [folder = parts.folder, ending, spans = parsed.spans, grid_us](SQLite::Database& database) {
     return make_file(folder, ending, most_samples(database, spans) * (1 + kUsualPeriodUs / grid_us));
   };
-  auto file = co_await parts.recording.exports.reader().ask(std::move(job));
+  auto file = co_await parts.history.reader().ask(std::move(job));
   if (!file) co_return std::unexpected{file.error()};
   co_return ExportFilePtr{file->release(), end_on_worker(parts)};
 }
 
 // To its end, or until there is no room: nobody knows before how long the gaps of a grid are.
 template <class Writer>
-asio::awaitable<Result<void>> write_in_slices(ApiParts& parts, Writer& writer) {
+asio::awaitable<Result<void>> write_in_slices(ExportRoutes parts, Writer& writer) {
   for (Result<bool> more = true; *more;) {
-    auto slice = [&writer, folder = parts.recording.exports_folder()](SQLite::Database& database) -> Result<bool> {
+    auto slice = [&writer, folder = parts.folder](SQLite::Database& database) -> Result<bool> {
       if (free_bytes_of(folder) >= kSpareBytes) return writer.advance(database);
       return fail(ErrorCode::unavailable, "the export would fill the station's disk; export CSV, which needs no room",
                   "low_space");
     };
-    more = co_await parts.recording.exports.reader().ask(std::move(slice));
+    more = co_await parts.history.reader().ask(std::move(slice));
     if (!more) co_return std::unexpected{more.error()};
   }
   co_return Result<void>{};
 }
 
-Answer export_mat(ApiParts& parts, Request request) {
+Answer export_mat(ExportRoutes parts, Request request) {
   auto parsed = co_await parse_export(parts, std::move(request));
   if (!parsed) co_return problem(parsed.error());
   auto file = co_await begin_file(parts, *parsed, ".mat");
@@ -116,31 +118,30 @@ Answer export_mat(ApiParts& parts, Request request) {
   const Result<void> written = co_await write_in_slices(parts, *writer);
   if (!written) co_return problem(written.error());
   co_return attachment("application/x-matlab-data", parsed->query.run, ".mat",
-                       std::make_unique<FileStream>(parts.recording.exports, std::move(*file)));
+                       std::make_unique<FileStream>(parts.history, std::move(*file)));
 }
 
-Answer export_sqlite(ApiParts& parts, Request request) {
+Answer export_sqlite(ExportRoutes parts, Request request) {
   auto parsed = co_await parse_export(parts, std::move(request));
   if (!parsed) co_return problem(parsed.error());
   auto file = co_await begin_file(parts, *parsed, ".sqlite");
   if (!file) co_return problem(file.error());
-  co_await parts.recording.exports.settle();  // events and commands that were heard
+  co_await parts.history.settle();  // events and commands that were heard
   const std::unique_ptr<RunFile, EndOnWorker> writer{
-      new RunFile{(*file)->path(), reading_uri(parts.recording.path(), false), std::move(parsed->spans), parsed->query},
+      new RunFile{(*file)->path(), reading_uri(parts.database, false), std::move(parsed->spans), parsed->query},
       end_on_worker(parts)};
   const Result<void> written = co_await write_in_slices(parts, *writer);
   if (!written) co_return problem(written.error());
   co_return attachment("application/vnd.sqlite3", parsed->query.run, ".sqlite",
-                       std::make_unique<FileStream>(parts.recording.exports, std::move(*file)));
+                       std::make_unique<FileStream>(parts.history, std::move(*file)));
 }
 
 }  // namespace
 
-void add_export_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* pattern, std::vector<std::string> query,
-                                     Answer (*answer)(ApiParts&, Request)) {
-    router.add({"GET", pattern, Scope::record, std::move(query),
-                [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+void add_export_routes(Router& router, ExportRoutes parts) {
+  const auto add = [&router, parts](const char* pattern, std::vector<std::string> query,
+                                    Answer (*answer)(ExportRoutes, Request)) {
+    router.add({"GET", pattern, Scope::record, std::move(query), with(parts, answer)});
   };
   add("/api/v1/runs/{run_id}/samples.csv", {"channels", "grid_us"}, export_csv);
   add("/api/v1/runs/{run_id}/samples.mat", {"channels", "grid_us"}, export_mat);

@@ -2,8 +2,12 @@
 #include <algorithm>
 
 #include "server/api/bodies/fluid_model_body.hpp"
+#include "server/api/bodies/json.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/config/station_document.hpp"
+#include "server/station/station.hpp"
+#include "server/storage/ingest/recorder.hpp"
+#include "server/storage/runs/fluid_models.hpp"
 
 namespace server {
 using nlohmann::json;
@@ -14,12 +18,12 @@ constexpr std::size_t kMaxFluidBytes = 200;  // of what somebody sends; a listed
 constexpr microseconds kSendingPatience{3'000'000};
 constexpr microseconds kSendingLook{50'000};
 
-json model_json(ApiParts& parts, const std::string& fluid) {
-  const FluidModel* model = parts.recording.fluid_models.in_force().find(fluid);
+json model_json(FluidRoutes parts, const std::string& fluid) {
+  const FluidModel* model = parts.fluid_models.in_force().find(fluid);
   return model == nullptr ? json(nullptr) : to_json(*model);
 }
 
-Answer list_fluids(ApiParts& parts, Request) {
+Answer list_fluids(FluidRoutes parts, Request) {
   const Envelope& envelope = parts.station.envelope();
   json list = json::array();
   for (const auto& [fluid, limits] : envelope.of_fluid()) {
@@ -45,7 +49,7 @@ Result<std::string> parse_fluid(const std::string& text, const Envelope& envelop
 }
 
 // What has become of the fluid's model on the robot, when that is known in time.
-boost::asio::awaitable<json> model_sent(ApiParts& parts, std::string id) {
+boost::asio::awaitable<json> model_sent(FluidRoutes parts, std::string id) {
   const std::int64_t deadline_us = parts.clock.steady_us() + kSendingPatience.count();
   while (parts.station.find(id)->model.state == ModelState::sending && parts.clock.steady_us() < deadline_us) {
     co_await parts.clock.sleep_for(kSendingLook);
@@ -54,14 +58,14 @@ boost::asio::awaitable<json> model_sent(ApiParts& parts, std::string id) {
 }
 
 // Answered when it is on disk: a restart must not bring looser limits back.
-Answer set_fluid(ApiParts& parts, Request request) {
+Answer set_fluid(FluidRoutes parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   const Envelope& envelope = parts.station.envelope();
   const auto fluid = parse_fluid(request.body, envelope);
   if (!fluid) co_return problem(fluid.error());
   const auto set = parts.station.set_fluid(id, *fluid, author_of(request, parts.clock));
   if (!set) co_return problem(set.error());
-  const bool stored = co_await parts.recording.recorder.flush_records();
+  const bool stored = co_await parts.recorder.flush_records();
   if (!stored) {
     co_return problem(503, "the fluid is in force and could not be stored yet; the station's log says why",
                       "not_stored");
@@ -81,22 +85,21 @@ json robots_in(const Station& station, const std::string& fluid) {
   return robots;
 }
 
-Answer set_model(ApiParts& parts, Request request) {
+Answer set_model(FluidRoutes parts, Request request) {
   const auto fluid = parts.station.envelope().listed(request.param.at("fluid"));
   if (!fluid) co_return problem(fluid.error());
   auto model = parse_fluid_model(request.body);
   if (!model) co_return problem(model.error());
-  const auto set =
-      co_await parts.recording.fluid_models.set(*fluid, std::move(*model), author_of(request, parts.clock));
+  const auto set = co_await parts.fluid_models.set(*fluid, std::move(*model), author_of(request, parts.clock));
   if (!set) co_return problem(set.error());
   co_return json_response(
       200, {{"fluid", *fluid}, {"model", to_json(*set)}, {"robots_not_updated", robots_in(parts.station, *fluid)}});
 }
 
-Answer remove_model(ApiParts& parts, Request request) {
+Answer remove_model(FluidRoutes parts, Request request) {
   const auto fluid = parts.station.envelope().listed(request.param.at("fluid"));
   if (!fluid) co_return problem(fluid.error());
-  const auto removed = co_await parts.recording.fluid_models.remove(*fluid, author_of(request, parts.clock));
+  const auto removed = co_await parts.fluid_models.remove(*fluid, author_of(request, parts.clock));
   if (!removed) co_return problem(removed.error());
   co_return json_response(
       200, {{"fluid", *fluid}, {"model", nullptr}, {"robots_not_updated", robots_in(parts.station, *fluid)}});
@@ -104,11 +107,10 @@ Answer remove_model(ApiParts& parts, Request request) {
 
 }  // namespace
 
-void add_fluid_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
-                                     Answer (*answer)(ApiParts&, Request)) {
-    router.add(
-        {method, pattern, needs, {}, [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+void add_fluid_routes(Router& router, FluidRoutes parts) {
+  const auto add = [&router, parts](const char* method, const char* pattern, Scope needs,
+                                    Answer (*answer)(FluidRoutes, Request)) {
+    router.add({method, pattern, needs, {}, with(parts, answer)});
   };
   add("GET", "/api/v1/fluids", Scope::read, list_fluids);
   add("POST", "/api/v1/fluids/{fluid}/model", Scope::command, set_model);

@@ -1,5 +1,8 @@
 // What a robot says is in force: its parameters and its controller.
+#include "base/json_text.hpp"
 #include "server/api/routes/routes.hpp"
+#include "server/live/state_json.hpp"
+#include "server/station/station.hpp"
 
 namespace server {
 using nlohmann::json;
@@ -26,7 +29,7 @@ json parameter_json(const rheonaut_Parameter& parameter) {
           {"bounds_motion", bounds_motion(parameter.name)}};
 }
 
-Answer get_parameters(ApiParts& parts, Request request) {
+Answer get_parameters(InForceRoutes parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   const RobotSettings* known = parts.station.settings(id);
   if (known == nullptr) co_return problem(unknown_robot(id).error());
@@ -38,7 +41,7 @@ Answer get_parameters(ApiParts& parts, Request request) {
                                 {"parameters", std::move(table)}});
 }
 
-Answer get_controller(ApiParts& parts, Request request) {
+Answer get_controller(InForceRoutes parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   const RobotSettings* known = parts.station.settings(id);
   if (known == nullptr) co_return problem(unknown_robot(id).error());
@@ -51,11 +54,9 @@ Answer get_controller(ApiParts& parts, Request request) {
 
 }  // namespace
 
-void add_in_force_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* pattern, Answer (*answer)(ApiParts&, Request)) {
-    router.add({"GET", pattern, Scope::read, {}, [&parts, answer](Request request) {
-                  return answer(parts, std::move(request));
-                }});
+void add_in_force_routes(Router& router, InForceRoutes parts) {
+  const auto add = [&router, parts](const char* pattern, Answer (*answer)(InForceRoutes, Request)) {
+    router.add({"GET", pattern, Scope::read, {}, with(parts, answer)});
   };
   add("/api/v1/robots/{robot_id}/parameters", get_parameters);
   add("/api/v1/robots/{robot_id}/controller", get_controller);

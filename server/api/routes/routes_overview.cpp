@@ -1,6 +1,8 @@
 // Overviews of a run and of a robot's recording: the least and the largest values, a point per pixel.
 #include "server/api/bodies/column_text.hpp"
+#include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
+#include "server/storage/query/history.hpp"
 
 namespace server {
 namespace {
@@ -8,26 +10,26 @@ namespace {
 constexpr std::int64_t kMaxPoints = 10'000;
 constexpr std::int64_t kDefaultPoints = 2'000;
 
-Answer overview(ApiParts& parts, Request request, Excerpt excerpt) {
+Answer overview(OverviewRoutes parts, Request request, Excerpt excerpt) {
   const auto points = query_number(request, "points", 1, kMaxPoints, kDefaultPoints);
   if (!points) co_return problem(points.error());
   const auto channels = query_channels(request);
   if (!channels) co_return problem(channels.error());
   const OverviewQuery query{.points = static_cast<std::size_t>(*points), .channels = *channels};
-  auto found = co_await parts.recording.history.overview(std::move(excerpt), query);
+  auto found = co_await parts.history.overview(std::move(excerpt), query);
   if (!found) co_return problem(found.error());
   auto job = [found = std::move(*found), channels = *channels] { return overview_text(found, channels); };
-  std::string text = co_await parts.recording.history.reader().run(std::move(job));
+  std::string text = co_await parts.history.reader().run(std::move(job));
   co_return json_text_response(200, std::move(text));
 }
 
-Answer overview_of_run(ApiParts& parts, Request request) {
+Answer overview_of_run(OverviewRoutes parts, Request request) {
   auto excerpt = run_excerpt(request);
   if (!excerpt) co_return problem(excerpt.error());
   co_return co_await overview(parts, std::move(request), std::move(*excerpt));
 }
 
-Answer overview_of_robot(ApiParts& parts, Request request) {
+Answer overview_of_robot(OverviewRoutes parts, Request request) {
   auto excerpt = robot_excerpt(request);
   if (!excerpt) co_return problem(excerpt.error());
   co_return co_await overview(parts, std::move(request), std::move(*excerpt));
@@ -35,12 +37,9 @@ Answer overview_of_robot(ApiParts& parts, Request request) {
 
 }  // namespace
 
-void add_overview_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* pattern, Answer (*answer)(ApiParts&, Request)) {
-    router.add(
-        {"GET", pattern, Scope::read, {"from_us", "to_us", "points", "channels"}, [&parts, answer](Request request) {
-           return answer(parts, std::move(request));
-         }});
+void add_overview_routes(Router& router, OverviewRoutes parts) {
+  const auto add = [&router, parts](const char* pattern, Answer (*answer)(OverviewRoutes, Request)) {
+    router.add({"GET", pattern, Scope::read, {"from_us", "to_us", "points", "channels"}, with(parts, answer)});
   };
   add("/api/v1/runs/{run_id}/overview", overview_of_run);
   add("/api/v1/robots/{robot_id}/overview", overview_of_robot);

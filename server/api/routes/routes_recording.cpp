@@ -1,6 +1,10 @@
 // The recording as such: its health, its figures for Prometheus, and backups.
+#include "server/api/bodies/json.hpp"
 #include "server/api/routes/metrics.hpp"
 #include "server/api/routes/routes.hpp"
+#include "server/net/transport_security.hpp"
+#include "server/station/station.hpp"
+#include "server/storage/recording_parts.hpp"
 
 namespace server {
 using nlohmann::json;
@@ -44,7 +48,7 @@ json to_json(const BackupRecord& backup) {
           {"path", backup.path.string()}};
 }
 
-Answer get_recording(ApiParts& parts, Request) {
+Answer get_recording(RecordingRoutes parts, Request) {
   const RecordingParts& recording = parts.recording;
   const bool failing = recording.recorder.failing();
   const bool has_room = recording.disk_watch.state() == SpaceState::ok;
@@ -67,28 +71,28 @@ Answer get_recording(ApiParts& parts, Request) {
             {"retention", to_json(recording.retention)}});
 }
 
-Answer acknowledge_losses(ApiParts& parts, Request request) {
+Answer acknowledge_losses(RecordingRoutes parts, Request request) {
   const Author by = author_of(request, parts.clock);
   const auto done = co_await parts.recording.head_watch.acknowledge(by);
   if (!done) co_return problem(done.error());
   co_return json_response(200, json::object());
 }
 
-Answer get_metrics(ApiParts& parts, Request) {
+Answer get_metrics(RecordingRoutes parts, Request) {
   Response response;
   response.content_type = "text/plain; version=0.0.4";
-  response.body = metrics_text(parts.recording, parts.station, *parts.facts.security, parts.tasks.exceptions());
+  response.body = metrics_text(parts.recording, parts.station, parts.security, parts.exceptions);
   co_return response;
 }
 
-Answer list_backups(ApiParts& parts, Request) {
+Answer list_backups(RecordingRoutes parts, Request) {
   const std::vector<BackupRecord> backups = co_await parts.recording.backups.list();
   json list = json::array();
   for (const BackupRecord& backup : backups) list.push_back(to_json(backup));
   co_return json_response(200, {{"backups", std::move(list)}});
 }
 
-Answer create_backup(ApiParts& parts, Request request) {
+Answer create_backup(RecordingRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"name"});
   if (!body) co_return problem(body.error());
   const auto name = body->text("name", 1, kMaxNameBytes);
@@ -106,11 +110,10 @@ json losses_json(const std::vector<StoreLoss>& losses) {
   return list;
 }
 
-void add_recording_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
-                                     Answer (*answer)(ApiParts&, Request)) {
-    router.add(
-        {method, pattern, needs, {}, [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+void add_recording_routes(Router& router, RecordingRoutes parts) {
+  const auto add = [&router, parts](const char* method, const char* pattern, Scope needs,
+                                    Answer (*answer)(RecordingRoutes, Request)) {
+    router.add({method, pattern, needs, {}, with(parts, answer)});
   };
   add("GET", "/metrics", Scope::read, get_metrics);
   add("GET", "/api/v1/recording", Scope::read, get_recording);

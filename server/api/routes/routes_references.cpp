@@ -3,7 +3,11 @@
 
 #include <cmath>
 
+#include "server/analysis/analysis_service.hpp"
+#include "server/api/bodies/json.hpp"
+#include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
+#include "server/storage/runs/outside_references.hpp"
 
 namespace server {
 using nlohmann::json;
@@ -141,14 +145,14 @@ Result<ReferenceRequest> parse_reference(const std::string& text) {
   return request;
 }
 
-Answer import_reference(ApiParts& parts, Request request) {
+Answer import_reference(ReferenceRoutes parts, Request request) {
   const auto run = run_id_of(request);
   if (!run) co_return problem(run.error());
   const Author by = author_of(request, parts.clock);
   auto parse = [body = std::move(request.body)] { return parse_reference(body); };
   auto wanted = co_await parts.analysis.compute(std::move(parse));
   if (!wanted) co_return problem(wanted.error());
-  OutsideReferences& references = parts.recording.references;
+  OutsideReferences& references = parts.references;
   const std::string reason = wanted->reason;
   const Result<void> may = co_await references.check(*run, reason);
   if (!may) co_return problem(may.error());
@@ -170,25 +174,25 @@ Answer import_reference(ApiParts& parts, Request request) {
   co_return response;
 }
 
-Answer get_reference(ApiParts& parts, Request request) {
+Answer get_reference(ReferenceRoutes parts, Request request) {
   const auto run = run_id_of(request);
   if (!run) co_return problem(run.error());
-  const auto found = co_await parts.recording.references.find(*run);
+  const auto found = co_await parts.references.find(*run);
   if (!found) co_return problem(found.error());
   co_return json_response(200, to_json(*found));
 }
 
-Answer remove_reference(ApiParts& parts, Request request) {
+Answer remove_reference(ReferenceRoutes parts, Request request) {
   const auto run = run_id_of(request);
   if (!run) co_return problem(run.error());
   const auto reason = parse_discard(request.body);
   if (!reason) co_return problem(reason.error());
-  const auto removed = co_await parts.recording.references.remove(*run, *reason, author_of(request, parts.clock));
+  const auto removed = co_await parts.references.remove(*run, *reason, author_of(request, parts.clock));
   if (!removed) co_return problem(removed.error());
   co_return json_response(200, to_json(*removed));
 }
 
-Answer list_positions(ApiParts& parts, Request request) {
+Answer list_positions(ReferenceRoutes parts, Request request) {
   const auto run = run_id_of(request);
   if (!run) co_return problem(run.error());
   const auto after = query_number(request, "after", 0, kMaxId, -1);
@@ -196,7 +200,7 @@ Answer list_positions(ApiParts& parts, Request request) {
   const auto limit = query_number(request, "limit", 1, kMaxPagePositions, kMaxPagePositions);
   if (!limit) co_return problem(limit.error());
   const auto after_us = *after < 0 ? std::nullopt : std::optional{static_cast<std::uint64_t>(*after)};
-  const auto found = co_await parts.recording.references.page(*run, after_us, static_cast<std::size_t>(*limit));
+  const auto found = co_await parts.references.page(*run, after_us, static_cast<std::size_t>(*limit));
   if (!found) co_return problem(found.error());
   const OutsidePositions& positions = found->positions;
   const bool is_full = positions.size() == static_cast<std::size_t>(*limit);
@@ -231,13 +235,11 @@ json to_json(const OutsideReference& reference) {
   return out;
 }
 
-void add_reference_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
-                                     std::vector<std::string> query, Answer (*answer)(ApiParts&, Request),
-                                     std::size_t max_body_bytes = kMaxBodyBytes) {
-    router.add({method, pattern, needs, std::move(query),
-                [&parts, answer](Request request) { return answer(parts, std::move(request)); }, false,
-                max_body_bytes});
+void add_reference_routes(Router& router, ReferenceRoutes parts) {
+  const auto add = [&router, parts](const char* method, const char* pattern, Scope needs,
+                                    std::vector<std::string> query, Answer (*answer)(ReferenceRoutes, Request),
+                                    std::size_t max_body_bytes = kMaxBodyBytes) {
+    router.add({method, pattern, needs, std::move(query), with(parts, answer), false, max_body_bytes});
   };
   add("POST", "/api/v1/runs/{run_id}/reference", Scope::record, {}, import_reference, kMaxReferenceBytes);
   add("GET", "/api/v1/runs/{run_id}/reference", Scope::read, {}, get_reference);

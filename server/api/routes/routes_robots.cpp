@@ -4,7 +4,12 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
+#include "server/api/bodies/json.hpp"
+#include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
+#include "server/live/robot_texts.hpp"
+#include "server/station/station.hpp"
+#include "server/storage/query/history.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -29,7 +34,7 @@ json robot_json(const RobotState& robot, const Caller& caller) {
 }
 
 // The same of all robots, some at a time: nobody else waits for it.
-Answer list_robots_to_stop(ApiParts& parts, Request request) {
+Answer list_robots_to_stop(RobotRoutes parts, Request request) {
   constexpr std::size_t kInATurn = 32;
   std::string text = R"({"robots":[)", last;
   for (bool more = true; more;) {
@@ -61,7 +66,7 @@ class RobotList final : public BodyStream {
   RobotDocument document_;
 };
 
-Answer list_robots(ApiParts& parts, Request request) {
+Answer list_robots(RobotRoutes parts, Request request) {
   if (!request.caller.scopes.allow(Scope::read)) co_return co_await list_robots_to_stop(parts, std::move(request));
   RobotDocument document{parts.texts, R"({"robots":[)", "]}"};
   std::string first = co_await document.next();
@@ -71,29 +76,28 @@ Answer list_robots(ApiParts& parts, Request request) {
   co_return response;
 }
 
-Answer get_robot(ApiParts& parts, Request request) {
+Answer get_robot(RobotRoutes parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   const RobotState* robot = parts.station.find(id);
   if (robot == nullptr) co_return unknown_robot(id);
   co_return json_response(200, robot_json(*robot, request.caller));
 }
 
-Answer list_events(ApiParts& parts, Request request) {
+Answer list_events(RobotRoutes parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
   const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
   if (!limit) co_return problem(limit.error());
-  const auto events = co_await parts.recording.history.events(id, static_cast<std::size_t>(*limit));
+  const auto events = co_await parts.history.events(id, static_cast<std::size_t>(*limit));
   co_return json_response(200, list_json("events", events));
 }
 
 }  // namespace
 
-void add_robot_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* pattern, Scope needs, std::vector<std::string> query,
-                                     Answer (*answer)(ApiParts&, Request)) {
-    router.add({"GET", pattern, needs, std::move(query),
-                [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+void add_robot_routes(Router& router, RobotRoutes parts) {
+  const auto add = [&router, parts](const char* pattern, Scope needs, std::vector<std::string> query,
+                                    Answer (*answer)(RobotRoutes, Request)) {
+    router.add({"GET", pattern, needs, std::move(query), with(parts, answer)});
   };
   add("/api/v1/robots", Scope::look, {}, list_robots);
   add("/api/v1/robots/{robot_id}", Scope::look, {}, get_robot);

@@ -1,15 +1,23 @@
 // Runs: begin, end, make afterwards, annotate, discard, list, certify, measure.
 #include <fmt/format.h>
 
+#include "server/analysis/analysis_service.hpp"
+#include "server/api/bodies/json.hpp"
+#include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/identity/auth.hpp"
+#include "server/live/live_feed.hpp"
+#include "server/station/station.hpp"
+#include "server/storage/runs/certifier.hpp"
+#include "server/storage/runs/runs.hpp"
+#include "server/storage/upkeep/disk_watch.hpp"
 
 namespace server {
 using nlohmann::json;
 
 namespace {
 
-Answer list_runs(ApiParts& parts, Request request) {
+Answer list_runs(RunRoutes parts, Request request) {
   const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
   if (!limit) co_return problem(limit.error());
   const auto before = query_number(request, "before", 1, kMaxRunId, 0);
@@ -24,13 +32,13 @@ Answer list_runs(ApiParts& parts, Request request) {
       co_return problem(400, "state is none of open, ended, interrupted and discarded", "out_of_range");
     }
   }
-  const auto runs = co_await parts.recording.runs.list(std::move(filter));
+  const auto runs = co_await parts.runs.list(std::move(filter));
   co_return json_response(200, list_json("runs", runs));
 }
 
 // SAFETY: whoever names the fluid that the robot is in decides which limits hold, and which model it is sent: that is a
 // command. False for somebody who may not, and names the fluid that it is in: then nothing is to be said of the robot.
-Result<bool> may_name_fluid(const ApiParts& parts, const Request& request, const RobotId& robot_id,
+Result<bool> may_name_fluid(const RunRoutes& parts, const Request& request, const RobotId& robot_id,
                             const std::string& fluid) {
   if (fluid.empty() || request.caller.scopes.allow(Scope::command)) return true;
   const RobotState* robot = parts.station.find(robot_id);
@@ -44,10 +52,10 @@ Result<bool> may_name_fluid(const ApiParts& parts, const Request& request, const
               "not_permitted");
 }
 
-Answer create_run(ApiParts& parts, Request request) {
+Answer create_run(RunRoutes parts, Request request) {
   auto wish = parse_run(request.body);
   if (!wish) co_return problem(wish.error());
-  const Result<void> room = parts.recording.disk_watch.may_begin("a run");
+  const Result<void> room = parts.disk_watch.may_begin("a run");
   if (!room) co_return problem(room.error());
   if (parts.station.find(wish->robot_id) == nullptr) {
     co_return problem(404, fmt::format("no robot '{}' is known", wish->robot_id), "unknown_robot");
@@ -57,7 +65,7 @@ Answer create_run(ApiParts& parts, Request request) {
     if (!named) co_return problem(named.error());
     if (!*named) wish->conditions.fluid.clear();  // the run takes the robot's
   }
-  Runs& runs = parts.recording.runs;
+  Runs& runs = parts.runs;
   const Author by = author_of(request, parts.clock);
   auto made = wish->range ? runs.make_afterwards(wish->robot_id, wish->conditions, *wish->range, by)
                           : runs.create(wish->robot_id, wish->conditions, by);
@@ -69,32 +77,32 @@ Answer create_run(ApiParts& parts, Request request) {
   co_return response;
 }
 
-Answer get_run(ApiParts& parts, Request request) {
+Answer get_run(RunRoutes parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
-  const auto run = co_await parts.recording.runs.find(*id);
+  const auto run = co_await parts.runs.find(*id);
   if (!run) co_return problem(run.error());
   co_return json_response(200, to_json(*run));
 }
 
-Answer end_run(ApiParts& parts, Request request) {
+Answer end_run(RunRoutes parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
   const auto verdict = parse_run_end(request.body);
   if (!verdict) co_return problem(verdict.error());
-  const auto run = co_await parts.recording.runs.end(*id, *verdict, author_of(request, parts.clock));
+  const auto run = co_await parts.runs.end(*id, *verdict, author_of(request, parts.clock));
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
   co_return json_response(200, to_json(*run));
 }
 
-Answer annotate_run(ApiParts& parts, Request request) {
+Answer annotate_run(RunRoutes parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
   auto annotation = parse_annotation(request.body);
   if (!annotation) co_return problem(annotation.error());
   if (const auto fluid = annotation->texts.find("fluid"); fluid != annotation->texts.end()) {
-    const auto before = co_await parts.recording.runs.find(*id);
+    const auto before = co_await parts.runs.find(*id);
     if (!before) co_return problem(before.error());
     if (auto stands = still_stands(request.caller); !stands) co_return problem(stands.error());
     const bool is_open = before->state == RunState::open;
@@ -102,18 +110,18 @@ Answer annotate_run(ApiParts& parts, Request request) {
     if (!named) co_return problem(named.error());
     annotation->names_fluid_of_robot = *named;
   }
-  const auto run = co_await parts.recording.runs.annotate(*id, *annotation, author_of(request, parts.clock));
+  const auto run = co_await parts.runs.annotate(*id, *annotation, author_of(request, parts.clock));
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
   co_return json_response(200, to_json(*run));
 }
 
-Answer discard_run(ApiParts& parts, Request request) {
+Answer discard_run(RunRoutes parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
   const auto reason = parse_discard(request.body);
   if (!reason) co_return problem(reason.error());
-  const auto run = co_await parts.recording.runs.discard(*id, *reason, author_of(request, parts.clock));
+  const auto run = co_await parts.runs.discard(*id, *reason, author_of(request, parts.clock));
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));
   co_return json_response(200, to_json(*run));
@@ -140,18 +148,18 @@ json to_json(const RunCertificate& found, RunId run) {
   return out;
 }
 
-Answer get_certificate(ApiParts& parts, Request request) {
+Answer get_certificate(RunRoutes parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
-  const auto certificate = co_await parts.recording.certifier.find(*id);
+  const auto certificate = co_await parts.certifier.find(*id);
   if (!certificate) co_return problem(certificate.error());
   co_return json_response(200, to_json(*certificate, *id));
 }
 
-Answer get_snapshot(ApiParts& parts, Request request) {
+Answer get_snapshot(RunRoutes parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
-  const auto snapshot = co_await parts.recording.runs.snapshot(*id);
+  const auto snapshot = co_await parts.runs.snapshot(*id);
   if (!snapshot) co_return problem(snapshot.error());
   json in_force = json::array();
   for (const InForce& document : snapshot->in_force) {
@@ -200,7 +208,7 @@ json to_json(const MeasuredStep& step) {
   return out;
 }
 
-Answer get_step_metrics(ApiParts& parts, Request request) {
+Answer get_step_metrics(RunRoutes parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
   const auto measures = co_await parts.analysis.measures(*id);
@@ -215,11 +223,10 @@ Answer get_step_metrics(ApiParts& parts, Request request) {
 
 }  // namespace
 
-void add_run_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* method, const char* pattern, Scope needs,
-                                     std::vector<std::string> query, Answer (*answer)(ApiParts&, Request)) {
-    router.add({method, pattern, needs, std::move(query),
-                [&parts, answer](Request request) { return answer(parts, std::move(request)); }});
+void add_run_routes(Router& router, RunRoutes parts) {
+  const auto add = [&router, parts](const char* method, const char* pattern, Scope needs,
+                                    std::vector<std::string> query, Answer (*answer)(RunRoutes, Request)) {
+    router.add({method, pattern, needs, std::move(query), with(parts, answer)});
   };
   add("GET", "/api/v1/runs", Scope::read, {"robot_id", "state", "before", "limit"}, list_runs);
   add("POST", "/api/v1/runs", Scope::record, {}, create_run);

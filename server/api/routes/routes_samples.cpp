@@ -1,6 +1,8 @@
 // What was recorded: samples of a run or a robot as JSON pages, and what is missing.
 #include "server/api/bodies/column_text.hpp"
+#include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
+#include "server/storage/query/history.hpp"
 
 namespace server {
 namespace {
@@ -9,12 +11,12 @@ constexpr std::int64_t kMaxPage = kMaxPageSamples;
 constexpr std::int64_t kDefaultPage = 1000;
 
 // Text of many samples takes milliseconds: it is made on the readers' thread, never on the loop.
-Answer list_samples(ApiParts& parts, Request request, Excerpt excerpt) {
+Answer list_samples(SampleRoutes parts, Request request, Excerpt excerpt) {
   const auto limit = query_number(request, "limit", 1, kMaxPage, kDefaultPage);
   if (!limit) co_return problem(limit.error());
   const auto after = query_cursor(request);
   if (!after) co_return problem(after.error());
-  History& history = parts.recording.history;
+  History& history = parts.history;
   auto page = co_await history.segments(std::move(excerpt), *after, static_cast<std::size_t>(*limit));
   if (!page) co_return problem(page.error());
   auto job = [page = std::move(*page)] { return page_text(page); };
@@ -22,12 +24,12 @@ Answer list_samples(ApiParts& parts, Request request, Excerpt excerpt) {
   co_return json_text_response(200, std::move(text));
 }
 
-Answer list_gaps(ApiParts& parts, Request request, Excerpt excerpt) {
+Answer list_gaps(SampleRoutes parts, Request request, Excerpt excerpt) {
   const auto limit = query_number(request, "limit", 1, static_cast<std::int64_t>(kMaxPageGaps), kDefaultPage);
   if (!limit) co_return problem(limit.error());
   const auto after = query_cursor(request);
   if (!after) co_return problem(after.error());
-  History& history = parts.recording.history;
+  History& history = parts.history;
   auto found = co_await history.gaps(std::move(excerpt), *after, static_cast<std::size_t>(*limit));
   if (!found) co_return problem(found.error());
   auto job = [found = std::move(*found)] { return absences_text(found); };
@@ -36,10 +38,10 @@ Answer list_gaps(ApiParts& parts, Request request, Excerpt excerpt) {
 }
 
 // The same route for a run and for a robot.
-using ExcerptRoute = Answer (*)(ApiParts&, Request, Excerpt);
+using ExcerptRoute = Answer (*)(SampleRoutes, Request, Excerpt);
 using ExcerptOf = Result<Excerpt> (*)(const Request&);
 
-Answer answer_excerpt(ApiParts& parts, Request request, ExcerptOf excerpt_of, ExcerptRoute answer) {
+Answer answer_excerpt(SampleRoutes parts, Request request, ExcerptOf excerpt_of, ExcerptRoute answer) {
   auto excerpt = excerpt_of(request);
   if (!excerpt) co_return problem(excerpt.error());
   co_return co_await answer(parts, std::move(request), std::move(*excerpt));
@@ -47,10 +49,10 @@ Answer answer_excerpt(ApiParts& parts, Request request, ExcerptOf excerpt_of, Ex
 
 }  // namespace
 
-void add_sample_routes(Router& router, ApiParts& parts) {
-  const auto add = [&router, &parts](const char* pattern, std::vector<std::string> query, ExcerptOf excerpt_of,
-                                     ExcerptRoute answer) {
-    router.add({"GET", pattern, Scope::read, std::move(query), [&parts, excerpt_of, answer](Request request) {
+void add_sample_routes(Router& router, SampleRoutes parts) {
+  const auto add = [&router, parts](const char* pattern, std::vector<std::string> query, ExcerptOf excerpt_of,
+                                    ExcerptRoute answer) {
+    router.add({"GET", pattern, Scope::read, std::move(query), [parts, excerpt_of, answer](Request request) {
                   return answer_excerpt(parts, std::move(request), excerpt_of, answer);
                 }});
   };

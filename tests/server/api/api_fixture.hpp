@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <string>
 
+#include "server/analysis/analysis_service.hpp"
 #include "server/api/api_server.hpp"
 #include "server/station/model_sender.hpp"
 #include "server/storage/recording_parts.hpp"

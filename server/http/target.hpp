@@ -1,0 +1,37 @@
+// The target of a request: its text as it was sent, and its path and query, taken apart once.
+//
+// Whoever judges a request by its path uses path() or segments(), never the text.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace server {
+
+class Target {
+ public:
+  Target() = default;
+  Target(std::string text);  // NOLINT(google-explicit-constructor): a target is written as its text
+  Target(const char* text) : Target{std::string{text}} {}  // NOLINT(google-explicit-constructor)
+
+  const std::string& text() const { return text_; }
+  bool is_acceptable() const { return !segments_.empty(); }
+  // Of the path, split and then decoded; at least one. None, and an empty path, when it is not acceptable.
+  const std::vector<std::string>& segments() const { return segments_; }
+  const std::string& path() const { return path_; }
+  std::string_view query() const;  // still encoded; empty when there is none
+
+ private:
+  std::string text_;
+  std::vector<std::string> segments_;
+  std::string path_;
+};
+
+std::vector<std::string> split(std::string_view text, char separator);
+
+// "%41" to "A"; empty when the text is not a valid encoding, or decodes to a control character.
+std::optional<std::string> percent_decode(std::string_view text, bool plus_is_space);
+
+}  // namespace server
