@@ -41,7 +41,7 @@ export function useCloseOnEscape(close: () => void): void {
 // touch screen has no Escape, and its menus stay.
 export function keep_menus_shut(target: Pick<Window, 'addEventListener'>): void {
   target.addEventListener('contextmenu', (event) => {
-    const is_touch = (event as PointerEvent).pointerType === 'touch';
+    const is_touch = event.pointerType === 'touch';
     if (!is_touch && !event.shiftKey) event.preventDefault();
   });
 }

@@ -46,7 +46,7 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
                  on_start={(name, fluid) => (name === '' ? asking.fail('Give the run a name.') : void start(name, fluid))}
                  on_fluid={set_fluid} />
       )}
-      {is_current && <ModelLine session={session} robot={robot} pending={asking.pending} on_send={set_fluid} />}
+      {is_current && <ModelLine session={session} robot={robot} pending={asking.pending} on_send={(fluid) => void set_fluid(fluid)} />}
       <OutcomeLine asking={asking} />
     </fieldset>
   );
