@@ -85,7 +85,9 @@ export class Api {
   };
 
   emergency_stop = async (robot_id: string, key: string): Promise<StopOutcome> =>
-    outcome_of([await this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/emergency-stop`, undefined, key)]);
+    outcome_of([
+      await this.ask<CommandRecord>('POST', `/robots/${encodeURIComponent(robot_id)}/emergency-stop`, undefined, key),
+    ]);
 
   // A stop that failed for some robots is an error whose content says what became of all of them.
   emergency_stop_all = async (key: string): Promise<StopOutcome> => {
@@ -112,7 +114,8 @@ export class Api {
   set_fluid = (robot_id: string, fluid: string | null) =>
     this.ask<object>('POST', `/robots/${encodeURIComponent(robot_id)}/fluid`, { fluid });
   newest_run = async (robot_id: string) =>
-    (await this.ask<{ runs: RunRecord[] }>('GET', `/runs?robot_id=${encodeURIComponent(robot_id)}&limit=1`)).runs[0] ?? null;
+    (await this.ask<{ runs: RunRecord[] }>('GET', `/runs?robot_id=${encodeURIComponent(robot_id)}&limit=1`)).runs[0] ??
+    null;
   start_run = (robot_id: string, name: string, fluid: string) =>
     this.ask<RunRecord>('POST', '/runs', { robot_id, name, ...(fluid === '' ? {} : { fluid }) }); // '': not known
   end_run = (run_id: number) => this.ask<RunRecord>('POST', `/runs/${run_id}/end`);
@@ -129,7 +132,8 @@ export class Api {
   enrolments = async () => (await this.ask<{ enrolments: Enrolment[] }>('GET', '/enrolments')).enrolments;
   retire_robot = (robot_id: string, retired: boolean) =>
     this.ask<Enrolment>('POST', `/robots/${encodeURIComponent(robot_id)}/retire`, { retired });
-  revoke_robot = (robot_id: string) => this.ask<Enrolment>('POST', `/enrolments/${encodeURIComponent(robot_id)}/revoke`);
+  revoke_robot = (robot_id: string) =>
+    this.ask<Enrolment>('POST', `/enrolments/${encodeURIComponent(robot_id)}/revoke`);
 
   // True when the station answers that this page may not speak to it.
   async is_signed_out(): Promise<boolean> {
@@ -168,7 +172,8 @@ export class Api {
 
 function error_of(status: number, problem: Partial<Problem> | null, retry_after_s: number): ApiError {
   const reason = problem?.reason ?? '';
-  if (status === 429) return new ApiError(`Too many attempts. Try again in ${retry_after_s} s.`, status, reason, '', problem);
+  if (status === 429)
+    return new ApiError(`Too many attempts. Try again in ${retry_after_s} s.`, status, reason, '', problem);
   const known = allowed_range(problem?.detail ?? '') ?? kReasons[reason];
   const otherwise = problem?.detail || problem?.title || `The station answered ${status} without a reason.`;
   return new ApiError(known ?? otherwise, status, reason, known ? (problem?.detail ?? '') : '', problem);

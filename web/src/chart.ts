@@ -139,15 +139,33 @@ export class StripChart {
         y: { auto: false, range: () => this.range },
       },
       axes: [
-        { ...axis, show: true, size: show_time ? 26 : 0, gap: 6, splits: () => this.time_splits(), values: show_time ? (_, at) => at.map(time_label) : () => [] },
-        { ...axis, size: 58, gap: 8, splits: () => this.options.splits ?? range_splits(this.range), values: (_, at) => at.map(label) },
+        {
+          ...axis,
+          show: true,
+          size: show_time ? 26 : 0,
+          gap: 6,
+          splits: () => this.time_splits(),
+          values: show_time ? (_, at) => at.map(time_label) : () => [],
+        },
+        {
+          ...axis,
+          size: 58,
+          gap: 8,
+          splits: () => this.options.splits ?? range_splits(this.range),
+          values: (_, at) => at.map(label),
+        },
       ],
       bands: band ? [{ series: [2, 1], fill: colour(band.colour) }] : [],
-      series: [{}, ...edges.map((edge, at) => this.series(edge, at, 'transparent')),
-               ...traces.map((trace, at) => this.series(trace, at + edges.length, colour(trace.colour)))],
+      series: [
+        {},
+        ...edges.map((edge, at) => this.series(edge, at, 'transparent')),
+        ...traces.map((trace, at) => this.series(trace, at + edges.length, colour(trace.colour))),
+      ],
       hooks: {
         setSelect: [(u) => this.selected(u)],
-        setCursor: [(u) => this.on_cursor(u.cursor.left === undefined || u.cursor.left < 0 ? null : (u.cursor.idx ?? null))],
+        setCursor: [
+          (u) => this.on_cursor(u.cursor.left === undefined || u.cursor.left < 0 ? null : (u.cursor.idx ?? null)),
+        ],
         draw: [(u) => this.draw_pen(u, colour('--plot'), colour(traces.at(-1)?.colour ?? '--ink'))],
       },
     };
@@ -161,7 +179,10 @@ export class StripChart {
       ...(trace.dash_px ? { dash: trace.dash_px } : {}),
       points: { show: false },
       gaps: (u) =>
-        (this.window.gaps_s[at] ?? []).map(([from_s, to_s]) => [u.valToPos(from_s, 'x', true), u.valToPos(to_s, 'x', true)]),
+        (this.window.gaps_s[at] ?? []).map(([from_s, to_s]) => [
+          u.valToPos(from_s, 'x', true),
+          u.valToPos(to_s, 'x', true),
+        ]),
     };
   }
 
@@ -178,7 +199,13 @@ export class StripChart {
     if (time_s < -0.5) return;
     const ratio = devicePixelRatio;
     u.ctx.beginPath();
-    u.ctx.arc(u.valToPos(time_s, 'x', true), u.valToPos(this.window.values.at(-1)?.[last] as number, 'y', true), 3.5 * ratio, 0, 7);
+    u.ctx.arc(
+      u.valToPos(time_s, 'x', true),
+      u.valToPos(this.window.values.at(-1)?.[last] as number, 'y', true),
+      3.5 * ratio,
+      0,
+      7,
+    );
     u.ctx.fillStyle = fill;
     u.ctx.fill();
     u.ctx.lineWidth = 2 * ratio;

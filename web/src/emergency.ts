@@ -31,7 +31,14 @@ export interface StopWays {
 }
 
 export const kLate_ms = 1000;
-export const kIdleStop: StopState = { phase: 'idle', robot_id: null, pressed_at_ms: 0, answered_after_ms: null, outcome: null, problem: '' };
+export const kIdleStop: StopState = {
+  phase: 'idle',
+  robot_id: null,
+  pressed_at_ms: 0,
+  answered_after_ms: null,
+  outcome: null,
+  problem: '',
+};
 
 export class EmergencyStop {
   state: StopState = kIdleStop;
@@ -49,7 +56,13 @@ export class EmergencyStop {
     this.show({ ...kIdleStop, phase: 'sent', robot_id, pressed_at_ms });
     const settle = (change: Partial<StopState>) => {
       if (press !== this.press) return; // a later press shows its own state
-      this.show({ ...kIdleStop, robot_id, pressed_at_ms, answered_after_ms: this.ways.now_ms() - pressed_at_ms, ...change });
+      this.show({
+        ...kIdleStop,
+        robot_id,
+        pressed_at_ms,
+        answered_after_ms: this.ways.now_ms() - pressed_at_ms,
+        ...change,
+      });
       this.look();
     };
     try {
@@ -57,7 +70,10 @@ export class EmergencyStop {
       settle({ phase: phase_of(outcome), outcome });
     } catch (error) {
       const problem = error instanceof Error ? error.message : String(error);
-      settle({ phase: 'failed', problem: by_socket ? `Sent over the live link; the second way failed: ${problem}` : problem });
+      settle({
+        phase: 'failed',
+        problem: by_socket ? `Sent over the live link; the second way failed: ${problem}` : problem,
+      });
     }
   }
 

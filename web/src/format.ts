@@ -28,7 +28,9 @@ export const volts_of_mv = (value_mv: number | null | undefined) => scaled(value
 export const milliseconds_of_us = (time_us: number | null | undefined, decimals = 1) => scaled(time_us, 1e-3, decimals);
 
 export const count = (value: number | null | undefined) =>
-  value === null || value === undefined ? kMissing : Math.round(value).toLocaleString('en').replaceAll(',', '\u202f').replace('-', kMinus);
+  value === null || value === undefined
+    ? kMissing
+    : Math.round(value).toLocaleString('en').replaceAll(',', '\u202f').replace('-', kMinus);
 
 // The length a person typed in millimetres, in metres; null when it is no number. Comma and both minus signs are taken.
 export function parse_millimetres(text: string): number | null {

@@ -59,10 +59,20 @@ export const stop_button_keys = {
 
 // What the page says of its keys.
 export const kShortcuts: readonly { keys: string[]; what: string }[] = [
-  { keys: ['Esc'], what: 'Stops the robot that the red button names; without one, every robot. From every field, list and panel; what is open closes as well.' },
+  {
+    keys: ['Esc'],
+    what: 'Stops the robot that the red button names; without one, every robot. From every field, list and panel; what is open closes as well.',
+  },
   { keys: ['Space'], what: 'Never stops. It belongs to “Hold to run” and to text.' },
-  { keys: ['Enter'], what: 'Presses the button that has the focus, the stop as well; in a field it sends what was typed.' },
+  {
+    keys: ['Enter'],
+    what: 'Presses the button that has the focus, the stop as well; in a field it sends what was typed.',
+  },
   { keys: ['↑', '↓'], what: 'Choose in a list; letters search in it.' },
-  { keys: ['Shift', 'right click'], what: 'The browser’s own menu. While it is open the browser keeps Escape: press the red button.' },
+  {
+    keys: ['Shift', 'right click'],
+    what: 'The browser’s own menu. While it is open the browser keeps Escape: press the red button.',
+  },
 ];
-export const kFullScreenNote = 'In full screen a browser keeps Escape for itself: the first press may only leave full screen. Press the red button there.';
+export const kFullScreenNote =
+  'In full screen a browser keeps Escape for itself: the first press may only leave full screen. Press the red button there.';

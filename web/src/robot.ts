@@ -21,7 +21,8 @@ export function model_of(flags: number, position_sd_m: number | null, told?: Rob
   if (flags & kModelMismatch) return `${named} does not fit`;
   // Under the flag, too: a former model of the same fluid may be what is confirmed.
   if (fluid && told?.state === 'sending') return `model of ${fluid} being sent`;
-  if (is_confirmed && (told?.state === 'failed' || told?.state === 'sending')) return 'model confirmed for another fluid';
+  if (is_confirmed && (told?.state === 'failed' || told?.state === 'sending'))
+    return 'model confirmed for another fluid';
   if (is_confirmed) return named === 'model' ? 'model confirmed' : `${named}, confirmed`;
   return fluid && told?.state === 'failed' ? `model of ${fluid} could not be sent` : 'model assumed';
 }

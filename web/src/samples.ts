@@ -24,8 +24,12 @@ export const kColumns = [
 export type Column = (typeof kColumns)[number];
 
 // Where the robot believes that it is: what its controller sees, less the disturbance that was injected. null: not known.
-export function estimate_of(position_m: number | null | undefined, disturbance_m: number | null | undefined): number | null {
-  if (position_m === null || position_m === undefined || disturbance_m === null || disturbance_m === undefined) return null;
+export function estimate_of(
+  position_m: number | null | undefined,
+  disturbance_m: number | null | undefined,
+): number | null {
+  if (position_m === null || position_m === undefined || disturbance_m === null || disturbance_m === undefined)
+    return null;
   return position_m - disturbance_m;
 }
 
@@ -52,7 +56,9 @@ export class SampleRing {
     this.capacity = capacity;
     this.time_s = new Float64Array(capacity);
     this.slot_index = new Float64Array(capacity).fill(-1);
-    this.columns = Object.fromEntries(kColumns.map((name) => [name, new Float64Array(capacity)])) as typeof this.columns;
+    this.columns = Object.fromEntries(
+      kColumns.map((name) => [name, new Float64Array(capacity)]),
+    ) as typeof this.columns;
   }
 
   // Lays a batch down; page_now_s is when it arrived.

@@ -24,7 +24,11 @@ export class Session {
   readonly shows_access = signal(false); // in place of the plots
   readonly phase = signal<LinkPhase>('connecting');
   readonly stop_state = signal(kIdleStop);
-  readonly held = signal<{ robot_id: string | null; lapsed: boolean; error: string }>({ robot_id: null, lapsed: false, error: '' });
+  readonly held = signal<{ robot_id: string | null; lapsed: boolean; error: string }>({
+    robot_id: null,
+    lapsed: false,
+    error: '',
+  });
   readonly link: LiveLink;
   readonly emergency: EmergencyStop;
   readonly hold: DutyHold;

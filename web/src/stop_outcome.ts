@@ -66,7 +66,8 @@ export function words_of_all({ summary, reason }: StopOutcome, answered_in: stri
   const { robots, acknowledged, unanswered, failed, kept, left_out } = summary;
   if (robots === 0) return 'The stop may not have arrived: the station knows no robot.';
   const parts = [
-    failed > 0 && `${names(summary, 'failed', failed)}: the stop may not have arrived (${sentence(reason) || 'the station’s log says why'}). Press again, or cut the power.`,
+    failed > 0 &&
+      `${names(summary, 'failed', failed)}: the stop may not have arrived (${sentence(reason) || 'the station’s log says why'}). Press again, or cut the power.`,
     `Stopped ${acknowledged} of ${count(robots - left_out, 'robot')} in ${answered_in}.`,
     unanswered > 0 && `${names(summary, 'unanswered', unanswered)}: not answered yet; the stop is repeated.`,
     kept > 0 && `${names(summary, 'kept', kept)}: not connected; kept, and sent first on return.`,

@@ -83,7 +83,15 @@ export class Store {
   note(text: string): void {
     this.notes += 1;
     const at_ms = this.clocks.utc_ms();
-    this.write({ key: `note-${this.notes}`, at_ms, robot_id: '', event: null, command: null, note: text, position_sd_m: null });
+    this.write({
+      key: `note-${this.notes}`,
+      at_ms,
+      robot_id: '',
+      event: null,
+      command: null,
+      note: text,
+      position_sd_m: null,
+    });
   }
 
   set_runs(open: RunRecord[]): void {
@@ -180,7 +188,15 @@ export class Store {
     const { kind, boot_id, robot_time_us } = event;
     const heard_sd_m = this.find(event.robot_id)?.position_sd_m_at(boot_id, robot_time_us) ?? null;
     const position_sd_m = kind === 'position_zeroed' ? null : heard_sd_m; // that was of the place before
-    return { key, at_ms: event.received_at_us / 1000, robot_id: event.robot_id, event, command: null, note: null, position_sd_m };
+    return {
+      key,
+      at_ms: event.received_at_us / 1000,
+      robot_id: event.robot_id,
+      event,
+      command: null,
+      note: null,
+      position_sd_m,
+    };
   }
 
   private write(line: LogLine): void {
@@ -208,5 +224,13 @@ function merge_log(pending: LogLine[], log: LogLine[]): LogLine[] {
 
 function line_of_command(command: CommandRecord): LogLine {
   const at_ms = command.submitted_at_us / 1000;
-  return { key: `command-${command.command_id}`, at_ms, robot_id: command.robot_id, event: null, command, note: null, position_sd_m: null };
+  return {
+    key: `command-${command.command_id}`,
+    at_ms,
+    robot_id: command.robot_id,
+    event: null,
+    command,
+    note: null,
+    position_sd_m: null,
+  };
 }

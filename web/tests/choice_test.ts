@@ -34,7 +34,8 @@ test('typed letters search, a repeated one goes on to the next', () => {
 
 // SAFETY: while a native pop-up is open the browser keeps the first Escape, and the robot runs on.
 test('nothing on the page opens a native pop-up', () => {
-  const native = /<select|<datalist|<dialog|\blist=|popover|showModal|type="(date|time|month|week|datetime-local|color|file|search|email)|\b(alert|confirm|prompt)\(/;
+  const native =
+    /<select|<datalist|<dialog|\blist=|popover|showModal|type="(date|time|month|week|datetime-local|color|file|search|email)|\b(alert|confirm|prompt)\(/;
   const sources = readdirSync('src', { recursive: true, encoding: 'utf8' }).filter((name) => name.endsWith('.tsx'));
   expect(sources.length).toBeGreaterThan(15);
   for (const name of sources) {
@@ -42,7 +43,8 @@ test('nothing on the page opens a native pop-up', () => {
     expect(source.match(native)?.[0], name).toBeUndefined();
     if (name.endsWith('signed_out.tsx')) continue; // nothing can be stopped from there
     for (const [input] of source.matchAll(/<input[^>]*>?/g)) {
-      if (!input.includes('type="range"')) expect(input, `${name}: earlier entries would be listed`).toContain('autoComplete="off"');
+      if (!input.includes('type="range"'))
+        expect(input, `${name}: earlier entries would be listed`).toContain('autoComplete="off"');
     }
   }
 });

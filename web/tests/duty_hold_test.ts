@@ -51,7 +51,9 @@ test('a stale stamp ends the hold for good: 0 is sent, and a fresh stamp does no
 
 test('a stop that may have been overtaken by the start is sent again', async () => {
   let answer_start: () => void = () => undefined;
-  const { hold, world } = held((duty) => (duty === 0 ? Promise.resolve() : new Promise<void>((done) => (answer_start = done))));
+  const { hold, world } = held((duty) =>
+    duty === 0 ? Promise.resolve() : new Promise<void>((done) => (answer_start = done)),
+  );
   hold.press('rheo-1', 0.3);
   hold.release();
   expect(world.duties).toEqual([0.3, 0]);

@@ -6,7 +6,8 @@ import { kFullScreenNote, kShortcuts, listen_for_stop_key } from '../src/keys';
 import { outcome_of, type StopEvidence } from '../src/stop_outcome';
 import { settle } from './fakes';
 
-const record = (state: CommandRecord['state'], robot_id = 'rheo-1', reason = '') => ({ state, robot_id, reason }) as CommandRecord;
+const record = (state: CommandRecord['state'], robot_id = 'rheo-1', reason = '') =>
+  ({ state, robot_id, reason }) as CommandRecord;
 
 function stop_with(over_http: () => Promise<CommandRecord[]>, over_socket: () => boolean = () => true) {
   const heard: StopEvidence = { latched: 0, kept: 0, cleared: 0, open: 1 };

@@ -71,7 +71,9 @@ export class FakeNode {
   }
   // `type` as in "PointerDown".
   fire(type: string, event: object = {}): void {
-    this.listeners.get(type)?.call(this, { type, currentTarget: this, button: 0, preventDefault: () => undefined, ...event });
+    this.listeners
+      .get(type)
+      ?.call(this, { type, currentTarget: this, button: 0, preventDefault: () => undefined, ...event });
   }
 }
 

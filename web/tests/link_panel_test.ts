@@ -16,7 +16,15 @@ afterEach(() => {
 });
 
 const robot_with = (changed_limits: RobotState['changed_limits']) =>
-  ({ robot_id: 'a', link: 'connected', mode: 'manual', changed_limits, next_seq: 0, durable_next_seq: 0, control: null }) as RobotState;
+  ({
+    robot_id: 'a',
+    link: 'connected',
+    mode: 'manual',
+    changed_limits,
+    next_seq: 0,
+    durable_next_seq: 0,
+    control: null,
+  }) as RobotState;
 
 test('a limit that differs from its default is shown until it is restored', async () => {
   const store = new Store({ page_ms: () => 0, utc_ms: () => 0 });

@@ -6,7 +6,11 @@ import { FakeSurroundings } from './fakes';
 function started(): { around: FakeSurroundings; link: LiveLink; heard: string[] } {
   const around = new FakeSurroundings();
   const heard: string[] = [];
-  const link = new LiveLink(around, (message) => heard.push(message.type), () => undefined);
+  const link = new LiveLink(
+    around,
+    (message) => heard.push(message.type),
+    () => undefined,
+  );
   link.start();
   return { around, link, heard };
 }

@@ -26,6 +26,8 @@ test('a model that does not fit stands out; its end does not', () => {
 });
 
 test('a position has a ± only where one is known', () => {
-  expect(line({ kind: 'mode_changed', mode: 'manual', position_m: 0.1 }, 0.002)[2]).toContain('controller at 100.0 ± 4.0 mm');
+  expect(line({ kind: 'mode_changed', mode: 'manual', position_m: 0.1 }, 0.002)[2]).toContain(
+    'controller at 100.0 ± 4.0 mm',
+  );
   expect(line({ kind: 'position_zeroed', position_m: 0 })[2]).toContain('controller at 0.0 mm');
 });

@@ -20,7 +20,11 @@ afterEach(() => {
 
 const kProblem = 'the database has lost commits: run 4 ends at sample 1200';
 const station_with = (problems: string[]) =>
-  ({ version: '1', security: { exposed: false, certificate: null }, losses: problems.map((problem) => ({ noticed_at_us: 0, problem })) }) as unknown as Station;
+  ({
+    version: '1',
+    security: { exposed: false, certificate: null },
+    losses: problems.map((problem) => ({ noticed_at_us: 0, problem })),
+  }) as unknown as Station;
 
 function drawn_for(role: string, problems: string[]) {
   const station = signal(station_with(problems));

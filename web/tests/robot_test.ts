@@ -15,7 +15,9 @@ test('an estimate says whether its model is assumed, confirmed or does not fit; 
 test('limits that are not at their default stand in one line, and nothing where there are none', () => {
   expect(changed_limits_of({ changed_limits: [] })).toBe('');
   const far = { name: 'position_limit_max_m', unit: 'm', value: 0.2, default: 100 };
-  expect(changed_limits_of({ changed_limits: [far] })).toBe('Changed limits: position_limit_max_m 0.2 m (default 100 m)');
+  expect(changed_limits_of({ changed_limits: [far] })).toBe(
+    'Changed limits: position_limit_max_m 0.2 m (default 100 m)',
+  );
   const action = { name: 'link_loss_action', unit: '', value: 2, default: 0 };
   expect(changed_limits_of({ changed_limits: [far, action] })).toBe(
     'Changed limits: position_limit_max_m 0.2 m (default 100 m), link_loss_action 2 (default 0)',
@@ -49,7 +51,11 @@ test('beside the fluid stands what became of its model, and nothing where there 
   expect(model_notice(told('assumed', null, 'the robot has booted: name its fluid again'), 'water', true)).toBe(
     'The model of water is not in force: the robot has booted: name its fluid again.',
   );
-  expect(model_notice(told('failed', 'water', 'the motor is on'), 'water', true)).toBe('The model of water could not be sent: the motor is on.');
-  expect(model_notice(told('confirmed', 'water'), 'water', true)).toBe('The model of water is in force, fit error 0.21 %.');
+  expect(model_notice(told('failed', 'water', 'the motor is on'), 'water', true)).toBe(
+    'The model of water could not be sent: the motor is on.',
+  );
+  expect(model_notice(told('confirmed', 'water'), 'water', true)).toBe(
+    'The model of water is in force, fit error 0.21 %.',
+  );
   expect(model_notice(told('sending'), null, false)).toBe('The confirmation of the model before is being taken back.');
 });

@@ -5,7 +5,8 @@ import { Session } from '../src/session';
 
 afterEach(() => vi.unstubAllGlobals());
 
-const robot = (robot_id: string, link: RobotState['link']) => ({ robot_id, link, mode: 'manual', emergency_id: null, pending_stop: null }) as RobotState;
+const robot = (robot_id: string, link: RobotState['link']) =>
+  ({ robot_id, link, mode: 'manual', emergency_id: null, pending_stop: null }) as RobotState;
 
 function session_beside(away: RobotState) {
   vi.stubGlobal('fetch', () => Promise.reject(new Error('no network here')));

@@ -23,7 +23,12 @@ test('a browser that keeps nothing, or nonsense, shows everything', () => {
       throw new Error('full');
     },
   };
-  for (const shelf of [null, refusing, shelf_of({ 'rheonaut.hidden_robots': '{"a":' }), shelf_of({ 'rheonaut.hidden_robots': '{"a":1}' })]) {
+  for (const shelf of [
+    null,
+    refusing,
+    shelf_of({ 'rheonaut.hidden_robots': '{"a":' }),
+    shelf_of({ 'rheonaut.hidden_robots': '{"a":1}' }),
+  ]) {
     const { hidden_robots } = new ViewSettings(shelf);
     expect(hidden_robots.names.value.size).toBe(0);
     hidden_robots.add('a');

@@ -3,7 +3,8 @@ import { expect, test } from 'vitest';
 import { Api, type CommandRecord } from '../src/api';
 import { outcome_of, phase_of, words_of_all } from '../src/stop_outcome';
 
-const record = (robot_id: string, state: CommandRecord['state'], reason = '') => ({ robot_id, state, reason }) as CommandRecord;
+const record = (robot_id: string, state: CommandRecord['state'], reason = '') =>
+  ({ robot_id, state, reason }) as CommandRecord;
 const fleet = (size: number, state: CommandRecord['state'], name = 'tank') =>
   Array.from({ length: size }, (_, n) => record(`${name}-${n}`, state));
 
@@ -28,14 +29,25 @@ test('the worst decides, and a stop of nobody is none', () => {
   expect(phase_of(outcome_of([]))).toBe('failed');
 });
 
-const summary = { robots: 5, acknowledged: 2, unanswered: 0, failed: 1, kept: 0, left_out: 2, not_named: 0,
-                  not_acknowledged: [{ robot_id: 'b', outcome: 'failed' as const }] };
+const summary = {
+  robots: 5,
+  acknowledged: 2,
+  unanswered: 0,
+  failed: 1,
+  kept: 0,
+  left_out: 2,
+  not_named: 0,
+  not_acknowledged: [{ robot_id: 'b', outcome: 'failed' as const }],
+};
 const answer = (status: number, body: object) =>
   new Api(() => Promise.resolve(new Response(JSON.stringify(body), { status })));
 
 test('the summary of the station is taken, also of a stop that failed for some', async () => {
   for (const status of [200, 500]) {
-    const outcome = await answer(status, { summary, commands: [record('b', 'failed', 'link_lost')] }).emergency_stop_all('key');
+    const outcome = await answer(status, {
+      summary,
+      commands: [record('b', 'failed', 'link_lost')],
+    }).emergency_stop_all('key');
     expect(outcome).toEqual({ summary, reason: 'link_lost' });
     expect(words_of_all(outcome, '9 ms')).toContain('Left out: 2 retired');
   }

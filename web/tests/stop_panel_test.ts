@@ -21,7 +21,15 @@ afterEach(() => {
 });
 
 const latched = (emergency_id: string) =>
-  ({ robot_id: 'a', link: 'connected', mode: 'emergency', emergency_id, emergency_cause: 'operator', control: null, pending_stop: null }) as RobotState;
+  ({
+    robot_id: 'a',
+    link: 'connected',
+    mode: 'emergency',
+    emergency_id,
+    emergency_cause: 'operator',
+    control: null,
+    pending_stop: null,
+  }) as RobotState;
 
 // The page of an operator who may clear; `cleared`: the emergencies that it has asked to clear.
 function drawn_with(state: RobotState) {

@@ -20,7 +20,14 @@ test('numerals follow the last sample, at the refresh and not per sample', () =>
   store.hear(batch(0, 5));
   expect(one.readout.value.position_m).toBeNull();
   store.refresh();
-  expect(one.readout.value).toMatchObject({ position_m: 0.004, estimate_m: 0.004, setpoint_m: 0.1, duty: 0.5, mode: 'auto', stale: false });
+  expect(one.readout.value).toMatchObject({
+    position_m: 0.004,
+    estimate_m: 0.004,
+    setpoint_m: 0.1,
+    duty: 0.5,
+    mode: 'auto',
+    stale: false,
+  });
 });
 
 test('a disturbance moves what the controller sees away from where the robot is', () => {
@@ -68,7 +75,12 @@ test('backfill is history: it does not move the numerals back', () => {
   expect(store.find('rheo-1')!.readout.value).toMatchObject({ received: 10, missing: 15 });
   store.hear(batch(5, 15, { backfill: true, mode: 'manual' }));
   store.refresh();
-  expect(store.find('rheo-1')!.readout.value).toMatchObject({ position_m: 0.024, mode: 'auto', received: 25, missing: 0 });
+  expect(store.find('rheo-1')!.readout.value).toMatchObject({
+    position_m: 0.024,
+    mode: 'auto',
+    received: 25,
+    missing: 0,
+  });
 });
 
 test('a new boot counts anew', () => {
@@ -97,7 +109,14 @@ test('a robot that was connected stays selected when its link breaks, whoever el
   const { store } = store_with(robot('a'), robot('b'));
   store.hear({ type: 'robot', robot: robot('a', { link: 'disconnected' }) });
   expect(store.selected_id.value).toBe('a');
-  store.hear({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots: [robot('a', { link: 'disconnected' }), robot('b')] });
+  store.hear({
+    type: 'welcome',
+    actor: 'session:1',
+    version: '',
+    utc_us: 0,
+    stamp_us: 0,
+    robots: [robot('a', { link: 'disconnected' }), robot('b')],
+  });
   expect(store.selected_id.value).toBe('a');
 });
 
@@ -119,7 +138,16 @@ test('a robot that was sent something stays selected, also one that was never co
 });
 
 const event_at = (robot_time_us: number, change: Partial<EventRecord> = {}) =>
-  ({ robot_id: 'rheo-1', boot_id: '11', event_seq: robot_time_us, robot_time_us, kind: 'mode_changed', position_m: 0.1, received_at_us: 9, ...change }) as EventRecord;
+  ({
+    robot_id: 'rheo-1',
+    boot_id: '11',
+    event_seq: robot_time_us,
+    robot_time_us,
+    kind: 'mode_changed',
+    position_m: 0.1,
+    received_at_us: 9,
+    ...change,
+  }) as EventRecord;
 
 test('the position of an event has the ± of its own moment, or none', () => {
   const { store } = store_with(robot('rheo-1', { boot_id: '11', latest_robot_time_us: 0, position_sd_m: 0.02 }));
@@ -141,7 +169,10 @@ test('the position of an event has the ± of its own moment, or none', () => {
 test('the log keeps the last lines, newest first, and a command has one line that changes', () => {
   const { store } = store_with(robot('rheo-1'));
   const command = (n: number, state: CommandRecord['state']) =>
-    store.hear({ type: 'command', command: { command_id: String(n), robot_id: 'rheo-1', state, submitted_at_us: n } as CommandRecord });
+    store.hear({
+      type: 'command',
+      command: { command_id: String(n), robot_id: 'rheo-1', state, submitted_at_us: n } as CommandRecord,
+    });
   for (let n = 0; n < 3 * kLogLines; ++n) {
     command(n, 'sent');
     if (n % 7 === 0) store.refresh();
@@ -156,12 +187,17 @@ test('the log keeps the last lines, newest first, and a command has one line tha
 
 test('a log tells events and commands together; of each command one line stays', () => {
   const { store } = store_with(robot('rheo-1'));
-  const command = (n: number, state: CommandRecord['state']) => ({ command_id: String(n), robot_id: 'rheo-1', state, submitted_at_us: n }) as CommandRecord;
+  const command = (n: number, state: CommandRecord['state']) =>
+    ({ command_id: String(n), robot_id: 'rheo-1', state, submitted_at_us: n }) as CommandRecord;
   const event = { robot_id: 'rheo-1', boot_id: '7', event_seq: 3, kind: 'emergency', received_at_us: 9 } as EventRecord;
   store.hear({ type: 'command', command: command(1, 'sent') });
   store.hear({ type: 'log', events: [event], commands: [command(1, 'acknowledged'), command(2, 'sent')] });
   store.refresh();
-  expect(store.log.value.map((line) => line.command?.state ?? line.event?.kind)).toEqual(['sent', 'acknowledged', 'emergency']);
+  expect(store.log.value.map((line) => line.command?.state ?? line.event?.kind)).toEqual([
+    'sent',
+    'acknowledged',
+    'emergency',
+  ]);
 });
 
 test('dropped messages are said', () => {
@@ -186,7 +222,13 @@ test('a robot whose samples are not asked for shows link and mode, and no old nu
   store.watch(['rheo-1']);
   clock.page = 1500;
   store.refresh();
-  expect(store.find('rheo-2')!.readout.value).toMatchObject({ watched: false, position_m: null, estimate_m: null, mode: 'auto', stale: false });
+  expect(store.find('rheo-2')!.readout.value).toMatchObject({
+    watched: false,
+    position_m: null,
+    estimate_m: null,
+    mode: 'auto',
+    stale: false,
+  });
   expect(store.find('rheo-1')!.readout.value.stale).toBe(true);
   store.hear({ type: 'robot', robot: robot('rheo-2', { mode: 'emergency', link: 'disconnected' }) });
   store.refresh();
@@ -229,7 +271,14 @@ test('renewals of a lease are no lines of the log, unless they fail', () => {
 });
 
 const run = (run_id: number, state: RunRecord['state']) =>
-  ({ run_id, robot_id: 'rheo-1', name: 'a', state, started_at_us: 1, ended_at_us: state === 'open' ? null : 2 }) as RunRecord;
+  ({
+    run_id,
+    robot_id: 'rheo-1',
+    name: 'a',
+    state,
+    started_at_us: 1,
+    ended_at_us: state === 'open' ? null : 2,
+  }) as RunRecord;
 
 test('a run that was interrupted is known until its robot has a newer one, and is told once', () => {
   const { store } = store_with(robot('rheo-1'));
@@ -273,7 +322,11 @@ test('samples of before the latch that come after its news do not undo it; its e
 });
 
 test('of a stop of every robot a retired one counts only while it is connected', () => {
-  const { store } = store_with(robot('a', { retired: true, link: 'disconnected' }), robot('b', { retired: true }), robot('c'));
+  const { store } = store_with(
+    robot('a', { retired: true, link: 'disconnected' }),
+    robot('b', { retired: true }),
+    robot('c'),
+  );
   expect(store.stop_evidence(null, 0).open).toBe(2);
 });
 

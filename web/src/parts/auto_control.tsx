@@ -31,7 +31,13 @@ export function AutoControl({ session, robot }: { session: Session; robot: Robot
     asking.clear();
   };
   const step_button = (step_mm: number) => (
-    <button type="button" class="step" key={step_mm} onClick={() => step(step_mm)} aria-label={`${step_mm} millimetres`}>
+    <button
+      type="button"
+      class="step"
+      key={step_mm}
+      onClick={() => step(step_mm)}
+      aria-label={`${step_mm} millimetres`}
+    >
       {step_mm > 0 ? `+${step_mm}` : `\u2212${-step_mm}`}
     </button>
   );

@@ -17,7 +17,10 @@ export type Move = { open: boolean; at: number } | 'choose' | null;
 // Where a key leads in a list of `size` options. null: the key is none of ours.
 export function move(key: string, open: boolean, at: number, size: number, has_alt = false): Move {
   const last = size - 1;
-  if (!open) return ['ArrowDown', 'ArrowUp', 'Enter', ' ', 'Home', 'End'].includes(key) ? { open: true, at: key === 'Home' ? 0 : key === 'End' ? last : at } : null;
+  if (!open)
+    return ['ArrowDown', 'ArrowUp', 'Enter', ' ', 'Home', 'End'].includes(key)
+      ? { open: true, at: key === 'Home' ? 0 : key === 'End' ? last : at }
+      : null;
   switch (key) {
     case 'ArrowDown':
       return { open: true, at: Math.min(last, at + 1) };
@@ -63,7 +66,10 @@ interface ChoiceProps {
 }
 
 export function Choice({ id, label, options, value, disabled = false, on_choose }: ChoiceProps) {
-  const chosen = Math.max(0, options.findIndex((option) => option.value === value));
+  const chosen = Math.max(
+    0,
+    options.findIndex((option) => option.value === value),
+  );
   const open = useSignal(false);
   const at = useSignal(chosen);
   const typed = useRef({ text: '', at_ms: -Infinity });

@@ -15,13 +15,26 @@ export function ControlLine({ session, robot }: { session: Session; robot: Robot
   const change = (action: ControlBody['action'], what: string) =>
     void asking.ask(what, () => session.api.change_control(robot_id, { action }));
   const key = (id: string, text: string, action: ControlBody['action'], what: string, is_asked = false) => (
-    <button type="button" id={id} disabled={!is_current || asking.pending || is_asked} onClick={() => change(action, what)}>
+    <button
+      type="button"
+      id={id}
+      disabled={!is_current || asking.pending || is_asked}
+      onClick={() => change(action, what)}
+    >
       {text}
     </button>
   );
   return (
-    <div class={`control-line ${is_mine ? 'mine' : control && is_current ? 'other' : 'free'}`} id="control-line" data-holder={is_current ? (control?.holder ?? '') : ''}>
-      <p>{is_current ? who(control?.holder ?? null, is_mine, may_command, robot.readout.value.mode === 'auto') : 'Cut off from the station: who controls the robot is not known.'}</p>
+    <div
+      class={`control-line ${is_mine ? 'mine' : control && is_current ? 'other' : 'free'}`}
+      id="control-line"
+      data-holder={is_current ? (control?.holder ?? '') : ''}
+    >
+      <p>
+        {is_current
+          ? who(control?.holder ?? null, is_mine, may_command, robot.readout.value.mode === 'auto')
+          : 'Cut off from the station: who controls the robot is not known.'}
+      </p>
       {may_command && is_mine && control?.wished_by && (
         <>
           <p class="wish">{control.wished_by} asks for control.</p>
@@ -30,8 +43,17 @@ export function ControlLine({ session, robot }: { session: Session; robot: Robot
       )}
       {may_command && is_mine && key('release-control', 'Release', 'release', 'Release')}
       {may_command && is_current && control === null && key('take-control', 'Take control', 'take', 'Take control')}
-      {may_command && is_current && control !== null && !is_mine &&
-        key('ask-for-control', control.wished_by === me ? 'Asked' : 'Ask for control', 'request', 'Ask', control.wished_by === me)}
+      {may_command &&
+        is_current &&
+        control !== null &&
+        !is_mine &&
+        key(
+          'ask-for-control',
+          control.wished_by === me ? 'Asked' : 'Ask for control',
+          'request',
+          'Ask',
+          control.wished_by === me,
+        )}
       <OutcomeLine asking={asking} />
     </div>
   );
@@ -41,5 +63,7 @@ function who(holder: string | null, is_mine: boolean, may_command: boolean, is_a
   if (is_mine) return 'You are in control.';
   if (holder !== null) return `${holder} is in control. You may watch, and stop.`;
   if (is_auto) return 'Unattended: in auto, and nobody is in control.';
-  return may_command ? 'Nobody is in control; your next command takes it.' : 'Nobody is in control. You may watch, and stop.';
+  return may_command
+    ? 'Nobody is in control; your next command takes it.'
+    : 'Nobody is in control. You may watch, and stop.';
 }

@@ -84,7 +84,12 @@ export function GuardedButton(props: Omit<HeldProps, 'on_press' | 'on_release'> 
     }, kGuard_ms);
   };
   return (
-    <HeldButton {...rest} class={`guarded ${rest.class ?? ''} ${holding.value ? 'holding' : ''}`} on_press={start} on_release={stop}>
+    <HeldButton
+      {...rest}
+      class={`guarded ${rest.class ?? ''} ${holding.value ? 'holding' : ''}`}
+      on_press={start}
+      on_release={stop}
+    >
       <span class="progress" />
       <span>{children}</span>
     </HeldButton>

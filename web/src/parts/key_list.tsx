@@ -16,7 +16,13 @@ export function KeyList() {
   }, []);
   return (
     <span class="keys" ref={root}>
-      <button type="button" id="show-keys" aria-expanded={open.value} aria-controls="key-list" onClick={() => (open.value = !open.value)}>
+      <button
+        type="button"
+        id="show-keys"
+        aria-expanded={open.value}
+        aria-controls="key-list"
+        onClick={() => (open.value = !open.value)}
+      >
         Keys
       </button>
       <section class="key-list" id="key-list" aria-label="Keys" hidden={!open.value}>

@@ -15,19 +15,59 @@ export function LinkPanel({ robot }: { robot: Robot }) {
       <h2>Link</h2>
       <dl>
         <Figure name="Round trip" unit="ms" value={milliseconds_of_us(clock?.round_trip_us)} />
-        <Figure name="Clock ±" unit="ms" value={milliseconds_of_us(clock?.uncertainty_us, 2)} title="Uncertainty of the robot's clock against the station's" />
-        <Figure name="Shown here" unit="" value={count(received)} tone="on-desk-only" title="Samples that this page has received" />
-        <Figure name="Missed here" unit="" value={count(missing)} tone={missing > 0 ? 'caution' : ''} title="Samples that this page has not received; the recording has its own count" />
-        <Figure name="Lost for good" unit="" value={count(lost)} tone={lost > 0 ? 'alarm' : ''} title="Overwritten on the robot before the station had them on disk" />
-        <Figure name="Not yet on disk" unit="" value={count(lag)} tone={lag > 200 ? 'caution' : ''} title="Samples received but not yet durable" />
+        <Figure
+          name="Clock ±"
+          unit="ms"
+          value={milliseconds_of_us(clock?.uncertainty_us, 2)}
+          title="Uncertainty of the robot's clock against the station's"
+        />
+        <Figure
+          name="Shown here"
+          unit=""
+          value={count(received)}
+          tone="on-desk-only"
+          title="Samples that this page has received"
+        />
+        <Figure
+          name="Missed here"
+          unit=""
+          value={count(missing)}
+          tone={missing > 0 ? 'caution' : ''}
+          title="Samples that this page has not received; the recording has its own count"
+        />
+        <Figure
+          name="Lost for good"
+          unit=""
+          value={count(lost)}
+          tone={lost > 0 ? 'alarm' : ''}
+          title="Overwritten on the robot before the station had them on disk"
+        />
+        <Figure
+          name="Not yet on disk"
+          unit=""
+          value={count(lag)}
+          tone={lag > 200 ? 'caution' : ''}
+          title="Samples received but not yet durable"
+        />
       </dl>
       <h2>Robot</h2>
       {changed_limits_of(state) && <p id="changed-limits">{changed_limits_of(state)}</p>}
       <dl>
-        <Figure name="Buffer" unit="%" value={percent(fill, 0)} tone={(fill ?? 0) > 0.8 ? 'caution' : ''} title="Fill of the robot's ring of samples" />
+        <Figure
+          name="Buffer"
+          unit="%"
+          value={percent(fill, 0)}
+          tone={(fill ?? 0) > 0.8 ? 'caution' : ''}
+          title="Fill of the robot's ring of samples"
+        />
         <Figure name="Supply" unit="V" value={volts_of_mv(status?.supply_mv)} />
         <Figure name="Signal" unit="dBm" value={count(status?.rssi_dbm)} />
-        <Figure name="Missed ticks" unit="" value={count(status?.missed_ticks)} tone={(status?.missed_ticks ?? 0) > 0 ? 'caution' : 'on-desk-only'} />
+        <Figure
+          name="Missed ticks"
+          unit=""
+          value={count(status?.missed_ticks)}
+          tone={(status?.missed_ticks ?? 0) > 0 ? 'caution' : 'on-desk-only'}
+        />
       </dl>
     </section>
   );

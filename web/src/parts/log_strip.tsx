@@ -36,22 +36,41 @@ export function describe({ event, command, note, position_sd_m }: LogLine): [ton
   if (command) {
     const refused = ['rejected', 'expired', 'failed', 'unknown'].includes(command.state);
     const alarm = command.kind === 'emergency_stop';
-    const off = alarm && command.verified_after_us !== null ? ` · motor off after ${(command.verified_after_us / 1000).toFixed(1)} ms` : '';
+    const off =
+      alarm && command.verified_after_us !== null
+        ? ` · motor off after ${(command.verified_after_us / 1000).toFixed(1)} ms`
+        : '';
     const end = refused ? `${command.state}: ${sentence(command.reason)}` : command.state;
-    return [refused ? 'caution' : alarm ? 'alarm' : '', 'command', `${words(command.kind)}${arguments_text(command.arguments)} · ${end}${off}`];
+    return [
+      refused ? 'caution' : alarm ? 'alarm' : '',
+      'command',
+      `${words(command.kind)}${arguments_text(command.arguments)} · ${end}${off}`,
+    ];
   }
   if (event) {
     const alarm = event.kind === 'emergency';
-    const where = event.kind === 'mode_changed' ? ` to ${event.mode}` : event.kind === 'sub_state_changed' ? ` to ${event.sub_state}` : '';
+    const where =
+      event.kind === 'mode_changed'
+        ? ` to ${event.mode}`
+        : event.kind === 'sub_state_changed'
+          ? ` to ${event.sub_state}`
+          : '';
     const much = event.kind === 'disturbance' ? ` ${millimetres(event.value)} mm` : '';
     const of_latch = event.kind === 'emergency' ? event.emergency_cause : null;
-    const cause = [of_latch ?? event.cause].filter((said) => said && said !== 'none').map((said) => ` · ${words(said)}`).join('');
+    const cause = [of_latch ?? event.cause]
+      .filter((said) => said && said !== 'none')
+      .map((said) => ` · ${words(said)}`)
+      .join('');
     const detail = event.detail ? ` · ${event.detail}` : '';
     const spread = position_sd_m === null ? '' : ` ${plus_minus(position_sd_m)}`;
     const at = event.position_m !== null ? ` · controller at ${millimetres(event.position_m)}${spread} mm` : '';
     const way_out = kWaysOut[event.kind] ? ` · ${kWaysOut[event.kind]}` : '';
     const caution = /lost|fault|limit|lapsed|uncertain|mismatch$/.test(event.kind);
-    return [alarm ? 'alarm' : caution ? 'caution' : '', 'event', words(event.kind) + much + where + cause + detail + at + way_out];
+    return [
+      alarm ? 'alarm' : caution ? 'caution' : '',
+      'event',
+      words(event.kind) + much + where + cause + detail + at + way_out,
+    ];
   }
   return ['quiet', 'page', note ?? ''];
 }

@@ -17,7 +17,9 @@ export function ModeAnnunciator({ robot, is_current }: { robot: Robot; is_curren
     <div class={`annunciator ${stale || !is_current ? 'stale' : ''}`} data-mode={mode}>
       <h1>
         {robot_id}
-        <small>{!is_current ? 'cut off' : link === 'connected' ? `firmware ${firmware_version || '–'}` : 'not connected'}</small>
+        <small>
+          {!is_current ? 'cut off' : link === 'connected' ? `firmware ${firmware_version || '–'}` : 'not connected'}
+        </small>
       </h1>
       <div class="cells" aria-hidden="true">
         {cell('manual', 'Manual', '')}

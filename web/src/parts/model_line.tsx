@@ -18,12 +18,18 @@ export function ModelLine({ session, robot, pending, on_send }: ModelLineProps) 
   const has_model = session.fluids.value?.some((each) => each.fluid === fluid && each.model !== null) ?? false;
   const text = model_notice(model, fluid, has_model);
   if (text === '') return null;
-  const may_send = fluid !== null && (has_model || model.fluid === fluid) && model.state !== 'confirmed' && model.state !== 'sending';
+  const may_send =
+    fluid !== null && (has_model || model.fluid === fluid) && model.state !== 'confirmed' && model.state !== 'sending';
   return (
     <div class="model-line" id="model-line" role="status">
       <p class={model.state === 'failed' ? 'failed' : 'quiet'}>{text}</p>
       {may_send && (
-        <button type="button" id="send-model" disabled={pending || link !== 'connected' || !is_free_or_mine} onClick={() => on_send(fluid)}>
+        <button
+          type="button"
+          id="send-model"
+          disabled={pending || link !== 'connected' || !is_free_or_mine}
+          onClick={() => on_send(fluid)}
+        >
           Send the model
         </button>
       )}

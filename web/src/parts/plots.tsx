@@ -46,7 +46,8 @@ export function Plots({ robot }: { robot: Robot }) {
     const made = new ChartDeck(robot.ring, (next) => (state.value = next));
     [kPosition, kDuty, kImpedance].forEach((options, at) => {
       const write = cursors[at];
-      const show = (index: number | null, window: PlotWindow) => write && (write.value = cursor_text(options, index, window));
+      const show = (index: number | null, window: PlotWindow) =>
+        write && (write.value = cursor_text(options, index, window));
       made.add(hosts[at as 0 | 1 | 2].current as HTMLElement, options, show);
     });
     deck.current = made;
@@ -105,13 +106,18 @@ function cursor_text(options: StripOptions, index: number | null, window: PlotWi
   if (index === null || index >= window.size) return '';
   const unit = options === kPosition ? 'mm' : options === kDuty ? '%' : 'mV';
   const value = window.values.at(-1)?.[index];
-  const shown = options === kPosition ? position_text(index, window) : options === kDuty ? percent(value) : millivolts(value);
+  const shown =
+    options === kPosition ? position_text(index, window) : options === kDuty ? percent(value) : millivolts(value);
   return `${shown} ${unit} at \u2212${Math.abs(window.time_s[index] ?? 0).toFixed(2)} s`;
 }
 
 // The columns of kPosition: two edges of the band, then its traces.
 function position_text(index: number, window: PlotWindow): string {
-  const [high_m, seen_m, estimate_m] = [1, 4, 5].map((column) => window.values[column]?.[index] ?? NaN) as [number, number, number];
+  const [high_m, seen_m, estimate_m] = [1, 4, 5].map((column) => window.values[column]?.[index] ?? NaN) as [
+    number,
+    number,
+    number,
+  ];
   const seen = seen_m === estimate_m ? '' : `, seen ${millimetres(seen_m)},`;
   return `${millimetres(estimate_m)} ± ${millimetres(high_m - estimate_m)}${seen}`;
 }

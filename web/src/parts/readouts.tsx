@@ -13,11 +13,17 @@ export function Readouts({ robot }: { robot: Robot }) {
   return (
     <section class={`readouts ${now.stale ? 'stale' : ''}`} aria-label="Measured now">
       <Numeral name="Position, estimated" unit="mm" value={millimetres(now.estimate_m)} kind="main" id="position">
-        <span>{plus_minus(now.position_sd_m)} mm (2 sd){now.model && `, ${now.model}`}</span>
+        <span>
+          {plus_minus(now.position_sd_m)} mm (2 sd){now.model && `, ${now.model}`}
+        </span>
         {now.stale ? <span class="silent">{silent}</span> : <span>{off_by(now.estimate_m, now.setpoint_m)}</span>}
       </Numeral>
       <Numeral name="Controller sees" unit="mm" value={millimetres(now.position_m)} kind="seen" id="seen">
-        <span>{[plus_minus(now.position_sd_m), now.stale ? '' : off_by(now.position_m, now.setpoint_m)].filter(Boolean).join(', ')}</span>
+        <span>
+          {[plus_minus(now.position_sd_m), now.stale ? '' : off_by(now.position_m, now.setpoint_m)]
+            .filter(Boolean)
+            .join(', ')}
+        </span>
         <span class={now.disturbance_m ? 'disturbed' : ''} id="disturbance">
           disturbance {millimetres(now.disturbance_m)} mm
         </span>

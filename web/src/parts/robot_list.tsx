@@ -16,7 +16,9 @@ export function RobotList({ session }: { session: Session }) {
     (settings.hidden_robots.names.value.has(robot.robot_id) || robot.is_left_out.value);
   const shown = useComputed(() => store.robots.value.filter((robot) => edits.value || !is_hidden(robot)));
   const hidden = useComputed(() => store.robots.value.filter(is_hidden).length);
-  const alarms = useComputed(() => store.robots.value.filter((robot) => is_hidden(robot) && robot.is_alarming.value).length);
+  const alarms = useComputed(
+    () => store.robots.value.filter((robot) => is_hidden(robot) && robot.is_alarming.value).length,
+  );
   const hide_away = () => {
     const away = store.robots.peek().filter((robot) => robot.is_away.peek());
     settings.hidden_robots.add(...away.map((robot) => robot.robot_id));
@@ -26,8 +28,14 @@ export function RobotList({ session }: { session: Session }) {
     <nav class="robot-list" aria-label="Robots">
       <h2>Robots</h2>
       {store.robots.value.length > 1 && (
-        <button type="button" class="edit-list" id="edit-robots" aria-pressed={edits.value} title="Only this view: a hidden robot is stopped like any other"
-                onClick={() => (edits.value = !edits.value)}>
+        <button
+          type="button"
+          class="edit-list"
+          id="edit-robots"
+          aria-pressed={edits.value}
+          title="Only this view: a hidden robot is stopped like any other"
+          onClick={() => (edits.value = !edits.value)}
+        >
           {button_text}
           {alarms.value > 0 && <b class="alarm"> {alarms.value} in emergency</b>}
         </button>
@@ -57,10 +65,33 @@ function RobotEntry({ session, robot }: { session: Session; robot: Robot }) {
   const is_current = store.is_current.value;
   const away = link !== 'connected';
   // Green says that samples arrive; of a robot whose samples are not asked for nobody here knows that.
-  const tone = mode === 'emergency' ? 'alarm' : away ? 'off' : !is_current || (watched && stale) ? 'caution' : watched ? 'good' : 'unwatched';
-  const what = !is_current ? 'not known: cut off' : away ? (retired ? 'retired' : 'not connected') : watched && stale ? 'silent' : mode;
+  const tone =
+    mode === 'emergency'
+      ? 'alarm'
+      : away
+        ? 'off'
+        : !is_current || (watched && stale)
+          ? 'caution'
+          : watched
+            ? 'good'
+            : 'unwatched';
+  const what = !is_current
+    ? 'not known: cut off'
+    : away
+      ? retired
+        ? 'retired'
+        : 'not connected'
+      : watched && stale
+        ? 'silent'
+        : mode;
   return (
-    <button type="button" class="robot-entry" aria-pressed={store.selected_id.value === robot_id} data-tone={tone} onClick={() => store.select(robot_id)}>
+    <button
+      type="button"
+      class="robot-entry"
+      aria-pressed={store.selected_id.value === robot_id}
+      data-tone={tone}
+      onClick={() => store.select(robot_id)}
+    >
       <span class={`dot ${tone}`} />
       <span class="name">{robot_id}</span>
       <span class="what">{what}</span>
@@ -77,8 +108,13 @@ function HideButton({ session, robot_id }: { session: Session; robot_id: string 
   const { hidden_robots } = session.settings;
   const is_hidden = hidden_robots.names.value.has(robot_id);
   return (
-    <button type="button" class="hide" aria-pressed={is_hidden} aria-label={`${is_hidden ? 'Show' : 'Hide'} ${robot_id}`}
-            onClick={() => (is_hidden ? hidden_robots.remove(robot_id) : hidden_robots.add(robot_id))}>
+    <button
+      type="button"
+      class="hide"
+      aria-pressed={is_hidden}
+      aria-label={`${is_hidden ? 'Show' : 'Hide'} ${robot_id}`}
+      onClick={() => (is_hidden ? hidden_robots.remove(robot_id) : hidden_robots.add(robot_id))}
+    >
       {is_hidden ? 'Show' : 'Hide'}
     </button>
   );

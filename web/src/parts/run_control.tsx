@@ -21,7 +21,8 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
     asking.ask('Run', async () => store.take_run(await session.api.start_run(robot_id, name, fluid)));
   const set_fluid = (fluid: string) =>
     asking.ask('Fluid of the robot', () => session.api.set_fluid(robot_id, fluid === '' ? null : fluid));
-  const end = (run_id: number) => asking.ask('End of run', async () => store.take_run(await session.api.end_run(run_id)));
+  const end = (run_id: number) =>
+    asking.ask('End of run', async () => store.take_run(await session.api.end_run(run_id)));
 
   return (
     <fieldset class={`control run ${run && is_current ? 'engaged' : ''}`}>
@@ -42,11 +43,22 @@ export function RunControl({ session, robot }: { session: Session; robot: Robot 
           </button>
         </div>
       ) : (
-        <RunForm session={session} robot={robot} disabled={link !== 'connected' || asking.pending}
-                 on_start={(name, fluid) => (name === '' ? asking.fail('Give the run a name.') : void start(name, fluid))}
-                 on_fluid={set_fluid} />
+        <RunForm
+          session={session}
+          robot={robot}
+          disabled={link !== 'connected' || asking.pending}
+          on_start={(name, fluid) => (name === '' ? asking.fail('Give the run a name.') : void start(name, fluid))}
+          on_fluid={set_fluid}
+        />
       )}
-      {is_current && <ModelLine session={session} robot={robot} pending={asking.pending} on_send={(fluid) => void set_fluid(fluid)} />}
+      {is_current && (
+        <ModelLine
+          session={session}
+          robot={robot}
+          pending={asking.pending}
+          on_send={(fluid) => void set_fluid(fluid)}
+        />
+      )}
       <OutcomeLine asking={asking} />
     </fieldset>
   );
@@ -66,8 +78,13 @@ function RunForm({ session, robot, disabled, on_start, on_fluid }: RunFormProps)
   const listed = session.fluids.value;
   const known = robot.state.value.fluid ?? '';
   const fluid = picked.value ?? known;
-  const names = [...new Set([...(listed?.map((each) => each.fluid) ?? kBuiltInFluids), known])].filter((name) => name !== '');
-  const options = [...names.map((name) => ({ value: name, text: fluid_text(name) })), { value: '', text: 'fluid not known' }];
+  const names = [...new Set([...(listed?.map((each) => each.fluid) ?? kBuiltInFluids), known])].filter(
+    (name) => name !== '',
+  );
+  const options = [
+    ...names.map((name) => ({ value: name, text: fluid_text(name) })),
+    { value: '', text: 'fluid not known' },
+  ];
   const pick = (next: string) => {
     picked.value = next;
     if (listed) void on_fluid(next).then((taken) => taken || (picked.value = null));
@@ -83,8 +100,15 @@ function RunForm({ session, robot, disabled, on_start, on_fluid }: RunFormProps)
       }}
     >
       {/* A browser offers earlier entries in a native list, which would keep the first Escape for itself. */}
-      <input aria-label="Name of the run" id="run-name" placeholder="Name" autoComplete="off" maxLength={200} value={name.value}
-             onInput={(event) => (name.value = event.currentTarget.value)} />
+      <input
+        aria-label="Name of the run"
+        id="run-name"
+        placeholder="Name"
+        autoComplete="off"
+        maxLength={200}
+        value={name.value}
+        onInput={(event) => (name.value = event.currentTarget.value)}
+      />
       <Choice id="run-fluid" label="Fluid" options={options} value={fluid} on_choose={pick} />
       <button type="submit" id="start-run" disabled={disabled}>
         Start run
@@ -100,10 +124,14 @@ function Interrupted({ session, robot_id }: { session: Session; robot_id: string
   return (
     <div class="interrupted" id="interrupted-run" role="status">
       <p>
-        Run “{run.name}” was interrupted at {clock_time((run.ended_at_us ?? run.started_at_us) / 1000).slice(0, 8)}: the station stopped
-        while it was open. {lost(run)}
+        Run “{run.name}” was interrupted at {clock_time((run.ended_at_us ?? run.started_at_us) / 1000).slice(0, 8)}: the
+        station stopped while it was open. {lost(run)}
       </p>
-      <button type="button" id="dismiss-interrupted" onClick={() => session.settings.dismissed.add(session.notice_of(run))}>
+      <button
+        type="button"
+        id="dismiss-interrupted"
+        onClick={() => session.settings.dismissed.add(session.notice_of(run))}
+      >
         Dismiss
       </button>
     </div>

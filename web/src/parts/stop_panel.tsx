@@ -38,7 +38,14 @@ export function StopPanel({ session }: { session: Session }) {
 function StopLine({ session }: { session: Session }) {
   const { phase } = session.stop_state.value;
   return (
-    <p class={`stop-line ${phase}`} role="status" aria-live="assertive" id="stop-line" data-phase={phase} tabIndex={phase === 'idle' ? undefined : 0}>
+    <p
+      class={`stop-line ${phase}`}
+      role="status"
+      aria-live="assertive"
+      id="stop-line"
+      data-phase={phase}
+      tabIndex={phase === 'idle' ? undefined : 0}
+    >
       {stop_text(session)}
     </p>
   );
@@ -58,12 +65,18 @@ function stop_text(session: Session): string {
     case 'late':
       return `${may_not} no answer yet. ${what_to_do}`;
     case 'seen':
-      return robot_id === null ? 'Stopped: telemetry of every robot shows the latch.' : `Stopped: telemetry of ${who} shows the latch.`;
+      return robot_id === null
+        ? 'Stopped: telemetry of every robot shows the latch.'
+        : `Stopped: telemetry of ${who} shows the latch.`;
     case 'stopped':
-      return robot_id === null && outcome ? words_of_all(outcome, ms) : `Stopped ${who} in ${ms}, from press to the robot's answer.`;
+      return robot_id === null && outcome
+        ? words_of_all(outcome, ms)
+        : `Stopped ${who} in ${ms}, from press to the robot's answer.`;
     case 'kept':
       if (robot_id !== null) return `Kept: will be delivered first when ${who} returns.`;
-      return outcome ? words_of_all(outcome, ms) : 'Stopped all that are connected. Kept for the others: delivered first when they return.';
+      return outcome
+        ? words_of_all(outcome, ms)
+        : 'Stopped all that are connected. Kept for the others: delivered first when they return.';
     case 'unanswered':
       if (robot_id === null && outcome) return words_of_all(outcome, ms);
       return `Sent, but ${who} has not answered yet. It is kept and sent first until it does.`;
@@ -78,7 +91,9 @@ export function may_clear(session: Session, robot: Robot): boolean {
   const { control, link } = robot.state.value;
   const me = session.me.value;
   const is_free_or_mine = control === null || control.holder === session.store.actor.value;
-  return session.store.is_current.value && link === 'connected' && me !== null && me.role !== 'viewer' && is_free_or_mine;
+  return (
+    session.store.is_current.value && link === 'connected' && me !== null && me.role !== 'viewer' && is_free_or_mine
+  );
 }
 
 function Latch({ session, robot }: { session: Session; robot: Robot }) {
@@ -90,7 +105,9 @@ function Latch({ session, robot }: { session: Session; robot: Robot }) {
     return asking.outcome.value.phase === 'idle' ? null : <OutcomeLine asking={asking} />;
   }
   const clear = (id: string) =>
-    asking.ask(`Clear ${id}`, () => session.api.clear_emergency(robot_id, id)).then((cleared) => cleared && session.emergency.forget());
+    asking
+      .ask(`Clear ${id}`, () => session.api.clear_emergency(robot_id, id))
+      .then((cleared) => cleared && session.emergency.forget());
   return (
     <div class="latch" id="latch" data-emergency-id={known_id ?? ''}>
       <h2>{mode === 'emergency' ? 'Latched: the motor stays off' : 'Stop not acknowledged yet'}</h2>
@@ -105,14 +122,23 @@ function Latch({ session, robot }: { session: Session; robot: Robot }) {
         </div>
       </dl>
       {pending_stop !== null && (
-        <p>{link === 'connected' ? 'Sent; waiting for the robot.' : 'Kept: will be delivered first when the robot returns.'}</p>
+        <p>
+          {link === 'connected'
+            ? 'Sent; waiting for the robot.'
+            : 'Kept: will be delivered first when the robot returns.'}
+        </p>
       )}
       {stale && Number.isFinite(sample_age_ms) && <p>Last sample {age(sample_age_ms)} ago.</p>}
       {known_id !== null && pending_stop === null && (
         <>
           <WhoMayClear session={session} robot={robot} />
           {/* SAFETY: of another emergency it is another button: a hold that began before it clears nothing. */}
-          <GuardedButton key={known_id} id="clear-emergency" disabled={!may_clear(session, robot) || asking.pending} on_held={() => void clear(known_id)}>
+          <GuardedButton
+            key={known_id}
+            id="clear-emergency"
+            disabled={!may_clear(session, robot) || asking.pending}
+            on_held={() => void clear(known_id)}
+          >
             Hold 1 s to clear {known_id.slice(-6).padStart(7, '…')}
           </GuardedButton>
         </>

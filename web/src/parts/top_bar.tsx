@@ -10,7 +10,13 @@ export function TopBar({ session }: { session: Session }) {
   const { store, station } = session;
   return (
     <header class="top-bar">
-      <a class="wordmark" href="/api/v1/station" title="What the station says of itself" target="_blank" rel="noreferrer">
+      <a
+        class="wordmark"
+        href="/api/v1/station"
+        title="What the station says of itself"
+        target="_blank"
+        rel="noreferrer"
+      >
         <svg viewBox="0 0 34 20" aria-hidden="true">
           <path d="M1 12c4.5 0 4.5-8 9-8s4.5 8 9 8 4.5-8 9-8" />
           <circle cx="19" cy="12" r="3.4" />
@@ -40,7 +46,14 @@ export function TopBar({ session }: { session: Session }) {
       </span>
       <WhoIsIn session={session} />
       <KeyList />
-      <button type="button" class="stop-all" id="stop-all" title="Hidden ones as well" {...stop_button_keys} onClick={session.stop_all}>
+      <button
+        type="button"
+        class="stop-all"
+        id="stop-all"
+        title="Hidden ones as well"
+        {...stop_button_keys}
+        onClick={session.stop_all}
+      >
         Stop all robots
       </button>
     </header>
@@ -58,7 +71,12 @@ function WhoIsIn({ session }: { session: Session }) {
         {me.user || 'by link'} <span class="quiet">{me.role}</span>
       </span>
       {me.role === 'admin' && (
-        <button type="button" id="show-access" aria-pressed={shows_access.value} onClick={() => (shows_access.value = !shows_access.value)}>
+        <button
+          type="button"
+          id="show-access"
+          aria-pressed={shows_access.value}
+          onClick={() => (shows_access.value = !shows_access.value)}
+        >
           {shows_access.value ? 'Back to the plots' : 'Access'}
         </button>
       )}

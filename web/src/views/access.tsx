@@ -31,7 +31,12 @@ export function Access({ session }: { session: Session }) {
   };
   const load = () =>
     attempt(async () => {
-      const [sessions, users, tokens, robots] = await Promise.all([api.sessions(), api.users(), api.tokens(), api.enrolments()]);
+      const [sessions, users, tokens, robots] = await Promise.all([
+        api.sessions(),
+        api.users(),
+        api.tokens(),
+        api.enrolments(),
+      ]);
       lists.value = { sessions, users, tokens, robots };
     });
   const end = (what: () => Promise<unknown>) => void attempt(what).then(() => (problem.value ? undefined : load()));
@@ -46,31 +51,69 @@ export function Access({ session }: { session: Session }) {
       </p>
       <List title="Signed in" empty={lists.value && sessions.length === 0 ? 'Nobody.' : ''}>
         {sessions.map((each) => (
-          <Row key={each.session} id={`session-${each.session}`} name={each.user || 'by link'}
-               note={`session ${each.session} from ${each.peer || 'an older station'}, last used ${when(each.last_used_at_us)}${each.is_mine ? ', this page' : ''}`}
-               title={each.agent} action="Hold to sign out" on_end={() => end(() => api.revoke_session(each.session))} />
+          <Row
+            key={each.session}
+            id={`session-${each.session}`}
+            name={each.user || 'by link'}
+            note={`session ${each.session} from ${each.peer || 'an older station'}, last used ${when(each.last_used_at_us)}${each.is_mine ? ', this page' : ''}`}
+            title={each.agent}
+            action="Hold to sign out"
+            on_end={() => end(() => api.revoke_session(each.session))}
+          />
         ))}
       </List>
-      <List title="Users" empty={lists.value && users.length === 0 ? 'None: people get in by one-time links. Add one with: rheonaut user add' : ''}>
+      <List
+        title="Users"
+        empty={
+          lists.value && users.length === 0
+            ? 'None: people get in by one-time links. Add one with: rheonaut user add'
+            : ''
+        }
+      >
         {users.map((each) => (
-          <Row key={each.name} id={`user-${each.name}`} name={each.name} note={`${each.role}${each.disabled ? ', disabled' : ''}, made ${when(each.made_at_us)}`}
-               action="Hold to remove" on_end={() => end(() => api.remove_user(each.name))} />
+          <Row
+            key={each.name}
+            id={`user-${each.name}`}
+            name={each.name}
+            note={`${each.role}${each.disabled ? ', disabled' : ''}, made ${when(each.made_at_us)}`}
+            action="Hold to remove"
+            on_end={() => end(() => api.remove_user(each.name))}
+          />
         ))}
       </List>
-      <List title="API tokens" empty={lists.value && good_tokens.length === 0 ? 'None. Make one with: rheonaut token create' : ''}>
+      <List
+        title="API tokens"
+        empty={lists.value && good_tokens.length === 0 ? 'None. Make one with: rheonaut token create' : ''}
+      >
         {good_tokens.map((each) => (
-          <Row key={each.name} id={`token-${each.name}`} name={each.name}
-               note={`${each.scopes.replaceAll(',', ', ')}; ${each.last_used_at_us === null ? 'never used' : `used ${when(each.last_used_at_us)}`}${each.expires_at_us === null ? '' : `, until ${when(each.expires_at_us)}`}`}
-               action="Hold to revoke" on_end={() => end(() => api.revoke_token(each.name))} />
+          <Row
+            key={each.name}
+            id={`token-${each.name}`}
+            name={each.name}
+            note={`${each.scopes.replaceAll(',', ', ')}; ${each.last_used_at_us === null ? 'never used' : `used ${when(each.last_used_at_us)}`}${each.expires_at_us === null ? '' : `, until ${when(each.expires_at_us)}`}`}
+            action="Hold to revoke"
+            on_end={() => end(() => api.revoke_token(each.name))}
+          />
         ))}
       </List>
-      <List title="Robots" empty={lists.value && robots.length === 0 ? 'None. Enrol one with: rheonaut robot enroll' : ''}>
+      <List
+        title="Robots"
+        empty={lists.value && robots.length === 0 ? 'None. Enrol one with: rheonaut robot enroll' : ''}
+      >
         {robots.map((each) => (
-          <Row key={each.robot_id} id={`robot-${each.robot_id}`} name={each.robot_id}
-               note={note_of(each)}
-               action={each.revoked_at_us === null ? 'Hold to revoke' : ''} on_end={() => end(() => api.revoke_robot(each.robot_id))}>
+          <Row
+            key={each.robot_id}
+            id={`robot-${each.robot_id}`}
+            name={each.robot_id}
+            note={note_of(each)}
+            action={each.revoked_at_us === null ? 'Hold to revoke' : ''}
+            on_end={() => end(() => api.revoke_robot(each.robot_id))}
+          >
             {each.retired_at_us !== undefined && (
-              <GuardedButton id={`retire-${each.robot_id}`} on_held={() => end(() => api.retire_robot(each.robot_id, each.retired_at_us === null))}>
+              <GuardedButton
+                id={`retire-${each.robot_id}`}
+                on_held={() => end(() => api.retire_robot(each.robot_id, each.retired_at_us === null))}
+              >
                 {each.retired_at_us === null ? 'Hold to retire' : 'Hold to put back'}
               </GuardedButton>
             )}
@@ -88,7 +131,15 @@ function note_of(robot: Enrolment): string {
   return `${robot.has_token ? 'with a token' : 'without a token, from this machine only'}, enrolled by ${robot.enrolled_by}${retired}`;
 }
 
-function List({ title, empty, children }: { title: string; empty: string | false | null; children: ComponentChildren }) {
+function List({
+  title,
+  empty,
+  children,
+}: {
+  title: string;
+  empty: string | false | null;
+  children: ComponentChildren;
+}) {
   return (
     <section aria-label={title}>
       <h2>{title}</h2>

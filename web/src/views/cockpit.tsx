@@ -68,8 +68,13 @@ function Waiting({ session }: { session: Session }) {
     <div class="waiting">
       <h2>No robot yet</h2>
       <p>
-        Robots connect to the station by themselves{address && <>, at <code>{address}</code></>}. The first one that
-        does is shown here.
+        Robots connect to the station by themselves
+        {address && (
+          <>
+            , at <code>{address}</code>
+          </>
+        )}
+        . The first one that does is shown here.
       </p>
     </div>
   );

@@ -37,11 +37,28 @@ export function SignedOut({ session }: { session: Session }) {
       >
         <h2>Or sign in</h2>
         <label for="user">User</label>
-        <input id="user" name="username" autocomplete="username" autocapitalize="none" spellcheck={false} required maxLength={31}
-               value={user.value} onInput={(event) => (user.value = event.currentTarget.value)} />
+        <input
+          id="user"
+          name="username"
+          autocomplete="username"
+          autocapitalize="none"
+          spellcheck={false}
+          required
+          maxLength={31}
+          value={user.value}
+          onInput={(event) => (user.value = event.currentTarget.value)}
+        />
         <label for="password">Password</label>
-        <input id="password" name="password" type="password" autocomplete="current-password" required maxLength={200}
-               value={password.value} onInput={(event) => (password.value = event.currentTarget.value)} />
+        <input
+          id="password"
+          name="password"
+          type="password"
+          autocomplete="current-password"
+          required
+          maxLength={200}
+          value={password.value}
+          onInput={(event) => (password.value = event.currentTarget.value)}
+        />
         <button type="submit" id="sign-in" class="primary" disabled={pending.value}>
           {pending.value ? 'Signing in…' : 'Sign in'}
         </button>
