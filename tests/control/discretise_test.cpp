@@ -15,7 +15,7 @@
 namespace control {
 namespace {
 
-nlohmann::json golden() { return nlohmann::json::parse(std::ifstream(TEST_DATA_DIR "/fopd_discrete_order5.json")); }
+nlohmann::json golden_fit() { return nlohmann::json::parse(std::ifstream(TEST_DATA_DIR "/fopd_discrete_order5.json")); }
 
 DiscretisationOptions direct(double a) {
   DiscretisationOptions options;
@@ -48,7 +48,7 @@ TEST(Discretise, ReproducesTheReferenceCoefficients) {
                                                                          {"dk_a0.5_M2048", direct(0.5)},
                                                                          {"dk_a0.9_M2048", direct(0.9)},
                                                                          {"oustaloup5_0.1_1000_tustin", oustaloup()}};
-  const auto sets = golden()["reference_sets"];
+  const auto sets = golden_fit()["reference_sets"];
   for (const auto& [name, options] : cases) {
     SCOPED_TRACE(name);
     const Discretisation result = discretise(kPaperController, options);
@@ -74,7 +74,7 @@ TEST(Discretise, MeetsTheLimitsOfTheReferenceFits) {
 }
 
 TEST(Discretise, MeasuresTheErrorsOfTheReferenceSets) {
-  const auto reference = golden();
+  const auto reference = golden_fit();
   const std::vector<double> w = reference["w"];
   for (const auto& [name, set] : reference["reference_sets"].items()) {
     SCOPED_TRACE(name);
@@ -93,7 +93,7 @@ TEST(Discretise, MeasuresTheErrorsOfTheReferenceSets) {
 }
 
 TEST(Discretise, HasTheReferenceGeneratingFunction) {
-  const auto reference = golden();
+  const auto reference = golden_fit();
   const std::vector<double> w = reference["w"];
   for (const double a : {0.0, 0.5, 0.9}) {
     const auto& expected = reference["generating"][a == 0 ? "a=0" : a == 0.5 ? "a=0.5" : "a=0.9"];

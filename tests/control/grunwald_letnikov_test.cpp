@@ -16,7 +16,7 @@ namespace {
 constexpr double kDuty = 0.3;
 
 // At rest until the first sample, as in the reference.
-std::vector<double> step_duty(std::size_t count) {
+std::vector<double> constant_duty(std::size_t count) {
   std::vector<double> duty(count, kDuty);
   duty.front() = 0;
   return duty;
@@ -25,7 +25,7 @@ std::vector<double> step_duty(std::size_t count) {
 void expect_reference(const char* key, std::size_t terms) {
   const auto reference = nlohmann::json::parse(std::ifstream(TEST_DATA_DIR "/gl_scheme_reference.json"));
   const std::vector<double> velocity_m_s =
-      grunwald_letnikov_velocity(kNonNewtonianModel, reference["h"], step_duty(501), terms);
+      grunwald_letnikov_velocity(kNonNewtonianModel, reference["h"], constant_duty(501), terms);
   for (std::size_t i = 0; i < reference["k"].size(); ++i) {
     const std::size_t k = reference["k"][i];
     const double expected = reference[key][i];
@@ -41,7 +41,7 @@ TEST(GrunwaldLetnikov, ErrsInProportionToTheStepSize) {
   const double once[] = {1.0};
   const double exact_m_s = step_response(kNonNewtonianModel, kDuty, once).velocity_m_s[0];
   const auto error_m_s = [&](std::size_t steps) {
-    const std::vector<double> duty = step_duty(steps + 1);
+    const std::vector<double> duty = constant_duty(steps + 1);
     return grunwald_letnikov_velocity(kNonNewtonianModel, 1.0 / static_cast<double>(steps), duty).back() - exact_m_s;
   };
   EXPECT_NEAR(error_m_s(500) / error_m_s(1000), 2, 0.02);

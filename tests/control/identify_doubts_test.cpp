@@ -16,7 +16,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-const FractionalModel kLag{0.1, 0, 0.2, 1, 2, 1};
+const FractionalModel kFirstOrder{0.1, 0, 0.2, 1, 2, 1};
 
 IdentificationOptions one_start(Structure structure) {
   IdentificationOptions options;
@@ -27,12 +27,12 @@ IdentificationOptions one_start(Structure structure) {
 
 Recording lag_run(double sd_m = 1e-4, std::size_t samples = 401) {
   std::vector<double> duty = prbs_duty(1, 0.2, 0.01 * static_cast<double>(samples - 1), 0.01);
-  return position_run(kLag, duty, sd_m, 4);
+  return position_run(kFirstOrder, duty, sd_m, 4);
 }
 
 Recording two_channel_run() {
   Recording run = lag_run();
-  run.velocity_m_s = output_of(kLag, Channel::velocity, 0.01, run.duty);
+  run.velocity_m_s = output_of(kFirstOrder, Channel::velocity, 0.01, run.duty);
   add_noise(run.velocity_m_s, 1e-3, 8);
   return run;
 }
@@ -54,7 +54,7 @@ TEST(IdentifyDoubts, AreNoneForACleanRun) {
 
 TEST(IdentifyDoubts, AnUnknownOffsetIsFittedByDefaultAndMissedAloud) {
   for (const Structure structure : {Structure::first_order, Structure::fractional}) {
-    Recording run = position_run(kLag, step_duty(0.3, 3, 0.01), 1e-4, 4);
+    Recording run = position_run(kFirstOrder, step_duty(0.3, 3, 0.01), 1e-4, 4);
     for (double& x : run.position_m) x += 0.01;
     IdentificationOptions options = one_start(structure);
     const Identification found = identify(run, options);
@@ -144,7 +144,7 @@ TEST(IdentifyDoubts, ThePlanIsNotTheRunThatWasMade) {
 
 TEST(IdentifyDoubts, ADeadTimeAtItsLimitComesFirst) {
   Recording run = lag_run();
-  run.position_m = output_of(kLag, Channel::position, 0.01, run.duty, 0.15);
+  run.position_m = output_of(kFirstOrder, Channel::position, 0.01, run.duty, 0.15);
   add_noise(run.position_m, 1e-4, 1);
   for (const Structure structure : {Structure::first_order, Structure::fractional}) {
     IdentificationOptions options = one_start(structure);

@@ -26,7 +26,7 @@ IdentificationOptions reference_options() {
   return options;
 }
 
-IdentificationOptions one_start(Structure structure = Structure::fractional) {
+IdentificationOptions first_start_only(Structure structure = Structure::fractional) {
   IdentificationOptions options;
   options.structure = structure;
   options.further_starts = 0;
@@ -96,7 +96,7 @@ TEST(Identify, RecoversTheModelFromARunWithoutNoise) {
     Recording recording{0.01, std::vector<double>(501, 0.3), {}, {}};
     (channel == Channel::position ? recording.position_m : recording.velocity_m_s) =
         step_response(kNonNewtonianModel, channel, 0.3, 0.01, 501);
-    expect_model(identify(recording, one_start()).best.model, kNonNewtonianModel, 1e-8);
+    expect_model(identify(recording, first_start_only()).best.model, kNonNewtonianModel, 1e-8);
   }
 }
 
@@ -110,7 +110,7 @@ TEST(Identify, RecoversRandomModelsFromRandomDuties) {
                                 between(1.4, 1.95), between(0.5, 0.95)};
     std::vector<double> duty(401);
     for (double& u : duty) u = between(-1, 1);
-    IdentificationOptions options = one_start();
+    IdentificationOptions options = first_start_only();
     options.further_starts = 1;
     expect_model(identify(position_run(truth, duty, 0, 1), options).best.model, truth, 1e-8);
   }
@@ -126,21 +126,21 @@ TEST(Identify, TakesAnyDutyAndBothChannels) {
     Recording recording = position_run(kNonNewtonianModel, duty, 1e-5, 3);
     recording.velocity_m_s = output_of(kNonNewtonianModel, Channel::velocity, 0.01, duty);
     add_noise(recording.velocity_m_s, 1e-3, 4);
-    const Fit fit = identify(recording, one_start()).best;
+    const Fit fit = identify(recording, first_start_only()).best;
     EXPECT_NEAR(fit.model.b2, 0.11031, 4 * *fit.one_sigma[2]);
     EXPECT_NEAR(fit.model.alpha, 1.7263, 4 * *fit.one_sigma[3]);
     EXPECT_LT(*fit.one_sigma[3], 0.05);
     EXPECT_EQ(fit.position_residual_m.size(), 501U);
     EXPECT_EQ(fit.velocity_residual_m_s.size(), 501U);
     recording.velocity_m_s.clear();
-    EXPECT_LT(*fit.one_sigma[1], *identify(recording, one_start()).best.one_sigma[1]);
+    EXPECT_LT(*fit.one_sigma[1], *identify(recording, first_start_only()).best.one_sigma[1]);
   }
 }
 
 TEST(Identify, FindsTheOffset) {
   Recording recording = position_run(kNonNewtonianModel, prbs_duty(1, 0.2, 5, 0.01), 0, 1);
   for (double& x : recording.position_m) x += 0.25;
-  const Fit fit = identify(recording, one_start()).best;
+  const Fit fit = identify(recording, first_start_only()).best;
   EXPECT_NEAR(fit.offset_m, 0.25, 1e-9);
   EXPECT_EQ(fit.free_parameters, 6);
   expect_model(fit.model, kNonNewtonianModel, 1e-7);
@@ -151,7 +151,7 @@ TEST(Identify, FindsTheDeadTimeBetweenSamples) {
     const std::vector<double> duty = prbs_duty(1, 0.2, 4, 0.01);
     Recording recording{0.01, duty, output_of(kNonNewtonianModel, Channel::position, 0.01, duty, dead_time_s), {}};
     add_noise(recording.position_m, 1e-6, 1);
-    IdentificationOptions options = one_start();
+    IdentificationOptions options = first_start_only();
     options.longest_dead_time_s = 0.2;
     const Fit fit = identify(recording, options).best;
     ASSERT_TRUE(fit.dead_time_sigma_s);
@@ -179,11 +179,11 @@ TEST(Identify, ChoosesTheStructureOfTheModelByAic) {
 
 TEST(Identify, DoesNotDependOnUnits) {
   Recording recording = position_run(kNonNewtonianModel, prbs_duty(1, 0.2, 5, 0.01), 1e-4, 2);
-  const Fit metres = identify(recording, one_start()).best;
+  const Fit metres = identify(recording, first_start_only()).best;
   for (double& x : recording.position_m) x *= 1000;
-  const Fit millimetres = identify(recording, one_start()).best;
+  const Fit millimetres = identify(recording, first_start_only()).best;
   for (double& u : recording.duty) u *= 100;
-  const Fit percent = identify(recording, one_start()).best;
+  const Fit percent = identify(recording, first_start_only()).best;
   FractionalModel expected = metres.model;
   expected.kp *= 1000;
   expect_model(millimetres.model, expected, 1e-7);
@@ -196,7 +196,7 @@ TEST(Identify, DoesNotDependOnUnits) {
 TEST(Identify, AbsoluteErrorIsNotMovedByOutliers) {
   Recording recording = position_run(kNonNewtonianModel, prbs_duty(1, 0.2, 4, 0.01), 1e-5, 6);
   for (std::size_t k = 7; k < recording.position_m.size(); k += 23) recording.position_m[k] += 0.02;
-  IdentificationOptions options = one_start();
+  IdentificationOptions options = first_start_only();
   const Fit squares = identify(recording, options).best;
   options.cost = Cost::absolute_error;
   const Fit absolute = identify(recording, options).best;
@@ -225,7 +225,7 @@ TEST(Identify, EndsWhenToldTo) {
   EXPECT_EQ(untried.best.end, SearchEnd::time_limit);
   EXPECT_THAT(untried.warnings, Contains(HasSubstr("before its first iteration")));
 
-  options = one_start();
+  options = first_start_only();
   options.iteration_limit = 2;
   const Fit fit = identify(recording, options).best;
   EXPECT_EQ(fit.end, SearchEnd::iteration_limit);
@@ -234,13 +234,14 @@ TEST(Identify, EndsWhenToldTo) {
 
 TEST(Identify, WarnsOfWhatItCannotTell) {
   Recording recording = position_run(kNonNewtonianModel, prbs_duty(1, 0.2, 4, 0.01), 1e-5, 2);
-  EXPECT_TRUE(identify(recording, one_start()).warnings.empty());
+  EXPECT_TRUE(identify(recording, first_start_only()).warnings.empty());
   for (std::size_t k = 0; k < recording.position_m.size(); ++k) {
     recording.position_m[k] += 1e-3 * std::sin(0.3 * static_cast<double>(k));
   }
-  EXPECT_THAT(identify(recording, one_start()).warnings, Contains(HasSubstr("residuals of position_m are not white")));
+  EXPECT_THAT(identify(recording, first_start_only()).warnings,
+              Contains(HasSubstr("residuals of position_m are not white")));
   const Recording lag = position_run({0.1, 0, 0.2, 1, 2, 1}, std::vector<double>(301, 0.3), 1e-4, 2);
-  const std::vector<std::string> warnings = identify(lag, one_start()).warnings;
+  const std::vector<std::string> warnings = identify(lag, first_start_only()).warnings;
   EXPECT_THAT(warnings, Contains(HasSubstr("the duty is 0.3 throughout")));
   EXPECT_THAT(warnings, Contains(HasSubstr("cannot determine")));
 }

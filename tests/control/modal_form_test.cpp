@@ -17,7 +17,7 @@ namespace {
 
 using std::numbers::pi;
 
-nlohmann::json golden(const std::string& name) {
+nlohmann::json response_of(const std::string& name) {
   return nlohmann::json::parse(std::ifstream(std::string(TEST_DATA_DIR "/") + name));
 }
 
@@ -75,14 +75,14 @@ std::string described(const FractionalModel& m) {
 }
 
 TEST(ModalForm, MeetsTheReferenceStepsOfModel29AtEveryTolerance) {
-  const auto velocity = golden("fo_step_velocity.json"), position = golden("fo_step_position.json");
+  const auto velocity = response_of("fo_step_velocity.json"), position = response_of("fo_step_position.json");
   for (const double tolerance : {1e-2, 1e-4, 1e-6, 1e-7, 1e-9, 1e-11, 1e-13}) {
     expect_golden(kNonNewtonianModel, velocity, position, tolerance);
   }
 }
 
 TEST(ModalForm, MeetsTheReferenceStepsOfTheIntegerModel28AtEveryTolerance) {
-  const auto reference = golden("io_step.json");
+  const auto reference = response_of("io_step.json");
   for (const double tolerance : {1e-2, 1e-4, 1e-6, 1e-7, 1e-9, 1e-11, 1e-13}) {
     expect_golden(kNewtonianModel, reference, reference, tolerance);
   }
@@ -154,7 +154,7 @@ TEST(ModalForm, IsFiniteForAbsurdCoefficients) {
 }
 
 TEST(LogPole, IsThePoleOfTheReference) {
-  const auto pole = golden("fo_step_velocity.json")["poles_principal_sheet"][0];
+  const auto pole = response_of("fo_step_velocity.json")["poles_principal_sheet"][0];
   const std::optional<Complex> log_p = log_pole(kNonNewtonianModel);
   ASSERT_TRUE(log_p);
   EXPECT_NEAR(std::exp(*log_p).real(), pole[0].get<double>(), 1e-12);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kDuty = 0.3;
 
-nlohmann::json golden(const std::string& name) {
+nlohmann::json golden_response(const std::string& name) {
   return nlohmann::json::parse(std::ifstream(std::string(TEST_DATA_DIR "/") + name));
 }
 
@@ -41,15 +41,15 @@ double velocity(const ModalPlant& plant) { return plant.velocity_m_s(); }
 
 TEST(ModalPlant, FollowsModel29Within2e6AtAnyStepSize) {
   for (const double dt_s : {1e-3, 1e-2}) {
-    expect_golden(kNonNewtonianModel, dt_s, golden("fo_step_velocity.json"), "velocity", 2e-6, velocity);
-    expect_golden(kNonNewtonianModel, dt_s, golden("fo_step_position.json"), "position", 2e-6, position);
+    expect_golden(kNonNewtonianModel, dt_s, golden_response("fo_step_velocity.json"), "velocity", 2e-6, velocity);
+    expect_golden(kNonNewtonianModel, dt_s, golden_response("fo_step_position.json"), "position", 2e-6, position);
   }
 }
 
 TEST(ModalPlant, FollowsTheIntegerModel28Within2e6AtAnyStepSize) {
   for (const double dt_s : {1e-3, 1e-2}) {
-    expect_golden(kNewtonianModel, dt_s, golden("io_step.json"), "velocity", 2e-6, velocity);
-    expect_golden(kNewtonianModel, dt_s, golden("io_step.json"), "position", 2e-6, position);
+    expect_golden(kNewtonianModel, dt_s, golden_response("io_step.json"), "velocity", 2e-6, velocity);
+    expect_golden(kNewtonianModel, dt_s, golden_response("io_step.json"), "position", 2e-6, position);
   }
 }
 

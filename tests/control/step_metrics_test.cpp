@@ -16,7 +16,7 @@
 namespace control {
 namespace {
 
-constexpr double kPeriodS = 0.01, kTargetM = 0.1, kDisturbanceM = -0.05, kDisturbedAtS = 20;
+constexpr double kSampleS = 0.01, kTargetM = 0.1, kDisturbanceM = -0.05, kDisturbedAtS = 20;
 
 struct Trajectory {
   std::vector<double> time_s, position_m;
@@ -26,11 +26,11 @@ struct Trajectory {
 Trajectory run_reference(const nlohmann::json& golden, const FractionalModel& model, double duty_min, double duty_max) {
   const std::vector<double> b = golden["controller_b"], a = golden["controller_a"];
   std::vector<double> memory(b.size(), 0);  // direct form II transposed
-  ModalPlant plant{model, kPeriodS};
+  ModalPlant plant{model, kSampleS};
   Trajectory trajectory;
   for (int k = 0; k < 4000; ++k) {
     const double measured_m = plant.position_m() + (k >= 2000 ? kDisturbanceM : 0);
-    trajectory.time_s.push_back(k * kPeriodS);
+    trajectory.time_s.push_back(k * kSampleS);
     trajectory.position_m.push_back(measured_m);
     const double error_m = kTargetM - measured_m, duty = b[0] * error_m + memory[0];
     for (std::size_t i = 1; i < b.size(); ++i) {
@@ -98,8 +98,8 @@ TEST(StepMetrics, IntegratesTheErrorByTheTrapezoidalRule) {
 TEST(StepMetrics, IntegralsOfAnExponentialAreThoseOfTheTextbook) {
   std::vector<double> time_s, position_m;
   for (int k = 0; k <= 3000; ++k) {
-    time_s.push_back(k * kPeriodS);
-    position_m.push_back(1 - std::exp(-k * kPeriodS));
+    time_s.push_back(k * kSampleS);
+    position_m.push_back(1 - std::exp(-k * kSampleS));
   }
   const StepMetrics metrics = measure_step(time_s, position_m, {0, 100, 0, 1, 0.02});
   EXPECT_NEAR(metrics.iae_m_s, 1, 1e-4);
@@ -141,7 +141,7 @@ TEST(StepMetrics, OfANoisyRecordAreCloseToThoseOfTheCleanOne) {
 TEST(StepMetrics, SayThatANoisyRecordNeverSettledAndThatNoiseIsNoOvershoot) {
   Trajectory outside, inside;
   for (int k = 0; k < 2000; ++k) {
-    for (Trajectory* run : {&outside, &inside}) run->time_s.push_back(k * kPeriodS);
+    for (Trajectory* run : {&outside, &inside}) run->time_s.push_back(k * kSampleS);
     outside.position_m.push_back(k < 100 ? 0.001 * k : 0.1033);
     inside.position_m.push_back(std::min(0.001 * k, 0.1));
   }
@@ -159,8 +159,8 @@ TEST(StepMetrics, NeverCallsAnOscillationThroughTheBandSettled) {
   for (int phase = 0; phase < 60; ++phase) {
     Trajectory run;
     for (int k = 0; k < 2000; ++k) {
-      run.time_s.push_back(k * kPeriodS);
-      run.position_m.push_back(k < 10 ? 0 : kTargetM + 0.01 * std::sin(4 * k * kPeriodS + phase * 2 * 3.14159265 / 60));
+      run.time_s.push_back(k * kSampleS);
+      run.position_m.push_back(k < 10 ? 0 : kTargetM + 0.01 * std::sin(4 * k * kSampleS + phase * 2 * 3.14159265 / 60));
     }
     EXPECT_FALSE(measure_step(run.time_s, run.position_m, {0, 20, 0, kTargetM, 0.002}).settling_s.has_value()) << phase;
   }
@@ -170,7 +170,7 @@ TEST(StepMetrics, WantTheLastTwentiethOfTheRecordInsideTheBand) {
   for (const int entered : {0, 500, 948, 952, 999}) {
     Trajectory run;
     for (int k = 0; k <= 1000; ++k) {
-      run.time_s.push_back(k * kPeriodS);
+      run.time_s.push_back(k * kSampleS);
       run.position_m.push_back(k < entered ? 0 : kTargetM);
     }
     const StepMetrics metrics = measure_step(run.time_s, run.position_m, {0, 20, 0, kTargetM, 0.002});
@@ -181,7 +181,7 @@ TEST(StepMetrics, WantTheLastTwentiethOfTheRecordInsideTheBand) {
 TEST(StepMetrics, GiveNoSettlingWhereTheNoiseIsAsWideAsTheBand) {
   Trajectory still;
   for (int k = 0; k < 4000; ++k) {
-    still.time_s.push_back(k * kPeriodS);
+    still.time_s.push_back(k * kSampleS);
     still.position_m.push_back(std::min(0.001 * k, kTargetM));
   }
   StepExperiment step{0, 40, 0, kTargetM, 0.002};

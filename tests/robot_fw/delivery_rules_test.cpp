@@ -6,7 +6,7 @@ namespace robot_fw {
 namespace {
 
 constexpr float kClearMv = 175, kGlucoseMv = 120;
-constexpr float kSetpointM = 0.5F;
+constexpr float kGoalM = 0.5F;
 
 // On its way to the setpoint, at a position that the test sets.
 class DeliveryRules : public ::testing::Test {
@@ -14,7 +14,7 @@ class DeliveryRules : public ::testing::Test {
   DeliveryRules() {
     core.known_position_m = 0.0F;
     core.tick();
-    core.order(sim_robot::set_auto(kSetpointM));
+    core.order(sim_robot::set_auto(kGoalM));
     core.tick();
     core.events.clear();
   }
@@ -39,9 +39,9 @@ TEST_F(DeliveryRules, HoldsThePositionOfTheFifthReading) {
     be_at(0.001F * static_cast<float>(i));
     read(kGlucoseMv, 1);
     EXPECT_EQ(sub_state(), i < 5 ? "navigating" : "delivering") << i;
-    EXPECT_FLOAT_EQ(reference_m(), i < 5 ? kSetpointM : 0.005F) << i;
+    EXPECT_FLOAT_EQ(reference_m(), i < 5 ? kGoalM : 0.005F) << i;
   }
-  EXPECT_EQ(core.sample.setpoint_m, kSetpointM) << "for afterwards";
+  EXPECT_EQ(core.sample.setpoint_m, kGoalM) << "for afterwards";
   EXPECT_EQ(events_of(rheonaut_EVENT_KIND_DETECTION), 1);
   EXPECT_FLOAT_EQ(core.events.back().position_m, 0.005F);
   EXPECT_EQ(core.events.back().value, kGlucoseMv);
@@ -70,7 +70,7 @@ TEST_F(DeliveryRules, GoesOnToItsSetpointWhenTheGlucoseHasMixed) {
   EXPECT_EQ(sub_state(), "delivering");
   read(kClearMv, 1);
   EXPECT_EQ(sub_state(), "navigating");
-  EXPECT_EQ(reference_m(), kSetpointM);
+  EXPECT_EQ(reference_m(), kGoalM);
   EXPECT_NEAR(core.events.back().value, 0.5, 1e-3) << "seconds";
 }
 
@@ -99,7 +99,7 @@ TEST_F(DeliveryRules, ReadingsFromElsewhereSayNothingAboutThePlace) {
 
 TEST_F(DeliveryRules, TheSameGlucoseIsNotFoundTwice) {
   read(kGlucoseMv, 5);
-  core.order(sim_robot::set_setpoint(kSetpointM));
+  core.order(sim_robot::set_setpoint(kGoalM));
   read(kGlucoseMv, 500);
   EXPECT_EQ(sub_state(), "navigating");
   read(kClearMv, 49);
@@ -113,7 +113,7 @@ TEST_F(DeliveryRules, TheSameGlucoseIsNotFoundTwice) {
 TEST_F(DeliveryRules, WithoutTheMonitorThereIsNeitherGlucoseNorAFault) {
   core.order(sim_robot::set_manual());
   core.order(sim_robot::set_parameter("impedance_monitor", 0));
-  core.order(sim_robot::set_auto(kSetpointM));
+  core.order(sim_robot::set_auto(kGoalM));
   read(kGlucoseMv, 100);
   read(0, 100);
   EXPECT_EQ(sub_state(), "navigating");
@@ -129,9 +129,9 @@ TEST_F(DeliveryRules, AnElectrodeThatCannotBeBelievedKeepsTheRobotOutOfAuto) {
   EXPECT_EQ(core.order(sim_robot::clear_emergency(core.robot.emergency_id())).result, rheonaut_COMMAND_RESULT_ACCEPTED);
   read(1001, 5);
   EXPECT_EQ(core.robot.mode(), rheonaut_MODE_MANUAL) << "in manual the operator may go on by eye";
-  EXPECT_EQ(core.order(sim_robot::set_auto(kSetpointM)).reason, rheonaut_REJECT_REASON_CAUSE_STANDS);
+  EXPECT_EQ(core.order(sim_robot::set_auto(kGoalM)).reason, rheonaut_REJECT_REASON_CAUSE_STANDS);
   read(kClearMv, 50);
-  EXPECT_EQ(core.order(sim_robot::set_auto(kSetpointM)).result, rheonaut_COMMAND_RESULT_ACCEPTED);
+  EXPECT_EQ(core.order(sim_robot::set_auto(kGoalM)).result, rheonaut_COMMAND_RESULT_ACCEPTED);
 }
 
 class HoldAlone : public DeliveryRules {
@@ -139,8 +139,8 @@ class HoldAlone : public DeliveryRules {
   HoldAlone() {
     core.order(sim_robot::set_manual());
     core.order(sim_robot::set_parameter("link_loss_action", 1));
-    core.order(sim_robot::set_parameter("position_limit_max_m", kSetpointM));
-    core.order(sim_robot::set_auto(kSetpointM));
+    core.order(sim_robot::set_parameter("position_limit_max_m", kGoalM));
+    core.order(sim_robot::set_auto(kGoalM));
     core.tick();
   }
   // Silence, 1 mm a tick.

@@ -10,7 +10,7 @@ namespace {
 
 using namespace sim_robot;
 
-constexpr float kNominalMv = 175, kGlucoseMv = 120;
+constexpr float kNominalMv = 175, kPatchMv = 120;
 
 // A robot on its way to 0.1 m through a fluid in which a test pours glucose.
 class Delivery : public ::testing::Test {
@@ -49,7 +49,7 @@ class Delivery : public ::testing::Test {
     for (int k = 0; k < std::lround(seconds * 100); ++k) {
       const bool off = is_off(std::lround(now_s() * 100));
       robot->world().set_fault(Sensor::electrode,
-                               {off ? SensorFaultKind::offset : SensorFaultKind::none, kNominalMv - kGlucoseMv});
+                               {off ? SensorFaultKind::offset : SensorFaultKind::none, kNominalMv - kPatchMv});
       station->step();
     }
   }
@@ -74,7 +74,7 @@ TEST_F(Delivery, HoldsWhereItFindsGlucoseUntilThatHasMixedAndGoesOn) {
   ASSERT_EQ(detections(), 1u);
   const auto started = events_of(rheonaut_EVENT_KIND_DELIVERY_STARTED);
   ASSERT_EQ(started.size(), 1u);
-  EXPECT_EQ(started[0].value, kGlucoseMv);
+  EXPECT_EQ(started[0].value, kPatchMv);
   EXPECT_GT(started[0].position_m, 0.05F);
   EXPECT_LT(started[0].position_m, 0.06F);
   EXPECT_EQ(sub_state(), rheonaut_SUB_STATE_DELIVERING);
@@ -270,10 +270,10 @@ TEST_F(Delivery, TheElectrodesFaultIsKnownWhenTheMonitorIsSwitchedOn) {
 
 TEST(ImpedanceMonitor, TakesFiveReadingsInARow) {
   ImpedanceMonitor monitor;
-  for (int k = 0; k < 4; ++k) EXPECT_FALSE(monitor.step(kGlucoseMv, true, true, {}));
+  for (int k = 0; k < 4; ++k) EXPECT_FALSE(monitor.step(kPatchMv, true, true, {}));
   EXPECT_FALSE(monitor.step(kNominalMv, true, true, {}));
-  for (int k = 0; k < 4; ++k) EXPECT_FALSE(monitor.step(kGlucoseMv, true, true, {}));
-  EXPECT_TRUE(monitor.step(kGlucoseMv, true, true, {}));
+  for (int k = 0; k < 4; ++k) EXPECT_FALSE(monitor.step(kPatchMv, true, true, {}));
+  EXPECT_TRUE(monitor.step(kPatchMv, true, true, {}));
 }
 
 TEST(ImpedanceMonitor, ReadingsThatCannotBeUsedAreNoGlucose) {
@@ -285,7 +285,7 @@ TEST(ImpedanceMonitor, IsArmedAgainAfter50ReadingsInTheBand) {
   ImpedanceMonitor monitor;
   const auto detects = [&] {
     bool detected = false;
-    for (int k = 0; k < 5; ++k) detected = monitor.step(kGlucoseMv, true, true, {});
+    for (int k = 0; k < 5; ++k) detected = monitor.step(kPatchMv, true, true, {});
     return detected;
   };
   EXPECT_TRUE(detects());

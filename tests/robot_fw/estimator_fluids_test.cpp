@@ -18,7 +18,7 @@ namespace {
 
 using sim_robot::kTickS;
 
-constexpr int kSeeds = 3;
+constexpr int kSeedsPerFluid = 3;
 constexpr float kManualDuty[] = {0.3F, 0.8F};
 constexpr double kManualS = 30, kDurationS = 42;
 
@@ -99,7 +99,7 @@ std::vector<Second> seconds_of(const sim_robot::PlantParameters& truth, const Es
 std::vector<Second> seconds_of(const std::vector<Fluid>& fluids, std::optional<float> manual_duty) {
   std::vector<Second> all;
   for (const Fluid& fluid : fluids) {
-    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    for (std::uint64_t seed = 1; seed <= kSeedsPerFluid; ++seed) {
       const auto seconds = seconds_of({.model = fluid.model}, EstimatorParameters{}, manual_duty, seed);
       all.insert(all.end(), seconds.begin(), seconds.end());
     }

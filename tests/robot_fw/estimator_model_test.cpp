@@ -15,7 +15,7 @@
 namespace robot_fw {
 namespace {
 
-constexpr float kTickS = 0.01F;
+constexpr float kModelTickS = 0.01F;
 
 EstimatorParameters told(const control::EstimatorModel& model) {
   EstimatorParameters parameters;
@@ -32,7 +32,7 @@ double largest_error_m_s(const EstimatorParameters& parameters, const control::F
   Estimator estimator{parameters};
   double largest_m_s = 0;
   for (const double velocity_m_s : response) {
-    estimator.step({0, false, 1, kTickS});
+    estimator.step({0, false, 1, kModelTickS});
     largest_m_s = std::max(largest_m_s, std::abs(static_cast<double>(estimator.velocity_m_s()) - velocity_m_s));
   }
   return largest_m_s;

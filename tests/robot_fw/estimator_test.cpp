@@ -14,13 +14,13 @@
 namespace robot_fw {
 namespace {
 
-constexpr float kTickS = 0.01F;
+constexpr float kEstimatorTickS = 0.01F;
 
 // Ticks of an estimator whose accelerometer has neither noise nor bias.
 class EstimatorTest : public ::testing::Test {
  protected:
   void tick(float duty, int counts, bool is_valid = true) {
-    estimator.step({static_cast<std::int16_t>(counts), is_valid, duty, kTickS});
+    estimator.step({static_cast<std::int16_t>(counts), is_valid, duty, kEstimatorTickS});
   }
   void rest(double seconds) {
     for (int k = 0; k < std::lround(seconds * 100); ++k) tick(0, noise(random));
@@ -38,11 +38,11 @@ void expect_to_follow(const VelocityModel& model, const control::FractionalModel
   EstimatorParameters parameters;
   parameters.model = model;
   Estimator estimator{parameters};
-  control::ModalPlant plant{truth, static_cast<double>(kTickS)};
+  control::ModalPlant plant{truth, static_cast<double>(kEstimatorTickS)};
   for (int k = 0; k < 6000; ++k) {
     const float duty = k % 200 < 100 ? 1.0F : -0.5F;
     plant.step(static_cast<double>(duty));
-    estimator.step({0, false, duty, kTickS});
+    estimator.step({0, false, duty, kEstimatorTickS});
     ASSERT_NEAR(estimator.velocity_m_s(), plant.velocity_m_s(), tolerance) << "tick " << k;
   }
 }
@@ -76,7 +76,7 @@ TEST_F(EstimatorTest, IsSurerAtRestWithTheMotorOffThanWithTheMotorOn) {
   for (int k = 0; k < 3000; ++k) {
     const int counts = noise(random);
     tick(0, counts);
-    driven.step({static_cast<std::int16_t>(counts), true, 1e-6F, kTickS});
+    driven.step({static_cast<std::int16_t>(counts), true, 1e-6F, kEstimatorTickS});
   }
   EXPECT_LT(2 * estimator.position_sd_m(), driven.position_sd_m());
 }
@@ -90,7 +90,7 @@ TEST_F(EstimatorTest, TakesADutyInTheDeadZoneAsZero) {
   EstimatorParameters parameters;
   parameters.dead_zone_duty = 0.05F;
   Estimator told{parameters};
-  for (int k = 0; k < 500; ++k) told.step({0, false, 0.04F, kTickS});
+  for (int k = 0; k < 500; ++k) told.step({0, false, 0.04F, kEstimatorTickS});
   EXPECT_EQ(told.position_m(), 0);
 }
 
@@ -139,7 +139,7 @@ TEST_F(EstimatorTest, StaysFiniteWhateverComesIn) {
     const bool wild = k / 10'000 % 2 == 0;
     const float wanted = what == 0 ? std::numeric_limits<float>::infinity() : duty(random);
     estimator.step({static_cast<std::int16_t>(wild ? counts(random) : noise(random)), what != 1, wanted,
-                    what == 2 ? dt_s(random) : kTickS});
+                    what == 2 ? dt_s(random) : kEstimatorTickS});
     ASSERT_TRUE(std::isfinite(estimator.position_m()) && std::isfinite(estimator.velocity_m_s())) << "tick " << k;
     ASSERT_TRUE(std::isfinite(estimator.position_sd_m()) && estimator.position_sd_m() >= 0) << "tick " << k;
   }
@@ -149,7 +149,7 @@ TEST_F(EstimatorTest, StartsAnewAndUnsureWhenItsParametersAreNotFinite) {
   EstimatorParameters parameters;
   parameters.noise_m_s2 = std::numeric_limits<float>::quiet_NaN();
   Estimator broken{parameters};
-  for (int k = 0; k < 100; ++k) broken.step({static_cast<std::int16_t>(noise(random)), true, 0, kTickS});
+  for (int k = 0; k < 100; ++k) broken.step({static_cast<std::int16_t>(noise(random)), true, 0, kEstimatorTickS});
   EXPECT_NEAR(broken.position_m(), 0, 0.001F);
   EXPECT_EQ(broken.position_sd_m(), 10);
 }
@@ -176,7 +176,7 @@ Sds sds_in_a_minute(const EstimatorParameters& parameters, bool held) {
   Sds sds;
   for (int k = 0; k < 6000; ++k) {
     const float duty = held || k / 200 % 2 == 0 ? 0.6F : 0;
-    estimator.step({static_cast<std::int16_t>(noise(random)), true, duty, kTickS});
+    estimator.step({static_cast<std::int16_t>(noise(random)), true, duty, kEstimatorTickS});
     if (k < 100) continue;
     sds.least_m = std::min(sds.least_m, estimator.position_sd_m());
     sds.greatest_m = std::max(sds.greatest_m, estimator.position_sd_m());
@@ -208,11 +208,11 @@ TEST_F(EstimatorTest, FindsItsVelocityWhenItStartsAnewInMotion) {
   const auto tick = [&](float duty) {
     const float before_m_s = std::exchange(true_m_s, 0);
     for (std::size_t i = 0; i < kModelSections; ++i) {
-      section[i] += (1 - std::exp(-kTickS / parameters.model.time_constant_s[i])) * (duty - section[i]);
+      section[i] += (1 - std::exp(-kEstimatorTickS / parameters.model.time_constant_s[i])) * (duty - section[i]);
       true_m_s += parameters.model.gain_m_s[i] * section[i];
     }
-    const float counts = 100 * (true_m_s - before_m_s) / kTickS;
-    driven.step({static_cast<std::int16_t>(std::lround(counts) + noise(random)), true, duty, kTickS});
+    const float counts = 100 * (true_m_s - before_m_s) / kEstimatorTickS;
+    driven.step({static_cast<std::int16_t>(std::lround(counts) + noise(random)), true, duty, kEstimatorTickS});
   };
   int ticks = 0;
   for (; driven.position_sd_m() < 1 && ticks < 6000; ++ticks) tick(ticks / 200 % 2 == 0 ? 0.6F : 0);

@@ -13,7 +13,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr const char* kModel = "/api/v1/fluids/water/model";
-constexpr const char* kFluid = "/api/v1/robots/r1/fluid";
+constexpr const char* kFluidOfRobot = "/api/v1/robots/r1/fluid";
 
 // As `rheonaut estimator --json` prints it.
 json printed() {
@@ -125,7 +125,7 @@ TEST_F(FluidModelsRouteTest, WhatIsNoModelOrOfNoFluidIsRefusedAndNothingIsKept) 
 }
 
 TEST_F(FluidModelsRouteTest, NothingIsSentByItselfToARobotInTheFluid) {
-  ASSERT_EQ(ask("POST", kFluid, {{"fluid", "water"}}).parsed()["model"]["state"], "assumed");
+  ASSERT_EQ(ask("POST", kFluidOfRobot, {{"fluid", "water"}}).parsed()["model"]["state"], "assumed");
   const Answered set = ask("POST", kModel, printed());
   EXPECT_EQ(set.parsed()["robots_not_updated"], json::array({"r1"}));
   clock.run_for(1s);
@@ -134,7 +134,7 @@ TEST_F(FluidModelsRouteTest, NothingIsSentByItselfToARobotInTheFluid) {
 
 TEST_F(FluidModelsRouteTest, TheAnswerAndTheRobotsDocumentSayWhatBecameOfIt) {
   ASSERT_EQ(ask("POST", kModel, printed()).status, 200);
-  const auto asked = begin("POST", kFluid, {{"fluid", "water"}});
+  const auto asked = begin("POST", kFluidOfRobot, {{"fluid", "water"}});
   clock.run_for(200ms);
   ASSERT_EQ(robot->commands().size(), 1U);
   EXPECT_STREQ(robot->commands()[0].action.set_parameter.name, "model_gain_1_m_s");

@@ -303,10 +303,10 @@ TEST_F(AdmissionTest, WhatARobotNoLongerHasIsToldApart) {
   silent.oldest_seq = 150;
   connect(silent);
   flush();
-  using Rows = std::vector<std::string>;
+  using GapRows = std::vector<std::string>;
   EXPECT_EQ(rows("SELECT robot_id, first_seq, last_seq, cause FROM robot_gap ORDER BY robot_id DESC, first_seq"),
-            (Rows{"nemo|0|99|acknowledged_earlier", "nemo|100|149|ring_overrun", "dory|0|149|ring_overrun"}));
-  EXPECT_EQ(rows("SELECT first_event_seq, last_event_seq, cause FROM event_gap"), Rows{"0|7|acknowledged_earlier"});
+            (GapRows{"nemo|0|99|acknowledged_earlier", "nemo|100|149|ring_overrun", "dory|0|149|ring_overrun"}));
+  EXPECT_EQ(rows("SELECT first_event_seq, last_event_seq, cause FROM event_gap"), GapRows{"0|7|acknowledged_earlier"});
 }
 
 TEST_F(AdmissionTest, WhatThisStoreHoldsIsNoGapHoweverFarItWasAcknowledged) {
