@@ -65,7 +65,7 @@ async function clear_latch() {
   const button = page.locator('#clear-emergency');
   await button.hover();
   await page.mouse.down();
-  await page.waitForTimeout(300); // let go too early: it is guarded
+  await page.waitForTimeout(100); // let go too early, also in a browser that is slow: it is guarded
   await page.mouse.up();
   assert.equal(await mode(), 'emergency');
   await hold_to_clear(page);

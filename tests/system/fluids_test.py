@@ -2,10 +2,9 @@
 
 import json
 import sqlite3
-import time
 import unittest
 
-from processes import lab
+from processes import lab, wait_until
 
 CONFIG = "[limits.Water]\nduty_max = 0.5\n[fluids.oil]\n"
 
@@ -107,12 +106,8 @@ class FluidsTest(unittest.TestCase):
             listed = place.tool("fluid", "list", "--data", place.data).stdout
             self.assertRegex(listed, r"oil +model with a fit error of 0.21 %, set 20.* by token:local")
             self.assertRegex(listed, r"water +no model")
-            for _ in range(100):
-                sent = station.robot("sim-1")["model"]
-                if sent["state"] == "confirmed":
-                    break
-                time.sleep(0.05)
-            self.assertEqual((sent["state"], sent["fluid"]), ("confirmed", "oil"), "the robot holds it, bit for bit")
+            wait_until(lambda: station.robot("sim-1")["model"]["state"] == "confirmed", 30, "the robot holds it, bit for bit")
+            self.assertEqual(station.robot("sim-1")["model"]["fluid"], "oil")
             done = place.tool("fluid", "remove-model", "oil", "--data", place.data)
             self.assertIn("The fluid oil has no model any more", done.stdout)
             self.assertIn("before their fluid is named again: sim-1", done.stdout)

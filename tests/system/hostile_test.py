@@ -69,7 +69,7 @@ class HostileTest(unittest.TestCase):
     def test_slowloris(self):
         self.attack("slowloris")
         self.expect_stops(3)
-        self.assertGreaterEqual(self.metric("http_connections"), 100)
+        wait_until(lambda: self.metric("http_connections") >= 100, 20, "a hundred drips")
         self.expect_stops(9)  # all of them are ended once, and come again
         said = [line for line in self.place.log("station").splitlines() if "emergency stop" not in line]
         self.assertLess(len(said), 40, "they fill no log")
@@ -78,7 +78,7 @@ class HostileTest(unittest.TestCase):
         self.attack("idle")
         self.expect_stops(5)
         self.assertLessEqual(self.metric("http_connections"), 256 + 64)
-        self.assertGreaterEqual(self.metric("http_connections_replaced_total"), 700)
+        wait_until(lambda: self.metric("http_connections_replaced_total") >= 700, 20, "the port replaces them")
         self.place.start_robot(self.station, "sim-2")
         self.station.wait_for_robot("sim-2")
         wait_until(lambda: self.metric("robot_connections") >= 500, 10, "the robots' port holds them, too")
@@ -92,11 +92,12 @@ class HostileTest(unittest.TestCase):
         self.expect_stops(5)
 
     def test_giant_and_broken_frames(self):
+        begun = time.monotonic()
         self.attack("frames")
         self.expect_stops(5)
         lines = [line for line in self.place.log("station").splitlines() if "was not let in" in line]
         self.assertTrue(lines)
-        self.assertLess(len(lines), 15, "one a second at most")
+        self.assertLess(len(lines), max(15, time.monotonic() - begun + 2), "one a second at most")
 
     def test_pages_that_never_read(self):
         self.attack("silent_pages")

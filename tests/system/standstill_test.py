@@ -13,6 +13,7 @@ PATIENT = "[robots]\nlink_timeout_ms = 5000\nheartbeat_interval_ms = 200\n"  # t
 HALT_S = 1.5  # time has to pass: this is what is tested
 COMMANDS = "/api/v1/robots/sim-1/commands"
 DUTY = json.dumps({"kind": "set_duty", "duty": 0.5, "life_ms": 500}).encode()
+LASTING_DUTY = json.dumps({"kind": "set_duty", "duty": 0.5, "life_ms": 10_000}).encode()  # a busy machine may be late
 
 
 class StandstillTest(unittest.TestCase):
@@ -74,7 +75,7 @@ class StandstillTest(unittest.TestCase):
         self.station.post(f"/api/v1/runs/{run_id}/end")
         self.assertEqual(self.duties(run_id), {0.0})
         self.assertIn("stood still for", self.place.log("station"))
-        known.sendall(command)
+        known.sendall(post(COMMANDS, LASTING_DUTY, self.station.token))
         status, said = self.answer(known)
         self.assertEqual((status, said["kind"]), (200, "set_duty"), said)
 
