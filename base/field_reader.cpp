@@ -5,8 +5,8 @@
 #include <cmath>
 #include <sstream>
 
-#include "base/invalid_argument.hpp"
 #include "base/field_list.hpp"
+#include "base/invalid_argument.hpp"
 
 namespace sim_robot {
 namespace {

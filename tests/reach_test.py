@@ -1,0 +1,119 @@
+#!/usr/bin/env python3
+"""Shows deploy/reach.py changes in a small tree and in this one, and what each of them can reach."""
+import pathlib
+import re
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "deploy"))
+import reach  # noqa: E402
+
+SMALL_TREE = {
+    "protocol/frame.hpp": "",
+    "server/net/door.hpp": '#include "protocol/frame.hpp"\n',
+    "server/net/door.cpp": '#include "server/net/door.hpp"\n',
+    "server/net/door_queue.cpp": '#include "server/net/door.hpp"\n',  # carries out a part of door.hpp
+    "server/api/routes/page.hpp": '#include "server/net/door.hpp"\n',
+    "server/api/openapi.yaml": "",
+    "server/main.cpp": '#include "server/api/routes/page.hpp"\n',
+    "sim_robot/world/world.hpp": "",
+    "sim_robot/main.cpp": '#include "sim_robot/world/world.hpp"\n',
+    "tests/server/CMakeLists.txt": "rheonaut_test(net_test STATION\n  SOURCES\n    net/door_test.cpp\n  LIBRARIES server)\n"
+                                   "rheonaut_test(page_test STATION\n  SOURCES\n    page_test.cpp\n    words.cpp)\n",
+    "tests/server/net/door_test.cpp": '#include "server/net/door.hpp"\nread("door_cases.json");\n',
+    "tests/server/page_test.cpp": '#include "server/api/routes/page.hpp"\n#include "words.hpp"\n',
+    "tests/server/words.hpp": "",
+    "tests/server/words.cpp": '#include "words.hpp"\nread("docs/page.md");\n',
+    "tests/sim_robot/CMakeLists.txt": "rheonaut_test(world_test\n  SOURCES\n    world_test.cpp)\n",
+    "tests/sim_robot/world_test.cpp": '#include "sim_robot/world/world.hpp"\n',
+    "tests/fuzz/CMakeLists.txt": "add_library(frame_fuzz_target OBJECT frame_fuzz.cpp)\n",
+    "tests/fuzz/frame_fuzz.cpp": '#include "protocol/frame.hpp"\n',
+    "tests/system/processes.py": "",
+    "tests/system/kill_test.py": "from processes import lab\n",
+    "tests/system/proxy_test.py": "import os\n",
+    "tests/browser/programs.mjs": "",
+    "tests/browser/escape_test.mjs": "import { run } from './programs.mjs';\n",
+}
+PROCESSES = {"test system_kill", "test system_proxy", "test browser_escape", "program goldens_test"}
+
+
+class ReachTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        for name, text in SMALL_TREE.items():
+            path = self.root / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+
+    def expect(self, changed, reached):
+        lines = set(reach.reached(self.root, changed.split()))
+        checks = {f"test {name}" for name in reach.CHECKS}
+        self.assertLessEqual(checks, lines, "the checks run after every change")
+        self.assertEqual(lines - checks, set(reached), changed)
+
+    def test_a_source_reaches_what_includes_its_room_and_the_programs(self):
+        station = {"program net_test", "program page_test"} | PROCESSES
+        self.expect("server/net/door.hpp", station)
+        self.expect("server/net/door_queue.cpp", station)
+        self.expect("server/net/a_deleted_file.cpp", station)
+        self.expect("server/api/routes/page.hpp", station - {"program net_test"})
+        self.expect("sim_robot/world/world.hpp",
+                    {"program world_test", "test rheonaut_sim_.*", "lx106", "test esp8266_check"} | PROCESSES)
+
+    def test_what_all_stand_on_reaches_all_that_include_it(self):
+        self.expect("protocol/robot.proto", {"program net_test", "program page_test", "program frame_fuzz_replay", "lx106",
+                                             "test esp8266_check", "test golden_frames_by_protoc"} | PROCESSES)
+
+    def test_a_test_reaches_itself_and_its_words_all_that_use_them(self):
+        self.expect("tests/server/net/door_test.cpp", {"program net_test"})
+        self.expect("tests/server/words.cpp", {"program page_test"})
+        self.expect("tests/server/CMakeLists.txt", {"program net_test", "program page_test"})
+
+    def test_what_a_test_reads_reaches_it(self):
+        self.expect("docs/page.md", {"program page_test"})
+        self.expect("docs/other.md", ())
+        self.expect("tests/data/door_cases.json", {"program net_test"})
+        self.expect("tests/data/fuzz/frame/1", {"program frame_fuzz_replay"})
+
+    def test_data_that_nobody_names_reaches_every_program(self):
+        self.expect("tests/data/new.json", {"program net_test", "program page_test", "program world_test",
+                                            "program frame_fuzz_replay"})
+
+    def test_a_script_reaches_itself_and_those_that_import_it(self):
+        self.expect("tests/system/kill_test.py", {"test system_kill"})
+        self.expect("tests/system/processes.py", {"test system_kill"})
+        self.expect("tests/browser/programs.mjs", {"test browser_escape"})
+
+    def test_the_page_reaches_its_own_tests_and_the_browsers(self):
+        self.expect("web/src/api.ts", {"test web", "test browser_escape"})
+        self.expect("web/tests/api_test.ts", {"test web"})
+        self.expect("server/api/openapi.yaml", {"test web", "program page_test"} | PROCESSES)
+
+    def test_what_decides_how_it_is_built_reaches_everything(self):
+        for path in ("CMakeLists.txt", "cmake/rooms.cmake", "tests/CMakeLists.txt", "deploy/test", ".ci/run"):
+            self.assertEqual(reach.reached(self.root, ["docs/other.md", path]), ["everything"], path)
+
+
+class ThisTreeTest(unittest.TestCase):
+    def test_every_test_program_is_known(self):
+        said = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("CMakeLists.txt"))
+        written = set(re.findall(r"^rheonaut_test\((\w+)", said, re.M))
+        tree = reach.Tree(ROOT)
+        self.assertLessEqual(written, set(tree.programs))
+        self.assertGreaterEqual(len(written), 10)
+        for name, units in tree.programs.items():
+            self.assertTrue(any(node.split("/")[0] in reach.FOLDERS for node in tree.closure(units)), name)
+
+    def test_every_system_test_of_ctest_is_known(self):
+        listing = (ROOT / "tests/system/CMakeLists.txt").read_text(encoding="utf-8")
+        written = re.search(r"foreach\(name ([^)]*)\)", listing).group(1).split()
+        known = {name for name, _, _ in reach.Tree(ROOT).scripts()}
+        self.assertLessEqual({f"system_{name}" for name in written}, known)
+
+
+if __name__ == "__main__":
+    unittest.main()
