@@ -3,7 +3,9 @@
 
 A path in backquotes that begins with one of our folders must be a file or folder, with or without its suffix; `*` and
 `<noun>` match anything. A block of code that names a file, as "```cpp tests/sim_robot/story_examples_test.cpp", must
-stand in that file word for word. The station's own kinds of events are those of the table in docs/database.md. Prints `file:line: what is missing` and fails if anything is.
+stand in that file word for word. The station's own kinds of events are those of the table in docs/database.md.
+Every decision has a number of its own and a row in docs/decisions/README.md, which also names the numbers that were never
+given. Prints `file:line: what is missing` and fails if anything is.
 """
 import pathlib
 import re
@@ -46,8 +48,28 @@ def event_kinds(root):
     yield from (f"docs/database.md: the station makes no event {kind}" for kind in sorted(listed - made))
 
 
+def decision_numbers(root):
+    """What is wrong with the numbers of the decisions and with their index."""
+    folder = root / "docs/decisions"
+    pages = sorted(page.name for page in folder.glob("[0-9]*.md"))
+    if not pages:
+        return
+    index = folder / "README.md"
+    text = index.read_text(encoding="utf-8") if index.is_file() else ""
+    listed = re.findall(r"^\| \[\d+\]\(([^)]+)\)", text, re.M)
+    not_given = re.search(r"^Not assigned: ([^.]*)\.", text, re.M)
+    skipped = set(re.findall(r"\d{4}", not_given.group(1))) if not_given else set()
+    numbers = [page[:4] for page in pages]
+    yield from (f"docs/decisions: the number {n} is given twice" for n in sorted({n for n in numbers if numbers.count(n) > 1}))
+    expected = {f"{n:04}" for n in range(1, int(numbers[-1]) + 1)}
+    yield from (f"docs/decisions: there is no decision {n}" for n in sorted(expected - set(numbers) - skipped))
+    yield from (f"docs/decisions/README.md: {n} is a decision" for n in sorted(skipped & set(numbers)))
+    yield from (f"docs/decisions/README.md: no row for {page}" for page in pages if listed.count(page) != 1)
+
+
 def faults(root):
     yield from event_kinds(root)
+    yield from decision_numbers(root)
     documents = [*root.glob("*.md"), *root.glob("docs/**/*.md")]
     for document in sorted(documents):
         text = document.read_text(encoding="utf-8")

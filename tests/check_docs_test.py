@@ -41,6 +41,19 @@ class CheckDocs(unittest.TestCase):
             self.assertEqual(list(faults(root)), ["docs/database.md: no row for the event connected of the station",
                                                   "docs/database.md: the station makes no event gone"])
 
+    def test_decisions_have_numbers_without_doubles_and_unexplained_holes(self):
+        with tempfile.TemporaryDirectory() as folder:
+            decisions = pathlib.Path(folder) / "docs/decisions"
+            decisions.mkdir(parents=True)
+            for name in ("0001-a.md", "0002-b.md", "0002-c.md", "0005-d.md"):
+                (decisions / name).touch()
+            (decisions / "README.md").write_text("Not assigned: 0001, 0003. So be it.\n\n"
+                                                 "| [0001](0001-a.md) | a |\n| [0002](0002-b.md) | b |\n"
+                                                 "| [0002](0002-c.md) | c |\n")
+            self.assertEqual(list(faults(pathlib.Path(folder))), [
+                "docs/decisions: the number 0002 is given twice", "docs/decisions: there is no decision 0004",
+                "docs/decisions/README.md: 0001 is a decision", "docs/decisions/README.md: no row for 0005-d.md"])
+
 
 if __name__ == "__main__":
     unittest.main()
