@@ -307,8 +307,8 @@ OwnPosition own_position(const StoredSample& stored) {
           stored.robot_time_us,
           stored.utc_us,
           stored.clock_uncertainty_us,
-          stored.sample.position_m - stored.disturbance_m,
-          stored.position_sd_m};
+          stored.sample.position_m - or_nan(stored.disturbance_m),
+          or_nan(stored.position_sd_m)};
 }
 
 Result<PlacedReference> place_reference(const ReferenceRequest& request, std::span<const OwnPosition> samples,

@@ -88,7 +88,7 @@ std::optional<std::string> gap_between(const Piece& piece, const StoredSample& b
 double largest_position_sd_m(const Piece& piece) {
   double largest_m = 0;
   for (const StoredSample& stored : piece.samples) {
-    if (stored.position_sd_m > 0) largest_m = std::max(largest_m, static_cast<double>(stored.position_sd_m));
+    largest_m = std::max(largest_m, static_cast<double>(stored.position_sd_m.value_or(0)));
   }
   return largest_m;
 }
@@ -108,8 +108,8 @@ std::optional<std::string> missing_in(const Piece& piece, const StoredSample& st
     return fmt::format("sample seq {} at {:.3f} s lacks a value (duty {}, acceleration_m_s2 {})", stored.seq,
                        piece.seconds(stored), sample.duty, sample.acceleration_m_s2);
   }
-  const bool is_whole = std::isfinite(sample.position_m) && std::isfinite(stored.disturbance_m) &&
-                        std::isfinite(sample.duty) && (!window.with_velocity || std::isfinite(sample.velocity_m_s));
+  const bool is_whole = std::isfinite(sample.position_m) && stored.disturbance_m && std::isfinite(sample.duty) &&
+                        (!window.with_velocity || std::isfinite(sample.velocity_m_s));
   if (is_whole) return std::nullopt;
   return fmt::format("sample seq {} at {:.3f} s lacks a value (duty {}, position_m {}, velocity_m_s {})", stored.seq,
                      piece.seconds(stored), sample.duty, sample.position_m, sample.velocity_m_s);
@@ -233,10 +233,10 @@ StepPoint step_point(const StoredSample& stored) {
   point.seq = stored.seq;
   point.robot_time_us = stored.robot_time_us;
   point.position_m = stored.sample.position_m;
-  point.disturbance_m = stored.disturbance_m;
+  point.disturbance_m = or_nan(stored.disturbance_m);
   point.setpoint_m = stored.setpoint_m.value_or(0);
   point.steered = stored.mode == rheonaut_MODE_AUTO && stored.setpoint_m.has_value();
-  point.position_sd_m = stored.position_sd_m;
+  point.position_sd_m = or_nan(stored.position_sd_m);
   return point;
 }
 
@@ -291,7 +291,7 @@ Result<RunRecording> recording_of(std::span<const StoredSample> samples, const R
       continue;
     }
     recording.position_m.push_back(static_cast<double>(stored.sample.position_m) -
-                                   static_cast<double>(stored.disturbance_m));
+                                   static_cast<double>(or_nan(stored.disturbance_m)));
     if (window.with_velocity) recording.velocity_m_s.push_back(static_cast<double>(stored.sample.velocity_m_s));
   }
   if (motion == Motion::outside) {

@@ -15,31 +15,6 @@
 namespace server {
 namespace {
 
-std::optional<float> finite(float value) { return std::isfinite(value) ? std::optional{value} : std::nullopt; }
-
-SampleContext context_of(const protocol::Telemetry& telemetry) {
-  SampleContext context;
-  context.period_us = telemetry.period_us;
-  context.mode = telemetry.mode;
-  context.sub_state = telemetry.sub_state;
-  if (telemetry.has_setpoint_m) context.setpoint_m = finite(telemetry.setpoint_m);
-  context.disturbance_m = finite(telemetry.disturbance_m);
-  context.position_sd_m = finite(telemetry.position_sd_m);
-  context.controller_id = telemetry.controller_id;
-  context.emergency_id = telemetry.emergency_id;
-  context.emergency_cause = telemetry.emergency_cause;
-  context.flags = telemetry.flags;
-  return context;
-}
-
-void copy_samples(const protocol::Telemetry& telemetry, std::vector<Sample>& into) {
-  into.resize(telemetry.position_m_count);
-  for (std::size_t i = 0; i < into.size(); ++i) {
-    into[i] = {telemetry.position_m[i], telemetry.velocity_m_s[i], telemetry.acceleration_m_s2[i],
-               telemetry.duty[i],       telemetry.impedance_mv[i], telemetry.reference_m[i]};
-  }
-}
-
 constexpr std::int64_t kRefusalPeriodUs = 10'000'000;
 constexpr std::int64_t kInvalidPeriodUs = 10'000'000;
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "protocol/messages.hpp"
+#include "server/station/state/telemetry_fields.hpp"
 
 // In the namespace of the generated struct. Byte by byte, so that no field is forgotten and NaN equals NaN; padding, if
 // there is any, may make a difference where there is none.
@@ -25,31 +26,6 @@ namespace server {
 using RobotId = std::string;      // 1 to 31 characters of [a-z0-9_-]
 using BootId = std::uint64_t;     // random per boot of a robot, never 0; a decimal string in JSON
 using CommandId = std::uint64_t;  // random, never 0; a decimal string in JSON
-
-struct Sample {
-  float position_m = 0;
-  float velocity_m_s = 0;
-  float acceleration_m_s2 = 0;
-  float duty = 0;  // in [-1, 1]
-  float impedance_mv = 0;
-  float reference_m = 0;
-  bool operator==(const Sample&) const = default;
-};
-
-// What a telemetry frame says once for all its samples; a change of any of it begins a new segment in the store.
-struct SampleContext {
-  std::uint32_t period_us = 0;
-  protocol::Mode mode = rheonaut_MODE_UNSPECIFIED;
-  protocol::SubState sub_state = rheonaut_SUB_STATE_NONE;
-  std::optional<float> setpoint_m;
-  std::optional<float> disturbance_m = 0.0F;  // as in setpoint_m and position_sd_m, none stands for no finite number
-  std::optional<float> position_sd_m = 0.0F;
-  std::uint32_t controller_id = 0;
-  std::uint64_t emergency_id = 0;  // 0: not latched
-  protocol::EmergencyCause emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;
-  std::uint32_t flags = 0;  // TelemetryFlag
-  bool operator==(const SampleContext&) const = default;
-};
 
 // Consecutive samples of one boot, as they arrived in one frame.
 struct SampleBatch {

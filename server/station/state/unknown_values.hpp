@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "protocol/messages.hpp"
+#include "server/station/state/telemetry_fields.hpp"
 
 namespace server {
 
@@ -39,20 +40,18 @@ class UnknownValues {
     }
     return *this;
   }
+  UnknownValues& add_fields_of(const SampleContext& context) {
+    for_each_batch_field_of<FieldKind::enumerator>([&](const auto& field) { add(field.name, context.*field.member); });
+    return *this;
+  }
   std::optional<std::string> text() const { return text_.empty() ? std::nullopt : std::optional{text_ + '}'}; }
 
  private:
   std::string text_;
 };
 
-// Of a SampleContext, or whatever has its fields.
-template <class Context>
-std::optional<std::string> unknown_values(const Context& context) {
-  return UnknownValues{}
-      .add("mode", context.mode)
-      .add("sub_state", context.sub_state)
-      .add("emergency_cause", context.emergency_cause)
-      .text();
+inline std::optional<std::string> unknown_values(const SampleContext& context) {
+  return UnknownValues{}.add_fields_of(context).text();
 }
 
 // "busy", or "unknown_17" where only the text is kept.

@@ -1,6 +1,7 @@
 // Prepared statements, one transaction per batch; row numbers come from a counter that is stored with the rows.
 #include "server/storage/ingest/sample_store.hpp"
 
+#include <fmt/format.h>
 #include <sqlite3.h>
 
 #include <stdexcept>
@@ -13,14 +14,21 @@ namespace server {
 namespace {
 
 constexpr std::uint64_t kLogPageBytes = 4096 + 24;  // a page and its header
-constexpr const char* kInsertSegment =
-    "INSERT INTO segment (boot_key, first_seq, last_seq, first_row, last_row, first_robot_time_us, period_us,"
-    " first_received_at_us, received_at_us, utc_offset_us, clock_uncertainty_us, mode, sub_state, setpoint_m,"
-    " disturbance_m, position_sd_m, controller_id, emergency_id, emergency_cause, flags, min_position_m, "
-    "max_position_m,"
-    " min_velocity_m_s, max_velocity_m_s, min_acceleration_m_s2, max_acceleration_m_s2, min_duty, max_duty,"
-    " min_impedance_mv, max_impedance_mv, min_reference_m, max_reference_m, unknown_values)"
-    " VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?, ?,?,?,?,?,?,?,?,?,?,?,?, ?)";
+constexpr int kSegmentPlaceColumns = 12;            // of insert_segment_query(), before those of the table of fields
+
+std::string insert_segment_query() {
+  std::string columns =
+      "boot_key, first_seq, last_seq, first_row, last_row, first_robot_time_us, period_us, first_received_at_us,"
+      " received_at_us, utc_offset_us, clock_uncertainty_us, unknown_values";
+  for_each_batch_field([&](const auto& field) { columns += fmt::format(", {}", field.name); });
+  for_each_sample_field([&](const auto& field) { columns += fmt::format(", min_{0}, max_{0}", field.name); });
+  std::string marks = "?";
+  for (std::size_t column = 1; column < kSegmentPlaceColumns + kBatchFieldCount + 2 * kSampleFieldCount; ++column) {
+    marks += ",?";
+  }
+  return fmt::format("INSERT INTO segment ({}) VALUES ({})", columns, marks);
+}
+
 constexpr const char* kInsertGap =
     "INSERT INTO gap (boot_key, first_seq, last_seq, cause, noticed_at_us) VALUES (?,?,?,?,?)";
 constexpr const char* kInsertEventGap =
@@ -42,7 +50,7 @@ SampleStore::SampleStore(Database& database)
       boots_{database},
       next_row_{database.handle().execAndGet("SELECT value FROM meta WHERE name = 'next_row'").getInt64()},
       rows_{database.handle()},
-      insert_segment_{database.handle(), kInsertSegment},
+      insert_segment_{database.handle(), insert_segment_query()},
       insert_gap_{database.handle(), kInsertGap},
       insert_event_{database.handle(), kInsertEvent},
       insert_event_gap_{database.handle(), kInsertEventGap},
@@ -101,13 +109,18 @@ std::int64_t SampleStore::write_segment(const Segment& segment, std::int64_t fir
   const auto& [min, max] = rows_.write(segment.samples, first_row);
   const std::int64_t next_row = first_row + static_cast<std::int64_t>(segment.samples.size());
   const SampleContext& context = segment.context;
-  execute(insert_segment_, segment.boot_key, segment.first_seq, segment.next_seq() - 1, first_row, next_row - 1,
-          segment.first_robot_time_us, context.period_us, segment.first_received_at_us, segment.received_at_us,
-          segment.utc_offset_us, segment.clock_uncertainty_us, protocol::text(context.mode),
-          protocol::text(context.sub_state), context.setpoint_m, context.disturbance_m, context.position_sd_m,
-          context.controller_id, context.emergency_id, protocol::text(context.emergency_cause), context.flags,  //
-          min[0], max[0], min[1], max[1], min[2], max[2], min[3], max[3], min[4], max[4], min[5], max[5],
-          unknown_values(context));
+  bind_all(insert_segment_, segment.boot_key, segment.first_seq, segment.next_seq() - 1, first_row, next_row - 1,
+           segment.first_robot_time_us, context.period_us, segment.first_received_at_us, segment.received_at_us,
+           segment.utc_offset_us, segment.clock_uncertainty_us, unknown_values(context));
+  int column = kSegmentPlaceColumns;
+  for_each_batch_field(
+      [&](const auto& field) { bind_value(insert_segment_, ++column, text_or_value(context.*field.member)); });
+  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    bind_value(insert_segment_, ++column, min[channel]);
+    bind_value(insert_segment_, ++column, max[channel]);
+  }
+  insert_segment_.exec();
+  insert_segment_.reset();
   return next_row;
 }
 

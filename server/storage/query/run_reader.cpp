@@ -20,15 +20,28 @@ namespace {
 
 // The view gives the samples of a run in order of span and seq, without sorting. That of schema version 1, which a
 // station has not opened since, knows no time of the first receipt: the same as the last one's then.
-constexpr const char* kQuery =
-    "SELECT span, boot_id, seq, robot_time_us, utc_us, received_at_us, position_m, velocity_m_s, acceleration_m_s2,"
-    " duty, impedance_mv, reference_m, mode, sub_state, setpoint_m, disturbance_m, position_sd_m, controller_id,"
-    " emergency_id, emergency_cause, flags, clock_uncertainty_us, {} FROM run_sample WHERE run_id = ? LIMIT ?";
+std::string run_query(std::int64_t version) {
+  std::string sql =
+      fmt::format("SELECT span, boot_id, seq, robot_time_us, utc_us, clock_uncertainty_us, {}, received_at_us",
+                  version == 1 ? "received_at_us" : "first_received_at_us");
+  const auto add = [&](const auto& field) { (sql += ", ") += column_or_null(field, version); };
+  for_each_sample_field(add);
+  for_each_batch_field(add);
+  return sql + " FROM run_sample WHERE run_id = ? LIMIT ?";
+}
 
 std::uint64_t id_from(const std::string& text) {  // decimal text: it may exceed int64
   std::uint64_t id = 0;
   std::from_chars(text.data(), text.data() + text.size(), id);
   return id;
+}
+
+void read_field(const SQLite::Column& column, std::optional<float>& into) { into = optional_float(column); }
+void read_field(const SQLite::Column& column, std::uint32_t& into) { into = column.getUInt(); }
+void read_field(const SQLite::Column& column, std::uint64_t& into) { into = id_from(column.getString()); }
+template <class Enumerator>
+void read_field(const SQLite::Column& column, Enumerator& into) {
+  into = enumerator_from<Enumerator>(column.getString());
 }
 
 StoredSample sample_from(SQLite::Statement& row) {
@@ -38,24 +51,13 @@ StoredSample sample_from(SQLite::Statement& row) {
   stored.seq = unsigned_id(row.getColumn(2));
   stored.robot_time_us = unsigned_id(row.getColumn(3));
   stored.utc_us = row.getColumn(4).getInt64();
-  stored.received_at_us = row.getColumn(5).getInt64();
-  stored.sample.position_m = float_or_nan(row.getColumn(6));
-  stored.sample.velocity_m_s = float_or_nan(row.getColumn(7));
-  stored.sample.acceleration_m_s2 = float_or_nan(row.getColumn(8));
-  stored.sample.duty = float_or_nan(row.getColumn(9));
-  stored.sample.impedance_mv = float_or_nan(row.getColumn(10));
-  stored.sample.reference_m = float_or_nan(row.getColumn(11));
-  stored.mode = mode_from(row.getColumn(12).getString());
-  stored.sub_state = sub_state_from(row.getColumn(13).getString());
-  stored.setpoint_m = optional_float(row.getColumn(14));
-  stored.disturbance_m = float_or_nan(row.getColumn(15));
-  stored.position_sd_m = float_or_nan(row.getColumn(16));
-  stored.controller_id = row.getColumn(17).getUInt();
-  stored.emergency_id = id_from(row.getColumn(18).getString());
-  stored.emergency_cause = emergency_cause_from(row.getColumn(19).getString());
-  stored.flags = row.getColumn(20).getUInt();
-  stored.clock_uncertainty_us = row.getColumn(21).getInt64();
-  stored.first_received_at_us = row.getColumn(22).getInt64();
+  stored.clock_uncertainty_us = row.getColumn(5).getInt64();
+  stored.first_received_at_us = row.getColumn(6).getInt64();
+  stored.received_at_us = row.getColumn(7).getInt64();
+  int column = 8;
+  for_each_sample_field(
+      [&](const SampleField& field) { stored.sample.*field.member = float_or_nan(row.getColumn(column++)); });
+  for_each_batch_field([&](const auto& field) { read_field(row.getColumn(column++), stored.*field.member); });
   return stored;
 }
 
@@ -85,8 +87,7 @@ Result<std::vector<StoredSample>> query_run(SQLite::Database& database, RunId ru
                                                         range.getColumn(1).getInt64(), range.getColumn(2).getInt64()));
   }
   std::vector<StoredSample> samples;
-  const bool is_first_version = database.execAndGet("PRAGMA user_version").getInt64() == 1;
-  SQLite::Statement rows{database, fmt::format(kQuery, is_first_version ? "received_at_us" : "first_received_at_us")};
+  SQLite::Statement rows{database, run_query(database.execAndGet("PRAGMA user_version").getInt64())};
   bind_all(rows, run, static_cast<std::int64_t>(limit + 1));
   while (rows.executeStep()) samples.push_back(sample_from(rows));
   if (samples.size() > limit) {

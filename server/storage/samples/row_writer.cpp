@@ -10,13 +10,17 @@
 namespace server {
 namespace {
 
-constexpr const char* kInsertSamples =
-    "INSERT INTO sample (row, position_m, velocity_m_s, acceleration_m_s2, duty, impedance_mv, reference_m) VALUES ";
-constexpr const char* kOneRow = "(?,?,?,?,?,?,?)";
-
-std::array<float, kChannels> channels_of(const Sample& sample) {
-  return {sample.position_m, sample.velocity_m_s, sample.acceleration_m_s2,
-          sample.duty,       sample.impedance_mv, sample.reference_m};
+// "INSERT INTO sample (row, …) VALUES (?,…),(?,…)" for so many rows.
+std::string insert_query(std::size_t rows) {
+  std::string sql = "INSERT INTO sample (row";
+  std::string one_row = "(?";
+  for (const SampleField& field : kSampleFields) {
+    sql.append(", ").append(field.name);
+    one_row += ",?";
+  }
+  sql += ") VALUES ";
+  for (std::size_t row = 0; row < rows; ++row) sql.append(row > 0 ? "," : "").append(one_row).append(")");
+  return sql;
 }
 
 }  // namespace
@@ -25,8 +29,7 @@ RowWriter::RowWriter(SQLite::Database& database)
     : database_{database}, insert_block_{prepare(kBlockRows)}, insert_one_{prepare(1)} {}
 
 RawStatement RowWriter::prepare(std::size_t rows) {
-  std::string sql = kInsertSamples;
-  for (std::size_t row = 0; row < rows; ++row) sql.append(row > 0 ? "," : "").append(kOneRow);
+  const std::string sql = insert_query(rows);
   sqlite3_stmt* statement = nullptr;
   const int result =
       sqlite3_prepare_v3(database_.getHandle(), sql.c_str(), -1, SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
@@ -45,7 +48,7 @@ Extremes RowWriter::write(const std::vector<Sample>& samples, std::int64_t first
       insert(insert_block_.get(), block_);
       waiting_ = 0;
     }
-    block_[waiting_] = {.row = row++, .values = channels_of(sample)};
+    block_[waiting_] = {.row = row++, .values = values_of(sample)};
     for (std::size_t channel = 0; channel < kChannels; ++channel) {
       const float value = block_[waiting_].values[channel];
       if (!std::isfinite(value)) continue;

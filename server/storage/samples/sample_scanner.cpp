@@ -10,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "server/station/state/unknown_values.hpp"
 #include "server/storage/samples/stored_rows.hpp"
 
 namespace server {
@@ -22,12 +23,18 @@ constexpr const char* kInRange =
     " FROM segment WHERE boot_key = ?1 AND first_seq >= ?2 - 99 AND first_seq <= ?3 AND last_seq >= ?2"
     " ORDER BY first_seq";
 
-constexpr const char* kSegmentColumns =
-    "SELECT first_seq, last_seq, first_row, first_robot_time_us, period_us,"
-    " iif(first_received_at_us = 0, received_at_us, first_received_at_us), received_at_us, utc_offset_us,"
-    " clock_uncertainty_us, mode, sub_state, emergency_cause, setpoint_m, disturbance_m, position_sd_m, controller_id,"
-    " emergency_id, flags, ";
 constexpr std::int64_t kUnknownValuesSince = 7;  // version: the tools read older ones, too
+constexpr int kContextColumn = 9;                // of segment_query(): the first of kBatchFields
+
+// Of a database of this version of the schema.
+std::string segment_query(std::int64_t version) {
+  std::string sql =
+      "SELECT first_seq, last_seq, first_row, first_robot_time_us, period_us,"
+      " iif(first_received_at_us = 0, received_at_us, first_received_at_us), received_at_us, utc_offset_us,"
+      " clock_uncertainty_us";
+  for_each_batch_field([&](const auto& field) { (sql += ", ") += column_or_null(field, version); });
+  return sql + ", " + (version >= kUnknownValuesSince ? "unknown_values" : "NULL") + kInRange;
+}
 
 Channel channel(std::size_t index) { return static_cast<Channel>(index); }
 
@@ -69,23 +76,19 @@ std::optional<float> optional_at(sqlite3_stmt* row, int column) {
   return is_null ? std::nullopt : std::optional{static_cast<float>(sqlite3_column_double(row, column))};
 }
 
-template <class Named, class Parse>
-auto enumerator_at(sqlite3_stmt* row, int column, Named& last, Parse parse) {
+template <class Named, class Enumerator>
+void read_enumerator(sqlite3_stmt* row, int column, Named& last, Enumerator& into) {
   const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
   if (text != nullptr && last.name != text) {
     last.name = text;
-    last.value = parse(last.name);
+    last.number = number_of(enumerator_from<Enumerator>(last.name));
   }
-  return last.value;
+  into = static_cast<Enumerator>(last.number);
 }
 
 }  // namespace
 
-const char* text(Channel value) {
-  constexpr std::array<const char*, kChannels> kNames{"position_m", "velocity_m_s", "acceleration_m_s2",
-                                                      "duty",       "impedance_mv", "reference_m"};
-  return kNames[static_cast<std::size_t>(value)];
-}
+const char* text(Channel value) { return kSampleFields[static_cast<std::size_t>(value)].name; }
 
 Result<Channels> parse_channels(std::string_view text) {
   Channels channels;
@@ -109,11 +112,11 @@ Result<Channels> parse_channels(std::string_view text) {
 void FinalizeStatement::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 
 SampleScanner::SampleScanner(SQLite::Database& database, Channels channels) : database_{database}, channels_{channels} {
-  const bool has_unknown = database.execAndGet("PRAGMA user_version").getInt64() >= kUnknownValuesSince;
-  segments_ = prepare(database, std::string{kSegmentColumns} + (has_unknown ? "unknown_values" : "NULL") + kInRange);
+  const std::int64_t version = database.execAndGet("PRAGMA user_version").getInt64();
+  segments_ = prepare(database, segment_query(version));
   std::string sql = "SELECT row";
   for (std::size_t index = 0; index < kChannels; ++index) {
-    if (channels[index]) sql += fmt::format(", {}", text(channel(index)));
+    if (channels[index]) (sql += ", ") += column_or_null(kSampleFields[index], version);
   }
   rows_ = prepare(database, sql + " FROM sample WHERE row >= ?1 ORDER BY row");
 }
@@ -163,18 +166,26 @@ std::int64_t SampleScanner::read_segment(Segment& into) {
   into.received_at_us = sqlite3_column_int64(row, 6);
   into.utc_offset_us = sqlite3_column_int64(row, 7);
   into.clock_uncertainty_us = sqlite3_column_int64(row, 8);
-  context.mode = enumerator_at(row, 9, mode_, mode_from);
-  context.sub_state = enumerator_at(row, 10, sub_state_, sub_state_from);
-  context.emergency_cause = enumerator_at(row, 11, emergency_cause_, emergency_cause_from);
-  context.setpoint_m = optional_at(row, 12);
-  context.disturbance_m = optional_at(row, 13);
-  context.position_sd_m = optional_at(row, 14);
-  context.controller_id = static_cast<std::uint32_t>(unsigned_at(row, 15));
-  context.emergency_id = unsigned_at(row, 16);
-  context.flags = static_cast<std::uint32_t>(unsigned_at(row, 17));
-  const auto* unknown = reinterpret_cast<const char*>(sqlite3_column_text(row, 18));
-  if (unknown != nullptr) set_unknown(context, unknown);
+  read_context(context);
   return sqlite3_column_int64(row, 2) + static_cast<std::int64_t>(skipped);
+}
+
+void SampleScanner::read_context(SampleContext& into) {
+  sqlite3_stmt* row = segments_.get();
+  int column = kContextColumn;
+  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+    Value& value = into.*field.member;
+    if constexpr (BatchField<Value>::kKind == FieldKind::enumerator) {
+      read_enumerator(row, column, last_texts_[static_cast<std::size_t>(column - kContextColumn)], value);
+    } else if constexpr (BatchField<Value>::kKind == FieldKind::number) {
+      value = optional_at(row, column);
+    } else {
+      value = static_cast<Value>(unsigned_at(row, column));
+    }
+    ++column;
+  });
+  const auto* unknown = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
+  if (unknown != nullptr) set_unknown(into, unknown);
 }
 
 void SampleScanner::read_rows(std::int64_t first_row, Segment& into) {
@@ -209,8 +220,11 @@ std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boo
   if (samples.next <= samples.first) return heads;
   std::string sql =
       "SELECT first_seq, last_seq, first_robot_time_us, period_us, utc_offset_us, clock_uncertainty_us, flags";
+  const std::int64_t version = database.execAndGet("PRAGMA user_version").getInt64();
   for (std::size_t index = 0; index < kChannels; ++index) {
-    if (channels[index]) sql += fmt::format(", min_{0}, max_{0}", text(channel(index)));
+    if (!channels[index]) continue;
+    const bool is_stored = kSampleFields[index].since_schema <= version;
+    sql += is_stored ? fmt::format(", min_{0}, max_{0}", text(channel(index))) : ", NULL, NULL";
   }
   const RawStatement statement = prepare(database, sql + kInRange + " LIMIT ?4");
   sqlite3_stmt* row = statement.get();

@@ -2,7 +2,8 @@
 // check that reads many samples.
 //
 // On the thread that owns the database handle: a reader's, or the disk thread. Prepares its statements once and keeps
-// them; no text is parsed per row. Needs the present version of the schema. Between begin() and the end of the samples
+// them; no text is parsed per row. Reads every version of the schema: what
+// a version does not have is NULL there. Between begin() and the end of the samples
 // (or end()) it holds a read transaction on the handle, so whoever stops early says so with end().
 #pragma once
 
@@ -19,22 +20,25 @@
 #include <vector>
 
 #include "server/runtime/result.hpp"
+#include "server/station/state/telemetry_fields.hpp"
 #include "server/storage/samples/segment.hpp"
 
 struct sqlite3_stmt;
 
 namespace server {
 
-// In the order of the columns of `sample` and of the members of Sample.
-enum class Channel : std::uint8_t { position_m, velocity_m_s, acceleration_m_s2, duty, impedance_mv, reference_m };
-constexpr std::size_t kChannels = 6;
+// A row of kSampleFields, by its index.
+enum class Channel : std::uint8_t {};
+constexpr std::size_t kChannels = kSampleFieldCount;
 using Channels = std::bitset<kChannels>;
 inline Channels all_channels() { return Channels{}.set(); }
 
 // By Channel.
-inline constexpr std::array<float Sample::*, kChannels> kSampleMembers{
-    &Sample::position_m, &Sample::velocity_m_s, &Sample::acceleration_m_s2,
-    &Sample::duty,       &Sample::impedance_mv, &Sample::reference_m};
+inline constexpr auto kSampleMembers = [] {
+  std::array<float Sample::*, kChannels> members{};
+  for (std::size_t index = 0; index < kChannels; ++index) members[index] = kSampleFields[index].member;
+  return members;
+}();
 
 const char* text(Channel value);
 
@@ -61,15 +65,15 @@ class SampleScanner {
   void end();
 
  private:
-  // The enumerator of a text, which is looked up only when the text is another one than last time.
-  template <class Value>
+  // The number of an enumerator's text, which is looked up only when the text is another one than last time.
   struct Named {
     std::string name = "?";  // no enumerator's
-    Value value{};
+    std::int32_t number = 0;
   };
 
-  std::int64_t read_segment(
-      Segment& into);  // returns its first row; the samples' number is right, their values are not
+  // Returns its first row; the samples' number is right, their values are not.
+  std::int64_t read_segment(Segment& into);
+  void read_context(SampleContext& into);
   void read_rows(std::int64_t first_row, Segment& into);
   void seek(std::int64_t row);
 
@@ -81,9 +85,7 @@ class SampleScanner {
   std::int64_t boot_key_ = 0;
   std::int64_t next_row_ = 0;  // that rows_ gives at its next step; 0: it must seek
   bool scanning_ = false;
-  Named<protocol::Mode> mode_;
-  Named<protocol::SubState> sub_state_;
-  Named<protocol::EmergencyCause> emergency_cause_;
+  std::array<Named, kBatchFieldCount> last_texts_;  // by row of kBatchFields
 };
 
 // What is known of a segment without its rows.

@@ -32,12 +32,9 @@ Segment part_of(const Segment& segment, Interval range) {
 }
 
 Sample as_stored(const Sample& sample) {
-  return {.position_m = as_stored(sample.position_m),
-          .velocity_m_s = as_stored(sample.velocity_m_s),
-          .acceleration_m_s2 = as_stored(sample.acceleration_m_s2),
-          .duty = as_stored(sample.duty),
-          .impedance_mv = as_stored(sample.impedance_mv),
-          .reference_m = as_stored(sample.reference_m)};
+  Sample stored;
+  for_each_sample_field([&](const SampleField& field) { stored.*field.member = as_stored(sample.*field.member); });
+  return stored;
 }
 
 }  // namespace server

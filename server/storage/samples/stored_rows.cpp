@@ -5,7 +5,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "server/station/state/unknown_values.hpp"
 #include "server/storage/database/statement.hpp"
 #include "server/storage/samples/command_store.hpp"
 
@@ -19,41 +18,18 @@ CommandState command_state_from(const std::string& name) {
   return CommandState::failed;
 }
 
-template <class Enumerator>
-Enumerator enumerator_from(const std::string& text, int first, int last) {
-  for (int value = first; value <= last; ++value) {
-    if (text == protocol::text(static_cast<Enumerator>(value))) return static_cast<Enumerator>(value);
-  }
-  return static_cast<Enumerator>(text == "unknown" ? kNumberNotKept : 0);
-}
-
 constexpr const char* kUnfinished = "state IN ('queued', 'sent')";
 
 }  // namespace
 
-protocol::Mode mode_from(const std::string& text) {
-  return enumerator_from<protocol::Mode>(text, _rheonaut_Mode_MIN, _rheonaut_Mode_MAX);
-}
-
-protocol::SubState sub_state_from(const std::string& text) {
-  return enumerator_from<protocol::SubState>(text, _rheonaut_SubState_MIN, _rheonaut_SubState_MAX);
-}
-
-protocol::EmergencyCause emergency_cause_from(const std::string& text) {
-  return enumerator_from<protocol::EmergencyCause>(text, _rheonaut_EmergencyCause_MIN, _rheonaut_EmergencyCause_MAX);
-}
-
 void set_unknown(SampleContext& context, const std::string& unknown_values) {
   const auto numbers = nlohmann::json::parse(unknown_values, nullptr, false);
   if (!numbers.is_object()) return;
-  const auto set = [&numbers]<class Enumerator>(const char* field, Enumerator& value) {
-    const auto number = numbers.find(field);
+  for_each_batch_field_of<FieldKind::enumerator>([&]<class Enumerator>(const BatchField<Enumerator>& field) {
+    const auto number = numbers.find(field.name);
     if (number == numbers.end() || !number->is_number_integer()) return;
-    value = static_cast<Enumerator>(number->get<std::int32_t>());
-  };
-  set("mode", context.mode);
-  set("sub_state", context.sub_state);
-  set("emergency_cause", context.emergency_cause);
+    context.*field.member = static_cast<Enumerator>(number->template get<std::int32_t>());
+  });
 }
 
 std::string select_commands(const char* condition) {
@@ -107,9 +83,9 @@ RobotEvent event_from(SQLite::Statement& row) {
   event.kind = row.getColumn(5).getString();
   event.cause = row.getColumn(6).getString();
   SampleContext context;
-  context.mode = mode_from(row.getColumn(7).getString());
-  context.sub_state = sub_state_from(row.getColumn(8).getString());
-  context.emergency_cause = emergency_cause_from(row.getColumn(14).getString());
+  context.mode = enumerator_from<protocol::Mode>(row.getColumn(7).getString());
+  context.sub_state = enumerator_from<protocol::SubState>(row.getColumn(8).getString());
+  context.emergency_cause = enumerator_from<protocol::EmergencyCause>(row.getColumn(14).getString());
   if (!row.getColumn(16).isNull()) event.unknown_values = row.getColumn(16).getString();
   if (event.unknown_values) set_unknown(context, *event.unknown_values);
   event.mode = context.mode;

@@ -7,17 +7,32 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/station/state/station_state.hpp"
+#include "server/station/state/unknown_values.hpp"
 #include "server/storage/database/database.hpp"
 
 namespace server {
 
 // The enumerator whose text() this is; of "unknown" kNumberNotKept (unknown_values.hpp), of any other text 0.
-protocol::Mode mode_from(const std::string& text);
-protocol::SubState sub_state_from(const std::string& text);
-protocol::EmergencyCause emergency_cause_from(const std::string& text);
+template <class Enumerator>
+Enumerator enumerator_from(std::string_view text) {
+  constexpr int kMostEnumerators = 256;
+  for (int number = 0; number < kMostEnumerators; ++number) {
+    const auto value = static_cast<Enumerator>(number);
+    if (!is_unknown(value) && text == protocol::text(value)) return value;
+  }
+  return static_cast<Enumerator>(text == "unknown" ? kNumberNotKept : 0);
+}
+
+// The column of a field in a database of this version of the schema, as SQL.
+template <class Field>
+const char* column_or_null(const Field& field, std::int64_t version) {
+  return field.since_schema <= version ? field.name : "NULL";
+}
+
 // Puts the numbers of a column unknown_values in their place.
 void set_unknown(SampleContext& context, const std::string& unknown_values);
 

@@ -48,14 +48,15 @@ std::string difference(const Certificate& found, const Certificate& stored) {
   return "its longest gap or its clock is not that of the certificate";
 }
 
-// Whether the extremes of the segment ?1, ?2 are those of the rows ?3 to ?4.
-std::string extremes_query() {
+// Whether the extremes of the segment ?1, ?2 are those of the rows ?3 to ?4, in a database of this schema version.
+std::string extremes_query(std::int64_t version) {
   std::string found;
   std::string differ;
-  for (std::size_t index = 0; index < kChannels; ++index) {
-    const char* channel = text(static_cast<Channel>(index));
-    found += fmt::format("{0}min({1}) AS low_{1}, max({1}) AS high_{1}", index == 0 ? "" : ", ", channel);
-    differ += fmt::format("{0}low_{1} IS NOT min_{1} OR high_{1} IS NOT max_{1}", index == 0 ? "" : " OR ", channel);
+  for (const SampleField& field : kSampleFields) {
+    if (field.since_schema > version) continue;
+    found += fmt::format("{0}min({1}) AS low_{1}, max({1}) AS high_{1}", found.empty() ? "" : ", ", field.name);
+    differ +=
+        fmt::format("{0}low_{1} IS NOT min_{1} OR high_{1} IS NOT max_{1}", differ.empty() ? "" : " OR ", field.name);
   }
   return fmt::format(
       "SELECT {} FROM (SELECT {} FROM sample WHERE row BETWEEN ?3 AND ?4), segment WHERE boot_key = ?1 AND first_seq = "
@@ -99,7 +100,7 @@ class Checking {
   const StoreCheck& wish_;
   StoreFindings& findings_;
   SQLite::Statement rows_{database_, "SELECT count(*) FROM sample WHERE row BETWEEN ? AND ?"};
-  SQLite::Statement extremes_{database_, extremes_query()};
+  SQLite::Statement extremes_{database_, extremes_query(database_.execAndGet("PRAGMA user_version").getInt64())};
 };
 
 void Checking::check_rows_counter() {

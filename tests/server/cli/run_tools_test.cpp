@@ -64,7 +64,7 @@ class RunTools : public RecordingTest {
       const Sample& s = stored.sample;
       const auto cell = [](float value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string{}; };
       out << fmt::format("{},{},{},{},{},{},{}\n", stored.robot_time_us, cell(s.position_m), cell(s.velocity_m_s),
-                         s.acceleration_m_s2, s.duty, stored.disturbance_m, stored.position_sd_m);
+                         s.acceleration_m_s2, s.duty, or_nan(stored.disturbance_m), or_nan(stored.position_sd_m));
     }
   }
 

@@ -101,8 +101,8 @@ TEST_F(CertificateTest, HashesTheDocumentedBytes) {
     put_float(one.sample.impedance_mv);
     put_float(one.sample.reference_m);
     put_float(one.setpoint_m.value_or(std::nanf("")));
-    put_float(one.disturbance_m);
-    put_float(one.position_sd_m);
+    put_float(or_nan(one.disturbance_m));
+    put_float(or_nan(one.position_sd_m));
     put(static_cast<std::uint64_t>(one.mode), 4);
     put(static_cast<std::uint64_t>(one.sub_state), 4);
     put(static_cast<std::uint64_t>(one.emergency_cause), 4);

@@ -83,10 +83,10 @@ class ExportTest : public RandomRecordingTest {
     for (const auto member : kSampleMembers) fields.push_back(bits(stored.sample.*member));
     fields.push_back(fmt::format("{} {}", protocol::text(stored.mode), protocol::text(stored.sub_state)));
     fields.push_back(bits(stored.setpoint_m.value_or(NAN)));
-    fields.push_back(bits(stored.disturbance_m));
+    fields.push_back(bits(or_nan(stored.disturbance_m)));
     fields.push_back(
         fmt::format("{} {} {}", stored.clock_uncertainty_us, stored.first_received_at_us, stored.received_at_us));
-    fields.push_back(bits(stored.position_sd_m));
+    fields.push_back(bits(or_nan(stored.position_sd_m)));
     fields.push_back(fmt::format("{} {} {} {} {} {}", stored.controller_id, stored.emergency_id,
                                  protocol::text(stored.emergency_cause), stored.flags,
                                  unknown_values(stored).value_or("none"), gap_before));
