@@ -15,6 +15,8 @@ namespace {
 constexpr std::size_t kPageSamples = 2'000;
 constexpr std::size_t kPieceBytes = 384 * 1024;  // of a grid, whose gaps may be long
 constexpr std::int64_t kSecondUs = 1'000'000;
+constexpr std::size_t kBeforeTimes = 4;  // so many fields of a batch stand before the times of receipt
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 // Six digits: 000001.
 void append_micros(std::string& out, std::int64_t micros) {
@@ -89,25 +91,33 @@ std::string CsvWriter::header() const {
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     if (query_.channels[channel]) out += fmt::format(",{}", text(static_cast<Channel>(channel)));
   }
-  out += grid_ ? ",setpoint_m,gap\n"
-               : ",mode,sub_state,setpoint_m,disturbance_m,clock_uncertainty_us,first_received_at_us,received_at_us,"
-                 "position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,gap_after,unknown_values\n";
-  return out;
+  if (grid_) return out + ",setpoint_m,gap\n";
+  std::size_t number = 0;
+  for_each_batch_field([&](const auto& field) {
+    if (number++ == kBeforeTimes) out += ",clock_uncertainty_us,first_received_at_us,received_at_us";
+    out += fmt::format(",{}", field.name);
+  });
+  return out + ",gap_before,gap_after,unknown_values\n";
 }
 
 // What follows the channels, up to gap_before.
 std::string CsvWriter::shared_text(const Segment& segment) const {
-  const SampleContext& context = segment.context;
-  std::string out = fmt::format(",{},{},", protocol::text(context.mode), protocol::text(context.sub_state));
-  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-  append_float(out, context.setpoint_m.value_or(kNone), "");
-  out += ',';
-  append_float(out, context.disturbance_m.value_or(kNone), "");
-  out += fmt::format(",{},{},{},", segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us);
-  append_float(out, context.position_sd_m.value_or(kNone), "");
-  out += fmt::format(",{},{},{},{},", context.controller_id, context.emergency_id,
-                     protocol::text(context.emergency_cause), context.flags);
-  return out;
+  std::string out;
+  std::size_t number = 0;
+  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+    if (number++ == kBeforeTimes) {
+      out +=
+          fmt::format(",{},{},{}", segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us);
+    }
+    out += ',';
+    const Value& value = segment.context.*field.member;
+    if constexpr (BatchField<Value>::kKind == FieldKind::number) {
+      append_float(out, or_nan(value), "");
+    } else {
+      out += fmt::format("{}", text_or_value(value));
+    }
+  });
+  return out + ',';
 }
 
 void CsvWriter::append(std::string& out, const ExportSegment& exported) {
@@ -144,14 +154,13 @@ void CsvWriter::append(std::string& out, const GridRow& row) {
   append_micros(out, row.since_us % kSecondUs);
   out += ',';
   utc_.append(out, row.utc_us);
-  const float none = std::numeric_limits<float>::quiet_NaN();
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     if (!query_.channels[channel]) continue;
     out += ',';
-    append_float(out, row.sample != nullptr ? row.sample->*kSampleMembers[channel] : none, "");
+    append_float(out, row.sample != nullptr ? row.sample->*kSampleMembers[channel] : kNone, "");
   }
   out += ',';
-  append_float(out, row.sample != nullptr ? row.setpoint_m.value_or(none) : none, "");
+  append_float(out, row.sample != nullptr ? or_nan(row.setpoint_m) : kNone, "");
   out += row.sample != nullptr ? ",0\n" : ",1\n";
 }
 

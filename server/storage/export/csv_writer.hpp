@@ -1,8 +1,7 @@
 // A run as CSV: a header line with units in the names, then a line per sample, or per step of a uniform grid.
 //
-//   span,boot_id,seq,robot_time_us,utc,<channels>,mode,sub_state,setpoint_m,disturbance_m,clock_uncertainty_us,
-//   first_received_at_us,received_at_us,position_sd_m,controller_id,emergency_id,emergency_cause,flags,gap_before,
-//   gap_after,unknown_values
+//   span,boot_id,seq,robot_time_us,utc,<channels>,<the first four of kBatchFields>,clock_uncertainty_us,
+//   first_received_at_us,received_at_us,<the others>,gap_before,gap_after,unknown_values
 //   span,t_s,utc,<channels>,setpoint_m,gap                                                                (grid)
 //
 // Numbers are the shortest decimals that give the same binary32 back; what is no finite number is an empty field. utc

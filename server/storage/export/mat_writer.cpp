@@ -12,6 +12,7 @@
 #include <memory>
 #include <system_error>
 
+#include "server/station/state/unknown_values.hpp"
 #include "server/storage/database/statement.hpp"
 
 namespace server {
@@ -34,13 +35,30 @@ void add_facts(SQLite::Database& database, const char* table, const char* prefix
   }
 }
 
+// "0 none, 1 navigating": those without a gap from 0 on.
 template <class Enumerator>
-std::string names(int last) {
+std::string names() {
   std::string out;
-  for (int value = 0; value <= last; ++value) {
-    out += fmt::format("{}{} {}", value == 0 ? "" : ", ", value, protocol::text(static_cast<Enumerator>(value)));
+  for (int number = 0; number == 0 || !is_unknown(static_cast<Enumerator>(number)); ++number) {
+    const char* comma = number == 0 ? "" : ", ";
+    out += fmt::format("{}{} {}", comma, number, protocol::text(static_cast<Enumerator>(number)));
   }
   return out;
+}
+
+// Numbers first, then the rest.
+template <class Put>
+void put_context(const SampleContext& context, const Put& put) {
+  for_each_batch_field_of<FieldKind::number>([&](const auto& field) { put(or_nan(context.*field.member)); });
+  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+    const Value& value = context.*field.member;
+    if constexpr (BatchField<Value>::kKind == FieldKind::id) {
+      put(static_cast<std::uint32_t>(value >> 32));
+      put(static_cast<std::uint32_t>(value & 0xffffffff));
+    } else if constexpr (BatchField<Value>::kKind != FieldKind::number) {
+      put(static_cast<std::uint32_t>(value));
+    }
+  });
 }
 
 // A character is two bytes there, whatever its place in the alphabets.
@@ -114,16 +132,18 @@ void MatWriter::write_facts(SQLite::Database& database) {
     boot_ids += fmt::format("{}{} {}", boot_ids.empty() ? "" : ", ", span.span, span.boot_id);
   }
   facts.emplace_back("boot_ids", boot_ids);
-  facts.emplace_back("modes", names<protocol::Mode>(_rheonaut_Mode_MAX));
-  facts.emplace_back("sub_states", names<protocol::SubState>(_rheonaut_SubState_MAX));
-  facts.emplace_back("emergency_causes", names<protocol::EmergencyCause>(_rheonaut_EmergencyCause_MAX));
+  for_each_batch_field_of<FieldKind::enumerator>([&]<class Enumerator>(const BatchField<Enumerator>& field) {
+    facts.emplace_back(fmt::format("{}s", field.name), names<Enumerator>());
+  });
   facts.emplace_back("grid_us", query_.grid_us ? std::to_string(*query_.grid_us) : "");
   write_struct(path_, facts);
 }
 
 void MatWriter::add_columns() {
   using Type = MatColumn::Type;
-  const auto add = [this](const char* name, Type type) { columns_.emplace_back(name, type, path_.parent_path()); };
+  const auto add = [this](const std::string& name, Type type) {
+    columns_.emplace_back(name, type, path_.parent_path());
+  };
   add("span", Type::uint32);
   if (grid_) {
     add("t_s", Type::float64);
@@ -135,20 +155,20 @@ void MatWriter::add_columns() {
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     if (query_.channels[channel]) add(text(static_cast<Channel>(channel)), Type::float32);
   }
-  add("setpoint_m", Type::float32);
   if (grid_) {
+    add("setpoint_m", Type::float32);
     add("gap", Type::uint32);
     return;
   }
-  add("disturbance_m", Type::float32);
-  add("position_sd_m", Type::float32);
-  add("mode", Type::uint32);
-  add("sub_state", Type::uint32);
-  add("controller_id", Type::uint32);
-  add("emergency_id_high", Type::uint32);
-  add("emergency_id_low", Type::uint32);
-  add("emergency_cause", Type::uint32);
-  add("flags", Type::uint32);
+  for_each_batch_field_of<FieldKind::number>([&](const auto& field) { add(field.name, Type::float32); });
+  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+    if constexpr (BatchField<Value>::kKind == FieldKind::id) {
+      add(fmt::format("{}_high", field.name), Type::uint32);
+      add(fmt::format("{}_low", field.name), Type::uint32);
+    } else if constexpr (BatchField<Value>::kKind != FieldKind::number) {
+      add(field.name, Type::uint32);
+    }
+  });
   add("clock_uncertainty_us", Type::float64);
   add("first_received_at_us", Type::float64);
   add("received_at_us", Type::float64);
@@ -175,7 +195,6 @@ bool MatWriter::push_rows() {
 // In the order of add_columns(), and in its types.
 void MatWriter::push(const ExportSegment& exported) {
   const Segment& segment = exported.part->segment;
-  const SampleContext& context = segment.context;
   for (std::size_t index = 0; index < segment.samples.size(); ++index) {
     auto column = columns_.begin();
     const auto put = [&column](auto value) { (column++)->push(value); };
@@ -187,16 +206,7 @@ void MatWriter::push(const ExportSegment& exported) {
     for (std::size_t channel = 0; channel < kChannels; ++channel) {
       if (query_.channels[channel]) put(segment.samples[index].*kSampleMembers[channel]);
     }
-    put(context.setpoint_m.value_or(kNaN));
-    put(context.disturbance_m.value_or(kNaN));
-    put(context.position_sd_m.value_or(kNaN));
-    put(static_cast<std::uint32_t>(context.mode));
-    put(static_cast<std::uint32_t>(context.sub_state));
-    put(context.controller_id);
-    put(static_cast<std::uint32_t>(context.emergency_id >> 32));
-    put(static_cast<std::uint32_t>(context.emergency_id & 0xffffffff));
-    put(static_cast<std::uint32_t>(context.emergency_cause));
-    put(context.flags);
+    put_context(segment.context, put);
     put(static_cast<double>(segment.clock_uncertainty_us));
     put(static_cast<double>(segment.first_received_at_us));
     put(static_cast<double>(segment.received_at_us));
@@ -214,7 +224,7 @@ void MatWriter::push(const GridRow& row) {
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     if (query_.channels[channel]) put(row.sample != nullptr ? row.sample->*kSampleMembers[channel] : kNaN);
   }
-  put(row.sample != nullptr ? row.setpoint_m.value_or(kNaN) : kNaN);
+  put(row.sample != nullptr ? or_nan(row.setpoint_m) : kNaN);
   put(std::uint32_t{row.sample == nullptr});
 }
 

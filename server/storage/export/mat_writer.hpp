@@ -1,12 +1,11 @@
 // A run as a MAT file of version 5, for MATLAB and Octave: a struct `info` with what is said of the run, and a column
 // vector for each quantity, named as in the CSV.
 //
-// Channels, setpoint_m, disturbance_m and position_sd_m are single and NaN where there is no number; times, seq,
-// gap_before and gap_after are double, which holds them exactly; span, mode, sub_state, controller_id, emergency_cause
-// and flags are uint32, and emergency_id is two of them (high, low), since no double holds it. mode, sub_state and
-// emergency_cause are the numbers of the protocol, also those that this version does not know, spelled out in
-// info.modes, info.sub_states and info.emergency_causes; info.boot_ids has the boots of the spans. On a grid: span,
-// t_s, utc_us, the channels, setpoint_m and gap.
+// Channels and numbers of a batch (telemetry_fields.hpp) are single and NaN where there is no number; times, seq,
+// gap_before and gap_after are double, which holds them exactly; span, enumerators and counts are uint32, and an id is
+// two of them (NAME_high, NAME_low), since no double holds it. Enumerators are the numbers of the protocol, also those
+// that this version does not know, spelled out in info (info.modes for mode); info.boot_ids has the boots of the spans.
+// On a grid: span, t_s, utc_us, the channels, setpoint_m and gap.
 //
 // On the thread that owns the database handle; no other thread may use matio meanwhile. Errors: invalid when a column
 // would have more than 2 GiB, which the format does not hold. Throws when the disk does not take it.

@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kSliceSamples = 2'500;
 constexpr std::size_t kSliceGaps = 5'000;
 
-constexpr const char* kTables = R"sql(
+constexpr const char* kPlaceColumns = R"sql(
 CREATE TABLE sample (
   span INTEGER NOT NULL,
   boot_id TEXT NOT NULL,
@@ -26,25 +26,39 @@ CREATE TABLE sample (
   clock_uncertainty_us INTEGER NOT NULL,   -- half-width; -1: there was no estimate
   first_received_at_us INTEGER NOT NULL,
   received_at_us INTEGER NOT NULL,
-  position_m REAL,
-  velocity_m_s REAL,
-  acceleration_m_s2 REAL,
-  duty REAL,
-  impedance_mv REAL,
-  reference_m REAL,
-  mode TEXT NOT NULL,
-  sub_state TEXT NOT NULL,
-  setpoint_m REAL,
-  disturbance_m REAL,
-  position_sd_m REAL,
-  controller_id INTEGER NOT NULL,
-  emergency_id TEXT NOT NULL,
-  emergency_cause TEXT NOT NULL,
-  flags INTEGER NOT NULL,
-  gap_before INTEGER NOT NULL,             -- samples that are missing right before this one
+)sql";
+constexpr int kPlaceColumnCount = 8;
+constexpr const char* kOtherColumns =
+    R"sql(  gap_before INTEGER NOT NULL,             -- samples that are missing right before this one
   gap_after INTEGER NOT NULL,              -- and after it, to the end of its span
   unknown_values TEXT                      -- JSON: numbers of enumerators that are 'unknown'; NULL: there are none
 );
+)sql";
+constexpr int kOtherColumnCount = 3;
+
+template <FieldKind Kind>
+constexpr const char* sql_type() {
+  if (Kind == FieldKind::number) return "REAL";
+  return Kind == FieldKind::count ? "INTEGER NOT NULL" : "TEXT NOT NULL";
+}
+
+std::string create_sample() {
+  std::string sql = kPlaceColumns;
+  for (const SampleField& field : kSampleFields) sql += fmt::format("  {} REAL,\n", field.name);
+  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+    sql += fmt::format("  {} {},\n", field.name, sql_type<BatchField<Value>::kKind>());
+  });
+  return sql + kOtherColumns;
+}
+
+std::string insert_sample() {
+  std::string sql = "INSERT INTO sample VALUES (?";
+  constexpr std::size_t kColumns = kPlaceColumnCount + kSampleFieldCount + kBatchFieldCount + kOtherColumnCount;
+  for (std::size_t column = 1; column < kColumns; ++column) sql += ",?";
+  return sql + ")";
+}
+
+constexpr const char* kTables = R"sql(
 CREATE TABLE audit (                       -- docs/database.md
   entry INTEGER PRIMARY KEY,
   at_us INTEGER,                           -- this to salt: NULL in entries of other robots and of accounts
@@ -135,8 +149,6 @@ constexpr Copy kCopies[] = {
 constexpr std::size_t kReferenceCopies = 3;  // the last ones
 constexpr int kMostReferenceTries = 5;
 
-constexpr const char* kInsert = "INSERT INTO sample VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)";
-
 std::int64_t signed_seq(std::uint64_t seq) { return static_cast<std::int64_t>(seq); }
 
 }  // namespace
@@ -163,7 +175,7 @@ void RunFile::begin() {
   file_->exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF");
   file_->exec(
       fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kRunFileApplicationId, kRunFileVersion));
-  file_->exec(kTables);
+  file_->exec(create_sample() + kTables);
   SQLite::Statement attach{*file_, "ATTACH ? AS store"};
   execute(attach, store_);
 }
@@ -211,7 +223,7 @@ void RunFile::add_gaps(SQLite::Database& database) {
     execute(insert, std::to_string(gap.boot_id), gap.first_seq, gap.last_seq, gap.cause, gap.noticed_at_us);
   }
   gaps_after_ = page.next;
-  if (!gaps_after_) insert_ = std::make_unique<SQLite::Statement>(*file_, kInsert);
+  if (!gaps_after_) insert_ = std::make_unique<SQLite::Statement>(*file_, insert_sample());
 }
 
 bool RunFile::add_samples(SQLite::Database& database) {
@@ -231,22 +243,35 @@ bool RunFile::add_samples(SQLite::Database& database) {
 
 void RunFile::add(const ExportSegment& exported) {
   const Segment& segment = exported.part->segment;
-  const SampleContext& context = segment.context;
   const std::string boot_id = std::to_string(exported.part->boot_id);
-  const std::string emergency_id = std::to_string(context.emergency_id);
-  const std::optional<std::string> unknown = unknown_values(context);
+  bind_shared(segment.context);
   for (std::size_t index = 0; index < segment.samples.size(); ++index) {
-    const Sample& sample = segment.samples[index];
     const std::uint64_t robot_time_us = segment.robot_time_us(index);
-    execute(*insert_, exported.part->span, boot_id, signed_seq(segment.first_seq + index), robot_time_us,
-            static_cast<std::int64_t>(robot_time_us) + segment.utc_offset_us, segment.clock_uncertainty_us,
-            segment.first_received_at_us, segment.received_at_us,  //
-            sample.position_m, sample.velocity_m_s, sample.acceleration_m_s2, sample.duty, sample.impedance_mv,
-            sample.reference_m, protocol::text(context.mode), protocol::text(context.sub_state), context.setpoint_m,
-            context.disturbance_m, context.position_sd_m, context.controller_id, emergency_id,
-            protocol::text(context.emergency_cause), context.flags, signed_seq(index == 0 ? exported.gap_before : 0),
-            signed_seq(index + 1 == segment.samples.size() ? exported.gap_after : 0), unknown);
+    bind_all(*insert_, exported.part->span, boot_id, signed_seq(segment.first_seq + index), robot_time_us,
+             static_cast<std::int64_t>(robot_time_us) + segment.utc_offset_us, segment.clock_uncertainty_us,
+             segment.first_received_at_us, segment.received_at_us);
+    int column = kPlaceColumnCount;
+    for (const float value : values_of(segment.samples[index])) bind_value(*insert_, ++column, value);
+    column += static_cast<int>(kBatchFieldCount);
+    bind_value(*insert_, ++column, signed_seq(index == 0 ? exported.gap_before : 0));
+    bind_value(*insert_, ++column, signed_seq(index + 1 == segment.samples.size() ? exported.gap_after : 0));
+    insert_->exec();
   }
+}
+
+// Values stay bound from row to row.
+void RunFile::bind_shared(const SampleContext& context) {
+  insert_->tryReset();
+  int column = kPlaceColumnCount + static_cast<int>(kSampleFieldCount);
+  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+    const Value& value = context.*field.member;
+    if constexpr (BatchField<Value>::kKind == FieldKind::id) {
+      bind_value(*insert_, ++column, std::to_string(value));
+    } else {
+      bind_value(*insert_, ++column, text_or_value(value));
+    }
+  });
+  bind_value(*insert_, column + kOtherColumnCount, unknown_values(context));
 }
 
 }  // namespace server

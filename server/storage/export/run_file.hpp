@@ -42,6 +42,7 @@ class RunFile {
   void add_gaps(SQLite::Database& database);
   bool add_samples(SQLite::Database& database);
   void add(const ExportSegment& segment);
+  void bind_shared(const SampleContext& context);
 
   std::filesystem::path path_;
   std::string store_;
