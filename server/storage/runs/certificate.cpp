@@ -7,16 +7,19 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <limits>
-#include <string_view>
 #include <tuple>
 
 namespace server {
 namespace {
 
-constexpr std::size_t kMaxSampleBytes = 104;
+constexpr std::size_t kPlaceBytes = 40;  // boot_id, seq, times
+constexpr std::size_t kMaxSampleBytes = [] {
+  std::size_t bytes = kPlaceBytes + 4 * kSampleFieldCount;
+  for_each_batch_field([&](const auto& field) { bytes += field.kKind == FieldKind::id ? 8 : 4; });
+  return bytes;
+}();
 
-std::string_view preamble(int format) { return format == 1 ? "rheonaut-samples-1\n" : "rheonaut-samples-2\n"; }
+std::string preamble(int format) { return fmt::format("rheonaut-samples-{}\n", format); }
 
 class ByteWriter {
  public:
@@ -26,9 +29,10 @@ class ByteWriter {
   void put(Integer value) {
     for (std::size_t byte = 0; byte < sizeof value; ++byte) *at_++ = static_cast<unsigned char>(value >> (8 * byte));
   }
+  // Format 1 had a byte for each enumerator, and 0 for those that it did not know.
   template <class Enumerator>
-  void put_number(Enumerator value) {
-    put(static_cast<std::uint32_t>(value));
+  void put_enumerator(Enumerator value, int format) {
+    format == 1 ? put(static_cast<std::uint8_t>(value)) : put(static_cast<std::uint32_t>(value));
   }
   std::size_t bytes_since(const unsigned char* begin) const { return static_cast<std::size_t>(at_ - begin); }
   void put_float(float value) { put(std::isnan(value) ? 0x7fc00000U : std::bit_cast<std::uint32_t>(value)); }
@@ -37,18 +41,26 @@ class ByteWriter {
   unsigned char* at_;
 };
 
-// Format 1 had a byte for each, and 0 for those that it did not know.
-void write_enumerators_1(ByteWriter& bytes, const SampleContext& context) {
-  bytes.put(static_cast<std::uint8_t>(context.mode));
-  bytes.put(static_cast<std::uint8_t>(context.sub_state));
-  bytes.put(static_cast<std::uint8_t>(context.emergency_cause));
-  bytes.put(std::uint8_t{0});
+// What samples share: numbers, enumerators, counts, ids, each in the order of the table.
+void write_context(ByteWriter& bytes, int format, const SampleContext& context) {
+  const auto is_in = [format](const auto& field) { return field.since_digest <= format; };
+  for_each_batch_field_of<FieldKind::number>([&](const auto& field) {
+    if (is_in(field)) bytes.put_float(or_nan(context.*field.member));
+  });
+  for_each_batch_field_of<FieldKind::enumerator>([&](const auto& field) {
+    if (is_in(field)) bytes.put_enumerator(context.*field.member, format);
+  });
+  if (format == 1) bytes.put(std::uint8_t{0});  // after three bytes of enumerators
+  const auto put = [&](const auto& field) {
+    if (is_in(field)) bytes.put(context.*field.member);
+  };
+  for_each_batch_field_of<FieldKind::count>(put);
+  for_each_batch_field_of<FieldKind::id>(put);
 }
 
 // How many bytes it wrote.
 std::size_t write_sample(unsigned char* into, int format, BootId boot_id, const Segment& segment, std::size_t index) {
   const Sample& sample = segment.samples[index];
-  const SampleContext& context = segment.context;
   const std::uint64_t robot_time_us = segment.robot_time_us(index);
   ByteWriter bytes{into};
   bytes.put(boot_id);
@@ -56,23 +68,10 @@ std::size_t write_sample(unsigned char* into, int format, BootId boot_id, const 
   bytes.put(robot_time_us);
   bytes.put(robot_time_us + std::bit_cast<std::uint64_t>(segment.utc_offset_us));
   bytes.put(std::bit_cast<std::uint64_t>(segment.clock_uncertainty_us));
-  for (const float value : {sample.position_m, sample.velocity_m_s, sample.acceleration_m_s2, sample.duty,
-                            sample.impedance_mv, sample.reference_m}) {
-    bytes.put_float(value);
-  }
-  for (const std::optional<float>& value : {context.setpoint_m, context.disturbance_m, context.position_sd_m}) {
-    bytes.put_float(value.value_or(std::numeric_limits<float>::quiet_NaN()));
-  }
-  if (format == 1) {
-    write_enumerators_1(bytes, context);
-  } else {
-    bytes.put_number(context.mode);
-    bytes.put_number(context.sub_state);
-    bytes.put_number(context.emergency_cause);
-  }
-  bytes.put(context.controller_id);
-  bytes.put(context.flags);
-  bytes.put(context.emergency_id);
+  for_each_sample_field([&](const SampleField& field) {
+    if (field.since_digest <= format) bytes.put_float(sample.*field.member);
+  });
+  write_context(bytes, format, segment.context);
   return bytes.bytes_since(into);
 }
 
@@ -88,7 +87,7 @@ bool Certificate::agrees_with(const Certificate& other) const {
 }
 
 SampleHash::SampleHash(int format) : format_{format} {
-  const std::string_view begin = preamble(format);
+  const std::string begin = preamble(format);
   crypto_hash_sha256_init(&state_);
   crypto_hash_sha256_update(&state_, reinterpret_cast<const unsigned char*>(begin.data()), begin.size());
 }

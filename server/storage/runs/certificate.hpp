@@ -2,13 +2,12 @@
 //
 //   hashed = "rheonaut-samples-2\n" sample*                                 in order of span and seq
 //   sample = boot_id:u64 seq:u64 robot_time_us:u64 utc_us:i64 clock_uncertainty_us:i64
-//            position_m:f32 velocity_m_s:f32 acceleration_m_s2:f32 duty:f32 impedance_mv:f32 reference_m:f32
-//            setpoint_m:f32 disturbance_m:f32 position_sd_m:f32
-//            mode:i32 sub_state:i32 emergency_cause:i32 controller_id:u32 flags:u32 emergency_id:u64     104 bytes
+//            kSampleFields:f32*  numbers:f32* enumerators:i32* counts:u32* ids:u64* of kBatchFields       104 bytes
 //
+// Of the fields (telemetry_fields.hpp) a digest contains those whose since_digest is not above its format.
 // Little-endian; f32 is binary32, a NaN and a value that is not there are 0x7fc00000; enumerators are the numbers of
 // the robot's protocol, also those that this version does not know. Format 1, of runs that were certified before schema
-// 7, has "rheonaut-samples-1\n" and mode:u8 sub_state:u8 emergency_cause:u8 0:u8, 96 bytes. How samples are cut into
+// 7, has "rheonaut-samples-1\n", and each enumerator as u8 with a 0:u8 after them, 96 bytes. How samples are cut into
 // segments and where their rows lie is not in it, so it is the same after a backup, an export or a VACUUM; nor is what
 // people said of the run, which they may change. docs/database.md repeats this for whoever checks it with another
 // program.
@@ -31,7 +30,7 @@
 
 namespace server {
 
-inline constexpr int kCertificateFormat = 2;  // of new ones; those of 1 are verified for ever
+inline constexpr int kCertificateFormat = newest_digest_format();  // of new ones; older ones are verified for ever
 
 struct Certificate {
   int format = kCertificateFormat;
