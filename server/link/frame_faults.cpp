@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/station/state/telemetry_fields.hpp"
+
 namespace server {
 namespace {
 
@@ -51,9 +53,10 @@ void mend(protocol::Telemetry& batch, const FrameReach& reach, FrameFaults& faul
                     kMaxPeriodUs));
     faults.is_unusable = true;
   }
-  if (batch.has_setpoint_m) check_finite(faults, "setpoint_m", batch.setpoint_m, batch.first_seq);
-  check_finite(faults, "disturbance_m", batch.disturbance_m, batch.first_seq);
-  check_finite(faults, "position_sd_m", batch.position_sd_m, batch.first_seq);
+  for_each_batch_field_of<FieldKind::number>([&](const auto& field) {
+    const bool is_there = field.has == nullptr || batch.*field.has;
+    if (is_there) check_finite(faults, field.name, batch.*field.wire, batch.first_seq);
+  });
 }
 
 void mend(protocol::Event& event, const FrameReach& reach, FrameFaults& faults) {

@@ -27,7 +27,12 @@ json clock_json(const RobotState& robot) {
           {"round_trip_us", clock.round_trip_us}};
 }
 
-json decimal_or_null(const std::optional<float>& value) { return value ? decimal(*value) : json(nullptr); }
+json field_json(const std::optional<float>& value) { return value ? decimal(*value) : json(nullptr); }
+json field_json(std::uint64_t id) { return id_text(id); }
+template <class Value>
+json field_json(const Value& value) {
+  return text_or_value(value);
+}
 
 json object_or_null(const std::optional<std::string>& text) { return text ? json::parse(*text) : json(nullptr); }
 
@@ -59,12 +64,9 @@ json id_text(std::uint64_t id) { return id == 0 ? json(nullptr) : json(std::to_s
 json time_or_null(std::int64_t time_us) { return time_us == 0 ? json(nullptr) : json(time_us); }
 
 json to_json(const Sample& sample) {
-  return {{"position_m", decimal(sample.position_m)},
-          {"velocity_m_s", decimal(sample.velocity_m_s)},
-          {"acceleration_m_s2", decimal(sample.acceleration_m_s2)},
-          {"duty", decimal(sample.duty)},
-          {"impedance_mv", decimal(sample.impedance_mv)},
-          {"reference_m", decimal(sample.reference_m)}};
+  json out;
+  for_each_sample_field([&](const SampleField& field) { out[field.name] = decimal(sample.*field.member); });
+  return out;
 }
 
 json to_json(const ControlState& control) {
@@ -102,16 +104,8 @@ json to_json(const RobotState& robot) {
   out["sample_period_us"] = robot.sample_period_us;
   out["ring_capacity"] = robot.ring_capacity;
   out["parameters_checksum"] = robot.parameters_checksum;
-  out["controller_id"] = context.controller_id;
   out["controller_checksum"] = robot.controller_checksum;
-  out["mode"] = protocol::text(context.mode);
-  out["sub_state"] = protocol::text(context.sub_state);
-  out["setpoint_m"] = decimal_or_null(context.setpoint_m);
-  out["disturbance_m"] = decimal_or_null(context.disturbance_m);
-  out["position_sd_m"] = decimal_or_null(context.position_sd_m);
-  out["emergency_id"] = id_text(context.emergency_id);
-  out["emergency_cause"] = protocol::text(context.emergency_cause);
-  out["flags"] = context.flags;
+  for_each_batch_field([&](const auto& field) { out[field.name] = field_json(context.*field.member); });
   out["sample"] = robot.sample ? to_json(*robot.sample) : json(nullptr);
   out["next_seq"] = robot.next_seq;
   out["oldest_seq"] = robot.oldest_seq;
@@ -126,12 +120,8 @@ json to_json(const RobotState& robot) {
   for (const ChangedLimit& limit : robot.changed_limits) out["changed_limits"].push_back(to_json(limit));
   out["model"] = to_json(robot.model);
   out["invalid_values"] = robot.invalid_values;
-  out["unknown_values"] = object_or_null(UnknownValues{}
-                                             .add("reset_cause", robot.reset_cause)
-                                             .add("mode", context.mode)
-                                             .add("sub_state", context.sub_state)
-                                             .add("emergency_cause", context.emergency_cause)
-                                             .text());
+  out["unknown_values"] =
+      object_or_null(UnknownValues{}.add("reset_cause", robot.reset_cause).add_fields_of(context).text());
   out["control"] = robot.control.holder.empty() ? json(nullptr) : to_json(robot.control);
   return out;
 }
@@ -193,23 +183,14 @@ std::string samples_message(const SampleBatch& batch) {
   head["first_seq"] = batch.first_seq;
   head["first_robot_time_us"] = batch.first_robot_time_us;
   head["period_us"] = context.period_us;
-  head["mode"] = protocol::text(context.mode);
-  head["sub_state"] = protocol::text(context.sub_state);
-  head["setpoint_m"] = decimal_or_null(context.setpoint_m);
-  head["disturbance_m"] = decimal_or_null(context.disturbance_m);
-  head["position_sd_m"] = decimal_or_null(context.position_sd_m);
-  head["emergency_id"] = id_text(context.emergency_id);
-  head["flags"] = context.flags;
+  for_each_batch_field([&](const auto& field) {
+    if (field.is_in_live_samples) head[field.name] = field_json(context.*field.member);
+  });
   head["unknown_values"] = object_or_null(unknown_values(context));
   head["backfill"] = (context.flags & rheonaut_TELEMETRY_FLAG_BACKFILL) != 0;
   std::string out = dump(head);
   out.pop_back();  // the closing brace: the columns follow
-  append_column(out, "position_m", batch.samples, &Sample::position_m);
-  append_column(out, "velocity_m_s", batch.samples, &Sample::velocity_m_s);
-  append_column(out, "acceleration_m_s2", batch.samples, &Sample::acceleration_m_s2);
-  append_column(out, "duty", batch.samples, &Sample::duty);
-  append_column(out, "impedance_mv", batch.samples, &Sample::impedance_mv);
-  append_column(out, "reference_m", batch.samples, &Sample::reference_m);
+  for_each_sample_field([&](const SampleField& field) { append_column(out, field.name, batch.samples, field.member); });
   out += '}';
   return out;
 }

@@ -11,23 +11,23 @@
 namespace server {
 namespace {
 
+void append_value(std::string& out, const std::optional<float>& value) { append_float(out, or_nan(value), "null"); }
+void append_value(std::string& out, std::uint32_t value) { append_number(out, value); }
+void append_value(std::string& out, std::uint64_t id) { out += id == 0 ? "null" : fmt::format(R"("{}")", id); }
+template <class Enumerator>
+void append_value(std::string& out, Enumerator value) {
+  out += fmt::format(R"("{}")", protocol::text(value));
+}
+
 // What a sample's object ends with.
 std::string shared_text(const Segment& segment) {
-  const SampleContext& context = segment.context;
-  std::string out = fmt::format(
-      R"(,"clock_uncertainty_us":{},"first_received_at_us":{},"received_at_us":{},"mode":"{}","sub_state":"{}")",
-      segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us, protocol::text(context.mode),
-      protocol::text(context.sub_state));
-  out += R"(,"setpoint_m":)";
-  append_float(out, context.setpoint_m.value_or(NAN), "null");
-  out += R"(,"disturbance_m":)";
-  append_float(out, context.disturbance_m.value_or(NAN), "null");
-  out += R"(,"position_sd_m":)";
-  append_float(out, context.position_sd_m.value_or(NAN), "null");
-  out += fmt::format(R"(,"controller_id":{},"emergency_id":)", context.controller_id);
-  out += context.emergency_id == 0 ? "null" : fmt::format(R"("{}")", context.emergency_id);
-  out += fmt::format(R"(,"emergency_cause":"{}","flags":{},"unknown_values":{}}})",
-                     protocol::text(context.emergency_cause), context.flags, unknown_values(context).value_or("null"));
+  std::string out = fmt::format(R"(,"clock_uncertainty_us":{},"first_received_at_us":{},"received_at_us":{})",
+                                segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us);
+  for_each_batch_field([&](const auto& field) {
+    out += fmt::format(R"(,"{}":)", field.name);
+    append_value(out, segment.context.*field.member);
+  });
+  out += fmt::format(R"(,"unknown_values":{}}})", unknown_values(segment.context).value_or("null"));
   return out;
 }
 
