@@ -7,20 +7,12 @@
 
 import type { SamplesMessage } from './api';
 import { kSpread_sd } from './format';
+import { kBatchNumbers, kSampleFields } from './telemetry_fields';
 
-// position_m is what the controller sees, the disturbance included; estimate_m where the robot believes that it is, and
-// estimate_low_m and estimate_high_m lie two standard deviations below and above that.
-export const kColumns = [
-  'position_m',
-  'estimate_m',
-  'estimate_low_m',
-  'estimate_high_m',
-  'reference_m',
-  'setpoint_m',
-  'duty',
-  'impedance_mv',
-  'velocity_m_s',
-] as const;
+// Every number of a live batch, and what is computed of it: position_m is what the controller sees, the disturbance
+// included; estimate_m where the robot believes that it is, and estimate_low_m and estimate_high_m lie two standard
+// deviations below and above that.
+export const kColumns = [...kSampleFields, ...kBatchNumbers, 'estimate_m', 'estimate_low_m', 'estimate_high_m'] as const;
 export type Column = (typeof kColumns)[number];
 
 // Where the robot believes that it is: what its controller sees, less the disturbance that was injected. null: not known.
@@ -83,17 +75,13 @@ export class SampleRing {
       if (this.slot_index[slot] !== index) this.received += 1;
       this.slot_index[slot] = index;
       this.time_s[slot] = (batch.first_robot_time_us + i * batch.period_us) / 1e6 + this.time_base_s;
+      for (const name of kSampleFields) this.columns[name][slot] = batch[name][i] ?? NaN;
+      for (const name of kBatchNumbers) this.columns[name][slot] = batch[name] ?? NaN;
+      if (batch.setpoint_m === null) this.columns.reference_m[slot] = NaN; // there is nothing that the robot follows
       const estimate_m = estimate_of(batch.position_m[i], batch.disturbance_m) ?? NaN;
-      this.columns.position_m[slot] = batch.position_m[i] ?? NaN;
       this.columns.estimate_m[slot] = estimate_m;
       this.columns.estimate_low_m[slot] = estimate_m - spread_m;
       this.columns.estimate_high_m[slot] = estimate_m + spread_m;
-      // Without a setpoint there is nothing that the robot follows.
-      this.columns.reference_m[slot] = batch.setpoint_m === null ? NaN : (batch.reference_m[i] ?? NaN);
-      this.columns.setpoint_m[slot] = batch.setpoint_m ?? NaN;
-      this.columns.duty[slot] = batch.duty[i] ?? NaN;
-      this.columns.impedance_mv[slot] = batch.impedance_mv[i] ?? NaN;
-      this.columns.velocity_m_s[slot] = batch.velocity_m_s[i] ?? NaN;
     }
     if (first + size - 1 <= this.newest) return; // sent again: the edge is led by new samples alone
     this.newest = first + size - 1;
