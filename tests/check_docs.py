@@ -40,7 +40,7 @@ def event_kinds(root):
     rows = re.findall(r"^\| (`[^|]+) \|", section.group(1), re.M) if section else []
     listed = {kind for row in rows for kind in re.findall(r"`(\w+)`", row)}
     made = set()
-    for source in (root / "server/station").glob("*.cpp"):
+    for source in (root / "server/station").rglob("*.cpp"):
         text = source.read_text(encoding="utf-8")
         made |= set(re.findall(r"\bnote(?:_model)?\([^;\"]*?,\s*\"(\w+)\"", text))
         made |= set(re.findall(r"\brobot, \"(control_\w+)\"", text))

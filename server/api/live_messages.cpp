@@ -10,6 +10,7 @@
 #include "server/api/routes/emergency.hpp"
 #include "server/http/http.hpp"
 #include "server/runtime/counted.hpp"
+#include "server/station/commands/recent_commands.hpp"
 
 namespace server {
 namespace asio = boost::asio;

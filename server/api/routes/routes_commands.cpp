@@ -11,6 +11,7 @@
 #include "server/identity/auth.hpp"
 #include "server/station/station.hpp"
 #include "server/storage/query/history.hpp"
+#include "server/station/commands/recent_commands.hpp"
 
 namespace server {
 namespace asio = boost::asio;

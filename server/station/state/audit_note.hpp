@@ -1,4 +1,4 @@
-// What the audit is told of one act: who, from where, when, what, and what came of it.
+// An entry for the audit of one act: who, from where, when, what, and what came of it.
 //
 // Plain values. Whoever acts on behalf of somebody is given an Author; what is done makes an AuditNote of it, and the
 // recorder, or the store that changes the database, appends it (recording/audit_chain).

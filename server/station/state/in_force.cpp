@@ -43,15 +43,15 @@ std::optional<std::string> ParameterTable::add(const protocol::ParameterPage& pa
                    {"default", decimal(parameter.default_value)}};
   }
   std::string text = table.dump(-1, ' ', false, json::error_handler_t::replace);
-  if (text == told_) return std::nullopt;
-  told_ = std::move(text);
+  if (text == reported_) return std::nullopt;
+  reported_ = std::move(text);
   last_known_ = parameters_;
-  return told_;
+  return reported_;
 }
 
 void ParameterTable::begin_again() {
   parameters_.clear();
-  told_.clear();
+  reported_.clear();
 }
 
 std::vector<ChangedLimit> ParameterTable::changed_limits() const {
@@ -90,10 +90,10 @@ void RobotSettings::begin_again() {
   controller_before.reset();
 }
 
-void RobotSettings::add(const protocol::Controller& told, std::optional<protocol::Controller> former,
+void RobotSettings::add(const protocol::Controller& reported, std::optional<protocol::Controller> former,
                         std::int64_t at_us) {
   controller_before = std::move(former);
-  controller = told;
+  controller = reported;
   controller_at_us = at_us;
   is_controller_current = true;
 }

@@ -1,4 +1,4 @@
-// What a robot says is in force: its parameters and its controller, as JSON for the record.
+// What a robot reports to be in force: its parameters and its controller, as JSON for the record.
 //
 // A robot sends both after each Welcome, and what changed after each change. Loop thread; one for each connection.
 #pragma once
@@ -12,7 +12,7 @@
 
 namespace server {
 
-// Of the robot's parameters, those that bound its motion: only an admin changes them, and says that they mean it.
+// Of the robot's parameters, those that bound its motion: only an admin changes them, with a confirmation.
 bool bounds_motion(const std::string& parameter);
 
 class ParameterTable {
@@ -21,14 +21,14 @@ class ParameterTable {
   // parameter is known and one of them has changed; nothing before. A page that cannot be is passed over.
   std::optional<std::string> add(const protocol::ParameterPage& page);
 
-  // A new connection: what was known stays known, and is current again when the robot has told the whole table.
+  // A new connection: what was known stays known, and is current again when the robot has reported the whole table.
   void begin_again();
   // The table as it was last whole; empty when it never was.
   const std::map<std::string, rheonaut_Parameter>& last_known() const { return last_known_; }
-  bool is_current() const { return !told_.empty(); }
+  bool is_current() const { return !reported_.empty(); }
   // Of the parameters that bound motion, those that differ from their default.
   std::vector<ChangedLimit> changed_limits() const;
-  // The latest that was said of one of them; none yet.
+  // The latest that was reported of one of them; none yet.
   std::optional<float> value(const std::string& name) const {
     const auto found = parameters_.find(name);
     return found == parameters_.end() ? std::nullopt : std::optional{found->second.value};
@@ -38,26 +38,26 @@ class ParameterTable {
   static constexpr std::uint32_t kMost = 256;  // parameters of a robot
 
   std::map<std::string, rheonaut_Parameter> parameters_, last_known_;
-  std::string told_;  // of this connection
+  std::string reported_;  // of this connection
 };
 
 // Whether they are the same bit for bit.
 bool is_same(float a, float b);
 bool is_same(const protocol::Controller& a, const protocol::Controller& b);
 
-// What a robot has said last.
+// What a robot has reported last.
 struct RobotSettings {
   ParameterTable parameters;
-  std::int64_t parameters_at_us = 0;  // UTC, when the table was last told; 0: never
+  std::int64_t parameters_at_us = 0;  // UTC, when the table was last reported; 0: never
   std::optional<protocol::Controller> controller;
   std::int64_t controller_at_us = 0;
-  bool is_controller_current = false;  // said in this connection
+  bool is_controller_current = false;  // reported in this connection
   // What restore_controller brings back: none when the station has not seen it, as after a new connection.
   std::optional<protocol::Controller> controller_before;
 
   void begin_again();
   // `former`: what restore_controller brings back now; none: not known.
-  void add(const protocol::Controller& told, std::optional<protocol::Controller> former, std::int64_t at_us);
+  void add(const protocol::Controller& reported, std::optional<protocol::Controller> former, std::int64_t at_us);
 };
 
 // Coefficients as they were sent, in the order of the message.

@@ -1,6 +1,6 @@
 // The way from the station to one connected robot; a robot session implements it.
 //
-// Loop thread. The station forgets the port in Station::on_disconnected, which the session calls before it ends.
+// Loop thread. The station drops the port in Station::on_disconnected, which the session calls before it ends.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace server {
 
-struct Seat;  // server/station/seat.hpp
+struct RobotEntry;  // server/station/robot_entry.hpp
 
 class RobotPort {
  public:
@@ -42,8 +42,8 @@ class RobotPort {
   virtual void close(const std::string& reason) = 0;
 
  private:
-  friend class Station;
-  Seat* seat_ = nullptr;  // the robot's place in the station, while this port has it
+  friend class RobotTable;
+  RobotEntry* entry_ = nullptr;  // of its robot, while this port is the one that the station uses
 };
 
 }  // namespace server

@@ -1,6 +1,7 @@
 // What a request says besides its command: its key, its age, what to wait for; and control, over the routes.
 #include <gmock/gmock.h>
 
+#include "server/station/commands/recent_commands.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {

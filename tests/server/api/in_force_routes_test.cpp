@@ -3,7 +3,7 @@
 #include <functional>
 #include <semaphore>
 
-#include "server/station/recent_commands.hpp"
+#include "server/station/commands/recent_commands.hpp"
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {

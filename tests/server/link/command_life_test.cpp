@@ -1,4 +1,5 @@
 // What becomes of a command after it was sent: seen in telemetry or not, superseded, asked for again.
+#include "server/station/commands/recent_commands.hpp"
 #include "tests/server/link/link_fixture.hpp"
 
 namespace server {

@@ -1,5 +1,5 @@
 // Control of a robot: one at a time, ended by silence, handed over, forced.
-#include "server/station/authority.hpp"
+#include "server/station/commands/authority.hpp"
 
 #include <gtest/gtest.h>
 
@@ -92,7 +92,7 @@ TEST_F(AuthorityTest, IsHandedOverToWhoHasAsked) {
 TEST_F(AuthorityTest, AWishIsForgottenAfterAWhile) {
   ASSERT_TRUE(authority_.take("r1", "session:1", 300s));
   ASSERT_TRUE(authority_.request("r1", "session:2"));
-  clock_.run_for(kWishLife);
+  clock_.run_for(kRequestLife);
   EXPECT_EQ(authority_.of("r1").wished_by, "");
   EXPECT_FALSE(authority_.hand_over("r1", "session:1"));
 }

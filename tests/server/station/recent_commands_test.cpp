@@ -1,5 +1,5 @@
 // The memory of keyed commands, and their ids.
-#include "server/station/recent_commands.hpp"
+#include "server/station/commands/recent_commands.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // What counts as evidence for each kind of command, and what does not.
-#include "server/station/telemetry_verifier.hpp"
+#include "server/station/commands/telemetry_verifier.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,43 @@
+// Decides who may command which robot, by the leases of Authority and by how old a picture the request was made from.
+//
+// Nothing here is ever asked about an emergency stop. It publishes nothing: a change is returned. Loop thread.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/station/commands/authority.hpp"
+#include "server/station/commands/requests.hpp"
+
+namespace server {
+
+const char* text(ControlAction action);
+
+class CommandAuthority {
+ public:
+  explicit CommandAuthority(Clock& clock) : authority_{clock} {}
+
+  ControlState of(const RobotId& robot) const { return authority_.of(robot); }
+  Result<void> may_use(const RobotId& robot, const std::string& actor) const {
+    return authority_.may_use(robot, actor);
+  }
+
+  // conflict when the command needs control of the robot and another has it.
+  Result<void> may_command(const CommandRequest& request) const;
+  // conflict when what its page saw was too old for what the command would do.
+  Result<void> check_sight(const CommandRequest& request) const;
+  // A command has been sent: whoever commands a robot that nobody controls takes control. The change, if there is one.
+  std::optional<Authority::Change> on_commanded(const CommandRequest& request);
+
+  // What a request for control changes, if anything.
+  Result<std::optional<Authority::Change>> change(const ControlRequest& request);
+  // A sign of life of an actor.
+  void keep(const std::string& actor, microseconds age);
+  std::vector<Authority::Change> expire() { return authority_.expire(); }
+
+ private:
+  Authority authority_;
+};
+
+}  // namespace server

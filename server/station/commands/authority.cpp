@@ -1,0 +1,130 @@
+// A lease a robot, ended by time, by its holder or by force.
+#include "server/station/commands/authority.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace server {
+namespace {
+
+std::unexpected<Error> held_by(const RobotId& robot, const std::string& holder) {
+  return fail(ErrorCode::conflict,
+              fmt::format("robot '{}' is controlled by {}; ask for control, or wait until it ends", robot, holder),
+              "not_in_control");
+}
+
+}  // namespace
+
+ControlState Authority::of(const RobotId& robot) const {
+  const auto found = leases_.find(robot);
+  const std::int64_t now_us = clock_.steady_us();
+  if (found == leases_.end() || found->second.ends_us <= now_us) return {};
+  const Lease& lease = found->second;
+  return {lease.holder, lease.taken_at_us, lease.request_ends_us > now_us ? lease.requested_by : std::string{}};
+}
+
+Authority::Lease* Authority::lease_of(const RobotId& robot) {
+  const auto found = leases_.find(robot);
+  return found == leases_.end() || found->second.ends_us <= clock_.steady_us() ? nullptr : &found->second;
+}
+
+Authority::Lease& Authority::give(const RobotId& robot, const std::string& actor, microseconds life) {
+  Lease& lease = leases_[robot];
+  lease = Lease{actor, clock_.utc_us(), clock_.steady_us() + life.count(), life, "", 0};
+  return lease;
+}
+
+Result<Authority::Lease*> Authority::own_lease(const RobotId& robot, const std::string& actor) {
+  Lease* lease = lease_of(robot);
+  if (lease == nullptr) {
+    return fail(ErrorCode::conflict, fmt::format("nobody controls robot '{}'", robot), "not_in_control");
+  }
+  if (lease->holder != actor) return held_by(robot, lease->holder);
+  return lease;
+}
+
+Result<void> Authority::may_use(const RobotId& robot, const std::string& actor) const {
+  const ControlState now = of(robot);
+  if (now.holder.empty() || now.holder == actor) return {};
+  return held_by(robot, now.holder);
+}
+
+Result<std::optional<Authority::Change>> Authority::use(const RobotId& robot, const std::string& actor) {
+  Lease* lease = lease_of(robot);
+  if (lease == nullptr || lease->holder != actor) return take(robot, actor, kControlLife);
+  lease->ends_us = std::max(lease->ends_us, clock_.steady_us() + kControlLife.count());
+  return std::nullopt;
+}
+
+Result<std::optional<Authority::Change>> Authority::take(const RobotId& robot, const std::string& actor,
+                                                         microseconds life) {
+  Lease* lease = lease_of(robot);
+  // SAFETY: control is never shared, and never changes hands behind its holder's back.
+  if (lease != nullptr && lease->holder != actor) return held_by(robot, lease->holder);
+  if (lease != nullptr) {
+    lease->life = life;
+    lease->ends_us = clock_.steady_us() + life.count();
+    return std::nullopt;
+  }
+  give(robot, actor, life);
+  return Change{robot, "control_taken", "by " + actor};
+}
+
+Authority::Change Authority::take_by_force(const RobotId& robot, const std::string& actor, const std::string& reason) {
+  const Lease* lease = lease_of(robot);
+  const std::string from = lease == nullptr ? "nobody" : lease->holder;
+  give(robot, actor, kControlLife);
+  return {robot, "control_forced", fmt::format("by {} from {}: {}", actor, from, reason)};
+}
+
+Result<Authority::Change> Authority::release(const RobotId& robot, const std::string& actor) {
+  const auto lease = own_lease(robot, actor);
+  if (!lease) return std::unexpected{lease.error()};
+  leases_.erase(robot);
+  return Change{robot, "control_released", "by " + actor};
+}
+
+Result<Authority::Change> Authority::request(const RobotId& robot, const std::string& actor) {
+  Lease* lease = lease_of(robot);
+  if (lease == nullptr) {
+    return fail(ErrorCode::conflict, fmt::format("nobody controls robot '{}'; take control", robot), "control_is_free");
+  }
+  if (lease->holder == actor) return fail(ErrorCode::conflict, "you are in control already", "in_control");
+  lease->requested_by = actor;
+  lease->request_ends_us = clock_.steady_us() + kRequestLife.count();
+  return Change{robot, "control_requested", fmt::format("by {} from {}", actor, lease->holder)};
+}
+
+Result<Authority::Change> Authority::hand_over(const RobotId& robot, const std::string& actor) {
+  const auto lease = own_lease(robot, actor);
+  if (!lease) return std::unexpected{lease.error()};
+  if ((*lease)->request_ends_us <= clock_.steady_us()) {
+    return fail(ErrorCode::conflict, fmt::format("nobody has asked for control of robot '{}'", robot), "not_requested");
+  }
+  const std::string to = (*lease)->requested_by;
+  give(robot, to, kControlLife);
+  return Change{robot, "control_handed_over", fmt::format("by {} to {}", actor, to)};
+}
+
+void Authority::keep_alive(const std::string& actor) {
+  const std::int64_t now_us = clock_.steady_us();
+  for (auto& [robot, lease] : leases_) {
+    // SAFETY: what has ended stays ended.
+    const bool is_own = lease.holder == actor && lease.ends_us > now_us;
+    if (is_own) lease.ends_us = std::max(lease.ends_us, now_us + lease.life.count());
+  }
+}
+
+std::vector<Authority::Change> Authority::expire() {
+  std::vector<Change> changes;
+  std::erase_if(leases_, [&changes, now_us = clock_.steady_us()](const auto& entry) {
+    const auto& [robot, lease] = entry;
+    if (lease.ends_us > now_us) return false;
+    changes.push_back({robot, "control_expired", lease.holder + " has gone silent"});
+    return true;
+  });
+  return changes;
+}
+
+}  // namespace server

@@ -1,0 +1,78 @@
+// Who may command which robot: control is a lease that one actor holds, for as long as it shows that it is there.
+//
+// An actor is a session of a page ("session:3") or a token ("token:local"). Whoever commands a robot that nobody
+// controls takes control by it. Nothing here is ever asked about an emergency stop. Loop thread; bookkeeping only: the
+// station reports what changes.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/runtime/clock.hpp"
+#include "server/runtime/result.hpp"
+#include "server/station/commands/requests.hpp"
+#include "server/station/state/station_state.hpp"
+
+namespace server {
+
+inline constexpr microseconds kRequestLife{30'000'000};  // of a request for control
+
+class Authority {
+ public:
+  // A change of who holds control, in words for the log of the robot.
+  struct Change {
+    RobotId robot_id;
+    std::string kind;   // control_taken, control_released, control_expired, control_forced, control_handed_over, …
+    std::string cause;  // who, from whom, why
+  };
+
+  explicit Authority(Clock& clock) : clock_{clock} {}
+
+  // Who holds control now; no holder: nobody.
+  ControlState of(const RobotId& robot) const;
+
+  // Whether a command of the actor would be let through; conflict when another holds control.
+  Result<void> may_use(const RobotId& robot, const std::string& actor) const;
+
+  // For a command of the actor: control is its own afterwards, at least for kControlLife. conflict when another holds
+  // it.
+  Result<std::optional<Change>> use(const RobotId& robot, const std::string& actor);
+
+  // `life` is how long it lasts without a sign of life. A page gives one by keep_alive() several times a second.
+  Result<std::optional<Change>> take(const RobotId& robot, const std::string& actor, microseconds life);
+  // From whoever has it. The API lets only an admin do this; the reason is kept.
+  Change take_by_force(const RobotId& robot, const std::string& actor, const std::string& reason);
+  Result<Change> release(const RobotId& robot, const std::string& actor);
+  // Asks the holder for it. conflict when nobody holds it: take it.
+  Result<Change> request(const RobotId& robot, const std::string& actor);
+  // To whoever has asked for it.
+  Result<Change> hand_over(const RobotId& robot, const std::string& actor);
+
+  // Everything that the actor holds lasts for its life from now.
+  void keep_alive(const std::string& actor);
+
+  // Ends what has ended, and returns it.
+  std::vector<Change> expire();
+
+ private:
+  struct Lease {
+    std::string holder;
+    std::int64_t taken_at_us = 0;  // UTC
+    std::int64_t ends_us = 0;      // steady
+    microseconds life{0};
+    std::string requested_by;
+    std::int64_t request_ends_us = 0;  // steady
+  };
+
+  Lease* lease_of(const RobotId& robot);  // null when nobody holds it now
+  Lease& give(const RobotId& robot, const std::string& actor, microseconds life);
+  Result<Lease*> own_lease(const RobotId& robot, const std::string& actor);
+
+  Clock& clock_;
+  std::map<RobotId, Lease> leases_;  // of known robots only
+};
+
+}  // namespace server

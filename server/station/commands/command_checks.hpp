@@ -1,0 +1,21 @@
+// The checks that every command passes before it is sent: envelope and preconditions. Pure.
+#pragma once
+
+#include "server/config/envelope.hpp"
+#include "server/runtime/result.hpp"
+#include "server/station/commands/orders_ahead.hpp"
+#include "server/station/state/station_state.hpp"
+
+namespace server {
+
+bool moves_the_motor(const protocol::Command& command);
+
+// False for what commands nothing: whoever may command at all may send it.
+bool needs_control(const protocol::Command& command);
+
+// invalid for a value outside the limits, conflict when the robot's state forbids the command now. `ahead`: what is on
+// its way to the robot, or waits there. Judges nothing that only the robot can know; the robot checks everything again.
+Result<void> check_command(const protocol::Command& command, const RobotState& robot, const Envelope& envelope,
+                           const OrdersAhead& ahead);
+
+}  // namespace server

@@ -1,0 +1,63 @@
+// What people and scripts may ask the station for: a command, an emergency stop, control of a robot.
+//
+// Plain values. An actor is a session of a page ("session:3") or a token ("token:local").
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/runtime/clock.hpp"
+#include "server/station/state/station_state.hpp"
+
+namespace server {
+
+inline constexpr microseconds kControlLife{3'000'000};       // after the holder's last sign of life
+inline constexpr microseconds kLongestControl{600'000'000};  // that a script may ask for
+inline constexpr microseconds kOldestSight{400'000};         // of what a page has seen, to take or keep anything
+inline bool is_fresh(microseconds age) { return age >= microseconds{0} && age <= kOldestSight; }
+
+// A request to command a robot. `action` has its action member set; the station fills id, boot and validity.
+struct CommandRequest {
+  RobotId robot_id;
+  protocol::Command action = rheonaut_Command_init_zero;
+  std::string arguments = "{}";  // as JSON, for the record
+  std::string actor;
+  std::string peer;                   // the address that it came from
+  microseconds life{2'000'000};       // its time to live, at most 10 s, from when it was issued
+  microseconds age{0};                // it was issued so long before it arrived
+  std::string life_from = "arrival";  // how that is known, see CommandRecord
+  microseconds unread{0};             // the station stood still: it may have waited for so long before it was read
+  std::string key;                    // of the client, new for each command; a request that is repeated sends nothing
+  std::int64_t received_us = 0;       // steady, when it arrived at the station; 0: now
+  bool until_verified = false;        // wait for more than the robot's answer
+  bool takes_control = true;          // of a robot that nobody controls
+};
+
+struct StopRequest {
+  RobotId robot_id;
+  std::string actor;
+  std::string peer;              // as above
+  std::string key;               // as above: one press may come by two ways
+  std::int64_t received_us = 0;  // as above
+};
+
+struct StopsOfAll {
+  std::vector<CommandRecord> records;
+  std::vector<RobotId> failed;    // the station could not take their stop; its log says why
+  std::vector<RobotId> left_out;  // retired and not connected
+};
+
+enum class ControlAction : std::uint8_t { take, force, release, request, hand_over };
+
+struct ControlRequest {
+  RobotId robot_id;
+  std::string actor;
+  std::string peer;  // the address that it came from
+  ControlAction action = ControlAction::take;
+  microseconds life{kControlLife};  // take: without a sign of life; at most kLongestControl
+  std::string reason;               // force: why
+  microseconds age{0};              // take, force: of what its page saw; above kOldestSight it begins nothing
+};
+
+}  // namespace server

@@ -1,0 +1,226 @@
+// What people and scripts ask for: commands, emergency stops, control. Each is checked, carried out and followed.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <boost/asio/post.hpp>
+#include <set>
+#include <utility>
+
+#include "server/station/commands/command_checks.hpp"
+#include "server/station/station.hpp"
+#include "server/station/station_parts.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr microseconds kMaxLife{protocol::kMaxCommandLifeUs};
+constexpr microseconds kPatience{2'000'000};  // with the answer, after the life has ended
+constexpr microseconds kSeenPatience{6'000'000};
+constexpr microseconds kWatchInterval{200'000};
+
+Error unknown_robot(const RobotId& id) {
+  return {ErrorCode::not_found, fmt::format("no robot '{}' is known", id), "unknown_robot"};
+}
+
+// A robot refuses what would come after the command's life.
+Result<void> check_time(const PendingCommand& pending, const RobotState& robot) {
+  const protocol::Command& wire = pending.wire;
+  if (!wire.has_execute_at_robot_us || wire.execute_at_robot_us <= wire.valid_until_robot_us) return {};
+  return fail(
+      ErrorCode::invalid,
+      fmt::format("execute_at_robot_us = {} lies {} ms after the end of the command's life, which is counted in "
+                  "the time of robot '{}', now at least {}; life_ms must reach it",
+                  wire.execute_at_robot_us, (wire.execute_at_robot_us - wire.valid_until_robot_us) / 1000 + 1, robot.id,
+                  robot.latest_robot_time_us),
+      "out_of_range");
+}
+
+// What speaks against the request; nothing is sent then.
+Result<void> check_request(const CommandRequest& request, const protocol::Command& wire, const RobotEntry& entry,
+                           const Envelope& envelope) {
+  if (request.life <= microseconds{0} || request.life > kMaxLife) {
+    return fail(ErrorCode::invalid, fmt::format("life = {} ms is outside 1 to 10000", request.life.count() / 1000),
+                "out_of_range");
+  }
+  if (entry.port == nullptr) {
+    return fail(ErrorCode::not_connected, fmt::format("robot '{}' is not connected", request.robot_id),
+                "not_connected");
+  }
+  // SAFETY: which setpoint is in force, or where the robot has come to, no hello says.
+  const bool is_shown = entry.orders.next_sample_at_robot_us() != entry.connected_at_robot_us;
+  const bool is_compared = entry.robot.context.mode == rheonaut_MODE_AUTO || entry.robot.sample;
+  if (setpoint_of(wire) && is_compared && !is_shown) {
+    return fail(ErrorCode::invalid,
+                fmt::format("robot '{}' has just connected, and what a step counts from is not known before its next "
+                            "telemetry",
+                            request.robot_id),
+                "step_too_large");
+  }
+  return check_command(wire, entry.robot, envelope, entry.orders_ahead(&wire));
+}
+
+void note_timed(TimedOrders& timed, const PendingCommand& pending) {
+  if (!pending.is_timed_order()) return;
+  timed.by = pending.record.actor;
+  timed.until_robot_us = std::max(timed.until_robot_us, pending.wire.execute_at_robot_us);
+}
+
+// SAFETY: what was refused, also by a full queue, or came too late, takes no control.
+void take_control(StationParts& parts, const CommandRequest& request, PendingCommand& sent) {
+  if (!request.takes_control) return;
+  if (const auto change = parts.control.on_commanded(request)) parts.publish(*change, request.actor, request.peer);
+  sent.is_by_holder = parts.control.of(request.robot_id).holder == request.actor;
+}
+
+// Checks the request and gives it to the link. An error: nothing was sent. What came too late has ended already.
+Result<std::shared_ptr<PendingCommand>> send_command(StationParts& parts, RobotEntry& entry,
+                                                     const CommandRequest& request) {
+  // SAFETY: whoever is not in control moves nothing, page, script or experiment.
+  if (auto held = parts.control.may_command(request); !held) return std::unexpected{held.error()};
+  // SAFETY: what waits on the robot for whoever was in control before is dropped ahead of this command, or it is not
+  // sent.
+  const bool is_clear = !needs_control(request.action) || parts.drop_outdated(entry);
+  auto pending = make_pending(parts.loop, parts.clock, request, entry.robot);
+  const auto checked = check_request(request, pending->wire, entry, parts.envelope);
+  if (!checked) return std::unexpected{checked.error()};
+  // SAFETY: what was issued longer ago than its life is not sent, and is accounted for.
+  if (request.age >= request.life) {
+    parts.tracker.end(*pending, CommandState::expired, "too_old_on_arrival");
+    return pending;
+  }
+  if (auto seen = parts.control.check_sight(request); !seen) return std::unexpected{seen.error()};
+  if (auto reached = check_time(*pending, entry.robot); !reached) return std::unexpected{reached.error()};
+  parts.tracker.supersede_queued(entry, *pending);
+  if (!is_clear || !entry.port->send(pending->wire, pending->deadline_us)) {
+    return fail(ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),
+                "queue_full");
+  }
+  take_control(parts, request, *pending);
+  note_timed(entry.timed, *pending);
+  entry.commands.add(pending);
+  parts.notifier.publish(pending->record);
+  return pending;
+}
+
+// The stops were handed to their links; now they are recorded. One that fails keeps no other from it.
+void publish_stops(SinkNotifier& notifier, const RobotTable& robots, const std::vector<CommandRecord>& records,
+                   std::vector<RobotId>& failed) {
+  std::set<RobotId> published;
+  for (const CommandRecord& record : records) {
+    try {
+      notifier.publish(record);
+      if (published.insert(record.robot_id).second) notifier.publish(robots.states().at(record.robot_id));
+    } catch (const std::exception& error) {
+      spdlog::error("emergency stop of robot '{}': {}", record.robot_id, error.what());
+      if (std::ranges::find(failed, record.robot_id) == failed.end()) failed.push_back(record.robot_id);
+    }
+  }
+}
+
+}  // namespace
+
+asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
+  RobotEntry* const known = parts_->robots.find(request.robot_id);
+  if (known == nullptr) co_return parts_->refuse(request, unknown_robot(request.robot_id));
+  if (request.action.which_action == rheonaut_Command_emergency_stop_tag) {
+    StopRequest stop{request.robot_id, request.actor, request.peer, request.key, request.received_us};
+    co_return co_await emergency_stop(std::move(stop), request.life);
+  }
+  // SAFETY: what moves, and waited while the station stood still, is as old as that.
+  if (moves_the_motor(request.action)) request.age = std::max(request.age, request.unread);
+  RobotEntry& entry = *known;
+  CommandTracker& tracker = parts_->tracker;
+  const microseconds patience = request.life + (request.until_verified ? kSeenPatience : kPatience);
+  if (!request.key.empty()) {
+    const auto same = tracker.find_same(request, entry);
+    if (!same) co_return parts_->refuse(request, same.error());
+    if (*same != nullptr) co_return co_await tracker.follow(*same, request.until_verified, patience);
+  }
+  const auto sent = send_command(*parts_, entry, request);
+  if (!sent) co_return parts_->refuse(request, sent.error());
+  co_return co_await tracker.follow(*sent, request.until_verified, patience);
+}
+
+asio::awaitable<Result<CommandRecord>> Station::emergency_stop(StopRequest request, microseconds patience) {
+  RobotEntry* entry = parts_->robots.find(request.robot_id);
+  if (entry == nullptr) {
+    Error error = unknown_robot(request.robot_id);
+    note_refusal({request.actor, request.peer, parts_->clock.utc_us()}, request.robot_id, "command",
+                 R"({"kind":"emergency_stop"})", error);
+    co_return std::unexpected{std::move(error)};
+  }
+  std::vector<CommandRecord> records;
+  const auto stop = parts_->stops.begin(*entry, request, records);
+  parts_->publish_all(records);
+  if (!records.empty()) parts_->notifier.publish(entry->robot);
+  const bool is_connected = entry->port != nullptr;
+  auto outcome = co_await parts_->tracker.follow(stop, false, patience);
+  // The log can wait: it is written once the answer has gone.
+  asio::post(parts_->loop, [request = std::move(request), record = *outcome, is_connected] {
+    const char* state = is_connected ? text(record.state) : "kept until it returns";
+    spdlog::warn("emergency stop of robot '{}' by {}: {}", request.robot_id, request.actor, state);
+  });
+  co_return outcome;
+}
+
+asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds patience) {
+  const std::int64_t deadline_us = parts_->clock.steady_us() + patience.count();
+  std::vector<std::pair<std::shared_ptr<PendingCommand>, bool>> stops;  // and whether the robot is there
+  std::vector<CommandRecord> records;  // published once every frame has been handed over
+  StopsOfAll outcome;
+  for (auto& [id, entry] : parts_->robots.entries()) {
+    if (parts_->stops.may_be_left_out(entry)) {
+      outcome.left_out.push_back(id);
+      continue;
+    }
+    try {
+      stops.emplace_back(parts_->stops.begin(entry, request, records), entry.port != nullptr);
+    } catch (const std::exception& error) {  // SAFETY: the others are stopped all the same
+      spdlog::error("emergency stop of robot '{}': {}", id, error.what());
+      outcome.failed.push_back(id);
+    }
+  }
+  publish_stops(parts_->notifier, parts_->robots, records, outcome.failed);
+  spdlog::warn("emergency stop of all {} robots by {}; {} retired ones are not connected and left out", stops.size(),
+               request.actor, outcome.left_out.size());
+  for (const auto& [stop, is_connected] : stops) {
+    const microseconds left{is_connected ? std::max<std::int64_t>(deadline_us - parts_->clock.steady_us(), 0) : 0};
+    if (left.count() > 0) co_await parts_->tracker.follow(stop, false, left);
+    const bool has_failed = std::ranges::find(outcome.failed, stop->record.robot_id) != outcome.failed.end();
+    if (!has_failed) outcome.records.push_back(stop->record);
+  }
+  co_return outcome;
+}
+
+Result<ControlState> Station::control(const ControlRequest& request) {
+  RobotEntry* entry = parts_->robots.find(request.robot_id);
+  if (entry != nullptr) parts_->drop_outdated(*entry);
+  Result<std::optional<Authority::Change>> change = std::unexpected{unknown_robot(request.robot_id)};
+  if (entry != nullptr) change = parts_->control.change(request);
+  if (!change) {
+    note_refusal({request.actor, request.peer, parts_->clock.utc_us()}, request.robot_id, "control",
+                 fmt::format(R"({{"wish":"{}"}})", text(request.action)), change.error());
+    return std::unexpected{change.error()};
+  }
+  if (*change) parts_->publish(**change, request.actor, request.peer);
+  return parts_->control.of(request.robot_id);
+}
+
+void Station::keep_control(const std::string& actor, microseconds age) { parts_->control.keep(actor, age); }
+
+asio::awaitable<void> Station::watch_control() {
+  for (;;) {
+    co_await parts_->clock.sleep_for(kWatchInterval);
+    for (const Authority::Change& change : parts_->control.expire()) parts_->publish(change, "station", "");
+  }
+}
+
+void Station::note_refusal(Author by, const RobotId& robot_id, const char* what, std::string detail,
+                           const Error& error) {
+  parts_->publish_refusal(std::move(by), robot_id, what, detail, error);
+}
+
+}  // namespace server

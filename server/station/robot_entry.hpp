@@ -1,0 +1,48 @@
+// What the station holds of one robot beside its public state: its connection, its commands, and what it has reported.
+//
+// Plain data of parts that know nothing of each other; the parts of the station act on it. Lives as long as the
+// station.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "server/station/commands/order_timeline.hpp"
+#include "server/station/commands/robot_commands.hpp"
+#include "server/station/event_limit.hpp"
+#include "server/station/reported_configuration.hpp"
+#include "server/station/state/robot_port.hpp"
+
+namespace server {
+
+inline constexpr std::int64_t kEventPeriodUs = 10'000'000;  // of refusals, and of values that cannot be
+
+// Timed commands that may wait on the robot: whose they are (empty: nobody's), and until when one of them may.
+struct TimedOrders {
+  std::string by;
+  std::uint64_t until_robot_us = 0;
+  const char* drop_because = nullptr;  // why they have to be dropped; null: they need not
+  bool has_lost_a_step = false;        // the robot dropped a setpoint of its own accord: another may have built on it
+  CommandId drop_id = 0;               // that drops them, until it is acknowledged; 0: none
+};
+
+struct RobotEntry {
+  explicit RobotEntry(RobotState& of) : robot{of} {}
+
+  OrdersAhead orders_ahead(const protocol::Command* newer = nullptr) const {
+    return orders.ahead(robot, commands, newer);
+  }
+
+  RobotState& robot;
+  RobotPort* port = nullptr;  // null while disconnected
+  RobotCommands commands;
+  OrderTimeline orders;
+  TimedOrders timed;
+  ReportedConfiguration reported;
+  std::uint64_t connected_at_robot_us = 0;    // by its hello
+  std::uint64_t latch_known_at_robot_us = 0;  // older telemetry says nothing about the latch
+  EventLimit refusals{kEventPeriodUs};
+  EventLimit invalid_values{kEventPeriodUs};
+};
+
+}  // namespace server

@@ -1,0 +1,66 @@
+#include "server/station/sink_notifier.hpp"
+
+#include <utility>
+
+#include "server/station/state/unknown_values.hpp"
+
+namespace server {
+
+void SinkNotifier::publish(const RobotState& robot) {
+  for (StationSink* sink : sinks_) sink->on_robot(robot);
+}
+
+void SinkNotifier::publish(const CommandRecord& record) {
+  for (StationSink* sink : sinks_) sink->on_command(record);
+}
+
+void SinkNotifier::publish(const AuditNote& audit) {
+  for (StationSink* sink : sinks_) sink->on_audit(audit);
+}
+
+void SinkNotifier::publish(const RobotState& robot, const SampleBatch& batch) {
+  for (StationSink* sink : sinks_) sink->on_samples(robot, batch);
+}
+
+void SinkNotifier::publish(const RobotState& robot, const RobotEvent& event) {
+  for (StationSink* sink : sinks_) sink->on_event(robot, event);
+}
+
+void SinkNotifier::publish(const RobotState& robot, const ClockRecord& record) {
+  for (StationSink* sink : sinks_) sink->on_clock(robot, record);
+}
+
+void SinkNotifier::publish(const RobotState& robot, const InForceRecord& record) {
+  for (StationSink* sink : sinks_) sink->on_in_force(robot, record);
+}
+
+void SinkNotifier::publish_fluid(const RobotState& robot) {
+  for (StationSink* sink : sinks_) sink->on_fluid(robot);
+}
+
+void SinkNotifier::publish_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) {
+  for (StationSink* sink : sinks_) sink->on_unusable_samples(robot, first_seq, next_seq);
+}
+
+void SinkNotifier::publish_unusable_event(const RobotState& robot, std::uint64_t event_seq) {
+  for (StationSink* sink : sinks_) sink->on_unusable_event(robot, event_seq);
+}
+
+void SinkNotifier::note(const RobotState& robot, std::string kind, std::string detail, std::string cause) {
+  RobotEvent event;
+  event.robot_id = robot.id;
+  event.boot_id = robot.boot_id;
+  event.kind = std::move(kind);
+  event.cause = std::move(cause);
+  event.detail = std::move(detail);
+  event.emergency_id = robot.context.emergency_id;
+  event.emergency_cause = robot.context.emergency_cause;
+  event.unknown_values = unknown_values(robot.context);
+  event.mode = robot.context.mode;
+  event.sub_state = robot.context.sub_state;
+  event.robot_time_us = robot.latest_robot_time_us;
+  event.received_at_us = clock_.utc_us();
+  publish(robot, event);
+}
+
+}  // namespace server

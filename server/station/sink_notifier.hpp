@@ -1,0 +1,41 @@
+// Hands everything that happens to the sinks: the recorder, the live feed, the runs.
+//
+// Sinks are called in the order in which they were added, and outlive this. What one throws reaches the caller.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/runtime/clock.hpp"
+#include "server/station/state/station_sink.hpp"
+
+namespace server {
+
+class SinkNotifier {
+ public:
+  explicit SinkNotifier(Clock& clock) : clock_{clock} {}
+
+  void add(StationSink& sink) { sinks_.push_back(&sink); }
+
+  void publish(const RobotState& robot);
+  void publish(const CommandRecord& record);
+  void publish(const AuditNote& audit);
+  void publish(const RobotState& robot, const SampleBatch& batch);
+  void publish(const RobotState& robot, const RobotEvent& event);
+  void publish(const RobotState& robot, const ClockRecord& record);
+  void publish(const RobotState& robot, const InForceRecord& record);
+  void publish_fluid(const RobotState& robot);
+  void publish_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq);
+  void publish_unusable_event(const RobotState& robot, std::uint64_t event_seq);
+
+  // An event of the station itself about a robot. Its kind has a row in docs/database.md: tests/check_docs.py compares
+  // the table with the literals of the calls.
+  void note(const RobotState& robot, std::string kind, std::string detail, std::string cause = "none");
+
+ private:
+  Clock& clock_;
+  std::vector<StationSink*> sinks_;
+};
+
+}  // namespace server

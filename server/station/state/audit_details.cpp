@@ -1,0 +1,26 @@
+#include "server/station/state/audit_details.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "server/station/state/audit_note.hpp"
+
+namespace server {
+
+std::string refusal_detail(const std::string& request, const std::string& problem, const std::string& reason) {
+  constexpr std::size_t kMaxProblemBytes = 300;
+  nlohmann::json detail = nlohmann::json::parse(request, nullptr, false);
+  if (!detail.is_object()) detail = nlohmann::json::object();
+  detail["problem"] = problem.substr(0, kMaxProblemBytes);
+  if (!reason.empty()) detail["reason"] = reason;
+  return audit_detail(detail);
+}
+
+std::string control_detail(const std::string& cause, const std::string& holder) {
+  return audit_detail({{"cause", cause}, {"holder", holder}});
+}
+
+std::string fluid_detail(const std::string& before) { return audit_detail({{"before", before}}); }
+
+std::string refused_fluid(const std::string& fluid) { return nlohmann::json{{"fluid", fluid}}.dump(); }
+
+}  // namespace server

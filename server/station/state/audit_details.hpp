@@ -1,0 +1,16 @@
+// What the entries of the audit say in detail of acts that the station decides; as JSON, see AuditNote::detail.
+#pragma once
+
+#include <string>
+
+namespace server {
+
+// A request that was refused: what is known of it, as a JSON object, with the problem, and the reason if there is one.
+// Of what somebody else says only the beginning is kept: it may be anything.
+std::string refusal_detail(const std::string& request, const std::string& problem, const std::string& reason);
+
+std::string control_detail(const std::string& cause, const std::string& holder);
+std::string fluid_detail(const std::string& before);
+std::string refused_fluid(const std::string& fluid);  // the request of a refusal
+
+}  // namespace server

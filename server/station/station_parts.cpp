@@ -1,0 +1,52 @@
+#include "server/station/station_parts.hpp"
+
+#include <fmt/format.h>
+
+#include <string_view>
+
+#include "server/station/state/audit_details.hpp"
+
+namespace server {
+
+void StationParts::publish(const Authority::Change& change, const std::string& actor, const std::string& peer) {
+  RobotEntry* entry = robots.find(change.robot_id);
+  if (entry == nullptr) return;
+  RobotState& robot = entry->robot;
+  robot.control = control.of(robot.id);
+  drop_outdated(*entry);
+  notifier.note(robot, change.kind, change.cause);
+  AuditNote audit;
+  audit.by = {actor, peer, clock.utc_us()};
+  audit.robot_id = robot.id;
+  audit.action = "control." + change.kind.substr(std::string_view{"control_"}.size());
+  audit.detail = control_detail(change.cause, robot.control.holder);
+  notifier.publish(audit);
+  notifier.publish(robot);
+}
+
+void StationParts::publish_all(const std::vector<CommandRecord>& records) {
+  for (const CommandRecord& record : records) notifier.publish(record);
+}
+
+void StationParts::publish_refusal(Author by, const RobotId& robot_id, const char* what, const std::string& detail,
+                                   const Error& error) {
+  constexpr std::size_t kMaxNameBytes = 40;
+  AuditNote note;
+  note.by = std::move(by);
+  note.robot_id = robots.find(robot_id) != nullptr ? robot_id : "";
+  note.action = std::string{what} + ".refused";
+  note.subject = robot_id.substr(0, kMaxNameBytes);
+  note.detail = refusal_detail(detail, error.detail, error.reason);
+  note.can_flood = true;
+  notifier.publish(note);
+}
+
+// Nothing is sent, and the audit gets an entry.
+std::unexpected<Error> StationParts::refuse(const CommandRequest& request, Error error) {
+  const char* kind = protocol::kind(request.action);
+  publish_refusal({request.actor, request.peer, clock.utc_us()}, request.robot_id, "command",
+                  fmt::format(R"({{"kind":"{}","arguments":{}}})", kind, request.arguments), error);
+  return std::unexpected{std::move(error)};
+}
+
+}  // namespace server

@@ -1,0 +1,56 @@
+// What the station is made of: the parts behind Station, each with its job, and what they share.
+//
+// Private to the Station's own files. A part declared later may use those before it.
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/config/envelope.hpp"
+#include "server/config/link_settings.hpp"
+#include "server/station/command_authority.hpp"
+#include "server/station/command_tracker.hpp"
+#include "server/station/emergency_stops.hpp"
+#include "server/station/robot_table.hpp"
+#include "server/station/sink_notifier.hpp"
+#include "server/station/timed_commands.hpp"
+
+namespace server {
+
+struct StationParts {
+  StationParts(boost::asio::io_context& its_loop, Clock& its_clock, Envelope limits, LinkTimes link_times)
+      : loop{its_loop}, clock{its_clock}, envelope{std::move(limits)}, times{link_times} {}
+
+  const CommandLimits& limits_of(const RobotState& robot) const { return envelope.in(robot.fluid); }
+  // SAFETY: what waits for whoever was in control before is dropped ahead of what comes next; false: it must not come.
+  bool drop_outdated(RobotEntry& entry) { return timed.drop_outdated(entry, control.of(entry.robot.id).holder); }
+
+  // A change of control has been decided: what it ends is dropped, and everybody is notified.
+  void publish(const Authority::Change& change, const std::string& actor, const std::string& peer);
+  void publish_all(const std::vector<CommandRecord>& records);
+  // What was refused, for the audit; `detail` as a JSON object.
+  void publish_refusal(Author by, const RobotId& robot_id, const char* what, const std::string& detail,
+                       const Error& error);
+  std::unexpected<Error> refuse(const CommandRequest& request, Error error);
+
+  boost::asio::io_context& loop;
+  Clock& clock;
+  const Envelope envelope;
+  const LinkTimes times;
+  SinkNotifier notifier{clock};
+  RobotTable robots;
+  CommandAuthority control{clock};
+  CommandTracker tracker{loop, clock, notifier};
+  EmergencyStops stops{loop, clock, tracker.recent()};
+  TimedCommands timed{loop, clock, notifier, tracker};
+  EventLimit enrolment_refusals{kEventPeriodUs};  // of robots that are not known, whatever their names are
+  std::uint64_t invalid_values = 0;               // of all robots, since the station started
+  SampleBatch batch;                              // of the frame that is being received; kept for its memory
+  std::function<void(const RobotState&, const Author&)> on_fluid_named = [](const RobotState&, const Author&) {};
+};
+
+}  // namespace server

@@ -1,0 +1,43 @@
+// Takes back what may no longer be done: commands that wait for the link, and those that wait on the robot for their
+// time.
+//
+// SAFETY: nothing that waits on the robot outlives the control of whoever sent it, nor the limits that it was held to.
+// Loop thread.
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <functional>
+#include <string>
+
+#include "server/station/command_tracker.hpp"
+
+namespace server {
+
+class TimedCommands {
+ public:
+  TimedCommands(boost::asio::io_context& loop, Clock& clock, SinkNotifier& notifier, CommandTracker& tracker)
+      : loop_{loop}, clock_{clock}, notifier_{notifier}, tracker_{tracker} {}
+
+  // Drops what is to be dropped now, given who is in control (empty: nobody). Sent before anything that comes next, on
+  // a link that keeps the order. False: there is no room for it on the link, so no command may follow.
+  bool drop_outdated(RobotEntry& entry, const std::string& holder);
+
+  // The same for everything that waits, for a reason of the station's own.
+  void drop_all(RobotEntry& entry, const std::string& holder, const char* reason);
+
+  // SAFETY: what still waits for the link is not sent once it may no longer be, timed or not; but it may end a motion.
+  void withdraw_queued(RobotEntry& entry, const char* reason,
+                       const std::function<bool(const PendingCommand&)>& is_meant);
+
+ private:
+  void choose_reason(RobotEntry& entry, const std::string& holder) const;
+  bool send_drop(RobotEntry& entry);
+  void end_timed(RobotEntry& entry, const char* reason);
+
+  boost::asio::io_context& loop_;
+  Clock& clock_;
+  SinkNotifier& notifier_;
+  CommandTracker& tracker_;
+};
+
+}  // namespace server

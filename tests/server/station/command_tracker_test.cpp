@@ -1,0 +1,117 @@
+// Commands from their submission to their end, without a station around them.
+#include "server/station/command_tracker.hpp"
+
+#include <gmock/gmock.h>
+
+#include "tests/server/station/entry_fixture.hpp"
+
+namespace server {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+class CommandTrackerTest : public EntryTest {
+ protected:
+  CommandTrackerTest() { notifier.add(sink); }
+
+  static protocol::CommandAck answer(const PendingCommand& pending, protocol::CommandResult result) {
+    protocol::CommandAck ack = rheonaut_CommandAck_init_zero;
+    ack.command_id = pending.record.id;
+    ack.result = result;
+    ack.effect_at_robot_us = 1'050'000;
+    return ack;
+  }
+  void answered(PendingCommand& pending, protocol::CommandResult result) {
+    const auto ack = answer(pending, result);
+    const auto found = tracker.find_answered(entry, ack);
+    ASSERT_NE(found, nullptr);
+    tracker.on_answer(entry, *found, ack);
+  }
+  static SampleBatch batch_with_duty(float duty) {
+    SampleBatch batch;
+    batch.first_robot_time_us = 1'060'000;
+    batch.context.period_us = 10'000;
+    batch.context.mode = rheonaut_MODE_MANUAL;
+    batch.samples.resize(2);
+    for (Sample& sample : batch.samples) sample.duty = duty;
+    return batch;
+  }
+
+  SinkNotifier notifier{clock};
+  KeepingSink sink;
+  CommandTracker tracker{loop, clock, notifier};
+};
+
+TEST_F(CommandTrackerTest, SentThenAcknowledgedThenSeenInTelemetry) {
+  const auto duty = add(set_duty(0.3F));
+  tracker.on_sent(entry, duty->record.id);
+  answered(*duty, rheonaut_COMMAND_RESULT_ACCEPTED);
+  tracker.on_samples(entry, batch_with_duty(0.3F));
+  EXPECT_THAT(sink.states, ElementsAre(CommandState::sent, CommandState::acknowledged, CommandState::verified));
+  EXPECT_TRUE(entry.commands.is_empty());
+}
+
+TEST_F(CommandTrackerTest, WhatIsSentWithAStopIsHeldBackForWhoeverHandsItOver) {
+  const auto duty = add(set_duty(0.3F));
+  std::vector<CommandRecord> held_back;
+  entry.commands.sent_with_stop = &held_back;
+  tracker.on_sent(entry, duty->record.id);
+  EXPECT_THAT(sink.states, IsEmpty());
+  ASSERT_EQ(held_back.size(), 1u);
+  EXPECT_EQ(held_back[0].state, CommandState::sent);
+}
+
+TEST_F(CommandTrackerTest, WhatIsNotSentInTimeExpiresAndWhatGetsNoAnswerIsUnknown) {
+  const auto queued = add(set_duty(0.3F)), sent = add(set_duty(0.2F));
+  tracker.on_sent(entry, sent->record.id);
+  clock.run_for(std::chrono::milliseconds{2'500});  // their life is 2 s
+  tracker.expire(entry);
+  EXPECT_EQ(queued->record.state, CommandState::expired);
+  EXPECT_EQ(queued->record.reason, "not_sent_in_time");
+  EXPECT_EQ(sent->record.state, CommandState::sent) << "its answer may be on its way";
+  clock.run_for(std::chrono::seconds{1});
+  tracker.expire(entry);
+  EXPECT_EQ(sent->record.state, CommandState::unknown);
+  answered(*sent, rheonaut_COMMAND_RESULT_REJECTED);
+  EXPECT_EQ(sent->record.state, CommandState::rejected) << "an answer that comes after all";
+}
+
+TEST_F(CommandTrackerTest, WhenTheLinkIsLostOnlyStopsStay) {
+  protocol::Command stop = rheonaut_Command_init_zero;
+  stop.which_action = rheonaut_Command_emergency_stop_tag;
+  const auto kept = add(stop), queued = add(set_duty(0.3F));
+  tracker.end_with_link(entry, "link_lost");
+  EXPECT_EQ(queued->record.state, CommandState::failed);
+  EXPECT_EQ(kept->record.state, CommandState::queued);
+  EXPECT_NE(entry.commands.newest_stop(), nullptr);
+}
+
+TEST_F(CommandTrackerTest, AnEventThatNamesACommandStandsForItsLostAnswer) {
+  const auto duty = add(set_duty(0.3F));
+  tracker.on_sent(entry, duty->record.id);
+  protocol::Event event = rheonaut_Event_init_zero;
+  event.command_id = duty->record.id;
+  event.event_robot_time_us = 1'040'000;
+  tracker.on_event(entry, event);
+  EXPECT_EQ(duty->record.state, CommandState::acknowledged);
+  EXPECT_EQ(duty->record.reason, "named_by_event");
+}
+
+TEST_F(CommandTrackerTest, AKeyThatWasUsedForAnotherCommandIsRefused) {
+  CommandRequest request;
+  request.robot_id = robot.id;
+  request.actor = "session:1";
+  request.key = "try-1";
+  request.action = set_duty(0.3F);
+  const auto pending = make_pending(loop, clock, request, robot);
+  entry.commands.add(pending);
+  EXPECT_EQ(tracker.find_same(request, entry).value(), pending);
+  request.arguments = R"({"duty":0.4})";
+  EXPECT_EQ(tracker.find_same(request, entry).error().reason, "key_reused");
+  request.key = "try-2";
+  EXPECT_EQ(tracker.find_same(request, entry).value(), nullptr);
+}
+
+}  // namespace
+}  // namespace server

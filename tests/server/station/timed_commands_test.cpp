@@ -1,0 +1,68 @@
+// What waits is taken back when control ends, limits narrow or a step is lost.
+#include "server/station/timed_commands.hpp"
+
+#include <gmock/gmock.h>
+
+#include "tests/server/station/entry_fixture.hpp"
+
+namespace server {
+namespace {
+
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+class TimedCommandsTest : public EntryTest {
+ protected:
+  std::shared_ptr<PendingCommand> add_timed() {
+    protocol::Command command = set_duty(0.3F);
+    command.has_execute_at_robot_us = true;
+    command.execute_at_robot_us = 1'500'000;
+    entry.timed.by = "session:1";
+    entry.timed.until_robot_us = command.execute_at_robot_us;
+    return add(command);
+  }
+
+  SinkNotifier notifier{clock};
+  CommandTracker tracker{loop, clock, notifier};
+  TimedCommands timed{loop, clock, notifier, tracker};
+};
+
+TEST_F(TimedCommandsTest, NothingIsDroppedWhileItsSenderIsInControl) {
+  add_timed();
+  EXPECT_TRUE(timed.drop_outdated(entry, "session:1"));
+  EXPECT_THAT(port.sent, IsEmpty());
+}
+
+TEST_F(TimedCommandsTest, WhenControlEndsTheRobotIsToldOnceToDropWhatWaits) {
+  const auto waiting = add_timed();
+  tracker.on_sent(entry, waiting->record.id);
+  EXPECT_TRUE(timed.drop_outdated(entry, ""));
+  ASSERT_THAT(port.sent, SizeIs(1));
+  EXPECT_EQ(port.sent[0].which_action, rheonaut_Command_drop_timed_tag);
+  EXPECT_STREQ(waiting->expiry(), "control_ended");
+  EXPECT_TRUE(timed.drop_outdated(entry, ""));
+  EXPECT_THAT(port.sent, SizeIs(1)) << "it is on its way";
+  entry.commands.take_unanswered(entry.timed.drop_id);
+  EXPECT_TRUE(timed.drop_outdated(entry, ""));
+  EXPECT_THAT(port.sent, SizeIs(2)) << "it ended without an acknowledgement";
+}
+
+TEST_F(TimedCommandsTest, WithoutRoomOnTheLinkNoCommandMayFollow) {
+  add_timed();
+  port.is_full = true;
+  EXPECT_FALSE(timed.drop_outdated(entry, ""));
+  port.is_full = false;
+  EXPECT_TRUE(timed.drop_outdated(entry, ""));
+}
+
+TEST_F(TimedCommandsTest, WhatIsQueuedIsWithdrawnUnlessItEndsAMotion) {
+  const auto forward = add(set_duty(0.3F)), halt = add(set_duty(0));
+  port.can_withdraw = {forward->record.id, halt->record.id};
+  timed.withdraw_queued(entry, "limits_changed", [](const PendingCommand&) { return true; });
+  EXPECT_EQ(forward->record.state, CommandState::superseded);
+  EXPECT_EQ(forward->record.reason, "limits_changed");
+  EXPECT_EQ(halt->record.state, CommandState::queued);
+}
+
+}  // namespace
+}  // namespace server
