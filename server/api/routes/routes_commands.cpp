@@ -9,9 +9,9 @@
 #include "server/api/routes/emergency.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/identity/auth.hpp"
+#include "server/station/commands/recent_commands.hpp"
 #include "server/station/station.hpp"
 #include "server/storage/query/history.hpp"
-#include "server/station/commands/recent_commands.hpp"
 
 namespace server {
 namespace asio = boost::asio;
