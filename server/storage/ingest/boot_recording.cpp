@@ -24,6 +24,8 @@ constexpr std::int64_t kUnknownUtcToleranceUs = 1'000'000;
 // Successive boots have complete segments 37 samples apart: any 100 of them are spread evenly.
 constexpr std::uint64_t kBootsApart = 37;
 
+constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
+
 constexpr microseconds kHolePatience = 500ms;  // before a hole that does not shrink is asked for
 constexpr microseconds kAskInterval = 1s;
 
@@ -68,9 +70,16 @@ void add_lost(std::vector<LostRange>& gaps, const LostRange& range, const Interv
 
 }  // namespace
 
+bool is_malformed(const SampleBatch& batch) {
+  const std::uint32_t period_us = batch.context.period_us;
+  const bool numbers = batch.first_seq < kMaxRecordedNumber && batch.oldest_seq < kMaxRecordedNumber &&
+                       batch.first_robot_time_us < kMaxRecordedNumber && period_us > 0 && period_us <= kMaxPeriodUs;
+  return batch.samples.empty() || !numbers;
+}
+
 void BootRecording::load(StoredBoot stored) {
   key_ = stored.key;
-  taken_ = received_ = std::move(stored.samples);
+  committed_ = received_ = std::move(stored.samples);
   received_events_ = std::move(stored.events);
   durable_next_seq_ = received_.first_hole();
   durable_next_event_seq_ = received_events_.first_hole();
@@ -92,12 +101,12 @@ void BootRecording::connect(const AdmissionRequest& hello, std::int64_t restored
   connected_at_us_ = hello.received_at_us;
   next_seq_ = std::max(next_seq_, hello.next_seq);
   last_robot_time_us_ = std::max(last_robot_time_us_, hello.robot_time_us);
-  give_up_below(std::min(hello.acknowledged_next_seq, hello.oldest_seq), acknowledged_cause, hello.received_at_us);
-  give_up_below(hello.oldest_seq, cause, hello.received_at_us);
+  set_lost_below(std::min(hello.acknowledged_next_seq, hello.oldest_seq), acknowledged_cause, hello.received_at_us);
+  set_lost_below(hello.oldest_seq, cause, hello.received_at_us);
   next_event_seq_ = std::max(next_event_seq_, hello.next_event_seq);
-  give_up_events_below(std::min(hello.acknowledged_next_event_seq, hello.oldest_event_seq), acknowledged_cause,
-                       hello.received_at_us);
-  give_up_events_below(hello.oldest_event_seq, cause, hello.received_at_us);
+  set_events_lost_below(std::min(hello.acknowledged_next_event_seq, hello.oldest_event_seq), acknowledged_cause,
+                        hello.received_at_us);
+  set_events_lost_below(hello.oldest_event_seq, cause, hello.received_at_us);
   sample_hole_.reset();  // the robot now sends by itself what it holds
   event_hole_.reset();
 }
@@ -169,7 +178,7 @@ void BootRecording::refuse(const SampleBatch& batch) {
   for (const Interval& part : received_.missing({batch.first_seq, batch.next_seq()})) refused_.insert(part);
 }
 
-void BootRecording::give_up_below(std::uint64_t oldest_seq, const char* cause, std::int64_t utc_us) {
+void BootRecording::set_lost_below(std::uint64_t oldest_seq, const char* cause, std::int64_t utc_us) {
   if (oldest_seq <= received_.first_hole()) return;
   for (const Interval& lost : received_.insert({0, oldest_seq})) {
     add_lost(waiting_gaps_, {key_, lost, cause, utc_us}, refused_);
@@ -177,12 +186,12 @@ void BootRecording::give_up_below(std::uint64_t oldest_seq, const char* cause, s
   next_seq_ = std::max(next_seq_, oldest_seq);
 }
 
-void BootRecording::give_up(Interval samples, const char* cause, std::int64_t utc_us) {
+void BootRecording::set_lost(Interval samples, const char* cause, std::int64_t utc_us) {
   for (const Interval& lost : received_.insert(samples)) add_gap(waiting_gaps_, {key_, lost, cause, utc_us});
   next_seq_ = std::max(next_seq_, samples.next);
 }
 
-void BootRecording::give_up_event(std::uint64_t event_seq, const char* cause, std::int64_t utc_us) {
+void BootRecording::set_event_lost(std::uint64_t event_seq, const char* cause, std::int64_t utc_us) {
   for (const Interval& lost : received_events_.insert({event_seq, event_seq + 1})) {
     add_gap(waiting_event_gaps_, {key_, lost, cause, utc_us});
   }
@@ -202,38 +211,39 @@ void BootRecording::refuse_event(std::uint64_t event_seq) {
   refused_events_.insert({event_seq, event_seq + 1});
 }
 
-void BootRecording::give_up_events_below(std::uint64_t oldest_event_seq, const char* cause, std::int64_t utc_us) {
+void BootRecording::set_events_lost_below(std::uint64_t oldest_event_seq, const char* cause, std::int64_t utc_us) {
   if (oldest_event_seq <= received_events_.first_hole()) return;
   for (const Interval& lost : received_events_.insert({0, oldest_event_seq})) {
     add_lost(waiting_event_gaps_, {key_, lost, cause, utc_us}, refused_events_);
   }
 }
 
-void BootRecording::take_segments(bool all, std::deque<Segment>& into) {
+std::vector<Segment> BootRecording::take_segments(bool all) {
   const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(all ? waiting_.size() : complete_);
-  into.insert(into.end(), std::make_move_iterator(waiting_.begin()), std::make_move_iterator(end));
+  std::vector<Segment> taken{std::make_move_iterator(waiting_.begin()), std::make_move_iterator(end)};
   waiting_.erase(waiting_.begin(), end);
   complete_ = 0;
   waiting_since_us_ = completed_at_us_;  // what is left began then, or later
+  return taken;
 }
 
-void BootRecording::take_records(WriteBatch& batch) {
-  for (const LostRange& gap : waiting_gaps_) taken_.insert(gap.lost);
+void BootRecording::move_gaps(WriteBatch& batch) {
+  for (const LostRange& gap : waiting_gaps_) committed_.insert(gap.lost);
   std::ranges::move(std::exchange(waiting_gaps_, {}), std::back_inserter(batch.gaps));
   std::ranges::move(std::exchange(waiting_event_gaps_, {}), std::back_inserter(batch.event_gaps));
   has_new_events_ = false;
 }
 
-void BootRecording::set_taken(const Segment& segment) {
-  if (!taken_.extend(segment.interval())) taken_.insert(segment.interval());
-  taken_robot_time_us_ = std::max(taken_robot_time_us_, segment.robot_time_us(segment.samples.size() - 1));
+void BootRecording::set_committed(const Segment& segment) {
+  if (!committed_.extend(segment.interval())) committed_.insert(segment.interval());
+  committed_robot_time_us_ = std::max(committed_robot_time_us_, segment.robot_time_us(segment.samples.size() - 1));
 }
 
 BootProgress BootRecording::progress() const {
   return {.boot_key = key_,
-          .durable_next_seq = taken_.first_hole(),
+          .durable_next_seq = committed_.first_hole(),
           .durable_next_event_seq = received_events_.first_hole(),
-          .last_robot_time_us = taken_robot_time_us_};
+          .last_robot_time_us = committed_robot_time_us_};
 }
 
 void BootRecording::set_durable(const BootProgress& progress) {

@@ -1,8 +1,9 @@
 // One boot of a robot as the recorder sees it: what is here, what waits to be written, what is still missing.
 //
-// Loop thread only; owned by the Recorder. Plain bookkeeping: it neither waits nor writes. Times are the caller's.
+// Loop thread only; owned by its BootEntry. Plain bookkeeping: it neither waits nor writes. Times are the caller's.
 //
-//   received = taken + waiting (samples and known gaps)      taken = what went into a commit, done or under way
+//   received = committed + waiting or queued (samples and known gaps)
+//   committed = what went into a commit, done or under way
 //   next_seq ≥ received.end(): every sample below it was made by the robot
 //
 // Segments end at the same samples of a boot whatever happens before: where seq + 37 · key is a multiple of 100. So
@@ -10,13 +11,15 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <vector>
 
 #include "server/storage/ingest/sample_store.hpp"
 
 namespace server {
+
+// What no robot can mean. One such value in a commit might keep everything behind it from being stored.
+bool is_malformed(const SampleBatch& batch);
 
 // When to ask for what is missing: once its beginning was the same for a while, and then at intervals.
 class HoleWatch {
@@ -41,41 +44,41 @@ class BootRecording {
 
   // A Hello with these numbers is of a boot that went on, not of another one with the same id.
   bool continues(std::uint64_t next_seq, std::uint64_t robot_time_us) const;
-  // The robot has connected, holding the samples [hello.oldest_seq, hello.next_seq). What it held no more when it was
-  // first heard after a restore, in the same boot, was lost by that; restored_at_us is 0 when there was none. What else
-  // is missing and was acknowledged to it, another store had, or this one before it lost commits.
+  // The robot has connected, holding the samples [hello.oldest_seq, hello.next_seq). What it held no more when it
+  // first connected after a restore, in the same boot, was lost by that; restored_at_us is 0 when there was none. What
+  // else is missing and was acknowledged to it, another store had, or this one before it lost commits.
   void connect(const AdmissionRequest& hello, std::int64_t restored_at_us);
 
   // Samples of the batch that are not here yet.
   std::size_t count_new(const SampleBatch& batch) const;
-  // Takes them into the waiting segments.
+  // Adds them to the waiting segments.
   void append(const SampleBatch& batch, std::int64_t steady_us);
   // There is no room: the samples stay missing and are asked for again.
   void refuse(const SampleBatch& batch);
   // The robot no longer holds what is missing below.
-  void give_up_below(std::uint64_t oldest_seq, const char* cause, std::int64_t utc_us);
+  void set_lost_below(std::uint64_t oldest_seq, const char* cause, std::int64_t utc_us);
   // These came and cannot be recorded.
-  void give_up(Interval samples, const char* cause, std::int64_t utc_us);
-  void give_up_event(std::uint64_t event_seq, const char* cause, std::int64_t utc_us);
+  void set_lost(Interval samples, const char* cause, std::int64_t utc_us);
+  void set_event_lost(std::uint64_t event_seq, const char* cause, std::int64_t utc_us);
   // False for an event that is here already.
   bool append_event(std::uint64_t event_seq);
   // There is no room: the event stays missing and is asked for again.
   void refuse_event(std::uint64_t event_seq);
-  void give_up_events_below(std::uint64_t oldest_event_seq, const char* cause, std::int64_t utc_us);
+  void set_events_lost_below(std::uint64_t oldest_event_seq, const char* cause, std::int64_t utc_us);
 
   // A waiting segment is complete: nothing can be added to it.
   bool has_complete() const { return complete_ > 0; }
-  // Gaps wait, or an event was heard since the last take_records().
+  // Gaps wait, or an event was received since the last move_gaps().
   bool has_records() const { return !waiting_gaps_.empty() || !waiting_event_gaps_.empty() || has_new_events_; }
   // Since when the oldest waiting sample waits.
   std::int64_t waiting_since_us() const { return waiting_since_us_; }
 
-  // Hands over the waiting segments: all, or up to the last complete one.
-  void take_segments(bool all, std::deque<Segment>& into);
-  // Hands over the gaps.
-  void take_records(WriteBatch& batch);
-  // The segment goes into the commit that is being made up.
-  void set_taken(const Segment& segment);
+  // Removes and returns the waiting segments: all, or up to the last complete one.
+  std::vector<Segment> take_segments(bool all);
+  // Moves the gaps into the commit that is being built.
+  void move_gaps(WriteBatch& batch);
+  // The segment goes into the commit that is being built.
+  void set_committed(const Segment& segment);
   // What is durable once that commit is, when no event is left out of it.
   BootProgress progress() const;
   // It is.
@@ -87,7 +90,7 @@ class BootRecording {
   std::optional<Interval> overdue_samples(std::int64_t steady_us);
   bool has_overdue_events(std::int64_t steady_us);
 
-  // Heard, and not taken yet; in the order of arrival.
+  // Received, and not enqueued yet; in the order of arrival.
   const std::vector<Segment>& waiting() const { return waiting_; }
   const std::vector<LostRange>& waiting_gaps() const { return waiting_gaps_; }
 
@@ -110,13 +113,13 @@ class BootRecording {
   std::uint64_t last_robot_time_us_ = 0;
   std::int64_t connected_at_us_ = 0;  // UTC, the latest time
 
-  std::uint64_t next_event_seq_ = 0;       // every event below it was made
-  std::uint64_t taken_robot_time_us_ = 0;  // of the newest taken sample
+  std::uint64_t next_event_seq_ = 0;           // every event below it was made
+  std::uint64_t committed_robot_time_us_ = 0;  // of the newest committed sample
   std::uint64_t durable_next_seq_ = 0;
   std::uint64_t durable_next_event_seq_ = 0;
 
   IntervalSet received_;
-  IntervalSet taken_;
+  IntervalSet committed_;
   IntervalSet refused_;
   IntervalSet received_events_;
   IntervalSet refused_events_;

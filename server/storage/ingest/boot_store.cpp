@@ -22,13 +22,6 @@ bool matches(const SQLite::Column& stored, const std::string& token) {
   return same(hash, hash_of(token));
 }
 
-Admission refusal(protocol::RefusalReason reason, std::string detail) {
-  Admission admission;
-  admission.refusal = reason;
-  admission.detail = std::move(detail);
-  return admission;
-}
-
 void set_token(SQLite::Statement& statement, int index, const std::string& token) {
   if (token.empty()) return statement.bind(index);
   const SecretHash hash = hash_of(token);
@@ -45,6 +38,13 @@ void add_intervals(SQLite::Database& database, const char* sql, std::int64_t boo
 }
 
 }  // namespace
+
+Admission refusal(protocol::RefusalReason reason, std::string detail) {
+  Admission admission;
+  admission.refusal = reason;
+  admission.detail = std::move(detail);
+  return admission;
+}
 
 Admission reused(const AdmissionRequest& request, const RobotId& owner) {
   return refusal(

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "server/station/state/robot_archive.hpp"
@@ -40,7 +41,7 @@ struct AdmissionOutcome {
   StoredBoot boot;  // key 0: it was refused, is not known here, or was not looked for
 };
 
-// A boot that was heard of for the first time; the recorder has numbered it.
+// A boot that was admitted for the first time; the recorder has numbered it.
 struct NewBoot {
   std::int64_t boot_key = 0;
   AdmissionRequest hello;
@@ -63,6 +64,8 @@ struct BootStart {
   std::uint64_t robot_time_us = 0;
   std::int64_t noticed_at_us = 0;  // UTC
 };
+
+Admission refusal(protocol::RefusalReason reason, std::string detail);
 
 // The refusal of a boot_id that is another robot's.
 Admission reused(const AdmissionRequest& request, const RobotId& owner);

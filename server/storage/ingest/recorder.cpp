@@ -1,14 +1,13 @@
-// The queue between the station and the disk.
 #include "server/storage/ingest/recorder.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
-#include <iterator>
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
 
-#include "server/storage/database/disk_reserve.hpp"
-#include "server/storage/samples/stored_rows.hpp"
+#include "server/runtime/counted.hpp"
+#include "server/storage/ingest/boot_segments.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -18,15 +17,9 @@ namespace {
 
 constexpr microseconds kCommitInterval = 100ms;
 constexpr microseconds kOverflowLogInterval = 10s;
-constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
-
-// What no robot can mean. One such value in a commit might keep everything behind it from being stored.
-bool is_malformed(const SampleBatch& batch) {
-  const std::uint32_t period_us = batch.context.period_us;
-  const bool numbers = batch.first_seq < kMaxRecordedNumber && batch.oldest_seq < kMaxRecordedNumber &&
-                       batch.first_robot_time_us < kMaxRecordedNumber && period_us > 0 && period_us <= kMaxPeriodUs;
-  return batch.samples.empty() || !numbers;
-}
+// Boots in one turn of the loop, which must not take over 1 ms; for those that are reported a robot gets a frame each.
+constexpr std::size_t kBootsInATurn = 128;
+constexpr std::size_t kReportsInATurn = 32;
 
 AuditNote of_station(const char* action, std::int64_t utc_us) {
   AuditNote note;
@@ -41,47 +34,34 @@ Recorder::Recorder(asio::io_context& loop, Clock& clock, WorkerThread& disk, Wor
                    RecorderOptions options)
     : loop_{loop},
       clock_{clock},
-      disk_{disk},
       options_{std::move(options)},
-      checkpointer_{loop, clock, checkpoints, options_.path, options_.checkpoint_bytes, options_.checkpoint_interval} {}
+      checkpointer_{loop, clock, checkpoints, options_.path, options_.checkpoint_bytes, options_.checkpoint_interval},
+      database_{disk, checkpointer_, options_.path},
+      admission_{loop, [this](std::vector<AdmissionQuestion> all) { return ask_database(std::move(all)); }},
+      boots_{std::make_unique<BootRegistry>()},
+      queue_{std::make_unique<CommitQueue>(options_.max_queued_samples, options_.max_queued_records)},
+      flushes_{loop, clock} {}
 
 Recorder::~Recorder() = default;
 
 asio::awaitable<RestoredState> Recorder::open() {
-  auto job = [this, utc_us = clock_.utc_us()] {
-    const std::filesystem::path folder = std::filesystem::absolute(options_.path).parent_path();
-    std::error_code not_told;  // then it counts as much
-    give_up_disk_reserve(options_.path, std::filesystem::space(folder, not_told).available);
-    database_ = std::make_unique<Database>(options_.path);
-    store_ = std::make_unique<SampleStore>(*database_);
-    try {
-      fail_unfinished_commands(*database_, utc_us);
-    } catch (const SQLite::Exception& error) {  // SAFETY: with a full disk, too, robots come in and can be stopped
-      spdlog::warn("commands of an earlier start stay unfinished in the record: {}", error.what());
-    }
-    keep_disk_reserve(options_.path, std::filesystem::space(folder, not_told).available);
-    BootStore boots{*database_};
-    next_boot_key_ = boots.next_boot_key();
-    restored_at_us_ = database_->restored_at_us();
-    spdlog::info("audit: goes on from {}", text(audit_head(database_->handle())));
-    return RestoredState{database_->store_id(), boots.robots(), pending_stops(*database_)};
-  };
-  RestoredState restored = co_await disk_.run(std::move(job));
+  OpenedDatabase opened = co_await database_.open(clock_.utc_us());
+  boots_ = std::make_unique<BootRegistry>(opened.next_boot_key, opened.restored_at_us);
   AuditNote started = of_station("station.started", clock_.utc_us());
-  started.detail = fmt::format(R"({{"version":"{}","store_id":"{}"}})", RHEONAUT_VERSION, restored.store_id);
+  started.detail = fmt::format(R"({{"version":"{}","store_id":"{}"}})", RHEONAUT_VERSION, opened.restored.store_id);
   on_audit(started);
-  co_return restored;
+  co_return std::move(opened.restored);
 }
 
 asio::awaitable<void> Recorder::run() {
   for (;;) {
     co_await wait_for_commit();
     co_await checkpointer_.wait_for_room();
-    if (writing_.empty()) take();  // or the same content, until it is stored
+    if (!queue_->has_commit()) build_commit();  // or the same content, until it is stored
     co_await write();
-    forget_unused();
+    boots_->forget_unused(clock_.steady_us());
     if (failing()) continue;
-    end_flushes();
+    flushes_.on_durable(queue_->position());
     co_await finish_checkpoint();
     co_await ask_for_missing();
   }
@@ -89,185 +69,236 @@ asio::awaitable<void> Recorder::run() {
 
 asio::awaitable<void> Recorder::wait_for_commit() {
   if (failing()) {
-    co_await clock_.sleep_until(retry_at_us_);
+    co_await clock_.sleep_until(failure_.retry_at_us());
     co_return;
   }
-  if (boots_.empty() && queue_.empty() && flushes_.empty() && !quota_.has_left_out()) {
+  if (boots_->empty() && queue_->has_no_records() && flushes_.empty() && !quota_.has_left_out()) {
     idle_ = true;
     co_await work_.wait();
     idle_ = false;
   }
-  const std::int64_t regular_us = last_commit_us_ + kCommitInterval.count();
-  while (flushes_.empty() && clock_.steady_us() < regular_us) {
-    co_await flush_wanted_.wait_until(clock_, regular_us);
-  }
+  co_await flushes_.until_wanted(last_commit_us_ + kCommitInterval.count());
   last_commit_us_ = clock_.steady_us();
 }
 
-void Recorder::close(const std::function<void(Database&, std::int64_t)>& last) {
-  if (!store_) return;
-  tell_left_out(true);
-  std::string problem;
-  for (;;) {  // first a commit that failed, or was cancelled
-    if (writing_.empty()) {
-      for (BootEntry& entry : boots_) entry.second.is_written = false;
-      writing_boots_.clear();
-      line_up_everything();
-      take();
-    }
-    if (writing_.empty()) break;
-    problem = try_to_write();
-    if (!problem.empty()) break;
-    count_written(writing_);
-    writing_ = {};
+void Recorder::build_commit() {
+  record_left_out(false);
+  enqueue_due(*boots_, *queue_, clock_.steady_us());
+  queue_->build_commit(boots_->with_records());
+  flushes_.on_commit_built();
+}
+
+asio::awaitable<void> Recorder::write() {
+  if (!queue_->has_commit()) co_return;
+  const std::string problem = co_await database_.write(queue_->commit());
+  if (!problem.empty()) {
+    ++counters_.commits_failed;
+    failure_.on_failed(problem, options_.path, clock_.steady_us());
+    co_return;
   }
+  failure_.on_written();
+  WriteBatch written = queue_->finish_commit();
+  const bool had_samples = counters_.samples_written > 0;
+  counters_.count_written(written);
+  if (!had_samples && counters_.samples_written > 0) checkpointer_.pass_at_once();
+  co_await report_durable(std::move(written.progress));
+}
+
+// In turns, so that nothing else on the loop waits for all of them.
+asio::awaitable<void> Recorder::report_durable(std::vector<BootProgress> progress) {
+  std::size_t reported = 0;
+  for (const BootProgress& now : progress) {
+    BootEntry& boot = *queue_->take_finished();
+    boot.recording.set_durable(now);
+    if (on_durable_) {
+      on_durable_(boot.recording.robot_id(), boot.boot_id, now.durable_next_seq, now.durable_next_event_seq);
+    }
+    if (++reported % kReportsInATurn == 0) co_await asio::post(loop_, asio::use_awaitable);
+  }
+}
+
+asio::awaitable<void> Recorder::finish_checkpoint() {
+  if (!checkpointer_.wants_finish()) co_return;
+  const CheckpointMode mode = checkpointer_.finish_mode();
+  auto finish = [mode](Database& database) { return checkpoint(database.handle(), mode); };
+  const CheckpointOutcome outcome = co_await on_disk(std::move(finish));
+  checkpointer_.on_finish(mode, outcome);
+}
+
+// All that miss something, in turns.
+asio::awaitable<void> Recorder::ask_for_missing() {
+  const std::int64_t now_us = clock_.steady_us();
+  const bool room_for_samples = on_missing_ && queue_->is_half_empty_of_samples();
+  const bool room_for_events = on_missing_events_ && queue_->is_half_empty_of_records();
+  for (std::size_t left = boots_->holes(); left > 0; --left) {
+    if (left % kBootsInATurn == 0) co_await asio::post(loop_, asio::use_awaitable);
+    BootEntry* boot = boots_->next_with_holes();
+    if (boot == nullptr) continue;
+    const RobotId& robot_id = boot->recording.robot_id();
+    if (room_for_samples) {
+      const auto hole = boot->recording.overdue_samples(now_us);
+      if (hole) on_missing_(robot_id, boot->boot_id, hole->first, hole->next);
+    }
+    if (room_for_events && boot->recording.has_overdue_events(now_us)) {
+      ++counters_.events_asked_again;
+      on_missing_events_(robot_id, boot->boot_id);
+    }
+  }
+}
+
+void Recorder::close(const std::function<void(Database&, std::int64_t)>& last) {
+  if (!database_.is_open()) return;
+  record_left_out(true);
+  const std::string problem = write_rest();
   if (!problem.empty()) {
     spdlog::error(
         "the last {} samples, {} events and {} commands could not be written into {}: {}. Robots send again what they "
         "still hold",
-        queued_samples_, writing_.events.size() + queue_.events.size(),
-        writing_.commands.size() + queue_.commands.size(), options_.path.string(), problem);
+        queue_->samples(), queue_->events(), queue_->commands(), options_.path.string(), problem);
   }
-  writing_ = {};
-  store_.reset();
-  try {
-    if (last) last(*database_, clock_.utc_us());
-    const AuditHead head = append_audit(database_->handle(), of_station("station.stopped", clock_.utc_us()));
-    spdlog::info("audit: ends with {}", text(head));
-  } catch (const std::exception& error) {
-    spdlog::warn("the last words of the audit could not be written: {}", error.what());
+  database_.close(last, clock_.utc_us(), of_station("station.stopped", clock_.utc_us()));
+}
+
+// First a commit that failed, or was cancelled. Returns the problem.
+std::string Recorder::write_rest() {
+  for (;;) {
+    if (!queue_->has_commit()) {
+      queue_->forget_finished();
+      enqueue_everything(*boots_, *queue_);
+      build_commit();
+    }
+    if (!queue_->has_commit()) return {};
+    std::string problem = database_.write_now(queue_->commit());
+    if (!problem.empty()) return problem;
+    counters_.count_written(queue_->finish_commit());
   }
-  try {
-    database_->checkpoint();
-  } catch (const std::exception& error) {  // only the log stays longer: it is read at the next start
-    spdlog::warn("the write-ahead log of {} could not be emptied: {}", options_.path.string(), error.what());
+}
+
+asio::awaitable<Admission> Recorder::admit(AdmissionRequest request) {
+  std::optional<Admission> malformed = refuse_malformed(request);
+  if (malformed) co_return std::move(*malformed);
+  BootEntry& boot = boots_->enter(request.boot_id, request.robot_id);
+  const Counted admitting{boot.admissions};  // keeps the boot, whatever happens
+  wake();
+  AdmissionQuestion question{request, boot.owner()};
+  const std::int64_t asked_us = clock_.steady_us();
+  bool is_ending = boots_->another_starts(request, asked_us);
+  AdmissionOutcome outcome = co_await admission_.ask(std::move(question));
+  is_ending = is_ending || boots_->another_starts(request, asked_us);
+  const bool is_stored = outcome.boot.key != 0;
+  Admission admission =
+      is_stored && is_ending ? another_boot_connected() : admit_boot(boot, std::move(outcome), request);
+  if (!boot.recording.loaded() && boot.admissions == 1) boots_->forget_soon();
+  co_return admission;
+}
+
+Admission Recorder::admit_boot(BootEntry& boot, AdmissionOutcome outcome, const AdmissionRequest& request) {
+  if (outcome.admission.refusal != rheonaut_REFUSAL_REASON_NONE) return std::move(outcome.admission);
+  const bool is_new = !boot.recording.loaded() && outcome.boot.key == 0;
+  if (is_new && !queue_->has_room_for_boot()) {
+    return refusal(rheonaut_REFUSAL_REASON_STATION_BUSY, "too many new boots wait for the disk; try again");
   }
-  database_.reset();
+  Admission admission =
+      boots_->admit(boot, std::move(outcome.boot), std::move(outcome.admission), request, clock_.steady_us());
+  if (is_new) queue_->enqueue(NewBoot{boot.recording.key(), request});
+  return admission;
+}
+
+asio::awaitable<std::vector<AdmissionOutcome>> Recorder::ask_database(std::vector<AdmissionQuestion> questions) {
+  auto job = [questions = std::move(questions), enrol = options_.enrolment](Database& database) {
+    return BootStore{database}.admit(questions, enrol);
+  };
+  co_return co_await on_disk(std::move(job));
 }
 
 void Recorder::on_robot(const RobotState& robot) {
-  const auto found = boots_.find(robot.boot_id);
-  if (found == boots_.end() || found->second.recording.robot_id() != robot.id) return;
-  Boot& boot = found->second;
-  boot.connected = robot.link == LinkState::connected && !boot.replaced;
-  if (boot.connected && boot.hello) {
-    const AdmissionRequest hello = *std::exchange(boot.hello, {});
-    boot.recording.connect(hello, restored_at_us_);
-    replace_others(robot.id, robot.boot_id);
-    boot.starts_waiting -= std::erase_if(
-        starts_, [&](const WaitingStart& waiting) { return waiting.start.boot_key == boot.recording.key(); });
-    ++boot.starts_waiting;
-    starts_.push_back({{.robot_id = hello.robot_id,
-                        .boot_key = boot.recording.key(),
-                        .announced_next_seq = hello.next_seq,
-                        .announced_next_event_seq = hello.next_event_seq,
-                        .robot_time_us = hello.robot_time_us,
-                        .noticed_at_us = hello.received_at_us},
-                       lined_up_});
-    boot.started = true;
-  }
-  watch(*found);
+  BootEntry* boot = boots_->find(robot.boot_id);
+  if (boot == nullptr || boot->recording.robot_id() != robot.id) return;
+  boot->connected = robot.link == LinkState::connected && !boot->replaced;
+  if (boot->connected && boot->hello) start(*boot);
+  watch(*boot);
 }
 
-// Those that have ever connected, as BootStore::start() ends them in the database.
-void Recorder::replace_others(const RobotId& robot_id, BootId boot_id) {
-  const auto [begin, end] = by_robot_.equal_range(robot_id);
-  for (auto of_robot = begin; of_robot != end; ++of_robot) {
-    BootEntry& entry = *of_robot->second;
-    Boot& other = entry.second;
-    if (entry.first == boot_id || other.recording.connected_at_us() == 0) continue;
-    const char* cause = other.recording.connected_at_us() < restored_at_us_ ? "restore" : "reboot";
-    other.connected = false;
-    replaced_boots_ += other.replaced ? 0 : 1;
-    other.replaced = true;
-    other.recording.give_up_below(other.recording.next_seq(), cause, clock_.utc_us());
-    other.recording.give_up_events_below(other.recording.next_event_seq(), cause, clock_.utc_us());
-    line_up(entry, true);
-    watch(entry);
+void Recorder::start(BootEntry& boot) {
+  BootRegistry::Started started = boots_->start(boot, clock_.utc_us());
+  for (BootEntry* replaced : started.replaced) {
+    queue_->enqueue_segments(*replaced, true);
+    watch(*replaced);
   }
+  queue_->enqueue_start(boot, std::move(started.start));
 }
 
 void Recorder::on_samples(const RobotState&, const SampleBatch& batch) {
-  const auto found = boots_.find(batch.boot_id);
-  if (is_malformed(batch) || found == boots_.end() || !found->second.started || found->second.replaced) {
+  BootEntry* boot = boots_->find_recorded(batch.boot_id);
+  if (boot == nullptr || is_malformed(batch)) {
     ++counters_.batches_malformed;
     return;
   }
-  BootRecording& recording = found->second.recording;
-  const std::size_t added = recording.count_new(batch);
+  const std::size_t added = boot->recording.count_new(batch);
   counters_.samples_duplicate += batch.samples.size() - added;
-  if (queued_samples_ + added > options_.max_queued_samples) {
-    recording.refuse(batch);
-    counters_.samples_refused += added;
-    const std::int64_t now_us = clock_.steady_us();
-    if (now_us - overflow_logged_us_ >= kOverflowLogInterval.count()) {
-      overflow_logged_us_ = now_us;
-      spdlog::warn("the disk does not keep up: {} samples wait, {} were refused so far and will be asked for again",
-                   queued_samples_, counters_.samples_refused);
-    }
+  if (queue_->has_room_for_samples(added)) {
+    boot->recording.append(batch, clock_.steady_us());
+    queue_->count_received(added);
   } else {
-    recording.append(batch, clock_.steady_us());
-    queued_samples_ += added;
+    boot->recording.refuse(batch);
+    note_refused(added);
   }
-  recording.give_up_below(batch.oldest_seq, "ring_overrun", batch.received_at_us);
-  watch(*found);
+  boot->recording.set_lost_below(batch.oldest_seq, "ring_overrun", batch.received_at_us);
+  watch(*boot);
 }
 
-// Null unless samples of the boot are recorded now.
-Recorder::BootEntry* Recorder::recorded(BootId boot_id) {
-  const auto found = boots_.find(boot_id);
-  return found != boots_.end() && found->second.started && !found->second.replaced ? &*found : nullptr;
+void Recorder::note_refused(std::size_t samples) {
+  counters_.samples_refused += samples;
+  const std::int64_t now_us = clock_.steady_us();
+  if (now_us - overflow_logged_us_ < kOverflowLogInterval.count()) return;
+  overflow_logged_us_ = now_us;
+  spdlog::warn("the disk does not keep up: {} samples wait, {} were refused so far and will be asked for again",
+               queue_->samples(), counters_.samples_refused);
 }
 
 void Recorder::on_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) {
   ++counters_.batches_malformed;
-  BootEntry* entry = recorded(robot.boot_id);
-  if (entry == nullptr || next_seq > kMaxRecordedNumber) return;
-  entry->second.recording.give_up({first_seq, next_seq}, "invalid", robot.last_received_at_us);
-  watch(*entry);
+  BootEntry* boot = boots_->find_recorded(robot.boot_id);
+  if (boot == nullptr || next_seq > kMaxRecordedNumber) return;
+  boot->recording.set_lost({first_seq, next_seq}, "invalid", robot.last_received_at_us);
+  watch(*boot);
 }
 
 void Recorder::on_unusable_event(const RobotState& robot, std::uint64_t event_seq) {
-  BootEntry* entry = recorded(robot.boot_id);
-  if (entry == nullptr || event_seq >= kMaxRecordedNumber) return;
-  entry->second.recording.give_up_event(event_seq, "invalid", robot.last_received_at_us);
-  watch(*entry);
+  BootEntry* boot = boots_->find_recorded(robot.boot_id);
+  if (boot == nullptr || event_seq >= kMaxRecordedNumber) return;
+  boot->recording.set_event_lost(event_seq, "invalid", robot.last_received_at_us);
+  watch(*boot);
 }
 
 // SAFETY: whatever waits, since its limits must hold after a restart. One entry for each robot at most.
 void Recorder::on_fluid(const RobotState& robot) {
-  queue_.fluids[robot.id] = robot.fluid;
+  queue_->set_fluid(robot.id, robot.fluid);
   wake();
 }
 
 void Recorder::on_event(const RobotState&, const RobotEvent& event) {
-  const auto found = boots_.find(event.boot_id);
-  const bool known = found != boots_.end() && found->second.started && !found->second.replaced;
+  BootEntry* boot = boots_->find_recorded(event.boot_id);
   if (!event.event_seq) {
     if (!room_for_record()) return;
-    queue_.events.push_back({known ? found->second.recording.key() : 0, event});
+    queue_->enqueue(StoredEvent{boot == nullptr ? 0 : boot->recording.key(), event});
     return wake();
   }
-  if (!known || *event.event_seq >= kMaxRecordedNumber || event.oldest_event_seq >= kMaxRecordedNumber) return;
-  BootRecording& recording = found->second.recording;
+  if (boot == nullptr || *event.event_seq >= kMaxRecordedNumber || event.oldest_event_seq >= kMaxRecordedNumber) return;
   if (!room_for_record()) {
-    recording.refuse_event(*event.event_seq);
-  } else if (recording.append_event(*event.event_seq)) {
-    queue_.events.push_back({recording.key(), event});
+    boot->recording.refuse_event(*event.event_seq);
+  } else if (boot->recording.append_event(*event.event_seq)) {
+    queue_->enqueue(StoredEvent{boot->recording.key(), event});
   }
-  recording.give_up_events_below(event.oldest_event_seq, "ring_overrun", event.received_at_us);
-  watch(*found);
+  boot->recording.set_events_lost_below(event.oldest_event_seq, "ring_overrun", event.received_at_us);
+  watch(*boot);
 }
 
 void Recorder::on_command(const CommandRecord& command) {
-  if (const auto queued = queued_commands_.find(command.id); queued != queued_commands_.end()) {
-    queue_.commands[queued->second] = command;
-    return;
-  }
+  if (queue_->replace(command)) return;
   // SAFETY: a stop must be known after a restart, so it is recorded whatever waits.
   if (command.kind != "emergency_stop" && !room_for_record()) return quota_.leave_out("command");
-  queued_commands_.emplace(command.id, queue_.commands.size());
-  queue_.commands.push_back(command);
+  queue_->enqueue(command);
   wake();
 }
 
@@ -275,49 +306,94 @@ void Recorder::on_audit(const AuditNote& note) {
   wake();
   if (note.can_flood && !quota_.take(note.action, clock_.steady_us())) return;
   if (!room_for_record()) return quota_.leave_out(note.action);
-  queue_.audit.push_back(note);
+  queue_->enqueue(note);
 }
 
 // What has no entry is an entry, too: nobody can make the audit silent unseen.
-void Recorder::tell_left_out(bool at_once) {
+void Recorder::record_left_out(bool at_once) {
   for (const auto& [action, count] : quota_.tell(clock_.steady_us(), at_once)) {
     AuditNote note = of_station("audit.left_out", clock_.utc_us());
     note.subject = action;
     note.detail = fmt::format(R"({{"count":{}}})", count);
-    queue_.audit.push_back(std::move(note));
+    queue_->enqueue(std::move(note));
   }
 }
 
 void Recorder::on_clock(const RobotState&, const ClockRecord& record) {
   const std::int64_t boot_key = key_of(record.boot_id);
   if (boot_key == 0 || !room_for_record()) return;
-  queue_.clocks.push_back({boot_key, record});
+  queue_->enqueue(StoredClock{boot_key, record});
   wake();
 }
 
 void Recorder::on_in_force(const RobotState&, const InForceRecord& record) {
   const std::int64_t boot_key = key_of(record.boot_id);
   if (boot_key == 0 || record.first_seq >= kMaxRecordedNumber || !room_for_record()) return;
-  queue_.in_force.push_back({boot_key, record});
+  queue_->enqueue(StoredInForce{boot_key, record});
   wake();
 }
 
 // 0 unless samples of the boot are recorded now.
 std::int64_t Recorder::key_of(BootId boot_id) const {
-  const auto found = boots_.find(boot_id);
-  const bool known = found != boots_.end() && found->second.started && !found->second.replaced;
-  return known ? found->second.recording.key() : 0;
+  const BootEntry* boot = boots_->find_recorded(boot_id);
+  return boot == nullptr ? 0 : boot->recording.key();
 }
 
 bool Recorder::room_for_record() {
-  if (queued_records() < options_.max_queued_records) return true;
+  if (queue_->has_room_for_record()) return true;
   if (counters_.records_refused++ == 0)
     spdlog::error("the disk does not keep up: commands are not recorded, events are asked for again");
   return false;
 }
 
+void Recorder::watch(BootEntry& boot) {
+  boots_->watch(boot);
+  wake();
+}
+
 void Recorder::wake() {
   if (idle_) work_.notify();
+}
+
+std::size_t Recorder::queued_samples() const { return queue_->samples(); }
+
+std::uint64_t Recorder::next_seq(BootId boot_id) const {
+  const BootEntry* boot = boots_->find(boot_id);
+  return boot == nullptr ? 0 : boot->recording.next_seq();
+}
+
+std::vector<Segment> Recorder::waiting(BootId boot_id, Interval samples, std::size_t limit) const {
+  const BootEntry* boot = boots_->find_loaded(boot_id);
+  return boot == nullptr ? std::vector<Segment>{} : waiting_samples(*queue_, *boot, samples, limit);
+}
+
+std::vector<LostRange> Recorder::waiting_gaps(BootId boot_id, Interval samples) const {
+  const BootEntry* boot = boots_->find_loaded(boot_id);
+  return boot == nullptr ? std::vector<LostRange>{} : server::waiting_gaps(*queue_, *boot, samples);
+}
+
+asio::awaitable<bool> Recorder::flush() {
+  enqueue_everything(*boots_, *queue_);
+  co_return co_await flush_until(queue_->end());
+}
+
+asio::awaitable<bool> Recorder::flush(BootId boot_id) {
+  BootEntry* boot = boots_->find(boot_id);
+  if (boot == nullptr || !boot->recording.loaded() || boot->is_stored()) co_return true;
+  queue_->enqueue_segments(*boot, true);
+  co_return co_await flush_until(queue_->end());
+}
+
+asio::awaitable<bool> Recorder::flush_records() { co_return co_await flush_until(queue_->end_of_starts()); }
+
+asio::awaitable<bool> Recorder::flush_boots() {
+  if (!queue_->has_starts()) co_return true;
+  co_return co_await flush_records();
+}
+
+asio::awaitable<bool> Recorder::flush_until(QueuePosition position) {
+  wake();
+  co_return co_await flushes_.wait_for(position);
 }
 
 }  // namespace server

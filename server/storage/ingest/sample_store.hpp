@@ -5,6 +5,7 @@
 // samples into segments; the store numbers their rows and computes the extremes.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -33,6 +34,9 @@ struct StoredInForce {
   std::int64_t boot_key = 0;
   InForceRecord record;
 };
+
+// In one transaction at most.
+inline constexpr std::size_t kMaxCommitSamples = 200'000;
 
 // All that is written in one transaction.
 struct WriteBatch {

@@ -1,0 +1,70 @@
+#include "server/storage/ingest/database_worker.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/storage/database/disk_reserve.hpp"
+#include "server/storage/database/file_check.hpp"
+#include "server/storage/samples/stored_rows.hpp"
+
+namespace server {
+namespace asio = boost::asio;
+
+asio::awaitable<OpenedDatabase> DatabaseWorker::open(std::int64_t utc_us) {
+  auto job = [this, utc_us] { return open_now(utc_us); };
+  co_return co_await disk_.run(std::move(job));
+}
+
+OpenedDatabase DatabaseWorker::open_now(std::int64_t utc_us) {
+  const std::filesystem::path folder = std::filesystem::absolute(path_).parent_path();
+  std::error_code unknown;  // then it counts as much
+  give_up_disk_reserve(path_, std::filesystem::space(folder, unknown).available);
+  database_ = std::make_unique<Database>(path_);
+  store_ = std::make_unique<SampleStore>(*database_);
+  try {
+    fail_unfinished_commands(*database_, utc_us);
+  } catch (const SQLite::Exception& error) {  // SAFETY: with a full disk, too, robots come in and can be stopped
+    spdlog::warn("commands of an earlier start stay unfinished in the record: {}", error.what());
+  }
+  keep_disk_reserve(path_, std::filesystem::space(folder, unknown).available);
+  BootStore boots{*database_};
+  const std::int64_t next_boot_key = boots.next_boot_key();
+  spdlog::info("audit: goes on from {}", text(audit_head(database_->handle())));
+  return {.restored = {database_->store_id(), boots.robots(), pending_stops(*database_)},
+          .next_boot_key = next_boot_key,
+          .restored_at_us = database_->restored_at_us()};
+}
+
+asio::awaitable<std::string> DatabaseWorker::write(const WriteBatch& commit) {
+  auto job = [this, &commit](Database&) { return write_now(commit); };
+  co_return co_await run(std::move(job));
+}
+
+std::string DatabaseWorker::write_now(const WriteBatch& commit) {
+  try {
+    store_->write(commit);
+    return {};
+  } catch (const std::exception& error) {  // disk full, locked, unreadable: never a reason to end the emergency stop
+    return write_problem(error);
+  }
+}
+
+void DatabaseWorker::close(const std::function<void(Database&, std::int64_t)>& last, std::int64_t utc_us,
+                           const AuditNote& stopped) {
+  store_.reset();
+  try {
+    if (last) last(*database_, utc_us);
+    const AuditHead head = append_audit(database_->handle(), stopped);
+    spdlog::info("audit: ends with {}", text(head));
+  } catch (const std::exception& error) {
+    spdlog::warn("the last words of the audit could not be written: {}", error.what());
+  }
+  try {
+    database_->checkpoint();
+  } catch (const std::exception& error) {  // only the log stays longer: it is read at the next start
+    spdlog::warn("the write-ahead log of {} could not be emptied: {}", path_.string(), error.what());
+  }
+  database_.reset();
+}
+
+}  // namespace server

@@ -1,0 +1,74 @@
+#include "server/storage/ingest/robot_admission.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+namespace server {
+namespace asio = boost::asio;
+
+std::optional<Admission> refuse_malformed(const AdmissionRequest& request) {
+  const bool is_malformed = request.next_seq >= kMaxRecordedNumber || request.oldest_seq > request.next_seq ||
+                            request.next_event_seq >= kMaxRecordedNumber || request.robot_time_us >= kMaxRecordedNumber;
+  if (!is_malformed) return std::nullopt;
+  return refusal(rheonaut_REFUSAL_REASON_MALFORMED,
+                 fmt::format("oldest_seq {}, next_seq {}, next_event_seq {} and robot time {} µs cannot be",
+                             request.oldest_seq, request.next_seq, request.next_event_seq, request.robot_time_us));
+}
+
+class RobotAdmission::Turn {
+ public:
+  explicit Turn(RobotAdmission& of) : admission_{of} { admission_.is_asking_ = true; }
+  ~Turn() {
+    admission_.is_asking_ = false;
+    for (const auto& question : admission_.questions_) question->answered.notify();
+  }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+ private:
+  RobotAdmission& admission_;
+};
+
+asio::awaitable<AdmissionOutcome> RobotAdmission::ask(AdmissionQuestion question) {
+  const auto mine = std::make_shared<Question>(loop_, std::move(question));
+  questions_.push_back(mine);
+  while (!mine->outcome) {
+    if (is_asking_) {
+      co_await mine->answered.wait();
+    } else {
+      co_await ask_for_all();
+    }
+  }
+  check_revoked(*mine->outcome, mine->question.request);
+  co_return std::move(*mine->outcome);
+}
+
+asio::awaitable<void> RobotAdmission::ask_for_all() {
+  const Turn turn{*this};
+  std::vector<AdmissionQuestion> questions;
+  for (const auto& waiting : questions_) questions.push_back(waiting->question);
+  auto outcomes = co_await ask_database_(std::move(questions));
+  for (AdmissionOutcome& outcome : outcomes) {
+    questions_.front()->outcome = std::move(outcome);
+    questions_.front()->answered.notify();
+    questions_.pop_front();
+  }
+}
+
+void RobotAdmission::set_revoked(const RobotId& robot_id, bool revoked) {
+  revoked ? static_cast<void>(revoked_.insert(robot_id)) : static_cast<void>(revoked_.erase(robot_id));
+}
+
+void RobotAdmission::check_revoked(AdmissionOutcome& outcome, const AdmissionRequest& request) const {
+  if (outcome.admission.refusal != rheonaut_REFUSAL_REASON_NONE) return;
+  if (revoked_.contains(request.robot_id)) {  // since the disk was asked
+    outcome.admission = revoked(request.robot_id);
+  } else if (outcome.admission.newly_enrolled) {
+    spdlog::info("robot '{}' enrolled from loopback {} a token", request.robot_id,
+                 request.token.empty() ? "without" : "with");
+  }
+}
+
+}  // namespace server
