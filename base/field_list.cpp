@@ -5,16 +5,16 @@
 
 #include "base/invalid_argument.hpp"
 
-namespace sim_robot {
+namespace base {
 
 std::string number_text(double value) {
-  return std::isinf(value) ? (value > 0 ? "for ever" : "since ever") : control::join_text(value);
+  return std::isinf(value) ? (value > 0 ? "for ever" : "since ever") : join_text(value);
 }
 
 std::string range_text(Range range) {
   if (std::isinf(range.minimum) && std::isinf(range.maximum)) return "any number";
-  if (std::isinf(range.maximum)) return control::join_text(range.minimum, " or more");
-  return control::join_text(range.minimum, " to ", range.maximum);
+  if (std::isinf(range.maximum)) return join_text(range.minimum, " or more");
+  return join_text(range.minimum, " to ", range.maximum);
 }
 
 bool Field::must_be_given() const {
@@ -76,4 +76,4 @@ void FieldList::within(const std::string& prefix, const Inside& inside) {
 
 void FieldList::must(const std::function<void()>&) {}
 
-}  // namespace sim_robot
+}  // namespace base

@@ -8,7 +8,7 @@
 
 #include "base/fields.hpp"
 
-namespace sim_robot {
+namespace base {
 
 struct Field {
   std::string key;  // with the tables it is in: vessel.pump.ramp_s, glucose.patches[].length_m
@@ -46,4 +46,4 @@ class FieldList final : public Fields {
   std::string prefix_;
 };
 
-}  // namespace sim_robot
+}  // namespace base

@@ -6,9 +6,9 @@
 #include <sstream>
 
 #include "base/field_list.hpp"
-#include "base/invalid_argument.hpp"
+#include "base/toml_value.hpp"
 
-namespace sim_robot {
+namespace base {
 namespace {
 
 constexpr std::size_t kMaxShown = 60;
@@ -75,12 +75,12 @@ FieldReader::FieldReader(const toml::table& table, const std::string& origin, st
     : table_(table), origin_(origin), path_(std::move(path)) {}
 
 void FieldReader::fail(const toml::source_position& at, const std::string& key, const std::string& why) const {
-  control::throw_invalid(place(at), path_, key, ": ", why);
+  throw_invalid(place(at), path_, key, ": ", why);
 }
 
 std::string FieldReader::place(const toml::source_position& at) const {
   std::string text = origin_;
-  if (at) text += control::join_text(":", at.line, ":", at.column);
+  if (at) text += join_text(":", at.line, ":", at.column);
   return text.empty() ? "" : text + ": ";
 }
 
@@ -94,7 +94,7 @@ std::string FieldReader::meant_for(const std::string& key) const {
   for (const auto& [given, value] : table_) {
     const std::string name{given.str()};
     if (std::ranges::find(known_, name) == known_.end() && !nearest(name, wanted).empty()) {
-      return control::join_text("; is '", cut(name), "' in line ", given.source().begin.line, " meant for it?");
+      return join_text("; is '", cut(name), "' in line ", given.source().begin.line, " meant for it?");
     }
   }
   return "";
@@ -110,19 +110,18 @@ const toml::node* FieldReader::find(const char* key, bool must_be_given, const c
 void FieldReader::number(const char* key, double& value, Range range, const char* what) {
   const toml::node* node = find(key, std::isnan(value), what);
   if (node == nullptr) return;
-  if (!node->is_number()) fail(*node, key, "must be a number, is " + shown(*node));
-  value = node->value<double>().value();
-  if (!(value >= range.minimum && value <= range.maximum)) {
-    fail(*node, key, "is " + shown(*node) + ", allowed is " + range_text(range));
-  }
+  const auto given = exact<double>(*node);
+  if (!given) fail(*node, key, "must be a number, is " + shown(*node));
+  if (!range.holds(*given)) fail(*node, key, "is " + shown(*node) + ", allowed is " + range_text(range));
+  value = *given;
 }
 
 void FieldReader::whole(const char* key, std::uint64_t& value, Range range, const char* what) {
   const toml::node* node = find(key, false, what);
   if (node == nullptr) return;
-  const auto given = node->value_exact<std::int64_t>();
+  const auto given = exact<std::int64_t>(*node);
   if (!given) fail(*node, key, "must be a whole number, is " + shown(*node));
-  if (*given < 0 || static_cast<double>(*given) < range.minimum || static_cast<double>(*given) > range.maximum) {
+  if (*given < 0 || !range.holds(static_cast<double>(*given))) {
     fail(*node, key, "is " + shown(*node) + ", allowed is " + range_text(range));
   }
   value = static_cast<std::uint64_t>(*given);
@@ -131,15 +130,17 @@ void FieldReader::whole(const char* key, std::uint64_t& value, Range range, cons
 void FieldReader::flag(const char* key, bool& value, const char* what) {
   const toml::node* node = find(key, false, what);
   if (node == nullptr) return;
-  if (!node->is_boolean()) fail(*node, key, "must be true or false, is " + shown(*node));
-  value = node->as_boolean()->get();
+  const auto given = exact<bool>(*node);
+  if (!given) fail(*node, key, "must be true or false, is " + shown(*node));
+  value = *given;
 }
 
 void FieldReader::text(const char* key, std::string& value, const char* what) {
   const toml::node* node = find(key, value.empty(), what);
   if (node == nullptr) return;
-  if (!node->is_string()) fail(*node, key, "must be a text in quotes, is " + shown(*node));
-  value = node->as_string()->get();
+  const auto given = exact<std::string>(*node);
+  if (!given) fail(*node, key, "must be a text in quotes, is " + shown(*node));
+  value = *given;
 }
 
 void FieldReader::choice(const char* key, std::size_t& index, std::span<const char* const> names, const char* what) {
@@ -173,7 +174,7 @@ void FieldReader::tables(const char* key, const char* what, const Inside& inside
   const toml::array* all = node->as_array();
   if (all == nullptr) fail(*node, key, "must be a list of tables, [[" + path_ + key + "]], is " + shown(*node));
   for (std::size_t i = 0; i < all->size(); ++i) {
-    read_table(*all->get(i), control::join_text(key, "[", i, "]"), inside);
+    read_table(*all->get(i), join_text(key, "[", i, "]"), inside);
   }
 }
 
@@ -189,7 +190,7 @@ void FieldReader::must(const std::function<void()>& check) {
         fail(value, name, why);
     }
     const std::string table = path_.empty() ? "" : path_.substr(0, path_.size() - 1) + ": ";
-    control::throw_invalid(place(table_.source().begin), table, why);
+    throw_invalid(place(table_.source().begin), table, why);
   }
 }
 
@@ -201,4 +202,4 @@ void FieldReader::finish() const {
   }
 }
 
-}  // namespace sim_robot
+}  // namespace base

@@ -11,7 +11,7 @@
 
 #include "base/fields.hpp"
 
-namespace sim_robot {
+namespace base {
 
 class FieldReader final : public Fields {
  public:
@@ -47,4 +47,4 @@ class FieldReader final : public Fields {
 // One of the names that is nearly the text, or empty when none is.
 std::string nearest(const std::string& text, std::span<const std::string> names);
 
-}  // namespace sim_robot
+}  // namespace base

@@ -11,13 +11,15 @@
 #include <span>
 #include <string>
 
-namespace sim_robot {
+namespace base {
 
 constexpr double kForEver = std::numeric_limits<double>::infinity();
 constexpr double kMustBeGiven = std::numeric_limits<double>::quiet_NaN();
 
 struct Range {
   double minimum = -kForEver, maximum = kForEver;  // both allowed
+
+  bool holds(double value) const { return value >= minimum && value <= maximum; }  // false for NaN
 };
 
 class Fields {
@@ -42,4 +44,4 @@ class Fields {
   virtual void must(const std::function<void()>& check) = 0;
 };
 
-}  // namespace sim_robot
+}  // namespace base

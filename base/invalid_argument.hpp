@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace control {
+namespace base {
 
 // The parts one after the other, numbers with ten digits.
 template <class... Parts>
@@ -24,4 +24,4 @@ template <class... Parts>
 
 inline bool is_positive(double value) { return value > 0 && std::isfinite(value); }
 
-}  // namespace control
+}  // namespace base

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <cmath>
 
-namespace server {
+namespace base {
 
 nlohmann::json decimal(float value) {
   if (!std::isfinite(value)) return nullptr;
@@ -19,4 +19,4 @@ std::string dump(const nlohmann::json& value) {
   return value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-}  // namespace server
+}  // namespace base

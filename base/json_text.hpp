@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-namespace server {
+namespace base {
 
 // A float as the shortest decimal that gives the same float back: 0.1, not 0.10000000149011612. null unless finite.
 nlohmann::json decimal(float value);
@@ -12,4 +12,4 @@ nlohmann::json decimal(float value);
 // The text of a JSON value; bytes that are not UTF-8 are replaced.
 std::string dump(const nlohmann::json& value);
 
-}  // namespace server
+}  // namespace base

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-namespace server {
+namespace base {
 
 template <std::integral Number>
 void append_number(std::string& out, Number value) {
@@ -29,4 +29,4 @@ inline void append_float(std::string& out, float value, std::string_view otherwi
   out.append(digits, written.ptr);
 }
 
-}  // namespace server
+}  // namespace base

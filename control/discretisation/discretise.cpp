@@ -32,21 +32,21 @@ constexpr double kTriedA[] = {0.0, 0.25, 0.5, 0.8, 0.9, 1.0};
 
 template <class... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
-  throw_invalid("discretisation: ", parts...);
+  base::throw_invalid("discretisation: ", parts...);
 }
 
 void check(const FopdController& controller, const DiscretisationOptions& options) {
   check(controller);
-  if (!is_positive(options.period_s)) refuse("period_s must be positive, is ", options.period_s);
+  if (!base::is_positive(options.period_s)) refuse("period_s must be positive, is ", options.period_s);
   if (options.order < 1 || options.order > kLargestOrder) {
     refuse("order must lie in 1..", kLargestOrder, ", is ", options.order);
   }
-  if (!is_positive(options.loop_bandwidth_rad_s)) {
+  if (!base::is_positive(options.loop_bandwidth_rad_s)) {
     refuse("loop_bandwidth_rad_s must be positive, is ", options.loop_bandwidth_rad_s);
   }
   if (options.method == DiscretisationMethod::oustaloup) {
     const double low = options.band_low_rad_s, high = options.band_high_rad_s;
-    if (is_positive(low) && high > low && std::isfinite(high)) return;
+    if (base::is_positive(low) && high > low && std::isfinite(high)) return;
     refuse("the band must have 0 < band_low_rad_s < band_high_rad_s, has ", low, " and ", high);
   }
   if (!(options.a >= 0 && options.a <= 1)) refuse("a must lie in [0, 1], is ", options.a);
@@ -133,9 +133,9 @@ void add_transfer(Discretisation& result) {
     return;
   }
   result.transfer_note =
-      join_text("no numerator and denominator: with poles this near 1 (order ", result.options.order, " at ", period_s,
-                " s) coefficients in double are off by ", std::setprecision(2), 100 * result.transfer_max_relative,
-                " % of the response; run the sections, which are not");
+      base::join_text("no numerator and denominator: with poles this near 1 (order ", result.options.order, " at ",
+                      period_s, " s) coefficients in double are off by ", std::setprecision(2),
+                      100 * result.transfer_max_relative, " % of the response; run the sections, which are not");
 }
 
 // Why not, without naming the options.
@@ -155,7 +155,7 @@ std::expected<Discretisation, std::string> try_discretise(const FopdController& 
     fit_max_relative = max_fit_error(result.sections, options.period_s, controller, options.a,
                                      error_frequencies(options.period_s, options.loop_bandwidth_rad_s));
     if (!(fit_max_relative <= kUselessFit)) {
-      return std::unexpected(join_text("fits only to ", std::setprecision(3), 100 * fit_max_relative, " %"));
+      return std::unexpected(base::join_text("fits only to ", std::setprecision(3), 100 * fit_max_relative, " %"));
     }
   }
   result.dc_gain_before = dc_gain(result.sections);
@@ -175,7 +175,7 @@ std::expected<Discretisation, std::string> try_discretise(const FopdController& 
 
 std::string name_of(const DiscretisationOptions& options) {
   if (options.method == DiscretisationMethod::oustaloup) return "Oustaloup and Tustin";
-  return join_text("direct method with a = ", options.a);
+  return base::join_text("direct method with a = ", options.a);
 }
 
 // What works where these options do not: every one has been tried.
@@ -184,9 +184,9 @@ std::string advice(const FopdController& controller, const DiscretisationOptions
   const auto works = [&](const DiscretisationOptions& options, const std::string& name) {
     const auto tried = try_discretise(controller, options);
     if (!tried || !tried->is_stable) return false;
-    advice += join_text(advice.empty() ? "" : ", ", name, std::setprecision(2), " (off by ",
-                        100 * tried->errors.max_relative_in_bandwidth, " % below ", std::setprecision(4),
-                        tried->errors.bandwidth_rad_s, " rad/s)");
+    advice += base::join_text(advice.empty() ? "" : ", ", name, std::setprecision(2), " (off by ",
+                              100 * tried->errors.max_relative_in_bandwidth, " % below ", std::setprecision(4),
+                              tried->errors.bandwidth_rad_s, " rad/s)");
     return true;
   };
   DiscretisationOptions options = refused;
@@ -194,14 +194,14 @@ std::string advice(const FopdController& controller, const DiscretisationOptions
     bool is_found = false;
     for (const int order : {refused.order + distance, refused.order - distance}) {
       options.order = order;
-      is_found = is_found || (order >= 1 && order <= kLargestOrder && works(options, join_text("order ", order)));
+      is_found = is_found || (order >= 1 && order <= kLargestOrder && works(options, base::join_text("order ", order)));
     }
     if (is_found) break;
   }
   options = refused;
   for (const double a : kTriedA) {
     options.a = a;
-    if (a != refused.a && works(options, join_text("a = ", a))) break;
+    if (a != refused.a && works(options, base::join_text("a = ", a))) break;
   }
   options = refused;
   options.method = DiscretisationMethod::oustaloup;
@@ -244,8 +244,9 @@ std::string reason_for(const DiscretisationChoice& choice) {
 Discretisation discretise(const FopdController& controller, const DiscretisationOptions& options) {
   auto result = try_discretise(controller, options);
   if (!result) {
-    throw std::runtime_error(join_text("discretisation: the ", name_of(options), " of order ", options.order, " at ",
-                                       options.period_s, " s ", result.error(), "; ", advice(controller, options)));
+    throw std::runtime_error(base::join_text("discretisation: the ", name_of(options), " of order ", options.order,
+                                             " at ", options.period_s, " s ", result.error(), "; ",
+                                             advice(controller, options)));
   }
   return *std::move(result);
 }
@@ -262,7 +263,7 @@ DiscretisationChoice choose_discretisation(const FopdController& controller, dou
     if (!tried) {
       choice.refused.push_back({name_of(options), tried.error()});
     } else if (!tried->is_stable) {
-      choice.refused.push_back({name_of(options), join_text("has a pole of magnitude ", tried->largest_pole)});
+      choice.refused.push_back({name_of(options), base::join_text("has a pole of magnitude ", tried->largest_pole)});
     } else {
       choice.compared.push_back(*std::move(tried));
     }
@@ -275,9 +276,9 @@ DiscretisationChoice choose_discretisation(const FopdController& controller, dou
   compare();
   if (choice.compared.empty()) {
     std::string reasons;
-    for (const auto& [name, reason] : choice.refused) reasons += join_text("; the ", name, " ", reason);
+    for (const auto& [name, reason] : choice.refused) reasons += base::join_text("; the ", name, " ", reason);
     throw std::runtime_error(
-        join_text("discretisation: nothing stable at ", period_s, " s with order ", order, reasons));
+        base::join_text("discretisation: nothing stable at ", period_s, " s with order ", order, reasons));
   }
   const auto is_better = [](const Discretisation& left, const Discretisation& right) {
     if (is_accurate(left) != is_accurate(right)) return is_accurate(left);

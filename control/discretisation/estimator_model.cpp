@@ -269,17 +269,17 @@ double fit_error_of(const EstimatorSections& sections, const Target& target, dou
 std::string reason_of(const FractionalModel& plant, double fit_error, const Target& target) {
   const double final_velocity_m_s = plant.kp / plant.b3;
   if (std::abs(final_velocity_m_s) > kLargestParameterM_S) {
-    return join_text("the plant's final velocity is ", final_velocity_m_s,
-                     " m/s per duty, and the robot's gains end at ", kLargestParameterM_S, " m/s");
+    return base::join_text("the plant's final velocity is ", final_velocity_m_s,
+                           " m/s per duty, and the robot's gains end at ", kLargestParameterM_S, " m/s");
   }
   const double overshoot = *std::ranges::max_element(target.velocity) - 1;
-  return join_text("four first-order sections come no nearer to the plant's step response than ",
-                   std::round(1e4 * fit_error) / 100, " % of the final velocity, and the robot needs ",
-                   100 * kLargestFitError, " %",
-                   overshoot > kOvershoots ? join_text("; the plant overshoots by ", std::round(1e3 * overshoot) / 10,
-                                                       " %, which sections without oscillation follow badly")
-                                           : std::string{},
-                   plant.dead_time_s > 0 ? "; the plant has a dead time, and sections have none" : "");
+  return base::join_text(
+      "four first-order sections come no nearer to the plant's step response than ", std::round(1e4 * fit_error) / 100,
+      " % of the final velocity, and the robot needs ", 100 * kLargestFitError, " %",
+      overshoot > kOvershoots ? base::join_text("; the plant overshoots by ", std::round(1e3 * overshoot) / 10,
+                                                " %, which sections without oscillation follow badly")
+                              : std::string{},
+      plant.dead_time_s > 0 ? "; the plant has a dead time, and sections have none" : "");
 }
 
 }  // namespace

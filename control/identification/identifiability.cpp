@@ -51,11 +51,10 @@ std::string sigma_words(std::size_t parameter, std::optional<double> sigma, doub
 }
 
 bool can_be_planned_with(const FractionalModel& m, const PlannedExperiment& plan) {
-  const auto is_positive = [](double value) { return value > 0 && std::isfinite(value); };
   const auto is_sd = [](double value) { return value >= 0 && std::isfinite(value); };
-  return is_positive(m.kp) && is_positive(m.b2) && is_positive(m.b3) && m.b1 >= 0 && std::isfinite(m.b1) &&
-         m.beta > 0 && m.beta <= 1 && m.alpha > m.beta && m.alpha <= 2 && is_sd(plan.position_sd_m) &&
-         is_sd(plan.velocity_sd_m_s) && is_sd(plan.acceleration_sd_m_s2) &&
+  return base::is_positive(m.kp) && base::is_positive(m.b2) && base::is_positive(m.b3) && m.b1 >= 0 &&
+         std::isfinite(m.b1) && m.beta > 0 && m.beta <= 1 && m.alpha > m.beta && m.alpha <= 2 &&
+         is_sd(plan.position_sd_m) && is_sd(plan.velocity_sd_m_s) && is_sd(plan.acceleration_sd_m_s2) &&
          plan.position_sd_m + plan.velocity_sd_m_s + plan.acceleration_sd_m_s2 > 0;
 }
 
@@ -160,8 +159,9 @@ void add_at_bounds(const Fit& fit, const IdentificationOptions& options, std::ve
 
 void add_constant_duty(const Recording& recording, std::vector<std::string>& warnings) {
   if (!std::ranges::all_of(recording.duty, [&](double duty) { return duty == recording.duty.front(); })) return;
-  warnings.push_back(join_text("the duty is ", recording.duty.front(), " throughout: a single step shows fast terms ",
-                               "only in its first samples; change the duty during the run"));
+  warnings.push_back(base::join_text("the duty is ", recording.duty.front(),
+                                     " throughout: a single step shows fast terms ",
+                                     "only in its first samples; change the duty during the run"));
 }
 
 }  // namespace
@@ -190,26 +190,29 @@ std::string end_words(SearchEnd end) {
 std::vector<std::string> search_doubts(const Fit& fit, const IdentificationOptions& options) {
   std::vector<std::string> warnings;
   if (fit.starts == 0) {
-    warnings.push_back(join_text("the search ", end_words(fit.end),
-                                 " before its first iteration: the parameters are the paper's start, with the best "
-                                 "gain, and say nothing; raise the limit"));
+    warnings.push_back(
+        base::join_text("the search ", end_words(fit.end),
+                        " before its first iteration: the parameters are the paper's start, with the best "
+                        "gain, and say nothing; raise the limit"));
   } else if (fit.end == SearchEnd::not_finite) {
-    warnings.push_back(join_text("the search ", end_words(fit.end), " after ", fit.iterations,
-                                 " iterations: the parameters are the best so far; check the units of the recording"));
+    warnings.push_back(
+        base::join_text("the search ", end_words(fit.end), " after ", fit.iterations,
+                        " iterations: the parameters are the best so far; check the units of the recording"));
   } else if (fit.end != SearchEnd::converged) {
-    warnings.push_back(join_text("the search ", end_words(fit.end), " after ", fit.iterations, " iterations of start ",
-                                 fit.starts, " of ", 1 + options.further_starts,
-                                 ": the parameters are the best so far, not the optimum; raise the limit"));
+    warnings.push_back(base::join_text("the search ", end_words(fit.end), " after ", fit.iterations,
+                                       " iterations of start ", fit.starts, " of ", 1 + options.further_starts,
+                                       ": the parameters are the best so far, not the optimum; raise the limit"));
   }
   if (dead_time_is_at_its_limit(fit, options)) {
-    warnings.push_back(join_text("the dead time, ", fit.model.dead_time_s, " s, lies at the longest that was allowed, ",
-                                 options.longest_dead_time_s,
-                                 " s: the other parameters make up for what it lacks; allow a longer one"));
+    warnings.push_back(base::join_text("the dead time, ", fit.model.dead_time_s,
+                                       " s, lies at the longest that was allowed, ", options.longest_dead_time_s,
+                                       " s: the other parameters make up for what it lacks; allow a longer one"));
   }
   if (fit.starts > 1 && fit.starts_that_agree < 2) {
-    warnings.push_back(join_text("only ", fit.starts_that_agree, " of ", fit.starts,
-                                 " starts reached the best cost: it may be a local minimum; raise further_starts or "
-                                 "the iteration limit"));
+    warnings.push_back(
+        base::join_text("only ", fit.starts_that_agree, " of ", fit.starts,
+                        " starts reached the best cost: it may be a local minimum; raise further_starts or "
+                        "the iteration limit"));
   }
   return warnings;
 }

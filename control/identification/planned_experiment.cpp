@@ -18,7 +18,9 @@ constexpr double kModelTolerance = 1e-9;
 constexpr double kLargestDuty = 1e3;
 constexpr Index kSensorUnknowns = 3;  // of an acceleration: bias, drift, lag
 
-[[noreturn]] void refuse(const char* what, double value) { throw_invalid("planned experiment: ", what, ' ', value); }
+[[noreturn]] void refuse(const char* what, double value) {
+  base::throw_invalid("planned experiment: ", what, ' ', value);
+}
 
 void check(const PlannedExperiment& experiment) {
   if (!(experiment.dt_s >= 1e-6 && experiment.dt_s <= 1e4))

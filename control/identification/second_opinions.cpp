@@ -203,18 +203,20 @@ std::vector<std::string> lag_doubts(const Recording& recording, const Identifica
   const SensorFit& sensor = *fit.sensor;
   const bool finds_dead_time = options.longest_dead_time_s > 0;
   if (sensor.delay_is_at_limit && !finds_dead_time) {
-    return {join_text("the sensor's readings came out ", 1e3 * sensor.delay_s,
-                      " ms late, the most that is searched for without a dead time: the other parameters make up for "
-                      "what it lacks; search for a dead time (--dead-time-s)")};
+    return {
+        base::join_text("the sensor's readings came out ", 1e3 * sensor.delay_s,
+                        " ms late, the most that is searched for without a dead time: the other parameters make up for "
+                        "what it lacks; search for a dead time (--dead-time-s)")};
   }
   // How old samples in step with the ticks are is not known: up to a period.
   const double late_s = sensor.delay_s - options.sensor_lag_s.value_or(0), half_period_s = recording.dt_s / 2;
   const double at_least_s = late_s - (sensor.has_own_clock ? half_period_s : 2 * half_period_s);
   const double at_most_s = late_s - (sensor.has_own_clock ? half_period_s : 0);
   if (options.sensor_lag_s && at_most_s < -kNoticeableLagS) {
-    return {join_text("the sensor's readings come ", 1e3 * (at_most_s + *options.sensor_lag_s),
-                      " ms late at most, less than the sensor's own lag that was given, ", 1e3 * *options.sensor_lag_s,
-                      " ms, which hides any dead time: give the lag that it has, in seconds (--sensor-lag-s)")};
+    return {base::join_text("the sensor's readings come ", 1e3 * (at_most_s + *options.sensor_lag_s),
+                            " ms late at most, less than the sensor's own lag that was given, ",
+                            1e3 * *options.sensor_lag_s,
+                            " ms, which hides any dead time: give the lag that it has, in seconds (--sensor-lag-s)")};
   }
   if (!(at_least_s > kNoticeableLagS)) return {};
   std::ostringstream text;

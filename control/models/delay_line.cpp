@@ -17,7 +17,7 @@ constexpr double kMostSteps = 1e6;
 DelayLine::DelayLine(double dead_time_s, double dt_s) {
   const double steps = dead_time_s / dt_s;
   if (!(steps >= 0 && steps <= kMostSteps)) {
-    throw_invalid("dead time: dead_time_s ", dead_time_s, " must be 0 to 1e6 steps of ", dt_s, " s");
+    base::throw_invalid("dead time: dead_time_s ", dead_time_s, " must be 0 to 1e6 steps of ", dt_s, " s");
   }
   const double whole = std::floor(steps + kWhole), rest = steps - whole;
   if (rest > kWhole) earlier_share_ = rest;

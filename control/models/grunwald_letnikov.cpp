@@ -11,7 +11,9 @@ namespace {
 
 constexpr std::size_t kMostSamples = 200'000;
 
-[[noreturn]] void refuse(const char* what, double value) { throw_invalid("Grünwald-Letnikov: ", what, ' ', value); }
+[[noreturn]] void refuse(const char* what, double value) {
+  base::throw_invalid("Grünwald-Letnikov: ", what, ' ', value);
+}
 
 // c_0 .. c_{count-1} of (1).
 std::vector<double> coefficients(const FractionalModel& model, double dt_s, std::size_t count) {
@@ -34,8 +36,8 @@ std::vector<double> grunwald_letnikov_velocity(const FractionalModel& model, dou
   if (model.dead_time_s > 0) refuse("the model must have no dead time, has", model.dead_time_s);
   if (!(dt_s > 0 && std::isfinite(dt_s))) refuse("dt_s must be positive, is", dt_s);
   if (duty.size() > kMostSamples) {
-    throw_invalid("Grünwald-Letnikov: at most ", kMostSamples, " samples, there are ", duty.size(),
-                  "; lengthen dt_s, or use step_response or ModalPlant");
+    base::throw_invalid("Grünwald-Letnikov: at most ", kMostSamples, " samples, there are ", duty.size(),
+                        "; lengthen dt_s, or use step_response or ModalPlant");
   }
   for (const double u : duty) {
     if (!std::isfinite(u)) refuse("duty must be finite, is", u);

@@ -21,13 +21,13 @@ constexpr double kLargestLogRate = 4e4;      // where those are given up: enough
 
 void check(const ModalRange& range) {
   if (!(range.shortest_s > 0 && std::isfinite(range.shortest_s))) {
-    throw_invalid("modal form: shortest_s must be positive, is ", range.shortest_s);
+    base::throw_invalid("modal form: shortest_s must be positive, is ", range.shortest_s);
   }
   if (!(range.longest_s > range.shortest_s && std::isfinite(range.longest_s))) {
-    throw_invalid("modal form: longest_s must be above shortest_s, is ", range.longest_s);
+    base::throw_invalid("modal form: longest_s must be above shortest_s, is ", range.longest_s);
   }
   if (!(range.tolerance >= 1e-14 && range.tolerance <= 0.1)) {
-    throw_invalid("modal form: tolerance must lie in [1e-14, 0.1], is ", range.tolerance);
+    base::throw_invalid("modal form: tolerance must lie in [1e-14, 0.1], is ", range.tolerance);
   }
 }
 

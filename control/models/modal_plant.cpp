@@ -17,7 +17,7 @@ constexpr double kSettled = 1e-17;  // what is left of a mode after one step, wh
 
 ModalPlant::Modes::Modes(const FractionalModel& of_model, double of_dt_s) : model(of_model), dt_s(of_dt_s) {
   if (!(dt_s > 0 && std::isfinite(dt_s))) {
-    throw_invalid("modal plant: dt_s must be positive and finite, is ", dt_s);
+    base::throw_invalid("modal plant: dt_s must be positive and finite, is ", dt_s);
   }
   const ModalForm form = modal_form(model, kRange);
   const double earlier_s = DelayLine{model.dead_time_s, dt_s}.earlier_share() * dt_s, later_s = dt_s - earlier_s;

@@ -11,7 +11,7 @@ namespace {
 
 using std::numbers::pi;
 
-[[noreturn]] void refuse(const char* what, double value) { throw_invalid(what, ' ', value); }
+[[noreturn]] void refuse(const char* what, double value) { base::throw_invalid(what, ' ', value); }
 
 void check_positive(const char* what, double value) {
   if (!(value > 0 && std::isfinite(value))) refuse(what, value);

@@ -10,7 +10,7 @@ namespace {
 
 void check_limit(const char* name, double value) {
   if (value >= 0 && std::isfinite(value)) return;
-  throw_invalid("reference profile: ", name, " must be positive, or 0 for no limit, is ", value);
+  base::throw_invalid("reference profile: ", name, " must be positive, or 0 for no limit, is ", value);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace control {
 namespace {
 
-[[noreturn]] void refuse(const char* what, double value) { throw_invalid("controller: ", what, ' ', value); }
+[[noreturn]] void refuse(const char* what, double value) { base::throw_invalid("controller: ", what, ' ', value); }
 
 }  // namespace
 

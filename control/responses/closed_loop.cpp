@@ -18,13 +18,13 @@ constexpr double kBandFraction = 0.02;
 
 void require(bool is_good, const char* what, double value) {
   if (is_good) return;
-  throw_invalid("closed loop: ", what, ", is ", value);
+  base::throw_invalid("closed loop: ", what, ", is ", value);
 }
 
 void check(const ClosedLoopExperiment& e) {
   check(e.plant);
-  require(is_positive(e.period_s), "period_s must be positive", e.period_s);
-  require(is_positive(e.duration_s), "duration_s must be positive", e.duration_s);
+  require(base::is_positive(e.period_s), "period_s must be positive", e.period_s);
+  require(base::is_positive(e.duration_s), "duration_s must be positive", e.duration_s);
   require(e.duration_s / e.period_s <= kMostSamples,
           "duration_s must be at most 1e6 periods: shorten it or lengthen period_s", e.duration_s);
   require(std::isfinite(e.setpoint_m), "setpoint_m must be finite", e.setpoint_m);

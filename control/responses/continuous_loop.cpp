@@ -121,8 +121,9 @@ std::vector<Complex> log_zeros(const Loop& loop) {
     low = bisect(low, kLastAngleRad, [&](double angle_rad) { return zeros_before(loop, angle_rad) <= before; });
     zeros.push_back(zero_at(loop, low));
     if (std::abs(zeros.back().imag() - low) < 1e-6) continue;
-    throw_invalid("continuous loop: found no closed-loop pole at ", low, " rad, where one must be; please report the ",
-                  "plant and kp ", loop.controller.kp, ", kd ", loop.controller.kd, ", mu ", loop.controller.mu);
+    base::throw_invalid("continuous loop: found no closed-loop pole at ", low,
+                        " rad, where one must be; please report the ", "plant and kp ", loop.controller.kp, ", kd ",
+                        loop.controller.kd, ", mu ", loop.controller.mu);
   }
   return zeros;
 }
@@ -130,20 +131,20 @@ std::vector<Complex> log_zeros(const Loop& loop) {
 Loop checked(const FractionalModel& plant, const FopdController& controller) {
   check(plant);
   check(controller);
-  if (!(plant.kp > 0)) throw_invalid("continuous loop: the plant's kp must be positive, is ", plant.kp);
+  if (!(plant.kp > 0)) base::throw_invalid("continuous loop: the plant's kp must be positive, is ", plant.kp);
   if (plant.dead_time_s > 0) {
-    throw_invalid("continuous loop: the plant must have no dead time, has ", plant.dead_time_s,
-                  " s; predict_closed_loop takes one");
+    base::throw_invalid("continuous loop: the plant must have no dead time, has ", plant.dead_time_s,
+                        " s; predict_closed_loop takes one");
   }
   if (controller.kd > 0 && controller.mu > plant_order(plant) - kLeastExcess) {
-    throw_invalid("continuous loop: mu must be at most ", plant_order(plant) - kLeastExcess,
-                  " with this plant, or the loop follows at once, is ", controller.mu);
+    base::throw_invalid("continuous loop: mu must be at most ", plant_order(plant) - kLeastExcess,
+                        " with this plant, or the loop follows at once, is ", controller.mu);
   }
   Loop loop{plant, controller};
   loop.log_rate = crossover_log_rate(loop);
   if (zeros_before(loop, pi / 2) != 0) {
-    throw_invalid("continuous loop: kp ", controller.kp, ", kd ", controller.kd, ", mu ", controller.mu,
-                  " make the loop with this plant unstable; take a lower kp");
+    base::throw_invalid("continuous loop: kp ", controller.kp, ", kd ", controller.kd, ", mu ", controller.mu,
+                        " make the loop with this plant unstable; take a lower kp");
   }
   return loop;
 }
@@ -164,7 +165,7 @@ std::pair<double, double> widest_gap(const std::vector<Complex>& zeros) {
 }  // namespace
 
 ContinuousLoop::ContinuousLoop(const FractionalModel& plant, const FopdController& controller, double ray) {
-  if (!(ray > 0 && ray < 1)) throw_invalid("continuous loop: ray must lie in (0, 1), is ", ray);
+  if (!(ray > 0 && ray < 1)) base::throw_invalid("continuous loop: ray must lie in (0, 1), is ", ray);
   const Loop loop = checked(plant, controller);
   rate_rad_s_ = std::exp(loop.log_rate);
   const std::vector<Complex> zeros = log_zeros(loop);
@@ -193,7 +194,7 @@ std::span<const ContinuousLoop::Node> ContinuousLoop::living(double time_s) cons
 }
 
 double ContinuousLoop::position(double time_s) const {
-  if (!(time_s >= 0)) throw_invalid("continuous loop: time_s must be 0 or positive, is ", time_s);
+  if (!(time_s >= 0)) base::throw_invalid("continuous loop: time_s must be 0 or positive, is ", time_s);
   if (time_s == 0) return 0;
   double sum = -std::expm1(-rate_rad_s_ * time_s);
   for (const auto& pole : poles_) sum += (pole.weight * std::exp(pole.rate * time_s)).imag();
@@ -202,7 +203,7 @@ double ContinuousLoop::position(double time_s) const {
 }
 
 double ContinuousLoop::velocity(double time_s) const {
-  if (!(time_s > 0)) throw_invalid("continuous loop: time_s must be positive, is ", time_s);
+  if (!(time_s > 0)) base::throw_invalid("continuous loop: time_s must be positive, is ", time_s);
   double sum = rate_rad_s_ * std::exp(-rate_rad_s_ * time_s);
   for (const auto& pole : poles_) sum += (pole.weight * pole.rate * std::exp(pole.rate * time_s)).imag();
   for (const auto& node : living(time_s)) sum += (node.weight * node.rate * std::exp(node.rate * time_s)).imag();
@@ -211,7 +212,7 @@ double ContinuousLoop::velocity(double time_s) const {
 
 ContinuousStep measure_continuous_step(const ContinuousLoop& loop, double horizon_s) {
   if (!(horizon_s > 0 && std::isfinite(horizon_s))) {
-    throw_invalid("continuous loop: horizon_s must be positive, is ", horizon_s);
+    base::throw_invalid("continuous loop: horizon_s must be positive, is ", horizon_s);
   }
   ContinuousStep step;
   const double wanted = std::max(kGridPoints, horizon_s * loop.rate_rad_s() / kGridPerRate);

@@ -20,7 +20,7 @@ constexpr double kListedLogGain = -2.3;  // ln 0.1: phase crossovers that a dead
 
 void check_frequency(double omega_rad_s) {
   if (omega_rad_s > 0 && std::isfinite(omega_rad_s)) return;
-  throw_invalid("frequency must be positive and finite, is ", omega_rad_s, " rad/s");
+  base::throw_invalid("frequency must be positive and finite, is ", omega_rad_s, " rad/s");
 }
 
 // One real quantity along the axis, with its slope in ln ω.
@@ -282,8 +282,8 @@ std::vector<double> log_spaced(double first_rad_s, double last_rad_s, int count)
   check_frequency(first_rad_s);
   check_frequency(last_rad_s);
   if (!(last_rad_s > first_rad_s && count >= 2)) {
-    throw_invalid("frequencies: need at least 2 from low to high, not ", count, " from ", first_rad_s, " to ",
-                  last_rad_s, " rad/s");
+    base::throw_invalid("frequencies: need at least 2 from low to high, not ", count, " from ", first_rad_s, " to ",
+                        last_rad_s, " rad/s");
   }
   const double first = std::log(first_rad_s), step = (std::log(last_rad_s) - first) / (count - 1);
   std::vector<double> frequencies(static_cast<std::size_t>(count));

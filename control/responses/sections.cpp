@@ -17,16 +17,16 @@ constexpr double kSamePole = 1e-9;      // relative distance of poles that count
 void check(const DiscreteTransferFunction& transfer) {
   const auto &b = transfer.numerator, &a = transfer.denominator;
   if (a.empty() || a.size() != b.size()) {
-    throw_invalid("sections: ", "numerator and denominator must have the same length, have ", b.size(), " and ",
-                  a.size(), "; fill the shorter up with zeros");
+    base::throw_invalid("sections: ", "numerator and denominator must have the same length, have ", b.size(), " and ",
+                        a.size(), "; fill the shorter up with zeros");
   }
-  if (a[0] != 1) throw_invalid("sections: ", "denominator must begin with 1, begins with ", a[0]);
+  if (a[0] != 1) base::throw_invalid("sections: ", "denominator must begin with 1, begins with ", a[0]);
   for (std::size_t k = 0; k < a.size(); ++k) {
     if (std::isfinite(a[k]) && std::isfinite(b[k])) continue;
-    throw_invalid("sections: ", "coefficient ", k, " is not finite (", b[k], ", ", a[k], ")");
+    base::throw_invalid("sections: ", "coefficient ", k, " is not finite (", b[k], ", ", a[k], ")");
   }
   if (!(transfer.period_s > 0 && std::isfinite(transfer.period_s))) {
-    throw_invalid("sections: ", "period_s must be positive, is ", transfer.period_s);
+    base::throw_invalid("sections: ", "period_s must be positive, is ", transfer.period_s);
   }
 }
 
@@ -71,14 +71,15 @@ std::pair<Complex, Complex> pole_pair(const SecondOrderSection& section) {
 std::string find_fault(const std::vector<Complex>& pole) {
   for (std::size_t i = 0; i < pole.size(); ++i) {
     if (!(std::abs(pole[i]) < 1)) {
-      return join_text("sections: pole ", pole[i].real(), " + ", pole[i].imag(),
-                       "i is not inside the unit circle; fit again");
+      return base::join_text("sections: pole ", pole[i].real(), " + ", pole[i].imag(),
+                             "i is not inside the unit circle; fit again");
     }
     for (std::size_t j = 0; j < i; ++j) {
       const double distance = std::abs(pole[i] - pole[j]);
       const bool both_near_zero = std::abs(pole[i]) < kNearZeroPole && std::abs(pole[j]) < kNearZeroPole;
       if (distance > kSamePole * std::abs(pole[i]) && !both_near_zero) continue;
-      return join_text("sections: poles ", pole[j].real(), " and ", pole[i].real(), " coincide; take a lower order");
+      return base::join_text("sections: poles ", pole[j].real(), " and ", pole[i].real(),
+                             " coincide; take a lower order");
     }
   }
   return "";
@@ -172,7 +173,8 @@ std::vector<Complex> zeros(const ParallelSections& sections) {
     through += s.b0;
     i += 2;
   }
-  if (through == 0) throw_invalid("sections: ", "the first sample of the impulse response is 0: zeros at infinity");
+  if (through == 0)
+    base::throw_invalid("sections: ", "the first sample of the impulse response is 0: zeros at infinity");
   return eigenvalues(a - b * c.transpose() / through);
 }
 
@@ -283,7 +285,7 @@ void SectionFilter::reset() {
 }
 
 double float32_rms_error(const ParallelSections& sections, std::span<const double> error_m) {
-  if (error_m.empty()) throw_invalid("sections: ", "no error signal to compare float32 and double on");
+  if (error_m.empty()) base::throw_invalid("sections: ", "no error signal to compare float32 and double on");
   std::vector<float> first(sections.first_order.size()), second(2 * sections.second_order.size());
   SectionFilter exact{sections};
   double sum = 0;

@@ -18,7 +18,7 @@ constexpr double kFewestSmoothed = 5, kMostSmoothed = 21;
 
 template <class... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
-  throw_invalid("step metrics: ", parts...);
+  base::throw_invalid("step metrics: ", parts...);
 }
 
 void check(std::span<const double> time_s, std::span<const double> position_m, const StepExperiment& experiment) {

@@ -20,7 +20,7 @@ constexpr double kNarrowestRad = 0.88 * pi;  // poles nearer to the negative axi
 constexpr double kModalTolerance = 1e-12;
 constexpr double kOneEvent = 8 * std::numeric_limits<double>::epsilon();  // relative; nearer times are the same
 
-[[noreturn]] void refuse(const char* what, double value) { throw_invalid("time response: ", what, ' ', value); }
+[[noreturn]] void refuse(const char* what, double value) { base::throw_invalid("time response: ", what, ' ', value); }
 
 // A point z = s t of the upper half of (2), and e^z dz/dφ · 2/N.
 struct Node {

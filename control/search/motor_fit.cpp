@@ -19,7 +19,7 @@ constexpr std::size_t kFewestSamples = 10;
 
 template <typename... Parts>
 [[noreturn]] void refuse(const Parts&... parts) {
-  throw_invalid("motor fit: ", parts...);
+  base::throw_invalid("motor fit: ", parts...);
 }
 
 void check(double dt_s, std::span<const double> duty, std::span<const double> rate_rad_s) {

@@ -32,12 +32,12 @@ constexpr int kIterations = 30;
 
 void check(const PositionRecord& record, const char* name) {
   if (record.time_s.size() != record.position_m.size()) {
-    throw_invalid("clock alignment: ", name, " has ", record.time_s.size(), " times and ", record.position_m.size(),
-                  " positions");
+    base::throw_invalid("clock alignment: ", name, " has ", record.time_s.size(), " times and ",
+                        record.position_m.size(), " positions");
   }
   for (std::size_t k = 1; k < record.time_s.size(); ++k) {
     if (!(record.time_s[k] > record.time_s[k - 1])) {
-      throw_invalid("clock alignment: the times of ", name, " must ascend, [", k, "] is ", record.time_s[k]);
+      base::throw_invalid("clock alignment: the times of ", name, " must ascend, [", k, "] is ", record.time_s[k]);
     }
   }
 }
@@ -290,39 +290,40 @@ ClockAlignment align_clocks(PositionRecord outside, PositionRecord own, OffsetRa
   check(own, "the robot's record");
   for (const PositionRecord& record : {outside, own}) {
     if (record.time_s.size() < 2 || !(record.time_s.back() - record.time_s.front() > 2 * kWindowS)) {
-      return refused(join_text("a record of more than ", 2 * kWindowS, " s of each is needed"));
+      return refused(base::join_text("a record of more than ", 2 * kWindowS, " s of each is needed"));
     }
     if (record.time_s.back() - record.time_s.front() > kLongestRecordS) {
-      return refused(join_text("a record is longer than ", kLongestRecordS, " s: give the part with the run"));
+      return refused(base::join_text("a record is longer than ", kLongestRecordS, " s: give the part with the run"));
     }
   }
   const Motion outside_motion = motion_of(outside), own_motion = motion_of(own);
   const double least_m = std::min(outside_motion.largest_m(), own_motion.largest_m());
   if (least_m < kLeastMotionM) {
-    return refused(join_text(own_motion.largest_m() <= outside_motion.largest_m() ? "by its own record the robot"
-                                                                                  : "by the outside record the robot",
-                             " moves by at most ", rounded(1e3 * least_m), " mm in ", kWindowS, " s, and ",
-                             1e3 * kLeastMotionM, " mm are needed"));
+    return refused(base::join_text(own_motion.largest_m() <= outside_motion.largest_m()
+                                       ? "by its own record the robot"
+                                       : "by the outside record the robot",
+                                   " moves by at most ", rounded(1e3 * least_m), " mm in ", kWindowS, " s, and ",
+                                   1e3 * kLeastMotionM, " mm are needed"));
   }
   const Correlogram found = correlogram(outside_motion, own_motion, range);
   const auto best = static_cast<std::size_t>(std::ranges::max_element(found.rho) - found.rho.begin());
   if (!(found.rho[best] >= kLeastCorrelation)) {
-    return refused(join_text("the two motions resemble each other too little: their correlation is at most ",
-                             rounded(std::max(0.0, found.rho[best])), ", at an offset of ",
-                             rounded(found.offset_s(best)), " s, and ", kLeastCorrelation, " is needed"));
+    return refused(base::join_text("the two motions resemble each other too little: their correlation is at most ",
+                                   rounded(std::max(0.0, found.rho[best])), ", at an offset of ",
+                                   rounded(found.offset_s(best)), " s, and ", kLeastCorrelation, " is needed"));
   }
   if (const auto rival = rival_of(found, best)) {
-    return refused(join_text("two offsets fit nearly as well, ", rounded(found.offset_s(best)), " s (correlation ",
-                             rounded(found.rho[best]), ") and ", rounded(found.offset_s(*rival)), " s (",
-                             rounded(found.rho[*rival]), "): the motion repeats itself"));
+    return refused(base::join_text(
+        "two offsets fit nearly as well, ", rounded(found.offset_s(best)), " s (correlation ", rounded(found.rho[best]),
+        ") and ", rounded(found.offset_s(*rival)), " s (", rounded(found.rho[*rival]), "): the motion repeats itself"));
   }
   if (const double width_s = plateau_s(found, best); width_s > kWidestPlateauS) {
-    return refused(join_text("offsets over ", rounded(width_s), " s fit nearly alike around ",
-                             rounded(found.offset_s(best)), " s: the speed changes too little"));
+    return refused(base::join_text("offsets over ", rounded(width_s), " s fit nearly alike around ",
+                                   rounded(found.offset_s(best)), " s: the speed changes too little"));
   }
   OffsetFit fit{outside, own};
   if (!fit.run(found.offset_s(best))) {
-    return refused(join_text("the offset of ", rounded(found.offset_s(best)), " s cannot be made more exact"));
+    return refused(base::join_text("the offset of ", rounded(found.offset_s(best)), " s cannot be made more exact"));
   }
   return {{}, fit.offset_s, fit.offset_sd_s(), found.rho[best], fit.ratio};
 }

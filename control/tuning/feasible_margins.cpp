@@ -9,7 +9,7 @@
 namespace control {
 namespace {
 
-[[noreturn]] void refuse(const char* what, double value) { throw_invalid("tuning: ", what, ' ', value); }
+[[noreturn]] void refuse(const char* what, double value) { base::throw_invalid("tuning: ", what, ' ', value); }
 
 }  // namespace
 

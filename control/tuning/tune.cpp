@@ -12,7 +12,7 @@
 namespace control {
 namespace {
 
-[[noreturn]] void refuse(const char* what, double value) { throw_invalid("tuning: ", what, ' ', value); }
+[[noreturn]] void refuse(const char* what, double value) { base::throw_invalid("tuning: ", what, ' ', value); }
 
 void check(const TuningSpec& spec) {
   check_crossover(spec.gain_crossover_rad_s);

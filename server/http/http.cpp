@@ -53,7 +53,7 @@ int http_status(ErrorCode code) {
   return 500;
 }
 
-Response json_response(int status, const json& body) { return json_text_response(status, dump(body)); }
+Response json_response(int status, const json& body) { return json_text_response(status, base::dump(body)); }
 
 Response json_text_response(int status, std::string text) {
   Response response;

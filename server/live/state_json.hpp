@@ -11,6 +11,9 @@
 
 namespace server {
 
+using base::decimal;
+using base::dump;
+
 nlohmann::json to_json(const RobotModel& model);
 nlohmann::json to_json(const RobotState& robot);
 nlohmann::json to_json(const Sample& sample);

@@ -46,7 +46,7 @@ CommandRequest set_parameter(const RobotId& id, const Author& by, const std::str
   auto& parameter = request.action.action.set_parameter;
   std::strncpy(parameter.name, name.c_str(), sizeof parameter.name - 1);
   parameter.value = value;
-  request.arguments = nlohmann::json{{"name", name}, {"value", decimal(value)}}.dump();
+  request.arguments = nlohmann::json{{"name", name}, {"value", base::decimal(value)}}.dump();
   return request;
 }
 

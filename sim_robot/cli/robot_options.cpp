@@ -15,7 +15,7 @@ void check_faults(const Scenario& scenario) {
     try {
       check(timed.fault, scenario.robot.world);
     } catch (const std::invalid_argument& error) {
-      control::throw_invalid("scenario ", scenario.name, ", fault at ", timed.at_s, " s: ", error.what());
+      base::throw_invalid("scenario ", scenario.name, ", fault at ", timed.at_s, " s: ", error.what());
     }
   }
 }
@@ -55,8 +55,7 @@ Scenario scenario_of(const RobotOptions& options) {
   if (options.clock_drift_ppm) robot.clock_drift_ppm = *options.clock_drift_ppm;
   if (options.token) robot.token = *options.token;
   if (options.duration_s) scenario.duration_s = *options.duration_s;
-  if (!std::isfinite(scenario.duration_s))
-    control::throw_invalid("--duration-s: ", scenario.duration_s, " is not a time");
+  if (!std::isfinite(scenario.duration_s)) base::throw_invalid("--duration-s: ", scenario.duration_s, " is not a time");
   robot.boot_id = options.boot_id ? parse_boot_id(*options.boot_id) : random_boot_id();
   check(robot);
   check_faults(scenario);

@@ -40,10 +40,10 @@ void spawn(asio::io_context& loop, asio::awaitable<void> task) {
 void announce(const Scenario& scenario, bool has_network, const LinkLog& tell) {
   if (!scenario.name.empty()) tell("scenario " + scenario.name + ": " + scenario.description);
   if (!scenario.script.empty()) tell("its script is for `rheonaut-sim play`; here the station gives the commands");
-  if (scenario.duration_s > 0) tell(control::join_text("ends by itself after ", scenario.duration_s, " s"));
+  if (scenario.duration_s > 0) tell(base::join_text("ends by itself after ", scenario.duration_s, " s"));
   for (const TimedFault& timed : scenario.faults) {
     const std::string reason = why_not(timed.fault.kind, has_network);
-    if (!reason.empty()) tell(control::join_text("at ", timed.at_s, " s will be passed over: ", reason));
+    if (!reason.empty()) tell(base::join_text("at ", timed.at_s, " s will be passed over: ", reason));
   }
 }
 
@@ -92,8 +92,8 @@ StationAddress put_between(std::optional<Proxy>& network, asio::io_context& loop
   options.target = station;
   network.emplace(loop, options, only_unreachable());
   spawn(loop, network->run());
-  say(control::join_text("dials ", station.host, ":", station.port, " through ", network->endpoint(),
-                         " in this process, which does the faults of the link"));
+  say(base::join_text("dials ", station.host, ":", station.port, " through ", network->endpoint(),
+                      " in this process, which does the faults of the link"));
   return {"127.0.0.1", std::to_string(network->endpoint().port()), station.trust};
 }
 
@@ -162,7 +162,7 @@ int RunCommand::run_one(const Scenario& scenario, const StationAddress& station)
   std::optional<FaultServer> server;
   if (!faults_at_.empty()) {
     server.emplace(loop, parse_faults_address(faults_at_, faults_anywhere_), client.faults(), client.faulty());
-    say(control::join_text("faults at http://", server->address(), "/faults"));
+    say(base::join_text("faults at http://", server->address(), "/faults"));
     spawn(loop, server->run());
   }
   std::optional<TruthFile> truth;

@@ -29,8 +29,8 @@ int ScenariosCommand::run() const {
     return EXIT_SUCCESS;
   }
   if (!shown_.empty()) find_scenario(shown_);  // says which there are
-  for (const ShippedScenario& shipped : shipped_scenarios()) {
-    if (shown_ == shipped.name) std::cout << shipped.text;
+  for (const base::EmbeddedFile& shipped : scenario_files()) {
+    if (shown_ == shipped.name) std::cout << shipped.content;
     if (!shown_.empty()) continue;
     const Scenario scenario = find_scenario(std::string(shipped.name));
     std::cout << std::left << std::setw(24) << shipped.name << scenario.description << '\n';

@@ -20,16 +20,15 @@ toml::table flat_table(std::string_view json) {
   const auto watch = [&seen](int depth, Json::parse_event_t event, Json& parsed) {
     const bool is_deep =
         depth > 0 && (event == Json::parse_event_t::object_start || event == Json::parse_event_t::array_start);
-    if (is_deep)
-      control::throw_invalid("a fault is one object of texts, numbers, true and false, without objects in it");
+    if (is_deep) base::throw_invalid("a fault is one object of texts, numbers, true and false, without objects in it");
     if (event == Json::parse_event_t::key && !seen.insert(parsed.get<std::string>()).second) {
-      control::throw_invalid(parsed.get<std::string>(), ": is given twice");
+      base::throw_invalid(parsed.get<std::string>(), ": is given twice");
     }
     return true;
   };
   const Json given = Json::parse(json, watch, false);
-  if (given.is_discarded()) control::throw_invalid("this is not JSON; a fault is {\"fault\":\"electrode_offset\",…}");
-  if (!given.is_object()) control::throw_invalid("a fault is an object, {\"fault\":\"electrode_offset\",…}");
+  if (given.is_discarded()) base::throw_invalid("this is not JSON; a fault is {\"fault\":\"electrode_offset\",…}");
+  if (!given.is_object()) base::throw_invalid("a fault is an object, {\"fault\":\"electrode_offset\",…}");
   toml::table table;
   for (const auto& [key, value] : given.items()) {
     if (value.is_number_integer() && (!value.is_number_unsigned() || value.get<std::uint64_t>() <= INT64_MAX)) {
@@ -41,7 +40,7 @@ toml::table flat_table(std::string_view json) {
     } else if (value.is_string()) {
       table.insert(key, value.get<std::string>());
     } else {
-      control::throw_invalid(key, ": must be a text, a number, true or false, is null");
+      base::throw_invalid(key, ": must be a text, a number, true or false, is null");
     }
   }
   return table;
@@ -52,7 +51,7 @@ toml::table flat_table(std::string_view json) {
 Fault parse_fault_json(std::string_view json) {
   const toml::table table = flat_table(json);
   const std::string no_origin;
-  FieldReader reader{table, no_origin};
+  base::FieldReader reader{table, no_origin};
   Fault fault;
   fields_with_kind(reader, fault);
   reader.finish();
@@ -62,16 +61,16 @@ Fault parse_fault_json(std::string_view json) {
 void check(const Fault& fault, const WorldConfig& world) {
   const FaultType& type = type_of(fault.kind);
   if (type.target == FaultTarget::accelerometer && !world.imu) {
-    control::throw_invalid(type.name, ": the perfect sensor has no faults; leave out preset = \"perfect\"");
+    base::throw_invalid(type.name, ": the perfect sensor has no faults; leave out preset = \"perfect\"");
   }
   if (fault.kind == FaultKind::mean_flow && !world.vessel) {
-    control::throw_invalid("mean_flow: there is no vessel; give the world a [vessel]");
+    base::throw_invalid("mean_flow: there is no vessel; give the world a [vessel]");
   }
   if (fault.kind == FaultKind::pour_glucose) check(fault.patch);
   const bool is_clock = fault.kind == FaultKind::clock_drift || fault.kind == FaultKind::clock_jump;
   const double by = fault.kind == FaultKind::clock_drift ? fault.drift_ppm : fault.jump_s;
-  if (is_clock && !std::isfinite(by)) control::throw_invalid(type.name, ": ", by, " is no number to change a clock by");
-  if (!(fault.for_s > 0)) control::throw_invalid("for_s must be positive, is ", fault.for_s);
+  if (is_clock && !std::isfinite(by)) base::throw_invalid(type.name, ": ", by, " is no number to change a clock by");
+  if (!(fault.for_s > 0)) base::throw_invalid("for_s must be positive, is ", fault.for_s);
 }
 
 }  // namespace sim_robot

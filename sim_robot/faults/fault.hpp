@@ -20,6 +20,11 @@
 
 namespace sim_robot {
 
+using base::Fields;
+using base::kForEver;
+using base::kMustBeGiven;
+using base::Range;
+
 struct WorldConfig;
 
 // In the order of fault_types().

@@ -88,12 +88,12 @@ Recording::Recording(protocol::Bytes stream) {
     if (state == protocol::FrameReader::State::incomplete) break;  // it was cut off while it was recorded
     const auto frame =
         state == protocol::FrameReader::State::complete ? protocol::decode_robot_frame(reader.payload()) : std::nullopt;
-    if (!frame) control::throw_invalid("recording: frame ", frames_.size(), " of telemetry is none of this protocol");
+    if (!frame) base::throw_invalid("recording: frame ", frames_.size(), " of telemetry is none of this protocol");
     const bool is_live = frame->which_body == rheonaut_RobotFrame_telemetry_tag &&
                          (frame->body.telemetry.flags & rheonaut_TELEMETRY_FLAG_BACKFILL) == 0;
     if (is_live) add(frame->body.telemetry);
   }
-  if (frames_.empty()) control::throw_invalid("recording: there is no telemetry in it");
+  if (frames_.empty()) base::throw_invalid("recording: there is no telemetry in it");
 }
 
 // A frame without time and without the fields of the head is encoded as its tail.
@@ -107,7 +107,7 @@ void Recording::add(const protocol::Telemetry& batch) {
   frame.body.telemetry.oldest_seq = 0;
   std::array<std::uint8_t, protocol::kMaxFrameBytes> bytes;
   const protocol::Bytes tail = inner({bytes.data(), protocol::encode(frame, bytes.data(), bytes.size())});
-  if (tail.size > kMaxTailBytes) control::throw_invalid("recording: a frame of telemetry is too long, ", tail.size);
+  if (tail.size > kMaxTailBytes) base::throw_invalid("recording: a frame of telemetry is too long, ", tail.size);
   frames_.push_back({samples_, batch.flags, tails_.size(), tail.size});
   tails_.insert(tails_.end(), tail.begin(), tail.end());
   samples_ += batch.position_m_count;
@@ -155,7 +155,7 @@ std::size_t Recording::write(std::uint64_t number, const Head& head, std::uint8_
 
 Recording load_recording(const std::filesystem::path& path) {
   std::ifstream file{path, std::ios::binary};
-  if (!file) control::throw_invalid("recording: cannot open ", path.string());
+  if (!file) base::throw_invalid("recording: cannot open ", path.string());
   const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
   return Recording{{reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}};
 }
@@ -178,8 +178,8 @@ Recording make_recording(double seconds, std::uint32_t samples_per_frame, std::u
 std::uint32_t replay_period_us(const Recording& recording, double rate) {
   const double period_us = std::round(recording.period_us() / rate);
   if (!(rate > 0) || !(period_us >= 100 && period_us <= 10e6)) {
-    control::throw_invalid("--rate must make the sample period 0.1 ms to 10 s, is ", rate, " for a period of ",
-                           recording.period_us(), " us");
+    base::throw_invalid("--rate must make the sample period 0.1 ms to 10 s, is ", rate, " for a period of ",
+                        recording.period_us(), " us");
   }
   return static_cast<std::uint32_t>(period_us);
 }

@@ -27,7 +27,7 @@ ScenarioRun::ScenarioRun(const Scenario& scenario, FaultTimeline::Log log)
 }
 
 void ScenarioRun::run() {
-  if (scenario_.duration_s <= 0) control::throw_invalid(scenario_.name, ": has no duration_s, so its run has no end");
+  if (scenario_.duration_s <= 0) base::throw_invalid(scenario_.name, ": has no duration_s, so its run has no end");
   while (time_s() < scenario_.duration_s - kHalfTickS) step();
 }
 

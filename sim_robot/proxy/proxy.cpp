@@ -24,7 +24,7 @@ std::string text(const tcp::endpoint& endpoint) {
 }
 
 double seconds_until(std::chrono::steady_clock::time_point end) {
-  if (end == std::chrono::steady_clock::time_point::max()) return kForEver;
+  if (end == std::chrono::steady_clock::time_point::max()) return base::kForEver;
   return std::max(0.0, std::chrono::duration<double>(end - std::chrono::steady_clock::now()).count());
 }
 

@@ -19,13 +19,13 @@ constexpr const char* kRoutes = "there are GET /faults, POST /faults and DELETE 
 // null: has no default, or is without end.
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-Json value_of(const Field& field) {
+Json value_of(const base::Field& field) {
   if (field.must_be_given()) return nullptr;
   if (const double* value = std::get_if<double>(&field.value)) return number(*value);
   return std::visit([](const auto& value) { return Json(value); }, field.value);
 }
 
-Json describe(const Field& field) {
+Json describe(const base::Field& field) {
   Json json{{"key", field.key}, {"must_be_given", field.must_be_given()}, {"default", value_of(field)}};
   const bool is_number =
       std::holds_alternative<double>(field.value) || std::holds_alternative<std::uint64_t>(field.value);
@@ -42,12 +42,12 @@ Json known_faults(const FaultyRobot& robot) {
   Json all = Json::array();
   for (std::size_t i = 0; i < fault_types().size(); ++i) {
     Fault fault{.kind = static_cast<FaultKind>(i)};
-    FieldList list;
+    base::FieldList list;
     fields(list, fault);
     Json json{{"fault", fault_types()[i].name}, {"what", fault_types()[i].what}};
     json["is_in_this_run"] = why_not(fault.kind, robot.link != nullptr).empty();
     json["fields"] = Json::array();
-    for (const Field& field : list.fields) json["fields"].push_back(describe(field));
+    for (const base::Field& field : list.fields) json["fields"].push_back(describe(field));
     all.push_back(json);
   }
   return all;
@@ -57,10 +57,10 @@ double seconds(std::uint64_t us) { return static_cast<double>(us) * 1e-6; }
 
 Json as_json(const FaultInForce& each) {
   Fault fault = each.fault;
-  FieldList list;
+  base::FieldList list;
   fields(list, fault);
   Json json{{"id", each.id}, {"fault", type_of(fault.kind).name}};
-  for (const Field& field : list.fields) json[field.key] = value_of(field);
+  for (const base::Field& field : list.fields) json[field.key] = value_of(field);
   json["since_s"] = seconds(each.since_us);
   json["until_s"] = each.until_us == FaultTimeline::kNever ? Json(nullptr) : Json(seconds(each.until_us));
   return json;

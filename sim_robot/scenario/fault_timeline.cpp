@@ -112,7 +112,7 @@ void FaultTimeline::end_replaced(const Fault& next, const FaultyRobot& robot) {
 }
 
 void FaultTimeline::say(std::uint64_t at_us, const std::string& what) const {
-  if (log_) log_(control::join_text("at ", static_cast<double>(at_us) * 1e-6, " s: ", what));
+  if (log_) log_(base::join_text("at ", static_cast<double>(at_us) * 1e-6, " s: ", what));
 }
 
 }  // namespace sim_robot

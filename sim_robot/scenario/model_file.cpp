@@ -20,7 +20,7 @@ constexpr std::array<std::string_view, 7> kNumbers{"kp", "b1", "b2", "b3", "alph
 constexpr std::array<std::string_view, 5> kPassedOver{"name", "comment", "description", "dc_gain_m_s", "poles_rad_s"};
 
 const Json& model_in(const Json& given) {
-  if (!given.is_object()) control::throw_invalid("model: ", given.dump(), " is not an object with kp, b1, b2, …");
+  if (!given.is_object()) base::throw_invalid("model: ", given.dump(), " is not an object with kp, b1, b2, …");
   for (const char* key : {"parameters", "model"}) {
     if (given.contains(key) && given[key].is_object()) return given[key];
   }
@@ -29,8 +29,8 @@ const Json& model_in(const Json& given) {
 
 double number(const Json& model, const char* key) {
   const auto found = model.find(key);
-  if (found == model.end()) control::throw_invalid("model: '", key, "' is missing");
-  if (!found->is_number()) control::throw_invalid("model: '", key, "' must be a number, is ", found->dump());
+  if (found == model.end()) base::throw_invalid("model: '", key, "' is missing");
+  if (!found->is_number()) base::throw_invalid("model: '", key, "' must be a number, is ", found->dump());
   return *found;
 }
 
@@ -38,7 +38,7 @@ void refuse_unknown(const Json& model) {
   for (const auto& [key, value] : model.items()) {
     if (std::ranges::find(kNumbers, key) != kNumbers.end()) continue;
     if (std::ranges::find(kPassedOver, key) != kPassedOver.end()) continue;
-    control::throw_invalid("model: there is no '", key, "'; it has kp, b1, b2, b3, alpha, beta, dead_time_s");
+    base::throw_invalid("model: there is no '", key, "'; it has kp, b1, b2, b3, alpha, beta, dead_time_s");
   }
 }
 
@@ -48,7 +48,7 @@ double dead_time_s(const Json& given, const Json& model) {
   const double in_model_s = number(model, "dead_time_s");
   const double beside_s = given.contains("dead_time_s") ? number(given, "dead_time_s") : in_model_s;
   if (beside_s != in_model_s) {
-    control::throw_invalid("model: 'dead_time_s' is ", in_model_s, " in it and ", beside_s, " beside it; leave one");
+    base::throw_invalid("model: 'dead_time_s' is ", in_model_s, " in it and ", beside_s, " beside it; leave one");
   }
   return in_model_s;
 }
@@ -57,7 +57,7 @@ double dead_time_s(const Json& given, const Json& model) {
 
 PlantParameters parse_model(const std::string& json) {
   const Json given = Json::parse(json, nullptr, false);
-  if (given.is_discarded()) control::throw_invalid("model: this is not JSON");
+  if (given.is_discarded()) base::throw_invalid("model: this is not JSON");
   const Json& model = model_in(given);
   refuse_unknown(model);
   PlantParameters read;
@@ -72,11 +72,11 @@ PlantParameters parse_model(const std::string& json) {
 PlantParameters load_model(const std::string& path) {
   std::ifstream file{path, std::ios::binary};
   std::ostringstream text;
-  if (!(file && text << file.rdbuf())) control::throw_invalid(path, ": cannot be read");
+  if (!(file && text << file.rdbuf())) base::throw_invalid(path, ": cannot be read");
   try {
     return parse_model(text.str());
   } catch (const std::invalid_argument& error) {
-    control::throw_invalid(path, ": ", error.what());
+    base::throw_invalid(path, ": ", error.what());
   }
 }
 

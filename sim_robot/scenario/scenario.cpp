@@ -14,13 +14,13 @@ constexpr std::size_t kMaxBytes = 1'000'000;
 
 toml::table parsed(std::string_view text, const std::string& name) {
   if (text.size() > kMaxBytes) {
-    control::throw_invalid(name, ": has ", text.size(), " bytes, allowed are ", kMaxBytes);
+    base::throw_invalid(name, ": has ", text.size(), " bytes, allowed are ", kMaxBytes);
   }
   try {
     return toml::parse(text, name);
   } catch (const toml::parse_error& error) {
     const toml::source_position at = error.source().begin;
-    control::throw_invalid(name, ":", at.line, ":", at.column, ": ", error.description());
+    base::throw_invalid(name, ":", at.line, ":", at.column, ": ", error.description());
   }
 }
 
@@ -30,7 +30,7 @@ Scenario parse_scenario(std::string_view text, const std::string& name) {
   const toml::table table = parsed(text, name);
   Scenario scenario;
   scenario.name = std::filesystem::path{name}.stem().string();
-  FieldReader reader{table, name};
+  base::FieldReader reader{table, name};
   fields(reader, scenario);
   reader.finish();
   return scenario;
@@ -40,19 +40,19 @@ Scenario load_scenario(const std::filesystem::path& file) {
   std::ifstream stream{file, std::ios::binary};
   std::ostringstream text;
   if (!std::filesystem::is_regular_file(file) || !(stream && text << stream.rdbuf())) {
-    control::throw_invalid("scenario '", file.string(), "' cannot be read");
+    base::throw_invalid("scenario '", file.string(), "' cannot be read");
   }
   return parse_scenario(text.str(), file.string());
 }
 
 Scenario find_scenario(const std::string& name_or_file) {
   std::string names;
-  for (const ShippedScenario& shipped : shipped_scenarios()) {
-    if (shipped.name == name_or_file) return parse_scenario(shipped.text, std::string(shipped.name) + ".toml");
+  for (const base::EmbeddedFile& shipped : scenario_files()) {
+    if (shipped.name == name_or_file) return parse_scenario(shipped.content, std::string(shipped.name) + ".toml");
     names += (names.empty() ? "" : ", ") + std::string(shipped.name);
   }
   if (std::filesystem::is_regular_file(name_or_file)) return load_scenario(name_or_file);
-  control::throw_invalid("there is no scenario '", name_or_file, "', neither a file nor one of ", names);
+  base::throw_invalid("there is no scenario '", name_or_file, "', neither a file nor one of ", names);
 }
 
 }  // namespace sim_robot

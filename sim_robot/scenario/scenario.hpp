@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/embedded_file.hpp"
 #include "sim_robot/faults/fault.hpp"
 #include "sim_robot/robot/simulated_robot.hpp"
 
@@ -62,12 +63,8 @@ Scenario load_scenario(const std::filesystem::path& file);
 void fields(Fields& fields, Scenario& scenario);
 void fields(Fields& fields, ScriptStep& step);
 
-// Those that come with the program, by name.
-struct ShippedScenario {
-  std::string_view name;
-  std::string_view text;
-};
-std::span<const ShippedScenario> shipped_scenarios();
+// Those that come with the program, by name: the files of sim_robot/scenarios/ without their ending.
+std::span<const base::EmbeddedFile> scenario_files();
 // A shipped one by its name, otherwise the file; throws std::invalid_argument that names those there are.
 Scenario find_scenario(const std::string& name_or_file);
 

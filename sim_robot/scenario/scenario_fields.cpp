@@ -35,7 +35,7 @@ void insert_by_time(std::vector<Timed>& all, const Timed& one) {
 // Nothing may come behind the end.
 void check_time(double at_s, double duration_s) {
   if (duration_s > 0 && at_s >= duration_s) {
-    control::throw_invalid("at_s is ", at_s, ", when the scenario has ended; its duration_s is ", duration_s);
+    base::throw_invalid("at_s is ", at_s, ", when the scenario has ended; its duration_s is ", duration_s);
   }
 }
 

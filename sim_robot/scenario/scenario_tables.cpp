@@ -7,17 +7,17 @@
 namespace sim_robot {
 namespace {
 
-std::string row(const std::string& key, const Field& field) {
+std::string row(const std::string& key, const base::Field& field) {
   const std::string value = field.must_be_given() ? "must be given" : field.value_text();
   return "| " + key + " | " + value + " | " + field.allowed() + " | " + field.what + " |\n";
 }
 
 std::string scenario_table() {
   Scenario scenario;
-  FieldList list;
+  base::FieldList list;
   fields(list, scenario);
   std::string text = "| key | default | allowed | what it is |\n|---|---|---|---|\n";
-  for (const Field& field : list.fields) {
+  for (const base::Field& field : list.fields) {
     const bool has_own_table = field.key.starts_with("faults[]") || field.key.starts_with("script[]");
     if (!has_own_table) text += row("`" + field.key + "`", field);
   }
@@ -25,9 +25,9 @@ std::string scenario_table() {
 }
 
 // One row for the name and one for each field of it.
-std::string rows_of(const std::string& name, const std::string& what, const FieldList& list) {
+std::string rows_of(const std::string& name, const std::string& what, const base::FieldList& list) {
   std::string text = "| `" + name + "` | | | " + what + " |\n";
-  for (const Field& field : list.fields) text += row("· `" + field.key + "`", field);
+  for (const base::Field& field : list.fields) text += row("· `" + field.key + "`", field);
   return text;
 }
 
@@ -35,7 +35,7 @@ std::string fault_table() {
   std::string text = "| fault | default | allowed | what it is |\n|---|---|---|---|\n";
   for (std::size_t i = 0; i < fault_types().size(); ++i) {
     Fault fault{.kind = static_cast<FaultKind>(i)};
-    FieldList list;
+    base::FieldList list;
     fields(list, fault);
     text += rows_of(fault_types()[i].name, fault_types()[i].what, list);
   }
@@ -46,7 +46,7 @@ std::string script_table() {
   std::string text = "| command | default | allowed | what it is |\n|---|---|---|---|\n";
   for (std::size_t i = 0; i < script_commands().size(); ++i) {
     ScriptStep step{.command = static_cast<ScriptCommand>(i)};
-    FieldList list;
+    base::FieldList list;
     fields(list, step);
     text += rows_of(script_commands()[i], "", list);
   }

@@ -1,7 +1,7 @@
 // The keys of the world in a scenario.
 #pragma once
 
-#include "base/fields.hpp"
+#include "sim_robot/faults/fault.hpp"  // Fields, Range
 #include "sim_robot/world/world.hpp"
 
 namespace sim_robot {

@@ -13,14 +13,14 @@ namespace {
 constexpr double kHourS = 3600;
 
 void check_positive(const char* name, double value_mv) {
-  if (!control::is_positive(value_mv)) {
-    control::throw_invalid("battery: ", name, " must be positive and finite, is ", value_mv);
+  if (!base::is_positive(value_mv)) {
+    base::throw_invalid("battery: ", name, " must be positive and finite, is ", value_mv);
   }
 }
 
 void check_not_negative(const char* name, double value) {
   if (!(value >= 0 && std::isfinite(value))) {
-    control::throw_invalid("battery: ", name, " must be 0 or more and finite, is ", value);
+    base::throw_invalid("battery: ", name, " must be 0 or more and finite, is ", value);
   }
 }
 

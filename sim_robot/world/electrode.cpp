@@ -10,19 +10,19 @@ namespace sim_robot {
 
 void check(const SensorFault& fault) {
   if (!std::isfinite(fault.magnitude)) {
-    control::throw_invalid("sensor fault: its magnitude must be finite, is ", fault.magnitude);
+    base::throw_invalid("sensor fault: its magnitude must be finite, is ", fault.magnitude);
   }
   if (fault.kind == SensorFaultKind::noisy && fault.magnitude < 0) {
-    control::throw_invalid("sensor fault: noise must be 0 or more, is ", fault.magnitude);
+    base::throw_invalid("sensor fault: noise must be 0 or more, is ", fault.magnitude);
   }
 }
 
 void check(const ElectrodeParameters& parameters) {
   if (!(parameters.noise_mv >= 0 && std::isfinite(parameters.noise_mv))) {
-    control::throw_invalid("electrode: noise_mv must be 0 or more and finite, is ", parameters.noise_mv);
+    base::throw_invalid("electrode: noise_mv must be 0 or more and finite, is ", parameters.noise_mv);
   }
-  if (!std::isfinite(parameters.offset_mv)) control::throw_invalid("electrode: offset_mv is ", parameters.offset_mv);
-  if (!std::isfinite(parameters.drift_mv_s)) control::throw_invalid("electrode: drift_mv_s is ", parameters.drift_mv_s);
+  if (!std::isfinite(parameters.offset_mv)) base::throw_invalid("electrode: offset_mv is ", parameters.offset_mv);
+  if (!std::isfinite(parameters.drift_mv_s)) base::throw_invalid("electrode: drift_mv_s is ", parameters.drift_mv_s);
 }
 
 Electrode::Electrode(const ElectrodeParameters& parameters, std::uint64_t seed)

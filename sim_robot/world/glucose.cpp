@@ -34,24 +34,24 @@ double normal_distribution(double z) {
 
 void check_not_negative(const char* name, double value) {
   if (!(value >= 0 && std::isfinite(value))) {
-    control::throw_invalid("glucose: ", name, " must be 0 or more and finite, is ", value);
+    base::throw_invalid("glucose: ", name, " must be 0 or more and finite, is ", value);
   }
 }
 
 }  // namespace
 
 void check(const GlucosePatch& patch) {
-  if (!std::isfinite(patch.position_m)) control::throw_invalid("glucose: position_m is ", patch.position_m);
-  if (!control::is_positive(patch.length_m)) {
-    control::throw_invalid("glucose: length_m must be positive and finite, is ", patch.length_m);
+  if (!std::isfinite(patch.position_m)) base::throw_invalid("glucose: position_m is ", patch.position_m);
+  if (!base::is_positive(patch.length_m)) {
+    base::throw_invalid("glucose: length_m must be positive and finite, is ", patch.length_m);
   }
   check_not_negative("concentration", patch.concentration);
   check_not_negative("edge_m", patch.edge_m);
   check_not_negative("mixing_m2_s", patch.mixing_m2_s);
   check_not_negative("poured_at_s", patch.poured_at_s);
-  if (!(patch.decay_s > 0)) control::throw_invalid("glucose: decay_s must be positive, is ", patch.decay_s);
+  if (!(patch.decay_s > 0)) base::throw_invalid("glucose: decay_s must be positive, is ", patch.decay_s);
   if (!(patch.removed_at_s >= patch.poured_at_s)) {
-    control::throw_invalid("glucose: removed_at_s ", patch.removed_at_s, " is before poured_at_s ", patch.poured_at_s);
+    base::throw_invalid("glucose: removed_at_s ", patch.removed_at_s, " is before poured_at_s ", patch.poured_at_s);
   }
 }
 
@@ -82,7 +82,7 @@ Glucose::Glucose(const GlucoseParameters& parameters)
 void Glucose::pour(GlucosePatch patch) {
   std::erase_if(patches_, [this](const Patch& each) { return time_s_ >= each.removed_at_s - kHalfTickS; });
   if (patches_.size() >= kMaxPatches) {
-    control::throw_invalid("glucose: there are ", patches_.size(), " patches, more are not allowed");
+    base::throw_invalid("glucose: there are ", patches_.size(), " patches, more are not allowed");
   }
   patch.poured_at_s = time_s_;
   patches_.push_back(begun(patch));

@@ -14,7 +14,7 @@ namespace {
 
 void check_between(const char* name, double value, double least, double most) {
   if (!(value >= least && value <= most)) {
-    control::throw_invalid("IMU: ", name, " must be in [", least, ", ", most, "], is ", value);
+    base::throw_invalid("IMU: ", name, " must be in [", least, ", ", most, "], is ", value);
   }
 }
 

@@ -10,10 +10,10 @@ namespace sim_robot {
 
 void check(const MotorParameters& parameters) {
   if (!(parameters.dead_zone_duty >= 0 && parameters.dead_zone_duty < 1)) {
-    control::throw_invalid("motor: dead_zone_duty must be in [0, 1), is ", parameters.dead_zone_duty);
+    base::throw_invalid("motor: dead_zone_duty must be in [0, 1), is ", parameters.dead_zone_duty);
   }
   if (!(parameters.time_constant_s >= 0 && parameters.time_constant_s <= 10)) {
-    control::throw_invalid("motor: time_constant_s must be in [0, 10], is ", parameters.time_constant_s);
+    base::throw_invalid("motor: time_constant_s must be in [0, 10], is ", parameters.time_constant_s);
   }
 }
 

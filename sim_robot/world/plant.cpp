@@ -28,7 +28,7 @@ void check(const PlantParameters& parameters) {
   const bool is_linear = parameters.kind == PlantKind::linear;
   const double dead_time_s = parameters.dead_time_s + (is_linear ? parameters.model.dead_time_s : 0);
   if (!(parameters.dead_time_s >= 0 && dead_time_s <= 10))
-    control::throw_invalid("dead_time_s is ", dead_time_s, ", allowed is 0 to 10");
+    base::throw_invalid("dead_time_s is ", dead_time_s, ", allowed is 0 to 10");
   if (is_linear) return control::check(parameters.model);
   if (parameters.kind == PlantKind::shear_thinning) return check(parameters.shear_thinning);
   control::hydrodynamic_model(parameters.hydrodynamics);  // refuses what cannot be
@@ -39,8 +39,8 @@ PlantParameters fluid(const std::string& name) {
   if (name == "water") return {.model = control::kNewtonianModel};
   if (name == "water_nonlinear") return {.kind = PlantKind::nonlinear};
   if (name == "shear_thinning") return {.kind = PlantKind::shear_thinning};
-  control::throw_invalid("there is no fluid '", name,
-                         "'; there are non_newtonian, water, water_nonlinear and shear_thinning");
+  base::throw_invalid("there is no fluid '", name,
+                      "'; there are non_newtonian, water, water_nonlinear and shear_thinning");
 }
 
 NonlinearPlant::NonlinearPlant(const control::HydrodynamicParameters& p, double dt_s, int steps)

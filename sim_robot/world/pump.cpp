@@ -32,7 +32,7 @@ std::span<const double> profile_table() {
 
 void check(const PumpParameters& parameters) {
   const auto refuse = [](const char* name, const char* allowed, double value) {
-    control::throw_invalid("pump: ", name, " must be ", allowed, ", is ", value);
+    base::throw_invalid("pump: ", name, " must be ", allowed, ", is ", value);
   };
   if (!(std::abs(parameters.mean_flow_m3_s) <= 0.01)) {
     refuse("mean_flow_m3_s", "in [-0.01, 0.01] (10 L/s)", parameters.mean_flow_m3_s);
@@ -52,7 +52,7 @@ double pump_profile(double time_s) {
 }
 
 void write_flow_csv(std::ostream& out, double mean_flow_m3_s, int rows) {
-  if (rows < 2) control::throw_invalid("flow CSV: needs at least 2 rows, not ", rows);
+  if (rows < 2) base::throw_invalid("flow CSV: needs at least 2 rows, not ", rows);
   out << "t_s,flow_m3_s\n" << std::setprecision(9);
   for (int row = 0; row < rows; ++row) {
     const double time_s = kPumpPeriodS * row / rows;

@@ -12,7 +12,7 @@ constexpr double kSizedAtDuty = 0.6;
 
 void need(const char* name, double value, double least, double most) {
   if (!(value >= least && value <= most)) {
-    control::throw_invalid(name, " is ", value, ", allowed is ", least, " to ", most);
+    base::throw_invalid(name, " is ", value, ", allowed is ", least, " to ", most);
   }
 }
 

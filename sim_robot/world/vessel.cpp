@@ -14,7 +14,7 @@ double per_area(double diameter_m) { return 4 / (std::numbers::pi * diameter_m *
 
 void check_length(const char* name, double value_m, double least_m, double most_m) {
   if (!(value_m >= least_m && value_m <= most_m)) {
-    control::throw_invalid("vessel: ", name, " must be in [", least_m, ", ", most_m, "], is ", value_m);
+    base::throw_invalid("vessel: ", name, " must be in [", least_m, ", ", most_m, "], is ", value_m);
   }
 }
 

@@ -96,12 +96,12 @@ robot_fw::Inputs World::read(std::uint64_t robot_time_us) {
 void World::set_fault(Sensor sensor, const SensorFault& fault) {
   check(fault);
   if (sensor == Sensor::electrode) return electrode_.set_fault(fault);
-  if (!imu_) control::throw_invalid("the perfect sensor has no faults; give the world an imu");
+  if (!imu_) base::throw_invalid("the perfect sensor has no faults; give the world an imu");
   imu_->set_fault(fault);
 }
 
 void World::set_mean_flow_m3_s(double flow_m3_s) {
-  if (!vessel_) control::throw_invalid("a mean flow of ", flow_m3_s, " m3/s needs a vessel");
+  if (!vessel_) base::throw_invalid("a mean flow of ", flow_m3_s, " m3/s needs a vessel");
   vessel_->set_mean_flow_m3_s(flow_m3_s);
 }
 

@@ -178,7 +178,7 @@ Condition caught_up() {
   return {"caught up",
           [](const Moment& moment) { return moment.heard.link == LinkView::up && moment.samples_owed == 0; },
           [](const Moment& moment) {
-            return control::join_text(moment.samples_owed, " samples are owed, ", text(moment.heard.link));
+            return base::join_text(moment.samples_owed, " samples are owed, ", text(moment.heard.link));
           }};
 }
 

@@ -60,14 +60,14 @@ struct Record {
 
 TEST(ShippedScenarios, AreAllThere) {
   std::vector<std::string> names;
-  for (const ShippedScenario& each : shipped_scenarios()) names.emplace_back(each.name);
+  for (const base::EmbeddedFile& each : scenario_files()) names.emplace_back(each.name);
   const std::vector<std::string> expected{"bad_day",        "figure_5", "figure_7", "figure_8_non_newtonian",
                                           "figure_8_water", "figure_9", "figure_a2"};
   EXPECT_EQ(names, expected);
 }
 
 TEST(ShippedScenarios, HaveADescriptionAnEndAndNoSampleLost) {
-  for (const ShippedScenario& each : shipped_scenarios()) {
+  for (const base::EmbeddedFile& each : scenario_files()) {
     const Scenario scenario = shipped(std::string(each.name));
     EXPECT_NE(scenario.description, Scenario{}.description) << each.name;
     EXPECT_GT(scenario.duration_s, 0) << each.name;

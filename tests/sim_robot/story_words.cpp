@@ -29,7 +29,7 @@ void check_kind(std::string_view kind) {
   for (int each = _rheonaut_EventKind_MIN; each <= _rheonaut_EventKind_MAX; ++each) {
     if (kind == protocol::text(static_cast<protocol::EventKind>(each))) return;
   }
-  control::throw_invalid("there is no event '", kind, "'; docs/protocol.md has their kinds");
+  base::throw_invalid("there is no event '", kind, "'; docs/protocol.md has their kinds");
 }
 
 std::string seconds(double value_s) { return short_text(value_s) + " s"; }
@@ -188,10 +188,10 @@ Answer StoryWords::await_answer(std::uint64_t id, Limit limit, Where where) {
 
 void StoryWords::fail(const std::string& what, const std::string& instead, Where where) const {
   const Moment now = moment();
-  throw StoryFailed(control::join_text(where.file_name(), ":", where.line(), ": ", what, "\n  instead   ", instead,
-                                       "\n  at        ", seconds(now.time_s), " of the story\n  heard     ",
-                                       text(now.heard), "\n  in truth  ", text(now.truth), "\n  events    ",
-                                       told_events(), "\n  commands  ", told_commands()));
+  throw StoryFailed(base::join_text(where.file_name(), ":", where.line(), ": ", what, "\n  instead   ", instead,
+                                    "\n  at        ", seconds(now.time_s), " of the story\n  heard     ",
+                                    text(now.heard), "\n  in truth  ", text(now.truth), "\n  events    ", told_events(),
+                                    "\n  commands  ", told_commands()));
 }
 
 std::string StoryWords::told_events() const {

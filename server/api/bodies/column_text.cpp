@@ -9,6 +9,9 @@
 #include "server/station/state/unknown_values.hpp"
 
 namespace server {
+
+using base::append_float;
+using base::append_number;
 namespace {
 
 void append_value(std::string& out, const std::optional<float>& value) { append_float(out, or_nan(value), "null"); }

@@ -68,7 +68,7 @@ Result<std::string> document_in(const Members& body) {
     if (!plant.is_object()) return fail(ErrorCode::bad_request, "plant must be an object", "wrong_type");
     document["plant"] = plant;
   }
-  std::string text = dump(document);
+  std::string text = base::dump(document);
   if (text.size() <= kMaxDocumentBytes) return text;
   return fail(
       ErrorCode::invalid,
@@ -78,7 +78,7 @@ Result<std::string> document_in(const Members& body) {
 
 json list_of(const FluidModel::Numbers& numbers) {
   json list = json::array();
-  for (const float number : numbers) list.push_back(decimal(number));
+  for (const float number : numbers) list.push_back(base::decimal(number));
   return list;
 }
 

@@ -2,20 +2,49 @@
 #include "server/api/routes/assets.hpp"
 
 #include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
 
 namespace server {
+namespace {
 
-Response asset_response(const Request& request, const Asset& asset) {
+constexpr std::array<std::pair<std::string_view, const char*>, 13> kContentTypes{{
+    {".html", "text/html; charset=utf-8"},
+    {".js", "text/javascript; charset=utf-8"},
+    {".css", "text/css; charset=utf-8"},
+    {".json", "application/json"},
+    {".map", "application/json"},
+    {".webmanifest", "application/manifest+json"},
+    {".svg", "image/svg+xml"},
+    {".png", "image/png"},
+    {".ico", "image/x-icon"},
+    {".woff", "font/woff"},
+    {".woff2", "font/woff2"},
+    {".txt", "text/plain; charset=utf-8"},
+    {".yaml", "application/yaml; charset=utf-8"},
+}};
+
+const char* content_type_of(std::string_view name) {
+  const std::string_view ending = name.substr(std::min(name.rfind('.'), name.size()));
+  const auto found = std::ranges::find(kContentTypes, ending, [](const auto& known) { return known.first; });
+  return found == kContentTypes.end() ? "application/octet-stream" : found->second;
+}
+
+}  // namespace
+
+Response asset_response(const Request& request, const base::EmbeddedFile& file) {
+  const std::string etag = '"' + std::string{file.digest} + '"';
   Response response;
-  response.content_type = asset.content_type;
-  response.headers.emplace_back("ETag", asset.etag);
-  const bool hashed = std::string_view{asset.path}.starts_with("/assets/");
+  response.content_type = content_type_of(file.name);
+  response.headers.emplace_back("ETag", etag);
+  const bool hashed = file.name.starts_with("/assets/");
   response.headers.emplace_back("Cache-Control", hashed ? "public, max-age=31536000, immutable" : "no-cache");
-  if (request.header("if-none-match").find(asset.etag) != std::string::npos) {
+  if (request.header("if-none-match").find(etag) != std::string::npos) {
     response.status = 304;
     return response;
   }
-  response.body.assign(asset.begin, asset.begin + asset.size);
+  response.body = file.content;
   return response;
 }
 
@@ -26,9 +55,9 @@ Response page_response(const Request& request) {
     return response;
   }
   const std::string path = request.path == "/" ? "/index.html" : request.path;
-  const auto assets = page_assets();
-  const auto found = std::ranges::find_if(assets, [&path](const Asset& asset) { return path == asset.path; });
-  if (found != assets.end()) return asset_response(request, *found);
+  const auto files = cockpit_files();
+  const auto found = std::ranges::find(files, path, &base::EmbeddedFile::name);
+  if (found != files.end()) return asset_response(request, *found);
   if (path == "/index.html") {
     return html_response(200,
                          "<!doctype html><title>Rheonaut</title><p>This station was built without the cockpit. Its API "

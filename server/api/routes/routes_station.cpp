@@ -23,7 +23,7 @@ Answer get_station(StationRoutes parts, Request) {
                                 {"losses", losses_json(parts.head_watch.losses())}});
 }
 
-Answer get_openapi(StationRoutes, Request request) { co_return asset_response(request, openapi_document()); }
+Answer get_openapi(StationRoutes, Request request) { co_return asset_response(request, openapi_files().front()); }
 
 // A link that lets one page in, as admin. Its address is the one that was asked, which RequestGuard knows to be ours.
 Answer make_login_link(StationRoutes parts, Request request) {

@@ -8,6 +8,8 @@
 #include "base/json_text.hpp"
 
 namespace server {
+
+using base::decimal;
 namespace {
 
 using nlohmann::json;

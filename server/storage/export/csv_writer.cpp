@@ -10,6 +10,9 @@
 #include "server/station/state/unknown_values.hpp"
 
 namespace server {
+
+using base::append_float;
+using base::append_number;
 namespace {
 
 constexpr std::size_t kPageSamples = 2'000;

@@ -54,6 +54,13 @@ class MigrationTest : public RecordingTest {
   }
 };
 
+TEST(Migrations, AreFilesThatAreNumberedFromOne) {
+  std::size_t number = 0;
+  for (const base::EmbeddedFile& file : migration_files()) EXPECT_EQ(file.name, std::to_string(++number) + ".sql");
+  EXPECT_EQ(number, migrations().size());
+  EXPECT_GE(number, 7U);
+}
+
 TEST_F(MigrationTest, EveryRunOfVersion1ReadsTheSame) {
   make_version_1();
   const std::vector<std::string> before = runs_as_read();

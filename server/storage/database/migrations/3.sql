@@ -1,11 +1,7 @@
-// SQL of the third migration: how long each stage of a command took.
-//
-// It adds columns only, so it takes no longer with a large database.
-#include "server/storage/database/schema.hpp"
+-- The third migration: how long each stage of a command took.
+--
+-- It adds columns only, so it takes no longer with a large database.
 
-namespace server {
-
-const char* const kThirdSchema = R"sql(
 -- Steady time from the request's arrival at the station to each stage; NULL: not reached, or not known (version 2).
 ALTER TABLE command ADD COLUMN sent_after_us INTEGER;
 ALTER TABLE command ADD COLUMN acknowledged_after_us INTEGER;
@@ -18,6 +14,3 @@ SELECT printf('%llu', command_id) AS command_id, robot_id, printf('%llu', boot_i
   state, reason, submitted_at_us, sent_at_us, ended_at_us, effect_at_robot_us,
   printf('%llu', emergency_id) AS emergency_id, sent_after_us, acknowledged_after_us, verified_after_us, life_from
 FROM command;
-)sql";
-
-}  // namespace server

@@ -1,11 +1,7 @@
-// SQL of the second migration: what runs, clocks, certificates and retention need beside the samples themselves.
-//
-// It adds columns and tables only, so it takes as long as the database has boots and runs: no sample is rewritten.
-#include "server/storage/database/schema.hpp"
+-- The second migration: what runs, clocks, certificates and retention need beside the samples themselves.
+--
+-- It adds columns and tables only, so it takes as long as the database has boots and runs: no sample is rewritten.
 
-namespace server {
-
-const char* const kSecondSchema = R"sql(
 -- Everything below these is stored, lost or purged; 0: not known, the segments and gaps tell.
 ALTER TABLE boot ADD COLUMN durable_next_seq INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE boot ADD COLUMN durable_next_event_seq INTEGER NOT NULL DEFAULT 0;
@@ -159,6 +155,3 @@ SELECT boot.robot_id, printf('%llu', boot.boot_id) AS boot_id, clock_estimate.ro
   clock_estimate.robot_time_us + clock_estimate.utc_offset_us AS utc_us, clock_estimate.utc_offset_us,
   clock_estimate.uncertainty_us, clock_estimate.drift_ppm, clock_estimate.round_trip_us, clock_estimate.station_step_us
 FROM clock_estimate JOIN boot USING (boot_key);
-)sql";
-
-}  // namespace server

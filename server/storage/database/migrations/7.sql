@@ -1,12 +1,8 @@
-// SQL of the seventh migration: fluids and their models, retired robots, causes of events of their own, what a robot
-// says that this station does not know or cannot compute with, and positions that were measured from outside.
-//
-// It adds columns and tables only: no row is rewritten.
-#include "server/storage/database/schema.hpp"
+-- The seventh migration: fluids and their models, retired robots, causes of events of their own, what a robot
+-- says that this station does not know or cannot compute with, and positions that were measured from outside.
+--
+-- It adds columns and tables only: no row is rewritten.
 
-namespace server {
-
-const char* const kSeventhSchema = R"sql(
 ALTER TABLE robot ADD COLUMN fluid TEXT NOT NULL DEFAULT '';  -- that it swims in, of the configuration's list; '': not known
 ALTER TABLE robot ADD COLUMN retired_at_us INTEGER;           -- NULL: in use
 ALTER TABLE robot ADD COLUMN retired_by TEXT;                 -- the actor
@@ -139,6 +135,3 @@ CREATE TABLE outside_position (
   position_sd_m REAL NOT NULL,
   PRIMARY KEY (reference_id, robot_time_us)
 ) WITHOUT ROWID;
-)sql";
-
-}  // namespace server

@@ -1,11 +1,7 @@
-// SQL of the migration that adds the audit: who did what, when and from where, chained by hashes.
-//
-// It adds columns and a table: no row is rewritten. Commands that have ended have no entry; meta says how many.
-#include "server/storage/database/schema.hpp"
+-- The fifth migration adds the audit: who did what, when and from where, chained by hashes.
+--
+-- It adds columns and a table: no row is rewritten. Commands that have ended have no entry; meta says how many.
 
-namespace server {
-
-const char* const kFifthSchema = R"sql(
 CREATE TABLE audit (
   entry INTEGER PRIMARY KEY,     -- 1, 2, 3 and so on, without holes
   at_us INTEGER NOT NULL,        -- UTC when it happened; entries are in the order in which they were written
@@ -33,6 +29,3 @@ ALTER TABLE command ADD COLUMN peer TEXT NOT NULL DEFAULT '';  -- the address th
 ALTER TABLE command ADD COLUMN audit_entry INTEGER;            -- that says what this row says; NULL: older than the audit
 INSERT INTO meta (name, value)
   SELECT 'commands_before_audit', count(*) FROM command WHERE state NOT IN ('queued', 'sent');
-)sql";
-
-}  // namespace server

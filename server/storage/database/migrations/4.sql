@@ -1,11 +1,7 @@
-// SQL of the migration that adds accounts: users, API tokens, sessions of pages, and how each robot was enrolled.
-//
-// It adds columns and tables only: no row is rewritten.
-#include "server/storage/database/schema.hpp"
+-- The fourth migration adds accounts: users, API tokens, sessions of pages, and how each robot was enrolled.
+--
+-- It adds columns and tables only: no row is rewritten.
 
-namespace server {
-
-const char* const kFourthSchema = R"sql(
 CREATE TABLE user (
   name TEXT PRIMARY KEY,
   role TEXT NOT NULL CHECK (role IN ('viewer', 'operator', 'admin')),
@@ -40,6 +36,3 @@ CREATE TABLE page_session (
 ALTER TABLE robot ADD COLUMN enrolled_by TEXT NOT NULL DEFAULT 'loopback';  -- the actor; 'loopback': by itself
 ALTER TABLE robot ADD COLUMN revoked_at_us INTEGER;                         -- NULL: it may connect
 ALTER TABLE robot ADD COLUMN revoked_by TEXT;
-)sql";
-
-}  // namespace server

@@ -1,0 +1,10 @@
+# Embeds the built cockpit in server_api_routes. RHEONAUT_WEB_DIST may name a cockpit that was built elsewhere; otherwise
+# it is what the target web_dist makes. Without either the station answers with a plain page.
+set(RHEONAUT_WEB_DIST "${CMAKE_BINARY_DIR}/web/dist" CACHE PATH "Folder of the built cockpit to embed")
+set(cockpit)
+if(TARGET web_dist AND RHEONAUT_WEB_DIST STREQUAL "${CMAKE_BINARY_DIR}/web/dist")
+  list(APPEND cockpit web_dist ${CMAKE_BINARY_DIR}/web/dist/index.html)
+elseif(EXISTS ${RHEONAUT_WEB_DIST}/index.html)
+  list(APPEND cockpit ${RHEONAUT_WEB_DIST}/index.html)
+endif()
+rheonaut_embed(server_api_routes server::cockpit_files FILES /=${RHEONAUT_WEB_DIST}/ DEPENDS ${cockpit})
