@@ -7,14 +7,15 @@
 #include <toml++/toml.h>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <set>
-#include <stdexcept>
 #include <utility>
 
+#include "base/fields.hpp"
+#include "base/invalid_argument.hpp"
+#include "base/toml_value.hpp"
 #include "server/config/endpoint.hpp"
 
 namespace server {
@@ -27,8 +28,7 @@ class ConfigFile {
     try {
       table_ = toml::parse(text, path_);
     } catch (const toml::parse_error& error) {
-      throw std::invalid_argument{
-          fmt::format("{}:{}: {}", path_, error.source().begin.line, std::string{error.description()})};
+      base::throw_invalid(path_, ":", error.source().begin.line, ": ", error.description());
     }
   }
 
@@ -38,24 +38,19 @@ class ConfigFile {
     known_.insert(fmt::format("{}.{}", section, key));
     const toml::node* node = find(section, key);
     if (node == nullptr) return false;
-    const auto value = exact<T>(*node);
+    const auto value = base::exact<T>(*node);
     if (!value) fail(*node, section, key, fmt::format("must be {}", type_name(into)));
     into = *value;
     return true;
   }
 
-  void take_number(const char* section, const char* key, double minimum, double maximum, double& into) {
-    if (!take(section, key, into)) return;
-    if (std::isfinite(into) && into >= minimum && into <= maximum) return;
-    fail(*find(section, key), section, key, fmt::format("= {} is outside {} to {}", into, minimum, maximum));
+  void take_number(const char* section, const char* key, base::Range range, double& into) {
+    if (take(section, key, into)) check_range(section, key, range, into);
   }
 
-  void take_count(const char* section, const char* key, std::int64_t minimum, std::int64_t maximum,
-                  std::uint32_t& into) {
+  void take_count(const char* section, const char* key, base::Range range, std::uint32_t& into) {
     std::int64_t value = into;
-    if (take(section, key, value) && (value < minimum || value > maximum)) {
-      fail(*find(section, key), section, key, fmt::format("= {} is outside {} to {}", value, minimum, maximum));
-    }
+    if (take(section, key, value)) check_range(section, key, range, value);
     into = static_cast<std::uint32_t>(value);
   }
 
@@ -75,8 +70,7 @@ class ConfigFile {
     for (const auto& [section, content] : table_) {
       const std::string section_name{section.str()};
       if (!content.is_table()) {
-        throw std::invalid_argument{
-            fmt::format("{}:{}: '{}' stands outside a section", path_, content.source().begin.line, section_name)};
+        base::throw_invalid(path_, ":", content.source().begin.line, ": '", section_name, "' stands outside a section");
       }
       refuse_unknown_keys(section_name, *content.as_table());
     }
@@ -96,7 +90,7 @@ class ConfigFile {
   }
 
   [[noreturn]] void fail(const toml::node& node, const char* section, const char* key, const std::string& why) const {
-    throw std::invalid_argument{fmt::format("{}:{}: {}.{} {}", path_, node.source().begin.line, section, key, why)};
+    base::throw_invalid(path_, ":", node.source().begin.line, ": ", section, ".", key, " ", why);
   }
 
   // `section` may be a table within a section: "limits.water".
@@ -107,24 +101,23 @@ class ConfigFile {
   }
 
  private:
+  template <class Number>
+  void check_range(const char* section, const char* key, base::Range range, Number value) const {
+    if (range.holds(static_cast<double>(value))) return;
+    fail(*find(section, key), section, key,
+         fmt::format("= {} is outside {} to {}", value, static_cast<Number>(range.minimum),
+                     static_cast<Number>(range.maximum)));
+  }
+
   void refuse_unknown_keys(const std::string& section, const toml::table& content) const {
     for (const auto& [key, value] : content) {
       const std::string name = fmt::format("{}.{}", section, std::string{key.str()});
       if (value.is_table() && known_tables_.contains(name)) {
         refuse_unknown_keys(name, *value.as_table());
       } else if (!known_.contains(name)) {
-        throw std::invalid_argument{fmt::format("{}:{}: unknown option '{}'; known are {}", path_,
-                                                value.source().begin.line, name, fmt::join(known_, ", "))};
+        base::throw_invalid(path_, ":", value.source().begin.line, ": unknown option '", name, "'; known are ",
+                            fmt::format("{}", fmt::join(known_, ", ")));
       }
-    }
-  }
-
-  template <class T>
-  static std::optional<T> exact(const toml::node& node) {
-    if constexpr (std::is_same_v<T, double>) {
-      return node.is_number() ? node.value<double>() : std::nullopt;
-    } else {
-      return node.value_exact<T>();
     }
   }
 
@@ -155,17 +148,17 @@ void read_tls(ConfigFile& file, TlsConfig& tls) {
 
 void read_limits(ConfigFile& file, const std::string& section, CommandLimits& limits) {
   const char* name = section.c_str();
-  file.take_number(name, "setpoint_min_m", -100, 100, limits.setpoint_min_m);
-  file.take_number(name, "setpoint_max_m", -100, 100, limits.setpoint_max_m);
-  file.take_number(name, "setpoint_step_m", 0, 200, limits.setpoint_step_m);
-  file.take_number(name, "duty_min", -1, 0, limits.duty_min);
-  file.take_number(name, "duty_max", 0, 1, limits.duty_max);
-  file.take_number(name, "power_duty", 0, 1, limits.power_duty);
-  file.take_number(name, "power_s", 0, 3600, limits.power_s);
-  file.take_number(name, "disturbance_max_m", 0, 100, limits.disturbance_max_m);
+  file.take_number(name, "setpoint_min_m", {-100, 100}, limits.setpoint_min_m);
+  file.take_number(name, "setpoint_max_m", {-100, 100}, limits.setpoint_max_m);
+  file.take_number(name, "setpoint_step_m", {0, 200}, limits.setpoint_step_m);
+  file.take_number(name, "duty_min", {-1, 0}, limits.duty_min);
+  file.take_number(name, "duty_max", {0, 1}, limits.duty_max);
+  file.take_number(name, "power_duty", {0, 1}, limits.power_duty);
+  file.take_number(name, "power_s", {0, 3600}, limits.power_s);
+  file.take_number(name, "disturbance_max_m", {0, 100}, limits.disturbance_max_m);
   if (limits.setpoint_min_m < limits.setpoint_max_m) return;
-  throw std::invalid_argument{fmt::format("{0}.setpoint_min_m = {1} must be below {0}.setpoint_max_m = {2}", section,
-                                          limits.setpoint_min_m, limits.setpoint_max_m)};
+  base::throw_invalid(fmt::format("{0}.setpoint_min_m = {1} must be below {0}.setpoint_max_m = {2}", section,
+                                  limits.setpoint_min_m, limits.setpoint_max_m));
 }
 
 std::string name_of_fluid(ConfigFile& file, const char* section, const std::string& key) {
@@ -192,8 +185,8 @@ void read_envelope(ConfigFile& file, Envelope& envelope) {
 }
 
 void read_places(ConfigFile& file, const char* section, PortPlaces& places) {
-  file.take_count(section, "max_connections", 16, 32'768, places.connections);
-  file.take_count(section, "max_connections_per_address", 1, 32'768, places.of_address);
+  file.take_count(section, "max_connections", {16, 32'768}, places.connections);
+  file.take_count(section, "max_connections_per_address", {1, 32'768}, places.of_address);
 }
 
 void read(ConfigFile& file, Config& config) {
@@ -204,18 +197,18 @@ void read(ConfigFile& file, Config& config) {
   read_places(file, "http", config.http_places);
   if (file.take("robots", "listen", config.robots)) config.robots_or_any_port = false;
   file.take("robots", "enrol_on_loopback", config.enrolment.allowed);
-  file.take_count("robots", "max_enrolled_on_loopback", 0, 100'000, config.enrolment.most_robots);
-  file.take_count("robots", "enrolments_per_minute", 1, 100'000, config.enrolment.most_a_minute);
+  file.take_count("robots", "max_enrolled_on_loopback", {0, 100'000}, config.enrolment.most_robots);
+  file.take_count("robots", "enrolments_per_minute", {1, 100'000}, config.enrolment.most_a_minute);
   read_places(file, "robots", config.robot_places);
-  file.take_count("robots", "link_timeout_ms", 200, 5000, config.link.link_timeout_ms);
-  file.take_count("robots", "heartbeat_interval_ms", 50, 2500, config.link.heartbeat_interval_ms);
-  file.take_count("robots", "samples_per_frame", 0, protocol::kMaxSamplesPerFrame, config.link.samples_per_frame);
+  file.take_count("robots", "link_timeout_ms", {200, 5000}, config.link.link_timeout_ms);
+  file.take_count("robots", "heartbeat_interval_ms", {50, 2500}, config.link.heartbeat_interval_ms);
+  file.take_count("robots", "samples_per_frame", {0, protocol::kMaxSamplesPerFrame}, config.link.samples_per_frame);
   read_envelope(file, config.envelope);
   RecordingConfig& recording = config.recording;
-  file.take_count("recording", "retention_days", 0, 36'500, recording.retention_days);
-  file.take_count("recording", "max_database_mb", 0, 100'000'000, recording.max_database_mb);
-  file.take_count("recording", "low_space_mb", 0, 100'000'000, recording.low_space_mb);
-  file.take_count("recording", "critical_space_mb", 0, 100'000'000, recording.critical_space_mb);
+  file.take_count("recording", "retention_days", {0, 36'500}, recording.retention_days);
+  file.take_count("recording", "max_database_mb", {0, 100'000'000}, recording.max_database_mb);
+  file.take_count("recording", "low_space_mb", {0, 100'000'000}, recording.low_space_mb);
+  file.take_count("recording", "critical_space_mb", {0, 100'000'000}, recording.critical_space_mb);
   std::string backup_dir;
   if (file.take("recording", "backup_dir", backup_dir)) recording.backup_dir = backup_dir;
   read_tls(file, config.tls);
@@ -234,18 +227,17 @@ void read(ConfigFile& file, Config& config) {
 void check_tls(const Config& config) {
   const TlsConfig& tls = config.tls;
   if (tls.certificate.empty() != tls.key.empty()) {
-    throw std::invalid_argument{"tls.certificate and tls.key belong together: give both, or neither"};
+    base::throw_invalid("tls.certificate and tls.key belong together: give both, or neither");
   }
   if (tls.mode == TlsMode::on && tls.insecure) {
-    throw std::invalid_argument{"tls.mode = 'on' and tls.insecure = true contradict each other: remove one of them"};
+    base::throw_invalid("tls.mode = 'on' and tls.insecure = true contradict each other: remove one of them");
   }
   for (const auto& [option, listen] : {std::pair{"http.listen", config.http}, {"robots.listen", config.robots}}) {
     if (!config.is_exposed(listen) || tls.insecure) continue;
-    throw std::invalid_argument{
-        fmt::format("{} = '{}' can be reached by other machines, and tls.mode is 'off': set it to 'auto' and make a "
-                    "certificate with `rheonaut certificate`, or accept with tls.insecure = true that everyone on the "
-                    "way can read and change what is sent",
-                    option, listen)};
+    base::throw_invalid(option, " = '", listen,
+                        "' can be reached by other machines, and tls.mode is 'off': set it to 'auto' and make a "
+                        "certificate with `rheonaut certificate`, or accept with tls.insecure = true that everyone on "
+                        "the way can read and change what is sent");
   }
 }
 
@@ -254,14 +246,12 @@ void check(const Config& config) {
   parse_endpoint(config.robots);
   check_tls(config);
   if (config.recording.critical_space_mb > config.recording.low_space_mb) {
-    throw std::invalid_argument{
-        fmt::format("recording.critical_space_mb = {} must be at most recording.low_space_mb = {}",
-                    config.recording.critical_space_mb, config.recording.low_space_mb)};
+    base::throw_invalid("recording.critical_space_mb = ", config.recording.critical_space_mb,
+                        " must be at most recording.low_space_mb = ", config.recording.low_space_mb);
   }
   if (config.link.heartbeat_interval_ms * 2 > config.link.link_timeout_ms) {
-    throw std::invalid_argument{
-        fmt::format("robots.heartbeat_interval_ms = {} must be at most half of robots.link_timeout_ms = {}",
-                    config.link.heartbeat_interval_ms, config.link.link_timeout_ms)};
+    base::throw_invalid("robots.heartbeat_interval_ms = ", config.link.heartbeat_interval_ms,
+                        " must be at most half of robots.link_timeout_ms = ", config.link.link_timeout_ms);
   }
 }
 
@@ -302,11 +292,11 @@ Config load_config(const ConfigFlags& flags) {
   Config config;
   if (flags.file) {
     if (!std::filesystem::is_regular_file(*flags.file)) {
-      throw std::invalid_argument{fmt::format("config file '{}' does not exist", flags.file->string())};
+      base::throw_invalid("config file '", flags.file->string(), "' does not exist");
     }
     std::ifstream in{*flags.file, std::ios::binary};
     const std::string text{std::istreambuf_iterator<char>{in}, {}};
-    if (!in) throw std::invalid_argument{fmt::format("config file '{}' cannot be read", flags.file->string())};
+    if (!in) base::throw_invalid("config file '", flags.file->string(), "' cannot be read");
     ConfigFile file{text, flags.file->string()};
     read(file, config);
   }

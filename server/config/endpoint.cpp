@@ -5,7 +5,8 @@
 #include <boost/asio/ip/address.hpp>
 #include <charconv>
 #include <sstream>
-#include <stdexcept>
+
+#include "base/invalid_argument.hpp"
 
 namespace server {
 namespace asio = boost::asio;
@@ -13,18 +14,18 @@ using asio::ip::tcp;
 
 tcp::endpoint parse_endpoint(const std::string& text) {
   const auto colon = text.rfind(':');
-  if (colon == std::string::npos) throw std::invalid_argument{"'" + text + "' is not ADDR:PORT, e.g. 127.0.0.1:8080"};
+  if (colon == std::string::npos) base::throw_invalid("'", text, "' is not ADDR:PORT, e.g. 127.0.0.1:8080");
   std::string host = text.substr(0, colon);
   if (host.size() > 1 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
   if (host == "localhost") host = "127.0.0.1";
   boost::system::error_code error;
   const auto address = asio::ip::make_address(host, error);
-  if (error) throw std::invalid_argument{"'" + host + "' in '" + text + "' is not an IP address"};
+  if (error) base::throw_invalid("'", host, "' in '", text, "' is not an IP address");
   unsigned port = 0;
   const char* end = text.data() + text.size();
   const auto [rest, code] = std::from_chars(text.data() + colon + 1, end, port);
   if (code != std::errc{} || rest != end || port > 65535) {
-    throw std::invalid_argument{"the port of '" + text + "' is not a number from 0 to 65535"};
+    base::throw_invalid("the port of '", text, "' is not a number from 0 to 65535");
   }
   return {address, static_cast<asio::ip::port_type>(port)};
 }
