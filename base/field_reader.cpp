@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "base/field_list.hpp"
+#include "base/invalid_argument.hpp"
 #include "base/toml_value.hpp"
 
 namespace base {

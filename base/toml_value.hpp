@@ -1,4 +1,5 @@
-// A value of TOML as the type that a key takes, and nothing near it: 1 is no text, "1" no number and 1.5 no whole number.
+// A value of TOML as the type that a key takes, and nothing near it: 1 is no text, "1" no number and 1.5 no whole
+// number.
 #pragma once
 
 #include <toml++/toml.h>
