@@ -1,19 +1,20 @@
-// One connection of a robot: hello and welcome, then frames both ways until the link is lost.
+// One connection of a robot: when it is read, written and given up, from the hello until the link is lost.
 //
 //   Hello → (Station::may_connect, RobotArchive::admit) → Welcome → { reader ‖ writer ‖ watch }
 //
-// Loop thread. Owns its stream; lives in the frame of run_robot_session and is the Station's RobotPort while welcomed.
+// What the greeting says stands in greeting.hpp, what is sent next in robot_outbox.hpp. Loop thread. Owns its stream;
+// lives in the coroutine RobotListener::session and is the Station's RobotPort while it is welcome.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "protocol/frame.hpp"
-#include "server/link/command_window.hpp"
 #include "server/link/frame_faults.hpp"
+#include "server/link/greeting.hpp"
+#include "server/link/robot_outbox.hpp"
 #include "server/net/byte_stream.hpp"
 #include "server/runtime/clock.hpp"
 #include "server/station/state/robot_archive.hpp"
@@ -22,7 +23,7 @@
 
 namespace server {
 
-// Of all sessions, since each works off at once what it reads: memory that is in the processor's cache.
+// Shared by all sessions, since each handles at once what it reads: memory that is in the processor's cache.
 struct ReadBuffers {
   std::array<std::uint8_t, ByteStream::kReadBytes> input;
   protocol::RobotFrame frame;
@@ -30,8 +31,6 @@ struct ReadBuffers {
 
 class RobotSession final : public RobotPort {
  public:
-  static constexpr std::size_t kMaxQueuedCommands = 64;  // a further one is refused
-  static constexpr std::size_t kMaxQueuedStops = 16;     // a further one takes the place of the oldest
   static constexpr std::chrono::seconds kHelloTime{5};
 
   RobotSession(boost::asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
@@ -53,19 +52,15 @@ class RobotSession final : public RobotPort {
   void close(const std::string& reason) override;
 
  private:
-  struct QueuedCommand {
-    protocol::Command command;
-    std::int64_t deadline_us;
-  };
   using EndReason = std::string;
 
   void read();
-  void work_off(protocol::Bytes unread);
+  void on_bytes(protocol::Bytes unread);
   bool decode_next_of(protocol::Bytes& unread);
   void on_hello(const protocol::RobotFrame& frame);
   boost::asio::awaitable<bool> admit(const protocol::Hello& hello);
-  protocol::StationFrame welcome(const Admission& admission) const;
-  boost::asio::awaitable<bool> refuse(protocol::RefusalReason reason, std::string detail);
+  std::optional<Refusal> refusal_if_connected(const protocol::Hello& hello) const;
+  boost::asio::awaitable<bool> refuse(Refusal refusal);
 
   boost::asio::awaitable<EndReason> part(boost::asio::awaitable<EndReason> task);
   boost::asio::awaitable<EndReason> read_frames();
@@ -73,12 +68,10 @@ class RobotSession final : public RobotPort {
   boost::asio::awaitable<EndReason> watch_link();
 
   void on_frame(protocol::RobotFrame& frame);
-  void give_up(const protocol::RobotFrame& frame);
+  void report_unusable(const protocol::RobotFrame& frame);
   void on_heartbeat(const protocol::RobotFrame& frame);
   void flush();
-  void tell_what_is_awaited();
-  std::optional<protocol::StationFrame> next_frame();
-  protocol::StationFrame heartbeat();
+  void update_read_priority();
 
   Clock& clock_;
   std::unique_ptr<ByteStream> stream_;
@@ -97,18 +90,7 @@ class RobotSession final : public RobotPort {
 
   Signal reading_paused_;  // the hello has come, or a reason to close
   Signal wake_writer_;     // something is ready that flush() could not write
-  std::array<std::uint8_t, protocol::kMaxFramedBytes> output_{};
-  protocol::Bytes unsent_;  // of output_: the rest of a frame that the stream did not take at once
-  std::optional<protocol::StationFrame> welcome_;     // the first frame that is written
-  std::deque<protocol::Command> stops_;               // SAFETY: always written first
-  CommandId awaited_stop_ = 0, awaited_command_ = 0;  // the last that was written and is not answered; 0: none
-  std::deque<QueuedCommand> commands_;
-  CommandWindow window_;  // SAFETY: of all but stops
-  protocol::StationHeartbeat durable_ = rheonaut_StationHeartbeat_init_zero;
-  bool heartbeat_wanted_ = false;  // before it is due
-  std::int64_t next_heartbeat_us_ = 0;
-  std::int64_t next_probe_us_ = 0;
-  std::uint64_t probe_us_ = 0;  // the stamp that waits for its answer; 0: none
+  RobotOutbox outbox_;
 
   std::int64_t last_received_us_ = 0;
   std::optional<std::int64_t> writing_since_us_;  // while there is something unsent

@@ -23,7 +23,7 @@ class ControlTest : public LinkTest {
   }
   void fill_queue() {
     const std::size_t before = results.size();
-    for (std::size_t i = 0; i < RobotSession::kMaxQueuedCommands && results.size() == before; ++i) {
+    for (std::size_t i = 0; i < RobotOutbox::kMaxQueuedCommands && results.size() == before; ++i) {
       submit_as("someone", ping());
     }
     EXPECT_EQ(results.size(), before + 1);

@@ -147,7 +147,7 @@ TEST_F(LinkTest, ManyStopsAreBoundedAndAllAnswered) {
   auto* robot = connect();
   for (int i = 0; i < 100; ++i) stop_robot(1s);
   clock.settle();
-  EXPECT_LE(robot->commands().size(), RobotSession::kMaxQueuedStops);
+  EXPECT_LE(robot->commands().size(), RobotOutbox::kMaxQueuedStops);
   for (const auto& command : robot->commands()) robot->acknowledge(command, rheonaut_COMMAND_RESULT_ACCEPTED, 9);
   ASSERT_TRUE(clock.run_until([&] { return results.size() == 100; }, 2s));
   for (const auto& result : results) EXPECT_EQ(result->state, CommandState::acknowledged);

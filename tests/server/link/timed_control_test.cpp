@@ -1,5 +1,5 @@
 // Commands that wait on the robot for their time: their ends, and that they outlive nobody's control.
-#include "server/link/robot_session.hpp"
+#include "server/link/robot_outbox.hpp"
 #include "tests/server/link/timed_fixture.hpp"
 
 namespace server {
@@ -169,7 +169,7 @@ TEST_F(TimedControlTest, IsDroppedAheadOfTheNextHoldersFirstCommand) {
 // SAFETY: nobody's command passes the one that drops what waits.
 TEST_F(TimedControlTest, IsDroppedBeforeAnythingElseAlsoWhenTheLinkWasFull) {
   take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
-  for (std::size_t i = 0; i < CommandWindow::kMost + RobotSession::kMaxQueuedCommands; ++i) {
+  for (std::size_t i = 0; i < CommandWindow::kMost + RobotOutbox::kMaxQueuedCommands; ++i) {
     submit(ping(), 8s);
     clock.settle();
   }

@@ -1,7 +1,7 @@
 // The limits of commands that wait on the robot for their time: steps between them, and the fluid.
 #include <gmock/gmock.h>
 
-#include "server/link/robot_session.hpp"
+#include "server/link/robot_outbox.hpp"
 #include "tests/server/link/timed_fixture.hpp"
 
 namespace server {
@@ -159,7 +159,7 @@ TEST_F(TimedLimitsTest, WhatTheLinkHasNotTakenIsNotSentWhenTheLimitsBecomeNarrow
 
 TEST_F(TimedLimitsTest, ItIsDroppedLaterWhenTheLinkWasFullAndNothingIsRenewedBefore) {
   take_in(timed(set_duty(0.8F), in_ms(7000), "a"));
-  for (std::size_t i = 0; i < CommandWindow::kMost + RobotSession::kMaxQueuedCommands; ++i) {
+  for (std::size_t i = 0; i < CommandWindow::kMost + RobotOutbox::kMaxQueuedCommands; ++i) {
     submit(ping(), 5s);
     clock.settle();
   }
@@ -196,7 +196,7 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheSetpointBeforeItWas) {
 TEST_F(TimedLimitsTest, ADropThatFoundNoRoomIsSentAsSoonAsThereIsSome) {
   const auto first = take_in(timed(set_setpoint(0.25F), in_ms(1000), "a"));
   take_in(timed(set_setpoint(0.5F), in_ms(2000), "a"));
-  for (std::size_t i = 0; i < CommandWindow::kMost + RobotSession::kMaxQueuedCommands; ++i) {
+  for (std::size_t i = 0; i < CommandWindow::kMost + RobotOutbox::kMaxQueuedCommands; ++i) {
     submit(ping(), 9s);
     clock.settle();
   }

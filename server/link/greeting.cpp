@@ -1,0 +1,89 @@
+// Checks a Hello and fills a Welcome.
+#include "server/link/greeting.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "server/link/frame_faults.hpp"
+
+namespace server {
+namespace {
+
+template <std::size_t size>
+void copy_text(char (&to)[size], const std::string& from) {
+  const std::size_t count = std::min(from.size(), size - 1);
+  std::memcpy(to, from.data(), count);
+  to[count] = '\0';
+}
+
+bool is_robot_id(const std::string& id) {
+  constexpr auto kAllowed = "abcdefghijklmnopqrstuvwxyz0123456789_-";
+  return !id.empty() && id.find_first_not_of(kAllowed) == std::string::npos;
+}
+
+}  // namespace
+
+std::optional<Refusal> refusal_of(const protocol::Hello& hello, std::uint64_t robot_time_us) {
+  if (hello.protocol_version != protocol::kProtocolVersion) {
+    return Refusal{rheonaut_REFUSAL_REASON_VERSION, "this station speaks protocol version " +
+                                                        std::to_string(protocol::kProtocolVersion) + ", the robot " +
+                                                        std::to_string(hello.protocol_version)};
+  }
+  const bool samples_can_be = hello.oldest_seq <= hello.next_seq && hello.next_seq <= kMaxNumber;
+  const bool events_can_be = hello.oldest_event_seq <= hello.next_event_seq && hello.next_event_seq <= kMaxNumber;
+  if (is_robot_id(hello.robot_id) && hello.boot_id != 0 && samples_can_be && events_can_be &&
+      robot_time_us <= kMaxNumber) {
+    return std::nullopt;
+  }
+  return Refusal{rheonaut_REFUSAL_REASON_MALFORMED,
+                 "robot_id must be 1 to 31 of [a-z0-9_-], boot_id not 0, and oldest_seq ≤ next_seq"};
+}
+
+std::optional<Refusal> refusal_of(const Admission& admission) {
+  if (admission.refusal == rheonaut_REFUSAL_REASON_NONE) return std::nullopt;
+  return Refusal{admission.refusal, admission.detail};
+}
+
+AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t robot_time_us, bool from_loopback,
+                                   std::int64_t received_at_us) {
+  AdmissionRequest request;
+  request.robot_id = hello.robot_id;
+  request.token = hello.token;
+  request.from_loopback = from_loopback;
+  request.boot_id = hello.boot_id;
+  request.reset_cause = hello.reset_cause;
+  request.firmware_version = hello.firmware_version;
+  request.sample_period_us = hello.sample_period_us;
+  request.robot_time_us = robot_time_us;
+  request.oldest_seq = hello.oldest_seq;
+  request.next_seq = hello.next_seq;
+  request.oldest_event_seq = hello.oldest_event_seq;
+  request.next_event_seq = hello.next_event_seq;
+  request.acknowledged_next_seq = hello.acknowledged_next_seq;
+  request.acknowledged_next_event_seq = hello.acknowledged_next_event_seq;
+  request.received_at_us = received_at_us;
+  return request;
+}
+
+protocol::Welcome welcome_of(const Admission& admission, const LinkTimes& times, std::int64_t utc_us) {
+  protocol::Welcome welcome = rheonaut_Welcome_init_zero;
+  welcome.protocol_version = protocol::kProtocolVersion;
+  welcome.store_id = admission.store_id;
+  welcome.durable_next_seq = admission.durable_next_seq;
+  welcome.durable_next_event_seq = admission.durable_next_event_seq;
+  welcome.link_timeout_ms = times.link_timeout_ms;
+  welcome.heartbeat_interval_ms = times.heartbeat_interval_ms;
+  welcome.samples_per_frame = times.samples_per_frame;
+  welcome.utc_us = utc_us;
+  return welcome;
+}
+
+protocol::Welcome welcome_of(const Refusal& refusal) {
+  protocol::Welcome welcome = rheonaut_Welcome_init_zero;
+  welcome.protocol_version = protocol::kProtocolVersion;
+  welcome.refusal = refusal.reason;
+  copy_text(welcome.detail, refusal.detail);
+  return welcome;
+}
+
+}  // namespace server

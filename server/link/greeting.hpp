@@ -1,0 +1,34 @@
+// The greeting of a robot: what its Hello must say, and the Welcome that answers it.
+//
+// Pure. Who may be connected is asked elsewhere: Station::may_connect, RobotArchive::admit.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "protocol/messages.hpp"
+#include "server/config/link_settings.hpp"
+#include "server/station/state/robot_archive.hpp"
+
+namespace server {
+
+struct Refusal {
+  protocol::RefusalReason reason = rheonaut_REFUSAL_REASON_NONE;
+  std::string detail;  // for people
+};
+
+// Of a Hello that says what cannot be, or speaks another version; nothing when it may be admitted.
+std::optional<Refusal> refusal_of(const protocol::Hello& hello, std::uint64_t robot_time_us);
+// Of a robot that the archive does not admit.
+std::optional<Refusal> refusal_of(const Admission& admission);
+
+// What the archive is asked. `robot_time_us` is that of the Hello's frame, `received_at_us` UTC.
+AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t robot_time_us, bool from_loopback,
+                                   std::int64_t received_at_us);
+
+protocol::Welcome welcome_of(const Admission& admission, const LinkTimes& times, std::int64_t utc_us);
+// Says no; the detail is cut to the room of the message.
+protocol::Welcome welcome_of(const Refusal& refusal);
+
+}  // namespace server

@@ -1,0 +1,111 @@
+// Which Hello is refused and with which words, and what a Welcome says.
+#include "server/link/greeting.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "server/link/frame_faults.hpp"
+
+namespace server {
+namespace {
+
+protocol::Hello hello() {
+  protocol::Hello hello = rheonaut_Hello_init_zero;
+  hello.protocol_version = protocol::kProtocolVersion;
+  std::strcpy(hello.robot_id, "r1");
+  hello.boot_id = 7;
+  hello.oldest_seq = 10;
+  hello.next_seq = 20;
+  return hello;
+}
+
+protocol::RefusalReason reason_for(const protocol::Hello& hello, std::uint64_t robot_time_us = 0) {
+  const auto refusal = refusal_of(hello, robot_time_us);
+  return refusal ? refusal->reason : rheonaut_REFUSAL_REASON_NONE;
+}
+
+TEST(Greeting, AHelloThatCanBeIsNotRefused) {
+  EXPECT_EQ(reason_for(hello()), rheonaut_REFUSAL_REASON_NONE);
+  EXPECT_EQ(reason_for(hello(), kMaxNumber), rheonaut_REFUSAL_REASON_NONE);
+}
+
+TEST(Greeting, AnotherVersionIsRefusedBeforeAnythingElse) {
+  auto other = hello();
+  other.protocol_version += 1;
+  other.boot_id = 0;
+  const auto refusal = refusal_of(other, 0);
+  ASSERT_TRUE(refusal);
+  EXPECT_EQ(refusal->reason, rheonaut_REFUSAL_REASON_VERSION);
+  const auto number = std::to_string(other.protocol_version);
+  EXPECT_TRUE(refusal->detail.ends_with(", the robot " + number)) << refusal->detail;
+}
+
+TEST(Greeting, NumbersThatCannotBeAreMalformed) {
+  for (const auto field : {&protocol::Hello::oldest_seq, &protocol::Hello::oldest_event_seq, &protocol::Hello::next_seq,
+                           &protocol::Hello::next_event_seq}) {
+    auto bad = hello();
+    bad.*field = kMaxNumber + 1;
+    EXPECT_EQ(reason_for(bad), rheonaut_REFUSAL_REASON_MALFORMED);
+  }
+  auto without_boot = hello();
+  without_boot.boot_id = 0;
+  EXPECT_EQ(reason_for(without_boot), rheonaut_REFUSAL_REASON_MALFORMED);
+  EXPECT_EQ(reason_for(hello(), kMaxNumber + 1), rheonaut_REFUSAL_REASON_MALFORMED);
+}
+
+TEST(Greeting, NamesHaveTheirCharacters) {
+  for (const char* name : {"", "R1", "r 1", "r/1"}) {
+    auto bad = hello();
+    std::strcpy(bad.robot_id, name);
+    EXPECT_EQ(reason_for(bad), rheonaut_REFUSAL_REASON_MALFORMED) << name;
+  }
+}
+
+TEST(Greeting, TheArchiveIsAskedWithWhatTheRobotSays) {
+  auto said = hello();
+  std::strcpy(said.token, "secret");
+  said.acknowledged_next_seq = 15;
+  const AdmissionRequest request = admission_request(said, 1'000, true, 2'000);
+  EXPECT_EQ(request.robot_id, "r1");
+  EXPECT_EQ(request.token, "secret");
+  EXPECT_TRUE(request.from_loopback);
+  EXPECT_EQ(request.boot_id, 7U);
+  EXPECT_EQ(request.oldest_seq, 10U);
+  EXPECT_EQ(request.next_seq, 20U);
+  EXPECT_EQ(request.acknowledged_next_seq, 15U);
+  EXPECT_EQ(request.robot_time_us, 1'000U);
+  EXPECT_EQ(request.received_at_us, 2'000);
+}
+
+TEST(Greeting, AWelcomeSaysWhatIsDurableAndTheTimes) {
+  Admission admission;
+  admission.store_id = 3;
+  admission.durable_next_seq = 17;
+  admission.durable_next_event_seq = 2;
+  EXPECT_FALSE(refusal_of(admission));
+  const protocol::Welcome welcome = welcome_of(admission, LinkTimes{1'500, 300, 10}, 99);
+  EXPECT_EQ(welcome.protocol_version, protocol::kProtocolVersion);
+  EXPECT_EQ(welcome.refusal, rheonaut_REFUSAL_REASON_NONE);
+  EXPECT_EQ(welcome.store_id, 3U);
+  EXPECT_EQ(welcome.durable_next_seq, 17U);
+  EXPECT_EQ(welcome.durable_next_event_seq, 2U);
+  EXPECT_EQ(welcome.link_timeout_ms, 1'500U);
+  EXPECT_EQ(welcome.heartbeat_interval_ms, 300U);
+  EXPECT_EQ(welcome.samples_per_frame, 10U);
+  EXPECT_EQ(welcome.utc_us, 99);
+}
+
+TEST(Greeting, ARefusalOfTheArchiveIsCutToItsRoom) {
+  Admission admission;
+  admission.refusal = rheonaut_REFUSAL_REASON_WRONG_TOKEN;
+  admission.detail = std::string(500, 'x');
+  const auto refusal = refusal_of(admission);
+  ASSERT_TRUE(refusal);
+  const protocol::Welcome welcome = welcome_of(*refusal);
+  EXPECT_EQ(welcome.refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);
+  EXPECT_EQ(std::strlen(welcome.detail), sizeof welcome.detail - 1);
+}
+
+}  // namespace
+}  // namespace server
