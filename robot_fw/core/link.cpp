@@ -16,14 +16,14 @@ std::uint64_t elapsed_us(std::uint64_t from_us, std::uint64_t now_us) {
 }  // namespace
 
 void Link::opened(std::uint64_t now_us) {
-  reader.reset();
+  reader_.reset();
   phase_ = Phase::greeting;
   connection_at_us_ = now_us;
 }
 
 void Link::welcomed(const protocol::Welcome& welcome, std::uint32_t default_timeout_ms, std::uint64_t now_us) {
   phase_ = Phase::up;
-  const auto or_default = [](std::uint32_t wish, std::uint32_t preset) { return wish == 0 ? preset : wish; };
+  const auto or_default = [](std::uint32_t asked, std::uint32_t preset) { return asked == 0 ? preset : asked; };
   // SAFETY: whatever the station asks for, silence is noticed within 5 s.
   const std::uint32_t timeout_ms =
       std::clamp(or_default(welcome.link_timeout_ms, default_timeout_ms), kMinLinkTimeoutMs, kMaxLinkTimeoutMs);

@@ -21,6 +21,9 @@ class Link {
   void welcomed(const protocol::Welcome& welcome, std::uint32_t default_timeout_ms, std::uint64_t now_us);
   // Any frame of a link that is up. Returns the seconds without link when this restores a lost one.
   std::optional<float> heard(std::uint64_t now_us);
+  // The bytes of this connection, see FrameReader.
+  protocol::FrameReader::State push(protocol::Bytes& bytes) { return reader_.push(bytes); }
+  protocol::Bytes payload() const { return reader_.payload(); }
   // Once per tick: true in the tick in which the link is found to be lost.
   bool goes_lost(std::uint64_t now_us);
   void sent(std::uint64_t now_us) { sent_at_us_ = now_us; }
@@ -35,8 +38,6 @@ class Link {
     return samples_per_frame_ == 0 ? preferred : samples_per_frame_;
   }
 
-  protocol::FrameReader reader;  // of the bytes of this connection
-
  private:
   Phase phase_ = Phase::closed;
   bool established_ = false;  // was up once in this boot
@@ -46,7 +47,8 @@ class Link {
   std::uint64_t sent_at_us_ = 0;
   std::uint64_t timeout_us_ = protocol::kDefaultLinkTimeoutMs * 1000ULL;
   std::uint64_t heartbeat_interval_us_ = protocol::kDefaultHeartbeatIntervalMs * 1000ULL;
-  std::uint32_t samples_per_frame_ = 0;  // 0: the station has no wish
+  std::uint32_t samples_per_frame_ = 0;  // 0: the station leaves it to the robot
+  protocol::FrameReader reader_;
 };
 
 }  // namespace robot_fw

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "robot_fw/core/controller_message.hpp"
 #include "robot_fw/core/saturate.hpp"
 
 namespace robot_fw {
@@ -25,12 +24,13 @@ bool finite(const Motion& motion) {
 
 Robot::Robot(const RobotConfig& config)
     : config_(config),
-      motion_sense_(parameters_.estimator(), config.reset_cause == rheonaut_RESET_CAUSE_POWER_ON ? 0.0F : kCoastingSdM),
-      electrode_(kElectrodeRules),
-      controllers_(
-          adapted(built_in_controller(config.duty_min), {config.duty_min, config.duty_max}, config.sample_period_us)),
       safety_({config.duty_min, config.duty_max}, config.boot_id),
-      gate_(config.boot_id) {
+      electrode_(kElectrodeRules),
+      settings_({config.duty_min, config.duty_max}, config.sample_period_us),
+      motion_sense_(settings_.parameters().estimator(),
+                    config.reset_cause == rheonaut_RESET_CAUSE_POWER_ON ? 0.0F : kCoastingSdM),
+      gate_(config.boot_id),
+      channel_(config.samples_per_frame) {
   note(rheonaut_EVENT_KIND_BOOT, rheonaut_EVENT_CAUSE_RESET, 0);
   load_settings();
   const bool suspicious_reset =
@@ -46,6 +46,14 @@ Robot::Robot(const RobotConfig& config)
   } else if (suspicious_reset) {
     emergency(rheonaut_EMERGENCY_CAUSE_RESET, rheonaut_EVENT_CAUSE_RESET, 0);  // SAFETY: comes up latched
   }
+}
+
+void Robot::load_settings() {
+  if (config_.storage == nullptr) return;
+  const auto faults = settings_.load(*config_.storage);
+  if (faults.parameters) note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_RESET, 0);  // to the defaults
+  if (faults.controller) note_controller(rheonaut_EVENT_CAUSE_RESET);  // the built-in one
+  motion_sense_.set_parameters(settings_.parameters().estimator());
 }
 
 Outputs Robot::step(const Inputs& inputs, float dt_s) {
@@ -96,7 +104,7 @@ float Robot::watch_clock(std::uint64_t robot_time_us, float dt_s) {
   now_us_ = std::max(now_us_, robot_time_us);  // frames may have come in after this tick was due
   const auto elapsed_us = static_cast<std::int64_t>(robot_time_us - inputs_.robot_time_us);  // negative: it went back
   const float stepped_s = static_cast<float>(elapsed_us) * 1e-6F - dt_s;
-  const bool stepped = samples_.next_seq() > 0 && stepped_s > dt_s / 2;
+  const bool stepped = channel_.samples().next_seq() > 0 && stepped_s > dt_s / 2;
   if (!stepped) return 0;
   untold_step_s_ += stepped_s;
   if (time_step_told_us_ == 0 || now_us_ - time_step_told_us_ >= kTimeStepPauseUs) {
@@ -136,15 +144,15 @@ void Robot::let_orders_run_out() {
 ControllerDuty Robot::wanted_duty(const Motion& measured, float dt_s) {
   const auto target_m = pilot_.target_m();
   if (!target_m) return {pilot_.manual_duty(), pilot_.manual_duty()};
-  const ProfileLimits limits{parameters_[ParameterId::profile_velocity_m_s],
-                             parameters_[ParameterId::profile_acceleration_m_s2]};
+  const ProfileLimits limits{settings_.parameters()[ParameterId::profile_velocity_m_s],
+                             settings_.parameters()[ParameterId::profile_acceleration_m_s2]};
   reference_m_ = profile_.step(*target_m, measured.position_m, limits, dt_s);
-  return controllers_.step(reference_m_ - measured.position_m, measured.position_m);
+  return settings_.controllers().step(reference_m_ - measured.position_m, measured.position_m);
 }
 
 // The duty as near to the one wanted as the slew allows. In manual 0 is 0 at once: what ends, ends.
 float Robot::slewed(float duty, float dt_s) const {
-  const float slew_per_s = parameters_[ParameterId::duty_slew_per_s];
+  const float slew_per_s = settings_.parameters()[ParameterId::duty_slew_per_s];
   if (slew_per_s <= 0 || (!pilot_.is_auto() && duty == 0)) return duty;
   return std::clamp(duty, duty_ - slew_per_s * dt_s, duty_ + slew_per_s * dt_s);
 }
@@ -160,9 +168,7 @@ void Robot::record_sample(const Motion& measured, float dt_s) {
   const bool usable_period = dt_s > 0 && dt_s < 1;
   const std::uint32_t period_us =
       usable_period ? saturated<std::uint32_t>(dt_s * 1e6F + 0.5F) : config_.sample_period_us;
-  const bool changed = samples_.push(sample, batch_values(), saturated_, now_us_, period_us);
-  outbox_.sample_made(samples_, changed || sample_is_urgent_);
-  sample_is_urgent_ = false;
+  channel_.push(sample, batch_values(), saturated_, now_us_, period_us);
 }
 
 BatchValues Robot::batch_values() const {
@@ -175,12 +181,12 @@ BatchValues Robot::batch_values() const {
   values.setpoint_m = pilot_.setpoint_m().value_or(0.0F);
   values.disturbance_m = pilot_.disturbance_m();
   values.position_sd_m = motion_sense_.position_sd_m();
-  values.controller_id = controllers_.in_force().controller_id;
+  values.controller_id = settings_.controllers().in_force().controller_id;
   unsigned flags = 0;
-  if (link_.lost()) flags |= rheonaut_TELEMETRY_FLAG_LINK_LOSS;
+  if (channel_.link().lost()) flags |= rheonaut_TELEMETRY_FLAG_LINK_LOSS;
   if (pilot_.lease_lapsed()) flags |= rheonaut_TELEMETRY_FLAG_LEASE_LAPSED;
   if (safety_.outside_limits()) flags |= rheonaut_TELEMETRY_FLAG_POSITION_LIMIT;
-  if (parameters_[ParameterId::model_confirmed] == 1) flags |= rheonaut_TELEMETRY_FLAG_MODEL_CONFIRMED;
+  if (settings_.parameters()[ParameterId::model_confirmed] == 1) flags |= rheonaut_TELEMETRY_FLAG_MODEL_CONFIRMED;
   if (motion_sense_.model_mismatch()) flags |= rheonaut_TELEMETRY_FLAG_MODEL_MISMATCH;
   if (!inputs_are_sound_ || sensor_fault_stands()) flags |= rheonaut_TELEMETRY_FLAG_SENSOR_FAULT;
   values.flags = static_cast<std::uint16_t>(flags);
@@ -197,7 +203,7 @@ void Robot::stop_motion(protocol::EventCause cause, std::uint64_t command_id) {
   const bool was_delivering = pilot_.delivering();
   const float delivered_s = was_delivering ? pilot_.end_delivery(now_us_) : 0;
   pilot_.halt();
-  controllers_.reset();
+  settings_.controllers().reset();
   profile_.restart();
   duty_ = 0;
   if (was_delivering) note(rheonaut_EVENT_KIND_DELIVERY_ENDED, cause, delivered_s, command_id);
@@ -210,10 +216,32 @@ void Robot::emergency(protocol::EmergencyCause cause, protocol::EventCause event
   note(rheonaut_EVENT_KIND_EMERGENCY, event_cause, 0, command_id);
 }
 
+// Says which controller is in force when that has changed.
+void Robot::announce_controller() {
+  if (!settings_.take_controller_news()) return;
+  note_controller(rheonaut_EVENT_CAUSE_COMMAND, settings_.controller_command_id());
+  channel_.outbox().controller_changed();
+}
+
+void Robot::note_controller(protocol::EventCause cause, std::uint64_t command_id) {
+  note(rheonaut_EVENT_KIND_CONTROLLER_CHANGED, cause,
+       static_cast<float>(settings_.controllers().in_force().controller_id), command_id);
+}
+
+void Robot::storage_failed() { note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_INTERNAL, 0); }
+
+// Each change is written at the first tick at rest; a write that fails is an event.
+void Robot::save_settings() {
+  if (config_.storage == nullptr || motor_on()) return;  // SAFETY: writing may block for long
+  const auto faults = settings_.save(*config_.storage);
+  if (faults.parameters) storage_failed();
+  if (faults.controller) note_controller(rheonaut_EVENT_CAUSE_INTERNAL);
+}
+
 std::uint32_t Robot::float_state_checksum() const {
   Crc32 crc;
   motion_sense_.add_to(crc);
-  controllers_.add_to(crc);
+  settings_.controllers().add_to(crc);
   crc.add_float(reference_m_);
   crc.add_float(duty_);
   return crc.value();
@@ -224,7 +252,7 @@ void Robot::note(protocol::EventKind kind, protocol::EventCause cause, float val
   event.event_robot_time_us = now_us_;
   event.kind = kind;
   event.cause = cause;
-  event.sample_seq = samples_.next_seq();
+  event.sample_seq = channel_.samples().next_seq();
   event.mode = mode();
   event.sub_state = mode() == rheonaut_MODE_AUTO ? pilot_.sub_state() : rheonaut_SUB_STATE_NONE;
   event.position_m = seen_motion().position_m;
@@ -232,8 +260,7 @@ void Robot::note(protocol::EventKind kind, protocol::EventCause cause, float val
   event.emergency_id = safety_.emergency_id();
   event.command_id = command_id;
   event.emergency_cause = safety_.cause();
-  events_.push(event);
-  sample_is_urgent_ = true;
+  channel_.push(event);
 }
 
 }  // namespace robot_fw

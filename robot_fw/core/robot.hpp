@@ -8,22 +8,16 @@
 // duty() on the motor.
 #pragma once
 
-#include "protocol/frame.hpp"
 #include "robot_fw/core/commands.hpp"
-#include "robot_fw/core/controller_switch.hpp"
-#include "robot_fw/core/event_ring.hpp"
 #include "robot_fw/core/hardware_io.hpp"
 #include "robot_fw/core/impedance_monitor.hpp"
-#include "robot_fw/core/link.hpp"
 #include "robot_fw/core/motion_sense.hpp"
-#include "robot_fw/core/outbox.hpp"
-#include "robot_fw/core/parameters.hpp"
 #include "robot_fw/core/pilot.hpp"
 #include "robot_fw/core/reference_profile.hpp"
+#include "robot_fw/core/robot_settings.hpp"
 #include "robot_fw/core/safety.hpp"
 #include "robot_fw/core/sensor_watch.hpp"
-#include "robot_fw/core/settings_store.hpp"
-#include "robot_fw/core/telemetry_ring.hpp"
+#include "robot_fw/core/station_channel.hpp"
 
 namespace robot_fw {
 
@@ -55,7 +49,7 @@ class Robot {
   // Writes the message due first to `out`, one whole frame; 0 when none is due or it does not fit.
   std::size_t transmit(std::uint8_t* out, std::size_t capacity, std::uint64_t now_us);
   // The station has been silent on an open connection for the time-out: close it and dial again.
-  bool connection_is_silent(std::uint64_t now_us) const { return link_.connection_is_silent(now_us); }
+  bool connection_is_silent(std::uint64_t now_us) const { return channel_.link().connection_is_silent(now_us); }
 
   // What the storage was given could not be kept after all.
   void storage_failed();
@@ -66,21 +60,24 @@ class Robot {
   protocol::EmergencyCause emergency_cause() const { return safety_.cause(); }
   // Nothing moves or is ordered to: what blocks for long may be done now.
   bool at_rest() const { return !motor_on(); }
-  bool link_up() const { return link_.up(); }
-  bool link_lost() const { return link_.lost(); }
+  bool link_up() const { return channel_.link().up(); }
+  bool link_lost() const { return channel_.link().lost(); }
   // Why the station refused the last connection; the detail is for people.
-  protocol::RefusalReason refusal() const { return refusal_; }
-  const char* refusal_detail() const { return refusal_detail_.data(); }
+  protocol::RefusalReason refusal() const { return channel_.refusal(); }
+  const char* refusal_detail() const { return channel_.refusal_detail(); }
   // For who counts what became of the samples; commands include those that were refused.
-  const TelemetryRing& samples() const { return samples_; }
-  const Outbox& outbox() const { return outbox_; }
-  std::uint32_t commands_received() const { return commands_received_; }
+  const TelemetryRing& samples() const { return channel_.samples(); }
+  const Outbox& outbox() const { return channel_.outbox(); }
+  std::uint32_t commands_received() const { return channel_.commands_received(); }
   // CRC-32 over every float that a tick works with: equal on two machines that compute alike.
   std::uint32_t float_state_checksum() const;
 
  private:
   // The parts of a tick, in robot.cpp.
   bool sound(const Inputs& inputs, float dt_s) const;
+  void load_settings();
+  void save_settings();
+  bool motor_on() const { return duty_ != 0 || pilot_.motion_ordered(); }
   float watch_clock(std::uint64_t robot_time_us, float dt_s);
   void run_due_commands();
   void let_orders_run_out();
@@ -91,6 +88,8 @@ class Robot {
   Motion seen_motion() const;  // by the controller: disturbance included
   void stop_motion(protocol::EventCause cause, std::uint64_t command_id = 0);
   void emergency(protocol::EmergencyCause cause, protocol::EventCause event_cause, std::uint64_t command_id);
+  void announce_controller();
+  void note_controller(protocol::EventCause cause, std::uint64_t command_id = 0);
   void note(protocol::EventKind kind, protocol::EventCause cause, float value, std::uint64_t command_id = 0);
 
   // What ends or changes motion by itself, in robot_watch.cpp.
@@ -124,22 +123,14 @@ class Robot {
   Verdict check_position(float position_m) const;
   Verdict check_setpoint(float setpoint_m) const;
   Verdict check_certainty(float setpoint_m) const;
-
-  // Parameters and controllers, in robot_settings.cpp.
-  Verdict set_controller(const protocol::Controller& controller, std::uint64_t command_id);
-  Verdict restore_controller(std::uint64_t command_id);
+  Verdict announced(Verdict about_the_controller);
   Verdict set_parameter(const rheonaut_SetParameter& order, std::uint64_t command_id);
   Verdict get_parameters(std::uint32_t first_index, std::uint64_t command_id);
-  void announce_controller();
-  bool motor_on() const { return duty_ != 0 || pilot_.motion_ordered(); }
-  void load_settings();
-  void save_settings();
   PositionLimits position_limits() const;
 
   // Frames in and out, in robot_frames.cpp.
-  bool on_frame(protocol::Bytes payload);
+  bool on_frame();
   bool on_welcome(const protocol::Welcome& welcome);
-  void on_heartbeat(const protocol::StationHeartbeat& heartbeat);
   void station_heard();
   void fill(Outgoing what, protocol::RobotFrame& frame) const;
   void fill_parameters(const PageRequest& request, protocol::ParameterPage& page) const;
@@ -155,30 +146,20 @@ class Robot {
   bool saturated_ = false;
   std::uint64_t time_step_told_us_ = 0;
   float untold_step_s_ = 0;
-  bool sample_is_urgent_ = false;  // something happened since the last one
+  std::uint32_t worst_tick_us_ = 0;  // since the last status
 
-  Parameters parameters_;
-  MotionSense motion_sense_;
+  // Small parts first: what is near costs the chip less code.
+  Pilot pilot_;
+  Safety safety_;
+  ReferenceProfile profile_;
+  ImpedanceMonitor impedance_;
   SensorWatch electrode_;
   SensorFault told_electrode_fault_ = SensorFault::none;
-  ImpedanceMonitor impedance_;
-  Pilot pilot_;
-  ReferenceProfile profile_;
-  ControllerSwitch controllers_;
-  std::uint64_t controller_command_id_ = 0;  // the last command about the controller
-  bool parameters_unsaved_ = false, controller_unsaved_ = false;
-  Safety safety_;
-  CommandGate gate_;
+  RobotSettings settings_;
+  MotionSense motion_sense_;
   TimedCommands timed_;
-  TelemetryRing samples_;
-  EventRing events_;
-  Link link_;
-  Outbox outbox_;
-  std::uint32_t bad_frames_ = 0;
-  std::uint32_t commands_received_ = 0;
-  std::uint32_t worst_tick_us_ = 0;  // since the last status
-  protocol::RefusalReason refusal_ = rheonaut_REFUSAL_REASON_NONE;
-  std::array<char, 64> refusal_detail_{};
+  CommandGate gate_;
+  StationChannel channel_;
 };
 
 // What the ESP8266 has for all of it besides the ring and the bytes of a frame. A host's pointers and sizes take more;

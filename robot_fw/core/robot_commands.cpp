@@ -36,17 +36,17 @@ void Robot::on_command(const protocol::Command& command) {
   // SAFETY: what lapsed since the last tick stays lapsed; a new one would begin its lease anew.
   if (timed_.lease_lapsed(now_us_)) drop_timed_commands(kTimedExpired);
   if (!timed_.hold(command, now_us_)) return answer(command.command_id, rejected(rheonaut_REJECT_REASON_BUSY));
-  outbox_.ack(ack_for(command.command_id, kAccepted, command.execute_at_robot_us));
+  channel_.outbox().ack(ack_for(command.command_id, kAccepted, command.execute_at_robot_us));
 }
 
 // SAFETY: a stop asks for no boot, no life, no mode and no id, and acts before this returns.
 void Robot::on_emergency_stop(const protocol::Command& command) {
   const bool repeated = command.command_id != 0 && !gate_.remember(command.command_id);
   if (repeated && safety_.latched()) {
-    return outbox_.ack_stop(ack_for(command.command_id, {rheonaut_COMMAND_RESULT_DUPLICATE}, 0));
+    return channel_.outbox().ack_stop(ack_for(command.command_id, {rheonaut_COMMAND_RESULT_DUPLICATE}, 0));
   }
   emergency(rheonaut_EMERGENCY_CAUSE_OPERATOR, rheonaut_EVENT_CAUSE_COMMAND, command.command_id);
-  outbox_.ack_stop(ack_for(command.command_id, kAccepted, now_us_));
+  channel_.outbox().ack_stop(ack_for(command.command_id, kAccepted, now_us_));
 }
 
 protocol::CommandAck Robot::ack_for(std::uint64_t command_id, Verdict verdict, std::uint64_t effect_at_us) const {
@@ -60,8 +60,8 @@ protocol::CommandAck Robot::ack_for(std::uint64_t command_id, Verdict verdict, s
 }
 
 void Robot::answer(std::uint64_t command_id, Verdict verdict) {
-  outbox_.ack(ack_for(command_id, verdict, verdict.accepted() ? now_us_ : 0));
-  if (verdict.accepted()) sample_is_urgent_ = true;
+  channel_.outbox().ack(ack_for(command_id, verdict, verdict.accepted() ? now_us_ : 0));
+  if (verdict.accepted()) channel_.hurry();
 }
 
 // The ack went out when the command was taken in; a second one is only due when nothing came of it.
@@ -91,8 +91,9 @@ Verdict Robot::execute(const protocol::Command& command) {
     case rheonaut_Command_zero_position_tag: return zero_position(id);
     case rheonaut_Command_ping_tag: return kAccepted;
     case rheonaut_Command_drop_timed_tag: drop_timed_commands(kTimedExpired); return kAccepted;
-    case rheonaut_Command_set_controller_tag: return set_controller(command.action.set_controller, id);
-    case rheonaut_Command_restore_controller_tag: return restore_controller(id);
+    case rheonaut_Command_set_controller_tag:
+      return announced(settings_.set_controller(command.action.set_controller, pilot_.is_auto(), id));
+    case rheonaut_Command_restore_controller_tag: return announced(settings_.restore_controller(pilot_.is_auto(), id));
     case rheonaut_Command_set_parameter_tag: return set_parameter(command.action.set_parameter, id);
     case rheonaut_Command_get_parameters_tag: return get_parameters(command.action.get_parameters.first_index, id);
     default: return rejected(rheonaut_REJECT_REASON_UNSUPPORTED);
@@ -101,7 +102,7 @@ Verdict Robot::execute(const protocol::Command& command) {
 
 Verdict Robot::check_position(float position_m) const {
   if (!std::isfinite(position_m)) return rejected(rheonaut_REJECT_REASON_NOT_FINITE);
-  if (std::fabs(position_m) > parameters_[ParameterId::setpoint_limit_m]) {
+  if (std::fabs(position_m) > settings_.parameters()[ParameterId::setpoint_limit_m]) {
     return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
   }
   return kAccepted;
@@ -137,7 +138,7 @@ Verdict Robot::set_mode(const rheonaut_SetMode& order, std::uint64_t command_id)
   stop_motion(rheonaut_EVENT_CAUSE_COMMAND, command_id);  // SAFETY: nothing outlives a change of mode
   drop_timed_commands(rejected(rheonaut_REJECT_REASON_WRONG_MODE));
   if (to_auto && before == rheonaut_MODE_MANUAL) impedance_.arm();  // what manual has found is not delivered to yet
-  if (to_auto) pilot_.enter_auto(order.setpoint_m, parameters_[ParameterId::auto_limit_s], now_us_);
+  if (to_auto) pilot_.enter_auto(order.setpoint_m, settings_.parameters()[ParameterId::auto_limit_s], now_us_);
   if (mode() != before) note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, 0, command_id);
   if (to_auto) {
     note(rheonaut_EVENT_KIND_SETPOINT_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, order.setpoint_m, command_id);
@@ -217,6 +218,47 @@ Verdict Robot::zero_position(std::uint64_t command_id) {
   safety_.watch_certainty(0, 0, position_limits());
   note(rheonaut_EVENT_KIND_POSITION_ZEROED, rheonaut_EVENT_CAUSE_COMMAND, before_m, command_id);
   return kAccepted;
+}
+
+// A controller that the command brought into force is announced before the command is answered.
+Verdict Robot::announced(Verdict verdict) {
+  if (verdict.accepted()) announce_controller();
+  return verdict;
+}
+
+Verdict Robot::set_parameter(const rheonaut_SetParameter& order, std::uint64_t command_id) {
+  const auto index = Parameters::find(order.name);
+  if (!index) return rejected(rheonaut_REJECT_REASON_UNKNOWN_PARAMETER);
+  if (!std::isfinite(order.value)) return rejected(rheonaut_REJECT_REASON_NOT_FINITE);
+  if (!Parameters::in_range(*index, order.value)) return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
+  // SAFETY: what shapes or limits motion stays as it is while the motor is on.
+  if (Parameters::spec(*index).only_at_rest && motor_on()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
+  const bool is_estimators = *index >= static_cast<std::size_t>(ParameterId::model_gain_1_m_s);
+  // SAFETY: an estimator that starts anew while the robot coasts would take it to stand, and be sure of that.
+  if (is_estimators && !motion_sense_.is_settled()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
+  // SAFETY: whoever changes the model says anew that it is the fluid's; one that is half of another is nobody's.
+  const bool takes_back = Parameters::is_of_model(*index) && settings_.parameters()[ParameterId::model_confirmed] == 1;
+  if (!channel_.outbox().has_room_for_pages(takes_back ? 2 : 1)) return rejected(rheonaut_REJECT_REASON_BUSY);
+  constexpr auto kConfirmed = static_cast<std::size_t>(ParameterId::model_confirmed);
+  settings_.set_parameter(*index, order.value);
+  if (takes_back) settings_.set_parameter(kConfirmed, 0);
+  if (is_estimators) motion_sense_.set_parameters(settings_.parameters().estimator());
+  note(rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_COMMAND, order.value, command_id);
+  channel_.outbox().ask_page({command_id, *index, 1});
+  if (takes_back) channel_.outbox().ask_page({0, kConfirmed, 1});
+  return kAccepted;
+}
+
+Verdict Robot::get_parameters(std::uint32_t first_index, std::uint64_t command_id) {
+  if (first_index >= kParameterCount) return rejected(rheonaut_REJECT_REASON_OUT_OF_RANGE);
+  if (!channel_.outbox().has_room_for_pages(1)) return rejected(rheonaut_REJECT_REASON_BUSY);
+  channel_.outbox().ask_page({command_id, first_index, std::min(PageRequest::kMost, kParameterCount - first_index)});
+  return kAccepted;
+}
+
+PositionLimits Robot::position_limits() const {
+  const Parameters& parameters = settings_.parameters();
+  return {parameters[ParameterId::position_limit_min_m], parameters[ParameterId::position_limit_max_m]};
 }
 
 }  // namespace robot_fw

@@ -46,7 +46,7 @@ void Robot::on_sensor_news(SensorFault fault, protocol::EventCause which, float 
 }
 
 SensorFault Robot::electrode_fault() const {
-  return parameters_[ParameterId::impedance_monitor] == 0 ? SensorFault::none : electrode_.fault();
+  return settings_.parameters()[ParameterId::impedance_monitor] == 0 ? SensorFault::none : electrode_.fault();
 }
 
 bool Robot::sensor_fault_stands() const {
@@ -54,17 +54,17 @@ bool Robot::sensor_fault_stands() const {
 }
 
 void Robot::watch_link() {
-  if (!link_.goes_lost(now_us_)) return;
+  if (!channel_.goes_lost(now_us_)) return;
   note(rheonaut_EVENT_KIND_LINK_LOST, rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
   drop_timed_commands(kTimedExpired);
-  const LinkLossAction action = parameters_.link_loss_action();
+  const LinkLossAction action = settings_.parameters().link_loss_action();
   if (!pilot_.is_auto() || action == LinkLossAction::stop) {
     const bool was_auto = pilot_.is_auto();
     stop_motion(rheonaut_EVENT_CAUSE_LINK_LOSS);  // SAFETY: nobody is there to stop it
     if (was_auto) note(rheonaut_EVENT_KIND_MODE_CHANGED, rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
     return;
   }
-  pilot_.outlive_link(parameters_[ParameterId::link_loss_limit_s], now_us_);
+  pilot_.outlive_link(settings_.parameters()[ParameterId::link_loss_limit_s], now_us_);
   if (action == LinkLossAction::go_on) return;
   if (pilot_.delivering()) end_delivery(rheonaut_EVENT_CAUSE_LINK_LOSS, 0);
   const PositionLimits limits = position_limits();
@@ -87,7 +87,8 @@ void Robot::watch_limits(const Motion& measured, float dt_s) {
     if (!safety_.latched()) emergency(rheonaut_EMERGENCY_CAUSE_POSITION_LIMIT, rheonaut_EVENT_CAUSE_LIMIT, 0);
   }
   safety_.watch_certainty(position_m, 2 * motion_sense_.position_sd_m(), limits);
-  const PowerLimit power{parameters_[ParameterId::power_limit_duty], parameters_[ParameterId::power_limit_s]};
+  const PowerLimit power{settings_.parameters()[ParameterId::power_limit_duty],
+                         settings_.parameters()[ParameterId::power_limit_s]};
   if (safety_.too_long_at_power(duty_, dt_s, power)) {
     note(rheonaut_EVENT_KIND_LIMIT_HIT, rheonaut_EVENT_CAUSE_LIMIT, power.time_s);
     emergency(rheonaut_EMERGENCY_CAUSE_TIME_AT_POWER, rheonaut_EVENT_CAUSE_LIMIT, 0);  // SAFETY: a motor gets hot
@@ -107,18 +108,19 @@ void Robot::watch_certainty(float wanted_duty) {
 
 // Glucose on the way: the robot holds where it has found it until it has mixed.
 void Robot::watch_impedance(const Motion& measured) {
-  if (parameters_[ParameterId::impedance_monitor] == 0 || !inputs_are_sound_) return;
+  if (settings_.parameters()[ParameterId::impedance_monitor] == 0 || !inputs_are_sound_) return;
   const float impedance_mv = inputs_.impedance_mv;
-  const bool can_return = controllers_.in_force().duty_min < 0;  // a motor without reverse stays where it comes to rest
+  const bool can_return =
+      settings_.controllers().in_force().duty_min < 0;  // a motor without reverse stays where it comes to rest
   const bool in_place =
       !pilot_.delivering() || !can_return || std::fabs(measured.position_m - *pilot_.target_m()) <= kInPlaceM;
   const bool usable = electrode_fault() == SensorFault::none && electrode_.in_range(impedance_mv);
-  const bool detected = impedance_.step(impedance_mv, usable, in_place, parameters_.impedance());
+  const bool detected = impedance_.step(impedance_mv, usable, in_place, settings_.parameters().impedance());
   if (pilot_.delivering() && impedance_.mixed()) end_delivery(rheonaut_EVENT_CAUSE_IMPEDANCE, 0);
   if (!detected || pilot_.delivering()) return;  // in a delivery it is the same glucose
   note(rheonaut_EVENT_KIND_DETECTION, rheonaut_EVENT_CAUSE_IMPEDANCE, impedance_mv);
   if (!pilot_.is_auto()) return;
-  pilot_.start_delivery(measured.position_m, parameters_[ParameterId::delivery_limit_s], now_us_);
+  pilot_.start_delivery(measured.position_m, settings_.parameters()[ParameterId::delivery_limit_s], now_us_);
   profile_.restart();
   note(rheonaut_EVENT_KIND_DELIVERY_STARTED, rheonaut_EVENT_CAUSE_IMPEDANCE, impedance_mv);
 }
