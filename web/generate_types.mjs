@@ -14,7 +14,8 @@ writeFileSync(target, `// Generated from server/api/openapi.yaml by generate_typ
 
 // The fields of a live batch: columns with a value per sample, and numbers that its samples share.
 const batch = document.match(/^ {4}LiveSamples:\n(?: {5,}.*\n)+/m)[0];
-const names = (type) => [...batch.matchAll(new RegExp(`^ {8}(\\w+): \\{ ${type} \\}$`, 'gm'))].map(([, name]) => `  '${name}',\n`).join('');
+const names = (type) =>
+  [...batch.matchAll(new RegExp(`^ {8}(\\w+): \\{ ${type} \\}$`, 'gm'))].map(([, name]) => `  '${name}',\n`).join('');
 const fields = `// Generated from server/api/openapi.yaml by generate_types.mjs; not edited by hand.
 
 // What a live batch has for each of its samples.

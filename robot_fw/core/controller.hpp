@@ -59,28 +59,28 @@ struct ControllerSections {
   }
 };
 
-constexpr ControllerSections kPaperController{1,
-                                              0,
-                                              65.0028F,
-                                              117.11186F,
-                                              {-0.464926381F, -29.9971855F,  //
-                                               -0.102256174F, -14.5876807F,  //
-                                               0.438034375F, -5.32587518F,   //
-                                               0.822226735F, -1.00519276F,   //
-                                               0.970840994F, -0.0781306414F},
-                                              5};
+inline constexpr ControllerSections kPaperController{1,
+                                                     0,
+                                                     65.0028F,
+                                                     117.11186F,
+                                                     {-0.464926381F, -29.9971855F,  //
+                                                      -0.102256174F, -14.5876807F,  //
+                                                      0.438034375F, -5.32587518F,   //
+                                                      0.822226735F, -1.00519276F,   //
+                                                      0.970840994F, -0.0781306414F},
+                                                     5};
 
 // (4), as `rheonaut tune --crossover-rad-s 3 --phase-margin-deg 90` and `discretise --method direct --a 0` make it.
-constexpr ControllerSections kOneWayController{1000,  // apart from those that people number from 2 on
-                                               0,
-                                               29.971237F,
-                                               275.274536F,
-                                               {0.00472445041F, -216.798706F,  //
-                                                0.276149809F, -12.4680691F,    //
-                                                0.64420408F, -2.42204237F,     //
-                                                0.880512714F, -0.313556492F,   //
-                                                0.976423144F, -0.0193156041F},
-                                               5};
+inline constexpr ControllerSections kOneWayController{1000,  // apart from those that people number from 2 on
+                                                      0,
+                                                      29.971237F,
+                                                      275.274536F,
+                                                      {0.00472445041F, -216.798706F,  //
+                                                       0.276149809F, -12.4680691F,    //
+                                                       0.64420408F, -2.42204237F,     //
+                                                       0.880512714F, -0.313556492F,   //
+                                                       0.976423144F, -0.0193156041F},
+                                                      5};
 
 // What a robot has until it is given another: duty_min is that of its motor.
 constexpr const ControllerSections& built_in_controller(float duty_min) {

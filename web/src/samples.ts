@@ -12,7 +12,13 @@ import { kBatchNumbers, kSampleFields } from './telemetry_fields';
 // Every number of a live batch, and what is computed of it: position_m is what the controller sees, the disturbance
 // included; estimate_m where the robot believes that it is, and estimate_low_m and estimate_high_m lie two standard
 // deviations below and above that.
-export const kColumns = [...kSampleFields, ...kBatchNumbers, 'estimate_m', 'estimate_low_m', 'estimate_high_m'] as const;
+export const kColumns = [
+  ...kSampleFields,
+  ...kBatchNumbers,
+  'estimate_m',
+  'estimate_low_m',
+  'estimate_high_m',
+] as const;
 export type Column = (typeof kColumns)[number];
 
 // Where the robot believes that it is: what its controller sees, less the disturbance that was injected. null: not known.
