@@ -1,4 +1,4 @@
-// Wires the ground station: what exists, who hears whom, how it stops.
+// Wires the ground station: what exists, what reports to what, how it stops.
 #include <spdlog/spdlog.h>
 
 #include <csignal>
@@ -30,10 +30,10 @@ static int serve(const Config& config) {
   WorkerThread readers{"readers", 10}, exports{"exports", 10}, maths{"maths", 10};
   TaskGroup tasks{loop};
   TransportSecurity security{clock, config};  // of both ports
-  // Centre: the only owner of live state, and the only door for commands.
+  // Centre: the only owner of live state, and the only way in for commands.
   Station station{loop, clock, config.envelope, config.link};
 
-  // Out: they hear the station and never call it back; what has become durable comes back through one function.
+  // Out: they get the station's reports and never call it back; only what is durable comes back, through one function.
   const RecorderOptions recorder_options{config.database(), config.enrolment};
   RecordingParts recording{loop, clock, disk, readers, exports, checkpoints, recorder_options, config.recording};
   LiveFeed live{clock};
@@ -71,7 +71,7 @@ static int serve(const Config& config) {
 
 int main(int argc, char** argv) try {
   std::signal(SIGPIPE, SIG_IGN);
-  const cli::Wish wish = cli::parse_command_line(argc, argv);
+  const cli::CommandLine wish = cli::parse_command_line(argc, argv);
   if (const auto exit_code = cli::answer(wish, std::cout)) return *exit_code;
   return serve(load_config(std::get<cli::Serve>(wish).flags));
 } catch (const std::exception& error) {

@@ -108,7 +108,7 @@ Result<void> on_watch(const Members& message, Subscriber& page, LiveParts& parts
   }
   const auto watched = robots.get<std::set<RobotId>>();
   parts.live.watch(page, watched);
-  for (const RobotId& id : watched) {  // told anew with the next stamp, since the page has not heard all of it
+  for (const RobotId& id : watched) {  // published again with the next stamp, since the page has not received all of it
     if (const RobotState* robot = parts.station.find(id)) parts.live.on_robot(*robot);
   }
   return {};

@@ -35,7 +35,7 @@ inline constexpr std::size_t kMaxWatched = 64;  // robots, of a page
 // The first message of a page. Its stamp is of now: the states in it are as new or newer.
 RobotDocument welcome_message(const std::string& actor, const LiveParts& parts);
 
-// Acts on one message. Returns at once: a stop or a renewal goes on as a task, and what becomes of it is heard as
+// Acts on one message. Returns at once: a stop or a renewal goes on as a task, and its outcome is published as
 // `command`. The error, if any, is for the page.
 Result<void> on_page_message(const std::string& text, const Caller& caller, Subscriber& page, LiveParts& parts);
 

@@ -52,7 +52,7 @@ class LivePage {
   asio::awaitable<void> run(UpgradeRequest upgrade) {
     const auto [error] = co_await socket_.async_accept(upgrade, asio::as_tuple(asio::use_awaitable));
     if (error) co_return;
-    parts_.live.add(queue_);  // what changes while the welcome is written is told after it
+    parts_.live.add(queue_);  // what changes while the welcome is written is queued after it
     co_await (part(read()) || part(write()) || part(watch()) || caller_.standing->wait_for_end());
     if (caller_.standing->ended()) spdlog::info("the page of {} was signed out", caller_.actor);
   }
@@ -107,7 +107,7 @@ class LivePage {
     }
   }
 
-  // Each of its messages may become a task: it is heard a bounded number of times a second, and its own wait for that.
+  // Each of its messages may become a task: so many a second are read, and the page's further ones wait.
   bool is_too_talkative() {
     if (heard_at_us_ - second_began_us_ >= kSecondUs) {
       second_began_us_ = heard_at_us_;

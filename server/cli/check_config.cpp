@@ -29,8 +29,8 @@ std::string protection(const Config& config, const std::string& listen) {
 
 }  // namespace
 
-int run(const CheckConfig& wish, std::ostream& out) {
-  const Config config = load_config(wish.flags);
+int run(const CheckConfig& line, std::ostream& out) {
+  const Config config = load_config(line.flags);
   fmt::print(out, "data     {}\n", std::filesystem::absolute(config.data_dir).string());
   fmt::print(out, "http     {}{}\n", config.http, config.http_or_any_port ? " (or a free port)" : "");
   fmt::print(out, "robots   {}{}\n", config.robots, config.robots_or_any_port ? " (or a free port)" : "");

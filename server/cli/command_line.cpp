@@ -31,23 +31,23 @@ void add_options(CLI::App& command, ConfigFlags& flags) {
   add("--robots", flags.robots, "ADDR:PORT where robots dial in (default: 127.0.0.1:7070; port 0: any)");
 }
 
-void add_options(CLI::App& command, Serve& wish) {
-  add_options(command, wish.flags);
+void add_options(CLI::App& command, Serve& line) {
+  add_options(command, line.flags);
   command.footer("Example: rheonaut serve --data ~/lab --robots 127.0.0.1:7070");
 }
 
-void add_options(CLI::App& command, CheckConfig& wish) {
-  add_options(command, wish.flags);
+void add_options(CLI::App& command, CheckConfig& line) {
+  add_options(command, line.flags);
   command.footer("Example: rheonaut check-config --data ~/lab");
 }
 
-// A command whose options fill a T, which becomes the wish.
+// A command whose options fill a T, which becomes the line.
 template <class T>
-void offer(CLI::App& app, const char* name, const char* purpose, Wish& wish) {
+void offer(CLI::App& app, const char* name, const char* purpose, CommandLine& line) {
   auto parsed = std::make_shared<T>();
   CLI::App* command = app.add_subcommand(name, purpose);
   add_options(*command, *parsed);
-  command->callback([parsed, &wish] { wish = *parsed; });
+  command->callback([parsed, &line] { line = *parsed; });
 }
 
 // One line, also for what CLI11 says in two; a word that is no command is named.
@@ -68,34 +68,34 @@ std::string complaint(const CLI::App& app, const CLI::Error& error) {
 
 }  // namespace
 
-Wish parse_command_line(int argc, char** argv) {
+CommandLine parse_command_line(int argc, char** argv) {
   CLI::App app{"Rheonaut, the ground station for small robots"};
   app.set_version_flag("--version", RHEONAUT_VERSION);
   app.require_subcommand(1);
   app.footer("Example: rheonaut serve --data ~/lab --robots 127.0.0.1:7070");
   app.failure_message([](const CLI::App* whole, const CLI::Error& error) { return complaint(*whole, error); });
-  Wish wish;
-  offer<Serve>(app, "serve", "Run the station until SIGINT or SIGTERM", wish);
-  offer<CheckConfig>(app, "check-config", "Check a configuration and print what it means", wish);
-  offer<Certificate>(app, "certificate", "Make or renew the station's certificate for TLS", wish);
-  offer<Backup>(app, "backup", "Copy a station's database, also while it runs, and verify the copy", wish);
-  offer<Restore>(app, "restore", "Make a backup the database of a new data folder", wish);
-  offer<UserCommand>(app, "user", "Users of a station: add, list, change, remove", wish);
-  offer<TokenCommand>(app, "token", "API tokens of a station: create, list, revoke", wish);
-  offer<RobotCommand>(app, "robot", "Robots of a station: enroll, list, revoke", wish);
-  offer<FluidCommand>(app, "fluid", "Fluids of a station and their models: list, model, remove-model", wish);
-  offer<Model>(app, "model", "Show the motion models, compute the hydrodynamic one, fit the motor", wish);
-  offer<Bode>(app, "bode", "Crossover, margins and frequency response of the open loop", wish);
-  offer<Step>(app, "step", "Velocity and position after a step of duty, or any duty", wish);
-  offer<Identify>(app, "identify", "Find the model that fits a recording; plan an experiment", wish);
-  offer<EstimatorQuestion>(app, "estimator", "Turn a plant into the model of the robot's estimator", wish);
-  offer<Tune>(app, "tune", "Find the controller for a crossover and a phase margin", wish);
-  offer<Discretise>(app, "discretise", "Turn the controller into coefficients for the robot", wish);
-  offer<Export>(app, "export", "Write a recorded run as a file: CSV, MAT or SQLite", wish);
+  CommandLine line;
+  offer<Serve>(app, "serve", "Run the station until SIGINT or SIGTERM", line);
+  offer<CheckConfig>(app, "check-config", "Check a configuration and print what it means", line);
+  offer<Certificate>(app, "certificate", "Make or renew the station's certificate for TLS", line);
+  offer<Backup>(app, "backup", "Copy a station's database, also while it runs, and verify the copy", line);
+  offer<Restore>(app, "restore", "Make a backup the database of a new data folder", line);
+  offer<UserCommand>(app, "user", "Users of a station: add, list, change, remove", line);
+  offer<TokenCommand>(app, "token", "API tokens of a station: create, list, revoke", line);
+  offer<RobotCommand>(app, "robot", "Robots of a station: enroll, list, revoke", line);
+  offer<FluidCommand>(app, "fluid", "Fluids of a station and their models: list, model, remove-model", line);
+  offer<Model>(app, "model", "Show the motion models, compute the hydrodynamic one, fit the motor", line);
+  offer<Bode>(app, "bode", "Crossover, margins and frequency response of the open loop", line);
+  offer<Step>(app, "step", "Velocity and position after a step of duty, or any duty", line);
+  offer<Identify>(app, "identify", "Find the model that fits a recording; plan an experiment", line);
+  offer<EstimatorQuestion>(app, "estimator", "Turn a plant into the model of the robot's estimator", line);
+  offer<Tune>(app, "tune", "Find the controller for a crossover and a phase margin", line);
+  offer<Discretise>(app, "discretise", "Turn the controller into coefficients for the robot", line);
+  offer<Export>(app, "export", "Write a recorded run as a file: CSV, MAT or SQLite", line);
   offer<ReferenceCommand>(app, "reference", "A run's position as it was measured from outside: import, show, remove",
-                          wish);
-  offer<Predict>(app, "predict", "Predict a closed-loop experiment, beside a recorded one", wish);
-  offer<Verify>(app, "verify", "Check a station's database and the certificates of its runs", wish);
+                          line);
+  offer<Predict>(app, "predict", "Predict a closed-loop experiment, beside a recorded one", line);
+  offer<Verify>(app, "verify", "Check a station's database and the certificates of its runs", line);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -103,10 +103,10 @@ Wish parse_command_line(int argc, char** argv) {
     if (!std::cout.flush()) throw std::runtime_error{kNotWritten};
     return answered;
   }
-  return wish;
+  return line;
 }
 
-std::optional<int> answer(const Wish& wish, std::ostream& out) {
+std::optional<int> answer(const CommandLine& line, std::ostream& out) {
   return std::visit(
       [&out](const auto& wanted) -> std::optional<int> {
         using T = std::decay_t<decltype(wanted)>;
@@ -122,7 +122,7 @@ std::optional<int> answer(const Wish& wish, std::ostream& out) {
           return exit_code;
         }
       },
-      wish);
+      line);
 }
 
 }  // namespace server::cli

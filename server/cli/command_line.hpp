@@ -39,17 +39,17 @@ struct Answered {
   int exit_code = 0;
 };
 
-using Wish = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
-                          Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand,
-                          RobotCommand, FluidCommand, ReferenceCommand>;
+using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model,
+                                 Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
+                                 TokenCommand, RobotCommand, FluidCommand, ReferenceCommand>;
 
-Wish parse_command_line(int argc, char** argv);
+CommandLine parse_command_line(int argc, char** argv);
 
 // Does everything but to serve, and returns the exit code; none for Serve. Writes to `out` only what is complete.
 // Throws what the tools throw: a sentence for the user.
-std::optional<int> answer(const Wish& wish, std::ostream& out);
+std::optional<int> answer(const CommandLine& line, std::ostream& out);
 
 // Reads and checks a configuration, and prints what it means.
-int run(const CheckConfig& wish, std::ostream& out);
+int run(const CheckConfig& line, std::ostream& out);
 
 }  // namespace server::cli

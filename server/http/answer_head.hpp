@@ -1,5 +1,5 @@
 // The head of an HTTP answer as bytes: status, framing, what the response says of itself, and what every answer, errors
-// included, tells a browser about how it may be used. Field names are those of RFC 9110 and of the W3C.
+// included, says how a browser may use it. Field names are those of RFC 9110 and of the W3C.
 #pragma once
 
 #include <string>

@@ -55,7 +55,7 @@ Response body_too_large(std::size_t limit) {
   return problem(413, fmt::format("the body has more than {} bytes", limit), "too_large");
 }
 
-// What follows the header cannot be told: Beast takes a coding that it does not know for no body at all.
+// The length of what follows the header is not known: Beast takes a coding that it does not know for no body at all.
 bool has_unknown_length(const http::request_parser<http::string_body>& parser) {
   return parser.get().count(http::field::transfer_encoding) > 0 && !parser.chunked();
 }
@@ -70,10 +70,11 @@ bool can_pass_over_body(const http::request_parser<http::string_body>& parser) {
 
 }  // namespace
 
-HttpConnection::HttpConnection(HttpStream stream, Guest& guest, TlsGate* tls, Clock& clock, const RequestGuard& guard,
-                               const Router& router, Upgrades& upgrades, ExceptionLog& exceptions)
+HttpConnection::HttpConnection(HttpStream stream, ConnectionSlot& slot, TlsHandshakes* tls, Clock& clock,
+                               const RequestGuard& guard, const Router& router, Upgrades& upgrades,
+                               ExceptionLog& exceptions)
     : stream_{std::move(stream)},
-      guest_{guest},
+      slot_{slot},
       tls_{tls},
       clock_{clock},
       guard_{guard},
@@ -81,7 +82,7 @@ HttpConnection::HttpConnection(HttpStream stream, Guest& guest, TlsGate* tls, Cl
       upgrades_{upgrades},
       exceptions_{exceptions},
       deadline_us_{kNever} {
-  guest_.on_end([this] { stream_.end(); });
+  slot_.on_end([this] { stream_.end(); });
 }
 
 asio::awaitable<void> HttpConnection::talk() {
@@ -110,9 +111,9 @@ asio::awaitable<void> HttpConnection::watch() {
 
 asio::awaitable<HttpConnection::Next> HttpConnection::secure() {
   if (tls_ == nullptr) co_return Next::another;
-  const TlsGate::Outcome outcome = co_await tls_->secure(stream_, "http port");
-  if (outcome == TlsGate::Outcome::secure) co_return Next::another;
-  if (outcome == TlsGate::Outcome::not_tls) {
+  const TlsHandshakes::Outcome outcome = co_await tls_->secure(stream_, "http port");
+  if (outcome == TlsHandshakes::Outcome::secure) co_return Next::another;
+  if (outcome == TlsHandshakes::Outcome::not_tls) {
     const Response plain =
         problem(400, "this port speaks TLS only: use https:// instead of http://", "plain_http_on_tls_port");
     stream_.wire().write(asio::buffer(last_answer(plain, false)));
@@ -167,7 +168,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
   if (error) co_return co_await refuse_unreadable(error);
   deadline_us_ = kNever;  // a route bounds its own waits
   const Next next = co_await carry_out(std::move(head), parser.release());
-  if (next == Next::another) guest_.rest();
+  if (next == Next::another) slot_.rest();
   co_return next;
 }
 
@@ -267,7 +268,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::carry_out_stop(Parser& par
   if (!goes_on) co_return co_await send_and_close(std::move(response), parser.release());
   const Next next = co_await send(std::move(response), message);
   if (next == Next::end) co_return next;
-  guest_.rest();
+  slot_.rest();
   allow(kRequestTime);
   parser.body_limit(kMaxBodyBytes);
   const boost::system::error_code error = co_await read_body(parser);
@@ -277,7 +278,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::carry_out_stop(Parser& par
 }
 
 void HttpConnection::admit(Request& request, Caller caller) {
-  if (!caller.actor.empty()) guest_.becomes(Guest::busy);
+  if (!caller.actor.empty()) slot_.becomes(ConnectionSlot::busy);
   request.caller = std::move(caller);
   request.caller.peer = address_of(stream_);
   request.actor = request.caller.actor;
@@ -366,7 +367,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::send(Response response, co
   co_return framing.keep_alive ? Next::another : Next::end;
 }
 
-// False when it was cut short: the missing last chunk tells the client (HTTP/1.0 has no way to say so).
+// False when it was cut short: the missing last chunk shows it to the client (HTTP/1.0 has no way to say so).
 asio::awaitable<bool> HttpConnection::send_stream(BodyStream& body, bool chunked, std::string route) {
   for (;;) {
     deadline_us_ = kNever;

@@ -7,7 +7,7 @@
 // (408), 60 s idle between two, 30 s for the client to take a piece of the answer.
 // Malformed HTTP is 400 and the end of the connection. An exception of a route is logged and answered with 500. A GET
 // whose client has gone is cancelled; a POST is always carried out. In TLS the handshake is part of the first request's
-// 10 s, and who speaks plain HTTP is told so (400). Each answer has the security headers, and is not cached unless it
+// 10 s, and plain HTTP is answered with 400. Each answer has the security headers, and is not cached unless it
 // says so itself. Loop thread. What it is given outlives it.
 //
 // SAFETY: an emergency stop is carried out when its head is complete. Of the head only Host, Origin and credential are
@@ -27,7 +27,7 @@
 #include "server/http/request_guard.hpp"
 #include "server/http/router.hpp"
 #include "server/http/upgrade.hpp"
-#include "server/net/entrance.hpp"
+#include "server/net/port_access.hpp"
 #include "server/runtime/counted.hpp"
 #include "server/runtime/exceptions.hpp"
 
@@ -36,7 +36,7 @@ namespace server {
 inline constexpr std::size_t kMaxHeaderBytes = 16 * 1024;
 inline constexpr std::size_t kMaxTargetBytes = 8 * 1024;
 inline constexpr std::size_t kMaxHeaderFields = 100;
-inline constexpr std::size_t kMaxLoginBodyBytes = 4 * 1024;  // of strangers
+inline constexpr std::size_t kMaxLoginBodyBytes = 4 * 1024;  // of unauthenticated
 inline constexpr std::size_t kMaxPagesOfOne = 32;            // on /live, of one user, token or link
 inline constexpr microseconds kRequestTime{std::chrono::seconds{10}};
 inline constexpr microseconds kLongBodyTime{std::chrono::seconds{60}};
@@ -46,7 +46,7 @@ inline constexpr microseconds kLingerTime{std::chrono::seconds{2}};  // for a re
 
 class HttpConnection {
  public:
-  HttpConnection(HttpStream stream, Guest& guest, TlsGate* tls, Clock& clock, const RequestGuard& guard,
+  HttpConnection(HttpStream stream, ConnectionSlot& slot, TlsHandshakes* tls, Clock& clock, const RequestGuard& guard,
                  const Router& router, Upgrades& upgrades, ExceptionLog& exceptions);
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;
@@ -88,8 +88,8 @@ class HttpConnection {
   void allow(microseconds duration) { deadline_us_ = clock_.steady_us() + duration.count(); }
 
   HttpStream stream_;
-  Guest& guest_;
-  TlsGate* tls_;  // null: plain HTTP
+  ConnectionSlot& slot_;
+  TlsHandshakes* tls_;  // null: plain HTTP
   Clock& clock_;
   const RequestGuard& guard_;
   const Router& router_;

@@ -14,9 +14,9 @@ using namespace asio::experimental::awaitable_operators;  // NOLINT: operators o
 namespace {
 
 // In the middle of a handshake nobody would understand it.
-void say_why(StreamSocket& stream, Door::Refusal refusal) {
+void say_why(StreamSocket& stream, ConnectionLimiter::Refusal refusal) {
   Response response = problem(503, "all connections of the station are taken; try again", "busy");
-  if (refusal == Door::Refusal::address_has_its_share) {
+  if (refusal == ConnectionLimiter::Refusal::address_has_its_share) {
     response = problem(429, "your address has as many connections as the station allows; close some", "busy");
   }
   response.headers.emplace_back("Retry-After", "5");
@@ -25,12 +25,12 @@ void say_why(StreamSocket& stream, Door::Refusal refusal) {
 
 }  // namespace
 
-HttpServer::HttpServer(TaskGroup& tasks, Clock& clock, Listener& listener, Entrance& entrance,
+HttpServer::HttpServer(TaskGroup& tasks, Clock& clock, Listener& listener, PortAccess& access,
                        const RequestGuard& guard, const Router& router, Upgrades& upgrades)
     : tasks_{tasks},
       clock_{clock},
       listener_{listener},
-      entrance_{entrance},
+      access_{access},
       guard_{guard},
       router_{router},
       upgrades_{upgrades} {}
@@ -40,18 +40,18 @@ asio::awaitable<void> HttpServer::run() {
 }
 
 void HttpServer::on_connection(HttpStream stream) {
-  auto guest = entrance_.door.admit(address_of(stream), stream.from_loopback());
-  if (guest) {
+  auto slot = access_.limiter.admit(address_of(stream), stream.from_loopback());
+  if (slot) {
     const std::string which = "http connection of " + stream.peer();
     tasks_.spawn("http connection", contained(tasks_.exceptions(), clock_, Ended::http_connection, which,
-                                              serve(std::move(stream), std::move(*guest))));
-  } else if (entrance_.tls == nullptr) {
-    say_why(stream, guest.error());
+                                              serve(std::move(stream), std::move(*slot))));
+  } else if (access_.tls == nullptr) {
+    say_why(stream, slot.error());
   }
 }
 
-asio::awaitable<void> HttpServer::serve(HttpStream stream, std::unique_ptr<Guest> guest) {
-  HttpConnection connection{std::move(stream), *guest,    entrance_.tls,      clock_, guard_,
+asio::awaitable<void> HttpServer::serve(HttpStream stream, std::unique_ptr<ConnectionSlot> slot) {
+  HttpConnection connection{std::move(stream), *slot,     access_.tls,        clock_, guard_,
                             router_,           upgrades_, tasks_.exceptions()};
   co_await (connection.talk() || connection.watch());
   if (!connection.wants_upgrade()) co_return;

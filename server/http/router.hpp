@@ -37,7 +37,7 @@ struct Route {
 class Router {
  public:
   void add(Route route);
-  // Hears of whoever is refused because of what they may not do.
+  // Called for each caller that is refused for want of a scope.
   void set_on_refused(std::function<void(const Request&, Scope)> on_refused) { on_refused_ = std::move(on_refused); }
   void set_fallback(std::function<Response(const Request&)> fallback) { fallback_ = std::move(fallback); }
 
@@ -46,7 +46,7 @@ class Router {
 
   // How long a body may be for it.
   std::size_t max_body_bytes(const std::string& method, const Target& target) const;
-  // What the caller would need for it and has not, before a long body is read; on_refused has heard of it then.
+  // What the caller would need for it and has not, before a long body is read; on_refused has been called then.
   std::optional<Scope> scope_lacking(const std::string& method, const Target& target, const Caller& caller) const;
 
   // A coroutine that throws passes its exception on.

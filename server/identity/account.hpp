@@ -1,7 +1,7 @@
 // Who may do what: roles and scopes, and users, API tokens, page sessions and enrolled robots as plain values.
 //
 // A role is what a person may do, a scope is one part of that, and a token has some of them. Every route needs one
-// scope; the least role that has it is what people are told. Times are UTC in microseconds, 0: never.
+// scope; a refusal names the least role that has it. Times are UTC in microseconds, 0: never.
 #pragma once
 
 #include <array>

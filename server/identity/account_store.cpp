@@ -100,7 +100,7 @@ std::optional<User> AccountStore::find_user(const std::string& name) {
   return query.executeStep() ? std::optional{read_user(query)} : std::nullopt;
 }
 
-// In the transaction of what it tells of. A robot's is found with the robot's.
+// In the transaction of the change. An entry about a robot names it, so that it is found with the robot's others.
 void AccountStore::note(const Author& by, const char* action, const std::string& subject,
                         const nlohmann::json& detail) {
   AuditNote note;

@@ -232,15 +232,15 @@ asio::awaitable<Result<void>> Accounts::remove_user(std::string name, Author by)
 
 std::vector<ApiToken> Accounts::tokens() const { return {tokens_.begin(), tokens_.end()}; }
 
-asio::awaitable<Result<NewToken>> Accounts::add_token(TokenWish wish, Author by) {
+asio::awaitable<Result<NewToken>> Accounts::add_token(TokenRequest request, Author by) {
   NewToken made;
   made.secret = random_secret();
-  made.token.name = wish.name;
+  made.token.name = request.name;
   made.token.hash = hash_of(made.secret);
-  made.token.scopes = wish.scopes;
-  made.token.owner = wish.owner;
+  made.token.scopes = request.scopes;
+  made.token.owner = request.owner;
   made.token.made_at_us = by.at_us;
-  made.token.expires_at_us = wish.days == 0 ? 0 : made.token.made_at_us + wish.days * kDayUs;
+  made.token.expires_at_us = request.days == 0 ? 0 : made.token.made_at_us + request.days * kDayUs;
   auto job = [token = made.token, by](AccountStore& store) { return store.add_token(token, by); };
   const auto added = co_await on_store(std::move(job));
   if (!added) co_return std::unexpected{added.error()};

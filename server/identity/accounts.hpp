@@ -22,7 +22,7 @@ namespace server {
 
 inline constexpr std::int64_t kMaxTokenDays = 3650;
 
-struct TokenWish {
+struct TokenRequest {
   std::string name;
   Scopes scopes;
   std::int64_t days = 0;  // 0: it does not run out
@@ -54,7 +54,7 @@ class Accounts {
   // The secret of a new session, for its cookie.
   std::string open_session(const std::string& user, const std::string& peer, const std::string& agent);
   bool end_session(std::uint64_t number, const Author& by);
-  // Of a user that there is the audit tells the name; what else was typed may be a password.
+  // The audit has the name of a user that exists; another name may be a password typed in the wrong field.
   void on_refused_sign_in(const std::string& user, const std::string& peer, const char* reason);
   const std::list<Sessions::Open>& sessions() const { return sessions_.all(); }
 
@@ -66,7 +66,7 @@ class Accounts {
   boost::asio::awaitable<Result<void>> remove_user(std::string name, Author by);
 
   std::vector<ApiToken> tokens() const;
-  boost::asio::awaitable<Result<NewToken>> add_token(TokenWish wish, Author by);
+  boost::asio::awaitable<Result<NewToken>> add_token(TokenRequest request, Author by);
   boost::asio::awaitable<Result<ApiToken>> revoke_token(std::string name, Author by);
 
   boost::asio::awaitable<Result<std::vector<Enrolment>>> enrolments();

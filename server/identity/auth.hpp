@@ -35,7 +35,7 @@ class Auth {
   std::optional<Caller> caller_of_token(const std::string& token) const;
   std::optional<Caller> caller_of_session(const std::string& secret) const;
 
-  // Browsers do not tell cookies of one host apart by port, so each station has a name of its own.
+  // Browsers do not separate cookies of one host by port, so each station has a name of its own.
   const std::string& cookie_name() const { return cookie_name_; }
   // The value of Set-Cookie; an empty secret ends it. `is_secure`: for TLS only.
   std::string cookie(const std::string& secret, bool is_secure) const;

@@ -11,14 +11,14 @@ namespace asio = boost::asio;
 
 RobotListener::RobotListener(asio::io_context& loop, Clock& clock, TaskGroup& tasks, Station& station,
                              RobotArchive& archive, const asio::ip::tcp::endpoint& endpoint, bool or_any_port,
-                             Entrance& entrance)
+                             PortAccess& access)
     : loop_{loop},
       clock_{clock},
       tasks_{tasks},
       station_{station},
       archive_{archive},
       listener_{loop, clock, endpoint, or_any_port},
-      entrance_{entrance},
+      access_{access},
       sockets_{loop, clock} {}
 
 asio::awaitable<void> RobotListener::run() {
@@ -29,36 +29,36 @@ asio::awaitable<void> RobotListener::run() {
 }
 
 void RobotListener::accept(StreamSocket socket) {
-  if (entrance_.tls == nullptr) return serve(make_stream(std::move(socket), sockets_));
-  auto guest = entrance_.door.admit(host_of(socket.peer()), socket.from_loopback());
-  if (!guest) return;
+  if (access_.tls == nullptr) return serve(make_stream(std::move(socket), sockets_));
+  auto slot = access_.limiter.admit(host_of(socket.peer()), socket.from_loopback());
+  if (!slot) return;
   const std::string which = "robot session of " + socket.peer();
   tasks_.spawn("robot session", contained(tasks_.exceptions(), clock_, Ended::robot_session, which,
-                                          secure_session(std::move(socket), std::move(*guest))));
+                                          secure_session(std::move(socket), std::move(*slot))));
 }
 
 void RobotListener::serve(std::unique_ptr<ByteStream> stream) {
-  auto guest = entrance_.door.admit(host_of(stream->peer()), stream->from_loopback());
-  if (!guest) return;
+  auto slot = access_.limiter.admit(host_of(stream->peer()), stream->from_loopback());
+  if (!slot) return;
   const std::string which = "robot session of " + stream->peer();
   tasks_.spawn("robot session", contained(tasks_.exceptions(), clock_, Ended::robot_session, which,
-                                          session(std::move(stream), std::move(*guest))));
+                                          session(std::move(stream), std::move(*slot))));
 }
 
-asio::awaitable<void> RobotListener::secure_session(StreamSocket socket, std::unique_ptr<Guest> guest) {
-  guest->on_end([&socket] { socket.end(); });
-  const TlsGate::Outcome outcome = co_await entrance_.tls->secure(socket, "robot port");
-  if (outcome != TlsGate::Outcome::secure) co_return;
-  co_await session(make_stream(std::move(socket), sockets_), std::move(guest));
+asio::awaitable<void> RobotListener::secure_session(StreamSocket socket, std::unique_ptr<ConnectionSlot> slot) {
+  slot->on_end([&socket] { socket.end(); });
+  const TlsHandshakes::Outcome outcome = co_await access_.tls->secure(socket, "robot port");
+  if (outcome != TlsHandshakes::Outcome::secure) co_return;
+  co_await session(make_stream(std::move(socket), sockets_), std::move(slot));
 }
 
-asio::awaitable<void> RobotListener::session(std::unique_ptr<ByteStream> stream, std::unique_ptr<Guest> guest) {
+asio::awaitable<void> RobotListener::session(std::unique_ptr<ByteStream> stream, std::unique_ptr<ConnectionSlot> slot) {
   const std::string peer = stream->peer();
   RobotSession session{loop_, clock_, std::move(stream), station_, archive_, buffers_};
-  guest->on_end([&session] { session.close("it gave way to another connection"); });
+  slot->on_end([&session] { session.close("it gave way to another connection"); });
   const bool welcome = co_await session.greet();
   if (!welcome) co_return log_unwelcome(peer, session.why_unwelcome());
-  guest->becomes(Guest::busy);
+  slot->becomes(ConnectionSlot::busy);
   const std::string which = fmt::format("robot '{}', {}", session.robot_id(), peer);
   co_await contained(tasks_.exceptions(), clock_, Ended::robot_session, which, session.serve());
 }

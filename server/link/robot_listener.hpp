@@ -1,14 +1,14 @@
 // The port where robots dial in: each connection becomes a task of its own, behind its TLS handshake if there is one.
 //
-// A robot is a stranger to the door until its hello has been accepted; how many may be connected, and who gives way,
-// the door says (server/net/door.hpp). A welcomed robot never does. Who is refused is closed without a word. Loop
+// A robot's connection is unauthenticated until its hello has been accepted. ConnectionLimiter says how many may be
+// connected and which of them is evicted; never that of a welcomed robot. A refused connection is closed at once. Loop
 // thread. Outlives the sessions it started.
 #pragma once
 
 #include "server/link/robot_session.hpp"
-#include "server/net/entrance.hpp"
 #include "server/net/listener.hpp"
 #include "server/net/poll_set.hpp"
+#include "server/net/port_access.hpp"
 #include "server/runtime/tasks.hpp"
 
 namespace server {
@@ -16,7 +16,7 @@ namespace server {
 class RobotListener {
  public:
   RobotListener(boost::asio::io_context& loop, Clock& clock, TaskGroup& tasks, Station& station, RobotArchive& archive,
-                const boost::asio::ip::tcp::endpoint& endpoint, bool or_any_port, Entrance& entrance);
+                const boost::asio::ip::tcp::endpoint& endpoint, bool or_any_port, PortAccess& access);
 
   boost::asio::awaitable<void> run();
 
@@ -27,8 +27,8 @@ class RobotListener {
 
  private:
   void accept(StreamSocket socket);
-  boost::asio::awaitable<void> secure_session(StreamSocket socket, std::unique_ptr<Guest> guest);
-  boost::asio::awaitable<void> session(std::unique_ptr<ByteStream> stream, std::unique_ptr<Guest> guest);
+  boost::asio::awaitable<void> secure_session(StreamSocket socket, std::unique_ptr<ConnectionSlot> slot);
+  boost::asio::awaitable<void> session(std::unique_ptr<ByteStream> stream, std::unique_ptr<ConnectionSlot> slot);
   void log_unwelcome(const std::string& peer, const std::string& why);
 
   boost::asio::io_context& loop_;
@@ -37,7 +37,7 @@ class RobotListener {
   Station& station_;
   RobotArchive& archive_;
   Listener listener_;
-  Entrance& entrance_;
+  PortAccess& access_;
   SparseLines lines_;
   ReadBuffers buffers_{};
   PollSet sockets_;  // of the robots

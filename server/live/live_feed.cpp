@@ -16,7 +16,7 @@ using nlohmann::json;
 
 namespace {
 constexpr std::int64_t kStampIntervalUs = 100'000;
-constexpr std::size_t kRobotsAStamp = 200;  // that are told before it; the others after the next
+constexpr std::size_t kRobotsAStamp = 200;  // that are published before it; the others after the next
 constexpr std::size_t kWorkInATurn = 60;    // of the loop, in messages put into queues
 constexpr std::size_t kWorkOfARobot = 12;   // to write its state
 constexpr std::int64_t kGatheredUs = 50'000;
@@ -31,7 +31,7 @@ bool continues(const SampleBatch& before, const SampleBatch& next) {
          next.first_robot_time_us == before.first_robot_time_us + static_cast<std::uint64_t>(length_us(before));
 }
 
-// A message to some: its text is written when the first is to hear it, and once for all.
+// A message to some: its text is written for the first subscriber, and once for all.
 template <class Write>
 class Message {
  public:
@@ -74,7 +74,7 @@ void LiveFeed::remove(Subscriber& subscriber) {
       if (!is_watched(robot)) robot.gathered.reset();
     }
   }
-  const auto chose = choosy_.extract(&subscriber);
+  const auto chose = filtered_.extract(&subscriber);
   if (!chose) return;
   for (const RobotId& id : chose.mapped()) {
     const auto robot = robots_.find(id);
@@ -87,7 +87,7 @@ void LiveFeed::remove(Subscriber& subscriber) {
 
 void LiveFeed::watch(Subscriber& subscriber, const std::set<RobotId>& robots) {
   remove(subscriber);
-  choosy_.emplace(&subscriber, robots);
+  filtered_.emplace(&subscriber, robots);
   for (const RobotId& id : robots) robots_[id].watchers.push_back(&subscriber);
 }
 
@@ -100,7 +100,7 @@ asio::awaitable<void> LiveFeed::run() {
     publish_log();
     Message stamp{[&] { return dump({{"type", "stamp"}, {"stamp_us", clock_.steady_us()}}); }};
     stamp.push(watch_all_, true);
-    stamp.push(std::views::keys(choosy_), true);
+    stamp.push(std::views::keys(filtered_), true);
   }
 }
 
@@ -135,26 +135,26 @@ LiveFeed::Headline LiveFeed::headline(const RobotState& robot) {
 std::size_t LiveFeed::publish_robot(const Robot& robot, const Change& change) {
   const RobotState& state = change.state;
   Message message{[&] { return dump({{"type", "robot"}, {"robot", to_json(state)}}); }};
-  std::size_t told = 0;
+  std::size_t published = 0;
   const auto push = [&](Subscriber* to) {
     to->push_state(state.id, message.text());
-    ++told;
+    ++published;
   };
   if (change.to_watchers) {
     std::ranges::for_each(watch_all_, push);
     std::ranges::for_each(robot.watchers, push);
   }
-  if (!change.to_others) return told;
-  for (const auto& [one, watched] : choosy_) {
+  if (!change.to_others) return published;
+  for (const auto& [one, watched] : filtered_) {
     if (!watched.contains(state.id)) push(one);
   }
-  return told;
+  return published;
 }
 
 void LiveFeed::publish_run(json run) {
   Message message{[&] { return dump({{"type", "run"}, {"run", std::move(run)}}); }};
   message.push(watch_all_, false);
-  message.push(std::views::keys(choosy_), false);
+  message.push(std::views::keys(filtered_), false);
 }
 
 // With the newest state.
@@ -167,7 +167,7 @@ LiveFeed::Change& LiveFeed::change_of(Robot& robot, const RobotState& state) {
   return *robot.change;
 }
 
-// Samples that were taken before a large change are told before it.
+// Samples from before a large change are published before it.
 void LiveFeed::on_headline(Robot& robot, const RobotState& state) {
   robot.headline = headline(state);
   publish_gathered(robot);
@@ -231,7 +231,7 @@ void LiveFeed::publish_late_samples() {
 
 void LiveFeed::on_event(const RobotState&, const RobotEvent& event) {
   Message{[&] { return dump({{"type", "event"}, {"event", to_json(event)}}); }}.push(watch_all_, false);
-  if (choosy_.empty()) return;
+  if (filtered_.empty()) return;
   events_.push_back(event);
   if (events_.size() == kMaxLog) publish_log();
 }
@@ -249,7 +249,7 @@ bool LiveFeed::is_news(const CommandRecord& record) {
 void LiveFeed::on_command(const CommandRecord& record) {
   if (!is_heard() || !is_news(record)) return;
   Message{[&] { return dump({{"type", "command"}, {"command", to_json(record)}}); }}.push(watch_all_, false);
-  if (choosy_.empty()) return;
+  if (filtered_.empty()) return;
   std::erase_if(commands_, [&](const CommandRecord& older) { return older.id == record.id; });
   commands_.push_back(record);
   if (commands_.size() == kMaxLog) publish_log();
@@ -258,7 +258,7 @@ void LiveFeed::on_command(const CommandRecord& record) {
 void LiveFeed::publish_log() {
   if (events_.empty() && commands_.empty()) return;
   Message log{[&] { return dump({{"type", "log"}, {"events", list(events_)}, {"commands", list(commands_)}}); }};
-  log.push(std::views::keys(choosy_), false);
+  log.push(std::views::keys(filtered_), false);
   events_.clear();
   commands_.clear();
 }

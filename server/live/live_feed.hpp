@@ -1,5 +1,5 @@
-// What happens now, for everyone who watches: hears the station, writes each message once, and hands the same text to
-// every subscriber.
+// What happens now, for everyone who watches: a sink of the station that writes each message once and queues the same
+// text for every subscriber.
 //
 // Loop thread. Outlives its subscribers. Never waits for anyone: a subscriber's queue is bounded.
 #pragma once
@@ -21,10 +21,10 @@
 
 namespace server {
 
-// Whoever watches a robot hears at once what changed of it, but for small changes of its state (with the next stamp)
-// and samples (50 ms of them at a time). Whoever said what it watches hears the rest with the next stamp only: the
+// Whoever watches a robot gets its changes at once, but for small changes of its state (with the next stamp)
+// and samples (50 ms of them at a time). Whoever said what it watches gets the rest with the next stamp only: the
 // large changes of the other robots, and one `log` of all events and commands. So a page costs the same few messages a
-// second however many robots there are. A lease that was renewed, some ten times a second, is told to nobody.
+// second however many robots there are. A lease that was renewed, some ten times a second, is not published.
 class LiveFeed final : public StationSink {
  public:
   explicit LiveFeed(Clock& clock) : clock_{clock} {}
@@ -34,7 +34,7 @@ class LiveFeed final : public StationSink {
 
   void add(Subscriber& subscriber);
   void remove(Subscriber& subscriber);
-  // Whose samples and every change of state it hears from now on; before the first call, those of all.
+  // Whose samples and every change of state it gets from now on; before the first call, those of all.
   void watch(Subscriber& subscriber, const std::set<RobotId>& robots);
 
   void publish_run(nlohmann::json run);
@@ -48,17 +48,17 @@ class LiveFeed final : public StationSink {
 
  private:
   using Subscribers = std::vector<Subscriber*>;
-  // What of a robot is large: told to all, and to those who watch it at once.
+  // Of a robot's state what is published to all, and at once to those who watch it.
   using Headline = std::tuple<LinkState, BootId, protocol::Mode, protocol::SubState, std::uint64_t, CommandId>;
 
-  // What is still to be told of a robot's state, and to whom.
+  // What is still to be published of a robot's state, and to whom.
   struct Change {
     RobotState state;
     bool to_watchers;
     bool to_others;
   };
   struct Robot {
-    std::optional<Headline> headline;     // as it was told; none yet: it is watched and has said nothing
+    std::optional<Headline> headline;     // as it was published; none yet: it is watched and has reported nothing
     Subscribers watchers;                 // among those that chose
     std::optional<Change> change;         // since the last stamp
     std::optional<SampleBatch> gathered;  // under 50 ms of samples
@@ -67,7 +67,7 @@ class LiveFeed final : public StationSink {
   };
 
   static Headline headline(const RobotState& robot);
-  bool is_heard() const { return !watch_all_.empty() || !choosy_.empty(); }
+  bool is_heard() const { return !watch_all_.empty() || !filtered_.empty(); }
   bool is_watched(const Robot& robot) const { return !watch_all_.empty() || !robot.watchers.empty(); }
   boost::asio::awaitable<void> publish_changed();
   void on_headline(Robot& robot, const RobotState& state);
@@ -81,7 +81,7 @@ class LiveFeed final : public StationSink {
 
   Clock& clock_;
   Subscribers watch_all_;
-  std::map<Subscriber*, std::set<RobotId>> choosy_;  // that said what they watch
+  std::map<Subscriber*, std::set<RobotId>> filtered_;  // that said what they watch
   std::unordered_map<RobotId, Robot> robots_;
   std::vector<RobotId> changed_;         // that have a change
   std::vector<RobotEvent> events_;       // of the next log

@@ -72,7 +72,7 @@ json to_json(const Sample& sample) {
 json to_json(const ControlState& control) {
   return {{"holder", control.holder},
           {"taken_at_us", control.taken_at_us},
-          {"wished_by", control.wished_by.empty() ? json(nullptr) : json(control.wished_by)}};
+          {"wished_by", control.requested_by.empty() ? json(nullptr) : json(control.requested_by)}};
 }
 
 json to_json(const ChangedLimit& limit) {

@@ -1,4 +1,4 @@
-// Queues what is told, and drops what is oldest when nobody reads.
+// Queues messages, and drops the oldest when nobody reads.
 #include "server/live/subscriber.hpp"
 
 #include <algorithm>

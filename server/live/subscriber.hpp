@@ -16,9 +16,9 @@ namespace server {
 using LiveText = std::shared_ptr<const std::string>;
 
 // One listener's queue. Of each robot at most one state waits: a newer one takes the place of the older, so a state is
-// never dropped, and whoever is slow hears the newest. Of everything else at most kMaxMessages and kMaxBytes wait: when
-// it is full the oldest samples and stamps are dropped first, then the oldest of what is left, and the reader is told
-// how many by a `dropped` message.
+// never dropped, and a slow reader gets the newest. Of everything else at most kMaxMessages and kMaxBytes wait: when
+// it is full the oldest samples and stamps are dropped first, then the oldest of what is left, and the reader is
+// notified how many by a `dropped` message.
 class Subscriber {
  public:
   static constexpr std::size_t kMaxMessages = 256;
@@ -28,7 +28,7 @@ class Subscriber {
 
   void push(LiveText message, bool droppable);
   void push_state(const RobotId& robot, LiveText message);
-  // Drops what waits of the robots whose ids follow the first of these, up to the second: a newer state was told.
+  // Drops what waits of the robots whose ids follow the first of these, up to the second: a newer state was published.
   void forget_states(const RobotId& after, const RobotId& last);
   boost::asio::awaitable<void> wait();  // until a message waits; throws operation_aborted when cancelled
   LiveText pop();                       // null when none waits

@@ -42,13 +42,13 @@ class SocketStream final : public ByteStream {
     ::setsockopt(descriptor_.get(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kMaxUnsentBytes, sizeof kMaxUnsentBytes);
   }
 
-  // In TLS whole records, as long as a further one has room: so OpenSSL keeps none back, of which no epoll would tell.
+  // In TLS whole records, as long as a further one has room: so OpenSSL keeps none back, which no epoll would report.
   Read read_now(asio::mutable_buffer into) override {
     Wire::Attempt last = wire_.read(into);
     Read read{last.size, static_cast<bool>(last.error)};
     while (wire_.is_secure() && last.size > 0 && into.size() - read.size >= kMaxRecordBytes) {
       last = wire_.read(into + read.size);
-      read.size += last.size;  // an end is told of by the next read
+      read.size += last.size;  // the next read reports an end
     }
     return read;
   }

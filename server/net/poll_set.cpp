@@ -1,4 +1,4 @@
-// Level-triggered: what was not read to the end is ready again at the next look, behind the others.
+// Level-triggered: what was not read to the end is ready again in the next round, behind the others.
 #include "server/net/poll_set.hpp"
 
 #include <unistd.h>
@@ -17,11 +17,11 @@ namespace server {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-PollSet::Lane::Lane() : epoll{::epoll_create1(EPOLL_CLOEXEC)} {
+PollSet::Group::Group() : epoll{::epoll_create1(EPOLL_CLOEXEC)} {
   if (epoll < 0) throw boost::system::system_error{errno, boost::system::system_category(), "epoll_create1"};
 }
 
-PollSet::Lane::~Lane() { ::close(epoll); }
+PollSet::Group::~Group() { ::close(epoll); }
 
 PollSet::PollSet(asio::io_context& loop, Clock& clock) : loop_{loop}, clock_{clock} {}
 
@@ -32,15 +32,16 @@ PollSet::~PollSet() {
   }
 }
 
-// As long as it lasts the loop knows of the lane, and wakes for each of its sockets that becomes ready. Asio's own
-// epoll is edge-triggered; what is ready when a wait begins ends it all the same, since the wait itself registers anew.
-struct PollSet::Loan {
-  Loan(asio::io_context& loop, const Lane& lane) : descriptor{loop} { descriptor.assign(lane.epoll, error); }
-  ~Loan() {
+// While it lasts the group's epoll is registered with the loop, which wakes for each socket that becomes ready. Asio's
+// own epoll is edge-triggered; what is ready when a wait begins ends it all the same, since the wait itself registers
+// anew.
+struct PollSet::Registration {
+  Registration(asio::io_context& loop, const Group& group) : descriptor{loop} { descriptor.assign(group.epoll, error); }
+  ~Registration() {
     if (descriptor.is_open()) descriptor.release();
   }
-  Loan(const Loan&) = delete;
-  Loan& operator=(const Loan&) = delete;
+  Registration(const Registration&) = delete;
+  Registration& operator=(const Registration&) = delete;
   auto ready() { return descriptor.async_wait(asio::posix::descriptor_base::wait_read, asio::use_awaitable); }
   asio::posix::stream_descriptor descriptor;
   error_code error;  // for want of memory
@@ -48,68 +49,69 @@ struct PollSet::Loan {
 
 asio::awaitable<void> PollSet::run() {
   for (;;) {
-    co_await look_when_woken();
-    co_await look_at_intervals();
+    co_await poll_when_woken();
+    co_await poll_at_intervals();
   }
 }
 
-// Until two have spoken within a pause. To lend the epoll takes as long as it has sockets, so it is not done often.
-asio::awaitable<void> PollSet::look_when_woken() {
-  Loan loan{loop_, all_};
-  if (loan.error) co_return;
-  for (std::int64_t heard_at_us = 0;;) {
-    co_await loan.ready();
+// Until two sockets were ready within a pause. To register the epoll takes longer the more sockets it has, so it is not
+// done often.
+asio::awaitable<void> PollSet::poll_when_woken() {
+  Registration registration{loop_, all_};
+  if (registration.error) co_return;
+  for (std::int64_t received_at_us = 0;;) {
+    co_await registration.ready();
     const std::int64_t now_us = clock_.steady_us();
-    const std::size_t found = co_await work_off(all_);
-    if (found > 1 || (found == 1 && now_us - heard_at_us < kPause.count())) co_return;
-    if (found == 1) heard_at_us = now_us;
+    const std::size_t found = co_await poll_until_empty(all_);
+    if (found > 1 || (found == 1 && now_us - received_at_us < kPause.count())) co_return;
+    if (found == 1) received_at_us = now_us;
   }
 }
 
 // Until it has been quiet for a while.
-asio::awaitable<void> PollSet::look_at_intervals() {
+asio::awaitable<void> PollSet::poll_at_intervals() {
   std::int64_t due_us = clock_.steady_us() + kPause.count();
-  for (int quiet_looks = 0; quiet_looks < kQuietLooks;) {
+  for (int quiet_rounds = 0; quiet_rounds < kQuietRounds;) {
     co_await clock_.sleep_until(due_us);
     due_us = clock_.steady_us() + kPause.count();
-    const std::size_t found = co_await work_off(all_);
-    quiet_looks = found > 1 ? 0 : quiet_looks + 1;
+    const std::size_t found = co_await poll_until_empty(all_);
+    quiet_rounds = found > 1 ? 0 : quiet_rounds + 1;
   }
 }
 
 asio::awaitable<void> PollSet::run_awaited() {
-  Loan loan{loop_, awaited_};
-  if (loan.error) throw boost::system::system_error{loan.error, "cannot watch robots"};
+  Registration registration{loop_, awaited_};
+  if (registration.error) throw boost::system::system_error{registration.error, "cannot watch robots"};
   for (;;) {
-    co_await loan.ready();
-    co_await work_off(awaited_);
+    co_await registration.ready();
+    co_await poll_until_empty(awaited_);
   }
 }
 
 // Returns how many there were.
-asio::awaitable<std::size_t> PollSet::work_off(Lane& lane) {
+asio::awaitable<std::size_t> PollSet::poll_until_empty(Group& group) {
   for (std::size_t total = 0;;) {
-    const std::size_t found = look(lane);
+    const std::size_t found = poll(group);
     total += found;
     if (found < kAtOnce) co_return total;
     co_await asio::post(loop_, asio::use_awaitable);
   }
 }
 
-// How many it found. Who is woken may destroy any socket.
-std::size_t PollSet::look(Lane& lane) {
-  const int found = ::epoll_wait(lane.epoll, lane.ready.data(), kAtOnce, 0);
-  lane.ready_count = static_cast<std::size_t>(std::max(found, 0));
-  for (std::size_t at = 0; at < lane.ready_count; ++at) {
-    const epoll_event event = lane.ready[at];
+// How many were ready. The code that is called may destroy any socket.
+std::size_t PollSet::poll(Group& group) {
+  const int found = ::epoll_wait(group.epoll, group.ready.data(), kAtOnce, 0);
+  group.ready_count = static_cast<std::size_t>(std::max(found, 0));
+  for (std::size_t at = 0; at < group.ready_count; ++at) {
+    const epoll_event event = group.ready[at];
     if (event.data.ptr != nullptr) static_cast<Socket*>(event.data.ptr)->on_ready(event.events);
   }
-  return std::exchange(lane.ready_count, 0);
+  return std::exchange(group.ready_count, 0);
 }
 
 void PollSet::forget(const Socket& socket) {
-  for (Lane* lane : {&all_, &awaited_}) {
-    for (epoll_event& event : lane->ready) {
+  for (Group* group : {&all_, &awaited_}) {
+    for (epoll_event& event : group->ready) {
       if (event.data.ptr == &socket) event.data.ptr = nullptr;
     }
   }
@@ -163,7 +165,7 @@ void PollSet::Socket::on_ready(std::uint32_t events) {
 
 // An awaited socket stays in the epoll of all, with an empty mask: ready in both it would wake the loop twice, and to
 // fill a mask cannot fail, so what is no longer awaited, or for want of memory never was, is read with the others.
-// Where nobody reads or waits to write it is in none: an epoll tells of the end of a connection whatever the mask,
+// Where nobody reads or waits to write it is in none: an epoll reports the end of a connection whatever the mask,
 // again and again.
 bool PollSet::Socket::update() {
   if (set_ == nullptr) return !reader_ && !writer_;
@@ -174,14 +176,14 @@ bool PollSet::Socket::update() {
   return set_events(set_->all_, in_all_, reading != 0, is_read_there ? 0 : reading) && is_set;
 }
 
-bool PollSet::Socket::set_events(const Lane& lane, std::optional<std::uint32_t>& present, bool is_wanted,
+bool PollSet::Socket::set_events(const Group& group, std::optional<std::uint32_t>& present, bool is_wanted,
                                  std::uint32_t wanted) {
   if (is_wanted ? present == wanted : !present) return true;
   epoll_event event{};
   event.events = wanted;
   event.data.ptr = this;
   const int operation = !is_wanted ? EPOLL_CTL_DEL : present ? EPOLL_CTL_MOD : EPOLL_CTL_ADD;
-  if (::epoll_ctl(lane.epoll, operation, descriptor_, &event) != 0) return false;
+  if (::epoll_ctl(group.epoll, operation, descriptor_, &event) != 0) return false;
   present = is_wanted ? std::optional{wanted} : std::nullopt;
   return true;
 }

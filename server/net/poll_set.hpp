@@ -1,12 +1,12 @@
 // Many sockets behind one descriptor of the loop: an epoll of their own, so that a fleet that talks wakes the loop 500
 // times a second at most, and takes a few microseconds of it at a time.
 //
-//   sockets ─┬─ epoll of all ──────── looked at every 2 ms ─────────── a few sockets, then everybody else's turn
-//            └─ epoll of the awaited ── looked at when something comes ── likewise
+//   sockets ─┬─ epoll of all ────────── polled every 2 ms ──────────── a few sockets, then the loop's other work
+//            └─ epoll of the awaited ── polled when one is ready ────── likewise
 //
 // The second is for sockets from which an answer is expected, and those to which somebody waits to write. When hardly
-// anybody speaks, the first is looked at when something comes, too. Loop thread. When the set is gone its sockets wait
-// for nothing any more.
+// any robot sends, the first is polled when a socket is ready, too. Loop thread. After the set is
+// destroyed no wait on its sockets ends.
 #pragma once
 
 #include <sys/epoll.h>
@@ -28,16 +28,16 @@ namespace server {
 
 class PollSet {
  public:
-  static constexpr int kAtOnce = 8;                         // sockets, between two looks of the loop at everything else
-  static constexpr std::chrono::microseconds kPause{2000};  // from one look at all sockets to the next
-  static constexpr int kQuietLooks = 5;                     // with one ready at most, until the loop is woken instead
+  static constexpr int kAtOnce = 8;                         // sockets a poll round, before the loop does its other work
+  static constexpr std::chrono::microseconds kPause{2000};  // from one poll of all sockets to the next
+  static constexpr int kQuietRounds = 5;  // rounds with one ready at most, until the loop is woken instead
 
   PollSet(boost::asio::io_context& loop, Clock& clock);
   ~PollSet();  // whoever still waits is let go by the loop
   PollSet(const PollSet&) = delete;
   PollSet& operator=(const PollSet&) = delete;
 
-  // Look until cancelled. Without them nobody's wait ends.
+  // Poll until cancelled. Without them no wait ends.
   boost::asio::awaitable<void> run();
   boost::asio::awaitable<void> run_awaited();
 
@@ -45,27 +45,27 @@ class PollSet {
 
  private:
   // One epoll.
-  struct Lane {
-    Lane();
-    ~Lane();
-    Lane(const Lane&) = delete;
-    Lane& operator=(const Lane&) = delete;
+  struct Group {
+    Group();
+    ~Group();
+    Group(const Group&) = delete;
+    Group& operator=(const Group&) = delete;
     int epoll;
-    std::array<epoll_event, kAtOnce> ready{};  // of the present look
+    std::array<epoll_event, kAtOnce> ready{};  // of the present round
     std::size_t ready_count = 0;
   };
 
-  struct Loan;
+  struct Registration;
 
-  boost::asio::awaitable<void> look_at_intervals();
-  boost::asio::awaitable<void> look_when_woken();
-  boost::asio::awaitable<std::size_t> work_off(Lane& lane);
-  std::size_t look(Lane& lane);
+  boost::asio::awaitable<void> poll_at_intervals();
+  boost::asio::awaitable<void> poll_when_woken();
+  boost::asio::awaitable<std::size_t> poll_until_empty(Group& group);
+  std::size_t poll(Group& group);
   void forget(const Socket& socket);
 
   boost::asio::io_context& loop_;
   Clock& clock_;
-  Lane all_, awaited_;
+  Group all_, awaited_;
   std::unordered_set<Socket*> sockets_;
 };
 
@@ -95,12 +95,12 @@ class PollSet::Socket {
   void end_wait(boost::system::error_code error);
   void on_ready(std::uint32_t events);
   bool update();
-  bool set_events(const Lane& lane, std::optional<std::uint32_t>& present, bool is_wanted, std::uint32_t wanted);
+  bool set_events(const Group& group, std::optional<std::uint32_t>& present, bool is_wanted, std::uint32_t wanted);
 
   boost::asio::io_context& loop_;
   PollSet* set_;  // null when it is gone
   int descriptor_;
-  std::optional<std::uint32_t> in_all_, in_awaited_;  // the events that each epoll looks for, where it is there
+  std::optional<std::uint32_t> in_all_, in_awaited_;  // the events that each epoll waits for, where the socket is in it
   bool is_awaited_ = false;
   std::function<void()> reader_;
   Waiter writer_;

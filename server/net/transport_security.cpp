@@ -53,13 +53,13 @@ void log_in_force(const TlsCertificate& certificate) {
 }
 
 // Behind one address of this machine there may be many: a proxy, a test, a fleet. A quarter is left for all others.
-DoorLimits limits(const PortPlaces& places, std::size_t strangers) {
-  return {places.connections, strangers, places.of_address, places.connections - places.connections / 4};
+ConnectionLimits limits(const PortPlaces& places, std::size_t unauthenticated) {
+  return {places.connections, unauthenticated, places.of_address, places.connections - places.connections / 4};
 }
 
 // Of a request it is known at once who makes it, of a robot after its hello.
-DoorLimits http_limits(const PortPlaces& places) { return limits(places, places.connections); }
-DoorLimits robot_limits(const PortPlaces& places) { return limits(places, std::max(places.connections / 4, 1U)); }
+ConnectionLimits http_limits(const PortPlaces& places) { return limits(places, places.connections); }
+ConnectionLimits robot_limits(const PortPlaces& places) { return limits(places, std::max(places.connections / 4, 1U)); }
 
 }  // namespace
 
@@ -155,7 +155,7 @@ std::string TransportSecurity::to_trust() const {
 }
 
 nlohmann::json TransportSecurity::state() const {
-  const auto word = [](const Entrance& port) { return port.tls != nullptr ? "tls" : "plain"; };
+  const auto word = [](const PortAccess& port) { return port.tls != nullptr ? "tls" : "plain"; };
   nlohmann::json out{
       {"http", word(http_)}, {"robots", word(robots_)}, {"exposed", is_exposed()}, {"certificate", nullptr}};
   if (gate_) {

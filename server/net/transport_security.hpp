@@ -1,5 +1,5 @@
 // What protects the two ports: how many may be connected, which of them speaks TLS, with which certificate, and what
-// people must be told of it.
+// people must be warned of.
 //
 // The certificate's files are looked at every two seconds. Once they have changed and then stood still for one look,
 // new connections get them; files that cannot be used are an error in the log, and the old ones stay in force. A
@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "server/config/config.hpp"
-#include "server/net/entrance.hpp"
+#include "server/net/port_access.hpp"
 #include "server/runtime/clock.hpp"
 #include "server/runtime/worker.hpp"
 
@@ -31,10 +31,10 @@ class TransportSecurity {
   // Reads the certificate when a port needs it. Throws std::runtime_error saying what is missing and how to make it.
   TransportSecurity(Clock& clock, const Config& config);
 
-  Entrance& http() { return http_; }
-  Entrance& robots() { return robots_; }
-  const Entrance& http() const { return http_; }
-  const Entrance& robots() const { return robots_; }
+  PortAccess& http() { return http_; }
+  PortAccess& robots() { return robots_; }
+  const PortAccess& http() const { return http_; }
+  const PortAccess& robots() const { return robots_; }
 
   boost::asio::awaitable<void> run();  // watches and warns until cancelled
 
@@ -46,7 +46,7 @@ class TransportSecurity {
   std::string to_trust() const;
 
   const WorkerThread& worker() const { return worker_; }
-  const TlsGate* gate() const { return gate_ ? &*gate_ : nullptr; }
+  const TlsHandshakes* gate() const { return gate_ ? &*gate_ : nullptr; }
   bool is_exposed() const { return !exposed_.empty(); }
 
  private:
@@ -67,8 +67,8 @@ class TransportSecurity {
   std::filesystem::path certificate_, key_;
   std::string exposed_;  // the ports that are, for people
   WorkerThread worker_{"handshakes", 10};
-  std::optional<TlsGate> gate_;
-  Entrance http_, robots_;
+  std::optional<TlsHandshakes> gate_;
+  PortAccess http_, robots_;
   std::string tried_, seen_;  // stamps of the files
   std::int64_t next_exposed_us_ = 0, next_expiry_us_ = 0;
 };

@@ -48,7 +48,7 @@ class ExceptionLog {
 boost::asio::awaitable<void> contained(ExceptionLog& log, const Clock& clock, Ended ended, std::string which,
                                        boost::asio::awaitable<void> task);
 
-// `co_await (a || b)` throws both failures in one when it is cancelled; the first of them tells what happened. Each may
+// `co_await (a || b)` throws both failures in one when it is cancelled; the first of them is the cause. Each may
 // be such a pair itself.
 std::exception_ptr first_of(std::exception_ptr failure);
 

@@ -1,5 +1,5 @@
 // The order in which the system runs the station's threads on a machine that is full: the loop, then the thread that
-// writes what the loop hears, then everybody else.
+// writes what the loop receives, then everybody else.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -152,10 +152,9 @@ asio::awaitable<Result<CommandRecord>> Station::emergency_stop(StopRequest reque
                  R"({"kind":"emergency_stop"})", error);
     co_return std::unexpected{std::move(error)};
   }
-  std::vector<CommandRecord> records;
-  const auto stop = parts_->stops.begin(*entry, request, records);
-  parts_->publish_all(records);
-  if (!records.empty()) parts_->notifier.publish(entry->robot);
+  std::shared_ptr<PendingCommand> stop;
+  const auto begin = [&](std::vector<CommandRecord>& made) { stop = parts_->stops.begin(*entry, request, made); };
+  parts_->publish_stops_of(begin, &entry->robot);
   const bool is_connected = entry->port != nullptr;
   auto outcome = co_await parts_->tracker.follow(stop, false, patience);
   // The log can wait: it is written once the answer has gone.

@@ -46,9 +46,8 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   begin_connection(entry, hello, details, admission, peer, parts_->clock.steady_us());
   spdlog::info("robot '{}' connected from {}: boot {}, {} samples held, durable to {}", robot.id, peer, robot.boot_id,
                details.next_seq - details.oldest_seq, admission.durable_next_seq);
-  std::vector<CommandRecord> stopped;
-  parts_->stops.on_connected(entry, lost_its_latch, stopped);
-  parts_->publish_all(stopped);
+  parts_->publish_stops_of(
+      [&](std::vector<CommandRecord>& made) { parts_->stops.on_connected(entry, lost_its_latch, made); });
   entry.timed.drop_because = "link_lost";  // as the robot drops it when it notices
   parts_->drop_outdated(entry);
   parts_->notifier.note(robot, "connected", fmt::format("from {}", peer));
@@ -96,9 +95,8 @@ void Station::on_frame(RobotPort& port, std::uint64_t robot_time_us) {
   robot.last_received_steady_us = parts_->clock.steady_us();
   robot.latest_robot_time_us = std::max(robot.latest_robot_time_us, robot_time_us);
   parts_->tracker.expire(*entry);
-  std::vector<CommandRecord> stopped;
-  parts_->stops.repeat(*entry, stopped);
-  parts_->publish_all(stopped);
+  if (!robot.pending_stop) return;
+  parts_->publish_stops_of([&](std::vector<CommandRecord>& made) { parts_->stops.repeat(*entry, made); });
 }
 
 void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) {

@@ -1,6 +1,7 @@
 #include "server/station/station_parts.hpp"
 
 #include <fmt/format.h>
+#include <exception>
 
 #include <string_view>
 
@@ -24,8 +25,25 @@ void StationParts::publish(const Authority::Change& change, const std::string& a
   notifier.publish(robot);
 }
 
-void StationParts::publish_all(const std::vector<CommandRecord>& records) {
-  for (const CommandRecord& record : records) notifier.publish(record);
+void StationParts::publish_stops_of(const std::function<void(std::vector<CommandRecord>&)>& act,
+                                    const RobotState* robot) {
+  std::exception_ptr first_failure;
+  const auto keep_on = [&first_failure](auto&& step) {
+    try {
+      step();
+    } catch (...) {
+      if (!first_failure) first_failure = std::current_exception();
+    }
+  };
+  std::vector<CommandRecord> made;
+  keep_on([&] { act(made); });
+  for (const CommandRecord& record : made) {
+    keep_on([&] { notifier.publish(record); });
+  }
+  if (robot != nullptr && !made.empty()) {
+    keep_on([&] { notifier.publish(*robot); });
+  }
+  if (first_failure) std::rethrow_exception(first_failure);
 }
 
 void StationParts::publish_refusal(Author by, const RobotId& robot_id, const char* what, const std::string& detail,

@@ -31,7 +31,10 @@ struct StationParts {
 
   // A change of control has been decided: what it ends is dropped, and everybody is notified.
   void publish(const Authority::Change& change, const std::string& actor, const std::string& peer);
-  void publish_all(const std::vector<CommandRecord>& records);
+  // SAFETY: runs `act`, which hands stops to a link, and then publishes each record that it made and, if there is one,
+  // `robot`; also when `act` or a sink throws: a stop must be known after a restart. The first exception goes on then.
+  void publish_stops_of(const std::function<void(std::vector<CommandRecord>& made)>& act,
+                        const RobotState* robot = nullptr);
   // What was refused, for the audit; `detail` as a JSON object.
   void publish_refusal(Author by, const RobotId& robot_id, const char* what, const std::string& detail,
                        const Error& error);

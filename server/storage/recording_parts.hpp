@@ -31,7 +31,7 @@ struct RecordingParts {
                  WorkerThread& exports_worker, WorkerThread& checkpoints, const RecorderOptions& options,
                  const RecordingConfig& config = {});
 
-  // The station is heard from now on, and hears what has become durable and what is missing.
+  // The recording gets the station's reports from now on; the station gets what has become durable and what is missing.
   void connect(Station& station);
 
   // Opens or creates the database and reads what the station must know again; before robots arrive. Throws when the

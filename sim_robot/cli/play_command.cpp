@@ -20,7 +20,7 @@ void write_boot(std::ostream& out, const ScenarioRun& run, const Samples& sample
 }
 
 void write_csv(std::ostream& out, const ScenarioRun& run) {
-  const HeardRobot& station = run.station();
+  const ReceivedTelemetry& station = run.station();
   out << "t_s,position_m,velocity_m_s,acceleration_m_s2,duty,impedance_mv,reference_m,position_sd_m,mode,sub_state,"
          "boot,true_position_m\n";
   out.precision(9);

@@ -111,8 +111,8 @@ bool ReplayedRobot::on_welcome(const protocol::Welcome& welcome) {
   refusal_ = welcome.refusal;
   if (refusal_ != rheonaut_REFUSAL_REASON_NONE) return false;
   phase_ = Phase::up;
-  const auto or_default = [](std::uint32_t wish_ms, std::uint32_t preset_ms) {
-    return (wish_ms == 0 ? preset_ms : wish_ms) * 1000ULL;
+  const auto or_default = [](std::uint32_t requested_ms, std::uint32_t preset_ms) {
+    return (requested_ms == 0 ? preset_ms : requested_ms) * 1000ULL;
   };
   silence_us_ = or_default(welcome.link_timeout_ms, protocol::kDefaultLinkTimeoutMs);
   heartbeat_us_ = or_default(welcome.heartbeat_interval_ms, protocol::kDefaultHeartbeatIntervalMs);

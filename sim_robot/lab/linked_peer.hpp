@@ -5,12 +5,12 @@
 // heard plus the time since.
 #pragma once
 
-#include "sim_robot/lab/heard_robot.hpp"
 #include "sim_robot/lab/impaired_link.hpp"
+#include "sim_robot/lab/received_telemetry.hpp"
 
 namespace sim_robot {
 
-class LinkedPeer : public HeardRobot {
+class LinkedPeer : public ReceivedTelemetry {
  public:
   static constexpr std::uint64_t kHeartbeatUs = 200'000;
   static constexpr std::uint64_t kLinkTimeoutUs = 1'000'000;

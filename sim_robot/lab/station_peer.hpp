@@ -4,13 +4,13 @@
 // server/.
 #pragma once
 
-#include "sim_robot/lab/heard_robot.hpp"
+#include "sim_robot/lab/received_telemetry.hpp"
 #include "sim_robot/lab/station_commands.hpp"
 #include "sim_robot/robot/simulated_robot.hpp"
 
 namespace sim_robot {
 
-class StationPeer : public HeardRobot {
+class StationPeer : public ReceivedTelemetry {
  public:
   explicit StationPeer(SimulatedRobot& robot) : robot_(robot) {}
 

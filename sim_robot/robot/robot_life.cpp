@@ -65,7 +65,7 @@ void RobotLife::reboot(const Reboot& reboot) {
   next.restored_emergency_id = reboot.keeps_latch ? core().emergency_id() : 0;
   next.restored_emergency_cause = reboot.keeps_latch ? core().emergency_cause() : rheonaut_EMERGENCY_CAUSE_NONE;
   if (!reboot.keeps_storage) storage_.erase();
-  close_the_books();
+  archive_boot();
   robot_.reset(next);
   ++boots_;
   coasted_to_us_ = true_us_;
@@ -74,7 +74,7 @@ void RobotLife::reboot(const Reboot& reboot) {
   free_at_us_ = 0;
 }
 
-void RobotLife::close_the_books() {
+void RobotLife::archive_boot() {
   const robot_fw::TelemetryRing& ring = core().samples();
   lost_at_reboot_ = ring.fill();
   earlier_.samples_made += ring.next_seq();

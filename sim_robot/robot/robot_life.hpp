@@ -69,7 +69,7 @@ class RobotLife {
     std::map<robot_fw::StorageKey, std::vector<std::uint8_t>> values_;
   };
 
-  void close_the_books();
+  void archive_boot();
   SimulatedRobotConfig with_storage(SimulatedRobotConfig config);
   void keep_clock();
   double clock_us() const;

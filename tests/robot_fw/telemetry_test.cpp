@@ -48,7 +48,7 @@ TEST_F(Telemetry, BringsFiveSamplesInAFrame) {
   expect_no_hole();
 }
 
-TEST_F(Telemetry, BringsAsManySamplesInAFrameAsTheStationWishes) {
+TEST_F(Telemetry, BringsAsManySamplesInAFrameAsTheStationAsksFor) {
   for (const std::uint32_t wish : {1U, 2U, 7U, 24U, 25U, 26U, UINT32_MAX}) {
     station.disconnect();
     station.welcome.samples_per_frame = wish;

@@ -82,7 +82,7 @@ class SystemTest : public ::testing::Test, public sim_robot::StoryWords {
   Recorder* recorder = nullptr;  // of recording, as are the next two
   Runs* runs = nullptr;
   History* history = nullptr;
-  Entrance entrance{{clock, "robot port", DoorLimits{}}, nullptr};
+  PortAccess entrance{{clock, "robot port", ConnectionLimits{}}, nullptr};
   std::unique_ptr<RobotListener> listener;
   std::unique_ptr<VirtualRobot> robot;
 

@@ -48,7 +48,7 @@ struct ParsedCommand {
   protocol::Command action;
   std::string arguments;  // as JSON, without what every command may have
   microseconds life{2'000'000};
-  std::optional<std::int64_t> stamp_us;      // of /live: the station's steady time, as the page last heard it
+  std::optional<std::int64_t> stamp_us;      // of /live: the station's steady time, as the page received it last
   std::optional<std::int64_t> issued_at_us;  // UTC
   bool is_confirmed = false;                 // its sender says that motion may be bounded otherwise
 };
@@ -65,12 +65,12 @@ struct ParsedControl {
 // The body of POST …/control, e.g. {"action":"take","lease_ms":3000}.
 Result<ParsedControl> parse_control(const std::string& body);
 
-struct RunWish {
+struct RunRequest {
   RobotId robot_id;
   RunConditions conditions;
   std::optional<RecordedRange> range;  // of a run that is made afterwards
 };
-Result<RunWish> parse_run(const std::string& body);
+Result<RunRequest> parse_run(const std::string& body);
 Result<std::string> parse_run_end(const std::string& body);  // the verdict; an empty body has none
 Result<RunAnnotation> parse_annotation(const std::string& body);
 Result<std::string> parse_discard(const std::string& body);  // the reason

@@ -90,20 +90,20 @@ Result<ParsedControl> parse_control(const std::string& text) {
   return control;
 }
 
-Result<RunWish> parse_run(const std::string& text) {
+Result<RunRequest> parse_run(const std::string& text) {
   const auto body = Members::parse(text, {"robot_id", "name", "fluid", "pump_profile", "mean_flow_m_s", "tube",
                                           "operator_name", "profile", "notes", "span"});
   if (!body) return std::unexpected{body.error()};
-  RunWish wish;
+  RunRequest request;
   const auto robot_id = body->text("robot_id", 0, kMaxTextBytes);
   if (!robot_id) return std::unexpected{robot_id.error()};
   if (!is_robot_id(*robot_id)) {
     return fail(ErrorCode::invalid, "robot_id is not 1 to 31 characters of [a-z0-9_-]", "out_of_range");
   }
-  wish.robot_id = *robot_id;
+  request.robot_id = *robot_id;
   const auto name = body->text("name", 1, kMaxNameBytes);
   if (!name) return std::unexpected{name.error()};
-  RunConditions& conditions = wish.conditions;
+  RunConditions& conditions = request.conditions;
   conditions.name = *name;
   if (body->has("mean_flow_m_s")) {
     const auto flow = body->number("mean_flow_m_s");
@@ -117,11 +117,11 @@ Result<RunWish> parse_run(const std::string& text) {
   for (const auto& [member, into] : texts) {
     if (auto read = read_text(*body, member, *into); !read) return std::unexpected{read.error()};
   }
-  if (!body->has("span")) return wish;
+  if (!body->has("span")) return request;
   auto range = read_range(body->object().at("span"));
   if (!range) return std::unexpected{range.error()};
-  wish.range = *range;
-  return wish;
+  request.range = *range;
+  return request;
 }
 
 Result<std::string> parse_run_end(const std::string& text) {

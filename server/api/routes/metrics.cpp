@@ -53,17 +53,17 @@ class Metrics {
   std::string text_;
 };
 
-void add_door(Metrics& metrics, const std::string& port, const Door& door) {
-  metrics.gauge(port + "_connections", door.connections(), "Open now.");
-  metrics.counter(port + "_connections_refused_total", door.counters().refused, "No place was left for them.");
-  metrics.counter(port + "_connections_replaced_total", door.counters().replaced, "They gave way to others.");
+void add_port(Metrics& metrics, const std::string& port, const ConnectionLimiter& limiter) {
+  metrics.gauge(port + "_connections", limiter.connections(), "Open now.");
+  metrics.counter(port + "_connections_refused_total", limiter.counters().refused, "No place was left for them.");
+  metrics.counter(port + "_connections_replaced_total", limiter.counters().replaced, "They gave way to others.");
 }
 
 void add_security(Metrics& metrics, const TransportSecurity& security) {
-  add_door(metrics, "http", security.http().door);
-  add_door(metrics, "robot", security.robots().door);
+  add_port(metrics, "http", security.http().limiter);
+  add_port(metrics, "robot", security.robots().limiter);
   metrics.gauge("exposed", security.is_exposed() ? 1 : 0, "1 while a port speaks plain TCP beyond this machine.");
-  const TlsGate* gate = security.gate();
+  const TlsHandshakes* gate = security.gate();
   if (gate == nullptr) return;
   const auto not_after_s = std::max<std::int64_t>(gate->context().certificate.not_after_us / 1'000'000, 0);
   metrics.gauge("tls_certificate_not_after_s", static_cast<std::uint64_t>(not_after_s), "End of its life, UTC.");

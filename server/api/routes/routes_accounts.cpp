@@ -147,13 +147,13 @@ Answer add_token(AccountRoutes parts, Request request) {
   if (!words) co_return problem(words.error());
   const auto scopes = parse_scopes(*words);
   if (!scopes) co_return problem(scopes.error());
-  TokenWish wish{*name, *scopes, 0, request.caller.user};
+  TokenRequest token_request{*name, *scopes, 0, request.caller.user};
   if (body->has("days")) {
     const auto days = body->integer("days", 1, kMaxTokenDays);
     if (!days) co_return problem(days.error());
-    wish.days = *days;
+    token_request.days = *days;
   }
-  const auto made = co_await parts.accounts.add_token(std::move(wish), author_of(request, parts.clock));
+  const auto made = co_await parts.accounts.add_token(std::move(token_request), author_of(request, parts.clock));
   if (!made) co_return problem(made.error());
   json answer = to_json(made->token);
   answer["secret"] = made->secret;

@@ -56,7 +56,7 @@ Response command_response(const CommandRecord& record) {
                  with_command);
 }
 
-// The client's own name of a wish, in the header Idempotency-Key.
+// The client's own name of a request, in the header Idempotency-Key.
 Result<std::string> key_of(const Request& request) {
   std::string key = request.header("idempotency-key");
   if (key.empty() || is_command_key(key)) return key;
@@ -227,37 +227,37 @@ Answer submit_command(CommandRoutes parts, Request request) {
 // What a page must say to begin to control, and may not ask for: it keeps control by signs of life.
 Result<void> check_sight(const Request& request, ParsedControl& parsed, Clock& clock) {
   const Caller& caller = request.caller;
-  ControlRequest& wish = parsed.request;
-  if (wish.action != ControlAction::take && wish.action != ControlAction::force) return {};
-  wish.age = request.unread;
+  ControlRequest& control_request = parsed.request;
+  if (control_request.action != ControlAction::take && control_request.action != ControlAction::force) return {};
+  control_request.age = request.unread;
   if (auto said = check_stamp(caller, parsed.stamp_us); !said) return said;
-  if (caller.session != 0 && wish.life > kControlLife) {
+  if (caller.session != 0 && control_request.life > kControlLife) {
     return fail(ErrorCode::invalid, fmt::format("lease_ms of a page is at most {}", kControlLife.count() / 1000),
                 "out_of_range");
   }
   if (!parsed.stamp_us) return {};
   const auto age = age_of_stamp(*parsed.stamp_us, clock);
   if (!age) return std::unexpected{age.error()};
-  wish.age = std::max(wish.age, *age);
+  control_request.age = std::max(control_request.age, *age);
   return {};
 }
 
 Answer change_control(CommandRoutes parts, Request request) {
   auto parsed = parse_control(request.body);
   if (!parsed) co_return refused(parts, request, "control", parsed.error());
-  ControlRequest& wish = parsed->request;
-  wish.robot_id = request.param.at("robot_id");
-  wish.actor = request.actor;
-  wish.peer = request.peer;
+  ControlRequest& control_request = parsed->request;
+  control_request.robot_id = request.param.at("robot_id");
+  control_request.actor = request.actor;
+  control_request.peer = request.peer;
   // SAFETY: nobody but an admin takes control out of another's hands.
-  if (wish.action == ControlAction::force && !request.caller.scopes.allow(Scope::admin)) {
+  if (control_request.action == ControlAction::force && !request.caller.scopes.allow(Scope::admin)) {
     const Error error{ErrorCode::forbidden, "to take control by force needs the role admin", "not_permitted"};
     co_return refused(parts, request, "control", error);
   }
   if (auto seen = check_sight(request, *parsed, parts.clock); !seen) {
     co_return refused(parts, request, "control", seen.error());
   }
-  const auto control = parts.station.control(wish);
+  const auto control = parts.station.control(control_request);
   if (!control) co_return problem(control.error());
   co_return json_response(200, {{"control", control->holder.empty() ? json(nullptr) : to_json(*control)}});
 }

@@ -126,7 +126,7 @@ Answer export_sqlite(ExportRoutes parts, Request request) {
   if (!parsed) co_return problem(parsed.error());
   auto file = co_await begin_file(parts, *parsed, ".sqlite");
   if (!file) co_return problem(file.error());
-  co_await parts.history.settle();  // events and commands that were heard
+  co_await parts.history.settle();  // events and commands that were received
   const std::unique_ptr<RunFile, EndOnWorker> writer{
       new RunFile{(*file)->path(), reading_uri(parts.database, false), std::move(parsed->spans), parsed->query},
       end_on_worker(parts)};

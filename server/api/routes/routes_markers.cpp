@@ -43,9 +43,9 @@ Answer add_marker(MarkerRoutes parts, Request request) {
   if (!body) co_return problem(body.error());
   const RobotState* robot = parts.station.find(robot_id);
   if (robot == nullptr) co_return no_such_robot(robot_id);
-  MarkerWish wish{robot_id, std::move(body->text), request.actor, body->at_us,
-                  robot->link == LinkState::connected ? robot->boot_id : 0};
-  const auto marker = co_await parts.markers.add(std::move(wish));
+  MarkerRequest marker_request{robot_id, std::move(body->text), request.actor, body->at_us,
+                               robot->link == LinkState::connected ? robot->boot_id : 0};
+  const auto marker = co_await parts.markers.add(std::move(marker_request));
   if (!marker) co_return problem(marker.error());
   co_return json_response(201, to_json(*marker));
 }

@@ -53,22 +53,23 @@ Result<bool> may_name_fluid(const RunRoutes& parts, const Request& request, cons
 }
 
 Answer create_run(RunRoutes parts, Request request) {
-  auto wish = parse_run(request.body);
-  if (!wish) co_return problem(wish.error());
+  auto run_request = parse_run(request.body);
+  if (!run_request) co_return problem(run_request.error());
   const Result<void> room = parts.disk_watch.may_begin("a run");
   if (!room) co_return problem(room.error());
-  if (parts.station.find(wish->robot_id) == nullptr) {
-    co_return problem(404, fmt::format("no robot '{}' is known", wish->robot_id), "unknown_robot");
+  if (parts.station.find(run_request->robot_id) == nullptr) {
+    co_return problem(404, fmt::format("no robot '{}' is known", run_request->robot_id), "unknown_robot");
   }
-  if (!wish->range) {
-    const auto named = may_name_fluid(parts, request, wish->robot_id, wish->conditions.fluid);
+  if (!run_request->range) {
+    const auto named = may_name_fluid(parts, request, run_request->robot_id, run_request->conditions.fluid);
     if (!named) co_return problem(named.error());
-    if (!*named) wish->conditions.fluid.clear();  // the run takes the robot's
+    if (!*named) run_request->conditions.fluid.clear();  // the run takes the robot's
   }
   Runs& runs = parts.runs;
   const Author by = author_of(request, parts.clock);
-  auto made = wish->range ? runs.make_afterwards(wish->robot_id, wish->conditions, *wish->range, by)
-                          : runs.create(wish->robot_id, wish->conditions, by);
+  auto made = run_request->range
+                  ? runs.make_afterwards(run_request->robot_id, run_request->conditions, *run_request->range, by)
+                  : runs.create(run_request->robot_id, run_request->conditions, by);
   const auto run = co_await std::move(made);
   if (!run) co_return problem(run.error());
   parts.live.publish_run(to_json(*run));

@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "server/cli/accounts/account_door.hpp"
+#include "server/cli/accounts/account_access.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
 

@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <tuple>
 
-#include "server/cli/accounts/account_door.hpp"
+#include "server/cli/accounts/account_access.hpp"
 #include "server/cli/terminal/options.hpp"
 
 namespace server::cli {
@@ -15,10 +15,10 @@ namespace {
 
 using Act = RobotCommand::Act;
 
-CLI::App* offer(CLI::App& command, RobotCommand& wish, Act act, const char* name, const char* purpose) {
+CLI::App* offer(CLI::App& command, RobotCommand& options, Act act, const char* name, const char* purpose) {
   CLI::App* sub = command.add_subcommand(name, purpose);
-  sub->add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
-  sub->callback([&wish, act] { wish.act = act; });
+  sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->callback([&options, act] { options.act = act; });
   return sub;
 }
 
@@ -49,9 +49,9 @@ int list(const nlohmann::json& robots, bool as_json, std::ostream& out) {
   return 0;
 }
 
-int enroll(const RobotCommand& wish, std::ostream& out) {
-  const nlohmann::json made = AccountDoor{wish.data_dir, AccountDoor::Missing::make}.enrol(wish.robot_id);
-  if (wish.json) {
+int enroll(const RobotCommand& options, std::ostream& out) {
+  const nlohmann::json made = AccountAccess{options.data_dir, AccountAccess::Missing::make}.enrol(options.robot_id);
+  if (options.json) {
     fmt::print(out, "{}\n", made.dump(2));
     return 0;
   }
@@ -61,46 +61,49 @@ int enroll(const RobotCommand& wish, std::ostream& out) {
              "Firmware: the first two values of kSecrets in robot_fw/esp8266/secrets.hpp\n"
              "  \"{0}\",\n  \"{1}\",\n"
              "Simulated robot: rheonaut-sim --id {0} --token {1}\n",
-             wish.robot_id, token);
+             options.robot_id, token);
   return 0;
 }
 
 }  // namespace
 
-void add_options(CLI::App& command, RobotCommand& wish) {
+void add_options(CLI::App& command, RobotCommand& options) {
   command.require_subcommand(1);
-  auto* enroll = offer(command, wish, Act::enroll, "enroll", "Give a robot a token and print it: it is shown only now");
-  enroll->add_option("robot_id", wish.robot_id, "1 to 31 characters of [a-z0-9_-]")->required()->check(robot_id());
-  enroll->add_flag("--json", wish.json, "As JSON");
+  auto* enroll =
+      offer(command, options, Act::enroll, "enroll", "Give a robot a token and print it: it is shown only now");
+  enroll->add_option("robot_id", options.robot_id, "1 to 31 characters of [a-z0-9_-]")->required()->check(robot_id());
+  enroll->add_flag("--json", options.json, "As JSON");
   enroll->footer("Example: rheonaut robot enroll rheo-1 --data lab");
-  offer(command, wish, Act::list, "list", "List the robots that may or might connect")
-      ->add_flag("--json", wish.json, "As JSON");
+  offer(command, options, Act::list, "list", "List the robots that may or might connect")
+      ->add_flag("--json", options.json, "As JSON");
   constexpr std::tuple<Act, const char*, const char*> kOfOne[] = {
       {Act::revoke, "revoke", "Refuse a robot from now on, and end its connection"},
       {Act::retire, "retire", "Leave a robot out of the stop of all robots while it is not connected"},
       {Act::unretire, "unretire", "Put a retired robot back into use"}};
   for (const auto& [act, name, purpose] : kOfOne) {
-    offer(command, wish, act, name, purpose)
-        ->add_option("robot_id", wish.robot_id, "The robot")
+    offer(command, options, act, name, purpose)
+        ->add_option("robot_id", options.robot_id, "The robot")
         ->required()
         ->check(robot_id());
   }
-  add_options(command, wish.settings);
+  add_options(command, options.settings);
   command.footer("Example: rheonaut robot list --data lab");
 }
 
-int run(const RobotCommand& wish, std::ostream& out) {
-  if (wish.settings.of != RobotSettingsCommand::Of::nothing) return run(wish.settings, out);
-  if (wish.act == Act::enroll) return enroll(wish, out);
-  AccountDoor door{wish.data_dir, AccountDoor::Missing::refuse};
-  if (wish.act == Act::list) return list(door.enrolments(), wish.json, out);
-  if (wish.act == Act::revoke) {
-    door.revoke_robot(wish.robot_id);
+int run(const RobotCommand& options, std::ostream& out) {
+  if (options.settings.of != RobotSettingsCommand::Of::nothing) return run(options.settings, out);
+  if (options.act == Act::enroll) return enroll(options, out);
+  AccountAccess accounts{options.data_dir, AccountAccess::Missing::refuse};
+  if (options.act == Act::list) return list(accounts.enrolments(), options.json, out);
+  if (options.act == Act::revoke) {
+    accounts.revoke_robot(options.robot_id);
   } else {
-    door.set_retired(wish.robot_id, wish.act == Act::retire);
+    accounts.set_retired(options.robot_id, options.act == Act::retire);
   }
-  const char* done = wish.act == Act::revoke ? "revoked" : wish.act == Act::retire ? "retired" : "put back into use";
-  fmt::print(out, "Robot {} was {}\n", wish.robot_id, done);
+  const char* done = options.act == Act::revoke   ? "revoked"
+                     : options.act == Act::retire ? "retired"
+                                                  : "put back into use";
+  fmt::print(out, "Robot {} was {}\n", options.robot_id, done);
   return 0;
 }
 

@@ -24,10 +24,10 @@ struct RobotCommand {
   RobotSettingsCommand settings;  // if of is not nothing, this is what is wanted
 };
 
-void add_options(CLI::App& command, RobotCommand& wish);
+void add_options(CLI::App& command, RobotCommand& options);
 
 // `enroll` prints the robot's token and where it belongs; nobody can read it again. Throws std::runtime_error saying
 // why nothing was changed.
-int run(const RobotCommand& wish, std::ostream& out);
+int run(const RobotCommand& options, std::ostream& out);
 
 }  // namespace server::cli

@@ -25,8 +25,8 @@ constexpr std::size_t kPageParameters = 6;
 
 class Robot {
  public:
-  explicit Robot(const RobotSettingsCommand& wish)
-      : station_{wish.data_dir}, path_{"/api/v1/robots/" + wish.robot_id} {}
+  explicit Robot(const RobotSettingsCommand& options)
+      : station_{options.data_dir}, path_{"/api/v1/robots/" + options.robot_id} {}
 
   json get(const char* what) const { return checked(station_.ask("GET", path_ + what)); }
   json command(const json& body) const {
@@ -45,7 +45,7 @@ class Robot {
 };
 
 // What became of a change: the exit status.
-int tell(const json& record, const std::string& what, bool as_json, std::ostream& out) {
+int print_outcome(const json& record, const std::string& what, bool as_json, std::ostream& out) {
   const bool is_verified = record.at("state") == "verified";
   if (as_json) {
     fmt::print(out, "{}\n", record.dump(2));
@@ -85,29 +85,30 @@ int list_parameters(const Robot& robot, bool as_json, std::ostream& out) {
   return 0;
 }
 
-int set_parameter(const Robot& robot, const RobotSettingsCommand& wish, std::ostream& out) {
-  const auto sign = wish.set.find('=');
+int set_parameter(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
+  const auto sign = options.set.find('=');
   double value = 0;
-  const char* const end = wish.set.data() + wish.set.size();
+  const char* const end = options.set.data() + options.set.size();
   const auto read = sign == std::string::npos ? std::from_chars_result{end, std::errc::invalid_argument}
-                                              : std::from_chars(wish.set.data() + sign + 1, end, value);
+                                              : std::from_chars(options.set.data() + sign + 1, end, value);
   if (sign == 0 || read.ec != std::errc{} || read.ptr != end) {
-    throw std::runtime_error{fmt::format("--set '{}' is not NAME=VALUE, such as duty_slew_per_s=5", wish.set)};
+    throw std::runtime_error{fmt::format("--set '{}' is not NAME=VALUE, such as duty_slew_per_s=5", options.set)};
   }
-  json body{{"kind", "set_parameter"}, {"name", wish.set.substr(0, sign)}, {"value", value}};
-  if (wish.confirm) body["confirm"] = true;
-  return tell(robot.command(body), fmt::format("{} = {}", wish.set.substr(0, sign), value), wish.json, out);
+  json body{{"kind", "set_parameter"}, {"name", options.set.substr(0, sign)}, {"value", value}};
+  if (options.confirm) body["confirm"] = true;
+  return print_outcome(robot.command(body), fmt::format("{} = {}", options.set.substr(0, sign), value), options.json,
+                       out);
 }
 
 // The station keeps what each page says.
-int read_parameters(const Robot& robot, const RobotSettingsCommand& wish, std::ostream& out) {
+int read_parameters(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
   std::size_t count = 1;
   for (std::size_t first = 0; first < count; first += kPageParameters) {
     const json record = robot.command({{"kind", "get_parameters"}, {"first_index", first}});
-    if (record.at("state") != "verified") return tell(record, "reading parameters", wish.json, out);
+    if (record.at("state") != "verified") return print_outcome(record, "reading parameters", options.json, out);
     count = robot.get("/parameters").at("parameters").size();
   }
-  return list_parameters(robot, wish.json, out);
+  return list_parameters(robot, options.json, out);
 }
 
 int show_controller(const Robot& robot, bool as_json, std::ostream& out) {
@@ -152,62 +153,63 @@ json sections_in(const std::string& file, const Robot& robot) {
   return {{"period_s", made["period_s"]}, {"dc_gain", made["dc_gain"]}, {"sections", made["sections"]}};
 }
 
-int set_controller(const Robot& robot, const RobotSettingsCommand& wish, std::ostream& out) {
-  json body{{"kind", "set_controller"}, {"controller", sections_in(wish.set, robot)}};
-  if (wish.duty_min) body["duty_min"] = *wish.duty_min;
-  if (wish.duty_max) body["duty_max"] = *wish.duty_max;
-  if (!wish.derivative_on.empty()) body["derivative_on"] = wish.derivative_on;
-  if (wish.confirm) body["confirm"] = true;
+int set_controller(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
+  json body{{"kind", "set_controller"}, {"controller", sections_in(options.set, robot)}};
+  if (options.duty_min) body["duty_min"] = *options.duty_min;
+  if (options.duty_max) body["duty_max"] = *options.duty_max;
+  if (!options.derivative_on.empty()) body["derivative_on"] = options.derivative_on;
+  if (options.confirm) body["confirm"] = true;
   const json record = robot.command(body);
   const json& id = record.at("arguments").at("controller").at("controller_id");
-  return tell(record, fmt::format("controller {}", id.dump()), wish.json, out);
+  return print_outcome(record, fmt::format("controller {}", id.dump()), options.json, out);
 }
 
-int restore_controller(const Robot& robot, const RobotSettingsCommand& wish, std::ostream& out) {
+int restore_controller(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
   json body{{"kind", "restore_controller"}};
-  if (wish.confirm) body["confirm"] = true;
-  return tell(robot.command(body), "the controller before", wish.json, out);
+  if (options.confirm) body["confirm"] = true;
+  return print_outcome(robot.command(body), "the controller before", options.json, out);
 }
 
-CLI::App* offer(CLI::App& robot, RobotSettingsCommand& wish, Of of, const char* name, const char* purpose) {
+CLI::App* offer(CLI::App& robot, RobotSettingsCommand& options, Of of, const char* name, const char* purpose) {
   CLI::App* sub = robot.add_subcommand(name, purpose);
-  sub->add_option("robot_id", wish.robot_id, "The robot")->required();
-  sub->add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
-  sub->add_flag("--confirm", wish.confirm, "Of a change that bounds motion otherwise: it is meant");
-  sub->add_flag("--json", wish.json, "As JSON");
-  sub->callback([&wish, of] { wish.of = of; });
+  sub->add_option("robot_id", options.robot_id, "The robot")->required();
+  sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->add_flag("--confirm", options.confirm, "Of a change that bounds motion otherwise: it is meant");
+  sub->add_flag("--json", options.json, "As JSON");
+  sub->callback([&options, of] { options.of = of; });
   return sub;
 }
 
 }  // namespace
 
-void add_options(CLI::App& robot, RobotSettingsCommand& wish) {
-  CLI::App* parameters = offer(robot, wish, Of::parameters, "parameters", "List a robot's parameters, or set one");
+void add_options(CLI::App& robot, RobotSettingsCommand& options) {
+  CLI::App* parameters = offer(robot, options, Of::parameters, "parameters", "List a robot's parameters, or set one");
   CLI::Option* set =
-      parameters->add_option("--set", wish.set, "NAME=VALUE: set this one and wait until it is verified");
-  parameters->add_flag("--read", wish.read_anew, "Ask the robot for all of them again, then list them")->excludes(set);
+      parameters->add_option("--set", options.set, "NAME=VALUE: set this one and wait until it is verified");
+  parameters->add_flag("--read", options.read_anew, "Ask the robot for all of them again, then list them")
+      ->excludes(set);
   parameters->footer("Example: rheonaut robot parameters sim-1 --set duty_slew_per_s=5 --data lab");
-  CLI::App* controller = offer(robot, wish, Of::controller, "controller", "Show a robot's controller, or set one");
+  CLI::App* controller = offer(robot, options, Of::controller, "controller", "Show a robot's controller, or set one");
   CLI::Option* file = controller->add_option(
-      "--set", wish.set, "What discretise --json printed, or a controller as of tune, which is discretised first");
-  controller->add_flag("--restore", wish.restore, "Back to the controller before the last change")->excludes(file);
-  controller->add_option("--duty-min", wish.duty_min, "With --set (default: as the controller in force)")
+      "--set", options.set, "What discretise --json printed, or a controller as of tune, which is discretised first");
+  controller->add_flag("--restore", options.restore, "Back to the controller before the last change")->excludes(file);
+  controller->add_option("--duty-min", options.duty_min, "With --set (default: as the controller in force)")
       ->check(from_to(-1, 0));
-  controller->add_option("--duty-max", wish.duty_max, "With --set (default: as the controller in force)")
+  controller->add_option("--duty-max", options.duty_max, "With --set (default: as the controller in force)")
       ->check(from_to(0, 1));
-  controller->add_option("--derivative-on", wish.derivative_on, "error or measurement (default: as in force)")
+  controller->add_option("--derivative-on", options.derivative_on, "error or measurement (default: as in force)")
       ->check(CLI::IsMember({"error", "measurement"}));
   controller->footer("Example: rheonaut robot controller sim-1 --set c.json --data lab");
 }
 
-int run(const RobotSettingsCommand& wish, std::ostream& out) {
-  const Robot robot{wish};
-  if (wish.of == Of::parameters) {
-    if (!wish.set.empty()) return set_parameter(robot, wish, out);
-    return wish.read_anew ? read_parameters(robot, wish, out) : list_parameters(robot, wish.json, out);
+int run(const RobotSettingsCommand& options, std::ostream& out) {
+  const Robot robot{options};
+  if (options.of == Of::parameters) {
+    if (!options.set.empty()) return set_parameter(robot, options, out);
+    return options.read_anew ? read_parameters(robot, options, out) : list_parameters(robot, options.json, out);
   }
-  if (wish.restore) return restore_controller(robot, wish, out);
-  return wish.set.empty() ? show_controller(robot, wish.json, out) : set_controller(robot, wish, out);
+  if (options.restore) return restore_controller(robot, options, out);
+  return options.set.empty() ? show_controller(robot, options.json, out) : set_controller(robot, options, out);
 }
 
 }  // namespace server::cli

@@ -29,11 +29,11 @@ struct RobotSettingsCommand {
 };
 
 // Adds both as subcommands.
-void add_options(CLI::App& robot, RobotSettingsCommand& wish);
+void add_options(CLI::App& robot, RobotSettingsCommand& options);
 
 // 0, or kNotVerified when the robot accepted a change and has not said it back. Throws std::runtime_error saying why
 // nothing was changed, or that the robot says something else than it was sent.
 inline constexpr int kNotVerified = 5;
-int run(const RobotSettingsCommand& wish, std::ostream& out);
+int run(const RobotSettingsCommand& options, std::ostream& out);
 
 }  // namespace server::cli

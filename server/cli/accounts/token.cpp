@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "server/cli/accounts/account_door.hpp"
+#include "server/cli/accounts/account_access.hpp"
 #include "server/cli/terminal/options.hpp"
 
 namespace server::cli {
@@ -14,10 +14,10 @@ namespace {
 
 using Act = TokenCommand::Act;
 
-CLI::App* offer(CLI::App& command, TokenCommand& wish, Act act, const char* name, const char* purpose) {
+CLI::App* offer(CLI::App& command, TokenCommand& options, Act act, const char* name, const char* purpose) {
   CLI::App* sub = command.add_subcommand(name, purpose);
-  sub->add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
-  sub->callback([&wish, act] { wish.act = act; });
+  sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->callback([&options, act] { options.act = act; });
   return sub;
 }
 
@@ -38,12 +38,12 @@ int list(const nlohmann::json& tokens, bool as_json, std::ostream& out) {
   return 0;
 }
 
-int create(const TokenCommand& wish, std::ostream& out) {
-  const auto scopes = parse_scopes(wish.scopes);
+int create(const TokenCommand& options, std::ostream& out) {
+  const auto scopes = parse_scopes(options.scopes);
   if (!scopes) throw std::runtime_error{scopes.error().detail};
   const nlohmann::json made =
-      AccountDoor{wish.data_dir, AccountDoor::Missing::make}.add_token(wish.name, *scopes, wish.days);
-  if (wish.json) {
+      AccountAccess{options.data_dir, AccountAccess::Missing::make}.add_token(options.name, *scopes, options.days);
+  if (options.json) {
     fmt::print(out, "{}\n", made.dump(2));
   } else {
     fmt::print(out, "{}\n", made.at("secret").get<std::string>());
@@ -53,31 +53,31 @@ int create(const TokenCommand& wish, std::ostream& out) {
 
 }  // namespace
 
-void add_options(CLI::App& command, TokenCommand& wish) {
+void add_options(CLI::App& command, TokenCommand& options) {
   command.require_subcommand(1);
-  auto* create = offer(command, wish, Act::create, "create", "Make a token and print it: it is shown only now");
-  create->add_option("name", wish.name, "What it is called: 1 to 31 characters of [a-z0-9._-]")
+  auto* create = offer(command, options, Act::create, "create", "Make a token and print it: it is shown only now");
+  create->add_option("name", options.name, "What it is called: 1 to 31 characters of [a-z0-9._-]")
       ->required()
       ->check(named());
-  create->add_option("--scopes", wish.scopes, "Of read, stop, record, command, admin (default: read,stop)")
+  create->add_option("--scopes", options.scopes, "Of read, stop, record, command, admin (default: read,stop)")
       ->check(named());
-  create->add_option("--days", wish.days, "After so many it runs out (default: it does not)")->check(whole(1, 3650));
-  create->add_flag("--json", wish.json, "As JSON");
+  create->add_option("--days", options.days, "After so many it runs out (default: it does not)")->check(whole(1, 3650));
+  create->add_flag("--json", options.json, "As JSON");
   create->footer("Example: rheonaut token create logger --scopes read,record --days 30 --data lab");
-  offer(command, wish, Act::list, "list", "List the tokens")->add_flag("--json", wish.json, "As JSON");
-  offer(command, wish, Act::revoke, "revoke", "End a token at once")
-      ->add_option("name", wish.name, "What it is called")
+  offer(command, options, Act::list, "list", "List the tokens")->add_flag("--json", options.json, "As JSON");
+  offer(command, options, Act::revoke, "revoke", "End a token at once")
+      ->add_option("name", options.name, "What it is called")
       ->required()
       ->check(named());
   command.footer("Example: rheonaut token list --data lab");
 }
 
-int run(const TokenCommand& wish, std::ostream& out) {
-  if (wish.act == Act::create) return create(wish, out);
-  AccountDoor door{wish.data_dir, AccountDoor::Missing::refuse};
-  if (wish.act == Act::list) return list(door.tokens(), wish.json, out);
-  door.revoke_token(wish.name);
-  fmt::print(out, "Token {} was revoked\n", wish.name);
+int run(const TokenCommand& options, std::ostream& out) {
+  if (options.act == Act::create) return create(options, out);
+  AccountAccess accounts{options.data_dir, AccountAccess::Missing::refuse};
+  if (options.act == Act::list) return list(accounts.tokens(), options.json, out);
+  accounts.revoke_token(options.name);
+  fmt::print(out, "Token {} was revoked\n", options.name);
   return 0;
 }
 

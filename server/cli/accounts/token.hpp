@@ -22,9 +22,9 @@ struct TokenCommand {
   bool json = false;
 };
 
-void add_options(CLI::App& command, TokenCommand& wish);
+void add_options(CLI::App& command, TokenCommand& options);
 
 // `create` prints the token; nobody can read it again. Throws std::runtime_error saying why nothing was changed.
-int run(const TokenCommand& wish, std::ostream& out);
+int run(const TokenCommand& options, std::ostream& out);
 
 }  // namespace server::cli

@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "server/cli/accounts/account_door.hpp"
+#include "server/cli/accounts/account_access.hpp"
 #include "server/cli/terminal/options.hpp"
 
 namespace server::cli {
@@ -14,20 +14,20 @@ namespace {
 
 using Act = UserCommand::Act;
 
-CLI::App* offer(CLI::App& command, UserCommand& wish, Act act, const char* name, const char* purpose) {
+CLI::App* offer(CLI::App& command, UserCommand& options, Act act, const char* name, const char* purpose) {
   CLI::App* sub = command.add_subcommand(name, purpose);
-  sub->add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
-  sub->callback([&wish, act] { wish.act = act; });
+  sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->callback([&options, act] { options.act = act; });
   return sub;
 }
 
-void add_name(CLI::App* command, UserCommand& wish) {
-  command->add_option("name", wish.name, "The user: 1 to 31 characters of [a-z0-9._-]")->required()->check(named());
+void add_name(CLI::App* command, UserCommand& options) {
+  command->add_option("name", options.name, "The user: 1 to 31 characters of [a-z0-9._-]")->required()->check(named());
 }
 
-int list(AccountDoor& door, const UserCommand& wish, std::ostream& out) {
-  const nlohmann::json users = door.users();
-  if (wish.json) {
+int list(AccountAccess& accounts, const UserCommand& options, std::ostream& out) {
+  const nlohmann::json users = accounts.users();
+  if (options.json) {
     fmt::print(out, "{}\n", users.dump(2));
     return 0;
   }
@@ -42,41 +42,43 @@ int list(AccountDoor& door, const UserCommand& wish, std::ostream& out) {
 
 }  // namespace
 
-void add_options(CLI::App& command, UserCommand& wish) {
+void add_options(CLI::App& command, UserCommand& options) {
   command.require_subcommand(1);
-  auto* add = offer(command, wish, Act::add, "add", "Add a user; the password is asked for");
-  add_name(add, wish);
-  add_word(*add, "--role", wish.role, kRoles, "viewer (sees, stops), operator (commands) or admin")->required();
+  auto* add = offer(command, options, Act::add, "add", "Add a user; the password is asked for");
+  add_name(add, options);
+  add_word(*add, "--role", options.role, kRoles, "viewer (sees, stops), operator (commands) or admin")->required();
   add->footer("Example: rheonaut user add anna --role operator --data lab");
-  offer(command, wish, Act::list, "list", "List the users")->add_flag("--json", wish.json, "As JSON");
-  add_name(offer(command, wish, Act::remove, "remove", "Remove a user, with sessions and tokens"), wish);
-  add_name(offer(command, wish, Act::password, "password", "Give a user a new password; ends their sessions"), wish);
-  auto* role = offer(command, wish, Act::role, "role", "Give a user another role");
-  add_name(role, wish);
-  add_word(*role, "role", wish.role, kRoles, "viewer, operator or admin")->required();
-  add_name(offer(command, wish, Act::disable, "disable", "Keep a user out until enabled again"), wish);
-  add_name(offer(command, wish, Act::enable, "enable", "Let a disabled user in again"), wish);
+  offer(command, options, Act::list, "list", "List the users")->add_flag("--json", options.json, "As JSON");
+  add_name(offer(command, options, Act::remove, "remove", "Remove a user, with sessions and tokens"), options);
+  add_name(offer(command, options, Act::password, "password", "Give a user a new password; ends their sessions"),
+           options);
+  auto* role = offer(command, options, Act::role, "role", "Give a user another role");
+  add_name(role, options);
+  add_word(*role, "role", options.role, kRoles, "viewer, operator or admin")->required();
+  add_name(offer(command, options, Act::disable, "disable", "Keep a user out until enabled again"), options);
+  add_name(offer(command, options, Act::enable, "enable", "Let a disabled user in again"), options);
   command.footer("Example: rheonaut user list --data lab");
 }
 
-int run(const UserCommand& wish, std::ostream& out) {
-  const bool wants_password = wish.act == Act::add || wish.act == Act::password;
-  if (wish.act == Act::add) {
-    if (const auto named = check_name(wish.name); !named) throw std::runtime_error{named.error().detail};
+int run(const UserCommand& options, std::ostream& out) {
+  const bool wants_password = options.act == Act::add || options.act == Act::password;
+  if (options.act == Act::add) {
+    if (const auto named = check_name(options.name); !named) throw std::runtime_error{named.error().detail};
   }
-  const std::string password = wants_password ? read_password(wish.name) : "";
-  AccountDoor door{wish.data_dir, wish.act == Act::add ? AccountDoor::Missing::make : AccountDoor::Missing::refuse};
+  const std::string password = wants_password ? read_password(options.name) : "";
+  AccountAccess accounts{options.data_dir,
+                         options.act == Act::add ? AccountAccess::Missing::make : AccountAccess::Missing::refuse};
   const char* done = "";
-  switch (wish.act) {
-    case Act::list: return list(door, wish, out);
-    case Act::add: door.add_user(wish.name, wish.role, password), done = "was added"; break;
-    case Act::remove: door.remove_user(wish.name), done = "was removed"; break;
-    case Act::password: door.set_password(wish.name, password), done = "has a new password"; break;
-    case Act::role: door.set_role(wish.name, wish.role), done = "has a new role"; break;
-    case Act::disable: door.set_disabled(wish.name, true), done = "is kept out"; break;
-    case Act::enable: door.set_disabled(wish.name, false), done = "may sign in"; break;
+  switch (options.act) {
+    case Act::list: return list(accounts, options, out);
+    case Act::add: accounts.add_user(options.name, options.role, password), done = "was added"; break;
+    case Act::remove: accounts.remove_user(options.name), done = "was removed"; break;
+    case Act::password: accounts.set_password(options.name, password), done = "has a new password"; break;
+    case Act::role: accounts.set_role(options.name, options.role), done = "has a new role"; break;
+    case Act::disable: accounts.set_disabled(options.name, true), done = "is kept out"; break;
+    case Act::enable: accounts.set_disabled(options.name, false), done = "may sign in"; break;
   }
-  fmt::print(out, "User {} {}\n", wish.name, done);
+  fmt::print(out, "User {} {}\n", options.name, done);
   return 0;
 }
 

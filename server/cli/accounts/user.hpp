@@ -23,10 +23,10 @@ struct UserCommand {
   bool json = false;
 };
 
-void add_options(CLI::App& command, UserCommand& wish);
+void add_options(CLI::App& command, UserCommand& options);
 
 // A password is read from the terminal or standard input, never from an argument. Throws std::runtime_error saying why
 // nothing was changed.
-int run(const UserCommand& wish, std::ostream& out);
+int run(const UserCommand& options, std::ostream& out);
 
 }  // namespace server::cli

@@ -28,15 +28,15 @@ namespace {
 constexpr microseconds kLook = 200ms;
 constexpr int kAccepted = 202;
 
-void check(const Backup& wish) {
-  const fs::path database = wish.data_dir / "station.sqlite";
+void check(const Backup& options) {
+  const fs::path database = options.data_dir / "station.sqlite";
   if (!fs::exists(database)) throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
-  if (fs::exists(wish.to)) throw std::runtime_error{fmt::format("'{}' is there already", wish.to.string())};
-  const fs::path folder = fs::absolute(wish.to).parent_path();
+  if (fs::exists(options.to)) throw std::runtime_error{fmt::format("'{}' is there already", options.to.string())};
+  const fs::path folder = fs::absolute(options.to).parent_path();
   if (!fs::is_directory(folder)) throw std::runtime_error{fmt::format("there is no folder '{}'", folder.string())};
 }
 
-// The record of that name, as the station tells it now.
+// The record of that name, as the station reports it now.
 nlohmann::json look(const StationClient& station, const std::string& name) {
   const StationAnswer answer = station.ask("GET", "/api/v1/backups");
   for (const auto& backup : answer.body.value("backups", nlohmann::json::array())) {
@@ -67,21 +67,23 @@ fs::path let_station_copy(const StationClient& station) {
 
 }  // namespace
 
-void add_options(CLI::App& command, Backup& wish) {
-  command.add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
-  command.add_option("--to", wish.to, "The file to make; there is none of that name yet")->check(named())->required();
+void add_options(CLI::App& command, Backup& options) {
+  command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  command.add_option("--to", options.to, "The file to make; there is none of that name yet")
+      ->check(named())
+      ->required();
   command.footer("Example: rheonaut backup --data ~/lab --to /mnt/other-disk/lab-monday.sqlite");
 }
 
-int run(const Backup& wish, std::ostream& out) {
-  check(wish);
+int run(const Backup& options, std::ostream& out) {
+  check(options);
   umask(077);
-  if (const std::optional<FolderLock> lock = FolderLock::try_take(wish.data_dir)) {
-    back_up_closed(wish.data_dir / "station.sqlite", wish.to);
+  if (const std::optional<FolderLock> lock = FolderLock::try_take(options.data_dir)) {
+    back_up_closed(options.data_dir / "station.sqlite", options.to);
   } else {
-    move_finished(let_station_copy(StationClient{wish.data_dir}), wish.to);
+    move_finished(let_station_copy(StationClient{options.data_dir}), options.to);
   }
-  fmt::print(out, "{}: {} bytes, verified\n", wish.to.string(), fs::file_size(wish.to));
+  fmt::print(out, "{}: {} bytes, verified\n", options.to.string(), fs::file_size(options.to));
   return 0;
 }
 

@@ -15,9 +15,9 @@ struct Backup {
   std::filesystem::path to;
 };
 
-void add_options(CLI::App& command, Backup& wish);
+void add_options(CLI::App& command, Backup& options);
 
 // Never replaces a file. Throws std::runtime_error saying why there is no backup.
-int run(const Backup& wish, std::ostream& out);
+int run(const Backup& options, std::ostream& out);
 
 }  // namespace server::cli

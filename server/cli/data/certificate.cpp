@@ -53,8 +53,8 @@ bool is_name(const std::string& name) {
 }
 
 // Those that were asked for, or else those of the certificate that is renewed; always those of this machine.
-std::vector<std::string> names_of(const Certificate& wish, const Files& files) {
-  std::vector<std::string> names = wish.names;
+std::vector<std::string> names_of(const Certificate& options, const Files& files) {
+  std::vector<std::string> names = options.names;
   if (names.empty() && fs::exists(files.certificate)) names = describe(*load_certificate(files.certificate)).names;
   for (const std::string& own : {host_name(), std::string{"localhost"}, std::string{"127.0.0.1"}, std::string{"::1"}}) {
     if (is_name(own)) add(names, own);
@@ -71,16 +71,16 @@ void make_authority_unless_there(const Files& files, std::ostream& out) {
   fmt::print(out, "made     {}, the authority of this lab\n", files.authority.string());
 }
 
-void check(const Certificate& wish, const Files& files) {
-  for (const std::string& name : wish.names) {
+void check(const Certificate& options, const Files& files) {
+  for (const std::string& name : options.names) {
     if (!is_name(name)) throw std::runtime_error{fmt::format("'{}' is neither a host name nor an address", name)};
   }
-  if (fs::exists(files.certificate) && !wish.renew) {
+  if (fs::exists(files.certificate) && !options.renew) {
     throw std::runtime_error{
         fmt::format("'{}' is there already; --renew makes a new one with the same key, so that pins stay valid",
                     files.certificate.string())};
   }
-  if (wish.new_key && !wish.renew) throw std::runtime_error{"--new-key goes with --renew"};
+  if (options.new_key && !options.renew) throw std::runtime_error{"--new-key goes with --renew"};
 }
 
 void print_what_to_do(const Files& files, const TlsCertificate& made, std::ostream& out) {
@@ -99,30 +99,30 @@ void print_what_to_do(const Files& files, const TlsCertificate& made, std::ostre
 
 }  // namespace
 
-void add_options(CLI::App& command, Certificate& wish) {
-  command.add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+void add_options(CLI::App& command, Certificate& options) {
+  command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
   command
-      .add_option("--name", wish.names,
+      .add_option("--name", options.names,
                   "Host names and IP addresses by which it is reached, beside this machine's name and loopback")
       ->check(named());
-  command.add_flag("--renew", wish.renew, "Make a new one though there is one, with the same key and names");
-  command.add_flag("--new-key", wish.new_key, "... with another key: everyone who pinned the old one must be told");
-  command.add_option("--days", wish.days, "How long it is good for (default: 825)")->check(whole(1, kMaxDays));
+  command.add_flag("--renew", options.renew, "Make a new one though there is one, with the same key and names");
+  command.add_flag("--new-key", options.new_key, "... with another key: everyone who pinned the old one must be told");
+  command.add_option("--days", options.days, "How long it is good for (default: 825)")->check(whole(1, kMaxDays));
   command.footer("Example: rheonaut certificate --data ~/lab --name lab-pc.local --name 192.168.1.20");
 }
 
-int run(const Certificate& wish, std::ostream& out) {
-  const Files files{wish.data_dir};
-  check(wish, files);
-  make_data_folder(wish.data_dir);
+int run(const Certificate& options, std::ostream& out) {
+  const Files files{options.data_dir};
+  check(options, files);
+  make_data_folder(options.data_dir);
   make_data_folder(files.folder);
-  const std::vector<std::string> names = names_of(wish, files);
+  const std::vector<std::string> names = names_of(options, files);
   make_authority_unless_there(files, out);
-  const bool keeps_key = fs::exists(files.key) && !wish.new_key;
+  const bool keeps_key = fs::exists(files.key) && !options.new_key;
   const Openssl<EVP_PKEY> key = keeps_key ? load_key(files.key) : make_key();
   const Openssl<X509> authority = load_certificate(files.authority);
   const Openssl<EVP_PKEY> authority_key = load_key(files.authority_key);
-  const Openssl<X509> made = make_certificate(*key, names, wish.days, *authority, *authority_key);
+  const Openssl<X509> made = make_certificate(*key, names, options.days, *authority, *authority_key);
   if (!keeps_key) write_private(files.key, key_pem(*key));
   write_private(files.certificate, certificate_pem(*made));
   print_what_to_do(files, describe(*made), out);

@@ -23,10 +23,10 @@ struct Certificate {
   int days = 825;  // of the station's certificate; more is refused by some browsers
 };
 
-void add_options(CLI::App& command, Certificate& wish);
+void add_options(CLI::App& command, Certificate& options);
 
 // Never replaces a certificate without `renew`, nor its key without `new_key`; a running station takes the new one by
 // itself. Throws std::runtime_error.
-int run(const Certificate& wish, std::ostream& out);
+int run(const Certificate& options, std::ostream& out);
 
 }  // namespace server::cli

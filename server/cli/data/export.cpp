@@ -70,17 +70,17 @@ Result<void> write_sqlite(SQLite::Database& database, const std::string& uri, co
   return {};
 }
 
-Result<void> write(SQLite::Database& database, const std::string& uri, const Export& wish, const ExportQuery& query,
+Result<void> write(SQLite::Database& database, const std::string& uri, const Export& options, const ExportQuery& query,
                    const std::filesystem::path& path) {
   if (database.execAndGet("PRAGMA user_version").getInt64() < 2) {
     return fail(ErrorCode::invalid, "the database is of an earlier version; let a station open it once");
   }
   if (!run_exists(database, query.run)) {
-    return fail(ErrorCode::not_found, fmt::format("there is no run {} in {}", query.run, wish.data_dir.string()));
+    return fail(ErrorCode::not_found, fmt::format("there is no run {} in {}", query.run, options.data_dir.string()));
   }
   std::vector<RecordedSpan> spans = read_spans(database, query.run, 0);
   for (RecordedSpan& span : spans) span.cut(span.made());
-  switch (wish.format) {
+  switch (options.format) {
     case ExportFormat::csv: return write_csv(database, CsvWriter{std::move(spans), query}, path);
     case ExportFormat::mat: return write_mat(database, path, std::move(spans), query);
     case ExportFormat::sqlite: return write_sqlite(database, uri, path, std::move(spans), query);
@@ -99,37 +99,40 @@ const char* text(ExportFormat value) {
   return "";
 }
 
-void add_options(CLI::App& command, Export& wish) {
-  command.add_option("--run", wish.run, "A recorded run by its number")->required()->check(whole(1, kLargestRun));
-  add_word(command, "--format", wish.format, std::array{ExportFormat::csv, ExportFormat::mat, ExportFormat::sqlite},
+void add_options(CLI::App& command, Export& options) {
+  command.add_option("--run", options.run, "A recorded run by its number")->required()->check(whole(1, kLargestRun));
+  add_word(command, "--format", options.format, std::array{ExportFormat::csv, ExportFormat::mat, ExportFormat::sqlite},
            "csv, mat (MATLAB and Octave) or sqlite")
       ->required();
-  command.add_option("--to", wish.to, "The file; one that is there is replaced")->required()->check(named());
-  command.add_option("--grid-us", wish.grid_us, "csv, mat: rows at equal steps of time, the nearest sample or none")
+  command.add_option("--to", options.to, "The file; one that is there is replaced")->required()->check(named());
+  command.add_option("--grid-us", options.grid_us, "csv, mat: rows at equal steps of time, the nearest sample or none")
       ->check(whole(kMinGridUs, kMaxGridUs));
-  command.add_option("--channels", wish.channels, "Names with commas between them, e.g. position_m,duty; default all")
+  command
+      .add_option("--channels", options.channels, "Names with commas between them, e.g. position_m,duty; default all")
       ->check(named());
-  command.add_option("--data", wish.data_dir, "Folder of the station that recorded it (default: rheonaut-data)")
+  command.add_option("--data", options.data_dir, "Folder of the station that recorded it (default: rheonaut-data)")
       ->check(named());
   command.footer("Example: rheonaut export --run 1 --format mat --to run-1.mat --data ~/lab");
 }
 
-int run(const Export& wish, std::ostream& out) {
-  ExportQuery query{.run = wish.run, .channels = all_channels(), .grid_us = wish.grid_us};
-  if (wish.grid_us && wish.format == ExportFormat::sqlite) throw std::runtime_error{"--grid-us is for csv and mat"};
-  if (!wish.channels.empty()) {
-    const auto channels = parse_channels(wish.channels);
+int run(const Export& options, std::ostream& out) {
+  ExportQuery query{.run = options.run, .channels = all_channels(), .grid_us = options.grid_us};
+  if (options.grid_us && options.format == ExportFormat::sqlite)
+    throw std::runtime_error{"--grid-us is for csv and mat"};
+  if (!options.channels.empty()) {
+    const auto channels = parse_channels(options.channels);
     if (!channels) throw std::runtime_error{"--" + channels.error().detail};
     query.channels = *channels;
   }
-  PartFile part{wish.to};
+  PartFile part{options.to};
   const auto read = [&](SQLite::Database& database, const std::string& uri) {
-    return write(database, uri, wish, query, part.path());
+    return write(database, uri, options, query, part.path());
   };
-  const auto done = read_store(wish.data_dir / "station.sqlite", read);
+  const auto done = read_store(options.data_dir / "station.sqlite", read);
   if (!done) throw std::runtime_error{done.error().detail};
   part.keep();
-  out << fmt::format("run {}: {} ({} bytes)\n", wish.run, wish.to.string(), std::filesystem::file_size(wish.to));
+  out << fmt::format("run {}: {} ({} bytes)\n", options.run, options.to.string(),
+                     std::filesystem::file_size(options.to));
   return 0;
 }
 

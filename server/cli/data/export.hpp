@@ -25,9 +25,9 @@ struct Export {
   std::string channels;  // empty: all
 };
 
-void add_options(CLI::App& command, Export& wish);
+void add_options(CLI::App& command, Export& options);
 
 // Throws std::runtime_error saying what is wrong; the file is there as a whole or not at all.
-int run(const Export& wish, std::ostream& out);
+int run(const Export& options, std::ostream& out);
 
 }  // namespace server::cli

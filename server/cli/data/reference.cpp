@@ -37,27 +37,28 @@ T value_of(Result<T> result) {
   if constexpr (!std::is_void_v<T>) return std::move(*result);
 }
 
-CLI::App* offer(CLI::App& command, ReferenceCommand& wish, Act act, const char* name, const char* purpose) {
+CLI::App* offer(CLI::App& command, ReferenceCommand& options, Act act, const char* name, const char* purpose) {
   CLI::App* sub = command.add_subcommand(name, purpose);
-  sub->add_option("--run", wish.run, "A recorded run by its number")
+  sub->add_option("--run", options.run, "A recorded run by its number")
       ->required()
       ->check(whole(1, std::numeric_limits<RunId>::max()));
-  sub->add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
-  sub->callback([&wish, act] { wish.act = act; });
+  sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->callback([&options, act] { options.act = act; });
   return sub;
 }
 
-void add_clock_options(CLI::App& sub, ReferenceCommand& wish) {
-  auto* offset = sub.add_option("--offset-s", wish.offset_s,
+void add_clock_options(CLI::App& sub, ReferenceCommand& options) {
+  auto* offset = sub.add_option("--offset-s", options.offset_s,
                                 "Clock: t_s plus this is the time since the first sample of the run's span");
-  auto* utc = sub.add_option("--utc-s", wish.utc_s, "Clock: UTC (Unix time) of t_s = 0; 0 where t_s is Unix time");
-  auto* marker = sub.add_option("--marker", wish.marker, "Clock: a marker of the run, by number or text, and --at-s");
-  auto* at = sub.add_option("--at-s", wish.at_s, "The t_s of that marker")->needs(marker);
+  auto* utc = sub.add_option("--utc-s", options.utc_s, "Clock: UTC (Unix time) of t_s = 0; 0 where t_s is Unix time");
+  auto* marker =
+      sub.add_option("--marker", options.marker, "Clock: a marker of the run, by number or text, and --at-s");
+  auto* at = sub.add_option("--at-s", options.at_s, "The t_s of that marker")->needs(marker);
   marker->needs(at)->check(named());
-  auto* sd = sub.add_option("--clock-sd-s", wish.clock_sd_s, "How exact that clock is (one sigma)");
+  auto* sd = sub.add_option("--clock-sd-s", options.clock_sd_s, "How exact that clock is (one sigma)");
   sd->check(non_negative());
-  auto* from = sub.add_option("--search-from-s", wish.search_from_s, "By correlation: the least offset to look at");
-  auto* to = sub.add_option("--search-to-s", wish.search_to_s, "By correlation: the largest offset to look at");
+  auto* from = sub.add_option("--search-from-s", options.search_from_s, "By correlation: the least offset to look at");
+  auto* to = sub.add_option("--search-to-s", options.search_to_s, "By correlation: the largest offset to look at");
   offset->check(finite())->excludes(utc)->excludes(marker);
   utc->check(non_negative())->excludes(marker);
   for (auto* search : {from, to}) {
@@ -76,41 +77,41 @@ std::string text_of_file(const std::string& file) {
   return text;
 }
 
-ReferenceClockRequest clock_of(const ReferenceCommand& wish) {
+ReferenceClockRequest clock_of(const ReferenceCommand& options) {
   ReferenceClockRequest clock;
-  clock.sd_s = wish.clock_sd_s;
-  if (wish.offset_s) {
+  clock.sd_s = options.clock_sd_s;
+  if (options.offset_s) {
     clock.method = ReferenceClock::offset;
-    clock.offset_s = *wish.offset_s;
-  } else if (wish.utc_s) {
+    clock.offset_s = *options.offset_s;
+  } else if (options.utc_s) {
     clock.method = ReferenceClock::utc;
-    clock.zero_at_us = std::llround(*wish.utc_s * 1e6);
-  } else if (!wish.marker.empty()) {
+    clock.zero_at_us = std::llround(*options.utc_s * 1e6);
+  } else if (!options.marker.empty()) {
     clock.method = ReferenceClock::marker;
-    clock.at_s = wish.at_s.value_or(0);
+    clock.at_s = options.at_s.value_or(0);
     std::int64_t id = 0;
-    const char* end = wish.marker.data() + wish.marker.size();
-    const auto read = std::from_chars(wish.marker.data(), end, id);
+    const char* end = options.marker.data() + options.marker.size();
+    const auto read = std::from_chars(options.marker.data(), end, id);
     if (read.ec == std::errc{} && read.ptr == end) clock.marker_id = id;
-    clock.marker_text = wish.marker;
+    clock.marker_text = options.marker;
   } else {
-    if (wish.clock_sd_s) throw std::runtime_error{"--clock-sd-s belongs to --offset-s, --utc-s or --marker"};
-    clock.search.from_s = wish.search_from_s.value_or(clock.search.from_s);
-    clock.search.to_s = wish.search_to_s.value_or(clock.search.to_s);
+    if (options.clock_sd_s) throw std::runtime_error{"--clock-sd-s belongs to --offset-s, --utc-s or --marker"};
+    clock.search.from_s = options.search_from_s.value_or(clock.search.from_s);
+    clock.search.to_s = options.search_to_s.value_or(clock.search.to_s);
   }
   return clock;
 }
 
-ReferenceRequest request_of(const ReferenceCommand& wish) {
+ReferenceRequest request_of(const ReferenceCommand& options) {
   ReferenceRequest request;
-  request.csv = text_of_file(wish.csv_file);
-  request.source = fs::path{wish.csv_file}.filename().string();
-  request.clock = clock_of(wish);
-  request.span = wish.span;
-  request.keeps_zero = wish.keeps_zero;
-  request.is_in_metres = wish.is_in_metres;
-  if (wish.sd_mm) request.sd_m = *wish.sd_mm / 1e3;
-  request.reason = wish.reason;
+  request.csv = text_of_file(options.csv_file);
+  request.source = fs::path{options.csv_file}.filename().string();
+  request.clock = clock_of(options);
+  request.span = options.span;
+  request.keeps_zero = options.keeps_zero;
+  request.is_in_metres = options.is_in_metres;
+  if (options.sd_mm) request.sd_m = *options.sd_mm / 1e3;
+  request.reason = options.reason;
   return request;
 }
 
@@ -140,45 +141,45 @@ json json_of(const ReferenceRequest& request) {
   return out;
 }
 
-json ask_station(const ReferenceCommand& wish, const std::string& path, const json& body) {
+json ask_station(const ReferenceCommand& options, const std::string& path, const json& body) {
   const StationAnswer answer =
-      StationClient{wish.data_dir}.ask("POST", fmt::format("/api/v1/runs/{}/reference{}", wish.run, path), body);
+      StationClient{options.data_dir}.ask("POST", fmt::format("/api/v1/runs/{}/reference{}", options.run, path), body);
   if (answer.status < kFirstProblem) return answer.body;
   throw std::runtime_error{answer.body.value("detail", fmt::format("the station answers {}", answer.status))};
 }
 
 // In the database, which is closed: nobody else writes.
-OutsideReference import_closed(const ReferenceCommand& wish, const ReferenceRequest& request) {
-  const fs::path path = wish.data_dir / "station.sqlite";
+OutsideReference import_closed(const ReferenceCommand& options, const ReferenceRequest& request) {
+  const fs::path path = options.data_dir / "station.sqlite";
   Database database{path};
-  value_of(check_may_import(database.handle(), wish.run, request.reason));
+  value_of(check_may_import(database.handle(), options.run, request.reason));
   std::optional<MarkerPlace> marker;
   const ReferenceClockRequest& clock = request.clock;
   if (clock.method == ReferenceClock::marker) {
-    marker = value_of(find_marker(database.handle(), wish.run, clock.marker_id, clock.marker_text));
+    marker = value_of(find_marker(database.handle(), options.run, clock.marker_id, clock.marker_text));
   }
   std::vector<OwnPosition> own;
-  for (const StoredSample& stored : value_of(read_run(path, wish.run, kMaxAnalysedSamples))) {
+  for (const StoredSample& stored : value_of(read_run(path, options.run, kMaxAnalysedSamples))) {
     own.push_back(own_position(stored));
   }
-  const std::vector<Zeroing> zeroings = find_zeroings(database.handle(), wish.run);
+  const std::vector<Zeroing> zeroings = find_zeroings(database.handle(), options.run);
   PlacedReference placed = value_of(place_reference(request, own, zeroings, marker));
   const Author by = command_line_author();
-  placed.reference.run = wish.run;
+  placed.reference.run = options.run;
   placed.reference.actor = by.actor;
   placed.reference.made_at_us = by.at_us;
   return value_of(store_reference(database.handle(), placed.reference, placed.positions, request.reason, by));
 }
 
-StoredReference read_stored(const ReferenceCommand& wish, bool with_positions) {
+StoredReference read_stored(const ReferenceCommand& options, bool with_positions) {
   StoredReference stored;
   auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
-    auto found = read_reference(database, wish.run, {}, with_positions ? kMaxReferenceRows : 0);
-    if (!found) return fail(ErrorCode::not_found, fmt::format("run {} has no reference", wish.run));
+    auto found = read_reference(database, options.run, {}, with_positions ? kMaxReferenceRows : 0);
+    if (!found) return fail(ErrorCode::not_found, fmt::format("run {} has no reference", options.run));
     stored = std::move(*found);
     return {};
   };
-  value_of(read_store(wish.data_dir / "station.sqlite", read));
+  value_of(read_store(options.data_dir / "station.sqlite", read));
   return stored;
 }
 
@@ -190,29 +191,29 @@ void write(const OutsideReference& reference, std::ostream& out) {
              clock_in_words(reference), zero_in_words(reference));
 }
 
-void import_one(const ReferenceCommand& wish, std::ostream& out) {
-  const ReferenceRequest request = request_of(wish);
-  if (const auto lock = FolderLock::try_take(wish.data_dir)) {
-    write(import_closed(wish, request), out);
+void import_one(const ReferenceCommand& options, std::ostream& out) {
+  const ReferenceRequest request = request_of(options);
+  if (const auto lock = FolderLock::try_take(options.data_dir)) {
+    write(import_closed(options, request), out);
     return;
   }
-  ask_station(wish, "", json_of(request));
-  write(read_stored(wish, false).reference, out);
+  ask_station(options, "", json_of(request));
+  write(read_stored(options, false).reference, out);
 }
 
-void remove_one(const ReferenceCommand& wish, std::ostream& out) {
-  if (const auto lock = FolderLock::try_take(wish.data_dir)) {
-    Database database{wish.data_dir / "station.sqlite"};
-    value_of(remove_reference(database.handle(), wish.run, wish.reason, command_line_author()));
+void remove_one(const ReferenceCommand& options, std::ostream& out) {
+  if (const auto lock = FolderLock::try_take(options.data_dir)) {
+    Database database{options.data_dir / "station.sqlite"};
+    value_of(remove_reference(database.handle(), options.run, options.reason, command_line_author()));
     while (delete_some_positions(database.handle())) continue;
   } else {
-    ask_station(wish, "/remove", {{"reason", wish.reason}});
+    ask_station(options, "/remove", {{"reason", options.reason}});
   }
-  fmt::print(out, "run {} has no reference any more\n", wish.run);
+  fmt::print(out, "run {} has no reference any more\n", options.run);
 }
 
-void export_csv(const ReferenceCommand& wish, std::ostream& out) {
-  const StoredReference stored = read_stored(wish, true);
+void export_csv(const ReferenceCommand& options, std::ostream& out) {
+  const StoredReference stored = read_stored(options, true);
   const OutsidePositions& positions = stored.positions;
   fmt::print(out, "# {} of run {}, span {}\nrobot_time_us,position_m,position_sd_m\n", stored.reference.source,
              stored.reference.run, stored.reference.span);
@@ -223,40 +224,41 @@ void export_csv(const ReferenceCommand& wish, std::ostream& out) {
 
 }  // namespace
 
-void add_options(CLI::App& command, ReferenceCommand& wish) {
+void add_options(CLI::App& command, ReferenceCommand& options) {
   command.require_subcommand(1);
-  auto* importing = offer(command, wish, Act::import, "import", "Put a position measured from outside beside a run");
-  importing->add_option("--csv", wish.csv_file, "Its columns: t_s, position_m and, if it has one, position_sd_m")
+  auto* importing = offer(command, options, Act::import, "import", "Put a position measured from outside beside a run");
+  importing->add_option("--csv", options.csv_file, "Its columns: t_s, position_m and, if it has one, position_sd_m")
       ->required()
       ->check(named());
-  importing->add_option("--sd-mm", wish.sd_mm, "How exact each position is (one sigma), without a column position_sd_m")
+  importing
+      ->add_option("--sd-mm", options.sd_mm, "How exact each position is (one sigma), without a column position_sd_m")
       ->check(from_to(1e-4, 1000));
-  add_clock_options(*importing, wish);
-  importing->add_option("--span", wish.span, "Which span of the run, if the robot rebooted during it")
+  add_clock_options(*importing, options);
+  importing->add_option("--span", options.span, "Which span of the run, if the robot rebooted during it")
       ->check(whole(0, std::numeric_limits<std::uint32_t>::max()));
-  importing->add_flag("--keep-zero", wish.keeps_zero, "Its zero is the robot's (default: estimated from the run)");
-  importing->add_flag("--metres", wish.is_in_metres, "Its positions are in metres, also where they do not look so");
-  importing->add_option("--reason", wish.reason, "Why another reference of the run is replaced")->check(named());
+  importing->add_flag("--keep-zero", options.keeps_zero, "Its zero is the robot's (default: estimated from the run)");
+  importing->add_flag("--metres", options.is_in_metres, "Its positions are in metres, also where they do not look so");
+  importing->add_option("--reason", options.reason, "Why another reference of the run is replaced")->check(named());
   importing->footer(
       "Without --offset-s, --utc-s or --marker the clock is found by correlation with the robot's own motion.\n"
       "Example: rheonaut reference import --run 1 --csv camera.csv --sd-mm 0.5 --data lab");
-  offer(command, wish, Act::show, "show", "Say what was imported, and how its clock and zero were found");
-  offer(command, wish, Act::export_positions, "export", "Write its positions as CSV, on the robot's clock");
-  offer(command, wish, Act::remove, "remove", "Remove it")
-      ->add_option("--reason", wish.reason, "Why")
+  offer(command, options, Act::show, "show", "Say what was imported, and how its clock and zero were found");
+  offer(command, options, Act::export_positions, "export", "Write its positions as CSV, on the robot's clock");
+  offer(command, options, Act::remove, "remove", "Remove it")
+      ->add_option("--reason", options.reason, "Why")
       ->required()
       ->check(named());
   command.footer("Example: rheonaut reference show --run 1 --data lab");
 }
 
-int run(const ReferenceCommand& wish, std::ostream& out) {
-  const fs::path database = wish.data_dir / "station.sqlite";
+int run(const ReferenceCommand& options, std::ostream& out) {
+  const fs::path database = options.data_dir / "station.sqlite";
   if (!fs::exists(database)) throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
-  switch (wish.act) {
-    case Act::import: import_one(wish, out); break;
-    case Act::show: write(read_stored(wish, false).reference, out); break;
-    case Act::export_positions: export_csv(wish, out); break;
-    case Act::remove: remove_one(wish, out); break;
+  switch (options.act) {
+    case Act::import: import_one(options, out); break;
+    case Act::show: write(read_stored(options, false).reference, out); break;
+    case Act::export_positions: export_csv(options, out); break;
+    case Act::remove: remove_one(options, out); break;
   }
   return 0;
 }

@@ -30,8 +30,8 @@ struct ReferenceCommand {
   std::string reason;
 };
 
-void add_options(CLI::App& command, ReferenceCommand& wish);
+void add_options(CLI::App& command, ReferenceCommand& options);
 
-int run(const ReferenceCommand& wish, std::ostream& out);
+int run(const ReferenceCommand& options, std::ostream& out);
 
 }  // namespace server::cli

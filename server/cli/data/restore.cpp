@@ -14,22 +14,23 @@
 
 namespace server::cli {
 
-void add_options(CLI::App& command, Restore& wish) {
-  command.add_option("--from", wish.from, "The backup")->check(named())->required();
-  command.add_option("--data", wish.data_dir, "Folder of the station; made when missing (default: rheonaut-data)")
+void add_options(CLI::App& command, Restore& options) {
+  command.add_option("--from", options.from, "The backup")->check(named())->required();
+  command.add_option("--data", options.data_dir, "Folder of the station; made when missing (default: rheonaut-data)")
       ->check(named());
   command.footer("Example: rheonaut restore --from /mnt/other-disk/lab-monday.sqlite --data ~/lab-restored");
 }
 
-int run(const Restore& wish, std::ostream& out) {
-  make_data_folder(wish.data_dir);
-  const auto lock = FolderLock::try_take(wish.data_dir);
+int run(const Restore& options, std::ostream& out) {
+  make_data_folder(options.data_dir);
+  const auto lock = FolderLock::try_take(options.data_dir);
   if (!lock) {
-    throw std::runtime_error{fmt::format("a station runs in '{}'; stop it first", wish.data_dir.string())};
+    throw std::runtime_error{fmt::format("a station runs in '{}'; stop it first", options.data_dir.string())};
   }
-  const RestoredStore restored = restore_database(wish.from, wish.data_dir, command_line_author());
+  const RestoredStore restored = restore_database(options.from, options.data_dir, command_line_author());
   fmt::print(out, "{}: {} samples and {} runs, verified; {} of the runs were open and are interrupted\n",
-             (wish.data_dir / "station.sqlite").string(), restored.samples, restored.runs, restored.runs_interrupted);
+             (options.data_dir / "station.sqlite").string(), restored.samples, restored.runs,
+             restored.runs_interrupted);
   return 0;
 }
 

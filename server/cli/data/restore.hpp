@@ -15,9 +15,9 @@ struct Restore {
   std::filesystem::path data_dir = "rheonaut-data";
 };
 
-void add_options(CLI::App& command, Restore& wish);
+void add_options(CLI::App& command, Restore& options);
 
 // Never replaces a database. Throws std::runtime_error saying why nothing was restored.
-int run(const Restore& wish, std::ostream& out);
+int run(const Restore& options, std::ostream& out);
 
 }  // namespace server::cli

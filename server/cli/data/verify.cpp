@@ -48,7 +48,7 @@ std::vector<std::string> find_losses(SQLite::Database& database, const Result<st
 }
 
 // A run alone is not worth reading every page for; nor is it done unasked beside a station, whose log would grow.
-Result<Verified> verify_file(const std::filesystem::path& path, const Verify& wish) {
+Result<Verified> verify_file(const std::filesystem::path& path, const Verify& options) {
   Verified verified;
   auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
     verified = {};
@@ -58,12 +58,12 @@ Result<Verified> verify_file(const std::filesystem::path& path, const Verify& wi
                                                   "station brings it up to date when it opens it",
                                                   path.string(), version));
     }
-    if (!wish.run) {
+    if (!options.run) {
       verified.losses = find_losses(database, load_head_file(path));
-      verified.audit = check_audit(database, wish.expected);
+      verified.audit = check_audit(database, options.expected);
     }
-    if (wish.audit) return {};
-    const StoreCheck check{wish.run, wish.integrity || (!wish.run && lock_is_free(path))};
+    if (options.audit) return {};
+    const StoreCheck check{options.run, options.integrity || (!options.run && lock_is_free(path))};
     auto findings = check_store(database, check);
     if (!findings) return std::unexpected{findings.error()};
     verified.store = std::move(*findings);
@@ -85,8 +85,8 @@ bool is_export(const std::filesystem::path& path) {
   }
 }
 
-Result<Verified> verify_export(const std::filesystem::path& path, const Verify& wish) {
-  if (!wish.audit) {
+Result<Verified> verify_export(const std::filesystem::path& path, const Verify& options) {
+  if (!options.audit) {
     return fail(ErrorCode::invalid,
                 fmt::format("{} is the export of a run; --audit verifies the audit in it", path.string()));
   }
@@ -97,14 +97,14 @@ Result<Verified> verify_export(const std::filesystem::path& path, const Verify& 
                   fmt::format("{} was exported by an earlier version: no audit is in it", path.string()));
     }
     Verified verified;
-    verified.audit = check_exported_audit(file, wish.expected);
+    verified.audit = check_exported_audit(file, options.expected);
     return verified;
   } catch (const SQLite::Exception& error) {
     return fail(ErrorCode::unavailable, fmt::format("cannot read {}: SQLite says '{}'", path.string(), error.what()));
   }
 }
 
-void write_table(std::ostream& out, const Verified& verified, const Verify& wish) {
+void write_table(std::ostream& out, const Verified& verified, const Verify& options) {
   const std::vector<std::string> faults = verified.faults();
   for (const std::string& fault : faults) fmt::print(out, "fault: {}\n", one_line(fault));
   if (verified.store) {
@@ -119,7 +119,7 @@ void write_table(std::ostream& out, const Verified& verified, const Verify& wish
     fmt::print(out, "audit     {} entries{}, {} commands agree with it\n", findings.entries, hidden, findings.commands);
     fmt::print(out, "head      {}\n", findings.head.entry == 0 ? "-" : text(findings.head));
   }
-  if (verified.store && !verified.integrity_checked && !wish.run) {
+  if (verified.store && !verified.integrity_checked && !options.run) {
     fmt::print(out,
                "skipped   SQLite's integrity check, since a station runs: its log would grow meanwhile; "
                "--integrity makes it\n");
@@ -152,42 +152,42 @@ nlohmann::ordered_json json_of(const Verified& verified) {
 
 }  // namespace
 
-void add_options(CLI::App& command, Verify& wish) {
-  auto* data = command.add_option("--data", wish.data_dir, "Folder of the station (default: rheonaut-data)");
+void add_options(CLI::App& command, Verify& options) {
+  auto* data = command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)");
   data->check(named());
-  command.add_option("--file", wish.file, "This database, e.g. a backup, and not the folder's")
+  command.add_option("--file", options.file, "This database, e.g. a backup, and not the folder's")
       ->check(named())
       ->excludes(data);
-  auto* run = command.add_option("--run", wish.run, "Only this run: its samples and its certificate")
+  auto* run = command.add_option("--run", options.run, "Only this run: its samples and its certificate")
                   ->check(whole(1, std::numeric_limits<std::int64_t>::max()));
-  command.add_flag("--integrity", wish.integrity,
+  command.add_flag("--integrity", options.integrity,
                    "SQLite's own check of every page also while a station runs, whose log grows meanwhile");
-  auto* audit = command.add_flag("--audit", wish.audit, "Only the audit; --file may name the export of a run");
+  auto* audit = command.add_flag("--audit", options.audit, "Only the audit; --file may name the export of a run");
   audit->excludes(run);
-  const auto expect = [&wish](const std::string& given) {
+  const auto expect = [&options](const std::string& given) {
     const auto head = parse_audit_head(given);
     if (!head) throw CLI::ValidationError{"--expect", head.error().detail};
-    wish.expected = *head;
+    options.expected = *head;
   };
   command
       .add_option_function<std::string>("--expect", expect,
                                         "ENTRY:HASH of the audit as it once was, from the log or an earlier verify")
       ->excludes(run);
-  add_json_flag(command, wish.form);
+  add_json_flag(command, options.form);
   command.footer("Example: rheonaut verify --data ~/lab");
 }
 
-int run(const Verify& wish, std::ostream& out) {
-  const std::filesystem::path path = wish.file.value_or(wish.data_dir / "station.sqlite");
-  const auto verified = is_export(path) ? verify_export(path, wish) : verify_file(path, wish);
+int run(const Verify& options, std::ostream& out) {
+  const std::filesystem::path path = options.file.value_or(options.data_dir / "station.sqlite");
+  const auto verified = is_export(path) ? verify_export(path, options) : verify_file(path, options);
   if (!verified) {
     fmt::print(stderr, "rheonaut: {}\n", one_line(verified.error().detail));
     return kUnreadable;
   }
-  if (wish.form.is_json) {
+  if (options.form.is_json) {
     write_json(out, json_of(*verified));
   } else {
-    write_table(out, *verified, wish);
+    write_table(out, *verified, options);
   }
   return verified->faults().empty() ? 0 : kFaults;
 }

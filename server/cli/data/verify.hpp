@@ -25,9 +25,9 @@ struct Verify {
   OutputForm form;
 };
 
-void add_options(CLI::App& command, Verify& wish);
+void add_options(CLI::App& command, Verify& options);
 
-// 0: all is well; 1: faults, a line each; 2: it cannot be read, which is told on standard error.
-int run(const Verify& wish, std::ostream& out);
+// 0: all is well; 1: faults, a line each; 2: it cannot be read, the reason is on standard error.
+int run(const Verify& options, std::ostream& out);
 
 }  // namespace server::cli

@@ -14,8 +14,8 @@ namespace {
 constexpr int kTablePoints = 13, kCsvPoints = 200, kMaxPoints = 100'000;
 constexpr double kFrom_rad_s = 0.1, kTo_rad_s = 1000;
 
-std::vector<control::BodePoint> response(const Bode& wish, const control::OpenLoop& loop, int points) {
-  const double from_rad_s = wish.from_rad_s.value_or(kFrom_rad_s), to_rad_s = wish.to_rad_s.value_or(kTo_rad_s);
+std::vector<control::BodePoint> response(const Bode& options, const control::OpenLoop& loop, int points) {
+  const double from_rad_s = options.from_rad_s.value_or(kFrom_rad_s), to_rad_s = options.to_rad_s.value_or(kTo_rad_s);
   if (!(to_rad_s > from_rad_s)) {
     throw std::invalid_argument{fmt::format("--to-rad-s {} must lie above --from-rad-s {}", to_rad_s, from_rad_s)};
   }
@@ -40,19 +40,19 @@ std::string list(std::span<const double> values) {
 
 }  // namespace
 
-void add_options(CLI::App& command, Bode& wish) {
-  add_option(command, wish.plant);
-  add_option(command, wish.controller);
-  command.add_flag("--velocity-loop", wish.is_velocity_loop, "Without the integrator from velocity to position");
-  command.add_option("--from-rad-s", wish.from_rad_s, "First frequency of the response (default: 0.1)")
+void add_options(CLI::App& command, Bode& options) {
+  add_option(command, options.plant);
+  add_option(command, options.controller);
+  command.add_flag("--velocity-loop", options.is_velocity_loop, "Without the integrator from velocity to position");
+  command.add_option("--from-rad-s", options.from_rad_s, "First frequency of the response (default: 0.1)")
       ->check(positive());
-  command.add_option("--to-rad-s", wish.to_rad_s, "Last frequency (default: 1000)")->check(positive());
+  command.add_option("--to-rad-s", options.to_rad_s, "Last frequency (default: 1000)")->check(positive());
   command
-      .add_option("--points", wish.points,
+      .add_option("--points", options.points,
                   "How many frequencies, evenly in the logarithm (default: 13 in the table, 200 in CSV); with --json "
                   "adds the response")
       ->check(whole(2, kMaxPoints));
-  add_json_and_csv_flags(command, wish.form);
+  add_json_and_csv_flags(command, options.form);
   command.footer(
       "The margins are those of the open loop, plant times controller.\n"
       "Example: rheonaut bode --plant newtonian --from-rad-s 1 --to-rad-s 100");
@@ -76,30 +76,30 @@ void write_margins(std::ostream& out, const control::Margins& margins) {
   if (!margins.is_closed_loop_stable) out << "the closed loop is UNSTABLE: these numbers are no margins\n";
 }
 
-int run(const Bode& wish, std::ostream& out) {
-  const control::OpenLoop loop{read(wish.plant), read(wish.controller), wish.is_velocity_loop};
-  if (wish.form.is_csv) {
-    write_points(out, response(wish, loop, wish.points.value_or(kCsvPoints)));
+int run(const Bode& options, std::ostream& out) {
+  const control::OpenLoop loop{read(options.plant), read(options.controller), options.is_velocity_loop};
+  if (options.form.is_csv) {
+    write_points(out, response(options, loop, options.points.value_or(kCsvPoints)));
     return 0;
   }
   const control::Margins margins = control::margins(loop);
-  if (wish.form.is_json) {
-    if (!wish.points && (wish.from_rad_s || wish.to_rad_s)) {
+  if (options.form.is_json) {
+    if (!options.points && (options.from_rad_s || options.to_rad_s)) {
       throw std::invalid_argument{"--from-rad-s and --to-rad-s belong to the response, which --json has with --points"};
     }
     OrderedJson answer = json_of(margins);
     answer["plant"] = json_of(loop.plant);
     answer["controller"] = json_of(loop.controller);
-    answer["velocity_loop"] = wish.is_velocity_loop;
-    if (wish.points)
-      answer["response"] = json_of(std::span<const control::BodePoint>(response(wish, loop, *wish.points)));
+    answer["velocity_loop"] = options.is_velocity_loop;
+    if (options.points)
+      answer["response"] = json_of(std::span<const control::BodePoint>(response(options, loop, *options.points)));
     write_json(out, answer);
     return 0;
   }
   write_margins(out, margins);
   out << '\n';
   Table table{{"omega (rad/s)", "magnitude (dB)", "phase (deg)"}};
-  for (const auto& point : response(wish, loop, wish.points.value_or(kTablePoints))) {
+  for (const auto& point : response(options, loop, options.points.value_or(kTablePoints))) {
     table.row({cell(point.omega_rad_s, 5), fixed(point.magnitude_db, 2), fixed(point.phase_deg, 2)});
   }
   table.write(out);

@@ -18,8 +18,8 @@ struct Bode {
   OutputForm form;
 };
 
-void add_options(CLI::App& command, Bode& wish);
-int run(const Bode& wish, std::ostream& out);
+void add_options(CLI::App& command, Bode& options);
+int run(const Bode& options, std::ostream& out);
 
 // Lines of name, value and unit; also for what a tuning achieved.
 void write_margins(std::ostream& out, const control::Margins& margins);

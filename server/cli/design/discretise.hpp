@@ -31,7 +31,7 @@ struct Discretise {
   OutputForm form;
 };
 
-void add_options(CLI::App& command, Discretise& wish);
-int run(const Discretise& wish, std::ostream& out);
+void add_options(CLI::App& command, Discretise& given);
+int run(const Discretise& given, std::ostream& out);
 
 }  // namespace server::cli

@@ -28,23 +28,23 @@ std::array<double, kParameters> values_of(const control::FractionalModel& model)
   return {model.kp, model.b1, model.b2, model.alpha, model.beta};
 }
 
-void add_source(CLI::App& command, Identify& wish) {
-  auto* csv = command.add_option("--csv", wish.csv,
+void add_source(CLI::App& command, Identify& asked) {
+  auto* csv = command.add_option("--csv", asked.csv,
                                  "Recording with columns t_s (equally spaced), duty, and position_m or velocity_m_s");
   csv->check(named());
-  add_options(command, wish.run);
+  add_options(command, asked.run);
   auto* run = command.get_option("--run");
   run->excludes(csv);
-  command.add_option("--span", wish.window.span, "Which span of the run, if the robot rebooted during it")
+  command.add_option("--span", asked.window.span, "Which span of the run, if the robot rebooted during it")
       ->check(whole(0, std::numeric_limits<std::uint32_t>::max()))
       ->needs(run);
-  command.add_option("--from-s", wish.window.from_s, "First second of the span to use")->check(finite())->needs(run);
-  command.add_option("--to-s", wish.window.to_s, "Last second of the span to use")->check(finite())->needs(run);
-  add_word(command, "--channels", wish.channels,
+  command.add_option("--from-s", asked.window.from_s, "First second of the span to use")->check(finite())->needs(run);
+  command.add_option("--to-s", asked.window.to_s, "Last second of the span to use")->check(finite())->needs(run);
+  add_word(command, "--channels", asked.channels,
            std::array{ChannelChoice::best, ChannelChoice::outside, ChannelChoice::robot},
            "best, outside or robot: whether a position from outside is fitted (default: best, where the run has one)")
       ->needs(run);
-  command.add_flag("--with-velocity", wish.window.with_velocity,
+  command.add_flag("--with-velocity", asked.window.with_velocity,
                    "Also fit the velocity that the robot recorded, where its position is known");
 }
 
@@ -68,8 +68,8 @@ void add_search(CLI::App& command, control::IdentificationOptions& options) {
   command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 60)")->check(positive());
 }
 
-void add_plan(CLI::App& command, Identify& wish) {
-  Plan& plan = wish.plan;
+void add_plan(CLI::App& command, Identify& asked) {
+  Plan& plan = asked.plan;
   auto* flag = command.add_flag("--plan", plan.is_wanted, "No recording: what an experiment would tell about --plant");
   flag->excludes(command.get_option("--csv"))->excludes(command.get_option("--run"))->group("Planning");
   const auto add = [&command, flag](const char* name, auto& value, const char* meaning) {
@@ -99,15 +99,15 @@ std::vector<std::string> channels_of(const control::Recording& recording) {
   return names;
 }
 
-RunRecording recording_for(const Identify& wish) {
-  if (wish.csv) return read_recording(*wish.csv, wish.window.with_velocity);
-  if (!wish.run.run) {
+RunRecording recording_for(const Identify& asked) {
+  if (asked.csv) return read_recording(*asked.csv, asked.window.with_velocity);
+  if (!asked.run.run) {
     throw std::runtime_error{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
   }
-  const std::vector<StoredSample> samples = read_samples(wish.run);
-  const std::optional<StoredReference> reference = read_reference(wish.run);
-  auto recording = recording_of(samples, wish.window, reference ? &*reference : nullptr, wish.channels);
-  if (!recording) throw std::runtime_error{fmt::format("run {}: {}", *wish.run.run, recording.error().detail)};
+  const std::vector<StoredSample> samples = read_samples(asked.run);
+  const std::optional<StoredReference> reference = read_reference(asked.run);
+  auto recording = recording_of(samples, asked.window, reference ? &*reference : nullptr, asked.channels);
+  if (!recording) throw std::runtime_error{fmt::format("run {}: {}", *asked.run.run, recording.error().detail)};
   return std::move(*recording);
 }
 
@@ -118,8 +118,8 @@ bool show_progress(const control::Progress& progress) {
   return true;
 }
 
-control::Identification search(const Identify& wish, const control::Recording& recording) {
-  control::IdentificationOptions options = wish.options;
+control::Identification search(const Identify& asked, const control::Recording& recording) {
+  control::IdentificationOptions options = asked.options;
   const bool is_watched = ::isatty(STDERR_FILENO) != 0;
   if (is_watched) options.on_progress = show_progress;
   control::Identification found = control::identify(recording, options);
@@ -143,7 +143,7 @@ constexpr double kLargerThanSaid = 1.5;  // residuals, in sd of the reference
 // What a position from outside adds to the doubts.
 constexpr double kSuspiciousClockS = 0.005;
 
-void add_outside_doubts(const RunRecording& given, const Identify& wish, control::Identification& found) {
+void add_outside_doubts(const RunRecording& given, const Identify& asked, control::Identification& found) {
   if (!(given.position_sd_m > 0)) return;
   const double residual_sd_m = found.best.residual_sd;
   if (residual_sd_m > kLargerThanSaid * given.position_sd_m) {
@@ -162,7 +162,7 @@ void add_outside_doubts(const RunRecording& given, const Identify& wish, control
             ? "if it is not, that is a dead time of the plant; search with --dead-time-s"
             : "the positions come before the duty that moves the robot, as no plant does; correct the clock's offset"));
   }
-  if (wish.options.longest_dead_time_s > 0) {
+  if (asked.options.longest_dead_time_s > 0) {
     found.warnings.emplace_back("the dead time contains what is left of the error of the outside position's clock");
   }
 }
@@ -241,14 +241,14 @@ OrderedJson residuals_json(const Fit& fit, const RunRecording& given) {
 
 }  // namespace
 
-void add_options(CLI::App& command, Identify& wish) {
-  add_source(command, wish);
-  add_search(command, wish.options);
-  command.add_flag("--residuals", wish.with_residuals, "With --json: also the residuals, measured less model");
-  add_json_flag(command, wish.form);
+void add_options(CLI::App& command, Identify& asked) {
+  add_source(command, asked);
+  add_search(command, asked.options);
+  command.add_flag("--residuals", asked.with_residuals, "With --json: also the residuals, measured less model");
+  add_json_flag(command, asked.form);
   command.get_option("--residuals")->needs("--json");
-  add_plan(command, wish);
-  add_option(command, wish.plant);
+  add_plan(command, asked);
+  add_option(command, asked.plant);
   command.get_option("--plant")->needs("--plan")->group("Planning");
   for (const char* searching :
        {"--structure", "--cost", "--dead-time-s", "--sensor-lag-s", "--time-limit-s", "--residuals"}) {
@@ -259,15 +259,15 @@ void add_options(CLI::App& command, Identify& wish) {
       "Example: rheonaut identify --csv run.csv --structure fractional");
 }
 
-int run(const Identify& wish, std::ostream& out) {
-  if (wish.plan.is_wanted) return run_plan(wish, out);
-  const RunRecording given = recording_for(wish);
+int run(const Identify& asked, std::ostream& out) {
+  if (asked.plan.is_wanted) return run_plan(asked, out);
+  const RunRecording given = recording_for(asked);
   for (const std::string& warning : given.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
-  control::Identification found = search(wish, given.recording);
+  control::Identification found = search(asked, given.recording);
   found.warnings.insert(found.warnings.end(), given.warnings.begin(), given.warnings.end());
-  add_outside_doubts(given, wish, found);
+  add_outside_doubts(given, asked, found);
   const std::optional<control::EstimatorModel> estimator = estimator_of(found.best);
-  if (wish.form.is_json) {
+  if (asked.form.is_json) {
     OrderedJson answer = json_of(found);
     answer["estimator"] = estimator ? json_of(*estimator) : OrderedJson{};
     answer["channels"] = channels_of(given.recording);
@@ -276,7 +276,7 @@ int run(const Identify& wish, std::ostream& out) {
       answer["position_chi_square"] = chi_square->value;
       answer["position_degrees_of_freedom"] = chi_square->degrees_of_freedom;
     }
-    if (wish.with_residuals) answer["residuals"] = residuals_json(found.best, given);
+    if (asked.with_residuals) answer["residuals"] = residuals_json(found.best, given);
     write_json(out, answer);
   } else {
     fmt::print(out, "fitted: {}; {}\n\n", fmt::join(channels_of(given.recording), ", "), given.channels_reason);

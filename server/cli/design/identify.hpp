@@ -42,12 +42,12 @@ struct Identify {
   OutputForm form;
 };
 
-void add_options(CLI::App& command, Identify& wish);
+void add_options(CLI::App& command, Identify& given);
 
 // 0, or kNotConverged: then the best that was found stands in the answer.
-int run(const Identify& wish, std::ostream& out);
+int run(const Identify& given, std::ostream& out);
 
 // Of the plan alone.
-int run_plan(const Identify& wish, std::ostream& out);
+int run_plan(const Identify& given, std::ostream& out);
 
 }  // namespace server::cli

@@ -123,41 +123,42 @@ const char* text(Preset value) {
   return "unknown";
 }
 
-void add_options(CLI::App& command, Model& wish) {
-  add_word(command, "--preset", wish.preset, std::array{Preset::non_newtonian, Preset::newtonian, Preset::hydrodynamic},
+void add_options(CLI::App& command, Model& options) {
+  add_word(command, "--preset", options.preset,
+           std::array{Preset::non_newtonian, Preset::newtonian, Preset::hydrodynamic},
            "Print this model as a model file: non_newtonian, newtonian, hydrodynamic");
   auto* motor =
-      command.add_option("--motor-csv", wish.motor_csv, "Fit the motor to a CSV with columns t_s, duty, rate_rad_s");
+      command.add_option("--motor-csv", options.motor_csv, "Fit the motor to a CSV with columns t_s, duty, rate_rad_s");
   motor->check(named());
-  add_parameters(command, wish.parameters);
+  add_parameters(command, options.parameters);
   motor->excludes("--motor-gain-rad-s")->excludes("--motor-time-constant-s");
   // What would go unused: the printed presets of the paper do not depend on it.
-  command.parse_complete_callback([&command, &wish] {
-    if (!wish.preset || *wish.preset == Preset::hydrodynamic) return;
+  command.parse_complete_callback([&command, &options] {
+    if (!options.preset || *options.preset == Preset::hydrodynamic) return;
     for (const CLI::Option* option : command.get_options()) {
       if (option->count() == 0 || (option->get_group() != kHydrodynamics && option->get_name() != "--motor-csv"))
         continue;
       throw CLI::ExcludesError{option->get_name(),
-                               fmt::format("--preset {}, which it does not change", text(*wish.preset))};
+                               fmt::format("--preset {}, which it does not change", text(*options.preset))};
     }
   });
-  add_json_flag(command, wish.form);
+  add_json_flag(command, options.form);
   command.footer("Example: rheonaut model --preset hydrodynamic --mass-kg 0.12");
 }
 
-int run(const Model& wish, std::ostream& out) {
-  control::HydrodynamicParameters parameters = wish.parameters;
+int run(const Model& options, std::ostream& out) {
+  control::HydrodynamicParameters parameters = options.parameters;
   std::optional<control::MotorFit> motor;
-  if (wish.motor_csv) {
-    motor = fit_motor(*wish.motor_csv);
+  if (options.motor_csv) {
+    motor = fit_motor(*options.motor_csv);
     parameters.motor = motor->motor;
   }
   const control::HydrodynamicModel derived = control::hydrodynamic_model(parameters);
-  if (wish.preset) {
-    write_json(out, json_of(chosen(*wish.preset, derived)));
+  if (options.preset) {
+    write_json(out, json_of(chosen(*options.preset, derived)));
     return 0;
   }
-  if (wish.form.is_json) {
+  if (options.form.is_json) {
     OrderedJson hydrodynamic = json_of(derived);
     hydrodynamic["model"] = described(derived.model);
     hydrodynamic["parameters"] = json_of(parameters);

@@ -21,7 +21,7 @@ struct Model {
   OutputForm form;
 };
 
-void add_options(CLI::App& command, Model& wish);
-int run(const Model& wish, std::ostream& out);
+void add_options(CLI::App& command, Model& options);
+int run(const Model& options, std::ostream& out);
 
 }  // namespace server::cli

@@ -21,7 +21,7 @@ struct Predict {
   OutputForm form;
 };
 
-void add_options(CLI::App& command, Predict& wish);
-int run(const Predict& wish, std::ostream& out);
+void add_options(CLI::App& command, Predict& given);
+int run(const Predict& given, std::ostream& out);
 
 }  // namespace server::cli

@@ -17,17 +17,17 @@ constexpr double kFirstTime_s = 0.01;
 constexpr int kLogSpacedTimes = 20;
 constexpr double kMaxTimes = 1'000'000;
 
-std::vector<double> times_of(const Step& wish) {
-  if (!wish.times_s.empty()) return wish.times_s;
-  if (!wish.every_s)
-    return control::log_spaced(std::min(kFirstTime_s, wish.until_s / 2), wish.until_s, kLogSpacedTimes);
-  const double count = std::floor(wish.until_s / *wish.every_s * (1 + 1e-12)) + 1;
+std::vector<double> times_of(const Step& options) {
+  if (!options.times_s.empty()) return options.times_s;
+  if (!options.every_s)
+    return control::log_spaced(std::min(kFirstTime_s, options.until_s / 2), options.until_s, kLogSpacedTimes);
+  const double count = std::floor(options.until_s / *options.every_s * (1 + 1e-12)) + 1;
   if (!(count <= kMaxTimes)) {
     throw std::invalid_argument{fmt::format("--every-s {} up to --until-s {} makes {} times; at most {} are allowed",
-                                            *wish.every_s, wish.until_s, count, kMaxTimes)};
+                                            *options.every_s, options.until_s, count, kMaxTimes)};
   }
   std::vector<double> times_s;
-  for (int i = 0; i < static_cast<int>(count); ++i) times_s.push_back(i * *wish.every_s);
+  for (int i = 0; i < static_cast<int>(count); ++i) times_s.push_back(i * *options.every_s);
   return times_s;
 }
 
@@ -42,47 +42,48 @@ void write_table(std::ostream& out, std::span<const double> times_s, std::span<c
 
 }  // namespace
 
-void add_options(CLI::App& command, Step& wish) {
-  add_option(command, wish.plant);
-  auto* duty = command.add_option("--duty", wish.duty, "Height of the step, -1 to 1 (default: 0.3)");
+void add_options(CLI::App& command, Step& options) {
+  add_option(command, options.plant);
+  auto* duty = command.add_option("--duty", options.duty, "Height of the step, -1 to 1 (default: 0.3)");
   duty->check(from_to(-1, 1));
-  auto* times = command.add_option("--times", wish.times_s, "Times in s, e.g. 0.1,1,5,60")->delimiter(',');
+  auto* times = command.add_option("--times", options.times_s, "Times in s, e.g. 0.1,1,5,60")->delimiter(',');
   times->check(non_negative());
-  auto* every = command.add_option("--every-s", wish.every_s, "Equally spaced times from 0 on");
+  auto* every = command.add_option("--every-s", options.every_s, "Equally spaced times from 0 on");
   every->check(positive())->excludes(times);
-  auto* until = command.add_option("--until-s", wish.until_s, "The last time (default: 60)");
+  auto* until = command.add_option("--until-s", options.until_s, "The last time (default: 60)");
   until->check(positive())->excludes(times);
   command
-      .add_option("--duty-csv", wish.duty_csv, "Any input: CSV with columns t_s and duty, which holds until the next")
+      .add_option("--duty-csv", options.duty_csv,
+                  "Any input: CSV with columns t_s and duty, which holds until the next")
       ->check(named())
       ->excludes(duty)
       ->excludes(times)
       ->excludes(every)
       ->excludes(until);
-  add_json_and_csv_flags(command, wish.form);
+  add_json_and_csv_flags(command, options.form);
   command.footer("Example: rheonaut step --duty 0.3 --times 0.1,1,5,60");
 }
 
-int run(const Step& wish, std::ostream& out) {
-  const control::FractionalModel plant = read(wish.plant);
+int run(const Step& options, std::ostream& out) {
+  const control::FractionalModel plant = read(options.plant);
   std::vector<double> times_s, duty;
   control::TimeResponse response;
-  if (!wish.duty_csv) {
-    times_s = times_of(wish);
-    duty.assign(times_s.size(), wish.duty);
-    response = control::step_response(plant, wish.duty, times_s);
+  if (!options.duty_csv) {
+    times_s = times_of(options);
+    duty.assign(times_s.size(), options.duty);
+    response = control::step_response(plant, options.duty, times_s);
   } else {
-    CsvColumns columns = read_csv(*wish.duty_csv, {"t_s", "duty"});
+    CsvColumns columns = read_csv(*options.duty_csv, {"t_s", "duty"});
     times_s = std::move(columns["t_s"]);
     duty = std::move(columns["duty"]);
     response = control::sampled_response(plant, times_s, duty);
   }
-  if (wish.form.is_csv) {
+  if (options.form.is_csv) {
     write_csv(out, {{"t_s", times_s},
                     {"duty", duty},
                     {"velocity_m_s", response.velocity_m_s},
                     {"position_m", response.position_m}});
-  } else if (wish.form.is_json) {
+  } else if (options.form.is_json) {
     write_json(out, {{"t_s", times_s},
                      {"duty", duty},
                      {"velocity_m_s", response.velocity_m_s},

@@ -20,7 +20,7 @@ struct Step {
   OutputForm form;
 };
 
-void add_options(CLI::App& command, Step& wish);
-int run(const Step& wish, std::ostream& out);
+void add_options(CLI::App& command, Step& options);
+int run(const Step& options, std::ostream& out);
 
 }  // namespace server::cli

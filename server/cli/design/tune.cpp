@@ -21,14 +21,14 @@ control::RobustnessTable robustness_of(const control::FractionalModel& plant,
   return control::robustness(plant, discretised(controller, Sampling{}).chosen);
 }
 
-void write_asked_and_achieved(std::ostream& out, const Tune& wish, const control::TunedController& tuned) {
+void write_asked_and_achieved(std::ostream& out, const Tune& options, const control::TunedController& tuned) {
   const auto& c = tuned.controller;
   fmt::print(out, "kp = {:.8g}, kd = {:.8g}, mu = {:.8g}\n\n", c.kp, c.kd, c.mu);
   const control::Margins& achieved = tuned.achieved;
   Table table{{"specification", "asked", "achieved", "<unit"}};
-  table.row({"gain crossover", cell(wish.spec.gain_crossover_rad_s), cell(achieved.gain_crossover_rad_s), "rad/s"});
-  table.row({"phase margin", cell(wish.spec.phase_margin_deg), cell(achieved.phase_margin_deg), "deg"});
-  table.row({"phase slope (iso-damping)", wish.spec.mu ? "-" : "0", cell(achieved.phase_slope_deg_per_rad_s, 3),
+  table.row({"gain crossover", cell(options.spec.gain_crossover_rad_s), cell(achieved.gain_crossover_rad_s), "rad/s"});
+  table.row({"phase margin", cell(options.spec.phase_margin_deg), cell(achieved.phase_margin_deg), "deg"});
+  table.row({"phase slope (iso-damping)", options.spec.mu ? "-" : "0", cell(achieved.phase_slope_deg_per_rad_s, 3),
              "deg/(rad/s)"});
   table.row({"Ms", "-", cell(achieved.ms, 4), ""});
   table.row({"Mt", "-", cell(achieved.mt, 4), ""});
@@ -50,14 +50,14 @@ void write_offers(std::ostream& out, const char* title, std::span<const control:
 
 using Ranges = std::vector<control::PhaseMarginRange>;
 
-void write_ranges(std::ostream& out, const Tune& wish, const Ranges& ranges) {
+void write_ranges(std::ostream& out, const Tune& options, const Ranges& ranges) {
   if (ranges.empty()) {
-    fmt::print(out, "\nno phase margin has a sound iso-damped design at {} rad/s\n", wish.spec.gain_crossover_rad_s);
+    fmt::print(out, "\nno phase margin has a sound iso-damped design at {} rad/s\n", options.spec.gain_crossover_rad_s);
     return;
   }
   std::vector<std::string> words;
   for (const auto& range : ranges) words.push_back(fmt::format("{:.2f} to {:.2f}", range.low_deg, range.high_deg));
-  fmt::print(out, "\niso-damped phase margins at {} rad/s: {} deg\n", wish.spec.gain_crossover_rad_s,
+  fmt::print(out, "\niso-damped phase margins at {} rad/s: {} deg\n", options.spec.gain_crossover_rad_s,
              fmt::join(words, ", "));
 }
 
@@ -68,16 +68,16 @@ OrderedJson ends_of(const Ranges& ranges) {
   return ends;
 }
 
-OrderedJson answer_of(const Tune& wish, const control::FractionalModel& plant, const control::TuningResult& result,
+OrderedJson answer_of(const Tune& options, const control::FractionalModel& plant, const control::TuningResult& result,
                       const Ranges& ranges) {
   OrderedJson answer = json_of(result);
   answer["feasible_phase_margins_deg"] = ends_of(ranges);
-  answer["asked"] = {{"crossover_rad_s", wish.spec.gain_crossover_rad_s},
-                     {"phase_margin_deg", wish.spec.phase_margin_deg},
-                     {"mu", or_null(wish.spec.mu)},
-                     {"velocity_loop", wish.spec.is_velocity_loop}};
+  answer["asked"] = {{"crossover_rad_s", options.spec.gain_crossover_rad_s},
+                     {"phase_margin_deg", options.spec.phase_margin_deg},
+                     {"mu", or_null(options.spec.mu)},
+                     {"velocity_loop", options.spec.is_velocity_loop}};
   answer["plant"] = json_of(plant);
-  if (wish.with_robustness && result.tuned) {
+  if (options.with_robustness && result.tuned) {
     answer["robustness"] = json_of(robustness_of(plant, result.tuned->controller));
   }
   return answer;
@@ -85,35 +85,37 @@ OrderedJson answer_of(const Tune& wish, const control::FractionalModel& plant, c
 
 }  // namespace
 
-void add_options(CLI::App& command, Tune& wish) {
-  add_option(command, wish.plant);
-  command.add_option("--crossover-rad-s", wish.spec.gain_crossover_rad_s, "Gain crossover")
+void add_options(CLI::App& command, Tune& options) {
+  add_option(command, options.plant);
+  command.add_option("--crossover-rad-s", options.spec.gain_crossover_rad_s, "Gain crossover")
       ->required()
       ->check(positive());
-  command.add_option("--phase-margin-deg", wish.spec.phase_margin_deg, "Phase margin")->required()->check(finite());
-  command.add_option("--mu", wish.spec.mu, "Order of the derivative, which gives up iso-damping (default: iso-damped)")
+  command.add_option("--phase-margin-deg", options.spec.phase_margin_deg, "Phase margin")->required()->check(finite());
+  command
+      .add_option("--mu", options.spec.mu, "Order of the derivative, which gives up iso-damping (default: iso-damped)")
       ->check(finite());
-  command.add_flag("--velocity-loop", wish.spec.is_velocity_loop, "Without the integrator from velocity to position");
-  command.add_flag("--robustness", wish.with_robustness, "Also predict what becomes of it when the plant differs");
-  add_json_flag(command, wish.form);
+  command.add_flag("--velocity-loop", options.spec.is_velocity_loop,
+                   "Without the integrator from velocity to position");
+  command.add_flag("--robustness", options.with_robustness, "Also predict what becomes of it when the plant differs");
+  add_json_flag(command, options.form);
   command.footer(
       "Exit status 3: nothing meets the specification; the answer says why, and what comes near.\n"
       "Example: rheonaut tune --crossover-rad-s 5 --phase-margin-deg 91");
 }
 
-int run(const Tune& wish, std::ostream& out) {
-  const control::FractionalModel plant = read(wish.plant);
-  const control::TuningResult result = control::tune(plant, wish.spec);
-  const Ranges ranges = control::sound_phase_margins(plant, wish.spec);
-  if (wish.form.is_json) {
-    write_json(out, answer_of(wish, plant, result, ranges));
+int run(const Tune& options, std::ostream& out) {
+  const control::FractionalModel plant = read(options.plant);
+  const control::TuningResult result = control::tune(plant, options.spec);
+  const Ranges ranges = control::sound_phase_margins(plant, options.spec);
+  if (options.form.is_json) {
+    write_json(out, answer_of(options, plant, result, ranges));
   } else if (result.tuned) {
-    write_asked_and_achieved(out, wish, *result.tuned);
-    write_ranges(out, wish, ranges);
-    if (wish.with_robustness) write_robustness(out, robustness_of(plant, result.tuned->controller));
+    write_asked_and_achieved(out, options, *result.tuned);
+    write_ranges(out, options, ranges);
+    if (options.with_robustness) write_robustness(out, robustness_of(plant, result.tuned->controller));
   } else {
     fmt::print(out, "not feasible: {}\n", result.reason);
-    write_ranges(out, wish, ranges);
+    write_ranges(out, options, ranges);
     write_offers(out, "nearest", result.nearest);
     write_offers(out, "relaxed", result.relaxed);
   }

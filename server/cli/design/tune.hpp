@@ -18,9 +18,9 @@ struct Tune {
   OutputForm form;
 };
 
-void add_options(CLI::App& command, Tune& wish);
+void add_options(CLI::App& command, Tune& options);
 
 // 0, or kInfeasible when nothing meets the specification.
-int run(const Tune& wish, std::ostream& out);
+int run(const Tune& options, std::ostream& out);
 
 }  // namespace server::cli

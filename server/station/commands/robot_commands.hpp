@@ -37,7 +37,7 @@ struct RobotCommands {
 
   // That waits for an answer, for telemetry or for a report; null when it is none of them.
   std::shared_ptr<PendingCommand> on_its_way(CommandId id) const;
-  // One that ended without an answer is kept, since telemetry may still tell what became of it.
+  // One that ended without an answer is kept, since telemetry may still show its effect.
   void keep_unknown(std::shared_ptr<PendingCommand> ended);
   // One whose end was unknown waits for its answer again; null when it is not one of those.
   std::shared_ptr<PendingCommand> reopen(CommandId id);

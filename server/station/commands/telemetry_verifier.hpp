@@ -23,7 +23,7 @@ bool is_shown_between(const protocol::Command& command, std::uint64_t from_robot
                       const SampleBatch& batch);
 
 enum class Sight : std::uint8_t {
-  unseen,    // the batch was made too early to tell, or shows something else within the window
+  unseen,    // the batch was made too early, or shows something else within the window
   seen,      //
   missed,    // the window has passed
   overtaken  // something newer has taken the place of what was ordered: of what telemetry shows, an emergency

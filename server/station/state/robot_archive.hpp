@@ -50,7 +50,7 @@ class RobotArchive {
   virtual ~RobotArchive() = default;
 
   // Checks the robot's token, refuses a boot_id that was used by another boot (`boot_id_reused`: robot time or next_seq
-  // lies before what is stored), remembers the boot, and tells what of it is stored.
+  // lies before what is stored), remembers the boot, and returns what of it is stored.
   virtual boost::asio::awaitable<Admission> admit(AdmissionRequest request) = 0;
 };
 

@@ -110,7 +110,7 @@ struct InForceRecord {
 struct ControlState {
   std::string holder;            // an actor; empty: nobody, whoever commands takes it
   std::int64_t taken_at_us = 0;  // UTC
-  std::string wished_by;         // who has asked the holder for it; empty: nobody
+  std::string requested_by;      // who has asked the holder for it; empty: nobody
   bool operator==(const ControlState&) const = default;
 };
 

@@ -38,16 +38,16 @@ class AuditQuota {
     return std::ranges::any_of(left_out_, [](const auto& entry) { return entry.second.count > 0; });
   }
 
-  // What was left out since it was told last; of each action each 10 s, or now.
-  std::vector<std::pair<std::string, std::uint64_t>> tell(std::int64_t now_us, bool at_once) {
-    std::vector<std::pair<std::string, std::uint64_t>> told;
+  // What was left out since it was reported last; of each action each 10 s, or now.
+  std::vector<std::pair<std::string, std::uint64_t>> report(std::int64_t now_us, bool at_once) {
+    std::vector<std::pair<std::string, std::uint64_t>> reported;
     for (auto& [action, left] : left_out_) {
       const bool is_due = at_once || left.told_us == 0 || now_us - left.told_us >= kOneEach.count();
       if (left.count == 0 || !is_due) continue;
       left.told_us = now_us;
-      told.emplace_back(action, std::exchange(left.count, 0));
+      reported.emplace_back(action, std::exchange(left.count, 0));
     }
-    return told;
+    return reported;
   }
 
  private:

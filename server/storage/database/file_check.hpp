@@ -1,5 +1,5 @@
-// Whether a file may be opened as the station's database, told from its bytes before SQLite sees it; and what damage is
-// called.
+// Whether a file may be opened as the station's database, judged by its bytes before SQLite opens it; and what damage
+// is called.
 //
 // SQLite carries out what a crash has left beside a file (a journal, a log) as soon as it reads it. What is not ours is
 // therefore refused before: file, journal and log stay byte for byte. Any thread.
@@ -15,7 +15,7 @@
 namespace server {
 
 // Why it is refused: not SQLite, of another program, of a newer Rheonaut, truncated. None when there is no file, when
-// it is blank, or ours. Ours in the write-ahead log only looks blank here: then SQLite has to tell.
+// it is blank, or ours. Ours in the write-ahead log only looks blank here: then SQLite has to decide.
 std::optional<std::string> file_problem(const std::filesystem::path& path);
 
 // SQLite deletes a write-ahead log whose database is gone. Whoever finds that again needs both, so the log gets another

@@ -31,7 +31,7 @@ void sync_folder_of(const fs::path& path) { sync(fs::absolute(path).parent_path(
 // What is read of a synced file after this comes from its disk.
 void forget_cached(const fs::path& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return;  // reading it will tell
+  if (file < 0) return;  // reading it will report the error
   ::posix_fadvise(file, 0, 0, POSIX_FADV_DONTNEED);
   ::close(file);
 }

@@ -41,7 +41,7 @@ void bind_value(SQLite::Statement& statement, int index, const std::optional<T>&
 // Binds all values in order, before the rows are fetched.
 template <class... Values>
 void bind_all(SQLite::Statement& statement, const Values&... values) {
-  statement.tryReset();  // gives again the error of a last execution that failed, which has been told already
+  statement.tryReset();  // gives again the error of a last execution that failed, which was reported already
   int index = 0;
   (bind_value(statement, ++index, values), ...);
 }

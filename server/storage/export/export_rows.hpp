@@ -40,7 +40,7 @@ struct GridRow {
 // At least as many samples as the spans hold, from the index alone.
 std::uint64_t most_samples(SQLite::Database& database, const std::vector<RecordedSpan>& spans);
 
-// Segments from page to page. The last one of a page is held back until the next page tells whether its span goes on.
+// Segments from page to page. The last one of a page is held back until the next page shows whether its span continues.
 class PagedSegments {
  public:
   void give(SegmentPage page);       // the page after the one before

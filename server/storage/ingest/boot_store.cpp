@@ -75,7 +75,7 @@ std::vector<RestoredRobot> BootStore::robots() {
   return robots;
 }
 
-// SAFETY: a boot that has connected and of which nothing is stored yet says nothing: then the one before it tells.
+// SAFETY: a boot that has connected and of which nothing is stored yet does not count: then the boot before it decides.
 std::uint64_t BootStore::latch_of(const RobotId& robot_id) {
   SQLite::Statement boots{database_.handle(), "SELECT boot_key FROM boot WHERE robot_id = ? ORDER BY boot_key DESC"};
   bind_all(boots, robot_id);
@@ -85,7 +85,7 @@ std::uint64_t BootStore::latch_of(const RobotId& robot_id) {
   return 0;
 }
 
-// A change of the latch is an event and begins a new segment: whichever of the two is later tells. A stop's event is
+// A change of the latch is an event and begins a new segment: the later of the two counts. A stop's event is
 // the earlier one where its samples have arrived, and the only one where they have not.
 std::optional<std::uint64_t> BootStore::last_emergency(std::int64_t boot_key) {
   SQLite::Statement event{database_.handle(),

@@ -96,7 +96,7 @@ class BootStore {
   void set_fluid(const RobotId& robot_id, const std::string& fluid);
 
   // Inside the caller's transaction: ends the robot's other boots (what is missing of them is lost: `reboot`, or
-  // `restore` if they have not been heard since), and lets its open run go on in this one.
+  // `restore` if nothing was received since), and lets its open run go on in this one.
   void start(const BootStart& start);
 
  private:

@@ -49,11 +49,12 @@ std::string DatabaseWorker::write_now(const WriteBatch& commit) {
   }
 }
 
-void DatabaseWorker::close(const std::function<void(Database&, std::int64_t)>& last, std::int64_t utc_us,
-                           const AuditNote& stopped) {
+void DatabaseWorker::close(const std::function<void(Database&, std::int64_t)>& last, const Clock& clock,
+                           AuditNote stopped) {
   store_.reset();
   try {
-    if (last) last(*database_, utc_us);
+    if (last) last(*database_, clock.utc_us());
+    stopped.by.at_us = clock.utc_us();  // it is the last entry
     const AuditHead head = append_audit(database_->handle(), stopped);
     spdlog::info("audit: ends with {}", text(head));
   } catch (const std::exception& error) {

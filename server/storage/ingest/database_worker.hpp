@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/runtime/clock.hpp"
 #include "server/runtime/worker.hpp"
 #include "server/station/state/robot_archive.hpp"
 #include "server/station/state/station_state.hpp"
@@ -58,11 +59,10 @@ class DatabaseWorker {
   // Returns the problem, empty when the commit is durable. It must stay as it is meanwhile.
   boost::asio::awaitable<std::string> write(const WriteBatch& commit);
 
-  // After the loop has ended: the same in this thread; `last` has the database to itself; then its log is emptied and
-  // it is closed. They do not throw.
+  // After the loop has ended: the same in this thread; `last` has the database to itself; then the audit gets its last
+  // entry, the log is emptied and the database closed. They do not throw.
   std::string write_now(const WriteBatch& commit);
-  void close(const std::function<void(Database&, std::int64_t utc_us)>& last, std::int64_t utc_us,
-             const AuditNote& stopped);
+  void close(const std::function<void(Database&, std::int64_t utc_us)>& last, const Clock& clock, AuditNote stopped);
 
  private:
   // After a job of the disk thread, whatever came of it: reports how long the log is.

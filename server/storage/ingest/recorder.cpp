@@ -156,7 +156,7 @@ void Recorder::close(const std::function<void(Database&, std::int64_t)>& last) {
         "still hold",
         queue_->samples(), queue_->events(), queue_->commands(), options_.path.string(), problem);
   }
-  database_.close(last, clock_.utc_us(), of_station("station.stopped", clock_.utc_us()));
+  database_.close(last, clock_, of_station("station.stopped", clock_.utc_us()));
 }
 
 // First a commit that failed, or was cancelled. Returns the problem.
@@ -311,7 +311,7 @@ void Recorder::on_audit(const AuditNote& note) {
 
 // What has no entry is an entry, too: nobody can make the audit silent unseen.
 void Recorder::record_left_out(bool at_once) {
-  for (const auto& [action, count] : quota_.tell(clock_.steady_us(), at_once)) {
+  for (const auto& [action, count] : quota_.report(clock_.steady_us(), at_once)) {
     AuditNote note = of_station("audit.left_out", clock_.utc_us());
     note.subject = action;
     note.detail = fmt::format(R"({{"count":{}}})", count);

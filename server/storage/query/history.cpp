@@ -52,7 +52,7 @@ asio::awaitable<Result<std::vector<RecordedSpan>>> History::spans(Excerpt excerp
   auto query = [excerpt, first_span = after ? after->span : 0](SQLite::Database& database) {
     return read_excerpt(database, excerpt, first_span);
   };
-  co_await recorder_.flush_boots();  // a reboot heard before this moves the open span first
+  co_await recorder_.flush_boots();  // a reboot received before this moves the open span first
   auto found = co_await reader_.ask(std::move(query));
   if (!found) co_return found;
   for (RecordedSpan& span : *found) {
@@ -99,7 +99,7 @@ asio::awaitable<Result<SegmentPage>> History::segments(Excerpt excerpt, std::opt
   if (limit < 1 || limit > kMaxPageSamples) {
     co_return fail(ErrorCode::invalid, fmt::format("limit is {}, allowed are 1 to {}", limit, kMaxPageSamples));
   }
-  auto found = co_await spans(excerpt, after, limit + 1);  // one more tells whether this is the end
+  auto found = co_await spans(excerpt, after, limit + 1);  // one more shows whether this is the end
   if (!found) co_return std::unexpected{found.error()};
   auto query = [spans = std::move(*found), after, limit, channels](SQLite::Database& database) {
     return read_segments(database, spans, after, limit, channels);

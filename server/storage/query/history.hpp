@@ -40,7 +40,7 @@ inline Excerpt excerpt_of(RunId run) { return {.run = run, .robot_id = {}, .wind
 struct AbsencePage {
   std::vector<Gap> gaps;
   std::vector<MissingRange> missing;
-  std::optional<SampleCursor> next;  // the last sample that the page tells of; empty: the end
+  std::optional<SampleCursor> next;  // the last sample of the page; empty: the end
 };
 
 struct Overview {
@@ -78,7 +78,7 @@ class History {
 
   boost::asio::awaitable<AuditPage> audit(AuditFilter filter);
 
-  // Returns when every command and event that the recorder has heard is durable, or after 3 s when the disk fails.
+  // Returns when every command and event that the recorder has received is durable, or after 3 s when the disk fails.
   boost::asio::awaitable<void> settle();
 
   // For questions of one's own, and for text that is made of what a question gave.

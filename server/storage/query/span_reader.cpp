@@ -154,7 +154,7 @@ std::vector<RecordedSpan> read_boots(SQLite::Database& database, const RobotId& 
 SegmentPage read_segments(SQLite::Database& database, const std::vector<RecordedSpan>& spans,
                           const std::optional<SampleCursor>& after, std::size_t limit, Channels channels) {
   SegmentPage page;
-  std::size_t wanted = limit + 1;  // one more tells whether this is the end
+  std::size_t wanted = limit + 1;  // one more shows whether this is the end
   SampleScanner scanner{database, channels};
   for (const RecordedSpan& span : spans) {
     if (after && span.span < after->span) continue;
@@ -194,7 +194,7 @@ GapPage read_gaps(SQLite::Database& database, const std::vector<RecordedSpan>& s
     Interval range = span.samples;
     if (after && after->span == span.span) range.first = std::max(range.first, after->seq + 1);
     if (range.next <= range.first) continue;
-    const std::size_t wanted = limit + 1 - page.gaps.size();  // one more tells whether this is the end
+    const std::size_t wanted = limit + 1 - page.gaps.size();  // one more shows whether this is the end
     std::ranges::move(read_span_gaps(query, span, range, wanted), std::back_inserter(page.gaps));
     if (page.gaps.size() > limit) break;
   }

@@ -17,24 +17,25 @@ namespace {
 constexpr std::size_t kMaxTextBytes = 4000;
 constexpr std::size_t kMaxListed = 1000;
 
-std::optional<BootSample> sample_of(SQLite::Database& database, const MarkerWish& wish, const BootHeads& heads) {
-  if (wish.at_us) return sample_at(database, heads, wish.robot_id, *wish.at_us);
-  const auto boot = samples_of_boot(database, wish.robot_id, wish.boot_id);
-  const auto head = heads.find(wish.boot_id);
+std::optional<BootSample> sample_of(SQLite::Database& database, const MarkerRequest& request, const BootHeads& heads) {
+  if (request.at_us) return sample_at(database, heads, request.robot_id, *request.at_us);
+  const auto boot = samples_of_boot(database, request.robot_id, request.boot_id);
+  const auto head = heads.find(request.boot_id);
   if (!boot || head == heads.end() || head->second == 0) return std::nullopt;
   return BootSample{boot->boot_key, boot->boot_id, head->second - 1};
 }
 
-Result<Marker> insert(SQLite::Database& database, const MarkerWish& wish, const BootHeads& heads, std::int64_t utc_us) {
+Result<Marker> insert(SQLite::Database& database, const MarkerRequest& request, const BootHeads& heads,
+                      std::int64_t utc_us) {
   SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
-  const std::optional<BootSample> at = sample_of(database, wish, heads);
+  const std::optional<BootSample> at = sample_of(database, request, heads);
   if (!at) {
-    return fail(ErrorCode::invalid, fmt::format("robot '{}' had made no sample then", wish.robot_id),
+    return fail(ErrorCode::invalid, fmt::format("robot '{}' had made no sample then", request.robot_id),
                 "nothing_recorded");
   }
   SQLite::Statement add{database, "INSERT INTO marker (boot_key, seq, text, actor, made_at_us) VALUES (?, ?, ?, ?, ?)"};
-  execute(add, at->boot_key, at->seq, wish.text, wish.actor, utc_us);
-  Marker marker{database.getLastInsertRowid(), at->boot_id, at->seq, {}, {}, wish.text, wish.actor, utc_us};
+  execute(add, at->boot_key, at->seq, request.text, request.actor, utc_us);
+  Marker marker{database.getLastInsertRowid(), at->boot_id, at->seq, {}, {}, request.text, request.actor, utc_us};
   if (const auto time = time_of(database, at->boot_key, at->seq)) {
     marker.robot_time_us = time->robot_time_us;
     marker.utc_us = time->utc_us;
@@ -64,23 +65,23 @@ std::vector<Marker> read_markers(SQLite::Database& database, SQLite::Statement& 
 
 }  // namespace
 
-asio::awaitable<Result<Marker>> Markers::add(MarkerWish wish) {
-  if (wish.text.empty() || wish.text.size() > kMaxTextBytes) {
+asio::awaitable<Result<Marker>> Markers::add(MarkerRequest request) {
+  if (request.text.empty() || request.text.size() > kMaxTextBytes) {
     co_return fail(ErrorCode::invalid, fmt::format("a marker's text has 1 to {} bytes", kMaxTextBytes));
   }
-  if (!wish.at_us && wish.boot_id == 0) {
-    co_return fail(ErrorCode::not_connected, fmt::format("robot '{}' is not connected; give at_us", wish.robot_id));
+  if (!request.at_us && request.boot_id == 0) {
+    co_return fail(ErrorCode::not_connected, fmt::format("robot '{}' is not connected; give at_us", request.robot_id));
   }
-  if (wish.at_us && *wish.at_us > clock_.utc_us()) {
+  if (request.at_us && *request.at_us > clock_.utc_us()) {
     co_return fail(ErrorCode::invalid, "at_us is in the future", "out_of_range");
   }
-  const BootHeads heads{{wish.boot_id, recorder_.next_seq(wish.boot_id)}};
+  const BootHeads heads{{request.boot_id, recorder_.next_seq(request.boot_id)}};
   const bool flushed = co_await recorder_.flush_records();
   if (!flushed) {
     co_return fail(ErrorCode::unavailable, "the disk cannot be written now; the station's log says why. Try again");
   }
-  auto job = [wish, heads, utc_us = clock_.utc_us()](Database& database) {
-    return insert(database.handle(), wish, heads, utc_us);
+  auto job = [request, heads, utc_us = clock_.utc_us()](Database& database) {
+    return insert(database.handle(), request, heads, utc_us);
   };
   co_return co_await recorder_.on_disk(std::move(job));
 }

@@ -29,7 +29,7 @@ struct Marker {
   std::int64_t made_at_us = 0;  // UTC
 };
 
-struct MarkerWish {
+struct MarkerRequest {
   RobotId robot_id;
   std::string text;  // 1 to 4000 bytes
   std::string actor;
@@ -44,7 +44,7 @@ class Markers {
 
   // not_connected for a marker now of a robot that is not there; invalid for a time that is in the future or has no
   // sample, or for a bad text.
-  boost::asio::awaitable<Result<Marker>> add(MarkerWish wish);
+  boost::asio::awaitable<Result<Marker>> add(MarkerRequest request);
 
   // In the order in which they were made, at most `limit` (1 to 1000) after the marker `after` (0: from the first).
   boost::asio::awaitable<std::vector<Marker>> of_robot(RobotId robot_id, std::int64_t after, std::size_t limit);

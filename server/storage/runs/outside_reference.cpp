@@ -16,7 +16,7 @@ namespace server {
 namespace {
 
 constexpr std::int64_t kSchemaSince = 7;
-constexpr std::size_t kMaxToldBytes = 200;  // of a reason
+constexpr std::size_t kMaxNotedBytes = 200;  // of a reason
 constexpr const char* kInUse = "completed_at_us IS NOT NULL AND removed_at_us IS NULL";
 constexpr const char* kColumns =
     "reference_id, run_id, span, source, sha256, clock_method, clock_offset_s, clock_sd_s, correlation, motion_ratio,"
@@ -59,7 +59,8 @@ OutsideReference reference_from(SQLite::Statement& row) {
   return found;
 }
 
-void tell(SQLite::Database& database, RunId run, const char* action, const nlohmann::json& detail, const Author& by) {
+void note_in_audit(SQLite::Database& database, RunId run, const char* action, const nlohmann::json& detail,
+                   const Author& by) {
   AuditNote note;
   note.by = by;
   note.robot_id = robot_of(database, run);
@@ -185,11 +186,11 @@ Result<void> complete_reference(SQLite::Database& database, std::int64_t referen
   if (const auto before = find_reference(database, made.run)) {
     mark_removed(database, before->id, reason, by);
     detail["replaces"] = before->source;
-    detail["reason"] = reason.substr(0, kMaxToldBytes);
+    detail["reason"] = reason.substr(0, kMaxNotedBytes);
   }
   SQLite::Statement complete{database, "UPDATE outside_reference SET completed_at_us = ?2 WHERE reference_id = ?1"};
   execute(complete, reference, by.at_us);
-  tell(database, made.run, "run.reference_imported", detail, by);
+  note_in_audit(database, made.run, "run.reference_imported", detail, by);
   transaction.commit();
   return {};
 }
@@ -200,8 +201,8 @@ Result<void> remove_reference(SQLite::Database& database, RunId run, const std::
   const auto found = find_reference(database, run);
   if (!found) return fail(ErrorCode::not_found, fmt::format("run {} has no reference", run), "no_reference");
   mark_removed(database, found->id, reason, by);
-  tell(database, run, "run.reference_removed", {{"source", found->source}, {"reason", reason.substr(0, kMaxToldBytes)}},
-       by);
+  note_in_audit(database, run, "run.reference_removed",
+                {{"source", found->source}, {"reason", reason.substr(0, kMaxNotedBytes)}}, by);
   transaction.commit();
   return {};
 }

@@ -12,7 +12,7 @@
 namespace server {
 namespace {
 
-constexpr std::size_t kMaxToldBytes = 200;  // of a text that stands in run_note as a whole
+constexpr std::size_t kMaxNotedBytes = 200;  // of a text that stands in run_note as a whole
 constexpr std::array<const char*, 8> kTextColumns{"name",          "fluid",   "pump_profile", "tube",
                                                   "operator_name", "profile", "notes",        "verdict"};
 
@@ -43,7 +43,7 @@ std::optional<RunId> RunStore::add_afterwards(Run run, const RecordedSamples& sa
     execute(add, id, static_cast<std::int64_t>(span), boot.boot_key, boot.samples.first, boot.samples.next - 1);
   }
   stored.reset();
-  tell(id, run.robot_id, "run.made", {{"name", run.conditions.name}, {"afterwards", true}}, by);
+  note_in_audit(id, run.robot_id, "run.made", {{"name", run.conditions.name}, {"afterwards", true}}, by);
   transaction.commit();
   return id;
 }
@@ -77,7 +77,7 @@ Result<void> RunStore::annotate(RunId id, const RunAnnotation& annotation, const
     const std::optional<double>& flow = annotation.mean_flow_m_s;
     change("mean_flow_m_s", flow, flow ? fmt::format("{}", *flow) : "");
   }
-  if (!changed.empty()) tell(id, robot_of(handle_, id), "run.annotated", {{"changed", changed}}, by);
+  if (!changed.empty()) note_in_audit(id, robot_of(handle_, id), "run.annotated", {{"changed", changed}}, by);
   transaction.commit();
   return {};
 }
@@ -92,7 +92,7 @@ Result<void> RunStore::discard(RunId id, const std::string& reason, const Author
   execute(mark, id);
   add_note(id, by, "state", text(*state), "discarded");
   add_note(id, by, "discard_reason", "", reason);
-  tell(id, robot_of(handle_, id), "run.discarded", {{"reason", reason.substr(0, kMaxToldBytes)}}, by);
+  note_in_audit(id, robot_of(handle_, id), "run.discarded", {{"reason", reason.substr(0, kMaxNotedBytes)}}, by);
   transaction.commit();
   return {};
 }

@@ -13,7 +13,7 @@
 namespace server {
 namespace {
 
-constexpr std::size_t kMaxToldBytes = 200;  // of a verdict, which stands in the run as a whole
+constexpr std::size_t kMaxNotedBytes = 200;  // of a verdict, which stands in the run as a whole
 
 }  // namespace
 
@@ -36,7 +36,7 @@ Result<RunId> RunStore::add(const Run& run, const std::string& station_document,
   execute(add_span, id, boot.getColumn(0).getInt64(), span.first_seq);
   boot.reset();
   put_in_force(id, station_document, run.started_at_us);
-  tell(id, run.robot_id, "run.made", {{"name", run.conditions.name}}, by);
+  note_in_audit(id, run.robot_id, "run.made", {{"name", run.conditions.name}}, by);
   transaction.commit();
   return id;
 }
@@ -61,7 +61,7 @@ void RunStore::end(RunId id, const std::string& verdict, const std::string& stat
       " WHERE run_id = ?1"};
   execute(mark, id, by.at_us, verdict);
   put_in_force(id, station_document, by.at_us);  // in the spans that reboots have begun
-  tell(id, robot_of(handle_, id), "run.ended", {{"verdict", verdict.substr(0, kMaxToldBytes)}}, by);
+  note_in_audit(id, robot_of(handle_, id), "run.ended", {{"verdict", verdict.substr(0, kMaxNotedBytes)}}, by);
   transaction.commit();
 }
 
@@ -82,15 +82,15 @@ std::vector<RunId> RunStore::interrupt(std::int64_t utc_us) {
       last = time_of(handle_, last_span.getColumn(0).getInt64(), unsigned_id(last_span.getColumn(1)));
     }
     execute(mark, id, last ? last->utc_us : 0);
-    tell(id, robot_of(handle_, id), "run.interrupted", nlohmann::json::object(), {"station", "", utc_us});
+    note_in_audit(id, robot_of(handle_, id), "run.interrupted", nlohmann::json::object(), {"station", "", utc_us});
   }
   last_span.reset();
   transaction.commit();
   return open;
 }
 
-void RunStore::tell(RunId id, const RobotId& robot_id, const char* action, const nlohmann::json& detail,
-                    const Author& by) {
+void RunStore::note_in_audit(RunId id, const RobotId& robot_id, const char* action, const nlohmann::json& detail,
+                             const Author& by) {
   AuditNote note;
   note.by = by;
   note.robot_id = robot_id;
@@ -113,7 +113,7 @@ void RunStore::close_span(RunId id) {
   execute(drop, id, next);
   SQLite::Statement close{handle_, "UPDATE run_span SET last_seq = ?2 - 1 WHERE run_id = ?1 AND last_seq IS NULL"};
   execute(close, id, next);
-  // The station has heard these samples, though they need not be stored yet: if they never are, they count as lost.
+  // The station has received these samples, though they need not be stored yet: if they never are, they count as lost.
   SQLite::Statement made{handle_,
                          "UPDATE boot SET announced_next_seq = max(announced_next_seq, ?2) WHERE boot_key = ?1"};
   execute(made, boot_key, next);

@@ -41,7 +41,8 @@ class RunStore {
 
  private:
   RunId insert(const Run& run);
-  void tell(RunId id, const RobotId& robot_id, const char* action, const nlohmann::json& detail, const Author& by);
+  void note_in_audit(RunId id, const RobotId& robot_id, const char* action, const nlohmann::json& detail,
+                     const Author& by);
   void add_note(RunId id, const Author& author, const std::string& field, const std::string& before,
                 const std::string& after);
   void put_in_force(RunId id, const std::string& station_document, std::int64_t utc_us);

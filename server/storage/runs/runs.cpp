@@ -201,10 +201,10 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, Author by)
   if (verdict.size() > kMaxTextBytes) {
     co_return fail(ErrorCode::invalid, fmt::format("a verdict has at most {} bytes", kMaxTextBytes));
   }
-  BootHeads heard = heads();                                // of the boot that a reboot may end meanwhile
-  const bool flushed = co_await recorder_.flush_records();  // a reboot heard before this moves the open span first
+  BootHeads received = heads();                             // of the boot that a reboot may end meanwhile
+  const bool flushed = co_await recorder_.flush_records();  // a reboot received before this moves the open span first
   if (!flushed) co_return std::unexpected{disk_fails()};
-  for (const auto& [boot_id, next_seq] : heads()) heard[boot_id] = std::max(heard[boot_id], next_seq);
+  for (const auto& [boot_id, next_seq] : heads()) received[boot_id] = std::max(received[boot_id], next_seq);
   const auto open = std::ranges::find(open_runs_, id, [](const auto& entry) { return entry.second; });
   if (id == 0 || open == open_runs_.end()) {
     const std::optional<Run> known = co_await read(id);
@@ -214,7 +214,7 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, Author by)
   const auto robot = robots_.find(open->first);
   const BootId boot_id = robot == robots_.end() ? 0 : robot->second.boot_id;
   by.at_us = clock_.utc_us();
-  auto job = [id, verdict, by, heads = std::move(heard), document = station_document_](Database& database) {
+  auto job = [id, verdict, by, heads = std::move(received), document = station_document_](Database& database) {
     RunStore{database, heads}.end(id, verdict, document, by);
   };
   struct Ending {  // by one request at a time; the run stays open when the job throws

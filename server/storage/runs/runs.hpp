@@ -38,7 +38,7 @@ class Runs final : public StationSink {
   // What load() could not do, because the disk could not be written: until it is done. No run begins before.
   boost::asio::awaitable<void> finish_loading();
 
-  // Some run is open: it is to be interrupted when the recorder has written all it heard.
+  // Some run is open: it is to be interrupted when the recorder has written all that it received.
   bool any_open() const { return !open_runs_.empty(); }
 
   // Of an author the time is not looked at: it is now. create and end: unavailable while the disk cannot be written.

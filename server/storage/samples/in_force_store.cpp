@@ -31,8 +31,8 @@ void store_in_force(SQLite::Database& database, std::int64_t boot_key, const InF
                            " ORDER BY first_seq DESC LIMIT 1"};
   bind_all(latest, boot_key, record.kind, record.first_seq);
   const bool is_first = !latest.executeStep();
-  if (!is_first && latest.getColumn(0).getInt64() == key) return;  // told again after a reconnection
-  // Nobody can have changed it before the boot was first heard.
+  if (!is_first && latest.getColumn(0).getInt64() == key) return;  // reported again after a reconnection
+  // Nobody can have changed it before the boot's first report.
   const std::uint64_t first_seq = is_first && !record.is_change ? 0 : record.first_seq;
   SQLite::Statement add{database,
                         "INSERT OR REPLACE INTO in_force (boot_key, kind, first_seq, document_key, noticed_at_us)"

@@ -41,7 +41,7 @@ class ChainWalk {
   ChainWalk(AuditFindings& findings, const std::optional<AuditHead>& expected, bool is_export)
       : findings_{findings}, expected_{expected}, is_export_{is_export} {}
 
-  // False: it is bad, and so is told. An export begins anywhere in the chain, so its first entry follows from nothing.
+  // False: it is bad, and reported so. An export begins anywhere in the chain, so its first entry follows from nothing.
   bool take(SQLite::Statement& row) {
     const std::int64_t number = row.getColumn(0).getInt64();
     const std::int64_t before = findings_.head.entry;
@@ -114,7 +114,7 @@ bool tells_of_command(const AuditNote& note) {
   return note.action.starts_with("command.") && note.action != "command.refused";
 }
 
-// That an entry tells of a command which is not there; what the row says is compared from its side.
+// Finds an entry about a command which is not there; what the row says is compared from its side.
 class CommandLookup {
  public:
   explicit CommandLookup(SQLite::Database& database)
@@ -167,11 +167,11 @@ bool say_the_same(const AuditNote& a, const AuditNote& b) {
 void check_command(const CommandRecord& command, std::int64_t entry, SQLite::Statement& by_entry,
                    AuditFindings& findings) {
   bind_all(by_entry, entry);
-  const auto told = by_entry.executeStep() ? audit_entry_from(by_entry) : std::nullopt;
-  if (!told) {
+  const auto noted = by_entry.executeStep() ? audit_entry_from(by_entry) : std::nullopt;
+  if (!noted) {
     findings.faults.push_back(
         fmt::format("command {} names entry {} of the audit, which is not there", command.id, entry));
-  } else if (!say_the_same(told->note, audit_note_of(command))) {
+  } else if (!say_the_same(noted->note, audit_note_of(command))) {
     findings.faults.push_back(
         fmt::format("command {} does not say what entry {} of the audit says of it", command.id, entry));
   }

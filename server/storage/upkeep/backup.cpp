@@ -73,7 +73,7 @@ void remove_parts(const fs::path& folder, std::uint64_t store_id) {
   }
 }
 
-// What can be told before it begins. Makes the folder, and room in it.
+// What can be refused before it begins. Makes the folder, and room in it.
 Result<void> check_room(const fs::path& path, const fs::path& database, std::uint64_t store_id) {
   std::error_code error;
   fs::create_directories(path.parent_path(), error);

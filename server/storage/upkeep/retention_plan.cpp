@@ -68,7 +68,7 @@ bool RetentionPlan::look(SQLite::Database& database) {
 
 void RetentionPlan::read_held(SQLite::Database& database) { newest_run_ = add_held(database, 0, held_); }
 
-// SAFETY: the newest segment of a boot that may go on tells after a restart whether the robot is latched.
+// SAFETY: the newest segment of a boot that may go on shows after a restart whether the robot is latched.
 void RetentionPlan::read_boots(SQLite::Database& database) {
   SQLite::Statement boots{database, kBoots};
   bind_all(boots, boot_key_, std::int64_t{kBootsAtOnce});

@@ -16,7 +16,7 @@
 namespace server {
 namespace {
 
-constexpr std::size_t kMostHoles = 100;  // told of a boot
+constexpr std::size_t kMostHoles = 100;  // reported of a boot
 constexpr std::int64_t kPageSegments = 1000;
 constexpr std::uint64_t kPageSamples = 100'000;
 constexpr std::uint64_t kEverySeq = std::numeric_limits<std::int64_t>::max();
@@ -66,8 +66,8 @@ std::string extremes_query(std::int64_t version) {
 
 class Checking {
  public:
-  Checking(SQLite::Database& database, const StoreCheck& wish, StoreFindings& findings)
-      : database_{database}, wish_{wish}, findings_{findings} {}
+  Checking(SQLite::Database& database, const StoreCheck& options, StoreFindings& findings)
+      : database_{database}, options_{options}, findings_{findings} {}
 
   void check_rows_counter();
   void check_boots();
@@ -97,7 +97,7 @@ class Checking {
   void check_rows(SQLite::Statement& segment, std::int64_t boot_key, const std::string& whose);
 
   SQLite::Database& database_;
-  const StoreCheck& wish_;
+  const StoreCheck& options_;
   StoreFindings& findings_;
   SQLite::Statement rows_{database_, "SELECT count(*) FROM sample WHERE row BETWEEN ? AND ?"};
   SQLite::Statement extremes_{database_, extremes_query(database_.execAndGet("PRAGMA user_version").getInt64())};
@@ -218,7 +218,7 @@ void Checking::check_rows(SQLite::Statement& segment, std::int64_t boot_key, con
     fault("{}the segment at sample {} of boot key {} has {} of its {} rows", whose, first_seq, boot_key, found,
           last_row - first_row + 1);
   }
-  if (!wish_.integrity) return;
+  if (!options_.integrity) return;
   bind_all(extremes_, boot_key, first_seq, first_row, last_row);
   if (extremes_.executeStep() && extremes_.getColumn(0).getInt() != 0) {
     fault("{}the extremes of the segment at sample {} of boot key {} are not those of its samples", whose, first_seq,
@@ -310,13 +310,13 @@ void Checking::check_integrity() {
   }
 }
 
-void check_all(SQLite::Database& database, const StoreCheck& wish, StoreFindings& findings) {
-  Checking checking{database, wish, findings};
-  if (wish.integrity) checking.check_integrity();
-  checking.check_spans(wish.run);
-  if (wish.run) {
-    checking.check_samples_of(*wish.run);
-    return checking.check_certificate(*wish.run);
+void check_all(SQLite::Database& database, const StoreCheck& options, StoreFindings& findings) {
+  Checking checking{database, options, findings};
+  if (options.integrity) checking.check_integrity();
+  checking.check_spans(options.run);
+  if (options.run) {
+    checking.check_samples_of(*options.run);
+    return checking.check_certificate(*options.run);
   }
   checking.check_rows_counter();
   checking.check_references();
@@ -329,13 +329,13 @@ void check_all(SQLite::Database& database, const StoreCheck& wish, StoreFindings
 
 }  // namespace
 
-Result<StoreFindings> check_store(SQLite::Database& database, const StoreCheck& wish) {
+Result<StoreFindings> check_store(SQLite::Database& database, const StoreCheck& options) {
   StoreFindings findings;
-  if (wish.run && !read_run_state(database, *wish.run)) {
-    return fail(ErrorCode::not_found, fmt::format("there is no run {}", *wish.run));
+  if (options.run && !read_run_state(database, *options.run)) {
+    return fail(ErrorCode::not_found, fmt::format("there is no run {}", *options.run));
   }
   try {
-    check_all(database, wish, findings);
+    check_all(database, options, findings);
   } catch (const SQLite::Exception& error) {  // what cannot be read is damaged; anything else is not the database's
     if (error.getErrorCode() != SQLITE_CORRUPT && error.getErrorCode() != SQLITE_NOTADB) throw;
     findings.faults.push_back(fmt::format("SQLite: {}", error.what()));

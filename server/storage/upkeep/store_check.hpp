@@ -33,6 +33,6 @@ struct StoreFindings {
 };
 
 // not_found when there is no such run.
-Result<StoreFindings> check_store(SQLite::Database& database, const StoreCheck& wish);
+Result<StoreFindings> check_store(SQLite::Database& database, const StoreCheck& options);
 
 }  // namespace server

@@ -45,7 +45,7 @@ class AuditRoutesTest : public ApiTest {
   }
 };
 
-TEST_F(AuditRoutesTest, ACommandIsThereFromItsWishToItsEnd) {
+TEST_F(AuditRoutesTest, ACommandIsThereFromItsRequestToItsEnd) {
   connect_robot();
   EXPECT_EQ(command({{"kind", "set_duty"}, {"duty", 0.25}}).status, 200);
   const json taken = latest("control.taken");

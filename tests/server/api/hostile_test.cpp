@@ -82,12 +82,12 @@ TEST_F(HostileTest, AThousandIdleConnectionsLeaveRoom) {
     idle.push_back(dial(i % 2 == 0 ? "127.0.0.1" : "127.0.0.2"));
     if (i % 100 == 99) expect_stops();
   }
-  const Door& door = security.http().door;
-  EXPECT_LE(door.connections(), door.limits().connections);
-  EXPECT_GE(door.counters().replaced, 700U);
-  EXPECT_EQ(door.counters().refused, 0U);
+  const ConnectionLimiter& limiter = security.http().limiter;
+  EXPECT_LE(limiter.connections(), limiter.limits().connections);
+  EXPECT_GE(limiter.counters().replaced, 700U);
+  EXPECT_EQ(limiter.counters().refused, 0U);
   clock.run_for(11s);
-  EXPECT_LE(door.connections(), 3U) << "they never said a word";
+  EXPECT_LE(limiter.connections(), 3U) << "they never said a word";
   expect_stops();
 }
 
@@ -153,9 +153,9 @@ TEST_F(HostileTest, APageThatNeverReadsIsLetGo) {
     }
   };
   keep_alive(28);
-  EXPECT_EQ(security.http().door.connections(), 2U);
+  EXPECT_EQ(security.http().limiter.connections(), 2U);
   keep_alive(5);
-  EXPECT_EQ(security.http().door.connections(), 1U) << "let go";
+  EXPECT_EQ(security.http().limiter.connections(), 1U) << "let go";
 }
 
 // A flood of messages is the flooder's own wait; a stop is obeyed all the same.
@@ -221,7 +221,7 @@ TEST_F(SmallHostileTest, IdleConnectionsOfKnownPeopleGiveWayAndBusyOnesStay) {
   const std::size_t before = robot->commands().size();
   pages.front()->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
   EXPECT_EQ(robot->commands().size(), before + 1) << "a page that is open stops though all places are taken";
-  EXPECT_GE(security.http().door.counters().refused, 2U);
+  EXPECT_GE(security.http().limiter.counters().refused, 2U);
 }
 
 }  // namespace

@@ -146,8 +146,8 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
                 response.stream = std::make_unique<CutStream>();
                 co_return response;
               }});
-  Entrance entrance{{clock, "http port", DoorLimits{}}, nullptr};
-  HttpServer server{tasks, clock, listener, entrance, guard, router, upgrades};
+  PortAccess access{{clock, "http port", ConnectionLimits{}}, nullptr};
+  HttpServer server{tasks, clock, listener, access, guard, router, upgrades};
   tasks.spawn("http", server.run());
   {
     RawClient client{clock, listener.endpoint().port()};
@@ -204,8 +204,8 @@ TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
   Auth& auth = credentials.auth;
   const RequestGuard guard{auth, {}};
   const Router router;
-  Entrance entrance{{clock, "http port", DoorLimits{}}, nullptr};
-  HttpServer server{tasks, clock, listener, entrance, guard, router, upgrades};
+  PortAccess access{{clock, "http port", ConnectionLimits{}}, nullptr};
+  HttpServer server{tasks, clock, listener, access, guard, router, upgrades};
   tasks.spawn("http", server.run());
   const auto session = auth.log_in(auth.new_login_code(), "", "");
   {
@@ -220,7 +220,7 @@ TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
   }
   EXPECT_EQ(tasks.exit_code(), 0);
   EXPECT_FALSE(tasks.stopping());
-  EXPECT_EQ(entrance.door.connections(), 0U);
+  EXPECT_EQ(access.limiter.connections(), 0U);
   EXPECT_EQ(tasks.exceptions().count(Ended::live_page), 1U);
   tasks.stop();
   clock.settle();

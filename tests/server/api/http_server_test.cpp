@@ -134,8 +134,8 @@ TEST_F(HttpServerTest, WhoIsInMakesALinkForAnotherPageAndALookDoesNotUseItUp) {
   EXPECT_TRUE(talk("HEAD" + rest).starts_with("HTTP/1.1 405 "));
   EXPECT_TRUE(talk("GET" + rest).starts_with("HTTP/1.1 303 "));
   EXPECT_TRUE(talk("GET" + rest).starts_with("HTTP/1.1 401 "));
-  const std::string stranger = "POST /api/v1/login-links HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
-  EXPECT_TRUE(talk(stranger).starts_with("HTTP/1.1 401 "));
+  const std::string post = "POST /api/v1/login-links HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+  EXPECT_TRUE(talk(post).starts_with("HTTP/1.1 401 "));
 }
 
 TEST_F(HttpServerTest, RefusesAWrongHost) {
@@ -374,7 +374,7 @@ TEST_F(HttpServerTest, SilentConnectionsDoNotKeepAStopOut) {
   known.send(head("GET /api/v1/station"));
   known.read_until("}");
   std::vector<std::unique_ptr<RawClient>> silent;
-  for (std::size_t i = 1; i < security.http().door.limits().of_loopback + 40; ++i) {
+  for (std::size_t i = 1; i < security.http().limiter.limits().of_loopback + 40; ++i) {
     silent.push_back(std::make_unique<RawClient>(clock, api->port()));
   }
   RawClient person{clock, api->port()};

@@ -195,7 +195,7 @@ TEST_F(RightsTest, ATokenOfAUserIsBoundByTheUsersRole) {
     const Author nobody;
     user = co_await in.add_user(anna, nobody);
     Scopes all = Scopes::of(Role::admin);
-    TokenWish wish{"all", all, 0, "anna"};
+    TokenRequest wish{"all", all, 0, "anna"};
     token = co_await in.add_token(wish, nobody);
   };
   tasks.spawn("make", make(accounts, added, made));

@@ -16,14 +16,14 @@ ToolAnswer ask_tool(const std::filesystem::path& folder, const std::string& comm
   ToolAnswer given;
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
-  const Wish wish = parse_command_line(static_cast<int>(arguments.size()), arguments.data());
+  const CommandLine line = parse_command_line(static_cast<int>(arguments.size()), arguments.data());
   const std::string help = ::testing::internal::GetCapturedStdout();
   given.error = ::testing::internal::GetCapturedStderr();
   std::ostringstream out;
   ::testing::internal::CaptureStderr();
   std::string thrown;
   try {
-    given.exit_code = answer(wish, out).value_or(0);
+    given.exit_code = answer(line, out).value_or(0);
   } catch (const std::exception& error) {
     given.exit_code = 1;
     thrown = error.what();

@@ -180,7 +180,7 @@ TEST_F(CommandLifeTest, WhatIsOlderThanItsLifeOnArrivalIsNotSentAndIsAccountedFo
   EXPECT_LE(robot->commands()[0].valid_until_robot_us, robot->robot_now_us() + 100'000);
 }
 
-TEST_F(CommandLifeTest, AWishThatComesAgainUnderItsKeyIsNotSentAgain) {
+TEST_F(CommandLifeTest, ARequestThatComesAgainUnderItsKeyIsNotSentAgain) {
   auto* robot = connect();
   CommandRequest request = request_of(set_duty(0.3F));
   request.key = "try-1";

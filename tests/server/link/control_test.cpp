@@ -154,7 +154,7 @@ TEST_F(ControlTest, EachChangeIsAnEventOfTheRobot) {
   ASSERT_TRUE(control("session:1", ControlAction::take));
   EXPECT_EQ(sink.events.back().kind, "control_taken");
   ASSERT_TRUE(control("session:2", ControlAction::request));
-  EXPECT_EQ(sink.robots.back().control.wished_by, "session:2");
+  EXPECT_EQ(sink.robots.back().control.requested_by, "session:2");
   ASSERT_TRUE(control("session:1", ControlAction::hand_over));
   EXPECT_EQ(sink.robots.back().control.holder, "session:2");
   ASSERT_TRUE(control("session:1", ControlAction::force));

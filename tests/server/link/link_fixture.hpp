@@ -80,10 +80,10 @@ class LinkTest : public ::testing::Test {
   Station station;
   RecordingSink sink;
   FakeArchive archive;
-  static constexpr DoorLimits kPlaces{400, 100, 50, 300};
-  Entrance entrance{{clock, "robot port", kPlaces}, nullptr};
-  RobotListener listener{loop,  clock,   tasks, station, archive, {boost::asio::ip::address_v4::loopback(), 0},
-                         false, entrance};
+  static constexpr ConnectionLimits kPlaces{400, 100, 50, 300};
+  PortAccess access{{clock, "robot port", kPlaces}, nullptr};
+  RobotListener listener{loop,  clock, tasks, station, archive, {boost::asio::ip::address_v4::loopback(), 0},
+                         false, access};
   std::vector<Result<CommandRecord>> results;
 
  private:

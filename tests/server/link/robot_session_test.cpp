@@ -222,12 +222,12 @@ TEST_F(LinkTest, ARefusedTokenIsAnEventOfARobotThatIsKnown) {
   ASSERT_EQ(sink.events.back().kind, "connection_refused");
   EXPECT_NE(sink.events.back().detail.find("wrong_token: the token of 'r1' is another one"), std::string::npos);
   const std::size_t before = sink.events.size();
-  auto* stranger = dial();
+  auto* unauthenticated = dial();
   auto hello = TestRobot::hello_frame();
   hello.body.hello.robot_id[1] = '9';
-  stranger->send(hello);
-  ASSERT_TRUE(clock.run_until([&] { return stranger->closed; }, 1s));
-  EXPECT_EQ(sink.events.size(), before) << "a stranger's name makes no record";
+  unauthenticated->send(hello);
+  ASSERT_TRUE(clock.run_until([&] { return unauthenticated->closed; }, 1s));
+  EXPECT_EQ(sink.events.size(), before) << "an unauthenticated robot's name makes no record";
   EXPECT_TRUE(connected());
 }
 
@@ -322,21 +322,21 @@ TEST_F(LinkTest, AnAnswerToNoProbeOfOursDoesNotMoveTheClock) {
 TEST_F(LinkTest, TheOldestSilentConnectionGivesWayAndARobotNever) {
   auto* robot = connect();
   std::vector<TestRobot*> silent;
-  for (std::size_t i = 0; i < kPlaces.strangers + 20; ++i) {
+  for (std::size_t i = 0; i < kPlaces.unauthenticated + 20; ++i) {
     silent.push_back(dial());
     clock.settle();
   }
   EXPECT_TRUE(silent[19]->closed);
   EXPECT_FALSE(silent[20]->closed);
-  EXPECT_EQ(entrance.door.counters().replaced, 20U);
+  EXPECT_EQ(access.limiter.counters().replaced, 20U);
   EXPECT_FALSE(robot->closed);
   clock.run_for(6s);  // the silent ones are gone
-  EXPECT_EQ(entrance.door.connections(), 1U);
+  EXPECT_EQ(access.limiter.connections(), 1U);
   EXPECT_TRUE(connected());
 }
 
 TEST_F(LinkTest, ARobotGetsInThroughACrowdOfSilentConnectionsAndIsStopped) {
-  for (std::size_t i = 0; i < kPlaces.strangers; ++i) dial();
+  for (std::size_t i = 0; i < kPlaces.unauthenticated; ++i) dial();
   clock.settle();
   auto* robot = connect();
   for (int i = 0; i < 50; ++i) dial();

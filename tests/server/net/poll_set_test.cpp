@@ -149,7 +149,7 @@ TEST_F(PollSetTest, TwoWithinAPauseAreAFleetUntilItHasBeenQuiet) {
   lines[1]->say('x');
   clock.settle();
   EXPECT_EQ(heard, (std::vector<int>{0, 1}));
-  for (std::size_t looks = 1; looks <= PollSet::kQuietLooks; ++looks) {
+  for (std::size_t looks = 1; looks <= PollSet::kQuietRounds; ++looks) {
     lines[0]->say('x');
     clock.settle();
     EXPECT_EQ(heard.size(), 1 + looks);
@@ -158,7 +158,7 @@ TEST_F(PollSetTest, TwoWithinAPauseAreAFleetUntilItHasBeenQuiet) {
   }
   lines[0]->say('x');
   clock.settle();
-  EXPECT_EQ(heard.size(), 3U + PollSet::kQuietLooks);
+  EXPECT_EQ(heard.size(), 3U + PollSet::kQuietRounds);
 }
 
 TEST_F(PollSetTest, EverybodyElseHasATurnAfterAFew) {

@@ -98,7 +98,7 @@ class TlsTest : public ::testing::Test {
   std::unique_ptr<TransportSecurity> security;
   std::unique_ptr<StreamSocket> served;  // the last connection
   PollSet sockets{loop, clock};
-  std::optional<TlsGate::Outcome> outcome;
+  std::optional<TlsHandshakes::Outcome> outcome;
   std::ostringstream log;
   std::shared_ptr<spdlog::logger> before = spdlog::default_logger();
 };

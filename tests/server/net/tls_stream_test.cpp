@@ -12,7 +12,7 @@ TEST_F(TlsTest, BytesLeaveAtOnce) {
   start();
   Client client{clock, listener.endpoint()};
   ASSERT_TRUE(client.shake_hands());
-  ASSERT_EQ(outcome, TlsGate::Outcome::secure);
+  ASSERT_EQ(outcome, TlsHandshakes::Outcome::secure);
   const auto stream = make_stream(std::move(*served), sockets);
   EXPECT_EQ(stream->write_now(asio::buffer("stop", 4)), 4U);
   EXPECT_EQ(client.read(4), "stop");

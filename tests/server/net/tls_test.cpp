@@ -14,7 +14,7 @@ TEST_F(TlsTest, AClientThatSaysNothingIsLetGoAfterTenSecondsAndHoldsNobodyUp) {
   EXPECT_FALSE(outcome);
   const std::int64_t begun_us = clock.steady_us();
   ASSERT_TRUE(clock.run_until([&] { return outcome.has_value(); }, 20s));
-  EXPECT_EQ(*outcome, TlsGate::Outcome::failed);
+  EXPECT_EQ(*outcome, TlsHandshakes::Outcome::failed);
   EXPECT_EQ(clock.steady_us() - begun_us, kHandshakeTime.count());
   EXPECT_EQ(security->gate()->counters().failed, 1U);
   EXPECT_THAT(log.str(), HasSubstr("test port: no TLS with 127.0.0.1:"));
@@ -26,13 +26,13 @@ TEST_F(TlsTest, WhoDoesNotSpeakTlsIsToldApartAndWhatItSentCanStillBeRead) {
   Client client{clock, listener.endpoint()};
   client.send_plain("GET / HTTP/1.1\r\n");
   ASSERT_TRUE(clock.run_until([&] { return outcome.has_value(); }, 1s));
-  EXPECT_EQ(*outcome, TlsGate::Outcome::not_tls);
+  EXPECT_EQ(*outcome, TlsHandshakes::Outcome::not_tls);
   char bytes[64];
   EXPECT_EQ(::recv(served->tcp().native_handle(), bytes, sizeof bytes, MSG_DONTWAIT), 16);
   Client garbage{clock, listener.endpoint()};
   garbage.send_plain(std::string(1, '\x16') + std::string(200, 'x'));
   ASSERT_TRUE(clock.run_until([&] { return outcome.has_value(); }, 1s));
-  EXPECT_EQ(*outcome, TlsGate::Outcome::failed);
+  EXPECT_EQ(*outcome, TlsHandshakes::Outcome::failed);
 }
 
 TEST_F(TlsTest, AtMostOneFailureASecondIsLogged) {

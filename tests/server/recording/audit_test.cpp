@@ -143,9 +143,9 @@ TEST_F(AuditTest, ACommitThatFailsTakesItsEntriesWithIt) {
 
 TEST_F(AuditTest, AKillLeavesAWholeChainAndTheNextStartGoesOnWithIt) {
   start();
-  CommandRecord stop_wish = command(3, CommandState::sent);
-  stop_wish.kind = "emergency_stop";
-  recorder_->on_command(stop_wish);
+  CommandRecord stop_request = command(3, CommandState::sent);
+  stop_request.kind = "emergency_stop";
+  recorder_->on_command(stop_request);
   recorder_->on_command(command(4, CommandState::sent));
   flush_records();
   recorder_->on_audit(note("control.taken"));  // not committed
@@ -229,9 +229,9 @@ TEST_F(AuditTest, WhatTheFullQueueDoesNotTakeIsCountedToo) {
   start(options);
   for (int n = 0; n < 25; ++n) recorder_->on_audit(note("control.taken"));
   recorder_->on_command(command(5));
-  CommandRecord stop_wish = command(6);
-  stop_wish.kind = "emergency_stop";
-  recorder_->on_command(stop_wish);  // SAFETY: is recorded whatever waits
+  CommandRecord stop_request = command(6);
+  stop_request.kind = "emergency_stop";
+  recorder_->on_command(stop_request);  // SAFETY: is recorded whatever waits
   stop();
   const std::int64_t written = number("SELECT count(*) FROM audit WHERE action = 'control.taken'");
   EXPECT_LE(written, 10);

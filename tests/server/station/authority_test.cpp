@@ -82,18 +82,18 @@ TEST_F(AuthorityTest, IsHandedOverToWhoHasAsked) {
   ASSERT_TRUE(authority_.use("r1", "session:1"));
   EXPECT_EQ(authority_.hand_over("r1", "session:1").error().reason, "not_requested");
   ASSERT_TRUE(authority_.request("r1", "session:2"));
-  EXPECT_EQ(authority_.of("r1").wished_by, "session:2");
+  EXPECT_EQ(authority_.of("r1").requested_by, "session:2");
   EXPECT_FALSE(authority_.hand_over("r1", "session:2")) << "who asks does not decide";
   ASSERT_TRUE(authority_.hand_over("r1", "session:1"));
   EXPECT_EQ(authority_.of("r1").holder, "session:2");
-  EXPECT_EQ(authority_.of("r1").wished_by, "");
+  EXPECT_EQ(authority_.of("r1").requested_by, "");
 }
 
-TEST_F(AuthorityTest, AWishIsForgottenAfterAWhile) {
+TEST_F(AuthorityTest, ARequestIsForgottenAfterAWhile) {
   ASSERT_TRUE(authority_.take("r1", "session:1", 300s));
   ASSERT_TRUE(authority_.request("r1", "session:2"));
   clock_.run_for(kRequestLife);
-  EXPECT_EQ(authority_.of("r1").wished_by, "");
+  EXPECT_EQ(authority_.of("r1").requested_by, "");
   EXPECT_FALSE(authority_.hand_over("r1", "session:1"));
 }
 

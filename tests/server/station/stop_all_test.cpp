@@ -30,6 +30,7 @@ class NotingPort final : public RobotPort {
     notes_.push_back("frame " + id_);
     stop = command.command_id;
     station_.on_command_sent(*this, command.command_id);
+    if (breaks_behind_it) throw std::runtime_error{"no memory"};
   }
   void acknowledge(std::uint64_t, std::uint64_t) override {}
   void request_resend(std::uint64_t, std::uint64_t) override {}
@@ -45,6 +46,7 @@ class NotingPort final : public RobotPort {
   }
 
   bool is_broken = false;
+  bool breaks_behind_it = false;  // the frame has left then
   CommandId stop = 0;
 
  private:
@@ -94,6 +96,36 @@ class StopAllTest : public ::testing::Test {
     clock.settle();
   }
 
+  // Of "a"; what the sinks and the link throw is swallowed.
+  void stop_one() {
+    auto task = [](StopAllTest& test) -> boost::asio::awaitable<void> {
+      StopRequest request;
+      request.robot_id = "a";
+      request.actor = "user:anna";
+      try {
+        co_await test.station.emergency_stop(std::move(request), 1s);
+      } catch (const std::runtime_error&) {
+        test.notes.push_back("exception");
+      }
+    };
+    tasks.spawn("stop one", task(*this));
+    clock.settle();
+  }
+
+  // To "a", whose link never says that it was sent.
+  void submit_duty() {
+    auto task = [](StopAllTest& test) -> boost::asio::awaitable<void> {
+      CommandRequest request;
+      request.robot_id = "a";
+      request.actor = "user:anna";
+      request.action.which_action = rheonaut_Command_set_duty_tag;
+      request.action.action.set_duty.lease_ms = 500;
+      co_await test.station.submit(std::move(request));
+    };
+    tasks.spawn("duty", task(*this));
+    clock.settle();
+  }
+
   boost::asio::io_context loop;
   VirtualClock clock{loop};
   TaskGroup tasks{loop};
@@ -139,6 +171,22 @@ TEST_F(StopAllTest, OneThatCannotBeStoppedKeepsNoOtherFromIt) {
   EXPECT_THAT(outcome->failed, ElementsAre("a", "c"));
   ASSERT_EQ(outcome->records.size(), 1u);
   EXPECT_EQ(outcome->records[0].robot_id, "b");
+}
+
+// SAFETY: else a stop that the robot has not acknowledged would be unknown after a restart of the station.
+TEST_F(StopAllTest, AStopIsRecordedThoughItsLinkFailsBehindIt) {
+  connect("a").breaks_behind_it = true;
+  stop_one();
+  EXPECT_THAT(notes, ElementsAre("frame a", "record a", "exception"));
+}
+
+TEST_F(StopAllTest, ASinkThatFailsKeepsNoRecordFromBeingPublished) {
+  connect("a");
+  submit_duty();
+  notes.clear();
+  sink.broken = "a";
+  stop_one();
+  EXPECT_THAT(notes, ElementsAre("frame a", "record a", "record a", "exception")) << "of the stop and of the duty";
 }
 
 TEST_F(StopAllTest, ARobotThatIsAwayIsNotWaitedFor) {

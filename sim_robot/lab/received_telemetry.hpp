@@ -1,6 +1,6 @@
-// What the least of a station has heard of its robot, and what it says because of that.
+// What the simplest station has received from its robot, and how it answers.
 //
-// Everything heard counts as stored at once. A sample that the robot no longer holds is final: the acknowledgement
+// Everything received counts as stored at once. A sample that the robot no longer holds is final: the acknowledgement
 // passes over it, and lost_samples() counts it.
 #pragma once
 
@@ -30,14 +30,14 @@ struct ReceivedSample {
   std::uint32_t controller_id = 0;
 };
 
-class HeardRobot {
+class ReceivedTelemetry {
  public:
   std::optional<protocol::CommandAck> ack_of(std::uint64_t command_id) const;
   // Of this boot, below what is acknowledged.
   std::uint64_t lost_samples() const { return lost_samples_; }
   std::uint64_t durable_next_seq() const { return samples.empty() ? 0 : durable_next_seq_; }
 
-  bool attentive = true;                                   // sends signs of life
+  bool attentive = true;                                   // sends heartbeats
   bool keeps_samples = true;                               // acknowledges as durable
   protocol::Welcome welcome = rheonaut_Welcome_init_zero;  // its durable numbers are filled in
 
@@ -52,7 +52,7 @@ class HeardRobot {
   std::vector<std::map<std::uint64_t, ReceivedSample>> earlier_boots;
 
  protected:
-  ~HeardRobot() = default;
+  ~ReceivedTelemetry() = default;
 
   // False when the bytes are no frames.
   bool take(protocol::Bytes bytes);

@@ -1,5 +1,5 @@
 // Each function twice: a request, or a transaction.
-#include "server/cli/accounts/account_door.hpp"
+#include "server/cli/accounts/account_access.hpp"
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -66,7 +66,7 @@ std::string ask_silently(const std::string& question) {
 
 }  // namespace
 
-AccountDoor::AccountDoor(const fs::path& data_dir, Missing missing) {
+AccountAccess::AccountAccess(const fs::path& data_dir, Missing missing) {
   const fs::path database = data_dir / "station.sqlite";
   if (missing == Missing::make) {
     make_data_folder(data_dir);
@@ -81,16 +81,16 @@ AccountDoor::AccountDoor(const fs::path& data_dir, Missing missing) {
   }
 }
 
-json AccountDoor::ask(const std::string& method, const std::string& target, const json& body) const {
+json AccountAccess::ask(const std::string& method, const std::string& target, const json& body) const {
   const StationAnswer answer = station_->ask(method, "/api/v1" + target, body);
   constexpr int kFirstProblem = 300;
   if (answer.status < kFirstProblem) return answer.body;
   throw std::runtime_error{answer.body.value("detail", fmt::format("the station answers {}", answer.status))};
 }
 
-json AccountDoor::users() { return station_ ? ask("GET", "/users").at("users") : list_of(store().load().users); }
+json AccountAccess::users() { return station_ ? ask("GET", "/users").at("users") : list_of(store().load().users); }
 
-void AccountDoor::add_user(const std::string& name, Role role, const std::string& password) {
+void AccountAccess::add_user(const std::string& name, Role role, const std::string& password) {
   if (station_) {
     ask("POST", "/users", {{"name", name}, {"role", text(role)}, {"password", password}});
     return;
@@ -101,7 +101,7 @@ void AccountDoor::add_user(const std::string& name, Role role, const std::string
   value_of(store().add_user({name, role, hash_password(password, {}), by.at_us, by.actor, false}, by));
 }
 
-void AccountDoor::change_user(const std::string& name, const UserChange& change, const json& body) {
+void AccountAccess::change_user(const std::string& name, const UserChange& change, const json& body) {
   value_of(check_name(name));
   if (station_) {
     ask("POST", "/users/" + name + "/change", body);
@@ -110,22 +110,22 @@ void AccountDoor::change_user(const std::string& name, const UserChange& change,
   }
 }
 
-void AccountDoor::set_role(const std::string& name, Role role) {
+void AccountAccess::set_role(const std::string& name, Role role) {
   change_user(name, {role, {}, {}}, {{"role", text(role)}});
 }
 
-void AccountDoor::set_password(const std::string& name, const std::string& password) {
+void AccountAccess::set_password(const std::string& name, const std::string& password) {
   value_of(check_password(password));
   UserChange change;
   if (!station_) change.password_hash = hash_password(password, {});
   change_user(name, change, {{"password", password}});
 }
 
-void AccountDoor::set_disabled(const std::string& name, bool disabled) {
+void AccountAccess::set_disabled(const std::string& name, bool disabled) {
   change_user(name, {{}, {}, disabled}, {{"disabled", disabled}});
 }
 
-void AccountDoor::remove_user(const std::string& name) {
+void AccountAccess::remove_user(const std::string& name) {
   value_of(check_name(name));
   if (station_) {
     ask("POST", "/users/" + name + "/remove");
@@ -134,9 +134,9 @@ void AccountDoor::remove_user(const std::string& name) {
   }
 }
 
-json AccountDoor::tokens() { return station_ ? ask("GET", "/tokens").at("tokens") : list_of(store().load().tokens); }
+json AccountAccess::tokens() { return station_ ? ask("GET", "/tokens").at("tokens") : list_of(store().load().tokens); }
 
-json AccountDoor::add_token(const std::string& name, Scopes scopes, std::int64_t days) {
+json AccountAccess::add_token(const std::string& name, Scopes scopes, std::int64_t days) {
   json body{{"name", name}, {"scopes", text(scopes)}};
   if (days != 0) body["days"] = days;
   if (station_) return ask("POST", "/tokens", body);
@@ -156,7 +156,7 @@ json AccountDoor::add_token(const std::string& name, Scopes scopes, std::int64_t
   return made;
 }
 
-void AccountDoor::revoke_token(const std::string& name) {
+void AccountAccess::revoke_token(const std::string& name) {
   value_of(check_name(name));
   if (station_) {
     ask("POST", "/tokens/" + name + "/revoke");
@@ -165,11 +165,11 @@ void AccountDoor::revoke_token(const std::string& name) {
   }
 }
 
-json AccountDoor::enrolments() {
+json AccountAccess::enrolments() {
   return station_ ? ask("GET", "/enrolments").at("enrolments") : list_of(store().enrolments());
 }
 
-json AccountDoor::enrol(const std::string& robot_id) {
+json AccountAccess::enrol(const std::string& robot_id) {
   if (station_) return ask("POST", "/enrolments", {{"robot_id", robot_id}});
   const std::string secret = random_secret();
   json made = to_json(value_of(store().enrol(robot_id, hash_of(secret), command_line_author())));
@@ -177,7 +177,7 @@ json AccountDoor::enrol(const std::string& robot_id) {
   return made;
 }
 
-void AccountDoor::revoke_robot(const std::string& robot_id) {
+void AccountAccess::revoke_robot(const std::string& robot_id) {
   if (station_) {
     ask("POST", "/enrolments/" + robot_id + "/revoke");
   } else {
@@ -185,7 +185,7 @@ void AccountDoor::revoke_robot(const std::string& robot_id) {
   }
 }
 
-void AccountDoor::set_retired(const std::string& robot_id, bool retired) {
+void AccountAccess::set_retired(const std::string& robot_id, bool retired) {
   if (station_) {
     ask("POST", "/robots/" + robot_id + "/retire", {{"retired", retired}});
   } else {

@@ -1,5 +1,5 @@
 // Who gets in at a port whose places are few, and who gives way.
-#include "server/net/door.hpp"
+#include "server/net/connection_limiter.hpp"
 
 #include <gtest/gtest.h>
 #include <spdlog/sinks/ostream_sink.h>
@@ -16,7 +16,7 @@ namespace {
 class DoorTest : public ::testing::Test {
  protected:
   struct Visitor {
-    std::unique_ptr<Guest> guest;
+    std::unique_ptr<ConnectionSlot> slot;
     bool ended = false;
   };
 
@@ -27,31 +27,32 @@ class DoorTest : public ::testing::Test {
   ~DoorTest() override { spdlog::set_default_logger(before); }
 
   // Null when refused.
-  Visitor* come(const std::string& address, Guest::State state = Guest::stranger, bool from_loopback = false) {
-    auto guest = door.admit(address, from_loopback);
-    if (!guest) {
-      refusal = guest.error();
+  Visitor* come(const std::string& address, ConnectionSlot::State state = ConnectionSlot::unauthenticated,
+                bool from_loopback = false) {
+    auto slot = limiter.admit(address, from_loopback);
+    if (!slot) {
+      refusal = slot.error();
       return nullptr;
     }
     visitors.push_back(std::make_unique<Visitor>());
     Visitor* visitor = visitors.back().get();
-    visitor->guest = std::move(*guest);
-    visitor->guest->on_end([visitor] { visitor->ended = true; });
-    visitor->guest->becomes(state);
+    visitor->slot = std::move(*slot);
+    visitor->slot->on_end([visitor] { visitor->ended = true; });
+    visitor->slot->becomes(state);
     return visitor;
   }
   // Whoever was ended goes, as its task does at the loop's next turn.
   void go() {
     for (const auto& visitor : visitors) {
-      if (visitor->ended) visitor->guest.reset();
+      if (visitor->ended) visitor->slot.reset();
     }
   }
 
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  Door door{clock, "test port", {8, 6, 3, 6}};
+  ConnectionLimiter limiter{clock, "test port", {8, 6, 3, 6}};
   std::vector<std::unique_ptr<Visitor>> visitors;
-  std::optional<Door::Refusal> refusal;
+  std::optional<ConnectionLimiter::Refusal> refusal;
   std::ostringstream log;
   std::shared_ptr<spdlog::logger> before = spdlog::default_logger();
 };
@@ -59,35 +60,35 @@ class DoorTest : public ::testing::Test {
 TEST_F(DoorTest, AnAddressWithItsShareGivesUpItsOldestStranger) {
   Visitor* first = come("10.0.0.1");
   Visitor* second = come("10.0.0.1");
-  come("10.0.0.1", Guest::busy);
+  come("10.0.0.1", ConnectionSlot::busy);
   Visitor* other = come("10.0.0.2");
   EXPECT_NE(come("10.0.0.1"), nullptr);
   EXPECT_TRUE(first->ended);
   EXPECT_FALSE(second->ended || other->ended);
   EXPECT_NE(come("10.0.0.1"), nullptr);
   EXPECT_TRUE(second->ended);
-  EXPECT_EQ(door.counters().replaced, 2U);
+  EXPECT_EQ(limiter.counters().replaced, 2U);
   go();
-  EXPECT_EQ(door.connections(), 4U);
+  EXPECT_EQ(limiter.connections(), 4U);
 }
 
 TEST_F(DoorTest, AnIdleOneGivesWayWhenThereIsNoStrangerAndABusyOneNever) {
-  Visitor* idle = come("10.0.0.1", Guest::idle);
-  Visitor* later = come("10.0.0.1", Guest::idle);
-  come("10.0.0.1", Guest::busy);
-  idle->guest->becomes(Guest::busy);
-  idle->guest->rest();  // now it is the other that is idle the longest
-  EXPECT_NE(come("10.0.0.1", Guest::busy), nullptr);
+  Visitor* idle = come("10.0.0.1", ConnectionSlot::idle);
+  Visitor* later = come("10.0.0.1", ConnectionSlot::idle);
+  come("10.0.0.1", ConnectionSlot::busy);
+  idle->slot->becomes(ConnectionSlot::busy);
+  idle->slot->rest();  // now it is the other that is idle the longest
+  EXPECT_NE(come("10.0.0.1", ConnectionSlot::busy), nullptr);
   EXPECT_TRUE(later->ended);
-  EXPECT_NE(come("10.0.0.1", Guest::busy), nullptr);
+  EXPECT_NE(come("10.0.0.1", ConnectionSlot::busy), nullptr);
   EXPECT_TRUE(idle->ended);
   EXPECT_EQ(come("10.0.0.1"), nullptr);
-  EXPECT_EQ(refusal, Door::Refusal::address_has_its_share);
+  EXPECT_EQ(refusal, ConnectionLimiter::Refusal::address_has_its_share);
   EXPECT_NE(come("10.0.0.2"), nullptr) << "nobody else is kept out";
-  EXPECT_EQ(door.counters().refused, 1U);
+  EXPECT_EQ(limiter.counters().refused, 1U);
 }
 
-// SAFETY: whoever has most strangers loses one, and the one who came alone to stop a robot stays.
+// SAFETY: whoever has most unauthenticated loses one, and the one who came alone to stop a robot stays.
 TEST_F(DoorTest, AFullDoorTakesTheStrangerOfWhoeverHasMost) {
   Visitor* alone = come("10.0.0.9");
   Visitor* of_two = come("10.0.0.2");
@@ -95,7 +96,7 @@ TEST_F(DoorTest, AFullDoorTakesTheStrangerOfWhoeverHasMost) {
   Visitor* of_three = come("10.0.0.1");
   come("10.0.0.1");
   come("10.0.0.1");
-  EXPECT_NE(come("10.0.0.3"), nullptr) << "strangers have 6 places";
+  EXPECT_NE(come("10.0.0.3"), nullptr) << "unauthenticated have 6 places";
   EXPECT_TRUE(of_three->ended);
   EXPECT_FALSE(alone->ended || of_two->ended);
   EXPECT_NE(come("10.0.0.4"), nullptr);
@@ -104,21 +105,21 @@ TEST_F(DoorTest, AFullDoorTakesTheStrangerOfWhoeverHasMost) {
 }
 
 TEST_F(DoorTest, AFullDoorWithNobodyWhoMayGoRefuses) {
-  for (int i = 0; i < 8; ++i) ASSERT_NE(come("10.0.0." + std::to_string(i), Guest::busy), nullptr);
+  for (int i = 0; i < 8; ++i) ASSERT_NE(come("10.0.0." + std::to_string(i), ConnectionSlot::busy), nullptr);
   EXPECT_EQ(come("10.0.0.9"), nullptr);
-  EXPECT_EQ(refusal, Door::Refusal::full);
+  EXPECT_EQ(refusal, ConnectionLimiter::Refusal::full);
   visitors.pop_back();
   EXPECT_NE(come("10.0.0.9"), nullptr);
 }
 
 TEST_F(DoorTest, AddressesOfThisMachineHaveMoreAndNotAll) {
-  for (int i = 0; i < 6; ++i) ASSERT_NE(come("127.0.0.1", Guest::busy, true), nullptr);
-  EXPECT_EQ(come("127.0.0.1", Guest::stranger, true), nullptr);
+  for (int i = 0; i < 6; ++i) ASSERT_NE(come("127.0.0.1", ConnectionSlot::busy, true), nullptr);
+  EXPECT_EQ(come("127.0.0.1", ConnectionSlot::unauthenticated, true), nullptr);
   EXPECT_NE(come("10.0.0.1"), nullptr);
 }
 
 TEST_F(DoorTest, ANetworkOfIpv6IsOneAddress) {
-  for (int i = 0; i < 3; ++i) come("2001:db8:1:2::" + std::to_string(i), Guest::busy);
+  for (int i = 0; i < 3; ++i) come("2001:db8:1:2::" + std::to_string(i), ConnectionSlot::busy);
   EXPECT_EQ(come("2001:db8:1:2:ffff::1"), nullptr);
   EXPECT_NE(come("2001:db8:1:3::1"), nullptr);
 }
@@ -129,24 +130,24 @@ TEST_F(DoorTest, WhoWasEndedHasNoSayAnyMore) {
   come("10.0.0.1");
   come("10.0.0.1");
   ASSERT_TRUE(first->ended);
-  first->guest->becomes(Guest::busy);
-  EXPECT_EQ(door.connections(), 4U);
-  EXPECT_NE(come("10.0.0.1", Guest::busy), nullptr) << "it does not count";
+  first->slot->becomes(ConnectionSlot::busy);
+  EXPECT_EQ(limiter.connections(), 4U);
+  EXPECT_NE(come("10.0.0.1", ConnectionSlot::busy), nullptr) << "it does not count";
   go();
-  EXPECT_EQ(door.connections(), 3U);
+  EXPECT_EQ(limiter.connections(), 3U);
 }
 
 // Each still has its descriptor; a flood that is faster than they go does not grow them without bound.
 TEST_F(DoorTest, ThoseWhoLeaveAreBounded) {
   for (int i = 0; i < 1000; ++i) come("10.0.0.1");
-  EXPECT_EQ(door.connections(), 3U + 64U);
-  EXPECT_EQ(door.counters().refused, 1000U - 3U - 64U);
+  EXPECT_EQ(limiter.connections(), 3U + 64U);
+  EXPECT_EQ(limiter.counters().refused, 1000U - 3U - 64U);
   go();
   EXPECT_NE(come("10.0.0.1"), nullptr);
 }
 
 TEST_F(DoorTest, RefusalsAreLoggedOnceASecond) {
-  for (int i = 0; i < 3; ++i) come("10.0.0.1", Guest::busy);
+  for (int i = 0; i < 3; ++i) come("10.0.0.1", ConnectionSlot::busy);
   for (int i = 0; i < 20; ++i) EXPECT_EQ(come("10.0.0.1"), nullptr);
   clock.run_for(std::chrono::seconds{1});
   EXPECT_EQ(come("10.0.0.1"), nullptr);

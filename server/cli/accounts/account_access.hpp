@@ -16,10 +16,10 @@
 namespace server::cli {
 
 // Every function throws std::runtime_error with a sentence when it cannot be done.
-class AccountDoor {
+class AccountAccess {
  public:
   enum class Missing : std::uint8_t { refuse, make };  // what to do when there is no database yet
-  AccountDoor(const std::filesystem::path& data_dir, Missing missing);
+  AccountAccess(const std::filesystem::path& data_dir, Missing missing);
 
   nlohmann::json users();
   void add_user(const std::string& name, Role role, const std::string& password);

@@ -1,5 +1,4 @@
-// Keeps the books of one robot: samples, gaps, answers.
-#include "sim_robot/lab/heard_robot.hpp"
+#include "sim_robot/lab/received_telemetry.hpp"
 
 #include <utility>
 
@@ -10,7 +9,7 @@ constexpr std::uint64_t kCommandLifeUs = 2'000'000;
 
 }  // namespace
 
-bool HeardRobot::take(protocol::Bytes bytes) {
+bool ReceivedTelemetry::take(protocol::Bytes bytes) {
   while (!bytes.empty()) {
     switch (reader_.push(bytes)) {
       case protocol::FrameReader::State::incomplete: break;
@@ -25,7 +24,7 @@ bool HeardRobot::take(protocol::Bytes bytes) {
   return true;
 }
 
-void HeardRobot::on_frame(const protocol::RobotFrame& frame) {
+void ReceivedTelemetry::on_frame(const protocol::RobotFrame& frame) {
   frames.push_back(frame);
   switch (frame.which_body) {
     case rheonaut_RobotFrame_hello_tag: on_hello(frame.body.hello); break;
@@ -40,7 +39,7 @@ void HeardRobot::on_frame(const protocol::RobotFrame& frame) {
   }
 }
 
-void HeardRobot::on_hello(const protocol::Hello& frame) {
+void ReceivedTelemetry::on_hello(const protocol::Hello& frame) {
   hello = frame;
   if (frame.boot_id == boot_id_) return;
   if (boot_id_ != 0) earlier_boots.push_back(std::exchange(samples, {}));
@@ -49,7 +48,7 @@ void HeardRobot::on_hello(const protocol::Hello& frame) {
   durable_next_seq_ = lost_samples_ = 0;
 }
 
-void HeardRobot::on_telemetry(const protocol::Telemetry& batch) {
+void ReceivedTelemetry::on_telemetry(const protocol::Telemetry& batch) {
   for (pb_size_t i = 0; i < batch.position_m_count; ++i) {
     ReceivedSample sample;
     sample.robot_time_us = batch.first_robot_time_us + std::uint64_t{i} * batch.period_us;
@@ -76,11 +75,11 @@ void HeardRobot::on_telemetry(const protocol::Telemetry& batch) {
   }
 }
 
-std::uint64_t HeardRobot::durable_next_event_seq() const {
+std::uint64_t ReceivedTelemetry::durable_next_event_seq() const {
   return events.size() > earlier_events_ ? events.back().event_seq + 1 : 0;
 }
 
-protocol::StationFrame HeardRobot::welcome_frame() const {
+protocol::StationFrame ReceivedTelemetry::welcome_frame() const {
   protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
   frame.which_body = rheonaut_StationFrame_welcome_tag;
   frame.body.welcome = welcome;
@@ -90,7 +89,7 @@ protocol::StationFrame HeardRobot::welcome_frame() const {
   return frame;
 }
 
-protocol::StationFrame HeardRobot::heartbeat_frame(protocol::StationHeartbeat heartbeat) const {
+protocol::StationFrame ReceivedTelemetry::heartbeat_frame(protocol::StationHeartbeat heartbeat) const {
   if (keeps_samples) {
     heartbeat.durable_next_seq = durable_next_seq();
     heartbeat.durable_next_event_seq = durable_next_event_seq();
@@ -101,14 +100,15 @@ protocol::StationFrame HeardRobot::heartbeat_frame(protocol::StationHeartbeat he
   return frame;
 }
 
-protocol::Command HeardRobot::completed(protocol::Command command, std::uint64_t boot_id, std::uint64_t robot_time_us) {
+protocol::Command ReceivedTelemetry::completed(protocol::Command command, std::uint64_t boot_id,
+                                               std::uint64_t robot_time_us) {
   if (command.command_id == 0) command.command_id = next_command_id_++;
   if (command.boot_id == 0) command.boot_id = boot_id;
   if (command.valid_until_robot_us == 0) command.valid_until_robot_us = robot_time_us + kCommandLifeUs;
   return command;
 }
 
-std::optional<protocol::CommandAck> HeardRobot::ack_of(std::uint64_t command_id) const {
+std::optional<protocol::CommandAck> ReceivedTelemetry::ack_of(std::uint64_t command_id) const {
   for (auto ack = acks.rbegin(); ack != acks.rend(); ++ack) {
     if (ack->command_id == command_id) return *ack;
   }

@@ -30,7 +30,7 @@ struct TlsCounters {
   std::uint64_t failed = 0;
 };
 
-class TlsGate {
+class TlsHandshakes {
  public:
   enum class Outcome : std::uint8_t {
     secure,
@@ -38,7 +38,7 @@ class TlsGate {
     not_tls,  // the client began with something else, which waits to be read; counted as failed
   };
 
-  TlsGate(Clock& clock, WorkerThread& worker, std::shared_ptr<const TlsContext> context)
+  TlsHandshakes(Clock& clock, WorkerThread& worker, std::shared_ptr<const TlsContext> context)
       : clock_{clock}, worker_{worker}, context_{std::move(context)} {}
 
   // `port` is for the log: "robot port". The socket lives until the answer.

@@ -1,5 +1,5 @@
 // Waits on the loop, computes on the worker.
-#include "server/tls/tls_gate.hpp"
+#include "server/tls/tls_handshakes.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -20,7 +20,7 @@ constexpr std::uint8_t kHandshakeRecord = 22;  // RFC 8446, 5.1: the first byte 
 
 }  // namespace
 
-asio::awaitable<TlsGate::Outcome> TlsGate::secure(StreamSocket& socket, const char* port) {
+asio::awaitable<TlsHandshakes::Outcome> TlsHandshakes::secure(StreamSocket& socket, const char* port) {
   End end{Outcome::failed, fmt::format("not done within {} s", kHandshakeTime / std::chrono::seconds{1})};
   try {
     auto first = co_await (shake_hands(socket) || clock_.sleep_for(kHandshakeTime));
@@ -39,7 +39,7 @@ asio::awaitable<TlsGate::Outcome> TlsGate::secure(StreamSocket& socket, const ch
   co_return end.outcome;
 }
 
-asio::awaitable<TlsGate::End> TlsGate::shake_hands(StreamSocket& socket) {
+asio::awaitable<TlsHandshakes::End> TlsHandshakes::shake_hands(StreamSocket& socket) {
   co_await socket.tcp().async_wait(tcp::socket::wait_read, asio::use_awaitable);
   Wire& wire = socket.wire();
   std::uint8_t first = 0;
@@ -58,7 +58,7 @@ asio::awaitable<TlsGate::End> TlsGate::shake_hands(StreamSocket& socket) {
   }
 }
 
-void TlsGate::log_failure(const std::string& peer, const char* port, const std::string& why) {
+void TlsHandshakes::log_failure(const std::string& peer, const char* port, const std::string& why) {
   const auto unsaid = lines_.next(clock_.steady_us());
   if (unsaid) spdlog::warn("{}: no TLS with {}: {}{}", port, peer, why, and_before(*unsaid));
 }

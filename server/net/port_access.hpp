@@ -1,0 +1,15 @@
+// What a connection passes before its port talks to it: the limits of connections, and the TLS handshake.
+#pragma once
+
+#include "server/net/connection_limiter.hpp"
+#include "server/tls/tls_handshakes.hpp"
+
+namespace server {
+
+// Outlives the connections. Not moved.
+struct PortAccess {
+  ConnectionLimiter limiter;
+  TlsHandshakes* tls = nullptr;  // null: plain TCP
+};
+
+}  // namespace server
