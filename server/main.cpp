@@ -71,9 +71,9 @@ static int serve(const Config& config) {
 
 int main(int argc, char** argv) try {
   std::signal(SIGPIPE, SIG_IGN);
-  const cli::CommandLine wish = cli::parse_command_line(argc, argv);
-  if (const auto exit_code = cli::answer(wish, std::cout)) return *exit_code;
-  return serve(load_config(std::get<cli::Serve>(wish).flags));
+  const cli::CommandLine line = cli::parse_command_line(argc, argv);
+  if (const auto exit_code = cli::answer(line, std::cout)) return *exit_code;
+  return serve(load_config(std::get<cli::Serve>(line).flags));
 } catch (const std::exception& error) {
   fmt::print(stderr, "rheonaut: {}\n", server::cli::one_line(error.what()));
   return EXIT_FAILURE;
