@@ -18,7 +18,7 @@ constexpr std::size_t kMaxSamplesPerFrame = 25;  // as in robot.options
 constexpr std::uint32_t kDefaultLinkTimeoutMs = 1000;
 constexpr std::uint32_t kDefaultHeartbeatIntervalMs = 200;
 constexpr std::uint32_t kLeaseMs = 500;  // a manual duty lives this long unless renewed
-constexpr std::uint64_t kMaxCommandLifeUs = 10'000'000;
+constexpr std::uint64_t kMaxTimeToLiveUs = 10'000'000;
 
 static_assert(rheonaut_RobotFrame_size <= kMaxFrameBytes, "a robot frame may exceed the frame limit");
 static_assert(rheonaut_StationFrame_size <= kMaxFrameBytes, "a station frame may exceed the frame limit");

@@ -6,12 +6,12 @@
 
 namespace robot_fw {
 
-Verdict CommandGate::admit(const protocol::Command& command, std::uint64_t now_us) {
+Verdict CommandFilter::admit(const protocol::Command& command, std::uint64_t now_us) {
   if (command.command_id == 0 || command.which_action == 0) return rejected(rheonaut_REJECT_REASON_MALFORMED);
-  if (command.boot_id != boot_id_) return {rheonaut_COMMAND_RESULT_OTHER_BOOT};   // SAFETY: meant for an earlier life
+  if (command.boot_id != boot_id_) return {rheonaut_COMMAND_RESULT_OTHER_BOOT};   // SAFETY: meant for an earlier boot
   if (!remember(command.command_id)) return {rheonaut_COMMAND_RESULT_DUPLICATE};  // SAFETY: nothing runs twice
   if (now_us > command.valid_until_robot_us) return {rheonaut_COMMAND_RESULT_EXPIRED};  // SAFETY: nothing stale moves
-  if (command.valid_until_robot_us - now_us > protocol::kMaxCommandLifeUs) {
+  if (command.valid_until_robot_us - now_us > protocol::kMaxTimeToLiveUs) {
     return rejected(rheonaut_REJECT_REASON_LIFE_TOO_LONG);  // SAFETY: such a clock cannot be right
   }
   if (command.has_execute_at_robot_us && command.execute_at_robot_us > command.valid_until_robot_us) {
@@ -20,7 +20,7 @@ Verdict CommandGate::admit(const protocol::Command& command, std::uint64_t now_u
   return kAccepted;
 }
 
-bool CommandGate::remember(std::uint64_t command_id) {
+bool CommandFilter::remember(std::uint64_t command_id) {
   if (std::find(recent_.begin(), recent_.end(), command_id) != recent_.end()) return false;
   recent_[oldest_] = command_id;
   oldest_ = (oldest_ + 1) % recent_.size();

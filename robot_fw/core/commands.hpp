@@ -20,10 +20,10 @@ constexpr Verdict kAccepted{};
 constexpr Verdict kTimedExpired{rheonaut_COMMAND_RESULT_EXPIRED};  // of a timed command that nobody waits for any more
 constexpr Verdict rejected(protocol::RejectReason reason) { return {rheonaut_COMMAND_RESULT_REJECTED, reason}; }
 
-// Lets each command through once, for this boot, within its life. Says nothing about modes.
-class CommandGate {
+// Admits each command once, for this boot, within its time to live. Does not check modes.
+class CommandFilter {
  public:
-  explicit CommandGate(std::uint64_t boot_id) : boot_id_(boot_id) {}
+  explicit CommandFilter(std::uint64_t boot_id) : boot_id_(boot_id) {}
 
   Verdict admit(const protocol::Command& command, std::uint64_t now_us);
 

@@ -1,6 +1,6 @@
 // Where the robot is and how fast: the estimate, or in its place what a perfect sensor says.
 //
-// Ticks that never came are made up for as the motor has spent them: with its duty for 50 ms, then off, as a port
+// Ticks that never came are made up for as the motor has spent them: with its duty for 50 ms, then off, as a board
 // forces it off. The standard deviation goes in steps, so that it does not change in every batch: it is 1 to 2 times
 // that of the estimator, and at least 0.1 mm.
 #pragma once
@@ -12,7 +12,7 @@
 
 namespace robot_fw {
 
-constexpr float kMotorOffS = 0.05F;  // a port forces the motor off after so long without a tick
+constexpr float kMotorOffS = 0.05F;  // a board forces the motor off after so long without a tick
 
 class MotionSense {
  public:

@@ -29,7 +29,7 @@ Robot::Robot(const RobotConfig& config)
       settings_({config.duty_min, config.duty_max}, config.sample_period_us),
       motion_sense_(settings_.parameters().estimator(),
                     config.reset_cause == rheonaut_RESET_CAUSE_POWER_ON ? 0.0F : kCoastingSdM),
-      gate_(config.boot_id),
+      filter_(config.boot_id),
       channel_(config.samples_per_frame) {
   note(rheonaut_EVENT_KIND_BOOT, rheonaut_EVENT_CAUSE_RESET, 0);
   load_settings();

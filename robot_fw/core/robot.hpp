@@ -4,7 +4,7 @@
 //               telemetry
 //   receive()   bytes from the station, at any time between ticks; an emergency stop acts in here
 //   transmit()  bytes to the station, at any time between ticks; never waits
-// The port (a simulated robot, an ESP8266) owns the clock, the connection and the motor pin. After every call it puts
+// The board (a simulated robot, an ESP8266) owns the clock, the connection and the motor pin. After every call it puts
 // duty() on the motor.
 #pragma once
 
@@ -31,7 +31,7 @@ struct RobotConfig {
   float duty_max = 1;                   // in (0, 1]
   std::uint32_t samples_per_frame = 5;  // 1 to 25; the station may ask for another
   std::uint32_t sample_period_us = 10'000;
-  std::uint64_t restored_emergency_id = 0;  // a latch that the port's memory kept over the reset; 0: none
+  std::uint64_t restored_emergency_id = 0;  // a latch that the board's memory kept over the reset; 0: none
   protocol::EmergencyCause restored_emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;
   Storage* storage = nullptr;  // of parameters and controller, outlives the robot; null: they end with the boot
 };
@@ -158,7 +158,7 @@ class Robot {
   RobotSettings settings_;
   MotionSense motion_sense_;
   TimedCommands timed_;
-  CommandGate gate_;
+  CommandFilter filter_;
   StationChannel channel_;
 };
 

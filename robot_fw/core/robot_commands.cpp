@@ -21,7 +21,7 @@ bool is_abort(const protocol::Command& command) {
 }  // namespace
 
 void Robot::on_command(const protocol::Command& command) {
-  const Verdict verdict = gate_.admit(command, now_us_);
+  const Verdict verdict = filter_.admit(command, now_us_);
   if (!verdict.accepted()) return answer(command.command_id, verdict);
   const bool later = command.has_execute_at_robot_us && command.execute_at_robot_us > now_us_;
   if (!later) {
@@ -39,9 +39,9 @@ void Robot::on_command(const protocol::Command& command) {
   channel_.outbox().ack(ack_for(command.command_id, kAccepted, command.execute_at_robot_us));
 }
 
-// SAFETY: a stop asks for no boot, no life, no mode and no id, and acts before this returns.
+// SAFETY: a stop needs no boot, no time to live, no mode and no id, and acts before this returns.
 void Robot::on_emergency_stop(const protocol::Command& command) {
-  const bool repeated = command.command_id != 0 && !gate_.remember(command.command_id);
+  const bool repeated = command.command_id != 0 && !filter_.remember(command.command_id);
   if (repeated && safety_.latched()) {
     return channel_.outbox().ack_stop(ack_for(command.command_id, {rheonaut_COMMAND_RESULT_DUPLICATE}, 0));
   }

@@ -1,4 +1,4 @@
-// Parameters and controller over a reset: what the port keeps, and in which form.
+// Parameters and controller over a reset: what the board keeps, and in which form.
 //
 //   parameters := value* checksum     each value of the table in its order, then Parameters::checksum(), which covers
 //                                     the names too: a table of another firmware does not match
@@ -16,7 +16,7 @@ namespace robot_fw {
 
 enum class StorageKey : std::uint8_t { parameters = 1, controller = 2 };
 
-// A few bytes under each key, kept by the port over resets. The core saves only while the motor is off.
+// A few bytes under each key, kept by the board over resets. The core saves only while the motor is off.
 class Storage {
  public:
   static constexpr std::size_t kMaxBytes = 320;  // of one value

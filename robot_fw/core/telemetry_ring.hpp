@@ -2,7 +2,7 @@
 //
 // Samples hold only what changes in every tick. What changes rarely (mode, setpoint, time base...) is kept once, as a
 // segment with the first seq it applies to; a sample's time is its segment's first time plus whole periods. 21.6 kB;
-// on the ESP8266 7.7 kB of them lie outside, in memory that the port provides.
+// on the ESP8266 7.7 kB of them lie outside, in memory that the board provides.
 #pragma once
 
 #include <array>

@@ -3,7 +3,7 @@
 
 #include <user_interface.h>
 
-#include "robot_fw/esp8266/robot_port.hpp"
+#include "robot_fw/esp8266/board.hpp"
 
 // What the core calls of the sketch. Declared here, since the IDE would declare them without the "C".
 extern "C" void preinit();

@@ -3,7 +3,7 @@
 
 #include "secrets.hpp"
 
-static robot_fw::esp8266::RobotPort port{kSecrets};
+static robot_fw::esp8266::Board board{kSecrets};
 
 // SAFETY: a software reset leaves pins as they were; the core calls this before anything else of ours.
 extern "C" void preinit() { robot_fw::esp8266::force_motor_off(robot_fw::esp8266::kSettings.motor.pwm_pin); }
@@ -13,6 +13,6 @@ extern "C" void custom_crash_callback(struct rst_info*, std::uint32_t, std::uint
   robot_fw::esp8266::force_motor_off(robot_fw::esp8266::kSettings.motor.pwm_pin);
 }
 
-void setup() { port.begin(); }
+void setup() { board.begin(); }
 
-void loop() { port.step(); }
+void loop() { board.step(); }

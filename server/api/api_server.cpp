@@ -71,7 +71,7 @@ void ApiServer::add_routes(boost::asio::io_context& loop, Station& station, Live
   add_command_routes(router_, {clock_, history, station});
   add_in_force_routes(router_, {station});
   add_fluid_routes(router_, {clock_, recording.fluid_models, recording.recorder, station});
-  add_run_routes(router_, {analysis, recording.certifier, clock_, recording.disk_watch, live, recording.runs, station});
+  add_run_routes(router_, {analysis, recording.digester, clock_, recording.disk_watch, live, recording.runs, station});
   add_marker_routes(router_, {recording.markers, station});
   add_reference_routes(router_, {analysis, clock_, recording.references});
   add_sample_routes(router_, {history});

@@ -19,7 +19,7 @@ using nlohmann::json;
 namespace {
 
 // A renewal that waited longer is worth nothing: the lease it would extend has lapsed.
-constexpr microseconds kRenewalLife{protocol::kLeaseMs * 1000};
+constexpr microseconds kRenewalTimeToLive{protocol::kLeaseMs * 1000};
 
 asio::awaitable<void> stop_one(LiveParts& parts, StopRequest request) {
   co_await stop_robot(parts.station, std::move(request));
@@ -93,7 +93,7 @@ Result<void> on_renew_lease(const Members& message, const Caller& caller, LivePa
   request.action.which_action = rheonaut_Command_renew_lease_tag;
   request.actor = caller.actor;
   request.peer = caller.peer;
-  request.life = kRenewalLife - microseconds{age_us};
+  request.time_to_live = kRenewalTimeToLive - microseconds{age_us};
   spawn(parts, "lease renewal of robot '" + *robot_id + "'", renew(parts, std::move(request)));
   return {};
 }

@@ -108,15 +108,15 @@ CommandLine parse_command_line(int argc, char** argv) {
 
 std::optional<int> answer(const CommandLine& line, std::ostream& out) {
   return std::visit(
-      [&out](const auto& wanted) -> std::optional<int> {
-        using T = std::decay_t<decltype(wanted)>;
+      [&out](const auto& options) -> std::optional<int> {
+        using T = std::decay_t<decltype(options)>;
         if constexpr (std::is_same_v<T, Serve>) {
           return std::nullopt;
         } else if constexpr (std::is_same_v<T, Answered>) {
-          return wanted.exit_code;
+          return options.exit_code;
         } else {
           std::ostringstream text;
-          const int exit_code = run(wanted, text);
+          const int exit_code = run(options, text);
           out << text.view() << std::flush;
           if (!out) throw std::runtime_error{kNotWritten};
           return exit_code;

@@ -55,7 +55,7 @@ std::string Auth::new_login_code() {
   std::erase_if(codes_, [now_us = clock_.steady_us()](const Code& code) { return code.ends_at_us <= now_us; });
   if (codes_.size() >= kMaxLoginCodes) codes_.pop_front();
   std::string code = random_secret();
-  codes_.push_back({hash_of(code), clock_.steady_us() + kLoginCodeLife.count()});
+  codes_.push_back({hash_of(code), clock_.steady_us() + kLoginCodeValidity.count()});
   return code;
 }
 
@@ -80,7 +80,7 @@ std::optional<Caller> Auth::caller_of_session(const std::string& secret) const {
 }
 
 std::string Auth::cookie(const std::string& secret, bool is_secure) const {
-  const auto life_s = secret.empty() ? 0 : kCookieLife.count() / 1'000'000;
+  const auto life_s = secret.empty() ? 0 : kCookieValidity.count() / 1'000'000;
   return fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age={}{}", cookie_name_, secret, life_s,
                      is_secure ? "; Secure" : "");
 }

@@ -14,8 +14,8 @@
 
 namespace server {
 
-inline constexpr microseconds kLoginCodeLife{std::chrono::minutes{10}};
-inline constexpr microseconds kCookieLife{
+inline constexpr microseconds kLoginCodeValidity{std::chrono::minutes{10}};
+inline constexpr microseconds kCookieValidity{
     std::chrono::days{30}};  // in the browser; the station decides what it is worth
 inline constexpr std::size_t kMaxLoginCodes = 16;
 inline constexpr const char* kOldSessionCookie = "rheonaut_session";  // of stations before there were accounts

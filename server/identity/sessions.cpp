@@ -52,7 +52,7 @@ std::string Sessions::add(const std::string& user, const std::string& peer, cons
   const std::int64_t now_us = clock_.utc_us();
   const PageSession session{next_number_++, hash_of(secret),
                             user,           now_us,
-                            now_us,         now_us + kSessionLife.count(),
+                            now_us,         now_us + kSessionValidity.count(),
                             peer,           agent.substr(0, kMaxAgentBytes)};
   sessions_.push_back({session, std::make_shared<Standing>(loop_), 0});
   ++revision_;
@@ -81,7 +81,7 @@ const Sessions::Open* Sessions::find(const std::string& secret) {
 
 void Sessions::renew(Open& session) {
   session.last_used_at_us = clock_.utc_us();
-  session.ends_at_us = std::max(session.ends_at_us, session.last_used_at_us + kSessionLife.count());
+  session.ends_at_us = std::max(session.ends_at_us, session.last_used_at_us + kSessionValidity.count());
   if (session.ends_at_us - session.saved_end_us < kSessionSaveInterval.count()) return;
   session.saved_end_us = session.ends_at_us;  // if it cannot be saved, the next hour tries again
   ++revision_;

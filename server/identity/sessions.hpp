@@ -1,7 +1,7 @@
 // The sessions of pages, in memory: a cookie's hash, whose it is, and when it ends.
 //
-// A session ends kSessionLife after its last use; an open /live is use. Each user has a bounded number: one more takes
-// the place of the one that was unused for longest. What changed is written by Accounts. Loop thread.
+// A session ends kSessionValidity after its last use; an open /live is use. Each user has a bounded number of sessions:
+// a new one replaces the one that was unused for longest. Accounts writes the changes. Loop thread.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace server {
 
-inline constexpr microseconds kSessionLife{std::chrono::hours{12}};  // from its last use
+inline constexpr microseconds kSessionValidity{std::chrono::hours{12}};  // from its last use
 inline constexpr microseconds kSessionSaveInterval{std::chrono::hours{1}};
 inline constexpr std::size_t kMaxSessionsOfLinks = 64;
 inline constexpr std::size_t kMaxSessionsOfUser = 8;

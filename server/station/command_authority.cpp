@@ -44,7 +44,7 @@ Result<void> CommandAuthority::may_command(const CommandRequest& request) const 
 }
 
 // SAFETY: by an old picture nobody takes control, and nobody keeps a motor running. Who is in control may still say
-// something else to the robot, within the command's life.
+// something else to the robot, within the command's time to live.
 Result<void> CommandAuthority::check_sight(const CommandRequest& request) const {
   if (!needs_control(request.action) || !is_of_old_picture(request)) return {};
   if (request.action.which_action == rheonaut_Command_renew_lease_tag) return too_old(request.age, "renew a lease");
@@ -63,7 +63,7 @@ Result<std::optional<Authority::Change>> CommandAuthority::change(const ControlR
   // SAFETY: nobody takes control by an old picture; nor could they keep it by one.
   if (!is_fresh(request.age)) return too_old(request.age, "take control");
   switch (request.action) {
-    case ControlAction::take: return authority_.take(robot, request.actor, request.life);
+    case ControlAction::take: return authority_.take(robot, request.actor, request.lease);
     case ControlAction::force: return authority_.take_by_force(robot, request.actor, request.reason);
     case ControlAction::release: return some(authority_.release(robot, request.actor));
     case ControlAction::request: return some(authority_.request(robot, request.actor));

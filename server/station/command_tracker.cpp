@@ -15,7 +15,7 @@ namespace asio = boost::asio;
 
 namespace {
 
-constexpr microseconds kAckGrace{1'000'000};   // an answer may come this much after the life ended
+constexpr microseconds kAckGrace{1'000'000};   // an answer may come this much after the time to live
 constexpr microseconds kSeenGrace{5'000'000};  // what shows the effect may come so much after it
 
 // Whether a command need not be seen in telemetry since a later one has taken its place.

@@ -16,8 +16,8 @@ namespace asio = boost::asio;
 
 namespace {
 
-constexpr microseconds kMaxLife{protocol::kMaxCommandLifeUs};
-constexpr microseconds kPatience{2'000'000};  // with the answer, after the life has ended
+constexpr microseconds kMaxTimeToLive{protocol::kMaxTimeToLiveUs};
+constexpr microseconds kPatience{2'000'000};  // for the answer, after the time to live
 constexpr microseconds kSeenPatience{6'000'000};
 constexpr microseconds kWatchInterval{200'000};
 
@@ -25,7 +25,7 @@ Error unknown_robot(const RobotId& id) {
   return {ErrorCode::not_found, fmt::format("no robot '{}' is known", id), "unknown_robot"};
 }
 
-// A robot refuses what would come after the command's life.
+// A robot refuses what would come after the command's time to live.
 Result<void> check_time(const PendingCommand& pending, const RobotState& robot) {
   const protocol::Command& wire = pending.wire;
   if (!wire.has_execute_at_robot_us || wire.execute_at_robot_us <= wire.valid_until_robot_us) return {};
@@ -41,9 +41,9 @@ Result<void> check_time(const PendingCommand& pending, const RobotState& robot) 
 // What speaks against the request; nothing is sent then.
 Result<void> check_request(const CommandRequest& request, const protocol::Command& wire, const RobotEntry& entry,
                            const Envelope& envelope) {
-  if (request.life <= microseconds{0} || request.life > kMaxLife) {
-    return fail(ErrorCode::invalid, fmt::format("life = {} ms is outside 1 to 10000", request.life.count() / 1000),
-                "out_of_range");
+  if (request.time_to_live <= microseconds{0} || request.time_to_live > kMaxTimeToLive) {
+    return fail(ErrorCode::invalid,
+                fmt::format("life_ms = {} is outside 1 to 10000", request.time_to_live.count() / 1000), "out_of_range");
   }
   if (entry.port == nullptr) {
     return fail(ErrorCode::not_connected, fmt::format("robot '{}' is not connected", request.robot_id),
@@ -86,8 +86,8 @@ Result<std::shared_ptr<PendingCommand>> send_command(StationParts& parts, RobotE
   auto pending = make_pending(parts.loop, parts.clock, request, entry.robot);
   const auto checked = check_request(request, pending->wire, entry, parts.envelope);
   if (!checked) return std::unexpected{checked.error()};
-  // SAFETY: what was issued longer ago than its life is not sent, and is accounted for.
-  if (request.age >= request.life) {
+  // SAFETY: what was issued longer ago than its time to live is not sent, and is accounted for.
+  if (request.age >= request.time_to_live) {
     parts.tracker.end(*pending, CommandState::expired, "too_old_on_arrival");
     return pending;
   }
@@ -127,13 +127,13 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
   if (known == nullptr) co_return parts_->refuse(request, unknown_robot(request.robot_id));
   if (request.action.which_action == rheonaut_Command_emergency_stop_tag) {
     StopRequest stop{request.robot_id, request.actor, request.peer, request.key, request.received_us};
-    co_return co_await emergency_stop(std::move(stop), request.life);
+    co_return co_await emergency_stop(std::move(stop), request.time_to_live);
   }
   // SAFETY: what moves, and waited while the station stood still, is as old as that.
   if (moves_the_motor(request.action)) request.age = std::max(request.age, request.unread);
   RobotEntry& entry = *known;
   CommandTracker& tracker = parts_->tracker;
-  const microseconds patience = request.life + (request.until_verified ? kSeenPatience : kPatience);
+  const microseconds patience = request.time_to_live + (request.until_verified ? kSeenPatience : kPatience);
   if (!request.key.empty()) {
     const auto same = tracker.find_same(request, entry);
     if (!same) co_return parts_->refuse(request, same.error());

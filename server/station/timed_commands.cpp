@@ -57,7 +57,7 @@ bool TimedCommands::send_drop(RobotEntry& entry) {
   request.robot_id = entry.robot.id;
   request.action.which_action = rheonaut_Command_drop_timed_tag;
   request.actor = "station:control";
-  request.life = microseconds{protocol::kMaxCommandLifeUs};
+  request.time_to_live = microseconds{protocol::kMaxTimeToLiveUs};
   const auto drop = make_pending(loop_, clock_, request, entry.robot);
   if (!entry.port->send(drop->wire, drop->deadline_us)) return false;
   entry.timed.by.clear();

@@ -26,8 +26,8 @@ RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThrea
     : recorder{loop, clock, disk, checkpoints, options},
       head_watch{clock, recorder, checkpoints, options.head_interval},
       reader{options.path, readers},
-      certifier{clock, recorder, reader},
-      runs{clock, recorder, reader, certifier},
+      digester{clock, recorder, reader},
+      runs{clock, recorder, reader, digester},
       markers{clock, recorder, reader},
       references{clock, recorder, reader},
       fluid_models{clock, recorder},
@@ -66,7 +66,7 @@ void RecordingParts::spawn(TaskGroup& tasks) {
   tasks.spawn("recorder", recorder.run());
   tasks.spawn("checkpoints", recorder.run_checkpoints());
   tasks.spawn("head of the database", head_watch.run());
-  tasks.spawn("certifier", certifier.run());
+  tasks.spawn("digester", digester.run());
   tasks.spawn("interrupted runs", runs.finish_loading());
   tasks.spawn("disk watch", disk_watch.run());
   tasks.spawn("backups", backups.run());

@@ -14,10 +14,10 @@
 #include "server/storage/database/database_reader.hpp"
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/query/history.hpp"
-#include "server/storage/runs/certifier.hpp"
 #include "server/storage/runs/fluid_models.hpp"
 #include "server/storage/runs/markers.hpp"
 #include "server/storage/runs/outside_references.hpp"
+#include "server/storage/runs/run_digester.hpp"
 #include "server/storage/runs/runs.hpp"
 #include "server/storage/upkeep/backup.hpp"
 #include "server/storage/upkeep/disk_watch.hpp"
@@ -51,7 +51,7 @@ struct RecordingParts {
   Recorder recorder;
   HeadWatch head_watch;
   DatabaseReader reader;
-  Certifier certifier;
+  RunDigester digester;
   Runs runs;
   Markers markers;
   OutsideReferences references;

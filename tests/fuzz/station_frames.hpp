@@ -16,7 +16,7 @@ struct KnownOfRobot {
 
 protocol::StationFrame welcome(ByteSource& source, const KnownOfRobot& robot);
 protocol::StationFrame heartbeat(ByteSource& source, const KnownOfRobot& robot);
-// The first byte says which action, the second how sound its identity and life are.
+// The first byte says which action, the second how sound its identity and time to live are.
 protocol::Command command(ByteSource& source, const KnownOfRobot& robot);
 protocol::StationFrame frame_of(const protocol::Command& command);
 

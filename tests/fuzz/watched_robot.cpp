@@ -128,7 +128,7 @@ void WatchedRobot::overhear(const protocol::StationFrame& frame) {
       [[fallthrough]];
     case rheonaut_Command_set_duty_tag:
     case rheonaut_Command_set_duty_schedule_tag: {
-      const std::uint64_t latest_us = std::min(command.valid_until_robot_us, now_us_ + protocol::kMaxCommandLifeUs);
+      const std::uint64_t latest_us = std::min(command.valid_until_robot_us, now_us_ + protocol::kMaxTimeToLiveUs);
       const std::uint64_t acts_by_us = command.has_execute_at_robot_us ? std::max(latest_us, now_us_) : now_us_;
       moves_until_us_ = std::max(moves_until_us_, acts_by_us + kLeaseUs);
     }

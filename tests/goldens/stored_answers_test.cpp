@@ -2,7 +2,7 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <fmt/format.h>
 
-#include "server/storage/runs/certificate.hpp"
+#include "server/storage/runs/run_digest.hpp"
 #include "tests/goldens/answers.hpp"
 #include "tests/goldens/database_text.hpp"
 #include "tests/goldens/golden_file.hpp"
@@ -119,9 +119,9 @@ TEST_F(GoldenAnswers, Digests) {
   std::string text;
   for (const RunId run : {1, 2, 3, 4, 6, 7}) {
     for (const int format : {1, 2}) {
-      Certification certification{read_certified_spans(database, run), format};
-      while (certification.advance(database, 50) == Certification::Progress::more) continue;
-      const Certificate made = certification.certificate();
+      DigestComputation computation{read_digest_spans(database, run), format};
+      while (computation.advance(database, 50) == DigestComputation::Progress::more) continue;
+      const RunDigest made = computation.digest();
       text += fmt::format("run {} format {}: {} live, {} sent again, {} lost, {}\n", run, format, made.samples_live,
                           made.samples_backfilled, made.samples_lost, made.sha256);
     }

@@ -101,7 +101,7 @@ void Session::tick() {
   if (connected_) acknowledge();
 }
 
-// As a port does in a tick.
+// As a board does in a tick.
 void Session::listen() {
   Record record;
   record.kind = RecordKind::transmit;

@@ -1,4 +1,4 @@
-// How much the recorded session's port sends after one tick, so that no tick takes long.
+// How much the recorded session's board sends after one tick, so that no tick takes long.
 //
 //   SendTurn turn;
 //   while (turn.goes_on()) turn.sent(robot.transmit(out, capacity, now_us));

@@ -72,7 +72,7 @@ class BareCore {
     command.which_action = action;
     return command;
   }
-  // Sends a command and hears the answer; adds id, boot and life where they are 0.
+  // Sends a command and receives the answer; adds id, boot and time to live where they are 0.
   protocol::CommandAck order(protocol::Command command) {
     if (command.command_id == 0) command.command_id = ++last_id_;
     if (command.boot_id == 0) command.boot_id = kBootId;

@@ -1,4 +1,4 @@
-// Which commands run: identity, life, arguments and mode.
+// Which commands run: identity, time to live, arguments and mode.
 #include <cmath>
 
 #include "tests/robot_fw/driven_robot.hpp"
@@ -197,7 +197,7 @@ TEST_F(Commands, ATimedCommandWhoseTickComesAfterItsLifeExpires) {
   expect_at_rest();
 }
 
-TEST_F(Commands, ATimedCommandRunsToTheEndOfItsLife) {
+TEST_F(Commands, ATimedCommandRunsToTheEndOfItsTimeToLive) {
   protocol::Command command = set_duty(0.5F);
   command.has_execute_at_robot_us = true;
   command.execute_at_robot_us = robot.robot_time_us() + 5 * kTickUs;

@@ -1,4 +1,4 @@
-// What a port keeps over resets, in memory, for tests.
+// What a board keeps over resets, in memory, for tests.
 #pragma once
 
 #include <map>

@@ -20,7 +20,7 @@ class TimedCommandsTest : public SystemTest {
     request.robot_id = "sim-1";
     request.action = action;
     request.actor = "test";
-    request.life = 8s;
+    request.time_to_live = 8s;
     tasks.spawn("order", submit_and_forget(std::move(request)));
     clock.settle();
     return sink.commands.back().id;

@@ -14,7 +14,7 @@ using nlohmann::json;
 
 constexpr std::size_t kMaxTextBytes = 4000;
 constexpr std::int64_t kMaxParameters = 256;  // of a robot
-constexpr std::int64_t kMaxLifeMs = protocol::kMaxCommandLifeUs / 1000;
+constexpr std::int64_t kMaxTimeToLiveMs = protocol::kMaxTimeToLiveUs / 1000;
 constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
 
 Result<void> read_set_mode(const Members& body, protocol::Command& action) {
@@ -241,9 +241,9 @@ Result<ParsedCommand> parse_command(const std::string& text, const protocol::Con
   }
   ParsedCommand command;
   if (body->has("life_ms")) {
-    const auto life_ms = body->integer("life_ms", 1, kMaxLifeMs);
+    const auto life_ms = body->integer("life_ms", 1, kMaxTimeToLiveMs);
     if (!life_ms) return std::unexpected{life_ms.error()};
-    command.life = std::chrono::milliseconds{*life_ms};
+    command.time_to_live = std::chrono::milliseconds{*life_ms};
   }
   if (auto read = body->time("stamp_us", command.stamp_us); !read) return std::unexpected{read.error()};
   if (auto read = body->time("issued_at_us", command.issued_at_us); !read) return std::unexpected{read.error()};

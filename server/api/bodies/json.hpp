@@ -47,7 +47,7 @@ class Members {
 struct ParsedCommand {
   protocol::Command action;
   std::string arguments;  // as JSON, without what every command may have
-  microseconds life{2'000'000};
+  microseconds time_to_live{2'000'000};
   std::optional<std::int64_t> stamp_us;      // of /live: the station's steady time, as the page received it last
   std::optional<std::int64_t> issued_at_us;  // UTC
   bool is_confirmed = false;                 // its sender says that motion may be bounded otherwise

@@ -77,7 +77,7 @@ Result<ParsedControl> parse_control(const std::string& text) {
     }
     const auto lease_ms = body->integer("lease_ms", 1, kLongestControl.count() / 1000);
     if (!lease_ms) return std::unexpected{lease_ms.error()};
-    request.life = std::chrono::milliseconds{*lease_ms};
+    request.lease = std::chrono::milliseconds{*lease_ms};
   }
   if (!is_forced && body->has("reason")) {
     return fail(ErrorCode::bad_request, "reason goes with force only", "unknown_member");

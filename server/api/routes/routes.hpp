@@ -25,7 +25,7 @@ namespace server {
 class Accounts;
 class AnalysisService;
 class Auth;
-class Certifier;
+class RunDigester;
 class DiskWatch;
 class ExceptionLog;
 class FluidModels;
@@ -140,7 +140,7 @@ void add_robot_routes(Router& router, RobotRoutes parts);
 
 struct RunRoutes {
   AnalysisService& analysis;
-  Certifier& certifier;
+  RunDigester& digester;
   Clock& clock;
   DiskWatch& disk_watch;
   LiveFeed& live;

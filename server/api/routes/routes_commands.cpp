@@ -67,7 +67,7 @@ Result<std::string> key_of(const Request& request) {
 constexpr std::int64_t kClockToleranceUs = 1'000'000;  // of a script's clock ahead of ours
 
 // SAFETY: what a page asks for is worth as little as what its operator saw was old, so a page says what that was. (Only
-// a script is near enough to the station for a life that counts from the arrival.)
+// a script is near enough to the station for a time to live that counts from the arrival.)
 Result<void> check_stamp(const Caller& caller, const std::optional<std::int64_t>& stamp_us) {
   if (caller.session == 0 || stamp_us) return {};
   return fail(ErrorCode::invalid, "a page must send stamp_us, the latest stamp that it heard on /live",
@@ -184,7 +184,7 @@ CommandRequest request_of(const Request& request, ParsedCommand& parsed, std::st
   command.arguments = std::move(parsed.arguments);
   command.actor = request.actor;
   command.peer = request.peer;
-  command.life = parsed.life;
+  command.time_to_live = parsed.time_to_live;
   command.key = std::move(key);
   command.received_us = request.received_us;
   command.unread = request.unread;
@@ -231,8 +231,8 @@ Result<void> check_sight(const Request& request, ParsedControl& parsed, Clock& c
   if (control_request.action != ControlAction::take && control_request.action != ControlAction::force) return {};
   control_request.age = request.unread;
   if (auto said = check_stamp(caller, parsed.stamp_us); !said) return said;
-  if (caller.session != 0 && control_request.life > kControlLife) {
-    return fail(ErrorCode::invalid, fmt::format("lease_ms of a page is at most {}", kControlLife.count() / 1000),
+  if (caller.session != 0 && control_request.lease > kControlLease) {
+    return fail(ErrorCode::invalid, fmt::format("lease_ms of a page is at most {}", kControlLease.count() / 1000),
                 "out_of_range");
   }
   if (!parsed.stamp_us) return {};

@@ -1,4 +1,4 @@
-// Runs: begin, end, make afterwards, annotate, discard, list, certify, measure.
+// Runs: begin, end, make afterwards, annotate, discard, list, digest, measure.
 #include <fmt/format.h>
 
 #include "server/analysis/analysis_service.hpp"
@@ -8,7 +8,7 @@
 #include "server/identity/auth.hpp"
 #include "server/live/live_feed.hpp"
 #include "server/station/station.hpp"
-#include "server/storage/runs/certifier.hpp"
+#include "server/storage/runs/run_digester.hpp"
 #include "server/storage/runs/runs.hpp"
 #include "server/storage/upkeep/disk_watch.hpp"
 
@@ -128,33 +128,33 @@ Answer discard_run(RunRoutes parts, Request request) {
   co_return json_response(200, to_json(*run));
 }
 
-json to_json(const RunCertificate& found, RunId run) {
-  const Certificate& certificate = found.certificate;
+json to_json(const CurrentDigest& found, RunId run) {
+  const RunDigest& digest = found.digest;
   json out;
   out["run_id"] = run;
   out["final"] = found.is_final;
-  out["format"] = certificate.format;
-  out["samples_expected"] = certificate.samples_expected;
-  out["samples_live"] = certificate.samples_live;
-  out["samples_backfilled"] = certificate.samples_backfilled;
-  out["samples_lost"] = certificate.samples_lost;
-  out["samples_missing"] = certificate.samples_missing();
-  out["lost_by_cause"] = certificate.lost_by_cause;
-  out["longest_gap_samples"] = certificate.longest_gap_samples;
-  out["longest_gap_us"] = certificate.longest_gap_us;
-  out["worst_clock_uncertainty_us"] = certificate.worst_clock_uncertainty_us;
-  out["samples_without_clock"] = certificate.samples_without_clock;
-  out["sha256"] = found.is_final ? json(certificate.sha256) : json(nullptr);
-  out["made_at_us"] = certificate.made_at_us;
+  out["format"] = digest.format;
+  out["samples_expected"] = digest.samples_expected;
+  out["samples_live"] = digest.samples_live;
+  out["samples_backfilled"] = digest.samples_backfilled;
+  out["samples_lost"] = digest.samples_lost;
+  out["samples_missing"] = digest.samples_missing();
+  out["lost_by_cause"] = digest.lost_by_cause;
+  out["longest_gap_samples"] = digest.longest_gap_samples;
+  out["longest_gap_us"] = digest.longest_gap_us;
+  out["worst_clock_uncertainty_us"] = digest.worst_clock_uncertainty_us;
+  out["samples_without_clock"] = digest.samples_without_clock;
+  out["sha256"] = found.is_final ? json(digest.sha256) : json(nullptr);
+  out["made_at_us"] = digest.made_at_us;
   return out;
 }
 
-Answer get_certificate(RunRoutes parts, Request request) {
+Answer get_digest(RunRoutes parts, Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return problem(id.error());
-  const auto certificate = co_await parts.certifier.find(*id);
-  if (!certificate) co_return problem(certificate.error());
-  co_return json_response(200, to_json(*certificate, *id));
+  const auto digest = co_await parts.digester.find(*id);
+  if (!digest) co_return problem(digest.error());
+  co_return json_response(200, to_json(*digest, *id));
 }
 
 Answer get_snapshot(RunRoutes parts, Request request) {
@@ -235,7 +235,7 @@ void add_run_routes(Router& router, RunRoutes parts) {
   add("POST", "/api/v1/runs/{run_id}/end", Scope::record, {}, end_run);
   add("POST", "/api/v1/runs/{run_id}/annotate", Scope::record, {}, annotate_run);
   add("POST", "/api/v1/runs/{run_id}/discard", Scope::record, {}, discard_run);
-  add("GET", "/api/v1/runs/{run_id}/certificate", Scope::read, {}, get_certificate);
+  add("GET", "/api/v1/runs/{run_id}/certificate", Scope::read, {}, get_digest);
   add("GET", "/api/v1/runs/{run_id}/snapshot", Scope::read, {}, get_snapshot);
   add("GET", "/api/v1/runs/{run_id}/step-metrics", Scope::read, {}, get_step_metrics);
 }

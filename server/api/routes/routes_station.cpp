@@ -35,7 +35,7 @@ Answer make_login_link(StationRoutes parts, Request request) {
   note.action = "account.link_made";
   note.can_flood = true;
   parts.recorder.on_audit(note);
-  co_return json_response(201, {{"url", url}, {"expires_at_us", parts.clock.utc_us() + kLoginCodeLife.count()}});
+  co_return json_response(201, {{"url", url}, {"expires_at_us", parts.clock.utc_us() + kLoginCodeValidity.count()}});
 }
 
 Answer log_in(StationRoutes parts, Request request) {

@@ -21,7 +21,7 @@ struct RobotCommand {
   std::filesystem::path data_dir = "rheonaut-data";
   std::string robot_id;
   bool json = false;
-  RobotSettingsCommand settings;  // if of is not nothing, this is what is wanted
+  RobotSettingsCommand settings;  // runs instead, unless its `of` is nothing
 };
 
 void add_options(CLI::App& command, RobotCommand& options);

@@ -133,17 +133,18 @@ int show_controller(const Robot& robot, bool as_json, std::ostream& out) {
 json sections_in(const std::string& file, const Robot& robot) {
   std::ifstream in{file};
   if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file)};
-  const json given = json::parse(in, nullptr, false);
-  const auto told_by_robot = [&given] { return given.is_object() && given.contains("period_us"); };
-  if (given.is_object() && given.contains("sections")) {
+  const json content = json::parse(in, nullptr, false);
+  const auto is_robots_controller = [&content] { return content.is_object() && content.contains("period_us"); };
+  if (content.is_object() && content.contains("sections")) {
     json needed;
     for (const char* name : {"period_s", "dc_gain", "sections"}) {
-      if (given.contains(name)) needed[name] = given[name];
+      if (content.contains(name)) needed[name] = content[name];
     }
     return needed;
   }
-  if (given.is_object() && given.contains("controller") && given.contains("told_at_us")) return given["controller"];
-  if (told_by_robot()) return given;
+  if (content.is_object() && content.contains("controller") && content.contains("told_at_us"))
+    return content["controller"];
+  if (is_robots_controller()) return content;
   Sampling sampling;
   const json in_force = robot.get("/controller").at("controller");
   constexpr double kUsPerS = 1e6;

@@ -111,7 +111,7 @@ void write_table(std::ostream& out, const Verified& verified, const Verify& opti
     const StoreFindings& findings = *verified.store;
     fmt::print(out, "segments  {} with {} samples\n", findings.segments, findings.samples);
     fmt::print(out, "runs      {} verified, {} with samples on their way, {} not certified yet\n",
-               findings.runs_verified, findings.runs_incomplete, findings.runs_uncertified);
+               findings.runs_verified, findings.runs_incomplete, findings.runs_without_digest);
   }
   if (verified.audit) {
     const AuditFindings& findings = *verified.audit;
@@ -136,7 +136,7 @@ nlohmann::ordered_json json_of(const Verified& verified) {
     out["samples"] = findings.samples;
     out["runs_verified"] = findings.runs_verified;
     out["runs_incomplete"] = findings.runs_incomplete;
-    out["runs_uncertified"] = findings.runs_uncertified;
+    out["runs_uncertified"] = findings.runs_without_digest;
     out["integrity_checked"] = verified.integrity_checked;
   }
   if (verified.audit) {

@@ -1,4 +1,4 @@
-// `rheonaut verify`: whether a station's database is what it should be, its certificates are true, and its audit is as
+// `rheonaut verify`: whether a station's database is what it should be, its digests are true, and its audit is as
 // it was written.
 #pragma once
 

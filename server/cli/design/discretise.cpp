@@ -98,17 +98,17 @@ control::DiscretisationChoice discretised(const control::FopdController& control
   return {made, "as asked for", {made}, {}};
 }
 
-void add_options(CLI::App& command, Discretise& given) {
-  add_option(command, given.controller);
-  add_options(command, given.sampling);
-  add_json_flag(command, given.form);
+void add_options(CLI::App& command, Discretise& options) {
+  add_option(command, options.controller);
+  add_options(command, options.sampling);
+  add_json_flag(command, options.form);
   command.footer("Example: rheonaut discretise --period-s 0.01 --order 5 --method direct --a 0.5");
 }
 
-int run(const Discretise& given, std::ostream& out) {
-  const control::FopdController controller = read(given.controller);
-  const control::DiscretisationChoice choice = discretised(controller, given.sampling);
-  if (given.form.is_json) {
+int run(const Discretise& options, std::ostream& out) {
+  const control::FopdController controller = read(options.controller);
+  const control::DiscretisationChoice choice = discretised(controller, options.sampling);
+  if (options.form.is_json) {
     OrderedJson answer = json_of(choice.chosen);
     answer["reason"] = choice.reason;
     answer["compared"] = OrderedJson::array();

@@ -31,7 +31,7 @@ struct Discretise {
   OutputForm form;
 };
 
-void add_options(CLI::App& command, Discretise& given);
-int run(const Discretise& given, std::ostream& out);
+void add_options(CLI::App& command, Discretise& options);
+int run(const Discretise& options, std::ostream& out);
 
 }  // namespace server::cli

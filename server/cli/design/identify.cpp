@@ -28,23 +28,23 @@ std::array<double, kParameters> values_of(const control::FractionalModel& model)
   return {model.kp, model.b1, model.b2, model.alpha, model.beta};
 }
 
-void add_source(CLI::App& command, Identify& asked) {
-  auto* csv = command.add_option("--csv", asked.csv,
+void add_source(CLI::App& command, Identify& options) {
+  auto* csv = command.add_option("--csv", options.csv,
                                  "Recording with columns t_s (equally spaced), duty, and position_m or velocity_m_s");
   csv->check(named());
-  add_options(command, asked.run);
+  add_options(command, options.run);
   auto* run = command.get_option("--run");
   run->excludes(csv);
-  command.add_option("--span", asked.window.span, "Which span of the run, if the robot rebooted during it")
+  command.add_option("--span", options.window.span, "Which span of the run, if the robot rebooted during it")
       ->check(whole(0, std::numeric_limits<std::uint32_t>::max()))
       ->needs(run);
-  command.add_option("--from-s", asked.window.from_s, "First second of the span to use")->check(finite())->needs(run);
-  command.add_option("--to-s", asked.window.to_s, "Last second of the span to use")->check(finite())->needs(run);
-  add_word(command, "--channels", asked.channels,
+  command.add_option("--from-s", options.window.from_s, "First second of the span to use")->check(finite())->needs(run);
+  command.add_option("--to-s", options.window.to_s, "Last second of the span to use")->check(finite())->needs(run);
+  add_word(command, "--channels", options.channels,
            std::array{ChannelChoice::best, ChannelChoice::outside, ChannelChoice::robot},
            "best, outside or robot: whether a position from outside is fitted (default: best, where the run has one)")
       ->needs(run);
-  command.add_flag("--with-velocity", asked.window.with_velocity,
+  command.add_flag("--with-velocity", options.window.with_velocity,
                    "Also fit the velocity that the robot recorded, where its position is known");
 }
 
@@ -68,8 +68,8 @@ void add_search(CLI::App& command, control::IdentificationOptions& options) {
   command.add_option("--time-limit-s", options.time_limit_s, "Of the search (default: 60)")->check(positive());
 }
 
-void add_plan(CLI::App& command, Identify& asked) {
-  Plan& plan = asked.plan;
+void add_plan(CLI::App& command, Identify& options) {
+  Plan& plan = options.plan;
   auto* flag = command.add_flag("--plan", plan.is_wanted, "No recording: what an experiment would tell about --plant");
   flag->excludes(command.get_option("--csv"))->excludes(command.get_option("--run"))->group("Planning");
   const auto add = [&command, flag](const char* name, auto& value, const char* meaning) {
@@ -99,15 +99,15 @@ std::vector<std::string> channels_of(const control::Recording& recording) {
   return names;
 }
 
-RunRecording recording_for(const Identify& asked) {
-  if (asked.csv) return read_recording(*asked.csv, asked.window.with_velocity);
-  if (!asked.run.run) {
+RunRecording recording_for(const Identify& options) {
+  if (options.csv) return read_recording(*options.csv, options.window.with_velocity);
+  if (!options.run.run) {
     throw std::runtime_error{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
   }
-  const std::vector<StoredSample> samples = read_samples(asked.run);
-  const std::optional<StoredReference> reference = read_reference(asked.run);
-  auto recording = recording_of(samples, asked.window, reference ? &*reference : nullptr, asked.channels);
-  if (!recording) throw std::runtime_error{fmt::format("run {}: {}", *asked.run.run, recording.error().detail)};
+  const std::vector<StoredSample> samples = read_samples(options.run);
+  const std::optional<StoredReference> reference = read_reference(options.run);
+  auto recording = recording_of(samples, options.window, reference ? &*reference : nullptr, options.channels);
+  if (!recording) throw std::runtime_error{fmt::format("run {}: {}", *options.run.run, recording.error().detail)};
   return std::move(*recording);
 }
 
@@ -118,11 +118,11 @@ bool show_progress(const control::Progress& progress) {
   return true;
 }
 
-control::Identification search(const Identify& asked, const control::Recording& recording) {
-  control::IdentificationOptions options = asked.options;
+control::Identification search(const Identify& options, const control::Recording& recording) {
+  control::IdentificationOptions settings = options.search;
   const bool is_watched = ::isatty(STDERR_FILENO) != 0;
-  if (is_watched) options.on_progress = show_progress;
-  control::Identification found = control::identify(recording, options);
+  if (is_watched) settings.on_progress = show_progress;
+  control::Identification found = control::identify(recording, settings);
   if (is_watched) fmt::print(stderr, "\r\x1b[K");
   return found;
 }
@@ -143,14 +143,14 @@ constexpr double kLargerThanSaid = 1.5;  // residuals, in sd of the reference
 // What a position from outside adds to the doubts.
 constexpr double kSuspiciousClockS = 0.005;
 
-void add_outside_doubts(const RunRecording& given, const Identify& asked, control::Identification& found) {
-  if (!(given.position_sd_m > 0)) return;
+void add_outside_doubts(const RunRecording& recorded, const Identify& options, control::Identification& found) {
+  if (!(recorded.position_sd_m > 0)) return;
   const double residual_sd_m = found.best.residual_sd;
-  if (residual_sd_m > kLargerThanSaid * given.position_sd_m) {
+  if (residual_sd_m > kLargerThanSaid * recorded.position_sd_m) {
     found.warnings.push_back(fmt::format(
         "the residuals, {:.2g} mm, are larger than the position from outside is said to be exact, {:.2g} mm: "
         "its clock, its scale or the model is not right",
-        1e3 * residual_sd_m, 1e3 * given.position_sd_m));
+        1e3 * residual_sd_m, 1e3 * recorded.position_sd_m));
   }
   // A dead time of the plant and a camera's clock that is ahead look the same: positions come late after the duty.
   const control::Fit& best = found.best;
@@ -162,7 +162,7 @@ void add_outside_doubts(const RunRecording& given, const Identify& asked, contro
             ? "if it is not, that is a dead time of the plant; search with --dead-time-s"
             : "the positions come before the duty that moves the robot, as no plant does; correct the clock's offset"));
   }
-  if (asked.options.longest_dead_time_s > 0) {
+  if (options.search.longest_dead_time_s > 0) {
     found.warnings.emplace_back("the dead time contains what is left of the error of the outside position's clock");
   }
 }
@@ -172,10 +172,10 @@ struct ChiSquare {
   double value = 0, degrees_of_freedom = 0;
 };
 
-std::optional<ChiSquare> chi_square_of(const RunRecording& given, const Fit& fit) {
+std::optional<ChiSquare> chi_square_of(const RunRecording& recorded, const Fit& fit) {
   const auto positions = static_cast<double>(fit.position_residual_m.size());
-  if (!(given.position_sd_m > 0) || !std::isfinite(fit.residual_sd)) return std::nullopt;
-  const double relative_sd = fit.residual_sd / given.position_sd_m;
+  if (!(recorded.position_sd_m > 0) || !std::isfinite(fit.residual_sd)) return std::nullopt;
+  const double relative_sd = fit.residual_sd / recorded.position_sd_m;
   return ChiSquare{positions * relative_sd * relative_sd, positions - fit.free_parameters};
 }
 
@@ -230,10 +230,10 @@ void write_estimator(std::ostream& out, const control::EstimatorModel& model) {
 }
 
 // In metres, also of positions that are weighed in the fit.
-OrderedJson residuals_json(const Fit& fit, const RunRecording& given) {
+OrderedJson residuals_json(const Fit& fit, const RunRecording& recorded) {
   std::vector<double> position_m = fit.position_residual_m;
-  const std::vector<double>& sd_m = given.recording.position_sd_m;
-  for (std::size_t i = 0; i < sd_m.size(); ++i) position_m[i] *= sd_m[i] / given.position_sd_m;
+  const std::vector<double>& sd_m = recorded.recording.position_sd_m;
+  for (std::size_t i = 0; i < sd_m.size(); ++i) position_m[i] *= sd_m[i] / recorded.position_sd_m;
   return {{"position_m", position_m},
           {"velocity_m_s", fit.velocity_residual_m_s},
           {"acceleration_m_s2", fit.acceleration_residual_m_s2}};
@@ -241,14 +241,14 @@ OrderedJson residuals_json(const Fit& fit, const RunRecording& given) {
 
 }  // namespace
 
-void add_options(CLI::App& command, Identify& asked) {
-  add_source(command, asked);
-  add_search(command, asked.options);
-  command.add_flag("--residuals", asked.with_residuals, "With --json: also the residuals, measured less model");
-  add_json_flag(command, asked.form);
+void add_options(CLI::App& command, Identify& options) {
+  add_source(command, options);
+  add_search(command, options.search);
+  command.add_flag("--residuals", options.with_residuals, "With --json: also the residuals, measured less model");
+  add_json_flag(command, options.form);
   command.get_option("--residuals")->needs("--json");
-  add_plan(command, asked);
-  add_option(command, asked.plant);
+  add_plan(command, options);
+  add_option(command, options.plant);
   command.get_option("--plant")->needs("--plan")->group("Planning");
   for (const char* searching :
        {"--structure", "--cost", "--dead-time-s", "--sensor-lag-s", "--time-limit-s", "--residuals"}) {
@@ -259,29 +259,29 @@ void add_options(CLI::App& command, Identify& asked) {
       "Example: rheonaut identify --csv run.csv --structure fractional");
 }
 
-int run(const Identify& asked, std::ostream& out) {
-  if (asked.plan.is_wanted) return run_plan(asked, out);
-  const RunRecording given = recording_for(asked);
-  for (const std::string& warning : given.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
-  control::Identification found = search(asked, given.recording);
-  found.warnings.insert(found.warnings.end(), given.warnings.begin(), given.warnings.end());
-  add_outside_doubts(given, asked, found);
+int run(const Identify& options, std::ostream& out) {
+  if (options.plan.is_wanted) return run_plan(options, out);
+  const RunRecording recorded = recording_for(options);
+  for (const std::string& warning : recorded.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
+  control::Identification found = search(options, recorded.recording);
+  found.warnings.insert(found.warnings.end(), recorded.warnings.begin(), recorded.warnings.end());
+  add_outside_doubts(recorded, options, found);
   const std::optional<control::EstimatorModel> estimator = estimator_of(found.best);
-  if (asked.form.is_json) {
+  if (options.form.is_json) {
     OrderedJson answer = json_of(found);
     answer["estimator"] = estimator ? json_of(*estimator) : OrderedJson{};
-    answer["channels"] = channels_of(given.recording);
-    answer["channels_reason"] = given.channels_reason;
-    if (const auto chi_square = chi_square_of(given, found.best)) {
+    answer["channels"] = channels_of(recorded.recording);
+    answer["channels_reason"] = recorded.channels_reason;
+    if (const auto chi_square = chi_square_of(recorded, found.best)) {
       answer["position_chi_square"] = chi_square->value;
       answer["position_degrees_of_freedom"] = chi_square->degrees_of_freedom;
     }
-    if (asked.with_residuals) answer["residuals"] = residuals_json(found.best, given);
+    if (options.with_residuals) answer["residuals"] = residuals_json(found.best, recorded);
     write_json(out, answer);
   } else {
-    fmt::print(out, "fitted: {}; {}\n\n", fmt::join(channels_of(given.recording), ", "), given.channels_reason);
+    fmt::print(out, "fitted: {}; {}\n\n", fmt::join(channels_of(recorded.recording), ", "), recorded.channels_reason);
     write_parameters(out, found.best);
-    if (const auto chi_square = chi_square_of(given, found.best)) {
+    if (const auto chi_square = chi_square_of(recorded, found.best)) {
       fmt::print(out, "chi-square of the position from outside: {} with {} degrees of freedom\n",
                  fixed(chi_square->value, 1), chi_square->degrees_of_freedom);
     }

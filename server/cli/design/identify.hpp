@@ -35,19 +35,19 @@ struct Identify {
   RunChoice run;
   RunWindow window;
   ChannelChoice channels = ChannelChoice::best;
-  control::IdentificationOptions options;
+  control::IdentificationOptions search;
   bool with_residuals = false;
   Plan plan;
   PlantChoice plant;  // of the plan
   OutputForm form;
 };
 
-void add_options(CLI::App& command, Identify& given);
+void add_options(CLI::App& command, Identify& options);
 
 // 0, or kNotConverged: then the best that was found stands in the answer.
-int run(const Identify& given, std::ostream& out);
+int run(const Identify& options, std::ostream& out);
 
 // Of the plan alone.
-int run_plan(const Identify& given, std::ostream& out);
+int run_plan(const Identify& options, std::ostream& out);
 
 }  // namespace server::cli

@@ -34,10 +34,10 @@ control::PlannedExperiment experiment_of(const Plan& plan, bool fits_offset) {
 
 const char* text(PlannedDuty value) { return value == PlannedDuty::step ? "step" : "prbs"; }
 
-int run_plan(const Identify& given, std::ostream& out) {
-  const control::FractionalModel plant = read(given.plant);
-  const auto expected = control::expected_uncertainty(plant, experiment_of(given.plan, given.options.fits_offset));
-  if (given.form.is_json) {
+int run_plan(const Identify& options, std::ostream& out) {
+  const control::FractionalModel plant = read(options.plant);
+  const auto expected = control::expected_uncertainty(plant, experiment_of(options.plan, options.search.fits_offset));
+  if (options.form.is_json) {
     OrderedJson answer = json_of(expected);
     answer["plant"] = json_of(plant);
     write_json(out, answer);
@@ -52,8 +52,8 @@ int run_plan(const Identify& given, std::ostream& out) {
                sigma ? cell(100 * *sigma / std::abs(values[i]), 3) : "-"});
   }
   fmt::print(out, "{} of {} s, amplitude {}, every {} s; noise sd {} m, {} m/s, {} m/s² (0: not recorded)\n\n",
-             text(given.plan.duty), given.plan.duration_s, given.plan.amplitude, given.plan.dt_s,
-             given.plan.position_sd_m, given.plan.velocity_sd_m_s, given.plan.acceleration_sd_m_s2);
+             text(options.plan.duty), options.plan.duration_s, options.plan.amplitude, options.plan.dt_s,
+             options.plan.position_sd_m, options.plan.velocity_sd_m_s, options.plan.acceleration_sd_m_s2);
   table.write(out);
   return 0;
 }

@@ -186,42 +186,42 @@ OrderedJson answer_of(const control::ClosedLoopExperiment& experiment, const con
 
 }  // namespace
 
-void add_options(CLI::App& command, Predict& given) {
-  add_option(command, given.plant);
-  add_option(command, given.controller);
-  add_options(command, given.sampling);
-  add_world(command, given.experiment);
-  add_options(command, given.run);
+void add_options(CLI::App& command, Predict& options) {
+  add_option(command, options.plant);
+  add_option(command, options.controller);
+  add_options(command, options.sampling);
+  add_world(command, options.experiment);
+  add_options(command, options.run);
   for (const char* flag : {"--setpoint-m", "--duration-s", "--disturbance-m", "--disturbance-at-s"}) {
     command.get_option("--run")->excludes(flag);
   }
-  command.add_flag("--robustness", given.with_robustness, "Also for other gains, the other fluid, a one-way motor");
-  add_json_and_csv_flags(command, given.form);
+  command.add_flag("--robustness", options.with_robustness, "Also for other gains, the other fluid, a one-way motor");
+  add_json_and_csv_flags(command, options.form);
   command.footer(
       "With --run, the experiment is the run's first step of setpoint and the disturbance after it, and what the run\n"
       "did stands beside the prediction.\n"
       "Example: rheonaut predict --setpoint-m 0.1 --duration-s 40 --disturbance-m -0.05 --disturbance-at-s 20");
 }
 
-int run(const Predict& given, std::ostream& out) {
-  const control::DiscretisationChoice controller = discretised(read(given.controller), given.sampling);
-  control::ClosedLoopExperiment experiment = given.experiment;
-  const Measured measured = given.run.run ? follow(given.run, experiment) : Measured{};
-  experiment.plant = read(given.plant);
+int run(const Predict& options, std::ostream& out) {
+  const control::DiscretisationChoice controller = discretised(read(options.controller), options.sampling);
+  control::ClosedLoopExperiment experiment = options.experiment;
+  const Measured measured = options.run.run ? follow(options.run, experiment) : Measured{};
+  experiment.plant = read(options.plant);
   experiment.controller = controller.chosen.sections;
-  experiment.period_s = given.sampling.period_s;
+  experiment.period_s = options.sampling.period_s;
   const control::ClosedLoopPrediction prediction = control::predict_closed_loop(experiment);
-  if (given.form.is_csv) {
+  if (options.form.is_csv) {
     write_samples(out, prediction);
-  } else if (given.form.is_json) {
+  } else if (options.form.is_json) {
     OrderedJson answer = answer_of(experiment, controller, prediction, measured);
-    if (given.with_robustness) {
+    if (options.with_robustness) {
       answer["robustness"] = server::json_of(control::robustness(experiment.plant, controller.chosen));
     }
     write_json(out, answer);
   } else {
     write_table(out, experiment, prediction, measured);
-    if (given.with_robustness) write_robustness(out, control::robustness(experiment.plant, controller.chosen));
+    if (options.with_robustness) write_robustness(out, control::robustness(experiment.plant, controller.chosen));
   }
   return 0;
 }

@@ -21,7 +21,7 @@ struct Predict {
   OutputForm form;
 };
 
-void add_options(CLI::App& command, Predict& given);
-int run(const Predict& given, std::ostream& out);
+void add_options(CLI::App& command, Predict& options);
+int run(const Predict& options, std::ostream& out);
 
 }  // namespace server::cli

@@ -29,9 +29,9 @@ Authority::Lease* Authority::lease_of(const RobotId& robot) {
   return found == leases_.end() || found->second.ends_us <= clock_.steady_us() ? nullptr : &found->second;
 }
 
-Authority::Lease& Authority::give(const RobotId& robot, const std::string& actor, microseconds life) {
+Authority::Lease& Authority::give(const RobotId& robot, const std::string& actor, microseconds duration) {
   Lease& lease = leases_[robot];
-  lease = Lease{actor, clock_.utc_us(), clock_.steady_us() + life.count(), life, "", 0};
+  lease = Lease{actor, clock_.utc_us(), clock_.steady_us() + duration.count(), duration, "", 0};
   return lease;
 }
 
@@ -52,29 +52,29 @@ Result<void> Authority::may_use(const RobotId& robot, const std::string& actor) 
 
 Result<std::optional<Authority::Change>> Authority::use(const RobotId& robot, const std::string& actor) {
   Lease* lease = lease_of(robot);
-  if (lease == nullptr || lease->holder != actor) return take(robot, actor, kControlLife);
-  lease->ends_us = std::max(lease->ends_us, clock_.steady_us() + kControlLife.count());
+  if (lease == nullptr || lease->holder != actor) return take(robot, actor, kControlLease);
+  lease->ends_us = std::max(lease->ends_us, clock_.steady_us() + kControlLease.count());
   return std::nullopt;
 }
 
 Result<std::optional<Authority::Change>> Authority::take(const RobotId& robot, const std::string& actor,
-                                                         microseconds life) {
+                                                         microseconds duration) {
   Lease* lease = lease_of(robot);
   // SAFETY: control is never shared, and never changes hands behind its holder's back.
   if (lease != nullptr && lease->holder != actor) return held_by(robot, lease->holder);
   if (lease != nullptr) {
-    lease->life = life;
-    lease->ends_us = clock_.steady_us() + life.count();
+    lease->duration = duration;
+    lease->ends_us = clock_.steady_us() + duration.count();
     return std::nullopt;
   }
-  give(robot, actor, life);
+  give(robot, actor, duration);
   return Change{robot, "control_taken", "by " + actor};
 }
 
 Authority::Change Authority::take_by_force(const RobotId& robot, const std::string& actor, const std::string& reason) {
   const Lease* lease = lease_of(robot);
   const std::string from = lease == nullptr ? "nobody" : lease->holder;
-  give(robot, actor, kControlLife);
+  give(robot, actor, kControlLease);
   return {robot, "control_forced", fmt::format("by {} from {}: {}", actor, from, reason)};
 }
 
@@ -92,7 +92,7 @@ Result<Authority::Change> Authority::request(const RobotId& robot, const std::st
   }
   if (lease->holder == actor) return fail(ErrorCode::conflict, "you are in control already", "in_control");
   lease->requested_by = actor;
-  lease->request_ends_us = clock_.steady_us() + kRequestLife.count();
+  lease->request_ends_us = clock_.steady_us() + kRequestTimeout.count();
   return Change{robot, "control_requested", fmt::format("by {} from {}", actor, lease->holder)};
 }
 
@@ -103,7 +103,7 @@ Result<Authority::Change> Authority::hand_over(const RobotId& robot, const std::
     return fail(ErrorCode::conflict, fmt::format("nobody has asked for control of robot '{}'", robot), "not_requested");
   }
   const std::string to = (*lease)->requested_by;
-  give(robot, to, kControlLife);
+  give(robot, to, kControlLease);
   return Change{robot, "control_handed_over", fmt::format("by {} to {}", actor, to)};
 }
 
@@ -112,7 +112,7 @@ void Authority::keep_alive(const std::string& actor) {
   for (auto& [robot, lease] : leases_) {
     // SAFETY: what has ended stays ended.
     const bool is_own = lease.holder == actor && lease.ends_us > now_us;
-    if (is_own) lease.ends_us = std::max(lease.ends_us, now_us + lease.life.count());
+    if (is_own) lease.ends_us = std::max(lease.ends_us, now_us + lease.duration.count());
   }
 }
 

@@ -18,7 +18,7 @@
 
 namespace server {
 
-inline constexpr microseconds kRequestLife{30'000'000};  // of a request for control
+inline constexpr microseconds kRequestTimeout{30'000'000};  // of a request for control
 
 class Authority {
  public:
@@ -37,21 +37,21 @@ class Authority {
   // Whether a command of the actor would be let through; conflict when another holds control.
   Result<void> may_use(const RobotId& robot, const std::string& actor) const;
 
-  // For a command of the actor: control is its own afterwards, at least for kControlLife. conflict when another holds
+  // For a command of the actor: control is its own afterwards, at least for kControlLease. conflict when another holds
   // it.
   Result<std::optional<Change>> use(const RobotId& robot, const std::string& actor);
 
-  // `life` is how long it lasts without a sign of life. A page gives one by keep_alive() several times a second.
-  Result<std::optional<Change>> take(const RobotId& robot, const std::string& actor, microseconds life);
-  // From whoever has it. The API lets only an admin do this; the reason is kept.
+  // `duration`: how long the lease lasts without a keep_alive(). A page calls that several times a second.
+  Result<std::optional<Change>> take(const RobotId& robot, const std::string& actor, microseconds duration);
+  // From its present holder. The API lets only an admin do this; the reason is kept.
   Change take_by_force(const RobotId& robot, const std::string& actor, const std::string& reason);
   Result<Change> release(const RobotId& robot, const std::string& actor);
   // Asks the holder for it. conflict when nobody holds it: take it.
   Result<Change> request(const RobotId& robot, const std::string& actor);
-  // To whoever has asked for it.
+  // To the actor that requested it.
   Result<Change> hand_over(const RobotId& robot, const std::string& actor);
 
-  // Everything that the actor holds lasts for its life from now.
+  // Extends every lease of the actor to its duration from now.
   void keep_alive(const std::string& actor);
 
   // Ends what has ended, and returns it.
@@ -62,13 +62,13 @@ class Authority {
     std::string holder;
     std::int64_t taken_at_us = 0;  // UTC
     std::int64_t ends_us = 0;      // steady
-    microseconds life{0};
+    microseconds duration{0};
     std::string requested_by;
     std::int64_t request_ends_us = 0;  // steady
   };
 
   Lease* lease_of(const RobotId& robot);  // null when nobody holds it now
-  Lease& give(const RobotId& robot, const std::string& actor, microseconds life);
+  Lease& give(const RobotId& robot, const std::string& actor, microseconds duration);
   Result<Lease*> own_lease(const RobotId& robot, const std::string& actor);
 
   Clock& clock_;

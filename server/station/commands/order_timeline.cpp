@@ -41,7 +41,7 @@ bool OrderTimeline::is_over(const PendingCommand& unanswered) const {
   return is_schedule(wire) && unanswered.number < schedules_ended_by_;
 }
 
-// What has no answer has acted, if ever, by the end of its life; what has one at the time that the answer says.
+// A command without an answer has acted by the end of its time to live, if ever; an answered one at the answer's time.
 OrdersAhead OrderTimeline::ahead(const RobotState& robot, const RobotCommands& commands,
                                  const protocol::Command* newer) const {
   OrdersAhead orders;

@@ -65,7 +65,7 @@ OrderAhead unanswered_order(const protocol::Command& command, std::uint64_t robo
   OrderAhead order{&command, robot_now_us};
   if (command.has_execute_at_robot_us) order.from_robot_us = std::max(robot_now_us, command.execute_at_robot_us);
   order.until_robot_us = command.valid_until_robot_us;
-  order.from_robot_us = std::min(order.from_robot_us, order.until_robot_us);  // its life has ended: it has acted before
+  order.from_robot_us = std::min(order.from_robot_us, order.until_robot_us);  // expired: it has acted
   return order;
 }
 

@@ -26,7 +26,8 @@ std::optional<double> setpoint_of(const protocol::Command& command);
 // Setpoints are floats on the way: a step of just the limit is not too large.
 bool is_too_large(double step_m, const CommandLimits& limits);
 
-// When the command acts that the robot has not acknowledged: from its time on, or from now, until the end of its life.
+// When the command acts that the robot has not acknowledged: from its time on, or from now, until its time to live
+// ends.
 OrderAhead unanswered_order(const protocol::Command& command, std::uint64_t robot_now_us);
 
 // SAFETY: no two setpoints of which one may follow the other are farther apart than the largest step. Every order may

@@ -40,8 +40,9 @@ std::shared_ptr<PendingCommand> make_pending(boost::asio::io_context& loop, cons
   record.peer = request.peer;
   record.submitted_at_us = clock.utc_us();
   if (!pending->is_stop()) {
-    // The robot's clock is not known exactly; this reading is never ahead of it, so a life can only come out shorter.
-    const std::int64_t left_us = std::max<std::int64_t>((request.life - request.age).count(), 0);
+    // The robot's clock is not known exactly; this reading is never ahead of it, so the command can only expire
+    // earlier.
+    const std::int64_t left_us = std::max<std::int64_t>((request.time_to_live - request.age).count(), 0);
     pending->wire.valid_until_robot_us = static_cast<std::uint64_t>(robot_now_us(robot, clock) + left_us);
     pending->deadline_us = now_us + left_us;
     record.life_from = request.life_from;

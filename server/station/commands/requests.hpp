@@ -12,7 +12,7 @@
 
 namespace server {
 
-inline constexpr microseconds kControlLife{3'000'000};       // after the holder's last sign of life
+inline constexpr microseconds kControlLease{3'000'000};      // after the holder's last sign of life
 inline constexpr microseconds kLongestControl{600'000'000};  // that a script may ask for
 inline constexpr microseconds kOldestSight{400'000};         // of what a page has seen, to take or keep anything
 inline bool is_fresh(microseconds age) { return age >= microseconds{0} && age <= kOldestSight; }
@@ -23,15 +23,15 @@ struct CommandRequest {
   protocol::Command action = rheonaut_Command_init_zero;
   std::string arguments = "{}";  // as JSON, for the record
   std::string actor;
-  std::string peer;                   // the address that it came from
-  microseconds life{2'000'000};       // its time to live, at most 10 s, from when it was issued
-  microseconds age{0};                // it was issued so long before it arrived
-  std::string life_from = "arrival";  // how that is known, see CommandRecord
-  microseconds unread{0};             // the station stood still: it may have waited for so long before it was read
-  std::string key;                    // of the client, new for each command; a request that is repeated sends nothing
-  std::int64_t received_us = 0;       // steady, when it arrived at the station; 0: now
-  bool until_verified = false;        // wait for more than the robot's answer
-  bool takes_control = true;          // of a robot that nobody controls
+  std::string peer;                      // the address that it came from
+  microseconds time_to_live{2'000'000};  // at most 10 s, from when it was issued
+  microseconds age{0};                   // it was issued so long before it arrived
+  std::string life_from = "arrival";     // how that is known, see CommandRecord
+  microseconds unread{0};                // the station stood still: it may have waited for so long before it was read
+  std::string key;               // of the client, new for each command; a request that is repeated sends nothing
+  std::int64_t received_us = 0;  // steady, when it arrived at the station; 0: now
+  bool until_verified = false;   // wait for more than the robot's answer
+  bool takes_control = true;     // of a robot that nobody controls
 };
 
 struct StopRequest {
@@ -55,9 +55,9 @@ struct ControlRequest {
   std::string actor;
   std::string peer;  // the address that it came from
   ControlAction action = ControlAction::take;
-  microseconds life{kControlLife};  // take: without a sign of life; at most kLongestControl
-  std::string reason;               // force: why
-  microseconds age{0};              // take, force: of what its page saw; above kOldestSight it begins nothing
+  microseconds lease{kControlLease};  // take: without a sign of life; at most kLongestControl
+  std::string reason;                 // force: why
+  microseconds age{0};                // take, force: of what its page saw; above kOldestSight it begins nothing
 };
 
 }  // namespace server

@@ -186,7 +186,7 @@ enum class CommandState : std::uint8_t {
   acknowledged,  // the robot accepted it; the last state of one that telemetry cannot show, or could not: `reason`
   verified,      // telemetry has shown what it was to bring about
   rejected,      // the robot refused it: `reason`
-  expired,       // its life ended before it took effect
+  expired,       // its time to live ended before it took effect
   failed,        // the link ended before it was sent, or telemetry went on without showing it: `reason`
   superseded,    // a newer command took its place before it was sent, or could be seen
   unknown,       // it was sent and no answer came; whether it has run may be known later
@@ -218,7 +218,7 @@ struct CommandRecord {
   std::int64_t sent_after_us = -1;
   std::int64_t acknowledged_after_us = -1;
   std::int64_t verified_after_us = -1;
-  std::string life_from;  // its life counts from: "arrival", "stamp" (of /live), "issued_at"; empty for a stop
+  std::string life_from;  // its time to live counts from: "arrival", "stamp" (of /live), "issued_at"; empty for a stop
   std::string peer;       // the address that it came from; empty: from the station itself
 };
 

@@ -47,7 +47,7 @@ class RunReading {
   RunReading(SQLite::Database& database, const BootHeads& heads) : database_{database}, heads_{heads} {}
 
   void complete(Run& run) {
-    const bool is_certified = read_certificate(run);
+    const bool has_digest = read_digest(run);
     bind_all(spans_, run.id);
     while (spans_.executeStep()) {
       const std::int64_t boot_key = spans_.getColumn(0).getInt64();
@@ -55,17 +55,17 @@ class RunReading {
           .boot_id = unsigned_id(spans_.getColumn(1)), .first_seq = unsigned_id(spans_.getColumn(2)), .last_seq = {}};
       if (!spans_.getColumn(3).isNull()) span.last_seq = unsigned_id(spans_.getColumn(3));
       run.spans.push_back(span);
-      if (!is_certified) count(run, span, boot_key, unsigned_id(spans_.getColumn(4)));
+      if (!has_digest) count(run, span, boot_key, unsigned_id(spans_.getColumn(4)));
     }
   }
 
  private:
-  bool read_certificate(Run& run) {
-    bind_all(certificate_, run.id);
-    if (!certificate_.executeStep()) return false;
-    run.samples_expected = unsigned_id(certificate_.getColumn(0));
-    run.samples_stored = unsigned_id(certificate_.getColumn(1));
-    run.samples_lost = unsigned_id(certificate_.getColumn(2));
+  bool read_digest(Run& run) {
+    bind_all(digest_, run.id);
+    if (!digest_.executeStep()) return false;
+    run.samples_expected = unsigned_id(digest_.getColumn(0));
+    run.samples_stored = unsigned_id(digest_.getColumn(1));
+    run.samples_lost = unsigned_id(digest_.getColumn(2));
     return true;
   }
 
@@ -92,9 +92,9 @@ class RunReading {
 
   SQLite::Database& database_;
   const BootHeads& heads_;
-  SQLite::Statement certificate_{database_,
-                                 "SELECT samples_expected, samples_live + samples_backfilled, samples_lost"
-                                 " FROM run_certificate WHERE run_id = ?"};
+  SQLite::Statement digest_{database_,
+                            "SELECT samples_expected, samples_live + samples_backfilled, samples_lost"
+                            " FROM run_certificate WHERE run_id = ?"};
   SQLite::Statement spans_{database_,
                            "SELECT boot_key, boot_id, first_seq, last_seq, durable_next_seq"
                            " FROM run_span JOIN boot USING (boot_key) WHERE run_id = ? ORDER BY span"};

@@ -1,7 +1,7 @@
 // Runs as they are stored, with the counts of their samples.
 //
-// On the thread that owns the database handle; reads only. The counts of a run that has a certificate are the
-// certificate's, so a list of ended runs reads no segment; those of any other run are summed over its segments.
+// On the thread that owns the database handle; reads only. The counts of a run that has a digest are the
+// digest's, so a list of ended runs reads no segment; those of any other run are summed over its segments.
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>

@@ -9,7 +9,7 @@
 
 #include "server/storage/database/database_reader.hpp"
 #include "server/storage/ingest/recorder.hpp"
-#include "server/storage/runs/certifier.hpp"
+#include "server/storage/runs/run_digester.hpp"
 #include "server/storage/runs/run_store.hpp"
 
 namespace server {
@@ -109,8 +109,8 @@ std::optional<RunState> run_state_from(const std::string& name) {
   return std::nullopt;
 }
 
-Runs::Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, Certifier& certifier)
-    : clock_{clock}, recorder_{recorder}, reader_{reader}, certifier_{certifier} {}
+Runs::Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, RunDigester& digester)
+    : clock_{clock}, recorder_{recorder}, reader_{reader}, digester_{digester} {}
 
 asio::awaitable<void> Runs::load() {
   auto by_stop = or_problem([](Database& database) {
@@ -235,7 +235,7 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, Author by)
     std::optional<Run> run = co_await read(id);
     if (!run) co_return std::unexpected{no_such_run(id)};
     if (!stored || is_complete(*run) || clock_.steady_us() >= deadline_us) {
-      certifier_.add(id);
+      digester_.add(id);
       co_return std::move(*run);
     }
     co_await clock_.sleep_for(kEndLook);
@@ -270,7 +270,7 @@ asio::awaitable<Result<Run>> Runs::make_afterwards(RobotId robot_id, RunConditio
     };
     id = co_await recorder_.on_disk(std::move(job));
   }
-  certifier_.add(*id);
+  digester_.add(*id);
   co_return co_await find(*id);
 }
 

@@ -23,14 +23,14 @@
 
 namespace server {
 
-class Certifier;
+class RunDigester;
 class Recorder;
 class DatabaseReader;
 struct RecordedSamples;
 
 class Runs final : public StationSink {
  public:
-  Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, Certifier& certifier);
+  Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, RunDigester& digester);
 
   // Runs that were open when the station was killed are interrupted; the log names them, and those that its last stop
   // interrupted. Call before robots arrive.
@@ -52,7 +52,7 @@ class Runs final : public StationSink {
   boost::asio::awaitable<Result<Run>> make_afterwards(RobotId robot_id, RunConditions conditions, RecordedRange range,
                                                       Author by);
 
-  // Changes what was said of the run; each change leaves a row in run_note. Its samples and their certificate have
+  // Changes what was said of the run; each change leaves a row in run_note. Its samples and their digest have
   // nothing to do with it. conflict for a discarded run.
   boost::asio::awaitable<Result<Run>> annotate(RunId id, RunAnnotation annotation, Author by);
 
@@ -102,7 +102,7 @@ class Runs final : public StationSink {
   Clock& clock_;
   Recorder& recorder_;
   DatabaseReader& reader_;
-  Certifier& certifier_;
+  RunDigester& digester_;
   std::map<RobotId, Robot> robots_;
   std::map<RobotId, RunId> open_runs_;  // 0: being created
   bool is_loaded_ = false;

@@ -8,7 +8,7 @@
 #include <map>
 
 #include "server/storage/database/statement.hpp"
-#include "server/storage/runs/certificate.hpp"
+#include "server/storage/runs/run_digest.hpp"
 #include "server/storage/runs/run_queries.hpp"
 #include "server/storage/samples/interval_set.hpp"
 #include "server/storage/samples/sample_scanner.hpp"
@@ -28,8 +28,8 @@ std::vector<std::int64_t> numbers(SQLite::Database& database, const char* sql) {
   return found;
 }
 
-// The first member of two certificates that differs.
-std::string difference(const Certificate& found, const Certificate& stored) {
+// The first member of two digests that differs.
+std::string difference(const RunDigest& found, const RunDigest& stored) {
   const auto number = [](const char* name, auto now, auto then) {
     return fmt::format("{} is {}, the certificate says {}", name, now, then);
   };
@@ -74,7 +74,7 @@ class Checking {
   void check_owners();
   void check_spans(std::optional<RunId> run);
   void check_samples_of(RunId run);
-  void check_certificate(RunId run);
+  void check_digest(RunId run);
   void check_references();
   void check_integrity();
 
@@ -257,36 +257,36 @@ void Checking::check_spans(std::optional<RunId> only) {
 }
 
 void Checking::check_samples_of(RunId run) {
-  for (const CertifiedSpan& span : read_certified_spans(database_, run)) {
+  for (const DigestSpan& span : read_digest_spans(database_, run)) {
     check_segments(span.boot_key, span.samples, fmt::format("run {}: ", run));
   }
 }
 
-void Checking::check_certificate(RunId run) {
-  std::optional<Certification> certification;
-  std::optional<Certificate> stored;  // as it was when the last page was read
-  auto progress = Certification::Progress::more;
-  while (progress == Certification::Progress::more) {
+void Checking::check_digest(RunId run) {
+  std::optional<DigestComputation> computation;
+  std::optional<RunDigest> stored;  // as it was when the last page was read
+  auto progress = DigestComputation::Progress::more;
+  while (progress == DigestComputation::Progress::more) {
     const SQLite::Transaction moment{database_};
-    stored = read_certificate(database_, run);
+    stored = read_digest(database_, run);
     const std::optional<RunState> state = read_run_state(database_, run);
     if (!state || *state == RunState::open || *state == RunState::discarded) return;
-    if (!certification) {
-      certification.emplace(read_certified_spans(database_, run), stored ? stored->format : kCertificateFormat);
+    if (!computation) {
+      computation.emplace(read_digest_spans(database_, run), stored ? stored->format : kDigestFormat);
     }
     try {
-      progress = certification->advance(database_, kPageSamples);
+      progress = computation->advance(database_, kPageSamples);
     } catch (const std::runtime_error& error) {  // a row is not there, or cannot be read
       return fault("run {}: {}", run, error.what());
     }
   }
-  const bool is_complete = progress == Certification::Progress::done;
+  const bool is_complete = progress == DigestComputation::Progress::done;
   if (!stored) {
-    ++(is_complete ? findings_.runs_uncertified : findings_.runs_incomplete);
+    ++(is_complete ? findings_.runs_without_digest : findings_.runs_incomplete);
   } else if (!is_complete) {
-    fault("run {}: {} is missing, but the certificate says that nothing is", run, certification->place());
-  } else if (!certification->certificate().agrees_with(*stored)) {
-    fault("run {}: {}", run, difference(certification->certificate(), *stored));
+    fault("run {}: {} is missing, but the certificate says that nothing is", run, computation->place());
+  } else if (!computation->digest().agrees_with(*stored)) {
+    fault("run {}: {}", run, difference(computation->digest(), *stored));
   } else {
     ++findings_.runs_verified;
   }
@@ -316,14 +316,14 @@ void check_all(SQLite::Database& database, const StoreCheck& options, StoreFindi
   checking.check_spans(options.run);
   if (options.run) {
     checking.check_samples_of(*options.run);
-    return checking.check_certificate(*options.run);
+    return checking.check_digest(*options.run);
   }
   checking.check_rows_counter();
   checking.check_references();
   checking.check_owners();
   checking.check_boots();
   for (const RunId run : numbers(database, "SELECT run_id FROM run WHERE state IN ('ended', 'interrupted')")) {
-    checking.check_certificate(run);
+    checking.check_digest(run);
   }
 }
 

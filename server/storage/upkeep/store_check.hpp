@@ -1,4 +1,4 @@
-// Whether a database keeps what docs/database.md promises, and whether each certificate is still true.
+// Whether a database keeps what docs/database.md promises, and whether each digest is still true.
 //
 // Reads only, in short transactions, so it works beside a running station without holding its log. On the thread that
 // owns the handle, which is in no transaction. Of the present schema version.
@@ -27,9 +27,9 @@ struct StoreFindings {
   std::vector<std::string> faults;  // a line each; empty: the database is as it should be
   std::uint64_t segments = 0;
   std::uint64_t samples = 0;
-  std::uint64_t runs_verified = 0;     // their certificates were recomputed and agree
-  std::uint64_t runs_incomplete = 0;   // have ended; samples are still on their way
-  std::uint64_t runs_uncertified = 0;  // complete, and the station has not made the certificate yet
+  std::uint64_t runs_verified = 0;        // their digests were recomputed and agree
+  std::uint64_t runs_incomplete = 0;      // have ended; samples are still on their way
+  std::uint64_t runs_without_digest = 0;  // complete, and the station has not made the digest yet
 };
 
 // not_found when there is no such run.

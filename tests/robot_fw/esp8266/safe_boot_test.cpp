@@ -1,5 +1,5 @@
 // The motor's pin through boot, setup, crash and reset, with the sketch as it is flashed.
-#include "board.hpp"
+#include "board_fixture.hpp"
 
 extern "C" void preinit();
 extern "C" void custom_crash_callback(struct rst_info*, std::uint32_t, std::uint32_t);
@@ -9,7 +9,7 @@ void loop();
 namespace robot_fw::esp8266 {
 namespace {
 
-class SafeBoot : public Board {};
+class SafeBoot : public BoardFixture {};
 
 TEST_F(SafeBoot, PinIsLowBeforeDuringAndAfterSetup) {
   for (const bool left_high : {false, true}) {
@@ -65,8 +65,8 @@ TEST_F(SafeBoot, PinStaysLowUntilAnOrderCameAndATickCompleted) {
   EXPECT_EQ(chip.pins[kMotorPin].high_us, 0U);
   order(sim_robot::set_duty(1, 500));
   while (chip.now_us % 10'000 != 2'000) chip.pass(kTurnUs);
-  port->step();
-  port->step();
+  board->step();
+  board->step();
   EXPECT_FALSE(chip.level(kMotorPin)) << "the command is read, the tick not yet due";
   run_ms(10);
   EXPECT_TRUE(chip.level(kMotorPin));

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <map>
 
-#include "board.hpp"
+#include "board_fixture.hpp"
 #include "robot_fw/esp8266/instruction_ram.hpp"
 
 namespace robot_fw::esp8266 {
@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kWordsElsewhere = kSamplesElsewhere * sizeof(Sample) / 4;
 constexpr std::uint32_t kUntouched = 0xDEADBEEF;
 
-class SamplesElsewhere : public Board {
+class SamplesElsewhere : public BoardFixture {
  protected:
   SamplesElsewhere() { chip.instruction_ram.fill(kUntouched); }
 
@@ -110,8 +110,8 @@ TEST_F(SamplesElsewhere, WithoutRoomThereIsNoRobotAndTheLedSaysSo) {
     chip.instruction_ram_bytes = room_bytes;
     chip.pins[kMotorPin].latch = true;  // as a reset may leave it
     boot();
-    EXPECT_FALSE(port->has_robot());
-    EXPECT_EQ(port->led_pattern(), LedPattern::refused);
+    EXPECT_FALSE(board->has_robot());
+    EXPECT_EQ(board->led_pattern(), LedPattern::refused);
     const auto led = static_cast<std::size_t>(kSettings.led.pin);
     const std::uint64_t dark_before_us = chip.pins[led].high_us;
     EXPECT_EQ(motor_high_us([this] { run_ms(10'000); }), 0U);
@@ -124,7 +124,7 @@ TEST_F(SamplesElsewhere, WithoutRoomThereIsNoRobotAndTheLedSaysSo) {
   }
   chip.instruction_ram_bytes = kWordsElsewhere * 4;
   boot();
-  EXPECT_TRUE(port->has_robot());
+  EXPECT_TRUE(board->has_robot());
 }
 
 }  // namespace

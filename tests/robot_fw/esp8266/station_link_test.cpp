@@ -1,17 +1,17 @@
 // The way to the station: what is set before the handshake, when it may happen, and how frames leave.
 #include "robot_fw/esp8266/station_link.hpp"
 
-#include "board.hpp"
+#include "board_fixture.hpp"
 
 namespace robot_fw::esp8266 {
 namespace {
 
-class Link : public Board {
+class Link : public BoardFixture {
  protected:
   // Opens, and is welcomed with this batch.
   void connect_with(std::uint32_t samples_per_frame) {
     boot();
-    for (int i = 0; i < 100 && port->link().state() != StationLink::State::open; ++i) run_ms(100);
+    for (int i = 0; i < 100 && board->link().state() != StationLink::State::open; ++i) run_ms(100);
     protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
     frame.which_body = rheonaut_StationFrame_welcome_tag;
     frame.body.welcome.protocol_version = protocol::kProtocolVersion;
@@ -42,11 +42,11 @@ TEST_F(Link, TimeoutsOfATurnAreShorterThanTheMotors) {
   chip.socket.takes = false;
   std::uint64_t longest_us = 0;
   const int dials = chip.socket.dials;
-  while (chip.now_us < 8'000'000 && port->link().state() == StationLink::State::open && chip.socket.dials == dials) {
+  while (chip.now_us < 8'000'000 && board->link().state() == StationLink::State::open && chip.socket.dials == dials) {
     chip.pass(kTurnUs);
     const std::uint64_t before_us = chip.now_us;
-    port->step();
-    const bool is_the_same = port->link().state() == StationLink::State::open && chip.socket.dials == dials;
+    board->step();
+    const bool is_the_same = board->link().state() == StationLink::State::open && chip.socket.dials == dials;
     if (is_the_same) longest_us = std::max(longest_us, chip.now_us - before_us);
   }
   EXPECT_GT(longest_us, 0U);
@@ -56,13 +56,13 @@ TEST_F(Link, TimeoutsOfATurnAreShorterThanTheMotors) {
 TEST_F(Link, KeyThatIsNoneIsShownAndNobodyIsDialled) {
   Secrets secrets = kTestSecrets;
   secrets.station_key_pem = "MFkwEwYHKoZIzj0CAQYIKoZIzj0DAQcDQgAE";
-  port.emplace(secrets);
-  port->begin();
+  board.emplace(secrets);
+  board->begin();
   run_ms(10'000);
-  EXPECT_EQ(port->led_pattern(), LedPattern::refused);
+  EXPECT_EQ(board->led_pattern(), LedPattern::refused);
   EXPECT_EQ(chip.joins, 0);
   EXPECT_EQ(chip.socket.dials, 0);
-  port.reset();  // before the secrets
+  board.reset();  // before the secrets
 }
 
 TEST_F(Link, NetworkIsNeverKeptInFlashNorRejoinedBehindOurBack) {
@@ -77,7 +77,7 @@ TEST_F(Link, StationThatDoesNotAgreeOnShortRecordsIsLeft) {
   boot();
   run_ms(6'000);
   EXPECT_GT(chip.socket.dials, 0);
-  EXPECT_NE(port->link().state(), StationLink::State::open);
+  EXPECT_NE(board->link().state(), StationLink::State::open);
   EXPECT_TRUE(chip.socket.writes.empty());
 }
 
@@ -96,7 +96,7 @@ TEST_F(Link, AttemptsFollowWithinASecondWhileTheRingHasRoom) {
     for (std::size_t i = 1; i < socket.attempt_began_us.size(); ++i) {
       EXPECT_LE(socket.attempt_began_us[i] - socket.attempt_failed_us[i - 1], 1'000'000U) << "refuses: " << refuses;
     }
-    EXPECT_LT(port->robot().samples().fill(), TelemetryRing::kCapacity);
+    EXPECT_LT(board->robot().samples().fill(), TelemetryRing::kCapacity);
     new_chip();
   }
 }
@@ -108,7 +108,7 @@ TEST_F(Link, AttemptWithoutAnAnswerEndsAfterTwoSecondsWithTheMotorOff) {
     socket.attempt_began_us.clear();
     socket.attempt_failed_us.clear();
     drive(0.5F);
-    chip.before_blocking = [this] { EXPECT_TRUE(port->motor().is_off()); };
+    chip.before_blocking = [this] { EXPECT_TRUE(board->motor().is_off()); };
     socket.knows_name = knows_name;
     socket.answers = false;
     socket.connected = false;
@@ -135,7 +135,7 @@ TEST_F(Link, PausesGrowOnceTheRingIsFull) {
   chip.socket.refuses = true;
   boot();
   run_ms(20'000);
-  ASSERT_EQ(port->robot().samples().fill(), TelemetryRing::kCapacity);
+  ASSERT_EQ(board->robot().samples().fill(), TelemetryRing::kCapacity);
   const int dials = chip.socket.dials;
   EXPECT_GE(dials, 15);
   run_ms(60'000);
@@ -161,18 +161,18 @@ TEST_F(Link, NeverDialsWithTheMotorOn) {
     run_ms(80);
   }
   chip.before_blocking = [this] {
-    EXPECT_TRUE(port->motor().is_off());
-    EXPECT_TRUE(port->robot().at_rest());
+    EXPECT_TRUE(board->motor().is_off());
+    EXPECT_TRUE(board->robot().at_rest());
     EXPECT_FALSE(chip.level(kMotorPin));
   };
   const int dials = chip.socket.dials;
   chip.socket.connected = false;
   run_ms(100);
-  EXPECT_NE(port->link().state(), StationLink::State::open);
-  EXPECT_FALSE(port->motor().is_off()) << "the lease still runs";
+  EXPECT_NE(board->link().state(), StationLink::State::open);
+  EXPECT_FALSE(board->motor().is_off()) << "the lease still runs";
   EXPECT_EQ(chip.socket.dials, dials);
   run_ms(5'000);
-  EXPECT_TRUE(port->motor().is_off());
+  EXPECT_TRUE(board->motor().is_off());
   EXPECT_GT(chip.socket.dials, dials);
 }
 
@@ -181,13 +181,13 @@ TEST_F(Link, NeverDialsInAutoEvenAtDutyZero) {
   wait_for_sensors();
   order(sim_robot::set_auto(-0.1F));  // behind it, and the motor has no reverse
   run_ms(20);
-  ASSERT_EQ(port->robot().mode(), rheonaut_MODE_AUTO);
-  ASSERT_TRUE(port->motor().is_off());
+  ASSERT_EQ(board->robot().mode(), rheonaut_MODE_AUTO);
+  ASSERT_TRUE(board->motor().is_off());
   const int dials = chip.socket.dials;
   chip.socket.connected = false;
-  chip.before_blocking = [this] { EXPECT_NE(port->robot().mode(), rheonaut_MODE_AUTO); };
+  chip.before_blocking = [this] { EXPECT_NE(board->robot().mode(), rheonaut_MODE_AUTO); };
   run_ms(900);
-  EXPECT_EQ(port->robot().mode(), rheonaut_MODE_AUTO) << "within the link time-out";
+  EXPECT_EQ(board->robot().mode(), rheonaut_MODE_AUTO) << "within the link time-out";
   EXPECT_EQ(chip.socket.dials, dials);
   run_ms(5'000);
   EXPECT_GT(chip.socket.dials, dials);
@@ -196,11 +196,11 @@ TEST_F(Link, NeverDialsInAutoEvenAtDutyZero) {
 TEST_F(Link, NeverRejoinsWithTheMotorOn) {
   connect();
   drive(0.5F);
-  chip.before_blocking = [this] { EXPECT_TRUE(port->motor().is_off()); };
+  chip.before_blocking = [this] { EXPECT_TRUE(board->motor().is_off()); };
   const int joins = chip.joins;
   chip.wifi_begun = false;
   run_ms(200);
-  EXPECT_EQ(port->link().state(), StationLink::State::off);
+  EXPECT_EQ(board->link().state(), StationLink::State::off);
   EXPECT_EQ(chip.joins, joins);
   run_ms(3'000);
   EXPECT_GT(chip.joins, joins);
@@ -273,7 +273,7 @@ TEST_F(Link, LastRecordLeavesAlsoWhileInputWaits) {
   for (int i = 0; i < 100; ++i) ping();  // more than a turn reads
   for (int turn = 0; turn < 5; ++turn) {
     chip.pass(kTurnUs);
-    port->step();
+    board->step();
     ASSERT_TRUE(chip.socket.input_is_found);
     EXPECT_EQ(chip.socket.sealed, 0U) << "turn " << turn;
   }
@@ -286,7 +286,7 @@ TEST_F(Link, NoFrameFollowsARecordThatTlsStillHolds) {
   const std::size_t writes = chip.socket.writes.size();
   const std::uint64_t until_us = chip.now_us + 300'000;
   while (chip.now_us < until_us) run_ms(1);
-  ASSERT_EQ(port->link().state(), StationLink::State::open);
+  ASSERT_EQ(board->link().state(), StationLink::State::open);
   EXPECT_EQ(chip.socket.writes.size(), writes + 1);
   EXPECT_GT(chip.socket.sealed, 0U);
   chip.socket.takes = true;

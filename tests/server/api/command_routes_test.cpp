@@ -148,7 +148,7 @@ TEST_F(CommandRoutesTest, APageSaysWhatItsOperatorSaw) {
   EXPECT_EQ(ask("POST", kCommands, renewal).parsed()["reason"], "stale");
   EXPECT_TRUE(robot->commands().empty());
   begin("POST", kCommands, old);
-  EXPECT_EQ(robot->commands().size(), 1U) << "who is in control may say something else within the command's life";
+  EXPECT_EQ(robot->commands().size(), 1U) << "who is in control may send another within its time to live";
   EXPECT_EQ(ask("POST", control, {{"action", "release"}, {"stamp_us", 1}}).status, 400);
   EXPECT_EQ(ask("POST", control, {{"action", "release"}}).status, 200);
   json seen = duty_;
@@ -210,7 +210,7 @@ TEST_F(CommandRoutesTest, ControlIsTakenAndGivenBack) {
 
 TEST_F(CommandRoutesTest, WhoIsNotInControlIsToldWhoIs) {
   connect_robot();
-  ASSERT_TRUE(station.control({"r1", "session:7", "", ControlAction::take, kControlLife, ""}));
+  ASSERT_TRUE(station.control({"r1", "session:7", "", ControlAction::take, kControlLease, ""}));
   const Answered answered = ask("POST", kCommands, duty_);
   EXPECT_EQ(answered.status, 409);
   EXPECT_EQ(answered.parsed()["reason"], "not_in_control");

@@ -126,7 +126,7 @@ TEST_F(LiveSocketTest, APageHearsTheStateOfARobotThatItBeginsToWatch) {
   const auto page = open_page();
   page->say({{"type", "watch"}, {"robots", json::array()}});
   clock.settle();
-  ASSERT_TRUE(station.control({"r1", "session:7", "", ControlAction::take, kControlLife, "", microseconds{0}}));
+  ASSERT_TRUE(station.control({"r1", "session:7", "", ControlAction::take, kControlLease, "", microseconds{0}}));
   clock.run_for(200ms);
   page->hear("log");
   page->say({{"type", "watch"}, {"robots", {"r1"}}});

@@ -46,7 +46,7 @@ TEST(ParseCommand, CarriesTheValues) {
   EXPECT_EQ(command->action.action.set_mode.mode, rheonaut_MODE_AUTO);
   EXPECT_TRUE(command->action.action.set_mode.has_setpoint_m);
   EXPECT_EQ(command->action.action.set_mode.setpoint_m, 0.1F);
-  EXPECT_EQ(command->life, std::chrono::milliseconds{500});
+  EXPECT_EQ(command->time_to_live, std::chrono::milliseconds{500});
   EXPECT_EQ(command->arguments, R"({"mode":"auto","setpoint_m":0.1})");
   const auto timed = parse_command(R"({"kind":"set_duty","duty":0.1,"execute_at_robot_us":5000000})");
   ASSERT_TRUE(timed);

@@ -49,7 +49,7 @@ class ReferenceRoutesTest : public ApiTest {
 
 TEST_F(ReferenceRoutesTest, IsStoredBesideTheRunAndShown) {
   record();
-  const json certificate = ask("GET", "/api/v1/runs/1/certificate").parsed();
+  const json digest = ask("GET", "/api/v1/runs/1/certificate").parsed();
   EXPECT_EQ(ask("GET", kPath).status, 404);
   const Answered made = import(body());
   ASSERT_EQ(made.status, 201) << made.body;
@@ -74,7 +74,7 @@ TEST_F(ReferenceRoutesTest, IsStoredBesideTheRunAndShown) {
   const json samples = ask("GET", "/api/v1/runs/1/samples?limit=1").parsed();
   EXPECT_EQ(positions["robot_time_us"][0].get<std::int64_t>(),
             samples["samples"][0]["robot_time_us"].get<std::int64_t>() + 10'000);
-  EXPECT_EQ(ask("GET", "/api/v1/runs/1/certificate").parsed(), certificate);  // the digest is of the run alone
+  EXPECT_EQ(ask("GET", "/api/v1/runs/1/certificate").parsed(), digest);  // the digest is of the run alone
 }
 
 TEST_F(ReferenceRoutesTest, ARunInWhichTheRobotSaysThatItWasZeroedTakesNone) {

@@ -1,4 +1,4 @@
-// Runs after their end, and markers, through the routes: certificate, annotation, discard, runs made afterwards.
+// Runs after their end, and markers, through the routes: digest, annotation, discard, runs made afterwards.
 #include "tests/server/api/api_fixture.hpp"
 
 namespace server {
@@ -20,18 +20,18 @@ class RunRoutesTest : public ApiTest {
   }
 };
 
-TEST_F(RunRoutesTest, AnEndedRunHasACertificate) {
+TEST_F(RunRoutesTest, AnEndedRunHasADigest) {
   record();
   const Answered answered = ask("GET", "/api/v1/runs/1/certificate");
   ASSERT_EQ(answered.status, 200) << answered.body;
-  const json certificate = answered.parsed();
-  EXPECT_EQ(certificate["final"], true);
-  EXPECT_EQ(certificate["format"], 2);
-  EXPECT_EQ(certificate["samples_expected"], 10);
-  EXPECT_EQ(certificate["samples_live"], 10);
-  EXPECT_EQ(certificate["samples_missing"], 0);
-  EXPECT_EQ(certificate["lost_by_cause"], json::object());
-  EXPECT_EQ(certificate["sha256"].get<std::string>().size(), 64U);
+  const json digest = answered.parsed();
+  EXPECT_EQ(digest["final"], true);
+  EXPECT_EQ(digest["format"], 2);
+  EXPECT_EQ(digest["samples_expected"], 10);
+  EXPECT_EQ(digest["samples_live"], 10);
+  EXPECT_EQ(digest["samples_missing"], 0);
+  EXPECT_EQ(digest["lost_by_cause"], json::object());
+  EXPECT_EQ(digest["sha256"].get<std::string>().size(), 64U);
   EXPECT_EQ(ask("GET", "/api/v1/runs/99/certificate").status, 404);
   ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "open"}});
   EXPECT_EQ(ask("GET", "/api/v1/runs/2/certificate").status, 409);

@@ -96,7 +96,7 @@ TEST_F(StandstillTest, AStopThatWaitedIsObeyed) {
   EXPECT_EQ(robot->commands()[0].which_action, rheonaut_Command_emergency_stop_tag);
 }
 
-TEST_F(StandstillTest, WhatMovesNothingKeepsItsLife) {
+TEST_F(StandstillTest, WhatMovesNothingKeepsItsTimeToLive) {
   expect_sent(set_duty(500));
   send_during(700ms, post(kCommands, {{"kind", "set_mode"}, {"mode", "manual"}, {"life_ms", 500}}));
   ASSERT_EQ(robot->commands().size(), 2U);

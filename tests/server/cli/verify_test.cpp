@@ -25,7 +25,7 @@ class VerifyTest : public RecordingTest {
     const RunId run = wait(runs_->create(robot.id, named("one")))->id;
     make(robot, 250);
     ASSERT_TRUE(wait(runs_->end(run, "")).has_value());
-    ASSERT_TRUE(wait(recording_->certifier.find(run))->is_final);
+    ASSERT_TRUE(wait(recording_->digester.find(run))->is_final);
   }
 };
 

@@ -43,7 +43,7 @@ class ControlTest : public LinkTest {
     return command;
   }
   Result<ControlState> control(const std::string& actor, ControlAction action) {
-    return station.control({"r1", actor, "10.0.0.7", action, kControlLife, "a test"});
+    return station.control({"r1", actor, "10.0.0.7", action, kControlLease, "a test"});
   }
 };
 
@@ -65,7 +65,7 @@ TEST_F(ControlTest, ACommandThatIsRefusedOrCameTooLateTakesNoControl) {
   EXPECT_EQ(station.find("r1")->control.holder, "");
   CommandRequest late = request_of(set_duty(0));
   late.actor = "session:1";
-  late.age = late.life;
+  late.age = late.time_to_live;
   submit(std::move(late));
   clock.settle();
   EXPECT_EQ(results.at(1)->state, CommandState::expired);

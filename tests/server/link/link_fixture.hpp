@@ -36,16 +36,16 @@ class LinkTest : public ::testing::Test {
   }
 
   // Submits without waiting for the end; the result appears in `results`.
-  static CommandRequest request_of(protocol::Command action, microseconds life = 2s) {
+  static CommandRequest request_of(protocol::Command action, microseconds time_to_live = 2s) {
     CommandRequest request;
     request.robot_id = "r1";
     request.action = action;
     request.actor = "test";
-    request.life = life;
+    request.time_to_live = time_to_live;
     return request;
   }
   void submit(CommandRequest request) { tasks.spawn("submit", run_submit(std::move(request))); }
-  void submit(protocol::Command action, microseconds life = 2s) { submit(request_of(action, life)); }
+  void submit(protocol::Command action, microseconds time_to_live = 2s) { submit(request_of(action, time_to_live)); }
   void stop_robot(microseconds patience = 1s, std::string key = "") {
     tasks.spawn("stop", run_stop({"r1", "test", "", std::move(key), 0}, patience));
   }

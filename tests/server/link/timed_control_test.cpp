@@ -9,7 +9,7 @@ using TimedControlTest = TimedTest;
 
 TEST_F(TimedControlTest, IsLookedForFromItsTimeOn) {
   const std::uint64_t at_us = in_ms(6000);
-  take_in(timed(set_duty(0.25F), at_us, "a"));
+  admit(timed(set_duty(0.25F), at_us, "a"));
   clock.run_for(5900ms);
   EXPECT_TRUE(results.empty()) << "longer than what runs at once may take";
   auto frame = TestRobot::samples_frame(0, 1, at_us, 0);
@@ -21,7 +21,7 @@ TEST_F(TimedControlTest, IsLookedForFromItsTimeOn) {
 }
 
 TEST_F(TimedControlTest, ExcusesNoStopThatTheMotorRunsOnAfter) {
-  take_in(timed(set_duty(0.25F), in_ms(5000), "a"));
+  admit(timed(set_duty(0.25F), in_ms(5000), "a"));
   stop_robot(8s);
   clock.settle();
   robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, 7);
@@ -59,8 +59,8 @@ TEST_F(TimedControlTest, AStopIsExcusedByAClearOfItsLatch) {
 }
 
 TEST_F(TimedControlTest, EndsAsTheRobotSaysWhenItDropsIt) {
-  const auto first = take_in(timed(set_duty(0.25F), in_ms(3000), "a"));
-  const auto second = take_in(timed(set_duty(0.5F), in_ms(4000), "a"));
+  const auto first = admit(timed(set_duty(0.25F), in_ms(3000), "a"));
+  const auto second = admit(timed(set_duty(0.5F), in_ms(4000), "a"));
   robot->acknowledge(first, rheonaut_COMMAND_RESULT_EXPIRED);
   robot->acknowledge(second, rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_LATCHED);
   clock.settle();
@@ -82,8 +82,8 @@ TEST_F(TimedControlTest, IsRefusedForATimeAfterTheLifeOfTheCommand) {
 TEST_F(TimedControlTest, AScheduleThatIsReplacedBeforeItsFirstMotionIsSuperseded) {
   robot->send_samples(0, 5, in_ms(0), 0);
   const std::uint64_t at_us = in_ms(500);
-  take_in(timed(moves_after_a_second(), at_us, "a"));
-  take_in(timed(set_duty(0), at_us + 700'000, "a"));
+  admit(timed(moves_after_a_second(), at_us, "a"));
+  admit(timed(set_duty(0), at_us + 700'000, "a"));
   for (std::uint64_t seq = 5; seq < 250; seq += 5) robot->send_samples(seq, 5, at_us + seq * 10'000, 0);
   clock.settle();
   EXPECT_EQ(latest_of_kind("set_duty").state, CommandState::verified);
@@ -94,8 +94,8 @@ TEST_F(TimedControlTest, AScheduleThatIsReplacedBeforeItsFirstMotionIsSuperseded
 TEST_F(TimedControlTest, AScheduleThatShouldHaveMovedBeforeTheNextCommandFails) {
   robot->send_samples(0, 5, in_ms(0), 0);
   const std::uint64_t at_us = in_ms(500);
-  take_in(timed(moves_after_a_second(), at_us, "a"));
-  take_in(timed(set_duty(0), at_us + 1'600'000, "a"));
+  admit(timed(moves_after_a_second(), at_us, "a"));
+  admit(timed(set_duty(0), at_us + 1'600'000, "a"));
   for (std::uint64_t seq = 5; seq < 250; seq += 5) robot->send_samples(seq, 5, at_us + seq * 10'000, 0);
   clock.settle();
   EXPECT_EQ(latest_of_kind("set_duty_schedule").state, CommandState::failed)
@@ -104,7 +104,7 @@ TEST_F(TimedControlTest, AScheduleThatShouldHaveMovedBeforeTheNextCommandFails) 
 
 TEST_F(TimedControlTest, AScheduleIsSeenByItsFirstMotion) {
   const std::uint64_t at_us = in_ms(500);
-  take_in(timed(moves_after_a_second(), at_us, "a"));
+  admit(timed(moves_after_a_second(), at_us, "a"));
   robot->send_samples(0, 5, at_us, 0);
   robot->send_samples(5, 5, at_us + 600'000, 0);
   clock.settle();
@@ -119,17 +119,17 @@ TEST_F(TimedControlTest, AScheduleIsSeenByItsFirstMotion) {
 
 // SAFETY: each way in which control ends.
 TEST_F(TimedControlTest, IsDroppedWhenControlIsReleasedForcedHandedOverOrExpires) {
-  take_in(timed(set_duty(0.25F), in_ms(2000), "a"));
+  admit(timed(set_duty(0.25F), in_ms(2000), "a"));
   control(ControlAction::release, "a");
   EXPECT_EQ(drops(), 1U);
   accept_last();
 
-  take_in(timed(set_duty(0.25F), in_ms(2000), "a"));
+  admit(timed(set_duty(0.25F), in_ms(2000), "a"));
   control(ControlAction::force, "b");
   EXPECT_EQ(drops(), 2U);
   accept_last();
 
-  take_in(timed(set_duty(0.25F), in_ms(2000), "b"));
+  admit(timed(set_duty(0.25F), in_ms(2000), "b"));
   control(ControlAction::request, "a");
   EXPECT_EQ(drops(), 2U) << "who asks for control changes nothing";
   control(ControlAction::hand_over, "b");
@@ -137,7 +137,7 @@ TEST_F(TimedControlTest, IsDroppedWhenControlIsReleasedForcedHandedOverOrExpires
   accept_last();
 
   tasks.spawn("watch", station.watch_control());
-  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  admit(timed(set_duty(0.25F), in_ms(7000), "a"));
   clock.run_for(2900ms);
   EXPECT_EQ(drops(), 3U);
   clock.run_for(500ms);
@@ -146,7 +146,7 @@ TEST_F(TimedControlTest, IsDroppedWhenControlIsReleasedForcedHandedOverOrExpires
 }
 
 TEST_F(TimedControlTest, IsNotDroppedWhenNoneMayWaitAnyMore) {
-  take_in(timed(set_duty(0.25F), in_ms(500), "a"));
+  admit(timed(set_duty(0.25F), in_ms(500), "a"));
   clock.run_for(1s);
   control(ControlAction::release, "a");
   EXPECT_EQ(drops(), 0U);
@@ -154,7 +154,7 @@ TEST_F(TimedControlTest, IsNotDroppedWhenNoneMayWaitAnyMore) {
 
 // Nobody has noticed yet that control has run out; the next holder's first command comes all the same.
 TEST_F(TimedControlTest, IsDroppedAheadOfTheNextHoldersFirstCommand) {
-  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  admit(timed(set_duty(0.25F), in_ms(7000), "a"));
   clock.run_for(3100ms);
   CommandRequest next = request_of(set_duty(0.5F));
   next.actor = "b";
@@ -168,7 +168,7 @@ TEST_F(TimedControlTest, IsDroppedAheadOfTheNextHoldersFirstCommand) {
 
 // SAFETY: nobody's command passes the one that drops what waits.
 TEST_F(TimedControlTest, IsDroppedBeforeAnythingElseAlsoWhenTheLinkWasFull) {
-  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  admit(timed(set_duty(0.25F), in_ms(7000), "a"));
   for (std::size_t i = 0; i < CommandWindow::kMost + RobotOutbox::kMaxQueuedCommands; ++i) {
     submit(ping(), 8s);
     clock.settle();
@@ -199,14 +199,14 @@ TEST_F(TimedControlTest, IsDroppedBeforeAnythingElseAlsoWhenTheLinkWasFull) {
 }
 
 TEST_F(TimedControlTest, OfTheSameActorIsDroppedToWhenControlHadEndedInBetween) {
-  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  admit(timed(set_duty(0.25F), in_ms(7000), "a"));
   clock.run_for(3100ms);
   control(ControlAction::take, "a");
   EXPECT_EQ(drops(), 1U);
 }
 
 TEST_F(TimedControlTest, IsDroppedFirstOnTheNextConnectionWhenTheLinkWasCut) {
-  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  admit(timed(set_duty(0.25F), in_ms(7000), "a"));
   control(ControlAction::release, "a");
   ASSERT_EQ(drops(), 1U) << "and the link is cut before the answer";
   come_back();
@@ -220,7 +220,7 @@ TEST_F(TimedControlTest, IsDroppedAgainWhenThatCameTooLateButNotForAFirmwareThat
     submit(std::move(next));
     clock.settle();
   };
-  take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  admit(timed(set_duty(0.25F), in_ms(7000), "a"));
   control(ControlAction::force, "b");
   robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_EXPIRED);
   clock.settle();
@@ -234,7 +234,7 @@ TEST_F(TimedControlTest, IsDroppedAgainWhenThatCameTooLateButNotForAFirmwareThat
 }
 
 TEST_F(TimedControlTest, OfALostLinkEndsAsTheRobotSaysWhenItIsBack) {
-  const auto sent = take_in(timed(set_duty(0.25F), in_ms(7000), "a"));
+  const auto sent = admit(timed(set_duty(0.25F), in_ms(7000), "a"));
   come_back();
   EXPECT_EQ(latest(sent.command_id).state, CommandState::unknown);
   EXPECT_EQ(latest(sent.command_id).reason, "link_lost");
@@ -256,7 +256,7 @@ TEST_F(TimedControlTest, OfALostLinkIsVerifiedBySamplesThatNothingElseExplains) 
   };
   show_duty_at(0, in_ms(0), 0);
   const std::uint64_t at_us = in_ms(1000);
-  const auto alone = take_in(timed(set_duty(0.25F), at_us, "a"));
+  const auto alone = admit(timed(set_duty(0.25F), at_us, "a"));
   come_back();
   clock.run_for(1s);
   show_duty_at(1, at_us, 0.25F);
@@ -265,8 +265,8 @@ TEST_F(TimedControlTest, OfALostLinkIsVerifiedBySamplesThatNothingElseExplains) 
   clock.run_for(10s);
   show_duty_at(2, in_ms(0), 0);
   const std::uint64_t next_us = in_ms(1000);
-  const auto first = take_in(timed(set_duty(0.25F), next_us, "a"));
-  take_in(timed(set_duty(0.25F), in_ms(500), "a"));
+  const auto first = admit(timed(set_duty(0.25F), next_us, "a"));
+  admit(timed(set_duty(0.25F), in_ms(500), "a"));
   come_back();
   clock.run_for(1s);
   show_duty_at(3, next_us, 0.25F);
@@ -276,7 +276,7 @@ TEST_F(TimedControlTest, OfALostLinkIsVerifiedBySamplesThatNothingElseExplains) 
 // Its acknowledgement of a drop finds room on the robot, whatever else is on its way.
 TEST_F(TimedControlTest, KeepsAPlaceOfTheAcknowledgementsUntilItsEnd) {
   std::vector<protocol::Command> waiting;
-  for (int i = 0; i < 4; ++i) waiting.push_back(take_in(timed(set_duty(0.25F), in_ms(5000), "a")));
+  for (int i = 0; i < 4; ++i) waiting.push_back(admit(timed(set_duty(0.25F), in_ms(5000), "a")));
   for (int i = 0; i < 6; ++i) submit(ping(), 8s);
   clock.settle();
   EXPECT_EQ(robot->commands().size(), 4U + 2U);
@@ -291,7 +291,7 @@ TEST_F(TimedControlTest, KeepsAPlaceOfTheAcknowledgementsUntilItsEnd) {
 
 TEST_F(TimedControlTest, FreesItsPlaceTwoTicksAfterItsTime) {
   const std::uint64_t at_us = in_ms(500);
-  for (int i = 0; i < 4; ++i) take_in(timed(set_duty(0.25F), at_us, "a"));
+  for (int i = 0; i < 4; ++i) admit(timed(set_duty(0.25F), at_us, "a"));
   for (int i = 0; i < 6; ++i) submit(ping(), 8s);
   clock.settle();
   ASSERT_EQ(robot->commands().size(), 4U + 2U);
@@ -375,7 +375,7 @@ TEST_F(TimedControlTest, WhatTheLinkHasNotTakenEndsWhenControlIsReleasedButNotWh
 }
 
 TEST_F(TimedControlTest, LeavesThoseThatTheHolderStillControls) {
-  take_in(timed(set_duty(0.25F), in_ms(2000), "a"));
+  admit(timed(set_duty(0.25F), in_ms(2000), "a"));
   control(ControlAction::take, "a");
   CommandRequest more = request_of(set_duty(0.1F));
   more.actor = "a";

@@ -33,7 +33,7 @@ class TimedTest : public LinkTest {
     robot->send(frame);
     clock.settle();
   }
-  protocol::Command take_in(CommandRequest request) {
+  protocol::Command admit(CommandRequest request) {
     const protocol::Command sent = send_out(std::move(request));
     accept_for_its_time(sent);
     return sent;
@@ -70,7 +70,7 @@ class TimedTest : public LinkTest {
         std::ranges::count_if(kinds(), [](const char* kind) { return kind == std::string{"drop_timed"}; }));
   }
   void control(ControlAction action, const char* actor) {
-    EXPECT_TRUE(station.control({"r1", actor, "", action, kControlLife, "because"}));
+    EXPECT_TRUE(station.control({"r1", actor, "", action, kControlLease, "because"}));
     clock.settle();
   }
   static protocol::Command ping() {

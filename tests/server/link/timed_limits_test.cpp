@@ -62,8 +62,8 @@ class TimedLimitsTest : public TimedTest {
     robot->send(frame);
     clock.settle();
   }
-  CommandRequest now(protocol::Command command, microseconds life = 1s) const {
-    CommandRequest request = request_of(command, life);
+  CommandRequest now(protocol::Command command, microseconds time_to_live = 1s) const {
+    CommandRequest request = request_of(command, time_to_live);
     request.actor = "a";
     return request;
   }
@@ -80,14 +80,14 @@ class TimedLimitsTest : public TimedTest {
 };
 
 TEST_F(TimedLimitsTest, ASetpointNowIsNotMoreThanAStepFromOneThatWaits) {
-  take_in(timed(set_setpoint(0.25F), in_ms(5000), "a"));
+  admit(timed(set_setpoint(0.25F), in_ms(5000), "a"));
   EXPECT_THAT(refusal(now(set_setpoint(-0.25F))), HasSubstr("step_too_large"));
   EXPECT_EQ(refusal(now(set_setpoint(0))), "");
 }
 
 TEST_F(TimedLimitsTest, AStaircaseIsTakenInStepByStep) {
-  take_in(timed(set_setpoint(0.25F), in_ms(1000), "a"));
-  take_in(timed(set_setpoint(0.5F), in_ms(2000), "a"));
+  admit(timed(set_setpoint(0.25F), in_ms(1000), "a"));
+  admit(timed(set_setpoint(0.5F), in_ms(2000), "a"));
   EXPECT_EQ(refusal(timed(set_setpoint(0.75F), in_ms(3000), "a")), "");
   EXPECT_THAT(refusal(timed(set_setpoint(1), in_ms(4000), "a")), HasSubstr("from the setpoint 0.500 that waits"))
       << "the step before it is not acknowledged";
@@ -106,7 +106,7 @@ TEST_F(TimedLimitsTest, OneOnItsWayCountsUntilTelemetryShowsWhatIsInForce) {
   EXPECT_EQ(refusal(now(set_setpoint(0))), "");
 }
 
-TEST_F(TimedLimitsTest, OneWithoutAnAnswerCountsUntilTelemetryComesFromAfterItsLife) {
+TEST_F(TimedLimitsTest, OneWithoutAnAnswerCountsUntilTelemetryComesFromAfterItsTimeToLive) {
   EXPECT_EQ(refusal(now(set_setpoint(0.25F), 500ms)), "");
   ASSERT_TRUE(clock.run_until([&] { return !results.empty(); }, 3s));
   EXPECT_EQ(results[0]->state, CommandState::unknown);
@@ -116,7 +116,7 @@ TEST_F(TimedLimitsTest, OneWithoutAnAnswerCountsUntilTelemetryComesFromAfterItsL
 }
 
 TEST_F(TimedLimitsTest, OfAFormerHolderHindersNobody) {
-  take_in(timed(set_setpoint(0.25F), in_ms(7000), "a"));
+  admit(timed(set_setpoint(0.25F), in_ms(7000), "a"));
   clock.run_for(3100ms);
   CommandRequest next = now(set_setpoint(-0.25F));
   next.actor = "b";
@@ -125,7 +125,7 @@ TEST_F(TimedLimitsTest, OfAFormerHolderHindersNobody) {
 }
 
 TEST_F(TimedLimitsTest, ItIsDroppedWhenTheLimitsOfTheFluidBecomeNarrower) {
-  const auto sent = take_in(timed(set_duty(0.8F), in_ms(5000), "a"));
+  const auto sent = admit(timed(set_duty(0.8F), in_ms(5000), "a"));
   ASSERT_TRUE(station.set_fluid("r1", "water", {"a", "", 0}));
   clock.settle();
   EXPECT_EQ(drops(), 1U);
@@ -134,7 +134,7 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheLimitsOfTheFluidBecomeNarrower) {
   EXPECT_EQ(latest(sent.command_id).state, CommandState::expired);
   EXPECT_EQ(latest(sent.command_id).reason, "limits_changed");
 
-  take_in(timed(set_duty(0.5F), in_ms(3000), "a"));
+  admit(timed(set_duty(0.5F), in_ms(3000), "a"));
   ASSERT_TRUE(station.set_fluid("r1", "non_newtonian", {"a", "", 0}));
   clock.settle();
   EXPECT_EQ(drops(), 1U) << "the limits have become wider";
@@ -158,7 +158,7 @@ TEST_F(TimedLimitsTest, WhatTheLinkHasNotTakenIsNotSentWhenTheLimitsBecomeNarrow
 }
 
 TEST_F(TimedLimitsTest, ItIsDroppedLaterWhenTheLinkWasFullAndNothingIsRenewedBefore) {
-  take_in(timed(set_duty(0.8F), in_ms(7000), "a"));
+  admit(timed(set_duty(0.8F), in_ms(7000), "a"));
   for (std::size_t i = 0; i < CommandWindow::kMost + RobotOutbox::kMaxQueuedCommands; ++i) {
     submit(ping(), 5s);
     clock.settle();
@@ -182,8 +182,8 @@ TEST_F(TimedLimitsTest, ItIsDroppedLaterWhenTheLinkWasFullAndNothingIsRenewedBef
 
 // The robot refuses one by itself; whatever was a step from it is more than that from what is in force.
 TEST_F(TimedLimitsTest, ItIsDroppedWhenTheSetpointBeforeItWas) {
-  const auto first = take_in(timed(set_setpoint(0.25F), in_ms(1000), "a"));
-  const auto second = take_in(timed(set_setpoint(0.5F), in_ms(2000), "a"));
+  const auto first = admit(timed(set_setpoint(0.25F), in_ms(1000), "a"));
+  const auto second = admit(timed(set_setpoint(0.5F), in_ms(2000), "a"));
   clock.run_for(1s);
   robot->acknowledge(first, rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_UNCERTAIN);
   show_setpoint(0);
@@ -194,8 +194,8 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheSetpointBeforeItWas) {
 }
 
 TEST_F(TimedLimitsTest, ADropThatFoundNoRoomIsSentAsSoonAsThereIsSome) {
-  const auto first = take_in(timed(set_setpoint(0.25F), in_ms(1000), "a"));
-  take_in(timed(set_setpoint(0.5F), in_ms(2000), "a"));
+  const auto first = admit(timed(set_setpoint(0.25F), in_ms(1000), "a"));
+  admit(timed(set_setpoint(0.5F), in_ms(2000), "a"));
   for (std::size_t i = 0; i < CommandWindow::kMost + RobotOutbox::kMaxQueuedCommands; ++i) {
     submit(ping(), 9s);
     clock.settle();
@@ -210,8 +210,8 @@ TEST_F(TimedLimitsTest, ADropThatFoundNoRoomIsSentAsSoonAsThereIsSome) {
 }
 
 TEST_F(TimedLimitsTest, WhatIsToBeDroppedCountsWhereItMayHaveActedBefore) {
-  take_in(timed(set_setpoint(0.25F), in_ms(500), "a"));
-  take_in(timed(set_setpoint(0), in_ms(3000), "a"));
+  admit(timed(set_setpoint(0.25F), in_ms(500), "a"));
+  admit(timed(set_setpoint(0), in_ms(3000), "a"));
   clock.run_for(510ms);
   control(ControlAction::force, "b");
   ASSERT_EQ(drops(), 1U);
@@ -223,7 +223,7 @@ TEST_F(TimedLimitsTest, WhatIsToBeDroppedCountsWhereItMayHaveActedBefore) {
 }
 
 TEST_F(TimedLimitsTest, WhatIsToBeDroppedCountsWhileTheLeaseMayBeExtended) {
-  take_in(timed(set_setpoint(0.25F), in_ms(3000), "a"));
+  admit(timed(set_setpoint(0.25F), in_ms(3000), "a"));
   protocol::Command renewal = rheonaut_Command_init_zero;
   renewal.which_action = rheonaut_Command_renew_lease_tag;
   submit(now(renewal));
@@ -238,7 +238,7 @@ TEST_F(TimedLimitsTest, WhatIsToBeDroppedCountsWhileTheLeaseMayBeExtended) {
 }
 
 TEST_F(TimedLimitsTest, AfterAReconnectNoSetpointIsJudgedByWhatWasInForceBefore) {
-  take_in(timed(set_setpoint(0.25F), in_ms(100), "a"));
+  admit(timed(set_setpoint(0.25F), in_ms(100), "a"));
   robot->link.cut();
   clock.run_for(200ms);
   come_back();
@@ -265,8 +265,8 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheRobotHasBeenDrivenMoreThanAStepAway) {
   automatic.action.set_mode.mode = rheonaut_MODE_AUTO;
   automatic.action.set_mode.has_setpoint_m = true;
   automatic.action.set_mode.setpoint_m = 0.2F;
-  const auto first = take_in(timed(automatic, in_ms(5000), "a"));
-  take_in(timed(set_setpoint(0.4F), in_ms(6000), "a"));
+  const auto first = admit(timed(automatic, in_ms(5000), "a"));
+  admit(timed(set_setpoint(0.4F), in_ms(6000), "a"));
   clock.run_for(1s);
   show_position(-0.05F);
   EXPECT_EQ(drops(), 0U) << "just the limit; and only the first counts from the position";
@@ -341,7 +341,7 @@ TEST_F(TimedLimitsTest, AScheduleWithoutAnAnswerCountsUntilALaterDutyIsAccepted)
 
 TEST_F(TimedLimitsTest, AScheduleThatHasBegunAtItsTimeCountsByWhatIsLeft) {
   ASSERT_TRUE(station.set_fluid("r1", "oil", {"a", "", 0}));
-  const auto sent = take_in(timed(at_power(9), in_ms(100), "a"));
+  const auto sent = admit(timed(at_power(9), in_ms(100), "a"));
   EXPECT_THAT(refusal(timed(at_power(2), in_ms(5000), "a")), HasSubstr("asks for 9.0 s more"));
   clock.run_for(1100ms);
   show_a_second_at_power(sent.execute_at_robot_us);
@@ -353,7 +353,7 @@ TEST_F(TimedLimitsTest, AScheduleThatHasBegunAtItsTimeCountsByWhatIsLeft) {
 
 TEST_F(TimedLimitsTest, ADroppedScheduleCountsNoMore) {
   ASSERT_TRUE(station.set_fluid("r1", "oil", {"a", "", 0}));
-  const auto sent = take_in(timed(at_power(9), in_ms(5000), "a"));
+  const auto sent = admit(timed(at_power(9), in_ms(5000), "a"));
   EXPECT_THAT(refusal(now(at_power(2))), HasSubstr("too_long_at_power"));
   robot->acknowledge(sent, rheonaut_COMMAND_RESULT_EXPIRED);
   clock.settle();
@@ -361,8 +361,8 @@ TEST_F(TimedLimitsTest, ADroppedScheduleCountsNoMore) {
 }
 
 TEST_F(TimedLimitsTest, NothingIsDroppedAgainThatTheRobotDroppedTogether) {
-  const auto first = take_in(timed(set_setpoint(0.25F), in_ms(1000), "a"));
-  const auto second = take_in(timed(set_setpoint(0.5F), in_ms(2000), "a"));
+  const auto first = admit(timed(set_setpoint(0.25F), in_ms(1000), "a"));
+  const auto second = admit(timed(set_setpoint(0.5F), in_ms(2000), "a"));
   for (const auto& command : {first, second}) robot->acknowledge(command, rheonaut_COMMAND_RESULT_EXPIRED);
   show_setpoint(0);
   EXPECT_EQ(drops(), 0U);

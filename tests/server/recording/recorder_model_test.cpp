@@ -224,13 +224,13 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
     return seen;
   }
 
-  // A run of the whole boot has a certificate that says what a recount of its stored samples says.
-  void expect_certified(const TestRobot& robot, BootId boot_id, std::uint64_t next_seq) {
+  // A run of the whole boot has a digest that says what a recount of its stored samples says.
+  void expect_digest(const TestRobot& robot, BootId boot_id, std::uint64_t next_seq) {
     const auto run = wait(runs_->make_afterwards(robot.id, named("all"), SeqSpan{boot_id, 0, next_seq - 1}, {}));
     ASSERT_TRUE(run.has_value()) << run.error().detail;
-    const auto found = wait(recording_->certifier.find(run->id));
+    const auto found = wait(recording_->digester.find(run->id));
     ASSERT_TRUE(found && found->is_final);
-    const Certificate& certificate = found->certificate;
+    const RunDigest& digest = found->digest;
     const auto& stored = stored_[boot_id];
     std::uint64_t backfilled = 0;
     std::uint64_t longest = 0;
@@ -241,11 +241,11 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
       longest = std::max(longest, gap);
       if (sample != stored.end()) backfilled += sample->second & 1U;
     }
-    EXPECT_EQ(certificate.samples_expected, next_seq);
-    EXPECT_EQ(certificate.samples_live, stored.size() - backfilled);
-    EXPECT_EQ(certificate.samples_backfilled, backfilled);
-    EXPECT_EQ(certificate.samples_lost, next_seq - stored.size());
-    EXPECT_EQ(certificate.longest_gap_samples, longest);
+    EXPECT_EQ(digest.samples_expected, next_seq);
+    EXPECT_EQ(digest.samples_live, stored.size() - backfilled);
+    EXPECT_EQ(digest.samples_backfilled, backfilled);
+    EXPECT_EQ(digest.samples_lost, next_seq - stored.size());
+    EXPECT_EQ(digest.longest_gap_samples, longest);
   }
 
   static constexpr std::uint64_t kEventRing = 6;
@@ -287,7 +287,7 @@ TEST_P(RecorderModelTest, StoresOrListsEverySampleExactlyOnce) {
     if (samples.empty()) continue;
     for (const auto& [seq, times] : samples) ASSERT_EQ(times, 1) << "boot " << boot_id << " sample " << seq;
     EXPECT_EQ(samples.rbegin()->first + 1, samples.size()) << "boot " << boot_id << " has a hole";
-    expect_certified(robot, boot_id, samples.size());
+    expect_digest(robot, boot_id, samples.size());
   }
   for (const auto& [boot_id, made] : made_by_ended_) {
     EXPECT_GE(seen[boot_id].size(), durable_next_seqs_[boot_id]);

@@ -28,10 +28,10 @@ class RunAfterwardsTest : public RecordingTest {
     robot_.late_us += 60'000'000;  // so that its time goes on where UTC does
     connect(robot_);
   }
-  Certificate certificate_of(RunId run) {
-    const auto found = wait(recording_->certifier.find(run));
+  RunDigest digest_of(RunId run) {
+    const auto found = wait(recording_->digester.find(run));
     EXPECT_TRUE(found && found->is_final);
-    return found ? found->certificate : Certificate{};
+    return found ? found->digest : RunDigest{};
   }
   std::vector<std::pair<BootId, std::uint64_t>> samples_of(RunId run) {
     std::vector<std::pair<BootId, std::uint64_t>> samples;
@@ -66,7 +66,7 @@ TEST_F(RunAfterwardsTest, IsTheRunThatWouldHaveBeenMadeLive) {
   EXPECT_EQ(run->ended_at_us, utc_of(39));
   EXPECT_EQ(samples_of(run->id), samples_of(live));
   EXPECT_EQ(samples_of(run->id).size(), 180u);
-  EXPECT_TRUE(certificate_of(run->id).agrees_with(certificate_of(live)));
+  EXPECT_TRUE(digest_of(run->id).agrees_with(digest_of(live)));
 }
 
 TEST_F(RunAfterwardsTest, TakesSamplesByTheirNumbers) {
@@ -175,7 +175,7 @@ TEST_F(RunAfterwardsTest, EachAnnotationLeavesANote) {
   connect(robot_);
   make(robot_, 50);
   const RunId id = made(SeqSpan{robot_.boot_id, 0, 49})->id;
-  const Certificate before = certificate_of(id);
+  const RunDigest before = digest_of(id);
   RunAnnotation annotation;
   annotation.texts = {{"fluid", "water"}, {"notes", "a second look"}, {"name", "afterwards"}};
   annotation.has_mean_flow = true;
@@ -191,7 +191,7 @@ TEST_F(RunAfterwardsTest, EachAnnotationLeavesANote) {
             (std::vector<std::string>{"token:ana|fluid||water", "token:ana|notes||a second look",
                                       "token:ana|mean_flow_m_s||0.5", "token:bob|fluid|water|non_newtonian",
                                       "token:bob|mean_flow_m_s|0.5|"}));
-  EXPECT_TRUE(certificate_of(id).agrees_with(before));
+  EXPECT_TRUE(digest_of(id).agrees_with(before));
   annotation.texts = {{"name", ""}};
   EXPECT_EQ(wait(runs_->annotate(id, annotation, {})).error().code, ErrorCode::invalid);
   EXPECT_EQ(wait(runs_->annotate(99, {}, {})).error().code, ErrorCode::not_found);

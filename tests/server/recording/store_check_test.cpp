@@ -38,7 +38,7 @@ class StoreCheckTest : public RecordingTest {
   RunId begin(const TestRobot& robot) { return wait(runs_->create(robot.id, named("checked")))->id; }
   void end(RunId run) {
     ASSERT_TRUE(wait(runs_->end(run, "")).has_value());
-    ASSERT_TRUE(wait(recording_->certifier.find(run))->is_final);
+    ASSERT_TRUE(wait(recording_->digester.find(run))->is_final);
   }
   void damage(const std::string& sql) {
     SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE};
@@ -57,7 +57,7 @@ TEST_F(StoreCheckTest, FindsNothingInAGoodDatabase) {
   EXPECT_THAT(found.faults, IsEmpty());
   EXPECT_EQ(found.runs_verified, 2u);
   EXPECT_EQ(found.runs_incomplete, 0u);
-  EXPECT_EQ(found.runs_uncertified, 0u);
+  EXPECT_EQ(found.runs_without_digest, 0u);
   EXPECT_EQ(found.samples, 380u);
   EXPECT_EQ(findings({.run = 1, .integrity = false}).runs_verified, 1u);
 }
@@ -98,7 +98,7 @@ TEST_F(StoreCheckTest, AChangedModeClockOrFlagIsFound) {
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("run 1: samples_live is 180, the certificate says 280")));
 }
 
-TEST_F(StoreCheckTest, ALostSegmentIsMissedByTheCertificate) {
+TEST_F(StoreCheckTest, ALostSegmentIsMissedByTheDigest) {
   damage("DELETE FROM segment WHERE first_row = 101");
   EXPECT_THAT(faults(), Contains(HasSubstr("run 1: sample 100 of boot 18364758544493064720 is missing")));
 }
@@ -176,7 +176,7 @@ TEST_F(StoreCheckTest, SamplesThatWereHeardBeforeAKillButNeverCameAreLostWithThe
   robot.boot_id = 6;
   connect(robot);
   flush();
-  EXPECT_TRUE(wait(recording_->certifier.find(run))->is_final);
+  EXPECT_TRUE(wait(recording_->digester.find(run))->is_final);
   EXPECT_EQ(wait(runs_->find(run))->samples_lost, 10u);
   EXPECT_THAT(faults(), IsEmpty());
 }

@@ -1,4 +1,4 @@
-// What a station of schema version 6 recorded, certified, exported and audited stays as it was under the present
+// What a station of schema version 6 recorded, digested, exported and audited stays as it was under the present
 // schema.
 #include <fmt/ranges.h>
 #include <gmock/gmock.h>
@@ -50,7 +50,7 @@ class Version6Test : public RecordingTest {
             {"samples", store.samples},
             {"runs_verified", store.runs_verified},
             {"runs_incomplete", store.runs_incomplete},
-            {"runs_uncertified", store.runs_uncertified},
+            {"runs_uncertified", store.runs_without_digest},
             {"integrity_checked", true},
             {"audit_entries", audit.entries},
             {"audit_hidden", audit.hidden},
@@ -148,7 +148,7 @@ TEST_F(Version6Test, AStationGoesOnAndTheChainWithIt) {
   robot.boot_id = 4712;
   connect(robot);
   make(robot, 100);
-  clock_.run_for(5s);  // the run that was cut off gets its certificate
+  clock_.run_for(5s);  // the run that was cut off gets its digest
   stop();
   const nlohmann::json found = verified();
   EXPECT_THAT(found["faults"], IsEmpty());

@@ -55,9 +55,9 @@ TEST_F(CommandAuthorityTest, ByAnOldPictureNobodyTakesControlOrRenewsALease) {
 
 TEST_F(CommandAuthorityTest, ControlEndsWithoutASignOfLifeAndAnOldPictureIsNone) {
   ASSERT_TRUE(take("anna"));
-  clock.run_for(kControlLife / 2);
+  clock.run_for(kControlLease / 2);
   authority.keep("anna", microseconds{0});
-  clock.run_for(kControlLife - microseconds{1'000});
+  clock.run_for(kControlLease - microseconds{1'000});
   EXPECT_TRUE(authority.expire().empty());
   authority.keep("anna", kOldestSight * 2);
   clock.run_for(microseconds{2'000});

@@ -65,7 +65,7 @@ TEST_F(CommandTrackerTest, WhatIsSentWithAStopIsHeldBackForWhoeverHandsItOver) {
 TEST_F(CommandTrackerTest, WhatIsNotSentInTimeExpiresAndWhatGetsNoAnswerIsUnknown) {
   const auto queued = add(set_duty(0.3F)), sent = add(set_duty(0.2F));
   tracker.on_sent(entry, sent->record.id);
-  clock.run_for(std::chrono::milliseconds{2'500});  // their life is 2 s
+  clock.run_for(std::chrono::milliseconds{2'500});  // their time to live is 2 s
   tracker.expire(entry);
   EXPECT_EQ(queued->record.state, CommandState::expired);
   EXPECT_EQ(queued->record.reason, "not_sent_in_time");

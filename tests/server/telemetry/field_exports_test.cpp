@@ -18,7 +18,7 @@
 #include "server/storage/export/run_file.hpp"
 #include "server/storage/ingest/sample_store.hpp"
 #include "server/storage/query/run_reader.hpp"
-#include "server/storage/runs/certificate.hpp"
+#include "server/storage/runs/run_digest.hpp"
 #include "tests/server/telemetry/field_names.hpp"
 
 namespace server {
@@ -260,7 +260,7 @@ TEST_F(FieldExports, TheDigestOfTheNewestFormatChangesWithEachField) {
   segment.context = batch_.context;
   segment.samples = batch_.samples;
   const auto digest = [](const Segment& of) {
-    SampleHash hash{kCertificateFormat};
+    SampleHash hash{kDigestFormat};
     hash.add(kBoot, of);
     return hash.text();
   };

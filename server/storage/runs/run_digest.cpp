@@ -1,5 +1,5 @@
 // Counting, and the bytes that are hashed.
-#include "server/storage/runs/certificate.hpp"
+#include "server/storage/runs/run_digest.hpp"
 
 #include <fmt/format.h>
 
@@ -77,8 +77,8 @@ std::size_t write_sample(unsigned char* into, int format, BootId boot_id, const 
 
 }  // namespace
 
-bool Certificate::agrees_with(const Certificate& other) const {
-  const auto all = [](const Certificate& one) {
+bool RunDigest::agrees_with(const RunDigest& other) const {
+  const auto all = [](const RunDigest& one) {
     return std::tie(one.samples_expected, one.samples_live, one.samples_backfilled, one.samples_lost, one.lost_by_cause,
                     one.longest_gap_samples, one.longest_gap_us, one.worst_clock_uncertainty_us,
                     one.samples_without_clock, one.sha256);
@@ -156,14 +156,14 @@ void SampleTally::note_gap(std::uint64_t samples, std::int64_t us) {
   counts_.longest_gap_us = std::max(counts_.longest_gap_us, us);
 }
 
-Certification::Certification(std::vector<CertifiedSpan> spans, int format)
+DigestComputation::DigestComputation(std::vector<DigestSpan> spans, int format)
     : spans_{std::move(spans)}, format_{format}, hash_{format} {
   if (spans_.empty()) return;
   next_seq_ = spans_[0].samples.first;
   tally_.begin_span(spans_[0].samples, spans_[0].period_us);
 }
 
-Certification::Progress Certification::advance(SQLite::Database& database, std::uint64_t max_samples) {
+DigestComputation::Progress DigestComputation::advance(SQLite::Database& database, std::uint64_t max_samples) {
   while (span_ < spans_.size()) {
     const Progress progress = advance_span(database, max_samples);
     if (progress != Progress::done) return progress;
@@ -175,14 +175,14 @@ Certification::Progress Certification::advance(SQLite::Database& database, std::
   return Progress::done;
 }
 
-Certificate Certification::certificate() const {
-  Certificate certificate = tally_.counts();
-  certificate.format = format_;
-  certificate.sha256 = hash_.text();
-  return certificate;
+RunDigest DigestComputation::digest() const {
+  RunDigest digest = tally_.counts();
+  digest.format = format_;
+  digest.sha256 = hash_.text();
+  return digest;
 }
 
-std::string Certification::place() const {
+std::string DigestComputation::place() const {
   return span_ < spans_.size() ? fmt::format("sample {} of boot {}", next_seq_, spans_[span_].boot_id) : "nothing";
 }
 

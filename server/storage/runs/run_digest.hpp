@@ -1,4 +1,4 @@
-// The completeness certificate of a run: what of it was expected, came, and is lost, and a SHA-256 over its samples.
+// The digest of a run: how many samples were expected, received and lost, and a SHA-256 over them.
 //
 //   hashed = "rheonaut-samples-2\n" sample*                                 in order of span and seq
 //   sample = boot_id:u64 seq:u64 robot_time_us:u64 utc_us:i64 clock_uncertainty_us:i64
@@ -6,10 +6,10 @@
 //
 // Of the fields (telemetry_fields.hpp) a digest contains those whose since_digest is not above its format.
 // Little-endian; f32 is binary32, a NaN and a value that is not there are 0x7fc00000; enumerators are the numbers of
-// the robot's protocol, also those that this version does not know. Format 1, of runs that were certified before schema
-// 7, has "rheonaut-samples-1\n", and each enumerator as u8 with a 0:u8 after them, 96 bytes. How samples are cut into
+// the robot's protocol, also those that this version does not know. Format 1, of digests made before schema 7,
+// has "rheonaut-samples-1\n", and each enumerator as u8 with a 0:u8 after them, 96 bytes. How samples are cut into
 // segments and where their rows lie is not in it, so it is the same after a backup, an export or a VACUUM; nor is what
-// people said of the run, which they may change. docs/database.md repeats this for whoever checks it with another
+// people said of the run, which they may change. docs/database.md repeats this for those who check it with another
 // program.
 //
 // Pure, but for advance(), which are called on the thread that owns the database handle and end within a
@@ -30,10 +30,10 @@
 
 namespace server {
 
-inline constexpr int kCertificateFormat = newest_digest_format();  // of new ones; older ones are verified for ever
+inline constexpr int kDigestFormat = newest_digest_format();  // of new ones; older ones are verified for ever
 
-struct Certificate {
-  int format = kCertificateFormat;
+struct RunDigest {
+  int format = kDigestFormat;
   std::uint64_t samples_expected = 0;
   std::uint64_t samples_live = 0;
   std::uint64_t samples_backfilled = 0;  // sent again, on request or after a reconnect
@@ -50,7 +50,7 @@ struct Certificate {
     return samples_expected - samples_live - samples_backfilled - samples_lost;
   }
   // Says the same of the samples; when it was made does not count.
-  bool agrees_with(const Certificate& other) const;
+  bool agrees_with(const RunDigest& other) const;
 };
 
 class SampleHash {
@@ -81,12 +81,12 @@ class SampleTally {
   void add_lost(Interval samples, const std::string& cause);
   void end_span();
 
-  const Certificate& counts() const { return counts_; }
+  const RunDigest& counts() const { return counts_; }
 
  private:
   void note_gap(std::uint64_t samples, std::int64_t us);
 
-  Certificate counts_;
+  RunDigest counts_;
   Interval span_;
   std::uint64_t next_seq_ = 0;           // of the span: above the last stored sample
   std::int64_t next_robot_time_us_ = 0;  // at which that one is due
@@ -95,33 +95,33 @@ class SampleTally {
 };
 
 // One span of a closed run.
-struct CertifiedSpan {
+struct DigestSpan {
   std::int64_t boot_key = 0;
   BootId boot_id = 0;
   Interval samples;
   std::uint32_t period_us = 0;
 };
-std::vector<CertifiedSpan> read_certified_spans(SQLite::Database& database, RunId run);
+std::vector<DigestSpan> read_digest_spans(SQLite::Database& database, RunId run);
 
-// A certificate in the making: goes over the samples once, in pages, and stops where one is still on its way.
-class Certification {
+// Computes a digest: reads the samples once, in pages, and stops at the first sample that is still missing.
+class DigestComputation {
  public:
   enum class Progress : std::uint8_t { more, waiting, done };
 
-  explicit Certification(std::vector<CertifiedSpan> spans, int format = kCertificateFormat);
+  explicit DigestComputation(std::vector<DigestSpan> spans, int format = kDigestFormat);
 
-  // Takes in at most about `max_samples` samples.
+  // Reads at most about `max_samples` samples.
   Progress advance(SQLite::Database& database, std::uint64_t max_samples);
 
-  // What has been taken in.
-  Certificate certificate() const;
+  // Of the samples read so far.
+  RunDigest digest() const;
   // The sample that comes next, for messages.
   std::string place() const;
 
  private:
   Progress advance_span(SQLite::Database& database, std::uint64_t& max_samples);
 
-  std::vector<CertifiedSpan> spans_;
+  std::vector<DigestSpan> spans_;
   std::size_t span_ = 0;
   std::uint64_t next_seq_ = 0;  // of that span
   SampleTally tally_;
@@ -129,27 +129,27 @@ class Certification {
   SampleHash hash_;
 };
 
-// The counts of a run whose samples are not all there, from the heads of its segments; the hash is empty.
+// The counts of a run with missing samples, from the heads of its segments; the hash is empty.
 class HeadTally {
  public:
-  explicit HeadTally(std::vector<CertifiedSpan> spans = {}) : spans_{std::move(spans)} {}
+  explicit HeadTally(std::vector<DigestSpan> spans = {}) : spans_{std::move(spans)} {}
 
-  // Takes in a page; false at the end.
+  // Reads a page; false at the end.
   bool advance(SQLite::Database& database);
 
-  const Certificate& counts() const { return tally_.counts(); }
+  const RunDigest& counts() const { return tally_.counts(); }
 
  private:
-  std::vector<CertifiedSpan> spans_;
+  std::vector<DigestSpan> spans_;
   std::size_t span_ = 0;
   std::uint64_t next_seq_ = 0;  // of that span, once it has begun
   bool has_begun_ = false;
   SampleTally tally_;
 };
 
-std::optional<Certificate> read_certificate(SQLite::Database& database, RunId run);
+std::optional<RunDigest> read_digest(SQLite::Database& database, RunId run);
 
 // Does nothing when the run has been discarded meanwhile.
-void write_certificate(SQLite::Database& database, RunId run, const Certificate& certificate);
+void write_digest(SQLite::Database& database, RunId run, const RunDigest& digest);
 
 }  // namespace server

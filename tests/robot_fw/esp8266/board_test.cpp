@@ -1,12 +1,12 @@
 // The robot on its board, from boot to reset: stops, ticks, inputs, latch, settings, LED.
-#include "robot_fw/esp8266/robot_port.hpp"
+#include "robot_fw/esp8266/board.hpp"
 
-#include "board.hpp"
+#include "board_fixture.hpp"
 
 namespace robot_fw::esp8266 {
 namespace {
 
-class Port : public Board {
+class BoardTest : public BoardFixture {
  protected:
   std::optional<protocol::Status> status() {
     std::optional<protocol::Status> last;
@@ -31,43 +31,43 @@ class Port : public Board {
   }
 };
 
-TEST_F(Port, DrivesTheMotorByOrder) {
+TEST_F(BoardTest, DrivesTheMotorByOrder) {
   connect();
   drive(0.5F);
   EXPECT_NEAR(static_cast<double>(motor_high_us([this] { run_ms(100); })), 50'000, 2'000);
 }
 
-TEST_F(Port, LeaseThatLapsesTurnsThePinOff) {
+TEST_F(BoardTest, LeaseThatLapsesTurnsThePinOff) {
   connect();
   drive(0.5F);
   run_ms(600);
   EXPECT_EQ(motor_high_us([this] { run_ms(500); }), 0U);
 }
 
-TEST_F(Port, StopBetweenTicksTurnsThePinOffAtOnce) {
+TEST_F(BoardTest, StopBetweenTicksTurnsThePinOffAtOnce) {
   connect();
   drive(1);
   while (!chip.level(kMotorPin)) run_ms(1);
   while (chip.now_us % 10'000 != 3'000) {  // in the middle between two ticks
     chip.pass(kTurnUs);
-    port->step();
+    board->step();
   }
   ASSERT_TRUE(chip.level(kMotorPin));
   heard();
   order(sim_robot::emergency_stop());
-  port->step();  // no time has passed, so no tick has run
+  board->step();  // no time has passed, so no tick has run
   EXPECT_FALSE(chip.level(kMotorPin));
-  EXPECT_TRUE(port->motor().is_off());
+  EXPECT_TRUE(board->motor().is_off());
   bool acknowledged = false;
   for (const protocol::RobotFrame& frame : heard()) {
     acknowledged |= frame.which_body == rheonaut_RobotFrame_command_ack_tag;
   }
   EXPECT_TRUE(acknowledged) << "in the same turn";
-  EXPECT_EQ(port->led_pattern(), LedPattern::emergency);
+  EXPECT_EQ(board->led_pattern(), LedPattern::emergency);
   EXPECT_EQ(motor_high_us([this] { run_ms(500); }), 0U);
 }
 
-TEST_F(Port, BlockedTickTurnsThePinOffAndTheNextOneOn) {
+TEST_F(BoardTest, BlockedTickTurnsThePinOffAndTheNextOneOn) {
   connect();
   drive(1);
   chip.pass(50'000);
@@ -76,26 +76,26 @@ TEST_F(Port, BlockedTickTurnsThePinOffAndTheNextOneOn) {
   heartbeat();
   run_ms(1);
   EXPECT_TRUE(chip.level(kMotorPin)) << "a tick has completed, and the lease still runs";
-  EXPECT_EQ(port->motor().dead_man_trips(), 1U);
+  EXPECT_EQ(board->motor().dead_man_trips(), 1U);
 }
 
-TEST_F(Port, MissedTicksAreCountedAndToldAndOneTickRuns) {
+TEST_F(BoardTest, MissedTicksAreCountedAndToldAndOneTickRuns) {
   connect();
   const std::uint32_t before = missed_ticks();
   while (chip.now_us % 10'000 != 1'000) {
     chip.pass(kTurnUs);
-    port->step();
+    board->step();
   }
   const int ticks = chip.watchdog_feeds;
   chip.pass(35'000);
-  port->step();
+  board->step();
   EXPECT_EQ(chip.watchdog_feeds, ticks + 1);
-  port->step();
+  board->step();
   EXPECT_EQ(chip.watchdog_feeds, ticks + 1) << "none is caught up";
   EXPECT_EQ(missed_ticks(), before + 2) << "due at 9, 19 and 29 ms of the 35: the last of them ran";
 }
 
-TEST_F(Port, InputsReachTheStation) {
+TEST_F(BoardTest, InputsReachTheStation) {
   chip.analogue = 180;
   chip.imu_registers[0x35] = 0b00'11'11'00;
   connect();
@@ -117,51 +117,51 @@ TEST_F(Port, InputsReachTheStation) {
   EXPECT_NEAR(impedance_mv, 176, 0.1);
 }
 
-TEST_F(Port, LatchSurvivesAResetAndLosesItsPowerWithTheBattery) {
+TEST_F(BoardTest, LatchSurvivesAResetAndLosesItsPowerWithTheBattery) {
   connect();
   order(sim_robot::emergency_stop());
   run_ms(1);
-  const std::uint64_t id = port->robot().emergency_id();
+  const std::uint64_t id = board->robot().emergency_id();
   ASSERT_NE(id, 0U);
   chip.reset(4);
   boot();
-  EXPECT_EQ(port->robot().emergency_id(), id);
-  EXPECT_EQ(port->robot().emergency_cause(), rheonaut_EMERGENCY_CAUSE_OPERATOR);
+  EXPECT_EQ(board->robot().emergency_id(), id);
+  EXPECT_EQ(board->robot().emergency_cause(), rheonaut_EMERGENCY_CAUSE_OPERATOR);
   chip.power_cycle();
   boot();
-  EXPECT_EQ(port->robot().emergency_id(), 0U);
+  EXPECT_EQ(board->robot().emergency_id(), 0U);
 }
 
-TEST_F(Port, ClearedLatchDoesNotComeBack) {
+TEST_F(BoardTest, ClearedLatchDoesNotComeBack) {
   connect();
   order(sim_robot::emergency_stop());
   run_ms(1);
-  order(sim_robot::clear_emergency(port->robot().emergency_id()));
+  order(sim_robot::clear_emergency(board->robot().emergency_id()));
   run_ms(20);
-  ASSERT_EQ(port->robot().emergency_id(), 0U);
+  ASSERT_EQ(board->robot().emergency_id(), 0U);
   chip.reset(4);
   boot();
-  EXPECT_EQ(port->robot().emergency_id(), 0U);
+  EXPECT_EQ(board->robot().emergency_id(), 0U);
 }
 
-TEST_F(Port, WatchdogCrashAndBrownOutComeUpLatched) {
+TEST_F(BoardTest, WatchdogCrashAndBrownOutComeUpLatched) {
   chip.power_cycle();
   boot();
-  EXPECT_EQ(port->robot().emergency_id(), 0U) << "an ordinary power-on";
+  EXPECT_EQ(board->robot().emergency_id(), 0U) << "an ordinary power-on";
   for (const std::uint32_t reason : {1U, 2U, 3U}) {
     chip.power_cycle();
     chip.reset(reason);
     boot();
-    EXPECT_EQ(port->robot().emergency_cause(), rheonaut_EMERGENCY_CAUSE_RESET) << reason;
+    EXPECT_EQ(board->robot().emergency_cause(), rheonaut_EMERGENCY_CAUSE_RESET) << reason;
   }
   chip.power_cycle();
   boot();
   chip.reset(0);  // power came back before the memory was gone
   boot();
-  EXPECT_EQ(port->robot().emergency_cause(), rheonaut_EMERGENCY_CAUSE_RESET);
+  EXPECT_EQ(board->robot().emergency_cause(), rheonaut_EMERGENCY_CAUSE_RESET);
 }
 
-TEST_F(Port, BootIdsDiffer) {
+TEST_F(BoardTest, BootIdsDiffer) {
   connect();
   const std::uint64_t first = boot_id();
   EXPECT_NE(first, 0U);
@@ -171,14 +171,14 @@ TEST_F(Port, BootIdsDiffer) {
   EXPECT_NE(boot_id(), first);
 }
 
-TEST_F(Port, ParametersAreWrittenWithTheMotorOffAndKept) {
+TEST_F(BoardTest, ParametersAreWrittenWithTheMotorOffAndKept) {
   connect();
   drive(0.5F);
   protocol::Command command = rheonaut_Command_init_zero;
   command.which_action = rheonaut_Command_set_parameter_tag;
   std::snprintf(command.action.set_parameter.name, sizeof(command.action.set_parameter.name), "setpoint_limit_m");
   command.action.set_parameter.value = 2.5F;
-  chip.before_blocking = [this] { EXPECT_TRUE(port->motor().is_off()); };
+  chip.before_blocking = [this] { EXPECT_TRUE(board->motor().is_off()); };
   order(command);
   run_ms(300);
   EXPECT_EQ(chip.flash_erases, 0) << "the motor is on";
@@ -189,47 +189,47 @@ TEST_F(Port, ParametersAreWrittenWithTheMotorOffAndKept) {
   wait_for_sensors();
   order(sim_robot::set_auto(2.0F));
   run_ms(20);
-  EXPECT_EQ(port->robot().mode(), rheonaut_MODE_AUTO) << "beyond the default limit of 1 m";
+  EXPECT_EQ(board->robot().mode(), rheonaut_MODE_AUTO) << "beyond the default limit of 1 m";
 }
 
-TEST_F(Port, LedTellsTheState) {
+TEST_F(BoardTest, LedTellsTheState) {
   boot();
-  EXPECT_EQ(port->led_pattern(), LedPattern::connecting);
+  EXPECT_EQ(board->led_pattern(), LedPattern::connecting);
   come_up();
-  EXPECT_EQ(port->led_pattern(), LedPattern::connected);
+  EXPECT_EQ(board->led_pattern(), LedPattern::connected);
   heard();
   protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
   chip.reset(4);
   boot();
-  for (int i = 0; i < 100 && port->link().state() != StationLink::State::open; ++i) run_ms(100);
+  for (int i = 0; i < 100 && board->link().state() != StationLink::State::open; ++i) run_ms(100);
   frame.which_body = rheonaut_StationFrame_welcome_tag;
   frame.body.welcome.protocol_version = protocol::kProtocolVersion;
   frame.body.welcome.refusal = rheonaut_REFUSAL_REASON_WRONG_TOKEN;
   say(frame);
   run_ms(1);
-  EXPECT_EQ(port->led_pattern(), LedPattern::refused);
+  EXPECT_EQ(board->led_pattern(), LedPattern::refused);
 }
 
-TEST_F(Port, StopThatWaitedInAStallIsReadBeforeTheLinkIsGivenUp) {
+TEST_F(BoardTest, StopThatWaitedInAStallIsReadBeforeTheLinkIsGivenUp) {
   connect();
   drive(0.5F);
   chip.pass(3'000'000);
   order(sim_robot::emergency_stop());
   const std::deque<std::uint8_t> stop = chip.socket.incoming;
   chip.socket.incoming.resize(stop.size() / 2);  // its other half is still on the way
-  port->step();
-  EXPECT_EQ(port->link().state(), StationLink::State::open);
+  board->step();
+  EXPECT_EQ(board->link().state(), StationLink::State::open);
   chip.socket.incoming.assign(stop.begin() + static_cast<long>(stop.size() / 2), stop.end());
-  port->step();
-  EXPECT_NE(port->robot().emergency_id(), 0U);
+  board->step();
+  EXPECT_NE(board->robot().emergency_id(), 0U);
 }
 
 // The memory table of docs/robot.md: a frame of 1.0 kB, the flash record of 0.5 kB, the rest 0.4 kB.
-TEST_F(Port, AddsAsMuchMemoryToTheCoreAsTheTableSays) {
-  EXPECT_LE(sizeof(RobotPort) - sizeof(Robot) - sizeof(StationLink), 1'900U);
+TEST_F(BoardTest, AddsAsMuchMemoryToTheCoreAsTheTableSays) {
+  EXPECT_LE(sizeof(Board) - sizeof(Robot) - sizeof(StationLink), 1'900U);
 }
 
-TEST_F(Port, ComesUpWithTheControllerForItsMotor) {
+TEST_F(BoardTest, ComesUpWithTheControllerForItsMotor) {
   const auto built_in_with = [this](std::int8_t direction_pin) {
     Settings settings;
     settings.motor.direction_pin = direction_pin;
@@ -245,7 +245,7 @@ TEST_F(Port, ComesUpWithTheControllerForItsMotor) {
   EXPECT_EQ(built_in_with(13), kPaperController.controller_id);
 }
 
-TEST_F(Port, DirectionPinAllowsNegativeDuties) {
+TEST_F(BoardTest, DirectionPinAllowsNegativeDuties) {
   Settings settings;
   settings.motor.direction_pin = 13;
   connect(settings);
@@ -255,7 +255,7 @@ TEST_F(Port, DirectionPinAllowsNegativeDuties) {
   connect();
   order(sim_robot::set_duty(-0.5F, 500));
   run_ms(30);
-  EXPECT_EQ(port->robot().duty(), 0) << "without one";
+  EXPECT_EQ(board->robot().duty(), 0) << "without one";
 }
 
 }  // namespace

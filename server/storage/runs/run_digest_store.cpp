@@ -1,9 +1,9 @@
-// What of a certificate is read from the database and written into it.
+// Reads digests from the database and writes them.
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "server/storage/database/statement.hpp"
-#include "server/storage/runs/certificate.hpp"
+#include "server/storage/runs/run_digest.hpp"
 #include "server/storage/samples/sample_scanner.hpp"
 
 namespace server {
@@ -65,8 +65,8 @@ std::map<std::string, std::uint64_t> causes_from(const std::string& text) {
 
 }  // namespace
 
-Certification::Progress Certification::advance_span(SQLite::Database& database, std::uint64_t& max_samples) {
-  const CertifiedSpan& span = spans_[span_];
+DigestComputation::Progress DigestComputation::advance_span(SQLite::Database& database, std::uint64_t& max_samples) {
+  const DigestSpan& span = spans_[span_];
   const Interval rest{next_seq_, span.samples.next};
   if (rest.first >= rest.next) return Progress::done;
   const std::vector<Lost> lost = read_lost(database, span.boot_key, rest);
@@ -93,8 +93,8 @@ Certification::Progress Certification::advance_span(SQLite::Database& database, 
   return next_seq_ >= span.samples.next ? Progress::done : Progress::waiting;
 }
 
-std::vector<CertifiedSpan> read_certified_spans(SQLite::Database& database, RunId run) {
-  std::vector<CertifiedSpan> spans;
+std::vector<DigestSpan> read_digest_spans(SQLite::Database& database, RunId run) {
+  std::vector<DigestSpan> spans;
   SQLite::Statement query{database,
                           "SELECT boot_key, boot_id, first_seq, last_seq, sample_period_us"
                           " FROM run_span JOIN boot USING (boot_key)"
@@ -111,7 +111,7 @@ std::vector<CertifiedSpan> read_certified_spans(SQLite::Database& database, RunI
 
 bool HeadTally::advance(SQLite::Database& database) {
   if (span_ == spans_.size()) return false;
-  const CertifiedSpan& span = spans_[span_];
+  const DigestSpan& span = spans_[span_];
   if (!has_begun_) {
     tally_.begin_span(span.samples, span.period_us);
     for (const Lost& lost : read_lost(database, span.boot_key, span.samples)) tally_.add_lost(lost.samples, lost.cause);
@@ -127,37 +127,37 @@ bool HeadTally::advance(SQLite::Database& database) {
   return ++span_ < spans_.size();
 }
 
-std::optional<Certificate> read_certificate(SQLite::Database& database, RunId run) {
+std::optional<RunDigest> read_digest(SQLite::Database& database, RunId run) {
   SQLite::Statement row{database,
                         "SELECT samples_expected, samples_live, samples_backfilled, samples_lost, lost_by_cause,"
                         " longest_gap_samples, longest_gap_us, worst_clock_uncertainty_us, samples_without_clock,"
                         " sha256, made_at_us, format FROM run_certificate WHERE run_id = ? AND format BETWEEN 1 AND ?"};
-  bind_all(row, run, std::int64_t{kCertificateFormat});
+  bind_all(row, run, std::int64_t{kDigestFormat});
   if (!row.executeStep()) return std::nullopt;
-  Certificate certificate;
-  certificate.samples_expected = unsigned_id(row.getColumn(0));
-  certificate.samples_live = unsigned_id(row.getColumn(1));
-  certificate.samples_backfilled = unsigned_id(row.getColumn(2));
-  certificate.samples_lost = unsigned_id(row.getColumn(3));
-  certificate.lost_by_cause = causes_from(row.getColumn(4).getString());
-  certificate.longest_gap_samples = unsigned_id(row.getColumn(5));
-  certificate.longest_gap_us = row.getColumn(6).getInt64();
-  certificate.worst_clock_uncertainty_us = row.getColumn(7).getInt64();
-  certificate.samples_without_clock = unsigned_id(row.getColumn(8));
-  certificate.sha256 = row.getColumn(9).getString();
-  certificate.made_at_us = row.getColumn(10).getInt64();
-  certificate.format = row.getColumn(11).getInt();
-  return certificate;
+  RunDigest digest;
+  digest.samples_expected = unsigned_id(row.getColumn(0));
+  digest.samples_live = unsigned_id(row.getColumn(1));
+  digest.samples_backfilled = unsigned_id(row.getColumn(2));
+  digest.samples_lost = unsigned_id(row.getColumn(3));
+  digest.lost_by_cause = causes_from(row.getColumn(4).getString());
+  digest.longest_gap_samples = unsigned_id(row.getColumn(5));
+  digest.longest_gap_us = row.getColumn(6).getInt64();
+  digest.worst_clock_uncertainty_us = row.getColumn(7).getInt64();
+  digest.samples_without_clock = unsigned_id(row.getColumn(8));
+  digest.sha256 = row.getColumn(9).getString();
+  digest.made_at_us = row.getColumn(10).getInt64();
+  digest.format = row.getColumn(11).getInt();
+  return digest;
 }
 
-void write_certificate(SQLite::Database& database, RunId run, const Certificate& certificate) {
+void write_digest(SQLite::Database& database, RunId run, const RunDigest& digest) {
   SQLite::Statement add{database,
                         "INSERT OR REPLACE INTO run_certificate SELECT ?,?,?,?,?,?,?,?,?,?,?,?,?"
                         " WHERE EXISTS (SELECT 1 FROM run WHERE run_id = ?1 AND state IN ('ended', 'interrupted'))"};
-  execute(add, run, std::int64_t{certificate.format}, certificate.samples_expected, certificate.samples_live,
-          certificate.samples_backfilled, certificate.samples_lost, json_of(certificate.lost_by_cause).dump(),
-          certificate.longest_gap_samples, certificate.longest_gap_us, certificate.worst_clock_uncertainty_us,
-          certificate.samples_without_clock, certificate.sha256, certificate.made_at_us);
+  execute(add, run, std::int64_t{digest.format}, digest.samples_expected, digest.samples_live,
+          digest.samples_backfilled, digest.samples_lost, json_of(digest.lost_by_cause).dump(),
+          digest.longest_gap_samples, digest.longest_gap_us, digest.worst_clock_uncertainty_us,
+          digest.samples_without_clock, digest.sha256, digest.made_at_us);
 }
 
 }  // namespace server

@@ -1,8 +1,8 @@
-// Gives every run that has ended its certificate, as soon as each of its samples is stored or known lost.
+// Makes the digest of every run that has ended, as soon as each of its samples is stored or known lost.
 //
-// Loop thread. The samples are read once, in pages, on the readers' thread; the certificate is written on the disk
+// Loop thread. The samples are read once, in pages, on the readers' thread; the digest is written on the disk
 // thread. A run whose robot still holds samples is looked at again after a while, at first often, at last each minute.
-// While the disk cannot be written nothing is certified. Needs run(); recorder and reader outlive it.
+// While the disk cannot be written no digest is made. Needs run(); recorder and reader outlive it.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -16,18 +16,18 @@
 #include "server/runtime/result.hpp"
 #include "server/storage/database/database_reader.hpp"
 #include "server/storage/ingest/recorder.hpp"
-#include "server/storage/runs/certificate.hpp"
+#include "server/storage/runs/run_digest.hpp"
 
 namespace server {
 
-struct RunCertificate {
-  Certificate certificate;
+struct CurrentDigest {
+  RunDigest digest;
   bool is_final = false;  // no: samples are on their way, the counts are those of now, and there is no hash
 };
 
-class Certifier {
+class RunDigester {
  public:
-  Certifier(Clock& clock, Recorder& recorder, DatabaseReader& reader);
+  RunDigester(Clock& clock, Recorder& recorder, DatabaseReader& reader);
 
   // Until cancelled.
   boost::asio::awaitable<void> run();
@@ -35,13 +35,13 @@ class Certifier {
   // The run has ended.
   void add(RunId run);
 
-  // Waits up to 3 s for a certificate that is only not made yet. not_found for an unknown run, conflict for an open one
-  // and for one that was discarded without a certificate.
-  boost::asio::awaitable<Result<RunCertificate>> find(RunId run);
+  // Waits up to 3 s for a digest that is only not made yet. not_found for an unknown run, conflict for an open one
+  // and for one that was discarded without a digest.
+  boost::asio::awaitable<Result<CurrentDigest>> find(RunId run);
 
  private:
   struct Pending {
-    std::optional<Certification> begun;
+    std::optional<DigestComputation> begun;
     std::int64_t due_us = 0;    // steady
     std::int64_t delay_us = 0;  // until it is looked at again
     std::uint64_t looks = 0;    // that have ended
@@ -49,9 +49,9 @@ class Certifier {
 
   boost::asio::awaitable<void> wait_until_due();
   boost::asio::awaitable<void> look_at(RunId run);
-  boost::asio::awaitable<bool> store(RunId run, Certificate certificate);
-  boost::asio::awaitable<std::optional<Certificate>> stored(RunId run);
-  boost::asio::awaitable<Certificate> count(RunId run);
+  boost::asio::awaitable<bool> store(RunId run, RunDigest digest);
+  boost::asio::awaitable<std::optional<RunDigest>> stored(RunId run);
+  boost::asio::awaitable<RunDigest> count(RunId run);
 
   Clock& clock_;
   Recorder& recorder_;

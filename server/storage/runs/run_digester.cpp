@@ -1,5 +1,5 @@
 // One run at a time, page by page.
-#include "server/storage/runs/certifier.hpp"
+#include "server/storage/runs/run_digester.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -23,27 +23,27 @@ constexpr microseconds kLongestDelay = 60s;
 constexpr microseconds kFindPatience = 3s;
 constexpr microseconds kFindLook = 20ms;
 
-// A page of a certificate, or why there can be none.
+// A page of a digest, or why there can be none.
 struct Page {
-  Certification certification{{}};
-  Certification::Progress progress = Certification::Progress::more;
+  DigestComputation computation{{}};
+  DigestComputation::Progress progress = DigestComputation::Progress::more;
   std::string problem;
 };
 
-Page next_page(SQLite::Database& database, RunId run, std::optional<Certification> begun) {
+Page next_page(SQLite::Database& database, RunId run, std::optional<DigestComputation> begun) {
   Page page;
   try {
     const SQLite::Transaction moment{database};
-    page.certification = begun ? std::move(*begun) : Certification{read_certified_spans(database, run)};
-    page.progress = page.certification.advance(database, kPageSamples);
+    page.computation = begun ? std::move(*begun) : DigestComputation{read_digest_spans(database, run)};
+    page.progress = page.computation.advance(database, kPageSamples);
   } catch (const std::exception& error) {  // the file is damaged or the disk fails: the station goes on without
     page.problem = error.what();
   }
   return page;
 }
 
-// Runs that ended before the last stop of the station, or under a version that made no certificates.
-std::vector<RunId> uncertified_runs(SQLite::Database& database) {
+// Runs that ended before the last stop of the station, or under a version that made no digests.
+std::vector<RunId> runs_without_digest(SQLite::Database& database) {
   std::vector<RunId> runs;
   try {
     SQLite::Statement rows{database,
@@ -51,18 +51,18 @@ std::vector<RunId> uncertified_runs(SQLite::Database& database) {
                            " AND NOT EXISTS (SELECT 1 FROM run_certificate WHERE run_id = run.run_id)"};
     while (rows.executeStep()) runs.push_back(rows.getColumn(0).getInt64());
   } catch (const SQLite::Exception& error) {
-    spdlog::error("runs without a certificate cannot be looked for: {}", error.what());
+    spdlog::error("runs without a digest cannot be looked for: {}", error.what());
   }
   return runs;
 }
 
 }  // namespace
 
-Certifier::Certifier(Clock& clock, Recorder& recorder, DatabaseReader& reader)
+RunDigester::RunDigester(Clock& clock, Recorder& recorder, DatabaseReader& reader)
     : clock_{clock}, recorder_{recorder}, reader_{reader}, added_{recorder.loop()} {}
 
-asio::awaitable<void> Certifier::run() {
-  const std::vector<RunId> runs = co_await reader_.ask(uncertified_runs);
+asio::awaitable<void> RunDigester::run() {
+  const std::vector<RunId> runs = co_await reader_.ask(runs_without_digest);
   for (const RunId run : runs) add(run);
   for (;;) {
     co_await wait_until_due();
@@ -72,21 +72,21 @@ asio::awaitable<void> Certifier::run() {
   }
 }
 
-void Certifier::add(RunId run) {
+void RunDigester::add(RunId run) {
   Pending& pending = pending_[run];
   pending.due_us = clock_.steady_us();
   pending.delay_us = kFirstDelay.count();
   added_.notify();
 }
 
-asio::awaitable<Result<RunCertificate>> Certifier::find(RunId run) {
+asio::awaitable<Result<CurrentDigest>> RunDigester::find(RunId run) {
   auto query = [run](SQLite::Database& database) { return read_run_state(database, run); };
   const std::optional<RunState> state = co_await reader_.ask(std::move(query));
   if (!state) co_return fail(ErrorCode::not_found, fmt::format("there is no run {}", run));
   if (*state == RunState::open) {
     co_return fail(ErrorCode::conflict, fmt::format("run {} is open; a certificate is made when it has ended", run));
   }
-  std::optional<Certificate> made = co_await stored(run);
+  std::optional<RunDigest> made = co_await stored(run);
   if (!made && *state == RunState::discarded) {
     co_return fail(ErrorCode::conflict, fmt::format("run {} was discarded before it had a certificate", run));
   }
@@ -101,14 +101,14 @@ asio::awaitable<Result<RunCertificate>> Certifier::find(RunId run) {
     while (!is_looked_at() && clock_.steady_us() < deadline_us) co_await clock_.sleep_for(kFindLook);
     made = co_await stored(run);
   }
-  if (made) co_return RunCertificate{std::move(*made), true};
-  Certificate counts = co_await count(run);
+  if (made) co_return CurrentDigest{std::move(*made), true};
+  RunDigest counts = co_await count(run);
   counts.made_at_us = clock_.utc_us();
-  co_return RunCertificate{std::move(counts), false};
+  co_return CurrentDigest{std::move(counts), false};
 }
 
-asio::awaitable<Certificate> Certifier::count(RunId run) {
-  auto begin = [run](SQLite::Database& database) { return HeadTally{read_certified_spans(database, run)}; };
+asio::awaitable<RunDigest> RunDigester::count(RunId run) {
+  auto begin = [run](SQLite::Database& database) { return HeadTally{read_digest_spans(database, run)}; };
   HeadTally tally = co_await reader_.ask(std::move(begin));
   bool has_more = true;
   while (has_more) {
@@ -122,7 +122,7 @@ asio::awaitable<Certificate> Certifier::count(RunId run) {
   co_return tally.counts();
 }
 
-asio::awaitable<void> Certifier::wait_until_due() {
+asio::awaitable<void> RunDigester::wait_until_due() {
   if (pending_.empty()) {
     co_await added_.wait();
     co_return;
@@ -133,21 +133,21 @@ asio::awaitable<void> Certifier::wait_until_due() {
   co_await added_.wait_until(clock_, due_us);
 }
 
-asio::awaitable<void> Certifier::look_at(RunId run) {
-  std::optional<Certification> begun = std::exchange(pending_[run].begun, std::nullopt);
+asio::awaitable<void> RunDigester::look_at(RunId run) {
+  std::optional<DigestComputation> begun = std::exchange(pending_[run].begun, std::nullopt);
   Page page;
   do {
     auto query = [run, begun = std::move(begun)](SQLite::Database& database) mutable {
       return next_page(database, run, std::move(begun));
     };
     page = co_await reader_.ask(std::move(query));
-    begun = std::move(page.certification);
-  } while (page.problem.empty() && page.progress == Certification::Progress::more);
+    begun = std::move(page.computation);
+  } while (page.problem.empty() && page.progress == DigestComputation::Progress::more);
 
-  if (page.problem.empty() && page.progress == Certification::Progress::done) {
-    Certificate certificate = begun->certificate();
-    certificate.made_at_us = clock_.utc_us();
-    const bool is_stored = co_await store(run, std::move(certificate));
+  if (page.problem.empty() && page.progress == DigestComputation::Progress::done) {
+    RunDigest digest = begun->digest();
+    digest.made_at_us = clock_.utc_us();
+    const bool is_stored = co_await store(run, std::move(digest));
     if (is_stored) {
       pending_.erase(run);
       co_return;
@@ -158,16 +158,16 @@ asio::awaitable<void> Certifier::look_at(RunId run) {
   if (page.problem.empty()) {
     pending.begun = std::move(begun);
   } else if (pending.looks == 1) {
-    spdlog::error("run {} gets no certificate: {}", run, page.problem);
+    spdlog::error("run {} gets no digest: {}", run, page.problem);
   }
   pending.due_us = clock_.steady_us() + pending.delay_us;
   pending.delay_us = std::min(2 * pending.delay_us, kLongestDelay.count());
 }
 
-asio::awaitable<bool> Certifier::store(RunId run, Certificate certificate) {
-  auto job = [run, certificate = std::move(certificate)](Database& database) {
+asio::awaitable<bool> RunDigester::store(RunId run, RunDigest digest) {
+  auto job = [run, digest = std::move(digest)](Database& database) {
     try {
-      write_certificate(database.handle(), run, certificate);
+      write_digest(database.handle(), run, digest);
       return true;
     } catch (const SQLite::Exception&) {  // the disk is full or locked; the recorder says so
       return false;
@@ -176,8 +176,8 @@ asio::awaitable<bool> Certifier::store(RunId run, Certificate certificate) {
   co_return co_await recorder_.on_disk(std::move(job));
 }
 
-asio::awaitable<std::optional<Certificate>> Certifier::stored(RunId run) {
-  auto query = [run](SQLite::Database& database) { return read_certificate(database, run); };
+asio::awaitable<std::optional<RunDigest>> RunDigester::stored(RunId run) {
+  auto query = [run](SQLite::Database& database) { return read_digest(database, run); };
   co_return co_await reader_.ask(std::move(query));
 }
 

@@ -1,5 +1,5 @@
-// The certificate says of a run exactly what a naive recount of its samples says.
-#include "server/storage/runs/certificate.hpp"
+// The digest says of a run exactly what a naive recount of its samples says.
+#include "server/storage/runs/run_digest.hpp"
 
 #include <array>
 #include <bit>
@@ -12,17 +12,17 @@
 namespace server {
 namespace {
 
-class CertificateTest : public RecordingTest {
+class RunDigestTest : public RecordingTest {
  protected:
   TestRobot robot_;
 
   RunId create() { return wait(runs_->create(robot_.id, named("certified")))->id; }
   void end(RunId id) { ASSERT_TRUE(wait(runs_->end(id, "")).has_value()); }
-  Certificate final_certificate(RunId id) {
-    const Result<RunCertificate> found = wait(recording_->certifier.find(id));
+  RunDigest final_digest(RunId id) {
+    const Result<CurrentDigest> found = wait(recording_->digester.find(id));
     EXPECT_TRUE(found.has_value()) << found.error().detail;
     EXPECT_TRUE(found && found->is_final);
-    return found ? found->certificate : Certificate{};
+    return found ? found->digest : RunDigest{};
   }
   void reboot() {
     disconnect(robot_);
@@ -56,24 +56,24 @@ class CertificateTest : public RecordingTest {
   }
 };
 
-TEST_F(CertificateTest, CountsWhatCameAndWhatIsLost) {
+TEST_F(RunDigestTest, CountsWhatCameAndWhatIsLost) {
   start();
-  const Certificate certificate = final_certificate(make_eventful_run());
-  EXPECT_EQ(certificate.samples_expected, 310u);
-  EXPECT_EQ(certificate.samples_live, 293u);
-  EXPECT_EQ(certificate.samples_backfilled, 7u);
-  EXPECT_EQ(certificate.samples_lost, 10u);
-  EXPECT_EQ(certificate.samples_missing(), 0u);
-  EXPECT_EQ(certificate.lost_by_cause, (std::map<std::string, std::uint64_t>{{"reboot", 10}}));
-  EXPECT_EQ(certificate.longest_gap_samples, 10u);
-  EXPECT_EQ(certificate.longest_gap_us, 100'000);
-  EXPECT_EQ(certificate.worst_clock_uncertainty_us, 300);
-  EXPECT_EQ(certificate.samples_without_clock, 0u);
-  EXPECT_EQ(certificate.made_at_us, clock_.utc_us());
+  const RunDigest digest = final_digest(make_eventful_run());
+  EXPECT_EQ(digest.samples_expected, 310u);
+  EXPECT_EQ(digest.samples_live, 293u);
+  EXPECT_EQ(digest.samples_backfilled, 7u);
+  EXPECT_EQ(digest.samples_lost, 10u);
+  EXPECT_EQ(digest.samples_missing(), 0u);
+  EXPECT_EQ(digest.lost_by_cause, (std::map<std::string, std::uint64_t>{{"reboot", 10}}));
+  EXPECT_EQ(digest.longest_gap_samples, 10u);
+  EXPECT_EQ(digest.longest_gap_us, 100'000);
+  EXPECT_EQ(digest.worst_clock_uncertainty_us, 300);
+  EXPECT_EQ(digest.samples_without_clock, 0u);
+  EXPECT_EQ(digest.made_at_us, clock_.utc_us());
 }
 
 // The bytes of docs/database.md, made another way: each sample as its page tells it, written member by member.
-TEST_F(CertificateTest, HashesTheDocumentedBytes) {
+TEST_F(RunDigestTest, HashesTheDocumentedBytes) {
   start();
   robot_.context.controller_id = 7;
   robot_.context.emergency_id = 0xfedcba9876543210;
@@ -116,10 +116,10 @@ TEST_F(CertificateTest, HashesTheDocumentedBytes) {
   std::string expected;
   for (const unsigned char byte : hash)
     expected += "0123456789abcdef"[byte >> 4U], expected += "0123456789abcdef"[byte & 15U];
-  EXPECT_EQ(final_certificate(id).sha256, expected);
+  EXPECT_EQ(final_digest(id).sha256, expected);
 }
 
-TEST_F(CertificateTest, IsFinalOnlyWhenTheLastSampleHasArrived) {
+TEST_F(RunDigestTest, IsFinalOnlyWhenTheLastSampleHasArrived) {
   start();
   connect(robot_);
   const RunId id = create();
@@ -127,20 +127,20 @@ TEST_F(CertificateTest, IsFinalOnlyWhenTheLastSampleHasArrived) {
   robot_.next_seq = 40;  // 20..39 are on their way
   make(robot_, 10);
   end(id);
-  const Result<RunCertificate> now = wait(recording_->certifier.find(id));
+  const Result<CurrentDigest> now = wait(recording_->digester.find(id));
   ASSERT_TRUE(now.has_value());
   EXPECT_FALSE(now->is_final);
-  EXPECT_EQ(now->certificate.samples_live, 30u);
-  EXPECT_EQ(now->certificate.samples_missing(), 20u);
-  EXPECT_EQ(now->certificate.longest_gap_samples, 20u);
-  EXPECT_EQ(now->certificate.sha256, "");
+  EXPECT_EQ(now->digest.samples_live, 30u);
+  EXPECT_EQ(now->digest.samples_missing(), 20u);
+  EXPECT_EQ(now->digest.longest_gap_samples, 20u);
+  EXPECT_EQ(now->digest.sha256, "");
   EXPECT_EQ(number("SELECT count(*) FROM run_certificate"), 0);
   send(robot_, 20, 20);
   flush();
-  EXPECT_EQ(final_certificate(id).samples_live, 50u);
+  EXPECT_EQ(final_digest(id).samples_live, 50u);
 }
 
-TEST_F(CertificateTest, IsMadeByItselfWhenTheRestArrives) {
+TEST_F(RunDigestTest, IsMadeByItselfWhenTheRestArrives) {
   start();
   connect(robot_);
   const RunId id = create();
@@ -154,20 +154,20 @@ TEST_F(CertificateTest, IsMadeByItselfWhenTheRestArrives) {
             std::vector<std::string>{std::to_string(id) + "|50"});
 }
 
-TEST_F(CertificateTest, IsMadeWhenTheDiskCanBeWrittenAgain) {
+TEST_F(RunDigestTest, IsMadeWhenTheDiskCanBeWrittenAgain) {
   start();
   change("CREATE TRIGGER full BEFORE INSERT ON run_certificate BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
   const RunId id = make_eventful_run();
-  const Result<RunCertificate> now = wait(recording_->certifier.find(id));
+  const Result<CurrentDigest> now = wait(recording_->digester.find(id));
   ASSERT_TRUE(now.has_value());
   EXPECT_FALSE(now->is_final);
-  EXPECT_EQ(now->certificate.samples_missing(), 0u);
+  EXPECT_EQ(now->digest.samples_missing(), 0u);
   change("DROP TRIGGER full");
   clock_.run_for(60s);
   EXPECT_EQ(number("SELECT count(*) FROM run_certificate"), 1);
 }
 
-TEST_F(CertificateTest, ADamagedRunHasNoneAndTheStationGoesOn) {
+TEST_F(RunDigestTest, ADamagedRunHasNoneAndTheStationGoesOn) {
   start();
   connect(robot_);
   const RunId damaged = create();
@@ -175,17 +175,17 @@ TEST_F(CertificateTest, ADamagedRunHasNoneAndTheStationGoesOn) {
   flush();
   change("DELETE FROM sample WHERE row = 7");
   end(damaged);
-  const Result<RunCertificate> found = wait(recording_->certifier.find(damaged));
+  const Result<CurrentDigest> found = wait(recording_->digester.find(damaged));
   ASSERT_TRUE(found.has_value());
   EXPECT_FALSE(found->is_final);
   const RunId next = create();
   make(robot_, 20);
   end(next);
-  EXPECT_EQ(final_certificate(next).samples_live, 20u);
+  EXPECT_EQ(final_digest(next).samples_live, 20u);
   EXPECT_EQ(number("SELECT count(*) FROM run_certificate"), 1);
 }
 
-TEST_F(CertificateTest, IsMadeAfterARestartForARunThatTheStopInterrupted) {
+TEST_F(RunDigestTest, IsMadeAfterARestartForARunThatTheStopInterrupted) {
   start();
   connect(robot_);
   const RunId id = create();
@@ -195,13 +195,13 @@ TEST_F(CertificateTest, IsMadeAfterARestartForARunThatTheStopInterrupted) {
   start();
   clock_.run_for(1s);
   EXPECT_EQ(number("SELECT count(*) FROM run_certificate"), 1);
-  EXPECT_EQ(final_certificate(id).samples_live, 250u);
+  EXPECT_EQ(final_digest(id).samples_live, 250u);
 }
 
-TEST_F(CertificateTest, AThousandRunsAreListedFromTheirCertificatesWithoutASegment) {
+TEST_F(RunDigestTest, AThousandRunsAreListedFromTheirDigestsWithoutASegment) {
   start();
   const RunId id = make_eventful_run();
-  final_certificate(id);
+  final_digest(id);
   change(
       "CREATE TEMP TABLE n AS WITH RECURSIVE count(i) AS (SELECT 2 UNION ALL SELECT i + 1 FROM count WHERE i < 1000)"
       " SELECT i FROM count;"
@@ -226,26 +226,26 @@ TEST_F(CertificateTest, AThousandRunsAreListedFromTheirCertificatesWithoutASegme
   }
 }
 
-TEST_F(CertificateTest, ThereIsNoneOfAnOpenOrUnknownRun) {
+TEST_F(RunDigestTest, ThereIsNoneOfAnOpenOrUnknownRun) {
   start();
   connect(robot_);
   const RunId id = create();
-  EXPECT_EQ(wait(recording_->certifier.find(id)).error().code, ErrorCode::conflict);
-  EXPECT_EQ(wait(recording_->certifier.find(99)).error().code, ErrorCode::not_found);
+  EXPECT_EQ(wait(recording_->digester.find(id)).error().code, ErrorCode::conflict);
+  EXPECT_EQ(wait(recording_->digester.find(99)).error().code, ErrorCode::not_found);
 }
 
-TEST_F(CertificateTest, AnEmptyRunHasOne) {
+TEST_F(RunDigestTest, AnEmptyRunHasOne) {
   start();
   connect(robot_);
   const RunId id = create();
   end(id);
-  const Certificate certificate = final_certificate(id);
-  EXPECT_EQ(certificate.samples_expected, 0u);
-  EXPECT_EQ(certificate.worst_clock_uncertainty_us, -1);
-  EXPECT_EQ(certificate.sha256, SampleHash{kCertificateFormat}.text());
+  const RunDigest digest = final_digest(id);
+  EXPECT_EQ(digest.samples_expected, 0u);
+  EXPECT_EQ(digest.worst_clock_uncertainty_us, -1);
+  EXPECT_EQ(digest.sha256, SampleHash{kDigestFormat}.text());
 }
 
-TEST_F(CertificateTest, CountsSamplesThatHaveNoClock) {
+TEST_F(RunDigestTest, CountsSamplesThatHaveNoClock) {
   start();
   connect(robot_);
   const RunId id = create();
@@ -255,13 +255,13 @@ TEST_F(CertificateTest, CountsSamplesThatHaveNoClock) {
   robot_.next_seq = 5;
   make(robot_, 5);
   end(id);
-  EXPECT_EQ(final_certificate(id).samples_without_clock, 5u);
+  EXPECT_EQ(final_digest(id).samples_without_clock, 5u);
 }
 
-TEST_F(CertificateTest, IsTheSameAfterAVacuumAndWhenSegmentsAreCutDifferently) {
+TEST_F(RunDigestTest, IsTheSameAfterAVacuumAndWhenSegmentsAreCutDifferently) {
   start();
   const RunId id = make_eventful_run();
-  const Certificate before = final_certificate(id);
+  const RunDigest before = final_digest(id);
   stop();
   // Each segment in two, the second half in rows of its own.
   change(
@@ -284,10 +284,10 @@ TEST_F(CertificateTest, IsTheSameAfterAVacuumAndWhenSegmentsAreCutDifferently) {
   const auto segments = number("SELECT count(*) FROM segment");
   start();
   EXPECT_GT(segments, 8);
-  EXPECT_TRUE(final_certificate(id).agrees_with(before));
+  EXPECT_TRUE(final_digest(id).agrees_with(before));
 }
 
-TEST_F(CertificateTest, ARunLongerThanAPageIsCountedWhole) {
+TEST_F(RunDigestTest, ARunLongerThanAPageIsCountedWhole) {
   start();
   connect(robot_);
   const RunId id = create();
@@ -296,7 +296,7 @@ TEST_F(CertificateTest, ARunLongerThanAPageIsCountedWhole) {
     flush();
   }
   end(id);
-  EXPECT_EQ(final_certificate(id).samples_live, 45'000u);
+  EXPECT_EQ(final_digest(id).samples_live, 45'000u);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // Boot, tick, and what happens between two ticks.
-#include "robot_fw/esp8266/robot_port.hpp"
+#include "robot_fw/esp8266/board.hpp"
 
 #include <Arduino.h>
 #include <user_interface.h>
@@ -29,7 +29,7 @@ bool place_samples() {
 
 }  // namespace
 
-RobotPort::RobotPort(const Secrets& secrets, const Settings& settings)
+Board::Board(const Secrets& secrets, const Settings& settings)
     : secrets_(secrets),
       motor_(settings.motor),
       imu_(settings.imu),
@@ -37,7 +37,7 @@ RobotPort::RobotPort(const Secrets& secrets, const Settings& settings)
       led_(settings.led),
       link_(secrets, clock_) {}
 
-void RobotPort::begin() {
+void Board::begin() {
   motor_.begin();  // SAFETY: first of all
   led_.begin();
   // SAFETY: without memory there is no robot: no tick completes, so nothing ever raises the motor's pin.
@@ -64,7 +64,7 @@ void RobotPort::begin() {
   ticks_.begin(clock_.now_us());
 }
 
-void RobotPort::step() {
+void Board::step() {
   if (!robot_) {
     led_.show(led_pattern(), clock_.now_us());
     return;
@@ -78,7 +78,7 @@ void RobotPort::step() {
 }
 
 // Sensors, core, motor: nothing in here waits for the network or the flash.
-void RobotPort::tick() {
+void Board::tick() {
   const std::uint64_t began_us = clock_.now_us();
   const Inputs inputs = read_inputs(ticks_.take(began_us));
   robot_->step(inputs, kTickUs * 1e-6F);
@@ -88,7 +88,7 @@ void RobotPort::tick() {
   tick_us_ = static_cast<std::uint32_t>(clock_.now_us() - began_us);
 }
 
-Inputs RobotPort::read_inputs(std::uint64_t robot_time_us) {
+Inputs Board::read_inputs(std::uint64_t robot_time_us) {
   const Bno055::Reading reading = imu_.read(robot_time_us);
   analogue_.read();
   Inputs inputs;
@@ -106,7 +106,7 @@ Inputs RobotPort::read_inputs(std::uint64_t robot_time_us) {
 }
 
 // At most one piece a turn, so that a flood from the network delays no tick.
-bool RobotPort::receive() {
+bool Board::receive() {
   const std::size_t size = link_.read(bytes_.data(), kPieceBytes);
   if (size == 0) return false;
   const bool keep = robot_->receive({bytes_.data(), size}, clock_.now_us());
@@ -117,7 +117,7 @@ bool RobotPort::receive() {
   return true;
 }
 
-void RobotPort::transmit() {
+void Board::transmit() {
   const std::size_t room = link_.room();
   if (room == 0) return;
   // SAFETY: only what TCP takes at once; a frame that does not fit stays with the core.
@@ -128,13 +128,13 @@ void RobotPort::transmit() {
 
 // SAFETY: only when nothing came in this turn; after a stall the silence may be the robot's own, and a stop that waited
 // is read before the verdict.
-void RobotPort::close_when_dead() {
+void Board::close_when_dead() {
   if (link_.state() != StationLink::State::open) return;
   if (!link_.alive() || robot_->connection_is_silent(clock_.now_us())) close_link();
 }
 
 // What may block, for seconds.
-void RobotPort::use_rest() {
+void Board::use_rest() {
   const bool at_rest = robot_->at_rest() && motor_.is_off();
   if (at_rest && !storage_.write_pending()) robot_->storage_failed();
   const bool was_open = link_.state() == StationLink::State::open;
@@ -146,14 +146,14 @@ void RobotPort::use_rest() {
   }
 }
 
-void RobotPort::keep_latch() { latch_.keep(robot_->emergency_id(), robot_->emergency_cause()); }
+void Board::keep_latch() { latch_.keep(robot_->emergency_id(), robot_->emergency_cause()); }
 
-void RobotPort::close_link() {
+void Board::close_link() {
   link_.close();
   robot_->link_closed(clock_.now_us());
 }
 
-LedPattern RobotPort::led_pattern() const {
+LedPattern Board::led_pattern() const {
   if (!robot_) return LedPattern::refused;
   if (robot_->emergency_id() != 0) return LedPattern::emergency;
   if (robot_->link_up()) return LedPattern::connected;

@@ -8,7 +8,7 @@
 
 #include "chip.hpp"
 #include "protocol/frame.hpp"
-#include "robot_fw/esp8266/robot_port.hpp"
+#include "robot_fw/esp8266/board.hpp"
 #include "sim_robot/lab/station_commands.hpp"
 
 namespace robot_fw::esp8266 {
@@ -18,9 +18,9 @@ inline const Secrets kTestSecrets{"robot-1", "token", "wifi", "password", "192.0
 constexpr int kMotorPin = kSettings.motor.pwm_pin;
 constexpr std::uint32_t kTurnUs = 250;  // of the loop
 
-class Board : public ::testing::Test {
+class BoardFixture : public ::testing::Test {
  protected:
-  Board() { new_chip(); }
+  BoardFixture() { new_chip(); }
 
   void new_chip() {
     chip = Chip{};
@@ -29,9 +29,9 @@ class Board : public ::testing::Test {
   }
 
   void boot(const Settings& settings = kSettings) {
-    port.reset();
-    port.emplace(kTestSecrets, settings);
-    port->begin();
+    board.reset();
+    board.emplace(kTestSecrets, settings);
+    board->begin();
     read_writes = 0;
   }
 
@@ -40,7 +40,7 @@ class Board : public ::testing::Test {
       chip.pass(kTurnUs);
       auto& low_byte = chip.imu_registers[0x28];  // at rest: a reading that never changes is a fault
       if (low_byte <= 1 && chip.now_us % 10'000 < kTurnUs) low_byte ^= 1;
-      port->step();
+      board->step();
     }
   }
 
@@ -50,15 +50,15 @@ class Board : public ::testing::Test {
     come_up();
   }
   void come_up() {
-    for (int i = 0; i < 200 && port->link().state() != StationLink::State::open; ++i) run_ms(100);
-    ASSERT_EQ(port->link().state(), StationLink::State::open);
+    for (int i = 0; i < 200 && board->link().state() != StationLink::State::open; ++i) run_ms(100);
+    ASSERT_EQ(board->link().state(), StationLink::State::open);
     run_ms(1);
     protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
     frame.which_body = rheonaut_StationFrame_welcome_tag;
     frame.body.welcome.protocol_version = protocol::kProtocolVersion;
     say(frame);
     run_ms(20);
-    ASSERT_TRUE(port->robot().link_up());
+    ASSERT_TRUE(board->robot().link_up());
   }
 
   void say(const protocol::StationFrame& frame) {
@@ -92,7 +92,7 @@ class Board : public ::testing::Test {
   void drive(float duty) {
     order(sim_robot::set_duty(duty, 500));
     run_ms(20);
-    ASSERT_EQ(port->robot().duty(), duty);
+    ASSERT_EQ(board->robot().duty(), duty);
   }
 
   // Of the Hello of this connection.
@@ -126,7 +126,7 @@ class Board : public ::testing::Test {
     return chip.pins[kMotorPin].high_us - before;
   }
 
-  std::optional<RobotPort> port;
+  std::optional<Board> board;
   std::size_t read_writes = 0;
   std::uint64_t last_command_id = 0, known_boot_id = 0;
 };

@@ -5,7 +5,7 @@
 namespace server {
 namespace {
 
-class CommandLifeTest : public LinkTest {
+class CommandOutcomeTest : public LinkTest {
  protected:
   void accept(TestRobot& robot, std::size_t which) {
     robot.acknowledge(robot.commands().at(which), rheonaut_COMMAND_RESULT_ACCEPTED);
@@ -35,7 +35,7 @@ class CommandLifeTest : public LinkTest {
   std::uint64_t next_seq_ = 0;
 };
 
-TEST_F(CommandLifeTest, IsVerifiedWhenTelemetryShowsItAfterItsEffect) {
+TEST_F(CommandOutcomeTest, IsVerifiedWhenTelemetryShowsItAfterItsEffect) {
   auto* robot = connect();
   submit(set_duty(0.3F));
   clock.settle();
@@ -53,7 +53,7 @@ TEST_F(CommandLifeTest, IsVerifiedWhenTelemetryShowsItAfterItsEffect) {
   EXPECT_NE(latest(results[0]->id).ended_at_us, 0);
 }
 
-TEST_F(CommandLifeTest, FailsWhenTelemetryGoesOnWithoutShowingIt) {
+TEST_F(CommandOutcomeTest, FailsWhenTelemetryGoesOnWithoutShowingIt) {
   auto* robot = connect();
   submit(set_duty(0.3F));
   clock.settle();
@@ -66,7 +66,7 @@ TEST_F(CommandLifeTest, FailsWhenTelemetryGoesOnWithoutShowingIt) {
   EXPECT_EQ(latest(results[0]->id).reason, "not_seen_in_telemetry");
 }
 
-TEST_F(CommandLifeTest, WithoutTelemetryItStaysAcknowledgedAndEnds) {
+TEST_F(CommandOutcomeTest, WithoutTelemetryItStaysAcknowledgedAndEnds) {
   auto* robot = connect();
   submit(set_duty(0.3F));
   clock.settle();
@@ -83,7 +83,7 @@ TEST_F(CommandLifeTest, WithoutTelemetryItStaysAcknowledgedAndEnds) {
   EXPECT_EQ(latest(results.at(1)->id).reason, "link_lost");
 }
 
-TEST_F(CommandLifeTest, ANewerOneThatTookItsPlaceBeforeItWasSeenSupersedesIt) {
+TEST_F(CommandOutcomeTest, ANewerOneThatTookItsPlaceBeforeItWasSeenSupersedesIt) {
   auto* robot = connect();
   submit(set_duty(0.3F));
   clock.settle();
@@ -98,7 +98,7 @@ TEST_F(CommandLifeTest, ANewerOneThatTookItsPlaceBeforeItWasSeenSupersedesIt) {
   EXPECT_EQ(latest(results.at(1)->id).state, CommandState::verified);
 }
 
-TEST_F(CommandLifeTest, AnEmergencyOfTheRobotSupersedesWhatWasNotSeen) {
+TEST_F(CommandOutcomeTest, AnEmergencyOfTheRobotSupersedesWhatWasNotSeen) {
   auto* robot = connect();
   submit(set_duty(0.3F));
   clock.settle();
@@ -109,7 +109,7 @@ TEST_F(CommandLifeTest, AnEmergencyOfTheRobotSupersedesWhatWasNotSeen) {
   EXPECT_EQ(latest(results[0]->id).reason, "by_an_emergency");
 }
 
-TEST_F(CommandLifeTest, WhoWantsToWaitsUntilItIsVerified) {
+TEST_F(CommandOutcomeTest, WhoWantsToWaitsUntilItIsVerified) {
   auto* robot = connect();
   CommandRequest request = request_of(set_setpoint(0.1F));
   request.until_verified = true;
@@ -123,7 +123,7 @@ TEST_F(CommandLifeTest, WhoWantsToWaitsUntilItIsVerified) {
   EXPECT_EQ(results[0]->state, CommandState::verified);
 }
 
-TEST_F(CommandLifeTest, WhatNoSampleCanShowEndsAcknowledged) {
+TEST_F(CommandOutcomeTest, WhatNoSampleCanShowEndsAcknowledged) {
   auto* robot = connect();
   protocol::Command ping = rheonaut_Command_init_zero;
   ping.which_action = rheonaut_Command_ping_tag;
@@ -138,7 +138,7 @@ TEST_F(CommandLifeTest, WhatNoSampleCanShowEndsAcknowledged) {
 }
 
 // SAFETY: of what piled up while the link took nothing, only the newest setpoint is sent.
-TEST_F(CommandLifeTest, OfTheSetpointsThatWaitOnlyTheNewestIsSent) {
+TEST_F(CommandOutcomeTest, OfTheSetpointsThatWaitOnlyTheNewestIsSent) {
   auto* robot = dial(64);
   robot->say_hello();
   ASSERT_TRUE(clock.run_until([&] { return !robot->welcomes().empty(); }, 1s));
@@ -159,8 +159,8 @@ TEST_F(CommandLifeTest, OfTheSetpointsThatWaitOnlyTheNewestIsSent) {
   EXPECT_EQ(static_cast<std::size_t>(superseded) + commands.size(), 51u) << "each is sent, or is told superseded";
 }
 
-// SAFETY: its life counts from when it was issued.
-TEST_F(CommandLifeTest, WhatIsOlderThanItsLifeOnArrivalIsNotSentAndIsAccountedFor) {
+// SAFETY: its time to live counts from when it was issued.
+TEST_F(CommandOutcomeTest, WhatIsOlderThanItsLifeOnArrivalIsNotSentAndIsAccountedFor) {
   auto* robot = connect();
   CommandRequest request = request_of(set_duty(0.3F), 500ms);
   request.age = 500ms;
@@ -180,7 +180,7 @@ TEST_F(CommandLifeTest, WhatIsOlderThanItsLifeOnArrivalIsNotSentAndIsAccountedFo
   EXPECT_LE(robot->commands()[0].valid_until_robot_us, robot->robot_now_us() + 100'000);
 }
 
-TEST_F(CommandLifeTest, ARequestThatComesAgainUnderItsKeyIsNotSentAgain) {
+TEST_F(CommandOutcomeTest, ARequestThatComesAgainUnderItsKeyIsNotSentAgain) {
   auto* robot = connect();
   CommandRequest request = request_of(set_duty(0.3F));
   request.key = "try-1";
@@ -210,7 +210,7 @@ TEST_F(CommandLifeTest, ARequestThatComesAgainUnderItsKeyIsNotSentAgain) {
 }
 
 // A station that restarted has forgotten, and the robot has not.
-TEST_F(CommandLifeTest, WhatTheRobotHasHadBeforeIsAcknowledged) {
+TEST_F(CommandOutcomeTest, WhatTheRobotHasHadBeforeIsAcknowledged) {
   auto* robot = connect();
   CommandRequest request = request_of(set_duty(0.3F));
   request.key = "try-1";

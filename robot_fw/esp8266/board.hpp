@@ -23,9 +23,9 @@ namespace robot_fw::esp8266 {
 
 constexpr std::uint32_t kTickUs = 10'000;
 
-class RobotPort {
+class Board {
  public:
-  explicit RobotPort(const Secrets& secrets, const Settings& settings = kSettings);
+  explicit Board(const Secrets& secrets, const Settings& settings = kSettings);
 
   void begin();
   void step();
