@@ -1,4 +1,4 @@
-// Writes down which fields there are, with the values that they have.
+// Lists the fields of a struct with their values.
 #pragma once
 
 #include <cstdint>

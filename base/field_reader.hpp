@@ -1,7 +1,7 @@
 // Fills a struct from a TOML table and refuses what is not in the struct.
 //
-// Errors: std::invalid_argument, `file:line:column: key: what is wrong, the value, what is allowed`. Without the place
-// when the table was not read from a text, as one that was made of JSON.
+// Errors: std::invalid_argument, `file:line:column: key: what is wrong, the value, what is allowed`. The place is left
+// out when the table was not read from text (for example, made from JSON).
 #pragma once
 
 #include <toml++/toml.h>

@@ -1,8 +1,8 @@
-// How a struct says which keys it has in a file or a request: name, unit (in the name), default, range, meaning.
+// Declares the keys of a struct in a file or a request: name with unit, default, range, meaning.
 //
 // One function per struct calls Fields once for each member. FieldReader then fills the struct from TOML or JSON, and
-// FieldList writes the table of what there is: parser, documents and the answers of the fault server cannot differ.
-// A number that is NaN and a text that is empty have no default: they must be given.
+// FieldList writes their table, so parser, documents and the answers of the fault server cannot differ. A default of
+// NaN or an empty text means that the value is required.
 #pragma once
 
 #include <cstdint>

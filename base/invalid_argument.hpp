@@ -1,4 +1,4 @@
-// Refuses an argument: what is wrong, which value it has, and what is allowed, as std::invalid_argument.
+// Throws std::invalid_argument for an argument: what is wrong, its value, and what is allowed.
 #pragma once
 
 #include <cmath>

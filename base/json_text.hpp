@@ -1,4 +1,4 @@
-// JSON as text: floats as short decimals, and strings that need not be UTF-8.
+// Writes JSON text: floats as short decimals, and strings that need not be UTF-8.
 #pragma once
 
 #include <nlohmann/json.hpp>

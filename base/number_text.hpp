@@ -1,4 +1,4 @@
-// Numbers as decimal text, appended to a string: integers, and floats as the shortest decimal that gives them back.
+// Numbers as decimal text, appended to a string: integers, and floats as the shortest decimal that reads back the same.
 //
 // For text of many numbers; std::to_chars underneath, which is some ten times as fast as a JSON tree.
 #pragma once

@@ -1,5 +1,4 @@
-// A value of TOML as the type that a key takes, and nothing near it: 1 is no text, "1" no number and 1.5 no whole
-// number.
+// Reads a TOML value as exactly the type of its key: 1 is no text, "1" no number and 1.5 no whole number.
 #pragma once
 
 #include <toml++/toml.h>

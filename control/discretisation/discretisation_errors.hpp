@@ -1,4 +1,4 @@
-// Measures how far a discrete controller is from the fractional one it stands for, in magnitude and phase.
+// Measures the error of a discrete controller against its fractional one, in magnitude and phase.
 //
 //   ε(ω) = G(e^{jωT})/C(jω) - 1 at 200 logarithmically spaced ω up to 0.8 of the Nyquist frequency      (1)
 //   generating function  C_a(z) = C(s),  s = ((1 + a)/T) (1 - z^-1)/(1 + a z^-1)                        (2)

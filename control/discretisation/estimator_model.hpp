@@ -3,7 +3,7 @@
 //   v(t) = v_∞ Σ g_i (1 - e^{-t/τ_i})                                     (1)   step of duty 1; v_∞ = kp/b3
 //   y_i → y_i + σ(T/τ_i) (u - y_i),  σ(x) = 12x/(12 + 6x + x²) ≈ 1 - e^{-x}     (2)   as robot_fw/core/estimator does
 //   it minimise Σ_n |v(nT)/v_∞ - Σ g_i (1 - (1 - σ_i)^n)|^p over g_i, ln τ_i       (3)   p = 2, 4, … 64: nearly the
-//   largest
+//                                                                          largest
 //
 // (3) is searched by Levenberg and Marquardt from several starts, with as few sections as do and at most four. The
 // times are dense early and spaced evenly in ln t later, up to 60 s, with the final velocity beside them, so that the
@@ -11,9 +11,8 @@
 // within ±10 v_∞, so that float32 costs a fit error of 1e-5 at most, and within what the robot's parameters may be.
 // What is returned are float32 values, and their fit error is measured by (2) in float32.
 //
-// Reach:    sections have real poles. Plants that overshoot by a percent or more cannot be met by four of them,
-// whatever
-//           the search does: is_met is false then, and `reason` says so. With b1, b2 of (29) halved to doubled, orders
+// Reach:    sections have real poles. Plants that overshoot by a percent or more cannot be met by four of them:
+//           is_met is false then, and `reason` says so. With b1, b2 of (29) halved to doubled, orders
 //           1.4 to 1.95 and 0.6 to 0.98, three plants in five are met (docs/control.md).
 // Errors:   throws std::invalid_argument as check() does. No fit that is good enough is a result.
 #pragma once

@@ -1,4 +1,4 @@
-// Asks a run whether its parameters change with amplitude: then no linear model holds for all of it.
+// Tests whether a run's parameters change with amplitude: then no linear model holds for all of it.
 //
 //   r = J a + E c + noise                                              (1)   r: residuals of the fit
 //   J: slopes of the output by all parameters, and the columns below    what another linear model could explain
@@ -8,7 +8,7 @@
 //
 // A parameter q that is q0 + q1 |u| adds q1 ∂model/∂q for the duty u|u| to the output, and a drag that is not in
 // proportion to the speed adds the model's response to v|v|, in lowest order: a score test, without a second search.
-// u|u| tells nothing if the duty only has one size, v|v| nothing if the speed hardly changes.
+// u|u| says nothing if the duty has one magnitude only, v|v| nothing if the speed hardly changes.
 // Not amplitude: what J has besides (an output of the model that comes later, offset, drift and motion before the run
 // in position and velocity; readings of another age in each second, if the sensor's clock was not found). Doubtful is F
 // above 60 with a share of at least 10 %: figures over fluids and seeds are in docs/control.md. Errors: none thrown.

@@ -1,4 +1,4 @@
-// Turns the end of a search into a fit: what is left unexplained, how sure the parameters are, what the AIC is.
+// Turns the result of a search into a fit: its residuals, the sigmas of the parameters, the AIC.
 //
 // Sigmas are those of the cost: (5) of identify.hpp for least squares, (6) for the absolute error. A structure that was
 // never searched has none.

@@ -1,4 +1,4 @@
-// Says in words what a fit does not tell, and what to do about it.
+// Warnings in words: what a fit does not determine, and what to do about it.
 //
 // Doubtful is: one sigma of b1 or b2 above half of it, of kp above a tenth, of alpha or beta above 0.1; a correlation
 // above 0.99; a parameter at its bound; starts that disagree; a duty that never changes; a search that did not end.

@@ -1,4 +1,4 @@
-// Identifies a motion model from a recorded run, and says what the run cannot tell.
+// Identifies a motion model from a recorded run, and reports what the run does not determine.
 //
 //   y(t) = model(duty; kp, b1, b2, α, β) + offset,  b3 = 1              (1)   [birs2021] (20); one scale is redundant
 //   least squares: Σ (y - model)²/σ_channel²                            (2)   output error

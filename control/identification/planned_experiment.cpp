@@ -1,4 +1,4 @@
-// Predicts what a planned experiment would tell, and makes duties for it.
+// Predicts the uncertainty of a planned experiment's fit, and makes duties for it.
 #include "control/identification/planned_experiment.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What a planned experiment would tell of a model's parameters, and duties for such plans.
+// How well a planned experiment would determine a model's parameters, and duties for such plans.
 //
 // (5) is that of identify.hpp. Errors: throws std::invalid_argument quoting the bad value.
 #pragma once
@@ -11,8 +11,9 @@
 
 namespace control {
 
-// What a planned experiment would tell, the model's dead time being known: one-sigma of each parameter by (5), for
-// white noise of these sizes (0: channel not recorded). Of an acceleration bias, drift and lag are never known.
+// The uncertainty that a planned experiment would leave, with the model's dead time known: one-sigma of each parameter
+// by (5), for white noise of these sizes (0: channel not recorded). Of an acceleration bias, drift and lag are never
+// known.
 struct PlannedExperiment {
   double dt_s = 0.01;
   std::vector<double> duty;
@@ -23,7 +24,7 @@ struct PlannedExperiment {
 };
 
 struct ExpectedUncertainty {
-  std::array<std::optional<double>, kParameters> one_sigma;  // none: this experiment cannot tell at all
+  std::array<std::optional<double>, kParameters> one_sigma;  // none: this experiment does not determine it
   std::array<std::array<double, kParameters>, kParameters> correlation{};
 };
 

@@ -1,9 +1,8 @@
-// Says in words what the residuals of a fit give away: a model that does not describe the run, outliers, a bias,
-// colour.
+// Warnings in words from the residuals of a fit: a model that does not describe the run, outliers, a bias, colour.
 //
 // Doubtful is: a fit below 50 %; a residual beyond 6 robust sd, 1.4826 times the median size; a mean beyond 4 of its
 // own sigmas, by the number of independent samples; a Ljung-Box p below 0.01 in any channel. Residuals of the size of
-// rounding are not looked at.
+// rounding are ignored.
 // Errors: none thrown.
 #pragma once
 

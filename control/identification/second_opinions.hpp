@@ -1,6 +1,6 @@
-// Tries other ways to explain a run than the fit that was found, and says in words which of them do better.
+// Tries other explanations of a run than the fit, and reports in words which of them fit better.
 //
-//   a sign turned round: if the fit is poor, and the turned one leaves less than half as much
+//   an inverted sign: if the fit is poor, and inverting leaves less than half of the residual
 //   an offset, if it was not to be fitted: AIC lower by more than 10
 //   a run that begins in motion: v0 e^{-t/T} added to the model by one linear step, for the best of some T        (1)
 // (1) is the change of least squares with all parameters free, so a part of v0 that they can imitate does not count.

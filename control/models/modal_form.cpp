@@ -12,7 +12,7 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kNearestToCutRad = 1e-7;    // nearer, a pole cannot be told from a double one on the cut
+constexpr double kNearestToCutRad = 1e-7;    // nearer, a pole equals a double one on the cut numerically
 constexpr double kNearestToUndamped = 1e-9;  // relative to π/α; nearer, sin αφ has too few digits to bisect by
 constexpr double kFastestLogRate = 40;       // of a mode, against 1/shortest_s; still faster ones follow at once
 constexpr double kLargestGrowth = 1e20;

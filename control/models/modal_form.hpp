@@ -13,7 +13,7 @@
 // much faster rates. What the sum leaves out beyond its fastest rate is one more real mode of that rate: such modes
 // have settled by shortest_s, so only their sum matters.
 //
-// A dead time of the model is not in the form: h is the response after it. Those who step the form hold the duty back.
+// The form excludes the model's dead time: h is the response after it. Code that steps the form delays the duty.
 // Shapes:   rate and weight have the same length; every rate lies left of the imaginary axis, in the upper half plane
 //           or on the real axis, and its mode counts twice the real part.
 // Accuracy: velocity and position step responses for shortest_s ≤ t ≤ longest_s within `tolerance` relative, or within

@@ -12,9 +12,8 @@
 // Accuracy: velocity and position step responses within 2e-6 relative from 10 ms to a day, or 1e-14 of kp/b3 and of
 //           kp/b3 ∫|u| dt where that is more (rounding), for every model that check() allows and every dt_s; before
 //           10 ms within 2e-6 of the value at 10 ms. Held by modal_plant_test.cpp.
-// Cost:     144 modes for (29), one pass over them per step. Plants of one model and dt_s share what does not change in
-// a
-//           step (made on one thread, one after the other), so that a thousand of them fit the cache: 2.3 kB each.
+// Cost:     144 modes for (29), one pass over them per step. Plants of one model and dt_s share their constants (made
+//           on one thread, one after the other), so that a thousand of them fit the cache: 2.3 kB each.
 // Errors:   throws std::invalid_argument quoting the bad value.
 #pragma once
 

@@ -1,4 +1,4 @@
-// The reference as it travels to the setpoint: limited in velocity and acceleration, from rest to rest.
+// The reference on its way to the setpoint: limited in velocity and acceleration, from rest to rest.
 //
 //   accelerate at a for v/a, cruise at v, brake at a; from distance < v²/a on without a cruise: peak velocity √(a d)
 //   (1)

@@ -1,4 +1,4 @@
-// A discrete transfer function, and the same as parallel sections, which is how the robot runs it.
+// A discrete transfer function, and the same as parallel sections, as the robot runs it.
 //
 //   G(z) = Σ b_k z^-k / Σ a_k z^-k,  a_0 = 1                                                                 (1)
 //        = direct + Σ_i r_i/(1 - p_i z^-1) + Σ_j (b0_j + b1_j z^-1)/(1 + a1_j z^-1 + a2_j z^-2)             (2)

@@ -56,7 +56,7 @@ struct IdentificationOptions {
   bool fits_position_clock = true;
 
   // Of an accelerometer's readings, beyond their sampling and their low pass. What comes later than that is the plant's
-  // dead time; the record alone cannot tell one from the other.
+  // dead time; the record alone cannot separate the two.
   std::optional<double> sensor_lag_s;
 };
 

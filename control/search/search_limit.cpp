@@ -1,4 +1,4 @@
-// Compares the clock with the share's end, and tells the watcher when it has been silent for long.
+// Compares the clock with the share's end, and calls the progress function after a long silence.
 #include "control/search/search_limit.hpp"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
-// Ends a search on time, or when the one who watches it says so; it is asked inside long steps too.
+// Ends a search after its time limit, or when the progress function cancels it; long steps check it, too.
 //
-// Once reached it stays reached: by the time limit until the next share begins, by cancelling for ever. The watcher
-// hears of every iteration, and at least each kMostSilenceS while the search asks.
+// Once reached it stays reached: after the time limit until the next share begins, after cancelling for ever. The
+// progress function is called after every iteration, and at least each kMostSilenceS while the search checks.
 #pragma once
 
 #include <functional>
@@ -20,7 +20,7 @@ class SearchLimit {
 
   void begin_share(int parts);  // what follows may use one of so many equal parts of the time that is left
   void begin(const Progress& progress) { progress_ = progress; }
-  void report(const Progress& progress);  // the watcher hears it at once
+  void report(const Progress& progress);  // calls the progress function at once
   bool is_reached();
   std::optional<SearchEnd> end() const { return end_; }
   double left_s() const;  // of the whole limit

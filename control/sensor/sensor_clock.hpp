@@ -1,11 +1,11 @@
-// Finds the clock of an accelerometer from the readings and from what a model expects.
+// Finds the clock of an accelerometer from its readings and a model's prediction.
 //
-// Where the acceleration changes fast, each piece of ten readings tells their age s by the shift that fits best.
+// Where the acceleration changes fast, the shift that fits a piece of ten readings best is their age s.
 // Samples lie at A + P j, so exp(2πi (s - t)/P) has the same angle for all pieces: P is where these agree best, A the
-// angle.  (1) Which sample a tick reads is then found from the costs of all orders near: squares of the residuals,
-// limited; a sample read again must repeat the last reading, which a new one does now and then only. (2) Both are asked
-// to stop between all steps: then there is no clock, and an order is the best so far. Errors: none thrown; none where
-// no piece changes fast enough to tell.
+// angle.  (1) The sample that each tick reads is then found by comparing all near orders by their limited squared
+// residuals; a sample read again must repeat the last reading, which a new one rarely does. (2) Both can be stopped
+// between steps: then there is no clock, and the order is the best so far. Errors: none thrown; no clock where
+// no piece changes fast enough for that.
 #pragma once
 
 #include <optional>

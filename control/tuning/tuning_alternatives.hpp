@@ -1,5 +1,5 @@
 // What to offer when a tuning specification has no solution: the nearest that has one, and designs that give up less
-// important wishes.
+// important requirements.
 //
 // Only sound designs are offered (is_sound of design.hpp). Nearest crossovers are looked for within a factor of 1e6, in
 // steps of 2 %, and margins in 60 steps of the range of a crossover, so that a band narrower than that may be missed.

@@ -1,4 +1,4 @@
-// Which commands may run: the check of identity and time, and the few that wait for their time.
+// Checks the identity and time of commands, and holds the timed commands until they are due.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ struct Verdict {
 };
 
 constexpr Verdict kAccepted{};
-constexpr Verdict kTimedExpired{rheonaut_COMMAND_RESULT_EXPIRED};  // of a timed command that nobody waits for any more
+constexpr Verdict kTimedExpired{rheonaut_COMMAND_RESULT_EXPIRED};  // a timed command whose lease has lapsed
 constexpr Verdict rejected(protocol::RejectReason reason) { return {rheonaut_COMMAND_RESULT_REJECTED, reason}; }
 
 // Admits each command once, for this boot, within its time to live. Does not check modes.
@@ -36,22 +36,22 @@ class CommandFilter {
   std::size_t oldest_ = 0;
 };
 
-// Commands admitted with a time still to come, encoded one behind the other in the order in which they came.
+// Admitted commands whose time is still to come, encoded one behind the other in order of arrival.
 //
-// SAFETY: they wait under a lease, in every mode: whoever sent them must show that they are still there.
+// SAFETY: they wait under a lease, in every mode: their sender must keep renewing it.
 class TimedCommands {
  public:
   static constexpr std::size_t kMaxCommands = 4;
   static constexpr std::size_t kMaxBytes = 496;  // of all; a schedule of 64 entries with ticks below 2 million fits
 
-  // False when there is no room for it. Its sender is there: the lease of all that wait begins anew.
+  // False when there is no room. Renews the lease of all that wait, since their sender is there.
   bool hold(const protocol::Command& command, std::uint64_t now_us);
   // Extends that lease; false when nothing waits, or when it has lapsed.
   bool renew_lease(std::uint32_t lease_ms, std::uint64_t now_us);
   bool lease_lapsed(std::uint64_t now_us) const { return size_bytes_[0] > 0 && now_us >= lease_until_us_; }
-  // Takes out the earliest one due at `now_us`, of several for the same time the one that came first.
+  // Removes and returns the earliest command due at `now_us`; of several for the same time, the first to arrive.
   std::optional<protocol::Command> take_due(std::uint64_t now_us);
-  // Drops one and says its id; empty when none is left.
+  // Drops one command and returns its id; empty when none is left.
   std::optional<std::uint64_t> drop_any();
 
  private:

@@ -1,4 +1,4 @@
-// Fractional PD controllers, executed as parallel first- and second-order sections; and the two that are built in.
+// Fractional PD controllers, executed as parallel first- and second-order sections; and the two built-in ones.
 //
 //   C(s) = 65.0028 (1 + 0.0305 s^0.6524)                                   (30) of the paper
 //   C(s) = 29.9712 (1 + 0.105235 s^0.945500)                               (4)   for a motor without reverse
@@ -9,16 +9,16 @@
 //   u = kp · e + (C - kp) · (y_0 - y)      with the derivative on the measurement     (3)
 //
 //   e → error_m, reference less position in m;  y → position_m, y_0 the first one after a reset
-//   u → duty wanted, not yet limited;  sampling period 10 ms
+//   u → requested duty, not yet limited;  sampling period 10 ms
 // The states are driven by the error (or, in (3), the position) alone. The limited duty is never written back: with
 // some coefficients that locks the motor for ever, and without an integrator there is nothing to wind up. In (3) a
-// change of the setpoint acts through kp alone. C - kp has no gain at DC, so that y_0 changes nothing but that the
+// change of the setpoint acts through kp alone. C - kp has no gain at DC, so that y_0 only makes the
 // sections start as if the robot had always been there.
 // Accuracy: the sections are the order 5 fits of (30) by the direct method with a = 0.5, with (2) at most 1.2 % and
 // 0.25 deg off below 30 rad/s, and of (4) with a = 0, 1.1 % and 0.4 deg off up to 6 rad/s. Differs from the paper:
 // `direct` is corrected so that (2) holds exactly; the fit of (30) alone has C(1) = 65.59. (4) is not in the paper: it
-// is tuned to 3 rad/s and 90 degrees, iso-damped, so that the robot hardly overshoots, from where it could not come
-// back (docs/control.md). With a = 0 all residues are negative: the duty after a step of the error never changes its
+// is tuned to 3 rad/s and 90 degrees, iso-damped, so that the robot, which cannot move back, hardly overshoots
+// (docs/control.md). With a = 0 all residues are negative: the duty after a step of the error never changes its
 // sign.
 #pragma once
 
@@ -71,7 +71,7 @@ inline constexpr ControllerSections kPaperController{1,
                                                      5};
 
 // (4), as `rheonaut tune --crossover-rad-s 3 --phase-margin-deg 90` and `discretise --method direct --a 0` make it.
-inline constexpr ControllerSections kOneWayController{1000,  // apart from those that people number from 2 on
+inline constexpr ControllerSections kOneWayController{1000,  // outside the ids that people choose, from 2 on
                                                       0,
                                                       29.971237F,
                                                       275.274536F,
@@ -82,7 +82,7 @@ inline constexpr ControllerSections kOneWayController{1000,  // apart from those
                                                        0.976423144F, -0.0193156041F},
                                                       5};
 
-// What a robot has until it is given another: duty_min is that of its motor.
+// The controller of a robot until another is set; duty_min is that of its motor.
 constexpr const ControllerSections& built_in_controller(float duty_min) {
   return duty_min < 0 ? kPaperController : kOneWayController;
 }
@@ -90,7 +90,7 @@ constexpr const ControllerSections& built_in_controller(float duty_min) {
 // The direct term for which (2) holds; not finite where some section has no DC gain.
 float corrected_direct(const ControllerSections& sections);
 
-// What a controller asks for, and what its own limits leave of it.
+// A controller's duty before and after its own limits.
 struct ControllerDuty {
   float asked = 0;
   float limited = 0;

@@ -1,4 +1,4 @@
-// Controllers as messages: their checksum, whether the robot would run them, and the way into and out of a message.
+// Controllers as messages: their checksum, why the robot refuses one, and conversion from and to a message.
 #pragma once
 
 #include "protocol/messages.hpp"
@@ -10,7 +10,7 @@ namespace robot_fw {
 // CRC-32 of the fields 3 to 14 in order.
 std::uint32_t checksum_of(const protocol::Controller& controller);
 
-// Why the robot does not run this controller; none when it does.
+// Why the robot refuses this controller; none when it accepts it.
 protocol::RejectReason fault_of(const protocol::Controller& controller, const DutyRange& motor,
                                 std::uint32_t sample_period_us);
 

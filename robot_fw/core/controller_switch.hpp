@@ -1,9 +1,9 @@
-// The controller in force, the one before it, and the way from one to the other.
+// The controller in force, the one before it, and the change between them.
 //
 //   at rest   the new one is in force at once
 //   in auto   it runs on the same error beside the old one for 1 s, then the duty passes from the old one to the new
 //             one over 0.2 s; it is in force from the first tick of that cross-fade on
-// A reset, which ends motion or starts auto afresh, ends a change at once.
+// A reset (motion ends, or auto starts) ends a change at once.
 #pragma once
 
 #include "robot_fw/core/controller.hpp"
@@ -17,9 +17,9 @@ class ControllerSwitch {
 
   explicit ControllerSwitch(const ControllerSections& first) : newest_(first), former_(first) {}
 
-  // Takes a new controller, in place of one that is not in force yet; false during a cross-fade.
+  // Begins the change to a new controller; it replaces one not yet in force. False during a cross-fade.
   bool set(const ControllerSections& sections, bool moving);
-  // Back to the one before. A change that was under way turns back where it is, without a jump. False if there is none.
+  // Changes back to the one before. A change under way reverses without a jump. False if there is none.
   bool restore(bool moving);
 
   ControllerDuty step(float error_m, float position_m);

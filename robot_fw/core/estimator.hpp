@@ -1,4 +1,4 @@
-// Where the robot is: a Kalman filter on accelerometer readings, aided by what a model makes of the motor's duty.
+// Estimates the robot's position: a Kalman filter on accelerometer readings, aided by a model driven by the duty.
 //
 //   v_m = Σ (g_i + δ_i) y_i,  y_i' = (u - y_i)/τ_i                 (1)   model: first-order sections, from (28) or (29)
 //   p' = v,  v' = a - b                                            (2)   a = counts/100 m/s²; without a reading
@@ -7,31 +7,30 @@
 //   p → position, v → velocity, b → bias (random walk), δ_i → error of a section's gain (constant), d → drift with a
 //   pulsating flow (0 without one);  u → duty;  ε → `shape_error` · v_m, a reading's age times a, and a floor
 //
-// - The model's gain may be off by ±20 %: all δ_i alike (sd `gain_error` · g_i); that is known within a few percent
-// once
-//   the robot has moved. A measurement beyond 3 sd reopens it, so that it also finds the gain of another fluid; that is
-//   a model_mismatch, as are surprises that go on.
+// - The model's gain may be off by ±20 %: all δ_i alike (sd `gain_error` · g_i); it is known within a few percent
+//   once the robot has moved. A measurement beyond 3 sd raises its variance again, so that the filter also finds the
+//   gain of another fluid; that is a model_mismatch, as are lasting surprises.
 // - A model that nobody has confirmed for this fluid may have another shape as well: each δ_i has an sd of its own,
-//   `section_error` · Σ g. The sections span 0.03 s to 15 s, so most of another fluid's shape is found while driving,
-//   and what is not known of it yet is in position_sd_m.
+//   `section_error` · Σ g. The sections span 0.03 s to 15 s, so driving finds most of another fluid's shape, and
+//   position_sd_m includes the part that is still unknown.
 // - With the motor off and v_m died down, (3) has a smaller floor: the zero-velocity update.
-// - Errors of (3) keep their sign for `correlation_s` and more. They are taken as white noise of the same area,
+// - Errors of (3) keep their sign for `correlation_s` and more. They are treated as white noise of the same area,
 //   variance · 2 correlation / interval.
-// - The sensor's clock is its own: a reading repeated or skipped costs up to a · 10 ms of velocity for good, a relative
-//   noise of each tick's change. Readings equal 25 times in a row are taken as missing.
-// - Motion under a duty below `doubtful_duty`, where the motor may stand still, is summed and counted in the standard
-//   deviation, without a change of the filter: a doubt in (3) would let the estimate wander in a closed loop.
-// - Velocity that pulsates unexplained for 3 s is a flow: it carries the robot by an unknown mean, with an sd 1.5 times
-//   the pulsation's rms, in v and d alike; δ starts afresh.
+// - The sensor has its own clock: a repeated or skipped reading changes the velocity by up to a · 10 ms for good, which
+//   is modelled as noise relative to each tick's change. 25 equal readings in a row count as missing.
+// - Motion under a duty below `doubtful_duty`, where the motor may stand still, is summed and added to the
+//   standard deviation. The filter itself does not change: more noise in (3) would let the estimate drift in a loop.
+// - An unexplained pulsation of the velocity over 3 s counts as a flow, which carries the robot by an unknown mean: its
+//   sd is 1.5 times the pulsation's rms, in v and d alike; δ starts again.
 // Cannot see: a steady drift with the fluid. With the motor off, 1 mm/s for 40 s is 40 mm, outside any position_sd_m.
 //             Nor a pulsating flow below 4 mm/s rms, 8 mm/s mean with the pump's profile.
 // Accuracy: ≤ 5 mm at 95 % 42 s after moves of 0.1 m, within 2 position_sd_m in ≥ 90 % of trials; the table is in
-//           docs/robot.md, held by estimator_study_test.cpp. In fluids that nobody told it: estimator_fluids_test.cpp.
+//           docs/robot.md, held by estimator_study_test.cpp. In other fluids than its model's:
+//           estimator_fluids_test.cpp.
 // Cost:     544 bytes; in instructions of the chip: docs/robot.md.
-// Errors:   a duty that is not finite counts as 0, a tick of a length outside (0, 0.1] s is passed over; if a state is
-//           not finite nevertheless, or rounding spoils the covariance, it starts anew: position_sd_m 10 m, and any
-//           velocity.
-// Differs from the paper: it names an algorithm that is not known to us; this one takes its place.
+// Errors:   a duty that is not finite counts as 0, a tick of a length outside (0, 0.1] s is ignored; if a state is
+//           still not finite, or rounding spoils the covariance, it restarts: position_sd_m 10 m, any velocity.
+// Differs from the paper: the algorithm that the paper names is not published; this one replaces it.
 #pragma once
 
 #include <array>
@@ -57,14 +56,14 @@ constexpr VelocityModel kFluidVelocityModel{{-0.0812087F, 0.175233F, 0.00547444F
 // (28) of the paper, exact.
 constexpr VelocityModel kWaterVelocityModel{{0.513615F, -0.165841F, 0, 0}, {0.0681359F, 0.0220005F, 1, 1}};
 
-// Standard deviations, where nothing else is said.
+// Standard deviations, unless noted.
 struct EstimatorParameters {
   VelocityModel model = kFluidVelocityModel;
   float dead_zone_duty = 0;              // below it the motor stands still
   float doubtful_duty = 0.05F;           // below it the motor may stand still
   bool is_confirmed = false;             // the model is that of the fluid that the robot swims in
   float gain_error = 0.2F;               // of all gains alike, relative, at the start
-  float section_error = 0.12F;           // of each gain by itself, relative to the steady gain, unless confirmed
+  float section_error = 0.12F;           // of each single gain, relative to the steady gain, unless confirmed
   float shape_error = 0.05F;             // of the model's velocity, relative to it, whatever its gain
   float driven_velocity_m_s = 0.0004F;   // of the model's velocity, whatever it is
   float resting_velocity_m_s = 0.0001F;  // the same with the motor off
@@ -83,19 +82,18 @@ struct EstimatorInputs {
 
 class Estimator {
  public:
-  // At position 0, at rest; `position_sd_m` is for one that may yet be coasting.
+  // Starts at position 0, at rest; pass `position_sd_m` when the robot may still be coasting.
   explicit Estimator(const EstimatorParameters& parameters, float position_sd_m = 0);
 
   void step(const EstimatorInputs& inputs);
-  // Position is 0 here, and known.
+  // Sets the position to 0, with variance 0.
   void zero_position();
   // From the next tick on; is_settled() must hold.
   void set_parameters(const EstimatorParameters& parameters);
 
   // The motor is off and the model's velocity has died down.
   bool at_rest() const;
-  // The same, or the motor has been off for 5 s in which the accelerometer felt nothing: whatever the parameters are,
-  // they can be changed then.
+  // As above, or the motor has been off and the accelerometer has read nothing for 5 s: any parameter may change then.
   bool is_settled() const { return at_rest() || still_s_ >= kSettledS; }
 
   float position_m() const { return position_m_; }
@@ -117,7 +115,7 @@ class Estimator {
   enum State : std::size_t { position, velocity, bias, drift, gain };  // gain: the first section's
   using Vector = std::array<float, kStates>;
 
-  // What happened since the covariance was last brought up to date.
+  // Since the last update of the covariance.
   struct Interval {
     int ticks = 0;
     float duration_s = 0;
@@ -143,13 +141,13 @@ class Estimator {
   void let_drift_die_down();
   void admit_drift();
   float measurement_variance() const;
-  bool compare_with_model();  // false: the covariance is none any more
+  bool compare_with_model();  // false: the covariance is no longer valid
   void correct(const Vector& gains, const Vector& ph, float variance, float innovation);
   void watch_model(float surprise);
   void guard(bool sound);
 
   EstimatorParameters parameters_;
-  std::array<float, kModelSections> section_share_{};   // of its way to go, that a section goes in a tick
+  std::array<float, kModelSections> section_share_{};   // share of its remaining way that a section goes in a tick
   std::array<float, kModelSections> section_{};         // of a section with gain 1
   std::array<float, kModelSections> section_change_{};  // of it, in this tick
   float tuned_dt_s_ = 0;
@@ -176,7 +174,7 @@ class Estimator {
   float flow_m_s_ = 0;
   bool drift_admitted_ = false;
   float surprise_ = 0;
-  float surprises_ = 0;    // over what is to be expected, summed
+  float surprises_ = 0;    // the excess over the expected value, summed
   int strange_gains_ = 0;  // measurements in a row
   bool mismatch_ = false;
 };

@@ -12,7 +12,7 @@ class EventRing {
  public:
   static constexpr std::size_t kCapacity = 16;
 
-  // Numbers the event and keeps it; the oldest one makes room and is counted as lost.
+  // Numbers the event and keeps it. A full ring drops its oldest event and counts it as lost.
   void push(const protocol::Event& event);
   // Forgets every event below `next_event_seq`; a number above next_seq() is ignored.
   void acknowledge(std::uint64_t next_event_seq);
@@ -21,7 +21,7 @@ class EventRing {
 
   std::uint64_t oldest_seq() const { return oldest_seq_; }
   std::uint64_t next_seq() const { return next_seq_; }
-  // The highest number that acknowledge() took.
+  // The highest number that was acknowledged.
   std::uint64_t acknowledged_next_seq() const { return acknowledged_next_seq_; }
   std::uint32_t lost() const { return lost_; }
 

@@ -1,4 +1,4 @@
-// What a tick reads from the hardware and what it gives back.
+// The inputs of a tick from the hardware, and its outputs.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct Inputs {
 
   std::int16_t acceleration_counts = 0;  // along the tube, gravity removed, 100 per m/s²
   bool acceleration_is_valid = false;    // a reading came since the last tick
-  // From a perfect sensor, in place of the estimate: the simulator has one, a robot leaves it empty.
+  // From a perfect sensor, in place of the estimate; only the simulator has one.
   std::optional<Motion> known_motion;
 
   float impedance_mv = 0;  // of the electrode; 0 when it could not be read

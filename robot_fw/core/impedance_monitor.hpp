@@ -1,7 +1,7 @@
-// Finds glucose by the impedance that it lowers, and says when it has mixed.
+// Detects glucose, which lowers the impedance, and reports when it has mixed.
 //
 //   glucose     5 readings in a row differ from the nominal one by more than `band_mv`
-//   mixed       50 readings in a row, taken where the robot is to hold, are within `exit_band_mv` of it
+//   mixed       50 readings in a row, taken at the position to hold, are within `exit_band_mv` of it
 //   armed again after a detection: 50 readings in a row within `band_mv`
 // Appendix B of the paper: 175 mV without glucose, 120 mV in it.
 #pragma once
@@ -16,8 +16,8 @@ struct ImpedanceRules {
 
 class ImpedanceMonitor {
  public:
-  // Once per tick. `usable`: the electrode's reading lies within its range; `in_place`: the robot is where it is to
-  // hold. True in the tick of a detection.
+  // Once per tick. `usable`: the electrode's reading lies within its range; `in_place`: the robot is at the position
+  // to hold. True in the tick of a detection.
   bool step(float impedance_mv, bool usable, bool in_place, const ImpedanceRules& rules);
   bool mixed() const;
   void arm() { armed_ = true; }

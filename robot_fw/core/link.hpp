@@ -1,4 +1,4 @@
-// The state of the link to the station: greeting, signs of life, loss.
+// The state of the link to the station: greeting, time of the last frame, loss.
 //
 // A link is not a connection. It is lost only by silence, and a new connection within the time-out carries it on.
 //   closed --opened--> greeting --welcome--> up --closed--> closed
@@ -17,7 +17,7 @@ class Link {
 
   void opened(std::uint64_t now_us);
   void closed() { phase_ = Phase::closed; }
-  // Takes over the station's time-outs, within bounds; the link is up from here on.
+  // Uses the station's time-outs, within bounds; the link is up from now on.
   void welcomed(const protocol::Welcome& welcome, std::uint32_t default_timeout_ms, std::uint64_t now_us);
   // Any frame of a link that is up. Returns the seconds without link when this restores a lost one.
   std::optional<float> heard(std::uint64_t now_us);
@@ -32,7 +32,7 @@ class Link {
   bool up() const { return phase_ == Phase::up; }
   bool lost() const { return lost_; }
   bool heartbeat_due(std::uint64_t now_us) const { return now_us >= sent_at_us_ + heartbeat_interval_us_; }
-  // Nothing came over this connection for the time-out: whoever owns it should close it and dial again.
+  // Nothing arrived over this connection for the time-out: its owner should close it and dial again.
   bool connection_is_silent(std::uint64_t now_us) const;
   std::uint32_t samples_per_frame(std::uint32_t preferred) const {
     return samples_per_frame_ == 0 ? preferred : samples_per_frame_;

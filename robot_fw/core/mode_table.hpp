@@ -1,7 +1,6 @@
 // Which command may run in which mode.
 //
-// The whole of it is one table in mode_table.cpp; docs/robot.md has it for readers, mode_table_test.cpp goes through
-// every row, state and event.
+// mode_table.cpp has the table, docs/robot.md describes it, and mode_table_test.cpp tests every row, state and event.
 #pragma once
 
 #include "protocol/messages.hpp"

@@ -1,7 +1,7 @@
-// Where the robot is and how fast: the estimate, or in its place what a perfect sensor says.
+// The robot's position and velocity: the estimate, or the readings of a perfect sensor.
 //
-// Ticks that never came are made up for as the motor has spent them: with its duty for 50 ms, then off, as a board
-// forces it off. The standard deviation goes in steps, so that it does not change in every batch: it is 1 to 2 times
+// Missed ticks are estimated as the motor spent them: with its duty for 50 ms, then off, as a board forces it off. The
+// standard deviation goes in steps, so that it does not change in every batch: it is 1 to 2 times
 // that of the estimator, and at least 0.1 mm.
 #pragma once
 
@@ -21,13 +21,13 @@ class MotionSense {
 
   // Once per tick: `duty` is what the motor had since the last one, `missed_s` the time since then beyond dt_s.
   void step(const Inputs& inputs, float duty, float dt_s, float missed_s);
-  // The position is 0 from here on. The motor is off.
+  // Sets the position to 0. The motor is off.
   void zero_position();
   // Takes effect in the next tick; is_settled() must hold.
   void set_parameters(const EstimatorParameters& parameters) { estimator_.set_parameters(parameters); }
 
   bool is_settled() const { return estimator_.is_settled(); }
-  // A fault that a reset has not ended: it stands until readings say otherwise.
+  // Restores a fault from before a reset: it holds until good readings end it.
   void distrust() { watch_.distrust(); }
 
   const Motion& motion() const { return motion_; }

@@ -1,8 +1,8 @@
-// What is sent next: the order of the messages and the place each of them has reached.
+// Decides what is sent next: the order of the messages, and how far each sequence has been sent.
 //
-// First to last: hello, acks of stops, acks, parameters and controller as asked for, events, live samples, status,
-// heartbeat, what is in force (after a Welcome), backfill. Backfill is what the station lacks from before this
-// connection or asks for again; it flows at no more than twice the rate of the live samples.
+// First to last: hello, acks of stops, acks, requested parameters and controller, events, live samples, status,
+// heartbeat, what is in force (after a Welcome), backfill. Backfill: samples from before this connection
+// that the station lacks, or that it requests again; at most twice the rate of the live samples.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ struct SampleRun {
   void extend(std::uint64_t from_seq, std::uint64_t to_seq);
 };
 
-// A page of the parameter table, as the answer to a command; of command 0 when nobody asked.
+// A page of the parameter table, as the answer to a command; command 0: sent without a request.
 struct PageRequest {
   static constexpr std::size_t kMost = sizeof(protocol::ParameterPage::parameters) / sizeof(rheonaut_Parameter);
 
@@ -43,15 +43,15 @@ class Outbox {
 
   // A new connection: hello first. Acks that were not sent stay due.
   void opened() { hello_due_ = true; }
-  // The station is there: what the rings hold by now is backfill, what follows is live.
+  // The station answers: samples in the rings are backfill, later ones are live.
   void welcomed(const TelemetryRing& samples, const EventRing& events);
   void resend(std::uint64_t first_seq, std::uint64_t end_seq) { backfill_.extend(first_seq, end_seq); }
   void resend_events(const EventRing& events) { event_next_ = events.oldest_seq(); }
 
-  // When the queue is full the oldest ack that does not answer a stop makes room, or, if all do, this one is not kept;
-  // the station then asks by repeating the command.
+  // A full queue drops its oldest ack that does not answer a stop. If all answer stops, this ack is dropped; the
+  // station then repeats the command.
   void ack(const protocol::CommandAck& ack);
-  // Ahead of every other ack, and already before Welcome. Always kept; if all answer stops, the oldest makes room.
+  // Ahead of every other ack, and already before Welcome. Always kept; a queue full of acks of stops drops its oldest.
   void ack_stop(const protocol::CommandAck& ack);
   // There must be room for it.
   void ask_page(const PageRequest& page) { pages_[page_count_++] = page; }
@@ -61,7 +61,7 @@ class Outbox {
   // Once per tick, after the sample was made; `urgent` sends it, and all before it, at once.
   void sample_made(const TelemetryRing& samples, bool urgent);
 
-  // The message due first; nothing changes until sent() confirms it.
+  // The first message that is due; nothing changes until sent() confirms it.
   Outgoing next(const Link& link, const TelemetryRing& samples, const EventRing& events,
                 std::uint32_t samples_per_frame, std::uint64_t now_us);
   // The message that next() named was written. `samples_in_frame` counts for telemetry.

@@ -1,7 +1,7 @@
-// The numbers of the firmware that a station may set: one table with name, unit, range and default.
+// The parameters of the firmware that a station may set: one table with name, unit, range and default.
 //
-// Each takes effect as its row says. Their checksum covers, in the order of the table, the characters of each name and
-// then its value as 4 bytes, little-endian: another table or another value is another checksum.
+// The checksum covers, in the order of the table, the characters of each name and then its value as 4 bytes,
+// little-endian: another table or another value gives another checksum.
 #pragma once
 
 #include <array>
@@ -69,7 +69,7 @@ class Parameters {
 
   static const ParameterSpec& spec(std::size_t index);
   static std::optional<std::size_t> find(const char* name);
-  // Finite, within the range of its row, and whole where that says so.
+  // Finite, within the range of its row, and a whole number where the row requires one.
   static bool in_range(std::size_t index, float value);
   // A gain or time constant of the estimator's model.
   static bool is_of_model(std::size_t index);

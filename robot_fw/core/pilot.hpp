@@ -1,6 +1,6 @@
-// What the robot has been told to do: manual with a duty, or auto with a setpoint.
+// What the robot is commanded to do: manual with a duty, or auto with a setpoint.
 //
-// Everything here dies with halt(): no setpoint, duty, lease, schedule or disturbance outlives a change of mode, an
+// halt() clears everything here: no setpoint, duty, lease, schedule or disturbance outlives a change of mode, an
 // emergency or a lost link.
 #pragma once
 
@@ -30,28 +30,28 @@ class Pilot {
   void set_schedule(const rheonaut_SetDutySchedule& schedule, std::uint64_t now_us);
   // Extends a duty or schedule that still runs; false when there is none.
   bool renew_lease(std::uint32_t lease_ms, std::uint64_t now_us);
-  // Whether the lease of a duty or schedule has run out, as tick() will say.
+  // Whether the lease of a duty or schedule has run out, as tick() will report.
   bool lease_lapses(std::uint64_t now_us) const { return lease_until_us_ != 0 && now_us >= lease_until_us_; }
 
   // In auto: holds `position_m` in place of the setpoint, for at most `limit_s`.
   void start_delivery(float position_m, float limit_s, std::uint64_t now_us);
-  // Goes on to the setpoint; says how long it was.
+  // Continues to the setpoint; returns how long it was held.
   float end_delivery(std::uint64_t now_us);
   // In auto: the link is gone, auto ends after `limit_s` unless it comes back.
   void outlive_link(float limit_s, std::uint64_t now_us);
   void link_restored() { alone_until_us_ = 0; }
 
-  // Once per tick, before the duty is asked for: says what has run out. A duty or schedule has ended by then; auto and
-  // deliveries are the caller's to end.
+  // Once per tick, before duty(): returns what has run out. A duty or schedule has ended by then; the caller ends auto
+  // and deliveries.
   Lapse tick(std::uint64_t now_us);
-  // Once per tick, in auto: whether the robot has come to its setpoint to stay, or has left it again.
+  // Once per tick, in auto: whether the robot has reached its setpoint and stays there, or has left it again.
   bool arrival_changed(float position_m);
 
   bool is_auto() const { return setpoint_m_.has_value(); }
   bool delivering() const { return delivery_m_.has_value(); }
   protocol::SubState sub_state() const;
   std::optional<float> setpoint_m() const { return setpoint_m_; }
-  // Where it is to be: the setpoint, or where it delivers.
+  // The position to hold: the setpoint, or where it delivers.
   std::optional<float> target_m() const { return delivery_m_ ? delivery_m_ : setpoint_m_; }
   float disturbance_m() const { return disturbance_m_; }
   float manual_duty() const { return manual_duty_; }

@@ -1,11 +1,11 @@
-// The way of the reference from where the robot is to the setpoint, with limited speed and acceleration.
+// Moves the reference from the robot's position to the setpoint with limited speed and acceleration.
 //
 //   v[k] = min(v[k-1] + a·T, v_max, v_stop(d)),   r[k] = r[k-1] + v[k]·T                      (1)
 //   v_stop(d) = a·T·(x/n + (n-1)/2),  x = d/(a·T²),  n = ⌈(√(1 + 8x) - 1)/2⌉              (2)
 //       from it, a·T less in each of n ticks, d is just enough
 //   d → distance left in m;  T → dt_s;  v_max, a → ProfileLimits
-// The first reference is the measured position, at speed 0. A limit of 0 is none; with neither the reference is the
-// setpoint from the first tick on.
+// The first reference is the measured position, at speed 0. A limit of 0 means no limit; without both limits the
+// reference is the setpoint from the first tick on.
 #pragma once
 
 namespace robot_fw {

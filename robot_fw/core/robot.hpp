@@ -4,8 +4,8 @@
 //               telemetry
 //   receive()   bytes from the station, at any time between ticks; an emergency stop acts in here
 //   transmit()  bytes to the station, at any time between ticks; never waits
-// The board (a simulated robot, an ESP8266) owns the clock, the connection and the motor pin. After every call it puts
-// duty() on the motor.
+// The board (a simulated robot, an ESP8266) owns the clock, the connection and the motor pin. After every call it
+// applies duty() to the motor.
 #pragma once
 
 #include "robot_fw/core/commands.hpp"

@@ -12,7 +12,7 @@ bool runs_when_latched(const protocol::Command& command) {
   return refusal_in(rheonaut_MODE_EMERGENCY, command.which_action) == rheonaut_REJECT_REASON_NONE;
 }
 
-// SAFETY: whoever stops the motor at once means what waits, too.
+// SAFETY: stopping the motor at once also drops the commands that wait.
 bool is_abort(const protocol::Command& command) {
   return command.which_action == rheonaut_Command_set_duty_tag && command.action.set_duty.duty == 0 &&
          !command.has_execute_at_robot_us;
@@ -64,7 +64,7 @@ void Robot::answer(std::uint64_t command_id, Verdict verdict) {
   if (verdict.accepted()) channel_.hurry();
 }
 
-// The ack went out when the command was taken in; a second one is only due when nothing came of it.
+// The command was acknowledged when it was admitted; a second ack is only due when it did not run.
 void Robot::run_timed_command(const protocol::Command& command) {
   const bool expired = now_us_ > command.valid_until_robot_us;  // SAFETY: a tick that came too late runs nothing stale
   const Verdict verdict = expired ? Verdict{rheonaut_COMMAND_RESULT_EXPIRED} : execute(command);
@@ -234,9 +234,9 @@ Verdict Robot::set_parameter(const rheonaut_SetParameter& order, std::uint64_t c
   // SAFETY: what shapes or limits motion stays as it is while the motor is on.
   if (Parameters::spec(*index).only_at_rest && motor_on()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
   const bool is_estimators = *index >= static_cast<std::size_t>(ParameterId::model_gain_1_m_s);
-  // SAFETY: an estimator that starts anew while the robot coasts would take it to stand, and be sure of that.
+  // SAFETY: an estimator restarted while the robot coasts would assume that it stands, with a small variance.
   if (is_estimators && !motion_sense_.is_settled()) return rejected(rheonaut_REJECT_REASON_MOTOR_ON);
-  // SAFETY: whoever changes the model says anew that it is the fluid's; one that is half of another is nobody's.
+  // SAFETY: changing a parameter of the model takes its confirmation back; a half-changed model fits no fluid.
   const bool takes_back = Parameters::is_of_model(*index) && settings_.parameters()[ParameterId::model_confirmed] == 1;
   if (!channel_.outbox().has_room_for_pages(takes_back ? 2 : 1)) return rejected(rheonaut_REJECT_REASON_BUSY);
   constexpr auto kConfirmed = static_cast<std::size_t>(ParameterId::model_confirmed);

@@ -1,6 +1,6 @@
-// What a station may set and a reset keeps: the parameters, the controllers, and which of them are not saved yet.
+// The settings that a station may change and a reset keeps: parameters and controllers, and which are not saved yet.
 //
-// When they may change, and what the station is told of it, is their owner's to say.
+// The owner decides when they may change, and reports changes to the station.
 #pragma once
 
 #include <cstdint>

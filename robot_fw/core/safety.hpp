@@ -1,6 +1,6 @@
-// The emergency latch, the position limits, the time at power, and the last word on the duty.
+// The emergency latch, the position limits, the time at power, and the final limit of the duty.
 //
-// Each stop gives the latch a new id, so that a clear, which names an id, can never undo a later stop.
+// Each stop gives the latch a new id. A clear names an id, so it can never reset a later stop.
 #pragma once
 
 #include <cstdint>

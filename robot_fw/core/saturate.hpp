@@ -1,4 +1,4 @@
-// The only way from float to integer in the core.
+// Converts float to integer with saturation; the core converts nowhere else.
 #pragma once
 
 #include <cstdint>

@@ -1,10 +1,10 @@
-// Whether a sensor can be believed: its readings come, change, and lie within its range.
+// Detects sensor faults: readings that are missing, do not change, or lie outside the range.
 //
 //   missing       no reading in `missing_ticks` ticks in a row
-//   stuck         `stuck_readings` in a row are equal; 0: not looked for
+//   stuck         `stuck_readings` in a row are equal; 0: not checked
 //   out_of_range  `wrong_readings` in a row lie outside [min, max]
-// A fault ends after 50 good readings in a row, and as many as it takes to see one that is stuck. A sensor that has
-// never given a reading is missing.
+// A fault ends after 50 good readings in a row, or `stuck_readings` if that is more. A sensor without any reading yet
+// is missing.
 #pragma once
 
 #include <cstdint>

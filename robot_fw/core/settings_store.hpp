@@ -1,10 +1,10 @@
-// Parameters and controller over a reset: what the board keeps, and in which form.
+// Parameters and controller as the board stores them over a reset.
 //
 //   parameters := value* checksum     each value of the table in its order, then Parameters::checksum(), which covers
-//                                     the names too: a table of another firmware does not match
+//                                     the names, too: it differs for the table of another firmware
 //   controller := RobotFrame crc      the message as on the wire, then the CRC-32 of its bytes
 //   numbers are 4 bytes, little-endian
-// What does not match is not there: the defaults stay.
+// Without a matching record the defaults stay.
 #pragma once
 
 #include <optional>

@@ -1,9 +1,8 @@
-// What is exchanged with the station: the link, the samples and events that it may still ask for, and the frame that is
-// due next.
+// The exchange with the station: the link, the samples and events that it may still request, and the next due frame.
 //
-//   in    push() until a frame is complete, frame() decodes it; what it means for the motor is its owner's to say
-//   out   next() names the frame that is due first, fill() fills those that this part knows, sent() confirms it
-// Samples and events are kept, in a link or without one, until a Welcome or heartbeat says that they are on disk.
+//   in    push() until a frame is complete, frame() decodes it; the owner acts on it
+//   out   next() names the first due frame, fill() fills the kinds that this part knows, sent() confirms it
+// Samples and events are kept, with or without a link, until a Welcome or heartbeat reports that they are on disk.
 #pragma once
 
 #include <array>

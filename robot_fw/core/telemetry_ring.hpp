@@ -1,8 +1,8 @@
 // The last 8 s of samples, kept until the station has them on disk.
 //
-// Samples hold only what changes in every tick. What changes rarely (mode, setpoint, time base...) is kept once, as a
-// segment with the first seq it applies to; a sample's time is its segment's first time plus whole periods. 21.6 kB;
-// on the ESP8266 7.7 kB of them lie outside, in memory that the board provides.
+// A sample holds only the values that change in every tick. Values that change rarely (mode, setpoint, time base...)
+// are stored once, as a segment with the first seq it applies to; a sample's time is its segment's first time plus
+// whole periods. 21.6 kB; on the ESP8266 7.7 kB of them lie outside, in memory that the board provides.
 #pragma once
 
 #include <array>

@@ -1,4 +1,5 @@
-// The chip's one analogue input: the electrode (DS550), and the supply where a switch leads it there once a second.
+// The chip's one analogue input: the electrode (DS550), and the supply voltage where a switch connects it once a
+// second.
 #pragma once
 
 #include <cstdint>

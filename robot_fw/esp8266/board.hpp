@@ -1,4 +1,4 @@
-// The robot on its board: ties the core to the clock, the sensors, the motor, the link and the flash.
+// The board support: connects the core to the clock, the sensors, the motor, the link and the flash.
 //
 // begin() once, then step() for ever. Owns everything; one instance, since the motor's interrupt has no owner, and in
 // static storage: it holds the core with its ring, 22 kB. 7.7 kB more of the ring lie in instruction RAM; where

@@ -1,9 +1,9 @@
-// What outlives a loss of power: parameters and controller, in two sectors of flash that take turns.
+// Stores parameters and controller over a loss of power, in two sectors of flash that are written in turn.
 //
 //   record := magic sequence parameters_size controller_size parameters controller crc
 // with words of 4 bytes, little-endian, values of 160 and 272, and the CRC-32 of all before it: 452 bytes.
-// The sector with the higher sequence counts. A write erases and fills the other one, so a cut of power in the middle
-// of it leaves the older record whole. save() keeps the value in RAM; write_pending() writes it, with the motor off.
+// The sector with the higher sequence is valid. A write erases and fills the other one, so a power cut during a write
+// leaves the older record intact. save() keeps the value in RAM; write_pending() writes it, with the motor off.
 // The two sectors are the first of the file system's area, which nothing else here uses.
 #pragma once
 

@@ -1,8 +1,8 @@
-// The emergency latch over a reset: in the memory of the chip's real-time clock, which a reset leaves alone.
+// Stores the emergency latch over a reset, in the memory of the chip's real-time clock.
 //
 //   record := magic emergency_id cause crc     20 bytes, from the 64th of its 128 words on
-// A loss of power ends it, so the CRC decides whether there is a record. One is always kept, latched or not: where it
-// is sound after a "power-on", the supply only dipped.
+// A loss of power erases it, so the CRC decides whether there is a record. A record is always kept, latched or not: a
+// valid one after a "power-on" shows that the supply only dipped.
 #pragma once
 
 #include <cstdint>

@@ -2,9 +2,9 @@
 //
 //   share = 0                                  for duty = 0
 //   share = dead_zone + (1 - dead_zone) |duty|  otherwise
-// One interrupt owns the pin: it raises it only while armed, and only a completed tick arms it, for just under 50 ms.
-// It is the chip's non-maskable one, so it runs while interrupts are off, while a crash is being printed and while
-// flash is written; it touches nothing but RAM and two registers.
+// One interrupt owns the pin. It raises the pin only while armed, and only a completed tick arms it, for just under
+// 50 ms. It is the chip's non-maskable interrupt, so it runs while interrupts are off, during a crash dump and while
+// flash is written; it uses only RAM and two registers.
 // One motor a program, since the interrupt has no owner.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Why the chip was reset, in the protocol's words.
+// The cause of the chip's reset, as an enumerator of the protocol.
 #pragma once
 
 #include <cstdint>

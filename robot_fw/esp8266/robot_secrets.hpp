@@ -1,4 +1,4 @@
-// The form of what secrets.example.hpp fills in.
+// The struct of the values in secrets.example.hpp.
 #pragma once
 
 #include <cstdint>

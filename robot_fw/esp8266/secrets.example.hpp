@@ -1,5 +1,5 @@
 // Who this robot is and whom it trusts. Copy to secrets.hpp, fill in, and keep that copy to yourself.
-// The key below is nobody's.
+// The key below is an example.
 #pragma once
 
 #include "robot_fw/esp8266/robot_secrets.hpp"

@@ -1,4 +1,4 @@
-// What is soldered to which pin, and how readings become numbers. The one file to change for another board.
+// The board's pins, and the conversion of readings to units. The only file to change for another board.
 #pragma once
 
 #include <cstdint>

@@ -47,7 +47,7 @@ void StationLink::begin() {
   WiFi.persistent(false);        // SAFETY: nothing of the network is ever written to flash
   WiFi.setAutoReconnect(false);  // SAFETY: joining again is ours to time
   WiFi.mode(WIFI_STA);
-  WiFi.setSleepMode(WIFI_NONE_SLEEP);  // a sleeping radio hears a stop 0.1 s late
+  WiFi.setSleepMode(WIFI_NONE_SLEEP);  // a sleeping radio receives a stop 0.1 s late
 }
 
 bool StationLink::step(bool at_rest, bool ring_has_room) {

@@ -1,12 +1,12 @@
-// The way to the station: Wi-Fi, then TCP and TLS, dialled again for ever.
+// The connection to the station: Wi-Fi, then TCP and TLS, dialled again for ever.
 //
 //   off --begin--> joining --joined--> ready --dialled--> open
 //   open --lost or closed--> ready; from any state, Wi-Fi gone --> off
-// What blocks (the handshake takes seconds, joining and closing may take 0.3 s) happens only when the caller says that
-// the robot is at rest; nothing else here waits. Without an answer, reaching the station ends after 2 s, the handshake
-// after 8 s. After a failure the next attempt waits 0.1 to 0.6 s, while the ring has room: what it holds is not lost
-// yet. With a full ring pauses grow to eight times as long. TLS 1.2 with the station's key pinned and records of at
-// most 512 bytes, both ways.
+// Blocking calls (the handshake takes seconds, joining and closing up to 0.3 s) are made only when the caller reports
+// that the robot is at rest; nothing else here waits. Without an answer, reaching the station ends after 2 s, the
+// handshake after 8 s. After a failure the next attempt waits 0.1 to 0.6 s, while the ring has room. With a full ring
+// pauses grow to eight times as long. TLS 1.2 with the station's key pinned and records of at most 512 bytes, both
+// ways.
 #pragma once
 
 #include "protocol/bytes.hpp"

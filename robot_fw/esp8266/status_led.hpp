@@ -1,4 +1,4 @@
-// The status LED: what the robot is about, told by its rhythm.
+// The status LED: its rhythm shows the robot's state.
 //
 //   connecting  1 s: half on, half off
 //   connected   2 s: one short flash

@@ -1,4 +1,4 @@
-// A recorded session: what went into a robot's core, call by call, as bytes.
+// A recorded session: the inputs of a robot's core, call by call, as bytes.
 //
 //   recording := record*
 //   record    := kind:u8 now_us:u64 body

@@ -1,4 +1,4 @@
-// Plays a recorded session to a core, and says line by line what came out of it; the same on host and chip.
+// Replays a recorded session on a core and prints its outputs line by line; the same on host and chip.
 //
 //   trace := line*
 //   line  := "tick " now_us " " checksum       the state of the floats after the tick, in hexadecimal

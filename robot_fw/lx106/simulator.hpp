@@ -1,4 +1,4 @@
-// What QEMU offers a program: files, a clock, an end.
+// QEMU's services for a program: files, a clock, exit.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// How deep the stack was, by the paint that is gone.
+// Measures the deepest use of the stack: paints it, and later finds the first overwritten byte.
 #pragma once
 
 #include <cstdint>

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::size_t kMaxQuoted = 40;
-constexpr const char* kDuty = "duty";  // the one column whose range its name tells
+constexpr const char* kDuty = "duty";  // the one column whose range is known
 
 std::string_view trimmed(std::string_view cell) {
   const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };

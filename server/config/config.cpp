@@ -223,7 +223,7 @@ void read(ConfigFile& file, Config& config) {
   file.refuse_unknown_keys();
 }
 
-// SAFETY: whoever can listen on the way could read the token and drive the robots.
+// SAFETY: anybody on the network path could read the token and drive the robots.
 void check_tls(const Config& config) {
   const TlsConfig& tls = config.tls;
   if (tls.certificate.empty() != tls.key.empty()) {

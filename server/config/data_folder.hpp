@@ -1,7 +1,7 @@
-// The folder of everything one station keeps: made when missing, locked against a second station, announced when ready.
+// The data folder of a station: created when missing, locked against a second station, announced when ready.
 //
 //   station.sqlite                   written by the recorder
-//   station.head.json                what the database held some seconds ago (recording/store_head)
+//   station.head.json                the database's state some seconds ago (storage/upkeep/store_head)
 //   rheonaut.token, .sessions        written by the API
 //   endpoints.json                   {"http":"127.0.0.1:8080","robots":"127.0.0.1:7070","pid":123}, while it runs; and
 //                                    "tls_certificate", the file to trust, when http is https
@@ -20,7 +20,7 @@
 
 namespace server {
 
-// Whoever holds it is the only program that writes into a data folder.
+// The lock on a data folder: only the program that holds it writes there.
 class FolderLock {
  public:
   // None when another program holds it. The folder is there. Throws std::runtime_error when it cannot be asked.

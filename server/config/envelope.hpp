@@ -1,4 +1,4 @@
-// The limits of commands: those that hold anywhere, and those in each fluid that a robot may be in. Pure.
+// The limits of commands: the general ones, and those for each fluid. Pure.
 //
 // The list of fluids is fixed when the station starts: two are built in, the configuration adds others and may give
 // each its own limits. Names are compared without case (of ASCII) and outer blanks; here they stand in lower case.

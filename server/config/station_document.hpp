@@ -1,4 +1,4 @@
-// The configuration that bears on what a robot does, as JSON: what a run keeps of its station.
+// The part of the configuration that affects robots, as JSON: each run stores it.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

@@ -2,7 +2,7 @@
 //
 //   router.add({"GET", "/api/v1/runs/{run_id}/gaps", Scope::read, {}, list_gaps});
 //
-// Whoever may not do what the route needs is refused with 403 before the route sees the request.
+// A caller without the route's scope gets 403 before the route sees the request.
 // A path is split at '/', then decoded; a segment with a hidden '/', a control character or ".." is refused with 400,
 // an unknown or repeated query parameter too. An unknown path under /api/ is 404, a known one with another method 405
 // with Allow. HEAD is answered as GET (the server leaves the body out). Every other path goes to the fallback.

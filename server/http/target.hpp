@@ -1,6 +1,6 @@
 // The target of a request: its text as it was sent, and its path and query, taken apart once.
 //
-// Whoever judges a request by its path uses path() or segments(), never the text.
+// Checks of the path use path() or segments(), never the text.
 #pragma once
 
 #include <optional>

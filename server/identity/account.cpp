@@ -62,7 +62,7 @@ Scopes Scopes::of(Role role) {
   return scopes;
 }
 
-// SAFETY: whoever may move a robot may stop it, whatever the token was given.
+// SAFETY: the scope command includes stop, even for a token without it.
 Scopes& Scopes::add(Scope scope) {
   bits_ |= bit(scope);
   if (scope == Scope::read || scope == Scope::stop) add(Scope::look);

@@ -26,9 +26,9 @@ enum class Scope : std::uint8_t {
   read,
   stop,
   record,   // and read
-  command,  // and read and stop: who may move a robot may stop it
+  command,  // and read and stop
   admin,    // everything
-  look,     // what whoever stops must see: read and stop bring it along, no token has it by name
+  look,     // what is shown to a caller who may stop: read and stop include it, no token has it by name
 };
 inline constexpr std::array kTokenScopes{Scope::read, Scope::stop, Scope::record, Scope::command, Scope::admin};
 

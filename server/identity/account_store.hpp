@@ -1,7 +1,7 @@
 // SQL of accounts: users, API tokens, sessions of pages, and the enrolment of robots.
 //
 // On the thread that owns the handle: a running station's disk thread, or a tool that holds the data folder's lock.
-// Each change is one transaction, with its entry in the audit. A Result's error is for whoever asked; SQLite's own
+// Each change is one transaction, with its entry in the audit. A Result's error goes to the caller; SQLite's own
 // failures are exceptions.
 #pragma once
 

@@ -71,9 +71,9 @@ class Accounts {
 
   boost::asio::awaitable<Result<std::vector<Enrolment>>> enrolments();
   boost::asio::awaitable<Result<NewEnrolment>> enrol(std::string robot_id, Author by);
-  // It is refused from now on; whoever calls ends its connection.
+  // The robot is refused from now on; the caller ends its connection.
   boost::asio::awaitable<Result<Enrolment>> revoke_robot(std::string robot_id, Author by);
-  // Only stored: whoever calls notifies the station, of a robot that is put into use before, of a retired one after.
+  // Only stores it. The caller notifies the station: before, when a robot returns to use; after, when it retires.
   boost::asio::awaitable<Result<Enrolment>> set_retired(std::string robot_id, bool retired, Author by);
 
  private:

@@ -10,7 +10,7 @@
 
 namespace server {
 
-// Of a credential, shared by whoever rests on it: ended when it is revoked, has run out, or its role has changed.
+// Whether a credential still holds, shared by its users: ends when it is revoked or expires, or its role changes.
 // Loop thread.
 class Standing {
  public:

@@ -1,4 +1,4 @@
-// Slows down whoever guesses passwords, by user and by address.
+// Delays repeated failed logins, by user and by address.
 //
 // After some failures each further attempt has to wait twice as long as the one before, up to a limit; a quarter of an
 // hour without attempts forgets them. For a user the wait is short, since a stranger can cause it; for an address it is
@@ -31,11 +31,11 @@ class LoginThrottle {
   explicit LoginThrottle(const Key& key = random_key()) : key_{key} {}  // a test knows its key
   static Key random_key();
 
-  // How long an attempt has to wait from now (steady) on; 0: it may be made.
+  // How long an attempt has to wait from `now_us` (steady); 0: not at all.
   microseconds wait(const std::string& user, const std::string& address, std::int64_t now_us) const;
 
-  // An attempt is made: a failure until on_success() takes it back. The user's failures are forgotten then, those of
-  // the address stay, since whoever has one account may be guessing another's.
+  // Counts an attempt as a failure until on_success(). That forgets the user's failures; those of the address stay,
+  // since the owner of one account may be guessing the password of another.
   void on_attempt(const std::string& user, const std::string& address, std::int64_t now_us);
   void on_success(const std::string& user, const std::string& address);
 

@@ -1,9 +1,9 @@
-// The acknowledgements that a robot may owe: never more than it can keep.
+// Limits the commands that a robot has not acknowledged, since it can keep 8 acknowledgements only.
 //
-// A robot keeps 8 acknowledgements that it could not send yet. Two places are for an emergency stop and its repetition,
-// which ask nobody and are not counted here. A command takes a place from when it is written until it is answered. One
-// that waits on the robot for its time may be answered twice, the second time when it is dropped, and all that wait are
-// dropped together: it takes two places, and after its first answer one until its time has passed. Pure.
+// Two places are reserved for an emergency stop and its repetition, which are not counted here. A command takes a place
+// from when it is written until it is answered. A timed command may be answered twice, the second time when the robot
+// drops it, and the robot drops all of them together: so it takes two places, and one from its first answer until its
+// time has passed. Pure.
 #pragma once
 
 #include <algorithm>

@@ -1,7 +1,6 @@
-// What of a robot's frame cannot be, though it decodes, and would harm those who compute with it.
+// Finds impossible values in a decoded frame of a robot, before anything computes with them.
 //
-// None of it ends the link: a robot sends again what is not acknowledged, so the same frame would end the next one,
-// too.
+// They do not end the link: a robot repeats what is not acknowledged, so the same frame would end the next link, too.
 #pragma once
 
 #include <cstdint>

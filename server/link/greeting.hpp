@@ -1,6 +1,6 @@
-// The greeting of a robot: what its Hello must say, and the Welcome that answers it.
+// The greeting of a robot: the check of its Hello, and the Welcome that answers it.
 //
-// Pure. Who may be connected is asked elsewhere: Station::may_connect, RobotArchive::admit.
+// Pure. Admission is decided elsewhere: Station::may_connect, RobotArchive::admit.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The port where robots dial in: each connection becomes a task of its own, behind its TLS handshake if there is one.
+// The listening port for robots: each connection becomes a task of its own, after its TLS handshake if there is one.
 //
 // A robot's connection is unauthenticated until its hello has been accepted. ConnectionLimiter says how many may be
 // connected and which of them is evicted; never that of a welcomed robot. A refused connection is closed at once. Loop

@@ -1,6 +1,6 @@
-// What is sent to one robot: the order of its frames, and the rest of a frame that the stream did not take at once.
+// The frames to be sent to one robot: their order, and the unsent rest of a frame.
 //
-// First to last: Welcome, emergency stops, commands, a heartbeat when it is due or asked for. Commands wait in a
+// First to last: Welcome, emergency stops, commands, a heartbeat when it is due or requested. Commands wait in a
 // bounded queue until the robot has a place for their answer (command_window.hpp), or until their validity has passed.
 // Times are steady µs. Pure, on the thread of its owner: no socket, no clock, no station.
 #pragma once

@@ -1,8 +1,8 @@
-// One connection of a robot: when it is read, written and given up, from the hello until the link is lost.
+// One connection of a robot, from the hello until the link is lost: decides when to read, write and close it.
 //
 //   Hello → (Station::may_connect, RobotArchive::admit) → Welcome → { reader ‖ writer ‖ watch }
 //
-// What the greeting says stands in greeting.hpp, what is sent next in robot_outbox.hpp. Loop thread. Owns its stream;
+// greeting.hpp has the greeting, robot_outbox.hpp decides what is sent next. Loop thread. Owns its stream;
 // lives in the coroutine RobotListener::session and is the Station's RobotPort while it is welcome.
 #pragma once
 

@@ -57,7 +57,7 @@ json list(const Values& values) {
 }
 }  // namespace
 
-// While nobody listens nothing is kept up; whoever comes gets the state of the station first.
+// Without browsers nothing is collected; a new one gets the state of the station first.
 void LiveFeed::add(Subscriber& subscriber) {
   if (!is_heard()) {
     robots_.clear();

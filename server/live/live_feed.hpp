@@ -1,7 +1,7 @@
-// What happens now, for everyone who watches: a sink of the station that writes each message once and queues the same
-// text for every subscriber.
+// The live messages for browsers: a sink of the station that writes each message once and queues the same text for
+// every subscriber.
 //
-// Loop thread. Outlives its subscribers. Never waits for anyone: a subscriber's queue is bounded.
+// Loop thread. Outlives its subscribers. Never waits for a subscriber: queues are bounded.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -21,8 +21,8 @@
 
 namespace server {
 
-// Whoever watches a robot gets its changes at once, but for small changes of its state (with the next stamp)
-// and samples (50 ms of them at a time). Whoever said what it watches gets the rest with the next stamp only: the
+// A page gets the changes of the robots that it watches at once, except small changes of state (with the next stamp)
+// and samples (50 ms of them at a time). A page that has named its robots gets the rest with the next stamp only: the
 // large changes of the other robots, and one `log` of all events and commands. So a page costs the same few messages a
 // second however many robots there are. A lease that was renewed, some ten times a second, is not published.
 class LiveFeed final : public StationSink {

@@ -1,11 +1,10 @@
-// The states of all robots as JSON text, for whoever reads them all: in pieces, so that the loop never stands still for
-// a page that opens in front of thousands of robots.
+// The states of all robots as JSON text, made in pieces, so that a page of thousands of robots never blocks the loop.
 //
-// The text of a robot is kept, and written again only when its state differs from the one that was written: robots that
-// are away, most of those that a station has seen in years, cost a comparison. Nothing is written that nobody reads. A
-// piece is a bounded piece of work, and each turn of the loop makes one, however many readers there are.
+// The text of a robot is kept, and written again only when its state has changed: an absent robot costs a comparison.
+// Without readers nothing is written. A piece is a bounded amount of work, and each turn of the loop makes one, however
+// many readers there are.
 //
-// Loop thread. The station outlives it; it outlives those who read. Why so: decision 0035.
+// Loop thread. The station outlives it; it outlives its readers. Why so: decision 0035.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -1,4 +1,4 @@
-// The queue of one who watches: what it has not read yet, bounded however slow it is.
+// The queue of one subscriber: its unread messages, bounded however slowly it reads.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -68,7 +68,7 @@ std::expected<std::unique_ptr<ConnectionSlot>, ConnectionLimiter::Refusal> Conne
   return std::make_unique<ConnectionSlot>(*this, network);
 }
 
-// Of this address, or of whoever has most unauthenticated.
+// Evicts one of this address, or (null) of the address with most unauthenticated connections.
 bool ConnectionLimiter::make_room(const std::string* address) {
   if (slots_[ConnectionSlot::leaving].size() >= kMaxLeaving) return false;
   ConnectionSlot* slot = first_of(ConnectionSlot::unauthenticated, address);

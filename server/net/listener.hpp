@@ -1,4 +1,4 @@
-// A listening TCP port that hands each connection on, and survives what accept() may throw at it.
+// A listening TCP port that passes each connection on and continues after errors of accept().
 //
 // Loop thread. Outlives its run(). Uses the clock to pause when the process is out of file descriptors.
 #pragma once

@@ -1,11 +1,11 @@
-// Many sockets behind one descriptor of the loop: an epoll of their own, so that a fleet that talks wakes the loop 500
-// times a second at most, and takes a few microseconds of it at a time.
+// Many sockets behind one descriptor of the loop: an epoll of their own, so that a sending fleet wakes the loop at most
+// 500 times a second, for a few microseconds each.
 //
 //   sockets ─┬─ epoll of all ────────── polled every 2 ms ──────────── a few sockets, then the loop's other work
 //            └─ epoll of the awaited ── polled when one is ready ────── likewise
 //
-// The second is for sockets from which an answer is expected, and those to which somebody waits to write. When hardly
-// any robot sends, the first is polled when a socket is ready, too. Loop thread. After the set is
+// The second is for sockets from which an answer is expected, and those with a waiting writer. When hardly any robot
+// sends, the first is polled when a socket is ready, too. Loop thread. After the set is
 // destroyed no wait on its sockets ends.
 #pragma once
 
@@ -33,7 +33,7 @@ class PollSet {
   static constexpr int kQuietRounds = 5;  // rounds with one ready at most, until the loop is woken instead
 
   PollSet(boost::asio::io_context& loop, Clock& clock);
-  ~PollSet();  // whoever still waits is let go by the loop
+  ~PollSet();  // the loop resumes those that still wait
   PollSet(const PollSet&) = delete;
   PollSet& operator=(const PollSet&) = delete;
 

@@ -1,4 +1,4 @@
-// What a connection passes before its port talks to it: the limits of connections, and the TLS handshake.
+// The steps before a port serves a connection: the limits of connections, and the TLS handshake.
 #pragma once
 
 #include "server/net/connection_limiter.hpp"

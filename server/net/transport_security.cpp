@@ -126,7 +126,7 @@ void TransportSecurity::take(Look look) {
 
 void TransportSecurity::remind() {
   const std::int64_t now_us = clock_.steady_us();
-  if (is_exposed() && now_us >= next_exposed_us_) {  // SAFETY: whoever runs this must not be able to overlook it
+  if (is_exposed() && now_us >= next_exposed_us_) {  // SAFETY: the operator must not be able to overlook it
     next_exposed_us_ = now_us + kExposedReminder.count();
     spdlog::error(
         "INSECURE: {} speaks plain TCP beyond this machine (tls.insecure = true): everyone on the way can read the "

@@ -1,10 +1,10 @@
-// What protects the two ports: how many may be connected, which of them speaks TLS, with which certificate, and what
-// people must be warned of.
+// The protection of the two ports: limits of connections, which of them uses TLS, with which certificate, and warnings
+// in the log.
 //
-// The certificate's files are looked at every two seconds. Once they have changed and then stood still for one look,
-// new connections get them; files that cannot be used are an error in the log, and the old ones stay in force. A
-// certificate that ends within 30 days is named in the log once a day, and a port that anybody on the way can read or
-// change once an hour. Loop thread; owns the worker that computes handshakes.
+// The certificate's files are checked every two seconds. Changed files that are the same at the next check are used for
+// new connections; unusable files are an error in the log, and the old ones stay in force. The log warns once a day of
+// a certificate that ends within 30 days, and once an hour of a port that anybody on the network can read or change.
+// Loop thread; owns the worker that computes handshakes.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

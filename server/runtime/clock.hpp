@@ -1,4 +1,4 @@
-// Where all of the station's time comes from: steady time, UTC and the only timer, from one injected object.
+// The station's clock: steady time, UTC and the only timer, in one injected object.
 //
 // Nothing else in server/ reads a clock or sets a timer, so a test can run the whole station in virtual time. A Clock
 // lives on the loop's thread and outlives every coroutine that waits on it.

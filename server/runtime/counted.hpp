@@ -1,4 +1,4 @@
-// Counts itself while it lives: how many coroutines are inside some piece of work.
+// Counts its own instances: how many coroutines are inside some piece of work.
 #pragma once
 
 namespace server {

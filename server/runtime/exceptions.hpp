@@ -1,8 +1,8 @@
-// Exceptions that end something smaller than the station: logged with their text and what they ended, and counted.
+// Logs and counts exceptions that end something smaller than the station.
 //
-// A robot's session, a connection, a request, a page and the sending of a model end alone by what they throw. A cause
-// may lie outside and come again as often as somebody likes, so the log has one line a second of each name and text,
-// and at most kMostNames of them in a second; then one a second of all others of the kind. The counts are in /metrics.
+// An exception ends only the robot's session, connection, request, page or sending of a model that threw it. A client
+// may cause it as often as it likes, so the log has one line a second for each name and text, at most kMostNames of
+// them in a second, and one a second for all others of the kind. The counts are in /metrics.
 // Loop thread.
 #pragma once
 

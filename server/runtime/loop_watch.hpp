@@ -1,10 +1,10 @@
-// Knows when the loop has stood still: then what it reads first has waited meanwhile.
+// Detects that the loop was halted: the bytes that it reads first have then waited meanwhile.
 //
 //   turn, turn, … , rest, (waits) turn, … , rest, (halted) turn: what is read now may be as old as the turn before it
 //
-// A program that is halted, a machine that is suspended or has no time for it: the loop cannot know which, but it sees
-// the gap between two of its turns. All that lay in its sockets meanwhile is read before it rests again. Times are
-// steady, which goes on in a suspend (server/runtime/clock.hpp). Kept by who runs the loop. Loop thread.
+// The process may be halted, or the machine suspended or overloaded: the loop cannot know which, but it measures the
+// gap between two of its turns. All bytes that arrived meanwhile are read before it rests again. Times are steady and
+// go on in a suspend (server/runtime/clock.hpp). Owned by the code that runs the loop. Loop thread.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// Files that hold secrets: whole or not there, and readable by their owner only.
+// Files that hold secrets: written completely or not at all, and readable by their owner only.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
-// The order in which the system runs the station's threads on a machine that is full: the loop, then the thread that
-// writes what the loop receives, then everybody else.
+// Priorities of the station's threads on a busy machine: the loop first, then the thread that writes what the loop
+// receives, then all others.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

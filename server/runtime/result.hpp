@@ -1,4 +1,4 @@
-// How expected failures travel in the station: as a value with a code and a sentence.
+// Expected failures in the station as values: a code and a sentence.
 #pragma once
 
 #include <cstdint>

@@ -1,8 +1,8 @@
-// The station's secrets: how they are made, what is kept of them, and how they are compared.
+// The station's secrets: making, hashing and comparing them.
 //
-// A secret is 256 random bits as base64url; of one that nobody can guess a plain hash (BLAKE2b-256) is kept. A password
-// can be guessed, so of it Argon2id is kept. What is compared is compared in constant time. Any thread; nothing here
-// throws but for want of random numbers or memory (std::runtime_error).
+// A secret is 256 random bits as base64url; it cannot be guessed, so a plain hash (BLAKE2b-256) is stored. A password
+// can be guessed, so its Argon2id hash is stored. Comparisons take constant time. Any thread; throws only when random
+// numbers or memory are missing (std::runtime_error).
 #pragma once
 
 #include <array>

@@ -1,8 +1,7 @@
-// Whose turn it is, of many who have work of the same kind: of the pages to which something is to be written. A few
-// between two looks at all sockets.
+// Schedules coroutines with work of the same kind (writing to pages): a few run between two polls of all sockets.
 //
-// Without it the loop would work off all of them, often for milliseconds, before it looks at the request of a person,
-// and again at each further step of that request. Loop thread; outlives those who wait.
+// Without it the loop would serve all pages, often for milliseconds, before it reads a person's request, and again at
+// each further step of that request. Loop thread; outlives the waiting coroutines.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -1,4 +1,4 @@
-// A thread for blocking work: a job goes in as a value and its result comes back to the loop as a value.
+// A thread for blocking work: jobs and their results are passed as values.
 //
 //   auto job = [path] { return count_rows(path); };   // named, owns copies of all it uses
 //   const int rows = co_await disk.run(std::move(job));

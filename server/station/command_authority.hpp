@@ -1,6 +1,6 @@
-// Decides who may command which robot, by the leases of Authority and by how old a picture the request was made from.
+// Decides who may command which robot, by the leases of Authority and by the age of the state that the request saw.
 //
-// Nothing here is ever asked about an emergency stop. It publishes nothing: a change is returned. Loop thread.
+// Emergency stops are never checked here. Publishes nothing: changes are returned. Loop thread.
 #pragma once
 
 #include <optional>
@@ -27,12 +27,12 @@ class CommandAuthority {
   Result<void> may_command(const CommandRequest& request) const;
   // conflict when what its page saw was too old for what the command would do.
   Result<void> check_sight(const CommandRequest& request) const;
-  // A command has been sent: whoever commands a robot that nobody controls takes control. The change, if there is one.
+  // A command has been sent: commanding a robot that nobody controls takes control. Returns the change, if any.
   std::optional<Authority::Change> on_commanded(const CommandRequest& request);
 
   // What a request for control changes, if anything.
   Result<std::optional<Authority::Change>> change(const ControlRequest& request);
-  // A sign of life of an actor.
+  // The actor is still there.
   void keep(const std::string& actor, microseconds age);
   std::vector<Authority::Change> expire() { return authority_.expire(); }
 

@@ -84,7 +84,7 @@ void CommandTracker::on_sent(RobotEntry& entry, CommandId id) {
   record.sent_at_us = clock_.utc_us();
   record.sent_after_us = clock_.steady_us() - pending->received_us;
   if (pending->is_timed) stop_times_.sent.add(record.sent_after_us);
-  // SAFETY: while stops are being handed to the link nothing is recorded; whoever hands them publishes it afterwards.
+  // SAFETY: while stops are being handed to the link nothing is recorded; their sender publishes them afterwards.
   if (entry.commands.sent_with_stop != nullptr) return entry.commands.sent_with_stop->push_back(record);
   notifier_.publish(record);
 }

@@ -1,7 +1,7 @@
 // Follows each command from its submission to its end: sent, answered, seen in telemetry, read back, expired.
 //
-// Every change of a record is published at once; whoever waits for a command is woken. Emergency stops are followed
-// like other commands once a robot has acknowledged them; until then EmergencyStops decides. Loop thread.
+// Every change of a record is published at once, and coroutines that wait for a command are resumed. EmergencyStops
+// follows an emergency stop until a robot has acknowledged it; then it is followed here as well. Loop thread.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -1,7 +1,7 @@
-// Hands emergency stops to robots: ahead of everything, kept until a robot has obeyed, repeated while it has not.
+// Sends emergency stops to robots: ahead of everything, kept until the robot has obeyed, repeated while it has not.
 //
-// It publishes nothing. What is to be published of a stop is appended to the caller's list, so that the frames of all
-// robots can leave before anything is recorded. Loop thread.
+// Publishes nothing: records are appended to the caller's list, so that the frames of all robots can be sent before
+// anything is recorded. Loop thread.
 #pragma once
 
 #include <boost/asio/io_context.hpp>

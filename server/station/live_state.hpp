@@ -1,4 +1,4 @@
-// How a robot's live state follows what the robot sends: its hello, its samples, its events.
+// Updates a robot's live state from the messages of the robot: its hello, samples and events.
 #pragma once
 
 #include <cstdint>

@@ -6,8 +6,8 @@
 //     → confirmed, when the robot's telemetry shows it
 //   a fluid without a model, or none: → model_confirmed = 0, unless the robot's model is only assumed
 //
-// Each command goes through Station::submit on behalf of whoever named the fluid. A robot takes parameters at rest
-// only, so a robot that moves is waited for, for kPatience. What could not be done stands in RobotState::model and an
+// Each command goes through Station::submit on behalf of the actor that named the fluid. A robot takes parameters at
+// rest only, so a moving robot is waited for, for kPatience. What could not be done stands in RobotState::model and an
 // event.
 //
 // SAFETY: a confirmation that is not this fluid's is owed to be taken back, however long that takes: after kPatience it

@@ -1,7 +1,7 @@
-// What one robot has reported of itself and what is to be recorded of it: its parameters, its controller, its clock.
+// The parameters, the controller and the clock that one robot has reported, and their changes to record.
 //
-// A robot reports parameters and controller after each Welcome, and what has changed after each change. Nothing here is
-// published: each function returns what is to be. Loop thread.
+// A robot reports parameters and controller after each Welcome, and each change of them. Publishes nothing: each
+// function returns what the caller publishes. Loop thread.
 #pragma once
 
 #include <cstdint>

@@ -78,10 +78,10 @@ void take_control(StationParts& parts, const CommandRequest& request, PendingCom
 // Checks the request and gives it to the link. An error: nothing was sent. What came too late has ended already.
 Result<std::shared_ptr<PendingCommand>> send_command(StationParts& parts, RobotEntry& entry,
                                                      const CommandRequest& request) {
-  // SAFETY: whoever is not in control moves nothing, page, script or experiment.
+  // SAFETY: only the holder of control moves the robot, be it a page, a script or an experiment.
   if (auto held = parts.control.may_command(request); !held) return std::unexpected{held.error()};
-  // SAFETY: what waits on the robot for whoever was in control before is dropped ahead of this command, or it is not
-  // sent.
+  // SAFETY: timed commands of the former holder of control are dropped from the robot before this command is sent, or
+  // it is not sent.
   const bool is_clear = !needs_control(request.action) || parts.drop_outdated(entry);
   auto pending = make_pending(parts.loop, parts.clock, request, entry.robot);
   const auto checked = check_request(request, pending->wire, entry, parts.envelope);

@@ -1,6 +1,6 @@
-// Hands everything that happens to the sinks: the recorder, the live feed, the runs.
+// Notifies the sinks of everything that happens: the recorder, the live feed, the runs.
 //
-// Sinks are called in the order in which they were added, and outlive this. What one throws reaches the caller.
+// Sinks are called in the order in which they were added, and outlive this. Their exceptions reach the caller.
 #pragma once
 
 #include <cstdint>

@@ -3,8 +3,8 @@
 //   robot sessions → Station → sinks (recorder, live feed, runs)
 //   people and scripts → Station::submit → robot session
 //
-// What is behind it are parts with one job each, in station_parts.hpp. Loop thread only. Outlives the sessions and
-// everything that submits; sinks and the archive outlive it.
+// It consists of parts with one job each, in station_parts.hpp. Loop thread only. Outlives the sessions and everything
+// that submits; sinks and the archive outlive it.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -1,4 +1,4 @@
-// What the station is made of: the parts behind Station, each with its job, and what they share.
+// The parts behind Station, each with one job, and the state that they share.
 //
 // Private to the Station's own files. A part declared later may use those before it.
 #pragma once
@@ -26,7 +26,7 @@ struct StationParts {
       : loop{its_loop}, clock{its_clock}, envelope{std::move(limits)}, times{link_times} {}
 
   const CommandLimits& limits_of(const RobotState& robot) const { return envelope.in(robot.fluid); }
-  // SAFETY: what waits for whoever was in control before is dropped ahead of what comes next; false: it must not come.
+  // SAFETY: timed commands of the former holder of control are dropped before the next command; false: do not send it.
   bool drop_outdated(RobotEntry& entry) { return timed.drop_outdated(entry, control.of(entry.robot.id).holder); }
 
   // A change of control has been decided: what it ends is dropped, and everybody is notified.

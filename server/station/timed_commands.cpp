@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint64_t kDueGraceUs = 200'000;  // after its time a timed command has run or is dropped
 
-// Nobody loses by it that it still comes, whoever is in control, and someone may by its absence.
+// A command that only ends motion may still run after control has changed: dropping it could do harm, running it not.
 bool only_ends_motion(const protocol::Command& command) {
   if (command.which_action == rheonaut_Command_set_mode_tag) {
     return command.action.set_mode.mode == rheonaut_MODE_MANUAL;

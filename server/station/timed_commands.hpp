@@ -1,7 +1,7 @@
-// Takes back what may no longer be done: commands that wait for the link, and those that wait on the robot for their
+// Drops commands that may no longer run: those that wait for the link, and those that wait on the robot for their
 // time.
 //
-// SAFETY: nothing that waits on the robot outlives the control of whoever sent it, nor the limits that it was held to.
+// SAFETY: no timed command outlives its sender's control, nor the limits that it was checked against.
 // Loop thread.
 #pragma once
 

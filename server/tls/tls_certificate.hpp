@@ -1,4 +1,4 @@
-// What a certificate for TLS says: whom it names, until when, and the key that clients may pin.
+// The contents of a TLS certificate: names, expiry, and the key that clients may pin.
 #pragma once
 
 #include <cstdint>

@@ -1,10 +1,9 @@
-// Leads connections through their TLS handshake, and knows what became of them.
+// Performs the TLS handshakes of connections and counts their results.
 //
 // The public-key arithmetic runs on a worker, one step of one handshake at a time in order of arrival, so that the loop
-// is never held up: neither by a thousand robots that come back at once nor by an RSA key. A client that is silent, or
-// silent in between, holds nobody else's turn. Each handshake has 10 s. How many may wait is bounded by what each port
-// bounds: its connections. A failure is logged, at most one line a second, and ends that connection only.
-// Loop thread. Outlives the handshakes.
+// is never blocked: neither by a thousand robots that reconnect at once nor by an RSA key. A silent client does not
+// delay others. Each handshake has 10 s. The limits of connections of each port also bound the waiting handshakes. A
+// failure is logged, at most one line a second, and ends that connection only. Loop thread. Outlives the handshakes.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -1,4 +1,4 @@
-// Prints what the station has heard of the robot, boot by boot.
+// Prints what the station has received from the robot, boot by boot.
 #include "sim_robot/cli/play_command.hpp"
 
 #include <CLI/CLI.hpp>

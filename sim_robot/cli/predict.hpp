@@ -1,4 +1,4 @@
-// What the paper's closed-loop experiment gives, computed in virtual time, as a table or as JSON.
+// The result of the paper's closed-loop experiment in virtual time, as a table or as JSON.
 #pragma once
 
 #include <string>

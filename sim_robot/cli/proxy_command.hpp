@@ -14,7 +14,7 @@ class ProxyCommand {
   explicit ProxyCommand(CLI::App& app);  // adds the subcommand
 
   bool chosen() const { return command_->parsed(); }
-  // Until SIGINT or SIGTERM; returns the exit status. Throws what is wrong with the arguments or the port.
+  // Until SIGINT or SIGTERM; returns the exit status. Throws for wrong arguments or a taken port.
   int run() const;
 
  private:

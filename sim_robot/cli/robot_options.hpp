@@ -1,4 +1,4 @@
-// The flags of rheonaut-sim that choose a scenario and change what it says.
+// The flags of rheonaut-sim that choose a scenario and override its keys.
 #pragma once
 
 #include <optional>
@@ -22,7 +22,7 @@ void add_duty(CLI::App& app, RobotOptions& options);
 // Everything but --scenario.
 void add_robot(CLI::App& app, RobotOptions& options);
 
-// The scenario with the flags put in, checked; the boot id is a random one unless it was given. Throws
+// The scenario with the flags applied, checked; the boot id is random unless it was given. Throws
 // std::invalid_argument.
 Scenario scenario_of(const RobotOptions& options);
 

@@ -13,8 +13,8 @@ class RunCommand {
  public:
   explicit RunCommand(CLI::App& app);  // adds its flags to the program itself
 
-  // Until SIGINT or SIGTERM, or the end of the duration; returns the exit status. Throws what is wrong with the
-  // arguments or the port.
+  // Until SIGINT or SIGTERM, or the end of the duration; returns the exit status. Throws for wrong
+  // arguments or a taken port.
   int run() const;
 
  private:

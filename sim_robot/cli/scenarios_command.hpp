@@ -1,4 +1,4 @@
-// `rheonaut-sim scenarios`: those that come with the program.
+// `rheonaut-sim scenarios`: lists the built-in scenarios.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// The flags of rheonaut-sim that say which station to trust.
+// The flags of rheonaut-sim that choose the trusted station.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// The flags of rheonaut-sim that say what world the robot is in.
+// The flags of rheonaut-sim that set the robot's world.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ class App;
 
 namespace sim_robot {
 
-// What was given; the rest is as it was.
+// Flags that were given; the others change nothing.
 struct WorldOptions {
   std::optional<std::string> fluid;
   std::optional<std::string> model_file;  // in place of the fluid
@@ -25,7 +25,7 @@ struct WorldOptions {
 void add_fluid(CLI::App& app, WorldOptions& options);
 void add_surroundings(CLI::App& app, WorldOptions& options);
 
-// Puts what was given into the world. Reads the model's file; throws std::invalid_argument.
+// Applies the given flags to the world. Reads the model's file; throws std::invalid_argument.
 void put(const WorldOptions& options, WorldConfig& world);
 
 }  // namespace sim_robot

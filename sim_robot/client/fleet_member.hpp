@@ -1,4 +1,4 @@
-// What a fleet knows of each of its robots: when it has its turn, and what became of its samples.
+// What a fleet needs of each robot: its turn, and the counts of its samples.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -33,11 +33,11 @@ class FleetMember {
 
   // Robot time 0 is at `at`, which is not later than now.
   virtual void boot(Clock::time_point at) = 0;
-  // Makes the samples that are due, and gives up a connection that is silent. True when there is something to send.
+  // Makes the samples that are due, and closes a silent connection. True when there is something to send.
   virtual bool tick() = 0;
-  // Asks for the memory of the next tick ahead of it.
+  // Prefetches the memory of the next tick.
   virtual void prefetch() const {}
-  // Sends what can be sent without waiting.
+  // Sends without waiting.
   virtual void send() = 0;
   virtual Clock::time_point next_tick_at() const = 0;
   // Never returns but by cancellation.

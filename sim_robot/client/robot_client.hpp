@@ -3,8 +3,8 @@
 // True time is the host's steady clock since the robot booted first, on time or late, in a tick or between two. Ticks
 // are due at multiples of the period; late ones run before any byte is handed to the robot, so its time never goes
 // back. After a stall (the process was stopped, the machine busy) the missed ones are skipped and counted. A tick never
-// waits for the network: see station_connection.hpp. A reboot leaves the connection without an end, and resets it when
-// the robot is back. With a handshake, as TLS on the robot's board, it dials only at rest, and nothing ticks until the
+// waits for the network: see station_connection.hpp. A reboot leaves the connection open, and resets it when the robot
+// is back. With a handshake, as TLS on the robot's board, the robot dials only at rest, and no tick runs until the
 // handshake is over.
 // Faults of the link need a proxy between it and the station: `link`, whose address is given as the station's, and
 // which must outlive the client. Null: there is none. A robot whose loop is blocked neither reads nor writes. Owns
@@ -33,12 +33,12 @@ class RobotClient final : public FleetMember, private Speaker {
   // Boots now, ticks and connects until cancelled. Never returns otherwise.
   boost::asio::awaitable<void> run();
 
-  // The parts of run(), for who has many robots.
+  // The parts of run(), for a fleet.
   void boot(Clock::time_point at) override { booted_at_ = at; }
   bool tick() override;
   void prefetch() const override { robot().prefetch(); }
   void send() override { connection_.flush(); }
-  // A robot without power or with a blocked loop is looked after as often as any: a fault may be due, or end.
+  // A robot without power or with a blocked loop is polled as often as any: a fault may be due, or end.
   Clock::time_point next_tick_at() const override;
   boost::asio::awaitable<void> stay_connected() override { return connection_.run(); }
 
@@ -47,7 +47,7 @@ class RobotClient final : public FleetMember, private Speaker {
   SampleCounts samples() const override;
   const StationConnection& connection() const override { return connection_; }
   const SimulatedRobot& robot() const { return life_.robot(); }
-  // For who injects faults while it runs, on the same thread.
+  // For injecting faults while it runs, on the same thread.
   SimulatedRobot& robot() { return life_.robot(); }
   FaultTimeline& faults() { return faults_; }
   FaultyRobot faulty() { return {life_, link_}; }

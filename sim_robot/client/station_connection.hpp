@@ -1,9 +1,9 @@
 // The robot's end of a connection to a station, TCP or TLS: dials for ever, reads as bytes arrive, writes without
 // waiting.
 //
-// What speaks over it is a Speaker: a simulated robot, or a recording that is replayed. What the socket does not take
-// at once of a frame stays here, the speaker is asked for no other until it is gone. When it is dialled again after a
-// failure: see redial.hpp.
+// A Speaker speaks over it: a simulated robot, or a recording that is replayed. The part of a frame that the socket
+// does not take at once stays here, and the speaker is asked for the next frame once it is sent. redial.hpp decides
+// when to dial again after a failure.
 // One buffer serves the reads of all connections of a thread. The loop and the speaker must outlive the connection.
 #pragma once
 
@@ -26,7 +26,7 @@
 
 namespace sim_robot {
 
-// What people are told about the link, one line each.
+// Log lines about the link.
 using LinkLog = std::function<void(const std::string& line)>;
 
 class Speaker {
@@ -37,24 +37,24 @@ class Speaker {
   virtual bool on_bytes(protocol::Bytes bytes) = 0;
   // The frame due first, whole, as Robot::transmit(); 0 when none is.
   virtual std::size_t next_frame(std::uint8_t* out, std::size_t capacity) = 0;
-  // The station took it in, over the connection that is open or was last.
+  // The station has admitted the robot, over the present or last connection.
   virtual bool is_welcome() const = 0;
   virtual protocol::RefusalReason refusal() const = 0;
   virtual std::string refusal_detail() const = 0;
-  // False once samples are lost while there is no connection: nothing is gained then by dialling often.
+  // False once samples are lost while there is no connection: frequent dialling gains nothing then.
   virtual bool ring_has_room() const = 0;
   // Whether to dial now; asked again every 10 ms.
   virtual bool may_dial() const { return true; }
   // Whether to read now what has arrived; asked again every 10 ms.
   virtual bool is_listening() const { return true; }
-  // How long until a connection made is open; empty: it is not wanted any more.
+  // How long until a new connection is open; empty: the connection is no longer needed.
   virtual std::optional<std::chrono::milliseconds> begin_handshake() { return std::chrono::milliseconds(0); }
 
  protected:
   ~Speaker() = default;
 };
 
-// How the connections of this one went so far.
+// The results of the connections so far.
 struct LinkCounts {
   std::uint64_t unreachable = 0;  // attempts without a connection
   std::uint64_t opened = 0;
@@ -72,15 +72,15 @@ class StationConnection {
   // Dials and reads until cancelled. Never returns otherwise.
   boost::asio::awaitable<void> run();
 
-  // Takes the frame that is due next from the speaker, unless one is still under way. True when there is one to write.
+  // Takes the next due frame from the speaker, unless one is still being sent. True when there is one to write.
   bool prepare();
-  // Hands the socket what it takes without waiting, one write per frame.
+  // Writes what the socket takes without waiting, one write per frame.
   void flush();
-  // Closes the connection of a station that is silent, unless bytes of it wait to be read.
+  // Closes the connection of a silent station, unless bytes from it wait to be read.
   void close_as_silent();
-  // The speaker has lost its memory: the socket stays as it is, without a word to either side.
+  // The speaker has rebooted: the socket stays open, and nothing is sent over it.
   void forget();
-  // Resets what was forgotten.
+  // Resets the connection of before the reboot.
   void reset_forgotten();
 
   bool is_open() const { return is_open_; }

@@ -84,8 +84,8 @@ StationTrust::Connection StationTrust::connection() const {
   return made;
 }
 
-// SAFETY: whoever holds another key could give the robot any command. OpenSSL itself has refused what `authority` does
-// not vouch for.
+// SAFETY: a station with another key could give the robot any command. OpenSSL itself refuses a certificate that
+// `authority` has not signed.
 std::string StationTrust::objection(const SSL& connection) const {
   if (pin_.empty()) return "";
   const X509* certificate = SSL_get0_peer_certificate(&connection);

@@ -1,4 +1,4 @@
-// Everything that can be made to go wrong with a simulated robot while it runs: by time line, over HTTP, or by a test.
+// The faults of a simulated robot while it runs: begun by a time line, over HTTP, or by a test.
 //
 // One struct for all kinds; fields() says which of its members a kind has, with names, units, ranges and defaults.
 // TOML, JSON and docs/scenarios.md follow from it. A fault on a target replaces the one that is in force there. Errors:
@@ -96,15 +96,15 @@ void fields_with_kind(Fields& fields, Fault& fault);
 // Throws what is wrong with its values, or what the world lacks for it.
 void check(const Fault& fault, const WorldConfig& world);
 
-// Empty when a run with, or without, a network of its own can do it; otherwise why not.
+// Empty when a run with (or without) its own network can have this fault; otherwise why not.
 std::string why_not(FaultKind kind, bool has_network);
 // The same for this robot; throws what why_not() says, too.
 void check(const Fault& fault, const FaultyRobot& robot);
-// From the robot's next tick on. Throws as check() does.
+// Begins the fault with the robot's next tick. Throws as check() does.
 void apply(const Fault& fault, const FaultyRobot& robot);
-// Ends one that lasts: its target is as it was when robot and link were made.
+// Ends a lasting fault: its target is again as it was when robot and link were made.
 void end(const Fault& fault, const FaultyRobot& robot);
-// Whether robot or link, which were told its for_s, end it when that is over.
+// Whether robot or link end it by themselves after its for_s.
 bool ends_by_itself(FaultKind kind);
 
 // {"fault":"electrode_offset","offset_mv":40,"for_s":5}

@@ -1,4 +1,4 @@
-// What faults act on: a robot over its boots, and the network between it and its station.
+// The targets of faults: a robot over its boots, and the network between it and its station.
 #pragma once
 
 #include <cstddef>
@@ -18,12 +18,12 @@ struct LinkImpairments {
 // A network that can be broken: ImpairedLink in virtual time, Proxy over sockets.
 class FaultyLink {
  public:
-  // Nothing passes and nobody is reached, until it is over or resume(). When it is over by itself, what waits comes
-  // with the first retransmission that gets through, or every connection is reset.
+  // Nothing passes and no connection is made, until the outage ends or resume(). When it ends by itself, waiting bytes
+  // come with the first retransmission that gets through, or every connection is reset.
   virtual void outage(double for_s, bool then_reset) = 0;
-  // The connections there are take bytes and say nothing, until resume(); new ones are well.
+  // Present connections take bytes and deliver nothing, until resume(); new ones work.
   virtual void half_open(Direction direction) = 0;
-  // Ends outage and half-open; what waits comes at once.
+  // Ends outage and half-open; waiting bytes come at once.
   virtual void resume() = 0;
   virtual void cut(std::size_t after_bytes) = 0;  // the end behind so many of the bytes under way
   virtual void reset() = 0;                       // the end at once, and nothing of them
@@ -39,7 +39,7 @@ class FaultyLink {
 
 struct FaultyRobot {
   RobotLife& life;
-  FaultyLink* link;  // null: this run has no network of its own to break
+  FaultyLink* link;  // null: this run has no network of its own
 };
 
 }  // namespace sim_robot

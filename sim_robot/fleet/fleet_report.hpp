@@ -1,4 +1,4 @@
-// What a fleet tells people and scripts: a line of rates each second, a summary at its end, and how it went.
+// What a fleet prints for people and scripts: a line of rates each second, and a summary with the result at its end.
 //
 // The fields are those of docs/fleet.md, with the same names in text and JSON.
 #pragma once
@@ -21,7 +21,7 @@ struct FleetSnapshot {
 
 double process_cpu_s();
 
-// What came about between two moments, per second.
+// The rates between two moments, per second.
 std::string rates_text(const FleetSnapshot& from, const FleetSnapshot& to, const Lateness& lateness);
 std::string rates_json(const FleetSnapshot& from, const FleetSnapshot& to, const Lateness& lateness);
 
@@ -30,10 +30,10 @@ std::string summary_text(const FleetSnapshot& end, const Lateness& lateness, con
 std::string summary_json(const FleetSnapshot& end, const Lateness& lateness, const std::string& fault);
 
 struct FleetFault {
-  int exit_status = 1;  // 2 when no robot ever got in
+  int exit_status = 1;  // 2 when no robot was ever admitted
   std::string reason;
 };
-// Empty when every robot was taken in, no sample is lost or unsettled, and at most 5 % of the ticks were skipped.
+// Empty when every robot was admitted, no sample is lost or unsettled, and at most 5 % of the ticks were skipped.
 std::optional<FleetFault> fleet_fault(const FleetSnapshot& end);
 
 }  // namespace sim_robot

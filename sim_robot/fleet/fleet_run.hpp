@@ -25,7 +25,7 @@ struct FleetOptions {
 };
 
 // Robots of one kind: each has its own id, boot id and seed (the kind's seed and those that follow).
-// Returns the exit status: 0 when nothing was lost, 2 when no robot ever got in, else 1; the summary says why.
+// Returns the exit status: 0 when nothing was lost, 2 when no robot was ever admitted, else 1; the summary says why.
 int run_fleet(const FleetOptions& options, const SimulatedRobotConfig& kind, std::ostream& out);
 
 // Robots that replay a recording, `rate` times as fast as it was made, each from its beginning.

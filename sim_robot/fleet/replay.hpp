@@ -1,4 +1,4 @@
-// Recorded telemetry, cut so that it can be sent as that of any robot at any time without encoding its samples again.
+// Recorded telemetry, prepared for sending as any robot at any time without encoding the samples again.
 //
 //   frame     := length 08 robot_time_us 22 length telemetry
 //   telemetry := [08 first_seq] [10 first_robot_time_us] 18 period_us [20 oldest_seq] tail [60 flags]               (1)
@@ -31,7 +31,7 @@ class Recording {
   // The frame that holds a sample.
   std::uint64_t frame_of(std::uint64_t seq) const;
 
-  // What a robot says of a frame of its own; sample 0 was made at robot time 0.
+  // The head of a robot's own frame; sample 0 was made at robot time 0.
   struct Head {
     std::uint64_t robot_time_us = 0;
     std::uint32_t period_us = 10'000;

@@ -3,7 +3,7 @@
 // To a station it is a robot with a boot of its own, samples from 0 on without a gap, a clock that runs with the
 // host's, acknowledgements, resends and a ring of kRingSamples that counts what falls out as lost. As frames can be
 // written again at any time, it keeps numbers and not bytes. It answers clock probes, says its status each second, and
-// refuses every command as unsupported: it has no motor. An emergency stop therefore stays unacknowledged as obeyed.
+// refuses every command as unsupported: it has no motor. So it never acknowledges an emergency stop as carried out.
 // One thread: that of `loop`. Loop and recording must outlive the robot.
 #pragma once
 
@@ -20,7 +20,7 @@ struct ReplayConfig {
   std::string token;
   std::uint64_t boot_id = 1;
   std::uint32_t period_us = 10'000;        // of samples
-  Lateness* acknowledged_after = nullptr;  // told of each frame, from its last sample to its acknowledgement
+  Lateness* acknowledged_after = nullptr;  // of each frame, from its last sample to its acknowledgement
 };
 
 class ReplayedRobot final : public FleetMember, private Speaker {
@@ -33,7 +33,7 @@ class ReplayedRobot final : public FleetMember, private Speaker {
   // Of the wheel: a turn, or several, for each frame of mean length.
   static std::chrono::microseconds turn_period(const Recording& recording, std::uint32_t period_us);
 
-  // The first sample is made a period after the turn, so that the last one of a frame is made at a turn.
+  // The first sample is made one period after the turn, so that the last sample of a frame is made at a turn.
   void boot(Clock::time_point at) override { booted_at_ = at + std::chrono::microseconds(config_.period_us); }
   bool tick() override;
   void send() override { connection_.flush(); }

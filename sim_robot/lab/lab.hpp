@@ -1,4 +1,4 @@
-// A robot over its boots, a bad network, the least of a station, and faults by time: stepped together, in virtual time.
+// A robot over its boots, a bad network, a minimal station and a time line of faults, stepped together in virtual time.
 #pragma once
 
 #include <utility>
@@ -17,9 +17,9 @@ class Lab {
   Lab(const Lab&) = delete;
   Lab& operator=(const Lab&) = delete;
 
-  // The tick that is due, with the faults that begin before it, and 10 ms of network and station behind it.
+  // One step: the faults that begin now, the due tick, then 10 ms of network and station.
   void step() {
-    link.exchange();  // what the station has said since arrives before the tick
+    link.exchange();  // what the station has sent since arrives before the tick
     faults.advance(faulty(), next_us_);
     link.exchange();
     station.serve();

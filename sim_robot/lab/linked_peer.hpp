@@ -1,8 +1,8 @@
-// The least of a station at the far end of an impaired link: it accepts, welcomes, keeps the time and declares silence.
+// A minimal station at the far end of an impaired link: it accepts, welcomes, keeps the time and detects silence.
 //
-// As StationPeer, but it knows of the robot only what has arrived. Its own rules are the protocol's: a heartbeat every
-// 200 ms, a link lost after 1 s of silence whatever the connection says, commands that live from the last robot time
-// heard plus the time since.
+// As StationPeer, but it knows of the robot only what has arrived. It follows the protocol: a heartbeat every 200 ms, a
+// link lost after 1 s of silence whatever the state of the connection, and commands whose time to live counts from the
+// last robot time received plus the time since.
 #pragma once
 
 #include "sim_robot/lab/impaired_link.hpp"
@@ -19,11 +19,12 @@ class LinkedPeer : public ReceivedTelemetry {
 
   // Each step is one of the link, then serve().
   void step();
-  // What has arrived, then what is due.
+  // Reads what has arrived, then sends what is due.
   void serve();
   void run(double for_s);
 
-  // Adds id, boot and life where they are 0, says it on the open connection, and returns the id. It is lost with it.
+  // Adds id, boot and time to live where they are 0, sends the command on the open connection, and returns its id. The
+  // command is lost with the connection.
   std::uint64_t send(protocol::Command command);
 
   bool is_connected() const { return connected_; }
@@ -43,7 +44,7 @@ class LinkedPeer : public ReceivedTelemetry {
   int connections_ = 0;
   bool connected_ = false, welcomed_ = false;
   std::optional<std::uint64_t> heard_at_us_;
-  std::uint64_t heartbeat_at_us_ = 0;  // they acknowledge samples, so commands take none's place
+  std::uint64_t heartbeat_at_us_ = 0;  // they acknowledge samples, so they are sent beside commands
   std::vector<std::uint8_t> unsent_;
 };
 

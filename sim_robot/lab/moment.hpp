@@ -1,4 +1,4 @@
-// What is known of a robot at one moment: by the station that hears it, and in truth.
+// What is known of a robot at one moment: as the station received it, and as simulated.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,7 @@ struct Moment {
   std::uint64_t samples_owed = 0;  // older than the newest that has arrived, and neither arrived nor lost for good
 };
 
-// Something the robot noted, as the station has heard it. Kind and cause are spelled as in docs/protocol.md.
+// An event of the robot, as the station received it. Kind and cause are spelled as in docs/protocol.md.
 struct HeardEvent {
   std::string kind, cause;
   double robot_time_s = 0;
@@ -46,7 +46,7 @@ struct HeardEvent {
   std::uint64_t emergency_id = 0;
 };
 
-// What the robot said to a command, or why it got none.
+// The robot's answer to a command, or why it got none.
 struct Answer {
   std::string text;  // "accepted", "expired", "latched", …
   std::uint64_t emergency_id = 0;

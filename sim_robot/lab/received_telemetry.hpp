@@ -1,4 +1,4 @@
-// What the simplest station has received from its robot, and how it answers.
+// What a minimal station has received from its robot, and its answers.
 //
 // Everything received counts as stored at once. A sample that the robot no longer holds is final: the acknowledgement
 // passes over it, and lost_samples() counts it.
@@ -58,7 +58,7 @@ class ReceivedTelemetry {
   bool take(protocol::Bytes bytes);
   protocol::StationFrame welcome_frame() const;
   protocol::StationFrame heartbeat_frame(protocol::StationHeartbeat heartbeat) const;
-  // With id, boot and life where they are 0.
+  // With id, boot and time to live where they are 0.
   protocol::Command completed(protocol::Command command, std::uint64_t boot_id, std::uint64_t robot_time_us);
 
   protocol::FrameReader reader_;  // of this connection

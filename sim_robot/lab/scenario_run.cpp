@@ -76,7 +76,7 @@ void ScenarioRun::say(const ScriptStep& step) {
   duty_until_s_ = 0;  // another command for the motor ends the duty
 }
 
-// The last that the station has heard of; 0: none.
+// The last one that the station received; 0: none.
 std::uint64_t ScenarioRun::emergency_id() const {
   const LinkedPeer& station = lab_.station;
   if (!station.samples.empty()) return station.samples.rbegin()->second.emergency_id;

@@ -2,8 +2,8 @@
 // follows the script.
 //
 // The same scenario and boot id give the same bytes; see docs/scenarios.md. The network is perfect until a fault makes
-// it bad. What the script says waits while the station knows that there is no link; what it says into a link that has
-// just died is lost with it.
+// it bad. Commands of the script wait while the station knows that there is no link; a command sent over a link that
+// has just died is lost.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ class ScenarioRun {
   explicit ScenarioRun(const Scenario& scenario, FaultTimeline::Log log = {});
 
   void step();  // one tick
-  // To the end; throws std::invalid_argument when the scenario has none.
+  // Runs to the end; throws std::invalid_argument when the scenario has none.
   void run();
 
   double time_s() const { return lab_.time_s(); }  // true time of the next tick
@@ -29,9 +29,9 @@ class ScenarioRun {
   const SimulatedRobot& robot() const { return lab_.robot.robot(); }
   const LinkedPeer& station() const { return lab_.station; }
   const FaultTimeline& faults() const { return lab_.faults; }
-  // Where the robot was when it made a sample, from where it was made itself; boots count from 1.
+  // The robot's true position at a sample, relative to its start; boots count from 1.
   double true_position_m(std::size_t boot, std::uint64_t robot_time_us) const;
-  // Every frame of the robot that has arrived so far, as it was on the wire.
+  // Every frame of the robot that has arrived so far, as bytes of the wire.
   std::vector<std::uint8_t> bytes() const;
 
  private:

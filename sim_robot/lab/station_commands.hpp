@@ -1,4 +1,4 @@
-// Commands as a station gives them, without ids and times: whoever sends them adds those.
+// Commands as a station gives them, without ids and times: the sender adds those.
 //
 // Knows the protocol and no robot, so that a test of a robot with another layout in memory can use it.
 #pragma once

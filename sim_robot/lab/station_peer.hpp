@@ -1,6 +1,6 @@
-// The least of a station, in the same process and in virtual time: it welcomes, acknowledges, commands and listens.
+// A minimal station in the same process and in virtual time: it welcomes, acknowledges, commands and receives.
 //
-// What the prediction and the tests drive a robot with; linked_peer has a network in between. The station proper is in
+// The prediction and the tests drive a robot with it; linked_peer has a network in between. The real station is in
 // server/.
 #pragma once
 
@@ -14,7 +14,7 @@ class StationPeer : public ReceivedTelemetry {
  public:
   explicit StationPeer(SimulatedRobot& robot) : robot_(robot) {}
 
-  // Opens a connection, takes the Hello and answers it; what is stored already is what was heard.
+  // Opens a connection, reads the Hello and answers it; what was received counts as stored.
   void connect();
   void disconnect();
 
@@ -22,10 +22,10 @@ class StationPeer : public ReceivedTelemetry {
   // acknowledges it.
   void run(int ticks);
   void step();
-  // Everything the robot has to send now.
+  // Reads everything that the robot has to send now.
   void listen();
 
-  // Adds id, boot and life where they are 0, sends, and returns the id.
+  // Adds id, boot and time to live where they are 0, sends the command, and returns its id.
   std::uint64_t send(protocol::Command command);
   // False when the robot wants the connection closed.
   bool send(const protocol::StationFrame& frame);

@@ -1,6 +1,6 @@
 // One direction of a bad TCP connection, in virtual time and without sockets: bytes go in, and come out later.
 //
-// TCP delivers in order, so nothing is lost, doubled or overtaken here. What a network does to segments shows as time:
+// TCP delivers in order, so nothing is lost, doubled or overtaken here. Impairments of segments show as delays:
 //
 //   sent    = max(now, sent of the one before) + size / bytes_per_s                        (1)   throttle
 //   arrival = sent + delay + uniform(0, jitter) + rto · (2^k - 1), k losses in a row      (2)   loss: the time-out
@@ -9,7 +9,7 @@
 // A segment is at most 1460 bytes, and on a throttled link at most 10 ms of it. Between stall() and its end nothing
 // arrives; the segment that was lost first is then sent again at rto · (2^k - 1) after its time, so that an old
 // connection revives up to as long after the stall as the stall was. A stall without end is a half-open connection: it
-// takes what its buffer holds and says nothing.
+// takes what its buffer holds and delivers nothing.
 // Errors:   check() throws std::invalid_argument, quoting the value. Times may not go back.
 // Differs from TCP: no fast retransmission, which needs traffic behind the loss; no congestion control.
 #pragma once
@@ -36,7 +36,7 @@ struct Impairment {
   std::size_t buffer_bytes = 4096;  // taken and not yet out; the robot's TCP stack holds about as much
 };
 
-// Throws std::invalid_argument that names and quotes what cannot be.
+// Throws std::invalid_argument that names and quotes an impossible value.
 void check(const Impairment& impairment);
 
 class ImpairedStream {
@@ -45,22 +45,22 @@ class ImpairedStream {
 
   ImpairedStream(const Impairment& impairment, std::uint64_t seed);
 
-  // Takes what the buffer has room for and says how much that was; the rest is the caller's to offer again.
+  // Takes as many bytes as the buffer has room for and returns their number; the caller offers the rest again.
   std::size_t push(protocol::Bytes bytes, std::uint64_t now_us);
-  // The end of the stream, which follows the last byte as a segment of its own. Nothing is taken after it.
+  // Ends the stream: the end follows the last byte as a segment of its own. Nothing is taken after it.
   void close(std::uint64_t now_us);
-  // The end of the stream behind so many of the bytes that are under way; the rest is gone.
+  // Ends the stream after so many of the bytes under way, and drops the rest.
   void cut(std::size_t after_bytes, std::uint64_t now_us);
-  // Bytes that are due by now; at most split_bytes, and 0 when there are none.
+  // Returns the bytes that are due by now: at most split_bytes, and 0 when there are none.
   std::size_t pull(std::uint8_t* out, std::size_t capacity, std::uint64_t now_us);
-  // Every byte is out, and so is the end.
+  // Every byte and the end have been pulled.
   bool ended(std::uint64_t now_us) const;
 
-  // Nothing arrives from now until then; kNever: half-open. A later call replaces an earlier one's end.
+  // Nothing arrives from now until then; kNever: half-open. A later call replaces the end of an earlier one.
   void stall(std::uint64_t now_us, std::uint64_t until_us);
-  // Ends a stall, also one without end: what waits arrives now.
+  // Ends a stall, also a half-open one: waiting bytes arrive now.
   void resume(std::uint64_t now_us);
-  // For what is pushed from now on; what waits for a throttle that is less narrow now comes as early as that allows.
+  // Holds for bytes pushed from now on; bytes that wait for a throttle come as early as the new one allows.
   void impair(const Impairment& impairment, std::uint64_t now_us);
 
   // When the next byte or the end is due; empty when nothing is under way, or for ever.

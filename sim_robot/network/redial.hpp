@@ -1,8 +1,8 @@
 // How long a robot waits before it dials its station again.
 //
-// Pauses are random, so that robots that lost one station do not come back at once. While the ring has room every
-// moment counts, since what it holds is not lost yet: attempts begin at most 1 s apart. Once the ring is full samples
-// are lost whatever the robot does, and pauses grow to four times as long.
+// Pauses are random, so that robots that lost one station do not come back at once. While the ring has room no
+// sample is lost yet, so attempts begin at most 1 s apart. Once the ring is full samples are lost whatever the robot
+// does, and pauses grow to four times as long.
 #pragma once
 
 #include <algorithm>

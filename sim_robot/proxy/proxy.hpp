@@ -1,11 +1,11 @@
-// A TCP proxy that makes a bad network of a good one: each connection to it is one to the target, impaired.
+// A TCP proxy that simulates a bad network: it forwards each connection to the target, impaired.
 //
-// While it runs it obeys control(): a line of one word and its numbers.
+// control() changes it while it runs, by a line of one word and its numbers.
 //   cut [BYTES] | reset | half-open [up|down|both] | outage SECONDS [reset] | heal
 //   delay MS | jitter MS | throttle BYTES_PER_S | loss PROBABILITY | split BYTES
-// An outage takes every connection and those that come meanwhile: they are accepted, as a kernel does, and hear
-// nothing. The settings hold for bytes from then on. heal ends outage and half-open and takes all settings back. Loop
-// thread. Outlives run(): stop() and let the loop run dry before it goes.
+// An outage stalls every connection; new ones are accepted, as a kernel does, and receive nothing. The settings hold
+// for bytes from then on. heal ends outage and half-open and resets all settings. Loop thread. Must outlive run(): call
+// stop() and let the loop finish before destroying it.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -37,7 +37,7 @@ class Proxy final : public FaultyLink {
   boost::asio::awaitable<void> run();  // accepts until stop()
   void stop();                         // closes everything
 
-  // Obeys a line and answers with one: what it did, or what is wrong with the line.
+  // Executes a line; returns what was done, or what is wrong with the line.
   std::string control(const std::string& line);
 
   void cut(std::size_t after_bytes) override;

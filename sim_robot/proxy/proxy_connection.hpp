@@ -1,8 +1,8 @@
 // One client of the proxy and its connection to the target: two sockets with an impaired stream in either direction.
 //
-// The end of a stream passes through as bytes do, each direction by itself. A reset passes through at once, except in a
-// stall, where nobody may learn of it.
-// Loop thread. Held by a shared pointer: its coroutine holds one, and the proxy looks at it through a weak one.
+// The end of a stream passes through as bytes do, each direction by itself. A reset passes through at once, except
+// during a stall.
+// Loop thread. Held by a shared pointer: its coroutine holds one, the proxy a weak one.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -2,9 +2,9 @@
 // blocks.
 //
 // Owns the robot, its clock and the two memories that outlive a boot: the storage of parameters and controller, and the
-// latch. The plant goes on through all of it, without a motor while the robot is off.
+// latch. The plant runs through reboots, without a motor while the robot is off.
 //   robot clock = at the last change + (true time since) · (1 + drift)
-// True time is what the network and the station live in; it is given to advance_to() and never read anywhere. A tick
+// True time is the time of the network and the station; advance_to() gets it, and nothing reads a clock. A tick
 // runs when the robot's own clock has reached its time, so a fast clock ticks more often.
 #pragma once
 
@@ -23,7 +23,7 @@ struct Reboot {
   bool keeps_storage = true;  // the flash is not erased
 };
 
-// What became of the boots before this one: a ring that a reset found full of samples is lost with them.
+// Totals of the boots before this one; a reset loses the samples in its ring.
 struct EarlierBoots {
   std::uint64_t samples_made = 0, samples_lost = 0, commands = 0, missed_ticks = 0;
 };
@@ -35,9 +35,9 @@ class RobotLife {
   // Runs the ticks that are due up to a true time.
   void advance_to(std::uint64_t true_us);
 
-  // From now on: off, then on again with another boot id, which follows from the one before and is as random as that.
+  // Switches off now, then on again with another boot id, which is derived from the one before.
   void reboot(const Reboot& reboot);
-  // The loop does nothing else for so long, as in a TLS handshake: ticks are missed. A longer block under way stays.
+  // Blocks the loop for so long, as a TLS handshake does: ticks are missed. A longer present block stays.
   void block(double for_s);
   void unblock();                // ends every block
   void drift(double ppm);        // of the robot's clock against true time, from now on

@@ -25,7 +25,7 @@ struct SimulatedRobotConfig {
   protocol::EmergencyCause restored_emergency_cause = rheonaut_EMERGENCY_CAUSE_NONE;
 };
 
-// Throws std::invalid_argument, quoting the value, when a name, token, boot id, duty range or the world cannot be.
+// Throws std::invalid_argument, quoting the value, for an invalid name, token, boot id, duty range or world.
 void check(const SimulatedRobotConfig& config);
 
 // Never 0, never from a seed.
@@ -44,7 +44,7 @@ class SimulatedRobot {
   SimulatedRobot& operator=(const SimulatedRobot&) = delete;
 
   void step();  // one tick of kPeriodS
-  // Asks for the memory that a tick works on, ahead of it: many robots do not fit a cache.
+  // Prefetches the memory of the next tick: many robots do not fit a cache.
   void prefetch() const;
 
   // Lets robot time reach `now_us`: afterwards no tick is due. Ticks that are up to kMaxLatenessUs late run one by one,
@@ -53,12 +53,12 @@ class SimulatedRobot {
   // Time passes without ticks: the motor keeps the duty it has for 50 ms and is off then, as on the robot's board; the
   // core sees nothing but the later time.
   void skip(std::uint64_t ticks);
-  // As advance_to(), with a loop that does nothing: ticks that are over kMaxLatenessUs late, and those after them, are
-  // skipped; so when it goes on only the latest one runs.
+  // As advance_to(), with a blocked loop: ticks that are over kMaxLatenessUs late, and those after them, are skipped;
+  // so when the loop goes on only the latest one runs.
   void idle_to(std::uint64_t now_us);
 
-  // What sim_robot/robot/robot_life makes of a robot. A reset begins the core anew at robot time 0 with what `config`
-  // says of boot, cause, duty, storage and latch; plant and sensors are the same and go on.
+  // For sim_robot/robot/robot_life. A reset restarts the core at robot time 0 with the boot, cause, duty, storage and
+  // latch of `config`; plant and sensors go on.
   void reset(const SimulatedRobotConfig& config);
   void coast(std::uint64_t ticks);      // without power: the plant alone, robot time stands still
   void jump_clock(std::int64_t by_us);  // robot time alone; back to 0 at most

@@ -1,4 +1,4 @@
-// What the fault server answers, without HTTP around it.
+// The answers of the fault server, without HTTP.
 #pragma once
 
 #include <string>

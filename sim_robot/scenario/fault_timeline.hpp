@@ -1,8 +1,8 @@
-// What is in force of the faults, and which of them are still to come.
+// The faults in force, and those still to come.
 //
 // A scenario's faults come by true time since the run began, others by inject() at once. Each holds for its for_s; then
 // its target is as it was when robot and link were made. One that follows on the same target replaces it, and a reboot
-// ends a block. A fault that this run cannot do is said and passed over. The same in virtual and in real time.
+// ends a block. A fault that is impossible in this run is logged and skipped. The same in virtual and in real time.
 #pragma once
 
 #include <cstdint>
@@ -27,15 +27,15 @@ class FaultTimeline {
   static constexpr std::uint64_t kNever = kNeverUs;
   using Log = std::function<void(const std::string& line)>;
 
-  // The faults by time. `log` is told what begins and ends; it may be empty.
+  // The faults by time. `log` gets a line when a fault begins or ends; it may be empty.
   explicit FaultTimeline(std::vector<TimedFault> faults = {}, Log log = {});
 
-  // As RobotLife::advance_to(), with what is due applied between the ticks.
+  // As RobotLife::advance_to(), with due faults applied between the ticks.
   void advance(const FaultyRobot& robot, std::uint64_t true_us);
 
-  // Returns its id; those that happen at once have one too, but are never in force. Throws as apply().
+  // Returns the fault's id; momentary faults have one too, but are never in force. Throws as apply().
   std::uint64_t inject(const Fault& fault, const FaultyRobot& robot);
-  // Ends it before its time. False when none in force has this id.
+  // Ends a fault before its time. False when no fault in force has this id.
   bool withdraw(std::uint64_t id, const FaultyRobot& robot);
 
   const std::vector<FaultInForce>& in_force() const { return in_force_; }

@@ -5,8 +5,8 @@
 //   {"parameters":{…},"dead_time_s":0.03,…}                                          `rheonaut identify --json`
 //   {"model":{…},…}                                                                  `hydrodynamic` of `rheonaut model
 //   --json`
-// See docs/commands.md. A `dead_time_s` may stand in the model and beside it. Keys of a model that say something else
-// about it are passed over. Errors: throws std::invalid_argument that says what is wrong, which value it has, and what
+// See docs/commands.md. A `dead_time_s` may stand in the model and beside it. Other keys of a model are
+// ignored. Errors: throws std::invalid_argument that says what is wrong, which value it has, and what
 // is allowed.
 #pragma once
 

@@ -1,4 +1,4 @@
-// A scenario: a robot in its world, what goes wrong when, and what an experiment does with it. A TOML file.
+// A scenario: a robot in its world, its faults by time, and the commands of an experiment. A TOML file.
 //
 // docs/scenarios.md lists the keys. Errors are std::invalid_argument, `file:line:column: key: what is wrong`, with the
 // value and what is allowed; unknown keys are errors too.
@@ -55,7 +55,7 @@ struct Scenario {
   std::vector<ScriptStep> script;  // by time; a simulated robot that dials a station leaves it to the station
 };
 
-// `name` is what errors call the text.
+// `name` stands for the text in errors.
 Scenario parse_scenario(std::string_view text, const std::string& name);
 Scenario load_scenario(const std::filesystem::path& file);
 
@@ -63,9 +63,9 @@ Scenario load_scenario(const std::filesystem::path& file);
 void fields(Fields& fields, Scenario& scenario);
 void fields(Fields& fields, ScriptStep& step);
 
-// Those that come with the program, by name: the files of sim_robot/scenarios/ without their ending.
+// The built-in scenarios, by name: the files of sim_robot/scenarios/ without their ending.
 std::span<const base::EmbeddedFile> scenario_files();
-// A shipped one by its name, otherwise the file; throws std::invalid_argument that names those there are.
+// A built-in scenario by its name, otherwise a file; throws std::invalid_argument that lists the built-in ones.
 Scenario find_scenario(const std::string& name_or_file);
 
 }  // namespace sim_robot

@@ -1,4 +1,4 @@
-// Every key of a scenario, every fault and every command of a script as Markdown: what docs/scenarios.md holds.
+// Every key of a scenario, every fault and every command of a script as Markdown, for docs/scenarios.md.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// What a DropSens DS550 electrode makes of the fluid's impedance.
+// The readings of a DropSens DS550 electrode from the fluid's impedance.
 //
 //   reading = Z + offset + drift · t + noise                                                        (1)   mV
 // Offset and drift as given; the noise is white. No data sheet gives these numbers: kDs550 is assumed.

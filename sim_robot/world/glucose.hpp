@@ -43,7 +43,7 @@ class Glucose {
 
   void step();  // one tick
 
-  // One more, from now on; poured_at_s is taken as now. Throws when there are kMaxPatches that are not removed.
+  // Adds a patch now, whatever its poured_at_s. Throws when kMaxPatches are there already.
   void pour(GlucosePatch patch);
 
   double time_s() const { return time_s_; }       // since it began, in which patches are removed

@@ -30,7 +30,7 @@ struct WorldConfig {
   BatteryParameters battery;
   std::optional<VesselParameters> vessel;  // empty: fluid at rest without end
   GlucoseParameters glucose;
-  std::optional<ImuParameters> imu;  // empty: a perfect sensor, which tells the core the truth
+  std::optional<ImuParameters> imu;  // empty: a perfect sensor, which gives the core the true position
   ElectrodeParameters electrode;
   std::uint64_t seed = 1;  // of the sensors' noise
 };

@@ -33,7 +33,7 @@ class TurnsTest : public ::testing::Test {
   std::vector<std::string> done;
 };
 
-TEST_F(TurnsTest, AFewGoAtOnceAndTheOthersAfterWhoeverIsReadyThen) {
+TEST_F(TurnsTest, AFewGoAtOnceAndTheOthersAfterThoseThatAreReadyThen) {
   for (int i = 0; i < 2 * kAtOnce + 1; ++i) spawn("page");
   asio::post(loop, [this] { done.emplace_back("person"); });
   loop.run();

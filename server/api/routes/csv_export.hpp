@@ -1,7 +1,7 @@
 // A run as the body of an answer: CSV line by line as it is read, other formats from a file that is made first.
 //
 // Loop thread; the work is done on the exports' worker in slices of 20 ms, and no faster than the client takes it, so
-// that memory does not grow with the run and whoever leaves stops the work.
+// that memory does not grow with the run, and the work stops when the client disconnects.
 #pragma once
 
 #include <filesystem>

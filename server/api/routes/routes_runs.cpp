@@ -36,8 +36,8 @@ Answer list_runs(RunRoutes parts, Request request) {
   co_return json_response(200, list_json("runs", runs));
 }
 
-// SAFETY: whoever names the fluid that the robot is in decides which limits hold, and which model it is sent: that is a
-// command. False for somebody who may not, and names the fluid that it is in: then nothing is to be said of the robot.
+// SAFETY: the fluid named for a robot decides which limits hold and which model it is sent, so naming it is a command.
+// False when the caller may not command but names the present fluid: then nothing changes for the robot.
 Result<bool> may_name_fluid(const RunRoutes& parts, const Request& request, const RobotId& robot_id,
                             const std::string& fluid) {
   if (fluid.empty() || request.caller.scopes.allow(Scope::command)) return true;

@@ -62,7 +62,7 @@ std::vector<std::string> names_of(const Certificate& options, const Files& files
   return names;
 }
 
-// Whoever runs it again after a crash finds either nothing or all of a pair; a key without certificate is used.
+// After a crash either nothing or both files of a pair are there; a key without certificate is used.
 void make_authority_unless_there(const Files& files, std::ostream& out) {
   if (fs::exists(files.authority)) return;
   const Openssl<EVP_PKEY> key = fs::exists(files.authority_key) ? load_key(files.authority_key) : make_key();

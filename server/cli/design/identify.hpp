@@ -1,4 +1,4 @@
-// `rheonaut identify`: a model from a recording, and what a planned experiment would tell.
+// `rheonaut identify`: a model from a recording, and the uncertainty of a planned experiment.
 #pragma once
 
 #include <cstdint>

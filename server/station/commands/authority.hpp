@@ -1,8 +1,8 @@
-// Who may command which robot: control is a lease that one actor holds, for as long as it shows that it is there.
+// Who may command which robot: control is a lease that one actor holds and keeps renewing.
 //
-// An actor is a session of a page ("session:3") or a token ("token:local"). Whoever commands a robot that nobody
-// controls takes control by it. Nothing here is ever asked about an emergency stop. Loop thread; bookkeeping only: the
-// station reports what changes.
+// An actor is a session of a page ("session:3") or a token ("token:local"). An actor that commands a robot without a
+// holder becomes its holder. An emergency stop is never checked here. Loop thread; only keeps the leases: the station
+// reports changes.
 #pragma once
 
 #include <cstdint>

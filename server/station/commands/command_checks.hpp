@@ -10,7 +10,7 @@ namespace server {
 
 bool moves_the_motor(const protocol::Command& command);
 
-// False for what commands nothing: whoever may command at all may send it.
+// False for commands that change nothing: any caller with the scope command may send them.
 bool needs_control(const protocol::Command& command);
 
 // invalid for a value outside the limits, conflict when the robot's state forbids the command now. `ahead`: what is on

@@ -1,7 +1,7 @@
 // Whether telemetry alone proves that a command has run, when its answer is lost. Pure.
 //
-// Its effect proves it only if nothing else explains the effect: neither how the robot was before, nor another command
-// for the motor, sent before it or after it; and only while the command can have taken effect.
+// The effect is a proof only if nothing else explains it: neither the robot's earlier state, nor another command for
+// the motor, sent before or after this one; and only while the command can have taken effect.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// What one robot is still to do, in the order of its time: schedules that run, orders that wait for their time, and
-// commands that are on their way.
+// The orders that one robot has yet to carry out, by time: running schedules, timed commands that wait, and commands on
+// their way.
 //
 // It holds the accepted schedules itself; everything else it reads from the robot's commands. Loop thread.
 #pragma once

@@ -1,5 +1,5 @@
-// What is on its way to a robot, or waits there for its time: the setpoints that a further one must fit between, and
-// the time at power that is ordered already. Pure.
+// Orders on their way to a robot, or waiting there: the setpoints that a new one must fit between, and the time at
+// power that they use. Pure.
 #pragma once
 
 #include <cstdint>

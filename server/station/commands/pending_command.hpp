@@ -1,4 +1,4 @@
-// One command from its submission to its end: its record, its frame, and what it still waits for.
+// One command from its submission to its end: its record, its frame, and the answer or effect that it waits for.
 //
 // Times are steady times of the station unless the name says robot. Loop thread.
 #pragma once
@@ -50,10 +50,10 @@ std::int64_t robot_now_us(const RobotState& robot, const Clock& clock);
 std::shared_ptr<PendingCommand> make_pending(boost::asio::io_context& loop, const Clock& clock,
                                              const CommandRequest& request, const RobotState& robot);
 
-// A command that was answered before, for whoever asks for it again.
+// A command that was answered before, for a request that repeats it.
 std::shared_ptr<PendingCommand> answered_before(boost::asio::io_context& loop, const CommandRecord& record);
 
-// Writes the end into the record and wakes whoever waits for it. The caller publishes the record.
+// Writes the end into the record and resumes the coroutine that waits for it. The caller publishes the record.
 void end_command(PendingCommand& pending, CommandState state, std::string reason, const Clock& clock,
                  RecentCommands& recent);
 

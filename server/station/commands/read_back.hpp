@@ -1,4 +1,4 @@
-// Whether what a robot reports to be in force is what commands have ordered. Pure.
+// Compares the values that a robot reports to be in force with those that commands have set. Pure.
 //
 // A robot writes a report when it sends it, and by then it may have run newer commands as well. It acknowledges all of
 // them first.

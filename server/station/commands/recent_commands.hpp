@@ -1,6 +1,5 @@
-// Commands that carried a key of their client and have been answered: a request that is repeated gets what became of
-// the first and sends nothing. The oldest are forgotten; the robot itself never runs one of its last 64 twice. Loop
-// thread.
+// Answered commands that carried an idempotency key: a repeated request gets the result of the first and sends nothing.
+// The oldest are forgotten; the robot itself never runs one of its last 64 commands twice. Loop thread.
 #pragma once
 
 #include <deque>

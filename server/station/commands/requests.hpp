@@ -1,4 +1,4 @@
-// What people and scripts may ask the station for: a command, an emergency stop, control of a robot.
+// Requests of people and scripts to the station: a command, an emergency stop, control of a robot.
 //
 // Plain values. An actor is a session of a page ("session:3") or a token ("token:local").
 #pragma once

@@ -1,4 +1,4 @@
-// The commands of one robot, listed by what they wait for: an answer, telemetry, a report, or nothing any more.
+// The commands of one robot, in lists by what they wait for: an answer, telemetry, a report, or nothing.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Whether telemetry shows what a command was to bring about. Pure.
+// Whether telemetry shows the effect of a command. Pure.
 #pragma once
 
 #include "server/station/state/station_state.hpp"

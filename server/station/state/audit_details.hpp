@@ -1,4 +1,4 @@
-// What the entries of the audit say in detail of acts that the station decides; as JSON, see AuditNote::detail.
+// The details of audit entries for acts that the station decides, as JSON; see AuditNote::detail.
 #pragma once
 
 #include <string>

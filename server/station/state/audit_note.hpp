@@ -1,7 +1,7 @@
-// An entry for the audit of one act: who, from where, when, what, and what came of it.
+// An entry for the audit: who did what, from where, when, and with which result.
 //
-// Plain values. Whoever acts on behalf of somebody is given an Author; what is done makes an AuditNote of it, and the
-// recorder, or the store that changes the database, appends it (recording/audit_chain).
+// Plain values. Code that acts on behalf of somebody gets an Author and makes an AuditNote of it; the recorder, or the
+// store that changes the database, appends the note (storage/audit/audit_chain).
 #pragma once
 
 #include <cstdint>

@@ -37,7 +37,7 @@ struct FluidModel {
 // As the robot names them, in the order of its table.
 std::array<std::pair<std::string, float>, 2 * kFluidModelSections> parameters_of(const FluidModel& model);
 
-// The models in force, by fluid. Whoever stores them fills it.
+// The models in force, by fluid. The store of the models fills it.
 class FluidModelList {
  public:
   // Null when the fluid has none; until the next change of the list.

@@ -1,6 +1,6 @@
-// What a robot reports to be in force: its parameters and its controller, as JSON for the record.
+// The parameters and the controller that a robot reports to be in force, as JSON for the record.
 //
-// A robot sends both after each Welcome, and what changed after each change. Loop thread; one for each connection.
+// A robot sends both after each Welcome, and each change. Loop thread; one for each connection.
 #pragma once
 
 #include <map>

@@ -1,4 +1,4 @@
-// What the station must know of a robot's past before it welcomes it; the recorder implements it.
+// The recorded past of a robot that the station needs before the Welcome; the recorder implements it.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -1,4 +1,4 @@
-// The way from the station to one connected robot; a robot session implements it.
+// The interface to one connected robot; a robot session implements it.
 //
 // Loop thread. The station drops the port in Station::on_disconnected, which the session calls before it ends.
 #pragma once

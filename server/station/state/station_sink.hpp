@@ -1,4 +1,4 @@
-// What receives all that the station publishes: the recorder, the live feed, the runs.
+// The interface of the station's observers: the recorder, the live feed, the runs.
 //
 // Called on the loop's thread. A sink returns at once, copies what it keeps, and never calls the station from inside.
 #pragma once

@@ -1,4 +1,4 @@
-// The values that flow through the station: what is known of a robot, its samples, events and commands.
+// The values that flow through the station: the state of a robot, its samples, events and commands.
 //
 // Plain values, copied freely. Enumerators are those of the protocol; protocol::text() gives their JSON spelling.
 #pragma once
@@ -108,7 +108,7 @@ struct InForceRecord {
 
 // Who may command a robot now.
 struct ControlState {
-  std::string holder;            // an actor; empty: nobody, whoever commands takes it
+  std::string holder;            // an actor; empty: nobody, the next actor to command takes it
   std::int64_t taken_at_us = 0;  // UTC
   std::string requested_by;      // who has asked the holder for it; empty: nobody
   bool operator==(const ControlState&) const = default;

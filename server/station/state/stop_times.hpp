@@ -1,6 +1,6 @@
-// How long emergency stops took, since the start of the program: from the request's arrival at the station until its
-// frame left, until the robot answered that it had obeyed, and until telemetry showed duty 0. Only stops of robots that
-// were connected count: one that is kept for a robot's return waits for that.
+// Durations of emergency stops since the start of the program: from the request's arrival at the station until its
+// frame was sent, until the robot answered that it had obeyed, and until telemetry showed duty 0. Only stops of
+// connected robots count: a stop for an absent robot waits for its return.
 #pragma once
 
 #include <algorithm>

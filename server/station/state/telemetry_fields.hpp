@@ -1,5 +1,4 @@
-// The one table of the fields of telemetry: what a robot says of each sample, and what it says once for a batch of
-// them.
+// The table of the fields of telemetry: those of each sample, and those of a batch of samples.
 //
 // A field is a member of Sample or SampleContext and a row of kSampleFields or kBatchFields. Everything that copies,
 // stores, reads, hashes or exports samples visits the rows, so a new field needs no line there. The loops have constant

@@ -5,8 +5,8 @@
 //                                 · detail)
 //   where a number has 8 bytes, little-endian; a text is its length in bytes, a number, and then its bytes in UTF-8
 //
-// So whoever holds one hash of the chain holds all that was written up to there: docs/database.md. The salt keeps the
-// content of an entry secret from whoever is shown its content_hash only.
+// So one hash of the chain proves all that was written up to it: docs/database.md. The salt keeps the content of an
+// entry secret from readers of its content_hash.
 //
 // On the thread that owns the handle. The chain's head is read from the table for each entry, inside the transaction
 // that it is part of: a transaction that fails takes its entries, and nothing else, with it. Throws SQLite::Exception.

@@ -1,4 +1,4 @@
-// Pages of the audit, newest first, for whoever asks what happened.
+// Pages of the audit, newest first.
 //
 // On the thread that owns the handle. A page looks at a bounded number of entries, whether they match or not.
 #pragma once

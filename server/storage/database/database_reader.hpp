@@ -3,9 +3,9 @@
 //   auto query = [id](SQLite::Database& database) { return count_rows(database, id); };   // owns copies, at most 20 ms
 //   const int rows = co_await reader.ask(std::move(query));
 //
-// Loop thread. The handle is opened by the first question and used on the worker's thread only. Questions are short, so
-// that no read transaction lives long and whoever stops asking is rid of the work; longer work is a series of them.
-// The worker outlives it.
+// Loop thread. The handle is opened by the first query and used on the worker's thread only. Queries are short, so that
+// no read transaction lasts long and a cancelled caller stops the work; longer work is a series of queries. The worker
+// outlives the reader.
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>

@@ -136,8 +136,8 @@ std::optional<std::string> file_problem(const fs::path& path) {
   }
   const Bytes head{path, kHeadBytes};
   if (head.size() == 0) return "it cannot be read";
-  // The power may have failed while the first page was moved out of the log: SQLite reads it from there, and whoever
-  // opens the file looks at its marks again.
+  // The power may have failed while the first page was moved out of the log: SQLite reads it from there, and
+  // opening the file checks its marks again.
   if (has_log(path) || was_just_begun(path)) return std::nullopt;
   if (!head.begins_with(kMagic)) return "it is not an SQLite database";
   if (head.size() < kHeadBytes) return fmt::format("it is truncated: {} bytes are there", head.size());

@@ -18,8 +18,8 @@ namespace server {
 // it is blank, or ours. Ours in the write-ahead log only looks blank here: then SQLite has to decide.
 std::optional<std::string> file_problem(const std::filesystem::path& path);
 
-// SQLite deletes a write-ahead log whose database is gone. Whoever finds that again needs both, so the log gets another
-// name, which is returned; none when there is nothing to keep. Throws std::filesystem::filesystem_error.
+// SQLite deletes a write-ahead log whose database is gone. Restoring that database needs its log, so this renames
+// the log. Returns the new name; none when there is nothing to keep. Throws std::filesystem::filesystem_error.
 std::optional<std::filesystem::path> set_aside_orphaned_log(const std::filesystem::path& path);
 
 // Whether the error says that the file does not hold what SQLite wrote.

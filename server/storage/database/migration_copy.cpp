@@ -20,7 +20,7 @@ constexpr int kPagesAtOnce = 4096;
 constexpr double kMegabyte = 1e6;
 constexpr std::int64_t kAuditSince = 5;  // version
 
-// Tells two states of one store apart: everything that is recorded counts up in one of these.
+// Distinguishes two states of one store: everything that is recorded increments one of these.
 std::string state_of(SQLite::Database& database, std::int64_t version) {
   const auto text = [&](const char* sql) { return database.execAndGet(sql).getString(); };
   return text("SELECT coalesce(group_concat(name || '=' || value), '') FROM (SELECT * FROM meta ORDER BY name)") +

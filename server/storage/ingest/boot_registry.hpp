@@ -43,7 +43,7 @@ class BootRegistry {
   const BootEntry* find_loaded(BootId boot_id) const;  // null: nothing can be known of it yet
   BootEntry* find_recorded(BootId boot_id);            // null unless samples of it are recorded now
 
-  // The boot's entry, made if there is none. Whoever waits for the answer of an admission counts itself in
+  // The boot's entry, made if there is none. A caller that waits for the answer of an admission counts itself in
   // `admissions`.
   BootEntry& enter(BootId boot_id, const RobotId& robot_id);
 
@@ -71,7 +71,7 @@ class BootRegistry {
   BootEntry* take_due() { return due_.take_first(); }
   // The next boot whose oldest waiting sample is old; null: none. watch() it after its samples were enqueued.
   BootEntry* take_aged(std::int64_t now_us);
-  // Those with gaps or events; whoever takes their records takes them from the list.
+  // Boots with gaps or events; taking their records removes them from the list.
   BootsWithRecords& with_records() { return with_records_; }
   // How many may have holes, and the next of them, which goes to the end of the list; null: it has none any more.
   std::size_t holes() const { return with_holes_.size(); }

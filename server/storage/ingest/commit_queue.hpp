@@ -78,7 +78,7 @@ class CommitQueue {
   // Nobody reports what is durable any more.
   void forget_finished();
 
-  // Whoever waits for all that is enqueued now waits until as many segments have left the queue.
+  // To wait for all that is enqueued now, wait until as many segments have left the queue.
   QueuePosition end() const { return enqueued_; }
   // The same for starts of boots.
   QueuePosition end_of_starts() const { return starts_.empty() ? 0 : starts_.back().after; }

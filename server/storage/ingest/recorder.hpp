@@ -111,7 +111,7 @@ class Recorder final : public StationSink, public RobotArchive {
   boost::asio::awaitable<void> next_commit() { return checkpointer_.next_commit(); }
 
   // Return true when what they name, as far as it was received, is durable, and false after 3 s if it is not yet. Need
-  // run(). Those of samples cut segments short; whoever only reads samples joins waiting() instead.
+  // run(). Those of samples cut segments short; a caller that only reads samples uses waiting() instead.
   boost::asio::awaitable<bool> flush();          // everything: the segments of every robot are cut
   boost::asio::awaitable<bool> flush(BootId);    // the samples and gaps of one boot; nothing is written if none wait
   boost::asio::awaitable<bool> flush_records();  // events, commands and boots

@@ -70,7 +70,7 @@ void append(SQLite::Database& database, const std::string& fluid, const FluidMod
   transaction.commit();
 }
 
-// An error for whoever asked: a disk that is full does not end the station.
+// Returned to the caller as an error: a full disk does not end the station.
 Result<void> stored(Database& database, const std::string& fluid, const FluidModel* model, const Author& by) {
   try {
     append(database.handle(), fluid, model, by);

@@ -4,7 +4,7 @@
 // On the thread that owns the database handle: a reader's, or the disk thread. Prepares its statements once and keeps
 // them; no text is parsed per row. Reads every version of the schema: what
 // a version does not have is NULL there. Between begin() and the end of the samples
-// (or end()) it holds a read transaction on the handle, so whoever stops early says so with end().
+// (or end()) it holds a read transaction on the handle, so a caller that stops early calls end().
 #pragma once
 
 #include <SQLiteCpp/SQLiteCpp.h>

@@ -1,4 +1,4 @@
-// Signing in with a password, and whoever tries to guess one.
+// Signing in with a password, and attempts to guess one.
 #include "server/identity/login_throttle.hpp"
 
 #include "tests/server/api/api_fixture.hpp"

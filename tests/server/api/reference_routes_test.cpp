@@ -179,7 +179,7 @@ TEST_F(ReferenceRoutesTest, StepsAreNotMeasuredByAReferenceThatIsNoLongerWhole) 
   EXPECT_EQ(answer.parsed()["reason"], "reference_changed");
 }
 
-// Whoever may import sends up to 16 MB here; anybody else, and every other route, keeps to 64 kB.
+// A caller that may import may send 16 MB to this route; other callers and other routes are limited to 64 kB.
 TEST_F(ReferenceRoutesTest, OnlyThisRouteTakesALongBody) {
   record();
   const std::string text = body(60'000).dump();

@@ -1,4 +1,4 @@
-// Control at the one door: whoever is not in control moves nothing, and everyone may stop.
+// Control of a robot: only its holder moves the robot, and everyone may stop it.
 #include "tests/server/link/link_fixture.hpp"
 
 namespace server {

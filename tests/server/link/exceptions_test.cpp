@@ -112,7 +112,7 @@ TEST_F(SessionExceptionTest, OfTwoWithinASecondBothNamesAndBothTextsAreLogged) {
   EXPECT_EQ(log.lines_with("GET /api/v1/robots: no such table"), 1U) << log.text();
 }
 
-// Whoever can choose the text fills neither the log nor the memory.
+// A client that chooses the text can fill neither the log nor the memory.
 TEST_F(SessionExceptionTest, OfThousandsOfNamesFewAreLogged) {
   ExceptionLog exceptions;
   const auto flood = [&](const std::string& word) {

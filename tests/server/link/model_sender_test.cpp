@@ -414,7 +414,7 @@ TEST_F(ModelSenderTest, WhatTheRobotTakesBackByItselfIsAssumed) {
   EXPECT_EQ(model().fluid, "") << "of no fluid that the station knows";
 }
 
-TEST_F(ModelSenderTest, TakesNoControlForWhoeverNamedTheFluid) {
+TEST_F(ModelSenderTest, TakesNoControlForTheActorThatNamedTheFluid) {
   begin();
   is_coasting = true;
   name_fluid("water", "user:anna");

@@ -41,7 +41,7 @@ class DoorTest : public ::testing::Test {
     visitor->slot->becomes(state);
     return visitor;
   }
-  // Whoever was ended goes, as its task does at the loop's next turn.
+  // An evicted connection leaves, as its task does at the loop's next turn.
   void go() {
     for (const auto& visitor : visitors) {
       if (visitor->ended) visitor->slot.reset();
@@ -88,8 +88,8 @@ TEST_F(DoorTest, AnIdleOneGivesWayWhenThereIsNoStrangerAndABusyOneNever) {
   EXPECT_EQ(limiter.counters().refused, 1U);
 }
 
-// SAFETY: whoever has most unauthenticated loses one, and the one who came alone to stop a robot stays.
-TEST_F(DoorTest, AFullDoorTakesTheStrangerOfWhoeverHasMost) {
+// SAFETY: the address with most unauthenticated connections loses one; a single client that stops a robot stays.
+TEST_F(DoorTest, AFullLimiterEvictsFromTheAddressWithMostUnauthenticated) {
   Visitor* alone = come("10.0.0.9");
   Visitor* of_two = come("10.0.0.2");
   come("10.0.0.2");

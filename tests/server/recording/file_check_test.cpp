@@ -83,7 +83,7 @@ TEST_F(FileCheckTest, AForeignFileWithAHotJournalStaysByteForByte) {
   EXPECT_EQ(content(path_), file);
   EXPECT_EQ(content(beside(path_, "-journal")), journal);
 
-  // Whoever lets SQLite look first changes it.
+  // SQLite would change it by opening it.
   SQLite::Database{path_.string(), SQLite::OPEN_READWRITE}.execAndGet("SELECT count(*) FROM theirs");
   EXPECT_NE(content(path_), file);
 }

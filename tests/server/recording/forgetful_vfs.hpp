@@ -38,7 +38,7 @@ class ForgetfulVfs {
   // The next writes say SQLITE_FULL and have no effect.
   void refuse_writes(unsigned count);
 
-  // Whoever writes to a database, and not to its log, stands still until let_go().
+  // A writer to the database, not to its log, blocks until let_go().
   void hold_database_writes();
   bool await_held_write(std::chrono::seconds limit) const;  // until somebody does
   void let_go();

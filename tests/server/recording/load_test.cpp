@@ -82,7 +82,7 @@ TEST_F(LoadTest, ABootOfAnOlderProgramIsReadWholeOnce) {
   EXPECT_EQ(number("SELECT durable_next_seq FROM boot"), 260);
 }
 
-// Whoever purges leaves a gap, and below what is durable nothing is looked for.
+// A purge leaves a gap, and nothing is searched below what is durable.
 TEST_F(LoadTest, WhatWasPurgedIsNeitherAHoleNorLost) {
   start();
   connect(robot_);

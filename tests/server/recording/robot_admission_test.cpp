@@ -66,7 +66,7 @@ TEST_F(RobotAdmissionTest, AsksTogetherForAllThatCameMeanwhile) {
   EXPECT_EQ(answers_, (std::map<RobotId, std::string>{{"a", "a"}, {"b", "b"}, {"c", "c"}}));
 }
 
-TEST_F(RobotAdmissionTest, WhoeverFailsLeavesTheOthersAnAnswer) {
+TEST_F(RobotAdmissionTest, AFailedAdmissionLeavesTheOthersTheirAnswer) {
   fails_once_ = true;
   for (const char* robot : {"a", "b"}) ask(robot);
   let_answer();

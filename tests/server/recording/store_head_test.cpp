@@ -187,7 +187,7 @@ TEST_F(StoreHeadTest, AStoreThatBeganAnewIsNoticed) {
   EXPECT_THAT(losses()[0], HasSubstr("another one"));
 }
 
-// SQLite would delete it, and whoever finds the database again needs it.
+// SQLite would delete it, and it is needed when the database is found again.
 TEST_F(StoreHeadTest, TheLogOfADatabaseThatIsGoneIsKept) {
   record(500);
   kill_at_once();

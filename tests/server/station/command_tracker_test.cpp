@@ -52,7 +52,7 @@ TEST_F(CommandTrackerTest, SentThenAcknowledgedThenSeenInTelemetry) {
   EXPECT_TRUE(entry.commands.is_empty());
 }
 
-TEST_F(CommandTrackerTest, WhatIsSentWithAStopIsHeldBackForWhoeverHandsItOver) {
+TEST_F(CommandTrackerTest, RecordsOfAStopAreHeldBackUntilItsSenderPublishesThem) {
   const auto duty = add(set_duty(0.3F));
   std::vector<CommandRecord> held_back;
   entry.commands.sent_with_stop = &held_back;
