@@ -1,4 +1,4 @@
-// What can be computed from a run: reads it page by page, and does the mathematics on a worker.
+// Computations on a run: reads it page by page, and computes on a worker.
 //
 // Loop thread; history and worker outlive it.
 #pragma once

@@ -1,4 +1,4 @@
-// Models, controllers and what control/ computes of them, as JSON: one spelling for files, command line and API.
+// Models, controllers and the results of control/ as JSON: one spelling for files, command line and API.
 //
 // Keys are the names of the fields in control/, with their units. A number that is not finite or not there is null.
 // Reading is strict: a model has kp, b1, b2, alpha, beta and perhaps b3 and dead_time_s, a controller kp, kd, mu;

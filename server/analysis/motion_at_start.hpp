@@ -1,4 +1,4 @@
-// Sees whether a recording begins in motion, which identification cannot know: its model rests before the first sample.
+// Detects that a recording begins in motion; identification assumes that the robot rests before the first sample.
 #pragma once
 
 #include <optional>

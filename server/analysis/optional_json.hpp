@@ -1,4 +1,4 @@
-// A number that may not be there, as JSON.
+// An optional number as JSON.
 #pragma once
 
 #include <cmath>

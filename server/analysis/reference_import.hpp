@@ -1,4 +1,4 @@
-// Puts a position that was measured from outside onto the clock, and to the zero, of a recorded run.
+// Aligns a position measured from outside with the clock and the zero of a recorded run.
 //
 // The text is CSV with the columns t_s (ascending), position_m and, if it has one, position_sd_m. The clock is given by
 // an offset, by the UTC of t_s = 0, by the time that a marker of the run has in the text, or found by correlation with

@@ -1,4 +1,4 @@
-// Doubts the unit of positions from outside that move far more than the robot's own record does.
+// Refuses outside positions whose unit seems wrong: they move far more than the robot's own record.
 //
 // Without a clock by correlation a robot may have missed much of its motion, but not all but a 30th of over 2 m: that
 // looks like centimetres or millimetres. A flow carries a robot along unseen, as when it holds a position that it

@@ -1,4 +1,4 @@
-// Turns the samples of a run into what the mathematics takes: one gapless, equally spaced piece of one boot.
+// Turns the samples of a run into a recording for control/: one gapless, equally spaced piece of one boot.
 #pragma once
 
 #include <limits>

@@ -1,4 +1,4 @@
-// What a page says on /live and what it means, without a socket.
+// The messages of a page on /live, parsed without a socket.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// One page on /live: sends what the feed says, and takes emergency stops and lease renewals.
+// One page on /live: sends the feed's messages, and receives emergency stops and lease renewals.
 //
 // One reader and one writer. The queue between feed and writer is bounded (Subscriber: oldest samples are dropped, and
 // the page is notified). A message of a page has at most 4 kB, and 500 a second are read. A page is let go that is

@@ -1,4 +1,4 @@
-// What the user asked for on the command line.
+// The user's options from the command line.
 #pragma once
 
 #include <optional>

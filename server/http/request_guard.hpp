@@ -1,4 +1,4 @@
-// Decides whether a request is let in, before any route sees it.
+// Accepts or refuses a request before any route sees it.
 //
 // In this order: the Host header names this station (421; keeps out pages that point their own name at this machine);
 // a request that changes something, and /live, comes from the station's own page if from a page at all (403);

@@ -1,4 +1,4 @@
-// The one path where a connection may stop being HTTP, and who takes it over.
+// The path where a connection may be upgraded from HTTP, and the code that takes it over.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

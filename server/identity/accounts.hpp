@@ -1,4 +1,4 @@
-// Users, API tokens and sessions of pages: in memory for those who ask, in the database for the next start.
+// Users, API tokens and sessions of pages: in memory for requests, in the database for the next start.
 //
 // Looking somebody up is synchronous and touches no disk. What gives rights is stored before it is in force; what takes
 // rights away is in force at once, and then stored. SAFETY: a full or failing disk refuses nobody who is signed in:

@@ -1,4 +1,4 @@
-// Credentials: whose a token or a cookie is, and the one-time codes that let a page in.
+// Credentials: the owner of a token or a cookie, and the one-time codes by which a page signs in.
 //
 // The station's own token (256 random bits, base64url) stands in `rheonaut.token`, mode 0600, in the data folder, stays
 // the same over restarts and may do everything; it is for scripts on this machine. Codes live in memory only. What is

@@ -1,4 +1,4 @@
-// Who asks: what a request or an open page may do, and whether that still holds.
+// The caller of a request or an open page: its rights, and whether they still hold.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// What was recorded as JSON text: pages of samples, overviews, and what is missing; spelled as openapi.yaml says.
+// Recorded values as JSON text: pages of samples, overviews, and missing samples; spelled as openapi.yaml says.
 //
 // Written without a JSON tree, since it is long. Still takes milliseconds: on a worker, never on the loop.
 #pragma once

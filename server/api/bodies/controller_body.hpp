@@ -1,4 +1,4 @@
-// A controller as somebody sends it over the API, made into what goes to the robot.
+// Converts a controller from the body of a request to the message for the robot.
 #pragma once
 
 #include "server/api/bodies/json.hpp"

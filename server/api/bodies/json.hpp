@@ -1,4 +1,4 @@
-// JSON of the API: bodies of requests checked member by member, and what was recorded as JSON.
+// JSON of the API: bodies of requests checked member by member, and recorded values as JSON.
 //
 // Errors: bad_request for what is not JSON or has a wrong form, invalid for a value out of range or an unknown kind;
 // each sentence names the member and quotes the value.

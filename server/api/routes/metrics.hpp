@@ -1,4 +1,4 @@
-// The figures of recording, TLS and what failed as Prometheus reads them: text format 0.0.4.
+// Metrics of recording, TLS and failures for Prometheus: text format 0.0.4.
 //
 //   # HELP rheonaut_samples_written_total Samples that are durable.
 //   # TYPE rheonaut_samples_written_total counter

@@ -1,4 +1,4 @@
-// `rheonaut predict`: what a closed-loop experiment will do, beside what a recorded one did.
+// `rheonaut predict`: predicts a closed-loop experiment, and compares it with a recorded one.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// The table of a controller in worlds it was not tuned for, as text.
+// The table of a controller's results with other plants than it was tuned for, as text.
 #pragma once
 
 #include <ostream>

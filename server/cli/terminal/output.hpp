@@ -1,4 +1,4 @@
-// How a tool answers: a table for people, JSON or CSV for programs.
+// The output of a tool: a table for people, JSON or CSV for programs.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,5 +1,5 @@
-// How many entries of the audit strangers and broken scripts can cause: of each action that anybody can cause any
-// number of, a burst and then one each 10 s. The rest is counted, and the count is an entry, at most one each 10 s.
+// Limits the audit entries that unauthenticated clients and broken scripts can cause: for each such action a burst,
+// then one each 10 s. The rest is counted, and the count is an entry, at most one each 10 s.
 //
 // Plain bookkeeping; times are the caller's, steady. The actions are of a fixed set, so it is small.
 #pragma once

@@ -1,4 +1,4 @@
-// What was recorded, for people and programs: samples, overviews and gaps of an excerpt; events, commands.
+// Queries of recorded data: samples, overviews and gaps of an excerpt; events, commands.
 //
 // Loop thread; the queries run on a worker with a read-only connection, in slices of at most 20 ms, so no read
 // transaction lives long, nobody waits behind a long question, and a coroutine that is cancelled asks no further.

@@ -1,4 +1,4 @@
-// Markers: what somebody noted at a sample of a robot's recording. They belong to the recording, so a run shows those
+// Markers: notes of people at a sample of a robot's recording. They belong to the recording, so a run shows those
 // in its spans, and one made afterwards has them, too.
 //
 // Loop thread; SQL on the disk thread and the readers'.

@@ -1,4 +1,4 @@
-// Between time and samples of a robot, over its boots: what a run made afterwards and a marker stand for.
+// Converts between times and samples of a robot over its boots, for markers and runs made afterwards.
 //
 // On the thread that owns the database handle; a few index look-ups for each boot, whatever its length.
 #pragma once

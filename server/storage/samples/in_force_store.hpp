@@ -1,4 +1,4 @@
-// Texts that were in force, each stored once, and from which sample of a boot on; the clock estimates of boots.
+// Documents in force, each stored once, and the sample of a boot from which they hold; the clock estimates of boots.
 //
 // Inside the caller's transaction, on the thread of the handle.
 #pragma once

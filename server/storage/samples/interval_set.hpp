@@ -1,4 +1,4 @@
-// A set of sequence numbers, kept as disjoint intervals: which samples of a boot are here.
+// A set of sequence numbers, kept as disjoint intervals: for example the stored samples of a boot.
 #pragma once
 
 #include <cstdint>

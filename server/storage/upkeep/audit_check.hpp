@@ -1,4 +1,4 @@
-// Whether a chain of audit entries is whole, and whether the commands say what the audit says of them.
+// Checks that a chain of audit entries is complete, and that the commands agree with their audit entries.
 //
 // Reads only, page by page in short transactions and in bounded memory, so it works beside a running station. On the
 // thread that owns the handle, which is in no transaction.

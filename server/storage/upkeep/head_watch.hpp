@@ -1,4 +1,4 @@
-// Keeps the head of the database in a file beside it (store_head), and says when the database is behind it.
+// Keeps the head of the database in a file beside it (store_head), and reports when the database is behind it.
 //
 // Whatever it finds, the station records and carries commands. A loss is reported until an admin acknowledges it, over
 // restarts, too. A head that cannot be written stays as it is, behind the database. Loop thread; reads and writes on

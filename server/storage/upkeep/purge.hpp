@@ -1,4 +1,4 @@
-// Removes stored segments with their rows, and notes that they were there: each of their samples is in a gap of cause
+// Removes stored segments with their rows, and records that they existed: each of their samples is in a gap of cause
 // `retention` afterwards, so that it is neither asked for again nor counted as lost. Gives free pages back.
 //
 // On the disk thread.

@@ -1,4 +1,4 @@
-// Puts a backup where a station finds it. For the command line: no station runs in the folder, its lock is held.
+// Restores a backup into a data folder. For the command line: no station runs in the folder, its lock is held.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Removes what is too old or too much: samples that no run holds, the oldest first. Positions that were measured from
-// outside go as soon as their run is discarded, or they are replaced.
+// Removes samples over the limits of age or size: those that no run holds, the oldest first. Positions that were
+// measured from outside go as soon as their run is discarded, or they are replaced.
 //
 // What may go is found on a reader. It goes in steps of one transaction on the disk thread, each of which ends by the
 // clock, well before 50 ms. Commits go in between, and at least half of the disk thread's time is theirs. Removed pages

@@ -1,5 +1,5 @@
-// Which stored samples may go, the oldest first: whole segments that no run holds, that are durable with all before
-// them, and old enough.
+// Selects the stored samples to remove, the oldest first: whole segments that no run holds, that are durable with all
+// before them, and old enough.
 //
 // A run holds its spans until it is discarded; an open span holds everything from its first sample on. Also kept is the
 // newest segment of a boot that may go on.

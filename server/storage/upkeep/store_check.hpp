@@ -1,4 +1,4 @@
-// Whether a database keeps what docs/database.md promises, and whether each digest is still true.
+// Checks a database against the promises of docs/database.md, and recomputes each digest.
 //
 // Reads only, in short transactions, so it works beside a running station without holding its log. On the thread that
 // owns the handle, which is in no transaction. Of the present schema version.

@@ -1,4 +1,4 @@
-// What a database held at a moment, in a small file beside it: so a store that began anew, a write-ahead log that was
+// A database's state at one moment, in a small file beside it: so a store that began anew, a write-ahead log that was
 // removed or cut, and an older copy in its place are noticed at the next start, and by `rheonaut verify`.
 //
 //   station.sqlite → station.head.json
