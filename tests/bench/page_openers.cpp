@@ -3,7 +3,7 @@
 //   page_openers PORT TOKEN PAGES_A_SECOND ROBOTS
 //
 // Says "ready" when the first pages have opened; ends with its standard input, and prints how many opened, and the p50
-// and worst time of one in ms. Exit status 1 when a page is refused, is not told of ROBOTS robots, or none opened.
+// and worst time of one in ms. Exit status 1 when a page is refused, does not receive ROBOTS robots, or none opened.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -50,7 +50,7 @@ std::string request_of(const std::string& path, const std::string& token, const 
   return "GET " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer " + token + "\r\n" + fields + "\r\n";
 }
 
-// How many robots a text tells of; a name that is cut in two by a chunk or a frame is not counted.
+// How many robots a text contains; a name that is cut in two by a chunk or a frame is not counted.
 int robots_in(const std::string& text) {
   int robots = 0;
   for (auto at = text.find("\"robot_id\""); at != std::string::npos; at = text.find("\"robot_id\"", at + 1)) ++robots;

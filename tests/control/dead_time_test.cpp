@@ -348,7 +348,7 @@ TEST(DeadTime, APredictionBeginsToMoveAfterIt) {
   EXPECT_GT(prediction.position_m[6], 0);
 }
 
-TEST(DeadTime, APlannedExperimentTellsAsMuchOfALateRecord) {
+TEST(DeadTime, APlannedExperimentIsAsCertainOfALateRecord) {
   PlannedExperiment plan;
   plan.duty = prbs_duty(1, 0.5, 20, 0.01);
   plan.position_sd_m = 1e-3;

@@ -206,7 +206,7 @@ TEST(Identify, AbsoluteErrorIsNotMovedByOutliers) {
   EXPECT_EQ(absolute.end, SearchEnd::converged);
 }
 
-TEST(Identify, EndsWhenToldTo) {
+TEST(Identify, EndsWhenCancelled) {
   const Recording recording = position_run(kNonNewtonianModel, std::vector<double>(301, 0.3), 1e-4, 2);
   IdentificationOptions options;
   int calls = 0;

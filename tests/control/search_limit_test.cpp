@@ -45,7 +45,7 @@ TEST(SearchLimit, SharesTheTimeThatIsLeft) {
   EXPECT_EQ(limit.end(), SearchEnd::time_limit);
 }
 
-TEST(SearchLimit, AsksAWatcherWhoHasHeardNothingForLong) {
+TEST(SearchLimit, CallsTheProgressFunctionAfterALongSilence) {
   double now_s = 0;
   int calls = 0;
   SearchLimit limit(100, [&](const Progress&) { return ++calls < 2; }, [&] { return now_s; });

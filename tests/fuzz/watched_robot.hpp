@@ -28,7 +28,7 @@ class WatchedRobot {
   std::size_t transmit(std::size_t capacity);
   void transmit_all();
   // Sends it alone on a connection where nothing waits, and again. It is answered at once and runs once at most;
-  // refused, it changes nothing, now or later: a copy that hears a ping instead drives on in the same way.
+  // refused, it changes nothing, now or later: a copy that receives a ping instead drives on in the same way.
   void order(const protocol::Command& command);
   // Connects anew: every sample that the robot still holds arrives.
   void expect_every_sample();
@@ -61,7 +61,7 @@ class WatchedRobot {
   std::uint64_t now_us_ = 0;
   std::uint64_t made_ = 0;  // samples
 
-  // What the station said, as far as the robot can have heard it.
+  // What the station said, as far as the robot can have received it.
   protocol::FrameReader reader_;
   bool open_ = false, up_ = false, between_frames_ = true, heard_welcome_ = false;
   std::optional<std::uint64_t> heard_at_us_;

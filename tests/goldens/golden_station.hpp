@@ -1,7 +1,7 @@
-// A station whose database, clock and random bytes are given, with robots that say what they are told to.
+// A station whose database, clock and random bytes are given, with robots that send what the test gives them.
 //
 //   GoldenStation station{path_of_a_database};
-//   station.live_text();                            // what pages heard so far
+//   station.live_text();                            // what pages received so far
 //   station.finish();                               // SIGTERM
 //
 // Everything that it writes and says is the same in every run.
@@ -26,7 +26,7 @@ class GoldenStation final : public ApiTest {
 
   // Welcomed, and alive from then on; the robot has booted so long ago.
   TestRobot& dial(const protocol::RobotFrame& hello, microseconds booted_ago = 5s);
-  void pass(microseconds duration);  // pages read meanwhile what they are told
+  void pass(microseconds duration);  // pages read their messages meanwhile
   void send(TestRobot& from, const protocol::RobotFrame& frame, microseconds then = 0s);
   std::int64_t utc_us() const { return clock.utc_us(); }
   void step_utc(microseconds by) { clock.step_utc(by); }
@@ -36,10 +36,10 @@ class GoldenStation final : public ApiTest {
   using Reply = std::function<void(const protocol::Command&)>;
   Answered command(TestRobot& to, const std::string& path, const json& body, const Reply& reply);
 
-  // What a page is told when it opens, and when it says what cannot be acted on.
+  // The messages to a page when it opens, and after an invalid message of it.
   std::string welcome();
   std::string problem_of(const std::string& message);
-  std::string dropped_message();  // what a page hears first that has read too slowly
+  std::string dropped_message();  // the first message to a page that has read too slowly
   // Message by message, a line each: of a page that watches all, and of one that watches some robots; what they heard
   // while `is_kept`.
   bool is_kept = false;

@@ -9,7 +9,7 @@
 namespace server {
 namespace {
 
-TEST(GoldenStory, IsRecordedAndToldAsItWas) {
+TEST(GoldenStory, IsRecordedAndReportedAsItWas) {
   const Story story = record_story();
   for (const auto& [name, text] : story.documents) expect_golden(name, text);
   expect_golden("database.sql", story.database);

@@ -1,4 +1,4 @@
-// A core whose sensors the test sets by hand, connected to a station that hears everything.
+// A core whose sensors the test sets by hand, connected to a station that receives everything.
 //
 // It is a value: a copy goes its own way, which shows what a command or an event changes and what it leaves.
 #pragma once

@@ -6,7 +6,7 @@
 namespace robot_fw {
 namespace {
 
-// A plain gain: the duty for an error of 1 tells who drives.
+// A plain gain: the duty for an error of 1 shows which controller drives.
 ControllerSections gain(std::uint32_t id, float kp) {
   ControllerSections sections;
   sections.controller_id = id;

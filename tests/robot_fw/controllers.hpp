@@ -53,7 +53,7 @@ inline protocol::Controller golden_biquads() {
   return controller;
 }
 
-// The paper's with another gain, so that every duty tells which of the two drives.
+// The paper's with another gain, so that every duty shows which of the two drives.
 inline protocol::Controller scaled_controller(std::uint32_t id, float factor) {
   protocol::Controller controller = golden_controller();
   controller.controller_id = id;

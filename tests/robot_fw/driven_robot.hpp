@@ -20,7 +20,7 @@ inline sim_robot::SimulatedRobotConfig with_boot_id(sim_robot::SimulatedRobotCon
 class DrivenRobot : public ::testing::Test {
  protected:
   explicit DrivenRobot(const sim_robot::SimulatedRobotConfig& config = {}) : robot(with_boot_id(config)) {
-    station.welcome.samples_per_frame = 1;  // every sample is heard in its tick
+    station.welcome.samples_per_frame = 1;  // every sample is received in its tick
     station.connect();
     station.run(2);
   }

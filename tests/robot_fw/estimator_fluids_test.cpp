@@ -1,5 +1,5 @@
-// In fluids that nobody told it, the estimator says how well it knows the position; with the fluid's model confirmed it
-// is as sure as ever.
+// In fluids other than its model's the estimator reports how well it knows the position; with the fluid's model
+// confirmed it is as sure as ever.
 #include <gtest/gtest.h>
 
 #include <algorithm>

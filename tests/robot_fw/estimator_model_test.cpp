@@ -62,7 +62,7 @@ TEST(EstimatorModelOnTheRobot, ItsParametersAreInTheirRanges) {
 }
 
 // Figure 7's loop, closed on the estimate. docs/robot.md has more fluids and seeds.
-TEST(EstimatorModelOnTheRobot, KnowsThePositionInTheFluidsThatItWasToldTheModelOf) {
+TEST(EstimatorModelOnTheRobot, KnowsThePositionInTheFluidsWhoseModelItHas) {
   const auto& middle = control::kNonNewtonianModel;
   for (const auto& plant : {control::FractionalModel{0.1, 0.65 * middle.b1, 0.57 * middle.b2, 1, 1.67, 0.83},
                             control::FractionalModel{0.1, 1.21 * middle.b1, 2.00 * middle.b2, 1, 1.68, 0.72},

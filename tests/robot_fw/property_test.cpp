@@ -167,7 +167,7 @@ TEST_P(AnyOrder, TheDutyStaysInRangeAndIsZeroInEmergency) {
   EXPECT_EQ(station.samples.size(), station.samples.rbegin()->first + 1);  // and not one is missing
 }
 
-// Two robots hear the same; one also hears commands that are too late or came before. Nobody can tell them apart.
+// Two robots receive the same; one also receives late or repeated commands. They behave identically.
 TEST_P(AnyOrder, ExpiredAndRepeatedCommandsChangeNothing) {
   SimulatedRobotConfig config;
   config.boot_id = kBootId;

@@ -53,7 +53,7 @@ TEST(ReferenceProfile, TakesTheTimeOfATrapezoid) {
   EXPECT_EQ(r[256], 0.1F);
 }
 
-TEST(ReferenceProfile, StartsAnewWhenToldTo) {
+TEST(ReferenceProfile, RestartsOnRequest) {
   ReferenceProfile profile;
   for (int i = 0; i < 100; ++i) profile.step(0.1F, 0, {0.05F, 0.1F}, kDtS);
   profile.restart();

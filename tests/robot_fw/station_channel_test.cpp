@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint32_t kSamplesPerFrame = 5;
 
-// A channel and what it was told and says; nobody behind it.
+// A channel with its input and output, without a robot behind it.
 class StationChannelTest : public ::testing::Test {
  protected:
   using State = protocol::FrameReader::State;

@@ -34,7 +34,7 @@ class Telemetry : public DrivenRobot {
     }
     return status;
   }
-  // Every sample from the first to the last heard is there.
+  // Every sample from the first to the last received is there.
   void expect_no_hole() const {
     ASSERT_FALSE(station.samples.empty());
     EXPECT_EQ(station.samples.rbegin()->first + 1 - station.samples.begin()->first, station.samples.size());

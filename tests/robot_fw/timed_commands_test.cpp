@@ -33,7 +33,7 @@ std::uint64_t taken_id(TimedCommands& commands, std::uint64_t now_us) {
   return command ? command->command_id : 0;
 }
 
-TEST(TimedCommands, AreTakenInTheOrderOfTheirTimesAndThenOfTheirComing) {
+TEST(TimedCommands, RunInTheOrderOfTheirTimesAndThenOfTheirArrival) {
   TimedCommands commands;
   for (const auto& [id, at_us] : {std::pair{1U, 300U}, {2U, 100U}, {3U, 200U}, {4U, 100U}}) {
     EXPECT_TRUE(commands.hold(timed(sim_robot::set_duty(0.5F), id, at_us), 0));

@@ -10,7 +10,7 @@
 namespace sim_robot {
 namespace {
 
-TEST(Battery, NeverSagsUnlessItIsTold) {
+TEST(Battery, NeverSagsByDefault) {
   Battery battery{{}};
   for (int k = 0; k < 1000; ++k) battery.step(1);
   EXPECT_EQ(battery.supply_mv(), 3000);

@@ -25,7 +25,7 @@ Spread spread_of(Electrode& electrode) {
   return {mean, std::sqrt(squares / kReadings - mean * mean)};
 }
 
-TEST(Electrode, TellsTheTruthByDefault) {
+TEST(Electrode, MeasuresExactlyByDefault) {
   Electrode electrode{{}, 1};
   electrode.step();
   EXPECT_EQ(electrode.read(175), 175);

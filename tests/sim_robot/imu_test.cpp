@@ -89,7 +89,7 @@ TEST(Imu, RepeatsAndSkipsReadingsByItsOwnClock) {
   EXPECT_LT(skipped, 60);
 }
 
-TEST(Imu, MissesReadsAsOftenAsItIsTold) {
+TEST(Imu, MissesReadsAsOftenAsConfigured) {
   ImuParameters parameters = silent();
   parameters.missed_read_probability = 0.1;
   Imu imu{parameters, 1};

@@ -237,7 +237,7 @@ TEST_F(NetworkFaults, AHandshakeBlocksTheRobotAtRestAndItsMissedTicksAreCounted)
   expect_events({"time_step", "time_step"});
 }
 
-TEST_F(NetworkFaults, TheSameSeedTellsTheSameStory) {
+TEST_F(NetworkFaults, TheSameSeedGivesTheSameStory) {
   const auto frames_heard = [this](std::uint64_t seed) {
     begin_with({.jitter_s = 0.1, .loss_probability = 0.2}, seed);
     std::vector<std::size_t> heard;

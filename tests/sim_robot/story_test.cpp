@@ -81,7 +81,7 @@ TEST_F(StoryTest, HoldsFailsInTheMomentInWhichItDoesNot) {
   EXPECT_LT(now_s(), 1);
 }
 
-TEST_F(StoryTest, WhatTheStationHeardAndTheTruthAreAskedApart) {
+TEST_F(StoryTest, WhatTheStationReceivedAndTheTruthAreSeparate) {
   begin();
   start_driving(0.5);
   outage(3);
@@ -194,7 +194,7 @@ TEST_F(StoryTest, NothingLostFailsWhenSomethingWas) {
   EXPECT_THAT(failure([&] { expect_whole(); }), AllOf(HasSubstr("expected: no sample lost\n"), HasSubstr("lost are ")));
 }
 
-TEST_F(StoryTest, ARobotThatIsNeverHeardHasNoStory) {
+TEST_F(StoryTest, ARobotThatNeverSendsHasNoStory) {
   Setting setting;
   setting.link.down.delay_s = setting.link.up.delay_s = 20;
   EXPECT_THAT(failure([&] { begin(setting); }), HasSubstr("awaited for 10 s: the first sample"));

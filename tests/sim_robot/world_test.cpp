@@ -43,7 +43,7 @@ TEST(World, IsTheModelAloneByDefaultToTheLastBit) {
   EXPECT_EQ(world.flow_m3_s(), 0);
 }
 
-TEST(World, WithAnAccelerometerTellsTheCoreNoPosition) {
+TEST(World, WithAnAccelerometerGivesTheCoreNoPosition) {
   World world{with_everything(1)};
   world.step(0.5);
   const robot_fw::Inputs inputs = world.read(0);

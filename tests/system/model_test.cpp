@@ -86,7 +86,7 @@ TEST_F(ModelTest, ARunThatNamesTheFluidBringsItsModel) {
   expect_in_force();
 }
 
-TEST_F(ModelTest, ARobotThatDrivesIsToldWhenItRests) {
+TEST_F(ModelTest, ARobotThatDrivesIsSentTheModelWhenItRests) {
   begin();
   send(sim_robot::set_auto(0.02F)).expect_accepted();
   pass(1);

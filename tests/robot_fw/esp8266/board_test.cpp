@@ -79,7 +79,7 @@ TEST_F(BoardTest, BlockedTickTurnsThePinOffAndTheNextOneOn) {
   EXPECT_EQ(board->motor().dead_man_trips(), 1U);
 }
 
-TEST_F(BoardTest, MissedTicksAreCountedAndToldAndOneTickRuns) {
+TEST_F(BoardTest, MissedTicksAreCountedAndReportedAndOneTickRuns) {
   connect();
   const std::uint32_t before = missed_ticks();
   while (chip.now_us % 10'000 != 1'000) {
@@ -192,7 +192,7 @@ TEST_F(BoardTest, ParametersAreWrittenWithTheMotorOffAndKept) {
   EXPECT_EQ(board->robot().mode(), rheonaut_MODE_AUTO) << "beyond the default limit of 1 m";
 }
 
-TEST_F(BoardTest, LedTellsTheState) {
+TEST_F(BoardTest, LedShowsTheState) {
   boot();
   EXPECT_EQ(board->led_pattern(), LedPattern::connecting);
   come_up();

@@ -82,7 +82,7 @@ TEST_F(SamplesElsewhere, AreReadAsTheyWereWrittenAcrossBothBorders) {
   }
 }
 
-TEST_F(SamplesElsewhere, BackfillTellsWhatWasToldLive) {
+TEST_F(SamplesElsewhere, BackfillRepeatsWhatWasSentLive) {
   connect();
   const std::map<std::uint64_t, float> live_mv = impedances_mv(1'250);
   ASSERT_GT(live_mv.size(), 1'200U);

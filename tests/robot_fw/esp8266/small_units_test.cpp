@@ -42,7 +42,7 @@ TEST(TickSchedule, MissedTicksAreCountedNotCaughtUp) {
   EXPECT_EQ(ticks.missed(), 3U);
 }
 
-TEST(ResetCause, WatchdogCrashAndBrownOutAreToldFromTheOthers) {
+TEST(ResetCause, WatchdogCrashAndBrownOutAreDistinguishedFromTheOthers) {
   EXPECT_EQ(reset_cause(0, false), rheonaut_RESET_CAUSE_POWER_ON);
   EXPECT_EQ(reset_cause(0, true), rheonaut_RESET_CAUSE_BROWN_OUT);
   for (const std::uint32_t reason : {1U, 2U, 3U}) EXPECT_EQ(reset_cause(reason, true), rheonaut_RESET_CAUSE_WATCHDOG);

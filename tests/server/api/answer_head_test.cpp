@@ -1,4 +1,4 @@
-// How the head of an answer is framed, and what it tells a browser.
+// How the head of an answer is framed, and its fields for browsers.
 #include "server/http/answer_head.hpp"
 
 #include <gtest/gtest.h>

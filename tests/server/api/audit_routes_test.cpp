@@ -1,4 +1,4 @@
-// Who did what, when and from where, as the route tells it: of commands, refusals, control, sign-ins and accounts.
+// Who did what, when and from where, as the route reports it: of commands, refusals, control, sign-ins and accounts.
 #include <gmock/gmock.h>
 
 #include "server/storage/database/database.hpp"

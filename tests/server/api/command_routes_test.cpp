@@ -113,7 +113,7 @@ TEST_F(CommandRoutesTest, TheLifeOfACommandCountsFromWhenItWasIssued) {
   EXPECT_EQ(ask("POST", kCommands, late).status, 422);
 }
 
-// SAFETY: a page's wish is worth as little as what its operator saw was old; only a stop needs to say nothing.
+// SAFETY: a page's request is refused when its operator saw an old state; only a stop needs no stamp.
 TEST_F(CommandRoutesTest, APageSaysWhatItsOperatorSaw) {
   connect_robot();
   session = 1;
@@ -208,7 +208,7 @@ TEST_F(CommandRoutesTest, ControlIsTakenAndGivenBack) {
   EXPECT_EQ(ask("POST", "/api/v1/robots/r9/control", {{"action", "take"}}).status, 404);
 }
 
-TEST_F(CommandRoutesTest, WhoIsNotInControlIsToldWhoIs) {
+TEST_F(CommandRoutesTest, ARefusalNamesTheHolderOfControl) {
   connect_robot();
   ASSERT_TRUE(station.control({"r1", "session:7", "", ControlAction::take, kControlLease, ""}));
   const Answered answered = ask("POST", kCommands, duty_);

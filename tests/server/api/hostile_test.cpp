@@ -132,7 +132,7 @@ TEST_F(HostileTest, OversizedAndDeeplyNestedJsonIsRefused) {
   expect_stops();
 }
 
-// It goes on saying that it is there, and takes nothing: what it was told waits in bounds, and then it goes.
+// The client stays alive and reads nothing: its messages wait within bounds, and then its connection ends.
 TEST_F(HostileTest, APageThatNeverReadsIsLetGo) {
   Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
   ASSERT_TRUE(page.open());
@@ -159,7 +159,7 @@ TEST_F(HostileTest, APageThatNeverReadsIsLetGo) {
 }
 
 // A flood of messages is the flooder's own wait; a stop is obeyed all the same.
-TEST_F(HostileTest, ATalkativePageIsHeardABoundedNumberOfTimesASecond) {
+TEST_F(HostileTest, ATalkativePageIsReadABoundedNumberOfTimesASecond) {
   Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
   const std::size_t before = robot->commands().size();
   std::size_t heard = 0;

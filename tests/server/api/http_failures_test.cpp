@@ -37,7 +37,7 @@ class HttpFailuresTest : public ApiTest {
   CapturedLog log;
 };
 
-TEST_F(HttpFailuresTest, ADatabaseThatFailsIsToldWithoutItsWords) {
+TEST_F(HttpFailuresTest, ADatabaseThatFailsIsReportedWithoutItsText) {
   connect_robot();
   ASSERT_EQ(ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}}).status, 201);
   spoil("PRAGMA foreign_keys = OFF; ALTER TABLE run RENAME TO lost; ALTER TABLE user RENAME TO nobody");

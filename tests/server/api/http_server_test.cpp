@@ -187,7 +187,7 @@ TEST_F(HttpServerTest, RefusesALongTargetAndTooManyFields) {
   expect_alive();
 }
 
-TEST_F(HttpServerTest, WhoMayNotSendABodyIsToldBeforeItArrives) {
+TEST_F(HttpServerTest, ACallerWithoutTheRightIsRefusedBeforeItsBodyArrives) {
   const struct {
     const char* head;
     const char* status;
@@ -254,7 +254,7 @@ TEST_F(HttpServerTest, AnIdleConnectionEndsAfterAMinute) {
   EXPECT_TRUE(client.closed());
 }
 
-TEST_F(HttpServerTest, TellsAWaitingClientToGoOn) {
+TEST_F(HttpServerTest, LetsAWaitingClientContinue) {
   RawClient client{clock, api->port()};
   client.send(
       head("POST /api/v1/runs", "Content-Type: application/json\r\nContent-Length: 2\r\nExpect: 100-continue\r\n"));

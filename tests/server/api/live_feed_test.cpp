@@ -68,7 +68,7 @@ TEST_F(LiveFeedTest, StampsTenTimesASecond) {
   EXPECT_EQ(all.back()["stamp_us"], clock.steady_us());
 }
 
-TEST_F(LiveFeedTest, TellsLinkModeAndEmergencyAtOnceAndTheRestWithTheNextStamp) {
+TEST_F(LiveFeedTest, SendsLinkModeAndEmergencyAtOnceAndTheRestWithTheNextStamp) {
   live.on_robot(robot);
   EXPECT_EQ(types(), Types{"robot"});
   robot.durable_next_seq = 5;
@@ -85,7 +85,7 @@ TEST_F(LiveFeedTest, TellsLinkModeAndEmergencyAtOnceAndTheRestWithTheNextStamp) 
   EXPECT_EQ(types(), (Types{"robot", "samples"}));
 }
 
-TEST_F(LiveFeedTest, NeverTellsAnOlderStateAfterANewerOne) {
+TEST_F(LiveFeedTest, NeverSendsAnOlderStateAfterANewerOne) {
   live.on_robot(robot);
   live.on_robot(robot);  // waits for the stamp
   robot.context.setpoint_m = 0.1F;
@@ -155,7 +155,7 @@ TEST_F(LiveFeedTest, GathersSamplesUntilTheyAreFiftyMilliseconds) {
   EXPECT_EQ(types(), (Types{"samples", "robot"})) << "in the order in which it happened";
 }
 
-TEST_F(LiveFeedTest, OfWhatItDoesNotWatchAPageHearsLargeChangesWithTheNextStamp) {
+TEST_F(LiveFeedTest, OfWhatItDoesNotWatchAPageReceivesLargeChangesWithTheNextStamp) {
   RobotState other = robot;
   other.id = "r2";
   live.on_robot(robot);
@@ -181,7 +181,7 @@ TEST_F(LiveFeedTest, OfWhatItDoesNotWatchAPageHearsLargeChangesWithTheNextStamp)
   EXPECT_EQ(types(), Types{"stamp"}) << "nothing of small changes";
 }
 
-TEST_F(LiveFeedTest, WhoBeginsToWatchBeforeTheStampHearsWhatChanged) {
+TEST_F(LiveFeedTest, APageThatBeginsToWatchBeforeTheStampReceivesWhatChanged) {
   live.watch(listener, {});
   live.on_robot(robot);
   live.watch(listener, {"r1"});
@@ -247,7 +247,7 @@ TEST_F(LiveFeedTest, ARobotThatIsWatchedNeedNotBeKnown) {
   EXPECT_EQ(types(), Types{});
 }
 
-TEST_F(LiveFeedTest, WhoSaidWhatItWatchesHearsOneLogWithEachStamp) {
+TEST_F(LiveFeedTest, APageThatNamedItsRobotsReceivesOneLogWithEachStamp) {
   Subscriber all{loop};
   live.add(all);
   live.watch(listener, {});
@@ -286,7 +286,7 @@ TEST_F(LiveFeedTest, WritesOneTextForAll) {
   EXPECT_EQ(other.pop(), nullptr);
 }
 
-TEST_F(LiveFeedTest, ASlowListenerLosesTheOldestSamplesAndHearsHowMany) {
+TEST_F(LiveFeedTest, ASlowListenerLosesTheOldestSamplesAndReceivesHowMany) {
   live.on_robot(robot);
   CommandRecord stop;
   stop.kind = "emergency_stop";
@@ -342,9 +342,9 @@ TEST_F(LiveFeedTest, AHeadlineIsNeverDropped) {
   EXPECT_EQ(std::ranges::count_if(all, is_state), 2 * Subscriber::kMaxMessages + 1);
 }
 
-// However large the fleet, the loop has turns between a few robots and the next, and the page hears all before the
+// However large the fleet, the loop has turns between a few robots and the next, and the page receives all before the
 // stamp.
-TEST_F(LiveFeedTest, AFleetIsToldInTurnsOfTheLoop) {
+TEST_F(LiveFeedTest, AFleetIsSentInTurnsOfTheLoop) {
   clock.settle();
   constexpr std::size_t kFleet = 200;
   const auto change = [&] {
@@ -363,8 +363,8 @@ TEST_F(LiveFeedTest, AFleetIsToldInTurnsOfTheLoop) {
   EXPECT_LE(most, 20U);
 }
 
-// What changes while the fleet is told is told once, the newer state last.
-TEST_F(LiveFeedTest, WhatChangesBetweenTwoTurnsIsToldAfterwards) {
+// A change while the fleet is being sent is sent once, the newer state last.
+TEST_F(LiveFeedTest, WhatChangesBetweenTwoTurnsIsSentAfterwards) {
   clock.settle();
   std::vector<RobotState> fleet(40, robot);
   for (std::size_t i = 0; i < fleet.size(); ++i) fleet[i].id = "fleet-" + std::to_string(10 + i);
@@ -382,7 +382,7 @@ TEST_F(LiveFeedTest, WhatChangesBetweenTwoTurnsIsToldAfterwards) {
   while (told.empty() && loop.poll_one() > 0) listen();
   ASSERT_LT(told.size(), fleet.size());
   fleet.front().durable_next_seq = fleet.back().durable_next_seq = 7;
-  live.on_robot(fleet.front());  // was told: again with the next stamp
+  live.on_robot(fleet.front());  // was sent: again with the next stamp
   live.on_robot(fleet.back());   // was not: once, as it is now
   clock.settle();
   listen();

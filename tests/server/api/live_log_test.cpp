@@ -1,4 +1,4 @@
-// What of commands is told to those who watch.
+// Which changes of commands pages receive.
 #include <gtest/gtest.h>
 
 #include "server/live/live_feed.hpp"
@@ -18,7 +18,7 @@ std::vector<json> messages_of(Subscriber& subscriber) {
 }
 
 // While somebody holds a duty its lease is renewed some ten times a second.
-TEST(LiveLog, OfLeasesThatAreRenewedNobodyHearsOnlyThatOneWasNot) {
+TEST(LiveLog, OfRenewalsOfLeasesOnlyARefusedOneIsSent) {
   boost::asio::io_context loop;
   VirtualClock clock{loop};
   TaskGroup tasks{loop};

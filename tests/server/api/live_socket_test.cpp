@@ -19,7 +19,7 @@ class LiveSocketTest : public ApiTest {
   }
 };
 
-TEST_F(LiveSocketTest, WelcomesWithEveryRobotThenTellsWhatHappens) {
+TEST_F(LiveSocketTest, WelcomesWithEveryRobotThenSendsWhatHappens) {
   connect_robot();
   const auto page = open_page();
   const json welcome = page->hear("welcome");
@@ -98,7 +98,7 @@ TEST_F(LiveSocketTest, RenewsALeaseWithAFreshStampOnly) {
   EXPECT_EQ(commands(rheonaut_Command_renew_lease_tag).size(), 1U);
 }
 
-TEST_F(LiveSocketTest, APageHearsTheSamplesOfTheRobotsItWatches) {
+TEST_F(LiveSocketTest, APageReceivesTheSamplesOfTheRobotsItWatches) {
   connect_robot();
   const auto page = open_page();
   page->say({{"type", "watch"}, {"robots", {"r2"}}});
@@ -120,8 +120,8 @@ TEST_F(LiveSocketTest, APageHearsTheSamplesOfTheRobotsItWatches) {
   }
 }
 
-// What it was not told while it watched others it hears when it begins to watch.
-TEST_F(LiveSocketTest, APageHearsTheStateOfARobotThatItBeginsToWatch) {
+// When a page begins to watch a robot it receives what it missed of that robot.
+TEST_F(LiveSocketTest, APageReceivesTheStateOfARobotThatItBeginsToWatch) {
   connect_robot();
   const auto page = open_page();
   page->say({{"type", "watch"}, {"robots", json::array()}});

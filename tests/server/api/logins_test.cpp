@@ -193,7 +193,7 @@ TEST_F(LoginsTest, TenThousandBadLoginsCostAFewHashesAndSignNobodyOut) {
   ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));
   robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_ACCEPTED, 9);
   EXPECT_EQ(end(stopping).status, 200);
-  // The right password has to wait as well, and no longer than it was told.
+  // The right password has to wait as well, and no longer than the answer said.
   const Answered throttled = log_in("anna", "correct horse");
   ASSERT_EQ(throttled.status, 429);
   clock.run_for(seconds{std::stoi(header(throttled, "Retry-After"))});

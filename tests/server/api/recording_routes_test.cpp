@@ -23,7 +23,7 @@ class RecordingRoutesTest : public ApiTest {
   }
 };
 
-TEST_F(RecordingRoutesTest, TellsWhatWasRecordedAndHowMuchRoomThereIs) {
+TEST_F(RecordingRoutesTest, ReportsWhatWasRecordedAndHowMuchRoomThereIs) {
   set_free_bytes(50'000'000'000);
   connect_robot();
   make_samples(*robot, 0, 20);
@@ -125,7 +125,7 @@ class ShortLogTest : public ApiTest {
   std::uint64_t next_seq_ = 0;
 };
 
-TEST_F(ShortLogTest, ALogThatAForeignProgramHoldsIsToldUntilItEnds) {
+TEST_F(ShortLogTest, ALogThatAForeignProgramHoldsIsReportedUntilItEnds) {
   connect_robot();
   record(5s);
   EXPECT_EQ(held_s(), 0);

@@ -244,7 +244,7 @@ TEST_F(ReferenceImportTest, RowsBeforeAndAfterTheSpanAreLeftOut) {
   EXPECT_EQ(refusal().reason, "not_in_run");
 }
 
-TEST_F(ReferenceImportTest, WhatIsWrongIsToldWithItsLine) {
+TEST_F(ReferenceImportTest, WhatIsWrongIsReportedWithItsLine) {
   request.csv = "# remark\nt_s,position_m\n0,0.1\n0.1,x\n";
   EXPECT_EQ(refusal().detail, "camera.csv line 4: 'x' in column position_m is not a finite number");
   request.csv = "t_s,position_m\n0,0.1\n\n0.1,0.1\n0.1,0.2\n";

@@ -1,4 +1,4 @@
-// Every route under every role and scope: who may do what, and what they are told when they may not.
+// Every route under every role and scope: who may do what, and the answers to those who may not.
 #include <set>
 
 #include "tests/server/api/api_fixture.hpp"

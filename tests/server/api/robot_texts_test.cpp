@@ -78,7 +78,7 @@ TEST_F(RobotTextsTest, ATextIsWrittenAgainWhenItsStateHasChangedAndThenOnly) {
   read_all();
   EXPECT_EQ(texts.written(), 50U);
   ASSERT_TRUE(station.set_fluid(name_of(20), "water", {"token:local", "", 0}));
-  station.on_durable(name_of(30), 31, 4711, 0);  // which no sink hears
+  station.on_durable(name_of(30), 31, 4711, 0);  // of which no sink is notified
   const json list = json::parse(read_all());
   EXPECT_EQ(texts.written(), 52U);
   EXPECT_EQ(list[20]["fluid"], "water");

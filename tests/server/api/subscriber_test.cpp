@@ -39,7 +39,7 @@ TEST(Subscriber, DropsWhatIsOldestWhenThereAreNoSamples) {
   EXPECT_EQ(*listener.pop(), "1");
 }
 
-// Of robots that were told by another way, in order of their ids; a newer state of them waits again.
+// Of robots that were sent by another way, in order of their ids; a newer state of them waits again.
 TEST(Subscriber, ForgetsTheStatesOfARangeOfRobots) {
   boost::asio::io_context loop;
   Subscriber listener{loop};

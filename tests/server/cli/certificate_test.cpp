@@ -53,7 +53,7 @@ TEST_F(CertificateTest, NothingIsOverwrittenUnasked) {
   EXPECT_EQ(certificate().pin, pin);
 }
 
-TEST_F(CertificateTest, ARenewalKeepsKeyNamesAndAuthorityUnlessToldOtherwise) {
+TEST_F(CertificateTest, ARenewalKeepsKeyNamesAndAuthorityByDefault) {
   ask("certificate --data @lab --name lab-pc.local --days 10");
   const TlsCertificate first = certificate();
   const auto authority = load_certificate(file("lab-ca.crt"));

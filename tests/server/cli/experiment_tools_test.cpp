@@ -185,7 +185,7 @@ TEST_F(Identifying, NumbersBeyondAllBoundsAreNoSuccess) {
   EXPECT_THAT(answer.text, Not(HasSubstr("inf")));
 }
 
-TEST_F(Identifying, APlanTellsWhatAnExperimentWouldTell) {
+TEST_F(Identifying, APlanPredictsTheUncertaintyOfAnExperiment) {
   const auto prbs = ask("identify --plan --json").json();
   EXPECT_NEAR(prbs["one_sigma"]["alpha"], 0.021, 0.006);
   EXPECT_THAT(ask("identify --plan --plan-duty step --plan-amplitude 0.3").text, HasSubstr("relative (%)"));

@@ -24,7 +24,7 @@ class RunTools : public RecordingTest {
  protected:
   ToolAnswer ask(const std::string& command) { return cli::ask_tool(folder_, command + " --data @."); }
 
-  // The robot swims for this many samples under this duty, and the station hears of it.
+  // The robot swims for this many samples under this duty, and the station records it.
   void swim(std::size_t count, double duty) {
     SampleBatch batch = robot_.batch(robot_.next_seq, count);
     for (Sample& sample : batch.samples) {
@@ -202,7 +202,7 @@ TEST_F(RunTools, IdentifyRefusesAGapAndSaysWhereItIs) {
   EXPECT_NE(ask("identify --run 1 --to-s 0.99 --structure first_order").exit_code, 1);
 }
 
-TEST_F(RunTools, IdentifyTellsARobotThatRanLateFromLostSamples) {
+TEST_F(RunTools, IdentifyDistinguishesARobotThatRanLateFromLostSamples) {
   begin();
   swim(100, 0.3);
   robot_.late_us = 60'000;

@@ -15,7 +15,7 @@ namespace server::cli {
 struct ToolAnswer {
   int exit_code = 0;
   std::string text;   // standard output
-  std::string error;  // what the user is told when it fails
+  std::string error;  // the message to the user when it fails
   nlohmann::json json() const { return nlohmann::json::parse(text); }
 };
 

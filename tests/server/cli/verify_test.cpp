@@ -52,7 +52,7 @@ TEST_F(VerifyTest, NamesEachFaultInALine) {
   EXPECT_EQ(ask("--run 1 --json").json()["faults"].size(), 1u);
 }
 
-TEST_F(VerifyTest, ADatabaseThatIsNotThereOrForeignOrOldIsToldApart) {
+TEST_F(VerifyTest, ADatabaseThatIsNotThereOrForeignOrOldIsDistinguished) {
   EXPECT_EQ(ask().exit_code, 2);
   EXPECT_FALSE(std::filesystem::exists(path_));
   std::ofstream{path_} << "not a database, but long enough to be looked at as one";
@@ -100,7 +100,7 @@ TEST_F(VerifyTest, ChecksAFileThatIsNamed) {
   EXPECT_EQ(ask().exit_code, 1);
 }
 
-TEST_F(VerifyTest, WalksTheAuditAndTellsItsHead) {
+TEST_F(VerifyTest, ReadsTheAuditAndPrintsItsHead) {
   record();
   stop();
   const ToolAnswer answer = ask("--audit --json");

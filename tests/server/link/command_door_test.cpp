@@ -71,7 +71,7 @@ TEST_F(LinkTest, RefusesWithoutSendingWhatIsOutsideTheEnvelope) {
   EXPECT_TRUE(robot->commands().empty());
 }
 
-TEST_F(LinkTest, AnUnknownAndADisconnectedRobotAreToldApart) {
+TEST_F(LinkTest, AnUnknownAndADisconnectedRobotAreDistinguished) {
   submit(set_duty(0));
   clock.settle();
   EXPECT_EQ(results.at(0).error().code, ErrorCode::not_found);

@@ -69,7 +69,7 @@ TEST_F(InvalidValuesTest, WhatIsNoFiniteNumberIsNothingAndTheSamplesAreKept) {
   EXPECT_TRUE(unusable.samples.empty());
 }
 
-TEST_F(InvalidValuesTest, TheyAreCountedAndToldOnceInTenSeconds) {
+TEST_F(InvalidValuesTest, TheyAreCountedAndReportedOnceInTenSeconds) {
   auto* robot = connect();
   const auto send_broken = [&](std::uint64_t first_seq) {
     robot->send(samples(first_seq, [](auto& frame) {

@@ -4,7 +4,7 @@
 namespace server {
 namespace {
 
-TEST_F(LinkTest, WelcomesARobotAndTellsItWhatIsDurable) {
+TEST_F(LinkTest, WelcomesARobotAndSendsItWhatIsDurable) {
   archive.answer.store_id = 5;
   archive.answer.durable_next_seq = 120;
   archive.answer.durable_next_event_seq = 3;
@@ -264,7 +264,7 @@ TEST_F(LinkTest, SamplesSentAgainDoNotChangeTheLiveState) {
   EXPECT_EQ(station.find("r1")->sample->position_m, 104.0F);
 }
 
-TEST_F(LinkTest, TellsTheRobotWhatIsDurableAndWhatToSendAgain) {
+TEST_F(LinkTest, SendsTheRobotWhatIsDurableAndWhatToSendAgain) {
   auto* robot = connect();
   station.on_durable("r1", 77, 40, 2);
   station.request_resend("r1", 77, 40, 60);

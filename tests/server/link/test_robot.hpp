@@ -1,4 +1,4 @@
-// A robot made by hand for tests of the link: says what the test tells it and keeps what the station says.
+// A robot made by hand for tests of the link: sends what the test gives it and keeps what the station sends.
 #pragma once
 
 #include <functional>
@@ -10,7 +10,7 @@
 
 namespace server {
 
-// Admits everyone, unless told otherwise; remembers what it was asked.
+// Admits everyone by default; keeps the requests.
 class FakeArchive final : public RobotArchive {
  public:
   boost::asio::awaitable<Admission> admit(AdmissionRequest request) override {
@@ -22,7 +22,7 @@ class FakeArchive final : public RobotArchive {
   std::vector<AdmissionRequest> requests;
 };
 
-// Keeps everything it hears.
+// Keeps everything that it is notified of.
 class RecordingSink final : public StationSink {
  public:
   void on_robot(const RobotState& robot) override { robots.push_back(robot); }

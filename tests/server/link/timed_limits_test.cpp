@@ -85,7 +85,7 @@ TEST_F(TimedLimitsTest, ASetpointNowIsNotMoreThanAStepFromOneThatWaits) {
   EXPECT_EQ(refusal(now(set_setpoint(0))), "");
 }
 
-TEST_F(TimedLimitsTest, AStaircaseIsTakenInStepByStep) {
+TEST_F(TimedLimitsTest, AStaircaseIsAdmittedStepByStep) {
   admit(timed(set_setpoint(0.25F), in_ms(1000), "a"));
   admit(timed(set_setpoint(0.5F), in_ms(2000), "a"));
   EXPECT_EQ(refusal(timed(set_setpoint(0.75F), in_ms(3000), "a")), "");

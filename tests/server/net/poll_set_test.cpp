@@ -121,7 +121,7 @@ TEST_F(PollSetTest, WhatIsNotReadToTheEndIsReadyAgain) {
   EXPECT_EQ(heard.size(), 5U) << "a call takes one byte";
 }
 
-// One robot is heard when it speaks; of a fleet one look hears all that has come in the pause.
+// One robot is read when it sends; of a fleet one poll reads all bytes of the pause.
 TEST_F(PollSetTest, AFleetIsLookedAtOncePerPause) {
   add_lines(3);
   all_say();
@@ -252,7 +252,7 @@ TEST_F(PollSetTest, AnEventThatNobodyWatchesDoesNotKeepTheLoopBusy) {
   EXPECT_THAT(heard, ::testing::ElementsAre(0));
 }
 
-TEST_F(PollSetTest, TheEndIsTold) {
+TEST_F(PollSetTest, TheEndIsReported) {
   add_lines(1);
   bool has_ended = false;
   lines[0]->socket().watch([&] {

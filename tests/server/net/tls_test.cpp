@@ -21,7 +21,7 @@ TEST_F(TlsTest, AClientThatSaysNothingIsLetGoAfterTenSecondsAndHoldsNobodyUp) {
   EXPECT_THAT(log.str(), HasSubstr("not done within 10 s"));
 }
 
-TEST_F(TlsTest, WhoDoesNotSpeakTlsIsToldApartAndWhatItSentCanStillBeRead) {
+TEST_F(TlsTest, WhoDoesNotSpeakTlsIsDistinguishedAndWhatItSentCanStillBeRead) {
   start();
   Client client{clock, listener.endpoint()};
   client.send_plain("GET / HTTP/1.1\r\n");

@@ -160,7 +160,7 @@ TEST_F(AdmissionTest, ARobotThatIsRevokedWhileItIsAdmittedIsRefused) {
   EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_NONE);
 }
 
-TEST_F(AdmissionTest, TellsTheStoreAndWhatIsDurable) {
+TEST_F(AdmissionTest, SendsTheStoreAndWhatIsDurable) {
   start();
   connect(robot_);
   make(robot_, 20);
@@ -286,8 +286,8 @@ TEST_F(AdmissionTest, ManyBootsShareACommit) {
   EXPECT_EQ(number("SELECT count(*) FROM boot WHERE connected_at_us IS NOT NULL"), kRobots);
 }
 
-// Another store told the robot so, or this one before it lost it; what came after was overwritten in the ring.
-TEST_F(AdmissionTest, WhatARobotNoLongerHasIsToldApart) {
+// Another store acknowledged them, or this one before it lost them; what came after was overwritten in the ring.
+TEST_F(AdmissionTest, WhatARobotNoLongerHasIsDistinguished) {
   start();
   robot_.next_seq = 900;
   robot_.oldest_seq = 150;

@@ -96,13 +96,13 @@ TEST_F(CommitSpreadTest, ABacklogDrainsInBoundedCommitsBesideAShortLog) {
 }
 
 // What waits for the loop meanwhile, such as an emergency stop, does not wait for all robots.
-TEST_F(CommitSpreadTest, WhatIsDurableIsToldInTurnsOfTheLoop) {
+TEST_F(CommitSpreadTest, WhatIsDurableIsSentInTurnsOfTheLoop) {
   constexpr std::size_t kRobots = 600;
   start();
   connect_robots(kRobots);
   flush();
   std::size_t told = 0;
-  std::vector<std::size_t> seen{0};  // how many were told when the loop came to something else
+  std::vector<std::size_t> seen{0};  // how many were sent when the loop came to other work
   recorder_->set_on_durable([&](const RobotId&, BootId, std::uint64_t, std::uint64_t) {
     ++told;
     boost::asio::post(loop_, [&] { seen.push_back(told); });
@@ -116,7 +116,7 @@ TEST_F(CommitSpreadTest, WhatIsDurableIsToldInTurnsOfTheLoop) {
 }
 
 // A reboot ends the earlier boot only when all that waits of it is written.
-TEST_F(CommitSpreadTest, ARebootInABacklogLosesNothingThatWasHeard) {
+TEST_F(CommitSpreadTest, ARebootInABacklogLosesNothingThatWasReceived) {
   start();
   connect_robots(2);
   flush();

@@ -137,7 +137,7 @@ TEST_F(ExcerptTest, WhatIsNeitherStoredNorLostIsMissing) {
   EXPECT_EQ(missing(excerpt_of(run)), (Ranges{{80, 89}}));
 }
 
-// Pages of any size tell together what one page tells, each all of its part: no more than `limit` of either kind.
+// Pages of any size contain together what one page contains, each all of its part: no more than `limit` of either kind.
 TEST_F(ExcerptTest, GapsComeInPages) {
   const RunId run = record(14);
   std::size_t missing = 0;

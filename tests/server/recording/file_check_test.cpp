@@ -1,4 +1,4 @@
-// What is not ours, or not whole, is told from its bytes and stays as it is; damage at run time says what to do.
+// A foreign or damaged file is detected from its bytes and stays unchanged; the message of damage says what to do.
 #include "server/storage/database/file_check.hpp"
 
 #include <fmt/format.h>

@@ -8,7 +8,7 @@
 //
 // Counted are write, sync, truncation and removal of a database, journal or log, and the barrier between two steps of
 // the shared index. The failing call has its effect, but says SQLITE_IOERR like every later one. Real syncs are left
-// out: the machine's own power stays on. It tells SQLite that writes are safe for their neighbours except where
+// out: the machine's own power stays on. It reports to SQLite that writes are safe for their neighbours except where
 // Survival is torn. Any thread.
 #pragma once
 

@@ -88,7 +88,7 @@ TEST_F(ForgetfulVfsTest, AKillForgetsNothingButMakesNothingDurable) {
   EXPECT_EQ(rows(), 1);
 }
 
-TEST_F(ForgetfulVfsTest, SaysThatTheDiskIsFullAsOftenAsItWasTold) {
+TEST_F(ForgetfulVfsTest, ReportsAFullDiskAsOftenAsRequested) {
   SQLite::Database database = open();
   vfs_.refuse_writes(1);
   EXPECT_THROW(database.exec("INSERT INTO t VALUES (2)"), SQLite::Exception);

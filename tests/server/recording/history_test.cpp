@@ -93,7 +93,7 @@ TEST_F(HistoryTest, PagesFollowOneAnotherOverSegmentsAndSpans) {
   }
 }
 
-TEST_F(HistoryTest, AnswersHoldWhatWasHeardBeforeTheQuestion) {
+TEST_F(HistoryTest, AnswersHoldWhatWasReceivedBeforeTheQuestion) {
   start();
   connect(robot_);
   const RunId id = create();

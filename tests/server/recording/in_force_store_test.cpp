@@ -30,7 +30,7 @@ class InForceStoreTest : public RecordingTest {
   TestRobot robot_;
 };
 
-TEST_F(InForceStoreTest, ATextIsStoredOnceAndWhatIsToldAgainAddsNothing) {
+TEST_F(InForceStoreTest, ATextIsStoredOnceAndWhatIsReportedAgainAddsNothing) {
   say("controller", "{\"kp\":1}", 0);
   say("parameters", "{\"kp\":1}", 0);    // another kind with the same text
   say("controller", "{\"kp\":1}", 500);  // after a reconnection

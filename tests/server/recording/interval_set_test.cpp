@@ -29,7 +29,7 @@ TEST(IntervalSet, TheFirstHoleIsWhereTheCumulativePartEnds) {
   EXPECT_EQ(set.end(), 10u);
 }
 
-TEST(IntervalSet, TellsWhatIsCoveredAndWhatIsMissing) {
+TEST(IntervalSet, KnowsWhatIsCoveredAndWhatIsMissing) {
   IntervalSet set;
   set.insert({2, 4});
   set.insert({6, 8});

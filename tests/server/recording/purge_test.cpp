@@ -109,7 +109,7 @@ TEST_F(PurgeTest, ARunThatComesToABootWhileAPurgeIsUnderWayHoldsIt) {
   pass();
 }
 
-// SAFETY: its newest segment tells whether the robot is latched.
+// SAFETY: its newest segment shows whether the robot is latched.
 TEST_F(PurgeTest, ABootThatComesBackWhileAPurgeIsUnderWayKeepsItsNewestSegment) {
   keep(0);
   record(1000);

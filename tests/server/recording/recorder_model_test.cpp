@@ -43,7 +43,7 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
     trim(robot);
   }
 
-  // What the queue takes whole is heard: it waits or is stored from then on.
+  // What the queue takes completely counts as received: it waits or is stored from then on.
   void send_heard(const TestRobot& robot, std::uint64_t first_seq, std::size_t count) {
     const std::uint64_t refused = recorder_->counters().samples_refused;
     send(robot, first_seq, count);
@@ -90,7 +90,7 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
     for (std::uint64_t seq = oldest_event_seq(); seq < next_event_seq_; ++seq) send_event(robot, seq);
   }
 
-  // Each event is stored once or listed as lost; what was heard is stored, and what the robot holds is not lost.
+  // Each event is stored once or listed as lost; what was received is stored, and what the robot holds is not lost.
   void expect_every_event_once(const TestRobot& robot) {
     std::map<std::uint64_t, int> seen;
     SQLite::Database database = open_for_reading(path_);
@@ -111,8 +111,8 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
     if (!seen.empty()) EXPECT_EQ(seen.rbegin()->first + 1, next_event_seq_);
   }
 
-  // What was heard is read back from memory and disk, each sample from one of them; nothing else is; and what is stored
-  // as durable of a boot is no more than is there.
+  // What was received is read back from memory and disk, each sample from one of them; nothing else is; and what is
+  // stored as durable of a boot is no more than is there.
   void check_on_the_way(const TestRobot& robot) {
     std::set<std::uint64_t> waiting;
     for (const Segment& segment : recorder_->waiting(robot.boot_id, {0, robot.next_seq})) {

@@ -246,7 +246,7 @@ TEST_F(RecorderTest, AcknowledgedSamplesSurviveAKillAndTheRestIsAskedFor) {
   EXPECT_EQ(durable_next_seq_, 150u);
 }
 
-TEST_F(RecorderTest, CloseWritesEverythingThatWasHeard) {
+TEST_F(RecorderTest, CloseWritesEverythingThatWasReceived) {
   start();
   connect(robot_);
   make(robot_, 33);

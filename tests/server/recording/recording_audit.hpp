@@ -1,4 +1,4 @@
-// What the database must hold, by what robots and people were told; and the comparison.
+// What the database must hold by the acknowledgements to robots and people; and the comparison.
 //
 // A RecordingTruth is kept outside the station. The audit reads tables, not the recorder, and returns a sentence for
 // each fault: empty is good.
@@ -22,7 +22,7 @@ struct BootTruth {
   RobotId robot_id;
   float impedance_mv = 0;          // of all its samples, and of no other boot's
   std::uint64_t made = 0;          // samples; sample n has position_m n/1000
-  std::uint64_t acknowledged = 0;  // the robot was told that all below is durable
+  std::uint64_t acknowledged = 0;  // the robot was sent that all below is durable
   IntervalSet let_go;              // samples that the robot lost before they were acknowledged
   std::uint64_t events_made = 0;   // event n has the value n
   std::uint64_t events_acknowledged = 0;
@@ -37,7 +37,7 @@ struct CommandTruth {
 };
 
 struct RecordingTruth {
-  std::uint64_t store_id = 0;  // 0: no robot was told one
+  std::uint64_t store_id = 0;  // 0: no robot was sent one
   std::map<BootId, BootTruth> boots;
   std::map<CommandId, CommandTruth> commands;
   std::set<std::uint64_t> station_events;  // that were said to be durable; by sample_seq

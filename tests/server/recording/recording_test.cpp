@@ -53,7 +53,7 @@ void RecordingTest::start(RecorderOptions options, const RecordingConfig& config
   recorder_->set_on_durable(
       [this](const RobotId& robot_id, BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event_seq) {
         durable_next_seqs_[boot_id] = next_seq;
-        if (latest_boots_[robot_id] != boot_id) return;  // nobody hears it any more
+        if (latest_boots_[robot_id] != boot_id) return;  // no longer connected
         durable_next_seq_ = next_seq;
         durable_next_event_seq_ = next_event_seq;
       });

@@ -69,7 +69,7 @@ class RecordingTest : public ::testing::Test {
 
   // A station begins on this folder: opens the database, loads the runs, records.
   void start(RecorderOptions options = {}, const RecordingConfig& config = {});
-  // SIGTERM: everything heard is on disk afterwards.
+  // SIGTERM: everything received is on disk afterwards.
   void stop();
   // kill -9: what was not committed is gone.
   void kill();
@@ -137,7 +137,7 @@ class RecordingTest : public ::testing::Test {
   History* history_ = nullptr;
   RestoredState restored_;
   std::map<RobotId, BootId> latest_boots_;
-  std::uint64_t durable_next_seq_ = 0;  // as told last, of a robot's latest boot
+  std::uint64_t durable_next_seq_ = 0;  // as sent last, of a robot's latest boot
   std::map<BootId, std::uint64_t> durable_next_seqs_;
   std::uint64_t durable_next_event_seq_ = 0;
   std::vector<Missing> missing_;  // as asked for

@@ -149,7 +149,7 @@ TEST_F(RetentionTest, GapsOfOtherCausesKeepTheirRows) {
 }
 
 // A gap row stands for what was removed, so the boot reads the same to the robot.
-TEST_F(RetentionTest, ARobotThatComesBackAfterARestartIsToldWhatItWasToldBefore) {
+TEST_F(RetentionTest, ARobotThatReconnectsAfterARestartReceivesTheSameAsBefore) {
   keep(7);
   record(1000);
   age(8 * kDay);

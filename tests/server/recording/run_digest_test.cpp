@@ -72,7 +72,7 @@ TEST_F(RunDigestTest, CountsWhatCameAndWhatIsLost) {
   EXPECT_EQ(digest.made_at_us, clock_.utc_us());
 }
 
-// The bytes of docs/database.md, made another way: each sample as its page tells it, written member by member.
+// The bytes of docs/database.md, made another way: each sample as on its page, written member by member.
 TEST_F(RunDigestTest, HashesTheDocumentedBytes) {
   start();
   robot_.context.controller_id = 7;

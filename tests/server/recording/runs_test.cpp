@@ -268,7 +268,7 @@ TEST_F(RunsTest, IsInterruptedByAKillAtTheLastSampleThatIsKnown) {
   send(robot_, batch);
   robot_.next_seq = 130;
   flush();
-  make(robot_, 44);  // heard, but not committed: gone with the station
+  make(robot_, 44);  // received, but not committed: gone with the station
   kill();
   start();
   const Run run = find(id);
@@ -321,7 +321,7 @@ TEST_F(RunsTest, ARobotThatSaidHowFarItWasMayStillSendTheRestOfAnInterruptedRun)
   EXPECT_EQ(find(id).samples_stored, 70u);
 }
 
-TEST_F(RunsTest, AnOrderlyStopInterruptsARunWithEverySampleThatWasHeard) {
+TEST_F(RunsTest, AnOrderlyStopInterruptsARunWithEverySampleThatWasReceived) {
   start();
   connect(robot_);
   const RunId id = create();

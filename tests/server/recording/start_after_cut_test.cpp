@@ -1,4 +1,4 @@
-// What a database finds at its start, robots are told that they may forget: so it has to be durable by then.
+// At a start robots may discard what the database has: so that has to be durable by then.
 #include <gmock/gmock.h>
 #include <stdlib.h>
 

@@ -160,7 +160,7 @@ TEST_F(StoreCheckTest, ARunWhoseSamplesAreOnTheirWayIsNoFault) {
   EXPECT_EQ(found.runs_verified, 2u);
 }
 
-TEST_F(StoreCheckTest, SamplesThatWereHeardBeforeAKillButNeverCameAreLostWithTheBoot) {
+TEST_F(StoreCheckTest, SamplesThatWereReceivedBeforeAKillButNeverCameAreLostWithTheBoot) {
   TestRobot robot;
   robot.boot_id = 5;
   start();
@@ -181,7 +181,7 @@ TEST_F(StoreCheckTest, SamplesThatWereHeardBeforeAKillButNeverCameAreLostWithThe
   EXPECT_THAT(faults(), IsEmpty());
 }
 
-TEST_F(StoreCheckTest, AnUnknownRunIsToldApart) {
+TEST_F(StoreCheckTest, AnUnknownRunIsDistinguished) {
   SQLite::Database database = open_for_reading(path_);
   EXPECT_EQ(check_store(database, {.run = 9, .integrity = false}).error().code, ErrorCode::not_found);
 }

@@ -31,7 +31,7 @@ TEST_F(AuthorityTest, WhoCommandsFirstIsInControlAndAnotherIsRefusedByName) {
   EXPECT_EQ(authority_.of("r1").holder, "session:1");
 }
 
-TEST_F(AuthorityTest, EndsWithSilenceAndIsToldOnce) {
+TEST_F(AuthorityTest, EndsWithSilenceAndIsReportedOnce) {
   ASSERT_TRUE(authority_.use("r1", "session:1"));
   clock_.run_for(kControlLease - 1us);
   EXPECT_FALSE(authority_.use("r1", "session:2"));

@@ -26,7 +26,7 @@ protocol::ParameterPage page_of(std::uint32_t total, std::initializer_list<std::
   return page;
 }
 
-TEST(ParameterTableTest, IsToldWhenEveryParameterIsKnownAndAgainWhenOneHasChanged) {
+TEST(ParameterTableTest, IsReportedWhenEveryParameterIsKnownAndAgainWhenOneHasChanged) {
   ParameterTable table;
   EXPECT_FALSE(table.add(page_of(3, {{"a", 0.1F}, {"b", 2}})).has_value());
   const auto whole = table.add(page_of(3, {{"c", 3}}));

@@ -136,7 +136,7 @@ class StopAllTest : public ::testing::Test {
   std::optional<StopsOfAll> outcome;
 };
 
-TEST_F(StopAllTest, EveryFrameIsHandedOverBeforeAnythingIsToldOfAny) {
+TEST_F(StopAllTest, EveryFrameIsHandedOverBeforeAnythingIsPublished) {
   for (const char* id : {"a", "b", "c"}) connect(id);
   stop_all();
   EXPECT_THAT(notes, ElementsAre("frame a", "frame b", "frame c", "record a", "record b", "record c"));
@@ -223,7 +223,7 @@ TEST_F(StopAllTest, ARetiredRobotThatMayDriveSinceBeforeTheStationStartedIsStopp
   EXPECT_EQ(outcome->records.at(0).state, CommandState::queued) << "it is stopped when it comes back";
 }
 
-TEST_F(StopAllTest, ARetiredRobotThatWasHeardAgainIsStoppedForAMinuteAfterItsLinkWasLost) {
+TEST_F(StopAllTest, ARetiredRobotThatConnectedAgainIsStoppedForAMinuteAfterItsLinkWasLost) {
   station.restore({{.id = "a", .retired_at_us = clock.utc_us()}}, {});
   clock.run_for(1s);
   connect("a");

@@ -33,7 +33,7 @@ TEST_F(TimedCommandsTest, NothingIsDroppedWhileItsSenderIsInControl) {
   EXPECT_THAT(port.sent, IsEmpty());
 }
 
-TEST_F(TimedCommandsTest, WhenControlEndsTheRobotIsToldOnceToDropWhatWaits) {
+TEST_F(TimedCommandsTest, WhenControlEndsTheRobotIsSentOneDropOfWhatWaits) {
   const auto waiting = add_timed();
   tracker.on_sent(entry, waiting->record.id);
   EXPECT_TRUE(timed.drop_outdated(entry, ""));

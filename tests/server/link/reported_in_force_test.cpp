@@ -4,7 +4,7 @@
 namespace server {
 namespace {
 
-class ToldInForceTest : public LinkTest {
+class ReportedInForceTest : public LinkTest {
  protected:
   void say_controller(TestRobot& robot, float kp, std::uint64_t robot_time_us) {
     protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
@@ -17,7 +17,7 @@ class ToldInForceTest : public LinkTest {
   const InForceRecord& latest() const { return sink.in_force.back(); }
 };
 
-TEST_F(ToldInForceTest, AChangeHoldsFromTheFirstSampleMadeAfterIt) {
+TEST_F(ReportedInForceTest, AChangeHoldsFromTheFirstSampleMadeAfterIt) {
   auto* robot = connect();
   const std::uint64_t now_us = robot->robot_now_us() + 100'000;
   robot->send_samples(0, 5, now_us, 0);
@@ -34,7 +34,7 @@ TEST_F(ToldInForceTest, AChangeHoldsFromTheFirstSampleMadeAfterIt) {
   EXPECT_EQ(latest().first_seq, 10U);
 }
 
-TEST_F(ToldInForceTest, WhatARobotSaysWhenItConnectsAgainIsNoChange) {
+TEST_F(ReportedInForceTest, WhatARobotSaysWhenItConnectsAgainIsNoChange) {
   auto* before = connect();
   say_controller(*before, 1, 0);
   say_controller(*before, 2, 0);
