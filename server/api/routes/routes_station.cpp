@@ -39,7 +39,7 @@ Answer make_login_link(StationRoutes parts, Request request) {
 }
 
 Answer log_in(StationRoutes parts, Request request) {
-  if (request.method == "HEAD") {  // whoever only looks, as previews of links do, does not use the code up
+  if (request.method == "HEAD") {  // a preview of the link must not use the code up
     Response response = problem(405, "HEAD is not possible here", "method_not_allowed");
     response.headers.emplace_back("Allow", "GET");
     co_return response;

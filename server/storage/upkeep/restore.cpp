@@ -54,7 +54,7 @@ RestoredStore mark(Database& database, const fs::path& from, const Author& by) {
   SQLite::Statement set{handle, "INSERT OR REPLACE INTO meta (name, value) VALUES (?, ?)"};
   execute(set, "store_id", restored.store_id);
   execute(set, "restored_at_us", by.at_us);
-  handle.exec("DELETE FROM page_session");     // of the time of the backup: whoever was signed out since stays so
+  handle.exec("DELETE FROM page_session");     // of the time of the backup: users signed out since stay so
   handle.exec("UPDATE robot SET fluid = ''");  // SAFETY: robots may have been put into others since
   AuditNote note;
   note.by = by;

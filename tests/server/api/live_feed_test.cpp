@@ -267,7 +267,7 @@ TEST_F(LiveFeedTest, APageThatNamedItsRobotsReceivesOneLogWithEachStamp) {
   EXPECT_EQ(told[0]["events"].size(), 1U);
   ASSERT_EQ(told[0]["commands"].size(), 2U) << "the newest record of each";
   EXPECT_EQ(told[0]["commands"][1]["command_id"], "1");
-  EXPECT_EQ(all.size(), 5U) << "and the stamp; whoever watches all heard it already";
+  EXPECT_EQ(all.size(), 5U) << "and the stamp; a page that watches all received it already";
   for (CommandId id = 1; id <= 64; ++id) {
     command.id = id;
     live.on_command(command);

@@ -71,7 +71,7 @@ TEST_F(StandstillTest, ALongerLifeCountsFromTheTurnBefore) {
   expect_sent(set_duty(500));
   EXPECT_EQ(holder(), "token:local");
   send_during(700ms, post(kCommands, set_duty(2000)));
-  ASSERT_EQ(robot->commands().size(), 2U) << "whoever is in control is";
+  ASSERT_EQ(robot->commands().size(), 2U) << "that of the holder of control is";
   EXPECT_LE(robot->commands().back().valid_until_robot_us, robot->robot_now_us() + 1'300'000);
 }
 

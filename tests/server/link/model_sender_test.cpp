@@ -188,7 +188,7 @@ TEST_F(ModelSenderTest, WhatTheRobotDoesNotHoldYetIsSentAndThenConfirmed) {
   EXPECT_EQ(model().fit_error, 0.002);
   EXPECT_EQ(model().set_at_us, some_model().set_at_us);
   EXPECT_THAT(events(), ElementsAre("model_confirmed"));
-  EXPECT_EQ(sink.commands.back().actor, "token:local") << "on behalf of whoever named the fluid";
+  EXPECT_EQ(sink.commands.back().actor, "token:local") << "on behalf of the actor that named the fluid";
 
   name_fluid("water");
   live(1s);
