@@ -25,7 +25,11 @@ std::string failure_of(const SSL& tls) {
 void Wire::begin_tls(SSL_CTX& context) {
   tls_.reset(SSL_new(&context));
   if (!tls_ || SSL_set_fd(tls_.get(), descriptor_) != 1) throw std::bad_alloc{};
-  SSL_is_server(tls_.get()) == 1 ? SSL_set_accept_state(tls_.get()) : SSL_set_connect_state(tls_.get());
+  if (SSL_is_server(tls_.get()) == 1) {
+    SSL_set_accept_state(tls_.get());
+  } else {
+    SSL_set_connect_state(tls_.get());
+  }
 }
 
 Wire::Handshake Wire::shake_hands() {

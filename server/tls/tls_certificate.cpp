@@ -17,9 +17,8 @@ namespace {
 
 base::Openssl<BIO> open(const fs::path& file) {
   base::Openssl<BIO> bio{BIO_new_file(file.c_str(), "r")};
-  if (!bio)
-    throw std::runtime_error{fmt::format("cannot read '{}': {}", file.string(), base::openssl_error("no reason"))};
-  return bio;
+  if (bio) return bio;
+  throw std::runtime_error{fmt::format("cannot read '{}': {}", file.string(), base::openssl_error("no reason"))};
 }
 
 // A key behind a password would ask for it on the terminal, and the station would wait.
