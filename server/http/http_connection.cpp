@@ -104,7 +104,7 @@ asio::awaitable<void> HttpConnection::watch() {
   while (clock_.steady_us() < deadline_us_) co_await clock_.sleep_for(kWatchInterval);
   if (request_has_begun_) {
     const Response late = problem(408, "the request did not arrive in time", "too_slow");
-    stream_.wire().write(asio::buffer(last_answer(late, stream_.is_secure())));
+    stream_.write_now(last_answer(late, stream_.is_secure()));
   }
   stream_.end();
 }
@@ -116,7 +116,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::secure() {
   if (outcome == TlsHandshakes::Outcome::not_tls) {
     const Response plain =
         problem(400, "this port speaks TLS only: use https:// instead of http://", "plain_http_on_tls_port");
-    stream_.wire().write(asio::buffer(last_answer(plain, false)));
+    stream_.write_now(last_answer(plain, false));
     co_await discard_rest();
   }
   co_return Next::end;

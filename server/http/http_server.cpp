@@ -20,7 +20,7 @@ void say_why(StreamSocket& stream, ConnectionLimiter::Refusal refusal) {
     response = problem(429, "your address has as many connections as the station allows; close some", "busy");
   }
   response.headers.emplace_back("Retry-After", "5");
-  stream.wire().write(asio::buffer(last_answer(response, false)));
+  stream.write_now(last_answer(response, false));
 }
 
 }  // namespace

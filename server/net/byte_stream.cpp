@@ -33,7 +33,7 @@ class Descriptor {
 
 class SocketStream final : public ByteStream {
  public:
-  SocketStream(PollSet& set, std::string peer, bool from_loopback, std::pair<int, Wire> released)
+  SocketStream(PollSet& set, std::string peer, bool from_loopback, std::pair<int, base::Wire> released)
       : peer_{std::move(peer)},
         from_loopback_{from_loopback},
         descriptor_{released.first},
@@ -44,10 +44,11 @@ class SocketStream final : public ByteStream {
 
   // In TLS whole records, as long as a further one has room: so OpenSSL keeps none back, which no epoll would report.
   Read read_now(asio::mutable_buffer into) override {
-    Wire::Attempt last = wire_.read(into);
-    Read read{last.size, static_cast<bool>(last.error)};
+    base::Wire::Attempt last = wire_.read(into.data(), into.size());
+    Read read{last.size, last.has_ended()};
     while (wire_.is_secure() && last.size > 0 && into.size() - read.size >= kMaxRecordBytes) {
-      last = wire_.read(into + read.size);
+      const asio::mutable_buffer rest = into + read.size;
+      last = wire_.read(rest.data(), rest.size());
       read.size += last.size;  // the next read reports an end
     }
     return read;
@@ -55,14 +56,14 @@ class SocketStream final : public ByteStream {
 
   void on_readable(std::function<void()> call) override { socket_.watch(std::move(call)); }
 
-  std::size_t write_now(asio::const_buffer bytes) override { return wire_.write(bytes).size; }
+  std::size_t write_now(asio::const_buffer bytes) override { return wire_.write(bytes.data(), bytes.size()).size; }
 
   asio::awaitable<bool> write(asio::const_buffer bytes) override {
     while (bytes.size() > 0) {
-      const Wire::Attempt last = wire_.write(bytes);
-      if (last.error) co_return false;
+      const base::Wire::Attempt last = wire_.write(bytes.data(), bytes.size());
+      if (last.has_ended()) co_return false;
       bytes += last.size;
-      if (last.wait != Wire::Wait::none) co_await socket_.writable();
+      if (last.wait != base::Wire::Wait::none) co_await socket_.writable();
     }
     co_return true;
   }
@@ -78,7 +79,7 @@ class SocketStream final : public ByteStream {
   std::string peer_;
   bool from_loopback_;
   Descriptor descriptor_;
-  Wire wire_;
+  base::Wire wire_;
   PollSet::Socket socket_;
 };
 

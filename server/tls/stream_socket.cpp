@@ -24,6 +24,11 @@ StreamSocket::StreamSocket(tcp::socket socket) : socket_{std::move(socket)}, wir
   from_loopback_ = remote.address().is_loopback();
 }
 
+StreamSocket::ErrorCode StreamSocket::error_of(const Attempt& attempt) {
+  if (attempt.is_end) return asio::error::eof;
+  return {attempt.error, boost::system::system_category()};
+}
+
 asio::mutable_buffer StreamSocket::scratch() {
   static std::array<std::uint8_t, kRecordBytes> bytes;  // of the loop, which copies into it and seals in one step
   return asio::buffer(bytes);
@@ -34,11 +39,11 @@ asio::awaitable<void> StreamSocket::peer_gone() {
     co_await socket_.async_wait(tcp::socket::wait_read, asio::use_awaitable);
     const Attempt ahead = wire_.peek();
     if (ahead.size > 0) co_await socket_.async_wait(tcp::socket::wait_error, asio::use_awaitable);
-    if (ahead.size > 0 || ahead.error) co_return;
+    if (ahead.size > 0 || ahead.has_ended()) co_return;
   }
 }
 
-std::pair<int, Wire> StreamSocket::release() && { return {socket_.release(), std::move(wire_)}; }
+std::pair<int, base::Wire> StreamSocket::release() && { return {socket_.release(), std::move(wire_)}; }
 
 void StreamSocket::end() {
   boost::system::error_code ignored;

@@ -13,9 +13,10 @@
 #include <boost/beast/websocket/teardown.hpp>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 
-#include "server/tls/wire.hpp"
+#include "base/tls/wire.hpp"
 
 namespace server {
 
@@ -31,7 +32,10 @@ class StreamSocket {
   const std::string& peer() const { return peer_; }  // "192.0.2.7:4711"
   bool from_loopback() const { return from_loopback_; }
   bool is_secure() const { return wire_.is_secure(); }
-  Wire& wire() { return wire_; }  // while it shakes hands nothing else uses the socket but end()
+  base::Wire& wire() { return wire_; }  // while it shakes hands nothing else uses the socket but end()
+
+  // As much as the socket takes at once; the rest is dropped.
+  void write_now(std::string_view bytes) { wire_.write(bytes.data(), bytes.size()); }
 
   template <class Buffers, class Token>
   auto async_read_some(const Buffers& into, Token&& token);
@@ -43,7 +47,7 @@ class StreamSocket {
   boost::asio::awaitable<void> peer_gone();
 
   // Gives the descriptor away, which the loop then knows no longer, and the wire over it.
-  std::pair<int, Wire> release() &&;
+  std::pair<int, base::Wire> release() &&;
   // Both directions; what is under way ends. The descriptor stays until the destructor: another thread may be using it.
   void end();
 
@@ -51,14 +55,15 @@ class StreamSocket {
   template <class Try>
   class Operation;
 
-  using Attempt = Wire::Attempt;
+  using Attempt = base::Wire::Attempt;
 
   template <class Buffers>
   Attempt write_gathered(const Buffers& bytes);
+  static ErrorCode error_of(const Attempt& attempt);
   static boost::asio::mutable_buffer scratch();  // for what is written as one record; valid until the next call
 
   boost::asio::ip::tcp::socket socket_;
-  Wire wire_;
+  base::Wire wire_;
   std::string peer_;
   bool from_loopback_ = false;
 };
@@ -71,17 +76,17 @@ class StreamSocket::Operation {
 
   template <class Self>
   void operator()(Self& self, ErrorCode error = {}) {
-    if (is_done_) return self.complete(last_.error, last_.size);
+    if (is_done_) return self.complete(error_of(last_), last_.size);
     if (error) return self.complete(error, 0);
     last_ = try_();
-    if (last_.wait != Wire::Wait::none) {
+    if (last_.wait != base::Wire::Wait::none) {
       has_waited_ = true;
       auto& socket = stream_.socket_;
-      const auto what = last_.wait == Wire::Wait::readable ? boost::asio::ip::tcp::socket::wait_read
-                                                           : boost::asio::ip::tcp::socket::wait_write;
+      const auto what = last_.wait == base::Wire::Wait::readable ? boost::asio::ip::tcp::socket::wait_read
+                                                                 : boost::asio::ip::tcp::socket::wait_write;
       return socket.async_wait(what, std::move(self));
     }
-    if (has_waited_) return self.complete(last_.error, last_.size);
+    if (has_waited_) return self.complete(error_of(last_), last_.size);
     is_done_ = true;
     boost::asio::post(stream_.get_executor(), std::move(self));
   }
@@ -99,9 +104,9 @@ StreamSocket::Attempt StreamSocket::write_gathered(const Buffers& bytes) {
   const boost::asio::const_buffer front = first == boost::asio::buffer_sequence_end(bytes)
                                               ? boost::asio::const_buffer{}
                                               : boost::asio::const_buffer{*first};
-  if (front.size() == boost::asio::buffer_size(bytes)) return wire_.write(front);
+  if (front.size() == boost::asio::buffer_size(bytes)) return wire_.write(front.data(), front.size());
   const boost::asio::mutable_buffer record = scratch();
-  return wire_.write(boost::asio::buffer(record, boost::asio::buffer_copy(record, bytes)));
+  return wire_.write(record.data(), boost::asio::buffer_copy(record, bytes));
 }
 
 template <class Buffers, class Token>
@@ -112,7 +117,9 @@ auto StreamSocket::async_read_some(const Buffers& into, Token&& token) {
       auto at = boost::asio::buffer_sequence_begin(buffers);
       const auto end = boost::asio::buffer_sequence_end(buffers);
       while (at != end && boost::asio::mutable_buffer{*at}.size() == 0) ++at;
-      return at == end ? Attempt{} : wire_.read(*at);
+      if (at == end) return Attempt{};
+      const boost::asio::mutable_buffer first{*at};
+      return wire_.read(first.data(), first.size());
     };
     Operation operation{*this, std::move(attempt)};
     return boost::asio::async_compose<decltype(on_end), void(ErrorCode, std::size_t)>(std::move(operation), on_end,

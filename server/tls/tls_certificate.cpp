@@ -5,19 +5,20 @@
 #include <fmt/format.h>
 #include <openssl/pem.h>
 
-#include <array>
 #include <ctime>
 #include <stdexcept>
+
+#include "base/tls/public_key.hpp"
 
 namespace server {
 namespace fs = std::filesystem;
 
 namespace {
 
-Openssl<BIO> open(const fs::path& file) {
-  Openssl<BIO> bio{BIO_new_file(file.c_str(), "r")};
-  if (!bio) throw std::runtime_error{fmt::format("cannot read '{}': {}", file.string(), openssl_error("no reason"))};
-  return bio;
+base::Openssl<BIO> open(const fs::path& file) {
+  base::Openssl<BIO> bio{BIO_new_file(file.c_str(), "r")};
+  if (bio) return bio;
+  throw std::runtime_error{fmt::format("cannot read '{}': {}", file.string(), base::openssl_error("no reason"))};
 }
 
 // A key behind a password would ask for it on the terminal, and the station would wait.
@@ -44,7 +45,7 @@ std::string address_of(const ASN1_OCTET_STRING* bytes) {
 
 std::vector<std::string> names_of(const X509& certificate) {
   std::vector<std::string> names;
-  const Openssl<GENERAL_NAMES> found{
+  const base::Openssl<GENERAL_NAMES> found{
       static_cast<GENERAL_NAMES*>(X509_get_ext_d2i(&certificate, NID_subject_alt_name, nullptr, nullptr))};
   for (int i = 0; i < sk_GENERAL_NAME_num(found.get()); ++i) {
     const GENERAL_NAME* name = sk_GENERAL_NAME_value(found.get(), i);
@@ -56,35 +57,22 @@ std::vector<std::string> names_of(const X509& certificate) {
 
 }  // namespace
 
-Openssl<X509> load_certificate(const fs::path& file) {
-  Openssl<X509> certificate{PEM_read_bio_X509(open(file).get(), nullptr, no_password, nullptr)};
+base::Openssl<X509> load_certificate(const fs::path& file) {
+  base::Openssl<X509> certificate{PEM_read_bio_X509(open(file).get(), nullptr, no_password, nullptr)};
   if (certificate) return certificate;
   throw std::runtime_error{
-      fmt::format("'{}' holds no certificate in PEM: {}", file.string(), openssl_error("unreadable"))};
+      fmt::format("'{}' holds no certificate in PEM: {}", file.string(), base::openssl_error("unreadable"))};
 }
 
-Openssl<EVP_PKEY> load_key(const fs::path& file) {
-  Openssl<EVP_PKEY> key{PEM_read_bio_PrivateKey(open(file).get(), nullptr, no_password, nullptr)};
+base::Openssl<EVP_PKEY> load_key(const fs::path& file) {
+  base::Openssl<EVP_PKEY> key{PEM_read_bio_PrivateKey(open(file).get(), nullptr, no_password, nullptr)};
   if (key) return key;
   throw std::runtime_error{fmt::format("'{}' holds no private key in PEM without a password: {}", file.string(),
-                                       openssl_error("unreadable"))};
-}
-
-std::string pin_of(EVP_PKEY& key) {
-  unsigned char* der = nullptr;
-  const int size = i2d_PUBKEY(&key, &der);
-  if (size <= 0) throw std::runtime_error{openssl_error("a public key that cannot be encoded")};
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned int digest_size = 0;
-  EVP_Digest(der, static_cast<std::size_t>(size), digest.data(), &digest_size, EVP_sha256(), nullptr);
-  OPENSSL_free(der);
-  std::string hex;
-  for (unsigned int i = 0; i < digest_size; ++i) hex += fmt::format("{:02x}", digest[i]);
-  return hex;
+                                       base::openssl_error("unreadable"))};
 }
 
 std::string public_key_pem(EVP_PKEY& key) {
-  const Openssl<BIO> memory{BIO_new(BIO_s_mem())};
+  const base::Openssl<BIO> memory{BIO_new(BIO_s_mem())};
   PEM_write_bio_PUBKEY(memory.get(), &key);
   char* text = nullptr;
   const long size = BIO_get_mem_data(memory.get(), &text);
@@ -97,8 +85,8 @@ TlsCertificate describe(X509& certificate) {
   out.not_before_us = utc_us(X509_get0_notBefore(&certificate));
   out.not_after_us = utc_us(X509_get0_notAfter(&certificate));
   EVP_PKEY* key = X509_get0_pubkey(&certificate);
-  if (key == nullptr) throw std::runtime_error{openssl_error("a certificate with a key of an unknown kind")};
-  out.pin = pin_of(*key);
+  if (key == nullptr) throw std::runtime_error{base::openssl_error("a certificate with a key of an unknown kind")};
+  out.pin = base::pin_of(*key);
   out.public_key_pem = public_key_pem(*key);
   return out;
 }

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/tls/openssl.hpp"
+#include "base/tls/openssl.hpp"
 
 namespace server {
 
@@ -19,11 +19,10 @@ struct TlsCertificate {
 };
 
 // The first certificate in a PEM file, or the key. Throw std::runtime_error that names the file.
-Openssl<X509> load_certificate(const std::filesystem::path& file);
-Openssl<EVP_PKEY> load_key(const std::filesystem::path& file);
+base::Openssl<X509> load_certificate(const std::filesystem::path& file);
+base::Openssl<EVP_PKEY> load_key(const std::filesystem::path& file);
 
 TlsCertificate describe(X509& certificate);
-std::string pin_of(EVP_PKEY& key);
 std::string public_key_pem(EVP_PKEY& key);
 
 }  // namespace server

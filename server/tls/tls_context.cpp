@@ -20,21 +20,17 @@ constexpr long kMaxSessions = 4096;  // kept for clients that take no tickets; t
 
 void require(long done, const char* what) {
   if (done == 1) return;
-  throw std::runtime_error{fmt::format("TLS cannot be set up: {}: {}", what, openssl_error("no reason"))};
+  throw std::runtime_error{fmt::format("TLS cannot be set up: {}: {}", what, base::openssl_error("no reason"))};
 }
 
 void set_up(SSL_CTX* context) {
-  require(SSL_CTX_set_min_proto_version(context, TLS1_2_VERSION), "versions");
   require(SSL_CTX_set_max_proto_version(context, TLS1_3_VERSION), "versions");
   require(SSL_CTX_set_cipher_list(context, kCiphers12), "ciphers of TLS 1.2");
   require(SSL_CTX_set_ciphersuites(context, kCiphers13), "ciphers of TLS 1.3");
   require(SSL_CTX_set1_groups_list(context, kGroups), "groups");
-  // A client without hardware for AES puts ChaCha20 first and gets it. A cut connection is an end like any other, after
-  // which the session may be resumed: frames and HTTP messages say themselves how long they are.
-  SSL_CTX_set_options(context, SSL_OP_IGNORE_UNEXPECTED_EOF | SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION |
-                                   SSL_OP_CIPHER_SERVER_PREFERENCE | SSL_OP_PRIORITIZE_CHACHA);
-  SSL_CTX_set_mode(context,
-                   SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER | SSL_MODE_RELEASE_BUFFERS);
+  // A client without hardware for AES puts ChaCha20 first and gets it.
+  SSL_CTX_set_options(context, SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION | SSL_OP_CIPHER_SERVER_PREFERENCE |
+                                   SSL_OP_PRIORITIZE_CHACHA);
   constexpr unsigned char kSessionsOf[] = "rheonaut";
   require(SSL_CTX_set_session_id_context(context, kSessionsOf, sizeof kSessionsOf), "sessions");
   SSL_CTX_set_session_cache_mode(context, SSL_SESS_CACHE_SERVER);
@@ -45,22 +41,21 @@ void set_up(SSL_CTX* context) {
 }  // namespace
 
 std::shared_ptr<const TlsContext> load_tls_context(const fs::path& certificate, const fs::path& key) {
-  const Openssl<X509> leaf = load_certificate(certificate);
-  const Openssl<EVP_PKEY> secret = load_key(key);
+  const base::Openssl<X509> leaf = load_certificate(certificate);
+  const base::Openssl<EVP_PKEY> secret = load_key(key);
   if (X509_check_private_key(leaf.get(), secret.get()) != 1) {
-    openssl_error("");
+    base::openssl_error("");
     throw std::runtime_error{
         fmt::format("the key in '{}' is not that of the certificate in '{}'", key.string(), certificate.string())};
   }
   auto context = std::make_shared<TlsContext>();
   context->certificate = describe(*leaf);
-  context->ssl.reset(SSL_CTX_new(TLS_server_method()));
-  require(context->ssl != nullptr ? 1 : 0, "memory");
+  context->ssl = base::make_tls_context(TLS_server_method());
   set_up(context->ssl.get());
   if (SSL_CTX_use_certificate_chain_file(context->ssl.get(), certificate.c_str()) != 1 ||
       SSL_CTX_use_PrivateKey(context->ssl.get(), secret.get()) != 1) {
     throw std::runtime_error{
-        fmt::format("'{}' cannot be used for TLS: {}", certificate.string(), openssl_error("no reason"))};
+        fmt::format("'{}' cannot be used for TLS: {}", certificate.string(), base::openssl_error("no reason"))};
   }
   return context;
 }

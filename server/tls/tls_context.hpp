@@ -7,13 +7,13 @@
 #include <filesystem>
 #include <memory>
 
-#include "server/tls/openssl.hpp"
+#include "base/tls/openssl.hpp"
 #include "server/tls/tls_certificate.hpp"
 
 namespace server {
 
 struct TlsContext {
-  Openssl<SSL_CTX> ssl;
+  base::Openssl<SSL_CTX> ssl;
   TlsCertificate certificate;
 };
 

@@ -41,7 +41,7 @@ asio::awaitable<TlsHandshakes::Outcome> TlsHandshakes::secure(StreamSocket& sock
 
 asio::awaitable<TlsHandshakes::End> TlsHandshakes::shake_hands(StreamSocket& socket) {
   co_await socket.tcp().async_wait(tcp::socket::wait_read, asio::use_awaitable);
-  Wire& wire = socket.wire();
+  base::Wire& wire = socket.wire();
   std::uint8_t first = 0;
   if (::recv(socket.tcp().native_handle(), &first, 1, MSG_PEEK | MSG_DONTWAIT) != 1) {
     co_return End{Outcome::failed, "closed before it began"};
@@ -50,10 +50,10 @@ asio::awaitable<TlsHandshakes::End> TlsHandshakes::shake_hands(StreamSocket& soc
   wire.begin_tls(*context_->ssl);
   for (;;) {
     auto step = [&wire] { return wire.shake_hands(); };
-    const Wire::Handshake reached = co_await worker_.run(std::move(step));
+    const base::Wire::Handshake reached = co_await worker_.run(std::move(step));
     if (!reached.failure.empty()) co_return End{Outcome::failed, reached.failure};
-    if (reached.wait == Wire::Wait::none) co_return End{};
-    const auto what = reached.wait == Wire::Wait::readable ? tcp::socket::wait_read : tcp::socket::wait_write;
+    if (reached.wait == base::Wire::Wait::none) co_return End{};
+    const auto what = reached.wait == base::Wire::Wait::readable ? tcp::socket::wait_read : tcp::socket::wait_write;
     co_await socket.tcp().async_wait(what, asio::use_awaitable);
   }
 }

@@ -76,11 +76,9 @@ asio::awaitable<void> StationConnection::serve() {
 // The wait came before, so that nothing lies in the buffer but what is handed on at once: all connections share it.
 bool StationConnection::take_bytes() {
   thread_local std::array<std::uint8_t, 4096> bytes;
-  boost::system::error_code error;
-  const std::size_t size = socket_.read_some(bytes.data(), bytes.size(), error);
-  if (error == asio::error::would_block) return true;
-  if (error) return false;
-  const bool keep = speaker_.on_bytes({bytes.data(), size});
+  const base::Wire::Attempt read = socket_.read(bytes.data(), bytes.size());
+  if (read.size == 0) return !read.has_ended();
+  const bool keep = speaker_.on_bytes({bytes.data(), read.size});
   flush();
   notice_welcome();
   return keep;
@@ -112,9 +110,9 @@ void StationConnection::flush() {
 
 // True when all of it was taken; keeps the rest otherwise.
 bool StationConnection::write() {
-  boost::system::error_code error;
-  frame_sent_ += socket_.write_some({frame_.data() + frame_sent_, frame_size_ - frame_sent_}, error);
-  if (error && error != asio::error::would_block) close();
+  const base::Wire::Attempt written = socket_.write({frame_.data() + frame_sent_, frame_size_ - frame_sent_});
+  frame_sent_ += written.size;
+  if (written.has_ended()) close();
   return is_open_ && frame_sent_ == frame_size_;
 }
 

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <string>
 
+#include "base/tls/wire.hpp"
 #include "protocol/bytes.hpp"
 #include "sim_robot/client/dialling.hpp"
 #include "sim_robot/client/station_trust.hpp"
@@ -19,8 +20,6 @@ namespace sim_robot {
 
 class StationSocket {
  public:
-  using ErrorCode = boost::system::error_code;
-
   explicit StationSocket(boost::asio::io_context& loop) : socket_(loop) {}
 
   // Dials, and shakes hands when there is a trust; empty: connected, else why not. Within `limit` each for resolving
@@ -29,9 +28,8 @@ class StationSocket {
 
   // False when it was cancelled or closed.
   boost::asio::awaitable<bool> wait_readable();
-  // asio::error::would_block when there is nothing, or no room.
-  std::size_t read_some(std::uint8_t* into, std::size_t capacity, ErrorCode& error);
-  std::size_t write_some(protocol::Bytes bytes, ErrorCode& error);
+  base::Wire::Attempt read(std::uint8_t* into, std::size_t capacity) { return wire_.read(into, capacity); }
+  base::Wire::Attempt write(protocol::Bytes bytes) { return wire_.write(bytes.first, bytes.size); }
   bool has_unread();
 
   void cancel();
@@ -41,11 +39,11 @@ class StationSocket {
 
  private:
   boost::asio::awaitable<std::string> shake_hands(StationAddress station);
-  void forget_tls();
+  void forget_wire();
 
   boost::asio::ip::tcp::socket socket_;
-  StationTrust::Connection tls_;
-  StationTrust::Session session_;
+  base::Wire wire_{-1};  // of no descriptor until it is connected
+  base::Openssl<SSL_SESSION> session_;
 };
 
 }  // namespace sim_robot

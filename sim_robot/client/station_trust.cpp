@@ -1,16 +1,11 @@
 // Sets up OpenSSL as a client and compares keys.
 #include "sim_robot/client/station_trust.hpp"
 
-#include <openssl/evp.h>
-#include <openssl/x509.h>
-#include <openssl/x509v3.h>
-
-#include <algorithm>
-#include <array>
 #include <boost/asio/ip/address.hpp>
 #include <cctype>
-#include <new>
 #include <stdexcept>
+
+#include "base/tls/public_key.hpp"
 
 namespace sim_robot {
 namespace {
@@ -30,23 +25,6 @@ std::string parse_pin(const std::string& text) {
   throw std::invalid_argument("--tls-pin: '" + text + "' is not a SHA-256 of 64 hexadecimal digits");
 }
 
-std::string pin_of(const X509& certificate) {
-  unsigned char* der = nullptr;
-  const int size = i2d_X509_PUBKEY(X509_get_X509_PUBKEY(&certificate), &der);
-  if (size <= 0) return "";
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned int digest_size = 0;
-  EVP_Digest(der, static_cast<std::size_t>(size), digest.data(), &digest_size, EVP_sha256(), nullptr);
-  OPENSSL_free(der);
-  constexpr char kHex[] = "0123456789abcdef";
-  std::string hex;
-  for (unsigned int i = 0; i < digest_size; ++i) {
-    hex += kHex[digest[i] / 16U];
-    hex += kHex[digest[i] % 16U];
-  }
-  return hex;
-}
-
 void believe(SSL_CTX* context, const std::string& authority, const std::string& host) {
   if (SSL_CTX_load_verify_locations(context, authority.c_str(), nullptr) != 1) {
     throw std::invalid_argument("--tls-ca: '" + authority + "' holds no certificates in PEM");
@@ -64,24 +42,11 @@ void believe(SSL_CTX* context, const std::string& authority, const std::string& 
 
 StationTrust::StationTrust(const std::optional<std::string>& pin, const std::optional<std::string>& authority,
                            const std::string& host)
-    : context_(SSL_CTX_new(TLS_client_method())), pin_(pin ? parse_pin(*pin) : "") {
+    : context_(base::make_tls_context(TLS_client_method())), pin_(pin ? parse_pin(*pin) : "") {
   if (!pin && !authority) throw std::invalid_argument("TLS needs --tls-pin or --tls-ca");
-  if (!context_) throw std::bad_alloc{};
-  SSL_CTX_set_min_proto_version(context_.get(), TLS1_2_VERSION);
   SSL_CTX_set_cipher_list(context_.get(), kCiphers12);
-  SSL_CTX_set_mode(context_.get(),
-                   SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER | SSL_MODE_RELEASE_BUFFERS);
-  // A cut connection is an end like any other, after which the session may be resumed: frames say how long they are.
-  SSL_CTX_set_options(context_.get(), SSL_OP_IGNORE_UNEXPECTED_EOF);
   SSL_CTX_set_session_cache_mode(context_.get(), SSL_SESS_CACHE_CLIENT | SSL_SESS_CACHE_NO_INTERNAL);
   if (authority) believe(context_.get(), *authority, host);
-}
-
-StationTrust::Connection StationTrust::connection() const {
-  Connection made{SSL_new(context_.get())};
-  if (!made) throw std::bad_alloc{};
-  SSL_set_connect_state(made.get());
-  return made;
 }
 
 // SAFETY: a station with another key could give the robot any command. OpenSSL itself refuses a certificate that
@@ -89,7 +54,8 @@ StationTrust::Connection StationTrust::connection() const {
 std::string StationTrust::objection(const SSL& connection) const {
   if (pin_.empty()) return "";
   const X509* certificate = SSL_get0_peer_certificate(&connection);
-  const std::string found = certificate == nullptr ? "none" : pin_of(*certificate);
+  const EVP_PKEY* key = certificate == nullptr ? nullptr : X509_get0_pubkey(certificate);
+  const std::string found = key == nullptr ? "none" : base::pin_of(*key);
   return found == pin_ ? "" : "its key has the pin " + found;
 }
 

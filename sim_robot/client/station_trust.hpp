@@ -4,11 +4,10 @@
 // one. One trust serves any number of robots on one thread.
 #pragma once
 
-#include <openssl/ssl.h>
-
-#include <memory>
 #include <optional>
 #include <string>
+
+#include "base/tls/openssl.hpp"
 
 namespace sim_robot {
 
@@ -20,25 +19,12 @@ class StationTrust {
   StationTrust(const std::optional<std::string>& pin, const std::optional<std::string>& authority,
                const std::string& host);
 
-  struct Free {
-    void operator()(SSL_CTX* context) const { SSL_CTX_free(context); }
-    // Its session may be resumed though it was cut; after a fault OpenSSL has forgotten it.
-    void operator()(SSL* connection) const {
-      SSL_set_shutdown(connection, SSL_SENT_SHUTDOWN | SSL_RECEIVED_SHUTDOWN);
-      SSL_free(connection);
-    }
-    void operator()(SSL_SESSION* session) const { SSL_SESSION_free(session); }
-  };
-  using Connection = std::unique_ptr<SSL, Free>;
-  using Session = std::unique_ptr<SSL_SESSION, Free>;
-
-  // A client's connection that has not begun.
-  Connection connection() const;
+  SSL_CTX& context() const { return *context_; }  // of the connections to the station
   // After its handshake: why it is not the station's; empty: it is.
   std::string objection(const SSL& connection) const;
 
  private:
-  std::unique_ptr<SSL_CTX, Free> context_;
+  base::Openssl<SSL_CTX> context_;
   std::string pin_;  // lower case; empty: none
 };
 

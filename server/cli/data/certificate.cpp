@@ -65,7 +65,7 @@ std::vector<std::string> names_of(const Certificate& options, const Files& files
 // After a crash either nothing or both files of a pair are there; a key without certificate is used.
 void make_authority_unless_there(const Files& files, std::ostream& out) {
   if (fs::exists(files.authority)) return;
-  const Openssl<EVP_PKEY> key = fs::exists(files.authority_key) ? load_key(files.authority_key) : make_key();
+  const base::Openssl<EVP_PKEY> key = fs::exists(files.authority_key) ? load_key(files.authority_key) : make_key();
   write_private(files.authority_key, key_pem(*key));
   write_private(files.authority, certificate_pem(*make_authority(*key)));
   fmt::print(out, "made     {}, the authority of this lab\n", files.authority.string());
@@ -119,10 +119,10 @@ int run(const Certificate& options, std::ostream& out) {
   const std::vector<std::string> names = names_of(options, files);
   make_authority_unless_there(files, out);
   const bool keeps_key = fs::exists(files.key) && !options.new_key;
-  const Openssl<EVP_PKEY> key = keeps_key ? load_key(files.key) : make_key();
-  const Openssl<X509> authority = load_certificate(files.authority);
-  const Openssl<EVP_PKEY> authority_key = load_key(files.authority_key);
-  const Openssl<X509> made = make_certificate(*key, names, options.days, *authority, *authority_key);
+  const base::Openssl<EVP_PKEY> key = keeps_key ? load_key(files.key) : make_key();
+  const base::Openssl<X509> authority = load_certificate(files.authority);
+  const base::Openssl<EVP_PKEY> authority_key = load_key(files.authority_key);
+  const base::Openssl<X509> made = make_certificate(*key, names, options.days, *authority, *authority_key);
   if (!keeps_key) write_private(files.key, key_pem(*key));
   write_private(files.certificate, certificate_pem(*made));
   print_what_to_do(files, describe(*made), out);

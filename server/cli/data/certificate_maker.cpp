@@ -19,12 +19,12 @@ constexpr long kDaySeconds = 24 * 60 * 60;
 constexpr long kX509Version3 = 2;
 
 void require(bool done, const char* what) {
-  if (!done) throw std::runtime_error{fmt::format("cannot make {}: {}", what, openssl_error("no reason"))};
+  if (!done) throw std::runtime_error{fmt::format("cannot make {}: {}", what, base::openssl_error("no reason"))};
 }
 
 template <class Write>
 std::string pem(Write write, const char* what) {
-  const Openssl<BIO> memory{BIO_new(BIO_s_mem())};
+  const base::Openssl<BIO> memory{BIO_new(BIO_s_mem())};
   require(memory != nullptr && write(memory.get()) == 1, what);
   char* text = nullptr;
   const long size = BIO_get_mem_data(memory.get(), &text);
@@ -35,13 +35,13 @@ void add_extension(X509& certificate, const X509& issuer, int kind, const std::s
   X509V3_CTX context;
   X509V3_set_ctx_nodb(&context);
   X509V3_set_ctx(&context, const_cast<X509*>(&issuer), &certificate, nullptr, nullptr, 0);
-  const Openssl<X509_EXTENSION> extension{X509V3_EXT_conf_nid(nullptr, &context, kind, value.c_str())};
+  const base::Openssl<X509_EXTENSION> extension{X509V3_EXT_conf_nid(nullptr, &context, kind, value.c_str())};
   require(extension != nullptr && X509_add_ext(&certificate, extension.get(), -1) == 1, "an extension");
 }
 
 // Whose it is, when, and a serial number that nobody can guess.
-Openssl<X509> begin(EVP_PKEY& key, const std::string& common_name, int days) {
-  Openssl<X509> certificate{X509_new()};
+base::Openssl<X509> begin(EVP_PKEY& key, const std::string& common_name, int days) {
+  base::Openssl<X509> certificate{X509_new()};
   require(certificate != nullptr, "a certificate");
   std::array<unsigned char, 16> serial{};
   require(RAND_bytes(serial.data(), serial.size()) == 1, "a serial number");
@@ -70,8 +70,8 @@ bool is_address(const std::string& name) {
   return inet_pton(AF_INET, name.c_str(), bytes.data()) == 1 || inet_pton(AF_INET6, name.c_str(), bytes.data()) == 1;
 }
 
-Openssl<EVP_PKEY> make_key() {
-  Openssl<EVP_PKEY> key{EVP_EC_gen("P-256")};
+base::Openssl<EVP_PKEY> make_key() {
+  base::Openssl<EVP_PKEY> key{EVP_EC_gen("P-256")};
   require(key != nullptr, "a key");
   return key;
 }
@@ -87,11 +87,11 @@ std::string certificate_pem(X509& certificate) {
   return pem([&certificate](BIO* to) { return PEM_write_bio_X509(to, &certificate); }, "the file of a certificate");
 }
 
-Openssl<X509> make_authority(EVP_PKEY& key) {
+base::Openssl<X509> make_authority(EVP_PKEY& key) {
   std::array<unsigned char, 4> mark{};  // two labs' authorities must not look alike in a browser's list
   require(RAND_bytes(mark.data(), mark.size()) == 1, "a name");
   const std::string name = fmt::format("Rheonaut lab {:02x}{:02x}{:02x}{:02x}", mark[0], mark[1], mark[2], mark[3]);
-  Openssl<X509> authority = begin(key, name, kAuthorityDays);
+  base::Openssl<X509> authority = begin(key, name, kAuthorityDays);
   X509_set_issuer_name(authority.get(), X509_get_subject_name(authority.get()));
   add_extension(*authority, *authority, NID_basic_constraints, "critical,CA:TRUE,pathlen:0");
   add_extension(*authority, *authority, NID_key_usage, "critical,keyCertSign,cRLSign");
@@ -100,9 +100,9 @@ Openssl<X509> make_authority(EVP_PKEY& key) {
   return authority;
 }
 
-Openssl<X509> make_certificate(EVP_PKEY& key, const std::vector<std::string>& names, int days, const X509& authority,
-                               EVP_PKEY& authority_key) {
-  Openssl<X509> certificate = begin(key, "station", days);
+base::Openssl<X509> make_certificate(EVP_PKEY& key, const std::vector<std::string>& names, int days,
+                                     const X509& authority, EVP_PKEY& authority_key) {
+  base::Openssl<X509> certificate = begin(key, "station", days);
   X509_set_issuer_name(certificate.get(), X509_get_subject_name(&authority));
   std::string subject;
   for (const std::string& name : names) {

@@ -174,8 +174,8 @@ class Client {
  private:
   VirtualClock& clock_;
   int socket_ = -1;
-  Openssl<SSL_CTX> context_{SSL_CTX_new(TLS_client_method())};
-  Openssl<SSL> ssl_;
+  base::Openssl<SSL_CTX> context_{SSL_CTX_new(TLS_client_method())};
+  base::Openssl<SSL> ssl_;
 };
 
 }  // namespace server

@@ -1,4 +1,4 @@
-// OpenSSL's objects with owners, and what OpenSSL says went wrong.
+// OpenSSL's objects with owners, contexts as a Wire needs them, and the texts of OpenSSL's errors.
 #pragma once
 
 #include <openssl/bio.h>
@@ -10,7 +10,7 @@
 #include <memory>
 #include <string>
 
-namespace server {
+namespace base {
 
 struct OpensslFree {
   void operator()(BIO* object) const { BIO_free_all(object); }
@@ -24,12 +24,18 @@ struct OpensslFree {
     SSL_free(object);
   }
   void operator()(SSL_CTX* object) const { SSL_CTX_free(object); }
+  void operator()(SSL_SESSION* object) const { SSL_SESSION_free(object); }
 };
 
 template <class T>
 using Openssl = std::unique_ptr<T, OpensslFree>;
 
+// A context for connections of a Wire, of TLS_server_method() or TLS_client_method(): TLS 1.2 or newer, writes that may
+// be partial, and a cut connection is an end like any other (frames and HTTP messages say themselves how long they
+// are), so its session may be resumed. Throws std::runtime_error.
+Openssl<SSL_CTX> make_tls_context(const SSL_METHOD* side);
+
 // The latest error of this thread in OpenSSL's words, which is taken from its queue; `otherwise` when there is none.
 std::string openssl_error(const char* otherwise);
 
-}  // namespace server
+}  // namespace base
