@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <utility>
+#include <variant>
 
 #include "server/station/models/confirmation_judgement.hpp"
 #include "server/station/models/model_exchange.hpp"
@@ -170,7 +171,7 @@ void ModelSender::on_samples(const RobotState& robot, const SampleBatch& batch) 
 
 void ModelSender::on_in_force(const RobotState& robot, const InForceRecord& record) {
   const auto found = entries_.find(robot.id);
-  if (record.kind != "parameters" || found == entries_.end()) return;
+  if (!std::holds_alternative<ReportedParameters>(record.content) || found == entries_.end()) return;
   found->second.seen.on_page(record.first_seq, clock_.steady_us());
   look_again(robot.id);
 }
