@@ -15,7 +15,7 @@
 #include "server/net/transport_security.hpp"
 #include "server/runtime/log.hpp"
 #include "server/runtime/real_time.hpp"
-#include "server/station/model_sender.hpp"
+#include "server/station/models/model_sender.hpp"
 #include "server/storage/recording_parts.hpp"
 
 using namespace server;  // NOLINT: this file is the station, seen from outside

@@ -33,7 +33,7 @@ control/tuning
 sim_robot/world sim_robot/robot sim_robot/network sim_robot/faults sim_robot/scenario sim_robot/lab sim_robot/client
 sim_robot/fleet sim_robot/proxy sim_robot/cli
 server/runtime server/config server/tls server/net
-server/station/state server/station/commands server/station server/link server/live
+server/station/state server/station/commands server/station server/station/models server/link server/live
 server/storage/database server/storage/audit server/storage/samples server/storage/ingest server/storage/runs
 server/storage/query server/storage/export server/storage/upkeep server/storage
 server/analysis server/identity server/http server/api/bodies server/api/routes server/api

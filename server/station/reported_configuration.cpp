@@ -32,23 +32,21 @@ void ReportedConfiguration::begin_boot() {
 
 std::optional<InForceRecord> ReportedConfiguration::add(const protocol::ParameterPage& page,
                                                         const ReportMoment& moment) {
-  auto table = settings_.parameters.add(page);
-  if (!table) return std::nullopt;
+  if (!settings_.parameters.add(page)) return std::nullopt;
   settings_.parameters_at_us = moment.utc_us;
-  return record("parameters", std::move(*table), moment);
+  return record(settings_.parameters.last_known(), moment);
 }
 
 InForceRecord ReportedConfiguration::add(const protocol::Controller& controller,
                                          std::optional<protocol::Controller> former, const ReportMoment& moment) {
   settings_.add(controller, std::move(former), moment.utc_us);
-  return record("controller", controller_json(controller), moment);
+  return record(controller, moment);
 }
 
-InForceRecord ReportedConfiguration::record(std::string kind, std::string content, const ReportMoment& moment) {
+InForceRecord ReportedConfiguration::record(InForceContent content, const ReportMoment& moment) {
   InForceRecord record;
   record.boot_id = moment.boot_id;
-  record.is_change = !reported_kinds_.insert(kind).second;
-  record.kind = std::move(kind);
+  record.is_change = !reported_kinds_.insert(content.index()).second;
   record.first_seq = moment.first_seq;
   record.content = std::move(content);
   record.noticed_at_us = moment.utc_us;

@@ -4,10 +4,10 @@
 // function returns what the caller publishes. Loop thread.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <set>
-#include <string>
 
 #include "server/station/state/clock_sync.hpp"
 #include "server/station/state/in_force.hpp"
@@ -51,10 +51,10 @@ class ReportedConfiguration {
   ClockReport add(const ClockExchange& exchange, const RobotState& robot, std::int64_t utc_minus_steady_us);
 
  private:
-  InForceRecord record(std::string kind, std::string content, const ReportMoment& moment);
+  InForceRecord record(InForceContent content, const ReportMoment& moment);
 
   RobotSettings settings_;
-  std::set<std::string> reported_kinds_;  // in this connection
+  std::set<std::size_t> reported_kinds_;  // in this connection, as index() of the content
   ClockSync clock_sync_;                  // of the boot that is, or was last, connected
   ClockRecord clock_recorded_;            // the latest of that boot; boot_id 0: none yet
   std::int64_t utc_minus_steady_us_ = 0;  // at its latest exchange

@@ -95,6 +95,110 @@ TEST_F(StationChannelTest, SendsAnEventAndTheSampleAfterItAtOnce) {
   EXPECT_EQ(sent(), (std::vector{Outgoing::event, Outgoing::live}));
 }
 
+TEST_F(StationChannelTest, FillsAFrameWithAllThatItsSamplesAre) {
+  connect();
+  sent();
+  BatchValues values;
+  values.mode = rheonaut_MODE_AUTO;
+  values.sub_state = rheonaut_SUB_STATE_NONE;
+  values.has_setpoint = true;
+  values.setpoint_m = 0.1F;
+  values.disturbance_m = 0.02F;
+  values.position_sd_m = 0.003F;
+  values.controller_id = 4;
+  values.emergency_id = 99;
+  values.emergency_cause = rheonaut_EMERGENCY_CAUSE_OPERATOR;
+  values.flags = rheonaut_TELEMETRY_FLAG_MODEL_CONFIRMED;
+  const std::uint64_t first_us = now_us + 10'000;
+  for (std::uint32_t i = 0; i < kSamplesPerFrame; ++i) {
+    const auto n = static_cast<float>(i);
+    now_us += 10'000;
+    channel.push(Sample{n, n + 0.1F, n + 0.2F, n + 0.3F, n + 0.4F, n + 0.5F}, values, i == 2, now_us, 10'000);
+  }
+  ASSERT_EQ(sent(), std::vector{Outgoing::live});
+  ASSERT_EQ(frame.which_body, rheonaut_RobotFrame_telemetry_tag);
+  const protocol::Telemetry& batch = frame.body.telemetry;
+  EXPECT_EQ(batch.first_seq, 0U);
+  EXPECT_EQ(batch.oldest_seq, 0U);
+  EXPECT_EQ(batch.first_robot_time_us, first_us);
+  EXPECT_EQ(batch.period_us, 10'000U);
+  EXPECT_EQ(batch.mode, rheonaut_MODE_AUTO);
+  EXPECT_TRUE(batch.has_setpoint_m);
+  EXPECT_EQ(batch.setpoint_m, 0.1F);
+  EXPECT_EQ(batch.disturbance_m, 0.02F);
+  EXPECT_EQ(batch.position_sd_m, 0.003F);
+  EXPECT_EQ(batch.controller_id, 4U);
+  EXPECT_EQ(batch.emergency_id, 99U);
+  EXPECT_EQ(batch.emergency_cause, rheonaut_EMERGENCY_CAUSE_OPERATOR);
+  EXPECT_EQ(batch.flags, rheonaut_TELEMETRY_FLAG_MODEL_CONFIRMED | rheonaut_TELEMETRY_FLAG_SATURATED);
+  for (const pb_size_t count : {batch.position_m_count, batch.velocity_m_s_count, batch.acceleration_m_s2_count,
+                                batch.duty_count, batch.impedance_mv_count, batch.reference_m_count}) {
+    ASSERT_EQ(count, kSamplesPerFrame);
+  }
+  for (std::uint32_t i = 0; i < kSamplesPerFrame; ++i) {
+    const auto n = static_cast<float>(i);
+    EXPECT_EQ(batch.position_m[i], n);
+    EXPECT_EQ(batch.velocity_m_s[i], n + 0.1F);
+    EXPECT_EQ(batch.acceleration_m_s2[i], n + 0.2F);
+    EXPECT_EQ(batch.duty[i], n + 0.3F);
+    EXPECT_EQ(batch.impedance_mv[i], n + 0.4F);
+    EXPECT_EQ(batch.reference_m[i], n + 0.5F);
+  }
+}
+
+TEST_F(StationChannelTest, FillsTheLargestBatchIntoOneFrame) {
+  channel.opened(now_us);
+  auto asks_for_more = welcome();
+  asks_for_more.samples_per_frame = 1'000;
+  ASSERT_TRUE(channel.accept(asks_for_more, 1'000, now_us));
+  channel.resume(asks_for_more);
+  sent();
+  make_samples(protocol::kMaxSamplesPerFrame);
+  ASSERT_EQ(sent(), std::vector{Outgoing::live});
+  EXPECT_EQ(frame.body.telemetry.position_m_count, protocol::kMaxSamplesPerFrame);
+  std::array<std::uint8_t, protocol::kMaxFramedBytes> bytes{};
+  EXPECT_GT(protocol::write_frame(frame, bytes.data(), bytes.size()), 0U);
+}
+
+TEST_F(StationChannelTest, FillsAnAnswerAndAnEvent) {
+  connect();
+  sent();
+  protocol::CommandAck ack = rheonaut_CommandAck_init_zero;
+  ack.command_id = 5;
+  ack.result = rheonaut_COMMAND_RESULT_REJECTED;
+  ack.reason = rheonaut_REJECT_REASON_MOTOR_ON;
+  ack.emergency_id = 99;
+  ack.effect_at_robot_us = now_us;
+  channel.outbox().ack(ack);
+  ASSERT_EQ(sent(), std::vector{Outgoing::ack});
+  ASSERT_EQ(frame.which_body, rheonaut_RobotFrame_command_ack_tag);
+  EXPECT_EQ(frame.body.command_ack.command_id, 5U);
+  EXPECT_EQ(frame.body.command_ack.result, rheonaut_COMMAND_RESULT_REJECTED);
+  EXPECT_EQ(frame.body.command_ack.reason, rheonaut_REJECT_REASON_MOTOR_ON);
+  EXPECT_EQ(frame.body.command_ack.emergency_id, 99U);
+  EXPECT_EQ(frame.body.command_ack.effect_at_robot_us, now_us);
+  make_event();
+  ASSERT_EQ(sent(), std::vector{Outgoing::event});
+  ASSERT_EQ(frame.which_body, rheonaut_RobotFrame_event_tag);
+  EXPECT_EQ(frame.body.event.kind, rheonaut_EVENT_KIND_BOOT);
+}
+
+TEST_F(StationChannelTest, InAHurryTheNextSampleLeavesAtOnceWithAllBeforeIt) {
+  connect();
+  make_samples(kSamplesPerFrame);
+  sent();
+  make_samples(2);
+  EXPECT_EQ(sent(), std::vector<Outgoing>{}) << "a batch waits until it is complete";
+  channel.hurry();
+  EXPECT_EQ(sent(), std::vector<Outgoing>{}) << "the sample has to be made first";
+  make_samples(1);
+  ASSERT_EQ(sent(), std::vector{Outgoing::live});
+  EXPECT_EQ(frame.body.telemetry.first_seq, kSamplesPerFrame);
+  EXPECT_EQ(frame.body.telemetry.position_m_count, 3U);
+  make_samples(1);
+  EXPECT_EQ(sent(), std::vector<Outgoing>{}) << "for one sample only";
+}
+
 TEST_F(StationChannelTest, SendsAgainWhatTheStationLacks) {
   make_samples(8);
   connect(3);

@@ -10,7 +10,7 @@
 #include <set>
 
 #include "server/runtime/tasks.hpp"
-#include "server/station/model_sender.hpp"
+#include "server/station/models/model_sender.hpp"
 #include "server/storage/recording_parts.hpp"
 #include "tests/sim_robot/story_words.hpp"
 #include "tests/system/virtual_robot.hpp"

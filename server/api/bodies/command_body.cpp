@@ -6,6 +6,7 @@
 
 #include "server/api/bodies/controller_body.hpp"
 #include "server/api/bodies/json.hpp"
+#include "server/storage/samples/in_force_json.hpp"
 
 namespace server {
 namespace {
@@ -223,7 +224,7 @@ Result<void> read_confirm(const json& arguments, bool& is_confirmed) {
 
 // A controller is recorded as it was sent to the robot.
 std::string controller_arguments(const protocol::Controller& controller, bool is_confirmed) {
-  json arguments{{"controller", json::parse(controller_json(controller))}};
+  json arguments{{"controller", controller_json(controller)}};
   if (is_confirmed) arguments["confirm"] = true;
   return dump(arguments);
 }

@@ -3,6 +3,7 @@
 #include "server/api/routes/routes.hpp"
 #include "server/live/state_json.hpp"
 #include "server/station/station.hpp"
+#include "server/storage/samples/in_force_json.hpp"
 
 namespace server {
 using nlohmann::json;
@@ -45,7 +46,7 @@ Answer get_controller(InForceRoutes parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   const RobotSettings* known = parts.station.settings(id);
   if (known == nullptr) co_return problem(unknown_robot(id).error());
-  const json controller = known->controller ? json::parse(controller_json(*known->controller)) : json(nullptr);
+  const json controller = known->controller ? controller_json(*known->controller) : json(nullptr);
   co_return json_response(200, {{"robot_id", id},
                                 {"is_current", is_connected(parts.station, id) && known->is_controller_current},
                                 {"told_at_us", time_or_null(known->controller_at_us)},

@@ -1,24 +1,21 @@
-// Pages put together, messages written out.
+// Pages put together, values compared.
 #include "server/station/state/in_force.hpp"
 
 #include <algorithm>
 #include <bit>
+#include <string_view>
 #include <utility>
-
-#include "base/json_text.hpp"
 
 namespace server {
 
-using base::decimal;
 namespace {
 
-using nlohmann::json;
-
-template <std::size_t size>
-json numbers(const float (&values)[size], std::size_t count) {
-  json list = json::array();
-  for (std::size_t i = 0; i < std::min(count, size); ++i) list.push_back(decimal(values[i]));
-  return list;
+bool is_same_entry(const ReportedParameters::value_type& a, const ReportedParameters::value_type& b) {
+  const rheonaut_Parameter& one = a.second;
+  const rheonaut_Parameter& other = b.second;
+  return a.first == b.first && std::string_view{one.unit} == other.unit && is_same(one.value, other.value) &&
+         is_same(one.minimum, other.minimum) && is_same(one.maximum, other.maximum) &&
+         is_same(one.default_value, other.default_value);
 }
 
 template <std::size_t size>
@@ -29,31 +26,22 @@ bool same_list(const float (&a)[size], std::size_t a_count, const float (&b)[siz
 
 }  // namespace
 
-std::optional<std::string> ParameterTable::add(const protocol::ParameterPage& page) {
-  if (page.total > kMost) return std::nullopt;
+bool ParameterTable::add(const protocol::ParameterPage& page) {
+  if (page.total > kMost) return false;
   for (std::size_t i = 0; i < page.parameters_count; ++i) {
     const rheonaut_Parameter& parameter = page.parameters[i];
     if (parameters_.size() < kMost || parameters_.contains(parameter.name)) parameters_[parameter.name] = parameter;
   }
-  if (parameters_.empty() || parameters_.size() != page.total) return std::nullopt;
-  json table = json::object();
-  for (const auto& [name, parameter] : parameters_) {
-    table[name] = {{"value", decimal(parameter.value)},
-                   {"unit", parameter.unit},
-                   {"minimum", decimal(parameter.minimum)},
-                   {"maximum", decimal(parameter.maximum)},
-                   {"default", decimal(parameter.default_value)}};
-  }
-  std::string text = table.dump(-1, ' ', false, json::error_handler_t::replace);
-  if (text == reported_) return std::nullopt;
-  reported_ = std::move(text);
+  if (parameters_.empty() || parameters_.size() != page.total) return false;
+  if (is_current_ && std::ranges::equal(parameters_, last_known_, is_same_entry)) return false;
+  is_current_ = true;
   last_known_ = parameters_;
-  return reported_;
+  return true;
 }
 
 void ParameterTable::begin_again() {
   parameters_.clear();
-  reported_.clear();
+  is_current_ = false;
 }
 
 std::vector<ChangedLimit> ParameterTable::changed_limits() const {
@@ -98,25 +86,6 @@ void RobotSettings::add(const protocol::Controller& reported, std::optional<prot
   controller = reported;
   controller_at_us = at_us;
   is_controller_current = true;
-}
-
-std::string controller_json(const protocol::Controller& controller) {
-  const json out{
-      {"controller_id", controller.controller_id},
-      {"checksum", controller.checksum},
-      {"period_us", controller.period_us},
-      {"kp", decimal(controller.kp)},
-      {"direct", decimal(controller.direct)},
-      {"pole", numbers(controller.pole, controller.pole_count)},
-      {"residue", numbers(controller.residue, controller.residue_count)},
-      {"biquad_b0", numbers(controller.biquad_b0, controller.biquad_b0_count)},
-      {"biquad_b1", numbers(controller.biquad_b1, controller.biquad_b1_count)},
-      {"biquad_a1", numbers(controller.biquad_a1, controller.biquad_a1_count)},
-      {"biquad_a2", numbers(controller.biquad_a2, controller.biquad_a2_count)},
-      {"duty_min", decimal(controller.duty_min)},
-      {"duty_max", decimal(controller.duty_max)},
-      {"derivative_on", controller.derivative_on == rheonaut_DERIVATIVE_ON_MEASUREMENT ? "measurement" : "error"}};
-  return out.dump();
 }
 
 }  // namespace server

@@ -1,9 +1,8 @@
-// The parameters and the controller that a robot reports to be in force, as JSON for the record.
+// What a robot reports to be in force: its parameters and its controller.
 //
 // A robot sends both after each Welcome, and each change. Loop thread; one for each connection.
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,15 +16,15 @@ bool bounds_motion(const std::string& parameter);
 
 class ParameterTable {
  public:
-  // Takes a page. The whole table as JSON, {"name": {"value", "unit", "minimum", "maximum", "default"}}, once every
-  // parameter is known and one of them has changed; nothing before. A page that cannot be is passed over.
-  std::optional<std::string> add(const protocol::ParameterPage& page);
+  // Takes a page. True once every parameter is known and one of them has changed; last_known() is the table then. A
+  // page that cannot be is passed over.
+  bool add(const protocol::ParameterPage& page);
 
   // A new connection: what was known stays known, and is current again when the robot has reported the whole table.
   void begin_again();
   // The table as it was last whole; empty when it never was.
-  const std::map<std::string, rheonaut_Parameter>& last_known() const { return last_known_; }
-  bool is_current() const { return !reported_.empty(); }
+  const ReportedParameters& last_known() const { return last_known_; }
+  bool is_current() const { return is_current_; }
   // Of the parameters that bound motion, those that differ from their default.
   std::vector<ChangedLimit> changed_limits() const;
   // The latest that was reported of one of them; none yet.
@@ -37,8 +36,8 @@ class ParameterTable {
  private:
   static constexpr std::uint32_t kMost = 256;  // parameters of a robot
 
-  std::map<std::string, rheonaut_Parameter> parameters_, last_known_;
-  std::string reported_;  // of this connection
+  ReportedParameters parameters_, last_known_;
+  bool is_current_ = false;  // last_known_ was reported in this connection
 };
 
 // Whether they are the same bit for bit.
@@ -59,8 +58,5 @@ struct RobotSettings {
   // `former`: what restore_controller brings back now; none: not known.
   void add(const protocol::Controller& reported, std::optional<protocol::Controller> former, std::int64_t at_us);
 };
-
-// Coefficients as they were sent, in the order of the message.
-std::string controller_json(const protocol::Controller& controller);
 
 }  // namespace server

@@ -7,8 +7,10 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "protocol/messages.hpp"
@@ -96,13 +98,15 @@ struct ClockRecord {
   std::int64_t station_step_us = 0;  // UTC was set by so much since the record before; 0: it was not
 };
 
+using ReportedParameters = std::map<std::string, rheonaut_Parameter>;  // by name
+using InForceContent = std::variant<ReportedParameters, protocol::Controller>;
+
 // What is in force on a robot from a sample of its boot on, until the next of its kind.
 struct InForceRecord {
   BootId boot_id = 0;
-  std::string kind;                // "parameters" or "controller"
-  bool is_change = false;          // said later in a connection, and not to begin it
-  std::uint64_t first_seq = 0;     // the first sample made after it was said
-  std::string content;             // JSON
+  bool is_change = false;       // said later in a connection, and not to begin it
+  std::uint64_t first_seq = 0;  // the first sample made after it was said
+  InForceContent content;
   std::int64_t noticed_at_us = 0;  // UTC
 };
 
@@ -121,7 +125,7 @@ struct ChangedLimit {
   bool operator==(const ChangedLimit&) const = default;
 };
 
-// The model in a robot's estimator, and whether the station has sent it: station/model_sender.
+// The model in a robot's estimator, and whether the station has sent it: station/models.
 enum class ModelState : std::uint8_t {
   assumed,    // the robot's own word: nobody has said that its model is that of its fluid
   sending,    // on its way

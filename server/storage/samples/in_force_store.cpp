@@ -6,6 +6,7 @@
 #include <array>
 
 #include "server/storage/database/statement.hpp"
+#include "server/storage/samples/in_force_json.hpp"
 
 namespace server {
 
@@ -25,11 +26,12 @@ std::int64_t document_key(SQLite::Database& database, const std::string& kind, c
 }
 
 void store_in_force(SQLite::Database& database, std::int64_t boot_key, const InForceRecord& record) {
-  const std::int64_t key = document_key(database, record.kind, record.content);
+  const std::string kind = kind_of(record.content);
+  const std::int64_t key = document_key(database, kind, document_text(record.content));
   SQLite::Statement latest{database,
                            "SELECT document_key FROM in_force WHERE boot_key = ? AND kind = ? AND first_seq <= ?"
                            " ORDER BY first_seq DESC LIMIT 1"};
-  bind_all(latest, boot_key, record.kind, record.first_seq);
+  bind_all(latest, boot_key, kind, record.first_seq);
   const bool is_first = !latest.executeStep();
   if (!is_first && latest.getColumn(0).getInt64() == key) return;  // reported again after a reconnection
   // Nobody can have changed it before the boot's first report.
@@ -37,7 +39,7 @@ void store_in_force(SQLite::Database& database, std::int64_t boot_key, const InF
   SQLite::Statement add{database,
                         "INSERT OR REPLACE INTO in_force (boot_key, kind, first_seq, document_key, noticed_at_us)"
                         " VALUES (?, ?, ?, ?, ?)"};
-  execute(add, boot_key, record.kind, first_seq, key, record.noticed_at_us);
+  execute(add, boot_key, kind, first_seq, key, record.noticed_at_us);
 }
 
 void store_clock(SQLite::Database& database, std::int64_t boot_key, const ClockRecord& record) {

@@ -8,7 +8,7 @@
 
 #include "server/analysis/analysis_service.hpp"
 #include "server/api/api_server.hpp"
-#include "server/station/model_sender.hpp"
+#include "server/station/models/model_sender.hpp"
 #include "server/storage/recording_parts.hpp"
 #include "tests/server/link/test_robot.hpp"
 

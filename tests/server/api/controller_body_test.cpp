@@ -8,7 +8,7 @@
 
 #include "control/discretisation/discretise.hpp"
 #include "server/analysis/control_json.hpp"
-#include "server/station/state/in_force.hpp"
+#include "server/storage/samples/in_force_json.hpp"
 
 namespace server {
 namespace {
@@ -92,7 +92,7 @@ TEST(ControllerBody, ComputesTheChecksumOfTheProtocolAndAnIdFromIt) {
   EXPECT_EQ(controller->controller_id, 3'099'722'980U & 0xFF'FFFFU);
   EXPECT_EQ(read({{"controller", given}, {"controller_id", 9}})->controller_id, 9U);
 
-  const json told = json::parse(controller_json(*controller));
+  const json told = controller_json(*controller);
   EXPECT_TRUE(is_same(*read({{"controller", told}}), *controller)) << "what the robot says can be sent back";
   json changed = told;
   changed["kp"] = 60;

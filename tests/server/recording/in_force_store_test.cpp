@@ -12,52 +12,57 @@ class InForceStoreTest : public RecordingTest {
     connect(robot_);
   }
 
-  void say(const std::string& kind, const std::string& content, std::uint64_t first_seq, bool is_change = false) {
+  void report(InForceContent content, std::uint64_t first_seq, bool is_change = false) {
     recorder_->on_in_force(RobotState{}, {.boot_id = robot_.boot_id,
-                                          .kind = kind,
                                           .is_change = is_change,
                                           .first_seq = first_seq,
-                                          .content = content,
+                                          .content = std::move(content),
                                           .noticed_at_us = clock_.utc_us()});
   }
+  static protocol::Controller controller(float kp) {
+    protocol::Controller controller = rheonaut_Controller_init_zero;
+    controller.kp = kp;
+    return controller;
+  }
+  // The kind, the first sample, and what tells the documents of these tests apart.
   std::vector<std::string> in_force() {
     wait(recorder_->flush_records());
     return rows(
-        "SELECT kind, first_seq, content FROM in_force JOIN document USING (document_key, kind)"
-        " ORDER BY kind, first_seq");
+        "SELECT kind, first_seq, coalesce(json_extract(content, '$.kp'), content)"
+        " FROM in_force JOIN document USING (document_key, kind) ORDER BY kind, first_seq");
   }
 
   TestRobot robot_;
 };
 
 TEST_F(InForceStoreTest, ATextIsStoredOnceAndWhatIsReportedAgainAddsNothing) {
-  say("controller", "{\"kp\":1}", 0);
-  say("parameters", "{\"kp\":1}", 0);    // another kind with the same text
-  say("controller", "{\"kp\":1}", 500);  // after a reconnection
-  say("controller", "{\"kp\":2}", 700);
-  say("controller", "{\"kp\":1}", 900);  // and back
-  const std::vector<std::string> expected{"controller|0|{\"kp\":1}", "controller|700|{\"kp\":2}",
-                                          "controller|900|{\"kp\":1}", "parameters|0|{\"kp\":1}"};
+  report(controller(1), 0);
+  report(ReportedParameters{}, 0);  // another kind
+  report(controller(1), 500);       // after a reconnection
+  report(controller(2), 700);
+  report(controller(1), 900);  // and back
+  const std::vector<std::string> expected{"controller|0|1.0", "controller|700|2.0", "controller|900|1.0",
+                                          "parameters|0|{}"};
   EXPECT_EQ(in_force(), expected);
   EXPECT_EQ(number("SELECT count(*) FROM document"), 3);
 }
 
 TEST_F(InForceStoreTest, WhatABootSaysFirstHoldsFromItsBeginning) {
-  say("controller", "{\"kp\":1}", 200);  // it had made 200 samples when it connected
-  say("controller", "{\"kp\":2}", 300, true);
-  say("parameters", "{}", 400, true);  // what was before has not been recorded
-  const std::vector<std::string> expected{"controller|0|{\"kp\":1}", "controller|300|{\"kp\":2}", "parameters|400|{}"};
+  report(controller(1), 200);  // it had made 200 samples when it connected
+  report(controller(2), 300, true);
+  report(ReportedParameters{}, 400, true);  // what was before has not been recorded
+  const std::vector<std::string> expected{"controller|0|1.0", "controller|300|2.0", "parameters|400|{}"};
   EXPECT_EQ(in_force(), expected);
 }
 
 TEST_F(InForceStoreTest, ANumberThatCannotBeIsNotStored) {
-  say("controller", "{}", kMaxRecordedNumber, true);
+  report(controller(1), kMaxRecordedNumber, true);
   EXPECT_TRUE(in_force().empty());
 }
 
 TEST_F(InForceStoreTest, OfABootThatIsNotRecordedNothingIsStored) {
   robot_.boot_id = 12345;
-  say("controller", "{}", 0);
+  report(controller(1), 0);
   EXPECT_TRUE(in_force().empty());
 }
 
@@ -77,18 +82,19 @@ TEST_F(InForceStoreTest, ClockEstimatesAreStoredWithTheirBoot) {
 }
 
 TEST_F(InForceStoreTest, ARunShowsWhatWasInForceInIt) {
-  say("controller", "before", 0);
-  say("controller", "at its begin", 40);
+  report(controller(1), 0);   // before it
+  report(controller(2), 40);  // at its begin
   make(robot_, 100);
   const Run run = *wait(runs_->create("nemo", named("a run"), {"test", "", 0}));
-  say("controller", "in it", 150);
+  report(controller(3), 150);  // in it
   make(robot_, 100);
   flush();
   wait(runs_->end(run.id, ""));
-  say("controller", "after", 250);
+  report(controller(4), 250);  // after it
   wait(recorder_->flush_records());
-  const std::vector<std::string> expected{"controller|100|at its begin", "controller|150|in it"};
-  EXPECT_EQ(rows("SELECT kind, first_seq, content FROM run_in_force ORDER BY first_seq"), expected);
+  const std::vector<std::string> expected{"controller|100|2.0", "controller|150|3.0"};
+  EXPECT_EQ(rows("SELECT kind, first_seq, json_extract(content, '$.kp') FROM run_in_force ORDER BY first_seq"),
+            expected);
 }
 
 }  // namespace

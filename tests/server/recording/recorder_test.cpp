@@ -1,45 +1,10 @@
 // Every sample that is acknowledged is stored once, in its place; what is lost is listed.
-// LONG: one rule each of one class, in one vocabulary.
-#include "server/storage/ingest/recorder.hpp"
-
-#include <limits>
-
-#include "tests/server/recording/recording_test.hpp"
+#include "tests/server/recording/recorder_fixture.hpp"
 
 namespace server {
 namespace {
 
-using Rows = std::vector<std::string>;
-
-class RecorderTest : public RecordingTest {
- protected:
-  Rows segments() { return rows("SELECT first_seq, last_seq FROM segment ORDER BY first_seq"); }
-  Rows gaps() { return rows("SELECT first_seq, last_seq, cause FROM gap ORDER BY first_seq"); }
-  std::int64_t samples() { return number("SELECT count(*) FROM sample"); }
-
-  void send_event(const TestRobot& robot, std::uint64_t event_seq, std::uint64_t oldest = 0) {
-    RobotEvent event;
-    event.robot_id = robot.id;
-    event.boot_id = robot.boot_id;
-    event.event_seq = event_seq;
-    event.oldest_event_seq = oldest;
-    event.kind = "mode_changed";
-    event.cause = "command";
-    event.mode = rheonaut_MODE_AUTO;
-    recorder_->on_event(state_of(robot, LinkState::connected), event);
-  }
-
-  void send_command(CommandId id, const char* kind, CommandState state) {
-    CommandRecord command;
-    command.id = id;
-    command.robot_id = robot_.id;
-    command.kind = kind;
-    command.state = state;
-    recorder_->on_command(command);
-  }
-
-  TestRobot robot_;
-};
+class RecorderTest : public RecorderFixture {};
 
 TEST_F(RecorderTest, StoresAFullGroupAtTheNextCommitAndAcknowledgesIt) {
   start();
@@ -205,26 +170,6 @@ TEST_F(RecorderTest, AsksNothingOfARobotThatIsNotConnected) {
   EXPECT_TRUE(missing_.empty());
 }
 
-TEST_F(RecorderTest, AFullQueueRefusesAndAsksAgainSoThatSentIsStoredPlusLost) {
-  RecorderOptions options;
-  options.max_queued_samples = 30;
-  start(options);
-  connect(robot_);
-  make(robot_, 60);  // within one instant: 30 are queued, 30 refused
-  EXPECT_EQ(recorder_->counters().samples_refused, 30u);
-  EXPECT_EQ(recorder_->queued_samples(), 30u);
-  flush();
-  EXPECT_EQ(durable_next_seq_, 30u);
-  EXPECT_TRUE(clock_.run_until([&] { return !missing_.empty(); }, 2s));
-  EXPECT_EQ(missing_.back(), (Missing{30, 60}));
-  robot_.oldest_seq = 40;  // too late for ten of them
-  send(robot_, 40, 20);
-  flush();
-  EXPECT_EQ(gaps(), Rows{"30|39|queue_full"});
-  EXPECT_EQ(samples() + number("SELECT sum(last_seq - first_seq + 1) FROM gap"), 60);
-  EXPECT_EQ(durable_next_seq_, 60u);
-}
-
 TEST_F(RecorderTest, AcknowledgedSamplesSurviveAKillAndTheRestIsAskedFor) {
   start();
   connect(robot_);
@@ -297,25 +242,6 @@ TEST_F(RecorderTest, AsksForMissingEventsOnceASecond) {
   clock_.run_for(5s);
   EXPECT_EQ(missing_events_, 2);
   EXPECT_EQ(durable_next_event_seq_, 3u);
-}
-
-TEST_F(RecorderTest, AnEventThatTheFullQueueRefusedIsAskedForAgain) {
-  RecorderOptions options;
-  options.max_queued_records = 2;
-  start(options);
-  connect(robot_);
-  for (std::uint64_t seq = 0; seq < 5; ++seq) send_event(robot_, seq);
-  EXPECT_EQ(recorder_->counters().records_refused, 3u);
-  for (std::uint64_t next = 2; durable_next_event_seq_ < 5;) {
-    const int asked = missing_events_;
-    ASSERT_TRUE(clock_.run_until([&] { return missing_events_ > asked; }, 2s));
-    EXPECT_EQ(durable_next_event_seq_, next);
-    for (std::uint64_t seq = next; seq < 5; ++seq) send_event(robot_, seq);
-    clock_.run_for(200ms);
-    next += 2;
-  }
-  EXPECT_EQ(number("SELECT count(*) FROM event"), 5);
-  EXPECT_EQ(number("SELECT count(*) FROM event_gap"), 0);
 }
 
 TEST_F(RecorderTest, SegmentsOfEachBootEndAtItsOwnSamples) {
@@ -396,106 +322,6 @@ TEST_F(RecorderTest, RestoresPendingStopsAndEndsOtherCommands) {
   EXPECT_EQ(rows("SELECT state, reason FROM command WHERE command_id = 4"), Rows{"failed|station_restarted"});
 }
 
-TEST_F(RecorderTest, IgnoresNumbersThatCannotBe) {
-  start();
-  connect(robot_);
-  SampleBatch absurd = robot_.batch(0, 5);
-  absurd.first_seq = ~0ULL - 2;
-  send(robot_, absurd);
-  absurd = robot_.batch(0, 5);
-  absurd.oldest_seq = 1ULL << 63;
-  send(robot_, absurd);
-  flush();
-  EXPECT_EQ(samples(), 0);
-  EXPECT_EQ(recorder_->counters().batches_malformed, 2u);
-}
-
-// Another program that has the database locked.
-class ForeignWriter {
- public:
-  explicit ForeignWriter(const std::filesystem::path& path) : database_{path.string(), SQLite::OPEN_READWRITE, 5000} {}
-  void run(const char* sql) { database_.exec(sql); }
-
- private:
-  SQLite::Database database_;
-};
-
-TEST_F(RecorderTest, AForeignLockDelaysRecordingAndLosesNothing) {
-  start();
-  connect(robot_);
-  make(robot_, 10);
-  flush();
-  ForeignWriter foreign{path_};
-  foreign.run("BEGIN IMMEDIATE");
-  make(robot_, 100);
-  EXPECT_TRUE(clock_.run_until([&] { return recorder_->failing(); }, 1s));
-  EXPECT_EQ(durable_next_seq_, 10u);
-  make(robot_, 20);
-  const std::int64_t began_us = clock_.steady_us();
-  EXPECT_FALSE(wait(recorder_->flush()));
-  EXPECT_EQ(clock_.steady_us() - began_us, 3'000'000);
-  TestRobot other;
-  other.id = "dory";
-  other.boot_id = 7;
-  EXPECT_EQ(admit(other).refusal, rheonaut_REFUSAL_REASON_STATION_BUSY);
-  foreign.run("ROLLBACK");
-  EXPECT_TRUE(wait(recorder_->flush()));
-  EXPECT_FALSE(recorder_->failing());
-  EXPECT_EQ(durable_next_seq_, 130u);
-  EXPECT_EQ(samples(), 130);
-  EXPECT_EQ(tasks_->exit_code(), 0);
-}
-
-TEST_F(RecorderTest, AFailingDiskIsTriedAgainEverySecondWithTheSameContent) {
-  start();
-  connect(robot_);
-  flush();
-  ForeignWriter foreign{path_};
-  foreign.run("CREATE TRIGGER full BEFORE INSERT ON segment BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
-  make(robot_, 100);
-  clock_.run_for(10s);
-  EXPECT_TRUE(recorder_->failing());
-  EXPECT_GE(recorder_->counters().commits_failed, 9u);
-  EXPECT_LE(recorder_->counters().commits_failed, 11u);
-  make(robot_, 100);
-  foreign.run("DROP TRIGGER full");
-  clock_.run_for(1100ms);
-  EXPECT_FALSE(recorder_->failing());
-  EXPECT_EQ(durable_next_seq_, 200u);
-  EXPECT_EQ(segments(), (Rows{"0|99", "100|199"}));
-}
-
-TEST_F(RecorderTest, CloseDoesNotThrowWhenTheDiskFails) {
-  start();
-  connect(robot_);
-  make(robot_, 10);
-  ForeignWriter foreign{path_};
-  foreign.run("BEGIN IMMEDIATE");
-  stop();
-  foreign.run("ROLLBACK");
-  EXPECT_EQ(samples(), 0);
-}
-
-TEST_F(RecorderTest, AFullQueueStillTakesEveryStopAndTheNewestStateOfACommand) {
-  RecorderOptions options;
-  options.max_queued_records = 2;
-  start(options);
-  send_command(1, "set_duty", CommandState::queued);
-  send_command(2, "set_duty", CommandState::queued);
-  send_command(3, "set_duty", CommandState::queued);  // beyond the limit
-  send_command(1, "set_duty", CommandState::acknowledged);
-  send_command(4, "emergency_stop", CommandState::queued);
-  send_command(5, "emergency_stop", CommandState::queued);
-  send_command(5, "emergency_stop", CommandState::acknowledged);
-  EXPECT_EQ(recorder_->counters().records_refused, 1u);
-  flush();
-  EXPECT_EQ(rows("SELECT command_id, state FROM command ORDER BY command_id"),
-            (Rows{"1|acknowledged", "2|queued", "4|queued", "5|acknowledged"}));
-  send_command(4, "emergency_stop", CommandState::acknowledged);
-  flush();
-  EXPECT_EQ(rows("SELECT state FROM command WHERE command_id = 4"), Rows{"acknowledged"});
-}
-
 TEST_F(RecorderTest, RestoresTheLatestBootAndTheLatchItWasIn) {
   const auto restored = [this] {
     flush();
@@ -537,22 +363,6 @@ TEST_F(RecorderTest, RestoresTheLatestBootAndTheLatchItWasIn) {
   rebooted.boot_id = 3;  // a smaller number, and a later boot
   connect(rebooted);
   EXPECT_EQ(restored().boot_id, 3u);
-}
-
-TEST_F(RecorderTest, IgnoresABatchWithATimeThatCannotBe) {
-  start();
-  connect(robot_);
-  std::vector<SampleBatch> malformed(3, robot_.batch(0, 5));
-  malformed[0].context.period_us = 0;
-  malformed[1].context.period_us = 10'000'001;
-  malformed[2].first_robot_time_us = 1ULL << 62;
-  for (const SampleBatch& batch : malformed) send(robot_, batch);
-  EXPECT_EQ(recorder_->counters().batches_malformed, 3u);
-  EXPECT_EQ(recorder_->queued_samples(), 0u);
-  make(robot_, 10);
-  flush();
-  EXPECT_EQ(samples(), 10);
-  stop();
 }
 
 TEST_F(RecorderTest, KeepsNoBookkeepingOfBootsThatAreGone) {

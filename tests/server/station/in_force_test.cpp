@@ -4,12 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
+#include <cstring>
+#include <initializer_list>
 
 namespace server {
 namespace {
-
-using nlohmann::json;
 
 protocol::ParameterPage page_of(std::uint32_t total, std::initializer_list<std::pair<const char*, float>> values) {
   protocol::ParameterPage page = rheonaut_ParameterPage_init_zero;
@@ -28,49 +27,55 @@ protocol::ParameterPage page_of(std::uint32_t total, std::initializer_list<std::
 
 TEST(ParameterTableTest, IsReportedWhenEveryParameterIsKnownAndAgainWhenOneHasChanged) {
   ParameterTable table;
-  EXPECT_FALSE(table.add(page_of(3, {{"a", 0.1F}, {"b", 2}})).has_value());
-  const auto whole = table.add(page_of(3, {{"c", 3}}));
-  ASSERT_TRUE(whole.has_value());
-  const json expected = {{"value", 0.1}, {"unit", "s"}, {"minimum", -1.0}, {"maximum", 10.0}, {"default", 2.0}};
-  EXPECT_EQ(json::parse(*whole)["a"], expected);
-  EXPECT_EQ(json::parse(*whole).size(), 3u);
+  EXPECT_FALSE(table.add(page_of(3, {{"a", 0.1F}, {"b", 2}})));
+  EXPECT_FALSE(table.is_current());
+  EXPECT_TRUE(table.add(page_of(3, {{"c", 3}})));
+  EXPECT_TRUE(table.is_current());
+  ASSERT_EQ(table.last_known().size(), 3U);
+  EXPECT_EQ(table.last_known().at("a").value, 0.1F);
 
-  EXPECT_FALSE(table.add(page_of(3, {{"b", 2}})).has_value()) << "nothing has changed";
-  const auto changed = table.add(page_of(3, {{"b", 5}}));
-  ASSERT_TRUE(changed.has_value());
-  EXPECT_EQ(json::parse(*changed)["b"]["value"], 5.0);
+  EXPECT_FALSE(table.add(page_of(3, {{"b", 2}}))) << "nothing has changed";
+  EXPECT_TRUE(table.add(page_of(3, {{"b", 5}})));
+  EXPECT_EQ(table.last_known().at("b").value, 5);
+}
+
+TEST(ParameterTableTest, AChangeOfWhatIsBesideTheValueIsAChange) {
+  using Change = void (*)(rheonaut_Parameter&);
+  const std::initializer_list<Change> changes{
+      [](rheonaut_Parameter& one) { one.unit[0] = 'm'; }, [](rheonaut_Parameter& one) { one.minimum = -2; },
+      [](rheonaut_Parameter& one) { one.maximum = 11; }, [](rheonaut_Parameter& one) { one.default_value = 3; }};
+  ParameterTable table;
+  auto page = page_of(1, {{"a", 1}});
+  ASSERT_TRUE(table.add(page));
+  for (const Change change : changes) {
+    change(page.parameters[0]);
+    EXPECT_TRUE(table.add(page));
+    EXPECT_FALSE(table.add(page));
+  }
+}
+
+TEST(ParameterTableTest, ANewConnectionReportsTheSameTableAgain) {
+  ParameterTable table;
+  ASSERT_TRUE(table.add(page_of(1, {{"a", 1}})));
+  table.begin_again();
+  EXPECT_FALSE(table.is_current());
+  EXPECT_EQ(table.last_known().size(), 1U) << "it stays known";
+  EXPECT_FALSE(table.value("a").has_value());
+  EXPECT_TRUE(table.add(page_of(1, {{"a", 1}})));
+}
+
+TEST(ParameterTableTest, ANumberThatIsNoneDoesNotChangeForEver) {
+  ParameterTable table;
+  EXPECT_TRUE(table.add(page_of(1, {{"a", std::nanf("")}})));
+  EXPECT_FALSE(table.add(page_of(1, {{"a", std::nanf("")}})));
 }
 
 TEST(ParameterTableTest, ARobotThatNamesEverMoreParametersFillsNoMemory) {
   ParameterTable table;
   for (int i = 0; i < 10'000; ++i) {
-    EXPECT_FALSE(table.add(page_of(1, {{("p" + std::to_string(i)).c_str(), 1}, {"q", 1}})).has_value());
+    EXPECT_FALSE(table.add(page_of(1, {{("p" + std::to_string(i)).c_str(), 1}, {"q", 1}})));
   }
-  EXPECT_FALSE(table.add(page_of(4'000'000'000, {{"a", 1}})).has_value());
-}
-
-TEST(ParameterTableTest, ANumberThatIsNoneIsNullAndABadNameIsStillJson) {
-  ParameterTable table;
-  const auto whole = table.add(page_of(1, {{"\xff\xfe", std::nanf("")}}));
-  ASSERT_TRUE(whole.has_value());
-  EXPECT_TRUE(json::parse(*whole).front()["value"].is_null());
-}
-
-TEST(ControllerJsonTest, HoldsTheCoefficientsAsTheyWereSent) {
-  protocol::Controller controller = rheonaut_Controller_init_zero;
-  controller.controller_id = 7;
-  controller.kp = 3.4F;
-  controller.pole_count = controller.residue_count = 2;
-  controller.pole[1] = 0.5F;
-  controller.residue[0] = -1.25F;
-  controller.derivative_on = rheonaut_DERIVATIVE_ON_MEASUREMENT;
-  const json written = json::parse(controller_json(controller));
-  EXPECT_EQ(written["controller_id"], 7);
-  EXPECT_EQ(written["kp"], 3.4);
-  EXPECT_EQ(written["pole"], (json{0.0, 0.5}));
-  EXPECT_EQ(written["residue"], (json{-1.25, 0.0}));
-  EXPECT_EQ(written["biquad_b0"], json::array());
-  EXPECT_EQ(written["derivative_on"], "measurement");
+  EXPECT_FALSE(table.add(page_of(4'000'000'000, {{"a", 1}})));
 }
 
 }  // namespace
