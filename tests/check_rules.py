@@ -34,8 +34,8 @@ sim_robot/world sim_robot/robot sim_robot/network sim_robot/faults sim_robot/sce
 sim_robot/fleet sim_robot/proxy sim_robot/cli
 server/runtime server/config server/tls server/net
 server/station/state server/station/commands server/station server/link server/live
-server/storage/database server/storage/audit server/storage/samples server/storage/ingest server/storage/runs
-server/storage/query server/storage/export server/storage/upkeep server/storage
+server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest
+server/storage/runs server/storage/query server/storage/export server/storage/upkeep server/storage
 server/analysis server/identity server/http server/api/bodies server/api/routes server/api
 server/cli/terminal server/cli/design server/cli/accounts server/cli/data server/cli
 """.split()

@@ -14,7 +14,7 @@
 #include <optional>
 #include <vector>
 
-#include "server/storage/ingest/sample_store.hpp"
+#include "server/storage/commits/sample_store.hpp"
 
 namespace server {
 

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "server/runtime/clock.hpp"
-#include "server/storage/ingest/boot_store.hpp"
+#include "server/storage/commits/boot_store.hpp"
 
 namespace server {
 
