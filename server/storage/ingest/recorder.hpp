@@ -128,6 +128,7 @@ class Recorder final : public StationSink, public RobotArchive {
 
   void on_robot(const RobotState& robot) override;
   void on_fluid(const RobotState& robot) override;
+  // Filled from checked telemetry: its numbers are not judged again. Dropped and counted when no such boot is recorded.
   void on_samples(const RobotState& robot, const SampleBatch& batch) override;
   void on_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) override;
   void on_unusable_event(const RobotState& robot, std::uint64_t event_seq) override;

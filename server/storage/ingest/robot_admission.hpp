@@ -21,9 +21,6 @@
 
 namespace server {
 
-// The refusal of numbers that cannot be stored; nothing when they can.
-std::optional<Admission> refuse_malformed(const AdmissionRequest& request);
-
 class RobotAdmission {
  public:
   // One outcome for each question, in order: BootStore::admit on the disk thread.

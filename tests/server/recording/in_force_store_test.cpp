@@ -1,4 +1,5 @@
 // What a robot says is in force, and how its clock was found to run, in the database.
+#include "server/station/state/checked.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
@@ -51,7 +52,7 @@ TEST_F(InForceStoreTest, WhatABootSaysFirstHoldsFromItsBeginning) {
 }
 
 TEST_F(InForceStoreTest, ANumberThatCannotBeIsNotStored) {
-  say("controller", "{}", kMaxRecordedNumber, true);
+  say("controller", "{}", kMaxRobotNumber + 1, true);
   EXPECT_TRUE(in_force().empty());
 }
 
