@@ -52,8 +52,8 @@ static int serve(const Config& config) {
   AnalysisService analysis{recording.history, maths};
   const ApiOptions options = api_options(config, restored.store_id, text(robots.endpoint()), security);
   ApiServer api{loop, tasks, clock, options, station, live, recording, analysis};
+  if (config.real_time) tasks.spawn("priorities", ask_for_real_time(disk));
   recording.spawn(tasks);
-  if (config.real_time) tasks.spawn("the disk's priority", ask_for_real_time(disk));
   tasks.spawn("control", station.watch_control());
   tasks.spawn("live feed", live.run());
   tasks.spawn("robots", robots.run());
@@ -63,8 +63,8 @@ static int serve(const Config& config) {
   tasks.spawn("announcement", folder.announce(clock, {api.address(), options.robots_address, security.to_trust()}));
   spdlog::info("ready: page {}, robots {}, data {}", api.url(), options.robots_address, config.data_dir.string());
   api.print_login_url();
-  tasks.run(clock, config.real_time);  // returns when every task has ended
-  recording.close();                   // every sample that was received is on disk
+  tasks.run(clock);   // returns when every task has ended
+  recording.close();  // every sample that was received is on disk
   spdlog::info("stopped");
   return tasks.exit_code();
 }

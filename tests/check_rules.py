@@ -34,12 +34,18 @@ sim_robot/world sim_robot/robot sim_robot/network sim_robot/faults sim_robot/sce
 sim_robot/fleet sim_robot/proxy sim_robot/cli
 server/runtime server/config server/tls server/net
 server/station/state server/station/commands server/station server/station/models server/link server/live
-server/storage/database server/storage/audit server/storage/samples server/storage/ingest server/storage/runs
-server/storage/query server/storage/export server/storage/upkeep server/storage
+server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest
+server/storage/runs server/storage/query server/storage/export server/storage/upkeep server/storage
 server/analysis server/identity server/http server/api/bodies server/api/routes server/api
 server/cli/terminal server/cli/design server/cli/accounts server/cli/data server/cli
 """.split()
 ROOMS_WITH_CONTROL = {"server/analysis", "server/cli/design"}
+# What decides only about the order of work, and the files of server/ that know it ("Threads of the station").
+SEAMS = {
+    "server/net/poll_set.hpp": {"server/net/poll_set.cpp", "server/net/byte_stream.cpp", "server/link/robot_listener.hpp"},
+    "server/runtime/turns.hpp": {"server/runtime/turns.cpp", "server/live/robot_texts.hpp", "server/api/live_messages.hpp"},
+    "server/runtime/real_time.hpp": {"server/runtime/real_time.cpp", "server/main.cpp"},
+}
 MOST_FILES_IN_A_ROOM = 26  # .cpp and .hpp
 # Libraries that a folder must not see (beginnings of <...>).
 FOREIGN = {
@@ -159,6 +165,15 @@ def check_includes(source):
             if area in ("robot_fw/core", "robot_fw/esp8266") or folder == "protocol":
                 if target in NOT_ON_THE_ROBOT:
                     yield line, f"<{target}> needs heap, threads or clocks, which the robot has not"
+
+
+def check_seams(source):
+    """seam: what decides about the order of work has the users that ARCHITECTURE.md names, and no others."""
+    if not source.is_cpp or source.parts[0] != "server":
+        return
+    for line, _, target in includes(source):
+        if source.name not in SEAMS.get(target, {source.name}):
+            yield line, f"{target} has the users that ARCHITECTURE.md names: make the work short, or give it to a worker"
 
 
 def check_links(source):
@@ -349,8 +364,8 @@ def check_first_line(source):
         yield 1, "the opening comment is not a sentence"
 
 
-RULES = (check_includes, check_links, check_room, check_co_await, check_tasks, check_clock, check_threads, check_secrets, check_size, check_names,
-         check_text, check_first_line)
+RULES = (check_includes, check_seams, check_links, check_room, check_co_await, check_tasks, check_clock, check_threads,
+         check_secrets, check_size, check_names, check_text, check_first_line)
 
 
 def sources(root):

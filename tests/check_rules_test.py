@@ -33,6 +33,8 @@ BAD = [
     ("include", "server/runtime/clock.cpp", FIRST + '#include "server/storage/ingest/recorder.hpp"\n'),
     ("include", "server/new/thing.cpp", FIRST + '#include "server/runtime/clock.hpp"\n'),
     ("include", "server/link/robot_session.cpp", FIRST + '#include "robot_session.hpp"\n'),
+    ("seam", "server/runtime/tasks.cpp", FIRST + '#include "server/runtime/real_time.hpp"\n'),
+    ("seam", "server/link/robot_session.cpp", FIRST + '#include "server/net/poll_set.hpp"\n'),
     ("link", "protocol/CMakeLists.txt", "# Links.\ntarget_link_libraries(protocol PUBLIC server)\n"),
     ("link", "server/CMakeLists.txt", "# Links.\ntarget_link_libraries(server\n  PUBLIC protocol robot_fw_core)\n"),
     ("include", "control/models/a.cpp", FIRST + '#include "control/tuning/tune.hpp"\n'),
@@ -75,6 +77,7 @@ BAD = [
 GOOD = [
     ("server/link/robot_session.cpp", FIRST + '#include "server/net/byte_stream.hpp"\n#include "server/runtime/clock.hpp"\n'),
     ("server/analysis/job.cpp", FIRST + '#include "control/tuning/tune.hpp"\n#include "server/storage/database/database.hpp"\n'),
+    ("server/link/robot_listener.hpp", FIRST + '#include "server/net/poll_set.hpp"\n'),
     ("server/main.cpp", FIRST + '#include "server/link/a.hpp"\n#include "server/api/b.hpp"\n'),
     ("robot_fw/esp8266/motor.cpp", FIRST + '#include <Arduino.h>\n#include "robot_fw/core/robot.hpp"\n'),
     ("robot_fw/core/robot.cpp", FIRST + '#include <array>\n#include "protocol/messages.hpp"\n'),

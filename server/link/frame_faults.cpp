@@ -11,7 +11,7 @@
 namespace server {
 namespace {
 
-constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
+std::uint64_t reach_from(std::uint64_t number, std::uint64_t leap) { return std::min(number + leap, kMaxRobotNumber); }
 
 void add(FrameFaults& faults, const char* cause, std::string words) {
   if (faults.count++ > 0) return;
@@ -70,15 +70,16 @@ void mend(protocol::Event& event, const FrameReach& reach, FrameFaults& faults) 
 }  // namespace
 
 FrameReach FrameReach::after(const protocol::Hello& hello, std::uint64_t robot_time_us) {
-  return {hello.next_seq + kSeqLeap, hello.next_event_seq + kSeqLeap, robot_time_us + kTimeLeapUs};
+  return {reach_from(hello.next_seq, kSeqLeap), reach_from(hello.next_event_seq, kSeqLeap),
+          reach_from(robot_time_us, kTimeLeapUs)};
 }
 
 void FrameReach::advance(const protocol::RobotFrame& frame) {
-  robot_time_us = std::max(robot_time_us, frame.robot_time_us + kTimeLeapUs);
+  robot_time_us = std::max(robot_time_us, reach_from(frame.robot_time_us, kTimeLeapUs));
   if (frame.which_body == rheonaut_RobotFrame_telemetry_tag) {
-    seq = std::max(seq, frame.body.telemetry.first_seq + kSeqLeap);
+    seq = std::max(seq, reach_from(frame.body.telemetry.first_seq, kSeqLeap));
   } else if (frame.which_body == rheonaut_RobotFrame_event_tag) {
-    event_seq = std::max(event_seq, frame.body.event.event_seq + kSeqLeap);
+    event_seq = std::max(event_seq, reach_from(frame.body.event.event_seq, kSeqLeap));
   }
 }
 
@@ -87,8 +88,14 @@ FrameFaults mend(protocol::RobotFrame& frame, const FrameReach& reach) {
   const bool has_no_time = is_too_large(faults, "robot_time_us", frame.robot_time_us, reach.robot_time_us);
   if (has_no_time) frame.robot_time_us = 0;
   switch (frame.which_body) {
-    case rheonaut_RobotFrame_telemetry_tag: mend(frame.body.telemetry, reach, faults); break;
-    case rheonaut_RobotFrame_event_tag: mend(frame.body.event, reach, faults); break;
+    case rheonaut_RobotFrame_telemetry_tag:
+      mend(frame.body.telemetry, reach, faults);
+      if (!faults.is_unusable) faults.samples = Checked<protocol::Telemetry>{frame.body.telemetry};
+      break;
+    case rheonaut_RobotFrame_event_tag:
+      mend(frame.body.event, reach, faults);
+      if (!faults.is_unusable) faults.event = Checked<protocol::Event>{frame.body.event};
+      break;
     case rheonaut_RobotFrame_heartbeat_tag: {
       protocol::Heartbeat& answer = frame.body.heartbeat;
       const bool is_no_time =

@@ -4,23 +4,23 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "protocol/messages.hpp"
+#include "server/station/state/checked.hpp"
 
 namespace server {
 
-constexpr std::uint64_t kMaxNumber = std::uint64_t{1} << 62;  // of a sample or µs: beyond any boot, and safe to add to
-
 // How far the numbers of a robot's next frame can have come. A robot counts without leaps, so one that is far ahead of
-// all before it cannot be: if it were taken, every true one after it would look old.
+// all before it cannot be: if it were taken, every true one after it would look old. Never above kMaxRobotNumber.
 struct FrameReach {
   static constexpr std::uint64_t kSeqLeap = 1'000'000;         // beyond what any outage within a connection makes
   static constexpr std::uint64_t kTimeLeapUs = 3'600'000'000;  // likewise
 
-  std::uint64_t seq = kMaxNumber;
-  std::uint64_t event_seq = kMaxNumber;
-  std::uint64_t robot_time_us = kMaxNumber;
+  std::uint64_t seq = kMaxRobotNumber;
+  std::uint64_t event_seq = kMaxRobotNumber;
+  std::uint64_t robot_time_us = kMaxRobotNumber;
 
   // Of the frames after a hello or after this frame, which was mended.
   static FrameReach after(const protocol::Hello& hello, std::uint64_t robot_time_us);
@@ -33,6 +33,10 @@ struct FrameFaults {
   std::string first;         // in words
   bool is_unusable = false;  // the frame's samples, or its event, cannot be recorded
   bool has_number = true;    // ... but it is known which they are
+
+  // What the frame holds, unless it is unusable.
+  std::optional<Checked<protocol::Telemetry>> samples;
+  std::optional<Checked<protocol::Event>> event;
 };
 
 // Finds them. A number or time that cannot be and is not needed becomes 0, which says nothing.

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "server/link/frame_faults.hpp"
+#include "server/station/state/checked.hpp"
 
 namespace server {
 namespace {
@@ -29,10 +29,10 @@ std::optional<Refusal> refusal_of(const protocol::Hello& hello, std::uint64_t ro
                                                         std::to_string(protocol::kProtocolVersion) + ", the robot " +
                                                         std::to_string(hello.protocol_version)};
   }
-  const bool samples_can_be = hello.oldest_seq <= hello.next_seq && hello.next_seq <= kMaxNumber;
-  const bool events_can_be = hello.oldest_event_seq <= hello.next_event_seq && hello.next_event_seq <= kMaxNumber;
+  const bool samples_can_be = hello.oldest_seq <= hello.next_seq && hello.next_seq <= kMaxRobotNumber;
+  const bool events_can_be = hello.oldest_event_seq <= hello.next_event_seq && hello.next_event_seq <= kMaxRobotNumber;
   if (is_robot_id(hello.robot_id) && hello.boot_id != 0 && samples_can_be && events_can_be &&
-      robot_time_us <= kMaxNumber) {
+      robot_time_us <= kMaxRobotNumber) {
     return std::nullopt;
   }
   return Refusal{rheonaut_REFUSAL_REASON_MALFORMED,

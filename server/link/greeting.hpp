@@ -18,7 +18,8 @@ struct Refusal {
   std::string detail;  // for people
 };
 
-// Of a Hello that says what cannot be, or speaks another version; nothing when it may be admitted.
+// Of a Hello that says what cannot be, or speaks another version; nothing when it may be admitted: the archive does not
+// judge its numbers again.
 std::optional<Refusal> refusal_of(const protocol::Hello& hello, std::uint64_t robot_time_us);
 // Of a robot that the archive does not admit.
 std::optional<Refusal> refusal_of(const Admission& admission);

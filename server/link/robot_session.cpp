@@ -198,11 +198,11 @@ void RobotSession::on_frame(protocol::RobotFrame& frame) {
     outbox_.on_robot_time(frame.robot_time_us, hello_->sample_period_us);
   }
   switch (frame.which_body) {
-    case rheonaut_RobotFrame_telemetry_tag: station_.on_samples(*this, frame.body.telemetry); break;
+    case rheonaut_RobotFrame_telemetry_tag: station_.on_samples(*this, *faults.samples); break;
     case rheonaut_RobotFrame_event_tag:
       outbox_.on_event_of(
           frame.body.event.command_id);  // the answer came before the event of its command, or never will
-      station_.on_event(*this, frame.body.event);
+      station_.on_event(*this, *faults.event);
       break;
     case rheonaut_RobotFrame_status_tag: station_.on_status(*this, frame.body.status); break;
     case rheonaut_RobotFrame_parameter_page_tag: station_.on_parameters(*this, frame.body.parameter_page); break;

@@ -2,6 +2,7 @@
 #include "server/runtime/real_time.hpp"
 
 #include <sched.h>
+#include <spdlog/spdlog.h>
 
 namespace server {
 
@@ -12,6 +13,9 @@ bool ask_for_real_time(Priority priority) {
 }
 
 boost::asio::awaitable<void> ask_for_real_time(WorkerThread& disk) {
+  const bool is_granted = ask_for_real_time(Priority::loop);
+  spdlog::info("the loop runs {}",
+               is_granted ? "with real-time priority" : "without real-time priority: the system does not permit it");
   auto ask = [] { return ask_for_real_time(Priority::disk); };
   co_await disk.run(std::move(ask));
 }

@@ -10,8 +10,6 @@
 #include <chrono>
 #include <csignal>
 
-#include "server/runtime/real_time.hpp"
-
 namespace server {
 namespace asio = boost::asio;
 
@@ -31,12 +29,7 @@ void TaskGroup::spawn(std::string name, asio::awaitable<void> task) {
   asio::co_spawn(loop_, std::move(task), asio::bind_cancellation_slot(signal->slot(), std::move(on_end)));
 }
 
-void TaskGroup::run(Clock& clock, bool in_real_time) {
-  if (in_real_time) {
-    const bool is_granted = ask_for_real_time(Priority::loop);
-    spdlog::info("the loop runs {}",
-                 is_granted ? "with real-time priority" : "without real-time priority: the system does not permit it");
-  }
+void TaskGroup::run(Clock& clock) {
   while (!loop_.stopped()) {
     if (loop_.poll_one() == 0) {
       clock.watch().rest();

@@ -23,10 +23,8 @@ class TaskGroup {
   // exit_code() 1: the service manager then restarts the station. After stop() nothing starts any more.
   void spawn(std::string name, boost::asio::awaitable<void> task);
 
-  // Runs the loop until every task has ended, in turns that the clock's watch sees. `in_real_time`: the thread asks to
-  // run before all ordinary threads of the machine (SCHED_RR), so that a stop does not wait for them; where that is not
-  // permitted, it goes on without.
-  void run(Clock& clock, bool in_real_time);
+  // Runs the loop until every task has ended, in turns that the clock's watch sees.
+  void run(Clock& clock);
 
   // Cancels every task; each ends at its next wait.
   void stop();

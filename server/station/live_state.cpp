@@ -68,7 +68,8 @@ void begin_connection(RobotEntry& entry, const AdmissionRequest& hello, const pr
   show_hello(robot, hello, details, admission, is_other_boot);
 }
 
-void fill_batch(const RobotState& robot, const protocol::Telemetry& telemetry, SampleBatch& batch) {
+void fill_batch(const RobotState& robot, Checked<protocol::Telemetry> checked, SampleBatch& batch) {
+  const protocol::Telemetry& telemetry = *checked;
   batch.robot_id = robot.id;
   batch.boot_id = robot.boot_id;
   batch.first_seq = telemetry.first_seq;
@@ -108,7 +109,8 @@ bool show_samples(RobotEntry& entry, const SampleBatch& batch, const CommandLimi
   return is_new_controller;
 }
 
-RobotEvent event_of(const RobotState& robot, const protocol::Event& event) {
+RobotEvent event_of(const RobotState& robot, Checked<protocol::Event> checked) {
+  const protocol::Event& event = *checked;
   RobotEvent out;
   out.robot_id = robot.id;
   out.boot_id = robot.boot_id;

@@ -99,7 +99,7 @@ void Station::on_frame(RobotPort& port, std::uint64_t robot_time_us) {
   parts_->publish_stops_of([&](std::vector<CommandRecord>& made) { parts_->stops.repeat(*entry, made); });
 }
 
-void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) {
+void Station::on_samples(RobotPort& port, Checked<protocol::Telemetry> telemetry) {
   RobotEntry* entry = RobotTable::of(port);
   if (entry == nullptr) return;
   RobotState& robot = entry->robot;
@@ -119,12 +119,12 @@ void Station::on_samples(RobotPort& port, const protocol::Telemetry& telemetry) 
   parts_->tracker.settle_unanswered(*entry, batch);
 }
 
-void Station::on_event(RobotPort& port, const protocol::Event& event) {
+void Station::on_event(RobotPort& port, Checked<protocol::Event> event) {
   RobotEntry* entry = RobotTable::of(port);
   if (entry == nullptr) return;
   parts_->notifier.publish(entry->robot, event_of(entry->robot, event));
-  entry->orders.note_event(event);
-  parts_->tracker.on_event(*entry, event);
+  entry->orders.note_event(*event);
+  parts_->tracker.on_event(*entry, *event);
 }
 
 void Station::on_invalid_values(RobotPort& port, std::uint64_t count, const char* cause, const std::string& first) {

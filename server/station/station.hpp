@@ -22,6 +22,7 @@
 #include "server/runtime/result.hpp"
 #include "server/station/commands/requests.hpp"
 #include "server/station/state/audit_note.hpp"
+#include "server/station/state/checked.hpp"
 #include "server/station/state/clock_sync.hpp"
 #include "server/station/state/in_force.hpp"
 #include "server/station/state/robot_archive.hpp"
@@ -99,8 +100,8 @@ class Station {
   // 10 s whatever their names are.
   void on_enrolment_refused(const RobotId& id, const std::string& peer, const std::string& detail);
   void on_frame(RobotPort& port, std::uint64_t robot_time_us);  // any frame: a sign of life
-  void on_samples(RobotPort& port, const protocol::Telemetry& telemetry);
-  void on_event(RobotPort& port, const protocol::Event& event);
+  void on_samples(RobotPort& port, Checked<protocol::Telemetry> telemetry);
+  void on_event(RobotPort& port, Checked<protocol::Event> event);
   // Values of a frame that cannot be: counted, and an event of the first of them, at most one each 10 s.
   void on_invalid_values(RobotPort& port, std::uint64_t count, const char* cause, const std::string& first);
   // What came and cannot be recorded is lost for good: else the robot would send it again for ever.

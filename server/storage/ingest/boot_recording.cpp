@@ -24,8 +24,6 @@ constexpr std::int64_t kUnknownUtcToleranceUs = 1'000'000;
 // Successive boots have complete segments 37 samples apart: any 100 of them are spread evenly.
 constexpr std::uint64_t kBootsApart = 37;
 
-constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
-
 constexpr microseconds kHolePatience = 500ms;  // before a hole that does not shrink is asked for
 constexpr microseconds kAskInterval = 1s;
 
@@ -69,13 +67,6 @@ void add_lost(std::vector<LostRange>& gaps, const LostRange& range, const Interv
 }
 
 }  // namespace
-
-bool is_malformed(const SampleBatch& batch) {
-  const std::uint32_t period_us = batch.context.period_us;
-  const bool numbers = batch.first_seq < kMaxRecordedNumber && batch.oldest_seq < kMaxRecordedNumber &&
-                       batch.first_robot_time_us < kMaxRecordedNumber && period_us > 0 && period_us <= kMaxPeriodUs;
-  return batch.samples.empty() || !numbers;
-}
 
 void BootRecording::load(StoredBoot stored) {
   key_ = stored.key;

@@ -14,12 +14,9 @@
 #include <optional>
 #include <vector>
 
-#include "server/storage/ingest/sample_store.hpp"
+#include "server/storage/commits/sample_store.hpp"
 
 namespace server {
-
-// What no robot can mean. One such value in a commit might keep everything behind it from being stored.
-bool is_malformed(const SampleBatch& batch);
 
 // When to ask for what is missing: once its beginning was the same for a while, and then at intervals.
 class HoleWatch {

@@ -7,6 +7,7 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "server/runtime/counted.hpp"
+#include "server/station/state/checked.hpp"
 #include "server/storage/ingest/boot_segments.hpp"
 
 namespace server {
@@ -175,8 +176,6 @@ std::string Recorder::write_rest() {
 }
 
 asio::awaitable<Admission> Recorder::admit(AdmissionRequest request) {
-  std::optional<Admission> malformed = refuse_malformed(request);
-  if (malformed) co_return std::move(*malformed);
   BootEntry& boot = boots_->enter(request.boot_id, request.robot_id);
   const Counted admitting{boot.admissions};  // keeps the boot, whatever happens
   wake();
@@ -230,7 +229,7 @@ void Recorder::start(BootEntry& boot) {
 
 void Recorder::on_samples(const RobotState&, const SampleBatch& batch) {
   BootEntry* boot = boots_->find_recorded(batch.boot_id);
-  if (boot == nullptr || is_malformed(batch)) {
+  if (boot == nullptr) {
     ++counters_.batches_malformed;
     return;
   }
@@ -259,14 +258,14 @@ void Recorder::note_refused(std::size_t samples) {
 void Recorder::on_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) {
   ++counters_.batches_malformed;
   BootEntry* boot = boots_->find_recorded(robot.boot_id);
-  if (boot == nullptr || next_seq > kMaxRecordedNumber) return;
+  if (boot == nullptr) return;
   boot->recording.set_lost({first_seq, next_seq}, "invalid", robot.last_received_at_us);
   watch(*boot);
 }
 
 void Recorder::on_unusable_event(const RobotState& robot, std::uint64_t event_seq) {
   BootEntry* boot = boots_->find_recorded(robot.boot_id);
-  if (boot == nullptr || event_seq >= kMaxRecordedNumber) return;
+  if (boot == nullptr) return;
   boot->recording.set_event_lost(event_seq, "invalid", robot.last_received_at_us);
   watch(*boot);
 }
@@ -284,7 +283,7 @@ void Recorder::on_event(const RobotState&, const RobotEvent& event) {
     queue_->enqueue(StoredEvent{boot == nullptr ? 0 : boot->recording.key(), event});
     return wake();
   }
-  if (boot == nullptr || *event.event_seq >= kMaxRecordedNumber || event.oldest_event_seq >= kMaxRecordedNumber) return;
+  if (boot == nullptr) return;
   if (!room_for_record()) {
     boot->recording.refuse_event(*event.event_seq);
   } else if (boot->recording.append_event(*event.event_seq)) {
@@ -328,7 +327,7 @@ void Recorder::on_clock(const RobotState&, const ClockRecord& record) {
 
 void Recorder::on_in_force(const RobotState&, const InForceRecord& record) {
   const std::int64_t boot_key = key_of(record.boot_id);
-  if (boot_key == 0 || record.first_seq >= kMaxRecordedNumber || !room_for_record()) return;
+  if (boot_key == 0 || record.first_seq > kMaxRobotNumber || !room_for_record()) return;
   queue_->enqueue(StoredInForce{boot_key, record});
   wake();
 }

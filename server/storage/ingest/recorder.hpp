@@ -38,8 +38,8 @@
 #include "server/station/state/robot_archive.hpp"
 #include "server/station/state/station_sink.hpp"
 #include "server/storage/audit/audit_quota.hpp"
-#include "server/storage/ingest/checkpointer.hpp"
-#include "server/storage/ingest/database_worker.hpp"
+#include "server/storage/commits/checkpointer.hpp"
+#include "server/storage/commits/database_worker.hpp"
 #include "server/storage/ingest/flush_waiters.hpp"
 #include "server/storage/ingest/robot_admission.hpp"
 #include "server/storage/ingest/write_failure.hpp"
@@ -128,6 +128,7 @@ class Recorder final : public StationSink, public RobotArchive {
 
   void on_robot(const RobotState& robot) override;
   void on_fluid(const RobotState& robot) override;
+  // Filled from checked telemetry: its numbers are not judged again. Dropped and counted when no such boot is recorded.
   void on_samples(const RobotState& robot, const SampleBatch& batch) override;
   void on_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) override;
   void on_unusable_event(const RobotState& robot, std::uint64_t event_seq) override;

@@ -1,21 +1,11 @@
 #include "server/storage/ingest/robot_admission.hpp"
 
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <utility>
 
 namespace server {
 namespace asio = boost::asio;
-
-std::optional<Admission> refuse_malformed(const AdmissionRequest& request) {
-  const bool is_malformed = request.next_seq >= kMaxRecordedNumber || request.oldest_seq > request.next_seq ||
-                            request.next_event_seq >= kMaxRecordedNumber || request.robot_time_us >= kMaxRecordedNumber;
-  if (!is_malformed) return std::nullopt;
-  return refusal(rheonaut_REFUSAL_REASON_MALFORMED,
-                 fmt::format("oldest_seq {}, next_seq {}, next_event_seq {} and robot time {} µs cannot be",
-                             request.oldest_seq, request.next_seq, request.next_event_seq, request.robot_time_us));
-}
 
 class RobotAdmission::Turn {
  public:

@@ -17,12 +17,9 @@
 #include <vector>
 
 #include "server/runtime/clock.hpp"
-#include "server/storage/ingest/boot_store.hpp"
+#include "server/storage/commits/boot_store.hpp"
 
 namespace server {
-
-// The refusal of numbers that cannot be stored; nothing when they can.
-std::optional<Admission> refuse_malformed(const AdmissionRequest& request);
 
 class RobotAdmission {
  public:

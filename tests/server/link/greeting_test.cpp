@@ -5,7 +5,7 @@
 
 #include <cstring>
 
-#include "server/link/frame_faults.hpp"
+#include "server/station/state/checked.hpp"
 
 namespace server {
 namespace {
@@ -27,7 +27,7 @@ protocol::RefusalReason reason_for(const protocol::Hello& hello, std::uint64_t r
 
 TEST(Greeting, AHelloThatCanBeIsNotRefused) {
   EXPECT_EQ(reason_for(hello()), rheonaut_REFUSAL_REASON_NONE);
-  EXPECT_EQ(reason_for(hello(), kMaxNumber), rheonaut_REFUSAL_REASON_NONE);
+  EXPECT_EQ(reason_for(hello(), kMaxRobotNumber), rheonaut_REFUSAL_REASON_NONE);
 }
 
 TEST(Greeting, AnotherVersionIsRefusedBeforeAnythingElse) {
@@ -45,13 +45,18 @@ TEST(Greeting, NumbersThatCannotBeAreMalformed) {
   for (const auto field : {&protocol::Hello::oldest_seq, &protocol::Hello::oldest_event_seq, &protocol::Hello::next_seq,
                            &protocol::Hello::next_event_seq}) {
     auto bad = hello();
-    bad.*field = kMaxNumber + 1;
+    bad.*field = kMaxRobotNumber + 1;
     EXPECT_EQ(reason_for(bad), rheonaut_REFUSAL_REASON_MALFORMED);
+  }
+  for (const auto oldest : {&protocol::Hello::oldest_seq, &protocol::Hello::oldest_event_seq}) {
+    auto crossed = hello();
+    crossed.*oldest = 21;
+    EXPECT_EQ(reason_for(crossed), rheonaut_REFUSAL_REASON_MALFORMED) << "it holds what it has not made";
   }
   auto without_boot = hello();
   without_boot.boot_id = 0;
   EXPECT_EQ(reason_for(without_boot), rheonaut_REFUSAL_REASON_MALFORMED);
-  EXPECT_EQ(reason_for(hello(), kMaxNumber + 1), rheonaut_REFUSAL_REASON_MALFORMED);
+  EXPECT_EQ(reason_for(hello(), kMaxRobotNumber + 1), rheonaut_REFUSAL_REASON_MALFORMED);
 }
 
 TEST(Greeting, NamesHaveTheirCharacters) {

@@ -169,7 +169,69 @@ TEST_F(InvalidValuesTest, OfARobotWhoseFramesDoNotDecodeAStopIsRepeatedAndComman
   EXPECT_TRUE(std::ranges::any_of(results, [](const auto& one) { return one->state == CommandState::unknown; }));
 }
 
-TEST(FrameFaults, AHeartbeatWithATimeThatCannotBeAnswersNothing) {
+class FrameFaultsTest : public ::testing::Test {
+ protected:
+  static protocol::RobotFrame samples(std::uint64_t first_seq, std::uint64_t oldest_seq, std::uint64_t time_us) {
+    protocol::RobotFrame frame = TestRobot::samples_frame(first_seq, 5, time_us, 0);
+    frame.body.telemetry.first_robot_time_us = time_us;
+    frame.body.telemetry.oldest_seq = oldest_seq;
+    return frame;
+  }
+  // Of a robot whose numbers are as large as they can be, whatever it has sent since its hello.
+  static FrameReach at_the_end() {
+    protocol::Hello hello = rheonaut_Hello_init_zero;
+    hello.next_seq = hello.next_event_seq = kMaxRobotNumber;
+    FrameReach reach = FrameReach::after(hello, kMaxRobotNumber);
+    reach.advance(samples(kMaxRobotNumber, 0, kMaxRobotNumber));
+    return reach;
+  }
+};
+
+TEST_F(FrameFaultsTest, WhatCanBeUsedIsCheckedAndNothingElse) {
+  protocol::RobotFrame frame = samples(10, 5, 6'000'000);
+  const FrameFaults none = mend(frame, {});
+  ASSERT_TRUE(none.samples);
+  EXPECT_EQ(&**none.samples, &frame.body.telemetry);
+  EXPECT_FALSE(none.event);
+  for (const std::uint32_t period_us : {0U, kMaxPeriodUs + 1}) {
+    frame.body.telemetry.period_us = period_us;
+    const FrameFaults faults = mend(frame, {});
+    EXPECT_TRUE(faults.is_unusable);
+    EXPECT_FALSE(faults.samples) << period_us;
+  }
+  frame.which_body = rheonaut_RobotFrame_event_tag;
+  frame.body.event = rheonaut_Event_init_zero;
+  EXPECT_TRUE(mend(frame, {}).event);
+  EXPECT_FALSE(mend(frame, {}).samples);
+  frame.body.event.sample_seq = kFar;
+  EXPECT_FALSE(mend(frame, {}).event);
+}
+
+TEST_F(FrameFaultsTest, NoNumberIsBeyondWhatCanBeStoredHoweverFarTheRobotHasCome) {
+  const FrameReach reach = at_the_end();
+  protocol::RobotFrame last = samples(kMaxRobotNumber, kMaxRobotNumber, kMaxRobotNumber);
+  EXPECT_TRUE(mend(last, reach).samples);
+  protocol::RobotFrame late = samples(0, 0, kMaxRobotNumber + 1);
+  EXPECT_FALSE(mend(late, reach).samples);
+  protocol::RobotFrame beyond = samples(kMaxRobotNumber + 1, 0, 6'000'000);
+  EXPECT_FALSE(mend(beyond, reach).samples);
+  protocol::RobotFrame event = rheonaut_RobotFrame_init_zero;
+  event.which_body = rheonaut_RobotFrame_event_tag;
+  event.body.event.event_seq = kMaxRobotNumber;
+  EXPECT_TRUE(mend(event, reach).event);
+  event.body.event.event_seq = kMaxRobotNumber + 1;
+  EXPECT_FALSE(mend(event, reach).event);
+}
+
+TEST_F(FrameFaultsTest, TheOldestThatARobotHoldsIsNotAboveWhatItSends) {
+  protocol::RobotFrame frame = samples(10, 11, 6'000'000);
+  const FrameFaults faults = mend(frame, {});
+  EXPECT_EQ(faults.count, 1u);
+  ASSERT_TRUE(faults.samples);
+  EXPECT_EQ((**faults.samples).oldest_seq, 0u);
+}
+
+TEST_F(FrameFaultsTest, AHeartbeatWithATimeThatCannotBeAnswersNothing) {
   protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
   frame.which_body = rheonaut_RobotFrame_heartbeat_tag;
   frame.body.heartbeat.echo_station_time_us = 5;

@@ -324,12 +324,6 @@ TEST_F(AdmissionTest, WhatThisStoreHoldsIsNoGapHoweverFarItWasAcknowledged) {
   EXPECT_EQ(number("SELECT count(*) FROM event_gap"), 0);
 }
 
-TEST_F(AdmissionTest, RefusesNumbersThatCannotBe) {
-  start();
-  robot_.oldest_seq = 5;  // but next_seq is 0
-  EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_MALFORMED);
-}
-
 TEST_F(AdmissionTest, OnlySoManyRobotsEnrolThemselvesAMinute) {
   most_a_minute_ = 3;
   start();

@@ -1,4 +1,5 @@
 // What a robot says is in force, and how its clock was found to run, in the database.
+#include "server/station/state/checked.hpp"
 #include "tests/server/recording/recording_test.hpp"
 
 namespace server {
@@ -56,7 +57,7 @@ TEST_F(InForceStoreTest, WhatABootSaysFirstHoldsFromItsBeginning) {
 }
 
 TEST_F(InForceStoreTest, ANumberThatCannotBeIsNotStored) {
-  report(controller(1), kMaxRecordedNumber, true);
+  report(controller(1), kMaxRobotNumber + 1, true);
   EXPECT_TRUE(in_force().empty());
 }
 

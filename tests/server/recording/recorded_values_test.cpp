@@ -111,6 +111,7 @@ TEST_F(RecordedValuesTest, WhatCannotBeRecordedIsAFinalGap) {
   EXPECT_EQ(rows("SELECT first_event_seq, last_event_seq, cause FROM event_gap"), Rows{"0|0|invalid"});
   EXPECT_EQ(number("SELECT count(*) FROM sample"), 95);
   EXPECT_TRUE(missing_.empty());
+  EXPECT_EQ(recorder_->counters().batches_malformed, 2u);
 }
 
 }  // namespace

@@ -322,6 +322,14 @@ TEST_F(RecorderTest, RestoresPendingStopsAndEndsOtherCommands) {
   EXPECT_EQ(rows("SELECT state, reason FROM command WHERE command_id = 4"), Rows{"failed|station_restarted"});
 }
 
+TEST_F(RecorderTest, CountsABatchOfABootThatIsNotRecorded) {
+  start();
+  send(robot_, 0, 5);
+  flush();
+  EXPECT_EQ(samples(), 0);
+  EXPECT_EQ(recorder_->counters().batches_malformed, 1u);
+}
+
 TEST_F(RecorderTest, RestoresTheLatestBootAndTheLatchItWasIn) {
   const auto restored = [this] {
     flush();

@@ -86,20 +86,5 @@ TEST_F(RobotAdmissionTest, ARobotThatIsRevokedMeanwhileIsRefused) {
   EXPECT_EQ(refusals_["a"], rheonaut_REFUSAL_REASON_NONE);
 }
 
-TEST(RefuseMalformed, NamesTheNumbersThatCannotBe) {
-  AdmissionRequest request;
-  request.next_seq = 5;
-  request.oldest_seq = 5;
-  EXPECT_FALSE(refuse_malformed(request));
-  request.oldest_seq = 6;
-  const auto refusal = refuse_malformed(request);
-  ASSERT_TRUE(refusal);
-  EXPECT_EQ(refusal->refusal, rheonaut_REFUSAL_REASON_MALFORMED);
-  EXPECT_NE(refusal->detail.find("oldest_seq 6"), std::string::npos) << refusal->detail;
-  request.oldest_seq = 0;
-  request.next_event_seq = kMaxRecordedNumber;
-  EXPECT_TRUE(refuse_malformed(request));
-}
-
 }  // namespace
 }  // namespace server

@@ -15,9 +15,6 @@
 
 namespace server {
 
-// A number of a sample or event, or microseconds, is below this: far from SQLite's signed limit.
-inline constexpr std::uint64_t kMaxRecordedNumber = 1ULL << 62;
-
 // A boot as it is stored.
 struct StoredBoot {
   std::int64_t key = 0;

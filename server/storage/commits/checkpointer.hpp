@@ -25,7 +25,7 @@
 
 #include "server/runtime/clock.hpp"
 #include "server/runtime/worker.hpp"
-#include "server/storage/ingest/sample_store.hpp"
+#include "server/storage/commits/sample_store.hpp"
 
 namespace server {
 

@@ -1,5 +1,5 @@
 // SQL of admission and of the succession of boots.
-#include "server/storage/ingest/boot_store.hpp"
+#include "server/storage/commits/boot_store.hpp"
 
 #include <SQLiteCpp/Savepoint.h>
 #include <fmt/format.h>

@@ -18,7 +18,7 @@
 #include "server/runtime/worker.hpp"
 #include "server/station/state/robot_archive.hpp"
 #include "server/station/state/station_state.hpp"
-#include "server/storage/ingest/checkpointer.hpp"
+#include "server/storage/commits/checkpointer.hpp"
 
 namespace server {
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "server/station/state/station_state.hpp"
+#include "server/storage/commits/boot_store.hpp"
 #include "server/storage/database/database.hpp"
-#include "server/storage/ingest/boot_store.hpp"
 #include "server/storage/samples/command_store.hpp"
 #include "server/storage/samples/row_writer.hpp"
 #include "server/storage/samples/segment.hpp"

@@ -1,4 +1,4 @@
-#include "server/storage/ingest/database_worker.hpp"
+#include "server/storage/commits/database_worker.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>

@@ -1,5 +1,5 @@
 // Prepared statements, one transaction per batch; row numbers come from a counter that is stored with the rows.
-#include "server/storage/ingest/sample_store.hpp"
+#include "server/storage/commits/sample_store.hpp"
 
 #include <fmt/format.h>
 #include <sqlite3.h>

@@ -1,5 +1,5 @@
 // When to checkpoint, and what to say when that does not help.
-#include "server/storage/ingest/checkpointer.hpp"
+#include "server/storage/commits/checkpointer.hpp"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>

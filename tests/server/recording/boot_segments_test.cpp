@@ -1,0 +1,138 @@
+// Segments between boots and commits: what is enqueued when, and what a reader finds before it is durable.
+#include "server/storage/ingest/boot_segments.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+namespace server {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr Interval kAllSamples{0, std::numeric_limits<std::uint64_t>::max()};
+constexpr std::size_t kNoLimit = std::numeric_limits<std::size_t>::max();
+
+class BootSegmentsTest : public ::testing::Test {
+ protected:
+  // Its segments end at multiples of 100: it has the first key.
+  BootSegmentsTest() : nemo_{connect(10, "nemo")} {}
+
+  BootEntry& connect(BootId boot_id, const RobotId& robot_id) {
+    AdmissionRequest hello;
+    hello.robot_id = robot_id;
+    hello.boot_id = boot_id;
+    BootEntry& boot = boots_.enter(boot_id, robot_id);
+    boots_.admit(boot, {}, {}, hello, 0);
+    boot.connected = true;
+    boots_.start(boot, 0);
+    return boot;
+  }
+  void receive(BootEntry& boot, std::uint64_t first_seq, std::size_t samples, float position_m = 1) {
+    SampleBatch batch;
+    batch.first_seq = first_seq;
+    batch.first_robot_time_us = first_seq * 10'000;
+    batch.context.period_us = 10'000;
+    batch.samples.resize(samples);
+    for (Sample& sample : batch.samples) sample.position_m = position_m;
+    boot.recording.append(batch, 0);
+    boots_.watch(boot);
+    queue_.count_received(samples);
+  }
+  void build_commit() { queue_.build_commit(boots_.with_records()); }
+
+  std::vector<std::string> found(const BootEntry& boot, Interval range = kAllSamples, std::size_t limit = kNoLimit) {
+    std::vector<std::string> parts;
+    for (const Segment& segment : waiting_samples(queue_, boot, range, limit)) {
+      parts.push_back(std::to_string(segment.first_seq) + "-" + std::to_string(segment.next_seq() - 1));
+    }
+    return parts;
+  }
+  std::vector<std::string> gaps(const BootEntry& boot, Interval range = kAllSamples) {
+    std::vector<std::string> parts;
+    for (const LostRange& gap : waiting_gaps(queue_, boot, range)) {
+      parts.push_back(std::to_string(gap.lost.first) + "-" + std::to_string(gap.lost.next - 1) + " " + gap.cause);
+    }
+    return parts;
+  }
+
+  BootRegistry boots_{1, 0};
+  CommitQueue queue_{1'000'000, 1000};
+  BootEntry& nemo_;
+};
+
+TEST_F(BootSegmentsTest, CompleteSegmentsAreDueAndTheRestOnceItIsOld) {
+  receive(nemo_, 0, 150);
+  enqueue_due(boots_, queue_, 0);
+  EXPECT_EQ(nemo_.queued_segments, 1U);
+  enqueue_due(boots_, queue_, 1'099'999);
+  EXPECT_EQ(nemo_.queued_segments, 1U);
+  enqueue_due(boots_, queue_, 1'100'000);
+  EXPECT_EQ(nemo_.queued_segments, 2U);
+  EXPECT_TRUE(nemo_.recording.waiting().empty());
+}
+
+TEST_F(BootSegmentsTest, WhatDoesNotFitIntoTheCommitIsNotTouched) {
+  receive(nemo_, 0, kMaxCommitSamples);
+  BootEntry& dory = connect(20, "dory");
+  receive(dory, 0, 250);
+  enqueue_due(boots_, queue_, 2'000'000);
+  EXPECT_TRUE(queue_.has_full_commit());
+  EXPECT_EQ(dory.queued_segments, 0U);
+  build_commit();
+  enqueue_due(boots_, queue_, 2'000'000);
+  EXPECT_GT(dory.queued_segments, 0U);
+  EXPECT_TRUE(dory.recording.waiting().empty());
+}
+
+TEST_F(BootSegmentsTest, EverythingIsEnqueuedOfEveryBoot) {
+  BootEntry& dory = connect(20, "dory");
+  receive(nemo_, 0, 150);
+  receive(dory, 0, 5);
+  enqueue_everything(boots_, queue_);
+  EXPECT_EQ(nemo_.queued_segments, 2U);
+  EXPECT_EQ(dory.queued_segments, 1U);
+}
+
+TEST_F(BootSegmentsTest, AReaderFindsSamplesWhereverTheyWait) {
+  BootEntry& dory = connect(20, "dory");
+  receive(dory, 0, 5);
+  receive(nemo_, 200, 100);
+  enqueue_due(boots_, queue_, 0);
+  build_commit();  // with 200 to 299
+  receive(nemo_, 100, 100);
+  enqueue_due(boots_, queue_, 0);  // 100 to 199
+  receive(nemo_, 300, 5);
+  EXPECT_THAT(found(nemo_), ElementsAre("100-199", "200-299", "300-304"));
+  EXPECT_THAT(found(nemo_, {150, 302}), ElementsAre("150-199", "200-299", "300-301"));
+  EXPECT_THAT(found(nemo_, {305, 400}), IsEmpty());
+  EXPECT_THAT(found(nemo_, kAllSamples, 101), ElementsAre("100-199", "200-299"));
+  EXPECT_THAT(found(dory), ElementsAre("0-4"));
+}
+
+TEST_F(BootSegmentsTest, AReaderFindsSamplesAsTheDatabaseWillGiveThemBack) {
+  receive(nemo_, 0, 1, -0.0F);
+  receive(nemo_, 1, 1, std::numeric_limits<float>::infinity());
+  const std::vector<Segment> segments = waiting_samples(queue_, nemo_, kAllSamples, kNoLimit);
+  ASSERT_EQ(segments.size(), 1U);
+  EXPECT_FALSE(std::signbit(segments[0].samples.at(0).position_m));
+  EXPECT_TRUE(std::isnan(segments[0].samples.at(1).position_m));
+}
+
+TEST_F(BootSegmentsTest, AReaderFindsGapsWhereverTheyWait) {
+  nemo_.recording.set_lost({50, 60}, "invalid", 0);
+  boots_.watch(nemo_);
+  build_commit();
+  nemo_.recording.set_lost({10, 20}, "invalid", 0);
+  boots_.watch(nemo_);
+  EXPECT_THAT(gaps(nemo_), ElementsAre("10-19 invalid", "50-59 invalid"));
+  EXPECT_THAT(gaps(nemo_, {20, 51}), ElementsAre("50-59 invalid"));
+  EXPECT_THAT(gaps(connect(20, "dory")), IsEmpty());
+}
+
+}  // namespace
+}  // namespace server
