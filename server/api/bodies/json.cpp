@@ -8,8 +8,6 @@
 #include <cmath>
 #include <limits>
 
-#include "server/api/bodies/limits.hpp"
-
 namespace server {
 
 using nlohmann::json;

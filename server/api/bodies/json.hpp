@@ -4,7 +4,9 @@
 // each sentence names the member and quotes the value.
 #pragma once
 
+#include <cstdint>
 #include <initializer_list>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -19,6 +21,8 @@
 namespace server {
 
 inline constexpr int kMaxJsonDepth = 16;  // of what is sent to the station; nothing that it knows needs more than 3
+
+inline constexpr std::int64_t kMaxTimeUs = std::numeric_limits<std::int64_t>::max();
 
 template <class Number>
 struct Range {

@@ -26,7 +26,6 @@ struct Limit {
   Range<Number> range;
 };
 
-inline constexpr std::int64_t kMaxTimeUs = std::numeric_limits<std::int64_t>::max();
 inline constexpr std::int64_t kMaxUint32 = std::numeric_limits<std::uint32_t>::max();
 inline constexpr std::int64_t kMaxJavaScriptInteger = 9'007'199'254'740'991;
 inline constexpr Range<std::size_t> kNameBytes{1, 200}, kTextBytes{0, 4000}, kReasonBytes{1, 4000};
