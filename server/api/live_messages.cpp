@@ -40,7 +40,7 @@ void spawn(LiveParts& parts, const std::string& name, asio::awaitable<void> task
 }
 
 Result<RobotId> known_robot(const Members& message, const LiveParts& parts) {
-  auto id = message.text("robot_id", 0, 100);
+  auto id = message.text("robot_id", {0, 100});
   if (!id) return id;
   if (parts.station.find(*id) != nullptr) return id;
   return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", *id), "unknown_robot");
@@ -52,7 +52,7 @@ Result<void> on_emergency_stop(const Members& message, const Caller& caller, Liv
   request.peer = caller.peer;
   request.received_us = parts.clock.steady_us();
   // SAFETY: a stop is obeyed also when the message carries members that nobody knows, or a key that is none.
-  if (const auto key = message.text("key", 1, 64); key && is_command_key(*key)) request.key = *key;
+  if (const auto key = message.text("key", {1, 64}); key && is_command_key(*key)) request.key = *key;
   if (message.has("robot_id") && message.object().at("robot_id").is_null()) {
     spawn(parts, "emergency stop of all robots", stop_all(parts, std::move(request)));
     return {};
@@ -68,7 +68,7 @@ Result<void> on_emergency_stop(const Members& message, const Caller& caller, Liv
 Result<void> on_keep_alive(const Members& message, const Caller& caller, LiveParts& parts) {
   if (auto known = message.only({"type", "stamp_us"}); !known) return known;
   if (!message.has("stamp_us")) return {};
-  const auto stamp_us = message.integer("stamp_us", 0, INT64_MAX);
+  const auto stamp_us = message.integer("stamp_us", {0, INT64_MAX});
   if (!stamp_us) return std::unexpected{stamp_us.error()};
   parts.station.keep_control(caller.actor, microseconds{parts.clock.steady_us() - *stamp_us});
   return {};
@@ -78,7 +78,7 @@ Result<void> on_renew_lease(const Members& message, const Caller& caller, LivePa
   if (auto known = message.only({"type", "robot_id", "stamp_us"}); !known) return known;
   const auto robot_id = known_robot(message, parts);
   if (!robot_id) return std::unexpected{robot_id.error()};
-  const auto stamp_us = message.integer("stamp_us", 0, INT64_MAX);
+  const auto stamp_us = message.integer("stamp_us", {0, INT64_MAX});
   if (!stamp_us) return std::unexpected{stamp_us.error()};
   // SAFETY: what the page saw is too old, so its operator may be looking at a robot that has moved on.
   const std::int64_t age_us = parts.clock.steady_us() - *stamp_us;
@@ -131,7 +131,7 @@ RobotDocument welcome_message(const std::string& actor, const LiveParts& parts) 
 Result<void> on_page_message(const std::string& text, const Caller& caller, Subscriber& page, LiveParts& parts) {
   const auto message = Members::parse(text, {});
   if (!message) return std::unexpected{message.error()};
-  const auto type = message->text("type", 1, 40);
+  const auto type = message->text("type", {1, 40});
   if (!type) return std::unexpected{type.error()};
   if (*type == "emergency_stop") return on_emergency_stop(*message, caller, parts);
   if (*type == "renew_lease") return on_renew_lease(*message, caller, parts);

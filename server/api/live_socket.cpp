@@ -79,7 +79,7 @@ class LivePage {
   // SAFETY: a stop needs no more than to see the robot; of a type that is not known here, command is needed.
   Result<void> check_permission(const std::string& text) const {
     const auto message = Members::parse(text, {});
-    const auto type = message ? message->text("type", 0, kMaxMessageBytes) : std::unexpected{message.error()};
+    const auto type = message ? message->text("type", {0, kMaxMessageBytes}) : std::unexpected{message.error()};
     if (!type) return {};  // refused for that
     const bool is_reading = *type == "keep_alive" || *type == "watch";
     const Scope needed = *type == "emergency_stop" ? Scope::stop : is_reading ? Scope::read : Scope::command;

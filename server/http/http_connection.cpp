@@ -1,72 +1,25 @@
-// Reads HTTP/1.1 with Beast, and writes it with answer_head; the only unit besides the WebSocket of /live that knows
-// it. LONG: the turns of a connection, and every way in which they end, stand in one place.
+// The turns of a connection, and every way in which they end.
 #include "server/http/http_connection.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
-#include <algorithm>
-#include <array>
 #include <boost/asio/as_tuple.hpp>
-#include <boost/asio/experimental/awaitable_operators.hpp>
-#include <boost/asio/multiple_exceptions.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
+#include <boost/beast/http/read.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
-#include <cctype>
-#include <limits>
-#include <variant>
 
 #include "server/http/answer_head.hpp"
 
 namespace server {
 namespace asio = boost::asio;
 namespace http = boost::beast::http;
-using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
 
 namespace {
 
-constexpr auto kNever = std::numeric_limits<std::int64_t>::max();
 constexpr microseconds kWatchInterval{std::chrono::seconds{1}};  // how exactly time-outs are kept
 constexpr std::size_t kReadBytes = 4096;
 constexpr std::size_t kMaxDiscardBytes = 1024 * 1024;
-
-// All but the body.
-template <class Message>
-Request plain_head(const Message& message) {
-  Request request;
-  request.method = message.method_string();
-  request.target = Target{std::string{message.target()}};
-  for (const auto& field : message) {
-    std::string name = field.name_string();
-    std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    std::string& value = request.headers[name];
-    if (!value.empty()) value += name == "cookie" ? "; " : ", ";
-    value += field.value();
-  }
-  return request;
-}
-
-std::string route_of(std::string_view method, std::string_view target) {
-  return fmt::format("{} {}", method, target.substr(0, 200));
-}
-
-Response body_too_large(std::size_t limit) {
-  return problem(413, fmt::format("the body has more than {} bytes", limit), "too_large");
-}
-
-// The length of what follows the header is not known: Beast takes a coding that it does not know for no body at all.
-bool has_unknown_length(const http::request_parser<http::string_body>& parser) {
-  return parser.get().count(http::field::transfer_encoding) > 0 && !parser.chunked();
-}
-
-// Whether the connection can go on behind a body that nobody needs. Told what became of its request, a client that
-// expects 100-continue may leave the body out; what follows may then be either.
-bool can_pass_over_body(const http::request_parser<http::string_body>& parser) {
-  const auto& head = parser.get();
-  if (!head.keep_alive() || head.version() < 11 || head.count(http::field::expect) > 0) return false;
-  return parser.content_length().value_or(0) <= kMaxBodyBytes;
-}
 
 }  // namespace
 
@@ -81,7 +34,8 @@ HttpConnection::HttpConnection(HttpStream stream, ConnectionSlot& slot, TlsHands
       router_{router},
       upgrades_{upgrades},
       exceptions_{exceptions},
-      deadline_us_{kNever} {
+      deadline_{clock},
+      sender_{stream_, deadline_, clock, exceptions} {
   slot_.on_end([this] { stream_.end(); });
 }
 
@@ -90,18 +44,18 @@ asio::awaitable<void> HttpConnection::talk() {
 }
 
 asio::awaitable<void> HttpConnection::take_turns() {
-  allow(kRequestTime);
+  deadline_.allow(kRequestTime);
   const Next begun = co_await secure();
   if (begun == Next::end) co_return;
   for (;;) {
     const Next next = co_await read_and_answer();
     if (next == Next::end) co_return;
-    allow(kIdleTime);
+    deadline_.allow(kIdleTime);
   }
 }
 
 asio::awaitable<void> HttpConnection::watch() {
-  while (clock_.steady_us() < deadline_us_) co_await clock_.sleep_for(kWatchInterval);
+  while (!deadline_.has_passed()) co_await clock_.sleep_for(kWatchInterval);
   if (request_has_begun_) {
     const Response late = problem(408, "the request did not arrive in time", "too_slow");
     stream_.write_now(last_answer(late, stream_.is_secure()));
@@ -109,7 +63,7 @@ asio::awaitable<void> HttpConnection::watch() {
   stream_.end();
 }
 
-asio::awaitable<HttpConnection::Next> HttpConnection::secure() {
+asio::awaitable<Next> HttpConnection::secure() {
   if (tls_ == nullptr) co_return Next::another;
   const TlsHandshakes::Outcome outcome = co_await tls_->secure(stream_, "http port");
   if (outcome == TlsHandshakes::Outcome::secure) co_return Next::another;
@@ -122,7 +76,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::secure() {
   co_return Next::end;
 }
 
-bool HttpConnection::wants_upgrade(const Request& request, const Message& message) const {
+bool HttpConnection::wants_upgrade(const Request& request, const RequestMessage& message) const {
   return request.target.path() == upgrades_.path && boost::beast::websocket::is_upgrade(message) && buffer_.size() == 0;
 }
 
@@ -134,7 +88,7 @@ bool HttpConnection::begin_page(const Caller& caller) {
   return true;
 }
 
-asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
+asio::awaitable<Next> HttpConnection::read_and_answer() {
   if (buffer_.size() == 0) {
     unread_since_us_.reset();
     const auto [error, size] =
@@ -143,9 +97,9 @@ asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
     buffer_.commit(size);
     note_arrival();
   }
-  allow(kRequestTime);
+  deadline_.allow(kRequestTime);
   request_has_begun_ = true;
-  Parser parser;
+  RequestParser parser;
   parser.header_limit(kMaxHeaderBytes);
   parser.body_limit(boost::none);  // is set when it is known whose body it is
   Request head;
@@ -161,13 +115,16 @@ asio::awaitable<HttpConnection::Next> HttpConnection::read_and_answer() {
     if (router_.is_stop(head.method, head.target)) co_return co_await carry_out_stop(parser, std::move(head));
     auto refusal = refusal_of(parser, head);
     if (refusal) co_return co_await send_and_close(std::move(*refusal), parser.release());
+  }
+  HeaderFields fields{parser};
+  if (!error) {
     error = co_await read_body(parser);
     note_arrival();
   }
   request_has_begun_ = false;
   if (error) co_return co_await refuse_unreadable(error);
-  deadline_us_ = kNever;  // a route bounds its own waits
-  const Next next = co_await carry_out(std::move(head), parser.release());
+  deadline_.lift();  // a route bounds its own waits
+  const Next next = co_await carry_out(std::move(head), fields.release(parser));
   if (next == Next::another) slot_.rest();
   co_return next;
 }
@@ -180,14 +137,8 @@ void HttpConnection::note_arrival() {
 }
 
 // What the header alone is refused for. The last word has carry_out(), which knows the body.
-std::optional<Response> HttpConnection::refusal_of(Parser& parser, const Request& head) {
-  const Message& message = parser.get();
-  if (head.target.text().size() > kMaxTargetBytes) {
-    return problem(414, fmt::format("the target has more than {} bytes", kMaxTargetBytes), "too_large");
-  }
-  if (std::distance(message.begin(), message.end()) > static_cast<std::ptrdiff_t>(kMaxHeaderFields)) {
-    return problem(431, fmt::format("the header has more than {} fields", kMaxHeaderFields), "too_large");
-  }
+std::optional<Response> HttpConnection::refusal_of(RequestParser& parser, const Request& head) {
+  if (auto too_large = header_too_large(parser.get())) return too_large;
   if (parser.is_done()) return std::nullopt;  // there is no body
   parser.body_limit(kMaxBodyBytes);
   const std::uint64_t length = parser.content_length().value_or(0);
@@ -202,7 +153,7 @@ std::optional<Response> HttpConnection::refusal_of(Parser& parser, const Request
     if (lacking) return not_permitted(*admitted, *lacking);
     parser.body_limit(limit);
     parser.get().body().reserve(length);
-    allow(kLongBodyTime);
+    deadline_.allow(kLongBodyTime);
     return std::nullopt;
   }
   parser.body_limit(kMaxLoginBodyBytes);
@@ -210,7 +161,7 @@ std::optional<Response> HttpConnection::refusal_of(Parser& parser, const Request
   return body_too_large(kMaxLoginBodyBytes);
 }
 
-asio::awaitable<boost::system::error_code> HttpConnection::read_body(Parser& parser) {
+asio::awaitable<boost::system::error_code> HttpConnection::read_body(RequestParser& parser) {
   if (parser.is_done()) co_return boost::system::error_code{};
   if (parser.get()[http::field::expect] == "100-continue") {
     const std::string go_on = "HTTP/1.1 100 Continue\r\n\r\n";
@@ -226,18 +177,18 @@ asio::awaitable<boost::system::error_code> HttpConnection::read_body(Parser& par
   co_return error;
 }
 
-asio::awaitable<HttpConnection::Next> HttpConnection::carry_out(Request request, Message message) {
+asio::awaitable<Next> HttpConnection::carry_out(Request request, RequestMessage message) {
   request.body = std::move(message.body());
   request.received_us = clock_.steady_us();
   if (unread_since_us_) request.unread = microseconds{request.received_us - *unread_since_us_};
   auto admitted = guard_.admit(request);
-  if (!admitted) co_return co_await send(std::move(admitted.error()), message);
+  if (!admitted) co_return co_await sender_.send(std::move(admitted.error()), message);
   admit(request, std::move(*admitted));
   if (wants_upgrade(request, message)) {
     if (!begin_page(request.caller)) {
       Response refused = problem(429, fmt::format("{} has {} pages open; close some", request.actor, kMaxPagesOfOne),
                                  "too_many_pages");
-      co_return co_await send(std::move(refused), message);
+      co_return co_await sender_.send(std::move(refused), message);
     }
     upgrade_.emplace(message.base());
     caller_ = std::move(request.caller);
@@ -246,30 +197,30 @@ asio::awaitable<HttpConnection::Next> HttpConnection::carry_out(Request request,
   // SAFETY: what changes something, above all a stop, is carried out though its client has hung up.
   if (request.method != "GET" && request.method != "HEAD") {
     Response response = co_await answer(std::move(request));
-    co_return co_await send(std::move(response), message);
+    co_return co_await sender_.send(std::move(response), message);
   }
-  auto response = co_await while_present(answer(std::move(request)));
+  auto response = co_await while_present(stream_, answer(std::move(request)));
   if (!response) co_return Next::end;
-  co_return co_await send(std::move(*response), message);
+  co_return co_await sender_.send(std::move(*response), message);
 }
 
 // SAFETY: a stop is carried out now, whatever comes with it; its body is looked at when it has been answered.
-asio::awaitable<HttpConnection::Next> HttpConnection::carry_out_stop(Parser& parser, Request request) {
+asio::awaitable<Next> HttpConnection::carry_out_stop(RequestParser& parser, Request request) {
   request_has_begun_ = false;
-  deadline_us_ = kNever;
-  const Message& message = parser.get();
+  deadline_.lift();
+  const RequestMessage& message = parser.get();
   request.received_us = clock_.steady_us();
   auto admitted = guard_.admit(request);
-  if (!admitted && parser.is_done()) co_return co_await send(std::move(admitted.error()), message);
+  if (!admitted && parser.is_done()) co_return co_await sender_.send(std::move(admitted.error()), message);
   if (!admitted) co_return co_await send_and_close(std::move(admitted.error()), parser.release());
   admit(request, std::move(*admitted));
   Response response = co_await answer(std::move(request));
   const bool goes_on = parser.is_done() || can_pass_over_body(parser);
   if (!goes_on) co_return co_await send_and_close(std::move(response), parser.release());
-  const Next next = co_await send(std::move(response), message);
+  const Next next = co_await sender_.send(std::move(response), message);
   if (next == Next::end) co_return next;
   slot_.rest();
-  allow(kRequestTime);
+  deadline_.allow(kRequestTime);
   parser.body_limit(kMaxBodyBytes);
   const boost::system::error_code error = co_await read_body(parser);
   if (!error) co_return Next::another;
@@ -285,40 +236,19 @@ void HttpConnection::admit(Request& request, Caller caller) {
   request.peer = request.caller.peer;
 }
 
-// What the work gives, or nothing when the client goes first: the work is cancelled then, and has ended.
-template <class T>
-asio::awaitable<std::optional<T>> HttpConnection::while_present(asio::awaitable<T> work) {
-  try {
-    std::variant<T, std::monostate> first = co_await (std::move(work) || stream_.peer_gone());
-    if (first.index() == 0) co_return std::move(std::get<0>(first));
-    co_return std::nullopt;
-  } catch (const asio::multiple_exceptions&) {  // both were cancelled: the station stops, or the time is over
-    throw boost::system::system_error{asio::error::operation_aborted};
-  }
-}
-
 // Says why, if the client spoke at all, and gives it the time to read that.
-asio::awaitable<HttpConnection::Next> HttpConnection::refuse_unreadable(boost::system::error_code error) {
-  static const auto& http_category = http::make_error_code(http::error::bad_method).category();
-  if (error.category() != http_category || error == http::error::end_of_stream ||
-      error == http::error::partial_message) {
-    co_return Next::end;
-  }
-  Response response = problem(400, "this is not HTTP/1.1: " + error.message(), "malformed_http");
-  if (error == http::error::header_limit) {
-    response = problem(431, fmt::format("the header has more than {} bytes", kMaxHeaderBytes), "too_large");
-  } else if (error == http::error::body_limit) {
-    response = body_too_large(kMaxBodyBytes);
-  }
-  Message unreadable;
-  unreadable.version(11);
-  co_return co_await send_and_close(std::move(response), std::move(unreadable));
+asio::awaitable<Next> HttpConnection::refuse_unreadable(boost::system::error_code error) {
+  auto response = unreadable(error);
+  if (!response) co_return Next::end;
+  RequestMessage message;
+  message.version(11);
+  co_return co_await send_and_close(std::move(*response), std::move(message));
 }
 
-asio::awaitable<HttpConnection::Next> HttpConnection::send_and_close(Response response, Message message) {
+asio::awaitable<Next> HttpConnection::send_and_close(Response response, RequestMessage message) {
   request_has_begun_ = false;
   message.keep_alive(false);
-  co_await send(std::move(response), message);
+  co_await sender_.send(std::move(response), message);
   co_await discard_rest();
   co_return Next::end;
 }
@@ -326,7 +256,7 @@ asio::awaitable<HttpConnection::Next> HttpConnection::send_and_close(Response re
 // Closing with unread bytes would reset the connection and could destroy the answer on its way.
 asio::awaitable<void> HttpConnection::discard_rest() {
   stream_.wire().end_sending();
-  allow(kLingerTime);
+  deadline_.allow(kLingerTime);
   buffer_.clear();
   std::size_t discarded = 0;
   while (discarded < kMaxDiscardBytes) {
@@ -349,64 +279,6 @@ asio::awaitable<Response> HttpConnection::answer(Request request) {
   if (is_cancellation(failure)) std::rethrow_exception(failure);
   exceptions_.note(Ended::request, route, failure, clock_.steady_us());
   co_return problem(500, "the station could not answer; its log says why", "internal");
-}
-
-asio::awaitable<HttpConnection::Next> HttpConnection::send(Response response, const Message& to) {
-  const bool has_body = to.method() != http::verb::head && may_have_body(response.status);
-  const bool is_framed = response.stream == nullptr || to.version() >= 11;  // else the connection's end is its end
-  const Framing framing{to.version(), to.keep_alive() && is_framed, stream_.is_secure(), to[http::field::host]};
-  const std::string head = answer_head(response, framing);
-  const std::array parts{asio::buffer(head), has_body ? asio::buffer(response.body) : asio::const_buffer{}};
-  allow(kWriteTime);
-  const auto [error, size] = co_await asio::async_write(stream_, parts, asio::as_tuple(asio::use_awaitable));
-  if (error) co_return Next::end;
-  if (response.stream != nullptr && has_body) {
-    const bool is_whole = co_await send_stream(*response.stream, is_framed, route_of(to.method_string(), to.target()));
-    if (!is_whole) co_return Next::end;
-  }
-  co_return framing.keep_alive ? Next::another : Next::end;
-}
-
-// False when it was cut short: the missing last chunk shows it to the client (HTTP/1.0 has no way to say so).
-asio::awaitable<bool> HttpConnection::send_stream(BodyStream& body, bool chunked, std::string route) {
-  for (;;) {
-    deadline_us_ = kNever;
-    const auto made = co_await while_present(next_piece(body, route));
-    if (!made || !*made) co_return false;
-    const std::optional<std::string>& piece = **made;
-    if (!piece) break;
-    if (piece->empty()) continue;
-    allow(kWriteTime);
-    boost::system::error_code error;
-    const auto bytes = asio::buffer(*piece);
-    if (chunked) {
-      std::tie(error, std::ignore) =
-          co_await asio::async_write(stream_, http::make_chunk(bytes), asio::as_tuple(asio::use_awaitable));
-    } else {
-      std::tie(error, std::ignore) = co_await asio::async_write(stream_, bytes, asio::as_tuple(asio::use_awaitable));
-    }
-    if (error) co_return false;
-  }
-  if (!chunked) co_return true;
-  allow(kWriteTime);
-  const auto [error, size] =
-      co_await asio::async_write(stream_, http::make_chunk_last(), asio::as_tuple(asio::use_awaitable));
-  co_return !error;
-}
-
-asio::awaitable<Result<std::optional<std::string>>> HttpConnection::next_piece(BodyStream& body,
-                                                                               const std::string& route) {
-  std::exception_ptr failure;
-  try {
-    auto piece = co_await body.next();
-    if (!piece) spdlog::error("{}: the answer was cut short: {}", route, piece.error().detail);
-    co_return piece;
-  } catch (...) {
-    failure = first_of(std::current_exception());
-  }
-  if (is_cancellation(failure)) std::rethrow_exception(failure);
-  exceptions_.note(Ended::request, route + ": the answer was cut short", failure, clock_.steady_us());
-  co_return fail(ErrorCode::internal, text_of(failure));
 }
 
 }  // namespace server

@@ -18,13 +18,15 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/http.hpp>
 #include <cstdint>
 #include <memory>
 #include <optional>
 
+#include "server/http/answer_sender.hpp"
+#include "server/http/deadline.hpp"
 #include "server/http/http_stream.hpp"
 #include "server/http/request_guard.hpp"
+#include "server/http/request_reading.hpp"
 #include "server/http/router.hpp"
 #include "server/http/upgrade.hpp"
 #include "server/net/port_access.hpp"
@@ -33,15 +35,10 @@
 
 namespace server {
 
-inline constexpr std::size_t kMaxHeaderBytes = 16 * 1024;
-inline constexpr std::size_t kMaxTargetBytes = 8 * 1024;
-inline constexpr std::size_t kMaxHeaderFields = 100;
-inline constexpr std::size_t kMaxLoginBodyBytes = 4 * 1024;  // of unauthenticated
-inline constexpr std::size_t kMaxPagesOfOne = 32;            // on /live, of one user, token or link
+inline constexpr std::size_t kMaxPagesOfOne = 32;  // on /live, of one user, token or link
 inline constexpr microseconds kRequestTime{std::chrono::seconds{10}};
 inline constexpr microseconds kLongBodyTime{std::chrono::seconds{60}};
 inline constexpr microseconds kIdleTime{std::chrono::seconds{60}};
-inline constexpr microseconds kWriteTime{std::chrono::seconds{30}};
 inline constexpr microseconds kLingerTime{std::chrono::seconds{2}};  // for a refused client to read why
 
 class HttpConnection {
@@ -60,32 +57,22 @@ class HttpConnection {
   const Caller& caller() const { return caller_; }
 
  private:
-  using Message = boost::beast::http::request<boost::beast::http::string_body>;
-  using Parser = boost::beast::http::request_parser<boost::beast::http::string_body>;
-  enum class Next : std::uint8_t { another, end };
-
   boost::asio::awaitable<void> take_turns();
   boost::asio::awaitable<Next> secure();
   boost::asio::awaitable<Next> read_and_answer();
-  boost::asio::awaitable<boost::system::error_code> read_body(Parser& parser);
-  boost::asio::awaitable<Next> carry_out(Request request, Message message);
-  boost::asio::awaitable<Next> carry_out_stop(Parser& parser, Request request);
+  boost::asio::awaitable<boost::system::error_code> read_body(RequestParser& parser);
+  boost::asio::awaitable<Next> carry_out(Request request, RequestMessage message);
+  boost::asio::awaitable<Next> carry_out_stop(RequestParser& parser, Request request);
   void admit(Request& request, Caller caller);
-  std::optional<Response> refusal_of(Parser& parser, const Request& head);
+  std::optional<Response> refusal_of(RequestParser& parser, const Request& head);
   boost::asio::awaitable<Next> refuse_unreadable(boost::system::error_code error);
-  boost::asio::awaitable<Next> send_and_close(Response response, Message message);
+  boost::asio::awaitable<Next> send_and_close(Response response, RequestMessage message);
   boost::asio::awaitable<Response> answer(Request request);
-  template <class T>
-  boost::asio::awaitable<std::optional<T>> while_present(boost::asio::awaitable<T> work);
-  boost::asio::awaitable<Next> send(Response response, const Message& to);
-  boost::asio::awaitable<bool> send_stream(BodyStream& body, bool chunked, std::string route);
-  boost::asio::awaitable<Result<std::optional<std::string>>> next_piece(BodyStream& body, const std::string& route);
   boost::asio::awaitable<void> discard_rest();
 
   void note_arrival();
-  bool wants_upgrade(const Request& request, const Message& message) const;
+  bool wants_upgrade(const Request& request, const RequestMessage& message) const;
   bool begin_page(const Caller& caller);  // false: there are too many of one
-  void allow(microseconds duration) { deadline_us_ = clock_.steady_us() + duration.count(); }
 
   HttpStream stream_;
   ConnectionSlot& slot_;
@@ -96,7 +83,8 @@ class HttpConnection {
   Upgrades& upgrades_;
   ExceptionLog& exceptions_;
   boost::beast::flat_buffer buffer_{kMaxHeaderBytes + kMaxBodyBytes};
-  std::int64_t deadline_us_;
+  Deadline deadline_;
+  AnswerSender sender_;
   bool request_has_begun_ = false;
   std::optional<std::int64_t> unread_since_us_;  // what was read last may have waited so long; empty: it has not
   std::optional<UpgradeRequest> upgrade_;

@@ -1,4 +1,4 @@
-// Matches paths, decodes what they carry, and calls the route.
+// Matches paths, names what they carry, and calls the route.
 #include "server/http/router.hpp"
 
 #include <fmt/format.h>
@@ -12,20 +12,17 @@ namespace {
 
 bool is_parameter(const std::string& segment) { return !segment.empty() && segment.front() == '{'; }
 
-Result<std::map<std::string, std::string>> parse_query(std::string_view text, const std::vector<std::string>& known) {
+Result<std::map<std::string, std::string>> query_of(const Target& target, const std::vector<std::string>& known) {
+  auto pairs = target.query();
+  if (!pairs) return fail(ErrorCode::bad_request, "the query is not a valid encoding", "malformed_query");
   std::map<std::string, std::string> query;
-  if (text.empty()) return query;
-  for (const std::string& pair : split(text, '&')) {
-    const auto equals = pair.find('=');
-    const auto name = percent_decode(pair.substr(0, equals), true);
-    const auto value = percent_decode(equals == std::string::npos ? "" : pair.substr(equals + 1), true);
-    if (!name || !value) return fail(ErrorCode::bad_request, "the query is not a valid encoding", "malformed_query");
-    if (std::ranges::find(known, *name) == known.end()) {
-      return fail(ErrorCode::bad_request, fmt::format("query parameter '{}' is not known here", name->substr(0, 40)),
+  for (auto& [name, value] : *pairs) {
+    if (std::ranges::find(known, name) == known.end()) {
+      return fail(ErrorCode::bad_request, fmt::format("query parameter '{}' is not known here", name.substr(0, 40)),
                   "unknown_parameter");
     }
-    if (!query.emplace(*name, *value).second) {
-      return fail(ErrorCode::bad_request, fmt::format("query parameter '{}' is given twice", *name), "malformed_query");
+    if (!query.emplace(name, std::move(value)).second) {
+      return fail(ErrorCode::bad_request, fmt::format("query parameter '{}' is given twice", name), "malformed_query");
     }
   }
   return query;
@@ -116,7 +113,7 @@ Answer Router::dispatch(Request request) const {
       if (is_parameter(name)) request.param[name.substr(1, name.size() - 2)] = request.target.segments()[i];
     }
     if (!route.is_stop) {
-      auto parsed = parse_query(request.target.query(), route.query);
+      auto parsed = query_of(request.target, route.query);
       if (!parsed) co_return problem(parsed.error());
       request.query = std::move(*parsed);
     }

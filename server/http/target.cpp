@@ -1,5 +1,6 @@
 #include "server/http/target.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace server {
@@ -13,8 +14,7 @@ int hex_value(char c) {
 }
 
 // Empty when the path is not acceptable.
-std::vector<std::string> path_segments(std::string_view target) {
-  const std::string_view path = target.substr(0, target.find('?'));
+std::vector<std::string> path_segments(std::string_view path) {
   if (path.empty() || path.front() != '/') return {};
   auto segments = split(path.substr(1), '/');
   for (std::string& segment : segments) {
@@ -59,13 +59,24 @@ std::optional<std::string> percent_decode(std::string_view text, bool plus_is_sp
   return out;
 }
 
-Target::Target(std::string text) : text_{std::move(text)}, segments_{path_segments(text_)} {
+Target::Target(std::string text)
+    : text_{std::move(text)},
+      path_size_{std::min(text_.find('?'), text_.size())},
+      segments_{path_segments(std::string_view{text_}.substr(0, path_size_))} {
   for (const std::string& segment : segments_) path_ += "/" + segment;
 }
 
-std::string_view Target::query() const {
-  const auto question_mark = text_.find('?');
-  return question_mark == std::string::npos ? std::string_view{} : std::string_view{text_}.substr(question_mark + 1);
+std::optional<Target::Query> Target::query() const {
+  Query query;
+  if (path_size_ + 1 >= text_.size()) return query;
+  for (const std::string& pair : split(std::string_view{text_}.substr(path_size_ + 1), '&')) {
+    const auto equals = pair.find('=');
+    auto name = percent_decode(pair.substr(0, equals), true);
+    auto value = percent_decode(equals == std::string::npos ? "" : pair.substr(equals + 1), true);
+    if (!name || !value) return std::nullopt;
+    query.emplace_back(std::move(*name), std::move(*value));
+  }
+  return query;
 }
 
 }  // namespace server

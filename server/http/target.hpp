@@ -1,4 +1,4 @@
-// The target of a request: its text as it was sent, and its path and query, taken apart once.
+// The target of a request: its text as it was sent, and its path and query, which are parsed here alone.
 //
 // Checks of the path use path() or segments(), never the text.
 #pragma once
@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace server {
@@ -21,10 +22,13 @@ class Target {
   // Of the path, split and then decoded; at least one. None, and an empty path, when it is not acceptable.
   const std::vector<std::string>& segments() const { return segments_; }
   const std::string& path() const { return path_; }
-  std::string_view query() const;  // still encoded; empty when there is none
+  // Names and values, decoded, in their order; empty when it is not a valid encoding.
+  using Query = std::vector<std::pair<std::string, std::string>>;
+  std::optional<Query> query() const;
 
  private:
   std::string text_;
+  std::size_t path_size_ = 0;  // of the text: what follows is the query with its question mark
   std::vector<std::string> segments_;
   std::string path_;
 };

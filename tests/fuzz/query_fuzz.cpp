@@ -45,12 +45,16 @@ void decode(std::string_view text) {
 }
 
 // A segment never hides a way to another folder.
-void read_path(const std::string& text) {
+void read_target(const std::string& text) {
   const Target target{text};
   require(target.is_acceptable() == !target.path().empty());
   for (const std::string& segment : target.segments()) {
     require(segment != "." && segment != ".." && segment.find_first_of("/\\") == std::string::npos);
     require(!has_control_character(segment));
+  }
+  const auto query = target.query();
+  for (const auto& [name, value] : query.value_or(Target::Query{})) {
+    require(!has_control_character(name) && !has_control_character(value));
   }
 }
 
@@ -122,7 +126,7 @@ void ask(const std::string& target) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT
   const std::string text{reinterpret_cast<const char*>(data), size};
   server::decode(text);
-  server::read_path(text);
+  server::read_target(text);
   server::read_cursor(text);
   server::ask(text);
   return 0;

@@ -2,10 +2,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "server/api/bodies/controller_body.hpp"
 #include "server/api/bodies/json.hpp"
+#include "server/api/bodies/limits.hpp"
 #include "server/storage/samples/in_force_json.hpp"
 
 namespace server {
@@ -13,14 +13,9 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMaxTextBytes = 4000;
-constexpr std::int64_t kMaxParameters = 256;  // of a robot
-constexpr std::int64_t kMaxTimeToLiveMs = protocol::kMaxTimeToLiveUs / 1000;
-constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
-
 Result<void> read_set_mode(const Members& body, protocol::Command& action) {
   if (auto known = body.only({"mode", "setpoint_m"}); !known) return known;
-  const auto mode = body.text("mode", 0, kMaxTextBytes);
+  const auto mode = body.text("mode", {0, kMaxLongWordBytes});
   if (!mode) return std::unexpected{mode.error()};
   action.which_action = rheonaut_Command_set_mode_tag;
   auto& set_mode = action.action.set_mode;
@@ -59,9 +54,9 @@ Result<void> read_inject_disturbance(const Members& body, protocol::Command& act
   return read_float(body, "disturbance_m", action.action.inject_disturbance.disturbance_m);
 }
 
-Result<void> read_lease(const Members& body, std::uint32_t& lease_ms) {
+Result<void> read_lease(const Members& body, Range<std::int64_t> allowed, std::uint32_t& lease_ms) {
   if (!body.has("lease_ms")) return {};
-  const auto value = body.integer("lease_ms", 1, protocol::kLeaseMs);
+  const auto value = body.integer("lease_ms", allowed);
   if (!value) return std::unexpected{value.error()};
   lease_ms = static_cast<std::uint32_t>(*value);
   return {};
@@ -73,13 +68,13 @@ Result<void> read_set_duty(const Members& body, protocol::Command& action) {
   if (!duty) return std::unexpected{duty.error()};
   action.which_action = rheonaut_Command_set_duty_tag;
   action.action.set_duty.duty = *duty;
-  return read_lease(body, action.action.set_duty.lease_ms);
+  return read_lease(body, integers("SetDutyBody.lease_ms"), action.action.set_duty.lease_ms);
 }
 
 Result<void> read_renew_lease(const Members& body, protocol::Command& action) {
   if (auto known = body.only({"lease_ms"}); !known) return known;
   action.which_action = rheonaut_Command_renew_lease_tag;
-  return read_lease(body, action.action.renew_lease.lease_ms);
+  return read_lease(body, integers("RenewLeaseBody.lease_ms"), action.action.renew_lease.lease_ms);
 }
 
 Result<void> read_clear_emergency(const Members& body, protocol::Command& action) {
@@ -96,7 +91,7 @@ Result<void> read_set_parameter(const Members& body, protocol::Command& action) 
   if (auto known = body.only({"name", "value", "confirm"}); !known) return known;
   action.which_action = rheonaut_Command_set_parameter_tag;
   auto& set_parameter = action.action.set_parameter;
-  const auto name = body.text("name", 1, sizeof set_parameter.name - 1);
+  const auto name = body.text("name", text_bytes("SetParameterBody.name"));
   if (!name) return std::unexpected{name.error()};
   const auto value = body.number_as_float("value");
   if (!value) return std::unexpected{value.error()};
@@ -116,7 +111,7 @@ Result<void> read_get_parameters(const Members& body, protocol::Command& action)
   if (auto known = body.only({"first_index"}); !known) return known;
   action.which_action = rheonaut_Command_get_parameters_tag;
   if (!body.has("first_index")) return {};
-  const auto first_index = body.integer("first_index", 0, kMaxParameters - 1);
+  const auto first_index = body.integer("first_index", integers("GetParametersBody.first_index"));
   if (!first_index) return std::unexpected{first_index.error()};
   action.action.get_parameters.first_index = static_cast<std::uint32_t>(*first_index);
   return {};
@@ -142,26 +137,29 @@ Result<void> read_set_duty_schedule(const Members& body, protocol::Command& acti
   if (auto known = body.only({"schedule"}); !known) return known;
   action.which_action = rheonaut_Command_set_duty_schedule_tag;
   auto& schedule = action.action.set_duty_schedule;
-  constexpr std::size_t kMost = std::size(rheonaut_SetDutySchedule{}.duty);
+  constexpr Range<std::size_t> kEntries = list_size("SetDutyScheduleBody.schedule");
+  static_assert(kEntries.maximum == std::size(rheonaut_SetDutySchedule{}.duty));
   if (!body.has("schedule")) return fail(ErrorCode::bad_request, "schedule is missing", "missing_member");
   const json& entries = body.object().at("schedule");
   if (!entries.is_array()) return fail(ErrorCode::bad_request, "schedule is not a list", "wrong_type");
-  if (entries.empty() || entries.size() > kMost) {
-    return fail(ErrorCode::invalid, fmt::format("schedule has {} entries, allowed are 1 to {}", entries.size(), kMost),
+  if (entries.size() < kEntries.minimum || entries.size() > kEntries.maximum) {
+    return fail(ErrorCode::invalid,
+                fmt::format("schedule has {} entries, allowed are {} to {}", entries.size(), kEntries.minimum,
+                            kEntries.maximum),
                 "out_of_range");
   }
-  std::int64_t least_tick = 0;
+  Range<std::int64_t> ticks = integers("SetDutyScheduleBody.schedule[].tick");
   for (const json& entry : entries) {
     if (!entry.is_object()) return fail(ErrorCode::bad_request, "an entry of schedule is not an object", "wrong_type");
     const Members members{entry};
     if (auto known = members.only({"tick", "duty"}); !known) return known;
-    const auto tick = members.integer("tick", least_tick, std::numeric_limits<std::uint32_t>::max());
+    const auto tick = members.integer("tick", ticks);
     if (!tick) return std::unexpected{tick.error()};
     const auto duty = members.number_as_float("duty");
     if (!duty) return std::unexpected{duty.error()};
     schedule.tick[schedule.tick_count++] = static_cast<std::uint32_t>(*tick);
     schedule.duty[schedule.duty_count++] = *duty;
-    least_tick = *tick + 1;
+    ticks.minimum = *tick + 1;
   }
   if (schedule.duty[schedule.duty_count - 1] == 0.0F) return {};
   return fail(ErrorCode::invalid, "the last duty of a schedule is 0", "out_of_range");
@@ -206,7 +204,7 @@ Result<void> read_execute_at(const Kind& kind, json& arguments, protocol::Comman
     return fail(ErrorCode::bad_request, fmt::format("{} takes no {}: it acts at once", kind.name, kName),
                 "unknown_member");
   }
-  const auto at_us = Members{arguments}.integer(kName, 0, kLargest);
+  const auto at_us = Members{arguments}.integer(kName, integers("ExecuteAtRobotUs"));
   if (!at_us) return std::unexpected{at_us.error()};
   action.has_execute_at_robot_us = true;
   action.execute_at_robot_us = static_cast<std::uint64_t>(*at_us);
@@ -234,7 +232,7 @@ std::string controller_arguments(const protocol::Controller& controller, bool is
 Result<ParsedCommand> parse_command(const std::string& text, const protocol::Controller* in_force) {
   const auto body = Members::parse(text, {});
   if (!body) return std::unexpected{body.error()};
-  const auto kind = body->text("kind", 0, kMaxTextBytes);
+  const auto kind = body->text("kind", {0, kMaxLongWordBytes});
   if (!kind) return std::unexpected{kind.error()};
   const auto* known = std::ranges::find_if(kKinds, [&kind](const Kind& one) { return *kind == one.name; });
   if (known == std::end(kKinds)) {
@@ -242,7 +240,7 @@ Result<ParsedCommand> parse_command(const std::string& text, const protocol::Con
   }
   ParsedCommand command;
   if (body->has("life_ms")) {
-    const auto life_ms = body->integer("life_ms", 1, kMaxTimeToLiveMs);
+    const auto life_ms = body->integer("life_ms", integers("LifeMs"));
     if (!life_ms) return std::unexpected{life_ms.error()};
     command.time_to_live = std::chrono::milliseconds{*life_ms};
   }

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 
+#include "server/api/bodies/limits.hpp"
+
 namespace server {
 namespace {
 
@@ -92,11 +94,13 @@ Result<void> add_second_order(const json& section, double& direct, protocol::Con
 
 // Of what `rheonaut discretise --json` prints only what the robot needs; the rest explains it to people.
 Result<void> read_sections(const Members& given, protocol::Controller& out) {
-  constexpr double kUsPerS = 1e6, kLongestS = 10;
+  constexpr double kUsPerS = 1e6;
+  constexpr Range<double> kPeriods_s = numbers("DiscretisedController.period_s");
   const auto period_s = given.number("period_s");
   if (!period_s) return std::unexpected{period_s.error()};
-  if (!(*period_s > 0 && *period_s <= kLongestS)) {
-    return fail(ErrorCode::invalid, fmt::format("period_s = {} is outside 0 to {}", *period_s, kLongestS),
+  if (!(*period_s > kPeriods_s.minimum && *period_s <= kPeriods_s.maximum)) {
+    return fail(ErrorCode::invalid,
+                fmt::format("period_s = {} is outside {} to {}", *period_s, kPeriods_s.minimum, kPeriods_s.maximum),
                 "out_of_range");
   }
   out.period_us = static_cast<std::uint32_t>(std::lround(*period_s * kUsPerS));
@@ -123,7 +127,7 @@ Result<void> read_coefficients(const Members& given, protocol::Controller& out) 
   auto known = given.only({"controller_id", "checksum", "period_us", "kp", "direct", "pole", "residue", "biquad_b0",
                            "biquad_b1", "biquad_a1", "biquad_a2", "duty_min", "duty_max", "derivative_on"});
   if (!known) return known;
-  const auto period_us = given.integer("period_us", 1, 10'000'000);
+  const auto period_us = given.integer("period_us", integers("Controller.period_us"));
   if (!period_us) return std::unexpected{period_us.error()};
   out.period_us = static_cast<std::uint32_t>(*period_us);
   if (auto read = read_float(given, "kp", out.kp); !read) return read;
@@ -151,7 +155,7 @@ Result<void> read_derivative(const Members& body, const Members& given, const pr
     out.derivative_on = in_force == nullptr ? rheonaut_DERIVATIVE_ON_ERROR : in_force->derivative_on;
     return {};
   }
-  const auto text = of.text("derivative_on", 0, 40);
+  const auto text = of.text("derivative_on", {0, 40});
   if (!text) return std::unexpected{text.error()};
   out.derivative_on = *text == "measurement" ? rheonaut_DERIVATIVE_ON_MEASUREMENT : rheonaut_DERIVATIVE_ON_ERROR;
   if (*text == "measurement" || *text == "error") return {};
@@ -160,10 +164,9 @@ Result<void> read_derivative(const Members& body, const Members& given, const pr
 }
 
 Result<void> read_identity(const Members& body, const Members& given, protocol::Controller& out) {
-  constexpr std::int64_t kMost = std::numeric_limits<std::uint32_t>::max();
   out.checksum = checksum_of(out);
   if (given.has("checksum") && !given.has("sections")) {
-    const auto checksum = given.integer("checksum", 0, kMost);
+    const auto checksum = given.integer("checksum", integers("Controller.checksum"));
     if (!checksum) return std::unexpected{checksum.error()};
     if (static_cast<std::uint32_t>(*checksum) != out.checksum) {
       return fail(
@@ -173,9 +176,11 @@ Result<void> read_identity(const Members& body, const Members& given, protocol::
           "checksum");
     }
   }
-  const Members& of = body.has("controller_id") ? body : given;
+  const bool is_of_body = body.has("controller_id");
+  const Members& of = is_of_body ? body : given;
   if (of.has("controller_id")) {
-    const auto id = of.integer("controller_id", 1, kMost);
+    const auto id = of.integer("controller_id", is_of_body ? integers("SetControllerBody.controller_id")
+                                                           : integers("Controller.controller_id"));
     if (!id) return std::unexpected{id.error()};
     out.controller_id = static_cast<std::uint32_t>(*id);
     return {};

@@ -7,18 +7,21 @@
 #include <optional>
 
 #include "base/json_text.hpp"
-#include "server/api/bodies/json.hpp"
+#include "server/api/bodies/limits.hpp"
 
 namespace server {
 namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMaxDocumentBytes = 16'384;
-constexpr const char* kTexts[] = {"name", "comment", "description"};
+constexpr std::pair<const char*, Range<std::size_t>> kTexts[] = {
+    {"name", text_bytes("FluidModelBody.name")},
+    {"comment", text_bytes("FluidModelBody.comment")},
+    {"description", text_bytes("FluidModelBody.description")}};
 
 // Each is a float32 on its way to the robot: what is checked is what is sent.
-Result<FluidModel::Numbers> numbers(const Members& body, const char* name, float minimum, float maximum) {
+Result<FluidModel::Numbers> sections_in(const Members& body, const char* name, Range<double> allowed) {
+  const auto minimum = static_cast<float>(allowed.minimum), maximum = static_cast<float>(allowed.maximum);
   const auto wrong = [name] {
     return fail(ErrorCode::bad_request, fmt::format("{} must be a list of {} numbers", name, kFluidModelSections),
                 "wrong_type");
@@ -42,14 +45,15 @@ Result<FluidModel::Numbers> numbers(const Members& body, const char* name, float
 Result<double> fit_error_in(const Members& body) {
   const auto fit_error = body.number("fit_error");
   if (!fit_error) return fit_error;
-  if (!(*fit_error >= 0)) {
+  constexpr Range<double> kAllowed = numbers("FluidModelBody.fit_error");
+  if (!(*fit_error >= kAllowed.minimum)) {
     return fail(ErrorCode::invalid, fmt::format("fit_error = {} is negative", *fit_error), "out_of_range");
   }
-  if (*fit_error > kMaxModelFitError) {
+  if (*fit_error > kAllowed.maximum) {
     return fail(ErrorCode::invalid,
                 fmt::format("fit_error = {:.2g} %: a model that is off by more than {} % of the final velocity makes a "
                             "robot surer of its position than it may be; fit it again, or leave the robots without one",
-                            *fit_error * 100, kMaxModelFitError * 100),
+                            *fit_error * 100, kAllowed.maximum * 100),
                 "fit_too_bad");
   }
   return fit_error;
@@ -57,9 +61,9 @@ Result<double> fit_error_in(const Members& body) {
 
 Result<std::string> document_in(const Members& body) {
   json document = json::object();
-  for (const char* name : kTexts) {
+  for (const auto& [name, bytes] : kTexts) {
     if (!body.has(name)) continue;
-    const auto text = body.text(name, 0, kMaxDocumentBytes);
+    const auto text = body.text(name, bytes);
     if (!text) return text;
     document[name] = *text;
   }
@@ -89,9 +93,10 @@ Result<FluidModel> parse_fluid_model(const std::string& text) {
       text, {"model_gain_m_s", "model_time_constant_s", "fit_error", "plant", "name", "comment", "description"});
   if (!body) return std::unexpected{body.error()};
   FluidModel model;
-  const auto gain = numbers(*body, "model_gain_m_s", -kMaxModelGain_m_s, kMaxModelGain_m_s);
+  const auto gain = sections_in(*body, "model_gain_m_s", numbers("FluidModelBody.model_gain_m_s[]"));
   if (!gain) return std::unexpected{gain.error()};
-  const auto time_constant = numbers(*body, "model_time_constant_s", kMinModelTimeConstant_s, kMaxModelTimeConstant_s);
+  const auto time_constant =
+      sections_in(*body, "model_time_constant_s", numbers("FluidModelBody.model_time_constant_s[]"));
   if (!time_constant) return std::unexpected{time_constant.error()};
   const auto fit_error = fit_error_in(*body);
   if (!fit_error) return std::unexpected{fit_error.error()};

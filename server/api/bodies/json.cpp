@@ -76,14 +76,14 @@ Result<void> Members::only(std::initializer_list<const char*> known) const {
   return {};
 }
 
-Result<std::string> Members::text(const char* name, std::size_t min_length, std::size_t max_length) const {
+Result<std::string> Members::text(const char* name, Range<std::size_t> bytes) const {
   if (!has(name)) return missing(name);
   const json& value = object_.at(name);
   if (!value.is_string()) return wrong_type(name, "a string", value);
   auto text = value.get<std::string>();
-  if (text.size() < min_length || text.size() > max_length) {
+  if (text.size() < bytes.minimum || text.size() > bytes.maximum) {
     return fail(ErrorCode::invalid,
-                fmt::format("{} has {} bytes, allowed are {} to {}", name, text.size(), min_length, max_length),
+                fmt::format("{} has {} bytes, allowed are {} to {}", name, text.size(), bytes.minimum, bytes.maximum),
                 "out_of_range");
   }
   return text;
@@ -106,13 +106,14 @@ Result<float> Members::number_as_float(const char* name) const {
   return static_cast<float>(*value);
 }
 
-Result<std::int64_t> Members::integer(const char* name, std::int64_t minimum, std::int64_t maximum) const {
+Result<std::int64_t> Members::integer(const char* name, Range<std::int64_t> allowed) const {
   if (!has(name)) return missing(name);
   const json& value = object_.at(name);
   if (!value.is_number_integer()) return wrong_type(name, "an integer", value);
   const bool beyond = value.is_number_unsigned() && value.get<std::uint64_t>() > std::uint64_t{INT64_MAX};
-  if (beyond || value.get<std::int64_t>() < minimum || value.get<std::int64_t>() > maximum) {
-    return fail(ErrorCode::invalid, fmt::format("{} = {} is outside {} to {}", name, quote(value), minimum, maximum),
+  if (beyond || value.get<std::int64_t>() < allowed.minimum || value.get<std::int64_t>() > allowed.maximum) {
+    return fail(ErrorCode::invalid,
+                fmt::format("{} = {} is outside {} to {}", name, quote(value), allowed.minimum, allowed.maximum),
                 "out_of_range");
   }
   return value.get<std::int64_t>();
@@ -120,7 +121,7 @@ Result<std::int64_t> Members::integer(const char* name, std::int64_t minimum, st
 
 Result<void> Members::time(const char* name, std::optional<std::int64_t>& into) const {
   if (!has(name)) return {};
-  const auto time_us = integer(name, 0, std::numeric_limits<std::int64_t>::max());
+  const auto time_us = integer(name, {0, kMaxTimeUs});
   if (!time_us) return std::unexpected{time_us.error()};
   into = *time_us;
   return {};

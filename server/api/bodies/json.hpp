@@ -4,7 +4,9 @@
 // each sentence names the member and quotes the value.
 #pragma once
 
+#include <cstdint>
 #include <initializer_list>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -20,6 +22,13 @@ namespace server {
 
 inline constexpr int kMaxJsonDepth = 16;  // of what is sent to the station; nothing that it knows needs more than 3
 
+inline constexpr std::int64_t kMaxTimeUs = std::numeric_limits<std::int64_t>::max();
+
+template <class Number>
+struct Range {
+  Number minimum, maximum;  // both allowed
+};
+
 // The members of one JSON object, taken one by one.
 class Members {
  public:
@@ -31,10 +40,10 @@ class Members {
   bool has(const char* name) const { return object_.contains(name); }
 
   // Each errors when the member is missing or of another type or outside its range.
-  Result<std::string> text(const char* name, std::size_t min_length, std::size_t max_length) const;
+  Result<std::string> text(const char* name, Range<std::size_t> bytes) const;
   Result<double> number(const char* name) const;
   Result<float> number_as_float(const char* name) const;
-  Result<std::int64_t> integer(const char* name, std::int64_t minimum, std::int64_t maximum) const;
+  Result<std::int64_t> integer(const char* name, Range<std::int64_t> allowed) const;
   Result<std::uint64_t> id(const char* name) const;
   Result<void> time(const char* name, std::optional<std::int64_t>& into) const;  // left out: none
 

@@ -2,27 +2,23 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
+#include <tuple>
+#include <utility>
 
-#include "server/api/bodies/json.hpp"
+#include "server/api/bodies/limits.hpp"
 
 namespace server {
 namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMaxNameBytes = 200;
-constexpr std::size_t kMaxTextBytes = 4000;
-
-Result<void> read_text(const Members& body, const char* name, std::string& into) {
+Result<void> read_text(const Members& body, const char* name, Range<std::size_t> bytes, std::string& into) {
   if (!body.has(name)) return {};
-  auto value = body.text(name, 0, kMaxTextBytes);
+  auto value = body.text(name, bytes);
   if (!value) return std::unexpected{value.error()};
   into = std::move(*value);
   return {};
 }
-
-constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
 
 Result<RecordedRange> read_range(const json& value) {
   if (!value.is_object()) return fail(ErrorCode::bad_request, "span is not an object", "wrong_type");
@@ -31,26 +27,38 @@ Result<RecordedRange> read_range(const json& value) {
     if (auto known = span.only({"boot_id", "first_seq", "last_seq"}); !known) return std::unexpected{known.error()};
     const auto boot_id = span.id("boot_id");
     if (!boot_id) return std::unexpected{boot_id.error()};
-    const auto first = span.integer("first_seq", 0, kLargest - 1);
+    const auto first = span.integer("first_seq", integers("SeqSpan.first_seq"));
     if (!first) return std::unexpected{first.error()};
-    const auto last = span.integer("last_seq", *first, kLargest - 1);
+    const auto last = span.integer("last_seq", {*first, integers("SeqSpan.last_seq").maximum});
     if (!last) return std::unexpected{last.error()};
     return SeqSpan{*boot_id, static_cast<std::uint64_t>(*first), static_cast<std::uint64_t>(*last)};
   }
   if (auto known = span.only({"from_us", "to_us"}); !known) return std::unexpected{known.error()};
-  const auto from_us = span.integer("from_us", 0, kLargest - 1);
+  const auto from_us = span.integer("from_us", integers("TimeSpan.from_us"));
   if (!from_us) return std::unexpected{from_us.error()};
-  const auto to_us = span.integer("to_us", *from_us, kLargest - 1);
+  const auto to_us = span.integer("to_us", {*from_us, integers("TimeSpan.to_us").maximum});
   if (!to_us) return std::unexpected{to_us.error()};
   return TimeSpan{*from_us, *to_us};
 }
+
+// By name: of several faults the first is answered.
+constexpr std::pair<const char*, Range<std::size_t>> kAnnotationTexts[] = {
+    {"fluid", text_bytes("RunAnnotationBody.fluid")},
+    {"name", text_bytes("RunAnnotationBody.name")},
+    {"notes", text_bytes("RunAnnotationBody.notes")},
+    {"operator_name", text_bytes("RunAnnotationBody.operator_name")},
+    {"profile", text_bytes("RunAnnotationBody.profile")},
+    {"pump_profile", text_bytes("RunAnnotationBody.pump_profile")},
+    {"tube", text_bytes("RunAnnotationBody.tube")},
+    {"verdict", text_bytes("RunAnnotationBody.verdict")},
+};
 
 }  // namespace
 
 Result<ParsedControl> parse_control(const std::string& text) {
   const auto body = Members::parse(text, {"action", "lease_ms", "reason", "stamp_us"});
   if (!body) return std::unexpected{body.error()};
-  const auto action = body->text("action", 1, kMaxNameBytes);
+  const auto action = body->text("action", {1, kMaxWordBytes});
   if (!action) return std::unexpected{action.error()};
   constexpr std::pair<const char*, ControlAction> kActions[] = {{"take", ControlAction::take},
                                                                 {"force", ControlAction::force},
@@ -75,7 +83,7 @@ Result<ParsedControl> parse_control(const std::string& text) {
     if (request.action != ControlAction::take) {
       return fail(ErrorCode::bad_request, "lease_ms goes with take only", "unknown_member");
     }
-    const auto lease_ms = body->integer("lease_ms", 1, kLongestControl.count() / 1000);
+    const auto lease_ms = body->integer("lease_ms", integers("ControlBody.lease_ms"));
     if (!lease_ms) return std::unexpected{lease_ms.error()};
     request.lease = std::chrono::milliseconds{*lease_ms};
   }
@@ -83,7 +91,7 @@ Result<ParsedControl> parse_control(const std::string& text) {
     return fail(ErrorCode::bad_request, "reason goes with force only", "unknown_member");
   }
   if (is_forced) {
-    auto reason = body->text("reason", 1, kMaxNameBytes);
+    auto reason = body->text("reason", text_bytes("ControlBody.reason"));
     if (!reason) return std::unexpected{reason.error()};
     request.reason = std::move(*reason);
   }
@@ -95,13 +103,13 @@ Result<RunRequest> parse_run(const std::string& text) {
                                           "operator_name", "profile", "notes", "span"});
   if (!body) return std::unexpected{body.error()};
   RunRequest request;
-  const auto robot_id = body->text("robot_id", 0, kMaxTextBytes);
+  const auto robot_id = body->text("robot_id", {0, kMaxLongWordBytes});
   if (!robot_id) return std::unexpected{robot_id.error()};
   if (!is_robot_id(*robot_id)) {
     return fail(ErrorCode::invalid, "robot_id is not 1 to 31 characters of [a-z0-9_-]", "out_of_range");
   }
   request.robot_id = *robot_id;
-  const auto name = body->text("name", 1, kMaxNameBytes);
+  const auto name = body->text("name", text_bytes("RunBody.name"));
   if (!name) return std::unexpected{name.error()};
   RunConditions& conditions = request.conditions;
   conditions.name = *name;
@@ -110,12 +118,15 @@ Result<RunRequest> parse_run(const std::string& text) {
     if (!flow) return std::unexpected{flow.error()};
     conditions.mean_flow_m_s = *flow;
   }
-  const std::pair<const char*, std::string*> texts[] = {
-      {"fluid", &conditions.fluid},     {"pump_profile", &conditions.pump_profile},
-      {"tube", &conditions.tube},       {"operator_name", &conditions.operator_name},
-      {"profile", &conditions.profile}, {"notes", &conditions.notes}};
-  for (const auto& [member, into] : texts) {
-    if (auto read = read_text(*body, member, *into); !read) return std::unexpected{read.error()};
+  const std::tuple<const char*, Range<std::size_t>, std::string*> texts[] = {
+      {"fluid", text_bytes("RunBody.fluid"), &conditions.fluid},
+      {"pump_profile", text_bytes("RunBody.pump_profile"), &conditions.pump_profile},
+      {"tube", text_bytes("RunBody.tube"), &conditions.tube},
+      {"operator_name", text_bytes("RunBody.operator_name"), &conditions.operator_name},
+      {"profile", text_bytes("RunBody.profile"), &conditions.profile},
+      {"notes", text_bytes("RunBody.notes"), &conditions.notes}};
+  for (const auto& [member, bytes, into] : texts) {
+    if (auto read = read_text(*body, member, bytes, *into); !read) return std::unexpected{read.error()};
   }
   if (!body->has("span")) return request;
   auto range = read_range(body->object().at("span"));
@@ -129,7 +140,8 @@ Result<std::string> parse_run_end(const std::string& text) {
   if (text.empty()) return verdict;
   const auto body = Members::parse(text, {"verdict"});
   if (!body) return std::unexpected{body.error()};
-  if (auto read = read_text(*body, "verdict", verdict); !read) return std::unexpected{read.error()};
+  if (auto read = read_text(*body, "verdict", text_bytes("RunEndBody.verdict"), verdict); !read)
+    return std::unexpected{read.error()};
   return verdict;
 }
 
@@ -138,10 +150,9 @@ Result<RunAnnotation> parse_annotation(const std::string& text) {
       text, {"name", "fluid", "pump_profile", "mean_flow_m_s", "tube", "operator_name", "profile", "notes", "verdict"});
   if (!body) return std::unexpected{body.error()};
   RunAnnotation annotation;
-  for (const auto& [member, value] : body->object().items()) {
-    if (member == "mean_flow_m_s") continue;
-    const bool is_name = member == "name";
-    const auto given = body->text(member.c_str(), is_name ? 1 : 0, is_name ? kMaxNameBytes : kMaxTextBytes);
+  for (const auto& [member, bytes] : kAnnotationTexts) {
+    if (!body->has(member)) continue;
+    const auto given = body->text(member, bytes);
     if (!given) return std::unexpected{given.error()};
     annotation.texts[member] = *given;
   }
@@ -156,17 +167,17 @@ Result<RunAnnotation> parse_annotation(const std::string& text) {
 Result<std::string> parse_discard(const std::string& text) {
   const auto body = Members::parse(text, {"reason"});
   if (!body) return std::unexpected{body.error()};
-  return body->text("reason", 1, kMaxTextBytes);
+  return body->text("reason", text_bytes("RunDiscardBody.reason"));
 }
 
 Result<MarkerBody> parse_marker(const std::string& text) {
   const auto body = Members::parse(text, {"text", "at_us"});
   if (!body) return std::unexpected{body.error()};
-  const auto said = body->text("text", 1, kMaxTextBytes);
+  const auto said = body->text("text", text_bytes("MarkerBody.text"));
   if (!said) return std::unexpected{said.error()};
   MarkerBody marker{*said, {}};
   if (!body->has("at_us")) return marker;
-  const auto at_us = body->integer("at_us", 0, kLargest - 1);
+  const auto at_us = body->integer("at_us", integers("MarkerBody.at_us"));
   if (!at_us) return std::unexpected{at_us.error()};
   marker.at_us = *at_us;
   return marker;

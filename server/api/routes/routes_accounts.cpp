@@ -3,7 +3,7 @@
 // A secret stands in one answer only, that of the request which made it.
 #include <fmt/format.h>
 
-#include "server/api/bodies/json.hpp"
+#include "server/api/bodies/limits.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/identity/auth.hpp"
 #include "server/identity/logins.hpp"
@@ -13,8 +13,6 @@ namespace server {
 using nlohmann::json;
 
 namespace {
-
-constexpr std::size_t kMaxWordBytes = 200;
 
 // ---- signing in and out
 
@@ -34,9 +32,9 @@ json me_json(const std::string& user, const std::string& actor, Scopes scopes) {
 Answer log_in(AccountRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"user", "password"});
   if (!body) co_return problem(body.error());
-  const auto user = body->text("user", 0, kMaxWordBytes);
+  const auto user = body->text("user", text_bytes("LoginBody.user"));
   if (!user) co_return problem(user.error());
-  const auto password = body->text("password", 0, 10 * kMaxPasswordBytes);
+  const auto password = body->text("password", text_bytes("LoginBody.password"));
   if (!password) co_return problem(password.error());
   LoginAttempt attempt{*user, *password, request.peer, request.header("user-agent")};
   const auto secret = co_await parts.logins.log_in(std::move(attempt));
@@ -74,14 +72,14 @@ Answer list_users(AccountRoutes parts, Request) {
 Answer add_user(AccountRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"name", "role", "password"});
   if (!body) co_return problem(body.error());
-  const auto name = body->text("name", 0, kMaxWordBytes);
+  const auto name = body->text("name", {0, kMaxWordBytes});
   if (!name) co_return problem(name.error());
   if (const auto checked = check_name(*name); !checked) co_return problem(checked.error());
-  const auto word = body->text("role", 0, kMaxWordBytes);
+  const auto word = body->text("role", {0, kMaxWordBytes});
   if (!word) co_return problem(word.error());
   const auto role = parse_role(*word);
   if (!role) co_return problem(role.error());
-  const auto password = body->text("password", kMinPasswordBytes, kMaxPasswordBytes);
+  const auto password = body->text("password", text_bytes("UserBody.password"));
   if (!password) co_return problem(password.error());
   auto hash = co_await parts.logins.hash(*password);
   if (!hash) co_return problem(hash.error());
@@ -99,7 +97,7 @@ Answer change_user(AccountRoutes parts, Request request) {
   if (!body) co_return problem(body.error());
   UserChange change;
   if (body->has("role")) {
-    const auto word = body->text("role", 0, kMaxWordBytes);
+    const auto word = body->text("role", {0, kMaxWordBytes});
     if (!word) co_return problem(word.error());
     const auto role = parse_role(*word);
     if (!role) co_return problem(role.error());
@@ -111,7 +109,7 @@ Answer change_user(AccountRoutes parts, Request request) {
     change.disabled = value.get<bool>();
   }
   if (body->has("password")) {
-    const auto password = body->text("password", kMinPasswordBytes, kMaxPasswordBytes);
+    const auto password = body->text("password", text_bytes("UserChange.password"));
     if (!password) co_return problem(password.error());
     auto hash = co_await parts.logins.hash(*password);
     if (!hash) co_return problem(hash.error());
@@ -139,17 +137,17 @@ Answer list_tokens(AccountRoutes parts, Request) {
 Answer add_token(AccountRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"name", "scopes", "days"});
   if (!body) co_return problem(body.error());
-  const auto name = body->text("name", 0, kMaxWordBytes);
+  const auto name = body->text("name", {0, kMaxWordBytes});
   if (!name) co_return problem(name.error());
   if (const auto checked = check_name(*name); !checked) co_return problem(checked.error());
   if (*name == "local") co_return problem(422, "local is the name of the station's own token", "out_of_range");
-  const auto words = body->text("scopes", 1, kMaxWordBytes);
+  const auto words = body->text("scopes", text_bytes("ScopeList"));
   if (!words) co_return problem(words.error());
   const auto scopes = parse_scopes(*words);
   if (!scopes) co_return problem(scopes.error());
   TokenRequest token_request{*name, *scopes, 0, request.caller.user};
   if (body->has("days")) {
-    const auto days = body->integer("days", 1, kMaxTokenDays);
+    const auto days = body->integer("days", integers("TokenBody.days"));
     if (!days) co_return problem(days.error());
     token_request.days = *days;
   }
@@ -198,7 +196,7 @@ Answer list_enrolments(AccountRoutes parts, Request) {
 Answer enrol_robot(AccountRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"robot_id"});
   if (!body) co_return problem(body.error());
-  const auto robot_id = body->text("robot_id", 0, kMaxWordBytes);
+  const auto robot_id = body->text("robot_id", {0, kMaxWordBytes});
   if (!robot_id) co_return problem(robot_id.error());
   if (!is_robot_id(*robot_id)) {
     co_return problem(422, "robot_id is not 1 to 31 characters of [a-z0-9_-]", "out_of_range");

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "server/api/bodies/fluid_model_body.hpp"
-#include "server/api/bodies/json.hpp"
+#include "server/api/bodies/limits.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/config/station_document.hpp"
 #include "server/station/station.hpp"
@@ -14,7 +14,6 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::size_t kMaxFluidBytes = 200;  // of what somebody sends; a listed name is shorter
 constexpr microseconds kSendingPatience{3'000'000};
 constexpr microseconds kSendingLook{50'000};
 
@@ -43,7 +42,7 @@ Result<std::string> parse_fluid(const std::string& text, const Envelope& envelop
   const auto body = Members::parse(text, {"fluid"});
   if (!body) return std::unexpected{body.error()};
   if (body->has("fluid") && body->object().at("fluid").is_null()) return std::string{};
-  const auto fluid = body->text("fluid", 1, kMaxFluidBytes);
+  const auto fluid = body->text("fluid", text_bytes("FluidBody.fluid"));
   if (!fluid) return fluid;
   return envelope.listed(*fluid);
 }

@@ -1,5 +1,5 @@
 // The recording as such: its health, its figures for Prometheus, and backups.
-#include "server/api/bodies/json.hpp"
+#include "server/api/bodies/limits.hpp"
 #include "server/api/routes/metrics.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/net/transport_security.hpp"
@@ -10,8 +10,6 @@ namespace server {
 using nlohmann::json;
 
 namespace {
-
-constexpr std::size_t kMaxNameBytes = 200;  // longer ones are refused here; which are names, Backups says
 
 json or_null(const std::string& text) { return text.empty() ? json(nullptr) : json(text); }
 
@@ -95,7 +93,7 @@ Answer list_backups(RecordingRoutes parts, Request) {
 Answer create_backup(RecordingRoutes parts, Request request) {
   const auto body = Members::parse(request.body, {"name"});
   if (!body) co_return problem(body.error());
-  const auto name = body->text("name", 1, kMaxNameBytes);
+  const auto name = body->text("name", {1, kMaxWordBytes});
   if (!name) co_return problem(name.error());
   const auto backup = co_await parts.recording.backups.begin(*name);
   if (!backup) co_return problem(backup.error());

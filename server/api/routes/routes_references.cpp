@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "server/analysis/analysis_service.hpp"
-#include "server/api/bodies/json.hpp"
+#include "server/api/bodies/limits.hpp"
 #include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/storage/runs/outside_references.hpp"
@@ -14,51 +14,48 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::int64_t kMaxId = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
 constexpr std::int64_t kMaxPagePositions = 10'000;
-constexpr std::size_t kMaxNameBytes = 200;
-constexpr std::size_t kMaxReasonBytes = 4000;
-constexpr double kLargestS = 1e10;
 
 json or_null(std::optional<double> value) { return value ? json(*value) : json(nullptr); }
 
 // Of a member that may be left out: none then.
-Result<std::optional<double>> number_within(const Members& body, const char* name, double low, double high) {
+Result<std::optional<double>> number_within(const Members& body, const char* name, Range<double> allowed) {
   if (!body.has(name)) return std::nullopt;
   const auto value = body.number(name);
   if (!value) return std::unexpected{value.error()};
-  if (*value >= low && *value <= high) return *value;
-  return fail(ErrorCode::invalid, fmt::format("{} must be from {} to {}, is {}", name, low, high, *value),
+  if (*value >= allowed.minimum && *value <= allowed.maximum) return *value;
+  return fail(ErrorCode::invalid,
+              fmt::format("{} must be from {} to {}, is {}", name, allowed.minimum, allowed.maximum, *value),
               "out_of_range");
 }
 
-Result<double> needed_number(const Members& body, const char* name, double low, double high) {
-  const auto value = number_within(body, name, low, high);
+Result<double> needed_number(const Members& body, const char* name, Range<double> allowed) {
+  const auto value = number_within(body, name, allowed);
   if (!value) return std::unexpected{value.error()};
   if (*value) return **value;
   return fail(ErrorCode::bad_request, fmt::format("{} is missing", name), "missing_member");
 }
 
 Result<void> parse_marker_clock(const Members& body, ReferenceClockRequest& clock) {
-  const auto at_s = needed_number(body, "at_s", -kLargestS, kLargestS);
+  const auto at_s = needed_number(body, "at_s", numbers("ReferenceClock.at_s"));
   if (!at_s) return std::unexpected{at_s.error()};
   clock.at_s = *at_s;
   if (body.has("marker_id")) {
-    const auto id = body.integer("marker_id", 1, kMaxId);
+    const auto id = body.integer("marker_id", integers("ReferenceClock.marker_id"));
     if (!id) return std::unexpected{id.error()};
     clock.marker_id = *id;
     return {};
   }
-  const auto said = body.text("marker_text", 1, kMaxReasonBytes);
+  const auto said = body.text("marker_text", text_bytes("ReferenceClock.marker_text"));
   if (!said) return std::unexpected{said.error()};
   clock.marker_text = *said;
   return {};
 }
 
 Result<void> parse_search(const Members& body, ReferenceClockRequest& clock) {
-  const auto from_s = number_within(body, "from_s", -kLargestS, kLargestS);
+  const auto from_s = number_within(body, "from_s", numbers("ReferenceClock.from_s"));
   if (!from_s) return std::unexpected{from_s.error()};
-  const auto to_s = number_within(body, "to_s", -kLargestS, kLargestS);
+  const auto to_s = number_within(body, "to_s", numbers("ReferenceClock.to_s"));
   if (!to_s) return std::unexpected{to_s.error()};
   clock.search.from_s = from_s->value_or(clock.search.from_s);
   clock.search.to_s = to_s->value_or(clock.search.to_s);
@@ -69,7 +66,7 @@ Result<void> parse_search(const Members& body, ReferenceClockRequest& clock) {
 Result<ReferenceClockRequest> parse_clock(const json& given) {
   if (!given.is_object()) return fail(ErrorCode::bad_request, "clock must be an object", "wrong_type");
   const Members body{given};
-  const auto method = body.text("method", 1, 20);
+  const auto method = body.text("method", {1, 20});
   if (!method) return std::unexpected{method.error()};
   ReferenceClockRequest clock;
   const auto only = [&](std::initializer_list<const char*> known) { return body.only(known); };
@@ -77,13 +74,13 @@ Result<ReferenceClockRequest> parse_clock(const json& given) {
   if (*method == text(ReferenceClock::offset)) {
     clock.method = ReferenceClock::offset;
     read = only({"method", "sd_s", "offset_s"});
-    const auto offset_s = needed_number(body, "offset_s", -kLargestS, kLargestS);
+    const auto offset_s = needed_number(body, "offset_s", numbers("ReferenceClock.offset_s"));
     if (read && !offset_s) read = std::unexpected{offset_s.error()};
     clock.offset_s = offset_s.value_or(0);
   } else if (*method == text(ReferenceClock::utc)) {
     clock.method = ReferenceClock::utc;
     read = only({"method", "sd_s", "zero_at_us"});
-    const auto zero_at_us = body.integer("zero_at_us", 0, kMaxId);
+    const auto zero_at_us = body.integer("zero_at_us", integers("ReferenceClock.zero_at_us"));
     if (read && !zero_at_us) read = std::unexpected{zero_at_us.error()};
     clock.zero_at_us = zero_at_us.value_or(0);
   } else if (*method == text(ReferenceClock::marker)) {
@@ -97,7 +94,7 @@ Result<ReferenceClockRequest> parse_clock(const json& given) {
     return fail(ErrorCode::invalid, "clock.method is none of offset, utc, marker and correlation", "out_of_range");
   }
   if (!read) return std::unexpected{read.error()};
-  const auto sd_s = number_within(body, "sd_s", 0, 1000);
+  const auto sd_s = number_within(body, "sd_s", numbers("ReferenceClock.sd_s"));
   if (!sd_s) return std::unexpected{sd_s.error()};
   clock.sd_s = *sd_s;
   return clock;
@@ -115,10 +112,10 @@ Result<ReferenceRequest> parse_reference(const std::string& text) {
   auto body = Members::parse(text, {"csv", "source", "clock", "span", "keep_zero", "metres", "sd_m", "reason"});
   if (!body) return std::unexpected{body.error()};
   ReferenceRequest request;
-  auto csv = body->text("csv", 1, kMaxReferenceBytes);
+  auto csv = body->text("csv", text_bytes("ReferenceBody.csv"));
   if (!csv) return std::unexpected{csv.error()};
   request.csv = std::move(*csv);
-  const auto source = body->text("source", 1, kMaxNameBytes);
+  const auto source = body->text("source", text_bytes("ReferenceBody.source"));
   if (!source) return std::unexpected{source.error()};
   request.source = *source;
   if (!body->has("clock")) return fail(ErrorCode::bad_request, "clock is missing", "missing_member");
@@ -126,7 +123,7 @@ Result<ReferenceRequest> parse_reference(const std::string& text) {
   if (!clock) return std::unexpected{clock.error()};
   request.clock = std::move(*clock);
   if (body->has("span")) {
-    const auto span = body->integer("span", 0, 1'000'000);
+    const auto span = body->integer("span", integers("ReferenceBody.span"));
     if (!span) return std::unexpected{span.error()};
     request.span = static_cast<std::uint32_t>(*span);
   }
@@ -135,11 +132,11 @@ Result<ReferenceRequest> parse_reference(const std::string& text) {
   if (!is_in_metres) return std::unexpected{is_in_metres.error()};
   request.keeps_zero = *keeps_zero;
   request.is_in_metres = *is_in_metres;
-  const auto sd_m = number_within(*body, "sd_m", 1e-7, 1);
+  const auto sd_m = number_within(*body, "sd_m", numbers("ReferenceBody.sd_m"));
   if (!sd_m) return std::unexpected{sd_m.error()};
   request.sd_m = *sd_m;
   if (!body->has("reason")) return request;
-  const auto reason = body->text("reason", 1, kMaxReasonBytes);
+  const auto reason = body->text("reason", text_bytes("ReferenceBody.reason"));
   if (!reason) return std::unexpected{reason.error()};
   request.reason = *reason;
   return request;
@@ -195,7 +192,7 @@ Answer remove_reference(ReferenceRoutes parts, Request request) {
 Answer list_positions(ReferenceRoutes parts, Request request) {
   const auto run = run_id_of(request);
   if (!run) co_return problem(run.error());
-  const auto after = query_number(request, "after", 0, kMaxId, -1);
+  const auto after = query_number(request, "after", 0, kMaxJavaScriptInteger, -1);
   if (!after) co_return problem(after.error());
   const auto limit = query_number(request, "limit", 1, kMaxPagePositions, kMaxPagePositions);
   if (!limit) co_return problem(limit.error());

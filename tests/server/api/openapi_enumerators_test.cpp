@@ -2,9 +2,7 @@
 // them makes the whole answer invalid for a client that was generated from the document.
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <set>
-#include <sstream>
 #include <string>
 
 #include "server/analysis/run_steps.hpp"
@@ -14,6 +12,7 @@
 #include "server/storage/runs/run.hpp"
 #include "server/storage/upkeep/backup.hpp"
 #include "server/storage/upkeep/disk_watch.hpp"
+#include "tests/server/api/openapi_document.hpp"
 
 namespace server {
 namespace {
@@ -30,32 +29,14 @@ Texts possible() {
   return texts;
 }
 
-std::string whole_document() {
-  std::ifstream in{OPENAPI_YAML};
-  return {std::istreambuf_iterator<char>{in}, {}};
-}
-
-// The lines from `name:`, at this indentation, to the next that is indented no further.
-std::string section(const std::string& lines, std::size_t indentation, const std::string& name) {
-  std::istringstream in{lines};
-  std::string line, found;
-  while (std::getline(in, line)) {
-    const bool is_inside = line.empty() || line.find_first_not_of(' ') > indentation;
-    if (!found.empty() && !is_inside) break;
-    if (!found.empty() || line.starts_with(std::string(indentation, ' ') + name + ":")) found += line + '\n';
-  }
-  return found;
-}
-
 // Of "Mode", a schema, or of "Robot.link", one of its properties.
 Texts documented(const std::string& name) {
+  static const nlohmann::json document = openapi_document();
   const auto dot = name.find('.');
-  std::string lines = section(whole_document(), 4, name.substr(0, dot));
-  if (dot != std::string::npos) lines = section(lines, 8, name.substr(dot + 1));
-  const auto begin = lines.find("enum: [") + 7;
-  std::istringstream list{lines.substr(std::min(begin, lines.size()), lines.find(']', begin) - begin)};
+  nlohmann::json schema = document["components"]["schemas"].at(name.substr(0, dot));
+  if (dot != std::string::npos) schema = schema.at("properties").at(name.substr(dot + 1));
   Texts texts;
-  for (std::string text; std::getline(list >> std::ws, text, ',');) texts.insert(text);
+  for (const nlohmann::json& text : schema.at("enum")) texts.insert(text.get<std::string>());
   return texts;
 }
 

@@ -1,8 +1,11 @@
 // The document and the routes say the same, both ways.
+#include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <set>
 
 #include "tests/server/api/api_fixture.hpp"
+#include "tests/server/api/openapi_document.hpp"
 
 namespace server {
 namespace {
@@ -13,32 +16,21 @@ struct Operation {
 };
 using Operations = std::map<std::string, Operation>;  // by "GET /path"
 
-std::size_t indentation(const std::string& line) { return line.find_first_not_of(' '); }
-
-// Reads the part below `paths:`, which is written with two spaces a level and parameters one a line.
 Operations documented() {
-  std::ifstream in{OPENAPI_YAML};
+  const json document = openapi_document();
   Operations operations;
-  std::string line, path, operation;
-  bool in_paths = false;
-  while (std::getline(in, line)) {
-    if (line.empty()) continue;
-    const auto depth = indentation(line);
-    if (depth == 0) in_paths = line == "paths:";
-    if (!in_paths) continue;
-    const std::string key = line.substr(depth, line.find(':') - depth);
-    if (depth == 2) path = key;
-    const bool is_method = depth == 4 && (key == "get" || key == "post" || key == "put" || key == "delete");
-    if (is_method) {
-      operation = (key == "get" ? "GET " : key == "post" ? "POST " : key + " ") + path;
-      operations[operation];
-    }
-    if (depth == 6 && key == "x-scope") operations[operation].scope = line.substr(line.find(':') + 2);
-    if (depth < 8) continue;
-    if (line.find("parameters/limit'") != std::string::npos) operations[operation].query.insert("limit");
-    const auto name = line.find("{ name: ");
-    if (name != std::string::npos && line.find("in: query") != std::string::npos) {
-      operations[operation].query.insert(line.substr(name + 8, line.find(',', name) - name - 8));
+  for (const auto& [path, methods] : document["paths"].items()) {
+    for (const auto& [method, described] : methods.items()) {
+      if (method == "parameters") continue;
+      std::string name = method;
+      std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+      Operation& operation = operations[name + " " + path];
+      operation.scope = described["x-scope"];
+      for (json parameter : described.value("parameters", json::array())) {
+        if (parameter.contains("$ref"))
+          parameter = document.at(json::json_pointer{parameter["$ref"].get<std::string>().substr(1)});
+        if (parameter["in"] == "query") operation.query.insert(parameter["name"]);
+      }
     }
   }
   return operations;

@@ -6,11 +6,11 @@
 namespace server {
 namespace {
 
-TEST(Target, HasADecodedPathAndAnEncodedQuery) {
+TEST(Target, HasADecodedPathAndQuery) {
   const Target target{"/api/v1/robots/r%31/samples?after=1%2D2&limit=3"};
   EXPECT_EQ(target.path(), "/api/v1/robots/r1/samples");
   EXPECT_EQ(target.segments().back(), "samples");
-  EXPECT_EQ(target.query(), "after=1%2D2&limit=3");
+  EXPECT_EQ(target.query(), (Target::Query{{"after", "1-2"}, {"limit", "3"}}));
   EXPECT_EQ(target.text(), "/api/v1/robots/r%31/samples?after=1%2D2&limit=3");
 }
 
@@ -21,6 +21,19 @@ TEST(Target, IsNotAcceptableWhereItsPathCouldMeanAnotherOne) {
     EXPECT_FALSE(target.is_acceptable()) << text;
     EXPECT_EQ(target.path(), "") << text;
     EXPECT_TRUE(target.segments().empty()) << text;
+  }
+}
+
+TEST(Target, QueryKeepsOrderAndRepeatedNames) {
+  EXPECT_EQ(Target{"/a?x=1&y&x=a+b&=c&&z=1=2"}.query(),
+            (Target::Query{{"x", "1"}, {"y", ""}, {"x", "a b"}, {"", "c"}, {"", ""}, {"z", "1=2"}}));
+  for (const char* text : {"", "/a", "/a?"}) EXPECT_EQ(Target{text}.query(), Target::Query{}) << text;
+}
+
+TEST(Target, QueryIsEmptyWhereItIsNotAValidEncoding) {
+  for (const char* text : {"/a?x=%", "/a?x=%2", "/a?%zz", "/a?x=%00", "/a?x=1&y=%0a"}) {
+    EXPECT_EQ(Target{text}.query(), std::nullopt) << text;
+    EXPECT_EQ(Target{text}.path(), "/a") << text;
   }
 }
 

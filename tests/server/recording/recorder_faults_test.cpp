@@ -112,36 +112,6 @@ TEST_F(RecorderFaultsTest, AFullQueueStillTakesEveryStopAndTheNewestStateOfAComm
   EXPECT_EQ(rows("SELECT state FROM command WHERE command_id = 4"), Rows{"acknowledged"});
 }
 
-TEST_F(RecorderFaultsTest, IgnoresNumbersThatCannotBe) {
-  start();
-  connect(robot_);
-  SampleBatch absurd = robot_.batch(0, 5);
-  absurd.first_seq = ~0ULL - 2;
-  send(robot_, absurd);
-  absurd = robot_.batch(0, 5);
-  absurd.oldest_seq = 1ULL << 63;
-  send(robot_, absurd);
-  flush();
-  EXPECT_EQ(samples(), 0);
-  EXPECT_EQ(recorder_->counters().batches_malformed, 2u);
-}
-
-TEST_F(RecorderFaultsTest, IgnoresABatchWithATimeThatCannotBe) {
-  start();
-  connect(robot_);
-  std::vector<SampleBatch> malformed(3, robot_.batch(0, 5));
-  malformed[0].context.period_us = 0;
-  malformed[1].context.period_us = 10'000'001;
-  malformed[2].first_robot_time_us = 1ULL << 62;
-  for (const SampleBatch& batch : malformed) send(robot_, batch);
-  EXPECT_EQ(recorder_->counters().batches_malformed, 3u);
-  EXPECT_EQ(recorder_->queued_samples(), 0u);
-  make(robot_, 10);
-  flush();
-  EXPECT_EQ(samples(), 10);
-  stop();
-}
-
 TEST_F(RecorderFaultsTest, AnEventThatTheFullQueueRefusedIsAskedForAgain) {
   RecorderOptions options;
   options.max_queued_records = 2;

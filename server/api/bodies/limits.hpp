@@ -1,0 +1,152 @@
+// The limits of request bodies, each once: the parsers take them from these tables, and limits_test compares the tables
+// with server/api/openapi.yaml in both directions.
+//
+// A property is named by its schema and itself: "RunBody.name", "LifeMs", "SetDutyScheduleBody.schedule[].tick".
+// Texts are counted in bytes of UTF-8. The maxLength of the document is the same number, of characters; so a text that
+// is not ASCII is refused although it has fewer characters than that.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+#include <string_view>
+
+#include "server/analysis/reference_import.hpp"
+#include "server/api/bodies/json.hpp"
+#include "server/identity/accounts.hpp"
+#include "server/runtime/secrets.hpp"
+#include "server/station/state/fluid_model.hpp"
+
+namespace server {
+
+template <class Number>
+struct Limit {
+  std::string_view property;
+  Range<Number> range;
+};
+
+inline constexpr std::int64_t kMaxUint32 = std::numeric_limits<std::uint32_t>::max();
+inline constexpr std::int64_t kMaxJavaScriptInteger = 9'007'199'254'740'991;
+inline constexpr Range<std::size_t> kNameBytes{1, 200}, kTextBytes{0, 4000}, kReasonBytes{1, 4000};
+inline constexpr Range<double> kReferenceSeconds{-1e10, 1e10}, kReferenceClockSd_s{0, 1000};
+
+// Of a text with an enum or a pattern in the document. Longer ones are refused by their length alone.
+inline constexpr std::size_t kMaxWordBytes = 200;
+inline constexpr std::size_t kMaxLongWordBytes = 4000;
+
+inline constexpr std::size_t kMaxDocumentBytes = 16'384;  // of a fluid's model: its texts and plant together
+
+inline constexpr Limit<std::size_t> kTextLimits[] = {
+    // bytes: minLength, maxLength
+    {"ControlBody.reason", kNameBytes},
+    {"FluidBody.fluid", kNameBytes},
+    {"FluidModelBody.comment", {0, kMaxDocumentBytes}},
+    {"FluidModelBody.description", {0, kMaxDocumentBytes}},
+    {"FluidModelBody.name", {0, kMaxDocumentBytes}},
+    {"LoginBody.password", {0, 10 * kMaxPasswordBytes}},
+    {"LoginBody.user", {0, kMaxWordBytes}},
+    {"MarkerBody.text", kReasonBytes},
+    {"ReferenceBody.csv", {1, kMaxReferenceBytes}},
+    {"ReferenceBody.reason", kReasonBytes},
+    {"ReferenceBody.source", kNameBytes},
+    {"ReferenceClock.marker_text", kReasonBytes},
+    {"RunAnnotationBody.fluid", kTextBytes},
+    {"RunAnnotationBody.name", kNameBytes},
+    {"RunAnnotationBody.notes", kTextBytes},
+    {"RunAnnotationBody.operator_name", kTextBytes},
+    {"RunAnnotationBody.profile", kTextBytes},
+    {"RunAnnotationBody.pump_profile", kTextBytes},
+    {"RunAnnotationBody.tube", kTextBytes},
+    {"RunAnnotationBody.verdict", kTextBytes},
+    {"RunBody.fluid", kTextBytes},
+    {"RunBody.name", kNameBytes},
+    {"RunBody.notes", kTextBytes},
+    {"RunBody.operator_name", kTextBytes},
+    {"RunBody.profile", kTextBytes},
+    {"RunBody.pump_profile", kTextBytes},
+    {"RunBody.tube", kTextBytes},
+    {"RunDiscardBody.reason", kReasonBytes},
+    {"RunEndBody.verdict", kTextBytes},
+    {"ScopeList", {1, kMaxWordBytes}},
+    {"SetParameterBody.name", {1, sizeof(rheonaut_SetParameter::name) - 1}},
+    {"UserBody.password", {kMinPasswordBytes, kMaxPasswordBytes}},
+    {"UserChange.password", {kMinPasswordBytes, kMaxPasswordBytes}},
+};
+
+inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
+    // minimum, maximum
+    {"ControlBody.lease_ms", {1, kLongestControl.count() / 1000}},
+    {"ControlBody.stamp_us", {0, kMaxTimeUs}},
+    {"Controller.checksum", {0, kMaxUint32}},
+    {"Controller.controller_id", {1, kMaxUint32}},
+    {"Controller.period_us", {1, 10'000'000}},
+    {"ExecuteAtRobotUs", {0, kMaxTimeUs}},
+    {"GetParametersBody.first_index", {0, 255}},
+    {"IssuedAtUs", {0, kMaxTimeUs}},
+    {"LifeMs", {1, protocol::kMaxCommandLifeUs / 1000}},
+    {"MarkerBody.at_us", {0, kMaxTimeUs - 1}},
+    {"ReferenceBody.span", {0, 1'000'000}},
+    {"ReferenceClock.marker_id", {1, kMaxJavaScriptInteger}},
+    {"ReferenceClock.zero_at_us", {0, kMaxJavaScriptInteger}},
+    {"RenewLeaseBody.lease_ms", {1, protocol::kLeaseMs}},
+    {"SeqSpan.first_seq", {0, kMaxTimeUs - 1}},
+    {"SeqSpan.last_seq", {0, kMaxTimeUs - 1}},  // from first_seq on
+    {"SetControllerBody.controller_id", {1, kMaxUint32}},
+    {"SetDutyBody.lease_ms", {1, protocol::kLeaseMs}},
+    {"SetDutyScheduleBody.schedule[].tick", {0, kMaxUint32}},
+    {"StampUs", {0, kMaxTimeUs}},
+    {"TimeSpan.from_us", {0, kMaxTimeUs - 1}},
+    {"TimeSpan.to_us", {0, kMaxTimeUs - 1}},  // from from_us on
+    {"TokenBody.days", {1, kMaxTokenDays}},
+};
+
+inline constexpr Limit<double> kNumberLimits[] = {
+    // minimum or exclusiveMinimum, maximum
+    {"DiscretisedController.period_s", {0, 10}},  // not 0
+    {"FluidModelBody.fit_error", {0, kMaxModelFitError}},
+    {"FluidModelBody.model_gain_m_s[]", {-kMaxModelGain_m_s, kMaxModelGain_m_s}},
+    {"FluidModelBody.model_time_constant_s[]", {kMinModelTimeConstant_s, kMaxModelTimeConstant_s}},
+    {"ReferenceBody.sd_m", {1e-7, 1}},
+    {"ReferenceClock.at_s", kReferenceSeconds},
+    {"ReferenceClock.from_s", kReferenceSeconds},
+    {"ReferenceClock.offset_s", kReferenceSeconds},
+    {"ReferenceClock.sd_s", kReferenceClockSd_s},
+    {"ReferenceClock.to_s", kReferenceSeconds},
+};
+
+// SAFETY: the robot refuses what is outside; the station passes it on, since what it knows of a robot may be old.
+inline constexpr Limit<double> kLimitsOfTheRobot[] = {
+    {"SetControllerBody.duty_max", {0, 1}},  // not 0
+    {"SetControllerBody.duty_min", {-1, 0}},
+    {"SetDutyBody.duty", {-1, 1}},
+    {"SetDutyScheduleBody.schedule[].duty", {-1, 1}},
+};
+
+inline constexpr Limit<std::size_t> kListLimits[] = {
+    // minItems, maxItems
+    {"Controller.biquad_a1", {0, std::size(rheonaut_Controller{}.biquad_a1)}},
+    {"Controller.biquad_a2", {0, std::size(rheonaut_Controller{}.biquad_a2)}},
+    {"Controller.biquad_b0", {0, std::size(rheonaut_Controller{}.biquad_b0)}},
+    {"Controller.biquad_b1", {0, std::size(rheonaut_Controller{}.biquad_b1)}},
+    {"Controller.pole", {0, std::size(rheonaut_Controller{}.pole)}},
+    {"Controller.residue", {0, std::size(rheonaut_Controller{}.residue)}},
+    {"FluidModelBody.model_gain_m_s", {kFluidModelSections, kFluidModelSections}},
+    {"FluidModelBody.model_time_constant_s", {kFluidModelSections, kFluidModelSections}},
+    {"SetDutyScheduleBody.schedule", {1, std::size(rheonaut_SetDutySchedule{}.duty)}},
+};
+
+// Of a property that the table does not have: an error of the compiler.
+template <class Number, std::size_t size>
+consteval Range<Number> limit_in(const Limit<Number> (&table)[size], std::string_view property) {
+  for (const Limit<Number>& limit : table) {
+    if (limit.property == property) return limit.range;
+  }
+  throw "no such property";
+}
+consteval Range<std::size_t> text_bytes(std::string_view property) { return limit_in(kTextLimits, property); }
+consteval Range<std::int64_t> integers(std::string_view property) { return limit_in(kIntegerLimits, property); }
+consteval Range<double> numbers(std::string_view property) { return limit_in(kNumberLimits, property); }
+consteval Range<std::size_t> list_size(std::string_view property) { return limit_in(kListLimits, property); }
+
+}  // namespace server

@@ -1,0 +1,49 @@
+// What a connection reads from Beast's parser of requests: the head as a plain value, whether the end of the body is
+// known, and the answers to what is not HTTP or too large.
+#pragma once
+
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <cstddef>
+#include <optional>
+
+#include "server/http/http.hpp"
+
+namespace server {
+
+inline constexpr std::size_t kMaxHeaderBytes = 16 * 1024;
+inline constexpr std::size_t kMaxTargetBytes = 8 * 1024;
+inline constexpr std::size_t kMaxHeaderFields = 100;
+inline constexpr std::size_t kMaxLoginBodyBytes = 4 * 1024;  // of unauthenticated
+
+using RequestMessage = boost::beast::http::request<boost::beast::http::string_body>;
+using RequestParser = boost::beast::http::request_parser<boost::beast::http::string_body>;
+
+// All but the body. Repeated fields are joined.
+Request plain_head(const RequestMessage& message);
+
+// The length of what follows the header is not known: Beast takes a coding that it does not know for no body at all.
+bool has_unknown_length(const RequestParser& parser);
+
+// Whether the connection can go on behind a body that nobody needs. Told what became of its request, a client that
+// expects 100-continue may leave the body out; what follows may then be either.
+bool can_pass_over_body(const RequestParser& parser);
+
+// The message with the fields of its header alone: Beast adds the trailers of a chunked body to them.
+class HeaderFields {
+ public:
+  explicit HeaderFields(const RequestParser& parser);  // when the header is complete, and before the body is read
+  RequestMessage release(RequestParser& parser);
+
+ private:
+  std::optional<RequestMessage::header_type> of_chunked_;
+};
+
+Response body_too_large(std::size_t limit);
+// Of a header that is within Beast's own limit: 414 or 431, if any.
+std::optional<Response> header_too_large(const RequestMessage& message);
+// To what the parser refused; none when the client has gone.
+std::optional<Response> unreadable(boost::system::error_code error);
+
+}  // namespace server
