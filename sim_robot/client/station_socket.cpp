@@ -4,11 +4,11 @@
 #include <openssl/err.h>
 #include <openssl/x509v3.h>
 
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <utility>
+
+#include "sim_robot/client/no_throw.hpp"
 
 namespace sim_robot {
 namespace {
@@ -18,7 +18,6 @@ using asio::ip::tcp;
 using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
 
 constexpr std::chrono::seconds kHandshakeTimeout{10};
-constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
 // What OpenSSL holds against the station, in its words.
 std::string reason(const SSL& tls) {

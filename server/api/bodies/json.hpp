@@ -20,6 +20,10 @@ namespace server {
 
 inline constexpr int kMaxJsonDepth = 16;  // of what is sent to the station; nothing that it knows needs more than 3
 
+inline nlohmann::json number_or_null(std::optional<double> value) {
+  return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+}
+
 // The members of one JSON object, taken one by one.
 class Members {
  public:

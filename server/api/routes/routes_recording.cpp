@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kMaxNameBytes = 200;  // longer ones are refused here; which are names, Backups says
 
-json or_null(const std::string& text) { return text.empty() ? json(nullptr) : json(text); }
+json text_or_null(const std::string& text) { return text.empty() ? json(nullptr) : json(text); }
 
 json to_json(const RecorderCounters& counters) {
   return {{"samples_written", counters.samples_written},
@@ -44,7 +44,7 @@ json to_json(const BackupRecord& backup) {
           {"state", text(backup.state)},
           {"pages_done", backup.pages_done},
           {"pages_total", backup.pages_total},
-          {"problem", or_null(backup.problem)},
+          {"problem", text_or_null(backup.problem)},
           {"path", backup.path.string()}};
 }
 
@@ -59,7 +59,7 @@ Answer get_recording(RecordingRoutes parts, Request) {
       200, {{"state", failing    ? "failing"
                       : has_room ? "recording"
                                  : "low_space"},
-            {"problem", or_null(failing ? recording.recorder.problem() : recording.disk_watch.problem())},
+            {"problem", text_or_null(failing ? recording.recorder.problem() : recording.disk_watch.problem())},
             {"space", text(recording.disk_watch.state())},
             {"queued_samples", recording.recorder.queued_samples()},
             {"free_bytes", use.free_bytes},

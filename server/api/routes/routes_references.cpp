@@ -16,11 +16,9 @@ namespace {
 
 constexpr std::int64_t kMaxId = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
 constexpr std::int64_t kMaxPagePositions = 10'000;
-constexpr std::size_t kMaxNameBytes = 200;
+constexpr std::size_t kMaxSourceBytes = 200;
 constexpr std::size_t kMaxReasonBytes = 4000;
 constexpr double kLargestS = 1e10;
-
-json or_null(std::optional<double> value) { return value ? json(*value) : json(nullptr); }
 
 // Of a member that may be left out: none then.
 Result<std::optional<double>> number_within(const Members& body, const char* name, double low, double high) {
@@ -118,7 +116,7 @@ Result<ReferenceRequest> parse_reference(const std::string& text) {
   auto csv = body->text("csv", 1, kMaxReferenceBytes);
   if (!csv) return std::unexpected{csv.error()};
   request.csv = std::move(*csv);
-  const auto source = body->text("source", 1, kMaxNameBytes);
+  const auto source = body->text("source", 1, kMaxSourceBytes);
   if (!source) return std::unexpected{source.error()};
   request.source = *source;
   if (!body->has("clock")) return fail(ErrorCode::bad_request, "clock is missing", "missing_member");
@@ -221,12 +219,12 @@ json to_json(const OutsideReference& reference) {
   out["sha256"] = reference.sha256;
   out["clock_method"] = text(reference.clock);
   out["clock_offset_s"] = reference.clock_offset_s;
-  out["clock_sd_s"] = or_null(reference.clock_sd_s);
-  out["correlation"] = or_null(reference.correlation);
-  out["motion_ratio"] = or_null(reference.motion_ratio);
+  out["clock_sd_s"] = number_or_null(reference.clock_sd_s);
+  out["correlation"] = number_or_null(reference.correlation);
+  out["motion_ratio"] = number_or_null(reference.motion_ratio);
   out["zero_is_kept"] = reference.zero_is_kept;
   out["zero_offset_m"] = reference.zero_offset_m;
-  out["zero_sd_m"] = or_null(reference.zero_sd_m);
+  out["zero_sd_m"] = number_or_null(reference.zero_sd_m);
   out["samples"] = reference.samples;
   out["samples_left_out"] = reference.samples_left_out;
   out["actor"] = reference.actor;
