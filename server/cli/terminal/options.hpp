@@ -36,6 +36,7 @@ CLI::Option* add_word(CLI::App& command, const char* name, Target& target, std::
   const auto refuse = [values, find](std::string& word) -> std::string {
     if (find(word) < static_cast<std::ptrdiff_t>(count)) return {};
     std::vector<std::string> words;
+    words.reserve(values.size());
     for (const T value : values) words.emplace_back(text(value));
     return fmt::format("must be one of {}, is '{}'", fmt::join(words, ", "), word);
   };

@@ -170,6 +170,7 @@ asio::awaitable<std::vector<BackupRecord>> Backups::list() {
     if (!was_removed) found[record.name] = record;
   }
   std::vector<BackupRecord> all;
+  all.reserve(found.size());
   for (auto& [name, record] : found) all.push_back(std::move(record));
   co_return all;
 }
