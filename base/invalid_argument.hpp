@@ -24,4 +24,10 @@ template <class... Parts>
 
 inline bool is_positive(double value) { return value > 0 && std::isfinite(value); }
 
+// `of` names what has the parameter: "battery".
+inline void check_not_negative(const char* of, const char* name, double value) {
+  if (value >= 0 && std::isfinite(value)) return;
+  throw_invalid(of, ": ", name, " must be 0 or more and finite, is ", value);
+}
+
 }  // namespace base

@@ -18,4 +18,5 @@ function(rheonaut_embed target function)
     COMMENT "Embedding ${name}"
     VERBATIM)
   target_sources(${target} PRIVATE ${out}/${name}.S ${out}/${name}.cpp)
+  set_source_files_properties(${out}/${name}.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)  # all have the same names
 endfunction()

@@ -13,12 +13,20 @@ set(RHEONAUT_PRECOMPILED
   "^server_cli" server_cli_terminal
   "^server_" server_runtime)
 
+# Sources of the station and of the simulated robot are compiled six at a time, because most of the time goes into
+# headers; therefore names in the anonymous namespaces of one room differ. Those of control/ stay apart: there the time
+# goes into code, and a change of one would compile its neighbours.
+option(RHEONAUT_UNITY "Compile the sources of a room in groups" ON)
+
 function(rheonaut_room name)
   cmake_parse_arguments(room "" "" "SOURCES;USES;LIBRARIES" ${ARGN})
   add_library(${name} STATIC ${room_SOURCES})
   target_compile_features(${name} PUBLIC cxx_std_23)
   target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PUBLIC ${room_USES} ${room_LIBRARIES} PRIVATE project_warnings)
+  if(RHEONAUT_UNITY AND name MATCHES "^(server|sim_robot)_")
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+  endif()
   rheonaut_share_precompiled(${name})
 endfunction()
 

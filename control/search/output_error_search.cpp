@@ -129,6 +129,7 @@ std::vector<int> OutputErrorSearch::free_parameters(Structure structure) const {
 
 std::vector<Channel> OutputErrorSearch::channels() const {
   std::vector<Channel> result;
+  result.reserve(measured_.size());
   for (const Measured& measured : measured_) result.push_back(measured.channel);
   return result;
 }

@@ -42,14 +42,12 @@ struct SearchResult {
 };
 
 // What is free beside the model's own parameters follows the kParameters of these.
-enum FreeParameter : int {
-  kOffset = kParameters,
-  kDeadTime,
-  kSensorTime,
-  kSensorPeriod,
-  kSensorTimeConstant,
-  kPositionClock
-};
+inline constexpr int kOffset = kParameters;
+inline constexpr int kDeadTime = kOffset + 1;
+inline constexpr int kSensorTime = kOffset + 2;
+inline constexpr int kSensorPeriod = kOffset + 3;
+inline constexpr int kSensorTimeConstant = kOffset + 4;
+inline constexpr int kPositionClock = kOffset + 5;
 
 class OutputErrorSearch {
  public:

@@ -18,13 +18,13 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::size_t kMaxQuoted = 60;
+constexpr std::size_t kMaxQuotedValue = 60;
 
 // Arrays and objects are only named: writing one that is nested 100 000 deep would exhaust the stack.
 std::string quote(const json& value) {
   if (value.is_structured()) return value.is_array() ? "an array" : "an object";
   std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
-  if (text.size() > kMaxQuoted) text = text.substr(0, kMaxQuoted) + "...";
+  if (text.size() > kMaxQuotedValue) text = text.substr(0, kMaxQuotedValue) + "...";
   return text;
 }
 

@@ -13,7 +13,7 @@ namespace server {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-constexpr std::size_t kMaxQuoted = 40;
+constexpr std::size_t kMaxQuotedCell = 40;
 constexpr const char* kDuty = "duty";  // the one column whose range is known
 
 std::string_view trimmed(std::string_view cell) {
@@ -105,7 +105,7 @@ class Reader {
     for (const char* name : required_) {
       if (!columns_.contains(name)) {
         refuse_line(fmt::format("column {} is missing in the heading '{}'; needed are {}", name,
-                                trimmed(line).substr(0, 2 * kMaxQuoted), wanted()));
+                                trimmed(line).substr(0, 2 * kMaxQuotedCell), wanted()));
       }
     }
     has_heading_ = true;
@@ -133,7 +133,7 @@ class Reader {
     double value = 0;
     const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
     if (error != std::errc{} || end != cell.data() + cell.size() || !std::isfinite(value)) {
-      refuse_line(fmt::format("'{}' in column {} is not a finite number", cell.substr(0, kMaxQuoted), column));
+      refuse_line(fmt::format("'{}' in column {} is not a finite number", cell.substr(0, kMaxQuotedCell), column));
     }
     if (column == kDuty && std::abs(value) > 1) {
       refuse_line(fmt::format("duty {} is outside [-1, 1]; is it in percent?", value));

@@ -15,7 +15,7 @@
 namespace server {
 namespace {
 
-constexpr std::size_t kFewestPositions = 10;
+constexpr std::size_t kFewestPositionsToImport = 10;
 constexpr double kLeastOwnSdM = 1e-4;  // weights do not grow beyond it
 constexpr double kLargestPositionM = 1e6, kLargestTimeS = 1e10;
 constexpr double kLeastSdM = 1e-7;    // what is given to be surer weighs down all the others
@@ -258,7 +258,7 @@ Result<void> check_unit(const Given& inside, const OwnRecord& own) {
     outside_m.push_back(inside.position_m[row]);
     own_m.push_back(at->position_m);
   }
-  if (time_s.size() < kFewestPositions) return {};
+  if (time_s.size() < kFewestPositionsToImport) return {};
   return check_metres(time_s, std::move(outside_m), std::move(own_m));
 }
 
@@ -276,7 +276,7 @@ Result<void> find_zero(const Given& inside, const OwnRecord& own, OutsideReferen
     outside_variance_m2 += inside.sd_m[row] * inside.sd_m[row];
     ++used;
   }
-  if (used < kFewestPositions) {
+  if (used < kFewestPositionsToImport) {
     return fail(ErrorCode::invalid,
                 fmt::format("only {} positions fall on samples of the robot's own record, so the zero cannot be found; "
                             "keep the zero (--keep-zero) if it is the robot's",
@@ -329,13 +329,13 @@ Result<PlacedReference> place_reference(const ReferenceRequest& request, std::sp
     return std::unexpected{found.error()};
   }
   const Given inside = rows_in_span(*given, *own, made.clock_offset_s);
-  if (inside.time_s.size() < kFewestPositions) {
+  if (inside.time_s.size() < kFewestPositionsToImport) {
     return fail(
         ErrorCode::invalid,
         fmt::format("{} of {} rows lie in span {} of the run, from 0 to {:.3f} s, with a clock offset of {:.3f} "
                     "s; at least {} are needed",
                     inside.time_s.size(), given->time_s.size(), own->span, own->seconds(own->last_us),
-                    made.clock_offset_s, kFewestPositions),
+                    made.clock_offset_s, kFewestPositionsToImport),
         "not_in_run");
   }
   if (!request.is_in_metres) {

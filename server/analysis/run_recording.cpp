@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kFewestSamples = 10;
 constexpr std::size_t kMostFaults = 5, kMostWindows = 3;  // in a message
 constexpr double kTimeToRest_s = 5;
-constexpr std::size_t kFewestPositions = 20;  // from outside
+constexpr std::size_t kFewestPositionsToFit = 20;  // from outside
 
 struct Piece {
   std::uint64_t span_began_us = 0;
@@ -171,7 +171,7 @@ class Cut {
 struct OutsidePart {
   std::vector<double> time_s, position_m, sd_m;
 
-  bool is_enough() const { return time_s.size() >= kFewestPositions; }
+  bool is_enough() const { return time_s.size() >= kFewestPositionsToFit; }
   std::string in_words(const StoredReference& from) const {
     const OutsideReference& reference = from.reference;
     const double rate_hz = static_cast<double>(time_s.size() - 1) / (time_s.back() - time_s.front());
@@ -270,7 +270,7 @@ Result<RunRecording> recording_of(std::span<const StoredSample> samples, const R
       choice == ChannelChoice::robot || reference == nullptr ? OutsidePart{} : outside_part(*piece, *reference);
   if (choice == ChannelChoice::outside && !outside.is_enough()) {
     return fail(ErrorCode::invalid, fmt::format("the window has {} positions from outside; at least {} are needed",
-                                                outside.time_s.size(), kFewestPositions));
+                                                outside.time_s.size(), kFewestPositionsToFit));
   }
   const Motion motion = outside.is_enough() ? Motion::outside
                         : position_sd_m > 0 ? Motion::acceleration

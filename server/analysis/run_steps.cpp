@@ -11,7 +11,7 @@ namespace {
 constexpr double kBandOfStep = 0.02;
 constexpr double kLongestPauseS = 0.25;  // in a reference: a longer one hides too much of a step
 constexpr double kLongestStepS = 0.1;    // between samples of the robot, to compare in between
-constexpr std::size_t kFewestPositions = 10;
+constexpr std::size_t kFewestPositionsOfAStep = 10;
 
 // Compares the robot's own position with the reference, in the order of time.
 class Comparison {
@@ -161,7 +161,7 @@ class Cutter {
     const auto first = std::ranges::lower_bound(outside.robot_time_us, begin_us) - outside.robot_time_us.begin();
     const auto last = std::ranges::upper_bound(outside.robot_time_us, end_us) - outside.robot_time_us.begin();
     const auto from = static_cast<std::size_t>(first), to = static_cast<std::size_t>(last);
-    if (to < from + kFewestPositions) return;
+    if (to < from + kFewestPositionsOfAStep) return;
     const auto pause_s = [](std::uint64_t a, std::uint64_t b) { return static_cast<double>(b - a) * 1e-6; };
     bool is_covered = pause_s(begin_us, outside.robot_time_us[from]) <= kLongestPauseS &&
                       pause_s(outside.robot_time_us[to - 1], end_us) <= kLongestPauseS;

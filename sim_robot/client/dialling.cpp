@@ -1,13 +1,13 @@
 // Resolves and connects, each against a timer.
 #include "sim_robot/client/dialling.hpp"
 
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/connect.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <stdexcept>
 #include <vector>
+
+#include "sim_robot/client/no_throw.hpp"
 
 namespace sim_robot {
 namespace {
@@ -15,8 +15,6 @@ namespace {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
-
-constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
 // Empty when there are none.
 asio::awaitable<std::vector<tcp::endpoint>> resolve(tcp::socket& socket, StationAddress address,

@@ -2,7 +2,6 @@
 #include "sim_robot/client/fault_server.hpp"
 
 #include <array>
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
@@ -11,6 +10,7 @@
 #include <charconv>
 #include <stdexcept>
 
+#include "sim_robot/client/no_throw.hpp"
 #include "sim_robot/scenario/fault_requests.hpp"
 
 namespace sim_robot {
@@ -23,7 +23,6 @@ using asio::ip::tcp;
 constexpr std::size_t kMaxHeaderBytes = 8 * 1024, kMaxBodyBytes = 16 * 1024;
 constexpr std::chrono::seconds kPauseAfterFailure{1}, kLingerTime{1};
 constexpr std::size_t kMaxDiscardBytes = 1024 * 1024;
-constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
 using HttpRequest = http::request<http::string_body>;
 

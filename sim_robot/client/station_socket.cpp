@@ -1,10 +1,10 @@
 // Dials, shakes hands, and keeps the session.
 #include "sim_robot/client/station_socket.hpp"
 
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <utility>
+
+#include "sim_robot/client/no_throw.hpp"
 
 namespace sim_robot {
 namespace {
@@ -14,7 +14,6 @@ using asio::ip::tcp;
 using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
 
 constexpr std::chrono::seconds kHandshakeTimeout{10};
-constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
 }  // namespace
 

@@ -2,13 +2,12 @@
 #include "sim_robot/proxy/proxy_connection.hpp"
 
 #include <array>
-#include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/experimental/awaitable_operators.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
 #include <utility>
 
+#include "sim_robot/client/no_throw.hpp"
 #include "sim_robot/world/microseconds.hpp"
 
 namespace sim_robot {
@@ -21,7 +20,6 @@ using namespace std::chrono_literals;
 
 constexpr auto kConnectTimeout = 2s;
 constexpr auto kCutDeadline = 1s;
-constexpr auto kNoThrow = asio::as_tuple(asio::use_awaitable);
 
 }  // namespace
 

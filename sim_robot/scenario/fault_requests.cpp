@@ -11,22 +11,22 @@
 namespace sim_robot {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 constexpr std::string_view kPath = "/faults";
 constexpr const char* kRoutes = "there are GET /faults, POST /faults and DELETE /faults/{id}";
 
 // null: has no default, or is without end.
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+OrderedJson number(double value) { return std::isfinite(value) ? OrderedJson(value) : OrderedJson(nullptr); }
 
-Json value_of(const base::Field& field) {
+OrderedJson value_of(const base::Field& field) {
   if (field.must_be_given()) return nullptr;
   if (const double* value = std::get_if<double>(&field.value)) return number(*value);
-  return std::visit([](const auto& value) { return Json(value); }, field.value);
+  return std::visit([](const auto& value) { return OrderedJson(value); }, field.value);
 }
 
-Json describe(const base::Field& field) {
-  Json json{{"key", field.key}, {"must_be_given", field.must_be_given()}, {"default", value_of(field)}};
+OrderedJson describe(const base::Field& field) {
+  OrderedJson json{{"key", field.key}, {"must_be_given", field.must_be_given()}, {"default", value_of(field)}};
   const bool is_number =
       std::holds_alternative<double>(field.value) || std::holds_alternative<std::uint64_t>(field.value);
   if (is_number) {
@@ -38,15 +38,15 @@ Json describe(const base::Field& field) {
   return json;
 }
 
-Json known_faults(const FaultyRobot& robot) {
-  Json all = Json::array();
+OrderedJson known_faults(const FaultyRobot& robot) {
+  OrderedJson all = OrderedJson::array();
   for (std::size_t i = 0; i < fault_types().size(); ++i) {
     Fault fault{.kind = static_cast<FaultKind>(i)};
     base::FieldList list;
     fields(list, fault);
-    Json json{{"fault", fault_types()[i].name}, {"what", fault_types()[i].what}};
+    OrderedJson json{{"fault", fault_types()[i].name}, {"what", fault_types()[i].what}};
     json["is_in_this_run"] = why_not(fault.kind, robot.link != nullptr).empty();
-    json["fields"] = Json::array();
+    json["fields"] = OrderedJson::array();
     for (const base::Field& field : list.fields) json["fields"].push_back(describe(field));
     all.push_back(json);
   }
@@ -55,23 +55,23 @@ Json known_faults(const FaultyRobot& robot) {
 
 double seconds(std::uint64_t us) { return static_cast<double>(us) * 1e-6; }
 
-Json as_json(const FaultInForce& each) {
+OrderedJson as_json(const FaultInForce& each) {
   Fault fault = each.fault;
   base::FieldList list;
   fields(list, fault);
-  Json json{{"id", each.id}, {"fault", type_of(fault.kind).name}};
+  OrderedJson json{{"id", each.id}, {"fault", type_of(fault.kind).name}};
   for (const base::Field& field : list.fields) json[field.key] = value_of(field);
   json["since_s"] = seconds(each.since_us);
-  json["until_s"] = each.until_us == FaultTimeline::kNever ? Json(nullptr) : Json(seconds(each.until_us));
+  json["until_s"] = each.until_us == FaultTimeline::kNever ? OrderedJson(nullptr) : OrderedJson(seconds(each.until_us));
   return json;
 }
 
 FaultAnswer list_faults(const FaultTimeline& faults, const FaultyRobot& robot) {
   const RobotLife& life = robot.life;
-  Json json{{"robot_id", life.robot().config().robot_id}, {"time_s", seconds(life.true_us())}};
+  OrderedJson json{{"robot_id", life.robot().config().robot_id}, {"time_s", seconds(life.true_us())}};
   json["robot_time_s"] = seconds(life.robot().robot_time_us());
   json["boots"] = life.boots();
-  json["in_force"] = Json::array();
+  json["in_force"] = OrderedJson::array();
   for (const FaultInForce& each : faults.in_force()) json["in_force"].push_back(as_json(each));
   json["to_come"] = faults.to_come();
   json["known"] = known_faults(robot);
@@ -89,7 +89,7 @@ FaultAnswer inject(const FaultRequest& request, FaultTimeline& faults, const Fau
       return fault_problem(409, "not_in_this_run", reason);
     }
     const std::uint64_t id = faults.inject(fault, robot);
-    return {201, Json{{"id", id}}.dump() + "\n"};
+    return {201, OrderedJson{{"id", id}}.dump() + "\n"};
   } catch (const std::invalid_argument& error) {
     return fault_problem(400, "invalid_fault", error.what());
   }
@@ -122,8 +122,8 @@ bool is_plain_host(std::string host) {
 }  // namespace
 
 FaultAnswer fault_problem(int status, const std::string& reason, const std::string& detail) {
-  const Json json{{"status", status}, {"reason", reason}, {"detail", detail}};
-  return {status, json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"};
+  const OrderedJson json{{"status", status}, {"reason", reason}, {"detail", detail}};
+  return {status, json.dump(-1, ' ', false, OrderedJson::error_handler_t::replace) + "\n"};
 }
 
 FaultAnswer answer(const FaultRequest& request, FaultTimeline& faults, const FaultyRobot& robot) {

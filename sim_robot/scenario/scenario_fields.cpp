@@ -13,7 +13,7 @@ constexpr std::array<const char*, 9> kCommands{"set_auto",      "set_manual",   
                                                "set_duty",      "inject_disturbance", "set_parameter",
                                                "zero_position", "emergency_stop",     "clear_emergency"};
 
-constexpr Range kTimes{0, 1e9};
+constexpr Range kRunTimes{0, 1e9};
 
 void robot_fields(Fields& fields, SimulatedRobotConfig& robot) {
   double duty_min = static_cast<double>(robot.duty.min), duty_max = static_cast<double>(robot.duty.max);
@@ -67,7 +67,7 @@ void fields(Fields& fields, Scenario& scenario) {
   world_fields(fields, scenario.robot.world);
   const auto fault_inside = [&scenario](Fields& inside) {
     TimedFault timed;
-    inside.number("at_s", timed.at_s, kTimes, "time of the run");
+    inside.number("at_s", timed.at_s, kRunTimes, "time of the run");
     fields_with_kind(inside, timed.fault);
     inside.must([&timed, &scenario] {
       check_time(timed.at_s, scenario.duration_s);
@@ -78,7 +78,7 @@ void fields(Fields& fields, Scenario& scenario) {
   fields.tables("faults", "", fault_inside);
   const auto step_inside = [&scenario](Fields& inside) {
     ScriptStep step;
-    inside.number("at_s", step.at_s, kTimes, "time of the run");
+    inside.number("at_s", step.at_s, kRunTimes, "time of the run");
     std::size_t index = kCommands.size();
     inside.choice("command", index, kCommands, "what a station says to the robot");
     step.command = static_cast<ScriptCommand>(index < kCommands.size() ? index : 0);

@@ -14,7 +14,7 @@ constexpr std::array<const char*, 2> kAccelerometers{"bno055", "perfect"};
 constexpr std::array<const char*, 2> kElectrodes{"perfect", "ds550"};
 
 constexpr Range kNotNegative{0, 1e9};
-constexpr Range kTimes{0, kForEver};
+constexpr Range kRemovalTimes{0, kForEver};
 
 void fluid_fields(Fields& fields, PlantParameters& plant) {
   std::size_t index = 0;
@@ -84,7 +84,7 @@ void glucose_fields(Fields& fields, GlucoseParameters& glucose) {
     GlucosePatch patch{.position_m = kMustBeGiven};
     patch_fields(inside, patch);
     inside.number("poured_at_s", patch.poured_at_s, {0, 1e9}, "time of the run");
-    inside.number("removed_at_s", patch.removed_at_s, kTimes, "time of the run");
+    inside.number("removed_at_s", patch.removed_at_s, kRemovalTimes, "time of the run");
     inside.must([&patch] { check(patch); });
     glucose.patches.push_back(patch);
   };

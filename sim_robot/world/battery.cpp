@@ -18,20 +18,14 @@ void check_positive(const char* name, double value_mv) {
   }
 }
 
-void check_not_negative(const char* name, double value) {
-  if (!(value >= 0 && std::isfinite(value))) {
-    base::throw_invalid("battery: ", name, " must be 0 or more and finite, is ", value);
-  }
-}
-
 }  // namespace
 
 void check(const BatteryParameters& parameters) {
   check_positive("open_circuit_mv", parameters.open_circuit_mv);
   check_positive("nominal_mv", parameters.nominal_mv);
-  check_not_negative("sag_mv", parameters.sag_mv);
-  check_not_negative("idle_discharge_mv_h", parameters.idle_discharge_mv_h);
-  check_not_negative("motor_discharge_mv_h", parameters.motor_discharge_mv_h);
+  base::check_not_negative("battery", "sag_mv", parameters.sag_mv);
+  base::check_not_negative("battery", "idle_discharge_mv_h", parameters.idle_discharge_mv_h);
+  base::check_not_negative("battery", "motor_discharge_mv_h", parameters.motor_discharge_mv_h);
 }
 
 Battery::Battery(const BatteryParameters& parameters)

@@ -32,12 +32,6 @@ double normal_distribution(double z) {
   return std::lerp(kTable[k], kTable[k + 1], at - static_cast<double>(k));
 }
 
-void check_not_negative(const char* name, double value) {
-  if (!(value >= 0 && std::isfinite(value))) {
-    base::throw_invalid("glucose: ", name, " must be 0 or more and finite, is ", value);
-  }
-}
-
 }  // namespace
 
 void check(const GlucosePatch& patch) {
@@ -45,10 +39,10 @@ void check(const GlucosePatch& patch) {
   if (!base::is_positive(patch.length_m)) {
     base::throw_invalid("glucose: length_m must be positive and finite, is ", patch.length_m);
   }
-  check_not_negative("concentration", patch.concentration);
-  check_not_negative("edge_m", patch.edge_m);
-  check_not_negative("mixing_m2_s", patch.mixing_m2_s);
-  check_not_negative("poured_at_s", patch.poured_at_s);
+  base::check_not_negative("glucose", "concentration", patch.concentration);
+  base::check_not_negative("glucose", "edge_m", patch.edge_m);
+  base::check_not_negative("glucose", "mixing_m2_s", patch.mixing_m2_s);
+  base::check_not_negative("glucose", "poured_at_s", patch.poured_at_s);
   if (!(patch.decay_s > 0)) base::throw_invalid("glucose: decay_s must be positive, is ", patch.decay_s);
   if (!(patch.removed_at_s >= patch.poured_at_s)) {
     base::throw_invalid("glucose: removed_at_s ", patch.removed_at_s, " is before poured_at_s ", patch.poured_at_s);
@@ -56,8 +50,8 @@ void check(const GlucosePatch& patch) {
 }
 
 void check(const GlucoseParameters& parameters) {
-  check_not_negative("nominal_mv", parameters.nominal_mv);
-  check_not_negative("glucose_mv", parameters.glucose_mv);
+  base::check_not_negative("glucose", "nominal_mv", parameters.nominal_mv);
+  base::check_not_negative("glucose", "glucose_mv", parameters.glucose_mv);
   for (const GlucosePatch& patch : parameters.patches) check(patch);
 }
 

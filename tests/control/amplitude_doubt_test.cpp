@@ -34,7 +34,7 @@ Recording dragged_run(double dead_time_s) {
 
 // Of the true fluid, as if it had been found.
 AmplitudeEvidence evidence_of(const Recording& run, double dead_time_s) {
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.longest_dead_time_s = 1;
   OutputErrorSearch search(run, options);
   SearchPoint point{kFluid};
@@ -55,7 +55,7 @@ TEST(AmplitudeDoubt, AnOrderThatWasForcedIsNamedAsTheLikelierReason) {
   Recording run{kPeriodS, prbs_duty(0.6, 0.5, 12, kPeriodS), {}, {}};
   run.acceleration_m_s2 = output_of({0.13, 0.009, 0.16, 1, 1.9, 0.95}, Channel::acceleration, kPeriodS, run.duty);
   add_noise(run.acceleration_m_s2, 0.01, 5);
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.further_starts = 0;
   options.structure = Structure::first_order;
   const auto claim = StartsWith("the parameters change with amplitude: ");

@@ -26,7 +26,7 @@ std::filesystem::path figure_path(const char* name) {
 TEST(Figure5, TheModelIsFoundAsFarAsTheRunCanTell) {
   const Recording run = position_run(kNonNewtonianModel, step_duty(0.3, 5, 0.01), kPaperResidualM, 5);
   const std::vector<double> truth = output_of(kNonNewtonianModel, Channel::position, 0.01, run.duty);
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = Structure::fractional;
   const Identification found = identify(run, options);
 

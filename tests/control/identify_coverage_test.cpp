@@ -20,7 +20,7 @@ void add_laplace_noise(std::vector<double>& values, double sd, unsigned seed) {
 
 // Twice the seeds: of kp and of b2.
 double covered_share(bool is_laplace, Cost cost, unsigned seeds) {
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = Structure::first_order;
   options.further_starts = 0;
   options.cost = cost;
@@ -71,7 +71,7 @@ TEST(IdentifyCoverage, FindsDeadTimeAndOffsetTogether) {
   Recording run{0.01, duty, output_of(kNonNewtonianModel, Channel::position, 0.01, duty, 0.0871), {}};
   for (double& x : run.position_m) x += 0.4;
   add_noise(run.position_m, 1e-5, 3);
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = Structure::fractional;
   options.further_starts = 0;
   options.longest_dead_time_s = 0.2;
@@ -88,7 +88,7 @@ TEST(IdentifyCoverage, AicIsTheSumOverTheChannels) {
   Recording run = position_run(kLag, duty, 1e-4, 5);
   run.velocity_m_s = output_of(kLag, Channel::velocity, 0.01, duty);
   add_noise(run.velocity_m_s, 2e-2, 6);
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = Structure::first_order;
   const Fit fit = identify(run, options).best;
   const auto mean_square = [](const std::vector<double>& residual) {

@@ -19,7 +19,7 @@ using testing::Not;
 const FractionalModel kFirstOrder{0.1, 0, 0.2, 1, 2, 1};
 
 IdentificationOptions one_start(Structure structure) {
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = structure;
   options.further_starts = 0;
   return options;

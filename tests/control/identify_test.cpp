@@ -19,7 +19,7 @@ using testing::HasSubstr;
 
 // As the reference was made.
 IdentificationOptions reference_options() {
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = Structure::fractional;
   options.further_starts = 0;
   options.fits_offset = false;
@@ -27,7 +27,7 @@ IdentificationOptions reference_options() {
 }
 
 IdentificationOptions first_start_only(Structure structure = Structure::fractional) {
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = structure;
   options.further_starts = 0;
   return options;
@@ -163,7 +163,7 @@ TEST(Identify, FindsTheDeadTimeBetweenSamples) {
 
 TEST(Identify, ChoosesTheStructureOfTheModelByAic) {
   const std::vector<double> duty = prbs_duty(1, 0.2, 5, 0.01);
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.further_starts = 1;
   const std::vector<std::pair<Structure, FractionalModel>> cases{{Structure::first_order, {0.1, 0, 0.2, 1, 2, 1}},
                                                                  {Structure::second_order, {0.1, 0.01, 0.06, 1, 2, 1}},
@@ -208,7 +208,7 @@ TEST(Identify, AbsoluteErrorIsNotMovedByOutliers) {
 
 TEST(Identify, EndsWhenCancelled) {
   const Recording recording = position_run(kNonNewtonianModel, std::vector<double>(301, 0.3), 1e-4, 2);
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   int calls = 0;
   options.on_progress = [&](const Progress& progress) {
     EXPECT_GE(progress.sse, 0);
@@ -263,7 +263,7 @@ TEST(Identify, RefusesWhatItCannotUse) {
   EXPECT_THAT(changed([](Recording& r) { r.dt_s = 0; }), HasSubstr("dt_s must be positive, is 0"));
   EXPECT_THAT(changed([](Recording& r) { r.position_m.clear(); }), HasSubstr("all empty"));
   EXPECT_THAT(changed([](Recording& r) { r.acceleration_m_s2 = r.position_m; }), HasSubstr("give it alone"));
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.longest_dead_time_s = 2;
   EXPECT_THAT(refusal(good, options), HasSubstr("longest_dead_time_s"));
   EXPECT_THAT(changed([](Recording& r) { r.dt_s = 1e-9; }), HasSubstr("dt_s must be from 1e-06 to 10000, is 1e-09"));

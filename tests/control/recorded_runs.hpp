@@ -11,6 +11,13 @@
 
 namespace control {
 
+// A search that ends by itself, however busy the machine is.
+inline IdentificationOptions unhurried_options() {
+  IdentificationOptions options;
+  options.time_limit_s = 1e6;
+  return options;
+}
+
 inline std::vector<double> output_of(const FractionalModel& model, Channel channel, double dt_s,
                                      const std::vector<double>& duty, double dead_time_s = 0) {
   OutputModel output(channel, dt_s, duty, dead_time_s, 1e-13);

@@ -10,6 +10,7 @@
 #include "control/models/modal_plant.hpp"
 #include "control/sensor/position_times.hpp"
 #include "control/sensor/position_weight.hpp"
+#include "recorded_runs.hpp"
 
 namespace control {
 namespace {
@@ -61,7 +62,7 @@ TEST(ReferenceFit, ParametersComeOutWithinThreeSigmasWhateverTheCamerasClock) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const Camera camera{.clock_late_s = 0.001 * (seed % 5) - 0.002};
     const Recording recording = watched(plant, camera, seed);
-    IdentificationOptions options;
+    IdentificationOptions options = unhurried_options();
     options.structure = Structure::fractional;
     options.further_starts = 0;
     const Fit fit = identify(recording, options).best;
@@ -84,7 +85,7 @@ TEST(ReferenceFit, ParametersComeOutWithinThreeSigmasWhateverTheCamerasClock) {
 // 5 ms are nearly the same to the model as a change of its fastest lag: only the sigmas tell whether they were unknown.
 TEST(ReferenceFit, ABelievedClockIsNoUnknown) {
   const Recording recording = watched(normalised(kNonNewtonianModel), {.clock_late_s = 0.005}, 3);
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = Structure::fractional;
   options.further_starts = 0;
   const Fit free = identify(recording, options).best;
@@ -99,7 +100,7 @@ TEST(ReferenceFit, ABelievedClockIsNoUnknown) {
 TEST(ReferenceFit, PositionsWeighByTheirOwnSds) {
   const FractionalModel plant = normalised(kNonNewtonianModel);
   constexpr double kSure = 0.0003, kUnsure = 0.012;
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = Structure::second_order;  // parameters of which the run is sure
   options.further_starts = 0;
   FractionalModel second_order = plant;
@@ -146,7 +147,7 @@ TEST(ReferenceFit, APoorFitIsNamedHoweverFarUnsurePositionsLieApart) {
     recording.position_sd_m.push_back(k % 10 == 0 ? 2 : 0.0005);
     if (k % 10 == 0) recording.position_m[k] += noise(random);
   }
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = Structure::first_order;
   options.further_starts = 0;
   EXPECT_GT(identify(recording, options).best.fit_percent, 80);
@@ -161,7 +162,7 @@ TEST(ReferenceFit, ADoubtAboutWeighedPositionsSaysThatTheyAre) {
   Recording recording = watched(normalised(kNonNewtonianModel), {}, 3);
   recording.position_sd_m.assign(recording.position_m.size(), 0.0005);
   recording.position_m[500] += 0.1;
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = Structure::first_order;
   options.further_starts = 0;
   EXPECT_THAT(identify(recording, options).warnings,
@@ -170,7 +171,7 @@ TEST(ReferenceFit, ADoubtAboutWeighedPositionsSaysThatTheyAre) {
 
 TEST(ReferenceFit, EqualSdsChangeNothing) {
   Recording recording = watched(kNonNewtonianModel, {}, 2);
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = Structure::second_order;
   options.further_starts = 0;
   const Fit without = identify(recording, options).best;

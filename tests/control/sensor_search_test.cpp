@@ -45,7 +45,7 @@ Recording acceleration_run(double duration_s, double noise_m_s2, double failed_s
 }
 
 IdentificationOptions one_start() {
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.structure = Structure::second_order;
   options.further_starts = 0;
   return options;
@@ -117,7 +117,7 @@ TEST(SensorSearch, DoubtsALagOfTheSensorThatTheReadingsDoNotHave) {
 
 TEST(SensorSearch, ALagOfTheSensorNeedsASensor) {
   const std::vector<double> duty = prbs_duty(0.6, 0.2, 4, kPeriodS);
-  IdentificationOptions options;
+  IdentificationOptions options = unhurried_options();
   options.sensor_lag_s = 0.01;
   EXPECT_THROW(identify(position_run(kFluid, duty, 1e-4, 1), options), std::invalid_argument);
   options.sensor_lag_s = -0.01;

@@ -53,6 +53,14 @@ std::array<double, control::kParameters> values(const control::FractionalModel& 
 
 }  // namespace
 
+control::IdentificationOptions one_start_options() {
+  control::IdentificationOptions options;
+  options.structure = control::Structure::fractional;
+  options.further_starts = 0;
+  options.time_limit_s = 1e6;
+  return options;
+}
+
 std::vector<double> study_duty() { return control::prbs_duty(0.6, 0.5, 60, SimulatedRobot::kPeriodS); }
 
 control::Recording record(const IdentificationTrial& trial, std::uint64_t seed) {
@@ -120,9 +128,7 @@ double worst_response_error(const control::FractionalModel& model, const control
 }
 
 TrialFit fit_of(const control::Recording& recording, const control::FractionalModel& fluid) {
-  control::IdentificationOptions options;
-  options.structure = control::Structure::fractional;
-  options.further_starts = 0;
+  const control::IdentificationOptions options = one_start_options();
   TrialFit result{control::identify(recording, options).best};
   result.worst_response = worst_response_error(result.fit.model, fluid);
   control::PlannedExperiment experiment;

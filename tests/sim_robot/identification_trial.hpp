@@ -28,6 +28,9 @@ inline constexpr std::array<control::FractionalModel, 5> kStudyFluids{{
     {0.09, 0.0085, 0.066, 1, 1.85, 0.7},
 }};
 
+// Fractional, from the first start alone, and without an end in time: a busy machine fits the same.
+control::IdentificationOptions one_start_options();
+
 // ±0.6 in bits of 0.5 s for 60 s.
 std::vector<double> study_duty();
 

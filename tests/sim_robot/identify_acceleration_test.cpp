@@ -35,9 +35,7 @@ TEST(IdentifyBelief, TwoRobotsThatBelieveInDifferentFluidsFindTheSame) {
 TEST(IdentifyBelief, ADeadTimeOfTheFluidIsFound) {
   const auto duty = control::prbs_duty(0.6, 0.5, 20, 0.01);
   const control::Recording recording = record({.fluid = kFluid, .duty = duty, .dead_time_s = 0.07}, 2);
-  control::IdentificationOptions options;
-  options.structure = control::Structure::fractional;
-  options.further_starts = 0;
+  control::IdentificationOptions options = one_start_options();
   options.longest_dead_time_s = 0.2;
   const control::Fit fit = control::identify(recording, options).best;
   EXPECT_NEAR(fit.model.dead_time_s, 0.07, 0.002);

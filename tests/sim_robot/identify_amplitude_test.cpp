@@ -12,10 +12,7 @@ constexpr double kPositionSdM = 0.0005;
 constexpr std::uint64_t kSeed = 7;
 
 control::Identification identified(const control::Recording& recording) {
-  control::IdentificationOptions options;
-  options.structure = control::Structure::fractional;
-  options.further_starts = 0;
-  return control::identify(recording, options);
+  return control::identify(recording, one_start_options());
 }
 
 bool doubts_amplitude(const control::Identification& found) {

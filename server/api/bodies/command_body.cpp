@@ -36,7 +36,7 @@ Result<void> read_set_mode(const Members& body, protocol::Command& action) {
   return {};
 }
 
-Result<void> read_float(const Members& body, const char* name, float& into) {
+Result<void> read_only_float(const Members& body, const char* name, float& into) {
   if (auto known = body.only({name}); !known) return known;
   const auto value = body.number_as_float(name);
   if (!value) return std::unexpected{value.error()};
@@ -46,12 +46,12 @@ Result<void> read_float(const Members& body, const char* name, float& into) {
 
 Result<void> read_set_setpoint(const Members& body, protocol::Command& action) {
   action.which_action = rheonaut_Command_set_setpoint_tag;
-  return read_float(body, "setpoint_m", action.action.set_setpoint.setpoint_m);
+  return read_only_float(body, "setpoint_m", action.action.set_setpoint.setpoint_m);
 }
 
 Result<void> read_inject_disturbance(const Members& body, protocol::Command& action) {
   action.which_action = rheonaut_Command_inject_disturbance_tag;
-  return read_float(body, "disturbance_m", action.action.inject_disturbance.disturbance_m);
+  return read_only_float(body, "disturbance_m", action.action.inject_disturbance.disturbance_m);
 }
 
 Result<void> read_lease(const Members& body, Range<std::int64_t> allowed, std::uint32_t& lease_ms) {

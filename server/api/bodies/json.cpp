@@ -14,11 +14,11 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::size_t kMaxQuoted = 60;
+constexpr std::size_t kMaxQuotedValue = 60;
 
 std::string quote(const json& value) {
   std::string text = dump(value);
-  if (text.size() > kMaxQuoted) text = text.substr(0, kMaxQuoted) + "…";
+  if (text.size() > kMaxQuotedValue) text = text.substr(0, kMaxQuotedValue) + "…";
   return text;
 }
 
@@ -99,9 +99,9 @@ Result<double> Members::number(const char* name) const {
 Result<float> Members::number_as_float(const char* name) const {
   const auto value = number(name);
   if (!value) return std::unexpected{value.error()};
-  constexpr double kLargest = std::numeric_limits<float>::max();
-  if (std::abs(*value) > kLargest) {
-    return fail(ErrorCode::invalid, fmt::format("{} = {} is beyond ±{}", name, *value, kLargest), "out_of_range");
+  constexpr double kLargestFloat = std::numeric_limits<float>::max();
+  if (std::abs(*value) > kLargestFloat) {
+    return fail(ErrorCode::invalid, fmt::format("{} = {} is beyond ±{}", name, *value, kLargestFloat), "out_of_range");
   }
   return static_cast<float>(*value);
 }

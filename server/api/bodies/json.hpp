@@ -28,6 +28,9 @@ template <class Number>
 struct Range {
   Number minimum, maximum;  // both allowed
 };
+inline nlohmann::json number_or_null(std::optional<double> value) {
+  return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+}
 
 // The members of one JSON object, taken one by one.
 class Members {

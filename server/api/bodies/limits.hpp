@@ -84,7 +84,7 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"ExecuteAtRobotUs", {0, kMaxTimeUs}},
     {"GetParametersBody.first_index", {0, 255}},
     {"IssuedAtUs", {0, kMaxTimeUs}},
-    {"LifeMs", {1, protocol::kMaxCommandLifeUs / 1000}},
+    {"LifeMs", {1, protocol::kMaxTimeToLiveUs / 1000}},
     {"MarkerBody.at_us", {0, kMaxTimeUs - 1}},
     {"ReferenceBody.span", {0, 1'000'000}},
     {"ReferenceClock.marker_id", {1, kMaxJavaScriptInteger}},

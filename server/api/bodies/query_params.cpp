@@ -12,7 +12,7 @@ namespace server {
 namespace {
 
 constexpr std::int64_t kLatest = (std::int64_t{1} << 53) - 1;  // that a JavaScript number holds
-constexpr std::size_t kMaxQuoted = 40;
+constexpr std::size_t kMaxQuotedParameter = 40;
 
 }  // namespace
 
@@ -25,10 +25,10 @@ Result<std::int64_t> query_number(const Request& request, const std::string& nam
   const char* end = text.data() + text.size();
   const auto [rest, error] = std::from_chars(text.data(), end, value);
   if (error != std::errc{} || rest != end || value < minimum || value > maximum) {
-    return fail(
-        ErrorCode::bad_request,
-        fmt::format("{} = '{}' is not a number from {} to {}", name, text.substr(0, kMaxQuoted), minimum, maximum),
-        "out_of_range");
+    return fail(ErrorCode::bad_request,
+                fmt::format("{} = '{}' is not a number from {} to {}", name, text.substr(0, kMaxQuotedParameter),
+                            minimum, maximum),
+                "out_of_range");
   }
   return value;
 }

@@ -182,4 +182,6 @@ inline Author author_of(const Request& request, const Clock& clock) {
 inline constexpr std::int64_t kDefaultLimit = 100;
 inline constexpr std::int64_t kMaxLimit = 1000;
 
+Response unknown_robot(const std::string& id);  // 404, whatever was asked of it
+
 }  // namespace server

@@ -10,7 +10,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::size_t kMaxWordBytes = 100;
+constexpr std::size_t kMaxFilterBytes = 100;
 constexpr std::int64_t kMaxNumber = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
 
 json to_json(const AuditEntry& entry) {
@@ -31,7 +31,7 @@ json to_json(const AuditEntry& entry) {
 
 std::optional<std::string> word_of(const Request& request, const char* name) {
   const auto given = request.query.find(name);
-  return given == request.query.end() ? std::nullopt : std::optional{given->second.substr(0, kMaxWordBytes)};
+  return given == request.query.end() ? std::nullopt : std::optional{given->second.substr(0, kMaxFilterBytes)};
 }
 
 Result<AuditFilter> filter_of(const Request& request) {
@@ -77,7 +77,7 @@ void add_audit_routes(Router& router, AuditRoutes parts) {
     AuditNote note;
     note.by = author_of(request, parts.clock);
     note.action = "request.refused";
-    note.subject = request.path.substr(0, kMaxWordBytes);
+    note.subject = request.path.substr(0, kMaxFilterBytes);
     note.detail = audit_detail({{"method", request.method}, {"needs", text(needed)}});
     note.can_flood = true;
     parts.recorder.on_audit(note);

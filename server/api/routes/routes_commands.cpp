@@ -19,10 +19,6 @@ using nlohmann::json;
 
 namespace {
 
-Response unknown_robot(const std::string& id) {
-  return problem(404, fmt::format("no robot '{}' is known", id.substr(0, 40)), "unknown_robot");
-}
-
 // What became of a command that was sent.
 Response command_response(const CommandRecord& record) {
   const json with_command{{"command", to_json(record)}};

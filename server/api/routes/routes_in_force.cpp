@@ -10,7 +10,7 @@ using nlohmann::json;
 
 namespace {
 
-std::unexpected<Error> unknown_robot(const std::string& id) {
+std::unexpected<Error> robot_not_known(const std::string& id) {
   return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", id), "unknown_robot");
 }
 
@@ -33,7 +33,7 @@ json parameter_json(const rheonaut_Parameter& parameter) {
 Answer get_parameters(InForceRoutes parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   const RobotSettings* known = parts.station.settings(id);
-  if (known == nullptr) co_return problem(unknown_robot(id).error());
+  if (known == nullptr) co_return problem(robot_not_known(id).error());
   json table;  // null: nothing is known, which is not the same as a robot without parameters
   for (const auto& [name, parameter] : known->parameters.last_known()) table.push_back(parameter_json(parameter));
   co_return json_response(200, {{"robot_id", id},
@@ -45,7 +45,7 @@ Answer get_parameters(InForceRoutes parts, Request request) {
 Answer get_controller(InForceRoutes parts, Request request) {
   const std::string& id = request.param.at("robot_id");
   const RobotSettings* known = parts.station.settings(id);
-  if (known == nullptr) co_return problem(unknown_robot(id).error());
+  if (known == nullptr) co_return problem(robot_not_known(id).error());
   const json controller = known->controller ? controller_json(*known->controller) : json(nullptr);
   co_return json_response(200, {{"robot_id", id},
                                 {"is_current", is_connected(parts.station, id) && known->is_controller_current},

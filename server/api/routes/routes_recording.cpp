@@ -11,7 +11,7 @@ using nlohmann::json;
 
 namespace {
 
-json or_null(const std::string& text) { return text.empty() ? json(nullptr) : json(text); }
+json text_or_null(const std::string& text) { return text.empty() ? json(nullptr) : json(text); }
 
 json to_json(const RecorderCounters& counters) {
   return {{"samples_written", counters.samples_written},
@@ -42,7 +42,7 @@ json to_json(const BackupRecord& backup) {
           {"state", text(backup.state)},
           {"pages_done", backup.pages_done},
           {"pages_total", backup.pages_total},
-          {"problem", or_null(backup.problem)},
+          {"problem", text_or_null(backup.problem)},
           {"path", backup.path.string()}};
 }
 
@@ -57,7 +57,7 @@ Answer get_recording(RecordingRoutes parts, Request) {
       200, {{"state", failing    ? "failing"
                       : has_room ? "recording"
                                  : "low_space"},
-            {"problem", or_null(failing ? recording.recorder.problem() : recording.disk_watch.problem())},
+            {"problem", text_or_null(failing ? recording.recorder.problem() : recording.disk_watch.problem())},
             {"space", text(recording.disk_watch.state())},
             {"queued_samples", recording.recorder.queued_samples()},
             {"free_bytes", use.free_bytes},

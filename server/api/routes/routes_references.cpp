@@ -16,8 +16,6 @@ namespace {
 
 constexpr std::int64_t kMaxPagePositions = 10'000;
 
-json or_null(std::optional<double> value) { return value ? json(*value) : json(nullptr); }
-
 // Of a member that may be left out: none then.
 Result<std::optional<double>> number_within(const Members& body, const char* name, Range<double> allowed) {
   if (!body.has(name)) return std::nullopt;
@@ -218,12 +216,12 @@ json to_json(const OutsideReference& reference) {
   out["sha256"] = reference.sha256;
   out["clock_method"] = text(reference.clock);
   out["clock_offset_s"] = reference.clock_offset_s;
-  out["clock_sd_s"] = or_null(reference.clock_sd_s);
-  out["correlation"] = or_null(reference.correlation);
-  out["motion_ratio"] = or_null(reference.motion_ratio);
+  out["clock_sd_s"] = number_or_null(reference.clock_sd_s);
+  out["correlation"] = number_or_null(reference.correlation);
+  out["motion_ratio"] = number_or_null(reference.motion_ratio);
   out["zero_is_kept"] = reference.zero_is_kept;
   out["zero_offset_m"] = reference.zero_offset_m;
-  out["zero_sd_m"] = or_null(reference.zero_sd_m);
+  out["zero_sd_m"] = number_or_null(reference.zero_sd_m);
   out["samples"] = reference.samples;
   out["samples_left_out"] = reference.samples_left_out;
   out["actor"] = reference.actor;

@@ -15,11 +15,11 @@ namespace server {
 namespace asio = boost::asio;
 using nlohmann::json;
 
-namespace {
-
 Response unknown_robot(const std::string& id) {
   return problem(404, fmt::format("no robot '{}' is known", id.substr(0, 40)), "unknown_robot");
 }
+
+namespace {
 
 // All of a robot, or for a token that may stop and not read what its stop is about and nothing else.
 json robot_json(const RobotState& robot, const Caller& caller) {

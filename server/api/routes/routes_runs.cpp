@@ -178,8 +178,6 @@ Answer get_snapshot(RunRoutes parts, Request request) {
   co_return json_response(200, out);
 }
 
-json or_null(std::optional<double> value) { return value ? json(*value) : json(nullptr); }
-
 json to_json(const std::optional<EstimateError>& error) {
   if (!error) return nullptr;
   return {{"rms_m", error->rms_m},
@@ -201,10 +199,10 @@ json to_json(const MeasuredStep& step) {
   out["position_source"] = position_source(step);
   out["position_sd_m"] = decimal(static_cast<float>(step.position_sd_m));
   out["estimate_error"] = to_json(step.estimate_error);
-  out["settling_s"] = or_null(step.metrics.settling_s);
+  out["settling_s"] = number_or_null(step.metrics.settling_s);
   out["overshoot_percent"] = step.metrics.overshoot_percent;
   out["peak_m"] = step.metrics.peak_m;
-  out["rise_10_90_s"] = or_null(step.metrics.rise_10_90_s);
+  out["rise_10_90_s"] = number_or_null(step.metrics.rise_10_90_s);
   out["steady_state_error_m"] = step.metrics.steady_state_error_m;
   return out;
 }

@@ -20,11 +20,10 @@ namespace server::cli {
 namespace {
 
 using nlohmann::json;
-using Act = FluidCommand::Act;
-
 constexpr int kDone = 200;
 
-CLI::App* offer(CLI::App& command, FluidCommand& options, Act act, const char* name, const char* purpose) {
+CLI::App* offer(CLI::App& command, FluidCommand& options, FluidCommand::Act act, const char* name,
+                const char* purpose) {
   CLI::App* sub = command.add_subcommand(name, purpose);
   sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
   sub->callback([&options, act] { options.act = act; });
@@ -73,7 +72,7 @@ int list(const FluidCommand& options, std::ostream& out) {
 }
 
 int change(const FluidCommand& options, std::ostream& out) {
-  const bool removes = options.act == Act::remove_model;
+  const bool removes = options.act == FluidCommand::Act::remove_model;
   const std::string path = path_of_model(options.fluid);
   const json answer = removes ? ask(options, "POST", path + "/remove", json::object())
                               : ask(options, "POST", path, read_model(options.file));
@@ -94,23 +93,25 @@ int change(const FluidCommand& options, std::ostream& out) {
 
 void add_options(CLI::App& command, FluidCommand& options) {
   command.require_subcommand(1);
-  offer(command, options, Act::list, "list", "List the fluids that robots may be in, and which have a model")
+  offer(command, options, FluidCommand::Act::list, "list",
+        "List the fluids that robots may be in, and which have a model")
       ->add_flag("--json", options.json, "As JSON");
-  auto* model = offer(command, options, Act::model, "model", "Give a fluid the model that is sent to robots in it");
+  auto* model =
+      offer(command, options, FluidCommand::Act::model, "model", "Give a fluid the model that is sent to robots in it");
   model->add_option("fluid", options.fluid, "The fluid, as `rheonaut fluid list` names it")->required()->check(named());
   model->add_option("file", options.file, "The model, from `rheonaut estimator --json`; -: standard input")
       ->required()
       ->check(named());
   model->add_flag("--json", options.json, "As JSON");
   model->footer("Example: rheonaut fluid model water model.json --data lab");
-  auto* remove = offer(command, options, Act::remove_model, "remove-model", "Take a fluid's model away");
+  auto* remove = offer(command, options, FluidCommand::Act::remove_model, "remove-model", "Take a fluid's model away");
   remove->add_option("fluid", options.fluid, "The fluid")->required()->check(named());
   remove->add_flag("--json", options.json, "As JSON");
   command.footer("Example: rheonaut fluid list --data lab");
 }
 
 int run(const FluidCommand& options, std::ostream& out) {
-  return options.act == Act::list ? list(options, out) : change(options, out);
+  return options.act == FluidCommand::Act::list ? list(options, out) : change(options, out);
 }
 
 }  // namespace server::cli

@@ -13,9 +13,8 @@
 namespace server::cli {
 namespace {
 
-using Act = RobotCommand::Act;
-
-CLI::App* offer(CLI::App& command, RobotCommand& options, Act act, const char* name, const char* purpose) {
+CLI::App* offer(CLI::App& command, RobotCommand& options, RobotCommand::Act act, const char* name,
+                const char* purpose) {
   CLI::App* sub = command.add_subcommand(name, purpose);
   sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
   sub->callback([&options, act] { options.act = act; });
@@ -69,17 +68,17 @@ int enroll(const RobotCommand& options, std::ostream& out) {
 
 void add_options(CLI::App& command, RobotCommand& options) {
   command.require_subcommand(1);
-  auto* enroll =
-      offer(command, options, Act::enroll, "enroll", "Give a robot a token and print it: it is shown only now");
+  auto* enroll = offer(command, options, RobotCommand::Act::enroll, "enroll",
+                       "Give a robot a token and print it: it is shown only now");
   enroll->add_option("robot_id", options.robot_id, "1 to 31 characters of [a-z0-9_-]")->required()->check(robot_id());
   enroll->add_flag("--json", options.json, "As JSON");
   enroll->footer("Example: rheonaut robot enroll rheo-1 --data lab");
-  offer(command, options, Act::list, "list", "List the robots that may or might connect")
+  offer(command, options, RobotCommand::Act::list, "list", "List the robots that may or might connect")
       ->add_flag("--json", options.json, "As JSON");
-  constexpr std::tuple<Act, const char*, const char*> kOfOne[] = {
-      {Act::revoke, "revoke", "Refuse a robot from now on, and end its connection"},
-      {Act::retire, "retire", "Leave a robot out of the stop of all robots while it is not connected"},
-      {Act::unretire, "unretire", "Put a retired robot back into use"}};
+  constexpr std::tuple<RobotCommand::Act, const char*, const char*> kOfOne[] = {
+      {RobotCommand::Act::revoke, "revoke", "Refuse a robot from now on, and end its connection"},
+      {RobotCommand::Act::retire, "retire", "Leave a robot out of the stop of all robots while it is not connected"},
+      {RobotCommand::Act::unretire, "unretire", "Put a retired robot back into use"}};
   for (const auto& [act, name, purpose] : kOfOne) {
     offer(command, options, act, name, purpose)
         ->add_option("robot_id", options.robot_id, "The robot")
@@ -92,17 +91,17 @@ void add_options(CLI::App& command, RobotCommand& options) {
 
 int run(const RobotCommand& options, std::ostream& out) {
   if (options.settings.of != RobotSettingsCommand::Of::nothing) return run(options.settings, out);
-  if (options.act == Act::enroll) return enroll(options, out);
+  if (options.act == RobotCommand::Act::enroll) return enroll(options, out);
   AccountAccess accounts{options.data_dir, AccountAccess::Missing::refuse};
-  if (options.act == Act::list) return list(accounts.enrolments(), options.json, out);
-  if (options.act == Act::revoke) {
+  if (options.act == RobotCommand::Act::list) return list(accounts.enrolments(), options.json, out);
+  if (options.act == RobotCommand::Act::revoke) {
     accounts.revoke_robot(options.robot_id);
   } else {
-    accounts.set_retired(options.robot_id, options.act == Act::retire);
+    accounts.set_retired(options.robot_id, options.act == RobotCommand::Act::retire);
   }
-  const char* done = options.act == Act::revoke   ? "revoked"
-                     : options.act == Act::retire ? "retired"
-                                                  : "put back into use";
+  const char* done = options.act == RobotCommand::Act::revoke   ? "revoked"
+                     : options.act == RobotCommand::Act::retire ? "retired"
+                                                                : "put back into use";
   fmt::print(out, "Robot {} was {}\n", options.robot_id, done);
   return 0;
 }

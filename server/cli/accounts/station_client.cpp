@@ -94,7 +94,8 @@ StationAnswer StationClient::ask(const std::string& method, const std::string& t
     socket.connect(endpoint_);
     return certificate_.empty() ? converse(socket, request) : converse_in_tls(socket, request, certificate_);
   } catch (const std::exception& error) {
-    throw std::runtime_error{fmt::format("the station on {} does not answer: {}", text(endpoint_), error.what())};
+    throw std::runtime_error{
+        fmt::format("the station on {} does not answer: {}", server::text(endpoint_), error.what())};
   }
 }
 

@@ -12,9 +12,8 @@
 namespace server::cli {
 namespace {
 
-using Act = TokenCommand::Act;
-
-CLI::App* offer(CLI::App& command, TokenCommand& options, Act act, const char* name, const char* purpose) {
+CLI::App* offer(CLI::App& command, TokenCommand& options, TokenCommand::Act act, const char* name,
+                const char* purpose) {
   CLI::App* sub = command.add_subcommand(name, purpose);
   sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
   sub->callback([&options, act] { options.act = act; });
@@ -55,7 +54,8 @@ int create(const TokenCommand& options, std::ostream& out) {
 
 void add_options(CLI::App& command, TokenCommand& options) {
   command.require_subcommand(1);
-  auto* create = offer(command, options, Act::create, "create", "Make a token and print it: it is shown only now");
+  auto* create =
+      offer(command, options, TokenCommand::Act::create, "create", "Make a token and print it: it is shown only now");
   create->add_option("name", options.name, "What it is called: 1 to 31 characters of [a-z0-9._-]")
       ->required()
       ->check(named());
@@ -64,8 +64,9 @@ void add_options(CLI::App& command, TokenCommand& options) {
   create->add_option("--days", options.days, "After so many it runs out (default: it does not)")->check(whole(1, 3650));
   create->add_flag("--json", options.json, "As JSON");
   create->footer("Example: rheonaut token create logger --scopes read,record --days 30 --data lab");
-  offer(command, options, Act::list, "list", "List the tokens")->add_flag("--json", options.json, "As JSON");
-  offer(command, options, Act::revoke, "revoke", "End a token at once")
+  offer(command, options, TokenCommand::Act::list, "list", "List the tokens")
+      ->add_flag("--json", options.json, "As JSON");
+  offer(command, options, TokenCommand::Act::revoke, "revoke", "End a token at once")
       ->add_option("name", options.name, "What it is called")
       ->required()
       ->check(named());
@@ -73,9 +74,9 @@ void add_options(CLI::App& command, TokenCommand& options) {
 }
 
 int run(const TokenCommand& options, std::ostream& out) {
-  if (options.act == Act::create) return create(options, out);
+  if (options.act == TokenCommand::Act::create) return create(options, out);
   AccountAccess accounts{options.data_dir, AccountAccess::Missing::refuse};
-  if (options.act == Act::list) return list(accounts.tokens(), options.json, out);
+  if (options.act == TokenCommand::Act::list) return list(accounts.tokens(), options.json, out);
   accounts.revoke_token(options.name);
   fmt::print(out, "Token {} was revoked\n", options.name);
   return 0;

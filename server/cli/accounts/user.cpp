@@ -12,9 +12,7 @@
 namespace server::cli {
 namespace {
 
-using Act = UserCommand::Act;
-
-CLI::App* offer(CLI::App& command, UserCommand& options, Act act, const char* name, const char* purpose) {
+CLI::App* offer(CLI::App& command, UserCommand& options, UserCommand::Act act, const char* name, const char* purpose) {
   CLI::App* sub = command.add_subcommand(name, purpose);
   sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
   sub->callback([&options, act] { options.act = act; });
@@ -44,39 +42,43 @@ int list(AccountAccess& accounts, const UserCommand& options, std::ostream& out)
 
 void add_options(CLI::App& command, UserCommand& options) {
   command.require_subcommand(1);
-  auto* add = offer(command, options, Act::add, "add", "Add a user; the password is asked for");
+  auto* add = offer(command, options, UserCommand::Act::add, "add", "Add a user; the password is asked for");
   add_name(add, options);
   add_word(*add, "--role", options.role, kRoles, "viewer (sees, stops), operator (commands) or admin")->required();
   add->footer("Example: rheonaut user add anna --role operator --data lab");
-  offer(command, options, Act::list, "list", "List the users")->add_flag("--json", options.json, "As JSON");
-  add_name(offer(command, options, Act::remove, "remove", "Remove a user, with sessions and tokens"), options);
-  add_name(offer(command, options, Act::password, "password", "Give a user a new password; ends their sessions"),
+  offer(command, options, UserCommand::Act::list, "list", "List the users")
+      ->add_flag("--json", options.json, "As JSON");
+  add_name(offer(command, options, UserCommand::Act::remove, "remove", "Remove a user, with sessions and tokens"),
            options);
-  auto* role = offer(command, options, Act::role, "role", "Give a user another role");
+  add_name(offer(command, options, UserCommand::Act::password, "password",
+                 "Give a user a new password; ends their sessions"),
+           options);
+  auto* role = offer(command, options, UserCommand::Act::role, "role", "Give a user another role");
   add_name(role, options);
   add_word(*role, "role", options.role, kRoles, "viewer, operator or admin")->required();
-  add_name(offer(command, options, Act::disable, "disable", "Keep a user out until enabled again"), options);
-  add_name(offer(command, options, Act::enable, "enable", "Let a disabled user in again"), options);
+  add_name(offer(command, options, UserCommand::Act::disable, "disable", "Keep a user out until enabled again"),
+           options);
+  add_name(offer(command, options, UserCommand::Act::enable, "enable", "Let a disabled user in again"), options);
   command.footer("Example: rheonaut user list --data lab");
 }
 
 int run(const UserCommand& options, std::ostream& out) {
-  const bool wants_password = options.act == Act::add || options.act == Act::password;
-  if (options.act == Act::add) {
+  const bool wants_password = options.act == UserCommand::Act::add || options.act == UserCommand::Act::password;
+  if (options.act == UserCommand::Act::add) {
     if (const auto named = check_name(options.name); !named) throw std::runtime_error{named.error().detail};
   }
   const std::string password = wants_password ? read_password(options.name) : "";
-  AccountAccess accounts{options.data_dir,
-                         options.act == Act::add ? AccountAccess::Missing::make : AccountAccess::Missing::refuse};
+  AccountAccess accounts{options.data_dir, options.act == UserCommand::Act::add ? AccountAccess::Missing::make
+                                                                                : AccountAccess::Missing::refuse};
   const char* done = "";
   switch (options.act) {
-    case Act::list: return list(accounts, options, out);
-    case Act::add: accounts.add_user(options.name, options.role, password), done = "was added"; break;
-    case Act::remove: accounts.remove_user(options.name), done = "was removed"; break;
-    case Act::password: accounts.set_password(options.name, password), done = "has a new password"; break;
-    case Act::role: accounts.set_role(options.name, options.role), done = "has a new role"; break;
-    case Act::disable: accounts.set_disabled(options.name, true), done = "is kept out"; break;
-    case Act::enable: accounts.set_disabled(options.name, false), done = "may sign in"; break;
+    case UserCommand::Act::list: return list(accounts, options, out);
+    case UserCommand::Act::add: accounts.add_user(options.name, options.role, password), done = "was added"; break;
+    case UserCommand::Act::remove: accounts.remove_user(options.name), done = "was removed"; break;
+    case UserCommand::Act::password: accounts.set_password(options.name, password), done = "has a new password"; break;
+    case UserCommand::Act::role: accounts.set_role(options.name, options.role), done = "has a new role"; break;
+    case UserCommand::Act::disable: accounts.set_disabled(options.name, true), done = "is kept out"; break;
+    case UserCommand::Act::enable: accounts.set_disabled(options.name, false), done = "may sign in"; break;
   }
   fmt::print(out, "User {} {}\n", options.name, done);
   return 0;

@@ -85,7 +85,7 @@ Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experime
   return measured;
 }
 
-OrderedJson json_of(const std::optional<EstimateError>& error) {
+OrderedJson estimate_error_json(const std::optional<EstimateError>& error) {
   if (!error) return nullptr;
   return {{"rms_m", error->rms_m},
           {"worst_m", error->worst_m},
@@ -93,7 +93,7 @@ OrderedJson json_of(const std::optional<EstimateError>& error) {
           {"samples", error->samples}};
 }
 
-OrderedJson json_of(const MeasuredStep& step) {
+OrderedJson measured_step_json(const MeasuredStep& step) {
   OrderedJson out = {{"cause", text(step.cause)},
                      {"span", step.span},
                      {"at_s", step.at_s},
@@ -102,8 +102,8 @@ OrderedJson json_of(const MeasuredStep& step) {
                      {"band_m", step.band_m},
                      {"position_source", position_source(step)},
                      {"position_sd_m", step.position_sd_m},
-                     {"estimate_error", json_of(step.estimate_error)}};
-  out.update(server::json_of(step.metrics));
+                     {"estimate_error", estimate_error_json(step.estimate_error)}};
+  out.update(json_of(step.metrics));
   return out;
 }
 
@@ -168,7 +168,7 @@ void add_world(CLI::App& command, control::ClosedLoopExperiment& e) {
 
 OrderedJson answer_of(const control::ClosedLoopExperiment& experiment, const control::DiscretisationChoice& controller,
                       const control::ClosedLoopPrediction& prediction, const Measured& measured) {
-  OrderedJson answer = server::json_of(prediction);
+  OrderedJson answer = json_of(prediction);
   answer["experiment"] = {
       {"setpoint_m", experiment.setpoint_m},       {"duration_s", experiment.duration_s},
       {"disturbance_m", experiment.disturbance_m}, {"disturbance_at_s", experiment.disturbance_at_s},
@@ -176,9 +176,9 @@ OrderedJson answer_of(const control::ClosedLoopExperiment& experiment, const con
   if (experiment.settling_band_m > 0) answer["experiment"]["settling_band_m"] = experiment.settling_band_m;
   answer["compared_with"] = measured.steps.empty() ? OrderedJson{} : OrderedJson(measured.position_source);
   answer["measured_steps"] = OrderedJson::array();
-  for (const MeasuredStep& step : measured.steps) answer["measured_steps"].push_back(json_of(step));
-  answer["plant"] = server::json_of(experiment.plant);
-  answer["sections"] = server::json_of(experiment.controller);
+  for (const MeasuredStep& step : measured.steps) answer["measured_steps"].push_back(measured_step_json(step));
+  answer["plant"] = json_of(experiment.plant);
+  answer["sections"] = json_of(experiment.controller);
   answer["period_s"] = experiment.period_s;
   answer["method"] = text(controller.chosen.options.method);
   return answer;
@@ -216,7 +216,7 @@ int run(const Predict& options, std::ostream& out) {
   } else if (options.form.is_json) {
     OrderedJson answer = answer_of(experiment, controller, prediction, measured);
     if (options.with_robustness) {
-      answer["robustness"] = server::json_of(control::robustness(experiment.plant, controller.chosen));
+      answer["robustness"] = json_of(control::robustness(experiment.plant, controller.chosen));
     }
     write_json(out, answer);
   } else {

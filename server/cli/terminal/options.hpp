@@ -27,14 +27,16 @@ CLI::Validator whole(long long low, long long high);
 CLI::Validator named();  // any text but the empty one, which an unset variable of the shell leaves
 
 // One of `values`, by the word that text() gives it.
-template <class T, class Target, std::size_t N>
-CLI::Option* add_word(CLI::App& command, const char* name, Target& target, std::array<T, N> values, const char* help) {
+template <class T, class Target, std::size_t count>
+CLI::Option* add_word(CLI::App& command, const char* name, Target& target, std::array<T, count> values,
+                      const char* help) {
   const auto find = [values](const std::string& word) {
     return std::ranges::find_if(values, [&word](T value) { return word == text(value); }) - values.begin();
   };
   const auto refuse = [values, find](std::string& word) -> std::string {
-    if (find(word) < static_cast<std::ptrdiff_t>(N)) return {};
+    if (find(word) < static_cast<std::ptrdiff_t>(count)) return {};
     std::vector<std::string> words;
+    words.reserve(values.size());
     for (const T value : values) words.emplace_back(text(value));
     return fmt::format("must be one of {}, is '{}'", fmt::join(words, ", "), word);
   };

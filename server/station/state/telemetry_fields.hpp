@@ -127,8 +127,8 @@ inline constexpr std::size_t kBatchFieldCount = std::tuple_size_v<decltype(kBatc
 // Calls visit(field) for each row, in the order of the table.
 template <class Visit>
 constexpr void for_each_sample_field(Visit&& visit) {
-  [&]<std::size_t... Index>(std::index_sequence<Index...>) {
-    (visit(kSampleFields[Index]), ...);
+  [&]<std::size_t... index>(std::index_sequence<index...>) {
+    (visit(kSampleFields[index]), ...);
   }(std::make_index_sequence<kSampleFieldCount>{});
 }
 template <class Visit>
@@ -136,10 +136,10 @@ constexpr void for_each_batch_field(Visit&& visit) {
   std::apply([&](const auto&... field) { (visit(field), ...); }, kBatchFields);
 }
 // Only for the rows of one kind.
-template <FieldKind Kind, class Visit>
+template <FieldKind kind, class Visit>
 constexpr void for_each_batch_field_of(Visit&& visit) {
   for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
-    if constexpr (BatchField<Value>::kKind == Kind) visit(field);
+    if constexpr (BatchField<Value>::kKind == kind) visit(field);
   });
 }
 

@@ -47,8 +47,6 @@ std::uint64_t BackupCopy::pages_done() const {
 
 namespace {
 
-constexpr int kPagesAtOnce = 4096;
-
 [[noreturn]] void fail_backup(const std::filesystem::path& from, const std::string& why) {
   throw std::runtime_error{fmt::format("no backup of '{}' was made: {}", from.string(), why)};
 }
@@ -62,7 +60,7 @@ void back_up_closed(const std::filesystem::path& from, const std::filesystem::pa
     {
       SQLite::Database source{from.string(), SQLite::OPEN_READONLY};
       BackupCopy copy{source, draft.path()};
-      while (!copy.step(kPagesAtOnce)) continue;
+      while (!copy.step(BackupCopy::kPagesAtOnce)) continue;
     }
     SQLite::Database copy{draft.path().string(), SQLite::OPEN_READWRITE};
     copy.exec("PRAGMA journal_mode = DELETE");

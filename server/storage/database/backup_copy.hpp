@@ -19,6 +19,8 @@ namespace server {
 
 class BackupCopy {
  public:
+  static constexpr int kPagesAtOnce = 4096;  // where nobody waits for the database meanwhile
+
   // Replaces the file `to`.
   BackupCopy(SQLite::Database& from, const std::filesystem::path& to);
 

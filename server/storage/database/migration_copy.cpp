@@ -16,7 +16,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kPagesAtOnce = 4096;
 constexpr double kMegabyte = 1e6;
 constexpr std::int64_t kAuditSince = 5;  // version
 
@@ -59,7 +58,7 @@ void copy_to(SQLite::Database& database, const fs::path& target) {
   const Draft draft{fs::path{target}.concat(".part")};
   {
     BackupCopy copy{database, draft.path()};
-    while (!copy.step(kPagesAtOnce)) continue;
+    while (!copy.step(BackupCopy::kPagesAtOnce)) continue;
   }
   {
     SQLite::Database copy{draft.path().string(), SQLite::OPEN_READWRITE};

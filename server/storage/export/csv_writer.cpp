@@ -15,7 +15,7 @@ using base::append_float;
 using base::append_number;
 namespace {
 
-constexpr std::size_t kPageSamples = 2'000;
+constexpr std::size_t kCsvPageSamples = 2'000;
 constexpr std::size_t kPieceBytes = 384 * 1024;  // of a grid, whose gaps may be long
 constexpr std::int64_t kSecondUs = 1'000'000;
 constexpr std::size_t kBeforeTimes = 4;  // so many fields of a batch stand before the times of receipt
@@ -66,7 +66,7 @@ std::optional<std::string> CsvWriter::next(SQLite::Database& database) {
   append_rows(out);
   if (out.size() >= kPieceBytes) return out;
   if (at_end_) return out.empty() ? std::nullopt : std::optional{std::move(out)};
-  SegmentPage page = read_segments(database, spans_, after_, kPageSamples, query_.channels);
+  SegmentPage page = read_segments(database, spans_, after_, kCsvPageSamples, query_.channels);
   after_ = page.next;
   at_end_ = !after_;
   grid_ ? grid_->give(std::move(page)) : segments_.give(std::move(page));

@@ -18,7 +18,7 @@
 namespace server {
 namespace {
 
-constexpr std::size_t kPageSamples = 10'000;
+constexpr std::size_t kMatPageSamples = 10'000;
 constexpr std::size_t kMaxGridRows = 50'000;  // at a time; a gap may be long
 constexpr std::uint64_t kMaxColumnBytes = (std::uint64_t{1} << 31) - 1024;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -116,7 +116,7 @@ Result<bool> MatWriter::advance(SQLite::Database& database) {
   }
   if (more_of_page) return true;
   if (at_end_) return copy_columns();
-  SegmentPage page = read_segments(database, spans_, after_, kPageSamples, query_.channels);
+  SegmentPage page = read_segments(database, spans_, after_, kMatPageSamples, query_.channels);
   after_ = page.next;
   at_end_ = !after_;
   grid_ ? grid_->give(std::move(page)) : segments_.give(std::move(page));

@@ -36,10 +36,10 @@ constexpr const char* kOtherColumns =
 )sql";
 constexpr int kOtherColumnCount = 3;
 
-template <FieldKind Kind>
+template <FieldKind kind>
 constexpr const char* sql_type() {
-  if (Kind == FieldKind::number) return "REAL";
-  return Kind == FieldKind::count ? "INTEGER NOT NULL" : "TEXT NOT NULL";
+  if (kind == FieldKind::number) return "REAL";
+  return kind == FieldKind::count ? "INTEGER NOT NULL" : "TEXT NOT NULL";
 }
 
 std::string create_sample() {

@@ -11,7 +11,7 @@ namespace server {
 namespace {
 
 constexpr std::size_t kSliceSamples = 20'000;
-constexpr std::size_t kSliceSegments = 5'000;
+constexpr std::size_t kSliceHeads = 5'000;
 constexpr std::uint64_t kSegmentSamples = 100;  // at most
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
@@ -66,7 +66,7 @@ std::vector<Extent> read_extents(SQLite::Database& database, const RecordedSpan&
                                  Channels channels) {
   const SQLite::Transaction moment{database};  // nothing is purged between a head and its rows
   std::vector<Extent> extents;
-  for (const SegmentHead& head : read_heads(database, span.boot_key, range, channels, kSliceSegments)) {
+  for (const SegmentHead& head : read_heads(database, span.boot_key, range, channels, kSliceHeads)) {
     if (head.first_seq >= range.first && head.next_seq <= range.next) {
       extents.push_back(extent_of(head));
       continue;
@@ -157,7 +157,7 @@ bool OverviewScan::advance_segments(SQLite::Database& database) {
   const RecordedSpan& span = spans_[span_];
   Interval range{next_seq_, span.samples.next};
   std::vector<Extent> extents = read_extents(database, span, range, query_.channels);
-  if (extents.size() == kSliceSegments) range.next = extents.back().samples.next;
+  if (extents.size() == kSliceHeads) range.next = extents.back().samples.next;
   add_waiting(span, range, extents);
   for (const Extent& extent : extents) add(first_place_[span_] + extent.samples.first - span.samples.first, extent);
   next_seq_ = range.next;

@@ -16,7 +16,7 @@ namespace asio = boost::asio;
 
 namespace {
 
-constexpr const char* kColumns =
+constexpr const char* kModelColumns =
     "fluid, set_at_us, set_by, gain_1_m_s, gain_2_m_s, gain_3_m_s, gain_4_m_s, time_constant_1_s, time_constant_2_s,"
     " time_constant_3_s, time_constant_4_s, fit_error, document";
 constexpr int kFirstGain = 3;  // in that order, as are the next
@@ -31,7 +31,7 @@ std::vector<Named> read_in_force(SQLite::Database& database) {
   SQLite::Statement rows{database, fmt::format("SELECT {} FROM fluid_model WHERE model_row IN"
                                                " (SELECT max(model_row) FROM fluid_model GROUP BY fluid)"
                                                " AND gain_1_m_s IS NOT NULL ORDER BY fluid",
-                                               kColumns)};
+                                               kModelColumns)};
   while (rows.executeStep()) {
     auto& [fluid, model] = models.emplace_back();
     fluid = rows.getColumn(0).getString();
@@ -52,7 +52,8 @@ std::vector<Named> read_in_force(SQLite::Database& database) {
 void append(SQLite::Database& database, const std::string& fluid, const FluidModel* model, const Author& by) {
   SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement add{
-      database, fmt::format("INSERT INTO fluid_model ({}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", kColumns)};
+      database,
+      fmt::format("INSERT INTO fluid_model ({}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", kModelColumns)};
   bind_all(add, fluid, by.at_us, by.actor);
   if (model != nullptr) {
     int index = kFirstGain;

@@ -16,9 +16,9 @@ namespace server {
 namespace {
 
 constexpr std::int64_t kSchemaSince = 7;
-constexpr std::size_t kMaxNotedBytes = 200;  // of a reason
+constexpr std::size_t kMaxNotedReasonBytes = 200;  // of a reason
 constexpr const char* kInUse = "completed_at_us IS NOT NULL AND removed_at_us IS NULL";
-constexpr const char* kColumns =
+constexpr const char* kReferenceColumns =
     "reference_id, run_id, span, source, sha256, clock_method, clock_offset_s, clock_sd_s, correlation, motion_ratio,"
     " zero_is_kept, zero_offset_m, zero_sd_m, samples, samples_left_out, actor, made_at_us";
 
@@ -94,7 +94,7 @@ std::optional<OutsideReference> find_reference(SQLite::Database& database, RunId
   SQLite::Statement query{database,
                           fmt::format("SELECT {} FROM outside_reference WHERE run_id = ?1 AND {} AND NOT EXISTS (SELECT"
                                       " 1 FROM run WHERE run.run_id = ?1 AND state = 'discarded')",
-                                      kColumns, kInUse)};
+                                      kReferenceColumns, kInUse)};
   bind_all(query, run);
   if (!query.executeStep()) return std::nullopt;
   return reference_from(query);
@@ -149,7 +149,7 @@ Result<std::int64_t> begin_reference(SQLite::Database& database, const OutsideRe
   if (const auto may = check_may_import(database, made.run, reason); !may) return std::unexpected{may.error()};
   SQLite::Statement add{database, fmt::format("INSERT INTO outside_reference ({}) VALUES"
                                               " (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                                              kColumns)};
+                                              kReferenceColumns)};
   execute(add, made.run, made.span, made.source, made.sha256, text(made.clock), made.clock_offset_s, made.clock_sd_s,
           made.correlation, made.motion_ratio, made.zero_is_kept ? 1U : 0U, made.zero_offset_m, made.zero_sd_m,
           made.samples, made.samples_left_out, made.actor, made.made_at_us);
@@ -171,7 +171,8 @@ void add_positions(SQLite::Database& database, std::int64_t reference, const Out
 Result<void> complete_reference(SQLite::Database& database, std::int64_t reference, const std::string& reason,
                                 const Author& by) {
   SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
-  SQLite::Statement query{database, fmt::format("SELECT {} FROM outside_reference WHERE reference_id = ?", kColumns)};
+  SQLite::Statement query{database,
+                          fmt::format("SELECT {} FROM outside_reference WHERE reference_id = ?", kReferenceColumns)};
   bind_all(query, reference);
   if (!query.executeStep()) return fail(ErrorCode::not_found, "the reference is not there any more");
   const OutsideReference made = reference_from(query);
@@ -186,7 +187,7 @@ Result<void> complete_reference(SQLite::Database& database, std::int64_t referen
   if (const auto before = find_reference(database, made.run)) {
     mark_removed(database, before->id, reason, by);
     detail["replaces"] = before->source;
-    detail["reason"] = reason.substr(0, kMaxNotedBytes);
+    detail["reason"] = reason.substr(0, kMaxNotedReasonBytes);
   }
   SQLite::Statement complete{database, "UPDATE outside_reference SET completed_at_us = ?2 WHERE reference_id = ?1"};
   execute(complete, reference, by.at_us);
@@ -202,7 +203,7 @@ Result<void> remove_reference(SQLite::Database& database, RunId run, const std::
   if (!found) return fail(ErrorCode::not_found, fmt::format("run {} has no reference", run), "no_reference");
   mark_removed(database, found->id, reason, by);
   note_in_audit(database, run, "run.reference_removed",
-                {{"source", found->source}, {"reason", reason.substr(0, kMaxNotedBytes)}}, by);
+                {{"source", found->source}, {"reason", reason.substr(0, kMaxNotedReasonBytes)}}, by);
   transaction.commit();
   return {};
 }

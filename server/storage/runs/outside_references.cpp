@@ -13,7 +13,7 @@ namespace asio = boost::asio;
 
 namespace {
 
-Error disk_fails() {
+Error reference_not_stored() {
   return {ErrorCode::unavailable, "the disk cannot be written now; the station's log says why. Try again", {}};
 }
 
@@ -24,7 +24,7 @@ auto on_writable_disk(Job job) {
     try {
       return job(database);
     } catch (const SQLite::Exception&) {
-      return std::unexpected{disk_fails()};
+      return std::unexpected{reference_not_stored()};
     }
   };
 }

@@ -12,7 +12,7 @@
 namespace server {
 namespace {
 
-constexpr std::size_t kMaxNotedBytes = 200;  // of a text that stands in run_note as a whole
+constexpr std::size_t kMaxDiscardReasonBytes = 200;  // of a text that stands in run_note as a whole
 constexpr std::array<const char*, 8> kTextColumns{"name",          "fluid",   "pump_profile", "tube",
                                                   "operator_name", "profile", "notes",        "verdict"};
 
@@ -92,7 +92,7 @@ Result<void> RunStore::discard(RunId id, const std::string& reason, const Author
   execute(mark, id);
   add_note(id, by, "state", text(*state), "discarded");
   add_note(id, by, "discard_reason", "", reason);
-  note_in_audit(id, robot_of(handle_, id), "run.discarded", {{"reason", reason.substr(0, kMaxNotedBytes)}}, by);
+  note_in_audit(id, robot_of(handle_, id), "run.discarded", {{"reason", reason.substr(0, kMaxDiscardReasonBytes)}}, by);
   transaction.commit();
   return {};
 }

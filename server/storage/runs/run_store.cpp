@@ -13,7 +13,7 @@
 namespace server {
 namespace {
 
-constexpr std::size_t kMaxNotedBytes = 200;  // of a verdict, which stands in the run as a whole
+constexpr std::size_t kMaxNotedVerdictBytes = 200;  // of a verdict, which stands in the run as a whole
 
 }  // namespace
 
@@ -61,7 +61,7 @@ void RunStore::end(RunId id, const std::string& verdict, const std::string& stat
       " WHERE run_id = ?1"};
   execute(mark, id, by.at_us, verdict);
   put_in_force(id, station_document, by.at_us);  // in the spans that reboots have begun
-  note_in_audit(id, robot_of(handle_, id), "run.ended", {{"verdict", verdict.substr(0, kMaxNotedBytes)}}, by);
+  note_in_audit(id, robot_of(handle_, id), "run.ended", {{"verdict", verdict.substr(0, kMaxNotedVerdictBytes)}}, by);
   transaction.commit();
 }
 

@@ -22,9 +22,9 @@ namespace {
 
 constexpr std::size_t kMaxNameBytes = 64;
 constexpr std::size_t kMaxRecords = 100;
-constexpr int kPagesAtOnce = 64;
+constexpr int kPagesBetweenClockReads = 64;
 constexpr int kMaxPagesAStep = 1024;
-constexpr microseconds kStepTime = 30ms;
+constexpr microseconds kCopyStepTime = 30ms;
 constexpr microseconds kPause = 20ms;  // at least, between two steps: for the commits
 constexpr const char* kSuffix = ".sqlite";
 
@@ -50,9 +50,9 @@ CopyStep make_step(std::unique_ptr<BackupCopy>& copy, const Clock& clock) {
   CopyStep step;
   const std::int64_t begun_us = clock.steady_us();
   try {
-    for (int pages = 0; pages < kMaxPagesAStep && !step.complete; pages += kPagesAtOnce) {
-      step.complete = copy->step(kPagesAtOnce);
-      if (clock.steady_us() - begun_us >= kStepTime.count()) break;
+    for (int pages = 0; pages < kMaxPagesAStep && !step.complete; pages += kPagesBetweenClockReads) {
+      step.complete = copy->step(kPagesBetweenClockReads);
+      if (clock.steady_us() - begun_us >= kCopyStepTime.count()) break;
     }
     step.pages_done = copy->pages_done();
     step.pages_total = copy->pages_total();
@@ -170,6 +170,7 @@ asio::awaitable<std::vector<BackupRecord>> Backups::list() {
     if (!was_removed) found[record.name] = record;
   }
   std::vector<BackupRecord> all;
+  all.reserve(found.size());
   for (auto& [name, record] : found) all.push_back(std::move(record));
   co_return all;
 }

@@ -22,8 +22,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kPagesAtOnce = 4096;
-
 [[noreturn]] void refuse(const fs::path& from, const std::string& why) {
   throw std::runtime_error{fmt::format("cannot restore from '{}': {}; nothing was restored", from.string(), why)};
 }
@@ -42,7 +40,7 @@ void check(const fs::path& from, const fs::path& to) {
 void copy_database(const fs::path& from, const fs::path& to) {
   SQLite::Database source{from.string(), SQLite::OPEN_READONLY};
   BackupCopy copy{source, to};
-  while (!copy.step(kPagesAtOnce)) continue;
+  while (!copy.step(BackupCopy::kPagesAtOnce)) continue;
 }
 
 RestoredStore mark(Database& database, const fs::path& from, const Author& by) {

@@ -6,7 +6,7 @@
 namespace server {
 namespace {
 
-using seconds = std::chrono::seconds;
+using std::chrono::seconds;
 
 TEST(Secrets, AreComparedToTheirLastByteWhereverTheyDiffer) {
   const SecretHash hash = hash_of("a secret");

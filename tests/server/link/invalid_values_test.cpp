@@ -26,7 +26,7 @@ class InvalidValuesTest : public LinkTest {
   InvalidValuesTest() { station.add_sink(unusable); }
 
   static protocol::RobotFrame samples(std::uint64_t first_seq, auto change) {
-    protocol::RobotFrame frame = test::samples_frame(first_seq, 5, 6'000'000, 0);
+    protocol::RobotFrame frame = TestRobot::samples_frame(first_seq, 5, 6'000'000, 0);
     change(frame);
     return frame;
   }
@@ -45,7 +45,6 @@ class InvalidValuesTest : public LinkTest {
     return found;
   }
 
-  using test = TestRobot;
   UnusableSink unusable;
 };
 
