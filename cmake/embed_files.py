@@ -3,7 +3,7 @@
 
 Usage: embed_files.py FUNCTION OUT_S OUT_CPP NAME=FILE...
 
-FUNCTION (with its namespace: server::migration_files) returns the files as std::span<const base::EmbeddedFile>, in the
+FUNCTION (with its namespace: server::storage::migration_files) returns the files as std::span<const base::EmbeddedFile>, in the
 order of the arguments. NAME=FOLDER/ embeds every file in a folder and those below it, sorted, each under NAME and its
 path in the folder; a folder that does not exist has no files.
 """
@@ -35,7 +35,7 @@ def main():
     for number, (key, file) in enumerate(files):
         content = file.read_bytes()
         digest = hashlib.sha256(content).hexdigest()[:32]  # in the assembler, too: its text changes with the content
-        symbol = f"embedded_{namespace}_{name}_{number}"
+        symbol = f"embedded_{namespace.replace('::', '_')}_{name}_{number}"
         assembler += [f"// {digest}", f".global {symbol}", f"{symbol}:", f".incbin {quoted(file.resolve().as_posix())}",
                       ".byte 0"]
         symbols.append(f"extern const char {symbol}[];")

@@ -20,38 +20,38 @@
 
 using namespace server;  // NOLINT: this file is the station, seen from outside
 
-static int serve(const Config& config) {
-  start_log(config.log_level);
-  DataFolder folder{config.data_dir};
+static int serve(const config::Config& config) {
+  runtime::start_log(config.log_level);
+  config::DataFolder folder{config.data_dir};
   // The ground everything stands on; declared first, destroyed last.
   boost::asio::io_context loop{1};  // all sockets, all live state
-  SystemClock clock{loop};
-  WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
-  WorkerThread readers{"readers", 10}, exports{"exports", 10}, maths{"maths", 10};
-  TaskGroup tasks{loop};
-  TransportSecurity security{clock, config};  // of both ports
+  runtime::SystemClock clock{loop};
+  runtime::WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
+  runtime::WorkerThread readers{"readers", 10}, exports{"exports", 10}, maths{"maths", 10};
+  runtime::TaskGroup tasks{loop};
+  net::TransportSecurity security{clock, config};  // of both ports
   // Centre: the only owner of live state, and the only way in for commands.
-  Station station{loop, clock, config.envelope, config.link};
+  station::Station station{loop, clock, config.envelope, config.link};
 
   // Out: they get the station's reports and never call it back; only what is durable comes back, through one function.
-  const RecorderOptions recorder_options{config.database(), config.enrolment};
-  RecordingParts recording{loop, clock, disk, readers, exports, checkpoints, recorder_options, config.recording};
-  LiveFeed live{clock};
+  const storage::RecorderOptions recorder{config.database(), config.enrolment};
+  storage::RecordingParts recording{loop, clock, disk, readers, exports, checkpoints, recorder, config.recording};
+  live::LiveFeed live{clock};
   recording.connect(station);
   recording.runs.set_station_document(station_document(config));
   station.add_sink(live);
-  const RestoredState restored = run_first(loop, recording.open());
+  const storage::RestoredState restored = runtime::run_first(loop, recording.open());
   station.restore(restored.robots, restored.pending_stops);
   // In: robots arrive here; each session becomes the station's RobotPort. Robots are sent the model of their fluid.
-  const auto robot_port = parse_endpoint(config.robots);
-  RobotListener robots{
-      loop, clock, tasks, station, recording.recorder, robot_port, config.robots_or_any_port, security.robots()};
-  ModelSender models{loop, tasks, clock, station, recording.fluid_models.in_force()};
+  const auto at = config::parse_endpoint(config.robots);
+  link::RobotListener robots{
+      loop, clock, tasks, station, recording.recorder, at, config.robots_or_any_port, security.robots()};
+  station::ModelSender models{loop, tasks, clock, station, recording.fluid_models.in_force()};
 
   // People and scripts.
-  AnalysisService analysis{recording.history, maths};
-  const ApiOptions options = api_options(config, restored.store_id, text(robots.endpoint()), security);
-  ApiServer api{loop, tasks, clock, options, station, live, recording, analysis};
+  analysis::AnalysisService analysis{recording.history, maths};
+  const auto options = api::api_options(config, restored.store_id, config::text(robots.endpoint()), security);
+  api::ApiServer api{loop, tasks, clock, options, station, live, recording, analysis};
   if (config.real_time) tasks.spawn("priorities", ask_for_real_time(disk));
   recording.spawn(tasks);
   tasks.spawn("control", station.watch_control());
@@ -75,6 +75,6 @@ int main(int argc, char** argv) try {
   if (const auto exit_code = cli::answer(line, std::cout)) return *exit_code;
   return serve(load_config(std::get<cli::Serve>(line).flags));
 } catch (const std::exception& error) {
-  fmt::print(stderr, "rheonaut: {}\n", server::cli::one_line(error.what()));
+  fmt::print(stderr, "rheonaut: {}\n", cli::one_line(error.what()));
   return EXIT_FAILURE;
 }

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-namespace server {
+namespace server::analysis {
 namespace asio = boost::asio;
 
 namespace {
@@ -14,9 +14,10 @@ constexpr std::size_t kPositionsPage = 10'000;
 }  // namespace
 
 template <class Point>
-asio::awaitable<Result<std::vector<Point>>> AnalysisService::gather(RunId run, Point (*of)(const StoredSample&)) {
+asio::awaitable<Result<std::vector<Point>>> AnalysisService::gather(storage::RunId run,
+                                                                    Point (*of)(const storage::StoredSample&)) {
   std::vector<Point> points;
-  std::optional<SampleCursor> after;
+  std::optional<storage::SampleCursor> after;
   do {
     const auto page = co_await history_.samples(run, after, kPage);
     if (!page) co_return std::unexpected{page.error()};
@@ -24,34 +25,34 @@ asio::awaitable<Result<std::vector<Point>>> AnalysisService::gather(RunId run, P
       co_return fail(ErrorCode::invalid, fmt::format("the run has more than {} samples", kMaxAnalysedSamples),
                      "run_too_long");
     }
-    for (const StoredSample& sample : page->samples) points.push_back(of(sample));
+    for (const storage::StoredSample& sample : page->samples) points.push_back(of(sample));
     after = page->next;
   } while (after);
   co_return points;
 }
 
-asio::awaitable<Result<std::optional<StoredReference>>> AnalysisService::reference_of(RunId run) {
-  auto find = [run](SQLite::Database& database) { return find_reference(database, run); };
+asio::awaitable<Result<std::optional<storage::StoredReference>>> AnalysisService::reference_of(storage::RunId run) {
+  auto find = [run](SQLite::Database& database) { return storage::find_reference(database, run); };
   auto found = co_await history_.reader().ask(std::move(find));
-  if (!found) co_return std::optional<StoredReference>{};
-  StoredReference stored{std::move(*found), {}};
-  OutsidePositions& all = stored.positions;
+  if (!found) co_return std::optional<storage::StoredReference>{};
+  storage::StoredReference stored{std::move(*found), {}};
+  storage::OutsidePositions& all = stored.positions;
   for (std::size_t read = kPositionsPage; read == kPositionsPage;) {
     const auto after_us = all.size() == 0 ? std::nullopt : std::optional{all.robot_time_us.back()};
     auto ask = [id = stored.reference.id, after_us](SQLite::Database& database) {
-      return read_positions(database, id, after_us, kPositionsPage);
+      return storage::read_positions(database, id, after_us, kPositionsPage);
     };
-    const OutsidePositions page = co_await history_.reader().ask(std::move(ask));
+    const storage::OutsidePositions page = co_await history_.reader().ask(std::move(ask));
     read = page.size();
     all.robot_time_us.insert(all.robot_time_us.end(), page.robot_time_us.begin(), page.robot_time_us.end());
     all.position_m.insert(all.position_m.end(), page.position_m.begin(), page.position_m.end());
     all.position_sd_m.insert(all.position_sd_m.end(), page.position_sd_m.begin(), page.position_sd_m.end());
   }
-  if (all.size() != stored.reference.samples) co_return std::unexpected{changed_while_read(run)};
+  if (all.size() != stored.reference.samples) co_return std::unexpected{storage::changed_while_read(run)};
   co_return stored;
 }
 
-asio::awaitable<Result<RunMeasures>> AnalysisService::measures(RunId run) {
+asio::awaitable<Result<RunMeasures>> AnalysisService::measures(storage::RunId run) {
   auto gathered = co_await gather(run, step_point);
   if (!gathered) co_return std::unexpected{gathered.error()};
   auto found = co_await reference_of(run);
@@ -68,11 +69,11 @@ asio::awaitable<Result<RunMeasures>> AnalysisService::measures(RunId run) {
   co_return co_await maths_.run(std::move(job));
 }
 
-asio::awaitable<Result<PlacedReference>> AnalysisService::place(RunId run, ReferenceRequest request,
-                                                                std::optional<MarkerPlace> marker) {
+asio::awaitable<Result<PlacedReference>> AnalysisService::place(storage::RunId run, ReferenceRequest request,
+                                                                std::optional<storage::MarkerPlace> marker) {
   auto gathered = co_await gather(run, own_position);
   if (!gathered) co_return std::unexpected{gathered.error()};
-  auto find = [run](SQLite::Database& database) { return find_zeroings(database, run); };
+  auto find = [run](SQLite::Database& database) { return storage::find_zeroings(database, run); };
   auto zeroings = co_await history_.reader().ask(std::move(find));
   auto job = [own = std::move(*gathered), zeroings = std::move(zeroings), request = std::move(request), marker] {
     return place_reference(request, own, zeroings, marker);
@@ -80,4 +81,4 @@ asio::awaitable<Result<PlacedReference>> AnalysisService::place(RunId run, Refer
   co_return co_await maths_.run(std::move(job));
 }
 
-}  // namespace server
+}  // namespace server::analysis

@@ -12,7 +12,7 @@
 #include "control/models/modal_form.hpp"
 #include "server/analysis/optional_json.hpp"
 
-namespace server {
+namespace server::analysis {
 
 using nlohmann::json;
 
@@ -276,4 +276,4 @@ OrderedJson poles_json(const control::FractionalModel& model) {
   return out;
 }
 
-}  // namespace server
+}  // namespace server::analysis

@@ -19,7 +19,7 @@
 #include "control/tuning/tune.hpp"
 #include "server/runtime/result.hpp"
 
-namespace server {
+namespace server::analysis {
 
 using OrderedJson = nlohmann::ordered_json;  // keys in the order in which a person reads them
 
@@ -54,4 +54,4 @@ OrderedJson json_of(const control::RobustnessTable& table);
 // ln p of the poles as 1/s, upper half plane first; real poles of integer orders too.
 OrderedJson poles_json(const control::FractionalModel& model);
 
-}  // namespace server
+}  // namespace server::analysis

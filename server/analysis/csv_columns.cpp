@@ -9,7 +9,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace server {
+namespace server::analysis {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
@@ -164,4 +164,4 @@ CsvColumns parse_csv(std::string_view text, const std::string& source, std::init
   return reader.end();
 }
 
-}  // namespace server
+}  // namespace server::analysis

@@ -16,7 +16,7 @@
 #include <string_view>
 #include <vector>
 
-namespace server {
+namespace server::analysis {
 
 inline constexpr std::size_t kMaxCsvRows = 2'000'000;
 
@@ -29,4 +29,4 @@ CsvColumns parse_csv(std::string_view text, const std::string& source, std::init
                      std::initializer_list<const char*> optional = {},
                      std::initializer_list<const char*> with_gaps = {});
 
-}  // namespace server
+}  // namespace server::analysis

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-namespace server {
+namespace server::analysis {
 namespace {
 
 constexpr std::size_t kSamples = 12;
@@ -110,4 +110,4 @@ std::optional<std::string> motion_at_start(const control::Recording& recording,
       speed.value);
 }
 
-}  // namespace server
+}  // namespace server::analysis

@@ -7,7 +7,7 @@
 
 #include "control/identification/identify.hpp"
 
-namespace server {
+namespace server::analysis {
 
 // A warning for the reader of the fit: the speed of the first samples, and what to do. None when the recording may well
 // begin at rest, also under a duty that sets in with its first sample. An acceleration alone does not show it: there
@@ -15,4 +15,4 @@ namespace server {
 std::optional<std::string> motion_at_start(const control::Recording& recording,
                                            std::span<const double> recorded_velocity_m_s = {});
 
-}  // namespace server
+}  // namespace server::analysis

@@ -12,7 +12,7 @@
 #include "server/analysis/csv_columns.hpp"
 #include "server/analysis/reference_unit.hpp"
 
-namespace server {
+namespace server::analysis {
 namespace {
 
 constexpr std::size_t kFewestPositionsToImport = 10;
@@ -119,7 +119,7 @@ Error zeroed_at(double at_s) {
           "zeroed"};
 }
 
-Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::span<const Zeroing> zeroings,
+Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::span<const storage::Zeroing> zeroings,
                              std::optional<std::uint32_t> wanted) {
   if (own.empty()) return fail(ErrorCode::invalid, "the run has no samples");
   if (!wanted && own.front().span != own.back().span) {
@@ -153,7 +153,7 @@ Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::span<const Z
     record.sd_m.push_back(static_cast<double>(sample.position_sd_m));
   }
   if (!has_begun) return fail(ErrorCode::invalid, fmt::format("the run has no samples in span {}", record.span));
-  for (const Zeroing& zeroing : zeroings) {
+  for (const storage::Zeroing& zeroing : zeroings) {
     const bool is_within = zeroing.robot_time_us > record.first_us && zeroing.robot_time_us <= record.last_us;
     if (zeroing.span == record.span && is_within) {
       return std::unexpected{zeroed_at(record.seconds(zeroing.robot_time_us))};
@@ -169,13 +169,13 @@ Result<OwnRecord> own_record(std::span<const OwnPosition> own, std::span<const Z
 }
 
 Result<void> find_clock(const ReferenceRequest& request, const Given& given, const OwnRecord& own,
-                        std::optional<MarkerPlace> marker, OutsideReference& into) {
+                        std::optional<storage::MarkerPlace> marker, storage::OutsideReference& into) {
   const ReferenceClockRequest& asked = request.clock;
   into.clock = asked.method;
   into.clock_sd_s = asked.sd_s;
   switch (asked.method) {
-    case ReferenceClock::offset: into.clock_offset_s = asked.offset_s; return {};
-    case ReferenceClock::utc: {
+    case storage::ReferenceClock::offset: into.clock_offset_s = asked.offset_s; return {};
+    case storage::ReferenceClock::utc: {
       if (!own.utc_offset_us) {
         return fail(ErrorCode::invalid,
                     "the station had no estimate of the robot's clock in this span, so UTC does not "
@@ -189,13 +189,13 @@ Result<void> find_clock(const ReferenceRequest& request, const Given& given, con
       into.clock_sd_s = std::hypot(asked.sd_s.value_or(0), half_width_s / std::sqrt(3.0), drift_s / std::sqrt(3.0));
       return {};
     }
-    case ReferenceClock::marker:
+    case storage::ReferenceClock::marker:
       if (!marker || marker->span != own.span) {
         return fail(ErrorCode::invalid, fmt::format("the marker does not stand in span {}", own.span));
       }
       into.clock_offset_s = own.seconds(marker->robot_time_us) - asked.at_s;
       return {};
-    case ReferenceClock::correlation: break;
+    case storage::ReferenceClock::correlation: break;
   }
   const control::ClockAlignment found =
       control::align_clocks({given.time_s, given.position_m}, {own.time_s, own.position_m}, asked.search);
@@ -263,7 +263,7 @@ Result<void> check_unit(const Given& inside, const OwnRecord& own) {
 }
 
 // The mean of own less outside position, weighed by how sure the robot is; none where the two have no time in common.
-Result<void> find_zero(const Given& inside, const OwnRecord& own, OutsideReference& into) {
+Result<void> find_zero(const Given& inside, const OwnRecord& own, storage::OutsideReference& into) {
   double sum_m = 0, weights = 0, surest_m = std::numeric_limits<double>::infinity(), outside_variance_m2 = 0;
   std::size_t used = 0;
   for (std::size_t row = 0; row < inside.time_s.size(); ++row) {
@@ -302,17 +302,18 @@ std::string plus_minus(std::optional<double> sd, double scale, const char* unit)
 
 }  // namespace
 
-OwnPosition own_position(const StoredSample& stored) {
+OwnPosition own_position(const storage::StoredSample& stored) {
   return {stored.span,
           stored.robot_time_us,
           stored.utc_us,
           stored.clock_uncertainty_us,
-          stored.sample.position_m - or_nan(stored.disturbance_m),
-          or_nan(stored.position_sd_m)};
+          stored.sample.position_m - station::or_nan(stored.disturbance_m),
+          station::or_nan(stored.position_sd_m)};
 }
 
 Result<PlacedReference> place_reference(const ReferenceRequest& request, std::span<const OwnPosition> samples,
-                                        std::span<const Zeroing> zeroings, std::optional<MarkerPlace> marker) {
+                                        std::span<const storage::Zeroing> zeroings,
+                                        std::optional<storage::MarkerPlace> marker) {
   const auto given = read_given(request);
   if (!given) return std::unexpected{given.error()};
   const auto own = own_record(samples, zeroings,
@@ -321,7 +322,7 @@ Result<PlacedReference> place_reference(const ReferenceRequest& request, std::sp
                                            : std::nullopt);
   if (!own) return std::unexpected{own.error()};
   PlacedReference placed;
-  OutsideReference& made = placed.reference;
+  storage::OutsideReference& made = placed.reference;
   made.span = own->span;
   made.source = request.source;
   made.sha256 = sha256_of(request.csv);
@@ -347,7 +348,7 @@ Result<PlacedReference> place_reference(const ReferenceRequest& request, std::sp
   }
   for (std::size_t row = 0; row < inside.time_s.size(); ++row) {
     const std::uint64_t at_us = own->first_us + static_cast<std::uint64_t>(std::llround(1e6 * inside.time_s[row]));
-    OutsidePositions& positions = placed.positions;
+    storage::OutsidePositions& positions = placed.positions;
     if (positions.size() > 0 && positions.robot_time_us.back() >= at_us) {
       return fail(ErrorCode::invalid, "two rows lie less than a microsecond apart", "malformed_csv");
     }
@@ -360,7 +361,7 @@ Result<PlacedReference> place_reference(const ReferenceRequest& request, std::sp
   return placed;
 }
 
-std::string clock_in_words(const OutsideReference& reference) {
+std::string clock_in_words(const storage::OutsideReference& reference) {
   std::string how = fmt::format("clock by {}", text(reference.clock));
   if (reference.correlation) {
     how += fmt::format(" with the robot's own motion ({:.4f}; it moves {:.3f} times what that says)",
@@ -370,10 +371,10 @@ std::string clock_in_words(const OutsideReference& reference) {
                      reference.clock_offset_s, plus_minus(reference.clock_sd_s, 1e3, "ms"), reference.span);
 }
 
-std::string zero_in_words(const OutsideReference& reference) {
+std::string zero_in_words(const storage::OutsideReference& reference) {
   if (reference.zero_is_kept) return "zero kept as it was given";
   return fmt::format("zero by the robot's own record: {:.4f} m{} were added to each position", reference.zero_offset_m,
                      plus_minus(reference.zero_sd_m, 1e3, "mm"));
 }
 
-}  // namespace server
+}  // namespace server::analysis

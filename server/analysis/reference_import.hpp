@@ -19,13 +19,13 @@
 #include "server/storage/runs/outside_reference.hpp"
 #include "server/storage/samples/stored_sample.hpp"
 
-namespace server {
+namespace server::analysis {
 
 inline constexpr std::size_t kMaxReferenceRows = 1'000'000;
 inline constexpr std::size_t kMaxReferenceBytes = 16 * 1024 * 1024;  // of a request
 
 struct ReferenceClockRequest {
-  ReferenceClock method = ReferenceClock::correlation;
+  storage::ReferenceClock method = storage::ReferenceClock::correlation;
   double offset_s = 0;          // offset: time in the text, plus this = seconds since the first sample of the span
   std::int64_t zero_at_us = 0;  // utc: of t_s = 0
   std::optional<std::int64_t> marker_id;  // marker: this one or, without it, the only one with the text
@@ -55,21 +55,22 @@ struct OwnPosition {
   float position_m = 0;     // where the robot believes it is: without the disturbance
   float position_sd_m = 0;  // 0: it knows
 };
-OwnPosition own_position(const StoredSample& stored);
+OwnPosition own_position(const storage::StoredSample& stored);
 
 struct PlacedReference {
-  OutsideReference reference;  // without run, author and time
-  OutsidePositions positions;
+  storage::OutsideReference reference;  // without run, author and time
+  storage::OutsidePositions positions;
 };
 
 // `marker` belongs to the method of that name; `zeroings` are those of the run's boots. invalid: what cannot be used,
 // with the line of the text, or why the clock cannot be found and what to do, or that positions over 2 m are not in
 // metres by the robot's own record.
 Result<PlacedReference> place_reference(const ReferenceRequest& request, std::span<const OwnPosition> own,
-                                        std::span<const Zeroing> zeroings, std::optional<MarkerPlace> marker);
+                                        std::span<const storage::Zeroing> zeroings,
+                                        std::optional<storage::MarkerPlace> marker);
 
 // What was done, in words: "clock by correlation (0.998) with the robot's own motion: ...".
-std::string clock_in_words(const OutsideReference& reference);
-std::string zero_in_words(const OutsideReference& reference);
+std::string clock_in_words(const storage::OutsideReference& reference);
+std::string zero_in_words(const storage::OutsideReference& reference);
 
-}  // namespace server
+}  // namespace server::analysis

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace server {
+namespace server::analysis {
 namespace {
 
 constexpr double kMostSpanRatio = 30, kSuspiciousSpanM = 2, kLeastOwnSpanM = 0.001;
@@ -58,4 +58,4 @@ Result<void> check_metres(const std::vector<double>& time_s, std::vector<double>
               "out_of_range");
 }
 
-}  // namespace server
+}  // namespace server::analysis

@@ -10,7 +10,7 @@
 
 #include "server/runtime/result.hpp"
 
-namespace server {
+namespace server::analysis {
 
 // What to do about positions that move so many times what the robot's own record does.
 std::string unit_advice(double ratio);
@@ -18,4 +18,4 @@ std::string unit_advice(double ratio);
 // Both motions at the same, ascending times.
 Result<void> check_metres(const std::vector<double>& time_s, std::vector<double> outside_m, std::vector<double> own_m);
 
-}  // namespace server
+}  // namespace server::analysis

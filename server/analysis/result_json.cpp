@@ -2,7 +2,7 @@
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/optional_json.hpp"
 
-namespace server {
+namespace server::analysis {
 namespace {
 
 using Sigmas = std::array<std::optional<double>, control::kParameters>;
@@ -181,4 +181,4 @@ OrderedJson json_of(const control::RobustnessTable& table) {
   return out;
 }
 
-}  // namespace server
+}  // namespace server::analysis

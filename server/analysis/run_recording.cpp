@@ -10,7 +10,7 @@
 #include "control/sensor/position_weight.hpp"
 #include "server/analysis/motion_at_start.hpp"
 
-namespace server {
+namespace server::analysis {
 namespace {
 
 constexpr std::size_t kFewestSamples = 10;
@@ -20,15 +20,15 @@ constexpr std::size_t kFewestPositionsToFit = 20;  // from outside
 
 struct Piece {
   std::uint64_t span_began_us = 0;
-  std::vector<StoredSample> samples;
+  std::vector<storage::StoredSample> samples;
   std::optional<double> driven_at_s;  // the last duty before them, if it is not long ago
 
-  double seconds(const StoredSample& stored) const {
+  double seconds(const storage::StoredSample& stored) const {
     return static_cast<double>(stored.robot_time_us - span_began_us) / 1e6;
   }
 };
 
-Result<Piece> select(std::span<const StoredSample> samples, const RunWindow& window) {
+Result<Piece> select(std::span<const storage::StoredSample> samples, const RunWindow& window) {
   if (samples.empty()) return fail(ErrorCode::invalid, "the run has no samples");
   if (!window.span && samples.front().span != samples.back().span) {
     return fail(ErrorCode::invalid,
@@ -38,7 +38,7 @@ Result<Piece> select(std::span<const StoredSample> samples, const RunWindow& win
   const std::uint32_t span = window.span.value_or(samples.front().span);
   Piece piece;
   bool has_begun = false;
-  for (const StoredSample& stored : samples) {
+  for (const storage::StoredSample& stored : samples) {
     if (stored.span != span) continue;
     if (!has_begun) piece.span_began_us = stored.robot_time_us;
     has_begun = true;
@@ -60,7 +60,7 @@ Result<Piece> select(std::span<const StoredSample> samples, const RunWindow& win
 double usual_step_s(const Piece& piece) {
   std::vector<double> steps_s;
   for (std::size_t i = 1; i < piece.samples.size(); ++i) {
-    const StoredSample &before = piece.samples[i - 1], &after = piece.samples[i];
+    const storage::StoredSample &before = piece.samples[i - 1], &after = piece.samples[i];
     if (after.seq == before.seq + 1) steps_s.push_back(piece.seconds(after) - piece.seconds(before));
   }
   if (steps_s.empty()) return 0;
@@ -71,8 +71,8 @@ double usual_step_s(const Piece& piece) {
 
 // What is wrong between two neighbours, if anything. Stored times are right to 100 us, so equal spacing is asked for
 // within a tenth.
-std::optional<std::string> gap_between(const Piece& piece, const StoredSample& before, const StoredSample& after,
-                                       double dt_s) {
+std::optional<std::string> gap_between(const Piece& piece, const storage::StoredSample& before,
+                                       const storage::StoredSample& after, double dt_s) {
   const double at_s = piece.seconds(before), step_s = piece.seconds(after) - at_s;
   if (after.seq != before.seq + 1) {
     return fmt::format("a gap of {:.3f} s at {:.3f} s ({} samples after seq {} are not there)", step_s, at_s,
@@ -87,7 +87,7 @@ std::optional<std::string> gap_between(const Piece& piece, const StoredSample& b
 
 double largest_position_sd_m(const Piece& piece) {
   double largest_m = 0;
-  for (const StoredSample& stored : piece.samples) {
+  for (const storage::StoredSample& stored : piece.samples) {
     largest_m = std::max(largest_m, static_cast<double>(stored.position_sd_m.value_or(0)));
   }
   return largest_m;
@@ -96,9 +96,9 @@ double largest_position_sd_m(const Piece& piece) {
 // Where the motion of the piece is had from.
 enum class Motion : std::uint8_t { outside, acceleration, position };
 
-std::optional<std::string> missing_in(const Piece& piece, const StoredSample& stored, const RunWindow& window,
+std::optional<std::string> missing_in(const Piece& piece, const storage::StoredSample& stored, const RunWindow& window,
                                       Motion motion) {
-  const Sample& sample = stored.sample;
+  const station::Sample& sample = stored.sample;
   if (motion == Motion::outside) {
     if (std::isfinite(sample.duty)) return std::nullopt;
     return fmt::format("sample seq {} at {:.3f} s lacks its duty", stored.seq, piece.seconds(stored));
@@ -120,7 +120,7 @@ class Cut {
  public:
   Cut(const Piece& piece, const RunWindow& window, double dt_s, Motion motion) {
     for (std::size_t i = 0; i < piece.samples.size(); ++i) {
-      const StoredSample& stored = piece.samples[i];
+      const storage::StoredSample& stored = piece.samples[i];
       if (i > 0) {
         if (const auto gap = gap_between(piece, piece.samples[i - 1], stored, dt_s)) end_part(i, i, *gap);
       }
@@ -172,8 +172,8 @@ struct OutsidePart {
   std::vector<double> time_s, position_m, sd_m;
 
   bool is_enough() const { return time_s.size() >= kFewestPositionsToFit; }
-  std::string in_words(const StoredReference& from) const {
-    const OutsideReference& reference = from.reference;
+  std::string in_words(const storage::StoredReference& from) const {
+    const storage::OutsideReference& reference = from.reference;
     const double rate_hz = static_cast<double>(time_s.size() - 1) / (time_s.back() - time_s.front());
     const std::string clock_sd =
         reference.clock_sd_s ? fmt::format(" ± {:.2g} ms", 2e3 * *reference.clock_sd_s) : std::string{};
@@ -189,7 +189,7 @@ struct OutsidePart {
   }
 };
 
-OutsidePart outside_part(const Piece& piece, const StoredReference& stored) {
+OutsidePart outside_part(const Piece& piece, const storage::StoredReference& stored) {
   OutsidePart part;
   if (stored.reference.span != piece.samples.front().span) return part;
   const std::uint64_t first_us = piece.samples.front().robot_time_us, last_us = piece.samples.back().robot_time_us;
@@ -227,16 +227,16 @@ std::optional<std::string> driven_before(const Piece& piece) {
 
 }  // namespace
 
-StepPoint step_point(const StoredSample& stored) {
+StepPoint step_point(const storage::StoredSample& stored) {
   StepPoint point;
   point.span = stored.span;
   point.seq = stored.seq;
   point.robot_time_us = stored.robot_time_us;
   point.position_m = stored.sample.position_m;
-  point.disturbance_m = or_nan(stored.disturbance_m);
+  point.disturbance_m = station::or_nan(stored.disturbance_m);
   point.setpoint_m = stored.setpoint_m.value_or(0);
   point.steered = stored.mode == rheonaut_MODE_AUTO && stored.setpoint_m.has_value();
-  point.position_sd_m = or_nan(stored.position_sd_m);
+  point.position_sd_m = station::or_nan(stored.position_sd_m);
   return point;
 }
 
@@ -259,8 +259,8 @@ const char* text(ChannelChoice value) {
   return "";
 }
 
-Result<RunRecording> recording_of(std::span<const StoredSample> samples, const RunWindow& window,
-                                  const StoredReference* reference, ChannelChoice choice) {
+Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples, const RunWindow& window,
+                                  const storage::StoredReference* reference, ChannelChoice choice) {
   const auto piece = select(samples, window);
   if (!piece) return std::unexpected{piece.error()};
   const auto& chosen = piece->samples;
@@ -282,7 +282,7 @@ Result<RunRecording> recording_of(std::span<const StoredSample> samples, const R
   recording.dt_s =
       (piece->seconds(chosen.back()) - piece->seconds(chosen.front())) / static_cast<double>(chosen.size() - 1);
   std::vector<double> recorded_m_s;
-  for (const StoredSample& stored : chosen) {
+  for (const storage::StoredSample& stored : chosen) {
     recorded_m_s.push_back(static_cast<double>(stored.sample.velocity_m_s));
     recording.duty.push_back(static_cast<double>(stored.sample.duty));
     if (motion == Motion::outside) continue;
@@ -291,7 +291,7 @@ Result<RunRecording> recording_of(std::span<const StoredSample> samples, const R
       continue;
     }
     recording.position_m.push_back(static_cast<double>(stored.sample.position_m) -
-                                   static_cast<double>(or_nan(stored.disturbance_m)));
+                                   static_cast<double>(station::or_nan(stored.disturbance_m)));
     if (window.with_velocity) recording.velocity_m_s.push_back(static_cast<double>(stored.sample.velocity_m_s));
   }
   if (motion == Motion::outside) {
@@ -310,4 +310,4 @@ Result<RunRecording> recording_of(std::span<const StoredSample> samples, const R
   return made;
 }
 
-}  // namespace server
+}  // namespace server::analysis

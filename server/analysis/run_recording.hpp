@@ -13,11 +13,11 @@
 #include "server/storage/runs/outside_reference.hpp"
 #include "server/storage/samples/stored_sample.hpp"
 
-namespace server {
+namespace server::analysis {
 
 inline constexpr std::size_t kMaxAnalysedSamples = 2'000'000;  // 5 h at 100 Hz; 80 MB
 
-StepPoint step_point(const StoredSample& stored);
+StepPoint step_point(const storage::StoredSample& stored);
 
 // Which part of a run: seconds of robot time since the first sample of the span.
 struct RunWindow {
@@ -52,8 +52,8 @@ std::string channels_reason(double largest_position_sd_m);
 // was measured: without the disturbance, which the robot adds to it. invalid: several spans to choose from, too few
 // samples, or gaps or missing values; the detail names each (samples that were lost told from periods that the robot
 // skipped) and the longest windows without one, as flags.
-Result<RunRecording> recording_of(std::span<const StoredSample> samples, const RunWindow& window,
-                                  const StoredReference* reference = nullptr,
+Result<RunRecording> recording_of(std::span<const storage::StoredSample> samples, const RunWindow& window,
+                                  const storage::StoredReference* reference = nullptr,
                                   ChannelChoice choice = ChannelChoice::best);
 
-}  // namespace server
+}  // namespace server::analysis

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-namespace server {
+namespace server::analysis {
 namespace {
 
 constexpr double kBandOfStep = 0.02;
@@ -56,7 +56,7 @@ struct PositionAt {
 
 // Where a line through the positions from `first` to before `last`, weighed by their sds, passes at this time. Its sd
 // grows by what the positions scatter more about the line than they are said to.
-PositionAt on_line(const OutsidePositions& outside, std::size_t first, std::size_t last, std::uint64_t at_us) {
+PositionAt on_line(const storage::OutsidePositions& outside, std::size_t first, std::size_t last, std::uint64_t at_us) {
   const auto after_s = [&](std::size_t i) {
     return (static_cast<double>(outside.robot_time_us[i]) - static_cast<double>(at_us)) * 1e-6;
   };
@@ -95,7 +95,7 @@ std::optional<StepCause> step_at(const StepPoint& before, const StepPoint& point
 
 class Cutter {
  public:
-  explicit Cutter(const StoredReference* reference) : reference_{reference} {}
+  explicit Cutter(const storage::StoredReference* reference) : reference_{reference} {}
 
   void take(const StepPoint& point) {
     if (points_ == 0 || before_.span != point.span) span_began_us_ = point.robot_time_us;
@@ -155,7 +155,7 @@ class Cutter {
 
   // The reference in the step, if it covers it without a pause: what it measured takes the place of the estimate.
   void measure_from_outside() {
-    const OutsidePositions& outside = reference_->positions;
+    const storage::OutsidePositions& outside = reference_->positions;
     const std::uint64_t begin_us = points_of_step_.front().robot_time_us;
     const std::uint64_t end_us = points_of_step_.back().robot_time_us;
     const auto first = std::ranges::lower_bound(outside.robot_time_us, begin_us) - outside.robot_time_us.begin();
@@ -172,7 +172,7 @@ class Cutter {
   }
 
   void take_reference(std::size_t from, std::size_t to) {
-    const OutsidePositions& outside = reference_->positions;
+    const storage::OutsidePositions& outside = reference_->positions;
     const double disturbance_m = static_cast<double>(points_of_step_.front().disturbance_m);
     std::vector<double> time_s, position_m;
     double squares_m2 = 0, sd_m = 0;
@@ -210,7 +210,7 @@ class Cutter {
   // Where the robot was when the step began, also in motion: on the line through the positions shortly before it, and
   // the first one after it where those are too few.
   PositionAt start_from_outside(std::size_t from) const {
-    const OutsidePositions& outside = reference_->positions;
+    const storage::OutsidePositions& outside = reference_->positions;
     const std::uint64_t begin_us = points_of_step_.front().robot_time_us;
     constexpr std::uint64_t kShortlyUs = 200'000;
     constexpr std::size_t kFewestOfLine = 3;
@@ -219,7 +219,7 @@ class Cutter {
     return on_line(outside, first, from - first < kFewestOfLine ? from + 1 : from, begin_us);
   }
 
-  const StoredReference* reference_;
+  const storage::StoredReference* reference_;
   StepPoint before_;
   std::uint64_t points_ = 0;
   std::uint64_t span_began_us_ = 0;
@@ -239,14 +239,16 @@ const char* position_source(const MeasuredStep& step) {
   return step.position_sd_m > 0 ? "estimate" : "known";
 }
 
-std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points, const StoredReference* reference) {
+std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points,
+                                        const storage::StoredReference* reference) {
   Cutter cutter{reference};
   for (const StepPoint& point : points) cutter.take(point);
   return cutter.end();
 }
 
-std::optional<EstimateError> estimate_error(const std::vector<StepPoint>& points, const StoredReference& reference) {
-  const OutsidePositions& outside = reference.positions;
+std::optional<EstimateError> estimate_error(const std::vector<StepPoint>& points,
+                                            const storage::StoredReference& reference) {
+  const storage::OutsidePositions& outside = reference.positions;
   Comparison comparison;
   std::size_t next = 0;
   for (std::size_t k = 1; k < points.size(); ++k) {
@@ -261,4 +263,4 @@ std::optional<EstimateError> estimate_error(const std::vector<StepPoint>& points
   return comparison.end();
 }
 
-}  // namespace server
+}  // namespace server::analysis

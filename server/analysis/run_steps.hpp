@@ -16,7 +16,7 @@
 #include "control/responses/step_metrics.hpp"
 #include "server/storage/runs/outside_reference.hpp"
 
-namespace server {
+namespace server::analysis {
 
 // What of a stored sample matters here.
 struct StepPoint {
@@ -61,9 +61,10 @@ const char* position_source(const MeasuredStep& step);  // "outside", "estimate"
 
 // Points in order of span and seq. A step that goes nowhere is left out; a position that is not finite ends a step.
 std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points,
-                                        const StoredReference* reference = nullptr);
+                                        const storage::StoredReference* reference = nullptr);
 
 // Over all of the reference; none where the two have no time in common.
-std::optional<EstimateError> estimate_error(const std::vector<StepPoint>& points, const StoredReference& reference);
+std::optional<EstimateError> estimate_error(const std::vector<StepPoint>& points,
+                                            const storage::StoredReference& reference);
 
-}  // namespace server
+}  // namespace server::analysis

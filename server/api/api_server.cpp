@@ -11,7 +11,7 @@
 #include "server/config/endpoint.hpp"
 #include "server/storage/recording_parts.hpp"
 
-namespace server {
+namespace server::api {
 namespace {
 
 std::vector<std::string> host_names(const ApiOptions& options) {
@@ -21,17 +21,17 @@ std::vector<std::string> host_names(const ApiOptions& options) {
   return names;
 }
 
-StationFacts facts_of(const ApiOptions& options, const Listener& listener, const Clock& clock) {
-  return {options.version,        options.store_id,  text(listener.endpoint()),
+StationFacts facts_of(const ApiOptions& options, const net::Listener& listener, const runtime::Clock& clock) {
+  return {options.version,        options.store_id,  config::text(listener.endpoint()),
           options.robots_address, clock.steady_us(), options.security};
 }
 
 }  // namespace
 
-ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string robots_address,
-                       TransportSecurity& security) {
+ApiOptions api_options(const config::Config& config, std::uint64_t store_id, std::string robots_address,
+                       net::TransportSecurity& security) {
   ApiOptions options;
-  options.endpoint = parse_endpoint(config.http);
+  options.endpoint = config::parse_endpoint(config.http);
   options.or_any_port = config.http_or_any_port;
   options.data_dir = config.data_dir;
   options.hosts = config.http_hosts;
@@ -42,8 +42,9 @@ ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string
   return options;
 }
 
-ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clock, const ApiOptions& options,
-                     Station& station, LiveFeed& live, RecordingParts& recording, AnalysisService& analysis)
+ApiServer::ApiServer(boost::asio::io_context& loop, runtime::TaskGroup& tasks, runtime::Clock& clock,
+                     const ApiOptions& options, station::Station& station, live::LiveFeed& live,
+                     storage::RecordingParts& recording, analysis::AnalysisService& analysis)
     : tasks_{tasks},
       clock_{clock},
       listener_{loop, clock, options.endpoint, options.or_any_port},
@@ -55,16 +56,16 @@ ApiServer::ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clo
       facts_{facts_of(options, listener_, clock)},
       live_{loop, tasks, clock, station, live, texts_, options.version},
       upgrades_{"/live",
-                [this](HttpStream stream, UpgradeRequest upgrade, Caller caller) {
+                [this](http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller) {
                   return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live_);
                 }},
       server_{tasks, clock, listener_, options.security->http(), guard_, router_, upgrades_} {
   add_routes(loop, station, live, recording, analysis);
 }
 
-void ApiServer::add_routes(boost::asio::io_context& loop, Station& station, LiveFeed& live, RecordingParts& recording,
-                           AnalysisService& analysis) {
-  History& history = recording.history;
+void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& station, live::LiveFeed& live,
+                           storage::RecordingParts& recording, analysis::AnalysisService& analysis) {
+  storage::History& history = recording.history;
   add_station_routes(router_, {auth_, clock_, recording.head_watch, recording.recorder, facts_});
   add_recording_routes(router_, {clock_, recording, station, *facts_.security, tasks_.exceptions()});
   add_robot_routes(router_, {loop, history, station, texts_});
@@ -87,7 +88,7 @@ boost::asio::awaitable<void> ApiServer::run() {
   co_await server_.run();
 }
 
-std::string ApiServer::address() const { return text(listener_.endpoint()); }
+std::string ApiServer::address() const { return config::text(listener_.endpoint()); }
 
 void ApiServer::print_login_url() {
   fmt::print("Open the cockpit with this one-time link:\n  {}\n", login_url());
@@ -97,9 +98,9 @@ void ApiServer::print_login_url() {
 std::string ApiServer::url() const {
   auto endpoint = listener_.endpoint();
   if (endpoint.address().is_unspecified()) endpoint.address(boost::asio::ip::address_v4::loopback());
-  return base_url(facts_, text(endpoint));
+  return base_url(facts_, config::text(endpoint));
 }
 
-std::string ApiServer::login_url() { return server::login_url(url(), auth_.new_login_code()); }
+std::string ApiServer::login_url() { return api::login_url(url(), auth_.new_login_code()); }
 
-}  // namespace server
+}  // namespace server::api

@@ -16,7 +16,7 @@
 #include "server/live/robot_texts.hpp"
 #include "server/net/transport_security.hpp"
 
-namespace server {
+namespace server::api {
 
 struct ApiOptions {
   boost::asio::ip::tcp::endpoint endpoint;  // port 0: any free one
@@ -25,49 +25,50 @@ struct ApiOptions {
   std::vector<std::string> hosts;           // further names for the Host header
   std::string version;
   std::uint64_t store_id = 0;
-  std::string robots_address;             // "127.0.0.1:7070", for people
-  TransportSecurity* security = nullptr;  // must be given
-  PasswordCost password_cost;
+  std::string robots_address;                  // "127.0.0.1:7070", for people
+  net::TransportSecurity* security = nullptr;  // must be given
+  runtime::PasswordCost password_cost;
 };
 
-ApiOptions api_options(const Config& config, std::uint64_t store_id, std::string robots_address,
-                       TransportSecurity& security);
+ApiOptions api_options(const config::Config& config, std::uint64_t store_id, std::string robots_address,
+                       net::TransportSecurity& security);
 
 class ApiServer {
  public:
   // Opens the port and makes the token. Throws when either is not possible.
-  ApiServer(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clock, const ApiOptions& options, Station& station,
-            LiveFeed& live, RecordingParts& recording, AnalysisService& analysis);
+  ApiServer(boost::asio::io_context& loop, runtime::TaskGroup& tasks, runtime::Clock& clock, const ApiOptions& options,
+            station::Station& station, live::LiveFeed& live, storage::RecordingParts& recording,
+            analysis::AnalysisService& analysis);
 
   boost::asio::awaitable<void> run();
 
   std::uint16_t port() const { return listener_.endpoint().port(); }
   std::string address() const;  // "127.0.0.1:8080"
   std::string url() const;      // "https://127.0.0.1:8080", for a browser on this machine
-  const Router& router() const { return router_; }
+  const http::Router& router() const { return router_; }
   std::string login_url();  // a link that lets one page in, for 10 minutes
   void print_login_url();   // on standard output, for the person at the console
 
-  Accounts& accounts() { return accounts_; }
-  const Logins& logins() const { return logins_; }
+  identity::Accounts& accounts() { return accounts_; }
+  const identity::Logins& logins() const { return logins_; }
 
  private:
-  void add_routes(boost::asio::io_context& loop, Station& station, LiveFeed& live, RecordingParts& recording,
-                  AnalysisService& analysis);
+  void add_routes(boost::asio::io_context& loop, station::Station& station, live::LiveFeed& live,
+                  storage::RecordingParts& recording, analysis::AnalysisService& analysis);
 
-  TaskGroup& tasks_;
-  Clock& clock_;
-  Listener listener_;
-  Accounts accounts_;
-  Auth auth_;
-  Logins logins_;
-  RequestGuard guard_;
-  RobotTexts texts_;
+  runtime::TaskGroup& tasks_;
+  runtime::Clock& clock_;
+  net::Listener listener_;
+  identity::Accounts accounts_;
+  identity::Auth auth_;
+  identity::Logins logins_;
+  http::RequestGuard guard_;
+  live::RobotTexts texts_;
   StationFacts facts_;
   LiveParts live_;
-  Upgrades upgrades_;
-  Router router_;
-  HttpServer server_;
+  http::Upgrades upgrades_;
+  http::Router router_;
+  http::HttpServer server_;
 };
 
-}  // namespace server
+}  // namespace server::api

@@ -12,7 +12,7 @@
 #include "server/runtime/counted.hpp"
 #include "server/station/commands/recent_commands.hpp"
 
-namespace server {
+namespace server::api {
 namespace asio = boost::asio;
 using nlohmann::json;
 
@@ -21,38 +21,39 @@ namespace {
 // A renewal that waited longer is worth nothing: the lease it would extend has lapsed.
 constexpr microseconds kRenewalTimeToLive{protocol::kLeaseMs * 1000};
 
-asio::awaitable<void> stop_one(LiveParts& parts, StopRequest request) {
+asio::awaitable<void> stop_one(LiveParts& parts, station::StopRequest request) {
   co_await stop_robot(parts.station, std::move(request));
 }
 
-asio::awaitable<void> stop_all(LiveParts& parts, StopRequest request) {
+asio::awaitable<void> stop_all(LiveParts& parts, station::StopRequest request) {
   co_await stop_all_robots(parts.station, std::move(request));
 }
 
-asio::awaitable<void> renew(LiveParts& parts, CommandRequest request) {
-  const Counted counted{parts.renewals};
+asio::awaitable<void> renew(LiveParts& parts, station::CommandRequest request) {
+  const runtime::Counted counted{parts.renewals};
   co_await parts.station.submit(std::move(request));
 }
 
 // What a message begins goes on by itself, and fails alone.
 void spawn(LiveParts& parts, const std::string& name, asio::awaitable<void> task) {
-  parts.tasks.spawn(name, contained(parts.tasks.exceptions(), parts.clock, Ended::request, name, std::move(task)));
+  parts.tasks.spawn(name,
+                    contained(parts.tasks.exceptions(), parts.clock, runtime::Ended::request, name, std::move(task)));
 }
 
-Result<RobotId> known_robot(const Members& message, const LiveParts& parts) {
+Result<station::RobotId> known_robot(const Members& message, const LiveParts& parts) {
   auto id = message.text("robot_id", {0, 100});
   if (!id) return id;
   if (parts.station.find(*id) != nullptr) return id;
   return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", *id), "unknown_robot");
 }
 
-Result<void> on_emergency_stop(const Members& message, const Caller& caller, LiveParts& parts) {
-  StopRequest request;
+Result<void> on_emergency_stop(const Members& message, const identity::Caller& caller, LiveParts& parts) {
+  station::StopRequest request;
   request.actor = caller.actor;
   request.peer = caller.peer;
   request.received_us = parts.clock.steady_us();
   // SAFETY: a stop is obeyed also when the message carries members that nobody knows, or a key that is none.
-  if (const auto key = message.text("key", {1, 64}); key && is_command_key(*key)) request.key = *key;
+  if (const auto key = message.text("key", {1, 64}); key && station::is_command_key(*key)) request.key = *key;
   if (message.has("robot_id") && message.object().at("robot_id").is_null()) {
     spawn(parts, "emergency stop of all robots", stop_all(parts, std::move(request)));
     return {};
@@ -65,7 +66,7 @@ Result<void> on_emergency_stop(const Members& message, const Caller& caller, Liv
 }
 
 // With the latest stamp it keeps what the page controls.
-Result<void> on_keep_alive(const Members& message, const Caller& caller, LiveParts& parts) {
+Result<void> on_keep_alive(const Members& message, const identity::Caller& caller, LiveParts& parts) {
   if (auto known = message.only({"type", "stamp_us"}); !known) return known;
   if (!message.has("stamp_us")) return {};
   const auto stamp_us = message.integer("stamp_us", {0, INT64_MAX});
@@ -74,7 +75,7 @@ Result<void> on_keep_alive(const Members& message, const Caller& caller, LivePar
   return {};
 }
 
-Result<void> on_renew_lease(const Members& message, const Caller& caller, LiveParts& parts) {
+Result<void> on_renew_lease(const Members& message, const identity::Caller& caller, LiveParts& parts) {
   if (auto known = message.only({"type", "robot_id", "stamp_us"}); !known) return known;
   const auto robot_id = known_robot(message, parts);
   if (!robot_id) return std::unexpected{robot_id.error()};
@@ -82,12 +83,12 @@ Result<void> on_renew_lease(const Members& message, const Caller& caller, LivePa
   if (!stamp_us) return std::unexpected{stamp_us.error()};
   // SAFETY: what the page saw is too old, so its operator may be looking at a robot that has moved on.
   const std::int64_t age_us = parts.clock.steady_us() - *stamp_us;
-  if (age_us > kOldestSight.count() || age_us < 0) {
+  if (age_us > station::kOldestSight.count() || age_us < 0) {
     return fail(ErrorCode::conflict, fmt::format("the stamp is {} ms old; at most 400 renew a lease", age_us / 1000),
                 "stale");
   }
   if (parts.renewals >= kMaxRenewals) return fail(ErrorCode::unavailable, "too many renewals are on their way", "busy");
-  CommandRequest request;
+  station::CommandRequest request;
   request.robot_id = *robot_id;
   request.action = rheonaut_Command_init_zero;
   request.action.which_action = rheonaut_Command_renew_lease_tag;
@@ -99,36 +100,38 @@ Result<void> on_renew_lease(const Members& message, const Caller& caller, LivePa
 }
 
 // A robot that is not known may come yet.
-Result<void> on_watch(const Members& message, Subscriber& page, LiveParts& parts) {
+Result<void> on_watch(const Members& message, live::Subscriber& page, LiveParts& parts) {
   if (auto known = message.only({"type", "robots"}); !known) return known;
   const json robots = message.has("robots") ? message.object().at("robots") : json();
   const auto is_id = [](const json& id) { return id.is_string() && id.get_ref<const std::string&>().size() <= 31; };
   if (!robots.is_array() || robots.size() > kMaxWatched || !std::ranges::all_of(robots, is_id)) {
     return fail(ErrorCode::invalid, fmt::format("robots must be at most {} robot ids", kMaxWatched), "malformed");
   }
-  const auto watched = robots.get<std::set<RobotId>>();
+  const auto watched = robots.get<std::set<station::RobotId>>();
   parts.live.watch(page, watched);
-  for (const RobotId& id : watched) {  // published again with the next stamp, since the page has not received all of it
-    if (const RobotState* robot = parts.station.find(id)) parts.live.on_robot(*robot);
+  for (const station::RobotId& id :
+       watched) {  // published again with the next stamp, since the page has not received all of it
+    if (const station::RobotState* robot = parts.station.find(id)) parts.live.on_robot(*robot);
   }
   return {};
 }
 
 }  // namespace
 
-RobotDocument welcome_message(const std::string& actor, const LiveParts& parts) {
+live::RobotDocument welcome_message(const std::string& actor, const LiveParts& parts) {
   json message;
   message["type"] = "welcome";
   message["actor"] = actor;
   message["version"] = parts.version;
   message["utc_us"] = parts.clock.utc_us();
   message["stamp_us"] = parts.clock.steady_us();
-  std::string head = dump(message);
+  std::string head = base::dump(message);
   head.pop_back();  // the closing brace: the robots follow
   return {parts.texts, head + R"(,"robots":[)", "]}"};
 }
 
-Result<void> on_page_message(const std::string& text, const Caller& caller, Subscriber& page, LiveParts& parts) {
+Result<void> on_page_message(const std::string& text, const identity::Caller& caller, live::Subscriber& page,
+                             LiveParts& parts) {
   const auto message = Members::parse(text, {});
   if (!message) return std::unexpected{message.error()};
   const auto type = message->text("type", {1, 40});
@@ -141,8 +144,8 @@ Result<void> on_page_message(const std::string& text, const Caller& caller, Subs
 }
 
 std::string problem_message(const Error& error) {
-  const json body = problem_json(http_status(error.code), error.detail, error.reason);
-  return dump({{"type", "problem"}, {"problem", body}});
+  const json body = http::problem_json(http::http_status(error.code), error.detail, error.reason);
+  return base::dump({{"type", "problem"}, {"problem", body}});
 }
 
-}  // namespace server
+}  // namespace server::api

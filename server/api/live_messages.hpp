@@ -14,31 +14,32 @@
 #include "server/runtime/turns.hpp"
 #include "server/station/station.hpp"
 
-namespace server {
+namespace server::api {
 
 // Everything outlives every page.
 struct LiveParts {
   boost::asio::io_context& loop;
-  TaskGroup& tasks;
-  Clock& clock;
-  Station& station;
-  LiveFeed& live;
-  RobotTexts& texts;
+  runtime::TaskGroup& tasks;
+  runtime::Clock& clock;
+  station::Station& station;
+  live::LiveFeed& live;
+  live::RobotTexts& texts;
   std::string version;
-  std::size_t renewals = 0;  // on their way
-  Turns turns{loop, 3};      // of the pages that something is written to: some 70 µs of work
+  std::size_t renewals = 0;       // on their way
+  runtime::Turns turns{loop, 3};  // of the pages that something is written to: some 70 µs of work
 };
 
 inline constexpr std::size_t kMaxRenewals = 256;
 inline constexpr std::size_t kMaxWatched = 64;  // robots, of a page
 
 // The first message of a page. Its stamp is of now: the states in it are as new or newer.
-RobotDocument welcome_message(const std::string& actor, const LiveParts& parts);
+live::RobotDocument welcome_message(const std::string& actor, const LiveParts& parts);
 
 // Acts on one message. Returns at once: a stop or a renewal goes on as a task, and its outcome is published as
 // `command`. The error, if any, is for the page.
-Result<void> on_page_message(const std::string& text, const Caller& caller, Subscriber& page, LiveParts& parts);
+Result<void> on_page_message(const std::string& text, const identity::Caller& caller, live::Subscriber& page,
+                             LiveParts& parts);
 
 std::string problem_message(const Error& error);
 
-}  // namespace server
+}  // namespace server::api

@@ -14,7 +14,7 @@
 
 #include "server/api/bodies/json.hpp"
 
-namespace server {
+namespace server::api {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace websocket = boost::beast::websocket;
@@ -32,7 +32,7 @@ constexpr int kMaxMessagesASecond = 500;  // a page that drives a robot says som
 
 class LivePage {
  public:
-  LivePage(HttpStream stream, Caller caller, LiveParts& parts)
+  LivePage(http::HttpStream stream, identity::Caller caller, LiveParts& parts)
       : socket_{std::move(stream)}, caller_{std::move(caller)}, parts_{parts}, queue_{parts.loop} {
     websocket::stream_base::timeout none;  // time is the injected clock's business
     none.handshake_timeout = none.idle_timeout = websocket::stream_base::none();
@@ -49,7 +49,7 @@ class LivePage {
   LivePage(const LivePage&) = delete;
   LivePage& operator=(const LivePage&) = delete;
 
-  asio::awaitable<void> run(UpgradeRequest upgrade) {
+  asio::awaitable<void> run(http::UpgradeRequest upgrade) {
     const auto [error] = co_await socket_.async_accept(upgrade, asio::as_tuple(asio::use_awaitable));
     if (error) co_return;
     parts_.live.add(queue_);  // what changes while the welcome is written is queued after it
@@ -60,7 +60,7 @@ class LivePage {
  private:
   // By an exception the page ends: its other parts do not go on without this one.
   asio::awaitable<void> part(asio::awaitable<void> task) {
-    return contained(parts_.tasks.exceptions(), parts_.clock, Ended::live_page, "page of " + caller_.actor,
+    return contained(parts_.tasks.exceptions(), parts_.clock, runtime::Ended::live_page, "page of " + caller_.actor,
                      std::move(task));
   }
 
@@ -70,7 +70,7 @@ class LivePage {
       if (auto permitted = check_permission(text); !permitted) return permitted;
       return on_page_message(text, caller_, queue_, parts_);
     } catch (...) {
-      parts_.tasks.exceptions().note(Ended::request, "a message of " + caller_.actor + " on /live",
+      parts_.tasks.exceptions().note(runtime::Ended::request, "a message of " + caller_.actor + " on /live",
                                      std::current_exception(), parts_.clock.steady_us());
       return fail(ErrorCode::internal, "the station could not act on this message; its log says why", "internal");
     }
@@ -82,11 +82,13 @@ class LivePage {
     const auto type = message ? message->text("type", {0, kMaxMessageBytes}) : std::unexpected{message.error()};
     if (!type) return {};  // refused for that
     const bool is_reading = *type == "keep_alive" || *type == "watch";
-    const Scope needed = *type == "emergency_stop" ? Scope::stop : is_reading ? Scope::read : Scope::command;
+    const identity::Scope needed = *type == "emergency_stop" ? identity::Scope::stop
+                                   : is_reading              ? identity::Scope::read
+                                                             : identity::Scope::command;
     if (caller_.scopes.allow(needed)) return {};
     return fail(ErrorCode::forbidden,
                 fmt::format("{} needs the role {}; {} has the role {}", type->substr(0, 40),
-                            server::text(least_role(needed)), caller_.actor, server::text(caller_.role())),
+                            identity::text(least_role(needed)), caller_.actor, identity::text(caller_.role())),
                 "not_permitted");
   }
 
@@ -118,7 +120,7 @@ class LivePage {
 
   // One message, in as many frames as it has pieces.
   asio::awaitable<bool> write_welcome() {
-    RobotDocument welcome = welcome_message(caller_.actor, parts_);
+    live::RobotDocument welcome = welcome_message(caller_.actor, parts_);
     while (!welcome.is_whole()) {
       const std::string piece = co_await welcome.next();
       queue_.forget_states(welcome.after(), welcome.last());
@@ -136,7 +138,7 @@ class LivePage {
     if (!is_welcomed) co_return;
     for (;;) {
       co_await queue_.wait();
-      for (LiveText message = queue_.pop(); message != nullptr; message = queue_.pop()) {
+      for (live::LiveText message = queue_.pop(); message != nullptr; message = queue_.pop()) {
         if (!parts_.turns.take()) co_await parts_.turns.wait();
         writing_since_us_ = parts_.clock.steady_us();
         const auto [error, size] =
@@ -166,10 +168,10 @@ class LivePage {
     spdlog::info("the page of {} fell silent, or does not read", caller_.actor);
   }
 
-  websocket::stream<HttpStream> socket_;
-  Caller caller_;
+  websocket::stream<http::HttpStream> socket_;
+  identity::Caller caller_;
   LiveParts& parts_;
-  Subscriber queue_;
+  live::Subscriber queue_;
   std::int64_t heard_at_us_ = 0;
   std::int64_t pinged_at_us_ = 0;
   std::int64_t writing_since_us_ = kNever;
@@ -179,9 +181,10 @@ class LivePage {
 
 }  // namespace
 
-asio::awaitable<void> serve_live(HttpStream stream, UpgradeRequest upgrade, Caller caller, LiveParts& parts) {
+asio::awaitable<void> serve_live(http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller,
+                                 LiveParts& parts) {
   LivePage page{std::move(stream), std::move(caller), parts};
   co_await page.run(std::move(upgrade));
 }
 
-}  // namespace server
+}  // namespace server::api

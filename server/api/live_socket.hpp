@@ -14,9 +14,10 @@
 #include "server/http/upgrade.hpp"
 #include "server/identity/caller.hpp"
 
-namespace server {
+namespace server::api {
 
 // Ends when the page leaves or falls silent. Throws operation_aborted when cancelled.
-boost::asio::awaitable<void> serve_live(HttpStream stream, UpgradeRequest upgrade, Caller caller, LiveParts& parts);
+boost::asio::awaitable<void> serve_live(http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller,
+                                        LiveParts& parts);
 
-}  // namespace server
+}  // namespace server::api

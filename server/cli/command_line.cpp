@@ -21,7 +21,7 @@ namespace {
 
 constexpr const char* kNotWritten = "the answer could not be written; is the disk full?";
 
-void add_options(CLI::App& command, ConfigFlags& flags) {
+void add_options(CLI::App& command, config::ConfigFlags& flags) {
   const auto add = [&command](const char* name, auto& value, const char* meaning) {
     command.add_option(name, value, meaning)->check(named());
   };

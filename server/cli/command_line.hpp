@@ -27,11 +27,11 @@
 namespace server::cli {
 
 struct Serve {
-  ConfigFlags flags;
+  config::ConfigFlags flags;
 };
 
 struct CheckConfig {
-  ConfigFlags flags;
+  config::ConfigFlags flags;
 };
 
 // The user was answered already (--help, --version, or a mistake that was explained).

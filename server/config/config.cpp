@@ -18,7 +18,7 @@
 #include "base/toml_value.hpp"
 #include "server/config/endpoint.hpp"
 
-namespace server {
+namespace server::config {
 namespace {
 
 // Takes values out of a parsed file; what is left at the end is a key that nobody knows.
@@ -313,4 +313,4 @@ Config load_config(const ConfigFlags& flags) {
   return config;
 }
 
-}  // namespace server
+}  // namespace server::config

@@ -13,7 +13,7 @@
 #include "server/config/envelope.hpp"
 #include "server/config/link_settings.hpp"
 
-namespace server {
+namespace server::config {
 
 // Section [recording]: how long samples that no run holds are kept, and how much room there must be. 1 MB is 10^6
 // bytes.
@@ -96,4 +96,4 @@ Config load_config(const ConfigFlags& flags);
 // The same of a file's text alone; `name` is what errors call it.
 Config parse_config(const std::string& text, const std::string& name);
 
-}  // namespace server
+}  // namespace server::config

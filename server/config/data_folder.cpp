@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-namespace server {
+namespace server::config {
 namespace asio = boost::asio;
 
 namespace {
@@ -60,7 +60,7 @@ DataFolder::~DataFolder() {
   std::filesystem::remove(endpoints(), ignored);
 }
 
-asio::awaitable<void> DataFolder::announce(Clock& clock, Announcement announcement) {
+asio::awaitable<void> DataFolder::announce(runtime::Clock& clock, Announcement announcement) {
   nlohmann::json content{{"http", announcement.http}, {"robots", announcement.robots}, {"pid", getpid()}};
   if (!announcement.tls_certificate.empty()) content["tls_certificate"] = announcement.tls_certificate;
   for (bool warned = false; !write_endpoints(content.dump() + '\n'); warned = true) {
@@ -82,4 +82,4 @@ bool DataFolder::write_endpoints(const std::string& content) const {
   return out && !error;
 }
 
-}  // namespace server
+}  // namespace server::config

@@ -18,7 +18,7 @@
 
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::config {
 
 // The lock on a data folder: only the program that holds it writes there.
 class FolderLock {
@@ -51,7 +51,7 @@ class DataFolder {
 
   // Writes endpoints.json, whole or not at all. SAFETY: a full disk keeps no robot from being stopped: it is tried
   // again until it is there.
-  boost::asio::awaitable<void> announce(Clock& clock, Announcement announcement);
+  boost::asio::awaitable<void> announce(runtime::Clock& clock, Announcement announcement);
 
  private:
   bool write_endpoints(const std::string& content) const;
@@ -65,4 +65,4 @@ class DataFolder {
 // missing. Throws std::runtime_error that names it.
 void make_data_folder(const std::filesystem::path& path);
 
-}  // namespace server
+}  // namespace server::config

@@ -8,7 +8,7 @@
 
 #include "base/invalid_argument.hpp"
 
-namespace server {
+namespace server::config {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 
@@ -47,4 +47,4 @@ std::string network_of(const std::string& address) {
   return asio::ip::address_v6{bytes}.to_string();
 }
 
-}  // namespace server
+}  // namespace server::config

@@ -4,7 +4,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <string>
 
-namespace server {
+namespace server::config {
 
 // "localhost" stands for 127.0.0.1. Throws std::invalid_argument that quotes the text.
 boost::asio::ip::tcp::endpoint parse_endpoint(const std::string& text);
@@ -15,4 +15,4 @@ std::string host_of(const std::string& peer);  // without the port, or all of it
 // What counts as one address of strangers: an IPv6 network of 64 bits belongs to one customer.
 std::string network_of(const std::string& address);
 
-}  // namespace server
+}  // namespace server::config

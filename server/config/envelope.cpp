@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <ranges>
 
-namespace server {
+namespace server::config {
 namespace {
 
 constexpr std::size_t kMaxNameBytes = 40;
@@ -62,4 +62,4 @@ Result<std::string> Envelope::listed(const std::string& text) const {
               "unknown_fluid");
 }
 
-}  // namespace server
+}  // namespace server::config

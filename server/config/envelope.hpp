@@ -11,7 +11,7 @@
 
 #include "server/runtime/result.hpp"
 
-namespace server {
+namespace server::config {
 
 // What the station allows to be commanded.
 struct CommandLimits {
@@ -59,4 +59,4 @@ class Envelope {
   CommandLimits strictest_;
 };
 
-}  // namespace server
+}  // namespace server::config

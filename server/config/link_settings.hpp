@@ -5,7 +5,7 @@
 
 #include "protocol/messages.hpp"
 
-namespace server {
+namespace server::config {
 
 // What every robot is given in its Welcome.
 struct LinkTimes {
@@ -21,4 +21,4 @@ struct LoopbackEnrolment {
   std::uint32_t most_a_minute = 10;
 };
 
-}  // namespace server
+}  // namespace server::config

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace server {
+namespace server::config {
 
 nlohmann::json limits_json(const CommandLimits& limits) {
   return {{"setpoint_min_m", limits.setpoint_min_m},
@@ -29,4 +29,4 @@ std::string station_document(const Config& config) {
   return out.dump();
 }
 
-}  // namespace server
+}  // namespace server::config

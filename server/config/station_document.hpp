@@ -6,7 +6,7 @@
 
 #include "server/config/config.hpp"
 
-namespace server {
+namespace server::config {
 
 // Equal for equal configurations; its version is the program's.
 std::string station_document(const Config& config);
@@ -14,4 +14,4 @@ std::string station_document(const Config& config);
 // By their names in the configuration.
 nlohmann::json limits_json(const CommandLimits& limits);
 
-}  // namespace server
+}  // namespace server::config

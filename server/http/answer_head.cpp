@@ -7,7 +7,7 @@
 #include <cctype>
 #include <iterator>
 
-namespace server {
+namespace server::http {
 namespace {
 
 // Of the policy: nothing but what the cockpit is made of, from this origin; nothing inline; no frame around it. Of the
@@ -83,4 +83,4 @@ std::string last_answer(const Response& response, bool is_secure) {
   return answer_head(response, {.is_secure = is_secure}) + response.body;
 }
 
-}  // namespace server
+}  // namespace server::http

@@ -6,7 +6,7 @@
 
 #include "server/http/http.hpp"
 
-namespace server {
+namespace server::http {
 
 struct Framing {
   unsigned version = 11;    // of HTTP, as the request said: 10 or 11
@@ -25,4 +25,4 @@ std::string answer_head(const Response& response, const Framing& framing);
 // A whole answer, after which the connection ends: for those who did not get as far as a request.
 std::string last_answer(const Response& response, bool is_secure);
 
-}  // namespace server
+}  // namespace server::http

@@ -12,7 +12,7 @@
 
 #include "server/http/answer_head.hpp"
 
-namespace server {
+namespace server::http {
 namespace asio = boost::asio;
 namespace http = boost::beast::http;
 
@@ -73,11 +73,11 @@ asio::awaitable<Result<std::optional<std::string>>> AnswerSender::next_piece(Bod
     if (!piece) spdlog::error("{}: the answer was cut short: {}", route, piece.error().detail);
     co_return piece;
   } catch (...) {
-    failure = first_of(std::current_exception());
+    failure = runtime::first_of(std::current_exception());
   }
-  if (is_cancellation(failure)) std::rethrow_exception(failure);
-  exceptions_.note(Ended::request, route + ": the answer was cut short", failure, clock_.steady_us());
-  co_return fail(ErrorCode::internal, text_of(failure));
+  if (runtime::is_cancellation(failure)) std::rethrow_exception(failure);
+  exceptions_.note(runtime::Ended::request, route + ": the answer was cut short", failure, clock_.steady_us());
+  co_return fail(ErrorCode::internal, runtime::text_of(failure));
 }
 
-}  // namespace server
+}  // namespace server::http

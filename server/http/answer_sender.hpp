@@ -19,7 +19,7 @@
 #include "server/http/request_reading.hpp"
 #include "server/runtime/exceptions.hpp"
 
-namespace server {
+namespace server::http {
 
 inline constexpr microseconds kWriteTime{std::chrono::seconds{30}};
 
@@ -43,7 +43,7 @@ boost::asio::awaitable<std::optional<T>> while_present(HttpStream& stream, boost
 
 class AnswerSender {
  public:
-  AnswerSender(HttpStream& stream, Deadline& deadline, Clock& clock, ExceptionLog& exceptions)
+  AnswerSender(HttpStream& stream, Deadline& deadline, runtime::Clock& clock, runtime::ExceptionLog& exceptions)
       : stream_{stream}, deadline_{deadline}, clock_{clock}, exceptions_{exceptions} {}
 
   boost::asio::awaitable<Next> send(Response response, const RequestMessage& to);
@@ -56,8 +56,8 @@ class AnswerSender {
 
   HttpStream& stream_;
   Deadline& deadline_;
-  Clock& clock_;
-  ExceptionLog& exceptions_;
+  runtime::Clock& clock_;
+  runtime::ExceptionLog& exceptions_;
 };
 
-}  // namespace server
+}  // namespace server::http

@@ -6,19 +6,19 @@
 
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::http {
 
 class Deadline {
  public:
-  explicit Deadline(Clock& clock) : clock_{clock} {}
+  explicit Deadline(runtime::Clock& clock) : clock_{clock} {}
   void allow(microseconds duration) { at_us_ = clock_.steady_us() + duration.count(); }  // from now
   void lift() { at_us_ = kNever; }
   bool has_passed() const { return clock_.steady_us() >= at_us_; }
 
  private:
   static constexpr auto kNever = std::numeric_limits<std::int64_t>::max();
-  Clock& clock_;
+  runtime::Clock& clock_;
   std::int64_t at_us_ = kNever;
 };
 
-}  // namespace server
+}  // namespace server::http

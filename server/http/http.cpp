@@ -3,7 +3,7 @@
 
 #include "base/json_text.hpp"
 
-namespace server {
+namespace server::http {
 
 using nlohmann::json;
 
@@ -93,4 +93,4 @@ Response problem(const Error& error, json extra) {
   return problem(http_status(error.code), error.detail, error.reason, std::move(extra));
 }
 
-}  // namespace server
+}  // namespace server::http

@@ -14,7 +14,7 @@
 #include "server/identity/caller.hpp"
 #include "server/runtime/result.hpp"
 
-namespace server {
+namespace server::http {
 
 struct Request {
   std::string method;                          // "GET", "POST", …
@@ -26,7 +26,7 @@ struct Request {
 
   std::string peer;                          // the address it came from, without port
   std::string actor;                         // who asks: caller.actor
-  Caller caller;                             // and what they may do; set by RequestGuard
+  identity::Caller caller;                   // and what they may do; set by RequestGuard
   std::string path;                          // decoded; set by Router, as are the two below
   std::map<std::string, std::string> param;  // of the path, decoded
   std::map<std::string, std::string> query;  // decoded
@@ -67,4 +67,4 @@ Response problem(int status, std::string detail, std::string reason, nlohmann::j
 Response problem(const Error& error, nlohmann::json extra = nlohmann::json::object());
 nlohmann::json problem_json(int status, std::string detail, std::string reason);
 
-}  // namespace server
+}  // namespace server::http

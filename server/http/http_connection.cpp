@@ -11,7 +11,7 @@
 
 #include "server/http/answer_head.hpp"
 
-namespace server {
+namespace server::http {
 namespace asio = boost::asio;
 namespace http = boost::beast::http;
 
@@ -23,9 +23,9 @@ constexpr std::size_t kMaxDiscardBytes = 1024 * 1024;
 
 }  // namespace
 
-HttpConnection::HttpConnection(HttpStream stream, ConnectionSlot& slot, TlsHandshakes* tls, Clock& clock,
-                               const RequestGuard& guard, const Router& router, Upgrades& upgrades,
-                               ExceptionLog& exceptions)
+HttpConnection::HttpConnection(HttpStream stream, net::ConnectionSlot& slot, tls::TlsHandshakes* tls,
+                               runtime::Clock& clock, const RequestGuard& guard, const Router& router,
+                               Upgrades& upgrades, runtime::ExceptionLog& exceptions)
     : stream_{std::move(stream)},
       slot_{slot},
       tls_{tls},
@@ -40,7 +40,8 @@ HttpConnection::HttpConnection(HttpStream stream, ConnectionSlot& slot, TlsHands
 }
 
 asio::awaitable<void> HttpConnection::talk() {
-  co_await contained(exceptions_, clock_, Ended::http_connection, "http connection of " + stream_.peer(), take_turns());
+  co_await contained(exceptions_, clock_, runtime::Ended::http_connection, "http connection of " + stream_.peer(),
+                     take_turns());
 }
 
 asio::awaitable<void> HttpConnection::take_turns() {
@@ -65,9 +66,9 @@ asio::awaitable<void> HttpConnection::watch() {
 
 asio::awaitable<Next> HttpConnection::secure() {
   if (tls_ == nullptr) co_return Next::another;
-  const TlsHandshakes::Outcome outcome = co_await tls_->secure(stream_, "http port");
-  if (outcome == TlsHandshakes::Outcome::secure) co_return Next::another;
-  if (outcome == TlsHandshakes::Outcome::not_tls) {
+  const tls::TlsHandshakes::Outcome outcome = co_await tls_->secure(stream_, "http port");
+  if (outcome == tls::TlsHandshakes::Outcome::secure) co_return Next::another;
+  if (outcome == tls::TlsHandshakes::Outcome::not_tls) {
     const Response plain =
         problem(400, "this port speaks TLS only: use https:// instead of http://", "plain_http_on_tls_port");
     stream_.write_now(last_answer(plain, false));
@@ -80,7 +81,7 @@ bool HttpConnection::wants_upgrade(const Request& request, const RequestMessage&
   return request.target.path() == upgrades_.path && boost::beast::websocket::is_upgrade(message) && buffer_.size() == 0;
 }
 
-bool HttpConnection::begin_page(const Caller& caller) {
+bool HttpConnection::begin_page(const identity::Caller& caller) {
   std::erase_if(upgrades_.open, [](const auto& of_one) { return of_one.second == 0; });
   std::size_t& pages = upgrades_.open[caller.user.empty() ? caller.actor : caller.user];
   if (pages >= kMaxPagesOfOne) return false;
@@ -149,7 +150,7 @@ std::optional<Response> HttpConnection::refusal_of(RequestParser& parser, const 
   if (!admitted->actor.empty()) {
     if (length <= kMaxBodyBytes) return std::nullopt;
     admitted->peer = address_of(stream_);
-    const std::optional<Scope> lacking = router_.scope_lacking(head.method, head.target, *admitted);
+    const std::optional<identity::Scope> lacking = router_.scope_lacking(head.method, head.target, *admitted);
     if (lacking) return not_permitted(*admitted, *lacking);
     parser.body_limit(limit);
     parser.get().body().reserve(length);
@@ -228,8 +229,8 @@ asio::awaitable<Next> HttpConnection::carry_out_stop(RequestParser& parser, Requ
   co_return Next::end;
 }
 
-void HttpConnection::admit(Request& request, Caller caller) {
-  if (!caller.actor.empty()) slot_.becomes(ConnectionSlot::busy);
+void HttpConnection::admit(Request& request, identity::Caller caller) {
+  if (!caller.actor.empty()) slot_.becomes(net::ConnectionSlot::busy);
   request.caller = std::move(caller);
   request.caller.peer = address_of(stream_);
   request.actor = request.caller.actor;
@@ -274,11 +275,11 @@ asio::awaitable<Response> HttpConnection::answer(Request request) {
   try {
     co_return co_await router_.dispatch(std::move(request));
   } catch (...) {
-    failure = first_of(std::current_exception());
+    failure = runtime::first_of(std::current_exception());
   }
-  if (is_cancellation(failure)) std::rethrow_exception(failure);
-  exceptions_.note(Ended::request, route, failure, clock_.steady_us());
+  if (runtime::is_cancellation(failure)) std::rethrow_exception(failure);
+  exceptions_.note(runtime::Ended::request, route, failure, clock_.steady_us());
   co_return problem(500, "the station could not answer; its log says why", "internal");
 }
 
-}  // namespace server
+}  // namespace server::http

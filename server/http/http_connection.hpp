@@ -33,7 +33,7 @@
 #include "server/runtime/counted.hpp"
 #include "server/runtime/exceptions.hpp"
 
-namespace server {
+namespace server::http {
 
 inline constexpr std::size_t kMaxPagesOfOne = 32;  // on /live, of one user, token or link
 inline constexpr microseconds kRequestTime{std::chrono::seconds{10}};
@@ -43,8 +43,9 @@ inline constexpr microseconds kLingerTime{std::chrono::seconds{2}};  // for a re
 
 class HttpConnection {
  public:
-  HttpConnection(HttpStream stream, ConnectionSlot& slot, TlsHandshakes* tls, Clock& clock, const RequestGuard& guard,
-                 const Router& router, Upgrades& upgrades, ExceptionLog& exceptions);
+  HttpConnection(HttpStream stream, net::ConnectionSlot& slot, tls::TlsHandshakes* tls, runtime::Clock& clock,
+                 const RequestGuard& guard, const Router& router, Upgrades& upgrades,
+                 runtime::ExceptionLog& exceptions);
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;
 
@@ -54,7 +55,7 @@ class HttpConnection {
   bool wants_upgrade() const { return upgrade_.has_value(); }
   HttpStream take_stream() { return std::move(stream_); }
   UpgradeRequest take_upgrade() { return std::move(*upgrade_); }
-  const Caller& caller() const { return caller_; }
+  const identity::Caller& caller() const { return caller_; }
 
  private:
   boost::asio::awaitable<void> take_turns();
@@ -63,7 +64,7 @@ class HttpConnection {
   boost::asio::awaitable<boost::system::error_code> read_body(RequestParser& parser);
   boost::asio::awaitable<Next> carry_out(Request request, RequestMessage message);
   boost::asio::awaitable<Next> carry_out_stop(RequestParser& parser, Request request);
-  void admit(Request& request, Caller caller);
+  void admit(Request& request, identity::Caller caller);
   std::optional<Response> refusal_of(RequestParser& parser, const Request& head);
   boost::asio::awaitable<Next> refuse_unreadable(boost::system::error_code error);
   boost::asio::awaitable<Next> send_and_close(Response response, RequestMessage message);
@@ -72,24 +73,24 @@ class HttpConnection {
 
   void note_arrival();
   bool wants_upgrade(const Request& request, const RequestMessage& message) const;
-  bool begin_page(const Caller& caller);  // false: there are too many of one
+  bool begin_page(const identity::Caller& caller);  // false: there are too many of one
 
   HttpStream stream_;
-  ConnectionSlot& slot_;
-  TlsHandshakes* tls_;  // null: plain HTTP
-  Clock& clock_;
+  net::ConnectionSlot& slot_;
+  tls::TlsHandshakes* tls_;  // null: plain HTTP
+  runtime::Clock& clock_;
   const RequestGuard& guard_;
   const Router& router_;
   Upgrades& upgrades_;
-  ExceptionLog& exceptions_;
+  runtime::ExceptionLog& exceptions_;
   boost::beast::flat_buffer buffer_{kMaxHeaderBytes + kMaxBodyBytes};
   Deadline deadline_;
   AnswerSender sender_;
   bool request_has_begun_ = false;
   std::optional<std::int64_t> unread_since_us_;  // what was read last may have waited so long; empty: it has not
   std::optional<UpgradeRequest> upgrade_;
-  std::optional<Counted<std::size_t>> page_;  // among the pages of its caller
-  Caller caller_;                             // of the page
+  std::optional<runtime::Counted<std::size_t>> page_;  // among the pages of its caller
+  identity::Caller caller_;                            // of the page
 };
 
-}  // namespace server
+}  // namespace server::http

@@ -19,26 +19,26 @@
 #include "server/net/port_access.hpp"
 #include "server/runtime/tasks.hpp"
 
-namespace server {
+namespace server::http {
 
 class HttpServer {
  public:
-  HttpServer(TaskGroup& tasks, Clock& clock, Listener& listener, PortAccess& access, const RequestGuard& guard,
-             const Router& router, Upgrades& upgrades);
+  HttpServer(runtime::TaskGroup& tasks, runtime::Clock& clock, net::Listener& listener, net::PortAccess& access,
+             const RequestGuard& guard, const Router& router, Upgrades& upgrades);
 
   boost::asio::awaitable<void> run();  // accepts until cancelled
 
  private:
   void on_connection(HttpStream stream);
-  boost::asio::awaitable<void> serve(HttpStream stream, std::unique_ptr<ConnectionSlot> slot);
+  boost::asio::awaitable<void> serve(HttpStream stream, std::unique_ptr<net::ConnectionSlot> slot);
 
-  TaskGroup& tasks_;
-  Clock& clock_;
-  Listener& listener_;
-  PortAccess& access_;
+  runtime::TaskGroup& tasks_;
+  runtime::Clock& clock_;
+  net::Listener& listener_;
+  net::PortAccess& access_;
   const RequestGuard& guard_;
   const Router& router_;
   Upgrades& upgrades_;
 };
 
-}  // namespace server
+}  // namespace server::http

@@ -6,11 +6,11 @@
 #include "server/config/endpoint.hpp"
 #include "server/tls/stream_socket.hpp"
 
-namespace server {
+namespace server::http {
 
-using HttpStream = StreamSocket;
+using HttpStream = tls::StreamSocket;
 
 // Of the client, without its port.
-inline std::string address_of(const HttpStream& stream) { return host_of(stream.peer()); }
+inline std::string address_of(const HttpStream& stream) { return config::host_of(stream.peer()); }
 
-}  // namespace server
+}  // namespace server::http

@@ -7,7 +7,7 @@
 
 #include "server/http/router.hpp"
 
-namespace server {
+namespace server::http {
 namespace asio = boost::asio;
 
 namespace {
@@ -63,7 +63,7 @@ std::string cookie_value(const std::string& header, const std::string& name) {
   return {};
 }
 
-RequestGuard::RequestGuard(Auth& auth, std::vector<std::string> hosts, bool is_secure)
+RequestGuard::RequestGuard(identity::Auth& auth, std::vector<std::string> hosts, bool is_secure)
     : auth_{auth}, hosts_{std::move(hosts)}, scheme_{is_secure ? "https://" : "http://"} {
   std::ranges::transform(hosts_, hosts_.begin(), lower);
 }
@@ -86,11 +86,11 @@ std::optional<RequestGuard::Credential> RequestGuard::credential_of(const Reques
   }
   const std::string cookies = request.header("cookie");
   auto caller = auth_.caller_of_session(cookie_value(cookies, auth_.cookie_name()));
-  if (!caller) caller = auth_.caller_of_session(cookie_value(cookies, kOldSessionCookie));
+  if (!caller) caller = auth_.caller_of_session(cookie_value(cookies, identity::kOldSessionCookie));
   return caller ? std::optional{Credential{std::move(*caller), true}} : std::nullopt;
 }
 
-std::expected<Caller, Response> RequestGuard::admit(const Request& request) const {
+std::expected<identity::Caller, Response> RequestGuard::admit(const Request& request) const {
   const std::string host = request.header("host");
   if (!host_is_ours(host)) {
     return refuse(421, "this station does not answer to that Host; add the name to http.hosts in its configuration",
@@ -105,10 +105,10 @@ std::expected<Caller, Response> RequestGuard::admit(const Request& request) cons
     return refuse(403, "the request comes from a page of another origin", "wrong_origin");
   }
   const bool holds_data = live || path == "/metrics" || path.starts_with("/api/");
-  if (!holds_data && !changes_something(request)) return Caller{};
+  if (!holds_data && !changes_something(request)) return identity::Caller{};
   if (request.method == "POST" && path == kLoginPath) {
     if (!has_json_body(request)) return refuse_body();
-    return Caller{};
+    return identity::Caller{};
   }
 
   auto credential = credential_of(request);
@@ -121,10 +121,10 @@ std::expected<Caller, Response> RequestGuard::admit(const Request& request) cons
                   "wrong_origin");
   }
   if (!has_json_body(request)) return refuse_body();
-  if (live && !credential->caller.scopes.allow(Scope::read)) {
-    return std::unexpected{not_permitted(credential->caller, Scope::read)};
+  if (live && !credential->caller.scopes.allow(identity::Scope::read)) {
+    return std::unexpected{not_permitted(credential->caller, identity::Scope::read)};
   }
   return std::move(credential->caller);
 }
 
-}  // namespace server
+}  // namespace server::http

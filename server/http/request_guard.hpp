@@ -16,27 +16,27 @@
 #include "server/http/http.hpp"
 #include "server/identity/auth.hpp"
 
-namespace server {
+namespace server::http {
 
 class RequestGuard {
  public:
   // `hosts` are names or addresses without port, besides localhost and the loopback addresses. The station's own page
   // comes from https:// when the port is secure.
-  RequestGuard(Auth& auth, std::vector<std::string> hosts, bool is_secure = false);
+  RequestGuard(identity::Auth& auth, std::vector<std::string> hosts, bool is_secure = false);
 
   // Who asks (nobody where nobody needs to say), or the refusal.
-  std::expected<Caller, Response> admit(const Request& request) const;
+  std::expected<identity::Caller, Response> admit(const Request& request) const;
 
  private:
   struct Credential {
-    Caller caller;
+    identity::Caller caller;
     bool by_cookie = false;
   };
 
   bool host_is_ours(const std::string& host) const;
   std::optional<Credential> credential_of(const Request& request) const;
 
-  Auth& auth_;
+  identity::Auth& auth_;
   std::vector<std::string> hosts_;
   const char* scheme_;
 };
@@ -44,4 +44,4 @@ class RequestGuard {
 // Of the first cookie of this name in "a=1; b=2"; empty when there is none.
 std::string cookie_value(const std::string& header, const std::string& name);
 
-}  // namespace server
+}  // namespace server::http

@@ -10,7 +10,7 @@
 
 #include "server/http/router.hpp"
 
-namespace server {
+namespace server::http {
 namespace http = boost::beast::http;
 
 Request plain_head(const RequestMessage& message) {
@@ -74,4 +74,4 @@ std::optional<Response> unreadable(boost::system::error_code error) {
   return problem(400, "this is not HTTP/1.1: " + error.message(), "malformed_http");
 }
 
-}  // namespace server
+}  // namespace server::http

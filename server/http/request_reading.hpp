@@ -10,7 +10,7 @@
 
 #include "server/http/http.hpp"
 
-namespace server {
+namespace server::http {
 
 inline constexpr std::size_t kMaxHeaderBytes = 16 * 1024;
 inline constexpr std::size_t kMaxTargetBytes = 8 * 1024;
@@ -46,4 +46,4 @@ std::optional<Response> header_too_large(const RequestMessage& message);
 // To what the parser refused; none when the client has gone.
 std::optional<Response> unreadable(boost::system::error_code error);
 
-}  // namespace server
+}  // namespace server::http

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace server {
+namespace server::http {
 namespace asio = boost::asio;
 
 namespace {
@@ -35,7 +35,7 @@ void Router::add(Route route) {
   routes_.push_back(std::move(route));
 }
 
-Response not_permitted(const Caller& caller, Scope needed) {
+Response not_permitted(const identity::Caller& caller, identity::Scope needed) {
   const char* role = text(least_role(needed));
   std::string detail = fmt::format("this needs the role {} (a token: the scope {}); {} has the role {}", role,
                                    text(needed), caller.actor, text(caller.role()));
@@ -76,8 +76,8 @@ std::size_t Router::max_body_bytes(const std::string& method, const Target& targ
   return route == nullptr ? kMaxBodyBytes : route->max_body_bytes;
 }
 
-std::optional<Scope> Router::scope_lacking(const std::string& method, const Target& target,
-                                           const Caller& caller) const {
+std::optional<identity::Scope> Router::scope_lacking(const std::string& method, const Target& target,
+                                                     const identity::Caller& caller) const {
   const Route* route = find(method, target);
   if (route == nullptr || caller.scopes.allow(route->needs)) return std::nullopt;
   Request head;
@@ -128,4 +128,4 @@ Answer Router::dispatch(Request request) const {
   co_return problem(404, "there is nothing at this path", "unknown_path");
 }
 
-}  // namespace server
+}  // namespace server::http

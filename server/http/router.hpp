@@ -18,7 +18,7 @@
 
 #include "server/http/http.hpp"
 
-namespace server {
+namespace server::http {
 
 using Answer = boost::asio::awaitable<Response>;
 
@@ -27,7 +27,7 @@ inline constexpr std::size_t kMaxBodyBytes = 64 * 1024;  // of a request, where 
 struct Route {
   std::string method;
   std::string pattern;             // "/api/v1/robots/{robot_id}"
-  Scope needs;                     // no default: every route says it
+  identity::Scope needs;           // no default: every route says it
   std::vector<std::string> query;  // the parameters it knows
   std::function<Answer(Request)> answer;
   bool is_stop = false;  // SAFETY: an emergency stop, which is never refused for its form
@@ -38,7 +38,9 @@ class Router {
  public:
   void add(Route route);
   // Called for each caller that is refused for want of a scope.
-  void set_on_refused(std::function<void(const Request&, Scope)> on_refused) { on_refused_ = std::move(on_refused); }
+  void set_on_refused(std::function<void(const Request&, identity::Scope)> on_refused) {
+    on_refused_ = std::move(on_refused);
+  }
   void set_fallback(std::function<Response(const Request&)> fallback) { fallback_ = std::move(fallback); }
 
   // Whether the head alone, of this method and target, is reason enough to act.
@@ -47,7 +49,8 @@ class Router {
   // How long a body may be for it.
   std::size_t max_body_bytes(const std::string& method, const Target& target) const;
   // What the caller would need for it and has not, before a long body is read; on_refused has been called then.
-  std::optional<Scope> scope_lacking(const std::string& method, const Target& target, const Caller& caller) const;
+  std::optional<identity::Scope> scope_lacking(const std::string& method, const Target& target,
+                                               const identity::Caller& caller) const;
 
   // A coroutine that throws passes its exception on.
   Answer dispatch(Request request) const;
@@ -65,11 +68,11 @@ class Router {
 
   std::vector<Route> routes_;
   std::vector<Entry> entries_;
-  std::function<void(const Request&, Scope)> on_refused_;
+  std::function<void(const Request&, identity::Scope)> on_refused_;
   std::function<Response(const Request&)> fallback_;
 };
 
 // 403 that says which role is needed.
-Response not_permitted(const Caller& caller, Scope needed);
+Response not_permitted(const identity::Caller& caller, identity::Scope needed);
 
-}  // namespace server
+}  // namespace server::http

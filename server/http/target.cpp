@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace server {
+namespace server::http {
 namespace {
 
 int hex_value(char c) {
@@ -79,4 +79,4 @@ std::optional<Target::Query> Target::query() const {
   return query;
 }
 
-}  // namespace server
+}  // namespace server::http

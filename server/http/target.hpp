@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace server {
+namespace server::http {
 
 class Target {
  public:
@@ -38,4 +38,4 @@ std::vector<std::string> split(std::string_view text, char separator);
 // "%41" to "A"; empty when the text is not a valid encoding, or decodes to a control character.
 std::optional<std::string> percent_decode(std::string_view text, bool plus_is_space);
 
-}  // namespace server
+}  // namespace server::http

@@ -12,7 +12,7 @@
 #include "server/http/http_stream.hpp"
 #include "server/identity/caller.hpp"
 
-namespace server {
+namespace server::http {
 
 using UpgradeRequest = boost::beast::http::request<boost::beast::http::empty_body>;
 
@@ -20,8 +20,8 @@ using UpgradeRequest = boost::beast::http::request<boost::beast::http::empty_bod
 struct Upgrades {
   std::string path;
   // Ends when the connection does. Throws operation_aborted when cancelled.
-  std::function<boost::asio::awaitable<void>(HttpStream, UpgradeRequest, Caller)> serve;
+  std::function<boost::asio::awaitable<void>(HttpStream, UpgradeRequest, identity::Caller)> serve;
   std::map<std::string, std::size_t> open = {};  // connections, of each user, token or link
 };
 
-}  // namespace server
+}  // namespace server::http

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace server {
+namespace server::identity {
 
 using nlohmann::json;
 
@@ -120,10 +120,10 @@ Result<void> check_name(const std::string& name) {
 }
 
 Result<void> check_password(const std::string& password) {
-  if (password.size() >= kMinPasswordBytes && password.size() <= kMaxPasswordBytes) return {};
+  if (password.size() >= runtime::kMinPasswordBytes && password.size() <= runtime::kMaxPasswordBytes) return {};
   return fail(ErrorCode::invalid,
-              fmt::format("the password has {} bytes, allowed are {} to {}", password.size(), kMinPasswordBytes,
-                          kMaxPasswordBytes),
+              fmt::format("the password has {} bytes, allowed are {} to {}", password.size(),
+                          runtime::kMinPasswordBytes, runtime::kMaxPasswordBytes),
               "out_of_range");
 }
 
@@ -166,4 +166,4 @@ json to_json(const Enrolment& enrolment) {
           {"retired_by", enrolment.retired_by}};
 }
 
-}  // namespace server
+}  // namespace server::identity

@@ -12,7 +12,7 @@
 #include "server/runtime/result.hpp"
 #include "server/runtime/secrets.hpp"
 
-namespace server {
+namespace server::identity {
 
 enum class Role : std::uint8_t {
   viewer,     // sees everything, and may stop
@@ -72,7 +72,7 @@ struct User {
 
 struct ApiToken {
   std::string name;
-  SecretHash hash{};
+  runtime::SecretHash hash{};
   Scopes scopes;
   std::string owner;  // a user; empty: the station itself
   std::int64_t made_at_us = 0;
@@ -83,7 +83,7 @@ struct ApiToken {
 
 struct PageSession {
   std::uint64_t number = 0;
-  SecretHash hash{};
+  runtime::SecretHash hash{};
   std::string user;  // empty: let in by a one-time link
   std::int64_t made_at_us = 0;
   std::int64_t last_used_at_us = 0;
@@ -109,4 +109,4 @@ nlohmann::json to_json(const ApiToken& token);
 nlohmann::json to_json(const PageSession& session);
 nlohmann::json to_json(const Enrolment& enrolment);
 
-}  // namespace server
+}  // namespace server::identity

@@ -8,17 +8,17 @@
 #include "server/storage/audit/audit_chain.hpp"
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::identity {
 namespace {
 
-SecretHash read_hash(const SQLite::Column& column) {
-  SecretHash hash{};
+runtime::SecretHash read_hash(const SQLite::Column& column) {
+  runtime::SecretHash hash{};
   const auto* const bytes = static_cast<const unsigned char*>(column.getBlob());
   if (static_cast<std::size_t>(column.getBytes()) == hash.size()) std::copy_n(bytes, hash.size(), hash.begin());
   return hash;
 }
 
-void bind_hash(SQLite::Statement& statement, int index, const SecretHash& hash) {
+void bind_hash(SQLite::Statement& statement, int index, const runtime::SecretHash& hash) {
   statement.bind(index, hash.data(), static_cast<int>(hash.size()));
 }
 
@@ -45,9 +45,14 @@ ApiToken read_token(SQLite::Statement& row) {
 }
 
 PageSession read_session(SQLite::Statement& row) {
-  return {unsigned_id(row.getColumn(0)), read_hash(row.getColumn(1)), row.getColumn(2).getString(),
-          row.getColumn(3).getInt64(),   row.getColumn(4).getInt64(), row.getColumn(5).getInt64(),
-          row.getColumn(6).getString(),  row.getColumn(7).getString()};
+  return {storage::unsigned_id(row.getColumn(0)),
+          read_hash(row.getColumn(1)),
+          row.getColumn(2).getString(),
+          row.getColumn(3).getInt64(),
+          row.getColumn(4).getInt64(),
+          row.getColumn(5).getInt64(),
+          row.getColumn(6).getString(),
+          row.getColumn(7).getString()};
 }
 
 constexpr const char* kRobotColumns =
@@ -82,9 +87,9 @@ StoredAccounts AccountStore::load() {
                              "SELECT session, hash, user, made_at_us, last_used_at_us, ends_at_us, peer, agent"
                              " FROM page_session ORDER BY session",
                              read_session);
-  stored.next_session =
-      unsigned_id(database_.execAndGet("SELECT max(coalesce((SELECT value FROM meta WHERE name = 'next_session'), 1),"
-                                       " coalesce((SELECT max(session) FROM page_session), 0) + 1)"));
+  stored.next_session = storage::unsigned_id(
+      database_.execAndGet("SELECT max(coalesce((SELECT value FROM meta WHERE name = 'next_session'), 1),"
+                           " coalesce((SELECT max(session) FROM page_session), 0) + 1)"));
   stored.revoked_robots = read_all(database_, "SELECT robot_id FROM robot WHERE revoked_at_us IS NOT NULL",
                                    [](SQLite::Statement& row) { return row.getColumn(0).getString(); });
   return stored;
@@ -96,23 +101,23 @@ std::size_t AccountStore::count(const char* sql) {
 
 std::optional<User> AccountStore::find_user(const std::string& name) {
   SQLite::Statement query{database_, fmt::format("SELECT {} FROM user WHERE name = ?", kUserColumns)};
-  bind_all(query, name);
+  storage::bind_all(query, name);
   return query.executeStep() ? std::optional{read_user(query)} : std::nullopt;
 }
 
 // In the transaction of the change. An entry about a robot names it, so that it is found with the robot's others.
-void AccountStore::note(const Author& by, const char* action, const std::string& subject,
+void AccountStore::note(const station::Author& by, const char* action, const std::string& subject,
                         const nlohmann::json& detail) {
-  AuditNote note;
+  station::AuditNote note;
   note.by = by;
   note.action = action;
   const bool is_of_robot = note.action.starts_with("robot.");
   (is_of_robot ? note.robot_id : note.subject) = subject;
-  note.detail = audit_detail(detail);
-  AuditChain{database_}.append(note);
+  note.detail = station::audit_detail(detail);
+  storage::AuditChain{database_}.append(note);
 }
 
-Result<void> AccountStore::add_user(const User& user, const Author& by) {
+Result<void> AccountStore::add_user(const User& user, const station::Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   if (find_user(user.name)) {
     return fail(ErrorCode::conflict, fmt::format("there is a user '{}' already", user.name), "name_taken");
@@ -121,14 +126,14 @@ Result<void> AccountStore::add_user(const User& user, const Author& by) {
     return fail(ErrorCode::conflict, fmt::format("there are {} users; remove one first", kMaxUsers), "too_many");
   }
   SQLite::Statement add{database_, fmt::format("INSERT INTO user ({}) VALUES (?, ?, ?, ?, ?, ?)", kUserColumns)};
-  execute(add, user.name, text(user.role), user.password_hash, user.made_at_us, user.made_by,
-          std::int64_t{user.disabled});
+  storage::execute(add, user.name, text(user.role), user.password_hash, user.made_at_us, user.made_by,
+                   std::int64_t{user.disabled});
   note(by, "account.user_added", user.name, {{"role", text(user.role)}});
   transaction.commit();
   return {};
 }
 
-Result<User> AccountStore::change_user(const std::string& name, const UserChange& change, const Author& by) {
+Result<User> AccountStore::change_user(const std::string& name, const UserChange& change, const station::Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   std::optional<User> user = find_user(name);
   if (!user) return unknown("user", name);
@@ -136,10 +141,10 @@ Result<User> AccountStore::change_user(const std::string& name, const UserChange
   user->password_hash = change.password_hash.value_or(user->password_hash);
   user->disabled = change.disabled.value_or(user->disabled);
   SQLite::Statement update{database_, "UPDATE user SET role = ?, password_hash = ?, disabled = ? WHERE name = ?"};
-  execute(update, text(user->role), user->password_hash, std::int64_t{user->disabled}, name);
+  storage::execute(update, text(user->role), user->password_hash, std::int64_t{user->disabled}, name);
   if (change.password_hash || user->disabled) {
     SQLite::Statement end{database_, "DELETE FROM page_session WHERE user = ?"};
-    execute(end, name);
+    storage::execute(end, name);
   }
   nlohmann::json detail{{"role", text(user->role)}, {"disabled", user->disabled}};
   if (change.password_hash) detail["password"] = "changed";
@@ -148,23 +153,23 @@ Result<User> AccountStore::change_user(const std::string& name, const UserChange
   return *user;
 }
 
-Result<void> AccountStore::remove_user(const std::string& name, const Author& by) {
+Result<void> AccountStore::remove_user(const std::string& name, const station::Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement remove{database_, "DELETE FROM user WHERE name = ?"};
-  if (execute(remove, name) == 0) return unknown("user", name);
+  if (storage::execute(remove, name) == 0) return unknown("user", name);
   SQLite::Statement end{database_, "DELETE FROM page_session WHERE user = ?"};
-  execute(end, name);
+  storage::execute(end, name);
   SQLite::Statement revoke{database_, "UPDATE api_token SET revoked_at_us = ? WHERE owner = ? AND revoked_at_us = 0"};
-  execute(revoke, by.at_us, name);
+  storage::execute(revoke, by.at_us, name);
   note(by, "account.user_removed", name, nlohmann::json::object());
   transaction.commit();
   return {};
 }
 
-Result<void> AccountStore::add_token(const ApiToken& token, const Author& by) {
+Result<void> AccountStore::add_token(const ApiToken& token, const station::Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement known{database_, "SELECT 1 FROM api_token WHERE name = ?"};
-  bind_all(known, token.name);
+  storage::bind_all(known, token.name);
   if (known.executeStep()) {
     return fail(ErrorCode::conflict,
                 fmt::format("there is, or was, a token '{}'; the record of commands names tokens, so take another name",
@@ -188,19 +193,19 @@ Result<void> AccountStore::add_token(const ApiToken& token, const Author& by) {
   SQLite::Statement forget{database_,
                            "DELETE FROM api_token WHERE name IN (SELECT name FROM api_token WHERE revoked_at_us <> 0"
                            " ORDER BY revoked_at_us DESC LIMIT -1 OFFSET ?)"};
-  execute(forget, static_cast<std::int64_t>(kMaxTokens));
+  storage::execute(forget, static_cast<std::int64_t>(kMaxTokens));
   note(by, "account.token_made", token.name,
        {{"scopes", text(token.scopes)}, {"owner", token.owner}, {"expires_at_us", token.expires_at_us}});
   transaction.commit();
   return {};
 }
 
-Result<ApiToken> AccountStore::revoke_token(const std::string& name, const Author& by) {
+Result<ApiToken> AccountStore::revoke_token(const std::string& name, const station::Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement revoke{database_, "UPDATE api_token SET revoked_at_us = ?1 WHERE name = ?2 AND revoked_at_us = 0"};
-  const bool was_good = execute(revoke, by.at_us, name) > 0;
+  const bool was_good = storage::execute(revoke, by.at_us, name) > 0;
   SQLite::Statement query{database_, fmt::format("SELECT {} FROM api_token WHERE name = ?", kTokenColumns)};
-  bind_all(query, name);
+  storage::bind_all(query, name);
   if (!query.executeStep()) return unknown("token", name);
   ApiToken token = read_token(query);
   query.reset();
@@ -217,7 +222,7 @@ void AccountStore::replace_sessions(const std::vector<PageSession>& sessions, st
                         "INSERT INTO page_session (session, hash, user, made_at_us, last_used_at_us, ends_at_us, peer,"
                         " agent) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"};
   for (const PageSession& session : sessions) {
-    add.bind(1, signed_id(session.number));
+    add.bind(1, storage::signed_id(session.number));
     bind_hash(add, 2, session.hash);
     add.bind(3, session.user);
     add.bind(4, session.made_at_us);
@@ -229,9 +234,9 @@ void AccountStore::replace_sessions(const std::vector<PageSession>& sessions, st
     add.reset();
   }
   SQLite::Statement number{database_, "INSERT OR REPLACE INTO meta (name, value) VALUES ('next_session', ?)"};
-  execute(number, next_session);
+  storage::execute(number, next_session);
   SQLite::Statement use{database_, "UPDATE api_token SET last_used_at_us = ? WHERE name = ?"};
-  for (const ApiToken& token : used_tokens) execute(use, token.last_used_at_us, token.name);
+  for (const ApiToken& token : used_tokens) storage::execute(use, token.last_used_at_us, token.name);
   transaction.commit();
 }
 
@@ -241,11 +246,12 @@ std::vector<Enrolment> AccountStore::enrolments() {
 
 std::optional<Enrolment> AccountStore::find_robot(const std::string& robot_id) {
   SQLite::Statement query{database_, fmt::format("SELECT {} FROM robot WHERE robot_id = ?", kRobotColumns)};
-  bind_all(query, robot_id);
+  storage::bind_all(query, robot_id);
   return query.executeStep() ? std::optional{read_enrolment(query)} : std::nullopt;
 }
 
-Result<Enrolment> AccountStore::enrol(const std::string& robot_id, const SecretHash& token, const Author& by) {
+Result<Enrolment> AccountStore::enrol(const std::string& robot_id, const runtime::SecretHash& token,
+                                      const station::Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   const std::optional<Enrolment> known = find_robot(robot_id);
   if (known && known->has_token && known->revoked_at_us == 0) {
@@ -268,12 +274,12 @@ Result<Enrolment> AccountStore::enrol(const std::string& robot_id, const SecretH
   return *enrolled;
 }
 
-Result<Enrolment> AccountStore::revoke_robot(const std::string& robot_id, const Author& by) {
+Result<Enrolment> AccountStore::revoke_robot(const std::string& robot_id, const station::Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement revoke{database_,
                            "UPDATE robot SET revoked_at_us = ?, revoked_by = ?"
                            " WHERE robot_id = ? AND revoked_at_us IS NULL"};
-  const bool was_good = execute(revoke, by.at_us, by.actor, robot_id) > 0;
+  const bool was_good = storage::execute(revoke, by.at_us, by.actor, robot_id) > 0;
   const std::optional<Enrolment> revoked = find_robot(robot_id);
   if (!revoked) return unknown("robot", robot_id);
   if (was_good) note(by, "robot.revoked", robot_id, nlohmann::json::object());
@@ -281,12 +287,12 @@ Result<Enrolment> AccountStore::revoke_robot(const std::string& robot_id, const 
   return *revoked;
 }
 
-Result<Enrolment> AccountStore::set_retired(const std::string& robot_id, bool retired, const Author& by) {
+Result<Enrolment> AccountStore::set_retired(const std::string& robot_id, bool retired, const station::Author& by) {
   SQLite::Transaction transaction{database_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement retire{database_,
                            "UPDATE robot SET retired_at_us = ?2, retired_by = ?3"
                            " WHERE robot_id = ?1 AND (retired_at_us IS NULL) = ?4"};
-  bind_all(retire, robot_id);
+  storage::bind_all(retire, robot_id);
   if (retired) {
     retire.bind(2, by.at_us);
     retire.bind(3, by.actor);
@@ -300,4 +306,4 @@ Result<Enrolment> AccountStore::set_retired(const std::string& robot_id, bool re
   return *enrolment;
 }
 
-}  // namespace server
+}  // namespace server::identity

@@ -15,7 +15,7 @@
 #include "server/identity/account.hpp"
 #include "server/station/state/audit_note.hpp"
 
-namespace server {
+namespace server::identity {
 
 inline constexpr std::size_t kMaxUsers = 100;
 inline constexpr std::size_t kMaxTokens = 200;
@@ -43,15 +43,15 @@ class AccountStore {
   StoredAccounts load();
 
   // conflict: there is one of that name, or there are kMaxUsers.
-  Result<void> add_user(const User& user, const Author& by);
+  Result<void> add_user(const User& user, const station::Author& by);
   // not_found. A new password, or a user who is disabled, ends the user's sessions.
-  Result<User> change_user(const std::string& name, const UserChange& change, const Author& by);
-  Result<void> remove_user(const std::string& name, const Author& by);  // with sessions; tokens are revoked
+  Result<User> change_user(const std::string& name, const UserChange& change, const station::Author& by);
+  Result<void> remove_user(const std::string& name, const station::Author& by);  // with sessions; tokens are revoked
 
   // conflict: there was one of that name, or kMaxTokens are in use. The oldest of more than kMaxTokens that were
   // revoked is forgotten.
-  Result<void> add_token(const ApiToken& token, const Author& by);
-  Result<ApiToken> revoke_token(const std::string& name, const Author& by);
+  Result<void> add_token(const ApiToken& token, const station::Author& by);
+  Result<ApiToken> revoke_token(const std::string& name, const station::Author& by);
 
   // Everything that is in `sessions` is stored then, and nothing else; the tokens were last used then.
   void replace_sessions(const std::vector<PageSession>& sessions, std::uint64_t next_session,
@@ -59,18 +59,18 @@ class AccountStore {
 
   std::vector<Enrolment> enrolments();  // by robot
   // A robot that is new, was revoked, or has no token: it needs this one from now on. conflict: it has another.
-  Result<Enrolment> enrol(const std::string& robot_id, const SecretHash& token, const Author& by);
-  Result<Enrolment> revoke_robot(const std::string& robot_id, const Author& by);
+  Result<Enrolment> enrol(const std::string& robot_id, const runtime::SecretHash& token, const station::Author& by);
+  Result<Enrolment> revoke_robot(const std::string& robot_id, const station::Author& by);
   // A robot that is out of use: it may still connect. not_found.
-  Result<Enrolment> set_retired(const std::string& robot_id, bool retired, const Author& by);
+  Result<Enrolment> set_retired(const std::string& robot_id, bool retired, const station::Author& by);
 
  private:
   std::optional<User> find_user(const std::string& name);
   std::optional<Enrolment> find_robot(const std::string& robot_id);
   std::size_t count(const char* sql);
-  void note(const Author& by, const char* action, const std::string& subject, const nlohmann::json& detail);
+  void note(const station::Author& by, const char* action, const std::string& subject, const nlohmann::json& detail);
 
   SQLite::Database& database_;
 };
 
-}  // namespace server
+}  // namespace server::identity

@@ -8,7 +8,7 @@
 
 #include "server/storage/database/database.hpp"
 
-namespace server {
+namespace server::identity {
 namespace asio = boost::asio;
 
 namespace {
@@ -31,14 +31,15 @@ Error not_stored(Error error) {
 
 }  // namespace
 
-Accounts::Accounts(asio::io_context& loop, Clock& clock, Recorder& recorder, const std::filesystem::path& data_dir)
+Accounts::Accounts(asio::io_context& loop, runtime::Clock& clock, storage::Recorder& recorder,
+                   const std::filesystem::path& data_dir)
     : loop_{loop},
       clock_{clock},
       recorder_{recorder},
       old_sessions_file_{data_dir / "rheonaut.sessions"},
       sessions_{loop, clock},
       changed_{loop} {
-  SQLite::Database database = open_for_reading(recorder.path());
+  SQLite::Database database = storage::open_for_reading(recorder.path());
   const StoredAccounts stored = AccountStore{database}.load();
   for (const User& user : stored.users) users_.emplace(user.name, user);
   for (const ApiToken& token : stored.tokens) tokens_.push_back({token, std::make_shared<Standing>(loop)});
@@ -52,7 +53,7 @@ Accounts::Accounts(asio::io_context& loop, Clock& clock, Recorder& recorder, con
 
 template <class Job>
 asio::awaitable<std::invoke_result_t<Job, AccountStore&>> Accounts::on_store(Job job) {
-  auto guarded = [job = std::move(job)](Database& database) -> std::invoke_result_t<Job, AccountStore&> {
+  auto guarded = [job = std::move(job)](storage::Database& database) -> std::invoke_result_t<Job, AccountStore&> {
     try {
       AccountStore store{database.handle()};
       return job(store);
@@ -116,7 +117,7 @@ Caller Accounts::caller(std::string actor, const std::string& user, Scopes scope
 }
 
 std::optional<Caller> Accounts::caller_of_token(const std::string& secret) {
-  Token* token = find_secret(tokens_, hash_of(secret));
+  Token* token = runtime::find_secret(tokens_, runtime::hash_of(secret));
   const std::int64_t now_us = clock_.utc_us();
   if (token == nullptr || token->revoked_at_us != 0) return std::nullopt;
   if (token->expires_at_us != 0 && token->expires_at_us <= now_us) return std::nullopt;
@@ -149,7 +150,7 @@ std::string Accounts::open_session(const std::string& user, const std::string& p
   return secret;
 }
 
-bool Accounts::end_session(std::uint64_t number, const Author& by) {
+bool Accounts::end_session(std::uint64_t number, const station::Author& by) {
   const bool ended = sessions_.end(number);
   changed_.notify();
   if (ended) note(by, "account.session_ended", std::to_string(number), "{}", false);
@@ -162,8 +163,8 @@ void Accounts::on_refused_sign_in(const std::string& user, const std::string& pe
        true);
 }
 
-void Accounts::note(Author by, const char* action, std::string subject, std::string detail, bool can_flood) {
-  AuditNote note;
+void Accounts::note(station::Author by, const char* action, std::string subject, std::string detail, bool can_flood) {
+  station::AuditNote note;
   note.by = std::move(by);
   note.action = action;
   note.subject = std::move(subject);
@@ -177,7 +178,7 @@ const User* Accounts::find_user(const std::string& name) const {
   return user == users_.end() ? nullptr : &user->second;
 }
 
-asio::awaitable<Result<User>> Accounts::add_user(User user, Author by) {
+asio::awaitable<Result<User>> Accounts::add_user(User user, station::Author by) {
   user.made_at_us = by.at_us;
   user.made_by = by.actor;
   auto job = [user, by](AccountStore& store) { return store.add_user(user, by); };
@@ -196,7 +197,7 @@ void Accounts::renew_standing(const std::string& user) {
   }
 }
 
-asio::awaitable<Result<User>> Accounts::change_user(std::string name, UserChange change, Author by) {
+asio::awaitable<Result<User>> Accounts::change_user(std::string name, UserChange change, station::Author by) {
   const auto known = users_.find(name);
   const bool ends_sessions = change.password_hash.has_value() || change.disabled.value_or(false);
   const bool takes_rights =
@@ -217,7 +218,7 @@ asio::awaitable<Result<User>> Accounts::change_user(std::string name, UserChange
   co_return changed;
 }
 
-asio::awaitable<Result<void>> Accounts::remove_user(std::string name, Author by) {
+asio::awaitable<Result<void>> Accounts::remove_user(std::string name, station::Author by) {
   users_.erase(name);
   sessions_.end_of_user(name);
   for (Token& token : tokens_) {
@@ -232,11 +233,11 @@ asio::awaitable<Result<void>> Accounts::remove_user(std::string name, Author by)
 
 std::vector<ApiToken> Accounts::tokens() const { return {tokens_.begin(), tokens_.end()}; }
 
-asio::awaitable<Result<NewToken>> Accounts::add_token(TokenRequest request, Author by) {
+asio::awaitable<Result<NewToken>> Accounts::add_token(TokenRequest request, station::Author by) {
   NewToken made;
-  made.secret = random_secret();
+  made.secret = runtime::random_secret();
   made.token.name = request.name;
-  made.token.hash = hash_of(made.secret);
+  made.token.hash = runtime::hash_of(made.secret);
   made.token.scopes = request.scopes;
   made.token.owner = request.owner;
   made.token.made_at_us = by.at_us;
@@ -253,7 +254,7 @@ void Accounts::end_token(Token& token, std::int64_t utc_us) {
   token.standing->end();
 }
 
-asio::awaitable<Result<ApiToken>> Accounts::revoke_token(std::string name, Author by) {
+asio::awaitable<Result<ApiToken>> Accounts::revoke_token(std::string name, station::Author by) {
   for (Token& token : tokens_) {
     if (token.name == name) end_token(token, by.at_us);
   }
@@ -268,10 +269,10 @@ asio::awaitable<Result<std::vector<Enrolment>>> Accounts::enrolments() {
   co_return co_await on_store(std::move(job));
 }
 
-asio::awaitable<Result<NewEnrolment>> Accounts::enrol(std::string robot_id, Author by) {
+asio::awaitable<Result<NewEnrolment>> Accounts::enrol(std::string robot_id, station::Author by) {
   NewEnrolment made;
-  made.secret = random_secret();
-  auto job = [robot_id, by, hash = hash_of(made.secret)](AccountStore& store) {
+  made.secret = runtime::random_secret();
+  auto job = [robot_id, by, hash = runtime::hash_of(made.secret)](AccountStore& store) {
     return store.enrol(robot_id, hash, by);
   };
   auto enrolled = co_await on_store(std::move(job));
@@ -281,7 +282,7 @@ asio::awaitable<Result<NewEnrolment>> Accounts::enrol(std::string robot_id, Auth
   co_return made;
 }
 
-asio::awaitable<Result<Enrolment>> Accounts::revoke_robot(std::string robot_id, Author by) {
+asio::awaitable<Result<Enrolment>> Accounts::revoke_robot(std::string robot_id, station::Author by) {
   recorder_.set_revoked(robot_id, true);
   auto job = [robot_id, by](AccountStore& store) { return store.revoke_robot(robot_id, by); };
   const auto revoked = co_await on_store(std::move(job));
@@ -290,11 +291,11 @@ asio::awaitable<Result<Enrolment>> Accounts::revoke_robot(std::string robot_id, 
   co_return std::unexpected{not_stored(revoked.error())};
 }
 
-asio::awaitable<Result<Enrolment>> Accounts::set_retired(std::string robot_id, bool retired, Author by) {
+asio::awaitable<Result<Enrolment>> Accounts::set_retired(std::string robot_id, bool retired, station::Author by) {
   auto job = [robot_id, retired, by](AccountStore& store) { return store.set_retired(robot_id, retired, by); };
   auto stored = co_await on_store(std::move(job));
   if (!stored && !retired) co_return std::unexpected{not_stored(stored.error())};
   co_return stored;
 }
 
-}  // namespace server
+}  // namespace server::identity

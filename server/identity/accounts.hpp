@@ -18,7 +18,7 @@
 #include "server/identity/sessions.hpp"
 #include "server/storage/ingest/recorder.hpp"
 
-namespace server {
+namespace server::identity {
 
 inline constexpr std::int64_t kMaxTokenDays = 3650;
 
@@ -43,7 +43,8 @@ class Accounts {
  public:
   // Reads the database, which is open, and takes over the sessions of an older station's `rheonaut.sessions`. Throws
   // when the database cannot be read.
-  Accounts(boost::asio::io_context& loop, Clock& clock, Recorder& recorder, const std::filesystem::path& data_dir);
+  Accounts(boost::asio::io_context& loop, runtime::Clock& clock, storage::Recorder& recorder,
+           const std::filesystem::path& data_dir);
 
   // Writes what is to be written and ends what has run out, until cancelled.
   boost::asio::awaitable<void> run();
@@ -53,7 +54,7 @@ class Accounts {
 
   // The secret of a new session, for its cookie.
   std::string open_session(const std::string& user, const std::string& peer, const std::string& agent);
-  bool end_session(std::uint64_t number, const Author& by);
+  bool end_session(std::uint64_t number, const station::Author& by);
   // The audit has the name of a user that exists; another name may be a password typed in the wrong field.
   void on_refused_sign_in(const std::string& user, const std::string& peer, const char* reason);
   const std::list<Sessions::Open>& sessions() const { return sessions_.all(); }
@@ -61,20 +62,20 @@ class Accounts {
   const User* find_user(const std::string& name) const;  // null: there is none
   const std::map<std::string, User>& users() const { return users_; }
   // unavailable: the disk cannot be written now. Else what AccountStore says. `by.at_us` is when it is done.
-  boost::asio::awaitable<Result<User>> add_user(User user, Author by);
-  boost::asio::awaitable<Result<User>> change_user(std::string name, UserChange change, Author by);
-  boost::asio::awaitable<Result<void>> remove_user(std::string name, Author by);
+  boost::asio::awaitable<Result<User>> add_user(User user, station::Author by);
+  boost::asio::awaitable<Result<User>> change_user(std::string name, UserChange change, station::Author by);
+  boost::asio::awaitable<Result<void>> remove_user(std::string name, station::Author by);
 
   std::vector<ApiToken> tokens() const;
-  boost::asio::awaitable<Result<NewToken>> add_token(TokenRequest request, Author by);
-  boost::asio::awaitable<Result<ApiToken>> revoke_token(std::string name, Author by);
+  boost::asio::awaitable<Result<NewToken>> add_token(TokenRequest request, station::Author by);
+  boost::asio::awaitable<Result<ApiToken>> revoke_token(std::string name, station::Author by);
 
   boost::asio::awaitable<Result<std::vector<Enrolment>>> enrolments();
-  boost::asio::awaitable<Result<NewEnrolment>> enrol(std::string robot_id, Author by);
+  boost::asio::awaitable<Result<NewEnrolment>> enrol(std::string robot_id, station::Author by);
   // The robot is refused from now on; the caller ends its connection.
-  boost::asio::awaitable<Result<Enrolment>> revoke_robot(std::string robot_id, Author by);
+  boost::asio::awaitable<Result<Enrolment>> revoke_robot(std::string robot_id, station::Author by);
   // Only stores it. The caller notifies the station: before, when a robot returns to use; after, when it retires.
-  boost::asio::awaitable<Result<Enrolment>> set_retired(std::string robot_id, bool retired, Author by);
+  boost::asio::awaitable<Result<Enrolment>> set_retired(std::string robot_id, bool retired, station::Author by);
 
  private:
   struct Token : ApiToken {
@@ -88,11 +89,11 @@ class Accounts {
   void sweep();
   void end_token(Token& token, std::int64_t utc_us);
   void renew_standing(const std::string& user);
-  void note(Author by, const char* action, std::string subject, std::string detail, bool can_flood);
+  void note(station::Author by, const char* action, std::string subject, std::string detail, bool can_flood);
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
-  Recorder& recorder_;
+  runtime::Clock& clock_;
+  storage::Recorder& recorder_;
   std::filesystem::path old_sessions_file_;
   std::map<std::string, User> users_;
   std::list<Token> tokens_;
@@ -100,7 +101,7 @@ class Accounts {
   std::uint64_t token_uses_ = 0;  // grows with what is worth to be stored of tokens
   std::uint64_t saved_revision_ = 0;
   bool save_failed_ = false;
-  Signal changed_;
+  runtime::Signal changed_;
 };
 
-}  // namespace server
+}  // namespace server::identity

@@ -13,7 +13,7 @@
 
 #include "server/runtime/private_file.hpp"
 
-namespace server {
+namespace server::identity {
 namespace {
 
 namespace fs = std::filesystem;
@@ -26,7 +26,7 @@ std::string load_or_make_token(const fs::path& file) {
   std::string token;
   std::ifstream in{file};
   std::getline(in, token);
-  if (is_secret(token)) {
+  if (runtime::is_secret(token)) {
     struct stat status{};
     if (::stat(file.c_str(), &status) != 0) cannot("look at", file);
     if ((status.st_mode & 077U) != 0) {
@@ -36,31 +36,31 @@ std::string load_or_make_token(const fs::path& file) {
     return token;
   }
   if (fs::exists(file)) spdlog::warn("{} held no valid token; a new one was made", file.string());
-  token = random_secret();
-  write_private(file, token + "\n");
+  token = runtime::random_secret();
+  runtime::write_private(file, token + "\n");
   return token;
 }
 
 }  // namespace
 
-Auth::Auth(boost::asio::io_context& loop, Clock& clock, Accounts& accounts, const fs::path& data_dir,
+Auth::Auth(boost::asio::io_context& loop, runtime::Clock& clock, Accounts& accounts, const fs::path& data_dir,
            std::uint64_t store_id)
     : clock_{clock},
       accounts_{accounts},
       cookie_name_{fmt::format("{}_{:016x}", kOldSessionCookie, store_id)},
-      token_{hash_of(load_or_make_token(data_dir / "rheonaut.token"))},
+      token_{runtime::hash_of(load_or_make_token(data_dir / "rheonaut.token"))},
       token_standing_{std::make_shared<Standing>(loop)} {}
 
 std::string Auth::new_login_code() {
   std::erase_if(codes_, [now_us = clock_.steady_us()](const Code& code) { return code.ends_at_us <= now_us; });
   if (codes_.size() >= kMaxLoginCodes) codes_.pop_front();
-  std::string code = random_secret();
-  codes_.push_back({hash_of(code), clock_.steady_us() + kLoginCodeValidity.count()});
+  std::string code = runtime::random_secret();
+  codes_.push_back({runtime::hash_of(code), clock_.steady_us() + kLoginCodeValidity.count()});
   return code;
 }
 
 std::optional<std::string> Auth::log_in(const std::string& code, const std::string& peer, const std::string& agent) {
-  const Code* found = find_secret(codes_, hash_of(code));
+  const Code* found = runtime::find_secret(codes_, runtime::hash_of(code));
   const bool in_time = found != nullptr && found->ends_at_us > clock_.steady_us();
   codes_.remove_if([found](const Code& each) { return &each == found; });
   if (!in_time) {
@@ -71,7 +71,8 @@ std::optional<std::string> Auth::log_in(const std::string& code, const std::stri
 }
 
 std::optional<Caller> Auth::caller_of_token(const std::string& token) const {
-  if (same(hash_of(token), token_)) return Caller{"token:local", "", Scopes::of(Role::admin), 0, token_standing_, {}};
+  if (runtime::same(runtime::hash_of(token), token_))
+    return Caller{"token:local", "", Scopes::of(Role::admin), 0, token_standing_, {}};
   return accounts_.caller_of_token(token);
 }
 
@@ -94,4 +95,4 @@ Result<void> still_stands(const Caller& caller) {
       "not_permitted");
 }
 
-}  // namespace server
+}  // namespace server::identity

@@ -12,7 +12,7 @@
 
 #include "server/identity/accounts.hpp"
 
-namespace server {
+namespace server::identity {
 
 inline constexpr microseconds kLoginCodeValidity{std::chrono::minutes{10}};
 inline constexpr microseconds kCookieValidity{
@@ -23,7 +23,7 @@ inline constexpr const char* kOldSessionCookie = "rheonaut_session";  // of stat
 class Auth {
  public:
   // Reads the token or makes one. Throws std::runtime_error that names the file.
-  Auth(boost::asio::io_context& loop, Clock& clock, Accounts& accounts, const std::filesystem::path& data_dir,
+  Auth(boost::asio::io_context& loop, runtime::Clock& clock, Accounts& accounts, const std::filesystem::path& data_dir,
        std::uint64_t store_id);
 
   std::string new_login_code();  // the oldest code is forgotten when there are too many
@@ -42,14 +42,14 @@ class Auth {
 
  private:
   struct Code {
-    SecretHash hash{};
+    runtime::SecretHash hash{};
     std::int64_t ends_at_us = 0;  // steady
   };
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   Accounts& accounts_;
   std::string cookie_name_;
-  SecretHash token_{};
+  runtime::SecretHash token_{};
   std::shared_ptr<Standing> token_standing_;  // never ends
   std::list<Code> codes_;                     // oldest first
 };
@@ -57,4 +57,4 @@ class Auth {
 // SAFETY: nobody's credential outlives a wait: what has ended meanwhile, or has other rights now, commands nothing.
 Result<void> still_stands(const Caller& caller);
 
-}  // namespace server
+}  // namespace server::identity

@@ -8,7 +8,7 @@
 #include "server/identity/account.hpp"
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::identity {
 
 // Whether a credential still holds, shared by its users: ends when it is revoked or expires, or its role changes.
 // Loop thread.
@@ -27,7 +27,7 @@ class Standing {
 
  private:
   bool ended_ = false;
-  Signal changed_;
+  runtime::Signal changed_;
 };
 
 struct Caller {
@@ -41,4 +41,4 @@ struct Caller {
   Role role() const { return scopes.role(); }
 };
 
-}  // namespace server
+}  // namespace server::identity

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <stdexcept>
 
-namespace server {
+namespace server::identity {
 
 LoginThrottle::Key LoginThrottle::random_key() {
   static_assert(sizeof(Key) == crypto_shorthash_KEYBYTES);
@@ -27,7 +27,7 @@ std::size_t LoginThrottle::place_of(const std::string& name) const {
 
 microseconds LoginThrottle::wait(const std::string& user, const std::string& address, std::int64_t now_us) const {
   const std::int64_t next_us =
-      std::max(users_[place_of(user)].next_us, addresses_[place_of(network_of(address))].next_us);
+      std::max(users_[place_of(user)].next_us, addresses_[place_of(config::network_of(address))].next_us);
   return microseconds{std::max<std::int64_t>(0, next_us - now_us)};
 }
 
@@ -44,14 +44,14 @@ void LoginThrottle::add_failure(Place& place, int free, microseconds longest, st
 
 void LoginThrottle::on_attempt(const std::string& user, const std::string& address, std::int64_t now_us) {
   add_failure(users_[place_of(user)], kFreeOfUser, kLongestOfUser, now_us);
-  add_failure(addresses_[place_of(network_of(address))], kFreeOfAddress, kLongestOfAddress, now_us);
+  add_failure(addresses_[place_of(config::network_of(address))], kFreeOfAddress, kLongestOfAddress, now_us);
 }
 
 void LoginThrottle::on_success(const std::string& user, const std::string& address) {
   users_[place_of(user)] = {};
-  Place& place = addresses_[place_of(network_of(address))];
+  Place& place = addresses_[place_of(config::network_of(address))];
   place.failures = std::max(0, place.failures - 1);
   if (place.failures < kFreeOfAddress) place.next_us = 0;
 }
 
-}  // namespace server
+}  // namespace server::identity

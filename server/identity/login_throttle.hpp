@@ -16,7 +16,7 @@
 #include "server/config/endpoint.hpp"
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::identity {
 
 class LoginThrottle {
  public:
@@ -55,4 +55,4 @@ class LoginThrottle {
   Places addresses_ = Places(kPlaces);
 };
 
-}  // namespace server
+}  // namespace server::identity

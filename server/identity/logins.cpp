@@ -5,7 +5,7 @@
 
 #include "server/runtime/counted.hpp"
 
-namespace server {
+namespace server::identity {
 namespace asio = boost::asio;
 
 namespace {
@@ -44,13 +44,13 @@ asio::awaitable<std::expected<std::string, LoginRefusal>> Logins::log_in(LoginAt
     co_return refuse(ErrorCode::unavailable, "too many attempts have failed; wait before the next one", "throttled",
                      wait);
   }
-  const std::string network = network_of(attempt.peer);
+  const std::string network = config::network_of(attempt.peer);
   const auto of_address = waiting_of_address_.find(network);
   const bool address_waits = of_address != waiting_of_address_.end() && of_address->second >= kMaxWaitingOfAddress;
   if (waiting_ >= kMaxWaitingLogins || address_waits) {
     co_return refuse(ErrorCode::unavailable, "too many are signing in just now; try again", "busy", kBusyRetry);
   }
-  const Counted counted{waiting_};
+  const runtime::Counted counted{waiting_};
   const Waiting waiting{waiting_of_address_, network};
   throttle_.on_attempt(attempt.user, attempt.peer, clock_.steady_us());
   const bool right = co_await is_right(attempt);
@@ -65,12 +65,12 @@ asio::awaitable<std::expected<std::string, LoginRefusal>> Logins::log_in(LoginAt
 }
 
 asio::awaitable<bool> Logins::is_right(const LoginAttempt& attempt) {
-  if (attempt.password.size() > kMaxPasswordBytes) co_return false;
+  if (attempt.password.size() > runtime::kMaxPasswordBytes) co_return false;
   const User* user = accounts_.find_user(attempt.user);
   const std::string stored = user == nullptr ? std::string{} : user->password_hash;
   ++hashes_made_;
   auto job = [password = attempt.password, stored, cost = cost_] {
-    if (!stored.empty()) return is_password(password, stored);
+    if (!stored.empty()) return runtime::is_password(password, stored);
     hash_password(password, cost);  // an unknown user takes as long
     return false;
   };
@@ -83,10 +83,10 @@ asio::awaitable<bool> Logins::is_right(const LoginAttempt& attempt) {
 asio::awaitable<Result<std::string>> Logins::hash(std::string password) {
   if (auto checked = check_password(password); !checked) co_return std::unexpected{checked.error()};
   if (waiting_ >= kMaxWaitingLogins) co_return fail(ErrorCode::unavailable, "too many are signing in just now", "busy");
-  const Counted counted{waiting_};
+  const runtime::Counted counted{waiting_};
   ++hashes_made_;
   auto job = [password = std::move(password), cost = cost_] { return hash_password(password, cost); };
   co_return co_await worker_.run(std::move(job));
 }
 
-}  // namespace server
+}  // namespace server::identity

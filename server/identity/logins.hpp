@@ -14,7 +14,7 @@
 #include "server/identity/login_throttle.hpp"
 #include "server/runtime/worker.hpp"
 
-namespace server {
+namespace server::identity {
 
 inline constexpr std::size_t kMaxWaitingLogins = 8;
 inline constexpr std::size_t kMaxWaitingOfAddress = 2;
@@ -33,7 +33,8 @@ struct LoginRefusal {
 
 class Logins {
  public:
-  Logins(Clock& clock, Accounts& accounts, PasswordCost cost) : clock_{clock}, accounts_{accounts}, cost_{cost} {}
+  Logins(runtime::Clock& clock, Accounts& accounts, runtime::PasswordCost cost)
+      : clock_{clock}, accounts_{accounts}, cost_{cost} {}
 
   // The secret of a new session, for its cookie. unauthorized: user or password is wrong; unavailable: after so long.
   boost::asio::awaitable<std::expected<std::string, LoginRefusal>> log_in(LoginAttempt attempt);
@@ -41,20 +42,20 @@ class Logins {
   // For a user's new password. invalid: its length; unavailable: too many wait.
   boost::asio::awaitable<Result<std::string>> hash(std::string password);
 
-  const WorkerThread& worker() const { return worker_; }
+  const runtime::WorkerThread& worker() const { return worker_; }
   std::uint64_t hashes_made() const { return hashes_made_; }
 
  private:
   boost::asio::awaitable<bool> is_right(const LoginAttempt& attempt);
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   Accounts& accounts_;
-  PasswordCost cost_;
+  runtime::PasswordCost cost_;
   LoginThrottle throttle_;
   std::map<std::string, std::size_t> waiting_of_address_;  // at most kMaxWaitingLogins of them
   std::size_t waiting_ = 0;
   std::uint64_t hashes_made_ = 0;
-  WorkerThread worker_{"passwords", 10};
+  runtime::WorkerThread worker_{"passwords", 10};
 };
 
-}  // namespace server
+}  // namespace server::identity

@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <fstream>
 
-namespace server {
+namespace server::identity {
 namespace {
 
 constexpr std::size_t kMaxAgentBytes = 120;
 
-bool read_hex(const std::string& hex, SecretHash& hash) {
+bool read_hex(const std::string& hex, runtime::SecretHash& hash) {
   std::size_t size = 0;
   return sodium_hex2bin(hash.data(), hash.size(), hex.data(), hex.size(), nullptr, &size, nullptr) == 0 &&
          size == hash.size();
@@ -35,7 +35,7 @@ std::size_t Sessions::take_over(const std::filesystem::path& file) {
   std::size_t taken = 0;
   while (taken < kMaxSessionsOfLinks && in >> session.number >> session.ends_at_us >> hex) {
     if (!read_hex(hex, session.hash)) break;
-    if (find_secret(sessions_, session.hash) != nullptr || session.ends_at_us <= clock_.utc_us()) continue;
+    if (runtime::find_secret(sessions_, session.hash) != nullptr || session.ends_at_us <= clock_.utc_us()) continue;
     next_number_ = std::max(next_number_, session.number + 1);
     session.made_at_us = session.last_used_at_us = clock_.utc_us();
     sessions_.push_back({session, std::make_shared<Standing>(loop_), 0});
@@ -48,12 +48,10 @@ std::size_t Sessions::take_over(const std::filesystem::path& file) {
 std::string Sessions::add(const std::string& user, const std::string& peer, const std::string& agent) {
   sweep();
   make_room(user);
-  std::string secret = random_secret();
+  std::string secret = runtime::random_secret();
   const std::int64_t now_us = clock_.utc_us();
-  const PageSession session{next_number_++, hash_of(secret),
-                            user,           now_us,
-                            now_us,         now_us + kSessionValidity.count(),
-                            peer,           agent.substr(0, kMaxAgentBytes)};
+  const PageSession session{next_number_++, runtime::hash_of(secret),          user, now_us,
+                            now_us,         now_us + kSessionValidity.count(), peer, agent.substr(0, kMaxAgentBytes)};
   sessions_.push_back({session, std::make_shared<Standing>(loop_), 0});
   ++revision_;
   return secret;
@@ -73,7 +71,7 @@ void Sessions::make_room(const std::string& user) {
 }
 
 const Sessions::Open* Sessions::find(const std::string& secret) {
-  Open* session = find_secret(sessions_, hash_of(secret));
+  Open* session = runtime::find_secret(sessions_, runtime::hash_of(secret));
   if (session == nullptr || session->ends_at_us <= clock_.utc_us()) return nullptr;
   renew(*session);
   return session;
@@ -132,4 +130,4 @@ void Sessions::on_saved() {
   for (Open& session : sessions_) session.saved_end_us = session.ends_at_us;
 }
 
-}  // namespace server
+}  // namespace server::identity

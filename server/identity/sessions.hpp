@@ -12,7 +12,7 @@
 
 #include "server/identity/caller.hpp"
 
-namespace server {
+namespace server::identity {
 
 inline constexpr microseconds kSessionValidity{std::chrono::hours{12}};  // from its last use
 inline constexpr microseconds kSessionSaveInterval{std::chrono::hours{1}};
@@ -26,7 +26,7 @@ class Sessions {
     std::int64_t saved_end_us = 0;  // at most an hour before ends_at_us
   };
 
-  Sessions(boost::asio::io_context& loop, Clock& clock) : loop_{loop}, clock_{clock} {}
+  Sessions(boost::asio::io_context& loop, runtime::Clock& clock) : loop_{loop}, clock_{clock} {}
 
   void load(const std::vector<PageSession>& stored, std::uint64_t next_number);
   // Those of an older station, which kept them in a file: they were let in by links. How many were new.
@@ -53,10 +53,10 @@ class Sessions {
   void remove(std::list<Open>::iterator session);
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
+  runtime::Clock& clock_;
   std::list<Open> sessions_;
   std::uint64_t next_number_ = 1;
   std::uint64_t revision_ = 0;
 };
 
-}  // namespace server
+}  // namespace server::identity

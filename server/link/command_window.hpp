@@ -13,7 +13,7 @@
 
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::link {
 
 class CommandWindow {
  public:
@@ -39,7 +39,7 @@ class CommandWindow {
     found->places = 1;
     found->due_robot_us = ack.effect_at_robot_us;
   }
-  void ended(CommandId id) {
+  void ended(station::CommandId id) {
     std::erase_if(written_, [id](const Written& one) { return one.id == id; });
   }
   // By a frame that robots send after every acknowledgement that is due. Two ticks after its time a command has run, or
@@ -52,7 +52,7 @@ class CommandWindow {
 
  private:
   struct Written {
-    CommandId id;
+    station::CommandId id;
     std::int64_t deadline_us;
     std::size_t places;
     std::uint64_t due_robot_us = std::numeric_limits<std::uint64_t>::max();  // once it waits there
@@ -62,4 +62,4 @@ class CommandWindow {
   std::vector<Written> written_;
 };
 
-}  // namespace server
+}  // namespace server::link

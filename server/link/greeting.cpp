@@ -6,7 +6,7 @@
 
 #include "server/station/state/checked.hpp"
 
-namespace server {
+namespace server::link {
 namespace {
 
 template <std::size_t size>
@@ -29,24 +29,25 @@ std::optional<Refusal> refusal_of(const protocol::Hello& hello, std::uint64_t ro
                                                         std::to_string(protocol::kProtocolVersion) + ", the robot " +
                                                         std::to_string(hello.protocol_version)};
   }
-  const bool samples_can_be = hello.oldest_seq <= hello.next_seq && hello.next_seq <= kMaxRobotNumber;
-  const bool events_can_be = hello.oldest_event_seq <= hello.next_event_seq && hello.next_event_seq <= kMaxRobotNumber;
+  const bool samples_can_be = hello.oldest_seq <= hello.next_seq && hello.next_seq <= station::kMaxRobotNumber;
+  const bool events_can_be =
+      hello.oldest_event_seq <= hello.next_event_seq && hello.next_event_seq <= station::kMaxRobotNumber;
   if (is_robot_id(hello.robot_id) && hello.boot_id != 0 && samples_can_be && events_can_be &&
-      robot_time_us <= kMaxRobotNumber) {
+      robot_time_us <= station::kMaxRobotNumber) {
     return std::nullopt;
   }
   return Refusal{rheonaut_REFUSAL_REASON_MALFORMED,
                  "robot_id must be 1 to 31 of [a-z0-9_-], boot_id not 0, and oldest_seq ≤ next_seq"};
 }
 
-std::optional<Refusal> refusal_of(const Admission& admission) {
+std::optional<Refusal> refusal_of(const station::Admission& admission) {
   if (admission.refusal == rheonaut_REFUSAL_REASON_NONE) return std::nullopt;
   return Refusal{admission.refusal, admission.detail};
 }
 
-AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t robot_time_us, bool from_loopback,
-                                   std::int64_t received_at_us) {
-  AdmissionRequest request;
+station::AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t robot_time_us,
+                                            bool from_loopback, std::int64_t received_at_us) {
+  station::AdmissionRequest request;
   request.robot_id = hello.robot_id;
   request.token = hello.token;
   request.from_loopback = from_loopback;
@@ -65,7 +66,7 @@ AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t r
   return request;
 }
 
-protocol::Welcome welcome_of(const Admission& admission, const LinkTimes& times, std::int64_t utc_us) {
+protocol::Welcome welcome_of(const station::Admission& admission, const config::LinkTimes& times, std::int64_t utc_us) {
   protocol::Welcome welcome = rheonaut_Welcome_init_zero;
   welcome.protocol_version = protocol::kProtocolVersion;
   welcome.store_id = admission.store_id;
@@ -86,4 +87,4 @@ protocol::Welcome welcome_of(const Refusal& refusal) {
   return welcome;
 }
 
-}  // namespace server
+}  // namespace server::link

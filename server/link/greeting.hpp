@@ -11,7 +11,7 @@
 #include "server/config/link_settings.hpp"
 #include "server/station/state/robot_archive.hpp"
 
-namespace server {
+namespace server::link {
 
 struct Refusal {
   protocol::RefusalReason reason = rheonaut_REFUSAL_REASON_NONE;
@@ -22,14 +22,14 @@ struct Refusal {
 // judge its numbers again.
 std::optional<Refusal> refusal_of(const protocol::Hello& hello, std::uint64_t robot_time_us);
 // Of a robot that the archive does not admit.
-std::optional<Refusal> refusal_of(const Admission& admission);
+std::optional<Refusal> refusal_of(const station::Admission& admission);
 
 // What the archive is asked. `robot_time_us` is that of the Hello's frame, `received_at_us` UTC.
-AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t robot_time_us, bool from_loopback,
-                                   std::int64_t received_at_us);
+station::AdmissionRequest admission_request(const protocol::Hello& hello, std::uint64_t robot_time_us,
+                                            bool from_loopback, std::int64_t received_at_us);
 
-protocol::Welcome welcome_of(const Admission& admission, const LinkTimes& times, std::int64_t utc_us);
+protocol::Welcome welcome_of(const station::Admission& admission, const config::LinkTimes& times, std::int64_t utc_us);
 // Says no; the detail is cut to the room of the message.
 protocol::Welcome welcome_of(const Refusal& refusal);
 
-}  // namespace server
+}  // namespace server::link

@@ -11,36 +11,38 @@
 #include "server/net/port_access.hpp"
 #include "server/runtime/tasks.hpp"
 
-namespace server {
+namespace server::link {
 
 class RobotListener {
  public:
-  RobotListener(boost::asio::io_context& loop, Clock& clock, TaskGroup& tasks, Station& station, RobotArchive& archive,
-                const boost::asio::ip::tcp::endpoint& endpoint, bool or_any_port, PortAccess& access);
+  RobotListener(boost::asio::io_context& loop, runtime::Clock& clock, runtime::TaskGroup& tasks,
+                station::Station& station, station::RobotArchive& archive,
+                const boost::asio::ip::tcp::endpoint& endpoint, bool or_any_port, net::PortAccess& access);
 
   boost::asio::awaitable<void> run();
 
   // Serves an already connected stream, e.g. one end of a MemoryLink.
-  void serve(std::unique_ptr<ByteStream> stream);
+  void serve(std::unique_ptr<net::ByteStream> stream);
 
   boost::asio::ip::tcp::endpoint endpoint() const { return listener_.endpoint(); }
 
  private:
-  void accept(StreamSocket socket);
-  boost::asio::awaitable<void> secure_session(StreamSocket socket, std::unique_ptr<ConnectionSlot> slot);
-  boost::asio::awaitable<void> session(std::unique_ptr<ByteStream> stream, std::unique_ptr<ConnectionSlot> slot);
+  void accept(tls::StreamSocket socket);
+  boost::asio::awaitable<void> secure_session(tls::StreamSocket socket, std::unique_ptr<net::ConnectionSlot> slot);
+  boost::asio::awaitable<void> session(std::unique_ptr<net::ByteStream> stream,
+                                       std::unique_ptr<net::ConnectionSlot> slot);
   void log_unwelcome(const std::string& peer, const std::string& why);
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
-  TaskGroup& tasks_;
-  Station& station_;
-  RobotArchive& archive_;
-  Listener listener_;
-  PortAccess& access_;
-  SparseLines lines_;
+  runtime::Clock& clock_;
+  runtime::TaskGroup& tasks_;
+  station::Station& station_;
+  station::RobotArchive& archive_;
+  net::Listener listener_;
+  net::PortAccess& access_;
+  runtime::SparseLines lines_;
   ReadBuffers buffers_{};
-  PollSet sockets_;  // of the robots
+  net::PollSet sockets_;  // of the robots
 };
 
-}  // namespace server
+}  // namespace server::link

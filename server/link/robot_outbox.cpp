@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace server {
+namespace server::link {
 namespace {
 
 constexpr std::int64_t kProbePeriodUs = 1'000'000;
@@ -24,7 +24,7 @@ bool RobotOutbox::enqueue(const protocol::Command& command, std::int64_t deadlin
   return true;
 }
 
-bool RobotOutbox::withdraw(CommandId id) {
+bool RobotOutbox::withdraw(station::CommandId id) {
   return std::erase_if(commands_, [id](const QueuedCommand& queued) { return queued.command.command_id == id; }) > 0;
 }
 
@@ -128,4 +128,4 @@ protocol::StationHeartbeat RobotOutbox::take_heartbeat(std::int64_t now_us) {
   return heartbeat;
 }
 
-}  // namespace server
+}  // namespace server::link

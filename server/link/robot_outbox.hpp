@@ -14,7 +14,7 @@
 #include "server/link/command_window.hpp"
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::link {
 
 class RobotOutbox {
  public:
@@ -30,7 +30,7 @@ class RobotOutbox {
   void welcome(const protocol::Welcome& welcome);
   // To be written before `deadline_us` or not at all; false when the queue is full.
   bool enqueue(const protocol::Command& command, std::int64_t deadline_us);
-  bool withdraw(CommandId id);  // false when it is not queued (any more)
+  bool withdraw(station::CommandId id);  // false when it is not queued (any more)
   // SAFETY: ahead of everything that waits; drops the queued commands, which it supersedes. Never refused.
   void enqueue_stop(const protocol::Command& command);
   // What the following heartbeats say is durable; the next one leaves when something came from the robot.
@@ -45,7 +45,7 @@ class RobotOutbox {
     window_.robot_time_is(robot_time_us, tick_us);
   }
   void on_ack(const protocol::CommandAck& ack);
-  void on_event_of(CommandId id) { window_.ended(id); }
+  void on_event_of(station::CommandId id) { window_.ended(id); }
   // False when the probe of the robot's clock that waits for its answer had another stamp.
   bool on_probe_answer(std::uint64_t echo_station_time_us);
 
@@ -56,7 +56,7 @@ class RobotOutbox {
   std::int64_t next_heartbeat_us() const { return next_heartbeat_us_; }
 
   struct Written {
-    std::optional<CommandId> command_id;  // of a command or a stop
+    std::optional<station::CommandId> command_id;  // of a command or a stop
   };
   // Writes the frame that is due first; nothing when none is due, or while something is unsent.
   std::optional<Written> write_next(std::int64_t now_us, const Writer& write);
@@ -79,8 +79,8 @@ class RobotOutbox {
   std::array<std::uint8_t, protocol::kMaxFramedBytes> output_{};
   protocol::Bytes unsent_;  // of output_
   std::optional<protocol::Welcome> welcome_;
-  std::deque<protocol::Command> stops_;               // SAFETY: always written first
-  CommandId awaited_stop_ = 0, awaited_command_ = 0;  // the last that was written and is not answered; 0: none
+  std::deque<protocol::Command> stops_;                        // SAFETY: always written first
+  station::CommandId awaited_stop_ = 0, awaited_command_ = 0;  // the last that was written and is not answered; 0: none
   std::deque<QueuedCommand> commands_;
   CommandWindow window_;                                                        // SAFETY: of all but stops
   protocol::StationHeartbeat heartbeat_ = rheonaut_StationHeartbeat_init_zero;  // the next one, but for the probe
@@ -90,4 +90,4 @@ class RobotOutbox {
   std::uint64_t probe_us_ = 0;  // the stamp that waits for its answer; 0: none
 };
 
-}  // namespace server
+}  // namespace server::link

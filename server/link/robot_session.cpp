@@ -10,7 +10,7 @@
 #include "server/link/greeting.hpp"
 #include "server/runtime/exceptions.hpp"
 
-namespace server {
+namespace server::link {
 namespace asio = boost::asio;
 using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
 
@@ -22,8 +22,8 @@ constexpr std::int64_t kGridUs = 4'000;  // at whose multiples sessions wake, ma
 
 }  // namespace
 
-RobotSession::RobotSession(asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
-                           RobotArchive& archive, ReadBuffers& buffers)
+RobotSession::RobotSession(asio::io_context& loop, runtime::Clock& clock, std::unique_ptr<net::ByteStream> stream,
+                           station::Station& station, station::RobotArchive& archive, ReadBuffers& buffers)
     : clock_{clock},
       stream_{std::move(stream)},
       station_{station},
@@ -73,8 +73,8 @@ asio::awaitable<RobotSession::EndReason> RobotSession::part(asio::awaitable<EndR
   try {
     co_return co_await std::move(task);
   } catch (...) {
-    const std::exception_ptr failure = first_of(std::current_exception());
-    if (is_cancellation(failure)) std::rethrow_exception(failure);
+    const std::exception_ptr failure = runtime::first_of(std::current_exception());
+    if (runtime::is_cancellation(failure)) std::rethrow_exception(failure);
     failure_ = failure;
   }
   co_return kFault;
@@ -85,7 +85,7 @@ void RobotSession::read() {
   if (!is_greeted) return;
   try {
     if (!close_reason_.empty()) return reading_paused_.notify();
-    const ByteStream::Read got = stream_->read_now(asio::buffer(buffers_.input));
+    const net::ByteStream::Read got = stream_->read_now(asio::buffer(buffers_.input));
     if (got.size > 0) last_received_us_ = clock_.steady_us();
     on_bytes({buffers_.input.data(), got.size});
     if (got.has_ended && close_reason_.empty()) close_reason_ = kClosedByRobot;
@@ -146,7 +146,7 @@ asio::awaitable<bool> RobotSession::admit(const protocol::Hello& hello) {
   const auto request = admission_request(hello, hello_robot_time_us_, stream_->from_loopback(), clock_.utc_us());
   refusal = refusal_if_connected(hello);
   if (refusal) co_return co_await refuse(*refusal);
-  const Admission admission = co_await archive_.admit(request);
+  const station::Admission admission = co_await archive_.admit(request);
   if (admission.enrolment_full) station_.on_enrolment_refused(id, stream_->peer(), admission.detail);
   refusal = refusal_of(admission);
   if (!refusal) refusal = refusal_if_connected(hello);  // another connection may have won while we asked
@@ -227,7 +227,7 @@ void RobotSession::on_heartbeat(const protocol::RobotFrame& frame) {
   const protocol::Heartbeat& answer = frame.body.heartbeat;
   if (!outbox_.on_probe_answer(answer.echo_station_time_us)) return;
   update_read_priority();
-  ClockExchange exchange;
+  station::ClockExchange exchange;
   exchange.sent_at_us = static_cast<std::int64_t>(answer.echo_station_time_us);
   exchange.received_at_robot_us = static_cast<std::int64_t>(answer.echo_received_at_robot_us);
   exchange.answered_at_robot_us = static_cast<std::int64_t>(frame.robot_time_us);
@@ -293,7 +293,7 @@ bool RobotSession::send(const protocol::Command& command, std::int64_t deadline_
   return true;
 }
 
-bool RobotSession::withdraw(CommandId id) { return outbox_.withdraw(id); }
+bool RobotSession::withdraw(station::CommandId id) { return outbox_.withdraw(id); }
 
 void RobotSession::send_emergency_stop(const protocol::Command& command) {
   outbox_.enqueue_stop(command);
@@ -319,4 +319,4 @@ void RobotSession::close(const std::string& reason) {
   stream_->close();
 }
 
-}  // namespace server
+}  // namespace server::link

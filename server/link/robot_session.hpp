@@ -21,20 +21,20 @@
 #include "server/station/state/robot_port.hpp"
 #include "server/station/station.hpp"
 
-namespace server {
+namespace server::link {
 
 // Shared by all sessions, since each handles at once what it reads: memory that is in the processor's cache.
 struct ReadBuffers {
-  std::array<std::uint8_t, ByteStream::kReadBytes> input;
+  std::array<std::uint8_t, net::ByteStream::kReadBytes> input;
   protocol::RobotFrame frame;
 };
 
-class RobotSession final : public RobotPort {
+class RobotSession final : public station::RobotPort {
  public:
   static constexpr std::chrono::seconds kHelloTime{5};
 
-  RobotSession(boost::asio::io_context& loop, Clock& clock, std::unique_ptr<ByteStream> stream, Station& station,
-               RobotArchive& archive, ReadBuffers& buffers);
+  RobotSession(boost::asio::io_context& loop, runtime::Clock& clock, std::unique_ptr<net::ByteStream> stream,
+               station::Station& station, station::RobotArchive& archive, ReadBuffers& buffers);
   ~RobotSession() override;
 
   // Hello to Welcome; false when the robot was refused or said nothing. Then serve() to the end of the connection.
@@ -42,9 +42,9 @@ class RobotSession final : public RobotPort {
   const std::string& why_unwelcome() const { return close_reason_; }  // after greet() was false
   boost::asio::awaitable<void> serve();  // throws what the connection ended by, if that was an exception
 
-  const RobotId& robot_id() const override { return robot_id_; }
+  const station::RobotId& robot_id() const override { return robot_id_; }
   bool send(const protocol::Command& command, std::int64_t deadline_us) override;
-  bool withdraw(CommandId id) override;
+  bool withdraw(station::CommandId id) override;
   void send_emergency_stop(const protocol::Command& command) override;
   void acknowledge(std::uint64_t durable_next_seq, std::uint64_t durable_next_event_seq) override;
   void request_resend(std::uint64_t first_seq, std::uint64_t next_seq) override;
@@ -73,10 +73,10 @@ class RobotSession final : public RobotPort {
   void flush();
   void update_read_priority();
 
-  Clock& clock_;
-  std::unique_ptr<ByteStream> stream_;
-  Station& station_;
-  RobotArchive& archive_;
+  runtime::Clock& clock_;
+  std::unique_ptr<net::ByteStream> stream_;
+  station::Station& station_;
+  station::RobotArchive& archive_;
 
   protocol::FrameReader reader_;
   ReadBuffers& buffers_;
@@ -84,12 +84,12 @@ class RobotSession final : public RobotPort {
   std::exception_ptr failure_;             // that ended a part of the session
   std::optional<protocol::Hello> hello_;
   std::uint64_t hello_robot_time_us_ = 0;
-  RobotId claimed_id_;  // of a well-formed hello, whether the robot is admitted or not
-  RobotId robot_id_;    // from the hello
-  FrameReach reach_;    // of the next frame
+  station::RobotId claimed_id_;  // of a well-formed hello, whether the robot is admitted or not
+  station::RobotId robot_id_;    // from the hello
+  FrameReach reach_;             // of the next frame
 
-  Signal reading_paused_;  // the hello has come, or a reason to close
-  Signal wake_writer_;     // something is ready that flush() could not write
+  runtime::Signal reading_paused_;  // the hello has come, or a reason to close
+  runtime::Signal wake_writer_;     // something is ready that flush() could not write
   RobotOutbox outbox_;
 
   std::int64_t last_received_us_ = 0;
@@ -97,4 +97,4 @@ class RobotSession final : public RobotPort {
   std::string close_reason_;
 };
 
-}  // namespace server
+}  // namespace server::link

@@ -10,7 +10,7 @@
 
 #include "server/live/state_json.hpp"
 
-namespace server {
+namespace server::live {
 namespace asio = boost::asio;
 using nlohmann::json;
 
@@ -22,11 +22,11 @@ constexpr std::size_t kWorkOfARobot = 12;   // to write its state
 constexpr std::int64_t kGatheredUs = 50'000;
 constexpr std::size_t kMaxLog = 64;  // events and commands in one message
 
-std::int64_t length_us(const SampleBatch& batch) {
+std::int64_t length_us(const station::SampleBatch& batch) {
   return static_cast<std::int64_t>(batch.samples.size()) * batch.context.period_us;
 }
 
-bool continues(const SampleBatch& before, const SampleBatch& next) {
+bool continues(const station::SampleBatch& before, const station::SampleBatch& next) {
   return next.boot_id == before.boot_id && next.first_seq == before.next_seq() && next.context == before.context &&
          next.first_robot_time_us == before.first_robot_time_us + static_cast<std::uint64_t>(length_us(before));
 }
@@ -76,7 +76,7 @@ void LiveFeed::remove(Subscriber& subscriber) {
   }
   const auto chose = filtered_.extract(&subscriber);
   if (!chose) return;
-  for (const RobotId& id : chose.mapped()) {
+  for (const station::RobotId& id : chose.mapped()) {
     const auto robot = robots_.find(id);
     if (robot == robots_.end()) continue;
     std::erase(robot->second.watchers, &subscriber);
@@ -85,10 +85,10 @@ void LiveFeed::remove(Subscriber& subscriber) {
   }
 }
 
-void LiveFeed::watch(Subscriber& subscriber, const std::set<RobotId>& robots) {
+void LiveFeed::watch(Subscriber& subscriber, const std::set<station::RobotId>& robots) {
   remove(subscriber);
   filtered_.emplace(&subscriber, robots);
-  for (const RobotId& id : robots) robots_[id].watchers.push_back(&subscriber);
+  for (const station::RobotId& id : robots) robots_[id].watchers.push_back(&subscriber);
 }
 
 asio::awaitable<void> LiveFeed::run() {
@@ -108,12 +108,12 @@ asio::awaitable<void> LiveFeed::run() {
 // stamp; so do the last of very many, for the stamp itself must not be late.
 asio::awaitable<void> LiveFeed::publish_changed() {
   std::size_t work = 0;
-  std::vector<RobotId> due = std::exchange(changed_, {});
+  std::vector<station::RobotId> due = std::exchange(changed_, {});
   if (due.size() > kRobotsAStamp) {
     changed_.assign(std::next(due.begin(), kRobotsAStamp), due.end());
     due.resize(kRobotsAStamp);
   }
-  for (const RobotId& id : due) {
+  for (const station::RobotId& id : due) {
     const auto robot = robots_.find(id);
     if (robot == robots_.end() || !robot->second.change) continue;
     work += kWorkOfARobot + publish_robot(robot->second, *std::exchange(robot->second.change, std::nullopt));
@@ -123,7 +123,7 @@ asio::awaitable<void> LiveFeed::publish_changed() {
   }
 }
 
-LiveFeed::Headline LiveFeed::headline(const RobotState& robot) {
+LiveFeed::Headline LiveFeed::headline(const station::RobotState& robot) {
   return {robot.link,
           robot.boot_id,
           robot.context.mode,
@@ -133,7 +133,7 @@ LiveFeed::Headline LiveFeed::headline(const RobotState& robot) {
 }
 
 std::size_t LiveFeed::publish_robot(const Robot& robot, const Change& change) {
-  const RobotState& state = change.state;
+  const station::RobotState& state = change.state;
   Message message{[&] { return dump({{"type", "robot"}, {"robot", to_json(state)}}); }};
   std::size_t published = 0;
   const auto push = [&](Subscriber* to) {
@@ -158,7 +158,7 @@ void LiveFeed::publish_run(json run) {
 }
 
 // With the newest state.
-LiveFeed::Change& LiveFeed::change_of(Robot& robot, const RobotState& state) {
+LiveFeed::Change& LiveFeed::change_of(Robot& robot, const station::RobotState& state) {
   if (!robot.change) {
     robot.change.emplace();
     changed_.push_back(state.id);
@@ -168,7 +168,7 @@ LiveFeed::Change& LiveFeed::change_of(Robot& robot, const RobotState& state) {
 }
 
 // Samples from before a large change are published before it.
-void LiveFeed::on_headline(Robot& robot, const RobotState& state) {
+void LiveFeed::on_headline(Robot& robot, const station::RobotState& state) {
   robot.headline = headline(state);
   publish_gathered(robot);
   publish_robot(robot, {state, true, false});
@@ -177,7 +177,7 @@ void LiveFeed::on_headline(Robot& robot, const RobotState& state) {
   change.to_others = true;
 }
 
-void LiveFeed::on_robot(const RobotState& state) {
+void LiveFeed::on_robot(const station::RobotState& state) {
   if (!is_heard()) return;
   Robot& robot = robots_[state.id];
   if (robot.headline != headline(state)) {
@@ -187,7 +187,7 @@ void LiveFeed::on_robot(const RobotState& state) {
   }
 }
 
-void LiveFeed::on_samples(const RobotState& state, const SampleBatch& batch) {
+void LiveFeed::on_samples(const station::RobotState& state, const station::SampleBatch& batch) {
   if (!is_heard()) return;
   Robot& robot = robots_[state.id];
   const bool is_headline = robot.headline != headline(state);
@@ -201,7 +201,7 @@ void LiveFeed::on_samples(const RobotState& state, const SampleBatch& batch) {
   if (is_headline) publish_gathered(robot);
 }
 
-void LiveFeed::gather(Robot& robot, const SampleBatch& batch) {
+void LiveFeed::gather(Robot& robot, const station::SampleBatch& batch) {
   if (robot.gathered && continues(*robot.gathered, batch)) {
     auto& samples = robot.gathered->samples;
     samples.insert(samples.end(), batch.samples.begin(), batch.samples.end());
@@ -229,7 +229,7 @@ void LiveFeed::publish_late_samples() {
   }
 }
 
-void LiveFeed::on_event(const RobotState&, const RobotEvent& event) {
+void LiveFeed::on_event(const station::RobotState&, const station::RobotEvent& event) {
   Message{[&] { return dump({{"type", "event"}, {"event", to_json(event)}}); }}.push(watch_all_, false);
   if (filtered_.empty()) return;
   events_.push_back(event);
@@ -237,20 +237,21 @@ void LiveFeed::on_event(const RobotState&, const RobotEvent& event) {
 }
 
 // Of renewals only that they are refused now, and why: once, until one succeeds again.
-bool LiveFeed::is_news(const CommandRecord& record) {
+bool LiveFeed::is_news(const station::CommandRecord& record) {
   if (record.kind != "renew_lease") return true;
   std::string& refusal = robots_[record.robot_id].renewal_refusal;
   if (was_accepted(record.state)) refusal.clear();
-  const bool is_refused = record.state == CommandState::rejected || record.state == CommandState::expired ||
-                          record.state == CommandState::failed || record.state == CommandState::unknown;
+  const bool is_refused =
+      record.state == station::CommandState::rejected || record.state == station::CommandState::expired ||
+      record.state == station::CommandState::failed || record.state == station::CommandState::unknown;
   return is_refused && std::exchange(refusal, record.reason) != record.reason;
 }
 
-void LiveFeed::on_command(const CommandRecord& record) {
+void LiveFeed::on_command(const station::CommandRecord& record) {
   if (!is_heard() || !is_news(record)) return;
   Message{[&] { return dump({{"type", "command"}, {"command", to_json(record)}}); }}.push(watch_all_, false);
   if (filtered_.empty()) return;
-  std::erase_if(commands_, [&](const CommandRecord& older) { return older.id == record.id; });
+  std::erase_if(commands_, [&](const station::CommandRecord& older) { return older.id == record.id; });
   commands_.push_back(record);
   if (commands_.size() == kMaxLog) publish_log();
 }
@@ -263,4 +264,4 @@ void LiveFeed::publish_log() {
   commands_.clear();
 }
 
-}  // namespace server
+}  // namespace server::live

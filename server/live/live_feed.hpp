@@ -19,15 +19,15 @@
 #include "server/runtime/clock.hpp"
 #include "server/station/state/station_sink.hpp"
 
-namespace server {
+namespace server::live {
 
 // A page gets the changes of the robots that it watches at once, except small changes of state (with the next stamp)
 // and samples (50 ms of them at a time). A page that has named its robots gets the rest with the next stamp only: the
 // large changes of the other robots, and one `log` of all events and commands. So a page costs the same few messages a
 // second however many robots there are. A lease that was renewed, some ten times a second, is not published.
-class LiveFeed final : public StationSink {
+class LiveFeed final : public station::StationSink {
  public:
-  explicit LiveFeed(Clock& clock) : clock_{clock} {}
+  explicit LiveFeed(runtime::Clock& clock) : clock_{clock} {}
 
   // Every 100 ms: a stamp, and what waited for it. Until cancelled.
   boost::asio::awaitable<void> run();
@@ -35,57 +35,58 @@ class LiveFeed final : public StationSink {
   void add(Subscriber& subscriber);
   void remove(Subscriber& subscriber);
   // Whose samples and every change of state it gets from now on; before the first call, those of all.
-  void watch(Subscriber& subscriber, const std::set<RobotId>& robots);
+  void watch(Subscriber& subscriber, const std::set<station::RobotId>& robots);
 
   void publish_run(nlohmann::json run);
 
   std::size_t robots() const { return robots_.size(); }  // of which it keeps something
 
-  void on_robot(const RobotState& robot) override;
-  void on_samples(const RobotState& robot, const SampleBatch& batch) override;
-  void on_event(const RobotState& robot, const RobotEvent& event) override;
-  void on_command(const CommandRecord& record) override;
+  void on_robot(const station::RobotState& robot) override;
+  void on_samples(const station::RobotState& robot, const station::SampleBatch& batch) override;
+  void on_event(const station::RobotState& robot, const station::RobotEvent& event) override;
+  void on_command(const station::CommandRecord& record) override;
 
  private:
   using Subscribers = std::vector<Subscriber*>;
   // Of a robot's state what is published to all, and at once to those who watch it.
-  using Headline = std::tuple<LinkState, BootId, protocol::Mode, protocol::SubState, std::uint64_t, CommandId>;
+  using Headline = std::tuple<station::LinkState, station::BootId, protocol::Mode, protocol::SubState, std::uint64_t,
+                              station::CommandId>;
 
   // What is still to be published of a robot's state, and to whom.
   struct Change {
-    RobotState state;
+    station::RobotState state;
     bool to_watchers;
     bool to_others;
   };
   struct Robot {
-    std::optional<Headline> headline;     // as it was published; none yet: it is watched and has reported nothing
-    Subscribers watchers;                 // among those that chose
-    std::optional<Change> change;         // since the last stamp
-    std::optional<SampleBatch> gathered;  // under 50 ms of samples
-    std::int64_t gathered_since_us = 0;   // steady
-    std::string renewal_refusal;          // why its last lease was not renewed; empty: it was
+    std::optional<Headline> headline;  // as it was published; none yet: it is watched and has reported nothing
+    Subscribers watchers;              // among those that chose
+    std::optional<Change> change;      // since the last stamp
+    std::optional<station::SampleBatch> gathered;  // under 50 ms of samples
+    std::int64_t gathered_since_us = 0;            // steady
+    std::string renewal_refusal;                   // why its last lease was not renewed; empty: it was
   };
 
-  static Headline headline(const RobotState& robot);
+  static Headline headline(const station::RobotState& robot);
   bool is_heard() const { return !watch_all_.empty() || !filtered_.empty(); }
   bool is_watched(const Robot& robot) const { return !watch_all_.empty() || !robot.watchers.empty(); }
   boost::asio::awaitable<void> publish_changed();
-  void on_headline(Robot& robot, const RobotState& state);
-  Change& change_of(Robot& robot, const RobotState& state);
-  void gather(Robot& robot, const SampleBatch& batch);
+  void on_headline(Robot& robot, const station::RobotState& state);
+  Change& change_of(Robot& robot, const station::RobotState& state);
+  void gather(Robot& robot, const station::SampleBatch& batch);
   std::size_t publish_robot(const Robot& robot, const Change& change);  // returns to how many
   void publish_gathered(Robot& robot);
   void publish_late_samples();
   void publish_log();
-  bool is_news(const CommandRecord& record);
+  bool is_news(const station::CommandRecord& record);
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   Subscribers watch_all_;
-  std::map<Subscriber*, std::set<RobotId>> filtered_;  // that said what they watch
-  std::unordered_map<RobotId, Robot> robots_;
-  std::vector<RobotId> changed_;         // that have a change
-  std::vector<RobotEvent> events_;       // of the next log
-  std::vector<CommandRecord> commands_;  // likewise; of each command the newest record
+  std::map<Subscriber*, std::set<station::RobotId>> filtered_;  // that said what they watch
+  std::unordered_map<station::RobotId, Robot> robots_;
+  std::vector<station::RobotId> changed_;         // that have a change
+  std::vector<station::RobotEvent> events_;       // of the next log
+  std::vector<station::CommandRecord> commands_;  // likewise; of each command the newest record
 };
 
-}  // namespace server
+}  // namespace server::live

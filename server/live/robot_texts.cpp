@@ -5,14 +5,14 @@
 
 #include "server/live/state_json.hpp"
 
-namespace server {
+namespace server::live {
 namespace asio = boost::asio;
 
 asio::awaitable<void> RobotTexts::wait_for_turn() {
   if (!turns_.take()) co_await turns_.wait();
 }
 
-RobotTexts::Piece RobotTexts::piece_after(const RobotId& id) {
+RobotTexts::Piece RobotTexts::piece_after(const station::RobotId& id) {
   Piece piece;
   const std::uint64_t enough = written_ + kWrittenInAPiece;
   const auto& robots = station_.robots();
@@ -26,7 +26,7 @@ RobotTexts::Piece RobotTexts::piece_after(const RobotId& id) {
   return piece;
 }
 
-const std::string& RobotTexts::text_of(const RobotState& robot) {
+const std::string& RobotTexts::text_of(const station::RobotState& robot) {
   Kept& kept = kept_[robot.id];
   if (kept.text.empty() || kept.state != robot) {
     kept.text = dump(to_json(robot));
@@ -49,4 +49,4 @@ asio::awaitable<std::string> RobotDocument::next() {
   co_return text;
 }
 
-}  // namespace server
+}  // namespace server::live

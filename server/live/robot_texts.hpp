@@ -14,7 +14,7 @@
 #include "server/runtime/turns.hpp"
 #include "server/station/station.hpp"
 
-namespace server {
+namespace server::live {
 
 class RobotTexts {
  public:
@@ -22,30 +22,30 @@ class RobotTexts {
   static constexpr std::size_t kWrittenInAPiece = 8;     // or with so many texts that had to be written, 30 µs each
 
   struct Piece {
-    std::string text;     // JSON objects with commas between them
-    RobotId last;         // the last robot in it; empty: it has none
-    bool is_end = false;  // no robot follows
+    std::string text;       // JSON objects with commas between them
+    station::RobotId last;  // the last robot in it; empty: it has none
+    bool is_end = false;    // no robot follows
   };
 
-  RobotTexts(boost::asio::io_context& loop, const Station& station) : station_{station}, turns_{loop, 1} {}
+  RobotTexts(boost::asio::io_context& loop, const station::Station& station) : station_{station}, turns_{loop, 1} {}
 
   // Until a piece may be made; returns at once when none was made in this turn of the loop.
   boost::asio::awaitable<void> wait_for_turn();
   // The robots whose ids follow this one, in order, as their states are now; empty: from the first.
-  Piece piece_after(const RobotId& id);
+  Piece piece_after(const station::RobotId& id);
 
   std::uint64_t written() const { return written_; }  // texts, so far
 
  private:
   struct Kept {
-    RobotState state;
+    station::RobotState state;
     std::string text;
   };
-  const std::string& text_of(const RobotState& robot);
+  const std::string& text_of(const station::RobotState& robot);
 
-  const Station& station_;
-  Turns turns_;
-  std::unordered_map<RobotId, Kept> kept_;  // of those that somebody has read
+  const station::Station& station_;
+  runtime::Turns turns_;
+  std::unordered_map<station::RobotId, Kept> kept_;  // of those that somebody has read
   std::uint64_t written_ = 0;
 };
 
@@ -61,14 +61,14 @@ class RobotDocument {
   bool is_whole() const { return is_whole_; }
 
   // The robots in the latest piece are those whose ids follow the first of these, up to the second.
-  const RobotId& after() const { return after_; }
-  const RobotId& last() const { return last_; }
+  const station::RobotId& after() const { return after_; }
+  const station::RobotId& last() const { return last_; }
 
  private:
   RobotTexts& texts_;
   std::string head_, tail_;
-  RobotId after_, last_;
+  station::RobotId after_, last_;
   bool is_whole_ = false;
 };
 
-}  // namespace server
+}  // namespace server::live

@@ -6,7 +6,7 @@
 
 #include "server/station/state/unknown_values.hpp"
 
-namespace server {
+namespace server::live {
 namespace {
 
 using nlohmann::json;
@@ -19,8 +19,8 @@ json status_json(const protocol::Status& status) {
           {"lost_samples", status.lost_samples},           {"lost_events", status.lost_events}};
 }
 
-json clock_json(const RobotState& robot) {
-  const ClockEstimate& clock = robot.clock;
+json clock_json(const station::RobotState& robot) {
+  const station::ClockEstimate& clock = robot.clock;
   return {{"offset_us", clock.offset_us},
           {"uncertainty_us", clock.uncertainty_us(robot.latest_robot_time_us)},
           {"drift_ppm", clock.drift_ppm},
@@ -31,7 +31,7 @@ json field_json(const std::optional<float>& value) { return value ? decimal(*val
 json field_json(std::uint64_t id) { return id_text(id); }
 template <class Value>
 json field_json(const Value& value) {
-  return text_or_value(value);
+  return station::text_or_value(value);
 }
 
 json object_or_null(const std::optional<std::string>& text) { return text ? json::parse(*text) : json(nullptr); }
@@ -46,7 +46,8 @@ void append(std::string& out, float value) {
   out.append(digits, end);
 }
 
-void append_column(std::string& out, const char* name, const std::vector<Sample>& samples, float Sample::* channel) {
+void append_column(std::string& out, const char* name, const std::vector<station::Sample>& samples,
+                   float station::Sample::* channel) {
   out += ",\"";
   out += name;
   out += "\":[";
@@ -63,26 +64,27 @@ json id_text(std::uint64_t id) { return id == 0 ? json(nullptr) : json(std::to_s
 
 json time_or_null(std::int64_t time_us) { return time_us == 0 ? json(nullptr) : json(time_us); }
 
-json to_json(const Sample& sample) {
+json to_json(const station::Sample& sample) {
   json out;
-  for_each_sample_field([&](const SampleField& field) { out[field.name] = decimal(sample.*field.member); });
+  station::for_each_sample_field(
+      [&](const station::SampleField& field) { out[field.name] = decimal(sample.*field.member); });
   return out;
 }
 
-json to_json(const ControlState& control) {
+json to_json(const station::ControlState& control) {
   return {{"holder", control.holder},
           {"taken_at_us", control.taken_at_us},
           {"wished_by", control.requested_by.empty() ? json(nullptr) : json(control.requested_by)}};
 }
 
-json to_json(const ChangedLimit& limit) {
+json to_json(const station::ChangedLimit& limit) {
   return {{"name", limit.name},
           {"unit", limit.unit},
           {"value", decimal(limit.value)},
           {"default", decimal(limit.default_value)}};
 }
 
-json to_json(const RobotModel& model) {
+json to_json(const station::RobotModel& model) {
   return {{"state", text(model.state)},
           {"fluid", model.fluid.empty() ? json(nullptr) : json(model.fluid)},
           {"reason", model.reason},
@@ -90,12 +92,12 @@ json to_json(const RobotModel& model) {
           {"set_at_us", time_or_null(model.set_at_us)}};
 }
 
-json to_json(const RobotState& robot) {
-  const SampleContext& context = robot.context;
+json to_json(const station::RobotState& robot) {
+  const station::SampleContext& context = robot.context;
   json out;
   out["robot_id"] = robot.id;
   out["link"] = text(robot.link);
-  out["peer"] = robot.link == LinkState::connected ? json(robot.peer) : json(nullptr);
+  out["peer"] = robot.link == station::LinkState::connected ? json(robot.peer) : json(nullptr);
   out["connected_at_us"] = time_or_null(robot.connected_at_us);
   out["last_received_at_us"] = time_or_null(robot.last_received_at_us);
   out["boot_id"] = id_text(robot.boot_id);
@@ -105,7 +107,7 @@ json to_json(const RobotState& robot) {
   out["ring_capacity"] = robot.ring_capacity;
   out["parameters_checksum"] = robot.parameters_checksum;
   out["controller_checksum"] = robot.controller_checksum;
-  for_each_batch_field([&](const auto& field) { out[field.name] = field_json(context.*field.member); });
+  station::for_each_batch_field([&](const auto& field) { out[field.name] = field_json(context.*field.member); });
   out["sample"] = robot.sample ? to_json(*robot.sample) : json(nullptr);
   out["next_seq"] = robot.next_seq;
   out["oldest_seq"] = robot.oldest_seq;
@@ -117,16 +119,16 @@ json to_json(const RobotState& robot) {
   out["retired"] = robot.retired_at_us != 0;
   out["fluid"] = robot.fluid.empty() ? json(nullptr) : json(robot.fluid);
   out["changed_limits"] = json::array();
-  for (const ChangedLimit& limit : robot.changed_limits) out["changed_limits"].push_back(to_json(limit));
+  for (const station::ChangedLimit& limit : robot.changed_limits) out["changed_limits"].push_back(to_json(limit));
   out["model"] = to_json(robot.model);
   out["invalid_values"] = robot.invalid_values;
   out["unknown_values"] =
-      object_or_null(UnknownValues{}.add("reset_cause", robot.reset_cause).add_fields_of(context).text());
+      object_or_null(station::UnknownValues{}.add("reset_cause", robot.reset_cause).add_fields_of(context).text());
   out["control"] = robot.control.holder.empty() ? json(nullptr) : to_json(robot.control);
   return out;
 }
 
-json to_json(const CommandRecord& record) {
+json to_json(const station::CommandRecord& record) {
   json arguments = record.arguments.empty() ? json::object() : json::parse(record.arguments, nullptr, false);
   json out;
   out["command_id"] = std::to_string(record.id);
@@ -150,7 +152,7 @@ json to_json(const CommandRecord& record) {
   return out;
 }
 
-json to_json(const RobotEvent& event) {
+json to_json(const station::RobotEvent& event) {
   const bool of_robot = event.event_seq.has_value();
   const bool mode_known = event.mode != rheonaut_MODE_UNSPECIFIED;
   json out;
@@ -174,8 +176,8 @@ json to_json(const RobotEvent& event) {
   return out;
 }
 
-std::string samples_message(const SampleBatch& batch) {
-  const SampleContext& context = batch.context;
+std::string samples_message(const station::SampleBatch& batch) {
+  const station::SampleContext& context = batch.context;
   json head;
   head["type"] = "samples";
   head["robot_id"] = batch.robot_id;
@@ -183,16 +185,17 @@ std::string samples_message(const SampleBatch& batch) {
   head["first_seq"] = batch.first_seq;
   head["first_robot_time_us"] = batch.first_robot_time_us;
   head["period_us"] = context.period_us;
-  for_each_batch_field([&](const auto& field) {
+  station::for_each_batch_field([&](const auto& field) {
     if (field.is_in_live_samples) head[field.name] = field_json(context.*field.member);
   });
   head["unknown_values"] = object_or_null(unknown_values(context));
   head["backfill"] = (context.flags & rheonaut_TELEMETRY_FLAG_BACKFILL) != 0;
   std::string out = dump(head);
   out.pop_back();  // the closing brace: the columns follow
-  for_each_sample_field([&](const SampleField& field) { append_column(out, field.name, batch.samples, field.member); });
+  station::for_each_sample_field(
+      [&](const station::SampleField& field) { append_column(out, field.name, batch.samples, field.member); });
   out += '}';
   return out;
 }
 
-}  // namespace server
+}  // namespace server::live

@@ -6,7 +6,7 @@
 
 #include "server/live/state_json.hpp"
 
-namespace server {
+namespace server::live {
 namespace asio = boost::asio;
 using nlohmann::json;
 
@@ -17,13 +17,13 @@ void Subscriber::push(LiveText message, bool droppable) {
   arrived_.notify();
 }
 
-void Subscriber::push_state(const RobotId& robot, LiveText message) {
+void Subscriber::push_state(const station::RobotId& robot, LiveText message) {
   const bool is_first = states_.insert_or_assign(robot, std::move(message)).second;
   if (is_first) slots_.push_back({++pushed_, robot});
   arrived_.notify();
 }
 
-void Subscriber::forget_states(const RobotId& after, const RobotId& last) {
+void Subscriber::forget_states(const station::RobotId& after, const station::RobotId& last) {
   std::erase_if(slots_, [&](const Slot& slot) { return after < slot.robot && slot.robot <= last; });
   std::erase_if(states_, [&](const auto& state) { return after < state.first && state.first <= last; });
 }
@@ -69,4 +69,4 @@ LiveText Subscriber::pop() {
   return message;
 }
 
-}  // namespace server
+}  // namespace server::live

@@ -11,7 +11,7 @@
 #include "server/runtime/clock.hpp"
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::live {
 
 using LiveText = std::shared_ptr<const std::string>;
 
@@ -27,9 +27,9 @@ class Subscriber {
   explicit Subscriber(boost::asio::io_context& loop) : arrived_{loop} {}
 
   void push(LiveText message, bool droppable);
-  void push_state(const RobotId& robot, LiveText message);
+  void push_state(const station::RobotId& robot, LiveText message);
   // Drops what waits of the robots whose ids follow the first of these, up to the second: a newer state was published.
-  void forget_states(const RobotId& after, const RobotId& last);
+  void forget_states(const station::RobotId& after, const station::RobotId& last);
   boost::asio::awaitable<void> wait();  // until a message waits; throws operation_aborted when cancelled
   LiveText pop();                       // null when none waits
 
@@ -43,7 +43,7 @@ class Subscriber {
   };
   struct Slot {
     std::uint64_t number = 0;
-    RobotId robot;
+    station::RobotId robot;
   };
 
   void drop_one();
@@ -52,12 +52,12 @@ class Subscriber {
 
   std::deque<Entry> queue_;  // but for states
   std::size_t queued_bytes_ = 0;
-  std::deque<Slot> slots_;              // the robots whose states wait
-  std::map<RobotId, LiveText> states_;  // the newest of each
+  std::deque<Slot> slots_;                       // the robots whose states wait
+  std::map<station::RobotId, LiveText> states_;  // the newest of each
   bool state_was_last_ = false;
   std::uint64_t pushed_ = 0;
   std::uint64_t dropped_ = 0;
-  Signal arrived_;
+  runtime::Signal arrived_;
 };
 
-}  // namespace server
+}  // namespace server::live

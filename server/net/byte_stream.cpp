@@ -11,7 +11,7 @@
 #include "server/net/poll_set.hpp"
 #include "server/tls/stream_socket.hpp"
 
-namespace server {
+namespace server::net {
 namespace {
 
 namespace asio = boost::asio;
@@ -85,10 +85,10 @@ class SocketStream final : public ByteStream {
 
 }  // namespace
 
-std::unique_ptr<ByteStream> make_stream(StreamSocket socket, PollSet& set) {
+std::unique_ptr<ByteStream> make_stream(tls::StreamSocket socket, PollSet& set) {
   std::string peer = socket.peer();
   const bool from_loopback = socket.from_loopback();
   return std::make_unique<SocketStream>(set, std::move(peer), from_loopback, std::move(socket).release());
 }
 
-}  // namespace server
+}  // namespace server::net

@@ -11,10 +11,13 @@
 #include <memory>
 #include <string>
 
-namespace server {
+namespace server::tls {
+class StreamSocket;
+}  // namespace server::tls
+
+namespace server::net {
 
 class PollSet;
-class StreamSocket;
 
 class ByteStream {
  public:
@@ -51,7 +54,7 @@ class ByteStream {
 
 // Takes over a connected socket, in TLS when its handshake is done; it is read and written when the set says so. Sets a
 // small TCP_NOTSENT_LOWAT so that next to nothing waits in the kernel in front of an emergency stop.
-std::unique_ptr<ByteStream> make_stream(StreamSocket socket, PollSet& set);
+std::unique_ptr<ByteStream> make_stream(tls::StreamSocket socket, PollSet& set);
 
 // Two connected streams in memory, and the faults of the link between them.
 class MemoryLink {
@@ -74,4 +77,4 @@ class MemoryLink {
   std::shared_ptr<Pipe> there_, back_;
 };
 
-}  // namespace server
+}  // namespace server::net

@@ -5,7 +5,7 @@
 
 #include "server/config/endpoint.hpp"
 
-namespace server {
+namespace server::net {
 namespace {
 
 // Who was ended and has not gone yet still holds a descriptor.
@@ -57,7 +57,7 @@ bool ConnectionLimiter::is_full() const {
 
 std::expected<std::unique_ptr<ConnectionSlot>, ConnectionLimiter::Refusal> ConnectionLimiter::admit(
     const std::string& address, bool from_loopback) {
-  const std::string network = network_of(address);
+  const std::string network = config::network_of(address);
   const auto known = addresses_.find(network);
   const std::size_t here = known == addresses_.end() ? 0 : known->second.here;
   if (here >= (from_loopback ? limits_.of_loopback : limits_.of_address)) {
@@ -97,9 +97,9 @@ std::unexpected<ConnectionLimiter::Refusal> ConnectionLimiter::refuse(const std:
   if (const auto unsaid = lines_.next(clock_.steady_us())) {
     spdlog::warn("{}: {} refused, {}; {} connections are open{}", port_, address,
                  why == Refusal::full ? "all places are taken" : "its address has its share", connections(),
-                 and_before(*unsaid));
+                 runtime::and_before(*unsaid));
   }
   return std::unexpected{why};
 }
 
-}  // namespace server
+}  // namespace server::net

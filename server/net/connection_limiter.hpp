@@ -25,7 +25,7 @@
 #include "server/runtime/clock.hpp"
 #include "server/runtime/log.hpp"
 
-namespace server {
+namespace server::net {
 
 struct ConnectionLimits {
   std::size_t connections = 256;
@@ -81,7 +81,7 @@ class ConnectionLimiter {
   };
 
   // `port` is for the log: "http port".
-  ConnectionLimiter(Clock& clock, const char* port, const ConnectionLimits& limits)
+  ConnectionLimiter(runtime::Clock& clock, const char* port, const ConnectionLimits& limits)
       : clock_{clock}, port_{port}, limits_{limits} {}
   ConnectionLimiter(const ConnectionLimiter&) = delete;
   ConnectionLimiter& operator=(const ConnectionLimiter&) = delete;
@@ -100,15 +100,15 @@ class ConnectionLimiter {
   bool is_full() const;
   std::unexpected<Refusal> refuse(const std::string& address, Refusal why);
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   const char* port_;
   ConnectionLimits limits_;
   std::array<Slots, 4> slots_;  // by state, in the order in which they came into it
   Slot::Counts addresses_;
   ConnectionCounters counters_;
-  SparseLines lines_;
+  runtime::SparseLines lines_;
 };
 
 using ConnectionSlot = ConnectionLimiter::Slot;
 
-}  // namespace server
+}  // namespace server::net

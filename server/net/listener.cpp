@@ -11,7 +11,7 @@
 
 #include "server/config/endpoint.hpp"
 
-namespace server {
+namespace server::net {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 
@@ -38,7 +38,7 @@ void bind(tcp::acceptor& acceptor, const tcp::endpoint& endpoint, boost::system:
 
 }  // namespace
 
-Listener::Listener(asio::io_context& loop, Clock& clock, const tcp::endpoint& endpoint, bool or_any_port)
+Listener::Listener(asio::io_context& loop, runtime::Clock& clock, const tcp::endpoint& endpoint, bool or_any_port)
     : clock_{clock}, acceptor_{loop} {
   raise_descriptor_limit();
   boost::system::error_code error;
@@ -47,7 +47,7 @@ Listener::Listener(asio::io_context& loop, Clock& clock, const tcp::endpoint& en
     spdlog::warn("port {} is taken; using a free one", endpoint.port());
     bind(acceptor_, tcp::endpoint{endpoint.address(), 0}, error);
   }
-  if (error) throw boost::system::system_error{error, "cannot listen on " + text(endpoint)};
+  if (error) throw boost::system::system_error{error, "cannot listen on " + config::text(endpoint)};
 }
 
 asio::awaitable<void> Listener::run(std::function<void(tcp::socket)> on_connection) {
@@ -55,7 +55,7 @@ asio::awaitable<void> Listener::run(std::function<void(tcp::socket)> on_connecti
     auto [error, socket] = co_await acceptor_.async_accept(asio::as_tuple(asio::use_awaitable));
     if (error == asio::error::operation_aborted) co_return;
     if (error) {  // out of descriptors, or a peer that left before it was accepted
-      spdlog::warn("accept on {}: {}", text(endpoint()), error.message());
+      spdlog::warn("accept on {}: {}", config::text(endpoint()), error.message());
       co_await clock_.sleep_for(kPause);
       continue;
     }
@@ -63,4 +63,4 @@ asio::awaitable<void> Listener::run(std::function<void(tcp::socket)> on_connecti
   }
 }
 
-}  // namespace server
+}  // namespace server::net

@@ -9,13 +9,13 @@
 
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::net {
 
 class Listener {
  public:
   // Binds and listens at once; port 0 takes any free one. With `or_any_port` a taken port is replaced by a free one.
   // Throws boost::system::system_error that names the address.
-  Listener(boost::asio::io_context& loop, Clock& clock, const boost::asio::ip::tcp::endpoint& endpoint,
+  Listener(boost::asio::io_context& loop, runtime::Clock& clock, const boost::asio::ip::tcp::endpoint& endpoint,
            bool or_any_port = false);
 
   // Accepts until cancelled; `on_connection` starts a task with the socket and returns at once.
@@ -24,8 +24,8 @@ class Listener {
   boost::asio::ip::tcp::endpoint endpoint() const { return acceptor_.local_endpoint(); }
 
  private:
-  Clock& clock_;
+  runtime::Clock& clock_;
   boost::asio::ip::tcp::acceptor acceptor_;
 };
 
-}  // namespace server
+}  // namespace server::net

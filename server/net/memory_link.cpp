@@ -7,7 +7,7 @@
 #include "server/net/byte_stream.hpp"
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::net {
 namespace asio = boost::asio;
 
 // One direction: a bounded queue of bytes, as a socket buffer is.
@@ -49,7 +49,7 @@ struct MemoryLink::Pipe : std::enable_shared_from_this<MemoryLink::Pipe> {
   std::deque<std::uint8_t> bytes;
   std::function<void()> on_readable;
   bool is_calling = false;
-  Signal writable;
+  runtime::Signal writable;
   bool closed = false;
   bool stalled = false;
   bool awaited = false;
@@ -127,4 +127,4 @@ void MemoryLink::stall(bool stalled) {
   }
 }
 
-}  // namespace server
+}  // namespace server::net

@@ -13,7 +13,7 @@
 #include <new>
 #include <utility>
 
-namespace server {
+namespace server::net {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
@@ -23,7 +23,7 @@ PollSet::Group::Group() : epoll{::epoll_create1(EPOLL_CLOEXEC)} {
 
 PollSet::Group::~Group() { ::close(epoll); }
 
-PollSet::PollSet(asio::io_context& loop, Clock& clock) : loop_{loop}, clock_{clock} {}
+PollSet::PollSet(asio::io_context& loop, runtime::Clock& clock) : loop_{loop}, clock_{clock} {}
 
 PollSet::~PollSet() {
   for (Socket* socket : std::exchange(sockets_, {})) {
@@ -188,4 +188,4 @@ bool PollSet::Socket::set_events(const Group& group, std::optional<std::uint32_t
   return true;
 }
 
-}  // namespace server
+}  // namespace server::net

@@ -24,7 +24,7 @@
 
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::net {
 
 class PollSet {
  public:
@@ -32,7 +32,7 @@ class PollSet {
   static constexpr std::chrono::microseconds kPause{2000};  // from one poll of all sockets to the next
   static constexpr int kQuietRounds = 5;  // rounds with one ready at most, until the loop is woken instead
 
-  PollSet(boost::asio::io_context& loop, Clock& clock);
+  PollSet(boost::asio::io_context& loop, runtime::Clock& clock);
   ~PollSet();  // the loop resumes those that still wait
   PollSet(const PollSet&) = delete;
   PollSet& operator=(const PollSet&) = delete;
@@ -64,7 +64,7 @@ class PollSet {
   void forget(const Socket& socket);
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
+  runtime::Clock& clock_;
   Group all_, awaited_;
   std::unordered_set<Socket*> sockets_;
 };
@@ -106,4 +106,4 @@ class PollSet::Socket {
   Waiter writer_;
 };
 
-}  // namespace server
+}  // namespace server::net

@@ -4,12 +4,12 @@
 #include "server/net/connection_limiter.hpp"
 #include "server/tls/tls_handshakes.hpp"
 
-namespace server {
+namespace server::net {
 
 // Outlives the connections. Not moved.
 struct PortAccess {
   ConnectionLimiter limiter;
-  TlsHandshakes* tls = nullptr;  // null: plain TCP
+  tls::TlsHandshakes* tls = nullptr;  // null: plain TCP
 };
 
-}  // namespace server
+}  // namespace server::net

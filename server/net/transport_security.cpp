@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace server {
+namespace server::net {
 namespace fs = std::filesystem;
 namespace asio = boost::asio;
 
@@ -28,14 +28,14 @@ std::string stamp_of(const fs::path& certificate, const fs::path& key) {
   return stamp;
 }
 
-std::string exposed_ports(const Config& config) {
+std::string exposed_ports(const config::Config& config) {
   std::string ports;
   if (config.is_exposed(config.http)) ports = "http.listen = " + config.http;
   if (config.is_exposed(config.robots)) ports += (ports.empty() ? "" : ", ") + ("robots.listen = " + config.robots);
   return ports;
 }
 
-std::shared_ptr<const TlsContext> load_first(const Config& config) {
+std::shared_ptr<const tls::TlsContext> load_first(const config::Config& config) {
   const fs::path certificate = config.tls_certificate();
   if (config.tls.certificate.empty() && !fs::exists(certificate)) {
     throw std::runtime_error{fmt::format(
@@ -44,26 +44,28 @@ std::shared_ptr<const TlsContext> load_first(const Config& config) {
         "accept with tls.insecure = true that everyone on the way can read and change what is sent",
         config.http, config.robots, certificate.string(), config.data_dir.string())};
   }
-  return load_tls_context(certificate, config.tls_key());
+  return tls::load_tls_context(certificate, config.tls_key());
 }
 
-void log_in_force(const TlsCertificate& certificate) {
+void log_in_force(const tls::TlsCertificate& certificate) {
   spdlog::info("TLS: the certificate for {} is in force, sha256 pin {}", fmt::join(certificate.names, ", "),
                certificate.pin);
 }
 
 // Behind one address of this machine there may be many: a proxy, a test, a fleet. A quarter is left for all others.
-ConnectionLimits limits(const PortPlaces& places, std::size_t unauthenticated) {
+ConnectionLimits limits(const config::PortPlaces& places, std::size_t unauthenticated) {
   return {places.connections, unauthenticated, places.of_address, places.connections - places.connections / 4};
 }
 
 // Of a request it is known at once who makes it, of a robot after its hello.
-ConnectionLimits http_limits(const PortPlaces& places) { return limits(places, places.connections); }
-ConnectionLimits robot_limits(const PortPlaces& places) { return limits(places, std::max(places.connections / 4, 1U)); }
+ConnectionLimits http_limits(const config::PortPlaces& places) { return limits(places, places.connections); }
+ConnectionLimits robot_limits(const config::PortPlaces& places) {
+  return limits(places, std::max(places.connections / 4, 1U));
+}
 
 }  // namespace
 
-TransportSecurity::TransportSecurity(Clock& clock, const Config& config)
+TransportSecurity::TransportSecurity(runtime::Clock& clock, const config::Config& config)
     : clock_{clock},
       certificate_{config.tls_certificate()},
       key_{config.tls_key()},
@@ -104,7 +106,7 @@ TransportSecurity::Look TransportSecurity::look(const fs::path& certificate, con
   found.stamp = stamp_of(certificate, key);
   if (found.stamp == tried || found.stamp != seen) return found;
   try {
-    found.context = load_tls_context(certificate, key);
+    found.context = tls::load_tls_context(certificate, key);
   } catch (const std::exception& error) {
     found.problem = error.what();
   }
@@ -159,7 +161,7 @@ nlohmann::json TransportSecurity::state() const {
   nlohmann::json out{
       {"http", word(http_)}, {"robots", word(robots_)}, {"exposed", is_exposed()}, {"certificate", nullptr}};
   if (gate_) {
-    const TlsCertificate& certificate = gate_->context().certificate;
+    const tls::TlsCertificate& certificate = gate_->context().certificate;
     out["certificate"] = {{"names", certificate.names},
                           {"pin_sha256", certificate.pin},
                           {"not_after_us", certificate.not_after_us},
@@ -168,4 +170,4 @@ nlohmann::json TransportSecurity::state() const {
   return out;
 }
 
-}  // namespace server
+}  // namespace server::net

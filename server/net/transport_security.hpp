@@ -20,7 +20,7 @@
 #include "server/runtime/clock.hpp"
 #include "server/runtime/worker.hpp"
 
-namespace server {
+namespace server::net {
 
 inline constexpr microseconds kCertificateLook{std::chrono::seconds{2}};
 inline constexpr microseconds kExpiryWarning{std::chrono::days{30}};
@@ -29,7 +29,7 @@ inline constexpr microseconds kExposedReminder{std::chrono::hours{1}};
 class TransportSecurity {
  public:
   // Reads the certificate when a port needs it. Throws std::runtime_error saying what is missing and how to make it.
-  TransportSecurity(Clock& clock, const Config& config);
+  TransportSecurity(runtime::Clock& clock, const config::Config& config);
 
   PortAccess& http() { return http_; }
   PortAccess& robots() { return robots_; }
@@ -45,15 +45,15 @@ class TransportSecurity {
   // What programs on this machine need to trust the HTTP port; empty: it is plain.
   std::string to_trust() const;
 
-  const WorkerThread& worker() const { return worker_; }
-  const TlsHandshakes* gate() const { return gate_ ? &*gate_ : nullptr; }
+  const runtime::WorkerThread& worker() const { return worker_; }
+  const tls::TlsHandshakes* gate() const { return gate_ ? &*gate_ : nullptr; }
   bool is_exposed() const { return !exposed_.empty(); }
 
  private:
   // What one look at the files found.
   struct Look {
-    std::string stamp;                          // differs when a file has changed
-    std::shared_ptr<const TlsContext> context;  // null: nothing new, or a problem
+    std::string stamp;                               // differs when a file has changed
+    std::shared_ptr<const tls::TlsContext> context;  // null: nothing new, or a problem
     std::string problem;
   };
 
@@ -63,14 +63,14 @@ class TransportSecurity {
   void take(Look look);
   void remind();
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   std::filesystem::path certificate_, key_;
   std::string exposed_;  // the ports that are, for people
-  WorkerThread worker_{"handshakes", 10};
-  std::optional<TlsHandshakes> gate_;
+  runtime::WorkerThread worker_{"handshakes", 10};
+  std::optional<tls::TlsHandshakes> gate_;
   PortAccess http_, robots_;
   std::string tried_, seen_;  // stamps of the files
   std::int64_t next_exposed_us_ = 0, next_expiry_us_ = 0;
 };
 
-}  // namespace server
+}  // namespace server::net

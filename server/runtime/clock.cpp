@@ -6,7 +6,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <ctime>
 
-namespace server {
+namespace server::runtime {
 namespace asio = boost::asio;
 
 std::int64_t SystemClock::steady_us() const {
@@ -72,4 +72,4 @@ asio::awaitable<bool> Signal::wait_until(Clock& clock, std::int64_t deadline_us)
   co_return true;
 }
 
-}  // namespace server
+}  // namespace server::runtime

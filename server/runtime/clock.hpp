@@ -15,8 +15,11 @@
 #include "server/runtime/loop_watch.hpp"
 
 namespace server {
+using std::chrono::microseconds;  // every time and duration of the program
+class VirtualClock;               // of the tests
+}  // namespace server
 
-using std::chrono::microseconds;
+namespace server::runtime {
 
 class Clock {
  public:
@@ -40,7 +43,7 @@ class Clock {
 
    private:
     friend class SystemClock;
-    friend class VirtualClock;
+    friend class server::VirtualClock;
     bool has_rung_ = false;
     boost::asio::steady_timer* timer_ = nullptr;  // while somebody sleeps
   };
@@ -92,4 +95,4 @@ class Signal {
   bool remembered_ = false;  // a notification that nobody has taken yet
 };
 
-}  // namespace server
+}  // namespace server::runtime

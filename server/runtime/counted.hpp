@@ -1,7 +1,7 @@
 // Counts its own instances: how many coroutines are inside some piece of work.
 #pragma once
 
-namespace server {
+namespace server::runtime {
 
 template <class Number>
 class Counted {
@@ -15,4 +15,4 @@ class Counted {
   Number& count_;
 };
 
-}  // namespace server
+}  // namespace server::runtime

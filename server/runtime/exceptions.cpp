@@ -8,7 +8,7 @@
 #include <boost/system/system_error.hpp>
 #include <utility>
 
-namespace server {
+namespace server::runtime {
 namespace asio = boost::asio;
 
 const char* text(Ended value) {
@@ -81,4 +81,4 @@ std::string text_of(const std::exception_ptr& failure) {
   }
 }
 
-}  // namespace server
+}  // namespace server::runtime

@@ -16,7 +16,7 @@
 #include "server/runtime/clock.hpp"
 #include "server/runtime/log.hpp"
 
-namespace server {
+namespace server::runtime {
 
 // What was ended. `request` is one of HTTP, or a message of a page on /live; `model` the sending of a fluid's model to
 // one robot.
@@ -55,4 +55,4 @@ std::exception_ptr first_of(std::exception_ptr failure);
 bool is_cancellation(const std::exception_ptr& failure);
 std::string text_of(const std::exception_ptr& failure);
 
-}  // namespace server
+}  // namespace server::runtime

@@ -5,7 +5,7 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
-namespace server {
+namespace server::runtime {
 
 void start_log(const std::string& level) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("rheonaut"));
@@ -15,4 +15,4 @@ void start_log(const std::string& level) {
 
 std::string and_before(std::uint64_t unsaid) { return unsaid == 0 ? "" : fmt::format(" (and {} before)", unsaid); }
 
-}  // namespace server
+}  // namespace server::runtime

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-namespace server {
+namespace server::runtime {
 
 // `level` is trace, debug, info, warn or error.
 void start_log(const std::string& level);
@@ -32,4 +32,4 @@ class SparseLines {
 
 std::string and_before(std::uint64_t unsaid);  // " (and 19 before)", or nothing
 
-}  // namespace server
+}  // namespace server::runtime

@@ -3,7 +3,7 @@
 
 #include <spdlog/spdlog.h>
 
-namespace server {
+namespace server::runtime {
 
 void LoopWatch::turn(std::int64_t now_us) {
   if (last_us_ && now_us - *last_us_ > kStandstill.count()) {
@@ -19,4 +19,4 @@ std::chrono::microseconds LoopWatch::unread_for(std::int64_t now_us) {
   return std::chrono::microseconds{unread_since_us_ ? now_us - *unread_since_us_ : 0};
 }
 
-}  // namespace server
+}  // namespace server::runtime

@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace server {
+namespace server::runtime {
 
 class LoopWatch {
  public:
@@ -30,4 +30,4 @@ class LoopWatch {
   std::optional<std::int64_t> unread_since_us_;  // after a standstill, until it rests
 };
 
-}  // namespace server
+}  // namespace server::runtime

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <stdexcept>
 
-namespace server {
+namespace server::runtime {
 namespace fs = std::filesystem;
 
 namespace {
@@ -34,4 +34,4 @@ void write_private(const fs::path& file, const std::string& content) {
   fs::rename(temporary, file);
 }
 
-}  // namespace server
+}  // namespace server::runtime

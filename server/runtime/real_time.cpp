@@ -4,7 +4,7 @@
 #include <sched.h>
 #include <spdlog/spdlog.h>
 
-namespace server {
+namespace server::runtime {
 
 bool ask_for_real_time(Priority priority) {
   sched_param parameters{};
@@ -20,4 +20,4 @@ boost::asio::awaitable<void> ask_for_real_time(WorkerThread& disk) {
   co_await disk.run(std::move(ask));
 }
 
-}  // namespace server
+}  // namespace server::runtime

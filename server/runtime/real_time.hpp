@@ -1,12 +1,13 @@
 // Priorities of the station's threads on a busy machine: the loop first, then the thread that writes what the loop
-// receives, then all others. main.cpp asks for them, in one line; ARCHITECTURE.md says what the station is without them.
+// receives, then all others. main.cpp asks for them, in one line; ARCHITECTURE.md says what the station is without
+// them.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
 
 #include "server/runtime/worker.hpp"
 
-namespace server {
+namespace server::runtime {
 
 enum class Priority : int { disk = 0, loop = 1 };  // above the least of SCHED_RR
 
@@ -18,4 +19,4 @@ bool ask_for_real_time(Priority priority);
 // no time otherwise. Logs whether it was granted; where it is not, they go on without.
 boost::asio::awaitable<void> ask_for_real_time(WorkerThread& disk);
 
-}  // namespace server
+}  // namespace server::runtime

@@ -5,7 +5,7 @@
 
 #include <stdexcept>
 
-namespace server {
+namespace server::runtime {
 namespace {
 
 constexpr auto kVariant = sodium_base64_VARIANT_URLSAFE_NO_PADDING;
@@ -56,4 +56,4 @@ bool is_password(const std::string& password, const std::string& hash) {
   return crypto_pwhash_str_verify(hash.c_str(), password.data(), password.size()) == 0;
 }
 
-}  // namespace server
+}  // namespace server::runtime

@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <string>
 
-namespace server {
+namespace server::runtime {
 
 using SecretHash = std::array<unsigned char, 32>;
 
@@ -43,4 +43,4 @@ struct PasswordCost {
 std::string hash_password(const std::string& password, const PasswordCost& cost);
 bool is_password(const std::string& password, const std::string& hash);
 
-}  // namespace server
+}  // namespace server::runtime

@@ -10,7 +10,7 @@
 #include <chrono>
 #include <csignal>
 
-namespace server {
+namespace server::runtime {
 namespace asio = boost::asio;
 
 namespace {
@@ -63,4 +63,4 @@ asio::awaitable<void> TaskGroup::stop_on_signal() {
   stop();
 }
 
-}  // namespace server
+}  // namespace server::runtime

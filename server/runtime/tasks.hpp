@@ -13,7 +13,7 @@
 
 #include "server/runtime/exceptions.hpp"
 
-namespace server {
+namespace server::runtime {
 
 class TaskGroup {
  public:
@@ -73,4 +73,4 @@ inline void run_first(boost::asio::io_context& loop, boost::asio::awaitable<void
   if (failure) std::rethrow_exception(failure);
 }
 
-}  // namespace server
+}  // namespace server::runtime

@@ -6,7 +6,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <utility>
 
-namespace server {
+namespace server::runtime {
 namespace asio = boost::asio;
 
 bool Turns::take() {
@@ -41,4 +41,4 @@ void Turns::next_round() {
   if (!waiting_.empty()) begin_round();
 }
 
-}  // namespace server
+}  // namespace server::runtime

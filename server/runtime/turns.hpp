@@ -9,7 +9,7 @@
 #include <deque>
 #include <functional>
 
-namespace server {
+namespace server::runtime {
 
 class Turns {
  public:
@@ -34,4 +34,4 @@ class Turns {
   bool is_round_ = false;  // next_round() is under way, behind everything that is ready now
 };
 
-}  // namespace server
+}  // namespace server::runtime

@@ -7,7 +7,7 @@
 
 #include <boost/asio/post.hpp>
 
-namespace server {
+namespace server::runtime {
 
 WorkerThread::WorkerThread(std::string name, int niceness) {
   auto set_up = [name = std::move(name), niceness] {
@@ -19,4 +19,4 @@ WorkerThread::WorkerThread(std::string name, int niceness) {
 
 WorkerThread::~WorkerThread() { pool_.join(); }
 
-}  // namespace server
+}  // namespace server::runtime

@@ -20,7 +20,7 @@
 
 #include "server/runtime/counted.hpp"
 
-namespace server {
+namespace server::runtime {
 
 class WorkerThread {
  public:
@@ -54,4 +54,4 @@ class WorkerThread {
   boost::asio::thread_pool pool_{1};
 };
 
-}  // namespace server
+}  // namespace server::runtime

@@ -6,7 +6,7 @@
 
 #include "server/station/commands/command_checks.hpp"
 
-namespace server {
+namespace server::station {
 namespace {
 
 constexpr microseconds kMs{1000};
@@ -77,4 +77,4 @@ void CommandAuthority::keep(const std::string& actor, microseconds age) {
   if (is_fresh(age)) authority_.keep_alive(actor);
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -10,13 +10,13 @@
 #include "server/station/commands/authority.hpp"
 #include "server/station/commands/requests.hpp"
 
-namespace server {
+namespace server::station {
 
 const char* text(ControlAction action);
 
 class CommandAuthority {
  public:
-  explicit CommandAuthority(Clock& clock) : authority_{clock} {}
+  explicit CommandAuthority(runtime::Clock& clock) : authority_{clock} {}
 
   ControlState of(const RobotId& robot) const { return authority_.of(robot); }
   Result<void> may_use(const RobotId& robot, const std::string& actor) const {
@@ -40,4 +40,4 @@ class CommandAuthority {
   Authority authority_;
 };
 
-}  // namespace server
+}  // namespace server::station

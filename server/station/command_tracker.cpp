@@ -10,7 +10,7 @@
 #include "server/station/commands/read_back.hpp"
 #include "server/station/state/unknown_values.hpp"
 
-namespace server {
+namespace server::station {
 namespace asio = boost::asio;
 
 namespace {
@@ -62,7 +62,7 @@ asio::awaitable<Result<CommandRecord>> CommandTracker::follow(std::shared_ptr<Pe
   const CommandRecord& record = pending->record;
   const bool is_on_its_way = record.state == CommandState::queued || record.state == CommandState::sent;
   const bool is_reached = until_verified ? record.ended_at_us != 0 : !is_on_its_way;
-  Signal& reached = until_verified ? pending->ended : pending->answered;
+  runtime::Signal& reached = until_verified ? pending->ended : pending->answered;
   if (!is_reached) co_await reached.wait_until(clock_, clock_.steady_us() + patience.count());
   co_return record;
 }
@@ -326,4 +326,4 @@ void CommandTracker::settle_unanswered(RobotEntry& entry, const SampleBatch& bat
   });
 }
 
-}  // namespace server
+}  // namespace server::station

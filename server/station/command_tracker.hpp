@@ -17,11 +17,11 @@
 #include "server/station/sink_notifier.hpp"
 #include "server/station/state/stop_times.hpp"
 
-namespace server {
+namespace server::station {
 
 class CommandTracker {
  public:
-  CommandTracker(boost::asio::io_context& loop, Clock& clock, SinkNotifier& notifier)
+  CommandTracker(boost::asio::io_context& loop, runtime::Clock& clock, SinkNotifier& notifier)
       : loop_{loop}, clock_{clock}, notifier_{notifier} {}
 
   RecentCommands& recent() { return recent_; }  // that had a key, and have ended
@@ -74,10 +74,10 @@ class CommandTracker {
   bool end_if_sighted(PendingCommand& pending, Sight sight);
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
+  runtime::Clock& clock_;
   SinkNotifier& notifier_;
   RecentCommands recent_;
   StopTimes stop_times_;
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace server {
+namespace server::station {
 namespace {
 
 constexpr microseconds kRepeatStop{1'000'000};
@@ -153,4 +153,4 @@ void EmergencyStops::show_pending(RobotEntry& entry) {
   entry.robot.pending_stop = still == nullptr ? std::nullopt : std::optional{still->record.id};
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -12,11 +12,11 @@
 #include "server/station/commands/recent_commands.hpp"
 #include "server/station/robot_entry.hpp"
 
-namespace server {
+namespace server::station {
 
 class EmergencyStops {
  public:
-  EmergencyStops(boost::asio::io_context& loop, Clock& clock, RecentCommands& recent)
+  EmergencyStops(boost::asio::io_context& loop, runtime::Clock& clock, RecentCommands& recent)
       : loop_{loop}, clock_{clock}, recent_{recent} {}
 
   // Hands a stop to the link, or finds the one that is the answer to the request already; nothing is to be published
@@ -48,9 +48,9 @@ class EmergencyStops {
   void hand(RobotEntry& entry, PendingCommand& stop, std::vector<CommandRecord>& to_publish);
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
+  runtime::Clock& clock_;
   RecentCommands& recent_;
   const std::int64_t started_us_ = clock_.steady_us();
 };
 
-}  // namespace server
+}  // namespace server::station

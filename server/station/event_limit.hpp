@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-namespace server {
+namespace server::station {
 
 class EventLimit {
  public:
@@ -28,4 +28,4 @@ class EventLimit {
   std::uint64_t withheld_ = 0;        // since
 };
 
-}  // namespace server
+}  // namespace server::station

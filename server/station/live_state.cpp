@@ -8,7 +8,7 @@
 #include "server/station/state/telemetry_fields.hpp"
 #include "server/station/state/unknown_values.hpp"
 
-namespace server {
+namespace server::station {
 namespace {
 
 void begin_boot(RobotEntry& entry) {
@@ -41,7 +41,7 @@ void show_hello(RobotState& robot, const AdmissionRequest& hello, const protocol
   robot.status.reset();
 }
 
-void count_power(RobotState& robot, const SampleBatch& batch, const CommandLimits& limits) {
+void count_power(RobotState& robot, const SampleBatch& batch, const config::CommandLimits& limits) {
   const double period_s = batch.context.period_us / 1e6;
   for (const Sample& sample : batch.samples) {
     const bool is_at_power = std::abs(sample.duty) > limits.power_duty;
@@ -90,7 +90,7 @@ void fill_batch(const RobotState& robot, Checked<protocol::Telemetry> checked, S
   }
 }
 
-bool show_samples(RobotEntry& entry, const SampleBatch& batch, const CommandLimits& limits) {
+bool show_samples(RobotEntry& entry, const SampleBatch& batch, const config::CommandLimits& limits) {
   RobotState& robot = entry.robot;
   if (batch.next_seq() <= robot.next_seq) return false;  // sent again
   const std::uint64_t emergency_id = robot.context.emergency_id;
@@ -138,4 +138,4 @@ RobotEvent event_of(const RobotState& robot, Checked<protocol::Event> checked) {
   return out;
 }
 
-}  // namespace server
+}  // namespace server::station

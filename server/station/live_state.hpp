@@ -10,7 +10,7 @@
 #include "server/station/state/checked.hpp"
 #include "server/station/state/robot_archive.hpp"
 
-namespace server {
+namespace server::station {
 
 // The robot has connected. What belongs to its boot begins anew when it is another one.
 void begin_connection(RobotEntry& entry, const AdmissionRequest& hello, const protocol::Hello& details,
@@ -21,8 +21,8 @@ void fill_batch(const RobotState& robot, Checked<protocol::Telemetry> checked, S
 
 // A batch that is newer than what was shown becomes the robot's state; `limits` are those of its fluid. True when
 // another controller is in force.
-bool show_samples(RobotEntry& entry, const SampleBatch& batch, const CommandLimits& limits);
+bool show_samples(RobotEntry& entry, const SampleBatch& batch, const config::CommandLimits& limits);
 
 RobotEvent event_of(const RobotState& robot, Checked<protocol::Event> checked);
 
-}  // namespace server
+}  // namespace server::station

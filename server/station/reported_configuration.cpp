@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <utility>
 
-namespace server {
+namespace server::station {
 namespace {
 
 constexpr std::int64_t kClockRecordPeriodUs = 60'000'000;
@@ -81,4 +81,4 @@ ReportedConfiguration::ClockReport ReportedConfiguration::add(const ClockExchang
   return report;
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -13,7 +13,7 @@
 #include "server/station/state/in_force.hpp"
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 // When a report came, in the terms of what is recorded.
 struct ReportMoment {
@@ -60,4 +60,4 @@ class ReportedConfiguration {
   std::int64_t utc_minus_steady_us_ = 0;  // at its latest exchange
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -11,7 +11,7 @@
 #include "server/station/station.hpp"
 #include "server/station/station_parts.hpp"
 
-namespace server {
+namespace server::station {
 namespace asio = boost::asio;
 
 namespace {
@@ -40,7 +40,7 @@ Result<void> check_time(const PendingCommand& pending, const RobotState& robot) 
 
 // What speaks against the request; nothing is sent then.
 Result<void> check_request(const CommandRequest& request, const protocol::Command& wire, const RobotEntry& entry,
-                           const Envelope& envelope) {
+                           const config::Envelope& envelope) {
   if (request.time_to_live <= microseconds{0} || request.time_to_live > kMaxTimeToLive) {
     return fail(ErrorCode::invalid,
                 fmt::format("life_ms = {} is outside 1 to 10000", request.time_to_live.count() / 1000), "out_of_range");
@@ -222,4 +222,4 @@ void Station::note_refusal(Author by, const RobotId& robot_id, const char* what,
   parts_->publish_refusal(std::move(by), robot_id, what, detail, error);
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -13,7 +13,7 @@
 #include "server/station/reported_configuration.hpp"
 #include "server/station/state/robot_port.hpp"
 
-namespace server {
+namespace server::station {
 
 inline constexpr std::int64_t kEventPeriodUs = 10'000'000;  // of refusals, and of values that cannot be
 
@@ -45,4 +45,4 @@ struct RobotEntry {
   EventLimit invalid_values{kEventPeriodUs};
 };
 
-}  // namespace server
+}  // namespace server::station

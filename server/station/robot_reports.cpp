@@ -10,7 +10,7 @@
 #include "server/station/station.hpp"
 #include "server/station/station_parts.hpp"
 
-namespace server {
+namespace server::station {
 namespace {
 
 std::string more_text(std::uint64_t withheld) {
@@ -23,7 +23,7 @@ std::vector<const protocol::Command*> commands_of(const std::vector<std::shared_
   return commands;
 }
 
-ReportMoment moment_of(const RobotEntry& entry, const Clock& clock) {
+ReportMoment moment_of(const RobotEntry& entry, const runtime::Clock& clock) {
   return moment_of_report(entry.robot, entry.orders.next_sample_at_robot_us(), clock.utc_us());
 }
 
@@ -217,4 +217,4 @@ void Station::on_controller(RobotPort& port, const protocol::Controller& control
   parts_->tracker.on_read_back(*entry, sent, reading.sights);
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-namespace server {
+namespace server::station {
 
 RobotEntry& RobotTable::add(const RobotId& id) {
   RobotState& robot = states_[id];
@@ -49,4 +49,4 @@ Result<void> RobotTable::may_connect(const RobotId& id, BootId boot_id, std::int
                                                id, robot.peer, robot.boot_id, silent_us / 1000));
 }
 
-}  // namespace server
+}  // namespace server::station

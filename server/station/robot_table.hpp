@@ -9,7 +9,7 @@
 #include "server/runtime/result.hpp"
 #include "server/station/robot_entry.hpp"
 
-namespace server {
+namespace server::station {
 
 class RobotTable {
  public:
@@ -34,4 +34,4 @@ class RobotTable {
   std::map<RobotId, RobotEntry> entries_;  // the same robots
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -4,7 +4,7 @@
 
 #include "server/station/state/unknown_values.hpp"
 
-namespace server {
+namespace server::station {
 
 void SinkNotifier::publish(const RobotState& robot) {
   for (StationSink* sink : sinks_) sink->on_robot(robot);
@@ -63,4 +63,4 @@ void SinkNotifier::note(const RobotState& robot, std::string kind, std::string d
   publish(robot, event);
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -10,11 +10,11 @@
 #include "server/runtime/clock.hpp"
 #include "server/station/state/station_sink.hpp"
 
-namespace server {
+namespace server::station {
 
 class SinkNotifier {
  public:
-  explicit SinkNotifier(Clock& clock) : clock_{clock} {}
+  explicit SinkNotifier(runtime::Clock& clock) : clock_{clock} {}
 
   void add(StationSink& sink) { sinks_.push_back(&sink); }
 
@@ -34,8 +34,8 @@ class SinkNotifier {
   void note(const RobotState& robot, std::string kind, std::string detail, std::string cause = "none");
 
  private:
-  Clock& clock_;
+  runtime::Clock& clock_;
   std::vector<StationSink*> sinks_;
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -9,11 +9,11 @@
 #include "server/station/state/audit_details.hpp"
 #include "server/station/station_parts.hpp"
 
-namespace server {
+namespace server::station {
 namespace {
 
 // The configuration may have been changed since: a fluid that is no longer listed is not known.
-void restore_fluid(RobotState& robot, const std::string& fluid, const Envelope& envelope) {
+void restore_fluid(RobotState& robot, const std::string& fluid, const config::Envelope& envelope) {
   robot.fluid = envelope.is_listed(fluid) ? fluid : "";
   if (robot.fluid == fluid) return;
   spdlog::warn(
@@ -24,7 +24,8 @@ void restore_fluid(RobotState& robot, const std::string& fluid, const Envelope& 
 
 }  // namespace
 
-Station::Station(boost::asio::io_context& loop, Clock& clock, Envelope envelope, LinkTimes times)
+Station::Station(boost::asio::io_context& loop, runtime::Clock& clock, config::Envelope envelope,
+                 config::LinkTimes times)
     : parts_{std::make_unique<StationParts>(loop, clock, std::move(envelope), times)} {}
 
 Station::~Station() = default;
@@ -63,8 +64,8 @@ std::optional<float> Station::parameter_in_force(const RobotId& id, const std::s
 
 const StopTimes& Station::stop_times() const { return parts_->tracker.stop_times(); }
 std::uint64_t Station::invalid_values() const { return parts_->invalid_values; }
-LinkTimes Station::link_times() const { return parts_->times; }
-const Envelope& Station::envelope() const { return parts_->envelope; }
+config::LinkTimes Station::link_times() const { return parts_->times; }
+const config::Envelope& Station::envelope() const { return parts_->envelope; }
 
 void Station::remember(const CommandRecord& ended) { parts_->tracker.recent().put(ended, kLongAgoUs); }
 
@@ -99,7 +100,7 @@ Result<void> Station::set_fluid(const RobotId& id, const std::string& text, cons
     note_refusal(by, id, "fluid", refused_fluid(fluid), permitted.error());
     return permitted;
   }
-  const Envelope& envelope = parts_->envelope;
+  const config::Envelope& envelope = parts_->envelope;
   const bool is_narrower = is_narrower_than(envelope.in(fluid), envelope.in(robot.fluid));
   const std::string before = std::exchange(robot.fluid, fluid);
   // SAFETY: what waits was held to the limits of before, and outlives none that is narrower.
@@ -160,4 +161,4 @@ void Station::request_event_resend(const RobotId& id, BootId boot_id) {
   if (entry != nullptr && entry->port != nullptr) entry->port->request_event_resend();
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -31,13 +31,13 @@
 #include "server/station/state/station_state.hpp"
 #include "server/station/state/stop_times.hpp"
 
-namespace server {
+namespace server::station {
 
 struct StationParts;  // server/station/station_parts.hpp
 
 class Station {
  public:
-  Station(boost::asio::io_context& loop, Clock& clock, Envelope envelope, LinkTimes times);
+  Station(boost::asio::io_context& loop, runtime::Clock& clock, config::Envelope envelope, config::LinkTimes times);
   ~Station();
 
   void add_sink(StationSink& sink);
@@ -86,7 +86,7 @@ class Station {
 
   // --- called by robot sessions (link/) ---
 
-  LinkTimes link_times() const;
+  config::LinkTimes link_times() const;
   // Decides whether a robot that is already connected is replaced (same boot) or keeps its place. On admission the
   // session becomes the robot's port, and pending stops are sent to it first.
   Result<void> may_connect(const RobotId& id, BootId boot_id) const;
@@ -115,7 +115,7 @@ class Station {
   void on_controller(RobotPort& port, const protocol::Controller& controller);
 
   // The limits of commands, with the list of fluids.
-  const Envelope& envelope() const;
+  const config::Envelope& envelope() const;
 
   // Says which fluid the robot is in, as Envelope lists it; empty: not known. The limits of that fluid hold from this
   // call on, until another is named. not_found; invalid for a fluid that is not listed; conflict while somebody else is
@@ -150,4 +150,4 @@ class Station {
   std::unique_ptr<StationParts> parts_;
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -7,7 +7,7 @@
 
 #include "server/station/state/audit_details.hpp"
 
-namespace server {
+namespace server::station {
 
 void StationParts::publish(const Authority::Change& change, const std::string& actor, const std::string& peer) {
   RobotEntry* entry = robots.find(change.robot_id);
@@ -67,4 +67,4 @@ std::unexpected<Error> StationParts::refuse(const CommandRequest& request, Error
   return std::unexpected{std::move(error)};
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -19,13 +19,14 @@
 #include "server/station/sink_notifier.hpp"
 #include "server/station/timed_commands.hpp"
 
-namespace server {
+namespace server::station {
 
 struct StationParts {
-  StationParts(boost::asio::io_context& its_loop, Clock& its_clock, Envelope limits, LinkTimes link_times)
+  StationParts(boost::asio::io_context& its_loop, runtime::Clock& its_clock, config::Envelope limits,
+               config::LinkTimes link_times)
       : loop{its_loop}, clock{its_clock}, envelope{std::move(limits)}, times{link_times} {}
 
-  const CommandLimits& limits_of(const RobotState& robot) const { return envelope.in(robot.fluid); }
+  const config::CommandLimits& limits_of(const RobotState& robot) const { return envelope.in(robot.fluid); }
   // SAFETY: timed commands of the former holder of control are dropped before the next command; false: do not send it.
   bool drop_outdated(RobotEntry& entry) { return timed.drop_outdated(entry, control.of(entry.robot.id).holder); }
 
@@ -41,9 +42,9 @@ struct StationParts {
   std::unexpected<Error> refuse(const CommandRequest& request, Error error);
 
   boost::asio::io_context& loop;
-  Clock& clock;
-  const Envelope envelope;
-  const LinkTimes times;
+  runtime::Clock& clock;
+  const config::Envelope envelope;
+  const config::LinkTimes times;
   SinkNotifier notifier{clock};
   RobotTable robots;
   CommandAuthority control{clock};
@@ -56,4 +57,4 @@ struct StationParts {
   std::function<void(const RobotState&, const Author&)> on_fluid_named = [](const RobotState&, const Author&) {};
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -6,7 +6,7 @@
 
 #include "server/station/commands/command_checks.hpp"
 
-namespace server {
+namespace server::station {
 namespace {
 
 constexpr std::uint64_t kDueGraceUs = 200'000;  // after its time a timed command has run or is dropped
@@ -98,4 +98,4 @@ void TimedCommands::end_timed(RobotEntry& entry, const char* reason) {
   }
 }
 
-}  // namespace server
+}  // namespace server::station

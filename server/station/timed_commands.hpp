@@ -11,11 +11,11 @@
 
 #include "server/station/command_tracker.hpp"
 
-namespace server {
+namespace server::station {
 
 class TimedCommands {
  public:
-  TimedCommands(boost::asio::io_context& loop, Clock& clock, SinkNotifier& notifier, CommandTracker& tracker)
+  TimedCommands(boost::asio::io_context& loop, runtime::Clock& clock, SinkNotifier& notifier, CommandTracker& tracker)
       : loop_{loop}, clock_{clock}, notifier_{notifier}, tracker_{tracker} {}
 
   // Drops what is to be dropped now, given who is in control (empty: nobody). Sent before anything that comes next, on
@@ -35,9 +35,9 @@ class TimedCommands {
   void end_timed(RobotEntry& entry, const char* reason);
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
+  runtime::Clock& clock_;
   SinkNotifier& notifier_;
   CommandTracker& tracker_;
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -5,24 +5,25 @@
 
 #include "server/storage/runs/run_store.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 
 namespace {
 
-std::filesystem::path backup_folder(const std::filesystem::path& database, const RecordingConfig& config) {
+std::filesystem::path backup_folder(const std::filesystem::path& database, const config::RecordingConfig& config) {
   return std::filesystem::absolute(config.backup_dir.empty() ? database.parent_path() / "backups" : config.backup_dir);
 }
 
-RetentionPolicy retention_policy(const RecordingConfig& config) {
+RetentionPolicy retention_policy(const config::RecordingConfig& config) {
   return {config.retention_days, config.max_database_mb * std::uint64_t{1'000'000}};
 }
 
 }  // namespace
 
-RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                               WorkerThread& exports_worker, WorkerThread& checkpoints, const RecorderOptions& options,
-                               const RecordingConfig& config)
+RecordingParts::RecordingParts(asio::io_context& loop, runtime::Clock& clock, runtime::WorkerThread& disk,
+                               runtime::WorkerThread& readers, runtime::WorkerThread& exports_worker,
+                               runtime::WorkerThread& checkpoints, const RecorderOptions& options,
+                               const config::RecordingConfig& config)
     : recorder{loop, clock, disk, checkpoints, options},
       head_watch{clock, recorder, checkpoints, options.head_interval},
       reader{options.path, readers},
@@ -38,14 +39,14 @@ RecordingParts::RecordingParts(asio::io_context& loop, Clock& clock, WorkerThrea
       retention{clock, recorder, reader, disk_watch, references, retention_policy(config)},
       path_{options.path} {}
 
-void RecordingParts::connect(Station& station) {
+void RecordingParts::connect(station::Station& station) {
   station.add_sink(recorder);
   station.add_sink(runs);
   runs.set_envelope(station.envelope());
-  runs.set_on_fluid(std::bind_front(&Station::set_fluid, &station));
-  recorder.set_on_durable(std::bind_front(&Station::on_durable, &station));
-  recorder.set_on_missing(std::bind_front(&Station::request_resend, &station));
-  recorder.set_on_missing_events(std::bind_front(&Station::request_event_resend, &station));
+  runs.set_on_fluid(std::bind_front(&station::Station::set_fluid, &station));
+  recorder.set_on_durable(std::bind_front(&station::Station::on_durable, &station));
+  recorder.set_on_missing(std::bind_front(&station::Station::request_resend, &station));
+  recorder.set_on_missing_events(std::bind_front(&station::Station::request_event_resend, &station));
 }
 
 asio::awaitable<RestoredState> RecordingParts::open() {
@@ -62,7 +63,7 @@ asio::awaitable<RestoredState> RecordingParts::open() {
   co_return restored;
 }
 
-void RecordingParts::spawn(TaskGroup& tasks) {
+void RecordingParts::spawn(runtime::TaskGroup& tasks) {
   tasks.spawn("recorder", recorder.run());
   tasks.spawn("checkpoints", recorder.run_checkpoints());
   tasks.spawn("head of the database", head_watch.run());
@@ -82,4 +83,4 @@ void RecordingParts::close() {
   head_watch.close();
 }
 
-}  // namespace server
+}  // namespace server::storage

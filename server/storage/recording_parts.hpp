@@ -24,22 +24,23 @@
 #include "server/storage/upkeep/head_watch.hpp"
 #include "server/storage/upkeep/retention.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct RecordingParts {
-  RecordingParts(boost::asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& readers,
-                 WorkerThread& exports_worker, WorkerThread& checkpoints, const RecorderOptions& options,
-                 const RecordingConfig& config = {});
+  RecordingParts(boost::asio::io_context& loop, runtime::Clock& clock, runtime::WorkerThread& disk,
+                 runtime::WorkerThread& readers, runtime::WorkerThread& exports_worker,
+                 runtime::WorkerThread& checkpoints, const RecorderOptions& options,
+                 const config::RecordingConfig& config = {});
 
   // The recording gets the station's reports from now on; the station gets what has become durable and what is missing.
-  void connect(Station& station);
+  void connect(station::Station& station);
 
   // Opens or creates the database and reads what the station must know again; before robots arrive. Throws when the
   // file is not ours or cannot be written.
   boost::asio::awaitable<RestoredState> open();
 
   // Starts the lasting tasks.
-  void spawn(TaskGroup& tasks);
+  void spawn(runtime::TaskGroup& tasks);
 
   std::filesystem::path path() const { return path_; }                                       // of the database
   std::filesystem::path exports_folder() const { return path_.parent_path() / ".exports"; }  // empty after open()
@@ -66,4 +67,4 @@ struct RecordingParts {
   std::filesystem::path path_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -5,7 +5,7 @@
 #include <boost/asio/error.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
-namespace server {
+namespace server::tls {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 
@@ -51,4 +51,4 @@ void StreamSocket::end() {
   socket_.cancel(ignored);
 }
 
-}  // namespace server
+}  // namespace server::tls

@@ -18,7 +18,7 @@
 
 #include "base/tls/wire.hpp"
 
-namespace server {
+namespace server::tls {
 
 class StreamSocket {
  public:
@@ -148,4 +148,4 @@ void async_teardown(boost::beast::role_type role, StreamSocket& stream, OnEnd&& 
 }
 inline void beast_close_socket(StreamSocket& stream) { stream.end(); }
 
-}  // namespace server
+}  // namespace server::tls

@@ -10,7 +10,7 @@
 
 #include "base/tls/public_key.hpp"
 
-namespace server {
+namespace server::tls {
 namespace fs = std::filesystem;
 
 namespace {
@@ -91,4 +91,4 @@ TlsCertificate describe(X509& certificate) {
   return out;
 }
 
-}  // namespace server
+}  // namespace server::tls

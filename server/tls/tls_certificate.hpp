@@ -8,7 +8,7 @@
 
 #include "base/tls/openssl.hpp"
 
-namespace server {
+namespace server::tls {
 
 struct TlsCertificate {
   std::vector<std::string> names;  // of the subjectAltName: DNS names and IP addresses
@@ -25,4 +25,4 @@ base::Openssl<EVP_PKEY> load_key(const std::filesystem::path& file);
 TlsCertificate describe(X509& certificate);
 std::string public_key_pem(EVP_PKEY& key);
 
-}  // namespace server
+}  // namespace server::tls

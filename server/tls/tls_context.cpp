@@ -5,7 +5,7 @@
 
 #include <stdexcept>
 
-namespace server {
+namespace server::tls {
 namespace fs = std::filesystem;
 
 namespace {
@@ -60,4 +60,4 @@ std::shared_ptr<const TlsContext> load_tls_context(const fs::path& certificate, 
   return context;
 }
 
-}  // namespace server
+}  // namespace server::tls

@@ -10,7 +10,7 @@
 #include "base/tls/openssl.hpp"
 #include "server/tls/tls_certificate.hpp"
 
-namespace server {
+namespace server::tls {
 
 struct TlsContext {
   base::Openssl<SSL_CTX> ssl;
@@ -22,4 +22,4 @@ struct TlsContext {
 std::shared_ptr<const TlsContext> load_tls_context(const std::filesystem::path& certificate,
                                                    const std::filesystem::path& key);
 
-}  // namespace server
+}  // namespace server::tls

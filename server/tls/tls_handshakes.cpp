@@ -9,7 +9,7 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/system/system_error.hpp>
 
-namespace server {
+namespace server::tls {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using namespace asio::experimental::awaitable_operators;  // NOLINT: operators only
@@ -60,7 +60,7 @@ asio::awaitable<TlsHandshakes::End> TlsHandshakes::shake_hands(StreamSocket& soc
 
 void TlsHandshakes::log_failure(const std::string& peer, const char* port, const std::string& why) {
   const auto unsaid = lines_.next(clock_.steady_us());
-  if (unsaid) spdlog::warn("{}: no TLS with {}: {}{}", port, peer, why, and_before(*unsaid));
+  if (unsaid) spdlog::warn("{}: no TLS with {}: {}{}", port, peer, why, runtime::and_before(*unsaid));
 }
 
-}  // namespace server
+}  // namespace server::tls

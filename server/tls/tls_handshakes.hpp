@@ -19,7 +19,7 @@
 #include "server/tls/stream_socket.hpp"
 #include "server/tls/tls_context.hpp"
 
-namespace server {
+namespace server::tls {
 
 inline constexpr microseconds kHandshakeTime{std::chrono::seconds{10}};
 
@@ -37,7 +37,7 @@ class TlsHandshakes {
     not_tls,  // the client began with something else, which waits to be read; counted as failed
   };
 
-  TlsHandshakes(Clock& clock, WorkerThread& worker, std::shared_ptr<const TlsContext> context)
+  TlsHandshakes(runtime::Clock& clock, runtime::WorkerThread& worker, std::shared_ptr<const TlsContext> context)
       : clock_{clock}, worker_{worker}, context_{std::move(context)} {}
 
   // `port` is for the log: "robot port". The socket lives until the answer.
@@ -57,11 +57,11 @@ class TlsHandshakes {
   boost::asio::awaitable<End> shake_hands(StreamSocket& socket);
   void log_failure(const std::string& peer, const char* port, const std::string& why);
 
-  Clock& clock_;
-  WorkerThread& worker_;
+  runtime::Clock& clock_;
+  runtime::WorkerThread& worker_;
   std::shared_ptr<const TlsContext> context_;
   TlsCounters counters_;
-  SparseLines lines_;
+  runtime::SparseLines lines_;
 };
 
-}  // namespace server
+}  // namespace server::tls

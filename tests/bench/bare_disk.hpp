@@ -55,7 +55,7 @@ class Disk {
     advance_row_ = prepare("UPDATE meta SET value = ? WHERE name = 'next_row'");
     advance_boot_ = prepare("UPDATE boot SET last_robot_time_us = ? WHERE boot_key = ?");
     thread_ = std::thread{[this, in_real_time] {
-      if (in_real_time) server::ask_for_real_time(server::Priority::disk);
+      if (in_real_time) server::runtime::ask_for_real_time(server::runtime::Priority::disk);
       work();
     }};
   }
@@ -224,7 +224,7 @@ class Disk {
     return statement;
   }
 
-  server::Database database_;
+  server::storage::Database database_;
   sqlite3* handle_;
   sqlite3_stmt *insert_sample_, *insert_block_, *insert_segment_, *insert_robot_, *insert_boot_, *advance_row_,
       *advance_boot_;

@@ -25,12 +25,12 @@ void require(bool condition, const std::string& what) {
 class BodyStation : public ApiTest {
  public:
   BodyStation() {
-    station.restore({RestoredRobot{"r1"}}, {});
+    station.restore({station::RestoredRobot{"r1"}}, {});
     ask("POST", "/api/v1/users", {{"name", "anna"}, {"role", "operator"}, {"password", "correct horse"}});
     ask("POST", "/api/v1/tokens", {{"name", "ci"}, {"scopes", "read"}});
     ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}});
     api->accounts().open_session("anna", "", "");
-    for (const Route& route : api->router().routes()) {
+    for (const http::Route& route : api->router().routes()) {
       if (route.method != "GET") patterns_.push_back(route.pattern);
     }
     patterns_.push_back(kLive);
@@ -45,7 +45,7 @@ class BodyStation : public ApiTest {
     const std::size_t by_byte = choice.empty() ? 0 : static_cast<unsigned char>(choice.front()) % patterns_.size();
     const std::string pattern = named != patterns_.end() ? *named : patterns_[by_byte];
     if (pattern == kLive) return say(body);
-    std::optional<Response> response;
+    std::optional<http::Response> response;
     tasks.spawn("ask", answer(request_of(target_of(pattern), body), response));
     require(clock.run_until([&] { return response.has_value(); }, 60s), "no answer of " + pattern);
     const std::string what = pattern + ": " + std::to_string(response->status) + " " + response->body;
@@ -73,33 +73,36 @@ class BodyStation : public ApiTest {
     return target;
   }
 
-  Request request_of(const std::string& target, const std::string& body) {
-    Request request;
+  http::Request request_of(const std::string& target, const std::string& body) {
+    http::Request request;
     request.method = "POST";
     request.target = target;
     request.body = body;
     request.actor = "token:local";
     request.peer = "127.0.0.1";
-    request.caller =
-        Caller{"token:local", "", Scopes::of(Role::admin), 0, std::make_shared<Standing>(loop), "127.0.0.1"};
+    request.caller = identity::Caller{
+        "token:local", "", identity::Scopes::of(identity::Role::admin), 0, std::make_shared<identity::Standing>(loop),
+        "127.0.0.1"};
     return request;
   }
 
-  boost::asio::awaitable<void> answer(Request request, std::optional<Response>& into) {
+  boost::asio::awaitable<void> answer(http::Request request, std::optional<http::Response>& into) {
     into = co_await api->router().dispatch(std::move(request));
   }
 
   void say(const std::string& text) {
-    const Caller caller{"token:local", "", Scopes::of(Role::admin), 0, std::make_shared<Standing>(loop), "127.0.0.1"};
+    const identity::Caller caller{
+        "token:local", "", identity::Scopes::of(identity::Role::admin), 0, std::make_shared<identity::Standing>(loop),
+        "127.0.0.1"};
     const auto understood = on_page_message(text, caller, page_, live_parts_);
-    if (!understood) require(json::accept(problem_message(understood.error())), text);
+    if (!understood) require(json::accept(api::problem_message(understood.error())), text);
     clock.settle();
     ++changes_;
   }
 
-  Subscriber page_{loop};
-  RobotTexts texts_{loop, station};
-  LiveParts live_parts_{loop, tasks, clock, station, live, texts_, "0"};
+  live::Subscriber page_{loop};
+  live::RobotTexts texts_{loop, station};
+  api::LiveParts live_parts_{loop, tasks, clock, station, live, texts_, "0"};
   std::vector<std::string> patterns_;
   int changes_ = 0;
 };

@@ -16,14 +16,14 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-void require_sane(const CommandLimits& limits) {
+void require_sane(const config::CommandLimits& limits) {
   require(limits.setpoint_min_m < limits.setpoint_max_m && limits.setpoint_step_m >= 0);
   require(std::abs(limits.duty_min) <= 1 && std::abs(limits.duty_max) <= 1 && std::abs(limits.power_duty) <= 1);
   require(limits.power_s >= 0 && std::isfinite(limits.disturbance_max_m));
 }
 
-void expect_within_limits(const Config& config) {
-  for (const PortPlaces& places : {config.http_places, config.robot_places}) {
+void expect_within_limits(const config::Config& config) {
+  for (const config::PortPlaces& places : {config.http_places, config.robot_places}) {
     require(places.connections >= 16 && places.connections <= 32'768);
     require(places.of_address >= 1 && places.of_address <= 32'768);
   }
@@ -32,7 +32,7 @@ void expect_within_limits(const Config& config) {
   require_sane(config.envelope.anywhere());
   for (const auto& [fluid, limits] : config.envelope.of_fluid()) {
     require_sane(limits);
-    require(fluid_name(fluid) == fluid);
+    require(config::fluid_name(fluid) == fluid);
   }
   require(config.recording.critical_space_mb <= config.recording.low_space_mb);
   for (const std::string& listen : {config.http, config.robots}) {
@@ -43,7 +43,7 @@ void expect_within_limits(const Config& config) {
 
 void read(const std::string& text) {
   try {
-    expect_within_limits(parse_config(text, "fuzz.toml"));
+    expect_within_limits(config::parse_config(text, "fuzz.toml"));
   } catch (const std::invalid_argument& error) {
     require(!std::string{error.what()}.empty());
   }

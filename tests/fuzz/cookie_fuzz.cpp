@@ -39,12 +39,12 @@ struct Gatehouse {
   std::filesystem::path folder = new_folder();
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  Database database{folder / "station.sqlite"};
-  WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
-  Recorder recorder{loop, clock, disk, checkpoints, RecorderOptions{folder / "station.sqlite", {}}};
-  Accounts accounts{loop, clock, recorder, folder};
-  Auth auth{loop, clock, accounts, folder, 1};
-  RequestGuard guard{auth, {"station.lab"}};
+  storage::Database database{folder / "station.sqlite"};
+  runtime::WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
+  storage::Recorder recorder{loop, clock, disk, checkpoints, storage::RecorderOptions{folder / "station.sqlite", {}}};
+  identity::Accounts accounts{loop, clock, recorder, folder};
+  identity::Auth auth{loop, clock, accounts, folder, 1};
+  http::RequestGuard guard{auth, {"station.lab"}};
   std::string token, session;
 };
 
@@ -63,9 +63,9 @@ std::string first_cookie(const std::string& header, const std::string& name) {
   return {};
 }
 
-Request request_of(const std::string& text, const Gatehouse& house) {
+http::Request request_of(const std::string& text, const Gatehouse& house) {
   std::istringstream lines{text};
-  Request request;
+  http::Request request;
   std::getline(lines, request.method);
   std::string target;
   std::getline(lines, target);
@@ -80,12 +80,12 @@ Request request_of(const std::string& text, const Gatehouse& house) {
 
 void knock(const std::string& text) {
   static Gatehouse house;
-  const Request request = request_of(text, house);
+  const http::Request request = request_of(text, house);
   const std::string cookies = request.header("cookie");
   const std::string own = first_cookie(cookies, house.auth.cookie_name());
-  const std::string old = first_cookie(cookies, kOldSessionCookie);
-  require(cookie_value(cookies, house.auth.cookie_name()) == own);
-  require(cookie_value(cookies, kOldSessionCookie) == old);
+  const std::string old = first_cookie(cookies, identity::kOldSessionCookie);
+  require(http::cookie_value(cookies, house.auth.cookie_name()) == own);
+  require(http::cookie_value(cookies, identity::kOldSessionCookie) == old);
 
   const auto admitted = house.guard.admit(request);
   if (!admitted) {

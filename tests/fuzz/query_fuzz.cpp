@@ -37,83 +37,86 @@ std::string percent_encode(const std::string& text) {
 
 void decode(std::string_view text) {
   for (const bool plus_is_space : {false, true}) {
-    const auto decoded = percent_decode(text, plus_is_space);
+    const auto decoded = http::percent_decode(text, plus_is_space);
     if (!decoded) continue;
     require(!has_control_character(*decoded) && decoded->size() <= text.size());
-    require(percent_decode(percent_encode(*decoded), plus_is_space) == decoded);
+    require(http::percent_decode(percent_encode(*decoded), plus_is_space) == decoded);
   }
 }
 
 // A segment never hides a way to another folder.
 void read_target(const std::string& text) {
-  const Target target{text};
+  const http::Target target{text};
   require(target.is_acceptable() == !target.path().empty());
   for (const std::string& segment : target.segments()) {
     require(segment != "." && segment != ".." && segment.find_first_of("/\\") == std::string::npos);
     require(!has_control_character(segment));
   }
   const auto query = target.query();
-  for (const auto& [name, value] : query.value_or(Target::Query{})) {
+  for (const auto& [name, value] : query.value_or(http::Target::Query{})) {
     require(!has_control_character(name) && !has_control_character(value));
   }
 }
 
 void read_cursor(const std::string& text) {
-  const auto cursor = parse_cursor(text);
+  const auto cursor = api::parse_cursor(text);
   if (!cursor) return;
   require(cursor->seq + 1 != 0);  // a page begins there
-  const auto again = parse_cursor(cursor_text(*cursor));
+  const auto again = api::parse_cursor(api::cursor_text(*cursor));
   require(again && again->span == cursor->span && again->seq == cursor->seq);
 }
 
 // What the routes do with their parameters, without what they ask.
-Answer answer(Request request) {
-  const auto limit = query_number(request, "limit", 1, kMaximum, 100);
-  if (!limit) co_return problem(limit.error());
+http::Answer answer(http::Request request) {
+  const auto limit = api::query_number(request, "limit", 1, kMaximum, 100);
+  if (!limit) co_return http::problem(limit.error());
   require(*limit >= 1 && *limit <= kMaximum);
-  const auto before = query_number(request, "before", 1, std::numeric_limits<std::int64_t>::max(), 0);
-  if (!before) co_return problem(before.error());
+  const auto before = api::query_number(request, "before", 1, std::numeric_limits<std::int64_t>::max(), 0);
+  if (!before) co_return http::problem(before.error());
   require(*before >= 0);
-  const auto points = query_number(request, "points", 1, kMaximum, 2000);
-  if (!points) co_return problem(points.error());
+  const auto points = api::query_number(request, "points", 1, kMaximum, 2000);
+  if (!points) co_return http::problem(points.error());
   require(*points >= 1 && *points <= kMaximum);
-  const auto grid_us = query_number(request, "grid_us", kMinGridUs, kMaxGridUs, 0);
-  if (!grid_us) co_return problem(grid_us.error());
+  const auto grid_us = api::query_number(request, "grid_us", kMinGridUs, kMaxGridUs, 0);
+  if (!grid_us) co_return http::problem(grid_us.error());
   require(*grid_us == 0 || (*grid_us >= kMinGridUs && *grid_us <= kMaxGridUs));
   if (request.param.contains("run_id")) {
-    const auto run_id = run_id_of(request);
-    if (!run_id) co_return problem(run_id.error());
+    const auto run_id = api::run_id_of(request);
+    if (!run_id) co_return http::problem(run_id.error());
   }
   for (const auto& [name, value] : request.query) read_cursor(value);
-  const auto channels = query_channels(request);
-  if (!channels) co_return problem(channels.error());
+  const auto channels = api::query_channels(request);
+  if (!channels) co_return http::problem(channels.error());
   require(channels->any());
-  const auto window = query_window(request);
-  if (!window) co_return problem(window.error());
+  const auto window = api::query_window(request);
+  if (!window) co_return http::problem(window.error());
   require(!*window || ((*window)->from_us >= 0 && (*window)->to_us > (*window)->from_us));
-  co_return json_response(200, {{"path", request.path}, {"query", request.query}});
+  co_return http::json_response(200, {{"path", request.path}, {"query", request.query}});
 }
 
 // run_first wants a result that can be made before it is known.
-boost::asio::awaitable<Response> dispatch(const Router& router, Request request) {
+boost::asio::awaitable<http::Response> dispatch(const http::Router& router, http::Request request) {
   co_return co_await router.dispatch(std::move(request));
 }
 
 void ask(const std::string& target) {
-  Router router;
-  router.add({"GET", "/api/v1/runs", Scope::anyone, {"limit", "before", "robot_id"}, answer});
-  router.add({"POST", "/api/v1/runs", Scope::anyone, {}, answer});
-  router.add({"GET", "/api/v1/runs/{run_id}/samples", Scope::anyone, {"limit", "after"}, answer});
-  router.add(
-      {"GET", "/api/v1/runs/{run_id}/overview", Scope::anyone, {"from_us", "to_us", "points", "channels"}, answer});
-  router.add({"GET", "/api/v1/runs/{run_id}/samples.csv", Scope::anyone, {"channels", "grid_us"}, answer});
-  router.set_fallback([](const Request& request) { return json_response(200, {{"page", request.path}}); });
+  http::Router router;
+  router.add({"GET", "/api/v1/runs", identity::Scope::anyone, {"limit", "before", "robot_id"}, answer});
+  router.add({"POST", "/api/v1/runs", identity::Scope::anyone, {}, answer});
+  router.add({"GET", "/api/v1/runs/{run_id}/samples", identity::Scope::anyone, {"limit", "after"}, answer});
+  router.add({"GET",
+              "/api/v1/runs/{run_id}/overview",
+              identity::Scope::anyone,
+              {"from_us", "to_us", "points", "channels"},
+              answer});
+  router.add({"GET", "/api/v1/runs/{run_id}/samples.csv", identity::Scope::anyone, {"channels", "grid_us"}, answer});
+  router.set_fallback([](const http::Request& request) { return http::json_response(200, {{"page", request.path}}); });
   for (const char* method : {"GET", "HEAD", "POST"}) {
     boost::asio::io_context loop;
-    Request request;
+    http::Request request;
     request.method = method;
     request.target = target;
-    const Response response = run_first(loop, dispatch(router, std::move(request)));
+    const http::Response response = runtime::run_first(loop, dispatch(router, std::move(request)));
     require(response.status == 200 || (response.status >= 400 && response.status < 500));
     require(nlohmann::json::accept(response.body));
   }

@@ -11,19 +11,19 @@ namespace {
 constexpr const char* kConfig = "[limits]\nduty_max = 0.9\n[limits.water]\nduty_max = 0.5\n[fluids.oil]\n";
 
 // So few that a burst of samples finds no room.
-RecorderOptions recorder_options(const std::filesystem::path& database) {
-  RecorderOptions options;
+storage::RecorderOptions recorder_options(const std::filesystem::path& database) {
+  storage::RecorderOptions options;
   options.path = database;
   options.max_queued_samples = 70;
   return options;
 }
 
-Config config_of(const char* text) {
+config::Config config_of(const char* text) {
   fix_random_bytes();  // before anything of the station is made
-  return parse_config(text, "goldens.toml");
+  return config::parse_config(text, "goldens.toml");
 }
 
-asio::awaitable<void> read_whole(RobotDocument document, std::string& into) {
+asio::awaitable<void> read_whole(live::RobotDocument document, std::string& into) {
   while (!document.is_whole()) into += co_await document.next();
 }
 
@@ -82,15 +82,17 @@ std::string GoldenStation::welcome() {
 }
 
 std::string GoldenStation::problem_of(const std::string& message) {
-  const Caller caller{"user:ada", "", Scopes::of(Role::admin), 0, std::make_shared<Standing>(loop), "127.0.0.1"};
+  const identity::Caller caller{
+      "user:ada", "", identity::Scopes::of(identity::Role::admin), 0, std::make_shared<identity::Standing>(loop),
+      "127.0.0.1"};
   const auto understood = on_page_message(message, caller, all_, parts_);
-  return understood ? "" : problem_message(understood.error());
+  return understood ? "" : api::problem_message(understood.error());
 }
 
 std::string GoldenStation::dropped_message() {
-  Subscriber slow{loop};
+  live::Subscriber slow{loop};
   const auto sample = std::make_shared<const std::string>();
-  for (std::size_t i = 0; i < Subscriber::kMaxMessages + 3; ++i) slow.push(sample, true);
+  for (std::size_t i = 0; i < live::Subscriber::kMaxMessages + 3; ++i) slow.push(sample, true);
   return *slow.pop();
 }
 
@@ -104,8 +106,8 @@ void GoldenStation::read_pages() {
   read_page(watcher_, heard_by_watcher_);
 }
 
-void GoldenStation::read_page(Subscriber& page, std::string& into) const {
-  for (LiveText text = page.pop(); text != nullptr; text = page.pop()) {
+void GoldenStation::read_page(live::Subscriber& page, std::string& into) const {
+  for (live::LiveText text = page.pop(); text != nullptr; text = page.pop()) {
     if (is_kept) into += *text + "\n";
   }
 }

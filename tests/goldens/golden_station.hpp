@@ -45,7 +45,7 @@ class GoldenStation final : public ApiTest {
   bool is_kept = false;
   const std::string& heard_by_all() const { return heard_by_all_; }
   const std::string& heard_by_watcher() const { return heard_by_watcher_; }
-  void watch(const std::set<RobotId>& robots) { live.watch(watcher_, robots); }
+  void watch(const std::set<station::RobotId>& robots) { live.watch(watcher_, robots); }
 
   void finish();  // every sample is on disk, open runs are interrupted
   std::filesystem::path database() const { return folder.path() / "station.sqlite"; }
@@ -54,11 +54,11 @@ class GoldenStation final : public ApiTest {
  private:
   void TestBody() override {}
   void read_pages();
-  void read_page(Subscriber& page, std::string& into) const;
+  void read_page(live::Subscriber& page, std::string& into) const;
 
-  RobotTexts texts_{loop, station};
-  LiveParts parts_{loop, tasks, clock, station, live, texts_, "0.1.0"};
-  Subscriber all_{loop}, watcher_{loop};
+  live::RobotTexts texts_{loop, station};
+  api::LiveParts parts_{loop, tasks, clock, station, live, texts_, "0.1.0"};
+  live::Subscriber all_{loop}, watcher_{loop};
   std::string heard_by_all_, heard_by_watcher_;
   std::vector<std::unique_ptr<TestRobot>> robots_;
   bool is_finished_ = false;

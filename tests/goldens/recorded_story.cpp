@@ -13,9 +13,9 @@
 namespace server {
 namespace {
 
-constexpr BootId kFirstBoot = 0xfedcba9876543211;  // above what a signed number holds
-constexpr BootId kSecondBoot = 1;
-constexpr BootId kFleetBoot = 0x8000000000000000;
+constexpr station::BootId kFirstBoot = 0xfedcba9876543211;  // above what a signed number holds
+constexpr station::BootId kSecondBoot = 1;
+constexpr station::BootId kFleetBoot = 0x8000000000000000;
 constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 template <class Enumerator>

@@ -19,7 +19,7 @@ TEST(GoldenSchema, OfAFreshDatabase) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "station.sqlite";
   {
-    const Database database{path};
+    const storage::Database database{path};
   }
   expect_golden("schema.sql", schema_text(path));
 }

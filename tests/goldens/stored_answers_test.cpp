@@ -117,11 +117,11 @@ TEST_F(GoldenAnswers, Metrics) { expect_golden("metrics.txt", without_values(sta
 TEST_F(GoldenAnswers, Digests) {
   SQLite::Database database{(folder_.path() / "recorded.sqlite").string(), SQLite::OPEN_READONLY};
   std::string text;
-  for (const RunId run : {1, 2, 3, 4, 6, 7}) {
+  for (const storage::RunId run : {1, 2, 3, 4, 6, 7}) {
     for (const int format : {1, 2}) {
-      DigestComputation computation{read_digest_spans(database, run), format};
-      while (computation.advance(database, 50) == DigestComputation::Progress::more) continue;
-      const RunDigest made = computation.digest();
+      storage::DigestComputation computation{storage::read_digest_spans(database, run), format};
+      while (computation.advance(database, 50) == storage::DigestComputation::Progress::more) continue;
+      const storage::RunDigest made = computation.digest();
       text += fmt::format("run {} format {}: {} live, {} sent again, {} lost, {}\n", run, format, made.samples_live,
                           made.samples_backfilled, made.samples_lost, made.sha256);
     }

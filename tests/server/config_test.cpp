@@ -19,9 +19,9 @@ class ConfigTest : public ::testing::Test {
   ~ConfigTest() override { std::filesystem::remove_all(folder_); }
 
  protected:
-  ConfigFlags file(const std::string& content) {
+  config::ConfigFlags file(const std::string& content) {
     std::ofstream{folder_ / "station.toml"} << content;
-    ConfigFlags flags;
+    config::ConfigFlags flags;
     flags.file = folder_ / "station.toml";
     return flags;
   }
@@ -40,17 +40,17 @@ class ConfigTest : public ::testing::Test {
 };
 
 TEST_F(ConfigTest, DefaultsListenOnLoopbackOnly) {
-  const Config config = load_config({});
+  const config::Config config = config::load_config({});
   EXPECT_EQ(config.http, "127.0.0.1:8080");
   EXPECT_EQ(config.robots, "127.0.0.1:7070");
   EXPECT_TRUE(config.http_or_any_port && config.robots_or_any_port);
 }
 
 TEST_F(ConfigTest, TheDocumentedFileHoldsEveryDefault) {
-  ConfigFlags flags;
+  config::ConfigFlags flags;
   flags.file = std::filesystem::path{TEST_DATA_DIR} / "../../deploy/rheonaut.toml";
-  const Config from_file = load_config(flags);
-  const Config defaults;
+  const config::Config from_file = load_config(flags);
+  const config::Config defaults;
   EXPECT_EQ(from_file.data_dir, defaults.data_dir);
   EXPECT_EQ(from_file.http, defaults.http);
   EXPECT_EQ(from_file.http_hosts, defaults.http_hosts);
@@ -98,9 +98,9 @@ TEST_F(ConfigTest, TheDocumentedFileNamesEveryOption) {
 }
 
 TEST_F(ConfigTest, FlagsGoBeforeTheFileAndMakeAPortBinding) {
-  ConfigFlags flags = file("[http]\nlisten = \"127.0.0.1:9000\"\n[robots]\nlisten = \"127.0.0.1:9001\"\n");
+  config::ConfigFlags flags = file("[http]\nlisten = \"127.0.0.1:9000\"\n[robots]\nlisten = \"127.0.0.1:9001\"\n");
   flags.robots = "127.0.0.1:0";
-  const Config config = load_config(flags);
+  const config::Config config = load_config(flags);
   EXPECT_EQ(config.http, "127.0.0.1:9000");
   EXPECT_EQ(config.robots, "127.0.0.1:0");
   EXPECT_FALSE(config.http_or_any_port);
@@ -126,10 +126,10 @@ TEST_F(ConfigTest, MistakesNameFileLineOptionAndRemedy) {
 }
 
 TEST_F(ConfigTest, AFluidHasTheLimitsItNamesAndTheGeneralOnesElse) {
-  const Config config = load_config(file("[limits]\nduty_max = 0.8\n[limits.water]\nsetpoint_step_m = 0.05\n"));
+  const config::Config config = load_config(file("[limits]\nduty_max = 0.8\n[limits.water]\nsetpoint_step_m = 0.05\n"));
   EXPECT_EQ(config.envelope.in("water").setpoint_step_m, 0.05);
   EXPECT_EQ(config.envelope.in("water").duty_max, 0.8);
-  EXPECT_EQ(config.envelope.in("non_newtonian").setpoint_step_m, CommandLimits{}.setpoint_step_m);
+  EXPECT_EQ(config.envelope.in("non_newtonian").setpoint_step_m, config::CommandLimits{}.setpoint_step_m);
   EXPECT_EQ(config.envelope.in("non_newtonian").duty_max, 0.8);
   EXPECT_THAT(mistake("[limits.water]\nduty_mx = 1.0\n"), HasSubstr(":2: unknown option 'limits.water.duty_mx'"));
   EXPECT_THAT(mistake("[limits.water]\nduty_max = 2.0\n"), HasSubstr("limits.water.duty_max = 2 is outside 0 to 1"));
@@ -138,9 +138,9 @@ TEST_F(ConfigTest, AFluidHasTheLimitsItNamesAndTheGeneralOnesElse) {
 }
 
 TEST_F(ConfigTest, AFleetMayEnrolItselfWhereTheConfigurationForLoadTestsSaysSo) {
-  EXPECT_EQ(Config{}.enrolment.most_robots, 64U);
-  EXPECT_EQ(Config{}.enrolment.most_a_minute, 10U);
-  ConfigFlags flags;
+  EXPECT_EQ(config::Config{}.enrolment.most_robots, 64U);
+  EXPECT_EQ(config::Config{}.enrolment.most_a_minute, 10U);
+  config::ConfigFlags flags;
   flags.file = std::filesystem::path{TEST_DATA_DIR} / "../../deploy/fleet.toml";
   EXPECT_EQ(load_config(flags).enrolment.most_robots, 100'000U);
   EXPECT_EQ(load_config(flags).enrolment.most_a_minute, 100'000U);
@@ -149,7 +149,7 @@ TEST_F(ConfigTest, AFleetMayEnrolItselfWhereTheConfigurationForLoadTestsSaysSo) 
 }
 
 TEST_F(ConfigTest, EachSectionOfAFluidListsItWithoutRegardToCaseAndBlanks) {
-  const Config config = load_config(
+  const config::Config config = load_config(
       file("[limits.Water]\nduty_max = 0.5\n[limits.\" Xanthan 0.5 % \"]\nduty_max = 0.6\n[fluids.Glycerine]\n"
            "[fluids.WATER]\n"));
   std::vector<std::string> fluids;
@@ -165,20 +165,20 @@ TEST_F(ConfigTest, EachSectionOfAFluidListsItWithoutRegardToCaseAndBlanks) {
 }
 
 TEST_F(ConfigTest, AMissingFileIsAMistake) {
-  ConfigFlags flags;
+  config::ConfigFlags flags;
   flags.file = "no/such/file.toml";
   EXPECT_THROW(load_config(flags), std::invalid_argument);
 }
 
 TEST_F(ConfigTest, TlsIsSpokenWhereOtherMachinesListenUnlessSomebodySaysOtherwise) {
   const std::string listen = "[http]\nlisten = '192.0.2.1:8080'\n[robots]\nlisten = '[::1]:7070'\n[tls]\n";
-  const Config automatic = load_config(file(listen));
+  const config::Config automatic = load_config(file(listen));
   EXPECT_TRUE(automatic.speaks_tls(automatic.http) && !automatic.speaks_tls(automatic.robots));
   EXPECT_FALSE(automatic.is_exposed(automatic.http) || automatic.is_exposed(automatic.robots));
-  const Config on = load_config(file(listen + "mode = 'on'"));
+  const config::Config on = load_config(file(listen + "mode = 'on'"));
   EXPECT_TRUE(on.speaks_tls(on.http) && on.speaks_tls(on.robots));
   for (const char* plain : {"insecure = true", "mode = 'off'\ninsecure = true"}) {
-    const Config insecure = load_config(file(listen + plain));
+    const config::Config insecure = load_config(file(listen + plain));
     EXPECT_FALSE(insecure.speaks_tls(insecure.http) || insecure.speaks_tls(insecure.robots));
     EXPECT_TRUE(insecure.is_exposed(insecure.http) && !insecure.is_exposed(insecure.robots));
   }

@@ -16,7 +16,7 @@ namespace {
 using namespace std::chrono_literals;
 
 TEST(LoopWatch, WhatIsReadFirstAfterAStandstillIsAsOldAsTheTurnBefore) {
-  LoopWatch watch;
+  runtime::LoopWatch watch;
   watch.turn(1'000'000);
   EXPECT_EQ(watch.unread_for(4'000'000), 3s);
   watch.turn(4'010'000);
@@ -26,14 +26,14 @@ TEST(LoopWatch, WhatIsReadFirstAfterAStandstillIsAsOldAsTheTurnBefore) {
 }
 
 TEST(LoopWatch, ABusyLoopHasNotStoodStill) {
-  LoopWatch watch;
+  runtime::LoopWatch watch;
   EXPECT_EQ(watch.unread_for(1'000'000), 0s) << "the first turn there is";
   for (int i = 1; i <= 10; ++i) EXPECT_EQ(watch.unread_for(1'000'000 + i * 200'000), 0s);
   EXPECT_GT(watch.unread_for(3'200'001), 200ms);
 }
 
 TEST(LoopWatch, OfTwoStandstillsTheFirstCountsUntilAllHasBeenRead) {
-  LoopWatch watch;
+  runtime::LoopWatch watch;
   watch.turn(1'000'000);
   watch.turn(2'000'000);
   EXPECT_EQ(watch.unread_for(4'000'000), 3s);
@@ -45,7 +45,7 @@ TEST(LoopWatch, OfTwoStandstillsTheFirstCountsUntilAllHasBeenRead) {
 // the run by the next test can fail.
 TEST(SystemClock, SteadyTimeGoesOnInASuspend) {
   boost::asio::io_context loop{1};
-  const SystemClock clock{loop};
+  const runtime::SystemClock clock{loop};
   const auto since_boot_us = [] {
     timespec now{};
     clock_gettime(CLOCK_BOOTTIME, &now);

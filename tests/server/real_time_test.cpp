@@ -26,14 +26,14 @@ TEST(RealTime, TheLoopIsBeforeTheDiskAndBothBeforeOrdinaryThreads) {
   Scheduling loop_thread, disk_thread;
   std::jthread{[&] {
     asio::io_context loop;
-    WorkerThread disk{"disk"};
-    run_first(loop, ask_for_real_time(disk));
+    runtime::WorkerThread disk{"disk"};
+    runtime::run_first(loop, ask_for_real_time(disk));
     loop_thread = present();
-    auto look = [](WorkerThread& worker) -> asio::awaitable<Scheduling> {
+    auto look = [](runtime::WorkerThread& worker) -> asio::awaitable<Scheduling> {
       auto job = [] { return present(); };
       co_return co_await worker.run(std::move(job));
     };
-    disk_thread = run_first(loop, look(disk));
+    disk_thread = runtime::run_first(loop, look(disk));
   }}.join();
   if (loop_thread.policy == SCHED_OTHER) GTEST_SKIP() << "the system does not permit real-time priority";
   EXPECT_EQ(loop_thread.policy, SCHED_RR);

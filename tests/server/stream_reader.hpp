@@ -7,21 +7,21 @@
 namespace server {
 
 // At least one byte, or 0 when the stream has ended. Nobody else reads it.
-inline boost::asio::awaitable<std::size_t> read_some(boost::asio::io_context& loop, ByteStream& stream,
+inline boost::asio::awaitable<std::size_t> read_some(boost::asio::io_context& loop, net::ByteStream& stream,
                                                      boost::asio::mutable_buffer into) {
   struct Watch {
-    Watch(ByteStream& of, Signal& ready) : stream{of} {
+    Watch(net::ByteStream& of, runtime::Signal& ready) : stream{of} {
       stream.on_readable([&ready] { ready.notify(); });
     }
     ~Watch() { stream.on_readable(nullptr); }
     Watch(const Watch&) = delete;
     Watch& operator=(const Watch&) = delete;
-    ByteStream& stream;
+    net::ByteStream& stream;
   };
-  Signal ready{loop};
+  runtime::Signal ready{loop};
   const Watch watch{stream, ready};
   for (;;) {
-    const ByteStream::Read got = stream.read_now(into);
+    const net::ByteStream::Read got = stream.read_now(into);
     if (got.size > 0 || got.has_ended) co_return got.size;
     co_await ready.wait();
   }

@@ -28,8 +28,8 @@ class TurnsTest : public ::testing::Test {
   void spawn(std::string name) { tasks.spawn(name, work(name)); }
 
   asio::io_context loop;
-  TaskGroup tasks{loop};
-  Turns turns{loop, kAtOnce};
+  runtime::TaskGroup tasks{loop};
+  runtime::Turns turns{loop, kAtOnce};
   std::vector<std::string> done;
 };
 

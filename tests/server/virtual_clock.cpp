@@ -30,7 +30,7 @@ asio::awaitable<void> VirtualClock::sleep_until(std::int64_t deadline_us, Alarm*
 }
 
 void VirtualClock::settle() {
-  const auto busy = [](const WorkerThread* worker) { return worker->jobs() > 0; };
+  const auto busy = [](const runtime::WorkerThread* worker) { return worker->jobs() > 0; };
   for (;;) {
     loop_.restart();
     if (loop_.poll() > 0) continue;
@@ -42,7 +42,7 @@ void VirtualClock::settle() {
 
 void VirtualClock::advance_to(std::int64_t steady_us) {
   steady_us_ = std::max(steady_us_, steady_us);
-  watch() = LoopWatch{};  // it was idle
+  watch() = runtime::LoopWatch{};  // it was idle
   watch().turn(steady_us_);
   for (auto& [deadline_us, sleeper] : *sleepers_) {
     if (deadline_us > steady_us_) return;

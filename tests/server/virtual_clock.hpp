@@ -19,18 +19,18 @@
 
 namespace server {
 
-class VirtualClock final : public Clock {
+class VirtualClock final : public runtime::Clock {
  public:
   explicit VirtualClock(boost::asio::io_context& loop) : loop_{loop} {}
 
   std::int64_t steady_us() const override { return steady_us_; }
   std::int64_t utc_us() const override { return utc_offset_us_ + steady_us_; }
-  using Clock::sleep_until;
+  using runtime::Clock::sleep_until;
   boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us, Alarm* alarm) override;
 
   // Time stands still while this worker has a job.
-  void add_worker(const WorkerThread& worker) { workers_.push_back(&worker); }
-  void remove_worker(const WorkerThread& worker) { std::erase(workers_, &worker); }
+  void add_worker(const runtime::WorkerThread& worker) { workers_.push_back(&worker); }
+  void remove_worker(const runtime::WorkerThread& worker) { std::erase(workers_, &worker); }
 
   // Time passes and nobody is awake: who sleeps wakes after it, once, as on a machine that was halted or suspended.
   void skip(microseconds duration) {
@@ -63,7 +63,7 @@ class VirtualClock final : public Clock {
   void advance_to(std::int64_t steady_us);
 
   boost::asio::io_context& loop_;
-  std::vector<const WorkerThread*> workers_;
+  std::vector<const runtime::WorkerThread*> workers_;
   std::shared_ptr<Sleepers> sleepers_ = std::make_shared<Sleepers>();  // shared with those who sleep
   std::int64_t steady_us_ = 1'000'000;
   std::int64_t utc_offset_us_ = 1'750'000'000'000'000;

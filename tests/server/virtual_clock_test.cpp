@@ -18,9 +18,9 @@ using namespace std::chrono_literals;
 class VirtualClockTest : public ::testing::Test {
  protected:
   asio::io_context loop_{1};
-  WorkerThread worker_{"worker"};
+  runtime::WorkerThread worker_{"worker"};
   VirtualClock clock_{loop_};
-  TaskGroup tasks_{loop_};
+  runtime::TaskGroup tasks_{loop_};
   std::vector<std::int64_t> woken_us_;
 
   void SetUp() override { clock_.add_worker(worker_); }
@@ -50,7 +50,8 @@ TEST_F(VirtualClockTest, StopsAtTheLimit) {
 TEST_F(VirtualClockTest, StandsStillWhileAWorkerHasAJob) {
   const std::int64_t start_us = clock_.steady_us();
   std::int64_t finished_us = 0;
-  auto task = [](WorkerThread& worker, Clock& clock, std::int64_t& finished) -> asio::awaitable<void> {
+  auto task = [](runtime::WorkerThread& worker, runtime::Clock& clock,
+                 std::int64_t& finished) -> asio::awaitable<void> {
     auto job = [] { std::this_thread::yield(); };
     co_await worker.run(std::move(job));
     finished = clock.steady_us();
@@ -63,7 +64,7 @@ TEST_F(VirtualClockTest, StandsStillWhileAWorkerHasAJob) {
 
 TEST_F(VirtualClockTest, TheLoserOfARaceIsCancelledAndForgotten) {
   bool first_won = false;
-  auto task = [](Clock& clock, bool& won) -> asio::awaitable<void> {
+  auto task = [](runtime::Clock& clock, bool& won) -> asio::awaitable<void> {
     const auto winner = co_await (clock.sleep_for(1s) || clock.sleep_for(1h));
     won = winner.index() == 0;
   };
@@ -76,7 +77,9 @@ TEST_F(VirtualClockTest, TheLoserOfARaceIsCancelledAndForgotten) {
 
 TEST_F(VirtualClockTest, StoppingTheTasksEndsTheirSleepAndTheirRaces) {
   tasks_.spawn("sleeper", sleep_and_note(1h));
-  auto race = [](Clock& clock) -> asio::awaitable<void> { co_await (clock.sleep_for(1h) || clock.sleep_for(2h)); };
+  auto race = [](runtime::Clock& clock) -> asio::awaitable<void> {
+    co_await (clock.sleep_for(1h) || clock.sleep_for(2h));
+  };
   tasks_.spawn("race", race(clock_));
   clock_.settle();
   tasks_.stop();
@@ -93,7 +96,7 @@ class SignalTest : public VirtualClockTest {
     outcomes_.push_back(notified);
   }
 
-  Signal signal_{loop_};
+  runtime::Signal signal_{loop_};
   std::vector<bool> outcomes_;
 };
 
@@ -139,9 +142,9 @@ TEST_F(SignalTest, ACancelledWaitEndsTheTask) {
 
 // The machine's clock, in real time: only order and outcome are looked at.
 TEST_F(SignalTest, WorksOnTheClockOfTheMachine) {
-  SystemClock machine{loop_};
+  runtime::SystemClock machine{loop_};
   std::vector<bool> outcomes;
-  auto wait = [](Signal& signal, Clock& clock, microseconds duration,
+  auto wait = [](runtime::Signal& signal, runtime::Clock& clock, microseconds duration,
                  std::vector<bool>& into) -> asio::awaitable<void> {
     const bool notified = co_await signal.wait_until(clock, clock.steady_us() + duration.count());
     into.push_back(notified);

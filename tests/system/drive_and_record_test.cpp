@@ -11,11 +11,11 @@ namespace {
 class DriveAndRecordTest : public SystemTest {
  protected:
   // Auto to 0.1 m, shifted by -0.05 m at sample 2000, 4000 samples in all; the samples from the start of auto on.
-  std::vector<StoredSample> perform(robot_fw::DutyRange duty) {
+  std::vector<storage::StoredSample> perform(robot_fw::DutyRange duty) {
     sim_robot::SimulatedRobotConfig config;
     config.duty = duty;
     begin(config);
-    const RunId run = begin_run();
+    const storage::RunId run = begin_run();
     const auto started = send(sim_robot::set_auto(0.1F)).expect_accepted();
     const std::uint64_t first_seq = started.effect_at_robot_us / 10'000 + 1;  // it acts in the next tick
     run_until_just_before(first_seq + 2000);
@@ -26,14 +26,14 @@ class DriveAndRecordTest : public SystemTest {
     EXPECT_EQ(ended->samples_lost, 0u);
     EXPECT_EQ(ended->samples_stored, ended->samples_expected);
 
-    std::vector<StoredSample> samples = samples_of(run);
+    std::vector<storage::StoredSample> samples = samples_of(run);
     EXPECT_EQ(samples.size(), ended->samples_expected);
-    std::erase_if(samples, [&](const StoredSample& sample) { return sample.seq < first_seq; });
+    std::erase_if(samples, [&](const storage::StoredSample& sample) { return sample.seq < first_seq; });
     EXPECT_EQ(samples.at(0).mode, rheonaut_MODE_AUTO);
     return samples;
   }
 
-  static void expect_golden(const std::vector<StoredSample>& samples, const std::string& duty_limits) {
+  static void expect_golden(const std::vector<storage::StoredSample>& samples, const std::string& duty_limits) {
     const auto golden = nlohmann::json::parse(std::ifstream(TEST_DATA_DIR "/closed_loop_cases.json"));
     for (const auto& row : golden["sampled"]) {
       if (row["plant"] != "Eq(29)" || row["duty_limits"] != duty_limits) continue;
@@ -47,9 +47,10 @@ class DriveAndRecordTest : public SystemTest {
     FAIL() << "no such case";
   }
 
-  static control::StepMetrics measure(const std::vector<StoredSample>& samples, control::StepExperiment experiment) {
+  static control::StepMetrics measure(const std::vector<storage::StoredSample>& samples,
+                                      control::StepExperiment experiment) {
     std::vector<double> time_s, position_m;
-    for (const StoredSample& sample : samples) {
+    for (const storage::StoredSample& sample : samples) {
       time_s.push_back(static_cast<double>(sample.seq - samples[0].seq) * 0.01);
       position_m.push_back(sample.sample.position_m);
     }

@@ -19,7 +19,7 @@ class LinkFaultsTest : public SystemTest {
 
 TEST_F(LinkFaultsTest, ACutLinkLosesNoSampleThatTheRingHolds) {
   begin();
-  const RunId run = begin_run();
+  const storage::RunId run = begin_run();
   for (int i = 2; i <= 4; ++i) {
     pass(2);
     robot->cut();
@@ -31,7 +31,7 @@ TEST_F(LinkFaultsTest, ACutLinkLosesNoSampleThatTheRingHolds) {
 
 TEST_F(LinkFaultsTest, AStallOf5SecondsLosesNoSample) {
   begin();
-  const RunId run = begin_run();
+  const storage::RunId run = begin_run();
   pass(1);
   robot->redial = false;
   robot->stall(true);
@@ -44,7 +44,7 @@ TEST_F(LinkFaultsTest, AStallOf5SecondsLosesNoSample) {
 
 TEST_F(LinkFaultsTest, AnOutageLongerThanTheRingLeavesACountedGap) {
   begin();
-  const RunId run = begin_run();
+  const storage::RunId run = begin_run();
   pass(1);
   cut_for_good();
   pass(12);
@@ -54,9 +54,9 @@ TEST_F(LinkFaultsTest, AnOutageLongerThanTheRingLeavesACountedGap) {
   EXPECT_GT(ended->samples_lost, 300u);
   EXPECT_LT(ended->samples_lost, 600u);
   EXPECT_EQ(ended->samples_stored + ended->samples_lost, ended->samples_expected);
-  const auto gaps = wait_for(history->gaps(excerpt_of(run)));
+  const auto gaps = wait_for(history->gaps(storage::excerpt_of(run)));
   std::uint64_t lost = 0;  // in one stretch, noticed in one or more pieces while the ring moved on
-  for (const Gap& gap : gaps->gaps) {
+  for (const storage::Gap& gap : gaps->gaps) {
     lost += gap.last_seq - gap.first_seq + 1;
     if (&gap != &gaps->gaps.front()) EXPECT_EQ(gap.first_seq, (&gap - 1)->last_seq + 1);
   }
@@ -116,7 +116,7 @@ TEST_F(LinkFaultsTest, LinkLossStopsTheMotorAndNothingMovesWhenItReturns) {
 
 TEST_F(LinkFaultsTest, ADutyLivesAsLongAsItsLeaseIsRenewed) {
   begin();
-  const RunId run = begin_run();
+  const storage::RunId run = begin_run();
   start_driving(0.4);
   holds(in_truth(motor_on()), {.for_s = 3});
   robot->stall(true);
@@ -129,7 +129,7 @@ TEST_F(LinkFaultsTest, ADutyLivesAsLongAsItsLeaseIsRenewed) {
 
 TEST_F(LinkFaultsTest, TheNextSampleAfterAnEmergencyStopHasDuty0) {
   begin();
-  const RunId run = begin_run();
+  const storage::RunId run = begin_run();
   go_to(0.5);
   await(duty().above(0.5), {.limit_s = 0.3});
   const auto stopped = stop();
@@ -145,7 +145,7 @@ TEST_F(LinkFaultsTest, TheNextSampleAfterAnEmergencyStopHasDuty0) {
   expect(in_manual());
   ASSERT_TRUE(wait_for(runs->end(run, "")).has_value());
   int after = 0;
-  for (const StoredSample& sample : samples_of(run)) {
+  for (const storage::StoredSample& sample : samples_of(run)) {
     if (sample.robot_time_us <= stopped.effect_at_robot_us) continue;
     EXPECT_EQ(sample.sample.duty, 0) << "sample " << sample.seq;
     ++after;
@@ -168,7 +168,7 @@ TEST_F(LinkFaultsTest, AStopDuringAnOutageReachesTheRobotFirst) {
 
 TEST_F(LinkFaultsTest, ARebootOpensANewSpanOfTheRun) {
   begin();
-  const RunId id = begin_run();
+  const storage::RunId id = begin_run();
   pass(1);
   cut_for_good();
   pass(1.5);

@@ -13,7 +13,7 @@ constexpr std::uint32_t kFlagConfirmed = rheonaut_TELEMETRY_FLAG_MODEL_CONFIRMED
 class ModelTest : public SystemTest {
  protected:
   ModelTest() {
-    FluidModel model;
+    station::FluidModel model;
     model.gain_m_s = {0.1F, 0.2F / 3, -0.05F, 0.01F};
     model.time_constant_s = {0.1F, 1.0F / 3, 3, 12};
     model.fit_error = 0.001;
@@ -23,7 +23,7 @@ class ModelTest : public SystemTest {
   void name_fluid(const std::string& fluid, const std::string& actor = "token:local") {
     ASSERT_TRUE(station.set_fluid("sim-1", fluid, {actor, "", clock.utc_us()}));
   }
-  bool becomes(ModelState wanted) {
+  bool becomes(station::ModelState wanted) {
     return clock.run_until([&] { return state().model.state == wanted; }, 10s);
   }
   bool flag() const { return (state().context.flags & kFlagConfirmed) != 0; }
@@ -42,18 +42,18 @@ class ModelTest : public SystemTest {
     ASSERT_TRUE(clock.run_until([&] { return state().connected_at_us != connected_at_us; }, 5s));
     EXPECT_EQ(state().parameters_checksum, expected.checksum());
     pass(1);
-    EXPECT_EQ(state().model.state, ModelState::confirmed) << "the link alone changes nothing";
+    EXPECT_EQ(state().model.state, station::ModelState::confirmed) << "the link alone changes nothing";
     EXPECT_TRUE(flag());
   }
 
-  FluidModel model_;
+  station::FluidModel model_;
 };
 
 TEST_F(ModelTest, AFluidThatIsNamedBringsItsModelAndABootOrAnotherFluidTakesItAway) {
   begin();
   EXPECT_FALSE(flag());
   name_fluid("water");
-  ASSERT_TRUE(becomes(ModelState::confirmed)) << state().model.reason;
+  ASSERT_TRUE(becomes(station::ModelState::confirmed)) << state().model.reason;
   EXPECT_TRUE(flag());
   expect_in_force();
 
@@ -64,25 +64,25 @@ TEST_F(ModelTest, AFluidThatIsNamedBringsItsModelAndABootOrAnotherFluidTakesItAw
   sim_robot::SimulatedRobotConfig next = before->config();
   next.boot_id = before->config().boot_id + 1;
   begin(next);
-  ASSERT_TRUE(becomes(ModelState::assumed));
+  ASSERT_TRUE(becomes(station::ModelState::assumed));
   pass(5);
   EXPECT_FALSE(flag());
 
   name_fluid("water");
-  ASSERT_TRUE(becomes(ModelState::confirmed)) << state().model.reason;
+  ASSERT_TRUE(becomes(station::ModelState::confirmed)) << state().model.reason;
   name_fluid("non_newtonian");
-  ASSERT_TRUE(becomes(ModelState::assumed)) << state().model.reason;
+  ASSERT_TRUE(becomes(station::ModelState::assumed)) << state().model.reason;
   pass(0.2);
   EXPECT_FALSE(flag());
 }
 
 TEST_F(ModelTest, ARunThatNamesTheFluidBringsItsModel) {
   begin();
-  RunConditions conditions;
+  storage::RunConditions conditions;
   conditions.name = "in water";
   conditions.fluid = "water";
   ASSERT_TRUE(wait_for(runs->create("sim-1", conditions, {"token:local", "", 0})));
-  ASSERT_TRUE(becomes(ModelState::confirmed)) << state().model.reason;
+  ASSERT_TRUE(becomes(station::ModelState::confirmed)) << state().model.reason;
   expect_in_force();
 }
 
@@ -92,11 +92,11 @@ TEST_F(ModelTest, ARobotThatDrivesIsSentTheModelWhenItRests) {
   pass(1);
   name_fluid("water", "test");
   pass(2);
-  EXPECT_EQ(state().model.state, ModelState::sending);
+  EXPECT_EQ(state().model.state, station::ModelState::sending);
   EXPECT_FALSE(flag());
   send(sim_robot::set_manual()).expect_accepted();
-  ASSERT_TRUE(clock.run_until([&] { return state().model.state != ModelState::sending; }, 40s));
-  EXPECT_EQ(state().model.state, ModelState::confirmed) << state().model.reason;
+  ASSERT_TRUE(clock.run_until([&] { return state().model.state != station::ModelState::sending; }, 40s));
+  EXPECT_EQ(state().model.state, station::ModelState::confirmed) << state().model.reason;
 }
 
 }  // namespace

@@ -13,12 +13,12 @@ using nlohmann::json;
 
 class SnapshotTest : public SystemTest {
  protected:
-  RunSnapshot snapshot_of(RunId run) { return wait_for(runs->snapshot(run)).value(); }
+  storage::RunSnapshot snapshot_of(storage::RunId run) { return wait_for(runs->snapshot(run)).value(); }
 
   // In order of first_seq.
-  static std::vector<json> told(const RunSnapshot& snapshot, const std::string& kind) {
+  static std::vector<json> told(const storage::RunSnapshot& snapshot, const std::string& kind) {
     std::vector<json> documents;
-    for (const InForce& document : snapshot.in_force) {
+    for (const storage::InForce& document : snapshot.in_force) {
       if (document.kind == kind) documents.push_back(json::parse(document.content));
     }
     return documents;
@@ -28,7 +28,7 @@ class SnapshotTest : public SystemTest {
 TEST_F(SnapshotTest, TheParametersAndTheControllerOfTheCoreAreThoseOfTheRun) {
   begin();
   pass(1);
-  const RunSnapshot snapshot = snapshot_of(begin_run());
+  const storage::RunSnapshot snapshot = snapshot_of(begin_run());
   EXPECT_EQ(snapshot.firmware_version, state().firmware_version);
   EXPECT_FALSE(snapshot.firmware_version.empty());
   EXPECT_EQ(snapshot.parameters_checksum, robot_fw::Parameters{}.checksum());
@@ -59,13 +59,13 @@ TEST_F(SnapshotTest, TheParametersAndTheControllerOfTheCoreAreThoseOfTheRun) {
 
 TEST_F(SnapshotTest, WhatChangesWhileARunIsOpenIsInItFromThatSampleOn) {
   begin();
-  const RunId run = begin_run();
+  const storage::RunId run = begin_run();
   pass(1);
   const auto set = send(sim_robot::set_parameter("power_limit_s", 7)).expect_accepted();
   const auto sent = send(sim_robot::set_controller(robot_fw::golden_biquads())).expect_accepted();
   pass(1);
   expect_whole(run);
-  const RunSnapshot snapshot = snapshot_of(run);
+  const storage::RunSnapshot snapshot = snapshot_of(run);
 
   const auto parameters = told(snapshot, "parameters");
   ASSERT_EQ(parameters.size(), 2U);
@@ -83,7 +83,7 @@ TEST_F(SnapshotTest, WhatChangesWhileARunIsOpenIsInItFromThatSampleOn) {
   // later.
   const auto changed_at_us = [&snapshot](const std::string& kind) {
     std::uint64_t seq = 0;
-    for (const InForce& document : snapshot.in_force) {
+    for (const storage::InForce& document : snapshot.in_force) {
       if (document.kind == kind) seq = document.first_seq;
     }
     return seq * 10'000;

@@ -12,19 +12,19 @@ SystemTest::SystemTest() {
   clock.add_worker(readers);
   clock.add_worker(exports);
   clock.add_worker(checkpoints);
-  recording = std::make_unique<RecordingParts>(loop, clock, disk, readers, exports, checkpoints,
-                                               RecorderOptions{folder / "station.sqlite", {}});
+  recording = std::make_unique<storage::RecordingParts>(loop, clock, disk, readers, exports, checkpoints,
+                                                        storage::RecorderOptions{folder / "station.sqlite", {}});
   clock.add_worker(recording->backups.checker());
   recorder = &recording->recorder;
   runs = &recording->runs;
   history = &recording->history;
   recording->connect(station);
   station.add_sink(listener_of_events);
-  run_first(loop, recording->open());
+  runtime::run_first(loop, recording->open());
   recording->spawn(tasks);
-  models = std::make_unique<ModelSender>(loop, tasks, clock, station, recording->fluid_models.in_force());
+  models = std::make_unique<station::ModelSender>(loop, tasks, clock, station, recording->fluid_models.in_force());
   const boost::asio::ip::tcp::endpoint any_port{boost::asio::ip::address_v4::loopback(), 0};
-  listener = std::make_unique<RobotListener>(loop, clock, tasks, station, *recorder, any_port, false, entrance);
+  listener = std::make_unique<link::RobotListener>(loop, clock, tasks, station, *recorder, any_port, false, entrance);
 }
 
 SystemTest::~SystemTest() {
@@ -47,12 +47,12 @@ std::uint64_t SystemTest::give(const protocol::Command& command) {
 
 boost::asio::awaitable<void> SystemTest::submit(std::uint64_t id, protocol::Command action) {
   const bool is_stop = action.which_action == rheonaut_Command_emergency_stop_tag;
-  CommandRequest request;
+  station::CommandRequest request;
   request.robot_id = "sim-1";
   request.action = action;
   request.actor = "test";
   auto answered = is_stop ? station.emergency_stop({"sim-1", "test", "", "", 0}, 1s) : station.submit(request);
-  const Result<CommandRecord> result = co_await std::move(answered);
+  const Result<station::CommandRecord> result = co_await std::move(answered);
   if (!result) {
     answers_[id].text = result.error().reason;
     co_return;
@@ -68,13 +68,13 @@ std::optional<sim_robot::Answer> SystemTest::answer_to(std::uint64_t command_id)
   return found->second;
 }
 
-void SystemTest::Listener::on_robot(const RobotState& state) {
-  if (state.link != LinkState::connected || state.connected_at_us == connected_at_us_) return;
+void SystemTest::Listener::on_robot(const station::RobotState& state) {
+  if (state.link != station::LinkState::connected || state.connected_at_us == connected_at_us_) return;
   connected_at_us_ = state.connected_at_us;
   ++connections;
 }
 
-void SystemTest::Listener::on_event(const RobotState&, const RobotEvent& event) {
+void SystemTest::Listener::on_event(const station::RobotState&, const station::RobotEvent& event) {
   const bool is_of_the_station = !event.event_seq.has_value();
   if (is_of_the_station || !known_events_.insert({event.boot_id, *event.event_seq}).second) return;
   test_.hear({event.kind, event.cause, 1e-6 * static_cast<double>(event.robot_time_us),
@@ -87,15 +87,15 @@ sim_robot::Moment SystemTest::moment() const {
 }
 
 sim_robot::View SystemTest::heard() const {
-  const RobotState& known = state();
+  const station::RobotState& known = state();
   sim_robot::View view;
-  view.link = known.link == LinkState::connected ? sim_robot::LinkView::up : sim_robot::LinkView::lost;
+  view.link = known.link == station::LinkState::connected ? sim_robot::LinkView::up : sim_robot::LinkView::lost;
   view.mode = known.context.mode;
   view.emergency_id = known.context.emergency_id;
   view.sub_state = known.context.sub_state;
   if (known.context.setpoint_m) view.setpoint_m = static_cast<double>(*known.context.setpoint_m);
   view.flags = known.context.flags;
-  const Sample newest = known.sample.value_or(Sample{});
+  const station::Sample newest = known.sample.value_or(station::Sample{});
   view.position_m = static_cast<double>(newest.position_m);
   view.velocity_m_s = static_cast<double>(newest.velocity_m_s);
   view.duty = static_cast<double>(newest.duty);
@@ -103,15 +103,15 @@ sim_robot::View SystemTest::heard() const {
   return view;
 }
 
-RunId SystemTest::begin_run() {
-  RunConditions conditions;
+storage::RunId SystemTest::begin_run() {
+  storage::RunConditions conditions;
   conditions.name = "a run of the test";
   return wait_for(runs->create("sim-1", conditions)).value().id;
 }
 
-std::vector<StoredSample> SystemTest::samples_of(RunId run) {
-  std::vector<StoredSample> samples;
-  std::optional<SampleCursor> after;
+std::vector<storage::StoredSample> SystemTest::samples_of(storage::RunId run) {
+  std::vector<storage::StoredSample> samples;
+  std::optional<storage::SampleCursor> after;
   do {
     const auto page = wait_for(history->samples(run, after, 1000));
     EXPECT_TRUE(page.has_value());
@@ -121,7 +121,7 @@ std::vector<StoredSample> SystemTest::samples_of(RunId run) {
   return samples;
 }
 
-void SystemTest::expect_whole(RunId id) {
+void SystemTest::expect_whole(storage::RunId id) {
   const auto run = wait_for(runs->end(id, ""));
   ASSERT_TRUE(run.has_value());
   EXPECT_GT(run->samples_expected, 0u);

@@ -35,27 +35,27 @@ class SystemTest : public ::testing::Test, public sim_robot::StoryWords {
   }
 
   void begin(sim_robot::SimulatedRobotConfig config = {});  // it dials, and its first sample is heard
-  const RobotState& state() const { return *station.find("sim-1"); }
-  RunId begin_run();
-  std::vector<StoredSample> samples_of(RunId run);
+  const station::RobotState& state() const { return *station.find("sim-1"); }
+  storage::RunId begin_run();
+  std::vector<storage::StoredSample> samples_of(storage::RunId run);
   // Ends the run: nothing of it is lost.
-  void expect_whole(RunId run);
+  void expect_whole(storage::RunId run);
 
   sim_robot::Moment moment() const override;
 
  private:
-  class Listener final : public StationSink {
+  class Listener final : public station::StationSink {
    public:
     explicit Listener(SystemTest& test) : test_{test} {}
-    void on_robot(const RobotState& state) override;
-    void on_event(const RobotState& state, const RobotEvent& event) override;
+    void on_robot(const station::RobotState& state) override;
+    void on_event(const station::RobotState& state, const station::RobotEvent& event) override;
 
     int connections = 0;
 
    private:
     SystemTest& test_;
     std::int64_t connected_at_us_ = 0;
-    std::set<std::pair<BootId, std::uint64_t>> known_events_;  // one may come twice after a reconnect
+    std::set<std::pair<station::BootId, std::uint64_t>> known_events_;  // one may come twice after a reconnect
   };
 
   void step() override { clock.run_for(10ms); }
@@ -73,17 +73,17 @@ class SystemTest : public ::testing::Test, public sim_robot::StoryWords {
   std::filesystem::path folder;
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  WorkerThread disk{"disk"}, readers{"readers"}, exports{"exports"}, checkpoints{"checkpoints"};
-  TaskGroup tasks{loop};
+  runtime::WorkerThread disk{"disk"}, readers{"readers"}, exports{"exports"}, checkpoints{"checkpoints"};
+  runtime::TaskGroup tasks{loop};
   Listener listener_of_events{*this};
-  Station station{loop, clock, Envelope{}, LinkTimes{}};
-  std::unique_ptr<RecordingParts> recording;
-  std::unique_ptr<ModelSender> models;
-  Recorder* recorder = nullptr;  // of recording, as are the next two
-  Runs* runs = nullptr;
-  History* history = nullptr;
-  PortAccess entrance{{clock, "robot port", ConnectionLimits{}}, nullptr};
-  std::unique_ptr<RobotListener> listener;
+  station::Station station{loop, clock, config::Envelope{}, config::LinkTimes{}};
+  std::unique_ptr<storage::RecordingParts> recording;
+  std::unique_ptr<station::ModelSender> models;
+  storage::Recorder* recorder = nullptr;  // of recording, as are the next two
+  storage::Runs* runs = nullptr;
+  storage::History* history = nullptr;
+  net::PortAccess entrance{{clock, "robot port", net::ConnectionLimits{}}, nullptr};
+  std::unique_ptr<link::RobotListener> listener;
   std::unique_ptr<VirtualRobot> robot;
 
  private:

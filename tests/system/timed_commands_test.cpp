@@ -15,8 +15,8 @@ class TimedCommandsTest : public SystemTest {
 
   std::uint64_t in_ms(std::uint64_t ms) const { return state().latest_robot_time_us + ms * 1000; }
   // It is answered within 0.1 s, unless the link is stalled.
-  CommandId order(const protocol::Command& action) {
-    CommandRequest request;
+  station::CommandId order(const protocol::Command& action) {
+    station::CommandRequest request;
     request.robot_id = "sim-1";
     request.action = action;
     request.actor = "test";
@@ -25,15 +25,16 @@ class TimedCommandsTest : public SystemTest {
     clock.settle();
     return sink.commands.back().id;
   }
-  std::string end_of(CommandId id) const {
-    const auto& record = *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &CommandRecord::id);
+  std::string end_of(station::CommandId id) const {
+    const auto& record =
+        *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &station::CommandRecord::id);
     return std::string{text(record.state)} + (record.reason.empty() ? "" : " " + record.reason);
   }
 
   RecordingSink sink;
 
  private:
-  boost::asio::awaitable<void> submit_and_forget(CommandRequest request) {
+  boost::asio::awaitable<void> submit_and_forget(station::CommandRequest request) {
     const auto result = co_await station.submit(std::move(request));
     EXPECT_TRUE(result);
   }
@@ -42,7 +43,7 @@ class TimedCommandsTest : public SystemTest {
 // Four that wait and all that was on its way are acknowledged together.
 TEST_F(TimedCommandsTest, AllEndAsTheRobotSaysWhenItDropsThemAfterAStall) {
   begin();
-  std::vector<CommandId> waiting, pings;
+  std::vector<station::CommandId> waiting, pings;
   for (int i = 0; i < 4; ++i) {
     waiting.push_back(order(sim_robot::timed(sim_robot::set_duty(0.25F), in_ms(5000))));
     pass(0.1);
@@ -54,13 +55,13 @@ TEST_F(TimedCommandsTest, AllEndAsTheRobotSaysWhenItDropsThemAfterAStall) {
   pass(0.3);
   robot->stall(false);
   pass(0.5);
-  for (const CommandId id : waiting) EXPECT_EQ(end_of(id), "expired expired");
-  for (const CommandId id : pings) EXPECT_EQ(end_of(id), "acknowledged");
+  for (const station::CommandId id : waiting) EXPECT_EQ(end_of(id), "expired expired");
+  for (const station::CommandId id : pings) EXPECT_EQ(end_of(id), "acknowledged");
 }
 
 TEST_F(TimedCommandsTest, OneThatALostLinkDropsIsExpiredInTheRecord) {
   begin();
-  const CommandId waiting = order(sim_robot::timed(sim_robot::set_duty(0.25F), in_ms(5000)));
+  const station::CommandId waiting = order(sim_robot::timed(sim_robot::set_duty(0.25F), in_ms(5000)));
   pass(0.1);
   robot->cut();
   pass(0.1);

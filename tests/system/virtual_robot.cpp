@@ -13,20 +13,20 @@ struct VirtualRobot::Link {
 
   explicit Link(asio::io_context& loop) : memory{loop}, written{loop} {}
 
-  MemoryLink memory;
-  std::unique_ptr<ByteStream> stream = memory.take_first();
+  net::MemoryLink memory;
+  std::unique_ptr<net::ByteStream> stream = memory.take_first();
   std::vector<std::uint8_t> waiting;
-  Signal written;
+  runtime::Signal written;
   bool ended = false;
 };
 
-VirtualRobot::VirtualRobot(asio::io_context& loop, Clock& clock, TaskGroup& tasks,
+VirtualRobot::VirtualRobot(asio::io_context& loop, runtime::Clock& clock, runtime::TaskGroup& tasks,
                            sim_robot::SimulatedRobotConfig config)
     : loop_{loop}, clock_{clock}, tasks_{tasks}, robot_{std::move(config)}, booted_at_us_{clock.steady_us()} {
   tasks_.spawn("virtual robot", tick());
 }
 
-void VirtualRobot::dial(RobotListener& listener) {
+void VirtualRobot::dial(link::RobotListener& listener) {
   listener_ = &listener;
   const auto link = link_ = std::make_shared<Link>(loop_);
   listener.serve(link->memory.take_second());

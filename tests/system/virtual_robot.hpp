@@ -18,9 +18,10 @@ namespace server {
 
 class VirtualRobot {
  public:
-  VirtualRobot(boost::asio::io_context& loop, Clock& clock, TaskGroup& tasks, sim_robot::SimulatedRobotConfig config);
+  VirtualRobot(boost::asio::io_context& loop, runtime::Clock& clock, runtime::TaskGroup& tasks,
+               sim_robot::SimulatedRobotConfig config);
 
-  void dial(RobotListener& listener);
+  void dial(link::RobotListener& listener);
   void cut();                // the link ends for both sides
   void stall(bool stalled);  // half-open: nothing arrives on either side
 
@@ -45,11 +46,11 @@ class VirtualRobot {
   std::uint64_t now_us() const { return static_cast<std::uint64_t>(clock_.steady_us() - booted_at_us_); }
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
-  TaskGroup& tasks_;
+  runtime::Clock& clock_;
+  runtime::TaskGroup& tasks_;
   sim_robot::SimulatedRobot robot_;
   std::int64_t booted_at_us_;
-  RobotListener* listener_ = nullptr;
+  link::RobotListener* listener_ = nullptr;
   std::shared_ptr<Link> link_;  // shared with the tasks that read and write it
 };
 

@@ -8,13 +8,15 @@
 #include "server/api/bodies/query_params.hpp"
 #include "server/station/state/unknown_values.hpp"
 
-namespace server {
+namespace server::api {
 
 using base::append_float;
 using base::append_number;
 namespace {
 
-void append_value(std::string& out, const std::optional<float>& value) { append_float(out, or_nan(value), "null"); }
+void append_value(std::string& out, const std::optional<float>& value) {
+  append_float(out, station::or_nan(value), "null");
+}
 void append_value(std::string& out, std::uint32_t value) { append_number(out, value); }
 void append_value(std::string& out, std::uint64_t id) { out += id == 0 ? "null" : fmt::format(R"("{}")", id); }
 template <class Enumerator>
@@ -23,10 +25,10 @@ void append_value(std::string& out, Enumerator value) {
 }
 
 // What a sample's object ends with.
-std::string shared_text(const Segment& segment) {
+std::string shared_text(const storage::Segment& segment) {
   std::string out = fmt::format(R"(,"clock_uncertainty_us":{},"first_received_at_us":{},"received_at_us":{})",
                                 segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us);
-  for_each_batch_field([&](const auto& field) {
+  station::for_each_batch_field([&](const auto& field) {
     out += fmt::format(R"(,"{}":)", field.name);
     append_value(out, segment.context.*field.member);
   });
@@ -34,8 +36,8 @@ std::string shared_text(const Segment& segment) {
   return out;
 }
 
-void append_segment(std::string& out, const SpanSegment& part) {
-  const Segment& segment = part.segment;
+void append_segment(std::string& out, const storage::SpanSegment& part) {
+  const storage::Segment& segment = part.segment;
   const std::string beginning = fmt::format(R"({{"span":{},"boot_id":"{}","seq":)", part.span, part.boot_id);
   const std::string end = shared_text(segment);
   for (std::size_t index = 0; index < segment.samples.size(); ++index) {
@@ -47,11 +49,11 @@ void append_segment(std::string& out, const SpanSegment& part) {
     append_number(out, robot_time_us);
     out += R"(,"utc_us":)";
     append_number(out, static_cast<std::int64_t>(robot_time_us) + segment.utc_offset_us);
-    for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    for (std::size_t channel = 0; channel < storage::kChannels; ++channel) {
       out += ",\"";
-      out += text(static_cast<Channel>(channel));
+      out += text(static_cast<storage::Channel>(channel));
       out += "\":";
-      append_float(out, segment.samples[index].*kSampleMembers[channel], "null");
+      append_float(out, segment.samples[index].*storage::kSampleMembers[channel], "null");
     }
     out += end;
   }
@@ -76,42 +78,42 @@ void append_column(std::string& out, const char* name, const std::vector<Number>
   out += ']';
 }
 
-std::string next_text(const std::optional<SampleCursor>& next) {
+std::string next_text(const std::optional<storage::SampleCursor>& next) {
   return next ? '"' + cursor_text(*next) + '"' : "null";
 }
 
 // "gaps":[...]
-void append_gaps(std::string& out, const std::vector<Gap>& gaps) {
+void append_gaps(std::string& out, const std::vector<storage::Gap>& gaps) {
   out += R"("gaps":[)";
-  for (const Gap& gap : gaps) {
+  for (const storage::Gap& gap : gaps) {
     if (out.back() != '[') out += ',';
-    out +=
-        fmt::format(R"({{"robot_id":{},"boot_id":"{}","first_seq":{},"last_seq":{},"cause":{},"noticed_at_us":{}}})",
-                    dump(gap.robot_id), gap.boot_id, gap.first_seq, gap.last_seq, dump(gap.cause), gap.noticed_at_us);
+    out += fmt::format(R"({{"robot_id":{},"boot_id":"{}","first_seq":{},"last_seq":{},"cause":{},"noticed_at_us":{}}})",
+                       base::dump(gap.robot_id), gap.boot_id, gap.first_seq, gap.last_seq, base::dump(gap.cause),
+                       gap.noticed_at_us);
   }
   out += ']';
 }
 
 }  // namespace
 
-std::string page_text(const SegmentPage& page) {
+std::string page_text(const storage::SegmentPage& page) {
   std::string out = R"({"samples":[)";
-  for (const SpanSegment& part : page.segments) append_segment(out, part);
+  for (const storage::SpanSegment& part : page.segments) append_segment(out, part);
   out += R"(],"next":)" + next_text(page.next) + '}';
   return out;
 }
 
-std::string overview_text(const Overview& overview, Channels channels) {
-  const OverviewColumns& columns = overview.columns;
+std::string overview_text(const storage::Overview& overview, storage::Channels channels) {
+  const storage::OverviewColumns& columns = overview.columns;
   std::string out = columns.from_segments ? R"({"source":"segments",)" : R"({"source":"rows",)";
   append_column(out, "first_utc_us", columns.first_utc_us);
   out += ',';
   append_column(out, "last_utc_us", columns.last_utc_us);
   out += ',';
   append_column(out, "samples", columns.samples);
-  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+  for (std::size_t channel = 0; channel < storage::kChannels; ++channel) {
     if (!channels[channel]) continue;
-    out += fmt::format(R"(,"{}":{{)", text(static_cast<Channel>(channel)));
+    out += fmt::format(R"(,"{}":{{)", text(static_cast<storage::Channel>(channel)));
     append_column(out, "min", columns.min[channel]);
     out += ',';
     append_column(out, "max", columns.max[channel]);
@@ -123,11 +125,11 @@ std::string overview_text(const Overview& overview, Channels channels) {
   return out;
 }
 
-std::string absences_text(const AbsencePage& page) {
+std::string absences_text(const storage::AbsencePage& page) {
   std::string out = "{";
   append_gaps(out, page.gaps);
   out += R"(,"missing":[)";
-  for (const MissingRange& range : page.missing) {
+  for (const storage::MissingRange& range : page.missing) {
     if (out.back() != '[') out += ',';
     out += fmt::format(R"({{"boot_id":"{}","first_seq":{},"last_seq":{}}})", range.boot_id, range.first_seq,
                        range.last_seq);
@@ -136,4 +138,4 @@ std::string absences_text(const AbsencePage& page) {
   return out;
 }
 
-}  // namespace server
+}  // namespace server::api

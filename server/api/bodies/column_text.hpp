@@ -7,10 +7,10 @@
 
 #include "server/storage/query/history.hpp"
 
-namespace server {
+namespace server::api {
 
-std::string page_text(const SegmentPage& page);                          // SamplePage
-std::string overview_text(const Overview& overview, Channels channels);  // Overview
-std::string absences_text(const AbsencePage& page);                      // GapList
+std::string page_text(const storage::SegmentPage& page);                                   // SamplePage
+std::string overview_text(const storage::Overview& overview, storage::Channels channels);  // Overview
+std::string absences_text(const storage::AbsencePage& page);                               // GapList
 
-}  // namespace server
+}  // namespace server::api

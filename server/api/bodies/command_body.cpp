@@ -8,7 +8,7 @@
 #include "server/api/bodies/limits.hpp"
 #include "server/storage/samples/in_force_json.hpp"
 
-namespace server {
+namespace server::api {
 namespace {
 
 using nlohmann::json;
@@ -97,7 +97,7 @@ Result<void> read_set_parameter(const Members& body, protocol::Command& action) 
   if (!value) return std::unexpected{value.error()};
   name->copy(set_parameter.name, sizeof set_parameter.name - 1);
   set_parameter.value = *value;
-  if (!bounds_motion(*name)) {
+  if (!station::bounds_motion(*name)) {
     if (!body.has("confirm")) return {};
     return fail(ErrorCode::bad_request, "confirm goes only with parameters that bound motion", "unknown_member");
   }
@@ -222,9 +222,9 @@ Result<void> read_confirm(const json& arguments, bool& is_confirmed) {
 
 // A controller is recorded as it was sent to the robot.
 std::string controller_arguments(const protocol::Controller& controller, bool is_confirmed) {
-  json arguments{{"controller", controller_json(controller)}};
+  json arguments{{"controller", storage::controller_json(controller)}};
   if (is_confirmed) arguments["confirm"] = true;
-  return dump(arguments);
+  return base::dump(arguments);
 }
 
 }  // namespace
@@ -252,7 +252,7 @@ Result<ParsedCommand> parse_command(const std::string& text, const protocol::Con
   }
   json arguments = body->object();
   for (const char* of_all : {"kind", "life_ms", "stamp_us", "issued_at_us"}) arguments.erase(of_all);
-  command.arguments = dump(arguments);
+  command.arguments = base::dump(arguments);
   command.action = rheonaut_Command_init_zero;
   if (auto read = read_execute_at(*known, arguments, command.action); !read) return std::unexpected{read.error()};
   const Members action{std::move(arguments)};
@@ -268,4 +268,4 @@ Result<ParsedCommand> parse_command(const std::string& text, const protocol::Con
   return command;
 }
 
-}  // namespace server
+}  // namespace server::api

@@ -10,7 +10,7 @@
 
 #include "server/api/bodies/limits.hpp"
 
-namespace server {
+namespace server::api {
 namespace {
 
 using nlohmann::json;
@@ -233,4 +233,4 @@ Result<protocol::Controller> controller_from(const Members& body, const protocol
   return out;
 }
 
-}  // namespace server
+}  // namespace server::api

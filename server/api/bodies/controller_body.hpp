@@ -3,7 +3,7 @@
 
 #include "server/api/bodies/json.hpp"
 
-namespace server {
+namespace server::api {
 
 // Reads the members `controller`, `controller_id`, `duty_min`, `duty_max` and `derivative_on` of a command's body.
 // `controller` is what `rheonaut discretise --json` prints, or what a robot is said to run (GET …/controller).
@@ -14,4 +14,4 @@ Result<protocol::Controller> controller_from(const Members& body, const protocol
 // CRC-32 of its coefficients, as docs/protocol.md says.
 std::uint32_t checksum_of(const protocol::Controller& controller);
 
-}  // namespace server
+}  // namespace server::api

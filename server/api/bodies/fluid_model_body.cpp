@@ -9,7 +9,7 @@
 #include "base/json_text.hpp"
 #include "server/api/bodies/limits.hpp"
 
-namespace server {
+namespace server::api {
 namespace {
 
 using nlohmann::json;
@@ -20,16 +20,16 @@ constexpr std::pair<const char*, Range<std::size_t>> kTexts[] = {
     {"description", text_bytes("FluidModelBody.description")}};
 
 // Each is a float32 on its way to the robot: what is checked is what is sent.
-Result<FluidModel::Numbers> sections_in(const Members& body, const char* name, Range<double> allowed) {
+Result<station::FluidModel::Numbers> sections_in(const Members& body, const char* name, Range<double> allowed) {
   const auto minimum = static_cast<float>(allowed.minimum), maximum = static_cast<float>(allowed.maximum);
   const auto wrong = [name] {
-    return fail(ErrorCode::bad_request, fmt::format("{} must be a list of {} numbers", name, kFluidModelSections),
-                "wrong_type");
+    return fail(ErrorCode::bad_request,
+                fmt::format("{} must be a list of {} numbers", name, station::kFluidModelSections), "wrong_type");
   };
   if (!body.has(name)) return fail(ErrorCode::bad_request, fmt::format("{} is missing", name), "missing_member");
   const json& list = body.object().at(name);
-  if (!list.is_array() || list.size() != kFluidModelSections) return wrong();
-  FluidModel::Numbers out{};
+  if (!list.is_array() || list.size() != station::kFluidModelSections) return wrong();
+  station::FluidModel::Numbers out{};
   for (std::size_t i = 0; i < out.size(); ++i) {
     if (!list[i].is_number()) return wrong();
     out[i] = static_cast<float>(list[i].get<double>()) + 0.0F;  // never -0, which the database would not keep
@@ -80,7 +80,7 @@ Result<std::string> document_in(const Members& body) {
       "out_of_range");
 }
 
-json list_of(const FluidModel::Numbers& numbers) {
+json list_of(const station::FluidModel::Numbers& numbers) {
   json list = json::array();
   for (const float number : numbers) list.push_back(base::decimal(number));
   return list;
@@ -88,11 +88,11 @@ json list_of(const FluidModel::Numbers& numbers) {
 
 }  // namespace
 
-Result<FluidModel> parse_fluid_model(const std::string& text) {
+Result<station::FluidModel> parse_fluid_model(const std::string& text) {
   const auto body = Members::parse(
       text, {"model_gain_m_s", "model_time_constant_s", "fit_error", "plant", "name", "comment", "description"});
   if (!body) return std::unexpected{body.error()};
-  FluidModel model;
+  station::FluidModel model;
   const auto gain = sections_in(*body, "model_gain_m_s", numbers("FluidModelBody.model_gain_m_s[]"));
   if (!gain) return std::unexpected{gain.error()};
   const auto time_constant =
@@ -109,7 +109,7 @@ Result<FluidModel> parse_fluid_model(const std::string& text) {
   return model;
 }
 
-json to_json(const FluidModel& model) {
+json to_json(const station::FluidModel& model) {
   json out = json::parse(model.document, nullptr, false);
   if (!out.is_object()) out = json::object();
   out["model_gain_m_s"] = list_of(model.gain_m_s);
@@ -120,4 +120,4 @@ json to_json(const FluidModel& model) {
   return out;
 }
 
-}  // namespace server
+}  // namespace server::api

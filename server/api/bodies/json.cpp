@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-namespace server {
+namespace server::api {
 
 using nlohmann::json;
 
@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kMaxQuotedValue = 60;
 
 std::string quote(const json& value) {
-  std::string text = dump(value);
+  std::string text = base::dump(value);
   if (text.size() > kMaxQuotedValue) text = text.substr(0, kMaxQuotedValue) + "…";
   return text;
 }
@@ -148,16 +148,16 @@ bool is_robot_id(const std::string& text) {
   return !text.empty() && text.size() <= 31 && std::ranges::all_of(text, allowed);
 }
 
-json to_json(const Run& run) {
+json to_json(const storage::Run& run) {
   json spans = json::array();
-  for (const RunSpan& span : run.spans) {
+  for (const storage::RunSpan& span : run.spans) {
     json one;
     one["boot_id"] = std::to_string(span.boot_id);
     one["first_seq"] = span.first_seq;
     one["last_seq"] = span.last_seq ? json(*span.last_seq) : json(nullptr);
     spans.push_back(std::move(one));
   }
-  const RunConditions& conditions = run.conditions;
+  const storage::RunConditions& conditions = run.conditions;
   json out;
   out["run_id"] = run.id;
   out["robot_id"] = run.robot_id;
@@ -186,4 +186,4 @@ json to_json(const Run& run) {
   return out;
 }
 
-}  // namespace server
+}  // namespace server::api

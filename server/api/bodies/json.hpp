@@ -18,7 +18,9 @@
 #include "server/station/station.hpp"
 #include "server/storage/query/history.hpp"
 
-namespace server {
+namespace server::api {
+
+using live::to_json;  // beside those below
 
 inline constexpr int kMaxJsonDepth = 16;  // of what is sent to the station; nothing that it knows needs more than 3
 
@@ -70,7 +72,7 @@ struct ParsedCommand {
 Result<ParsedCommand> parse_command(const std::string& body, const protocol::Controller* in_force = nullptr);
 
 struct ParsedControl {
-  ControlRequest request;                // robot and actor are left empty
+  station::ControlRequest request;       // robot and actor are left empty
   std::optional<std::int64_t> stamp_us;  // as above; of take and force alone
 };
 
@@ -78,13 +80,13 @@ struct ParsedControl {
 Result<ParsedControl> parse_control(const std::string& body);
 
 struct RunRequest {
-  RobotId robot_id;
-  RunConditions conditions;
-  std::optional<RecordedRange> range;  // of a run that is made afterwards
+  station::RobotId robot_id;
+  storage::RunConditions conditions;
+  std::optional<storage::RecordedRange> range;  // of a run that is made afterwards
 };
 Result<RunRequest> parse_run(const std::string& body);
 Result<std::string> parse_run_end(const std::string& body);  // the verdict; an empty body has none
-Result<RunAnnotation> parse_annotation(const std::string& body);
+Result<storage::RunAnnotation> parse_annotation(const std::string& body);
 Result<std::string> parse_discard(const std::string& body);  // the reason
 struct MarkerBody {
   std::string text;
@@ -95,7 +97,7 @@ Result<MarkerBody> parse_marker(const std::string& body);
 std::optional<std::uint64_t> parse_id(const std::string& text);  // decimal, not 0
 bool is_robot_id(const std::string& text);
 
-nlohmann::json to_json(const Run& run);
+nlohmann::json to_json(const storage::Run& run);
 
 // {"<name>": [ … ]}
 template <class Items>
@@ -105,4 +107,4 @@ nlohmann::json list_json(const char* name, const Items& items) {
   return {{name, std::move(list)}};
 }
 
-}  // namespace server
+}  // namespace server::api

@@ -18,7 +18,7 @@
 #include "server/runtime/secrets.hpp"
 #include "server/station/state/fluid_model.hpp"
 
-namespace server {
+namespace server::api {
 
 template <class Number>
 struct Limit {
@@ -44,10 +44,10 @@ inline constexpr Limit<std::size_t> kTextLimits[] = {
     {"FluidModelBody.comment", {0, kMaxDocumentBytes}},
     {"FluidModelBody.description", {0, kMaxDocumentBytes}},
     {"FluidModelBody.name", {0, kMaxDocumentBytes}},
-    {"LoginBody.password", {0, 10 * kMaxPasswordBytes}},
+    {"LoginBody.password", {0, 10 * runtime::kMaxPasswordBytes}},
     {"LoginBody.user", {0, kMaxWordBytes}},
     {"MarkerBody.text", kReasonBytes},
-    {"ReferenceBody.csv", {1, kMaxReferenceBytes}},
+    {"ReferenceBody.csv", {1, analysis::kMaxReferenceBytes}},
     {"ReferenceBody.reason", kReasonBytes},
     {"ReferenceBody.source", kNameBytes},
     {"ReferenceClock.marker_text", kReasonBytes},
@@ -70,13 +70,13 @@ inline constexpr Limit<std::size_t> kTextLimits[] = {
     {"RunEndBody.verdict", kTextBytes},
     {"ScopeList", {1, kMaxWordBytes}},
     {"SetParameterBody.name", {1, sizeof(rheonaut_SetParameter::name) - 1}},
-    {"UserBody.password", {kMinPasswordBytes, kMaxPasswordBytes}},
-    {"UserChange.password", {kMinPasswordBytes, kMaxPasswordBytes}},
+    {"UserBody.password", {runtime::kMinPasswordBytes, runtime::kMaxPasswordBytes}},
+    {"UserChange.password", {runtime::kMinPasswordBytes, runtime::kMaxPasswordBytes}},
 };
 
 inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     // minimum, maximum
-    {"ControlBody.lease_ms", {1, kLongestControl.count() / 1000}},
+    {"ControlBody.lease_ms", {1, station::kLongestControl.count() / 1000}},
     {"ControlBody.stamp_us", {0, kMaxTimeUs}},
     {"Controller.checksum", {0, kMaxUint32}},
     {"Controller.controller_id", {1, kMaxUint32}},
@@ -98,15 +98,15 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"StampUs", {0, kMaxTimeUs}},
     {"TimeSpan.from_us", {0, kMaxTimeUs - 1}},
     {"TimeSpan.to_us", {0, kMaxTimeUs - 1}},  // from from_us on
-    {"TokenBody.days", {1, kMaxTokenDays}},
+    {"TokenBody.days", {1, identity::kMaxTokenDays}},
 };
 
 inline constexpr Limit<double> kNumberLimits[] = {
     // minimum or exclusiveMinimum, maximum
     {"DiscretisedController.period_s", {0, 10}},  // not 0
-    {"FluidModelBody.fit_error", {0, kMaxModelFitError}},
-    {"FluidModelBody.model_gain_m_s[]", {-kMaxModelGain_m_s, kMaxModelGain_m_s}},
-    {"FluidModelBody.model_time_constant_s[]", {kMinModelTimeConstant_s, kMaxModelTimeConstant_s}},
+    {"FluidModelBody.fit_error", {0, station::kMaxModelFitError}},
+    {"FluidModelBody.model_gain_m_s[]", {-station::kMaxModelGain_m_s, station::kMaxModelGain_m_s}},
+    {"FluidModelBody.model_time_constant_s[]", {station::kMinModelTimeConstant_s, station::kMaxModelTimeConstant_s}},
     {"ReferenceBody.sd_m", {1e-7, 1}},
     {"ReferenceClock.at_s", kReferenceSeconds},
     {"ReferenceClock.from_s", kReferenceSeconds},
@@ -131,8 +131,8 @@ inline constexpr Limit<std::size_t> kListLimits[] = {
     {"Controller.biquad_b1", {0, std::size(rheonaut_Controller{}.biquad_b1)}},
     {"Controller.pole", {0, std::size(rheonaut_Controller{}.pole)}},
     {"Controller.residue", {0, std::size(rheonaut_Controller{}.residue)}},
-    {"FluidModelBody.model_gain_m_s", {kFluidModelSections, kFluidModelSections}},
-    {"FluidModelBody.model_time_constant_s", {kFluidModelSections, kFluidModelSections}},
+    {"FluidModelBody.model_gain_m_s", {station::kFluidModelSections, station::kFluidModelSections}},
+    {"FluidModelBody.model_time_constant_s", {station::kFluidModelSections, station::kFluidModelSections}},
     {"SetDutyScheduleBody.schedule", {1, std::size(rheonaut_SetDutySchedule{}.duty)}},
 };
 
@@ -149,4 +149,4 @@ consteval Range<std::int64_t> integers(std::string_view property) { return limit
 consteval Range<double> numbers(std::string_view property) { return limit_in(kNumberLimits, property); }
 consteval Range<std::size_t> list_size(std::string_view property) { return limit_in(kListLimits, property); }
 
-}  // namespace server
+}  // namespace server::api

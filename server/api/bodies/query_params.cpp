@@ -8,7 +8,7 @@
 
 #include "server/api/bodies/json.hpp"
 
-namespace server {
+namespace server::api {
 namespace {
 
 constexpr std::int64_t kLatest = (std::int64_t{1} << 53) - 1;  // that a JavaScript number holds
@@ -16,7 +16,7 @@ constexpr std::size_t kMaxQuotedParameter = 40;
 
 }  // namespace
 
-Result<std::int64_t> query_number(const Request& request, const std::string& name, std::int64_t minimum,
+Result<std::int64_t> query_number(const http::Request& request, const std::string& name, std::int64_t minimum,
                                   std::int64_t maximum, std::int64_t fallback) {
   const auto given = request.query.find(name);
   if (given == request.query.end()) return fallback;
@@ -33,10 +33,10 @@ Result<std::int64_t> query_number(const Request& request, const std::string& nam
   return value;
 }
 
-std::string cursor_text(const SampleCursor& cursor) { return fmt::format("{}-{}", cursor.span, cursor.seq); }
+std::string cursor_text(const storage::SampleCursor& cursor) { return fmt::format("{}-{}", cursor.span, cursor.seq); }
 
-std::optional<SampleCursor> parse_cursor(const std::string& text) {
-  SampleCursor cursor;
+std::optional<storage::SampleCursor> parse_cursor(const std::string& text) {
+  storage::SampleCursor cursor;
   const char* end = text.data() + text.size();
   const auto span = std::from_chars(text.data(), end, cursor.span);
   if (span.ec != std::errc{} || span.ptr == end || *span.ptr != '-') return std::nullopt;
@@ -46,49 +46,50 @@ std::optional<SampleCursor> parse_cursor(const std::string& text) {
   return cursor;
 }
 
-Result<std::optional<SampleCursor>> query_cursor(const Request& request) {
+Result<std::optional<storage::SampleCursor>> query_cursor(const http::Request& request) {
   const auto given = request.query.find("after");
-  if (given == request.query.end()) return std::optional<SampleCursor>{};
+  if (given == request.query.end()) return std::optional<storage::SampleCursor>{};
   const auto cursor = parse_cursor(given->second);
   if (!cursor) return fail(ErrorCode::bad_request, "after is not the `next` of a page", "out_of_range");
   return cursor;
 }
 
-Result<Channels> query_channels(const Request& request) {
+Result<storage::Channels> query_channels(const http::Request& request) {
   const auto given = request.query.find("channels");
-  if (given == request.query.end()) return all_channels();
-  return parse_channels(given->second);
+  if (given == request.query.end()) return storage::all_channels();
+  return storage::parse_channels(given->second);
 }
 
-Result<std::optional<TimeWindow>> query_window(const Request& request) {
+Result<std::optional<storage::TimeWindow>> query_window(const http::Request& request) {
   const auto from_us = query_number(request, "from_us", 0, kLatest - 1, 0);
   if (!from_us) return std::unexpected{from_us.error()};
   const auto to_us = query_number(request, "to_us", *from_us + 1, kLatest, kLatest);
   if (!to_us) return std::unexpected{to_us.error()};
-  if (!request.query.contains("from_us") && !request.query.contains("to_us")) return std::optional<TimeWindow>{};
-  return TimeWindow{*from_us, *to_us};
+  if (!request.query.contains("from_us") && !request.query.contains("to_us"))
+    return std::optional<storage::TimeWindow>{};
+  return storage::TimeWindow{*from_us, *to_us};
 }
 
-Result<RunId> run_id_of(const Request& request) {
+Result<storage::RunId> run_id_of(const http::Request& request) {
   const std::string& text = request.param.at("run_id");
   const auto id = parse_id(text);
-  if (id && *id <= std::uint64_t{kMaxRunId}) return static_cast<RunId>(*id);
+  if (id && *id <= std::uint64_t{kMaxRunId}) return static_cast<storage::RunId>(*id);
   return fail(ErrorCode::bad_request, fmt::format("run_id = '{}' is not a number from 1", text.substr(0, 40)),
               "out_of_range");
 }
 
-Result<Excerpt> run_excerpt(const Request& request) {
+Result<storage::Excerpt> run_excerpt(const http::Request& request) {
   const auto run = run_id_of(request);
   if (!run) return std::unexpected{run.error()};
   const auto window = query_window(request);
   if (!window) return std::unexpected{window.error()};
-  return Excerpt{.run = *run, .robot_id = {}, .window = *window};
+  return storage::Excerpt{.run = *run, .robot_id = {}, .window = *window};
 }
 
-Result<Excerpt> robot_excerpt(const Request& request) {
+Result<storage::Excerpt> robot_excerpt(const http::Request& request) {
   const auto window = query_window(request);
   if (!window) return std::unexpected{window.error()};
-  return Excerpt{.run = {}, .robot_id = request.param.at("robot_id"), .window = *window};
+  return storage::Excerpt{.run = {}, .robot_id = request.param.at("robot_id"), .window = *window};
 }
 
-}  // namespace server
+}  // namespace server::api

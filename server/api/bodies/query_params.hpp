@@ -11,29 +11,29 @@
 #include "server/runtime/result.hpp"
 #include "server/storage/query/history.hpp"
 
-namespace server {
+namespace server::api {
 
 // A number within limits; `fallback` when it is not given.
-Result<std::int64_t> query_number(const Request& request, const std::string& name, std::int64_t minimum,
+Result<std::int64_t> query_number(const http::Request& request, const std::string& name, std::int64_t minimum,
                                   std::int64_t maximum, std::int64_t fallback);
 
 // A cursor is "span-seq"; opaque to its users.
-std::string cursor_text(const SampleCursor& cursor);
-std::optional<SampleCursor> parse_cursor(const std::string& text);
+std::string cursor_text(const storage::SampleCursor& cursor);
+std::optional<storage::SampleCursor> parse_cursor(const std::string& text);
 // `after`; none when it is not given.
-Result<std::optional<SampleCursor>> query_cursor(const Request& request);
+Result<std::optional<storage::SampleCursor>> query_cursor(const http::Request& request);
 
 // `channels`: names with commas between them, each once; all when it is not given.
-Result<Channels> query_channels(const Request& request);
+Result<storage::Channels> query_channels(const http::Request& request);
 
 // `from_us` and `to_us`, UTC, the second above the first; none when neither is given.
-Result<std::optional<TimeWindow>> query_window(const Request& request);
+Result<std::optional<storage::TimeWindow>> query_window(const http::Request& request);
 
 inline constexpr std::int64_t kMaxRunId = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
-Result<RunId> run_id_of(const Request& request);                  // of the path
+Result<storage::RunId> run_id_of(const http::Request& request);   // of the path
 
 // What the path's run_id or robot_id and the window name.
-Result<Excerpt> run_excerpt(const Request& request);
-Result<Excerpt> robot_excerpt(const Request& request);
+Result<storage::Excerpt> run_excerpt(const http::Request& request);
+Result<storage::Excerpt> robot_excerpt(const http::Request& request);
 
-}  // namespace server
+}  // namespace server::api

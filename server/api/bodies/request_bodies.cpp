@@ -7,7 +7,7 @@
 
 #include "server/api/bodies/limits.hpp"
 
-namespace server {
+namespace server::api {
 namespace {
 
 using nlohmann::json;
@@ -20,7 +20,7 @@ Result<void> read_text(const Members& body, const char* name, Range<std::size_t>
   return {};
 }
 
-Result<RecordedRange> read_range(const json& value) {
+Result<storage::RecordedRange> read_range(const json& value) {
   if (!value.is_object()) return fail(ErrorCode::bad_request, "span is not an object", "wrong_type");
   const Members span{value};
   if (span.has("boot_id")) {
@@ -31,14 +31,14 @@ Result<RecordedRange> read_range(const json& value) {
     if (!first) return std::unexpected{first.error()};
     const auto last = span.integer("last_seq", {*first, integers("SeqSpan.last_seq").maximum});
     if (!last) return std::unexpected{last.error()};
-    return SeqSpan{*boot_id, static_cast<std::uint64_t>(*first), static_cast<std::uint64_t>(*last)};
+    return storage::SeqSpan{*boot_id, static_cast<std::uint64_t>(*first), static_cast<std::uint64_t>(*last)};
   }
   if (auto known = span.only({"from_us", "to_us"}); !known) return std::unexpected{known.error()};
   const auto from_us = span.integer("from_us", integers("TimeSpan.from_us"));
   if (!from_us) return std::unexpected{from_us.error()};
   const auto to_us = span.integer("to_us", {*from_us, integers("TimeSpan.to_us").maximum});
   if (!to_us) return std::unexpected{to_us.error()};
-  return TimeSpan{*from_us, *to_us};
+  return storage::TimeSpan{*from_us, *to_us};
 }
 
 // By name: of several faults the first is answered.
@@ -60,11 +60,12 @@ Result<ParsedControl> parse_control(const std::string& text) {
   if (!body) return std::unexpected{body.error()};
   const auto action = body->text("action", {1, kMaxWordBytes});
   if (!action) return std::unexpected{action.error()};
-  constexpr std::pair<const char*, ControlAction> kActions[] = {{"take", ControlAction::take},
-                                                                {"force", ControlAction::force},
-                                                                {"release", ControlAction::release},
-                                                                {"request", ControlAction::request},
-                                                                {"hand_over", ControlAction::hand_over}};
+  constexpr std::pair<const char*, station::ControlAction> kActions[] = {
+      {"take", station::ControlAction::take},
+      {"force", station::ControlAction::force},
+      {"release", station::ControlAction::release},
+      {"request", station::ControlAction::request},
+      {"hand_over", station::ControlAction::hand_over}};
   const auto* known = std::ranges::find(kActions, *action, [](const auto& one) { return std::string{one.first}; });
   if (known == std::end(kActions)) {
     return fail(ErrorCode::invalid,
@@ -72,15 +73,15 @@ Result<ParsedControl> parse_control(const std::string& text) {
                 "out_of_range");
   }
   ParsedControl control;
-  ControlRequest& request = control.request;
+  station::ControlRequest& request = control.request;
   request.action = known->second;
-  const bool is_forced = request.action == ControlAction::force;
-  if (body->has("stamp_us") && request.action != ControlAction::take && !is_forced) {
+  const bool is_forced = request.action == station::ControlAction::force;
+  if (body->has("stamp_us") && request.action != station::ControlAction::take && !is_forced) {
     return fail(ErrorCode::bad_request, "stamp_us goes with take and force only", "unknown_member");
   }
   if (auto read = body->time("stamp_us", control.stamp_us); !read) return std::unexpected{read.error()};
   if (body->has("lease_ms")) {
-    if (request.action != ControlAction::take) {
+    if (request.action != station::ControlAction::take) {
       return fail(ErrorCode::bad_request, "lease_ms goes with take only", "unknown_member");
     }
     const auto lease_ms = body->integer("lease_ms", integers("ControlBody.lease_ms"));
@@ -111,7 +112,7 @@ Result<RunRequest> parse_run(const std::string& text) {
   request.robot_id = *robot_id;
   const auto name = body->text("name", text_bytes("RunBody.name"));
   if (!name) return std::unexpected{name.error()};
-  RunConditions& conditions = request.conditions;
+  storage::RunConditions& conditions = request.conditions;
   conditions.name = *name;
   if (body->has("mean_flow_m_s")) {
     const auto flow = body->number("mean_flow_m_s");
@@ -145,11 +146,11 @@ Result<std::string> parse_run_end(const std::string& text) {
   return verdict;
 }
 
-Result<RunAnnotation> parse_annotation(const std::string& text) {
+Result<storage::RunAnnotation> parse_annotation(const std::string& text) {
   const auto body = Members::parse(
       text, {"name", "fluid", "pump_profile", "mean_flow_m_s", "tube", "operator_name", "profile", "notes", "verdict"});
   if (!body) return std::unexpected{body.error()};
-  RunAnnotation annotation;
+  storage::RunAnnotation annotation;
   for (const auto& [member, bytes] : kAnnotationTexts) {
     if (!body->has(member)) continue;
     const auto given = body->text(member, bytes);
@@ -183,4 +184,4 @@ Result<MarkerBody> parse_marker(const std::string& text) {
   return marker;
 }
 
-}  // namespace server
+}  // namespace server::api

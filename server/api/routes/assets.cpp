@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-namespace server {
+namespace server::api {
 namespace {
 
 constexpr std::array<std::pair<std::string_view, const char*>, 13> kContentTypes{{
@@ -33,9 +33,9 @@ const char* content_type_of(std::string_view name) {
 
 }  // namespace
 
-Response asset_response(const Request& request, const base::EmbeddedFile& file) {
+http::Response asset_response(const http::Request& request, const base::EmbeddedFile& file) {
   const std::string etag = '"' + std::string{file.digest} + '"';
-  Response response;
+  http::Response response;
   response.content_type = content_type_of(file.name);
   response.headers.emplace_back("ETag", etag);
   const bool hashed = file.name.starts_with("/assets/");
@@ -48,9 +48,9 @@ Response asset_response(const Request& request, const base::EmbeddedFile& file) 
   return response;
 }
 
-Response page_response(const Request& request) {
+http::Response page_response(const http::Request& request) {
   if (request.method != "GET" && request.method != "HEAD") {
-    Response response = problem(405, request.method + " is not possible here", "method_not_allowed");
+    http::Response response = http::problem(405, request.method + " is not possible here", "method_not_allowed");
     response.headers.emplace_back("Allow", "GET, HEAD");
     return response;
   }
@@ -59,11 +59,12 @@ Response page_response(const Request& request) {
   const auto found = std::ranges::find(files, path, &base::EmbeddedFile::name);
   if (found != files.end()) return asset_response(request, *found);
   if (path == "/index.html") {
-    return html_response(200,
-                         "<!doctype html><title>Rheonaut</title><p>This station was built without the cockpit. Its API "
-                         "answers under /api/v1; build the target web_dist and then the station to have the page.");
+    return http::html_response(
+        200,
+        "<!doctype html><title>Rheonaut</title><p>This station was built without the cockpit. Its API "
+        "answers under /api/v1; build the target web_dist and then the station to have the page.");
   }
-  return problem(404, "there is nothing at this path", "unknown_path");
+  return http::problem(404, "there is nothing at this path", "unknown_path");
 }
 
-}  // namespace server
+}  // namespace server::api

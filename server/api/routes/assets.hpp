@@ -6,7 +6,7 @@
 #include "base/embedded_file.hpp"
 #include "server/http/http.hpp"
 
-namespace server {
+namespace server::api {
 
 // The cockpit's files by path, "index.html" as "/index.html"; none when the cockpit was not built.
 std::span<const base::EmbeddedFile> cockpit_files();
@@ -15,9 +15,9 @@ std::span<const base::EmbeddedFile> openapi_files();
 
 // The file with its ETag: 304 when the client has it. Files under /assets/ carry a hash in their name and never change;
 // everything else is asked for again each time. The content type follows from the file's ending.
-Response asset_response(const Request& request, const base::EmbeddedFile& file);
+http::Response asset_response(const http::Request& request, const base::EmbeddedFile& file);
 
 // The cockpit's file at request.path ("/" is index.html); 404 when there is none, 405 for anything but GET.
-Response page_response(const Request& request);
+http::Response page_response(const http::Request& request);
 
-}  // namespace server
+}  // namespace server::api

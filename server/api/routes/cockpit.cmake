@@ -7,4 +7,4 @@ if(TARGET web_dist AND RHEONAUT_WEB_DIST STREQUAL "${CMAKE_BINARY_DIR}/web/dist"
 elseif(EXISTS ${RHEONAUT_WEB_DIST}/index.html)
   list(APPEND cockpit ${RHEONAUT_WEB_DIST}/index.html)
 endif()
-rheonaut_embed(server_api_routes server::cockpit_files FILES /=${RHEONAUT_WEB_DIST}/ DEPENDS ${cockpit})
+rheonaut_embed(server_api_routes server::api::cockpit_files FILES /=${RHEONAUT_WEB_DIST}/ DEPENDS ${cockpit})

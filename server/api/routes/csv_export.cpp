@@ -8,7 +8,7 @@
 #include <fstream>
 #include <system_error>
 
-namespace server {
+namespace server::api {
 namespace asio = boost::asio;
 
 namespace {
@@ -53,4 +53,4 @@ asio::awaitable<Result<std::optional<std::string>>> FileStream::next() {
   co_return std::optional{std::move(piece)};
 }
 
-}  // namespace server
+}  // namespace server::api

@@ -13,25 +13,25 @@
 #include "server/storage/export/csv_writer.hpp"
 #include "server/storage/query/history.hpp"
 
-namespace server {
+namespace server::api {
 
-class CsvStream final : public BodyStream {
+class CsvStream final : public http::BodyStream {
  public:
   // `exports` is the history on the exports' worker.
-  CsvStream(History& exports, std::vector<RecordedSpan> spans, const ExportQuery& query)
+  CsvStream(storage::History& exports, std::vector<storage::RecordedSpan> spans, const storage::ExportQuery& query)
       : exports_{exports}, writer_{std::move(spans), query} {}
 
   boost::asio::awaitable<Result<std::optional<std::string>>> next() override;
 
  private:
-  History& exports_;
-  CsvWriter writer_;
+  storage::History& exports_;
+  storage::CsvWriter writer_;
 };
 
 // Destroys what holds a file where the file was written: to close or to remove gigabytes takes long.
 class EndOnWorker {
  public:
-  EndOnWorker(TaskGroup& tasks, DatabaseReader& reader) : tasks_{&tasks}, reader_{&reader} {}
+  EndOnWorker(runtime::TaskGroup& tasks, storage::DatabaseReader& reader) : tasks_{&tasks}, reader_{&reader} {}
 
   template <class T>
   void operator()(T* object) const {
@@ -40,8 +40,8 @@ class EndOnWorker {
   }
 
  private:
-  TaskGroup* tasks_;
-  DatabaseReader* reader_;
+  runtime::TaskGroup* tasks_;
+  storage::DatabaseReader* reader_;
 };
 
 // A file that is there for one answer: removed when this is destroyed.
@@ -61,16 +61,16 @@ class ExportFile {
 
 using ExportFilePtr = std::unique_ptr<ExportFile, EndOnWorker>;
 
-class FileStream final : public BodyStream {
+class FileStream final : public http::BodyStream {
  public:
-  FileStream(History& exports, ExportFilePtr file) : exports_{exports}, file_{std::move(file)} {}
+  FileStream(storage::History& exports, ExportFilePtr file) : exports_{exports}, file_{std::move(file)} {}
 
   boost::asio::awaitable<Result<std::optional<std::string>>> next() override;
 
  private:
-  History& exports_;
+  storage::History& exports_;
   ExportFilePtr file_;
   std::uint64_t sent_bytes_ = 0;
 };
 
-}  // namespace server
+}  // namespace server::api

@@ -6,26 +6,26 @@
 #include <utility>
 #include <vector>
 
-namespace server {
+namespace server::api {
 namespace asio = boost::asio;
 
-asio::awaitable<Result<CommandRecord>> stop_robot(Station& station, StopRequest request) {
-  const RobotState* robot = station.find(request.robot_id);
-  const bool connected = robot != nullptr && robot->link == LinkState::connected;
+asio::awaitable<Result<station::CommandRecord>> stop_robot(station::Station& station, station::StopRequest request) {
+  const station::RobotState* robot = station.find(request.robot_id);
+  const bool connected = robot != nullptr && robot->link == station::LinkState::connected;
   const microseconds patience = connected ? kStopPatience : microseconds{0};
   co_return co_await station.emergency_stop(std::move(request), patience);
 }
 
-asio::awaitable<StopsOfAll> stop_all_robots(Station& station, StopRequest request) {
+asio::awaitable<station::StopsOfAll> stop_all_robots(station::Station& station, station::StopRequest request) {
   return station.stop_all(std::move(request), kStopPatience);
 }
 
-nlohmann::ordered_json stop_summary(const Station& station, const StopsOfAll& stops) {
+nlohmann::ordered_json stop_summary(const station::Station& station, const station::StopsOfAll& stops) {
   std::size_t acknowledged = 0;
-  std::vector<RobotId> unanswered, kept;
-  for (const CommandRecord& record : stops.records) {
-    const RobotState* robot = station.find(record.robot_id);
-    const bool connected = robot != nullptr && robot->link == LinkState::connected;
+  std::vector<station::RobotId> unanswered, kept;
+  for (const station::CommandRecord& record : stops.records) {
+    const station::RobotState* robot = station.find(record.robot_id);
+    const bool connected = robot != nullptr && robot->link == station::LinkState::connected;
     if (was_accepted(record.state)) {
       ++acknowledged;
     } else {
@@ -40,11 +40,11 @@ nlohmann::ordered_json stop_summary(const Station& station, const StopsOfAll& st
   out["kept"] = kept.size();
   out["left_out"] = stops.left_out.size();
   out["not_acknowledged"] = nlohmann::ordered_json::array();
-  const std::array<std::pair<const char*, const std::vector<RobotId>*>, 3> named{
+  const std::array<std::pair<const char*, const std::vector<station::RobotId>*>, 3> named{
       {{"failed", &stops.failed}, {"unanswered", &unanswered}, {"kept", &kept}}};
   std::size_t not_named = 0;
   for (const auto& [outcome, robots] : named) {
-    for (const RobotId& id : *robots) {
+    for (const station::RobotId& id : *robots) {
       if (out["not_acknowledged"].size() == kMaxNamedRobots) {
         ++not_named;
       } else {
@@ -56,4 +56,4 @@ nlohmann::ordered_json stop_summary(const Station& station, const StopsOfAll& st
   return out;
 }
 
-}  // namespace server
+}  // namespace server::api

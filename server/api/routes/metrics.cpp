@@ -7,7 +7,7 @@
 #include <iterator>
 #include <string_view>
 
-namespace server {
+namespace server::api {
 namespace {
 
 class Metrics {
@@ -19,7 +19,7 @@ class Metrics {
     add(name, "gauge", fmt::to_string(value), meaning);
   }
   // In seconds, as Prometheus wants it.
-  void histogram(std::string_view name, std::string_view stage, const Histogram& times) {
+  void histogram(std::string_view name, std::string_view stage, const station::Histogram& times) {
     constexpr double kUsPerS = 1e6;
     const auto line = [&](std::string_view suffix, std::string_view bound, auto value) {
       fmt::format_to(std::back_inserter(text_), "rheonaut_{}{}{{stage=\"{}\"{}}} {}\n", name, suffix, stage, bound,
@@ -28,9 +28,9 @@ class Metrics {
     std::uint64_t count = 0;
     for (std::size_t at = 0; at < times.counts().size(); ++at) {
       count += times.counts()[at];
-      const bool is_last = at == Histogram::kBoundsUs.size();
+      const bool is_last = at == station::Histogram::kBoundsUs.size();
       const std::string bound =
-          is_last ? "+Inf" : fmt::to_string(static_cast<double>(Histogram::kBoundsUs[at]) / kUsPerS);
+          is_last ? "+Inf" : fmt::to_string(static_cast<double>(station::Histogram::kBoundsUs[at]) / kUsPerS);
       line("_bucket", fmt::format(",le=\"{}\"", bound), count);
     }
     line("_sum", "", static_cast<double>(times.sum_us()) / kUsPerS);
@@ -53,17 +53,17 @@ class Metrics {
   std::string text_;
 };
 
-void add_port(Metrics& metrics, const std::string& port, const ConnectionLimiter& limiter) {
+void add_port(Metrics& metrics, const std::string& port, const net::ConnectionLimiter& limiter) {
   metrics.gauge(port + "_connections", limiter.connections(), "Open now.");
   metrics.counter(port + "_connections_refused_total", limiter.counters().refused, "No place was left for them.");
   metrics.counter(port + "_connections_replaced_total", limiter.counters().replaced, "They gave way to others.");
 }
 
-void add_security(Metrics& metrics, const TransportSecurity& security) {
+void add_security(Metrics& metrics, const net::TransportSecurity& security) {
   add_port(metrics, "http", security.http().limiter);
   add_port(metrics, "robot", security.robots().limiter);
   metrics.gauge("exposed", security.is_exposed() ? 1 : 0, "1 while a port speaks plain TCP beyond this machine.");
-  const TlsHandshakes* gate = security.gate();
+  const tls::TlsHandshakes* gate = security.gate();
   if (gate == nullptr) return;
   const auto not_after_s = std::max<std::int64_t>(gate->context().certificate.not_after_us / 1'000'000, 0);
   metrics.gauge("tls_certificate_not_after_s", static_cast<std::uint64_t>(not_after_s), "End of its life, UTC.");
@@ -72,26 +72,27 @@ void add_security(Metrics& metrics, const TransportSecurity& security) {
   metrics.counter("tls_failed_total", gate->counters().failed, "Handshakes that failed.");
 }
 
-void add_exceptions(Metrics& metrics, const ExceptionLog& exceptions) {
+void add_exceptions(Metrics& metrics, const runtime::ExceptionLog& exceptions) {
   constexpr const char* kName = "exceptions_total";
   metrics.heading(kName, "counter", "What ended by a fault of the station; its log says which.");
-  for (const Ended ended : kAllEnded) metrics.labelled(kName, "where", text(ended), exceptions.count(ended));
+  for (const runtime::Ended ended : runtime::kAllEnded)
+    metrics.labelled(kName, "where", text(ended), exceptions.count(ended));
 }
 
 }  // namespace
 
-std::string metrics_text(const RecordingParts& recording, const Station& station, const TransportSecurity& security,
-                         const ExceptionLog& exceptions) {
-  const RecorderCounters& counters = recording.recorder.counters();
-  const DiskUse& use = recording.disk_watch.use();
-  const RetentionCounters& retention = recording.retention.counters();
+std::string metrics_text(const storage::RecordingParts& recording, const station::Station& station,
+                         const net::TransportSecurity& security, const runtime::ExceptionLog& exceptions) {
+  const storage::RecorderCounters& counters = recording.recorder.counters();
+  const storage::DiskUse& use = recording.disk_watch.use();
+  const storage::RetentionCounters& retention = recording.retention.counters();
   Metrics metrics;
   metrics.gauge("recording_failing", recording.recorder.failing() ? 1 : 0, "1 while nothing becomes durable.");
   metrics.gauge("space_state", static_cast<std::uint64_t>(recording.disk_watch.state()), "0 ok, 1 low, 2 critical.");
   metrics.gauge("queued_samples", recording.recorder.queued_samples(), "Received and not durable yet.");
   metrics.gauge("free_bytes", use.free_bytes, "On the disk of the database.");
   metrics.gauge("database_bytes", use.database_bytes, "Of the database file.");
-  const WalState& wal = recording.recorder.wal();
+  const storage::WalState& wal = recording.recorder.wal();
   metrics.gauge("wal_bytes", wal.bytes, "In use in the write-ahead log.");
   metrics.gauge("wal_held", wal.held_since_us == 0 ? 0 : 1,
                 "1 while another program keeps the log from beginning anew.");
@@ -108,7 +109,7 @@ std::string metrics_text(const RecordingParts& recording, const Station& station
   metrics.counter("invalid_values_total", station.invalid_values(), "Values of robots' frames that cannot be.");
   metrics.counter("commits_total", counters.commits, "Commits.");
   metrics.counter("commits_failed_total", counters.commits_failed, "Commits that failed and were tried again.");
-  const StopTimes& stops = station.stop_times();
+  const station::StopTimes& stops = station.stop_times();
   constexpr const char* kStopTimes = "emergency_stop_seconds";
   metrics.heading(kStopTimes, "histogram", "From the request to each stage of an emergency stop of a connected robot.");
   metrics.histogram(kStopTimes, "sent", stops.sent);
@@ -119,4 +120,4 @@ std::string metrics_text(const RecordingParts& recording, const Station& station
   return std::move(metrics).text();
 }
 
-}  // namespace server
+}  // namespace server::api

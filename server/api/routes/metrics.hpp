@@ -12,9 +12,9 @@
 #include "server/station/station.hpp"
 #include "server/storage/recording_parts.hpp"
 
-namespace server {
+namespace server::api {
 
-std::string metrics_text(const RecordingParts& recording, const Station& station, const TransportSecurity& security,
-                         const ExceptionLog& exceptions);
+std::string metrics_text(const storage::RecordingParts& recording, const station::Station& station,
+                         const net::TransportSecurity& security, const runtime::ExceptionLog& exceptions);
 
-}  // namespace server
+}  // namespace server::api

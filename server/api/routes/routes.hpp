@@ -20,168 +20,188 @@ namespace boost::asio {
 class io_context;
 }
 
-namespace server {
-
-class Accounts;
+namespace server::analysis {
 class AnalysisService;
+}  // namespace server::analysis
+
+namespace server::identity {
+class Accounts;
 class Auth;
+class Logins;
+}  // namespace server::identity
+
+namespace server::live {
+class LiveFeed;
+class RobotTexts;
+}  // namespace server::live
+
+namespace server::net {
+class TransportSecurity;
+}  // namespace server::net
+
+namespace server::runtime {
+class ExceptionLog;
+class TaskGroup;
+}  // namespace server::runtime
+
+namespace server::station {
+class Station;
+}  // namespace server::station
+
+namespace server::storage {
 class RunDigester;
 class DiskWatch;
-class ExceptionLog;
 class FluidModels;
 class HeadWatch;
 class History;
-class LiveFeed;
-class Logins;
 class Markers;
 class OutsideReferences;
 class Recorder;
-class RobotTexts;
 class Runs;
-class Station;
-class TaskGroup;
-class TransportSecurity;
 struct OutsideReference;
 struct RecordingParts;
 struct StoreLoss;
+}  // namespace server::storage
+
+namespace server::api {
 
 struct StationFacts {
   std::string version;
   std::uint64_t store_id = 0;
   std::string http_address;
   std::string robots_address;
-  std::int64_t started_at_us = 0;         // steady
-  TransportSecurity* security = nullptr;  // never null
+  std::int64_t started_at_us = 0;              // steady
+  net::TransportSecurity* security = nullptr;  // never null
   bool is_secure() const;
 };
 
 // The routes of each noun, with what they work with; all of it outlives the router.
 
 struct AccountRoutes {
-  Accounts& accounts;
-  Auth& auth;
-  Logins& logins;
-  Clock& clock;
-  Station& station;
+  identity::Accounts& accounts;
+  identity::Auth& auth;
+  identity::Logins& logins;
+  runtime::Clock& clock;
+  station::Station& station;
   const StationFacts& facts;
 };
-void add_account_routes(Router& router, AccountRoutes parts);
+void add_account_routes(http::Router& router, AccountRoutes parts);
 
 struct AuditRoutes {
-  Clock& clock;
-  History& history;
-  Recorder& recorder;
+  runtime::Clock& clock;
+  storage::History& history;
+  storage::Recorder& recorder;
 };
-void add_audit_routes(Router& router, AuditRoutes parts);
+void add_audit_routes(http::Router& router, AuditRoutes parts);
 
 struct CommandRoutes {
-  Clock& clock;
-  History& history;
-  Station& station;
+  runtime::Clock& clock;
+  storage::History& history;
+  station::Station& station;
 };
-void add_command_routes(Router& router, CommandRoutes parts);
+void add_command_routes(http::Router& router, CommandRoutes parts);
 
 struct ExportRoutes {
-  TaskGroup& tasks;
-  History& history;  // on a worker of its own
-  DiskWatch& disk_watch;
+  runtime::TaskGroup& tasks;
+  storage::History& history;  // on a worker of its own
+  storage::DiskWatch& disk_watch;
   std::filesystem::path database;
   std::filesystem::path folder;  // of files on their way
 };
-void add_export_routes(Router& router, ExportRoutes parts);
+void add_export_routes(http::Router& router, ExportRoutes parts);
 
 struct FluidRoutes {
-  Clock& clock;
-  FluidModels& fluid_models;
-  Recorder& recorder;
-  Station& station;
+  runtime::Clock& clock;
+  storage::FluidModels& fluid_models;
+  storage::Recorder& recorder;
+  station::Station& station;
 };
-void add_fluid_routes(Router& router, FluidRoutes parts);
+void add_fluid_routes(http::Router& router, FluidRoutes parts);
 
 struct InForceRoutes {
-  Station& station;
+  station::Station& station;
 };
-void add_in_force_routes(Router& router, InForceRoutes parts);
+void add_in_force_routes(http::Router& router, InForceRoutes parts);
 
 struct MarkerRoutes {
-  Markers& markers;
-  Station& station;
+  storage::Markers& markers;
+  station::Station& station;
 };
-void add_marker_routes(Router& router, MarkerRoutes parts);
+void add_marker_routes(http::Router& router, MarkerRoutes parts);
 
 struct OverviewRoutes {
-  History& history;
+  storage::History& history;
 };
-void add_overview_routes(Router& router, OverviewRoutes parts);
+void add_overview_routes(http::Router& router, OverviewRoutes parts);
 
 struct RecordingRoutes {
-  Clock& clock;
-  RecordingParts& recording;
-  Station& station;
-  TransportSecurity& security;
-  ExceptionLog& exceptions;
+  runtime::Clock& clock;
+  storage::RecordingParts& recording;
+  station::Station& station;
+  net::TransportSecurity& security;
+  runtime::ExceptionLog& exceptions;
 };
-void add_recording_routes(Router& router, RecordingRoutes parts);
+void add_recording_routes(http::Router& router, RecordingRoutes parts);
 
 struct ReferenceRoutes {
-  AnalysisService& analysis;
-  Clock& clock;
-  OutsideReferences& references;
+  analysis::AnalysisService& analysis;
+  runtime::Clock& clock;
+  storage::OutsideReferences& references;
 };
-void add_reference_routes(Router& router, ReferenceRoutes parts);
+void add_reference_routes(http::Router& router, ReferenceRoutes parts);
 
 struct RobotRoutes {
   boost::asio::io_context& loop;
-  History& history;
-  Station& station;
-  RobotTexts& texts;
+  storage::History& history;
+  station::Station& station;
+  live::RobotTexts& texts;
 };
-void add_robot_routes(Router& router, RobotRoutes parts);
+void add_robot_routes(http::Router& router, RobotRoutes parts);
 
 struct RunRoutes {
-  AnalysisService& analysis;
-  RunDigester& digester;
-  Clock& clock;
-  DiskWatch& disk_watch;
-  LiveFeed& live;
-  Runs& runs;
-  Station& station;
+  analysis::AnalysisService& analysis;
+  storage::RunDigester& digester;
+  runtime::Clock& clock;
+  storage::DiskWatch& disk_watch;
+  live::LiveFeed& live;
+  storage::Runs& runs;
+  station::Station& station;
 };
-void add_run_routes(Router& router, RunRoutes parts);
+void add_run_routes(http::Router& router, RunRoutes parts);
 
 struct SampleRoutes {
-  History& history;
+  storage::History& history;
 };
-void add_sample_routes(Router& router, SampleRoutes parts);
+void add_sample_routes(http::Router& router, SampleRoutes parts);
 
 struct StationRoutes {
-  Auth& auth;
-  Clock& clock;
-  HeadWatch& head_watch;
-  Recorder& recorder;
+  identity::Auth& auth;
+  runtime::Clock& clock;
+  storage::HeadWatch& head_watch;
+  storage::Recorder& recorder;
   const StationFacts& facts;
 };
-void add_station_routes(Router& router, StationRoutes parts);
+void add_station_routes(http::Router& router, StationRoutes parts);
 
 // An answer that gets its parts by value: they are references, and a coroutine keeps its own copy of them.
 template <class Parts>
-std::function<Answer(Request)> with(Parts parts, Answer (*answer)(Parts, Request)) {
-  return [parts, answer](Request request) { return answer(parts, std::move(request)); };
+std::function<http::Answer(http::Request)> with(Parts parts, http::Answer (*answer)(Parts, http::Request)) {
+  return [parts, answer](http::Request request) { return answer(parts, std::move(request)); };
 }
 
 std::string base_url(const StationFacts& facts, const std::string& address);  // "https://127.0.0.1:8080"
 std::string login_url(const std::string& base_url, const std::string& code);
-nlohmann::json to_json(const OutsideReference& reference);
-nlohmann::json losses_json(const std::vector<StoreLoss>& losses);
+nlohmann::json to_json(const storage::OutsideReference& reference);
+nlohmann::json losses_json(const std::vector<storage::StoreLoss>& losses);
 
 // Who asks, and now.
-inline Author author_of(const Request& request, const Clock& clock) {
+inline station::Author author_of(const http::Request& request, const runtime::Clock& clock) {
   return {request.actor, request.peer, clock.utc_us()};
 }
 
 inline constexpr std::int64_t kDefaultLimit = 100;
 inline constexpr std::int64_t kMaxLimit = 1000;
 
-Response unknown_robot(const std::string& id);  // 404, whatever was asked of it
+http::Response unknown_robot(const std::string& id);  // 404, whatever was asked of it
 
-}  // namespace server
+}  // namespace server::api

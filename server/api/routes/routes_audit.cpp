@@ -5,7 +5,7 @@
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/query/history.hpp"
 
-namespace server {
+namespace server::api {
 using nlohmann::json;
 
 namespace {
@@ -13,8 +13,8 @@ namespace {
 constexpr std::size_t kMaxFilterBytes = 100;
 constexpr std::int64_t kMaxNumber = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
 
-json to_json(const AuditEntry& entry) {
-  const AuditNote& note = entry.note;
+json to_json(const storage::AuditEntry& entry) {
+  const station::AuditNote& note = entry.note;
   json out;
   out["entry"] = entry.entry;
   out["at_us"] = note.by.at_us;
@@ -25,17 +25,17 @@ json to_json(const AuditEntry& entry) {
   out["subject"] = note.subject;
   out["detail"] = json::parse(note.detail, nullptr, false);
   if (out["detail"].is_discarded()) out["detail"] = note.detail;
-  out["hash"] = text(entry.hash);
+  out["hash"] = storage::text(entry.hash);
   return out;
 }
 
-std::optional<std::string> word_of(const Request& request, const char* name) {
+std::optional<std::string> word_of(const http::Request& request, const char* name) {
   const auto given = request.query.find(name);
   return given == request.query.end() ? std::nullopt : std::optional{given->second.substr(0, kMaxFilterBytes)};
 }
 
-Result<AuditFilter> filter_of(const Request& request) {
-  AuditFilter filter;
+Result<storage::AuditFilter> filter_of(const http::Request& request) {
+  storage::AuditFilter filter;
   filter.robot_id = word_of(request, "robot_id");
   filter.actor = word_of(request, "actor");
   filter.action = word_of(request, "action");
@@ -54,34 +54,34 @@ Result<AuditFilter> filter_of(const Request& request) {
   return filter;
 }
 
-Answer list_audit(AuditRoutes parts, Request request) {
+http::Answer list_audit(AuditRoutes parts, http::Request request) {
   const auto filter = filter_of(request);
-  if (!filter) co_return problem(filter.error());
-  const AuditPage page = co_await parts.history.audit(*filter);
+  if (!filter) co_return http::problem(filter.error());
+  const storage::AuditPage page = co_await parts.history.audit(*filter);
   json body{{"entries", json::array()}};
-  for (const AuditEntry& entry : page.entries) body["entries"].push_back(to_json(entry));
+  for (const storage::AuditEntry& entry : page.entries) body["entries"].push_back(to_json(entry));
   body["next_before"] = page.next == 0 ? json(nullptr) : json(page.next);
   body["head"] = page.head.entry == 0 ? json(nullptr) : json(text(page.head));
-  co_return json_response(200, body);
+  co_return http::json_response(200, body);
 }
 
 }  // namespace
 
-void add_audit_routes(Router& router, AuditRoutes parts) {
+void add_audit_routes(http::Router& router, AuditRoutes parts) {
   router.add({"GET",
               "/api/v1/audit",
-              Scope::admin,
+              identity::Scope::admin,
               {"robot_id", "actor", "action", "from_us", "to_us", "before", "limit"},
               with(parts, list_audit)});
-  router.set_on_refused([parts](const Request& request, Scope needed) {
-    AuditNote note;
+  router.set_on_refused([parts](const http::Request& request, identity::Scope needed) {
+    station::AuditNote note;
     note.by = author_of(request, parts.clock);
     note.action = "request.refused";
     note.subject = request.path.substr(0, kMaxFilterBytes);
-    note.detail = audit_detail({{"method", request.method}, {"needs", text(needed)}});
+    note.detail = station::audit_detail({{"method", request.method}, {"needs", text(needed)}});
     note.can_flood = true;
     parts.recorder.on_audit(note);
   });
 }
 
-}  // namespace server
+}  // namespace server::api

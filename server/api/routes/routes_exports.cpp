@@ -12,7 +12,7 @@
 #include "server/storage/query/run_reader.hpp"
 #include "server/storage/upkeep/disk_watch.hpp"
 
-namespace server {
+namespace server::api {
 namespace asio = boost::asio;
 
 namespace {
@@ -24,11 +24,11 @@ constexpr std::uint64_t kSampleBytes = 200;                  // at most, in any 
 constexpr std::uint64_t kSpareBytes = 512ULL * 1024 * 1024;  // that the recording goes on with
 
 struct ParsedExport {
-  ExportQuery query;
-  std::vector<RecordedSpan> spans;  // as far as they were made when the export began
+  storage::ExportQuery query;
+  std::vector<storage::RecordedSpan> spans;  // as far as they were made when the export began
 };
 
-asio::awaitable<Result<ParsedExport>> parse_export(ExportRoutes parts, Request request) {
+asio::awaitable<Result<ParsedExport>> parse_export(ExportRoutes parts, http::Request request) {
   ParsedExport parsed;
   const auto run = run_id_of(request);
   if (!run) co_return std::unexpected{run.error()};
@@ -38,15 +38,16 @@ asio::awaitable<Result<ParsedExport>> parse_export(ExportRoutes parts, Request r
   if (!grid_us) co_return std::unexpected{grid_us.error()};
   parsed.query = {.run = *run, .channels = *channels, .grid_us = {}};
   if (*grid_us != 0) parsed.query.grid_us = *grid_us;
-  auto spans = co_await parts.history.spans(excerpt_of(*run));
+  auto spans = co_await parts.history.spans(storage::excerpt_of(*run));
   if (!spans) co_return std::unexpected{spans.error()};
-  for (RecordedSpan& span : *spans) span.cut(span.made());
+  for (storage::RecordedSpan& span : *spans) span.cut(span.made());
   parsed.spans = std::move(*spans);
   co_return parsed;
 }
 
-Response attachment(const char* content_type, RunId run, const char* ending, std::unique_ptr<BodyStream> stream) {
-  Response response;
+http::Response attachment(const char* content_type, storage::RunId run, const char* ending,
+                          std::unique_ptr<http::BodyStream> stream) {
+  http::Response response;
   response.content_type = content_type;
   response.headers.emplace_back("Cache-Control", "no-store");
   response.headers.emplace_back("Content-Disposition", fmt::format("attachment; filename=\"run-{}{}\"", run, ending));
@@ -54,10 +55,10 @@ Response attachment(const char* content_type, RunId run, const char* ending, std
   return response;
 }
 
-Answer export_csv(ExportRoutes parts, Request request) {
+http::Answer export_csv(ExportRoutes parts, http::Request request) {
   auto parsed = co_await parse_export(parts, std::move(request));
-  if (!parsed) co_return problem(parsed.error());
-  const RunId run = parsed->query.run;
+  if (!parsed) co_return http::problem(parsed.error());
+  const storage::RunId run = parsed->query.run;
   co_return attachment("text/csv; charset=utf-8", run, ".csv",
                        std::make_unique<CsvStream>(parts.history, std::move(parsed->spans), parsed->query));
 }
@@ -66,7 +67,7 @@ Answer export_csv(ExportRoutes parts, Request request) {
 Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folder, const char* ending,
                                               std::uint64_t samples) {
   auto file = std::make_unique<ExportFile>(folder, ending);
-  const std::uint64_t free_bytes = free_bytes_of(folder);
+  const std::uint64_t free_bytes = storage::free_bytes_of(folder);
   const std::uint64_t wanted = 2 * samples * kSampleBytes + kSpareBytes;
   if (free_bytes < wanted) {
     return fail(ErrorCode::unavailable,
@@ -98,7 +99,7 @@ template <class Writer>
 asio::awaitable<Result<void>> write_in_slices(ExportRoutes parts, Writer& writer) {
   for (Result<bool> more = true; *more;) {
     auto slice = [&writer, folder = parts.folder](SQLite::Database& database) -> Result<bool> {
-      if (free_bytes_of(folder) >= kSpareBytes) return writer.advance(database);
+      if (storage::free_bytes_of(folder) >= kSpareBytes) return writer.advance(database);
       return fail(ErrorCode::unavailable, "the export would fill the station's disk; export CSV, which needs no room",
                   "low_space");
     };
@@ -108,44 +109,45 @@ asio::awaitable<Result<void>> write_in_slices(ExportRoutes parts, Writer& writer
   co_return Result<void>{};
 }
 
-Answer export_mat(ExportRoutes parts, Request request) {
+http::Answer export_mat(ExportRoutes parts, http::Request request) {
   auto parsed = co_await parse_export(parts, std::move(request));
-  if (!parsed) co_return problem(parsed.error());
+  if (!parsed) co_return http::problem(parsed.error());
   auto file = co_await begin_file(parts, *parsed, ".mat");
-  if (!file) co_return problem(file.error());
-  const std::unique_ptr<MatWriter, EndOnWorker> writer{
-      new MatWriter{(*file)->path(), std::move(parsed->spans), parsed->query}, end_on_worker(parts)};
+  if (!file) co_return http::problem(file.error());
+  const std::unique_ptr<storage::MatWriter, EndOnWorker> writer{
+      new storage::MatWriter{(*file)->path(), std::move(parsed->spans), parsed->query}, end_on_worker(parts)};
   const Result<void> written = co_await write_in_slices(parts, *writer);
-  if (!written) co_return problem(written.error());
+  if (!written) co_return http::problem(written.error());
   co_return attachment("application/x-matlab-data", parsed->query.run, ".mat",
                        std::make_unique<FileStream>(parts.history, std::move(*file)));
 }
 
-Answer export_sqlite(ExportRoutes parts, Request request) {
+http::Answer export_sqlite(ExportRoutes parts, http::Request request) {
   auto parsed = co_await parse_export(parts, std::move(request));
-  if (!parsed) co_return problem(parsed.error());
+  if (!parsed) co_return http::problem(parsed.error());
   auto file = co_await begin_file(parts, *parsed, ".sqlite");
-  if (!file) co_return problem(file.error());
+  if (!file) co_return http::problem(file.error());
   co_await parts.history.settle();  // events and commands that were received
-  const std::unique_ptr<RunFile, EndOnWorker> writer{
-      new RunFile{(*file)->path(), reading_uri(parts.database, false), std::move(parsed->spans), parsed->query},
+  const std::unique_ptr<storage::RunFile, EndOnWorker> writer{
+      new storage::RunFile{(*file)->path(), storage::reading_uri(parts.database, false), std::move(parsed->spans),
+                           parsed->query},
       end_on_worker(parts)};
   const Result<void> written = co_await write_in_slices(parts, *writer);
-  if (!written) co_return problem(written.error());
+  if (!written) co_return http::problem(written.error());
   co_return attachment("application/vnd.sqlite3", parsed->query.run, ".sqlite",
                        std::make_unique<FileStream>(parts.history, std::move(*file)));
 }
 
 }  // namespace
 
-void add_export_routes(Router& router, ExportRoutes parts) {
+void add_export_routes(http::Router& router, ExportRoutes parts) {
   const auto add = [&router, parts](const char* pattern, std::vector<std::string> query,
-                                    Answer (*answer)(ExportRoutes, Request)) {
-    router.add({"GET", pattern, Scope::record, std::move(query), with(parts, answer)});
+                                    http::Answer (*answer)(ExportRoutes, http::Request)) {
+    router.add({"GET", pattern, identity::Scope::record, std::move(query), with(parts, answer)});
   };
   add("/api/v1/runs/{run_id}/samples.csv", {"channels", "grid_us"}, export_csv);
   add("/api/v1/runs/{run_id}/samples.mat", {"channels", "grid_us"}, export_mat);
   add("/api/v1/runs/{run_id}/samples.sqlite", {}, export_sqlite);
 }
 
-}  // namespace server
+}  // namespace server::api

@@ -6,14 +6,14 @@
 #include "server/station/station.hpp"
 #include "server/storage/recording_parts.hpp"
 
-namespace server {
+namespace server::api {
 using nlohmann::json;
 
 namespace {
 
 json text_or_null(const std::string& text) { return text.empty() ? json(nullptr) : json(text); }
 
-json to_json(const RecorderCounters& counters) {
+json to_json(const storage::RecorderCounters& counters) {
   return {{"samples_written", counters.samples_written},
           {"samples_duplicate", counters.samples_duplicate},
           {"samples_refused", counters.samples_refused},
@@ -26,7 +26,7 @@ json to_json(const RecorderCounters& counters) {
           {"commits_failed", counters.commits_failed}};
 }
 
-json to_json(const Retention& retention) {
+json to_json(const storage::Retention& retention) {
   return {{"retention_days", retention.policy().retention_days},
           {"max_database_bytes", retention.policy().max_database_bytes},
           {"samples_purged", retention.counters().samples_purged},
@@ -35,9 +35,11 @@ json to_json(const Retention& retention) {
           {"all_held", retention.counters().all_held}};
 }
 
-json to_json(const StoreLoss& loss) { return {{"noticed_at_us", loss.noticed_at_us}, {"problem", loss.problem}}; }
+json to_json(const storage::StoreLoss& loss) {
+  return {{"noticed_at_us", loss.noticed_at_us}, {"problem", loss.problem}};
+}
 
-json to_json(const BackupRecord& backup) {
+json to_json(const storage::BackupRecord& backup) {
   return {{"name", backup.name},
           {"state", text(backup.state)},
           {"pages_done", backup.pages_done},
@@ -46,14 +48,14 @@ json to_json(const BackupRecord& backup) {
           {"path", backup.path.string()}};
 }
 
-Answer get_recording(RecordingRoutes parts, Request) {
-  const RecordingParts& recording = parts.recording;
+http::Answer get_recording(RecordingRoutes parts, http::Request) {
+  const storage::RecordingParts& recording = parts.recording;
   const bool failing = recording.recorder.failing();
-  const bool has_room = recording.disk_watch.state() == SpaceState::ok;
-  const DiskUse& use = recording.disk_watch.use();
-  const WalState& wal = recording.recorder.wal();
+  const bool has_room = recording.disk_watch.state() == storage::SpaceState::ok;
+  const storage::DiskUse& use = recording.disk_watch.use();
+  const storage::WalState& wal = recording.recorder.wal();
   const std::int64_t held_us = parts.clock.utc_us() - wal.held_since_us;
-  co_return json_response(
+  co_return http::json_response(
       200, {{"state", failing    ? "failing"
                       : has_room ? "recording"
                                  : "low_space"},
@@ -69,55 +71,55 @@ Answer get_recording(RecordingRoutes parts, Request) {
             {"retention", to_json(recording.retention)}});
 }
 
-Answer acknowledge_losses(RecordingRoutes parts, Request request) {
-  const Author by = author_of(request, parts.clock);
+http::Answer acknowledge_losses(RecordingRoutes parts, http::Request request) {
+  const station::Author by = author_of(request, parts.clock);
   const auto done = co_await parts.recording.head_watch.acknowledge(by);
-  if (!done) co_return problem(done.error());
-  co_return json_response(200, json::object());
+  if (!done) co_return http::problem(done.error());
+  co_return http::json_response(200, json::object());
 }
 
-Answer get_metrics(RecordingRoutes parts, Request) {
-  Response response;
+http::Answer get_metrics(RecordingRoutes parts, http::Request) {
+  http::Response response;
   response.content_type = "text/plain; version=0.0.4";
   response.body = metrics_text(parts.recording, parts.station, parts.security, parts.exceptions);
   co_return response;
 }
 
-Answer list_backups(RecordingRoutes parts, Request) {
-  const std::vector<BackupRecord> backups = co_await parts.recording.backups.list();
+http::Answer list_backups(RecordingRoutes parts, http::Request) {
+  const std::vector<storage::BackupRecord> backups = co_await parts.recording.backups.list();
   json list = json::array();
-  for (const BackupRecord& backup : backups) list.push_back(to_json(backup));
-  co_return json_response(200, {{"backups", std::move(list)}});
+  for (const storage::BackupRecord& backup : backups) list.push_back(to_json(backup));
+  co_return http::json_response(200, {{"backups", std::move(list)}});
 }
 
-Answer create_backup(RecordingRoutes parts, Request request) {
+http::Answer create_backup(RecordingRoutes parts, http::Request request) {
   const auto body = Members::parse(request.body, {"name"});
-  if (!body) co_return problem(body.error());
+  if (!body) co_return http::problem(body.error());
   const auto name = body->text("name", {1, kMaxWordBytes});
-  if (!name) co_return problem(name.error());
+  if (!name) co_return http::problem(name.error());
   const auto backup = co_await parts.recording.backups.begin(*name);
-  if (!backup) co_return problem(backup.error());
-  co_return json_response(202, to_json(*backup));
+  if (!backup) co_return http::problem(backup.error());
+  co_return http::json_response(202, to_json(*backup));
 }
 
 }  // namespace
 
-json losses_json(const std::vector<StoreLoss>& losses) {
+json losses_json(const std::vector<storage::StoreLoss>& losses) {
   json list = json::array();
-  for (const StoreLoss& loss : losses) list.push_back(to_json(loss));
+  for (const storage::StoreLoss& loss : losses) list.push_back(to_json(loss));
   return list;
 }
 
-void add_recording_routes(Router& router, RecordingRoutes parts) {
-  const auto add = [&router, parts](const char* method, const char* pattern, Scope needs,
-                                    Answer (*answer)(RecordingRoutes, Request)) {
+void add_recording_routes(http::Router& router, RecordingRoutes parts) {
+  const auto add = [&router, parts](const char* method, const char* pattern, identity::Scope needs,
+                                    http::Answer (*answer)(RecordingRoutes, http::Request)) {
     router.add({method, pattern, needs, {}, with(parts, answer)});
   };
-  add("GET", "/metrics", Scope::read, get_metrics);
-  add("GET", "/api/v1/recording", Scope::read, get_recording);
-  add("POST", "/api/v1/recording/losses/acknowledge", Scope::admin, acknowledge_losses);
-  add("GET", "/api/v1/backups", Scope::read, list_backups);
-  add("POST", "/api/v1/backups", Scope::admin, create_backup);
+  add("GET", "/metrics", identity::Scope::read, get_metrics);
+  add("GET", "/api/v1/recording", identity::Scope::read, get_recording);
+  add("POST", "/api/v1/recording/losses/acknowledge", identity::Scope::admin, acknowledge_losses);
+  add("GET", "/api/v1/backups", identity::Scope::read, list_backups);
+  add("POST", "/api/v1/backups", identity::Scope::admin, create_backup);
 }
 
-}  // namespace server
+}  // namespace server::api

@@ -9,7 +9,7 @@
 #include "server/api/routes/routes.hpp"
 #include "server/storage/runs/outside_references.hpp"
 
-namespace server {
+namespace server::api {
 using nlohmann::json;
 
 namespace {
@@ -34,7 +34,7 @@ Result<double> needed_number(const Members& body, const char* name, Range<double
   return fail(ErrorCode::bad_request, fmt::format("{} is missing", name), "missing_member");
 }
 
-Result<void> parse_marker_clock(const Members& body, ReferenceClockRequest& clock) {
+Result<void> parse_marker_clock(const Members& body, analysis::ReferenceClockRequest& clock) {
   const auto at_s = needed_number(body, "at_s", numbers("ReferenceClock.at_s"));
   if (!at_s) return std::unexpected{at_s.error()};
   clock.at_s = *at_s;
@@ -50,7 +50,7 @@ Result<void> parse_marker_clock(const Members& body, ReferenceClockRequest& cloc
   return {};
 }
 
-Result<void> parse_search(const Members& body, ReferenceClockRequest& clock) {
+Result<void> parse_search(const Members& body, analysis::ReferenceClockRequest& clock) {
   const auto from_s = number_within(body, "from_s", numbers("ReferenceClock.from_s"));
   if (!from_s) return std::unexpected{from_s.error()};
   const auto to_s = number_within(body, "to_s", numbers("ReferenceClock.to_s"));
@@ -61,31 +61,31 @@ Result<void> parse_search(const Members& body, ReferenceClockRequest& clock) {
   return fail(ErrorCode::invalid, "from_s must be below to_s", "out_of_range");
 }
 
-Result<ReferenceClockRequest> parse_clock(const json& given) {
+Result<analysis::ReferenceClockRequest> parse_clock(const json& given) {
   if (!given.is_object()) return fail(ErrorCode::bad_request, "clock must be an object", "wrong_type");
   const Members body{given};
   const auto method = body.text("method", {1, 20});
   if (!method) return std::unexpected{method.error()};
-  ReferenceClockRequest clock;
+  analysis::ReferenceClockRequest clock;
   const auto only = [&](std::initializer_list<const char*> known) { return body.only(known); };
   Result<void> read;
-  if (*method == text(ReferenceClock::offset)) {
-    clock.method = ReferenceClock::offset;
+  if (*method == text(storage::ReferenceClock::offset)) {
+    clock.method = storage::ReferenceClock::offset;
     read = only({"method", "sd_s", "offset_s"});
     const auto offset_s = needed_number(body, "offset_s", numbers("ReferenceClock.offset_s"));
     if (read && !offset_s) read = std::unexpected{offset_s.error()};
     clock.offset_s = offset_s.value_or(0);
-  } else if (*method == text(ReferenceClock::utc)) {
-    clock.method = ReferenceClock::utc;
+  } else if (*method == text(storage::ReferenceClock::utc)) {
+    clock.method = storage::ReferenceClock::utc;
     read = only({"method", "sd_s", "zero_at_us"});
     const auto zero_at_us = body.integer("zero_at_us", integers("ReferenceClock.zero_at_us"));
     if (read && !zero_at_us) read = std::unexpected{zero_at_us.error()};
     clock.zero_at_us = zero_at_us.value_or(0);
-  } else if (*method == text(ReferenceClock::marker)) {
-    clock.method = ReferenceClock::marker;
+  } else if (*method == text(storage::ReferenceClock::marker)) {
+    clock.method = storage::ReferenceClock::marker;
     read = only({"method", "sd_s", "marker_id", "marker_text", "at_s"});
     if (read) read = parse_marker_clock(body, clock);
-  } else if (*method == text(ReferenceClock::correlation)) {
+  } else if (*method == text(storage::ReferenceClock::correlation)) {
     read = only({"method", "from_s", "to_s"});
     if (read) read = parse_search(body, clock);
   } else {
@@ -106,10 +106,10 @@ Result<bool> flag(const Members& body, const char* name) {
   return fail(ErrorCode::bad_request, fmt::format("{} must be true or false", name), "wrong_type");
 }
 
-Result<ReferenceRequest> parse_reference(const std::string& text) {
+Result<analysis::ReferenceRequest> parse_reference(const std::string& text) {
   auto body = Members::parse(text, {"csv", "source", "clock", "span", "keep_zero", "metres", "sd_m", "reason"});
   if (!body) return std::unexpected{body.error()};
-  ReferenceRequest request;
+  analysis::ReferenceRequest request;
   auto csv = body->text("csv", text_bytes("ReferenceBody.csv"));
   if (!csv) return std::unexpected{csv.error()};
   request.csv = std::move(*csv);
@@ -140,75 +140,75 @@ Result<ReferenceRequest> parse_reference(const std::string& text) {
   return request;
 }
 
-Answer import_reference(ReferenceRoutes parts, Request request) {
+http::Answer import_reference(ReferenceRoutes parts, http::Request request) {
   const auto run = run_id_of(request);
-  if (!run) co_return problem(run.error());
-  const Author by = author_of(request, parts.clock);
+  if (!run) co_return http::problem(run.error());
+  const station::Author by = author_of(request, parts.clock);
   auto parse = [body = std::move(request.body)] { return parse_reference(body); };
   auto wanted = co_await parts.analysis.compute(std::move(parse));
-  if (!wanted) co_return problem(wanted.error());
-  OutsideReferences& references = parts.references;
+  if (!wanted) co_return http::problem(wanted.error());
+  storage::OutsideReferences& references = parts.references;
   const std::string reason = wanted->reason;
   const Result<void> may = co_await references.check(*run, reason);
-  if (!may) co_return problem(may.error());
-  std::optional<MarkerPlace> marker;
-  if (wanted->clock.method == ReferenceClock::marker) {
+  if (!may) co_return http::problem(may.error());
+  std::optional<storage::MarkerPlace> marker;
+  if (wanted->clock.method == storage::ReferenceClock::marker) {
     const auto found = co_await references.marker(*run, wanted->clock.marker_id, wanted->clock.marker_text);
-    if (!found) co_return problem(found.error());
+    if (!found) co_return http::problem(found.error());
     marker = *found;
   }
   auto placed = co_await parts.analysis.place(*run, std::move(*wanted), marker);
-  if (!placed) co_return problem(placed.error());
+  if (!placed) co_return http::problem(placed.error());
   placed->reference.run = *run;
   placed->reference.actor = by.actor;
   placed->reference.made_at_us = by.at_us;
   const auto made = co_await references.import(std::move(placed->reference), std::move(placed->positions), reason, by);
-  if (!made) co_return problem(made.error());
-  Response response = json_response(201, to_json(*made));
+  if (!made) co_return http::problem(made.error());
+  http::Response response = http::json_response(201, api::to_json(*made));
   response.headers.emplace_back("Location", fmt::format("/api/v1/runs/{}/reference", *run));
   co_return response;
 }
 
-Answer get_reference(ReferenceRoutes parts, Request request) {
+http::Answer get_reference(ReferenceRoutes parts, http::Request request) {
   const auto run = run_id_of(request);
-  if (!run) co_return problem(run.error());
+  if (!run) co_return http::problem(run.error());
   const auto found = co_await parts.references.find(*run);
-  if (!found) co_return problem(found.error());
-  co_return json_response(200, to_json(*found));
+  if (!found) co_return http::problem(found.error());
+  co_return http::json_response(200, api::to_json(*found));
 }
 
-Answer remove_reference(ReferenceRoutes parts, Request request) {
+http::Answer remove_reference(ReferenceRoutes parts, http::Request request) {
   const auto run = run_id_of(request);
-  if (!run) co_return problem(run.error());
+  if (!run) co_return http::problem(run.error());
   const auto reason = parse_discard(request.body);
-  if (!reason) co_return problem(reason.error());
+  if (!reason) co_return http::problem(reason.error());
   const auto removed = co_await parts.references.remove(*run, *reason, author_of(request, parts.clock));
-  if (!removed) co_return problem(removed.error());
-  co_return json_response(200, to_json(*removed));
+  if (!removed) co_return http::problem(removed.error());
+  co_return http::json_response(200, api::to_json(*removed));
 }
 
-Answer list_positions(ReferenceRoutes parts, Request request) {
+http::Answer list_positions(ReferenceRoutes parts, http::Request request) {
   const auto run = run_id_of(request);
-  if (!run) co_return problem(run.error());
+  if (!run) co_return http::problem(run.error());
   const auto after = query_number(request, "after", 0, kMaxJavaScriptInteger, -1);
-  if (!after) co_return problem(after.error());
+  if (!after) co_return http::problem(after.error());
   const auto limit = query_number(request, "limit", 1, kMaxPagePositions, kMaxPagePositions);
-  if (!limit) co_return problem(limit.error());
+  if (!limit) co_return http::problem(limit.error());
   const auto after_us = *after < 0 ? std::nullopt : std::optional{static_cast<std::uint64_t>(*after)};
   const auto found = co_await parts.references.page(*run, after_us, static_cast<std::size_t>(*limit));
-  if (!found) co_return problem(found.error());
-  const OutsidePositions& positions = found->positions;
+  if (!found) co_return http::problem(found.error());
+  const storage::OutsidePositions& positions = found->positions;
   const bool is_full = positions.size() == static_cast<std::size_t>(*limit);
-  co_return json_response(200, {{"span", found->reference.span},
-                                {"robot_time_us", positions.robot_time_us},
-                                {"position_m", positions.position_m},
-                                {"position_sd_m", positions.position_sd_m},
-                                {"next", is_full ? json(positions.robot_time_us.back()) : json(nullptr)}});
+  co_return http::json_response(200, {{"span", found->reference.span},
+                                      {"robot_time_us", positions.robot_time_us},
+                                      {"position_m", positions.position_m},
+                                      {"position_sd_m", positions.position_sd_m},
+                                      {"next", is_full ? json(positions.robot_time_us.back()) : json(nullptr)}});
 }
 
 }  // namespace
 
-json to_json(const OutsideReference& reference) {
+json to_json(const storage::OutsideReference& reference) {
   json out;
   out["run_id"] = reference.run;
   out["span"] = reference.span;
@@ -226,20 +226,22 @@ json to_json(const OutsideReference& reference) {
   out["samples_left_out"] = reference.samples_left_out;
   out["actor"] = reference.actor;
   out["made_at_us"] = reference.made_at_us;
-  out["in_words"] = clock_in_words(reference) + "; " + zero_in_words(reference);
+  out["in_words"] = analysis::clock_in_words(reference) + "; " + analysis::zero_in_words(reference);
   return out;
 }
 
-void add_reference_routes(Router& router, ReferenceRoutes parts) {
-  const auto add = [&router, parts](const char* method, const char* pattern, Scope needs,
-                                    std::vector<std::string> query, Answer (*answer)(ReferenceRoutes, Request),
-                                    std::size_t max_body_bytes = kMaxBodyBytes) {
+void add_reference_routes(http::Router& router, ReferenceRoutes parts) {
+  const auto add = [&router, parts](const char* method, const char* pattern, identity::Scope needs,
+                                    std::vector<std::string> query,
+                                    http::Answer (*answer)(ReferenceRoutes, http::Request),
+                                    std::size_t max_body_bytes = http::kMaxBodyBytes) {
     router.add({method, pattern, needs, std::move(query), with(parts, answer), false, max_body_bytes});
   };
-  add("POST", "/api/v1/runs/{run_id}/reference", Scope::record, {}, import_reference, kMaxReferenceBytes);
-  add("GET", "/api/v1/runs/{run_id}/reference", Scope::read, {}, get_reference);
-  add("POST", "/api/v1/runs/{run_id}/reference/remove", Scope::record, {}, remove_reference);
-  add("GET", "/api/v1/runs/{run_id}/reference/positions", Scope::read, {"after", "limit"}, list_positions);
+  add("POST", "/api/v1/runs/{run_id}/reference", identity::Scope::record, {}, import_reference,
+      analysis::kMaxReferenceBytes);
+  add("GET", "/api/v1/runs/{run_id}/reference", identity::Scope::read, {}, get_reference);
+  add("POST", "/api/v1/runs/{run_id}/reference/remove", identity::Scope::record, {}, remove_reference);
+  add("GET", "/api/v1/runs/{run_id}/reference/positions", identity::Scope::read, {"after", "limit"}, list_positions);
 }
 
-}  // namespace server
+}  // namespace server::api

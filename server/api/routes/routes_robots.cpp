@@ -11,48 +11,49 @@
 #include "server/station/station.hpp"
 #include "server/storage/query/history.hpp"
 
-namespace server {
+namespace server::api {
 namespace asio = boost::asio;
 using nlohmann::json;
 
-Response unknown_robot(const std::string& id) {
-  return problem(404, fmt::format("no robot '{}' is known", id.substr(0, 40)), "unknown_robot");
+http::Response unknown_robot(const std::string& id) {
+  return http::problem(404, fmt::format("no robot '{}' is known", id.substr(0, 40)), "unknown_robot");
 }
 
 namespace {
 
 // All of a robot, or for a token that may stop and not read what its stop is about and nothing else.
-json robot_json(const RobotState& robot, const Caller& caller) {
-  if (caller.scopes.allow(Scope::read)) return to_json(robot);
-  const SampleContext& context = robot.context;
+json robot_json(const station::RobotState& robot, const identity::Caller& caller) {
+  if (caller.scopes.allow(identity::Scope::read)) return api::to_json(robot);
+  const station::SampleContext& context = robot.context;
   return {{"robot_id", robot.id},
           {"link", text(robot.link)},
           {"mode", protocol::text(context.mode)},
-          {"emergency_id", id_text(context.emergency_id)},
+          {"emergency_id", live::id_text(context.emergency_id)},
           {"emergency_cause", protocol::text(context.emergency_cause)},
-          {"pending_stop", id_text(robot.pending_stop.value_or(0))}};
+          {"pending_stop", live::id_text(robot.pending_stop.value_or(0))}};
 }
 
 // The same of all robots, some at a time: nobody else waits for it.
-Answer list_robots_to_stop(RobotRoutes parts, Request request) {
+http::Answer list_robots_to_stop(RobotRoutes parts, http::Request request) {
   constexpr std::size_t kInATurn = 32;
   std::string text = R"({"robots":[)", last;
   for (bool more = true; more;) {
     auto robot = parts.station.robots().upper_bound(last);  // they may have changed since the last turn
     for (std::size_t count = 0; count < kInATurn && robot != parts.station.robots().end(); ++count, ++robot) {
-      text += (last.empty() ? "" : ",") + dump(robot_json(robot->second, request.caller));
+      text += (last.empty() ? "" : ",") + base::dump(robot_json(robot->second, request.caller));
       last = robot->first;
     }
     more = robot != parts.station.robots().end();
     if (more) co_await asio::post(parts.loop, asio::use_awaitable);
   }
-  co_return json_text_response(200, text + "]}");
+  co_return http::json_text_response(200, text + "]}");
 }
 
 // The robots that the first piece has no room for: each piece is made when the client has taken the one before.
-class RobotList final : public BodyStream {
+class RobotList final : public http::BodyStream {
  public:
-  RobotList(std::string first, RobotDocument document) : first_{std::move(first)}, document_{std::move(document)} {}
+  RobotList(std::string first, live::RobotDocument document)
+      : first_{std::move(first)}, document_{std::move(document)} {}
 
   asio::awaitable<Result<std::optional<std::string>>> next() override {
     if (!first_.empty()) co_return std::optional{std::exchange(first_, {})};
@@ -63,45 +64,46 @@ class RobotList final : public BodyStream {
 
  private:
   std::string first_;
-  RobotDocument document_;
+  live::RobotDocument document_;
 };
 
-Answer list_robots(RobotRoutes parts, Request request) {
-  if (!request.caller.scopes.allow(Scope::read)) co_return co_await list_robots_to_stop(parts, std::move(request));
-  RobotDocument document{parts.texts, R"({"robots":[)", "]}"};
+http::Answer list_robots(RobotRoutes parts, http::Request request) {
+  if (!request.caller.scopes.allow(identity::Scope::read))
+    co_return co_await list_robots_to_stop(parts, std::move(request));
+  live::RobotDocument document{parts.texts, R"({"robots":[)", "]}"};
   std::string first = co_await document.next();
-  if (document.is_whole()) co_return json_text_response(200, std::move(first));
-  Response response = json_text_response(200, "");
+  if (document.is_whole()) co_return http::json_text_response(200, std::move(first));
+  http::Response response = http::json_text_response(200, "");
   response.stream = std::make_unique<RobotList>(std::move(first), std::move(document));
   co_return response;
 }
 
-Answer get_robot(RobotRoutes parts, Request request) {
+http::Answer get_robot(RobotRoutes parts, http::Request request) {
   const std::string& id = request.param.at("robot_id");
-  const RobotState* robot = parts.station.find(id);
+  const station::RobotState* robot = parts.station.find(id);
   if (robot == nullptr) co_return unknown_robot(id);
-  co_return json_response(200, robot_json(*robot, request.caller));
+  co_return http::json_response(200, robot_json(*robot, request.caller));
 }
 
-Answer list_events(RobotRoutes parts, Request request) {
+http::Answer list_events(RobotRoutes parts, http::Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
   const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
-  if (!limit) co_return problem(limit.error());
+  if (!limit) co_return http::problem(limit.error());
   const auto events = co_await parts.history.events(id, static_cast<std::size_t>(*limit));
-  co_return json_response(200, list_json("events", events));
+  co_return http::json_response(200, list_json("events", events));
 }
 
 }  // namespace
 
-void add_robot_routes(Router& router, RobotRoutes parts) {
-  const auto add = [&router, parts](const char* pattern, Scope needs, std::vector<std::string> query,
-                                    Answer (*answer)(RobotRoutes, Request)) {
+void add_robot_routes(http::Router& router, RobotRoutes parts) {
+  const auto add = [&router, parts](const char* pattern, identity::Scope needs, std::vector<std::string> query,
+                                    http::Answer (*answer)(RobotRoutes, http::Request)) {
     router.add({"GET", pattern, needs, std::move(query), with(parts, answer)});
   };
-  add("/api/v1/robots", Scope::look, {}, list_robots);
-  add("/api/v1/robots/{robot_id}", Scope::look, {}, get_robot);
-  add("/api/v1/robots/{robot_id}/events", Scope::read, {"limit"}, list_events);
+  add("/api/v1/robots", identity::Scope::look, {}, list_robots);
+  add("/api/v1/robots/{robot_id}", identity::Scope::look, {}, get_robot);
+  add("/api/v1/robots/{robot_id}/events", identity::Scope::read, {"limit"}, list_events);
 }
 
-}  // namespace server
+}  // namespace server::api

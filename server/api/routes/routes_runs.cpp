@@ -12,36 +12,36 @@
 #include "server/storage/runs/runs.hpp"
 #include "server/storage/upkeep/disk_watch.hpp"
 
-namespace server {
+namespace server::api {
 using nlohmann::json;
 
 namespace {
 
-Answer list_runs(RunRoutes parts, Request request) {
+http::Answer list_runs(RunRoutes parts, http::Request request) {
   const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
-  if (!limit) co_return problem(limit.error());
+  if (!limit) co_return http::problem(limit.error());
   const auto before = query_number(request, "before", 1, kMaxRunId, 0);
-  if (!before) co_return problem(before.error());
-  RunFilter filter;
+  if (!before) co_return http::problem(before.error());
+  storage::RunFilter filter;
   filter.before = *before;
   filter.limit = static_cast<std::size_t>(*limit);
   if (const auto given = request.query.find("robot_id"); given != request.query.end()) filter.robot_id = given->second;
   if (const auto given = request.query.find("state"); given != request.query.end()) {
-    filter.state = run_state_from(given->second);
+    filter.state = storage::run_state_from(given->second);
     if (!filter.state) {
-      co_return problem(400, "state is none of open, ended, interrupted and discarded", "out_of_range");
+      co_return http::problem(400, "state is none of open, ended, interrupted and discarded", "out_of_range");
     }
   }
   const auto runs = co_await parts.runs.list(std::move(filter));
-  co_return json_response(200, list_json("runs", runs));
+  co_return http::json_response(200, list_json("runs", runs));
 }
 
 // SAFETY: the fluid named for a robot decides which limits hold and which model it is sent, so naming it is a command.
 // False when the caller may not command but names the present fluid: then nothing changes for the robot.
-Result<bool> may_name_fluid(const RunRoutes& parts, const Request& request, const RobotId& robot_id,
+Result<bool> may_name_fluid(const RunRoutes& parts, const http::Request& request, const station::RobotId& robot_id,
                             const std::string& fluid) {
-  if (fluid.empty() || request.caller.scopes.allow(Scope::command)) return true;
-  const RobotState* robot = parts.station.find(robot_id);
+  if (fluid.empty() || request.caller.scopes.allow(identity::Scope::command)) return true;
+  const station::RobotState* robot = parts.station.find(robot_id);
   const auto listed = parts.station.envelope().listed(fluid);
   if (robot == nullptr || !listed) return true;  // refused later
   if (robot->fluid == *listed) return false;
@@ -52,84 +52,84 @@ Result<bool> may_name_fluid(const RunRoutes& parts, const Request& request, cons
               "not_permitted");
 }
 
-Answer create_run(RunRoutes parts, Request request) {
+http::Answer create_run(RunRoutes parts, http::Request request) {
   auto run_request = parse_run(request.body);
-  if (!run_request) co_return problem(run_request.error());
+  if (!run_request) co_return http::problem(run_request.error());
   const Result<void> room = parts.disk_watch.may_begin("a run");
-  if (!room) co_return problem(room.error());
+  if (!room) co_return http::problem(room.error());
   if (parts.station.find(run_request->robot_id) == nullptr) {
-    co_return problem(404, fmt::format("no robot '{}' is known", run_request->robot_id), "unknown_robot");
+    co_return http::problem(404, fmt::format("no robot '{}' is known", run_request->robot_id), "unknown_robot");
   }
   if (!run_request->range) {
     const auto named = may_name_fluid(parts, request, run_request->robot_id, run_request->conditions.fluid);
-    if (!named) co_return problem(named.error());
+    if (!named) co_return http::problem(named.error());
     if (!*named) run_request->conditions.fluid.clear();  // the run takes the robot's
   }
-  Runs& runs = parts.runs;
-  const Author by = author_of(request, parts.clock);
+  storage::Runs& runs = parts.runs;
+  const station::Author by = author_of(request, parts.clock);
   auto made = run_request->range
                   ? runs.make_afterwards(run_request->robot_id, run_request->conditions, *run_request->range, by)
                   : runs.create(run_request->robot_id, run_request->conditions, by);
   const auto run = co_await std::move(made);
-  if (!run) co_return problem(run.error());
-  parts.live.publish_run(to_json(*run));
-  Response response = json_response(201, to_json(*run));
+  if (!run) co_return http::problem(run.error());
+  parts.live.publish_run(api::to_json(*run));
+  http::Response response = http::json_response(201, api::to_json(*run));
   response.headers.emplace_back("Location", fmt::format("/api/v1/runs/{}", run->id));
   co_return response;
 }
 
-Answer get_run(RunRoutes parts, Request request) {
+http::Answer get_run(RunRoutes parts, http::Request request) {
   const auto id = run_id_of(request);
-  if (!id) co_return problem(id.error());
+  if (!id) co_return http::problem(id.error());
   const auto run = co_await parts.runs.find(*id);
-  if (!run) co_return problem(run.error());
-  co_return json_response(200, to_json(*run));
+  if (!run) co_return http::problem(run.error());
+  co_return http::json_response(200, api::to_json(*run));
 }
 
-Answer end_run(RunRoutes parts, Request request) {
+http::Answer end_run(RunRoutes parts, http::Request request) {
   const auto id = run_id_of(request);
-  if (!id) co_return problem(id.error());
+  if (!id) co_return http::problem(id.error());
   const auto verdict = parse_run_end(request.body);
-  if (!verdict) co_return problem(verdict.error());
+  if (!verdict) co_return http::problem(verdict.error());
   const auto run = co_await parts.runs.end(*id, *verdict, author_of(request, parts.clock));
-  if (!run) co_return problem(run.error());
-  parts.live.publish_run(to_json(*run));
-  co_return json_response(200, to_json(*run));
+  if (!run) co_return http::problem(run.error());
+  parts.live.publish_run(api::to_json(*run));
+  co_return http::json_response(200, api::to_json(*run));
 }
 
-Answer annotate_run(RunRoutes parts, Request request) {
+http::Answer annotate_run(RunRoutes parts, http::Request request) {
   const auto id = run_id_of(request);
-  if (!id) co_return problem(id.error());
+  if (!id) co_return http::problem(id.error());
   auto annotation = parse_annotation(request.body);
-  if (!annotation) co_return problem(annotation.error());
+  if (!annotation) co_return http::problem(annotation.error());
   if (const auto fluid = annotation->texts.find("fluid"); fluid != annotation->texts.end()) {
     const auto before = co_await parts.runs.find(*id);
-    if (!before) co_return problem(before.error());
-    if (auto stands = still_stands(request.caller); !stands) co_return problem(stands.error());
-    const bool is_open = before->state == RunState::open;
+    if (!before) co_return http::problem(before.error());
+    if (auto stands = still_stands(request.caller); !stands) co_return http::problem(stands.error());
+    const bool is_open = before->state == storage::RunState::open;
     const auto named = is_open ? may_name_fluid(parts, request, before->robot_id, fluid->second) : Result<bool>{true};
-    if (!named) co_return problem(named.error());
+    if (!named) co_return http::problem(named.error());
     annotation->names_fluid_of_robot = *named;
   }
   const auto run = co_await parts.runs.annotate(*id, *annotation, author_of(request, parts.clock));
-  if (!run) co_return problem(run.error());
-  parts.live.publish_run(to_json(*run));
-  co_return json_response(200, to_json(*run));
+  if (!run) co_return http::problem(run.error());
+  parts.live.publish_run(api::to_json(*run));
+  co_return http::json_response(200, api::to_json(*run));
 }
 
-Answer discard_run(RunRoutes parts, Request request) {
+http::Answer discard_run(RunRoutes parts, http::Request request) {
   const auto id = run_id_of(request);
-  if (!id) co_return problem(id.error());
+  if (!id) co_return http::problem(id.error());
   const auto reason = parse_discard(request.body);
-  if (!reason) co_return problem(reason.error());
+  if (!reason) co_return http::problem(reason.error());
   const auto run = co_await parts.runs.discard(*id, *reason, author_of(request, parts.clock));
-  if (!run) co_return problem(run.error());
-  parts.live.publish_run(to_json(*run));
-  co_return json_response(200, to_json(*run));
+  if (!run) co_return http::problem(run.error());
+  parts.live.publish_run(api::to_json(*run));
+  co_return http::json_response(200, api::to_json(*run));
 }
 
-json to_json(const CurrentDigest& found, RunId run) {
-  const RunDigest& digest = found.digest;
+json to_json(const storage::CurrentDigest& found, storage::RunId run) {
+  const storage::RunDigest& digest = found.digest;
   json out;
   out["run_id"] = run;
   out["final"] = found.is_final;
@@ -149,21 +149,21 @@ json to_json(const CurrentDigest& found, RunId run) {
   return out;
 }
 
-Answer get_digest(RunRoutes parts, Request request) {
+http::Answer get_digest(RunRoutes parts, http::Request request) {
   const auto id = run_id_of(request);
-  if (!id) co_return problem(id.error());
+  if (!id) co_return http::problem(id.error());
   const auto digest = co_await parts.digester.find(*id);
-  if (!digest) co_return problem(digest.error());
-  co_return json_response(200, to_json(*digest, *id));
+  if (!digest) co_return http::problem(digest.error());
+  co_return http::json_response(200, to_json(*digest, *id));
 }
 
-Answer get_snapshot(RunRoutes parts, Request request) {
+http::Answer get_snapshot(RunRoutes parts, http::Request request) {
   const auto id = run_id_of(request);
-  if (!id) co_return problem(id.error());
+  if (!id) co_return http::problem(id.error());
   const auto snapshot = co_await parts.runs.snapshot(*id);
-  if (!snapshot) co_return problem(snapshot.error());
+  if (!snapshot) co_return http::problem(snapshot.error());
   json in_force = json::array();
-  for (const InForce& document : snapshot->in_force) {
+  for (const storage::InForce& document : snapshot->in_force) {
     in_force.push_back({{"kind", document.kind},
                         {"span", document.span},
                         {"first_seq", document.first_seq},
@@ -175,10 +175,10 @@ Answer get_snapshot(RunRoutes parts, Request request) {
   out["controller_checksum"] = snapshot->controller_checksum;
   out["parameters_checksum"] = snapshot->parameters_checksum;
   out["in_force"] = std::move(in_force);
-  co_return json_response(200, out);
+  co_return http::json_response(200, out);
 }
 
-json to_json(const std::optional<EstimateError>& error) {
+json to_json(const std::optional<analysis::EstimateError>& error) {
   if (!error) return nullptr;
   return {{"rms_m", error->rms_m},
           {"worst_m", error->worst_m},
@@ -186,18 +186,18 @@ json to_json(const std::optional<EstimateError>& error) {
           {"samples", error->samples}};
 }
 
-json to_json(const MeasuredStep& step) {
+json to_json(const analysis::MeasuredStep& step) {
   json out;
   out["cause"] = text(step.cause);
   out["span"] = step.span;
   out["first_seq"] = step.first_seq;
   out["last_seq"] = step.last_seq;
   out["at_s"] = step.at_s;
-  out["start_m"] = decimal(static_cast<float>(step.start_m));
-  out["target_m"] = decimal(static_cast<float>(step.target_m));
+  out["start_m"] = base::decimal(static_cast<float>(step.start_m));
+  out["target_m"] = base::decimal(static_cast<float>(step.target_m));
   out["band_m"] = step.band_m;
   out["position_source"] = position_source(step);
-  out["position_sd_m"] = decimal(static_cast<float>(step.position_sd_m));
+  out["position_sd_m"] = base::decimal(static_cast<float>(step.position_sd_m));
   out["estimate_error"] = to_json(step.estimate_error);
   out["settling_s"] = number_or_null(step.metrics.settling_s);
   out["overshoot_percent"] = step.metrics.overshoot_percent;
@@ -207,35 +207,35 @@ json to_json(const MeasuredStep& step) {
   return out;
 }
 
-Answer get_step_metrics(RunRoutes parts, Request request) {
+http::Answer get_step_metrics(RunRoutes parts, http::Request request) {
   const auto id = run_id_of(request);
-  if (!id) co_return problem(id.error());
+  if (!id) co_return http::problem(id.error());
   const auto measures = co_await parts.analysis.measures(*id);
-  if (!measures) co_return problem(measures.error());
+  if (!measures) co_return http::problem(measures.error());
   json list = json::array();
-  for (const MeasuredStep& step : measures->steps) list.push_back(to_json(step));
+  for (const analysis::MeasuredStep& step : measures->steps) list.push_back(to_json(step));
   json out{{"steps", std::move(list)}};
-  out["reference"] = measures->reference ? to_json(*measures->reference) : json(nullptr);
+  out["reference"] = measures->reference ? api::to_json(*measures->reference) : json(nullptr);
   out["estimate_error"] = to_json(measures->estimate_error);
-  co_return json_response(200, out);
+  co_return http::json_response(200, out);
 }
 
 }  // namespace
 
-void add_run_routes(Router& router, RunRoutes parts) {
-  const auto add = [&router, parts](const char* method, const char* pattern, Scope needs,
-                                    std::vector<std::string> query, Answer (*answer)(RunRoutes, Request)) {
+void add_run_routes(http::Router& router, RunRoutes parts) {
+  const auto add = [&router, parts](const char* method, const char* pattern, identity::Scope needs,
+                                    std::vector<std::string> query, http::Answer (*answer)(RunRoutes, http::Request)) {
     router.add({method, pattern, needs, std::move(query), with(parts, answer)});
   };
-  add("GET", "/api/v1/runs", Scope::read, {"robot_id", "state", "before", "limit"}, list_runs);
-  add("POST", "/api/v1/runs", Scope::record, {}, create_run);
-  add("GET", "/api/v1/runs/{run_id}", Scope::read, {}, get_run);
-  add("POST", "/api/v1/runs/{run_id}/end", Scope::record, {}, end_run);
-  add("POST", "/api/v1/runs/{run_id}/annotate", Scope::record, {}, annotate_run);
-  add("POST", "/api/v1/runs/{run_id}/discard", Scope::record, {}, discard_run);
-  add("GET", "/api/v1/runs/{run_id}/certificate", Scope::read, {}, get_digest);
-  add("GET", "/api/v1/runs/{run_id}/snapshot", Scope::read, {}, get_snapshot);
-  add("GET", "/api/v1/runs/{run_id}/step-metrics", Scope::read, {}, get_step_metrics);
+  add("GET", "/api/v1/runs", identity::Scope::read, {"robot_id", "state", "before", "limit"}, list_runs);
+  add("POST", "/api/v1/runs", identity::Scope::record, {}, create_run);
+  add("GET", "/api/v1/runs/{run_id}", identity::Scope::read, {}, get_run);
+  add("POST", "/api/v1/runs/{run_id}/end", identity::Scope::record, {}, end_run);
+  add("POST", "/api/v1/runs/{run_id}/annotate", identity::Scope::record, {}, annotate_run);
+  add("POST", "/api/v1/runs/{run_id}/discard", identity::Scope::record, {}, discard_run);
+  add("GET", "/api/v1/runs/{run_id}/certificate", identity::Scope::read, {}, get_digest);
+  add("GET", "/api/v1/runs/{run_id}/snapshot", identity::Scope::read, {}, get_snapshot);
+  add("GET", "/api/v1/runs/{run_id}/step-metrics", identity::Scope::read, {}, get_step_metrics);
 }
 
-}  // namespace server
+}  // namespace server::api

@@ -4,57 +4,58 @@
 #include "server/api/routes/routes.hpp"
 #include "server/storage/query/history.hpp"
 
-namespace server {
+namespace server::api {
 namespace {
 
-constexpr std::int64_t kMaxPage = kMaxPageSamples;
+constexpr std::int64_t kMaxPage = storage::kMaxPageSamples;
 constexpr std::int64_t kDefaultPage = 1000;
 
 // Text of many samples takes milliseconds: it is made on the readers' thread, never on the loop.
-Answer list_samples(SampleRoutes parts, Request request, Excerpt excerpt) {
+http::Answer list_samples(SampleRoutes parts, http::Request request, storage::Excerpt excerpt) {
   const auto limit = query_number(request, "limit", 1, kMaxPage, kDefaultPage);
-  if (!limit) co_return problem(limit.error());
+  if (!limit) co_return http::problem(limit.error());
   const auto after = query_cursor(request);
-  if (!after) co_return problem(after.error());
-  History& history = parts.history;
+  if (!after) co_return http::problem(after.error());
+  storage::History& history = parts.history;
   auto page = co_await history.segments(std::move(excerpt), *after, static_cast<std::size_t>(*limit));
-  if (!page) co_return problem(page.error());
+  if (!page) co_return http::problem(page.error());
   auto job = [page = std::move(*page)] { return page_text(page); };
   std::string text = co_await history.reader().run(std::move(job));
-  co_return json_text_response(200, std::move(text));
+  co_return http::json_text_response(200, std::move(text));
 }
 
-Answer list_gaps(SampleRoutes parts, Request request, Excerpt excerpt) {
-  const auto limit = query_number(request, "limit", 1, static_cast<std::int64_t>(kMaxPageGaps), kDefaultPage);
-  if (!limit) co_return problem(limit.error());
+http::Answer list_gaps(SampleRoutes parts, http::Request request, storage::Excerpt excerpt) {
+  const auto limit = query_number(request, "limit", 1, static_cast<std::int64_t>(storage::kMaxPageGaps), kDefaultPage);
+  if (!limit) co_return http::problem(limit.error());
   const auto after = query_cursor(request);
-  if (!after) co_return problem(after.error());
-  History& history = parts.history;
+  if (!after) co_return http::problem(after.error());
+  storage::History& history = parts.history;
   auto found = co_await history.gaps(std::move(excerpt), *after, static_cast<std::size_t>(*limit));
-  if (!found) co_return problem(found.error());
+  if (!found) co_return http::problem(found.error());
   auto job = [found = std::move(*found)] { return absences_text(found); };
   std::string text = co_await history.reader().run(std::move(job));
-  co_return json_text_response(200, std::move(text));
+  co_return http::json_text_response(200, std::move(text));
 }
 
 // The same route for a run and for a robot.
-using ExcerptRoute = Answer (*)(SampleRoutes, Request, Excerpt);
-using ExcerptOf = Result<Excerpt> (*)(const Request&);
+using ExcerptRoute = http::Answer (*)(SampleRoutes, http::Request, storage::Excerpt);
+using ExcerptOf = Result<storage::Excerpt> (*)(const http::Request&);
 
-Answer answer_excerpt(SampleRoutes parts, Request request, ExcerptOf excerpt_of, ExcerptRoute answer) {
+http::Answer answer_excerpt(SampleRoutes parts, http::Request request, ExcerptOf excerpt_of, ExcerptRoute answer) {
   auto excerpt = excerpt_of(request);
-  if (!excerpt) co_return problem(excerpt.error());
+  if (!excerpt) co_return http::problem(excerpt.error());
   co_return co_await answer(parts, std::move(request), std::move(*excerpt));
 }
 
 }  // namespace
 
-void add_sample_routes(Router& router, SampleRoutes parts) {
+void add_sample_routes(http::Router& router, SampleRoutes parts) {
   const auto add = [&router, parts](const char* pattern, std::vector<std::string> query, ExcerptOf excerpt_of,
                                     ExcerptRoute answer) {
-    router.add({"GET", pattern, Scope::read, std::move(query), [parts, excerpt_of, answer](Request request) {
-                  return answer_excerpt(parts, std::move(request), excerpt_of, answer);
-                }});
+    router.add(
+        {"GET", pattern, identity::Scope::read, std::move(query), [parts, excerpt_of, answer](http::Request request) {
+           return answer_excerpt(parts, std::move(request), excerpt_of, answer);
+         }});
   };
   add("/api/v1/runs/{run_id}/samples", {"after", "limit"}, run_excerpt, list_samples);
   add("/api/v1/robots/{robot_id}/samples", {"from_us", "to_us", "after", "limit"}, robot_excerpt, list_samples);
@@ -62,4 +63,4 @@ void add_sample_routes(Router& router, SampleRoutes parts) {
   add("/api/v1/robots/{robot_id}/gaps", {"from_us", "to_us", "after", "limit"}, robot_excerpt, list_gaps);
 }
 
-}  // namespace server
+}  // namespace server::api

@@ -8,57 +8,61 @@
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/upkeep/head_watch.hpp"
 
-namespace server {
+namespace server::api {
 namespace {
 
-Answer get_station(StationRoutes parts, Request) {
+http::Answer get_station(StationRoutes parts, http::Request) {
   const StationFacts& facts = parts.facts;
-  co_return json_response(200, {{"version", facts.version},
-                                {"store_id", std::to_string(facts.store_id)},
-                                {"utc_us", parts.clock.utc_us()},
-                                {"uptime_s", static_cast<double>(parts.clock.steady_us() - facts.started_at_us) / 1e6},
-                                {"http_address", facts.http_address},
-                                {"robots_address", facts.robots_address},
-                                {"security", facts.security->state()},
-                                {"losses", losses_json(parts.head_watch.losses())}});
+  co_return http::json_response(200,
+                                {{"version", facts.version},
+                                 {"store_id", std::to_string(facts.store_id)},
+                                 {"utc_us", parts.clock.utc_us()},
+                                 {"uptime_s", static_cast<double>(parts.clock.steady_us() - facts.started_at_us) / 1e6},
+                                 {"http_address", facts.http_address},
+                                 {"robots_address", facts.robots_address},
+                                 {"security", facts.security->state()},
+                                 {"losses", losses_json(parts.head_watch.losses())}});
 }
 
-Answer get_openapi(StationRoutes, Request request) { co_return asset_response(request, openapi_files().front()); }
+http::Answer get_openapi(StationRoutes, http::Request request) {
+  co_return asset_response(request, openapi_files().front());
+}
 
 // A link that lets one page in, as admin. Its address is the one that was asked, which RequestGuard knows to be ours.
-Answer make_login_link(StationRoutes parts, Request request) {
+http::Answer make_login_link(StationRoutes parts, http::Request request) {
   const std::string host = request.header("host");
   const std::string url =
       login_url(base_url(parts.facts, host.empty() ? parts.facts.http_address : host), parts.auth.new_login_code());
-  AuditNote note;
+  station::AuditNote note;
   note.by = author_of(request, parts.clock);
   note.action = "account.link_made";
   note.can_flood = true;
   parts.recorder.on_audit(note);
-  co_return json_response(201, {{"url", url}, {"expires_at_us", parts.clock.utc_us() + kLoginCodeValidity.count()}});
+  co_return http::json_response(
+      201, {{"url", url}, {"expires_at_us", parts.clock.utc_us() + identity::kLoginCodeValidity.count()}});
 }
 
-Answer log_in(StationRoutes parts, Request request) {
+http::Answer log_in(StationRoutes parts, http::Request request) {
   if (request.method == "HEAD") {  // a preview of the link must not use the code up
-    Response response = problem(405, "HEAD is not possible here", "method_not_allowed");
+    http::Response response = http::problem(405, "HEAD is not possible here", "method_not_allowed");
     response.headers.emplace_back("Allow", "GET");
     co_return response;
   }
   const auto session = parts.auth.log_in(request.query["code"], request.peer, request.header("user-agent"));
   if (!session) {
-    co_return html_response(
+    co_return http::html_response(
         401,
         "<!doctype html><title>Rheonaut</title><p>This link was used already or is too old. Open "
         "the link that the station prints when it starts, or make a new one: docs/api.md says how.");
   }
-  Response response = html_response(303, "");
+  http::Response response = http::html_response(303, "");
   response.headers.emplace_back("Location", "/");
   response.headers.emplace_back("Set-Cookie", parts.auth.cookie(*session, parts.facts.is_secure()));
   co_return response;
 }
 
-Answer live_without_upgrade(StationRoutes, Request) {
-  Response response = problem(426, "/live speaks WebSocket only", "upgrade_required");
+http::Answer live_without_upgrade(StationRoutes, http::Request) {
+  http::Response response = http::problem(426, "/live speaks WebSocket only", "upgrade_required");
   response.headers.emplace_back("Upgrade", "websocket");
   co_return response;
 }
@@ -75,17 +79,17 @@ std::string login_url(const std::string& base_url, const std::string& code) {
   return fmt::format("{}/login?code={}", base_url, code);
 }
 
-void add_station_routes(Router& router, StationRoutes parts) {
-  const auto add = [&router, parts](const char* pattern, Scope needs, std::vector<std::string> query,
-                                    Answer (*answer)(StationRoutes, Request)) {
+void add_station_routes(http::Router& router, StationRoutes parts) {
+  const auto add = [&router, parts](const char* pattern, identity::Scope needs, std::vector<std::string> query,
+                                    http::Answer (*answer)(StationRoutes, http::Request)) {
     router.add({"GET", pattern, needs, std::move(query), with(parts, answer)});
   };
-  add("/login", Scope::anyone, {"code"}, log_in);
-  add("/live", Scope::read, {}, live_without_upgrade);
-  add("/api/v1/station", Scope::read, {}, get_station);
-  add("/api/v1/openapi.yaml", Scope::read, {}, get_openapi);
-  router.add({"POST", "/api/v1/login-links", Scope::admin, {}, with(parts, make_login_link)});
+  add("/login", identity::Scope::anyone, {"code"}, log_in);
+  add("/live", identity::Scope::read, {}, live_without_upgrade);
+  add("/api/v1/station", identity::Scope::read, {}, get_station);
+  add("/api/v1/openapi.yaml", identity::Scope::read, {}, get_openapi);
+  router.add({"POST", "/api/v1/login-links", identity::Scope::admin, {}, with(parts, make_login_link)});
   router.set_fallback(page_response);
 }
 
-}  // namespace server
+}  // namespace server::api

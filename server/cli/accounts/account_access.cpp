@@ -69,13 +69,13 @@ std::string ask_silently(const std::string& question) {
 AccountAccess::AccountAccess(const fs::path& data_dir, Missing missing) {
   const fs::path database = data_dir / "station.sqlite";
   if (missing == Missing::make) {
-    make_data_folder(data_dir);
+    config::make_data_folder(data_dir);
   } else if (!fs::exists(database)) {
     throw std::runtime_error{fmt::format("there is no '{}'", database.string())};
   }
-  if (auto lock = FolderLock::try_take(data_dir)) {
+  if (auto lock = config::FolderLock::try_take(data_dir)) {
     lock_.emplace(std::move(*lock));
-    database_ = std::make_unique<Database>(database);
+    database_ = std::make_unique<storage::Database>(database);
   } else {
     station_.emplace(data_dir);
   }
@@ -90,19 +90,19 @@ json AccountAccess::ask(const std::string& method, const std::string& target, co
 
 json AccountAccess::users() { return station_ ? ask("GET", "/users").at("users") : list_of(store().load().users); }
 
-void AccountAccess::add_user(const std::string& name, Role role, const std::string& password) {
+void AccountAccess::add_user(const std::string& name, identity::Role role, const std::string& password) {
   if (station_) {
     ask("POST", "/users", {{"name", name}, {"role", text(role)}, {"password", password}});
     return;
   }
-  value_of(check_name(name));
-  value_of(check_password(password));
-  const Author by = command_line_author();
-  value_of(store().add_user({name, role, hash_password(password, {}), by.at_us, by.actor, false}, by));
+  value_of(identity::check_name(name));
+  value_of(identity::check_password(password));
+  const station::Author by = command_line_author();
+  value_of(store().add_user({name, role, runtime::hash_password(password, {}), by.at_us, by.actor, false}, by));
 }
 
-void AccountAccess::change_user(const std::string& name, const UserChange& change, const json& body) {
-  value_of(check_name(name));
+void AccountAccess::change_user(const std::string& name, const identity::UserChange& change, const json& body) {
+  value_of(identity::check_name(name));
   if (station_) {
     ask("POST", "/users/" + name + "/change", body);
   } else {
@@ -110,14 +110,14 @@ void AccountAccess::change_user(const std::string& name, const UserChange& chang
   }
 }
 
-void AccountAccess::set_role(const std::string& name, Role role) {
+void AccountAccess::set_role(const std::string& name, identity::Role role) {
   change_user(name, {role, {}, {}}, {{"role", text(role)}});
 }
 
 void AccountAccess::set_password(const std::string& name, const std::string& password) {
-  value_of(check_password(password));
-  UserChange change;
-  if (!station_) change.password_hash = hash_password(password, {});
+  value_of(identity::check_password(password));
+  identity::UserChange change;
+  if (!station_) change.password_hash = runtime::hash_password(password, {});
   change_user(name, change, {{"password", password}});
 }
 
@@ -126,7 +126,7 @@ void AccountAccess::set_disabled(const std::string& name, bool disabled) {
 }
 
 void AccountAccess::remove_user(const std::string& name) {
-  value_of(check_name(name));
+  value_of(identity::check_name(name));
   if (station_) {
     ask("POST", "/users/" + name + "/remove");
   } else {
@@ -136,18 +136,18 @@ void AccountAccess::remove_user(const std::string& name) {
 
 json AccountAccess::tokens() { return station_ ? ask("GET", "/tokens").at("tokens") : list_of(store().load().tokens); }
 
-json AccountAccess::add_token(const std::string& name, Scopes scopes, std::int64_t days) {
+json AccountAccess::add_token(const std::string& name, identity::Scopes scopes, std::int64_t days) {
   json body{{"name", name}, {"scopes", text(scopes)}};
   if (days != 0) body["days"] = days;
   if (station_) return ask("POST", "/tokens", body);
-  value_of(check_name(name));
+  value_of(identity::check_name(name));
   if (name == "local") throw std::runtime_error{"local is the name of the station's own token"};
-  const std::string secret = random_secret();
-  ApiToken token;
+  const std::string secret = runtime::random_secret();
+  identity::ApiToken token;
   token.name = name;
-  token.hash = hash_of(secret);
+  token.hash = runtime::hash_of(secret);
   token.scopes = scopes;
-  const Author by = command_line_author();
+  const station::Author by = command_line_author();
   token.made_at_us = by.at_us;
   token.expires_at_us = days == 0 ? 0 : token.made_at_us + days * kDayUs;
   value_of(store().add_token(token, by));
@@ -157,7 +157,7 @@ json AccountAccess::add_token(const std::string& name, Scopes scopes, std::int64
 }
 
 void AccountAccess::revoke_token(const std::string& name) {
-  value_of(check_name(name));
+  value_of(identity::check_name(name));
   if (station_) {
     ask("POST", "/tokens/" + name + "/revoke");
   } else {
@@ -171,8 +171,8 @@ json AccountAccess::enrolments() {
 
 json AccountAccess::enrol(const std::string& robot_id) {
   if (station_) return ask("POST", "/enrolments", {{"robot_id", robot_id}});
-  const std::string secret = random_secret();
-  json made = to_json(value_of(store().enrol(robot_id, hash_of(secret), command_line_author())));
+  const std::string secret = runtime::random_secret();
+  json made = to_json(value_of(store().enrol(robot_id, runtime::hash_of(secret), command_line_author())));
   made["secret"] = secret;
   return made;
 }

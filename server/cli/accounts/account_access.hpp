@@ -22,14 +22,14 @@ class AccountAccess {
   AccountAccess(const std::filesystem::path& data_dir, Missing missing);
 
   nlohmann::json users();
-  void add_user(const std::string& name, Role role, const std::string& password);
-  void set_role(const std::string& name, Role role);
+  void add_user(const std::string& name, identity::Role role, const std::string& password);
+  void set_role(const std::string& name, identity::Role role);
   void set_password(const std::string& name, const std::string& password);
   void set_disabled(const std::string& name, bool disabled);
   void remove_user(const std::string& name);
 
   nlohmann::json tokens();
-  nlohmann::json add_token(const std::string& name, Scopes scopes, std::int64_t days);  // with its "secret"
+  nlohmann::json add_token(const std::string& name, identity::Scopes scopes, std::int64_t days);  // with its "secret"
   void revoke_token(const std::string& name);
 
   nlohmann::json enrolments();
@@ -39,12 +39,12 @@ class AccountAccess {
 
  private:
   nlohmann::json ask(const std::string& method, const std::string& target, const nlohmann::json& body = nullptr) const;
-  void change_user(const std::string& name, const UserChange& change, const nlohmann::json& body);
-  AccountStore store() { return AccountStore{database_->handle()}; }
+  void change_user(const std::string& name, const identity::UserChange& change, const nlohmann::json& body);
+  identity::AccountStore store() { return identity::AccountStore{database_->handle()}; }
 
-  std::optional<FolderLock> lock_;
+  std::optional<config::FolderLock> lock_;
   std::optional<StationClient> station_;  // one of both
-  std::unique_ptr<Database> database_;
+  std::unique_ptr<storage::Database> database_;
 };
 
 // A password from the terminal, without showing it and twice, or the first line of standard input when that is none.

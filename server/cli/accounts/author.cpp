@@ -11,12 +11,12 @@
 
 namespace server::cli {
 
-Author command_line_author() {
+station::Author command_line_author() {
   boost::asio::io_context loop;
   const uid_t uid = ::geteuid();
   const passwd* const user = ::getpwuid(uid);
   const std::string name = user == nullptr ? std::to_string(uid) : user->pw_name;
-  return {"cli:" + name, "", SystemClock{loop}.utc_us()};
+  return {"cli:" + name, "", runtime::SystemClock{loop}.utc_us()};
 }
 
 }  // namespace server::cli

@@ -5,6 +5,6 @@
 
 namespace server::cli {
 
-Author command_line_author();  // now
+station::Author command_line_author();  // now
 
 }  // namespace server::cli

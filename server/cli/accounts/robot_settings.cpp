@@ -150,7 +150,7 @@ json sections_in(const std::string& file, const Robot& robot) {
   constexpr double kUsPerS = 1e6;
   if (!in_force.is_null()) sampling.period_s = in_force.at("period_us").get<double>() / kUsPerS;
   const auto chosen = discretised(read(ControllerChoice{file}), sampling).chosen;
-  const json made = json::parse(json_of(chosen).dump());
+  const json made = json::parse(analysis::json_of(chosen).dump());
   return {{"period_s", made["period_s"]}, {"dc_gain", made["dc_gain"]}, {"sections", made["sections"]}};
 }
 

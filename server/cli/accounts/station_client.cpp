@@ -31,7 +31,7 @@ nlohmann::json announcement_in(const std::filesystem::path& file) {
 
 // A station that listens on every address is asked on loopback.
 asio::ip::tcp::endpoint endpoint_of(const nlohmann::json& announcement) {
-  auto endpoint = parse_endpoint(announcement["http"].get<std::string>());
+  auto endpoint = config::parse_endpoint(announcement["http"].get<std::string>());
   if (endpoint.address().is_unspecified()) endpoint.address(asio::ip::address_v4::loopback());
   return endpoint;
 }
@@ -63,7 +63,7 @@ StationAnswer converse_in_tls(asio::ip::tcp::socket& socket, const Request& requ
   asio::ssl::stream<asio::ip::tcp::socket&> stream{socket, context};
   stream.handshake(asio::ssl::stream_base::client);
   X509* shown = SSL_get0_peer_certificate(stream.native_handle());
-  if (shown == nullptr || describe(*shown).pin != describe(*load_certificate(certificate)).pin) {
+  if (shown == nullptr || tls::describe(*shown).pin != tls::describe(*tls::load_certificate(certificate)).pin) {
     throw std::runtime_error{fmt::format("its key is not that of '{}'", certificate.string())};
   }
   return converse(stream, request);
@@ -95,7 +95,7 @@ StationAnswer StationClient::ask(const std::string& method, const std::string& t
     return certificate_.empty() ? converse(socket, request) : converse_in_tls(socket, request, certificate_);
   } catch (const std::exception& error) {
     throw std::runtime_error{
-        fmt::format("the station on {} does not answer: {}", server::text(endpoint_), error.what())};
+        fmt::format("the station on {} does not answer: {}", config::text(endpoint_), error.what())};
   }
 }
 

@@ -38,7 +38,7 @@ int list(const nlohmann::json& tokens, bool as_json, std::ostream& out) {
 }
 
 int create(const TokenCommand& options, std::ostream& out) {
-  const auto scopes = parse_scopes(options.scopes);
+  const auto scopes = identity::parse_scopes(options.scopes);
   if (!scopes) throw std::runtime_error{scopes.error().detail};
   const nlohmann::json made =
       AccountAccess{options.data_dir, AccountAccess::Missing::make}.add_token(options.name, *scopes, options.days);

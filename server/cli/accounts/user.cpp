@@ -44,7 +44,8 @@ void add_options(CLI::App& command, UserCommand& options) {
   command.require_subcommand(1);
   auto* add = offer(command, options, UserCommand::Act::add, "add", "Add a user; the password is asked for");
   add_name(add, options);
-  add_word(*add, "--role", options.role, kRoles, "viewer (sees, stops), operator (commands) or admin")->required();
+  add_word(*add, "--role", options.role, identity::kRoles, "viewer (sees, stops), operator (commands) or admin")
+      ->required();
   add->footer("Example: rheonaut user add anna --role operator --data lab");
   offer(command, options, UserCommand::Act::list, "list", "List the users")
       ->add_flag("--json", options.json, "As JSON");
@@ -55,7 +56,7 @@ void add_options(CLI::App& command, UserCommand& options) {
            options);
   auto* role = offer(command, options, UserCommand::Act::role, "role", "Give a user another role");
   add_name(role, options);
-  add_word(*role, "role", options.role, kRoles, "viewer, operator or admin")->required();
+  add_word(*role, "role", options.role, identity::kRoles, "viewer, operator or admin")->required();
   add_name(offer(command, options, UserCommand::Act::disable, "disable", "Keep a user out until enabled again"),
            options);
   add_name(offer(command, options, UserCommand::Act::enable, "enable", "Let a disabled user in again"), options);
@@ -65,7 +66,7 @@ void add_options(CLI::App& command, UserCommand& options) {
 int run(const UserCommand& options, std::ostream& out) {
   const bool wants_password = options.act == UserCommand::Act::add || options.act == UserCommand::Act::password;
   if (options.act == UserCommand::Act::add) {
-    if (const auto named = check_name(options.name); !named) throw std::runtime_error{named.error().detail};
+    if (const auto named = identity::check_name(options.name); !named) throw std::runtime_error{named.error().detail};
   }
   const std::string password = wants_password ? read_password(options.name) : "";
   AccountAccess accounts{options.data_dir, options.act == UserCommand::Act::add ? AccountAccess::Missing::make

@@ -19,7 +19,7 @@ struct UserCommand {
   Act act = Act::list;
   std::filesystem::path data_dir = "rheonaut-data";
   std::string name;
-  Role role = Role::viewer;
+  identity::Role role = identity::Role::viewer;
   bool json = false;
 };
 

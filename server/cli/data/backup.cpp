@@ -48,7 +48,7 @@ nlohmann::json look(const StationClient& station, const std::string& name) {
 // Where the station has put it.
 fs::path let_station_copy(const StationClient& station) {
   boost::asio::io_context loop;
-  SystemClock clock{loop};
+  runtime::SystemClock clock{loop};
   const std::string name = fmt::format("cli-{}-{}", clock.utc_us() / 1'000'000, getpid());
   const StationAnswer begun = station.ask("POST", "/api/v1/backups", {{"name", name}});
   if (begun.status != kAccepted) {
@@ -61,7 +61,7 @@ fs::path let_station_copy(const StationClient& station) {
     if (state == "failed") {
       throw std::runtime_error{fmt::format("the station made no backup: {}", backup.at("problem").get<std::string>())};
     }
-    run_first(loop, clock.sleep_for(kLook));
+    runtime::run_first(loop, clock.sleep_for(kLook));
   }
 }
 
@@ -78,10 +78,10 @@ void add_options(CLI::App& command, Backup& options) {
 int run(const Backup& options, std::ostream& out) {
   check(options);
   umask(077);
-  if (const std::optional<FolderLock> lock = FolderLock::try_take(options.data_dir)) {
-    back_up_closed(options.data_dir / "station.sqlite", options.to);
+  if (const std::optional<config::FolderLock> lock = config::FolderLock::try_take(options.data_dir)) {
+    storage::back_up_closed(options.data_dir / "station.sqlite", options.to);
   } else {
-    move_finished(let_station_copy(StationClient{options.data_dir}), options.to);
+    storage::move_finished(let_station_copy(StationClient{options.data_dir}), options.to);
   }
   fmt::print(out, "{}: {} bytes, verified\n", options.to.string(), fs::file_size(options.to));
   return 0;

@@ -55,7 +55,8 @@ bool is_name(const std::string& name) {
 // Those that were asked for, or else those of the certificate that is renewed; always those of this machine.
 std::vector<std::string> names_of(const Certificate& options, const Files& files) {
   std::vector<std::string> names = options.names;
-  if (names.empty() && fs::exists(files.certificate)) names = describe(*load_certificate(files.certificate)).names;
+  if (names.empty() && fs::exists(files.certificate))
+    names = tls::describe(*tls::load_certificate(files.certificate)).names;
   for (const std::string& own : {host_name(), std::string{"localhost"}, std::string{"127.0.0.1"}, std::string{"::1"}}) {
     if (is_name(own)) add(names, own);
   }
@@ -65,9 +66,9 @@ std::vector<std::string> names_of(const Certificate& options, const Files& files
 // After a crash either nothing or both files of a pair are there; a key without certificate is used.
 void make_authority_unless_there(const Files& files, std::ostream& out) {
   if (fs::exists(files.authority)) return;
-  const base::Openssl<EVP_PKEY> key = fs::exists(files.authority_key) ? load_key(files.authority_key) : make_key();
-  write_private(files.authority_key, key_pem(*key));
-  write_private(files.authority, certificate_pem(*make_authority(*key)));
+  const base::Openssl<EVP_PKEY> key = fs::exists(files.authority_key) ? tls::load_key(files.authority_key) : make_key();
+  runtime::write_private(files.authority_key, key_pem(*key));
+  runtime::write_private(files.authority, certificate_pem(*make_authority(*key)));
   fmt::print(out, "made     {}, the authority of this lab\n", files.authority.string());
 }
 
@@ -83,7 +84,7 @@ void check(const Certificate& options, const Files& files) {
   if (options.new_key && !options.renew) throw std::runtime_error{"--new-key goes with --renew"};
 }
 
-void print_what_to_do(const Files& files, const TlsCertificate& made, std::ostream& out) {
+void print_what_to_do(const Files& files, const tls::TlsCertificate& made, std::ostream& out) {
   fmt::print(out, "made     {}\n", files.certificate.string());
   fmt::print(out, "names    {}\n", fmt::join(made.names, ", "));
   fmt::print(out, "until    {:%Y-%m-%d}\n", fmt::gmtime(static_cast<std::time_t>(made.not_after_us / 1'000'000)));
@@ -114,18 +115,18 @@ void add_options(CLI::App& command, Certificate& options) {
 int run(const Certificate& options, std::ostream& out) {
   const Files files{options.data_dir};
   check(options, files);
-  make_data_folder(options.data_dir);
-  make_data_folder(files.folder);
+  config::make_data_folder(options.data_dir);
+  config::make_data_folder(files.folder);
   const std::vector<std::string> names = names_of(options, files);
   make_authority_unless_there(files, out);
   const bool keeps_key = fs::exists(files.key) && !options.new_key;
-  const base::Openssl<EVP_PKEY> key = keeps_key ? load_key(files.key) : make_key();
-  const base::Openssl<X509> authority = load_certificate(files.authority);
-  const base::Openssl<EVP_PKEY> authority_key = load_key(files.authority_key);
+  const base::Openssl<EVP_PKEY> key = keeps_key ? tls::load_key(files.key) : make_key();
+  const base::Openssl<X509> authority = tls::load_certificate(files.authority);
+  const base::Openssl<EVP_PKEY> authority_key = tls::load_key(files.authority_key);
   const base::Openssl<X509> made = make_certificate(*key, names, options.days, *authority, *authority_key);
-  if (!keeps_key) write_private(files.key, key_pem(*key));
-  write_private(files.certificate, certificate_pem(*made));
-  print_what_to_do(files, describe(*made), out);
+  if (!keeps_key) runtime::write_private(files.key, key_pem(*key));
+  runtime::write_private(files.certificate, certificate_pem(*made));
+  print_what_to_do(files, tls::describe(*made), out);
   return 0;
 }
 

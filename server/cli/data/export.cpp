@@ -32,7 +32,7 @@ class PartFile {
   PartFile& operator=(const PartFile&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  void keep() { finish_file(path_, wanted_); }
+  void keep() { storage::finish_file(path_, wanted_); }
 
  private:
   void clear() const {
@@ -44,7 +44,7 @@ class PartFile {
   std::filesystem::path path_;
 };
 
-Result<void> write_csv(SQLite::Database& database, CsvWriter writer, const std::filesystem::path& path) {
+Result<void> write_csv(SQLite::Database& database, storage::CsvWriter writer, const std::filesystem::path& path) {
   std::ofstream file{path, std::ios::binary | std::ios::trunc};
   while (const auto piece = writer.next(database)) file << *piece;
   file.flush();
@@ -52,9 +52,9 @@ Result<void> write_csv(SQLite::Database& database, CsvWriter writer, const std::
   return {};
 }
 
-Result<void> write_mat(SQLite::Database& database, const std::filesystem::path& path, std::vector<RecordedSpan> spans,
-                       const ExportQuery& query) {
-  MatWriter writer{path, std::move(spans), query};
+Result<void> write_mat(SQLite::Database& database, const std::filesystem::path& path,
+                       std::vector<storage::RecordedSpan> spans, const storage::ExportQuery& query) {
+  storage::MatWriter writer{path, std::move(spans), query};
   for (;;) {
     const auto more = writer.advance(database);
     if (!more) return std::unexpected{more.error()};
@@ -63,25 +63,25 @@ Result<void> write_mat(SQLite::Database& database, const std::filesystem::path& 
 }
 
 Result<void> write_sqlite(SQLite::Database& database, const std::string& uri, const std::filesystem::path& path,
-                          std::vector<RecordedSpan> spans, const ExportQuery& query) {
+                          std::vector<storage::RecordedSpan> spans, const storage::ExportQuery& query) {
   std::filesystem::remove(path);  // of an attempt that was begun again
-  RunFile writer{path, uri, std::move(spans), query};
+  storage::RunFile writer{path, uri, std::move(spans), query};
   while (writer.advance(database)) continue;
   return {};
 }
 
-Result<void> write(SQLite::Database& database, const std::string& uri, const Export& options, const ExportQuery& query,
-                   const std::filesystem::path& path) {
+Result<void> write(SQLite::Database& database, const std::string& uri, const Export& options,
+                   const storage::ExportQuery& query, const std::filesystem::path& path) {
   if (database.execAndGet("PRAGMA user_version").getInt64() < 2) {
     return fail(ErrorCode::invalid, "the database is of an earlier version; let a station open it once");
   }
-  if (!run_exists(database, query.run)) {
+  if (!storage::run_exists(database, query.run)) {
     return fail(ErrorCode::not_found, fmt::format("there is no run {} in {}", query.run, options.data_dir.string()));
   }
-  std::vector<RecordedSpan> spans = read_spans(database, query.run, 0);
-  for (RecordedSpan& span : spans) span.cut(span.made());
+  std::vector<storage::RecordedSpan> spans = storage::read_spans(database, query.run, 0);
+  for (storage::RecordedSpan& span : spans) span.cut(span.made());
   switch (options.format) {
-    case ExportFormat::csv: return write_csv(database, CsvWriter{std::move(spans), query}, path);
+    case ExportFormat::csv: return write_csv(database, storage::CsvWriter{std::move(spans), query}, path);
     case ExportFormat::mat: return write_mat(database, path, std::move(spans), query);
     case ExportFormat::sqlite: return write_sqlite(database, uri, path, std::move(spans), query);
   }
@@ -116,11 +116,11 @@ void add_options(CLI::App& command, Export& options) {
 }
 
 int run(const Export& options, std::ostream& out) {
-  ExportQuery query{.run = options.run, .channels = all_channels(), .grid_us = options.grid_us};
+  storage::ExportQuery query{.run = options.run, .channels = storage::all_channels(), .grid_us = options.grid_us};
   if (options.grid_us && options.format == ExportFormat::sqlite)
     throw std::runtime_error{"--grid-us is for csv and mat"};
   if (!options.channels.empty()) {
-    const auto channels = parse_channels(options.channels);
+    const auto channels = storage::parse_channels(options.channels);
     if (!channels) throw std::runtime_error{"--" + channels.error().detail};
     query.channels = *channels;
   }
@@ -128,7 +128,7 @@ int run(const Export& options, std::ostream& out) {
   const auto read = [&](SQLite::Database& database, const std::string& uri) {
     return write(database, uri, options, query, part.path());
   };
-  const auto done = read_store(options.data_dir / "station.sqlite", read);
+  const auto done = storage::read_store(options.data_dir / "station.sqlite", read);
   if (!done) throw std::runtime_error{done.error().detail};
   part.keep();
   out << fmt::format("run {}: {} ({} bytes)\n", options.run, options.to.string(),

@@ -41,7 +41,7 @@ CLI::App* offer(CLI::App& command, ReferenceCommand& options, Act act, const cha
   CLI::App* sub = command.add_subcommand(name, purpose);
   sub->add_option("--run", options.run, "A recorded run by its number")
       ->required()
-      ->check(whole(1, std::numeric_limits<RunId>::max()));
+      ->check(whole(1, std::numeric_limits<storage::RunId>::max()));
   sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
   sub->callback([&options, act] { options.act = act; });
   return sub;
@@ -71,23 +71,24 @@ std::string text_of_file(const std::string& file) {
   std::ifstream in{file, std::ios::binary};
   if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file)};
   std::string text{std::istreambuf_iterator<char>{in}, {}};
-  if (text.size() > kMaxReferenceBytes) {
-    throw std::runtime_error{fmt::format("'{}' has {} bytes, allowed are {}", file, text.size(), kMaxReferenceBytes)};
+  if (text.size() > analysis::kMaxReferenceBytes) {
+    throw std::runtime_error{
+        fmt::format("'{}' has {} bytes, allowed are {}", file, text.size(), analysis::kMaxReferenceBytes)};
   }
   return text;
 }
 
-ReferenceClockRequest clock_of(const ReferenceCommand& options) {
-  ReferenceClockRequest clock;
+analysis::ReferenceClockRequest clock_of(const ReferenceCommand& options) {
+  analysis::ReferenceClockRequest clock;
   clock.sd_s = options.clock_sd_s;
   if (options.offset_s) {
-    clock.method = ReferenceClock::offset;
+    clock.method = storage::ReferenceClock::offset;
     clock.offset_s = *options.offset_s;
   } else if (options.utc_s) {
-    clock.method = ReferenceClock::utc;
+    clock.method = storage::ReferenceClock::utc;
     clock.zero_at_us = std::llround(*options.utc_s * 1e6);
   } else if (!options.marker.empty()) {
-    clock.method = ReferenceClock::marker;
+    clock.method = storage::ReferenceClock::marker;
     clock.at_s = options.at_s.value_or(0);
     std::int64_t id = 0;
     const char* end = options.marker.data() + options.marker.size();
@@ -102,8 +103,8 @@ ReferenceClockRequest clock_of(const ReferenceCommand& options) {
   return clock;
 }
 
-ReferenceRequest request_of(const ReferenceCommand& options) {
-  ReferenceRequest request;
+analysis::ReferenceRequest request_of(const ReferenceCommand& options) {
+  analysis::ReferenceRequest request;
   request.csv = text_of_file(options.csv_file);
   request.source = fs::path{options.csv_file}.filename().string();
   request.clock = clock_of(options);
@@ -115,12 +116,12 @@ ReferenceRequest request_of(const ReferenceCommand& options) {
   return request;
 }
 
-json json_of(const ReferenceClockRequest& clock) {
+json json_of(const analysis::ReferenceClockRequest& clock) {
   json out{{"method", text(clock.method)}};
   if (clock.sd_s) out["sd_s"] = *clock.sd_s;
-  if (clock.method == ReferenceClock::offset) out["offset_s"] = clock.offset_s;
-  if (clock.method == ReferenceClock::utc) out["zero_at_us"] = clock.zero_at_us;
-  if (clock.method == ReferenceClock::marker) {
+  if (clock.method == storage::ReferenceClock::offset) out["offset_s"] = clock.offset_s;
+  if (clock.method == storage::ReferenceClock::utc) out["zero_at_us"] = clock.zero_at_us;
+  if (clock.method == storage::ReferenceClock::marker) {
     out["at_s"] = clock.at_s;
     clock.marker_id ? out["marker_id"] = *clock.marker_id : out["marker_text"] = clock.marker_text;
   }
@@ -129,7 +130,7 @@ json json_of(const ReferenceClockRequest& clock) {
   return out;
 }
 
-json json_of(const ReferenceRequest& request) {
+json json_of(const analysis::ReferenceRequest& request) {
   json out{{"csv", request.csv},
            {"source", request.source},
            {"clock", json_of(request.clock)},
@@ -149,51 +150,52 @@ json ask_station(const ReferenceCommand& options, const std::string& path, const
 }
 
 // In the database, which is closed: nobody else writes.
-OutsideReference import_closed(const ReferenceCommand& options, const ReferenceRequest& request) {
+storage::OutsideReference import_closed(const ReferenceCommand& options, const analysis::ReferenceRequest& request) {
   const fs::path path = options.data_dir / "station.sqlite";
-  Database database{path};
-  value_of(check_may_import(database.handle(), options.run, request.reason));
-  std::optional<MarkerPlace> marker;
-  const ReferenceClockRequest& clock = request.clock;
-  if (clock.method == ReferenceClock::marker) {
-    marker = value_of(find_marker(database.handle(), options.run, clock.marker_id, clock.marker_text));
+  storage::Database database{path};
+  value_of(storage::check_may_import(database.handle(), options.run, request.reason));
+  std::optional<storage::MarkerPlace> marker;
+  const analysis::ReferenceClockRequest& clock = request.clock;
+  if (clock.method == storage::ReferenceClock::marker) {
+    marker = value_of(storage::find_marker(database.handle(), options.run, clock.marker_id, clock.marker_text));
   }
-  std::vector<OwnPosition> own;
-  for (const StoredSample& stored : value_of(read_run(path, options.run, kMaxAnalysedSamples))) {
-    own.push_back(own_position(stored));
+  std::vector<analysis::OwnPosition> own;
+  for (const storage::StoredSample& stored :
+       value_of(storage::read_run(path, options.run, analysis::kMaxAnalysedSamples))) {
+    own.push_back(analysis::own_position(stored));
   }
-  const std::vector<Zeroing> zeroings = find_zeroings(database.handle(), options.run);
-  PlacedReference placed = value_of(place_reference(request, own, zeroings, marker));
-  const Author by = command_line_author();
+  const std::vector<storage::Zeroing> zeroings = storage::find_zeroings(database.handle(), options.run);
+  analysis::PlacedReference placed = value_of(place_reference(request, own, zeroings, marker));
+  const station::Author by = command_line_author();
   placed.reference.run = options.run;
   placed.reference.actor = by.actor;
   placed.reference.made_at_us = by.at_us;
   return value_of(store_reference(database.handle(), placed.reference, placed.positions, request.reason, by));
 }
 
-StoredReference read_stored(const ReferenceCommand& options, bool with_positions) {
-  StoredReference stored;
+storage::StoredReference read_stored(const ReferenceCommand& options, bool with_positions) {
+  storage::StoredReference stored;
   auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
-    auto found = read_reference(database, options.run, {}, with_positions ? kMaxReferenceRows : 0);
+    auto found = storage::read_reference(database, options.run, {}, with_positions ? analysis::kMaxReferenceRows : 0);
     if (!found) return fail(ErrorCode::not_found, fmt::format("run {} has no reference", options.run));
     stored = std::move(*found);
     return {};
   };
-  value_of(read_store(options.data_dir / "station.sqlite", read));
+  value_of(storage::read_store(options.data_dir / "station.sqlite", read));
   return stored;
 }
 
-void write(const OutsideReference& reference, std::ostream& out) {
+void write(const storage::OutsideReference& reference, std::ostream& out) {
   fmt::print(out, "run {}: {} positions of {}{}\n{}\n{}\n", reference.run, reference.samples, reference.source,
              reference.samples_left_out == 0
                  ? std::string{}
                  : fmt::format(", {} before or after the run left out", reference.samples_left_out),
-             clock_in_words(reference), zero_in_words(reference));
+             analysis::clock_in_words(reference), analysis::zero_in_words(reference));
 }
 
 void import_one(const ReferenceCommand& options, std::ostream& out) {
-  const ReferenceRequest request = request_of(options);
-  if (const auto lock = FolderLock::try_take(options.data_dir)) {
+  const analysis::ReferenceRequest request = request_of(options);
+  if (const auto lock = config::FolderLock::try_take(options.data_dir)) {
     write(import_closed(options, request), out);
     return;
   }
@@ -202,10 +204,10 @@ void import_one(const ReferenceCommand& options, std::ostream& out) {
 }
 
 void remove_one(const ReferenceCommand& options, std::ostream& out) {
-  if (const auto lock = FolderLock::try_take(options.data_dir)) {
-    Database database{options.data_dir / "station.sqlite"};
-    value_of(remove_reference(database.handle(), options.run, options.reason, command_line_author()));
-    while (delete_some_positions(database.handle())) continue;
+  if (const auto lock = config::FolderLock::try_take(options.data_dir)) {
+    storage::Database database{options.data_dir / "station.sqlite"};
+    value_of(storage::remove_reference(database.handle(), options.run, options.reason, command_line_author()));
+    while (storage::delete_some_positions(database.handle())) continue;
   } else {
     ask_station(options, "/remove", {{"reason", options.reason}});
   }
@@ -213,8 +215,8 @@ void remove_one(const ReferenceCommand& options, std::ostream& out) {
 }
 
 void export_csv(const ReferenceCommand& options, std::ostream& out) {
-  const StoredReference stored = read_stored(options, true);
-  const OutsidePositions& positions = stored.positions;
+  const storage::StoredReference stored = read_stored(options, true);
+  const storage::OutsidePositions& positions = stored.positions;
   fmt::print(out, "# {} of run {}, span {}\nrobot_time_us,position_m,position_sd_m\n", stored.reference.source,
              stored.reference.run, stored.reference.span);
   for (std::size_t i = 0; i < positions.size(); ++i) {

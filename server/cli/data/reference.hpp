@@ -21,7 +21,7 @@ struct ReferenceCommand {
   enum class Act : std::uint8_t { import, show, export_positions, remove };
   Act act = Act::show;
   std::filesystem::path data_dir = "rheonaut-data";
-  RunId run = 0;
+  storage::RunId run = 0;
   std::string csv_file;
   std::optional<double> sd_mm, offset_s, utc_s, at_s, clock_sd_s, search_from_s, search_to_s;
   std::string marker;  // its number, or its text

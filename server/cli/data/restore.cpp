@@ -22,12 +22,13 @@ void add_options(CLI::App& command, Restore& options) {
 }
 
 int run(const Restore& options, std::ostream& out) {
-  make_data_folder(options.data_dir);
-  const auto lock = FolderLock::try_take(options.data_dir);
+  config::make_data_folder(options.data_dir);
+  const auto lock = config::FolderLock::try_take(options.data_dir);
   if (!lock) {
     throw std::runtime_error{fmt::format("a station runs in '{}'; stop it first", options.data_dir.string())};
   }
-  const RestoredStore restored = restore_database(options.from, options.data_dir, command_line_author());
+  const storage::RestoredStore restored =
+      storage::restore_database(options.from, options.data_dir, command_line_author());
   fmt::print(out, "{}: {} samples and {} runs, verified; {} of the runs were open and are interrupted\n",
              (options.data_dir / "station.sqlite").string(), restored.samples, restored.runs,
              restored.runs_interrupted);

@@ -25,9 +25,9 @@ constexpr int kUnreadable = 2;
 
 struct Verified {
   std::vector<std::string> losses;  // what the head file beside the database names and the database has not
-  std::optional<StoreFindings> store;
+  std::optional<storage::StoreFindings> store;
   bool integrity_checked = false;
-  std::optional<AuditFindings> audit;
+  std::optional<storage::AuditFindings> audit;
 
   std::vector<std::string> faults() const {
     std::vector<std::string> all = losses;
@@ -38,11 +38,11 @@ struct Verified {
 };
 
 // The head file is read first, for beside a station that runs the database moves on.
-std::vector<std::string> find_losses(SQLite::Database& database, const Result<std::optional<HeadFile>>& head) {
+std::vector<std::string> find_losses(SQLite::Database& database, const Result<std::optional<storage::HeadFile>>& head) {
   if (!head) return {head.error().detail};
   if (!*head) return {};
   std::vector<std::string> losses;
-  for (const StoreLoss& loss : (*head)->losses) losses.push_back("not acknowledged: " + loss.problem);
+  for (const storage::StoreLoss& loss : (*head)->losses) losses.push_back("not acknowledged: " + loss.problem);
   if (auto loss = find_loss(database, **head)) losses.push_back(std::move(*loss));
   return losses;
 }
@@ -53,33 +53,33 @@ Result<Verified> verify_file(const std::filesystem::path& path, const Verify& op
   auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
     verified = {};
     const auto version = database.execAndGet("PRAGMA user_version").getInt64();
-    if (version < static_cast<std::int64_t>(migrations().size())) {
+    if (version < static_cast<std::int64_t>(storage::migrations().size())) {
       return fail(ErrorCode::invalid, fmt::format("{} has schema version {}, which this program cannot verify; a "
                                                   "station brings it up to date when it opens it",
                                                   path.string(), version));
     }
     if (!options.run) {
-      verified.losses = find_losses(database, load_head_file(path));
+      verified.losses = find_losses(database, storage::load_head_file(path));
       verified.audit = check_audit(database, options.expected);
     }
     if (options.audit) return {};
-    const StoreCheck check{options.run, options.integrity || (!options.run && lock_is_free(path))};
+    const storage::StoreCheck check{options.run, options.integrity || (!options.run && storage::lock_is_free(path))};
     auto findings = check_store(database, check);
     if (!findings) return std::unexpected{findings.error()};
     verified.store = std::move(*findings);
     verified.integrity_checked = check.integrity;
     return {};
   };
-  auto done = read_store(path, read);
+  auto done = storage::read_store(path, read);
   if (!done) return std::unexpected{done.error()};
   return verified;
 }
 
 bool is_export(const std::filesystem::path& path) {
   try {
-    SQLite::Database file{reading_uri(path, true),
+    SQLite::Database file{storage::reading_uri(path, true),
                           SQLite::OPEN_READONLY | SQLite::OPEN_URI};  // makes no files beside it
-    return file.execAndGet("PRAGMA application_id").getInt64() == kRunFileApplicationId;
+    return file.execAndGet("PRAGMA application_id").getInt64() == storage::kRunFileApplicationId;
   } catch (const SQLite::Exception&) {  // whatever it is, reading it says so
     return false;
   }
@@ -91,8 +91,8 @@ Result<Verified> verify_export(const std::filesystem::path& path, const Verify& 
                 fmt::format("{} is the export of a run; --audit verifies the audit in it", path.string()));
   }
   try {
-    SQLite::Database file = open_for_reading(path);
-    if (file.execAndGet("PRAGMA user_version").getInt64() < kRunFileVersion) {
+    SQLite::Database file = storage::open_for_reading(path);
+    if (file.execAndGet("PRAGMA user_version").getInt64() < storage::kRunFileVersion) {
       return fail(ErrorCode::invalid,
                   fmt::format("{} was exported by an earlier version: no audit is in it", path.string()));
     }
@@ -108,13 +108,13 @@ void write_table(std::ostream& out, const Verified& verified, const Verify& opti
   const std::vector<std::string> faults = verified.faults();
   for (const std::string& fault : faults) fmt::print(out, "fault: {}\n", one_line(fault));
   if (verified.store) {
-    const StoreFindings& findings = *verified.store;
+    const storage::StoreFindings& findings = *verified.store;
     fmt::print(out, "segments  {} with {} samples\n", findings.segments, findings.samples);
     fmt::print(out, "runs      {} verified, {} with samples on their way, {} not certified yet\n",
                findings.runs_verified, findings.runs_incomplete, findings.runs_without_digest);
   }
   if (verified.audit) {
-    const AuditFindings& findings = *verified.audit;
+    const storage::AuditFindings& findings = *verified.audit;
     const std::string hidden = findings.hidden == 0 ? "" : fmt::format(" ({} as hashes only)", findings.hidden);
     fmt::print(out, "audit     {} entries{}, {} commands agree with it\n", findings.entries, hidden, findings.commands);
     fmt::print(out, "head      {}\n", findings.head.entry == 0 ? "-" : text(findings.head));
@@ -131,7 +131,7 @@ nlohmann::ordered_json json_of(const Verified& verified) {
   nlohmann::ordered_json out;
   out["faults"] = verified.faults();
   if (verified.store) {
-    const StoreFindings& findings = *verified.store;
+    const storage::StoreFindings& findings = *verified.store;
     out["segments"] = findings.segments;
     out["samples"] = findings.samples;
     out["runs_verified"] = findings.runs_verified;
@@ -140,7 +140,7 @@ nlohmann::ordered_json json_of(const Verified& verified) {
     out["integrity_checked"] = verified.integrity_checked;
   }
   if (verified.audit) {
-    const AuditFindings& findings = *verified.audit;
+    const storage::AuditFindings& findings = *verified.audit;
     out["audit_entries"] = findings.entries;
     out["audit_hidden"] = findings.hidden;
     out["audit_commands"] = findings.commands;
@@ -165,7 +165,7 @@ void add_options(CLI::App& command, Verify& options) {
   auto* audit = command.add_flag("--audit", options.audit, "Only the audit; --file may name the export of a run");
   audit->excludes(run);
   const auto expect = [&options](const std::string& given) {
-    const auto head = parse_audit_head(given);
+    const auto head = storage::parse_audit_head(given);
     if (!head) throw CLI::ValidationError{"--expect", head.error().detail};
     options.expected = *head;
   };

@@ -17,11 +17,11 @@ namespace server::cli {
 
 struct Verify {
   std::filesystem::path data_dir = "rheonaut-data";
-  std::optional<std::filesystem::path> file;  // this one, instead of the folder's
-  std::optional<std::int64_t> run;            // only this one
-  bool integrity = false;                     // SQLite's own check also beside a running station
-  bool audit = false;                         // only the audit, also of a run's export
-  std::optional<AuditHead> expected;          // an entry that was in it once
+  std::optional<std::filesystem::path> file;   // this one, instead of the folder's
+  std::optional<std::int64_t> run;             // only this one
+  bool integrity = false;                      // SQLite's own check also beside a running station
+  bool audit = false;                          // only the audit, also of a run's export
+  std::optional<storage::AuditHead> expected;  // an entry that was in it once
   OutputForm form;
 };
 

@@ -87,12 +87,13 @@ int run(const Bode& options, std::ostream& out) {
     if (!options.points && (options.from_rad_s || options.to_rad_s)) {
       throw std::invalid_argument{"--from-rad-s and --to-rad-s belong to the response, which --json has with --points"};
     }
-    OrderedJson answer = json_of(margins);
-    answer["plant"] = json_of(loop.plant);
-    answer["controller"] = json_of(loop.controller);
+    analysis::OrderedJson answer = analysis::json_of(margins);
+    answer["plant"] = analysis::json_of(loop.plant);
+    answer["controller"] = analysis::json_of(loop.controller);
     answer["velocity_loop"] = options.is_velocity_loop;
     if (options.points)
-      answer["response"] = json_of(std::span<const control::BodePoint>(response(options, loop, *options.points)));
+      answer["response"] =
+          analysis::json_of(std::span<const control::BodePoint>(response(options, loop, *options.points)));
     write_json(out, answer);
     return 0;
   }

@@ -79,24 +79,25 @@ void add_option(CLI::App& command, ControllerChoice& choice) {
 control::FractionalModel read(const PlantChoice& choice) {
   if (!choice.file || *choice.file == "non_newtonian") return control::kNonNewtonianModel;
   if (*choice.file == "newtonian") return control::kNewtonianModel;
-  return value_of(*choice.file, model_from(read_json(*choice.file)));
+  return value_of(*choice.file, analysis::model_from(read_json(*choice.file)));
 }
 
 control::FopdController read(const ControllerChoice& choice) {
   if (!choice.file) return control::kPaperController;
-  return value_of(*choice.file, controller_from(read_json(*choice.file)));
+  return value_of(*choice.file, analysis::controller_from(read_json(*choice.file)));
 }
 
-CsvColumns read_csv(const std::string& file, std::initializer_list<const char*> required,
-                    std::initializer_list<const char*> optional, std::initializer_list<const char*> with_gaps) {
-  return parse_csv(read_text(file, kMaxCsvBytes), file, required, optional, with_gaps);
+analysis::CsvColumns read_csv(const std::string& file, std::initializer_list<const char*> required,
+                              std::initializer_list<const char*> optional,
+                              std::initializer_list<const char*> with_gaps) {
+  return analysis::parse_csv(read_text(file, kMaxCsvBytes), file, required, optional, with_gaps);
 }
 
 namespace {
 
 constexpr const char* kPositionSd = "position_sd_m";
 
-std::vector<double> times_of(const std::string& file, CsvColumns& columns) {
+std::vector<double> times_of(const std::string& file, analysis::CsvColumns& columns) {
   if (columns.contains("t_s")) return columns["t_s"];
   if (!columns.contains("robot_time_us")) refuse(file, "has no column t_s (seconds)");
   std::vector<double> time_s = columns["robot_time_us"];
@@ -106,14 +107,14 @@ std::vector<double> times_of(const std::string& file, CsvColumns& columns) {
 }
 
 // The decimals of an export stand for binary32.
-void round_to_binary32(CsvColumns& columns) {
+void round_to_binary32(analysis::CsvColumns& columns) {
   for (auto& [name, values] : columns) {
     if (name == "t_s" || name == "robot_time_us") continue;
     for (double& value : values) value = static_cast<double>(static_cast<float>(value));
   }
 }
 
-void take_off_disturbance(CsvColumns& columns) {
+void take_off_disturbance(analysis::CsvColumns& columns) {
   const std::vector<double>& disturbance_m = columns["disturbance_m"];
   std::vector<double>& position_m = columns["position_m"];
   for (std::size_t k = 0; k < std::min(disturbance_m.size(), position_m.size()); ++k) {
@@ -130,7 +131,7 @@ double largest_of(const std::vector<double>& values) {
 }
 
 // Leaves the columns that are fitted.
-std::string choose_channels(const std::string& file, CsvColumns& columns, bool with_velocity) {
+std::string choose_channels(const std::string& file, analysis::CsvColumns& columns, bool with_velocity) {
   if (!columns.contains(kPositionSd)) {
     columns.erase("acceleration_m_s2");
     return "the file has no column position_sd_m: what it holds is taken as measured";
@@ -138,7 +139,8 @@ std::string choose_channels(const std::string& file, CsvColumns& columns, bool w
   const double position_sd_m = largest_of(columns[kPositionSd]);
   if (position_sd_m > 0) {
     if (!columns.contains("acceleration_m_s2")) {
-      refuse(file, fmt::format("{}; but there is no column acceleration_m_s2", channels_reason(position_sd_m)));
+      refuse(file,
+             fmt::format("{}; but there is no column acceleration_m_s2", analysis::channels_reason(position_sd_m)));
     }
     columns.erase("position_m");
     columns.erase("velocity_m_s");
@@ -147,10 +149,10 @@ std::string choose_channels(const std::string& file, CsvColumns& columns, bool w
     if (!with_velocity && columns.contains("position_m")) columns.erase("velocity_m_s");
     take_off_disturbance(columns);
   }
-  return channels_reason(position_sd_m);
+  return analysis::channels_reason(position_sd_m);
 }
 
-void refuse_gaps(const std::string& file, const CsvColumns& columns) {
+void refuse_gaps(const std::string& file, const analysis::CsvColumns& columns) {
   for (const char* name : {"position_m", "velocity_m_s", "acceleration_m_s2"}) {
     const auto column = columns.find(name);
     if (column == columns.end()) continue;
@@ -164,14 +166,15 @@ void refuse_gaps(const std::string& file, const CsvColumns& columns) {
 
 }  // namespace
 
-RunRecording read_recording(const std::string& file, bool with_velocity) {
-  CsvColumns columns = read_csv(file, {"duty"}, {"t_s", "robot_time_us"},
-                                {"position_m", "velocity_m_s", kPositionSd, "acceleration_m_s2", "disturbance_m"});
+analysis::RunRecording read_recording(const std::string& file, bool with_velocity) {
+  analysis::CsvColumns columns =
+      read_csv(file, {"duty"}, {"t_s", "robot_time_us"},
+               {"position_m", "velocity_m_s", kPositionSd, "acceleration_m_s2", "disturbance_m"});
   const std::vector<double> time_s = times_of(file, columns);
   if (columns.contains(kPositionSd)) round_to_binary32(columns);
   const auto velocity = columns.find("velocity_m_s");
   const auto recorded_m_s = velocity == columns.end() ? std::vector<double>{} : velocity->second;
-  RunRecording made{{}, choose_channels(file, columns, with_velocity), {}};
+  analysis::RunRecording made{{}, choose_channels(file, columns, with_velocity), {}};
   const bool has_any = columns.contains("position_m") || columns.contains("velocity_m_s");
   if (!has_any && !columns.contains("acceleration_m_s2")) {
     refuse(file, "has neither position_m nor velocity_m_s; one of them is needed");
@@ -183,7 +186,7 @@ RunRecording read_recording(const std::string& file, bool with_velocity) {
   } catch (const std::invalid_argument& error) {
     refuse(file, error.what());
   }
-  if (auto moves = motion_at_start(made.recording, recorded_m_s)) made.warnings.push_back(std::move(*moves));
+  if (auto moves = analysis::motion_at_start(made.recording, recorded_m_s)) made.warnings.push_back(std::move(*moves));
   return made;
 }
 

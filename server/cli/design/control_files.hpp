@@ -31,14 +31,14 @@ void add_option(CLI::App& command, ControllerChoice& choice);
 control::FractionalModel read(const PlantChoice& choice);      // none: (29)
 control::FopdController read(const ControllerChoice& choice);  // none: (30)
 
-CsvColumns read_csv(const std::string& file, std::initializer_list<const char*> required,
-                    std::initializer_list<const char*> optional = {},
-                    std::initializer_list<const char*> with_gaps = {});
+analysis::CsvColumns read_csv(const std::string& file, std::initializer_list<const char*> required,
+                              std::initializer_list<const char*> optional = {},
+                              std::initializer_list<const char*> with_gaps = {});
 
 // Columns t_s (or robot_time_us, as the station exports), duty, and position_m or velocity_m_s or both. Where a column
 // position_sd_m says that the position is an estimate, acceleration_m_s2 is taken in their place. A file with that
 // column is a robot's record and is read as a run is: in binary32, without the disturbance, with_velocity only if asked
 // for.
-RunRecording read_recording(const std::string& file, bool with_velocity);
+analysis::RunRecording read_recording(const std::string& file, bool with_velocity);
 
 }  // namespace server::cli

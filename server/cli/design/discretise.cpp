@@ -109,13 +109,13 @@ int run(const Discretise& options, std::ostream& out) {
   const control::FopdController controller = read(options.controller);
   const control::DiscretisationChoice choice = discretised(controller, options.sampling);
   if (options.form.is_json) {
-    OrderedJson answer = json_of(choice.chosen);
+    analysis::OrderedJson answer = analysis::json_of(choice.chosen);
     answer["reason"] = choice.reason;
-    answer["compared"] = OrderedJson::array();
-    for (const Discretisation& other : choice.compared) answer["compared"].push_back(json_of(other));
-    answer["refused"] = OrderedJson::array();
+    answer["compared"] = analysis::OrderedJson::array();
+    for (const Discretisation& other : choice.compared) answer["compared"].push_back(analysis::json_of(other));
+    answer["refused"] = analysis::OrderedJson::array();
     for (const auto& [name, reason] : choice.refused) answer["refused"].push_back({{"name", name}, {"reason", reason}});
-    answer["controller"] = json_of(controller);
+    answer["controller"] = analysis::json_of(controller);
     write_json(out, answer);
     return 0;
   }

@@ -38,8 +38,8 @@ int run(const EstimatorQuestion& question, std::ostream& out) {
   const control::FractionalModel plant = read(question.plant);
   const control::EstimatorModel model = control::estimator_model(plant);
   if (question.form.is_json) {
-    OrderedJson answer = json_of(model);
-    answer["plant"] = json_of(plant);
+    analysis::OrderedJson answer = analysis::json_of(model);
+    answer["plant"] = analysis::json_of(plant);
     write_json(out, answer);
   } else if (model.is_met) {
     write_parameters(out, model);

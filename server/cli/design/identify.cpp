@@ -41,7 +41,7 @@ void add_source(CLI::App& command, Identify& options) {
   command.add_option("--from-s", options.window.from_s, "First second of the span to use")->check(finite())->needs(run);
   command.add_option("--to-s", options.window.to_s, "Last second of the span to use")->check(finite())->needs(run);
   add_word(command, "--channels", options.channels,
-           std::array{ChannelChoice::best, ChannelChoice::outside, ChannelChoice::robot},
+           std::array{analysis::ChannelChoice::best, analysis::ChannelChoice::outside, analysis::ChannelChoice::robot},
            "best, outside or robot: whether a position from outside is fitted (default: best, where the run has one)")
       ->needs(run);
   command.add_flag("--with-velocity", options.window.with_velocity,
@@ -99,13 +99,13 @@ std::vector<std::string> channels_of(const control::Recording& recording) {
   return names;
 }
 
-RunRecording recording_for(const Identify& options) {
+analysis::RunRecording recording_for(const Identify& options) {
   if (options.csv) return read_recording(*options.csv, options.window.with_velocity);
   if (!options.run.run) {
     throw std::runtime_error{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
   }
-  const std::vector<StoredSample> samples = read_samples(options.run);
-  const std::optional<StoredReference> reference = read_reference(options.run);
+  const std::vector<storage::StoredSample> samples = read_samples(options.run);
+  const std::optional<storage::StoredReference> reference = read_reference(options.run);
   auto recording = recording_of(samples, options.window, reference ? &*reference : nullptr, options.channels);
   if (!recording) throw std::runtime_error{fmt::format("run {}: {}", *options.run.run, recording.error().detail)};
   return std::move(*recording);
@@ -143,7 +143,8 @@ constexpr double kLargerThanSaid = 1.5;  // residuals, in sd of the reference
 // What a position from outside adds to the doubts.
 constexpr double kSuspiciousClockS = 0.005;
 
-void add_outside_doubts(const RunRecording& recorded, const Identify& options, control::Identification& found) {
+void add_outside_doubts(const analysis::RunRecording& recorded, const Identify& options,
+                        control::Identification& found) {
   if (!(recorded.position_sd_m > 0)) return;
   const double residual_sd_m = found.best.residual_sd;
   if (residual_sd_m > kLargerThanSaid * recorded.position_sd_m) {
@@ -172,7 +173,7 @@ struct ChiSquare {
   double value = 0, degrees_of_freedom = 0;
 };
 
-std::optional<ChiSquare> chi_square_of(const RunRecording& recorded, const Fit& fit) {
+std::optional<ChiSquare> chi_square_of(const analysis::RunRecording& recorded, const Fit& fit) {
   const auto positions = static_cast<double>(fit.position_residual_m.size());
   if (!(recorded.position_sd_m > 0) || !std::isfinite(fit.residual_sd)) return std::nullopt;
   const double relative_sd = fit.residual_sd / recorded.position_sd_m;
@@ -230,7 +231,7 @@ void write_estimator(std::ostream& out, const control::EstimatorModel& model) {
 }
 
 // In metres, also of positions that are weighed in the fit.
-OrderedJson residuals_json(const Fit& fit, const RunRecording& recorded) {
+analysis::OrderedJson residuals_json(const Fit& fit, const analysis::RunRecording& recorded) {
   std::vector<double> position_m = fit.position_residual_m;
   const std::vector<double>& sd_m = recorded.recording.position_sd_m;
   for (std::size_t i = 0; i < sd_m.size(); ++i) position_m[i] *= sd_m[i] / recorded.position_sd_m;
@@ -261,15 +262,15 @@ void add_options(CLI::App& command, Identify& options) {
 
 int run(const Identify& options, std::ostream& out) {
   if (options.plan.is_wanted) return run_plan(options, out);
-  const RunRecording recorded = recording_for(options);
+  const analysis::RunRecording recorded = recording_for(options);
   for (const std::string& warning : recorded.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
   control::Identification found = search(options, recorded.recording);
   found.warnings.insert(found.warnings.end(), recorded.warnings.begin(), recorded.warnings.end());
   add_outside_doubts(recorded, options, found);
   const std::optional<control::EstimatorModel> estimator = estimator_of(found.best);
   if (options.form.is_json) {
-    OrderedJson answer = json_of(found);
-    answer["estimator"] = estimator ? json_of(*estimator) : OrderedJson{};
+    analysis::OrderedJson answer = analysis::json_of(found);
+    answer["estimator"] = estimator ? analysis::json_of(*estimator) : analysis::OrderedJson{};
     answer["channels"] = channels_of(recorded.recording);
     answer["channels_reason"] = recorded.channels_reason;
     if (const auto chi_square = chi_square_of(recorded, found.best)) {

@@ -33,8 +33,8 @@ struct Plan {
 struct Identify {
   std::optional<std::string> csv;
   RunChoice run;
-  RunWindow window;
-  ChannelChoice channels = ChannelChoice::best;
+  analysis::RunWindow window;
+  analysis::ChannelChoice channels = analysis::ChannelChoice::best;
   control::IdentificationOptions search;
   bool with_residuals = false;
   Plan plan;

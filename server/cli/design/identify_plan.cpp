@@ -38,8 +38,8 @@ int run_plan(const Identify& options, std::ostream& out) {
   const control::FractionalModel plant = read(options.plant);
   const auto expected = control::expected_uncertainty(plant, experiment_of(options.plan, options.search.fits_offset));
   if (options.form.is_json) {
-    OrderedJson answer = json_of(expected);
-    answer["plant"] = json_of(plant);
+    analysis::OrderedJson answer = analysis::json_of(expected);
+    answer["plant"] = analysis::json_of(plant);
     write_json(out, answer);
     return 0;
   }

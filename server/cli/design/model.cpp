@@ -39,7 +39,7 @@ void add_parameters(CLI::App& command, control::HydrodynamicParameters& p) {
 }
 
 control::MotorFit fit_motor(const std::string& file) {
-  const CsvColumns columns = read_csv(file, {"t_s", "duty", "rate_rad_s"});
+  const analysis::CsvColumns columns = read_csv(file, {"t_s", "duty", "rate_rad_s"});
   const auto& times_s = columns.at("t_s");
   if (times_s.size() < 3)
     throw std::runtime_error{fmt::format("{}: has {} rows; at least 3 are needed", file, times_s.size())};
@@ -54,16 +54,16 @@ control::MotorFit fit_motor(const std::string& file) {
   return control::fit_motor(dt_s, columns.at("duty"), columns.at("rate_rad_s"));
 }
 
-OrderedJson described(const control::FractionalModel& model) {
-  OrderedJson out = json_of(model);
+analysis::OrderedJson described(const control::FractionalModel& model) {
+  analysis::OrderedJson out = analysis::json_of(model);
   out["dc_gain_m_s"] = model.kp / model.b3;
-  out["poles_rad_s"] = poles_json(model);
+  out["poles_rad_s"] = analysis::poles_json(model);
   return out;
 }
 
 std::string poles_text(const control::FractionalModel& model) {
   std::string text;
-  for (const auto& pole : poles_json(model)) {
+  for (const auto& pole : analysis::poles_json(model)) {
     const double imaginary = pole["imaginary"];
     if (imaginary < 0) continue;
     text += text.empty() ? "" : ", ";
@@ -155,17 +155,17 @@ int run(const Model& options, std::ostream& out) {
   }
   const control::HydrodynamicModel derived = control::hydrodynamic_model(parameters);
   if (options.preset) {
-    write_json(out, json_of(chosen(*options.preset, derived)));
+    write_json(out, analysis::json_of(chosen(*options.preset, derived)));
     return 0;
   }
   if (options.form.is_json) {
-    OrderedJson hydrodynamic = json_of(derived);
+    analysis::OrderedJson hydrodynamic = analysis::json_of(derived);
     hydrodynamic["model"] = described(derived.model);
-    hydrodynamic["parameters"] = json_of(parameters);
+    hydrodynamic["parameters"] = analysis::json_of(parameters);
     write_json(out, {{"non_newtonian", described(control::kNonNewtonianModel)},
                      {"newtonian", described(control::kNewtonianModel)},
                      {"hydrodynamic", hydrodynamic},
-                     {"motor_fit", motor ? json_of(*motor) : OrderedJson(nullptr)}});
+                     {"motor_fit", motor ? analysis::json_of(*motor) : analysis::OrderedJson(nullptr)}});
     return 0;
   }
   if (motor) write_fit(out, *motor);

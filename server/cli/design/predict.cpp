@@ -19,27 +19,28 @@ constexpr long long kLargestSeed = (1LL << 53) - 1;  // what JSON holds exactly
 
 // What a run did, and when the experiment that is predicted began in it.
 struct Measured {
-  std::vector<MeasuredStep> steps;
+  std::vector<analysis::MeasuredStep> steps;
   double began_at_s = 0;
   std::string position_source;  // in words
 };
 
-double largest_sd_m(std::span<const MeasuredStep> steps, bool is_from_outside) {
+double largest_sd_m(std::span<const analysis::MeasuredStep> steps, bool is_from_outside) {
   double largest_m = 0;
-  for (const MeasuredStep& step : steps) {
+  for (const analysis::MeasuredStep& step : steps) {
     if (step.is_from_outside == is_from_outside) largest_m = std::max(largest_m, step.position_sd_m);
   }
   return largest_m;
 }
 
 // From where the positions of the steps are had.
-std::string source_in_words(std::span<const MeasuredStep> steps, const std::optional<StoredReference>& reference) {
+std::string source_in_words(std::span<const analysis::MeasuredStep> steps,
+                            const std::optional<storage::StoredReference>& reference) {
   const double own_sd_m = largest_sd_m(steps, false);
   const std::string own = own_sd_m > 0
                               ? fmt::format("the robot's own estimate (position_sd_m is up to {:.2g} m)", own_sd_m)
                               : std::string{"the position is known: position_sd_m is 0 throughout"};
   if (!reference) return own;
-  const auto outside = std::ranges::count(steps, true, &MeasuredStep::is_from_outside);
+  const auto outside = std::ranges::count(steps, true, &analysis::MeasuredStep::is_from_outside);
   if (outside == 0) {
     return own + "; the position from outside has no step with 10 positions and no pause over 0.25 s";
   }
@@ -49,22 +50,23 @@ std::string source_in_words(std::span<const MeasuredStep> steps, const std::opti
   return fmt::format("{}, in {} of {} steps; in the others {}", measured, outside, steps.size(), own);
 }
 
-double time_of(std::span<const StepPoint> points, std::uint32_t span, std::uint64_t seq) {
-  const auto is_of_span = [span](const StepPoint& point) { return point.span == span; };
+double time_of(std::span<const analysis::StepPoint> points, std::uint32_t span, std::uint64_t seq) {
+  const auto is_of_span = [span](const analysis::StepPoint& point) { return point.span == span; };
   const auto first = std::ranges::find_if(points, is_of_span);
-  const auto at = std::ranges::find_if(first, points.end(), [seq](const StepPoint& point) { return point.seq == seq; });
+  const auto at =
+      std::ranges::find_if(first, points.end(), [seq](const analysis::StepPoint& point) { return point.seq == seq; });
   return static_cast<double>(at->robot_time_us - first->robot_time_us) * 1e-6;
 }
 
 // Makes the experiment the run's first step of setpoint, with the disturbance that follows it.
 Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experiment) {
-  std::vector<StepPoint> points;
-  for (const StoredSample& stored : read_samples(choice)) points.push_back(step_point(stored));
-  const std::optional<StoredReference> reference = read_reference(choice);
+  std::vector<analysis::StepPoint> points;
+  for (const storage::StoredSample& stored : read_samples(choice)) points.push_back(analysis::step_point(stored));
+  const std::optional<storage::StoredReference> reference = read_reference(choice);
   Measured measured;
   measured.steps = measure_steps(points, reference ? &*reference : nullptr);
   const auto& steps = measured.steps;
-  const auto first = std::ranges::find(steps, StepCause::setpoint, &MeasuredStep::cause);
+  const auto first = std::ranges::find(steps, analysis::StepCause::setpoint, &analysis::MeasuredStep::cause);
   if (first == steps.end()) {
     throw std::runtime_error{fmt::format("run {} has no step of setpoint in auto mode to compare with", *choice.run)};
   }
@@ -75,9 +77,10 @@ Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experime
   experiment.duration_s = time_of(points, first->span, first->last_seq) - first->at_s;
   experiment.disturbance_at_s = 2 * experiment.duration_s;
   const auto next = first + 1;
-  if (next != steps.end() && next->cause == StepCause::disturbance && next->span == first->span) {
-    const auto at = std::ranges::find_if(
-        points, [&](const StepPoint& point) { return point.span == next->span && point.seq == next->first_seq; });
+  if (next != steps.end() && next->cause == analysis::StepCause::disturbance && next->span == first->span) {
+    const auto at = std::ranges::find_if(points, [&](const analysis::StepPoint& point) {
+      return point.span == next->span && point.seq == next->first_seq;
+    });
     experiment.disturbance_m = static_cast<double>(at->disturbance_m) - static_cast<double>((at - 1)->disturbance_m);
     experiment.disturbance_at_s = next->at_s - first->at_s;
     experiment.duration_s = time_of(points, next->span, next->last_seq) - first->at_s;
@@ -85,7 +88,7 @@ Measured follow(const RunChoice& choice, control::ClosedLoopExperiment& experime
   return measured;
 }
 
-OrderedJson estimate_error_json(const std::optional<EstimateError>& error) {
+analysis::OrderedJson estimate_error_json(const std::optional<analysis::EstimateError>& error) {
   if (!error) return nullptr;
   return {{"rms_m", error->rms_m},
           {"worst_m", error->worst_m},
@@ -93,17 +96,17 @@ OrderedJson estimate_error_json(const std::optional<EstimateError>& error) {
           {"samples", error->samples}};
 }
 
-OrderedJson measured_step_json(const MeasuredStep& step) {
-  OrderedJson out = {{"cause", text(step.cause)},
-                     {"span", step.span},
-                     {"at_s", step.at_s},
-                     {"start_m", step.start_m},
-                     {"target_m", step.target_m},
-                     {"band_m", step.band_m},
-                     {"position_source", position_source(step)},
-                     {"position_sd_m", step.position_sd_m},
-                     {"estimate_error", estimate_error_json(step.estimate_error)}};
-  out.update(json_of(step.metrics));
+analysis::OrderedJson measured_step_json(const analysis::MeasuredStep& step) {
+  analysis::OrderedJson out = {{"cause", text(step.cause)},
+                               {"span", step.span},
+                               {"at_s", step.at_s},
+                               {"start_m", step.start_m},
+                               {"target_m", step.target_m},
+                               {"band_m", step.band_m},
+                               {"position_source", position_source(step)},
+                               {"position_sd_m", step.position_sd_m},
+                               {"estimate_error", estimate_error_json(step.estimate_error)}};
+  out.update(analysis::json_of(step.metrics));
   return out;
 }
 
@@ -124,7 +127,7 @@ void write_table(std::ostream& out, const control::ClosedLoopExperiment& experim
     add_row(table, fmt::format("disturbance {:g} m, predicted", experiment.disturbance_m),
             measured.began_at_s + experiment.disturbance_at_s, prediction.disturbance);
   }
-  for (const MeasuredStep& step : measured.steps) {
+  for (const analysis::MeasuredStep& step : measured.steps) {
     add_row(table,
             fmt::format("{} {:.4g} to {:.4g} m, measured{}", text(step.cause), step.start_m, step.target_m,
                         step.is_from_outside ? " from outside" : ""),
@@ -166,19 +169,22 @@ void add_world(CLI::App& command, control::ClosedLoopExperiment& e) {
   add("--seed", e.noise_seed, "Of the noise")->check(whole(0, kLargestSeed));
 }
 
-OrderedJson answer_of(const control::ClosedLoopExperiment& experiment, const control::DiscretisationChoice& controller,
-                      const control::ClosedLoopPrediction& prediction, const Measured& measured) {
-  OrderedJson answer = json_of(prediction);
+analysis::OrderedJson answer_of(const control::ClosedLoopExperiment& experiment,
+                                const control::DiscretisationChoice& controller,
+                                const control::ClosedLoopPrediction& prediction, const Measured& measured) {
+  analysis::OrderedJson answer = analysis::json_of(prediction);
   answer["experiment"] = {
       {"setpoint_m", experiment.setpoint_m},       {"duration_s", experiment.duration_s},
       {"disturbance_m", experiment.disturbance_m}, {"disturbance_at_s", experiment.disturbance_at_s},
       {"duty_min", experiment.duty_min},           {"duty_max", experiment.duty_max}};
   if (experiment.settling_band_m > 0) answer["experiment"]["settling_band_m"] = experiment.settling_band_m;
-  answer["compared_with"] = measured.steps.empty() ? OrderedJson{} : OrderedJson(measured.position_source);
-  answer["measured_steps"] = OrderedJson::array();
-  for (const MeasuredStep& step : measured.steps) answer["measured_steps"].push_back(measured_step_json(step));
-  answer["plant"] = json_of(experiment.plant);
-  answer["sections"] = json_of(experiment.controller);
+  answer["compared_with"] =
+      measured.steps.empty() ? analysis::OrderedJson{} : analysis::OrderedJson(measured.position_source);
+  answer["measured_steps"] = analysis::OrderedJson::array();
+  for (const analysis::MeasuredStep& step : measured.steps)
+    answer["measured_steps"].push_back(measured_step_json(step));
+  answer["plant"] = analysis::json_of(experiment.plant);
+  answer["sections"] = analysis::json_of(experiment.controller);
   answer["period_s"] = experiment.period_s;
   answer["method"] = text(controller.chosen.options.method);
   return answer;
@@ -214,9 +220,9 @@ int run(const Predict& options, std::ostream& out) {
   if (options.form.is_csv) {
     write_samples(out, prediction);
   } else if (options.form.is_json) {
-    OrderedJson answer = answer_of(experiment, controller, prediction, measured);
+    analysis::OrderedJson answer = answer_of(experiment, controller, prediction, measured);
     if (options.with_robustness) {
-      answer["robustness"] = json_of(control::robustness(experiment.plant, controller.chosen));
+      answer["robustness"] = analysis::json_of(control::robustness(experiment.plant, controller.chosen));
     }
     write_json(out, answer);
   } else {

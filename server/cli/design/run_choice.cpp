@@ -14,25 +14,26 @@ namespace server::cli {
 
 void add_options(CLI::App& command, RunChoice& choice) {
   auto* run = command.add_option("--run", choice.run, "A recorded run by its number");
-  run->check(whole(1, std::numeric_limits<RunId>::max()));
+  run->check(whole(1, std::numeric_limits<storage::RunId>::max()));
   command.add_option("--data", choice.data_dir, "Folder of the station that recorded it (default: rheonaut-data)")
       ->check(named())
       ->needs(run);
 }
 
-std::vector<StoredSample> read_samples(const RunChoice& choice) {
-  auto samples = read_run(choice.data_dir / "station.sqlite", choice.run.value(), kMaxAnalysedSamples);
+std::vector<storage::StoredSample> read_samples(const RunChoice& choice) {
+  auto samples =
+      storage::read_run(choice.data_dir / "station.sqlite", choice.run.value(), analysis::kMaxAnalysedSamples);
   if (!samples) throw std::runtime_error{samples.error().detail};
   return std::move(*samples);
 }
 
-std::optional<StoredReference> read_reference(const RunChoice& choice) {
-  std::optional<StoredReference> stored;
+std::optional<storage::StoredReference> read_reference(const RunChoice& choice) {
+  std::optional<storage::StoredReference> stored;
   auto read = [&](SQLite::Database& database, const std::string&) -> Result<void> {
-    stored = server::read_reference(database, choice.run.value());
+    stored = storage::read_reference(database, choice.run.value());
     return {};
   };
-  const auto done = read_store(choice.data_dir / "station.sqlite", read);
+  const auto done = storage::read_store(choice.data_dir / "station.sqlite", read);
   if (!done) throw std::runtime_error{done.error().detail};
   return stored;
 }

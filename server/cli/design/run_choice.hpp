@@ -21,7 +21,7 @@ struct RunChoice {
 void add_options(CLI::App& command, RunChoice& choice);
 
 // Throws std::runtime_error saying what is wrong; never creates or changes anything.
-std::vector<StoredSample> read_samples(const RunChoice& choice);
-std::optional<StoredReference> read_reference(const RunChoice& choice);  // none: the run has none
+std::vector<storage::StoredSample> read_samples(const RunChoice& choice);
+std::optional<storage::StoredReference> read_reference(const RunChoice& choice);  // none: the run has none
 
 }  // namespace server::cli

@@ -73,7 +73,7 @@ int run(const Step& options, std::ostream& out) {
     duty.assign(times_s.size(), options.duty);
     response = control::step_response(plant, options.duty, times_s);
   } else {
-    CsvColumns columns = read_csv(*options.duty_csv, {"t_s", "duty"});
+    analysis::CsvColumns columns = read_csv(*options.duty_csv, {"t_s", "duty"});
     times_s = std::move(columns["t_s"]);
     duty = std::move(columns["duty"]);
     response = control::sampled_response(plant, times_s, duty);
@@ -88,7 +88,7 @@ int run(const Step& options, std::ostream& out) {
                      {"duty", duty},
                      {"velocity_m_s", response.velocity_m_s},
                      {"position_m", response.position_m},
-                     {"plant", json_of(plant)}});
+                     {"plant", analysis::json_of(plant)}});
   } else {
     write_table(out, times_s, duty, response);
   }

@@ -61,24 +61,24 @@ void write_ranges(std::ostream& out, const Tune& options, const Ranges& ranges) 
              fmt::join(words, ", "));
 }
 
-OrderedJson ends_of(const Ranges& ranges) {
+analysis::OrderedJson ends_of(const Ranges& ranges) {
   if (ranges.empty()) return nullptr;
-  OrderedJson ends = OrderedJson::array();
+  analysis::OrderedJson ends = analysis::OrderedJson::array();
   for (const auto& range : ranges) ends.insert(ends.end(), {range.low_deg, range.high_deg});
   return ends;
 }
 
-OrderedJson answer_of(const Tune& options, const control::FractionalModel& plant, const control::TuningResult& result,
-                      const Ranges& ranges) {
-  OrderedJson answer = json_of(result);
+analysis::OrderedJson answer_of(const Tune& options, const control::FractionalModel& plant,
+                                const control::TuningResult& result, const Ranges& ranges) {
+  analysis::OrderedJson answer = analysis::json_of(result);
   answer["feasible_phase_margins_deg"] = ends_of(ranges);
   answer["asked"] = {{"crossover_rad_s", options.spec.gain_crossover_rad_s},
                      {"phase_margin_deg", options.spec.phase_margin_deg},
-                     {"mu", or_null(options.spec.mu)},
+                     {"mu", analysis::or_null(options.spec.mu)},
                      {"velocity_loop", options.spec.is_velocity_loop}};
-  answer["plant"] = json_of(plant);
+  answer["plant"] = analysis::json_of(plant);
   if (options.with_robustness && result.tuned) {
-    answer["robustness"] = json_of(robustness_of(plant, result.tuned->controller));
+    answer["robustness"] = analysis::json_of(robustness_of(plant, result.tuned->controller));
   }
   return answer;
 }

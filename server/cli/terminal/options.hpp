@@ -16,7 +16,7 @@
 
 namespace server::cli {
 
-using server::text;  // beside those of the tools' own enumerations
+using analysis::text;  // beside those of the tools' own enumerations
 
 // Each is a validator for CLI::Option::check.
 CLI::Validator finite();

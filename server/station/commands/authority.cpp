@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace server {
+namespace server::station {
 namespace {
 
 std::unexpected<Error> held_by(const RobotId& robot, const std::string& holder) {
@@ -127,4 +127,4 @@ std::vector<Authority::Change> Authority::expire() {
   return changes;
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -16,7 +16,7 @@
 #include "server/station/commands/requests.hpp"
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 inline constexpr microseconds kRequestTimeout{30'000'000};  // of a request for control
 
@@ -29,7 +29,7 @@ class Authority {
     std::string cause;  // who, from whom, why
   };
 
-  explicit Authority(Clock& clock) : clock_{clock} {}
+  explicit Authority(runtime::Clock& clock) : clock_{clock} {}
 
   // Who holds control now; no holder: nobody.
   ControlState of(const RobotId& robot) const;
@@ -71,8 +71,8 @@ class Authority {
   Lease& give(const RobotId& robot, const std::string& actor, microseconds duration);
   Result<Lease*> own_lease(const RobotId& robot, const std::string& actor);
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   std::map<RobotId, Lease> leases_;  // of known robots only
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace server {
+namespace server::station {
 namespace {
 
 Result<void> within(const char* name, double value, double minimum, double maximum) {
@@ -17,7 +17,7 @@ Result<void> within(const char* name, double value, double minimum, double maxim
 // SAFETY: the motor runs at power no longer than the limit, also when each command alone is within it. What waits for
 // its time or still runs counts too, ahead_s.
 Result<void> check_power(double duty, double lasts_s, double ahead_s, const RobotState& robot,
-                         const CommandLimits& limits) {
+                         const config::CommandLimits& limits) {
   const bool is_at_power = std::abs(duty) > limits.power_duty;
   if (!is_at_power || robot.at_power_s + ahead_s + lasts_s <= limits.power_s) return {};
   const std::string waits =
@@ -31,7 +31,7 @@ Result<void> check_power(double duty, double lasts_s, double ahead_s, const Robo
 
 // The schedule's own time at power counts, too. Its last duty ends it.
 Result<void> check_schedule(const protocol::Command& command, double ahead_s, const RobotState& robot,
-                            const CommandLimits& limits) {
+                            const config::CommandLimits& limits) {
   const auto& schedule = command.action.set_duty_schedule;
   double highest = 0;
   for (pb_size_t i = 0; i < schedule.duty_count; ++i) {
@@ -44,7 +44,7 @@ Result<void> check_schedule(const protocol::Command& command, double ahead_s, co
 
 // SAFETY: what runs or waits is extended only while it fits in the time at power. What has begun may be counted twice
 // for a tick or two.
-Result<void> check_renewal(double ahead_s, const RobotState& robot, const CommandLimits& limits) {
+Result<void> check_renewal(double ahead_s, const RobotState& robot, const config::CommandLimits& limits) {
   const double twice_s = 2e-6 * robot.sample_period_us;
   if (ahead_s <= twice_s || robot.at_power_s + ahead_s <= limits.power_s + twice_s) return {};
   return fail(
@@ -56,13 +56,14 @@ Result<void> check_renewal(double ahead_s, const RobotState& robot, const Comman
 }
 
 // SAFETY: a duty that runs since the limits were wider is not kept running. Duties are floats on the way.
-Result<void> check_running_duty(const RobotState& robot, const CommandLimits& limits) {
+Result<void> check_running_duty(const RobotState& robot, const config::CommandLimits& limits) {
   if (robot.context.mode != rheonaut_MODE_MANUAL) return {};
   return within("the running duty", robot.sample->duty, limits.duty_min - 1e-6, limits.duty_max + 1e-6);
 }
 
 // SAFETY: nor is a schedule that was accepted under wider ones, as far as it is still to run.
-Result<void> check_running_schedules(const OrdersAhead& ahead, const RobotState& robot, const CommandLimits& limits) {
+Result<void> check_running_schedules(const OrdersAhead& ahead, const RobotState& robot,
+                                     const config::CommandLimits& limits) {
   for (const OrderAhead& order : ahead) {
     if (order.command->which_action != rheonaut_Command_set_duty_schedule_tag) continue;
     const auto& schedule = order.command->action.set_duty_schedule;
@@ -78,7 +79,7 @@ Result<void> check_running_schedules(const OrdersAhead& ahead, const RobotState&
 }
 
 Result<void> check_values(const protocol::Command& command, const OrdersAhead& ahead, const RobotState& robot,
-                          const CommandLimits& limits) {
+                          const config::CommandLimits& limits) {
   const double ahead_s = at_power_ahead_s(ahead, robot.sample_period_us, limits);
   const auto in_range = [&limits](double setpoint_m) {
     return within("setpoint_m", setpoint_m, limits.setpoint_min_m, limits.setpoint_max_m);
@@ -143,9 +144,9 @@ bool needs_control(const protocol::Command& command) {
          command.which_action != rheonaut_Command_get_parameters_tag;
 }
 
-Result<void> check_command(const protocol::Command& command, const RobotState& robot, const Envelope& envelope,
+Result<void> check_command(const protocol::Command& command, const RobotState& robot, const config::Envelope& envelope,
                            const OrdersAhead& ahead) {
-  const CommandLimits& limits = envelope.in(robot.fluid);
+  const config::CommandLimits& limits = envelope.in(robot.fluid);
   auto values = check_values(command, ahead, robot, limits);
   if (values) values = check_steps(command, ahead, robot, limits);
   if (!values) {
@@ -167,4 +168,4 @@ Result<void> check_command(const protocol::Command& command, const RobotState& r
   return {};
 }
 
-}  // namespace server
+}  // namespace server::station

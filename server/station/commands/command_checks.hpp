@@ -6,7 +6,7 @@
 #include "server/station/commands/orders_ahead.hpp"
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 bool moves_the_motor(const protocol::Command& command);
 
@@ -15,7 +15,7 @@ bool needs_control(const protocol::Command& command);
 
 // invalid for a value outside the limits, conflict when the robot's state forbids the command now. `ahead`: what is on
 // its way to the robot, or waits there. Judges nothing that only the robot can know; the robot checks everything again.
-Result<void> check_command(const protocol::Command& command, const RobotState& robot, const Envelope& envelope,
+Result<void> check_command(const protocol::Command& command, const RobotState& robot, const config::Envelope& envelope,
                            const OrdersAhead& ahead);
 
-}  // namespace server
+}  // namespace server::station

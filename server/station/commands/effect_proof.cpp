@@ -5,7 +5,7 @@
 
 #include "server/station/commands/telemetry_verifier.hpp"
 
-namespace server {
+namespace server::station {
 namespace {
 
 // When it can have taken effect, and samples have shown it, at the latest.
@@ -63,4 +63,4 @@ bool is_proved(const PendingCommand& pending, const SampleBatch& batch) {
          is_shown_between(pending.wire, pending.look_from_robot_us, pending.look_until_robot_us, batch);
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -8,7 +8,7 @@
 
 #include "server/station/commands/robot_commands.hpp"
 
-namespace server {
+namespace server::station {
 
 // A command is being sent at this time of the robot: notes from when and until when its effect is a proof, and that it
 // is none for the others any more.
@@ -17,4 +17,4 @@ void prepare_proof(const RobotState& robot, const RobotCommands& commands, Pendi
 
 bool is_proved(const PendingCommand& pending, const SampleBatch& batch);
 
-}  // namespace server
+}  // namespace server::station

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace server {
+namespace server::station {
 namespace {
 
 // The lease of what waits, and what the station may know too late of the robot's time.
@@ -117,7 +117,7 @@ void OrderTimeline::drop_schedule(CommandId id) {
 }
 
 bool OrderTimeline::begins_too_far_away(const RobotState& robot, const RobotCommands& commands,
-                                        const CommandLimits& limits) const {
+                                        const config::CommandLimits& limits) const {
   if (robot.context.mode == rheonaut_MODE_AUTO || !robot.sample) return false;
   OrdersAhead setpoints = ahead(robot, commands);
   std::erase_if(setpoints, [](const OrderAhead& order) {
@@ -128,4 +128,4 @@ bool OrderTimeline::begins_too_far_away(const RobotState& robot, const RobotComm
   return is_too_large(std::abs(*setpoint_of(*first->command) - robot.sample->position_m), limits);
 }
 
-}  // namespace server
+}  // namespace server::station

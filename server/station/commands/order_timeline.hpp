@@ -11,7 +11,7 @@
 #include "server/station/commands/orders_ahead.hpp"
 #include "server/station/commands/robot_commands.hpp"
 
-namespace server {
+namespace server::station {
 
 class OrderTimeline {
  public:
@@ -35,7 +35,8 @@ class OrderTimeline {
                     const protocol::Command* newer = nullptr) const;
 
   // Whether the first setpoint that waits for its time is no longer within a step of where the robot has been driven.
-  bool begins_too_far_away(const RobotState& robot, const RobotCommands& commands, const CommandLimits& limits) const;
+  bool begins_too_far_away(const RobotState& robot, const RobotCommands& commands,
+                           const config::CommandLimits& limits) const;
 
  private:
   // A schedule that the robot has accepted, at the time look_from_robot_us, until it has ended.
@@ -52,4 +53,4 @@ class OrderTimeline {
   std::uint64_t schedules_ended_by_ = 0, timed_dropped_by_ = 0;  // numbers of the newest accepted that do so
 };
 
-}  // namespace server
+}  // namespace server::station

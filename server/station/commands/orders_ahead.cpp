@@ -7,14 +7,14 @@
 #include <cmath>
 #include <string>
 
-namespace server {
+namespace server::station {
 namespace {
 
 constexpr auto kWayOut =
     "; what waits is dropped by set_mode manual, by the release of control, or when it is not renewed for 500 ms";
 
 std::unexpected<Error> too_large(double setpoint_m, double from_m, const std::string& from, const char* way_out,
-                                 const CommandLimits& limits) {
+                                 const config::CommandLimits& limits) {
   return fail(
       ErrorCode::invalid,
       fmt::format("setpoint_m = {} is {:.3f} m from {}; a step is at most {} m{}", static_cast<float>(setpoint_m),
@@ -29,7 +29,7 @@ bool has_held_between(const OrdersAhead& ahead, std::uint64_t after_us, std::uin
 }
 
 // Without a setpoint in force the step is counted from where the robot is, as far as that is known.
-Result<void> check_step_from_now(double setpoint_m, const RobotState& robot, const CommandLimits& limits) {
+Result<void> check_step_from_now(double setpoint_m, const RobotState& robot, const config::CommandLimits& limits) {
   const bool is_steered = robot.context.mode == rheonaut_MODE_AUTO && robot.context.setpoint_m;
   if (!is_steered && !robot.sample) return {};
   const double from_m = is_steered ? *robot.context.setpoint_m : robot.sample->position_m;
@@ -50,7 +50,7 @@ bool is_schedule(const protocol::Command& command) {
   return command.which_action == rheonaut_Command_set_duty_schedule_tag;
 }
 
-bool is_too_large(double step_m, const CommandLimits& limits) {
+bool is_too_large(double step_m, const config::CommandLimits& limits) {
   return std::isfinite(step_m) && step_m > limits.setpoint_step_m + 1e-6;
 }
 
@@ -70,7 +70,7 @@ OrderAhead unanswered_order(const protocol::Command& command, std::uint64_t robo
 }
 
 Result<void> check_steps(const protocol::Command& command, const OrdersAhead& ahead, const RobotState& robot,
-                         const CommandLimits& limits) {
+                         const config::CommandLimits& limits) {
   const auto setpoint_m = setpoint_of(command);
   if (!setpoint_m) return {};
   const OrderAhead order = unanswered_order(command, robot.latest_robot_time_us);
@@ -95,7 +95,7 @@ std::uint64_t schedule_length_us(const protocol::Command& command, std::uint32_t
   return std::uint64_t{schedule.tick[schedule.tick_count - 1]} * tick_us;
 }
 
-double at_power_s(const protocol::Command& command, std::uint32_t tick_us, const CommandLimits& limits,
+double at_power_s(const protocol::Command& command, std::uint32_t tick_us, const config::CommandLimits& limits,
                   std::uint64_t sampled_us) {
   const auto is_at_power = [&limits](double duty) { return std::abs(duty) > limits.power_duty; };
   if (command.which_action == rheonaut_Command_set_duty_tag) {
@@ -114,7 +114,7 @@ double at_power_s(const protocol::Command& command, std::uint32_t tick_us, const
   return static_cast<double>(sum_us) / 1e6;
 }
 
-double at_power_ahead_s(const OrdersAhead& ahead, std::uint32_t tick_us, const CommandLimits& limits) {
+double at_power_ahead_s(const OrdersAhead& ahead, std::uint32_t tick_us, const config::CommandLimits& limits) {
   double sum_s = 0;
   for (const OrderAhead& order : ahead) {
     if (!order.command->has_execute_at_robot_us && !is_schedule(*order.command)) continue;
@@ -123,4 +123,4 @@ double at_power_ahead_s(const OrdersAhead& ahead, std::uint32_t tick_us, const C
   return sum_s;
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -10,7 +10,7 @@
 #include "server/runtime/result.hpp"
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 struct OrderAhead {
   const protocol::Command* command = nullptr;
@@ -24,7 +24,7 @@ bool is_schedule(const protocol::Command& command);
 std::optional<double> setpoint_of(const protocol::Command& command);
 
 // Setpoints are floats on the way: a step of just the limit is not too large.
-bool is_too_large(double step_m, const CommandLimits& limits);
+bool is_too_large(double step_m, const config::CommandLimits& limits);
 
 // When the command acts that the robot has not acknowledged: from its time on, or from now, until its time to live
 // ends.
@@ -34,17 +34,17 @@ OrderAhead unanswered_order(const protocol::Command& command, std::uint64_t robo
 // follow every other, and the setpoint in force or else the position, unless one that the robot holds lies between
 // their times.
 Result<void> check_steps(const protocol::Command& command, const OrdersAhead& ahead, const RobotState& robot,
-                         const CommandLimits& limits);
+                         const config::CommandLimits& limits);
 
 // From its effect on; 0 for anything but a schedule.
 std::uint64_t schedule_length_us(const protocol::Command& command, std::uint32_t tick_us);
 
 // How long the motor runs at power by this command alone: a duty for its lease, a schedule for the entries above the
 // limit that come after `sampled_us` of it.
-double at_power_s(const protocol::Command& command, std::uint32_t tick_us, const CommandLimits& limits,
+double at_power_s(const protocol::Command& command, std::uint32_t tick_us, const config::CommandLimits& limits,
                   std::uint64_t sampled_us = 0);
 
 // The same, of all that is to act at a time of its own, and of every schedule, as far as it is still to run.
-double at_power_ahead_s(const OrdersAhead& ahead, std::uint32_t tick_us, const CommandLimits& limits);
+double at_power_ahead_s(const OrdersAhead& ahead, std::uint32_t tick_us, const config::CommandLimits& limits);
 
-}  // namespace server
+}  // namespace server::station

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace server {
+namespace server::station {
 namespace {
 
 CommandId random_id() {
@@ -16,11 +16,11 @@ CommandId random_id() {
 
 }  // namespace
 
-std::int64_t robot_now_us(const RobotState& robot, const Clock& clock) {
+std::int64_t robot_now_us(const RobotState& robot, const runtime::Clock& clock) {
   return static_cast<std::int64_t>(robot.latest_robot_time_us) + clock.steady_us() - robot.last_received_steady_us;
 }
 
-std::shared_ptr<PendingCommand> make_pending(boost::asio::io_context& loop, const Clock& clock,
+std::shared_ptr<PendingCommand> make_pending(boost::asio::io_context& loop, const runtime::Clock& clock,
                                              const CommandRequest& request, const RobotState& robot) {
   auto pending = std::make_shared<PendingCommand>(loop);
   const std::int64_t now_us = clock.steady_us();
@@ -56,7 +56,7 @@ std::shared_ptr<PendingCommand> answered_before(boost::asio::io_context& loop, c
   return same;
 }
 
-void end_command(PendingCommand& pending, CommandState state, std::string reason, const Clock& clock,
+void end_command(PendingCommand& pending, CommandState state, std::string reason, const runtime::Clock& clock,
                  RecentCommands& recent) {
   CommandRecord& record = pending.record;
   record.state = state;
@@ -74,4 +74,4 @@ bool is_superseded_by(const PendingCommand& older, const protocol::Command& newe
   return older.record.state == CommandState::queued && older.wire.which_action == kind;
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -13,7 +13,7 @@
 #include "server/station/commands/recent_commands.hpp"
 #include "server/station/commands/requests.hpp"
 
-namespace server {
+namespace server::station {
 
 // The submitter waits for its answer, or its end. Shared by the robot's entry and the submitter, since either may go
 // first.
@@ -40,24 +40,24 @@ struct PendingCommand {
   bool is_overtaken = false;              // acknowledged, and a later one that moves the motor too
   bool is_proved_by_samples = false;      // sent: samples that show its effect prove that it has run
   const char* dropped_because = nullptr;  // timed: why the station has it dropped; null: it does not
-  Signal answered, ended;
+  runtime::Signal answered, ended;
 };
 
 // The robot's time now: of its latest frame and what has passed since. Never ahead of the robot's own clock.
-std::int64_t robot_now_us(const RobotState& robot, const Clock& clock);
+std::int64_t robot_now_us(const RobotState& robot, const runtime::Clock& clock);
 
 // Draws the id, names the boot, and computes the expiry from the latest robot time; a stop does not expire.
-std::shared_ptr<PendingCommand> make_pending(boost::asio::io_context& loop, const Clock& clock,
+std::shared_ptr<PendingCommand> make_pending(boost::asio::io_context& loop, const runtime::Clock& clock,
                                              const CommandRequest& request, const RobotState& robot);
 
 // A command that was answered before, for a request that repeats it.
 std::shared_ptr<PendingCommand> answered_before(boost::asio::io_context& loop, const CommandRecord& record);
 
 // Writes the end into the record and resumes the coroutine that waits for it. The caller publishes the record.
-void end_command(PendingCommand& pending, CommandState state, std::string reason, const Clock& clock,
+void end_command(PendingCommand& pending, CommandState state, std::string reason, const runtime::Clock& clock,
                  RecentCommands& recent);
 
 // Of the setpoints, and of the duties, that wait for the link only the newest is sent.
 bool is_superseded_by(const PendingCommand& older, const protocol::Command& newer);
 
-}  // namespace server
+}  // namespace server::station

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-namespace server {
+namespace server::station {
 namespace {
 
 bool is_set_parameter(const protocol::Command& command) {
@@ -137,4 +137,4 @@ ControllerReading read_back(SentCommands sent, const RobotSettings& known, const
   return reading;
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -11,7 +11,7 @@
 #include "server/station/commands/telemetry_verifier.hpp"
 #include "server/station/state/in_force.hpp"
 
-namespace server {
+namespace server::station {
 
 // True for what the robot itself reports after it: a page of parameters, the controller in force.
 bool is_read_back(const protocol::Command& command);
@@ -34,4 +34,4 @@ struct ControllerReading {
 // seen go is any that no other command has ordered.
 ControllerReading read_back(SentCommands sent, const RobotSettings& known, const protocol::Controller& reported);
 
-}  // namespace server
+}  // namespace server::station

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstring>
 
-namespace server {
+namespace server::station {
 
 void RecentCommands::put(const CommandRecord& record, std::int64_t now_us) {
   if (const auto known = entries_.find(record.id); known != entries_.end()) {
@@ -45,4 +45,4 @@ bool is_command_key(const std::string& key) {
   return !key.empty() && key.size() <= kMaxKey && std::ranges::all_of(key, is_allowed);
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -7,7 +7,7 @@
 
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 // SAFETY: of a command that is known from the database only. A stop of then is no answer to a press of now.
 inline constexpr std::int64_t kLongAgoUs = -3'600'000'000;
@@ -35,4 +35,4 @@ CommandId command_id_of(const RobotId& robot_id, const std::string& actor, const
 // 1 to 64 characters of [A-Za-z0-9._:-].
 bool is_command_key(const std::string& key);
 
-}  // namespace server
+}  // namespace server::station

@@ -10,7 +10,7 @@
 #include "server/runtime/clock.hpp"
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 inline constexpr microseconds kControlLease{3'000'000};      // after the holder's last sign of life
 inline constexpr microseconds kLongestControl{600'000'000};  // that a script may ask for
@@ -60,4 +60,4 @@ struct ControlRequest {
   microseconds age{0};                // take, force: of what its page saw; above kOldestSight it begins nothing
 };
 
-}  // namespace server
+}  // namespace server::station

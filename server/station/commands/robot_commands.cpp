@@ -5,7 +5,7 @@
 
 #include "server/station/commands/read_back.hpp"
 
-namespace server {
+namespace server::station {
 
 void RobotCommands::add(const std::shared_ptr<PendingCommand>& pending) {
   pending->number = ++last_number;
@@ -78,4 +78,4 @@ std::vector<std::shared_ptr<PendingCommand>> RobotCommands::to_be_read_back() co
   return sent;
 }
 
-}  // namespace server
+}  // namespace server::station

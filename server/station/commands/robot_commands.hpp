@@ -10,7 +10,7 @@
 
 #include "server/station/commands/pending_command.hpp"
 
-namespace server {
+namespace server::station {
 
 struct RobotCommands {
   static constexpr std::size_t kMaxWaiting = 64;  // of each of the queues; the oldest leave
@@ -46,4 +46,4 @@ struct RobotCommands {
   std::vector<std::shared_ptr<PendingCommand>> to_be_read_back() const;
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <span>
 
-namespace server {
+namespace server::station {
 namespace {
 
 constexpr float kSameDuty = 0.001F;  // a duty is a float on its whole way
@@ -113,4 +113,4 @@ Sight look_for(const protocol::Command& command, std::uint64_t effect_at_robot_u
   return last_us >= from_us + kVerifyWindowUs ? Sight::missed : Sight::unseen;
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -3,7 +3,7 @@
 
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 // Telemetry of at most this much robot time after the effect must show it.
 inline constexpr std::uint64_t kVerifyWindowUs = 500'000;
@@ -34,4 +34,4 @@ enum class Sight : std::uint8_t {
 Sight look_for(const protocol::Command& command, std::uint64_t effect_at_robot_us, std::uint64_t emergency_id,
                const SampleBatch& batch);
 
-}  // namespace server
+}  // namespace server::station

@@ -2,7 +2,7 @@
 
 #include "server/station/models/parameter_match.hpp"
 
-namespace server {
+namespace server::station {
 namespace {
 
 // A confirmation that did not come from here.
@@ -30,4 +30,4 @@ Judgement judge(const RobotState& robot, const ObservedConfirmation& seen, const
   return {Finding::nothing_new, is_flag_old};
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -10,7 +10,7 @@
 #include "server/station/models/observed_confirmation.hpp"
 #include "server/station/state/in_force.hpp"
 
-namespace server {
+namespace server::station {
 
 enum class Finding {
   nothing_new,
@@ -29,4 +29,4 @@ struct Judgement {
 Judgement judge(const RobotState& robot, const ObservedConfirmation& seen, const ParameterTable& reported,
                 const std::optional<FluidModel>& sent, const FluidModel* model, std::int64_t now_us);
 
-}  // namespace server
+}  // namespace server::station

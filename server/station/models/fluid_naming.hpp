@@ -9,7 +9,7 @@
 #include "server/station/state/fluid_model.hpp"
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 struct FluidNaming {
   std::uint64_t number = 0;  // counts those of this robot
@@ -19,4 +19,4 @@ struct FluidNaming {
   std::optional<FluidModel> model;  // none: a confirmation is taken back
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -7,7 +7,7 @@
 #include "server/station/models/parameter_match.hpp"
 #include "server/station/models/parameter_request.hpp"
 
-namespace server {
+namespace server::station {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
 
@@ -33,7 +33,7 @@ bool is_at_rest(const RobotState& robot) {
   return robot.context.mode != rheonaut_MODE_AUTO && (!robot.sample || robot.sample->duty == 0);
 }
 
-ModelExchange::ModelExchange(Clock& clock, ModelRobot& robot, FluidNaming naming)
+ModelExchange::ModelExchange(runtime::Clock& clock, ModelRobot& robot, FluidNaming naming)
     : clock_{clock}, robot_{robot}, naming_{std::move(naming)}, deadline_us_{clock.steady_us() + kPatience.count()} {}
 
 asio::awaitable<Result<void>> ModelExchange::run() { return naming_.model ? send_model() : take_back(); }
@@ -136,4 +136,4 @@ Result<void> ModelExchange::check_wanted() const {
   return {};
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -19,7 +19,7 @@
 #include "server/station/models/fluid_naming.hpp"
 #include "server/station/state/in_force.hpp"
 
-namespace server {
+namespace server::station {
 
 // The robot at the other end, as the station knows it now.
 class ModelRobot {
@@ -37,7 +37,7 @@ class ModelExchange {
  public:
   static constexpr microseconds kPatience{30'000'000};  // with a robot that moves
 
-  ModelExchange(Clock& clock, ModelRobot& robot, FluidNaming naming);
+  ModelExchange(runtime::Clock& clock, ModelRobot& robot, FluidNaming naming);
 
   boost::asio::awaitable<Result<void>> run();
 
@@ -52,7 +52,7 @@ class ModelExchange {
   boost::asio::awaitable<Outcome> wait_for_rest();
   Outcome check_wanted() const;
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   ModelRobot& robot_;
   const FluidNaming naming_;
   const std::int64_t deadline_us_;
@@ -61,4 +61,4 @@ class ModelExchange {
 // As far as the station knows; the robot itself may still coast.
 bool is_at_rest(const RobotState& robot);
 
-}  // namespace server
+}  // namespace server::station

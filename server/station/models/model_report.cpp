@@ -4,7 +4,7 @@
 
 #include <utility>
 
-namespace server {
+namespace server::station {
 namespace {
 
 constexpr const char* kNotTakenBack = "what was confirmed before is not taken back yet";
@@ -67,4 +67,4 @@ std::string not_sent_words(const FluidNaming& naming, const Error& error) {
   return fmt::format("the model of '{}' could not be sent: {}", naming.fluid, error.detail);
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -9,7 +9,7 @@
 #include "server/station/models/fluid_naming.hpp"
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 // Nobody has said that the robot's model is that of its fluid; `why` may be empty.
 RobotModel assumed_model(std::string why);
@@ -31,4 +31,4 @@ std::string confirmed_words(const FluidNaming& naming);
 std::string taken_back_words(const FluidNaming& naming);
 std::string not_sent_words(const FluidNaming& naming, const Error& error);
 
-}  // namespace server
+}  // namespace server::station

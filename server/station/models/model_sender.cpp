@@ -12,7 +12,7 @@
 #include "server/station/models/model_report.hpp"
 #include "server/station/models/parameter_match.hpp"
 
-namespace server {
+namespace server::station {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
 
@@ -44,7 +44,7 @@ class ModelSender::StationRobot final : public ModelRobot {
   const Entry& entry_;
 };
 
-ModelSender::ModelSender(asio::io_context& loop, TaskGroup& tasks, Clock& clock, Station& station,
+ModelSender::ModelSender(asio::io_context& loop, runtime::TaskGroup& tasks, runtime::Clock& clock, Station& station,
                          const FluidModelList& models)
     : loop_{loop}, tasks_{tasks}, clock_{clock}, station_{station}, models_{models}, wake_{loop_} {
   station.add_sink(*this);
@@ -101,7 +101,7 @@ asio::awaitable<void> ModelSender::work(RobotId id) {
 }
 
 asio::awaitable<void> ModelSender::alone(RobotId id, asio::awaitable<void> task) {
-  return contained(tasks_.exceptions(), clock_, Ended::model, fmt::format("the model of robot '{}'", id),
+  return contained(tasks_.exceptions(), clock_, runtime::Ended::model, fmt::format("the model of robot '{}'", id),
                    std::move(task));
 }
 
@@ -263,4 +263,4 @@ void ModelSender::settle_debt(const RobotState& robot, Entry& entry) {
   begin(robot.id, entry);
 }
 
-}  // namespace server
+}  // namespace server::station

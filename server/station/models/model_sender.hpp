@@ -33,14 +33,14 @@
 #include "server/station/state/fluid_model.hpp"
 #include "server/station/station.hpp"
 
-namespace server {
+namespace server::station {
 
 class ModelSender final : public StationSink {
  public:
   static constexpr microseconds kRetryInterval{5'000'000};  // of what is owed
 
   // From now on models are sent; a task of the group watches what robots report of theirs.
-  ModelSender(boost::asio::io_context& loop, TaskGroup& tasks, Clock& clock, Station& station,
+  ModelSender(boost::asio::io_context& loop, runtime::TaskGroup& tasks, runtime::Clock& clock, Station& station,
               const FluidModelList& models);
 
   void on_robot(const RobotState& robot) override;
@@ -76,14 +76,14 @@ class ModelSender final : public StationSink {
   void look_again(const RobotId& id);
 
   boost::asio::io_context& loop_;
-  TaskGroup& tasks_;
-  Clock& clock_;
+  runtime::TaskGroup& tasks_;
+  runtime::Clock& clock_;
   Station& station_;
   const FluidModelList& models_;
   std::unordered_map<RobotId, Entry> entries_;
   std::set<RobotId> changed_;  // of which run() must know
   std::set<RobotId> open_;     // that owe, or whose confirmation is not judged yet
-  Signal wake_;
+  runtime::Signal wake_;
 };
 
-}  // namespace server
+}  // namespace server::station

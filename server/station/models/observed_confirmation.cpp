@@ -1,6 +1,6 @@
 #include "server/station/models/observed_confirmation.hpp"
 
-namespace server {
+namespace server::station {
 
 bool ObservedConfirmation::on_flag(BootId boot_id, bool flag, std::int64_t now_us) {
   if (boot_id_ == boot_id && flag_ == flag) return false;
@@ -20,4 +20,4 @@ void ObservedConfirmation::on_page(std::uint64_t first_seq, std::int64_t now_us)
   page_came_us_ = now_us;
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -8,7 +8,7 @@
 
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 class ObservedConfirmation {
  public:
@@ -40,4 +40,4 @@ class ObservedConfirmation {
   std::int64_t page_came_us_ = 0;
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace server {
+namespace server::station {
 
 bool holds(const ParameterTable& reported, const FluidModel& model) {
   return std::ranges::all_of(parameters_of(model), [&](const auto& parameter) {
@@ -18,4 +18,4 @@ bool holds_another(const ParameterTable& reported, const FluidModel& model) {
   });
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -4,7 +4,7 @@
 #include "server/station/state/fluid_model.hpp"
 #include "server/station/state/in_force.hpp"
 
-namespace server {
+namespace server::station {
 
 // The parameter that confirms the other eight.
 inline constexpr const char* kModelConfirmed = "model_confirmed";
@@ -14,4 +14,4 @@ bool holds(const ParameterTable& reported, const FluidModel& model);
 // At least one has been reported that is not the model's.
 bool holds_another(const ParameterTable& reported, const FluidModel& model);
 
-}  // namespace server
+}  // namespace server::station

@@ -4,7 +4,7 @@
 
 #include "base/json_text.hpp"
 
-namespace server {
+namespace server::station {
 
 CommandRequest set_parameter_request(const RobotId& id, const Author& by, const std::string& name, float value) {
   CommandRequest request;
@@ -21,4 +21,4 @@ CommandRequest set_parameter_request(const RobotId& id, const Author& by, const 
   return request;
 }
 
-}  // namespace server
+}  // namespace server::station

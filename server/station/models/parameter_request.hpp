@@ -6,8 +6,8 @@
 #include "server/station/commands/requests.hpp"
 #include "server/station/state/audit_note.hpp"
 
-namespace server {
+namespace server::station {
 
 CommandRequest set_parameter_request(const RobotId& id, const Author& by, const std::string& name, float value);
 
-}  // namespace server
+}  // namespace server::station

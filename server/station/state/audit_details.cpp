@@ -4,7 +4,7 @@
 
 #include "server/station/state/audit_note.hpp"
 
-namespace server {
+namespace server::station {
 
 std::string refusal_detail(const std::string& request, const std::string& problem, const std::string& reason) {
   constexpr std::size_t kMaxProblemBytes = 300;
@@ -23,4 +23,4 @@ std::string fluid_detail(const std::string& before) { return audit_detail({{"bef
 
 std::string refused_fluid(const std::string& fluid) { return nlohmann::json{{"fluid", fluid}}.dump(); }
 
-}  // namespace server
+}  // namespace server::station

@@ -3,7 +3,7 @@
 
 #include <string>
 
-namespace server {
+namespace server::station {
 
 // A request that was refused: what is known of it, as a JSON object, with the problem, and the reason if there is one.
 // Of what somebody else says only the beginning is kept: it may be anything.
@@ -13,4 +13,4 @@ std::string control_detail(const std::string& cause, const std::string& holder);
 std::string fluid_detail(const std::string& before);
 std::string refused_fluid(const std::string& fluid);  // the request of a refusal
 
-}  // namespace server
+}  // namespace server::station

@@ -3,10 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
-namespace server {
+namespace server::station {
 
 std::string audit_detail(const nlohmann::json& detail) {
   return detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-}  // namespace server
+}  // namespace server::station

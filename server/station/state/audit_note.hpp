@@ -8,7 +8,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-namespace server {
+namespace server::station {
 
 struct Author {
   std::string actor;       // "user:anna/session:4", "token:ci", "station", "loopback", "cli:root"; empty: nobody said
@@ -28,4 +28,4 @@ struct AuditNote {
 // As text for `detail`; what is not UTF-8 is replaced.
 std::string audit_detail(const nlohmann::json& detail);
 
-}  // namespace server
+}  // namespace server::station

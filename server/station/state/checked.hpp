@@ -16,15 +16,18 @@
 
 #include "protocol/messages.hpp"
 
-namespace server {
+namespace server::link {
+struct FrameFaults;
+struct FrameReach;
+FrameFaults mend(protocol::RobotFrame& frame, const FrameReach& reach);
+}  // namespace server::link
+
+namespace server::station {
 
 // The largest number of a sample or event, and the latest robot time in µs: beyond any boot, and far from SQLite's
 // limit.
 inline constexpr std::uint64_t kMaxRobotNumber = (std::uint64_t{1} << 62) - 1;
 inline constexpr std::uint32_t kMaxPeriodUs = 10'000'000;
-
-struct FrameFaults;
-struct FrameReach;
 
 // A part of a frame, valid as long as the frame is.
 template <class Message>
@@ -33,10 +36,10 @@ class Checked {
   const Message& operator*() const { return *message_; }
 
  private:
-  friend FrameFaults mend(protocol::RobotFrame& frame, const FrameReach& reach);
+  friend link::FrameFaults link::mend(protocol::RobotFrame& frame, const link::FrameReach& reach);
   explicit Checked(const Message& message) : message_{&message} {}
 
   const Message* message_;
 };
 
-}  // namespace server
+}  // namespace server::station

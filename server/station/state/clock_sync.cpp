@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
-namespace server {
+namespace server::station {
 
 std::int64_t ClockEstimate::uncertainty_us(std::uint64_t robot_time_us) const {
   const auto age_us = std::abs(static_cast<std::int64_t>(robot_time_us - measured_at_robot_us));
@@ -51,4 +51,4 @@ double ClockSync::drift_ppm() const {
   return span_us <= 0 ? 0 : static_cast<double>(newer.offset_us - older.offset_us) / span_us * 1e6;
 }
 
-}  // namespace server
+}  // namespace server::station

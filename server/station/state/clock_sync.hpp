@@ -13,7 +13,7 @@
 
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 struct ClockExchange {
   std::int64_t sent_at_us = 0;             // t1
@@ -45,4 +45,4 @@ class ClockSync {
   ClockEstimate estimate_;
 };
 
-}  // namespace server
+}  // namespace server::station

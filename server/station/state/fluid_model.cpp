@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-namespace server {
+namespace server::station {
 
 std::array<std::pair<std::string, float>, 2 * kFluidModelSections> parameters_of(const FluidModel& model) {
   std::array<std::pair<std::string, float>, 2 * kFluidModelSections> parameters;
@@ -14,4 +14,4 @@ std::array<std::pair<std::string, float>, 2 * kFluidModelSections> parameters_of
   return parameters;
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-namespace server {
+namespace server::station {
 
 inline constexpr std::size_t kFluidModelSections = 4;
 
@@ -52,4 +52,4 @@ class FluidModelList {
   std::map<std::string, FluidModel> models_;
 };
 
-}  // namespace server
+}  // namespace server::station

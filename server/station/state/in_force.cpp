@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-namespace server {
+namespace server::station {
 
 namespace {
 
@@ -88,4 +88,4 @@ void RobotSettings::add(const protocol::Controller& reported, std::optional<prot
   is_controller_current = true;
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -9,7 +9,7 @@
 
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 // Of the robot's parameters, those that bound its motion: only an admin changes them, with a confirmation.
 bool bounds_motion(const std::string& parameter);
@@ -59,4 +59,4 @@ struct RobotSettings {
   void add(const protocol::Controller& reported, std::optional<protocol::Controller> former, std::int64_t at_us);
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -6,7 +6,7 @@
 #include "server/config/link_settings.hpp"
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 struct AdmissionRequest {
   RobotId robot_id;
@@ -54,4 +54,4 @@ class RobotArchive {
   virtual boost::asio::awaitable<Admission> admit(AdmissionRequest request) = 0;
 };
 
-}  // namespace server
+}  // namespace server::station

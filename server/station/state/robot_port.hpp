@@ -7,7 +7,7 @@
 
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 struct RobotEntry;  // server/station/robot_entry.hpp
 
@@ -46,4 +46,4 @@ class RobotPort {
   RobotEntry* entry_ = nullptr;  // of its robot, while this port is the one that the station uses
 };
 
-}  // namespace server
+}  // namespace server::station

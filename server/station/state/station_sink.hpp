@@ -6,7 +6,7 @@
 #include "server/station/state/audit_note.hpp"
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 class StationSink {
  public:
@@ -28,4 +28,4 @@ class StationSink {
   virtual void on_in_force(const RobotState&, const InForceRecord&) {}
 };
 
-}  // namespace server
+}  // namespace server::station

@@ -1,6 +1,6 @@
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::station {
 
 const char* text(LinkState value) { return value == LinkState::connected ? "connected" : "disconnected"; }
 
@@ -29,4 +29,4 @@ const char* text(CommandState value) {
   return "unknown";
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -23,7 +23,7 @@ inline bool operator==(const rheonaut_Status& a, const rheonaut_Status& b) {
   return std::bit_cast<Bytes>(a) == std::bit_cast<Bytes>(b);
 }
 
-namespace server {
+namespace server::station {
 
 using RobotId = std::string;      // 1 to 31 characters of [a-z0-9_-]
 using BootId = std::uint64_t;     // random per boot of a robot, never 0; a decimal string in JSON
@@ -226,4 +226,4 @@ struct CommandRecord {
   std::string peer;       // the address that it came from; empty: from the station itself
 };
 
-}  // namespace server
+}  // namespace server::station

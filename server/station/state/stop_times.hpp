@@ -7,7 +7,7 @@
 #include <array>
 #include <cstdint>
 
-namespace server {
+namespace server::station {
 
 // Counts of times by upper bound, as Prometheus keeps them.
 class Histogram {
@@ -34,4 +34,4 @@ struct StopTimes {
   Histogram sent, acknowledged, verified;
 };
 
-}  // namespace server
+}  // namespace server::station

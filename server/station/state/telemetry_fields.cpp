@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-namespace server {
+namespace server::station {
 
 SampleContext context_of(const protocol::Telemetry& telemetry) {
   SampleContext context;
@@ -27,4 +27,4 @@ void copy_samples(const protocol::Telemetry& telemetry, std::vector<Sample>& int
   }
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -26,7 +26,7 @@
 
 #include "protocol/messages.hpp"
 
-namespace server {
+namespace server::station {
 
 // What changes with each sample: binary32 each.
 struct Sample {
@@ -177,4 +177,4 @@ inline std::array<float, kSampleFieldCount> values_of(const Sample& sample) {
 SampleContext context_of(const protocol::Telemetry& telemetry);
 void copy_samples(const protocol::Telemetry& telemetry, std::vector<Sample>& into);
 
-}  // namespace server
+}  // namespace server::station

@@ -16,7 +16,7 @@
 #include "protocol/messages.hpp"
 #include "server/station/state/telemetry_fields.hpp"
 
-namespace server {
+namespace server::station {
 
 // Of an enumerator that a version before schema 7 stored: of those it kept the text alone.
 inline constexpr std::int32_t kNumberNotKept = std::numeric_limits<std::int32_t>::min();
@@ -60,4 +60,4 @@ std::string text_or_number(Enumerator value) {
   return is_unknown(value) ? fmt::format("unknown_{}", number_of(value)) : protocol::text(value);
 }
 
-}  // namespace server
+}  // namespace server::station

@@ -12,7 +12,7 @@
 
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::string_view kFormat = "rheonaut-audit-1\n";
@@ -98,7 +98,7 @@ Result<AuditHead> parse_audit_head(const std::string& text) {
                           text.substr(0, 100)));
 }
 
-AuditHash content_hash_of(const AuditNote& note, const AuditSalt& salt) {
+AuditHash content_hash_of(const station::AuditNote& note, const AuditSalt& salt) {
   Hashing hashing;
   hashing.add(kFormat.data(), kFormat.size());
   hashing.add(salt.data(), salt.size());
@@ -144,7 +144,7 @@ AuditChain::AuditChain(SQLite::Database& database)
     : head_{database, kSelectHead},
       insert_{database, fmt::format("INSERT INTO audit ({}) VALUES (?,?,?,?,?,?,?,?,?,?,?)", kAuditColumns)} {}
 
-std::int64_t AuditChain::append(const AuditNote& note) {
+std::int64_t AuditChain::append(const station::AuditNote& note) {
   const AuditHead before = read_head(head_);
   head_.reset();
   const std::int64_t entry = before.entry + 1;
@@ -161,11 +161,11 @@ std::int64_t AuditChain::append(const AuditNote& note) {
   return entry;
 }
 
-AuditHead append_audit(SQLite::Database& database, const AuditNote& note) {
+AuditHead append_audit(SQLite::Database& database, const station::AuditNote& note) {
   SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
   AuditChain{database}.append(note);
   transaction.commit();
   return audit_head(database);
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -22,14 +22,14 @@
 #include "server/runtime/result.hpp"
 #include "server/station/state/audit_note.hpp"
 
-namespace server {
+namespace server::storage {
 
 using AuditHash = std::array<unsigned char, 32>;
 using AuditSalt = std::array<unsigned char, 16>;
 
 struct AuditEntry {
   std::int64_t entry = 0;
-  AuditNote note;
+  station::AuditNote note;
   AuditSalt salt{};
   AuditHash content_hash{};
   AuditHash hash{};
@@ -45,7 +45,7 @@ std::string text(const AuditHash& hash);  // hexadecimal, lower case
 std::string text(const AuditHead& head);  // "42:9f86…", as verify --expect takes it
 Result<AuditHead> parse_audit_head(const std::string& text);
 
-AuditHash content_hash_of(const AuditNote& note, const AuditSalt& salt);
+AuditHash content_hash_of(const station::AuditNote& note, const AuditSalt& salt);
 AuditHash link_hash_of(const AuditHash& before, std::int64_t entry, const AuditHash& content_hash);
 
 // In the order in which audit_entry_from() reads them.
@@ -61,7 +61,7 @@ class AuditChain {
   explicit AuditChain(SQLite::Database& database);
 
   // In the caller's transaction. Returns the entry's number.
-  std::int64_t append(const AuditNote& note);
+  std::int64_t append(const station::AuditNote& note);
 
  private:
   SQLite::Statement head_;
@@ -69,6 +69,6 @@ class AuditChain {
 };
 
 // The same in a transaction of its own. Returns the head then.
-AuditHead append_audit(SQLite::Database& database, const AuditNote& note);
+AuditHead append_audit(SQLite::Database& database, const station::AuditNote& note);
 
-}  // namespace server
+}  // namespace server::storage

@@ -8,7 +8,7 @@
 
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 
 AuditPage read_audit(SQLite::Database& database, const AuditFilter& filter) {
   const SQLite::Transaction moment{database};
@@ -34,4 +34,4 @@ AuditPage read_audit(SQLite::Database& database, const AuditFilter& filter) {
   return page;
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -12,7 +12,7 @@
 
 #include "server/storage/audit/audit_chain.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct AuditFilter {
   std::optional<std::string> robot_id;  // empty text: the station itself
@@ -34,4 +34,4 @@ inline constexpr std::int64_t kAuditRowsLookedAt = 5'000;  // by one page; about
 
 AuditPage read_audit(SQLite::Database& database, const AuditFilter& filter);
 
-}  // namespace server
+}  // namespace server::storage

@@ -13,7 +13,7 @@
 
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::storage {
 
 class AuditQuota {
  public:
@@ -63,4 +63,4 @@ class AuditQuota {
   std::map<std::string, LeftOut> left_out_;
 };
 
-}  // namespace server
+}  // namespace server::storage

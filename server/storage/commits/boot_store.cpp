@@ -12,19 +12,19 @@
 #include "server/storage/audit/audit_chain.hpp"
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 bool matches(const SQLite::Column& stored, const std::string& token) {
-  SecretHash hash{};
+  runtime::SecretHash hash{};
   if (static_cast<std::size_t>(stored.getBytes()) != hash.size()) return false;
   std::copy_n(static_cast<const unsigned char*>(stored.getBlob()), hash.size(), hash.begin());
-  return same(hash, hash_of(token));
+  return runtime::same(hash, runtime::hash_of(token));
 }
 
 void set_token(SQLite::Statement& statement, int index, const std::string& token) {
   if (token.empty()) return statement.bind(index);
-  const SecretHash hash = hash_of(token);
+  const runtime::SecretHash hash = runtime::hash_of(token);
   statement.bind(index, hash.data(), static_cast<int>(hash.size()));
 }
 
@@ -39,33 +39,33 @@ void add_intervals(SQLite::Database& database, const char* sql, std::int64_t boo
 
 }  // namespace
 
-Admission refusal(protocol::RefusalReason reason, std::string detail) {
-  Admission admission;
+station::Admission refusal(protocol::RefusalReason reason, std::string detail) {
+  station::Admission admission;
   admission.refusal = reason;
   admission.detail = std::move(detail);
   return admission;
 }
 
-Admission reused(const AdmissionRequest& request, const RobotId& owner) {
+station::Admission reused(const station::AdmissionRequest& request, const station::RobotId& owner) {
   return refusal(
       rheonaut_REFUSAL_REASON_BOOT_ID_REUSED,
       fmt::format("boot {} belongs to robot '{}'; a boot_id must be random, new in each boot", request.boot_id, owner));
 }
 
-Admission revoked(const RobotId& robot_id) {
+station::Admission revoked(const station::RobotId& robot_id) {
   return refusal(rheonaut_REFUSAL_REASON_WRONG_TOKEN,
                  fmt::format("the token of robot '{}' was revoked; enrol the robot again", robot_id));
 }
 
-std::vector<RestoredRobot> BootStore::robots() {
-  std::vector<RestoredRobot> robots;
+std::vector<station::RestoredRobot> BootStore::robots() {
+  std::vector<station::RestoredRobot> robots;
   SQLite::Statement query{
       database_.handle(),
       "SELECT robot.robot_id, boot_id, coalesce(retired_at_us, 0), fluid FROM robot LEFT JOIN boot ON boot_key ="
       " (SELECT max(boot_key) FROM boot WHERE boot.robot_id = robot.robot_id)"
       " ORDER BY robot.robot_id"};
   while (query.executeStep()) {
-    const RobotId robot_id = query.getColumn(0).getString();
+    const station::RobotId robot_id = query.getColumn(0).getString();
     robots.push_back({.id = robot_id,
                       .boot_id = unsigned_id(query.getColumn(1)),
                       .emergency_id = latch_of(robot_id),
@@ -76,7 +76,7 @@ std::vector<RestoredRobot> BootStore::robots() {
 }
 
 // SAFETY: a boot that has connected and of which nothing is stored yet does not count: then the boot before it decides.
-std::uint64_t BootStore::latch_of(const RobotId& robot_id) {
+std::uint64_t BootStore::latch_of(const station::RobotId& robot_id) {
   SQLite::Statement boots{database_.handle(), "SELECT boot_key FROM boot WHERE robot_id = ? ORDER BY boot_key DESC"};
   bind_all(boots, robot_id);
   while (boots.executeStep()) {
@@ -114,7 +114,7 @@ std::int64_t BootStore::next_boot_key() {
 }
 
 std::vector<AdmissionOutcome> BootStore::admit(const std::vector<AdmissionQuestion>& questions,
-                                               const LoopbackEnrolment& enrolment) {
+                                               const config::LoopbackEnrolment& enrolment) {
   try {
     return admit_together(questions, enrolment);
   } catch (const std::exception&) {  // one that cannot be stored keeps no other out: each by itself
@@ -134,7 +134,7 @@ std::vector<AdmissionOutcome> BootStore::admit(const std::vector<AdmissionQuesti
 }
 
 std::vector<AdmissionOutcome> BootStore::admit_together(std::span<const AdmissionQuestion> questions,
-                                                        const LoopbackEnrolment& enrolment) {
+                                                        const config::LoopbackEnrolment& enrolment) {
   SQLite::Transaction transaction{database_.handle()};  // becomes a writing one only if a robot is new
   std::vector<AdmissionOutcome> outcomes;
   for (const AdmissionQuestion& question : questions) {
@@ -146,9 +146,9 @@ std::vector<AdmissionOutcome> BootStore::admit_together(std::span<const Admissio
   return outcomes;
 }
 
-AdmissionOutcome BootStore::admit_one(const AdmissionQuestion& question, const LoopbackEnrolment& enrolment) {
-  const AdmissionRequest& request = question.request;
-  std::optional<RobotId> owner = question.owner;
+AdmissionOutcome BootStore::admit_one(const AdmissionQuestion& question, const config::LoopbackEnrolment& enrolment) {
+  const station::AdmissionRequest& request = question.request;
+  std::optional<station::RobotId> owner = question.owner;
   AdmissionOutcome outcome;
   outcome.admission = check_robot(request, enrolment);
   outcome.admission.store_id = database_.store_id();
@@ -166,8 +166,9 @@ AdmissionOutcome BootStore::admit_one(const AdmissionQuestion& question, const L
   return outcome;
 }
 
-Admission BootStore::check_robot(const AdmissionRequest& request, const LoopbackEnrolment& enrolment) {
-  Admission admission;
+station::Admission BootStore::check_robot(const station::AdmissionRequest& request,
+                                          const config::LoopbackEnrolment& enrolment) {
+  station::Admission admission;
   const bool may_enrol = enrolment.allowed && request.from_loopback;
   if (request.token.empty() && !request.from_loopback) {
     return refusal(rheonaut_REFUSAL_REASON_WRONG_TOKEN,
@@ -210,13 +211,14 @@ Admission BootStore::check_robot(const AdmissionRequest& request, const Loopback
 }
 
 // SAFETY: whatever runs on this machine cannot fill the lists of robots, and the stop of all, with names.
-std::optional<Admission> BootStore::check_room(const AdmissionRequest& request, const LoopbackEnrolment& enrolment) {
+std::optional<station::Admission> BootStore::check_room(const station::AdmissionRequest& request,
+                                                        const config::LoopbackEnrolment& enrolment) {
   SQLite::Statement count{database_.handle(),
                           "SELECT count(*), coalesce(sum(enrolled_at_us BETWEEN ?1 - 60000000 AND ?1), 0) FROM robot"
                           " WHERE enrolled_by = 'loopback' AND revoked_at_us IS NULL"};
   bind_all(count, request.received_at_us);
   count.executeStep();
-  std::optional<Admission> refused;
+  std::optional<station::Admission> refused;
   if (unsigned_id(count.getColumn(0)) >= enrolment.most_robots) {
     refused =
         refusal(rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT,
@@ -233,8 +235,8 @@ std::optional<Admission> BootStore::check_room(const AdmissionRequest& request, 
   return refused;
 }
 
-void BootStore::note_enrolled(const AdmissionRequest& request) {
-  AuditNote note;
+void BootStore::note_enrolled(const station::AdmissionRequest& request) {
+  station::AuditNote note;
   note.by = {"loopback", "", request.received_at_us};
   note.robot_id = request.robot_id;
   note.action = "robot.enrolled";
@@ -251,7 +253,7 @@ void BootStore::add(const std::vector<NewBoot>& boots) {
   for (const auto& [boot_key, hello] : boots) {
     execute(add, boot_key, hello.boot_id, hello.robot_id, protocol::text(hello.reset_cause), hello.firmware_version,
             hello.sample_period_us, hello.received_at_us, hello.next_seq, hello.next_event_seq, hello.robot_time_us,
-            UnknownValues{}.add("reset_cause", hello.reset_cause).text());
+            station::UnknownValues{}.add("reset_cause", hello.reset_cause).text());
   }
   SQLite::Statement advance{database_.handle(),
                             "INSERT INTO meta (name, value) VALUES ('next_boot_key', ?)"
@@ -318,7 +320,7 @@ void BootStore::start(const BootStart& start) {
           start.boot_key);
 }
 
-void BootStore::set_fluid(const RobotId& robot_id, const std::string& fluid) {
+void BootStore::set_fluid(const station::RobotId& robot_id, const std::string& fluid) {
   SQLite::Statement update{database_.handle(), "UPDATE robot SET fluid = ? WHERE robot_id = ?"};
   execute(update, fluid, robot_id);
 }
@@ -350,4 +352,4 @@ void BootStore::end(std::int64_t boot_key, std::int64_t noticed_at_us) {
   execute(close, boot_key, boot.next_seq);
 }
 
-}  // namespace server
+}  // namespace server::storage

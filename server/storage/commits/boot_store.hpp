@@ -13,7 +13,7 @@
 #include "server/storage/database/database.hpp"
 #include "server/storage/samples/interval_set.hpp"
 
-namespace server {
+namespace server::storage {
 
 // A boot as it is stored.
 struct StoredBoot {
@@ -29,19 +29,19 @@ struct StoredBoot {
 // A robot asks to be let in. `owner` is the robot that the recorder knows the boot of; without one the boot is looked
 // for, and what is stored of it is read.
 struct AdmissionQuestion {
-  AdmissionRequest request;
-  std::optional<RobotId> owner;
+  station::AdmissionRequest request;
+  std::optional<station::RobotId> owner;
 };
 
 struct AdmissionOutcome {
-  Admission admission;
+  station::Admission admission;
   StoredBoot boot;  // key 0: it was refused, is not known here, or was not looked for
 };
 
 // A boot that was admitted for the first time; the recorder has numbered it.
 struct NewBoot {
   std::int64_t boot_key = 0;
-  AdmissionRequest hello;
+  station::AdmissionRequest hello;
 };
 
 // How far a boot is recorded once a commit is durable.
@@ -54,7 +54,7 @@ struct BootProgress {
 
 // A robot has connected with this boot.
 struct BootStart {
-  RobotId robot_id;
+  station::RobotId robot_id;
   std::int64_t boot_key = 0;
   std::uint64_t announced_next_seq = 0;
   std::uint64_t announced_next_event_seq = 0;
@@ -62,20 +62,20 @@ struct BootStart {
   std::int64_t noticed_at_us = 0;  // UTC
 };
 
-Admission refusal(protocol::RefusalReason reason, std::string detail);
+station::Admission refusal(protocol::RefusalReason reason, std::string detail);
 
 // The refusal of a boot_id that is another robot's.
-Admission reused(const AdmissionRequest& request, const RobotId& owner);
+station::Admission reused(const station::AdmissionRequest& request, const station::RobotId& owner);
 
 // The refusal of a robot whose enrolment was revoked.
-Admission revoked(const RobotId& robot_id);
+station::Admission revoked(const station::RobotId& robot_id);
 
 class BootStore {
  public:
   explicit BootStore(Database& database) : database_{database} {}
 
   // Every robot, with its latest boot and the latch that boot was last known to be in.
-  std::vector<RestoredRobot> robots();
+  std::vector<station::RestoredRobot> robots();
 
   // The next new boot gets this key. Keys are given in the order of admission and never twice.
   std::int64_t next_boot_key();
@@ -84,13 +84,13 @@ class BootStore {
   // writes nothing else, so a full disk still admits robots that are enrolled. Does not throw: who cannot be answered
   // is refused as STATION_BUSY. One outcome for each question, in order.
   std::vector<AdmissionOutcome> admit(const std::vector<AdmissionQuestion>& questions,
-                                      const LoopbackEnrolment& enrolment);
+                                      const config::LoopbackEnrolment& enrolment);
 
   // Inside the caller's transaction: these boots are known from now on.
   void add(const std::vector<NewBoot>& boots);
 
   // Inside the caller's transaction: the fluid that the robot is in; empty: not known.
-  void set_fluid(const RobotId& robot_id, const std::string& fluid);
+  void set_fluid(const station::RobotId& robot_id, const std::string& fluid);
 
   // Inside the caller's transaction: ends the robot's other boots (what is missing of them is lost: `reboot`, or
   // `restore` if nothing was received since), and lets its open run go on in this one.
@@ -98,12 +98,13 @@ class BootStore {
 
  private:
   std::vector<AdmissionOutcome> admit_together(std::span<const AdmissionQuestion> questions,
-                                               const LoopbackEnrolment& enrolment);
-  AdmissionOutcome admit_one(const AdmissionQuestion& question, const LoopbackEnrolment& enrolment);
-  Admission check_robot(const AdmissionRequest& request, const LoopbackEnrolment& enrolment);
-  std::optional<Admission> check_room(const AdmissionRequest& request, const LoopbackEnrolment& enrolment);
-  void note_enrolled(const AdmissionRequest& request);
-  std::uint64_t latch_of(const RobotId& robot_id);
+                                               const config::LoopbackEnrolment& enrolment);
+  AdmissionOutcome admit_one(const AdmissionQuestion& question, const config::LoopbackEnrolment& enrolment);
+  station::Admission check_robot(const station::AdmissionRequest& request, const config::LoopbackEnrolment& enrolment);
+  std::optional<station::Admission> check_room(const station::AdmissionRequest& request,
+                                               const config::LoopbackEnrolment& enrolment);
+  void note_enrolled(const station::AdmissionRequest& request);
+  std::uint64_t latch_of(const station::RobotId& robot_id);
   std::optional<std::uint64_t> last_emergency(std::int64_t boot_key);  // empty: nothing of it is stored
   StoredBoot load(std::int64_t boot_key);
   void end(std::int64_t boot_key, std::int64_t noticed_at_us);
@@ -111,4 +112,4 @@ class BootStore {
   Database& database_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -5,7 +5,7 @@
 #include <spdlog/spdlog.h>
 #include <sqlite3.h>
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
 
@@ -45,8 +45,8 @@ CheckpointOutcome checkpoint(SQLite::Database& database, CheckpointMode mode) {
   return outcome;
 }
 
-Checkpointer::Checkpointer(asio::io_context& loop, Clock& clock, WorkerThread& worker, std::filesystem::path path,
-                           std::uint64_t checkpoint_bytes, microseconds interval)
+Checkpointer::Checkpointer(asio::io_context& loop, runtime::Clock& clock, runtime::WorkerThread& worker,
+                           std::filesystem::path path, std::uint64_t checkpoint_bytes, microseconds interval)
     : clock_{clock},
       worker_{worker},
       path_{std::move(path)},
@@ -161,4 +161,4 @@ void Checkpointer::watch() {
                state_.bytes >> 20U, cause);
 }
 
-}  // namespace server
+}  // namespace server::storage

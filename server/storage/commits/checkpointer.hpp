@@ -27,7 +27,7 @@
 #include "server/runtime/worker.hpp"
 #include "server/storage/commits/sample_store.hpp"
 
-namespace server {
+namespace server::storage {
 
 // The write-ahead log.
 struct WalState {
@@ -54,8 +54,8 @@ CheckpointOutcome checkpoint(SQLite::Database& database, CheckpointMode mode);
 
 class Checkpointer {
  public:
-  Checkpointer(boost::asio::io_context& loop, Clock& clock, WorkerThread& worker, std::filesystem::path path,
-               std::uint64_t checkpoint_bytes, microseconds interval);
+  Checkpointer(boost::asio::io_context& loop, runtime::Clock& clock, runtime::WorkerThread& worker,
+               std::filesystem::path path, std::uint64_t checkpoint_bytes, microseconds interval);
 
   // Makes the passes, until cancelled.
   boost::asio::awaitable<void> run();
@@ -83,14 +83,14 @@ class Checkpointer {
   bool is_long() const { return state_.bytes >= checkpoint_bytes_ + checkpoint_bytes_ / 2; }
   void watch();
 
-  Clock& clock_;
-  WorkerThread& worker_;
+  runtime::Clock& clock_;
+  runtime::WorkerThread& worker_;
   std::filesystem::path path_;
   std::uint64_t checkpoint_bytes_;
   microseconds interval_;
-  Signal pass_wanted_;
-  Signal pass_ended_;
-  Signal committed_;
+  runtime::Signal pass_wanted_;
+  runtime::Signal pass_ended_;
+  runtime::Signal committed_;
 
   WalState state_;
   std::uint64_t commits_ = 0;         // so many have gone into the log
@@ -107,4 +107,4 @@ class Checkpointer {
   std::string problem_;               // of the latest try
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -7,7 +7,7 @@
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/samples/stored_rows.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 
 asio::awaitable<OpenedDatabase> DatabaseWorker::open(std::int64_t utc_us) {
@@ -49,8 +49,8 @@ std::string DatabaseWorker::write_now(const WriteBatch& commit) {
   }
 }
 
-void DatabaseWorker::close(const std::function<void(Database&, std::int64_t)>& last, const Clock& clock,
-                           AuditNote stopped) {
+void DatabaseWorker::close(const std::function<void(Database&, std::int64_t)>& last, const runtime::Clock& clock,
+                           station::AuditNote stopped) {
   store_.reset();
   try {
     if (last) last(*database_, clock.utc_us());
@@ -68,4 +68,4 @@ void DatabaseWorker::close(const std::function<void(Database&, std::int64_t)>& l
   database_.reset();
 }
 
-}  // namespace server
+}  // namespace server::storage

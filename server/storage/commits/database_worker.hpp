@@ -20,13 +20,13 @@
 #include "server/station/state/station_state.hpp"
 #include "server/storage/commits/checkpointer.hpp"
 
-namespace server {
+namespace server::storage {
 
 // What the station must know again after a restart.
 struct RestoredState {
   std::uint64_t store_id = 0;
-  std::vector<RestoredRobot> robots;
-  std::vector<CommandRecord> pending_stops;  // emergency stops that no robot has acknowledged
+  std::vector<station::RestoredRobot> robots;
+  std::vector<station::CommandRecord> pending_stops;  // emergency stops that no robot has acknowledged
 };
 
 // What the recorder must know, too.
@@ -38,7 +38,7 @@ struct OpenedDatabase {
 
 class DatabaseWorker {
  public:
-  DatabaseWorker(WorkerThread& disk, Checkpointer& checkpointer, std::filesystem::path path)
+  DatabaseWorker(runtime::WorkerThread& disk, Checkpointer& checkpointer, std::filesystem::path path)
       : disk_{disk}, checkpointer_{checkpointer}, path_{std::move(path)} {}
 
   // Opens or creates the database; before everything else. Throws when the file is not ours or cannot be written.
@@ -62,7 +62,8 @@ class DatabaseWorker {
   // After the loop has ended: the same in this thread; `last` has the database to itself; then the audit gets its last
   // entry, the log is emptied and the database closed. They do not throw.
   std::string write_now(const WriteBatch& commit);
-  void close(const std::function<void(Database&, std::int64_t utc_us)>& last, const Clock& clock, AuditNote stopped);
+  void close(const std::function<void(Database&, std::int64_t utc_us)>& last, const runtime::Clock& clock,
+             station::AuditNote stopped);
 
  private:
   // After a job of the disk thread, whatever came of it: reports how long the log is.
@@ -86,11 +87,11 @@ class DatabaseWorker {
 
   OpenedDatabase open_now(std::int64_t utc_us);
 
-  WorkerThread& disk_;
+  runtime::WorkerThread& disk_;
   Checkpointer& checkpointer_;
   std::filesystem::path path_;
   std::unique_ptr<Database> database_;  // used by jobs; by close() when no job can be under way
   std::unique_ptr<SampleStore> store_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -10,7 +10,7 @@
 #include "server/storage/database/statement.hpp"
 #include "server/storage/samples/in_force_store.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::uint64_t kLogPageBytes = 4096 + 24;  // a page and its header
@@ -20,10 +20,11 @@ std::string insert_segment_query() {
   std::string columns =
       "boot_key, first_seq, last_seq, first_row, last_row, first_robot_time_us, period_us, first_received_at_us,"
       " received_at_us, utc_offset_us, clock_uncertainty_us, unknown_values";
-  for_each_batch_field([&](const auto& field) { columns += fmt::format(", {}", field.name); });
-  for_each_sample_field([&](const auto& field) { columns += fmt::format(", min_{0}, max_{0}", field.name); });
+  station::for_each_batch_field([&](const auto& field) { columns += fmt::format(", {}", field.name); });
+  station::for_each_sample_field([&](const auto& field) { columns += fmt::format(", min_{0}, max_{0}", field.name); });
   std::string marks = "?";
-  for (std::size_t column = 1; column < kSegmentPlaceColumns + kBatchFieldCount + 2 * kSampleFieldCount; ++column) {
+  for (std::size_t column = 1;
+       column < kSegmentPlaceColumns + station::kBatchFieldCount + 2 * station::kSampleFieldCount; ++column) {
     marks += ",?";
   }
   return fmt::format("INSERT INTO segment ({}) VALUES ({})", columns, marks);
@@ -88,8 +89,8 @@ void SampleStore::write(const WriteBatch& batch) {
   for (const LostRange& gap : batch.event_gaps) {
     execute(insert_event_gap_, gap.boot_key, gap.lost.first, gap.lost.next - 1, gap.cause, gap.noticed_at_us);
   }
-  for (const AuditNote& note : batch.audit) audit_.append(note);
-  for (const CommandRecord& command : batch.commands) commands_.write(command, audit_);
+  for (const station::AuditNote& note : batch.audit) audit_.append(note);
+  for (const station::CommandRecord& command : batch.commands) commands_.write(command, audit_);
   for (const auto& [boot_key, record] : batch.clocks) store_clock(database_.handle(), boot_key, record);
   for (const auto& [boot_key, record] : batch.in_force) store_in_force(database_.handle(), boot_key, record);
   for (const auto& [robot_id, fluid] : batch.fluids) boots_.set_fluid(robot_id, fluid);
@@ -108,13 +109,13 @@ void SampleStore::write(const WriteBatch& batch) {
 std::int64_t SampleStore::write_segment(const Segment& segment, std::int64_t first_row) {
   const auto& [min, max] = rows_.write(segment.samples, first_row);
   const std::int64_t next_row = first_row + static_cast<std::int64_t>(segment.samples.size());
-  const SampleContext& context = segment.context;
+  const station::SampleContext& context = segment.context;
   bind_all(insert_segment_, segment.boot_key, segment.first_seq, segment.next_seq() - 1, first_row, next_row - 1,
            segment.first_robot_time_us, context.period_us, segment.first_received_at_us, segment.received_at_us,
            segment.utc_offset_us, segment.clock_uncertainty_us, unknown_values(context));
   int column = kSegmentPlaceColumns;
-  for_each_batch_field(
-      [&](const auto& field) { bind_value(insert_segment_, ++column, text_or_value(context.*field.member)); });
+  station::for_each_batch_field(
+      [&](const auto& field) { bind_value(insert_segment_, ++column, station::text_or_value(context.*field.member)); });
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     bind_value(insert_segment_, ++column, min[channel]);
     bind_value(insert_segment_, ++column, max[channel]);
@@ -125,7 +126,7 @@ std::int64_t SampleStore::write_segment(const Segment& segment, std::int64_t fir
 }
 
 void SampleStore::write_event(const StoredEvent& stored) {
-  const RobotEvent& event = stored.event;
+  const station::RobotEvent& event = stored.event;
   const auto boot_key = stored.boot_key == 0 ? std::nullopt : std::optional{stored.boot_key};
   const auto emergency_cause = event.emergency_cause.transform(
       [](protocol::EmergencyCause cause) { return std::string{protocol::text(cause)}; });
@@ -135,4 +136,4 @@ void SampleStore::write_event(const StoredEvent& stored) {
           event.unknown_values);
 }
 
-}  // namespace server
+}  // namespace server::storage

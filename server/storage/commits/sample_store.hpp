@@ -18,21 +18,21 @@
 #include "server/storage/samples/row_writer.hpp"
 #include "server/storage/samples/segment.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct StoredEvent {
   std::int64_t boot_key = 0;  // 0: an event of the station
-  RobotEvent event;
+  station::RobotEvent event;
 };
 
 struct StoredClock {
   std::int64_t boot_key = 0;
-  ClockRecord record;
+  station::ClockRecord record;
 };
 
 struct StoredInForce {
   std::int64_t boot_key = 0;
-  InForceRecord record;
+  station::InForceRecord record;
 };
 
 // In one transaction at most.
@@ -45,13 +45,13 @@ struct WriteBatch {
   std::vector<LostRange> gaps;
   std::vector<StoredEvent> events;
   std::vector<LostRange> event_gaps;
-  std::vector<AuditNote> audit;         // in this order, and before those of the commands
-  std::vector<CommandRecord> commands;  // each replaces what is stored of the same command
+  std::vector<station::AuditNote> audit;         // in this order, and before those of the commands
+  std::vector<station::CommandRecord> commands;  // each replaces what is stored of the same command
   std::vector<StoredClock> clocks;
   std::vector<StoredInForce> in_force;
-  std::map<RobotId, std::string> fluids;  // that robots are in from now on; empty: not known
-  std::vector<BootProgress> progress;     // of each boot that any of this belongs to
-  std::vector<BootStart> boots;           // applied last: they end the robots' earlier boots
+  std::map<station::RobotId, std::string> fluids;  // that robots are in from now on; empty: not known
+  std::vector<BootProgress> progress;              // of each boot that any of this belongs to
+  std::vector<BootStart> boots;                    // applied last: they end the robots' earlier boots
 
   bool empty() const;
 };
@@ -94,4 +94,4 @@ class SampleStore {
   SQLite::Statement count_commit_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -8,7 +8,7 @@
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/database/finished_file.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 SQLite::Database make_empty(const std::filesystem::path& path) {
@@ -72,4 +72,4 @@ void back_up_closed(const std::filesystem::path& from, const std::filesystem::pa
   finish_file(draft.path(), to);
 }
 
-}  // namespace server
+}  // namespace server::storage

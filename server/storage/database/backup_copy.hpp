@@ -15,7 +15,7 @@
 #include <filesystem>
 #include <memory>
 
-namespace server {
+namespace server::storage {
 
 class BackupCopy {
  public:
@@ -47,4 +47,4 @@ class BackupCopy {
 // std::runtime_error that says why there is none.
 void back_up_closed(const std::filesystem::path& from, const std::filesystem::path& to);
 
-}  // namespace server
+}  // namespace server::storage

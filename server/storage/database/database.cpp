@@ -14,7 +14,7 @@
 #include "server/storage/database/schema.hpp"
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr int kBusyTimeoutMs = 1000;  // of another program's lock; short, for all other jobs of the disk thread wait
@@ -143,4 +143,4 @@ SQLite::Database open_for_reading(const std::filesystem::path& path) {
   return database;
 }
 
-}  // namespace server
+}  // namespace server::storage

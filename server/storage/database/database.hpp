@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 
-namespace server {
+namespace server::storage {
 
 enum class BeforeMigration : std::uint8_t { keep_copy, change_in_place };
 
@@ -42,4 +42,4 @@ class Database {
 // For queries, beside the writing handle; never blocks it. For one thread at a time: SQLite takes no lock for it.
 SQLite::Database open_for_reading(const std::filesystem::path& path);
 
-}  // namespace server
+}  // namespace server::storage

@@ -20,11 +20,11 @@
 #include "server/runtime/worker.hpp"
 #include "server/storage/database/database.hpp"
 
-namespace server {
+namespace server::storage {
 
 class DatabaseReader {
  public:
-  DatabaseReader(std::filesystem::path path, WorkerThread& worker) : path_{std::move(path)}, worker_{worker} {}
+  DatabaseReader(std::filesystem::path path, runtime::WorkerThread& worker) : path_{std::move(path)}, worker_{worker} {}
 
   template <class Query>
   boost::asio::awaitable<std::invoke_result_t<Query, SQLite::Database&>> ask(Query query) {
@@ -49,9 +49,9 @@ class DatabaseReader {
 
  private:
   std::filesystem::path path_;
-  WorkerThread& worker_;
+  runtime::WorkerThread& worker_;
   std::unique_ptr<SQLite::Database> handle_;
   std::uint64_t questions_ = 0;
 };
 
-}  // namespace server
+}  // namespace server::storage

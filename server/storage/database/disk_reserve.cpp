@@ -5,7 +5,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-namespace server {
+namespace server::storage {
 namespace fs = std::filesystem;
 
 fs::path disk_reserve_of(const fs::path& database) { return fs::absolute(database).parent_path() / "rheonaut.reserve"; }
@@ -29,4 +29,4 @@ void keep_disk_reserve(const fs::path& database, std::uint64_t free_bytes) {
   if (!is_held) fs::remove(path, failed);
 }
 
-}  // namespace server
+}  // namespace server::storage

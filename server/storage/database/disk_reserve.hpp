@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 
-namespace server {
+namespace server::storage {
 
 inline constexpr std::uint64_t kDiskReserveBytes = 1'000'000;
 
@@ -21,4 +21,4 @@ void give_up_disk_reserve(const std::filesystem::path& database, std::uint64_t f
 // again the next time. Does not throw.
 void keep_disk_reserve(const std::filesystem::path& database, std::uint64_t free_bytes);
 
-}  // namespace server
+}  // namespace server::storage

@@ -14,7 +14,7 @@
 
 #include "server/storage/database/schema.hpp"
 
-namespace server {
+namespace server::storage {
 namespace fs = std::filesystem;
 
 namespace {
@@ -176,4 +176,4 @@ std::string find_damage(SQLite::Database& database) {
                      references.getColumn(2).getString());
 }
 
-}  // namespace server
+}  // namespace server::storage

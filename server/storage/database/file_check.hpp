@@ -12,7 +12,7 @@
 #include <optional>
 #include <string>
 
-namespace server {
+namespace server::storage {
 
 // Why it is refused: not SQLite, of another program, of a newer Rheonaut, truncated. None when there is no file, when
 // it is blank, or ours. Ours in the write-ahead log only looks blank here: then SQLite has to decide.
@@ -33,4 +33,4 @@ std::string find_damage(SQLite::Database& database);
 
 inline constexpr const char* kDamageRemedy = "stop the station, run rheonaut verify, restore a backup";
 
-}  // namespace server
+}  // namespace server::storage

@@ -11,7 +11,7 @@
 #include <string>
 #include <system_error>
 
-namespace server {
+namespace server::storage {
 namespace fs = std::filesystem;
 
 namespace {
@@ -93,4 +93,4 @@ void remove_draft(const std::filesystem::path& part) {
   }
 }
 
-}  // namespace server
+}  // namespace server::storage

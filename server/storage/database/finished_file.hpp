@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-namespace server {
+namespace server::storage {
 
 // Syncs the file `part`, renames it to `path`, and syncs the folder. Throws std::system_error.
 void finish_file(const std::filesystem::path& part, const std::filesystem::path& path);
@@ -32,4 +32,4 @@ class Draft {
   std::filesystem::path path_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -11,7 +11,7 @@
 #include "server/storage/database/disk_reserve.hpp"
 #include "server/storage/database/finished_file.hpp"
 
-namespace server {
+namespace server::storage {
 namespace fs = std::filesystem;
 
 namespace {
@@ -87,4 +87,4 @@ void keep_copy_before_migration(SQLite::Database& database, const fs::path& path
   spdlog::info("as it was it is kept in {}; remove that when you do not want to go back", target.string());
 }
 
-}  // namespace server
+}  // namespace server::storage

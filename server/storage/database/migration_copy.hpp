@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 
-namespace server {
+namespace server::storage {
 
 // `database` is the open file at `path`. The copy is there whole or not at all, and on disk when this returns; a copy
 // that is there already is never overwritten: one of this very state will do, beside another one it gets a number.
@@ -20,4 +20,4 @@ std::uint64_t available_bytes(const std::filesystem::path& folder);
 void keep_copy_before_migration(SQLite::Database& database, const std::filesystem::path& path, std::int64_t version,
                                 FreeBytes free_bytes = available_bytes);
 
-}  // namespace server
+}  // namespace server::storage

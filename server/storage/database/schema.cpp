@@ -3,7 +3,7 @@
 
 #include <vector>
 
-namespace server {
+namespace server::storage {
 
 std::span<const char* const> migrations() {
   static const std::vector<const char*> scripts = [] {
@@ -14,4 +14,4 @@ std::span<const char* const> migrations() {
   return scripts;
 }
 
-}  // namespace server
+}  // namespace server::storage

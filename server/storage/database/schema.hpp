@@ -9,7 +9,7 @@
 
 #include "base/embedded_file.hpp"
 
-namespace server {
+namespace server::storage {
 
 constexpr std::int32_t kApplicationId = 0x5268656f;  // "Rheo"
 constexpr std::int64_t kMaxSegmentSamples = 100;     // the views and queries look this far back for a segment's begin
@@ -19,4 +19,4 @@ std::span<const char* const> migrations();
 // The same as files: "1.sql", "2.sql" and so on.
 std::span<const base::EmbeddedFile> migration_files();
 
-}  // namespace server
+}  // namespace server::storage

@@ -11,7 +11,7 @@
 #include <optional>
 #include <string>
 
-namespace server {
+namespace server::storage {
 
 inline std::int64_t signed_id(std::uint64_t id) { return std::bit_cast<std::int64_t>(id); }
 inline std::uint64_t unsigned_id(const SQLite::Column& column) {
@@ -62,4 +62,4 @@ inline std::optional<float> optional_float(const SQLite::Column& column) {
   return column.isNull() ? std::nullopt : std::optional{static_cast<float>(column.getDouble())};
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -9,7 +9,7 @@
 #include "base/number_text.hpp"
 #include "server/station/state/unknown_values.hpp"
 
-namespace server {
+namespace server::storage {
 
 using base::append_float;
 using base::append_number;
@@ -96,7 +96,7 @@ std::string CsvWriter::header() const {
   }
   if (grid_) return out + ",setpoint_m,gap\n";
   std::size_t number = 0;
-  for_each_batch_field([&](const auto& field) {
+  station::for_each_batch_field([&](const auto& field) {
     if (number++ == kBeforeTimes) out += ",clock_uncertainty_us,first_received_at_us,received_at_us";
     out += fmt::format(",{}", field.name);
   });
@@ -107,17 +107,17 @@ std::string CsvWriter::header() const {
 std::string CsvWriter::shared_text(const Segment& segment) const {
   std::string out;
   std::size_t number = 0;
-  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+  station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
     if (number++ == kBeforeTimes) {
       out +=
           fmt::format(",{},{},{}", segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us);
     }
     out += ',';
     const Value& value = segment.context.*field.member;
-    if constexpr (BatchField<Value>::kKind == FieldKind::number) {
-      append_float(out, or_nan(value), "");
+    if constexpr (station::BatchField<Value>::kKind == station::FieldKind::number) {
+      append_float(out, station::or_nan(value), "");
     } else {
-      out += fmt::format("{}", text_or_value(value));
+      out += fmt::format("{}", station::text_or_value(value));
     }
   });
   return out + ',';
@@ -163,8 +163,8 @@ void CsvWriter::append(std::string& out, const GridRow& row) {
     append_float(out, row.sample != nullptr ? row.sample->*kSampleMembers[channel] : kNone, "");
   }
   out += ',';
-  append_float(out, row.sample != nullptr ? or_nan(row.setpoint_m) : kNone, "");
+  append_float(out, row.sample != nullptr ? station::or_nan(row.setpoint_m) : kNone, "");
   out += row.sample != nullptr ? ",0\n" : ",1\n";
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -17,7 +17,7 @@
 
 #include "server/storage/export/export_rows.hpp"
 
-namespace server {
+namespace server::storage {
 
 // "2026-03-01T12:00:00.000001Z". Remembers the second, which many have in common.
 class UtcText {
@@ -54,4 +54,4 @@ class CsvWriter {
   UtcText utc_;
 };
 
-}  // namespace server
+}  // namespace server::storage

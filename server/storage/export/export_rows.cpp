@@ -6,7 +6,7 @@
 #include "server/storage/database/schema.hpp"
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::uint64_t kLongestUs = std::uint64_t{1} << 61;  // whatever number a robot says it has reached
@@ -136,4 +136,4 @@ GridRow GridRows::after(const Segment& segment, std::uint64_t time_us) {
   return row;
 }
 
-}  // namespace server
+}  // namespace server::storage

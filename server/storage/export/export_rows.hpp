@@ -14,7 +14,7 @@
 
 #include "server/storage/query/span_reader.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct ExportQuery {
   RunId run = 0;
@@ -31,9 +31,9 @@ struct ExportSegment {
 
 struct GridRow {
   std::uint32_t span = 0;
-  std::int64_t since_us = 0;       // since the first sample of the span
-  std::int64_t utc_us = 0;         // in a gap by the clock of the sample before it
-  const Sample* sample = nullptr;  // null: a gap
+  std::int64_t since_us = 0;                // since the first sample of the span
+  std::int64_t utc_us = 0;                  // in a gap by the clock of the sample before it
+  const station::Sample* sample = nullptr;  // null: a gap
   std::optional<float> setpoint_m;
 };
 
@@ -75,7 +75,7 @@ class GridRows {
  private:
   // One sample, and what places it.
   struct Last {
-    Sample sample;
+    station::Sample sample;
     std::optional<float> setpoint_m;
     std::uint64_t robot_time_us = 0;
     std::uint32_t period_us = 0;
@@ -96,4 +96,4 @@ class GridRows {
   std::optional<Last> last_;    // of the segment before
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -10,7 +10,7 @@
 #include <system_error>
 #include <utility>
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::size_t kBufferBytes = 64 * 1024;
@@ -113,4 +113,4 @@ bool MatColumn::copy_some(int file) {
   return false;
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -15,7 +15,7 @@
 #include <filesystem>
 #include <string>
 
-namespace server {
+namespace server::storage {
 
 class MatColumn {
  public:
@@ -54,4 +54,4 @@ class MatColumn {
 // Writes everything or throws.
 void write_all(int file, const void* bytes, std::size_t size);
 
-}  // namespace server
+}  // namespace server::storage

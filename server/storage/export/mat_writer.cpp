@@ -15,7 +15,7 @@
 #include "server/station/state/unknown_values.hpp"
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::size_t kMatPageSamples = 10'000;
@@ -39,7 +39,7 @@ void add_facts(SQLite::Database& database, const char* table, const char* prefix
 template <class Enumerator>
 std::string names() {
   std::string out;
-  for (int number = 0; number == 0 || !is_unknown(static_cast<Enumerator>(number)); ++number) {
+  for (int number = 0; number == 0 || !station::is_unknown(static_cast<Enumerator>(number)); ++number) {
     const char* comma = number == 0 ? "" : ", ";
     out += fmt::format("{}{} {}", comma, number, protocol::text(static_cast<Enumerator>(number)));
   }
@@ -48,14 +48,15 @@ std::string names() {
 
 // Numbers first, then the rest.
 template <class Put>
-void put_context(const SampleContext& context, const Put& put) {
-  for_each_batch_field_of<FieldKind::number>([&](const auto& field) { put(or_nan(context.*field.member)); });
-  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+void put_context(const station::SampleContext& context, const Put& put) {
+  station::for_each_batch_field_of<station::FieldKind::number>(
+      [&](const auto& field) { put(station::or_nan(context.*field.member)); });
+  station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
     const Value& value = context.*field.member;
-    if constexpr (BatchField<Value>::kKind == FieldKind::id) {
+    if constexpr (station::BatchField<Value>::kKind == station::FieldKind::id) {
       put(static_cast<std::uint32_t>(value >> 32));
       put(static_cast<std::uint32_t>(value & 0xffffffff));
-    } else if constexpr (BatchField<Value>::kKind != FieldKind::number) {
+    } else if constexpr (station::BatchField<Value>::kKind != station::FieldKind::number) {
       put(static_cast<std::uint32_t>(value));
     }
   });
@@ -132,9 +133,10 @@ void MatWriter::write_facts(SQLite::Database& database) {
     boot_ids += fmt::format("{}{} {}", boot_ids.empty() ? "" : ", ", span.span, span.boot_id);
   }
   facts.emplace_back("boot_ids", boot_ids);
-  for_each_batch_field_of<FieldKind::enumerator>([&]<class Enumerator>(const BatchField<Enumerator>& field) {
-    facts.emplace_back(fmt::format("{}s", field.name), names<Enumerator>());
-  });
+  station::for_each_batch_field_of<station::FieldKind::enumerator>(
+      [&]<class Enumerator>(const station::BatchField<Enumerator>& field) {
+        facts.emplace_back(fmt::format("{}s", field.name), names<Enumerator>());
+      });
   facts.emplace_back("grid_us", query_.grid_us ? std::to_string(*query_.grid_us) : "");
   write_struct(path_, facts);
 }
@@ -160,12 +162,13 @@ void MatWriter::add_columns() {
     add("gap", Type::uint32);
     return;
   }
-  for_each_batch_field_of<FieldKind::number>([&](const auto& field) { add(field.name, Type::float32); });
-  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
-    if constexpr (BatchField<Value>::kKind == FieldKind::id) {
+  station::for_each_batch_field_of<station::FieldKind::number>(
+      [&](const auto& field) { add(field.name, Type::float32); });
+  station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
+    if constexpr (station::BatchField<Value>::kKind == station::FieldKind::id) {
       add(fmt::format("{}_high", field.name), Type::uint32);
       add(fmt::format("{}_low", field.name), Type::uint32);
-    } else if constexpr (BatchField<Value>::kKind != FieldKind::number) {
+    } else if constexpr (station::BatchField<Value>::kKind != station::FieldKind::number) {
       add(field.name, Type::uint32);
     }
   });
@@ -224,7 +227,7 @@ void MatWriter::push(const GridRow& row) {
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     if (query_.channels[channel]) put(row.sample != nullptr ? row.sample->*kSampleMembers[channel] : kNaN);
   }
-  put(row.sample != nullptr ? or_nan(row.setpoint_m) : kNaN);
+  put(row.sample != nullptr ? station::or_nan(row.setpoint_m) : kNaN);
   put(std::uint32_t{row.sample == nullptr});
 }
 
@@ -238,4 +241,4 @@ bool MatWriter::copy_columns() {
   return true;
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -23,7 +23,7 @@
 #include "server/storage/export/export_rows.hpp"
 #include "server/storage/export/mat_column.hpp"
 
-namespace server {
+namespace server::storage {
 
 class MatWriter {
  public:
@@ -57,4 +57,4 @@ class MatWriter {
   int file_ = -1;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -10,7 +10,7 @@
 #include "server/storage/database/schema.hpp"
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::size_t kSliceSamples = 2'500;
@@ -36,24 +36,25 @@ constexpr const char* kOtherColumns =
 )sql";
 constexpr int kOtherColumnCount = 3;
 
-template <FieldKind kind>
+template <station::FieldKind kind>
 constexpr const char* sql_type() {
-  if (kind == FieldKind::number) return "REAL";
-  return kind == FieldKind::count ? "INTEGER NOT NULL" : "TEXT NOT NULL";
+  if (kind == station::FieldKind::number) return "REAL";
+  return kind == station::FieldKind::count ? "INTEGER NOT NULL" : "TEXT NOT NULL";
 }
 
 std::string create_sample() {
   std::string sql = kPlaceColumns;
-  for (const SampleField& field : kSampleFields) sql += fmt::format("  {} REAL,\n", field.name);
-  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
-    sql += fmt::format("  {} {},\n", field.name, sql_type<BatchField<Value>::kKind>());
+  for (const station::SampleField& field : station::kSampleFields) sql += fmt::format("  {} REAL,\n", field.name);
+  station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
+    sql += fmt::format("  {} {},\n", field.name, sql_type<station::BatchField<Value>::kKind>());
   });
   return sql + kOtherColumns;
 }
 
 std::string insert_sample() {
   std::string sql = "INSERT INTO sample VALUES (?";
-  constexpr std::size_t kColumns = kPlaceColumnCount + kSampleFieldCount + kBatchFieldCount + kOtherColumnCount;
+  constexpr std::size_t kColumns =
+      kPlaceColumnCount + station::kSampleFieldCount + station::kBatchFieldCount + kOtherColumnCount;
   for (std::size_t column = 1; column < kColumns; ++column) sql += ",?";
   return sql + ")";
 }
@@ -252,7 +253,7 @@ void RunFile::add(const ExportSegment& exported) {
              segment.first_received_at_us, segment.received_at_us);
     int column = kPlaceColumnCount;
     for (const float value : values_of(segment.samples[index])) bind_value(*insert_, ++column, value);
-    column += static_cast<int>(kBatchFieldCount);
+    column += static_cast<int>(station::kBatchFieldCount);
     bind_value(*insert_, ++column, signed_seq(index == 0 ? exported.gap_before : 0));
     bind_value(*insert_, ++column, signed_seq(index + 1 == segment.samples.size() ? exported.gap_after : 0));
     insert_->exec();
@@ -260,18 +261,18 @@ void RunFile::add(const ExportSegment& exported) {
 }
 
 // Values stay bound from row to row.
-void RunFile::bind_shared(const SampleContext& context) {
+void RunFile::bind_shared(const station::SampleContext& context) {
   insert_->tryReset();
-  int column = kPlaceColumnCount + static_cast<int>(kSampleFieldCount);
-  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+  int column = kPlaceColumnCount + static_cast<int>(station::kSampleFieldCount);
+  station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
     const Value& value = context.*field.member;
-    if constexpr (BatchField<Value>::kKind == FieldKind::id) {
+    if constexpr (station::BatchField<Value>::kKind == station::FieldKind::id) {
       bind_value(*insert_, ++column, std::to_string(value));
     } else {
-      bind_value(*insert_, ++column, text_or_value(value));
+      bind_value(*insert_, ++column, station::text_or_value(value));
     }
   });
   bind_value(*insert_, column + kOtherColumnCount, unknown_values(context));
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -21,7 +21,7 @@
 #include "server/storage/database/schema.hpp"
 #include "server/storage/export/export_rows.hpp"
 
-namespace server {
+namespace server::storage {
 
 inline constexpr std::int64_t kRunFileApplicationId = kApplicationId + 1;
 inline constexpr std::int64_t kRunFileVersion = 2;  // its user_version
@@ -42,7 +42,7 @@ class RunFile {
   void add_gaps(SQLite::Database& database);
   bool add_samples(SQLite::Database& database);
   void add(const ExportSegment& segment);
-  void bind_shared(const SampleContext& context);
+  void bind_shared(const station::SampleContext& context);
 
   std::filesystem::path path_;
   std::string store_;
@@ -59,4 +59,4 @@ class RunFile {
   SegmentRows segments_;
 };
 
-}  // namespace server
+}  // namespace server::storage

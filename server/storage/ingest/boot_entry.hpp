@@ -13,15 +13,15 @@
 #include "server/storage/ingest/boot_recording.hpp"
 #include "server/storage/ingest/work_list.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct BootEntry {
-  BootEntry(BootId id, RobotId robot_id) : boot_id{id}, recording{std::move(robot_id)} {}
+  BootEntry(station::BootId id, station::RobotId robot_id) : boot_id{id}, recording{std::move(robot_id)} {}
 
   // Samples and events of it are recorded now.
   bool is_recorded() const { return started && !replaced; }
   // The robot that this boot belongs to, as far as that is known.
-  std::optional<RobotId> owner() const {
+  std::optional<station::RobotId> owner() const {
     return recording.loaded() ? std::optional{recording.robot_id()} : std::nullopt;
   }
   // Nothing of its samples and gaps waits for the disk.
@@ -33,14 +33,14 @@ struct BootEntry {
            in_commit.is_listed() || queued_segments > 0 || queued_starts > 0;
   }
 
-  const BootId boot_id;
+  const station::BootId boot_id;
   BootRecording recording;
   bool connected = false;
-  bool started = false;                   // has been connected
-  bool replaced = false;                  // a later boot of this robot has connected
-  int admissions = 0;                     // under way
-  std::int64_t last_used_us = 0;          // steady time of the last admission
-  std::optional<AdmissionRequest> hello;  // admitted, and not connected since
+  bool started = false;                            // has been connected
+  bool replaced = false;                           // a later boot of this robot has connected
+  int admissions = 0;                              // under way
+  std::int64_t last_used_us = 0;                   // steady time of the last admission
+  std::optional<station::AdmissionRequest> hello;  // admitted, and not connected since
 
   WorkLink<BootEntry> due;           // has a complete segment, or waiting samples and no connection
   TimedLink ageing;                  // has waiting samples
@@ -57,4 +57,4 @@ using BootsWithRecords = WorkList<BootEntry, &BootEntry::with_records>;
 using BootsWithHoles = WorkList<BootEntry, &BootEntry::with_holes>;
 using BootsInCommit = WorkList<BootEntry, &BootEntry::in_commit>;
 
-}  // namespace server
+}  // namespace server::storage

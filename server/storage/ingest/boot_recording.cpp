@@ -9,7 +9,7 @@
 #include "server/runtime/clock.hpp"
 #include "server/storage/database/schema.hpp"
 
-namespace server {
+namespace server::storage {
 using namespace std::chrono_literals;
 
 namespace {
@@ -29,7 +29,7 @@ constexpr microseconds kAskInterval = 1s;
 
 std::int64_t distance(std::uint64_t a, std::uint64_t b) { return std::abs(static_cast<std::int64_t>(a - b)); }
 
-bool goes_on(const Segment& segment, const SampleBatch& batch) {
+bool goes_on(const Segment& segment, const station::SampleBatch& batch) {
   const std::uint64_t batch_seq0_us = batch.first_robot_time_us - batch.first_seq * batch.context.period_us;
   const std::uint64_t segment_seq0_us = segment.first_robot_time_us - segment.first_seq * segment.context.period_us;
   const std::int64_t utc_tolerance_us = batch.clock_uncertainty_us < 0 ? kUnknownUtcToleranceUs : kUtcToleranceUs;
@@ -39,7 +39,7 @@ bool goes_on(const Segment& segment, const SampleBatch& batch) {
 }
 
 // How wrong the segment's estimate of UTC may be for the samples of this batch; -1: there was none.
-std::int64_t uncertainty_in(const Segment& segment, const SampleBatch& batch) {
+std::int64_t uncertainty_in(const Segment& segment, const station::SampleBatch& batch) {
   if (batch.clock_uncertainty_us < 0) return -1;
   return batch.clock_uncertainty_us + std::abs(batch.utc_offset_us - segment.utc_offset_us);
 }
@@ -84,7 +84,7 @@ bool BootRecording::continues(std::uint64_t next_seq, std::uint64_t robot_time_u
   return next_seq >= next_seq_ && robot_time_us >= last_robot_time_us_;
 }
 
-void BootRecording::connect(const AdmissionRequest& hello, std::int64_t restored_at_us) {
+void BootRecording::connect(const station::AdmissionRequest& hello, std::int64_t restored_at_us) {
   const std::int64_t booted_at_us = hello.received_at_us - static_cast<std::int64_t>(hello.robot_time_us);
   const bool is_from_before = std::max(connected_at_us_, booted_at_us) < restored_at_us;
   const char* cause = is_from_before ? "restore" : "ring_overrun";
@@ -102,12 +102,12 @@ void BootRecording::connect(const AdmissionRequest& hello, std::int64_t restored
   event_hole_.reset();
 }
 
-std::size_t BootRecording::count_new(const SampleBatch& batch) const {
+std::size_t BootRecording::count_new(const station::SampleBatch& batch) const {
   if (batch.first_seq >= received_.end()) return batch.samples.size();  // live, as nearly all are
   return count(received_.missing({batch.first_seq, batch.next_seq()}));
 }
 
-void BootRecording::append(const SampleBatch& batch, std::int64_t steady_us) {
+void BootRecording::append(const station::SampleBatch& batch, std::int64_t steady_us) {
   const auto time_us = batch.first_robot_time_us + (batch.samples.size() - 1) * batch.context.period_us;
   next_seq_ = std::max(next_seq_, batch.next_seq());
   last_robot_time_us_ = std::max(last_robot_time_us_, time_us);
@@ -125,7 +125,7 @@ std::uint64_t BootRecording::room_from(std::uint64_t seq) const {
   return kMost - (seq + kBootsApart * static_cast<std::uint64_t>(key_ - 1)) % kMost;
 }
 
-void BootRecording::append_part(const SampleBatch& batch, Interval part, std::int64_t steady_us) {
+void BootRecording::append_part(const station::SampleBatch& batch, Interval part, std::int64_t steady_us) {
   for (std::uint64_t seq = part.first; seq < part.next;) {
     const std::size_t index = segment_for(batch, seq);
     Segment& segment = waiting_[index];
@@ -146,7 +146,7 @@ void BootRecording::append_part(const SampleBatch& batch, Interval part, std::in
 }
 
 // Backfill and live samples come in turns, so the segment that goes on need not be the last one.
-std::size_t BootRecording::segment_for(const SampleBatch& batch, std::uint64_t seq) {
+std::size_t BootRecording::segment_for(const station::SampleBatch& batch, std::uint64_t seq) {
   const bool begins = room_from(seq) == static_cast<std::uint64_t>(kMaxSegmentSamples);
   for (std::size_t index = begins ? 0 : waiting_.size(); index > 0; --index) {
     const Segment& segment = waiting_[index - 1];
@@ -163,7 +163,7 @@ std::size_t BootRecording::segment_for(const SampleBatch& batch, std::uint64_t s
   return waiting_.size() - 1;
 }
 
-void BootRecording::refuse(const SampleBatch& batch) {
+void BootRecording::refuse(const station::SampleBatch& batch) {
   next_seq_ = std::max(next_seq_, batch.next_seq());
   refused_.erase_below(received_.first_hole());
   for (const Interval& part : received_.missing({batch.first_seq, batch.next_seq()})) refused_.insert(part);
@@ -261,4 +261,4 @@ bool BootRecording::has_overdue_events(std::int64_t steady_us) {
   return misses_events() && event_hole_.is_overdue(received_events_.first_hole(), steady_us);
 }
 
-}  // namespace server
+}  // namespace server::storage

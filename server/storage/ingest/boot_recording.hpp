@@ -16,7 +16,7 @@
 
 #include "server/storage/commits/sample_store.hpp"
 
-namespace server {
+namespace server::storage {
 
 // When to ask for what is missing: once its beginning was the same for a while, and then at intervals.
 class HoleWatch {
@@ -32,9 +32,9 @@ class HoleWatch {
 
 class BootRecording {
  public:
-  explicit BootRecording(RobotId robot_id) : robot_id_{std::move(robot_id)} {}
+  explicit BootRecording(station::RobotId robot_id) : robot_id_{std::move(robot_id)} {}
 
-  const RobotId& robot_id() const { return robot_id_; }
+  const station::RobotId& robot_id() const { return robot_id_; }
   std::int64_t key() const { return key_; }
   bool loaded() const { return key_ != 0; }
   void load(StoredBoot stored);
@@ -44,14 +44,14 @@ class BootRecording {
   // The robot has connected, holding the samples [hello.oldest_seq, hello.next_seq). What it held no more when it
   // first connected after a restore, in the same boot, was lost by that; restored_at_us is 0 when there was none. What
   // else is missing and was acknowledged to it, another store had, or this one before it lost commits.
-  void connect(const AdmissionRequest& hello, std::int64_t restored_at_us);
+  void connect(const station::AdmissionRequest& hello, std::int64_t restored_at_us);
 
   // Samples of the batch that are not here yet.
-  std::size_t count_new(const SampleBatch& batch) const;
+  std::size_t count_new(const station::SampleBatch& batch) const;
   // Adds them to the waiting segments.
-  void append(const SampleBatch& batch, std::int64_t steady_us);
+  void append(const station::SampleBatch& batch, std::int64_t steady_us);
   // There is no room: the samples stay missing and are asked for again.
-  void refuse(const SampleBatch& batch);
+  void refuse(const station::SampleBatch& batch);
   // The robot no longer holds what is missing below.
   void set_lost_below(std::uint64_t oldest_seq, const char* cause, std::int64_t utc_us);
   // These came and cannot be recorded.
@@ -101,10 +101,10 @@ class BootRecording {
   bool misses_samples() const { return received_.first_hole() < next_seq_; }
   bool misses_events() const { return received_events_.first_hole() < next_event_seq_; }
   std::uint64_t room_from(std::uint64_t seq) const;
-  void append_part(const SampleBatch& batch, Interval part, std::int64_t steady_us);
-  std::size_t segment_for(const SampleBatch& batch, std::uint64_t seq);
+  void append_part(const station::SampleBatch& batch, Interval part, std::int64_t steady_us);
+  std::size_t segment_for(const station::SampleBatch& batch, std::uint64_t seq);
 
-  RobotId robot_id_;
+  station::RobotId robot_id_;
   std::int64_t key_ = 0;
   std::uint64_t next_seq_ = 0;
   std::uint64_t last_robot_time_us_ = 0;
@@ -133,4 +133,4 @@ class BootRecording {
   HoleWatch event_hole_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -6,7 +6,7 @@
 
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::storage {
 using namespace std::chrono_literals;
 
 namespace {
@@ -24,35 +24,35 @@ bool is_unused(const BootEntry& boot, std::int64_t now_us) {
 
 }  // namespace
 
-Admission another_boot_connected() {
+station::Admission another_boot_connected() {
   return refusal(rheonaut_REFUSAL_REASON_STATION_BUSY, "another boot of this robot has just connected; try again");
 }
 
-BootEntry* BootRegistry::find(BootId boot_id) {
+BootEntry* BootRegistry::find(station::BootId boot_id) {
   const auto found = boots_.find(boot_id);
   return found == boots_.end() ? nullptr : &found->second;
 }
 
-const BootEntry* BootRegistry::find(BootId boot_id) const {
+const BootEntry* BootRegistry::find(station::BootId boot_id) const {
   const auto found = boots_.find(boot_id);
   return found == boots_.end() ? nullptr : &found->second;
 }
 
-const BootEntry* BootRegistry::find_loaded(BootId boot_id) const {
+const BootEntry* BootRegistry::find_loaded(station::BootId boot_id) const {
   const BootEntry* boot = find(boot_id);
   return boot != nullptr && boot->recording.loaded() ? boot : nullptr;
 }
 
-BootEntry* BootRegistry::find_recorded(BootId boot_id) {
+BootEntry* BootRegistry::find_recorded(station::BootId boot_id) {
   BootEntry* boot = find(boot_id);
   return boot != nullptr && boot->is_recorded() ? boot : nullptr;
 }
 
-BootEntry& BootRegistry::enter(BootId boot_id, const RobotId& robot_id) {
+BootEntry& BootRegistry::enter(station::BootId boot_id, const station::RobotId& robot_id) {
   return boots_.try_emplace(boot_id, boot_id, robot_id).first->second;
 }
 
-bool BootRegistry::another_starts(const AdmissionRequest& request, std::int64_t since_us) const {
+bool BootRegistry::another_starts(const station::AdmissionRequest& request, std::int64_t since_us) const {
   const auto [begin, end] = by_robot_.equal_range(request.robot_id);
   return std::any_of(begin, end, [&](const auto& of_robot) {
     const BootEntry& boot = *of_robot.second;
@@ -61,8 +61,8 @@ bool BootRegistry::another_starts(const AdmissionRequest& request, std::int64_t 
   });
 }
 
-Admission BootRegistry::admit(BootEntry& boot, StoredBoot stored, Admission answer, const AdmissionRequest& request,
-                              std::int64_t now_us) {
+station::Admission BootRegistry::admit(BootEntry& boot, StoredBoot stored, station::Admission answer,
+                                       const station::AdmissionRequest& request, std::int64_t now_us) {
   if (boot.replaced) return another_boot_connected();
   if (!boot.recording.loaded()) {
     load(boot, std::move(stored), request);
@@ -83,7 +83,7 @@ Admission BootRegistry::admit(BootEntry& boot, StoredBoot stored, Admission answ
 }
 
 // One that the disk does not know is numbered here and stored with the next commit.
-void BootRegistry::load(BootEntry& boot, StoredBoot stored, const AdmissionRequest& request) {
+void BootRegistry::load(BootEntry& boot, StoredBoot stored, const station::AdmissionRequest& request) {
   if (stored.key == 0) {
     stored.key = next_boot_key_++;
     stored.next_seq = request.next_seq;
@@ -96,7 +96,7 @@ void BootRegistry::load(BootEntry& boot, StoredBoot stored, const AdmissionReque
 }
 
 BootRegistry::Started BootRegistry::start(BootEntry& boot, std::int64_t utc_us) {
-  const AdmissionRequest hello = *std::exchange(boot.hello, {});
+  const station::AdmissionRequest hello = *std::exchange(boot.hello, {});
   boot.recording.connect(hello, restored_at_us_);
   boot.started = true;
   return {.start = {.robot_id = hello.robot_id,
@@ -174,4 +174,4 @@ void BootRegistry::forget(const BootEntry& boot) {
   replaced_ -= boot.replaced ? 1 : 0;
 }
 
-}  // namespace server
+}  // namespace server::storage

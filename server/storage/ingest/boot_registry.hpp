@@ -16,14 +16,14 @@
 
 #include "server/storage/ingest/boot_entry.hpp"
 
-namespace server {
+namespace server::storage {
 
 // The refusal of a boot whose robot has connected with another one: what is known of it may be out of date.
-Admission another_boot_connected();
+station::Admission another_boot_connected();
 
 class BootRegistry {
  public:
-  using Boots = std::unordered_map<BootId, BootEntry>;  // an entry stays where it is
+  using Boots = std::unordered_map<station::BootId, BootEntry>;  // an entry stays where it is
 
   // What a boot's connection has brought about.
   struct Started {
@@ -38,24 +38,24 @@ class BootRegistry {
 
   bool empty() const { return boots_.empty(); }
   Boots& all() { return boots_; }
-  BootEntry* find(BootId boot_id);  // null: it is not in use
-  const BootEntry* find(BootId boot_id) const;
-  const BootEntry* find_loaded(BootId boot_id) const;  // null: nothing can be known of it yet
-  BootEntry* find_recorded(BootId boot_id);            // null unless samples of it are recorded now
+  BootEntry* find(station::BootId boot_id);  // null: it is not in use
+  const BootEntry* find(station::BootId boot_id) const;
+  const BootEntry* find_loaded(station::BootId boot_id) const;  // null: nothing can be known of it yet
+  BootEntry* find_recorded(station::BootId boot_id);            // null unless samples of it are recorded now
 
   // The boot's entry, made if there is none. A caller that waits for the answer of an admission counts itself in
   // `admissions`.
-  BootEntry& enter(BootId boot_id, const RobotId& robot_id);
+  BootEntry& enter(station::BootId boot_id, const station::RobotId& robot_id);
 
   // Another boot of this robot has connected, and that was not stored at `since_us`: what was read of any other boot
   // since, may be what it was before it ended.
-  bool another_starts(const AdmissionRequest& request, std::int64_t since_us) const;
+  bool another_starts(const station::AdmissionRequest& request, std::int64_t since_us) const;
 
   // The boot of this request goes on as `stored`, what the database has of it, or as what is known of it here; a boot
   // without a key gets the next one. Refused when it is another robot's, was replaced, or cannot have gone back to what
   // the request says. `answer` is the admission by the database, which is completed.
-  Admission admit(BootEntry& boot, StoredBoot stored, Admission answer, const AdmissionRequest& request,
-                  std::int64_t now_us);
+  station::Admission admit(BootEntry& boot, StoredBoot stored, station::Admission answer,
+                           const station::AdmissionRequest& request, std::int64_t now_us);
 
   // A refused boot leaves nothing behind: the next forget_unused() looks for it.
   void forget_soon() { forget_at_once_ = true; }
@@ -81,13 +81,13 @@ class BootRegistry {
   void forget_unused(std::int64_t now_us);
 
  private:
-  void load(BootEntry& boot, StoredBoot stored, const AdmissionRequest& request);
+  void load(BootEntry& boot, StoredBoot stored, const station::AdmissionRequest& request);
   std::vector<BootEntry*> replace_others(const BootEntry& boot, std::int64_t utc_us);
   void replace(BootEntry& boot, std::int64_t utc_us);
   void forget(const BootEntry& boot);
 
   Boots boots_;
-  std::unordered_multimap<RobotId, BootEntry*> by_robot_;  // those that are loaded
+  std::unordered_multimap<station::RobotId, BootEntry*> by_robot_;  // those that are loaded
   std::int64_t next_boot_key_ = 0;
   std::int64_t restored_at_us_ = 0;
 
@@ -101,4 +101,4 @@ class BootRegistry {
   bool forget_at_once_ = false;
 };
 
-}  // namespace server
+}  // namespace server::storage

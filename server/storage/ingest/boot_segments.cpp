@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-namespace server {
+namespace server::storage {
 
 // First the complete segments, so that what has just begun after one is not taken for old.
 void enqueue_due(BootRegistry& boots, CommitQueue& queue, std::int64_t now_us) {
@@ -53,4 +53,4 @@ std::vector<LostRange> waiting_gaps(const CommitQueue& queue, const BootEntry& b
   return gaps;
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -10,7 +10,7 @@
 #include "server/storage/ingest/boot_registry.hpp"
 #include "server/storage/ingest/commit_queue.hpp"
 
-namespace server {
+namespace server::storage {
 
 // Enqueues what is due: only as much as a commit takes, the rest is not touched until its turn. `now_us` is steady.
 void enqueue_due(BootRegistry& boots, CommitQueue& queue, std::int64_t now_us);
@@ -25,4 +25,4 @@ std::vector<Segment> waiting_samples(const CommitQueue& queue, const BootEntry& 
 // Gaps that the range touches, ascending.
 std::vector<LostRange> waiting_gaps(const CommitQueue& queue, const BootEntry& boot, Interval range);
 
-}  // namespace server
+}  // namespace server::storage

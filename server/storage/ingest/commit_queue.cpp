@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace server {
+namespace server::storage {
 
 namespace {
 
@@ -27,12 +27,12 @@ void CommitQueue::enqueue_segments(BootEntry& boot, bool all) {
   }
 }
 
-void CommitQueue::enqueue(const CommandRecord& command) {
+void CommitQueue::enqueue(const station::CommandRecord& command) {
   queued_commands_.emplace(command.id, queued_.commands.size());
   queued_.commands.push_back(command);
 }
 
-bool CommitQueue::replace(const CommandRecord& command) {
+bool CommitQueue::replace(const station::CommandRecord& command) {
   const auto queued = queued_commands_.find(command.id);
   if (queued == queued_commands_.end()) return false;
   queued_.commands[queued->second] = command;
@@ -109,4 +109,4 @@ std::vector<const Segment*> CommitQueue::segments_of(const BootEntry& boot, Inte
   return found;
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -19,7 +19,7 @@
 
 #include "server/storage/ingest/boot_entry.hpp"
 
-namespace server {
+namespace server::storage {
 
 // So many segments have been enqueued, or have left the queue, ever.
 using QueuePosition = std::uint64_t;
@@ -46,14 +46,14 @@ class CommitQueue {
   bool has_room_for_record() const { return records() < max_records_; }
   bool is_half_empty_of_records() const { return records() <= max_records_ / 2; }
   void enqueue(StoredEvent event) { queued_.events.push_back(std::move(event)); }
-  void enqueue(AuditNote note) { queued_.audit.push_back(std::move(note)); }
+  void enqueue(station::AuditNote note) { queued_.audit.push_back(std::move(note)); }
   void enqueue(StoredClock clock) { queued_.clocks.push_back(std::move(clock)); }
   void enqueue(StoredInForce in_force) { queued_.in_force.push_back(std::move(in_force)); }
-  void enqueue(const CommandRecord& command);
+  void enqueue(const station::CommandRecord& command);
   // An earlier state of the command is queued: it becomes this one, which needs no room. False: none is.
-  bool replace(const CommandRecord& command);
+  bool replace(const station::CommandRecord& command);
   // At most one for each robot.
-  void set_fluid(const RobotId& robot_id, const std::string& fluid) { queued_.fluids[robot_id] = fluid; }
+  void set_fluid(const station::RobotId& robot_id, const std::string& fluid) { queued_.fluids[robot_id] = fluid; }
 
   bool has_room_for_boot() const { return queued_.new_boots.size() < max_records_; }
   void enqueue(NewBoot boot) { queued_.new_boots.push_back(std::move(boot)); }
@@ -108,8 +108,8 @@ class CommitQueue {
   std::size_t max_records_;
   std::size_t samples_ = 0;
 
-  WriteBatch queued_;                                           // records; the rest waits in the next two
-  std::unordered_map<CommandId, std::size_t> queued_commands_;  // where each waits in queued_.commands
+  WriteBatch queued_;                                                    // records; the rest waits in the next two
+  std::unordered_map<station::CommandId, std::size_t> queued_commands_;  // where each waits in queued_.commands
   std::deque<QueuedSegment> segments_;
   std::size_t segment_samples_ = 0;  // of segments_
   std::deque<QueuedStart> starts_;
@@ -121,4 +121,4 @@ class CommitQueue {
   std::vector<BootEntry*> starting_;  // in the order of its starts of boots
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -1,6 +1,6 @@
 #include "server/storage/ingest/flush_waiters.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
 
@@ -13,7 +13,7 @@ constexpr microseconds kFlushPatience = 3s;
 asio::awaitable<bool> FlushWaiters::wait_for(std::uint64_t position) {
   // Who gave up is dropped here, too: while the disk fails nothing else does it.
   std::erase_if(waiters_, [](const Waiter& waiter) { return waiter.done.expired(); });
-  const auto done = std::make_shared<Signal>(loop_);
+  const auto done = std::make_shared<runtime::Signal>(loop_);
   waiters_.push_back({done, position});
   wanted_.notify();
   co_return co_await done->wait_until(clock_, clock_.steady_us() + kFlushPatience.count());
@@ -37,4 +37,4 @@ void FlushWaiters::on_durable(std::uint64_t position) {
   });
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -13,11 +13,11 @@
 
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::storage {
 
 class FlushWaiters {
  public:
-  FlushWaiters(boost::asio::io_context& loop, Clock& clock) : loop_{loop}, clock_{clock}, wanted_{loop} {}
+  FlushWaiters(boost::asio::io_context& loop, runtime::Clock& clock) : loop_{loop}, clock_{clock}, wanted_{loop} {}
 
   bool empty() const { return waiters_.empty(); }
   std::size_t size() const { return waiters_.size(); }
@@ -36,15 +36,15 @@ class FlushWaiters {
 
  private:
   struct Waiter {
-    std::weak_ptr<Signal> done;
+    std::weak_ptr<runtime::Signal> done;
     std::uint64_t position = 0;
     bool is_in_commit = false;  // its records
   };
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
-  Signal wanted_;
+  runtime::Clock& clock_;
+  runtime::Signal wanted_;
   std::vector<Waiter> waiters_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -10,7 +10,7 @@
 #include "server/station/state/checked.hpp"
 #include "server/storage/ingest/boot_segments.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
 
@@ -22,8 +22,8 @@ constexpr microseconds kOverflowLogInterval = 10s;
 constexpr std::size_t kBootsInATurn = 128;
 constexpr std::size_t kReportsInATurn = 32;
 
-AuditNote of_station(const char* action, std::int64_t utc_us) {
-  AuditNote note;
+station::AuditNote of_station(const char* action, std::int64_t utc_us) {
+  station::AuditNote note;
   note.by = {"station", "", utc_us};
   note.action = action;
   return note;
@@ -31,8 +31,8 @@ AuditNote of_station(const char* action, std::int64_t utc_us) {
 
 }  // namespace
 
-Recorder::Recorder(asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& checkpoints,
-                   RecorderOptions options)
+Recorder::Recorder(asio::io_context& loop, runtime::Clock& clock, runtime::WorkerThread& disk,
+                   runtime::WorkerThread& checkpoints, RecorderOptions options)
     : loop_{loop},
       clock_{clock},
       options_{std::move(options)},
@@ -48,7 +48,7 @@ Recorder::~Recorder() = default;
 asio::awaitable<RestoredState> Recorder::open() {
   OpenedDatabase opened = co_await database_.open(clock_.utc_us());
   boots_ = std::make_unique<BootRegistry>(opened.next_boot_key, opened.restored_at_us);
-  AuditNote started = of_station("station.started", clock_.utc_us());
+  station::AuditNote started = of_station("station.started", clock_.utc_us());
   started.detail = fmt::format(R"({{"version":"{}","store_id":"{}"}})", RHEONAUT_VERSION, opened.restored.store_id);
   on_audit(started);
   co_return std::move(opened.restored);
@@ -135,7 +135,7 @@ asio::awaitable<void> Recorder::ask_for_missing() {
     if (left % kBootsInATurn == 0) co_await asio::post(loop_, asio::use_awaitable);
     BootEntry* boot = boots_->next_with_holes();
     if (boot == nullptr) continue;
-    const RobotId& robot_id = boot->recording.robot_id();
+    const station::RobotId& robot_id = boot->recording.robot_id();
     if (room_for_samples) {
       const auto hole = boot->recording.overdue_samples(now_us);
       if (hole) on_missing_(robot_id, boot->boot_id, hole->first, hole->next);
@@ -175,9 +175,9 @@ std::string Recorder::write_rest() {
   }
 }
 
-asio::awaitable<Admission> Recorder::admit(AdmissionRequest request) {
+asio::awaitable<station::Admission> Recorder::admit(station::AdmissionRequest request) {
   BootEntry& boot = boots_->enter(request.boot_id, request.robot_id);
-  const Counted admitting{boot.admissions};  // keeps the boot, whatever happens
+  const runtime::Counted admitting{boot.admissions};  // keeps the boot, whatever happens
   wake();
   AdmissionQuestion question{request, boot.owner()};
   const std::int64_t asked_us = clock_.steady_us();
@@ -185,19 +185,20 @@ asio::awaitable<Admission> Recorder::admit(AdmissionRequest request) {
   AdmissionOutcome outcome = co_await admission_.ask(std::move(question));
   is_ending = is_ending || boots_->another_starts(request, asked_us);
   const bool is_stored = outcome.boot.key != 0;
-  Admission admission =
+  station::Admission admission =
       is_stored && is_ending ? another_boot_connected() : admit_boot(boot, std::move(outcome), request);
   if (!boot.recording.loaded() && boot.admissions == 1) boots_->forget_soon();
   co_return admission;
 }
 
-Admission Recorder::admit_boot(BootEntry& boot, AdmissionOutcome outcome, const AdmissionRequest& request) {
+station::Admission Recorder::admit_boot(BootEntry& boot, AdmissionOutcome outcome,
+                                        const station::AdmissionRequest& request) {
   if (outcome.admission.refusal != rheonaut_REFUSAL_REASON_NONE) return std::move(outcome.admission);
   const bool is_new = !boot.recording.loaded() && outcome.boot.key == 0;
   if (is_new && !queue_->has_room_for_boot()) {
     return refusal(rheonaut_REFUSAL_REASON_STATION_BUSY, "too many new boots wait for the disk; try again");
   }
-  Admission admission =
+  station::Admission admission =
       boots_->admit(boot, std::move(outcome.boot), std::move(outcome.admission), request, clock_.steady_us());
   if (is_new) queue_->enqueue(NewBoot{boot.recording.key(), request});
   return admission;
@@ -210,10 +211,10 @@ asio::awaitable<std::vector<AdmissionOutcome>> Recorder::ask_database(std::vecto
   co_return co_await on_disk(std::move(job));
 }
 
-void Recorder::on_robot(const RobotState& robot) {
+void Recorder::on_robot(const station::RobotState& robot) {
   BootEntry* boot = boots_->find(robot.boot_id);
   if (boot == nullptr || boot->recording.robot_id() != robot.id) return;
-  boot->connected = robot.link == LinkState::connected && !boot->replaced;
+  boot->connected = robot.link == station::LinkState::connected && !boot->replaced;
   if (boot->connected && boot->hello) start(*boot);
   watch(*boot);
 }
@@ -227,7 +228,7 @@ void Recorder::start(BootEntry& boot) {
   queue_->enqueue_start(boot, std::move(started.start));
 }
 
-void Recorder::on_samples(const RobotState&, const SampleBatch& batch) {
+void Recorder::on_samples(const station::RobotState&, const station::SampleBatch& batch) {
   BootEntry* boot = boots_->find_recorded(batch.boot_id);
   if (boot == nullptr) {
     ++counters_.batches_malformed;
@@ -255,7 +256,7 @@ void Recorder::note_refused(std::size_t samples) {
                queue_->samples(), counters_.samples_refused);
 }
 
-void Recorder::on_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) {
+void Recorder::on_unusable_samples(const station::RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) {
   ++counters_.batches_malformed;
   BootEntry* boot = boots_->find_recorded(robot.boot_id);
   if (boot == nullptr) return;
@@ -263,7 +264,7 @@ void Recorder::on_unusable_samples(const RobotState& robot, std::uint64_t first_
   watch(*boot);
 }
 
-void Recorder::on_unusable_event(const RobotState& robot, std::uint64_t event_seq) {
+void Recorder::on_unusable_event(const station::RobotState& robot, std::uint64_t event_seq) {
   BootEntry* boot = boots_->find_recorded(robot.boot_id);
   if (boot == nullptr) return;
   boot->recording.set_event_lost(event_seq, "invalid", robot.last_received_at_us);
@@ -271,12 +272,12 @@ void Recorder::on_unusable_event(const RobotState& robot, std::uint64_t event_se
 }
 
 // SAFETY: whatever waits, since its limits must hold after a restart. One entry for each robot at most.
-void Recorder::on_fluid(const RobotState& robot) {
+void Recorder::on_fluid(const station::RobotState& robot) {
   queue_->set_fluid(robot.id, robot.fluid);
   wake();
 }
 
-void Recorder::on_event(const RobotState&, const RobotEvent& event) {
+void Recorder::on_event(const station::RobotState&, const station::RobotEvent& event) {
   BootEntry* boot = boots_->find_recorded(event.boot_id);
   if (!event.event_seq) {
     if (!room_for_record()) return;
@@ -293,7 +294,7 @@ void Recorder::on_event(const RobotState&, const RobotEvent& event) {
   watch(*boot);
 }
 
-void Recorder::on_command(const CommandRecord& command) {
+void Recorder::on_command(const station::CommandRecord& command) {
   if (queue_->replace(command)) return;
   // SAFETY: a stop must be known after a restart, so it is recorded whatever waits.
   if (command.kind != "emergency_stop" && !room_for_record()) return quota_.leave_out("command");
@@ -301,7 +302,7 @@ void Recorder::on_command(const CommandRecord& command) {
   wake();
 }
 
-void Recorder::on_audit(const AuditNote& note) {
+void Recorder::on_audit(const station::AuditNote& note) {
   wake();
   if (note.can_flood && !quota_.take(note.action, clock_.steady_us())) return;
   if (!room_for_record()) return quota_.leave_out(note.action);
@@ -311,29 +312,29 @@ void Recorder::on_audit(const AuditNote& note) {
 // What has no entry is an entry, too: nobody can make the audit silent unseen.
 void Recorder::record_left_out(bool at_once) {
   for (const auto& [action, count] : quota_.report(clock_.steady_us(), at_once)) {
-    AuditNote note = of_station("audit.left_out", clock_.utc_us());
+    station::AuditNote note = of_station("audit.left_out", clock_.utc_us());
     note.subject = action;
     note.detail = fmt::format(R"({{"count":{}}})", count);
     queue_->enqueue(std::move(note));
   }
 }
 
-void Recorder::on_clock(const RobotState&, const ClockRecord& record) {
+void Recorder::on_clock(const station::RobotState&, const station::ClockRecord& record) {
   const std::int64_t boot_key = key_of(record.boot_id);
   if (boot_key == 0 || !room_for_record()) return;
   queue_->enqueue(StoredClock{boot_key, record});
   wake();
 }
 
-void Recorder::on_in_force(const RobotState&, const InForceRecord& record) {
+void Recorder::on_in_force(const station::RobotState&, const station::InForceRecord& record) {
   const std::int64_t boot_key = key_of(record.boot_id);
-  if (boot_key == 0 || record.first_seq > kMaxRobotNumber || !room_for_record()) return;
+  if (boot_key == 0 || record.first_seq > station::kMaxRobotNumber || !room_for_record()) return;
   queue_->enqueue(StoredInForce{boot_key, record});
   wake();
 }
 
 // 0 unless samples of the boot are recorded now.
-std::int64_t Recorder::key_of(BootId boot_id) const {
+std::int64_t Recorder::key_of(station::BootId boot_id) const {
   const BootEntry* boot = boots_->find_recorded(boot_id);
   return boot == nullptr ? 0 : boot->recording.key();
 }
@@ -356,19 +357,19 @@ void Recorder::wake() {
 
 std::size_t Recorder::queued_samples() const { return queue_->samples(); }
 
-std::uint64_t Recorder::next_seq(BootId boot_id) const {
+std::uint64_t Recorder::next_seq(station::BootId boot_id) const {
   const BootEntry* boot = boots_->find(boot_id);
   return boot == nullptr ? 0 : boot->recording.next_seq();
 }
 
-std::vector<Segment> Recorder::waiting(BootId boot_id, Interval samples, std::size_t limit) const {
+std::vector<Segment> Recorder::waiting(station::BootId boot_id, Interval samples, std::size_t limit) const {
   const BootEntry* boot = boots_->find_loaded(boot_id);
   return boot == nullptr ? std::vector<Segment>{} : waiting_samples(*queue_, *boot, samples, limit);
 }
 
-std::vector<LostRange> Recorder::waiting_gaps(BootId boot_id, Interval samples) const {
+std::vector<LostRange> Recorder::waiting_gaps(station::BootId boot_id, Interval samples) const {
   const BootEntry* boot = boots_->find_loaded(boot_id);
-  return boot == nullptr ? std::vector<LostRange>{} : server::waiting_gaps(*queue_, *boot, samples);
+  return boot == nullptr ? std::vector<LostRange>{} : storage::waiting_gaps(*queue_, *boot, samples);
 }
 
 asio::awaitable<bool> Recorder::flush() {
@@ -376,7 +377,7 @@ asio::awaitable<bool> Recorder::flush() {
   co_return co_await flush_until(queue_->end());
 }
 
-asio::awaitable<bool> Recorder::flush(BootId boot_id) {
+asio::awaitable<bool> Recorder::flush(station::BootId boot_id) {
   BootEntry* boot = boots_->find(boot_id);
   if (boot == nullptr || !boot->recording.loaded() || boot->is_stored()) co_return true;
   queue_->enqueue_segments(*boot, true);
@@ -395,4 +396,4 @@ asio::awaitable<bool> Recorder::flush_until(QueuePosition position) {
   co_return co_await flushes_.wait_for(position);
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -44,15 +44,15 @@
 #include "server/storage/ingest/robot_admission.hpp"
 #include "server/storage/ingest/write_failure.hpp"
 
-namespace server {
+namespace server::storage {
 
 class BootRegistry;
 class CommitQueue;
 struct BootEntry;
 
 struct RecorderOptions {
-  std::filesystem::path path;   // of the database
-  LoopbackEnrolment enrolment;  // a new robot that connects from this machine is enrolled
+  std::filesystem::path path;           // of the database
+  config::LoopbackEnrolment enrolment;  // a new robot that connects from this machine is enrolled
   std::size_t max_queued_samples = 2'000'000;
   std::size_t max_queued_records = 100'000;   // events, commands, audit, clock estimates, texts in force
   std::uint64_t checkpoint_bytes = 64 << 20;  // of the write-ahead log, from which on it is moved into the database
@@ -83,16 +83,18 @@ struct RecorderCounters {
   }
 };
 
-class Recorder final : public StationSink, public RobotArchive {
+class Recorder final : public station::StationSink, public station::RobotArchive {
  public:
-  static constexpr std::size_t kMaxCommitSamples = server::kMaxCommitSamples;
+  static constexpr std::size_t kMaxCommitSamples = storage::kMaxCommitSamples;
 
-  using OnDurable = std::function<void(const RobotId&, BootId, std::uint64_t next_seq, std::uint64_t next_event_seq)>;
-  using OnMissing = std::function<void(const RobotId&, BootId, std::uint64_t first_seq, std::uint64_t next_seq)>;
-  using OnMissingEvents = std::function<void(const RobotId&, BootId)>;
+  using OnDurable = std::function<void(const station::RobotId&, station::BootId, std::uint64_t next_seq,
+                                       std::uint64_t next_event_seq)>;
+  using OnMissing =
+      std::function<void(const station::RobotId&, station::BootId, std::uint64_t first_seq, std::uint64_t next_seq)>;
+  using OnMissingEvents = std::function<void(const station::RobotId&, station::BootId)>;
 
-  Recorder(boost::asio::io_context& loop, Clock& clock, WorkerThread& disk, WorkerThread& checkpoints,
-           RecorderOptions options);
+  Recorder(boost::asio::io_context& loop, runtime::Clock& clock, runtime::WorkerThread& disk,
+           runtime::WorkerThread& checkpoints, RecorderOptions options);
   ~Recorder() override;
 
   void set_on_durable(OnDurable on_durable) { on_durable_ = std::move(on_durable); }
@@ -112,8 +114,9 @@ class Recorder final : public StationSink, public RobotArchive {
 
   // Return true when what they name, as far as it was received, is durable, and false after 3 s if it is not yet. Need
   // run(). Those of samples cut segments short; a caller that only reads samples uses waiting() instead.
-  boost::asio::awaitable<bool> flush();          // everything: the segments of every robot are cut
-  boost::asio::awaitable<bool> flush(BootId);    // the samples and gaps of one boot; nothing is written if none wait
+  boost::asio::awaitable<bool> flush();  // everything: the segments of every robot are cut
+  boost::asio::awaitable<bool> flush(
+      station::BootId);                          // the samples and gaps of one boot; nothing is written if none wait
   boost::asio::awaitable<bool> flush_records();  // events, commands and boots
   boost::asio::awaitable<bool> flush_boots();    // boots and the spans that they moved; nothing is written if none wait
 
@@ -121,23 +124,23 @@ class Recorder final : public StationSink, public RobotArchive {
   // the database to itself. Does not throw.
   void close(const std::function<void(Database&, std::int64_t utc_us)>& last = {});
 
-  boost::asio::awaitable<Admission> admit(AdmissionRequest request) override;
+  boost::asio::awaitable<station::Admission> admit(station::AdmissionRequest request) override;
 
   // A robot whose enrolment was revoked is refused from this call on, also one that is being admitted.
-  void set_revoked(const RobotId& robot_id, bool revoked) { admission_.set_revoked(robot_id, revoked); }
+  void set_revoked(const station::RobotId& robot_id, bool revoked) { admission_.set_revoked(robot_id, revoked); }
 
-  void on_robot(const RobotState& robot) override;
-  void on_fluid(const RobotState& robot) override;
+  void on_robot(const station::RobotState& robot) override;
+  void on_fluid(const station::RobotState& robot) override;
   // Filled from checked telemetry: its numbers are not judged again. Dropped and counted when no such boot is recorded.
-  void on_samples(const RobotState& robot, const SampleBatch& batch) override;
-  void on_unusable_samples(const RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) override;
-  void on_unusable_event(const RobotState& robot, std::uint64_t event_seq) override;
-  void on_event(const RobotState& robot, const RobotEvent& event) override;
-  void on_command(const CommandRecord& command) override;
+  void on_samples(const station::RobotState& robot, const station::SampleBatch& batch) override;
+  void on_unusable_samples(const station::RobotState& robot, std::uint64_t first_seq, std::uint64_t next_seq) override;
+  void on_unusable_event(const station::RobotState& robot, std::uint64_t event_seq) override;
+  void on_event(const station::RobotState& robot, const station::RobotEvent& event) override;
+  void on_command(const station::CommandRecord& command) override;
   // Written with the next commit; what can flood is bounded by an AuditQuota.
-  void on_audit(const AuditNote& note) override;
-  void on_clock(const RobotState& robot, const ClockRecord& record) override;
-  void on_in_force(const RobotState& robot, const InForceRecord& record) override;
+  void on_audit(const station::AuditNote& note) override;
+  void on_clock(const station::RobotState& robot, const station::ClockRecord& record) override;
+  void on_in_force(const station::RobotState& robot, const station::InForceRecord& record) override;
 
   // Runs job(Database&) on the disk thread, between two commits.
   template <class Job>
@@ -146,15 +149,15 @@ class Recorder final : public StationSink, public RobotArchive {
   }
 
   // One above the newest sample that a boot is known to have made; 0 when the boot is not in use.
-  std::uint64_t next_seq(BootId boot_id) const;
+  std::uint64_t next_seq(station::BootId boot_id) const;
 
   // What was received of a boot and is not durable yet, ascending, in the form in which it will be read back: its
   // samples, cut to the range, and its gaps in it. Of the samples those of the first segments that have `limit`
   // together, since hours may wait. A reader takes both before it asks the database; what it then finds in both it
   // takes from there. Nothing is missing so, since what was durable before is in every later read transaction.
   static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
-  std::vector<Segment> waiting(BootId boot_id, Interval samples, std::size_t limit = kAll) const;
-  std::vector<LostRange> waiting_gaps(BootId boot_id, Interval samples) const;
+  std::vector<Segment> waiting(station::BootId boot_id, Interval samples, std::size_t limit = kAll) const;
+  std::vector<LostRange> waiting_gaps(station::BootId boot_id, Interval samples) const;
 
   boost::asio::io_context& loop() { return loop_; }
   const std::filesystem::path& path() const { return options_.path; }
@@ -168,12 +171,12 @@ class Recorder final : public StationSink, public RobotArchive {
 
  private:
   boost::asio::awaitable<std::vector<AdmissionOutcome>> ask_database(std::vector<AdmissionQuestion> questions);
-  Admission admit_boot(BootEntry& boot, AdmissionOutcome outcome, const AdmissionRequest& request);
+  station::Admission admit_boot(BootEntry& boot, AdmissionOutcome outcome, const station::AdmissionRequest& request);
   void start(BootEntry& boot);
   void watch(BootEntry& boot);
   void note_refused(std::size_t samples);
   bool room_for_record();
-  std::int64_t key_of(BootId boot_id) const;
+  std::int64_t key_of(station::BootId boot_id) const;
   void record_left_out(bool at_once);
 
   boost::asio::awaitable<void> wait_for_commit();
@@ -187,7 +190,7 @@ class Recorder final : public StationSink, public RobotArchive {
   void wake();
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
+  runtime::Clock& clock_;
   RecorderOptions options_;
   OnDurable on_durable_;
   OnMissing on_missing_;
@@ -206,7 +209,7 @@ class Recorder final : public StationSink, public RobotArchive {
   std::int64_t last_commit_us_ = 0;      // steady
   std::int64_t overflow_logged_us_ = 0;  // steady
   bool idle_ = false;                    // run() waits for work_
-  Signal work_{loop_};                   // something to record, or a robot to watch
+  runtime::Signal work_{loop_};          // something to record, or a robot to watch
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 
 class RobotAdmission::Turn {
@@ -47,11 +47,11 @@ asio::awaitable<void> RobotAdmission::ask_for_all() {
   }
 }
 
-void RobotAdmission::set_revoked(const RobotId& robot_id, bool revoked) {
+void RobotAdmission::set_revoked(const station::RobotId& robot_id, bool revoked) {
   revoked ? static_cast<void>(revoked_.insert(robot_id)) : static_cast<void>(revoked_.erase(robot_id));
 }
 
-void RobotAdmission::check_revoked(AdmissionOutcome& outcome, const AdmissionRequest& request) const {
+void RobotAdmission::check_revoked(AdmissionOutcome& outcome, const station::AdmissionRequest& request) const {
   if (outcome.admission.refusal != rheonaut_REFUSAL_REASON_NONE) return;
   if (revoked_.contains(request.robot_id)) {  // since the disk was asked
     outcome.admission = revoked(request.robot_id);
@@ -61,4 +61,4 @@ void RobotAdmission::check_revoked(AdmissionOutcome& outcome, const AdmissionReq
   }
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -19,7 +19,7 @@
 #include "server/runtime/clock.hpp"
 #include "server/storage/commits/boot_store.hpp"
 
-namespace server {
+namespace server::storage {
 
 class RobotAdmission {
  public:
@@ -33,7 +33,7 @@ class RobotAdmission {
   boost::asio::awaitable<AdmissionOutcome> ask(AdmissionQuestion question);
 
   // A robot whose enrolment was revoked is refused from this call on, also one that is being asked for.
-  void set_revoked(const RobotId& robot_id, bool revoked);
+  void set_revoked(const station::RobotId& robot_id, bool revoked);
 
  private:
   // A robot that waits for its answer. Shared with it, since its coroutine may be cancelled.
@@ -41,19 +41,19 @@ class RobotAdmission {
     Question(boost::asio::io_context& loop, AdmissionQuestion asked) : question{std::move(asked)}, answered{loop} {}
     AdmissionQuestion question;
     std::optional<AdmissionOutcome> outcome;
-    Signal answered;  // or nobody asks any more
+    runtime::Signal answered;  // or nobody asks any more
   };
   // One coroutine asks at a time; when it ends, all that wait are woken.
   class Turn;
 
   boost::asio::awaitable<void> ask_for_all();
-  void check_revoked(AdmissionOutcome& outcome, const AdmissionRequest& request) const;
+  void check_revoked(AdmissionOutcome& outcome, const station::AdmissionRequest& request) const;
 
   boost::asio::io_context& loop_;
   AskDatabase ask_database_;
   std::deque<std::shared_ptr<Question>> questions_;  // as many as robots are greeted at a time
   bool is_asking_ = false;
-  std::set<RobotId> revoked_;  // as in the database, or newer; all of them were enrolled
+  std::set<station::RobotId> revoked_;  // as in the database, or newer; all of them were enrolled
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -16,7 +16,7 @@
 #include <queue>
 #include <vector>
 
-namespace server {
+namespace server::storage {
 
 // The place of an entry in one list.
 template <class Entry>
@@ -120,4 +120,4 @@ class TimedWorkList {
   std::priority_queue<Due, std::vector<Due>, std::greater<>> entries_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -4,7 +4,7 @@
 
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::storage {
 using namespace std::chrono_literals;
 
 namespace {
@@ -32,4 +32,4 @@ void WriteFailure::on_written() {
   problem_.clear();
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string>
 
-namespace server {
+namespace server::storage {
 
 class WriteFailure {
  public:
@@ -26,4 +26,4 @@ class WriteFailure {
   std::string problem_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -10,7 +10,7 @@
 #include "server/storage/database/statement.hpp"
 #include "server/storage/samples/stored_rows.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 
 namespace {
@@ -41,7 +41,7 @@ Result<std::vector<RecordedSpan>> read_excerpt(SQLite::Database& database, const
 
 }  // namespace
 
-History::History(std::filesystem::path database, Recorder& recorder, WorkerThread& readers)
+History::History(std::filesystem::path database, Recorder& recorder, runtime::WorkerThread& readers)
     : recorder_{recorder}, reader_{std::move(database), readers} {}
 
 asio::awaitable<void> History::settle() { co_await recorder_.flush_records(); }
@@ -171,9 +171,9 @@ asio::awaitable<Result<Overview>> History::overview(Excerpt excerpt, OverviewQue
   co_return overview;
 }
 
-asio::awaitable<std::vector<RobotEvent>> History::events(RobotId robot_id, std::size_t limit) {
+asio::awaitable<std::vector<station::RobotEvent>> History::events(station::RobotId robot_id, std::size_t limit) {
   auto query = [robot_id, limit](SQLite::Database& database) {
-    std::vector<RobotEvent> events;
+    std::vector<station::RobotEvent> events;
     SQLite::Statement rows{database, select_events("WHERE event.robot_id = ? ORDER BY event_row DESC LIMIT ?")};
     bind_all(rows, robot_id, clamped(limit));
     while (rows.executeStep()) events.push_back(event_from(rows));
@@ -183,9 +183,9 @@ asio::awaitable<std::vector<RobotEvent>> History::events(RobotId robot_id, std::
   co_return co_await reader_.ask(std::move(query));
 }
 
-asio::awaitable<std::vector<CommandRecord>> History::commands(RobotId robot_id, std::size_t limit) {
+asio::awaitable<std::vector<station::CommandRecord>> History::commands(station::RobotId robot_id, std::size_t limit) {
   auto query = [robot_id, limit](SQLite::Database& database) {
-    std::vector<CommandRecord> commands;
+    std::vector<station::CommandRecord> commands;
     SQLite::Statement rows{database, select_commands("WHERE robot_id = ? ORDER BY submitted_at_us DESC LIMIT ?")};
     bind_all(rows, robot_id, clamped(limit));
     while (rows.executeStep()) commands.push_back(command_from(rows));
@@ -201,8 +201,8 @@ asio::awaitable<AuditPage> History::audit(AuditFilter filter) {
   co_return co_await reader_.ask(std::move(query));
 }
 
-asio::awaitable<Result<CommandRecord>> History::command(CommandId id) {
-  auto query = [id](SQLite::Database& database) -> Result<CommandRecord> {
+asio::awaitable<Result<station::CommandRecord>> History::command(station::CommandId id) {
+  auto query = [id](SQLite::Database& database) -> Result<station::CommandRecord> {
     SQLite::Statement row{database, select_commands("WHERE command_id = ?")};
     bind_all(row, id);
     if (!row.executeStep()) return fail(ErrorCode::not_found, fmt::format("there is no command {}", id));
@@ -212,4 +212,4 @@ asio::awaitable<Result<CommandRecord>> History::command(CommandId id) {
   co_return co_await reader_.ask(std::move(query));
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -25,12 +25,12 @@
 #include "server/storage/query/span_reader.hpp"
 #include "server/storage/runs/run.hpp"
 
-namespace server {
+namespace server::storage {
 
 // A run or all that a robot recorded; or what of it lies in a window of time.
 struct Excerpt {
   std::optional<RunId> run;
-  RobotId robot_id;  // when there is no run
+  station::RobotId robot_id;  // when there is no run
   std::optional<TimeWindow> window;
 };
 
@@ -53,7 +53,7 @@ inline constexpr std::size_t kMaxPageGaps = 10'000;
 
 class History {
  public:
-  History(std::filesystem::path database, Recorder& recorder, WorkerThread& readers);
+  History(std::filesystem::path database, Recorder& recorder, runtime::WorkerThread& readers);
 
   // not_found: there is no such run or robot, in all of these.
   // At most `limit` samples (1 to 10000), in order of span and seq, after the cursor.
@@ -72,9 +72,9 @@ class History {
                                                                   std::size_t limit = Recorder::kAll);
 
   // Newest first, at most `limit` (1 to 1000).
-  boost::asio::awaitable<std::vector<RobotEvent>> events(RobotId robot_id, std::size_t limit);
-  boost::asio::awaitable<std::vector<CommandRecord>> commands(RobotId robot_id, std::size_t limit);
-  boost::asio::awaitable<Result<CommandRecord>> command(CommandId id);
+  boost::asio::awaitable<std::vector<station::RobotEvent>> events(station::RobotId robot_id, std::size_t limit);
+  boost::asio::awaitable<std::vector<station::CommandRecord>> commands(station::RobotId robot_id, std::size_t limit);
+  boost::asio::awaitable<Result<station::CommandRecord>> command(station::CommandId id);
 
   boost::asio::awaitable<AuditPage> audit(AuditFilter filter);
 
@@ -94,4 +94,4 @@ class History {
   DatabaseReader reader_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -7,7 +7,7 @@
 
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::size_t kSliceSamples = 20'000;
@@ -28,7 +28,7 @@ std::int64_t utc_us(const Segment& segment, std::size_t index) {
 }
 
 // fmin and fmax pass over NaN.
-void widen(Extent& extent, const Sample& sample) {
+void widen(Extent& extent, const station::Sample& sample) {
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     const float value = sample.*kSampleMembers[channel];
     extent.min[channel] = std::fmin(extent.min[channel], value);
@@ -191,4 +191,4 @@ void OverviewScan::add(std::uint64_t place, const Extent& extent) {
   }
 }
 
-}  // namespace server
+}  // namespace server::storage

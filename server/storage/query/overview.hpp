@@ -21,7 +21,7 @@
 
 #include "server/storage/query/span_reader.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct OverviewQuery {
   std::size_t points = 2000;  // at least 1
@@ -76,4 +76,4 @@ class OverviewScan {
   OverviewColumns columns_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -15,7 +15,7 @@
 #include "server/storage/database/statement.hpp"
 #include "server/storage/samples/stored_rows.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 // The view gives the samples of a run in order of span and seq, without sorting. That of schema version 1, which a
@@ -25,8 +25,8 @@ std::string run_query(std::int64_t version) {
       fmt::format("SELECT span, boot_id, seq, robot_time_us, utc_us, clock_uncertainty_us, {}, received_at_us",
                   version == 1 ? "received_at_us" : "first_received_at_us");
   const auto add = [&](const auto& field) { (sql += ", ") += column_or_null(field, version); };
-  for_each_sample_field(add);
-  for_each_batch_field(add);
+  station::for_each_sample_field(add);
+  station::for_each_batch_field(add);
   return sql + " FROM run_sample WHERE run_id = ? LIMIT ?";
 }
 
@@ -55,9 +55,9 @@ StoredSample sample_from(SQLite::Statement& row) {
   stored.first_received_at_us = row.getColumn(6).getInt64();
   stored.received_at_us = row.getColumn(7).getInt64();
   int column = 8;
-  for_each_sample_field(
-      [&](const SampleField& field) { stored.sample.*field.member = float_or_nan(row.getColumn(column++)); });
-  for_each_batch_field([&](const auto& field) { read_field(row.getColumn(column++), stored.*field.member); });
+  station::for_each_sample_field(
+      [&](const station::SampleField& field) { stored.sample.*field.member = float_or_nan(row.getColumn(column++)); });
+  station::for_each_batch_field([&](const auto& field) { read_field(row.getColumn(column++), stored.*field.member); });
   return stored;
 }
 
@@ -162,4 +162,4 @@ Result<std::vector<StoredSample>> read_run(const std::filesystem::path& path, Ru
   return samples;
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -17,7 +17,7 @@
 #include "server/storage/runs/run.hpp"
 #include "server/storage/samples/stored_sample.hpp"
 
-namespace server {
+namespace server::storage {
 
 // The samples in order of span and seq. not_found: no such file, no such run. invalid: not a station's database, or
 // more than limit samples.
@@ -33,4 +33,4 @@ std::string reading_uri(const std::filesystem::path& path, bool at_rest);
 
 bool lock_is_free(const std::filesystem::path& database);  // no station runs on its folder
 
-}  // namespace server
+}  // namespace server::storage

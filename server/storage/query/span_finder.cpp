@@ -3,7 +3,7 @@
 
 #include "server/storage/samples/boot_times.hpp"
 
-namespace server {
+namespace server::storage {
 
 std::vector<RecordedSpan> cut_to_window(SQLite::Database& database, std::span<RecordedSpan> spans, TimeWindow window) {
   std::vector<RecordedSpan> found;
@@ -19,4 +19,4 @@ std::vector<RecordedSpan> cut_to_window(SQLite::Database& database, std::span<Re
   return found;
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -15,7 +15,7 @@
 
 #include "server/storage/query/span_reader.hpp"
 
-namespace server {
+namespace server::storage {
 
 // [from_us, to_us), UTC
 struct TimeWindow {
@@ -27,4 +27,4 @@ struct TimeWindow {
 // gaps has no time and is dropped, too. What is found is moved out of `spans`.
 std::vector<RecordedSpan> cut_to_window(SQLite::Database& database, std::span<RecordedSpan> spans, TimeWindow window);
 
-}  // namespace server
+}  // namespace server::storage

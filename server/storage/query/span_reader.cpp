@@ -8,7 +8,7 @@
 
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::size_t kAllGaps = std::numeric_limits<std::int32_t>::max();
@@ -121,7 +121,7 @@ bool run_exists(SQLite::Database& database, RunId run) {
   return exists(std::move(query));
 }
 
-bool robot_exists(SQLite::Database& database, const RobotId& robot_id) {
+bool robot_exists(SQLite::Database& database, const station::RobotId& robot_id) {
   SQLite::Statement query{database, "SELECT 1 FROM robot WHERE robot_id = ?"};
   bind_all(query, robot_id);
   return exists(std::move(query));
@@ -139,7 +139,7 @@ std::vector<RecordedSpan> read_spans(SQLite::Database& database, RunId run, std:
   return spans;
 }
 
-std::vector<RecordedSpan> read_boots(SQLite::Database& database, const RobotId& robot_id) {
+std::vector<RecordedSpan> read_boots(SQLite::Database& database, const station::RobotId& robot_id) {
   std::vector<RecordedSpan> spans;
   SQLite::Statement query{database, std::string{"SELECT 0, boot_key, boot_id, robot_id, 0, 9223372036854775806,"} +
                                         kMade + ", durable_next_seq FROM boot WHERE robot_id = ? ORDER BY boot_key"};
@@ -222,4 +222,4 @@ std::vector<MissingRange> read_missing(SQLite::Database& database, const Recorde
   return missing;
 }
 
-}  // namespace server
+}  // namespace server::storage

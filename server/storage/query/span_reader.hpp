@@ -16,7 +16,7 @@
 #include "server/storage/samples/segment.hpp"
 #include "server/storage/samples/stored_sample.hpp"
 
-namespace server {
+namespace server::storage {
 
 // Where a page ended: the span and seq of its last sample. A page begins after it.
 struct SampleCursor {
@@ -31,7 +31,7 @@ struct SamplePage {
 
 struct SpanSegment {
   std::uint32_t span = 0;
-  BootId boot_id = 0;
+  station::BootId boot_id = 0;
   std::uint64_t span_first_seq = 0;
   std::uint64_t span_next_seq = 0;  // the end of what was made of the span
   Segment segment;                  // cut to the span
@@ -44,8 +44,8 @@ struct SegmentPage {
 
 struct Gap {
   std::uint32_t span = 0;
-  RobotId robot_id;
-  BootId boot_id = 0;
+  station::RobotId robot_id;
+  station::BootId boot_id = 0;
   std::uint64_t first_seq = 0;
   std::uint64_t last_seq = 0;
   std::string cause;
@@ -60,7 +60,7 @@ struct GapPage {
 // Samples that are neither stored nor lost: still on their way, if the robot comes back with them.
 struct MissingRange {
   std::uint32_t span = 0;
-  BootId boot_id = 0;
+  station::BootId boot_id = 0;
   std::uint64_t first_seq = 0;
   std::uint64_t last_seq = 0;
 };
@@ -69,8 +69,8 @@ struct MissingRange {
 struct RecordedSpan {
   std::uint32_t span = 0;  // index of the run's span, or of the robot's boot
   std::int64_t boot_key = 0;
-  BootId boot_id = 0;
-  RobotId robot_id;
+  station::BootId boot_id = 0;
+  station::RobotId robot_id;
   Interval samples;                // up to the largest number there is while the span is open
   std::uint64_t made_next = 0;     // every sample of the span below was made
   std::uint64_t settled_next = 0;  // every sample below is stored or lost for good; 0: not known
@@ -84,12 +84,12 @@ struct RecordedSpan {
 };
 
 bool run_exists(SQLite::Database& database, RunId run);
-bool robot_exists(SQLite::Database& database, const RobotId& robot_id);
+bool robot_exists(SQLite::Database& database, const station::RobotId& robot_id);
 
 // From this index on, with nothing waiting.
 std::vector<RecordedSpan> read_spans(SQLite::Database& database, RunId run, std::uint32_t first_span);
 // One for each boot of the robot, in the order in which they were first seen; with nothing waiting.
-std::vector<RecordedSpan> read_boots(SQLite::Database& database, const RobotId& robot_id);
+std::vector<RecordedSpan> read_boots(SQLite::Database& database, const station::RobotId& robot_id);
 
 // At most `limit` samples after the cursor, in order of span and seq.
 SegmentPage read_segments(SQLite::Database& database, const std::vector<RecordedSpan>& spans,
@@ -107,4 +107,4 @@ GapPage read_gaps(SQLite::Database& database, const std::vector<RecordedSpan>& s
 std::vector<MissingRange> read_missing(SQLite::Database& database, const RecordedSpan& span, Interval& left,
                                        std::size_t segments);
 
-}  // namespace server
+}  // namespace server::storage

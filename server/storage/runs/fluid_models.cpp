@@ -11,7 +11,7 @@
 #include "server/storage/database/database.hpp"
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 
 namespace {
@@ -20,10 +20,10 @@ constexpr const char* kModelColumns =
     "fluid, set_at_us, set_by, gain_1_m_s, gain_2_m_s, gain_3_m_s, gain_4_m_s, time_constant_1_s, time_constant_2_s,"
     " time_constant_3_s, time_constant_4_s, fit_error, document";
 constexpr int kFirstGain = 3;  // in that order, as are the next
-constexpr int kFirstTimeConstant = kFirstGain + static_cast<int>(kFluidModelSections);
-constexpr int kFitError = kFirstTimeConstant + static_cast<int>(kFluidModelSections);
+constexpr int kFirstTimeConstant = kFirstGain + static_cast<int>(station::kFluidModelSections);
+constexpr int kFitError = kFirstTimeConstant + static_cast<int>(station::kFluidModelSections);
 
-using Named = std::pair<std::string, FluidModel>;
+using Named = std::pair<std::string, station::FluidModel>;
 
 // The newest row of each fluid, unless it says that the fluid has none.
 std::vector<Named> read_in_force(SQLite::Database& database) {
@@ -37,7 +37,7 @@ std::vector<Named> read_in_force(SQLite::Database& database) {
     fluid = rows.getColumn(0).getString();
     model.set_at_us = rows.getColumn(1).getInt64();
     model.set_by = rows.getColumn(2).getString();
-    for (std::size_t i = 0; i < kFluidModelSections; ++i) {
+    for (std::size_t i = 0; i < station::kFluidModelSections; ++i) {
       const int column = static_cast<int>(i);
       model.gain_m_s[i] = float_or_nan(rows.getColumn(kFirstGain + column));
       model.time_constant_s[i] = float_or_nan(rows.getColumn(kFirstTimeConstant + column));
@@ -49,7 +49,8 @@ std::vector<Named> read_in_force(SQLite::Database& database) {
 }
 
 // Null: the fluid has none from now on.
-void append(SQLite::Database& database, const std::string& fluid, const FluidModel* model, const Author& by) {
+void append(SQLite::Database& database, const std::string& fluid, const station::FluidModel* model,
+            const station::Author& by) {
   SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement add{
       database,
@@ -62,17 +63,18 @@ void append(SQLite::Database& database, const std::string& fluid, const FluidMod
     bind_value(add, ++index, model->document);
   }
   add.exec();
-  AuditNote note;
+  station::AuditNote note;
   note.by = by;
   note.action = model != nullptr ? "fluid.model_set" : "fluid.model_removed";
   note.subject = fluid;
-  if (model != nullptr) note.detail = audit_detail({{"fit_error", model->fit_error}});
+  if (model != nullptr) note.detail = station::audit_detail({{"fit_error", model->fit_error}});
   AuditChain{database}.append(note);
   transaction.commit();
 }
 
 // Returned to the caller as an error: a full disk does not end the station.
-Result<void> stored(Database& database, const std::string& fluid, const FluidModel* model, const Author& by) {
+Result<void> stored(Database& database, const std::string& fluid, const station::FluidModel* model,
+                    const station::Author& by) {
   try {
     append(database.handle(), fluid, model, by);
     return {};
@@ -90,7 +92,8 @@ asio::awaitable<void> FluidModels::load() {
   for (auto& [fluid, model] : models) list_.put(fluid, std::move(model));
 }
 
-asio::awaitable<Result<FluidModel>> FluidModels::set(std::string fluid, FluidModel model, Author by) {
+asio::awaitable<Result<station::FluidModel>> FluidModels::set(std::string fluid, station::FluidModel model,
+                                                              station::Author by) {
   by.at_us = clock_.utc_us();
   model.set_by = by.actor;
   model.set_at_us = by.at_us;
@@ -101,7 +104,7 @@ asio::awaitable<Result<FluidModel>> FluidModels::set(std::string fluid, FluidMod
   co_return model;
 }
 
-asio::awaitable<Result<void>> FluidModels::remove(std::string fluid, Author by) {
+asio::awaitable<Result<void>> FluidModels::remove(std::string fluid, station::Author by) {
   if (list_.find(fluid) == nullptr) {
     co_return fail(ErrorCode::not_found, fmt::format("the fluid '{}' has no model", fluid), "no_model");
   }
@@ -112,4 +115,4 @@ asio::awaitable<Result<void>> FluidModels::remove(std::string fluid, Author by) 
   co_return done;
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -13,28 +13,29 @@
 #include "server/station/state/fluid_model.hpp"
 #include "server/storage/ingest/recorder.hpp"
 
-namespace server {
+namespace server::storage {
 
 class FluidModels {
  public:
-  FluidModels(Clock& clock, Recorder& recorder) : clock_{clock}, recorder_{recorder} {}
+  FluidModels(runtime::Clock& clock, Recorder& recorder) : clock_{clock}, recorder_{recorder} {}
 
   // Reads those in force; before everything else.
   boost::asio::awaitable<void> load();
 
-  const FluidModelList& in_force() const { return list_; }
+  const station::FluidModelList& in_force() const { return list_; }
 
   // In force when it is on disk, with its entry in the audit; author and time are set here. The model is a checked one,
   // the fluid a listed one. unavailable when the disk cannot be written.
-  boost::asio::awaitable<Result<FluidModel>> set(std::string fluid, FluidModel model, Author by);
+  boost::asio::awaitable<Result<station::FluidModel>> set(std::string fluid, station::FluidModel model,
+                                                          station::Author by);
 
   // The fluid has no model from then on. not_found when it has none.
-  boost::asio::awaitable<Result<void>> remove(std::string fluid, Author by);
+  boost::asio::awaitable<Result<void>> remove(std::string fluid, station::Author by);
 
  private:
-  Clock& clock_;
+  runtime::Clock& clock_;
   Recorder& recorder_;
-  FluidModelList list_;
+  station::FluidModelList list_;
 };
 
-}  // namespace server
+}  // namespace server::storage

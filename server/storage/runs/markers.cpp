@@ -9,7 +9,7 @@
 #include "server/storage/runs/run_queries.hpp"
 #include "server/storage/runs/run_spans.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 
 namespace {
@@ -86,7 +86,8 @@ asio::awaitable<Result<Marker>> Markers::add(MarkerRequest request) {
   co_return co_await recorder_.on_disk(std::move(job));
 }
 
-asio::awaitable<std::vector<Marker>> Markers::of_robot(RobotId robot_id, std::int64_t after, std::size_t limit) {
+asio::awaitable<std::vector<Marker>> Markers::of_robot(station::RobotId robot_id, std::int64_t after,
+                                                       std::size_t limit) {
   auto query = [robot_id, after, count = std::clamp<std::size_t>(limit, 1, kMaxListed)](SQLite::Database& database) {
     const SQLite::Transaction moment{database};
     SQLite::Statement rows{database,
@@ -113,4 +114,4 @@ asio::awaitable<Result<std::vector<Marker>>> Markers::of_run(RunId run) {
   co_return co_await reader_.ask(std::move(query));
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -16,11 +16,11 @@
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/runs/run.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct Marker {
   std::int64_t id = 0;
-  BootId boot_id = 0;
+  station::BootId boot_id = 0;
   std::uint64_t seq = 0;
   std::optional<std::uint64_t> robot_time_us;  // both of the sample; empty while nothing of its boot is stored
   std::optional<std::int64_t> utc_us;
@@ -30,16 +30,16 @@ struct Marker {
 };
 
 struct MarkerRequest {
-  RobotId robot_id;
+  station::RobotId robot_id;
   std::string text;  // 1 to 4000 bytes
   std::string actor;
   std::optional<std::int64_t> at_us;  // UTC: the sample then, or the last one before
-  BootId boot_id = 0;  // of the robot's present connection, 0 when there is none: its newest sample is now
+  station::BootId boot_id = 0;  // of the robot's present connection, 0 when there is none: its newest sample is now
 };
 
 class Markers {
  public:
-  Markers(Clock& clock, Recorder& recorder, DatabaseReader& reader)
+  Markers(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader)
       : clock_{clock}, recorder_{recorder}, reader_{reader} {}
 
   // not_connected for a marker now of a robot that is not there; invalid for a time that is in the future or has no
@@ -47,14 +47,15 @@ class Markers {
   boost::asio::awaitable<Result<Marker>> add(MarkerRequest request);
 
   // In the order in which they were made, at most `limit` (1 to 1000) after the marker `after` (0: from the first).
-  boost::asio::awaitable<std::vector<Marker>> of_robot(RobotId robot_id, std::int64_t after, std::size_t limit);
+  boost::asio::awaitable<std::vector<Marker>> of_robot(station::RobotId robot_id, std::int64_t after,
+                                                       std::size_t limit);
   // In order of span and seq.
   boost::asio::awaitable<Result<std::vector<Marker>>> of_run(RunId run);
 
  private:
-  Clock& clock_;
+  runtime::Clock& clock_;
   Recorder& recorder_;
   DatabaseReader& reader_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -12,7 +12,7 @@
 #include "server/storage/runs/run_spans.hpp"
 #include "server/storage/runs/run_store.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::int64_t kSchemaSince = 7;
@@ -60,17 +60,18 @@ OutsideReference reference_from(SQLite::Statement& row) {
 }
 
 void note_in_audit(SQLite::Database& database, RunId run, const char* action, const nlohmann::json& detail,
-                   const Author& by) {
-  AuditNote note;
+                   const station::Author& by) {
+  station::AuditNote note;
   note.by = by;
   note.robot_id = robot_of(database, run);
   note.action = action;
   note.subject = std::to_string(run);
-  note.detail = audit_detail(detail);
+  note.detail = station::audit_detail(detail);
   AuditChain{database}.append(note);
 }
 
-void mark_removed(SQLite::Database& database, std::int64_t reference, const std::string& reason, const Author& by) {
+void mark_removed(SQLite::Database& database, std::int64_t reference, const std::string& reason,
+                  const station::Author& by) {
   SQLite::Statement mark{database,
                          "UPDATE outside_reference SET removed_at_us = ?2, removed_by = ?3, removed_reason = ?4"
                          " WHERE reference_id = ?1"};
@@ -169,7 +170,7 @@ void add_positions(SQLite::Database& database, std::int64_t reference, const Out
 }
 
 Result<void> complete_reference(SQLite::Database& database, std::int64_t reference, const std::string& reason,
-                                const Author& by) {
+                                const station::Author& by) {
   SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement query{database,
                           fmt::format("SELECT {} FROM outside_reference WHERE reference_id = ?", kReferenceColumns)};
@@ -196,7 +197,8 @@ Result<void> complete_reference(SQLite::Database& database, std::int64_t referen
   return {};
 }
 
-Result<void> remove_reference(SQLite::Database& database, RunId run, const std::string& reason, const Author& by) {
+Result<void> remove_reference(SQLite::Database& database, RunId run, const std::string& reason,
+                              const station::Author& by) {
   SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
   if (!read_run_state(database, run)) return fail(ErrorCode::not_found, fmt::format("there is no run {}", run));
   const auto found = find_reference(database, run);
@@ -210,7 +212,7 @@ Result<void> remove_reference(SQLite::Database& database, RunId run, const std::
 
 Result<OutsideReference> store_reference(SQLite::Database& database, const OutsideReference& reference,
                                          const OutsidePositions& positions, const std::string& reason,
-                                         const Author& by) {
+                                         const station::Author& by) {
   const auto id = begin_reference(database, reference, reason);
   if (!id) return std::unexpected{id.error()};
   add_positions(database, *id, positions, 0, positions.size());
@@ -278,4 +280,4 @@ std::vector<Zeroing> find_zeroings(SQLite::Database& database, RunId run) {
   return found;
 }
 
-}  // namespace server
+}  // namespace server::storage

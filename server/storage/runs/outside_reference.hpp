@@ -20,7 +20,7 @@
 #include "server/station/state/audit_note.hpp"
 #include "server/storage/runs/run.hpp"
 
-namespace server {
+namespace server::storage {
 
 // How the clock of the outside record was put onto the robot's.
 enum class ReferenceClock : std::uint8_t { offset, utc, marker, correlation };
@@ -80,14 +80,15 @@ void add_positions(SQLite::Database& database, std::int64_t reference, const Out
                    std::size_t first, std::size_t count);
 // From now on it is in use, in place of the one before. Errors as above: the run may have changed meanwhile.
 Result<void> complete_reference(SQLite::Database& database, std::int64_t reference, const std::string& reason,
-                                const Author& by);
+                                const station::Author& by);
 // not_found: the run has none.
-Result<void> remove_reference(SQLite::Database& database, RunId run, const std::string& reason, const Author& by);
+Result<void> remove_reference(SQLite::Database& database, RunId run, const std::string& reason,
+                              const station::Author& by);
 
 // All of it at once, for a program that has the database to itself.
 Result<OutsideReference> store_reference(SQLite::Database& database, const OutsideReference& reference,
                                          const OutsidePositions& positions, const std::string& reason,
-                                         const Author& by);
+                                         const station::Author& by);
 
 // Those that were not completed, or this one of them, count as removed.
 void remove_unfinished_references(SQLite::Database& database, std::optional<std::int64_t> only, std::int64_t utc_us);
@@ -110,4 +111,4 @@ struct Zeroing {
 };
 std::vector<Zeroing> find_zeroings(SQLite::Database& database, RunId run);
 
-}  // namespace server
+}  // namespace server::storage

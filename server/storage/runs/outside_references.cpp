@@ -8,7 +8,7 @@
 
 #include "server/storage/runs/run_queries.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 
 namespace {
@@ -83,7 +83,7 @@ asio::awaitable<Result<void>> OutsideReferences::write(std::int64_t reference,
 
 asio::awaitable<Result<OutsideReference>> OutsideReferences::import(OutsideReference reference,
                                                                     OutsidePositions positions, std::string reason,
-                                                                    Author by) {
+                                                                    station::Author by) {
   auto begin = on_writable_disk(
       [reference, reason](Database& database) { return begin_reference(database.handle(), reference, reason); });
   const Result<std::int64_t> id = co_await recorder_.on_disk(std::move(begin));
@@ -107,7 +107,7 @@ asio::awaitable<Result<OutsideReference>> OutsideReferences::import(OutsideRefer
   co_return co_await find(reference.run);
 }
 
-asio::awaitable<Result<OutsideReference>> OutsideReferences::remove(RunId run, std::string reason, Author by) {
+asio::awaitable<Result<OutsideReference>> OutsideReferences::remove(RunId run, std::string reason, station::Author by) {
   auto found = co_await find(run);
   if (!found) co_return found;
   auto job = on_writable_disk(
@@ -126,4 +126,4 @@ asio::awaitable<void> OutsideReferences::sweep() {
   }
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -12,11 +12,11 @@
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/runs/outside_reference.hpp"
 
-namespace server {
+namespace server::storage {
 
 class OutsideReferences {
  public:
-  OutsideReferences(Clock& clock, Recorder& recorder, DatabaseReader& reader)
+  OutsideReferences(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader)
       : clock_{clock}, recorder_{recorder}, reader_{reader} {}
 
   // Before the first import: what an earlier start did not finish counts as removed.
@@ -33,8 +33,8 @@ class OutsideReferences {
   boost::asio::awaitable<Result<MarkerPlace>> marker(RunId run, std::optional<std::int64_t> id, std::string text);
   // Answers when it is in use. Errors as check_may_import, and unavailable while the disk cannot be written.
   boost::asio::awaitable<Result<OutsideReference>> import(OutsideReference reference, OutsidePositions positions,
-                                                          std::string reason, Author by);
-  boost::asio::awaitable<Result<OutsideReference>> remove(RunId run, std::string reason, Author by);
+                                                          std::string reason, station::Author by);
+  boost::asio::awaitable<Result<OutsideReference>> remove(RunId run, std::string reason, station::Author by);
 
   // Deletes positions that nobody can ask for any more.
   boost::asio::awaitable<void> sweep();
@@ -42,9 +42,9 @@ class OutsideReferences {
  private:
   boost::asio::awaitable<Result<void>> write(std::int64_t reference, std::shared_ptr<const OutsidePositions> positions);
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   Recorder& recorder_;
   DatabaseReader& reader_;
 };
 
-}  // namespace server
+}  // namespace server::storage

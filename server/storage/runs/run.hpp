@@ -10,7 +10,7 @@
 
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::storage {
 
 using RunId = std::int64_t;
 
@@ -50,21 +50,21 @@ struct TimeSpan {  // UTC, both ends included; over reboots
   std::int64_t to_us = 0;
 };
 struct SeqSpan {  // both ends included
-  BootId boot_id = 0;
+  station::BootId boot_id = 0;
   std::uint64_t first_seq = 0;
   std::uint64_t last_seq = 0;
 };
 using RecordedRange = std::variant<TimeSpan, SeqSpan>;
 
 struct RunSpan {
-  BootId boot_id = 0;
+  station::BootId boot_id = 0;
   std::uint64_t first_seq = 0;
   std::optional<std::uint64_t> last_seq;  // inclusive; empty while the span is open
 };
 
 struct Run {
   RunId id = 0;
-  RobotId robot_id;
+  station::RobotId robot_id;
   RunState state = RunState::open;
   bool made_afterwards = false;  // from what had been recorded already
   std::string made_by;           // the actor, e.g. "token:local"; empty: not known
@@ -98,10 +98,10 @@ struct RunSnapshot {
 
 // Which runs, newest first.
 struct RunFilter {
-  std::optional<RobotId> robot_id;
+  std::optional<station::RobotId> robot_id;
   std::optional<RunState> state;  // empty: all but the discarded
   RunId before = 0;               // 0: from the newest
   std::size_t limit = 100;        // 1 to 1000
 };
 
-}  // namespace server
+}  // namespace server::storage

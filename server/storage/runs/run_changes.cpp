@@ -9,7 +9,7 @@
 #include "server/storage/runs/run_store.hpp"
 #include "server/storage/samples/in_force_store.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::size_t kMaxDiscardReasonBytes = 200;  // of a text that stands in run_note as a whole
@@ -24,7 +24,7 @@ Result<RunState> state_of(SQLite::Database& database, RunId id) {
 
 }  // namespace
 
-std::optional<RunId> RunStore::add_afterwards(Run run, const RecordedSamples& samples, const Author& by) {
+std::optional<RunId> RunStore::add_afterwards(Run run, const RecordedSamples& samples, const station::Author& by) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement stored{handle_, "SELECT 1 FROM segment WHERE boot_key = ? LIMIT 1"};
   run.state = RunState::ended;
@@ -48,7 +48,7 @@ std::optional<RunId> RunStore::add_afterwards(Run run, const RecordedSamples& sa
   return id;
 }
 
-Result<void> RunStore::annotate(RunId id, const RunAnnotation& annotation, const Author& by) {
+Result<void> RunStore::annotate(RunId id, const RunAnnotation& annotation, const station::Author& by) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   const Result<RunState> state = state_of(handle_, id);
   if (!state) return std::unexpected{state.error()};
@@ -82,7 +82,7 @@ Result<void> RunStore::annotate(RunId id, const RunAnnotation& annotation, const
   return {};
 }
 
-Result<void> RunStore::discard(RunId id, const std::string& reason, const Author& by) {
+Result<void> RunStore::discard(RunId id, const std::string& reason, const station::Author& by) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   const Result<RunState> state = state_of(handle_, id);
   if (!state) return std::unexpected{state.error()};
@@ -97,7 +97,7 @@ Result<void> RunStore::discard(RunId id, const std::string& reason, const Author
   return {};
 }
 
-void RunStore::add_note(RunId id, const Author& author, const std::string& field, const std::string& before,
+void RunStore::add_note(RunId id, const station::Author& author, const std::string& field, const std::string& before,
                         const std::string& after) {
   SQLite::Statement add{
       handle_, "INSERT INTO run_note (run_id, made_at_us, actor, field, before, after) VALUES (?, ?, ?, ?, ?, ?)"};
@@ -116,4 +116,4 @@ void RunStore::put_in_force(RunId id, const std::string& station_document, std::
   execute(put, id, key, utc_us);
 }
 
-}  // namespace server
+}  // namespace server::storage

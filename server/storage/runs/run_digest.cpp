@@ -9,13 +9,13 @@
 #include <cmath>
 #include <tuple>
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::size_t kPlaceBytes = 40;  // boot_id, seq, times
 constexpr std::size_t kMaxSampleBytes = [] {
-  std::size_t bytes = kPlaceBytes + 4 * kSampleFieldCount;
-  for_each_batch_field([&](const auto& field) { bytes += field.kKind == FieldKind::id ? 8 : 4; });
+  std::size_t bytes = kPlaceBytes + 4 * station::kSampleFieldCount;
+  station::for_each_batch_field([&](const auto& field) { bytes += field.kKind == station::FieldKind::id ? 8 : 4; });
   return bytes;
 }();
 
@@ -42,25 +42,26 @@ class ByteWriter {
 };
 
 // What samples share: numbers, enumerators, counts, ids, each in the order of the table.
-void write_context(ByteWriter& bytes, int format, const SampleContext& context) {
+void write_context(ByteWriter& bytes, int format, const station::SampleContext& context) {
   const auto is_in = [format](const auto& field) { return field.since_digest <= format; };
-  for_each_batch_field_of<FieldKind::number>([&](const auto& field) {
-    if (is_in(field)) bytes.put_float(or_nan(context.*field.member));
+  station::for_each_batch_field_of<station::FieldKind::number>([&](const auto& field) {
+    if (is_in(field)) bytes.put_float(station::or_nan(context.*field.member));
   });
-  for_each_batch_field_of<FieldKind::enumerator>([&](const auto& field) {
+  station::for_each_batch_field_of<station::FieldKind::enumerator>([&](const auto& field) {
     if (is_in(field)) bytes.put_enumerator(context.*field.member, format);
   });
   if (format == 1) bytes.put(std::uint8_t{0});  // after three bytes of enumerators
   const auto put = [&](const auto& field) {
     if (is_in(field)) bytes.put(context.*field.member);
   };
-  for_each_batch_field_of<FieldKind::count>(put);
-  for_each_batch_field_of<FieldKind::id>(put);
+  station::for_each_batch_field_of<station::FieldKind::count>(put);
+  station::for_each_batch_field_of<station::FieldKind::id>(put);
 }
 
 // How many bytes it wrote.
-std::size_t write_sample(unsigned char* into, int format, BootId boot_id, const Segment& segment, std::size_t index) {
-  const Sample& sample = segment.samples[index];
+std::size_t write_sample(unsigned char* into, int format, station::BootId boot_id, const Segment& segment,
+                         std::size_t index) {
+  const station::Sample& sample = segment.samples[index];
   const std::uint64_t robot_time_us = segment.robot_time_us(index);
   ByteWriter bytes{into};
   bytes.put(boot_id);
@@ -68,7 +69,7 @@ std::size_t write_sample(unsigned char* into, int format, BootId boot_id, const 
   bytes.put(robot_time_us);
   bytes.put(robot_time_us + std::bit_cast<std::uint64_t>(segment.utc_offset_us));
   bytes.put(std::bit_cast<std::uint64_t>(segment.clock_uncertainty_us));
-  for_each_sample_field([&](const SampleField& field) {
+  station::for_each_sample_field([&](const station::SampleField& field) {
     if (field.since_digest <= format) bytes.put_float(sample.*field.member);
   });
   write_context(bytes, format, segment.context);
@@ -92,7 +93,7 @@ SampleHash::SampleHash(int format) : format_{format} {
   crypto_hash_sha256_update(&state_, reinterpret_cast<const unsigned char*>(begin.data()), begin.size());
 }
 
-void SampleHash::add(BootId boot_id, const Segment& segment) {
+void SampleHash::add(station::BootId boot_id, const Segment& segment) {
   std::array<unsigned char, 100 * kMaxSampleBytes> bytes;
   std::size_t used = 0;
   for (std::size_t index = 0; index < segment.samples.size(); ++index) {
@@ -186,4 +187,4 @@ std::string DigestComputation::place() const {
   return span_ < spans_.size() ? fmt::format("sample {} of boot {}", next_seq_, spans_[span_].boot_id) : "nothing";
 }
 
-}  // namespace server
+}  // namespace server::storage

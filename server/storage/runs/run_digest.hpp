@@ -28,9 +28,9 @@
 #include "server/storage/runs/run.hpp"
 #include "server/storage/samples/segment.hpp"
 
-namespace server {
+namespace server::storage {
 
-inline constexpr int kDigestFormat = newest_digest_format();  // of new ones; older ones are verified for ever
+inline constexpr int kDigestFormat = station::newest_digest_format();  // of new ones; older ones are verified for ever
 
 struct RunDigest {
   int format = kDigestFormat;
@@ -56,7 +56,7 @@ struct RunDigest {
 class SampleHash {
  public:
   explicit SampleHash(int format);
-  void add(BootId boot_id, const Segment& segment);
+  void add(station::BootId boot_id, const Segment& segment);
   std::string text() const;  // of all so far
 
  private:
@@ -97,7 +97,7 @@ class SampleTally {
 // One span of a closed run.
 struct DigestSpan {
   std::int64_t boot_key = 0;
-  BootId boot_id = 0;
+  station::BootId boot_id = 0;
   Interval samples;
   std::uint32_t period_us = 0;
 };
@@ -152,4 +152,4 @@ std::optional<RunDigest> read_digest(SQLite::Database& database, RunId run);
 // Does nothing when the run has been discarded meanwhile.
 void write_digest(SQLite::Database& database, RunId run, const RunDigest& digest);
 
-}  // namespace server
+}  // namespace server::storage

@@ -6,7 +6,7 @@
 #include "server/storage/runs/run_digest.hpp"
 #include "server/storage/samples/sample_scanner.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::uint64_t kTalliedSamples = 1'000'000;  // whose heads are read at once
@@ -160,4 +160,4 @@ void write_digest(SQLite::Database& database, RunId run, const RunDigest& digest
           digest.samples_without_clock, digest.sha256, digest.made_at_us);
 }
 
-}  // namespace server
+}  // namespace server::storage

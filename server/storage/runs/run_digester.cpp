@@ -11,7 +11,7 @@
 #include "server/storage/database/statement.hpp"
 #include "server/storage/runs/run_queries.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
 
@@ -58,7 +58,7 @@ std::vector<RunId> runs_without_digest(SQLite::Database& database) {
 
 }  // namespace
 
-RunDigester::RunDigester(Clock& clock, Recorder& recorder, DatabaseReader& reader)
+RunDigester::RunDigester(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader)
     : clock_{clock}, recorder_{recorder}, reader_{reader}, added_{recorder.loop()} {}
 
 asio::awaitable<void> RunDigester::run() {
@@ -181,4 +181,4 @@ asio::awaitable<std::optional<RunDigest>> RunDigester::stored(RunId run) {
   co_return co_await reader_.ask(std::move(query));
 }
 
-}  // namespace server
+}  // namespace server::storage

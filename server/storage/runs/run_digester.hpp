@@ -18,7 +18,7 @@
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/runs/run_digest.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct CurrentDigest {
   RunDigest digest;
@@ -27,7 +27,7 @@ struct CurrentDigest {
 
 class RunDigester {
  public:
-  RunDigester(Clock& clock, Recorder& recorder, DatabaseReader& reader);
+  RunDigester(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader);
 
   // Until cancelled.
   boost::asio::awaitable<void> run();
@@ -53,11 +53,11 @@ class RunDigester {
   boost::asio::awaitable<std::optional<RunDigest>> stored(RunId run);
   boost::asio::awaitable<RunDigest> count(RunId run);
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   Recorder& recorder_;
   DatabaseReader& reader_;
-  Signal added_;
+  runtime::Signal added_;
   std::map<RunId, Pending> pending_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -7,7 +7,7 @@
 
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 
 const char* const kRunColumns =
     "run_id, robot_id, name, fluid, pump_profile, mean_flow_m_s, tube, operator_name, notes, verdict,"
@@ -190,7 +190,7 @@ std::optional<RunSnapshot> read_snapshot(SQLite::Database& database, RunId id) {
 }
 
 std::uint64_t known_next_seq(SQLite::Database& database, const BootHeads& heads, std::int64_t boot_key,
-                             BootId boot_id) {
+                             station::BootId boot_id) {
   SQLite::Statement query{
       database,
       "SELECT max(announced_next_seq,"
@@ -203,4 +203,4 @@ std::uint64_t known_next_seq(SQLite::Database& database, const BootHeads& heads,
   return std::max(unsigned_id(query.getColumn(0)), head == heads.end() ? 0 : head->second);
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -14,10 +14,10 @@
 
 #include "server/storage/runs/run.hpp"
 
-namespace server {
+namespace server::storage {
 
 // One above the newest sample of each boot in use, as the recorder knows it.
-using BootHeads = std::map<BootId, std::uint64_t>;
+using BootHeads = std::map<station::BootId, std::uint64_t>;
 
 std::optional<Run> find_run(SQLite::Database& database, const BootHeads& heads, RunId id);
 std::optional<RunState> read_run_state(SQLite::Database& database, RunId id);
@@ -26,7 +26,7 @@ std::vector<Run> list_runs(SQLite::Database& database, const BootHeads& heads, c
 // A run that was open when the station stopped, or was killed.
 struct InterruptedRun {
   RunId id = 0;
-  RobotId robot_id;
+  station::RobotId robot_id;
   std::string name;
   std::string fluid;
   std::optional<std::int64_t> last_sample_at_us;  // UTC; empty: it has no sample
@@ -39,9 +39,10 @@ std::vector<RunId> interrupted_since_start(SQLite::Database& database);
 std::optional<RunSnapshot> read_snapshot(SQLite::Database& database, RunId id);
 
 // One above the newest sample that the boot is known to have made.
-std::uint64_t known_next_seq(SQLite::Database& database, const BootHeads& heads, std::int64_t boot_key, BootId boot_id);
+std::uint64_t known_next_seq(SQLite::Database& database, const BootHeads& heads, std::int64_t boot_key,
+                             station::BootId boot_id);
 
 // The columns of `run`, in the order in which a row of it is read.
 extern const char* const kRunColumns;
 
-}  // namespace server
+}  // namespace server::storage

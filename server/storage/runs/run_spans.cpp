@@ -8,7 +8,7 @@
 
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr int kBootsAtOnce = 32;  // in one call; two searches each, under 0.5 ms
@@ -21,8 +21,8 @@ std::optional<SampleTime> time_of(SQLite::Database& database, std::int64_t boot_
   return times.of(seq);
 }
 
-std::optional<BootSample> sample_at(SQLite::Database& database, const BootHeads& heads, const RobotId& robot_id,
-                                    std::int64_t utc_us) {
+std::optional<BootSample> sample_at(SQLite::Database& database, const BootHeads& heads,
+                                    const station::RobotId& robot_id, std::int64_t utc_us) {
   SQLite::Statement boots{database, "SELECT boot_key, boot_id FROM boot WHERE robot_id = ? ORDER BY boot_key DESC"};
   bind_all(boots, robot_id);
   BootTimes times{database};
@@ -39,7 +39,8 @@ std::optional<BootSample> sample_at(SQLite::Database& database, const BootHeads&
   return std::nullopt;
 }
 
-std::optional<BootSamples> samples_of_boot(SQLite::Database& database, const RobotId& robot_id, BootId boot_id) {
+std::optional<BootSamples> samples_of_boot(SQLite::Database& database, const station::RobotId& robot_id,
+                                           station::BootId boot_id) {
   SQLite::Statement boot{database, "SELECT boot_key FROM boot WHERE boot_id = ? AND robot_id = ?"};
   bind_all(boot, boot_id, robot_id);
   if (!boot.executeStep()) return std::nullopt;
@@ -121,4 +122,4 @@ void RangeSearch::describe(SQLite::Database& database) {
   }
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -16,7 +16,7 @@
 #include "server/storage/samples/boot_times.hpp"
 #include "server/storage/samples/interval_set.hpp"
 
-namespace server {
+namespace server::storage {
 
 // Empty when nothing of the boot is stored.
 std::optional<SampleTime> time_of(SQLite::Database& database, std::int64_t boot_key, std::uint64_t seq);
@@ -24,22 +24,23 @@ std::optional<SampleTime> time_of(SQLite::Database& database, std::int64_t boot_
 // Samples of one boot.
 struct BootSamples {
   std::int64_t boot_key = 0;
-  BootId boot_id = 0;
+  station::BootId boot_id = 0;
   Interval samples;
 };
 
 struct BootSample {
   std::int64_t boot_key = 0;
-  BootId boot_id = 0;
+  station::BootId boot_id = 0;
   std::uint64_t seq = 0;
 };
 
 // The robot's sample at this time, or the last one before; empty when it had made none.
-std::optional<BootSample> sample_at(SQLite::Database& database, const BootHeads& heads, const RobotId& robot_id,
-                                    std::int64_t utc_us);
+std::optional<BootSample> sample_at(SQLite::Database& database, const BootHeads& heads,
+                                    const station::RobotId& robot_id, std::int64_t utc_us);
 
 // All that a boot is known to have made; empty when the robot has no such boot.
-std::optional<BootSamples> samples_of_boot(SQLite::Database& database, const RobotId& robot_id, BootId boot_id);
+std::optional<BootSamples> samples_of_boot(SQLite::Database& database, const station::RobotId& robot_id,
+                                           station::BootId boot_id);
 
 // What a range stands for, and what is known of the robot where it begins.
 struct RecordedSamples {
@@ -54,7 +55,7 @@ struct RecordedSamples {
 // Finds the samples of a range, some boots in each call, so that a reader can do it in short questions.
 class RangeSearch {
  public:
-  RangeSearch(RobotId robot_id, RecordedRange range) : robot_id_{std::move(robot_id)}, range_{range} {}
+  RangeSearch(station::RobotId robot_id, RecordedRange range) : robot_id_{std::move(robot_id)}, range_{range} {}
 
   // True: there is more to look at.
   bool advance(SQLite::Database& database);
@@ -66,10 +67,10 @@ class RangeSearch {
   void search_boot(SQLite::Database& database, const SeqSpan& named);
   void describe(SQLite::Database& database);
 
-  RobotId robot_id_;
+  station::RobotId robot_id_;
   RecordedRange range_;
   std::int64_t boot_key_ = 0;  // of the last boot looked at
   Result<RecordedSamples> found_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -10,20 +10,20 @@
 #include "server/storage/database/statement.hpp"
 #include "server/storage/runs/run_spans.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::size_t kMaxNotedVerdictBytes = 200;  // of a verdict, which stands in the run as a whole
 
 }  // namespace
 
-RobotId robot_of(SQLite::Database& database, RunId run) {
+station::RobotId robot_of(SQLite::Database& database, RunId run) {
   SQLite::Statement query{database, "SELECT robot_id FROM run WHERE run_id = ?"};
   bind_all(query, run);
-  return query.executeStep() ? query.getColumn(0).getString() : RobotId{};
+  return query.executeStep() ? query.getColumn(0).getString() : station::RobotId{};
 }
 
-Result<RunId> RunStore::add(const Run& run, const std::string& station_document, const Author& by) {
+Result<RunId> RunStore::add(const Run& run, const std::string& station_document, const station::Author& by) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   const RunSpan& span = run.spans.front();
   SQLite::Statement boot{handle_, "SELECT boot_key FROM boot WHERE boot_id = ? AND ended_next_seq IS NULL"};
@@ -52,7 +52,8 @@ RunId RunStore::insert(const Run& run) {
   return handle_.getLastInsertRowid();
 }
 
-void RunStore::end(RunId id, const std::string& verdict, const std::string& station_document, const Author& by) {
+void RunStore::end(RunId id, const std::string& verdict, const std::string& station_document,
+                   const station::Author& by) {
   SQLite::Transaction transaction{handle_, SQLite::TransactionBehavior::IMMEDIATE};
   close_span(id);
   SQLite::Statement mark{
@@ -89,14 +90,14 @@ std::vector<RunId> RunStore::interrupt(std::int64_t utc_us) {
   return open;
 }
 
-void RunStore::note_in_audit(RunId id, const RobotId& robot_id, const char* action, const nlohmann::json& detail,
-                             const Author& by) {
-  AuditNote note;
+void RunStore::note_in_audit(RunId id, const station::RobotId& robot_id, const char* action,
+                             const nlohmann::json& detail, const station::Author& by) {
+  station::AuditNote note;
   note.by = by;
   note.robot_id = robot_id;
   note.action = action;
   note.subject = std::to_string(id);
-  note.detail = audit_detail(detail);
+  note.detail = station::audit_detail(detail);
   AuditChain{handle_}.append(note);
 }
 
@@ -119,4 +120,4 @@ void RunStore::close_span(RunId id) {
   execute(made, boot_key, next);
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -15,7 +15,7 @@
 #include "server/storage/runs/run_queries.hpp"
 #include "server/storage/runs/run_spans.hpp"
 
-namespace server {
+namespace server::storage {
 
 class RunStore {
  public:
@@ -23,27 +23,27 @@ class RunStore {
 
   // Stores a run with its one open span. not_connected when that boot has ended meanwhile. The station's document, if
   // there is one, is noted as in force in its spans, here and in end().
-  Result<RunId> add(const Run& run, const std::string& station_document, const Author& by);
+  Result<RunId> add(const Run& run, const std::string& station_document, const station::Author& by);
 
   // The same of what is recorded, and was found before. Nothing when a boot of which samples were found has none any
   // more: they have been purged meanwhile.
-  std::optional<RunId> add_afterwards(Run run, const RecordedSamples& samples, const Author& by);
+  std::optional<RunId> add_afterwards(Run run, const RecordedSamples& samples, const station::Author& by);
 
   // Both: not_found, and conflict for a discarded (annotate) or open (discard) run.
-  Result<void> annotate(RunId id, const RunAnnotation& annotation, const Author& by);
-  Result<void> discard(RunId id, const std::string& reason, const Author& by);
+  Result<void> annotate(RunId id, const RunAnnotation& annotation, const station::Author& by);
+  Result<void> discard(RunId id, const std::string& reason, const station::Author& by);
 
   // Closes the open span at the newest sample (a span without samples is dropped) and the run.
-  void end(RunId id, const std::string& verdict, const std::string& station_document, const Author& by);
+  void end(RunId id, const std::string& verdict, const std::string& station_document, const station::Author& by);
 
   // Closes every open run at the last sample known of its open span. Returns which they were.
   std::vector<RunId> interrupt(std::int64_t utc_us);
 
  private:
   RunId insert(const Run& run);
-  void note_in_audit(RunId id, const RobotId& robot_id, const char* action, const nlohmann::json& detail,
-                     const Author& by);
-  void add_note(RunId id, const Author& author, const std::string& field, const std::string& before,
+  void note_in_audit(RunId id, const station::RobotId& robot_id, const char* action, const nlohmann::json& detail,
+                     const station::Author& by);
+  void add_note(RunId id, const station::Author& author, const std::string& field, const std::string& before,
                 const std::string& after);
   void put_in_force(RunId id, const std::string& station_document, std::int64_t utc_us);
   void close_span(RunId id);
@@ -52,6 +52,6 @@ class RunStore {
   BootHeads heads_;
 };
 
-RobotId robot_of(SQLite::Database& database, RunId run);  // empty: there is no such run
+station::RobotId robot_of(SQLite::Database& database, RunId run);  // empty: there is no such run
 
-}  // namespace server
+}  // namespace server::storage

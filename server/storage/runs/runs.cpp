@@ -12,7 +12,7 @@
 #include "server/storage/runs/run_digester.hpp"
 #include "server/storage/runs/run_store.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
 
@@ -64,7 +64,7 @@ auto or_problem(Job job) {
 
 // SAFETY: its text stays as it was written, and says nothing of limits: those of the robot's own fluid hold, or if that
 // is not known the strictest.
-void report_fluid(const InterruptedRun& run, const Envelope& envelope) {
+void report_fluid(const InterruptedRun& run, const config::Envelope& envelope) {
   if (run.fluid.empty() || envelope.listed(run.fluid)) return;
   spdlog::warn(
       "run {} of robot '{}' was open in the fluid '{}', which the configuration does not list: unless the fluid of the "
@@ -72,7 +72,7 @@ void report_fluid(const InterruptedRun& run, const Envelope& envelope) {
       run.id, run.robot_id, run.fluid);
 }
 
-void report_interrupted(const Result<std::vector<InterruptedRun>>& interrupted, const Envelope& envelope) {
+void report_interrupted(const Result<std::vector<InterruptedRun>>& interrupted, const config::Envelope& envelope) {
   if (!interrupted) {
     spdlog::warn("runs that were open cannot be interrupted now: {}; tried again", interrupted.error().detail);
     return;
@@ -109,7 +109,7 @@ std::optional<RunState> run_state_from(const std::string& name) {
   return std::nullopt;
 }
 
-Runs::Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, RunDigester& digester)
+Runs::Runs(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader, RunDigester& digester)
     : clock_{clock}, recorder_{recorder}, reader_{reader}, digester_{digester} {}
 
 asio::awaitable<void> Runs::load() {
@@ -144,7 +144,7 @@ Result<void> Runs::check_fluid(std::string& fluid) const {
   return {};
 }
 
-asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions conditions, Author by) {
+asio::awaitable<Result<Run>> Runs::create(station::RobotId robot_id, RunConditions conditions, station::Author by) {
   Result<void> valid = check(conditions);
   if (valid) valid = check_fluid(conditions.fluid);
   if (!valid) co_return std::unexpected{valid.error()};
@@ -176,8 +176,8 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
   run.spans.push_back({.boot_id = robot.boot_id, .first_seq = recorder_.next_seq(robot.boot_id), .last_seq = {}});
 
   struct Creating {  // no second run of this robot meanwhile; forgotten unless the run was made
-    std::map<RobotId, RunId>& open;
-    RobotId robot;
+    std::map<station::RobotId, RunId>& open;
+    station::RobotId robot;
     ~Creating() {
       if (open[robot] == 0) open.erase(robot);
     }
@@ -197,7 +197,7 @@ asio::awaitable<Result<Run>> Runs::create(RobotId robot_id, RunConditions condit
   co_return run;
 }
 
-asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, Author by) {
+asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, station::Author by) {
   if (verdict.size() > kMaxTextBytes) {
     co_return fail(ErrorCode::invalid, fmt::format("a verdict has at most {} bytes", kMaxTextBytes));
   }
@@ -212,7 +212,7 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, Author by)
     co_return fail(ErrorCode::conflict, fmt::format("run {} has ended already", id));
   }
   const auto robot = robots_.find(open->first);
-  const BootId boot_id = robot == robots_.end() ? 0 : robot->second.boot_id;
+  const station::BootId boot_id = robot == robots_.end() ? 0 : robot->second.boot_id;
   by.at_us = clock_.utc_us();
   auto job = [id, verdict, by, heads = std::move(received), document = station_document_](Database& database) {
     RunStore{database, heads}.end(id, verdict, document, by);
@@ -242,8 +242,8 @@ asio::awaitable<Result<Run>> Runs::end(RunId id, std::string verdict, Author by)
   }
 }
 
-asio::awaitable<Result<Run>> Runs::make_afterwards(RobotId robot_id, RunConditions conditions, RecordedRange range,
-                                                   Author by) {
+asio::awaitable<Result<Run>> Runs::make_afterwards(station::RobotId robot_id, RunConditions conditions,
+                                                   RecordedRange range, station::Author by) {
   Result<void> valid = check(conditions);
   if (valid) valid = check_fluid(conditions.fluid);
   if (!valid) co_return std::unexpected{valid.error()};
@@ -274,14 +274,14 @@ asio::awaitable<Result<Run>> Runs::make_afterwards(RobotId robot_id, RunConditio
   co_return co_await find(*id);
 }
 
-asio::awaitable<Result<RecordedSamples>> Runs::samples_in(RobotId robot_id, RecordedRange range) {
+asio::awaitable<Result<RecordedSamples>> Runs::samples_in(station::RobotId robot_id, RecordedRange range) {
   RangeSearch search{std::move(robot_id), range};
   auto look = [&search](SQLite::Database& database) { return search.advance(database); };
   for (bool more = true; more;) more = co_await reader_.ask(look);
   co_return search.take();
 }
 
-asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, Author by) {
+asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, station::Author by) {
   RunConditions given;
   given.name = annotation.texts.contains("name") ? annotation.texts.at("name") : "unchanged";
   Result<void> outcome = check(given);
@@ -304,7 +304,7 @@ asio::awaitable<Result<Run>> Runs::annotate(RunId id, RunAnnotation annotation, 
   co_return co_await changed(id, std::move(outcome));
 }
 
-asio::awaitable<Result<Run>> Runs::discard(RunId id, std::string reason, Author by) {
+asio::awaitable<Result<Run>> Runs::discard(RunId id, std::string reason, station::Author by) {
   if (reason.size() > kMaxTextBytes) co_return std::unexpected{text_too_long()};
   const bool flushed = co_await recorder_.flush_records();
   if (!flushed) co_return std::unexpected{disk_fails()};
@@ -352,8 +352,8 @@ asio::awaitable<std::vector<Run>> Runs::list(RunFilter filter) {
   co_return co_await reader_.ask(std::move(query));
 }
 
-std::map<BootId, std::uint64_t> Runs::heads() const {
-  std::map<BootId, std::uint64_t> heads;
+std::map<station::BootId, std::uint64_t> Runs::heads() const {
+  std::map<station::BootId, std::uint64_t> heads;
   for (const auto& [robot_id, run_id] : open_runs_) {
     const auto robot = robots_.find(robot_id);
     if (robot != robots_.end()) heads[robot->second.boot_id] = recorder_.next_seq(robot->second.boot_id);
@@ -361,8 +361,8 @@ std::map<BootId, std::uint64_t> Runs::heads() const {
   return heads;
 }
 
-void Runs::on_robot(const RobotState& state) {
-  robots_[state.id] = {.connected = state.link == LinkState::connected,
+void Runs::on_robot(const station::RobotState& state) {
+  robots_[state.id] = {.connected = state.link == station::LinkState::connected,
                        .boot_id = state.boot_id,
                        .firmware_version = state.firmware_version,
                        .controller_id = state.context.controller_id,
@@ -371,4 +371,4 @@ void Runs::on_robot(const RobotState& state) {
                        .fluid = state.fluid};
 }
 
-}  // namespace server
+}  // namespace server::storage

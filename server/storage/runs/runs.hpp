@@ -21,16 +21,16 @@
 #include "server/station/state/station_sink.hpp"
 #include "server/storage/runs/run.hpp"
 
-namespace server {
+namespace server::storage {
 
 class RunDigester;
 class Recorder;
 class DatabaseReader;
 struct RecordedSamples;
 
-class Runs final : public StationSink {
+class Runs final : public station::StationSink {
  public:
-  Runs(Clock& clock, Recorder& recorder, DatabaseReader& reader, RunDigester& digester);
+  Runs(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader, RunDigester& digester);
 
   // Runs that were open when the station was killed are interrupted; the log names them, and those that its last stop
   // interrupted. Call before robots arrive.
@@ -45,44 +45,46 @@ class Runs final : public StationSink {
   // conflict when the robot has an open run, or somebody else is in control of it and the run names another fluid than
   // it is in; not_connected when it is not there, invalid for a bad name or fluid. A run that names none is in the
   // fluid that its robot is in.
-  boost::asio::awaitable<Result<Run>> create(RobotId robot_id, RunConditions conditions, Author by = {});
+  boost::asio::awaitable<Result<Run>> create(station::RobotId robot_id, RunConditions conditions,
+                                             station::Author by = {});
 
   // A run of what was recorded already; it has ended. Its robot need not be there. invalid for a range without samples
   // or in the future, not_found for a robot or boot that is not known.
-  boost::asio::awaitable<Result<Run>> make_afterwards(RobotId robot_id, RunConditions conditions, RecordedRange range,
-                                                      Author by);
+  boost::asio::awaitable<Result<Run>> make_afterwards(station::RobotId robot_id, RunConditions conditions,
+                                                      RecordedRange range, station::Author by);
 
   // Changes what was said of the run; each change leaves a row in run_note. Its samples and their digest have
   // nothing to do with it. conflict for a discarded run.
-  boost::asio::awaitable<Result<Run>> annotate(RunId id, RunAnnotation annotation, Author by);
+  boost::asio::awaitable<Result<Run>> annotate(RunId id, RunAnnotation annotation, station::Author by);
 
   // The run holds its samples no longer, and is not listed any more. conflict while it is open.
-  boost::asio::awaitable<Result<Run>> discard(RunId id, std::string reason, Author by);
+  boost::asio::awaitable<Result<Run>> discard(RunId id, std::string reason, station::Author by);
 
   // Of the station's configuration, as JSON: what each run keeps of it.
   void set_station_document(std::string json) { station_document_ = std::move(json); }
   boost::asio::awaitable<Result<RunSnapshot>> snapshot(RunId id);
 
   // The fluids that runs may name. Others are refused as invalid; before this call those that are built in.
-  void set_envelope(Envelope envelope) { envelope_ = std::move(envelope); }
+  void set_envelope(config::Envelope envelope) { envelope_ = std::move(envelope); }
   // An open run that names a fluid says by it that its robot is in this fluid. What is refused here refuses the run.
-  using OnFluid = std::function<Result<void>(const RobotId& robot_id, const std::string& fluid, const Author& by)>;
+  using OnFluid = std::function<Result<void>(const station::RobotId& robot_id, const std::string& fluid,
+                                             const station::Author& by)>;
   void set_on_fluid(OnFluid on_fluid) { on_fluid_ = std::move(on_fluid); }
 
   // Ends the run with the latest sample received. Answers when that sample is durable or known lost, at most 3 s later.
-  boost::asio::awaitable<Result<Run>> end(RunId id, std::string verdict, Author by = {});
+  boost::asio::awaitable<Result<Run>> end(RunId id, std::string verdict, station::Author by = {});
 
   boost::asio::awaitable<Result<Run>> find(RunId id);
 
   boost::asio::awaitable<std::vector<Run>> list(RunFilter filter);
 
-  void on_robot(const RobotState& robot) override;
+  void on_robot(const station::RobotState& robot) override;
 
  private:
   // What a new run takes from its robot.
   struct Robot {
     bool connected = false;
-    BootId boot_id = 0;
+    station::BootId boot_id = 0;
     std::string firmware_version;
     std::uint32_t controller_id = 0;
     std::uint32_t controller_checksum = 0;
@@ -92,24 +94,26 @@ class Runs final : public StationSink {
 
   boost::asio::awaitable<void> interrupt_open();
   Result<void> check_fluid(std::string& fluid) const;
-  boost::asio::awaitable<Result<RecordedSamples>> samples_in(RobotId robot_id, RecordedRange range);
+  boost::asio::awaitable<Result<RecordedSamples>> samples_in(station::RobotId robot_id, RecordedRange range);
   boost::asio::awaitable<Result<Run>> changed(RunId id, Result<void> outcome);
 
   // How far each robot's boot has come; what the database does not know yet of an open span.
-  std::map<BootId, std::uint64_t> heads() const;
+  std::map<station::BootId, std::uint64_t> heads() const;
   boost::asio::awaitable<std::optional<Run>> read(RunId id);
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   Recorder& recorder_;
   DatabaseReader& reader_;
   RunDigester& digester_;
-  std::map<RobotId, Robot> robots_;
-  std::map<RobotId, RunId> open_runs_;  // 0: being created
+  std::map<station::RobotId, Robot> robots_;
+  std::map<station::RobotId, RunId> open_runs_;  // 0: being created
   bool is_loaded_ = false;
   std::string station_document_;
-  Envelope envelope_;
-  OnFluid on_fluid_ = [](const RobotId&, const std::string&, const Author&) { return Result<void>{}; };
+  config::Envelope envelope_;
+  OnFluid on_fluid_ = [](const station::RobotId&, const std::string&, const station::Author&) {
+    return Result<void>{};
+  };
   std::set<RunId> ending_;  // of these, the ones whose end is being stored
 };
 
-}  // namespace server
+}  // namespace server::storage

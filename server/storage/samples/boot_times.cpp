@@ -7,7 +7,7 @@
 
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr const char* kColumns =
@@ -100,4 +100,4 @@ std::optional<BootTimes::Place> BootTimes::read(SQLite::Statement& query, std::u
   return place;
 }
 
-}  // namespace server
+}  // namespace server::storage

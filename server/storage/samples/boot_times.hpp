@@ -16,7 +16,7 @@
 
 #include "server/storage/samples/segment.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct SampleTime {
   std::uint64_t robot_time_us = 0;
@@ -60,4 +60,4 @@ class BootTimes {
   std::int64_t boot_key_ = 0;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -6,11 +6,11 @@
 
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 // When it came into this state, as far as that is known.
-std::int64_t changed_at_us(const CommandRecord& command) {
+std::int64_t changed_at_us(const station::CommandRecord& command) {
   if (command.ended_at_us != 0) return command.ended_at_us;
   const std::int64_t after_us = std::max({std::int64_t{0}, command.sent_after_us, command.acknowledged_after_us});
   return command.submitted_at_us + after_us;
@@ -18,7 +18,7 @@ std::int64_t changed_at_us(const CommandRecord& command) {
 
 }  // namespace
 
-AuditNote audit_note_of(const CommandRecord& command) {
+station::AuditNote audit_note_of(const station::CommandRecord& command) {
   nlohmann::json arguments = nlohmann::json::parse(command.arguments, nullptr, false);
   if (arguments.is_discarded()) arguments = command.arguments;
   nlohmann::json detail{{"kind", command.kind},
@@ -40,12 +40,12 @@ AuditNote audit_note_of(const CommandRecord& command) {
   add_time("verified_after_us", command.verified_after_us, -1);
   if (command.effect_at_robot_us != 0) detail["effect_at_robot_us"] = command.effect_at_robot_us;
   if (command.emergency_id != 0) detail["emergency_id"] = std::to_string(command.emergency_id);
-  AuditNote note;
+  station::AuditNote note;
   note.by = {command.actor, command.peer, changed_at_us(command)};
   note.robot_id = command.robot_id;
   note.action = std::string{"command."} + text(command.state);
   note.subject = std::to_string(command.id);
-  note.detail = audit_detail(detail);
+  note.detail = station::audit_detail(detail);
   return note;
 }
 
@@ -56,7 +56,7 @@ CommandStore::CommandStore(SQLite::Database& database)
               " acknowledged_after_us, verified_after_us, life_from, peer, audit_entry)"
               " VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,nullif(?,-1),nullif(?,-1),nullif(?,-1),?,?,?)"} {}
 
-void CommandStore::write(const CommandRecord& command, AuditChain& audit) {
+void CommandStore::write(const station::CommandRecord& command, AuditChain& audit) {
   const std::int64_t entry = audit.append(audit_note_of(command));
   execute(upsert_, command.id, command.robot_id, command.boot_id, command.kind, command.arguments, command.actor,
           text(command.state), command.reason, command.submitted_at_us, command.sent_at_us, command.ended_at_us,
@@ -64,4 +64,4 @@ void CommandStore::write(const CommandRecord& command, AuditChain& audit) {
           command.verified_after_us, command.life_from, command.peer, entry);
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -8,20 +8,20 @@
 #include "server/station/state/station_state.hpp"
 #include "server/storage/audit/audit_chain.hpp"
 
-namespace server {
+namespace server::storage {
 
 // "command." and the state; the detail says what was asked for and when each stage was reached.
-AuditNote audit_note_of(const CommandRecord& command);
+station::AuditNote audit_note_of(const station::CommandRecord& command);
 
 class CommandStore {
  public:
   explicit CommandStore(SQLite::Database& database);
 
   // Replaces what is stored of the same command.
-  void write(const CommandRecord& command, AuditChain& audit);
+  void write(const station::CommandRecord& command, AuditChain& audit);
 
  private:
   SQLite::Statement upsert_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -5,13 +5,13 @@
 
 #include "base/json_text.hpp"
 
-namespace server {
+namespace server::storage {
 using base::decimal;
 using nlohmann::json;
 
 namespace {
 
-json parameters_json(const ReportedParameters& parameters) {
+json parameters_json(const station::ReportedParameters& parameters) {
   json table = json::object();
   for (const auto& [name, parameter] : parameters) {
     table[name] = {{"value", decimal(parameter.value)},
@@ -32,12 +32,12 @@ json numbers(const float (&values)[size], std::size_t count) {
 
 }  // namespace
 
-const char* kind_of(const InForceContent& content) {
-  return std::holds_alternative<ReportedParameters>(content) ? "parameters" : "controller";
+const char* kind_of(const station::InForceContent& content) {
+  return std::holds_alternative<station::ReportedParameters>(content) ? "parameters" : "controller";
 }
 
-std::string document_text(const InForceContent& content) {
-  const auto* parameters = std::get_if<ReportedParameters>(&content);
+std::string document_text(const station::InForceContent& content) {
+  const auto* parameters = std::get_if<station::ReportedParameters>(&content);
   return base::dump(parameters != nullptr ? parameters_json(*parameters)
                                           : controller_json(std::get<protocol::Controller>(content)));
 }
@@ -59,4 +59,4 @@ json controller_json(const protocol::Controller& controller) {
           {"derivative_on", controller.derivative_on == rheonaut_DERIVATIVE_ON_MEASUREMENT ? "measurement" : "error"}};
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -6,14 +6,14 @@
 
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::storage {
 
 // "parameters" or "controller".
-const char* kind_of(const InForceContent& content);
+const char* kind_of(const station::InForceContent& content);
 // Of parameters {"name": {"value", "unit", "minimum", "maximum", "default"}}, of a controller as below.
-std::string document_text(const InForceContent& content);
+std::string document_text(const station::InForceContent& content);
 
 // Coefficients as they were sent, in the order of the message.
 nlohmann::json controller_json(const protocol::Controller& controller);
 
-}  // namespace server
+}  // namespace server::storage

@@ -8,7 +8,7 @@
 #include "server/storage/database/statement.hpp"
 #include "server/storage/samples/in_force_json.hpp"
 
-namespace server {
+namespace server::storage {
 
 std::int64_t document_key(SQLite::Database& database, const std::string& kind, const std::string& content) {
   std::array<unsigned char, crypto_hash_sha256_BYTES> hash{};
@@ -25,7 +25,7 @@ std::int64_t document_key(SQLite::Database& database, const std::string& kind, c
   return find.getColumn(0).getInt64();
 }
 
-void store_in_force(SQLite::Database& database, std::int64_t boot_key, const InForceRecord& record) {
+void store_in_force(SQLite::Database& database, std::int64_t boot_key, const station::InForceRecord& record) {
   const std::string kind = kind_of(record.content);
   const std::int64_t key = document_key(database, kind, document_text(record.content));
   SQLite::Statement latest{database,
@@ -42,7 +42,7 @@ void store_in_force(SQLite::Database& database, std::int64_t boot_key, const InF
   execute(add, boot_key, kind, first_seq, key, record.noticed_at_us);
 }
 
-void store_clock(SQLite::Database& database, std::int64_t boot_key, const ClockRecord& record) {
+void store_clock(SQLite::Database& database, std::int64_t boot_key, const station::ClockRecord& record) {
   SQLite::Statement add{database,
                         "INSERT OR REPLACE INTO clock_estimate (boot_key, robot_time_us, utc_offset_us, uncertainty_us,"
                         " drift_ppm, round_trip_us, station_step_us) VALUES (?, ?, ?, ?, ?, ?, ?)"};
@@ -50,4 +50,4 @@ void store_clock(SQLite::Database& database, std::int64_t boot_key, const ClockR
           record.round_trip_us, record.station_step_us);
 }
 
-}  // namespace server
+}  // namespace server::storage

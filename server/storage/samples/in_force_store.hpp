@@ -10,7 +10,7 @@
 
 #include "server/station/state/station_state.hpp"
 
-namespace server {
+namespace server::storage {
 
 // The key of this text; it is stored unless it is there already.
 std::int64_t document_key(SQLite::Database& database, const std::string& kind, const std::string& content);
@@ -18,8 +18,8 @@ std::int64_t document_key(SQLite::Database& database, const std::string& kind, c
 // The first of its kind in a boot is in force from sample 0 on, unless it is a change of what was not recorded. A later
 // record of the same kind from the same sample on takes the place of the earlier one. Nothing is stored when the same
 // text is in force already.
-void store_in_force(SQLite::Database& database, std::int64_t boot_key, const InForceRecord& record);
+void store_in_force(SQLite::Database& database, std::int64_t boot_key, const station::InForceRecord& record);
 
-void store_clock(SQLite::Database& database, std::int64_t boot_key, const ClockRecord& record);
+void store_clock(SQLite::Database& database, std::int64_t boot_key, const station::ClockRecord& record);
 
-}  // namespace server
+}  // namespace server::storage

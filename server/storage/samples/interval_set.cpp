@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
-namespace server {
+namespace server::storage {
 
 std::vector<Interval> IntervalSet::covered(Interval range) const {
   std::vector<Interval> parts;
@@ -71,4 +71,4 @@ std::uint64_t count(const std::vector<Interval>& intervals) {
   return sum;
 }
 
-}  // namespace server
+}  // namespace server::storage

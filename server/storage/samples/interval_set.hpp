@@ -5,7 +5,7 @@
 #include <map>
 #include <vector>
 
-namespace server {
+namespace server::storage {
 
 struct Interval {  // [first, next), empty when next <= first
   std::uint64_t first = 0;
@@ -44,4 +44,4 @@ class IntervalSet {
 
 std::uint64_t count(const std::vector<Interval>& intervals);
 
-}  // namespace server
+}  // namespace server::storage

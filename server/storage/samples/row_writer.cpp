@@ -7,14 +7,14 @@
 #include <limits>
 #include <string>
 
-namespace server {
+namespace server::storage {
 namespace {
 
 // "INSERT INTO sample (row, …) VALUES (?,…),(?,…)" for so many rows.
 std::string insert_query(std::size_t rows) {
   std::string sql = "INSERT INTO sample (row";
   std::string one_row = "(?";
-  for (const SampleField& field : kSampleFields) {
+  for (const station::SampleField& field : station::kSampleFields) {
     sql.append(", ").append(field.name);
     one_row += ",?";
   }
@@ -37,13 +37,13 @@ RawStatement RowWriter::prepare(std::size_t rows) {
   return RawStatement{statement};
 }
 
-Extremes RowWriter::write(const std::vector<Sample>& samples, std::int64_t first_row) {
+Extremes RowWriter::write(const std::vector<station::Sample>& samples, std::int64_t first_row) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   Extremes extremes;
   extremes.min.fill(kInfinity);
   extremes.max.fill(-kInfinity);
   std::int64_t row = first_row;
-  for (const Sample& sample : samples) {
+  for (const station::Sample& sample : samples) {
     if (waiting_ == kBlockRows) {
       insert(insert_block_.get(), block_);
       waiting_ = 0;
@@ -83,4 +83,4 @@ void RowWriter::insert(sqlite3_stmt* statement, std::span<const Row> rows) {
   if (result != SQLITE_DONE) throw SQLite::Exception{database_.getHandle(), result};
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -14,7 +14,7 @@
 #include "server/station/state/station_state.hpp"
 #include "server/storage/samples/sample_scanner.hpp"
 
-namespace server {
+namespace server::storage {
 
 // The smallest and largest finite value of each channel; infinite (stored as NULL) when there is none.
 struct Extremes {
@@ -30,7 +30,7 @@ class RowWriter {
   void begin() { waiting_ = 0; }
 
   // The rows get consecutive numbers. They are in the table once finish() has returned.
-  Extremes write(const std::vector<Sample>& samples, std::int64_t first_row);
+  Extremes write(const std::vector<station::Sample>& samples, std::int64_t first_row);
   void finish();
 
  private:
@@ -51,4 +51,4 @@ class RowWriter {
   std::size_t waiting_ = 0;  // of block_
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -13,7 +13,7 @@
 #include "server/station/state/unknown_values.hpp"
 #include "server/storage/samples/stored_rows.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -32,7 +32,7 @@ std::string segment_query(std::int64_t version) {
       "SELECT first_seq, last_seq, first_row, first_robot_time_us, period_us,"
       " iif(first_received_at_us = 0, received_at_us, first_received_at_us), received_at_us, utc_offset_us,"
       " clock_uncertainty_us";
-  for_each_batch_field([&](const auto& field) { (sql += ", ") += column_or_null(field, version); });
+  station::for_each_batch_field([&](const auto& field) { (sql += ", ") += column_or_null(field, version); });
   return sql + ", " + (version >= kUnknownValuesSince ? "unknown_values" : "NULL") + kInRange;
 }
 
@@ -81,14 +81,14 @@ void read_enumerator(sqlite3_stmt* row, int column, Named& last, Enumerator& int
   const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
   if (text != nullptr && last.name != text) {
     last.name = text;
-    last.number = number_of(enumerator_from<Enumerator>(last.name));
+    last.number = station::number_of(enumerator_from<Enumerator>(last.name));
   }
   into = static_cast<Enumerator>(last.number);
 }
 
 }  // namespace
 
-const char* text(Channel value) { return kSampleFields[static_cast<std::size_t>(value)].name; }
+const char* text(Channel value) { return station::kSampleFields[static_cast<std::size_t>(value)].name; }
 
 Result<Channels> parse_channels(std::string_view text) {
   Channels channels;
@@ -96,7 +96,7 @@ Result<Channels> parse_channels(std::string_view text) {
     const std::size_t comma = text.find(',');
     const std::string_view name = text.substr(0, comma);
     std::size_t index = 0;
-    while (index < kChannels && name != server::text(channel(index))) ++index;
+    while (index < kChannels && name != storage::text(channel(index))) ++index;
     if (index == kChannels || channels[index]) {
       const char* problem = index == kChannels ? "is no channel" : "is given twice";
       return fail(ErrorCode::bad_request, fmt::format("channels: '{}' {}", name.substr(0, 40), problem),
@@ -116,7 +116,7 @@ SampleScanner::SampleScanner(SQLite::Database& database, Channels channels) : da
   segments_ = prepare(database, segment_query(version));
   std::string sql = "SELECT row";
   for (std::size_t index = 0; index < kChannels; ++index) {
-    if (channels[index]) (sql += ", ") += column_or_null(kSampleFields[index], version);
+    if (channels[index]) (sql += ", ") += column_or_null(station::kSampleFields[index], version);
   }
   rows_ = prepare(database, sql + " FROM sample WHERE row >= ?1 ORDER BY row");
 }
@@ -156,7 +156,7 @@ std::int64_t SampleScanner::read_segment(Segment& into) {
   const std::uint64_t first = std::max(first_seq, range_.first);
   const std::uint64_t next = std::min(unsigned_at(row, 1) + 1, range_.next);
   const std::uint64_t skipped = first - first_seq;
-  SampleContext& context = into.context;
+  station::SampleContext& context = into.context;
   into.boot_key = boot_key_;
   into.first_seq = first;
   into.samples.resize(next - first);
@@ -170,14 +170,14 @@ std::int64_t SampleScanner::read_segment(Segment& into) {
   return sqlite3_column_int64(row, 2) + static_cast<std::int64_t>(skipped);
 }
 
-void SampleScanner::read_context(SampleContext& into) {
+void SampleScanner::read_context(station::SampleContext& into) {
   sqlite3_stmt* row = segments_.get();
   int column = kContextColumn;
-  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+  station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
     Value& value = into.*field.member;
-    if constexpr (BatchField<Value>::kKind == FieldKind::enumerator) {
+    if constexpr (station::BatchField<Value>::kKind == station::FieldKind::enumerator) {
       read_enumerator(row, column, last_texts_[static_cast<std::size_t>(column - kContextColumn)], value);
-    } else if constexpr (BatchField<Value>::kKind == FieldKind::number) {
+    } else if constexpr (station::BatchField<Value>::kKind == station::FieldKind::number) {
       value = optional_at(row, column);
     } else {
       value = static_cast<Value>(unsigned_at(row, column));
@@ -191,7 +191,7 @@ void SampleScanner::read_context(SampleContext& into) {
 void SampleScanner::read_rows(std::int64_t first_row, Segment& into) {
   sqlite3_stmt* row = rows_.get();
   if (next_row_ != first_row) seek(first_row);
-  for (Sample& sample : into.samples) {
+  for (station::Sample& sample : into.samples) {
     const int result = sqlite3_step(row);
     if (result != SQLITE_ROW && result != SQLITE_DONE) fail_with(database_);
     if (result == SQLITE_DONE || sqlite3_column_int64(row, 0) != next_row_) {
@@ -223,7 +223,7 @@ std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boo
   const std::int64_t version = database.execAndGet("PRAGMA user_version").getInt64();
   for (std::size_t index = 0; index < kChannels; ++index) {
     if (!channels[index]) continue;
-    const bool is_stored = kSampleFields[index].since_schema <= version;
+    const bool is_stored = station::kSampleFields[index].since_schema <= version;
     sql += is_stored ? fmt::format(", min_{0}, max_{0}", text(channel(index))) : ", NULL, NULL";
   }
   const RawStatement statement = prepare(database, sql + kInRange + " LIMIT ?4");
@@ -250,4 +250,4 @@ std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boo
   return heads;
 }
 
-}  // namespace server
+}  // namespace server::storage

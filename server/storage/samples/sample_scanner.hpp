@@ -25,18 +25,18 @@
 
 struct sqlite3_stmt;
 
-namespace server {
+namespace server::storage {
 
 // A row of kSampleFields, by its index.
 enum class Channel : std::uint8_t {};
-constexpr std::size_t kChannels = kSampleFieldCount;
+constexpr std::size_t kChannels = station::kSampleFieldCount;
 using Channels = std::bitset<kChannels>;
 inline Channels all_channels() { return Channels{}.set(); }
 
 // By Channel.
 inline constexpr auto kSampleMembers = [] {
-  std::array<float Sample::*, kChannels> members{};
-  for (std::size_t index = 0; index < kChannels; ++index) members[index] = kSampleFields[index].member;
+  std::array<float station::Sample::*, kChannels> members{};
+  for (std::size_t index = 0; index < kChannels; ++index) members[index] = station::kSampleFields[index].member;
   return members;
 }();
 
@@ -73,7 +73,7 @@ class SampleScanner {
 
   // Returns its first row; the samples' number is right, their values are not.
   std::int64_t read_segment(Segment& into);
-  void read_context(SampleContext& into);
+  void read_context(station::SampleContext& into);
   void read_rows(std::int64_t first_row, Segment& into);
   void seek(std::int64_t row);
 
@@ -85,7 +85,7 @@ class SampleScanner {
   std::int64_t boot_key_ = 0;
   std::int64_t next_row_ = 0;  // that rows_ gives at its next step; 0: it must seek
   bool scanning_ = false;
-  std::array<Named, kBatchFieldCount> last_texts_;  // by row of kBatchFields
+  std::array<Named, station::kBatchFieldCount> last_texts_;  // by row of kBatchFields
 };
 
 // What is known of a segment without its rows.
@@ -105,4 +105,4 @@ struct SegmentHead {
 std::vector<SegmentHead> read_heads(SQLite::Database& database, std::int64_t boot_key, Interval samples,
                                     Channels channels, std::size_t limit = std::numeric_limits<std::int32_t>::max());
 
-}  // namespace server
+}  // namespace server::storage

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace server {
+namespace server::storage {
 namespace {
 
 // SQLite stores NaN as NULL and -0.0 as 0.0; the store writes an infinity as NULL, too.
@@ -31,10 +31,11 @@ Segment part_of(const Segment& segment, Interval range) {
   return part;
 }
 
-Sample as_stored(const Sample& sample) {
-  Sample stored;
-  for_each_sample_field([&](const SampleField& field) { stored.*field.member = as_stored(sample.*field.member); });
+station::Sample as_stored(const station::Sample& sample) {
+  station::Sample stored;
+  station::for_each_sample_field(
+      [&](const station::SampleField& field) { stored.*field.member = as_stored(sample.*field.member); });
   return stored;
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -11,15 +11,15 @@
 #include "server/station/state/station_state.hpp"
 #include "server/storage/samples/interval_set.hpp"
 
-namespace server {
+namespace server::storage {
 
 // 1 to 100 consecutive samples that share everything but their values.
 struct Segment {
   std::int64_t boot_key = 0;
   std::uint64_t first_seq = 0;
   std::uint64_t first_robot_time_us = 0;
-  SampleContext context;
-  std::vector<Sample> samples;
+  station::SampleContext context;
+  std::vector<station::Sample> samples;
   std::int64_t first_received_at_us = 0;  // UTC, when the first of them had arrived
   std::int64_t received_at_us = 0;        // UTC, when the last of them had arrived
   std::int64_t utc_offset_us = 0;
@@ -34,7 +34,7 @@ struct Segment {
 Segment part_of(const Segment& segment, Interval range);
 
 // The sample as the database gives it back: NaN for what is not finite, and no negative zero.
-Sample as_stored(const Sample& sample);
+station::Sample as_stored(const station::Sample& sample);
 
 // Samples (or events) that are lost for good.
 struct LostRange {
@@ -44,4 +44,4 @@ struct LostRange {
   std::int64_t noticed_at_us = 0;  // UTC
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -8,28 +8,29 @@
 #include "server/storage/database/statement.hpp"
 #include "server/storage/samples/command_store.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
-CommandState command_state_from(const std::string& name) {
-  for (int value = 0; value <= static_cast<int>(kLastCommandState); ++value) {
-    if (name == text(static_cast<CommandState>(value))) return static_cast<CommandState>(value);
+station::CommandState command_state_from(const std::string& name) {
+  for (int value = 0; value <= static_cast<int>(station::kLastCommandState); ++value) {
+    if (name == text(static_cast<station::CommandState>(value))) return static_cast<station::CommandState>(value);
   }
-  return CommandState::failed;
+  return station::CommandState::failed;
 }
 
 constexpr const char* kUnfinished = "state IN ('queued', 'sent')";
 
 }  // namespace
 
-void set_unknown(SampleContext& context, const std::string& unknown_values) {
+void set_unknown(station::SampleContext& context, const std::string& unknown_values) {
   const auto numbers = nlohmann::json::parse(unknown_values, nullptr, false);
   if (!numbers.is_object()) return;
-  for_each_batch_field_of<FieldKind::enumerator>([&]<class Enumerator>(const BatchField<Enumerator>& field) {
-    const auto number = numbers.find(field.name);
-    if (number == numbers.end() || !number->is_number_integer()) return;
-    context.*field.member = static_cast<Enumerator>(number->template get<std::int32_t>());
-  });
+  station::for_each_batch_field_of<station::FieldKind::enumerator>(
+      [&]<class Enumerator>(const station::BatchField<Enumerator>& field) {
+        const auto number = numbers.find(field.name);
+        if (number == numbers.end() || !number->is_number_integer()) return;
+        context.*field.member = static_cast<Enumerator>(number->template get<std::int32_t>());
+      });
 }
 
 std::string select_commands(const char* condition) {
@@ -41,8 +42,8 @@ std::string select_commands(const char* condition) {
       condition);
 }
 
-CommandRecord command_from(SQLite::Statement& row) {
-  CommandRecord command;
+station::CommandRecord command_from(SQLite::Statement& row) {
+  station::CommandRecord command;
   command.id = unsigned_id(row.getColumn(0));
   command.robot_id = row.getColumn(1).getString();
   command.boot_id = unsigned_id(row.getColumn(2));
@@ -73,8 +74,8 @@ std::string select_events(const char* condition) {
       condition);
 }
 
-RobotEvent event_from(SQLite::Statement& row) {
-  RobotEvent event;
+station::RobotEvent event_from(SQLite::Statement& row) {
+  station::RobotEvent event;
   event.robot_id = row.getColumn(0).getString();
   event.boot_id = unsigned_id(row.getColumn(1));
   if (!row.getColumn(2).isNull()) event.event_seq = unsigned_id(row.getColumn(2));
@@ -82,7 +83,7 @@ RobotEvent event_from(SQLite::Statement& row) {
   event.sample_seq = unsigned_id(row.getColumn(4));
   event.kind = row.getColumn(5).getString();
   event.cause = row.getColumn(6).getString();
-  SampleContext context;
+  station::SampleContext context;
   context.mode = enumerator_from<protocol::Mode>(row.getColumn(7).getString());
   context.sub_state = enumerator_from<protocol::SubState>(row.getColumn(8).getString());
   context.emergency_cause = enumerator_from<protocol::EmergencyCause>(row.getColumn(14).getString());
@@ -100,8 +101,8 @@ RobotEvent event_from(SQLite::Statement& row) {
   return event;
 }
 
-std::vector<CommandRecord> pending_stops(Database& database) {
-  std::vector<CommandRecord> stops;
+std::vector<station::CommandRecord> pending_stops(Database& database) {
+  std::vector<station::CommandRecord> stops;
   const std::string condition =
       fmt::format("WHERE kind = 'emergency_stop' AND {} ORDER BY submitted_at_us", kUnfinished);
   SQLite::Statement query{database.handle(), select_commands(condition.c_str())};
@@ -111,14 +112,15 @@ std::vector<CommandRecord> pending_stops(Database& database) {
 
 void fail_unfinished_commands(Database& database, std::int64_t utc_us) {
   SQLite::Transaction transaction{database.handle(), SQLite::TransactionBehavior::IMMEDIATE};
-  std::vector<CommandRecord> unfinished;
+  std::vector<station::CommandRecord> unfinished;
   const std::string condition = fmt::format("WHERE kind <> 'emergency_stop' AND {}", kUnfinished);
   SQLite::Statement query{database.handle(), select_commands(condition.c_str())};
   while (query.executeStep()) unfinished.push_back(command_from(query));
   CommandStore commands{database.handle()};
   AuditChain audit{database.handle()};
-  for (CommandRecord& command : unfinished) {
-    command.state = command.state == CommandState::sent ? CommandState::unknown : CommandState::failed;
+  for (station::CommandRecord& command : unfinished) {
+    command.state =
+        command.state == station::CommandState::sent ? station::CommandState::unknown : station::CommandState::failed;
     command.reason = "station_restarted";
     command.ended_at_us = utc_us;
     commands.write(command, audit);
@@ -126,4 +128,4 @@ void fail_unfinished_commands(Database& database, std::int64_t utc_us) {
   transaction.commit();
 }
 
-}  // namespace server
+}  // namespace server::storage

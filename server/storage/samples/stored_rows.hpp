@@ -14,7 +14,7 @@
 #include "server/station/state/unknown_values.hpp"
 #include "server/storage/database/database.hpp"
 
-namespace server {
+namespace server::storage {
 
 // The enumerator whose text() this is; of "unknown" kNumberNotKept (unknown_values.hpp), of any other text 0.
 template <class Enumerator>
@@ -22,9 +22,9 @@ Enumerator enumerator_from(std::string_view text) {
   constexpr int kMostEnumerators = 256;
   for (int number = 0; number < kMostEnumerators; ++number) {
     const auto value = static_cast<Enumerator>(number);
-    if (!is_unknown(value) && text == protocol::text(value)) return value;
+    if (!station::is_unknown(value) && text == protocol::text(value)) return value;
   }
-  return static_cast<Enumerator>(text == "unknown" ? kNumberNotKept : 0);
+  return static_cast<Enumerator>(text == "unknown" ? station::kNumberNotKept : 0);
 }
 
 // The column of a field in a database of this version of the schema, as SQL.
@@ -34,19 +34,19 @@ const char* column_or_null(const Field& field, std::int64_t version) {
 }
 
 // Puts the numbers of a column unknown_values in their place.
-void set_unknown(SampleContext& context, const std::string& unknown_values);
+void set_unknown(station::SampleContext& context, const std::string& unknown_values);
 
 // `condition` is SQL that follows SELECT … FROM; its `?` are bound by the caller.
 std::string select_commands(const char* condition);
 std::string select_events(const char* condition);
-CommandRecord command_from(SQLite::Statement& row);
+station::CommandRecord command_from(SQLite::Statement& row);
 inline constexpr int kCommandAuditEntry = 18;  // its column; NULL: older than the audit
-RobotEvent event_from(SQLite::Statement& row);
+station::RobotEvent event_from(SQLite::Statement& row);
 
 // Emergency stops that no robot has acknowledged, oldest first.
-std::vector<CommandRecord> pending_stops(Database& database);
+std::vector<station::CommandRecord> pending_stops(Database& database);
 
 // Commands other than emergency stops that were on their way when the station stopped: nobody follows them any more.
 void fail_unfinished_commands(Database& database, std::int64_t utc_us);
 
-}  // namespace server
+}  // namespace server::storage

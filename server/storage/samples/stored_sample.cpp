@@ -1,11 +1,11 @@
 // A segment's common values written out for one of its samples.
 #include "server/storage/samples/stored_sample.hpp"
 
-namespace server {
+namespace server::storage {
 
-StoredSample stored_sample(const Segment& segment, std::size_t index, std::uint32_t span, BootId boot_id) {
+StoredSample stored_sample(const Segment& segment, std::size_t index, std::uint32_t span, station::BootId boot_id) {
   StoredSample stored;
-  static_cast<SampleContext&>(stored) = segment.context;
+  static_cast<station::SampleContext&>(stored) = segment.context;
   stored.span = span;
   stored.boot_id = boot_id;
   stored.seq = segment.first_seq + index;
@@ -18,4 +18,4 @@ StoredSample stored_sample(const Segment& segment, std::size_t index, std::uint3
   return stored;
 }
 
-}  // namespace server
+}  // namespace server::storage

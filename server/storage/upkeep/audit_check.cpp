@@ -14,7 +14,7 @@
 #include "server/storage/samples/command_store.hpp"
 #include "server/storage/samples/stored_rows.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::int64_t kPageRows = 1000;
@@ -62,20 +62,20 @@ class ChainWalk {
       ++findings_.hidden;
     } else {
       entry = audit_entry_from(row);
-      if (!entry || !same(content_hash_of(entry->note, entry->salt), entry->content_hash)) {
+      if (!entry || !runtime::same(content_hash_of(entry->note, entry->salt), entry->content_hash)) {
         return bad(fmt::format("audit: entry {} was changed: its content is not that of its content_hash", number));
       }
       content_hash = entry->content_hash;
       hash = entry->hash;
     }
-    if (!begins_export && !same(link_hash_of(findings_.head.hash, number, content_hash), hash)) {
+    if (!begins_export && !runtime::same(link_hash_of(findings_.head.hash, number, content_hash), hash)) {
       return bad(
           fmt::format("audit: entry {} does not follow on {}: it was moved, exchanged or inserted, or what was "
                       "before it was",
                       number, before == 0 ? "the beginning" : fmt::format("entry {}", before)));
     }
     const bool is_expected = expected_ && expected_->entry == number;
-    if (is_expected && !same(expected_->hash, hash)) {
+    if (is_expected && !runtime::same(expected_->hash, hash)) {
       return bad(fmt::format("audit: entry {} has the hash {}, not the expected {}: the chain was written anew", number,
                              text(hash), text(expected_->hash)));
     }
@@ -110,7 +110,7 @@ class ChainWalk {
   std::optional<AuditEntry> latest_;
 };
 
-bool tells_of_command(const AuditNote& note) {
+bool tells_of_command(const station::AuditNote& note) {
   return note.action.starts_with("command.") && note.action != "command.refused";
 }
 
@@ -158,13 +158,13 @@ bool walk_chain(SQLite::Database& database, ChainWalk& walk, AuditFindings& find
   return true;
 }
 
-bool say_the_same(const AuditNote& a, const AuditNote& b) {
-  const auto json = [](const AuditNote& note) { return nlohmann::json::parse(note.detail, nullptr, false); };
+bool say_the_same(const station::AuditNote& a, const station::AuditNote& b) {
+  const auto json = [](const station::AuditNote& note) { return nlohmann::json::parse(note.detail, nullptr, false); };
   return a.by.actor == b.by.actor && a.by.peer == b.by.peer && a.by.at_us == b.by.at_us && a.robot_id == b.robot_id &&
          a.action == b.action && a.subject == b.subject && json(a) == json(b);
 }
 
-void check_command(const CommandRecord& command, std::int64_t entry, SQLite::Statement& by_entry,
+void check_command(const station::CommandRecord& command, std::int64_t entry, SQLite::Statement& by_entry,
                    AuditFindings& findings) {
   bind_all(by_entry, entry);
   const auto noted = by_entry.executeStep() ? audit_entry_from(by_entry) : std::nullopt;
@@ -190,8 +190,9 @@ void check_commands(SQLite::Database& database, AuditFindings& findings) {
     for (read = 0; rows.executeStep(); ++read) {
       last = rows.getColumn(0).getInt64();
       const SQLite::Column entry = rows.getColumn(kCommandAuditEntry);
-      const CommandRecord command = command_from(rows);
-      const bool is_unfinished = command.state == CommandState::queued || command.state == CommandState::sent;
+      const station::CommandRecord command = command_from(rows);
+      const bool is_unfinished =
+          command.state == station::CommandState::queued || command.state == station::CommandState::sent;
       if (entry.isNull()) {
         without_entry += is_unfinished ? 0 : 1;  // of before the audit: it gets one with its end
       } else if (findings.faults.size() < kMostCommandFaults) {
@@ -226,4 +227,4 @@ AuditFindings check_exported_audit(SQLite::Database& exported, const std::option
   return findings;
 }
 
-}  // namespace server
+}  // namespace server::storage

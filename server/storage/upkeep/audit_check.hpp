@@ -13,7 +13,7 @@
 
 #include "server/storage/audit/audit_chain.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct AuditFindings {
   // Of the chain at most one, where it first is not as it was written; what comes after is not looked at.
@@ -31,4 +31,4 @@ AuditFindings check_audit(SQLite::Database& database, const std::optional<AuditH
 // Of a run's export (RunFile): the part of the chain that is in it.
 AuditFindings check_exported_audit(SQLite::Database& exported, const std::optional<AuditHead>& expected);
 
-}  // namespace server
+}  // namespace server::storage

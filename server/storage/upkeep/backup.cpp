@@ -12,7 +12,7 @@
 #include "server/storage/database/file_check.hpp"
 #include "server/storage/database/finished_file.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 namespace fs = std::filesystem;
 using namespace asio::experimental::awaitable_operators;
@@ -46,7 +46,7 @@ struct CopyStep {
 };
 
 // On the disk thread. Whatever goes wrong with the copy ends the copy, and nothing else.
-CopyStep make_step(std::unique_ptr<BackupCopy>& copy, const Clock& clock) {
+CopyStep make_step(std::unique_ptr<BackupCopy>& copy, const runtime::Clock& clock) {
   CopyStep step;
   const std::int64_t begun_us = clock.steady_us();
   try {
@@ -114,7 +114,7 @@ const char* text(BackupState value) {
   return "failed";
 }
 
-Backups::Backups(asio::io_context& loop, Clock& clock, Recorder& recorder, WorkerThread& readers,
+Backups::Backups(asio::io_context& loop, runtime::Clock& clock, Recorder& recorder, runtime::WorkerThread& readers,
                  const DiskWatch& disk_watch, fs::path folder)
     : loop_{loop},
       clock_{clock},
@@ -282,8 +282,8 @@ asio::awaitable<void> Backups::interrupt_when_cancelled(SQLite::Database& databa
     ~Interrupt() { sqlite3_interrupt(database.getHandle()); }
   };
   const Interrupt at_the_end{database};
-  Signal never{loop_};
+  runtime::Signal never{loop_};
   co_await never.wait();
 }
 
-}  // namespace server
+}  // namespace server::storage

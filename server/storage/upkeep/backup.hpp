@@ -23,7 +23,7 @@
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/upkeep/disk_watch.hpp"
 
-namespace server {
+namespace server::storage {
 
 enum class BackupState : std::uint8_t { copying, verifying, done, failed };
 const char* text(BackupState value);
@@ -39,7 +39,7 @@ struct BackupRecord {
 
 class Backups {
  public:
-  Backups(boost::asio::io_context& loop, Clock& clock, Recorder& recorder, WorkerThread& readers,
+  Backups(boost::asio::io_context& loop, runtime::Clock& clock, Recorder& recorder, runtime::WorkerThread& readers,
           const DiskWatch& disk_watch, std::filesystem::path folder);
   ~Backups();
 
@@ -62,7 +62,7 @@ class Backups {
   void close() { copy_.reset(); }
 
   // Has a job while a copy is verified: for the virtual time of tests.
-  const WorkerThread& checker() const { return checker_; }
+  const runtime::WorkerThread& checker() const { return checker_; }
 
  private:
   boost::asio::awaitable<std::string> make(BackupRecord& record);  // the problem, empty when it is done
@@ -73,9 +73,9 @@ class Backups {
   std::filesystem::path part_of(const std::filesystem::path& path) const;
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
+  runtime::Clock& clock_;
   Recorder& recorder_;
-  WorkerThread& readers_;
+  runtime::WorkerThread& readers_;
   const DiskWatch& disk_watch_;
   std::filesystem::path folder_;
   std::uint64_t store_id_ = 0;
@@ -83,8 +83,8 @@ class Backups {
   std::vector<BackupRecord> records_;  // of this program, the latest last; never more than kMaxRecords
   bool busy_ = false;                  // the latest is being made
   bool asked_ = false;                 // begin() has promised what run() has not taken up
-  Signal wanted_{loop_};
-  WorkerThread checker_{"backup", 10};
+  runtime::Signal wanted_{loop_};
+  runtime::WorkerThread checker_{"backup", 10};
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -8,7 +8,7 @@
 
 #include "server/storage/database/disk_reserve.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
@@ -29,7 +29,7 @@ const char* text(SpaceState value) {
   return "ok";
 }
 
-SpaceLimits space_limits(const RecordingConfig& config) {
+SpaceLimits space_limits(const config::RecordingConfig& config) {
   return {config.low_space_mb * kMegabyte, config.critical_space_mb * kMegabyte};
 }
 
@@ -49,7 +49,7 @@ std::uint64_t file_bytes(const fs::path& path) {
   return absent ? 0 : size;
 }
 
-DiskWatch::DiskWatch(Clock& clock, WorkerThread& readers, fs::path database, SpaceLimits limits)
+DiskWatch::DiskWatch(runtime::Clock& clock, runtime::WorkerThread& readers, fs::path database, SpaceLimits limits)
     : clock_{clock}, readers_{readers}, database_{std::move(database)}, limits_{limits} {}
 
 asio::awaitable<void> DiskWatch::run() {
@@ -99,4 +99,4 @@ Result<void> DiskWatch::may_begin(const char* what) const {
   return fail(ErrorCode::unavailable, fmt::format("{} cannot be begun: {}", what, problem()), "low_space");
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -15,7 +15,7 @@
 #include "server/runtime/result.hpp"
 #include "server/runtime/worker.hpp"
 
-namespace server {
+namespace server::storage {
 
 enum class SpaceState : std::uint8_t {
   ok,
@@ -28,7 +28,7 @@ struct SpaceLimits {
   std::uint64_t low_bytes = 0;
   std::uint64_t critical_bytes = 0;
 };
-SpaceLimits space_limits(const RecordingConfig& config);
+SpaceLimits space_limits(const config::RecordingConfig& config);
 
 // A state is left for a better one when there is a tenth more than its limit.
 SpaceState next_state(SpaceState now, std::uint64_t free_bytes, SpaceLimits limits);
@@ -46,7 +46,7 @@ class DiskWatch {
  public:
   using FreeBytes = std::function<std::uint64_t(const std::filesystem::path& folder)>;
 
-  DiskWatch(Clock& clock, WorkerThread& readers, std::filesystem::path database, SpaceLimits limits);
+  DiskWatch(runtime::Clock& clock, runtime::WorkerThread& readers, std::filesystem::path database, SpaceLimits limits);
 
   // Looks every 5 s, until cancelled.
   boost::asio::awaitable<void> run();
@@ -65,8 +65,8 @@ class DiskWatch {
  private:
   void enter(SpaceState state);
 
-  Clock& clock_;
-  WorkerThread& readers_;
+  runtime::Clock& clock_;
+  runtime::WorkerThread& readers_;
   std::filesystem::path database_;
   SpaceLimits limits_;
   FreeBytes free_bytes_ = free_bytes_of;
@@ -74,4 +74,4 @@ class DiskWatch {
   DiskUse use_;
 };
 
-}  // namespace server
+}  // namespace server::storage

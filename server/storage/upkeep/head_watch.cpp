@@ -12,7 +12,7 @@
 #include "server/storage/database/database.hpp"
 #include "server/storage/query/run_reader.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 
 namespace {
@@ -48,7 +48,8 @@ Look write_if_changed(const std::filesystem::path& path, HeadFile file) {
 
 }  // namespace
 
-HeadWatch::HeadWatch(Clock& clock, Recorder& recorder, WorkerThread& checkpoints, microseconds interval)
+HeadWatch::HeadWatch(runtime::Clock& clock, Recorder& recorder, runtime::WorkerThread& checkpoints,
+                     microseconds interval)
     : clock_{clock}, recorder_{recorder}, checkpoints_{checkpoints}, interval_{interval}, path_{recorder.path()} {}
 
 struct HeadWatch::Opened {
@@ -96,7 +97,7 @@ asio::awaitable<void> HeadWatch::open() {
 
 void HeadWatch::note(const std::string& loss) {
   spdlog::error("{}: {}", path_.string(), loss);
-  AuditNote note;
+  station::AuditNote note;
   note.by = {"station", "", clock_.utc_us()};
   note.action = "store.loss_noticed";
   note.detail = nlohmann::json{{"problem", loss}}.dump();
@@ -129,7 +130,7 @@ void HeadWatch::close() {
   }
 }
 
-asio::awaitable<Result<void>> HeadWatch::acknowledge(Author by) {
+asio::awaitable<Result<void>> HeadWatch::acknowledge(station::Author by) {
   if (file_.losses.empty()) co_return Result<void>{};
   const std::vector<StoreLoss> losses = std::exchange(file_.losses, {});
   auto job = [path = path_, file = file_] { return try_to_save(path, file); };
@@ -138,7 +139,7 @@ asio::awaitable<Result<void>> HeadWatch::acknowledge(Author by) {
     file_.losses = losses;
     co_return fail(ErrorCode::unavailable, problem);
   }
-  AuditNote note;
+  station::AuditNote note;
   note.by = std::move(by);
   note.action = "store.loss_acknowledged";
   note.detail = nlohmann::json{{"losses", losses.size()}}.dump();
@@ -153,4 +154,4 @@ void HeadWatch::note_problem(std::string problem) {
   problem_ = std::move(problem);
 }
 
-}  // namespace server
+}  // namespace server::storage

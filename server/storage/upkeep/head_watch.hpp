@@ -16,11 +16,11 @@
 #include "server/storage/ingest/recorder.hpp"
 #include "server/storage/upkeep/store_head.hpp"
 
-namespace server {
+namespace server::storage {
 
 class HeadWatch {
  public:
-  HeadWatch(Clock& clock, Recorder& recorder, WorkerThread& checkpoints, microseconds interval);
+  HeadWatch(runtime::Clock& clock, Recorder& recorder, runtime::WorkerThread& checkpoints, microseconds interval);
 
   // After the recorder's open(): compares the database with its head, and writes the present one.
   boost::asio::awaitable<void> open();
@@ -32,7 +32,7 @@ class HeadWatch {
   // That nobody has acknowledged.
   const std::vector<StoreLoss>& losses() const { return file_.losses; }
   // unavailable: the file cannot be written, and the losses stay.
-  boost::asio::awaitable<Result<void>> acknowledge(Author by);
+  boost::asio::awaitable<Result<void>> acknowledge(station::Author by);
 
  private:
   struct Opened;
@@ -40,13 +40,13 @@ class HeadWatch {
   void note(const std::string& loss);
   void note_problem(std::string problem);
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   Recorder& recorder_;
-  WorkerThread& checkpoints_;
+  runtime::WorkerThread& checkpoints_;
   microseconds interval_;
   std::filesystem::path path_;  // of the database
   HeadFile file_;               // as it was written last
   std::string problem_;         // of the latest try to write it; empty: none
 };
 
-}  // namespace server
+}  // namespace server::storage

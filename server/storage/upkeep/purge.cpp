@@ -9,7 +9,7 @@
 
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::size_t kSegmentsASlice = 4;  // about 1 ms
@@ -75,7 +75,8 @@ class Purge {
 
 }  // namespace
 
-std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const Clock& clock, std::int64_t utc_us) {
+std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const runtime::Clock& clock,
+                         std::int64_t utc_us) {
   std::uint64_t removed = 0;
   const std::int64_t end_us = clock.steady_us() + kStepTime.count();
   SQLite::Transaction transaction{database, SQLite::TransactionBehavior::IMMEDIATE};
@@ -91,7 +92,7 @@ std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const 
   return removed;
 }
 
-std::uint64_t shrink_step(SQLite::Database& database, const Clock& clock) {
+std::uint64_t shrink_step(SQLite::Database& database, const runtime::Clock& clock) {
   const auto free_pages = [&database] {
     return static_cast<std::uint64_t>(database.execAndGet("PRAGMA freelist_count").getInt64());
   };
@@ -108,4 +109,4 @@ std::uint64_t shrink_step(SQLite::Database& database, const Clock& clock) {
   return before - std::min(before, after);
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -11,7 +11,7 @@
 #include "server/runtime/clock.hpp"
 #include "server/storage/upkeep/retention_plan.hpp"
 
-namespace server {
+namespace server::storage {
 
 // After this no step of retention begins another slice of its work; a slice and the commit take far less than the rest
 // of the 50 ms that a step may take.
@@ -20,10 +20,11 @@ inline constexpr microseconds kStepTime{10'000};
 // Returns how many samples it removed. One transaction: walks along the plan in slices of a few segments and looks at
 // the clock between them. A gap of cause `retention` that touches a new one becomes one with it; the others stay as
 // they are. When it throws, the database is as it was, and the plan must not be used any more.
-std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const Clock& clock, std::int64_t utc_us);
+std::uint64_t purge_step(SQLite::Database& database, RetentionPlan& plan, const runtime::Clock& clock,
+                         std::int64_t utc_us);
 
 // Makes the file shorter by free pages, in slices of a few, with a look at the clock between them. Returns how many; 0
 // when none is left. One transaction.
-std::uint64_t shrink_step(SQLite::Database& database, const Clock& clock);
+std::uint64_t shrink_step(SQLite::Database& database, const runtime::Clock& clock);
 
-}  // namespace server
+}  // namespace server::storage

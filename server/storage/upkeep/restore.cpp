@@ -17,7 +17,7 @@
 #include "server/storage/runs/run_store.hpp"
 #include "server/storage/upkeep/store_head.hpp"
 
-namespace server {
+namespace server::storage {
 namespace fs = std::filesystem;
 
 namespace {
@@ -43,7 +43,7 @@ void copy_database(const fs::path& from, const fs::path& to) {
   while (!copy.step(BackupCopy::kPagesAtOnce)) continue;
 }
 
-RestoredStore mark(Database& database, const fs::path& from, const Author& by) {
+RestoredStore mark(Database& database, const fs::path& from, const station::Author& by) {
   RestoredStore restored;
   restored.runs_interrupted = static_cast<std::int64_t>(RunStore{database, {}}.interrupt(by.at_us).size());
   SQLite::Database& handle = database.handle();
@@ -54,10 +54,11 @@ RestoredStore mark(Database& database, const fs::path& from, const Author& by) {
   execute(set, "restored_at_us", by.at_us);
   handle.exec("DELETE FROM page_session");     // of the time of the backup: users signed out since stay so
   handle.exec("UPDATE robot SET fluid = ''");  // SAFETY: robots may have been put into others since
-  AuditNote note;
+  station::AuditNote note;
   note.by = by;
   note.action = "store.restored";
-  note.detail = audit_detail({{"from", from.filename().string()}, {"store_id", std::to_string(restored.store_id)}});
+  note.detail =
+      station::audit_detail({{"from", from.filename().string()}, {"store_id", std::to_string(restored.store_id)}});
   AuditChain{handle}.append(note);
   transaction.commit();
   restored.runs = handle.execAndGet("SELECT count(*) FROM run").getInt64();
@@ -67,7 +68,7 @@ RestoredStore mark(Database& database, const fs::path& from, const Author& by) {
 
 }  // namespace
 
-RestoredStore restore_database(const fs::path& from, const fs::path& folder, const Author& by) {
+RestoredStore restore_database(const fs::path& from, const fs::path& folder, const station::Author& by) {
   const fs::path to = folder / "station.sqlite";
   check(from, to);
   const Draft draft{folder / "station.sqlite.part"};
@@ -93,4 +94,4 @@ RestoredStore restore_database(const fs::path& from, const fs::path& folder, con
   return restored;
 }
 
-}  // namespace server
+}  // namespace server::storage

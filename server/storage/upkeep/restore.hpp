@@ -6,7 +6,7 @@
 
 #include "server/station/state/audit_note.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct RestoredStore {
   std::uint64_t store_id = 0;  // a new one: robots see that this is not the store they talked to last
@@ -20,6 +20,6 @@ struct RestoredStore {
 // std::runtime_error that says why not and what to do: there is a database already, the backup is foreign, newer or
 // damaged, there is no room.
 RestoredStore restore_database(const std::filesystem::path& from, const std::filesystem::path& folder,
-                               const Author& by);
+                               const station::Author& by);
 
-}  // namespace server
+}  // namespace server::storage

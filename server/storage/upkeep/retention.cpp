@@ -9,7 +9,7 @@
 
 #include "server/storage/upkeep/purge.hpp"
 
-namespace server {
+namespace server::storage {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
 
@@ -33,7 +33,7 @@ struct Step {
 
 // On the disk thread. A step that fails leaves everything as it was.
 template <class Work>
-Step measured(const Clock& clock, Work work) {
+Step measured(const runtime::Clock& clock, Work work) {
   Step step;
   const std::int64_t begun_us = clock.steady_us();
   try {
@@ -51,7 +51,7 @@ std::uint64_t pragma(SQLite::Database& database, const char* name) {
 
 }  // namespace
 
-Retention::Retention(Clock& clock, Recorder& recorder, DatabaseReader& reader, const DiskWatch& disk_watch,
+Retention::Retention(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader, const DiskWatch& disk_watch,
                      OutsideReferences& references, RetentionPolicy policy)
     : clock_{clock},
       recorder_{recorder},
@@ -173,4 +173,4 @@ asio::awaitable<void> Retention::make_room_for_commits(std::int64_t took_us) {
   co_await clock_.sleep_for(behind ? kPauseWhenBehind : std::max(kPause, took));
 }
 
-}  // namespace server
+}  // namespace server::storage

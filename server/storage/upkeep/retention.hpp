@@ -18,7 +18,7 @@
 #include "server/storage/upkeep/disk_watch.hpp"
 #include "server/storage/upkeep/retention_plan.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct RetentionPolicy {
   std::uint32_t retention_days = 0;      // 0: for ever
@@ -35,7 +35,7 @@ struct RetentionCounters {
 
 class Retention {
  public:
-  Retention(Clock& clock, Recorder& recorder, DatabaseReader& reader, const DiskWatch& disk_watch,
+  Retention(runtime::Clock& clock, Recorder& recorder, DatabaseReader& reader, const DiskWatch& disk_watch,
             OutsideReferences& references, RetentionPolicy policy);
 
   // Before robots arrive: what is stored now, an earlier start has written.
@@ -63,7 +63,7 @@ class Retention {
   boost::asio::awaitable<std::int64_t> next_row();
   boost::asio::awaitable<void> make_room_for_commits(std::int64_t took_us);
 
-  Clock& clock_;
+  runtime::Clock& clock_;
   Recorder& recorder_;
   DatabaseReader& reader_;
   const DiskWatch& disk_watch_;
@@ -73,4 +73,4 @@ class Retention {
   RetentionCounters counters_;
 };
 
-}  // namespace server
+}  // namespace server::storage

@@ -6,7 +6,7 @@
 
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::uint64_t kOpenEnd = std::numeric_limits<std::int64_t>::max();
@@ -138,4 +138,4 @@ bool RetentionPlan::Step::is_free(std::int64_t boot_key, std::uint64_t next_seq,
   return !came_back && !is_held;
 }
 
-}  // namespace server
+}  // namespace server::storage

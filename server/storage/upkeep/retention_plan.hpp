@@ -21,7 +21,7 @@
 #include "server/storage/samples/interval_set.hpp"
 #include "server/storage/upkeep/sample_ages.hpp"
 
-namespace server {
+namespace server::storage {
 
 // A segment as retention sees it.
 struct StoredSegment {
@@ -82,4 +82,4 @@ class RetentionPlan {
   std::priority_queue<Part, std::vector<Part>, std::greater<>> parts_;
 };
 
-}  // namespace server
+}  // namespace server::storage

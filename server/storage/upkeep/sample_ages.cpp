@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace server {
+namespace server::storage {
 
 void SampleAges::begin(std::int64_t next_row) {
   begun_row_ = next_row;
@@ -28,4 +28,4 @@ AgeLimit SampleAges::limit() const {
   return limit;
 }
 
-}  // namespace server
+}  // namespace server::storage

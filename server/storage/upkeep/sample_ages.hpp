@@ -13,7 +13,7 @@
 
 #include "server/runtime/clock.hpp"
 
-namespace server {
+namespace server::storage {
 
 // Which samples are old enough.
 struct AgeLimit {
@@ -29,7 +29,7 @@ struct AgeLimit {
 class SampleAges {
  public:
   // The age that is asked for. It is kept to a hundredth.
-  SampleAges(const Clock& clock, std::int64_t age_us) : clock_{clock}, age_us_{age_us} {}
+  SampleAges(const runtime::Clock& clock, std::int64_t age_us) : clock_{clock}, age_us_{age_us} {}
 
   // The program writes rows from this one on.
   void begin(std::int64_t next_row);
@@ -44,11 +44,11 @@ class SampleAges {
     std::int64_t next_row = 0;
   };
 
-  const Clock& clock_;
+  const runtime::Clock& clock_;
   std::int64_t age_us_;
   std::int64_t begun_row_ = 0;
   std::int64_t utc_minus_steady_us_ = 0;  // at the beginning
   std::deque<Note> notes_;                // the first one is the latest that is old enough, if any is
 };
 
-}  // namespace server
+}  // namespace server::storage

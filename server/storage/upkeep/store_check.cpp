@@ -13,7 +13,7 @@
 #include "server/storage/samples/interval_set.hpp"
 #include "server/storage/samples/sample_scanner.hpp"
 
-namespace server {
+namespace server::storage {
 namespace {
 
 constexpr std::size_t kMostHoles = 100;  // reported of a boot
@@ -52,7 +52,7 @@ std::string difference(const RunDigest& found, const RunDigest& stored) {
 std::string extremes_query(std::int64_t version) {
   std::string found;
   std::string differ;
-  for (const SampleField& field : kSampleFields) {
+  for (const station::SampleField& field : station::kSampleFields) {
     if (field.since_schema > version) continue;
     found += fmt::format("{0}min({1}) AS low_{1}, max({1}) AS high_{1}", found.empty() ? "" : ", ", field.name);
     differ +=
@@ -343,4 +343,4 @@ Result<StoreFindings> check_store(SQLite::Database& database, const StoreCheck& 
   return findings;
 }
 
-}  // namespace server
+}  // namespace server::storage

@@ -14,7 +14,7 @@
 #include "server/runtime/result.hpp"
 #include "server/storage/runs/run.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct StoreCheck {
   std::optional<RunId> run;  // only this one, with the samples of its spans
@@ -35,4 +35,4 @@ struct StoreFindings {
 // not_found when there is no such run.
 Result<StoreFindings> check_store(SQLite::Database& database, const StoreCheck& options);
 
-}  // namespace server
+}  // namespace server::storage

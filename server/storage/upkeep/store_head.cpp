@@ -13,7 +13,7 @@
 #include "server/runtime/secrets.hpp"
 #include "server/storage/database/statement.hpp"
 
-namespace server {
+namespace server::storage {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
@@ -102,7 +102,7 @@ void save_head_file(const fs::path& database, const HeadFile& file) {
                                       {"audit_head", audit.entry == 0 ? json(nullptr) : json(text(audit))},
                                       {"at_us", file.at_us},
                                       {"losses", std::move(losses)}};
-  write_private(head_file_of(database), object.dump() + '\n');
+  runtime::write_private(head_file_of(database), object.dump() + '\n');
 }
 
 StoreHead read_store_head(SQLite::Database& database) {
@@ -128,7 +128,7 @@ std::optional<std::string> find_loss(SQLite::Database& database, const HeadFile&
         utc_text(file.at_us), before.store_id, before.commits, before.audit.entry, now.store_id);
   }
   const bool has_entry =
-      before.audit.entry == 0 || same(hash_of_entry(database, before.audit.entry), before.audit.hash);
+      before.audit.entry == 0 || runtime::same(hash_of_entry(database, before.audit.entry), before.audit.hash);
   if (now.commits >= before.commits && has_entry) return std::nullopt;
   return fmt::format(
       "the database has lost commits: at {} it held {} and the audit ended with entry {}, now there are {} and {}. The "
@@ -136,4 +136,4 @@ std::optional<std::string> find_loss(SQLite::Database& database, const HeadFile&
       utc_text(file.at_us), before.commits, short_text(before.audit), now.commits, short_text(now.audit));
 }
 
-}  // namespace server
+}  // namespace server::storage

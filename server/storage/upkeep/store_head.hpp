@@ -23,7 +23,7 @@
 #include "server/runtime/result.hpp"
 #include "server/storage/audit/audit_chain.hpp"
 
-namespace server {
+namespace server::storage {
 
 struct StoreHead {
   std::uint64_t store_id = 0;  // 0: none
@@ -58,4 +58,4 @@ StoreHead read_store_head(SQLite::Database& database);
 // What the database has lost since the head was written, as a sentence; none: it holds all that the head names.
 std::optional<std::string> find_loss(SQLite::Database& database, const HeadFile& file);
 
-}  // namespace server
+}  // namespace server::storage

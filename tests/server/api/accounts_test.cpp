@@ -16,7 +16,7 @@ class AccountsTest : public ApiTest {
     return ask("POST", "/api/v1/tokens", {{"name", name}, {"scopes", of}}).parsed();
   }
   // As after a restart.
-  Accounts stored() { return Accounts{loop, clock, recorder, folder.path()}; }
+  identity::Accounts stored() { return identity::Accounts{loop, clock, recorder, folder.path()}; }
   std::string everything_on_disk() const {
     std::string all;
     for (const char* name : {"station.sqlite", "station.sqlite-wal"}) {
@@ -47,21 +47,21 @@ TEST_F(AccountsTest, UsersAreAddedListedChangedAndRemoved) {
   EXPECT_FALSE(users[0].contains("password_hash"));
   EXPECT_EQ(ask("POST", "/api/v1/users/anna/change", {{"role", "admin"}}).parsed()["role"], "admin");
   EXPECT_EQ(ask("POST", "/api/v1/users/nobody/change", {{"role", "admin"}}).status, 404);
-  EXPECT_EQ(stored().users().at("anna").role, Role::admin);
+  EXPECT_EQ(stored().users().at("anna").role, identity::Role::admin);
   EXPECT_EQ(ask("POST", "/api/v1/users/anna/remove").status, 200);
   EXPECT_EQ(ask("POST", "/api/v1/users/anna/remove").status, 404);
   EXPECT_TRUE(stored().users().empty());
 }
 
 TEST_F(AccountsTest, ThereAreAtMostAHundredUsers) {
-  for (std::size_t i = 0; i < kMaxUsers; ++i) ASSERT_EQ(make_user("user" + std::to_string(i)), 201);
+  for (std::size_t i = 0; i < identity::kMaxUsers; ++i) ASSERT_EQ(make_user("user" + std::to_string(i)), 201);
   EXPECT_EQ(make_user("one-more"), 409);
 }
 
 TEST_F(AccountsTest, ATokenIsShownOnceAndStoredAsAHash) {
   const json made = make_token("logger");
   const std::string secret = made["secret"];
-  EXPECT_TRUE(is_secret(secret));
+  EXPECT_TRUE(runtime::is_secret(secret));
   const Answered list = ask("GET", "/api/v1/tokens");
   EXPECT_EQ(list.body.find(secret), std::string::npos);
   EXPECT_EQ(list.parsed()["tokens"][0]["scopes"], "read,stop");
@@ -69,7 +69,7 @@ TEST_F(AccountsTest, ATokenIsShownOnceAndStoredAsAHash) {
   EXPECT_EQ(everything_on_disk().find(secret), std::string::npos);
   EXPECT_NE(everything_on_disk().find("logger"), std::string::npos);
 
-  Accounts restarted = stored();
+  identity::Accounts restarted = stored();
   EXPECT_EQ(restarted.caller_of_token(secret)->actor, "token:logger");
   EXPECT_EQ(api->accounts().caller_of_token(secret)->actor, "token:logger");
   clock.run_for(2min);
@@ -118,7 +118,7 @@ TEST_F(AccountsTest, AFailingDiskSignsNobodyOutAndNobodyIn) {
 TEST_F(AccountsTest, ARobotIsEnrolledRevokedAndEnrolledAgain) {
   const Answered made = ask("POST", "/api/v1/enrolments", {{"robot_id", "rheo-1"}});
   ASSERT_EQ(made.status, 201) << made.body;
-  EXPECT_TRUE(is_secret(made.parsed()["secret"]));
+  EXPECT_TRUE(runtime::is_secret(made.parsed()["secret"]));
   EXPECT_EQ(made.parsed()["enrolled_by"], "token:local");
   EXPECT_EQ(ask("POST", "/api/v1/enrolments", {{"robot_id", "rheo-1"}}).status, 409);
   EXPECT_EQ(ask("POST", "/api/v1/enrolments", {{"robot_id", "Rheo 1"}}).status, 422);

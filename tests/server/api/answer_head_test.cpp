@@ -11,13 +11,13 @@
 namespace server {
 namespace {
 
-class NoStream : public BodyStream {
+class NoStream : public http::BodyStream {
  public:
   boost::asio::awaitable<Result<std::optional<std::string>>> next() override { co_return std::nullopt; }
 };
 
-Response with_body(std::string body) {
-  Response response;
+http::Response with_body(std::string body) {
+  http::Response response;
   response.body = std::move(body);
   return response;
 }
@@ -59,7 +59,7 @@ TEST(AnswerHeadTest, ABodyHasItsLength) {
 
 // Its length would be that of the file which the client has.
 TEST(AnswerHeadTest, AnAnswer304HasNoLength) {
-  Response response;
+  http::Response response;
   response.status = 304;
   const std::string head = answer_head(response, {.keep_alive = true});
   EXPECT_EQ(field(head, "Content-Length"), kAbsent);
@@ -67,20 +67,20 @@ TEST(AnswerHeadTest, AnAnswer304HasNoLength) {
 }
 
 TEST(AnswerHeadTest, OnlySomeAnswersHaveABody) {
-  for (int status : {100, 101, 204, 304}) EXPECT_FALSE(may_have_body(status)) << status;
-  for (int status : {200, 201, 303, 404, 503}) EXPECT_TRUE(may_have_body(status)) << status;
+  for (int status : {100, 101, 204, 304}) EXPECT_FALSE(http::may_have_body(status)) << status;
+  for (int status : {200, 201, 303, 404, 503}) EXPECT_TRUE(http::may_have_body(status)) << status;
 }
 
 // RFC 9110, 7.8: who names a protocol to upgrade to, says so under Connection.
 TEST(AnswerHeadTest, AnUpgradeIsNamedUnderConnection) {
-  Response response;
+  http::Response response;
   response.headers.emplace_back("Upgrade", "websocket");
   EXPECT_EQ(field(answer_head(response, {.keep_alive = true}), "Connection"), (Field{1, "upgrade"}));
   EXPECT_EQ(field(answer_head(response, {}), "Connection"), (Field{1, "close, upgrade"}));
 }
 
 TEST(AnswerHeadTest, AStreamIsChunkedAndInHttp10EndsWithItsConnection) {
-  Response response;
+  http::Response response;
   response.stream = std::make_unique<NoStream>();
   const std::string chunked = answer_head(response, {.keep_alive = true});
   EXPECT_EQ(field(chunked, "Transfer-Encoding"), (Field{1, "chunked"}));
@@ -93,13 +93,13 @@ TEST(AnswerHeadTest, AStreamIsChunkedAndInHttp10EndsWithItsConnection) {
 }
 
 TEST(AnswerHeadTest, SaysWhatBecomesOfTheConnectionWhereThatIsNotTheRule) {
-  EXPECT_EQ(field(answer_head({}, {.keep_alive = true}), "Connection"), kAbsent);
-  EXPECT_EQ(field(answer_head({}, {}), "Connection"), (Field{1, "close"}));
-  EXPECT_EQ(field(answer_head({}, {.version = 10, .keep_alive = true}), "Connection"), (Field{1, "keep-alive"}));
+  EXPECT_EQ(field(http::answer_head({}, {.keep_alive = true}), "Connection"), kAbsent);
+  EXPECT_EQ(field(http::answer_head({}, {}), "Connection"), (Field{1, "close"}));
+  EXPECT_EQ(field(http::answer_head({}, {.version = 10, .keep_alive = true}), "Connection"), (Field{1, "keep-alive"}));
 }
 
 TEST(AnswerHeadTest, NothingIsCachedUnlessTheResponseSaysSo) {
-  Response response;
+  http::Response response;
   EXPECT_EQ(field(answer_head(response, {}), "Cache-Control"), (Field{1, "no-store"}));
   response.headers.emplace_back("Cache-Control", "no-cache");
   response.headers.emplace_back("ETag", "\"1\"");
@@ -110,7 +110,7 @@ TEST(AnswerHeadTest, NothingIsCachedUnlessTheResponseSaysSo) {
 // A Host of any other form would say more in the policy than the origin of /live.
 TEST(AnswerHeadTest, ThePolicyNamesAPlainHostOnly) {
   const auto policy = [](const std::string& host, bool is_secure) {
-    return field(answer_head({}, {.is_secure = is_secure, .host = host}), "Content-Security-Policy").second;
+    return field(http::answer_head({}, {.is_secure = is_secure, .host = host}), "Content-Security-Policy").second;
   };
   EXPECT_NE(policy("lab.local:8080", false).find("connect-src 'self' ws://lab.local:8080;"), std::string::npos);
   EXPECT_NE(policy("lab.local", true).find("connect-src 'self' wss://lab.local;"), std::string::npos);
@@ -121,7 +121,7 @@ TEST(AnswerHeadTest, ThePolicyNamesAPlainHostOnly) {
 
 TEST(AnswerHeadTest, OnlyTlsAsksForTlsNextTimeAndNotOfLocalhost) {
   const auto said = [](const std::string& host, bool is_secure) {
-    return field(answer_head({}, {.is_secure = is_secure, .host = host}), "Strict-Transport-Security").first;
+    return field(http::answer_head({}, {.is_secure = is_secure, .host = host}), "Strict-Transport-Security").first;
   };
   EXPECT_EQ(said("lab.local", true), 1);
   EXPECT_EQ(said("lab.local", false), 0);

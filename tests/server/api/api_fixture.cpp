@@ -24,13 +24,13 @@ TemporaryFolder::TemporaryFolder() {
 TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
 
 namespace {
-asio::awaitable<void> start(RecordingParts& recording, Station& station, bool& started) {
-  const RestoredState restored = co_await recording.open();
+asio::awaitable<void> start(storage::RecordingParts& recording, station::Station& station, bool& started) {
+  const storage::RestoredState restored = co_await recording.open();
   station.restore(restored.robots, restored.pending_stops);
   started = true;
 }
 
-RecorderOptions in_folder(RecorderOptions options, const std::filesystem::path& folder) {
+storage::RecorderOptions in_folder(storage::RecorderOptions options, const std::filesystem::path& folder) {
   const std::filesystem::path own = folder / "station.sqlite";
   if (!options.path.empty()) std::filesystem::copy_file(options.path, own);
   options.path = own;
@@ -39,7 +39,7 @@ RecorderOptions in_folder(RecorderOptions options, const std::filesystem::path& 
 
 }  // namespace
 
-ApiTest::ApiTest(Config of_station, RecorderOptions of_recorder)
+ApiTest::ApiTest(config::Config of_station, storage::RecorderOptions of_recorder)
     : config{std::move(of_station)},
       recording{loop, clock, disk, readers, exports, checkpoints, in_folder(std::move(of_recorder), folder.path())} {
   clock.add_worker(disk);
@@ -53,8 +53,8 @@ ApiTest::ApiTest(Config of_station, RecorderOptions of_recorder)
   bool started = false;
   tasks.spawn("start", start(recording, station, started));
   EXPECT_TRUE(clock.run_until([&] { return started; }, 10s));
-  models = std::make_unique<ModelSender>(loop, tasks, clock, station, recording.fluid_models.in_force());
-  ApiOptions options;
+  models = std::make_unique<station::ModelSender>(loop, tasks, clock, station, recording.fluid_models.in_force());
+  api::ApiOptions options;
   options.endpoint = {asio::ip::address_v4::loopback(), 0};
   options.data_dir = folder.path();
   options.hosts = {"station.lab"};
@@ -63,7 +63,7 @@ ApiTest::ApiTest(Config of_station, RecorderOptions of_recorder)
   options.robots_address = "127.0.0.1:7070";
   options.security = &security;
   options.password_cost = kCheapPasswords;
-  api = std::make_unique<ApiServer>(loop, tasks, clock, options, station, live, recording, analysis);
+  api = std::make_unique<api::ApiServer>(loop, tasks, clock, options, station, live, recording, analysis);
   clock.add_worker(api->logins().worker());
   recording.spawn(tasks);
   tasks.spawn("live feed", live.run());
@@ -85,7 +85,7 @@ TestRobot& ApiTest::connect_robot() {
   return *robot;
 }
 
-asio::awaitable<void> ApiTest::answer(Request request, std::shared_ptr<std::optional<Answered>> into) {
+asio::awaitable<void> ApiTest::answer(http::Request request, std::shared_ptr<std::optional<Answered>> into) {
   Answered answered;
   answered.response = co_await api->router().dispatch(std::move(request));
   answered.status = answered.response.status;
@@ -100,14 +100,14 @@ asio::awaitable<void> ApiTest::answer(Request request, std::shared_ptr<std::opti
 
 std::shared_ptr<std::optional<Answered>> ApiTest::begin(const std::string& method, const std::string& target,
                                                         const json& body, std::map<std::string, std::string> headers) {
-  Request request;
+  http::Request request;
   request.method = method;
   request.target = target;
   request.headers = std::move(headers);
   if (!body.is_null()) request.body = body.dump();
   request.actor = "token:local";
   request.peer = "127.0.0.1";
-  request.caller = Caller{"token:local", "", scopes, session, standing, "127.0.0.1"};
+  request.caller = identity::Caller{"token:local", "", scopes, session, standing, "127.0.0.1"};
   auto into = std::make_shared<std::optional<Answered>>();
   tasks.spawn("ask", answer(std::move(request), into));
   clock.settle();

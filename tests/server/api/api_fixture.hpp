@@ -18,7 +18,7 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 
 // A hash that takes no time; what it costs is no matter of these tests.
-inline constexpr PasswordCost kCheapPasswords{1, 8192};
+inline constexpr runtime::PasswordCost kCheapPasswords{1, 8192};
 
 class TemporaryFolder {
  public:
@@ -36,14 +36,14 @@ class TemporaryFolder {
 struct Answered {
   int status = 0;
   std::string body;
-  Response response;
+  http::Response response;
   json parsed() const { return json::parse(body); }
 };
 
 class ApiTest : public ::testing::Test {
  public:
   // The database is in `folder`: a new one, or a copy of the one that `of_recorder` names.
-  explicit ApiTest(Config of_station = {}, RecorderOptions of_recorder = {});
+  explicit ApiTest(config::Config of_station = {}, storage::RecorderOptions of_recorder = {});
   ~ApiTest() override;
 
  protected:
@@ -60,29 +60,30 @@ class ApiTest : public ::testing::Test {
   void make_samples(TestRobot& robot, std::uint64_t first_seq, pb_size_t count);
   std::string token() const;
 
-  Scopes scopes = Scopes::of(Role::admin);  // of who asks
-  std::uint64_t session = 0;                // likewise: of a page
-  Config config;                            // of the ports
+  identity::Scopes scopes = identity::Scopes::of(identity::Role::admin);  // of who asks
+  std::uint64_t session = 0;                                              // likewise: of a page
+  config::Config config;                                                  // of the ports
   TemporaryFolder folder;
   boost::asio::io_context loop{1};
-  std::shared_ptr<Standing> standing = std::make_shared<Standing>(loop);  // of who asks
-  WorkerThread disk{"disk"}, readers{"readers"}, exports{"exports"}, checkpoints{"checkpoints"}, maths{"maths"};
+  std::shared_ptr<identity::Standing> standing = std::make_shared<identity::Standing>(loop);  // of who asks
+  runtime::WorkerThread disk{"disk"}, readers{"readers"}, exports{"exports"}, checkpoints{"checkpoints"},
+      maths{"maths"};
   VirtualClock clock{loop};
-  TaskGroup tasks{loop};
-  Station station{loop, clock, config.envelope, LinkTimes{}};
-  RecordingParts recording;
-  std::unique_ptr<ModelSender> models;
-  Recorder& recorder{recording.recorder};
-  AnalysisService analysis{recording.history, maths};
-  LiveFeed live{clock};
-  TransportSecurity security{clock, config};
-  RobotListener robots{
+  runtime::TaskGroup tasks{loop};
+  station::Station station{loop, clock, config.envelope, config::LinkTimes{}};
+  storage::RecordingParts recording;
+  std::unique_ptr<station::ModelSender> models;
+  storage::Recorder& recorder{recording.recorder};
+  analysis::AnalysisService analysis{recording.history, maths};
+  live::LiveFeed live{clock};
+  net::TransportSecurity security{clock, config};
+  link::RobotListener robots{
       loop, clock, tasks, station, recorder, {boost::asio::ip::address_v4::loopback(), 0}, false, security.robots()};
-  std::unique_ptr<ApiServer> api;
+  std::unique_ptr<api::ApiServer> api;
   std::unique_ptr<TestRobot> robot;
 
  private:
-  boost::asio::awaitable<void> answer(Request request, std::shared_ptr<std::optional<Answered>> into);
+  boost::asio::awaitable<void> answer(http::Request request, std::shared_ptr<std::optional<Answered>> into);
 };
 
 // A client that sends raw bytes and lets the station run while it waits.

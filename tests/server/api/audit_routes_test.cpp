@@ -40,8 +40,8 @@ class AuditRoutesTest : public ApiTest {
     return end(asked);
   }
   void expect_whole_chain() {
-    SQLite::Database database = open_for_reading(recorder.path());
-    EXPECT_THAT(check_audit(database, {}).faults, IsEmpty());
+    SQLite::Database database = storage::open_for_reading(recorder.path());
+    EXPECT_THAT(storage::check_audit(database, {}).faults, IsEmpty());
   }
 };
 
@@ -88,12 +88,12 @@ TEST_F(AuditRoutesTest, WhatIsRefusedIsThereWithTheReason) {
   EXPECT_EQ(command({{"kind", "fly"}}).status, 422);
   EXPECT_THAT(latest("command.refused")["detail"]["problem"], HasSubstr("fly"));
   const json force{{"action", "force"}, {"reason", "he is asleep"}};
-  scopes = Scopes::of(Role::operator_);
+  scopes = identity::Scopes::of(identity::Role::operator_);
   EXPECT_EQ(ask("POST", "/api/v1/robots/r1/control", force).status, 403);
   EXPECT_EQ(ask("GET", "/api/v1/audit").status, 403);
-  scopes = Scopes::of(Role::viewer);
+  scopes = identity::Scopes::of(identity::Role::viewer);
   EXPECT_EQ(ask("POST", kCommands, {{"kind", "set_duty"}, {"duty", 0.1}}).status, 403);
-  scopes = Scopes::of(Role::admin);
+  scopes = identity::Scopes::of(identity::Role::admin);
   EXPECT_EQ(latest("control.refused")["detail"]["reason"], "not_permitted");
   EXPECT_EQ(latest("request.refused")["subject"], kCommands);
   EXPECT_EQ(latest("request.refused")["detail"], (json{{"method", "POST"}, {"needs", "command"}}));

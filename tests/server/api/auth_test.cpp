@@ -13,7 +13,8 @@ constexpr std::uint64_t kStore = 0xfedcba9876543210;
 
 // Credentials over the database of a station: made again, they are those of a station that was started again.
 struct Credentials {
-  Credentials(boost::asio::io_context& loop, Clock& clock, Recorder& recorder, const std::filesystem::path& folder)
+  Credentials(boost::asio::io_context& loop, runtime::Clock& clock, storage::Recorder& recorder,
+              const std::filesystem::path& folder)
       : accounts{loop, clock, recorder, folder}, auth{loop, clock, accounts, folder, kStore} {}
   std::string log_in() { return *auth.log_in(auth.new_login_code(), "127.0.0.1", "a browser"); }
   std::string actor(const std::string& session) {
@@ -21,8 +22,8 @@ struct Credentials {
     return caller ? caller->actor : "";
   }
 
-  Accounts accounts;
-  Auth auth;
+  identity::Accounts accounts;
+  identity::Auth auth;
 };
 
 class AuthTest : public ApiTest {
@@ -63,7 +64,7 @@ TEST_F(AuthTest, MakesATokenThatOnlyItsOwnerReads) {
   EXPECT_EQ(token().size(), 43U);  // 256 bits
   EXPECT_EQ(mode(), 0600U);
   EXPECT_EQ(station->auth.caller_of_token(token())->actor, "token:local");
-  EXPECT_EQ(station->auth.caller_of_token(token())->role(), Role::admin);
+  EXPECT_EQ(station->auth.caller_of_token(token())->role(), identity::Role::admin);
   EXPECT_FALSE(station->auth.caller_of_token(""));
   EXPECT_FALSE(station->auth.caller_of_token(token() + "x"));
   EXPECT_FALSE(std::filesystem::exists(file.string() + ".new"));
@@ -89,9 +90,9 @@ TEST_F(AuthTest, ReplacesWhatIsNoToken) {
 }
 
 TEST_F(AuthTest, SaysWhichFileItCannotWrite) {
-  Accounts accounts{loop, clock, recorder, home.path()};
+  identity::Accounts accounts{loop, clock, recorder, home.path()};
   try {
-    const Auth auth{loop, clock, accounts, home.path() / "missing", kStore};
+    const identity::Auth auth{loop, clock, accounts, home.path() / "missing", kStore};
     FAIL();
   } catch (const std::exception& error) {
     EXPECT_NE(std::string{error.what()}.find("rheonaut.token"), std::string::npos) << error.what();
@@ -100,14 +101,14 @@ TEST_F(AuthTest, SaysWhichFileItCannotWrite) {
 
 TEST_F(AuthTest, ACodeOpensOneSessionOnce) {
   auto* const station = start();
-  Auth& auth = station->auth;
+  identity::Auth& auth = station->auth;
   const std::string code = auth.new_login_code();
   EXPECT_FALSE(auth.log_in("guess", "", ""));
   const auto session = auth.log_in(code, "", "");
   ASSERT_TRUE(session);
   EXPECT_FALSE(auth.log_in(code, "", ""));
   EXPECT_EQ(station->actor(*session), "session:1");
-  EXPECT_EQ(auth.caller_of_session(*session)->role(), Role::admin);
+  EXPECT_EQ(auth.caller_of_session(*session)->role(), identity::Role::admin);
   EXPECT_FALSE(auth.caller_of_session(code));
   EXPECT_FALSE(auth.caller_of_token(*session));
 }
@@ -128,9 +129,9 @@ TEST_F(AuthTest, ASessionOutlivesTheStationAndItsNumberIsNotGivenTwice) {
 
 TEST_F(AuthTest, TheSessionsOfAnOlderStationAreTakenOverOnce) {
   const std::filesystem::path old = home.path() / "rheonaut.sessions";
-  const std::string secret = random_secret();
+  const std::string secret = runtime::random_secret();
   std::string hex;
-  for (const unsigned char byte : hash_of(secret)) hex += fmt::format("{:02x}", byte);
+  for (const unsigned char byte : runtime::hash_of(secret)) hex += fmt::format("{:02x}", byte);
   const std::int64_t end_us = clock.utc_us() + 3'600'000'000;
   std::ofstream{old} << "7 " << end_us << ' ' << hex << "\n8 " << end_us << " zz\n";
   auto* station = start();
@@ -194,14 +195,14 @@ TEST_F(AuthTest, AnOpenPageUsesItsSession) {
 
 TEST_F(AuthTest, ForgetsTheOldestWhenThereAreTooMany) {
   auto* const station = start();
-  Auth& auth = station->auth;
+  identity::Auth& auth = station->auth;
   const std::string first_code = auth.new_login_code();
-  for (std::size_t i = 0; i < kMaxLoginCodes; ++i) auth.new_login_code();
+  for (std::size_t i = 0; i < identity::kMaxLoginCodes; ++i) auth.new_login_code();
   EXPECT_FALSE(auth.log_in(first_code, "", ""));
   const std::string first = station->log_in();
-  for (std::size_t i = 0; i < kMaxSessionsOfLinks; ++i) station->log_in();
+  for (std::size_t i = 0; i < identity::kMaxSessionsOfLinks; ++i) station->log_in();
   EXPECT_EQ(station->actor(first), "");
-  EXPECT_EQ(station->accounts.sessions().size(), kMaxSessionsOfLinks);
+  EXPECT_EQ(station->accounts.sessions().size(), identity::kMaxSessionsOfLinks);
 }
 
 TEST_F(AuthTest, EachStationHasACookieOfItsOwnName) {
@@ -210,36 +211,36 @@ TEST_F(AuthTest, EachStationHasACookieOfItsOwnName) {
   EXPECT_EQ(
       station->auth.cookie("x", false).find("rheonaut_session_fedcba9876543210=x; HttpOnly; SameSite=Strict; Path=/"),
       0U);
-  const Auth other{loop, clock, station->accounts, home.path(), kStore + 1};
+  const identity::Auth other{loop, clock, station->accounts, home.path(), kStore + 1};
   EXPECT_NE(other.cookie_name(), station->auth.cookie_name());
 }
 
 class RequestGuardTest : public AuthTest {
  protected:
-  Request request(const std::string& method, const std::string& target) const {
-    Request made;
+  http::Request request(const std::string& method, const std::string& target) const {
+    http::Request made;
     made.method = method;
     made.target = target;
     made.headers["host"] = "localhost:8080";
     return made;
   }
-  Request with_token(const std::string& method, const std::string& target) const {
-    Request made = request(method, target);
+  http::Request with_token(const std::string& method, const std::string& target) const {
+    http::Request made = request(method, target);
     made.headers["authorization"] = "Bearer " + token();
     return made;
   }
-  Request with_cookie(const std::string& method, const std::string& target) const {
-    Request made = request(method, target);
+  http::Request with_cookie(const std::string& method, const std::string& target) const {
+    http::Request made = request(method, target);
     made.headers["cookie"] = "theme=dark; rheonaut_session_fedcba9876543210=" + session;
     return made;
   }
-  int status(const Request& asked) const {
+  int status(const http::Request& asked) const {
     const auto admitted = guard.admit(asked);
     return admitted ? 200 : admitted.error().status;
   }
 
   Credentials* station = start();
-  RequestGuard guard{station->auth, {"Station.Lab", "192.168.1.5"}};
+  http::RequestGuard guard{station->auth, {"Station.Lab", "192.168.1.5"}};
   std::string session = station->log_in();
 };
 
@@ -250,7 +251,7 @@ TEST_F(RequestGuardTest, NamesWhoAsks) {
 }
 
 TEST_F(RequestGuardTest, TakesTheCookieOfAnOlderStationAndNotThatOfAnother) {
-  Request asked = request("GET", "/api/v1/robots");
+  http::Request asked = request("GET", "/api/v1/robots");
   asked.headers["cookie"] = "rheonaut_session=" + session;
   EXPECT_EQ(status(asked), 200);
   asked.headers["cookie"] = "rheonaut_session_fedcba9876543211=" + session;
@@ -271,7 +272,7 @@ TEST_F(RequestGuardTest, EverythingWithDataNeedsACredential) {
   for (const char* target : {"/", "/login?code=x", "/assets/main.js"}) {
     EXPECT_EQ(status(request("GET", target)), 200) << target;
   }
-  Request wrong = with_cookie("GET", "/api/v1/robots");
+  http::Request wrong = with_cookie("GET", "/api/v1/robots");
   for (const char* credential : {"Bearer wrong", "Bearer ", "Basic abc", "Bearer"}) {
     wrong.headers["authorization"] = credential;
     EXPECT_EQ(status(wrong), 401) << credential;
@@ -279,7 +280,7 @@ TEST_F(RequestGuardTest, EverythingWithDataNeedsACredential) {
 }
 
 TEST_F(RequestGuardTest, AnswersOnlyToItsOwnNames) {
-  Request asked = with_token("GET", "/api/v1/robots");
+  http::Request asked = with_token("GET", "/api/v1/robots");
   for (const char* host : {"localhost", "LOCALHOST:1", "127.0.0.1:8080", "127.9.9.9", "[::1]:8080", "station.lab:8080",
                            "STATION.LAB", "192.168.1.5"}) {
     asked.headers["host"] = host;
@@ -294,17 +295,17 @@ TEST_F(RequestGuardTest, AnswersOnlyToItsOwnNames) {
 
 TEST_F(RequestGuardTest, RefusesOtherOriginsForChangesForSigningInAndForLive) {
   for (const char* origin : {"http://evil.example", "null", "http://localhost:8081", "https://localhost:8080"}) {
-    Request post = with_token("POST", "/api/v1/emergency-stop");
+    http::Request post = with_token("POST", "/api/v1/emergency-stop");
     post.headers["origin"] = origin;
     EXPECT_EQ(status(post), 403) << origin;
-    Request sign_in = request("POST", "/api/v1/login");
+    http::Request sign_in = request("POST", "/api/v1/login");
     sign_in.headers["origin"] = origin;
     EXPECT_EQ(status(sign_in), 403) << origin;
-    Request live = with_cookie("GET", "/live");
+    http::Request live = with_cookie("GET", "/live");
     live.headers["origin"] = origin;
     EXPECT_EQ(status(live), 403) << origin;
   }
-  Request own = with_cookie("GET", "/live");
+  http::Request own = with_cookie("GET", "/live");
   own.headers["origin"] = "http://localhost:8080";
   EXPECT_EQ(status(own), 200);
   EXPECT_EQ(status(with_cookie("GET", "/live")), 200);
@@ -312,7 +313,7 @@ TEST_F(RequestGuardTest, RefusesOtherOriginsForChangesForSigningInAndForLive) {
 
 TEST_F(RequestGuardTest, AChangeByCookieMustSayThatItComesFromTheStationsPage) {
   EXPECT_EQ(status(with_cookie("POST", "/api/v1/emergency-stop")), 403);
-  Request post = with_cookie("POST", "/api/v1/emergency-stop");
+  http::Request post = with_cookie("POST", "/api/v1/emergency-stop");
   post.headers["sec-fetch-site"] = "cross-site";
   EXPECT_EQ(status(post), 403);
   post.headers["sec-fetch-site"] = "same-origin";
@@ -324,7 +325,7 @@ TEST_F(RequestGuardTest, AChangeByCookieMustSayThatItComesFromTheStationsPage) {
 }
 
 TEST_F(RequestGuardTest, ABodyMustBeJson) {
-  for (Request post : {with_token("POST", "/api/v1/runs"), request("POST", "/api/v1/login")}) {
+  for (http::Request post : {with_token("POST", "/api/v1/runs"), request("POST", "/api/v1/login")}) {
     post.body = "{}";
     EXPECT_EQ(status(post), 415);
     for (const char* type : {"application/json", "application/json; charset=utf-8", "Application/JSON"}) {

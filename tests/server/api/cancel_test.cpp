@@ -45,7 +45,7 @@ class QuietClient {
   int socket_;
 };
 
-boost::asio::awaitable<void> hold(WorkerThread& worker, std::shared_future<void> until) {
+boost::asio::awaitable<void> hold(runtime::WorkerThread& worker, std::shared_future<void> until) {
   auto job = [until] { until.wait(); };
   co_await worker.run(std::move(job));
 }
@@ -53,7 +53,7 @@ boost::asio::awaitable<void> hold(WorkerThread& worker, std::shared_future<void>
 class CancelTest : public ApiTest {
  protected:
   // The worker does nothing more until go_on().
-  void stop_working(WorkerThread& worker) {
+  void stop_working(runtime::WorkerThread& worker) {
     gate_ = std::promise<void>{};
     tasks.spawn("gate", hold(worker, gate_.get_future().share()));
     loop.poll();
@@ -158,7 +158,7 @@ TEST_F(CancelTest, AStopIsAnsweredBesideQuestionsThatAreCancelled) {
   QuietClient stop{api->port()};
   std::promise<void> gate;
   const std::shared_future<void> opened = gate.get_future().share();
-  for (WorkerThread* worker : {&readers, &exports}) tasks.spawn("gate", hold(*worker, opened));
+  for (runtime::WorkerThread* worker : {&readers, &exports}) tasks.spawn("gate", hold(*worker, opened));
   question.send(head("GET /api/v1/runs/1/overview"));
   file.send(head("GET /api/v1/runs/1/samples.mat"));
   poll_until([&] { return questions() == asked_before + 1 && export_questions() == exported_before + 1; });
@@ -209,7 +209,7 @@ TEST_F(CancelTest, APostIsCarriedOutThoughItsClientHasGone) {
   make_run();
   QuietClient client{api->port()};
   stop_working(disk);
-  RobotEvent event;  // that the run's end must wait for
+  station::RobotEvent event;  // that the run's end must wait for
   event.robot_id = "r1";
   event.kind = "limit";
   recorder.on_event(*station.find("r1"), event);

@@ -44,12 +44,12 @@ TEST_F(CommandRoutesTest, ARetriedPostNeverSendsTwice) {
 // The memory of another station: only the database knows the command.
 TEST_F(CommandRoutesTest, WhatEndedInAnEarlierLifeOfTheStationIsFoundInTheDatabase) {
   connect_robot();
-  CommandRecord old;
-  old.id = command_id_of("r1", "token:local", "try-1");
+  station::CommandRecord old;
+  old.id = station::command_id_of("r1", "token:local", "try-1");
   old.robot_id = "r1";
   old.kind = "set_duty";
   old.arguments = R"({"duty":0.25})";
-  old.state = CommandState::verified;
+  old.state = station::CommandState::verified;
   old.submitted_at_us = old.ended_at_us = clock.utc_us();
   recorder.on_command(old);
   clock.run_for(1s);
@@ -70,12 +70,12 @@ TEST_F(CommandRoutesTest, AStopIsCarriedOutWhateverItsKey) {
 // SAFETY: a key that the database alone remembers is that of no press of now.
 TEST_F(CommandRoutesTest, AStopOfAnEarlierLifeIsNoAnswerToAStopOfNow) {
   connect_robot();
-  CommandRecord old;
-  old.id = command_id_of("r1", "token:local", "press-1");
+  station::CommandRecord old;
+  old.id = station::command_id_of("r1", "token:local", "press-1");
   old.robot_id = "r1";
   old.kind = "emergency_stop";
   old.arguments = "{}";
-  old.state = CommandState::verified;
+  old.state = station::CommandState::verified;
   old.submitted_at_us = old.ended_at_us = clock.utc_us();
   recorder.on_command(old);
   clock.run_for(1s);
@@ -210,7 +210,7 @@ TEST_F(CommandRoutesTest, ControlIsTakenAndGivenBack) {
 
 TEST_F(CommandRoutesTest, ARefusalNamesTheHolderOfControl) {
   connect_robot();
-  ASSERT_TRUE(station.control({"r1", "session:7", "", ControlAction::take, kControlLease, ""}));
+  ASSERT_TRUE(station.control({"r1", "session:7", "", station::ControlAction::take, station::kControlLease, ""}));
   const Answered answered = ask("POST", kCommands, duty_);
   EXPECT_EQ(answered.status, 409);
   EXPECT_EQ(answered.parsed()["reason"], "not_in_control");

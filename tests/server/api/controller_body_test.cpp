@@ -18,13 +18,14 @@ using nlohmann::json;
 json discretised(control::DiscretisationMethod method) {
   control::DiscretisationOptions options;
   options.method = method;
-  return json::parse(json_of(control::discretise(control::FopdController{65.0028, 0.0305, 0.6524}, options)).dump());
+  return json::parse(
+      analysis::json_of(control::discretise(control::FopdController{65.0028, 0.0305, 0.6524}, options)).dump());
 }
 
 json body_of(json controller) { return {{"controller", std::move(controller)}, {"duty_min", -1}, {"duty_max", 1}}; }
 
 Result<protocol::Controller> read(const json& body, const protocol::Controller* in_force = nullptr) {
-  return controller_from(Members{body}, in_force);
+  return controller_from(api::Members{body}, in_force);
 }
 
 // docs/protocol.md: u = direct · e + Σ residue_i · x_i + Σ biquads.
@@ -92,8 +93,8 @@ TEST(ControllerBody, ComputesTheChecksumOfTheProtocolAndAnIdFromIt) {
   EXPECT_EQ(controller->controller_id, 3'099'722'980U & 0xFF'FFFFU);
   EXPECT_EQ(read({{"controller", given}, {"controller_id", 9}})->controller_id, 9U);
 
-  const json told = controller_json(*controller);
-  EXPECT_TRUE(is_same(*read({{"controller", told}}), *controller)) << "what the robot says can be sent back";
+  const json told = storage::controller_json(*controller);
+  EXPECT_TRUE(station::is_same(*read({{"controller", told}}), *controller)) << "what the robot says can be sent back";
   json changed = told;
   changed["kp"] = 60;
   EXPECT_EQ(read({{"controller", changed}}).error().reason, "checksum");

@@ -23,7 +23,7 @@ json printed() {
 
 class FluidModelsRouteTest : public ApiTest {
  protected:
-  FluidModelsRouteTest() : ApiTest{parse_config("[fluids.oil]\n", "test.toml")} { connect_robot(); }
+  FluidModelsRouteTest() : ApiTest{config::parse_config("[fluids.oil]\n", "test.toml")} { connect_robot(); }
   json model_of(const std::string& wanted) {
     for (const json& fluid : ask("GET", "/api/v1/fluids").parsed()["fluids"]) {
       if (fluid["fluid"] == wanted) return fluid["model"];
@@ -36,15 +36,15 @@ TEST(ParseFluidModel, TakesWhatTheToolPrintsAndKeepsTheFloatsAndTheRest) {
   json body = printed();
   body["comment"] = "at 20 °C";
   body["model_gain_m_s"][2] = -0.0;
-  const auto model = parse_fluid_model(body.dump());
+  const auto model = api::parse_fluid_model(body.dump());
   ASSERT_TRUE(model) << model.error().detail;
   EXPECT_THAT(model->gain_m_s, ElementsAre(0.1F, -0.33333334F, 0.0F, 10.0F));
   EXPECT_THAT(model->time_constant_s, ElementsAre(0.03F, 0.5F, 3.0F, 1000.0F));
   EXPECT_FALSE(std::signbit(model->gain_m_s[2]));
   EXPECT_EQ(model->fit_error, 0.0021);
   EXPECT_EQ(json::parse(model->document)["plant"]["kp"], 0.13);
-  EXPECT_EQ(to_json(*model)["comment"], "at 20 °C");
-  EXPECT_EQ(to_json(*model)["model_gain_m_s"][1], -0.33333334) << "the shortest decimal of what is sent";
+  EXPECT_EQ(api::to_json(*model)["comment"], "at 20 °C");
+  EXPECT_EQ(api::to_json(*model)["model_gain_m_s"][1], -0.33333334) << "the shortest decimal of what is sent";
 }
 
 TEST(ParseFluidModel, RefusesWhatARobotWouldRefuseAndAFitThatMakesItsUncertaintyALie) {
@@ -75,7 +75,7 @@ TEST(ParseFluidModel, RefusesWhatARobotWouldRefuseAndAFitThatMakesItsUncertainty
   for (const Case& bad : cases) {
     json body = printed();
     body[bad.member] = bad.value;
-    const auto model = parse_fluid_model(body.dump());
+    const auto model = api::parse_fluid_model(body.dump());
     ASSERT_FALSE(model) << bad.words;
     EXPECT_EQ(model.error().code, bad.code) << model.error().detail;
     EXPECT_THAT(model.error().detail, HasSubstr(bad.words));
@@ -83,7 +83,7 @@ TEST(ParseFluidModel, RefusesWhatARobotWouldRefuseAndAFitThatMakesItsUncertainty
   for (const char* missing : {"model_gain_m_s", "model_time_constant_s", "fit_error"}) {
     json body = printed();
     body.erase(missing);
-    EXPECT_EQ(parse_fluid_model(body.dump()).error().reason, "missing_member") << missing;
+    EXPECT_EQ(api::parse_fluid_model(body.dump()).error().reason, "missing_member") << missing;
   }
 }
 
@@ -119,7 +119,7 @@ TEST_F(FluidModelsRouteTest, WhatIsNoModelOrOfNoFluidIsRefusedAndNothingIsKept) 
   EXPECT_EQ(unknown.status, 422);
   EXPECT_THAT(unknown.parsed()["detail"].get<std::string>(), HasSubstr("'watr' is none of non_newtonian, oil, water"));
   EXPECT_EQ(ask("POST", "/api/v1/fluids/watr/model/remove", json::object()).status, 422);
-  scopes = Scopes::of(Role::viewer);
+  scopes = identity::Scopes::of(identity::Role::viewer);
   EXPECT_EQ(ask("POST", kModel, printed()).status, 403);
   EXPECT_EQ(model_of("water"), nullptr);
 }

@@ -16,7 +16,7 @@ constexpr const char* kFluid = "/api/v1/robots/r1/fluid";
 
 class FluidsTest : public ApiTest {
  protected:
-  FluidsTest() : ApiTest{parse_config("[limits.Water]\nduty_max = 0.5\n[fluids.oil]\n", "test.toml")} {
+  FluidsTest() : ApiTest{config::parse_config("[limits.Water]\nduty_max = 0.5\n[fluids.oil]\n", "test.toml")} {
     connect_robot();
   }
   // What the station says to a duty of 0.8, which water's limits refuse; "" when it is sent.
@@ -80,7 +80,7 @@ TEST_F(FluidsTest, OneThatIsNotListedIsRefusedWithTheList) {
 
 TEST_F(FluidsTest, ARunThatNamesAnotherNeedsTheRightToCommand) {
   ASSERT_EQ(ask("POST", kFluid, {{"fluid", "water"}}).status, 200);
-  scopes = Scopes{}.add(Scope::record);
+  scopes = identity::Scopes{}.add(identity::Scope::record);
   const Answered refused = begin_run("oil");
   EXPECT_EQ(refused.status, 403) << refused.body;
   EXPECT_EQ(refused.parsed()["reason"], "not_permitted");
@@ -89,9 +89,9 @@ TEST_F(FluidsTest, ARunThatNamesAnotherNeedsTheRightToCommand) {
                    {"model_time_constant_s", {0.1, 1, 1, 1}},
                    {"fit_error", 0.001},
                    {"plant", {{"kp", 0.1}}}};
-  scopes = Scopes::of(Role::operator_);
+  scopes = identity::Scopes::of(identity::Role::operator_);
   ASSERT_LT(ask("POST", "/api/v1/fluids/water/model", model).status, 300);
-  scopes = Scopes{}.add(Scope::record);
+  scopes = identity::Scopes{}.add(identity::Scope::record);
   const std::size_t commands = robot->commands().size();
   const Answered run = begin_run(" Water");
   ASSERT_EQ(run.status, 201) << run.body;
@@ -115,7 +115,7 @@ TEST_F(FluidsTest, AnOpenRunIsPutRightByWhoMayNotCommandWithNothingSaidOfTheRobo
                    {"fit_error", 0.001},
                    {"plant", {{"kp", 0.1}}}};
   ASSERT_LT(ask("POST", "/api/v1/fluids/oil/model", model).status, 300);
-  scopes = Scopes{}.add(Scope::record);
+  scopes = identity::Scopes{}.add(identity::Scope::record);
   const std::size_t commands = robot->commands().size();
   const std::string path = "/api/v1/runs/" + run.parsed()["run_id"].dump();
   const Answered annotated = ask("POST", path + "/annotate", {{"fluid", " Oil"}});
@@ -130,7 +130,7 @@ TEST_F(FluidsTest, AnOpenRunIsPutRightByWhoMayNotCommandWithNothingSaidOfTheRobo
 TEST_F(FluidsTest, WhoseCredentialEndsWhileTheRunIsReadNamesNoFluid) {
   const Answered run = begin_run("water");
   std::binary_semaphore has_ended{0};
-  const auto reading = [](WorkerThread& worker, std::binary_semaphore& until) -> boost::asio::awaitable<void> {
+  const auto reading = [](runtime::WorkerThread& worker, std::binary_semaphore& until) -> boost::asio::awaitable<void> {
     auto job = [&until] {
       until.acquire();
       return true;
@@ -171,7 +171,7 @@ TEST_F(FluidsTest, ARunThatNamesOneSaysItOfTheRobotAndTheEndOfTheRunChangesNothi
 
 TEST_F(FluidsTest, WhileAnotherIsInControlARunNamesNoOtherFluid) {
   ASSERT_EQ(ask("POST", kFluid, {{"fluid", "water"}}).status, 200);
-  ASSERT_TRUE(station.control({"r1", "session:1", "", ControlAction::take, 60s, ""}));
+  ASSERT_TRUE(station.control({"r1", "session:1", "", station::ControlAction::take, 60s, ""}));
   const Answered refused = begin_run("oil");
   EXPECT_EQ(refused.status, 409);
   EXPECT_EQ(refused.parsed()["reason"], "not_in_control");

@@ -5,15 +5,15 @@
 namespace server {
 namespace {
 
-Config small_station() {
-  Config config;
+config::Config small_station() {
+  config::Config config;
   config.http_places = {16, 4};  // from an address of this machine 12
   return config;
 }
 
 class HostileTest : public ApiTest {
  protected:
-  explicit HostileTest(Config of_station = {}) : ApiTest{std::move(of_station)} {
+  explicit HostileTest(config::Config of_station = {}) : ApiTest{std::move(of_station)} {
     connect_robot();
     operator_ = std::make_unique<RawClient>(clock, api->port());
     expect_stops(*operator_);  // signed in before the trouble begins
@@ -82,7 +82,7 @@ TEST_F(HostileTest, AThousandIdleConnectionsLeaveRoom) {
     idle.push_back(dial(i % 2 == 0 ? "127.0.0.1" : "127.0.0.2"));
     if (i % 100 == 99) expect_stops();
   }
-  const ConnectionLimiter& limiter = security.http().limiter;
+  const net::ConnectionLimiter& limiter = security.http().limiter;
   EXPECT_LE(limiter.connections(), limiter.limits().connections);
   EXPECT_GE(limiter.counters().replaced, 700U);
   EXPECT_EQ(limiter.counters().refused, 0U);
@@ -136,7 +136,7 @@ TEST_F(HostileTest, OversizedAndDeeplyNestedJsonIsRefused) {
 TEST_F(HostileTest, APageThatNeverReadsIsLetGo) {
   Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
   ASSERT_TRUE(page.open());
-  SampleBatch batch;
+  station::SampleBatch batch;
   batch.robot_id = "r1";
   batch.boot_id = 77;
   batch.samples.resize(25);
@@ -178,7 +178,7 @@ TEST_F(HostileTest, ATalkativePageIsReadABoundedNumberOfTimesASecond) {
 TEST_F(HostileTest, OneUserHasABoundedNumberOfPages) {
   const std::string bearer = "Authorization: Bearer " + token() + "\r\n";
   std::vector<std::unique_ptr<Page>> pages;
-  for (std::size_t i = 0; i < kMaxPagesOfOne; ++i) {
+  for (std::size_t i = 0; i < http::kMaxPagesOfOne; ++i) {
     pages.push_back(std::make_unique<Page>(clock, api->port(), bearer));
     ASSERT_TRUE(pages.back()->open()) << i;
   }

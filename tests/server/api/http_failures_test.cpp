@@ -53,10 +53,10 @@ TEST_F(HttpFailuresTest, ADatabaseThatFailsIsReportedWithoutItsText) {
 }
 
 // A sink that fails, as nothing in the station should.
-class Thrower final : public StationSink {
+class Thrower final : public station::StationSink {
  public:
-  void on_command(const CommandRecord& record) override {
-    if (record.state == CommandState::acknowledged) throw std::runtime_error{"no room for a command"};
+  void on_command(const station::CommandRecord& record) override {
+    if (record.state == station::CommandState::acknowledged) throw std::runtime_error{"no room for a command"};
   }
 };
 
@@ -70,7 +70,7 @@ TEST_F(HttpFailuresTest, AStopThatFailsOnceItIsSentIsLoggedAndThePageGoesOn) {
   robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_ACCEPTED, 7);
   clock.settle();
   EXPECT_TRUE(says(log.text(), "no room for a command")) << log.text();
-  EXPECT_EQ(tasks.exceptions().count(Ended::robot_session), 1U);
+  EXPECT_EQ(tasks.exceptions().count(runtime::Ended::robot_session), 1U);
   EXPECT_EQ(station.find("r1")->context.emergency_id, 7U);
   EXPECT_FALSE(page.closed());
   EXPECT_EQ(tasks.exit_code(), 0);
@@ -97,20 +97,20 @@ TEST_F(HttpFailuresTest, NoRefusalSpeaksOfTheInside) {
 
 // Those of a station that has just been made.
 struct NewCredentials {
-  NewCredentials(boost::asio::io_context& loop, Clock& clock, const std::filesystem::path& folder)
+  NewCredentials(boost::asio::io_context& loop, runtime::Clock& clock, const std::filesystem::path& folder)
       : database{folder / "station.sqlite"},
-        recorder{loop, clock, disk, checkpoints, RecorderOptions{folder / "station.sqlite", {}}},
+        recorder{loop, clock, disk, checkpoints, storage::RecorderOptions{folder / "station.sqlite", {}}},
         accounts{loop, clock, recorder, folder},
         auth{loop, clock, accounts, folder, 1} {}
-  Database database;
-  WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
-  Recorder recorder;
-  Accounts accounts;
-  Auth auth;
+  storage::Database database;
+  runtime::WorkerThread disk{"disk"}, checkpoints{"checkpoints"};
+  storage::Recorder recorder;
+  identity::Accounts accounts;
+  identity::Auth auth;
 };
 
 // A body that fails after its first piece.
-class CutStream final : public BodyStream {
+class CutStream final : public http::BodyStream {
  public:
   boost::asio::awaitable<Result<std::optional<std::string>>> next() override {
     if (has_begun_) throw std::runtime_error{"secret"};
@@ -128,26 +128,28 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
   const CapturedLog log;
   boost::asio::io_context loop{1};
   VirtualClock clock{loop};
-  TaskGroup tasks{loop};
-  Station station{loop, clock, Envelope{}, LinkTimes{}};
-  LiveFeed feed{clock};
-  RobotTexts texts{loop, station};
-  LiveParts live{loop, tasks, clock, station, feed, texts, "0"};
-  Upgrades upgrades{"/live", [&](HttpStream stream, UpgradeRequest upgrade, Caller caller) {
-                      return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live);
-                    }};
-  Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
+  runtime::TaskGroup tasks{loop};
+  station::Station station{loop, clock, config::Envelope{}, config::LinkTimes{}};
+  live::LiveFeed feed{clock};
+  live::RobotTexts texts{loop, station};
+  api::LiveParts live{loop, tasks, clock, station, feed, texts, "0"};
+  http::Upgrades upgrades{"/live", [&](http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller) {
+                            return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live);
+                          }};
+  net::Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
   NewCredentials credentials{loop, clock, folder.path()};
-  const RequestGuard guard{credentials.auth, {}};
-  Router router;
-  router.add({"GET", "/broken", Scope::anyone, {}, [](Request) -> Answer { throw std::runtime_error{"secret"}; }});
-  router.add({"GET", "/cut", Scope::anyone, {}, [](Request) -> Answer {
-                Response response;
+  const http::RequestGuard guard{credentials.auth, {}};
+  http::Router router;
+  router.add({"GET", "/broken", identity::Scope::anyone, {}, [](http::Request) -> http::Answer {
+                throw std::runtime_error{"secret"};
+              }});
+  router.add({"GET", "/cut", identity::Scope::anyone, {}, [](http::Request) -> http::Answer {
+                http::Response response;
                 response.stream = std::make_unique<CutStream>();
                 co_return response;
               }});
-  PortAccess access{{clock, "http port", ConnectionLimits{}}, nullptr};
-  HttpServer server{tasks, clock, listener, access, guard, router, upgrades};
+  net::PortAccess access{{clock, "http port", net::ConnectionLimits{}}, nullptr};
+  http::HttpServer server{tasks, clock, listener, access, guard, router, upgrades};
   tasks.spawn("http", server.run());
   {
     RawClient client{clock, listener.endpoint().port()};
@@ -157,7 +159,7 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
     EXPECT_FALSE(says(answer, "secret"));
   }
   EXPECT_TRUE(log.has("GET /broken: secret")) << log.text();
-  EXPECT_EQ(tasks.exceptions().count(Ended::request), 1U);
+  EXPECT_EQ(tasks.exceptions().count(runtime::Ended::request), 1U);
   {
     RawClient client{clock, listener.endpoint().port()};
     client.send("GET /cut HTTP/1.1\r\nHost: localhost\r\n\r\n");
@@ -165,25 +167,25 @@ TEST(HttpServer, AnExceptionOfARouteIs500AndSaysNothing) {
     EXPECT_TRUE(says(answer, "first") && !answer.ends_with("0\r\n\r\n")) << answer;
   }
   clock.run_for(1s);
-  EXPECT_EQ(tasks.exceptions().count(Ended::request), 2U);
+  EXPECT_EQ(tasks.exceptions().count(runtime::Ended::request), 2U);
   EXPECT_EQ(tasks.exit_code(), 0);
   tasks.stop();
   clock.settle();
 }
 
 // The station's clock, until it breaks.
-class BrokenClock final : public Clock {
+class BrokenClock final : public runtime::Clock {
  public:
-  explicit BrokenClock(Clock& clock) : clock_{clock} {}
+  explicit BrokenClock(runtime::Clock& clock) : clock_{clock} {}
   std::int64_t steady_us() const override { throw std::runtime_error{"the clock is broken"}; }
   std::int64_t utc_us() const override { return clock_.utc_us(); }
-  using Clock::sleep_until;
+  using runtime::Clock::sleep_until;
   boost::asio::awaitable<void> sleep_until(std::int64_t deadline_us, Alarm* alarm) override {
     return clock_.sleep_until(deadline_us, alarm);
   }
 
  private:
-  Clock& clock_;
+  runtime::Clock& clock_;
 };
 
 TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
@@ -191,21 +193,21 @@ TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
   boost::asio::io_context loop{1};
   VirtualClock clock{loop};
   BrokenClock broken{clock};
-  TaskGroup tasks{loop};
-  Station station{loop, clock, Envelope{}, LinkTimes{}};
-  LiveFeed feed{clock};
-  RobotTexts texts{loop, station};
-  LiveParts live{loop, tasks, broken, station, feed, texts, "0"};
-  Upgrades upgrades{"/live", [&](HttpStream stream, UpgradeRequest upgrade, Caller caller) {
-                      return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live);
-                    }};
-  Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
+  runtime::TaskGroup tasks{loop};
+  station::Station station{loop, clock, config::Envelope{}, config::LinkTimes{}};
+  live::LiveFeed feed{clock};
+  live::RobotTexts texts{loop, station};
+  api::LiveParts live{loop, tasks, broken, station, feed, texts, "0"};
+  http::Upgrades upgrades{"/live", [&](http::HttpStream stream, http::UpgradeRequest upgrade, identity::Caller caller) {
+                            return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live);
+                          }};
+  net::Listener listener{loop, clock, {boost::asio::ip::address_v4::loopback(), 0}};
   NewCredentials credentials{loop, clock, folder.path()};
-  Auth& auth = credentials.auth;
-  const RequestGuard guard{auth, {}};
-  const Router router;
-  PortAccess access{{clock, "http port", ConnectionLimits{}}, nullptr};
-  HttpServer server{tasks, clock, listener, access, guard, router, upgrades};
+  identity::Auth& auth = credentials.auth;
+  const http::RequestGuard guard{auth, {}};
+  const http::Router router;
+  net::PortAccess access{{clock, "http port", net::ConnectionLimits{}}, nullptr};
+  http::HttpServer server{tasks, clock, listener, access, guard, router, upgrades};
   tasks.spawn("http", server.run());
   const auto session = auth.log_in(auth.new_login_code(), "", "");
   {
@@ -221,7 +223,7 @@ TEST(HttpServer, AnExceptionOfAPageEndsThatPageOnly) {
   EXPECT_EQ(tasks.exit_code(), 0);
   EXPECT_FALSE(tasks.stopping());
   EXPECT_EQ(access.limiter.connections(), 0U);
-  EXPECT_EQ(tasks.exceptions().count(Ended::live_page), 1U);
+  EXPECT_EQ(tasks.exceptions().count(runtime::Ended::live_page), 1U);
   tasks.stop();
   clock.settle();
 }

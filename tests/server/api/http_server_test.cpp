@@ -181,7 +181,7 @@ TEST_F(HttpServerTest, RefusesALongTargetAndTooManyFields) {
   const std::string target = get("/api/v1/robots?x=" + std::string(8200, 'x'));
   EXPECT_TRUE(target.starts_with("HTTP/1.1 414 ")) << target;
   std::string fields;
-  for (std::size_t i = 0; i < kMaxHeaderFields; ++i) fields += "X-" + std::to_string(i) + ": 1\r\n";
+  for (std::size_t i = 0; i < http::kMaxHeaderFields; ++i) fields += "X-" + std::to_string(i) + ": 1\r\n";
   const std::string answer = talk(head("GET /api/v1/robots", fields));
   EXPECT_TRUE(answer.starts_with("HTTP/1.1 431 ")) << answer;
   expect_alive();

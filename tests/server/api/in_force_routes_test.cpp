@@ -73,7 +73,7 @@ class InForceRoutesTest : public ApiTest {
       happens();
       has_happened.release();
     };
-    auto reading = [](WorkerThread& worker, std::binary_semaphore& until) -> boost::asio::awaitable<void> {
+    auto reading = [](runtime::WorkerThread& worker, std::binary_semaphore& until) -> boost::asio::awaitable<void> {
       auto job = [&until] {
         until.acquire();
         return true;
@@ -96,8 +96,8 @@ class InForceRoutesTest : public ApiTest {
   }
 
  private:
-  struct AtController final : StationSink {
-    void on_in_force(const RobotState&, const InForceRecord&) override { happens(); }
+  struct AtController final : station::StationSink {
+    void on_in_force(const station::RobotState&, const station::InForceRecord&) override { happens(); }
     std::function<void()> happens;
   };
 
@@ -112,7 +112,7 @@ TEST_F(InForceRoutesTest, TheTableSaysWhatIsChangedAndWhatBoundsMotionAndWhether
   EXPECT_EQ(answer, (json{{"robot_id", "r1"}, {"is_current", false}, {"told_at_us", nullptr}, {"parameters", nullptr}}))
       << "nothing is known, which is no table without parameters";
   say_parameters();
-  scopes = Scopes{}.add(Scope::read);
+  scopes = identity::Scopes{}.add(identity::Scope::read);
   answer = ask("GET", kParameters).parsed();
   EXPECT_EQ(answer["is_current"], true);
   ASSERT_EQ(answer["parameters"].size(), 2U);
@@ -133,7 +133,7 @@ TEST_F(InForceRoutesTest, TheTableSaysWhatIsChangedAndWhatBoundsMotionAndWhether
   answer = ask("GET", kParameters).parsed();
   EXPECT_EQ(answer["is_current"], false);
   EXPECT_EQ(answer["parameters"].size(), 2U) << "what was last known";
-  scopes = Scopes{}.add(Scope::stop);
+  scopes = identity::Scopes{}.add(identity::Scope::stop);
   EXPECT_EQ(ask("GET", kParameters).status, 403);
 }
 
@@ -157,14 +157,14 @@ TEST_F(InForceRoutesTest, TheControllerIsShownAsTheRobotSaysIt) {
 // SAFETY: a wider duty range is more motion.
 TEST_F(InForceRoutesTest, AWiderControllerNeedsAnAdminWhoConfirms) {
   connect_robot();
-  scopes = Scopes::of(Role::operator_);
+  scopes = identity::Scopes::of(identity::Role::operator_);
   EXPECT_EQ(outcome(with_range(0, 0.5, true)), "not_permitted") << "the one in force is not known";
   say_controller(-0.25F, 0.5F);
   EXPECT_EQ(outcome(with_range(-0.25, 0.5)), "sent");
   EXPECT_EQ(outcome(with_range(0, 0.4)), "sent");
   EXPECT_EQ(outcome(with_range(0, 0.51, true)), "not_permitted");
   EXPECT_EQ(outcome(with_range(-0.26, 0.5, true)), "not_permitted");
-  scopes = Scopes::of(Role::admin);
+  scopes = identity::Scopes::of(identity::Role::admin);
   EXPECT_EQ(outcome(with_range(-0.25, 0.6)), "confirm_required");
   EXPECT_EQ(outcome(with_range(-0.25, 0.6, true)), "sent");
   json without = with_range(0, 1);
@@ -180,13 +180,13 @@ TEST_F(InForceRoutesTest, ARestoreNeedsAnAdminUnlessWhatComesBackIsKnownAndNotWi
   json confirmed = restore;
   confirmed["confirm"] = true;
   say_controller(0, 0.5F);
-  scopes = Scopes::of(Role::operator_);
+  scopes = identity::Scopes::of(identity::Role::operator_);
   EXPECT_EQ(outcome(restore), "not_permitted") << "what comes back is not known";
   say_controller(0, 1);
   EXPECT_EQ(outcome(restore), "sent");
   say_controller(0, 0.25F);
   EXPECT_EQ(outcome(confirmed), "not_permitted");
-  scopes = Scopes::of(Role::admin);
+  scopes = identity::Scopes::of(identity::Role::admin);
   EXPECT_EQ(outcome(restore), "confirm_required");
   EXPECT_EQ(outcome(confirmed), "sent");
 }
@@ -233,11 +233,11 @@ TEST_F(InForceRoutesTest, ARepeatIsAnsweredAsTheFirstWhateverIsInForceByNow) {
   const json restore{{"kind", "restore_controller"}};
   const json bound{{"kind", "set_parameter"}, {"name", "position_limit_max_m"}, {"value", 0.2}, {"confirm", true}};
   say_controller(-1, 1);
-  scopes = Scopes::of(Role::operator_);
+  scopes = identity::Scopes::of(identity::Role::operator_);
   const json restore_first = accepted(restore, "restore");
-  scopes = Scopes::of(Role::admin);
+  scopes = identity::Scopes::of(identity::Role::admin);
   const json set_first = accepted(set, "set"), bound_first = accepted(bound, "bound");
-  scopes = Scopes::of(Role::operator_);
+  scopes = identity::Scopes::of(identity::Role::operator_);
   const std::size_t sent = robot->commands().size();
 
   const auto expect_the_first_answers = [&](const char* when) {
@@ -264,12 +264,12 @@ TEST_F(InForceRoutesTest, ARepeatIsAnsweredAsTheFirstOverARestartToo) {
   json set = with_range(-1, 1);
   set.erase("duty_min");
   set.erase("duty_max");
-  CommandRecord old;
-  old.id = command_id_of("r1", "token:local", "old");
+  station::CommandRecord old;
+  old.id = station::command_id_of("r1", "token:local", "old");
   old.robot_id = "r1";
   old.kind = "set_controller";
   old.arguments = accepted(set, "new")["arguments"].dump();
-  old.state = CommandState::verified;
+  old.state = station::CommandState::verified;
   old.submitted_at_us = old.ended_at_us = clock.utc_us();
   recorder.on_command(old);
   clock.run_for(1s);
@@ -284,7 +284,7 @@ TEST_F(InForceRoutesTest, ARepeatIsAnsweredAsTheFirstOverARestartToo) {
 TEST_F(InForceRoutesTest, WhatMayBoundMotionIsJudgedAfterTheWait) {
   connect_robot();
   say_controller(-1, 1);
-  scopes = Scopes::of(Role::operator_);
+  scopes = identity::Scopes::of(identity::Role::operator_);
   EXPECT_EQ(overtaken(with_range(-1, 1), [] {}).parsed()["reason"], "not_permitted");
   EXPECT_TRUE(robot->commands().empty());
 }

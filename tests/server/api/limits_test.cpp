@@ -90,8 +90,8 @@ json as_documented(Number number) {
 }
 
 template <class Number, std::size_t size>
-void expect_documented(const Limit<Number> (&table)[size], const char* type, Properties& left) {
-  for (const Limit<Number>& limit : table) {
+void expect_documented(const api::Limit<Number> (&table)[size], const char* type, Properties& left) {
+  for (const api::Limit<Number>& limit : table) {
     const std::string name{limit.property};
     const auto found = left.find(name);
     if (found == left.end()) {
@@ -110,11 +110,11 @@ TEST(Limits, AreThoseOfTheDocumentInBothDirections) {
   RequestSchemas requests{document};
   EXPECT_EQ(requests.bodies, 18);
   Properties left = requests.limits;
-  expect_documented(kTextLimits, "string", left);
-  expect_documented(kIntegerLimits, "integer", left);
-  expect_documented(kNumberLimits, "number", left);
-  expect_documented(kLimitsOfTheRobot, "number", left);
-  expect_documented(kListLimits, "array", left);
+  expect_documented(api::kTextLimits, "string", left);
+  expect_documented(api::kIntegerLimits, "integer", left);
+  expect_documented(api::kNumberLimits, "number", left);
+  expect_documented(api::kLimitsOfTheRobot, "number", left);
+  expect_documented(api::kListLimits, "array", left);
   for (const auto& [name, limit] : left) ADD_FAILURE() << name << " is limited in the document alone";
 }
 
@@ -134,11 +134,11 @@ std::string repeated(std::size_t count, const std::string& character) {
 
 // The document says so, since its maxLength counts characters.
 TEST(Limits, OfTextsCountBytesAndNotCharacters) {
-  constexpr std::size_t kMost = text_bytes("MarkerBody.text").maximum;
-  EXPECT_TRUE(parse_marker(marker(repeated(kMost, "a"))));
-  EXPECT_TRUE(parse_marker(marker(repeated(kMost / 2, "ä"))));
+  constexpr std::size_t kMost = api::text_bytes("MarkerBody.text").maximum;
+  EXPECT_TRUE(api::parse_marker(marker(repeated(kMost, "a"))));
+  EXPECT_TRUE(api::parse_marker(marker(repeated(kMost / 2, "ä"))));
   for (const std::string& text : {repeated(kMost + 1, "a"), repeated(kMost / 2 + 1, "ä"), std::string{}}) {
-    const auto refused = parse_marker(marker(text));
+    const auto refused = api::parse_marker(marker(text));
     ASSERT_FALSE(refused) << text.size();
     EXPECT_EQ(refused.error().reason, "out_of_range");
   }

@@ -18,7 +18,7 @@ class LiveFeedTest : public ::testing::Test {
  public:
   LiveFeedTest() {
     robot.id = "r1";
-    robot.link = LinkState::connected;
+    robot.link = station::LinkState::connected;
     robot.boot_id = 0xfedcba9876543210;
     robot.context.mode = rheonaut_MODE_MANUAL;
     robot.context.period_us = 25'000;
@@ -33,7 +33,8 @@ class LiveFeedTest : public ::testing::Test {
  protected:
   std::vector<json> heard() {
     std::vector<json> all;
-    for (LiveText text = listener.pop(); text != nullptr; text = listener.pop()) all.push_back(json::parse(*text));
+    for (live::LiveText text = listener.pop(); text != nullptr; text = listener.pop())
+      all.push_back(json::parse(*text));
     return all;
   }
   std::vector<std::string> types() {
@@ -41,8 +42,8 @@ class LiveFeedTest : public ::testing::Test {
     for (const json& one : heard()) all.push_back(one["type"]);
     return all;
   }
-  SampleBatch batch(std::uint64_t first_seq) const {
-    SampleBatch made;
+  station::SampleBatch batch(std::uint64_t first_seq) const {
+    station::SampleBatch made;
     made.robot_id = robot.id;
     made.boot_id = robot.boot_id;
     made.first_seq = first_seq;
@@ -53,10 +54,10 @@ class LiveFeedTest : public ::testing::Test {
 
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  TaskGroup tasks{loop};
-  LiveFeed live{clock};
-  Subscriber listener{loop};
-  RobotState robot;
+  runtime::TaskGroup tasks{loop};
+  live::LiveFeed live{clock};
+  live::Subscriber listener{loop};
+  station::RobotState robot;
 };
 
 using Types = std::vector<std::string>;
@@ -112,7 +113,7 @@ TEST_F(LiveFeedTest, GathersSamplesUntilTheyAreFiftyMilliseconds) {
   live.on_robot(robot);
   heard();
   const auto one = [&](std::uint64_t seq) {
-    SampleBatch made = batch(seq);
+    station::SampleBatch made = batch(seq);
     made.first_robot_time_us = 25'000 * seq;
     made.samples.resize(1);
     return made;
@@ -127,16 +128,16 @@ TEST_F(LiveFeedTest, GathersSamplesUntilTheyAreFiftyMilliseconds) {
   live.on_samples(robot, one(2));
   live.on_samples(robot, one(4));  // not the next
   EXPECT_EQ(heard().at(0)["first_seq"], 2);
-  SampleBatch shifted = one(5);
+  station::SampleBatch shifted = one(5);
   shifted.first_robot_time_us += 1;
   live.on_samples(robot, shifted);  // at another time than it seems
   EXPECT_EQ(heard().at(0)["first_seq"], 4);
-  SampleBatch other = one(6);
+  station::SampleBatch other = one(6);
   other.first_robot_time_us += 1;
   other.context.setpoint_m = 0.3F;
   live.on_samples(robot, other);  // under other conditions
   EXPECT_EQ(heard().at(0)["first_seq"], 5);
-  SampleBatch rebooted = other;
+  station::SampleBatch rebooted = other;
   rebooted.boot_id = 1;
   rebooted.first_seq = 7;
   rebooted.first_robot_time_us += 25'000;
@@ -156,7 +157,7 @@ TEST_F(LiveFeedTest, GathersSamplesUntilTheyAreFiftyMilliseconds) {
 }
 
 TEST_F(LiveFeedTest, OfWhatItDoesNotWatchAPageReceivesLargeChangesWithTheNextStamp) {
-  RobotState other = robot;
+  station::RobotState other = robot;
   other.id = "r2";
   live.on_robot(robot);
   live.on_robot(other);
@@ -213,7 +214,7 @@ TEST_F(LiveFeedTest, AStampIsInTimeWhenAVeryLargeFleetChanges) {
 
 TEST_F(LiveFeedTest, SamplesOfALargeChangeDoNotWaitForMore) {
   live.on_robot(robot);
-  SampleBatch one = batch(0);
+  station::SampleBatch one = batch(0);
   one.samples.resize(1);
   robot.context.mode = one.context.mode = rheonaut_MODE_AUTO;
   heard();
@@ -223,7 +224,7 @@ TEST_F(LiveFeedTest, SamplesOfALargeChangeDoNotWaitForMore) {
 
 TEST_F(LiveFeedTest, SamplesThatWereGatheredForWhoLeftAreForgotten) {
   live.on_robot(robot);
-  SampleBatch one = batch(0);
+  station::SampleBatch one = batch(0);
   one.samples.resize(1);
   live.on_samples(robot, one);
   live.watch(listener, {});
@@ -248,12 +249,12 @@ TEST_F(LiveFeedTest, ARobotThatIsWatchedNeedNotBeKnown) {
 }
 
 TEST_F(LiveFeedTest, APageThatNamedItsRobotsReceivesOneLogWithEachStamp) {
-  Subscriber all{loop};
+  live::Subscriber all{loop};
   live.add(all);
   live.watch(listener, {});
-  CommandRecord command;
+  station::CommandRecord command;
   command.robot_id = "r1";
-  for (const CommandId id : std::vector<CommandId>{1, 2, 1}) {
+  for (const station::CommandId id : std::vector<station::CommandId>{1, 2, 1}) {
     command.id = id;
     live.on_command(command);
   }
@@ -268,7 +269,7 @@ TEST_F(LiveFeedTest, APageThatNamedItsRobotsReceivesOneLogWithEachStamp) {
   ASSERT_EQ(told[0]["commands"].size(), 2U) << "the newest record of each";
   EXPECT_EQ(told[0]["commands"][1]["command_id"], "1");
   EXPECT_EQ(all.size(), 5U) << "and the stamp; a page that watches all received it already";
-  for (CommandId id = 1; id <= 64; ++id) {
+  for (station::CommandId id = 1; id <= 64; ++id) {
     command.id = id;
     live.on_command(command);
   }
@@ -277,7 +278,7 @@ TEST_F(LiveFeedTest, APageThatNamedItsRobotsReceivesOneLogWithEachStamp) {
 }
 
 TEST_F(LiveFeedTest, WritesOneTextForAll) {
-  Subscriber other{loop};
+  live::Subscriber other{loop};
   live.add(other);
   live.on_event(robot, {});
   EXPECT_EQ(listener.pop().get(), other.pop().get());
@@ -288,15 +289,15 @@ TEST_F(LiveFeedTest, WritesOneTextForAll) {
 
 TEST_F(LiveFeedTest, ASlowListenerLosesTheOldestSamplesAndReceivesHowMany) {
   live.on_robot(robot);
-  CommandRecord stop;
+  station::CommandRecord stop;
   stop.kind = "emergency_stop";
   live.on_command(stop);
   for (std::uint64_t i = 0; i < 1000; ++i) live.on_samples(robot, batch(2 * i));
-  EXPECT_EQ(listener.size(), Subscriber::kMaxMessages + 1);  // the robot's state is not counted
+  EXPECT_EQ(listener.size(), live::Subscriber::kMaxMessages + 1);  // the robot's state is not counted
   const auto all = heard();
-  ASSERT_EQ(all.size(), Subscriber::kMaxMessages + 2);
+  ASSERT_EQ(all.size(), live::Subscriber::kMaxMessages + 2);
   EXPECT_EQ(all[0]["type"], "dropped");
-  EXPECT_EQ(all[0]["count"], 1001 - Subscriber::kMaxMessages);
+  EXPECT_EQ(all[0]["count"], 1001 - live::Subscriber::kMaxMessages);
   EXPECT_EQ(all[1]["type"], "robot");
   EXPECT_EQ(all[2]["type"], "command");
   EXPECT_EQ(all.back()["first_seq"], 2 * 999);
@@ -306,7 +307,7 @@ TEST_F(LiveFeedTest, ASlowListenerLosesTheOldestSamplesAndReceivesHowMany) {
 
 // A page that reads nothing holds one state of each robot, the newest, in the place of the first.
 TEST_F(LiveFeedTest, OfEachRobotOneStateWaits) {
-  RobotState other = robot;
+  station::RobotState other = robot;
   other.id = "r2";
   live.on_robot(robot);
   live.on_robot(other);
@@ -327,19 +328,19 @@ TEST_F(LiveFeedTest, OfEachRobotOneStateWaits) {
 TEST_F(LiveFeedTest, AHeadlineIsNeverDropped) {
   robot.context.emergency_id = 9;
   live.on_robot(robot);
-  RobotState fleet = robot;
-  for (std::size_t i = 0; i < 2 * Subscriber::kMaxMessages; ++i) {
+  station::RobotState fleet = robot;
+  for (std::size_t i = 0; i < 2 * live::Subscriber::kMaxMessages; ++i) {
     fleet.id = "fleet-" + std::to_string(i);
     live.on_robot(fleet);
     live.on_samples(robot, batch(2 * i));
     live.on_command({});
   }
-  EXPECT_EQ(listener.size(), 3 * Subscriber::kMaxMessages + 1);
+  EXPECT_EQ(listener.size(), 3 * live::Subscriber::kMaxMessages + 1);
   const auto all = heard();
   EXPECT_EQ(all[0]["type"], "dropped");
   EXPECT_EQ(all[1]["robot"]["emergency_id"], "9");
   const auto is_state = [](const json& one) { return one["type"] == "robot"; };
-  EXPECT_EQ(std::ranges::count_if(all, is_state), 2 * Subscriber::kMaxMessages + 1);
+  EXPECT_EQ(std::ranges::count_if(all, is_state), 2 * live::Subscriber::kMaxMessages + 1);
 }
 
 // However large the fleet, the loop has turns between a few robots and the next, and the page receives all before the
@@ -366,10 +367,10 @@ TEST_F(LiveFeedTest, AFleetIsSentInTurnsOfTheLoop) {
 // A change while the fleet is being sent is sent once, the newer state last.
 TEST_F(LiveFeedTest, WhatChangesBetweenTwoTurnsIsSentAfterwards) {
   clock.settle();
-  std::vector<RobotState> fleet(40, robot);
+  std::vector<station::RobotState> fleet(40, robot);
   for (std::size_t i = 0; i < fleet.size(); ++i) fleet[i].id = "fleet-" + std::to_string(10 + i);
   for (int i = 0; i < 2; ++i) {
-    for (const RobotState& one : fleet) live.on_robot(one);
+    for (const station::RobotState& one : fleet) live.on_robot(one);
     if (i == 0) heard();
   }
   clock.advance_to_next();

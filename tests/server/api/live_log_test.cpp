@@ -11,9 +11,10 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
-std::vector<json> messages_of(Subscriber& subscriber) {
+std::vector<json> messages_of(live::Subscriber& subscriber) {
   std::vector<json> all;
-  for (LiveText text = subscriber.pop(); text != nullptr; text = subscriber.pop()) all.push_back(json::parse(*text));
+  for (live::LiveText text = subscriber.pop(); text != nullptr; text = subscriber.pop())
+    all.push_back(json::parse(*text));
   return all;
 }
 
@@ -21,38 +22,38 @@ std::vector<json> messages_of(Subscriber& subscriber) {
 TEST(LiveLog, OfRenewalsOfLeasesOnlyARefusedOneIsSent) {
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  TaskGroup tasks{loop};
-  LiveFeed live{clock};
+  runtime::TaskGroup tasks{loop};
+  live::LiveFeed live{clock};
   tasks.spawn("live feed", live.run());
-  Subscriber listener{loop};
+  live::Subscriber listener{loop};
   live.add(listener);
   const auto heard = [&] { return messages_of(listener); };
-  Subscriber choosy{loop};
+  live::Subscriber choosy{loop};
   live.add(choosy);
   live.watch(choosy, {"r1"});
-  CommandRecord renewal;
+  station::CommandRecord renewal;
   renewal.robot_id = "r1";
   renewal.kind = "renew_lease";
-  const auto renew = [&](CommandState end, const char* reason) {
+  const auto renew = [&](station::CommandState end, const char* reason) {
     ++renewal.id;
-    for (const CommandState state : {CommandState::queued, CommandState::sent, end}) {
+    for (const station::CommandState state : {station::CommandState::queued, station::CommandState::sent, end}) {
       renewal.state = state;
       renewal.reason = state == end ? reason : "";
       live.on_command(renewal);
     }
   };
-  for (int i = 0; i < 100; ++i) renew(CommandState::acknowledged, "");
+  for (int i = 0; i < 100; ++i) renew(station::CommandState::acknowledged, "");
   EXPECT_TRUE(heard().empty());
-  for (int i = 0; i < 10; ++i) renew(CommandState::rejected, "nothing_to_renew");
+  for (int i = 0; i < 10; ++i) renew(station::CommandState::rejected, "nothing_to_renew");
   const auto told = heard();
   ASSERT_EQ(told.size(), 1U) << "once";
   EXPECT_EQ(told[0]["command"]["state"], "rejected");
-  renew(CommandState::failed, "link_lost");
+  renew(station::CommandState::failed, "link_lost");
   EXPECT_EQ(heard().at(0)["command"]["reason"], "link_lost") << "for another reason";
-  renew(CommandState::acknowledged, "");
-  renew(CommandState::failed, "link_lost");
+  renew(station::CommandState::acknowledged, "");
+  renew(station::CommandState::failed, "link_lost");
   EXPECT_EQ(heard().size(), 1U) << "refused anew";
-  renew(CommandState::unknown, "no_answer");
+  renew(station::CommandState::unknown, "no_answer");
   EXPECT_EQ(heard().at(0)["command"]["state"], "unknown") << "it may not have been renewed";
   clock.run_for(100ms);
   const auto logged = messages_of(choosy);

@@ -92,7 +92,7 @@ TEST_F(LiveRightsTest, ARevokedOrOldTokenEndsItsPages) {
 
   const Answered made = ask("POST", "/api/v1/tokens", {{"name", "b"}, {"scopes", "read"}, {"days", 1}});
   const std::string short_lived = made.parsed()["secret"];
-  std::optional<Caller> caller = api->accounts().caller_of_token(short_lived);
+  std::optional<identity::Caller> caller = api->accounts().caller_of_token(short_lived);
   ASSERT_TRUE(caller);
   clock.skip(24h - 1min);
   clock.settle();

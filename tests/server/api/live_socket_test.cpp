@@ -73,7 +73,7 @@ TEST_F(LiveSocketTest, AStopIsObeyedWhateverElseTheMessageSays) {
 TEST_F(LiveSocketTest, AStopIsObeyedFromAPageThatDoesNotRead) {
   connect_robot();
   const auto page = open_page();
-  SampleBatch batch;
+  station::SampleBatch batch;
   batch.robot_id = "r1";
   batch.boot_id = 77;
   batch.samples.resize(25);
@@ -126,7 +126,8 @@ TEST_F(LiveSocketTest, APageReceivesTheStateOfARobotThatItBeginsToWatch) {
   const auto page = open_page();
   page->say({{"type", "watch"}, {"robots", json::array()}});
   clock.settle();
-  ASSERT_TRUE(station.control({"r1", "session:7", "", ControlAction::take, kControlLease, "", microseconds{0}}));
+  ASSERT_TRUE(station.control(
+      {"r1", "session:7", "", station::ControlAction::take, station::kControlLease, "", microseconds{0}}));
   clock.run_for(200ms);
   page->hear("log");
   page->say({{"type", "watch"}, {"robots", {"r1"}}});
@@ -183,12 +184,12 @@ TEST_F(LiveSocketTest, KeepsAPageThatAnswersPings) {
 }
 
 // While it is broken it throws at everything that becomes of a command.
-class BrokenSink final : public StationSink {
+class BrokenSink final : public station::StationSink {
  public:
-  void on_robot(const RobotState&) override {}
-  void on_samples(const RobotState&, const SampleBatch&) override {}
-  void on_event(const RobotState&, const RobotEvent&) override {}
-  void on_command(const CommandRecord&) override {
+  void on_robot(const station::RobotState&) override {}
+  void on_samples(const station::RobotState&, const station::SampleBatch&) override {}
+  void on_event(const station::RobotState&, const station::RobotEvent&) override {}
+  void on_command(const station::CommandRecord&) override {
     if (is_broken) throw std::runtime_error{"the sink is broken"};
   }
   bool is_broken = false;

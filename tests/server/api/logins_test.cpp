@@ -9,19 +9,19 @@ namespace {
 using std::chrono::seconds;
 
 TEST(Secrets, AreComparedToTheirLastByteWhereverTheyDiffer) {
-  const SecretHash hash = hash_of("a secret");
-  EXPECT_TRUE(same(hash, hash_of("a secret")));
+  const runtime::SecretHash hash = runtime::hash_of("a secret");
+  EXPECT_TRUE(runtime::same(hash, runtime::hash_of("a secret")));
   for (std::size_t i = 0; i < hash.size(); ++i) {
-    SecretHash other = hash;
+    runtime::SecretHash other = hash;
     other[i] ^= 1U;
-    EXPECT_FALSE(same(hash, other)) << i;
+    EXPECT_FALSE(runtime::same(hash, other)) << i;
   }
 }
 
 // The search takes as many steps whether the first, the last or none is the right one.
 TEST(Secrets, AreLookedForAmongAllOfThem) {
   struct Counted {
-    SecretHash hash{};
+    runtime::SecretHash hash{};
   };
   struct Counting {
     std::vector<Counted> entries;
@@ -43,10 +43,10 @@ TEST(Secrets, AreLookedForAmongAllOfThem) {
     Iterator end() { return {this, entries.size()}; }
   };
   Counting all;
-  for (int i = 0; i < 50; ++i) all.entries.push_back({hash_of(std::to_string(i))});
+  for (int i = 0; i < 50; ++i) all.entries.push_back({runtime::hash_of(std::to_string(i))});
   for (const char* wanted : {"0", "25", "49", "nobody's"}) {
     all.steps = 0;
-    const Counted* found = find_secret(all, hash_of(wanted));
+    const Counted* found = runtime::find_secret(all, runtime::hash_of(wanted));
     EXPECT_EQ(found != nullptr, std::string{wanted} != "nobody's");
     EXPECT_EQ(all.steps, 50) << wanted;
   }
@@ -56,19 +56,19 @@ TEST(Secrets, PasswordsAreArgon2idWithASaltOfTheirOwn) {
   const std::string hash = hash_password("correct horse", kCheapPasswords);
   EXPECT_TRUE(hash.starts_with("$argon2id$v=19$")) << hash;
   EXPECT_NE(hash, hash_password("correct horse", kCheapPasswords));
-  EXPECT_TRUE(is_password("correct horse", hash));
-  EXPECT_FALSE(is_password("correct hors", hash));
-  EXPECT_FALSE(is_password("", hash));
-  EXPECT_FALSE(is_password("correct horse", "not a hash"));
-  EXPECT_TRUE(hash_password("x", {}).starts_with("$argon2id$v=19$m=65536,t=2,p=1$")) << "64 MiB, 2 passes";
+  EXPECT_TRUE(runtime::is_password("correct horse", hash));
+  EXPECT_FALSE(runtime::is_password("correct hors", hash));
+  EXPECT_FALSE(runtime::is_password("", hash));
+  EXPECT_FALSE(runtime::is_password("correct horse", "not a hash"));
+  EXPECT_TRUE(runtime::hash_password("x", {}).starts_with("$argon2id$v=19$m=65536,t=2,p=1$")) << "64 MiB, 2 passes";
 }
 
-constexpr LoginThrottle::Key kKey{1, 2, 3};  // under which none of the names below share a place
+constexpr identity::LoginThrottle::Key kKey{1, 2, 3};  // under which none of the names below share a place
 
 TEST(LoginThrottle, DoublesTheWaitUpToALimitAndForgets) {
-  LoginThrottle throttle{kKey};
+  identity::LoginThrottle throttle{kKey};
   std::int64_t now_us = 1'000'000;
-  for (int i = 1; i < LoginThrottle::kFreeOfUser; ++i) {
+  for (int i = 1; i < identity::LoginThrottle::kFreeOfUser; ++i) {
     throttle.on_attempt("anna", "10.0.0." + std::to_string(i), now_us);
     EXPECT_EQ(throttle.wait("anna", "10.0.0.99", now_us), seconds{0}) << i;
   }
@@ -84,13 +84,13 @@ TEST(LoginThrottle, DoublesTheWaitUpToALimitAndForgets) {
   throttle.on_success("anna", "10.0.0.99");
   EXPECT_EQ(throttle.wait("anna", "10.0.0.99", now_us), seconds{0});
   for (int i = 0; i < 20; ++i) throttle.on_attempt("anna", "10.0.0.98", now_us);
-  now_us += LoginThrottle::kForgetAfter.count();
+  now_us += identity::LoginThrottle::kForgetAfter.count();
   throttle.on_attempt("anna", "10.0.0.98", now_us);
   EXPECT_EQ(throttle.wait("anna", "10.0.0.98", now_us), seconds{0}) << "forgotten";
 }
 
 TEST(LoginThrottle, AnAddressWaitsLongerAndOneGoodAccountDoesNotOpenTheOthers) {
-  LoginThrottle throttle{kKey};
+  identity::LoginThrottle throttle{kKey};
   std::int64_t now_us = 1'000'000;
   for (int i = 0; i < 9; ++i) throttle.on_attempt("user" + std::to_string(i), "10.0.0.1", now_us);
   throttle.on_attempt("mine", "10.0.0.1", now_us);
@@ -104,11 +104,11 @@ TEST(LoginThrottle, AnAddressWaitsLongerAndOneGoodAccountDoesNotOpenTheOthers) {
 }
 
 TEST(LoginThrottle, ANetworkOfIpv6IsOneAddress) {
-  EXPECT_EQ(network_of("2001:db8:1:2:3:4:5:6"), network_of("2001:db8:1:2:ffff::1"));
-  EXPECT_NE(network_of("2001:db8:1:2::1"), network_of("2001:db8:1:3::1"));
-  EXPECT_EQ(network_of("::ffff:10.0.0.1"), "::ffff:10.0.0.1");
-  EXPECT_EQ(network_of("10.0.0.1"), "10.0.0.1");
-  EXPECT_EQ(network_of(""), "");
+  EXPECT_EQ(config::network_of("2001:db8:1:2:3:4:5:6"), config::network_of("2001:db8:1:2:ffff::1"));
+  EXPECT_NE(config::network_of("2001:db8:1:2::1"), config::network_of("2001:db8:1:3::1"));
+  EXPECT_EQ(config::network_of("::ffff:10.0.0.1"), "::ffff:10.0.0.1");
+  EXPECT_EQ(config::network_of("10.0.0.1"), "10.0.0.1");
+  EXPECT_EQ(config::network_of(""), "");
 }
 
 class LoginsTest : public ApiTest {
@@ -184,7 +184,7 @@ TEST_F(LoginsTest, TenThousandBadLoginsCostAFewHashesAndSignNobodyOut) {
     EXPECT_EQ(refused.parsed()["reason"], "throttled");
   }
   EXPECT_EQ(statuses[401] + statuses[429], 10'000);
-  EXPECT_LE(hashes() - before, static_cast<std::uint64_t>(LoginThrottle::kFreeOfAddress));
+  EXPECT_LE(hashes() - before, static_cast<std::uint64_t>(identity::LoginThrottle::kFreeOfAddress));
   EXPECT_EQ(api->accounts().sessions().size(), 1U);
   // Who is signed in goes on, and stops.
   scopes = api->accounts().caller_of_session(secret_of(in))->scopes;
@@ -203,15 +203,15 @@ TEST_F(LoginsTest, TenThousandBadLoginsCostAFewHashesAndSignNobodyOut) {
 TEST_F(LoginsTest, FewWaitAtATimeAndFewerOfOneAddress) {
   struct Asking {
     std::string peer;
-    std::optional<std::expected<std::string, LoginRefusal>> end;
+    std::optional<std::expected<std::string, identity::LoginRefusal>> end;
   };
   std::vector<Asking> all;
   for (int i = 0; i < 20; ++i) all.push_back({i < 5 ? "10.0.0.1" : "10.0.1." + std::to_string(i), {}});
-  const auto attempt = [](Logins& logins, Asking& asking, std::string name) -> boost::asio::awaitable<void> {
-    LoginAttempt wish{std::move(name), "guess", asking.peer, ""};
+  const auto attempt = [](identity::Logins& logins, Asking& asking, std::string name) -> boost::asio::awaitable<void> {
+    identity::LoginAttempt wish{std::move(name), "guess", asking.peer, ""};
     asking.end = co_await logins.log_in(std::move(wish));
   };
-  Logins logins{clock, api->accounts(), kCheapPasswords};
+  identity::Logins logins{clock, api->accounts(), kCheapPasswords};
   clock.add_worker(logins.worker());
   for (std::size_t i = 0; i < all.size(); ++i) {
     tasks.spawn("attempt", attempt(logins, all[i], "user" + std::to_string(i)));
@@ -226,15 +226,15 @@ TEST_F(LoginsTest, FewWaitAtATimeAndFewerOfOneAddress) {
     if (asking.end->error().error.reason == "busy" && asking.peer == "10.0.0.1") ++busy_of_one;
     if (asking.end->error().error.reason == "wrong_credentials") ++hashed;
   }
-  EXPECT_EQ(busy_of_one, 5 - kMaxWaitingOfAddress);
-  EXPECT_EQ(hashed, kMaxWaitingLogins);
-  EXPECT_EQ(logins.hashes_made(), kMaxWaitingLogins);
+  EXPECT_EQ(busy_of_one, 5 - identity::kMaxWaitingOfAddress);
+  EXPECT_EQ(hashed, identity::kMaxWaitingLogins);
+  EXPECT_EQ(logins.hashes_made(), identity::kMaxWaitingLogins);
 }
 
 TEST_F(LoginsTest, EachUserHasAFewSessionsAndTakesNobodyElsesPlace) {
   const std::string of_link = api->accounts().open_session("", "", "");
   std::vector<std::string> secrets;
-  for (std::size_t i = 0; i <= kMaxSessionsOfUser; ++i) {
+  for (std::size_t i = 0; i <= identity::kMaxSessionsOfUser; ++i) {
     secrets.push_back(secret_of(log_in("anna", "correct horse")));
     clock.run_for(1s);
   }

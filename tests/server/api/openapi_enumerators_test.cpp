@@ -48,19 +48,19 @@ TEST(OpenapiEnumerators, AreTheTextsOfTheProtocol) {
 }
 
 TEST(OpenapiEnumerators, AreTheTextsOfTheStation) {
-  EXPECT_EQ(documented("Role"), possible<Role>());
-  EXPECT_EQ(documented("Robot.link"), possible<LinkState>());
-  EXPECT_EQ(documented("RobotToStop.link"), possible<LinkState>());
-  EXPECT_EQ(documented("RobotModel.state"), possible<ModelState>());
-  EXPECT_EQ(documented("Command.state"), possible<CommandState>());
+  EXPECT_EQ(documented("Role"), possible<identity::Role>());
+  EXPECT_EQ(documented("Robot.link"), possible<station::LinkState>());
+  EXPECT_EQ(documented("RobotToStop.link"), possible<station::LinkState>());
+  EXPECT_EQ(documented("RobotModel.state"), possible<station::ModelState>());
+  EXPECT_EQ(documented("Command.state"), possible<station::CommandState>());
 }
 
 TEST(OpenapiEnumerators, AreTheTextsOfWhatIsRecorded) {
-  EXPECT_EQ(documented("RunState"), possible<RunState>());
-  EXPECT_EQ(documented("Recording.space"), possible<SpaceState>());
-  EXPECT_EQ(documented("Backup.state"), possible<BackupState>());
-  EXPECT_EQ(documented("Reference.clock_method"), possible<ReferenceClock>());
-  EXPECT_EQ(documented("Step.cause"), possible<StepCause>());
+  EXPECT_EQ(documented("RunState"), possible<storage::RunState>());
+  EXPECT_EQ(documented("Recording.space"), possible<storage::SpaceState>());
+  EXPECT_EQ(documented("Backup.state"), possible<storage::BackupState>());
+  EXPECT_EQ(documented("Reference.clock_method"), possible<storage::ReferenceClock>());
+  EXPECT_EQ(documented("Step.cause"), possible<analysis::StepCause>());
 }
 
 }  // namespace

@@ -42,14 +42,14 @@ TEST_F(OpenapiTest, EveryRouteIsDocumentedAndEveryDocumentedRouteExists) {
   const Operations document = documented();
   std::set<std::string> described, registered;
   for (const auto& [operation, details] : document) described.insert(operation);
-  for (const Route& route : api->router().routes()) registered.insert(route.method + " " + route.pattern);
+  for (const http::Route& route : api->router().routes()) registered.insert(route.method + " " + route.pattern);
   EXPECT_EQ(described, registered);
   EXPECT_GE(described.size(), 18U);
 }
 
 TEST_F(OpenapiTest, QueryParametersAreTheSame) {
   const Operations document = documented();
-  for (const Route& route : api->router().routes()) {
+  for (const http::Route& route : api->router().routes()) {
     const std::string operation = route.method + " " + route.pattern;
     const std::set<std::string> known{route.query.begin(), route.query.end()};
     EXPECT_EQ(document.at(operation).query, known) << operation;
@@ -58,7 +58,7 @@ TEST_F(OpenapiTest, QueryParametersAreTheSame) {
 
 TEST_F(OpenapiTest, EveryRouteNeedsWhatTheDocumentSays) {
   const Operations document = documented();
-  for (const Route& route : api->router().routes()) {
+  for (const http::Route& route : api->router().routes()) {
     const std::string operation = route.method + " " + route.pattern;
     EXPECT_EQ(document.at(operation).scope, text(route.needs)) << operation;
   }

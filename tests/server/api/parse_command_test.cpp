@@ -34,26 +34,26 @@ TEST(ParseCommand, UnderstandsEveryKind) {
       {R"({"kind":"ping"})", rheonaut_Command_ping_tag},
   };
   for (const auto& one : cases) {
-    const auto command = parse_command(one.body);
+    const auto command = api::parse_command(one.body);
     ASSERT_TRUE(command) << one.body << ": " << command.error().detail;
     EXPECT_EQ(command->action.which_action, one.action) << one.body;
   }
 }
 
 TEST(ParseCommand, CarriesTheValues) {
-  const auto command = parse_command(R"({"kind":"set_mode","mode":"auto","setpoint_m":0.1,"life_ms":500})");
+  const auto command = api::parse_command(R"({"kind":"set_mode","mode":"auto","setpoint_m":0.1,"life_ms":500})");
   ASSERT_TRUE(command);
   EXPECT_EQ(command->action.action.set_mode.mode, rheonaut_MODE_AUTO);
   EXPECT_TRUE(command->action.action.set_mode.has_setpoint_m);
   EXPECT_EQ(command->action.action.set_mode.setpoint_m, 0.1F);
   EXPECT_EQ(command->time_to_live, std::chrono::milliseconds{500});
   EXPECT_EQ(command->arguments, R"({"mode":"auto","setpoint_m":0.1})");
-  const auto timed = parse_command(R"({"kind":"set_duty","duty":0.1,"execute_at_robot_us":5000000})");
+  const auto timed = api::parse_command(R"({"kind":"set_duty","duty":0.1,"execute_at_robot_us":5000000})");
   ASSERT_TRUE(timed);
   EXPECT_TRUE(timed->action.has_execute_at_robot_us);
   EXPECT_EQ(timed->action.execute_at_robot_us, 5'000'000U);
   EXPECT_EQ(timed->arguments, R"({"duty":0.1,"execute_at_robot_us":5000000})");
-  const auto clear = parse_command(R"({"kind":"clear_emergency","emergency_id":"18446744073709551615"})");
+  const auto clear = api::parse_command(R"({"kind":"clear_emergency","emergency_id":"18446744073709551615"})");
   ASSERT_TRUE(clear);
   EXPECT_EQ(clear->action.action.clear_emergency.emergency_id, UINT64_MAX);
 }
@@ -112,9 +112,9 @@ TEST(ParseCommand, RefusesWithMemberAndValue) {
       {R"({"kind":"clear_emergency","emergency_id":"12x"})", 400, "emergency_id"},
   };
   for (const auto& one : cases) {
-    const auto command = parse_command(one.body);
+    const auto command = api::parse_command(one.body);
     ASSERT_FALSE(command) << one.body;
-    EXPECT_EQ(http_status(command.error().code), one.status) << one.body << ": " << command.error().detail;
+    EXPECT_EQ(http::http_status(command.error().code), one.status) << one.body << ": " << command.error().detail;
     EXPECT_NE(command.error().detail.find(one.says), std::string::npos) << one.body << ": " << command.error().detail;
   }
 }
@@ -124,40 +124,40 @@ TEST(ParseCommand, RefusesDeepNestingBeforeItIsParsed) {
     return R"({"kind":)" + std::string(static_cast<std::size_t>(levels - 1), '[') +
            std::string(static_cast<std::size_t>(levels - 1), ']') + "}";
   };
-  const auto deep = parse_command(nested(kMaxJsonDepth + 1));
+  const auto deep = api::parse_command(nested(api::kMaxJsonDepth + 1));
   ASSERT_FALSE(deep);
   EXPECT_EQ(deep.error().detail, "the body is nested deeper than 16 levels");
-  EXPECT_EQ(parse_command(nested(kMaxJsonDepth)).error().reason, "wrong_type");
-  EXPECT_EQ(parse_command(nested(30'000)).error().reason, "malformed_json");
-  EXPECT_EQ(parse_command(std::string(60'000, '[')).error().reason, "malformed_json");
+  EXPECT_EQ(api::parse_command(nested(api::kMaxJsonDepth)).error().reason, "wrong_type");
+  EXPECT_EQ(api::parse_command(nested(30'000)).error().reason, "malformed_json");
+  EXPECT_EQ(api::parse_command(std::string(60'000, '[')).error().reason, "malformed_json");
   // Brackets in a text are text.
-  EXPECT_TRUE(parse_marker(R"({"text":"[[[[[[[[[[[[[[[[[[[[\"[[{{"})"));
+  EXPECT_TRUE(api::parse_marker(R"({"text":"[[[[[[[[[[[[[[[[[[[[\"[[{{"})"));
 }
 
 TEST(ParseRun, NeedsRobotAndNameAndKnowsItsMembers) {
-  const auto wish = parse_run(R"({"robot_id":"r1","name":"first","fluid":"water","mean_flow_m_s":0.02})");
+  const auto wish = api::parse_run(R"({"robot_id":"r1","name":"first","fluid":"water","mean_flow_m_s":0.02})");
   ASSERT_TRUE(wish) << wish.error().detail;
   EXPECT_EQ(wish->conditions.name, "first");
   EXPECT_EQ(wish->conditions.mean_flow_m_s, 0.02);
-  EXPECT_FALSE(parse_run(R"({"robot_id":"r1"})"));
-  EXPECT_FALSE(parse_run(R"({"robot_id":"R 1","name":"x"})"));
-  EXPECT_FALSE(parse_run(R"({"robot_id":"r1","name":""})"));
-  EXPECT_FALSE(parse_run(R"({"robot_id":"r1","name":"x","verdict":"good"})"));
-  EXPECT_EQ(parse_run_end("").value(), "");
-  EXPECT_EQ(parse_run_end(R"({"verdict":"good"})").value(), "good");
+  EXPECT_FALSE(api::parse_run(R"({"robot_id":"r1"})"));
+  EXPECT_FALSE(api::parse_run(R"({"robot_id":"R 1","name":"x"})"));
+  EXPECT_FALSE(api::parse_run(R"({"robot_id":"r1","name":""})"));
+  EXPECT_FALSE(api::parse_run(R"({"robot_id":"r1","name":"x","verdict":"good"})"));
+  EXPECT_EQ(api::parse_run_end("").value(), "");
+  EXPECT_EQ(api::parse_run_end(R"({"verdict":"good"})").value(), "good");
 }
 
 TEST(StateJson, WritesFloatsAsTheShortestDecimal) {
-  EXPECT_EQ(decimal(0.1F).dump(), "0.1");
-  EXPECT_EQ(decimal(std::numeric_limits<float>::quiet_NaN()).dump(), "null");
-  EXPECT_EQ(decimal(1e-30F).dump(), "1e-30");
+  EXPECT_EQ(base::decimal(0.1F).dump(), "0.1");
+  EXPECT_EQ(base::decimal(std::numeric_limits<float>::quiet_NaN()).dump(), "null");
+  EXPECT_EQ(base::decimal(1e-30F).dump(), "1e-30");
 }
 
 TEST(StateJson, ReplacesBytesThatAreNotText) {
-  RobotState robot;
+  station::RobotState robot;
   robot.id = "r1";
   robot.firmware_version = "1.0\xff";
-  EXPECT_EQ(nlohmann::json::parse(dump(to_json(robot)))["firmware_version"], "1.0\xef\xbf\xbd");
+  EXPECT_EQ(nlohmann::json::parse(base::dump(live::to_json(robot)))["firmware_version"], "1.0\xef\xbf\xbd");
 }
 
 }  // namespace

@@ -42,11 +42,11 @@ TEST_F(RecordingRoutesTest, ReportsWhatWasRecordedAndHowMuchRoomThereIs) {
 TEST_F(RecordingRoutesTest, ALossIsReportedUntilAnAdminAcknowledgesIt) {
   EXPECT_EQ(ask("GET", "/api/v1/recording").parsed()["losses"], json::array());
   const auto database = folder.path() / "station.sqlite";
-  HeadFile head = **load_head_file(database);
+  storage::HeadFile head = **storage::load_head_file(database);
   head.head.commits += 1000;
   save_head_file(database, head);
   bool compared = false;
-  const auto compare = [](HeadWatch& watch, bool& done) -> boost::asio::awaitable<void> {
+  const auto compare = [](storage::HeadWatch& watch, bool& done) -> boost::asio::awaitable<void> {
     co_await watch.open();
     done = true;
   };
@@ -60,9 +60,9 @@ TEST_F(RecordingRoutesTest, ALossIsReportedUntilAnAdminAcknowledgesIt) {
   }
   EXPECT_THAT(ask("GET", "/metrics").body, HasSubstr("rheonaut_store_losses 1\n"));
   EXPECT_EQ(ask("GET", "/api/v1/recording").parsed()["state"], "recording");
-  scopes = Scopes::of(Role::operator_);
+  scopes = identity::Scopes::of(identity::Role::operator_);
   EXPECT_EQ(ask("POST", "/api/v1/recording/losses/acknowledge").status, 403);
-  scopes = Scopes::of(Role::admin);
+  scopes = identity::Scopes::of(identity::Role::admin);
   EXPECT_EQ(ask("POST", "/api/v1/recording/losses/acknowledge").status, 200);
   EXPECT_EQ(ask("GET", "/api/v1/station").parsed()["losses"], json::array());
   EXPECT_THAT(ask("GET", "/metrics").body, HasSubstr("rheonaut_store_losses 0\n"));

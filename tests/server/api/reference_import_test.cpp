@@ -25,7 +25,7 @@ class ReferenceImportTest : public ::testing::Test {
  protected:
   ReferenceImportTest() {
     for (int k = 0; k <= 3000; ++k) {
-      OwnPosition sample;
+      analysis::OwnPosition sample;
       sample.robot_time_us = 5'000'000 + static_cast<std::uint64_t>(k) * 10'000;
       sample.utc_us = 1'767'225'600'000'000 + k * 10'000;
       sample.clock_uncertainty_us = 600;
@@ -35,7 +35,7 @@ class ReferenceImportTest : public ::testing::Test {
     }
     request.source = "camera.csv";
     request.sd_m = 0.0005;
-    request.clock.method = ReferenceClock::offset;
+    request.clock.method = storage::ReferenceClock::offset;
   }
 
   // A camera whose clock says 0 at `zero_s` of the run, from_s to to_s of the run.
@@ -45,7 +45,7 @@ class ReferenceImportTest : public ::testing::Test {
       request.csv += fmt::format("{:.6f},9,{:.6f}\n", at_s - zero_s, truth_m(at_s) + zero_m);
     }
   }
-  PlacedReference place() {
+  analysis::PlacedReference place() {
     auto placed = place_reference(request, own, zeroings, marker);
     if (!placed) throw std::runtime_error{placed.error().detail};
     return std::move(*placed);
@@ -55,7 +55,7 @@ class ReferenceImportTest : public ::testing::Test {
     return placed ? Error{} : placed.error();
   }
   // How far the worst position is from the truth.
-  static double worst_m(const PlacedReference& placed) {
+  static double worst_m(const analysis::PlacedReference& placed) {
     double worst = 0;
     for (std::size_t i = 0; i < placed.positions.size(); ++i) {
       const double at_s = 1e-6 * static_cast<double>(placed.positions.robot_time_us[i] - 5'000'000);
@@ -64,10 +64,10 @@ class ReferenceImportTest : public ::testing::Test {
     return worst;
   }
 
-  std::vector<OwnPosition> own;
-  std::vector<Zeroing> zeroings;
-  ReferenceRequest request;
-  std::optional<MarkerPlace> marker;
+  std::vector<analysis::OwnPosition> own;
+  std::vector<storage::Zeroing> zeroings;
+  analysis::ReferenceRequest request;
+  std::optional<storage::MarkerPlace> marker;
 };
 
 TEST_F(ReferenceImportTest, ASpanInWhichTheRobotWasZeroedIsRefused) {
@@ -83,7 +83,7 @@ TEST_F(ReferenceImportTest, ASpanInWhichTheRobotWasZeroedIsRefused) {
 // Its standard deviation shows no zeroing of a robot that knows its position.
 TEST_F(ReferenceImportTest, ASpanWithAnEventOfAZeroingIsRefusedHoweverSureTheRobotIs) {
   see(0, 0);
-  for (OwnPosition& sample : own) sample.position_sd_m = 0;
+  for (analysis::OwnPosition& sample : own) sample.position_sd_m = 0;
   zeroings = {{0, 5'000'000}, {0, 35'000'001}, {1, 20'000'000}};  // before, after, and of another boot
   EXPECT_EQ(refusal().detail, "");
   zeroings.push_back({0, 20'000'000});
@@ -99,9 +99,9 @@ TEST_F(ReferenceImportTest, MillimetresAndCentimetresAreRefusedWhateverTheClockC
     }
   };
   request.clock.zero_at_us = 1'767'225'600'000'000;
-  marker = MarkerPlace{0, 5'000'000};
-  for (const auto method :
-       {ReferenceClock::offset, ReferenceClock::utc, ReferenceClock::marker, ReferenceClock::correlation}) {
+  marker = storage::MarkerPlace{0, 5'000'000};
+  for (const auto method : {storage::ReferenceClock::offset, storage::ReferenceClock::utc,
+                            storage::ReferenceClock::marker, storage::ReferenceClock::correlation}) {
     request.clock.method = method;
     for (const bool keeps_zero : {false, true}) {
       request.keeps_zero = keeps_zero;
@@ -123,24 +123,25 @@ TEST_F(ReferenceImportTest, MillimetresAndCentimetresAreRefusedWhateverTheClockC
 // What carries the robot along unseen makes no other unit.
 TEST_F(ReferenceImportTest, ARobotThatMissedMostOfItsMotionHasAReferenceAllTheSame) {
   see(0, 0);
-  for (OwnPosition& sample : own) sample.position_m *= 0.02F;
+  for (analysis::OwnPosition& sample : own) sample.position_m *= 0.02F;
   EXPECT_EQ(refusal().detail, "");
 }
 
 // A pump's flow, of which a robot feels nothing, as it holds a believed position.
 TEST_F(ReferenceImportTest, ASteadyFlowOfMetresMakesNoOtherUnit) {
-  for (OwnPosition& sample : own) sample.position_m *= 0.25F;
+  for (analysis::OwnPosition& sample : own) sample.position_m *= 0.25F;
   request.csv = "t_s,position_m\n";
   for (double at_s = 0.1; at_s < 29.9; at_s += 1.0 / 30) {
     request.csv += fmt::format("{:.6f},{:.6f}\n", at_s, truth_m(at_s) + 0.1 * at_s);
   }
   request.clock.zero_at_us = 1'767'225'600'000'000;
-  marker = MarkerPlace{0, 5'000'000};
-  for (const auto method : {ReferenceClock::offset, ReferenceClock::utc, ReferenceClock::marker}) {
+  marker = storage::MarkerPlace{0, 5'000'000};
+  for (const auto method :
+       {storage::ReferenceClock::offset, storage::ReferenceClock::utc, storage::ReferenceClock::marker}) {
     request.clock.method = method;
     EXPECT_EQ(refusal().detail, "") << text(method);
   }
-  request.clock.method = ReferenceClock::correlation;
+  request.clock.method = storage::ReferenceClock::correlation;
   EXPECT_EQ(refusal().reason, "no_correlation") << "the motions differ too much to find the clock, whatever the unit";
 }
 
@@ -163,7 +164,7 @@ TEST_F(ReferenceImportTest, AnOffsetIsAddedAndTheZeroIsTheRobots) {
   see(-3, 0.7);
   request.clock.offset_s = -3;
   request.clock.sd_s = 0.02;
-  const PlacedReference placed = place();
+  const analysis::PlacedReference placed = place();
   EXPECT_EQ(placed.reference.clock_offset_s, -3);
   EXPECT_EQ(placed.reference.clock_sd_s, 0.02);
   EXPECT_NEAR(placed.reference.zero_offset_m, -0.7, 1e-6);
@@ -172,14 +173,14 @@ TEST_F(ReferenceImportTest, AnOffsetIsAddedAndTheZeroIsTheRobots) {
   EXPECT_EQ(placed.positions.position_sd_m.front(), 0.0005);
   EXPECT_EQ(placed.reference.samples, placed.positions.size());
   EXPECT_EQ(placed.reference.samples_left_out, 0U);
-  EXPECT_THAT(clock_in_words(placed.reference), HasSubstr("t_s plus -3.0000 s ± 40 ms"));
-  EXPECT_THAT(zero_in_words(placed.reference), StartsWith("zero by the robot's own record: -0.7000 m"));
+  EXPECT_THAT(analysis::clock_in_words(placed.reference), HasSubstr("t_s plus -3.0000 s ± 40 ms"));
+  EXPECT_THAT(analysis::zero_in_words(placed.reference), StartsWith("zero by the robot's own record: -0.7000 m"));
 }
 
 TEST_F(ReferenceImportTest, AKeptZeroIsLeftAlone) {
   see(0, 0.7);
   request.keeps_zero = true;
-  const PlacedReference placed = place();
+  const analysis::PlacedReference placed = place();
   EXPECT_EQ(placed.reference.zero_offset_m, 0);
   EXPECT_FALSE(placed.reference.zero_sd_m);
   EXPECT_NEAR(placed.positions.position_m.front(), truth_m(0.1) + 0.7, 1e-5);
@@ -197,8 +198,8 @@ TEST_F(ReferenceImportTest, TheZeroIsFoundWhereTheRobotIsSure) {
 
 TEST_F(ReferenceImportTest, AMarkerTiesBothClocks) {
   see(2, 0);
-  marker = MarkerPlace{0, 5'000'000 + 6'500'000};
-  request.clock.method = ReferenceClock::marker;
+  marker = storage::MarkerPlace{0, 5'000'000 + 6'500'000};
+  request.clock.method = storage::ReferenceClock::marker;
   request.clock.at_s = 4.5;
   EXPECT_NEAR(place().reference.clock_offset_s, 2, 1e-9);
   EXPECT_LT(worst_m(place()), 1e-5);
@@ -208,35 +209,36 @@ TEST_F(ReferenceImportTest, AMarkerTiesBothClocks) {
 
 TEST_F(ReferenceImportTest, UtcGoesByTheClockThatTheStationKnew) {
   see(-1.25, 0);
-  request.clock.method = ReferenceClock::utc;
+  request.clock.method = storage::ReferenceClock::utc;
   request.clock.zero_at_us = 1'767'225'600'000'000 - 1'250'000;
   own.front().utc_us += 900'000;  // a guess of the first second
   own.front().clock_uncertainty_us = 900'000;
-  const PlacedReference placed = place();
+  const analysis::PlacedReference placed = place();
   EXPECT_NEAR(placed.reference.clock_offset_s, -1.25, 1e-9);
   EXPECT_NEAR(placed.reference.clock_sd_s.value(), 600e-6 / std::sqrt(3.0), 1e-9);
   for (std::size_t k = 0; k < own.size(); ++k) own[k].utc_us += static_cast<std::int64_t>(2 * k);  // 200 ppm
   EXPECT_GT(place().reference.clock_sd_s.value(), 0.003) << "one offset does not hold from end to end";
-  for (OwnPosition& sample : own) sample.clock_uncertainty_us = -1;
+  for (analysis::OwnPosition& sample : own) sample.clock_uncertainty_us = -1;
   EXPECT_EQ(refusal().reason, "no_clock");
 }
 
 TEST_F(ReferenceImportTest, CorrelationFindsTheClockAndSaysHow) {
   see(100.123, -0.4);
-  request.clock.method = ReferenceClock::correlation;
-  const PlacedReference placed = place();
+  request.clock.method = storage::ReferenceClock::correlation;
+  const analysis::PlacedReference placed = place();
   EXPECT_NEAR(placed.reference.clock_offset_s, 100.123, 1e-3);
   EXPECT_GT(placed.reference.correlation.value(), 0.99);
   EXPECT_LT(worst_m(placed), 1e-3);
-  EXPECT_THAT(clock_in_words(placed.reference), StartsWith("clock by correlation with the robot's own motion"));
-  for (OwnPosition& sample : own) sample.position_m = 0;
+  EXPECT_THAT(analysis::clock_in_words(placed.reference),
+              StartsWith("clock by correlation with the robot's own motion"));
+  for (analysis::OwnPosition& sample : own) sample.position_m = 0;
   EXPECT_EQ(refusal().reason, "no_correlation");
   EXPECT_THAT(refusal().detail, HasSubstr("the robot moves by at most 0 mm"));
 }
 
 TEST_F(ReferenceImportTest, RowsBeforeAndAfterTheSpanAreLeftOut) {
   see(0, 0, -2, 33);
-  const PlacedReference placed = place();
+  const analysis::PlacedReference placed = place();
   EXPECT_GE(placed.positions.robot_time_us.front(), 5'000'000U);
   EXPECT_LE(placed.positions.robot_time_us.back(), 35'000'000U);
   EXPECT_GT(placed.reference.samples_left_out, 100U);
@@ -261,7 +263,7 @@ TEST_F(ReferenceImportTest, WhatIsWrongIsReportedWithItsLine) {
 TEST_F(ReferenceImportTest, ARunWithARebootNeedsASpan) {
   see(0, 0);
   for (int k = 0; k < 100; ++k) {
-    OwnPosition sample = own.front();
+    analysis::OwnPosition sample = own.front();
     sample.span = 1;
     sample.robot_time_us += static_cast<std::uint64_t>(k) * 10'000;
     own.push_back(sample);
@@ -272,10 +274,10 @@ TEST_F(ReferenceImportTest, ARunWithARebootNeedsASpan) {
 }
 
 TEST_F(ReferenceImportTest, TheDisturbanceIsNoMotion) {
-  StoredSample stored;
+  storage::StoredSample stored;
   stored.sample.position_m = 0.15F;
   stored.disturbance_m = 0.05F;
-  EXPECT_FLOAT_EQ(own_position(stored).position_m, 0.1F);
+  EXPECT_FLOAT_EQ(analysis::own_position(stored).position_m, 0.1F);
 }
 
 }  // namespace

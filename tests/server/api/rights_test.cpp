@@ -16,7 +16,7 @@ class RightsTest : public ApiTest {
     }
     return target;
   }
-  bool refused(const Route& route) {
+  bool refused(const http::Route& route) {
     const Answered answered = ask(route.method, target_of(route.pattern));
     if (answered.status != 403) return false;
     const json problem = answered.parsed();
@@ -29,9 +29,9 @@ class RightsTest : public ApiTest {
 
 TEST_F(RightsTest, EveryRouteIsOpenToTheRolesThatItsScopeNamesAndToNoOther) {
   std::map<std::string, int> open;
-  for (const Role role : kRoles) {
-    scopes = Scopes::of(role);
-    for (const Route& route : api->router().routes()) {
+  for (const identity::Role role : identity::kRoles) {
+    scopes = identity::Scopes::of(role);
+    for (const http::Route& route : api->router().routes()) {
       const bool may = role >= least_role(route.needs);
       EXPECT_EQ(refused(route), !may) << text(role) << ": " << route.method << " " << route.pattern;
       open[text(role)] += may ? 1 : 0;
@@ -45,7 +45,7 @@ TEST_F(RightsTest, EveryRouteIsOpenToTheRolesThatItsScopeNamesAndToNoOther) {
 TEST_F(RightsTest, WithoutACredentialOnlySigningInIsThere) {
   scopes = {};
   std::set<std::string> open;
-  for (const Route& route : api->router().routes()) {
+  for (const http::Route& route : api->router().routes()) {
     if (!refused(route)) open.insert(route.method + " " + route.pattern);
   }
   EXPECT_EQ(open, (std::set<std::string>{"GET /login", "POST /api/v1/login"}));
@@ -54,14 +54,14 @@ TEST_F(RightsTest, WithoutACredentialOnlySigningInIsThere) {
 // Written out, so that a route that changes its scope by accident is noticed here.
 TEST_F(RightsTest, AViewerChangesNothingButMayStop) {
   std::set<std::string> changes;
-  for (const Route& route : api->router().routes()) {
-    if (route.method != "GET" && least_role(route.needs) == Role::viewer) changes.insert(route.pattern);
+  for (const http::Route& route : api->router().routes()) {
+    if (route.method != "GET" && least_role(route.needs) == identity::Role::viewer) changes.insert(route.pattern);
   }
   EXPECT_EQ(changes, (std::set<std::string>{"/api/v1/emergency-stop", "/api/v1/robots/{robot_id}/emergency-stop",
                                             "/api/v1/login", "/api/v1/logout"}));
   std::set<std::string> of_admins;
-  for (const Route& route : api->router().routes()) {
-    if (route.needs == Scope::admin) of_admins.insert(route.method + " " + route.pattern);
+  for (const http::Route& route : api->router().routes()) {
+    if (route.needs == identity::Scope::admin) of_admins.insert(route.method + " " + route.pattern);
   }
   EXPECT_TRUE(of_admins.contains("POST /api/v1/login-links")) << "a link signs in as admin";
   EXPECT_TRUE(of_admins.contains("POST /api/v1/backups"));
@@ -78,7 +78,7 @@ TEST_F(RightsTest, OnlyAnAdminChangesWhatBoundsTheMotionOfARobot) {
     if (!confirm.is_null()) body["confirm"] = std::move(confirm);
     return begin("POST", "/api/v1/robots/r1/commands", body);
   };
-  scopes = parse_scopes("command").value();
+  scopes = identity::parse_scopes("command").value();
   const auto refused = end(set("position_limit_max_m", true));
   EXPECT_EQ(refused.status, 403);
   EXPECT_TRUE(robot->commands().empty());
@@ -88,7 +88,7 @@ TEST_F(RightsTest, OnlyAnAdminChangesWhatBoundsTheMotionOfARobot) {
   EXPECT_EQ(robot->commands().back().action.set_parameter.value, 0.2F);
   robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, 0);
   EXPECT_EQ(end(of_operators).status, 200);
-  scopes = parse_scopes("admin").value();
+  scopes = identity::parse_scopes("admin").value();
   EXPECT_EQ(end(set("position_limit_max_m", nullptr)).status, 422);
   const auto of_admins = set("position_limit_max_m", true);
   ASSERT_EQ(robot->commands().size(), 2U);
@@ -100,10 +100,10 @@ TEST_F(RightsTest, OnlyAnAdminChangesWhatBoundsTheMotionOfARobot) {
 TEST_F(RightsTest, ATokenThatMayOnlyStopSeesWhatItsStopIsAboutAndNothingElse) {
   connect_robot();
   const auto stopping = begin("POST", "/api/v1/robots/r1/emergency-stop");
-  scopes = parse_scopes("stop").value();
+  scopes = identity::parse_scopes("stop").value();
   std::set<std::string> open;
-  for (const Route& route : api->router().routes()) {
-    if (route.needs != Scope::anyone && !refused(route)) open.insert(route.method + " " + route.pattern);
+  for (const http::Route& route : api->router().routes()) {
+    if (route.needs != identity::Scope::anyone && !refused(route)) open.insert(route.method + " " + route.pattern);
   }
   EXPECT_EQ(open, (std::set<std::string>{"GET /api/v1/robots", "GET /api/v1/robots/{robot_id}",
                                          "GET /api/v1/commands/{command_id}", "POST /api/v1/emergency-stop",
@@ -127,7 +127,7 @@ TEST_F(RightsTest, ATokenThatMayOnlyStopSeesWhatBecameOfItsStops) {
   const auto setting = begin("POST", "/api/v1/robots/r1/commands", {{"kind", "set_duty"}, {"duty", 0.1}});
   answer_last(0);
   const std::string duty = end(setting).parsed()["command_id"];
-  scopes = parse_scopes("stop").value();
+  scopes = identity::parse_scopes("stop").value();
   const auto stopping = begin("POST", "/api/v1/robots/r1/emergency-stop");
   const std::string pending = ask("GET", "/api/v1/robots/r1").parsed()["pending_stop"];
   EXPECT_EQ(seen(pending).parsed()["state"], "sent");
@@ -137,10 +137,10 @@ TEST_F(RightsTest, ATokenThatMayOnlyStopSeesWhatBecameOfItsStops) {
   EXPECT_EQ(ask("GET", "/api/v1/robots/r1").parsed()["emergency_id"], "9");
   EXPECT_EQ(seen(duty).status, 403) << "no stop";
 
-  StopRequest of_another;
+  station::StopRequest of_another;
   of_another.robot_id = "r1";
   of_another.actor = "token:other";
-  const auto stop_as_another = [](Station& of, StopRequest request) -> boost::asio::awaitable<void> {
+  const auto stop_as_another = [](station::Station& of, station::StopRequest request) -> boost::asio::awaitable<void> {
     co_await of.emergency_stop(std::move(request), 1s);
   };
   tasks.spawn("another's stop", stop_as_another(station, of_another));
@@ -150,60 +150,60 @@ TEST_F(RightsTest, ATokenThatMayOnlyStopSeesWhatBecameOfItsStops) {
   answer_last(10);
   clock.settle();
   EXPECT_EQ(seen(others).status, 403);
-  scopes = Scopes::of(Role::viewer);
+  scopes = identity::Scopes::of(identity::Role::viewer);
   EXPECT_EQ(seen(others).parsed()["actor"], "token:other");
 }
 
 TEST_F(RightsTest, AViewerSeesWhoIsInControl) {
   connect_robot();
-  ASSERT_TRUE(station.control({"r1", "user:anna/session:4", "", ControlAction::take, 60s, ""}));
-  scopes = Scopes::of(Role::viewer);
+  ASSERT_TRUE(station.control({"r1", "user:anna/session:4", "", station::ControlAction::take, 60s, ""}));
+  scopes = identity::Scopes::of(identity::Role::viewer);
   EXPECT_EQ(ask("GET", "/api/v1/robots/r1").parsed()["control"]["holder"], "user:anna/session:4");
 }
 
 TEST_F(RightsTest, EachScopeBringsAlongWhatItMust) {
-  const auto with = [](Scope scope) {
-    Scopes scopes;
+  const auto with = [](identity::Scope scope) {
+    identity::Scopes scopes;
     return text(scopes.add(scope));
   };
-  EXPECT_EQ(with(Scope::read), "read");
-  EXPECT_EQ(with(Scope::stop), "stop");
-  EXPECT_EQ(with(Scope::record), "read,record");
-  EXPECT_EQ(with(Scope::command), "read,stop,command") << "who may move a robot may stop it";
-  EXPECT_EQ(with(Scope::admin), "read,stop,record,command,admin");
-  for (const Role role : kRoles) {
-    EXPECT_TRUE(Scopes::of(role).allow(Scope::stop)) << text(role);
-    EXPECT_EQ(Scopes::of(role).role(), role);
-    EXPECT_EQ(parse_role(text(role)).value(), role);
-    EXPECT_EQ(parse_scopes(text(Scopes::of(role))).value(), Scopes::of(role));
+  EXPECT_EQ(with(identity::Scope::read), "read");
+  EXPECT_EQ(with(identity::Scope::stop), "stop");
+  EXPECT_EQ(with(identity::Scope::record), "read,record");
+  EXPECT_EQ(with(identity::Scope::command), "read,stop,command") << "who may move a robot may stop it";
+  EXPECT_EQ(with(identity::Scope::admin), "read,stop,record,command,admin");
+  for (const identity::Role role : identity::kRoles) {
+    EXPECT_TRUE(identity::Scopes::of(role).allow(identity::Scope::stop)) << text(role);
+    EXPECT_EQ(identity::Scopes::of(role).role(), role);
+    EXPECT_EQ(identity::parse_role(text(role)).value(), role);
+    EXPECT_EQ(identity::parse_scopes(text(identity::Scopes::of(role))).value(), identity::Scopes::of(role));
   }
   for (const char* wrong : {"", "read,", "Read", "read stop", "anyone", "root"}) {
-    EXPECT_FALSE(parse_scopes(wrong)) << wrong;
-    EXPECT_FALSE(parse_role(wrong)) << wrong;
+    EXPECT_FALSE(identity::parse_scopes(wrong)) << wrong;
+    EXPECT_FALSE(identity::parse_role(wrong)) << wrong;
   }
 }
 
 TEST_F(RightsTest, ATokenOfAUserIsBoundByTheUsersRole) {
-  Accounts& accounts = api->accounts();
-  std::optional<Result<User>> added;
-  std::optional<Result<NewToken>> made;
-  const auto make = [](Accounts& in, std::optional<Result<User>>& user,
-                       std::optional<Result<NewToken>>& token) -> boost::asio::awaitable<void> {
-    User anna;
+  identity::Accounts& accounts = api->accounts();
+  std::optional<Result<identity::User>> added;
+  std::optional<Result<identity::NewToken>> made;
+  const auto make = [](identity::Accounts& in, std::optional<Result<identity::User>>& user,
+                       std::optional<Result<identity::NewToken>>& token) -> boost::asio::awaitable<void> {
+    identity::User anna;
     anna.name = "anna";
-    anna.role = Role::operator_;
-    const Author nobody;
+    anna.role = identity::Role::operator_;
+    const station::Author nobody;
     user = co_await in.add_user(anna, nobody);
-    Scopes all = Scopes::of(Role::admin);
-    TokenRequest wish{"all", all, 0, "anna"};
+    identity::Scopes all = identity::Scopes::of(identity::Role::admin);
+    identity::TokenRequest wish{"all", all, 0, "anna"};
     token = co_await in.add_token(wish, nobody);
   };
   tasks.spawn("make", make(accounts, added, made));
   ASSERT_TRUE(clock.run_until([&] { return made.has_value(); }, 10s));
   ASSERT_TRUE(*made);
-  EXPECT_EQ(accounts.caller_of_token((*made)->secret)->role(), Role::operator_);
+  EXPECT_EQ(accounts.caller_of_token((*made)->secret)->role(), identity::Role::operator_);
   EXPECT_EQ(ask("POST", "/api/v1/users/anna/change", {{"role", "viewer"}}).status, 200);
-  EXPECT_EQ(accounts.caller_of_token((*made)->secret)->role(), Role::viewer);
+  EXPECT_EQ(accounts.caller_of_token((*made)->secret)->role(), identity::Role::viewer);
   EXPECT_EQ(ask("POST", "/api/v1/users/anna/change", {{"disabled", true}}).status, 200);
   EXPECT_FALSE(accounts.caller_of_token((*made)->secret));
   EXPECT_EQ(ask("POST", "/api/v1/users/anna/remove").status, 200);

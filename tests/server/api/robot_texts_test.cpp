@@ -18,8 +18,8 @@ namespace asio = boost::asio;
 
 std::string name_of(std::size_t number) { return fmt::format("r{:04}", number); }
 
-std::vector<RestoredRobot> fleet_of(std::size_t size) {
-  std::vector<RestoredRobot> fleet;
+std::vector<station::RestoredRobot> fleet_of(std::size_t size) {
+  std::vector<station::RestoredRobot> fleet;
   for (std::size_t i = 0; i < size; ++i) fleet.push_back({.id = name_of(i), .boot_id = i + 1, .emergency_id = 0});
   return fleet;
 }
@@ -34,14 +34,14 @@ class RobotTextsTest : public ::testing::Test {
  protected:
   void restore(std::size_t size) { station.restore(fleet_of(size), {}); }
   // The pieces of all robots, from the first to the end.
-  std::vector<RobotTexts::Piece> pieces() {
-    std::vector<RobotTexts::Piece> all;
+  std::vector<live::RobotTexts::Piece> pieces() {
+    std::vector<live::RobotTexts::Piece> all;
     do all.push_back(texts.piece_after(all.empty() ? "" : all.back().last));
     while (!all.back().is_end);
     return all;
   }
   asio::awaitable<void> read(std::string& into) {
-    RobotDocument document{texts, "[", "]"};
+    live::RobotDocument document{texts, "[", "]"};
     while (!document.is_whole()) into += co_await document.next();
   }
   std::string read_all() {
@@ -53,22 +53,23 @@ class RobotTextsTest : public ::testing::Test {
 
   asio::io_context loop{1};
   VirtualClock clock{loop};
-  TaskGroup tasks{loop};
-  Station station{loop, clock, Envelope{}, LinkTimes{}};
-  RobotTexts texts{loop, station};
+  runtime::TaskGroup tasks{loop};
+  station::Station station{loop, clock, config::Envelope{}, config::LinkTimes{}};
+  live::RobotTexts texts{loop, station};
 };
 
 TEST_F(RobotTextsTest, APieceIsABoundedPieceOfWork) {
   restore(500);
   const auto first = pieces();
   EXPECT_EQ(texts.written(), 500U);
-  EXPECT_GE(first.size(), 500 / RobotTexts::kWrittenInAPiece) << "each text of a piece had to be written";
+  EXPECT_GE(first.size(), 500 / live::RobotTexts::kWrittenInAPiece) << "each text of a piece had to be written";
   std::size_t largest_text = 0;
-  for (const auto& [id, robot] : station.robots()) largest_text = std::max(largest_text, dump(to_json(robot)).size());
+  for (const auto& [id, robot] : station.robots())
+    largest_text = std::max(largest_text, base::dump(live::to_json(robot)).size());
   const auto second = pieces();
   EXPECT_EQ(texts.written(), 500U);
   EXPECT_LT(second.size(), first.size()) << "nothing had to be written";
-  for (const auto& piece : second) EXPECT_LE(piece.text.size(), RobotTexts::kPieceBytes + largest_text);
+  for (const auto& piece : second) EXPECT_LE(piece.text.size(), live::RobotTexts::kPieceBytes + largest_text);
 }
 
 TEST_F(RobotTextsTest, ATextIsWrittenAgainWhenItsStateHasChangedAndThenOnly) {
@@ -109,8 +110,8 @@ TEST_F(RobotTextsTest, ATurnOfTheLoopMakesOnePieceHoweverManyRead) {
   };
   asio::post(loop, step);
   clock.settle();
-  ASSERT_GE(seen.size(), 200 / RobotTexts::kWrittenInAPiece);
-  for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_LE(seen[i] - seen[i - 1], RobotTexts::kWrittenInAPiece);
+  ASSERT_GE(seen.size(), 200 / live::RobotTexts::kWrittenInAPiece);
+  for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_LE(seen[i] - seen[i - 1], live::RobotTexts::kWrittenInAPiece);
   for (const std::string& text : into) EXPECT_EQ(json::parse(text).size(), 200U);
   EXPECT_EQ(texts.written(), 200U) << "each once, for all of them";
 }
@@ -118,12 +119,12 @@ TEST_F(RobotTextsTest, ATurnOfTheLoopMakesOnePieceHoweverManyRead) {
 // A robot that comes while somebody reads, before and behind where that one is.
 TEST_F(RobotTextsTest, RobotsMayAppearBetweenTwoPieces) {
   restore(40);
-  const RobotTexts::Piece first = texts.piece_after("");
+  const live::RobotTexts::Piece first = texts.piece_after("");
   ASSERT_FALSE(first.is_end);
   station.restore({{.id = "a-first", .boot_id = 1, .emergency_id = 0}}, {});
   station.restore({{.id = "z-last", .boot_id = 1, .emergency_id = 0}}, {});
   std::string rest;
-  for (RobotTexts::Piece piece = first; !piece.is_end;) {
+  for (live::RobotTexts::Piece piece = first; !piece.is_end;) {
     piece = texts.piece_after(piece.last);
     rest += (rest.empty() ? "" : ",") + piece.text;
   }
@@ -144,16 +145,16 @@ class OpeningPageTest : public ApiTest {
     for (std::size_t turn = 0; turn < kFleet + kLater; ++turn) {
       if (turn < kFleet) tasks.spawn("stop", stop(name_of(kFleet - 1 - turn)));
       if (turn >= kLater) {
-        const ControlRequest take{
-            name_of(kFleet - 1 - (turn - kLater)), "session:7", "", ControlAction::take, 60s, "", 0us};
+        const station::ControlRequest take{
+            name_of(kFleet - 1 - (turn - kLater)), "session:7", "", station::ControlAction::take, 60s, "", 0us};
         EXPECT_TRUE(station.control(take));
       }
       co_await asio::post(loop, asio::use_awaitable);
     }
     has_changed = true;
   }
-  asio::awaitable<void> stop(RobotId id) {
-    StopRequest request;
+  asio::awaitable<void> stop(station::RobotId id) {
+    station::StopRequest request;
     request.robot_id = std::move(id);
     request.actor = "session:7";
     co_await station.emergency_stop(std::move(request), 0us);

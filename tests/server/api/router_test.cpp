@@ -8,8 +8,8 @@
 namespace server {
 namespace {
 
-Answer echo(Request request) {
-  Response response;
+http::Answer echo(http::Request request) {
+  http::Response response;
   response.body = request.method + " " + request.path;
   for (const auto& [name, value] : request.param) response.body += " " + name + "=" + value;
   for (const auto& [name, value] : request.query) response.body += " ?" + name + "=" + value;
@@ -19,30 +19,32 @@ Answer echo(Request request) {
 class RouterTest : public ::testing::Test {
  protected:
   RouterTest() {
-    router_.add({"GET", "/api/v1/runs", Scope::anyone, {"limit", "after"}, echo});
-    router_.add({"POST", "/api/v1/runs", Scope::anyone, {}, echo});
-    router_.add({"GET", "/api/v1/runs/{run_id}/samples.csv", Scope::anyone, {}, echo});
-    router_.set_fallback([](const Request& request) {
-      Response response;
+    router_.add({"GET", "/api/v1/runs", identity::Scope::anyone, {"limit", "after"}, echo});
+    router_.add({"POST", "/api/v1/runs", identity::Scope::anyone, {}, echo});
+    router_.add({"GET", "/api/v1/runs/{run_id}/samples.csv", identity::Scope::anyone, {}, echo});
+    router_.set_fallback([](const http::Request& request) {
+      http::Response response;
       response.body = "page " + request.path;
       return response;
     });
   }
 
-  Response get(const std::string& target, const std::string& method = "GET") {
-    Request request;
+  http::Response get(const std::string& target, const std::string& method = "GET") {
+    http::Request request;
     request.method = method;
     request.target = target;
-    return run_first(loop_, run(std::move(request)));
+    return runtime::run_first(loop_, run(std::move(request)));
   }
   int status(const std::string& target, const std::string& method = "GET") { return get(target, method).status; }
 
  private:
   // run_first wants a result that can be made before it is known.
-  boost::asio::awaitable<Response> run(Request request) { co_return co_await router_.dispatch(std::move(request)); }
+  boost::asio::awaitable<http::Response> run(http::Request request) {
+    co_return co_await router_.dispatch(std::move(request));
+  }
 
   boost::asio::io_context loop_;
-  Router router_;
+  http::Router router_;
 };
 
 TEST_F(RouterTest, FindsByMethodAndPathAndDecodesParameters) {
@@ -65,7 +67,7 @@ TEST_F(RouterTest, AnswersUnknownPathsAndMethods) {
   EXPECT_EQ(status("/api/v1/runs/7"), 404);
   EXPECT_EQ(status("/api/v1/runs/"), 404);
   EXPECT_EQ(status("/api/v1/runs//samples.csv"), 404);
-  const Response refused = get("/api/v1/runs", "DELETE");
+  const http::Response refused = get("/api/v1/runs", "DELETE");
   EXPECT_EQ(refused.status, 405);
   ASSERT_EQ(refused.headers.back().first, "Allow");
   EXPECT_EQ(refused.headers.back().second, "GET, HEAD, POST");

@@ -254,12 +254,12 @@ std::int64_t worked_us() {
   return time.tv_sec * 1'000'000 + time.tv_nsec / 1000;
 }
 
-boost::asio::awaitable<void> fetch(const Router& router, std::string target, std::optional<std::string>& into) {
-  Request request;
+boost::asio::awaitable<void> fetch(const http::Router& router, std::string target, std::optional<std::string>& into) {
+  http::Request request;
   request.method = "GET";
   request.target = std::move(target);
-  request.caller.scopes = Scopes::of(Role::operator_);
-  Response response = co_await router.dispatch(std::move(request));
+  request.caller.scopes = identity::Scopes::of(identity::Role::operator_);
+  http::Response response = co_await router.dispatch(std::move(request));
   std::string text = std::move(response.body);
   if (response.stream != nullptr) {
     const auto piece = co_await response.stream->next();
@@ -326,11 +326,12 @@ TEST_F(RoutesTest, EventsComeNewestFirst) {
 
 TEST_F(RoutesTest, PagesHearOfRuns) {
   connect_robot();
-  Subscriber page{loop};
+  live::Subscriber page{loop};
   live.add(page);
   ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}});
   bool heard = false;
-  for (LiveText text = page.pop(); text != nullptr; text = page.pop()) heard |= json::parse(*text)["type"] == "run";
+  for (live::LiveText text = page.pop(); text != nullptr; text = page.pop())
+    heard |= json::parse(*text)["type"] == "run";
   EXPECT_TRUE(heard);
   live.remove(page);
 }

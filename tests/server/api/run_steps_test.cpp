@@ -30,7 +30,7 @@ class RunStepsTest : public ::testing::Test {
     ++next_seq;
   }
 
-  std::vector<StepPoint> points;
+  std::vector<analysis::StepPoint> points;
   std::uint32_t span = 0;
   std::uint64_t next_seq = 0;
   float position_sd_m = 0;
@@ -62,16 +62,16 @@ TEST_F(RunStepsTest, MeasuresSetpointsAndDisturbances) {
   rest(10);
   const auto steps = measure_steps(points);
   ASSERT_EQ(steps.size(), 3U);
-  EXPECT_EQ(steps[0].cause, StepCause::setpoint);
+  EXPECT_EQ(steps[0].cause, analysis::StepCause::setpoint);
   EXPECT_EQ(steps[0].first_seq, 50U);
   EXPECT_EQ(steps[0].last_seq, 1049U);
   EXPECT_NEAR(steps[0].at_s, 0.5, 1e-9);
   EXPECT_NEAR(*steps[0].metrics.settling_s, 0.38, 1e-9);  // 0.9^38 is the first power of 0.9 below 0.02
-  EXPECT_EQ(steps[1].cause, StepCause::disturbance);
+  EXPECT_EQ(steps[1].cause, analysis::StepCause::disturbance);
   EXPECT_NEAR(steps[1].start_m, 0.05, 1e-6);
   EXPECT_NEAR(steps[1].band_m, 0.002, 1e-9);
   EXPECT_NEAR(steps[1].metrics.steady_state_error_m, 0, 1e-6);
-  EXPECT_EQ(steps[2].cause, StepCause::setpoint);
+  EXPECT_EQ(steps[2].cause, analysis::StepCause::setpoint);
   EXPECT_NEAR(steps[2].start_m, 0.1, 1e-6);
 }
 
@@ -115,20 +115,20 @@ class StepsFromOutside : public RunStepsTest {
   void watch(std::uint64_t from_us, std::uint64_t to_us) {
     reference.positions = {};
     for (std::uint64_t at_us = from_us; at_us < to_us; at_us += 30'000) {
-      const StepPoint& point = points.at((at_us - 7'000'000) / 10'000);
+      const analysis::StepPoint& point = points.at((at_us - 7'000'000) / 10'000);
       reference.positions.robot_time_us.push_back(at_us);
       reference.positions.position_m.push_back(static_cast<double>(point.position_m - point.disturbance_m) - 0.003);
       reference.positions.position_sd_m.push_back(0.0002);
     }
   }
 
-  StoredReference reference;
+  storage::StoredReference reference;
 };
 
 TEST_F(StepsFromOutside, AreMeasuredByTheTruePositionAndSayHowWrongTheRobotWas) {
   const auto steps = measure_steps(points, &reference);
   ASSERT_EQ(steps.size(), 2U);
-  for (const MeasuredStep& step : steps) {
+  for (const analysis::MeasuredStep& step : steps) {
     EXPECT_TRUE(step.is_from_outside);
     EXPECT_NEAR(step.position_sd_m, 0.0002, 1e-9);
     EXPECT_NEAR(step.metrics.steady_state_error_m, 0.003, 1e-4);
@@ -144,7 +144,7 @@ TEST_F(StepsFromOutside, AreMeasuredByTheTruePositionAndSayHowWrongTheRobotWas) 
   const auto whole = estimate_error(points, reference);
   ASSERT_TRUE(whole);
   EXPECT_EQ(whole->samples, reference.positions.size());
-  for (StepPoint& point : points) point.position_sd_m = 0.0005F;
+  for (analysis::StepPoint& point : points) point.position_sd_m = 0.0005F;
   EXPECT_LT(estimate_error(points, reference)->within_2_sd, 0.05);  // now it claims ± 1 mm
 }
 
@@ -199,7 +199,7 @@ TEST_F(StepsFromOutside, AStartAmongPositionsThatScatterIsAsUncertainAsThey) {
 
 TEST_F(StepsFromOutside, TheUncertaintyOfTheZeroCounts) {
   reference.reference.zero_sd_m = 0.0015;
-  for (const MeasuredStep& step : measure_steps(points, &reference)) {
+  for (const analysis::MeasuredStep& step : measure_steps(points, &reference)) {
     EXPECT_NEAR(step.position_sd_m, std::hypot(0.0002, 0.0015), 1e-9);
   }
 }

@@ -15,8 +15,8 @@ class StopFormTest : public ApiTest {
 
   std::string bearer() const { return "Authorization: Bearer " + token() + "\r\n"; }
   std::string cookie() {
-    return "Cookie: " + std::string{kOldSessionCookie} + "=" + api->accounts().open_session("", "127.0.0.1", "") +
-           "\r\n";
+    return "Cookie: " + std::string{identity::kOldSessionCookie} + "=" +
+           api->accounts().open_session("", "127.0.0.1", "") + "\r\n";
   }
   static std::string post(const std::string& target, const std::string& headers) {
     return "POST " + target + " HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n";
@@ -78,7 +78,7 @@ TEST_F(StopFormTest, ABodyThatIsNoJsonIsIgnored) {
 TEST_F(StopFormTest, WhateverIsInTheQueryIsIgnored) {
   for (const char* target : {kStop, kStopAll}) {
     for (const std::string& query : {std::string{"?wait=verified"}, std::string{"?"}, std::string{"?a=1&a=1&%zz"},
-                                     "?" + std::string(kMaxTargetBytes, 'x')}) {
+                                     "?" + std::string(http::kMaxTargetBytes, 'x')}) {
       expect_stop(post(target + query, bearer()));
     }
   }
@@ -94,7 +94,7 @@ TEST_F(StopFormTest, ASlashAtTheEndIsIgnored) {
 
 TEST_F(StopFormTest, ManyHeaderFieldsAreIgnored) {
   std::string fields;
-  for (std::size_t i = 0; i < kMaxHeaderFields + 20; ++i) fields += "X-" + std::to_string(i) + ": 1\r\n";
+  for (std::size_t i = 0; i < http::kMaxHeaderFields + 20; ++i) fields += "X-" + std::to_string(i) + ": 1\r\n";
   expect_stop(post(kStop, bearer() + fields));
 }
 
@@ -106,7 +106,7 @@ TEST_F(StopFormTest, AHeadOf15kBIsObeyedAndOneOfMoreThan16kBRefusedInWords) {
   };
   expect_stop(head_of(15 * 1024));
   RawClient client{clock, api->port()};
-  client.send(head_of(kMaxHeaderBytes + 1024));
+  client.send(head_of(http::kMaxHeaderBytes + 1024));
   const std::string answer = client.read_until("bytes");
   EXPECT_TRUE(answer.starts_with("HTTP/1.1 431 ")) << answer;
   EXPECT_TRUE(answer.ends_with("the header has more than 16384 bytes")) << answer;
@@ -125,7 +125,7 @@ TEST_F(StopFormTest, DoesNotWaitForABodyThatNeverComes) {
   for (const char* body : {"Content-Length: 10\r\n", "Transfer-Encoding: chunked\r\n"}) {
     RawClient client{clock, api->port()};
     expect_stop(client, post(kStop, bearer() + body) + "5\r\nabc");
-    clock.run_for(kRequestTime + 2s);
+    clock.run_for(http::kRequestTime + 2s);
     EXPECT_TRUE(client.closed()) << "and nothing is said twice";
   }
 }
@@ -142,7 +142,7 @@ TEST_F(StopFormTest, AfterALargeBodyTheConnectionEnds) {
   expect_stop(client, post(kStop, bearer() + "Content-Length: 100000\r\n") + std::string(30'000, 'x'));
   EXPECT_TRUE(closes());
   EXPECT_TRUE(json::parse(body_).contains("command_id")) << body_;
-  clock.run_for(kLingerTime + 2s);
+  clock.run_for(http::kLingerTime + 2s);
   EXPECT_TRUE(client.closed());
 }
 
@@ -150,7 +150,7 @@ TEST_F(StopFormTest, AChunkedBodyThatGrowsTooLargeEndsTheConnection) {
   RawClient client{clock, api->port()};
   expect_stop(client, post(kStop, bearer() + "Transfer-Encoding: chunked\r\n"));
   client.send("20000\r\n" + std::string(0x20000, 'x') + "\r\n0\r\n\r\n" + post(kStop, bearer()));
-  clock.run_for(kLingerTime + 2s);
+  clock.run_for(http::kLingerTime + 2s);
   EXPECT_TRUE(client.closed());
   EXPECT_EQ(stops(), 1U);
 }
@@ -162,7 +162,7 @@ TEST_F(StopFormTest, IsNotHeldUpByAClientThatAsksWhetherItMaySend) {
   expect_stop(client, post(kStop, bearer() + "Expect: 100-continue\r\nContent-Length: 2000\r\n"));
   EXPECT_TRUE(closes());
   client.send(post(kStop, bearer()));
-  clock.run_for(kLingerTime + 2s);
+  clock.run_for(http::kLingerTime + 2s);
   EXPECT_TRUE(client.closed());
   EXPECT_EQ(stops(), 1U);
 }

@@ -13,7 +13,7 @@ class StopOfAllTest : public ApiTest {
  protected:
   // The station knows so many robots, which are not connected.
   void know(int count) {
-    std::vector<RestoredRobot> known;
+    std::vector<station::RestoredRobot> known;
     for (int i = 1; i <= count; ++i) known.push_back({.id = fmt::format("away-{:03}", i)});
     station.restore(known, {});
   }
@@ -76,7 +76,7 @@ TEST_F(StopOfAllTest, ARetiredRobotIsLeftOutUntilItConnects) {
   connect_robot();
   enrol("r2");
   robot->link.cut();
-  ASSERT_TRUE(clock.run_until([&] { return station.find("r1")->link == LinkState::disconnected; }, 2s));
+  ASSERT_TRUE(clock.run_until([&] { return station.find("r1")->link == station::LinkState::disconnected; }, 2s));
   clock.run_for(10ms);
   const Answered retired = retire("r1", true);
   EXPECT_EQ(retired.status, 200) << retired.body;
@@ -113,9 +113,9 @@ TEST_F(StopOfAllTest, WhatCannotBeRetiredIsRefused) {
   EXPECT_EQ(retire("nobody", true).status, 404);
   EXPECT_EQ(retire("r2", "yes").status, 400);
   EXPECT_EQ(ask("POST", "/api/v1/robots/r2/retire", json::object()).status, 400);
-  scopes = Scopes::of(Role::operator_);
+  scopes = identity::Scopes::of(identity::Role::operator_);
   EXPECT_EQ(retire("r2", true).status, 403);
-  scopes = Scopes::of(Role::admin);
+  scopes = identity::Scopes::of(identity::Role::admin);
   EXPECT_EQ(ask("GET", "/api/v1/robots/r2").parsed()["retired"], false);
 }
 

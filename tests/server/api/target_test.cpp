@@ -7,17 +7,17 @@ namespace server {
 namespace {
 
 TEST(Target, HasADecodedPathAndQuery) {
-  const Target target{"/api/v1/robots/r%31/samples?after=1%2D2&limit=3"};
+  const http::Target target{"/api/v1/robots/r%31/samples?after=1%2D2&limit=3"};
   EXPECT_EQ(target.path(), "/api/v1/robots/r1/samples");
   EXPECT_EQ(target.segments().back(), "samples");
-  EXPECT_EQ(target.query(), (Target::Query{{"after", "1-2"}, {"limit", "3"}}));
+  EXPECT_EQ(target.query(), (http::Target::Query{{"after", "1-2"}, {"limit", "3"}}));
   EXPECT_EQ(target.text(), "/api/v1/robots/r%31/samples?after=1%2D2&limit=3");
 }
 
 TEST(Target, IsNotAcceptableWhereItsPathCouldMeanAnotherOne) {
   for (const char* text :
        {"", "api", "?a=1", "/a/../b", "/a/%2e%2e/b", "/a/./b", "/a%2Fb", "/a%5Cb", "/a%00", "/a%", "/a%2"}) {
-    const Target target{text};
+    const http::Target target{text};
     EXPECT_FALSE(target.is_acceptable()) << text;
     EXPECT_EQ(target.path(), "") << text;
     EXPECT_TRUE(target.segments().empty()) << text;
@@ -25,20 +25,20 @@ TEST(Target, IsNotAcceptableWhereItsPathCouldMeanAnotherOne) {
 }
 
 TEST(Target, QueryKeepsOrderAndRepeatedNames) {
-  EXPECT_EQ(Target{"/a?x=1&y&x=a+b&=c&&z=1=2"}.query(),
-            (Target::Query{{"x", "1"}, {"y", ""}, {"x", "a b"}, {"", "c"}, {"", ""}, {"z", "1=2"}}));
-  for (const char* text : {"", "/a", "/a?"}) EXPECT_EQ(Target{text}.query(), Target::Query{}) << text;
+  EXPECT_EQ(http::Target{"/a?x=1&y&x=a+b&=c&&z=1=2"}.query(),
+            (http::Target::Query{{"x", "1"}, {"y", ""}, {"x", "a b"}, {"", "c"}, {"", ""}, {"z", "1=2"}}));
+  for (const char* text : {"", "/a", "/a?"}) EXPECT_EQ(http::Target{text}.query(), http::Target::Query{}) << text;
 }
 
 TEST(Target, QueryIsEmptyWhereItIsNotAValidEncoding) {
   for (const char* text : {"/a?x=%", "/a?x=%2", "/a?%zz", "/a?x=%00", "/a?x=1&y=%0a"}) {
-    EXPECT_EQ(Target{text}.query(), std::nullopt) << text;
-    EXPECT_EQ(Target{text}.path(), "/a") << text;
+    EXPECT_EQ(http::Target{text}.query(), std::nullopt) << text;
+    EXPECT_EQ(http::Target{text}.path(), "/a") << text;
   }
 }
 
 TEST(Target, OfTheRootHasOneEmptySegment) {
-  const Target target{"/"};
+  const http::Target target{"/"};
   EXPECT_TRUE(target.is_acceptable());
   EXPECT_EQ(target.path(), "/");
   EXPECT_EQ(target.segments().size(), 1u);

@@ -94,7 +94,7 @@ TEST_F(BadInput, CsvFiles) {
 TEST_F(BadInput, CsvRowsLongerThanTheHeading) {
   EXPECT_THAT(csv("t_s,duty,position_m\n0,0,0\n0,1,0,3,0,05\n"),
               AllOf(HasSubstr("line 3: has 6 cells, the heading has 3"), HasSubstr("decimal comma? use ;")));
-  const auto columns = parse_csv("note,t_s\n\"a,b\",1,\n", "text", {"t_s"});
+  const auto columns = analysis::parse_csv("note,t_s\n\"a,b\",1,\n", "text", {"t_s"});
   EXPECT_EQ(columns.at("t_s"), (std::vector<double>{1}));
 }
 
@@ -149,8 +149,9 @@ TEST_F(BadInput, OptionsThatWouldGoUnused) {
 }
 
 TEST_F(BadInput, CsvIsReadInAnyOrderWithSpacesQuotesAndOtherColumns) {
-  const auto columns = parse_csv("\xEF\xBB\xBF# x\r\n\r\n \"duty\" , note,t_s\r\n +0.5, a,1e-1\r\n\"-1\",,0.2", "text",
-                                 {"t_s", "duty"}, {"position_m"});
+  const auto columns =
+      analysis::parse_csv("\xEF\xBB\xBF# x\r\n\r\n \"duty\" , note,t_s\r\n +0.5, a,1e-1\r\n\"-1\",,0.2", "text",
+                          {"t_s", "duty"}, {"position_m"});
   EXPECT_EQ(columns.at("duty"), (std::vector<double>{0.5, -1}));
   EXPECT_EQ(columns.at("t_s"), (std::vector<double>{0.1, 0.2}));
   EXPECT_EQ(columns.size(), 2u);

@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 class CertificateTest : public ToolTest {
  protected:
   fs::path file(const char* name) const { return folder_ / "lab" / "tls" / name; }
-  TlsCertificate certificate() const { return describe(*load_certificate(file("station.crt"))); }
+  tls::TlsCertificate certificate() const { return tls::describe(*tls::load_certificate(file("station.crt"))); }
 };
 
 TEST_F(CertificateTest, IsSignedByTheLabsAuthorityAndNamesThisMachineAndWhatWasGiven) {
@@ -24,8 +24,8 @@ TEST_F(CertificateTest, IsSignedByTheLabsAuthorityAndNamesThisMachineAndWhatWasG
   for (const char* name : {"lab-pc.local", "192.0.2.7", "2001:db8::7", "localhost", "127.0.0.1", "::1"}) {
     EXPECT_THAT(certificate().names, Contains(name));
   }
-  const auto leaf = load_certificate(file("station.crt"));
-  const auto authority = load_certificate(file("lab-ca.crt"));
+  const auto leaf = tls::load_certificate(file("station.crt"));
+  const auto authority = tls::load_certificate(file("lab-ca.crt"));
   EXPECT_EQ(X509_verify(leaf.get(), X509_get0_pubkey(authority.get())), 1);
   EXPECT_EQ(X509_check_ca(leaf.get()), 0);
   EXPECT_EQ(X509_check_ca(authority.get()), 1);
@@ -55,13 +55,14 @@ TEST_F(CertificateTest, NothingIsOverwrittenUnasked) {
 
 TEST_F(CertificateTest, ARenewalKeepsKeyNamesAndAuthorityByDefault) {
   ask("certificate --data @lab --name lab-pc.local --days 10");
-  const TlsCertificate first = certificate();
-  const auto authority = load_certificate(file("lab-ca.crt"));
+  const tls::TlsCertificate first = certificate();
+  const auto authority = tls::load_certificate(file("lab-ca.crt"));
   ASSERT_EQ(ask("certificate --data @lab --renew").exit_code, 0);
   EXPECT_EQ(certificate().pin, first.pin);
   EXPECT_THAT(certificate().names, ElementsAreArray(first.names));
   EXPECT_GT(certificate().not_after_us, first.not_after_us + std::int64_t{86'400'000'000} * 700);
-  EXPECT_EQ(X509_cmp(authority.get(), load_certificate(file("lab-ca.crt")).get()), 0) << "browsers have imported it";
+  EXPECT_EQ(X509_cmp(authority.get(), tls::load_certificate(file("lab-ca.crt")).get()), 0)
+      << "browsers have imported it";
   ASSERT_EQ(ask("certificate --data @lab --renew --new-key").exit_code, 0);
   EXPECT_NE(certificate().pin, first.pin);
 }

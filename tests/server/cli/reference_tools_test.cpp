@@ -25,7 +25,7 @@ class ReferenceTools : public RecordingTest {
     start();
     connect(robot_);
     robot_.context.position_sd_m = 0.004F;
-    const RunId run = wait(runs_->create(robot_.id, named("swim"))).value().id;
+    const storage::RunId run = wait(runs_->create(robot_.id, named("swim"))).value().id;
     for (const double duty : {0.0, 0.4, -0.5, 0.6, -0.6, 0.3}) swim(100, duty);
     robot_.context.mode = rheonaut_MODE_AUTO;
     robot_.context.setpoint_m = 0.2F;
@@ -43,8 +43,8 @@ class ReferenceTools : public RecordingTest {
   ToolAnswer ask(const std::string& command) { return cli::ask_tool(folder_, command + " --data @."); }
 
   void swim(std::size_t count, double duty) {
-    SampleBatch batch = robot_.batch(robot_.next_seq, count);
-    for (Sample& sample : batch.samples) {
+    station::SampleBatch batch = robot_.batch(robot_.next_seq, count);
+    for (station::Sample& sample : batch.samples) {
       truth_m_.push_back(plant_.position_m());
       sample.position_m = static_cast<float>(0.5 * plant_.position_m());
       sample.acceleration_m_s2 =

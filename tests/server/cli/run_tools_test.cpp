@@ -26,8 +26,8 @@ class RunTools : public RecordingTest {
 
   // The robot swims for this many samples under this duty, and the station records it.
   void swim(std::size_t count, double duty) {
-    SampleBatch batch = robot_.batch(robot_.next_seq, count);
-    for (Sample& sample : batch.samples) {
+    station::SampleBatch batch = robot_.batch(robot_.next_seq, count);
+    for (station::Sample& sample : batch.samples) {
       sample.position_m = static_cast<float>(plant_.position_m()) + robot_.context.disturbance_m.value_or(0);
       sample.velocity_m_s = static_cast<float>(plant_.velocity_m_s());
       sample.duty = static_cast<float>(duty);
@@ -40,8 +40,8 @@ class RunTools : public RecordingTest {
 
   // As swim(), on an accelerometer whose readings the robot's filter has taken its bias off.
   void swim_on_the_accelerometer(std::size_t count, double duty) {
-    SampleBatch batch = robot_.batch(robot_.next_seq, count);
-    for (Sample& sample : batch.samples) {
+    station::SampleBatch batch = robot_.batch(robot_.next_seq, count);
+    for (station::Sample& sample : batch.samples) {
       const double reading_m_s2 = 0.01 * std::round((plant_.acceleration_m_s2() + noise_(random_)) / 0.01);
       sample.acceleration_m_s2 = static_cast<float>(reading_m_s2 - 0.0031);
       sample.position_m = static_cast<float>(0.5 * plant_.position_m());  // as a robot of another fluid believes
@@ -55,21 +55,22 @@ class RunTools : public RecordingTest {
   }
 
   // What an export has of the columns that matter here.
-  void write_csv(RunId run) {
-    const auto samples = read_run(path_, run, 10000);
+  void write_csv(storage::RunId run) {
+    const auto samples = storage::read_run(path_, run, 10000);
     ASSERT_TRUE(samples) << samples.error().detail;
     std::ofstream out{folder_ / "run.csv"};
     out << "robot_time_us,position_m,velocity_m_s,acceleration_m_s2,duty,disturbance_m,position_sd_m\n";
-    for (const StoredSample& stored : *samples) {
-      const Sample& s = stored.sample;
+    for (const storage::StoredSample& stored : *samples) {
+      const station::Sample& s = stored.sample;
       const auto cell = [](float value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string{}; };
       out << fmt::format("{},{},{},{},{},{},{}\n", stored.robot_time_us, cell(s.position_m), cell(s.velocity_m_s),
-                         s.acceleration_m_s2, s.duty, or_nan(stored.disturbance_m), or_nan(stored.position_sd_m));
+                         s.acceleration_m_s2, s.duty, station::or_nan(stored.disturbance_m),
+                         station::or_nan(stored.position_sd_m));
     }
   }
 
   // Both without the text that differs.
-  std::pair<nlohmann::json, nlohmann::json> from_run_and_csv(RunId run) {
+  std::pair<nlohmann::json, nlohmann::json> from_run_and_csv(storage::RunId run) {
     write_csv(run);
     const ToolAnswer of_run = ask("identify --run 1 --structure second_order --json");
     const ToolAnswer of_csv = cli::ask_tool(folder_, "identify --csv @run.csv --structure second_order --json");
@@ -78,7 +79,7 @@ class RunTools : public RecordingTest {
     return {of_run.json(), of_csv.json()};
   }
 
-  RunId begin() {
+  storage::RunId begin() {
     start();
     connect(robot_);
     return wait(runs_->create(robot_.id, named("duty step"))).value().id;
@@ -92,16 +93,16 @@ class RunTools : public RecordingTest {
 };
 
 TEST_F(RunTools, ReadsTheSamplesWhileTheStationRecords) {
-  const RunId run = begin();
+  const storage::RunId run = begin();
   swim(100, 0.3);
   flush();
-  const auto samples = read_run(path_, run, 1000);
+  const auto samples = storage::read_run(path_, run, 1000);
   ASSERT_TRUE(samples) << samples.error().detail;
   EXPECT_EQ(samples->size(), 100u);
   EXPECT_EQ(samples->front().boot_id, robot_.boot_id);
   EXPECT_EQ(samples->back().sample.duty, 0.3F);
-  EXPECT_FALSE(read_run(path_, run, 99));
-  EXPECT_THAT(read_run(path_, run + 1, 99).error().detail, HasSubstr("the database holds runs 1 to 1"));
+  EXPECT_FALSE(storage::read_run(path_, run, 99));
+  EXPECT_THAT(storage::read_run(path_, run + 1, 99).error().detail, HasSubstr("the database holds runs 1 to 1"));
 }
 
 TEST_F(RunTools, RefusesAFileThatIsNotAStations) {
@@ -121,7 +122,7 @@ TEST_F(RunTools, IdentifyFindsTheModelWithoutTheDisturbance) {
 }
 
 TEST_F(RunTools, IdentifyFitsTheAccelerationWhereThePositionIsAnEstimate) {
-  const RunId run = begin();
+  const storage::RunId run = begin();
   robot_.context.position_sd_m = 0.004F;
   for (const double duty : {0.0, 0.4, -0.5, 0.6, -0.6, 0.3}) swim_on_the_accelerometer(100, duty);
   flush();
@@ -153,7 +154,7 @@ TEST_F(RunTools, IdentifySaysHowMuchDeadTimeTheSensorsReadingsMayHide) {
 }
 
 TEST_F(RunTools, IdentifyFitsAKnownPositionAloneFromRunAndCsvAlike) {
-  const RunId run = begin();
+  const storage::RunId run = begin();
   swim(200, 0.3);
   robot_.context.disturbance_m = -0.05F;
   swim(200, -0.5);
@@ -164,7 +165,7 @@ TEST_F(RunTools, IdentifyFitsAKnownPositionAloneFromRunAndCsvAlike) {
 }
 
 TEST_F(RunTools, IdentifyNeedsOnlyTheValuesThatItFitsFromRunAndCsvAlike) {
-  const RunId run = begin();
+  const storage::RunId run = begin();
   lacks_a_velocity_ = true;
   for (const double duty : {0.3, -0.5}) swim(150, duty);
   flush();
@@ -176,7 +177,7 @@ TEST_F(RunTools, IdentifyNeedsOnlyTheValuesThatItFitsFromRunAndCsvAlike) {
 }
 
 TEST_F(RunTools, IdentifyNeedsNoEstimateWhereItFitsTheAcceleration) {
-  const RunId run = begin();
+  const storage::RunId run = begin();
   robot_.context.position_sd_m = 0.004F;
   lacks_a_velocity_ = true;
   for (const double duty : {0.4, -0.5, 0.6}) swim_on_the_accelerometer(100, duty);
@@ -235,7 +236,7 @@ TEST_F(RunTools, IdentifyWarnsOfAWindowThatBeginsInMotion) {
 
 TEST_F(RunTools, IdentifyWarnsOfAnEstimatedRunThatBeginsInMotion) {
   for (int tick = 0; tick < 200; ++tick) plant_.step(0.4);
-  const RunId run = begin();
+  const storage::RunId run = begin();
   robot_.context.position_sd_m = 0.004F;
   for (const double duty : {0.4, -0.5, 0.6}) swim_on_the_accelerometer(100, duty);
   flush();
@@ -245,7 +246,7 @@ TEST_F(RunTools, IdentifyWarnsOfAnEstimatedRunThatBeginsInMotion) {
 }
 
 TEST_F(RunTools, ReadingADatabaseAtRestLeavesNothingBeside) {
-  const RunId run = begin();
+  const storage::RunId run = begin();
   swim(100, 0.3);
   flush();
   stop();
@@ -257,7 +258,7 @@ TEST_F(RunTools, ReadingADatabaseAtRestLeavesNothingBeside) {
   const auto before = listing();
   EXPECT_FALSE(before.contains("station.sqlite-wal"));
   std::filesystem::permissions(folder_, std::filesystem::perms{0500});
-  const auto samples = read_run(path_, run, 1000);
+  const auto samples = storage::read_run(path_, run, 1000);
   std::filesystem::permissions(folder_, std::filesystem::perms{0700});
   ASSERT_TRUE(samples) << samples.error().detail;
   EXPECT_EQ(samples->size(), 100u);

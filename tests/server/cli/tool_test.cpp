@@ -21,7 +21,7 @@ ToolAnswer ask_tool(const std::filesystem::path& folder, const std::string& comm
   ToolAnswer given;
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
-  const CommandLine line = parse_command_line(static_cast<int>(arguments.size()), arguments.data());
+  const cli::CommandLine line = parse_command_line(static_cast<int>(arguments.size()), arguments.data());
   const std::string help = ::testing::internal::GetCapturedStdout();
   given.error = ::testing::internal::GetCapturedStderr();
   std::ostringstream out;

@@ -22,7 +22,7 @@ class VerifyTest : public RecordingTest {
     TestRobot robot;
     start();
     connect(robot);
-    const RunId run = wait(runs_->create(robot.id, named("one")))->id;
+    const storage::RunId run = wait(runs_->create(robot.id, named("one")))->id;
     make(robot, 250);
     ASSERT_TRUE(wait(runs_->end(run, "")).has_value());
     ASSERT_TRUE(wait(recording_->digester.find(run))->is_final);

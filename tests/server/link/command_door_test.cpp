@@ -15,10 +15,10 @@ TEST_F(LinkTest, ACommandIsAcknowledgedWithTheTimeOfItsEffect) {
   EXPECT_LE(command.valid_until_robot_us, robot->robot_now_us() + 2'000'000);
   robot->acknowledge(command, rheonaut_COMMAND_RESULT_ACCEPTED);
   ASSERT_TRUE(clock.run_until([&] { return !results.empty(); }, 100ms));
-  EXPECT_EQ(results[0]->state, CommandState::acknowledged);
+  EXPECT_EQ(results[0]->state, station::CommandState::acknowledged);
   EXPECT_EQ(results[0]->effect_at_robot_us, robot->robot_now_us());
-  EXPECT_EQ(sink.commands.front().state, CommandState::queued);
-  EXPECT_EQ(sink.commands.back().state, CommandState::acknowledged);
+  EXPECT_EQ(sink.commands.front().state, station::CommandState::queued);
+  EXPECT_EQ(sink.commands.back().state, station::CommandState::acknowledged);
 }
 
 TEST_F(LinkTest, ARefusalOfTheRobotReachesTheCaller) {
@@ -27,7 +27,7 @@ TEST_F(LinkTest, ARefusalOfTheRobotReachesTheCaller) {
   clock.settle();
   robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_WRONG_MODE);
   ASSERT_TRUE(clock.run_until([&] { return !results.empty(); }, 100ms));
-  EXPECT_EQ(results[0]->state, CommandState::rejected);
+  EXPECT_EQ(results[0]->state, station::CommandState::rejected);
   EXPECT_EQ(results[0]->reason, "wrong_mode");
 }
 
@@ -35,7 +35,7 @@ TEST_F(LinkTest, TheEndOfACommandWithoutAnswerIsUnknown) {
   connect();
   submit(set_duty(0.3F), 500ms);
   ASSERT_TRUE(clock.run_until([&] { return !results.empty(); }, 3s));
-  EXPECT_EQ(results[0]->state, CommandState::unknown);
+  EXPECT_EQ(results[0]->state, station::CommandState::unknown);
   EXPECT_EQ(results[0]->reason, "no_answer");
 }
 
@@ -53,11 +53,11 @@ TEST_F(LinkTest, ACommandThatWaitedLongerThanItsLifeIsNeverSent) {
   ASSERT_TRUE(clock.run_until([&] { return results.size() == 20; }, 3s));
   const std::size_t sent = robot->commands().size();
   EXPECT_LT(sent, 5u) << "what fitted into the link before it stalled";
-  const auto count = [this](CommandState state) {
+  const auto count = [this](station::CommandState state) {
     return std::ranges::count_if(results, [state](const auto& result) { return result->state == state; });
   };
-  EXPECT_EQ(static_cast<std::size_t>(count(CommandState::unknown)), sent);
-  EXPECT_EQ(static_cast<std::size_t>(count(CommandState::expired)), 20 - sent);
+  EXPECT_EQ(static_cast<std::size_t>(count(station::CommandState::unknown)), sent);
+  EXPECT_EQ(static_cast<std::size_t>(count(station::CommandState::expired)), 20 - sent);
 }
 
 TEST_F(LinkTest, RefusesWithoutSendingWhatIsOutsideTheEnvelope) {
@@ -87,7 +87,7 @@ TEST_F(LinkTest, TheEndOfWhatWasSentIsUnknownWhenTheLinkIsLost) {
   clock.settle();
   robot->link.cut();
   ASSERT_TRUE(clock.run_until([&] { return !results.empty(); }, 100ms));
-  EXPECT_EQ(results[0]->state, CommandState::unknown);
+  EXPECT_EQ(results[0]->state, station::CommandState::unknown);
   EXPECT_EQ(results[0]->reason, "link_lost");
 }
 

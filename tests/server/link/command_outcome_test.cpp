@@ -27,8 +27,8 @@ class CommandOutcomeTest : public LinkTest {
     clock.settle();
   }
 
-  const CommandRecord& latest(CommandId id) const {
-    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &CommandRecord::id);
+  const station::CommandRecord& latest(station::CommandId id) const {
+    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &station::CommandRecord::id);
   }
 
  private:
@@ -42,13 +42,13 @@ TEST_F(CommandOutcomeTest, IsVerifiedWhenTelemetryShowsItAfterItsEffect) {
   const std::uint64_t before_us = robot->robot_now_us();
   clock.run_for(10ms);
   accept(*robot, 0);
-  ASSERT_EQ(results.at(0)->state, CommandState::acknowledged);
+  ASSERT_EQ(results.at(0)->state, station::CommandState::acknowledged);
   EXPECT_EQ(results[0]->acknowledged_after_us, 10'000);
   show_duty(*robot, 0.3F, before_us);
-  EXPECT_EQ(latest(results[0]->id).state, CommandState::acknowledged) << "a duty of before is no evidence";
+  EXPECT_EQ(latest(results[0]->id).state, station::CommandState::acknowledged) << "a duty of before is no evidence";
   clock.run_for(10ms);
   show_duty(*robot, 0.3F, robot->robot_now_us());
-  EXPECT_EQ(latest(results[0]->id).state, CommandState::verified);
+  EXPECT_EQ(latest(results[0]->id).state, station::CommandState::verified);
   EXPECT_EQ(latest(results[0]->id).verified_after_us, 20'000);
   EXPECT_NE(latest(results[0]->id).ended_at_us, 0);
 }
@@ -59,7 +59,9 @@ TEST_F(CommandOutcomeTest, FailsWhenTelemetryGoesOnWithoutShowingIt) {
   clock.settle();
   accept(*robot, 0);
   for (int i = 0; i < 60; ++i) {
-    EXPECT_EQ(latest(results.at(0)->id).state, i <= 50 ? CommandState::acknowledged : CommandState::failed) << i;
+    EXPECT_EQ(latest(results.at(0)->id).state,
+              i <= 50 ? station::CommandState::acknowledged : station::CommandState::failed)
+        << i;
     show_duty(*robot, 0, robot->robot_now_us());
     clock.run_for(10ms);
   }
@@ -72,7 +74,7 @@ TEST_F(CommandOutcomeTest, WithoutTelemetryItStaysAcknowledgedAndEnds) {
   clock.settle();
   accept(*robot, 0);
   clock.run_for(6s);
-  EXPECT_EQ(latest(results.at(0)->id).state, CommandState::acknowledged);
+  EXPECT_EQ(latest(results.at(0)->id).state, station::CommandState::acknowledged);
   EXPECT_EQ(latest(results[0]->id).reason, "no_telemetry");
   EXPECT_NE(latest(results[0]->id).ended_at_us, 0);
   submit(set_duty(0.4F));
@@ -94,8 +96,8 @@ TEST_F(CommandOutcomeTest, ANewerOneThatTookItsPlaceBeforeItWasSeenSupersedesIt)
   show_duty(*robot, 0.4F, robot->robot_now_us());
   clock.run_for(600ms);
   show_duty(*robot, 0.4F, robot->robot_now_us());
-  EXPECT_EQ(latest(results.at(0)->id).state, CommandState::superseded);
-  EXPECT_EQ(latest(results.at(1)->id).state, CommandState::verified);
+  EXPECT_EQ(latest(results.at(0)->id).state, station::CommandState::superseded);
+  EXPECT_EQ(latest(results.at(1)->id).state, station::CommandState::verified);
 }
 
 TEST_F(CommandOutcomeTest, AnEmergencyOfTheRobotSupersedesWhatWasNotSeen) {
@@ -105,13 +107,13 @@ TEST_F(CommandOutcomeTest, AnEmergencyOfTheRobotSupersedesWhatWasNotSeen) {
   accept(*robot, 0);
   robot->send_samples(0, 1, robot->robot_now_us(), 5);
   clock.settle();
-  EXPECT_EQ(latest(results.at(0)->id).state, CommandState::superseded);
+  EXPECT_EQ(latest(results.at(0)->id).state, station::CommandState::superseded);
   EXPECT_EQ(latest(results[0]->id).reason, "by_an_emergency");
 }
 
 TEST_F(CommandOutcomeTest, WhoWantsToWaitsUntilItIsVerified) {
   auto* robot = connect();
-  CommandRequest request = request_of(set_setpoint(0.1F));
+  station::CommandRequest request = request_of(set_setpoint(0.1F));
   request.until_verified = true;
   submit(request);
   clock.settle();
@@ -120,20 +122,20 @@ TEST_F(CommandOutcomeTest, WhoWantsToWaitsUntilItIsVerified) {
   EXPECT_TRUE(results.empty());
   show_setpoint(*robot, 0.1F, robot->robot_now_us());
   ASSERT_EQ(results.size(), 1u);
-  EXPECT_EQ(results[0]->state, CommandState::verified);
+  EXPECT_EQ(results[0]->state, station::CommandState::verified);
 }
 
 TEST_F(CommandOutcomeTest, WhatNoSampleCanShowEndsAcknowledged) {
   auto* robot = connect();
   protocol::Command ping = rheonaut_Command_init_zero;
   ping.which_action = rheonaut_Command_ping_tag;
-  CommandRequest request = request_of(ping);
+  station::CommandRequest request = request_of(ping);
   request.until_verified = true;
   submit(request);
   clock.settle();
   accept(*robot, 0);
   ASSERT_EQ(results.size(), 1u);
-  EXPECT_EQ(results[0]->state, CommandState::acknowledged);
+  EXPECT_EQ(results[0]->state, station::CommandState::acknowledged);
   EXPECT_NE(results[0]->ended_at_us, 0);
 }
 
@@ -154,22 +156,22 @@ TEST_F(CommandOutcomeTest, OfTheSetpointsThatWaitOnlyTheNewestIsSent) {
   ASSERT_LT(commands.size(), 6u) << "what fitted into the link before it stalled";
   EXPECT_EQ(commands.back().which_action, rheonaut_Command_set_duty_tag);
   EXPECT_FLOAT_EQ(commands[commands.size() - 2].action.set_setpoint.setpoint_m, 0.49F);
-  const auto superseded =
-      std::ranges::count_if(results, [](const auto& result) { return result->state == CommandState::superseded; });
+  const auto superseded = std::ranges::count_if(
+      results, [](const auto& result) { return result->state == station::CommandState::superseded; });
   EXPECT_EQ(static_cast<std::size_t>(superseded) + commands.size(), 51u) << "each is sent, or is told superseded";
 }
 
 // SAFETY: its time to live counts from when it was issued.
 TEST_F(CommandOutcomeTest, WhatIsOlderThanItsLifeOnArrivalIsNotSentAndIsAccountedFor) {
   auto* robot = connect();
-  CommandRequest request = request_of(set_duty(0.3F), 500ms);
+  station::CommandRequest request = request_of(set_duty(0.3F), 500ms);
   request.age = 500ms;
   request.life_from = "issued_at";
   submit(request);
   clock.settle();
   EXPECT_TRUE(robot->commands().empty());
   ASSERT_EQ(results.size(), 1u);
-  EXPECT_EQ(results[0]->state, CommandState::expired);
+  EXPECT_EQ(results[0]->state, station::CommandState::expired);
   EXPECT_EQ(results[0]->reason, "too_old_on_arrival");
   EXPECT_EQ(results[0]->life_from, "issued_at");
   EXPECT_EQ(sink.commands.back().id, results[0]->id) << "it is recorded";
@@ -182,7 +184,7 @@ TEST_F(CommandOutcomeTest, WhatIsOlderThanItsLifeOnArrivalIsNotSentAndIsAccounte
 
 TEST_F(CommandOutcomeTest, ARequestThatComesAgainUnderItsKeyIsNotSentAgain) {
   auto* robot = connect();
-  CommandRequest request = request_of(set_duty(0.3F));
+  station::CommandRequest request = request_of(set_duty(0.3F));
   request.key = "try-1";
   submit(request);
   submit(request);  // while it is on its way
@@ -197,7 +199,7 @@ TEST_F(CommandOutcomeTest, ARequestThatComesAgainUnderItsKeyIsNotSentAgain) {
   EXPECT_EQ(robot->commands().size(), 1u);
   ASSERT_EQ(results.size(), 4u);
   for (const auto& result : results) EXPECT_EQ(result->id, results[0]->id);
-  EXPECT_EQ(results[3]->state, CommandState::verified);
+  EXPECT_EQ(results[3]->state, station::CommandState::verified);
 
   request.arguments = R"({"duty":0.4})";
   submit(request);
@@ -212,14 +214,14 @@ TEST_F(CommandOutcomeTest, ARequestThatComesAgainUnderItsKeyIsNotSentAgain) {
 // A station that restarted has forgotten, and the robot has not.
 TEST_F(CommandOutcomeTest, WhatTheRobotHasHadBeforeIsAcknowledged) {
   auto* robot = connect();
-  CommandRequest request = request_of(set_duty(0.3F));
+  station::CommandRequest request = request_of(set_duty(0.3F));
   request.key = "try-1";
   submit(request);
   clock.settle();
-  EXPECT_EQ(robot->commands().at(0).command_id, command_id_of("r1", "test", "try-1"));
+  EXPECT_EQ(robot->commands().at(0).command_id, station::command_id_of("r1", "test", "try-1"));
   robot->acknowledge(robot->commands()[0], rheonaut_COMMAND_RESULT_DUPLICATE);
   clock.settle();
-  EXPECT_EQ(results.at(0)->state, CommandState::acknowledged);
+  EXPECT_EQ(results.at(0)->state, station::CommandState::acknowledged);
   EXPECT_EQ(results[0]->reason, "duplicate");
 }
 

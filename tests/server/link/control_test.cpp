@@ -7,7 +7,7 @@ namespace {
 class ControlTest : public LinkTest {
  protected:
   void submit_as(const std::string& actor, protocol::Command action) {
-    CommandRequest request = request_of(action);
+    station::CommandRequest request = request_of(action);
     request.actor = actor;
     submit(std::move(request));
     clock.settle();
@@ -23,7 +23,7 @@ class ControlTest : public LinkTest {
   }
   void fill_queue() {
     const std::size_t before = results.size();
-    for (std::size_t i = 0; i < RobotOutbox::kMaxQueuedCommands && results.size() == before; ++i) {
+    for (std::size_t i = 0; i < link::RobotOutbox::kMaxQueuedCommands && results.size() == before; ++i) {
       submit_as("someone", ping());
     }
     EXPECT_EQ(results.size(), before + 1);
@@ -42,8 +42,8 @@ class ControlTest : public LinkTest {
     command.which_action = rheonaut_Command_ping_tag;
     return command;
   }
-  Result<ControlState> control(const std::string& actor, ControlAction action) {
-    return station.control({"r1", actor, "10.0.0.7", action, kControlLease, "a test"});
+  Result<station::ControlState> control(const std::string& actor, station::ControlAction action) {
+    return station.control({"r1", actor, "10.0.0.7", action, station::kControlLease, "a test"});
   }
 };
 
@@ -63,12 +63,12 @@ TEST_F(ControlTest, ACommandThatIsRefusedOrCameTooLateTakesNoControl) {
   submit_as("session:1", set_duty(1.5F));
   EXPECT_EQ(results.at(0).error().reason, "out_of_range");
   EXPECT_EQ(station.find("r1")->control.holder, "");
-  CommandRequest late = request_of(set_duty(0));
+  station::CommandRequest late = request_of(set_duty(0));
   late.actor = "session:1";
   late.age = late.time_to_live;
   submit(std::move(late));
   clock.settle();
-  EXPECT_EQ(results.at(1)->state, CommandState::expired);
+  EXPECT_EQ(results.at(1)->state, station::CommandState::expired);
   EXPECT_EQ(station.find("r1")->control.holder, "");
   EXPECT_TRUE(robot->commands().empty());
 }
@@ -79,7 +79,7 @@ TEST_F(ControlTest, ACommandThatFindsTheQueueFullTakesNoControl) {
   submit_as("session:1", set_duty(0.1F));
   EXPECT_EQ(results.back().error().reason, "queue_full");
   EXPECT_EQ(station.find("r1")->control.holder, "");
-  const auto takes = [](const RobotEvent& event) { return event.kind == "control_taken"; };
+  const auto takes = [](const station::RobotEvent& event) { return event.kind == "control_taken"; };
   EXPECT_EQ(std::ranges::count_if(sink.events, takes), 0);
   submit_as("session:2", set_duty(0.2F));
   EXPECT_EQ(results.back().error().reason, "queue_full") << "and not that another is in control";
@@ -98,7 +98,7 @@ TEST_F(ControlTest, ACommandThatFindsTheQueueFullHasCostNoOlderOne) {
   EXPECT_EQ(results.back().error().reason, "queue_full");
   submit_as("session:1", set_duty(0.2F));  // takes the place of the older duty
   ASSERT_EQ(results.size(), refused + 2);
-  EXPECT_EQ(results.back()->state, CommandState::superseded);
+  EXPECT_EQ(results.back()->state, station::CommandState::superseded);
   drain(*robot);
   std::vector<float> duties;
   for (const auto& command : robot->commands()) {
@@ -120,8 +120,8 @@ TEST_F(ControlTest, ARenewalOfAnotherKeepsNoMotorRunning) {
 TEST_F(ControlTest, EveryoneMayStop) {
   auto* robot = connect();
   submit_as("session:1", set_duty(0.1F));
-  StopRequest stop{"r1", "session:2", "", "", 0};
-  tasks.spawn("stop", [](Station& of, StopRequest request) -> boost::asio::awaitable<void> {
+  station::StopRequest stop{"r1", "session:2", "", "", 0};
+  tasks.spawn("stop", [](station::Station& of, station::StopRequest request) -> boost::asio::awaitable<void> {
     co_await of.emergency_stop(std::move(request), 1s);
   }(station, stop));
   clock.settle();
@@ -151,20 +151,20 @@ TEST_F(ControlTest, APageThatGoesSilentLosesControlAndItIsSaid) {
 
 TEST_F(ControlTest, EachChangeIsAnEventOfTheRobot) {
   connect();
-  ASSERT_TRUE(control("session:1", ControlAction::take));
+  ASSERT_TRUE(control("session:1", station::ControlAction::take));
   EXPECT_EQ(sink.events.back().kind, "control_taken");
-  ASSERT_TRUE(control("session:2", ControlAction::request));
+  ASSERT_TRUE(control("session:2", station::ControlAction::request));
   EXPECT_EQ(sink.robots.back().control.requested_by, "session:2");
-  ASSERT_TRUE(control("session:1", ControlAction::hand_over));
+  ASSERT_TRUE(control("session:1", station::ControlAction::hand_over));
   EXPECT_EQ(sink.robots.back().control.holder, "session:2");
-  ASSERT_TRUE(control("session:1", ControlAction::force));
+  ASSERT_TRUE(control("session:1", station::ControlAction::force));
   EXPECT_EQ(sink.events.back().detail, "by session:1 from session:2: a test");
-  ASSERT_TRUE(control("session:1", ControlAction::release));
+  ASSERT_TRUE(control("session:1", station::ControlAction::release));
   EXPECT_EQ(sink.robots.back().control.holder, "");
 }
 
 TEST_F(ControlTest, OfAnUnknownRobotThereIsNone) {
-  EXPECT_EQ(control("session:1", ControlAction::take).error().reason, "unknown_robot");
+  EXPECT_EQ(control("session:1", station::ControlAction::take).error().reason, "unknown_robot");
 }
 
 }  // namespace

@@ -23,12 +23,12 @@ TEST_F(LinkTest, AnEventOfALatchedRobotKeepsItsOwnCause) {
   robot->send(
       event_frame(rheonaut_EVENT_KIND_LINK_LOST, rheonaut_EVENT_CAUSE_LINK_LOSS, rheonaut_EMERGENCY_CAUSE_OPERATOR));
   clock.settle();
-  const RobotEvent& event = sink.events.back();
+  const station::RobotEvent& event = sink.events.back();
   EXPECT_EQ(event.kind, "link_lost");
   EXPECT_EQ(event.cause, "link_loss");
   EXPECT_EQ(event.emergency_cause, rheonaut_EMERGENCY_CAUSE_OPERATOR);
   EXPECT_EQ(event.detail, "");
-  const nlohmann::json said = to_json(event);
+  const nlohmann::json said = live::to_json(event);
   EXPECT_EQ(said["cause"], "link_loss");
   EXPECT_EQ(said["emergency_cause"], "operator");
   EXPECT_EQ(said["detail"], "");
@@ -38,8 +38,8 @@ TEST_F(LinkTest, AnEventWithoutALatchSaysThatThereIsNone) {
   auto* robot = connect();
   robot->send(event_frame(rheonaut_EVENT_KIND_TIME_STEP, rheonaut_EVENT_CAUSE_TIME, rheonaut_EMERGENCY_CAUSE_NONE));
   clock.settle();
-  EXPECT_EQ(to_json(sink.events.back())["cause"], "time");
-  EXPECT_EQ(to_json(sink.events.back())["emergency_cause"], "none");
+  EXPECT_EQ(live::to_json(sink.events.back())["cause"], "time");
+  EXPECT_EQ(live::to_json(sink.events.back())["emergency_cause"], "none");
 }
 
 TEST_F(LinkTest, TheStationsOwnEventsSayTheLatchAndPutTheirWordsIntoTheDetail) {
@@ -49,7 +49,7 @@ TEST_F(LinkTest, TheStationsOwnEventsSayTheLatchAndPutTheirWordsIntoTheDetail) {
   hello.body.hello.emergency_cause = rheonaut_EMERGENCY_CAUSE_SENSOR_STUCK;
   robot->send(hello);
   ASSERT_TRUE(clock.run_until([&] { return !robot->welcomes().empty(); }, 1s));
-  const RobotEvent& event = sink.events.back();
+  const station::RobotEvent& event = sink.events.back();
   EXPECT_EQ(event.kind, "connected");
   EXPECT_EQ(event.cause, "none");
   EXPECT_EQ(event.detail, "from " + station.find("r1")->peer);

@@ -8,16 +8,16 @@ namespace server {
 namespace {
 
 // A sink that fails, as nothing in the station should.
-class Thrower final : public StationSink {
+class Thrower final : public station::StationSink {
  public:
-  void on_samples(const RobotState& robot, const SampleBatch&) override {
+  void on_samples(const station::RobotState& robot, const station::SampleBatch&) override {
     if (robot.id == "r1") throw std::runtime_error{"no room for a sample"};
   }
-  void on_event(const RobotState&, const RobotEvent& event) override {
+  void on_event(const station::RobotState&, const station::RobotEvent& event) override {
     if (event.kind == kind_that_fails) throw std::runtime_error{"no room for an event"};
   }
-  void on_command(const CommandRecord& record) override {
-    if (record.state == CommandState::sent) throw std::runtime_error{"no room for a command"};
+  void on_command(const station::CommandRecord& record) override {
+    if (record.state == station::CommandState::sent) throw std::runtime_error{"no room for a command"};
   }
 
   std::string kind_that_fails = "none";
@@ -37,7 +37,7 @@ class SessionExceptionTest : public LinkTest {
     other->keep_talking();
     return other;
   }
-  std::uint64_t counted() { return tasks.exceptions().count(Ended::robot_session); }
+  std::uint64_t counted() { return tasks.exceptions().count(runtime::Ended::robot_session); }
   void expect_alive() {
     EXPECT_EQ(tasks.exit_code(), 0);
     EXPECT_FALSE(tasks.stopping());
@@ -57,7 +57,7 @@ TEST_F(SessionExceptionTest, OfReadingEndsThatSessionAloneAndIsLoggedWithTheRobo
   EXPECT_EQ(counted(), 1U);
   EXPECT_TRUE(log.has("robot 'r1', memory: no room for a sample")) << log.text();
   EXPECT_FALSE(other->closed);
-  EXPECT_EQ(station.find("r2")->link, LinkState::connected);
+  EXPECT_EQ(station.find("r2")->link, station::LinkState::connected);
   expect_alive();
 }
 
@@ -100,9 +100,10 @@ TEST_F(SessionExceptionTest, ComesInOneLineASecondAndCountsAll) {
 }
 
 TEST_F(SessionExceptionTest, OfTwoWithinASecondBothNamesAndBothTextsAreLogged) {
-  ExceptionLog exceptions;
+  runtime::ExceptionLog exceptions;
   const auto note = [&](const std::string& which, const char* text) {
-    exceptions.note(Ended::request, which, std::make_exception_ptr(std::runtime_error{text}), clock.steady_us());
+    exceptions.note(runtime::Ended::request, which, std::make_exception_ptr(std::runtime_error{text}),
+                    clock.steady_us());
   };
   note("GET /api/v1/runs", "disk full");
   note("GET /api/v1/robots", "disk full");
@@ -114,16 +115,16 @@ TEST_F(SessionExceptionTest, OfTwoWithinASecondBothNamesAndBothTextsAreLogged) {
 
 // A client that chooses the text can fill neither the log nor the memory.
 TEST_F(SessionExceptionTest, OfThousandsOfNamesFewAreLogged) {
-  ExceptionLog exceptions;
+  runtime::ExceptionLog exceptions;
   const auto flood = [&](const std::string& word) {
     for (int i = 0; i < 5000; ++i) {
-      exceptions.note(Ended::request, word + std::to_string(i), std::make_exception_ptr(std::runtime_error{"no"}),
-                      clock.steady_us());
+      exceptions.note(runtime::Ended::request, word + std::to_string(i),
+                      std::make_exception_ptr(std::runtime_error{"no"}), clock.steady_us());
     }
   };
   flood("first ");
   EXPECT_LE(log.lines_with("first "), 33U);
-  EXPECT_EQ(exceptions.count(Ended::request), 5000U);
+  EXPECT_EQ(exceptions.count(runtime::Ended::request), 5000U);
   clock.run_for(1s);
   flood("second ");
   EXPECT_GE(log.lines_with("second "), 2U) << "those of before have made room";

@@ -21,20 +21,20 @@ protocol::Hello hello() {
 }
 
 protocol::RefusalReason reason_for(const protocol::Hello& hello, std::uint64_t robot_time_us = 0) {
-  const auto refusal = refusal_of(hello, robot_time_us);
+  const auto refusal = link::refusal_of(hello, robot_time_us);
   return refusal ? refusal->reason : rheonaut_REFUSAL_REASON_NONE;
 }
 
 TEST(Greeting, AHelloThatCanBeIsNotRefused) {
   EXPECT_EQ(reason_for(hello()), rheonaut_REFUSAL_REASON_NONE);
-  EXPECT_EQ(reason_for(hello(), kMaxRobotNumber), rheonaut_REFUSAL_REASON_NONE);
+  EXPECT_EQ(reason_for(hello(), station::kMaxRobotNumber), rheonaut_REFUSAL_REASON_NONE);
 }
 
 TEST(Greeting, AnotherVersionIsRefusedBeforeAnythingElse) {
   auto other = hello();
   other.protocol_version += 1;
   other.boot_id = 0;
-  const auto refusal = refusal_of(other, 0);
+  const auto refusal = link::refusal_of(other, 0);
   ASSERT_TRUE(refusal);
   EXPECT_EQ(refusal->reason, rheonaut_REFUSAL_REASON_VERSION);
   const auto number = std::to_string(other.protocol_version);
@@ -45,7 +45,7 @@ TEST(Greeting, NumbersThatCannotBeAreMalformed) {
   for (const auto field : {&protocol::Hello::oldest_seq, &protocol::Hello::oldest_event_seq, &protocol::Hello::next_seq,
                            &protocol::Hello::next_event_seq}) {
     auto bad = hello();
-    bad.*field = kMaxRobotNumber + 1;
+    bad.*field = station::kMaxRobotNumber + 1;
     EXPECT_EQ(reason_for(bad), rheonaut_REFUSAL_REASON_MALFORMED);
   }
   for (const auto oldest : {&protocol::Hello::oldest_seq, &protocol::Hello::oldest_event_seq}) {
@@ -56,7 +56,7 @@ TEST(Greeting, NumbersThatCannotBeAreMalformed) {
   auto without_boot = hello();
   without_boot.boot_id = 0;
   EXPECT_EQ(reason_for(without_boot), rheonaut_REFUSAL_REASON_MALFORMED);
-  EXPECT_EQ(reason_for(hello(), kMaxRobotNumber + 1), rheonaut_REFUSAL_REASON_MALFORMED);
+  EXPECT_EQ(reason_for(hello(), station::kMaxRobotNumber + 1), rheonaut_REFUSAL_REASON_MALFORMED);
 }
 
 TEST(Greeting, NamesHaveTheirCharacters) {
@@ -71,7 +71,7 @@ TEST(Greeting, TheArchiveIsAskedWithWhatTheRobotSays) {
   auto said = hello();
   std::strcpy(said.token, "secret");
   said.acknowledged_next_seq = 15;
-  const AdmissionRequest request = admission_request(said, 1'000, true, 2'000);
+  const station::AdmissionRequest request = link::admission_request(said, 1'000, true, 2'000);
   EXPECT_EQ(request.robot_id, "r1");
   EXPECT_EQ(request.token, "secret");
   EXPECT_TRUE(request.from_loopback);
@@ -84,12 +84,12 @@ TEST(Greeting, TheArchiveIsAskedWithWhatTheRobotSays) {
 }
 
 TEST(Greeting, AWelcomeSaysWhatIsDurableAndTheTimes) {
-  Admission admission;
+  station::Admission admission;
   admission.store_id = 3;
   admission.durable_next_seq = 17;
   admission.durable_next_event_seq = 2;
-  EXPECT_FALSE(refusal_of(admission));
-  const protocol::Welcome welcome = welcome_of(admission, LinkTimes{1'500, 300, 10}, 99);
+  EXPECT_FALSE(link::refusal_of(admission));
+  const protocol::Welcome welcome = link::welcome_of(admission, config::LinkTimes{1'500, 300, 10}, 99);
   EXPECT_EQ(welcome.protocol_version, protocol::kProtocolVersion);
   EXPECT_EQ(welcome.refusal, rheonaut_REFUSAL_REASON_NONE);
   EXPECT_EQ(welcome.store_id, 3U);
@@ -102,10 +102,10 @@ TEST(Greeting, AWelcomeSaysWhatIsDurableAndTheTimes) {
 }
 
 TEST(Greeting, ARefusalOfTheArchiveIsCutToItsRoom) {
-  Admission admission;
+  station::Admission admission;
   admission.refusal = rheonaut_REFUSAL_REASON_WRONG_TOKEN;
   admission.detail = std::string(500, 'x');
-  const auto refusal = refusal_of(admission);
+  const auto refusal = link::refusal_of(admission);
   ASSERT_TRUE(refusal);
   const protocol::Welcome welcome = welcome_of(*refusal);
   EXPECT_EQ(welcome.refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);

@@ -12,11 +12,11 @@ constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::uint64_t kFar = std::uint64_t{1} << 63;
 
-struct UnusableSink final : StationSink {
-  void on_unusable_samples(const RobotState&, std::uint64_t first_seq, std::uint64_t next_seq) override {
+struct UnusableSink final : station::StationSink {
+  void on_unusable_samples(const station::RobotState&, std::uint64_t first_seq, std::uint64_t next_seq) override {
     samples.emplace_back(first_seq, next_seq);
   }
-  void on_unusable_event(const RobotState&, std::uint64_t event_seq) override { events.push_back(event_seq); }
+  void on_unusable_event(const station::RobotState&, std::uint64_t event_seq) override { events.push_back(event_seq); }
   std::vector<std::pair<std::uint64_t, std::uint64_t>> samples;
   std::vector<std::uint64_t> events;
 };
@@ -37,9 +37,9 @@ class InvalidValuesTest : public LinkTest {
     change(frame.body.event);
     return frame;
   }
-  std::vector<RobotEvent> told() const {
-    std::vector<RobotEvent> found;
-    for (const RobotEvent& event : sink.events) {
+  std::vector<station::RobotEvent> told() const {
+    std::vector<station::RobotEvent> found;
+    for (const station::RobotEvent& event : sink.events) {
       if (event.kind == "invalid_value") found.push_back(event);
     }
     return found;
@@ -63,7 +63,7 @@ TEST_F(InvalidValuesTest, WhatIsNoFiniteNumberIsNothingAndTheSamplesAreKept) {
   EXPECT_EQ(sink.batches[0].context.position_sd_m, 0.0F);
   EXPECT_EQ(sink.batches[1].context.position_sd_m, std::nullopt);
   EXPECT_EQ(sink.batches[2].context.setpoint_m, std::nullopt);
-  EXPECT_EQ(nlohmann::json::parse(samples_message(sink.batches[1]))["position_sd_m"], nullptr);
+  EXPECT_EQ(nlohmann::json::parse(live::samples_message(sink.batches[1]))["position_sd_m"], nullptr);
   EXPECT_EQ(sink.batches[0].context, sink.batches[0].context) << "or each batch would begin a new segment";
   EXPECT_TRUE(unusable.samples.empty());
 }
@@ -83,7 +83,7 @@ TEST_F(InvalidValuesTest, TheyAreCountedAndReportedOnceInTenSeconds) {
   EXPECT_EQ(told()[0].detail, "disturbance_m is nan from sample 0 on; NULL is stored (1 more since the last event)");
   EXPECT_EQ(station.find("r1")->invalid_values, 40u);
   EXPECT_EQ(station.invalid_values(), 40u);
-  EXPECT_EQ(to_json(*station.find("r1"))["invalid_values"], 40);
+  EXPECT_EQ(live::to_json(*station.find("r1"))["invalid_values"], 40);
   clock.run_for(10s);
   send_broken(100);
   ASSERT_EQ(told().size(), 2u);
@@ -165,7 +165,8 @@ TEST_F(InvalidValuesTest, OfARobotWhoseFramesDoNotDecodeAStopIsRepeatedAndComman
   EXPECT_TRUE(connected());
   EXPECT_GE(robot->commands().size(), 4u) << "the duty, and a stop each second";
   ASSERT_FALSE(results.empty());
-  EXPECT_TRUE(std::ranges::any_of(results, [](const auto& one) { return one->state == CommandState::unknown; }));
+  EXPECT_TRUE(
+      std::ranges::any_of(results, [](const auto& one) { return one->state == station::CommandState::unknown; }));
 }
 
 class FrameFaultsTest : public ::testing::Test {
@@ -177,54 +178,54 @@ class FrameFaultsTest : public ::testing::Test {
     return frame;
   }
   // Of a robot whose numbers are as large as they can be, whatever it has sent since its hello.
-  static FrameReach at_the_end() {
+  static link::FrameReach at_the_end() {
     protocol::Hello hello = rheonaut_Hello_init_zero;
-    hello.next_seq = hello.next_event_seq = kMaxRobotNumber;
-    FrameReach reach = FrameReach::after(hello, kMaxRobotNumber);
-    reach.advance(samples(kMaxRobotNumber, 0, kMaxRobotNumber));
+    hello.next_seq = hello.next_event_seq = station::kMaxRobotNumber;
+    link::FrameReach reach = link::FrameReach::after(hello, station::kMaxRobotNumber);
+    reach.advance(samples(station::kMaxRobotNumber, 0, station::kMaxRobotNumber));
     return reach;
   }
 };
 
 TEST_F(FrameFaultsTest, WhatCanBeUsedIsCheckedAndNothingElse) {
   protocol::RobotFrame frame = samples(10, 5, 6'000'000);
-  const FrameFaults none = mend(frame, {});
+  const link::FrameFaults none = link::mend(frame, {});
   ASSERT_TRUE(none.samples);
   EXPECT_EQ(&**none.samples, &frame.body.telemetry);
   EXPECT_FALSE(none.event);
-  for (const std::uint32_t period_us : {0U, kMaxPeriodUs + 1}) {
+  for (const std::uint32_t period_us : {0U, station::kMaxPeriodUs + 1}) {
     frame.body.telemetry.period_us = period_us;
-    const FrameFaults faults = mend(frame, {});
+    const link::FrameFaults faults = link::mend(frame, {});
     EXPECT_TRUE(faults.is_unusable);
     EXPECT_FALSE(faults.samples) << period_us;
   }
   frame.which_body = rheonaut_RobotFrame_event_tag;
   frame.body.event = rheonaut_Event_init_zero;
-  EXPECT_TRUE(mend(frame, {}).event);
-  EXPECT_FALSE(mend(frame, {}).samples);
+  EXPECT_TRUE(link::mend(frame, {}).event);
+  EXPECT_FALSE(link::mend(frame, {}).samples);
   frame.body.event.sample_seq = kFar;
-  EXPECT_FALSE(mend(frame, {}).event);
+  EXPECT_FALSE(link::mend(frame, {}).event);
 }
 
 TEST_F(FrameFaultsTest, NoNumberIsBeyondWhatCanBeStoredHoweverFarTheRobotHasCome) {
-  const FrameReach reach = at_the_end();
-  protocol::RobotFrame last = samples(kMaxRobotNumber, kMaxRobotNumber, kMaxRobotNumber);
+  const link::FrameReach reach = at_the_end();
+  protocol::RobotFrame last = samples(station::kMaxRobotNumber, station::kMaxRobotNumber, station::kMaxRobotNumber);
   EXPECT_TRUE(mend(last, reach).samples);
-  protocol::RobotFrame late = samples(0, 0, kMaxRobotNumber + 1);
+  protocol::RobotFrame late = samples(0, 0, station::kMaxRobotNumber + 1);
   EXPECT_FALSE(mend(late, reach).samples);
-  protocol::RobotFrame beyond = samples(kMaxRobotNumber + 1, 0, 6'000'000);
+  protocol::RobotFrame beyond = samples(station::kMaxRobotNumber + 1, 0, 6'000'000);
   EXPECT_FALSE(mend(beyond, reach).samples);
   protocol::RobotFrame event = rheonaut_RobotFrame_init_zero;
   event.which_body = rheonaut_RobotFrame_event_tag;
-  event.body.event.event_seq = kMaxRobotNumber;
+  event.body.event.event_seq = station::kMaxRobotNumber;
   EXPECT_TRUE(mend(event, reach).event);
-  event.body.event.event_seq = kMaxRobotNumber + 1;
+  event.body.event.event_seq = station::kMaxRobotNumber + 1;
   EXPECT_FALSE(mend(event, reach).event);
 }
 
 TEST_F(FrameFaultsTest, TheOldestThatARobotHoldsIsNotAboveWhatItSends) {
   protocol::RobotFrame frame = samples(10, 11, 6'000'000);
-  const FrameFaults faults = mend(frame, {});
+  const link::FrameFaults faults = link::mend(frame, {});
   EXPECT_EQ(faults.count, 1u);
   ASSERT_TRUE(faults.samples);
   EXPECT_EQ((**faults.samples).oldest_seq, 0u);
@@ -235,10 +236,10 @@ TEST_F(FrameFaultsTest, AHeartbeatWithATimeThatCannotBeAnswersNothing) {
   frame.which_body = rheonaut_RobotFrame_heartbeat_tag;
   frame.body.heartbeat.echo_station_time_us = 5;
   frame.body.heartbeat.echo_received_at_robot_us = kFar;
-  EXPECT_EQ(mend(frame, {}).count, 1u);
+  EXPECT_EQ(link::mend(frame, {}).count, 1u);
   EXPECT_EQ(frame.body.heartbeat.echo_station_time_us, 0u);
   frame.body.heartbeat.echo_station_time_us = 5;
-  EXPECT_EQ(mend(frame, {}).count, 0u);
+  EXPECT_EQ(link::mend(frame, {}).count, 0u);
   EXPECT_EQ(frame.body.heartbeat.echo_station_time_us, 5u);
 }
 

@@ -11,7 +11,8 @@ using namespace std::chrono_literals;
 
 class LinkTest : public ::testing::Test {
  public:
-  explicit LinkTest(const Envelope& envelope = Envelope{}) : station{loop, clock, envelope, LinkTimes{}} {
+  explicit LinkTest(const config::Envelope& envelope = config::Envelope{})
+      : station{loop, clock, envelope, config::LinkTimes{}} {
     station.add_sink(sink);
   }
   ~LinkTest() override {
@@ -36,15 +37,15 @@ class LinkTest : public ::testing::Test {
   }
 
   // Submits without waiting for the end; the result appears in `results`.
-  static CommandRequest request_of(protocol::Command action, microseconds time_to_live = 2s) {
-    CommandRequest request;
+  static station::CommandRequest request_of(protocol::Command action, microseconds time_to_live = 2s) {
+    station::CommandRequest request;
     request.robot_id = "r1";
     request.action = action;
     request.actor = "test";
     request.time_to_live = time_to_live;
     return request;
   }
-  void submit(CommandRequest request) { tasks.spawn("submit", run_submit(std::move(request))); }
+  void submit(station::CommandRequest request) { tasks.spawn("submit", run_submit(std::move(request))); }
   void submit(protocol::Command action, microseconds time_to_live = 2s) { submit(request_of(action, time_to_live)); }
   void stop_robot(microseconds patience = 1s, std::string key = "") {
     tasks.spawn("stop", run_stop({"r1", "test", "", std::move(key), 0}, patience));
@@ -70,28 +71,28 @@ class LinkTest : public ::testing::Test {
   }
 
   bool connected() const {
-    const RobotState* robot = station.find("r1");
-    return robot != nullptr && robot->link == LinkState::connected;
+    const station::RobotState* robot = station.find("r1");
+    return robot != nullptr && robot->link == station::LinkState::connected;
   }
 
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  TaskGroup tasks{loop};
-  Station station;
+  runtime::TaskGroup tasks{loop};
+  station::Station station;
   RecordingSink sink;
   FakeArchive archive;
-  static constexpr ConnectionLimits kPlaces{400, 100, 50, 300};
-  PortAccess access{{clock, "robot port", kPlaces}, nullptr};
-  RobotListener listener{loop,  clock, tasks, station, archive, {boost::asio::ip::address_v4::loopback(), 0},
-                         false, access};
-  std::vector<Result<CommandRecord>> results;
+  static constexpr net::ConnectionLimits kPlaces{400, 100, 50, 300};
+  net::PortAccess access{{clock, "robot port", kPlaces}, nullptr};
+  link::RobotListener listener{loop,  clock, tasks, station, archive, {boost::asio::ip::address_v4::loopback(), 0},
+                               false, access};
+  std::vector<Result<station::CommandRecord>> results;
 
  private:
-  boost::asio::awaitable<void> run_submit(CommandRequest request) {
+  boost::asio::awaitable<void> run_submit(station::CommandRequest request) {
     auto result = co_await station.submit(std::move(request));
     results.push_back(std::move(result));
   }
-  boost::asio::awaitable<void> run_stop(StopRequest request, microseconds patience) {
+  boost::asio::awaitable<void> run_stop(station::StopRequest request, microseconds patience) {
     auto result = co_await station.emergency_stop(std::move(request), patience);
     results.push_back(std::move(result));
   }

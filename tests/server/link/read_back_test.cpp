@@ -58,7 +58,7 @@ class ReadBackTest : public LinkTest {
   }
   // Sends it and lets the robot accept it; its id.
   std::uint64_t accepted(const protocol::Command& command) {
-    CommandRequest request = request_of(command);
+    station::CommandRequest request = request_of(command);
     request.until_verified = true;
     submit(std::move(request));
     clock.settle();
@@ -260,7 +260,7 @@ TEST_F(ReadBackTest, AfterTwoControllersInOneBurstItIsNotKnownWhatARestoreBrings
 }
 
 TEST_F(ReadBackTest, WhatTheRobotHasAnsweredBeforeIsNotWaitedFor) {
-  CommandRequest request = request_of(set_controller(controller(7)));
+  station::CommandRequest request = request_of(set_controller(controller(7)));
   request.until_verified = true;
   submit(std::move(request));
   clock.settle();
@@ -305,7 +305,7 @@ TEST_F(ReadBackTest, KnowsTheControllerThatARestoreBringsBackAsLongAsItHasSeenIt
   say(controller(3));
   robot->link.cut();
   clock.settle();
-  EXPECT_FALSE(station.find("r1")->link == LinkState::connected);
+  EXPECT_FALSE(station.find("r1")->link == station::LinkState::connected);
   EXPECT_EQ(station.settings("r1")->controller->controller_id, 3U) << "it is known, and not current";
   robot = connect();
   EXPECT_FALSE(station.settings("r1")->is_controller_current);
@@ -317,9 +317,9 @@ TEST_F(ReadBackTest, LimitsThatAreNotAtTheirDefaultBelongToTheState) {
   say_page(0, 0, "auto_limit_s", 0);
   EXPECT_TRUE(station.find("r1")->changed_limits.empty());
   say_page(0, 0, "auto_limit_s", 20);
-  const ChangedLimit expected{"auto_limit_s", "", 20, 0};
+  const station::ChangedLimit expected{"auto_limit_s", "", 20, 0};
   EXPECT_EQ(sink.robots.back().changed_limits, std::vector{expected});
-  EXPECT_FALSE(bounds_motion("duty_slew_per_s"));
+  EXPECT_FALSE(station::bounds_motion("duty_slew_per_s"));
 }
 
 }  // namespace

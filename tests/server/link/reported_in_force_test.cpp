@@ -14,7 +14,7 @@ class ReportedInForceTest : public LinkTest {
     robot.send(frame);
     clock.settle();
   }
-  const InForceRecord& latest() const { return sink.in_force.back(); }
+  const station::InForceRecord& latest() const { return sink.in_force.back(); }
 };
 
 TEST_F(ReportedInForceTest, AChangeHoldsFromTheFirstSampleMadeAfterIt) {

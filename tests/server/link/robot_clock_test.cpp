@@ -39,7 +39,7 @@ class RobotClockTest : public LinkTest {
     clock.settle();
   }
 
-  const ClockEstimate& estimate() const { return station.find("r1")->clock; }
+  const station::ClockEstimate& estimate() const { return station.find("r1")->clock; }
 };
 
 TEST_F(RobotClockTest, TheEstimateOutlivesAConnectionAndNotABoot) {
@@ -69,7 +69,7 @@ TEST_F(RobotClockTest, IsRecordedAtFirstAndThenOnceAMinute) {
   auto* robot = connect();
   for (int i = 0; i < 130; ++i) answer_probe(*robot, 1ms);
   ASSERT_EQ(sink.clocks.size(), 3u);
-  const ClockRecord& latest = sink.clocks.back();
+  const station::ClockRecord& latest = sink.clocks.back();
   EXPECT_EQ(latest.boot_id, 77u);
   EXPECT_EQ(latest.station_step_us, 0);
   EXPECT_GE(latest.robot_time_us, sink.clocks[1].robot_time_us + 60'000'000);
@@ -88,7 +88,7 @@ TEST_F(RobotClockTest, AStationClockThatIsSetIsRecordedAndMovesNoRobotTime) {
   ASSERT_EQ(sink.clocks.size(), 2u);
   EXPECT_EQ(sink.clocks.back().station_step_us, 3'600'000'000);
   EXPECT_NEAR(static_cast<double>(sink.clocks.back().utc_offset_us - recorded_us), 3.6e9, 10'000);
-  const auto is_set = [](const RobotEvent& event) { return event.kind == "station_clock_set"; };
+  const auto is_set = [](const station::RobotEvent& event) { return event.kind == "station_clock_set"; };
   ASSERT_EQ(std::ranges::count_if(sink.events, is_set), 1);
 
   clock.step_utc(-3600s);

@@ -13,7 +13,7 @@ namespace {
 constexpr std::int64_t kIntervalUs = 250'000;
 constexpr std::int64_t kLater = std::numeric_limits<std::int64_t>::max() / 2;
 
-protocol::Command command(CommandId id, pb_size_t action = rheonaut_Command_ping_tag) {
+protocol::Command command(station::CommandId id, pb_size_t action = rheonaut_Command_ping_tag) {
   protocol::Command command = rheonaut_Command_init_zero;
   command.command_id = id;
   command.which_action = action;
@@ -52,14 +52,14 @@ class RobotOutboxTest : public ::testing::Test {
     for (const auto& frame : frames) words.push_back(word(frame));
     return words;
   }
-  void stop(CommandId id) { outbox.enqueue_stop(command(id, rheonaut_Command_emergency_stop_tag)); }
-  void answer(CommandId id) {
+  void stop(station::CommandId id) { outbox.enqueue_stop(command(id, rheonaut_Command_emergency_stop_tag)); }
+  void answer(station::CommandId id) {
     protocol::CommandAck ack = rheonaut_CommandAck_init_zero;
     ack.command_id = id;
     outbox.on_ack(ack);
   }
 
-  RobotOutbox outbox{kIntervalUs};
+  link::RobotOutbox outbox{kIntervalUs};
   std::int64_t now_us = 10'000'000;
   std::vector<protocol::StationFrame> frames;
 
@@ -91,15 +91,16 @@ TEST_F(RobotOutboxTest, AStopDropsWhatIsQueued) {
 
 TEST_F(RobotOutboxTest, OfTooManyStopsTheOldestMakesRoom) {
   written();
-  for (CommandId id = 1; id <= RobotOutbox::kMaxQueuedStops + 1; ++id) stop(id);
+  for (station::CommandId id = 1; id <= link::RobotOutbox::kMaxQueuedStops + 1; ++id) stop(id);
   const Words words = written();
-  ASSERT_EQ(words.size(), RobotOutbox::kMaxQueuedStops);
+  ASSERT_EQ(words.size(), link::RobotOutbox::kMaxQueuedStops);
   EXPECT_EQ(words.front(), "stop 2");
-  EXPECT_EQ(words.back(), "stop " + std::to_string(RobotOutbox::kMaxQueuedStops + 1));
+  EXPECT_EQ(words.back(), "stop " + std::to_string(link::RobotOutbox::kMaxQueuedStops + 1));
 }
 
 TEST_F(RobotOutboxTest, AFullQueueRefusesUntilOneIsWithdrawn) {
-  for (CommandId id = 1; id <= RobotOutbox::kMaxQueuedCommands; ++id) EXPECT_TRUE(outbox.enqueue(command(id), kLater));
+  for (station::CommandId id = 1; id <= link::RobotOutbox::kMaxQueuedCommands; ++id)
+    EXPECT_TRUE(outbox.enqueue(command(id), kLater));
   EXPECT_FALSE(outbox.enqueue(command(100), kLater));
   EXPECT_TRUE(outbox.withdraw(5));
   EXPECT_FALSE(outbox.withdraw(5));
@@ -117,8 +118,8 @@ TEST_F(RobotOutboxTest, WhatIsTooOldIsNotSent) {
 // SAFETY: a robot keeps no more answers than these; a stop asks for no place.
 TEST_F(RobotOutboxTest, BeyondTheWindowCommandsWaitForAnswersAndStopsDoNot) {
   written();
-  for (CommandId id = 1; id <= CommandWindow::kMost + 2; ++id) outbox.enqueue(command(id), kLater);
-  EXPECT_EQ(written().size(), CommandWindow::kMost);
+  for (station::CommandId id = 1; id <= link::CommandWindow::kMost + 2; ++id) outbox.enqueue(command(id), kLater);
+  EXPECT_EQ(written().size(), link::CommandWindow::kMost);
   answer(2);
   EXPECT_EQ(written(), (Words{"command 7"}));
   outbox.on_event_of(3);
@@ -133,8 +134,8 @@ TEST_F(RobotOutboxTest, ATimedCommandHoldsItsPlaceUntilItsTimeHasPassed) {
   protocol::Command timed = command(1);
   timed.has_execute_at_robot_us = true;
   outbox.enqueue(timed, kLater);
-  for (CommandId id = 2; id <= CommandWindow::kMost; ++id) outbox.enqueue(command(id), kLater);
-  EXPECT_EQ(written().size(), CommandWindow::kMost - 1) << "it takes two places";
+  for (station::CommandId id = 2; id <= link::CommandWindow::kMost; ++id) outbox.enqueue(command(id), kLater);
+  EXPECT_EQ(written().size(), link::CommandWindow::kMost - 1) << "it takes two places";
   protocol::CommandAck ack = rheonaut_CommandAck_init_zero;
   ack.command_id = 1;
   ack.result = rheonaut_COMMAND_RESULT_ACCEPTED;
@@ -212,7 +213,7 @@ TEST_F(RobotOutboxTest, NothingFollowsAFrameWhoseRestIsUnsent) {
   };
   const auto first = outbox.write_next(now_us, write_one);
   ASSERT_TRUE(first);
-  EXPECT_EQ(first->command_id, CommandId{1});
+  EXPECT_EQ(first->command_id, station::CommandId{1});
   stop(9);
   EXPECT_EQ(written(), Words{}) << "not even a stop, inside a frame";
   receive(outbox.unsent());

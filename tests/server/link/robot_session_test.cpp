@@ -187,8 +187,8 @@ TEST_F(LinkTest, ARefusedSecondConnectionIsAnEventThatNamesBoth) {
   connect();
   const std::string first_peer = station.find("r1")->peer;
   const auto refusals = [this] {
-    std::vector<RobotEvent> found;
-    for (const RobotEvent& event : sink.events) {
+    std::vector<station::RobotEvent> found;
+    for (const station::RobotEvent& event : sink.events) {
       if (event.kind == "connection_refused") found.push_back(event);
     }
     return found;
@@ -245,7 +245,7 @@ TEST_F(LinkTest, SamplesReachTheSinksWithTheirContext) {
   auto* robot = connect();
   robot->send_samples(0, 5, robot->robot_now_us(), 0);
   ASSERT_TRUE(clock.run_until([&] { return !sink.batches.empty(); }, 100ms));
-  const SampleBatch& batch = sink.batches[0];
+  const station::SampleBatch& batch = sink.batches[0];
   EXPECT_EQ(batch.robot_id, "r1");
   EXPECT_EQ(batch.boot_id, 77u);
   EXPECT_EQ(batch.next_seq(), 5u);
@@ -302,7 +302,7 @@ TEST_F(LinkTest, AnswersOfTheRobotGiveTheClockOffset) {
   frame.body.heartbeat.echo_received_at_robot_us = robot->robot_now_us() - 10'000;
   robot->send(frame);
   clock.settle();
-  const ClockEstimate estimate = station.find("r1")->clock;
+  const station::ClockEstimate estimate = station.find("r1")->clock;
   ASSERT_TRUE(estimate.valid);
   EXPECT_LE(std::abs(estimate.offset_us - robot->booted_at_us), estimate.uncertainty_us(robot->robot_now_us()));
   EXPECT_LE(estimate.uncertainty_us(robot->robot_now_us()), 15'000);

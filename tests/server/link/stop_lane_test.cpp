@@ -15,7 +15,7 @@ TEST_F(LinkTest, AnEmergencyStopGoesAheadOfWhatWaitsAndReplacesIt) {
   ASSERT_EQ(robot->commands().size(), 1u) << "the queued commands must never reach the robot";
   EXPECT_EQ(robot->commands()[0].which_action, rheonaut_Command_emergency_stop_tag);
   EXPECT_EQ(results.size(), 5u);
-  for (const auto& result : results) EXPECT_EQ(result->state, CommandState::superseded);
+  for (const auto& result : results) EXPECT_EQ(result->state, station::CommandState::superseded);
 }
 
 // SAFETY: not behind the samples of a fleet, nor in a pause; what that means PollSetTest shows.
@@ -52,7 +52,7 @@ TEST_F(LinkTest, AStopLatchesTheStationUntilItIsCleared) {
   EXPECT_EQ(results.at(0).error().reason, "latched") << "before the robot has answered";
   robot->acknowledge(robot->commands().at(0), rheonaut_COMMAND_RESULT_ACCEPTED, 9);
   clock.settle();
-  EXPECT_EQ(results.at(1)->state, CommandState::acknowledged);
+  EXPECT_EQ(results.at(1)->state, station::CommandState::acknowledged);
   EXPECT_EQ(results.at(1)->emergency_id, 9u);
   submit(set_duty(0.1F));
   clock.settle();
@@ -90,7 +90,7 @@ TEST_F(LinkTest, AStopForADeadLinkIsKeptAndSentFirstAfterTheHello) {
   ASSERT_TRUE(clock.run_until([&] { return !connected(); }, 2s));
   stop_robot(100ms);
   ASSERT_TRUE(clock.run_until([&] { return !results.empty(); }, 1s));
-  EXPECT_EQ(results[0]->state, CommandState::queued);
+  EXPECT_EQ(results[0]->state, station::CommandState::queued);
   EXPECT_TRUE(station.find("r1")->pending_stop.has_value());
 
   auto* again = dial();
@@ -116,7 +116,7 @@ TEST_F(LinkTest, AStopForADeadLinkIsKeptAndSentFirstAfterTheHello) {
 }
 
 TEST_F(LinkTest, AStopOfAnEarlierStationIsSentWhenTheRobotReturns) {
-  CommandRecord kept;
+  station::CommandRecord kept;
   kept.id = 1234;
   kept.robot_id = "r1";
   kept.kind = "emergency_stop";
@@ -147,10 +147,10 @@ TEST_F(LinkTest, ManyStopsAreBoundedAndAllAnswered) {
   auto* robot = connect();
   for (int i = 0; i < 100; ++i) stop_robot(1s);
   clock.settle();
-  EXPECT_LE(robot->commands().size(), RobotOutbox::kMaxQueuedStops);
+  EXPECT_LE(robot->commands().size(), link::RobotOutbox::kMaxQueuedStops);
   for (const auto& command : robot->commands()) robot->acknowledge(command, rheonaut_COMMAND_RESULT_ACCEPTED, 9);
   ASSERT_TRUE(clock.run_until([&] { return results.size() == 100; }, 2s));
-  for (const auto& result : results) EXPECT_EQ(result->state, CommandState::acknowledged);
+  for (const auto& result : results) EXPECT_EQ(result->state, station::CommandState::acknowledged);
 }
 
 TEST_F(LinkTest, TheAnswerToAnEarlierStopDoesNotSettleALaterOne) {
@@ -285,8 +285,8 @@ TEST_F(LinkTest, AKeyThatWasUsedIsNoReasonNotToStop) {
 TEST_F(LinkTest, AStopIsTimedFromItsRequestToDutyZeroInTelemetry) {
   auto* robot = connect();
   robot->link.stall(true);
-  tasks.spawn("stop", [](Station& to, std::int64_t received_us) -> boost::asio::awaitable<void> {
-    StopRequest request{"r1", "test", "", "", received_us};
+  tasks.spawn("stop", [](station::Station& to, std::int64_t received_us) -> boost::asio::awaitable<void> {
+    station::StopRequest request{"r1", "test", "", "", received_us};
     co_await to.emergency_stop(std::move(request), 1s);
   }(station, clock.steady_us() - 300));
   clock.run_for(2ms);
@@ -296,8 +296,8 @@ TEST_F(LinkTest, AStopIsTimedFromItsRequestToDutyZeroInTelemetry) {
   clock.run_for(5ms);
   robot->send_samples(0, 1, robot->robot_now_us(), 9);
   clock.settle();
-  const CommandRecord& stop = sink.commands.back();
-  EXPECT_EQ(stop.state, CommandState::verified);
+  const station::CommandRecord& stop = sink.commands.back();
+  EXPECT_EQ(stop.state, station::CommandState::verified);
   EXPECT_EQ(stop.sent_after_us, 300);
   EXPECT_EQ(stop.acknowledged_after_us, 2300);
   EXPECT_EQ(stop.verified_after_us, 7300);

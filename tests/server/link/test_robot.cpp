@@ -8,8 +8,8 @@
 namespace server {
 namespace asio = boost::asio;
 
-TestRobot::TestRobot(asio::io_context& loop, Clock& clock, TaskGroup& tasks, RobotListener& listener,
-                     std::size_t capacity_bytes)
+TestRobot::TestRobot(asio::io_context& loop, runtime::Clock& clock, runtime::TaskGroup& tasks,
+                     link::RobotListener& listener, std::size_t capacity_bytes)
     : link{loop, capacity_bytes},
       booted_at_us{clock.steady_us() - 5'000'000},
       loop_{loop},

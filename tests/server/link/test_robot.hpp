@@ -11,39 +11,41 @@
 namespace server {
 
 // Admits everyone by default; keeps the requests.
-class FakeArchive final : public RobotArchive {
+class FakeArchive final : public station::RobotArchive {
  public:
-  boost::asio::awaitable<Admission> admit(AdmissionRequest request) override {
+  boost::asio::awaitable<station::Admission> admit(station::AdmissionRequest request) override {
     requests.push_back(request);
     co_return answer;
   }
 
-  Admission answer;
-  std::vector<AdmissionRequest> requests;
+  station::Admission answer;
+  std::vector<station::AdmissionRequest> requests;
 };
 
 // Keeps everything that it is notified of.
-class RecordingSink final : public StationSink {
+class RecordingSink final : public station::StationSink {
  public:
-  void on_robot(const RobotState& robot) override { robots.push_back(robot); }
-  void on_samples(const RobotState&, const SampleBatch& batch) override { batches.push_back(batch); }
-  void on_event(const RobotState&, const RobotEvent& event) override { events.push_back(event); }
-  void on_command(const CommandRecord& record) override { commands.push_back(record); }
-  void on_clock(const RobotState&, const ClockRecord& record) override { clocks.push_back(record); }
-  void on_in_force(const RobotState&, const InForceRecord& record) override { in_force.push_back(record); }
+  void on_robot(const station::RobotState& robot) override { robots.push_back(robot); }
+  void on_samples(const station::RobotState&, const station::SampleBatch& batch) override { batches.push_back(batch); }
+  void on_event(const station::RobotState&, const station::RobotEvent& event) override { events.push_back(event); }
+  void on_command(const station::CommandRecord& record) override { commands.push_back(record); }
+  void on_clock(const station::RobotState&, const station::ClockRecord& record) override { clocks.push_back(record); }
+  void on_in_force(const station::RobotState&, const station::InForceRecord& record) override {
+    in_force.push_back(record);
+  }
 
-  std::vector<RobotState> robots;
-  std::vector<SampleBatch> batches;
-  std::vector<RobotEvent> events;
-  std::vector<CommandRecord> commands;
-  std::vector<ClockRecord> clocks;
-  std::vector<InForceRecord> in_force;
+  std::vector<station::RobotState> robots;
+  std::vector<station::SampleBatch> batches;
+  std::vector<station::RobotEvent> events;
+  std::vector<station::CommandRecord> commands;
+  std::vector<station::ClockRecord> clocks;
+  std::vector<station::InForceRecord> in_force;
 };
 
 class TestRobot {
  public:
-  TestRobot(boost::asio::io_context& loop, Clock& clock, TaskGroup& tasks, RobotListener& listener,
-            std::size_t capacity_bytes = 64 * 1024);
+  TestRobot(boost::asio::io_context& loop, runtime::Clock& clock, runtime::TaskGroup& tasks,
+            link::RobotListener& listener, std::size_t capacity_bytes = 64 * 1024);
 
   static protocol::RobotFrame hello_frame(protocol::Mode mode = rheonaut_MODE_MANUAL);
   // At rest, in manual or in this emergency.
@@ -67,7 +69,7 @@ class TestRobot {
   std::vector<protocol::Command> commands() const;
   std::vector<protocol::StationHeartbeat> heartbeats() const;
 
-  MemoryLink link;
+  net::MemoryLink link;
   std::int64_t booted_at_us;
   bool reading = true;  // false: nothing is taken from the link any more
   bool closed = false;  // the station ended the stream
@@ -79,9 +81,9 @@ class TestRobot {
   boost::asio::awaitable<void> talk();
 
   boost::asio::io_context& loop_;
-  Clock& clock_;
-  TaskGroup& tasks_;
-  std::unique_ptr<ByteStream> stream_;
+  runtime::Clock& clock_;
+  runtime::TaskGroup& tasks_;
+  std::unique_ptr<net::ByteStream> stream_;
 };
 
 }  // namespace server

@@ -17,7 +17,7 @@ TEST_F(TimedControlTest, IsLookedForFromItsTimeOn) {
   robot->send(frame);
   clock.settle();
   ASSERT_EQ(results.size(), 1U);
-  EXPECT_EQ(results[0]->state, CommandState::verified);
+  EXPECT_EQ(results[0]->state, station::CommandState::verified);
 }
 
 TEST_F(TimedControlTest, ExcusesNoStopThatTheMotorRunsOnAfter) {
@@ -27,7 +27,8 @@ TEST_F(TimedControlTest, ExcusesNoStopThatTheMotorRunsOnAfter) {
   robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, 7);
   clock.settle();
   show_that_the_motor_runs_on();
-  EXPECT_EQ(latest_of_kind("emergency_stop").state, CommandState::failed) << latest_of_kind("emergency_stop").reason;
+  EXPECT_EQ(latest_of_kind("emergency_stop").state, station::CommandState::failed)
+      << latest_of_kind("emergency_stop").reason;
 }
 
 // The robot puts a stop's answer ahead of all others, also of a command that it has taken in before.
@@ -39,9 +40,10 @@ TEST_F(TimedControlTest, ExcusesNoStopWhoseAnswerPassesItsOwn) {
   accept_for_its_time(waiting);
   robot->acknowledge(waiting, rheonaut_COMMAND_RESULT_REJECTED, 7, rheonaut_REJECT_REASON_LATCHED);
   clock.settle();
-  EXPECT_EQ(latest_of_kind("set_duty").state, CommandState::rejected);
+  EXPECT_EQ(latest_of_kind("set_duty").state, station::CommandState::rejected);
   show_that_the_motor_runs_on();
-  EXPECT_EQ(latest_of_kind("emergency_stop").state, CommandState::failed) << latest_of_kind("emergency_stop").reason;
+  EXPECT_EQ(latest_of_kind("emergency_stop").state, station::CommandState::failed)
+      << latest_of_kind("emergency_stop").reason;
 }
 
 TEST_F(TimedControlTest, AStopIsExcusedByAClearOfItsLatch) {
@@ -54,7 +56,7 @@ TEST_F(TimedControlTest, AStopIsExcusedByAClearOfItsLatch) {
   robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, 0);
   clock.settle();
   show_that_the_motor_runs_on();
-  EXPECT_EQ(latest_of_kind("emergency_stop").state, CommandState::superseded)
+  EXPECT_EQ(latest_of_kind("emergency_stop").state, station::CommandState::superseded)
       << latest_of_kind("emergency_stop").reason;
 }
 
@@ -65,8 +67,8 @@ TEST_F(TimedControlTest, EndsAsTheRobotSaysWhenItDropsIt) {
   robot->acknowledge(second, rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_LATCHED);
   clock.settle();
   ASSERT_EQ(results.size(), 2U);
-  EXPECT_EQ(results[0]->state, CommandState::expired);
-  EXPECT_EQ(results[1]->state, CommandState::rejected);
+  EXPECT_EQ(results[0]->state, station::CommandState::expired);
+  EXPECT_EQ(results[1]->state, station::CommandState::rejected);
   EXPECT_EQ(results[1]->reason, "latched");
 }
 
@@ -86,8 +88,8 @@ TEST_F(TimedControlTest, AScheduleThatIsReplacedBeforeItsFirstMotionIsSuperseded
   admit(timed(set_duty(0), at_us + 700'000, "a"));
   for (std::uint64_t seq = 5; seq < 250; seq += 5) robot->send_samples(seq, 5, at_us + seq * 10'000, 0);
   clock.settle();
-  EXPECT_EQ(latest_of_kind("set_duty").state, CommandState::verified);
-  EXPECT_EQ(latest_of_kind("set_duty_schedule").state, CommandState::superseded)
+  EXPECT_EQ(latest_of_kind("set_duty").state, station::CommandState::verified);
+  EXPECT_EQ(latest_of_kind("set_duty_schedule").state, station::CommandState::superseded)
       << latest_of_kind("set_duty_schedule").reason;
 }
 
@@ -98,7 +100,7 @@ TEST_F(TimedControlTest, AScheduleThatShouldHaveMovedBeforeTheNextCommandFails) 
   admit(timed(set_duty(0), at_us + 1'600'000, "a"));
   for (std::uint64_t seq = 5; seq < 250; seq += 5) robot->send_samples(seq, 5, at_us + seq * 10'000, 0);
   clock.settle();
-  EXPECT_EQ(latest_of_kind("set_duty_schedule").state, CommandState::failed)
+  EXPECT_EQ(latest_of_kind("set_duty_schedule").state, station::CommandState::failed)
       << latest_of_kind("set_duty_schedule").reason;
 }
 
@@ -114,25 +116,25 @@ TEST_F(TimedControlTest, AScheduleIsSeenByItsFirstMotion) {
   robot->send(frame);
   clock.settle();
   ASSERT_EQ(results.size(), 1U);
-  EXPECT_EQ(results[0]->state, CommandState::verified);
+  EXPECT_EQ(results[0]->state, station::CommandState::verified);
 }
 
 // SAFETY: each way in which control ends.
 TEST_F(TimedControlTest, IsDroppedWhenControlIsReleasedForcedHandedOverOrExpires) {
   admit(timed(set_duty(0.25F), in_ms(2000), "a"));
-  control(ControlAction::release, "a");
+  control(station::ControlAction::release, "a");
   EXPECT_EQ(drops(), 1U);
   accept_last();
 
   admit(timed(set_duty(0.25F), in_ms(2000), "a"));
-  control(ControlAction::force, "b");
+  control(station::ControlAction::force, "b");
   EXPECT_EQ(drops(), 2U);
   accept_last();
 
   admit(timed(set_duty(0.25F), in_ms(2000), "b"));
-  control(ControlAction::request, "a");
+  control(station::ControlAction::request, "a");
   EXPECT_EQ(drops(), 2U) << "who asks for control changes nothing";
-  control(ControlAction::hand_over, "b");
+  control(station::ControlAction::hand_over, "b");
   EXPECT_EQ(drops(), 3U);
   accept_last();
 
@@ -148,7 +150,7 @@ TEST_F(TimedControlTest, IsDroppedWhenControlIsReleasedForcedHandedOverOrExpires
 TEST_F(TimedControlTest, IsNotDroppedWhenNoneMayWaitAnyMore) {
   admit(timed(set_duty(0.25F), in_ms(500), "a"));
   clock.run_for(1s);
-  control(ControlAction::release, "a");
+  control(station::ControlAction::release, "a");
   EXPECT_EQ(drops(), 0U);
 }
 
@@ -156,7 +158,7 @@ TEST_F(TimedControlTest, IsNotDroppedWhenNoneMayWaitAnyMore) {
 TEST_F(TimedControlTest, IsDroppedAheadOfTheNextHoldersFirstCommand) {
   admit(timed(set_duty(0.25F), in_ms(7000), "a"));
   clock.run_for(3100ms);
-  CommandRequest next = request_of(set_duty(0.5F));
+  station::CommandRequest next = request_of(set_duty(0.5F));
   next.actor = "b";
   submit(std::move(next));
   clock.settle();
@@ -169,12 +171,12 @@ TEST_F(TimedControlTest, IsDroppedAheadOfTheNextHoldersFirstCommand) {
 // SAFETY: nobody's command passes the one that drops what waits.
 TEST_F(TimedControlTest, IsDroppedBeforeAnythingElseAlsoWhenTheLinkWasFull) {
   admit(timed(set_duty(0.25F), in_ms(7000), "a"));
-  for (std::size_t i = 0; i < CommandWindow::kMost + RobotOutbox::kMaxQueuedCommands; ++i) {
+  for (std::size_t i = 0; i < link::CommandWindow::kMost + link::RobotOutbox::kMaxQueuedCommands; ++i) {
     submit(ping(), 8s);
     clock.settle();
   }
-  control(ControlAction::force, "b");
-  CommandRequest next = request_of(set_duty(0.5F), 8s);
+  control(station::ControlAction::force, "b");
+  station::CommandRequest next = request_of(set_duty(0.5F), 8s);
   next.actor = "b";
   std::size_t refused = 0, answered = 1;
   const auto is_next = [](const protocol::Command& one) {
@@ -201,13 +203,13 @@ TEST_F(TimedControlTest, IsDroppedBeforeAnythingElseAlsoWhenTheLinkWasFull) {
 TEST_F(TimedControlTest, OfTheSameActorIsDroppedToWhenControlHadEndedInBetween) {
   admit(timed(set_duty(0.25F), in_ms(7000), "a"));
   clock.run_for(3100ms);
-  control(ControlAction::take, "a");
+  control(station::ControlAction::take, "a");
   EXPECT_EQ(drops(), 1U);
 }
 
 TEST_F(TimedControlTest, IsDroppedFirstOnTheNextConnectionWhenTheLinkWasCut) {
   admit(timed(set_duty(0.25F), in_ms(7000), "a"));
-  control(ControlAction::release, "a");
+  control(station::ControlAction::release, "a");
   ASSERT_EQ(drops(), 1U) << "and the link is cut before the answer";
   come_back();
   EXPECT_EQ(robot->commands()[0].which_action, rheonaut_Command_drop_timed_tag);
@@ -215,13 +217,13 @@ TEST_F(TimedControlTest, IsDroppedFirstOnTheNextConnectionWhenTheLinkWasCut) {
 
 TEST_F(TimedControlTest, IsDroppedAgainWhenThatCameTooLateButNotForAFirmwareThatDoesNotKnowIt) {
   const auto submit_as_b = [this] {
-    CommandRequest next = request_of(set_duty(0.5F));
+    station::CommandRequest next = request_of(set_duty(0.5F));
     next.actor = "b";
     submit(std::move(next));
     clock.settle();
   };
   admit(timed(set_duty(0.25F), in_ms(7000), "a"));
-  control(ControlAction::force, "b");
+  control(station::ControlAction::force, "b");
   robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_EXPIRED);
   clock.settle();
   submit_as_b();
@@ -236,13 +238,13 @@ TEST_F(TimedControlTest, IsDroppedAgainWhenThatCameTooLateButNotForAFirmwareThat
 TEST_F(TimedControlTest, OfALostLinkEndsAsTheRobotSaysWhenItIsBack) {
   const auto sent = admit(timed(set_duty(0.25F), in_ms(7000), "a"));
   come_back();
-  EXPECT_EQ(latest(sent.command_id).state, CommandState::unknown);
+  EXPECT_EQ(latest(sent.command_id).state, station::CommandState::unknown);
   EXPECT_EQ(latest(sent.command_id).reason, "link_lost");
   ASSERT_EQ(robot->commands().size(), 1U);
   EXPECT_EQ(robot->commands()[0].which_action, rheonaut_Command_drop_timed_tag) << "nor does it outlive the link";
   robot->acknowledge(sent, rheonaut_COMMAND_RESULT_EXPIRED);
   accept_last();
-  EXPECT_EQ(latest(sent.command_id).state, CommandState::expired);
+  EXPECT_EQ(latest(sent.command_id).state, station::CommandState::expired);
   EXPECT_EQ(latest(sent.command_id).reason, "link_lost");
 }
 
@@ -260,7 +262,7 @@ TEST_F(TimedControlTest, OfALostLinkIsVerifiedBySamplesThatNothingElseExplains) 
   come_back();
   clock.run_for(1s);
   show_duty_at(1, at_us, 0.25F);
-  EXPECT_EQ(latest(alone.command_id).state, CommandState::verified);
+  EXPECT_EQ(latest(alone.command_id).state, station::CommandState::verified);
 
   clock.run_for(10s);
   show_duty_at(2, in_ms(0), 0);
@@ -270,7 +272,8 @@ TEST_F(TimedControlTest, OfALostLinkIsVerifiedBySamplesThatNothingElseExplains) 
   come_back();
   clock.run_for(1s);
   show_duty_at(3, next_us, 0.25F);
-  EXPECT_EQ(latest(first.command_id).state, CommandState::unknown) << "the other one may have brought it about";
+  EXPECT_EQ(latest(first.command_id).state, station::CommandState::unknown)
+      << "the other one may have brought it about";
 }
 
 // Its acknowledgement of a drop finds room on the robot, whatever else is on its way.
@@ -320,7 +323,7 @@ TEST_F(TimedControlTest, TakesTwoPlacesUntilTheRobotHasTakenItIn) {
 TEST_F(TimedControlTest, WhatTheLinkHasNotTakenEndsWithControlWhetherTimedOrNot) {
   fill_window();
   const auto submit_of_a = [this](const protocol::Command& command) {
-    CommandRequest request = request_of(command, 10s);
+    station::CommandRequest request = request_of(command, 10s);
     request.actor = "a";
     submit(std::move(request));
     clock.settle();
@@ -333,51 +336,52 @@ TEST_F(TimedControlTest, WhatTheLinkHasNotTakenEndsWithControlWhetherTimedOrNot)
   submit_of_a(set_manual);
   submit(timed(set_duty(0.25F), in_ms(100), "a"));
   clock.run_for(1s);
-  control(ControlAction::force, "b");
+  control(station::ControlAction::force, "b");
   for (const char* kind : {"set_duty", "set_duty_schedule"}) {
-    EXPECT_EQ(latest_of_kind(kind).state, CommandState::superseded) << kind;
+    EXPECT_EQ(latest_of_kind(kind).state, station::CommandState::superseded) << kind;
     EXPECT_EQ(latest_of_kind(kind).reason, "control_ended") << kind;
   }
-  CommandRequest next = request_of(set_duty(0.5F), 5s);
+  station::CommandRequest next = request_of(set_duty(0.5F), 5s);
   next.actor = "b";
   submit(std::move(next));
   clock.settle();
   answer_all();
   const auto sent = kinds();
-  ASSERT_EQ(sent.size(), CommandWindow::kMost + 2U);
-  EXPECT_EQ(sent[CommandWindow::kMost], std::string{"set_mode"}) << "what only ends a motion is sent";
+  ASSERT_EQ(sent.size(), link::CommandWindow::kMost + 2U);
+  EXPECT_EQ(sent[link::CommandWindow::kMost], std::string{"set_mode"}) << "what only ends a motion is sent";
   EXPECT_EQ(robot->commands().back().action.set_duty.duty, 0.5F);
 }
 
 TEST_F(TimedControlTest, WhatTheLinkHasNotTakenEndsWhenControlIsReleasedButNotWhenItIsTaken) {
   fill_window();
-  CommandRequest of_nobody = request_of(moves_after_a_second(), 9s);
+  station::CommandRequest of_nobody = request_of(moves_after_a_second(), 9s);
   of_nobody.actor = "a";
   of_nobody.takes_control = false;
   submit(of_nobody);
   clock.settle();
-  control(ControlAction::take, "a");
-  EXPECT_EQ(latest_of_kind("set_duty_schedule").state, CommandState::queued);
-  CommandRequest held = request_of(set_duty(0.5F), 9s);
+  control(station::ControlAction::take, "a");
+  EXPECT_EQ(latest_of_kind("set_duty_schedule").state, station::CommandState::queued);
+  station::CommandRequest held = request_of(set_duty(0.5F), 9s);
   held.actor = "a";
   submit(held);
   clock.settle();
   protocol::Command parameter = rheonaut_Command_init_zero;
   parameter.which_action = rheonaut_Command_set_parameter_tag;
-  CommandRequest without_control = request_of(parameter, 9s);  // as the sender of models does it
+  station::CommandRequest without_control = request_of(parameter, 9s);  // as the sender of models does it
   without_control.actor = "a";
   without_control.takes_control = false;
   submit(without_control);
   clock.settle();
-  control(ControlAction::release, "a");
+  control(station::ControlAction::release, "a");
   EXPECT_EQ(latest_of_kind("set_duty").reason, "control_ended");
-  EXPECT_EQ(latest_of_kind("set_parameter").state, CommandState::queued) << "it was not sent by right of control";
+  EXPECT_EQ(latest_of_kind("set_parameter").state, station::CommandState::queued)
+      << "it was not sent by right of control";
 }
 
 TEST_F(TimedControlTest, LeavesThoseThatTheHolderStillControls) {
   admit(timed(set_duty(0.25F), in_ms(2000), "a"));
-  control(ControlAction::take, "a");
-  CommandRequest more = request_of(set_duty(0.1F));
+  control(station::ControlAction::take, "a");
+  station::CommandRequest more = request_of(set_duty(0.1F));
   more.actor = "a";
   submit(std::move(more));
   clock.settle();

@@ -8,18 +8,18 @@ namespace server {
 
 class TimedTest : public LinkTest {
  protected:
-  explicit TimedTest(const Envelope& envelope = Envelope{}) : LinkTest{envelope} {}
+  explicit TimedTest(const config::Envelope& envelope = config::Envelope{}) : LinkTest{envelope} {}
 
   std::uint64_t in_ms(std::uint64_t ms) const { return robot->robot_now_us() + ms * 1000; }
-  CommandRequest timed(protocol::Command command, std::uint64_t at_us, const char* actor) const {
+  station::CommandRequest timed(protocol::Command command, std::uint64_t at_us, const char* actor) const {
     command.has_execute_at_robot_us = true;
     command.execute_at_robot_us = at_us;
-    CommandRequest request = request_of(command, 8s);
+    station::CommandRequest request = request_of(command, 8s);
     request.actor = actor;
     request.until_verified = true;
     return request;
   }
-  protocol::Command send_out(CommandRequest request) {
+  protocol::Command send_out(station::CommandRequest request) {
     submit(std::move(request));
     clock.settle();
     return robot->commands().back();
@@ -33,7 +33,7 @@ class TimedTest : public LinkTest {
     robot->send(frame);
     clock.settle();
   }
-  protocol::Command admit(CommandRequest request) {
+  protocol::Command admit(station::CommandRequest request) {
     const protocol::Command sent = send_out(std::move(request));
     accept_for_its_time(sent);
     return sent;
@@ -57,8 +57,8 @@ class TimedTest : public LinkTest {
       clock.run_for(50ms);
     }
   }
-  const CommandRecord& latest_of_kind(const std::string& kind) const {
-    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), kind, &CommandRecord::kind);
+  const station::CommandRecord& latest_of_kind(const std::string& kind) const {
+    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), kind, &station::CommandRecord::kind);
   }
   std::vector<const char*> kinds() const {
     std::vector<const char*> found;
@@ -69,8 +69,8 @@ class TimedTest : public LinkTest {
     return static_cast<std::size_t>(
         std::ranges::count_if(kinds(), [](const char* kind) { return kind == std::string{"drop_timed"}; }));
   }
-  void control(ControlAction action, const char* actor) {
-    EXPECT_TRUE(station.control({"r1", actor, "", action, kControlLease, "because"}));
+  void control(station::ControlAction action, const char* actor) {
+    EXPECT_TRUE(station.control({"r1", actor, "", action, station::kControlLease, "because"}));
     clock.settle();
   }
   static protocol::Command ping() {
@@ -80,7 +80,7 @@ class TimedTest : public LinkTest {
   }
   // What comes now waits in the station, until the robot answers.
   void fill_window() {
-    for (std::size_t i = 0; i < CommandWindow::kMost; ++i) submit(ping(), 9s);
+    for (std::size_t i = 0; i < link::CommandWindow::kMost; ++i) submit(ping(), 9s);
     clock.settle();
   }
   void answer_all() {
@@ -100,8 +100,8 @@ class TimedTest : public LinkTest {
     ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));
     robot->keep_talking();
   }
-  const CommandRecord& latest(CommandId id) const {
-    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &CommandRecord::id);
+  const station::CommandRecord& latest(station::CommandId id) const {
+    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &station::CommandRecord::id);
   }
   void accept_last() {
     robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED);

@@ -16,12 +16,12 @@ class TimedLimitsTest : public TimedTest {
     EXPECT_TRUE(station.set_fluid("r1", "non_newtonian", {"a", "", 0}));
     show_setpoint(0);
   }
-  static Envelope envelope() {
-    CommandLimits limits, water, oil;
+  static config::Envelope envelope() {
+    config::CommandLimits limits, water, oil;
     limits.setpoint_step_m = water.setpoint_step_m = 0.25;
     water.duty_max = 0.5;
     oil.power_s = 10;
-    return Envelope{limits, {{"water", water}, {"oil", oil}}};
+    return config::Envelope{limits, {{"water", water}, {"oil", oil}}};
   }
   void show_setpoint(float setpoint_m) {
     auto frame = TestRobot::samples_frame(next_seq_++, 1, robot->robot_now_us(), 0);
@@ -62,13 +62,13 @@ class TimedLimitsTest : public TimedTest {
     robot->send(frame);
     clock.settle();
   }
-  CommandRequest now(protocol::Command command, microseconds time_to_live = 1s) const {
-    CommandRequest request = request_of(command, time_to_live);
+  station::CommandRequest now(protocol::Command command, microseconds time_to_live = 1s) const {
+    station::CommandRequest request = request_of(command, time_to_live);
     request.actor = "a";
     return request;
   }
   // What speaks against it; empty when it is sent.
-  std::string refusal(CommandRequest request) {
+  std::string refusal(station::CommandRequest request) {
     const std::size_t before = results.size();
     submit(std::move(request));
     clock.settle();
@@ -109,7 +109,7 @@ TEST_F(TimedLimitsTest, OneOnItsWayCountsUntilTelemetryShowsWhatIsInForce) {
 TEST_F(TimedLimitsTest, OneWithoutAnAnswerCountsUntilTelemetryComesFromAfterItsTimeToLive) {
   EXPECT_EQ(refusal(now(set_setpoint(0.25F), 500ms)), "");
   ASSERT_TRUE(clock.run_until([&] { return !results.empty(); }, 3s));
-  EXPECT_EQ(results[0]->state, CommandState::unknown);
+  EXPECT_EQ(results[0]->state, station::CommandState::unknown);
   EXPECT_THAT(refusal(now(set_setpoint(-0.25F))), HasSubstr("from the setpoint 0.250 on its way"));
   show_setpoint(0);
   EXPECT_EQ(refusal(now(set_setpoint(-0.25F))), "");
@@ -118,7 +118,7 @@ TEST_F(TimedLimitsTest, OneWithoutAnAnswerCountsUntilTelemetryComesFromAfterItsT
 TEST_F(TimedLimitsTest, OfAFormerHolderHindersNobody) {
   admit(timed(set_setpoint(0.25F), in_ms(7000), "a"));
   clock.run_for(3100ms);
-  CommandRequest next = now(set_setpoint(-0.25F));
+  station::CommandRequest next = now(set_setpoint(-0.25F));
   next.actor = "b";
   EXPECT_EQ(refusal(next), "");
   EXPECT_EQ(drops(), 1U);
@@ -131,7 +131,7 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheLimitsOfTheFluidBecomeNarrower) {
   EXPECT_EQ(drops(), 1U);
   robot->acknowledge(sent, rheonaut_COMMAND_RESULT_EXPIRED);
   accept_last();
-  EXPECT_EQ(latest(sent.command_id).state, CommandState::expired);
+  EXPECT_EQ(latest(sent.command_id).state, station::CommandState::expired);
   EXPECT_EQ(latest(sent.command_id).reason, "limits_changed");
 
   admit(timed(set_duty(0.5F), in_ms(3000), "a"));
@@ -149,7 +149,7 @@ TEST_F(TimedLimitsTest, WhatTheLinkHasNotTakenIsNotSentWhenTheLimitsBecomeNarrow
   clock.settle();
   ASSERT_TRUE(station.set_fluid("r1", "water", {"a", "", 0}));
   clock.settle();
-  EXPECT_EQ(latest_of_kind("set_duty").state, CommandState::superseded);
+  EXPECT_EQ(latest_of_kind("set_duty").state, station::CommandState::superseded);
   EXPECT_EQ(latest_of_kind("set_duty").reason, "limits_changed");
   submit(now(set_duty(0.5F), 9s));
   ASSERT_TRUE(station.set_fluid("r1", "non_newtonian", {"a", "", 0}));
@@ -159,7 +159,7 @@ TEST_F(TimedLimitsTest, WhatTheLinkHasNotTakenIsNotSentWhenTheLimitsBecomeNarrow
 
 TEST_F(TimedLimitsTest, ItIsDroppedLaterWhenTheLinkWasFullAndNothingIsRenewedBefore) {
   admit(timed(set_duty(0.8F), in_ms(7000), "a"));
-  for (std::size_t i = 0; i < CommandWindow::kMost + RobotOutbox::kMaxQueuedCommands; ++i) {
+  for (std::size_t i = 0; i < link::CommandWindow::kMost + link::RobotOutbox::kMaxQueuedCommands; ++i) {
     submit(ping(), 5s);
     clock.settle();
   }
@@ -196,7 +196,7 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheSetpointBeforeItWas) {
 TEST_F(TimedLimitsTest, ADropThatFoundNoRoomIsSentAsSoonAsThereIsSome) {
   const auto first = admit(timed(set_setpoint(0.25F), in_ms(1000), "a"));
   admit(timed(set_setpoint(0.5F), in_ms(2000), "a"));
-  for (std::size_t i = 0; i < CommandWindow::kMost + RobotOutbox::kMaxQueuedCommands; ++i) {
+  for (std::size_t i = 0; i < link::CommandWindow::kMost + link::RobotOutbox::kMaxQueuedCommands; ++i) {
     submit(ping(), 9s);
     clock.settle();
   }
@@ -213,9 +213,9 @@ TEST_F(TimedLimitsTest, WhatIsToBeDroppedCountsWhereItMayHaveActedBefore) {
   admit(timed(set_setpoint(0.25F), in_ms(500), "a"));
   admit(timed(set_setpoint(0), in_ms(3000), "a"));
   clock.run_for(510ms);
-  control(ControlAction::force, "b");
+  control(station::ControlAction::force, "b");
   ASSERT_EQ(drops(), 1U);
-  CommandRequest next = now(set_setpoint(-0.25F));
+  station::CommandRequest next = now(set_setpoint(-0.25F));
   next.actor = "b";
   EXPECT_THAT(refusal(next), HasSubstr("from the setpoint 0.250 that waits")) << "its time has come";
   show_setpoint(0);
@@ -228,8 +228,8 @@ TEST_F(TimedLimitsTest, WhatIsToBeDroppedCountsWhileTheLeaseMayBeExtended) {
   renewal.which_action = rheonaut_Command_renew_lease_tag;
   submit(now(renewal));
   clock.settle();
-  control(ControlAction::force, "b");
-  CommandRequest next = now(set_setpoint(-0.25F));
+  control(station::ControlAction::force, "b");
+  station::CommandRequest next = now(set_setpoint(-0.25F));
   next.actor = "b";
   EXPECT_THAT(refusal(next), HasSubstr("step_too_large"));
   robot->acknowledge(robot->commands()[1], rheonaut_COMMAND_RESULT_ACCEPTED);
@@ -254,7 +254,7 @@ TEST_F(TimedLimitsTest, OneThatANewerOneTakesBackDoesNotHinderIt) {
   submit(now(set_setpoint(-0.25F), 9s));
   answer_all();
   EXPECT_EQ(robot->commands().back().action.set_setpoint.setpoint_m, -0.25F);
-  EXPECT_EQ(robot->commands().size(), CommandWindow::kMost + 1U);
+  EXPECT_EQ(robot->commands().size(), link::CommandWindow::kMost + 1U);
 }
 
 // Driven in manual until the time of set_mode auto comes.
@@ -274,7 +274,7 @@ TEST_F(TimedLimitsTest, ItIsDroppedWhenTheRobotHasBeenDrivenMoreThanAStepAway) {
   EXPECT_EQ(drops(), 1U);
   robot->acknowledge(first, rheonaut_COMMAND_RESULT_EXPIRED);
   accept_last();
-  EXPECT_EQ(latest(first.command_id).state, CommandState::expired);
+  EXPECT_EQ(latest(first.command_id).state, station::CommandState::expired);
   EXPECT_EQ(latest(first.command_id).reason, "step_too_large");
   show_position(-0.07F);
   EXPECT_EQ(drops(), 1U) << "nothing waits any more";
@@ -329,9 +329,9 @@ TEST_F(TimedLimitsTest, AScheduleWithoutAnAnswerCountsUntilALaterDutyIsAccepted)
   ASSERT_TRUE(station.set_fluid("r1", "oil", {"a", "", 0}));
   const auto next = [this] { return timed(at_power(2), in_ms(5000), "a"); };
   EXPECT_EQ(refusal(now(at_power(9))), "");
-  const CommandId id = robot->commands().back().command_id;
-  clock.run_until([&] { return latest(id).state == CommandState::unknown; }, 10s);
-  EXPECT_EQ(latest(id).state, CommandState::unknown);
+  const station::CommandId id = robot->commands().back().command_id;
+  clock.run_until([&] { return latest(id).state == station::CommandState::unknown; }, 10s);
+  EXPECT_EQ(latest(id).state, station::CommandState::unknown);
   EXPECT_THAT(refusal(next()), HasSubstr("too_long_at_power"));
   EXPECT_EQ(refusal(now(set_duty(0))), "");
   EXPECT_THAT(refusal(next()), HasSubstr("too_long_at_power")) << "not before the answer";
@@ -345,7 +345,7 @@ TEST_F(TimedLimitsTest, AScheduleThatHasBegunAtItsTimeCountsByWhatIsLeft) {
   EXPECT_THAT(refusal(timed(at_power(2), in_ms(5000), "a")), HasSubstr("asks for 9.0 s more"));
   clock.run_for(1100ms);
   show_a_second_at_power(sent.execute_at_robot_us);
-  EXPECT_EQ(latest(sent.command_id).state, CommandState::verified);
+  EXPECT_EQ(latest(sent.command_id).state, station::CommandState::verified);
   EXPECT_THAT(refusal(timed(at_power(2), in_ms(5000), "a")), HasSubstr("run for 1.0 s, and what runs or waits for its "
                                                                        "time asks for 8.0 s more"));
   EXPECT_EQ(refusal(timed(at_power(1), in_ms(5000), "a")), "");

@@ -17,11 +17,11 @@ class UnansweredTest : public LinkTest {
     clock.settle();
   }
   // Sent, and its validity passes without a word about it.
-  CommandId unanswered(const protocol::Command& command) {
+  station::CommandId unanswered(const protocol::Command& command) {
     const std::size_t before = results.size();
     submit(command, 500ms);
     EXPECT_TRUE(clock.run_until([&] { return results.size() > before; }, 3s));
-    EXPECT_EQ(results.back()->state, CommandState::unknown);
+    EXPECT_EQ(results.back()->state, station::CommandState::unknown);
     return results.back()->id;
   }
   // A sample that was made so long ago.
@@ -33,7 +33,7 @@ class UnansweredTest : public LinkTest {
     robot.send(frame);
     clock.settle();
   }
-  void say_event(TestRobot& robot, CommandId id, microseconds age = {}) {
+  void say_event(TestRobot& robot, station::CommandId id, microseconds age = {}) {
     protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
     frame.which_body = rheonaut_RobotFrame_event_tag;
     frame.body.event.kind = rheonaut_EVENT_KIND_SETPOINT_CHANGED;
@@ -43,8 +43,8 @@ class UnansweredTest : public LinkTest {
     robot.send(frame);
     clock.settle();
   }
-  const CommandRecord& latest(CommandId id) const {
-    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &CommandRecord::id);
+  const station::CommandRecord& latest(station::CommandId id) const {
+    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &station::CommandRecord::id);
   }
 
  private:
@@ -55,13 +55,13 @@ TEST_F(UnansweredTest, NoMoreAreOnTheirWayThanTheRobotCanAcknowledge) {
   auto* robot = connect();
   for (int i = 0; i < 14; ++i) submit(ping());
   clock.run_for(100ms);
-  EXPECT_EQ(robot->commands().size(), CommandWindow::kMost);
+  EXPECT_EQ(robot->commands().size(), link::CommandWindow::kMost);
   for (std::size_t i = 0; i < 14; ++i) {
     accept(*robot, i);
-    EXPECT_EQ(robot->commands().size(), std::min<std::size_t>(i + 1 + CommandWindow::kMost, 14));
+    EXPECT_EQ(robot->commands().size(), std::min<std::size_t>(i + 1 + link::CommandWindow::kMost, 14));
   }
   ASSERT_EQ(results.size(), 14u);
-  for (const auto& result : results) EXPECT_EQ(result->state, CommandState::acknowledged);
+  for (const auto& result : results) EXPECT_EQ(result->state, station::CommandState::acknowledged);
 }
 
 TEST_F(UnansweredTest, AStopWaitsForNoAnswer) {
@@ -70,7 +70,7 @@ TEST_F(UnansweredTest, AStopWaitsForNoAnswer) {
   clock.run_for(100ms);
   stop_robot();
   clock.settle();
-  ASSERT_EQ(robot->commands().size(), CommandWindow::kMost + 1);
+  ASSERT_EQ(robot->commands().size(), link::CommandWindow::kMost + 1);
   EXPECT_EQ(robot->commands().back().which_action, pb_size_t{rheonaut_Command_emergency_stop_tag});
 }
 
@@ -80,7 +80,7 @@ TEST_F(UnansweredTest, WhatWaitsForTheAnswersOfOthersKeepsItsValidity) {
   submit(ping(), 300ms);
   clock.run_for(400ms);
   ASSERT_EQ(results.size(), 1u);
-  EXPECT_EQ(results[0]->state, CommandState::expired);
+  EXPECT_EQ(results[0]->state, station::CommandState::expired);
   EXPECT_EQ(results[0]->reason, "not_sent_in_time");
   accept(*robot, 0);
   EXPECT_EQ(robot->commands().size(), 6u) << "it is not sent late";
@@ -98,17 +98,17 @@ TEST_F(UnansweredTest, AnAnswerThatNeverComesHoldsItsPlaceNoLongerThanItMayCome)
 
 TEST_F(UnansweredTest, ALateAnswerSettlesIt) {
   auto* robot = connect();
-  const CommandId id = unanswered(ping());
+  const station::CommandId id = unanswered(ping());
   accept(*robot, 0);
-  EXPECT_EQ(latest(id).state, CommandState::acknowledged);
+  EXPECT_EQ(latest(id).state, station::CommandState::acknowledged);
   EXPECT_EQ(latest(id).reason, "");
 }
 
 TEST_F(UnansweredTest, AnEventThatNamesItSettlesIt) {
   auto* robot = connect();
-  const CommandId id = unanswered(set_setpoint(0.1F));
+  const station::CommandId id = unanswered(set_setpoint(0.1F));
   say_event(*robot, id);
-  EXPECT_EQ(latest(id).state, CommandState::acknowledged);
+  EXPECT_EQ(latest(id).state, station::CommandState::acknowledged);
   EXPECT_EQ(latest(id).reason, "named_by_event");
   EXPECT_EQ(latest(id).effect_at_robot_us, robot->robot_now_us());
 }
@@ -119,46 +119,46 @@ TEST_F(UnansweredTest, AnEventWhoseAnswerWasDroppedSettlesItAtOnce) {
   clock.settle();
   say_event(*robot, robot->commands().at(0).command_id);
   ASSERT_EQ(results.size(), 1u);
-  EXPECT_EQ(results[0]->state, CommandState::acknowledged);
+  EXPECT_EQ(results[0]->state, station::CommandState::acknowledged);
 }
 
 TEST_F(UnansweredTest, SamplesThatNothingElseExplainsSettleIt) {
   auto* robot = connect();
   show_duty(*robot, 0);
-  const CommandId later = unanswered(set_duty(0.3F));
+  const station::CommandId later = unanswered(set_duty(0.3F));
   show_duty(*robot, 0.3F, 1s);
-  EXPECT_EQ(latest(later).state, CommandState::verified);
+  EXPECT_EQ(latest(later).state, station::CommandState::verified);
   EXPECT_EQ(latest(later).reason, "no_answer");
 
   submit(set_duty(0.4F), 500ms);
   clock.run_for(100ms);
   show_duty(*robot, 0.4F);
   ASSERT_TRUE(clock.run_until([&] { return results.size() == 2; }, 3s));
-  EXPECT_EQ(results[1]->state, CommandState::verified) << "they came before its answer was given up";
+  EXPECT_EQ(results[1]->state, station::CommandState::verified) << "they came before its answer was given up";
   EXPECT_EQ(results[1]->reason, "no_answer");
 }
 
 TEST_F(UnansweredTest, SamplesThatSomethingElseExplainsDoNot) {
   auto* robot = connect();
   show_duty(*robot, 0.2F);
-  const CommandId shown_before = unanswered(set_duty(0.2F));
-  const CommandId rest = unanswered(set_duty(0));
-  const CommandId first = unanswered(set_duty(0.3F)), second = unanswered(set_duty(0.3F));
+  const station::CommandId shown_before = unanswered(set_duty(0.2F));
+  const station::CommandId rest = unanswered(set_duty(0));
+  const station::CommandId first = unanswered(set_duty(0.3F)), second = unanswered(set_duty(0.3F));
   for (const float duty : {0.2F, 0.0F, 0.3F}) show_duty(*robot, duty);
-  for (const CommandId id : {shown_before, rest, first, second}) {
-    EXPECT_EQ(latest(id).state, CommandState::unknown);
+  for (const station::CommandId id : {shown_before, rest, first, second}) {
+    EXPECT_EQ(latest(id).state, station::CommandState::unknown);
   }
 }
 
 TEST_F(UnansweredTest, SamplesOfALaterTimeOrOfAnotherModeProveNothing) {
   auto* robot = connect();
   show_duty(*robot, 0);
-  const CommandId id = unanswered(set_duty(0.3F));
+  const station::CommandId id = unanswered(set_duty(0.3F));
   show_duty(*robot, 0.3F, 1s, rheonaut_MODE_AUTO);
   show_duty(*robot, 0.3F, 100ms);
   clock.run_for(20s);
   show_duty(*robot, 0.3F);
-  EXPECT_EQ(latest(id).state, CommandState::unknown);
+  EXPECT_EQ(latest(id).state, station::CommandState::unknown);
 }
 
 TEST_F(UnansweredTest, SamplesThatAnotherCommandExplainsProveNothing) {
@@ -172,14 +172,14 @@ TEST_F(UnansweredTest, SamplesThatAnotherCommandExplainsProveNothing) {
   clock.run_for(10ms);
   show_duty(*robot, 0.3F);
   ASSERT_TRUE(clock.run_until([&] { return results.size() == 2; }, 3s));
-  for (const auto& result : results) EXPECT_EQ(result->state, CommandState::unknown);
+  for (const auto& result : results) EXPECT_EQ(result->state, station::CommandState::unknown);
 }
 
 TEST_F(UnansweredTest, WhatTookEffectBeforeTheLinkWasLostIsNotMissedInLiveSamplesAfterIt) {
   auto* robot = connect();
   submit(set_setpoint(0.1F));
   clock.settle();
-  const CommandId id = robot->commands().at(0).command_id;
+  const station::CommandId id = robot->commands().at(0).command_id;
   robot->link.cut();
   clock.run_for(2s);
   robot = connect();
@@ -187,7 +187,7 @@ TEST_F(UnansweredTest, WhatTookEffectBeforeTheLinkWasLostIsNotMissedInLiveSample
   show_duty(*robot, 0);
   clock.run_for(1s);
   show_duty(*robot, 0);
-  EXPECT_EQ(latest(id).state, CommandState::acknowledged) << latest(id).reason;
+  EXPECT_EQ(latest(id).state, station::CommandState::acknowledged) << latest(id).reason;
 }
 
 TEST_F(UnansweredTest, OneThatAnEventNamesHoldsNoPlace) {
@@ -205,14 +205,14 @@ TEST_F(UnansweredTest, ALostLinkLeavesTheEndUnknownUntilTheRobotIsBack) {
   auto* robot = connect();
   submit(set_setpoint(0.1F));
   clock.settle();
-  const CommandId id = robot->commands().at(0).command_id;
+  const station::CommandId id = robot->commands().at(0).command_id;
   robot->link.cut();
   clock.settle();
-  EXPECT_EQ(latest(id).state, CommandState::unknown);
+  EXPECT_EQ(latest(id).state, station::CommandState::unknown);
   EXPECT_EQ(latest(id).reason, "link_lost");
   robot = connect();
   say_event(*robot, id);
-  EXPECT_EQ(latest(id).state, CommandState::acknowledged);
+  EXPECT_EQ(latest(id).state, station::CommandState::acknowledged);
 }
 
 }  // namespace

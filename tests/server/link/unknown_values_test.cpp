@@ -11,23 +11,25 @@ namespace {
 using nlohmann::json;
 
 TEST(UnknownValues, NameTheFieldsWhoseEnumeratorsAreNotKnown) {
-  SampleContext context;
+  station::SampleContext context;
   EXPECT_EQ(unknown_values(context), std::nullopt);
   context.mode = static_cast<protocol::Mode>(17);
   context.sub_state = rheonaut_SUB_STATE_HOLDING;
   EXPECT_EQ(unknown_values(context), R"({"mode":17})");
   context.emergency_cause = static_cast<protocol::EmergencyCause>(0x7fffffff);
   EXPECT_EQ(unknown_values(context), R"({"mode":17,"emergency_cause":2147483647})");
-  context.mode = static_cast<protocol::Mode>(kNumberNotKept);
+  context.mode = static_cast<protocol::Mode>(station::kNumberNotKept);
   EXPECT_STREQ(protocol::text(context.mode), "unknown");
   EXPECT_EQ(unknown_values(context), R"({"emergency_cause":2147483647})");
-  EXPECT_EQ(UnknownValues{}.add("reset_cause", rheonaut_RESET_CAUSE_UNKNOWN).text(), std::nullopt) << "it is known";
-  EXPECT_EQ(UnknownValues{}.add("reset_cause", static_cast<protocol::ResetCause>(9)).text(), R"({"reset_cause":9})");
+  EXPECT_EQ(station::UnknownValues{}.add("reset_cause", rheonaut_RESET_CAUSE_UNKNOWN).text(), std::nullopt)
+      << "it is known";
+  EXPECT_EQ(station::UnknownValues{}.add("reset_cause", static_cast<protocol::ResetCause>(9)).text(),
+            R"({"reset_cause":9})");
 }
 
 TEST(UnknownValues, AReasonKeepsItsNumberInTheText) {
-  EXPECT_EQ(text_or_number(rheonaut_REJECT_REASON_BUSY), "busy");
-  EXPECT_EQ(text_or_number(static_cast<protocol::RejectReason>(40)), "unknown_40");
+  EXPECT_EQ(station::text_or_number(rheonaut_REJECT_REASON_BUSY), "busy");
+  EXPECT_EQ(station::text_or_number(static_cast<protocol::RejectReason>(40)), "unknown_40");
 }
 
 // A newer robot, from its hello on, in every message of /live and in GET /robots.
@@ -37,11 +39,11 @@ TEST_F(LinkTest, ANewerFirmwaresValuesAreUnknownWithTheirNumbers) {
   hello.body.hello.reset_cause = static_cast<protocol::ResetCause>(9);
   robot->send(hello);
   ASSERT_TRUE(clock.run_until([&] { return !robot->welcomes().empty(); }, 1s));
-  const json state = to_json(*station.find("r1"));
+  const json state = live::to_json(*station.find("r1"));
   EXPECT_EQ(state["mode"], "unknown");
   EXPECT_EQ(state["reset_cause"], "unknown");
   EXPECT_EQ(state["unknown_values"], (json{{"mode", 17}, {"reset_cause", 9}}));
-  EXPECT_EQ(to_json(sink.events.back())["unknown_values"], (json{{"mode", 17}})) << "of the station's own event";
+  EXPECT_EQ(live::to_json(sink.events.back())["unknown_values"], (json{{"mode", 17}})) << "of the station's own event";
 
   auto frame = TestRobot::samples_frame(0, 5, 6'000'000, 0);
   frame.body.telemetry.mode = rheonaut_MODE_AUTO;
@@ -49,7 +51,7 @@ TEST_F(LinkTest, ANewerFirmwaresValuesAreUnknownWithTheirNumbers) {
   robot->send(frame);
   clock.settle();
   ASSERT_EQ(sink.batches.size(), 1u);
-  const json samples = json::parse(samples_message(sink.batches[0]));
+  const json samples = json::parse(live::samples_message(sink.batches[0]));
   EXPECT_EQ(samples["mode"], "auto");
   EXPECT_EQ(samples["sub_state"], "unknown");
   EXPECT_EQ(samples["unknown_values"], (json{{"sub_state", 5}}));
@@ -62,7 +64,7 @@ TEST_F(LinkTest, ANewerFirmwaresValuesAreUnknownWithTheirNumbers) {
   frame.body.event.emergency_cause = static_cast<protocol::EmergencyCause>(92);
   robot->send(frame);
   clock.settle();
-  const json event = to_json(sink.events.back());
+  const json event = live::to_json(sink.events.back());
   EXPECT_EQ(event["kind"], "unknown");
   EXPECT_EQ(event["cause"], "unknown");
   EXPECT_EQ(event["emergency_cause"], "unknown");

@@ -16,7 +16,7 @@ namespace {
 class DoorTest : public ::testing::Test {
  protected:
   struct Visitor {
-    std::unique_ptr<ConnectionSlot> slot;
+    std::unique_ptr<net::ConnectionSlot> slot;
     bool ended = false;
   };
 
@@ -27,7 +27,7 @@ class DoorTest : public ::testing::Test {
   ~DoorTest() override { spdlog::set_default_logger(before); }
 
   // Null when refused.
-  Visitor* come(const std::string& address, ConnectionSlot::State state = ConnectionSlot::unauthenticated,
+  Visitor* come(const std::string& address, net::ConnectionSlot::State state = net::ConnectionSlot::unauthenticated,
                 bool from_loopback = false) {
     auto slot = limiter.admit(address, from_loopback);
     if (!slot) {
@@ -50,9 +50,9 @@ class DoorTest : public ::testing::Test {
 
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  ConnectionLimiter limiter{clock, "test port", {8, 6, 3, 6}};
+  net::ConnectionLimiter limiter{clock, "test port", {8, 6, 3, 6}};
   std::vector<std::unique_ptr<Visitor>> visitors;
-  std::optional<ConnectionLimiter::Refusal> refusal;
+  std::optional<net::ConnectionLimiter::Refusal> refusal;
   std::ostringstream log;
   std::shared_ptr<spdlog::logger> before = spdlog::default_logger();
 };
@@ -60,7 +60,7 @@ class DoorTest : public ::testing::Test {
 TEST_F(DoorTest, AnAddressWithItsShareGivesUpItsOldestStranger) {
   Visitor* first = come("10.0.0.1");
   Visitor* second = come("10.0.0.1");
-  come("10.0.0.1", ConnectionSlot::busy);
+  come("10.0.0.1", net::ConnectionSlot::busy);
   Visitor* other = come("10.0.0.2");
   EXPECT_NE(come("10.0.0.1"), nullptr);
   EXPECT_TRUE(first->ended);
@@ -73,17 +73,17 @@ TEST_F(DoorTest, AnAddressWithItsShareGivesUpItsOldestStranger) {
 }
 
 TEST_F(DoorTest, AnIdleOneGivesWayWhenThereIsNoStrangerAndABusyOneNever) {
-  Visitor* idle = come("10.0.0.1", ConnectionSlot::idle);
-  Visitor* later = come("10.0.0.1", ConnectionSlot::idle);
-  come("10.0.0.1", ConnectionSlot::busy);
-  idle->slot->becomes(ConnectionSlot::busy);
+  Visitor* idle = come("10.0.0.1", net::ConnectionSlot::idle);
+  Visitor* later = come("10.0.0.1", net::ConnectionSlot::idle);
+  come("10.0.0.1", net::ConnectionSlot::busy);
+  idle->slot->becomes(net::ConnectionSlot::busy);
   idle->slot->rest();  // now it is the other that is idle the longest
-  EXPECT_NE(come("10.0.0.1", ConnectionSlot::busy), nullptr);
+  EXPECT_NE(come("10.0.0.1", net::ConnectionSlot::busy), nullptr);
   EXPECT_TRUE(later->ended);
-  EXPECT_NE(come("10.0.0.1", ConnectionSlot::busy), nullptr);
+  EXPECT_NE(come("10.0.0.1", net::ConnectionSlot::busy), nullptr);
   EXPECT_TRUE(idle->ended);
   EXPECT_EQ(come("10.0.0.1"), nullptr);
-  EXPECT_EQ(refusal, ConnectionLimiter::Refusal::address_has_its_share);
+  EXPECT_EQ(refusal, net::ConnectionLimiter::Refusal::address_has_its_share);
   EXPECT_NE(come("10.0.0.2"), nullptr) << "nobody else is kept out";
   EXPECT_EQ(limiter.counters().refused, 1U);
 }
@@ -105,21 +105,21 @@ TEST_F(DoorTest, AFullLimiterEvictsFromTheAddressWithMostUnauthenticated) {
 }
 
 TEST_F(DoorTest, AFullDoorWithNobodyWhoMayGoRefuses) {
-  for (int i = 0; i < 8; ++i) ASSERT_NE(come("10.0.0." + std::to_string(i), ConnectionSlot::busy), nullptr);
+  for (int i = 0; i < 8; ++i) ASSERT_NE(come("10.0.0." + std::to_string(i), net::ConnectionSlot::busy), nullptr);
   EXPECT_EQ(come("10.0.0.9"), nullptr);
-  EXPECT_EQ(refusal, ConnectionLimiter::Refusal::full);
+  EXPECT_EQ(refusal, net::ConnectionLimiter::Refusal::full);
   visitors.pop_back();
   EXPECT_NE(come("10.0.0.9"), nullptr);
 }
 
 TEST_F(DoorTest, AddressesOfThisMachineHaveMoreAndNotAll) {
-  for (int i = 0; i < 6; ++i) ASSERT_NE(come("127.0.0.1", ConnectionSlot::busy, true), nullptr);
-  EXPECT_EQ(come("127.0.0.1", ConnectionSlot::unauthenticated, true), nullptr);
+  for (int i = 0; i < 6; ++i) ASSERT_NE(come("127.0.0.1", net::ConnectionSlot::busy, true), nullptr);
+  EXPECT_EQ(come("127.0.0.1", net::ConnectionSlot::unauthenticated, true), nullptr);
   EXPECT_NE(come("10.0.0.1"), nullptr);
 }
 
 TEST_F(DoorTest, ANetworkOfIpv6IsOneAddress) {
-  for (int i = 0; i < 3; ++i) come("2001:db8:1:2::" + std::to_string(i), ConnectionSlot::busy);
+  for (int i = 0; i < 3; ++i) come("2001:db8:1:2::" + std::to_string(i), net::ConnectionSlot::busy);
   EXPECT_EQ(come("2001:db8:1:2:ffff::1"), nullptr);
   EXPECT_NE(come("2001:db8:1:3::1"), nullptr);
 }
@@ -130,9 +130,9 @@ TEST_F(DoorTest, WhoWasEndedHasNoSayAnyMore) {
   come("10.0.0.1");
   come("10.0.0.1");
   ASSERT_TRUE(first->ended);
-  first->slot->becomes(ConnectionSlot::busy);
+  first->slot->becomes(net::ConnectionSlot::busy);
   EXPECT_EQ(limiter.connections(), 4U);
-  EXPECT_NE(come("10.0.0.1", ConnectionSlot::busy), nullptr) << "it does not count";
+  EXPECT_NE(come("10.0.0.1", net::ConnectionSlot::busy), nullptr) << "it does not count";
   go();
   EXPECT_EQ(limiter.connections(), 3U);
 }
@@ -147,7 +147,7 @@ TEST_F(DoorTest, ThoseWhoLeaveAreBounded) {
 }
 
 TEST_F(DoorTest, RefusalsAreLoggedOnceASecond) {
-  for (int i = 0; i < 3; ++i) come("10.0.0.1", ConnectionSlot::busy);
+  for (int i = 0; i < 3; ++i) come("10.0.0.1", net::ConnectionSlot::busy);
   for (int i = 0; i < 20; ++i) EXPECT_EQ(come("10.0.0.1"), nullptr);
   clock.run_for(std::chrono::seconds{1});
   EXPECT_EQ(come("10.0.0.1"), nullptr);

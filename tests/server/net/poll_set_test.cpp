@@ -23,7 +23,8 @@ using namespace std::chrono_literals;
 // A connection within this process: the near end is in the set.
 class Line {
  public:
-  explicit Line(PollSet& set) : ends_{make_pair()}, socket_{std::make_unique<PollSet::Socket>(set, ends_.near)} {}
+  explicit Line(net::PollSet& set)
+      : ends_{make_pair()}, socket_{std::make_unique<net::PollSet::Socket>(set, ends_.near)} {}
   ~Line() {
     socket_.reset();
     hang_up();
@@ -51,7 +52,7 @@ class Line {
     return ::recv(ends_.near, &byte, 1, MSG_DONTWAIT) == 1 ? std::optional{byte} : std::nullopt;
   }
 
-  PollSet::Socket& socket() { return *socket_; }
+  net::PollSet::Socket& socket() { return *socket_; }
   void leave() { socket_.reset(); }
 
  private:
@@ -65,7 +66,7 @@ class Line {
   }
 
   Ends ends_;
-  std::unique_ptr<PollSet::Socket> socket_;
+  std::unique_ptr<net::PollSet::Socket> socket_;
 };
 
 class PollSetTest : public ::testing::Test {
@@ -107,8 +108,8 @@ class PollSetTest : public ::testing::Test {
 
   asio::io_context loop;
   VirtualClock clock{loop};
-  TaskGroup tasks{loop};
-  std::unique_ptr<PollSet> set = std::make_unique<PollSet>(loop, clock);
+  runtime::TaskGroup tasks{loop};
+  std::unique_ptr<net::PollSet> set = std::make_unique<net::PollSet>(loop, clock);
   std::vector<std::unique_ptr<Line>> lines;
   std::vector<int> heard;
   std::vector<std::string> waits_ended;
@@ -117,7 +118,7 @@ class PollSetTest : public ::testing::Test {
 TEST_F(PollSetTest, WhatIsNotReadToTheEndIsReadyAgain) {
   add_lines(1);
   for (int i = 0; i < 5; ++i) lines[0]->say('x');
-  clock.run_for(10 * PollSet::kPause);
+  clock.run_for(10 * net::PollSet::kPause);
   EXPECT_EQ(heard.size(), 5U) << "a call takes one byte";
 }
 
@@ -130,7 +131,7 @@ TEST_F(PollSetTest, AFleetIsLookedAtOncePerPause) {
   all_say();
   clock.settle();
   EXPECT_EQ(heard.size(), 3U);
-  clock.run_for(PollSet::kPause - 1us);
+  clock.run_for(net::PollSet::kPause - 1us);
   EXPECT_EQ(heard.size(), 3U);
   clock.run_for(1us);
   clock.settle();
@@ -149,20 +150,20 @@ TEST_F(PollSetTest, TwoWithinAPauseAreAFleetUntilItHasBeenQuiet) {
   lines[1]->say('x');
   clock.settle();
   EXPECT_EQ(heard, (std::vector<int>{0, 1}));
-  for (std::size_t looks = 1; looks <= PollSet::kQuietRounds; ++looks) {
+  for (std::size_t looks = 1; looks <= net::PollSet::kQuietRounds; ++looks) {
     lines[0]->say('x');
     clock.settle();
     EXPECT_EQ(heard.size(), 1 + looks);
-    clock.run_for(PollSet::kPause);
+    clock.run_for(net::PollSet::kPause);
     EXPECT_EQ(heard.size(), 2 + looks);
   }
   lines[0]->say('x');
   clock.settle();
-  EXPECT_EQ(heard.size(), 3U + PollSet::kQuietRounds);
+  EXPECT_EQ(heard.size(), 3U + net::PollSet::kQuietRounds);
 }
 
 TEST_F(PollSetTest, EverybodyElseHasATurnAfterAFew) {
-  add_lines(10 * PollSet::kAtOnce);
+  add_lines(10 * net::PollSet::kAtOnce);
   all_say();
   std::vector<std::size_t> seen;
   std::function<void()> step = [&] {
@@ -172,14 +173,14 @@ TEST_F(PollSetTest, EverybodyElseHasATurnAfterAFew) {
   asio::post(loop, step);
   clock.settle();
   ASSERT_GE(seen.size(), 10U);
-  for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_LE(seen[i] - seen[i - 1], std::size_t{PollSet::kAtOnce});
+  for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_LE(seen[i] - seen[i - 1], std::size_t{net::PollSet::kAtOnce});
   std::ranges::sort(heard);
   for (std::size_t i = 0; i < lines.size(); ++i) EXPECT_EQ(heard.at(i), static_cast<int>(i));
 }
 
 // SAFETY: what the answer to an emergency stop rests on.
 TEST_F(PollSetTest, TheAwaitedWaitsForNoPauseAndNoOther) {
-  add_lines(10 * PollSet::kAtOnce);
+  add_lines(10 * net::PollSet::kAtOnce);
   all_say();
   clock.settle();
   heard.clear();
@@ -187,7 +188,7 @@ TEST_F(PollSetTest, TheAwaitedWaitsForNoPauseAndNoOther) {
   all_say();
   clock.settle();
   EXPECT_THAT(heard, ::testing::ElementsAre(static_cast<int>(lines.size()) - 1)) << "the others are in their pause";
-  clock.run_for(PollSet::kPause);
+  clock.run_for(net::PollSet::kPause);
   clock.settle();
   EXPECT_EQ(heard.size(), lines.size());
 
@@ -202,7 +203,7 @@ TEST_F(PollSetTest, TheAwaitedWaitsForNoPauseAndNoOther) {
   }
   EXPECT_THAT(heard, ::testing::Contains(0));
   EXPECT_GT(heard.size(), 1U);
-  EXPECT_LE(heard.size(), 2U * PollSet::kAtOnce) << "a round of the others at most, and one that was under way";
+  EXPECT_LE(heard.size(), 2U * net::PollSet::kAtOnce) << "a round of the others at most, and one that was under way";
 }
 
 TEST_F(PollSetTest, WhoIsNoLongerAwaitedWaitsAgain) {
@@ -231,7 +232,7 @@ TEST_F(PollSetTest, WhatHasComeIsReadWhereverItsSocketGoes) {
   lines[0]->socket().set_awaited(false);
   clock.settle();
   EXPECT_EQ(heard, std::vector<int>{0});
-  clock.run_for(PollSet::kPause);
+  clock.run_for(net::PollSet::kPause);
   EXPECT_EQ(heard.size(), 3U);
 }
 
@@ -260,12 +261,12 @@ TEST_F(PollSetTest, TheEndIsReported) {
   });
   lines[0]->say('x');
   lines[0]->hang_up();
-  clock.run_for(3 * PollSet::kPause);
+  clock.run_for(3 * net::PollSet::kPause);
   EXPECT_TRUE(has_ended);
 }
 
 TEST_F(PollSetTest, WhoLeavesDuringALookIsNotCalled) {
-  add_lines(PollSet::kAtOnce);
+  add_lines(net::PollSet::kAtOnce);
   for (const auto& line : lines) {
     line->socket().watch([&, line = line.get()] {
       line->take();
@@ -318,7 +319,7 @@ TEST_F(PollSetTest, WhoStillWaitsAtTheEndOfTheSetIsLetGo) {
     std::shared_ptr<Line> line;
     static asio::awaitable<void> wait(std::shared_ptr<Line> line) { co_await line->socket().writable(); }
   };
-  auto other = std::make_unique<PollSet>(loop, clock);
+  auto other = std::make_unique<net::PollSet>(loop, clock);
   auto line = std::make_shared<Line>(*other);
   line->fill();
   tasks.spawn("writer", Held::wait(line));

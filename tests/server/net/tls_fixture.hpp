@@ -39,7 +39,7 @@ class TlsTest : public ::testing::Test {
     std::string name = (fs::temp_directory_path() / "rheonaut-tls-XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) throw std::runtime_error{"cannot make " + name};
     config.data_dir = name;
-    config.tls.mode = TlsMode::on;
+    config.tls.mode = config::TlsMode::on;
     spdlog::set_default_logger(
         std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
     make_certificate({});
@@ -64,12 +64,12 @@ class TlsTest : public ::testing::Test {
     make_certificate(wish);
   }
 
-  TransportSecurity& start() {
-    security = std::make_unique<TransportSecurity>(clock, config);
+  net::TransportSecurity& start() {
+    security = std::make_unique<net::TransportSecurity>(clock, config);
     clock.add_worker(security->worker());
     tasks.spawn("security", security->run());
     auto on_connection = [this](tcp::socket socket) {
-      served = std::make_unique<StreamSocket>(std::move(socket));
+      served = std::make_unique<tls::StreamSocket>(std::move(socket));
       outcome.reset();
       tasks.spawn("handshake", shake_hands());
     };
@@ -90,15 +90,15 @@ class TlsTest : public ::testing::Test {
 
   asio::awaitable<void> shake_hands() { outcome = co_await security->http().tls->secure(*served, "test port"); }
 
-  Config config;
+  config::Config config;
   asio::io_context loop{1};
   VirtualClock clock{loop};
-  TaskGroup tasks{loop};
-  Listener listener{loop, clock, {asio::ip::address_v4::loopback(), 0}};
-  std::unique_ptr<TransportSecurity> security;
-  std::unique_ptr<StreamSocket> served;  // the last connection
-  PollSet sockets{loop, clock};
-  std::optional<TlsHandshakes::Outcome> outcome;
+  runtime::TaskGroup tasks{loop};
+  net::Listener listener{loop, clock, {asio::ip::address_v4::loopback(), 0}};
+  std::unique_ptr<net::TransportSecurity> security;
+  std::unique_ptr<tls::StreamSocket> served;  // the last connection
+  net::PollSet sockets{loop, clock};
+  std::optional<tls::TlsHandshakes::Outcome> outcome;
   std::ostringstream log;
   std::shared_ptr<spdlog::logger> before = spdlog::default_logger();
 };
@@ -169,7 +169,7 @@ class Client {
     ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     clock_.settle();
   }
-  std::string pin() const { return describe(*SSL_get0_peer_certificate(ssl_.get())).pin; }
+  std::string pin() const { return tls::describe(*SSL_get0_peer_certificate(ssl_.get())).pin; }
 
  private:
   VirtualClock& clock_;

@@ -12,7 +12,7 @@ TEST_F(TlsTest, BytesLeaveAtOnce) {
   start();
   Client client{clock, listener.endpoint()};
   ASSERT_TRUE(client.shake_hands());
-  ASSERT_EQ(outcome, TlsHandshakes::Outcome::secure);
+  ASSERT_EQ(outcome, tls::TlsHandshakes::Outcome::secure);
   const auto stream = make_stream(std::move(*served), sockets);
   EXPECT_EQ(stream->write_now(asio::buffer("stop", 4)), 4U);
   EXPECT_EQ(client.read(4), "stop");
@@ -20,9 +20,9 @@ TEST_F(TlsTest, BytesLeaveAtOnce) {
 
 class Heard {
  public:
-  explicit Heard(ByteStream& stream) : stream_{stream} {
+  explicit Heard(net::ByteStream& stream) : stream_{stream} {
     stream_.on_readable([this] {
-      const ByteStream::Read got = stream_.read_now(asio::buffer(buffer_));
+      const net::ByteStream::Read got = stream_.read_now(asio::buffer(buffer_));
       text.append(buffer_.data(), got.size);
       if (got.has_ended) {
         has_ended = true;
@@ -34,8 +34,8 @@ class Heard {
   bool has_ended = false;
 
  private:
-  ByteStream& stream_;
-  std::vector<char> buffer_ = std::vector<char>(ByteStream::kReadBytes);
+  net::ByteStream& stream_;
+  std::vector<char> buffer_ = std::vector<char>(net::ByteStream::kReadBytes);
 };
 
 // OpenSSL keeps nothing back of which the socket would not tell.
@@ -100,7 +100,7 @@ TEST_F(TlsTest, WhatASocketDoesNotTakeIsWhatTheNextWriteBeginsWith) {
   }
   ASSERT_FALSE(rest.empty()) << "the socket never filled";
   std::optional<bool> written;
-  const auto write = [](ByteStream& to, std::string bytes, std::optional<bool>& done) -> asio::awaitable<void> {
+  const auto write = [](net::ByteStream& to, std::string bytes, std::optional<bool>& done) -> asio::awaitable<void> {
     done = co_await to.write(asio::buffer(bytes));
   };
   tasks.spawn("write", write(*stream, rest, written));

@@ -14,8 +14,8 @@ TEST_F(TlsTest, AClientThatSaysNothingIsLetGoAfterTenSecondsAndHoldsNobodyUp) {
   EXPECT_FALSE(outcome);
   const std::int64_t begun_us = clock.steady_us();
   ASSERT_TRUE(clock.run_until([&] { return outcome.has_value(); }, 20s));
-  EXPECT_EQ(*outcome, TlsHandshakes::Outcome::failed);
-  EXPECT_EQ(clock.steady_us() - begun_us, kHandshakeTime.count());
+  EXPECT_EQ(*outcome, tls::TlsHandshakes::Outcome::failed);
+  EXPECT_EQ(clock.steady_us() - begun_us, tls::kHandshakeTime.count());
   EXPECT_EQ(security->gate()->counters().failed, 1U);
   EXPECT_THAT(log.str(), HasSubstr("test port: no TLS with 127.0.0.1:"));
   EXPECT_THAT(log.str(), HasSubstr("not done within 10 s"));
@@ -26,13 +26,13 @@ TEST_F(TlsTest, WhoDoesNotSpeakTlsIsDistinguishedAndWhatItSentCanStillBeRead) {
   Client client{clock, listener.endpoint()};
   client.send_plain("GET / HTTP/1.1\r\n");
   ASSERT_TRUE(clock.run_until([&] { return outcome.has_value(); }, 1s));
-  EXPECT_EQ(*outcome, TlsHandshakes::Outcome::not_tls);
+  EXPECT_EQ(*outcome, tls::TlsHandshakes::Outcome::not_tls);
   char bytes[64];
   EXPECT_EQ(::recv(served->tcp().native_handle(), bytes, sizeof bytes, MSG_DONTWAIT), 16);
   Client garbage{clock, listener.endpoint()};
   garbage.send_plain(std::string(1, '\x16') + std::string(200, 'x'));
   ASSERT_TRUE(clock.run_until([&] { return outcome.has_value(); }, 1s));
-  EXPECT_EQ(*outcome, TlsHandshakes::Outcome::failed);
+  EXPECT_EQ(*outcome, tls::TlsHandshakes::Outcome::failed);
 }
 
 TEST_F(TlsTest, AtMostOneFailureASecondIsLogged) {
@@ -61,7 +61,7 @@ TEST_F(TlsTest, ANewCertificateIsInForceForNewConnectionsWithinTwoLooks) {
   auto stream = make_stream(std::move(*served), sockets);
 
   renew(true);
-  clock.run_for(2 * kCertificateLook + 1ms);
+  clock.run_for(2 * net::kCertificateLook + 1ms);
   const std::string second = security->gate()->context().certificate.pin;
   EXPECT_NE(second, first);
   Client new_client{clock, listener.endpoint()};
@@ -114,7 +114,7 @@ TEST_F(TlsTest, AKeyThatIsNotTheCertificatesIsRefusedByName) {
   config.tls.key = kept;
   config.tls.certificate = config.data_dir / "tls" / "station.crt";
   try {
-    TransportSecurity broken{clock, config};
+    net::TransportSecurity broken{clock, config};
     FAIL() << "was accepted";
   } catch (const std::runtime_error& error) {
     EXPECT_THAT(error.what(), HasSubstr("other.key"));
@@ -123,10 +123,10 @@ TEST_F(TlsTest, AKeyThatIsNotTheCertificatesIsRefusedByName) {
 }
 
 TEST_F(TlsTest, PlainTcpBeyondThisMachineIsShoutedAtOnceAndEachHour) {
-  config.tls.mode = TlsMode::automatic;
+  config.tls.mode = config::TlsMode::automatic;
   config.tls.insecure = true;
   config.robots = "192.0.2.1:7070";
-  TransportSecurity exposed{clock, config};
+  net::TransportSecurity exposed{clock, config};
   EXPECT_EQ(exposed.robots().tls, nullptr);
   EXPECT_TRUE(exposed.state()["exposed"].get<bool>());
   const std::string shout = "INSECURE: robots.listen = 192.0.2.1:7070";
@@ -143,7 +143,7 @@ TEST_F(TlsTest, PlainTcpBeyondThisMachineIsShoutedAtOnceAndEachHour) {
 TEST_F(TlsTest, WithoutACertificateTheSentenceSaysHowToMakeOne) {
   fs::remove_all(config.data_dir / "tls");
   try {
-    TransportSecurity none{clock, config};
+    net::TransportSecurity none{clock, config};
     FAIL() << "was accepted";
   } catch (const std::runtime_error& error) {
     EXPECT_THAT(error.what(), HasSubstr("rheonaut certificate --data " + config.data_dir.string()));

@@ -21,7 +21,7 @@ class AdmissionTest : public RecordingTest {
   static TestRobot numbered(int number) {
     TestRobot robot;
     robot.id = "r" + std::to_string(number);
-    robot.boot_id = 1000 + static_cast<BootId>(number);
+    robot.boot_id = 1000 + static_cast<station::BootId>(number);
     return robot;
   }
   // Of robots 1 to count, which ask one after the other.
@@ -32,7 +32,7 @@ class AdmissionTest : public RecordingTest {
   }
 
   // From elsewhere than loopback.
-  Admission admit_remote(const std::string& token) {
+  station::Admission admit_remote(const std::string& token) {
     TestRobot remote = robot_;
     remote.from_loopback = false;
     remote.token = token;
@@ -83,13 +83,13 @@ TEST_F(AdmissionTest, FollowsTheTable) {
       ASSERT_TRUE(admit(robot).newly_enrolled);
       stop();
     }
-    RecorderOptions options;
+    storage::RecorderOptions options;
     options.enrolment.allowed = entry.enrol_on_loopback;
     start(options);
     robot.token = entry.token;
     robot.from_loopback = entry.from_loopback;
     robot.boot_id = 77;
-    const Admission admission = admit(robot);
+    const station::Admission admission = admit(robot);
     EXPECT_EQ(admission.refusal, entry.expected) << admission.detail;
     EXPECT_EQ(admission.newly_enrolled, entry.newly_enrolled);
     EXPECT_EQ(admission.detail.empty(), entry.expected == kNone);
@@ -118,22 +118,25 @@ TEST_F(AdmissionTest, ARevokedRobotIsRefusedUntilItIsEnrolledAgain) {
   robot_.token = "secret";
   admit(robot_);
   const auto with_store = [this](auto change) {
-    auto job = [change](Database& database) {
-      AccountStore store{database.handle()};
+    auto job = [change](storage::Database& database) {
+      identity::AccountStore store{database.handle()};
       return change(store);
     };
     return wait(recorder_->on_disk(std::move(job)));
   };
-  ASSERT_TRUE(with_store([id = robot_.id](AccountStore& store) { return store.revoke_robot(id, {"anna", "", 1}); }));
+  ASSERT_TRUE(
+      with_store([id = robot_.id](identity::AccountStore& store) { return store.revoke_robot(id, {"anna", "", 1}); }));
   stop();
   start();  // from loopback, where strangers are enrolled
   for (const char* token : {"secret", "", "another"}) {
     robot_.token = token;
-    const Admission refused = admit(robot_);
+    const station::Admission refused = admit(robot_);
     EXPECT_EQ(refused.refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN) << token;
     EXPECT_NE(refused.detail.find("was revoked"), std::string::npos) << refused.detail;
   }
-  const auto enrol = [id = robot_.id](AccountStore& store) { return store.enrol(id, hash_of("new"), {"anna", "", 2}); };
+  const auto enrol = [id = robot_.id](identity::AccountStore& store) {
+    return store.enrol(id, runtime::hash_of("new"), {"anna", "", 2});
+  };
   ASSERT_TRUE(with_store(enrol));
   robot_.token = "secret";
   EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);
@@ -145,16 +148,17 @@ TEST_F(AdmissionTest, ARevokedRobotIsRefusedUntilItIsEnrolledAgain) {
 TEST_F(AdmissionTest, ARobotThatIsRevokedWhileItIsAdmittedIsRefused) {
   start();
   admit(robot_);
-  const auto revoke = [](Recorder& recorder, RobotId id) -> asio::awaitable<bool> {
+  const auto revoke = [](storage::Recorder& recorder, station::RobotId id) -> asio::awaitable<bool> {
     recorder.set_revoked(id, true);
     co_return true;
   };
-  const auto admit_and_revoke = [&revoke](Recorder& recorder, AdmissionRequest hello) -> asio::awaitable<Admission> {
-    const RobotId id = hello.robot_id;
+  const auto admit_and_revoke = [&revoke](storage::Recorder& recorder,
+                                          station::AdmissionRequest hello) -> asio::awaitable<station::Admission> {
+    const station::RobotId id = hello.robot_id;
     const auto both = co_await (recorder.admit(std::move(hello)) && revoke(recorder, id));  // the disk is asked first
     co_return std::get<0>(both);
   };
-  const Admission late = wait(admit_and_revoke(*recorder_, hello_of(robot_)));
+  const station::Admission late = wait(admit_and_revoke(*recorder_, hello_of(robot_)));
   EXPECT_EQ(late.refusal, rheonaut_REFUSAL_REASON_WRONG_TOKEN);
   recorder_->set_revoked(robot_.id, false);
   EXPECT_EQ(admit(robot_).refusal, rheonaut_REFUSAL_REASON_NONE);
@@ -165,7 +169,7 @@ TEST_F(AdmissionTest, SendsTheStoreAndWhatIsDurable) {
   connect(robot_);
   make(robot_, 20);
   flush();
-  const Admission again = admit(robot_);
+  const station::Admission again = admit(robot_);
   EXPECT_EQ(again.durable_next_seq, 20u);
   EXPECT_NE(again.store_id, 0u);
 }
@@ -204,7 +208,7 @@ TEST_F(AdmissionTest, ANewBootIsKnownBeforeItIsStored) {
   start();
   connect(robot_);
   EXPECT_EQ(number("SELECT count(*) FROM boot"), 0);
-  const Admission again = admit(robot_);
+  const station::Admission again = admit(robot_);
   EXPECT_EQ(again.refusal, rheonaut_REFUSAL_REASON_NONE) << again.detail;
   TestRobot other;
   other.id = "dory";
@@ -239,7 +243,7 @@ TEST_F(AdmissionTest, ADiskThatFailsStillAdmitsEnrolledRobots) {
 
 // A robot that reboots again and again while the disk fails does not fill the memory.
 TEST_F(AdmissionTest, NewBootsThatWaitForTheDiskAreBounded) {
-  RecorderOptions options;
+  storage::RecorderOptions options;
   options.max_queued_records = 5;
   start(options);
   connect(robot_);
@@ -249,7 +253,7 @@ TEST_F(AdmissionTest, NewBootsThatWaitForTheDiskAreBounded) {
   TestRobot rebooted;
   int admitted = 0;
   for (rebooted.boot_id = 100; rebooted.boot_id < 150; ++rebooted.boot_id) {
-    const Admission admission = admit(rebooted);
+    const station::Admission admission = admit(rebooted);
     admitted += admission.refusal == rheonaut_REFUSAL_REASON_NONE;
     if (rebooted.boot_id == 100) clock_.run_for(2s);  // that one is in the commit that fails
     if (rebooted.boot_id == 149) EXPECT_EQ(admission.refusal, rheonaut_REFUSAL_REASON_STATION_BUSY);
@@ -266,7 +270,7 @@ TEST_F(AdmissionTest, NewBootsThatWaitForTheDiskAreBounded) {
 TEST_F(AdmissionTest, ManyBootsShareACommit) {
   constexpr int kRobots = 200;
   start();
-  auto enrol = [](Database& database) {
+  auto enrol = [](storage::Database& database) {
     SQLite::Transaction transaction{database.handle()};
     database.handle().exec(
         "WITH RECURSIVE number(n) AS (VALUES (0) UNION ALL SELECT n + 1 FROM number WHERE n < 199)"
@@ -278,7 +282,7 @@ TEST_F(AdmissionTest, ManyBootsShareACommit) {
   for (int n = 0; n < kRobots; ++n) {
     TestRobot robot;
     robot.id = "r" + std::to_string(n);
-    robot.boot_id = 1000 + static_cast<BootId>(n);
+    robot.boot_id = 1000 + static_cast<station::BootId>(n);
     connect(robot);
   }
   clock_.run_for(200ms);
@@ -329,7 +333,7 @@ TEST_F(AdmissionTest, OnlySoManyRobotsEnrolThemselvesAMinute) {
   start();
   EXPECT_EQ(enrolled_of(5), 3);
   clock_.run_for(59s);
-  const Admission refused = admit(numbered(4));
+  const station::Admission refused = admit(numbered(4));
   EXPECT_EQ(refused.refusal, rheonaut_REFUSAL_REASON_STATION_BUSY);
   EXPECT_TRUE(refused.enrolment_full);
   EXPECT_THAT(refused.detail, HasSubstr("only 3 robots of this machine enrol themselves a minute: try again later"));
@@ -345,23 +349,24 @@ TEST_F(AdmissionTest, OnlySoManyRobotsEnrolThemselvesAtAll) {
   most_robots_ = 64;
   start();
   EXPECT_EQ(enrolled_of(70), 64);
-  const Admission refused = admit(numbered(65));
+  const station::Admission refused = admit(numbered(65));
   EXPECT_EQ(refused.refusal, rheonaut_REFUSAL_REASON_UNKNOWN_ROBOT);
   EXPECT_TRUE(refused.enrolment_full);
   EXPECT_THAT(refused.detail, HasSubstr("only 64 robots of this machine enrol themselves: rheonaut robot enroll r65"));
   EXPECT_EQ(number("SELECT count(*) FROM robot"), 64);
   const auto with_store = [this](auto change) {
-    auto job = [change](Database& database) {
-      AccountStore store{database.handle()};
+    auto job = [change](storage::Database& database) {
+      identity::AccountStore store{database.handle()};
       return change(store);
     };
     return wait(recorder_->on_disk(std::move(job)));
   };
-  ASSERT_TRUE(with_store([](AccountStore& store) { return store.enrol("r65", hash_of("a token"), {"anna", "", 1}); }));
+  ASSERT_TRUE(with_store(
+      [](identity::AccountStore& store) { return store.enrol("r65", runtime::hash_of("a token"), {"anna", "", 1}); }));
   TestRobot with_token = numbered(65);
   with_token.token = "a token";
   EXPECT_EQ(admit(with_token).refusal, rheonaut_REFUSAL_REASON_NONE) << "people enrol as many as they like";
-  ASSERT_TRUE(with_store([](AccountStore& store) { return store.revoke_robot("r1", {"anna", "", 1}); }));
+  ASSERT_TRUE(with_store([](identity::AccountStore& store) { return store.revoke_robot("r1", {"anna", "", 1}); }));
   EXPECT_TRUE(admit(numbered(66)).newly_enrolled) << "there is room again";
   EXPECT_FALSE(admit(numbered(67)).newly_enrolled);
 }
@@ -369,7 +374,7 @@ TEST_F(AdmissionTest, OnlySoManyRobotsEnrolThemselvesAtAll) {
 TEST_F(AdmissionTest, ARestartKnowsTheFluidOfARobot) {
   start();
   connect(robot_);
-  RobotState state = state_of(robot_, LinkState::connected);
+  station::RobotState state = state_of(robot_, station::LinkState::connected);
   for (const char* fluid : {"water", "non_newtonian"}) {
     state.fluid = fluid;
     recorder_->on_fluid(state);

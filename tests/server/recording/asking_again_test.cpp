@@ -14,16 +14,16 @@ class AskingAgainTest : public RecordingTest {
         " ORDER BY boot_key, first_event_seq");
   }
   void send_event(const TestRobot& robot, std::uint64_t event_seq) {
-    RobotEvent event;
+    station::RobotEvent event;
     event.robot_id = robot.id;
     event.boot_id = robot.boot_id;
     event.event_seq = event_seq;
     event.oldest_event_seq = robot.oldest_event_seq;
     event.kind = "detection";
-    recorder_->on_event(RobotState{}, event);
+    recorder_->on_event(station::RobotState{}, event);
   }
   // It has made nothing yet.
-  TestRobot rebooted(BootId boot_id) const {
+  TestRobot rebooted(station::BootId boot_id) const {
     TestRobot robot = robot_;
     robot.boot_id = boot_id;
     robot.next_seq = robot.next_event_seq = 0;
@@ -47,7 +47,7 @@ TEST_F(AskingAgainTest, ForEveryHoleAtOnce) {
 
 TEST_F(AskingAgainTest, AThousandRobotsWithinTwoSeconds) {
   start();
-  for (BootId boot = 1; boot <= 1000; ++boot) {
+  for (station::BootId boot = 1; boot <= 1000; ++boot) {
     TestRobot robot;
     robot.id = "r" + std::to_string(boot);
     robot.boot_id = boot;
@@ -145,7 +145,7 @@ TEST_F(AskingAgainTest, ABootIsNotReadWhileAnotherOneTakesItsPlace) {
 
 // As samples are: the robot lost them, because the station had refused them.
 TEST_F(AskingAgainTest, RefusedEventsThatAreLostLaterAreOfTheFullQueue) {
-  RecorderOptions options;
+  storage::RecorderOptions options;
   options.max_queued_records = 2;
   start(options);
   connect(robot_);
@@ -159,7 +159,7 @@ TEST_F(AskingAgainTest, RefusedEventsThatAreLostLaterAreOfTheFullQueue) {
 }
 
 TEST_F(AskingAgainTest, ARefusedEventThatCameAgainIsNotLost) {
-  RecorderOptions options;
+  storage::RecorderOptions options;
   options.max_queued_records = 2;
   start(options);
   connect(robot_);

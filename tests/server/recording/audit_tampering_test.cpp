@@ -28,19 +28,20 @@ class AuditTamperingTest : public RecordingTest {
   void SetUp() override {
     start();
     for (int n = 1; n <= 10; ++n) {
-      AuditNote taken;
+      station::AuditNote taken;
       taken.by = {"user:anna/session:4", "192.168.1.7", clock_.utc_us()};
       taken.robot_id = n % 2 == 0 ? "nemo" : "";
       taken.action = n % 2 == 0 ? "control.taken" : "account.signed_in";
       recorder_->on_audit(taken);
-      CommandRecord command;
-      command.id = static_cast<CommandId>(n) * 1'000'003U;
+      station::CommandRecord command;
+      command.id = static_cast<station::CommandId>(n) * 1'000'003U;
       command.robot_id = "nemo";
       command.kind = "set_duty";
       command.arguments = fmt::format(R"({{"duty":0.{}}})", n);
       command.actor = "token:ana";
       command.submitted_at_us = clock_.utc_us();
-      for (const CommandState state : {CommandState::queued, CommandState::sent, CommandState::verified}) {
+      for (const station::CommandState state :
+           {station::CommandState::queued, station::CommandState::sent, station::CommandState::verified}) {
         command.state = state;
         recorder_->on_command(command);
         ASSERT_TRUE(wait(recorder_->flush_records()));
@@ -48,7 +49,7 @@ class AuditTamperingTest : public RecordingTest {
       }
     }
     stop();
-    const AuditFindings good = findings();
+    const storage::AuditFindings good = findings();
     ASSERT_THAT(good.faults, IsEmpty());
     head_ = good.head;
     ASSERT_GE(head_.entry, 40);
@@ -64,19 +65,19 @@ class AuditTamperingTest : public RecordingTest {
     database.exec("DROP TRIGGER audit_in_order; DROP TRIGGER audit_unchanged; DROP TRIGGER audit_kept");
     return database;
   }
-  AuditFindings after(const std::string& sql, const std::optional<AuditHead>& expected = {}) {
+  storage::AuditFindings after(const std::string& sql, const std::optional<storage::AuditHead>& expected = {}) {
     {
       SQLite::Database database = opened();
       database.exec(sql);
     }
     return findings(expected);
   }
-  AuditFindings findings(const std::optional<AuditHead>& expected = {}) {
-    SQLite::Database database = open_for_reading(path_);
+  storage::AuditFindings findings(const std::optional<storage::AuditHead>& expected = {}) {
+    SQLite::Database database = storage::open_for_reading(path_);
     return check_audit(database, expected);
   }
   // The entry that the first fault names; 0: there is none.
-  static std::int64_t first_bad(const AuditFindings& found) {
+  static std::int64_t first_bad(const storage::AuditFindings& found) {
     if (found.faults.empty()) return 0;
     std::smatch match;
     const std::string& fault = found.faults.front();
@@ -90,7 +91,7 @@ class AuditTamperingTest : public RecordingTest {
         above, by);
   }
 
-  AuditHead head_;
+  storage::AuditHead head_;
   std::filesystem::path whole_;
   std::mt19937 random_{2026};
 };
@@ -104,7 +105,8 @@ TEST_F(AuditTamperingTest, AChangeOfAnyColumnOfAnyEntryIsFoundThere) {
       if (is_blob) {  // random: its first byte may be any
         value = fmt::format("CAST(iif(substr({0}, 1, 1) = x'00', x'01', x'00') || substr({0}, 2) AS BLOB)", column);
       }
-      const AuditFindings found = after(fmt::format("UPDATE audit SET {} = {} WHERE entry = {}", column, value, entry));
+      const storage::AuditFindings found =
+          after(fmt::format("UPDATE audit SET {} = {} WHERE entry = {}", column, value, entry));
       EXPECT_EQ(first_bad(found), entry) << column;
       EXPECT_EQ(found.head.entry, entry - 1);
     }
@@ -142,17 +144,17 @@ TEST_F(AuditTamperingTest, AnEntryThatIsRemovedMovedExchangedOrInsertedIsFound) 
 TEST_F(AuditTamperingTest, AnEntryWhoseHashesWereMadeGoodAgainBreaksTheNextOne) {
   const auto rewrite = [this](std::int64_t from, std::int64_t to) {
     SQLite::Database database = opened();
-    AuditHash before{};
+    storage::AuditHash before{};
     for (std::int64_t entry = 1; entry <= head_.entry; ++entry) {
-      SQLite::Statement row{database, fmt::format("SELECT {} FROM audit WHERE entry = ?", kAuditColumns)};
-      bind_all(row, entry);
+      SQLite::Statement row{database, fmt::format("SELECT {} FROM audit WHERE entry = ?", storage::kAuditColumns)};
+      storage::bind_all(row, entry);
       row.executeStep();
-      AuditEntry read = *audit_entry_from(row);
+      storage::AuditEntry read = *storage::audit_entry_from(row);
       row.reset();
       if (entry >= from && entry <= to) {
         if (entry == from) read.note.by.actor = "somebody else";
-        read.content_hash = content_hash_of(read.note, read.salt);
-        read.hash = link_hash_of(before, entry, read.content_hash);
+        read.content_hash = storage::content_hash_of(read.note, read.salt);
+        read.hash = storage::link_hash_of(before, entry, read.content_hash);
         SQLite::Statement update{database, "UPDATE audit SET actor = ?, content_hash = ?, hash = ? WHERE entry = ?"};
         update.bind(1, read.note.by.actor);
         update.bind(2, read.content_hash.data(), static_cast<int>(read.content_hash.size()));
@@ -179,7 +181,7 @@ TEST_F(AuditTamperingTest, AnEntryWhoseHashesWereMadeGoodAgainBreaksTheNextOne) 
 
 TEST_F(AuditTamperingTest, ATailThatWasCutOffIsFoundByAKeptHashAndByTheCommands) {
   for (const std::int64_t kept : {head_.entry - 1, head_.entry / 2, std::int64_t{1}, std::int64_t{0}}) {
-    const AuditFindings found = after(fmt::format("DELETE FROM audit WHERE entry > {}", kept), head_);
+    const storage::AuditFindings found = after(fmt::format("DELETE FROM audit WHERE entry > {}", kept), head_);
     ASSERT_FALSE(found.faults.empty());
     EXPECT_THAT(found.faults.front(), HasSubstr(fmt::format("ends with entry {}", kept)));
   }
@@ -194,7 +196,7 @@ TEST_F(AuditTamperingTest, ACommandThatSaysSomethingElseThanItsEntryIsFound) {
               ElementsAre(HasSubstr("command 1000003")));
   EXPECT_THAT(after("UPDATE command SET verified_after_us = 5 WHERE command_id = 1000003").faults,
               ElementsAre(HasSubstr("command 1000003")));
-  const AuditFindings removed = after("DELETE FROM command WHERE command_id = 1000003");
+  const storage::AuditFindings removed = after("DELETE FROM command WHERE command_id = 1000003");
   EXPECT_EQ(removed.faults.size(), 3u);  // one for each of its entries
   EXPECT_THAT(removed.faults.front(), HasSubstr("tells of command 1000003, which is not there"));
   EXPECT_THAT(after("UPDATE command SET audit_entry = NULL WHERE command_id = 1000003").faults,
@@ -208,7 +210,7 @@ TEST_F(AuditTamperingTest, ACommandThatSaysSomethingElseThanItsEntryIsFound) {
 
 TEST_F(AuditTamperingTest, AnExpectedEntryThatIsThereIsGood) {
   EXPECT_THAT(findings(head_).faults, IsEmpty());
-  AuditHead early{3, {}};
+  storage::AuditHead early{3, {}};
   EXPECT_THAT(findings(early).faults, ElementsAre(HasSubstr("entry 3 has the hash")));
 }
 

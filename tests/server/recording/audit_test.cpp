@@ -22,8 +22,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-AuditNote note(const std::string& action) {
-  AuditNote made;
+station::AuditNote note(const std::string& action) {
+  station::AuditNote made;
   made.by = {"user:anna/session:4", "192.168.1.7", 1'700'000'000'000'001};
   made.robot_id = "nemo";
   made.action = action;
@@ -33,39 +33,39 @@ AuditNote note(const std::string& action) {
 }
 
 TEST(AuditHashes, AreWhatAnybodyComputesByTheDocument) {
-  AuditSalt salt{};
+  storage::AuditSalt salt{};
   for (std::size_t i = 0; i < salt.size(); ++i) salt[i] = static_cast<unsigned char>(i);
-  const AuditHash content = content_hash_of(note("command.verified"), salt);
+  const storage::AuditHash content = storage::content_hash_of(note("command.verified"), salt);
   // By Python's hashlib.blake2b(…, digest_size=32).
-  EXPECT_EQ(text(content), "738487ff008269b9d5fc5659c89fee96ae77c01d7f6069d9f9c65b9ec6adb591");
-  EXPECT_EQ(text(link_hash_of(AuditHash{}, 1, content)),
+  EXPECT_EQ(storage::text(content), "738487ff008269b9d5fc5659c89fee96ae77c01d7f6069d9f9c65b9ec6adb591");
+  EXPECT_EQ(storage::text(storage::link_hash_of(storage::AuditHash{}, 1, content)),
             "12d9bbeddd85ef8fccb54aa70a8521d475bc81f5331edcb665dc63ae84c2133c");
 }
 
 TEST(AuditHashes, BytesThatMoveFromOneColumnIntoTheNextChangeIt) {
-  AuditNote one = note("command.sent");
-  AuditNote other = one;
+  station::AuditNote one = note("command.sent");
+  station::AuditNote other = one;
   one.by.actor = "ab";
   one.by.peer = "c";
   other.by.actor = "a";
   other.by.peer = "bc";
-  EXPECT_NE(content_hash_of(one, AuditSalt{}), content_hash_of(other, AuditSalt{}));
+  EXPECT_NE(storage::content_hash_of(one, storage::AuditSalt{}), storage::content_hash_of(other, storage::AuditSalt{}));
 }
 
 TEST(AuditHeads, AreReadAsTheyAreWritten) {
-  AuditHead head{42, {}};
+  storage::AuditHead head{42, {}};
   head.hash[0] = 0xab;
-  EXPECT_EQ(parse_audit_head(text(head)), head);
+  EXPECT_EQ(storage::parse_audit_head(text(head)), head);
   for (const char* bad : {"", "42", "42:", ":ab", "0:00", "x:00", "42:zz", "42:abcd"}) {
-    EXPECT_FALSE(parse_audit_head(bad)) << bad;
+    EXPECT_FALSE(storage::parse_audit_head(bad)) << bad;
   }
-  EXPECT_FALSE(parse_audit_head(text(head) + "00"));
+  EXPECT_FALSE(storage::parse_audit_head(text(head) + "00"));
 }
 
 class AuditTest : public RecordingTest {
  protected:
-  CommandRecord command(CommandId id, CommandState state = CommandState::queued) {
-    CommandRecord made;
+  station::CommandRecord command(station::CommandId id, station::CommandState state = station::CommandState::queued) {
+    station::CommandRecord made;
     made.id = id;
     made.robot_id = robot_.id;
     made.boot_id = robot_.boot_id;
@@ -78,13 +78,13 @@ class AuditTest : public RecordingTest {
     return made;
   }
   void flush_records() { ASSERT_TRUE(wait(recorder_->flush_records())); }
-  AuditFindings findings(const std::optional<AuditHead>& expected = {}) {
-    SQLite::Database database = open_for_reading(path_);
+  storage::AuditFindings findings(const std::optional<storage::AuditHead>& expected = {}) {
+    SQLite::Database database = storage::open_for_reading(path_);
     return check_audit(database, expected);
   }
   std::vector<std::string> actions() { return rows("SELECT action FROM audit ORDER BY entry"); }
-  AuditPage page(const AuditFilter& filter) {
-    SQLite::Database database = open_for_reading(path_);
+  storage::AuditPage page(const storage::AuditFilter& filter) {
+    SQLite::Database database = storage::open_for_reading(path_);
     return read_audit(database, filter);
   }
 
@@ -93,15 +93,15 @@ class AuditTest : public RecordingTest {
 
 TEST_F(AuditTest, ACommandLeavesAnEntryForEachStateThatIsStored) {
   start();
-  CommandRecord wish = command(18446744073709551615U);
+  station::CommandRecord wish = command(18446744073709551615U);
   recorder_->on_command(wish);
   flush_records();
-  wish.state = CommandState::sent;
+  wish.state = station::CommandState::sent;
   wish.sent_at_us = wish.submitted_at_us + 2'000;
   wish.sent_after_us = 2'000;
   recorder_->on_command(wish);
   flush_records();
-  wish.state = CommandState::rejected;
+  wish.state = station::CommandState::rejected;
   wish.reason = "wrong_mode";
   wish.ended_at_us = wish.submitted_at_us + 5'000;
   recorder_->on_command(wish);
@@ -115,7 +115,7 @@ TEST_F(AuditTest, ACommandLeavesAnEntryForEachStateThatIsStored) {
   EXPECT_EQ(detail.at("sent_after_us"), 2'000);
   EXPECT_EQ(number("SELECT at_us FROM audit WHERE entry = 4"), wish.ended_at_us);
   EXPECT_EQ(number("SELECT audit_entry FROM command"), 4);
-  const AuditFindings found = findings();
+  const storage::AuditFindings found = findings();
   EXPECT_THAT(found.faults, IsEmpty());
   EXPECT_EQ(found.entries, 4u);
   EXPECT_EQ(found.commands, 1u);
@@ -143,10 +143,10 @@ TEST_F(AuditTest, ACommitThatFailsTakesItsEntriesWithIt) {
 
 TEST_F(AuditTest, AKillLeavesAWholeChainAndTheNextStartGoesOnWithIt) {
   start();
-  CommandRecord stop_request = command(3, CommandState::sent);
+  station::CommandRecord stop_request = command(3, station::CommandState::sent);
   stop_request.kind = "emergency_stop";
   recorder_->on_command(stop_request);
-  recorder_->on_command(command(4, CommandState::sent));
+  recorder_->on_command(command(4, station::CommandState::sent));
   flush_records();
   recorder_->on_audit(note("control.taken"));  // not committed
   kill();
@@ -168,20 +168,20 @@ TEST_F(AuditTest, RunsRobotsAndAccountsAreInIt) {
   connect(robot_);
   make(robot_, 10);
   flush();
-  const Author by{"token:ana", "10.0.0.9", 0};
-  const RunId run = wait(runs_->create(robot_.id, named("one"), by))->id;
+  const station::Author by{"token:ana", "10.0.0.9", 0};
+  const storage::RunId run = wait(runs_->create(robot_.id, named("one"), by))->id;
   make(robot_, 10);
   ASSERT_TRUE(wait(runs_->end(run, "good", by)));
-  RunAnnotation annotation;
+  storage::RunAnnotation annotation;
   annotation.texts["notes"] = "warm";
   ASSERT_TRUE(wait(runs_->annotate(run, annotation, by)));
   ASSERT_TRUE(wait(runs_->discard(run, "the pump was off", by)));
   ASSERT_TRUE(wait(runs_->create(robot_.id, named("open"), by)));
-  auto accounts = [](Database& database) {
-    const Author who{"user:otto/session:1", "10.0.0.8", 7};
-    AccountStore store{database.handle()};
-    const bool added = store.add_user({"anna", Role::viewer, "", 7, who.actor, false}, who).has_value();
-    const bool twice = store.add_user({"anna", Role::viewer, "", 7, who.actor, false}, who).has_value();
+  auto accounts = [](storage::Database& database) {
+    const station::Author who{"user:otto/session:1", "10.0.0.8", 7};
+    identity::AccountStore store{database.handle()};
+    const bool added = store.add_user({"anna", identity::Role::viewer, "", 7, who.actor, false}, who).has_value();
+    const bool twice = store.add_user({"anna", identity::Role::viewer, "", 7, who.actor, false}, who).has_value();
     const bool revoked = store.revoke_robot("nemo", who).has_value() && store.revoke_robot("nemo", who).has_value();
     return added && !twice && revoked && !store.revoke_robot("nobody", who);
   };
@@ -200,7 +200,7 @@ TEST_F(AuditTest, RunsRobotsAndAccountsAreInIt) {
 
 TEST_F(AuditTest, AFloodOfRefusalsIsCountedAndDoesNotFillTheDisk) {
   start();
-  AuditNote refused = note("command.refused");
+  station::AuditNote refused = note("command.refused");
   refused.can_flood = true;
   for (int n = 0; n < 100; ++n) {
     for (int each = 0; each < 100; ++each) recorder_->on_audit(refused);
@@ -210,8 +210,8 @@ TEST_F(AuditTest, AFloodOfRefusalsIsCountedAndDoesNotFillTheDisk) {
   clock_.run_for(11s);
   flush_records();
   const std::int64_t written = number("SELECT count(*) FROM audit WHERE action = 'command.refused'");
-  EXPECT_GE(written, AuditQuota::kBurst);
-  EXPECT_LE(written, AuditQuota::kBurst + 1);
+  EXPECT_GE(written, storage::AuditQuota::kBurst);
+  EXPECT_LE(written, storage::AuditQuota::kBurst + 1);
   EXPECT_LE(number("SELECT count(*) FROM audit WHERE action = 'audit.left_out'"), 3);
   EXPECT_EQ(number("SELECT sum(detail ->> 'count') FROM audit WHERE action = 'audit.left_out'"
                    " AND subject = 'command.refused'"),
@@ -224,12 +224,12 @@ TEST_F(AuditTest, AFloodOfRefusalsIsCountedAndDoesNotFillTheDisk) {
 }
 
 TEST_F(AuditTest, WhatTheFullQueueDoesNotTakeIsCountedToo) {
-  RecorderOptions options;
+  storage::RecorderOptions options;
   options.max_queued_records = 10;
   start(options);
   for (int n = 0; n < 25; ++n) recorder_->on_audit(note("control.taken"));
   recorder_->on_command(command(5));
-  CommandRecord stop_request = command(6);
+  station::CommandRecord stop_request = command(6);
   stop_request.kind = "emergency_stop";
   recorder_->on_command(stop_request);  // SAFETY: is recorded whatever waits
   stop();
@@ -257,7 +257,7 @@ TEST_F(AuditTest, TheTableRefusesToBeChangedByAccident) {
 TEST_F(AuditTest, PagesAreFilteredAndGoOnWhereTheLastOneEnded) {
   start();
   for (int n = 0; n < 12'000; ++n) {
-    AuditNote each = note(n % 4000 == 0 ? "control.taken" : "run.annotated");
+    station::AuditNote each = note(n % 4000 == 0 ? "control.taken" : "run.annotated");
     each.by.at_us = 1'000'000 + n;
     each.by.actor = n % 2 == 0 ? "even" : "odd";
     each.robot_id = n % 3000 == 0 ? "dory" : "nemo";
@@ -266,19 +266,19 @@ TEST_F(AuditTest, PagesAreFilteredAndGoOnWhereTheLastOneEnded) {
   flush_records();
   std::vector<std::int64_t> found;
   int pages = 0;
-  AuditFilter filter;
+  storage::AuditFilter filter;
   filter.action = "control";
   filter.limit = 2;
   do {
-    const AuditPage some = page(filter);
-    for (const AuditEntry& entry : some.entries) found.push_back(entry.note.by.at_us);
+    const storage::AuditPage some = page(filter);
+    for (const storage::AuditEntry& entry : some.entries) found.push_back(entry.note.by.at_us);
     filter.before = some.next;
     EXPECT_EQ(some.head.entry, 12'001);
     ++pages;
   } while (filter.before != 0 && pages < 20);
   EXPECT_THAT(found, ElementsAre(1'008'000, 1'004'000, 1'000'000));
   EXPECT_GT(pages, 2) << "a page looks at a bounded number of entries";
-  AuditFilter all;
+  storage::AuditFilter all;
   all.actor = "odd";
   all.from_us = 1'011'900;
   all.to_us = 1'011'910;
@@ -290,39 +290,39 @@ TEST_F(AuditTest, PagesAreFilteredAndGoOnWhereTheLastOneEnded) {
 TEST_F(AuditTest, TheExportOfARunHoldsItsPartOfTheChainAndNobodyElsesDoings) {
   start();
   connect(robot_);
-  AuditNote elsewhere = note("control.forced");
+  station::AuditNote elsewhere = note("control.forced");
   elsewhere.robot_id = "dory";
   elsewhere.detail = R"({"secret":"of another robot"})";
-  AuditNote account = note("account.signed_in");
+  station::AuditNote account = note("account.signed_in");
   account.robot_id = "";
   account.by = {"user:very-secret/session:1", "10.9.8.7", 0};
-  AuditNote refused = note("command.refused");
+  station::AuditNote refused = note("command.refused");
   refused.robot_id = "";
   refused.subject = "very-secret-name";
-  const auto tell = [this](AuditNote each) {
+  const auto tell = [this](station::AuditNote each) {
     clock_.run_for(10ms);
     each.by.at_us = clock_.utc_us();
     recorder_->on_audit(each);
   };
   tell(note("control.taken"));
   clock_.run_for(10ms);
-  const RunId run = wait(runs_->create(robot_.id, named("exported")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("exported")))->id;
   make(robot_, 10);
   clock_.run_for(10ms);
   recorder_->on_command(command(7));
-  for (const AuditNote& each : {elsewhere, account, refused, note("control.released")}) tell(each);
+  for (const station::AuditNote& each : {elsewhere, account, refused, note("control.released")}) tell(each);
   ASSERT_TRUE(wait(runs_->end(run, "")));
   tell(note("control.taken"));
   flush_records();
   const auto file = folder_ / "run.sqlite";
   {
-    SQLite::Database database = open_for_reading(path_);
-    const ExportQuery query{.run = run, .channels = all_channels(), .grid_us = {}};
-    RunFile writer{file, reading_uri(path_, false), read_spans(database, run, 0), query};
+    SQLite::Database database = storage::open_for_reading(path_);
+    const storage::ExportQuery query{.run = run, .channels = storage::all_channels(), .grid_us = {}};
+    storage::RunFile writer{file, storage::reading_uri(path_, false), storage::read_spans(database, run, 0), query};
     while (writer.advance(database)) continue;
   }
   SQLite::Database exported{file.string(), SQLite::OPEN_READWRITE};
-  const AuditFindings found = check_exported_audit(exported, {});
+  const storage::AuditFindings found = storage::check_exported_audit(exported, {});
   EXPECT_THAT(found.faults, IsEmpty());
   std::vector<std::string> shown;
   SQLite::Statement query{exported, "SELECT coalesce(action, '-') FROM audit ORDER BY entry"};
@@ -339,10 +339,10 @@ TEST_F(AuditTest, TheExportOfARunHoldsItsPartOfTheChainAndNobodyElsesDoings) {
   EXPECT_THAT(findings(found.head).faults, IsEmpty());
   const auto hidden = exported.execAndGet("SELECT min(entry) FROM audit WHERE action IS NULL").getInt64();
   exported.exec(fmt::format("UPDATE audit SET content_hash = zeroblob(32) WHERE entry = {}", hidden));
-  EXPECT_THAT(check_exported_audit(exported, {}).faults,
+  EXPECT_THAT(storage::check_exported_audit(exported, {}).faults,
               ElementsAre(HasSubstr(fmt::format("entry {} does not follow on", hidden))));
   exported.exec(fmt::format("UPDATE audit SET actor = 'x' WHERE entry = {}", hidden));
-  EXPECT_THAT(check_exported_audit(exported, {}).faults, ElementsAre(HasSubstr("was changed")));
+  EXPECT_THAT(storage::check_exported_audit(exported, {}).faults, ElementsAre(HasSubstr("was changed")));
 }
 
 }  // namespace

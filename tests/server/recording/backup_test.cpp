@@ -20,23 +20,23 @@ using ::testing::IsEmpty;
 
 class BackupTest : public RecordingTest {
  protected:
-  void begin(RecordingConfig config = {}) {
+  void begin(config::RecordingConfig config = {}) {
     config.low_space_mb = config.critical_space_mb = 0;
     start({}, config);
     connect(robot_);
   }
-  BackupRecord record_of(const std::string& name) {
-    for (const BackupRecord& record : wait(recording_->backups.list())) {
+  storage::BackupRecord record_of(const std::string& name) {
+    for (const storage::BackupRecord& record : wait(recording_->backups.list())) {
       if (record.name == name) return record;
     }
     return {};
   }
-  BackupRecord back_up(const std::string& name) {
-    const Result<BackupRecord> begun = wait(recording_->backups.begin(name));
+  storage::BackupRecord back_up(const std::string& name) {
+    const Result<storage::BackupRecord> begun = wait(recording_->backups.begin(name));
     EXPECT_TRUE(begun) << begun.error().detail;
     const auto ended = [&] {
-      const BackupState state = record_of(name).state;
-      return state == BackupState::done || state == BackupState::failed;
+      const storage::BackupState state = record_of(name).state;
+      return state == storage::BackupState::done || state == storage::BackupState::failed;
     };
     EXPECT_TRUE(clock_.run_until([&] { return !recording_->backups.busy(); }, 600s));
     EXPECT_TRUE(ended());
@@ -57,11 +57,11 @@ class BackupTest : public RecordingTest {
 
 TEST_F(BackupTest, HoldsEverythingThatWasDurableAndNeedsNoFileBesideIt) {
   begin();
-  const RunId run = wait(runs_->create(robot_.id, named("kept")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("kept")))->id;
   make(robot_, 1000);
   ASSERT_TRUE(wait(runs_->end(run, "good")));
-  const BackupRecord made = back_up("monday");
-  ASSERT_EQ(made.state, BackupState::done) << made.problem;
+  const storage::BackupRecord made = back_up("monday");
+  ASSERT_EQ(made.state, storage::BackupState::done) << made.problem;
   EXPECT_EQ(made.path, folder_ / "backups" / "monday.sqlite");
   EXPECT_EQ(made.pages_done, made.pages_total);
   EXPECT_GT(made.pages_total, 10U);
@@ -69,9 +69,9 @@ TEST_F(BackupTest, HoldsEverythingThatWasDurableAndNeedsNoFileBesideIt) {
 
   SQLite::Database copy{made.path.string(), SQLite::OPEN_READONLY};
   EXPECT_EQ(copy.execAndGet("PRAGMA journal_mode").getString(), "delete");
-  EXPECT_EQ(find_damage(copy), "");
+  EXPECT_EQ(storage::find_damage(copy), "");
   EXPECT_THAT(coverage_faults(copy), IsEmpty());
-  SQLite::Database live = open_for_reading(path_);
+  SQLite::Database live = storage::open_for_reading(path_);
   EXPECT_EQ(stored_runs(copy), stored_runs(live));
   EXPECT_THAT(files(folder_ / "backups"), ::testing::ElementsAre("monday.sqlite"));
 }
@@ -87,8 +87,8 @@ TEST_F(BackupTest, UnderLoadItNeverBeginsAgainAndHoldsWhatWasDurableWhenTheCopyE
   std::uint64_t durable_before = 0;
   int looks = 0;
   while (recording_->backups.busy()) {
-    const BackupRecord now = record_of("busy");
-    if (now.state != BackupState::copying) break;
+    const storage::BackupRecord now = record_of("busy");
+    if (now.state != storage::BackupState::copying) break;
     ASSERT_GE(now.pages_done, pages_before) << "it began again";
     pages_before = now.pages_done;
     durable_before = durable_next_seq_;
@@ -96,17 +96,17 @@ TEST_F(BackupTest, UnderLoadItNeverBeginsAgainAndHoldsWhatWasDurableWhenTheCopyE
     make(robot_, 400, 25);  // 20,000 samples a second
     flush();
     clock_.run_for(10ms);
-    wait(recorder_->on_disk([](Database& database) {  // as the checkpoints of the station
+    wait(recorder_->on_disk([](storage::Database& database) {  // as the checkpoints of the station
       sqlite3_wal_checkpoint_v2(database.handle().getHandle(), nullptr, SQLITE_CHECKPOINT_PASSIVE, nullptr, nullptr);
       return true;
     }));
   }
   EXPECT_GT(looks, 2);
   ASSERT_TRUE(clock_.run_until([&] { return !recording_->backups.busy(); }, 600s));
-  const BackupRecord made = record_of("busy");
-  ASSERT_EQ(made.state, BackupState::done) << made.problem;
+  const storage::BackupRecord made = record_of("busy");
+  ASSERT_EQ(made.state, storage::BackupState::done) << made.problem;
   SQLite::Database copy{made.path.string(), SQLite::OPEN_READONLY};
-  EXPECT_EQ(find_damage(copy), "");
+  EXPECT_EQ(storage::find_damage(copy), "");
   EXPECT_THAT(coverage_faults(copy), IsEmpty());
   EXPECT_GT(durable_before, 600'000U);
   EXPECT_GE(copy.execAndGet("SELECT max(last_seq) + 1 FROM segment").getInt64(),
@@ -125,7 +125,7 @@ TEST_F(BackupTest, NamesThatAreNoneTakenOrUnderWayAreRefused) {
   EXPECT_EQ(refusal("two"), ErrorCode::conflict);
   ASSERT_TRUE(clock_.run_until([&] { return !recording_->backups.busy(); }, 60s));
   EXPECT_EQ(refusal("one"), ErrorCode::conflict);
-  EXPECT_EQ(back_up("two").state, BackupState::done);
+  EXPECT_EQ(back_up("two").state, storage::BackupState::done);
 }
 
 TEST_F(BackupTest, TheFolderIsListedAfterARestart) {
@@ -140,9 +140,9 @@ TEST_F(BackupTest, TheFolderIsListedAfterARestart) {
   }
   begin();
   std::vector<std::string> names;
-  for (const BackupRecord& record : wait(recording_->backups.list())) names.push_back(record.name);
+  for (const storage::BackupRecord& record : wait(recording_->backups.list())) names.push_back(record.name);
   EXPECT_THAT(names, ::testing::ElementsAre("one", "two"));
-  EXPECT_EQ(record_of("one").state, BackupState::done);
+  EXPECT_EQ(record_of("one").state, storage::BackupState::done);
   EXPECT_GT(record_of("one").pages_total, 10U);
   back_up("three");
   // Another station is making the foreign one.
@@ -154,7 +154,7 @@ TEST_F(BackupTest, TheFolderIsListedAfterARestart) {
 TEST_F(BackupTest, StationsMayHaveOneFolder) {
   const fs::path common = folder_ / "common";
   fs::create_directories(common);
-  RecordingConfig config;
+  config::RecordingConfig config;
   config.backup_dir = common;
   begin(config);
   for (int i = 0; i < 20; ++i) {
@@ -165,16 +165,21 @@ TEST_F(BackupTest, StationsMayHaveOneFolder) {
   const auto is_part = [](const std::string& name) { return name.contains(".part-"); };
   ASSERT_TRUE(clock_.run_until([&] { return std::ranges::any_of(files(common), is_part); }, 10s));
 
-  RecordingParts other{
-      loop_, clock_, disk_, readers_, exports_worker_, checkpoints_, RecorderOptions{folder_ / "other.sqlite", {}},
-      config};
+  storage::RecordingParts other{loop_,
+                                clock_,
+                                disk_,
+                                readers_,
+                                exports_worker_,
+                                checkpoints_,
+                                storage::RecorderOptions{folder_ / "other.sqlite", {}},
+                                config};
   clock_.add_worker(other.backups.checker());
   wait(other.open());
   other.spawn(*tasks_);
   ASSERT_TRUE(recording_->backups.busy());
   ASSERT_TRUE(wait(other.backups.begin("tuesday")));
   ASSERT_TRUE(clock_.run_until([&] { return !recording_->backups.busy() && !other.backups.busy(); }, 600s));
-  EXPECT_EQ(record_of("monday").state, BackupState::done) << record_of("monday").problem;
+  EXPECT_EQ(record_of("monday").state, storage::BackupState::done) << record_of("monday").problem;
   EXPECT_THAT(files(common), ::testing::UnorderedElementsAre("monday.sqlite", "tuesday.sqlite"));
   stop();
   clock_.remove_worker(other.backups.checker());
@@ -198,12 +203,12 @@ TEST_F(BackupTest, AStationThatStopsMeanwhileClosesItsDatabase) {
   }
   ASSERT_TRUE(wait(recording_->backups.begin("cut")));
   clock_.run_for(30ms);
-  ASSERT_EQ(record_of("cut").state, BackupState::copying);
+  ASSERT_EQ(record_of("cut").state, storage::BackupState::copying);
   stop();
   EXPECT_FALSE(fs::exists(folder_ / "backups" / "cut.sqlite"));
   EXPECT_FALSE(fs::exists(fs::path{path_}.concat("-wal"))) << "closed, and its log emptied";
   begin();
-  EXPECT_EQ(back_up("cut").state, BackupState::done);
+  EXPECT_EQ(back_up("cut").state, storage::BackupState::done);
 }
 
 }  // namespace

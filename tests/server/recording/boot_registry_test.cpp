@@ -11,40 +11,43 @@ constexpr auto kAccepted = rheonaut_REFUSAL_REASON_NONE;
 
 class BootRegistryTest : public ::testing::Test {
  protected:
-  static AdmissionRequest hello(const RobotId& robot_id, BootId boot_id, std::uint64_t next_seq = 0) {
-    AdmissionRequest request;
+  static station::AdmissionRequest hello(const station::RobotId& robot_id, station::BootId boot_id,
+                                         std::uint64_t next_seq = 0) {
+    station::AdmissionRequest request;
     request.robot_id = robot_id;
     request.boot_id = boot_id;
     request.next_seq = next_seq;
     request.received_at_us = 5 * kSecond;
     return request;
   }
-  Admission admit(const AdmissionRequest& request, StoredBoot stored = {}, std::int64_t now_us = 0) {
-    BootEntry& boot = boots_.enter(request.boot_id, request.robot_id);
+  station::Admission admit(const station::AdmissionRequest& request, storage::StoredBoot stored = {},
+                           std::int64_t now_us = 0) {
+    storage::BootEntry& boot = boots_.enter(request.boot_id, request.robot_id);
     return boots_.admit(boot, std::move(stored), {}, request, now_us);
   }
-  BootRegistry::Started connect(BootId boot_id, const RobotId& robot_id = "nemo") {
+  storage::BootRegistry::Started connect(station::BootId boot_id, const station::RobotId& robot_id = "nemo") {
     EXPECT_EQ(admit(hello(robot_id, boot_id)).refusal, kAccepted);
-    BootEntry& boot = *boots_.find(boot_id);
+    storage::BootEntry& boot = *boots_.find(boot_id);
     boot.connected = true;
     return boots_.start(boot, 0);
   }
-  BootEntry& receive(BootId boot_id, std::uint64_t first_seq, std::size_t samples, std::int64_t now_us) {
-    SampleBatch batch;
+  storage::BootEntry& receive(station::BootId boot_id, std::uint64_t first_seq, std::size_t samples,
+                              std::int64_t now_us) {
+    station::SampleBatch batch;
     batch.first_seq = first_seq;
     batch.context.period_us = 10'000;
     batch.samples.resize(samples);
-    BootEntry& boot = *boots_.find(boot_id);
+    storage::BootEntry& boot = *boots_.find(boot_id);
     boot.recording.append(batch, now_us);
     boots_.watch(boot);
     return boot;
   }
 
-  BootRegistry boots_{7, 0};
+  storage::BootRegistry boots_{7, 0};
 };
 
 TEST_F(BootRegistryTest, NumbersNewBootsAndKeepsTheKeysOfStoredOnes) {
-  StoredBoot stored;
+  storage::StoredBoot stored;
   stored.key = 3;
   admit(hello("nemo", 10));
   admit(hello("dory", 11), std::move(stored));
@@ -67,7 +70,7 @@ TEST_F(BootRegistryTest, AStartReplacesTheBootsThatHaveConnected) {
   connect(10);
   EXPECT_EQ(admit(hello("nemo", 11)).refusal, kAccepted);  // and never connects
   connect(20, "dory");
-  const BootRegistry::Started started = connect(12);
+  const storage::BootRegistry::Started started = connect(12);
   EXPECT_EQ(started.start.boot_key, boots_.find(12)->recording.key());
   ASSERT_EQ(started.replaced.size(), 1u);
   EXPECT_EQ(started.replaced[0]->boot_id, 10u);
@@ -90,7 +93,7 @@ TEST_F(BootRegistryTest, AnotherBootStartsUntilItIsStored) {
 
 TEST_F(BootRegistryTest, ACompleteSegmentIsDueAtOnceAndARestWhenItIsOld) {
   connect(10);
-  BootEntry& boot = receive(10, 0, 50, kSecond);
+  storage::BootEntry& boot = receive(10, 0, 50, kSecond);
   EXPECT_EQ(boots_.take_due(), nullptr);
   receive(10, 50, 100, kSecond);  // segments of the seventh boot end elsewhere than at a hundred
   EXPECT_EQ(boots_.take_due(), &boot);
@@ -102,7 +105,7 @@ TEST_F(BootRegistryTest, ACompleteSegmentIsDueAtOnceAndARestWhenItIsOld) {
 
 TEST_F(BootRegistryTest, WhatWasEnqueuedMeanwhileIsNotOld) {
   connect(10);
-  BootEntry& boot = receive(10, 0, 50, kSecond);
+  storage::BootEntry& boot = receive(10, 0, 50, kSecond);
   boot.recording.take_segments(true);
   receive(10, 50, 5, 2 * kSecond);
   EXPECT_EQ(boots_.take_aged(3 * kSecond), nullptr);
@@ -111,7 +114,7 @@ TEST_F(BootRegistryTest, WhatWasEnqueuedMeanwhileIsNotOld) {
 
 TEST_F(BootRegistryTest, WithoutAConnectionASingleSampleIsDue) {
   connect(10);
-  BootEntry& boot = receive(10, 0, 1, kSecond);
+  storage::BootEntry& boot = receive(10, 0, 1, kSecond);
   EXPECT_EQ(boots_.take_due(), nullptr);
   boot.connected = false;
   boots_.watch(boot);
@@ -121,8 +124,8 @@ TEST_F(BootRegistryTest, WithoutAConnectionASingleSampleIsDue) {
 TEST_F(BootRegistryTest, HolesAreServedInTurnUntilTheyAreClosed) {
   connect(10);
   connect(20, "dory");
-  BootEntry& nemo = receive(10, 5, 5, kSecond);
-  BootEntry& dory = receive(20, 5, 5, kSecond);
+  storage::BootEntry& nemo = receive(10, 5, 5, kSecond);
+  storage::BootEntry& dory = receive(20, 5, 5, kSecond);
   EXPECT_EQ(boots_.holes(), 2u);
   EXPECT_EQ(boots_.next_with_holes(), &nemo);
   EXPECT_EQ(boots_.next_with_holes(), &dory);
@@ -146,7 +149,7 @@ TEST_F(BootRegistryTest, ForgetsWhatNobodyUses) {
 
 TEST_F(BootRegistryTest, ForgetsARefusedBootAtOnceUnlessAnotherAdmissionIsUnderWay) {
   boots_.forget_unused(0);
-  BootEntry& boot = boots_.enter(10, "nemo");
+  storage::BootEntry& boot = boots_.enter(10, "nemo");
   boot.admissions = 1;
   boots_.forget_soon();
   boots_.forget_unused(1);

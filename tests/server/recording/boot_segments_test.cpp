@@ -14,7 +14,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr Interval kAllSamples{0, std::numeric_limits<std::uint64_t>::max()};
+constexpr storage::Interval kAllSamples{0, std::numeric_limits<std::uint64_t>::max()};
 constexpr std::size_t kNoLimit = std::numeric_limits<std::size_t>::max();
 
 class BootSegmentsTest : public ::testing::Test {
@@ -22,47 +22,48 @@ class BootSegmentsTest : public ::testing::Test {
   // Its segments end at multiples of 100: it has the first key.
   BootSegmentsTest() : nemo_{connect(10, "nemo")} {}
 
-  BootEntry& connect(BootId boot_id, const RobotId& robot_id) {
-    AdmissionRequest hello;
+  storage::BootEntry& connect(station::BootId boot_id, const station::RobotId& robot_id) {
+    station::AdmissionRequest hello;
     hello.robot_id = robot_id;
     hello.boot_id = boot_id;
-    BootEntry& boot = boots_.enter(boot_id, robot_id);
+    storage::BootEntry& boot = boots_.enter(boot_id, robot_id);
     boots_.admit(boot, {}, {}, hello, 0);
     boot.connected = true;
     boots_.start(boot, 0);
     return boot;
   }
-  void receive(BootEntry& boot, std::uint64_t first_seq, std::size_t samples, float position_m = 1) {
-    SampleBatch batch;
+  void receive(storage::BootEntry& boot, std::uint64_t first_seq, std::size_t samples, float position_m = 1) {
+    station::SampleBatch batch;
     batch.first_seq = first_seq;
     batch.first_robot_time_us = first_seq * 10'000;
     batch.context.period_us = 10'000;
     batch.samples.resize(samples);
-    for (Sample& sample : batch.samples) sample.position_m = position_m;
+    for (station::Sample& sample : batch.samples) sample.position_m = position_m;
     boot.recording.append(batch, 0);
     boots_.watch(boot);
     queue_.count_received(samples);
   }
   void build_commit() { queue_.build_commit(boots_.with_records()); }
 
-  std::vector<std::string> found(const BootEntry& boot, Interval range = kAllSamples, std::size_t limit = kNoLimit) {
+  std::vector<std::string> found(const storage::BootEntry& boot, storage::Interval range = kAllSamples,
+                                 std::size_t limit = kNoLimit) {
     std::vector<std::string> parts;
-    for (const Segment& segment : waiting_samples(queue_, boot, range, limit)) {
+    for (const storage::Segment& segment : waiting_samples(queue_, boot, range, limit)) {
       parts.push_back(std::to_string(segment.first_seq) + "-" + std::to_string(segment.next_seq() - 1));
     }
     return parts;
   }
-  std::vector<std::string> gaps(const BootEntry& boot, Interval range = kAllSamples) {
+  std::vector<std::string> gaps(const storage::BootEntry& boot, storage::Interval range = kAllSamples) {
     std::vector<std::string> parts;
-    for (const LostRange& gap : waiting_gaps(queue_, boot, range)) {
+    for (const storage::LostRange& gap : waiting_gaps(queue_, boot, range)) {
       parts.push_back(std::to_string(gap.lost.first) + "-" + std::to_string(gap.lost.next - 1) + " " + gap.cause);
     }
     return parts;
   }
 
-  BootRegistry boots_{1, 0};
-  CommitQueue queue_{1'000'000, 1000};
-  BootEntry& nemo_;
+  storage::BootRegistry boots_{1, 0};
+  storage::CommitQueue queue_{1'000'000, 1000};
+  storage::BootEntry& nemo_;
 };
 
 TEST_F(BootSegmentsTest, CompleteSegmentsAreDueAndTheRestOnceItIsOld) {
@@ -77,8 +78,8 @@ TEST_F(BootSegmentsTest, CompleteSegmentsAreDueAndTheRestOnceItIsOld) {
 }
 
 TEST_F(BootSegmentsTest, WhatDoesNotFitIntoTheCommitIsNotTouched) {
-  receive(nemo_, 0, kMaxCommitSamples);
-  BootEntry& dory = connect(20, "dory");
+  receive(nemo_, 0, storage::kMaxCommitSamples);
+  storage::BootEntry& dory = connect(20, "dory");
   receive(dory, 0, 250);
   enqueue_due(boots_, queue_, 2'000'000);
   EXPECT_TRUE(queue_.has_full_commit());
@@ -90,7 +91,7 @@ TEST_F(BootSegmentsTest, WhatDoesNotFitIntoTheCommitIsNotTouched) {
 }
 
 TEST_F(BootSegmentsTest, EverythingIsEnqueuedOfEveryBoot) {
-  BootEntry& dory = connect(20, "dory");
+  storage::BootEntry& dory = connect(20, "dory");
   receive(nemo_, 0, 150);
   receive(dory, 0, 5);
   enqueue_everything(boots_, queue_);
@@ -99,7 +100,7 @@ TEST_F(BootSegmentsTest, EverythingIsEnqueuedOfEveryBoot) {
 }
 
 TEST_F(BootSegmentsTest, AReaderFindsSamplesWhereverTheyWait) {
-  BootEntry& dory = connect(20, "dory");
+  storage::BootEntry& dory = connect(20, "dory");
   receive(dory, 0, 5);
   receive(nemo_, 200, 100);
   enqueue_due(boots_, queue_, 0);
@@ -117,7 +118,7 @@ TEST_F(BootSegmentsTest, AReaderFindsSamplesWhereverTheyWait) {
 TEST_F(BootSegmentsTest, AReaderFindsSamplesAsTheDatabaseWillGiveThemBack) {
   receive(nemo_, 0, 1, -0.0F);
   receive(nemo_, 1, 1, std::numeric_limits<float>::infinity());
-  const std::vector<Segment> segments = waiting_samples(queue_, nemo_, kAllSamples, kNoLimit);
+  const std::vector<storage::Segment> segments = waiting_samples(queue_, nemo_, kAllSamples, kNoLimit);
   ASSERT_EQ(segments.size(), 1U);
   EXPECT_FALSE(std::signbit(segments[0].samples.at(0).position_m));
   EXPECT_TRUE(std::isnan(segments[0].samples.at(1).position_m));

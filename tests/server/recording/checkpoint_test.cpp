@@ -42,7 +42,7 @@ class CheckpointTest : public RecordingTest {
     return count;
   }
 
-  RecorderOptions options_;
+  storage::RecorderOptions options_;
   TestRobot robot_;
   std::ostringstream log_;
   std::shared_ptr<spdlog::logger> usual_ = spdlog::default_logger();
@@ -77,8 +77,8 @@ TEST_F(CheckpointTest, TheLargestCommitFitsBetweenHalfAgainAndTwiceTheLog) {
   clock_.run_for(3s);
   const std::uint64_t before = recorder_->wal().bytes;
   for (TestRobot& robot : robots) {
-    SampleBatch batch = robot.batch(robot.next_seq, 200);
-    for (Sample& sample : batch.samples) {
+    station::SampleBatch batch = robot.batch(robot.next_seq, 200);
+    for (station::Sample& sample : batch.samples) {
       for (float* channel : {&sample.position_m, &sample.velocity_m_s, &sample.acceleration_m_s2, &sample.impedance_mv,
                              &sample.duty, &sample.reference_m}) {
         *channel = std::uniform_real_distribution<float>{-1, 1}(random);
@@ -89,7 +89,7 @@ TEST_F(CheckpointTest, TheLargestCommitFitsBetweenHalfAgainAndTwiceTheLog) {
   flush();
   EXPECT_GE(recorder_->counters().largest_commit_samples, 150'000U);
   EXPECT_EQ(number("SELECT count(*) FROM sample"), 201'000);
-  EXPECT_LE(recorder_->wal().bytes - before, RecorderOptions{}.checkpoint_bytes / 2);
+  EXPECT_LE(recorder_->wal().bytes - before, storage::RecorderOptions{}.checkpoint_bytes / 2);
 }
 
 // As exports do: one read transaction follows another, each through many commits.
@@ -97,11 +97,11 @@ TEST_F(CheckpointTest, ReadersWithoutAPauseDoNotMakeTheLogLong) {
   start(options_);
   connect(robot_);
   make_a_second();
-  WorkerThread exports{"exports"};
+  runtime::WorkerThread exports{"exports"};
   bool reads = true;
   int pages = 0;
   auto read = [path = path_] {
-    SQLite::Database database = open_for_reading(path);
+    SQLite::Database database = storage::open_for_reading(path);
     SQLite::Statement page{database, "SELECT count(*) FROM (SELECT a.row FROM sample AS a, sample AS b LIMIT 60000)"};
     page.executeStep();
   };
@@ -128,14 +128,15 @@ TEST_F(CheckpointTest, ReadersWithoutAPauseDoNotMakeTheLogLong) {
 TEST_F(CheckpointTest, AnExportThatTakesAnHourDoesNotMakeTheLogLong) {
   start(options_);
   connect(robot_);
-  const RunId run = wait(runs_->create(robot_.id, named("to export")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("to export")))->id;
   for (int i = 0; i < 8; ++i) {
     make(robot_, 8'000, 500);
     clock_.run_for(1s);
   }
   wait(runs_->end(run, ""));
-  auto spans = wait(recording_->exports.spans(excerpt_of(run))).value();
-  CsvStream csv{recording_->exports, std::move(spans), {.run = run, .channels = all_channels(), .grid_us = {}}};
+  auto spans = wait(recording_->exports.spans(storage::excerpt_of(run))).value();
+  api::CsvStream csv{
+      recording_->exports, std::move(spans), {.run = run, .channels = storage::all_channels(), .grid_us = {}}};
   std::ptrdiff_t lines = 0;
   bool ended = false;
   const auto take = [&] {

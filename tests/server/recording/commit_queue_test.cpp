@@ -9,16 +9,16 @@ namespace {
 class CommitQueueTest : public ::testing::Test {
  protected:
   CommitQueueTest() {
-    for (BootEntry* boot : {&nemo_, &dory_}) {
-      StoredBoot stored;
+    for (storage::BootEntry* boot : {&nemo_, &dory_}) {
+      storage::StoredBoot stored;
       stored.key = boot == &nemo_ ? 1 : 2;
       boot->recording.load(std::move(stored));
       boot->connected = true;
     }
   }
   // One segment for each hundred samples of the first boot.
-  void receive(BootEntry& boot, std::uint64_t first_seq, std::size_t samples) {
-    SampleBatch batch;
+  void receive(storage::BootEntry& boot, std::uint64_t first_seq, std::size_t samples) {
+    station::SampleBatch batch;
     batch.first_seq = first_seq;
     batch.first_robot_time_us = first_seq * 10'000;
     batch.context.period_us = 10'000;
@@ -26,17 +26,17 @@ class CommitQueueTest : public ::testing::Test {
     boot.recording.append(batch, 0);
     queue_.count_received(samples);
   }
-  static CommandRecord command(CommandId id, const std::string& kind) {
-    CommandRecord record;
+  static station::CommandRecord command(station::CommandId id, const std::string& kind) {
+    station::CommandRecord record;
     record.id = id;
     record.kind = kind;
     return record;
   }
 
-  BootEntry nemo_{10, "nemo"};
-  BootEntry dory_{20, "dory"};
-  BootsWithRecords with_records_;
-  CommitQueue queue_{1000, 3};
+  storage::BootEntry nemo_{10, "nemo"};
+  storage::BootEntry dory_{20, "dory"};
+  storage::BootsWithRecords with_records_;
+  storage::CommitQueue queue_{1000, 3};
 };
 
 TEST_F(CommitQueueTest, HasNoCommitOfNothing) {
@@ -66,7 +66,7 @@ TEST_F(CommitQueueTest, TheCommitSaysHowFarEachBootWillBeDurable) {
   queue_.enqueue_segments(dory_, true);
   queue_.enqueue_segments(nemo_, true);
   queue_.build_commit(with_records_);
-  const WriteBatch& commit = queue_.commit();
+  const storage::WriteBatch& commit = queue_.commit();
   ASSERT_EQ(commit.progress.size(), 2u);
   EXPECT_EQ(commit.progress[0].boot_key, 2);
   EXPECT_EQ(commit.progress[0].durable_next_seq, 5u);
@@ -84,7 +84,7 @@ TEST_F(CommitQueueTest, AFailedCommitStaysAndNothingPassesIt) {
   EXPECT_TRUE(queue_.has_commit());
   EXPECT_EQ(queue_.commit().segments.size(), 1u);
   EXPECT_EQ(queue_.samples(), 10u);
-  const WriteBatch written = queue_.finish_commit();
+  const storage::WriteBatch written = queue_.finish_commit();
   EXPECT_EQ(written.segments.size(), 1u);
   EXPECT_EQ(queue_.samples(), 5u);
   EXPECT_FALSE(queue_.has_commit());
@@ -95,13 +95,13 @@ TEST_F(CommitQueueTest, AFailedCommitStaysAndNothingPassesIt) {
 }
 
 TEST_F(CommitQueueTest, WhatIsBeyondACommitGoesIntoTheNext) {
-  constexpr std::size_t kTooMany = kMaxCommitSamples + 150;
+  constexpr std::size_t kTooMany = storage::kMaxCommitSamples + 150;
   receive(nemo_, 0, kTooMany);
   queue_.enqueue_segments(nemo_, true);
   EXPECT_TRUE(queue_.has_full_commit());
   queue_.build_commit(with_records_);
-  const WriteBatch first = queue_.finish_commit();
-  EXPECT_EQ(first.segments.size(), kMaxCommitSamples / 100);
+  const storage::WriteBatch first = queue_.finish_commit();
+  EXPECT_EQ(first.segments.size(), storage::kMaxCommitSamples / 100);
   EXPECT_FALSE(queue_.has_full_commit());
   EXPECT_EQ(queue_.samples(), 150u);
   queue_.build_commit(with_records_);
@@ -110,10 +110,10 @@ TEST_F(CommitQueueTest, WhatIsBeyondACommitGoesIntoTheNext) {
 }
 
 TEST_F(CommitQueueTest, AStartWaitsForTheSegmentsBeforeIt) {
-  receive(nemo_, 0, kMaxCommitSamples + 100);
+  receive(nemo_, 0, storage::kMaxCommitSamples + 100);
   queue_.enqueue_segments(nemo_, true);
   queue_.enqueue_start(dory_, {.robot_id = "dory", .boot_key = 2});
-  receive(nemo_, kMaxCommitSamples + 100, 5);
+  receive(nemo_, storage::kMaxCommitSamples + 100, 5);
   queue_.enqueue_segments(nemo_, true);
   EXPECT_EQ(queue_.end_of_starts(), queue_.end() - 1);
   queue_.build_commit(with_records_);
@@ -163,12 +163,12 @@ TEST_F(CommitQueueTest, IsBounded) {
   receive(nemo_, 0, 501);
   EXPECT_FALSE(queue_.is_half_empty_of_samples());
   EXPECT_FALSE(queue_.has_room_for_samples(500));
-  queue_.enqueue(AuditNote{});
+  queue_.enqueue(station::AuditNote{});
   EXPECT_TRUE(queue_.is_half_empty_of_records());
   queue_.enqueue(command(1, "mode"));
   EXPECT_FALSE(queue_.is_half_empty_of_records());
   EXPECT_TRUE(queue_.has_room_for_record());
-  queue_.enqueue(StoredEvent{});
+  queue_.enqueue(storage::StoredEvent{});
   EXPECT_FALSE(queue_.has_room_for_record());
   queue_.build_commit(with_records_);
   EXPECT_TRUE(queue_.has_room_for_record());  // whatever is in the commit

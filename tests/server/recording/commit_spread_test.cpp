@@ -10,7 +10,7 @@ class CommitSpreadTest : public RecordingTest {
  protected:
   // They are enrolled, and all connect in one instant.
   void connect_robots(std::size_t count) {
-    auto enrol = [count](Database& database) {
+    auto enrol = [count](storage::Database& database) {
       SQLite::Transaction transaction{database.handle()};
       SQLite::Statement add{database.handle(), "INSERT INTO robot (robot_id, enrolled_at_us) VALUES (?, 1)"};
       for (std::size_t n = 0; n < count; ++n) {
@@ -37,8 +37,8 @@ class CommitSpreadTest : public RecordingTest {
 
   // Numbers that the database stores in full.
   void make_noise(TestRobot& robot, std::size_t count) {
-    SampleBatch batch = robot.batch(robot.next_seq, count);
-    for (Sample& sample : batch.samples) {
+    station::SampleBatch batch = robot.batch(robot.next_seq, count);
+    for (station::Sample& sample : batch.samples) {
       sample.velocity_m_s = sample.acceleration_m_s2 = sample.duty = sample.position_m + 0.1F;
       sample.impedance_mv = sample.reference_m = sample.position_m + 0.2F;
     }
@@ -89,8 +89,8 @@ TEST_F(CommitSpreadTest, ABacklogDrainsInBoundedCommitsBesideAShortLog) {
   }
   EXPECT_EQ(recorder_->queued_samples(), 0u);
   EXPECT_EQ(written(), kSamples);
-  EXPECT_LE(recorder_->counters().largest_commit_samples, Recorder::kMaxCommitSamples);
-  EXPECT_GE(recorder_->counters().commits, kSamples / Recorder::kMaxCommitSamples);
+  EXPECT_LE(recorder_->counters().largest_commit_samples, storage::Recorder::kMaxCommitSamples);
+  EXPECT_GE(recorder_->counters().commits, kSamples / storage::Recorder::kMaxCommitSamples);
   EXPECT_GE(recorder_->wal().checkpoints, 1u);
   for (const TestRobot& robot : robots_) ASSERT_EQ(durable_next_seqs_[robot.boot_id], robot.next_seq);
 }
@@ -103,7 +103,7 @@ TEST_F(CommitSpreadTest, WhatIsDurableIsSentInTurnsOfTheLoop) {
   flush();
   std::size_t told = 0;
   std::vector<std::size_t> seen{0};  // how many were sent when the loop came to other work
-  recorder_->set_on_durable([&](const RobotId&, BootId, std::uint64_t, std::uint64_t) {
+  recorder_->set_on_durable([&](const station::RobotId&, station::BootId, std::uint64_t, std::uint64_t) {
     ++told;
     boost::asio::post(loop_, [&] { seen.push_back(told); });
   });

@@ -21,7 +21,7 @@ class DatabaseTest : public RecordingTest {
  protected:
   std::string refusal() {
     try {
-      const Database database{path_};
+      const storage::Database database{path_};
       return "(it was opened)";
     } catch (const std::runtime_error& error) {
       return error.what();
@@ -43,7 +43,7 @@ TEST_F(DatabaseTest, ItsFilesAreForTheStationsUserOnlyAlsoInAnOpenFolder) {
   const mode_t before = umask(022);
   fs::permissions(folder_, fs::perms{0755});
   {
-    const DataFolder data{folder_};
+    const config::DataFolder data{folder_};
     start();
     TestRobot robot;
     connect(robot);
@@ -59,13 +59,13 @@ TEST_F(DatabaseTest, ItsFilesAreForTheStationsUserOnlyAlsoInAnOpenFolder) {
 TEST_F(DatabaseTest, ANewFileHasOurMarksAndAStoreId) {
   std::uint64_t store_id = 0;
   {
-    const Database database{path_};
+    const storage::Database database{path_};
     store_id = database.store_id();
   }
   EXPECT_NE(store_id, 0u);
-  EXPECT_EQ(Database{path_}.store_id(), store_id);
-  EXPECT_EQ(number("PRAGMA application_id"), kApplicationId);
-  EXPECT_EQ(number("PRAGMA user_version"), static_cast<std::int64_t>(migrations().size()));
+  EXPECT_EQ(storage::Database{path_}.store_id(), store_id);
+  EXPECT_EQ(number("PRAGMA application_id"), storage::kApplicationId);
+  EXPECT_EQ(number("PRAGMA user_version"), static_cast<std::int64_t>(storage::migrations().size()));
   EXPECT_EQ(number("PRAGMA page_size"), 4096);
   EXPECT_EQ(number("PRAGMA auto_vacuum"), 2);
   EXPECT_EQ(rows("PRAGMA journal_mode"), std::vector<std::string>{"wal"});
@@ -95,7 +95,7 @@ TEST_F(DatabaseTest, RefusesAnUnmarkedDatabaseWithTables) {
 
 TEST_F(DatabaseTest, RefusesANewerSchema) {
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   make("PRAGMA user_version = 99");
   const std::string before = content();
@@ -105,7 +105,7 @@ TEST_F(DatabaseTest, RefusesANewerSchema) {
 
 TEST_F(DatabaseTest, RefusesADatabaseWithACorruptHeader) {
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   {
     std::fstream file{path_, std::ios::binary | std::ios::in | std::ios::out};
@@ -117,7 +117,7 @@ TEST_F(DatabaseTest, RefusesADatabaseWithACorruptHeader) {
 
 TEST_F(DatabaseTest, TakesAnEmptyFile) {
   std::ofstream{path_}.flush();
-  EXPECT_NE(Database{path_}.store_id(), 0u);
+  EXPECT_NE(storage::Database{path_}.store_id(), 0u);
 }
 
 TEST_F(DatabaseTest, AStationWithAForeignFileDoesNotStart) {
@@ -126,7 +126,7 @@ TEST_F(DatabaseTest, AStationWithAForeignFileDoesNotStart) {
 }
 
 TEST_F(DatabaseTest, TheSegmentChecksHold) {
-  Database database{path_};
+  storage::Database database{path_};
   database.handle().exec("PRAGMA foreign_keys = OFF");
   const auto insert = [&](int last_seq, int last_row) {
     database.handle().exec(fmt::format(
@@ -144,7 +144,7 @@ TEST_F(DatabaseTest, TheSegmentChecksHold) {
 
 TEST_F(DatabaseTest, RunSampleIsAnsweredByIndexAndRowNumber) {
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   std::vector<std::string> plan;
   for (const std::string& row : rows("EXPLAIN QUERY PLAN SELECT * FROM run_sample WHERE run_id = 1")) {

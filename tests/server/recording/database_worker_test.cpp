@@ -19,24 +19,24 @@ class DatabaseWorkerTest : public ::testing::Test {
   DatabaseWorkerTest() { std::filesystem::create_directories(folder_); }
   ~DatabaseWorkerTest() override { std::filesystem::remove_all(folder_); }
 
-  OpenedDatabase open() { return run_first(loop_, database_.open(clock_.utc_us())); }
-  std::string write(const WriteBatch& commit) { return run_first(loop_, database_.write(commit)); }
+  storage::OpenedDatabase open() { return runtime::run_first(loop_, database_.open(clock_.utc_us())); }
+  std::string write(const storage::WriteBatch& commit) { return runtime::run_first(loop_, database_.write(commit)); }
   void execute(const std::string& sql) {
-    auto job = [sql](Database& database) { return database.handle().exec(sql); };
-    run_first(loop_, database_.run(std::move(job)));
+    auto job = [sql](storage::Database& database) { return database.handle().exec(sql); };
+    runtime::run_first(loop_, database_.run(std::move(job)));
   }
   std::int64_t number(const std::string& sql) {
-    auto job = [sql](Database& database) { return database.handle().execAndGet(sql).getInt64(); };
-    return run_first(loop_, database_.run(std::move(job)));
+    auto job = [sql](storage::Database& database) { return database.handle().execAndGet(sql).getInt64(); };
+    return runtime::run_first(loop_, database_.run(std::move(job)));
   }
-  static AuditNote note(const std::string& action) {
-    AuditNote note;
+  static station::AuditNote note(const std::string& action) {
+    station::AuditNote note;
     note.by.actor = "station";
     note.action = action;
     return note;
   }
-  static WriteBatch commit_of(const std::string& action) {
-    WriteBatch commit;
+  static storage::WriteBatch commit_of(const std::string& action) {
+    storage::WriteBatch commit;
     commit.audit.push_back(note(action));
     return commit;
   }
@@ -48,16 +48,16 @@ class DatabaseWorkerTest : public ::testing::Test {
       std::filesystem::path{::testing::TempDir()} / ("database_worker_" + std::to_string(::getpid()));
   const std::filesystem::path path_ = folder_ / "station.sqlite";
   boost::asio::io_context loop_{1};
-  SystemClock clock_{loop_};
-  WorkerThread disk_{"disk"};
-  WorkerThread checkpoints_{"checkpoints"};
-  Checkpointer checkpointer_{loop_, clock_, checkpoints_, path_, 64 << 20, 10s};
-  DatabaseWorker database_{disk_, checkpointer_, path_};
+  runtime::SystemClock clock_{loop_};
+  runtime::WorkerThread disk_{"disk"};
+  runtime::WorkerThread checkpoints_{"checkpoints"};
+  storage::Checkpointer checkpointer_{loop_, clock_, checkpoints_, path_, 64 << 20, 10s};
+  storage::DatabaseWorker database_{disk_, checkpointer_, path_};
 };
 
 TEST_F(DatabaseWorkerTest, ANewDatabaseHasItsIdAndNoBoots) {
   EXPECT_FALSE(database_.is_open());
-  const OpenedDatabase opened = open();
+  const storage::OpenedDatabase opened = open();
   EXPECT_TRUE(database_.is_open());
   EXPECT_NE(opened.restored.store_id, 0U);
   EXPECT_TRUE(opened.restored.robots.empty());
@@ -77,14 +77,14 @@ TEST_F(DatabaseWorkerTest, ACommitIsWrittenAndTheLengthOfTheLogReported) {
   EXPECT_EQ(write(commit_of("a")), "");
   EXPECT_EQ(entries("a"), 1);
   EXPECT_GT(checkpointer_.state().bytes, 0U);
-  run_first(loop_, checkpointer_.next_commit());  // returns, since something was committed
+  runtime::run_first(loop_, checkpointer_.next_commit());  // returns, since something was committed
 }
 
 TEST_F(DatabaseWorkerTest, OfACommitThatFailsNothingIsStoredAndItCanBeWrittenAgain) {
   open();
-  WriteBatch commit = commit_of("a");
+  storage::WriteBatch commit = commit_of("a");
   execute("CREATE TEMP TRIGGER refuse BEFORE INSERT ON event BEGIN SELECT RAISE(ABORT, 'no room'); END");
-  RobotEvent event;
+  station::RobotEvent event;
   event.robot_id = "nemo";
   event.kind = "connected";
   commit.events.push_back({0, event});
@@ -109,7 +109,7 @@ TEST_F(DatabaseWorkerTest, ClosingWritesTheLastEntryOfTheAuditAndEmptiesTheLog) 
   SQLite::Database reader{path_.string(), SQLite::OPEN_READONLY};
   EXPECT_EQ(reader.execAndGet("SELECT count(*) FROM audit").getInt(), 1);
   bool had_database = false;
-  database_.close([&](Database& database, std::int64_t) { had_database = database.store_id() != 0; }, clock_,
+  database_.close([&](storage::Database& database, std::int64_t) { had_database = database.store_id() != 0; }, clock_,
                   note("station.stopped"));
   EXPECT_TRUE(had_database);
   EXPECT_FALSE(database_.is_open());
@@ -120,7 +120,7 @@ TEST_F(DatabaseWorkerTest, ClosingWritesTheLastEntryOfTheAuditAndEmptiesTheLog) 
 
 TEST_F(DatabaseWorkerTest, ClosingGoesOnWhenTheLastJobFails) {
   open();
-  database_.close([](Database&, std::int64_t) { throw std::runtime_error{"no disk"}; }, clock_,
+  database_.close([](storage::Database&, std::int64_t) { throw std::runtime_error{"no disk"}; }, clock_,
                   note("station.stopped"));
   EXPECT_FALSE(database_.is_open());
 }

@@ -45,7 +45,7 @@ class DiskFullTest : public RecordingTest {
  protected:
   void SetUp() override {
     if (std::getenv(kInside) == nullptr) GTEST_SKIP() << "unshare -rm is not possible here: no small disk";
-    RecordingConfig config;
+    config::RecordingConfig config;
     config.low_space_mb = 8;
     config.critical_space_mb = 2;
     config.backup_dir = other_disk();
@@ -56,15 +56,15 @@ class DiskFullTest : public RecordingTest {
     make(robot_, count, 25);
     flush();
   }
-  BackupRecord ended_backup(const std::string& name) {
+  storage::BackupRecord ended_backup(const std::string& name) {
     EXPECT_TRUE(clock_.run_until([&] { return !recording_->backups.busy(); }, 60s));
-    for (const BackupRecord& record : wait(recording_->backups.list())) {
+    for (const storage::BackupRecord& record : wait(recording_->backups.list())) {
       if (record.name == name) return record;
     }
     return {};
   }
   void expect_whole() {
-    SQLite::Database database = open_for_reading(path_);
+    SQLite::Database database = storage::open_for_reading(path_);
     EXPECT_THAT(coverage_faults(database), IsEmpty());
     EXPECT_EQ(rows("PRAGMA integrity_check"), std::vector<std::string>{"ok"});
   }
@@ -80,12 +80,12 @@ TEST_F(DiskFullTest, RecordingWaitsCommandsLiveAndAllIsStoredWhenThereIsRoomAgai
     clock_.run_for(10s);
     EXPECT_TRUE(recorder_->failing());
     EXPECT_THAT(recorder_->problem(), HasSubstr("Make room on the disk"));
-    EXPECT_EQ(recording_->disk_watch.state(), SpaceState::critical);
+    EXPECT_EQ(recording_->disk_watch.state(), storage::SpaceState::critical);
     EXPECT_FALSE(recording_->disk_watch.may_begin("a run"));
     EXPECT_FALSE(wait(recording_->backups.begin("no")));
     EXPECT_EQ(durable_next_seq_, 5000U) << "what is not on disk is not acknowledged";
 
-    CommandRecord stop;
+    station::CommandRecord stop;
     stop.id = 77;
     stop.robot_id = robot_.id;
     stop.kind = "emergency_stop";
@@ -97,7 +97,7 @@ TEST_F(DiskFullTest, RecordingWaitsCommandsLiveAndAllIsStoredWhenThereIsRoomAgai
   clock_.run_for(10s);
   EXPECT_FALSE(recorder_->failing());
   EXPECT_EQ(recorder_->problem(), "");
-  EXPECT_EQ(recording_->disk_watch.state(), SpaceState::ok);
+  EXPECT_EQ(recording_->disk_watch.state(), storage::SpaceState::ok);
   EXPECT_EQ(durable_next_seq_, 25'000U);
   EXPECT_EQ(number("SELECT count(*) FROM command WHERE command_id = 77"), 1);
   EXPECT_EQ(recorder_->counters().samples_lost, 0U);
@@ -109,13 +109,13 @@ TEST_F(DiskFullTest, ARestartOnAFullDiskHasAllThatWasAcknowledged) {
   record(5000);
   const std::uint64_t acknowledged = durable_next_seq_;
   ASSERT_TRUE(wait(runs_->create(robot_.id, named("open"))));
-  CommandRecord unfinished;
+  station::CommandRecord unfinished;
   unfinished.id = 76;
   unfinished.robot_id = robot_.id;
   unfinished.kind = "set_mode";
   recorder_->on_command(unfinished);
   wait(recorder_->flush_records());
-  fs::remove(disk_reserve_of(path_));  // the least that a start may find
+  fs::remove(storage::disk_reserve_of(path_));  // the least that a start may find
   {
     const Filler filler{disk()};
     make(robot_, 5000, 25);
@@ -136,16 +136,16 @@ TEST_F(DiskFullTest, ARestartOnAFullDiskHasAllThatWasAcknowledged) {
 
 TEST_F(DiskFullTest, ARestartOnAFullDiskUsesTheRoomThatWasKeptForIt) {
   record(5000);
-  ASSERT_TRUE(fs::exists(disk_reserve_of(path_)));
+  ASSERT_TRUE(fs::exists(storage::disk_reserve_of(path_)));
   {
     const Filler filler{disk()};
     kill();
     start();
-    EXPECT_FALSE(fs::exists(disk_reserve_of(path_)));
+    EXPECT_FALSE(fs::exists(storage::disk_reserve_of(path_)));
     EXPECT_GE(admit(robot_).durable_next_seq, durable_next_seq_);
   }
   clock_.run_for(6s);
-  EXPECT_TRUE(fs::exists(disk_reserve_of(path_))) << "kept again for the next start";
+  EXPECT_TRUE(fs::exists(storage::disk_reserve_of(path_))) << "kept again for the next start";
   expect_whole();
 }
 
@@ -155,16 +155,16 @@ TEST_F(DiskFullTest, WhereTheBackupsDiskIsFullOnlyTheBackupFails) {
   {
     const Filler filler{other_disk()};
     record(5000);
-    const BackupRecord failed = ended_backup("one");
-    EXPECT_EQ(failed.state, BackupState::failed);
+    const storage::BackupRecord failed = ended_backup("one");
+    EXPECT_EQ(failed.state, storage::BackupState::failed);
     EXPECT_NE(failed.problem, "");
     EXPECT_FALSE(recorder_->failing());
     EXPECT_EQ(durable_next_seq_, 205'000U);
   }
   EXPECT_TRUE(fs::is_empty(other_disk())) << "nothing is left of it";
   ASSERT_TRUE(wait(recording_->backups.begin("one")));
-  const BackupRecord made = ended_backup("one");
-  EXPECT_EQ(made.state, BackupState::done) << made.problem;
+  const storage::BackupRecord made = ended_backup("one");
+  EXPECT_EQ(made.state, storage::BackupState::done) << made.problem;
   fs::remove(made.path);
   expect_whole();
 }
@@ -192,7 +192,7 @@ TEST_F(DiskFullTest, ADatabaseOfAnOlderSchemaStaysAsItIsWhereACopyOfItDoesNotFit
     const Filler filler{disk()};
     fs::remove(kept);
     try {
-      const Database database{path_};
+      const storage::Database database{path_};
       ADD_FAILURE() << "it was migrated without a copy";
     } catch (const std::runtime_error& error) {
       EXPECT_THAT(error.what(),
@@ -203,7 +203,7 @@ TEST_F(DiskFullTest, ADatabaseOfAnOlderSchemaStaysAsItIsWhereACopyOfItDoesNotFit
     EXPECT_EQ(number("PRAGMA user_version"), 6);
     EXPECT_EQ(rows("PRAGMA integrity_check"), std::vector<std::string>{"ok"});
   }
-  const Database database{path_};
+  const storage::Database database{path_};
   EXPECT_TRUE(fs::exists(folder_ / "station.sqlite.schema-6"));
 }
 

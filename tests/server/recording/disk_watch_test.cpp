@@ -12,21 +12,23 @@ using ::testing::HasSubstr;
 constexpr std::uint64_t kMegabyte = 1'000'000;
 
 TEST(SpaceState, IsLeftWithATenthMoreThanItsLimit) {
-  const SpaceLimits limits{1000, 500};
-  const auto after = [&](SpaceState now, std::uint64_t free) { return next_state(now, free, limits); };
-  EXPECT_EQ(after(SpaceState::ok, 1000), SpaceState::ok);
-  EXPECT_EQ(after(SpaceState::ok, 999), SpaceState::low);
-  EXPECT_EQ(after(SpaceState::ok, 499), SpaceState::critical);
-  EXPECT_EQ(after(SpaceState::low, 1099), SpaceState::low);
-  EXPECT_EQ(after(SpaceState::low, 1100), SpaceState::ok);
-  EXPECT_EQ(after(SpaceState::low, 500), SpaceState::low);
-  EXPECT_EQ(after(SpaceState::critical, 549), SpaceState::critical);
-  EXPECT_EQ(after(SpaceState::critical, 550), SpaceState::low);
-  EXPECT_EQ(after(SpaceState::critical, 1099), SpaceState::low);
-  EXPECT_EQ(after(SpaceState::critical, 1100), SpaceState::ok);
+  const storage::SpaceLimits limits{1000, 500};
+  const auto after = [&](storage::SpaceState now, std::uint64_t free) { return next_state(now, free, limits); };
+  EXPECT_EQ(after(storage::SpaceState::ok, 1000), storage::SpaceState::ok);
+  EXPECT_EQ(after(storage::SpaceState::ok, 999), storage::SpaceState::low);
+  EXPECT_EQ(after(storage::SpaceState::ok, 499), storage::SpaceState::critical);
+  EXPECT_EQ(after(storage::SpaceState::low, 1099), storage::SpaceState::low);
+  EXPECT_EQ(after(storage::SpaceState::low, 1100), storage::SpaceState::ok);
+  EXPECT_EQ(after(storage::SpaceState::low, 500), storage::SpaceState::low);
+  EXPECT_EQ(after(storage::SpaceState::critical, 549), storage::SpaceState::critical);
+  EXPECT_EQ(after(storage::SpaceState::critical, 550), storage::SpaceState::low);
+  EXPECT_EQ(after(storage::SpaceState::critical, 1099), storage::SpaceState::low);
+  EXPECT_EQ(after(storage::SpaceState::critical, 1100), storage::SpaceState::ok);
 }
 
-TEST(SpaceState, WithoutLimitsThereIsAlwaysRoom) { EXPECT_EQ(next_state(SpaceState::ok, 0, {}), SpaceState::ok); }
+TEST(SpaceState, WithoutLimitsThereIsAlwaysRoom) {
+  EXPECT_EQ(next_state(storage::SpaceState::ok, 0, {}), storage::SpaceState::ok);
+}
 
 class DiskWatchTest : public RecordingTest {
  protected:
@@ -40,7 +42,7 @@ class DiskWatchTest : public RecordingTest {
     recording_->disk_watch.set_free_bytes([megabytes](const std::filesystem::path&) { return megabytes * kMegabyte; });
     clock_.run_for(6s);
   }
-  DiskWatch& watch() { return recording_->disk_watch; }
+  storage::DiskWatch& watch() { return recording_->disk_watch; }
 };
 
 TEST_F(DiskWatchTest, SaysHowMuchRoomIsLeftAndWhatToDo) {
@@ -48,7 +50,7 @@ TEST_F(DiskWatchTest, SaysHowMuchRoomIsLeftAndWhatToDo) {
   set_free(3000);
   EXPECT_EQ(watch().problem(), "");
   set_free(1999);
-  EXPECT_EQ(watch().state(), SpaceState::low);
+  EXPECT_EQ(watch().state(), storage::SpaceState::low);
   EXPECT_THAT(watch().problem(), HasSubstr("1999 MB are free"));
   EXPECT_THAT(watch().problem(), HasSubstr("the low_space_mb limit is 2000 MB: make room"));
   EXPECT_TRUE(watch().may_begin("a run"));
@@ -73,7 +75,7 @@ TEST_F(DiskWatchTest, WhenItIsCriticalNothingNewBeginsAndRecordingGoesOnUntilItR
   EXPECT_EQ(durable_next_seq_, 300U) << "recording goes on";
 
   set_free(5000);
-  EXPECT_EQ(watch().state(), SpaceState::ok);
+  EXPECT_EQ(watch().state(), storage::SpaceState::ok);
   EXPECT_TRUE(watch().may_begin("a run"));
 }
 
@@ -84,7 +86,7 @@ TEST_F(DiskWatchTest, ADiskThatDoesNotAnswerIsAsItWas) {
     throw std::filesystem::filesystem_error{"statvfs", std::make_error_code(std::errc::io_error)};
   });
   clock_.run_for(6s);
-  EXPECT_EQ(watch().state(), SpaceState::critical);
+  EXPECT_EQ(watch().state(), storage::SpaceState::critical);
   EXPECT_EQ(watch().use().free_bytes, 100 * kMegabyte);
 }
 

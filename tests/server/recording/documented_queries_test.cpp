@@ -32,7 +32,7 @@ std::vector<std::string> documented_queries() {
 TEST(DatabaseDocument, NamesTheSchemasVersion) {
   std::ifstream document{DATABASE_DOCUMENT};
   const std::string text{std::istreambuf_iterator<char>{document}, {}};
-  const std::string version = "the schema's version, " + std::to_string(migrations().size()) + " at present";
+  const std::string version = "the schema's version, " + std::to_string(storage::migrations().size()) + " at present";
   EXPECT_NE(text.find(version), std::string::npos) << version;
 }
 
@@ -70,15 +70,15 @@ class DocumentedQueries : public RecordingTest {
     robot.next_seq += 20;
     robot.oldest_seq = robot.next_seq;
     make(robot, 120);
-    RobotEvent event;
+    station::RobotEvent event;
     event.robot_id = robot.id;
     event.kind = "connected";
-    recorder_->on_event(state_of(robot, LinkState::connected), event);
-    CommandRecord command;
+    recorder_->on_event(state_of(robot, station::LinkState::connected), event);
+    station::CommandRecord command;
     command.id = ~0ULL;
     command.robot_id = robot.id;
     recorder_->on_command(command);
-    AuditNote refused;
+    station::AuditNote refused;
     refused.action = "command.refused";
     refused.detail = R"({"problem":"duty = 7 is outside -1 to 1"})";
     recorder_->on_audit(refused);

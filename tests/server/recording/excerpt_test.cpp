@@ -11,23 +11,23 @@ constexpr std::int64_t kUtcOffsetUs = 1'700'000'000'000'000;  // of every TestRo
 
 class ExcerptTest : public RandomRecordingTest {
  protected:
-  Excerpt window(std::int64_t from_us, std::int64_t to_us) const {
-    return {.run = {}, .robot_id = robot_.id, .window = TimeWindow{from_us, to_us}};
+  storage::Excerpt window(std::int64_t from_us, std::int64_t to_us) const {
+    return {.run = {}, .robot_id = robot_.id, .window = storage::TimeWindow{from_us, to_us}};
   }
   std::int64_t utc_of(std::uint64_t seq) const { return kUtcOffsetUs + static_cast<std::int64_t>(robot_.time_of(seq)); }
 
-  std::vector<std::uint64_t> seqs(const Excerpt& excerpt, std::size_t limit) {
+  std::vector<std::uint64_t> seqs(const storage::Excerpt& excerpt, std::size_t limit) {
     std::vector<std::uint64_t> seen;
-    std::optional<SampleCursor> after;
+    std::optional<storage::SampleCursor> after;
     do {
-      const SegmentPage page = wait(history_->segments(excerpt, after, limit)).value();
-      for (const StoredSample& stored : samples_of(page).samples) seen.push_back(stored.seq);
+      const storage::SegmentPage page = wait(history_->segments(excerpt, after, limit)).value();
+      for (const storage::StoredSample& stored : samples_of(page).samples) seen.push_back(stored.seq);
       after = page.next;
     } while (after);
     return seen;
   }
   using RandomRecordingTest::samples_of;
-  static SamplePage samples_of(const SegmentPage& page) { return server::samples_of(page); }
+  static storage::SamplePage samples_of(const storage::SegmentPage& page) { return server::storage::samples_of(page); }
 };
 
 TEST_F(ExcerptTest, PagesOfAWindowHoldItsSamplesWhetherStoredOrNot) {
@@ -53,7 +53,7 @@ TEST_F(ExcerptTest, PagesOfAWindowHoldItsSamplesWhetherStoredOrNot) {
 TEST_F(ExcerptTest, ManyBootsAreCutAFewAtATime) {
   start();
   connect(robot_);
-  std::vector<BootId> boots;
+  std::vector<station::BootId> boots;
   std::int64_t middle_us = 0;
   for (int boot = 0; boot < 210; ++boot) {
     make(robot_, 10);
@@ -67,15 +67,15 @@ TEST_F(ExcerptTest, ManyBootsAreCutAFewAtATime) {
   }
   flush();
   const auto boots_in = [&](std::int64_t from_us) {
-    std::vector<BootId> found;
+    std::vector<station::BootId> found;
     const auto spans = wait(history_->spans(window(from_us, utc_of(0)))).value();
-    for (const RecordedSpan& span : spans) found.push_back(span.boot_id);
+    for (const storage::RecordedSpan& span : spans) found.push_back(span.boot_id);
     return found;
   };
   const std::uint64_t before = history_->reader().questions();
   EXPECT_EQ(boots_in(kUtcOffsetUs), boots);
   EXPECT_EQ(history_->reader().questions() - before, 4U) << "one for the list";
-  EXPECT_EQ(boots_in(middle_us), std::vector<BootId>(boots.begin() + 150, boots.end()));
+  EXPECT_EQ(boots_in(middle_us), std::vector<station::BootId>(boots.begin() + 150, boots.end()));
 }
 
 TEST_F(ExcerptTest, AWindowOverSeveralBootsHoldsThemInOrder) {
@@ -87,7 +87,7 @@ TEST_F(ExcerptTest, AWindowOverSeveralBootsHoldsThemInOrder) {
   robot_.late_us = 5'000'000;  // its time begins later, so that boots follow one another
   connect(robot_);
   make(robot_, 30);
-  const std::vector<StoredSample> found =
+  const std::vector<storage::StoredSample> found =
       samples_of(wait(history_->segments(window(kUtcOffsetUs + 700'000, utc_of(10)), {}, 1000)).value()).samples;
   ASSERT_EQ(found.size(), 20u);
   EXPECT_EQ(found.front().span, 0u);
@@ -103,7 +103,7 @@ TEST_F(ExcerptTest, GapsAreCutToTheWindow) {
   make(robot_, 100);
   robot_.oldest_seq = robot_.next_seq = 200;
   make(robot_, 100);
-  const AbsencePage cut = wait(history_->gaps(window(utc_of(150), utc_of(250)))).value();
+  const storage::AbsencePage cut = wait(history_->gaps(window(utc_of(150), utc_of(250)))).value();
   ASSERT_EQ(cut.gaps.size(), 1u);
   EXPECT_EQ(cut.gaps[0].first_seq, 150u);
   EXPECT_EQ(cut.gaps[0].last_seq, 199u);
@@ -114,46 +114,46 @@ TEST_F(ExcerptTest, GapsAreCutToTheWindow) {
 TEST_F(ExcerptTest, WhatIsNeitherStoredNorLostIsMissing) {
   start();
   connect(robot_);
-  const RunId run = wait(runs_->create(robot_.id, named("run")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("run")))->id;
   send(robot_, 0, 20);
   send(robot_, 50, 20);
   flush();
   send(robot_, 90, 10);
-  const auto missing = [&](const Excerpt& excerpt) {
+  const auto missing = [&](const storage::Excerpt& excerpt) {
     std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges;
-    for (const MissingRange& range : wait(history_->gaps(excerpt))->missing) {
+    for (const storage::MissingRange& range : wait(history_->gaps(excerpt))->missing) {
       EXPECT_EQ(range.boot_id, robot_.boot_id);
       ranges.emplace_back(range.first_seq, range.last_seq);
     }
     return ranges;
   };
   using Ranges = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
-  EXPECT_EQ(missing(excerpt_of(run)), (Ranges{{20, 49}, {70, 89}}));
+  EXPECT_EQ(missing(storage::excerpt_of(run)), (Ranges{{20, 49}, {70, 89}}));
   EXPECT_EQ(missing(window(utc_of(30), utc_of(95))), (Ranges{{30, 49}, {70, 89}}));
   send(robot_, 20, 30);
-  EXPECT_EQ(missing(excerpt_of(run)), (Ranges{{70, 89}}));
+  EXPECT_EQ(missing(storage::excerpt_of(run)), (Ranges{{70, 89}}));
   robot_.oldest_seq = 80;
   send(robot_, 100, 5);  // says that 70 to 79 are lost
-  EXPECT_EQ(missing(excerpt_of(run)), (Ranges{{80, 89}}));
+  EXPECT_EQ(missing(storage::excerpt_of(run)), (Ranges{{80, 89}}));
 }
 
 // Pages of any size contain together what one page contains, each all of its part: no more than `limit` of either kind.
 TEST_F(ExcerptTest, GapsComeInPages) {
-  const RunId run = record(14);
+  const storage::RunId run = record(14);
   std::size_t missing = 0;
   for (const bool stored : {false, true}) {
     SCOPED_TRACE(stored);
     if (stored) flush();
-    for (const Excerpt& excerpt : {excerpt_of(run), window(utc_of(0), utc_of(1'000'000))}) {
-      const AbsencePage whole = wait(history_->gaps(excerpt)).value();
+    for (const storage::Excerpt& excerpt : {storage::excerpt_of(run), window(utc_of(0), utc_of(1'000'000))}) {
+      const storage::AbsencePage whole = wait(history_->gaps(excerpt)).value();
       ASSERT_GT(whole.gaps.size(), 3u);
       missing += whole.missing.size();
       for (const std::size_t limit : {std::size_t{1}, std::size_t{2}, whole.gaps.size() - 1, whole.gaps.size()}) {
         SCOPED_TRACE(limit);
-        AbsencePage together;
+        storage::AbsencePage together;
         std::size_t pages = 0;
         do {
-          const AbsencePage page = wait(history_->gaps(excerpt, together.next, limit)).value();
+          const storage::AbsencePage page = wait(history_->gaps(excerpt, together.next, limit)).value();
           ASSERT_LE(page.gaps.size(), limit);
           ASSERT_LE(page.missing.size(), limit);
           std::ranges::copy(page.gaps, std::back_inserter(together.gaps));
@@ -169,23 +169,24 @@ TEST_F(ExcerptTest, GapsComeInPages) {
     }
   }
   EXPECT_GT(missing, 1u);
-  EXPECT_EQ(wait(history_->gaps(excerpt_of(run), {}, 0)).error().code, ErrorCode::invalid);
-  EXPECT_EQ(wait(history_->gaps(excerpt_of(run), {}, kMaxPageGaps + 1)).error().code, ErrorCode::invalid);
+  EXPECT_EQ(wait(history_->gaps(storage::excerpt_of(run), {}, 0)).error().code, ErrorCode::invalid);
+  EXPECT_EQ(wait(history_->gaps(storage::excerpt_of(run), {}, storage::kMaxPageGaps + 1)).error().code,
+            ErrorCode::invalid);
 }
 
 // Each number up to the newest is in a sample, in a gap or missing, and only in one of them.
 TEST_F(ExcerptTest, SamplesGapsAndWhatIsMissingMakeTheWhole) {
   std::size_t missing = 0;
   for (const unsigned seed : {11U, 12U, 13U, 14U}) {
-    const RunId run = record(seed);
-    const AbsencePage absences = wait(history_->gaps(excerpt_of(run))).value();
+    const storage::RunId run = record(seed);
+    const storage::AbsencePage absences = wait(history_->gaps(storage::excerpt_of(run))).value();
     EXPECT_FALSE(absences.next.has_value());
-    std::map<BootId, std::map<std::uint64_t, int>> times;
-    for (const StoredSample& stored : samples_of(run)) ++times[stored.boot_id][stored.seq];
-    for (const Gap& gap : absences.gaps) {
+    std::map<station::BootId, std::map<std::uint64_t, int>> times;
+    for (const storage::StoredSample& stored : samples_of(run)) ++times[stored.boot_id][stored.seq];
+    for (const storage::Gap& gap : absences.gaps) {
       for (std::uint64_t seq = gap.first_seq; seq <= gap.last_seq; ++seq) ++times[gap.boot_id][seq];
     }
-    for (const MissingRange& range : absences.missing) {
+    for (const storage::MissingRange& range : absences.missing) {
       for (std::uint64_t seq = range.first_seq; seq <= range.last_seq; ++seq) ++times[range.boot_id][seq];
     }
     EXPECT_GT(absences.gaps.size(), 0u);
@@ -205,16 +206,16 @@ TEST_F(ExcerptTest, SamplesGapsAndWhatIsMissingMakeTheWhole) {
 }
 
 TEST_F(ExcerptTest, WhatIsMissingIsTheSameInSlicesOfAnySize) {
-  const RunId run = record(14);
-  const auto spans = wait(history_->spans(excerpt_of(run))).value();
-  SQLite::Database database = open_for_reading(path_);
+  const storage::RunId run = record(14);
+  const auto spans = wait(history_->spans(storage::excerpt_of(run))).value();
+  SQLite::Database database = storage::open_for_reading(path_);
   std::vector<std::vector<std::uint64_t>> found;
   for (const std::size_t segments : {1u, 3u, 10'000u}) {
     std::vector<std::uint64_t>& numbers = found.emplace_back();
-    for (const RecordedSpan& span : spans) {
-      Interval left = span.made();
+    for (const storage::RecordedSpan& span : spans) {
+      storage::Interval left = span.made();
       while (left.first < left.next) {
-        for (const MissingRange& range : read_missing(database, span, left, segments)) {
+        for (const storage::MissingRange& range : read_missing(database, span, left, segments)) {
           numbers.insert(numbers.end(), {range.boot_id, range.first_seq, range.last_seq});
         }
       }
@@ -227,9 +228,9 @@ TEST_F(ExcerptTest, WhatIsMissingIsTheSameInSlicesOfAnySize) {
 
 // The station's clock was set back: what lies between the two ends that bear the time is one piece.
 TEST_F(ExcerptTest, AClockThatWasSetBackLosesNothingOfTheWholeTime) {
-  const RunId run = record(13);
+  const storage::RunId run = record(13);
   std::int64_t first_us = std::numeric_limits<std::int64_t>::max();
-  for (const StoredSample& stored : samples_of(run)) first_us = std::min(first_us, stored.utc_us);
+  for (const storage::StoredSample& stored : samples_of(run)) first_us = std::min(first_us, stored.utc_us);
   const auto whole = wait(history_->segments({.run = {}, .robot_id = robot_.id, .window = {}}, {}, 10'000)).value();
   const auto window_of_all = wait(history_->segments(window(0, std::int64_t{1} << 52), {}, 10'000)).value();
   EXPECT_EQ(samples_of(window_of_all).samples.size(), samples_of(whole).samples.size());
@@ -245,7 +246,7 @@ TEST_F(ExcerptTest, ATimeThatOccursOnceIsFoundAlthoughTheClockWasSetBack) {
     clock_.step_utc(step);
     make_slowly(robot_, 500);
     flush();
-    const Excerpt all{.run = {}, .robot_id = robot_.id, .window = {}};
+    const storage::Excerpt all{.run = {}, .robot_id = robot_.id, .window = {}};
     const auto recorded = samples_of(wait(history_->segments(all, {}, 10'000)).value()).samples;
     ASSERT_EQ(recorded.size(), 1000u);
     for (const std::size_t index : {3u, 250u, 490u, 510u, 750u, 990u}) {
@@ -264,14 +265,14 @@ TEST_F(ExcerptTest, ATimeThatOccursOnceIsFoundAlthoughTheClockWasSetBack) {
 
 // There is one search from time to samples, also where the clock was set: a window and a run made afterwards agree.
 TEST_F(ExcerptTest, ARunMadeOfATimeHoldsWhatAWindowOfThatTimeShows) {
-  const auto numbers = [](const std::vector<StoredSample>& samples) {
-    std::vector<std::pair<BootId, std::uint64_t>> found;
-    for (const StoredSample& stored : samples) found.emplace_back(stored.boot_id, stored.seq);
+  const auto numbers = [](const std::vector<storage::StoredSample>& samples) {
+    std::vector<std::pair<station::BootId, std::uint64_t>> found;
+    for (const storage::StoredSample& stored : samples) found.emplace_back(stored.boot_id, stored.seq);
     return found;
   };
-  const RunId all = record(13);
+  const storage::RunId all = record(13);
   flush();
-  const std::vector<StoredSample> recorded = samples_of(all);
+  const std::vector<storage::StoredSample> recorded = samples_of(all);
   std::size_t found = 0;
   for (int i = 0; i < 40; ++i) {
     const std::int64_t from_us =
@@ -279,7 +280,8 @@ TEST_F(ExcerptTest, ARunMadeOfATimeHoldsWhatAWindowOfThatTimeShows) {
     const std::int64_t to_us = from_us + static_cast<std::int64_t>(random_() % 5'000'000);
     const auto seen =
         numbers(samples_of(wait(history_->segments(window(from_us, to_us + 1), {}, 10'000)).value()).samples);
-    const Result<Run> run = wait(runs_->make_afterwards(robot_.id, named("afterwards"), TimeSpan{from_us, to_us}, {}));
+    const Result<Run> run =
+        wait(runs_->make_afterwards(robot_.id, named("afterwards"), storage::TimeSpan{from_us, to_us}, {}));
     EXPECT_EQ(run ? numbers(samples_of(run->id)) : decltype(seen){}, seen) << from_us << " to " << to_us;
     found += seen.size();
   }

@@ -42,26 +42,26 @@ inline std::string joined(const std::vector<std::string>& fields) { return fmt::
 
 class ExportTest : public RandomRecordingTest {
  protected:
-  std::vector<RecordedSpan> spans_of(RunId run) {
-    auto spans = wait(recording_->exports.spans(excerpt_of(run))).value();
-    for (RecordedSpan& span : spans) span.cut(span.made());
+  std::vector<storage::RecordedSpan> spans_of(storage::RunId run) {
+    auto spans = wait(recording_->exports.spans(storage::excerpt_of(run))).value();
+    for (storage::RecordedSpan& span : spans) span.cut(span.made());
     return spans;
   }
 
-  std::string csv(const ExportQuery& query) {
-    SQLite::Database database = open_for_reading(path_);
-    CsvWriter writer{spans_of(query.run), query};
+  std::string csv(const storage::ExportQuery& query) {
+    SQLite::Database database = storage::open_for_reading(path_);
+    storage::CsvWriter writer{spans_of(query.run), query};
     std::string text;
     while (const auto piece = writer.next(database)) text += *piece;
     return text;
   }
 
   // By the history of the readers, with what waits.
-  Lines api_lines(RunId run) {
+  Lines api_lines(storage::RunId run) {
     Lines lines;
-    std::optional<StoredSample> last;
+    std::optional<storage::StoredSample> last;
     const auto spans = spans_of(run);
-    for (const StoredSample& stored : samples_of(run)) {
+    for (const storage::StoredSample& stored : samples_of(run)) {
       const bool follows = last && last->span == stored.span;
       const std::uint64_t expected = follows ? last->seq + 1 : spans.at(stored.span).samples.first;
       if (last && !follows) lines.back() += after_text(spans.at(last->span), *last);
@@ -72,29 +72,29 @@ class ExportTest : public RandomRecordingTest {
     if (last) lines.back() += after_text(spans.at(last->span), *last);
     return lines;
   }
-  static std::string after_text(const RecordedSpan& span, const StoredSample& last) {
+  static std::string after_text(const storage::RecordedSpan& span, const storage::StoredSample& last) {
     return fmt::format(" {}", span.made().next - last.seq - 1);
   }
 
   // Without gap_after.
-  static std::string line_of(const StoredSample& stored, std::uint64_t gap_before) {
+  static std::string line_of(const storage::StoredSample& stored, std::uint64_t gap_before) {
     std::vector<std::string> fields{
         fmt::format("{} {} {} {} {}", stored.span, stored.boot_id, stored.seq, stored.robot_time_us, stored.utc_us)};
-    for (const auto member : kSampleMembers) fields.push_back(bits(stored.sample.*member));
+    for (const auto member : storage::kSampleMembers) fields.push_back(bits(stored.sample.*member));
     fields.push_back(fmt::format("{} {}", protocol::text(stored.mode), protocol::text(stored.sub_state)));
     fields.push_back(bits(stored.setpoint_m.value_or(NAN)));
-    fields.push_back(bits(or_nan(stored.disturbance_m)));
+    fields.push_back(bits(station::or_nan(stored.disturbance_m)));
     fields.push_back(
         fmt::format("{} {} {}", stored.clock_uncertainty_us, stored.first_received_at_us, stored.received_at_us));
-    fields.push_back(bits(or_nan(stored.position_sd_m)));
+    fields.push_back(bits(station::or_nan(stored.position_sd_m)));
     fields.push_back(fmt::format("{} {} {} {} {} {}", stored.controller_id, stored.emergency_id,
                                  protocol::text(stored.emergency_cause), stored.flags,
                                  unknown_values(stored).value_or("none"), gap_before));
     return joined(fields);
   }
 
-  Lines csv_lines(RunId run) {
-    std::istringstream in{csv({.run = run, .channels = all_channels(), .grid_us = {}})};
+  Lines csv_lines(storage::RunId run) {
+    std::istringstream in{csv({.run = run, .channels = storage::all_channels(), .grid_us = {}})};
     std::string line;
     std::getline(in, line);
     EXPECT_EQ(line,
@@ -183,16 +183,16 @@ class ExportTest : public RandomRecordingTest {
     return variables;
   }
 
-  std::filesystem::path mat(const ExportQuery& query) {
+  std::filesystem::path mat(const storage::ExportQuery& query) {
     const auto file = folder_ / "run.mat";
-    SQLite::Database database = open_for_reading(path_);
-    MatWriter writer{file, spans_of(query.run), query};
+    SQLite::Database database = storage::open_for_reading(path_);
+    storage::MatWriter writer{file, spans_of(query.run), query};
     while (writer.advance(database).value()) continue;
     return file;
   }
 
-  Lines mat_lines(RunId run) {
-    const auto variables = variables_of(mat({.run = run, .channels = all_channels(), .grid_us = {}}));
+  Lines mat_lines(storage::RunId run) {
+    const auto variables = variables_of(mat({.run = run, .channels = storage::all_channels(), .grid_us = {}}));
     const auto spans = spans_of(run);
     const auto number = [&](const char* name, std::size_t row) {
       return static_cast<std::int64_t>(variables.at(name).numbers.at(row));
@@ -205,8 +205,8 @@ class ExportTest : public RandomRecordingTest {
                                          static_cast<std::uint64_t>(number("emergency_id_low", row));
       std::vector<std::string> fields{fmt::format("{} {} {} {} {}", span, spans.at(span).boot_id, number("seq", row),
                                                   number("robot_time_us", row), number("utc_us", row))};
-      for (std::size_t channel = 0; channel < kChannels; ++channel) {
-        fields.push_back(single(text(static_cast<Channel>(channel)), row));
+      for (std::size_t channel = 0; channel < storage::kChannels; ++channel) {
+        fields.push_back(single(text(static_cast<storage::Channel>(channel)), row));
       }
       fields.emplace_back(protocol::text(static_cast<protocol::Mode>(number("mode", row))));
       fields.emplace_back(protocol::text(static_cast<protocol::SubState>(number("sub_state", row))));
@@ -216,7 +216,7 @@ class ExportTest : public RandomRecordingTest {
                                    number("received_at_us", row)));
       fields.push_back(single("position_sd_m", row));
       const auto cause = static_cast<protocol::EmergencyCause>(number("emergency_cause", row));
-      const auto unknown = UnknownValues{}
+      const auto unknown = station::UnknownValues{}
                                .add("mode", static_cast<protocol::Mode>(number("mode", row)))
                                .add("sub_state", static_cast<protocol::SubState>(number("sub_state", row)))
                                .add("emergency_cause", cause)
@@ -229,12 +229,14 @@ class ExportTest : public RandomRecordingTest {
     return lines;
   }
 
-  std::filesystem::path run_file(RunId run) {
+  std::filesystem::path run_file(storage::RunId run) {
     const auto file = folder_ / "run.sqlite";
     std::filesystem::remove(file);
-    SQLite::Database database = open_for_reading(path_);
-    RunFile writer{
-        file, reading_uri(path_, false), spans_of(run), {.run = run, .channels = all_channels(), .grid_us = {}}};
+    SQLite::Database database = storage::open_for_reading(path_);
+    storage::RunFile writer{file,
+                            storage::reading_uri(path_, false),
+                            spans_of(run),
+                            {.run = run, .channels = storage::all_channels(), .grid_us = {}}};
     while (writer.advance(database)) continue;
     return file;
   }
@@ -249,10 +251,11 @@ class ExportTest : public RandomRecordingTest {
     return text + '}';
   }
 
-  Lines json_lines(RunId run) {
-    const SegmentPage page = wait(history_->segments(excerpt_of(run), {}, kMaxPageSamples)).value();
+  Lines json_lines(storage::RunId run) {
+    const storage::SegmentPage page =
+        wait(history_->segments(storage::excerpt_of(run), {}, storage::kMaxPageSamples)).value();
     Lines lines;
-    const auto json = nlohmann::json::parse(page_text(page));
+    const auto json = nlohmann::json::parse(api::page_text(page));
     const auto number = [](const nlohmann::json& value) { return value.is_null() ? NAN : value.get<float>(); };
     const auto word = [](const nlohmann::json& value) {
       return value.is_null() ? "0" : value.is_string() ? value.get<std::string>() : value.dump();
@@ -261,8 +264,8 @@ class ExportTest : public RandomRecordingTest {
       std::vector<std::string> fields;
       for (const char* name : {"span", "boot_id", "seq", "robot_time_us", "utc_us"})
         fields.push_back(word(sample[name]));
-      for (std::size_t channel = 0; channel < kChannels; ++channel) {
-        fields.push_back(bits(number(sample[text(static_cast<Channel>(channel))])));
+      for (std::size_t channel = 0; channel < storage::kChannels; ++channel) {
+        fields.push_back(bits(number(sample[text(static_cast<storage::Channel>(channel))])));
       }
       for (const char* name : {"mode", "sub_state"}) fields.push_back(word(sample[name]));
       for (const char* name : {"setpoint_m", "disturbance_m"}) fields.push_back(bits(number(sample[name])));

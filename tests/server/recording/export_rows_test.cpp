@@ -8,9 +8,9 @@
 namespace server {
 namespace {
 
-SpanSegment segment(std::uint32_t span, std::uint64_t first_seq, std::uint64_t first_robot_time_us, std::size_t samples,
-                    std::uint32_t period_us = 10'000) {
-  SpanSegment part;
+storage::SpanSegment segment(std::uint32_t span, std::uint64_t first_seq, std::uint64_t first_robot_time_us,
+                             std::size_t samples, std::uint32_t period_us = 10'000) {
+  storage::SpanSegment part;
   part.span = span;
   part.span_first_seq = 5;
   part.segment.first_seq = first_seq;
@@ -23,18 +23,20 @@ SpanSegment segment(std::uint32_t span, std::uint64_t first_seq, std::uint64_t f
   return part;
 }
 
-SegmentPage page(std::vector<SpanSegment> segments) { return {.segments = std::move(segments), .next = {}}; }
+storage::SegmentPage page(std::vector<storage::SpanSegment> segments) {
+  return {.segments = std::move(segments), .next = {}};
+}
 
 // A page does not tell whether the span of its last segment goes on.
 TEST(SegmentRows, CountTheSamplesThatAreMissingAtTheEndOfASpan) {
-  const auto ending = [](SpanSegment part) {
+  const auto ending = [](storage::SpanSegment part) {
     part.span_next_seq = 30;
     return part;
   };
-  const auto more = [](std::vector<SpanSegment> segments) {
-    return SegmentPage{.segments = std::move(segments), .next = SampleCursor{}};
+  const auto more = [](std::vector<storage::SpanSegment> segments) {
+    return storage::SegmentPage{.segments = std::move(segments), .next = storage::SampleCursor{}};
   };
-  SegmentRows rows;
+  storage::SegmentRows rows;
   rows.give(more({ending(segment(0, 5, 0, 5)), ending(segment(0, 10, 0, 5))}));
   EXPECT_EQ(rows.next()->gap_after, 0u);
   EXPECT_FALSE(rows.next().has_value()) << "it is not known yet";
@@ -42,7 +44,7 @@ TEST(SegmentRows, CountTheSamplesThatAreMissingAtTheEndOfASpan) {
   EXPECT_EQ(rows.next()->part->segment.first_seq, 10u);
   EXPECT_FALSE(rows.next().has_value());
   rows.give(page({ending(segment(1, 5, 0, 25))}));
-  ExportSegment last = *rows.next();
+  storage::ExportSegment last = *rows.next();
   EXPECT_EQ(last.gap_before, 5u);
   EXPECT_EQ(last.gap_after, 6u);
   last = *rows.next();
@@ -52,7 +54,7 @@ TEST(SegmentRows, CountTheSamplesThatAreMissingAtTheEndOfASpan) {
 }
 
 TEST(SegmentRows, CountTheSamplesThatAreMissingBeforeThem) {
-  SegmentRows rows;
+  storage::SegmentRows rows;
   rows.give(page({segment(0, 7, 0, 3), segment(0, 10, 0, 2)}));
   EXPECT_EQ(rows.next()->gap_before, 2u);  // the span begins with 5
   EXPECT_EQ(rows.next()->gap_before, 0u);
@@ -65,10 +67,10 @@ TEST(SegmentRows, CountTheSamplesThatAreMissingBeforeThem) {
 }
 
 // The position of each row of the grid, -1 in a gap.
-std::vector<float> positions(std::int64_t grid_us, const std::vector<SegmentPage>& pages) {
-  GridRows grid{grid_us};
+std::vector<float> positions(std::int64_t grid_us, const std::vector<storage::SegmentPage>& pages) {
+  storage::GridRows grid{grid_us};
   std::vector<float> found;
-  for (const SegmentPage& one : pages) {
+  for (const storage::SegmentPage& one : pages) {
     grid.give(one);
     while (const auto row = grid.next()) found.push_back(row->sample == nullptr ? -1 : row->sample->position_m);
   }
@@ -88,10 +90,10 @@ TEST(GridRows, AreEmptyInAGapAndBeginAnewInEachSpan) {
   const auto first = page({segment(0, 5, 1000, 2)});
   const auto second = page({segment(0, 9, 43'000, 2), segment(1, 5, 7, 2)});
   EXPECT_EQ(positions(10'000, {first, second}), (std::vector<float>{5, 6, -1, -1, 9, 10, 5, 6}));
-  GridRows grid{10'000};
+  storage::GridRows grid{10'000};
   grid.give(second);
   EXPECT_EQ(grid.next()->since_us, 0);
-  const GridRow row = *grid.next();
+  const storage::GridRow row = *grid.next();
   EXPECT_EQ(row.since_us, 10'000);
   EXPECT_EQ(row.utc_us, 1'053'000);
 }
@@ -102,7 +104,7 @@ TEST(GridRows, GoOnToTheEndOfTheSpan) {
   EXPECT_EQ(positions(10'000, {page({part})}), (std::vector<float>{5, 6, -1, -1, -1}));
   EXPECT_EQ(positions(5'000, {page({part})}), (std::vector<float>{5, 5, 6, 6, -1, -1, -1, -1, -1}));
   part.span_next_seq = std::uint64_t{1} << 62;  // as a robot may say
-  GridRows grid{3'600'000'000};
+  storage::GridRows grid{3'600'000'000};
   grid.give(page({part, segment(1, 5, 7, 2)}));
   for (int row = 0; row < 1000; ++row) ASSERT_TRUE(grid.next().has_value());
 }
@@ -110,7 +112,7 @@ TEST(GridRows, GoOnToTheEndOfTheSpan) {
 TEST(GridRows, AreThoseOfASearchOverAllSamples) {
   std::mt19937 random{7};
   for (int round = 0; round < 200; ++round) {
-    std::vector<SegmentPage> pages(1);
+    std::vector<storage::SegmentPage> pages(1);
     std::uint64_t seq = 5;
     std::uint64_t time_us = random() % 1000;
     for (int part = 0; part < 8; ++part) {
@@ -125,14 +127,15 @@ TEST(GridRows, AreThoseOfASearchOverAllSamples) {
     std::vector<float> expected;
     const std::uint64_t begin_us = pages.front().segments.front().segment.first_robot_time_us;
     std::uint64_t end_us = 0;
-    for (const SegmentPage& one : pages) {
-      for (const SpanSegment& part : one.segments) end_us = part.segment.robot_time_us(part.segment.samples.size() - 1);
+    for (const storage::SegmentPage& one : pages) {
+      for (const storage::SpanSegment& part : one.segments)
+        end_us = part.segment.robot_time_us(part.segment.samples.size() - 1);
     }
     for (std::uint64_t at_us = begin_us; at_us <= end_us; at_us += static_cast<std::uint64_t>(grid_us)) {
       float nearest = -1;
       std::uint64_t distance_us = std::numeric_limits<std::uint64_t>::max();
-      for (const SegmentPage& one : pages) {
-        for (const SpanSegment& part : one.segments) {
+      for (const storage::SegmentPage& one : pages) {
+        for (const storage::SpanSegment& part : one.segments) {
           for (std::size_t index = 0; index < part.segment.samples.size(); ++index) {
             const std::uint64_t sample_us = part.segment.robot_time_us(index);
             const std::uint64_t away_us = sample_us > at_us ? sample_us - at_us : at_us - sample_us;

@@ -13,7 +13,7 @@ namespace {
 TEST_F(ExportTest, WhatIsExportedIsWhatTheApiSaysAndWhatIsStored) {
   for (const unsigned seed : {21U, 22U}) {
     SCOPED_TRACE(seed);
-    const RunId run = record(seed);
+    const storage::RunId run = record(seed);
     const Lines expected = api_lines(run);
     ASSERT_GT(expected.size(), 500u);
     for (const bool stored : {false, true}) {
@@ -35,13 +35,13 @@ TEST_F(ExportTest, WhatIsExportedIsWhatTheApiSaysAndWhatIsStored) {
 }
 
 TEST_F(ExportTest, ARunFileHoldsTheRunsOtherRowsAndIsNoStationsDatabase) {
-  const RunId run = record(23);
+  const storage::RunId run = record(23);
   wait(runs_->end(run, ""));
   EXPECT_TRUE(wait(runs_->create(robot_.id, named("other"))).has_value());
   const auto file = run_file(run);
   SQLite::Database database{file.string(), SQLite::OPEN_READONLY};
   const auto value = [&](const char* sql) { return database.execAndGet(sql).getString(); };
-  EXPECT_EQ(value("PRAGMA application_id"), std::to_string(kApplicationId + 1));
+  EXPECT_EQ(value("PRAGMA application_id"), std::to_string(storage::kApplicationId + 1));
   EXPECT_EQ(value("PRAGMA integrity_check"), "ok");
   EXPECT_EQ(value("SELECT group_concat(name) FROM run"), "everything");
   EXPECT_EQ(value("SELECT count(*) FROM span"), "2");
@@ -49,14 +49,14 @@ TEST_F(ExportTest, ARunFileHoldsTheRunsOtherRowsAndIsNoStationsDatabase) {
             rows("SELECT sum(last_seq - first_seq + 1) FROM run_gap").at(0));
   EXPECT_FALSE(std::filesystem::exists(file.string() + "-wal"));
   kill();
-  EXPECT_THROW(Database{file}, std::exception);
+  EXPECT_THROW(storage::Database{file}, std::exception);
 }
 
 // What was lost at the end of a span is counted in its last row, is on the grid, and is what /gaps lists.
 TEST_F(ExportTest, LossesAtTheEndOfASpanShowInEveryFormat) {
   start();
   connect(robot_);
-  const RunId run = wait(runs_->create(robot_.id, named("run")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("run")))->id;
   make(robot_, 100);
   robot_.next_seq += 30;  // their frames are lost, and the reboot takes them
   disconnect(robot_);
@@ -68,7 +68,7 @@ TEST_F(ExportTest, LossesAtTheEndOfASpanShowInEveryFormat) {
   for (const bool stored : {false, true}) {
     SCOPED_TRACE(stored);
     if (stored) flush();
-    const std::vector<Gap> gaps = wait(history_->gaps(excerpt_of(run))).value().gaps;
+    const std::vector<storage::Gap> gaps = wait(history_->gaps(storage::excerpt_of(run))).value().gaps;
     ASSERT_EQ(gaps.size(), 1u);
     EXPECT_EQ(gaps[0].first_seq, 100u);
     EXPECT_EQ(gaps[0].last_seq, 129u);
@@ -79,7 +79,7 @@ TEST_F(ExportTest, LossesAtTheEndOfASpanShowInEveryFormat) {
       EXPECT_TRUE(lines[149].ends_with(" 0 0")) << lines[149];
     }
     EXPECT_EQ(gaps_in(run_file(run)).at(99), "0 30");
-    std::istringstream grid{csv({.run = run, .channels = all_channels(), .grid_us = 10'000})};
+    std::istringstream grid{csv({.run = run, .channels = storage::all_channels(), .grid_us = 10'000})};
     Lines rows;
     for (std::string line; std::getline(grid, line);) rows.push_back(line);
     ASSERT_EQ(rows.size(), 1u + 130 + 50);
@@ -94,20 +94,20 @@ TEST_F(ExportTest, ARunFileHasTheEventsOfItsSamplesWheneverTheyCame) {
   start();
   connect(robot_);
   make(robot_, 50);
-  const RunId run = wait(runs_->create(robot_.id, named("with events")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("with events")))->id;
   make(robot_, 100);
   wait(runs_->end(run, ""));
   clock_.run_for(5s);
   std::uint64_t event_seq = 0;
   for (const std::uint64_t sample_seq : {49u, 50u, 149u, 150u}) {
-    RobotEvent event;
+    station::RobotEvent event;
     event.robot_id = robot_.id;
     event.boot_id = robot_.boot_id;
     event.event_seq = event_seq++;
     event.sample_seq = sample_seq;
     event.kind = "detection";
     event.received_at_us = clock_.utc_us();
-    recorder_->on_event(RobotState{}, event);
+    recorder_->on_event(station::RobotState{}, event);
   }
   wait(recorder_->flush_records());
   SQLite::Database database{run_file(run).string(), SQLite::OPEN_READONLY};
@@ -121,21 +121,21 @@ TEST_F(ExportTest, TablesOfAnyLengthAreCopiedInSlices) {
   start();
   connect(robot_);
   make(robot_, 10);
-  CommandRecord command;
+  station::CommandRecord command;
   command.robot_id = robot_.id;
   command.kind = "renew_lease";
   command.arguments = "{}";
   command.id = 1;
   command.submitted_at_us = clock_.utc_us() - 1;
   recorder_->on_command(command);  // before the run
-  const RunId run = wait(runs_->create(robot_.id, named("busy")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("busy")))->id;
   make(robot_, 10);
-  RobotEvent event;
+  station::RobotEvent event;
   event.robot_id = robot_.id;
   event.kind = "connected";
   for (int n = 0; n < kEvents; ++n) {
     event.received_at_us = clock_.utc_us() + n;
-    recorder_->on_event(RobotState{}, event);
+    recorder_->on_event(station::RobotState{}, event);
   }
   for (int n = 0; n < kCommands; ++n) {
     command.id += 1;
@@ -146,9 +146,11 @@ TEST_F(ExportTest, TablesOfAnyLengthAreCopiedInSlices) {
   wait(recorder_->flush_records());
   const auto file = folder_ / "run.sqlite";
   {
-    SQLite::Database database = open_for_reading(path_);
-    RunFile writer{
-        file, reading_uri(path_, false), spans_of(run), {.run = run, .channels = all_channels(), .grid_us = {}}};
+    SQLite::Database database = storage::open_for_reading(path_);
+    storage::RunFile writer{file,
+                            storage::reading_uri(path_, false),
+                            spans_of(run),
+                            {.run = run, .channels = storage::all_channels(), .grid_us = {}}};
     std::int64_t most = 0;
     std::int64_t before = 0;
     for (bool more = writer.advance(database); more; more = writer.advance(database)) {
@@ -169,8 +171,9 @@ TEST_F(ExportTest, TablesOfAnyLengthAreCopiedInSlices) {
 }
 
 TEST_F(ExportTest, AGridAndChosenChannelsAreTheSameInCsvAndMat) {
-  const RunId run = record(24);
-  const ExportQuery query{.run = run, .channels = parse_channels("velocity_m_s,duty").value(), .grid_us = 25'000};
+  const storage::RunId run = record(24);
+  const storage::ExportQuery query{
+      .run = run, .channels = storage::parse_channels("velocity_m_s,duty").value(), .grid_us = 25'000};
   const auto variables = variables_of(mat(query));
   std::istringstream in{csv(query)};
   std::string line;
@@ -196,8 +199,8 @@ TEST_F(ExportTest, AGridAndChosenChannelsAreTheSameInCsvAndMat) {
 }
 
 TEST_F(ExportTest, AMatFileSaysWhatIsKnownOfTheRun) {
-  const RunId run = record(25);
-  const auto file = mat({.run = run, .channels = all_channels(), .grid_us = {}});
+  const storage::RunId run = record(25);
+  const auto file = mat({.run = run, .channels = storage::all_channels(), .grid_us = {}});
   const std::unique_ptr<mat_t, int (*)(mat_t*)> opened{Mat_Open(file.c_str(), MAT_ACC_RDONLY), Mat_Close};
   const std::unique_ptr<matvar_t, void (*)(matvar_t*)> facts{Mat_VarRead(opened.get(), "info"), Mat_VarFree};
   ASSERT_NE(facts, nullptr);
@@ -217,19 +220,19 @@ TEST_F(ExportTest, AMatFileSaysWhatIsKnownOfTheRun) {
 TEST_F(ExportTest, ALongGapOnAFineGridComesInPieces) {
   start();
   connect(robot_);
-  const RunId run = wait(runs_->create(robot_.id, named("run")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("run")))->id;
   make(robot_, 5);
   robot_.late_us = 3'600'000'000;
   make(robot_, 5);
-  SQLite::Database database = open_for_reading(path_);
-  CsvWriter writer{spans_of(run), {.run = run, .channels = all_channels(), .grid_us = 100}};
+  SQLite::Database database = storage::open_for_reading(path_);
+  storage::CsvWriter writer{spans_of(run), {.run = run, .channels = storage::all_channels(), .grid_us = 100}};
   for (int piece = 0; piece < 20; ++piece) EXPECT_LT(writer.next(database).value().size(), 500'000u);
 }
 
 TEST_F(ExportTest, TheCommandWritesWhatTheStationExports) {
-  const RunId run = record(26);
+  const storage::RunId run = record(26);
   flush();
-  const std::string expected = csv({.run = run, .channels = all_channels(), .grid_us = {}});
+  const std::string expected = csv({.run = run, .channels = storage::all_channels(), .grid_us = {}});
   for (const bool runs : {true, false}) {
     if (!runs) stop();
     cli::Export wish;

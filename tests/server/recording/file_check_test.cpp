@@ -27,7 +27,7 @@ class FileCheckTest : public RecordingTest {
 
   std::string refusal() {
     try {
-      const Database database{path_};
+      const storage::Database database{path_};
       return "(it was opened)";
     } catch (const std::runtime_error& error) {
       return error.what();
@@ -54,10 +54,10 @@ class FileCheckTest : public RecordingTest {
     SQLite::Database made{theirs_.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE};
     made.exec("PRAGMA page_size = 4096; PRAGMA auto_vacuum = INCREMENTAL; PRAGMA journal_mode = WAL");
     made.exec("PRAGMA wal_autocheckpoint = 0; BEGIN");
-    for (const char* script : migrations()) made.exec(script);
+    for (const char* script : storage::migrations()) made.exec(script);
     made.exec(fmt::format("INSERT INTO meta (name, value) VALUES ('store_id', {}), ('next_row', 1)", kStoreId));
-    made.exec(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}; COMMIT", kApplicationId,
-                          migrations().size()));
+    made.exec(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}; COMMIT", storage::kApplicationId,
+                          storage::migrations().size()));
     leave_at(theirs_, path_);
     return kStoreId;
   }
@@ -97,7 +97,7 @@ TEST_F(FileCheckTest, AForeignFileWhoseTablesAreInItsLogStaysByteForByte) {
   const std::string file = content(path_);
   const std::string log = content(beside(path_, "-wal"));
   ASSERT_GT(log.size(), 4096U);
-  EXPECT_FALSE(file_problem(path_).has_value()) << "it looks blank: SQLite has to tell";
+  EXPECT_FALSE(storage::file_problem(path_).has_value()) << "it looks blank: SQLite has to tell";
   EXPECT_THAT(refusal(), HasSubstr("belongs to another program"));
   EXPECT_EQ(content(path_), file);
   EXPECT_EQ(content(beside(path_, "-wal")), log);
@@ -144,13 +144,13 @@ TEST_F(FileCheckTest, AnEmptyFileWithSomebodysJournalIsRefused) {
 TEST_F(FileCheckTest, OurOwnFileWhoseTablesAreInItsLogIsOpened) {
   const std::uint64_t store_id = leave_begun();
   ASSERT_GT(content(beside(path_, "-wal")).size(), 4096U);
-  EXPECT_EQ(Database{path_}.store_id(), store_id);
+  EXPECT_EQ(storage::Database{path_}.store_id(), store_id);
 }
 
 TEST_F(FileCheckTest, AFirstPageThatIsHalfWrittenIsReadFromTheLog) {
   const std::uint64_t store_id = leave_begun();
   overwrite(0, std::string(512, '\x5a'));
-  EXPECT_EQ(Database{path_}.store_id(), store_id);
+  EXPECT_EQ(storage::Database{path_}.store_id(), store_id);
 
   overwrite(0, std::string(512, '\x5a'));
   fs::remove(beside(path_, "-wal"));
@@ -163,12 +163,12 @@ TEST_F(FileCheckTest, AFileThatWasJustBegunIsBegunAgain) {
   std::ofstream{beside(path_, "-journal"), std::ios::binary}
       << std::string{"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7\0\0\0\0\0\0\0\1\0\0\0\0\0\0\2\0\0\0\x10\0", 28}
       << std::string(512 - 28, '\0');
-  EXPECT_NE(Database{path_}.store_id(), 0U);
+  EXPECT_NE(storage::Database{path_}.store_id(), 0U);
 }
 
 TEST_F(FileCheckTest, ATruncatedFileIsRefused) {
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   fs::resize_file(path_, fs::file_size(path_) - 4096);
   const std::string file = content(path_);
@@ -180,7 +180,7 @@ TEST_F(FileCheckTest, ATruncatedFileIsRefused) {
 
 TEST_F(FileCheckTest, AHeaderWithoutAPageSizeIsDamaged) {
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   overwrite(16, std::string{"\x0f\xff", 2});
   EXPECT_THAT(refusal(), HasSubstr("its header is damaged; stop the station, run rheonaut verify, restore a backup"));
@@ -188,20 +188,20 @@ TEST_F(FileCheckTest, AHeaderWithoutAPageSizeIsDamaged) {
 
 TEST_F(FileCheckTest, FindsADamagedPageAndARowWithoutItsOther) {
   {
-    Database database{path_};
-    EXPECT_EQ(find_damage(database.handle()), "");
+    storage::Database database{path_};
+    EXPECT_EQ(storage::find_damage(database.handle()), "");
     database.handle().exec("PRAGMA foreign_keys = OFF; INSERT INTO gap VALUES (77, 0, 1, 'reboot', 0)");
-    EXPECT_EQ(find_damage(database.handle()), "a row of gap refers to a row of boot that is not there");
+    EXPECT_EQ(storage::find_damage(database.handle()), "a row of gap refers to a row of boot that is not there");
   }
   const std::int64_t page = number("SELECT rootpage FROM sqlite_master WHERE name = 'event'");
   overwrite(static_cast<std::size_t>((page - 1) * 4096), std::string(100, '\xff'));
-  Database database{path_};
-  EXPECT_NE(find_damage(database.handle()), "");
+  storage::Database database{path_};
+  EXPECT_NE(storage::find_damage(database.handle()), "");
 }
 
 TEST_F(FileCheckTest, DamageAtRunTimeSaysWhatToDoAndDoesNotAskForRoom) {
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   const std::int64_t page = number("SELECT rootpage FROM sqlite_master WHERE name = 'sample'");
   overwrite(static_cast<std::size_t>((page - 1) * 4096), std::string(100, '\xff'));
@@ -219,8 +219,8 @@ TEST_F(FileCheckTest, DamageAtRunTimeSaysWhatToDoAndDoesNotAskForRoom) {
 
 TEST_F(FileCheckTest, AFullDiskAsksForRoom) {
   const SQLite::Exception full{"database or disk is full", SQLITE_FULL};
-  EXPECT_THAT(write_problem(full), HasSubstr("Make room on the disk"));
-  EXPECT_FALSE(means_damage(full));
+  EXPECT_THAT(storage::write_problem(full), HasSubstr("Make room on the disk"));
+  EXPECT_FALSE(storage::means_damage(full));
 }
 
 }  // namespace

@@ -30,32 +30,32 @@ class FinishedFileTest : public RecordingTest {
 
 TEST_F(FinishedFileTest, ACopyIsComparedByteByByte) {
   const fs::path file = made("file", large_);
-  EXPECT_TRUE(holds_the_same(file, made("copy", large_)));
+  EXPECT_TRUE(storage::holds_the_same(file, made("copy", large_)));
   std::string changed = large_;
   changed.back() = 'x';
-  EXPECT_FALSE(holds_the_same(file, made("changed", changed)));
-  EXPECT_FALSE(holds_the_same(file, made("short", large_.substr(0, 2'000'000))));
-  EXPECT_FALSE(holds_the_same(file, made("long", large_ + "e")));
-  EXPECT_FALSE(holds_the_same(file, folder_ / "none"));
-  EXPECT_TRUE(holds_the_same(made("empty", ""), made("empty too", "")));
+  EXPECT_FALSE(storage::holds_the_same(file, made("changed", changed)));
+  EXPECT_FALSE(storage::holds_the_same(file, made("short", large_.substr(0, 2'000'000))));
+  EXPECT_FALSE(storage::holds_the_same(file, made("long", large_ + "e")));
+  EXPECT_FALSE(storage::holds_the_same(file, folder_ / "none"));
+  EXPECT_TRUE(storage::holds_the_same(made("empty", ""), made("empty too", "")));
 }
 
 TEST_F(FinishedFileTest, ACopyBecomesVisibleWhole) {
   const fs::path file = made("file", large_);
   made("there.part", "of an earlier attempt");
-  copy_finished(file, folder_ / "there");
+  storage::copy_finished(file, folder_ / "there");
   EXPECT_EQ(content_of(folder_ / "there"), large_);
   EXPECT_FALSE(fs::exists(folder_ / "there.part"));
   EXPECT_TRUE(fs::exists(file));
-  EXPECT_THROW(copy_finished(folder_ / "none", folder_ / "nowhere"), std::system_error);
+  EXPECT_THROW(storage::copy_finished(folder_ / "none", folder_ / "nowhere"), std::system_error);
   EXPECT_FALSE(fs::exists(folder_ / "nowhere"));
 }
 
 TEST_F(FinishedFileTest, WhatIsNotThereWholeLeavesTheFirstOne) {
   const fs::path file = made("file", large_);
-  EXPECT_THROW(move_finished(file, folder_ / "no folder" / "there"), std::system_error);
+  EXPECT_THROW(storage::move_finished(file, folder_ / "no folder" / "there"), std::system_error);
   EXPECT_EQ(content_of(file), large_);
-  move_finished(file, folder_ / "there");
+  storage::move_finished(file, folder_ / "there");
   EXPECT_EQ(content_of(folder_ / "there"), large_);
   EXPECT_FALSE(fs::exists(file));
 }

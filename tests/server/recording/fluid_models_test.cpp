@@ -15,17 +15,17 @@ using ::testing::ElementsAre;
 class FluidModelsTest : public RecordingTest {
  protected:
   // Numbers that no short decimal gives back.
-  static FluidModel model_of(float gain) {
-    FluidModel model;
+  static station::FluidModel model_of(float gain) {
+    station::FluidModel model;
     model.gain_m_s = {gain, -1.0F / 3, std::numeric_limits<float>::denorm_min(), 0};
     model.time_constant_s = {0.001F, 1.0F / 7, 3.14159265F, 1000};
     model.fit_error = 0.1 / 30;
     model.document = R"({"plant":{"kp":0.13}})";
     return model;
   }
-  FluidModels& models() { return recording_->fluid_models; }
-  const FluidModel* in_force(const std::string& fluid) { return models().in_force().find(fluid); }
-  Result<FluidModel> set(const std::string& fluid, const FluidModel& model) {
+  storage::FluidModels& models() { return recording_->fluid_models; }
+  const station::FluidModel* in_force(const std::string& fluid) { return models().in_force().find(fluid); }
+  Result<station::FluidModel> set(const std::string& fluid, const station::FluidModel& model) {
     return wait(models().set(fluid, model, {"user:anna/session:4", "10.0.0.7", 0}));
   }
 };
@@ -36,7 +36,7 @@ TEST_F(FluidModelsTest, TheNewestIsInForceOverARestartBitForBit) {
   ASSERT_TRUE(set("water", model_of(9)));
   ASSERT_TRUE(set("water", model_of(0.1F)));
   ASSERT_TRUE(set("oil", model_of(2)));
-  const FluidModel water = *in_force("water");
+  const station::FluidModel water = *in_force("water");
   EXPECT_EQ(water.set_by, "user:anna/session:4");
   EXPECT_GT(water.set_at_us, 0);
   kill();

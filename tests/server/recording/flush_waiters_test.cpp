@@ -38,8 +38,8 @@ class FlushWaitersTest : public ::testing::Test {
 
   asio::io_context loop_{1};
   VirtualClock clock_{loop_};
-  TaskGroup tasks_{loop_};
-  FlushWaiters waiters_{loop_, clock_};
+  runtime::TaskGroup tasks_{loop_};
+  storage::FlushWaiters waiters_{loop_, clock_};
   std::map<std::string, bool> outcomes_;   // by name: it became durable
   std::optional<std::int64_t> wanted_us_;  // steady, when the run loop went on
 

@@ -11,7 +11,7 @@ constexpr std::uint64_t kCheckpointBytes = 1 << 20;
 class HeldCheckpointTest : public RecordingTest {
  protected:
   void SetUp() override {
-    RecorderOptions options;
+    storage::RecorderOptions options;
     options.checkpoint_bytes = kCheckpointBytes;
     start(options);
     connect(robot_);

@@ -10,8 +10,8 @@ class HistoryTest : public RecordingTest {
  protected:
   TestRobot robot_;
 
-  RunId create() { return wait(runs_->create(robot_.id, named("run")))->id; }
-  SamplePage page(RunId id, std::optional<SampleCursor> after, std::size_t limit) {
+  storage::RunId create() { return wait(runs_->create(robot_.id, named("run")))->id; }
+  storage::SamplePage page(storage::RunId id, std::optional<storage::SampleCursor> after, std::size_t limit) {
     return wait(history_->samples(id, after, limit)).value();
   }
 };
@@ -29,8 +29,8 @@ TEST_F(HistoryTest, GivesBackEveryValueOfASample) {
   robot_.context.emergency_id = 0xfedcba9876543211;
   robot_.context.emergency_cause = rheonaut_EMERGENCY_CAUSE_POSITION_LIMIT;
   robot_.context.flags = rheonaut_TELEMETRY_FLAG_BACKFILL;
-  const RunId id = create();
-  SampleBatch batch = robot_.batch(0, 2);
+  const storage::RunId id = create();
+  station::SampleBatch batch = robot_.batch(0, 2);
   batch.samples[1] = {1, 2, 3, -0.5, 175, 0.1F};
   send(robot_, batch);
   const std::int64_t received_at_us = clock_.utc_us();
@@ -38,10 +38,10 @@ TEST_F(HistoryTest, GivesBackEveryValueOfASample) {
     SCOPED_TRACE(on_disk);
     if (on_disk > 0) flush();
     EXPECT_EQ(number("SELECT count(*) FROM sample"), on_disk);
-    const SamplePage all = page(id, std::nullopt, 10);
+    const storage::SamplePage all = page(id, std::nullopt, 10);
     ASSERT_EQ(all.samples.size(), 2u);
     EXPECT_FALSE(all.next.has_value());
-    const StoredSample& stored = all.samples[1];
+    const storage::StoredSample& stored = all.samples[1];
     EXPECT_EQ(stored.span, 0u);
     EXPECT_EQ(stored.boot_id, robot_.boot_id);
     EXPECT_EQ(stored.seq, 1u);
@@ -50,7 +50,7 @@ TEST_F(HistoryTest, GivesBackEveryValueOfASample) {
     EXPECT_EQ(stored.clock_uncertainty_us, 300);
     EXPECT_EQ(stored.first_received_at_us, received_at_us);
     EXPECT_EQ(stored.received_at_us, received_at_us);
-    EXPECT_EQ(stored.sample, (Sample{1, 2, 3, -0.5, 175, 0.1F}));
+    EXPECT_EQ(stored.sample, (station::Sample{1, 2, 3, -0.5, 175, 0.1F}));
     EXPECT_EQ(stored.mode, rheonaut_MODE_AUTO);
     EXPECT_EQ(stored.sub_state, rheonaut_SUB_STATE_NAVIGATING);
     EXPECT_EQ(stored.setpoint_m, 0.1F);
@@ -67,7 +67,7 @@ TEST_F(HistoryTest, PagesFollowOneAnotherOverSegmentsAndSpans) {
   start();
   connect(robot_);
   make(robot_, 37);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 230);
   robot_.boot_id += 1;
   robot_.next_seq = 0;
@@ -76,10 +76,10 @@ TEST_F(HistoryTest, PagesFollowOneAnotherOverSegmentsAndSpans) {
   for (const std::size_t limit : {1u, 7u, 100u, 230u, 349u, 350u, 10000u}) {
     SCOPED_TRACE(limit);
     std::vector<std::pair<std::uint32_t, std::uint64_t>> seen;
-    std::optional<SampleCursor> after;
+    std::optional<storage::SampleCursor> after;
     do {
-      const SamplePage next = page(id, after, limit);
-      for (const StoredSample& sample : next.samples) {
+      const storage::SamplePage next = page(id, after, limit);
+      for (const storage::StoredSample& sample : next.samples) {
         seen.emplace_back(sample.span, sample.seq);
         EXPECT_FLOAT_EQ(sample.sample.position_m, static_cast<float>(sample.seq) / 1000);
       }
@@ -96,7 +96,7 @@ TEST_F(HistoryTest, PagesFollowOneAnotherOverSegmentsAndSpans) {
 TEST_F(HistoryTest, AnswersHoldWhatWasReceivedBeforeTheQuestion) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 3);
   EXPECT_EQ(page(id, std::nullopt, 10).samples.size(), 3u);
 }
@@ -105,13 +105,13 @@ TEST_F(HistoryTest, AnswersHoldWhatWasReceivedBeforeTheQuestion) {
 TEST_F(HistoryTest, PollingARunWritesNothingAndCutsNoSegmentShort) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   for (std::size_t made = 5; made <= 400; made += 5) {
     make(robot_, 5);
     const auto commits = recorder_->counters().commits;
     EXPECT_EQ(page(id, std::nullopt, 1000).samples.size(), made);
-    EXPECT_EQ(page(id, SampleCursor{0, made - 2}, 1000).samples.size(), 1u);
-    EXPECT_TRUE(wait(history_->gaps(excerpt_of(id))).has_value());
+    EXPECT_EQ(page(id, storage::SampleCursor{0, made - 2}, 1000).samples.size(), 1u);
+    EXPECT_TRUE(wait(history_->gaps(storage::excerpt_of(id))).has_value());
     EXPECT_EQ(recorder_->counters().commits, commits);
     clock_.run_for(49ms);
   }
@@ -123,7 +123,7 @@ TEST_F(HistoryTest, PollingARunWritesNothingAndCutsNoSegmentShort) {
 TEST_F(HistoryTest, SamplesThatArriveLateArePutInTheirPlaceWhileTheyWait) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   send(robot_, 0, 10);
   send(robot_, 30, 10);
   flush();
@@ -132,10 +132,10 @@ TEST_F(HistoryTest, SamplesThatArriveLateArePutInTheirPlaceWhileTheyWait) {
   for (const std::size_t limit : {1u, 3u, 12u, 40u, 100u}) {
     SCOPED_TRACE(limit);
     std::vector<std::uint64_t> seen;
-    std::optional<SampleCursor> after;
+    std::optional<storage::SampleCursor> after;
     do {
-      const SamplePage next = page(id, after, limit);
-      for (const StoredSample& sample : next.samples) seen.push_back(sample.seq);
+      const storage::SamplePage next = page(id, after, limit);
+      for (const storage::StoredSample& sample : next.samples) seen.push_back(sample.seq);
       after = next.next;
     } while (after);
     ASSERT_EQ(seen.size(), 40u);
@@ -146,7 +146,7 @@ TEST_F(HistoryTest, SamplesThatArriveLateArePutInTheirPlaceWhileTheyWait) {
 TEST_F(HistoryTest, AnswersHoldWhatTheDiskDoesNotTake) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE};
   foreign.exec("BEGIN IMMEDIATE");
   make(robot_, 100);
@@ -155,14 +155,14 @@ TEST_F(HistoryTest, AnswersHoldWhatTheDiskDoesNotTake) {
   ASSERT_TRUE(clock_.run_until([&] { return recorder_->failing(); }, 3s));
   const std::int64_t asked_us = clock_.steady_us();
   EXPECT_EQ(page(id, std::nullopt, 1000).samples.size(), 105u);
-  const std::vector<Gap> gaps = wait(history_->gaps(excerpt_of(id))).value().gaps;
+  const std::vector<storage::Gap> gaps = wait(history_->gaps(storage::excerpt_of(id))).value().gaps;
   ASSERT_EQ(gaps.size(), 1u);
   EXPECT_EQ(gaps[0].first_seq, 100u);
   EXPECT_EQ(gaps[0].last_seq, 119u);
   EXPECT_EQ(clock_.steady_us(), asked_us);
   foreign.exec("ROLLBACK");
   clock_.run_for(3s);
-  EXPECT_EQ(wait(history_->gaps(excerpt_of(id))).value().gaps.size(), 1u);
+  EXPECT_EQ(wait(history_->gaps(storage::excerpt_of(id))).value().gaps.size(), 1u);
   EXPECT_EQ(page(id, std::nullopt, 1000).samples.size(), 105u);
 }
 
@@ -171,10 +171,10 @@ TEST_F(HistoryTest, QueriesOfEventsAndCommandsCutNoSegmentShort) {
   connect(robot_);
   for (std::uint64_t n = 0; n < 20; ++n) {
     make(robot_, 5);
-    RobotEvent event;
+    station::RobotEvent event;
     event.robot_id = robot_.id;
     event.kind = "event " + std::to_string(n);
-    recorder_->on_event(state_of(robot_, LinkState::connected), event);
+    recorder_->on_event(state_of(robot_, station::LinkState::connected), event);
     EXPECT_EQ(wait(history_->events(robot_.id, 1)).at(0).kind, event.kind);
     EXPECT_EQ(wait(history_->commands(robot_.id, 1)).size(), 0u);
     clock_.run_for(1ms);
@@ -186,7 +186,7 @@ TEST_F(HistoryTest, QueriesOfEventsAndCommandsCutNoSegmentShort) {
 TEST_F(HistoryTest, RefusesUnknownRunsAndBadLimits) {
   start();
   EXPECT_EQ(wait(history_->samples(1, std::nullopt, 10)).error().code, ErrorCode::not_found);
-  EXPECT_EQ(wait(history_->gaps(excerpt_of(1))).error().code, ErrorCode::not_found);
+  EXPECT_EQ(wait(history_->gaps(storage::excerpt_of(1))).error().code, ErrorCode::not_found);
   EXPECT_EQ(wait(history_->samples(1, std::nullopt, 0)).error().code, ErrorCode::invalid);
   EXPECT_EQ(wait(history_->samples(1, std::nullopt, 10001)).error().code, ErrorCode::invalid);
   EXPECT_EQ(wait(history_->command(1)).error().code, ErrorCode::not_found);
@@ -197,10 +197,10 @@ TEST_F(HistoryTest, ListsTheGapsOfARunCutToItsSpans) {
   connect(robot_);
   make(robot_, 10);
   robot_.next_seq = 20;
-  const RunId id = create();  // begins in sample 10, the newest is 9
+  const storage::RunId id = create();  // begins in sample 10, the newest is 9
   robot_.oldest_seq = 15;
   make(robot_, 10);
-  const std::vector<Gap> gaps = wait(history_->gaps(excerpt_of(id))).value().gaps;
+  const std::vector<storage::Gap> gaps = wait(history_->gaps(storage::excerpt_of(id))).value().gaps;
   ASSERT_EQ(gaps.size(), 1u);
   EXPECT_EQ(gaps[0].robot_id, robot_.id);
   EXPECT_EQ(gaps[0].boot_id, robot_.boot_id);
@@ -213,7 +213,7 @@ TEST_F(HistoryTest, GivesBackEventsAndCommandsNewestFirst) {
   start();
   connect(robot_);
   for (std::uint64_t n = 0; n < 3; ++n) {
-    RobotEvent event;
+    station::RobotEvent event;
     event.robot_id = robot_.id;
     event.kind = "event " + std::to_string(n);
     if (n > 0) {
@@ -222,17 +222,17 @@ TEST_F(HistoryTest, GivesBackEventsAndCommandsNewestFirst) {
       event.mode = rheonaut_MODE_EMERGENCY;
       event.emergency_id = 0xf000000000000001;
     }
-    recorder_->on_event(state_of(robot_, LinkState::connected), event);
-    CommandRecord command;
+    recorder_->on_event(state_of(robot_, station::LinkState::connected), event);
+    station::CommandRecord command;
     command.id = 0xf000000000000000 + n;
     command.robot_id = robot_.id;
     command.boot_id = robot_.boot_id;
     command.kind = "set_duty";
-    command.state = CommandState::acknowledged;
+    command.state = station::CommandState::acknowledged;
     command.submitted_at_us = static_cast<std::int64_t>(n);
     recorder_->on_command(command);
   }
-  const std::vector<RobotEvent> events = wait(history_->events(robot_.id, 10));
+  const std::vector<station::RobotEvent> events = wait(history_->events(robot_.id, 10));
   ASSERT_EQ(events.size(), 3u);
   EXPECT_EQ(events[0].kind, "event 2");
   EXPECT_EQ(events[0].boot_id, robot_.boot_id);
@@ -242,10 +242,10 @@ TEST_F(HistoryTest, GivesBackEventsAndCommandsNewestFirst) {
   EXPECT_EQ(events[2].boot_id, 0u);
   EXPECT_FALSE(events[2].event_seq.has_value());
   EXPECT_EQ(wait(history_->events(robot_.id, 2)).size(), 2u);
-  const std::vector<CommandRecord> commands = wait(history_->commands(robot_.id, 2));
+  const std::vector<station::CommandRecord> commands = wait(history_->commands(robot_.id, 2));
   ASSERT_EQ(commands.size(), 2u);
   EXPECT_EQ(commands[0].id, 0xf000000000000002);
-  EXPECT_EQ(wait(history_->command(0xf000000000000001))->state, CommandState::acknowledged);
+  EXPECT_EQ(wait(history_->command(0xf000000000000001))->state, station::CommandState::acknowledged);
 }
 
 }  // namespace

@@ -23,15 +23,16 @@ rheonaut_Parameter parameter_of(float value) {
 }
 
 TEST(InForceJsonTest, ATableOfParametersIsOneTextInTheOrderOfTheirNames) {
-  const InForceContent table = ReportedParameters{{"b", parameter_of(3)}, {"a", parameter_of(0.1F)}};
-  EXPECT_STREQ(kind_of(table), "parameters");
-  EXPECT_EQ(document_text(table), R"({"a":{"default":2.0,"maximum":10.0,"minimum":-1.0,"unit":"s","value":0.1},)"
-                                  R"("b":{"default":2.0,"maximum":10.0,"minimum":-1.0,"unit":"s","value":3.0}})");
+  const station::InForceContent table = station::ReportedParameters{{"b", parameter_of(3)}, {"a", parameter_of(0.1F)}};
+  EXPECT_STREQ(storage::kind_of(table), "parameters");
+  EXPECT_EQ(storage::document_text(table),
+            R"({"a":{"default":2.0,"maximum":10.0,"minimum":-1.0,"unit":"s","value":0.1},)"
+            R"("b":{"default":2.0,"maximum":10.0,"minimum":-1.0,"unit":"s","value":3.0}})");
 }
 
 TEST(InForceJsonTest, ANumberThatIsNoneIsNullAndABadNameIsStillJson) {
-  const InForceContent table = ReportedParameters{{"\xff\xfe", parameter_of(std::nanf(""))}};
-  EXPECT_TRUE(json::parse(document_text(table)).front()["value"].is_null());
+  const station::InForceContent table = station::ReportedParameters{{"\xff\xfe", parameter_of(std::nanf(""))}};
+  EXPECT_TRUE(json::parse(storage::document_text(table)).front()["value"].is_null());
 }
 
 TEST(InForceJsonTest, AControllerHoldsTheCoefficientsAsTheyWereSent) {
@@ -42,15 +43,15 @@ TEST(InForceJsonTest, AControllerHoldsTheCoefficientsAsTheyWereSent) {
   controller.pole[1] = 0.5F;
   controller.residue[0] = -1.25F;
   controller.derivative_on = rheonaut_DERIVATIVE_ON_MEASUREMENT;
-  const json written = controller_json(controller);
+  const json written = storage::controller_json(controller);
   EXPECT_EQ(written["controller_id"], 7);
   EXPECT_EQ(written["kp"], 3.4);
   EXPECT_EQ(written["pole"], (json{0.0, 0.5}));
   EXPECT_EQ(written["residue"], (json{-1.25, 0.0}));
   EXPECT_EQ(written["biquad_b0"], json::array());
   EXPECT_EQ(written["derivative_on"], "measurement");
-  EXPECT_STREQ(kind_of(controller), "controller");
-  EXPECT_EQ(document_text(controller), written.dump());
+  EXPECT_STREQ(storage::kind_of(controller), "controller");
+  EXPECT_EQ(storage::document_text(controller), written.dump());
 }
 
 }  // namespace

@@ -13,12 +13,12 @@ class InForceStoreTest : public RecordingTest {
     connect(robot_);
   }
 
-  void report(InForceContent content, std::uint64_t first_seq, bool is_change = false) {
-    recorder_->on_in_force(RobotState{}, {.boot_id = robot_.boot_id,
-                                          .is_change = is_change,
-                                          .first_seq = first_seq,
-                                          .content = std::move(content),
-                                          .noticed_at_us = clock_.utc_us()});
+  void report(station::InForceContent content, std::uint64_t first_seq, bool is_change = false) {
+    recorder_->on_in_force(station::RobotState{}, {.boot_id = robot_.boot_id,
+                                                   .is_change = is_change,
+                                                   .first_seq = first_seq,
+                                                   .content = std::move(content),
+                                                   .noticed_at_us = clock_.utc_us()});
   }
   static protocol::Controller controller(float kp) {
     protocol::Controller controller = rheonaut_Controller_init_zero;
@@ -38,8 +38,8 @@ class InForceStoreTest : public RecordingTest {
 
 TEST_F(InForceStoreTest, ATextIsStoredOnceAndWhatIsReportedAgainAddsNothing) {
   report(controller(1), 0);
-  report(ReportedParameters{}, 0);  // another kind
-  report(controller(1), 500);       // after a reconnection
+  report(station::ReportedParameters{}, 0);  // another kind
+  report(controller(1), 500);                // after a reconnection
   report(controller(2), 700);
   report(controller(1), 900);  // and back
   const std::vector<std::string> expected{"controller|0|1.0", "controller|700|2.0", "controller|900|1.0",
@@ -51,13 +51,13 @@ TEST_F(InForceStoreTest, ATextIsStoredOnceAndWhatIsReportedAgainAddsNothing) {
 TEST_F(InForceStoreTest, WhatABootSaysFirstHoldsFromItsBeginning) {
   report(controller(1), 200);  // it had made 200 samples when it connected
   report(controller(2), 300, true);
-  report(ReportedParameters{}, 400, true);  // what was before has not been recorded
+  report(station::ReportedParameters{}, 400, true);  // what was before has not been recorded
   const std::vector<std::string> expected{"controller|0|1.0", "controller|300|2.0", "parameters|400|{}"};
   EXPECT_EQ(in_force(), expected);
 }
 
 TEST_F(InForceStoreTest, ANumberThatCannotBeIsNotStored) {
-  report(controller(1), kMaxRobotNumber + 1, true);
+  report(controller(1), station::kMaxRobotNumber + 1, true);
   EXPECT_TRUE(in_force().empty());
 }
 
@@ -68,13 +68,13 @@ TEST_F(InForceStoreTest, OfABootThatIsNotRecordedNothingIsStored) {
 }
 
 TEST_F(InForceStoreTest, ClockEstimatesAreStoredWithTheirBoot) {
-  recorder_->on_clock(RobotState{}, {.boot_id = robot_.boot_id,
-                                     .robot_time_us = 61'000'000,
-                                     .utc_offset_us = 1'750'000'000'000'000,
-                                     .uncertainty_us = 420,
-                                     .drift_ppm = -12.5,
-                                     .round_trip_us = 800,
-                                     .station_step_us = 3'600'000'000});
+  recorder_->on_clock(station::RobotState{}, {.boot_id = robot_.boot_id,
+                                              .robot_time_us = 61'000'000,
+                                              .utc_offset_us = 1'750'000'000'000'000,
+                                              .uncertainty_us = 420,
+                                              .drift_ppm = -12.5,
+                                              .round_trip_us = 800,
+                                              .station_step_us = 3'600'000'000});
   wait(recorder_->flush_records());
   const std::vector<std::string> expected{"nemo|61000000|1750000061000000|420|-12.5|800|3600000000"};
   EXPECT_EQ(rows("SELECT robot_id, robot_time_us, utc_us, uncertainty_us, drift_ppm, round_trip_us, station_step_us"

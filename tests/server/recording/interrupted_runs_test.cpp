@@ -40,7 +40,7 @@ class InterruptedRunsTest : public RecordingTest {
   TestRobot robot_;
 
   void create(const std::string& name) {
-    RunConditions conditions;
+    storage::RunConditions conditions;
     conditions.name = name;
     EXPECT_TRUE(wait(runs_->create(robot_.id, std::move(conditions))));
   }
@@ -51,7 +51,7 @@ TEST_F(InterruptedRunsTest, TheLogNamesEachRunThatAStopOrAKillHasInterruptedOnce
   start();
   connect(robot_);
   create("step 1");
-  SampleBatch batch = robot_.batch(0, 100);
+  station::SampleBatch batch = robot_.batch(0, 100);
   batch.utc_offset_us = 1'750'000'000'000'000;  // 2025-06-15 15:06:40
   send(robot_, batch);
   robot_.next_seq = 100;

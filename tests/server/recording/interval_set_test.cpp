@@ -9,10 +9,10 @@
 namespace server {
 namespace {
 
-using Intervals = std::vector<Interval>;
+using Intervals = std::vector<storage::Interval>;
 
 TEST(IntervalSet, InsertReturnsOnlyWhatWasNew) {
-  IntervalSet set;
+  storage::IntervalSet set;
   EXPECT_EQ(set.insert({10, 20}), (Intervals{{10, 20}}));
   EXPECT_EQ(set.insert({5, 25}), (Intervals{{5, 10}, {20, 25}}));
   EXPECT_EQ(set.insert({5, 25}), Intervals{});
@@ -20,7 +20,7 @@ TEST(IntervalSet, InsertReturnsOnlyWhatWasNew) {
 }
 
 TEST(IntervalSet, TheFirstHoleIsWhereTheCumulativePartEnds) {
-  IntervalSet set;
+  storage::IntervalSet set;
   EXPECT_EQ(set.first_hole(), 0u);
   set.insert({5, 10});
   EXPECT_EQ(set.first_hole(), 0u);
@@ -30,7 +30,7 @@ TEST(IntervalSet, TheFirstHoleIsWhereTheCumulativePartEnds) {
 }
 
 TEST(IntervalSet, KnowsWhatIsCoveredAndWhatIsMissing) {
-  IntervalSet set;
+  storage::IntervalSet set;
   set.insert({2, 4});
   set.insert({6, 8});
   EXPECT_EQ(set.missing({0, 10}), (Intervals{{0, 2}, {4, 6}, {8, 10}}));
@@ -38,7 +38,7 @@ TEST(IntervalSet, KnowsWhatIsCoveredAndWhatIsMissing) {
 }
 
 TEST(IntervalSet, ExtendAddsOnlyAtTheEnd) {
-  IntervalSet set;
+  storage::IntervalSet set;
   EXPECT_FALSE(set.extend({0, 5}));
   set.insert({0, 5});
   EXPECT_FALSE(set.extend({4, 8}));
@@ -48,7 +48,7 @@ TEST(IntervalSet, ExtendAddsOnlyAtTheEnd) {
 }
 
 TEST(IntervalSet, EraseBelowKeepsTheRestAsItWas) {
-  IntervalSet set;
+  storage::IntervalSet set;
   set.insert({2, 4});
   set.insert({6, 10});
   set.erase_below(2);
@@ -56,12 +56,12 @@ TEST(IntervalSet, EraseBelowKeepsTheRestAsItWas) {
   set.erase_below(7);
   EXPECT_EQ(set.covered({0, 20}), (Intervals{{7, 10}}));
   set.erase_below(10);
-  EXPECT_EQ(set, IntervalSet{});
+  EXPECT_EQ(set, storage::IntervalSet{});
 }
 
 std::set<std::uint64_t> numbers(const Intervals& intervals) {
   std::set<std::uint64_t> found;
-  for (const Interval& interval : intervals) {
+  for (const storage::Interval& interval : intervals) {
     for (std::uint64_t n = interval.first; n < interval.next; ++n) EXPECT_TRUE(found.insert(n).second);
   }
   return found;
@@ -71,11 +71,11 @@ TEST(IntervalSet, AgreesWithANaiveSetUnderRandomInsertions) {
   constexpr std::uint64_t kLimit = 80;
   for (unsigned seed = 0; seed < 200; ++seed) {
     std::mt19937 random{seed};
-    IntervalSet set;
+    storage::IntervalSet set;
     std::set<std::uint64_t> model;
     for (int step = 0; step < 30; ++step) {
       const std::uint64_t first = random() % kLimit;
-      const Interval added{first, first + random() % 12};
+      const storage::Interval added{first, first + random() % 12};
       std::set<std::uint64_t> expected;
       for (std::uint64_t n = added.first; n < added.next; ++n) {
         if (model.insert(n).second) expected.insert(n);
@@ -85,7 +85,7 @@ TEST(IntervalSet, AgreesWithANaiveSetUnderRandomInsertions) {
       while (model.contains(hole)) ++hole;
       ASSERT_EQ(set.first_hole(), hole);
       ASSERT_EQ(set.end(), model.empty() ? 0 : *model.rbegin() + 1);
-      const Interval range{random() % kLimit, kLimit + 20};
+      const storage::Interval range{random() % kLimit, kLimit + 20};
       std::set<std::uint64_t> covered;
       std::set<std::uint64_t> missing;
       for (std::uint64_t n = range.first; n < range.next; ++n) (model.contains(n) ? covered : missing).insert(n);

@@ -31,7 +31,7 @@ class LoadTest : public RecordingTest {
 
   // Of the disk thread, from here on.
   void count(Work& work) {
-    auto job = [&work](Database& database) {
+    auto job = [&work](storage::Database& database) {
       const auto on_trace = [](unsigned kind, void* to, void*, void*) {
         Work& counted = *static_cast<Work*>(to);
         ++(kind == SQLITE_TRACE_ROW ? counted.rows : counted.statements);

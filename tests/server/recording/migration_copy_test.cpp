@@ -49,14 +49,14 @@ class MigrationCopyTest : public RecordingTest {
 TEST_F(MigrationCopyTest, TheDatabaseAsItWasIsKeptBesideIt) {
   const std::string before = dump_of(path_);
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   EXPECT_THAT(files(), ElementsAre("station.sqlite", "station.sqlite.schema-6"));
   EXPECT_EQ(dump_of(copy()), before);
   EXPECT_EQ(fs::status(copy()).permissions(), fs::perms::owner_read | fs::perms::owner_write);
   EXPECT_NE(dump_of(path_), before);
   {
-    const Database again{path_};
+    const storage::Database again{path_};
   }
   EXPECT_THAT(files(), ElementsAre("station.sqlite", "station.sqlite.schema-6"));
 }
@@ -68,7 +68,7 @@ TEST_F(MigrationCopyTest, WhatTheLogHoldsIsInTheCopy) {
   SQLite::Statement holds_the_log{reader, "SELECT * FROM run"};
   ASSERT_TRUE(holds_the_log.executeStep());
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   SQLite::Database kept{copy().string(), SQLite::OPEN_READONLY};
   EXPECT_EQ(kept.execAndGet("SELECT name FROM run WHERE run_id = 1").getString(), "in the log");
@@ -80,10 +80,10 @@ TEST_F(MigrationCopyTest, ANewDatabaseAndARestoredOneHaveNoCopy) {
   fs::create_directory(fresh);
   fs::create_directory(restored);
   {
-    const Database database{fresh / "station.sqlite"};
+    const storage::Database database{fresh / "station.sqlite"};
   }
   EXPECT_EQ(std::distance(fs::directory_iterator{fresh}, {}), 1);
-  restore_database(path_, restored, Author{"cli:test", "", 1});
+  storage::restore_database(path_, restored, station::Author{"cli:test", "", 1});
   std::set<std::string> names;
   for (const auto& entry : fs::directory_iterator{restored}) names.insert(entry.path().filename().string());
   EXPECT_EQ(names, (std::set<std::string>{"station.head.json", "station.sqlite"}));
@@ -98,9 +98,9 @@ TEST_F(MigrationCopyTest, AStartThatWasCutOffLeavesAUsableDatabaseAndOneCopy) {
   if (child == 0) {
     SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE};
     database.exec("PRAGMA journal_mode = WAL");
-    keep_copy_before_migration(database, path_, 6);
+    storage::keep_copy_before_migration(database, path_, 6);
     database.exec("BEGIN IMMEDIATE");
-    database.exec(migrations()[6]);
+    database.exec(storage::migrations()[6]);
     ::_exit(0);  // no destructor runs
   }
   int status = 0;
@@ -109,9 +109,9 @@ TEST_F(MigrationCopyTest, AStartThatWasCutOffLeavesAUsableDatabaseAndOneCopy) {
   EXPECT_EQ(dump_of(path_), before);
   std::ofstream{folder_ / "station.sqlite.schema-6.2.part"} << "of a start that was cut off while it copied";
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
-  EXPECT_EQ(number("PRAGMA user_version"), static_cast<std::int64_t>(migrations().size()));
+  EXPECT_EQ(number("PRAGMA user_version"), static_cast<std::int64_t>(storage::migrations().size()));
   EXPECT_EQ(dump_of(copy()), before);
   EXPECT_FALSE(fs::exists(folder_ / "station.sqlite.schema-6.2"));
 }
@@ -122,13 +122,13 @@ TEST_F(MigrationCopyTest, ACopyThatWasCutOffMakesRoomBeforeTheRoomIsLookedAt) {
   const auto full_with_it = [](const fs::path& folder) -> std::uint64_t {
     return fs::exists(folder / "station.sqlite.schema-6.part") ? 0 : 1'000'000'000'000;
   };
-  keep_copy_before_migration(database, path_, 6, full_with_it);
+  storage::keep_copy_before_migration(database, path_, 6, full_with_it);
   EXPECT_THAT(files(), ElementsAre("station.sqlite", "station.sqlite.schema-6"));
 }
 
 TEST_F(MigrationCopyTest, ACopyThatIsThereStaysAndTheNextHasANumber) {
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   const std::string first = content_of(copy());
   fs::remove(path_);
@@ -140,7 +140,7 @@ TEST_F(MigrationCopyTest, ACopyThatIsThereStaysAndTheNextHasANumber) {
   const std::string second = dump_of(path_);
   std::ofstream{folder_ / "station.sqlite.schema-6.2"} << "not a database";
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   EXPECT_EQ(content_of(copy()), first);
   EXPECT_EQ(content_of(folder_ / "station.sqlite.schema-6.2"), "not a database");

@@ -12,8 +12,8 @@ namespace {
 
 class MigrationTest : public RecordingTest {
  protected:
-  static constexpr BootId kFirstBoot = 18364758544493064720U;  // of tests/data/recording/version_1.sql
-  static constexpr BootId kSecondBoot = 4711;
+  static constexpr station::BootId kFirstBoot = 18364758544493064720U;  // of tests/data/recording/version_1.sql
+  static constexpr station::BootId kSecondBoot = 4711;
 
   void make_version_1() {
     std::ifstream in{std::filesystem::path{TEST_DATA_DIR} / "recording/version_1.sql"};
@@ -56,8 +56,9 @@ class MigrationTest : public RecordingTest {
 
 TEST(Migrations, AreFilesThatAreNumberedFromOne) {
   std::size_t number = 0;
-  for (const base::EmbeddedFile& file : migration_files()) EXPECT_EQ(file.name, std::to_string(++number) + ".sql");
-  EXPECT_EQ(number, migrations().size());
+  for (const base::EmbeddedFile& file : storage::migration_files())
+    EXPECT_EQ(file.name, std::to_string(++number) + ".sql");
+  EXPECT_EQ(number, storage::migrations().size());
   EXPECT_GE(number, 7U);
 }
 
@@ -65,10 +66,10 @@ TEST_F(MigrationTest, EveryRunOfVersion1ReadsTheSame) {
   make_version_1();
   const std::vector<std::string> before = runs_as_read();
   {
-    const Database database{path_};
+    const storage::Database database{path_};
     EXPECT_EQ(database.store_id(), kFirstBoot);  // the file's id is the same number
   }
-  EXPECT_EQ(number("PRAGMA user_version"), static_cast<std::int64_t>(migrations().size()));
+  EXPECT_EQ(number("PRAGMA user_version"), static_cast<std::int64_t>(storage::migrations().size()));
   EXPECT_EQ(runs_as_read(), before);
   EXPECT_EQ(number("SELECT count(*) FROM run_sample WHERE first_received_at_us <> received_at_us"), 0);
   EXPECT_EQ(number("SELECT count(*) FROM run_sample WHERE backfilled"), 50);
@@ -83,12 +84,12 @@ TEST_F(MigrationTest, AMigratedFileHasTheSchemaOfANewOne) {
       "SELECT type, name, sql FROM sqlite_master WHERE name NOT LIKE 'sqlite%' ORDER BY 1, 2";
   make_version_1();
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   const std::vector<std::string> migrated = rows(kSchema);
   std::filesystem::remove(path_);
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   EXPECT_EQ(rows(kSchema), migrated);
 }
@@ -106,12 +107,12 @@ TEST_F(MigrationTest, AStationGoesOnWhereVersion1Stopped) {
   EXPECT_EQ(durable_next_seq_, 100u);
   EXPECT_EQ(rows("SELECT first_row, last_row FROM segment ORDER BY first_row DESC LIMIT 1"),
             std::vector<std::string>{"301|310"});
-  const SamplePage page = wait(history_->samples(2, std::nullopt, 1000)).value();
+  const storage::SamplePage page = wait(history_->samples(2, std::nullopt, 1000)).value();
   EXPECT_EQ(page.samples.size(), 60u);  // interrupted by the stop of version 1
   EXPECT_EQ(page.samples.back().seq, 89u);
-  EXPECT_EQ(wait(runs_->find(2))->state, RunState::interrupted);
+  EXPECT_EQ(wait(runs_->find(2))->state, storage::RunState::interrupted);
   const Run first = wait(runs_->find(1)).value();
-  EXPECT_EQ(first.state, RunState::ended);
+  EXPECT_EQ(first.state, storage::RunState::ended);
   EXPECT_EQ(first.samples_stored, 190u);
   EXPECT_EQ(first.samples_lost, 10u);
 }
@@ -120,8 +121,8 @@ TEST_F(MigrationTest, AStationGoesOnWhereVersion1Stopped) {
 TEST_F(MigrationTest, CommandsOfBeforeTheAuditAreCounted) {
   make_version_1();
   const auto faults = [this] {
-    SQLite::Database database = open_for_reading(path_);
-    return check_audit(database, {}).faults;
+    SQLite::Database database = storage::open_for_reading(path_);
+    return storage::check_audit(database, {}).faults;
   };
   const auto add = [this](std::int64_t id, const char* state) {
     SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE, 5000};
@@ -145,10 +146,10 @@ TEST_F(MigrationTest, CommandsOfBeforeTheAuditAreCounted) {
 
 TEST_F(MigrationTest, ToolsReadVersion1WithoutChangingIt) {
   make_version_1();
-  const auto samples = read_run(path_, 1, 1000);
+  const auto samples = storage::read_run(path_, 1, 1000);
   ASSERT_TRUE(samples.has_value()) << samples.error().detail;
   ASSERT_EQ(samples->size(), 190u);
-  const StoredSample& sample = samples->at(50);  // seq 100 of the first boot
+  const storage::StoredSample& sample = samples->at(50);  // seq 100 of the first boot
   EXPECT_EQ(sample.boot_id, kFirstBoot);
   EXPECT_EQ(sample.first_received_at_us, 1'700'000'002'000'000);
   EXPECT_EQ(sample.received_at_us, 1'700'000'002'000'000);
@@ -162,7 +163,7 @@ TEST_F(MigrationTest, ToolsReadVersion1WithoutChangingIt) {
 
 TEST_F(MigrationTest, TheNewViewsAndTheLatchAreAnsweredByIndex) {
   {
-    const Database database{path_};
+    const storage::Database database{path_};
   }
   EXPECT_EQ(plan("SELECT robot_time_us, iif(kind = 'emergency', emergency_id, 0) FROM event WHERE boot_key = 1"
                  " AND event_seq IS NOT NULL AND kind IN ('emergency', 'emergency_cleared')"
@@ -177,7 +178,7 @@ TEST_F(MigrationTest, TheNewViewsAndTheLatchAreAnsweredByIndex) {
 // What was in force at a span's first sample counts, and what came into force within it; nothing before or after.
 TEST_F(MigrationTest, RunInForceShowsWhatASpanWasMadeWith) {
   make_version_1();
-  Database database{path_};
+  storage::Database database{path_};
   database.handle().exec(
       "INSERT INTO document VALUES (1, 'controller', x'01', '{\"id\":1}'), (2, 'controller', x'02', '{\"id\":2}'),"
       " (3, 'controller', x'0a', '{\"id\":3}'), (4, 'parameters', x'04', '{}');"

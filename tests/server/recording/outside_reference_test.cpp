@@ -16,18 +16,18 @@ using ::testing::IsEmpty;
 
 class OutsideReferenceTest : public RetentionTest {
  protected:
-  RunId make_run() {
+  storage::RunId make_run() {
     keep(0);
-    const RunId run = wait(runs_->create(robot_.id, named("swim"))).value().id;
+    const storage::RunId run = wait(runs_->create(robot_.id, named("swim"))).value().id;
     record(100);
     wait(runs_->end(run, ""));
     return run;
   }
-  static OutsideReference reference_of(RunId run, const std::string& source = "camera.csv") {
-    OutsideReference reference;
+  static storage::OutsideReference reference_of(storage::RunId run, const std::string& source = "camera.csv") {
+    storage::OutsideReference reference;
     reference.run = run;
     reference.source = source;
-    reference.clock = ReferenceClock::correlation;
+    reference.clock = storage::ReferenceClock::correlation;
     reference.clock_offset_s = 1.5;
     reference.clock_sd_s = 0.002;
     reference.correlation = 0.998;
@@ -35,8 +35,8 @@ class OutsideReferenceTest : public RetentionTest {
     reference.made_at_us = 7;
     return reference;
   }
-  static OutsidePositions positions(std::size_t count) {
-    OutsidePositions made;
+  static storage::OutsidePositions positions(std::size_t count) {
+    storage::OutsidePositions made;
     for (std::size_t i = 0; i < count; ++i) {
       made.robot_time_us.push_back(1000 * i);
       made.position_m.push_back(0.5);
@@ -44,34 +44,34 @@ class OutsideReferenceTest : public RetentionTest {
     }
     return made;
   }
-  Result<OutsideReference> import(const OutsideReference& reference, std::size_t count,
-                                  const std::string& reason = "") {
-    OutsideReference counted = reference;
+  Result<storage::OutsideReference> import(const storage::OutsideReference& reference, std::size_t count,
+                                           const std::string& reason = "") {
+    storage::OutsideReference counted = reference;
     counted.samples = count;
     return wait(recording_->references.import(std::move(counted), positions(count), reason, {"token:ana", "", 8}));
   }
   std::vector<std::string> faults() {
-    SQLite::Database database = open_for_reading(path_);
-    return check_store(database, {.run = {}, .integrity = true}).value().faults;
+    SQLite::Database database = storage::open_for_reading(path_);
+    return storage::check_store(database, {.run = {}, .integrity = true}).value().faults;
   }
 };
 
 TEST_F(OutsideReferenceTest, IsThereAsAWholeAndInOrder) {
-  const RunId run = make_run();
-  const std::size_t count = 2 * kReferenceSlice + 7;
+  const storage::RunId run = make_run();
+  const std::size_t count = 2 * storage::kReferenceSlice + 7;
   const auto made = import(reference_of(run), count);
   ASSERT_TRUE(made) << made.error().detail;
-  EXPECT_EQ(made->clock, ReferenceClock::correlation);
+  EXPECT_EQ(made->clock, storage::ReferenceClock::correlation);
   EXPECT_EQ(made->clock_sd_s, 0.002);
   EXPECT_EQ(made->motion_ratio, std::nullopt);
-  const OutsidePositions read = wait(recording_->references.page(run, {}, count + 1))->positions;
+  const storage::OutsidePositions read = wait(recording_->references.page(run, {}, count + 1))->positions;
   ASSERT_EQ(read.size(), count);
   EXPECT_EQ(read.robot_time_us.back(), 1000 * (count - 1));
   EXPECT_THAT(faults(), IsEmpty());
 }
 
 TEST_F(OutsideReferenceTest, ReplacingDeletesThePositionsOfTheOneBeforeAndKeepsItsRow) {
-  const RunId run = make_run();
+  const storage::RunId run = make_run();
   ASSERT_TRUE(import(reference_of(run), 5000));
   EXPECT_EQ(import(reference_of(run, "second.csv"), 3).error().reason, "has_reference");
   EXPECT_EQ(number("SELECT count(*) FROM outside_position"), 5000);
@@ -83,9 +83,9 @@ TEST_F(OutsideReferenceTest, ReplacingDeletesThePositionsOfTheOneBeforeAndKeepsI
 
 // Another connection removes it while a reading one has come so far, by each count of SQLite's steps.
 TEST_F(OutsideReferenceTest, WhatIsReadWhileItIsRemovedIsWholeOrNothing) {
-  const RunId run = make_run();
+  const storage::RunId run = make_run();
   ASSERT_TRUE(import(reference_of(run), 30));
-  SQLite::Database reader = open_for_reading(path_), writer{path_.string(), SQLite::OPEN_READWRITE};
+  SQLite::Database reader = storage::open_for_reading(path_), writer{path_.string(), SQLite::OPEN_READWRITE};
   struct Removal {
     SQLite::Database& database;
     int steps_left;
@@ -106,7 +106,7 @@ TEST_F(OutsideReferenceTest, WhatIsReadWhileItIsRemovedIsWholeOrNothing) {
   for (int steps = 1; not_found + found < 1000; ++steps) {
     Removal removal{writer, steps};
     sqlite3_progress_handler(reader.getHandle(), 1, Removal::on_step, &removal);
-    const auto read = read_reference(reader, run);
+    const auto read = storage::read_reference(reader, run);
     sqlite3_progress_handler(reader.getHandle(), 0, nullptr, nullptr);
     ++(read ? found : not_found);
     if (read) ASSERT_EQ(read->positions.size(), 30U) << "removed after " << steps << " steps";
@@ -118,14 +118,14 @@ TEST_F(OutsideReferenceTest, WhatIsReadWhileItIsRemovedIsWholeOrNothing) {
 }
 
 TEST_F(OutsideReferenceTest, AnExportDuringWhichItIsReplacedHasOneOfTheTwo) {
-  const RunId run = make_run();
+  const storage::RunId run = make_run();
   ASSERT_TRUE(import(reference_of(run), 12'000));  // three pieces
-  SQLite::Database database = open_for_reading(path_);
+  SQLite::Database database = storage::open_for_reading(path_);
   const auto file = folder_ / "run.sqlite";
-  RunFile writer{file,
-                 reading_uri(path_, false),
-                 read_spans(database, run, 0),
-                 {.run = run, .channels = all_channels(), .grid_us = {}}};
+  storage::RunFile writer{file,
+                          storage::reading_uri(path_, false),
+                          storage::read_spans(database, run, 0),
+                          {.run = run, .channels = storage::all_channels(), .grid_us = {}}};
   const auto copied = [&file](const char* sql) {
     SQLite::Database made{file.string(), SQLite::OPEN_READONLY};
     return made.tableExists("outside_position") ? made.execAndGet(sql).getInt64() : 0;
@@ -140,7 +140,7 @@ TEST_F(OutsideReferenceTest, AnExportDuringWhichItIsReplacedHasOneOfTheTwo) {
 }
 
 TEST_F(OutsideReferenceTest, GoesWithItsRun) {
-  const RunId run = make_run();
+  const storage::RunId run = make_run();
   ASSERT_TRUE(import(reference_of(run), 5000));
   pass();
   EXPECT_EQ(number("SELECT count(*) FROM outside_position"), 5000);  // the run holds it
@@ -152,16 +152,16 @@ TEST_F(OutsideReferenceTest, GoesWithItsRun) {
 }
 
 TEST_F(OutsideReferenceTest, ADiscardedRunIsExportedWithoutItsReference) {
-  const RunId run = make_run();
+  const storage::RunId run = make_run();
   ASSERT_TRUE(import(reference_of(run), 5000));
   wait(runs_->discard(run, "loose tube", {}));
   pass();
-  SQLite::Database database = open_for_reading(path_);
+  SQLite::Database database = storage::open_for_reading(path_);
   const auto file = folder_ / "run.sqlite";
-  RunFile writer{file,
-                 reading_uri(path_, false),
-                 read_spans(database, run, 0),
-                 {.run = run, .channels = all_channels(), .grid_us = {}}};
+  storage::RunFile writer{file,
+                          storage::reading_uri(path_, false),
+                          storage::read_spans(database, run, 0),
+                          {.run = run, .channels = storage::all_channels(), .grid_us = {}}};
   while (writer.advance(database)) continue;
   SQLite::Database made{file.string(), SQLite::OPEN_READONLY};
   EXPECT_EQ(made.execAndGet("SELECT count(*) FROM sample").getInt(), 100);
@@ -170,8 +170,8 @@ TEST_F(OutsideReferenceTest, ADiscardedRunIsExportedWithoutItsReference) {
 
 // The station was killed between two pieces.
 TEST_F(OutsideReferenceTest, WhatWasNotFinishedIsNeverInUse) {
-  const RunId run = make_run();
-  wait(recorder_->on_disk([run](Database& database) {
+  const storage::RunId run = make_run();
+  wait(recorder_->on_disk([run](storage::Database& database) {
     const auto id = begin_reference(database.handle(), reference_of(run), "");
     add_positions(database.handle(), *id, positions(10), 0, 10);
     return true;
@@ -186,7 +186,7 @@ TEST_F(OutsideReferenceTest, WhatWasNotFinishedIsNeverInUse) {
 }
 
 TEST_F(OutsideReferenceTest, VerifyNamesPositionsOfNoReference) {
-  const RunId run = make_run();
+  const storage::RunId run = make_run();
   ASSERT_TRUE(import(reference_of(run), 10));
   stop();
   {

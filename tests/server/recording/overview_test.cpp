@@ -14,12 +14,14 @@ namespace {
 
 class OverviewTest : public RandomRecordingTest {
  protected:
-  Overview overview(Excerpt excerpt, std::size_t points, Channels channels = all_channels()) {
+  storage::Overview overview(storage::Excerpt excerpt, std::size_t points,
+                             storage::Channels channels = storage::all_channels()) {
     return wait(history_->overview(std::move(excerpt), {.points = points, .channels = channels})).value();
   }
 
   // The points stand for the samples one after another.
-  static void expect_same(const OverviewColumns& columns, std::span<const StoredSample> samples, Channels channels) {
+  static void expect_same(const storage::OverviewColumns& columns, std::span<const storage::StoredSample> samples,
+                          storage::Channels channels) {
     std::size_t begin = 0;
     for (std::size_t point = 0; point < columns.samples.size(); ++point) {
       ASSERT_GT(columns.samples[point], 0u);
@@ -27,7 +29,7 @@ class OverviewTest : public RandomRecordingTest {
       const auto of_point = samples.subspan(begin, columns.samples[point]);
       EXPECT_EQ(columns.first_utc_us[point], of_point.front().utc_us);
       EXPECT_EQ(columns.last_utc_us[point], of_point.back().utc_us);
-      for (std::size_t channel = 0; channel < kChannels; ++channel) {
+      for (std::size_t channel = 0; channel < storage::kChannels; ++channel) {
         if (channels[channel]) expect_extremes(columns, channel, point, of_point);
       }
       begin += columns.samples[point];
@@ -35,13 +37,13 @@ class OverviewTest : public RandomRecordingTest {
     EXPECT_EQ(begin, samples.size());
   }
 
-  static void expect_extremes(const OverviewColumns& columns, std::size_t channel, std::size_t point,
-                              std::span<const StoredSample> samples) {
+  static void expect_extremes(const storage::OverviewColumns& columns, std::size_t channel, std::size_t point,
+                              std::span<const storage::StoredSample> samples) {
     float min = NAN;
     float max = NAN;
-    for (const StoredSample& stored : samples) {
-      min = std::fmin(min, stored.sample.*kSampleMembers[channel]);
-      max = std::fmax(max, stored.sample.*kSampleMembers[channel]);
+    for (const storage::StoredSample& stored : samples) {
+      min = std::fmin(min, stored.sample.*storage::kSampleMembers[channel]);
+      max = std::fmax(max, stored.sample.*storage::kSampleMembers[channel]);
     }
     const float found_min = columns.min[channel].at(point);
     const float found_max = columns.max[channel].at(point);
@@ -50,10 +52,10 @@ class OverviewTest : public RandomRecordingTest {
   }
 
   // A robot with samples without a hole, stored in segments of 100.
-  RunId record_plain(std::size_t samples) {
+  storage::RunId record_plain(std::size_t samples) {
     start();
     connect(robot_);
-    const RunId run = wait(runs_->create(robot_.id, named("run")))->id;
+    const storage::RunId run = wait(runs_->create(robot_.id, named("run")))->id;
     make(robot_, samples, 25);
     flush();
     return run;
@@ -63,16 +65,16 @@ class OverviewTest : public RandomRecordingTest {
 TEST_F(OverviewTest, SaysWhatAWalkOverTheSamplesSays) {
   for (const unsigned seed : {1U, 2U, 3U, 4U}) {
     SCOPED_TRACE(seed);
-    const RunId run = record(seed);
-    const std::vector<StoredSample> samples = samples_of(run);
+    const storage::RunId run = record(seed);
+    const std::vector<storage::StoredSample> samples = samples_of(run);
     ASSERT_GT(samples.size(), 500u);
     const auto commits = recorder_->counters().commits;
     std::set<bool> sources;
     for (const std::size_t points : {1u, 2u, 3u, 7u, 50u, 300u, 10'000u}) {
       SCOPED_TRACE(points);
-      const OverviewColumns columns = overview(excerpt_of(run), points).columns;
+      const storage::OverviewColumns columns = overview(storage::excerpt_of(run), points).columns;
       EXPECT_LE(columns.samples.size(), points);
-      expect_same(columns, samples, all_channels());
+      expect_same(columns, samples, storage::all_channels());
       sources.insert(columns.from_segments);
     }
     EXPECT_EQ(sources.size(), 2u) << "segments and rows";
@@ -85,36 +87,36 @@ TEST_F(OverviewTest, SaysWhatAWalkOverTheSamplesSays) {
 }
 
 TEST_F(OverviewTest, SaysTheSameOnceTheLastSamplesAreStored) {
-  const RunId run = record(5);
-  const std::vector<StoredSample> samples = samples_of(run);
-  const OverviewColumns before = overview(excerpt_of(run), 20).columns;
+  const storage::RunId run = record(5);
+  const std::vector<storage::StoredSample> samples = samples_of(run);
+  const storage::OverviewColumns before = overview(storage::excerpt_of(run), 20).columns;
   EXPECT_LT(number("SELECT count(*) FROM run_sample"), static_cast<std::int64_t>(samples.size()));
   flush();
-  const OverviewColumns after = overview(excerpt_of(run), 20).columns;
+  const storage::OverviewColumns after = overview(storage::excerpt_of(run), 20).columns;
   EXPECT_EQ(before.samples, after.samples);
   EXPECT_EQ(before.last_utc_us, after.last_utc_us);
-  expect_same(after, samples, all_channels());
+  expect_same(after, samples, storage::all_channels());
 }
 
 TEST_F(OverviewTest, ListsTheGaps) {
-  const RunId run = record(6);
-  const GapPage first = overview(excerpt_of(run), 50).gaps;
-  const std::vector<Gap>& gaps = first.gaps;
+  const storage::RunId run = record(6);
+  const storage::GapPage first = overview(storage::excerpt_of(run), 50).gaps;
+  const std::vector<storage::Gap>& gaps = first.gaps;
   EXPECT_FALSE(first.next.has_value());
-  const std::vector<Gap> listed = wait(history_->gaps(excerpt_of(run)))->gaps;
+  const std::vector<storage::Gap> listed = wait(history_->gaps(storage::excerpt_of(run)))->gaps;
   ASSERT_GT(gaps.size(), 1u);
   ASSERT_EQ(gaps.size(), listed.size());
   for (std::size_t index = 0; index < gaps.size(); ++index) EXPECT_EQ(gaps[index].first_seq, listed[index].first_seq);
 }
 
 TEST_F(OverviewTest, HoldsOnlyTheChannelsThatAreAskedFor) {
-  const RunId run = record(7);
-  const std::vector<StoredSample> samples = samples_of(run);
-  const Channels channels = parse_channels("duty,position_m").value();
+  const storage::RunId run = record(7);
+  const std::vector<storage::StoredSample> samples = samples_of(run);
+  const storage::Channels channels = storage::parse_channels("duty,position_m").value();
   for (const std::size_t points : {3u, 500u}) {
-    const OverviewColumns columns = overview(excerpt_of(run), points, channels).columns;
+    const storage::OverviewColumns columns = overview(storage::excerpt_of(run), points, channels).columns;
     expect_same(columns, samples, channels);
-    for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    for (std::size_t channel = 0; channel < storage::kChannels; ++channel) {
       EXPECT_EQ(columns.min[channel].empty(), !channels[channel]);
     }
   }
@@ -122,22 +124,22 @@ TEST_F(OverviewTest, HoldsOnlyTheChannelsThatAreAskedFor) {
 
 // 0.4 of the points, or a segment to a point.
 TEST_F(OverviewTest, ReadsRowsOnlyWhileSegmentsAreTooFew) {
-  const RunId run = record_plain(2000);
+  const storage::RunId run = record_plain(2000);
   ASSERT_EQ(number("SELECT count(*) FROM segment"), 20);
-  EXPECT_TRUE(overview(excerpt_of(run), 20).columns.from_segments);
-  EXPECT_TRUE(overview(excerpt_of(run), 50).columns.from_segments);
-  EXPECT_FALSE(overview(excerpt_of(run), 51).columns.from_segments);
-  EXPECT_EQ(overview(excerpt_of(run), 20).columns.samples, (std::vector<std::uint64_t>(20, 100)));
-  EXPECT_EQ(overview(excerpt_of(run), 50).columns.samples, (std::vector<std::uint64_t>(20, 100)));
-  EXPECT_EQ(overview(excerpt_of(run), 200).columns.samples, (std::vector<std::uint64_t>(200, 10)));
+  EXPECT_TRUE(overview(storage::excerpt_of(run), 20).columns.from_segments);
+  EXPECT_TRUE(overview(storage::excerpt_of(run), 50).columns.from_segments);
+  EXPECT_FALSE(overview(storage::excerpt_of(run), 51).columns.from_segments);
+  EXPECT_EQ(overview(storage::excerpt_of(run), 20).columns.samples, (std::vector<std::uint64_t>(20, 100)));
+  EXPECT_EQ(overview(storage::excerpt_of(run), 50).columns.samples, (std::vector<std::uint64_t>(20, 100)));
+  EXPECT_EQ(overview(storage::excerpt_of(run), 200).columns.samples, (std::vector<std::uint64_t>(200, 10)));
 }
 
 TEST_F(OverviewTest, ARunWithoutSamplesHasNoPoints) {
   start();
   connect(robot_);
-  const RunId run = wait(runs_->create(robot_.id, named("run")))->id;
-  EXPECT_EQ(overview(excerpt_of(run), 2000).columns.samples.size(), 0u);
-  EXPECT_EQ(wait(history_->overview(excerpt_of(99), {})).error().code, ErrorCode::not_found);
+  const storage::RunId run = wait(runs_->create(robot_.id, named("run")))->id;
+  EXPECT_EQ(overview(storage::excerpt_of(run), 2000).columns.samples.size(), 0u);
+  EXPECT_EQ(wait(history_->overview(storage::excerpt_of(99), {})).error().code, ErrorCode::not_found);
   EXPECT_EQ(wait(history_->overview({.run = {}, .robot_id = "nobody", .window = {}}, {})).error().code,
             ErrorCode::not_found);
 }
@@ -149,26 +151,27 @@ TEST_F(OverviewTest, AWindowOfARobotHoldsTheSamplesOfThatTime) {
        {std::pair{0L, 1L << 52}, {500L, 600L}, {499L, 601L}, {0L, 1L}, {1999L, 2000L}, {1234L, 1999L}}) {
     const auto [first, next] = window;
     SCOPED_TRACE(first);
-    const TimeWindow asked{begin_us + first * 10'000, begin_us + std::min(next, 100'000L) * 10'000};
-    const Excerpt excerpt{.run = {}, .robot_id = robot_.id, .window = asked};
+    const storage::TimeWindow asked{begin_us + first * 10'000, begin_us + std::min(next, 100'000L) * 10'000};
+    const storage::Excerpt excerpt{.run = {}, .robot_id = robot_.id, .window = asked};
     for (const std::size_t points : {2u, 700u}) {
-      const OverviewColumns columns = overview(excerpt, points).columns;
+      const storage::OverviewColumns columns = overview(excerpt, points).columns;
       EXPECT_EQ(columns.first_utc_us.front(), asked.from_us);
       EXPECT_EQ(columns.last_utc_us.back(), begin_us + (std::min(next, 2000L) - 1) * 10'000);
     }
   }
-  const Excerpt before{.run = {}, .robot_id = robot_.id, .window = TimeWindow{0, begin_us}};
-  const Excerpt after{.run = {}, .robot_id = robot_.id, .window = TimeWindow{begin_us + 20'000'000, 1L << 53}};
+  const storage::Excerpt before{.run = {}, .robot_id = robot_.id, .window = storage::TimeWindow{0, begin_us}};
+  const storage::Excerpt after{
+      .run = {}, .robot_id = robot_.id, .window = storage::TimeWindow{begin_us + 20'000'000, 1L << 53}};
   EXPECT_EQ(overview(before, 10).columns.samples.size(), 0u);
   EXPECT_EQ(overview(after, 10).columns.samples.size(), 0u);
 }
 
 // Each slice is a question of its own, after which a coroutine may be cancelled.
 TEST_F(OverviewTest, AsksInSlices) {
-  const RunId run = record_plain(45'000);
+  const storage::RunId run = record_plain(45'000);
   const auto questions_for = [&](std::size_t points) {
     const auto before = history_->reader().questions();
-    overview(excerpt_of(run), points);
+    overview(storage::excerpt_of(run), points);
     return history_->reader().questions() - before;
   };
   EXPECT_EQ(questions_for(100), 3u);     // spans, gaps, segments
@@ -180,8 +183,8 @@ TEST_F(OverviewTest, HoldsARobotThatBeginsFarAhead) {
   robot_.next_seq = robot_.oldest_seq = std::uint64_t{1} << 61;
   connect(robot_);
   make(robot_, 20);
-  const Excerpt all{.run = {}, .robot_id = robot_.id, .window = {}};
-  const OverviewColumns columns = overview(all, 10'000).columns;
+  const storage::Excerpt all{.run = {}, .robot_id = robot_.id, .window = {}};
+  const storage::OverviewColumns columns = overview(all, 10'000).columns;
   EXPECT_EQ(columns.samples, (std::vector<std::uint64_t>{20}));
   EXPECT_EQ(wait(history_->gaps(all))->missing.size(), 0u);
 }
@@ -190,17 +193,17 @@ TEST_F(OverviewTest, HoldsARobotThatBeginsFarAhead) {
 TEST_F(OverviewTest, SlicesOfSegmentsJoinWithoutASeam) {
   start();
   connect(robot_);
-  const RunId run = wait(runs_->create(robot_.id, named("run")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("run")))->id;
   for (int sample = 0; sample < 5'050; ++sample) {
     robot_.context.mode = sample % 2 == 0 ? rheonaut_MODE_AUTO : rheonaut_MODE_MANUAL;
     make(robot_, 1);
   }
   flush();
   ASSERT_EQ(number("SELECT count(*) FROM segment"), 5'050);
-  const OverviewColumns columns = overview(excerpt_of(run), 50).columns;
+  const storage::OverviewColumns columns = overview(storage::excerpt_of(run), 50).columns;
   EXPECT_TRUE(columns.from_segments);
   EXPECT_EQ(columns.samples, (std::vector<std::uint64_t>(50, 101)));
-  expect_same(columns, samples_of(run), all_channels());
+  expect_same(columns, samples_of(run), storage::all_channels());
 }
 
 TEST_F(OverviewTest, TheCountOfSegmentsIsAnsweredByTheIndexAlone) {

@@ -17,13 +17,13 @@ TEST_F(PurgeTest, SlicesOfAnySizeRemoveTheSame) {
   keep(0);
   record(1000);
   ASSERT_TRUE(wait(runs_->create(robot_.id, named("open"))));
-  SQLite::Database database = open_for_reading(path_);
+  SQLite::Database database = storage::open_for_reading(path_);
   const auto seqs = [&](std::size_t limit) {
     std::vector<std::uint64_t> firsts;
-    RetentionPlan plan = planned();
-    RetentionPlan::Step step{plan, database};
+    storage::RetentionPlan plan = planned();
+    storage::RetentionPlan::Step step{plan, database};
     while (!plan.empty()) {
-      for (const StoredSegment& segment : step.next(limit)) firsts.push_back(segment.samples.first);
+      for (const storage::StoredSegment& segment : step.next(limit)) firsts.push_back(segment.samples.first);
     }
     return firsts;
   };
@@ -32,12 +32,12 @@ TEST_F(PurgeTest, SlicesOfAnySizeRemoveTheSame) {
 }
 
 // Each look at it takes a while.
-class TickingClock final : public Clock {
+class TickingClock final : public runtime::Clock {
  public:
   explicit TickingClock(microseconds tick) : tick_us_{tick.count()} {}
   std::int64_t steady_us() const override { return steady_us_ += tick_us_; }
   std::int64_t utc_us() const override { return 0; }
-  using Clock::sleep_until;
+  using runtime::Clock::sleep_until;
   boost::asio::awaitable<void> sleep_until(std::int64_t, Alarm*) override { co_return; }
 
  private:
@@ -51,12 +51,12 @@ TEST_F(PurgeTest, AStepEndsByTheClock) {
   record(20'000);
   for (const auto& [tick, removed] : std::vector<std::pair<microseconds, std::uint64_t>>{
            {1ms, 10 * 400}, {4ms, 3 * 400}, {10ms, 400}, {100ms, 400}}) {
-    RetentionPlan plan = planned();
-    auto step = [&](Database& database) { return purge_step(database.handle(), plan, TickingClock{tick}, 0); };
+    storage::RetentionPlan plan = planned();
+    auto step = [&](storage::Database& database) { return purge_step(database.handle(), plan, TickingClock{tick}, 0); };
     EXPECT_EQ(wait(recorder_->on_disk(step)), removed) << tick.count();
   }
-  RetentionPlan plan = planned();
-  auto step = [&](Database& database) { return purge_step(database.handle(), plan, clock_, 0); };
+  storage::RetentionPlan plan = planned();
+  auto step = [&](storage::Database& database) { return purge_step(database.handle(), plan, clock_, 0); };
   EXPECT_LE(wait(recorder_->on_disk(step)), 10'000U) << "and no transaction is large on a fast one";
   EXPECT_THAT(gaps(), ::testing::SizeIs(1));
 }
@@ -64,7 +64,7 @@ TEST_F(PurgeTest, AStepEndsByTheClock) {
 TEST_F(PurgeTest, AStepThatGivesPagesBackEndsByTheClock) {
   keep(0);
   record(120'000);
-  RetentionPlan plan = planned();
+  storage::RetentionPlan plan = planned();
   carry_out(plan);
   const std::int64_t free_before = number("PRAGMA freelist_count");
   ASSERT_GT(free_before, 500);
@@ -72,12 +72,14 @@ TEST_F(PurgeTest, AStepThatGivesPagesBackEndsByTheClock) {
   std::uint64_t all = 0;
   for (const auto& [tick, expected] :
        std::vector<std::pair<microseconds, std::uint64_t>>{{1ms, 10 * 16}, {4ms, 3 * 16}, {10ms, 16}, {100ms, 16}}) {
-    auto step = [&](Database& database) { return shrink_step(database.handle(), TickingClock{tick}); };
+    auto step = [&](storage::Database& database) {
+      return storage::shrink_step(database.handle(), TickingClock{tick});
+    };
     const std::uint64_t returned = wait(recorder_->on_disk(step));
     EXPECT_EQ(returned, expected) << tick.count();
     all += returned;
   }
-  auto step = [&](Database& database) { return shrink_step(database.handle(), clock_); };
+  auto step = [&](storage::Database& database) { return storage::shrink_step(database.handle(), clock_); };
   const std::uint64_t returned = wait(recorder_->on_disk(step));
   EXPECT_EQ(returned, 256U) << "and no transaction is large on a fast one";
   EXPECT_EQ(number("PRAGMA freelist_count"), free_before - static_cast<std::int64_t>(all + returned));
@@ -88,9 +90,9 @@ TEST_F(PurgeTest, AStepThatGivesPagesBackEndsByTheClock) {
 TEST_F(PurgeTest, ARunMadeWhileAPurgeIsUnderWayHoldsItsSamples) {
   keep(0);
   record(2000);
-  RetentionPlan plan = planned();
+  storage::RetentionPlan plan = planned();
   const Result<Run> made =
-      wait(runs_->make_afterwards(robot_.id, named("in time"), SeqSpan{robot_.boot_id, 650, 849}, {}));
+      wait(runs_->make_afterwards(robot_.id, named("in time"), storage::SeqSpan{robot_.boot_id, 650, 849}, {}));
   ASSERT_TRUE(made.has_value());
   const auto before = runs();
   carry_out(plan);
@@ -101,8 +103,8 @@ TEST_F(PurgeTest, ARunMadeWhileAPurgeIsUnderWayHoldsItsSamples) {
 TEST_F(PurgeTest, ARunThatComesToABootWhileAPurgeIsUnderWayHoldsIt) {
   keep(0);
   record(1000);
-  const RunId run = wait(runs_->create(robot_.id, named("open")))->id;
-  RetentionPlan plan = planned();
+  const storage::RunId run = wait(runs_->create(robot_.id, named("open")))->id;
+  storage::RetentionPlan plan = planned();
   execute(fmt::format("UPDATE run_span SET first_seq = 300 WHERE run_id = {}", run));
   carry_out(plan);
   EXPECT_THAT(gaps(), IsEmpty());
@@ -120,7 +122,7 @@ TEST_F(PurgeTest, ABootThatComesBackWhileAPurgeIsUnderWayKeepsItsNewestSegment) 
   connect(robot_);
   record(100);
   clock_.run_for(3s);  // until the recorder has forgotten the first one
-  RetentionPlan plan = planned();
+  storage::RetentionPlan plan = planned();
   connect(first);
   wait(recorder_->flush_boots());
   carry_out(plan);
@@ -137,8 +139,8 @@ TEST_F(PurgeTest, AllBootsAreLookedAtAFewAtATime) {
     connect(robot_);
   }
   flush();
-  SQLite::Database database = open_for_reading(path_);
-  RetentionPlan plan{std::nullopt};
+  SQLite::Database database = storage::open_for_reading(path_);
+  storage::RetentionPlan plan{std::nullopt};
   EXPECT_TRUE(plan.look(database));
   EXPECT_FALSE(plan.look(database));
   age(8 * kDay);
@@ -161,7 +163,7 @@ TEST_F(PurgeTest, CommitsGoInBetween) {
   }
   EXPECT_GT(commits, 3);
   clock_.run_for(1s);
-  SQLite::Database database = open_for_reading(path_);
+  SQLite::Database database = storage::open_for_reading(path_);
   EXPECT_THAT(coverage_faults(database), IsEmpty());
   EXPECT_EQ(gaps(), Rows{"0|199999|retention"});
 }
@@ -169,7 +171,7 @@ TEST_F(PurgeTest, CommitsGoInBetween) {
 TEST(SampleAges, KeepANoteForEachHundredthOfTheAge) {
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  SampleAges ages{clock, microseconds{100h}.count()};
+  storage::SampleAges ages{clock, microseconds{100h}.count()};
   EXPECT_FALSE(ages.limit().covers(1, 0)) << "nothing is known yet";
   ages.begin(1000);
   EXPECT_FALSE(ages.limit().covers(1000, 0));

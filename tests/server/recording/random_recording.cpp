@@ -16,8 +16,8 @@ float RandomRecordingTest::any_value() {
   }
 }
 
-SampleContext RandomRecordingTest::any_context() {
-  SampleContext context = manual_at_100_hz();
+station::SampleContext RandomRecordingTest::any_context() {
+  station::SampleContext context = manual_at_100_hz();
   context.mode = random_() % 2 == 0 ? rheonaut_MODE_AUTO : rheonaut_MODE_EMERGENCY;
   context.sub_state = random_() % 2 == 0 ? rheonaut_SUB_STATE_NAVIGATING : rheonaut_SUB_STATE_NONE;
   if (random_() % 2 == 0) context.setpoint_m = static_cast<float>(random_() % 10) / 10;
@@ -40,8 +40,8 @@ void RandomRecordingTest::make_some() {
   if (random_() % 20 == 0) robot_.oldest_seq = robot_.next_seq += random_() % 50;  // the ring ran over
   if (random_() % 20 == 0) robot_.late_us += random_() % 300'000;                  // periods were skipped
   if (random_() % 40 == 0) utc_step_us_ -= 3'600'000'000;                          // the station's clock was set back
-  SampleBatch batch = robot_.batch(robot_.next_seq, 1 + random_() % 25);
-  for (Sample& sample : batch.samples) {
+  station::SampleBatch batch = robot_.batch(robot_.next_seq, 1 + random_() % 25);
+  for (station::Sample& sample : batch.samples) {
     sample = {any_value(), any_value(), any_value(), any_value(), any_value(), std::numeric_limits<float>::quiet_NaN()};
   }
   batch.utc_offset_us += utc_step_us_;
@@ -54,14 +54,14 @@ void RandomRecordingTest::make_some() {
   send(robot_, batch);
 }
 
-RunId RandomRecordingTest::record(unsigned seed, int rounds) {
+storage::RunId RandomRecordingTest::record(unsigned seed, int rounds) {
   random_.seed(seed);
   withheld_.clear();
   utc_step_us_ = 0;
   start();
   connect(robot_);
   make_some();
-  const RunId run = wait(runs_->create(robot_.id, named("everything")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("everything")))->id;
   for (int round = 0; round < rounds; ++round) {
     if (round == rounds / 2) {
       withheld_.clear();
@@ -71,7 +71,7 @@ RunId RandomRecordingTest::record(unsigned seed, int rounds) {
     }
     make_some();
     if (random_() % 4 == 0 && !withheld_.empty()) {  // backfill; the last withheld are never sent
-      SampleBatch late = withheld_.front();
+      station::SampleBatch late = withheld_.front();
       late.context.flags |= rheonaut_TELEMETRY_FLAG_BACKFILL;
       withheld_.erase(withheld_.begin());
       send(robot_, late);
@@ -82,11 +82,11 @@ RunId RandomRecordingTest::record(unsigned seed, int rounds) {
   return run;
 }
 
-std::vector<StoredSample> RandomRecordingTest::samples_of(RunId run) {
-  std::vector<StoredSample> samples;
-  std::optional<SampleCursor> after;
+std::vector<storage::StoredSample> RandomRecordingTest::samples_of(storage::RunId run) {
+  std::vector<storage::StoredSample> samples;
+  std::optional<storage::SampleCursor> after;
   do {
-    const SamplePage page = wait(history_->samples(run, after, 777)).value();
+    const storage::SamplePage page = wait(history_->samples(run, after, 777)).value();
     samples.insert(samples.end(), page.samples.begin(), page.samples.end());
     after = page.next;
   } while (after);

@@ -11,19 +11,19 @@ namespace server {
 class RandomRecordingTest : public RecordingTest {
  protected:
   // Begins a station and records with these random numbers; the last samples are not stored yet. Returns the run.
-  RunId record(unsigned seed, int rounds = 120);
+  storage::RunId record(unsigned seed, int rounds = 120);
 
   // Every sample of the run, page by page.
-  std::vector<StoredSample> samples_of(RunId run);
+  std::vector<storage::StoredSample> samples_of(storage::RunId run);
 
   float any_value();
-  SampleContext any_context();
+  station::SampleContext any_context();
   void make_some();
 
   TestRobot robot_;
   std::mt19937 random_;
   std::int64_t utc_step_us_ = 0;
-  std::vector<SampleBatch> withheld_;  // made, and not sent yet
+  std::vector<station::SampleBatch> withheld_;  // made, and not sent yet
 };
 
 }  // namespace server

@@ -14,7 +14,7 @@ class RecordedValuesTest : public RecordingTest {
 TEST_F(RecordedValuesTest, AnEventIsStoredWithItsCauseThatOfTheLatchAndItsDetail) {
   start();
   connect(robot_);
-  RobotEvent event;
+  station::RobotEvent event;
   event.robot_id = robot_.id;
   event.boot_id = robot_.boot_id;
   event.event_seq = 0;
@@ -22,11 +22,11 @@ TEST_F(RecordedValuesTest, AnEventIsStoredWithItsCauseThatOfTheLatchAndItsDetail
   event.cause = "link_loss";
   event.emergency_cause = rheonaut_EMERGENCY_CAUSE_OPERATOR;
   event.detail = "a sentence";
-  recorder_->on_event(state_of(robot_, LinkState::connected), event);
+  recorder_->on_event(state_of(robot_, station::LinkState::connected), event);
   wait(recorder_->flush_records());
   EXPECT_EQ(rows("SELECT kind, cause, emergency_cause, detail FROM robot_event"),
             Rows{"link_lost|link_loss|operator|a sentence"});
-  const RobotEvent read = wait(history_->events(robot_.id, 1)).at(0);
+  const station::RobotEvent read = wait(history_->events(robot_.id, 1)).at(0);
   EXPECT_EQ(read.cause, event.cause);
   EXPECT_EQ(read.emergency_cause, event.emergency_cause);
   EXPECT_EQ(read.detail, event.detail);
@@ -48,9 +48,9 @@ TEST_F(RecordedValuesTest, WhatANewerFirmwareSaysIsStoredWithItsNumberAndReadBac
   start();
   robot_.context.mode = static_cast<protocol::Mode>(17);
   connect(robot_);
-  const RunId run = wait(runs_->create(robot_.id, named("newer")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("newer")))->id;
   make(robot_, 100);
-  RobotEvent event;
+  station::RobotEvent event;
   event.robot_id = robot_.id;
   event.boot_id = robot_.boot_id;
   event.event_seq = 0;
@@ -58,15 +58,15 @@ TEST_F(RecordedValuesTest, WhatANewerFirmwareSaysIsStoredWithItsNumberAndReadBac
   event.mode = static_cast<protocol::Mode>(17);
   event.emergency_cause = static_cast<protocol::EmergencyCause>(30);
   event.unknown_values = R"({"kind":90,"mode":17,"emergency_cause":30})";
-  recorder_->on_event(state_of(robot_, LinkState::connected), event);
+  recorder_->on_event(state_of(robot_, station::LinkState::connected), event);
   flush();
   EXPECT_EQ(rows("SELECT DISTINCT mode, sub_state, unknown_values FROM run_sample WHERE run_id = 1"),
             Rows{R"(unknown|none|{"mode":17})"});
   EXPECT_EQ(rows("SELECT kind, mode, emergency_cause, unknown_values ->> 'kind' FROM robot_event"),
             Rows{"unknown|unknown|unknown|90"});
-  const SamplePage page = wait(history_->samples(run, std::nullopt, 1000)).value();
+  const storage::SamplePage page = wait(history_->samples(run, std::nullopt, 1000)).value();
   EXPECT_EQ(static_cast<int>(page.samples.at(0).mode), 17);
-  const RobotEvent read = wait(history_->events(robot_.id, 1)).at(0);
+  const station::RobotEvent read = wait(history_->events(robot_.id, 1)).at(0);
   EXPECT_EQ(static_cast<int>(read.mode), 17);
   EXPECT_EQ(static_cast<int>(*read.emergency_cause), 30);
   EXPECT_EQ(read.unknown_values, event.unknown_values);
@@ -77,14 +77,14 @@ TEST_F(RecordedValuesTest, WhatWasStoredAsUnknownWithoutANumberStaysUnknown) {
   start();
   robot_.context.mode = static_cast<protocol::Mode>(17);
   connect(robot_);
-  const RunId run = wait(runs_->create(robot_.id, named("of before")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("of before")))->id;
   make(robot_, 100);
   flush();
   {
     SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE, 5000};
     database.exec("UPDATE segment SET unknown_values = NULL");
   }
-  const SamplePage page = wait(history_->samples(run, std::nullopt, 1000)).value();
+  const storage::SamplePage page = wait(history_->samples(run, std::nullopt, 1000)).value();
   EXPECT_STREQ(protocol::text(page.samples.at(0).mode), "unknown");
 }
 
@@ -93,14 +93,14 @@ TEST_F(RecordedValuesTest, WhatCannotBeRecordedIsAFinalGap) {
   start();
   connect(robot_);
   make(robot_, 10);
-  RobotState state = state_of(robot_, LinkState::connected);
+  station::RobotState state = state_of(robot_, station::LinkState::connected);
   state.last_received_at_us = clock_.utc_us();
   recorder_->on_unusable_samples(state, 10, 15);
   recorder_->on_unusable_samples(state, 5, 12);  // again, with some that are stored
   recorder_->on_unusable_event(state, 0);
   robot_.next_seq = 15;
   make(robot_, 85);
-  RobotEvent event;
+  station::RobotEvent event;
   event.robot_id = robot_.id;
   event.boot_id = robot_.boot_id;
   event.event_seq = 1;

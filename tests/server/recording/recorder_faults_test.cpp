@@ -17,7 +17,7 @@ class ForeignWriter {
 };
 
 TEST_F(RecorderFaultsTest, AFullQueueRefusesAndAsksAgainSoThatSentIsStoredPlusLost) {
-  RecorderOptions options;
+  storage::RecorderOptions options;
   options.max_queued_samples = 30;
   start(options);
   connect(robot_);
@@ -93,27 +93,27 @@ TEST_F(RecorderFaultsTest, CloseDoesNotThrowWhenTheDiskFails) {
 }
 
 TEST_F(RecorderFaultsTest, AFullQueueStillTakesEveryStopAndTheNewestStateOfACommand) {
-  RecorderOptions options;
+  storage::RecorderOptions options;
   options.max_queued_records = 2;
   start(options);
-  send_command(1, "set_duty", CommandState::queued);
-  send_command(2, "set_duty", CommandState::queued);
-  send_command(3, "set_duty", CommandState::queued);  // beyond the limit
-  send_command(1, "set_duty", CommandState::acknowledged);
-  send_command(4, "emergency_stop", CommandState::queued);
-  send_command(5, "emergency_stop", CommandState::queued);
-  send_command(5, "emergency_stop", CommandState::acknowledged);
+  send_command(1, "set_duty", station::CommandState::queued);
+  send_command(2, "set_duty", station::CommandState::queued);
+  send_command(3, "set_duty", station::CommandState::queued);  // beyond the limit
+  send_command(1, "set_duty", station::CommandState::acknowledged);
+  send_command(4, "emergency_stop", station::CommandState::queued);
+  send_command(5, "emergency_stop", station::CommandState::queued);
+  send_command(5, "emergency_stop", station::CommandState::acknowledged);
   EXPECT_EQ(recorder_->counters().records_refused, 1u);
   flush();
   EXPECT_EQ(rows("SELECT command_id, state FROM command ORDER BY command_id"),
             (Rows{"1|acknowledged", "2|queued", "4|queued", "5|acknowledged"}));
-  send_command(4, "emergency_stop", CommandState::acknowledged);
+  send_command(4, "emergency_stop", station::CommandState::acknowledged);
   flush();
   EXPECT_EQ(rows("SELECT state FROM command WHERE command_id = 4"), Rows{"acknowledged"});
 }
 
 TEST_F(RecorderFaultsTest, AnEventThatTheFullQueueRefusedIsAskedForAgain) {
-  RecorderOptions options;
+  storage::RecorderOptions options;
   options.max_queued_records = 2;
   start(options);
   connect(robot_);

@@ -18,7 +18,7 @@ class RecorderFixture : public RecordingTest {
   std::int64_t samples() { return number("SELECT count(*) FROM sample"); }
 
   void send_event(const TestRobot& robot, std::uint64_t event_seq, std::uint64_t oldest = 0) {
-    RobotEvent event;
+    station::RobotEvent event;
     event.robot_id = robot.id;
     event.boot_id = robot.boot_id;
     event.event_seq = event_seq;
@@ -26,11 +26,11 @@ class RecorderFixture : public RecordingTest {
     event.kind = "mode_changed";
     event.cause = "command";
     event.mode = rheonaut_MODE_AUTO;
-    recorder_->on_event(state_of(robot, LinkState::connected), event);
+    recorder_->on_event(state_of(robot, station::LinkState::connected), event);
   }
 
-  void send_command(CommandId id, const char* kind, CommandState state) {
-    CommandRecord command;
+  void send_command(station::CommandId id, const char* kind, station::CommandState state) {
+    station::CommandRecord command;
     command.id = id;
     command.robot_id = robot_.id;
     command.kind = kind;

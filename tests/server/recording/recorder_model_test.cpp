@@ -74,14 +74,14 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
   }
 
   void send_event(const TestRobot& robot, std::uint64_t event_seq) {
-    RobotEvent event;
+    station::RobotEvent event;
     event.oldest_event_seq = oldest_event_seq();
     const std::uint64_t refused = recorder_->counters().records_refused;
     event.robot_id = robot.id;
     event.boot_id = robot.boot_id;
     event.event_seq = event_seq;
     event.kind = "mode_changed";
-    recorder_->on_event(state_of(robot, LinkState::connected), event);
+    recorder_->on_event(state_of(robot, station::LinkState::connected), event);
     if (recorder_->counters().records_refused == refused) heard_events_.insert(event_seq);
   }
 
@@ -93,14 +93,15 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
   // Each event is stored once or listed as lost; what was received is stored, and what the robot holds is not lost.
   void expect_every_event_once(const TestRobot& robot) {
     std::map<std::uint64_t, int> seen;
-    SQLite::Database database = open_for_reading(path_);
+    SQLite::Database database = storage::open_for_reading(path_);
     SQLite::Statement ranges{database,
                              "SELECT event_seq, event_seq, 0 FROM event WHERE boot_key = ?1 UNION ALL"
                              " SELECT first_event_seq, last_event_seq, 1 FROM event_gap WHERE boot_key = ?1"};
     ranges.bind(1, key_of(database, robot));
     while (ranges.executeStep()) {
       const bool is_lost = ranges.getColumn(2).getInt() != 0;
-      for (auto seq = unsigned_id(ranges.getColumn(0)); seq <= unsigned_id(ranges.getColumn(1)); ++seq) {
+      for (auto seq = storage::unsigned_id(ranges.getColumn(0)); seq <= storage::unsigned_id(ranges.getColumn(1));
+           ++seq) {
         ++seen[seq];
         if (is_lost) EXPECT_FALSE(heard_events_.contains(seq)) << "event " << seq;
         if (is_lost) EXPECT_LT(seq, oldest_event_seq());
@@ -115,21 +116,21 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
   // stored as durable of a boot is no more than is there.
   void check_on_the_way(const TestRobot& robot) {
     std::set<std::uint64_t> waiting;
-    for (const Segment& segment : recorder_->waiting(robot.boot_id, {0, robot.next_seq})) {
+    for (const storage::Segment& segment : recorder_->waiting(robot.boot_id, {0, robot.next_seq})) {
       for (std::uint64_t seq = segment.first_seq; seq < segment.next_seq(); ++seq) {
         ASSERT_TRUE(waiting.insert(seq).second) << seq << " waits twice";
         ASSERT_FLOAT_EQ(segment.samples[seq - segment.first_seq].position_m, static_cast<float>(seq) / 1000);
       }
     }
-    IntervalSet here;
-    SQLite::Database database = open_for_reading(path_);
+    storage::IntervalSet here;
+    SQLite::Database database = storage::open_for_reading(path_);
     SQLite::Statement stored{database,
                              "SELECT first_seq, last_seq + 1, 0 FROM segment WHERE boot_key = ?1 UNION ALL"
                              " SELECT first_seq, last_seq + 1, 1 FROM gap WHERE boot_key = ?1"};
     stored.bind(1, key_of(database, robot));
     while (stored.executeStep()) {
-      const Interval range{static_cast<std::uint64_t>(stored.getColumn(0).getInt64()),
-                           static_cast<std::uint64_t>(stored.getColumn(1).getInt64())};
+      const storage::Interval range{static_cast<std::uint64_t>(stored.getColumn(0).getInt64()),
+                                    static_cast<std::uint64_t>(stored.getColumn(1).getInt64())};
       ASSERT_EQ(count(here.insert(range)), range.next - range.first) << "stored twice";
       const auto waits = waiting.lower_bound(range.first);
       ASSERT_TRUE(waits == waiting.end() || *waits >= range.next) << *waits << " is stored, and waits";
@@ -138,7 +139,8 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
     const std::string boot = " FROM boot WHERE boot_key = " + std::to_string(key_of(database, robot));
     EXPECT_LE(database.execAndGet("SELECT coalesce(max(durable_next_seq), 0)" + boot).getInt64(),
               static_cast<std::int64_t>(here.first_hole()));
-    for (const LostRange& gap : recorder_->waiting_gaps(robot.boot_id, {0, robot.next_seq})) here.insert(gap.lost);
+    for (const storage::LostRange& gap : recorder_->waiting_gaps(robot.boot_id, {0, robot.next_seq}))
+      here.insert(gap.lost);
     for (const std::uint64_t seq : heard_) ASSERT_TRUE(waiting.contains(seq) || here.contains(seq)) << seq;
     for (const std::uint64_t seq : waiting) ASSERT_LT(seq, robot.next_seq);
   }
@@ -197,40 +199,42 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
   }
 
   // How often each sample is stored or listed as lost, boot by boot; each that is stored is what was sent.
-  std::map<BootId, std::map<std::uint64_t, int>> recorded(const TestRobot& robot) {
-    std::map<BootId, std::map<std::uint64_t, int>> seen;
-    SQLite::Database database = open_for_reading(path_);
-    SampleScanner scanner{database, all_channels()};
+  std::map<station::BootId, std::map<std::uint64_t, int>> recorded(const TestRobot& robot) {
+    std::map<station::BootId, std::map<std::uint64_t, int>> seen;
+    SQLite::Database database = storage::open_for_reading(path_);
+    storage::SampleScanner scanner{database, storage::all_channels()};
     SQLite::Statement boots{database, "SELECT boot_key, boot_id FROM boot"};
     SQLite::Statement gaps{database, "SELECT first_seq, last_seq FROM gap WHERE boot_key = ?"};
     while (boots.executeStep()) {
-      std::map<std::uint64_t, int>& samples = seen[unsigned_id(boots.getColumn(1))];
-      Segment segment;
+      std::map<std::uint64_t, int>& samples = seen[storage::unsigned_id(boots.getColumn(1))];
+      storage::Segment segment;
       scanner.begin(boots.getColumn(0).getInt64(), {0, 1U << 30U});
       while (scanner.next(segment)) {
         for (std::size_t index = 0; index < segment.samples.size(); ++index) {
           const std::uint64_t seq = segment.first_seq + index;
           ++samples[seq];
-          stored_[unsigned_id(boots.getColumn(1))][seq] = segment.context.flags;
+          stored_[storage::unsigned_id(boots.getColumn(1))][seq] = segment.context.flags;
           EXPECT_FLOAT_EQ(segment.samples[index].position_m, static_cast<float>(seq) / 1000);
           EXPECT_EQ(segment.robot_time_us(index), robot.time_of(seq));
         }
       }
-      bind_all(gaps, boots.getColumn(0).getInt64());
+      storage::bind_all(gaps, boots.getColumn(0).getInt64());
       while (gaps.executeStep()) {
-        for (auto seq = unsigned_id(gaps.getColumn(0)); seq <= unsigned_id(gaps.getColumn(1)); ++seq) ++samples[seq];
+        for (auto seq = storage::unsigned_id(gaps.getColumn(0)); seq <= storage::unsigned_id(gaps.getColumn(1)); ++seq)
+          ++samples[seq];
       }
     }
     return seen;
   }
 
   // A run of the whole boot has a digest that says what a recount of its stored samples says.
-  void expect_digest(const TestRobot& robot, BootId boot_id, std::uint64_t next_seq) {
-    const auto run = wait(runs_->make_afterwards(robot.id, named("all"), SeqSpan{boot_id, 0, next_seq - 1}, {}));
+  void expect_digest(const TestRobot& robot, station::BootId boot_id, std::uint64_t next_seq) {
+    const auto run =
+        wait(runs_->make_afterwards(robot.id, named("all"), storage::SeqSpan{boot_id, 0, next_seq - 1}, {}));
     ASSERT_TRUE(run.has_value()) << run.error().detail;
     const auto found = wait(recording_->digester.find(run->id));
     ASSERT_TRUE(found && found->is_final);
-    const RunDigest& digest = found->digest;
+    const storage::RunDigest& digest = found->digest;
     const auto& stored = stored_[boot_id];
     std::uint64_t backfilled = 0;
     std::uint64_t longest = 0;
@@ -250,11 +254,11 @@ class RecorderModelTest : public RecordingTest, public ::testing::WithParamInter
 
   static constexpr std::uint64_t kEventRing = 6;
 
-  RecorderOptions options_;
-  std::map<BootId, std::map<std::uint64_t, std::uint32_t>> stored_;  // flags of each stored sample
-  std::map<BootId, std::uint64_t> made_by_ended_;                    // samples
-  std::set<std::uint64_t> heard_;                                    // of the present boot
-  std::set<std::uint64_t> heard_events_;                             // the same
+  storage::RecorderOptions options_;
+  std::map<station::BootId, std::map<std::uint64_t, std::uint32_t>> stored_;  // flags of each stored sample
+  std::map<station::BootId, std::uint64_t> made_by_ended_;                    // samples
+  std::set<std::uint64_t> heard_;                                             // of the present boot
+  std::set<std::uint64_t> heard_events_;                                      // the same
   std::uint64_t next_event_seq_ = 0;
   int answered_events_ = 0;
 };
@@ -294,8 +298,8 @@ TEST_P(RecorderModelTest, StoresOrListsEverySampleExactlyOnce) {
     EXPECT_LE(seen[boot_id].size(), made);
   }
 
-  SQLite::Database database = open_for_reading(path_);
-  EXPECT_EQ(check_store(database, {.run = {}, .integrity = true})->faults, std::vector<std::string>{});
+  SQLite::Database database = storage::open_for_reading(path_);
+  EXPECT_EQ(storage::check_store(database, {.run = {}, .integrity = true})->faults, std::vector<std::string>{});
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, RecorderModelTest, ::testing::Range(0u, 24u));
@@ -306,13 +310,14 @@ class OverloadTest : public RecordingTest {
   static constexpr std::size_t kRing = 150;
 
   void begin(std::size_t robots) {
-    RecorderOptions options;
+    storage::RecorderOptions options;
     options.max_queued_samples = 500;
     start(options);
-    recorder_->set_on_missing([this](const RobotId&, BootId boot, std::uint64_t first_seq, std::uint64_t next_seq) {
-      asked_[boot] = {first_seq, next_seq};
-      ++times_asked_;
-    });
+    recorder_->set_on_missing(
+        [this](const station::RobotId&, station::BootId boot, std::uint64_t first_seq, std::uint64_t next_seq) {
+          asked_[boot] = {first_seq, next_seq};
+          ++times_asked_;
+        });
     for (std::size_t n = 0; n < robots; ++n) {
       TestRobot& robot = robots_.emplace_back();
       robot.id = "r" + std::to_string(n);
@@ -339,7 +344,7 @@ class OverloadTest : public RecordingTest {
   }
 
   std::vector<TestRobot> robots_;
-  std::map<BootId, Missing> asked_;
+  std::map<station::BootId, Missing> asked_;
   int times_asked_ = 0;
 };
 

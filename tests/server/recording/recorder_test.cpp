@@ -55,7 +55,7 @@ TEST_F(RecorderTest, BeginsASegmentWhenTimeSteps) {
   start();
   connect(robot_);
   make(robot_, 10);
-  SampleBatch late = robot_.batch(10, 5);
+  station::SampleBatch late = robot_.batch(10, 5);
   late.first_robot_time_us += 50;  // jitter of a tick
   send(robot_, late);
   late = robot_.batch(15, 5);
@@ -95,7 +95,7 @@ TEST_F(RecorderTest, DropsDuplicatesWhileACommitIsUnderWay) {
   start();
   connect(robot_);
   send(robot_, 0, 10);
-  auto flushing = [](Recorder& recorder) -> boost::asio::awaitable<void> { co_await recorder.flush(); };
+  auto flushing = [](storage::Recorder& recorder) -> boost::asio::awaitable<void> { co_await recorder.flush(); };
   tasks_->spawn("flush", flushing(*recorder_));
   while (disk_.jobs() == 0) loop_.poll_one();
   send(robot_, 5, 10);
@@ -274,7 +274,7 @@ TEST_F(RecorderTest, WhatComesAfterACompleteSegmentWaitsForItsOwn) {
 TEST_F(RecorderTest, ASegmentsUncertaintyHoldsForEachOfItsBatches) {
   start();
   connect(robot_);
-  SampleBatch batch = robot_.batch(0, 5);  // 300 µs
+  station::SampleBatch batch = robot_.batch(0, 5);  // 300 µs
   send(robot_, batch);
   batch = robot_.batch(5, 5);
   batch.utc_offset_us -= 400;
@@ -307,17 +307,17 @@ TEST_F(RecorderTest, HowFarABootIsDurableIsStoredWithIt) {
 
 TEST_F(RecorderTest, RestoresPendingStopsAndEndsOtherCommands) {
   start();
-  send_command(0xffffffffffffffff, "emergency_stop", CommandState::queued);
-  send_command(0xffffffffffffffff, "emergency_stop", CommandState::sent);
-  send_command(2, "emergency_stop", CommandState::acknowledged);
-  send_command(3, "set_duty", CommandState::sent);
-  send_command(4, "set_duty", CommandState::queued);
+  send_command(0xffffffffffffffff, "emergency_stop", station::CommandState::queued);
+  send_command(0xffffffffffffffff, "emergency_stop", station::CommandState::sent);
+  send_command(2, "emergency_stop", station::CommandState::acknowledged);
+  send_command(3, "set_duty", station::CommandState::sent);
+  send_command(4, "set_duty", station::CommandState::queued);
   flush();
   kill();
   start();
   ASSERT_EQ(restored_.pending_stops.size(), 1u);
   EXPECT_EQ(restored_.pending_stops[0].id, 0xffffffffffffffff);
-  EXPECT_EQ(restored_.pending_stops[0].state, CommandState::sent);
+  EXPECT_EQ(restored_.pending_stops[0].state, station::CommandState::sent);
   EXPECT_EQ(rows("SELECT state, reason FROM command WHERE command_id = 3"), Rows{"unknown|station_restarted"});
   EXPECT_EQ(rows("SELECT state, reason FROM command WHERE command_id = 4"), Rows{"failed|station_restarted"});
 }
@@ -338,14 +338,14 @@ TEST_F(RecorderTest, RestoresTheLatestBootAndTheLatchItWasIn) {
     return restored_.robots.at(0);
   };
   const auto send_latch = [this](std::uint64_t seq, const char* kind, std::uint64_t id, std::uint64_t robot_time_us) {
-    RobotEvent event;
+    station::RobotEvent event;
     event.robot_id = robot_.id;
     event.boot_id = robot_.boot_id;
     event.event_seq = seq;
     event.kind = kind;
     event.emergency_id = id;
     event.robot_time_us = robot_time_us;
-    recorder_->on_event(state_of(robot_, LinkState::connected), event);
+    recorder_->on_event(state_of(robot_, station::LinkState::connected), event);
   };
   start();
   connect(robot_);

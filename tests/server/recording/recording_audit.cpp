@@ -9,7 +9,9 @@
 namespace server {
 namespace {
 
-CommandState next(CommandState state) { return static_cast<CommandState>(static_cast<int>(state) + 1); }
+station::CommandState next(station::CommandState state) {
+  return static_cast<station::CommandState>(static_cast<int>(state) + 1);
+}
 
 class Audit {
  public:
@@ -21,7 +23,7 @@ class Audit {
     for (const auto& [boot_id, boot] : truth_.boots) check_boot(boot_id, boot, complete);
     check_commands();
     check_records();
-    for (const std::string& broken : check_audit(database_, {}).faults) faults_.push_back(broken);
+    for (const std::string& broken : storage::check_audit(database_, {}).faults) faults_.push_back(broken);
     return std::move(faults_);
   }
 
@@ -39,7 +41,7 @@ class Audit {
     SQLite::Statement foreign{database_, "PRAGMA foreign_key_check"};
     if (foreign.executeStep()) fault("a row of {} has no parent", foreign.getColumn(0).getString());
     if (number("PRAGMA page_size") != 4096 || number("PRAGMA auto_vacuum") != 2) fault("the file has other settings");
-    const auto store_id = unsigned_id(database_.execAndGet("SELECT value FROM meta WHERE name = 'store_id'"));
+    const auto store_id = storage::unsigned_id(database_.execAndGet("SELECT value FROM meta WHERE name = 'store_id'"));
     if (truth_.store_id != 0 && store_id != truth_.store_id) fault("another store_id than robots were told");
   }
 
@@ -58,28 +60,29 @@ class Audit {
   }
 
   // Adds the ranges of a query (first, last) to the set; a number that is in there already is a fault.
-  void add(IntervalSet& set, BootId boot_id, const char* what, const std::string& sql) {
+  void add(storage::IntervalSet& set, station::BootId boot_id, const char* what, const std::string& sql) {
     SQLite::Statement query{database_, sql};
-    bind_all(query, boot_id);
+    storage::bind_all(query, boot_id);
     while (query.executeStep()) {
-      const Interval range{unsigned_id(query.getColumn(0)), unsigned_id(query.getColumn(1)) + 1};
+      const storage::Interval range{storage::unsigned_id(query.getColumn(0)),
+                                    storage::unsigned_id(query.getColumn(1)) + 1};
       if (count(set.insert(range)) != range.next - range.first) {
         fault("boot {:x}: {} {} to {} twice", boot_id, what, range.first, range.next - 1);
       }
     }
   }
 
-  void check_boot(BootId boot_id, const BootTruth& boot, bool complete) {
+  void check_boot(station::BootId boot_id, const BootTruth& boot, bool complete) {
     constexpr const char* kOfBoot =
         "SELECT {0}, {1} FROM {2} WHERE boot_key = (SELECT boot_key FROM boot WHERE boot_id = ?)";
-    IntervalSet stored;
-    IntervalSet gaps;
+    storage::IntervalSet stored;
+    storage::IntervalSet gaps;
     add(stored, boot_id, "samples", fmt::format(kOfBoot, "first_seq", "last_seq", "segment"));
     add(gaps, boot_id, "gap", fmt::format(kOfBoot, "first_seq", "last_seq", "gap"));
     compare({boot_id, "sample", boot.made, boot.acknowledged, boot.let_go, boot.ended, complete}, stored, gaps);
     check_values(boot_id, boot);
-    IntervalSet events;
-    IntervalSet event_gaps;
+    storage::IntervalSet events;
+    storage::IntervalSet event_gaps;
     add(events, boot_id, "event",
         fmt::format(kOfBoot, "event_seq", "event_seq", "event") + " AND event_seq IS NOT NULL");
     add(event_gaps, boot_id, "event gap", fmt::format(kOfBoot, "first_event_seq", "last_event_seq", "event_gap"));
@@ -88,46 +91,46 @@ class Audit {
   }
 
   struct Claim {
-    BootId boot_id = 0;
+    station::BootId boot_id = 0;
     const char* noun = "";
     std::uint64_t made = 0;
     std::uint64_t acknowledged = 0;
-    const IntervalSet& let_go;
+    const storage::IntervalSet& let_go;
     bool ended = false;
     bool complete = false;
   };
 
-  void compare(const Claim& claim, const IntervalSet& stored, const IntervalSet& gaps) {
-    IntervalSet both = stored;
-    for (const Interval& gap : gaps.covered({0, ~0ULL})) {
+  void compare(const Claim& claim, const storage::IntervalSet& stored, const storage::IntervalSet& gaps) {
+    storage::IntervalSet both = stored;
+    for (const storage::Interval& gap : gaps.covered({0, ~0ULL})) {
       if (count(both.insert(gap)) != gap.next - gap.first) {
         fault("boot {:x}: {} {} to {} is stored and a gap", claim.boot_id, claim.noun, gap.first, gap.next - 1);
       }
-      for (const Interval& part : claim.let_go.missing(gap)) {
+      for (const storage::Interval& part : claim.let_go.missing(gap)) {
         fault("boot {:x}: {} {} to {} is a gap, but the robot had not lost it", claim.boot_id, claim.noun, part.first,
               part.next - 1);
       }
     }
     const std::uint64_t wanted = claim.complete && !claim.ended ? claim.made : claim.acknowledged;
-    for (const Interval& hole : both.missing({0, wanted})) {
+    for (const storage::Interval& hole : both.missing({0, wanted})) {
       fault("boot {:x}: {} {} to {} is neither stored nor a gap; acknowledged below {}, made {}", claim.boot_id,
             claim.noun, hole.first, hole.next - 1, claim.acknowledged, claim.made);
     }
     if (both.end() > claim.made) fault("boot {:x}: {} {} was never made", claim.boot_id, claim.noun, both.end() - 1);
   }
 
-  void check_values(BootId boot_id, const BootTruth& boot) {
+  void check_values(station::BootId boot_id, const BootTruth& boot) {
     SQLite::Statement wrong{database_,
                             "SELECT first_seq + row - first_row FROM boot JOIN segment USING (boot_key)"
                             " JOIN sample ON row BETWEEN first_row AND last_row WHERE boot_id = ?"
                             " AND (abs(position_m - (first_seq + row - first_row) / 1000.0) > 1e-3"
                             " OR impedance_mv <> ? OR robot_id <> ?)"};
-    bind_all(wrong, boot_id, boot.impedance_mv, boot.robot_id);
+    storage::bind_all(wrong, boot_id, boot.impedance_mv, boot.robot_id);
     if (wrong.executeStep()) fault("boot {:x}: sample {} has another's values", boot_id, wrong.getColumn(0).getInt64());
     SQLite::Statement event{database_,
                             "SELECT event_seq FROM boot JOIN event USING (boot_key) WHERE boot_id = ?"
                             " AND value <> event_seq"};
-    bind_all(event, boot_id);
+    storage::bind_all(event, boot_id);
     if (event.executeStep()) fault("boot {:x}: event {} has another's values", boot_id, event.getColumn(0).getInt64());
   }
 
@@ -135,15 +138,16 @@ class Audit {
     SQLite::Statement query{database_, "SELECT state FROM command WHERE command_id = ?"};
     for (const auto& [id, command] : truth_.commands) {
       if (!command.flushed) continue;
-      bind_all(query, id);
+      storage::bind_all(query, id);
       if (!query.executeStep()) {
         fault("command {} is gone", id);
         continue;
       }
       const std::string stored = query.getColumn(0).getString();
-      const bool is_by_restart = stored == text(CommandState::failed) || stored == text(CommandState::unknown);
+      const bool is_by_restart =
+          stored == text(station::CommandState::failed) || stored == text(station::CommandState::unknown);
       bool is_possible = is_by_restart && !command.is_stop;
-      for (CommandState state = *command.flushed; state <= command.latest; state = next(state)) {
+      for (station::CommandState state = *command.flushed; state <= command.latest; state = next(state)) {
         is_possible = is_possible || stored == text(state);
       }
       if (!is_possible) fault("command {} is {}, it was {}", id, stored, text(*command.flushed));
@@ -153,13 +157,13 @@ class Audit {
   void check_records() {
     SQLite::Statement event{database_, "SELECT count(*) FROM event WHERE boot_key IS NULL AND sample_seq = ?"};
     for (const std::uint64_t number : truth_.station_events) {
-      bind_all(event, number);
+      storage::bind_all(event, number);
       event.executeStep();
       if (event.getColumn(0).getInt64() != 1) fault("the station's event {} is not there once", number);
     }
     SQLite::Statement run{database_, "SELECT count(*) FROM run WHERE run_id = ?"};
     for (const std::int64_t run_id : truth_.runs) {
-      bind_all(run, run_id);
+      storage::bind_all(run, run_id);
       run.executeStep();
       if (run.getColumn(0).getInt64() != 1) fault("run {} is gone", run_id);
     }

@@ -19,27 +19,27 @@
 namespace server {
 
 struct BootTruth {
-  RobotId robot_id;
+  station::RobotId robot_id;
   float impedance_mv = 0;          // of all its samples, and of no other boot's
   std::uint64_t made = 0;          // samples; sample n has position_m n/1000
   std::uint64_t acknowledged = 0;  // the robot was sent that all below is durable
-  IntervalSet let_go;              // samples that the robot lost before they were acknowledged
+  storage::IntervalSet let_go;     // samples that the robot lost before they were acknowledged
   std::uint64_t events_made = 0;   // event n has the value n
   std::uint64_t events_acknowledged = 0;
-  IntervalSet events_let_go;
+  storage::IntervalSet events_let_go;
   bool ended = false;  // the robot has rebooted
 };
 
 struct CommandTruth {
   bool is_stop = false;
-  CommandState latest = CommandState::queued;
-  std::optional<CommandState> flushed;  // the latest that was said to be durable
+  station::CommandState latest = station::CommandState::queued;
+  std::optional<station::CommandState> flushed;  // the latest that was said to be durable
 };
 
 struct RecordingTruth {
   std::uint64_t store_id = 0;  // 0: no robot was sent one
-  std::map<BootId, BootTruth> boots;
-  std::map<CommandId, CommandTruth> commands;
+  std::map<station::BootId, BootTruth> boots;
+  std::map<station::CommandId, CommandTruth> commands;
   std::set<std::uint64_t> station_events;  // that were said to be durable; by sample_seq
   std::set<std::int64_t> runs;             // that were answered
 };

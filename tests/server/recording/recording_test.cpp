@@ -7,8 +7,8 @@
 
 namespace server {
 
-SampleBatch TestRobot::batch(std::uint64_t first_seq, std::size_t count) const {
-  SampleBatch batch;
+station::SampleBatch TestRobot::batch(std::uint64_t first_seq, std::size_t count) const {
+  station::SampleBatch batch;
   batch.robot_id = id;
   batch.boot_id = boot_id;
   batch.first_seq = first_seq;
@@ -39,28 +39,27 @@ RecordingTest::~RecordingTest() {
   std::filesystem::remove_all(folder_);
 }
 
-void RecordingTest::start(RecorderOptions options, const RecordingConfig& config) {
+void RecordingTest::start(storage::RecorderOptions options, const config::RecordingConfig& config) {
   options.path = path_;
   options.enrolment.most_robots = most_robots_;
   options.enrolment.most_a_minute = most_a_minute_;
-  tasks_ = std::make_unique<TaskGroup>(loop_);
-  recording_ =
-      std::make_unique<RecordingParts>(loop_, clock_, disk_, readers_, exports_worker_, checkpoints_, options, config);
+  tasks_ = std::make_unique<runtime::TaskGroup>(loop_);
+  recording_ = std::make_unique<storage::RecordingParts>(loop_, clock_, disk_, readers_, exports_worker_, checkpoints_,
+                                                         options, config);
   clock_.add_worker(recording_->backups.checker());
   recorder_ = &recording_->recorder;
   runs_ = &recording_->runs;
   history_ = &recording_->history;
-  recorder_->set_on_durable(
-      [this](const RobotId& robot_id, BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event_seq) {
-        durable_next_seqs_[boot_id] = next_seq;
-        if (latest_boots_[robot_id] != boot_id) return;  // no longer connected
-        durable_next_seq_ = next_seq;
-        durable_next_event_seq_ = next_event_seq;
-      });
-  recorder_->set_on_missing([this](const RobotId&, BootId, std::uint64_t first_seq, std::uint64_t next_seq) {
-    missing_.push_back({first_seq, next_seq});
+  recorder_->set_on_durable([this](const station::RobotId& robot_id, station::BootId boot_id, std::uint64_t next_seq,
+                                   std::uint64_t next_event_seq) {
+    durable_next_seqs_[boot_id] = next_seq;
+    if (latest_boots_[robot_id] != boot_id) return;  // no longer connected
+    durable_next_seq_ = next_seq;
+    durable_next_event_seq_ = next_event_seq;
   });
-  recorder_->set_on_missing_events([this](const RobotId&, BootId) { ++missing_events_; });
+  recorder_->set_on_missing([this](const station::RobotId&, station::BootId, std::uint64_t first_seq,
+                                   std::uint64_t next_seq) { missing_.push_back({first_seq, next_seq}); });
+  recorder_->set_on_missing_events([this](const station::RobotId&, station::BootId) { ++missing_events_; });
   restored_ = wait(recording_->open());
   recording_->spawn(*tasks_);
   clock_.settle();
@@ -85,8 +84,8 @@ void RecordingTest::kill() {
   tasks_.reset();
 }
 
-AdmissionRequest RecordingTest::hello_of(const TestRobot& robot) {
-  AdmissionRequest request;
+station::AdmissionRequest RecordingTest::hello_of(const TestRobot& robot) {
+  station::AdmissionRequest request;
   request.robot_id = robot.id;
   request.token = robot.token;
   request.from_loopback = robot.from_loopback;
@@ -104,10 +103,10 @@ AdmissionRequest RecordingTest::hello_of(const TestRobot& robot) {
   return request;
 }
 
-Admission RecordingTest::admit(const TestRobot& robot) { return wait(recorder_->admit(hello_of(robot))); }
+station::Admission RecordingTest::admit(const TestRobot& robot) { return wait(recorder_->admit(hello_of(robot))); }
 
-RobotState RecordingTest::state_of(const TestRobot& robot, LinkState link) const {
-  RobotState state;
+station::RobotState RecordingTest::state_of(const TestRobot& robot, station::LinkState link) const {
+  station::RobotState state;
   state.id = robot.id;
   state.link = link;
   state.boot_id = robot.boot_id;
@@ -118,16 +117,16 @@ RobotState RecordingTest::state_of(const TestRobot& robot, LinkState link) const
 }
 
 void RecordingTest::connect(const TestRobot& robot) {
-  const Admission admission = admit(robot);
+  const station::Admission admission = admit(robot);
   ASSERT_EQ(admission.refusal, rheonaut_REFUSAL_REASON_NONE) << admission.detail;
   latest_boots_[robot.id] = robot.boot_id;
-  const RobotState state = state_of(robot, LinkState::connected);
+  const station::RobotState state = state_of(robot, station::LinkState::connected);
   recorder_->on_robot(state);
   runs_->on_robot(state);
 }
 
 void RecordingTest::disconnect(const TestRobot& robot) {
-  const RobotState state = state_of(robot, LinkState::disconnected);
+  const station::RobotState state = state_of(robot, station::LinkState::disconnected);
   recorder_->on_robot(state);
   runs_->on_robot(state);
 }
@@ -152,21 +151,21 @@ void RecordingTest::send(const TestRobot& robot, std::uint64_t first_seq, std::s
   send(robot, robot.batch(first_seq, count));
 }
 
-void RecordingTest::send(const TestRobot& robot, const SampleBatch& batch) {
-  SampleBatch received = batch;
+void RecordingTest::send(const TestRobot& robot, const station::SampleBatch& batch) {
+  station::SampleBatch received = batch;
   received.received_at_us = clock_.utc_us();
-  const RobotState state = state_of(robot, LinkState::connected);
+  const station::RobotState state = state_of(robot, station::LinkState::connected);
   recorder_->on_samples(state, received);
   runs_->on_samples(state, received);
 }
 
 std::int64_t RecordingTest::number(const std::string& sql) {
-  return open_for_reading(path_).execAndGet(sql).getInt64();
+  return storage::open_for_reading(path_).execAndGet(sql).getInt64();
 }
 
 std::vector<std::string> RecordingTest::rows(const std::string& sql) {
   std::vector<std::string> found;
-  SQLite::Database database = open_for_reading(path_);
+  SQLite::Database database = storage::open_for_reading(path_);
   SQLite::Statement query{database, sql};
   while (query.executeStep()) {
     std::string row;

@@ -20,23 +20,23 @@ namespace server {
 
 using namespace std::chrono_literals;
 
-inline SampleContext manual_at_100_hz() {
-  SampleContext context;
+inline station::SampleContext manual_at_100_hz() {
+  station::SampleContext context;
   context.period_us = 10'000;
   context.mode = rheonaut_MODE_MANUAL;
   return context;
 }
 
-inline RunConditions named(std::string name) {
-  RunConditions conditions;
+inline storage::RunConditions named(std::string name) {
+  storage::RunConditions conditions;
   conditions.name = std::move(name);
   return conditions;
 }
 
 // A robot that makes a sample every 10 ms; position_m of sample n is n/1000.
 struct TestRobot {
-  RobotId id = "nemo";
-  BootId boot_id = 0xfedcba9876543210;
+  station::RobotId id = "nemo";
+  station::BootId boot_id = 0xfedcba9876543210;
   std::uint64_t next_seq = 0;    // the sample made next
   std::uint64_t oldest_seq = 0;  // the oldest still held
   std::uint64_t oldest_event_seq = 0;
@@ -45,12 +45,12 @@ struct TestRobot {
   std::uint64_t acknowledged_next_event_seq = 0;
   std::string token;
   bool from_loopback = true;
-  SampleContext context = manual_at_100_hz();
+  station::SampleContext context = manual_at_100_hz();
 
   std::uint64_t late_us = 0;  // by periods that it skipped
 
   std::uint64_t time_of(std::uint64_t seq) const { return 500'000 + late_us + seq * 10'000; }
-  SampleBatch batch(std::uint64_t first_seq, std::size_t count) const;
+  station::SampleBatch batch(std::uint64_t first_seq, std::size_t count) const;
 };
 
 struct Missing {
@@ -65,17 +65,17 @@ class RecordingTest : public ::testing::Test {
   ~RecordingTest() override;
 
  protected:
-  using Run = server::Run;  // and not testing::Test's
+  using Run = server::storage::Run;  // and not testing::Test's
 
   // A station begins on this folder: opens the database, loads the runs, records.
-  void start(RecorderOptions options = {}, const RecordingConfig& config = {});
+  void start(storage::RecorderOptions options = {}, const config::RecordingConfig& config = {});
   // SIGTERM: everything received is on disk afterwards.
   void stop();
   // kill -9: what was not committed is gone.
   void kill();
 
-  AdmissionRequest hello_of(const TestRobot& robot);
-  Admission admit(const TestRobot& robot);
+  station::AdmissionRequest hello_of(const TestRobot& robot);
+  station::Admission admit(const TestRobot& robot);
   void connect(const TestRobot& robot);  // must be admitted
   void disconnect(const TestRobot& robot);
   // The robot makes samples and the station receives them, `per_frame` at a time.
@@ -84,7 +84,7 @@ class RecordingTest : public ::testing::Test {
   void make_slowly(TestRobot& robot, std::size_t count);
   // The station receives samples that were made before.
   void send(const TestRobot& robot, std::uint64_t first_seq, std::size_t count);
-  void send(const TestRobot& robot, const SampleBatch& batch);
+  void send(const TestRobot& robot, const station::SampleBatch& batch);
   void flush() { wait(recorder_->flush()); }
 
   // What the disk holds now.
@@ -118,27 +118,27 @@ class RecordingTest : public ::testing::Test {
     if (!ended) throw std::runtime_error{"did not end within 60 s"};
   }
 
-  RobotState state_of(const TestRobot& robot, LinkState link) const;
+  station::RobotState state_of(const TestRobot& robot, station::LinkState link) const;
 
   std::filesystem::path folder_;
   std::filesystem::path path_;
   std::uint32_t most_robots_ = 100'000;  // that may enrol themselves, in all and in a minute
   std::uint32_t most_a_minute_ = 100'000;
   boost::asio::io_context loop_{1};
-  WorkerThread disk_{"disk"};
-  WorkerThread readers_{"readers"};
-  WorkerThread checkpoints_{"checkpoints"};
-  WorkerThread exports_worker_{"exports"};
+  runtime::WorkerThread disk_{"disk"};
+  runtime::WorkerThread readers_{"readers"};
+  runtime::WorkerThread checkpoints_{"checkpoints"};
+  runtime::WorkerThread exports_worker_{"exports"};
   VirtualClock clock_{loop_};
-  std::unique_ptr<TaskGroup> tasks_;
-  std::unique_ptr<RecordingParts> recording_;
-  Recorder* recorder_ = nullptr;  // of recording_, as are the next two
-  Runs* runs_ = nullptr;
-  History* history_ = nullptr;
-  RestoredState restored_;
-  std::map<RobotId, BootId> latest_boots_;
+  std::unique_ptr<runtime::TaskGroup> tasks_;
+  std::unique_ptr<storage::RecordingParts> recording_;
+  storage::Recorder* recorder_ = nullptr;  // of recording_, as are the next two
+  storage::Runs* runs_ = nullptr;
+  storage::History* history_ = nullptr;
+  storage::RestoredState restored_;
+  std::map<station::RobotId, station::BootId> latest_boots_;
   std::uint64_t durable_next_seq_ = 0;  // as sent last, of a robot's latest boot
-  std::map<BootId, std::uint64_t> durable_next_seqs_;
+  std::map<station::BootId, std::uint64_t> durable_next_seqs_;
   std::uint64_t durable_next_event_seq_ = 0;
   std::vector<Missing> missing_;  // as asked for
   int missing_events_ = 0;        // times that they were asked for

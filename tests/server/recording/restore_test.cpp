@@ -23,11 +23,11 @@ class RestoreTest : public RecordingTest {
   void record_and_back_up() {
     start();
     connect(robot_);
-    const RunId run = wait(runs_->create(robot_.id, named("ended")))->id;
+    const storage::RunId run = wait(runs_->create(robot_.id, named("ended")))->id;
     make(robot_, 400);
     EXPECT_TRUE(wait(runs_->end(run, "good")));
     EXPECT_TRUE(wait(runs_->create(robot_.id, named("open"))));
-    RobotState in_water = state_of(robot_, LinkState::connected);
+    station::RobotState in_water = state_of(robot_, station::LinkState::connected);
     in_water.fluid = "water";
     recorder_->on_fluid(in_water);
     make(robot_, 600);
@@ -40,7 +40,7 @@ class RestoreTest : public RecordingTest {
 
   std::string refusal(const fs::path& from) {
     try {
-      restore_database(from, new_folder_, {"cli:root", "", clock_.utc_us()});
+      storage::restore_database(from, new_folder_, {"cli:root", "", clock_.utc_us()});
       return "(it was restored)";
     } catch (const std::runtime_error& error) {
       return error.what();
@@ -57,7 +57,7 @@ class RestoreTest : public RecordingTest {
 
 TEST_F(RestoreTest, GivesTheSameRecordingUnderANewStoreId) {
   record_and_back_up();
-  const RestoredStore restored = restore_database(from_, new_folder_, {"cli:root", "", 1234});
+  const storage::RestoredStore restored = storage::restore_database(from_, new_folder_, {"cli:root", "", 1234});
   EXPECT_EQ(restored.runs, 2);
   EXPECT_EQ(restored.samples, 1000);
   EXPECT_NE(restored.store_id, store_id_);
@@ -73,7 +73,7 @@ TEST_F(RestoreTest, GivesTheSameRecordingUnderANewStoreId) {
 
 TEST_F(RestoreTest, RunsThatWereOpenAreInterruptedAtTheirLastSample) {
   record_and_back_up();
-  EXPECT_EQ(restore_database(from_, new_folder_, {"cli:root", "", 1234}).runs_interrupted, 1);
+  EXPECT_EQ(storage::restore_database(from_, new_folder_, {"cli:root", "", 1234}).runs_interrupted, 1);
   use_restored();
   EXPECT_EQ(rows("SELECT run_id, state, ended_at_us IS NULL, last_seq FROM run JOIN run_span USING (run_id)"),
             (std::vector<std::string>{"1|ended|0|399", "2|interrupted|0|999"}));
@@ -84,14 +84,14 @@ TEST_F(RestoreTest, RunsThatWereOpenAreInterruptedAtTheirLastSample) {
 TEST_F(RestoreTest, NoRobotIsTakenForBeingInTheFluidThatItWasInThen) {
   record_and_back_up();
   EXPECT_EQ(rows("SELECT fluid FROM robot"), std::vector<std::string>{"water"});
-  restore_database(from_, new_folder_, {"cli:root", "", 1234});
+  storage::restore_database(from_, new_folder_, {"cli:root", "", 1234});
   use_restored();
   EXPECT_EQ(rows("SELECT fluid FROM robot"), std::vector<std::string>{""});
 }
 
 TEST_F(RestoreTest, ARobotGoesOnWithTheRestoredStation) {
   record_and_back_up();
-  restore_database(from_, new_folder_, {"cli:root", "", 1234});
+  storage::restore_database(from_, new_folder_, {"cli:root", "", 1234});
   use_restored();
   start();
   EXPECT_NE(restored_.store_id, store_id_);
@@ -107,7 +107,7 @@ TEST_F(RestoreTest, ARobotGoesOnWithTheRestoredStation) {
 TEST_F(RestoreTest, WhatWasRecordedAfterTheBackupIsLostByTheRestore) {
   record_and_back_up();
   clock_.run_for(1s);
-  restore_database(from_, new_folder_, {"cli:root", "", clock_.utc_us()});
+  storage::restore_database(from_, new_folder_, {"cli:root", "", clock_.utc_us()});
   use_restored();
   start();
   robot_.next_seq = 5000;
@@ -132,7 +132,7 @@ TEST_F(RestoreTest, WhatWasRecordedAfterTheBackupIsLostByTheRestore) {
 TEST_F(RestoreTest, WhatIsLostLaterIsNotLostByTheRestore) {
   record_and_back_up();
   clock_.run_for(1s);
-  restore_database(from_, new_folder_, {"cli:root", "", clock_.utc_us()});
+  storage::restore_database(from_, new_folder_, {"cli:root", "", clock_.utc_us()});
   use_restored();
   start();
   connect(robot_);
@@ -171,7 +171,7 @@ TEST_F(RestoreTest, WhatWasMissingOfABootThatHasEndedSinceIsLostByTheRestore) {
   EXPECT_TRUE(clock_.run_until([&] { return !recording_->backups.busy(); }, 60s));
   stop();
   clock_.run_for(1s);
-  restore_database(from_, new_folder_, {"cli:root", "", clock_.utc_us()});
+  storage::restore_database(from_, new_folder_, {"cli:root", "", clock_.utc_us()});
   use_restored();
   start();
   for (int boot = 0; boot < 2; ++boot) {
@@ -225,7 +225,7 @@ TEST_F(RestoreTest, TakesADatabaseWhoseLogIsBesideIt) {
   connect(robot_);
   make(robot_, 300);
   flush();
-  EXPECT_EQ(restore_database(path_, new_folder_, {"cli:root", "", 1234}).samples, 300);
+  EXPECT_EQ(storage::restore_database(path_, new_folder_, {"cli:root", "", 1234}).samples, 300);
 }
 
 }  // namespace

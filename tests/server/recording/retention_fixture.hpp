@@ -38,37 +38,39 @@ class RetentionTest : public RecordingTest {
     make(robot_, count, 25);
     flush();
   }
-  void set_durable(BootId boot_id, std::uint64_t next_seq) {
+  void set_durable(station::BootId boot_id, std::uint64_t next_seq) {
     execute(fmt::format("UPDATE boot SET durable_next_seq = {} WHERE boot_id = {}", next_seq, signed_id_of(boot_id)));
   }
   void execute(const std::string& sql) {
-    wait(recorder_->on_disk([sql](Database& database) { return database.handle().exec(sql); }));
+    wait(recorder_->on_disk([sql](storage::Database& database) { return database.handle().exec(sql); }));
   }
-  static std::int64_t signed_id_of(BootId boot_id) { return static_cast<std::int64_t>(boot_id); }
+  static std::int64_t signed_id_of(station::BootId boot_id) { return static_cast<std::int64_t>(boot_id); }
   void pass() {
     wait(recording_->retention.pass());
-    SQLite::Database database = open_for_reading(path_);
+    SQLite::Database database = storage::open_for_reading(path_);
     EXPECT_THAT(coverage_faults(database), ::testing::IsEmpty());
     EXPECT_EQ(rows("PRAGMA integrity_check"), Rows{"ok"});
   }
   std::map<std::int64_t, std::vector<std::string>> runs() {
-    SQLite::Database database = open_for_reading(path_);
+    SQLite::Database database = storage::open_for_reading(path_);
     return stored_runs(database);
   }
   // Of everything that may go, whatever its age.
-  RetentionPlan planned() {
-    SQLite::Database database = open_for_reading(path_);
-    RetentionPlan plan{std::nullopt};
+  storage::RetentionPlan planned() {
+    SQLite::Database database = storage::open_for_reading(path_);
+    storage::RetentionPlan plan{std::nullopt};
     while (plan.look(database)) continue;
     return plan;
   }
-  void carry_out(RetentionPlan& plan) {
-    auto step = [&](Database& database) { return purge_step(database.handle(), plan, clock_, clock_.utc_us()); };
+  void carry_out(storage::RetentionPlan& plan) {
+    auto step = [&](storage::Database& database) {
+      return purge_step(database.handle(), plan, clock_, clock_.utc_us());
+    };
     while (!plan.empty()) wait(recorder_->on_disk(step));
   }
   Rows gaps() { return rows("SELECT first_seq, last_seq, cause FROM gap ORDER BY boot_key, first_seq"); }
   std::int64_t samples() { return number("SELECT count(*) FROM sample"); }
-  const RetentionCounters& counters() const { return recording_->retention.counters(); }
+  const storage::RetentionCounters& counters() const { return recording_->retention.counters(); }
 
   TestRobot robot_;
 };

@@ -17,7 +17,7 @@ class RetentionModelTest : public RecordingTest, public ::testing::WithParamInte
  protected:
   void begin() {
     const bool by_size = GetParam() % 2 == 0;
-    RecordingConfig config;
+    config::RecordingConfig config;
     config.retention_days = by_size ? 0 : 3;
     config.max_database_mb = by_size ? 1 : 0;
     start({}, config);
@@ -75,18 +75,18 @@ class RetentionModelTest : public RecordingTest, public ::testing::WithParamInte
   }
 
   void execute(const std::string& sql) {
-    wait(recorder_->on_disk([sql](Database& database) { return database.handle().exec(sql); }));
+    wait(recorder_->on_disk([sql](storage::Database& database) { return database.handle().exec(sql); }));
   }
 
   std::map<std::int64_t, std::vector<std::string>> runs() {
-    SQLite::Database database = open_for_reading(path_);
+    SQLite::Database database = storage::open_for_reading(path_);
     return stored_runs(database);
   }
 
   std::uint64_t pick(std::uint64_t limit) { return random_() % limit; }
 
   std::mt19937 random_{GetParam()};
-  static TestRobot robot(RobotId id, BootId boot_id) {
+  static TestRobot robot(station::RobotId id, station::BootId boot_id) {
     TestRobot robot;
     robot.id = std::move(id);
     robot.boot_id = boot_id;
@@ -104,7 +104,7 @@ TEST_P(RetentionModelTest, RunsStayAndEverySampleIsInOnePlace) {
     const auto before = runs();
     wait(recording_->retention.pass());
     EXPECT_EQ(runs(), before) << "round " << round;
-    SQLite::Database database = open_for_reading(path_);
+    SQLite::Database database = storage::open_for_reading(path_);
     ASSERT_THAT(coverage_faults(database), IsEmpty()) << "round " << round;
     if (pick(4) == 0) restart();
   }
@@ -124,7 +124,7 @@ TEST_P(RetentionModelTest, AVacuumByTheStockProgramChangesNoRun) {
   begin();
   make(robots_.front(), 300, 25);
   flush();
-  SQLite::Database database = open_for_reading(path_);
+  SQLite::Database database = storage::open_for_reading(path_);
   EXPECT_THAT(coverage_faults(database), IsEmpty()) << "row numbers go on where they were";
 }
 

@@ -85,7 +85,7 @@ TEST_F(RetentionTest, WorksByItself) {
 TEST_F(RetentionTest, ARunHoldsItsSamplesUntilItIsDiscarded) {
   keep(7);
   record(250);
-  const RunId run = wait(runs_->create(robot_.id, named("kept")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("kept")))->id;
   record(300);
   ASSERT_TRUE(wait(runs_->end(run, "good")));
   record(450);

@@ -16,23 +16,23 @@ namespace asio = boost::asio;
 class RobotAdmissionTest : public ::testing::Test {
  protected:
   // A database that answers when the test lets it.
-  asio::awaitable<std::vector<AdmissionOutcome>> answer(std::vector<AdmissionQuestion> questions) {
+  asio::awaitable<std::vector<storage::AdmissionOutcome>> answer(std::vector<storage::AdmissionQuestion> questions) {
     asked_.push_back(questions.size());
     co_await let_answer_.wait();
     if (fails_once_) {
       fails_once_ = false;
       throw std::runtime_error{"no disk"};
     }
-    std::vector<AdmissionOutcome> outcomes(questions.size());
+    std::vector<storage::AdmissionOutcome> outcomes(questions.size());
     for (std::size_t at = 0; at < questions.size(); ++at)
       outcomes[at].admission.detail = questions[at].request.robot_id;
     co_return outcomes;
   }
-  void ask(const RobotId& robot_id) {
-    AdmissionQuestion question;
+  void ask(const station::RobotId& robot_id) {
+    storage::AdmissionQuestion question;
     question.request.robot_id = robot_id;
     asio::co_spawn(loop_, admission_.ask(question),
-                   [this, robot_id](std::exception_ptr error, AdmissionOutcome outcome) {
+                   [this, robot_id](std::exception_ptr error, storage::AdmissionOutcome outcome) {
                      answers_[robot_id] = error ? "error" : outcome.admission.detail;
                      refusals_[robot_id] = outcome.admission.refusal;
                    });
@@ -48,12 +48,13 @@ class RobotAdmissionTest : public ::testing::Test {
   }
 
   asio::io_context loop_{1};
-  Signal let_answer_{loop_};
+  runtime::Signal let_answer_{loop_};
   std::vector<std::size_t> asked_;  // how many questions each time
   bool fails_once_ = false;
-  std::map<RobotId, std::string> answers_;
-  std::map<RobotId, protocol::RefusalReason> refusals_;
-  RobotAdmission admission_{loop_, [this](std::vector<AdmissionQuestion> all) { return answer(std::move(all)); }};
+  std::map<station::RobotId, std::string> answers_;
+  std::map<station::RobotId, protocol::RefusalReason> refusals_;
+  storage::RobotAdmission admission_{
+      loop_, [this](std::vector<storage::AdmissionQuestion> all) { return answer(std::move(all)); }};
 };
 
 TEST_F(RobotAdmissionTest, AsksTogetherForAllThatCameMeanwhile) {
@@ -61,9 +62,9 @@ TEST_F(RobotAdmissionTest, AsksTogetherForAllThatCameMeanwhile) {
   EXPECT_EQ(asked_, (std::vector<std::size_t>{1}));
   let_answer();
   EXPECT_EQ(asked_, (std::vector<std::size_t>{1, 2}));
-  EXPECT_EQ(answers_, (std::map<RobotId, std::string>{{"a", "a"}}));
+  EXPECT_EQ(answers_, (std::map<station::RobotId, std::string>{{"a", "a"}}));
   let_answer();
-  EXPECT_EQ(answers_, (std::map<RobotId, std::string>{{"a", "a"}, {"b", "b"}, {"c", "c"}}));
+  EXPECT_EQ(answers_, (std::map<station::RobotId, std::string>{{"a", "a"}, {"b", "b"}, {"c", "c"}}));
 }
 
 TEST_F(RobotAdmissionTest, AFailedAdmissionLeavesTheOthersTheirAnswer) {

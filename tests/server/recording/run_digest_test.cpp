@@ -16,13 +16,13 @@ class RunDigestTest : public RecordingTest {
  protected:
   TestRobot robot_;
 
-  RunId create() { return wait(runs_->create(robot_.id, named("certified")))->id; }
-  void end(RunId id) { ASSERT_TRUE(wait(runs_->end(id, "")).has_value()); }
-  RunDigest final_digest(RunId id) {
-    const Result<CurrentDigest> found = wait(recording_->digester.find(id));
+  storage::RunId create() { return wait(runs_->create(robot_.id, named("certified")))->id; }
+  void end(storage::RunId id) { ASSERT_TRUE(wait(runs_->end(id, "")).has_value()); }
+  storage::RunDigest final_digest(storage::RunId id) {
+    const Result<storage::CurrentDigest> found = wait(recording_->digester.find(id));
     EXPECT_TRUE(found.has_value()) << found.error().detail;
     EXPECT_TRUE(found && found->is_final);
-    return found ? found->digest : RunDigest{};
+    return found ? found->digest : storage::RunDigest{};
   }
   void reboot() {
     disconnect(robot_);
@@ -36,10 +36,10 @@ class RunDigestTest : public RecordingTest {
   }
 
   // 300 samples in two boots, 7 of them backfilled, and 10 lost.
-  RunId make_eventful_run() {
+  storage::RunId make_eventful_run() {
     connect(robot_);
     make(robot_, 20);
-    const RunId id = create();
+    const storage::RunId id = create();
     make(robot_, 93);
     robot_.next_seq += 7;
     make(robot_, 100);
@@ -58,7 +58,7 @@ class RunDigestTest : public RecordingTest {
 
 TEST_F(RunDigestTest, CountsWhatCameAndWhatIsLost) {
   start();
-  const RunDigest digest = final_digest(make_eventful_run());
+  const storage::RunDigest digest = final_digest(make_eventful_run());
   EXPECT_EQ(digest.samples_expected, 310u);
   EXPECT_EQ(digest.samples_live, 293u);
   EXPECT_EQ(digest.samples_backfilled, 7u);
@@ -80,7 +80,7 @@ TEST_F(RunDigestTest, HashesTheDocumentedBytes) {
   robot_.context.position_sd_m = 0.25F;
   robot_.context.disturbance_m.reset();
   robot_.context.mode = static_cast<protocol::Mode>(300);  // of a newer firmware
-  const RunId id = make_eventful_run();
+  const storage::RunId id = make_eventful_run();
   std::string bytes = "rheonaut-samples-2\n";
   const auto put = [&bytes](std::uint64_t value, int size) {
     for (int byte = 0; byte < size; ++byte) bytes += static_cast<char>(value >> (8 * byte));
@@ -88,7 +88,7 @@ TEST_F(RunDigestTest, HashesTheDocumentedBytes) {
   const auto put_float = [&](float value) {
     put(std::isnan(value) ? 0x7fc00000U : std::bit_cast<std::uint32_t>(value), 4);
   };
-  for (const StoredSample& one : wait(history_->samples(id, std::nullopt, 10'000))->samples) {
+  for (const storage::StoredSample& one : wait(history_->samples(id, std::nullopt, 10'000))->samples) {
     put(one.boot_id, 8);
     put(one.seq, 8);
     put(one.robot_time_us, 8);
@@ -101,8 +101,8 @@ TEST_F(RunDigestTest, HashesTheDocumentedBytes) {
     put_float(one.sample.impedance_mv);
     put_float(one.sample.reference_m);
     put_float(one.setpoint_m.value_or(std::nanf("")));
-    put_float(or_nan(one.disturbance_m));
-    put_float(or_nan(one.position_sd_m));
+    put_float(station::or_nan(one.disturbance_m));
+    put_float(station::or_nan(one.position_sd_m));
     put(static_cast<std::uint64_t>(one.mode), 4);
     put(static_cast<std::uint64_t>(one.sub_state), 4);
     put(static_cast<std::uint64_t>(one.emergency_cause), 4);
@@ -122,12 +122,12 @@ TEST_F(RunDigestTest, HashesTheDocumentedBytes) {
 TEST_F(RunDigestTest, IsFinalOnlyWhenTheLastSampleHasArrived) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 20);
   robot_.next_seq = 40;  // 20..39 are on their way
   make(robot_, 10);
   end(id);
-  const Result<CurrentDigest> now = wait(recording_->digester.find(id));
+  const Result<storage::CurrentDigest> now = wait(recording_->digester.find(id));
   ASSERT_TRUE(now.has_value());
   EXPECT_FALSE(now->is_final);
   EXPECT_EQ(now->digest.samples_live, 30u);
@@ -143,7 +143,7 @@ TEST_F(RunDigestTest, IsFinalOnlyWhenTheLastSampleHasArrived) {
 TEST_F(RunDigestTest, IsMadeByItselfWhenTheRestArrives) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 20);
   robot_.next_seq = 40;
   make(robot_, 10);
@@ -157,8 +157,8 @@ TEST_F(RunDigestTest, IsMadeByItselfWhenTheRestArrives) {
 TEST_F(RunDigestTest, IsMadeWhenTheDiskCanBeWrittenAgain) {
   start();
   change("CREATE TRIGGER full BEFORE INSERT ON run_certificate BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
-  const RunId id = make_eventful_run();
-  const Result<CurrentDigest> now = wait(recording_->digester.find(id));
+  const storage::RunId id = make_eventful_run();
+  const Result<storage::CurrentDigest> now = wait(recording_->digester.find(id));
   ASSERT_TRUE(now.has_value());
   EXPECT_FALSE(now->is_final);
   EXPECT_EQ(now->digest.samples_missing(), 0u);
@@ -170,15 +170,15 @@ TEST_F(RunDigestTest, IsMadeWhenTheDiskCanBeWrittenAgain) {
 TEST_F(RunDigestTest, ADamagedRunHasNoneAndTheStationGoesOn) {
   start();
   connect(robot_);
-  const RunId damaged = create();
+  const storage::RunId damaged = create();
   make(robot_, 100);
   flush();
   change("DELETE FROM sample WHERE row = 7");
   end(damaged);
-  const Result<CurrentDigest> found = wait(recording_->digester.find(damaged));
+  const Result<storage::CurrentDigest> found = wait(recording_->digester.find(damaged));
   ASSERT_TRUE(found.has_value());
   EXPECT_FALSE(found->is_final);
-  const RunId next = create();
+  const storage::RunId next = create();
   make(robot_, 20);
   end(next);
   EXPECT_EQ(final_digest(next).samples_live, 20u);
@@ -188,7 +188,7 @@ TEST_F(RunDigestTest, ADamagedRunHasNoneAndTheStationGoesOn) {
 TEST_F(RunDigestTest, IsMadeAfterARestartForARunThatTheStopInterrupted) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 250);
   flush();
   kill();
@@ -200,7 +200,7 @@ TEST_F(RunDigestTest, IsMadeAfterARestartForARunThatTheStopInterrupted) {
 
 TEST_F(RunDigestTest, AThousandRunsAreListedFromTheirDigestsWithoutASegment) {
   start();
-  const RunId id = make_eventful_run();
+  const storage::RunId id = make_eventful_run();
   final_digest(id);
   change(
       "CREATE TEMP TABLE n AS WITH RECURSIVE count(i) AS (SELECT 2 UNION ALL SELECT i + 1 FROM count WHERE i < 1000)"
@@ -214,7 +214,7 @@ TEST_F(RunDigestTest, AThousandRunsAreListedFromTheirDigestsWithoutASegment) {
       " lost_by_cause, longest_gap_samples, longest_gap_us, worst_clock_uncertainty_us, samples_without_clock, sha256,"
       " made_at_us FROM run_certificate, n WHERE run_id = 1;"
       "DELETE FROM segment; DELETE FROM gap");
-  RunFilter filter;
+  storage::RunFilter filter;
   filter.limit = 1000;
   const std::vector<Run> runs = wait(runs_->list(filter));
   ASSERT_EQ(runs.size(), 1000u);
@@ -229,7 +229,7 @@ TEST_F(RunDigestTest, AThousandRunsAreListedFromTheirDigestsWithoutASegment) {
 TEST_F(RunDigestTest, ThereIsNoneOfAnOpenOrUnknownRun) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   EXPECT_EQ(wait(recording_->digester.find(id)).error().code, ErrorCode::conflict);
   EXPECT_EQ(wait(recording_->digester.find(99)).error().code, ErrorCode::not_found);
 }
@@ -237,19 +237,19 @@ TEST_F(RunDigestTest, ThereIsNoneOfAnOpenOrUnknownRun) {
 TEST_F(RunDigestTest, AnEmptyRunHasOne) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   end(id);
-  const RunDigest digest = final_digest(id);
+  const storage::RunDigest digest = final_digest(id);
   EXPECT_EQ(digest.samples_expected, 0u);
   EXPECT_EQ(digest.worst_clock_uncertainty_us, -1);
-  EXPECT_EQ(digest.sha256, SampleHash{kDigestFormat}.text());
+  EXPECT_EQ(digest.sha256, storage::SampleHash{storage::kDigestFormat}.text());
 }
 
 TEST_F(RunDigestTest, CountsSamplesThatHaveNoClock) {
   start();
   connect(robot_);
-  const RunId id = create();
-  SampleBatch batch = robot_.batch(0, 5);
+  const storage::RunId id = create();
+  station::SampleBatch batch = robot_.batch(0, 5);
   batch.clock_uncertainty_us = -1;
   send(robot_, batch);
   robot_.next_seq = 5;
@@ -260,8 +260,8 @@ TEST_F(RunDigestTest, CountsSamplesThatHaveNoClock) {
 
 TEST_F(RunDigestTest, IsTheSameAfterAVacuumAndWhenSegmentsAreCutDifferently) {
   start();
-  const RunId id = make_eventful_run();
-  const RunDigest before = final_digest(id);
+  const storage::RunId id = make_eventful_run();
+  const storage::RunDigest before = final_digest(id);
   stop();
   // Each segment in two, the second half in rows of its own.
   change(
@@ -290,7 +290,7 @@ TEST_F(RunDigestTest, IsTheSameAfterAVacuumAndWhenSegmentsAreCutDifferently) {
 TEST_F(RunDigestTest, ARunLongerThanAPageIsCountedWhole) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   for (int i = 0; i < 45; ++i) {
     make(robot_, 1000, 25);
     flush();

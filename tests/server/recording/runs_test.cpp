@@ -8,8 +8,8 @@ class RunsTest : public RecordingTest {
  protected:
   TestRobot robot_;
 
-  RunId create(const std::string& name = "step 1") {
-    RunConditions conditions;
+  storage::RunId create(const std::string& name = "step 1") {
+    storage::RunConditions conditions;
     conditions.name = name;
     conditions.fluid = "water";
     conditions.mean_flow_m_s = 0.25;
@@ -18,12 +18,12 @@ class RunsTest : public RecordingTest {
     EXPECT_TRUE(run.has_value()) << run.error().detail;
     return run ? run->id : 0;
   }
-  Run find(RunId id) {
+  Run find(storage::RunId id) {
     const Result<Run> run = wait(runs_->find(id));
     EXPECT_TRUE(run.has_value());
     return run.value_or(Run{});
   }
-  Run end(RunId id, const std::string& verdict = "good") {
+  Run end(storage::RunId id, const std::string& verdict = "good") {
     const Result<Run> run = wait(runs_->end(id, verdict));
     EXPECT_TRUE(run.has_value());
     return run.value_or(Run{});
@@ -34,7 +34,7 @@ class RunsTest : public RecordingTest {
     robot_.next_seq = robot_.oldest_seq = 0;
     connect(robot_);
   }
-  std::int64_t samples_in(RunId id) {
+  std::int64_t samples_in(storage::RunId id) {
     return number("SELECT count(*) FROM run_sample WHERE run_id = " + std::to_string(id));
   }
 };
@@ -43,7 +43,7 @@ TEST_F(RunsTest, HoldsTheSamplesBetweenCreateAndEnd) {
   start();
   connect(robot_);
   make(robot_, 30);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 250);
   const Run run = end(id);
   make(robot_, 30);
@@ -53,7 +53,7 @@ TEST_F(RunsTest, HoldsTheSamplesBetweenCreateAndEnd) {
   EXPECT_EQ(run.conditions.mean_flow_m_s, 0.25);
   EXPECT_EQ(run.conditions.profile, "step");
   EXPECT_EQ(run.conditions.verdict, "good");
-  EXPECT_EQ(run.state, RunState::ended);
+  EXPECT_EQ(run.state, storage::RunState::ended);
   EXPECT_FALSE(run.made_afterwards);
   EXPECT_EQ(run.made_by, "token:local");
   EXPECT_EQ(run.firmware_version, "1.2.3");
@@ -71,27 +71,27 @@ TEST_F(RunsTest, HoldsTheSamplesBetweenCreateAndEnd) {
 TEST_F(RunsTest, AnOpenRunCountsWhatIsOnItsWay) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 100);
   clock_.run_for(150ms);
   make(robot_, 7);
   const Run run = find(id);
   EXPECT_EQ(run.samples_expected, 107u);
   EXPECT_EQ(run.samples_stored, 100u);
-  EXPECT_EQ(run.state, RunState::open);
+  EXPECT_EQ(run.state, storage::RunState::open);
   EXPECT_FALSE(run.spans[0].last_seq.has_value());
 }
 
 TEST_F(RunsTest, ReadingRunsWritesNothing) {
   start();
   connect(robot_);
-  const RunId ended = create();
+  const storage::RunId ended = create();
   make(robot_, 120);
   end(ended);
-  const RunId open = create();
+  const storage::RunId open = create();
   make(robot_, 30);
   clock_.run_for(1200ms);
-  SQLite::Database observer = open_for_reading(path_);
+  SQLite::Database observer = storage::open_for_reading(path_);
   const auto version = [&observer] { return observer.execAndGet("PRAGMA data_version").getInt64(); };
   const std::int64_t before = version();
   const std::uint64_t commits = recorder_->counters().commits;
@@ -110,7 +110,7 @@ TEST_F(RunsTest, CountsAreTheSameHoweverFarTheBootIsSettled) {
   start();
   connect(robot_);
   make(robot_, 20);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 130);
   robot_.next_seq += 30;  // 150..179 are lost
   robot_.oldest_seq = 180;
@@ -135,7 +135,7 @@ TEST_F(RunsTest, TheEndOfARunCutsNoSegmentOfAnotherRobotShort) {
   start();
   connect(robot_);
   connect(other);
-  const RunId id = create();
+  const storage::RunId id = create();
   clock_.run_for(1s);
   make(robot_, 30);
   make(other, 30);
@@ -153,7 +153,7 @@ TEST_F(RunsTest, RefusesASecondRunAnUnknownRobotAndABadName) {
   EXPECT_EQ(wait(runs_->create("nemo", named(""))).error().code, ErrorCode::invalid);
   EXPECT_EQ(wait(runs_->create("nemo", named("two\nlines"))).error().code, ErrorCode::invalid);
   EXPECT_EQ(wait(runs_->create("nemo", named(std::string(201, 'x')))).error().code, ErrorCode::invalid);
-  const RunId id = create();
+  const storage::RunId id = create();
   EXPECT_EQ(wait(runs_->create("nemo", named("x"))).error().code, ErrorCode::conflict);
   end(id);
   create("the next one");
@@ -166,7 +166,7 @@ TEST_F(RunsTest, RefusesASecondRunAnUnknownRobotAndABadName) {
 TEST_F(RunsTest, ARunWhoseEndCannotBeStoredStaysOpenAndCanBeEndedLater) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE, 5000};
   foreign.exec("CREATE TRIGGER full BEFORE UPDATE ON run BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
   EXPECT_THROW(wait(runs_->end(id, "")), std::exception);
@@ -179,14 +179,14 @@ TEST_F(RunsTest, ListsNewestFirstInPages) {
   start();
   connect(robot_);
   for (int i = 0; i < 5; ++i) end(create("run " + std::to_string(i)));
-  const auto ids = [&](RunId before, std::size_t limit, std::optional<RobotId> robot = std::nullopt) {
-    std::vector<RunId> found;
+  const auto ids = [&](storage::RunId before, std::size_t limit, std::optional<station::RobotId> robot = std::nullopt) {
+    std::vector<storage::RunId> found;
     for (const Run& run : wait(runs_->list({robot, std::nullopt, before, limit}))) found.push_back(run.id);
     return found;
   };
-  EXPECT_EQ(ids(0, 2), (std::vector<RunId>{5, 4}));
-  EXPECT_EQ(ids(4, 2), (std::vector<RunId>{3, 2}));
-  EXPECT_EQ(ids(2, 2), (std::vector<RunId>{1}));
+  EXPECT_EQ(ids(0, 2), (std::vector<storage::RunId>{5, 4}));
+  EXPECT_EQ(ids(4, 2), (std::vector<storage::RunId>{3, 2}));
+  EXPECT_EQ(ids(2, 2), (std::vector<storage::RunId>{1}));
   EXPECT_EQ(ids(0, 10, "nemo").size(), 5u);
   EXPECT_TRUE(ids(0, 10, "dory").empty());
 }
@@ -194,7 +194,7 @@ TEST_F(RunsTest, ListsNewestFirstInPages) {
 TEST_F(RunsTest, EndWaitsForBackfillAndAnswersAsSoonAsItIsThere) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 20);
   robot_.next_seq = 40;  // 20..39 are on their way
   make(robot_, 10);
@@ -212,7 +212,7 @@ TEST_F(RunsTest, EndWaitsForBackfillAndAnswersAsSoonAsItIsThere) {
 TEST_F(RunsTest, EndAnswersAfter3SecondsWithWhatIsStillMissing) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 20);
   robot_.next_seq = 40;
   make(robot_, 10);
@@ -238,7 +238,7 @@ TEST_F(RunsTest, ARebootOpensANewSpanAndWhatItLostIsCounted) {
   start();
   connect(robot_);
   make(robot_, 50);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 50);
   robot_.next_seq = 110;  // 100..109 never arrive
   make(robot_, 15);
@@ -262,8 +262,8 @@ TEST_F(RunsTest, IsInterruptedByAKillAtTheLastSampleThatIsKnown) {
   start();
   connect(robot_);
   make(robot_, 30);
-  const RunId id = create();
-  SampleBatch batch = robot_.batch(30, 100);
+  const storage::RunId id = create();
+  station::SampleBatch batch = robot_.batch(30, 100);
   batch.utc_offset_us = clock_.utc_us();
   send(robot_, batch);
   robot_.next_seq = 130;
@@ -272,7 +272,7 @@ TEST_F(RunsTest, IsInterruptedByAKillAtTheLastSampleThatIsKnown) {
   kill();
   start();
   const Run run = find(id);
-  EXPECT_EQ(run.state, RunState::interrupted);
+  EXPECT_EQ(run.state, storage::RunState::interrupted);
   ASSERT_EQ(run.spans.size(), 1u);
   EXPECT_EQ(run.spans[0].last_seq, 129u);
   EXPECT_EQ(run.ended_at_us, batch.utc_offset_us + static_cast<std::int64_t>(robot_.time_of(129)));
@@ -284,7 +284,7 @@ TEST_F(RunsTest, IsInterruptedByAKillAtTheLastSampleThatIsKnown) {
 TEST_F(RunsTest, WhatTheStationMissedIsRecordedButNotInTheInterruptedRun) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 100);
   flush();
   kill();
@@ -293,7 +293,7 @@ TEST_F(RunsTest, WhatTheStationMissedIsRecordedButNotInTheInterruptedRun) {
   const std::uint64_t durable = admit(robot_).durable_next_seq;
   connect(robot_);
   send(robot_, durable, 300 - durable);
-  const RunId next = create("the next one");
+  const storage::RunId next = create("the next one");
   make(robot_, 10);
   EXPECT_EQ(end(next).samples_stored, 10u);
   EXPECT_EQ(find(id).spans.at(0).last_seq, 99u);
@@ -304,7 +304,7 @@ TEST_F(RunsTest, WhatTheStationMissedIsRecordedButNotInTheInterruptedRun) {
 TEST_F(RunsTest, ARobotThatSaidHowFarItWasMayStillSendTheRestOfAnInterruptedRun) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 50);
   flush();
   disconnect(robot_);
@@ -324,7 +324,7 @@ TEST_F(RunsTest, ARobotThatSaidHowFarItWasMayStillSendTheRestOfAnInterruptedRun)
 TEST_F(RunsTest, AnOrderlyStopInterruptsARunWithEverySampleThatWasReceived) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 130);
   stop();
   EXPECT_EQ(rows("SELECT state, last_seq FROM run JOIN run_span USING (run_id)"),
@@ -335,7 +335,7 @@ TEST_F(RunsTest, AnOrderlyStopInterruptsARunWithEverySampleThatWasReceived) {
 TEST_F(RunsTest, ARebootJustBeforeAnOrderlyStopIsInTheInterruptedRun) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   make(robot_, 50);
   reboot();
   make(robot_, 20);
@@ -347,11 +347,11 @@ TEST_F(RunsTest, ARebootJustBeforeAnOrderlyStopIsInTheInterruptedRun) {
 TEST_F(RunsTest, AnInterruptedRunWithoutSamplesIsEmpty) {
   start();
   connect(robot_);
-  const RunId id = create();
+  const storage::RunId id = create();
   kill();
   start();
   const Run run = find(id);
-  EXPECT_EQ(run.state, RunState::interrupted);
+  EXPECT_EQ(run.state, storage::RunState::interrupted);
   EXPECT_TRUE(run.spans.empty());
   EXPECT_EQ(run.ended_at_us, run.started_at_us);
   reboot();

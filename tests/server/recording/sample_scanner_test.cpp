@@ -13,7 +13,7 @@ namespace server {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr Interval kAll{0, std::numeric_limits<std::uint64_t>::max()};
+constexpr storage::Interval kAll{0, std::numeric_limits<std::uint64_t>::max()};
 
 std::string text_of(float value) { return std::isnan(value) ? "none" : fmt::format("{}", value); }
 
@@ -29,8 +29,8 @@ class SampleScannerTest : public RecordingTest {
     }
   }
 
-  SampleContext context() {
-    SampleContext context = manual_at_100_hz();
+  station::SampleContext context() {
+    station::SampleContext context = manual_at_100_hz();
     context.mode = random_() % 2 == 0 ? rheonaut_MODE_AUTO : rheonaut_MODE_EMERGENCY;
     context.sub_state = random_() % 2 == 0 ? rheonaut_SUB_STATE_NAVIGATING : rheonaut_SUB_STATE_NONE;
     if (random_() % 2 == 0) context.setpoint_m = static_cast<float>(random_() % 10) / 10;
@@ -48,8 +48,8 @@ class SampleScannerTest : public RecordingTest {
   void make_some(TestRobot& robot) {
     if (random_() % 4 == 0) robot.context = context();
     if (random_() % 6 == 0) robot.oldest_seq = robot.next_seq += random_() % 50;  // the ring ran over
-    SampleBatch batch = robot.batch(robot.next_seq, 1 + random_() % 25);
-    for (Sample& sample : batch.samples) sample = {value(), value(), value(), value(), value(), value()};
+    station::SampleBatch batch = robot.batch(robot.next_seq, 1 + random_() % 25);
+    for (station::Sample& sample : batch.samples) sample = {value(), value(), value(), value(), value(), value()};
     if (random_() % 10 == 0) batch.clock_uncertainty_us = -1;
     send(robot, batch);
     robot.next_seq = batch.next_seq();
@@ -78,8 +78,8 @@ class SampleScannerTest : public RecordingTest {
   }
 
   // One line per sample, as stored.
-  std::vector<std::string> plain(std::int64_t boot_key, Interval range, Channels channels) {
-    SQLite::Database database = open_for_reading(path_);
+  std::vector<std::string> plain(std::int64_t boot_key, storage::Interval range, storage::Channels channels) {
+    SQLite::Database database = storage::open_for_reading(path_);
     SQLite::Statement query{
         database,
         "SELECT first_seq + row - first_row, first_robot_time_us + (row - first_row) * period_us, utc_offset_us,"
@@ -99,7 +99,7 @@ class SampleScannerTest : public RecordingTest {
       for (int column = 0; column < 9; ++column) line += query.getColumn(column).getString() + " ";
       for (int column = 9; column < 12; ++column) line += text_of(number(column)) + " ";
       for (int column = 12; column < 15; ++column) line += query.getColumn(column).getString() + " ";
-      for (std::size_t index = 0; index < kChannels; ++index) {
+      for (std::size_t index = 0; index < storage::kChannels; ++index) {
         line += text_of(channels[index] ? number(15 + static_cast<int>(index)) : kNaN) + " ";
       }
       lines.push_back(line);
@@ -107,9 +107,9 @@ class SampleScannerTest : public RecordingTest {
     return lines;
   }
 
-  static std::string line_of(const Segment& segment, std::size_t index) {
-    const SampleContext& context = segment.context;
-    const Sample& sample = segment.samples[index];
+  static std::string line_of(const storage::Segment& segment, std::size_t index) {
+    const station::SampleContext& context = segment.context;
+    const station::Sample& sample = segment.samples[index];
     std::string line = fmt::format(
         "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} ", segment.first_seq + index, segment.robot_time_us(index),
         segment.utc_offset_us, segment.clock_uncertainty_us, segment.first_received_at_us, segment.received_at_us,
@@ -123,9 +123,10 @@ class SampleScannerTest : public RecordingTest {
     return line;
   }
 
-  static std::vector<std::string> scanned(SampleScanner& scanner, std::int64_t boot_key, Interval range) {
+  static std::vector<std::string> scanned(storage::SampleScanner& scanner, std::int64_t boot_key,
+                                          storage::Interval range) {
     std::vector<std::string> lines;
-    Segment segment;
+    storage::Segment segment;
     scanner.begin(boot_key, range);
     while (scanner.next(segment)) {
       EXPECT_EQ(segment.boot_key, boot_key);
@@ -144,15 +145,15 @@ class RandomRecording : public SampleScannerTest, public ::testing::WithParamInt
 TEST_P(RandomRecording, AScanGivesWhatAPlainQueryGives) {
   random_.seed(GetParam());
   record();
-  SQLite::Database database = open_for_reading(path_);
+  SQLite::Database database = storage::open_for_reading(path_);
   const std::int64_t boots = number("SELECT max(boot_key) FROM boot");
   EXPECT_EQ(boots, 4);
   for (int round = 0; round < 20; ++round) {
-    const Channels channels = round == 0 ? all_channels() : Channels{random_() % 64};
-    SampleScanner scanner{database, channels};
+    const storage::Channels channels = round == 0 ? storage::all_channels() : storage::Channels{random_() % 64};
+    storage::SampleScanner scanner{database, channels};
     for (std::int64_t boot_key = 1; boot_key <= boots + 1; ++boot_key) {
       const std::uint64_t first = random_() % 600;
-      const Interval range = round == 0 ? kAll : Interval{first, first + random_() % 300};
+      const storage::Interval range = round == 0 ? kAll : storage::Interval{first, first + random_() % 300};
       SCOPED_TRACE(fmt::format("boot {}, {} to {}", boot_key, range.first, range.next));
       EXPECT_EQ(scanned(scanner, boot_key, range), plain(boot_key, range, channels));
     }
@@ -162,15 +163,15 @@ TEST_P(RandomRecording, AScanGivesWhatAPlainQueryGives) {
 TEST_P(RandomRecording, HeadsHoldTheExtremesOfTheirSegments) {
   random_.seed(GetParam());
   record();
-  SQLite::Database database = open_for_reading(path_);
-  const Interval range{50, 400};
-  Channels channels;
+  SQLite::Database database = storage::open_for_reading(path_);
+  const storage::Interval range{50, 400};
+  storage::Channels channels;
   channels.set(0).set(4);
-  SampleScanner scanner{database, channels};
+  storage::SampleScanner scanner{database, channels};
   for (std::int64_t boot_key = 1; boot_key <= 4; ++boot_key) {
-    for (const SegmentHead& head : read_heads(database, boot_key, range, channels)) {
+    for (const storage::SegmentHead& head : read_heads(database, boot_key, range, channels)) {
       EXPECT_TRUE(head.first_seq < range.next && head.next_seq > range.first);
-      Segment segment;
+      storage::Segment segment;
       scanner.begin(boot_key, {head.first_seq, head.next_seq});
       ASSERT_TRUE(scanner.next(segment));
       EXPECT_EQ(segment.first_seq, head.first_seq);
@@ -180,8 +181,8 @@ TEST_P(RandomRecording, HeadsHoldTheExtremesOfTheirSegments) {
       EXPECT_EQ(segment.utc_offset_us, head.utc_offset_us);
       EXPECT_EQ(segment.clock_uncertainty_us, head.clock_uncertainty_us);
       EXPECT_EQ(segment.context.flags, head.flags);
-      Sample low{kNaN, kNaN, kNaN, kNaN, kNaN, kNaN}, high = low;
-      for (const Sample& sample : segment.samples) {
+      station::Sample low{kNaN, kNaN, kNaN, kNaN, kNaN, kNaN}, high = low;
+      for (const station::Sample& sample : segment.samples) {
         low.position_m = std::fmin(low.position_m, sample.position_m);
         high.position_m = std::fmax(high.position_m, sample.position_m);
         low.impedance_mv = std::fmin(low.impedance_mv, sample.impedance_mv);
@@ -200,9 +201,9 @@ INSTANTIATE_TEST_SUITE_P(Seeds, RandomRecording, ::testing::Range(1u, 9u));
 
 TEST_F(SampleScannerTest, AScanThatStopsEarlyLetsGoOfTheDatabase) {
   record();
-  SQLite::Database database = open_for_reading(path_);
-  SampleScanner scanner{database, all_channels()};
-  Segment segment;
+  SQLite::Database database = storage::open_for_reading(path_);
+  storage::SampleScanner scanner{database, storage::all_channels()};
+  storage::Segment segment;
   scanner.begin(1, kAll);
   ASSERT_TRUE(scanner.next(segment));
   scanner.end();
@@ -213,13 +214,13 @@ TEST_F(SampleScannerTest, AScanThatStopsEarlyLetsGoOfTheDatabase) {
 
 TEST_F(SampleScannerTest, AnEmptyRangeAndAnUnknownBootHaveNoSamples) {
   record();
-  SQLite::Database database = open_for_reading(path_);
-  SampleScanner scanner{database, all_channels()};
+  SQLite::Database database = storage::open_for_reading(path_);
+  storage::SampleScanner scanner{database, storage::all_channels()};
   EXPECT_TRUE(scanned(scanner, 1, {5, 5}).empty());
   EXPECT_TRUE(scanned(scanner, 1, {7, 5}).empty());
   EXPECT_TRUE(scanned(scanner, 99, kAll).empty());
-  EXPECT_TRUE(read_heads(database, 1, {5, 5}, all_channels()).empty());
-  EXPECT_TRUE(read_heads(database, 99, kAll, all_channels()).empty());
+  EXPECT_TRUE(storage::read_heads(database, 1, {5, 5}, storage::all_channels()).empty());
+  EXPECT_TRUE(read_heads(database, 99, kAll, storage::all_channels()).empty());
 }
 
 TEST_F(SampleScannerTest, AMissingRowIsDamageAndNotASample) {
@@ -230,8 +231,8 @@ TEST_F(SampleScannerTest, AMissingRowIsDamageAndNotASample) {
   stop();
   SQLite::Database database{path_.string(), SQLite::OPEN_READWRITE};
   database.exec("DELETE FROM sample WHERE row = 12");
-  SampleScanner scanner{database, all_channels()};
-  Segment segment;
+  storage::SampleScanner scanner{database, storage::all_channels()};
+  storage::Segment segment;
   scanner.begin(1, kAll);
   EXPECT_THROW(scanner.next(segment), std::runtime_error);
   scanner.begin(1, {0, 11});

@@ -17,7 +17,7 @@ class StartAfterCutTest : public ::testing::Test {
     if (mkdtemp(folder.data()) == nullptr) throw std::runtime_error{"cannot make a folder " + folder};
     folder_ = folder;
     vfs_.begin(survival_, 0);
-    Database{path()};
+    storage::Database{path()};
   }
   ~StartAfterCutTest() override { std::filesystem::remove_all(folder_); }
 
@@ -29,7 +29,7 @@ class StartAfterCutTest : public ::testing::Test {
     vfs_.begin(survival_, last_call);
     int known = -1;
     try {
-      Database database{path()};
+      storage::Database database{path()};
       known = database.handle().execAndGet("SELECT count(*) FROM robot").getInt();
       while (!vfs_.has_failed()) {
         database.handle().exec("INSERT INTO robot (robot_id, enrolled_at_us) VALUES (hex(randomblob(8)), 0)");
@@ -43,7 +43,7 @@ class StartAfterCutTest : public ::testing::Test {
 
   int robots() {
     vfs_.begin(survival_, 0);
-    return Database{path()}.handle().execAndGet("SELECT count(*) FROM robot").getInt();
+    return storage::Database{path()}.handle().execAndGet("SELECT count(*) FROM robot").getInt();
   }
 
   std::mt19937 random_{7};
@@ -58,7 +58,7 @@ TEST_F(StartAfterCutTest, WhatAKillHasLeftInTheLogIsDurableOnceItWasRead) {
     int found = 0;
     {
       vfs_.begin(survival_, 0);
-      Database database{path()};
+      storage::Database database{path()};
       found = database.handle().execAndGet("SELECT count(*) FROM robot").getInt();
       vfs_.begin(survival_, 1);  // the power fails before anything else is synced
     }
@@ -90,12 +90,12 @@ TEST_F(StartAfterCutTest, BeginsBesideAReaderAndWithoutRoom) {
     SQLite::Database reader{path(), SQLite::OPEN_READWRITE};
     reader.exec("BEGIN");
     EXPECT_GT(reader.execAndGet("SELECT count(*) FROM robot").getInt(), 0);
-    Database{path()};
+    storage::Database{path()};
   }
   enrol_until(60);
   vfs_.begin(survival_, 0);
   vfs_.refuse_writes(1000);
-  EXPECT_NO_THROW(Database{path()});
+  EXPECT_NO_THROW(storage::Database{path()});
 }
 
 }  // namespace

@@ -59,26 +59,25 @@ void StationLife::live_until_cut() {
 }
 
 void StationLife::begin() {
-  RecorderOptions options;
+  storage::RecorderOptions options;
   options.checkpoint_bytes = (5 + pick(60)) * 4096;
   options.head_interval = 100ms;
   start(options);
-  for (const StoreLoss& loss : recording_->head_watch.losses()) note({loss.problem}, "at the next start");
-  recorder_->set_on_durable([this](const RobotId&, BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event) {
-    acknowledge(boot_id, next_seq, next_event);
-  });
-  recorder_->set_on_missing([this](const RobotId&, BootId boot_id, std::uint64_t first_seq, std::uint64_t next_seq) {
-    asked_[boot_id].push_back({first_seq, next_seq});
-  });
-  recorder_->set_on_missing_events([this](const RobotId&, BootId boot_id) { asked_events_.insert(boot_id); });
+  for (const storage::StoreLoss& loss : recording_->head_watch.losses()) note({loss.problem}, "at the next start");
+  recorder_->set_on_durable([this](const station::RobotId&, station::BootId boot_id, std::uint64_t next_seq,
+                                   std::uint64_t next_event) { acknowledge(boot_id, next_seq, next_event); });
+  recorder_->set_on_missing([this](const station::RobotId&, station::BootId boot_id, std::uint64_t first_seq,
+                                   std::uint64_t next_seq) { asked_[boot_id].push_back({first_seq, next_seq}); });
+  recorder_->set_on_missing_events(
+      [this](const station::RobotId&, station::BootId boot_id) { asked_events_.insert(boot_id); });
   moving_commands_.clear();
   station_events_.clear();
   open_run_.reset();
-  auto job = [without_sync = mutant_ == Mutant::synchronous_off](Database& database) {
+  auto job = [without_sync = mutant_ == Mutant::synchronous_off](storage::Database& database) {
     if (without_sync) database.handle().exec("PRAGMA synchronous = OFF");
   };
   wait(recorder_->on_disk(std::move(job)));
-  SQLite::Database database = open_for_reading(path_);
+  SQLite::Database database = storage::open_for_reading(path_);
   note(audit(database, truth_), "at the next start");
   check_stops();
   for (RingRobot& robot : robots_) {
@@ -89,8 +88,8 @@ void StationLife::begin() {
 // An emergency stop that was accepted is known until a robot has acknowledged it.
 void StationLife::check_stops() {
   for (const auto& [id, command] : truth_.commands) {
-    if (!command.is_stop || !command.flushed || command.latest == CommandState::acknowledged) continue;
-    if (std::ranges::find(restored_.pending_stops, id, &CommandRecord::id) == restored_.pending_stops.end()) {
+    if (!command.is_stop || !command.flushed || command.latest == station::CommandState::acknowledged) continue;
+    if (std::ranges::find(restored_.pending_stops, id, &station::CommandRecord::id) == restored_.pending_stops.end()) {
       note({fmt::format("stop {} is not pending", id)}, "at the next start");
     }
   }
@@ -98,7 +97,7 @@ void StationLife::check_stops() {
 
 void StationLife::end_well() {
   const auto compare = [this](const char* when) {
-    SQLite::Database database = open_for_reading(path_);
+    SQLite::Database database = storage::open_for_reading(path_);
     note(audit_complete(database, truth_), when);
   };
   try {

@@ -55,7 +55,7 @@ class StationLife final : public RecordingTest {
   void send_event(const RingRobot& robot, std::uint64_t event_seq);
   void send_held_events(const RingRobot& robot);
   void let_go(RingRobot& robot);
-  void acknowledge(BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event_seq);
+  void acknowledge(station::BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event_seq);
 
   void start_boot(RingRobot& robot);
   void reboot(RingRobot& robot);
@@ -78,14 +78,14 @@ class StationLife final : public RecordingTest {
 
   std::vector<RingRobot> robots_;
   RecordingTruth truth_;
-  std::map<BootId, IntervalSet> received_;
-  std::map<BootId, std::vector<Missing>> asked_;
-  std::set<BootId> asked_events_;
-  CommandId last_command_id_ = 0;
-  std::vector<CommandId> moving_commands_;  // of this session
-  std::set<std::uint64_t> station_events_;  // not flushed yet
+  std::map<station::BootId, storage::IntervalSet> received_;
+  std::map<station::BootId, std::vector<Missing>> asked_;
+  std::set<station::BootId> asked_events_;
+  station::CommandId last_command_id_ = 0;
+  std::vector<station::CommandId> moving_commands_;  // of this session
+  std::set<std::uint64_t> station_events_;           // not flushed yet
   std::uint64_t last_station_event_ = 0;
-  std::optional<RunId> open_run_;
+  std::optional<storage::RunId> open_run_;
 
   Faults faults_;
   std::vector<std::string> cuts_;

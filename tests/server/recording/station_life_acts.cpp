@@ -62,8 +62,8 @@ void StationLife::send_held(const RingRobot& robot, std::uint64_t first_seq, std
   const TestRobot& own = robot.own;
   const std::uint64_t next_seq = std::min(first_seq + count, own.next_seq);
   for (std::uint64_t seq = std::max(first_seq, own.oldest_seq); seq < next_seq; seq += kFrameSamples) {
-    SampleBatch batch = own.batch(seq, std::min(kFrameSamples, next_seq - seq));
-    for (Sample& sample : batch.samples) sample.impedance_mv = truth_.boots.at(own.boot_id).impedance_mv;
+    station::SampleBatch batch = own.batch(seq, std::min(kFrameSamples, next_seq - seq));
+    for (station::Sample& sample : batch.samples) sample.impedance_mv = truth_.boots.at(own.boot_id).impedance_mv;
     send(own, batch);
     received_[own.boot_id].insert({batch.first_seq, batch.next_seq()});
   }
@@ -71,8 +71,8 @@ void StationLife::send_held(const RingRobot& robot, std::uint64_t first_seq, std
 }
 
 void StationLife::answer_missing() {
-  const std::map<BootId, std::vector<Missing>> asked = std::exchange(asked_, {});
-  const std::set<BootId> asked_events = std::exchange(asked_events_, {});
+  const std::map<station::BootId, std::vector<Missing>> asked = std::exchange(asked_, {});
+  const std::set<station::BootId> asked_events = std::exchange(asked_events_, {});
   for (const RingRobot& robot : robots_) {
     if (asked_events.contains(robot.own.boot_id)) send_held_events(robot);
     const auto found = asked.find(robot.own.boot_id);
@@ -96,7 +96,7 @@ void StationLife::send_held_events(const RingRobot& robot) {
 
 void StationLife::send_event(const RingRobot& robot, std::uint64_t event_seq) {
   if (!robot.is_connected) return;
-  RobotEvent event;
+  station::RobotEvent event;
   event.robot_id = robot.own.id;
   event.boot_id = robot.own.boot_id;
   event.event_seq = event_seq;
@@ -104,13 +104,14 @@ void StationLife::send_event(const RingRobot& robot, std::uint64_t event_seq) {
   event.kind = "mode_changed";
   event.cause = "command";
   event.value = static_cast<float>(event_seq);
-  recorder_->on_event(state_of(robot.own, LinkState::connected), event);
+  recorder_->on_event(state_of(robot.own, station::LinkState::connected), event);
 }
 
 // What does not fit into the ring any more was neither acknowledged nor can it be sent again.
 void StationLife::let_go(RingRobot& robot) {
   BootTruth& truth = truth_.boots.at(robot.own.boot_id);
-  const auto drop = [](std::uint64_t next, std::uint64_t capacity, std::uint64_t& oldest, IntervalSet& dropped) {
+  const auto drop = [](std::uint64_t next, std::uint64_t capacity, std::uint64_t& oldest,
+                       storage::IntervalSet& dropped) {
     if (next <= oldest + capacity) return;
     dropped.insert({oldest, next - capacity});
     oldest = next - capacity;
@@ -120,7 +121,7 @@ void StationLife::let_go(RingRobot& robot) {
 }
 
 // The robot is told, believes it and forgets.
-void StationLife::acknowledge(BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event_seq) {
+void StationLife::acknowledge(station::BootId boot_id, std::uint64_t next_seq, std::uint64_t next_event_seq) {
   BootTruth& truth = truth_.boots.at(boot_id);
   truth.acknowledged = std::max(truth.acknowledged, next_seq);
   truth.events_acknowledged = std::max(truth.events_acknowledged, next_event_seq);
@@ -132,7 +133,7 @@ void StationLife::acknowledge(BootId boot_id, std::uint64_t next_seq, std::uint6
 }
 
 void StationLife::start_boot(RingRobot& robot) {
-  robot.own.boot_id = (static_cast<BootId>(random_()) << 32) | (truth_.boots.size() + 1);
+  robot.own.boot_id = (static_cast<station::BootId>(random_()) << 32) | (truth_.boots.size() + 1);
   robot.own.next_seq = robot.own.oldest_seq = 0;
   robot.next_event_seq = robot.oldest_event_seq = 0;
   BootTruth& truth = truth_.boots[robot.own.boot_id];
@@ -153,13 +154,13 @@ void StationLife::reboot(RingRobot& robot) {
 
 void StationLife::join(RingRobot& robot) {
   robot.own.next_event_seq = robot.next_event_seq;
-  const Admission admission = admit(robot.own);
+  const station::Admission admission = admit(robot.own);
   if (admission.refusal == rheonaut_REFUSAL_REASON_STATION_BUSY) return;
   if (admission.refusal != rheonaut_REFUSAL_REASON_NONE) return note({admission.detail}, "at a connection");
   if (truth_.store_id == 0) truth_.store_id = admission.store_id;
   if (truth_.store_id != admission.store_id) note({"another store_id"}, "at a connection");
   acknowledge(robot.own.boot_id, admission.durable_next_seq, admission.durable_next_event_seq);
-  const RobotState state = state_of(robot.own, LinkState::connected);
+  const station::RobotState state = state_of(robot.own, station::LinkState::connected);
   recorder_->on_robot(state);
   runs_->on_robot(state);
   robot.is_connected = true;
@@ -175,7 +176,7 @@ void StationLife::leave(RingRobot& robot) {
 // A command, the next state of one, or an event of the station.
 void StationLife::make_record() {
   if (pick(3) == 0) {
-    RobotEvent event;
+    station::RobotEvent event;
     event.robot_id = robots_.front().own.id;
     event.sample_seq = ++last_station_event_;
     event.kind = "connected";
@@ -184,15 +185,15 @@ void StationLife::make_record() {
     return;
   }
   const bool is_new = moving_commands_.empty() || pick(2) == 0;
-  const CommandId id = is_new ? ++last_command_id_ : moving_commands_[pick(moving_commands_.size())];
+  const station::CommandId id = is_new ? ++last_command_id_ : moving_commands_[pick(moving_commands_.size())];
   CommandTruth& truth = truth_.commands[id];
   if (is_new) {
     truth.is_stop = pick(2) == 0;
     moving_commands_.push_back(id);
-  } else if (truth.latest < CommandState::acknowledged) {
-    truth.latest = static_cast<CommandState>(static_cast<int>(truth.latest) + 1);
+  } else if (truth.latest < station::CommandState::acknowledged) {
+    truth.latest = static_cast<station::CommandState>(static_cast<int>(truth.latest) + 1);
   }
-  CommandRecord command;
+  station::CommandRecord command;
   command.id = id;
   command.robot_id = robots_.front().own.id;
   command.kind = truth.is_stop ? "emergency_stop" : "set_duty";
@@ -202,7 +203,7 @@ void StationLife::make_record() {
 
 void StationLife::flush_records() {
   if (!wait(recorder_->flush_records())) return;
-  for (const CommandId id : moving_commands_) truth_.commands[id].flushed = truth_.commands[id].latest;
+  for (const station::CommandId id : moving_commands_) truth_.commands[id].flushed = truth_.commands[id].latest;
   truth_.station_events.merge(station_events_);
   station_events_.clear();
 }
@@ -226,7 +227,7 @@ void StationLife::care_for_database() {
     case 1: restart(); break;
     default: {
       const std::string sql = std::string{"PRAGMA wal_checkpoint("} + kCheckpoints[pick(kCheckpoints.size())] + ")";
-      auto job = [sql](Database& database) {
+      auto job = [sql](storage::Database& database) {
         try {
           database.handle().exec(sql);
         } catch (const SQLite::Exception&) {  // the disk is full: the log stays longer

@@ -20,7 +20,7 @@ class StoreCheckTest : public RecordingTest {
     TestRobot robot;
     start();
     connect(robot);
-    const RunId first = begin(robot);
+    const storage::RunId first = begin(robot);
     make(robot, 200);
     robot.next_seq += 10;
     make(robot, 50);
@@ -30,13 +30,13 @@ class StoreCheckTest : public RecordingTest {
     connect(robot);
     make(robot, 30);
     end(first);
-    const RunId second = begin(robot);
+    const storage::RunId second = begin(robot);
     make(robot, 100);
     end(second);
     stop();
   }
-  RunId begin(const TestRobot& robot) { return wait(runs_->create(robot.id, named("checked")))->id; }
-  void end(RunId run) {
+  storage::RunId begin(const TestRobot& robot) { return wait(runs_->create(robot.id, named("checked")))->id; }
+  void end(storage::RunId run) {
     ASSERT_TRUE(wait(runs_->end(run, "")).has_value());
     ASSERT_TRUE(wait(recording_->digester.find(run))->is_final);
   }
@@ -45,15 +45,15 @@ class StoreCheckTest : public RecordingTest {
     database.exec("PRAGMA foreign_keys = OFF; PRAGMA ignore_check_constraints = ON");
     database.exec(sql);
   }
-  StoreFindings findings(const StoreCheck& wish = {}) {
-    SQLite::Database database = open_for_reading(path_);
+  storage::StoreFindings findings(const storage::StoreCheck& wish = {}) {
+    SQLite::Database database = storage::open_for_reading(path_);
     return check_store(database, wish).value();
   }
-  std::vector<std::string> faults(const StoreCheck& wish = {}) { return findings(wish).faults; }
+  std::vector<std::string> faults(const storage::StoreCheck& wish = {}) { return findings(wish).faults; }
 };
 
 TEST_F(StoreCheckTest, FindsNothingInAGoodDatabase) {
-  const StoreFindings found = findings({.run = {}, .integrity = true});
+  const storage::StoreFindings found = findings({.run = {}, .integrity = true});
   EXPECT_THAT(found.faults, IsEmpty());
   EXPECT_EQ(found.runs_verified, 2u);
   EXPECT_EQ(found.runs_incomplete, 0u);
@@ -149,12 +149,12 @@ TEST_F(StoreCheckTest, ARunWhoseSamplesAreOnTheirWayIsNoFault) {
   robot.boot_id = 5;
   start();
   connect(robot);
-  const RunId run = begin(robot);
+  const storage::RunId run = begin(robot);
   make(robot, 10);
   robot.next_seq += 5;
   make(robot, 10);
   ASSERT_TRUE(wait(runs_->end(run, "")).has_value());
-  const StoreFindings found = findings();  // beside the running station
+  const storage::StoreFindings found = findings();  // beside the running station
   EXPECT_THAT(found.faults, IsEmpty());
   EXPECT_EQ(found.runs_incomplete, 1u);
   EXPECT_EQ(found.runs_verified, 2u);
@@ -165,7 +165,7 @@ TEST_F(StoreCheckTest, SamplesThatWereReceivedBeforeAKillButNeverCameAreLostWith
   robot.boot_id = 5;
   start();
   connect(robot);
-  const RunId run = begin(robot);
+  const storage::RunId run = begin(robot);
   make(robot, 10);
   SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE, 5000};
   foreign.exec("CREATE TRIGGER full BEFORE INSERT ON segment BEGIN SELECT RAISE(ABORT, 'the disk is full'); END");
@@ -182,8 +182,8 @@ TEST_F(StoreCheckTest, SamplesThatWereReceivedBeforeAKillButNeverCameAreLostWith
 }
 
 TEST_F(StoreCheckTest, AnUnknownRunIsDistinguished) {
-  SQLite::Database database = open_for_reading(path_);
-  EXPECT_EQ(check_store(database, {.run = 9, .integrity = false}).error().code, ErrorCode::not_found);
+  SQLite::Database database = storage::open_for_reading(path_);
+  EXPECT_EQ(storage::check_store(database, {.run = 9, .integrity = false}).error().code, ErrorCode::not_found);
 }
 
 TEST_F(StoreCheckTest, FindsSamplesOutsideOfRunsThatAreInNothing) {

@@ -41,19 +41,19 @@ class StoreHeadTest : public RecordingTest {
 
   std::vector<std::string> losses() const {
     std::vector<std::string> problems;
-    for (const StoreLoss& loss : recording_->head_watch.losses()) problems.push_back(loss.problem);
+    for (const storage::StoreLoss& loss : recording_->head_watch.losses()) problems.push_back(loss.problem);
     return problems;
   }
 
-  HeadFile head_file() {
-    const auto file = load_head_file(path_);
+  storage::HeadFile head_file() {
+    const auto file = storage::load_head_file(path_);
     if (!file) throw std::runtime_error{file.error().detail};
-    return file->value_or(HeadFile{});
+    return file->value_or(storage::HeadFile{});
   }
 
-  StoreHead head_of_database() {
-    SQLite::Database database = open_for_reading(path_);
-    return read_store_head(database);
+  storage::StoreHead head_of_database() {
+    SQLite::Database database = storage::open_for_reading(path_);
+    return storage::read_store_head(database);
   }
 
   // The file alone, as it is without its log.
@@ -76,8 +76,8 @@ class StoreHeadTest : public RecordingTest {
 };
 
 TEST_F(StoreHeadTest, TheSchemaAndTheStoresIdentityAreInTheFileFromTheStart) {
-  const Database database{path_};
-  EXPECT_EQ(number_without_log("PRAGMA user_version"), static_cast<std::int64_t>(migrations().size()));
+  const storage::Database database{path_};
+  EXPECT_EQ(number_without_log("PRAGMA user_version"), static_cast<std::int64_t>(storage::migrations().size()));
   EXPECT_EQ(static_cast<std::uint64_t>(number_without_log("SELECT value FROM meta WHERE name = 'store_id'")),
             database.store_id());
 }
@@ -151,7 +151,7 @@ TEST_F(StoreHeadTest, ALogThatIsGoneIsReportedUntilAnAdminAcknowledgesIt) {
 TEST_F(StoreHeadTest, ALogThatIsCutAnywhereIsNoticed) {
   record(500);
   kill_at_once();
-  const HeadFile before = head_file();
+  const storage::HeadFile before = head_file();
   const fs::path all = path_.parent_path();
   const std::uintmax_t bytes = fs::file_size(log());
   int noticed = 0;
@@ -160,9 +160,9 @@ TEST_F(StoreHeadTest, ALogThatIsCutAnywhereIsNoticed) {
     path_ = folder_ / ("cut" + std::to_string(place)) / "station.sqlite";
     fs::copy(all, path_.parent_path());
     fs::resize_file(log(), bytes * place / kPlaces);
-    const StoreHead found = [this] {
-      Database database{path_};
-      return read_store_head(database.handle());
+    const storage::StoreHead found = [this] {
+      storage::Database database{path_};
+      return storage::read_store_head(database.handle());
     }();
     const bool has_lost = found.commits < before.head.commits || found.audit.entry < before.head.audit.entry;
     start();
@@ -220,7 +220,7 @@ TEST_F(StoreHeadTest, AnOlderCopyInItsPlaceIsNoticed) {
 TEST_F(StoreHeadTest, AnotherHistoryOfTheSameStoreIsNoticed) {
   record(500);
   stop();
-  HeadFile file = head_file();
+  storage::HeadFile file = head_file();
   file.head.audit.hash[5] ^= 1;
   save_head_file(path_, file);
   start();
@@ -232,8 +232,8 @@ TEST_F(StoreHeadTest, AFileThatIsNoHeadIsReplacedAndThatNobodyKnowsWhatIsLostIsS
   stop();
   const std::vector<std::string> contents{"", "{", "[1]", R"({"store_id":7})", "\xff\xfe", std::string(100'000, ' ')};
   for (const std::string& content : contents) {
-    std::ofstream{head_file_of(path_), std::ios::trunc} << content;
-    EXPECT_FALSE(load_head_file(path_));
+    std::ofstream{storage::head_file_of(path_), std::ios::trunc} << content;
+    EXPECT_FALSE(storage::load_head_file(path_));
     start();
     ASSERT_EQ(losses().size(), 1U);
     EXPECT_THAT(losses()[0], HasSubstr("whether station.sqlite has lost commits cannot be told"));
@@ -246,14 +246,14 @@ TEST_F(StoreHeadTest, AFileThatIsNoHeadIsReplacedAndThatNobodyKnowsWhatIsLostIsS
 TEST_F(StoreHeadTest, AHeadThatCannotBeWrittenHindersNothing) {
   record(500);
   stop();
-  fs::remove(head_file_of(path_));
-  fs::create_directories(head_file_of(path_) / "in the way");
+  fs::remove(storage::head_file_of(path_));
+  fs::create_directories(storage::head_file_of(path_) / "in the way");
   record(500);
   flush();
   EXPECT_EQ(durable_next_seq_, robot_.next_seq);
-  EXPECT_FALSE(load_head_file(path_));
+  EXPECT_FALSE(storage::load_head_file(path_));
   stop();
-  fs::remove_all(head_file_of(path_));
+  fs::remove_all(storage::head_file_of(path_));
   start();
   EXPECT_THAT(losses(), IsEmpty());
 }
@@ -262,14 +262,14 @@ TEST_F(StoreHeadTest, LossesAreBounded) {
   record(500);
   stop();
   for (int time = 0; time < 10; ++time) {
-    HeadFile file = head_file();
+    storage::HeadFile file = head_file();
     file.head.commits += 1000;
     save_head_file(path_, file);
     start();
     stop();
   }
   start();
-  EXPECT_EQ(losses().size(), kMaxLosses);
+  EXPECT_EQ(losses().size(), storage::kMaxLosses);
 }
 
 // The file of a database that was moved away is there still.
@@ -280,7 +280,7 @@ TEST_F(StoreHeadTest, ARestoreWritesANewOne) {
   make_slowly(robot_, 500);
   stop();
   fs::rename(path_, folder_ / "moved_away.sqlite");
-  restore_database(folder_ / "backups" / "b.sqlite", folder_, {"cli:root", "", clock_.utc_us()});
+  storage::restore_database(folder_ / "backups" / "b.sqlite", folder_, {"cli:root", "", clock_.utc_us()});
   EXPECT_EQ(head_file().head, head_of_database());
   start();
   EXPECT_THAT(losses(), IsEmpty());

@@ -32,12 +32,13 @@ std::map<std::int64_t, std::vector<std::string>> stored_runs(SQLite::Database& d
 
 std::vector<std::string> coverage_faults(SQLite::Database& database) {
   std::vector<std::string> faults;
-  std::map<std::int64_t, IntervalSet> covered;
+  std::map<std::int64_t, storage::IntervalSet> covered;
   SQLite::Statement ranges{database,
                            "SELECT boot_key, first_seq, last_seq, 'segment' FROM segment"
                            " UNION ALL SELECT boot_key, first_seq, last_seq, cause FROM gap"};
   while (ranges.executeStep()) {
-    const Interval range{unsigned_id(ranges.getColumn(1)), unsigned_id(ranges.getColumn(2)) + 1};
+    const storage::Interval range{storage::unsigned_id(ranges.getColumn(1)),
+                                  storage::unsigned_id(ranges.getColumn(2)) + 1};
     if (count(covered[ranges.getColumn(0).getInt64()].insert(range)) == range.next - range.first) continue;
     faults.push_back(fmt::format("boot {}: samples {} to {} ({}) twice", ranges.getColumn(0).getInt64(), range.first,
                                  range.next - 1, ranges.getColumn(3).getString()));
@@ -45,7 +46,7 @@ std::vector<std::string> coverage_faults(SQLite::Database& database) {
   SQLite::Statement boots{database, "SELECT boot_key, durable_next_seq FROM boot"};
   while (boots.executeStep()) {
     const std::int64_t boot_key = boots.getColumn(0).getInt64();
-    for (const Interval& hole : covered[boot_key].missing({0, unsigned_id(boots.getColumn(1))})) {
+    for (const storage::Interval& hole : covered[boot_key].missing({0, storage::unsigned_id(boots.getColumn(1))})) {
       faults.push_back(fmt::format("boot {}: samples {} to {} are nowhere", boot_key, hole.first, hole.next - 1));
     }
   }

@@ -33,16 +33,16 @@ class Version6Test : public RecordingTest {
 
   void migrate() {
     {
-      const Database database{path_};
+      const storage::Database database{path_};
     }
-    ASSERT_EQ(number("PRAGMA user_version"), static_cast<std::int64_t>(migrations().size()));
+    ASSERT_EQ(number("PRAGMA user_version"), static_cast<std::int64_t>(storage::migrations().size()));
   }
 
   // As `rheonaut verify --json` says it.
   nlohmann::json verified() {
-    SQLite::Database database = open_for_reading(path_);
-    const StoreFindings store = check_store(database, {.run = {}, .integrity = true}).value();
-    const AuditFindings audit = check_audit(database, {});
+    SQLite::Database database = storage::open_for_reading(path_);
+    const storage::StoreFindings store = storage::check_store(database, {.run = {}, .integrity = true}).value();
+    const storage::AuditFindings audit = storage::check_audit(database, {});
     std::vector<std::string> faults = store.faults;
     faults.insert(faults.end(), audit.faults.begin(), audit.faults.end());
     return {{"faults", faults},
@@ -123,7 +123,7 @@ TEST_F(Version6Test, WhatWasOverwrittenStaysAndIsMarked) {
   EXPECT_EQ(rows("SELECT kind, cause FROM event ORDER BY event_row"), before);
   EXPECT_EQ(number("SELECT count(*) FROM robot_event WHERE emergency_cause IS NULL AND detail = ''"), 17);
   start();
-  for (const RobotEvent& event : wait(history_->events("nemo", 100))) {
+  for (const station::RobotEvent& event : wait(history_->events("nemo", 100))) {
     EXPECT_FALSE(event.emergency_cause.has_value());
     if (event.kind == "link_lost") EXPECT_EQ(event.cause, "operator");
     if (event.kind == "disconnected") EXPECT_NE(event.cause, "none");
@@ -134,7 +134,7 @@ TEST_F(Version6Test, TheAuditInAnExportOfThenIsWhole) {
   const fs::path earlier = folder_ / "earlier.sqlite";
   make_database(earlier, "version_6_run_1.sql");
   SQLite::Database exported{earlier.string(), SQLite::OPEN_READONLY};
-  const AuditFindings audit = check_exported_audit(exported, {});
+  const storage::AuditFindings audit = storage::check_exported_audit(exported, {});
   EXPECT_THAT(audit.faults, IsEmpty());
   EXPECT_EQ(audit.entries, 8U);
   EXPECT_EQ(text(audit.head), "11:1a6d83bd6530bf5e1cb5bc9704007110e095ed834ee905b84161eb8a82a4e6fa");
@@ -143,7 +143,7 @@ TEST_F(Version6Test, TheAuditInAnExportOfThenIsWhole) {
 TEST_F(Version6Test, AStationGoesOnAndTheChainWithIt) {
   start();
   EXPECT_EQ(restored_.store_id, 14012994835199578285U);
-  EXPECT_EQ(wait(runs_->find(2))->state, RunState::interrupted);
+  EXPECT_EQ(wait(runs_->find(2))->state, storage::RunState::interrupted);
   TestRobot robot;
   robot.boot_id = 4712;
   connect(robot);

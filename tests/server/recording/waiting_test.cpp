@@ -9,7 +9,7 @@
 namespace server {
 namespace {
 
-constexpr Interval kAll{0, std::numeric_limits<std::uint64_t>::max()};
+constexpr storage::Interval kAll{0, std::numeric_limits<std::uint64_t>::max()};
 
 class WaitingTest : public RecordingTest {
  protected:
@@ -18,9 +18,9 @@ class WaitingTest : public RecordingTest {
     other_.boot_id = 7;
   }
 
-  std::vector<std::string> waiting(const TestRobot& robot, Interval range = kAll) {
+  std::vector<std::string> waiting(const TestRobot& robot, storage::Interval range = kAll) {
     std::vector<std::string> parts;
-    for (const Segment& segment : recorder_->waiting(robot.boot_id, range)) {
+    for (const storage::Segment& segment : recorder_->waiting(robot.boot_id, range)) {
       EXPECT_EQ(segment.samples.front().position_m, static_cast<float>(segment.first_seq) / 1000);
       EXPECT_EQ(segment.first_robot_time_us, robot.time_of(segment.first_seq));
       parts.push_back(std::to_string(segment.first_seq) + "-" + std::to_string(segment.next_seq() - 1));
@@ -30,7 +30,7 @@ class WaitingTest : public RecordingTest {
 
   std::vector<std::string> waiting_gaps(const TestRobot& robot) {
     std::vector<std::string> parts;
-    for (const LostRange& gap : recorder_->waiting_gaps(robot.boot_id, kAll)) {
+    for (const storage::LostRange& gap : recorder_->waiting_gaps(robot.boot_id, kAll)) {
       parts.push_back(std::to_string(gap.lost.first) + "-" + std::to_string(gap.lost.next - 1) + " " + gap.cause);
     }
     return parts;
@@ -94,7 +94,7 @@ TEST_F(WaitingTest, WhatTheDiskDoesNotTakeGoesOnWaiting) {
 TEST_F(WaitingTest, APageGetsTheFirstOfWhatWaits) {
   start();
   connect(robot_);
-  const RunId run = wait(runs_->create(robot_.id, named("run")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("run")))->id;
   flush();
   SQLite::Database foreign{path_.string(), SQLite::OPEN_READWRITE};
   foreign.exec("BEGIN IMMEDIATE");
@@ -103,19 +103,20 @@ TEST_F(WaitingTest, APageGetsTheFirstOfWhatWaits) {
   EXPECT_EQ(recorder_->waiting(robot_.boot_id, kAll, 150).back().next_seq(), 200u);
   EXPECT_EQ(recorder_->waiting(robot_.boot_id, {1'050, 30'000}, 1).back().next_seq(), 1'100u);
 
-  const auto waiting_in = [](const std::vector<RecordedSpan>& spans) {
+  const auto waiting_in = [](const std::vector<storage::RecordedSpan>& spans) {
     std::size_t samples = 0;
-    for (const Segment& segment : spans.at(0).waiting) samples += segment.samples.size();
+    for (const storage::Segment& segment : spans.at(0).waiting) samples += segment.samples.size();
     return samples;
   };
-  EXPECT_LE(waiting_in(wait(history_->spans(excerpt_of(run), SampleCursor{0, 999}, 500)).value()), 600u);
-  EXPECT_EQ(waiting_in(wait(history_->spans(excerpt_of(run))).value()), 30'000u);
+  EXPECT_LE(waiting_in(wait(history_->spans(storage::excerpt_of(run), storage::SampleCursor{0, 999}, 500)).value()),
+            600u);
+  EXPECT_EQ(waiting_in(wait(history_->spans(storage::excerpt_of(run))).value()), 30'000u);
 
   std::uint64_t next_seq = 0;
-  std::optional<SampleCursor> after;
+  std::optional<storage::SampleCursor> after;
   do {
-    const SamplePage page = wait(history_->samples(run, after, 7'001)).value();
-    for (const StoredSample& stored : page.samples) ASSERT_EQ(stored.seq, next_seq++);
+    const storage::SamplePage page = wait(history_->samples(run, after, 7'001)).value();
+    for (const storage::StoredSample& stored : page.samples) ASSERT_EQ(stored.seq, next_seq++);
     after = page.next;
     if (next_seq == 14'002) {  // the next pages join what is stored with what waits
       foreign.exec("ROLLBACK");
@@ -164,16 +165,16 @@ TEST_F(WaitingTest, AnUnknownBootHasNothingWaiting) {
 TEST_F(WaitingTest, ValuesAreThoseThatWillBeReadBack) {
   start();
   connect(robot_);
-  const RunId run = wait(runs_->create(robot_.id, named("run")))->id;
+  const storage::RunId run = wait(runs_->create(robot_.id, named("run")))->id;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  SampleBatch batch = robot_.batch(0, 2);
+  station::SampleBatch batch = robot_.batch(0, 2);
   batch.samples[0] = {-0.0F, kInfinity, -kInfinity, std::numeric_limits<float>::quiet_NaN(), 0.1F, 1e-40F};
   batch.samples[1] = {std::numeric_limits<float>::denorm_min(), std::numeric_limits<float>::max(), 1, -1, 1.0F / 3, 3};
   send(robot_, batch);
   const auto bits = [&] {
     std::vector<std::uint32_t> found;
-    for (const StoredSample& stored : wait(history_->samples(run, std::nullopt, 10))->samples) {
-      const Sample& sample = stored.sample;
+    for (const storage::StoredSample& stored : wait(history_->samples(run, std::nullopt, 10))->samples) {
+      const station::Sample& sample = stored.sample;
       for (const float value : {sample.position_m, sample.velocity_m_s, sample.acceleration_m_s2, sample.duty,
                                 sample.impedance_mv, sample.reference_m}) {
         found.push_back(std::bit_cast<std::uint32_t>(value));
@@ -225,7 +226,7 @@ TEST_F(WaitingTest, TheFirstAndTheLastArrivalOfASegmentAreStored) {
   make(robot_, 5);
   clock_.run_for(50ms);
   make(robot_, 5);
-  const std::vector<Segment> segments = recorder_->waiting(robot_.boot_id, kAll);
+  const std::vector<storage::Segment> segments = recorder_->waiting(robot_.boot_id, kAll);
   ASSERT_EQ(segments.size(), 1u);
   EXPECT_EQ(segments[0].first_received_at_us, first_us);
   EXPECT_EQ(segments[0].received_at_us, first_us + 50'000);

@@ -9,13 +9,13 @@ namespace server {
 namespace {
 
 struct Item {
-  WorkLink<Item> red;
-  WorkLink<Item> blue;
-  TimedLink timed;
+  storage::WorkLink<Item> red;
+  storage::WorkLink<Item> blue;
+  storage::TimedLink timed;
 };
-using RedItems = WorkList<Item, &Item::red>;
-using BlueItems = WorkList<Item, &Item::blue>;
-using TimedItems = TimedWorkList<Item, &Item::timed>;
+using RedItems = storage::WorkList<Item, &Item::red>;
+using BlueItems = storage::WorkList<Item, &Item::blue>;
+using TimedItems = storage::TimedWorkList<Item, &Item::timed>;
 
 std::vector<Item*> listed(const RedItems& list) {
   std::vector<Item*> items;

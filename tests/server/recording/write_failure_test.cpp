@@ -17,7 +17,7 @@ class WriteFailureTest : public ::testing::Test {
   std::size_t errors() const { return log_.lines_with("cannot be written: disk full"); }
 
   CapturedLog log_;
-  WriteFailure failure_;
+  storage::WriteFailure failure_;
 };
 
 TEST_F(WriteFailureTest, AFailedCommitIsTriedAgainAfterASecond) {

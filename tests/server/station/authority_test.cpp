@@ -14,7 +14,7 @@ class AuthorityTest : public ::testing::Test {
  protected:
   boost::asio::io_context loop_;
   VirtualClock clock_{loop_};
-  Authority authority_{clock_};
+  station::Authority authority_{clock_};
 };
 
 TEST_F(AuthorityTest, WhoCommandsFirstIsInControlAndAnotherIsRefusedByName) {
@@ -27,13 +27,13 @@ TEST_F(AuthorityTest, WhoCommandsFirstIsInControlAndAnotherIsRefusedByName) {
   EXPECT_EQ(second.error().reason, "not_in_control");
   EXPECT_NE(second.error().detail.find("session:1"), std::string::npos);
   EXPECT_TRUE(authority_.use("r2", "session:2")) << "another robot";
-  EXPECT_FALSE(authority_.take("r1", "session:2", kControlLease));
+  EXPECT_FALSE(authority_.take("r1", "session:2", station::kControlLease));
   EXPECT_EQ(authority_.of("r1").holder, "session:1");
 }
 
 TEST_F(AuthorityTest, EndsWithSilenceAndIsReportedOnce) {
   ASSERT_TRUE(authority_.use("r1", "session:1"));
-  clock_.run_for(kControlLease - 1us);
+  clock_.run_for(station::kControlLease - 1us);
   EXPECT_FALSE(authority_.use("r1", "session:2"));
   EXPECT_TRUE(authority_.expire().empty());
   clock_.run_for(1us);
@@ -53,7 +53,7 @@ TEST_F(AuthorityTest, ASignOfLifeKeepsWhatHasNotEnded) {
     authority_.keep_alive("session:2");
   }
   EXPECT_EQ(authority_.of("r1").holder, "session:1");
-  clock_.run_for(kControlLease);
+  clock_.run_for(station::kControlLease);
   authority_.keep_alive("session:1");  // SAFETY: too late; what has ended stays ended
   EXPECT_EQ(authority_.of("r1").holder, "");
 }
@@ -92,7 +92,7 @@ TEST_F(AuthorityTest, IsHandedOverToWhoHasAsked) {
 TEST_F(AuthorityTest, ARequestIsForgottenAfterAWhile) {
   ASSERT_TRUE(authority_.take("r1", "session:1", 300s));
   ASSERT_TRUE(authority_.request("r1", "session:2"));
-  clock_.run_for(kRequestTimeout);
+  clock_.run_for(station::kRequestTimeout);
   EXPECT_EQ(authority_.of("r1").requested_by, "");
   EXPECT_FALSE(authority_.hand_over("r1", "session:1"));
 }

@@ -24,8 +24,8 @@ struct TrueClock {
   std::int64_t offset_us(std::int64_t steady_us) const { return steady_us - robot_us(steady_us); }
 };
 
-ClockExchange exchange(const TrueClock& clock, std::int64_t sent_at_us, std::int64_t there_us, std::int64_t held_us,
-                       std::int64_t back_us) {
+station::ClockExchange exchange(const TrueClock& clock, std::int64_t sent_at_us, std::int64_t there_us,
+                                std::int64_t held_us, std::int64_t back_us) {
   return {.sent_at_us = sent_at_us,
           .received_at_robot_us = clock.robot_us(sent_at_us + there_us),
           .answered_at_robot_us = clock.robot_us(sent_at_us + there_us + held_us),
@@ -35,7 +35,9 @@ ClockExchange exchange(const TrueClock& clock, std::int64_t sent_at_us, std::int
 // Ten minutes of exchanges, each way delayed by itself, three in ten by ten times as much.
 class ClockSyncTest : public ::testing::TestWithParam<double> {
  protected:
-  ClockExchange next(std::int64_t sent_at_us) { return exchange(clock_, sent_at_us, delay_us(), 2000, delay_us()); }
+  station::ClockExchange next(std::int64_t sent_at_us) {
+    return exchange(clock_, sent_at_us, delay_us(), 2000, delay_us());
+  }
   std::int64_t delay_us() {
     const double delay_us = std::exponential_distribution{1.0 / 400}(random_) + 150;
     return static_cast<std::int64_t>(std::bernoulli_distribution{0.3}(random_) ? 10 * delay_us : delay_us);
@@ -43,13 +45,13 @@ class ClockSyncTest : public ::testing::TestWithParam<double> {
 
   std::mt19937_64 random_{7};
   TrueClock clock_{.booted_at_us = 40 * kSecondUs, .drift_ppm = GetParam()};
-  ClockSync sync_;
+  station::ClockSync sync_;
 };
 
 TEST_P(ClockSyncTest, IsNeverMoreWrongThanItSays) {
   for (std::int64_t steady_us = 50 * kSecondUs; steady_us < 650 * kSecondUs; steady_us += kSecondUs) {
     sync_.add(next(steady_us));
-    const ClockEstimate& estimate = sync_.estimate();
+    const station::ClockEstimate& estimate = sync_.estimate();
     for (const std::int64_t ago_us : {0L, 1L * kSecondUs, 8L * kSecondUs}) {  // live, and from the robot's ring
       const std::int64_t then_us = steady_us - ago_us;
       const auto robot_us = static_cast<std::uint64_t>(clock_.robot_us(then_us));
@@ -71,9 +73,9 @@ TEST_P(ClockSyncTest, FindsTheDriftWithinTenPpmAfterAMinute) {
 INSTANTIATE_TEST_SUITE_P(Drifts, ClockSyncTest, ::testing::Values(-100.0, -30.0, 0.0, 50.0, 100.0));
 
 TEST(ClockEstimateTest, IsLessCertainTheFurtherASampleIsFromTheExchange) {
-  ClockSync sync;
+  station::ClockSync sync;
   sync.add(exchange({}, 10 * kSecondUs, 100, 0, 100));
-  const ClockEstimate& estimate = sync.estimate();
+  const station::ClockEstimate& estimate = sync.estimate();
   const auto measured_us = static_cast<std::uint64_t>(10 * kSecondUs + 100);
   EXPECT_EQ(estimate.measured_at_robot_us, measured_us);
   EXPECT_NEAR(static_cast<double>(estimate.uncertainty_us(measured_us)), 100, 1);
@@ -82,7 +84,7 @@ TEST(ClockEstimateTest, IsLessCertainTheFurtherASampleIsFromTheExchange) {
 }
 
 TEST(ClockEstimateTest, AnExchangeThatCannotBeChangesNothing) {
-  ClockSync sync;
+  station::ClockSync sync;
   sync.add(
       {.sent_at_us = 5000, .received_at_robot_us = 900, .answered_at_robot_us = 800, .answer_received_at_us = 6000});
   sync.add(

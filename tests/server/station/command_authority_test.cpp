@@ -10,15 +10,15 @@ namespace {
 
 class CommandAuthorityTest : public ::testing::Test {
  protected:
-  static CommandRequest command(const std::string& actor, pb_size_t action = rheonaut_Command_set_duty_tag) {
-    CommandRequest request;
+  static station::CommandRequest command(const std::string& actor, pb_size_t action = rheonaut_Command_set_duty_tag) {
+    station::CommandRequest request;
     request.robot_id = "r1";
     request.actor = actor;
     request.action.which_action = action;
     return request;
   }
-  Result<std::optional<Authority::Change>> take(const std::string& actor, microseconds age = microseconds{0}) {
-    ControlRequest request;
+  Result<std::optional<station::Authority::Change>> take(const std::string& actor, microseconds age = microseconds{0}) {
+    station::ControlRequest request;
     request.robot_id = "r1";
     request.actor = actor;
     request.age = age;
@@ -27,7 +27,7 @@ class CommandAuthorityTest : public ::testing::Test {
 
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  CommandAuthority authority{clock};
+  station::CommandAuthority authority{clock};
 };
 
 TEST_F(CommandAuthorityTest, WhoCommandsARobotThatNobodyControlsTakesControl) {
@@ -41,9 +41,9 @@ TEST_F(CommandAuthorityTest, WhoCommandsARobotThatNobodyControlsTakesControl) {
 }
 
 TEST_F(CommandAuthorityTest, ByAnOldPictureNobodyTakesControlOrRenewsALease) {
-  CommandRequest old = command("anna");
+  station::CommandRequest old = command("anna");
   old.life_from = "stamp";
-  old.age = kOldestSight + microseconds{1};
+  old.age = station::kOldestSight + microseconds{1};
   EXPECT_EQ(authority.check_sight(old).error().reason, "stale");
   EXPECT_FALSE(authority.on_commanded(old).has_value());
   EXPECT_EQ(take("anna", old.age).error().reason, "stale");
@@ -55,11 +55,11 @@ TEST_F(CommandAuthorityTest, ByAnOldPictureNobodyTakesControlOrRenewsALease) {
 
 TEST_F(CommandAuthorityTest, ControlEndsWithoutASignOfLifeAndAnOldPictureIsNone) {
   ASSERT_TRUE(take("anna"));
-  clock.run_for(kControlLease / 2);
+  clock.run_for(station::kControlLease / 2);
   authority.keep("anna", microseconds{0});
-  clock.run_for(kControlLease - microseconds{1'000});
+  clock.run_for(station::kControlLease - microseconds{1'000});
   EXPECT_TRUE(authority.expire().empty());
-  authority.keep("anna", kOldestSight * 2);
+  authority.keep("anna", station::kOldestSight * 2);
   clock.run_for(microseconds{2'000});
   ASSERT_EQ(authority.expire().size(), 1u);
   EXPECT_EQ(authority.of("r1").holder, "");

@@ -20,16 +20,16 @@ class CommandChecksTest : public ::testing::Test {
   CommandChecksTest() {
     robot.id = "nemo";
     robot.sample_period_us = 10'000;
-    robot.sample = Sample{.position_m = 0.1F};
+    robot.sample = station::Sample{.position_m = 0.1F};
     robot.fluid = "non_newtonian";
-    CommandLimits water, oil;
+    config::CommandLimits water, oil;
     water.setpoint_step_m = 0.05;
     water.duty_max = 0.5;
     oil.setpoint_min_m = 0;
     oil.duty_max = 0.8;
     oil.power_duty = 0.3;
     oil.power_s = 10;
-    envelope = Envelope{{}, {{"water", water}, {"oil", oil}}};
+    envelope = config::Envelope{{}, {{"water", water}, {"oil", oil}}};
   }
 
   static protocol::Command setpoint(float setpoint_m) {
@@ -74,9 +74,9 @@ class CommandChecksTest : public ::testing::Test {
     return checked ? "" : checked.error().reason + ": " + checked.error().detail;
   }
 
-  Envelope envelope;
-  RobotState robot;
-  OrdersAhead ahead;
+  config::Envelope envelope;
+  station::RobotState robot;
+  station::OrdersAhead ahead;
 };
 
 TEST_F(CommandChecksTest, ValuesOutsideTheirRangeAreRefusedWithTheLimit) {
@@ -90,9 +90,9 @@ TEST_F(CommandChecksTest, ValuesOutsideTheirRangeAreRefusedWithTheLimit) {
 }
 
 TEST_F(CommandChecksTest, AStepOfTheSetpointCountsFromTheSetpointInForceElseFromThePosition) {
-  CommandLimits limits;
+  config::CommandLimits limits;
   limits.setpoint_step_m = 0.2;
-  envelope = Envelope{limits};
+  envelope = config::Envelope{limits};
   EXPECT_EQ(refusal(setpoint(0.3F)), "") << "just the limit, from the position";
   EXPECT_THAT(refusal(automatic(0.31F)), HasSubstr("step_too_large: setpoint_m = 0.31"));
   EXPECT_THAT(refusal(automatic(0.31F)), HasSubstr("is 0.210 m from the position 0.100; a step is at most 0.2 m"));
@@ -110,9 +110,9 @@ TEST_F(CommandChecksTest, AStepOfTheSetpointCountsFromTheSetpointInForceElseFrom
 class StepsTest : public CommandChecksTest {
  protected:
   StepsTest() {
-    CommandLimits limits;
+    config::CommandLimits limits;
     limits.setpoint_step_m = 0.2;
-    envelope = Envelope{limits};
+    envelope = config::Envelope{limits};
     robot.context.mode = rheonaut_MODE_AUTO;
     robot.context.setpoint_m = 0.1F;
     robot.latest_robot_time_us = at_us(0);
@@ -130,7 +130,7 @@ class StepsTest : public CommandChecksTest {
     ahead.push_back({&commands.emplace_back(command), time_us, time_us, true});
   }
   void on_its_way(const protocol::Command& command) {
-    ahead.push_back(unanswered_order(commands.emplace_back(command), at_us(0)));
+    ahead.push_back(station::unanswered_order(commands.emplace_back(command), at_us(0)));
   }
 
  private:
@@ -237,7 +237,7 @@ TEST_F(CommandChecksTest, AFluidHasItsOwnLimits) {
 
 TEST_F(CommandChecksTest, ADutyBeyondTheLimitsOfAFluidThatWasNamedSinceIsNotRenewed) {
   robot.context.mode = rheonaut_MODE_MANUAL;
-  robot.sample = Sample{.duty = 0.8F};
+  robot.sample = station::Sample{.duty = 0.8F};
   robot.fluid = "oil";
   EXPECT_EQ(refusal(renewal()), "");
   robot.fluid = "water";
@@ -248,7 +248,7 @@ TEST_F(CommandChecksTest, ADutyBeyondTheLimitsOfAFluidThatWasNamedSinceIsNotRene
 
 TEST_F(CommandChecksTest, AScheduleBeyondTheLimitsOfAFluidThatWasNamedSinceIsNotRenewed) {
   robot.context.mode = rheonaut_MODE_MANUAL;
-  robot.sample = Sample{.duty = 0.1F};
+  robot.sample = station::Sample{.duty = 0.1F};
   auto running = schedule({{0, 0.8F}, {1000, 0.1F}, {2000, 0.6F}, {3000, 0}});
   ahead = {{&running, 1, 30'000'001, false, 10'000'000}};
   robot.fluid = "oil";
@@ -274,17 +274,17 @@ TEST_F(CommandChecksTest, WhereTheFluidIsNotKnownTheStrictestOfAllLimitsHold) {
 }
 
 TEST(Envelope, TheLooserLimitsOfAFluidNeverHoldWhereItIsNotKnown) {
-  CommandLimits strict, loose;
+  config::CommandLimits strict, loose;
   strict.duty_max = 0.2;
   strict.setpoint_max_m = 0.5;
-  const Envelope envelope{strict, {{"oil", loose}}};
+  const config::Envelope envelope{strict, {{"oil", loose}}};
   EXPECT_EQ(envelope.strictest(), strict);
   EXPECT_EQ(envelope.in("oil"), loose);
   EXPECT_EQ(envelope.in("water"), strict) << "a built-in fluid without limits of its own";
 }
 
 TEST(Envelope, LimitsAreNarrowerInAnyOfTheirQuantities) {
-  CommandLimits limits, others;
+  config::CommandLimits limits, others;
   EXPECT_FALSE(is_narrower_than(limits, others));
   limits.duty_max = 0.5;
   limits.power_s = 100;
@@ -295,7 +295,7 @@ TEST(Envelope, LimitsAreNarrowerInAnyOfTheirQuantities) {
 }
 
 TEST(Envelope, AnUnknownFluidIsRefusedWithTheList) {
-  const Envelope envelope{{}, {{"oil", {}}}};
+  const config::Envelope envelope{{}, {{"oil", {}}}};
   EXPECT_EQ(envelope.listed(" Oil ").value(), "oil");
   EXPECT_EQ(envelope.listed("NON_Newtonian").value(), "non_newtonian");
   EXPECT_EQ(envelope.listed("").value(), "");

@@ -15,32 +15,32 @@ class CommandTrackerTest : public EntryTest {
  protected:
   CommandTrackerTest() { notifier.add(sink); }
 
-  static protocol::CommandAck answer(const PendingCommand& pending, protocol::CommandResult result) {
+  static protocol::CommandAck answer(const station::PendingCommand& pending, protocol::CommandResult result) {
     protocol::CommandAck ack = rheonaut_CommandAck_init_zero;
     ack.command_id = pending.record.id;
     ack.result = result;
     ack.effect_at_robot_us = 1'050'000;
     return ack;
   }
-  void answered(PendingCommand& pending, protocol::CommandResult result) {
+  void answered(station::PendingCommand& pending, protocol::CommandResult result) {
     const auto ack = answer(pending, result);
     const auto found = tracker.find_answered(entry, ack);
     ASSERT_NE(found, nullptr);
     tracker.on_answer(entry, *found, ack);
   }
-  static SampleBatch batch_with_duty(float duty) {
-    SampleBatch batch;
+  static station::SampleBatch batch_with_duty(float duty) {
+    station::SampleBatch batch;
     batch.first_robot_time_us = 1'060'000;
     batch.context.period_us = 10'000;
     batch.context.mode = rheonaut_MODE_MANUAL;
     batch.samples.resize(2);
-    for (Sample& sample : batch.samples) sample.duty = duty;
+    for (station::Sample& sample : batch.samples) sample.duty = duty;
     return batch;
   }
 
-  SinkNotifier notifier{clock};
+  station::SinkNotifier notifier{clock};
   KeepingSink sink;
-  CommandTracker tracker{loop, clock, notifier};
+  station::CommandTracker tracker{loop, clock, notifier};
 };
 
 TEST_F(CommandTrackerTest, SentThenAcknowledgedThenSeenInTelemetry) {
@@ -48,18 +48,19 @@ TEST_F(CommandTrackerTest, SentThenAcknowledgedThenSeenInTelemetry) {
   tracker.on_sent(entry, duty->record.id);
   answered(*duty, rheonaut_COMMAND_RESULT_ACCEPTED);
   tracker.on_samples(entry, batch_with_duty(0.3F));
-  EXPECT_THAT(sink.states, ElementsAre(CommandState::sent, CommandState::acknowledged, CommandState::verified));
+  EXPECT_THAT(sink.states, ElementsAre(station::CommandState::sent, station::CommandState::acknowledged,
+                                       station::CommandState::verified));
   EXPECT_TRUE(entry.commands.is_empty());
 }
 
 TEST_F(CommandTrackerTest, RecordsOfAStopAreHeldBackUntilItsSenderPublishesThem) {
   const auto duty = add(set_duty(0.3F));
-  std::vector<CommandRecord> held_back;
+  std::vector<station::CommandRecord> held_back;
   entry.commands.sent_with_stop = &held_back;
   tracker.on_sent(entry, duty->record.id);
   EXPECT_THAT(sink.states, IsEmpty());
   ASSERT_EQ(held_back.size(), 1u);
-  EXPECT_EQ(held_back[0].state, CommandState::sent);
+  EXPECT_EQ(held_back[0].state, station::CommandState::sent);
 }
 
 TEST_F(CommandTrackerTest, WhatIsNotSentInTimeExpiresAndWhatGetsNoAnswerIsUnknown) {
@@ -67,14 +68,14 @@ TEST_F(CommandTrackerTest, WhatIsNotSentInTimeExpiresAndWhatGetsNoAnswerIsUnknow
   tracker.on_sent(entry, sent->record.id);
   clock.run_for(std::chrono::milliseconds{2'500});  // their time to live is 2 s
   tracker.expire(entry);
-  EXPECT_EQ(queued->record.state, CommandState::expired);
+  EXPECT_EQ(queued->record.state, station::CommandState::expired);
   EXPECT_EQ(queued->record.reason, "not_sent_in_time");
-  EXPECT_EQ(sent->record.state, CommandState::sent) << "its answer may be on its way";
+  EXPECT_EQ(sent->record.state, station::CommandState::sent) << "its answer may be on its way";
   clock.run_for(std::chrono::seconds{1});
   tracker.expire(entry);
-  EXPECT_EQ(sent->record.state, CommandState::unknown);
+  EXPECT_EQ(sent->record.state, station::CommandState::unknown);
   answered(*sent, rheonaut_COMMAND_RESULT_REJECTED);
-  EXPECT_EQ(sent->record.state, CommandState::rejected) << "an answer that comes after all";
+  EXPECT_EQ(sent->record.state, station::CommandState::rejected) << "an answer that comes after all";
 }
 
 TEST_F(CommandTrackerTest, WhenTheLinkIsLostOnlyStopsStay) {
@@ -82,8 +83,8 @@ TEST_F(CommandTrackerTest, WhenTheLinkIsLostOnlyStopsStay) {
   stop.which_action = rheonaut_Command_emergency_stop_tag;
   const auto kept = add(stop), queued = add(set_duty(0.3F));
   tracker.end_with_link(entry, "link_lost");
-  EXPECT_EQ(queued->record.state, CommandState::failed);
-  EXPECT_EQ(kept->record.state, CommandState::queued);
+  EXPECT_EQ(queued->record.state, station::CommandState::failed);
+  EXPECT_EQ(kept->record.state, station::CommandState::queued);
   EXPECT_NE(entry.commands.newest_stop(), nullptr);
 }
 
@@ -94,12 +95,12 @@ TEST_F(CommandTrackerTest, AnEventThatNamesACommandStandsForItsLostAnswer) {
   event.command_id = duty->record.id;
   event.event_robot_time_us = 1'040'000;
   tracker.on_event(entry, event);
-  EXPECT_EQ(duty->record.state, CommandState::acknowledged);
+  EXPECT_EQ(duty->record.state, station::CommandState::acknowledged);
   EXPECT_EQ(duty->record.reason, "named_by_event");
 }
 
 TEST_F(CommandTrackerTest, AKeyThatWasUsedForAnotherCommandIsRefused) {
-  CommandRequest request;
+  station::CommandRequest request;
   request.robot_id = robot.id;
   request.actor = "session:1";
   request.key = "try-1";

@@ -8,19 +8,19 @@ namespace {
 
 class EffectProofTest : public EntryTest {
  protected:
-  std::shared_ptr<PendingCommand> send(const protocol::Command& command) {
+  std::shared_ptr<station::PendingCommand> send(const protocol::Command& command) {
     const auto pending = add(command);
     prepare_proof(robot, entry.commands, *pending, robot.latest_robot_time_us);
-    pending->record.state = CommandState::sent;
+    pending->record.state = station::CommandState::sent;
     return pending;
   }
-  static SampleBatch batch_with_duty(float duty, std::uint64_t from_robot_us) {
-    SampleBatch batch;
+  static station::SampleBatch batch_with_duty(float duty, std::uint64_t from_robot_us) {
+    station::SampleBatch batch;
     batch.first_robot_time_us = from_robot_us;
     batch.context.period_us = 10'000;
     batch.context.mode = rheonaut_MODE_MANUAL;
     batch.samples.resize(2);
-    for (Sample& sample : batch.samples) sample.duty = duty;
+    for (station::Sample& sample : batch.samples) sample.duty = duty;
     return batch;
   }
 };
@@ -41,7 +41,7 @@ TEST_F(EffectProofTest, WhatTheRobotComesToByItselfProvesNothing) {
 TEST_F(EffectProofTest, WhatTheRobotShowedBeforeProvesNothing) {
   robot.context.mode = rheonaut_MODE_MANUAL;
   robot.context.period_us = 10'000;
-  robot.sample = Sample{.duty = 0.3F};
+  robot.sample = station::Sample{.duty = 0.3F};
   const auto duty = send(set_duty(0.3F));
   EXPECT_FALSE(is_proved(*duty, batch_with_duty(0.3F, 1'100'000)));
 }

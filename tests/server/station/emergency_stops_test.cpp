@@ -14,8 +14,8 @@ using ::testing::SizeIs;
 
 class EmergencyStopsTest : public EntryTest {
  protected:
-  std::shared_ptr<PendingCommand> begin(const std::string& key = "") {
-    StopRequest request;
+  std::shared_ptr<station::PendingCommand> begin(const std::string& key = "") {
+    station::StopRequest request;
     request.actor = "user:anna";
     request.key = key;
     return stops.begin(entry, request, records);
@@ -28,9 +28,9 @@ class EmergencyStopsTest : public EntryTest {
     return ack;
   }
 
-  RecentCommands recent;
-  EmergencyStops stops{loop, clock, recent};
-  std::vector<CommandRecord> records;
+  station::RecentCommands recent;
+  station::EmergencyStops stops{loop, clock, recent};
+  std::vector<station::CommandRecord> records;
 };
 
 TEST_F(EmergencyStopsTest, TheFrameIsHandedOverAndItsRecordReturned) {
@@ -38,7 +38,7 @@ TEST_F(EmergencyStopsTest, TheFrameIsHandedOverAndItsRecordReturned) {
   EXPECT_THAT(port.stops, ElementsAre(stop->record.id));
   ASSERT_THAT(records, SizeIs(1));
   EXPECT_EQ(records[0].id, stop->record.id);
-  EXPECT_EQ(records[0].state, CommandState::queued);
+  EXPECT_EQ(records[0].state, station::CommandState::queued);
   EXPECT_EQ(robot.pending_stop, stop->record.id);
   EXPECT_EQ(entry.commands.sent_with_stop, nullptr) << "what the link sends later is published at once";
 }
@@ -46,7 +46,7 @@ TEST_F(EmergencyStopsTest, TheFrameIsHandedOverAndItsRecordReturned) {
 TEST_F(EmergencyStopsTest, WhatWasQueuedIsSuperseded) {
   const auto duty = add(set_duty(0.3F));
   begin();
-  EXPECT_EQ(duty->record.state, CommandState::superseded);
+  EXPECT_EQ(duty->record.state, station::CommandState::superseded);
   EXPECT_EQ(duty->record.reason, "by_emergency_stop");
   EXPECT_THAT(records, SizeIs(2));
   EXPECT_EQ(entry.commands.find_unanswered(duty->record.id), nullptr);
@@ -101,7 +101,7 @@ TEST_F(EmergencyStopsTest, AnAnswerSettlesThisStopAndTheEarlierOnes) {
   EXPECT_THAT(stops.on_answer(entry, *third, unlatched), IsEmpty()) << "it has not obeyed";
   entry.commands.take_unanswered(first->record.id);
   entry.commands.take_unanswered(second->record.id);
-  EmergencyStops::show_pending(entry);
+  station::EmergencyStops::show_pending(entry);
   EXPECT_EQ(robot.pending_stop, third->record.id);
 }
 

@@ -13,14 +13,14 @@
 
 namespace server {
 
-class KeepingPort final : public RobotPort {
+class KeepingPort final : public station::RobotPort {
  public:
-  const RobotId& robot_id() const override { return id; }
+  const station::RobotId& robot_id() const override { return id; }
   bool send(const protocol::Command& command, std::int64_t) override {
     if (!is_full) sent.push_back(command);
     return !is_full;
   }
-  bool withdraw(CommandId id_of_command) override { return can_withdraw.contains(id_of_command); }
+  bool withdraw(station::CommandId id_of_command) override { return can_withdraw.contains(id_of_command); }
   void send_emergency_stop(const protocol::Command& command) override {
     if (is_broken) throw std::runtime_error{"no memory"};
     stops.push_back(command.command_id);
@@ -30,11 +30,11 @@ class KeepingPort final : public RobotPort {
   void request_event_resend() override {}
   void close(const std::string& reason) override { closed_because = reason; }
 
-  RobotId id = "r1";
+  station::RobotId id = "r1";
   bool is_full = false, is_broken = false;
-  std::set<CommandId> can_withdraw;
+  std::set<station::CommandId> can_withdraw;
   std::vector<protocol::Command> sent;
-  std::vector<CommandId> stops;
+  std::vector<station::CommandId> stops;
   std::string closed_because;
 };
 
@@ -56,8 +56,9 @@ class EntryTest : public ::testing::Test {
     return command;
   }
   // Of an actor; queued, and waiting for its answer.
-  std::shared_ptr<PendingCommand> add(const protocol::Command& command, const std::string& actor = "session:1") {
-    CommandRequest request;
+  std::shared_ptr<station::PendingCommand> add(const protocol::Command& command,
+                                               const std::string& actor = "session:1") {
+    station::CommandRequest request;
     request.robot_id = robot.id;
     request.action = command;
     request.actor = actor;
@@ -68,18 +69,18 @@ class EntryTest : public ::testing::Test {
 
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  RobotState robot;
+  station::RobotState robot;
   KeepingPort port;
-  RobotEntry entry{robot};
+  station::RobotEntry entry{robot};
 };
 
 // Keeps the states of the commands that are published.
-class KeepingSink final : public StationSink {
+class KeepingSink final : public station::StationSink {
  public:
-  void on_command(const CommandRecord& record) override { states.push_back(record.state); }
-  void on_event(const RobotState&, const RobotEvent& event) override { events.push_back(event); }
-  std::vector<CommandState> states;
-  std::vector<RobotEvent> events;
+  void on_command(const station::CommandRecord& record) override { states.push_back(record.state); }
+  void on_event(const station::RobotState&, const station::RobotEvent& event) override { events.push_back(event); }
+  std::vector<station::CommandState> states;
+  std::vector<station::RobotEvent> events;
 };
 
 }  // namespace server

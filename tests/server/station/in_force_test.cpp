@@ -26,7 +26,7 @@ protocol::ParameterPage page_of(std::uint32_t total, std::initializer_list<std::
 }
 
 TEST(ParameterTableTest, IsReportedWhenEveryParameterIsKnownAndAgainWhenOneHasChanged) {
-  ParameterTable table;
+  station::ParameterTable table;
   EXPECT_FALSE(table.add(page_of(3, {{"a", 0.1F}, {"b", 2}})));
   EXPECT_FALSE(table.is_current());
   EXPECT_TRUE(table.add(page_of(3, {{"c", 3}})));
@@ -44,7 +44,7 @@ TEST(ParameterTableTest, AChangeOfWhatIsBesideTheValueIsAChange) {
   const std::initializer_list<Change> changes{
       [](rheonaut_Parameter& one) { one.unit[0] = 'm'; }, [](rheonaut_Parameter& one) { one.minimum = -2; },
       [](rheonaut_Parameter& one) { one.maximum = 11; }, [](rheonaut_Parameter& one) { one.default_value = 3; }};
-  ParameterTable table;
+  station::ParameterTable table;
   auto page = page_of(1, {{"a", 1}});
   ASSERT_TRUE(table.add(page));
   for (const Change change : changes) {
@@ -55,7 +55,7 @@ TEST(ParameterTableTest, AChangeOfWhatIsBesideTheValueIsAChange) {
 }
 
 TEST(ParameterTableTest, ANewConnectionReportsTheSameTableAgain) {
-  ParameterTable table;
+  station::ParameterTable table;
   ASSERT_TRUE(table.add(page_of(1, {{"a", 1}})));
   table.begin_again();
   EXPECT_FALSE(table.is_current());
@@ -65,13 +65,13 @@ TEST(ParameterTableTest, ANewConnectionReportsTheSameTableAgain) {
 }
 
 TEST(ParameterTableTest, ANumberThatIsNoneDoesNotChangeForEver) {
-  ParameterTable table;
+  station::ParameterTable table;
   EXPECT_TRUE(table.add(page_of(1, {{"a", std::nanf("")}})));
   EXPECT_FALSE(table.add(page_of(1, {{"a", std::nanf("")}})));
 }
 
 TEST(ParameterTableTest, ARobotThatNamesEverMoreParametersFillsNoMemory) {
-  ParameterTable table;
+  station::ParameterTable table;
   for (int i = 0; i < 10'000; ++i) {
     EXPECT_FALSE(table.add(page_of(1, {{("p" + std::to_string(i)).c_str(), 1}, {"q", 1}})));
   }

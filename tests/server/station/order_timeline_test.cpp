@@ -13,7 +13,7 @@ using ::testing::SizeIs;
 
 class OrderTimelineTest : public EntryTest {
  protected:
-  std::shared_ptr<PendingCommand> accept_schedule() {
+  std::shared_ptr<station::PendingCommand> accept_schedule() {
     protocol::Command command = rheonaut_Command_init_zero;
     command.which_action = rheonaut_Command_set_duty_schedule_tag;
     auto& schedule = command.action.set_duty_schedule;
@@ -26,9 +26,9 @@ class OrderTimelineTest : public EntryTest {
     timeline.note_accepted(pending, robot.sample_period_us);
     return pending;
   }
-  OrdersAhead ahead() const { return timeline.ahead(robot, entry.commands); }
+  station::OrdersAhead ahead() const { return timeline.ahead(robot, entry.commands); }
 
-  OrderTimeline timeline;
+  station::OrderTimeline timeline;
 };
 
 TEST_F(OrderTimelineTest, AScheduleCountsUntilSamplesHaveShownItsEnd) {

@@ -7,9 +7,9 @@ namespace server {
 namespace {
 
 TEST(RecentCommands, ForgetsTheOldestBeyondItsLimit) {
-  RecentCommands recent;
-  CommandRecord record;
-  for (CommandId id = 1; id <= RecentCommands::kMaxCommands + 1; ++id) {
+  station::RecentCommands recent;
+  station::CommandRecord record;
+  for (station::CommandId id = 1; id <= station::RecentCommands::kMaxCommands + 1; ++id) {
     record.id = id;
     recent.put(record, static_cast<std::int64_t>(id));
   }
@@ -19,30 +19,30 @@ TEST(RecentCommands, ForgetsTheOldestBeyondItsLimit) {
 }
 
 TEST(RecentCommands, KeepsTheLatestRecordAndTheFirstTime) {
-  RecentCommands recent;
-  CommandRecord record;
+  station::RecentCommands recent;
+  station::CommandRecord record;
   record.id = 5;
-  record.state = CommandState::acknowledged;
+  record.state = station::CommandState::acknowledged;
   recent.put(record, 10);
-  record.state = CommandState::verified;
+  record.state = station::CommandState::verified;
   recent.put(record, 20);
-  EXPECT_EQ(recent.find(5)->record.state, CommandState::verified);
+  EXPECT_EQ(recent.find(5)->record.state, station::CommandState::verified);
   EXPECT_EQ(recent.find(5)->answered_us, 10);
 }
 
 TEST(CommandKey, TheIdDependsOnRobotActorAndKey) {
-  const CommandId id = command_id_of("r1", "token:local", "a");
-  EXPECT_EQ(id, command_id_of("r1", "token:local", "a"));
-  EXPECT_NE(id, command_id_of("r2", "token:local", "a"));
-  EXPECT_NE(id, command_id_of("r1", "session:1", "a"));
-  EXPECT_NE(id, command_id_of("r1", "token:local", "b"));
+  const station::CommandId id = station::command_id_of("r1", "token:local", "a");
+  EXPECT_EQ(id, station::command_id_of("r1", "token:local", "a"));
+  EXPECT_NE(id, station::command_id_of("r2", "token:local", "a"));
+  EXPECT_NE(id, station::command_id_of("r1", "session:1", "a"));
+  EXPECT_NE(id, station::command_id_of("r1", "token:local", "b"));
 }
 
 TEST(CommandKey, IsShortAndPrintable) {
-  EXPECT_TRUE(is_command_key("7f31-A.b_c:9"));
-  EXPECT_TRUE(is_command_key(std::string(64, 'x')));
-  for (const char* key : {"", "a b", "a\n", "\xc3\xa4", "a/b"}) EXPECT_FALSE(is_command_key(key)) << key;
-  EXPECT_FALSE(is_command_key(std::string(65, 'x')));
+  EXPECT_TRUE(station::is_command_key("7f31-A.b_c:9"));
+  EXPECT_TRUE(station::is_command_key(std::string(64, 'x')));
+  for (const char* key : {"", "a b", "a\n", "\xc3\xa4", "a/b"}) EXPECT_FALSE(station::is_command_key(key)) << key;
+  EXPECT_FALSE(station::is_command_key(std::string(65, 'x')));
 }
 
 }  // namespace

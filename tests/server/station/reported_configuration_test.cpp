@@ -16,8 +16,8 @@ protocol::ParameterPage page_of(const char* name, float value) {
   return page;
 }
 
-RobotState robot_of_boot_7() {
-  RobotState robot;
+station::RobotState robot_of_boot_7() {
+  station::RobotState robot;
   robot.boot_id = 7;
   robot.sample_period_us = 10'000;
   robot.next_seq = 100;
@@ -26,7 +26,7 @@ RobotState robot_of_boot_7() {
 }
 
 TEST(ReportedConfigurationTest, TheFirstReportOfAConnectionIsNoChangeAndTheNextIs) {
-  ReportedConfiguration reported;
+  station::ReportedConfiguration reported;
   const auto first = reported.add(page_of("a", 1), {7, 100, 5});
   ASSERT_TRUE(first.has_value());
   EXPECT_FALSE(first->is_change);
@@ -46,15 +46,15 @@ TEST(ReportedConfigurationTest, TheFirstReportOfAConnectionIsNoChangeAndTheNextI
 }
 
 TEST(ReportedConfigurationTest, SamplesThatAreStillOnTheirWayWereMadeBeforeTheReport) {
-  const RobotState robot = robot_of_boot_7();
+  const station::RobotState robot = robot_of_boot_7();
   EXPECT_EQ(moment_of_report(robot, 1'000'000, 1).first_seq, 100u);
   EXPECT_EQ(moment_of_report(robot, 975'000, 1).first_seq, 103u) << "25 ms are three periods, the last begun";
   EXPECT_EQ(moment_of_report(robot, 1'010'000, 1).first_seq, 100u);
 }
 
 TEST(ReportedConfigurationTest, TheClockIsRecordedOnceAMinuteAndWhenTheStationsTimeIsSet) {
-  ReportedConfiguration reported;
-  RobotState robot = robot_of_boot_7();
+  station::ReportedConfiguration reported;
+  station::RobotState robot = robot_of_boot_7();
   std::int64_t now_us = 50'000'000;
   std::int64_t utc_minus_steady_us = 1'000'000'000;
   const auto exchange = [&](std::int64_t after_us) {

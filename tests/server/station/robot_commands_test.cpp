@@ -11,21 +11,23 @@ using ::testing::UnorderedElementsAre;
 
 class RobotCommandsTest : public ::testing::Test {
  protected:
-  std::shared_ptr<PendingCommand> make(CommandId id, pb_size_t which_action = rheonaut_Command_set_duty_tag) {
-    auto pending = std::make_shared<PendingCommand>(loop);
+  std::shared_ptr<station::PendingCommand> make(station::CommandId id,
+                                                pb_size_t which_action = rheonaut_Command_set_duty_tag) {
+    auto pending = std::make_shared<station::PendingCommand>(loop);
     pending->record.id = id;
     pending->wire.command_id = id;
     pending->wire.which_action = which_action;
     return pending;
   }
-  std::shared_ptr<PendingCommand> add(CommandId id, pb_size_t which_action = rheonaut_Command_set_duty_tag) {
+  std::shared_ptr<station::PendingCommand> add(station::CommandId id,
+                                               pb_size_t which_action = rheonaut_Command_set_duty_tag) {
     auto pending = make(id, which_action);
     commands.add(pending);
     return pending;
   }
 
   boost::asio::io_context loop;
-  RobotCommands commands;
+  station::RobotCommands commands;
 };
 
 TEST_F(RobotCommandsTest, AreNumberedInTheOrderOfSubmission) {
@@ -41,7 +43,7 @@ TEST_F(RobotCommandsTest, AreNumberedInTheOrderOfSubmission) {
 
 TEST_F(RobotCommandsTest, OnlyThoseThatAreNoStopAndHaveNotLeftAreQueued) {
   add(1);
-  add(2)->record.state = CommandState::sent;
+  add(2)->record.state = station::CommandState::sent;
   add(3, rheonaut_Command_emergency_stop_tag);
   add(4, rheonaut_Command_set_setpoint_tag);
   EXPECT_THAT(commands.queued(), UnorderedElementsAre(1U, 4U));
@@ -73,33 +75,33 @@ TEST_F(RobotCommandsTest, IsOnItsWayUntilNothingWaitsForItAnyMore) {
 
 TEST_F(RobotCommandsTest, OneWithAnUnknownEndWaitsForItsAnswerAgain) {
   const auto unknown = make(4);
-  unknown->record.state = CommandState::unknown;
+  unknown->record.state = station::CommandState::unknown;
   unknown->record.ended_at_us = 77;
   commands.keep_unknown(unknown);
   EXPECT_TRUE(commands.is_empty());
   EXPECT_EQ(commands.reopen(5), nullptr);
   EXPECT_EQ(commands.reopen(4), unknown);
-  EXPECT_EQ(unknown->record.state, CommandState::sent);
+  EXPECT_EQ(unknown->record.state, station::CommandState::sent);
   EXPECT_EQ(unknown->record.ended_at_us, 0);
   EXPECT_EQ(commands.find_unanswered(4), unknown);
   EXPECT_EQ(commands.reopen(4), nullptr);
 }
 
 TEST_F(RobotCommandsTest, OfManyWithAnUnknownEndTheOldestLeave) {
-  for (CommandId id = 1; id <= RobotCommands::kMaxWaiting + 1; ++id) commands.keep_unknown(make(id));
-  EXPECT_EQ(commands.unknown.size(), RobotCommands::kMaxWaiting);
+  for (station::CommandId id = 1; id <= station::RobotCommands::kMaxWaiting + 1; ++id) commands.keep_unknown(make(id));
+  EXPECT_EQ(commands.unknown.size(), station::RobotCommands::kMaxWaiting);
   EXPECT_EQ(commands.reopen(1), nullptr);
   EXPECT_NE(commands.reopen(2), nullptr);
 }
 
 TEST_F(RobotCommandsTest, WhatIsReadBackIsListedInTheOrderOfSubmissionOnceItHasLeft) {
   const auto sent = add(9, rheonaut_Command_set_parameter_tag);
-  add(1, rheonaut_Command_set_parameter_tag);  // queued
-  add(2)->record.state = CommandState::sent;   // telemetry shows it
+  add(1, rheonaut_Command_set_parameter_tag);          // queued
+  add(2)->record.state = station::CommandState::sent;  // telemetry shows it
   const auto acknowledged = add(3, rheonaut_Command_set_parameter_tag);
   commands.unread.push_back(commands.take_unanswered(3));
   EXPECT_THAT(commands.to_be_read_back(), ElementsAre(acknowledged));
-  sent->record.state = CommandState::sent;
+  sent->record.state = station::CommandState::sent;
   EXPECT_THAT(commands.to_be_read_back(), ElementsAre(sent, acknowledged));
 }
 

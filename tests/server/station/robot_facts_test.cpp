@@ -44,7 +44,7 @@ TEST_F(FluidTest, WhatIsNotListedIsRefusedAndChangesNothing) {
 TEST_F(FluidTest, WhileSomebodyIsInControlNobodyElseChangesTheLimitsThatTheyCommandUnder) {
   connect();
   ASSERT_TRUE(set("water", "session:2"));
-  ASSERT_TRUE(station.control({"r1", "session:1", "", ControlAction::take, kControlLease, ""}));
+  ASSERT_TRUE(station.control({"r1", "session:1", "", station::ControlAction::take, station::kControlLease, ""}));
   const auto refused = set("non_newtonian", "session:2");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, "not_in_control");

@@ -7,8 +7,8 @@ namespace server {
 namespace {
 
 TEST(RobotTableTest, ARobotIsAddedOnceAndFoundByItsBoot) {
-  RobotTable table;
-  RobotEntry& entry = table.add("r1");
+  station::RobotTable table;
+  station::RobotEntry& entry = table.add("r1");
   entry.robot.boot_id = 7;
   EXPECT_EQ(&table.add("r1"), &entry);
   EXPECT_EQ(table.find("r1"), &entry);
@@ -19,25 +19,25 @@ TEST(RobotTableTest, ARobotIsAddedOnceAndFoundByItsBoot) {
 }
 
 TEST(RobotTableTest, ANewerConnectionTakesThePlaceOfTheOlder) {
-  RobotTable table;
-  RobotEntry& entry = table.add("r1");
+  station::RobotTable table;
+  station::RobotEntry& entry = table.add("r1");
   KeepingPort older, newer;
-  EXPECT_EQ(RobotTable::connect(entry, older), nullptr);
-  EXPECT_EQ(RobotTable::of(older), &entry);
-  EXPECT_EQ(RobotTable::connect(entry, newer), &older);
-  EXPECT_EQ(RobotTable::of(older), nullptr);
-  EXPECT_EQ(RobotTable::of(newer), &entry);
-  RobotTable::disconnect(entry);
-  EXPECT_EQ(RobotTable::of(newer), nullptr);
+  EXPECT_EQ(station::RobotTable::connect(entry, older), nullptr);
+  EXPECT_EQ(station::RobotTable::of(older), &entry);
+  EXPECT_EQ(station::RobotTable::connect(entry, newer), &older);
+  EXPECT_EQ(station::RobotTable::of(older), nullptr);
+  EXPECT_EQ(station::RobotTable::of(newer), &entry);
+  station::RobotTable::disconnect(entry);
+  EXPECT_EQ(station::RobotTable::of(newer), nullptr);
   EXPECT_EQ(entry.port, nullptr);
 }
 
 TEST(RobotTableTest, AnotherBootMayConnectOnlyWhenTheRobotHasBeenSilent) {
-  RobotTable table;
+  station::RobotTable table;
   EXPECT_TRUE(table.may_connect("r1", 7, 0, 1'000)) << "not known yet";
-  RobotEntry& entry = table.add("r1");
+  station::RobotEntry& entry = table.add("r1");
   KeepingPort port;
-  RobotTable::connect(entry, port);
+  station::RobotTable::connect(entry, port);
   entry.robot.boot_id = 7;
   entry.robot.last_received_steady_us = 5'000;
   EXPECT_TRUE(table.may_connect("r1", 7, 5'500, 1'000));
@@ -46,7 +46,7 @@ TEST(RobotTableTest, AnotherBootMayConnectOnlyWhenTheRobotHasBeenSilent) {
 }
 
 TEST(EventLimitTest, OneInAPeriodIsPublishedAndTheOthersAreCounted) {
-  EventLimit limit{10};
+  station::EventLimit limit{10};
   EXPECT_EQ(limit.admit(100), 0u);
   EXPECT_EQ(limit.admit(105), std::nullopt);
   EXPECT_EQ(limit.admit(109, 3), std::nullopt);

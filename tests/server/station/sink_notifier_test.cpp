@@ -14,30 +14,30 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 // Notes the name of each call behind its own name; throws when it is told to.
-class NamingSink final : public StationSink {
+class NamingSink final : public station::StationSink {
  public:
   NamingSink(std::string name, std::vector<std::string>& calls) : name_{std::move(name)}, calls_{calls} {}
 
-  void on_robot(const RobotState&) override { note("robot"); }
-  void on_fluid(const RobotState&) override { note("fluid"); }
-  void on_samples(const RobotState&, const SampleBatch&) override { note("samples"); }
-  void on_unusable_samples(const RobotState&, std::uint64_t first_seq, std::uint64_t next_seq) override {
+  void on_robot(const station::RobotState&) override { note("robot"); }
+  void on_fluid(const station::RobotState&) override { note("fluid"); }
+  void on_samples(const station::RobotState&, const station::SampleBatch&) override { note("samples"); }
+  void on_unusable_samples(const station::RobotState&, std::uint64_t first_seq, std::uint64_t next_seq) override {
     note("unusable samples " + std::to_string(first_seq) + " to " + std::to_string(next_seq));
   }
-  void on_unusable_event(const RobotState&, std::uint64_t event_seq) override {
+  void on_unusable_event(const station::RobotState&, std::uint64_t event_seq) override {
     note("unusable event " + std::to_string(event_seq));
   }
-  void on_event(const RobotState&, const RobotEvent& event) override {
+  void on_event(const station::RobotState&, const station::RobotEvent& event) override {
     note("event");
     latest = event;
   }
-  void on_command(const CommandRecord&) override { note("command"); }
-  void on_audit(const AuditNote&) override { note("audit"); }
-  void on_clock(const RobotState&, const ClockRecord&) override { note("clock"); }
-  void on_in_force(const RobotState&, const InForceRecord&) override { note("in force"); }
+  void on_command(const station::CommandRecord&) override { note("command"); }
+  void on_audit(const station::AuditNote&) override { note("audit"); }
+  void on_clock(const station::RobotState&, const station::ClockRecord&) override { note("clock"); }
+  void on_in_force(const station::RobotState&, const station::InForceRecord&) override { note("in force"); }
 
   bool is_broken = false;
-  RobotEvent latest;
+  station::RobotEvent latest;
 
  private:
   void note(const std::string& call) {
@@ -59,20 +59,20 @@ class SinkNotifierTest : public ::testing::Test {
 
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  SinkNotifier notifier{clock};
+  station::SinkNotifier notifier{clock};
   std::vector<std::string> calls;
   NamingSink first{"first", calls}, second{"second", calls};
-  RobotState robot;
+  station::RobotState robot;
 };
 
 TEST_F(SinkNotifierTest, EachKindReachesItsOwnFunction) {
   notifier.publish(robot);
-  notifier.publish(CommandRecord{});
-  notifier.publish(AuditNote{});
-  notifier.publish(robot, SampleBatch{});
-  notifier.publish(robot, RobotEvent{});
-  notifier.publish(robot, ClockRecord{});
-  notifier.publish(robot, InForceRecord{});
+  notifier.publish(station::CommandRecord{});
+  notifier.publish(station::AuditNote{});
+  notifier.publish(robot, station::SampleBatch{});
+  notifier.publish(robot, station::RobotEvent{});
+  notifier.publish(robot, station::ClockRecord{});
+  notifier.publish(robot, station::InForceRecord{});
   notifier.publish_fluid(robot);
   notifier.publish_unusable_samples(robot, 5, 10);
   notifier.publish_unusable_event(robot, 3);
@@ -101,7 +101,7 @@ TEST_F(SinkNotifierTest, AnEventOfTheStationCarriesTheRobotsStateAndTheTime) {
   robot.context.emergency_cause = rheonaut_EMERGENCY_CAUSE_OPERATOR;
   robot.latest_robot_time_us = 1'000'000;
   notifier.note(robot, "connected", "from memory", "timeout");
-  const RobotEvent& event = first.latest;
+  const station::RobotEvent& event = first.latest;
   EXPECT_EQ(event.robot_id, "r1");
   EXPECT_EQ(event.boot_id, 7U);
   EXPECT_FALSE(event.event_seq.has_value()) << "the robot has not numbered it";

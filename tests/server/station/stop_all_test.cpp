@@ -17,14 +17,14 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 // Notes what is handed to it, and takes it as written at once.
-class NotingPort final : public RobotPort {
+class NotingPort final : public station::RobotPort {
  public:
-  NotingPort(Station& station, RobotId id, std::vector<std::string>& notes)
+  NotingPort(station::Station& station, station::RobotId id, std::vector<std::string>& notes)
       : station_{station}, id_{std::move(id)}, notes_{notes} {}
 
-  const RobotId& robot_id() const override { return id_; }
+  const station::RobotId& robot_id() const override { return id_; }
   bool send(const protocol::Command&, std::int64_t) override { return true; }
-  bool withdraw(CommandId) override { return false; }
+  bool withdraw(station::CommandId) override { return false; }
   void send_emergency_stop(const protocol::Command& command) override {
     if (is_broken) throw std::runtime_error{"no memory"};
     notes_.push_back("frame " + id_);
@@ -47,22 +47,22 @@ class NotingPort final : public RobotPort {
 
   bool is_broken = false;
   bool breaks_behind_it = false;  // the frame has left then
-  CommandId stop = 0;
+  station::CommandId stop = 0;
 
  private:
-  Station& station_;
-  RobotId id_;
+  station::Station& station_;
+  station::RobotId id_;
   std::vector<std::string>& notes_;
 };
 
-class NotingSink final : public StationSink {
+class NotingSink final : public station::StationSink {
  public:
   explicit NotingSink(std::vector<std::string>& notes) : notes_{notes} {}
-  void on_command(const CommandRecord& record) override {
+  void on_command(const station::CommandRecord& record) override {
     notes_.push_back("record " + record.robot_id);
     if (record.robot_id == broken) throw std::runtime_error{"no disk"};
   }
-  RobotId broken;
+  station::RobotId broken;
 
  private:
   std::vector<std::string>& notes_;
@@ -76,19 +76,20 @@ class StopAllTest : public ::testing::Test {
     clock.settle();
   }
 
-  NotingPort& connect(const RobotId& id) {
+  NotingPort& connect(const station::RobotId& id) {
     ports.push_back(std::make_unique<NotingPort>(station, id, notes));
-    AdmissionRequest hello;
+    station::AdmissionRequest hello;
     hello.robot_id = id;
     hello.boot_id = 7;
     hello.received_at_us = clock.utc_us();
-    station.on_connected(*ports.back(), hello, protocol::Hello(rheonaut_Hello_init_zero), Admission{}, "memory");
+    station.on_connected(*ports.back(), hello, protocol::Hello(rheonaut_Hello_init_zero), station::Admission{},
+                         "memory");
     return *ports.back();
   }
 
   void stop_all(microseconds patience = 1s) {
     auto task = [](StopAllTest& test, microseconds limit) -> boost::asio::awaitable<void> {
-      StopRequest request;
+      station::StopRequest request;
       request.actor = "user:anna";
       test.outcome = co_await test.station.stop_all(std::move(request), limit);
     };
@@ -99,7 +100,7 @@ class StopAllTest : public ::testing::Test {
   // Of "a"; what the sinks and the link throw is swallowed.
   void stop_one() {
     auto task = [](StopAllTest& test) -> boost::asio::awaitable<void> {
-      StopRequest request;
+      station::StopRequest request;
       request.robot_id = "a";
       request.actor = "user:anna";
       try {
@@ -115,7 +116,7 @@ class StopAllTest : public ::testing::Test {
   // To "a", whose link never says that it was sent.
   void submit_duty() {
     auto task = [](StopAllTest& test) -> boost::asio::awaitable<void> {
-      CommandRequest request;
+      station::CommandRequest request;
       request.robot_id = "a";
       request.actor = "user:anna";
       request.action.which_action = rheonaut_Command_set_duty_tag;
@@ -128,12 +129,12 @@ class StopAllTest : public ::testing::Test {
 
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  TaskGroup tasks{loop};
-  Station station{loop, clock, Envelope{}, LinkTimes{}};
+  runtime::TaskGroup tasks{loop};
+  station::Station station{loop, clock, config::Envelope{}, config::LinkTimes{}};
   std::vector<std::string> notes;
   NotingSink sink{notes};
   std::vector<std::unique_ptr<NotingPort>> ports;
-  std::optional<StopsOfAll> outcome;
+  std::optional<station::StopsOfAll> outcome;
 };
 
 TEST_F(StopAllTest, EveryFrameIsHandedOverBeforeAnythingIsPublished) {
@@ -144,7 +145,8 @@ TEST_F(StopAllTest, EveryFrameIsHandedOverBeforeAnythingIsPublished) {
   for (const auto& port : ports) port->obey();
   ASSERT_TRUE(clock.run_until([this] { return outcome.has_value(); }, 10ms));
   ASSERT_EQ(outcome->records.size(), 3u);
-  for (const CommandRecord& record : outcome->records) EXPECT_EQ(record.state, CommandState::acknowledged);
+  for (const station::CommandRecord& record : outcome->records)
+    EXPECT_EQ(record.state, station::CommandState::acknowledged);
   EXPECT_THAT(outcome->failed, IsEmpty());
 }
 
@@ -154,8 +156,8 @@ TEST_F(StopAllTest, ItWaitsForAllTogetherNoLongerThanItsPatience) {
   ports[1]->obey();
   EXPECT_FALSE(clock.run_until([this] { return outcome.has_value(); }, 990ms));
   ASSERT_TRUE(clock.run_until([this] { return outcome.has_value(); }, 20ms));
-  EXPECT_EQ(outcome->records[0].state, CommandState::sent);
-  EXPECT_EQ(outcome->records[1].state, CommandState::acknowledged);
+  EXPECT_EQ(outcome->records[0].state, station::CommandState::sent);
+  EXPECT_EQ(outcome->records[1].state, station::CommandState::acknowledged);
 }
 
 TEST_F(StopAllTest, OneThatCannotBeStoppedKeepsNoOtherFromIt) {
@@ -194,7 +196,7 @@ TEST_F(StopAllTest, ARobotThatIsAwayIsNotWaitedFor) {
   station.on_disconnected(*ports[0], "gone");
   stop_all(1s);
   ASSERT_TRUE(outcome.has_value());
-  EXPECT_EQ(outcome->records[0].state, CommandState::queued);
+  EXPECT_EQ(outcome->records[0].state, station::CommandState::queued);
 }
 
 TEST_F(StopAllTest, OnlyARetiredRobotThatIsNotConnectedIsLeftOut) {
@@ -220,7 +222,7 @@ TEST_F(StopAllTest, ARetiredRobotThatMayDriveSinceBeforeTheStationStartedIsStopp
   stop_all();
   ASSERT_TRUE(outcome.has_value());
   EXPECT_THAT(outcome->left_out, IsEmpty());
-  EXPECT_EQ(outcome->records.at(0).state, CommandState::queued) << "it is stopped when it comes back";
+  EXPECT_EQ(outcome->records.at(0).state, station::CommandState::queued) << "it is stopped when it comes back";
 }
 
 TEST_F(StopAllTest, ARetiredRobotThatConnectedAgainIsStoppedForAMinuteAfterItsLinkWasLost) {
@@ -233,7 +235,7 @@ TEST_F(StopAllTest, ARetiredRobotThatConnectedAgainIsStoppedForAMinuteAfterItsLi
   stop_all();
   ASSERT_TRUE(outcome.has_value());
   EXPECT_THAT(outcome->left_out, IsEmpty()) << "it may move on without its link";
-  EXPECT_EQ(outcome->records.at(0).state, CommandState::queued);
+  EXPECT_EQ(outcome->records.at(0).state, station::CommandState::queued);
   clock.run_for(2s);
   stop_all();
   EXPECT_THAT(outcome->left_out, ElementsAre("a"));

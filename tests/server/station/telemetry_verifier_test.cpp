@@ -10,8 +10,8 @@ namespace {
 
 constexpr std::uint64_t kEffectUs = 1'000'000;
 
-SampleBatch batch_at(std::uint64_t first_us, std::size_t count) {
-  SampleBatch batch;
+station::SampleBatch batch_at(std::uint64_t first_us, std::size_t count) {
+  station::SampleBatch batch;
   batch.first_robot_time_us = first_us;
   batch.context.period_us = 10'000;
   batch.context.mode = rheonaut_MODE_MANUAL;
@@ -27,34 +27,35 @@ protocol::Command command_of(pb_size_t tag) {
 
 TEST(TelemetryVerifier, AStopNeedsTheLatchAndDutyZero) {
   const auto stop = command_of(rheonaut_Command_emergency_stop_tag);
-  SampleBatch batch = batch_at(kEffectUs, 2);
-  EXPECT_EQ(look_for(stop, kEffectUs, 9, batch), Sight::unseen) << "not latched";
+  station::SampleBatch batch = batch_at(kEffectUs, 2);
+  EXPECT_EQ(look_for(stop, kEffectUs, 9, batch), station::Sight::unseen) << "not latched";
   batch.context.emergency_id = 9;
-  EXPECT_EQ(look_for(stop, kEffectUs, 9, batch), Sight::seen);
+  EXPECT_EQ(look_for(stop, kEffectUs, 9, batch), station::Sight::seen);
   batch.samples[0].duty = batch.samples[1].duty = 0.1F;
-  EXPECT_EQ(look_for(stop, kEffectUs, 9, batch), Sight::unseen) << "the motor runs";
+  EXPECT_EQ(look_for(stop, kEffectUs, 9, batch), station::Sight::unseen) << "the motor runs";
   batch.context.emergency_id = 10;
   batch.samples[1].duty = 0;
-  EXPECT_EQ(look_for(stop, kEffectUs, 9, batch), Sight::seen) << "a later stop shows the earlier one too";
+  EXPECT_EQ(look_for(stop, kEffectUs, 9, batch), station::Sight::seen) << "a later stop shows the earlier one too";
 }
 
 TEST(TelemetryVerifier, OnlySamplesFromTheEffectOnCount) {
   auto duty = command_of(rheonaut_Command_set_duty_tag);
   duty.action.set_duty.duty = 0.3F;
-  SampleBatch batch = batch_at(kEffectUs - 15'000, 3);  // the last one is made 5 ms after it
+  station::SampleBatch batch = batch_at(kEffectUs - 15'000, 3);  // the last one is made 5 ms after it
   batch.samples[0].duty = batch.samples[1].duty = 0.3F;
-  EXPECT_EQ(look_for(duty, kEffectUs, 0, batch), Sight::unseen);
+  EXPECT_EQ(look_for(duty, kEffectUs, 0, batch), station::Sight::unseen);
   batch.samples[2].duty = 0.3F;
-  EXPECT_EQ(look_for(duty, kEffectUs, 0, batch), Sight::seen);
-  EXPECT_EQ(look_for(duty, kEffectUs + 5'000, 0, batch), Sight::seen);
-  EXPECT_EQ(look_for(duty, kEffectUs + 5'001, 0, batch), Sight::unseen);
+  EXPECT_EQ(look_for(duty, kEffectUs, 0, batch), station::Sight::seen);
+  EXPECT_EQ(look_for(duty, kEffectUs + 5'000, 0, batch), station::Sight::seen);
+  EXPECT_EQ(look_for(duty, kEffectUs + 5'001, 0, batch), station::Sight::unseen);
 }
 
 TEST(TelemetryVerifier, TheWindowIsInTheRobotsTime) {
   auto duty = command_of(rheonaut_Command_set_duty_tag);
   duty.action.set_duty.duty = 0.3F;
-  EXPECT_EQ(look_for(duty, kEffectUs, 0, batch_at(kEffectUs + kVerifyWindowUs - 1, 1)), Sight::unseen);
-  EXPECT_EQ(look_for(duty, kEffectUs, 0, batch_at(kEffectUs + kVerifyWindowUs, 1)), Sight::missed);
+  EXPECT_EQ(look_for(duty, kEffectUs, 0, batch_at(kEffectUs + station::kVerifyWindowUs - 1, 1)),
+            station::Sight::unseen);
+  EXPECT_EQ(look_for(duty, kEffectUs, 0, batch_at(kEffectUs + station::kVerifyWindowUs, 1)), station::Sight::missed);
 }
 
 TEST(TelemetryVerifier, ModeAndSetpointMustBeTheOnesOrdered) {
@@ -64,36 +65,37 @@ TEST(TelemetryVerifier, ModeAndSetpointMustBeTheOnesOrdered) {
   mode.action.set_mode.setpoint_m = 0.1F;
   auto setpoint = command_of(rheonaut_Command_set_setpoint_tag);
   setpoint.action.set_setpoint.setpoint_m = 0.1F;
-  SampleBatch batch = batch_at(kEffectUs, 1);
+  station::SampleBatch batch = batch_at(kEffectUs, 1);
   batch.context.setpoint_m = 0.1F;
-  EXPECT_EQ(look_for(mode, kEffectUs, 0, batch), Sight::unseen);
-  EXPECT_EQ(look_for(setpoint, kEffectUs, 0, batch), Sight::unseen);
+  EXPECT_EQ(look_for(mode, kEffectUs, 0, batch), station::Sight::unseen);
+  EXPECT_EQ(look_for(setpoint, kEffectUs, 0, batch), station::Sight::unseen);
   batch.context.mode = rheonaut_MODE_AUTO;
-  EXPECT_EQ(look_for(mode, kEffectUs, 0, batch), Sight::seen);
-  EXPECT_EQ(look_for(setpoint, kEffectUs, 0, batch), Sight::seen);
+  EXPECT_EQ(look_for(mode, kEffectUs, 0, batch), station::Sight::seen);
+  EXPECT_EQ(look_for(setpoint, kEffectUs, 0, batch), station::Sight::seen);
   batch.context.setpoint_m = 0.2F;
-  EXPECT_EQ(look_for(mode, kEffectUs, 0, batch), Sight::unseen);
-  EXPECT_EQ(look_for(setpoint, kEffectUs, 0, batch), Sight::unseen);
+  EXPECT_EQ(look_for(mode, kEffectUs, 0, batch), station::Sight::unseen);
+  EXPECT_EQ(look_for(setpoint, kEffectUs, 0, batch), station::Sight::unseen);
 }
 
 TEST(TelemetryVerifier, AClearIsSeenWhenTheLatchIsGone) {
   const auto clear = command_of(rheonaut_Command_clear_emergency_tag);
-  SampleBatch batch = batch_at(kEffectUs, 1);
-  EXPECT_EQ(look_for(clear, kEffectUs, 0, batch), Sight::seen);
+  station::SampleBatch batch = batch_at(kEffectUs, 1);
+  EXPECT_EQ(look_for(clear, kEffectUs, 0, batch), station::Sight::seen);
   batch.context.emergency_id = 12;
-  EXPECT_EQ(look_for(clear, kEffectUs, 0, batch), Sight::overtaken) << "a new emergency";
+  EXPECT_EQ(look_for(clear, kEffectUs, 0, batch), station::Sight::overtaken) << "a new emergency";
 }
 
 TEST(TelemetryVerifier, KindsThatNoSampleShowsAreKnown) {
   for (const int tag : {rheonaut_Command_renew_lease_tag, rheonaut_Command_ping_tag, rheonaut_Command_zero_position_tag,
                         rheonaut_Command_drop_timed_tag}) {
-    EXPECT_FALSE(can_be_seen(command_of(static_cast<pb_size_t>(tag))));
-    EXPECT_EQ(look_for(command_of(static_cast<pb_size_t>(tag)), kEffectUs, 0, batch_at(kEffectUs, 1)), Sight::unseen);
+    EXPECT_FALSE(station::can_be_seen(command_of(static_cast<pb_size_t>(tag))));
+    EXPECT_EQ(look_for(command_of(static_cast<pb_size_t>(tag)), kEffectUs, 0, batch_at(kEffectUs, 1)),
+              station::Sight::unseen);
   }
 }
 
 TEST(StopTimes, CountsByUpperBound) {
-  Histogram times;
+  station::Histogram times;
   for (const std::int64_t time_us : {0, 50, 51, 1'000'000, 1'000'001}) times.add(time_us);
   EXPECT_EQ(times.counts().front(), 2u);
   EXPECT_EQ(times.counts()[1], 1u);

@@ -13,7 +13,7 @@ using ::testing::SizeIs;
 
 class TimedCommandsTest : public EntryTest {
  protected:
-  std::shared_ptr<PendingCommand> add_timed() {
+  std::shared_ptr<station::PendingCommand> add_timed() {
     protocol::Command command = set_duty(0.3F);
     command.has_execute_at_robot_us = true;
     command.execute_at_robot_us = 1'500'000;
@@ -22,9 +22,9 @@ class TimedCommandsTest : public EntryTest {
     return add(command);
   }
 
-  SinkNotifier notifier{clock};
-  CommandTracker tracker{loop, clock, notifier};
-  TimedCommands timed{loop, clock, notifier, tracker};
+  station::SinkNotifier notifier{clock};
+  station::CommandTracker tracker{loop, clock, notifier};
+  station::TimedCommands timed{loop, clock, notifier, tracker};
 };
 
 TEST_F(TimedCommandsTest, NothingIsDroppedWhileItsSenderIsInControl) {
@@ -58,10 +58,10 @@ TEST_F(TimedCommandsTest, WithoutRoomOnTheLinkNoCommandMayFollow) {
 TEST_F(TimedCommandsTest, WhatIsQueuedIsWithdrawnUnlessItEndsAMotion) {
   const auto forward = add(set_duty(0.3F)), halt = add(set_duty(0));
   port.can_withdraw = {forward->record.id, halt->record.id};
-  timed.withdraw_queued(entry, "limits_changed", [](const PendingCommand&) { return true; });
-  EXPECT_EQ(forward->record.state, CommandState::superseded);
+  timed.withdraw_queued(entry, "limits_changed", [](const station::PendingCommand&) { return true; });
+  EXPECT_EQ(forward->record.state, station::CommandState::superseded);
   EXPECT_EQ(forward->record.reason, "limits_changed");
-  EXPECT_EQ(halt->record.state, CommandState::queued);
+  EXPECT_EQ(halt->record.state, station::CommandState::queued);
 }
 
 }  // namespace

@@ -65,7 +65,7 @@ TEST(TelemetryFieldsInOpenapi, AreInStatesPagesAndLiveMessages) {
   expect_in(batch_names(), "StoredSample");
   expect_in(sample_names(), "LiveSamples");
   Names live;
-  for_each_batch_field([&](const auto& field) {
+  station::for_each_batch_field([&](const auto& field) {
     if (field.is_in_live_samples) live.emplace_back(field.name);
   });
   expect_in(live, "LiveSamples");
@@ -101,10 +101,10 @@ TEST(TelemetryFieldsInDatabaseDocument, AreTheChannelsAndTheColumnsOfTheView) {
 TEST(TelemetryFieldsInDatabaseDocument, AreTheBytesOfADigestInTheirOrder) {
   std::string fields;
   const auto add = [&](const auto& field) { fields += fmt::format("`{}` ", field.name); };
-  for_each_batch_field_of<FieldKind::number>(add);
-  for_each_batch_field_of<FieldKind::enumerator>(add);
-  for_each_batch_field_of<FieldKind::count>(add);
-  for_each_batch_field_of<FieldKind::id>(add);
+  station::for_each_batch_field_of<station::FieldKind::number>(add);
+  station::for_each_batch_field_of<station::FieldKind::enumerator>(add);
+  station::for_each_batch_field_of<station::FieldKind::count>(add);
+  station::for_each_batch_field_of<station::FieldKind::id>(add);
   const std::string table = passage("docs/database.md", "the six channels as binary32", "That is `format`");
   std::string listed;
   const std::regex quoted{"`[a-z_]+`"};

@@ -24,8 +24,8 @@
 namespace server {
 namespace {
 
-constexpr RunId kRun = 1;
-constexpr BootId kBoot = 7;
+constexpr storage::RunId kRun = 1;
+constexpr station::BootId kBoot = 7;
 constexpr std::int64_t kBootKey = 1;
 
 // A frame of three samples as the robot sends it, with no value 0.
@@ -51,12 +51,12 @@ protocol::Telemetry frame_of_firmware() {
   return frame;
 }
 
-SampleBatch batch_of(const protocol::Telemetry& frame) {
-  SampleBatch batch;
+station::SampleBatch batch_of(const protocol::Telemetry& frame) {
+  station::SampleBatch batch;
   batch.robot_id = "nemo";
   batch.boot_id = kBoot;
   batch.first_robot_time_us = frame.first_robot_time_us;
-  batch.context = context_of(frame);
+  batch.context = station::context_of(frame);
   copy_samples(frame, batch.samples);
   return batch;
 }
@@ -66,7 +66,7 @@ class FieldExports : public ::testing::Test {
   FieldExports() {
     std::string name = "/tmp/rheonaut-fields-XXXXXX";
     folder_ = mkdtemp(name.data());
-    Database database{path()};
+    storage::Database database{path()};
     database.handle().exec(
         "INSERT INTO robot (robot_id, enrolled_at_us) VALUES ('nemo', 1);"
         "INSERT INTO boot (boot_key, boot_id, robot_id, reset_cause, firmware_version, sample_period_us,"
@@ -76,14 +76,14 @@ class FieldExports : public ::testing::Test {
         " firmware_version, controller_id, controller_checksum, parameters_checksum, started_at_us, ended_at_us)"
         " VALUES (1, 'nemo', '', '', '', '', '', '', '', '', 0, 0, 0, 1, 2);"
         "INSERT INTO run_span (run_id, span, boot_key, first_seq, last_seq) VALUES (1, 0, 1, 0, 2)");
-    WriteBatch commit;
-    Segment segment;
+    storage::WriteBatch commit;
+    storage::Segment segment;
     segment.boot_key = kBootKey;
     segment.first_robot_time_us = batch_.first_robot_time_us;
     segment.context = batch_.context;
     segment.samples = batch_.samples;
     commit.segments.push_back(segment);
-    SampleStore{database}.write(commit);
+    storage::SampleStore{database}.write(commit);
   }
   ~FieldExports() override { std::filesystem::remove_all(folder_); }
 
@@ -96,14 +96,15 @@ class FieldExports : public ::testing::Test {
   }
   Words expected() const {
     Words words;
-    const Sample& sample = batch_.samples.at(1);
-    for_each_sample_field([&](const SampleField& field) { words[field.name] = word(sample.*field.member); });
-    for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+    const station::Sample& sample = batch_.samples.at(1);
+    station::for_each_sample_field(
+        [&](const station::SampleField& field) { words[field.name] = word(sample.*field.member); });
+    station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
       const Value& value = batch_.context.*field.member;
-      if constexpr (BatchField<Value>::kKind == FieldKind::number) {
-        words[field.name] = word(or_nan(value));
+      if constexpr (station::BatchField<Value>::kKind == station::FieldKind::number) {
+        words[field.name] = word(station::or_nan(value));
       } else {
-        words[field.name] = fmt::format("{}", text_or_value(value));
+        words[field.name] = fmt::format("{}", station::text_or_value(value));
       }
     });
     return words;
@@ -131,8 +132,8 @@ class FieldExports : public ::testing::Test {
   }
 
   std::filesystem::path folder_;
-  SampleBatch batch_ = batch_of(frame_of_firmware());
-  ExportQuery query_{.run = kRun, .channels = all_channels(), .grid_us = {}};
+  station::SampleBatch batch_ = batch_of(frame_of_firmware());
+  storage::ExportQuery query_{.run = kRun, .channels = storage::all_channels(), .grid_us = {}};
 };
 
 std::vector<std::string> cells(const std::string& line) {
@@ -151,16 +152,17 @@ TEST_F(FieldExports, TheFirmwareFillsEveryFieldAndItsFrameDecodes) {
   const auto decoded = protocol::decode_robot_frame(protocol::Bytes{bytes.data(), size});
   ASSERT_TRUE(decoded) << "the columns of samples are not of one length";
   const protocol::Telemetry& telemetry = decoded->body.telemetry;
-  for_each_sample_field([&](const SampleField& field) { EXPECT_NE((telemetry.*field.wire)[1], 0.0F) << field.name; });
-  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
-    using Wire = BatchField<Value>::Wire;
+  station::for_each_sample_field(
+      [&](const station::SampleField& field) { EXPECT_NE((telemetry.*field.wire)[1], 0.0F) << field.name; });
+  station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
+    using Wire = station::BatchField<Value>::Wire;
     EXPECT_NE(telemetry.*field.wire, Wire{}) << field.name;
   });
 }
 
 TEST_F(FieldExports, ACsvHasAColumnForEachField) {
-  SQLite::Database database = open_for_reading(path());
-  CsvWriter writer{read_spans(database, kRun, 0), query_};
+  SQLite::Database database = storage::open_for_reading(path());
+  storage::CsvWriter writer{storage::read_spans(database, kRun, 0), query_};
   std::string text;
   while (const auto piece = writer.next(database)) text += *piece;
   std::istringstream in{text};
@@ -173,8 +175,8 @@ TEST_F(FieldExports, ACsvHasAColumnForEachField) {
 }
 
 TEST_F(FieldExports, AMatFileHasAVariableForEachField) {
-  SQLite::Database database = open_for_reading(path());
-  MatWriter writer{folder_ / "run.mat", read_spans(database, kRun, 0), query_};
+  SQLite::Database database = storage::open_for_reading(path());
+  storage::MatWriter writer{folder_ / "run.mat", storage::read_spans(database, kRun, 0), query_};
   while (writer.advance(database).value()) continue;
   std::map<std::string, double> found;
   const std::unique_ptr<mat_t, int (*)(mat_t*)> file{Mat_Open((folder_ / "run.mat").c_str(), MAT_ACC_RDONLY),
@@ -186,14 +188,14 @@ TEST_F(FieldExports, AMatFileHasAVariableForEachField) {
     if (read->class_type == MAT_C_UINT32) found[read->name] = static_cast<std::uint32_t*>(read->data)[1];
   }
   const auto number = [&](const std::string& name) { return found.contains(name) ? found[name] : NAN; };
-  for_each_sample_field([&](const SampleField& field) {
+  station::for_each_sample_field([&](const station::SampleField& field) {
     EXPECT_EQ(number(field.name), static_cast<double>(batch_.samples[1].*field.member)) << field.name;
   });
-  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
+  station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
     const Value& value = batch_.context.*field.member;
-    if constexpr (BatchField<Value>::kKind == FieldKind::number) {
-      EXPECT_EQ(number(field.name), static_cast<double>(or_nan(value))) << field.name;
-    } else if constexpr (BatchField<Value>::kKind == FieldKind::id) {
+    if constexpr (station::BatchField<Value>::kKind == station::FieldKind::number) {
+      EXPECT_EQ(number(field.name), static_cast<double>(station::or_nan(value))) << field.name;
+    } else if constexpr (station::BatchField<Value>::kKind == station::FieldKind::id) {
       EXPECT_EQ(number(std::string{field.name} + "_high"), static_cast<double>(value >> 32)) << field.name;
       EXPECT_EQ(number(std::string{field.name} + "_low"), static_cast<double>(value & 0xffffffff)) << field.name;
     } else {
@@ -204,8 +206,9 @@ TEST_F(FieldExports, AMatFileHasAVariableForEachField) {
 
 TEST_F(FieldExports, ARunAsSqliteHasAColumnForEachField) {
   {
-    SQLite::Database database = open_for_reading(path());
-    RunFile writer{folder_ / "run.sqlite", reading_uri(path(), false), read_spans(database, kRun, 0), query_};
+    SQLite::Database database = storage::open_for_reading(path());
+    storage::RunFile writer{folder_ / "run.sqlite", storage::reading_uri(path(), false),
+                            storage::read_spans(database, kRun, 0), query_};
     while (writer.advance(database)) continue;
   }
   SQLite::Database file{(folder_ / "run.sqlite").string(), SQLite::OPEN_READONLY};
@@ -220,57 +223,58 @@ TEST_F(FieldExports, ARunAsSqliteHasAColumnForEachField) {
 }
 
 TEST_F(FieldExports, APageOfSamplesAndALiveMessageHaveEachField) {
-  SQLite::Database database = open_for_reading(path());
-  const SegmentPage page = read_segments(database, read_spans(database, kRun, 0), {}, 10, all_channels());
-  EXPECT_EQ(fields_of(words(nlohmann::json::parse(page_text(page))["samples"][1])), expected());
+  SQLite::Database database = storage::open_for_reading(path());
+  const storage::SegmentPage page =
+      read_segments(database, storage::read_spans(database, kRun, 0), {}, 10, storage::all_channels());
+  EXPECT_EQ(fields_of(words(nlohmann::json::parse(api::page_text(page))["samples"][1])), expected());
 
-  const auto live = nlohmann::json::parse(samples_message(batch_));
+  const auto live = nlohmann::json::parse(live::samples_message(batch_));
   Words found = words(live);
   for (const std::string& name : sample_names()) found[name] = word(live[name][1]);
   Words expected_live = expected();
-  for_each_batch_field([&](const auto& field) {
+  station::for_each_batch_field([&](const auto& field) {
     if (!field.is_in_live_samples) expected_live.erase(field.name);
   });
   EXPECT_EQ(fields_of(found), expected_live);
 }
 
 TEST_F(FieldExports, TheStateOfARobotHasEachField) {
-  RobotState robot;
+  station::RobotState robot;
   robot.context = batch_.context;
   robot.sample = batch_.samples[1];
-  const nlohmann::json state = to_json(robot);
+  const nlohmann::json state = live::to_json(robot);
   Words found = words(state);
   found.merge(words(state["sample"]));
   EXPECT_EQ(fields_of(found), expected());
 }
 
 TEST_F(FieldExports, TheToolsReadEachField) {
-  const auto samples = read_run(path(), kRun, 10);
+  const auto samples = storage::read_run(path(), kRun, 10);
   ASSERT_TRUE(samples);
   ASSERT_EQ(samples->size(), 3u);
   EXPECT_EQ(samples->at(1).sample, batch_.samples[1]);
-  SampleContext context = samples->at(1);
+  station::SampleContext context = samples->at(1);
   context.period_us = batch_.context.period_us;  // which is not in the view
   EXPECT_EQ(context, batch_.context);
 }
 
 // A field that a digest does not contain could be changed unseen.
 TEST_F(FieldExports, TheDigestOfTheNewestFormatChangesWithEachField) {
-  Segment segment;
+  storage::Segment segment;
   segment.context = batch_.context;
   segment.samples = batch_.samples;
-  const auto digest = [](const Segment& of) {
-    SampleHash hash{kDigestFormat};
+  const auto digest = [](const storage::Segment& of) {
+    storage::SampleHash hash{storage::kDigestFormat};
     hash.add(kBoot, of);
     return hash.text();
   };
-  for_each_sample_field([&](const SampleField& field) {
-    Segment changed = segment;
+  station::for_each_sample_field([&](const station::SampleField& field) {
+    storage::Segment changed = segment;
     changed.samples[1].*field.member += 1;
     EXPECT_NE(digest(changed), digest(segment)) << field.name;
   });
-  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
-    Segment changed = segment;
+  station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
+    storage::Segment changed = segment;
     changed.context.*field.member = Value{};
     EXPECT_NE(digest(changed), digest(segment)) << field.name;
   });

@@ -13,13 +13,13 @@ using Names = std::vector<std::string>;
 
 inline Names sample_names() {
   Names names;
-  for_each_sample_field([&](const auto& field) { names.emplace_back(field.name); });
+  station::for_each_sample_field([&](const auto& field) { names.emplace_back(field.name); });
   return names;
 }
 
 inline Names batch_names() {
   Names names;
-  for_each_batch_field([&](const auto& field) { names.emplace_back(field.name); });
+  station::for_each_batch_field([&](const auto& field) { names.emplace_back(field.name); });
   return names;
 }
 

@@ -34,11 +34,11 @@ Columns field_columns(SQLite::Database& database) {
 
 Columns expected_columns(std::int64_t version) {
   Columns columns;
-  for_each_sample_field([&](const auto& field) {
+  station::for_each_sample_field([&](const auto& field) {
     if (field.since_schema > version) return;
     for (const char* prefix : {"", "min_", "max_"}) columns.insert(std::string{prefix} + field.name);
   });
-  for_each_batch_field([&](const auto& field) {
+  station::for_each_batch_field([&](const auto& field) {
     if (field.since_schema <= version) columns.insert(field.name);
   });
   return columns;
@@ -46,15 +46,15 @@ Columns expected_columns(std::int64_t version) {
 
 TEST(TelemetryFields, AreTheColumnsOfEachVersionOfTheSchema) {
   SQLite::Database database{":memory:", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE};
-  for (std::size_t version = 1; version <= migrations().size(); ++version) {
-    database.exec(migrations()[version - 1]);
+  for (std::size_t version = 1; version <= storage::migrations().size(); ++version) {
+    database.exec(storage::migrations()[version - 1]);
     EXPECT_EQ(field_columns(database), expected_columns(static_cast<std::int64_t>(version))) << "version " << version;
   }
 }
 
 TEST(TelemetryFields, AreInTheViewOfSamplesOfTheNewestSchema) {
   SQLite::Database database{":memory:", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE};
-  for (const char* migration : migrations()) database.exec(migration);
+  for (const char* migration : storage::migrations()) database.exec(migration);
   const Columns view = columns_of(database, "run_sample");
   for (const std::string& name : sample_names()) EXPECT_TRUE(view.contains(name)) << name;
   for (const std::string& name : batch_names()) EXPECT_TRUE(view.contains(name)) << name;

@@ -27,26 +27,26 @@ std::map<std::string, std::string> fields_of_proto() {
   return fields;
 }
 
-std::string type_in_proto(const BatchField<std::optional<float>>& field) {
+std::string type_in_proto(const station::BatchField<std::optional<float>>& field) {
   return field.has == nullptr ? "float" : "optional float";
 }
-std::string type_in_proto(const BatchField<std::uint32_t>&) { return "uint32"; }
-std::string type_in_proto(const BatchField<std::uint64_t>&) { return "fixed64"; }
-std::string type_in_proto(const BatchField<protocol::Mode>&) { return "Mode"; }
-std::string type_in_proto(const BatchField<protocol::SubState>&) { return "SubState"; }
-std::string type_in_proto(const BatchField<protocol::EmergencyCause>&) { return "EmergencyCause"; }
+std::string type_in_proto(const station::BatchField<std::uint32_t>&) { return "uint32"; }
+std::string type_in_proto(const station::BatchField<std::uint64_t>&) { return "fixed64"; }
+std::string type_in_proto(const station::BatchField<protocol::Mode>&) { return "Mode"; }
+std::string type_in_proto(const station::BatchField<protocol::SubState>&) { return "SubState"; }
+std::string type_in_proto(const station::BatchField<protocol::EmergencyCause>&) { return "EmergencyCause"; }
 
 TEST(TelemetryFields, AreTheFieldsOfTheProtocolWithTheirTypes) {
   std::map<std::string, std::string> fields;
-  for_each_sample_field([&](const auto& field) { fields[field.name] = "repeated float"; });
-  for_each_batch_field([&](const auto& field) { fields[field.name] = type_in_proto(field); });
+  station::for_each_sample_field([&](const auto& field) { fields[field.name] = "repeated float"; });
+  station::for_each_batch_field([&](const auto& field) { fields[field.name] = type_in_proto(field); });
   EXPECT_EQ(fields, fields_of_proto());
 }
 
 // Another one for each number; of enumerators one that all have.
 template <class Field>
 Field::Wire value_of(float number) {
-  return static_cast<Field::Wire>(Field::kKind == FieldKind::enumerator ? 2 : number);
+  return static_cast<Field::Wire>(Field::kKind == station::FieldKind::enumerator ? 2 : number);
 }
 
 TEST(TelemetryFields, CopyEachColumnAndEachValueOfAFrameIntoItsMember) {
@@ -54,37 +54,37 @@ TEST(TelemetryFields, CopyEachColumnAndEachValueOfAFrameIntoItsMember) {
   frame.position_m_count = 2;
   frame.period_us = 10'000;
   float next = 1;
-  for_each_sample_field([&](const SampleField& field) {
+  station::for_each_sample_field([&](const station::SampleField& field) {
     (frame.*field.wire)[0] = next++;
     (frame.*field.wire)[1] = next++;
   });
-  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
-    frame.*field.wire = value_of<BatchField<Value>>(next++);
+  station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
+    frame.*field.wire = value_of<station::BatchField<Value>>(next++);
     if (field.has != nullptr) frame.*field.has = true;
   });
 
-  std::vector<Sample> samples;
+  std::vector<station::Sample> samples;
   copy_samples(frame, samples);
-  const SampleContext context = context_of(frame);
+  const station::SampleContext context = station::context_of(frame);
   ASSERT_EQ(samples.size(), 2u);
   EXPECT_EQ(context.period_us, 10'000u);
   float expected = 1;
-  for_each_sample_field([&](const SampleField& field) {
+  station::for_each_sample_field([&](const station::SampleField& field) {
     EXPECT_EQ(samples[0].*field.member, expected++) << field.name;
     EXPECT_EQ(samples[1].*field.member, expected++) << field.name;
   });
-  for_each_batch_field([&]<class Value>(const BatchField<Value>& field) {
-    EXPECT_EQ(context.*field.member, value_of<BatchField<Value>>(expected++)) << field.name;
+  station::for_each_batch_field([&]<class Value>(const station::BatchField<Value>& field) {
+    EXPECT_EQ(context.*field.member, value_of<station::BatchField<Value>>(expected++)) << field.name;
   });
 }
 
 TEST(TelemetryFields, TakeWhatIsNotFiniteOrNotThereAsNone) {
   protocol::Telemetry frame = rheonaut_Telemetry_init_zero;
-  for_each_batch_field_of<FieldKind::number>([&](const auto& field) {
+  station::for_each_batch_field_of<station::FieldKind::number>([&](const auto& field) {
     frame.*field.wire = field.has == nullptr ? std::numeric_limits<float>::infinity() : 1.0F;
   });
-  const SampleContext context = context_of(frame);
-  for_each_batch_field_of<FieldKind::number>(
+  const station::SampleContext context = station::context_of(frame);
+  station::for_each_batch_field_of<station::FieldKind::number>(
       [&](const auto& field) { EXPECT_EQ(context.*field.member, std::nullopt) << field.name; });
 }
 

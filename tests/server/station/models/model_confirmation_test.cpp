@@ -21,7 +21,7 @@ TEST_F(ModelConfirmationTest, AFluidWithoutAModelOrNoneTakesTheConfirmationBack)
     name_fluid(next);
     live(2s);
     EXPECT_EQ(held["model_confirmed"], 0);
-    EXPECT_EQ(model().state, ModelState::assumed);
+    EXPECT_EQ(model().state, station::ModelState::assumed);
     EXPECT_EQ(events().back(), "model_taken_back");
   }
   const std::size_t before = sent.size();
@@ -38,11 +38,11 @@ TEST_F(ModelConfirmationTest, WhatCouldNotBeTakenBackWhileTheRobotMovedIsTakenBa
   duty = 0.5F;
   live(200ms);
   name_fluid("non_newtonian");
-  live(ModelExchange::kPatience + 20s);
-  EXPECT_EQ(model().state, ModelState::failed);
+  live(station::ModelExchange::kPatience + 20s);
+  EXPECT_EQ(model().state, station::ModelState::failed);
   is_coasting = true;  // and says so
   duty = 0;
-  live(2 * (ModelExchange::kPatience + ModelSender::kRetryInterval) + 5s);
+  live(2 * (station::ModelExchange::kPatience + station::ModelSender::kRetryInterval) + 5s);
   EXPECT_EQ(held["model_confirmed"], 1);
   const auto kinds = events();
   EXPECT_EQ(std::count(kinds.begin(), kinds.end(), "model_not_taken_back"), 2) << "a retry is no news";
@@ -50,7 +50,7 @@ TEST_F(ModelConfirmationTest, WhatCouldNotBeTakenBackWhileTheRobotMovedIsTakenBa
   is_coasting = false;
   live(10s);
   EXPECT_EQ(held["model_confirmed"], 0);
-  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().state, station::ModelState::assumed);
 }
 
 TEST_F(ModelConfirmationTest, WhatWasNamedWhileTheRobotWasAwayIsTakenBackWhenItReturns) {
@@ -64,7 +64,7 @@ TEST_F(ModelConfirmationTest, WhatWasNamedWhileTheRobotWasAwayIsTakenBackWhenItR
   begin(77, seq);
   live(10s);
   EXPECT_EQ(held["model_confirmed"], 0);
-  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().state, station::ModelState::assumed);
 }
 
 // SAFETY's test: the robot had taken the confirmation when the link broke, and nobody has seen it.
@@ -75,14 +75,14 @@ TEST_F(ModelConfirmationTest, AConfirmationThatWasOnItsWayWhenTheLinkBrokeIsTake
   live(3s);
   ASSERT_FALSE(connected());
   ASSERT_EQ(held["model_confirmed"], 1);
-  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().state, station::ModelState::failed);
   name_fluid("non_newtonian");
   clock.run_for(3s);
   breaks_after_confirming = false;
   begin(77, seq);
   live(10s);
   EXPECT_EQ(held["model_confirmed"], 0);
-  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().state, station::ModelState::assumed);
 }
 
 TEST_F(ModelConfirmationTest, WhatTheRobotTakesBackByItselfIsAssumed) {
@@ -93,11 +93,11 @@ TEST_F(ModelConfirmationTest, WhatTheRobotTakesBackByItselfIsAssumed) {
   held["model_confirmed"] = 0;
   say("model_gain_1_m_s", 1);
   live(1s);
-  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().state, station::ModelState::assumed);
   EXPECT_THAT(model().reason, HasSubstr("a parameter was changed"));
   held["model_confirmed"] = 1;  // likewise
   live(1s);
-  EXPECT_EQ(model().state, ModelState::confirmed);
+  EXPECT_EQ(model().state, station::ModelState::confirmed);
   EXPECT_EQ(model().fluid, "") << "of no fluid that the station knows";
 }
 
@@ -105,7 +105,7 @@ TEST_F(ModelConfirmationTest, OtherBitsUnderAFlagThatNoSampleShowedFallingAreNoL
   begin();
   name_fluid("water");
   live(3s);
-  ASSERT_EQ(model(), (RobotModel{ModelState::confirmed, "water", "", 0.002, some_model().set_at_us}));
+  ASSERT_EQ(model(), (station::RobotModel{station::ModelState::confirmed, "water", "", 0.002, some_model().set_at_us}));
   held["model_gain_1_m_s"] = 0.3F;  // and confirmed again, before the next sample
   say("model_gain_1_m_s", 0.3F);
   live(500ms);
@@ -119,12 +119,12 @@ TEST_F(ModelConfirmationTest, AChangedParameterIsNoConfirmationBySomebodyElse) {
   live(3s);
   change("model_gain_3_m_s", 0.3F);
   clock.settle();
-  EXPECT_EQ(model().state, ModelState::assumed) << "the link may break now";
+  EXPECT_EQ(model().state, station::ModelState::assumed) << "the link may break now";
   live(2s);
-  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().state, station::ModelState::assumed);
   EXPECT_THAT(model().reason, HasSubstr("a parameter was changed"));
-  const auto is_of_no_fluid = [](const RobotState& one) {
-    return one.model.state == ModelState::confirmed && one.model.fluid.empty();
+  const auto is_of_no_fluid = [](const station::RobotState& one) {
+    return one.model.state == station::ModelState::confirmed && one.model.fluid.empty();
   };
   EXPECT_EQ(std::count_if(sink.robots.begin(), sink.robots.end(), is_of_no_fluid), 0);
 }
@@ -137,7 +137,7 @@ TEST_F(ModelConfirmationTest, AParameterThatIsChangedAfterTheLinkReturnedEndsThe
   EXPECT_EQ(model().fluid, "water");
   change("model_gain_1_m_s", 0.3F);
   live(2s);
-  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().state, station::ModelState::assumed);
   EXPECT_EQ(model().fluid, "");
 }
 
@@ -146,16 +146,16 @@ TEST_F(ModelConfirmationTest, OtherBitsOfARobotThatReturnsConfirmedAreNotTheFlui
   begin();
   name_fluid("water");
   live(3s);
-  ASSERT_TRUE(station.control({"r1", "session:1", "", ControlAction::take, 20s, ""}));
+  ASSERT_TRUE(station.control({"r1", "session:1", "", station::ControlAction::take, 20s, ""}));
   held["model_gain_1_m_s"] = 0.3F;
   come_back();
   live(2s);
-  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().state, station::ModelState::failed);
   EXPECT_EQ(model().reason, "what was confirmed before is not taken back yet");
   EXPECT_EQ(held["model_confirmed"], 1);
   live(30s);
   EXPECT_EQ(held["model_confirmed"], 0);
-  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().state, station::ModelState::assumed);
 }
 
 // SAFETY's test: no sample shows the flag falling.
@@ -172,7 +172,7 @@ TEST_F(ModelConfirmationTest, OtherBitsUnderAConfirmationThatTheStationOnlyJudge
   EXPECT_EQ(model().fluid, "");
   live(10s);
   EXPECT_EQ(held["model_confirmed"], 0);
-  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().state, station::ModelState::assumed);
 }
 
 TEST_F(ModelConfirmationTest, AfterARestartOfTheStationAConfirmationStandsForTheModelOfTheNamedFluidAlone) {
@@ -181,7 +181,7 @@ TEST_F(ModelConfirmationTest, AfterARestartOfTheStationAConfirmationStandsForThe
   station.restore({{.id = "r1", .boot_id = 77, .fluid = "water"}}, {});
   begin();
   live(2s);
-  EXPECT_EQ(model().state, ModelState::confirmed);
+  EXPECT_EQ(model().state, station::ModelState::confirmed);
   EXPECT_EQ(model().fluid, "water");
   EXPECT_THAT(sent, IsEmpty());
 }
@@ -191,13 +191,13 @@ TEST_F(ModelConfirmationTest, AConfirmationThatTheStationHasNotSeenBeingMadeIsTa
   held["model_confirmed"] = 1;
   station.restore({{.id = "r1", .boot_id = 77, .fluid = "water"}}, {});
   begin();
-  ASSERT_TRUE(station.control({"r1", "session:1", "", ControlAction::take, 10s, ""}));
+  ASSERT_TRUE(station.control({"r1", "session:1", "", station::ControlAction::take, 10s, ""}));
   live(5s);
   EXPECT_EQ(held["model_confirmed"], 1) << "while somebody is in control nothing is sent";
   live(10s);
   EXPECT_EQ(held["model_confirmed"], 0);
   EXPECT_EQ(sink.commands.back().actor, "station:model");
-  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().state, station::ModelState::assumed);
 }
 
 }  // namespace

@@ -18,32 +18,32 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 // Takes each parameter at once and reports it, as far as its members let it.
-class FakeModelRobot final : public ModelRobot {
+class FakeModelRobot final : public station::ModelRobot {
  public:
   FakeModelRobot() {
     robot.id = "r1";
     robot.boot_id = 7;
-    robot.link = LinkState::connected;
+    robot.link = station::LinkState::connected;
   }
 
-  const RobotState& state() const override { return robot; }
-  const ParameterTable& parameters() const override { return table; }
+  const station::RobotState& state() const override { return robot; }
+  const station::ParameterTable& parameters() const override { return table; }
   std::optional<bool> confirmation() const override { return flag; }
   std::uint64_t latest_naming() const override { return naming; }
-  boost::asio::awaitable<Result<CommandRecord>> submit(CommandRequest request) override {
+  boost::asio::awaitable<Result<station::CommandRecord>> submit(station::CommandRequest request) override {
     const auto& parameter = request.action.action.set_parameter;
     const std::string name = parameter.name;
     sent.push_back(name);
     if (name == names_another_at) ++naming;
-    CommandRecord record;
-    record.state = refusal.empty() ? CommandState::acknowledged : CommandState::rejected;
+    station::CommandRecord record;
+    record.state = refusal.empty() ? station::CommandState::acknowledged : station::CommandState::rejected;
     record.reason = refusal;
     if (refusal.empty()) take(name, parameter.value);
     co_return record;
   }
 
-  RobotState robot;
-  ParameterTable table;
+  station::RobotState robot;
+  station::ParameterTable table;
   std::optional<bool> flag = false;
   std::uint64_t naming = 1;
   std::string refusal;           // of each command; empty: it takes them
@@ -66,7 +66,7 @@ class ModelExchangeTest : public ::testing::Test {
     clock.settle();
   }
 
-  void start(std::optional<FluidModel> model) {
+  void start(std::optional<station::FluidModel> model) {
     tasks.spawn("exchange", exchange({1, {"token:local", "", 0}, 7, "water", std::move(model)}));
     clock.settle();
   }
@@ -74,13 +74,13 @@ class ModelExchangeTest : public ::testing::Test {
 
   boost::asio::io_context loop;
   VirtualClock clock{loop};
-  TaskGroup tasks{loop};
+  runtime::TaskGroup tasks{loop};
   FakeModelRobot robot;
   std::optional<Result<void>> outcome;  // none: it goes on
 
  private:
-  boost::asio::awaitable<void> exchange(FluidNaming naming) {
-    ModelExchange exchange{clock, robot, std::move(naming)};
+  boost::asio::awaitable<void> exchange(station::FluidNaming naming) {
+    station::ModelExchange exchange{clock, robot, std::move(naming)};
     const Result<void> result = co_await exchange.run();
     outcome = result;
   }
@@ -128,7 +128,7 @@ TEST_F(ModelExchangeTest, AConfirmationThatTelemetryDoesNotShowFails) {
 TEST_F(ModelExchangeTest, NothingIsSentToARobotThatMovesAndItIsWaitedForThirtySeconds) {
   robot.robot.context.mode = rheonaut_MODE_AUTO;
   start(some_model());
-  clock.run_for(ModelExchange::kPatience - 1s);
+  clock.run_for(station::ModelExchange::kPatience - 1s);
   EXPECT_FALSE(outcome.has_value());
   clock.run_for(2s);
   ASSERT_TRUE(outcome.has_value());
@@ -173,7 +173,7 @@ TEST_F(ModelExchangeTest, EndsWhenAnotherFluidIsNamedTheRobotBootsOrTheLinkBreak
   start(some_model());
   EXPECT_EQ(outcome->error().reason, "booted");
   robot.robot.boot_id = 7;
-  robot.robot.link = LinkState::disconnected;
+  robot.robot.link = station::LinkState::disconnected;
   start(some_model());
   EXPECT_EQ(outcome->error().reason, "not_connected");
   EXPECT_EQ(robot.sent.size(), 1U);

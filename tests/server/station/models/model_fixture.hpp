@@ -17,7 +17,7 @@ namespace server {
 class ModelSenderFixture : public LinkTest {
  protected:
   ModelSenderFixture() {
-    for (const auto& [name, value] : parameters_of(FluidModel{})) held[name] = value;
+    for (const auto& [name, value] : parameters_of(station::FluidModel{})) held[name] = value;
     held["model_confirmed"] = 0;
     models.put("water", some_model());
     tasks.spawn("control", station.watch_control());
@@ -102,17 +102,17 @@ class ModelSenderFixture : public LinkTest {
   void name_fluid(const std::string& fluid, const std::string& actor = "token:local") {
     ASSERT_TRUE(station.set_fluid("r1", fluid, {actor, "", clock.utc_us()}));
   }
-  const RobotModel& model() const { return station.find("r1")->model; }
+  const station::RobotModel& model() const { return station.find("r1")->model; }
   std::vector<std::string> events() const {
     std::vector<std::string> kinds;
-    for (const RobotEvent& event : sink.events) {
+    for (const station::RobotEvent& event : sink.events) {
       if (event.kind.starts_with("model_")) kinds.push_back(event.kind);
     }
     return kinds;
   }
   std::string latest_detail() const {
     std::string detail;
-    for (const RobotEvent& event : sink.events) {
+    for (const station::RobotEvent& event : sink.events) {
       if (event.kind.starts_with("model_")) detail = event.detail;
     }
     return detail;
@@ -124,8 +124,8 @@ class ModelSenderFixture : public LinkTest {
     return true;
   }
 
-  FluidModelList models;
-  ModelSender sender{loop, tasks, clock, station, models};
+  station::FluidModelList models;
+  station::ModelSender sender{loop, tasks, clock, station, models};
   TestRobot* robot = nullptr;
   std::map<std::string, float> held;
   std::map<std::string, float> bends;  // what the robot makes of whatever it is sent

@@ -8,35 +8,37 @@
 namespace server {
 namespace {
 
-FluidNaming named_water() { return {1, {"token:local", "", 0}, 7, "water", some_model()}; }
-FluidNaming named_nothing() { return {2, {"token:local", "", 0}, 7, "", std::nullopt}; }
+station::FluidNaming named_water() { return {1, {"token:local", "", 0}, 7, "water", some_model()}; }
+station::FluidNaming named_nothing() { return {2, {"token:local", "", 0}, 7, "", std::nullopt}; }
 
 TEST(ModelReportTest, AModelIsReportedWithItsFluidFitAndDateFromItsSendingOn) {
   const std::int64_t set_at_us = some_model().set_at_us;
-  EXPECT_EQ(model_on_its_way(named_water()), (RobotModel{ModelState::sending, "water", "", 0.002, set_at_us}));
-  EXPECT_EQ(confirmed_model("water", some_model()), (RobotModel{ModelState::confirmed, "water", "", 0.002, set_at_us}));
+  EXPECT_EQ(model_on_its_way(named_water()),
+            (station::RobotModel{station::ModelState::sending, "water", "", 0.002, set_at_us}));
+  EXPECT_EQ(confirmed_model("water", some_model()),
+            (station::RobotModel{station::ModelState::confirmed, "water", "", 0.002, set_at_us}));
   const Error error{ErrorCode::timed_out, "the motor is on", "motor_on"};
   EXPECT_EQ(failed_model(named_water(), error),
-            (RobotModel{ModelState::failed, "water", "the motor is on", 0.002, set_at_us}));
+            (station::RobotModel{station::ModelState::failed, "water", "the motor is on", 0.002, set_at_us}));
 }
 
 TEST(ModelReportTest, WhatIsTakenBackIsOfNoFluid) {
   const Error error{ErrorCode::timed_out, "the motor is on", "motor_on"};
   EXPECT_EQ(model_on_its_way(named_nothing()),
-            (RobotModel{ModelState::sending, "", "what was confirmed before is taken back", {}, 0}));
+            (station::RobotModel{station::ModelState::sending, "", "what was confirmed before is taken back", {}, 0}));
   EXPECT_EQ(failed_model(named_nothing(), error).reason,
             "what was confirmed before is not taken back yet: the motor is on");
   EXPECT_EQ(failed_model(named_nothing(), error).fluid, "");
-  EXPECT_EQ(model_to_be_taken_back().reason, "what was confirmed before is not taken back yet");
-  EXPECT_EQ(model_confirmed_by_command().fluid, "");
+  EXPECT_EQ(station::model_to_be_taken_back().reason, "what was confirmed before is not taken back yet");
+  EXPECT_EQ(station::model_confirmed_by_command().fluid, "");
 }
 
 TEST(ModelReportTest, ARobotWithoutAModelOfItsFluidIsToldWhy) {
-  FluidModelList models;
+  station::FluidModelList models;
   models.put("water", some_model());
   EXPECT_EQ(unsent_model(models, "water").reason, "name the fluid again to send its model");
   EXPECT_EQ(unsent_model(models, "non_newtonian").reason, "there is no model of 'non_newtonian'");
-  EXPECT_EQ(unsent_model(models, ""), RobotModel{});
+  EXPECT_EQ(unsent_model(models, ""), station::RobotModel{});
 }
 
 TEST(ModelReportTest, EventsNameTheFluidAndWhoeverNamedIt) {

@@ -18,13 +18,13 @@ using ::testing::Not;
 class ModelSenderTest : public ModelSenderFixture {};
 
 // A sink that fails once, as nothing in the station should.
-class FailsOnce final : public StationSink {
+class FailsOnce final : public station::StationSink {
  public:
-  void on_command(const CommandRecord& record) override {
-    if (record.state == CommandState::queued && std::exchange(at_command, false)) fail();
+  void on_command(const station::CommandRecord& record) override {
+    if (record.state == station::CommandState::queued && std::exchange(at_command, false)) fail();
   }
-  void on_robot(const RobotState& robot) override {
-    if (robot.model.state == ModelState::confirmed && std::exchange(at_confirmed, false)) fail();
+  void on_robot(const station::RobotState& robot) override {
+    if (robot.model.state == station::ModelState::confirmed && std::exchange(at_confirmed, false)) fail();
   }
   bool at_command = false, at_confirmed = false;
 
@@ -35,15 +35,15 @@ class FailsOnce final : public StationSink {
 TEST_F(ModelSenderTest, WhatTheRobotDoesNotHoldYetIsSentAndThenConfirmed) {
   held["model_time_constant_2_s"] = 1;
   begin();
-  EXPECT_EQ(model(), RobotModel{});
+  EXPECT_EQ(model(), station::RobotModel{});
   name_fluid("water");
-  EXPECT_EQ(model().state, ModelState::sending);
+  EXPECT_EQ(model().state, station::ModelState::sending);
   EXPECT_EQ(model().fluid, "water");
   live(5s);
   EXPECT_THAT(sent, ElementsAre("model_gain_1_m_s", "model_gain_2_m_s", "model_gain_3_m_s", "model_time_constant_1_s",
                                 "model_time_constant_3_s", "model_time_constant_4_s", "model_confirmed"));
   EXPECT_TRUE(holds_water());
-  EXPECT_EQ(model().state, ModelState::confirmed) << model().reason;
+  EXPECT_EQ(model().state, station::ModelState::confirmed) << model().reason;
   EXPECT_EQ(model().fluid, "water");
   EXPECT_EQ(model().fit_error, 0.002);
   EXPECT_EQ(model().set_at_us, some_model().set_at_us);
@@ -61,7 +61,7 @@ TEST_F(ModelSenderTest, OfParametersThatHoldOnlyTheConfirmationIsSent) {
   name_fluid("water");
   live(2s);
   EXPECT_THAT(sent, ElementsAre("model_confirmed"));
-  EXPECT_EQ(model().state, ModelState::confirmed);
+  EXPECT_EQ(model().state, station::ModelState::confirmed);
 }
 
 // SAFETY's test: what is read back, and not what was sent, is confirmed.
@@ -71,7 +71,7 @@ TEST_F(ModelSenderTest, AValueThatComesBackOtherwiseIsNeverConfirmed) {
   name_fluid("water");
   live(10s);
   EXPECT_THAT(sent, Not(Contains("model_confirmed")));
-  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().state, station::ModelState::failed);
   EXPECT_THAT(model().reason, HasSubstr("model_gain_2_m_s = -0.5 was sent, and the robot holds -0.49999997"));
   EXPECT_THAT(events(), ElementsAre("model_not_confirmed"));
   EXPECT_THAT(latest_detail(), HasSubstr("the model of 'water' could not be sent"));
@@ -82,7 +82,7 @@ TEST_F(ModelSenderTest, WhatTelemetryDoesNotShowIsNotConfirmed) {
   begin();
   name_fluid("water");
   live(8s);
-  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().state, station::ModelState::failed);
   EXPECT_THAT(model().reason, HasSubstr("telemetry does not show it"));
 }
 
@@ -93,7 +93,7 @@ TEST_F(ModelSenderTest, ARobotThatMovesIsWaitedForAndThenGivenUp) {
   live(200ms);
   name_fluid("water");
   live(10s);
-  EXPECT_EQ(model().state, ModelState::sending);
+  EXPECT_EQ(model().state, station::ModelState::sending);
   EXPECT_EQ(refused, 0) << "nothing is sent to a robot that is seen to move";
   mode = rheonaut_MODE_MANUAL;
   duty = 0;
@@ -102,14 +102,14 @@ TEST_F(ModelSenderTest, ARobotThatMovesIsWaitedForAndThenGivenUp) {
   EXPECT_GT(refused, 0);
   is_coasting = false;
   live(5s);
-  EXPECT_EQ(model().state, ModelState::confirmed);
+  EXPECT_EQ(model().state, station::ModelState::confirmed);
 
   models.put("water", some_model(0.5F));
   duty = 0.1F;
   live(200ms);
   name_fluid("water");
-  live(ModelExchange::kPatience + 1s);
-  EXPECT_EQ(model().state, ModelState::failed);
+  live(station::ModelExchange::kPatience + 1s);
+  EXPECT_EQ(model().state, station::ModelState::failed);
   EXPECT_THAT(model().reason, HasSubstr("the motor is on"));
   duty = 0;
   live(10s);
@@ -121,7 +121,7 @@ TEST_F(ModelSenderTest, ARobotThatIsAwayIsNotSentAModelLater) {
   robot->link.cut();
   clock.run_for(1s);
   name_fluid("water");
-  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().state, station::ModelState::failed);
   EXPECT_EQ(model().reason, "the robot was not connected; name the fluid again");
   begin(77, seq);
   live(5s);
@@ -132,14 +132,14 @@ TEST_F(ModelSenderTest, AfterABootTheModelIsAssumedUntilTheFluidIsNamedAgain) {
   begin();
   name_fluid("water");
   live(5s);
-  ASSERT_EQ(model().state, ModelState::confirmed);
+  ASSERT_EQ(model().state, station::ModelState::confirmed);
   robot->link.cut();
   clock.run_for(1s);
-  EXPECT_EQ(model().state, ModelState::confirmed) << "it may be back in the same boot";
+  EXPECT_EQ(model().state, station::ModelState::confirmed) << "it may be back in the same boot";
   held["model_confirmed"] = 0;
   begin(78);
   live(2s);
-  EXPECT_EQ(model().state, ModelState::assumed);
+  EXPECT_EQ(model().state, station::ModelState::assumed);
   EXPECT_EQ(model().reason, "the robot has booted: name its fluid again");
   const std::size_t before = sent.size();
   live(5s);
@@ -147,7 +147,7 @@ TEST_F(ModelSenderTest, AfterABootTheModelIsAssumedUntilTheFluidIsNamedAgain) {
   name_fluid("water");
   live(2s);
   EXPECT_EQ(sent.back(), "model_confirmed");
-  EXPECT_EQ(model().state, ModelState::confirmed);
+  EXPECT_EQ(model().state, station::ModelState::confirmed);
 }
 
 TEST_F(ModelSenderTest, TheFluidThatIsNamedLastCounts) {
@@ -159,26 +159,26 @@ TEST_F(ModelSenderTest, TheFluidThatIsNamedLastCounts) {
   name_fluid("non_newtonian");
   live(5s);
   EXPECT_EQ(model().fluid, "non_newtonian");
-  EXPECT_EQ(model().state, ModelState::confirmed);
+  EXPECT_EQ(model().state, station::ModelState::confirmed);
   EXPECT_EQ(held["model_gain_1_m_s"], 0.75F);
   EXPECT_THAT(events(), ElementsAre("model_confirmed"));
 }
 
 TEST_F(ModelSenderTest, WhoIsNotInControlSendsNothing) {
   begin();
-  ASSERT_TRUE(station.control({"r1", "session:1", "", ControlAction::take, 60s, ""}));
+  ASSERT_TRUE(station.control({"r1", "session:1", "", station::ControlAction::take, 60s, ""}));
   EXPECT_FALSE(station.set_fluid("r1", "water", {"session:2", "", 0}));
   live(2s);
   name_fluid("water", "session:1");
   live(250ms);
   const std::size_t before = sent.size();
   ASSERT_GT(before, 0U);
-  ASSERT_TRUE(station.control({"r1", "session:3", "", ControlAction::force, 60s, "a test"}));
+  ASSERT_TRUE(station.control({"r1", "session:3", "", station::ControlAction::force, 60s, "a test"}));
   live(5s);
-  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().state, station::ModelState::failed);
   EXPECT_THAT(model().reason, HasSubstr("controlled by session:3"));
-  ASSERT_TRUE(station.control({"r1", "session:3", "", ControlAction::take, 60s, ""}));
-  const RobotModel now = model();
+  ASSERT_TRUE(station.control({"r1", "session:3", "", station::ControlAction::take, 60s, ""}));
+  const station::RobotModel now = model();
   ASSERT_TRUE(station.set_fluid("r1", "water", {"session:2", "", 0})) << "no change";
   live(2s);
   EXPECT_EQ(model(), now);
@@ -193,7 +193,7 @@ TEST_F(ModelSenderTest, TakesNoControlForTheActorThatNamedTheFluid) {
   EXPECT_EQ(station.find("r1")->control.holder, "");
   is_coasting = false;
   live(5s);
-  EXPECT_EQ(model().state, ModelState::confirmed);
+  EXPECT_EQ(model().state, station::ModelState::confirmed);
   EXPECT_EQ(station.find("r1")->control.holder, "");
 }
 
@@ -209,7 +209,7 @@ TEST_F(ModelSenderTest, WhatIsChangedWhileTheConfirmationWaitsIsNotConfirmed) {
   change("model_gain_1_m_s", 0.3F);
   live(5s);
   EXPECT_THAT(sent, Not(Contains("model_confirmed")));
-  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().state, station::ModelState::failed);
   EXPECT_THAT(model().reason, HasSubstr("somebody else changed one"));
 }
 
@@ -217,7 +217,7 @@ class FailingModelTest : public ModelSenderFixture {
  protected:
   FailingModelTest() { station.add_sink(failing); }
   void expect_contained() {
-    EXPECT_EQ(tasks.exceptions().count(Ended::model), 1U);
+    EXPECT_EQ(tasks.exceptions().count(runtime::Ended::model), 1U);
     EXPECT_TRUE(log.has("the model of robot 'r1': no room for it")) << log.text();
     EXPECT_EQ(tasks.exit_code(), 0);
     EXPECT_FALSE(tasks.stopping());
@@ -233,12 +233,12 @@ TEST_F(FailingModelTest, AFaultWhileTheModelIsSentFailsThatModelAlone) {
   name_fluid("water");
   live(1s);
   expect_contained();
-  EXPECT_EQ(model().state, ModelState::failed);
+  EXPECT_EQ(model().state, station::ModelState::failed);
   EXPECT_EQ(model().reason, "a fault of the station; its log says which");
   EXPECT_THAT(events(), ElementsAre("model_not_confirmed"));
   name_fluid("water");
   live(5s);
-  EXPECT_EQ(model().state, ModelState::confirmed) << model().reason;
+  EXPECT_EQ(model().state, station::ModelState::confirmed) << model().reason;
 }
 
 TEST_F(FailingModelTest, AFaultAtItsEndStopsNothing) {
@@ -249,7 +249,7 @@ TEST_F(FailingModelTest, AFaultAtItsEndStopsNothing) {
   expect_contained();
   name_fluid("");
   live(5s);
-  EXPECT_EQ(model().state, ModelState::assumed) << "it goes on with the next fluid";
+  EXPECT_EQ(model().state, station::ModelState::assumed) << "it goes on with the next fluid";
 }
 
 TEST_F(FailingModelTest, AFaultWhileWhatTheRobotReportsIsFollowedStopsNothing) {
@@ -262,7 +262,7 @@ TEST_F(FailingModelTest, AFaultWhileWhatTheRobotReportsIsFollowedStopsNothing) {
   expect_contained();
   held["model_confirmed"] = 0;
   live(1s);
-  EXPECT_EQ(model().state, ModelState::assumed) << "it goes on to follow";
+  EXPECT_EQ(model().state, station::ModelState::assumed) << "it goes on to follow";
 }
 
 }  // namespace

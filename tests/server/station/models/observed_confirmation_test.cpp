@@ -9,7 +9,7 @@ namespace {
 constexpr std::int64_t kSecondUs = 1'000'000;
 
 TEST(ObservedConfirmationTest, OnlyAnotherFlagOrBootIsNew) {
-  ObservedConfirmation seen;
+  station::ObservedConfirmation seen;
   EXPECT_FALSE(seen.flag().has_value());
   EXPECT_TRUE(seen.on_flag(7, false, 0));
   EXPECT_FALSE(seen.on_flag(7, false, 1));
@@ -19,7 +19,7 @@ TEST(ObservedConfirmationTest, OnlyAnotherFlagOrBootIsNew) {
 }
 
 TEST(ObservedConfirmationTest, AFlagThatWasNotKnownBeforeWasNotSeenToRise) {
-  ObservedConfirmation seen;
+  station::ObservedConfirmation seen;
   seen.on_flag(7, true, 0);
   EXPECT_FALSE(seen.was_seen_to_rise());
   seen.on_flag(7, false, 1);
@@ -31,7 +31,7 @@ TEST(ObservedConfirmationTest, AFlagThatWasNotKnownBeforeWasNotSeenToRise) {
 
 // SAFETY's test: what happened while the link was cut, nobody knows.
 TEST(ObservedConfirmationTest, ALostLinkLeavesNoFlag) {
-  ObservedConfirmation seen;
+  station::ObservedConfirmation seen;
   seen.on_flag(7, false, 0);
   seen.on_disconnected();
   EXPECT_FALSE(seen.flag().has_value());
@@ -40,7 +40,7 @@ TEST(ObservedConfirmationTest, ALostLinkLeavesNoFlag) {
 }
 
 TEST(ObservedConfirmationTest, AFlagIsOlderThanAPageUntilASampleAfterItOrForFiveSeconds) {
-  ObservedConfirmation seen;
+  station::ObservedConfirmation seen;
   seen.on_flag(7, true, 0);
   EXPECT_FALSE(seen.is_older_than_page(100, 10 * kSecondUs)) << "there is none";
   seen.on_page(100, 10 * kSecondUs);
@@ -52,7 +52,7 @@ TEST(ObservedConfirmationTest, AFlagIsOlderThanAPageUntilASampleAfterItOrForFive
 }
 
 TEST(ObservedConfirmationTest, AFlagIsNewForFiveSeconds) {
-  ObservedConfirmation seen;
+  station::ObservedConfirmation seen;
   seen.on_flag(7, true, kSecondUs);
   seen.on_flag(7, true, 3 * kSecondUs);  // the same
   EXPECT_TRUE(seen.is_new(6 * kSecondUs - 1));

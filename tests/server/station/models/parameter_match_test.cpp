@@ -17,7 +17,7 @@ TEST(ParameterMatchTest, AllEightMustBeReportedToHoldAModel) {
   values.erase("model_gain_4_m_s");
   EXPECT_FALSE(holds(table_of(values), some_model()));
   EXPECT_FALSE(holds_another(table_of(values), some_model())) << "nothing speaks against it";
-  EXPECT_FALSE(holds(ParameterTable{}, some_model()));
+  EXPECT_FALSE(holds(station::ParameterTable{}, some_model()));
 }
 
 // SAFETY's test: the nearest float is another model.

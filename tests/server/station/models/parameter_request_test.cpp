@@ -7,8 +7,8 @@ namespace server {
 namespace {
 
 TEST(ParameterRequestTest, NamesWhoeverNamedTheFluidAndTakesNoControl) {
-  const CommandRequest request =
-      set_parameter_request("r1", {"user:anna", "10.0.0.7", 5}, "model_time_constant_1_s", 0.1F);
+  const station::CommandRequest request =
+      station::set_parameter_request("r1", {"user:anna", "10.0.0.7", 5}, "model_time_constant_1_s", 0.1F);
   EXPECT_EQ(request.robot_id, "r1");
   EXPECT_EQ(request.actor, "user:anna");
   EXPECT_EQ(request.peer, "10.0.0.7");
@@ -19,9 +19,9 @@ TEST(ParameterRequestTest, NamesWhoeverNamedTheFluidAndTakesNoControl) {
 }
 
 TEST(ParameterRequestTest, IsRecordedWithShortDecimals) {
-  EXPECT_EQ(set_parameter_request("r1", {}, "model_gain_1_m_s", 0.1F).arguments,
+  EXPECT_EQ(station::set_parameter_request("r1", {}, "model_gain_1_m_s", 0.1F).arguments,
             R"({"name":"model_gain_1_m_s","value":0.1})");
-  EXPECT_EQ(set_parameter_request("r1", {}, "model_confirmed", 1).arguments,
+  EXPECT_EQ(station::set_parameter_request("r1", {}, "model_confirmed", 1).arguments,
             R"({"name":"model_confirmed","value":1.0})");
 }
 

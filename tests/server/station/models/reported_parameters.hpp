@@ -10,8 +10,8 @@
 
 namespace server {
 
-inline FluidModel some_model(float first_gain = 0.25F) {
-  FluidModel model;
+inline station::FluidModel some_model(float first_gain = 0.25F) {
+  station::FluidModel model;
   model.gain_m_s = {first_gain, -0.5F, 0.1F, 0};
   model.time_constant_s = {0.1F, 1, 5, 15};
   model.fit_error = 0.002;
@@ -20,12 +20,12 @@ inline FluidModel some_model(float first_gain = 0.25F) {
   return model;
 }
 
-inline std::map<std::string, float> values_of(const FluidModel& model) {
+inline std::map<std::string, float> values_of(const station::FluidModel& model) {
   const auto parameters = parameters_of(model);
   return {parameters.begin(), parameters.end()};
 }
 
-inline void report(ParameterTable& table, const std::string& name, float value) {
+inline void report(station::ParameterTable& table, const std::string& name, float value) {
   protocol::ParameterPage page = rheonaut_ParameterPage_init_zero;
   page.total = 9;
   page.parameters_count = 1;
@@ -34,8 +34,8 @@ inline void report(ParameterTable& table, const std::string& name, float value) 
   table.add(page);
 }
 
-inline ParameterTable table_of(const std::map<std::string, float>& values) {
-  ParameterTable table;
+inline station::ParameterTable table_of(const std::map<std::string, float>& values) {
+  station::ParameterTable table;
   for (const auto& [name, value] : values) report(table, name, value);
   return table;
 }
