@@ -31,7 +31,7 @@ std::optional<Message> decode_any(const pb_msgdesc_t* fields, Bytes payload) {
 }
 
 // Part of decoding, as a length that does not fit is: the columns of a batch are one list of samples. What the numbers
-// say is judged by whoever receives them.
+// say is judged by the receiver.
 bool columns_agree(const Telemetry& batch) {
   const pb_size_t count = batch.position_m_count;
   return count > 0 && batch.velocity_m_s_count == count && batch.acceleration_m_s2_count == count &&

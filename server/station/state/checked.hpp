@@ -3,7 +3,7 @@
 // A frame is checked once, where it enters the station, and in two steps. protocol/messages decodes it: what has no
 // samples, or columns of different length, is no telemetry and does not decode. mend() in server/link/frame_faults
 // judges the numbers, and it alone makes a Checked. So what the station fills from one (SampleBatch, RobotEvent) has,
-// for whoever receives it:
+// for its receiver:
 //
 //   telemetry   1 to 25 samples; period_us 1 to kMaxPeriodUs; first_seq and first_robot_time_us ≤ kMaxRobotNumber;
 //               oldest_seq ≤ first_seq

@@ -28,9 +28,9 @@ TEST(LiveLog, OfRenewalsOfLeasesOnlyARefusedOneIsSent) {
   live::Subscriber listener{loop};
   live.add(listener);
   const auto heard = [&] { return messages_of(listener); };
-  live::Subscriber choosy{loop};
-  live.add(choosy);
-  live.watch(choosy, {"r1"});
+  live::Subscriber filtered{loop};
+  live.add(filtered);
+  live.watch(filtered, {"r1"});
   station::CommandRecord renewal;
   renewal.robot_id = "r1";
   renewal.kind = "renew_lease";
@@ -56,7 +56,7 @@ TEST(LiveLog, OfRenewalsOfLeasesOnlyARefusedOneIsSent) {
   renew(station::CommandState::unknown, "no_answer");
   EXPECT_EQ(heard().at(0)["command"]["state"], "unknown") << "it may not have been renewed";
   clock.run_for(100ms);
-  const auto logged = messages_of(choosy);
+  const auto logged = messages_of(filtered);
   ASSERT_EQ(logged.at(0)["type"], "log");
   EXPECT_EQ(logged[0]["commands"].size(), 4U);
   tasks.stop();

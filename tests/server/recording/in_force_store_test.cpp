@@ -25,7 +25,7 @@ class InForceStoreTest : public RecordingTest {
     controller.kp = kp;
     return controller;
   }
-  // The kind, the first sample, and what tells the documents of these tests apart.
+  // The kind, the first sample, and the part in which the documents of these tests differ.
   std::vector<std::string> in_force() {
     wait(recorder_->flush_records());
     return rows(
