@@ -42,7 +42,7 @@ static int serve(const config::Config& config) {
   station.add_sink(live);
   const storage::RestoredState restored = runtime::run_first(loop, recording.open());
   station.restore(restored.robots, restored.pending_stops);
-  // In: robots arrive here; each session becomes the station's RobotPort. Robots are sent the model of their fluid.
+  // In: robots arrive here; each session becomes the station's RobotLink. Robots are sent the model of their fluid.
   const auto at = config::parse_endpoint(config.robots);
   link::RobotListener robots{
       loop, clock, tasks, station, recording.recorder, at, config.robots_or_any_port, security.robots()};

@@ -38,15 +38,22 @@ class TidyTest(unittest.TestCase):
 
     def findings(self, *files):
         for entry in self.commands.values():
-            entry["command"] = tidy.PRECOMPILED.sub("", entry["command"])  # which this tree does not have
+            for each in ("command", "unit_command"):
+                entry[each] = tidy.PRECOMPILED.sub("", entry[each])  # which this tree does not have
         return "\n".join(tidy.findings(files, self.commands))
 
     def test_a_file_of_a_group_is_looked_at_by_itself(self):
         self.assertEqual(set(self.commands), {"base/good.cpp", "base/bad.cpp"})
         self.assertIn(f"-c {self.root}/base/bad.cpp", self.commands["base/bad.cpp"]["command"])
 
+    def test_a_group_that_is_asked_for_whole_is_read_once(self):
+        both = ["base/good.cpp", "base/bad.cpp"]
+        self.assertEqual(list(tidy.units_of(both, self.commands)), [(str(self.group), both)])
+        self.assertEqual(list(tidy.units_of(both[:1], self.commands)), [(f"{self.root}/base/good.cpp", both[:1])])
+
     def test_a_wrong_name_is_an_error(self):
         self.assertEqual(self.findings("base/good.cpp"), "")
+        self.assertRegex(self.findings("base/bad.cpp"), "bad.cpp.*error: invalid case style for function")
         self.assertRegex(self.findings("base/good.cpp", "base/bad.cpp"), "bad.cpp.*error: invalid case style for function")
 
     def test_a_header_compiles_on_its_own(self):

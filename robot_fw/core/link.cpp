@@ -36,10 +36,10 @@ void Link::welcomed(const protocol::Welcome& welcome, std::uint32_t default_time
   sent_at_us_ = now_us;
 }
 
-std::optional<float> Link::heard(std::uint64_t now_us) {
+std::optional<float> Link::frame_received(std::uint64_t now_us) {
   connection_at_us_ = now_us;
-  const std::uint64_t silence_us = elapsed_us(heard_at_us_, now_us);
-  heard_at_us_ = now_us;
+  const std::uint64_t silence_us = elapsed_us(received_at_us_, now_us);
+  received_at_us_ = now_us;
   established_ = true;
   if (!lost_) return std::nullopt;
   lost_ = false;
@@ -47,7 +47,7 @@ std::optional<float> Link::heard(std::uint64_t now_us) {
 }
 
 bool Link::goes_lost(std::uint64_t now_us) {
-  if (!established_ || lost_ || elapsed_us(heard_at_us_, now_us) <= timeout_us_) return false;
+  if (!established_ || lost_ || elapsed_us(received_at_us_, now_us) <= timeout_us_) return false;
   lost_ = true;
   return true;
 }

@@ -20,7 +20,7 @@ class Link {
   // Uses the station's time-outs, within bounds; the link is up from now on.
   void welcomed(const protocol::Welcome& welcome, std::uint32_t default_timeout_ms, std::uint64_t now_us);
   // Any frame of a link that is up. Returns the seconds without link when this restores a lost one.
-  std::optional<float> heard(std::uint64_t now_us);
+  std::optional<float> frame_received(std::uint64_t now_us);
   // The bytes of this connection, see FrameReader.
   protocol::FrameReader::State push(protocol::Bytes& bytes) { return reader_.push(bytes); }
   protocol::Bytes payload() const { return reader_.payload(); }
@@ -42,7 +42,7 @@ class Link {
   Phase phase_ = Phase::closed;
   bool established_ = false;  // was up once in this boot
   bool lost_ = false;
-  std::uint64_t heard_at_us_ = 0;       // last frame of a link that was up
+  std::uint64_t received_at_us_ = 0;    // last frame of a link that was up
   std::uint64_t connection_at_us_ = 0;  // opened, or last frame on this connection
   std::uint64_t sent_at_us_ = 0;
   std::uint64_t timeout_us_ = protocol::kDefaultLinkTimeoutMs * 1000ULL;

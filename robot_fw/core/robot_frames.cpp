@@ -69,7 +69,7 @@ bool Robot::on_welcome(const protocol::Welcome& welcome) {
 }
 
 void Robot::station_heard() {
-  const auto silence_s = channel_.heard(now_us_);
+  const auto silence_s = channel_.frame_received(now_us_);
   if (silence_s) pilot_.link_restored();
   if (silence_s) note(rheonaut_EVENT_KIND_LINK_RESTORED, rheonaut_EVENT_CAUSE_NONE, *silence_s);
 }

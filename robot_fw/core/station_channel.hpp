@@ -47,7 +47,7 @@ class StationChannel {
     outbox_.welcomed(samples_, events_);
   }
   // Any frame of a link that is up. The seconds without link when this restores a lost one.
-  std::optional<float> heard(std::uint64_t now_us) { return link_.heard(now_us); }
+  std::optional<float> frame_received(std::uint64_t now_us) { return link_.frame_received(now_us); }
   void on_heartbeat(const protocol::StationHeartbeat& heartbeat, std::uint64_t now_us);
 
   // Once per tick. A sample leaves at once, with all before it, when a batch value changed or something happened.

@@ -78,8 +78,9 @@ void Bno055::start_up(std::uint64_t now_us) {
       return enter(Phase::configuring, now_us, kToConfigModeUs);
     }
     case Phase::configuring: {
-      const bool told = write_register(kUnitsAt, kMetresPerSecondSquared) && write_register(kModeAt, kImuPlusMode);
-      if (!told) return restart(now_us, kRetryUs);
+      const bool is_configured =
+          write_register(kUnitsAt, kMetresPerSecondSquared) && write_register(kModeAt, kImuPlusMode);
+      if (!is_configured) return restart(now_us, kRetryUs);
       return enter(Phase::starting, now_us, kFromConfigModeUs);
     }
     case Phase::starting: return enter(Phase::running, now_us, 0);

@@ -70,9 +70,9 @@ void Board::step() {
     return;
   }
   if (ticks_.due(clock_.now_us())) tick();
-  const bool heard = receive();
+  const bool received = receive();
   transmit();
-  if (!heard) close_when_dead();
+  if (!received) close_when_dead();
   use_rest();
   led_.show(led_pattern(), clock_.now_us());
 }

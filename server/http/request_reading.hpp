@@ -26,8 +26,8 @@ Request plain_head(const RequestMessage& message);
 // The length of what follows the header is not known: Beast takes a coding that it does not know for no body at all.
 bool has_unknown_length(const RequestParser& parser);
 
-// Whether the connection can go on behind a body that nobody needs. Told what became of its request, a client that
-// expects 100-continue may leave the body out; what follows may then be either.
+// Whether the connection can go on behind a body that nobody needs. Once it has its answer, a client that
+// expects 100-continue may leave the body out; what follows may then be the body or the next request.
 bool can_pass_over_body(const RequestParser& parser);
 
 // The message with the fields of its header alone: Beast adds the trailers of a chunked body to them.

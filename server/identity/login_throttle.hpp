@@ -1,7 +1,7 @@
 // Delays repeated failed logins, by user and by address.
 //
 // After some failures each further attempt has to wait twice as long as the one before, up to a limit; a quarter of an
-// hour without attempts forgets them. For a user the wait is short, since a stranger can cause it; for an address it is
+// hour without attempts forgets them. For a user the wait is short, since anyone can cause it; for an address it is
 // long. Names and addresses fall into a fixed number of places, by a hash with a key that nobody knows: nothing grows,
 // an unknown user is treated as a known one, and nobody can aim at another's place.
 // SAFETY: it stands in front of passwords only. Who is signed in, a token and a one-time link never meet it.

@@ -3,7 +3,7 @@
 //   Hello → (Station::may_connect, RobotArchive::admit) → Welcome → { reader ‖ writer ‖ watch }
 //
 // greeting.hpp has the greeting, robot_outbox.hpp decides what is sent next. Loop thread. Owns its stream;
-// lives in the coroutine RobotListener::session and is the Station's RobotPort while it is welcome.
+// lives in the coroutine RobotListener::session and is the Station's RobotLink while it is welcome.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
@@ -18,7 +18,7 @@
 #include "server/net/byte_stream.hpp"
 #include "server/runtime/clock.hpp"
 #include "server/station/state/robot_archive.hpp"
-#include "server/station/state/robot_port.hpp"
+#include "server/station/state/robot_link.hpp"
 #include "server/station/station.hpp"
 
 namespace server::link {
@@ -29,7 +29,7 @@ struct ReadBuffers {
   protocol::RobotFrame frame;
 };
 
-class RobotSession final : public station::RobotPort {
+class RobotSession final : public station::RobotLink {
  public:
   static constexpr std::chrono::seconds kHelloTime{5};
 

@@ -70,7 +70,7 @@ asio::awaitable<Result<CommandRecord>> CommandTracker::follow(std::shared_ptr<Pe
 void CommandTracker::supersede_queued(RobotEntry& entry, const PendingCommand& newer) {
   std::vector<CommandId> older;
   for (const auto& [id, pending] : entry.commands.unanswered) {
-    if (is_superseded_by(*pending, newer.wire) && entry.port->withdraw(id)) older.push_back(id);
+    if (is_superseded_by(*pending, newer.wire) && entry.link->withdraw(id)) older.push_back(id);
   }
   for (const CommandId id : older) finish(entry, id, CommandState::superseded, "by_a_newer_command");
 }

@@ -30,7 +30,7 @@ class HeldBack {
 
 bool EmergencyStops::may_be_left_out(const RobotEntry& entry) const {
   const RobotState& robot = entry.robot;
-  if (robot.retired_at_us == 0 || entry.port != nullptr) return false;
+  if (robot.retired_at_us == 0 || entry.link != nullptr) return false;
   const std::int64_t heard_us = std::max(robot.last_received_steady_us, started_us_);
   return clock_.steady_us() - heard_us > kMayStillMove.count();
 }
@@ -46,7 +46,7 @@ std::shared_ptr<PendingCommand> EmergencyStops::begin(RobotEntry& entry, const S
   const CommandId id = command_id_of(entry.robot.id, stop_request.actor, stop_request.key);
   if (!recent_.find(id)) request.key = stop_request.key;
   const auto stop = make(entry, request);
-  stop->is_timed = entry.port != nullptr;
+  stop->is_timed = entry.link != nullptr;
   hand(entry, *stop, to_publish);  // SAFETY: the frame first, the record afterwards
   if (stop->record.state == CommandState::queued) to_publish.push_back(stop->record);
   return stop;
@@ -75,16 +75,16 @@ std::shared_ptr<PendingCommand> EmergencyStops::stop_in_force(RobotEntry& entry,
     if (is_same_press) return answered_before(loop_, recent->record);
   }
   const auto newest = entry.commands.newest_stop();
-  return entry.port == nullptr || entry.commands.stops() >= kMaxStops ? newest : nullptr;
+  return entry.link == nullptr || entry.commands.stops() >= kMaxStops ? newest : nullptr;
 }
 
 // SAFETY: the session writes it before anything else; what was queued for the robot never reaches it.
 void EmergencyStops::hand(RobotEntry& entry, PendingCommand& stop, std::vector<CommandRecord>& to_publish) {
-  if (entry.port == nullptr) return;
+  if (entry.link == nullptr) return;
   stop.handed_at_us = clock_.steady_us();
   {
     const HeldBack held_back{entry.commands, to_publish};
-    entry.port->send_emergency_stop(stop.wire);
+    entry.link->send_emergency_stop(stop.wire);
   }
   for (const CommandId id : entry.commands.queued()) {
     const auto superseded = entry.commands.take_unanswered(id);

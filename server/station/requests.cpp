@@ -45,7 +45,7 @@ Result<void> check_request(const CommandRequest& request, const protocol::Comman
     return fail(ErrorCode::invalid,
                 fmt::format("life_ms = {} is outside 1 to 10000", request.time_to_live.count() / 1000), "out_of_range");
   }
-  if (entry.port == nullptr) {
+  if (entry.link == nullptr) {
     return fail(ErrorCode::not_connected, fmt::format("robot '{}' is not connected", request.robot_id),
                 "not_connected");
   }
@@ -94,7 +94,7 @@ Result<std::shared_ptr<PendingCommand>> send_command(StationParts& parts, RobotE
   if (auto seen = parts.control.check_sight(request); !seen) return std::unexpected{seen.error()};
   if (auto reached = check_time(*pending, entry.robot); !reached) return std::unexpected{reached.error()};
   parts.tracker.supersede_queued(entry, *pending);
-  if (!is_clear || !entry.port->send(pending->wire, pending->deadline_us)) {
+  if (!is_clear || !entry.link->send(pending->wire, pending->deadline_us)) {
     return fail(ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),
                 "queue_full");
   }
@@ -155,7 +155,7 @@ asio::awaitable<Result<CommandRecord>> Station::emergency_stop(StopRequest reque
   std::shared_ptr<PendingCommand> stop;
   const auto begin = [&](std::vector<CommandRecord>& made) { stop = parts_->stops.begin(*entry, request, made); };
   parts_->publish_stops_of(begin, &entry->robot);
-  const bool is_connected = entry->port != nullptr;
+  const bool is_connected = entry->link != nullptr;
   auto outcome = co_await parts_->tracker.follow(stop, false, patience);
   // The log can wait: it is written once the answer has gone.
   asio::post(parts_->loop, [request = std::move(request), record = *outcome, is_connected] {
@@ -176,7 +176,7 @@ asio::awaitable<StopsOfAll> Station::stop_all(StopRequest request, microseconds 
       continue;
     }
     try {
-      stops.emplace_back(parts_->stops.begin(entry, request, records), entry.port != nullptr);
+      stops.emplace_back(parts_->stops.begin(entry, request, records), entry.link != nullptr);
     } catch (const std::exception& error) {  // SAFETY: the others are stopped all the same
       spdlog::error("emergency stop of robot '{}': {}", id, error.what());
       outcome.failed.push_back(id);

@@ -11,7 +11,7 @@
 #include "server/station/commands/robot_commands.hpp"
 #include "server/station/event_limit.hpp"
 #include "server/station/reported_configuration.hpp"
-#include "server/station/state/robot_port.hpp"
+#include "server/station/state/robot_link.hpp"
 
 namespace server::station {
 
@@ -34,7 +34,7 @@ struct RobotEntry {
   }
 
   RobotState& robot;
-  RobotPort* port = nullptr;  // null while disconnected
+  RobotLink* link = nullptr;  // null while disconnected
   RobotCommands commands;
   OrderTimeline orders;
   TimedOrders timed;

@@ -34,11 +34,11 @@ Result<void> Station::may_connect(const RobotId& id, BootId boot_id) const {
   return parts_->robots.may_connect(id, boot_id, parts_->clock.steady_us(), timeout_us);
 }
 
-void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const protocol::Hello& details,
+void Station::on_connected(RobotLink& link, const AdmissionRequest& hello, const protocol::Hello& details,
                            const Admission& admission, const std::string& peer) {
   RobotEntry& entry = parts_->robots.add(hello.robot_id);
   RobotState& robot = entry.robot;
-  if (RobotPort* previous = RobotTable::connect(entry, port); previous != nullptr) {
+  if (RobotLink* previous = RobotTable::connect(entry, link); previous != nullptr) {
     previous->close(fmt::format("replaced by a connection from {}", peer));
     parts_->notifier.note(robot, "connection_replaced", fmt::format("{} takes the place of {}", peer, robot.peer));
   }
@@ -54,8 +54,8 @@ void Station::on_connected(RobotPort& port, const AdmissionRequest& hello, const
   parts_->notifier.publish(robot);
 }
 
-void Station::on_disconnected(RobotPort& port, const std::string& reason) {
-  RobotEntry* entry = RobotTable::of(port);
+void Station::on_disconnected(RobotLink& link, const std::string& reason) {
+  RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;  // another connection has taken its place
   RobotTable::disconnect(*entry);
   RobotState& robot = entry->robot;
@@ -87,8 +87,8 @@ void Station::on_enrolment_refused(const RobotId& id, const std::string& peer, c
   parts_->notifier.note(unknown, "enrolment_refused", fmt::format("{}: {}{}", peer, detail, more));
 }
 
-void Station::on_frame(RobotPort& port, std::uint64_t robot_time_us) {
-  RobotEntry* entry = RobotTable::of(port);
+void Station::on_frame(RobotLink& link, std::uint64_t robot_time_us) {
+  RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   RobotState& robot = entry->robot;
   robot.last_received_at_us = parts_->clock.utc_us();
@@ -99,8 +99,8 @@ void Station::on_frame(RobotPort& port, std::uint64_t robot_time_us) {
   parts_->publish_stops_of([&](std::vector<CommandRecord>& made) { parts_->stops.repeat(*entry, made); });
 }
 
-void Station::on_samples(RobotPort& port, Checked<protocol::Telemetry> telemetry) {
-  RobotEntry* entry = RobotTable::of(port);
+void Station::on_samples(RobotLink& link, Checked<protocol::Telemetry> telemetry) {
+  RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   RobotState& robot = entry->robot;
   SampleBatch& batch = parts_->batch;
@@ -119,16 +119,16 @@ void Station::on_samples(RobotPort& port, Checked<protocol::Telemetry> telemetry
   parts_->tracker.settle_unanswered(*entry, batch);
 }
 
-void Station::on_event(RobotPort& port, Checked<protocol::Event> event) {
-  RobotEntry* entry = RobotTable::of(port);
+void Station::on_event(RobotLink& link, Checked<protocol::Event> event) {
+  RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   parts_->notifier.publish(entry->robot, event_of(entry->robot, event));
   entry->orders.note_event(*event);
   parts_->tracker.on_event(*entry, *event);
 }
 
-void Station::on_invalid_values(RobotPort& port, std::uint64_t count, const char* cause, const std::string& first) {
-  RobotEntry* entry = RobotTable::of(port);
+void Station::on_invalid_values(RobotLink& link, std::uint64_t count, const char* cause, const std::string& first) {
+  RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   parts_->invalid_values += count;
   entry->robot.invalid_values += count;
@@ -139,31 +139,31 @@ void Station::on_invalid_values(RobotPort& port, std::uint64_t count, const char
   parts_->notifier.note(entry->robot, "invalid_value", std::move(detail), cause);
 }
 
-void Station::on_unusable_samples(RobotPort& port, const protocol::Telemetry& telemetry) {
-  const RobotEntry* entry = RobotTable::of(port);
+void Station::on_unusable_samples(RobotLink& link, const protocol::Telemetry& telemetry) {
+  const RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   const std::uint64_t next_seq = telemetry.first_seq + telemetry.position_m_count;
   parts_->notifier.publish_unusable_samples(entry->robot, telemetry.first_seq, next_seq);
 }
 
-void Station::on_unusable_event(RobotPort& port, const protocol::Event& event) {
-  const RobotEntry* entry = RobotTable::of(port);
+void Station::on_unusable_event(RobotLink& link, const protocol::Event& event) {
+  const RobotEntry* entry = RobotTable::of(link);
   if (entry != nullptr) parts_->notifier.publish_unusable_event(entry->robot, event.event_seq);
 }
 
-void Station::on_status(RobotPort& port, const protocol::Status& status) {
-  RobotEntry* entry = RobotTable::of(port);
+void Station::on_status(RobotLink& link, const protocol::Status& status) {
+  RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   entry->robot.status = status;
   parts_->notifier.publish(entry->robot);
 }
 
-void Station::on_command_sent(RobotPort& port, CommandId id) {
-  if (RobotEntry* entry = RobotTable::of(port)) parts_->tracker.on_sent(*entry, id);
+void Station::on_command_sent(RobotLink& link, CommandId id) {
+  if (RobotEntry* entry = RobotTable::of(link)) parts_->tracker.on_sent(*entry, id);
 }
 
-void Station::on_command_ack(RobotPort& port, const protocol::CommandAck& ack) {
-  RobotEntry* entry = RobotTable::of(port);
+void Station::on_command_ack(RobotLink& link, const protocol::CommandAck& ack) {
+  RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   const auto pending = parts_->tracker.find_answered(*entry, ack);
   if (pending == nullptr) return;
@@ -178,8 +178,8 @@ void Station::on_command_ack(RobotPort& port, const protocol::CommandAck& ack) {
   parts_->notifier.publish(entry->robot);
 }
 
-void Station::on_clock(RobotPort& port, const ClockExchange& exchange) {
-  RobotEntry* entry = RobotTable::of(port);
+void Station::on_clock(RobotLink& link, const ClockExchange& exchange) {
+  RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   RobotState& robot = entry->robot;
   const std::int64_t utc_minus_steady_us = parts_->clock.utc_us() - parts_->clock.steady_us();
@@ -191,8 +191,8 @@ void Station::on_clock(RobotPort& port, const ClockExchange& exchange) {
   if (report.record) parts_->notifier.publish(robot, *report.record);
 }
 
-void Station::on_parameters(RobotPort& port, const protocol::ParameterPage& page) {
-  RobotEntry* entry = RobotTable::of(port);
+void Station::on_parameters(RobotLink& link, const protocol::ParameterPage& page) {
+  RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   RobotState& robot = entry->robot;
   if (const auto record = entry->reported.add(page, moment_of(*entry, parts_->clock))) {
@@ -207,8 +207,8 @@ void Station::on_parameters(RobotPort& port, const protocol::ParameterPage& page
   parts_->tracker.on_read_back(*entry, sent, read_back(commands_of(sent), page));
 }
 
-void Station::on_controller(RobotPort& port, const protocol::Controller& controller) {
-  RobotEntry* entry = RobotTable::of(port);
+void Station::on_controller(RobotLink& link, const protocol::Controller& controller) {
+  RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   const auto sent = entry->commands.to_be_read_back();
   ControllerReading reading = read_back(commands_of(sent), entry->reported.settings(), controller);

@@ -27,26 +27,27 @@ RobotEntry* RobotTable::find(const RobotId& id, BootId boot_id) {
   return entry == nullptr || entry->robot.boot_id != boot_id ? nullptr : entry;
 }
 
-RobotPort* RobotTable::connect(RobotEntry& entry, RobotPort& port) {
-  RobotPort* previous = std::exchange(entry.port, &port);
+RobotLink* RobotTable::connect(RobotEntry& entry, RobotLink& link) {
+  RobotLink* previous = std::exchange(entry.link, &link);
   if (previous != nullptr) previous->entry_ = nullptr;
-  port.entry_ = &entry;
+  link.entry_ = &entry;
   return previous;
 }
 
 void RobotTable::disconnect(RobotEntry& entry) {
-  if (RobotPort* port = std::exchange(entry.port, nullptr); port != nullptr) port->entry_ = nullptr;
+  if (RobotLink* link = std::exchange(entry.link, nullptr); link != nullptr) link->entry_ = nullptr;
 }
 
 Result<void> RobotTable::may_connect(const RobotId& id, BootId boot_id, std::int64_t now_us,
                                      std::int64_t timeout_us) const {
   const RobotEntry* entry = find(id);
-  if (entry == nullptr || entry->port == nullptr || entry->robot.boot_id == boot_id) return {};
+  if (entry == nullptr || entry->link == nullptr || entry->robot.boot_id == boot_id) return {};
   const RobotState& robot = entry->robot;
   const std::int64_t silent_us = now_us - robot.last_received_steady_us;
   if (silent_us >= timeout_us) return {};
-  return fail(ErrorCode::conflict, fmt::format("robot '{}' is connected from {} with boot {}; it was heard {} ms ago",
-                                               id, robot.peer, robot.boot_id, silent_us / 1000));
+  return fail(ErrorCode::conflict,
+              fmt::format("robot '{}' is connected from {} with boot {}; its last frame came {} ms ago", id, robot.peer,
+                          robot.boot_id, silent_us / 1000));
 }
 
 }  // namespace server::station

@@ -21,9 +21,9 @@ class RobotTable {
   std::map<RobotId, RobotEntry>& entries() { return entries_; }
 
   // The entry whose connection this is; null when another has taken its place.
-  static RobotEntry* of(const RobotPort& port) { return port.entry_; }
+  static RobotEntry* of(const RobotLink& link) { return link.entry_; }
   // Makes it the robot's connection; returns the one that it replaces, null when there is none.
-  static RobotPort* connect(RobotEntry& entry, RobotPort& port);
+  static RobotLink* connect(RobotEntry& entry, RobotLink& link);
   static void disconnect(RobotEntry& entry);
   // Of two connections with the same boot the newer counts. One of another boot has to wait until the robot has been
   // silent for the timeout: conflict.

@@ -139,7 +139,7 @@ void Station::set_retired(const RobotId& id, std::int64_t retired_at_us, const s
 
 void Station::end_connection(const RobotId& id, const std::string& reason) {
   const RobotEntry* entry = parts_->robots.find(id);
-  if (entry != nullptr && entry->port != nullptr) entry->port->close(reason);
+  if (entry != nullptr && entry->link != nullptr) entry->link->close(reason);
 }
 
 void Station::on_durable(const RobotId& id, BootId boot_id, std::uint64_t durable_next_seq,
@@ -148,17 +148,17 @@ void Station::on_durable(const RobotId& id, BootId boot_id, std::uint64_t durabl
   if (entry == nullptr) return;
   entry->robot.durable_next_seq = durable_next_seq;
   entry->robot.durable_next_event_seq = durable_next_event_seq;
-  if (entry->port != nullptr) entry->port->acknowledge(durable_next_seq, durable_next_event_seq);
+  if (entry->link != nullptr) entry->link->acknowledge(durable_next_seq, durable_next_event_seq);
 }
 
 void Station::request_resend(const RobotId& id, BootId boot_id, std::uint64_t first_seq, std::uint64_t next_seq) {
   const RobotEntry* entry = parts_->robots.find(id, boot_id);
-  if (entry != nullptr && entry->port != nullptr) entry->port->request_resend(first_seq, next_seq);
+  if (entry != nullptr && entry->link != nullptr) entry->link->request_resend(first_seq, next_seq);
 }
 
 void Station::request_event_resend(const RobotId& id, BootId boot_id) {
   const RobotEntry* entry = parts_->robots.find(id, boot_id);
-  if (entry != nullptr && entry->port != nullptr) entry->port->request_event_resend();
+  if (entry != nullptr && entry->link != nullptr) entry->link->request_event_resend();
 }
 
 }  // namespace server::station

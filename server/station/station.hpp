@@ -26,7 +26,7 @@
 #include "server/station/state/clock_sync.hpp"
 #include "server/station/state/in_force.hpp"
 #include "server/station/state/robot_archive.hpp"
-#include "server/station/state/robot_port.hpp"
+#include "server/station/state/robot_link.hpp"
 #include "server/station/state/station_sink.hpp"
 #include "server/station/state/station_state.hpp"
 #include "server/station/state/stop_times.hpp"
@@ -88,31 +88,31 @@ class Station {
 
   config::LinkTimes link_times() const;
   // Decides whether a robot that is already connected is replaced (same boot) or keeps its place. On admission the
-  // session becomes the robot's port, and pending stops are sent to it first.
+  // session becomes the robot's link, and pending stops are sent to it first.
   Result<void> may_connect(const RobotId& id, BootId boot_id) const;
-  void on_connected(RobotPort& port, const AdmissionRequest& hello, const protocol::Hello& details,
+  void on_connected(RobotLink& link, const AdmissionRequest& hello, const protocol::Hello& details,
                     const Admission& admission, const std::string& peer);
-  void on_disconnected(RobotPort& port, const std::string& reason);
+  void on_disconnected(RobotLink& link, const std::string& reason);
   // Somebody who calls itself this robot was not let in: an event, if the robot is known, at most one each 10 s.
   void on_refused(const RobotId& id, const std::string& peer, protocol::RefusalReason reason,
                   const std::string& detail);
   // A robot that is not known could not enrol itself: an event under its name, and a line of the log, at most one each
   // 10 s whatever their names are.
   void on_enrolment_refused(const RobotId& id, const std::string& peer, const std::string& detail);
-  void on_frame(RobotPort& port, std::uint64_t robot_time_us);  // any frame: a sign of life
-  void on_samples(RobotPort& port, Checked<protocol::Telemetry> telemetry);
-  void on_event(RobotPort& port, Checked<protocol::Event> event);
+  void on_frame(RobotLink& link, std::uint64_t robot_time_us);  // any frame: a sign of life
+  void on_samples(RobotLink& link, Checked<protocol::Telemetry> telemetry);
+  void on_event(RobotLink& link, Checked<protocol::Event> event);
   // Values of a frame that cannot be: counted, and an event of the first of them, at most one each 10 s.
-  void on_invalid_values(RobotPort& port, std::uint64_t count, const char* cause, const std::string& first);
+  void on_invalid_values(RobotLink& link, std::uint64_t count, const char* cause, const std::string& first);
   // What came and cannot be recorded is lost for good: else the robot would send it again for ever.
-  void on_unusable_samples(RobotPort& port, const protocol::Telemetry& telemetry);
-  void on_unusable_event(RobotPort& port, const protocol::Event& event);
-  void on_status(RobotPort& port, const protocol::Status& status);
-  void on_command_ack(RobotPort& port, const protocol::CommandAck& ack);
-  void on_command_sent(RobotPort& port, CommandId id);
-  void on_clock(RobotPort& port, const ClockExchange& exchange);
-  void on_parameters(RobotPort& port, const protocol::ParameterPage& page);
-  void on_controller(RobotPort& port, const protocol::Controller& controller);
+  void on_unusable_samples(RobotLink& link, const protocol::Telemetry& telemetry);
+  void on_unusable_event(RobotLink& link, const protocol::Event& event);
+  void on_status(RobotLink& link, const protocol::Status& status);
+  void on_command_ack(RobotLink& link, const protocol::CommandAck& ack);
+  void on_command_sent(RobotLink& link, CommandId id);
+  void on_clock(RobotLink& link, const ClockExchange& exchange);
+  void on_parameters(RobotLink& link, const protocol::ParameterPage& page);
+  void on_controller(RobotLink& link, const protocol::Controller& controller);
 
   // The limits of commands, with the list of fluids.
   const config::Envelope& envelope() const;

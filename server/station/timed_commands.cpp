@@ -33,7 +33,7 @@ bool TimedCommands::drop_outdated(RobotEntry& entry, const std::string& holder) 
   });
   choose_reason(entry, holder);
   const bool is_lost = entry.timed.drop_id != 0 && !entry.commands.unanswered.contains(entry.timed.drop_id);
-  if ((entry.timed.drop_because == nullptr && !is_lost) || entry.port == nullptr) return true;
+  if ((entry.timed.drop_because == nullptr && !is_lost) || entry.link == nullptr) return true;
   if (entry.timed.drop_because != nullptr) end_timed(entry, entry.timed.drop_because);
   return send_drop(entry);
 }
@@ -59,7 +59,7 @@ bool TimedCommands::send_drop(RobotEntry& entry) {
   request.actor = "station:control";
   request.time_to_live = microseconds{protocol::kMaxTimeToLiveUs};
   const auto drop = make_pending(loop_, clock_, request, entry.robot);
-  if (!entry.port->send(drop->wire, drop->deadline_us)) return false;
+  if (!entry.link->send(drop->wire, drop->deadline_us)) return false;
   entry.timed.by.clear();
   entry.timed.until_robot_us = 0;
   entry.timed.drop_because = nullptr;
@@ -71,13 +71,13 @@ bool TimedCommands::send_drop(RobotEntry& entry) {
 
 void TimedCommands::withdraw_queued(RobotEntry& entry, const char* reason,
                                     const std::function<bool(const PendingCommand&)>& is_meant) {
-  if (entry.port == nullptr) return;
+  if (entry.link == nullptr) return;
   std::vector<CommandId> withdrawn;
   for (const auto& [id, pending] : entry.commands.unanswered) {
     const bool is_bound = !pending->is_stop() && needs_control(pending->wire) && !only_ends_motion(pending->wire) &&
                           pending->wire.which_action != rheonaut_Command_drop_timed_tag;
     const bool is_queued = pending->record.state == CommandState::queued;
-    if (is_bound && is_queued && is_meant(*pending) && entry.port->withdraw(id)) withdrawn.push_back(id);
+    if (is_bound && is_queued && is_meant(*pending) && entry.link->withdraw(id)) withdrawn.push_back(id);
   }
   for (const CommandId id : withdrawn) tracker_.finish(entry, id, CommandState::superseded, reason);
 }
@@ -88,7 +88,7 @@ void TimedCommands::end_timed(RobotEntry& entry, const char* reason) {
   for (const auto& [id, pending] : entry.commands.unanswered) {
     if (!pending->is_timed_order()) continue;
     pending->dropped_because = reason;
-    if (pending->record.state == CommandState::queued && entry.port->withdraw(id)) unsent.push_back(id);
+    if (pending->record.state == CommandState::queued && entry.link->withdraw(id)) unsent.push_back(id);
   }
   for (const CommandId id : unsent) tracker_.finish(entry, id, CommandState::superseded, reason);
   for (const auto* sent : {&entry.commands.unseen, &entry.commands.unknown}) {

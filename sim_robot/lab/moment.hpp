@@ -31,14 +31,14 @@ View true_view(const SimulatedRobot& robot);
 
 struct Moment {
   double time_s = 0;               // virtual, since the story began
-  View heard;                      // the newest that has arrived at the station
+  View received;                   // the newest that has arrived at the station
   View truth;                      // in the robot and its world now; positions from where it was made
   int connections = 0;             // that have reached the station
   std::uint64_t samples_owed = 0;  // older than the newest that has arrived, and neither arrived nor lost for good
 };
 
 // An event of the robot, as the station received it. Kind and cause are spelled as in docs/protocol.md.
-struct HeardEvent {
+struct ReceivedEvent {
   std::string kind, cause;
   double robot_time_s = 0;
   double position_m = 0;

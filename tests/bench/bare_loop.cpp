@@ -165,9 +165,9 @@ class BareLoop {
   void take_request(int fd) {
     const std::string_view text = desk_.read(fd);
     if (text.empty() || views_.take(fd, text)) return;
-    const auto robot = std::find_if(
-        robots_.begin(), robots_.end(),
-        [wish = bare::StopDesk::robot_of(text)](const Robot& one) { return one.fd >= 0 && one.id == wish; });
+    const auto robot =
+        std::find_if(robots_.begin(), robots_.end(),
+                     [id = bare::StopDesk::robot_of(text)](const Robot& one) { return one.fd >= 0 && one.id == id; });
     if (robot == robots_.end()) return bare::StopDesk::answer(fd, "404 Not Found");
     protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
     frame.which_body = rheonaut_StationFrame_command_tag;

@@ -45,7 +45,7 @@ class LinkedRobot {
   explicit LinkedRobot(const SimulatedRobotConfig& config) : robot_(config) {
     robot_.link_opened(0);
     drain();
-    hear(welcome());
+    receive(welcome());
   }
 
   void prefetch() const { robot_.prefetch(); }
@@ -63,9 +63,9 @@ class LinkedRobot {
     protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
     frame.which_body = rheonaut_StationFrame_heartbeat_tag;
     frame.body.heartbeat.durable_next_seq = ticks_;
-    hear(frame);
+    receive(frame);
   }
-  void hear(const protocol::StationFrame& frame) {
+  void receive(const protocol::StationFrame& frame) {
     std::array<std::uint8_t, protocol::kMaxFramedBytes> bytes;
     const std::size_t size = protocol::write_frame(frame, bytes.data(), bytes.size());
     robot_.receive({bytes.data(), size}, robot_.robot_time_us());

@@ -21,7 +21,7 @@ std::uint64_t seq(ByteSource& source, const KnownOfRobot& robot) {
 protocol::Controller controller(ByteSource& source) {
   const std::uint8_t choice = source.byte();
   protocol::Controller controller =
-      choice % 2 == 0 ? robot_fw::golden_biquads() : robot_fw::scaled_controller(choice, 1.5F);
+      choice % 2 == 0 ? robot_fw::biquad_controller() : robot_fw::scaled_controller(choice, 1.5F);
   if (choice & 2) controller.duty_max = 0.5F;
   if (choice & 4) controller.duty_min = -0.4F;
   if (choice & 8) controller.derivative_on = rheonaut_DERIVATIVE_ON_MEASUREMENT;

@@ -92,7 +92,7 @@ void WatchedRobot::close() {
 
 void WatchedRobot::receive(protocol::Bytes bytes) {
   if (bytes.empty()) return;
-  if (open_) overhear(bytes);
+  if (open_) observe(bytes);
   const bool goes_on = robot_.receive(bytes, now_us_);
   require(open_ || !goes_on, "a closed connection hears nothing");
   check_latch();
@@ -105,18 +105,18 @@ void WatchedRobot::receive(protocol::Bytes bytes) {
   }
 }
 
-void WatchedRobot::overhear(protocol::Bytes bytes) {
+void WatchedRobot::observe(protocol::Bytes bytes) {
   auto state = protocol::FrameReader::State::complete;
   while (!bytes.empty()) {
     state = reader_.push(bytes);
     if (state == protocol::FrameReader::State::oversize) return;
     if (state != protocol::FrameReader::State::complete) continue;
-    if (const auto frame = protocol::decode_station_frame(reader_.payload())) overhear(*frame);
+    if (const auto frame = protocol::decode_station_frame(reader_.payload())) observe(*frame);
   }
   between_frames_ = state == protocol::FrameReader::State::complete;
 }
 
-void WatchedRobot::overhear(const protocol::StationFrame& frame) {
+void WatchedRobot::observe(const protocol::StationFrame& frame) {
   heard_at_us_ = now_us_;
   if (frame.which_body == rheonaut_StationFrame_welcome_tag) heard_welcome_ = true;
   if (frame.which_body != rheonaut_StationFrame_command_tag) return;

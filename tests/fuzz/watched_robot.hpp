@@ -45,8 +45,8 @@ class WatchedRobot {
   void check() const;
   void check_latch();
   void check_at_rest() const;
-  void overhear(protocol::Bytes bytes);
-  void overhear(const protocol::StationFrame& frame);
+  void observe(protocol::Bytes bytes);
+  void observe(const protocol::StationFrame& frame);
   void check_frame(const protocol::RobotFrame& frame);
   void check_telemetry(const protocol::Telemetry& batch);
   void check_live(const protocol::Telemetry& batch);

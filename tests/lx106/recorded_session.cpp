@@ -248,7 +248,7 @@ void auto_with_disturbance(Session& session, Expectations& expect) {
   expect.that(session.accepted(entry) && session.accepted(disturbance), "auto with a disturbance");
   const auto setpoint = session.send(sim_robot::set_setpoint(0.05F));
   session.run(300);
-  const auto controller = session.send(sim_robot::set_controller(robot_fw::golden_biquads()));
+  const auto controller = session.send(sim_robot::set_controller(robot_fw::biquad_controller()));
   session.run(200);
   const auto restored = session.send(sim_robot::restore_controller());
   session.run(200);

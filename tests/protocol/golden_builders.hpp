@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <initializer_list>
 #include <limits>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "protocol/frame.hpp"
+#include "tests/protocol/golden_controllers.hpp"
 
 namespace protocol {
 
@@ -69,49 +69,9 @@ void set_text(char (&field)[size], const std::string& text) {
   std::memcpy(field, text.c_str(), text.size() + 1);
 }
 
-template <std::size_t size>
-void set_column(float (&field)[size], pb_size_t& count, std::initializer_list<float> values) {
-  ASSERT_LE(values.size(), size);
-  std::copy(values.begin(), values.end(), field);
-  count = static_cast<pb_size_t>(values.size());
-}
-
 inline void set_sample_count(Telemetry& batch, pb_size_t count) {
   batch.position_m_count = batch.velocity_m_s_count = batch.acceleration_m_s2_count = count;
   batch.duty_count = batch.impedance_mv_count = batch.reference_m_count = count;
-}
-
-inline Controller paper_controller() {
-  Controller controller = rheonaut_Controller_init_zero;
-  controller.controller_id = 1;
-  controller.checksum = 3'099'722'980;
-  controller.period_us = 10'000;
-  controller.kp = 65.0028F;
-  controller.direct = 117.11186F;
-  set_column(controller.pole, controller.pole_count, {-0.4649264F, -0.1022562F, 0.4380344F, 0.8222267F, 0.970841F});
-  set_column(controller.residue, controller.residue_count,
-             {-29.9971855F, -14.5876807F, -5.3258752F, -1.0051928F, -0.0781306F});
-  controller.duty_min = -1;
-  controller.duty_max = 1;
-  return controller;
-}
-
-inline Controller biquad_controller() {
-  Controller controller = rheonaut_Controller_init_zero;
-  controller.controller_id = 2;
-  controller.checksum = 2'356'539'864;
-  controller.period_us = 10'000;
-  controller.kp = 30;
-  controller.direct = 40;
-  set_column(controller.pole, controller.pole_count, {0.5F});
-  set_column(controller.residue, controller.residue_count, {-3});
-  set_column(controller.biquad_b0, controller.biquad_b0_count, {0.25F});
-  set_column(controller.biquad_b1, controller.biquad_b1_count, {0.125F});
-  set_column(controller.biquad_a1, controller.biquad_a1_count, {-1.5F});
-  set_column(controller.biquad_a2, controller.biquad_a2_count, {0.625F});
-  controller.duty_max = 1;
-  controller.derivative_on = rheonaut_DERIVATIVE_ON_MEASUREMENT;
-  return controller;
 }
 
 }  // namespace protocol

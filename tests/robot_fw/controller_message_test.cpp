@@ -18,14 +18,14 @@ std::string fault(const protocol::Controller& controller, DutyRange motor = kMot
 }
 
 TEST(ControllerMessage, TheGoldenControllersCarryTheirChecksumAndAreSound) {
-  for (const auto& controller : {golden_controller(), golden_biquads()}) {
+  for (const auto& controller : {paper_controller(), biquad_controller()}) {
     EXPECT_EQ(checksum_of(controller), controller.checksum);
     EXPECT_EQ(fault(controller), "none");
   }
 }
 
 TEST(ControllerMessage, ComesBackAsItWent) {
-  for (const auto& sent : {golden_controller(), golden_biquads()}) {
+  for (const auto& sent : {paper_controller(), biquad_controller()}) {
     protocol::Controller back;
     write_controller(sections_of(sent), 10'000, back);
     EXPECT_EQ(checksum_of(back), sent.checksum);
@@ -35,7 +35,7 @@ TEST(ControllerMessage, ComesBackAsItWent) {
 }
 
 TEST(ControllerMessage, EveryCoefficientCountsInTheChecksum) {
-  protocol::Controller controller = golden_biquads();
+  protocol::Controller controller = biquad_controller();
   for (float* number : {&controller.kp, &controller.direct, &controller.pole[0], &controller.residue[0],
                         &controller.biquad_b0[0], &controller.biquad_b1[0], &controller.biquad_a1[0],
                         &controller.biquad_a2[0], &controller.duty_min, &controller.duty_max}) {
@@ -49,21 +49,21 @@ TEST(ControllerMessage, EveryCoefficientCountsInTheChecksum) {
 }
 
 TEST(ControllerMessage, RefusesUnevenColumnsNoIdAndAnUnknownDerivative) {
-  auto uneven = golden_controller(), nameless = golden_controller(), strange = golden_controller();
+  auto uneven = paper_controller(), nameless = paper_controller(), strange = paper_controller();
   uneven.residue_count = 4;
   nameless.controller_id = 0;
   strange.derivative_on = static_cast<rheonaut_DerivativeOn>(2);
   for (const auto& controller : {uneven, nameless, strange}) EXPECT_EQ(fault(with_checksum(controller)), "malformed");
   for (auto count : {&protocol::Controller::biquad_b0_count, &protocol::Controller::biquad_b1_count,
                      &protocol::Controller::biquad_a1_count, &protocol::Controller::biquad_a2_count}) {
-    auto controller = golden_biquads();
+    auto controller = biquad_controller();
     controller.*count = 0;
     EXPECT_EQ(fault(with_checksum(controller)), "malformed");
   }
 }
 
 TEST(ControllerMessage, RefusesWhatIsNotFinite) {
-  protocol::Controller controller = golden_biquads();
+  protocol::Controller controller = biquad_controller();
   for (float* number : {&controller.kp, &controller.direct, &controller.pole[0], &controller.residue[0],
                         &controller.biquad_b0[0], &controller.biquad_b1[0], &controller.biquad_a1[0],
                         &controller.biquad_a2[0], &controller.duty_min, &controller.duty_max}) {
@@ -77,7 +77,7 @@ TEST(ControllerMessage, RefusesWhatIsNotFinite) {
 }
 
 TEST(ControllerMessage, RefusesAGainAtDcThatIsNotFinite) {
-  protocol::Controller controller = golden_controller();
+  protocol::Controller controller = paper_controller();
   controller.residue[0] = 3e38F;
   controller.pole[0] = 0.9F;
   EXPECT_EQ(fault(with_checksum(controller)), "not_finite");
@@ -85,7 +85,7 @@ TEST(ControllerMessage, RefusesAGainAtDcThatIsNotFinite) {
 
 TEST(ControllerMessage, RefusesUnstablePoles) {
   for (const float pole : {1.0F, -1.0F, 1.0001F, -7.0F}) {
-    protocol::Controller controller = golden_controller();
+    protocol::Controller controller = paper_controller();
     controller.pole[2] = pole;
     EXPECT_EQ(fault(with_checksum(controller)), "unstable") << pole;
   }
@@ -94,7 +94,7 @@ TEST(ControllerMessage, RefusesUnstablePoles) {
 TEST(ControllerMessage, RefusesBiquadsOutsideTheTriangle) {
   const std::pair<float, float> outside[] = {{0, 1}, {0, -1}, {1.5F, 0.5F}, {-1.5F, 0.5F}, {2.1F, 0.9F}, {0.2F, -0.9F}};
   for (const auto& [a1, a2] : outside) {
-    protocol::Controller controller = golden_biquads();
+    protocol::Controller controller = biquad_controller();
     controller.biquad_a1[0] = a1;
     controller.biquad_a2[0] = a2;
     EXPECT_EQ(fault(with_checksum(controller)), "unstable") << a1 << ' ' << a2;
@@ -104,7 +104,7 @@ TEST(ControllerMessage, RefusesBiquadsOutsideTheTriangle) {
 TEST(ControllerMessage, RefusesADutyRangeBeyondTheMotorOr0) {
   const DutyRange beyond[] = {{-1, 0.7F}, {-0.4F, 1}, {0.1F, 0.5F}, {-0.3F, 0}, {-0.3F, -0.1F}};
   for (const DutyRange& range : beyond) {
-    protocol::Controller controller = golden_controller();
+    protocol::Controller controller = paper_controller();
     controller.duty_min = range.min;
     controller.duty_max = range.max;
     EXPECT_EQ(fault(with_checksum(controller), {-0.3F, 0.6F}), "out_of_range") << range.min << ' ' << range.max;
@@ -112,7 +112,7 @@ TEST(ControllerMessage, RefusesADutyRangeBeyondTheMotorOr0) {
 }
 
 TEST(ControllerMessage, RefusesAnotherPeriodAGainOf0AndTooManySections) {
-  auto slow = golden_controller(), inverse = golden_controller(), off = golden_controller(), large = golden_biquads();
+  auto slow = paper_controller(), inverse = paper_controller(), off = paper_controller(), large = biquad_controller();
   slow.period_us = 20'000;
   inverse.kp = -1;
   off.kp = 0;

@@ -125,7 +125,7 @@ TEST(Controller, ForgetsEverythingOnReset) {
 }
 
 ControllerSections biquads() {
-  ControllerSections sections = sections_of(golden_biquads());
+  ControllerSections sections = sections_of(biquad_controller());
   sections.derivative_on_measurement = false;
   return sections;
 }

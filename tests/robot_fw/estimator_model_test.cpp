@@ -17,7 +17,7 @@ namespace {
 
 constexpr float kModelTickS = 0.01F;
 
-EstimatorParameters told(const control::EstimatorModel& model) {
+EstimatorParameters parameters_of(const control::EstimatorModel& model) {
   EstimatorParameters parameters;
   parameters.model = {model.sections.gain_m_s, model.sections.time_constant_s};
   parameters.is_confirmed = true;
@@ -41,7 +41,7 @@ double largest_error_m_s(const EstimatorParameters& parameters, const control::F
 TEST(EstimatorModelOnTheRobot, IsSteppedAsItsFitErrorSays) {
   for (const auto& plant : {control::kNonNewtonianModel, control::kNewtonianModel, control::fluid_family(2, 7)[1]}) {
     const control::EstimatorModel model = control::estimator_model(plant);
-    EXPECT_NEAR(largest_error_m_s(told(model), plant) * plant.b3 / plant.kp, model.fit_error, 1e-4);
+    EXPECT_NEAR(largest_error_m_s(parameters_of(model), plant) * plant.b3 / plant.kp, model.fit_error, 1e-4);
   }
 }
 
@@ -70,7 +70,7 @@ TEST(EstimatorModelOnTheRobot, KnowsThePositionInTheFluidsWhoseModelItHas) {
                             control::FractionalModel{0.1, 0.50 * middle.b1, 0.61 * middle.b2, 1, 1.42, 0.70}}) {
     EstimatorTrial trial;
     trial.truth = plant;
-    trial.estimator = told(control::estimator_model(plant));
+    trial.estimator = parameters_of(control::estimator_model(plant));
     trial.closed_loop = true;
     trial.disturbance_m = -0.05;
     for (const std::uint64_t seed : {1U, 2U}) {

@@ -89,9 +89,9 @@ TEST_F(EstimatorTest, CountsTheWayUnderADoubtfulDutyAsUnsure) {
 TEST_F(EstimatorTest, TakesADutyInTheDeadZoneAsZero) {
   EstimatorParameters parameters;
   parameters.dead_zone_duty = 0.05F;
-  Estimator told{parameters};
-  for (int k = 0; k < 500; ++k) told.step({0, false, 0.04F, kEstimatorTickS});
-  EXPECT_EQ(told.position_m(), 0);
+  Estimator stepped{parameters};
+  for (int k = 0; k < 500; ++k) stepped.step({0, false, 0.04F, kEstimatorTickS});
+  EXPECT_EQ(stepped.position_m(), 0);
 }
 
 TEST_F(EstimatorTest, TakesReadingsThatNeverChangeAsMissing) {

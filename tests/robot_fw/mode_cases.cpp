@@ -193,7 +193,7 @@ const std::vector<CommandCase> kCommandCases{
      [](const BareCore& core) { return sim_robot::clear_emergency(core.robot.emergency_id() + 1); }},
     {"inject_disturbance", [](const BareCore&) { return sim_robot::inject_disturbance(-kDisturbanceM); }},
     {"zero_position", [](const BareCore&) { return sim_robot::zero_position(); }},
-    {"set_controller", [](const BareCore&) { return sim_robot::set_controller(golden_biquads()); }},
+    {"set_controller", [](const BareCore&) { return sim_robot::set_controller(biquad_controller()); }},
     {"restore_controller", [](const BareCore&) { return sim_robot::restore_controller(); }},
     {"set_parameter, one for any time",
      [](const BareCore&) { return sim_robot::set_parameter("setpoint_limit_m", 0.5F); }},
@@ -272,7 +272,7 @@ BareCore prepared(const StateCase& state, const ParameterValues& parameters) {
   core.tick();
   for (const auto& [name, value] : parameters) set(core, name, value);
   // So that restore_controller has one to go back to; an emergency would refuse it.
-  if (core.robot.emergency_id() == 0) accept(core, sim_robot::set_controller(golden_controller()));
+  if (core.robot.emergency_id() == 0) accept(core, sim_robot::set_controller(paper_controller()));
   core.tick();
   state.enter(core);
   return core;

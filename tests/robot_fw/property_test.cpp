@@ -75,7 +75,7 @@ class RandomStation {
   }
   // Sound ones, ones with a wrong value and the right checksum, and ones with a wrong checksum.
   protocol::Controller controller() {
-    protocol::Controller controller = number() % 2 == 0 ? golden_biquads() : scaled_controller(3, 1.5F);
+    protocol::Controller controller = number() % 2 == 0 ? biquad_controller() : scaled_controller(3, 1.5F);
     controller.duty_min = number() % 2 == 0 ? 0 : -0.4F;
     if (number() % 2 == 0) controller.duty_max = 0.5F;
     controller.derivative_on = number() % 2 == 0 ? rheonaut_DERIVATIVE_ON_ERROR : rheonaut_DERIVATIVE_ON_MEASUREMENT;
@@ -119,19 +119,19 @@ void turn_sensors(BareCore& core, RandomStation& random) {
 
 // An answer that nothing was done must be true; that the station lives is all that the robot has learnt.
 void expect_refusal_to_change_nothing(const BareCore& before, const BareCore& after) {
-  BareCore told = after, untold = before;
-  untold.heartbeat();
-  for (BareCore* each : {&told, &untold}) each->run(2);
-  ASSERT_EQ(told.robot.float_state_checksum(), untold.robot.float_state_checksum());
-  ASSERT_EQ(told.robot.mode(), untold.robot.mode());
-  ASSERT_EQ(told.robot.emergency_id(), untold.robot.emergency_id());
-  ASSERT_EQ(told.sample.sub_state, untold.sample.sub_state);
-  ASSERT_EQ(told.sample.setpoint_m, untold.sample.setpoint_m);
-  ASSERT_EQ(told.sample.disturbance_m, untold.sample.disturbance_m);
-  ASSERT_EQ(told.sample.flags, untold.sample.flags);
-  const auto told_hello = told.hello_now(), untold_hello = untold.hello_now();
-  ASSERT_EQ(told_hello.parameters_checksum, untold_hello.parameters_checksum);
-  ASSERT_EQ(told_hello.controller_checksum, untold_hello.controller_checksum);
+  BareCore with = after, without = before;
+  without.heartbeat();
+  for (BareCore* each : {&with, &without}) each->run(2);
+  ASSERT_EQ(with.robot.float_state_checksum(), without.robot.float_state_checksum());
+  ASSERT_EQ(with.robot.mode(), without.robot.mode());
+  ASSERT_EQ(with.robot.emergency_id(), without.robot.emergency_id());
+  ASSERT_EQ(with.sample.sub_state, without.sample.sub_state);
+  ASSERT_EQ(with.sample.setpoint_m, without.sample.setpoint_m);
+  ASSERT_EQ(with.sample.disturbance_m, without.sample.disturbance_m);
+  ASSERT_EQ(with.sample.flags, without.sample.flags);
+  const auto with_hello = with.hello_now(), without_hello = without.hello_now();
+  ASSERT_EQ(with_hello.parameters_checksum, without_hello.parameters_checksum);
+  ASSERT_EQ(with_hello.controller_checksum, without_hello.controller_checksum);
 }
 
 class AnyOrder : public ::testing::TestWithParam<unsigned> {};

@@ -22,13 +22,13 @@ class SetController : public DrivenRobot {
 };
 
 TEST_F(SetController, AtRestIsInForceAtOnceAndReadBack) {
-  EXPECT_EQ(set(golden_biquads()), "accepted");
+  EXPECT_EQ(set(biquad_controller()), "accepted");
   ASSERT_EQ(station.controllers.size(), 1u);
   EXPECT_EQ(station.controllers[0].controller_id, 2u);
-  EXPECT_EQ(station.controllers[0].checksum, golden_biquads().checksum);
-  EXPECT_EQ(checksum_of(station.controllers[0]), golden_biquads().checksum);
+  EXPECT_EQ(station.controllers[0].checksum, biquad_controller().checksum);
+  EXPECT_EQ(checksum_of(station.controllers[0]), biquad_controller().checksum);
   EXPECT_EQ(last().controller_id, 2u);
-  EXPECT_EQ(checksum(), golden_biquads().checksum);
+  EXPECT_EQ(checksum(), biquad_controller().checksum);
   EXPECT_EQ(station.hello->controller_id, 2u);
   EXPECT_EQ(events_of(rheonaut_EVENT_KIND_CONTROLLER_CHANGED), 1);
   EXPECT_EQ(station.events.back().value, 2);
@@ -46,7 +46,7 @@ TEST_F(SetController, ARefusedOneChangesNothing) {
   const auto before = checksum();
   station.run(2);
   station.controllers.clear();
-  auto broken = golden_biquads();
+  auto broken = biquad_controller();
   broken.kp = 31;
   EXPECT_EQ(set(broken), "checksum");
   broken.pole[0] = 1;
@@ -104,13 +104,13 @@ TEST_F(SetController, AChangeOfModeEndsTheChange) {
 
 TEST_F(SetController, IsRefusedInEmergency) {
   order(emergency_stop());
-  EXPECT_EQ(set(golden_biquads()), "latched");
+  EXPECT_EQ(set(biquad_controller()), "latched");
   EXPECT_EQ(answer(restore_controller()), "latched");
 }
 
 TEST_F(SetController, RestoreBringsBackTheOneBefore) {
   const auto before = checksum();
-  set(golden_biquads());
+  set(biquad_controller());
   EXPECT_EQ(answer(restore_controller()), "accepted");
   EXPECT_EQ(last().controller_id, 1u);
   EXPECT_EQ(checksum(), before);
@@ -120,7 +120,7 @@ TEST_F(SetController, RestoreBringsBackTheOneBefore) {
 }
 
 TEST_F(SetController, KeepsItsOwnDutyLimits) {
-  auto gentle = golden_controller();
+  auto gentle = paper_controller();
   gentle.controller_id = 9;
   gentle.duty_min = -0.2F;
   gentle.duty_max = 0.3F;
@@ -141,7 +141,7 @@ TEST(OneWayMotorController, IsAdaptedAndRefusesOneWithReverse) {
   SimulatedRobot robot{config};
   StationPeer station{robot};
   station.connect();
-  const auto id = station.send(set_controller(golden_controller()));
+  const auto id = station.send(set_controller(paper_controller()));
   station.run(2);
   EXPECT_EQ(station.ack_of(id)->reason, rheonaut_REJECT_REASON_OUT_OF_RANGE);
 }

@@ -44,11 +44,11 @@ TEST_F(Settings, ComeBackAfterAReset) {
   {
     Boot boot{storage};
     boot.order(set_parameter("auto_limit_s", 42));
-    boot.order(set_controller(golden_biquads()));
+    boot.order(set_controller(biquad_controller()));
   }
   Boot boot{storage};
   EXPECT_EQ(boot.station.hello->controller_id, 2u);
-  EXPECT_EQ(boot.station.hello->controller_checksum, golden_biquads().checksum);
+  EXPECT_EQ(boot.station.hello->controller_checksum, biquad_controller().checksum);
   boot.order(get_parameters(0));
   EXPECT_EQ(boot.station.pages[0].parameters[0].value, 42);
   EXPECT_NE(boot.station.hello->parameters_checksum, Parameters{}.checksum());
@@ -71,7 +71,7 @@ TEST_F(Settings, AModelIsOnlyAssumedAfterAReset) {
 }
 
 TEST_F(Settings, AfterAResetTheBuiltInControllerIsTheOneBefore) {
-  Boot{storage}.order(set_controller(golden_biquads()));
+  Boot{storage}.order(set_controller(biquad_controller()));
   Boot boot{storage};
   boot.order(restore_controller());
   EXPECT_EQ(boot.station.controllers.back().controller_id, 1u);
@@ -95,7 +95,7 @@ TEST_F(Settings, AreWrittenOncePerChangeAndOnlyWithTheMotorOff) {
 
 TEST_F(Settings, WithAnyBitWrongAreTheDefaults) {
   Boot{storage}.order(set_parameter("auto_limit_s", 42));
-  Boot{storage}.order(set_controller(golden_biquads()));
+  Boot{storage}.order(set_controller(biquad_controller()));
   const auto sound = storage.values;
   ASSERT_EQ(sound.size(), 2u);
   const auto defaults = Boot{*std::make_unique<MemoryStorage>()}.station.hello;
@@ -154,7 +154,7 @@ TEST_F(Settings, ThatDecayedAreAnEventOfTheBoot) {
   {
     Boot boot{storage};
     boot.order(set_parameter("auto_limit_s", 42));
-    boot.order(set_controller(golden_biquads()));
+    boot.order(set_controller(biquad_controller()));
     EXPECT_EQ(events_of(boot.station, rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_RESET), 0);
   }
   for (auto& [key, bytes] : storage.values) bytes.back() ^= 1;
@@ -173,7 +173,7 @@ TEST_F(Settings, ThatCannotBeKeptAreAnEvent) {
   storage.is_full = true;
   Boot boot{storage};
   boot.order(set_parameter("auto_limit_s", 42));
-  boot.order(set_controller(golden_biquads()));
+  boot.order(set_controller(biquad_controller()));
   EXPECT_EQ(events_of(boot.station, rheonaut_EVENT_KIND_PARAMETER_CHANGED, rheonaut_EVENT_CAUSE_INTERNAL), 1);
   EXPECT_EQ(events_of(boot.station, rheonaut_EVENT_KIND_CONTROLLER_CHANGED, rheonaut_EVENT_CAUSE_INTERNAL), 1);
 }

@@ -257,11 +257,11 @@ TEST_F(StationChannelTest, CountsCommandsAndFramesThatAreNone) {
 
 TEST_F(StationChannelTest, FindsSilenceOnceAndSaysHowLongItWas) {
   connect();
-  EXPECT_FALSE(channel.heard(now_us));
+  EXPECT_FALSE(channel.frame_received(now_us));
   EXPECT_FALSE(channel.goes_lost(now_us + 1'000'000));
   EXPECT_TRUE(channel.goes_lost(now_us + 1'000'001));
   EXPECT_FALSE(channel.goes_lost(now_us + 1'000'002));
-  const auto silence_s = channel.heard(now_us + 2'000'000);
+  const auto silence_s = channel.frame_received(now_us + 2'000'000);
   ASSERT_TRUE(silence_s);
   EXPECT_FLOAT_EQ(*silence_s, 2.0F);
 }

@@ -81,7 +81,7 @@ TEST_F(Ring, HoldsEightSecondsInTwentyTwoKilobytes) {
 
 TEST_F(Ring, GivesBatchesOfOneToTwentyFive) {
   for (int i = 0; i < 30; ++i) push();
-  for (std::size_t wish = 1; wish <= 25; ++wish) EXPECT_EQ(read(2, wish).position_m_count, wish);
+  for (std::size_t capacity = 1; capacity <= 25; ++capacity) EXPECT_EQ(read(2, capacity).position_m_count, capacity);
   EXPECT_EQ(read(2, 800).position_m_count, 25);  // more do not fit into a frame
   EXPECT_EQ(read(28, 25).position_m_count, 2);
 }

@@ -49,14 +49,14 @@ TEST_F(Telemetry, BringsFiveSamplesInAFrame) {
 }
 
 TEST_F(Telemetry, BringsAsManySamplesInAFrameAsTheStationAsksFor) {
-  for (const std::uint32_t wish : {1U, 2U, 7U, 24U, 25U, 26U, UINT32_MAX}) {
+  for (const std::uint32_t preferred : {1U, 2U, 7U, 24U, 25U, 26U, UINT32_MAX}) {
     station.disconnect();
-    station.welcome.samples_per_frame = wish;
+    station.welcome.samples_per_frame = preferred;
     station.connect();
     station.frames.clear();
     station.run(100);
     ASSERT_FALSE(batches(false).empty());
-    for (const auto& batch : batches(false)) EXPECT_EQ(batch.position_m_count, std::min(wish, 25U)) << wish;
+    for (const auto& batch : batches(false)) EXPECT_EQ(batch.position_m_count, std::min(preferred, 25U)) << preferred;
   }
   expect_no_hole();
 }

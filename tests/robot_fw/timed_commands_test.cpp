@@ -67,12 +67,12 @@ TEST(TimedCommands, AWholeScheduleOfALongLifeComesBackAsItWas) {
 
 TEST(TimedCommands, WithoutRoomAreNotHeldAndHarmNoOther) {
   TimedCommands commands;
-  EXPECT_TRUE(commands.hold(timed(sim_robot::set_controller(golden_biquads()), 1, 200), 0));
+  EXPECT_TRUE(commands.hold(timed(sim_robot::set_controller(biquad_controller()), 1, 200), 0));
   EXPECT_FALSE(commands.hold(timed(whole_schedule(2'000'000), 2, 100), 0));
   EXPECT_TRUE(commands.hold(timed(sim_robot::set_duty(-0.25F), 3, 300), 0));
   const auto controller = commands.take_due(1000);
   ASSERT_TRUE(controller.has_value());
-  EXPECT_EQ(checksum_of(controller->action.set_controller), golden_biquads().checksum);
+  EXPECT_EQ(checksum_of(controller->action.set_controller), biquad_controller().checksum);
   const auto duty = commands.take_due(1000);
   ASSERT_TRUE(duty.has_value());
   EXPECT_EQ(duty->action.set_duty.duty, -0.25F);

@@ -29,9 +29,9 @@ std::string mode_text(const View& view) {
 }
 
 const View& telemetry(const Moment& moment) {
-  if (moment.heard.is_truth)
+  if (moment.received.is_truth)
     throw std::logic_error("a core does not show sub-state, setpoint and flags: ask telemetry");
-  return moment.heard;
+  return moment.received;
 }
 
 std::string flag_texts(std::uint32_t flags) {
@@ -45,23 +45,23 @@ std::string flag_texts(std::uint32_t flags) {
 }
 
 Condition of_mode(const char* name, protocol::Mode mode) {
-  return {name, [mode](const Moment& moment) { return moment.heard.mode == mode; },
-          [](const Moment& moment) { return "it is in " + mode_text(moment.heard); }};
+  return {name, [mode](const Moment& moment) { return moment.received.mode == mode; },
+          [](const Moment& moment) { return "it is in " + mode_text(moment.received); }};
 }
 
 Condition of_sub_state(const char* name, protocol::SubState sub_state) {
   return {name, [sub_state](const Moment& moment) { return telemetry(moment).sub_state == sub_state; },
-          [](const Moment& moment) { return "it is in " + mode_text(moment.heard); }};
+          [](const Moment& moment) { return "it is in " + mode_text(moment.received); }};
 }
 
 Condition of_motor(const char* name, bool is_on) {
-  return {name, [is_on](const Moment& moment) { return (moment.heard.duty != 0) == is_on; },
-          [](const Moment& moment) { return "duty is " + short_text(moment.heard.duty); }};
+  return {name, [is_on](const Moment& moment) { return (moment.received.duty != 0) == is_on; },
+          [](const Moment& moment) { return "duty is " + short_text(moment.received.duty); }};
 }
 
 Condition of_link(LinkView link) {
-  return {text(link), [link](const Moment& moment) { return moment.heard.link == link; },
-          [](const Moment& moment) { return text(moment.heard.link); }};
+  return {text(link), [link](const Moment& moment) { return moment.received.link == link; },
+          [](const Moment& moment) { return text(moment.received.link); }};
 }
 
 std::string as_one(const std::string& text) {
@@ -131,7 +131,7 @@ inline namespace conditions {
 
 Condition in_truth(const Condition& condition) {
   const auto turned = [](Moment moment) {
-    moment.heard = moment.truth;
+    moment.received = moment.truth;
     return moment;
   };
   return {"in truth " + as_one(condition.text()),
@@ -140,16 +140,16 @@ Condition in_truth(const Condition& condition) {
 }
 
 Quantity position() {
-  return {"position", "m", [](const Moment& moment) { return moment.heard.position_m; }};
+  return {"position", "m", [](const Moment& moment) { return moment.received.position_m; }};
 }
 Quantity velocity() {
-  return {"velocity", "m/s", [](const Moment& moment) { return moment.heard.velocity_m_s; }};
+  return {"velocity", "m/s", [](const Moment& moment) { return moment.received.velocity_m_s; }};
 }
 Quantity duty() {
-  return {"duty", "", [](const Moment& moment) { return moment.heard.duty; }};
+  return {"duty", "", [](const Moment& moment) { return moment.received.duty; }};
 }
 Quantity impedance() {
-  return {"impedance", "mV", [](const Moment& moment) { return moment.heard.impedance_mv; }};
+  return {"impedance", "mV", [](const Moment& moment) { return moment.received.impedance_mv; }};
 }
 Quantity setpoint() {
   return {"setpoint", "m", [](const Moment& moment) { return telemetry(moment).setpoint_m.value_or(std::nan("")); }};
@@ -171,24 +171,24 @@ Condition link_lost() { return of_link(LinkView::lost); }
 
 Condition flagged(rheonaut_TelemetryFlag flag) {
   return {"flagged " + flag_texts(flag), [flag](const Moment& moment) { return (telemetry(moment).flags & flag) != 0; },
-          [](const Moment& moment) { return "flags are " + flag_texts(moment.heard.flags); }};
+          [](const Moment& moment) { return "flags are " + flag_texts(moment.received.flags); }};
 }
 
 Condition caught_up() {
   return {"caught up",
-          [](const Moment& moment) { return moment.heard.link == LinkView::up && moment.samples_owed == 0; },
+          [](const Moment& moment) { return moment.received.link == LinkView::up && moment.samples_owed == 0; },
           [](const Moment& moment) {
-            return base::join_text(moment.samples_owed, " samples are owed, ", text(moment.heard.link));
+            return base::join_text(moment.samples_owed, " samples are owed, ", text(moment.received.link));
           }};
 }
 
 }  // namespace conditions
 
 std::string text(const View& view) {
-  std::string told = "position " + short_text(view.position_m) + " m, velocity " + short_text(view.velocity_m_s) +
+  std::string line = "position " + short_text(view.position_m) + " m, velocity " + short_text(view.velocity_m_s) +
                      " m/s, duty " + short_text(view.duty) + ", impedance " + short_text(view.impedance_mv) + " mV, ";
-  if (view.setpoint_m) told += "setpoint " + short_text(*view.setpoint_m) + " m, ";
-  return told + mode_text(view) + ", " + text(view.link);
+  if (view.setpoint_m) line += "setpoint " + short_text(*view.setpoint_m) + " m, ";
+  return line + mode_text(view) + ", " + text(view.link);
 }
 
 std::string short_text(double value) {

@@ -2,8 +2,8 @@
 //
 //   position().within(0.005).of(0.1) and not motor_on()
 //   in_truth(motor_off())
-// They speak of what the station has heard; in_truth() asks the robot and its world instead. Words of auto's sub-state,
-// of setpoint and flags have no truth but what is heard: in_truth() of them throws std::logic_error.
+// They speak of what the station has received; in_truth() asks the robot and its world instead. Words of auto's
+// sub-state, of setpoint and flags have no truth but what is received: in_truth() of them throws std::logic_error.
 #pragma once
 
 #include <functional>

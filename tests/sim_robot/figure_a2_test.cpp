@@ -74,7 +74,7 @@ TEST_F(StopAndDeliver, WaitsUntilTheGlucoseHasMixedAndGoesOn) {
   begin(setting);
   go_to(0.2);
   await(delivering(), {.limit_s = 3});
-  const HeardEvent ended = expect_event("delivery_ended", {.within_s = 60});
+  const ReceivedEvent ended = expect_event("delivery_ended", {.within_s = 60});
   EXPECT_EQ(ended.cause, "impedance");
   EXPECT_GT(ended.value, 5);
   EXPECT_LT(ended.position_m, 0.1);

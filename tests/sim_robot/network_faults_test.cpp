@@ -238,17 +238,17 @@ TEST_F(NetworkFaults, AHandshakeBlocksTheRobotAtRestAndItsMissedTicksAreCounted)
 }
 
 TEST_F(NetworkFaults, TheSameSeedGivesTheSameStory) {
-  const auto frames_heard = [this](std::uint64_t seed) {
+  const auto frames_received = [this](std::uint64_t seed) {
     begin_with({.jitter_s = 0.1, .loss_probability = 0.2}, seed);
-    std::vector<std::size_t> heard;
+    std::vector<std::size_t> received;
     for (int i = 0; i < 1000; ++i) {
       pass(0.01);
-      heard.push_back(station().frames.size());
+      received.push_back(station().frames.size());
     }
-    return heard;
+    return received;
   };
-  EXPECT_EQ(frames_heard(3), frames_heard(3));
-  EXPECT_NE(frames_heard(3), frames_heard(4));
+  EXPECT_EQ(frames_received(3), frames_received(3));
+  EXPECT_NE(frames_received(3), frames_received(4));
 }
 
 }  // namespace

@@ -50,16 +50,16 @@ class RobotThroughProxy : public ProxyTest {
       read(end);
     });
   }
-  void answer(End& end, const protocol::RobotFrame& heard) {
+  void answer(End& end, const protocol::RobotFrame& received) {
     protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
     frame.which_body = rheonaut_StationFrame_heartbeat_tag;
-    if (heard.which_body == rheonaut_RobotFrame_hello_tag) {
+    if (received.which_body == rheonaut_RobotFrame_hello_tag) {
       frame.which_body = rheonaut_StationFrame_welcome_tag;
       frame.body.welcome.protocol_version = protocol::kProtocolVersion;
     }
-    if (heard.which_body == rheonaut_RobotFrame_telemetry_tag) ++samples;
-    if (heard.which_body == rheonaut_RobotFrame_hello_tag) hello = heard.body.hello;
-    if (heard.which_body == rheonaut_RobotFrame_status_tag) missed_ticks = heard.body.status.missed_ticks;
+    if (received.which_body == rheonaut_RobotFrame_telemetry_tag) ++samples;
+    if (received.which_body == rheonaut_RobotFrame_hello_tag) hello = received.body.hello;
+    if (received.which_body == rheonaut_RobotFrame_status_tag) missed_ticks = received.body.status.missed_ticks;
     std::array<std::uint8_t, protocol::kMaxFramedBytes> out;
     const std::size_t size = protocol::write_frame(frame, out.data(), out.size());
     boost::system::error_code ignored;
@@ -72,8 +72,8 @@ class RobotThroughProxy : public ProxyTest {
   bool comes_back() { return comes_back_after(connections); }
   bool comes_back_after(int before) {
     if (!run_until([&] { return connections > before; })) return false;
-    const int heard = samples;
-    return run_until([&] { return robot->robot().core().link_up() && samples > heard + 5; });
+    const int received = samples;
+    return run_until([&] { return robot->robot().core().link_up() && samples > received + 5; });
   }
 
   protocol::FrameReader reader;
@@ -99,8 +99,8 @@ TEST_F(RobotThroughProxy, KeepsItsLinkSplitDelayedAndThrottled) {
   begin();
   for (const char* fault : {"split 1", "delay 100", "jitter 50", "throttle 20000"}) {
     EXPECT_EQ(proxy->control(fault).substr(0, 3), "ok:");
-    const int heard = samples;
-    ASSERT_TRUE(run_until([&] { return samples > heard + 15; })) << fault;
+    const int received = samples;
+    ASSERT_TRUE(run_until([&] { return samples > received + 15; })) << fault;
   }
   EXPECT_EQ(connections, 1);
   EXPECT_TRUE(robot->robot().core().link_up());
@@ -164,9 +164,9 @@ TEST_F(RobotThroughProxy, AHalfOpenOnDemandIsWithdrawnBeforeItIsNoticed) {
   begin();
   const auto id = inject(R"({"fault":"link_half_open","direction":"up"})");
   loop.run_for(100ms);
-  const int heard = samples;
+  const int received = samples;
   EXPECT_TRUE(robot->faults().withdraw(id, robot->faulty()));
-  ASSERT_TRUE(run_until([&] { return samples > heard + 5; }));
+  ASSERT_TRUE(run_until([&] { return samples > received + 5; }));
   EXPECT_EQ(connections, 1);
 }
 
@@ -188,9 +188,9 @@ TEST_F(RobotThroughProxy, ABlockedLoopSaysNothingMissesTicksAndGoesOn) {
   begin();
   inject(R"({"fault":"block","for_s":0.4})");
   loop.run_for(50ms);  // what was under way
-  const int heard = samples;
+  const int received = samples;
   ASSERT_TRUE(run_until([&] { return robot->faults().in_force().empty(); }));
-  EXPECT_LE(samples, heard + 1);
+  EXPECT_LE(samples, received + 1);
   ASSERT_TRUE(run_until([&] { return missed_ticks > 0; }));
   EXPECT_GE(missed_ticks, 35u);
   EXPECT_EQ(connections, 1);
@@ -216,8 +216,8 @@ TEST_F(RobotThroughProxy, AClockThatDriftsOnDemandIsFastAndThenRightAgain) {
   const auto ahead_us = [&life] { return static_cast<std::int64_t>(life.robot_clock_us() - life.true_us()); };
   const std::int64_t ahead_then_us = ahead_us();
   EXPECT_GE(ahead_then_us, 49'000);
-  const int heard = samples;
-  ASSERT_TRUE(run_until([&] { return samples > heard + 5; }));
+  const int received = samples;
+  ASSERT_TRUE(run_until([&] { return samples > received + 5; }));
   EXPECT_NEAR(static_cast<double>(ahead_us()), static_cast<double>(ahead_then_us), 2);
 }
 

@@ -58,12 +58,12 @@ Moment Story::moment() const {
   const LinkedPeer& station = lab_->station;
   const std::uint64_t heard_of = station.samples.empty() ? 1 : station.samples.rbegin()->first + 1;
   const std::uint64_t made = std::max(heard_of, station.hello ? station.hello->next_seq : 0);
-  return {lab_->time_s(), heard(), true_view(lab_->robot.robot()), lab_->link.connections(),
+  return {lab_->time_s(), received(), true_view(lab_->robot.robot()), lab_->link.connections(),
           made - station.durable_next_seq()};
 }
 
 // After a reboot the newest sample is that of the boot before, but for what Hello has said.
-View Story::heard() const {
+View Story::received() const {
   const LinkedPeer& station = lab_->station;
   View view;
   view.link = station.link_is_lost() ? LinkView::lost : station.link_is_up() ? LinkView::up : LinkView::none;
@@ -95,9 +95,9 @@ void Story::hear_news() {
     const protocol::Event& event = events[events_heard_];
     const std::size_t boot = lab_->station.earlier_boots.size();
     if (!known_events_.insert({boot, event.event_seq, event.event_robot_time_us}).second) continue;
-    hear({protocol::text(event.kind), protocol::text(event.cause),
-          1e-6 * static_cast<double>(event.event_robot_time_us), static_cast<double>(event.position_m),
-          static_cast<double>(event.value), event.emergency_id});
+    receive({protocol::text(event.kind), protocol::text(event.cause),
+             1e-6 * static_cast<double>(event.event_robot_time_us), static_cast<double>(event.position_m),
+             static_cast<double>(event.value), event.emergency_id});
   }
 }
 

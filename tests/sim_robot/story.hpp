@@ -29,7 +29,7 @@ struct Setting {
 
 class Story : public StoryWords {
  public:
-  // A new robot in this setting, connected, its first sample heard.
+  // A new robot in this setting, connected, its first sample received.
   void begin(Setting setting = {}, Where where = Where::current());
 
   // From now on.
@@ -56,7 +56,7 @@ class Story : public StoryWords {
   std::uint64_t give(const protocol::Command& command) override;
   std::optional<Answer> answer_to(std::uint64_t command_id) const override;
   void hear_news();
-  View heard() const;
+  View received() const;
 
   std::unique_ptr<Lab> lab_;
   std::size_t events_heard_ = 0;  // of the station's

@@ -39,12 +39,12 @@ TEST_F(StoryExamples, AnElectrodeThatFailsInAutoIsAnEmergencyUntilItIsGoodAndCle
   begin();
   go_to(0.5);
   suffer({.kind = FaultKind::electrode_missing, .for_s = 3});
-  const HeardEvent fault = expect_event("sensor_fault");
+  const ReceivedEvent fault = expect_event("sensor_fault");
   EXPECT_EQ(fault.cause, "impedance");
   await(in_emergency() and motor_off() and flagged(rheonaut_TELEMETRY_FLAG_SENSOR_FAULT));
 
   send(clear_emergency(fault.emergency_id)).expect_refused("other_emergency");
-  send(clear_emergency(moment().heard.emergency_id)).expect_refused("cause_stands");
+  send(clear_emergency(moment().received.emergency_id)).expect_refused("cause_stands");
   send(set_auto(0.1F)).expect_refused("latched");
 
   expect_event("sensor_recovered", {.within_s = 5});

@@ -44,7 +44,7 @@ TEST_F(StoryTest, AFailedAwaitSaysWhereWhatForHowLongAndWhatWasTheCase) {
   EXPECT_THAT(said, HasSubstr("story_test.cpp:"));
   EXPECT_THAT(said, HasSubstr(": awaited for 2.5 s: position within 0.005 m of 0.3 m and holding\n"));
   EXPECT_THAT(said, HasSubstr("\n  instead   position is 0.1 m\n")) << "holding holds, and is not to blame";
-  EXPECT_THAT(said, HasSubstr("\n  heard     position 0.1 m, velocity "));
+  EXPECT_THAT(said, HasSubstr("\n  received  position 0.1 m, velocity "));
   EXPECT_THAT(said, HasSubstr(", impedance 175 mV, setpoint 0.1 m, auto holding, link up\n"));
   EXPECT_THAT(said, HasSubstr("\n  in truth  position 0.1 m, velocity "));
   EXPECT_THAT(said, HasSubstr("\n  events    boot 0 s, mode_changed "));
@@ -88,7 +88,7 @@ TEST_F(StoryTest, WhatTheStationReceivedAndTheTruthAreSeparate) {
   pass(1);
   expect(motor_on() and in_truth(motor_off()));
   expect(in_truth(position()  // it coasts and nobody hears of it
-                      .above(moment().heard.position_m)));
+                      .above(moment().received.position_m)));
   const std::string said = failure([&] { expect(in_truth(motor_on())); });
   EXPECT_THAT(said, HasSubstr("expected now: in truth motor on\n  instead   in truth duty is 0\n"));
 }
@@ -120,7 +120,7 @@ TEST_F(StoryTest, AnEventAnswersOneExpectation) {
   stop();
   clear();
   stop();
-  const HeardEvent first = expect_event("emergency"), second = expect_event("emergency");
+  const ReceivedEvent first = expect_event("emergency"), second = expect_event("emergency");
   EXPECT_LT(first.robot_time_s, second.robot_time_s);
   EXPECT_EQ(second.cause, "command");
   EXPECT_EQ(second.emergency_id, robot().core().emergency_id());

@@ -1,4 +1,4 @@
-// Steps both ends until what is told has come true, and says what was the case when it has not.
+// Steps both ends until a condition holds, and says what was the case when it has not.
 #include "tests/sim_robot/story_words.hpp"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kHalfTickS = kTickS / 2;  // times are compared with this room for rounding
 constexpr double kSetpointRoomM = 1e-4;    // of a float as large as setpoints may be
-constexpr std::size_t kEventsTold = 12, kCommandsTold = 4;
+constexpr std::size_t kEventsShown = 12, kCommandsShown = 4;
 
 bool is_for_the_motor(const protocol::Command& command) {
   switch (command.which_action) {
@@ -104,7 +104,7 @@ std::size_t StoryWords::take_event(std::string_view kind, std::size_t from, doub
   return *found;
 }
 
-HeardEvent StoryWords::expect_event(std::string_view kind, Within within, Where where) {
+ReceivedEvent StoryWords::expect_event(std::string_view kind, Within within, Where where) {
   const std::size_t found = take_event(kind, 0, moment().time_s + within.within_s);
   if (found < events_.size()) return events_[found];
   fail("expected within " + seconds(within.within_s) + ": event " + std::string(kind), "none came", where);
@@ -151,7 +151,7 @@ Answer StoryWords::stop(Where where) {
 }
 
 Answer StoryWords::clear(Where where) {
-  const Answer answer = send(clear_emergency(moment().heard.emergency_id)).expect_accepted({}, where);
+  const Answer answer = send(clear_emergency(moment().received.emergency_id)).expect_accepted({}, where);
   await(in_manual(), {}, where);
   return answer;
 }
@@ -189,28 +189,28 @@ Answer StoryWords::await_answer(std::uint64_t id, Limit limit, Where where) {
 void StoryWords::fail(const std::string& what, const std::string& instead, Where where) const {
   const Moment now = moment();
   throw StoryFailed(base::join_text(where.file_name(), ":", where.line(), ": ", what, "\n  instead   ", instead,
-                                    "\n  at        ", seconds(now.time_s), " of the story\n  heard     ",
-                                    text(now.heard), "\n  in truth  ", text(now.truth), "\n  events    ", told_events(),
-                                    "\n  commands  ", told_commands()));
+                                    "\n  at        ", seconds(now.time_s), " of the story\n  received  ",
+                                    text(now.received), "\n  in truth  ", text(now.truth), "\n  events    ",
+                                    events_text(), "\n  commands  ", commands_text()));
 }
 
-std::string StoryWords::told_events() const {
-  const std::size_t first = events_.size() - std::min(events_.size(), kEventsTold);
-  std::string told = first > 0 ? "…" : "";
+std::string StoryWords::events_text() const {
+  const std::size_t first = events_.size() - std::min(events_.size(), kEventsShown);
+  std::string text = first > 0 ? "…" : "";
   for (std::size_t i = first; i < events_.size(); ++i) {
-    told += (told.empty() ? "" : ", ") + events_[i].kind + " " + seconds(events_[i].robot_time_s);
+    text += (text.empty() ? "" : ", ") + events_[i].kind + " " + seconds(events_[i].robot_time_s);
   }
-  return told.empty() ? "none" : told;
+  return text.empty() ? "none" : text;
 }
 
-std::string StoryWords::told_commands() const {
-  const std::size_t first = given_.size() - std::min(given_.size(), kCommandsTold);
-  std::string told = first > 0 ? "…" : "";
+std::string StoryWords::commands_text() const {
+  const std::size_t first = given_.size() - std::min(given_.size(), kCommandsShown);
+  std::string text = first > 0 ? "…" : "";
   for (std::size_t i = first; i < given_.size(); ++i) {
     const auto answer = answer_to(given_[i].id);
-    told += (told.empty() ? "" : ", ") + given_[i].kind + " " + (answer ? answer->text : "unanswered");
+    text += (text.empty() ? "" : ", ") + given_[i].kind + " " + (answer ? answer->text : "unanswered");
   }
-  return told.empty() ? "none" : told;
+  return text.empty() ? "none" : text;
 }
 
 const std::string& StoryWords::kind_of(std::uint64_t command_id) const {

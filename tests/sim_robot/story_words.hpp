@@ -80,7 +80,7 @@ class StoryWords {
   void holds(const Condition& condition, For duration, Where where = Where::current());  // now and all the time
 
   // Each event heard since the story began answers one expectation. `kind` is spelled as in docs/protocol.md.
-  HeardEvent expect_event(std::string_view kind, Within within = {}, Where where = Where::current());
+  ReceivedEvent expect_event(std::string_view kind, Within within = {}, Where where = Where::current());
   // These in this order, whatever is in between.
   void expect_events(std::initializer_list<std::string_view> kinds, Within within = {}, Where where = Where::current());
   // None but those expected before.
@@ -98,12 +98,12 @@ class StoryWords {
   void let_go(Where where = Where::current());
 
   virtual Moment moment() const = 0;
-  const std::vector<HeardEvent>& events() const { return events_; }
+  const std::vector<ReceivedEvent>& events() const { return events_; }
 
  protected:
   StoryWords() = default;
-  void forget();                                                    // for a new beginning
-  void hear(const HeardEvent& event) { events_.push_back(event); }  // once for each
+  void forget();                                                          // for a new beginning
+  void receive(const ReceivedEvent& event) { events_.push_back(event); }  // once for each
   [[noreturn]] void fail(const std::string& what, const std::string& instead, Where where) const;
 
  private:
@@ -123,11 +123,11 @@ class StoryWords {
   std::optional<std::size_t> find_event(std::string_view kind, std::size_t from) const;
   std::size_t take_event(std::string_view kind, std::size_t from, double until_s);  // their number when none comes
   Answer await_answer(std::uint64_t id, Limit limit, Where where);
-  std::string told_events() const;
-  std::string told_commands() const;
+  std::string events_text() const;
+  std::string commands_text() const;
   const std::string& kind_of(std::uint64_t command_id) const;
 
-  std::vector<HeardEvent> events_;
+  std::vector<ReceivedEvent> events_;
   std::vector<bool> was_expected_;  // of events_, as far as it goes
   std::vector<Given> given_;
   bool is_driving_ = false;

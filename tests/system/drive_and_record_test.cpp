@@ -1,4 +1,4 @@
-// The paper's closed-loop experiment through the whole system: command door, link, core, plant, recorder, SQLite.
+// The paper's closed-loop experiment through the whole system: command checks, link, core, plant, recorder, SQLite.
 #include <fstream>
 #include <nlohmann/json.hpp>
 

@@ -16,7 +16,7 @@ class SnapshotTest : public SystemTest {
   storage::RunSnapshot snapshot_of(storage::RunId run) { return wait_for(runs->snapshot(run)).value(); }
 
   // In order of first_seq.
-  static std::vector<json> told(const storage::RunSnapshot& snapshot, const std::string& kind) {
+  static std::vector<json> records_of(const storage::RunSnapshot& snapshot, const std::string& kind) {
     std::vector<json> documents;
     for (const storage::InForce& document : snapshot.in_force) {
       if (document.kind == kind) documents.push_back(json::parse(document.content));
@@ -33,7 +33,7 @@ TEST_F(SnapshotTest, TheParametersAndTheControllerOfTheCoreAreThoseOfTheRun) {
   EXPECT_FALSE(snapshot.firmware_version.empty());
   EXPECT_EQ(snapshot.parameters_checksum, robot_fw::Parameters{}.checksum());
 
-  const auto parameters = told(snapshot, "parameters");
+  const auto parameters = records_of(snapshot, "parameters");
   ASSERT_EQ(parameters.size(), 1U);
   EXPECT_EQ(parameters[0].size(), robot_fw::kParameterCount);
   for (std::size_t i = 0; i < robot_fw::kParameterCount; ++i) {
@@ -43,7 +43,7 @@ TEST_F(SnapshotTest, TheParametersAndTheControllerOfTheCoreAreThoseOfTheRun) {
     EXPECT_EQ(parameters[0][spec.name]["unit"], spec.unit);
   }
 
-  const auto controllers = told(snapshot, "controller");
+  const auto controllers = records_of(snapshot, "controller");
   ASSERT_EQ(controllers.size(), 1U);
   const json& controller = controllers[0];
   EXPECT_EQ(controller["checksum"], snapshot.controller_checksum);
@@ -62,16 +62,16 @@ TEST_F(SnapshotTest, WhatChangesWhileARunIsOpenIsInItFromThatSampleOn) {
   const storage::RunId run = begin_run();
   pass(1);
   const auto set = send(sim_robot::set_parameter("power_limit_s", 7)).expect_accepted();
-  const auto sent = send(sim_robot::set_controller(robot_fw::golden_biquads())).expect_accepted();
+  const auto sent = send(sim_robot::set_controller(robot_fw::biquad_controller())).expect_accepted();
   pass(1);
   expect_whole(run);
   const storage::RunSnapshot snapshot = snapshot_of(run);
 
-  const auto parameters = told(snapshot, "parameters");
+  const auto parameters = records_of(snapshot, "parameters");
   ASSERT_EQ(parameters.size(), 2U);
   EXPECT_NE(parameters[0]["power_limit_s"]["value"], 7);
   EXPECT_EQ(parameters[1]["power_limit_s"]["value"], 7);
-  const auto controllers = told(snapshot, "controller");
+  const auto controllers = records_of(snapshot, "controller");
   ASSERT_EQ(controllers.size(), 2U);
   EXPECT_EQ(controllers[0]["kp"].get<float>(), robot_fw::kPaperController.kp);
   EXPECT_EQ(controllers[1]["kp"], 30);

@@ -77,16 +77,16 @@ void SystemTest::Listener::on_robot(const station::RobotState& state) {
 void SystemTest::Listener::on_event(const station::RobotState&, const station::RobotEvent& event) {
   const bool is_of_the_station = !event.event_seq.has_value();
   if (is_of_the_station || !known_events_.insert({event.boot_id, *event.event_seq}).second) return;
-  test_.hear({event.kind, event.cause, 1e-6 * static_cast<double>(event.robot_time_us),
-              static_cast<double>(event.position_m), static_cast<double>(event.value), event.emergency_id});
+  test_.receive({event.kind, event.cause, 1e-6 * static_cast<double>(event.robot_time_us),
+                 static_cast<double>(event.position_m), static_cast<double>(event.value), event.emergency_id});
 }
 
 sim_robot::Moment SystemTest::moment() const {
-  return {1e-6 * static_cast<double>(clock.steady_us()), heard(), sim_robot::true_view(robot->simulated()),
+  return {1e-6 * static_cast<double>(clock.steady_us()), received(), sim_robot::true_view(robot->simulated()),
           listener_of_events.connections, state().next_seq - state().durable_next_seq};
 }
 
-sim_robot::View SystemTest::heard() const {
+sim_robot::View SystemTest::received() const {
   const station::RobotState& known = state();
   sim_robot::View view;
   view.link = known.link == station::LinkState::connected ? sim_robot::LinkView::up : sim_robot::LinkView::lost;

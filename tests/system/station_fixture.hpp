@@ -62,7 +62,7 @@ class SystemTest : public ::testing::Test, public sim_robot::StoryWords {
   std::uint64_t give(const protocol::Command& command) override;
   std::optional<sim_robot::Answer> answer_to(std::uint64_t command_id) const override;
   boost::asio::awaitable<void> submit(std::uint64_t id, protocol::Command action);
-  sim_robot::View heard() const;
+  sim_robot::View received() const;
 
   template <class T>
   static boost::asio::awaitable<void> keep_result(boost::asio::awaitable<T> coroutine, std::optional<T>& result) {

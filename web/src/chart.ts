@@ -242,7 +242,7 @@ export class ChartDeck {
     this.frame = requestAnimationFrame(this.tick);
   }
 
-  // on_cursor hears which sample the pointer is at, null when it left.
+  // on_cursor gets which sample the pointer is at, null when it left.
   add(host: HTMLElement, options: StripOptions, on_cursor: (index: number | null, window: PlotWindow) => void): void {
     const chart: StripChart = new StripChart(
       host,

@@ -2,7 +2,7 @@
 //
 // A stop is never refused, never asks back and never waits for another. What is shown: pressed, then stopped with the
 // time from press to answer, or kept for a robot that is away, or the failure in words. "The stop may not have arrived"
-// stands until telemetry that was heard after the press shows the latch; a page that is cut off hears none.
+// stands until telemetry received after the press shows the latch; a page that is cut off receives none.
 
 import { is_complete, phase_of, type StopEvidence, type StopOutcome } from './stop_outcome';
 
@@ -25,7 +25,7 @@ export interface StopState {
 export interface StopWays {
   over_socket(robot_id: string | null, key: string): boolean;
   over_http(robot_id: string | null, key: string): Promise<StopOutcome>;
-  evidence(robot_id: string | null, since_ms: number): StopEvidence; // of what was heard since then
+  evidence(robot_id: string | null, since_ms: number): StopEvidence; // of what was received since then
   now_ms(): number;
   on_change(state: StopState): void;
 }

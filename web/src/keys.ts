@@ -1,7 +1,7 @@
 // Keys that work everywhere on the page. Escape is the emergency stop, whatever has the focus and whatever is open.
 //
 // What opens on the page is drawn by the page itself: the first Escape would only close a native pop-up (select, datalist,
-// date, a list of earlier entries), and the page would never hear of it.
+// date, a list of earlier entries), and the page would never know of it.
 
 import { useLayoutEffect } from 'preact/hooks';
 

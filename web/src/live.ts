@@ -1,4 +1,4 @@
-// The /live WebSocket that heals itself: opens, notices silence, and tries again until it is told to stop.
+// The /live WebSocket that heals itself: opens, notices silence, and tries again until it is stopped.
 //
 //   connecting → (welcome) → live → (closed, or silent for 1.5 s) → waiting → connecting → …
 //   waiting → (the station says 401) → signed_out → (a person opened the link, in whatever tab) → connecting → …
@@ -35,7 +35,7 @@ export const kFirstDelay_ms = 300;
 export const kLongestDelay_ms = 2000;
 const kDelayGrowth = 1.6;
 const kJitter = 0.3; // of the delay, either way
-export const kFresh_ms = 400; // a stamp younger than this proves that the station hears and answers
+export const kFresh_ms = 400; // a stamp younger than this proves that the station receives and answers
 export const kCurrent_ms = 1000; // without a stamp for this long, nothing is claimed of the station's present
 export const kSignedOut_ms = 2000; // how often a signed-out page asks whether it still is
 const kOpenState = 1;
@@ -104,13 +104,13 @@ export class LiveLink {
     this.set_phase('connecting');
     const socket = this.surroundings.open_socket();
     this.socket = socket;
-    socket.onmessage = (event: { data: unknown }) => this.hear(event.data);
+    socket.onmessage = (event: { data: unknown }) => this.receive(event.data);
     socket.onclose = () => this.lose();
     socket.onerror = () => undefined; // a close follows
     this.set_timer(() => this.lose(), kOpen_ms);
   }
 
-  private hear(data: unknown): void {
+  private receive(data: unknown): void {
     if (typeof data !== 'string') return;
     this.heard_at_ms = this.surroundings.now_ms();
     let message: LiveMessage;

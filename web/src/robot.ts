@@ -1,4 +1,4 @@
-// One robot as the page knows it: its state as the station told it last, and what its samples say.
+// One robot as the page knows it: its state as the station reported it last, and what its samples say.
 
 import { computed, signal, type Signal } from '@preact/signals';
 import type { RobotModel, RobotState, SamplesMessage } from './api';
@@ -11,20 +11,20 @@ const kSettle_ms = 500;
 const kModelConfirmed = 64; // of flags
 const kModelMismatch = 128;
 
-// Whose model the estimator has, and whether it is that of the fluid; empty where the position is no estimate. `told`:
-// what the station has told the robot.
-export function model_of(flags: number, position_sd_m: number | null, told?: RobotModel): string {
+// Whose model the estimator has, and whether it is that of the fluid; empty where the position is no estimate. `sent`:
+// what the station has sent to the robot.
+export function model_of(flags: number, position_sd_m: number | null, sent?: RobotModel): string {
   if (position_sd_m === 0) return '';
   const is_confirmed = (flags & kModelConfirmed) !== 0;
-  const fluid = told?.fluid ? fluid_text(told.fluid) : '';
-  const named = fluid && told?.state === 'confirmed' && is_confirmed ? `model of ${fluid}` : 'model';
+  const fluid = sent?.fluid ? fluid_text(sent.fluid) : '';
+  const named = fluid && sent?.state === 'confirmed' && is_confirmed ? `model of ${fluid}` : 'model';
   if (flags & kModelMismatch) return `${named} does not fit`;
   // Under the flag, too: a former model of the same fluid may be what is confirmed.
-  if (fluid && told?.state === 'sending') return `model of ${fluid} being sent`;
-  if (is_confirmed && (told?.state === 'failed' || told?.state === 'sending'))
+  if (fluid && sent?.state === 'sending') return `model of ${fluid} being sent`;
+  if (is_confirmed && (sent?.state === 'failed' || sent?.state === 'sending'))
     return 'model confirmed for another fluid';
   if (is_confirmed) return named === 'model' ? 'model confirmed' : `${named}, confirmed`;
-  return fluid && told?.state === 'failed' ? `model of ${fluid} could not be sent` : 'model assumed';
+  return fluid && sent?.state === 'failed' ? `model of ${fluid} could not be sent` : 'model assumed';
 }
 
 // The parameters that bound motion and are not at their default, in one line; empty when there is none.
@@ -37,7 +37,7 @@ export function changed_limits_of(state: Pick<RobotState, 'changed_limits'>): st
   return limits.length === 0 ? '' : `Changed limits: ${limits.join(', ')}`;
 }
 
-// What the numerals show; null: never heard.
+// What the numerals show; null: never received.
 export interface Readout {
   watched: boolean; // its samples are asked for; of the others nothing is shown that changes with each sample
   estimate_m: number | null; // where the robot believes that it is
@@ -56,7 +56,7 @@ export interface Readout {
   sample_age_ms: number;
   stale: boolean;
   received: number;
-  missing: number; // samples that this page has not got, since it first heard this boot
+  missing: number; // samples that this page has not got, since it first received this boot
 }
 
 const kEmptyReadout: Readout = {
@@ -116,7 +116,7 @@ export class Robot {
   private first_seq = 0;
   private next_seq = 0;
   private received = 0;
-  private stated_at_ms: number; // when the station last told its state
+  private stated_at_ms: number; // when the station last reported its state
   private latched_at_ms = -Infinity; // when news last showed the latch
   private is_latched = false; // by the latest news
   private shown: { state: RobotState; is_current: boolean } | null = null; // of a robot that is not watched
@@ -139,7 +139,7 @@ export class Robot {
     this.note_latch(state.mode, state.link === 'connected', now_ms);
   }
 
-  // What was heard since then of a stop of this robot. A latch counts by telemetry, and by the state of a robot that is
+  // What was received since then of a stop of this robot. A latch counts by telemetry, and by the state of a robot that is
   // connected, which is made of telemetry; a robot that is away keeps the mode that it had.
   stop_evidence(since_ms: number): 'latched' | 'cleared' | 'kept' | 'open' {
     if (this.latched_at_ms > since_ms) return this.is_latched ? 'latched' : 'cleared';
@@ -150,7 +150,7 @@ export class Robot {
   private note_latch(mode: string, is_news: boolean, now_ms: number): void {
     if (!is_news) return;
     const is_latched = mode === 'emergency';
-    // States come at once and samples some 50 ms later: what was made before the latch may be heard after it.
+    // States come at once and samples some 50 ms later: what was made before the latch may arrive after it.
     if (!is_latched && now_ms - this.latched_at_ms < kSettle_ms) return;
     this.is_latched = is_latched;
     if (is_latched) this.latched_at_ms = now_ms;
@@ -162,14 +162,14 @@ export class Robot {
     this.watched = watched;
   }
 
-  // Of the position at that moment; null: what the page heard last is of another one.
+  // Of the position at that moment; null: what the page received last is of another one.
   position_sd_m_at(boot_id: string | null, robot_time_us: number | null): number | null {
-    const heard = this.watched && this.latest ? end_of_samples(this.latest) : end_of_state(this.state.peek());
-    if (robot_time_us === null || boot_id === null || boot_id !== heard.boot_id) return null;
-    return Math.abs(robot_time_us - heard.robot_time_us) <= kSameMoment_us ? heard.position_sd_m : null;
+    const newest = this.watched && this.latest ? end_of_samples(this.latest) : end_of_state(this.state.peek());
+    if (robot_time_us === null || boot_id === null || boot_id !== newest.boot_id) return null;
+    return Math.abs(robot_time_us - newest.robot_time_us) <= kSameMoment_us ? newest.position_sd_m : null;
   }
 
-  hear(message: SamplesMessage, now_ms: number): void {
+  receive(message: SamplesMessage, now_ms: number): void {
     const size = message.position_m.length;
     if (message.boot_id !== this.boot_id) {
       this.boot_id = message.boot_id;
@@ -186,7 +186,7 @@ export class Robot {
     this.note_latch(message.mode, true, now_ms);
   }
 
-  // is_current: the page hears the station; what it knows of a robot is old otherwise.
+  // is_current: the page receives from the station; what it knows of a robot is old otherwise.
   refresh(now_ms: number, is_current: boolean): void {
     if (!this.watched) return this.refresh_from_state(is_current);
     this.shown = null;
@@ -219,7 +219,7 @@ export class Robot {
     };
   }
 
-  // The station tells of its link, mode and emergency at once; numbers would be old.
+  // The station reports its link, mode and emergency at once; numbers would be old.
   private refresh_from_state(is_current: boolean): void {
     const state = this.state.peek();
     if (this.shown?.state === state && this.shown.is_current === is_current) return;

@@ -46,7 +46,7 @@ export class Session {
       },
       (message) => {
         if (message.type === 'problem') this.hold.lapse(); // the only message that it can be about, but for a stop
-        this.store.hear(message);
+        this.store.receive(message);
       },
       () => this.on_phase(),
     );
@@ -122,7 +122,7 @@ export class Session {
     await this.api.log_out();
   };
 
-  // What /live does not tell: the station itself and the runs that are open.
+  // What /live does not report: the station itself and the runs that are open.
   private async load(): Promise<void> {
     try {
       this.station.value = await this.api.station();
@@ -135,7 +135,7 @@ export class Session {
     }
   }
 
-  // A page that stood still (a machine under load) hears first what waits for it: one refresh is let pass, never two.
+  // A page that stood still (a machine under load) receives first what waits for it: one refresh is let pass, never two.
   private judge_current(now_ms: number): void {
     const stood_still = now_ms - this.refreshed_at_ms > 3 * kRefresh_ms && !this.let_pass;
     const is_current = this.link.is_current();

@@ -29,7 +29,7 @@ export class Store {
     return this.by_id.get(this.selected_id.value ?? '') ?? null;
   });
   readonly log = signal<LogLine[]>([]);
-  // The page hears the station. While it does not, it does not know who is in control, nor whether a run is open.
+  // The page receives from the station. While it does not, it does not know who is in control, nor whether a run is open.
   readonly is_current = signal(false);
   readonly runs = signal<RunRecord[]>([]); // that are open, at most one for each robot
   readonly interrupted = signal<RunRecord[]>([]); // of each robot its newest run, if the station stopped in it
@@ -41,7 +41,7 @@ export class Store {
 
   constructor(private readonly clocks: { page_ms(): number; utc_ms(): number }) {}
 
-  hear(message: LiveMessage): void {
+  receive(message: LiveMessage): void {
     switch (message.type) {
       case 'welcome':
         batch(() => {
@@ -53,7 +53,7 @@ export class Store {
         this.take_states([message.robot]);
         break;
       case 'samples':
-        this.find(message.robot_id)?.hear(message, this.clocks.page_ms());
+        this.find(message.robot_id)?.receive(message, this.clocks.page_ms());
         break;
       case 'event':
         this.write(this.line_of_event(message.event));

@@ -1,6 +1,6 @@
 // What the tab says to whoever looks elsewhere: an emergency, and that the page is cut off, in title and icon.
 //
-// It follows the states that the station tells, which reach a tab in the background at once; timers there are slow.
+// It follows the states that the station reports, which reach a tab in the background at once; timers there are slow.
 
 import { computed, effect } from '@preact/signals';
 import type { Session } from './session';

@@ -58,7 +58,7 @@ test('ids of 64 bits pass through unrounded', async () => {
   expect(String(asked[0]?.options.body)).toContain('"18446744073709551615"');
 });
 
-test('a refused setpoint tells the range that is allowed, in millimetres', async () => {
+test('a refused setpoint names the range that is allowed, in millimetres', async () => {
   const detail = 'setpoint_m = 99.999 is outside -1 to 1';
   const { api } = api_that_answers(422, { title: 'Unprocessable', detail, reason: 'out_of_range' });
   expect((await failure(api.set_setpoint('rheo-1', 99.999))).message).toBe('Allowed is \u22121000 to 1000 mm.');

@@ -10,8 +10,8 @@ const record = (state: CommandRecord['state'], robot_id = 'rheo-1', reason = '')
   ({ state, robot_id, reason }) as CommandRecord;
 
 function stop_with(over_http: () => Promise<CommandRecord[]>, over_socket: () => boolean = () => true) {
-  const heard: StopEvidence = { latched: 0, kept: 0, cleared: 0, open: 1 };
-  const world = { now_ms: 0, ways: [] as string[], keys: [] as string[], states: [] as StopState[], heard };
+  const evidence: StopEvidence = { latched: 0, kept: 0, cleared: 0, open: 1 };
+  const world = { now_ms: 0, ways: [] as string[], keys: [] as string[], states: [] as StopState[], evidence };
   const emergency = new EmergencyStop({
     over_socket: (robot_id, key) => {
       world.ways.push(`socket ${robot_id}`);
@@ -23,7 +23,7 @@ function stop_with(over_http: () => Promise<CommandRecord[]>, over_socket: () =>
       world.keys.push(key);
       return over_http().then(outcome_of);
     },
-    evidence: () => world.heard,
+    evidence: () => world.evidence,
     now_ms: () => world.now_ms,
     on_change: (state) => world.states.push(state),
   });
@@ -114,7 +114,7 @@ test('that it may not have arrived stands until telemetry shows the latch', asyn
   await emergency.stop('rheo-1');
   for (world.now_ms = 0; world.now_ms < 3_600_000; world.now_ms += 60_000) emergency.look();
   expect(emergency.state.phase).toBe('failed');
-  world.heard = { latched: 1, kept: 0, cleared: 0, open: 0 };
+  world.evidence = { latched: 1, kept: 0, cleared: 0, open: 0 };
   emergency.look();
   expect(emergency.state.phase).toBe('seen');
 });
@@ -122,20 +122,20 @@ test('that it may not have arrived stands until telemetry shows the latch', asyn
 test('of every robot each must show its latch, or be away with the stop kept', async () => {
   const { emergency, world } = stop_with(() => Promise.reject(new Error('The station did not answer.')));
   await emergency.stop(null);
-  world.heard = { latched: 2, kept: 1, cleared: 0, open: 1 };
+  world.evidence = { latched: 2, kept: 1, cleared: 0, open: 1 };
   emergency.look();
   expect(emergency.state.phase).toBe('failed');
-  world.heard = { latched: 3, kept: 1, cleared: 0, open: 0 };
+  world.evidence = { latched: 3, kept: 1, cleared: 0, open: 0 };
   emergency.look();
   expect(emergency.state.phase).toBe('kept');
-  world.heard = { latched: 4, kept: 0, cleared: 0, open: 0 };
+  world.evidence = { latched: 4, kept: 0, cleared: 0, open: 0 };
   emergency.look();
   expect(emergency.state.phase).toBe('seen');
 });
 
 test('a late failure of one way is not shown over a latch that was seen', async () => {
   const { emergency, world } = stop_with(() => Promise.reject(new Error('The station did not answer.')));
-  world.heard = { latched: 1, kept: 0, cleared: 0, open: 0 };
+  world.evidence = { latched: 1, kept: 0, cleared: 0, open: 0 };
   await emergency.stop('rheo-1');
   expect(emergency.state.phase).toBe('seen');
 });
@@ -145,7 +145,7 @@ test('that a robot was stopped is no longer said when its latch is gone', async 
   await emergency.stop('rheo-1');
   emergency.look();
   expect(emergency.state.phase).toBe('stopped');
-  world.heard = { latched: 0, kept: 0, cleared: 1, open: 0 };
+  world.evidence = { latched: 0, kept: 0, cleared: 1, open: 0 };
   emergency.look();
   expect(emergency.state.phase).toBe('idle');
 });

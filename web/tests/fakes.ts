@@ -3,7 +3,7 @@
 import type { LiveMessage, SamplesMessage } from '../src/api';
 import type { Socket, Surroundings } from '../src/live';
 
-// Time that moves only when told to; timers run in their order.
+// Time that moves only when it is advanced; timers run in their order.
 export class FakeTime {
   now_ms = 0;
   private timers: { at_ms: number; every_ms: number | null; callback: () => void; id: number }[] = [];

@@ -28,18 +28,18 @@ const robot_with = (changed_limits: RobotState['changed_limits']) =>
 
 test('a limit that differs from its default is shown until it is restored', async () => {
   const store = new Store({ page_ms: () => 0, utc_ms: () => 0 });
-  store.hear({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots: [robot_with([])] });
+  store.receive({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots: [robot_with([])] });
   store.refresh();
   const page = new FakeNode(1, 'body');
   render(h(LinkPanel, { robot: store.robots.value[0]! }), page as unknown as Element);
-  const tell = async (limits: RobotState['changed_limits']) => {
-    store.hear({ type: 'robot', robot: robot_with(limits) });
+  const receive = async (limits: RobotState['changed_limits']) => {
+    store.receive({ type: 'robot', robot: robot_with(limits) });
     store.refresh();
     await vi.advanceTimersByTimeAsync(100);
   };
   expect(page.find('changed-limits')).toBeNull();
-  await tell([{ name: 'position_limit_max_m', unit: 'm', value: 0.2, default: 100 }]);
+  await receive([{ name: 'position_limit_max_m', unit: 'm', value: 0.2, default: 100 }]);
   expect(page.find('changed-limits')!.text).toBe('Changed limits: position_limit_max_m 0.2 m (default 100 m)');
-  await tell([]);
+  await receive([]);
   expect(page.find('changed-limits')).toBeNull();
 });

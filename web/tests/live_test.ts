@@ -3,16 +3,16 @@ import { expect, test } from 'vitest';
 import { kCurrent_ms, kFirstDelay_ms, kLongestDelay_ms, kSignedOut_ms, kSilence_ms, LiveLink } from '../src/live';
 import { FakeSurroundings } from './fakes';
 
-function started(): { around: FakeSurroundings; link: LiveLink; heard: string[] } {
+function started(): { around: FakeSurroundings; link: LiveLink; received: string[] } {
   const around = new FakeSurroundings();
-  const heard: string[] = [];
+  const received: string[] = [];
   const link = new LiveLink(
     around,
-    (message) => heard.push(message.type),
+    (message) => received.push(message.type),
     () => undefined,
   );
   link.start();
-  return { around, link, heard };
+  return { around, link, received };
 }
 
 test('is live once it was welcomed, not before', () => {
@@ -62,7 +62,7 @@ test('silence for 1.5 s is a lost connection, even if TCP says nothing', async (
   await around.time.advance(kSilence_ms);
   expect(link.phase).toBe('waiting');
   expect(first.closed).toBe(true);
-  expect(link.lost_at_ms).toBe(2000); // when it was heard last
+  expect(link.lost_at_ms).toBe(2000); // when the last message came
 });
 
 test('a connection that is never welcomed is given up', async () => {
@@ -117,24 +117,24 @@ test('what the page shows is current for a second after a stamp', async () => {
 });
 
 test('a message that is no JSON does not end the connection', () => {
-  const { around, link, heard } = started();
+  const { around, link, received } = started();
   around.socket.welcome();
   around.socket.onmessage?.({ data: '{"type":' } as never);
   around.socket.say({ type: 'stamp', stamp_us: 1 });
   expect(link.phase).toBe('live');
-  expect(heard).toEqual(['welcome', 'stamp']);
+  expect(received).toEqual(['welcome', 'stamp']);
 });
 
-test('what is said by a connection that was given up is not heard', async () => {
-  const { around, heard } = started();
+test('messages of a connection that was given up are ignored', async () => {
+  const { around, received } = started();
   const first = around.socket;
   first.welcome();
   await around.time.advance(kSilence_ms + kFirstDelay_ms);
   first.say({ type: 'stamp', stamp_us: 1 });
-  expect(heard).toEqual(['welcome']);
+  expect(received).toEqual(['welcome']);
 });
 
-test('send tells whether this way is open', () => {
+test('send returns whether this connection is open', () => {
   const { around, link } = started();
   expect(link.send({ type: 'keep_alive' })).toBe(false);
   around.socket.welcome();

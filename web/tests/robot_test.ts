@@ -24,7 +24,7 @@ test('limits that are not at their default stand in one line, and nothing where 
   );
 });
 
-const told = (state: RobotModel['state'], fluid: string | null = null, reason = ''): RobotModel => ({
+const model_state = (state: RobotModel['state'], fluid: string | null = null, reason = ''): RobotModel => ({
   state,
   fluid,
   reason,
@@ -32,30 +32,34 @@ const told = (state: RobotModel['state'], fluid: string | null = null, reason = 
   set_at_us: fluid === null ? null : 1,
 });
 
-test('it names the fluid whose model the station has told, and whether that holds', () => {
-  expect(model_of(64, 0.004, told('confirmed', 'water'))).toBe('model of water, confirmed');
-  expect(model_of(64 | 128, 0.004, told('confirmed', 'water'))).toBe('model of water does not fit');
-  expect(model_of(64, 0.004, told('confirmed'))).toBe('model confirmed');
-  expect(model_of(0, 0.004, told('sending', 'non_newtonian'))).toBe('model of non-Newtonian being sent');
-  expect(model_of(0, 0.004, told('failed', 'water', 'the motor is on'))).toBe('model of water could not be sent');
+test('it names the fluid whose model the station has sent, and whether that holds', () => {
+  expect(model_of(64, 0.004, model_state('confirmed', 'water'))).toBe('model of water, confirmed');
+  expect(model_of(64 | 128, 0.004, model_state('confirmed', 'water'))).toBe('model of water does not fit');
+  expect(model_of(64, 0.004, model_state('confirmed'))).toBe('model confirmed');
+  expect(model_of(0, 0.004, model_state('sending', 'non_newtonian'))).toBe('model of non-Newtonian being sent');
+  expect(model_of(0, 0.004, model_state('failed', 'water', 'the motor is on'))).toBe(
+    'model of water could not be sent',
+  );
   // A former model of water, or the one that is being confirmed.
-  expect(model_of(64, 0.004, told('sending', 'water'))).toBe('model of water being sent');
-  expect(model_of(64, 0.004, told('sending', null))).toBe('model confirmed for another fluid');
-  expect(model_of(64, 0.004, told('failed', null, 'x'))).toBe('model confirmed for another fluid');
-  expect(model_of(0, 0.004, told('confirmed', 'water'))).toBe('model assumed'); // telemetry has the last word
+  expect(model_of(64, 0.004, model_state('sending', 'water'))).toBe('model of water being sent');
+  expect(model_of(64, 0.004, model_state('sending', null))).toBe('model confirmed for another fluid');
+  expect(model_of(64, 0.004, model_state('failed', null, 'x'))).toBe('model confirmed for another fluid');
+  expect(model_of(0, 0.004, model_state('confirmed', 'water'))).toBe('model assumed'); // telemetry has the last word
 });
 
 test('beside the fluid stands what became of its model, and nothing where there is none', () => {
-  expect(model_notice(told('assumed'), 'water', false)).toBe('');
-  expect(model_notice(told('assumed'), 'water', true)).toBe('The model of water is not in force.');
-  expect(model_notice(told('assumed', null, 'the robot has booted: name its fluid again'), 'water', true)).toBe(
+  expect(model_notice(model_state('assumed'), 'water', false)).toBe('');
+  expect(model_notice(model_state('assumed'), 'water', true)).toBe('The model of water is not in force.');
+  expect(model_notice(model_state('assumed', null, 'the robot has booted: name its fluid again'), 'water', true)).toBe(
     'The model of water is not in force: the robot has booted: name its fluid again.',
   );
-  expect(model_notice(told('failed', 'water', 'the motor is on'), 'water', true)).toBe(
+  expect(model_notice(model_state('failed', 'water', 'the motor is on'), 'water', true)).toBe(
     'The model of water could not be sent: the motor is on.',
   );
-  expect(model_notice(told('confirmed', 'water'), 'water', true)).toBe(
+  expect(model_notice(model_state('confirmed', 'water'), 'water', true)).toBe(
     'The model of water is in force, fit error 0.21 %.',
   );
-  expect(model_notice(told('sending'), null, false)).toBe('The confirmation of the model before is being taken back.');
+  expect(model_notice(model_state('sending'), null, false)).toBe(
+    'The confirmation of the model before is being taken back.',
+  );
 });

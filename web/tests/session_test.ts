@@ -11,7 +11,7 @@ const robot = (robot_id: string, link: RobotState['link']) =>
 function session_beside(away: RobotState) {
   vi.stubGlobal('fetch', () => Promise.reject(new Error('no network here')));
   const session = new Session({ open_socket: () => ({}) as never });
-  session.store.hear({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots: [away] });
+  session.store.receive({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots: [away] });
   return session;
 }
 
@@ -24,7 +24,7 @@ test('a robot that was stopped, or sent anything, stays selected when another on
   for (const act of acts) {
     const session = session_beside(robot('a', 'disconnected'));
     await act(session);
-    session.store.hear({ type: 'robot', robot: robot('b', 'connected') });
+    session.store.receive({ type: 'robot', robot: robot('b', 'connected') });
     expect(session.store.selected_id.value).toBe('a');
   }
 });
@@ -32,6 +32,6 @@ test('a robot that was stopped, or sent anything, stays selected when another on
 test('what a page asks chooses no robot', async () => {
   const session = session_beside(robot('a', 'disconnected'));
   await session.api.newest_run('a').catch(() => undefined);
-  session.store.hear({ type: 'robot', robot: robot('b', 'connected') });
+  session.store.receive({ type: 'robot', robot: robot('b', 'connected') });
   expect(session.store.selected_id.value).toBe('b');
 });

@@ -34,7 +34,7 @@ const latched = (emergency_id: string) =>
 // The page of an operator who may clear; `cleared`: the emergencies that it has asked to clear.
 function drawn_with(state: RobotState) {
   const store = new Store({ page_ms: () => 0, utc_ms: () => 0 });
-  store.hear({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots: [state] });
+  store.receive({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots: [state] });
   store.is_current.value = true;
   store.refresh();
   const cleared: string[] = [];
@@ -47,11 +47,11 @@ function drawn_with(state: RobotState) {
   } as unknown as Session;
   const page = new FakeNode(1, 'body');
   render(h(StopPanel, { session }), page as unknown as Element);
-  const tell = (next: RobotState) => {
-    store.hear({ type: 'robot', robot: next });
+  const receive = (next: RobotState) => {
+    store.receive({ type: 'robot', robot: next });
     store.refresh();
   };
-  return { page, tell, cleared };
+  return { page, receive, cleared };
 }
 
 test('the latch is cleared by a hold of a whole second', async () => {
@@ -66,11 +66,11 @@ test('the latch is cleared by a hold of a whole second', async () => {
 
 // SAFETY: whoever holds has seen the emergency before, not the one that has come since.
 test('a hold that began before another emergency clears neither', async () => {
-  const { page, tell, cleared } = drawn_with(latched('A'));
+  const { page, receive, cleared } = drawn_with(latched('A'));
   await vi.advanceTimersByTimeAsync(100);
   page.find('clear-emergency')!.fire('PointerDown');
   await vi.advanceTimersByTimeAsync(900);
-  tell(latched('B'));
+  receive(latched('B'));
   await vi.advanceTimersByTimeAsync(5 * kGuard_ms);
   expect(page.find('clear-emergency')!.text).toContain('B');
   expect(cleared).toEqual([]);

@@ -10,14 +10,14 @@ const robot = (robot_id: string, change: Partial<RobotState> = {}) =>
 function store_with(...robots: RobotState[]) {
   const clock = { page: 0 };
   const store = new Store({ page_ms: () => clock.page, utc_ms: () => 1_700_000_000_000 });
-  store.hear({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots });
+  store.receive({ type: 'welcome', actor: 'session:1', version: '', utc_us: 0, stamp_us: 0, robots });
   return { store, clock };
 }
 
 test('numerals follow the last sample, at the refresh and not per sample', () => {
   const { store } = store_with(robot('rheo-1'));
   const one = store.find('rheo-1')!;
-  store.hear(batch(0, 5));
+  store.receive(batch(0, 5));
   expect(one.readout.value.position_m).toBeNull();
   store.refresh();
   expect(one.readout.value).toMatchObject({
@@ -32,7 +32,7 @@ test('numerals follow the last sample, at the refresh and not per sample', () =>
 
 test('a disturbance moves what the controller sees away from where the robot is', () => {
   const { store } = store_with(robot('rheo-1'));
-  store.hear(batch(100, 1, { disturbance_m: -0.05, position_m: [0.1] }));
+  store.receive(batch(100, 1, { disturbance_m: -0.05, position_m: [0.1] }));
   store.refresh();
   const { position_m, estimate_m, disturbance_m } = store.find('rheo-1')!.readout.value;
   expect(position_m).toBeCloseTo(0.1, 12);
@@ -42,14 +42,14 @@ test('a disturbance moves what the controller sees away from where the robot is'
 
 test('without a known disturbance nobody knows where the robot is', () => {
   const { store } = store_with(robot('rheo-1'));
-  store.hear(batch(100, 1, { disturbance_m: null }));
+  store.receive(batch(100, 1, { disturbance_m: null }));
   store.refresh();
   expect(store.find('rheo-1')!.readout.value).toMatchObject({ estimate_m: null, position_m: 0.1 });
 });
 
-test('no sample for over half a second marks every numeral stale and tells the age', () => {
+test('no sample for over half a second marks every numeral stale and shows the age', () => {
   const { store, clock } = store_with(robot('rheo-1'));
-  store.hear(batch(0, 5));
+  store.receive(batch(0, 5));
   clock.page = 500;
   store.refresh();
   expect(store.find('rheo-1')!.readout.value.stale).toBe(false);
@@ -60,20 +60,20 @@ test('no sample for over half a second marks every numeral stale and tells the a
 
 test('of a silent robot the mode is the one that the station knows', () => {
   const { store, clock } = store_with(robot('rheo-1'));
-  store.hear(batch(0, 5));
+  store.receive(batch(0, 5));
   clock.page = 1000;
-  store.hear({ type: 'robot', robot: robot('rheo-1', { mode: 'emergency', emergency_id: '9' }) });
+  store.receive({ type: 'robot', robot: robot('rheo-1', { mode: 'emergency', emergency_id: '9' }) });
   store.refresh();
   expect(store.find('rheo-1')!.readout.value).toMatchObject({ mode: 'emergency', emergency_id: '9' });
 });
 
 test('backfill is history: it does not move the numerals back', () => {
   const { store } = store_with(robot('rheo-1'));
-  store.hear(batch(0, 5));
-  store.hear(batch(20, 5));
+  store.receive(batch(0, 5));
+  store.receive(batch(20, 5));
   store.refresh();
   expect(store.find('rheo-1')!.readout.value).toMatchObject({ received: 10, missing: 15 });
-  store.hear(batch(5, 15, { backfill: true, mode: 'manual' }));
+  store.receive(batch(5, 15, { backfill: true, mode: 'manual' }));
   store.refresh();
   expect(store.find('rheo-1')!.readout.value).toMatchObject({
     position_m: 0.024,
@@ -85,8 +85,8 @@ test('backfill is history: it does not move the numerals back', () => {
 
 test('a new boot counts anew', () => {
   const { store } = store_with(robot('rheo-1'));
-  store.hear(batch(500, 5));
-  store.hear(batch(0, 5, { boot_id: '12' }));
+  store.receive(batch(500, 5));
+  store.receive(batch(0, 5, { boot_id: '12' }));
   store.refresh();
   expect(store.find('rheo-1')!.readout.value).toMatchObject({ received: 5, missing: 0 });
 });
@@ -99,7 +99,7 @@ test('the only robot is selected by itself, a connected one rather than one that
 test('what a person selected stays, whoever connects', () => {
   const { store } = store_with(robot('a', { link: 'disconnected' }));
   store.select('a');
-  store.hear({ type: 'robot', robot: robot('b') });
+  store.receive({ type: 'robot', robot: robot('b') });
   expect(store.selected_id.value).toBe('a');
   expect(store.robots.value).toHaveLength(2);
 });
@@ -107,9 +107,9 @@ test('what a person selected stays, whoever connects', () => {
 // SAFETY: Escape stops what is selected.
 test('a robot that was connected stays selected when its link breaks, whoever else is there', () => {
   const { store } = store_with(robot('a'), robot('b'));
-  store.hear({ type: 'robot', robot: robot('a', { link: 'disconnected' }) });
+  store.receive({ type: 'robot', robot: robot('a', { link: 'disconnected' }) });
   expect(store.selected_id.value).toBe('a');
-  store.hear({
+  store.receive({
     type: 'welcome',
     actor: 'session:1',
     version: '',
@@ -123,17 +123,17 @@ test('a robot that was connected stays selected when its link breaks, whoever el
 test('until a robot is connected the selection looks for one', () => {
   const { store } = store_with(robot('a', { link: 'disconnected' }), robot('b', { link: 'disconnected' }));
   expect(store.selected_id.value).toBe('a');
-  store.hear({ type: 'robot', robot: robot('b') });
+  store.receive({ type: 'robot', robot: robot('b') });
   expect(store.selected_id.value).toBe('b');
-  store.hear({ type: 'robot', robot: robot('a') });
-  store.hear({ type: 'robot', robot: robot('b', { link: 'disconnected' }) });
+  store.receive({ type: 'robot', robot: robot('a') });
+  store.receive({ type: 'robot', robot: robot('b', { link: 'disconnected' }) });
   expect(store.selected_id.value).toBe('b');
 });
 
 test('a robot that was sent something stays selected, also one that was never connected', () => {
   const { store } = store_with(robot('a', { link: 'disconnected' }));
   store.keep_selected();
-  store.hear({ type: 'robot', robot: robot('b') });
+  store.receive({ type: 'robot', robot: robot('b') });
   expect(store.selected_id.value).toBe('a');
 });
 
@@ -152,24 +152,24 @@ const event_at = (robot_time_us: number, change: Partial<EventRecord> = {}) =>
 test('the position of an event has the ± of its own moment, or none', () => {
   const { store } = store_with(robot('rheo-1', { boot_id: '11', latest_robot_time_us: 0, position_sd_m: 0.02 }));
   const sd_of = (event: EventRecord) => {
-    store.hear({ type: 'event', event });
+    store.receive({ type: 'event', event });
     store.refresh();
     return store.log.value[0]?.position_sd_m;
   };
   expect(sd_of(event_at(100_000))).toBe(0.02); // of the state, before samples come
-  store.hear(batch(1000, 5, { position_sd_m: 0.03 })); // to 10.04 s
+  store.receive(batch(1000, 5, { position_sd_m: 0.03 })); // to 10.04 s
   expect(sd_of(event_at(10_100_000))).toBe(0.03);
   expect(sd_of(event_at(4_000_000))).toBeNull();
   expect(sd_of(event_at(10_050_000, { boot_id: '10' }))).toBeNull();
   expect(sd_of(event_at(10_060_000, { kind: 'position_zeroed', position_m: 0 }))).toBeNull();
-  store.hear(batch(1005, 5, { position_sd_m: 0 })); // a perfect sensor
+  store.receive(batch(1005, 5, { position_sd_m: 0 })); // a perfect sensor
   expect(sd_of(event_at(10_110_000))).toBe(0);
 });
 
 test('the log keeps the last lines, newest first, and a command has one line that changes', () => {
   const { store } = store_with(robot('rheo-1'));
   const command = (n: number, state: CommandRecord['state']) =>
-    store.hear({
+    store.receive({
       type: 'command',
       command: { command_id: String(n), robot_id: 'rheo-1', state, submitted_at_us: n } as CommandRecord,
     });
@@ -185,13 +185,13 @@ test('the log keeps the last lines, newest first, and a command has one line tha
   expect(store.log.value[1]?.command?.state).toBe('acknowledged');
 });
 
-test('a log tells events and commands together; of each command one line stays', () => {
+test('a log brings events and commands together; of each command one line stays', () => {
   const { store } = store_with(robot('rheo-1'));
   const command = (n: number, state: CommandRecord['state']) =>
     ({ command_id: String(n), robot_id: 'rheo-1', state, submitted_at_us: n }) as CommandRecord;
   const event = { robot_id: 'rheo-1', boot_id: '7', event_seq: 3, kind: 'emergency', received_at_us: 9 } as EventRecord;
-  store.hear({ type: 'command', command: command(1, 'sent') });
-  store.hear({ type: 'log', events: [event], commands: [command(1, 'acknowledged'), command(2, 'sent')] });
+  store.receive({ type: 'command', command: command(1, 'sent') });
+  store.receive({ type: 'log', events: [event], commands: [command(1, 'acknowledged'), command(2, 'sent')] });
   store.refresh();
   expect(store.log.value.map((line) => line.command?.state ?? line.event?.kind)).toEqual([
     'sent',
@@ -202,7 +202,7 @@ test('a log tells events and commands together; of each command one line stays',
 
 test('dropped messages are said', () => {
   const { store } = store_with(robot('rheo-1'));
-  store.hear({ type: 'dropped', count: 12 });
+  store.receive({ type: 'dropped', count: 12 });
   store.refresh();
   expect(store.log.value[0]?.note).toContain('12');
 });
@@ -210,9 +210,9 @@ test('dropped messages are said', () => {
 test('an open run is shown until it ends', () => {
   const { store } = store_with(robot('rheo-1'));
   const run = { run_id: 7, robot_id: 'rheo-1', ended_at_us: null } as never as Parameters<Store['take_run']>[0];
-  store.hear({ type: 'run', run });
+  store.receive({ type: 'run', run });
   expect(store.runs.value).toHaveLength(1);
-  store.hear({ type: 'run', run: { ...run, ended_at_us: 5 } });
+  store.receive({ type: 'run', run: { ...run, ended_at_us: 5 } });
   expect(store.runs.value).toHaveLength(0);
 });
 
@@ -230,17 +230,17 @@ test('a robot whose samples are not asked for shows link and mode, and no old nu
     stale: false,
   });
   expect(store.find('rheo-1')!.readout.value.stale).toBe(true);
-  store.hear({ type: 'robot', robot: robot('rheo-2', { mode: 'emergency', link: 'disconnected' }) });
+  store.receive({ type: 'robot', robot: robot('rheo-2', { mode: 'emergency', link: 'disconnected' }) });
   store.refresh();
   expect(store.find('rheo-2')!.readout.value).toMatchObject({ mode: 'emergency', stale: true });
 });
 
 test('what was not asked for is not missing afterwards', () => {
   const { store } = store_with(robot('rheo-1'));
-  store.hear(batch(0, 5));
+  store.receive(batch(0, 5));
   store.watch([]);
   store.watch(['rheo-1']);
-  store.hear(batch(500, 5));
+  store.receive(batch(500, 5));
   store.refresh();
   expect(store.find('rheo-1')!.readout.value).toMatchObject({ received: 5, missing: 0 });
 });
@@ -261,11 +261,11 @@ test('renewals of a lease are no lines of the log, unless they fail', () => {
   const renewal = (n: number, state: CommandRecord['state']) =>
     ({ command_id: String(n), robot_id: 'rheo-1', kind: 'renew_lease', state, submitted_at_us: n }) as CommandRecord;
   const states = ['queued', 'sent', 'acknowledged', 'verified', 'superseded'] as const;
-  states.forEach((state, n) => store.hear({ type: 'command', command: renewal(n, state) }));
-  store.hear({ type: 'log', events: [], commands: states.map((state, n) => renewal(10 + n, state)) });
+  states.forEach((state, n) => store.receive({ type: 'command', command: renewal(n, state) }));
+  store.receive({ type: 'log', events: [], commands: states.map((state, n) => renewal(10 + n, state)) });
   store.refresh();
   expect(store.log.value).toHaveLength(0);
-  store.hear({ type: 'command', command: renewal(20, 'rejected') });
+  store.receive({ type: 'command', command: renewal(20, 'rejected') });
   store.refresh();
   expect(store.log.value.map((line) => line.command?.state)).toEqual(['rejected']);
 });
@@ -280,7 +280,7 @@ const run = (run_id: number, state: RunRecord['state']) =>
     ended_at_us: state === 'open' ? null : 2,
   }) as RunRecord;
 
-test('a run that was interrupted is known until its robot has a newer one, and is told once', () => {
+test('a run that was interrupted is known until its robot has a newer one, and is reported once', () => {
   const { store } = store_with(robot('rheo-1'));
   store.take_run(run(7, 'interrupted'));
   store.take_run(run(7, 'interrupted'));
@@ -293,31 +293,31 @@ test('a run that was interrupted is known until its robot has a newer one, and i
   expect(store.interrupted.value).toHaveLength(0);
 });
 
-test('a stop is shown by telemetry that was heard after it, and not by what a robot that is away was last', () => {
+test('a stop is shown by telemetry received after it, and not by what a robot that is away was last', () => {
   const { store, clock } = store_with(robot('rheo-1'));
   const latched = { mode: 'emergency', emergency_id: '9' } as const;
   clock.page = 100;
-  store.hear(batch(0, 5, latched));
+  store.receive(batch(0, 5, latched));
   expect(store.stop_evidence('rheo-1', 100)).toMatchObject({ latched: 0, open: 1 });
   clock.page = 200;
-  store.hear({ type: 'robot', robot: robot('rheo-1', { ...latched, link: 'disconnected', pending_stop: null }) });
+  store.receive({ type: 'robot', robot: robot('rheo-1', { ...latched, link: 'disconnected', pending_stop: null }) });
   expect(store.stop_evidence('rheo-1', 100)).toMatchObject({ latched: 0, open: 1 });
-  store.hear({ type: 'robot', robot: robot('rheo-1', { ...latched, link: 'disconnected', pending_stop: '5' }) });
+  store.receive({ type: 'robot', robot: robot('rheo-1', { ...latched, link: 'disconnected', pending_stop: '5' }) });
   expect(store.stop_evidence('rheo-1', 100)).toMatchObject({ kept: 1, open: 0 });
   clock.page = 300;
-  store.hear(batch(5, 5, latched));
+  store.receive(batch(5, 5, latched));
   expect(store.stop_evidence('rheo-1', 100)).toMatchObject({ latched: 1, open: 0 });
 });
 
 test('samples of before the latch that come after its news do not undo it; its end does', () => {
   const { store, clock } = store_with(robot('rheo-1'));
   clock.page = 100;
-  store.hear({ type: 'robot', robot: robot('rheo-1', { mode: 'emergency', emergency_id: '9' }) });
+  store.receive({ type: 'robot', robot: robot('rheo-1', { mode: 'emergency', emergency_id: '9' }) });
   clock.page = 150;
-  store.hear(batch(0, 5));
+  store.receive(batch(0, 5));
   expect(store.stop_evidence('rheo-1', 50)).toMatchObject({ latched: 1, cleared: 0 });
   clock.page = 5000;
-  store.hear(batch(5, 5, { mode: 'manual' }));
+  store.receive(batch(5, 5, { mode: 'manual' }));
   expect(store.stop_evidence('rheo-1', 50)).toMatchObject({ latched: 0, cleared: 1 });
 });
 

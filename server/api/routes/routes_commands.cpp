@@ -67,7 +67,7 @@ constexpr std::int64_t kClockToleranceUs = 1'000'000;  // of a script's clock ah
 // a script is near enough to the station for a time to live that counts from the arrival.)
 Result<void> check_stamp(const identity::Caller& caller, const std::optional<std::int64_t>& stamp_us) {
   if (caller.session == 0 || stamp_us) return {};
-  return fail(ErrorCode::invalid, "a page must send stamp_us, the latest stamp that it heard on /live",
+  return fail(ErrorCode::invalid, "a page must send stamp_us, the latest stamp that it received on /live",
               "stamp_required");
 }
 
@@ -99,7 +99,7 @@ Result<void> set_age(station::CommandRequest& command, const ParsedCommand& pars
   return {};
 }
 
-// What never comes to the station's door, for it is none of its words.
+// A request that is refused before it reaches the station: it is no command or action that the station knows.
 http::Response refused(CommandRoutes parts, const http::Request& request, const char* what, const Error& error) {
   parts.station.note_refusal(author_of(request, parts.clock), request.param.at("robot_id"), what, "{}", error);
   return http::problem(error);

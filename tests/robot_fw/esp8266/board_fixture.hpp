@@ -97,13 +97,13 @@ class BoardFixture : public ::testing::Test {
 
   // Of the Hello of this connection.
   std::uint64_t boot_id() {
-    for (const protocol::RobotFrame& frame : heard()) {
+    for (const protocol::RobotFrame& frame : received()) {
       if (frame.which_body == rheonaut_RobotFrame_hello_tag) known_boot_id = frame.body.hello.boot_id;
     }
     return known_boot_id;
   }
   // All frames since the last call.
-  std::vector<protocol::RobotFrame> heard() {
+  std::vector<protocol::RobotFrame> received() {
     std::vector<protocol::RobotFrame> frames;
     for (; read_writes < chip.socket.writes.size(); ++read_writes) {
       const std::vector<std::uint8_t>& bytes = chip.socket.writes[read_writes];

@@ -10,7 +10,7 @@ class BoardTest : public BoardFixture {
  protected:
   std::optional<protocol::Status> status() {
     std::optional<protocol::Status> last;
-    for (const protocol::RobotFrame& frame : heard()) {
+    for (const protocol::RobotFrame& frame : received()) {
       if (frame.which_body == rheonaut_RobotFrame_status_tag) last = frame.body.status;
     }
     return last;
@@ -23,7 +23,7 @@ class BoardTest : public BoardFixture {
     }
   }
   std::uint32_t missed_ticks() {
-    heard();
+    received();
     stay_ms(1'400);
     const auto last = status();
     EXPECT_TRUE(last.has_value());
@@ -53,13 +53,13 @@ TEST_F(BoardTest, StopBetweenTicksTurnsThePinOffAtOnce) {
     board->step();
   }
   ASSERT_TRUE(chip.level(kMotorPin));
-  heard();
+  received();
   order(sim_robot::emergency_stop());
   board->step();  // no time has passed, so no tick has run
   EXPECT_FALSE(chip.level(kMotorPin));
   EXPECT_TRUE(board->motor().is_off());
   bool acknowledged = false;
-  for (const protocol::RobotFrame& frame : heard()) {
+  for (const protocol::RobotFrame& frame : received()) {
     acknowledged |= frame.which_body == rheonaut_RobotFrame_command_ack_tag;
   }
   EXPECT_TRUE(acknowledged) << "in the same turn";
@@ -99,14 +99,14 @@ TEST_F(BoardTest, InputsReachTheStation) {
   chip.analogue = 180;
   chip.imu_registers[0x35] = 0b00'11'11'00;
   connect();
-  heard();
+  received();
   for (int i = 0; i < 3; ++i) {
     heartbeat();
     run_ms(500);
   }
   std::optional<protocol::Status> last;
   float impedance_mv = 0;
-  for (const protocol::RobotFrame& frame : heard()) {
+  for (const protocol::RobotFrame& frame : received()) {
     if (frame.which_body == rheonaut_RobotFrame_status_tag) last = frame.body.status;
     if (frame.which_body == rheonaut_RobotFrame_telemetry_tag) impedance_mv = frame.body.telemetry.impedance_mv[0];
   }
@@ -197,7 +197,7 @@ TEST_F(BoardTest, LedShowsTheState) {
   EXPECT_EQ(board->led_pattern(), LedPattern::connecting);
   come_up();
   EXPECT_EQ(board->led_pattern(), LedPattern::connected);
-  heard();
+  received();
   protocol::StationFrame frame = rheonaut_StationFrame_init_zero;
   chip.reset(4);
   boot();
@@ -236,7 +236,7 @@ TEST_F(BoardTest, ComesUpWithTheControllerForItsMotor) {
     chip.reset(4);
     connect(settings);
     std::uint32_t controller_id = 0;
-    for (const protocol::RobotFrame& frame : heard()) {
+    for (const protocol::RobotFrame& frame : received()) {
       if (frame.which_body == rheonaut_RobotFrame_hello_tag) controller_id = frame.body.hello.controller_id;
     }
     return controller_id;

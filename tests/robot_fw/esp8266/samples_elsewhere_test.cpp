@@ -29,7 +29,7 @@ class SamplesElsewhere : public BoardFixture {
       chip.analogue = 100 + analogue_turn++ % 397;
       if (tick % 10 == 0) heartbeat();
       run_ms(10);
-      for (const protocol::RobotFrame& frame : heard()) {
+      for (const protocol::RobotFrame& frame : received()) {
         if (frame.which_body != rheonaut_RobotFrame_telemetry_tag) continue;
         const protocol::Telemetry& batch = frame.body.telemetry;
         for (pb_size_t i = 0; i < batch.impedance_mv_count; ++i) {

@@ -217,15 +217,15 @@ TEST_F(Link, FrameThatDoesNotFitWaitsAndThenGoesInOneWrite) {
   connect();
   chip.socket.room = 100;
   run_ms(20);
-  heard();
+  received();
   const std::uint64_t before_us = chip.now_us;
   run_ms(400);
   EXPECT_EQ(chip.now_us - before_us, 400'000U) << "no tick waited";
-  for (const protocol::RobotFrame& frame : heard()) EXPECT_NE(frame.which_body, rheonaut_RobotFrame_telemetry_tag);
+  for (const protocol::RobotFrame& frame : received()) EXPECT_NE(frame.which_body, rheonaut_RobotFrame_telemetry_tag);
   chip.socket.room = 1072;
   run_ms(100);
   std::size_t samples = 0;
-  for (const protocol::RobotFrame& frame : heard()) {
+  for (const protocol::RobotFrame& frame : received()) {
     if (frame.which_body == rheonaut_RobotFrame_telemetry_tag) samples += frame.body.telemetry.position_m_count;
   }
   EXPECT_GE(samples, 40U);
@@ -258,7 +258,7 @@ TEST_F(Link, LargestFrameFitsAnEmptySendBuffer) {
   connect_with(25);
   run_ms(1'000);
   std::size_t largest = 0;
-  for (const protocol::RobotFrame& sent : heard()) {
+  for (const protocol::RobotFrame& sent : received()) {
     if (sent.which_body == rheonaut_RobotFrame_telemetry_tag) {
       largest = std::max<std::size_t>(largest, sent.body.telemetry.position_m_count);
     }

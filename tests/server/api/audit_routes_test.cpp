@@ -119,8 +119,8 @@ TEST_F(AuditRoutesTest, TenThousandRefusedCommandsLeaveAHundredEntriesAndACount)
 
 TEST_F(AuditRoutesTest, AccountsSessionsAndSignInsAreThereWithoutSecrets) {
   // Written before the next one: what is queued and what is stored at once are entries in the order of their commits.
-  const auto post = [this](const char* path, const json& wish = nullptr) {
-    Answered answered = ask("POST", path, wish);
+  const auto post = [this](const char* path, const json& body = nullptr) {
+    Answered answered = ask("POST", path, body);
     clock.run_for(200ms);
     return answered;
   };
@@ -162,7 +162,7 @@ TEST_F(AuditRoutesTest, APagesMessagesComeFromItsAddress) {
   clock.run_for(1s);
   EXPECT_EQ(latest("command.acknowledged")["peer"], "127.0.0.1");
   page.say({{"type", "renew_lease"}, {"robot_id", "r1"}, {"stamp_us", clock.steady_us() - 500'000}});
-  EXPECT_EQ(page.hear("problem")["problem"]["reason"], "stale");
+  EXPECT_EQ(page.receive("problem")["problem"]["reason"], "stale");
   EXPECT_EQ(latest("command.refused")["detail"]["reason"], "stale");
   EXPECT_EQ(latest("command.refused")["peer"], "127.0.0.1");
 }

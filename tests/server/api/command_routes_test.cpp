@@ -125,12 +125,12 @@ TEST_F(CommandRoutesTest, APageSaysWhatItsOperatorSaw) {
     EXPECT_EQ(answered.status, 422) << blind;
     EXPECT_EQ(answered.parsed()["reason"], "stamp_required") << blind;
   }
-  for (json wish : {json{{"action", "take"}}, json{{"action", "force"}, {"reason", "r"}}}) {
-    EXPECT_EQ(ask("POST", control, wish).parsed()["reason"], "stamp_required") << wish;
-    wish["stamp_us"] = clock.steady_us() - 400'001;
-    EXPECT_EQ(ask("POST", control, wish).parsed()["reason"], "stale") << wish;
-    wish["stamp_us"] = clock.steady_us() + 1;
-    EXPECT_EQ(ask("POST", control, wish).parsed()["reason"], "out_of_range") << wish;
+  for (json body : {json{{"action", "take"}}, json{{"action", "force"}, {"reason", "r"}}}) {
+    EXPECT_EQ(ask("POST", control, body).parsed()["reason"], "stamp_required") << body;
+    body["stamp_us"] = clock.steady_us() - 400'001;
+    EXPECT_EQ(ask("POST", control, body).parsed()["reason"], "stale") << body;
+    body["stamp_us"] = clock.steady_us() + 1;
+    EXPECT_EQ(ask("POST", control, body).parsed()["reason"], "out_of_range") << body;
   }
   EXPECT_EQ(ask("GET", "/api/v1/robots/r1").parsed()["control"], nullptr) << "what was refused took no control";
   EXPECT_TRUE(robot->commands().empty());

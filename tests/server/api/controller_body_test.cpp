@@ -93,9 +93,10 @@ TEST(ControllerBody, ComputesTheChecksumOfTheProtocolAndAnIdFromIt) {
   EXPECT_EQ(controller->controller_id, 3'099'722'980U & 0xFF'FFFFU);
   EXPECT_EQ(read({{"controller", given}, {"controller_id", 9}})->controller_id, 9U);
 
-  const json told = storage::controller_json(*controller);
-  EXPECT_TRUE(station::is_same(*read({{"controller", told}}), *controller)) << "what the robot says can be sent back";
-  json changed = told;
+  const json reported = storage::controller_json(*controller);
+  EXPECT_TRUE(station::is_same(*read({{"controller", reported}}), *controller))
+      << "what the robot says can be sent back";
+  json changed = reported;
   changed["kp"] = 60;
   EXPECT_EQ(read({{"controller", changed}}).error().reason, "checksum");
 }

@@ -125,9 +125,9 @@ TEST_F(HostileTest, OversizedAndDeeplyNestedJsonIsRefused) {
   EXPECT_TRUE(client->read_until("\r\n").starts_with("HTTP/1.1 413 "));
   Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
   page.say_text(R"({"type":)" + std::string(2000, '['));
-  EXPECT_EQ(page.hear("problem").at("problem").at("reason"), "malformed_json");
+  EXPECT_EQ(page.receive("problem").at("problem").at("reason"), "malformed_json");
   page.say_text(R"({"type":")" + std::string(5000, 'x') + "\"}");
-  page.hear("nothing");
+  page.receive("nothing");
   EXPECT_TRUE(page.closed());
   expect_stops();
 }
@@ -162,17 +162,17 @@ TEST_F(HostileTest, APageThatNeverReadsIsLetGo) {
 TEST_F(HostileTest, ATalkativePageIsReadABoundedNumberOfTimesASecond) {
   Page page{clock, api->port(), "Authorization: Bearer " + token() + "\r\n"};
   const std::size_t before = robot->commands().size();
-  std::size_t heard = 0;
+  std::size_t stops_read = 0;
   for (int i = 0; i < 600; ++i) {
     page.say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
-    if (robot->commands().size() == before + heard) continue;
-    robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, ++heard);
+    if (robot->commands().size() == before + stops_read) continue;
+    robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED, ++stops_read);
     clock.settle();
   }
-  EXPECT_EQ(heard, 500U);
+  EXPECT_EQ(stops_read, 500U);
   expect_stops();
   clock.run_for(1s);
-  EXPECT_GT(robot->commands().size(), before + heard + 2);
+  EXPECT_GT(robot->commands().size(), before + stops_read + 2);
 }
 
 TEST_F(HostileTest, OneUserHasABoundedNumberOfPages) {

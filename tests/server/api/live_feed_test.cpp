@@ -31,7 +31,7 @@ class LiveFeedTest : public ::testing::Test {
   }
 
  protected:
-  std::vector<json> heard() {
+  std::vector<json> received() {
     std::vector<json> all;
     for (live::LiveText text = listener.pop(); text != nullptr; text = listener.pop())
       all.push_back(json::parse(*text));
@@ -39,7 +39,7 @@ class LiveFeedTest : public ::testing::Test {
   }
   std::vector<std::string> types() {
     std::vector<std::string> all;
-    for (const json& one : heard()) all.push_back(one["type"]);
+    for (const json& one : received()) all.push_back(one["type"]);
     return all;
   }
   station::SampleBatch batch(std::uint64_t first_seq) const {
@@ -64,7 +64,7 @@ using Types = std::vector<std::string>;
 
 TEST_F(LiveFeedTest, StampsTenTimesASecond) {
   clock.run_for(1s);
-  const auto all = heard();
+  const auto all = received();
   ASSERT_EQ(all.size(), 10U);
   EXPECT_EQ(all.back()["stamp_us"], clock.steady_us());
 }
@@ -78,7 +78,7 @@ TEST_F(LiveFeedTest, SendsLinkModeAndEmergencyAtOnceAndTheRestWithTheNextStamp) 
   live.on_robot(robot);
   EXPECT_EQ(types(), Types{});
   clock.run_for(100ms);
-  const auto later = heard();
+  const auto later = received();
   ASSERT_EQ(later.size(), 2U);
   EXPECT_EQ(later[0]["robot"]["durable_next_seq"], 6);
   robot.context.emergency_id = 9;
@@ -91,15 +91,15 @@ TEST_F(LiveFeedTest, NeverSendsAnOlderStateAfterANewerOne) {
   live.on_robot(robot);  // waits for the stamp
   robot.context.setpoint_m = 0.1F;
   live.on_samples(robot, batch(0));
-  heard();
+  received();
   clock.run_for(100ms);
-  EXPECT_EQ(heard()[0]["robot"]["setpoint_m"], 0.1);
+  EXPECT_EQ(received()[0]["robot"]["setpoint_m"], 0.1);
 }
 
 TEST_F(LiveFeedTest, WritesSamplesAsColumns) {
   robot.context.flags = rheonaut_TELEMETRY_FLAG_BACKFILL;
   live.on_samples(robot, batch(7));
-  const json samples = heard().at(1);
+  const json samples = received().at(1);
   EXPECT_EQ(samples["boot_id"], "18364758544493064720");
   EXPECT_EQ(samples["first_seq"], 7);
   EXPECT_EQ(samples["position_m"], (json{0.1, 0.2}));
@@ -111,7 +111,7 @@ TEST_F(LiveFeedTest, WritesSamplesAsColumns) {
 // A page costs the same few messages a second, whether its robot sends each sample by itself or many at once.
 TEST_F(LiveFeedTest, GathersSamplesUntilTheyAreFiftyMilliseconds) {
   live.on_robot(robot);
-  heard();
+  received();
   const auto one = [&](std::uint64_t seq) {
     station::SampleBatch made = batch(seq);
     made.first_robot_time_us = 25'000 * seq;
@@ -121,31 +121,31 @@ TEST_F(LiveFeedTest, GathersSamplesUntilTheyAreFiftyMilliseconds) {
   live.on_samples(robot, one(0));
   EXPECT_EQ(types(), Types{});
   live.on_samples(robot, one(1));
-  const auto both = heard();
+  const auto both = received();
   EXPECT_EQ(both.at(0)["first_seq"], 0);
   EXPECT_EQ(both[0]["position_m"], (json{0.1, 0.1}));
 
   live.on_samples(robot, one(2));
   live.on_samples(robot, one(4));  // not the next
-  EXPECT_EQ(heard().at(0)["first_seq"], 2);
+  EXPECT_EQ(received().at(0)["first_seq"], 2);
   station::SampleBatch shifted = one(5);
   shifted.first_robot_time_us += 1;
   live.on_samples(robot, shifted);  // at another time than it seems
-  EXPECT_EQ(heard().at(0)["first_seq"], 4);
+  EXPECT_EQ(received().at(0)["first_seq"], 4);
   station::SampleBatch other = one(6);
   other.first_robot_time_us += 1;
   other.context.setpoint_m = 0.3F;
   live.on_samples(robot, other);  // under other conditions
-  EXPECT_EQ(heard().at(0)["first_seq"], 5);
+  EXPECT_EQ(received().at(0)["first_seq"], 5);
   station::SampleBatch rebooted = other;
   rebooted.boot_id = 1;
   rebooted.first_seq = 7;
   rebooted.first_robot_time_us += 25'000;
   live.on_samples(robot, rebooted);  // of another boot
-  EXPECT_EQ(heard().at(0)["first_seq"], 6);
+  EXPECT_EQ(received().at(0)["first_seq"], 6);
 
   clock.run_for(200ms);  // and what no further sample follows
-  const auto late = heard();
+  const auto late = received();
   EXPECT_EQ(late.at(0)["first_seq"], 7);
   robot.context.emergency_id = 9;
   live.on_samples(robot, one(8));
@@ -161,7 +161,7 @@ TEST_F(LiveFeedTest, OfWhatItDoesNotWatchAPageReceivesLargeChangesWithTheNextSta
   other.id = "r2";
   live.on_robot(robot);
   live.on_robot(other);
-  heard();
+  received();
   live.watch(listener, {"r1"});
   robot.context.emergency_id = other.context.emergency_id = 9;
   live.on_robot(robot);
@@ -172,10 +172,10 @@ TEST_F(LiveFeedTest, OfWhatItDoesNotWatchAPageReceivesLargeChangesWithTheNextSta
   live.on_samples(other, batch(0));
   EXPECT_EQ(types(), Types{});
   clock.run_for(100ms);
-  const auto told = heard();
-  ASSERT_EQ(told.size(), 2U);
-  EXPECT_EQ(told[0]["robot"]["emergency_id"], "9");
-  EXPECT_EQ(told[0]["robot"]["durable_next_seq"], 7);
+  const auto messages = received();
+  ASSERT_EQ(messages.size(), 2U);
+  EXPECT_EQ(messages[0]["robot"]["emergency_id"], "9");
+  EXPECT_EQ(messages[0]["robot"]["durable_next_seq"], 7);
   other.durable_next_seq = 8;
   live.on_robot(other);
   clock.run_for(100ms);
@@ -186,7 +186,7 @@ TEST_F(LiveFeedTest, APageThatBeginsToWatchBeforeTheStampReceivesWhatChanged) {
   live.watch(listener, {});
   live.on_robot(robot);
   live.watch(listener, {"r1"});
-  live.on_robot(robot);  // as the door does for each that is watched
+  live.on_robot(robot);  // as the station does for each that is watched
   clock.run_for(100ms);
   EXPECT_EQ(types(), (Types{"robot", "stamp"}));
 }
@@ -199,17 +199,17 @@ TEST_F(LiveFeedTest, AStampIsInTimeWhenAVeryLargeFleetChanges) {
     robot.id = "fleet-" + std::to_string(i);
     live.on_robot(robot);
   }
-  std::vector<std::size_t> told;
+  std::vector<std::size_t> messages;
   for (int stamp = 0; stamp < 4; ++stamp) {
     clock.run_for(100ms);
-    const auto all = heard();
+    const auto all = received();
     const auto is_in_time = [&](const json& one) {
       return one.value("stamp_us", std::int64_t{0}) == clock.steady_us();
     };
     EXPECT_EQ(std::ranges::count_if(all, is_in_time), 1);
-    told.push_back(all.size() - 1);
+    messages.push_back(all.size() - 1);
   }
-  EXPECT_EQ(told, (std::vector<std::size_t>{200, 200, 100, 0}));
+  EXPECT_EQ(messages, (std::vector<std::size_t>{200, 200, 100, 0}));
 }
 
 TEST_F(LiveFeedTest, SamplesOfALargeChangeDoNotWaitForMore) {
@@ -217,7 +217,7 @@ TEST_F(LiveFeedTest, SamplesOfALargeChangeDoNotWaitForMore) {
   station::SampleBatch one = batch(0);
   one.samples.resize(1);
   robot.context.mode = one.context.mode = rheonaut_MODE_AUTO;
-  heard();
+  received();
   live.on_samples(robot, one);
   EXPECT_EQ(types(), (Types{"robot", "samples"}));
 }
@@ -229,11 +229,11 @@ TEST_F(LiveFeedTest, SamplesThatWereGatheredForWhoLeftAreForgotten) {
   live.on_samples(robot, one);
   live.watch(listener, {});
   live.watch(listener, {"r1"});
-  heard();
+  received();
   live.on_samples(robot, batch(10));
-  const auto told = heard();
-  ASSERT_EQ(told.size(), 1U);
-  EXPECT_EQ(told[0]["first_seq"], 10);
+  const auto messages = received();
+  ASSERT_EQ(messages.size(), 1U);
+  EXPECT_EQ(messages[0]["first_seq"], 10);
 }
 
 // Pages may name what they like: what they named is forgotten with them.
@@ -262,12 +262,12 @@ TEST_F(LiveFeedTest, APageThatNamedItsRobotsReceivesOneLogWithEachStamp) {
   EXPECT_EQ(listener.size(), 0U);
   EXPECT_EQ(all.size(), 4U);
   clock.run_for(100ms);
-  const auto told = heard();
-  ASSERT_EQ(told.size(), 2U);
-  EXPECT_EQ(told[0]["type"], "log");
-  EXPECT_EQ(told[0]["events"].size(), 1U);
-  ASSERT_EQ(told[0]["commands"].size(), 2U) << "the newest record of each";
-  EXPECT_EQ(told[0]["commands"][1]["command_id"], "1");
+  const auto messages = received();
+  ASSERT_EQ(messages.size(), 2U);
+  EXPECT_EQ(messages[0]["type"], "log");
+  EXPECT_EQ(messages[0]["events"].size(), 1U);
+  ASSERT_EQ(messages[0]["commands"].size(), 2U) << "the newest record of each";
+  EXPECT_EQ(messages[0]["commands"][1]["command_id"], "1");
   EXPECT_EQ(all.size(), 5U) << "and the stamp; a page that watches all received it already";
   for (station::CommandId id = 1; id <= 64; ++id) {
     command.id = id;
@@ -294,7 +294,7 @@ TEST_F(LiveFeedTest, ASlowListenerLosesTheOldestSamplesAndReceivesHowMany) {
   live.on_command(stop);
   for (std::uint64_t i = 0; i < 1000; ++i) live.on_samples(robot, batch(2 * i));
   EXPECT_EQ(listener.size(), live::Subscriber::kMaxMessages + 1);  // the robot's state is not counted
-  const auto all = heard();
+  const auto all = received();
   ASSERT_EQ(all.size(), live::Subscriber::kMaxMessages + 2);
   EXPECT_EQ(all[0]["type"], "dropped");
   EXPECT_EQ(all[0]["count"], 1001 - live::Subscriber::kMaxMessages);
@@ -316,7 +316,7 @@ TEST_F(LiveFeedTest, OfEachRobotOneStateWaits) {
     live.on_robot(robot);
     clock.run_for(100ms);
   }
-  std::vector<json> states = heard();
+  std::vector<json> states = received();
   std::erase_if(states, [](const json& one) { return one["type"] != "robot"; });
   ASSERT_EQ(states.size(), 2U);
   EXPECT_EQ(states[0]["robot"]["robot_id"], "r1");
@@ -336,7 +336,7 @@ TEST_F(LiveFeedTest, AHeadlineIsNeverDropped) {
     live.on_command({});
   }
   EXPECT_EQ(listener.size(), 3 * live::Subscriber::kMaxMessages + 1);
-  const auto all = heard();
+  const auto all = received();
   EXPECT_EQ(all[0]["type"], "dropped");
   EXPECT_EQ(all[1]["robot"]["emergency_id"], "9");
   const auto is_state = [](const json& one) { return one["type"] == "robot"; };
@@ -355,7 +355,7 @@ TEST_F(LiveFeedTest, AFleetIsSentInTurnsOfTheLoop) {
     }
   };
   change();
-  heard();
+  received();
   change();
   std::size_t most = 0;
   clock.advance_to_next();
@@ -371,29 +371,29 @@ TEST_F(LiveFeedTest, WhatChangesBetweenTwoTurnsIsSentAfterwards) {
   for (std::size_t i = 0; i < fleet.size(); ++i) fleet[i].id = "fleet-" + std::to_string(10 + i);
   for (int i = 0; i < 2; ++i) {
     for (const station::RobotState& one : fleet) live.on_robot(one);
-    if (i == 0) heard();
+    if (i == 0) received();
   }
   clock.advance_to_next();
-  std::vector<json> told;
+  std::vector<json> messages;
   const auto listen = [&] {
-    for (const json& one : heard()) {
-      if (one["type"] == "robot") told.push_back(one["robot"]);
+    for (const json& one : received()) {
+      if (one["type"] == "robot") messages.push_back(one["robot"]);
     }
   };
-  while (told.empty() && loop.poll_one() > 0) listen();
-  ASSERT_LT(told.size(), fleet.size());
+  while (messages.empty() && loop.poll_one() > 0) listen();
+  ASSERT_LT(messages.size(), fleet.size());
   fleet.front().durable_next_seq = fleet.back().durable_next_seq = 7;
   live.on_robot(fleet.front());  // was sent: again with the next stamp
   live.on_robot(fleet.back());   // was not: once, as it is now
   clock.settle();
   listen();
-  EXPECT_EQ(told.size(), fleet.size());
-  EXPECT_EQ(told.back()["durable_next_seq"], 7);
+  EXPECT_EQ(messages.size(), fleet.size());
+  EXPECT_EQ(messages.back()["durable_next_seq"], 7);
   clock.run_for(100ms);
   listen();
-  ASSERT_EQ(told.size(), fleet.size() + 1);
-  EXPECT_EQ(told.back()["robot_id"], fleet.front().id);
-  EXPECT_EQ(told.back()["durable_next_seq"], 7);
+  ASSERT_EQ(messages.size(), fleet.size() + 1);
+  EXPECT_EQ(messages.back()["robot_id"], fleet.front().id);
+  EXPECT_EQ(messages.back()["durable_next_seq"], 7);
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ TEST(LiveLog, OfRenewalsOfLeasesOnlyARefusedOneIsSent) {
   tasks.spawn("live feed", live.run());
   live::Subscriber listener{loop};
   live.add(listener);
-  const auto heard = [&] { return messages_of(listener); };
+  const auto received = [&] { return messages_of(listener); };
   live::Subscriber filtered{loop};
   live.add(filtered);
   live.watch(filtered, {"r1"});
@@ -43,18 +43,18 @@ TEST(LiveLog, OfRenewalsOfLeasesOnlyARefusedOneIsSent) {
     }
   };
   for (int i = 0; i < 100; ++i) renew(station::CommandState::acknowledged, "");
-  EXPECT_TRUE(heard().empty());
+  EXPECT_TRUE(received().empty());
   for (int i = 0; i < 10; ++i) renew(station::CommandState::rejected, "nothing_to_renew");
-  const auto told = heard();
-  ASSERT_EQ(told.size(), 1U) << "once";
-  EXPECT_EQ(told[0]["command"]["state"], "rejected");
+  const auto messages = received();
+  ASSERT_EQ(messages.size(), 1U) << "once";
+  EXPECT_EQ(messages[0]["command"]["state"], "rejected");
   renew(station::CommandState::failed, "link_lost");
-  EXPECT_EQ(heard().at(0)["command"]["reason"], "link_lost") << "for another reason";
+  EXPECT_EQ(received().at(0)["command"]["reason"], "link_lost") << "for another reason";
   renew(station::CommandState::acknowledged, "");
   renew(station::CommandState::failed, "link_lost");
-  EXPECT_EQ(heard().size(), 1U) << "refused anew";
+  EXPECT_EQ(received().size(), 1U) << "refused anew";
   renew(station::CommandState::unknown, "no_answer");
-  EXPECT_EQ(heard().at(0)["command"]["state"], "unknown") << "it may not have been renewed";
+  EXPECT_EQ(received().at(0)["command"]["state"], "unknown") << "it may not have been renewed";
   clock.run_for(100ms);
   const auto logged = messages_of(filtered);
   ASSERT_EQ(logged.at(0)["type"], "log");

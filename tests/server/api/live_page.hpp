@@ -29,7 +29,7 @@ class Page {
   void say_text(const std::string& text) { send_frame('\x81', text); }
 
   // The next message of this type; others are passed over, pings are answered when `answers_pings`.
-  json hear(const std::string& type) {
+  json receive(const std::string& type) {
     for (int i = 0; i < 1000; ++i) {
       const auto text = next_message();
       if (!text) return nullptr;

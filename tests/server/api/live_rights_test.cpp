@@ -25,7 +25,7 @@ class LiveRightsTest : public ApiTest {
   // It ended within this second, and not for want of a sign of life.
   bool ends(Page& page) {
     clock.run_for(1s);
-    page.hear("nothing of this type");
+    page.receive("nothing of this type");
     return page.closed();
   }
   std::size_t stops() const {
@@ -41,12 +41,12 @@ TEST_F(LiveRightsTest, AViewerSeesAndStopsAndRenewsNothing) {
   add_user("vera", "viewer");
   const auto page = open_by_cookie(make_session("vera"));
   ASSERT_TRUE(page->open()) << page->answer;
-  EXPECT_EQ(page->hear("welcome")["robots"][0]["robot_id"], "r1");
+  EXPECT_EQ(page->receive("welcome")["robots"][0]["robot_id"], "r1");
   page->say({{"type", "renew_lease"}, {"robot_id", "r1"}, {"stamp_us", clock.steady_us()}});
-  const json problem = page->hear("problem");
+  const json problem = page->receive("problem");
   EXPECT_EQ(problem["problem"]["reason"], "not_permitted") << problem;
   page->say({{"type", "take_over_the_world"}});
-  EXPECT_EQ(page->hear("problem")["problem"]["reason"], "not_permitted") << "what is not known needs a commander";
+  EXPECT_EQ(page->receive("problem")["problem"]["reason"], "not_permitted") << "what is not known needs a commander";
   page->say({{"type", "keep_alive"}});
   page->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
   EXPECT_TRUE(clock.run_until([&] { return stops() == 1; }, 1s));
@@ -57,7 +57,7 @@ TEST_F(LiveRightsTest, ATokenThatMayOnlyReadNeitherStopsNorCommands) {
   const auto page = open(make_token("logger", "read"));
   ASSERT_TRUE(page->open()) << page->answer;
   page->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
-  EXPECT_EQ(page->hear("problem")["problem"]["reason"], "not_permitted");
+  EXPECT_EQ(page->receive("problem")["problem"]["reason"], "not_permitted");
   EXPECT_EQ(stops(), 0U);
 }
 
@@ -113,7 +113,7 @@ TEST_F(LiveRightsTest, AUserWithAnotherRoleComesBackWithIt) {
   const auto again = open_by_cookie(secret);
   ASSERT_TRUE(again->open()) << "the session goes on";
   again->say({{"type", "renew_lease"}, {"robot_id", "r1"}, {"stamp_us", clock.steady_us()}});
-  EXPECT_EQ(again->hear("problem")["problem"]["reason"], "not_permitted");
+  EXPECT_EQ(again->receive("problem")["problem"]["reason"], "not_permitted");
   EXPECT_EQ(ask("POST", "/api/v1/users/otto/change", {{"disabled", true}}).status, 200);
   EXPECT_TRUE(ends(*again));
   EXPECT_TRUE(open_by_cookie(secret)->answer.starts_with("HTTP/1.1 401 "));

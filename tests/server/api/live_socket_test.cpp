@@ -22,13 +22,13 @@ class LiveSocketTest : public ApiTest {
 TEST_F(LiveSocketTest, WelcomesWithEveryRobotThenSendsWhatHappens) {
   connect_robot();
   const auto page = open_page();
-  const json welcome = page->hear("welcome");
+  const json welcome = page->receive("welcome");
   EXPECT_EQ(welcome["robots"][0]["robot_id"], "r1");
   EXPECT_EQ(welcome["version"], "0.1.0");
   make_samples(*robot, 0, 5);
-  EXPECT_EQ(page->hear("samples")["position_m"], (json{0, 1, 2, 3, 4}));
+  EXPECT_EQ(page->receive("samples")["position_m"], (json{0, 1, 2, 3, 4}));
   clock.run_for(200ms);
-  EXPECT_LE(page->hear("stamp")["stamp_us"], clock.steady_us());
+  EXPECT_LE(page->receive("stamp")["stamp_us"], clock.steady_us());
 }
 
 TEST_F(LiveSocketTest, NeedsACredentialAndItsOwnOrigin) {
@@ -49,9 +49,9 @@ TEST_F(LiveSocketTest, StopsOneRobotOrAll) {
   const auto page = open_page();
   page->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
   ASSERT_EQ(commands(rheonaut_Command_emergency_stop_tag).size(), 1U);
-  const json heard = page->hear("command");
-  EXPECT_EQ(heard["command"]["kind"], "emergency_stop");
-  EXPECT_EQ(heard["command"]["actor"], "token:local");
+  const json received = page->receive("command");
+  EXPECT_EQ(received["command"]["kind"], "emergency_stop");
+  EXPECT_EQ(received["command"]["actor"], "token:local");
   page->say({{"type", "emergency_stop"}, {"robot_id", nullptr}});
   EXPECT_EQ(commands(rheonaut_Command_emergency_stop_tag).size(), 2U);
 }
@@ -92,9 +92,9 @@ TEST_F(LiveSocketTest, RenewsALeaseWithAFreshStampOnly) {
   renew(clock.steady_us() - 400'000);
   EXPECT_EQ(commands(rheonaut_Command_renew_lease_tag).size(), 1U);
   renew(clock.steady_us() - 400'001);
-  EXPECT_EQ(page->hear("problem")["problem"]["reason"], "stale");
+  EXPECT_EQ(page->receive("problem")["problem"]["reason"], "stale");
   renew(clock.steady_us() + 1);
-  EXPECT_EQ(page->hear("problem")["problem"]["reason"], "stale");
+  EXPECT_EQ(page->receive("problem")["problem"]["reason"], "stale");
   EXPECT_EQ(commands(rheonaut_Command_renew_lease_tag).size(), 1U);
 }
 
@@ -106,17 +106,17 @@ TEST_F(LiveSocketTest, APageReceivesTheSamplesOfTheRobotsItWatches) {
   make_samples(*robot, 0, 5);
   page->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
   clock.run_for(200ms);
-  const json log = page->hear("log");
+  const json log = page->receive("log");
   ASSERT_EQ(log["commands"].size(), 1U) << log << ": with the next stamp, of every robot";
   EXPECT_EQ(log["commands"][0]["robot_id"], "r1");
   page->say({{"type", "watch"}, {"robots", {"r1", "r2"}}});
   clock.settle();
   make_samples(*robot, 5, 5);
-  EXPECT_EQ(page->hear("samples")["first_seq"], 5);
+  EXPECT_EQ(page->receive("samples")["first_seq"], 5);
   for (const json& robots :
        {json("r1"), json{1}, json(std::vector<std::string>(65, "r1")), json{std::string(32, 'r')}}) {
     page->say({{"type", "watch"}, {"robots", robots}});
-    EXPECT_EQ(page->hear("problem")["problem"]["reason"], "malformed");
+    EXPECT_EQ(page->receive("problem")["problem"]["reason"], "malformed");
   }
 }
 
@@ -129,10 +129,10 @@ TEST_F(LiveSocketTest, APageReceivesTheStateOfARobotThatItBeginsToWatch) {
   ASSERT_TRUE(station.control(
       {"r1", "session:7", "", station::ControlAction::take, station::kControlLease, "", microseconds{0}}));
   clock.run_for(200ms);
-  page->hear("log");
+  page->receive("log");
   page->say({{"type", "watch"}, {"robots", {"r1"}}});
   clock.run_for(200ms);
-  EXPECT_EQ(page->hear("robot")["robot"]["control"]["holder"], "session:7");
+  EXPECT_EQ(page->receive("robot")["robot"]["control"]["holder"], "session:7");
 }
 
 TEST_F(LiveSocketTest, SaysWhatItDoesNotUnderstand) {
@@ -150,7 +150,7 @@ TEST_F(LiveSocketTest, SaysWhatItDoesNotUnderstand) {
                {R"({"type":"keep_alive","extra":1})", "unknown_member"}};
   for (const auto& one : cases) {
     page->say_text(one.text);
-    EXPECT_EQ(page->hear("problem")["problem"]["reason"], one.reason) << one.text;
+    EXPECT_EQ(page->receive("problem")["problem"]["reason"], one.reason) << one.text;
   }
   page->say({{"type", "keep_alive"}});
   EXPECT_FALSE(page->closed());
@@ -159,7 +159,7 @@ TEST_F(LiveSocketTest, SaysWhatItDoesNotUnderstand) {
 TEST_F(LiveSocketTest, RefusesAMessageOverFourKilobytes) {
   const auto page = open_page();
   page->say_text(std::string(5000, ' '));
-  page->hear("nothing");
+  page->receive("nothing");
   EXPECT_TRUE(page->closed());
 }
 
@@ -167,7 +167,7 @@ TEST_F(LiveSocketTest, LetsASilentPageGo) {
   const auto page = open_page();
   page->answers_pings = false;
   clock.run_for(31s);
-  page->hear("nothing");
+  page->receive("nothing");
   EXPECT_GE(page->pings, 1);
   EXPECT_TRUE(page->closed());
 }
@@ -176,8 +176,8 @@ TEST_F(LiveSocketTest, KeepsAPageThatAnswersPings) {
   const auto page = open_page();
   for (int i = 0; i < 12; ++i) {
     clock.run_for(5s);
-    EXPECT_FALSE(page->hear("stamp").is_null());
-    while (page->hear("stamp")["stamp_us"] < clock.steady_us() - 100'000) continue;
+    EXPECT_FALSE(page->receive("stamp").is_null());
+    while (page->receive("stamp")["stamp_us"] < clock.steady_us() - 100'000) continue;
   }
   EXPECT_GE(page->pings, 3);
   EXPECT_FALSE(page->closed());
@@ -201,14 +201,14 @@ TEST_F(LiveSocketTest, AnExceptionBehindAMessageEndsNeitherPageNorStation) {
   sink.is_broken = true;
   station.add_sink(sink);
   const auto page = open_page();
-  page->hear("welcome");
+  page->receive("welcome");
   page->say({{"type", "emergency_stop"}, {"robot_id", "r1"}});
   page->say({{"type", "emergency_stop"}, {"robot_id", nullptr}});
   page->say({{"type", "renew_lease"}, {"robot_id", "r1"}, {"stamp_us", clock.steady_us()}});
   EXPECT_FALSE(tasks.stopping());
   EXPECT_EQ(tasks.exit_code(), 0);
   page->say_text("nonsense");
-  EXPECT_EQ(page->hear("problem")["problem"]["reason"], "malformed_json");
+  EXPECT_EQ(page->receive("problem")["problem"]["reason"], "malformed_json");
   const Answered answered = ask("POST", "/api/v1/emergency-stop");
   sink.is_broken = false;
   EXPECT_EQ(answered.status, 500) << answered.body;
@@ -221,10 +221,10 @@ TEST_F(LiveSocketTest, EndsWhenTheStationStopsAndWhenThePageLeaves) {
   }
   clock.settle();
   const auto page = open_page();
-  page->hear("welcome");
+  page->receive("welcome");
   tasks.stop();
   clock.settle();
-  page->hear("nothing");
+  page->receive("nothing");
   EXPECT_TRUE(page->closed());
 }
 

@@ -208,8 +208,8 @@ TEST_F(LoginsTest, FewWaitAtATimeAndFewerOfOneAddress) {
   std::vector<Asking> all;
   for (int i = 0; i < 20; ++i) all.push_back({i < 5 ? "10.0.0.1" : "10.0.1." + std::to_string(i), {}});
   const auto attempt = [](identity::Logins& logins, Asking& asking, std::string name) -> boost::asio::awaitable<void> {
-    identity::LoginAttempt wish{std::move(name), "guess", asking.peer, ""};
-    asking.end = co_await logins.log_in(std::move(wish));
+    identity::LoginAttempt attempt{std::move(name), "guess", asking.peer, ""};
+    asking.end = co_await logins.log_in(std::move(attempt));
   };
   identity::Logins logins{clock, api->accounts(), kCheapPasswords};
   clock.add_worker(logins.worker());

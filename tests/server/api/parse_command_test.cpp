@@ -135,10 +135,10 @@ TEST(ParseCommand, RefusesDeepNestingBeforeItIsParsed) {
 }
 
 TEST(ParseRun, NeedsRobotAndNameAndKnowsItsMembers) {
-  const auto wish = api::parse_run(R"({"robot_id":"r1","name":"first","fluid":"water","mean_flow_m_s":0.02})");
-  ASSERT_TRUE(wish) << wish.error().detail;
-  EXPECT_EQ(wish->conditions.name, "first");
-  EXPECT_EQ(wish->conditions.mean_flow_m_s, 0.02);
+  const auto request = api::parse_run(R"({"robot_id":"r1","name":"first","fluid":"water","mean_flow_m_s":0.02})");
+  ASSERT_TRUE(request) << request.error().detail;
+  EXPECT_EQ(request->conditions.name, "first");
+  EXPECT_EQ(request->conditions.mean_flow_m_s, 0.02);
   EXPECT_FALSE(api::parse_run(R"({"robot_id":"r1"})"));
   EXPECT_FALSE(api::parse_run(R"({"robot_id":"R 1","name":"x"})"));
   EXPECT_FALSE(api::parse_run(R"({"robot_id":"r1","name":""})"));

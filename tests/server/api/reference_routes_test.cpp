@@ -100,9 +100,9 @@ TEST_F(ReferenceRoutesTest, IsReplacedAndRemovedWithAReason) {
   EXPECT_EQ(ask("GET", kPath).status, 404);
   EXPECT_EQ(ask("POST", std::string{kPath} + "/remove", {{"reason", "again"}}).status, 404);
   const json entries = ask("GET", "/api/v1/audit?action=run").parsed()["entries"];
-  std::string told;
-  for (const json& entry : entries) told += entry["action"].get<std::string>() + " ";
-  EXPECT_THAT(told, HasSubstr("run.reference_removed run.reference_imported run.reference_imported"));
+  std::string actions;
+  for (const json& entry : entries) actions += entry["action"].get<std::string>() + " ";
+  EXPECT_THAT(actions, HasSubstr("run.reference_removed run.reference_imported run.reference_imported"));
 }
 
 TEST_F(ReferenceRoutesTest, AnOpenADiscardedAndAnUnknownRunTakeNone) {

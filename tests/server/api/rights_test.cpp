@@ -195,8 +195,8 @@ TEST_F(RightsTest, ATokenOfAUserIsBoundByTheUsersRole) {
     const station::Author nobody;
     user = co_await in.add_user(anna, nobody);
     identity::Scopes all = identity::Scopes::of(identity::Role::admin);
-    identity::TokenRequest wish{"all", all, 0, "anna"};
-    token = co_await in.add_token(wish, nobody);
+    identity::TokenRequest request{"all", all, 0, "anna"};
+    token = co_await in.add_token(request, nobody);
   };
   tasks.spawn("make", make(accounts, added, made));
   ASSERT_TRUE(clock.run_until([&] { return made.has_value(); }, 10s));

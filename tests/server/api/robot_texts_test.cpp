@@ -171,25 +171,25 @@ TEST_F(OpeningPageTest, NothingIsLostBetweenTheWelcomeAndTheFirstChangeAndNothin
   station.restore(fleet_of(kFleet), {});
   Page page{clock, api->port(), bearer(), "127.0.0.1", [&] { tasks.spawn("changes", change_everything()); }};
   ASSERT_TRUE(page.open()) << page.answer;
-  const json welcome = page.hear("welcome");
+  const json welcome = page.receive("welcome");
   ASSERT_TRUE(has_changed);
   ASSERT_EQ(welcome["robots"].size(), kFleet);
-  std::map<std::string, int> heard;
+  std::map<std::string, int> received;
   std::size_t in_the_welcome = 0;
   for (const json& robot : welcome["robots"]) {
-    const int stage = heard[robot["robot_id"]] = stage_of(robot);
+    const int stage = received[robot["robot_id"]] = stage_of(robot);
     in_the_welcome += stage > 0 ? 1 : 0;
   }
   EXPECT_GT(in_the_welcome, 0U) << "it changed while the page opened,";
   EXPECT_LT(in_the_welcome, kFleet) << "also behind what had been written";
   const auto knows_all = [&] {
-    return std::ranges::all_of(heard, [](const auto& robot) { return robot.second == 3; });
+    return std::ranges::all_of(received, [](const auto& robot) { return robot.second == 3; });
   };
   for (int stamp = 0; stamp < 10 && !knows_all(); ++stamp) {
     clock.run_for(100ms);
     for (json message = page.next(); message.is_object() && message["type"] != "stamp"; message = page.next()) {
       if (message["type"] != "robot") continue;
-      int& stage = heard[message["robot"]["robot_id"]];
+      int& stage = received[message["robot"]["robot_id"]];
       const int newer = stage_of(message["robot"]);
       EXPECT_EQ(stage & ~newer, 0) << message["robot"]["robot_id"] << " went back";
       stage = newer;

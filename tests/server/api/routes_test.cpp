@@ -329,10 +329,10 @@ TEST_F(RoutesTest, PagesHearOfRuns) {
   live::Subscriber page{loop};
   live.add(page);
   ask("POST", "/api/v1/runs", {{"robot_id", "r1"}, {"name", "first"}});
-  bool heard = false;
+  bool found = false;
   for (live::LiveText text = page.pop(); text != nullptr; text = page.pop())
-    heard |= json::parse(*text)["type"] == "run";
-  EXPECT_TRUE(heard);
+    found |= json::parse(*text)["type"] == "run";
+  EXPECT_TRUE(found);
   live.remove(page);
 }
 

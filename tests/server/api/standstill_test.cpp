@@ -148,7 +148,7 @@ TEST_F(StandstillTest, APageThatSpokeBeforeKeepsNothingByIt) {
     clock.settle();
   };
   say_during(700ms, {{"type", "renew_lease"}, {"robot_id", "r1"}});
-  EXPECT_EQ(page.hear("problem")["problem"]["reason"], "stale");
+  EXPECT_EQ(page.receive("problem")["problem"]["reason"], "stale");
   EXPECT_EQ(robot->commands().size(), 1U);
   say_during(2400ms, {{"type", "keep_alive"}});
   clock.run_for(300ms);

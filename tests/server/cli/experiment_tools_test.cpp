@@ -128,13 +128,13 @@ TEST_F(Identifying, SaysWhetherTheRobotsEstimatorCanUseIt) {
   save("run.csv", ask("step --duty 0.3 --every-s 0.01 --until-s 5 --csv").text);
   const std::string identify = "identify --csv @run.csv --structure fractional";
   const Answer answer = ask(identify + " --json");
-  const auto told = answer.json()["estimator"];
-  EXPECT_EQ(told["model_gain_m_s"].size(), 4u);
-  EXPECT_EQ(told["model_time_constant_s"].size(), 4u);
-  EXPECT_LT(told["fit_error"], 0.002);
+  const auto settings = answer.json()["estimator"];
+  EXPECT_EQ(settings["model_gain_m_s"].size(), 4u);
+  EXPECT_EQ(settings["model_time_constant_s"].size(), 4u);
+  EXPECT_LT(settings["fit_error"], 0.002);
   save("m.json", answer.text);
   EXPECT_EQ(ask("bode --plant @m.json").exit_code, 0);
-  EXPECT_EQ(ask("estimator --plant @m.json --json").json()["model_gain_m_s"], told["model_gain_m_s"]);
+  EXPECT_EQ(ask("estimator --plant @m.json --json").json()["model_gain_m_s"], settings["model_gain_m_s"]);
   EXPECT_THAT(ask(identify).text, HasSubstr("the robot's estimator can use it, with a fit error of 0.1"));
 
   save("swing.json", R"({"kp":0.1,"b1":0.01,"b2":0.05,"alpha":2,"beta":1})");

@@ -27,10 +27,6 @@ class CommandOutcomeTest : public LinkTest {
     clock.settle();
   }
 
-  const station::CommandRecord& latest(station::CommandId id) const {
-    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &station::CommandRecord::id);
-  }
-
  private:
   std::uint64_t next_seq_ = 0;
 };
@@ -158,7 +154,7 @@ TEST_F(CommandOutcomeTest, OfTheSetpointsThatWaitOnlyTheNewestIsSent) {
   EXPECT_FLOAT_EQ(commands[commands.size() - 2].action.set_setpoint.setpoint_m, 0.49F);
   const auto superseded = std::ranges::count_if(
       results, [](const auto& result) { return result->state == station::CommandState::superseded; });
-  EXPECT_EQ(static_cast<std::size_t>(superseded) + commands.size(), 51u) << "each is sent, or is told superseded";
+  EXPECT_EQ(static_cast<std::size_t>(superseded) + commands.size(), 51u) << "each is sent, or ends as superseded";
 }
 
 // SAFETY: its time to live counts from when it was issued.

@@ -37,7 +37,7 @@ class InvalidValuesTest : public LinkTest {
     change(frame.body.event);
     return frame;
   }
-  std::vector<station::RobotEvent> told() const {
+  std::vector<station::RobotEvent> events() const {
     std::vector<station::RobotEvent> found;
     for (const station::RobotEvent& event : sink.events) {
       if (event.kind == "invalid_value") found.push_back(event);
@@ -78,16 +78,16 @@ TEST_F(InvalidValuesTest, TheyAreCountedAndReportedOnceInTenSeconds) {
     clock.settle();
   };
   for (std::uint64_t i = 0; i < 20; ++i) send_broken(5 * i);
-  ASSERT_EQ(told().size(), 1u);
-  EXPECT_EQ(told()[0].cause, "not_finite");
-  EXPECT_EQ(told()[0].detail, "disturbance_m is nan from sample 0 on; NULL is stored (1 more since the last event)");
+  ASSERT_EQ(events().size(), 1u);
+  EXPECT_EQ(events()[0].cause, "not_finite");
+  EXPECT_EQ(events()[0].detail, "disturbance_m is nan from sample 0 on; NULL is stored (1 more since the last event)");
   EXPECT_EQ(station.find("r1")->invalid_values, 40u);
   EXPECT_EQ(station.invalid_values(), 40u);
   EXPECT_EQ(live::to_json(*station.find("r1"))["invalid_values"], 40);
   clock.run_for(10s);
   send_broken(100);
-  ASSERT_EQ(told().size(), 2u);
-  EXPECT_TRUE(told()[1].detail.ends_with("(39 more since the last event)")) << told()[1].detail;
+  ASSERT_EQ(events().size(), 2u);
+  EXPECT_TRUE(events()[1].detail.ends_with("(39 more since the last event)")) << events()[1].detail;
 }
 
 TEST_F(InvalidValuesTest, SamplesWithoutATimeAreLostAndTheLinkGoesOn) {

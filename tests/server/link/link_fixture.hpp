@@ -47,6 +47,10 @@ class LinkTest : public ::testing::Test {
   }
   void submit(station::CommandRequest request) { tasks.spawn("submit", run_submit(std::move(request))); }
   void submit(protocol::Command action, microseconds time_to_live = 2s) { submit(request_of(action, time_to_live)); }
+  // The newest record of a command.
+  const station::CommandRecord& latest(station::CommandId id) const {
+    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &station::CommandRecord::id);
+  }
   void stop_robot(microseconds patience = 1s, std::string key = "") {
     tasks.spawn("stop", run_stop({"r1", "test", "", std::move(key), 0}, patience));
   }

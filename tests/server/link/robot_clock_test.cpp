@@ -12,10 +12,10 @@ class RobotClockTest : public LinkTest {
   void answer_probe(TestRobot& robot, microseconds there = 10ms) {
     const auto known = robot.heartbeats().size();
     const auto probe = [&] {
-      const auto heard = robot.heartbeats();
-      const auto found = std::find_if(heard.begin() + static_cast<std::ptrdiff_t>(known), heard.end(),
+      const auto received = robot.heartbeats();
+      const auto found = std::find_if(received.begin() + static_cast<std::ptrdiff_t>(known), received.end(),
                                       [](const auto& heartbeat) { return heartbeat.station_time_us != 0; });
-      return found == heard.end() ? 0 : found->station_time_us;
+      return found == received.end() ? 0 : found->station_time_us;
     };
     ASSERT_TRUE(clock.run_until([&] { return probe() != 0; }, 2s));
     const std::uint64_t station_time_us = probe();

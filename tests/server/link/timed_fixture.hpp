@@ -100,9 +100,6 @@ class TimedTest : public LinkTest {
     ASSERT_TRUE(clock.run_until([&] { return !robot->commands().empty(); }, 1s));
     robot->keep_talking();
   }
-  const station::CommandRecord& latest(station::CommandId id) const {
-    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &station::CommandRecord::id);
-  }
   void accept_last() {
     robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_ACCEPTED);
     clock.settle();

@@ -48,7 +48,7 @@ class TimedLimitsTest : public TimedTest {
       clock.settle();
     }
   }
-  void tell(protocol::EventKind kind) {
+  void send_event(protocol::EventKind kind) {
     protocol::RobotFrame frame = rheonaut_RobotFrame_init_zero;
     frame.which_body = rheonaut_RobotFrame_event_tag;
     frame.body.event.kind = kind;
@@ -288,9 +288,9 @@ TEST_F(TimedLimitsTest, AScheduleThatRunsCountsForTheTimeAtPowerUntilItEnds) {
   accept_last();
   EXPECT_THAT(refusal(next()), HasSubstr("asks for 9.0 s more"));
   clock.run_for(20ms);
-  tell(rheonaut_EVENT_KIND_SETPOINT_CHANGED);
+  send_event(rheonaut_EVENT_KIND_SETPOINT_CHANGED);
   EXPECT_THAT(refusal(next()), HasSubstr("too_long_at_power"));
-  tell(rheonaut_EVENT_KIND_LEASE_LAPSED);
+  send_event(rheonaut_EVENT_KIND_LEASE_LAPSED);
   EXPECT_EQ(refusal(next()), "");
   robot->acknowledge(robot->commands().back(), rheonaut_COMMAND_RESULT_REJECTED, 0, rheonaut_REJECT_REASON_BUSY);
   clock.settle();
@@ -320,7 +320,7 @@ TEST_F(TimedLimitsTest, AScheduleEndsWithWhatTheRobotReadsTogetherWithItAndWhere
   accept_last();
   clock.run_for(20ms);
   EXPECT_THAT(refusal(next()), HasSubstr("too_long_at_power"));
-  tell(rheonaut_EVENT_KIND_POSITION_UNCERTAIN);
+  send_event(rheonaut_EVENT_KIND_POSITION_UNCERTAIN);
   EXPECT_EQ(refusal(next()), "");
 }
 

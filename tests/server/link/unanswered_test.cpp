@@ -43,9 +43,6 @@ class UnansweredTest : public LinkTest {
     robot.send(frame);
     clock.settle();
   }
-  const station::CommandRecord& latest(station::CommandId id) const {
-    return *std::ranges::find(sink.commands.rbegin(), sink.commands.rend(), id, &station::CommandRecord::id);
-  }
 
  private:
   std::uint64_t next_seq_ = 0;

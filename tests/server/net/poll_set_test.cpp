@@ -88,7 +88,7 @@ class PollSetTest : public ::testing::Test {
       Line* line = lines.back().get();
       const int number = static_cast<int>(lines.size()) - 1;
       line->socket().watch([this, line, number] {
-        if (line->take()) heard.push_back(number);
+        if (line->take()) received.push_back(number);
       });
     }
   }
@@ -111,7 +111,7 @@ class PollSetTest : public ::testing::Test {
   runtime::TaskGroup tasks{loop};
   std::unique_ptr<net::PollSet> set = std::make_unique<net::PollSet>(loop, clock);
   std::vector<std::unique_ptr<Line>> lines;
-  std::vector<int> heard;
+  std::vector<int> received;
   std::vector<std::string> waits_ended;
 };
 
@@ -119,7 +119,7 @@ TEST_F(PollSetTest, WhatIsNotReadToTheEndIsReadyAgain) {
   add_lines(1);
   for (int i = 0; i < 5; ++i) lines[0]->say('x');
   clock.run_for(10 * net::PollSet::kPause);
-  EXPECT_EQ(heard.size(), 5U) << "a call takes one byte";
+  EXPECT_EQ(received.size(), 5U) << "a call takes one byte";
 }
 
 // One robot is read when it sends; of a fleet one poll reads all bytes of the pause.
@@ -127,19 +127,19 @@ TEST_F(PollSetTest, AFleetIsLookedAtOncePerPause) {
   add_lines(3);
   all_say();
   clock.settle();
-  EXPECT_EQ(heard.size(), 3U) << "the first look is at once";
+  EXPECT_EQ(received.size(), 3U) << "the first look is at once";
   all_say();
   clock.settle();
-  EXPECT_EQ(heard.size(), 3U);
+  EXPECT_EQ(received.size(), 3U);
   clock.run_for(net::PollSet::kPause - 1us);
-  EXPECT_EQ(heard.size(), 3U);
+  EXPECT_EQ(received.size(), 3U);
   clock.run_for(1us);
   clock.settle();
-  EXPECT_EQ(heard.size(), 6U);
+  EXPECT_EQ(received.size(), 6U);
   clock.run_for(1s);
   lines[1]->say('x');
   clock.settle();
-  EXPECT_EQ(heard.size(), 7U) << "after a silence at once again";
+  EXPECT_EQ(received.size(), 7U) << "after a silence at once again";
 }
 
 TEST_F(PollSetTest, TwoWithinAPauseAreAFleetUntilItHasBeenQuiet) {
@@ -149,17 +149,17 @@ TEST_F(PollSetTest, TwoWithinAPauseAreAFleetUntilItHasBeenQuiet) {
   clock.run_for(1ms);
   lines[1]->say('x');
   clock.settle();
-  EXPECT_EQ(heard, (std::vector<int>{0, 1}));
+  EXPECT_EQ(received, (std::vector<int>{0, 1}));
   for (std::size_t looks = 1; looks <= net::PollSet::kQuietRounds; ++looks) {
     lines[0]->say('x');
     clock.settle();
-    EXPECT_EQ(heard.size(), 1 + looks);
+    EXPECT_EQ(received.size(), 1 + looks);
     clock.run_for(net::PollSet::kPause);
-    EXPECT_EQ(heard.size(), 2 + looks);
+    EXPECT_EQ(received.size(), 2 + looks);
   }
   lines[0]->say('x');
   clock.settle();
-  EXPECT_EQ(heard.size(), 3U + net::PollSet::kQuietRounds);
+  EXPECT_EQ(received.size(), 3U + net::PollSet::kQuietRounds);
 }
 
 TEST_F(PollSetTest, EverybodyElseHasATurnAfterAFew) {
@@ -167,15 +167,15 @@ TEST_F(PollSetTest, EverybodyElseHasATurnAfterAFew) {
   all_say();
   std::vector<std::size_t> seen;
   std::function<void()> step = [&] {
-    seen.push_back(heard.size());
-    if (heard.size() < lines.size()) asio::post(loop, step);
+    seen.push_back(received.size());
+    if (received.size() < lines.size()) asio::post(loop, step);
   };
   asio::post(loop, step);
   clock.settle();
   ASSERT_GE(seen.size(), 10U);
   for (std::size_t i = 1; i < seen.size(); ++i) EXPECT_LE(seen[i] - seen[i - 1], std::size_t{net::PollSet::kAtOnce});
-  std::ranges::sort(heard);
-  for (std::size_t i = 0; i < lines.size(); ++i) EXPECT_EQ(heard.at(i), static_cast<int>(i));
+  std::ranges::sort(received);
+  for (std::size_t i = 0; i < lines.size(); ++i) EXPECT_EQ(received.at(i), static_cast<int>(i));
 }
 
 // SAFETY: what the answer to an emergency stop rests on.
@@ -183,39 +183,39 @@ TEST_F(PollSetTest, TheAwaitedWaitsForNoPauseAndNoOther) {
   add_lines(10 * net::PollSet::kAtOnce);
   all_say();
   clock.settle();
-  heard.clear();
+  received.clear();
   lines.back()->socket().set_awaited(true);
   all_say();
   clock.settle();
-  EXPECT_THAT(heard, ::testing::ElementsAre(static_cast<int>(lines.size()) - 1)) << "the others are in their pause";
+  EXPECT_THAT(received, ::testing::ElementsAre(static_cast<int>(lines.size()) - 1)) << "the others are in their pause";
   clock.run_for(net::PollSet::kPause);
   clock.settle();
-  EXPECT_EQ(heard.size(), lines.size());
+  EXPECT_EQ(received.size(), lines.size());
 
-  heard.clear();
+  received.clear();
   clock.run_for(1s);  // a look is due, and takes them eight at a time
   all_say();
   lines.back()->socket().set_awaited(false);
   lines[0]->socket().set_awaited(true);
-  for (int i = 0; i < 1000 && std::ranges::find(heard, 0) == heard.end(); ++i) {
+  for (int i = 0; i < 1000 && std::ranges::find(received, 0) == received.end(); ++i) {
     loop.restart();
     loop.poll_one();
   }
-  EXPECT_THAT(heard, ::testing::Contains(0));
-  EXPECT_GT(heard.size(), 1U);
-  EXPECT_LE(heard.size(), 2U * net::PollSet::kAtOnce) << "a round of the others at most, and one that was under way";
+  EXPECT_THAT(received, ::testing::Contains(0));
+  EXPECT_GT(received.size(), 1U);
+  EXPECT_LE(received.size(), 2U * net::PollSet::kAtOnce) << "a round of the others at most, and one that was under way";
 }
 
 TEST_F(PollSetTest, WhoIsNoLongerAwaitedWaitsAgain) {
   add_lines(2);
   all_say();
   clock.settle();
-  heard.clear();
+  received.clear();
   lines[0]->socket().set_awaited(true);
   lines[0]->socket().set_awaited(false);
   all_say();
   clock.settle();
-  EXPECT_TRUE(heard.empty());
+  EXPECT_TRUE(received.empty());
 }
 
 // What had come before, unread.
@@ -223,17 +223,17 @@ TEST_F(PollSetTest, WhatHasComeIsReadWhereverItsSocketGoes) {
   add_lines(2);
   all_say();
   clock.settle();
-  heard.clear();
+  received.clear();
   all_say();
   lines[0]->socket().set_awaited(true);
   clock.settle();
-  EXPECT_EQ(heard, std::vector<int>{0});
+  EXPECT_EQ(received, std::vector<int>{0});
   lines[0]->say('x');
   lines[0]->socket().set_awaited(false);
   clock.settle();
-  EXPECT_EQ(heard, std::vector<int>{0});
+  EXPECT_EQ(received, std::vector<int>{0});
   clock.run_for(net::PollSet::kPause);
-  EXPECT_EQ(heard.size(), 3U);
+  EXPECT_EQ(received.size(), 3U);
 }
 
 TEST_F(PollSetTest, AnEventThatNobodyWatchesDoesNotKeepTheLoopBusy) {
@@ -247,10 +247,10 @@ TEST_F(PollSetTest, AnEventThatNobodyWatchesDoesNotKeepTheLoopBusy) {
   clock.run_until([] { return false; }, 1s);
   EXPECT_EQ(clock.steady_us(), before_us) << "nobody sleeps, and the loop had settled";
   lines[0]->socket().watch([this] {
-    if (lines[0]->take()) heard.push_back(0);
+    if (lines[0]->take()) received.push_back(0);
   });
   clock.settle();
-  EXPECT_THAT(heard, ::testing::ElementsAre(0));
+  EXPECT_THAT(received, ::testing::ElementsAre(0));
 }
 
 TEST_F(PollSetTest, TheEndIsReported) {
@@ -270,7 +270,7 @@ TEST_F(PollSetTest, WhoLeavesDuringALookIsNotCalled) {
   for (const auto& line : lines) {
     line->socket().watch([&, line = line.get()] {
       line->take();
-      heard.push_back(1);
+      received.push_back(1);
       for (const auto& other : lines) {
         if (other.get() != line) other->leave();
       }
@@ -278,7 +278,7 @@ TEST_F(PollSetTest, WhoLeavesDuringALookIsNotCalled) {
   }
   all_say();
   clock.run_for(1s);
-  EXPECT_EQ(heard.size(), 1U);
+  EXPECT_EQ(received.size(), 1U);
 }
 
 TEST_F(PollSetTest, AWriterWaitsForRoom) {
@@ -290,7 +290,7 @@ TEST_F(PollSetTest, AWriterWaitsForRoom) {
   lines[0]->say('x');
   clock.run_for(1s);
   EXPECT_TRUE(waits_ended.empty()) << "reading does not end its wait";
-  EXPECT_EQ(heard.size(), 1U);
+  EXPECT_EQ(received.size(), 1U);
   lines[0]->drain();
   clock.run_for(1s);
   EXPECT_THAT(waits_ended, ::testing::ElementsAre("room"));

@@ -51,17 +51,17 @@ class TlsTest : public ::testing::Test {
     fs::remove_all(config.data_dir);
   }
 
-  void make_certificate(cli::Certificate wish) {
-    wish.data_dir = config.data_dir;
+  void make_certificate(cli::Certificate options) {
+    options.data_dir = config.data_dir;
     std::ostringstream ignored;
-    cli::run(wish, ignored);
+    cli::run(options, ignored);
   }
   void renew(bool new_key = false, int days = 825) {
-    cli::Certificate wish;
-    wish.renew = true;
-    wish.new_key = new_key;
-    wish.days = days;
-    make_certificate(wish);
+    cli::Certificate options;
+    options.renew = true;
+    options.new_key = new_key;
+    options.days = days;
+    make_certificate(options);
   }
 
   net::TransportSecurity& start() {

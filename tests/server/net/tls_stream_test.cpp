@@ -18,9 +18,9 @@ TEST_F(TlsTest, BytesLeaveAtOnce) {
   EXPECT_EQ(client.read(4), "stop");
 }
 
-class Heard {
+class Received {
  public:
-  explicit Heard(net::ByteStream& stream) : stream_{stream} {
+  explicit Received(net::ByteStream& stream) : stream_{stream} {
     stream_.on_readable([this] {
       const net::ByteStream::Read got = stream_.read_now(asio::buffer(buffer_));
       text.append(buffer_.data(), got.size);
@@ -44,13 +44,13 @@ TEST_F(TlsTest, RecordsThatCameTogetherAreReadTogether) {
   Client client{clock, listener.endpoint()};
   ASSERT_TRUE(client.shake_hands());
   const auto stream = make_stream(std::move(*served), sockets);
-  Heard heard{*stream};
+  Received received{*stream};
   clock.settle();
   client.cork(1);
   for (const char* record : {"telemetry ", "and ", "the answer"}) client.send(record);
   client.cork(0);
   clock.settle();
-  EXPECT_EQ(heard.text, "telemetry and the answer");
+  EXPECT_EQ(received.text, "telemetry and the answer");
 }
 
 TEST_F(TlsTest, WhatComesWithTheEndOfTheHandshakeIsRead) {
@@ -59,9 +59,9 @@ TEST_F(TlsTest, WhatComesWithTheEndOfTheHandshakeIsRead) {
   ASSERT_TRUE(client.shake_hands("hello"));
   ASSERT_TRUE(clock.run_until([&] { return outcome.has_value(); }, 1s));
   const auto stream = make_stream(std::move(*served), sockets);
-  Heard heard{*stream};
+  Received received{*stream};
   clock.settle();
-  EXPECT_EQ(heard.text, "hello");
+  EXPECT_EQ(received.text, "hello");
 }
 
 TEST_F(TlsTest, LargeRecordsAndTheEndBehindThemAreRead) {
@@ -69,7 +69,7 @@ TEST_F(TlsTest, LargeRecordsAndTheEndBehindThemAreRead) {
   Client client{clock, listener.endpoint()};
   ASSERT_TRUE(client.shake_hands());
   const auto stream = make_stream(std::move(*served), sockets);
-  Heard heard{*stream};
+  Received received{*stream};
   std::string all;
   for (int i = 0; i < 10; ++i) {
     const std::string record(16'000, static_cast<char>('a' + i));
@@ -79,9 +79,9 @@ TEST_F(TlsTest, LargeRecordsAndTheEndBehindThemAreRead) {
   }
   client.hang_up();
   clock.run_for(1s);
-  EXPECT_EQ(heard.text.size(), all.size());
-  EXPECT_EQ(heard.text, all);
-  EXPECT_TRUE(heard.has_ended);
+  EXPECT_EQ(received.text.size(), all.size());
+  EXPECT_EQ(received.text, all);
+  EXPECT_TRUE(received.has_ended);
 }
 
 // A peer that does not read: what does not fit waits, and nothing is lost, doubled or out of order.

@@ -93,18 +93,18 @@ class AuditTest : public RecordingTest {
 
 TEST_F(AuditTest, ACommandLeavesAnEntryForEachStateThatIsStored) {
   start();
-  station::CommandRecord wish = command(18446744073709551615U);
-  recorder_->on_command(wish);
+  station::CommandRecord record = command(18446744073709551615U);
+  recorder_->on_command(record);
   flush_records();
-  wish.state = station::CommandState::sent;
-  wish.sent_at_us = wish.submitted_at_us + 2'000;
-  wish.sent_after_us = 2'000;
-  recorder_->on_command(wish);
+  record.state = station::CommandState::sent;
+  record.sent_at_us = record.submitted_at_us + 2'000;
+  record.sent_after_us = 2'000;
+  recorder_->on_command(record);
   flush_records();
-  wish.state = station::CommandState::rejected;
-  wish.reason = "wrong_mode";
-  wish.ended_at_us = wish.submitted_at_us + 5'000;
-  recorder_->on_command(wish);
+  record.state = station::CommandState::rejected;
+  record.reason = "wrong_mode";
+  record.ended_at_us = record.submitted_at_us + 5'000;
+  recorder_->on_command(record);
   flush_records();
   EXPECT_THAT(actions(), ElementsAre("station.started", "command.queued", "command.sent", "command.rejected"));
   EXPECT_EQ(rows("SELECT DISTINCT actor, peer, robot_id, subject FROM audit WHERE entry > 1"),
@@ -113,7 +113,7 @@ TEST_F(AuditTest, ACommandLeavesAnEntryForEachStateThatIsStored) {
   EXPECT_EQ(detail.at("arguments").at("setpoint_m"), 0.1);
   EXPECT_EQ(detail.at("reason"), "wrong_mode");
   EXPECT_EQ(detail.at("sent_after_us"), 2'000);
-  EXPECT_EQ(number("SELECT at_us FROM audit WHERE entry = 4"), wish.ended_at_us);
+  EXPECT_EQ(number("SELECT at_us FROM audit WHERE entry = 4"), record.ended_at_us);
   EXPECT_EQ(number("SELECT audit_entry FROM command"), 4);
   const storage::AuditFindings found = findings();
   EXPECT_THAT(found.faults, IsEmpty());
@@ -299,20 +299,20 @@ TEST_F(AuditTest, TheExportOfARunHoldsItsPartOfTheChainAndNobodyElsesDoings) {
   station::AuditNote refused = note("command.refused");
   refused.robot_id = "";
   refused.subject = "very-secret-name";
-  const auto tell = [this](station::AuditNote each) {
+  const auto notify = [this](station::AuditNote each) {
     clock_.run_for(10ms);
     each.by.at_us = clock_.utc_us();
     recorder_->on_audit(each);
   };
-  tell(note("control.taken"));
+  notify(note("control.taken"));
   clock_.run_for(10ms);
   const storage::RunId run = wait(runs_->create(robot_.id, named("exported")))->id;
   make(robot_, 10);
   clock_.run_for(10ms);
   recorder_->on_command(command(7));
-  for (const station::AuditNote& each : {elsewhere, account, refused, note("control.released")}) tell(each);
+  for (const station::AuditNote& each : {elsewhere, account, refused, note("control.released")}) notify(each);
   ASSERT_TRUE(wait(runs_->end(run, "")));
-  tell(note("control.taken"));
+  notify(note("control.taken"));
   flush_records();
   const auto file = folder_ / "run.sqlite";
   {

@@ -101,17 +101,17 @@ TEST_F(CommitSpreadTest, WhatIsDurableIsSentInTurnsOfTheLoop) {
   start();
   connect_robots(kRobots);
   flush();
-  std::size_t told = 0;
+  std::size_t acknowledged = 0;
   std::vector<std::size_t> seen{0};  // how many were sent when the loop came to other work
   recorder_->set_on_durable([&](const station::RobotId&, station::BootId, std::uint64_t, std::uint64_t) {
-    ++told;
-    boost::asio::post(loop_, [&] { seen.push_back(told); });
+    ++acknowledged;
+    boost::asio::post(loop_, [&] { seen.push_back(acknowledged); });
   });
   for (TestRobot& robot : robots_) make(robot, 10, 10);
   const std::uint64_t commits = recorder_->counters().commits;
   flush();
   EXPECT_EQ(recorder_->counters().commits, commits + 1);
-  EXPECT_EQ(told, kRobots);
+  EXPECT_EQ(acknowledged, kRobots);
   for (std::size_t turn = 1; turn < seen.size(); ++turn) EXPECT_LE(seen[turn] - seen[turn - 1], 150u);
 }
 

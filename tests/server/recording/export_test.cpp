@@ -235,29 +235,29 @@ TEST_F(ExportTest, TheCommandWritesWhatTheStationExports) {
   const std::string expected = csv({.run = run, .channels = storage::all_channels(), .grid_us = {}});
   for (const bool runs : {true, false}) {
     if (!runs) stop();
-    cli::Export wish;
-    wish.run = run;
-    wish.to = folder_ / "out.csv";
-    wish.data_dir = folder_;
+    cli::Export options;
+    options.run = run;
+    options.to = folder_ / "out.csv";
+    options.data_dir = folder_;
     std::ostringstream out;
-    EXPECT_EQ(cli::run(wish, out), 0);
-    std::ifstream in{wish.to};
+    EXPECT_EQ(cli::run(options, out), 0);
+    std::ifstream in{options.to};
     const std::string written{std::istreambuf_iterator<char>{in}, {}};
     EXPECT_EQ(written.size(), expected.size());
     EXPECT_TRUE(written == expected);
-    wish.format = cli::ExportFormat::sqlite;
-    wish.to = folder_ / "out.sqlite";
-    EXPECT_EQ(cli::run(wish, out), 0);
-    EXPECT_EQ(rows_of(wish.to, "sample").size(), rows_of(path_, "run_sample").size());
-    wish.format = cli::ExportFormat::mat;
-    wish.to = folder_ / "out.mat";
-    EXPECT_EQ(cli::run(wish, out), 0);
-    EXPECT_EQ(variables_of(wish.to).at("seq").numbers.size(), rows_of(path_, "run_sample").size());
-    wish.run = 99;
-    wish.to = folder_ / "none.mat";
-    EXPECT_THROW(cli::run(wish, out), std::runtime_error);
-    EXPECT_FALSE(std::filesystem::exists(wish.to));
-    EXPECT_FALSE(std::filesystem::exists(wish.to.string() + ".part"));
+    options.format = cli::ExportFormat::sqlite;
+    options.to = folder_ / "out.sqlite";
+    EXPECT_EQ(cli::run(options, out), 0);
+    EXPECT_EQ(rows_of(options.to, "sample").size(), rows_of(path_, "run_sample").size());
+    options.format = cli::ExportFormat::mat;
+    options.to = folder_ / "out.mat";
+    EXPECT_EQ(cli::run(options, out), 0);
+    EXPECT_EQ(variables_of(options.to).at("seq").numbers.size(), rows_of(path_, "run_sample").size());
+    options.run = 99;
+    options.to = folder_ / "none.mat";
+    EXPECT_THROW(cli::run(options, out), std::runtime_error);
+    EXPECT_FALSE(std::filesystem::exists(options.to));
+    EXPECT_FALSE(std::filesystem::exists(options.to.string() + ".part"));
   }
 }
 

@@ -45,11 +45,11 @@ class StoreCheckTest : public RecordingTest {
     database.exec("PRAGMA foreign_keys = OFF; PRAGMA ignore_check_constraints = ON");
     database.exec(sql);
   }
-  storage::StoreFindings findings(const storage::StoreCheck& wish = {}) {
+  storage::StoreFindings findings(const storage::StoreCheck& options = {}) {
     SQLite::Database database = storage::open_for_reading(path_);
-    return check_store(database, wish).value();
+    return check_store(database, options).value();
   }
-  std::vector<std::string> faults(const storage::StoreCheck& wish = {}) { return findings(wish).faults; }
+  std::vector<std::string> faults(const storage::StoreCheck& options = {}) { return findings(options).faults; }
 };
 
 TEST_F(StoreCheckTest, FindsNothingInAGoodDatabase) {

@@ -59,14 +59,14 @@ class Version6Test : public RecordingTest {
   }
 
   fs::path exported(cli::ExportFormat format) {
-    cli::Export wish;
-    wish.run = 1;
-    wish.format = format;
-    wish.to = folder_ / (std::string{"run_1."} + cli::text(format));
-    wish.data_dir = folder_;
+    cli::Export options;
+    options.run = 1;
+    options.format = format;
+    options.to = folder_ / (std::string{"run_1."} + cli::text(format));
+    options.data_dir = folder_;
     std::ostringstream out;
-    EXPECT_EQ(cli::run(wish, out), 0);
-    return wish.to;
+    EXPECT_EQ(cli::run(options, out), 0);
+    return options.to;
   }
 };
 

@@ -35,7 +35,7 @@ class EmergencyStopsTest : public EntryTest {
 
 TEST_F(EmergencyStopsTest, TheFrameIsHandedOverAndItsRecordReturned) {
   const auto stop = begin();
-  EXPECT_THAT(port.stops, ElementsAre(stop->record.id));
+  EXPECT_THAT(link.stops, ElementsAre(stop->record.id));
   ASSERT_THAT(records, SizeIs(1));
   EXPECT_EQ(records[0].id, stop->record.id);
   EXPECT_EQ(records[0].state, station::CommandState::queued);
@@ -57,37 +57,37 @@ TEST_F(EmergencyStopsTest, OnePressThatComesTwiceIsOneStop) {
   records.clear();
   EXPECT_EQ(begin("press-1"), first);
   EXPECT_THAT(records, IsEmpty());
-  EXPECT_THAT(port.stops, SizeIs(1));
+  EXPECT_THAT(link.stops, SizeIs(1));
   EXPECT_NE(begin("press-2"), first);
-  EXPECT_THAT(port.stops, SizeIs(2));
+  EXPECT_THAT(link.stops, SizeIs(2));
 }
 
 TEST_F(EmergencyStopsTest, AStopThatTheLinkThrowsAwayIsKeptAndRepeatedEachSecond) {
-  port.is_broken = true;
+  link.is_broken = true;
   EXPECT_THROW(begin(), std::runtime_error);
   EXPECT_EQ(entry.commands.sent_with_stop, nullptr);
-  port.is_broken = false;
+  link.is_broken = false;
   stops.repeat(entry, records);
-  EXPECT_THAT(port.stops, IsEmpty());
+  EXPECT_THAT(link.stops, IsEmpty());
   clock.run_for(std::chrono::seconds{1});
   stops.repeat(entry, records);
-  EXPECT_THAT(port.stops, SizeIs(1));
+  EXPECT_THAT(link.stops, SizeIs(1));
 }
 
 TEST_F(EmergencyStopsTest, WithoutALinkItWaitsAndGoesFirstWhenTheRobotIsBack) {
-  entry.port = nullptr;
+  entry.link = nullptr;
   const auto stop = begin();
   EXPECT_EQ(begin(), stop) << "one stop is enough for a robot that is away";
-  entry.port = &port;
+  entry.link = &link;
   stops.on_connected(entry, false, records);
-  EXPECT_THAT(port.stops, ElementsAre(stop->record.id));
+  EXPECT_THAT(link.stops, ElementsAre(stop->record.id));
 }
 
 TEST_F(EmergencyStopsTest, ARobotThatLostItsLatchIsLatchedAgain) {
   stops.on_connected(entry, false, records);
-  EXPECT_THAT(port.stops, IsEmpty());
+  EXPECT_THAT(link.stops, IsEmpty());
   stops.on_connected(entry, true, records);
-  EXPECT_THAT(port.stops, SizeIs(1));
+  EXPECT_THAT(link.stops, SizeIs(1));
   ASSERT_THAT(records, SizeIs(1));
   EXPECT_EQ(records[0].actor, "station:latch");
 }
@@ -110,7 +110,7 @@ TEST_F(EmergencyStopsTest, OnlyARetiredRobotThatHasBeenAwayForLongIsLeftOut) {
   EXPECT_FALSE(stops.may_be_left_out(entry));
   robot.retired_at_us = 1;
   EXPECT_FALSE(stops.may_be_left_out(entry)) << "it is connected";
-  entry.port = nullptr;
+  entry.link = nullptr;
   EXPECT_TRUE(stops.may_be_left_out(entry));
   robot.last_received_steady_us = clock.steady_us();
   EXPECT_FALSE(stops.may_be_left_out(entry)) << "it may still move";

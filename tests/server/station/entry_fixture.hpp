@@ -13,7 +13,7 @@
 
 namespace server {
 
-class KeepingPort final : public station::RobotPort {
+class KeepingLink final : public station::RobotLink {
  public:
   const station::RobotId& robot_id() const override { return id; }
   bool send(const protocol::Command& command, std::int64_t) override {
@@ -46,7 +46,7 @@ class EntryTest : public ::testing::Test {
     robot.sample_period_us = 10'000;
     robot.latest_robot_time_us = 1'000'000;
     robot.last_received_steady_us = clock.steady_us();
-    entry.port = &port;
+    entry.link = &link;
   }
 
   static protocol::Command set_duty(float duty) {
@@ -70,7 +70,7 @@ class EntryTest : public ::testing::Test {
   boost::asio::io_context loop;
   VirtualClock clock{loop};
   station::RobotState robot;
-  KeepingPort port;
+  KeepingLink link;
   station::RobotEntry entry{robot};
 };
 

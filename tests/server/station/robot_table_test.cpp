@@ -21,7 +21,7 @@ TEST(RobotTableTest, ARobotIsAddedOnceAndFoundByItsBoot) {
 TEST(RobotTableTest, ANewerConnectionTakesThePlaceOfTheOlder) {
   station::RobotTable table;
   station::RobotEntry& entry = table.add("r1");
-  KeepingPort older, newer;
+  KeepingLink older, newer;
   EXPECT_EQ(station::RobotTable::connect(entry, older), nullptr);
   EXPECT_EQ(station::RobotTable::of(older), &entry);
   EXPECT_EQ(station::RobotTable::connect(entry, newer), &older);
@@ -29,15 +29,15 @@ TEST(RobotTableTest, ANewerConnectionTakesThePlaceOfTheOlder) {
   EXPECT_EQ(station::RobotTable::of(newer), &entry);
   station::RobotTable::disconnect(entry);
   EXPECT_EQ(station::RobotTable::of(newer), nullptr);
-  EXPECT_EQ(entry.port, nullptr);
+  EXPECT_EQ(entry.link, nullptr);
 }
 
 TEST(RobotTableTest, AnotherBootMayConnectOnlyWhenTheRobotHasBeenSilent) {
   station::RobotTable table;
   EXPECT_TRUE(table.may_connect("r1", 7, 0, 1'000)) << "not known yet";
   station::RobotEntry& entry = table.add("r1");
-  KeepingPort port;
-  station::RobotTable::connect(entry, port);
+  KeepingLink link;
+  station::RobotTable::connect(entry, link);
   entry.robot.boot_id = 7;
   entry.robot.last_received_steady_us = 5'000;
   EXPECT_TRUE(table.may_connect("r1", 7, 5'500, 1'000));

@@ -17,9 +17,9 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 // Notes what is handed to it, and takes it as written at once.
-class NotingPort final : public station::RobotPort {
+class NotingLink final : public station::RobotLink {
  public:
-  NotingPort(station::Station& station, station::RobotId id, std::vector<std::string>& notes)
+  NotingLink(station::Station& station, station::RobotId id, std::vector<std::string>& notes)
       : station_{station}, id_{std::move(id)}, notes_{notes} {}
 
   const station::RobotId& robot_id() const override { return id_; }
@@ -76,15 +76,15 @@ class StopAllTest : public ::testing::Test {
     clock.settle();
   }
 
-  NotingPort& connect(const station::RobotId& id) {
-    ports.push_back(std::make_unique<NotingPort>(station, id, notes));
+  NotingLink& connect(const station::RobotId& id) {
+    links.push_back(std::make_unique<NotingLink>(station, id, notes));
     station::AdmissionRequest hello;
     hello.robot_id = id;
     hello.boot_id = 7;
     hello.received_at_us = clock.utc_us();
-    station.on_connected(*ports.back(), hello, protocol::Hello(rheonaut_Hello_init_zero), station::Admission{},
+    station.on_connected(*links.back(), hello, protocol::Hello(rheonaut_Hello_init_zero), station::Admission{},
                          "memory");
-    return *ports.back();
+    return *links.back();
   }
 
   void stop_all(microseconds patience = 1s) {
@@ -133,7 +133,7 @@ class StopAllTest : public ::testing::Test {
   station::Station station{loop, clock, config::Envelope{}, config::LinkTimes{}};
   std::vector<std::string> notes;
   NotingSink sink{notes};
-  std::vector<std::unique_ptr<NotingPort>> ports;
+  std::vector<std::unique_ptr<NotingLink>> links;
   std::optional<station::StopsOfAll> outcome;
 };
 
@@ -142,7 +142,7 @@ TEST_F(StopAllTest, EveryFrameIsHandedOverBeforeAnythingIsPublished) {
   stop_all();
   EXPECT_THAT(notes, ElementsAre("frame a", "frame b", "frame c", "record a", "record b", "record c"));
   EXPECT_FALSE(outcome.has_value()) << "it waits for their answers";
-  for (const auto& port : ports) port->obey();
+  for (const auto& link : links) link->obey();
   ASSERT_TRUE(clock.run_until([this] { return outcome.has_value(); }, 10ms));
   ASSERT_EQ(outcome->records.size(), 3u);
   for (const station::CommandRecord& record : outcome->records)
@@ -153,7 +153,7 @@ TEST_F(StopAllTest, EveryFrameIsHandedOverBeforeAnythingIsPublished) {
 TEST_F(StopAllTest, ItWaitsForAllTogetherNoLongerThanItsPatience) {
   for (const char* id : {"a", "b", "c"}) connect(id);
   stop_all(1s);
-  ports[1]->obey();
+  links[1]->obey();
   EXPECT_FALSE(clock.run_until([this] { return outcome.has_value(); }, 990ms));
   ASSERT_TRUE(clock.run_until([this] { return outcome.has_value(); }, 20ms));
   EXPECT_EQ(outcome->records[0].state, station::CommandState::sent);
@@ -168,7 +168,7 @@ TEST_F(StopAllTest, OneThatCannotBeStoppedKeepsNoOtherFromIt) {
   stop_all();
   EXPECT_THAT(notes, ElementsAre("frame b", "frame c", "record b", "record c"));
   sink.broken.clear();
-  for (std::size_t i : {1u, 2u}) ports[i]->obey();
+  for (std::size_t i : {1u, 2u}) links[i]->obey();
   ASSERT_TRUE(clock.run_until([this] { return outcome.has_value(); }, 10ms));
   EXPECT_THAT(outcome->failed, ElementsAre("a", "c"));
   ASSERT_EQ(outcome->records.size(), 1u);
@@ -193,7 +193,7 @@ TEST_F(StopAllTest, ASinkThatFailsKeepsNoRecordFromBeingPublished) {
 
 TEST_F(StopAllTest, ARobotThatIsAwayIsNotWaitedFor) {
   connect("a");
-  station.on_disconnected(*ports[0], "gone");
+  station.on_disconnected(*links[0], "gone");
   stop_all(1s);
   ASSERT_TRUE(outcome.has_value());
   EXPECT_EQ(outcome->records[0].state, station::CommandState::queued);
@@ -202,12 +202,12 @@ TEST_F(StopAllTest, ARobotThatIsAwayIsNotWaitedFor) {
 TEST_F(StopAllTest, OnlyARetiredRobotThatIsNotConnectedIsLeftOut) {
   for (const char* id : {"away", "retired", "there"}) connect(id);
   clock.run_for(1s);
-  for (std::size_t i : {0u, 1u}) station.on_disconnected(*ports[i], "gone");
+  for (std::size_t i : {0u, 1u}) station.on_disconnected(*links[i], "gone");
   station.set_retired("retired", clock.utc_us(), "token:admin");
   station.set_retired("there", clock.utc_us(), "token:admin");
   clock.run_for(61s);
   stop_all();
-  ports[2]->obey();
+  links[2]->obey();
   ASSERT_TRUE(clock.run_until([this] { return outcome.has_value(); }, 10ms));
   EXPECT_THAT(outcome->left_out, ElementsAre("retired"));
   ASSERT_EQ(outcome->records.size(), 2u);
@@ -230,7 +230,7 @@ TEST_F(StopAllTest, ARetiredRobotThatConnectedAgainIsStoppedForAMinuteAfterItsLi
   clock.run_for(1s);
   connect("a");
   clock.run_for(1s);
-  station.on_disconnected(*ports[0], "gone");
+  station.on_disconnected(*links[0], "gone");
   clock.run_for(59s);
   stop_all();
   ASSERT_TRUE(outcome.has_value());

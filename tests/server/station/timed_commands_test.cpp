@@ -30,34 +30,34 @@ class TimedCommandsTest : public EntryTest {
 TEST_F(TimedCommandsTest, NothingIsDroppedWhileItsSenderIsInControl) {
   add_timed();
   EXPECT_TRUE(timed.drop_outdated(entry, "session:1"));
-  EXPECT_THAT(port.sent, IsEmpty());
+  EXPECT_THAT(link.sent, IsEmpty());
 }
 
 TEST_F(TimedCommandsTest, WhenControlEndsTheRobotIsSentOneDropOfWhatWaits) {
   const auto waiting = add_timed();
   tracker.on_sent(entry, waiting->record.id);
   EXPECT_TRUE(timed.drop_outdated(entry, ""));
-  ASSERT_THAT(port.sent, SizeIs(1));
-  EXPECT_EQ(port.sent[0].which_action, rheonaut_Command_drop_timed_tag);
+  ASSERT_THAT(link.sent, SizeIs(1));
+  EXPECT_EQ(link.sent[0].which_action, rheonaut_Command_drop_timed_tag);
   EXPECT_STREQ(waiting->expiry(), "control_ended");
   EXPECT_TRUE(timed.drop_outdated(entry, ""));
-  EXPECT_THAT(port.sent, SizeIs(1)) << "it is on its way";
+  EXPECT_THAT(link.sent, SizeIs(1)) << "it is on its way";
   entry.commands.take_unanswered(entry.timed.drop_id);
   EXPECT_TRUE(timed.drop_outdated(entry, ""));
-  EXPECT_THAT(port.sent, SizeIs(2)) << "it ended without an acknowledgement";
+  EXPECT_THAT(link.sent, SizeIs(2)) << "it ended without an acknowledgement";
 }
 
 TEST_F(TimedCommandsTest, WithoutRoomOnTheLinkNoCommandMayFollow) {
   add_timed();
-  port.is_full = true;
+  link.is_full = true;
   EXPECT_FALSE(timed.drop_outdated(entry, ""));
-  port.is_full = false;
+  link.is_full = false;
   EXPECT_TRUE(timed.drop_outdated(entry, ""));
 }
 
 TEST_F(TimedCommandsTest, WhatIsQueuedIsWithdrawnUnlessItEndsAMotion) {
   const auto forward = add(set_duty(0.3F)), halt = add(set_duty(0));
-  port.can_withdraw = {forward->record.id, halt->record.id};
+  link.can_withdraw = {forward->record.id, halt->record.id};
   timed.withdraw_queued(entry, "limits_changed", [](const station::PendingCommand&) { return true; });
   EXPECT_EQ(forward->record.state, station::CommandState::superseded);
   EXPECT_EQ(forward->record.reason, "limits_changed");

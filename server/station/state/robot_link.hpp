@@ -1,6 +1,6 @@
 // The interface to one connected robot; a robot session implements it.
 //
-// Loop thread. The station drops the port in Station::on_disconnected, which the session calls before it ends.
+// Loop thread. The station drops the link in Station::on_disconnected, which the session calls before it ends.
 #pragma once
 
 #include <string>
@@ -11,9 +11,9 @@ namespace server::station {
 
 struct RobotEntry;  // server/station/robot_entry.hpp
 
-class RobotPort {
+class RobotLink {
  public:
-  virtual ~RobotPort() = default;
+  virtual ~RobotLink() = default;
 
   virtual const RobotId& robot_id() const = 0;
 
@@ -43,7 +43,7 @@ class RobotPort {
 
  private:
   friend class RobotTable;
-  RobotEntry* entry_ = nullptr;  // of its robot, while this port is the one that the station uses
+  RobotEntry* entry_ = nullptr;  // of its robot, while this link is the one that the station uses
 };
 
 }  // namespace server::station

@@ -1,4 +1,4 @@
-// The way of a command through the door: sent, answered, expired, refused.
+// A command on its way to the robot and back: sent, answered, expired, refused.
 #include "tests/server/link/link_fixture.hpp"
 
 namespace server {
