@@ -156,6 +156,39 @@ void FieldReader::choice(const char* key, std::size_t& index, std::span<const ch
   index = static_cast<std::size_t>(found - known.begin());
 }
 
+void FieldReader::numbers(const char* key, std::vector<double>& values, Range range, const char* what) {
+  const toml::array* all = find_list(key, what, "[0.5, 1]");
+  if (all != nullptr) values.clear();
+  for (std::size_t i = 0; all != nullptr && i < all->size(); ++i) {
+    const toml::node& node = *all->get(i);
+    const std::string name = join_text(key, "[", i, "]");
+    const auto given = exact<double>(node);
+    if (!given) fail(node, name, "must be a number, is " + shown(node));
+    if (!range.holds(*given)) fail(node, name, "is " + shown(node) + ", allowed is " + range_text(range));
+    values.push_back(*given);
+  }
+}
+
+void FieldReader::texts(const char* key, std::vector<std::string>& values, const char* what) {
+  const toml::array* all = find_list(key, what, "[\"water\"]");
+  if (all != nullptr) values.clear();
+  for (std::size_t i = 0; all != nullptr && i < all->size(); ++i) {
+    const toml::node& node = *all->get(i);
+    const auto given = exact<std::string>(node);
+    if (!given || given->empty()) {
+      fail(node, join_text(key, "[", i, "]"), "must be a text in quotes that is not empty, is " + shown(node));
+    }
+    values.push_back(*given);
+  }
+}
+
+const toml::array* FieldReader::find_list(const char* key, const char* what, const char* example) {
+  const toml::node* node = find(key, false, what);
+  if (node == nullptr) return nullptr;
+  if (!node->is_array()) fail(*node, key, join_text("must be a list such as ", example, ", is ", shown(*node)));
+  return node->as_array();
+}
+
 void FieldReader::read_table(const toml::node& node, const std::string& key, const Inside& inside) const {
   const toml::table* table = node.as_table();
   if (table == nullptr) fail(node, key, "must be a table, is " + shown(node));

@@ -23,6 +23,8 @@ class FieldReader final : public Fields {
   void flag(const char* key, bool& value, const char* what) override;
   void text(const char* key, std::string& value, const char* what) override;
   void choice(const char* key, std::size_t& index, std::span<const char* const> names, const char* what) override;
+  void numbers(const char* key, std::vector<double>& values, Range range, const char* what) override;
+  void texts(const char* key, std::vector<std::string>& values, const char* what) override;
   void table(const char* key, const char* what, const Inside& inside) override;
   void tables(const char* key, const char* what, const Inside& inside) override;
   void must(const std::function<void()>& check) override;
@@ -33,6 +35,7 @@ class FieldReader final : public Fields {
  private:
   std::string meant_for(const std::string& key) const;
   const toml::node* find(const char* key, bool must_be_given, const char* what);
+  const toml::array* find_list(const char* key, const char* what, const char* example);  // null: not there
   [[noreturn]] void fail(const toml::source_position& at, const std::string& key, const std::string& why) const;
   [[noreturn]] void fail(const toml::node& node, const std::string& key, const std::string& why) const;
   std::string place(const toml::source_position& at) const;

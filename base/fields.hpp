@@ -10,6 +10,7 @@
 #include <limits>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace base {
 
@@ -34,6 +35,10 @@ class Fields {
   virtual void text(const char* key, std::string& value, const char* what) = 0;
   // One of the names; the index says which. An index beyond them: it must be given.
   virtual void choice(const char* key, std::size_t& index, std::span<const char* const> names, const char* what) = 0;
+
+  // Lists of numbers and of texts, which may be empty; every element within the range, no text empty.
+  virtual void numbers(const char* key, std::vector<double>& values, Range range, const char* what) = 0;
+  virtual void texts(const char* key, std::vector<std::string>& values, const char* what) = 0;
 
   // A table and a list of tables with fields of their own; nothing is asked of those that are absent. `inside` is
   // called once for the table, and once for each one of the list.

@@ -95,6 +95,7 @@ CommandLine parse_command_line(int argc, char** argv) {
   offer<ReferenceCommand>(app, "reference", "A run's position as it was measured from outside: import, show, remove",
                           line);
   offer<Predict>(app, "predict", "Predict a closed-loop experiment, beside a recorded one", line);
+  offer<ProfileQuestion>(app, "profile", "List experiment profiles; check one and predict its runs", line);
   offer<Verify>(app, "verify", "Check a station's database and the certificates of its runs", line);
   try {
     app.parse(argc, argv);

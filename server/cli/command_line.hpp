@@ -20,6 +20,7 @@
 #include "server/cli/design/identify.hpp"
 #include "server/cli/design/model.hpp"
 #include "server/cli/design/predict.hpp"
+#include "server/cli/design/profile.hpp"
 #include "server/cli/design/step.hpp"
 #include "server/cli/design/tune.hpp"
 #include "server/config/config.hpp"
@@ -41,7 +42,7 @@ struct Answered {
 
 using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model,
                                  Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
-                                 TokenCommand, RobotCommand, FluidCommand, ReferenceCommand>;
+                                 TokenCommand, RobotCommand, FluidCommand, ReferenceCommand, ProfileQuestion>;
 
 CommandLine parse_command_line(int argc, char** argv);
 

@@ -6,28 +6,11 @@
 
 #include "base/field_reader.hpp"
 #include "base/invalid_argument.hpp"
+#include "base/toml_text.hpp"
 
 namespace sim_robot {
-namespace {
-
-constexpr std::size_t kMaxBytes = 1'000'000;
-
-toml::table parsed(std::string_view text, const std::string& name) {
-  if (text.size() > kMaxBytes) {
-    base::throw_invalid(name, ": has ", text.size(), " bytes, allowed are ", kMaxBytes);
-  }
-  try {
-    return toml::parse(text, name);
-  } catch (const toml::parse_error& error) {
-    const toml::source_position at = error.source().begin;
-    base::throw_invalid(name, ":", at.line, ":", at.column, ": ", error.description());
-  }
-}
-
-}  // namespace
-
 Scenario parse_scenario(std::string_view text, const std::string& name) {
-  const toml::table table = parsed(text, name);
+  const toml::table table = base::parse_toml(text, name);
   Scenario scenario;
   scenario.name = std::filesystem::path{name}.stem().string();
   base::FieldReader reader{table, name};

@@ -7,11 +7,6 @@
 namespace sim_robot {
 namespace {
 
-std::string row(const std::string& key, const base::Field& field) {
-  const std::string value = field.must_be_given() ? "must be given" : field.value_text();
-  return "| " + key + " | " + value + " | " + field.allowed() + " | " + field.what + " |\n";
-}
-
 std::string scenario_table() {
   Scenario scenario;
   base::FieldList list;
@@ -19,15 +14,8 @@ std::string scenario_table() {
   std::string text = "| key | default | allowed | what it is |\n|---|---|---|---|\n";
   for (const base::Field& field : list.fields) {
     const bool has_own_table = field.key.starts_with("faults[]") || field.key.starts_with("script[]");
-    if (!has_own_table) text += row("`" + field.key + "`", field);
+    if (!has_own_table) text += base::markdown_row("`" + field.key + "`", field);
   }
-  return text;
-}
-
-// One row for the name and one for each field of it.
-std::string rows_of(const std::string& name, const std::string& what, const base::FieldList& list) {
-  std::string text = "| `" + name + "` | | | " + what + " |\n";
-  for (const base::Field& field : list.fields) text += row("· `" + field.key + "`", field);
   return text;
 }
 
@@ -37,7 +25,7 @@ std::string fault_table() {
     Fault fault{.kind = static_cast<FaultKind>(i)};
     base::FieldList list;
     fields(list, fault);
-    text += rows_of(fault_types()[i].name, fault_types()[i].what, list);
+    text += list.markdown_rows(fault_types()[i].name, fault_types()[i].what);
   }
   return text;
 }
@@ -48,7 +36,7 @@ std::string script_table() {
     ScriptStep step{.command = static_cast<ScriptCommand>(i)};
     base::FieldList list;
     fields(list, step);
-    text += rows_of(script_commands()[i], "", list);
+    text += list.markdown_rows(script_commands()[i], "");
   }
   return text;
 }

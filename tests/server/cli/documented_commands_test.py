@@ -8,7 +8,7 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).parents[3]
-TOOLS = ("model", "bode", "step", "identify", "estimator", "tune", "discretise", "predict")
+TOOLS = ("model", "bode", "step", "identify", "estimator", "tune", "discretise", "predict", "profile")
 ACCOUNT_TOOLS = ("user", "token", "robot")
 
 

@@ -1,0 +1,25 @@
+// A text in TOML as a table, of bounded size.
+#pragma once
+
+#include <toml++/toml.h>
+
+#include <string>
+#include <string_view>
+
+#include "base/invalid_argument.hpp"
+
+namespace base {
+
+// `name` stands for the text in errors, which are std::invalid_argument: `name:line:column: what is wrong`.
+inline toml::table parse_toml(std::string_view text, const std::string& name) {
+  constexpr std::size_t kMaxBytes = 1'000'000;
+  if (text.size() > kMaxBytes) throw_invalid(name, ": has ", text.size(), " bytes, allowed are ", kMaxBytes);
+  try {
+    return toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    const toml::source_position at = error.source().begin;
+    throw_invalid(name, ":", at.line, ":", at.column, ": ", error.description());
+  }
+}
+
+}  // namespace base

@@ -1,0 +1,200 @@
+// `rheonaut profile`.
+#include "server/cli/design/profile.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+
+#include "server/analysis/control_json.hpp"
+#include "server/cli/terminal/options.hpp"
+#include "server/experiments/preview.hpp"
+#include "server/experiments/profile_document.hpp"
+
+namespace server::cli {
+namespace {
+
+constexpr int kHasProblems = 3;
+
+using analysis::OrderedJson;
+using experiments::Preview;
+using experiments::Profile;
+using experiments::TimeLine;
+using experiments::Variant;
+
+struct Predicted {
+  Variant variant;
+  TimeLine line;
+  Preview preview;
+};
+
+// Repeats of a combination are the same, and are predicted once.
+std::vector<Predicted> predict(const Profile& profile, const ProfileQuestion& options) {
+  const control::ParallelSections sections = discretised(read(options.controller), options.sampling).chosen.sections;
+  std::vector<Predicted> runs;
+  for (const Variant& variant : experiments::variants_of(profile)) {
+    if (variant.repeat > 1) {
+      runs.push_back({variant, runs.back().line, runs.back().preview});
+      continue;
+    }
+    PlantChoice plant = options.plant;
+    if (!plant.file && variant.fluid == "water") plant.file = "newtonian";
+    TimeLine line = experiments::time_line_of(profile, variant);
+    Preview preview = experiments::preview_of(profile, line, read(plant), sections);
+    runs.push_back({variant, std::move(line), std::move(preview)});
+  }
+  return runs;
+}
+
+const char* kind_text(const experiments::Step& step) {
+  return experiments::step_kinds()[static_cast<std::size_t>(step.kind)];
+}
+
+OrderedJson json_of(const Predicted& run) {
+  const Preview& preview = run.preview;
+  return {{"fluid", run.variant.fluid.empty() ? OrderedJson(nullptr) : OrderedJson(run.variant.fluid)},
+          {"controller", run.variant.controller.empty() ? OrderedJson(nullptr) : OrderedJson(run.variant.controller)},
+          {"duty_factor", run.variant.duty_factor},
+          {"setpoint_factor", run.variant.setpoint_factor},
+          {"repeat", run.variant.repeat},
+          {"duration_s", run.line.duration_s()},
+          {"actions", run.line.actions.size()},
+          {"position_min_m", preview.position_min_m},
+          {"position_max_m", preview.position_max_m},
+          {"travel_m", preview.travel_m},
+          {"at_power_s", preview.at_power_s},
+          {"problems", preview.problems}};
+}
+
+OrderedJson steps_json(const Profile& profile, const TimeLine& line) {
+  OrderedJson steps = OrderedJson::array();
+  for (std::size_t i = 0; i < profile.steps.size(); ++i) {
+    steps.push_back({{"kind", kind_text(profile.steps[i])},
+                     {"begins_s", static_cast<double>(line.step_begins[i]) * experiments::kTick_s}});
+  }
+  return steps;
+}
+
+// The prediction of one run is that of --csv, column by column.
+void write_json(std::ostream& out, const Profile& profile, const std::vector<Predicted>& runs,
+                const Predicted& chosen) {
+  OrderedJson all = OrderedJson::array();
+  for (const Predicted& run : runs) all.push_back(json_of(run));
+  const Preview& preview = chosen.preview;
+  OrderedJson setpoint_m = OrderedJson::array();
+  for (const double value : preview.setpoint_m)
+    setpoint_m.push_back(std::isnan(value) ? OrderedJson(nullptr) : OrderedJson(value));
+  cli::write_json(out, {{"name", profile.name},
+                        {"purpose", profile.purpose},
+                        {"steps", steps_json(profile, chosen.line)},
+                        {"runs", std::move(all)},
+                        {"t_s", preview.time_s},
+                        {"position_m", preview.position_m},
+                        {"velocity_m_s", preview.velocity_m_s},
+                        {"duty", preview.duty},
+                        {"setpoint_m", std::move(setpoint_m)}});
+}
+
+void write_table(std::ostream& out, const Profile& profile, const std::vector<Predicted>& runs) {
+  fmt::print(out, "{}\n{}\n\n", one_line(profile.name), one_line(profile.purpose));
+  Table steps{{"step", "<kind", "begins (s)"}};
+  for (std::size_t i = 0; i < profile.steps.size(); ++i) {
+    const double begins_s = static_cast<double>(runs.front().line.step_begins[i]) * experiments::kTick_s;
+    steps.row({std::to_string(i + 1), kind_text(profile.steps[i]), fixed(begins_s, 2)});
+  }
+  steps.write(out);
+  fmt::print(out, "\n");
+  Table table{
+      {"run", "<fluid", "<controller", "duty ×", "setpoint ×", "duration (s)", "from (m)", "to (m)", "travel (m)"}};
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const auto& [variant, line, preview] = runs[i];
+    table.row({std::to_string(i + 1), variant.fluid.empty() ? "any" : one_line(variant.fluid),
+               variant.controller.empty() ? "in force" : one_line(variant.controller), cell(variant.duty_factor),
+               cell(variant.setpoint_factor), fixed(line.duration_s(), 2), fixed(preview.position_min_m, 3),
+               fixed(preview.position_max_m, 3), fixed(preview.travel_m, 3)});
+  }
+  table.write(out);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    for (const std::string& problem : runs[i].preview.problems) fmt::print(out, "run {}: {}\n", i + 1, problem);
+  }
+}
+
+int list(const ProfileQuestion& options, std::ostream& out) {
+  OrderedJson all = OrderedJson::array();
+  Table table{{"profile", "<name", "runs", "duration of a run (s)"}};
+  for (const base::EmbeddedFile& shipped : experiments::shipped_profiles()) {
+    const std::string file{shipped.name};
+    const Profile profile = experiments::find_profile(file);
+    const std::size_t runs = experiments::variants_of(profile).size();
+    const double duration_s = experiments::longest_duration_s(profile);
+    table.row({file, profile.name, std::to_string(runs), fixed(duration_s, 2)});
+    all.push_back({{"profile", file},
+                   {"name", profile.name},
+                   {"purpose", profile.purpose},
+                   {"runs", runs},
+                   {"duration_s", duration_s}});
+  }
+  if (options.form.is_json) {
+    cli::write_json(out, {{"profiles", std::move(all)}});
+  } else {
+    table.write(out);
+  }
+  return 0;
+}
+
+int print_text(const std::string& name, std::ostream& out) {
+  for (const base::EmbeddedFile& shipped : experiments::shipped_profiles()) {
+    if (shipped.name != name) continue;
+    out << shipped.content;
+    return 0;
+  }
+  throw std::invalid_argument{fmt::format("--text prints a profile that comes with the program; '{}' is none", name)};
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, ProfileQuestion& options) {
+  command.add_option("profile", options.profile, "Name or file (default: list those that come with the program)")
+      ->check(named());
+  add_option(command, options.plant);
+  add_option(command, options.controller);
+  add_options(command, options.sampling);
+  command.add_flag("--text", options.prints_text, "Print the document of a profile that comes with the program");
+  command.add_flag("--keys", options.prints_keys, "Print every key of a profile, as docs/experiments.md has them");
+  command.add_option("--run", options.run, "Of the grid: the run that --json and --csv predict sample by sample")
+      ->check(whole(1, experiments::kMostRuns));
+  add_json_and_csv_flags(command, options.form);
+  command.footer("Example: rheonaut profile figure_7");
+}
+
+int run(const ProfileQuestion& options, std::ostream& out) {
+  if (options.prints_keys) {
+    out << experiments::profile_tables();
+    return 0;
+  }
+  if (!options.profile) return list(options, out);
+  if (options.prints_text) return print_text(*options.profile, out);
+  const Profile profile = experiments::find_profile(*options.profile);
+  const std::vector<Predicted> runs = predict(profile, options);
+  if (options.run > runs.size()) {
+    throw std::invalid_argument{fmt::format("--run {}: the profile has {} runs", options.run, runs.size())};
+  }
+  const Predicted& chosen = runs[options.run - 1];
+  if (options.form.is_csv) {
+    const Preview& preview = chosen.preview;
+    write_csv(out, {{"t_s", preview.time_s},
+                    {"duty", preview.duty},
+                    {"velocity_m_s", preview.velocity_m_s},
+                    {"position_m", preview.position_m},
+                    {"setpoint_m", preview.setpoint_m}});
+  } else if (options.form.is_json) {
+    write_json(out, profile, runs, chosen);
+  } else {
+    write_table(out, profile, runs);
+  }
+  const bool is_sound = std::ranges::all_of(runs, [](const Predicted& each) { return each.preview.problems.empty(); });
+  return is_sound ? 0 : kHasProblems;
+}
+
+}  // namespace server::cli

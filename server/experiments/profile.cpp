@@ -1,0 +1,41 @@
+#include "server/experiments/profile.hpp"
+
+#include <array>
+#include <utility>
+
+namespace server::experiments {
+namespace {
+
+constexpr std::array<const char*, 10> kStepKinds{"rest", "duty",      "staircase", "ramp",        "chirp",
+                                                 "prbs", "multisine", "setpoint",  "disturbance", "scan"};
+constexpr std::array<const char*, 3> kPumpFlows{"off", "constant", "pulse_70_bpm"};
+
+// An empty list is an axis with the one value that changes nothing.
+template <class T>
+std::vector<T> axis(const std::vector<T>& values, T otherwise) {
+  return values.empty() ? std::vector<T>{std::move(otherwise)} : values;
+}
+
+}  // namespace
+
+std::span<const char* const> step_kinds() { return kStepKinds; }
+
+std::span<const char* const> pump_flows() { return kPumpFlows; }
+
+std::vector<Variant> variants_of(const Profile& profile) {
+  std::vector<Variant> variants;
+  for (const std::string& fluid : axis(profile.sweep.fluids, profile.conditions.fluid)) {
+    for (const std::string& controller : axis(profile.sweep.controllers, std::string{})) {
+      for (const double setpoint_factor : axis(profile.sweep.setpoint_factor, 1.0)) {
+        for (const double duty_factor : axis(profile.sweep.duty_factor, 1.0)) {
+          for (std::uint64_t repeat = 1; repeat <= profile.sweep.repeats; ++repeat) {
+            variants.push_back({fluid, controller, duty_factor, setpoint_factor, repeat});
+          }
+        }
+      }
+    }
+  }
+  return variants;
+}
+
+}  // namespace server::experiments

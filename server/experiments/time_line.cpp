@@ -1,0 +1,69 @@
+#include "server/experiments/time_line.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/experiments/duty_signals.hpp"
+
+namespace server::experiments {
+namespace {
+
+std::uint64_t scan_ticks(double distance_m, double velocity_m_s) {
+  return static_cast<std::uint64_t>(std::ceil(std::abs(distance_m) / velocity_m_s / kTick_s - 1e-6));
+}
+
+// Moves the setpoint in equal parts, the last one to its end; returns the ticks of the way.
+std::uint64_t add_scan(const Step& step, double from_m, double to_m, std::size_t index, TimeLine& line) {
+  const std::uint64_t way = scan_ticks(to_m - from_m, step.velocity_m_s);
+  const auto hold = static_cast<std::uint64_t>(std::llround(step.every_s / kTick_s));
+  for (std::uint64_t tick = 0; tick < way; tick += hold) {
+    const double share = std::min(1.0, static_cast<double>(tick + hold) / static_cast<double>(way));
+    line.actions.push_back({line.ticks + tick, ActionKind::setpoint, std::lerp(from_m, to_m, share), index});
+  }
+  return way;
+}
+
+}  // namespace
+
+TimeLine time_line_of(const Profile& profile, const Variant& variant) {
+  TimeLine line;
+  double setpoint_m = 0;
+  for (std::size_t index = 0; index < profile.steps.size(); ++index) {
+    const Step& step = profile.steps[index];
+    line.step_begins.push_back(line.ticks);
+    for (const DutyChange& change : duty_changes(step)) {
+      line.actions.push_back({line.ticks + change.tick, ActionKind::duty, change.duty * variant.duty_factor, index});
+    }
+    const double target_m = step.setpoint_m * variant.setpoint_factor;
+    if (step.kind == StepKind::setpoint) line.actions.push_back({line.ticks, ActionKind::setpoint, target_m, index});
+    if (step.kind == StepKind::disturbance) {
+      const double disturbance_m = step.disturbance_m * variant.setpoint_factor;
+      line.actions.push_back({line.ticks, ActionKind::disturbance, disturbance_m, index});
+    }
+    if (step.kind == StepKind::scan) line.ticks += add_scan(step, setpoint_m, target_m, index, line);
+    if (step.kind == StepKind::setpoint || step.kind == StepKind::scan) setpoint_m = target_m;
+    line.ticks += ticks_of(step);
+  }
+  // SAFETY: a profile never ends with a running motor in manual.
+  if (!profile.steps.empty() && !is_closed_loop(profile.steps.back().kind)) {
+    line.actions.push_back({line.ticks, ActionKind::duty, 0, profile.steps.size() - 1});
+  }
+  return line;
+}
+
+double longest_duration_s(const Profile& profile) {
+  double largest_factor = profile.sweep.setpoint_factor.empty() ? 1 : 0;
+  for (const double factor : profile.sweep.setpoint_factor) largest_factor = std::max(largest_factor, std::abs(factor));
+  std::uint64_t ticks = 0;
+  double setpoint_m = 0;
+  for (const Step& step : profile.steps) {
+    if (step.kind == StepKind::scan) {
+      ticks += scan_ticks((step.setpoint_m - setpoint_m) * largest_factor, step.velocity_m_s);
+    }
+    if (step.kind == StepKind::setpoint || step.kind == StepKind::scan) setpoint_m = step.setpoint_m;
+    ticks += ticks_of(step);
+  }
+  return static_cast<double>(ticks) * kTick_s;
+}
+
+}  // namespace server::experiments

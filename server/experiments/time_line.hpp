@@ -1,0 +1,34 @@
+// What one run of a profile commands, tick by tick. Pure.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "server/experiments/profile.hpp"
+
+namespace server::experiments {
+
+enum class ActionKind : std::uint8_t { duty, setpoint, disturbance };  // a duty: manual; a setpoint: auto
+
+struct Action {
+  std::uint64_t tick = 0;  // of the run
+  ActionKind kind = ActionKind::duty;
+  double value = 0;  // duty, or m; with the factors of the variant
+  std::size_t step = 0;
+  bool operator==(const Action&) const = default;
+};
+
+struct TimeLine {
+  std::vector<Action> actions;             // by tick; the last one sets duty 0 if a duty step ends the profile
+  std::vector<std::uint64_t> step_begins;  // tick of each step
+  std::uint64_t ticks = 0;                 // of the run
+  double duration_s() const { return static_cast<double>(ticks) * kTick_s; }
+};
+
+// A scan begins at the setpoint before it, or at 0.
+TimeLine time_line_of(const Profile& profile, const Variant& variant);
+
+// Of all variants.
+double longest_duration_s(const Profile& profile);
+
+}  // namespace server::experiments
