@@ -23,9 +23,10 @@ class TidyTest(unittest.TestCase):
         self.write(".clang-tidy", (ROOT / ".clang-tidy").read_text(encoding="utf-8"))
         self.group = self.write("build/unity_0_cxx.cxx", f'#include "{self.root}/base/good.cpp"\n'
                                                          f'#include "{self.root}/base/bad.cpp"\n')
-        self.write("base/good.cpp", "// Right.\nint length_mm() { return 1; }\n")
+        self.write("base/length.hpp", "#pragma once\nint length_mm();\n")
+        self.write("base/good.cpp", '#include "base/length.hpp"\nint length_mm() { return 1; }\n')
         self.write("base/bad.cpp", "// A name that is wrong.\nint LengthMm() { return 1; }\n")
-        command = f"/usr/bin/clang++-19 -Xclang -include-pch -Xclang a.pch -Xclang -include -Xclang a.hxx -o a.o -c {self.group}"
+        command = f"/usr/bin/clang++-19 -Xclang -include-pch -Xclang a.pch -Xclang -include -Xclang a.hxx -I{self.root} -o a.o -c {self.group}"
         self.write("build/compile_commands.json",
                    json.dumps([{"directory": str(self.root), "command": command, "file": str(self.group)}]))
         self.commands = tidy.commands_of(self.root / "build")
