@@ -143,6 +143,7 @@ class Cut {
     longest.resize(std::min(longest.size(), kMostWindows));
     if (longest.empty()) return fail(ErrorCode::invalid, detail + "; no part of it is long enough", "gap");
     std::vector<std::string> windows;
+    windows.reserve(longest.size());
     for (const Part& part : longest) {
       windows.push_back(fmt::format("--from-s {} --to-s {}", piece.seconds(piece.samples[part.begin]),
                                     piece.seconds(piece.samples[part.end - 1])));

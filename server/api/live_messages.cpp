@@ -60,8 +60,8 @@ Result<void> on_emergency_stop(const Members& message, const identity::Caller& c
   }
   auto robot_id = known_robot(message, parts);
   if (!robot_id) return std::unexpected{robot_id.error()};
-  request.robot_id = std::move(*robot_id);
-  spawn(parts, "emergency stop of robot '" + request.robot_id + "'", stop_one(parts, std::move(request)));
+  request.robot_id = *robot_id;
+  spawn(parts, "emergency stop of robot '" + *robot_id + "'", stop_one(parts, std::move(request)));
   return {};
 }
 

@@ -235,7 +235,7 @@ void CommandTracker::end_dropped(RobotEntry& entry, const protocol::CommandAck& 
   if (found == unseen.end() || !(*found)->wire.has_execute_at_robot_us) return;
   const bool was_rejected = ack.result == rheonaut_COMMAND_RESULT_REJECTED;
   if (!was_rejected && ack.result != rheonaut_COMMAND_RESULT_EXPIRED) return;
-  const auto pending = *found;
+  const auto pending = std::move(*found);
   unseen.erase(found);
   if (pending->dropped_because == nullptr && setpoint_of(pending->wire)) entry.timed.has_lost_a_step = true;
   end(*pending, was_rejected ? CommandState::rejected : CommandState::expired,

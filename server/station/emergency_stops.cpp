@@ -31,8 +31,8 @@ class HeldBack {
 bool EmergencyStops::may_be_left_out(const RobotEntry& entry) const {
   const RobotState& robot = entry.robot;
   if (robot.retired_at_us == 0 || entry.link != nullptr) return false;
-  const std::int64_t heard_us = std::max(robot.last_received_steady_us, started_us_);
-  return clock_.steady_us() - heard_us > kMayStillMove.count();
+  const std::int64_t last_received_us = std::max(robot.last_received_steady_us, started_us_);
+  return clock_.steady_us() - last_received_us > kMayStillMove.count();
 }
 
 std::shared_ptr<PendingCommand> EmergencyStops::begin(RobotEntry& entry, const StopRequest& stop_request,

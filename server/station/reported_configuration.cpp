@@ -38,8 +38,9 @@ std::optional<InForceRecord> ReportedConfiguration::add(const protocol::Paramete
 }
 
 InForceRecord ReportedConfiguration::add(const protocol::Controller& controller,
-                                         std::optional<protocol::Controller> former, const ReportMoment& moment) {
-  settings_.add(controller, std::move(former), moment.utc_us);
+                                         const std::optional<protocol::Controller>& former,
+                                         const ReportMoment& moment) {
+  settings_.add(controller, former, moment.utc_us);
   return record(controller, moment);
 }
 

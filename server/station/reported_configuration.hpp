@@ -42,7 +42,7 @@ class ReportedConfiguration {
   // Takes a page of parameters; a record when the table is whole and has changed.
   std::optional<InForceRecord> add(const protocol::ParameterPage& page, const ReportMoment& moment);
   // `former`: what restore_controller brings back now; none: not known.
-  InForceRecord add(const protocol::Controller& controller, std::optional<protocol::Controller> former,
+  InForceRecord add(const protocol::Controller& controller, const std::optional<protocol::Controller>& former,
                     const ReportMoment& moment);
 
   // Takes an exchange of times. It is recorded once a minute, when the estimate has moved by more than either says it

@@ -19,6 +19,7 @@ std::string more_text(std::uint64_t withheld) {
 
 std::vector<const protocol::Command*> commands_of(const std::vector<std::shared_ptr<PendingCommand>>& sent) {
   std::vector<const protocol::Command*> commands;
+  commands.reserve(sent.size());
   for (const auto& pending : sent) commands.push_back(&pending->wire);
   return commands;
 }
@@ -211,8 +212,8 @@ void Station::on_controller(RobotLink& link, const protocol::Controller& control
   RobotEntry* entry = RobotTable::of(link);
   if (entry == nullptr) return;
   const auto sent = entry->commands.to_be_read_back();
-  ControllerReading reading = read_back(commands_of(sent), entry->reported.settings(), controller);
-  const auto record = entry->reported.add(controller, std::move(reading.former), moment_of(*entry, parts_->clock));
+  const ControllerReading reading = read_back(commands_of(sent), entry->reported.settings(), controller);
+  const auto record = entry->reported.add(controller, reading.former, moment_of(*entry, parts_->clock));
   parts_->notifier.publish(entry->robot, record);
   parts_->tracker.on_read_back(*entry, sent, reading.sights);
 }

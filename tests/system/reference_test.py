@@ -1,6 +1,7 @@
 """A camera beside a run: the simulator's true position, on a clock that nobody knows, is imported by correlation; then the
 measures of the run are those of the truth, and identification fits it. Real processes, half a minute of real time."""
 import random
+import re
 import time
 import unittest
 
@@ -48,7 +49,14 @@ class ReferenceTest(unittest.TestCase):
                 seen_m = x0 + (x1 - x0) * (at_us - t0) / (t1 - t0) + ZERO_M + noise.gauss(0, SD_M)
                 out.write(f"{at_us / 1e6 - CLOCK_S:.6f},{seen_m:.6f}\n")
 
-    def test_a_camera_tells_the_true_error_and_is_what_is_fitted(self):
+    def identify(self, place, run_id, *options):
+        """Of the whole run, or of the longest part without a missed tick: a busy machine makes the robot miss some."""
+        command = ["identify", "--run", run_id, "--data", place.data, "--structure", "second_order", *options]
+        done = place.tool(*command)
+        part = re.search(r"the robot skipped .*; choose (--from-s) (\S+) (--to-s) ([\d.]+)", done.stderr)
+        return place.tool(*command, *part.groups()) if part else done
+
+    def test_a_camera_shows_the_true_error_and_is_what_is_fitted(self):
         with lab() as place:
             station = place.start_station()
             run, truth = self.record(place, station)
@@ -75,13 +83,12 @@ class ReferenceTest(unittest.TestCase):
             self.assertGreater(metrics["estimate_error"]["samples"], 500)
             self.assertLess(metrics["estimate_error"]["rms_m"], 0.05)
 
-            fitted = place.tool("identify", "--run", run_id, "--data", place.data, "--structure", "second_order")
+            fitted = self.identify(place, run_id)
             self.assertIn(fitted.returncode, (0, 4), fitted.stderr)
             self.assertTrue(fitted.stdout.startswith("fitted: position_m; position measured from outside (camera.csv)"),
                             fitted.stdout)
             self.assertIn(", 30 Hz, ", fitted.stdout.splitlines()[0])
-            of_robot = place.tool("identify", "--run", run_id, "--data", place.data, "--structure", "second_order",
-                                  "--channels", "robot")
+            of_robot = self.identify(place, run_id, "--channels", "robot")
             self.assertTrue(of_robot.stdout.startswith("fitted: acceleration_m_s2"), of_robot.stdout)
 
 

@@ -27,6 +27,7 @@ std::vector<double> times_of(const Step& options) {
                                             *options.every_s, options.until_s, count, kMaxTimes)};
   }
   std::vector<double> times_s;
+  times_s.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < static_cast<int>(count); ++i) times_s.push_back(i * *options.every_s);
   return times_s;
 }

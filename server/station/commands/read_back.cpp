@@ -108,6 +108,7 @@ bool is_read_back(const protocol::Command& command) {
 
 std::vector<Sight> read_back(SentCommands sent, const protocol::ParameterPage& page) {
   std::vector<Sight> sights;
+  sights.reserve(sent.size());
   for (std::size_t i = 0; i < sent.size(); ++i) sights.push_back(sight_of(*sent[i], sent.subspan(i + 1), page));
   return sights;
 }

@@ -61,7 +61,7 @@ void RobotCommands::keep_unknown(std::shared_ptr<PendingCommand> ended) {
 std::shared_ptr<PendingCommand> RobotCommands::reopen(CommandId id) {
   const auto found = std::ranges::find(unknown, id, [](const auto& pending) { return pending->record.id; });
   if (found == unknown.end()) return nullptr;
-  const auto pending = *found;
+  auto pending = std::move(*found);
   unknown.erase(found);
   pending->record.state = CommandState::sent;
   pending->record.ended_at_us = 0;

@@ -80,9 +80,9 @@ void RobotSettings::begin_again() {
   controller_before.reset();
 }
 
-void RobotSettings::add(const protocol::Controller& reported, std::optional<protocol::Controller> former,
+void RobotSettings::add(const protocol::Controller& reported, const std::optional<protocol::Controller>& former,
                         std::int64_t at_us) {
-  controller_before = std::move(former);
+  controller_before = former;
   controller = reported;
   controller_at_us = at_us;
   is_controller_current = true;

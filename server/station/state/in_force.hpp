@@ -56,7 +56,7 @@ struct RobotSettings {
 
   void begin_again();
   // `former`: what restore_controller brings back now; none: not known.
-  void add(const protocol::Controller& reported, std::optional<protocol::Controller> former, std::int64_t at_us);
+  void add(const protocol::Controller& reported, const std::optional<protocol::Controller>& former, std::int64_t at_us);
 };
 
 }  // namespace server::station

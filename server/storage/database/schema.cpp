@@ -6,12 +6,12 @@
 namespace server::storage {
 
 std::span<const char* const> migrations() {
-  static const std::vector<const char*> scripts = [] {
+  static const std::vector<const char*> kScripts = [] {
     std::vector<const char*> all;
     for (const base::EmbeddedFile& file : migration_files()) all.push_back(file.content.data());
     return all;
   }();
-  return scripts;
+  return kScripts;
 }
 
 }  // namespace server::storage

@@ -47,7 +47,7 @@ class CommitQueue {
   bool is_half_empty_of_records() const { return records() <= max_records_ / 2; }
   void enqueue(StoredEvent event) { queued_.events.push_back(std::move(event)); }
   void enqueue(station::AuditNote note) { queued_.audit.push_back(std::move(note)); }
-  void enqueue(StoredClock clock) { queued_.clocks.push_back(std::move(clock)); }
+  void enqueue(StoredClock clock) { queued_.clocks.push_back(clock); }
   void enqueue(StoredInForce in_force) { queued_.in_force.push_back(std::move(in_force)); }
   void enqueue(const station::CommandRecord& command);
   // An earlier state of the command is queued: it becomes this one, which needs no room. False: none is.

@@ -25,7 +25,7 @@ class WorkLink {
   bool is_listed() const { return is_listed_; }
 
  private:
-  template <class Listed, WorkLink<Listed> Listed::* kLink>
+  template <class Listed, WorkLink<Listed> Listed::* member>
   friend class WorkList;
   Entry* before_ = nullptr;
   Entry* after_ = nullptr;
@@ -33,7 +33,7 @@ class WorkLink {
 };
 
 // In the order in which they were added.
-template <class Entry, WorkLink<Entry> Entry::* kLink>
+template <class Entry, WorkLink<Entry> Entry::* member>
 class WorkList {
  public:
   WorkList() = default;
@@ -42,24 +42,24 @@ class WorkList {
 
   bool empty() const { return first_ == nullptr; }
   std::size_t size() const { return size_; }
-  Entry* first() const { return first_; }                                   // null: none
-  Entry* after(const Entry& entry) const { return (entry.*kLink).after_; }  // null: it is the last
+  Entry* first() const { return first_; }                                    // null: none
+  Entry* after(const Entry& entry) const { return (entry.*member).after_; }  // null: it is the last
 
   void add(Entry& entry) {
-    WorkLink<Entry>& link = entry.*kLink;
+    WorkLink<Entry>& link = entry.*member;
     if (link.is_listed_) return;
     link.is_listed_ = true;
     link.before_ = last_;
-    (last_ == nullptr ? first_ : (last_->*kLink).after_) = &entry;
+    (last_ == nullptr ? first_ : (last_->*member).after_) = &entry;
     last_ = &entry;
     ++size_;
   }
 
   void remove(Entry& entry) {
-    WorkLink<Entry>& link = entry.*kLink;
+    WorkLink<Entry>& link = entry.*member;
     if (!link.is_listed_) return;
-    (link.before_ == nullptr ? first_ : (link.before_->*kLink).after_) = link.after_;
-    (link.after_ == nullptr ? last_ : (link.after_->*kLink).before_) = link.before_;
+    (link.before_ == nullptr ? first_ : (link.before_->*member).after_) = link.after_;
+    (link.after_ == nullptr ? last_ : (link.after_->*member).before_) = link.before_;
     link = {};
     --size_;
   }
@@ -82,13 +82,13 @@ class TimedLink {
   bool is_listed() const { return is_listed_; }
 
  private:
-  template <class Entry, TimedLink Entry::* kLink>
+  template <class Entry, TimedLink Entry::* member>
   friend class TimedWorkList;
   bool is_listed_ = false;
 };
 
 // By the time from which on each is due.
-template <class Entry, TimedLink Entry::* kLink>
+template <class Entry, TimedLink Entry::* member>
 class TimedWorkList {
  public:
   TimedWorkList() = default;
@@ -97,8 +97,8 @@ class TimedWorkList {
 
   // An entry that stands there already keeps its time.
   void add(Entry& entry, std::int64_t due_us) {
-    if ((entry.*kLink).is_listed_) return;
-    (entry.*kLink).is_listed_ = true;
+    if ((entry.*member).is_listed_) return;
+    (entry.*member).is_listed_ = true;
     entries_.push({due_us, &entry});
   }
 
@@ -107,7 +107,7 @@ class TimedWorkList {
     if (entries_.empty() || entries_.top().due_us > now_us) return nullptr;
     Entry* entry = entries_.top().entry;
     entries_.pop();
-    (entry->*kLink).is_listed_ = false;
+    (entry->*member).is_listed_ = false;
     return entry;
   }
 
