@@ -5,6 +5,7 @@ import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync } from 'node:f
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
+import { setTimeout as delay } from 'node:timers/promises';
 
 const bin = process.env.RHEONAUT_BIN ?? new URL('../../build/dev/bin', import.meta.url).pathname;
 const kFleetConfig = new URL('../../deploy/fleet.toml', import.meta.url).pathname; // a whole fleet may enrol itself
@@ -44,6 +45,8 @@ export async function clear_latch(page) {
   }, 30_000);
 }
 
+const kLongestEnd_ms = 30_000;
+
 class Program {
   output = '';
 
@@ -64,7 +67,12 @@ class Program {
     const ended = once(this.process, 'exit');
     this.process.kill(signal);
     this.process.kill('SIGCONT'); // one that a failed test has stopped ends as well
+    const late = setTimeout(() => this.process.kill('SIGKILL'), kLongestEnd_ms);
     await ended;
+    clearTimeout(late);
+    if (this.process.signalCode === 'SIGKILL' && signal !== 'SIGKILL') {
+      throw new Error(`${this.name} did not end within ${kLongestEnd_ms} ms of ${signal}:\n${this.output.slice(-4000)}`);
+    }
   }
 }
 
@@ -149,7 +157,9 @@ export class Bench {
   }
 
   async close() {
-    await this.browser?.close();
+    // Chromium may never answer that it is closed; it ends with this program.
+    const closed = this.browser?.close().then(() => true, () => true);
+    if (closed && !(await Promise.race([closed, delay(kLongestEnd_ms, false)]))) console.error('the browser did not close');
     await this.proxy?.end();
     await this.robot?.end();
     await this.fleet?.end();
