@@ -10,10 +10,13 @@
 
 namespace base {
 
+inline constexpr std::size_t kMaxDocumentBytes = 1'000'000;
+
 // `name` stands for the text in errors, which are std::invalid_argument: `name:line:column: what is wrong`.
 inline toml::table parse_toml(std::string_view text, const std::string& name) {
-  constexpr std::size_t kMaxBytes = 1'000'000;
-  if (text.size() > kMaxBytes) throw_invalid(name, ": has ", text.size(), " bytes, allowed are ", kMaxBytes);
+  if (text.size() > kMaxDocumentBytes) {
+    throw_invalid(name, ": has ", text.size(), " bytes, allowed are ", kMaxDocumentBytes);
+  }
   try {
     return toml::parse(text, name);
   } catch (const toml::parse_error& error) {

@@ -13,8 +13,9 @@ function(rheonaut_embed target function)
   add_custom_command(
     OUTPUT ${out}/${name}.S ${out}/${name}.cpp
     COMMAND ${PYTHON3} ${PROJECT_SOURCE_DIR}/cmake/embed_files.py ${function} ${out}/${name}.S ${out}/${name}.cpp
-            ${embed_FILES}
+            ${out}/${name}.d ${embed_FILES}
     DEPENDS ${PROJECT_SOURCE_DIR}/cmake/embed_files.py ${files} ${embed_DEPENDS}
+    DEPFILE ${out}/${name}.d
     COMMENT "Embedding ${name}"
     VERBATIM)
   target_sources(${target} PRIVATE ${out}/${name}.S ${out}/${name}.cpp)

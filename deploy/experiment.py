@@ -95,7 +95,7 @@ def follow(station, robot_id, start_robot_us, until_s, truth=None):
         time.sleep(min(0.1, max(0.005, until_s - elapsed_s)))
 
 
-def tell_model(station, robot_id, rheonaut, fluid="non_newtonian"):
+def send_model(station, robot_id, rheonaut, fluid="non_newtonian"):
     """Gives the station the model of the fluid, and has it sent to the robot, read back and confirmed; the model."""
     asked = subprocess.run([rheonaut, "estimator", "--plant", fluid, "--json"], check=True, capture_output=True, text=True)
     model = json.loads(asked.stdout)
@@ -192,7 +192,7 @@ def main():
     station.wait_for_robot(options.robot)
     say(f"robot '{options.robot}': auto mode, setpoint {1e3 * SETPOINT_M:.0f} mm; at {DISTURBANCE_AT_S:.0f} s the "
         f"measured position is shifted by {1e3 * DISTURBANCE_M:.0f} mm; {DURATION_S:.0f} s in all")
-    model = tell_model(station, options.robot, options.rheonaut)
+    model = send_model(station, options.robot, options.rheonaut)
     say("model of the fluid (29), sent to the robot, read back and confirmed: gains " +
         ", ".join(f"{gain:.3g}" for gain in model["model_gain_m_s"]) + " m/s, time constants " +
         ", ".join(f"{constant:.3g}" for constant in model["model_time_constant_s"]) +

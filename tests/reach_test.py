@@ -12,17 +12,17 @@ import reach  # noqa: E402
 
 SMALL_TREE = {
     "protocol/frame.hpp": "",
-    "server/net/door.hpp": '#include "protocol/frame.hpp"\n',
-    "server/net/door.cpp": '#include "server/net/door.hpp"\n',
-    "server/net/door_queue.cpp": '#include "server/net/door.hpp"\n',  # carries out a part of door.hpp
-    "server/api/routes/page.hpp": '#include "server/net/door.hpp"\n',
+    "server/net/listener.hpp": '#include "protocol/frame.hpp"\n',
+    "server/net/listener.cpp": '#include "server/net/listener.hpp"\n',
+    "server/net/listener_queue.cpp": '#include "server/net/listener.hpp"\n',  # carries out a part of listener.hpp
+    "server/api/routes/page.hpp": '#include "server/net/listener.hpp"\n',
     "server/api/openapi.yaml": "",
     "server/main.cpp": '#include "server/api/routes/page.hpp"\n',
     "sim_robot/world/world.hpp": "",
     "sim_robot/main.cpp": '#include "sim_robot/world/world.hpp"\n',
-    "tests/server/CMakeLists.txt": "rheonaut_test(net_test STATION\n  SOURCES\n    net/door_test.cpp\n  LIBRARIES server)\n"
+    "tests/server/CMakeLists.txt": "rheonaut_test(net_test STATION\n  SOURCES\n    net/listener_test.cpp\n  LIBRARIES server)\n"
                                    "rheonaut_test(page_test STATION\n  SOURCES\n    page_test.cpp\n    words.cpp)\n",
-    "tests/server/net/door_test.cpp": '#include "server/net/door.hpp"\nread("door_cases.json");\n',
+    "tests/server/net/listener_test.cpp": '#include "server/net/listener.hpp"\nread("listener_cases.json");\n',
     "tests/server/page_test.cpp": '#include "server/api/routes/page.hpp"\n#include "words.hpp"\n',
     "tests/server/words.hpp": "",
     "tests/server/words.cpp": '#include "words.hpp"\nread("docs/page.md");\n',
@@ -57,8 +57,8 @@ class ReachTest(unittest.TestCase):
 
     def test_a_source_reaches_what_includes_its_room_and_the_programs(self):
         station = {"program net_test", "program page_test"} | PROCESSES
-        self.expect("server/net/door.hpp", station)
-        self.expect("server/net/door_queue.cpp", station)
+        self.expect("server/net/listener.hpp", station)
+        self.expect("server/net/listener_queue.cpp", station)
         self.expect("server/net/a_deleted_file.cpp", station)
         self.expect("server/api/routes/page.hpp", station - {"program net_test"})
         self.expect("sim_robot/world/world.hpp",
@@ -69,14 +69,14 @@ class ReachTest(unittest.TestCase):
                                              "test esp8266_check", "test golden_frames_by_protoc"} | PROCESSES)
 
     def test_a_test_reaches_itself_and_its_words_all_that_use_them(self):
-        self.expect("tests/server/net/door_test.cpp", {"program net_test"})
+        self.expect("tests/server/net/listener_test.cpp", {"program net_test"})
         self.expect("tests/server/words.cpp", {"program page_test"})
         self.expect("tests/server/CMakeLists.txt", {"program net_test", "program page_test"})
 
     def test_what_a_test_reads_reaches_it(self):
         self.expect("docs/page.md", {"program page_test"})
         self.expect("docs/other.md", ())
-        self.expect("tests/data/door_cases.json", {"program net_test"})
+        self.expect("tests/data/listener_cases.json", {"program net_test"})
         self.expect("tests/data/fuzz/frame/1", {"program frame_fuzz_replay"})
 
     def test_data_that_nobody_names_reaches_every_program(self):

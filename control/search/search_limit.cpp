@@ -16,7 +16,7 @@ SearchLimit::SearchLimit(double limit_s, std::function<bool(const Progress&)> on
       clock_(std::move(clock)),
       deadline_s_(clock_() + std::clamp(limit_s, 0.0, 1e6)),
       share_end_s_(deadline_s_),
-      last_told_s_(clock_()) {}
+      last_reported_s_(clock_()) {}
 
 void SearchLimit::begin_share(int parts) {
   if (end_ == SearchEnd::cancelled) return;
@@ -35,7 +35,7 @@ bool SearchLimit::is_reached() {
   const double now_s = clock_();
   if (now_s >= share_end_s_) {
     end_ = SearchEnd::time_limit;
-  } else if (now_s - last_told_s_ >= kMostSilenceS) {
+  } else if (now_s - last_reported_s_ >= kMostSilenceS) {
     ask_watcher(now_s);
   }
   return end_.has_value();
@@ -44,7 +44,7 @@ bool SearchLimit::is_reached() {
 double SearchLimit::left_s() const { return end_ == SearchEnd::cancelled ? 0 : std::max(0.0, deadline_s_ - clock_()); }
 
 void SearchLimit::ask_watcher(double now_s) {
-  last_told_s_ = now_s;
+  last_reported_s_ = now_s;
   if (on_progress_ && !on_progress_(progress_)) end_ = SearchEnd::cancelled;
 }
 

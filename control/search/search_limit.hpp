@@ -30,7 +30,7 @@ class SearchLimit {
 
   std::function<bool(const Progress&)> on_progress_;
   Clock clock_;
-  double deadline_s_, share_end_s_, last_told_s_;
+  double deadline_s_, share_end_s_, last_reported_s_;
   Progress progress_;
   std::optional<SearchEnd> end_;
 };

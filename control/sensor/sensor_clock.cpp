@@ -42,7 +42,7 @@ double squares(const ClockEvidence& e, Index first, double age_ticks) {
 }
 
 // The weight is the information on the age, in 1/s².
-std::vector<Piece> pieces_that_tell(const ClockEvidence& e) {
+std::vector<Piece> informative_pieces(const ClockEvidence& e) {
   std::vector<Piece> pieces;
   const double least = 1 / std::pow(kSharpestAge * e.dt_s, 2);
   for (Index first = kPiece; first + kPiece <= e.reading_m_s2.size(); first += kPiece) {
@@ -59,7 +59,8 @@ std::vector<Piece> pieces_that_tell(const ClockEvidence& e) {
       const double found = squares(e, first, tried);
       if (found < best) best = found, age = tried;
     }
-    pieces.push_back({age * e.dt_s, e.dt_s * static_cast<double>(first + kPiece / 2), weight});
+    const Index middle = first + kPiece / 2;
+    pieces.push_back({age * e.dt_s, e.dt_s * static_cast<double>(middle), weight});
   }
   std::ranges::sort(pieces, std::ranges::greater{}, &Piece::weight);
   if (pieces.size() > kMostPieces) pieces.resize(kMostPieces);
@@ -79,25 +80,25 @@ class OrderCost {
  public:
   OrderCost(const ClockEvidence& evidence, const SensorTiming& timing) : e_(evidence), timing_(timing) {
     const Index samples = e_.reading_m_s2.size();
-    tells_.resize(static_cast<std::size_t>(samples));
+    is_informative_.resize(static_cast<std::size_t>(samples));
     for (Index k = 1; k + 1 < samples; ++k) {
       const double step = std::max(std::abs(e_.expected_m_s2[k] - e_.expected_m_s2[k - 1]),
                                    k < 2 ? 0 : std::abs(e_.expected_m_s2[k - 1] - e_.expected_m_s2[k - 2]));
-      tells_[static_cast<std::size_t>(k)] = step > e_.sd_m_s2;
+      is_informative_[static_cast<std::size_t>(k)] = step > e_.sd_m_s2;
     }
   }
 
   double operator()(const ReadOrder& order) const {
     const double variance = e_.sd_m_s2 * e_.sd_m_s2;
     double sum = 0, last = -1e18;
-    for (std::size_t k = 0; k < tells_.size(); ++k) {
+    for (std::size_t k = 0; k < is_informative_.size(); ++k) {
       const double number =
           std::floor((e_.dt_s * static_cast<double>(k) - order.first_available_s) / order.period_s + 1e-9);
       const bool is_read_again = number == last;
       last = number;
       if (is_read_again) {
         sum += variance * (e_.is_repeated[k] ? -kNewButEqual : kLimit);
-      } else if (tells_[k]) {
+      } else if (is_informative_[k]) {
         const double place = (timing_.first_s + timing_.period_s * number) / e_.dt_s;
         const double r = e_.reading_m_s2[static_cast<Index>(k)] - between_ticks(e_.expected_m_s2, place);
         sum += std::min(r * r, kLimit * variance);
@@ -109,13 +110,13 @@ class OrderCost {
  private:
   const ClockEvidence& e_;
   const SensorTiming& timing_;
-  std::vector<bool> tells_;
+  std::vector<bool> is_informative_;
 };
 
 }  // namespace
 
 std::optional<SensorClock> find_clock(const ClockEvidence& e, double time_constant_s) {
-  const std::vector<Piece> pieces = pieces_that_tell(e);
+  const std::vector<Piece> pieces = informative_pieces(e);
   if (pieces.size() < 8) return std::nullopt;
   const double duration_s = e.dt_s * static_cast<double>(e.reading_m_s2.size());
   SensorClock clock{{0, e.dt_s, time_constant_s}, {0, e.dt_s}};

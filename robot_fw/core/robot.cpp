@@ -40,7 +40,7 @@ Robot::Robot(const RobotConfig& config)
     if (safety_.has_sensor_cause()) {
       motion_sense_.distrust();  // SAFETY: nor does it mend a sensor
       electrode_.distrust();
-      told_electrode_fault_ = electrode_fault();
+      reported_electrode_fault_ = electrode_fault();
     }
     note(rheonaut_EVENT_KIND_EMERGENCY, rheonaut_EVENT_CAUSE_RESET, 0);
   } else if (suspicious_reset) {
@@ -106,11 +106,11 @@ float Robot::watch_clock(std::uint64_t robot_time_us, float dt_s) {
   const float stepped_s = static_cast<float>(elapsed_us) * 1e-6F - dt_s;
   const bool stepped = channel_.samples().next_seq() > 0 && stepped_s > dt_s / 2;
   if (!stepped) return 0;
-  untold_step_s_ += stepped_s;
-  if (time_step_told_us_ == 0 || now_us_ - time_step_told_us_ >= kTimeStepPauseUs) {
-    note(rheonaut_EVENT_KIND_TIME_STEP, rheonaut_EVENT_CAUSE_TIME, untold_step_s_);
-    time_step_told_us_ = now_us_;
-    untold_step_s_ = 0;
+  unreported_step_s_ += stepped_s;
+  if (time_step_reported_us_ == 0 || now_us_ - time_step_reported_us_ >= kTimeStepPauseUs) {
+    note(rheonaut_EVENT_KIND_TIME_STEP, rheonaut_EVENT_CAUSE_TIME, unreported_step_s_);
+    time_step_reported_us_ = now_us_;
+    unreported_step_s_ = 0;
   }
   return stepped_s;
 }

@@ -1,6 +1,7 @@
 // The whole robot: a tick, bytes in, bytes out.
 //
-//   step()      one tick, 100 Hz: sensors, estimator, link, orders, limits, impedance, reference, controller, safety,
+//   step()      one tick, 100 Hz: estimator, sensors, link, orders, limits, impedance, reference, controller, slew,
+//   safety,
 //               telemetry
 //   receive()   bytes from the station, at any time between ticks; an emergency stop acts in here
 //   transmit()  bytes to the station, at any time between ticks; never waits
@@ -131,7 +132,7 @@ class Robot {
   // Frames in and out, in robot_frames.cpp.
   bool on_frame();
   bool on_welcome(const protocol::Welcome& welcome);
-  void station_heard();
+  void on_station_frame();
   void fill(Outgoing what, protocol::RobotFrame& frame) const;
   void fill_parameters(const PageRequest& request, protocol::ParameterPage& page) const;
   void fill_hello(protocol::Hello& hello) const;
@@ -144,8 +145,8 @@ class Robot {
   float reference_m_ = 0;  // in auto
   float duty_ = 0;
   bool saturated_ = false;
-  std::uint64_t time_step_told_us_ = 0;
-  float untold_step_s_ = 0;
+  std::uint64_t time_step_reported_us_ = 0;
+  float unreported_step_s_ = 0;
   std::uint32_t worst_tick_us_ = 0;  // since the last status
 
   // Small parts first: what is near costs the chip less code.
@@ -154,7 +155,7 @@ class Robot {
   ReferenceProfile profile_;
   ImpedanceMonitor impedance_;
   SensorWatch electrode_;
-  SensorFault told_electrode_fault_ = SensorFault::none;
+  SensorFault reported_electrode_fault_ = SensorFault::none;
   RobotSettings settings_;
   MotionSense motion_sense_;
   TimedCommands timed_;

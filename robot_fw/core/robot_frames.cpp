@@ -45,7 +45,7 @@ bool Robot::on_frame() {
   const auto frame = channel_.frame();
   if (!frame) return false;
   const bool is_up = channel_.link().up();
-  if (is_up) station_heard();
+  if (is_up) on_station_frame();
   const bool is_command = frame->which_body == rheonaut_StationFrame_command_tag;
   if (is_command && frame->body.command.which_action == rheonaut_Command_emergency_stop_tag) {
     on_emergency_stop(frame->body.command);  // SAFETY: a stop is obeyed before any Welcome
@@ -63,12 +63,12 @@ bool Robot::on_frame() {
 bool Robot::on_welcome(const protocol::Welcome& welcome) {
   const auto timeout_ms = saturated<std::uint32_t>(settings_.parameters()[ParameterId::link_timeout_ms]);
   if (!channel_.accept(welcome, timeout_ms, now_us_)) return false;
-  station_heard();
+  on_station_frame();
   channel_.resume(welcome);
   return true;
 }
 
-void Robot::station_heard() {
+void Robot::on_station_frame() {
   const auto silence_s = channel_.frame_received(now_us_);
   if (silence_s) pilot_.link_restored();
   if (silence_s) note(rheonaut_EVENT_KIND_LINK_RESTORED, rheonaut_EVENT_CAUSE_NONE, *silence_s);

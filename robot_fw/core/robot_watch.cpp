@@ -28,9 +28,9 @@ void Robot::watch_sensors() {
                    kMS2PerCount * static_cast<float>(inputs_.acceleration_counts));
   }
   electrode_.step(inputs_.impedance_mv, true);
-  if (electrode_fault() != told_electrode_fault_) {
-    told_electrode_fault_ = electrode_fault();
-    on_sensor_news(told_electrode_fault_, rheonaut_EVENT_CAUSE_IMPEDANCE, inputs_.impedance_mv);
+  if (electrode_fault() != reported_electrode_fault_) {
+    reported_electrode_fault_ = electrode_fault();
+    on_sensor_news(reported_electrode_fault_, rheonaut_EVENT_CAUSE_IMPEDANCE, inputs_.impedance_mv);
   }
   if (motion_sense_.mismatch_changed()) {
     note(motion_sense_.model_mismatch() ? rheonaut_EVENT_KIND_MODEL_MISMATCH : rheonaut_EVENT_KIND_MODEL_MISMATCH_ENDED,

@@ -8,9 +8,9 @@ namespace robot_fw {
 template <class Integer>
 Integer saturated(float value) {
   using Limits = std::numeric_limits<Integer>;
-  constexpr float half = static_cast<float>(Integer{1} << (Limits::digits - 1));
-  if (value >= 2 * half) return Limits::max();  // exact, a power of two
-  if (value <= (Limits::is_signed ? -2 * half : 0.0F)) return Limits::min();
+  constexpr float kHalf = static_cast<float>(Integer{1} << (Limits::digits - 1));
+  if (value >= 2 * kHalf) return Limits::max();  // exact, a power of two
+  if (value <= (Limits::is_signed ? -2 * kHalf : 0.0F)) return Limits::min();
   if (value != value) return 0;
   return static_cast<Integer>(value);
 }

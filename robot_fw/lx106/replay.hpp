@@ -23,7 +23,6 @@ class Replay {
 
   // What the last play() did.
   protocol::Bytes sent() const { return {frame_.data(), sent_bytes_}; }
-  bool wants_connection() const { return wants_connection_; }
   // The line of the trace about it; 0 when there is none.
   std::size_t describe(const Record& record, char (&line)[kMaxLineBytes]) const;
 

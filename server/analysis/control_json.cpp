@@ -132,6 +132,34 @@ Result<control::FractionalModel> model_from(const json& given) {
   return checked(model);
 }
 
+Result<std::optional<control::ExpectedUncertainty>> uncertainty_from(const json& fit) {
+  if (!fit.is_object() || !fit.contains("one_sigma")) return std::nullopt;
+  try {
+    control::ExpectedUncertainty known;
+    const std::string structure = fit.at("structure");
+    const bool is_fractional = structure == text(control::Structure::fractional);
+    const bool has_b1 = structure != text(control::Structure::first_order);
+    const std::array<bool, control::kParameters> is_free{true, has_b1, true, is_fractional, is_fractional};
+    for (std::size_t i = 0; i < control::kParameters; ++i) {
+      if (!is_free[i]) continue;
+      const json& sigma = fit.at("one_sigma").at(control::kParameterNames[i]);
+      if (sigma.is_null()) return std::nullopt;
+      known.one_sigma[i] = sigma.get<double>();
+      if (!(*known.one_sigma[i] >= 0)) {
+        return fail(ErrorCode::invalid, fmt::format("one_sigma of {} is {}, it must not be negative",
+                                                    control::kParameterNames[i], *known.one_sigma[i]));
+      }
+    }
+    known.correlation = fit.at("correlation").get<decltype(known.correlation)>();
+    return known;
+  } catch (const json::exception&) {
+    return fail(
+        ErrorCode::bad_request,
+        "the uncertainty is not as identify prints it: \"structure\", \"one_sigma\" by name, \"correlation\" 5 by 5",
+        "wrong_type");
+  }
+}
+
 Result<control::FopdController> controller_from(const json& value) {
   if (!value.is_object()) return not_an_object(value, "controller", R"({"kp":65.0028,"kd":0.0305,"mu":0.6524})");
   if (const auto feasible = value.find("feasible"); feasible == value.end()) {

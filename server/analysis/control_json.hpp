@@ -12,6 +12,7 @@
 #include "control/discretisation/discretise.hpp"
 #include "control/discretisation/estimator_model.hpp"
 #include "control/identification/identify.hpp"
+#include "control/identification/planned_experiment.hpp"
 #include "control/responses/closed_loop.hpp"
 #include "control/responses/margins.hpp"
 #include "control/search/motor_fit.hpp"
@@ -26,6 +27,9 @@ using OrderedJson = nlohmann::ordered_json;  // keys in the order in which a per
 // bad_request for a wrong shape, invalid for a value out of range; the detail names key, value and what is allowed.
 Result<control::FractionalModel> model_from(const nlohmann::json& value);
 Result<control::FopdController> controller_from(const nlohmann::json& value);
+// How well an identification knows the parameters of its model. None where it does not know one of them, and for a
+// model that was written by hand. The dead time is taken as known.
+Result<std::optional<control::ExpectedUncertainty>> uncertainty_from(const nlohmann::json& fit);
 
 const char* text(control::Structure value);
 const char* text(control::Cost value);

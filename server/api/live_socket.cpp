@@ -41,8 +41,8 @@ class LivePage {
     socket_.read_message_max(kMaxMessageBytes);
     socket_.text(true);
     socket_.auto_fragment(false);  // what is long is written in pieces already
-    heard_at_us_ = parts_.clock.steady_us();
-    auto on_control = [this](websocket::frame_type, beast::string_view) { heard_at_us_ = parts_.clock.steady_us(); };
+    received_at_us_ = parts_.clock.steady_us();
+    auto on_control = [this](websocket::frame_type, beast::string_view) { received_at_us_ = parts_.clock.steady_us(); };
     socket_.control_callback(std::move(on_control));
   }
   ~LivePage() { parts_.live.remove(queue_); }
@@ -97,7 +97,7 @@ class LivePage {
     for (;;) {
       const auto [error, size] = co_await socket_.async_read(buffer, asio::as_tuple(asio::use_awaitable));
       if (error) co_return;
-      heard_at_us_ = parts_.clock.steady_us();
+      received_at_us_ = parts_.clock.steady_us();
       if (is_too_talkative()) co_await parts_.clock.sleep_until(second_began_us_ + kSecondUs);
       const auto understood = act_on(beast::buffers_to_string(buffer.data()));
       buffer.clear();
@@ -111,11 +111,11 @@ class LivePage {
 
   // Each of its messages may become a task: so many a second are read, and the page's further ones wait.
   bool is_too_talkative() {
-    if (heard_at_us_ - second_began_us_ >= kSecondUs) {
-      second_began_us_ = heard_at_us_;
-      heard_in_second_ = 0;
+    if (received_at_us_ - second_began_us_ >= kSecondUs) {
+      second_began_us_ = received_at_us_;
+      received_in_second_ = 0;
     }
-    return ++heard_in_second_ > kMaxMessagesASecond;
+    return ++received_in_second_ > kMaxMessagesASecond;
   }
 
   // One message, in as many frames as it has pieces.
@@ -147,7 +147,7 @@ class LivePage {
         if (error) co_return;
       }
       const std::int64_t now_us = parts_.clock.steady_us();
-      if (now_us - std::max(heard_at_us_, pinged_at_us_) < kPingAfterUs) continue;
+      if (now_us - std::max(received_at_us_, pinged_at_us_) < kPingAfterUs) continue;
       pinged_at_us_ = now_us;
       const websocket::ping_data empty;
       writing_since_us_ = now_us;
@@ -161,9 +161,9 @@ class LivePage {
   asio::awaitable<void> watch() {
     for (;;) {
       const std::int64_t now_us = parts_.clock.steady_us();
-      if (now_us - heard_at_us_ >= kSilenceUs) break;
+      if (now_us - received_at_us_ >= kSilenceUs) break;
       if (now_us >= writing_since_us_ + kWritingUs) break;
-      co_await parts_.clock.sleep_until(std::min(heard_at_us_ + kSilenceUs, now_us + kSecondUs));
+      co_await parts_.clock.sleep_until(std::min(received_at_us_ + kSilenceUs, now_us + kSecondUs));
     }
     spdlog::info("the page of {} fell silent, or does not read", caller_.actor);
   }
@@ -172,11 +172,11 @@ class LivePage {
   identity::Caller caller_;
   LiveParts& parts_;
   live::Subscriber queue_;
-  std::int64_t heard_at_us_ = 0;
+  std::int64_t received_at_us_ = 0;
   std::int64_t pinged_at_us_ = 0;
   std::int64_t writing_since_us_ = kNever;
   std::int64_t second_began_us_ = 0;
-  int heard_in_second_ = 0;
+  int received_in_second_ = 0;
 };
 
 }  // namespace

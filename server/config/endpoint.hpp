@@ -12,7 +12,7 @@ std::string text(const boost::asio::ip::tcp::endpoint& endpoint);
 
 std::string host_of(const std::string& peer);  // without the port, or all of it where there is none
 
-// What counts as one address of strangers: an IPv6 network of 64 bits belongs to one customer.
+// What counts as one address of unauthenticated peers: an IPv6 network of 64 bits belongs to one customer.
 std::string network_of(const std::string& address);
 
 }  // namespace server::config

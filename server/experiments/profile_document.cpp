@@ -12,6 +12,7 @@
 #include "base/field_list.hpp"
 #include "base/field_reader.hpp"
 #include "base/invalid_argument.hpp"
+#include "base/json_table.hpp"
 #include "base/toml_text.hpp"
 #include "server/experiments/duty_signals.hpp"
 #include "server/experiments/time_line.hpp"
@@ -247,13 +248,32 @@ std::string profile_tables() {
   return text;
 }
 
-Profile parse_profile(std::string_view text, const std::string& name) {
-  const toml::table table = base::parse_toml(text, name);
+namespace {
+
+Profile read_profile(const toml::table& table, const std::string& name) {
   Profile profile;
   base::FieldReader reader{table, name};
   fields(reader, profile);
   reader.finish();
   return profile;
+}
+
+// Values of JSON have no place in the text: the errors of the reader begin with the key.
+Profile parse_json_profile(std::string_view text, const std::string& name) {
+  const toml::table table = base::parse_json_table(text, name);
+  try {
+    return read_profile(table, name);
+  } catch (const std::invalid_argument& error) {
+    base::throw_invalid(name, ": ", error.what());
+  }
+}
+
+}  // namespace
+
+Profile parse_profile(std::string_view text, const std::string& name) {
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  if (first != std::string_view::npos && text[first] == '{') return parse_json_profile(text, name);
+  return read_profile(base::parse_toml(text, name), name);
 }
 
 Profile find_profile(const std::string& name_or_file) {

@@ -1,7 +1,7 @@
-// The document of a profile: TOML, in a file or with the program.
+// The document of a profile: TOML or JSON with the same keys, in a file; or TOML with the program.
 //
-// docs/experiments.md lists its keys. Errors are std::invalid_argument, `name:line:column: key: what is wrong`, with
-// the value and what is allowed. A profile that was read is within its own limits.
+// docs/experiments.md lists its keys. Errors are std::invalid_argument, `name:line:column: key: what is wrong` (of JSON
+// `name: key: what is wrong`), with the value and what is allowed. A profile that was read is within its own limits.
 #pragma once
 
 #include <span>
@@ -19,7 +19,7 @@ void fields(base::Fields& fields, Profile& profile);
 // Every key, and every kind of step with its keys, as tables in Markdown for docs/experiments.md.
 std::string profile_tables();
 
-// `name` stands for the text in errors.
+// JSON begins with {, as no TOML does. `name` stands for the text in errors.
 Profile parse_profile(std::string_view text, const std::string& name);
 
 // A file, or one of shipped_profiles() by its name.

@@ -153,7 +153,7 @@ asio::awaitable<bool> RobotSession::admit(const protocol::Hello& hello) {
   if (refusal) co_return co_await refuse(*refusal);
 
   robot_id_ = id;
-  reach_ = FrameReach::after(hello, hello_robot_time_us_);
+  reach_ = station::FrameReach::after(hello, hello_robot_time_us_);
   outbox_.welcome(welcome_of(admission, station_.link_times(), clock_.utc_us()));
   last_received_us_ = clock_.steady_us();
   station_.on_connected(*this, request, hello, admission, stream_->peer());
@@ -189,7 +189,7 @@ void RobotSession::on_frame(protocol::RobotFrame& frame) {
     close_reason_ = "a second hello on one connection";
     return;
   }
-  const FrameFaults faults = mend(frame, reach_);
+  const station::FrameFaults faults = station::mend(frame, reach_);
   if (!faults.is_unusable) reach_.advance(frame);
   station_.on_frame(*this, frame.robot_time_us);
   if (faults.count > 0) station_.on_invalid_values(*this, faults.count, faults.cause, faults.first);

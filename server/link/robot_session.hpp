@@ -12,11 +12,11 @@
 #include <string>
 
 #include "protocol/frame.hpp"
-#include "server/link/frame_faults.hpp"
 #include "server/link/greeting.hpp"
 #include "server/link/robot_outbox.hpp"
 #include "server/net/byte_stream.hpp"
 #include "server/runtime/clock.hpp"
+#include "server/station/state/frame_faults.hpp"
 #include "server/station/state/robot_archive.hpp"
 #include "server/station/state/robot_link.hpp"
 #include "server/station/station.hpp"
@@ -86,7 +86,7 @@ class RobotSession final : public station::RobotLink {
   std::uint64_t hello_robot_time_us_ = 0;
   station::RobotId claimed_id_;  // of a well-formed hello, whether the robot is admitted or not
   station::RobotId robot_id_;    // from the hello
-  FrameReach reach_;             // of the next frame
+  station::FrameReach reach_;    // of the next frame
 
   runtime::Signal reading_paused_;  // the hello has come, or a reason to close
   runtime::Signal wake_writer_;     // something is ready that flush() could not write

@@ -59,7 +59,7 @@ json list(const Values& values) {
 
 // Without browsers nothing is collected; a new one gets the state of the station first.
 void LiveFeed::add(Subscriber& subscriber) {
-  if (!is_heard()) {
+  if (!has_subscribers()) {
     robots_.clear();
     changed_.clear();
     events_.clear();
@@ -178,7 +178,7 @@ void LiveFeed::on_headline(Robot& robot, const station::RobotState& state) {
 }
 
 void LiveFeed::on_robot(const station::RobotState& state) {
-  if (!is_heard()) return;
+  if (!has_subscribers()) return;
   Robot& robot = robots_[state.id];
   if (robot.headline != headline(state)) {
     on_headline(robot, state);
@@ -188,7 +188,7 @@ void LiveFeed::on_robot(const station::RobotState& state) {
 }
 
 void LiveFeed::on_samples(const station::RobotState& state, const station::SampleBatch& batch) {
-  if (!is_heard()) return;
+  if (!has_subscribers()) return;
   Robot& robot = robots_[state.id];
   const bool is_headline = robot.headline != headline(state);
   if (is_headline) {
@@ -248,7 +248,7 @@ bool LiveFeed::is_news(const station::CommandRecord& record) {
 }
 
 void LiveFeed::on_command(const station::CommandRecord& record) {
-  if (!is_heard() || !is_news(record)) return;
+  if (!has_subscribers() || !is_news(record)) return;
   Message{[&] { return dump({{"type", "command"}, {"command", to_json(record)}}); }}.push(watch_all_, false);
   if (filtered_.empty()) return;
   std::erase_if(commands_, [&](const station::CommandRecord& older) { return older.id == record.id; });

@@ -68,7 +68,7 @@ class LiveFeed final : public station::StationSink {
   };
 
   static Headline headline(const station::RobotState& robot);
-  bool is_heard() const { return !watch_all_.empty() || !filtered_.empty(); }
+  bool has_subscribers() const { return !watch_all_.empty() || !filtered_.empty(); }
   bool is_watched(const Robot& robot) const { return !watch_all_.empty() || !robot.watchers.empty(); }
   boost::asio::awaitable<void> publish_changed();
   void on_headline(Robot& robot, const station::RobotState& state);

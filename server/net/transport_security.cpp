@@ -75,34 +75,34 @@ TransportSecurity::TransportSecurity(runtime::Clock& clock, const config::Config
   const bool http_is_secure = config.speaks_tls(config.http), robots_are_secure = config.speaks_tls(config.robots);
   if (http_is_secure || robots_are_secure) {
     tried_ = seen_ = stamp_of(certificate_, key_);
-    gate_.emplace(clock_, worker_, load_first(config));
-    if (http_is_secure) http_.tls = &*gate_;
-    if (robots_are_secure) robots_.tls = &*gate_;
-    log_in_force(gate_->context().certificate);
+    handshakes_.emplace(clock_, worker_, load_first(config));
+    if (http_is_secure) http_.tls = &*handshakes_;
+    if (robots_are_secure) robots_.tls = &*handshakes_;
+    log_in_force(handshakes_->context().certificate);
   }
   remind();
 }
 
 asio::awaitable<void> TransportSecurity::run() {
   for (;;) {
-    co_await clock_.sleep_for(kCertificateLook);
-    if (gate_) co_await watch_files();
+    co_await clock_.sleep_for(kCertificateCheckInterval);
+    if (handshakes_) co_await watch_files();
     remind();
   }
 }
 
 asio::awaitable<void> TransportSecurity::watch_files() {
   auto job = [certificate = certificate_, key = key_, tried = tried_, seen = seen_] {
-    return look(certificate, key, tried, seen);
+    return check(certificate, key, tried, seen);
   };
-  Look found = co_await worker_.run(std::move(job));
-  take(std::move(found));
+  FileCheck found = co_await worker_.run(std::move(job));
+  apply(std::move(found));
 }
 
-// On the worker. Files that have changed since the last look may still be changing: a renewal writes two.
-TransportSecurity::Look TransportSecurity::look(const fs::path& certificate, const fs::path& key,
-                                                const std::string& tried, const std::string& seen) {
-  Look found;
+// On the worker. Files that have changed since the last check may still be changing: a renewal writes two.
+TransportSecurity::FileCheck TransportSecurity::check(const fs::path& certificate, const fs::path& key,
+                                                      const std::string& tried, const std::string& seen) {
+  FileCheck found;
   found.stamp = stamp_of(certificate, key);
   if (found.stamp == tried || found.stamp != seen) return found;
   try {
@@ -113,16 +113,16 @@ TransportSecurity::Look TransportSecurity::look(const fs::path& certificate, con
   return found;
 }
 
-void TransportSecurity::take(Look look) {
-  seen_ = look.stamp;
-  if (!look.problem.empty()) {
-    tried_ = look.stamp;
-    spdlog::error("TLS: the new certificate is not used, the one before stays in force: {}", look.problem);
-  } else if (look.context) {
-    tried_ = look.stamp;
-    gate_->use(std::move(look.context));
+void TransportSecurity::apply(FileCheck found) {
+  seen_ = found.stamp;
+  if (!found.problem.empty()) {
+    tried_ = found.stamp;
+    spdlog::error("TLS: the new certificate is not used, the one before stays in force: {}", found.problem);
+  } else if (found.context) {
+    tried_ = found.stamp;
+    handshakes_->use(std::move(found.context));
     next_expiry_us_ = 0;
-    log_in_force(gate_->context().certificate);
+    log_in_force(handshakes_->context().certificate);
   }
 }
 
@@ -135,9 +135,9 @@ void TransportSecurity::remind() {
         "token and drive the robots",
         exposed_);
   }
-  if (!gate_ || now_us < next_expiry_us_) return;
+  if (!handshakes_ || now_us < next_expiry_us_) return;
   next_expiry_us_ = now_us + kDayUs;
-  const std::int64_t left_us = gate_->context().certificate.not_after_us - clock_.utc_us();
+  const std::int64_t left_us = handshakes_->context().certificate.not_after_us - clock_.utc_us();
   if (left_us <= 0) {
     spdlog::error("TLS: the certificate '{}' has expired; renew it: rheonaut certificate --renew",
                   certificate_.string());
@@ -148,8 +148,8 @@ void TransportSecurity::remind() {
 }
 
 std::vector<std::string> TransportSecurity::names() const {
-  if (!gate_) return {};
-  return gate_->context().certificate.names;
+  if (!handshakes_) return {};
+  return handshakes_->context().certificate.names;
 }
 
 std::string TransportSecurity::to_trust() const {
@@ -160,8 +160,8 @@ nlohmann::json TransportSecurity::state() const {
   const auto word = [](const PortAccess& port) { return port.tls != nullptr ? "tls" : "plain"; };
   nlohmann::json out{
       {"http", word(http_)}, {"robots", word(robots_)}, {"exposed", is_exposed()}, {"certificate", nullptr}};
-  if (gate_) {
-    const tls::TlsCertificate& certificate = gate_->context().certificate;
+  if (handshakes_) {
+    const tls::TlsCertificate& certificate = handshakes_->context().certificate;
     out["certificate"] = {{"names", certificate.names},
                           {"pin_sha256", certificate.pin},
                           {"not_after_us", certificate.not_after_us},

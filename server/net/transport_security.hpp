@@ -22,7 +22,7 @@
 
 namespace server::net {
 
-inline constexpr microseconds kCertificateLook{std::chrono::seconds{2}};
+inline constexpr microseconds kCertificateCheckInterval{std::chrono::seconds{2}};
 inline constexpr microseconds kExpiryWarning{std::chrono::days{30}};
 inline constexpr microseconds kExposedReminder{std::chrono::hours{1}};
 
@@ -46,28 +46,28 @@ class TransportSecurity {
   std::string to_trust() const;
 
   const runtime::WorkerThread& worker() const { return worker_; }
-  const tls::TlsHandshakes* gate() const { return gate_ ? &*gate_ : nullptr; }
+  const tls::TlsHandshakes* handshakes() const { return handshakes_ ? &*handshakes_ : nullptr; }
   bool is_exposed() const { return !exposed_.empty(); }
 
  private:
-  // What one look at the files found.
-  struct Look {
+  // What one check of the files found.
+  struct FileCheck {
     std::string stamp;                               // differs when a file has changed
     std::shared_ptr<const tls::TlsContext> context;  // null: nothing new, or a problem
     std::string problem;
   };
 
-  static Look look(const std::filesystem::path& certificate, const std::filesystem::path& key, const std::string& tried,
-                   const std::string& seen);
+  static FileCheck check(const std::filesystem::path& certificate, const std::filesystem::path& key,
+                         const std::string& tried, const std::string& seen);
   boost::asio::awaitable<void> watch_files();
-  void take(Look look);
+  void apply(FileCheck found);
   void remind();
 
   runtime::Clock& clock_;
   std::filesystem::path certificate_, key_;
   std::string exposed_;  // the ports that are, for people
   runtime::WorkerThread worker_{"handshakes", 10};
-  std::optional<tls::TlsHandshakes> gate_;
+  std::optional<tls::TlsHandshakes> handshakes_;
   PortAccess http_, robots_;
   std::string tried_, seen_;  // stamps of the files
   std::int64_t next_exposed_us_ = 0, next_expiry_us_ = 0;

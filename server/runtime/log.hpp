@@ -11,7 +11,7 @@ namespace server::runtime {
 // `level` is trace, debug, info, warn or error.
 void start_log(const std::string& level);
 
-// Lets one line a second into the log, of what strangers can cause as often as they like.
+// Lets one line a second into the log, of what an unauthenticated peer can cause as often as they like.
 class SparseLines {
  public:
   // When the line may be written: how many were left out since the one before.

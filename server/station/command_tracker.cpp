@@ -222,7 +222,8 @@ void CommandTracker::on_read_back(RobotEntry& entry, std::span<const std::shared
     } else if (sights[i] == Sight::overtaken) {
       end(pending, CommandState::superseded, "by_a_newer_command");
     } else {
-      spdlog::error("robot '{}' says after {} {} what it was not told", record.robot_id, record.kind, record.arguments);
+      spdlog::error("robot '{}' reports other values than those of {} {}", record.robot_id, record.kind,
+                    record.arguments);
       end(pending, CommandState::failed, "read_back_differs");
     }
   }

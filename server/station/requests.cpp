@@ -1,4 +1,4 @@
-// What people and scripts ask for: commands, emergency stops, control. Each is checked, carried out and followed.
+// What people and scripts ask for: commands, emergency stops, control.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -7,7 +7,9 @@
 #include <set>
 #include <utility>
 
+#include "server/station/command_dispatch.hpp"
 #include "server/station/commands/command_checks.hpp"
+#include "server/station/state/audit_details.hpp"
 #include "server/station/station.hpp"
 #include "server/station/station_parts.hpp"
 
@@ -16,93 +18,12 @@ namespace asio = boost::asio;
 
 namespace {
 
-constexpr microseconds kMaxTimeToLive{protocol::kMaxTimeToLiveUs};
 constexpr microseconds kPatience{2'000'000};  // for the answer, after the time to live
 constexpr microseconds kSeenPatience{6'000'000};
 constexpr microseconds kWatchInterval{200'000};
 
 Error unknown_robot(const RobotId& id) {
   return {ErrorCode::not_found, fmt::format("no robot '{}' is known", id), "unknown_robot"};
-}
-
-// A robot refuses what would come after the command's time to live.
-Result<void> check_time(const PendingCommand& pending, const RobotState& robot) {
-  const protocol::Command& wire = pending.wire;
-  if (!wire.has_execute_at_robot_us || wire.execute_at_robot_us <= wire.valid_until_robot_us) return {};
-  return fail(
-      ErrorCode::invalid,
-      fmt::format("execute_at_robot_us = {} lies {} ms after the end of the command's life, which is counted in "
-                  "the time of robot '{}', now at least {}; life_ms must reach it",
-                  wire.execute_at_robot_us, (wire.execute_at_robot_us - wire.valid_until_robot_us) / 1000 + 1, robot.id,
-                  robot.latest_robot_time_us),
-      "out_of_range");
-}
-
-// What speaks against the request; nothing is sent then.
-Result<void> check_request(const CommandRequest& request, const protocol::Command& wire, const RobotEntry& entry,
-                           const config::Envelope& envelope) {
-  if (request.time_to_live <= microseconds{0} || request.time_to_live > kMaxTimeToLive) {
-    return fail(ErrorCode::invalid,
-                fmt::format("life_ms = {} is outside 1 to 10000", request.time_to_live.count() / 1000), "out_of_range");
-  }
-  if (entry.link == nullptr) {
-    return fail(ErrorCode::not_connected, fmt::format("robot '{}' is not connected", request.robot_id),
-                "not_connected");
-  }
-  // SAFETY: which setpoint is in force, or where the robot has come to, no hello says.
-  const bool is_shown = entry.orders.next_sample_at_robot_us() != entry.connected_at_robot_us;
-  const bool is_compared = entry.robot.context.mode == rheonaut_MODE_AUTO || entry.robot.sample;
-  if (setpoint_of(wire) && is_compared && !is_shown) {
-    return fail(ErrorCode::invalid,
-                fmt::format("robot '{}' has just connected, and what a step counts from is not known before its next "
-                            "telemetry",
-                            request.robot_id),
-                "step_too_large");
-  }
-  return check_command(wire, entry.robot, envelope, entry.orders_ahead(&wire));
-}
-
-void note_timed(TimedOrders& timed, const PendingCommand& pending) {
-  if (!pending.is_timed_order()) return;
-  timed.by = pending.record.actor;
-  timed.until_robot_us = std::max(timed.until_robot_us, pending.wire.execute_at_robot_us);
-}
-
-// SAFETY: what was refused, also by a full queue, or came too late, takes no control.
-void take_control(StationParts& parts, const CommandRequest& request, PendingCommand& sent) {
-  if (!request.takes_control) return;
-  if (const auto change = parts.control.on_commanded(request)) parts.publish(*change, request.actor, request.peer);
-  sent.is_by_holder = parts.control.of(request.robot_id).holder == request.actor;
-}
-
-// Checks the request and gives it to the link. An error: nothing was sent. What came too late has ended already.
-Result<std::shared_ptr<PendingCommand>> send_command(StationParts& parts, RobotEntry& entry,
-                                                     const CommandRequest& request) {
-  // SAFETY: only the holder of control moves the robot, be it a page, a script or an experiment.
-  if (auto held = parts.control.may_command(request); !held) return std::unexpected{held.error()};
-  // SAFETY: timed commands of the former holder of control are dropped from the robot before this command is sent, or
-  // it is not sent.
-  const bool is_clear = !needs_control(request.action) || parts.drop_outdated(entry);
-  auto pending = make_pending(parts.loop, parts.clock, request, entry.robot);
-  const auto checked = check_request(request, pending->wire, entry, parts.envelope);
-  if (!checked) return std::unexpected{checked.error()};
-  // SAFETY: what was issued longer ago than its time to live is not sent, and is accounted for.
-  if (request.age >= request.time_to_live) {
-    parts.tracker.end(*pending, CommandState::expired, "too_old_on_arrival");
-    return pending;
-  }
-  if (auto seen = parts.control.check_sight(request); !seen) return std::unexpected{seen.error()};
-  if (auto reached = check_time(*pending, entry.robot); !reached) return std::unexpected{reached.error()};
-  parts.tracker.supersede_queued(entry, *pending);
-  if (!is_clear || !entry.link->send(pending->wire, pending->deadline_us)) {
-    return fail(ErrorCode::unavailable, fmt::format("too many commands wait for robot '{}'", request.robot_id),
-                "queue_full");
-  }
-  take_control(parts, request, *pending);
-  note_timed(entry.timed, *pending);
-  entry.commands.add(pending);
-  parts.notifier.publish(pending->record);
-  return pending;
 }
 
 // The stops were handed to their links; now they are recorded. One that fails keeps no other from it.
@@ -139,7 +60,7 @@ asio::awaitable<Result<CommandRecord>> Station::submit(CommandRequest request) {
     if (!same) co_return parts_->refuse(request, same.error());
     if (*same != nullptr) co_return co_await tracker.follow(*same, request.until_verified, patience);
   }
-  const auto sent = send_command(*parts_, entry, request);
+  const auto sent = dispatch(*parts_, entry, request);
   if (!sent) co_return parts_->refuse(request, sent.error());
   co_return co_await tracker.follow(*sent, request.until_verified, patience);
 }
@@ -148,8 +69,8 @@ asio::awaitable<Result<CommandRecord>> Station::emergency_stop(StopRequest reque
   RobotEntry* entry = parts_->robots.find(request.robot_id);
   if (entry == nullptr) {
     Error error = unknown_robot(request.robot_id);
-    note_refusal({request.actor, request.peer, parts_->clock.utc_us()}, request.robot_id, "command",
-                 R"({"kind":"emergency_stop"})", error);
+    note_refusal({request.actor, request.peer, parts_->clock.utc_us()}, request.robot_id, "command", refused_stop(),
+                 error);
     co_return std::unexpected{std::move(error)};
   }
   std::shared_ptr<PendingCommand> stop;
@@ -201,7 +122,7 @@ Result<ControlState> Station::control(const ControlRequest& request) {
   if (entry != nullptr) change = parts_->control.change(request);
   if (!change) {
     note_refusal({request.actor, request.peer, parts_->clock.utc_us()}, request.robot_id, "control",
-                 fmt::format(R"({{"wish":"{}"}})", text(request.action)), change.error());
+                 refused_control(text(request.action)), change.error());
     return std::unexpected{change.error()};
   }
   if (*change) parts_->publish(**change, request.actor, request.peer);

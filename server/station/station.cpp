@@ -57,11 +57,6 @@ const RobotSettings* Station::settings(const RobotId& id) const {
   return entry == nullptr ? nullptr : &entry->reported.settings();
 }
 
-std::optional<float> Station::parameter_in_force(const RobotId& id, const std::string& name) const {
-  const RobotSettings* known = settings(id);
-  return known == nullptr ? std::nullopt : known->parameters.value(name);
-}
-
 const StopTimes& Station::stop_times() const { return parts_->tracker.stop_times(); }
 std::uint64_t Station::invalid_values() const { return parts_->invalid_values; }
 config::LinkTimes Station::link_times() const { return parts_->times; }

@@ -130,9 +130,6 @@ class Station {
   void set_model(const RobotId& id, RobotModel model);
   void note_model(const RobotId& id, const char* kind, const std::string& detail);
 
-  // The value of a parameter that the robot has reported in this connection; none while it has not.
-  std::optional<float> parameter_in_force(const RobotId& id, const std::string& name) const;
-
   // An administrator has retired the robot, or put it back into use (0); the database has it, or is about to.
   void set_retired(const RobotId& id, std::int64_t retired_at_us, const std::string& actor);
 

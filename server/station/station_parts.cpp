@@ -63,7 +63,7 @@ void StationParts::publish_refusal(Author by, const RobotId& robot_id, const cha
 std::unexpected<Error> StationParts::refuse(const CommandRequest& request, Error error) {
   const char* kind = protocol::kind(request.action);
   publish_refusal({request.actor, request.peer, clock.utc_us()}, request.robot_id, "command",
-                  fmt::format(R"({{"kind":"{}","arguments":{}}})", kind, request.arguments), error);
+                  refused_command(kind, request.arguments), error);
   return std::unexpected{std::move(error)};
 }
 

@@ -14,7 +14,7 @@ constexpr double kRecordedS = 30;
 
 ReplayCommand::ReplayCommand(CLI::App& app)
     : command_(app.add_subcommand("replay", "load test: many robots that send recorded telemetry as their own")) {
-  command_->add_option("--station", station_, "ADDR:PORT of the station's robot door")->required();
+  command_->add_option("--station", station_, "ADDR:PORT of the station's robot port")->required();
   add_tls(*command_, tls_);
   command_->add_option("--robots", options_.robots, "how many")->check(CLI::Range(1, kMostRobots))->required();
   command_->add_option("--id", options_.id_prefix, "the robots are ID-1 to ID-N")->capture_default_str();

@@ -107,7 +107,7 @@ void stop_at_end(asio::io_context& loop, asio::signal_set& stop, asio::steady_ti
 }  // namespace
 
 RunCommand::RunCommand(CLI::App& app) {
-  app.add_option("--station", station_, "ADDR:PORT of the station's robot door");
+  app.add_option("--station", station_, "ADDR:PORT of the station's robot port");
   add_tls(app, tls_);
   app.add_option("--handshake-ms", handshake_ms_, "as TLS on the robot's board: it dials at rest, and ticks are missed")
       ->check(CLI::Range(0, 30'000))

@@ -7,6 +7,7 @@
 
 #include "base/field_reader.hpp"
 #include "base/invalid_argument.hpp"
+#include "base/json_table.hpp"
 #include "sim_robot/robot/simulated_robot.hpp"
 
 namespace sim_robot {
@@ -29,21 +30,7 @@ toml::table flat_table(std::string_view json) {
   const Json given = Json::parse(json, watch, false);
   if (given.is_discarded()) base::throw_invalid("this is not JSON; a fault is {\"fault\":\"electrode_offset\",…}");
   if (!given.is_object()) base::throw_invalid("a fault is an object, {\"fault\":\"electrode_offset\",…}");
-  toml::table table;
-  for (const auto& [key, value] : given.items()) {
-    if (value.is_number_integer() && (!value.is_number_unsigned() || value.get<std::uint64_t>() <= INT64_MAX)) {
-      table.insert(key, value.get<std::int64_t>());
-    } else if (value.is_number()) {
-      table.insert(key, value.get<double>());
-    } else if (value.is_boolean()) {
-      table.insert(key, value.get<bool>());
-    } else if (value.is_string()) {
-      table.insert(key, value.get<std::string>());
-    } else {
-      base::throw_invalid(key, ": must be a text, a number, true or false, is null");
-    }
-  }
-  return table;
+  return base::table_of(given);
 }
 
 }  // namespace

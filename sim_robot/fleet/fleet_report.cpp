@@ -137,7 +137,7 @@ std::optional<FleetFault> fleet_fault(const FleetSnapshot& end) {
   if (counts.welcomed == 0) {
     if (counts.links.refusals > 0) return FleetFault{2, "the station refused every robot: " + counts.refusal};
     return FleetFault{2, counts.links.opened > 0
-                             ? "every connection ended before its welcome: is this the robots' door?"
+                             ? "every connection ended before its welcome: is this the robots' port?"
                              : "no robot ever reached the station"};
   }
   if (counts.welcomed < counts.robots) {

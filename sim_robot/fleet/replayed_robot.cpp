@@ -52,7 +52,7 @@ bool ReplayedRobot::tick() {
   make_frames();
   backfill_credit_ = kBackfillPerTurn;
   const bool is_open = connection_.is_open() && phase_ != Phase::closed;
-  if (is_open && robot_time_us() > heard_at_us_ + silence_us_) connection_.close_as_silent();
+  if (is_open && robot_time_us() > received_at_us_ + silence_us_) connection_.close_as_silent();
   return connection_.prepare();
 }
 
@@ -74,7 +74,7 @@ void ReplayedRobot::on_opened() {
   refusal_ = rheonaut_REFUSAL_REASON_NONE;
   reader_.reset();
   hello_is_due_ = true;
-  heard_at_us_ = robot_time_us();
+  received_at_us_ = robot_time_us();
   silence_us_ = protocol::kDefaultLinkTimeoutMs * 1000ULL;
 }
 
@@ -91,7 +91,7 @@ bool ReplayedRobot::on_bytes(protocol::Bytes bytes) {
 }
 
 bool ReplayedRobot::on_frame(const protocol::StationFrame& frame) {
-  heard_at_us_ = robot_time_us();
+  received_at_us_ = robot_time_us();
   if (frame.which_body == rheonaut_StationFrame_welcome_tag) {
     return phase_ == Phase::greeting && on_welcome(frame.body.welcome);
   }
@@ -102,7 +102,7 @@ bool ReplayedRobot::on_frame(const protocol::StationFrame& frame) {
     const protocol::StationHeartbeat& heartbeat = frame.body.heartbeat;
     acknowledge(heartbeat.durable_next_seq);
     resend(heartbeat.resend_first_seq, heartbeat.resend_next_seq);
-    if (heartbeat.station_time_us != 0) echo_ = {heartbeat.station_time_us, heard_at_us_};
+    if (heartbeat.station_time_us != 0) echo_ = {heartbeat.station_time_us, received_at_us_};
   }
   return true;
 }
@@ -120,7 +120,7 @@ bool ReplayedRobot::on_welcome(const protocol::Welcome& welcome) {
   backfill_ = {oldest_, next_};
   live_ = {next_, next_};
   status_due_us_ = 0;
-  sent_at_us_ = heard_at_us_;
+  sent_at_us_ = received_at_us_;
   return true;
 }
 

@@ -26,7 +26,7 @@ void LinkedPeer::accept() {
   connections_ = link_.connections();
   connected_ = true;
   welcomed_ = false;
-  heard_at_us_ = link_.now_us();
+  received_at_us_ = link_.now_us();
   unsent_.clear();
   reader_.reset();
   hello.reset();
@@ -35,7 +35,7 @@ void LinkedPeer::accept() {
 void LinkedPeer::read() {
   std::array<std::uint8_t, 1460> bytes;
   while (const std::size_t size = link_.receive(bytes.data(), bytes.size())) {
-    heard_at_us_ = link_.now_us();
+    received_at_us_ = link_.now_us();
     const bool good = take({bytes.data(), size});
     if (!good) link_.close();
   }

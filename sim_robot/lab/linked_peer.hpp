@@ -29,8 +29,8 @@ class LinkedPeer : public ReceivedTelemetry {
 
   bool is_connected() const { return connected_; }
   bool link_is_up() const { return welcomed_ && !link_is_lost(); }
-  bool link_is_lost() const { return heard_at_us_ && link_.now_us() > *heard_at_us_ + kLinkTimeoutUs; }
-  std::uint64_t silence_us() const { return link_.now_us() - heard_at_us_.value_or(0); }
+  bool link_is_lost() const { return received_at_us_ && link_.now_us() > *received_at_us_ + kLinkTimeoutUs; }
+  std::uint64_t silence_us() const { return link_.now_us() - received_at_us_.value_or(0); }
   std::uint64_t robot_time_us() const;  // a lower bound, as the station computes it
 
  private:
@@ -43,7 +43,7 @@ class LinkedPeer : public ReceivedTelemetry {
   ImpairedLink& link_;
   int connections_ = 0;
   bool connected_ = false, welcomed_ = false;
-  std::optional<std::uint64_t> heard_at_us_;
+  std::optional<std::uint64_t> received_at_us_;
   std::uint64_t heartbeat_at_us_ = 0;  // they acknowledge samples, so they are sent beside commands
   std::vector<std::uint8_t> unsent_;
 };

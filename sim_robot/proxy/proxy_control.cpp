@@ -67,7 +67,7 @@ Word setting(std::function<void(Impairment&, const Words&)> change) {
 
 const std::map<std::string, Word>& vocabulary() {
   constexpr double kMaxMs = 1e3 * kMaxOutageS;
-  static const std::map<std::string, Word> words{
+  static const std::map<std::string, Word> kWords{
       {"cut", {1, [](Proxy& proxy, const Words& line) { proxy.cut(line.size() < 2 ? 0 : count(line)); }}},
       {"reset", {0, [](Proxy& proxy, const Words&) { proxy.reset(); }}},
       {"half-open", {1, [](Proxy& proxy, const Words& line) { proxy.half_open(direction(line)); }}},
@@ -79,7 +79,7 @@ const std::map<std::string, Word>& vocabulary() {
       {"throttle", setting([](Impairment& to, const Words& line) { to.bytes_per_s = number(line, 1e12); })},
       {"loss", setting([](Impairment& to, const Words& line) { to.loss_probability = number(line, 1); })},
       {"split", setting([](Impairment& to, const Words& line) { to.split_bytes = count(line); })}};
-  return words;
+  return kWords;
 }
 
 std::string all_words() {

@@ -35,23 +35,23 @@ async function hold(page, selector, ms) {
 // What the station would say if it knew hundreds of robots more, none of them connected.
 async function make_large(page) {
   const model = await robot();
-  const strangers = Array.from({ length: kKnown }, (_, n) => ({ ...model, robot_id: `seen-once-${n}`, link: 'disconnected', mode: 'unspecified', emergency_id: null, control: null }));
+  const unknown = Array.from({ length: kKnown }, (_, n) => ({ ...model, robot_id: `seen-once-${n}`, link: 'disconnected', mode: 'unspecified', emergency_id: null, control: null }));
   await page.routeWebSocket('**/live', (socket) => {
     const station = socket.connectToServer();
     station.onMessage((text) => {
       const message = JSON.parse(text);
-      if (message.type === 'welcome') message.robots.push(...strangers);
+      if (message.type === 'welcome') message.robots.push(...unknown);
       socket.send(JSON.stringify(message));
     });
   });
   await page.route('**/api/v1/emergency-stop', async (route) => {
     const answer = await route.fetch();
     const content = await answer.json();
-    content.commands.push(...strangers.map(({ robot_id }) => ({ ...content.commands[0], robot_id, state: 'queued' })));
+    content.commands.push(...unknown.map(({ robot_id }) => ({ ...content.commands[0], robot_id, state: 'queued' })));
     if (content.summary) {
       content.summary.robots += kKnown;
       content.summary.kept += kKnown;
-      content.summary.not_acknowledged.push(...strangers.slice(0, 100).map(({ robot_id }) => ({ robot_id, outcome: 'kept' })));
+      content.summary.not_acknowledged.push(...unknown.slice(0, 100).map(({ robot_id }) => ({ robot_id, outcome: 'kept' })));
       content.summary.not_named += kKnown - 100;
     }
     await route.fulfill({ response: answer, json: content });
@@ -70,7 +70,7 @@ const steps = {
     viewer = await bench.open_page({ viewport: { width: 1440, height: 900 } });
     await sign_in(operator, 'olga');
     await sign_in(viewer, 'vera');
-    assert.match(await viewer.locator('#control-line').innerText(), /^Nobody is in control/);
+    await until('the page shows who is in control', async () => /^Nobody is in control/.test(await viewer.locator('#control-line').innerText()));
     assert.equal(await viewer.locator('#control-line button').count(), 0);
   },
 

@@ -65,8 +65,8 @@ class Program {
   async end(signal = 'SIGTERM') {
     if (!this.runs) return;
     const ended = once(this.process, 'exit');
+    this.process.kill('SIGCONT'); // one that a failed test has stopped ends as well; after the end it would stall LeakSanitizer
     this.process.kill(signal);
-    this.process.kill('SIGCONT'); // one that a failed test has stopped ends as well
     const late = setTimeout(() => this.process.kill('SIGKILL'), kLongestEnd_ms);
     await ended;
     clearTimeout(late);

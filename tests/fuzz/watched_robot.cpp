@@ -56,7 +56,7 @@ void WatchedRobot::check_latch() {
 }
 
 void WatchedRobot::check_at_rest() const {
-  const bool silent = !heard_at_us_ || now_us_ - *heard_at_us_ > kMaxSilenceUs;
+  const bool silent = !received_at_us_ || now_us_ - *received_at_us_ > kMaxSilenceUs;
   require(!silent || (robot_.duty() == 0 && robot_.mode() != rheonaut_MODE_AUTO), "without a link nothing moves");
   const bool manual = robot_.mode() == rheonaut_MODE_MANUAL;
   require(!manual || robot_.duty() == 0 || now_us_ < moves_until_us_, "without a lease nothing moves");
@@ -117,7 +117,7 @@ void WatchedRobot::observe(protocol::Bytes bytes) {
 }
 
 void WatchedRobot::observe(const protocol::StationFrame& frame) {
-  heard_at_us_ = now_us_;
+  received_at_us_ = now_us_;
   if (frame.which_body == rheonaut_StationFrame_welcome_tag) heard_welcome_ = true;
   if (frame.which_body != rheonaut_StationFrame_command_tag) return;
   const protocol::Command& command = frame.body.command;

@@ -64,7 +64,7 @@ class WatchedRobot {
   // What the station said, as far as the robot can have received it.
   protocol::FrameReader reader_;
   bool open_ = false, up_ = false, between_frames_ = true, heard_welcome_ = false;
-  std::optional<std::uint64_t> heard_at_us_;
+  std::optional<std::uint64_t> received_at_us_;
   std::uint64_t moves_until_us_ = 0;  // no manual duty lives longer
   std::set<std::uint64_t> cleared_ids_, latched_ids_;
   std::uint64_t latch_ = 0;

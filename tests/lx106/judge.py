@@ -21,7 +21,7 @@ BUDGETS = (
     ("text_bytes", "text: core, protocol, nanopb", 42 * 1024, "bytes"),
 )
 # Told beside them, without a limit of their own.
-TOLD = (
+REPORTED = (
     ("ticks", "ticks replayed", ""),
     ("worst_step", "worst `step()` alone", "instructions"),
     ("worst_transmit", "worst `transmit()` alone", "instructions"),
@@ -177,7 +177,7 @@ def main():
         print(f"| {what} | {figures[key]:,} | {limit:,} {unit} |")
         if figures[key] > limit:
             faults.append(f"over budget: {what}: {figures[key]:,} of {limit:,} {unit}")
-    for key, what, unit in TOLD:
+    for key, what, unit in REPORTED:
         print(f"| {what} | {figures[key]:,} {unit}".rstrip() + " | |")
     for fault in faults:
         print(f"lx106: {fault}")

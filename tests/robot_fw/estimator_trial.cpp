@@ -145,7 +145,7 @@ std::vector<NamedTrial> study_trials() {
   add("fluid, water's parameters", kWrong, {kKnowsWater});
   add("water, dead zone 0.03, 2 % misreads", kAllowed, {kInWater, kKnowsWater, kDeadZone});
   add("the same, loop on the estimate", kHeldAllowed, {kInWater, kKnowsWater, kDeadZone, kFigure7});
-  add("the same, dead zone told", kHeld, {kInWater, kKnowsWater, kDeadZone, kFigure7, kKnowsDeadZone});
+  add("the same, dead_zone_duty set", kHeld, {kInWater, kKnowsWater, kDeadZone, kFigure7, kKnowsDeadZone});
   add("pump on, mean flow 0", kHeld, {kHolding});
   add("pump on, mean flow 0.04 m/s", kAllowed, {kHolding, kFlow40});
   add("pump on, mean flow 0.1 m/s", kAllowed, {kHolding, kFlow100});

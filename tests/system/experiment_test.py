@@ -3,7 +3,7 @@ import concurrent.futures
 import unittest
 
 import processes  # puts deploy/ on the path
-from experiment import Truth, faults, perform, predict, tell_model
+from experiment import Truth, faults, perform, predict, send_model
 from processes import lab
 
 
@@ -17,7 +17,7 @@ class ExperimentTest(unittest.TestCase):
             place.start_robot(station, "known-1", "--sensor", "perfect")
             for name in ("sim-1", "known-1"):
                 station.wait_for_robot(name)
-            model = tell_model(station, "sim-1", processes.BIN / "rheonaut")
+            model = send_model(station, "sim-1", processes.BIN / "rheonaut")
             self.assertLessEqual(model["fit_error"], 0.005)
             with concurrent.futures.ThreadPoolExecutor() as both:
                 estimated = both.submit(perform, station, "sim-1", truth=truth)

@@ -32,7 +32,7 @@ class ModelTest : public SystemTest {
     robot_fw::Parameters expected;
     expected.set(robot_fw::ParameterId::model_confirmed, 1);
     for (const auto& [name, value] : parameters_of(model_)) {
-      const auto in_force = station.parameter_in_force("sim-1", name);
+      const auto in_force = station.settings("sim-1")->parameters.value(name);
       ASSERT_TRUE(in_force);
       EXPECT_EQ(std::bit_cast<std::uint32_t>(*in_force), std::bit_cast<std::uint32_t>(value)) << name;
       expected.set(robot_fw::Parameters::find(name.c_str()).value(), value);

@@ -1,6 +1,6 @@
 // What the page knows, as signals. Samples go into rings at full rate; numerals follow at 10 Hz; nothing else is kept.
 //
-// One flow: /live message → Store.hear → rings and pending values → Store.refresh (10 Hz) → signals → views.
+// One flow: /live message → Store.receive → rings and pending values → Store.refresh (10 Hz) → signals → views.
 
 import { batch, computed, signal } from '@preact/signals';
 import type { CommandRecord, EventRecord, LiveMessage, RobotState, RunRecord } from './api';

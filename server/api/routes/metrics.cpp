@@ -63,13 +63,14 @@ void add_security(Metrics& metrics, const net::TransportSecurity& security) {
   add_port(metrics, "http", security.http().limiter);
   add_port(metrics, "robot", security.robots().limiter);
   metrics.gauge("exposed", security.is_exposed() ? 1 : 0, "1 while a port speaks plain TCP beyond this machine.");
-  const tls::TlsHandshakes* gate = security.gate();
-  if (gate == nullptr) return;
-  const auto not_after_s = std::max<std::int64_t>(gate->context().certificate.not_after_us / 1'000'000, 0);
+  const tls::TlsHandshakes* handshakes = security.handshakes();
+  if (handshakes == nullptr) return;
+  const auto not_after_s = std::max<std::int64_t>(handshakes->context().certificate.not_after_us / 1'000'000, 0);
   metrics.gauge("tls_certificate_not_after_s", static_cast<std::uint64_t>(not_after_s), "End of its life, UTC.");
-  metrics.counter("tls_handshakes_total", gate->counters().handshakes, "Connections that are in TLS now, or were.");
-  metrics.counter("tls_resumed_total", gate->counters().resumed, "Of them, those that resumed a session.");
-  metrics.counter("tls_failed_total", gate->counters().failed, "Handshakes that failed.");
+  metrics.counter("tls_handshakes_total", handshakes->counters().handshakes,
+                  "Connections that are in TLS now, or were.");
+  metrics.counter("tls_resumed_total", handshakes->counters().resumed, "Of them, those that resumed a session.");
+  metrics.counter("tls_failed_total", handshakes->counters().failed, "Handshakes that failed.");
 }
 
 void add_exceptions(Metrics& metrics, const runtime::ExceptionLog& exceptions) {

@@ -1,4 +1,5 @@
 // The audit: who did what, when, from where, and what came of it.
+#include "server/api/bodies/limits.hpp"
 #include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/storage/audit/audit_queries.hpp"
@@ -11,7 +12,7 @@ using nlohmann::json;
 namespace {
 
 constexpr std::size_t kMaxFilterBytes = 100;
-constexpr std::int64_t kMaxNumber = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
+constexpr std::int64_t kMaxNumber = kMaxJavaScriptInteger;
 
 json to_json(const storage::AuditEntry& entry) {
   const station::AuditNote& note = entry.note;

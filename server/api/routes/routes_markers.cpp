@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "server/api/bodies/json.hpp"
+#include "server/api/bodies/limits.hpp"
 #include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/station/station.hpp"
@@ -12,7 +13,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::int64_t kMaxMarkerId = 9'007'199'254'740'991;  // the largest integer that JavaScript holds
+constexpr std::int64_t kMaxMarkerId = kMaxJavaScriptInteger;
 
 json to_json(const storage::Marker& marker) {
   json out;

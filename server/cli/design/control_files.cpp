@@ -82,6 +82,11 @@ control::FractionalModel read(const PlantChoice& choice) {
   return value_of(*choice.file, analysis::model_from(read_json(*choice.file)));
 }
 
+std::optional<control::ExpectedUncertainty> read_uncertainty(const PlantChoice& choice) {
+  if (!choice.file || *choice.file == "non_newtonian" || *choice.file == "newtonian") return std::nullopt;
+  return value_of(*choice.file, analysis::uncertainty_from(read_json(*choice.file)));
+}
+
 control::FopdController read(const ControllerChoice& choice) {
   if (!choice.file) return control::kPaperController;
   return value_of(*choice.file, analysis::controller_from(read_json(*choice.file)));

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "control/identification/identify.hpp"
+#include "control/identification/planned_experiment.hpp"
 #include "control/models/transfer_function.hpp"
 #include "server/analysis/csv_columns.hpp"
 #include "server/analysis/run_recording.hpp"
@@ -30,6 +31,8 @@ void add_option(CLI::App& command, ControllerChoice& choice);
 
 control::FractionalModel read(const PlantChoice& choice);      // none: (29)
 control::FopdController read(const ControllerChoice& choice);  // none: (30)
+// How well the plant's parameters are known, where identify has made the file.
+std::optional<control::ExpectedUncertainty> read_uncertainty(const PlantChoice& choice);
 
 analysis::CsvColumns read_csv(const std::string& file, std::initializer_list<const char*> required,
                               std::initializer_list<const char*> optional = {},

@@ -6,10 +6,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <limits>
+#include <optional>
 
 #include "server/analysis/control_json.hpp"
+#include "server/analysis/optional_json.hpp"
 #include "server/cli/terminal/options.hpp"
-#include "server/experiments/preview.hpp"
+#include "server/experiments/preview_band.hpp"
 #include "server/experiments/profile_document.hpp"
 
 namespace server::cli {
@@ -27,6 +30,7 @@ struct Predicted {
   Variant variant;
   TimeLine line;
   Preview preview;
+  std::vector<double> position_sd_m;  // of the model's parameters; empty: not known
 };
 
 // Repeats of a combination are the same, and are predicted once.
@@ -35,20 +39,29 @@ std::vector<Predicted> predict(const Profile& profile, const ProfileQuestion& op
   std::vector<Predicted> runs;
   for (const Variant& variant : experiments::variants_of(profile)) {
     if (variant.repeat > 1) {
-      runs.push_back({variant, runs.back().line, runs.back().preview});
+      runs.push_back(runs.back());
+      runs.back().variant = variant;
       continue;
     }
     PlantChoice plant = options.plant;
     if (!plant.file && variant.fluid == "water") plant.file = "newtonian";
     TimeLine line = experiments::time_line_of(profile, variant);
     Preview preview = experiments::preview_of(profile, line, read(plant), sections);
-    runs.push_back({variant, std::move(line), std::move(preview)});
+    std::vector<double> sd_m;
+    if (const auto uncertainty = read_uncertainty(plant)) {
+      sd_m = experiments::position_sd_of(profile, line, read(plant), *uncertainty, sections);
+    }
+    runs.push_back({variant, std::move(line), std::move(preview), std::move(sd_m)});
   }
   return runs;
 }
 
 const char* kind_text(const experiments::Step& step) {
   return experiments::step_kinds()[static_cast<std::size_t>(step.kind)];
+}
+
+std::optional<double> largest_sd_m(const Predicted& run) {
+  return run.position_sd_m.empty() ? std::nullopt : std::optional{std::ranges::max(run.position_sd_m)};
 }
 
 OrderedJson json_of(const Predicted& run) {
@@ -62,6 +75,7 @@ OrderedJson json_of(const Predicted& run) {
           {"actions", run.line.actions.size()},
           {"position_min_m", preview.position_min_m},
           {"position_max_m", preview.position_max_m},
+          {"position_sd_max_m", analysis::or_null(largest_sd_m(run))},
           {"travel_m", preview.travel_m},
           {"at_power_s", preview.at_power_s},
           {"problems", preview.problems}};
@@ -85,12 +99,14 @@ void write_json(std::ostream& out, const Profile& profile, const std::vector<Pre
   OrderedJson setpoint_m = OrderedJson::array();
   for (const double value : preview.setpoint_m)
     setpoint_m.push_back(std::isnan(value) ? OrderedJson(nullptr) : OrderedJson(value));
+  const bool is_known = !chosen.position_sd_m.empty();
   cli::write_json(out, {{"name", profile.name},
                         {"purpose", profile.purpose},
                         {"steps", steps_json(profile, chosen.line)},
                         {"runs", std::move(all)},
                         {"t_s", preview.time_s},
                         {"position_m", preview.position_m},
+                        {"position_sd_m", is_known ? OrderedJson(chosen.position_sd_m) : OrderedJson(nullptr)},
                         {"velocity_m_s", preview.velocity_m_s},
                         {"duty", preview.duty},
                         {"setpoint_m", std::move(setpoint_m)}});
@@ -105,14 +121,16 @@ void write_table(std::ostream& out, const Profile& profile, const std::vector<Pr
   }
   steps.write(out);
   fmt::print(out, "\n");
-  Table table{
-      {"run", "<fluid", "<controller", "duty ×", "setpoint ×", "duration (s)", "from (m)", "to (m)", "travel (m)"}};
+  Table table{{"run", "<fluid", "<controller", "duty ×", "setpoint ×", "duration (s)", "from (m)", "to (m)",
+               "± 2 sd (m)", "travel (m)"}};
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const auto& [variant, line, preview] = runs[i];
+    const auto& [variant, line, preview, position_sd_m] = runs[i];
+    const auto sd_m = largest_sd_m(runs[i]);
     table.row({std::to_string(i + 1), variant.fluid.empty() ? "any" : one_line(variant.fluid),
                variant.controller.empty() ? "in force" : one_line(variant.controller), cell(variant.duty_factor),
                cell(variant.setpoint_factor), fixed(line.duration_s(), 2), fixed(preview.position_min_m, 3),
-               fixed(preview.position_max_m, 3), fixed(preview.travel_m, 3)});
+               fixed(preview.position_max_m, 3), sd_m ? fmt::format("{:.2g}", 2 * *sd_m) : "-",
+               fixed(preview.travel_m, 3)});
   }
   table.write(out);
   for (std::size_t i = 0; i < runs.size(); ++i) {
@@ -183,11 +201,13 @@ int run(const ProfileQuestion& options, std::ostream& out) {
   const Predicted& chosen = runs[options.run - 1];
   if (options.form.is_csv) {
     const Preview& preview = chosen.preview;
+    const std::vector<double> unknown(preview.time_s.size(), std::numeric_limits<double>::quiet_NaN());
     write_csv(out, {{"t_s", preview.time_s},
                     {"duty", preview.duty},
                     {"velocity_m_s", preview.velocity_m_s},
                     {"position_m", preview.position_m},
-                    {"setpoint_m", preview.setpoint_m}});
+                    {"setpoint_m", preview.setpoint_m},
+                    {"position_sd_m", chosen.position_sd_m.empty() ? unknown : chosen.position_sd_m}});
   } else if (options.form.is_json) {
     write_json(out, profile, runs, chosen);
   } else {

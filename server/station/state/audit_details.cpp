@@ -21,6 +21,14 @@ std::string control_detail(const std::string& cause, const std::string& holder) 
 
 std::string fluid_detail(const std::string& before) { return audit_detail({{"before", before}}); }
 
+std::string refused_command(const std::string& kind, const std::string& arguments) {
+  return nlohmann::json{{"kind", kind}, {"arguments", nlohmann::json::parse(arguments, nullptr, false)}}.dump();
+}
+
+std::string refused_stop() { return nlohmann::json{{"kind", "emergency_stop"}}.dump(); }
+
+std::string refused_control(const std::string& action) { return nlohmann::json{{"wish", action}}.dump(); }
+
 std::string refused_fluid(const std::string& fluid) { return nlohmann::json{{"fluid", fluid}}.dump(); }
 
 }  // namespace server::station

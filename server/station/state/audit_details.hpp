@@ -11,6 +11,11 @@ std::string refusal_detail(const std::string& request, const std::string& proble
 
 std::string control_detail(const std::string& cause, const std::string& holder);
 std::string fluid_detail(const std::string& before);
-std::string refused_fluid(const std::string& fluid);  // the request of a refusal
+
+// Requests, for refusal_detail(). `arguments`: a JSON object.
+std::string refused_command(const std::string& kind, const std::string& arguments);
+std::string refused_stop();
+std::string refused_control(const std::string& action);
+std::string refused_fluid(const std::string& fluid);
 
 }  // namespace server::station

@@ -1,8 +1,8 @@
 // What a robot's frame holds, once the link has checked its numbers.
 //
 // A frame is checked once, where it enters the station, and in two steps. protocol/messages decodes it: what has no
-// samples, or columns of different length, is no telemetry and does not decode. mend() in server/link/frame_faults
-// judges the numbers, and it alone makes a Checked. So what the station fills from one (SampleBatch, RobotEvent) has,
+// samples, or columns of different length, is no telemetry and does not decode. mend() in frame_faults judges
+// the numbers, and it alone makes a Checked. So what the station fills from one (SampleBatch, RobotEvent) has,
 // for its receiver:
 //
 //   telemetry   1 to 25 samples; period_us 1 to kMaxPeriodUs; first_seq and first_robot_time_us ≤ kMaxRobotNumber;
@@ -16,13 +16,11 @@
 
 #include "protocol/messages.hpp"
 
-namespace server::link {
+namespace server::station {
+
 struct FrameFaults;
 struct FrameReach;
 FrameFaults mend(protocol::RobotFrame& frame, const FrameReach& reach);
-}  // namespace server::link
-
-namespace server::station {
 
 // The largest number of a sample or event, and the latest robot time in µs: beyond any boot, and far from SQLite's
 // limit.
@@ -36,7 +34,7 @@ class Checked {
   const Message& operator*() const { return *message_; }
 
  private:
-  friend link::FrameFaults link::mend(protocol::RobotFrame& frame, const link::FrameReach& reach);
+  friend FrameFaults mend(protocol::RobotFrame& frame, const FrameReach& reach);
   explicit Checked(const Message& message) : message_{&message} {}
 
   const Message* message_;

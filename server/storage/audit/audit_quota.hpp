@@ -42,9 +42,9 @@ class AuditQuota {
   std::vector<std::pair<std::string, std::uint64_t>> report(std::int64_t now_us, bool at_once) {
     std::vector<std::pair<std::string, std::uint64_t>> reported;
     for (auto& [action, left] : left_out_) {
-      const bool is_due = at_once || left.told_us == 0 || now_us - left.told_us >= kOneEach.count();
+      const bool is_due = at_once || left.reported_us == 0 || now_us - left.reported_us >= kOneEach.count();
       if (left.count == 0 || !is_due) continue;
-      left.told_us = now_us;
+      left.reported_us = now_us;
       reported.emplace_back(action, std::exchange(left.count, 0));
     }
     return reported;
@@ -57,7 +57,7 @@ class AuditQuota {
   };
   struct LeftOut {
     std::uint64_t count = 0;
-    std::int64_t told_us = 0;  // 0: never
+    std::int64_t reported_us = 0;  // 0: never
   };
   std::map<std::string, Allowance> allowances_;
   std::map<std::string, LeftOut> left_out_;

@@ -38,6 +38,7 @@ asio::awaitable<AdmissionOutcome> RobotAdmission::ask(AdmissionQuestion question
 asio::awaitable<void> RobotAdmission::ask_for_all() {
   const Turn turn{*this};
   std::vector<AdmissionQuestion> questions;
+  questions.reserve(questions_.size());
   for (const auto& waiting : questions_) questions.push_back(waiting->question);
   auto outcomes = co_await ask_database_(std::move(questions));
   for (AdmissionOutcome& outcome : outcomes) {

@@ -110,7 +110,7 @@ class ChainWalk {
   std::optional<AuditEntry> latest_;
 };
 
-bool tells_of_command(const station::AuditNote& note) {
+bool is_about_command(const station::AuditNote& note) {
   return note.action.starts_with("command.") && note.action != "command.refused";
 }
 
@@ -121,7 +121,7 @@ class CommandLookup {
       : row_{database, "SELECT coalesce(audit_entry, 0) FROM command WHERE command_id = ?"} {}
 
   std::optional<std::string> fault_of(const AuditEntry& entry) {
-    if (!tells_of_command(entry.note)) return std::nullopt;
+    if (!is_about_command(entry.note)) return std::nullopt;
     const std::string& subject = entry.note.subject;
     std::uint64_t id = 0;
     std::from_chars(subject.data(), subject.data() + subject.size(), id);

@@ -76,8 +76,8 @@ fs::path head_file_of(const fs::path& database) { return fs::path{database}.repl
 
 Result<std::optional<HeadFile>> load_head_file(const fs::path& database) {
   const fs::path path = head_file_of(database);
-  std::error_code not_told;
-  if (fs::status(path, not_told).type() == fs::file_type::not_found) return std::nullopt;
+  std::error_code status_error;
+  if (fs::status(path, status_error).type() == fs::file_type::not_found) return std::nullopt;
   try {
     const std::uintmax_t size = fs::file_size(path);
     if (size > kMaxFileBytes) throw std::runtime_error{fmt::format("it has {} bytes", size)};

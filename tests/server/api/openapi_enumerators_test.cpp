@@ -31,9 +31,9 @@ Texts possible() {
 
 // Of "Mode", a schema, or of "Robot.link", one of its properties.
 Texts documented(const std::string& name) {
-  static const nlohmann::json document = openapi_document();
+  static const nlohmann::json kDocument = openapi_document();
   const auto dot = name.find('.');
-  nlohmann::json schema = document["components"]["schemas"].at(name.substr(0, dot));
+  nlohmann::json schema = kDocument["components"]["schemas"].at(name.substr(0, dot));
   if (dot != std::string::npos) schema = schema.at("properties").at(name.substr(dot + 1));
   Texts texts;
   for (const nlohmann::json& text : schema.at("enum")) texts.insert(text.get<std::string>());

@@ -54,6 +54,7 @@ TEST_F(OpenapiTest, QueryParametersAreTheSame) {
     const std::set<std::string> known{route.query.begin(), route.query.end()};
     EXPECT_EQ(document.at(operation).query, known) << operation;
   }
+  EXPECT_FALSE(api->router().routes().empty());
 }
 
 TEST_F(OpenapiTest, EveryRouteNeedsWhatTheDocumentSays) {
@@ -62,6 +63,7 @@ TEST_F(OpenapiTest, EveryRouteNeedsWhatTheDocumentSays) {
     const std::string operation = route.method + " " + route.pattern;
     EXPECT_EQ(document.at(operation).scope, text(route.needs)) << operation;
   }
+  EXPECT_FALSE(api->router().routes().empty());
 }
 
 // Every example of docs/api.md calls a route that exists, and its JSON is JSON.

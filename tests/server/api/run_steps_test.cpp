@@ -199,7 +199,9 @@ TEST_F(StepsFromOutside, AStartAmongPositionsThatScatterIsAsUncertainAsThey) {
 
 TEST_F(StepsFromOutside, TheUncertaintyOfTheZeroCounts) {
   reference.reference.zero_sd_m = 0.0015;
-  for (const analysis::MeasuredStep& step : measure_steps(points, &reference)) {
+  const auto steps = measure_steps(points, &reference);
+  EXPECT_FALSE(steps.empty());
+  for (const analysis::MeasuredStep& step : steps) {
     EXPECT_NEAR(step.position_sd_m, std::hypot(0.0002, 0.0015), 1e-9);
   }
 }

@@ -44,11 +44,47 @@ TEST_F(ProfileTool, ARunOfWaterIsPredictedWithItsModel) {
   EXPECT_THAT(ask("profile figure_8 --run 3").error, HasSubstr("--run 3: the profile has 2 runs"));
 }
 
+// The uncertainty of the gain alone: the band is in proportion to the motion.
+TEST_F(ProfileTool, AModelThatIdentifyFoundGivesABand) {
+  EXPECT_TRUE(ask("profile figure_5 --json").json()["position_sd_m"].is_null()) << "the paper's has no uncertainty";
+  save("fit.json",
+       R"({"structure": "first_order", "parameters": {"kp": 0.1, "b1": 0, "b2": 0.11, "alpha": 2, "beta": 1},
+    "one_sigma": {"kp": 0.01, "b1": null, "b2": 0, "alpha": null, "beta": null},
+    "correlation": [[1,0,0,0,0],[0,0,0,0,0],[0,0,1,0,0],[0,0,0,0,0],[0,0,0,0,0]]})");
+  const auto json = ask("profile figure_5 --plant @fit.json --json").json();
+  const double position_m = json["position_m"].back(), sd_m = json["position_sd_m"].back();
+  EXPECT_GT(position_m, 0.1);
+  EXPECT_NEAR(sd_m, 0.1 * position_m, 1e-9);
+  EXPECT_EQ(json["runs"][0]["position_sd_max_m"], sd_m);
+  EXPECT_THAT(ask("profile figure_5 --plant @fit.json").text, HasSubstr("± 2 sd (m)"));
+  save("odd.json",
+       R"({"structure": "first_order", "parameters": {"kp": 0.1, "b1": 0, "b2": 0.11, "alpha": 2, "beta": 1},
+    "one_sigma": {"kp": "0.01"}})");
+  EXPECT_THAT(ask("profile figure_5 --plant @odd.json").error,
+              HasSubstr("the uncertainty is not as identify prints it"));
+}
+
+TEST_F(ProfileTool, APlantWhoseFitDoesNotDetermineAParameterHasNoBand) {
+  save("fit.json",
+       R"({"structure": "first_order", "parameters": {"kp": 0.1, "b1": 0, "b2": 0.11, "alpha": 2, "beta": 1},
+    "one_sigma": {"kp": 0.01, "b1": null, "b2": null, "alpha": null, "beta": null},
+    "correlation": [[1,0,0,0,0],[0,0,0,0,0],[0,0,1,0,0],[0,0,0,0,0],[0,0,0,0,0]]})");
+  EXPECT_TRUE(ask("profile figure_5 --plant @fit.json --json").json()["position_sd_m"].is_null());
+}
+
+TEST_F(ProfileTool, AProfileMayBeJson) {
+  save("mine.json", R"({"name": "Small step", "purpose": "p", "limits": {"duty_max": 0.3},
+    "step": [{"kind": "duty", "duty": 0.3, "for_s": 2}, {"kind": "rest", "for_s": 1}]})");
+  EXPECT_THAT(ask("profile @mine.json").text, StartsWith("Small step\n"));
+  save("bad.json", R"({"name": "n", "purpose": "p", "step": [{"kind": "duty", "duty": 2, "for_s": 2}]})");
+  EXPECT_THAT(ask("profile @bad.json").error, HasSubstr("bad.json: step[0].duty: is 2, allowed is -1 to 1"));
+}
+
 TEST_F(ProfileTool, PrintsItsTextWhichIsAProfile) {
   save("mine.toml", ask("profile identification_set --text").text);
   EXPECT_THAT(ask("profile @mine.toml").text, StartsWith("Identification set\n"));
   EXPECT_THAT(ask("profile @mine.toml --csv").text,
-              StartsWith("t_s,duty,velocity_m_s,position_m,setpoint_m\n0,0,0,0,"));
+              StartsWith("t_s,duty,velocity_m_s,position_m,setpoint_m,position_sd_m\n0,0,0,0,"));
   EXPECT_THAT(ask("profile @mine.toml --text").error, HasSubstr("comes with the program"));
 }
 

@@ -1,8 +1,8 @@
 // A value that cannot be takes no robot off the air: it would send it again, and be taken off again.
 #include <limits>
 
-#include "server/link/frame_faults.hpp"
 #include "server/live/state_json.hpp"
+#include "server/station/state/frame_faults.hpp"
 #include "tests/server/link/link_fixture.hpp"
 
 namespace server {
@@ -178,10 +178,10 @@ class FrameFaultsTest : public ::testing::Test {
     return frame;
   }
   // Of a robot whose numbers are as large as they can be, whatever it has sent since its hello.
-  static link::FrameReach at_the_end() {
+  static station::FrameReach at_the_end() {
     protocol::Hello hello = rheonaut_Hello_init_zero;
     hello.next_seq = hello.next_event_seq = station::kMaxRobotNumber;
-    link::FrameReach reach = link::FrameReach::after(hello, station::kMaxRobotNumber);
+    station::FrameReach reach = station::FrameReach::after(hello, station::kMaxRobotNumber);
     reach.advance(samples(station::kMaxRobotNumber, 0, station::kMaxRobotNumber));
     return reach;
   }
@@ -189,43 +189,43 @@ class FrameFaultsTest : public ::testing::Test {
 
 TEST_F(FrameFaultsTest, WhatCanBeUsedIsCheckedAndNothingElse) {
   protocol::RobotFrame frame = samples(10, 5, 6'000'000);
-  const link::FrameFaults none = link::mend(frame, {});
+  const station::FrameFaults none = station::mend(frame, {});
   ASSERT_TRUE(none.samples);
   EXPECT_EQ(&**none.samples, &frame.body.telemetry);
   EXPECT_FALSE(none.event);
   for (const std::uint32_t period_us : {0U, station::kMaxPeriodUs + 1}) {
     frame.body.telemetry.period_us = period_us;
-    const link::FrameFaults faults = link::mend(frame, {});
+    const station::FrameFaults faults = station::mend(frame, {});
     EXPECT_TRUE(faults.is_unusable);
     EXPECT_FALSE(faults.samples) << period_us;
   }
   frame.which_body = rheonaut_RobotFrame_event_tag;
   frame.body.event = rheonaut_Event_init_zero;
-  EXPECT_TRUE(link::mend(frame, {}).event);
-  EXPECT_FALSE(link::mend(frame, {}).samples);
+  EXPECT_TRUE(station::mend(frame, {}).event);
+  EXPECT_FALSE(station::mend(frame, {}).samples);
   frame.body.event.sample_seq = kFar;
-  EXPECT_FALSE(link::mend(frame, {}).event);
+  EXPECT_FALSE(station::mend(frame, {}).event);
 }
 
 TEST_F(FrameFaultsTest, NoNumberIsBeyondWhatCanBeStoredHoweverFarTheRobotHasCome) {
-  const link::FrameReach reach = at_the_end();
+  const station::FrameReach reach = at_the_end();
   protocol::RobotFrame last = samples(station::kMaxRobotNumber, station::kMaxRobotNumber, station::kMaxRobotNumber);
-  EXPECT_TRUE(mend(last, reach).samples);
+  EXPECT_TRUE(station::mend(last, reach).samples);
   protocol::RobotFrame late = samples(0, 0, station::kMaxRobotNumber + 1);
-  EXPECT_FALSE(mend(late, reach).samples);
+  EXPECT_FALSE(station::mend(late, reach).samples);
   protocol::RobotFrame beyond = samples(station::kMaxRobotNumber + 1, 0, 6'000'000);
-  EXPECT_FALSE(mend(beyond, reach).samples);
+  EXPECT_FALSE(station::mend(beyond, reach).samples);
   protocol::RobotFrame event = rheonaut_RobotFrame_init_zero;
   event.which_body = rheonaut_RobotFrame_event_tag;
   event.body.event.event_seq = station::kMaxRobotNumber;
-  EXPECT_TRUE(mend(event, reach).event);
+  EXPECT_TRUE(station::mend(event, reach).event);
   event.body.event.event_seq = station::kMaxRobotNumber + 1;
-  EXPECT_FALSE(mend(event, reach).event);
+  EXPECT_FALSE(station::mend(event, reach).event);
 }
 
 TEST_F(FrameFaultsTest, TheOldestThatARobotHoldsIsNotAboveWhatItSends) {
   protocol::RobotFrame frame = samples(10, 11, 6'000'000);
-  const link::FrameFaults faults = link::mend(frame, {});
+  const station::FrameFaults faults = station::mend(frame, {});
   EXPECT_EQ(faults.count, 1u);
   ASSERT_TRUE(faults.samples);
   EXPECT_EQ((**faults.samples).oldest_seq, 0u);
@@ -236,10 +236,10 @@ TEST_F(FrameFaultsTest, AHeartbeatWithATimeThatCannotBeAnswersNothing) {
   frame.which_body = rheonaut_RobotFrame_heartbeat_tag;
   frame.body.heartbeat.echo_station_time_us = 5;
   frame.body.heartbeat.echo_received_at_robot_us = kFar;
-  EXPECT_EQ(link::mend(frame, {}).count, 1u);
+  EXPECT_EQ(station::mend(frame, {}).count, 1u);
   EXPECT_EQ(frame.body.heartbeat.echo_station_time_us, 0u);
   frame.body.heartbeat.echo_station_time_us = 5;
-  EXPECT_EQ(link::mend(frame, {}).count, 0u);
+  EXPECT_EQ(station::mend(frame, {}).count, 0u);
   EXPECT_EQ(frame.body.heartbeat.echo_station_time_us, 5u);
 }
 

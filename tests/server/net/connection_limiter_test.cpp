@@ -13,18 +13,18 @@
 namespace server {
 namespace {
 
-class DoorTest : public ::testing::Test {
+class ConnectionLimiterTest : public ::testing::Test {
  protected:
   struct Visitor {
     std::unique_ptr<net::ConnectionSlot> slot;
     bool ended = false;
   };
 
-  DoorTest() {
+  ConnectionLimiterTest() {
     spdlog::set_default_logger(
         std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
   }
-  ~DoorTest() override { spdlog::set_default_logger(before); }
+  ~ConnectionLimiterTest() override { spdlog::set_default_logger(before); }
 
   // Null when refused.
   Visitor* come(const std::string& address, net::ConnectionSlot::State state = net::ConnectionSlot::unauthenticated,
@@ -57,7 +57,7 @@ class DoorTest : public ::testing::Test {
   std::shared_ptr<spdlog::logger> before = spdlog::default_logger();
 };
 
-TEST_F(DoorTest, AnAddressWithItsShareGivesUpItsOldestStranger) {
+TEST_F(ConnectionLimiterTest, AnAddressWithItsShareGivesUpItsOldestUnauthenticated) {
   Visitor* first = come("10.0.0.1");
   Visitor* second = come("10.0.0.1");
   come("10.0.0.1", net::ConnectionSlot::busy);
@@ -72,7 +72,7 @@ TEST_F(DoorTest, AnAddressWithItsShareGivesUpItsOldestStranger) {
   EXPECT_EQ(limiter.connections(), 4U);
 }
 
-TEST_F(DoorTest, AnIdleOneGivesWayWhenThereIsNoStrangerAndABusyOneNever) {
+TEST_F(ConnectionLimiterTest, AnIdleOneIsEndedWhenAllAreAuthenticatedAndABusyOneNever) {
   Visitor* idle = come("10.0.0.1", net::ConnectionSlot::idle);
   Visitor* later = come("10.0.0.1", net::ConnectionSlot::idle);
   come("10.0.0.1", net::ConnectionSlot::busy);
@@ -89,7 +89,7 @@ TEST_F(DoorTest, AnIdleOneGivesWayWhenThereIsNoStrangerAndABusyOneNever) {
 }
 
 // SAFETY: the address with most unauthenticated connections loses one; a single client that stops a robot stays.
-TEST_F(DoorTest, AFullLimiterEvictsFromTheAddressWithMostUnauthenticated) {
+TEST_F(ConnectionLimiterTest, AFullLimiterEvictsFromTheAddressWithMostUnauthenticated) {
   Visitor* alone = come("10.0.0.9");
   Visitor* of_two = come("10.0.0.2");
   come("10.0.0.2");
@@ -104,7 +104,7 @@ TEST_F(DoorTest, AFullLimiterEvictsFromTheAddressWithMostUnauthenticated) {
   EXPECT_FALSE(alone->ended);
 }
 
-TEST_F(DoorTest, AFullDoorWithNobodyWhoMayGoRefuses) {
+TEST_F(ConnectionLimiterTest, AFullLimiterWithNobodyWhoMayGoRefuses) {
   for (int i = 0; i < 8; ++i) ASSERT_NE(come("10.0.0." + std::to_string(i), net::ConnectionSlot::busy), nullptr);
   EXPECT_EQ(come("10.0.0.9"), nullptr);
   EXPECT_EQ(refusal, net::ConnectionLimiter::Refusal::full);
@@ -112,19 +112,19 @@ TEST_F(DoorTest, AFullDoorWithNobodyWhoMayGoRefuses) {
   EXPECT_NE(come("10.0.0.9"), nullptr);
 }
 
-TEST_F(DoorTest, AddressesOfThisMachineHaveMoreAndNotAll) {
+TEST_F(ConnectionLimiterTest, AddressesOfThisMachineHaveMoreAndNotAll) {
   for (int i = 0; i < 6; ++i) ASSERT_NE(come("127.0.0.1", net::ConnectionSlot::busy, true), nullptr);
   EXPECT_EQ(come("127.0.0.1", net::ConnectionSlot::unauthenticated, true), nullptr);
   EXPECT_NE(come("10.0.0.1"), nullptr);
 }
 
-TEST_F(DoorTest, ANetworkOfIpv6IsOneAddress) {
+TEST_F(ConnectionLimiterTest, ANetworkOfIpv6IsOneAddress) {
   for (int i = 0; i < 3; ++i) come("2001:db8:1:2::" + std::to_string(i), net::ConnectionSlot::busy);
   EXPECT_EQ(come("2001:db8:1:2:ffff::1"), nullptr);
   EXPECT_NE(come("2001:db8:1:3::1"), nullptr);
 }
 
-TEST_F(DoorTest, WhoWasEndedHasNoSayAnyMore) {
+TEST_F(ConnectionLimiterTest, WhoWasEndedHasNoSayAnyMore) {
   Visitor* first = come("10.0.0.1");
   come("10.0.0.1");
   come("10.0.0.1");
@@ -138,7 +138,7 @@ TEST_F(DoorTest, WhoWasEndedHasNoSayAnyMore) {
 }
 
 // Each still has its descriptor; a flood that is faster than they go does not grow them without bound.
-TEST_F(DoorTest, ThoseWhoLeaveAreBounded) {
+TEST_F(ConnectionLimiterTest, ThoseWhoLeaveAreBounded) {
   for (int i = 0; i < 1000; ++i) come("10.0.0.1");
   EXPECT_EQ(limiter.connections(), 3U + 64U);
   EXPECT_EQ(limiter.counters().refused, 1000U - 3U - 64U);
@@ -146,7 +146,7 @@ TEST_F(DoorTest, ThoseWhoLeaveAreBounded) {
   EXPECT_NE(come("10.0.0.1"), nullptr);
 }
 
-TEST_F(DoorTest, RefusalsAreLoggedOnceASecond) {
+TEST_F(ConnectionLimiterTest, RefusalsAreLoggedOnceASecond) {
   for (int i = 0; i < 3; ++i) come("10.0.0.1", net::ConnectionSlot::busy);
   for (int i = 0; i < 20; ++i) EXPECT_EQ(come("10.0.0.1"), nullptr);
   clock.run_for(std::chrono::seconds{1});

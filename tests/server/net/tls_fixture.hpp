@@ -8,6 +8,7 @@
 #include <openssl/err.h>
 #include <poll.h>
 #include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 
 #include <boost/asio/as_tuple.hpp>

@@ -16,7 +16,7 @@ TEST_F(TlsTest, AClientThatSaysNothingIsLetGoAfterTenSecondsAndHoldsNobodyUp) {
   ASSERT_TRUE(clock.run_until([&] { return outcome.has_value(); }, 20s));
   EXPECT_EQ(*outcome, tls::TlsHandshakes::Outcome::failed);
   EXPECT_EQ(clock.steady_us() - begun_us, tls::kHandshakeTime.count());
-  EXPECT_EQ(security->gate()->counters().failed, 1U);
+  EXPECT_EQ(security->handshakes()->counters().failed, 1U);
   EXPECT_THAT(log.str(), HasSubstr("test port: no TLS with 127.0.0.1:"));
   EXPECT_THAT(log.str(), HasSubstr("not done within 10 s"));
 }
@@ -49,20 +49,20 @@ TEST_F(TlsTest, AtMostOneFailureASecondIsLogged) {
   ASSERT_TRUE(clock.run_until([&] { return outcome.has_value(); }, 1s));
   EXPECT_EQ(said("no TLS"), 2);
   EXPECT_THAT(log.str(), HasSubstr("(and 19 before)"));
-  EXPECT_EQ(security->gate()->counters().failed, 21U);
+  EXPECT_EQ(security->handshakes()->counters().failed, 21U);
 }
 
 TEST_F(TlsTest, ANewCertificateIsInForceForNewConnectionsWithinTwoLooks) {
   start();
-  const std::string first = security->gate()->context().certificate.pin;
+  const std::string first = security->handshakes()->context().certificate.pin;
   Client old_client{clock, listener.endpoint()};
   ASSERT_TRUE(old_client.shake_hands());
   EXPECT_EQ(old_client.pin(), first);
   auto stream = make_stream(std::move(*served), sockets);
 
   renew(true);
-  clock.run_for(2 * net::kCertificateLook + 1ms);
-  const std::string second = security->gate()->context().certificate.pin;
+  clock.run_for(2 * net::kCertificateCheckInterval + 1ms);
+  const std::string second = security->handshakes()->context().certificate.pin;
   EXPECT_NE(second, first);
   Client new_client{clock, listener.endpoint()};
   ASSERT_TRUE(new_client.shake_hands());
@@ -73,10 +73,10 @@ TEST_F(TlsTest, ANewCertificateIsInForceForNewConnectionsWithinTwoLooks) {
 
 TEST_F(TlsTest, ABrokenNewFileIsSaidOnceAndTheOldOneStaysInForce) {
   start();
-  const std::string first = security->gate()->context().certificate.pin;
+  const std::string first = security->handshakes()->context().certificate.pin;
   std::ofstream{config.tls_certificate()} << "nonsense";
   clock.run_for(60s);
-  EXPECT_EQ(security->gate()->context().certificate.pin, first);
+  EXPECT_EQ(security->handshakes()->context().certificate.pin, first);
   EXPECT_THAT(log.str(), HasSubstr("holds no certificate in PEM"));
   EXPECT_EQ(said("the one before stays in force"), 1);
   Client client{clock, listener.endpoint()};
@@ -84,13 +84,13 @@ TEST_F(TlsTest, ABrokenNewFileIsSaidOnceAndTheOldOneStaysInForce) {
   fs::remove(config.tls_key());
   clock.run_for(60s);
   EXPECT_EQ(said("the one before stays in force"), 2) << "a file that goes missing is said, too";
-  EXPECT_EQ(security->gate()->context().certificate.pin, first);
+  EXPECT_EQ(security->handshakes()->context().certificate.pin, first);
 }
 
 TEST_F(TlsTest, AnExpiryIsWarnedOfThirtyDaysBeforeAndOnceADay) {
   start();
   EXPECT_FALSE(security->state()["certificate"]["expires_soon"].get<bool>());
-  const std::int64_t not_after_us = security->gate()->context().certificate.not_after_us;
+  const std::int64_t not_after_us = security->handshakes()->context().certificate.not_after_us;
   clock.step_utc(microseconds{not_after_us - clock.utc_us()} - 29h * 24);
   clock.skip(24h);
   clock.run_for(3s);

@@ -127,7 +127,7 @@ TEST_F(AdmissionTest, ARevokedRobotIsRefusedUntilItIsEnrolledAgain) {
   ASSERT_TRUE(
       with_store([id = robot_.id](identity::AccountStore& store) { return store.revoke_robot(id, {"anna", "", 1}); }));
   stop();
-  start();  // from loopback, where strangers are enrolled
+  start();  // from loopback, where robots that are not known are enrolled
   for (const char* token : {"secret", "", "another"}) {
     robot_.token = token;
     const station::Admission refused = admit(robot_);
@@ -152,6 +152,7 @@ TEST_F(AdmissionTest, ARobotThatIsRevokedWhileItIsAdmittedIsRefused) {
     recorder.set_revoked(id, true);
     co_return true;
   };
+  // The lambda outlives its coroutine. NOLINTNEXTLINE(cppcoreguidelines-avoid-capturing-lambda-coroutines)
   const auto admit_and_revoke = [&revoke](storage::Recorder& recorder,
                                           station::AdmissionRequest hello) -> asio::awaitable<station::Admission> {
     const station::RobotId id = hello.robot_id;

@@ -127,14 +127,14 @@ class StepsTest : public CommandChecksTest {
   static protocol::Command now(protocol::Command command, double life_s = 1) { return in(0, command, life_s); }
   void held(const protocol::Command& command) {
     const std::uint64_t time_us = command.execute_at_robot_us;
-    ahead.push_back({&commands.emplace_back(command), time_us, time_us, true});
+    ahead.push_back({&commands_.emplace_back(command), time_us, time_us, true});
   }
   void on_its_way(const protocol::Command& command) {
-    ahead.push_back(station::unanswered_order(commands.emplace_back(command), at_us(0)));
+    ahead.push_back(station::unanswered_order(commands_.emplace_back(command), at_us(0)));
   }
 
  private:
-  std::deque<protocol::Command> commands;
+  std::deque<protocol::Command> commands_;
 };
 
 TEST_F(StepsTest, ASetpointNowKeepsAStepFromTheNextThatWaits) {

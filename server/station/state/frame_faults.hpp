@@ -10,7 +10,7 @@
 #include "protocol/messages.hpp"
 #include "server/station/state/checked.hpp"
 
-namespace server::link {
+namespace server::station {
 
 // How far the numbers of a robot's next frame can have come. A robot counts without leaps, so one that is far ahead of
 // all before it cannot be: if it were taken, every true one after it would look old. Never above kMaxRobotNumber.
@@ -18,9 +18,9 @@ struct FrameReach {
   static constexpr std::uint64_t kSeqLeap = 1'000'000;         // beyond what any outage within a connection makes
   static constexpr std::uint64_t kTimeLeapUs = 3'600'000'000;  // likewise
 
-  std::uint64_t seq = station::kMaxRobotNumber;
-  std::uint64_t event_seq = station::kMaxRobotNumber;
-  std::uint64_t robot_time_us = station::kMaxRobotNumber;
+  std::uint64_t seq = kMaxRobotNumber;
+  std::uint64_t event_seq = kMaxRobotNumber;
+  std::uint64_t robot_time_us = kMaxRobotNumber;
 
   // Of the frames after a hello or after this frame, which was mended.
   static FrameReach after(const protocol::Hello& hello, std::uint64_t robot_time_us);
@@ -35,11 +35,11 @@ struct FrameFaults {
   bool has_number = true;    // ... but it is known which they are
 
   // What the frame holds, unless it is unusable.
-  std::optional<station::Checked<protocol::Telemetry>> samples;
-  std::optional<station::Checked<protocol::Event>> event;
+  std::optional<Checked<protocol::Telemetry>> samples;
+  std::optional<Checked<protocol::Event>> event;
 };
 
 // Finds them. A number or time that cannot be and is not needed becomes 0, which says nothing.
 FrameFaults mend(protocol::RobotFrame& frame, const FrameReach& reach);
 
-}  // namespace server::link
+}  // namespace server::station

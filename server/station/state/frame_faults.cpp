@@ -1,5 +1,5 @@
 // Numbers that are too large or not finite.
-#include "server/link/frame_faults.hpp"
+#include "server/station/state/frame_faults.hpp"
 
 #include <fmt/format.h>
 
@@ -8,12 +8,10 @@
 
 #include "server/station/state/telemetry_fields.hpp"
 
-namespace server::link {
+namespace server::station {
 namespace {
 
-std::uint64_t reach_from(std::uint64_t number, std::uint64_t leap) {
-  return std::min(number + leap, station::kMaxRobotNumber);
-}
+std::uint64_t reach_from(std::uint64_t number, std::uint64_t leap) { return std::min(number + leap, kMaxRobotNumber); }
 
 void add(FrameFaults& faults, const char* cause, std::string words) {
   if (faults.count++ > 0) return;
@@ -49,13 +47,13 @@ void mend(protocol::Telemetry& batch, const FrameReach& reach, FrameFaults& faul
   if (is_above_its_own(faults, "oldest_seq", batch.oldest_seq, batch.first_seq)) batch.oldest_seq = 0;
   if (is_too_large(faults, "first_robot_time_us", batch.first_robot_time_us, reach.robot_time_us))
     faults.is_unusable = true;
-  if (batch.period_us == 0 || batch.period_us > station::kMaxPeriodUs) {
+  if (batch.period_us == 0 || batch.period_us > kMaxPeriodUs) {
     add(faults, "out_of_range",
         fmt::format("period_us is {} from sample {} on, it must be 1 to {}", batch.period_us, batch.first_seq,
-                    station::kMaxPeriodUs));
+                    kMaxPeriodUs));
     faults.is_unusable = true;
   }
-  station::for_each_batch_field_of<station::FieldKind::number>([&](const auto& field) {
+  for_each_batch_field_of<FieldKind::number>([&](const auto& field) {
     const bool is_there = field.has == nullptr || batch.*field.has;
     if (is_there) check_finite(faults, field.name, batch.*field.wire, batch.first_seq);
   });
@@ -92,11 +90,11 @@ FrameFaults mend(protocol::RobotFrame& frame, const FrameReach& reach) {
   switch (frame.which_body) {
     case rheonaut_RobotFrame_telemetry_tag:
       mend(frame.body.telemetry, reach, faults);
-      if (!faults.is_unusable) faults.samples = station::Checked<protocol::Telemetry>{frame.body.telemetry};
+      if (!faults.is_unusable) faults.samples = Checked<protocol::Telemetry>{frame.body.telemetry};
       break;
     case rheonaut_RobotFrame_event_tag:
       mend(frame.body.event, reach, faults);
-      if (!faults.is_unusable) faults.event = station::Checked<protocol::Event>{frame.body.event};
+      if (!faults.is_unusable) faults.event = Checked<protocol::Event>{frame.body.event};
       break;
     case rheonaut_RobotFrame_heartbeat_tag: {
       protocol::Heartbeat& answer = frame.body.heartbeat;
@@ -110,4 +108,4 @@ FrameFaults mend(protocol::RobotFrame& frame, const FrameReach& reach) {
   return faults;
 }
 
-}  // namespace server::link
+}  // namespace server::station
