@@ -92,8 +92,8 @@ const steps = {
     await ben.mouse.down();
     await until('the duty runs', async () => (await robot()).sample.duty > 0.1);
     await kill(ben);
-    await until('the motor is off', async () => (await robot()).sample.duty === 0, 2000);
-    await until('control has expired', async () => (await holder()) === '', 10_000);
+    await until('the motor is off', async () => (await robot()).sample.duty === 0);
+    await until('control has expired', async () => (await holder()) === '');
     assert.ok((await events('control_expired')).length > 0);
     await enter_setpoint(anna, 60);
     await until('anna is in control', async () => (await holder()).includes('anna'));
@@ -110,17 +110,17 @@ const steps = {
     await slow.mouse.down();
     await until('the duty runs', async () => (await robot()).sample.duty > 0.1);
     bench.proxy.say('outage 5');
-    await until('the motor is off', async () => (await robot()).sample.duty === 0, 2000);
-    await until('control has expired', async () => (await holder()) === '', 10_000);
+    await until('the motor is off', async () => (await robot()).sample.duty === 0);
+    await until('control has expired', async () => (await holder()) === '');
     await slow.mouse.up();
     const off = await robot();
     await until('ten seconds of samples, the late bytes among them', async () => {
       const now = await robot();
       assert.equal(now.sample.duty, 0, 'nothing stale moves the motor');
       return now.next_seq > off.next_seq + 1000;
-    }, 30_000);
+    });
     assert.equal(await holder(), '', 'and nothing stale takes control');
-    await until('the page has healed', async () => (await slow.locator('.readouts.stale').count()) === 0, 15_000);
+    await until('the page has healed', async () => (await slow.locator('.readouts.stale').count()) === 0);
   },
 };
 

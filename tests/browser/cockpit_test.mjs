@@ -24,7 +24,7 @@ function watch(of, into = faults) {
 
 // ---- a small vocabulary
 
-const text = (selector) => page.locator(selector).first().innerText({ timeout: 5000 });
+const text = (selector) => page.locator(selector).first().innerText();
 const number = async (name) => Number((await text(`#numeral-${name} output`)).replace('\u2212', '-'));
 const mode = () => page.locator('.annunciator').getAttribute('data-mode');
 const seen_mode = (wanted) => until(`the page shows ${wanted}`, async () => (await mode()) === wanted);
@@ -98,7 +98,7 @@ const steps = {
   async 'auto brings the robot to 100 mm'() {
     await engage_auto(100);
     await page.locator('#setpoint-outcome.done').waitFor();
-    await until('the position arrives', async () => Math.abs((await number('position')) - 100) < 2, 15_000);
+    await until('the position arrives', async () => Math.abs((await number('position')) - 100) < 2);
     assert.equal(await number('setpoint'), 100);
     const drawn = await page.evaluate(() => {
       const canvas = document.querySelector('.strip-0 canvas');
@@ -118,7 +118,7 @@ const steps = {
       await page.fill('#setpoint-entry', String(setpoint_mm));
       await page.press('#setpoint-entry', 'Enter');
       const until_seq = (await robot()).next_seq + seconds * 100;
-      await until('the experiment goes on', async () => (await robot()).next_seq >= until_seq, 30_000);
+      await until('the experiment goes on', async () => (await robot()).next_seq >= until_seq);
     }
     assert.ok((await robot()).next_seq > first);
     await page.mouse.move(5, 5);
@@ -172,7 +172,7 @@ const steps = {
     let attempts = 1;
     while (!(await outlives_its_first_lease())) assert.ok(++attempts <= 4, 'a lease was renewed');
     await page.mouse.up();
-    await until('the duty ends', async () => (await robot()).sample.duty === 0, 1000);
+    await until('the duty ends', async () => (await robot()).sample.duty === 0);
     await until('the page shows it', async () => (await number('duty')) === 0);
   },
 
@@ -181,7 +181,7 @@ const steps = {
     await page.locator('.top-bar .lamp.caution').waitFor();
     await page.locator('.readouts.stale').waitFor();
     await bench.start_station();
-    await page.locator('.top-bar .lamp.good').waitFor({ timeout: 15_000 });
+    await page.locator('.top-bar .lamp.good').waitFor();
     await fresh();
     await seen_mode('manual');
     await nothing_moves('after the station came back');

@@ -16,9 +16,9 @@ const stops = async () =>
 async function escape_stops(what, press = () => page.keyboard.press('Escape')) {
   const before = await stops();
   await press();
-  await until(`Escape stops with ${what}`, async () => (await stops()) > before, 3000);
+  await until(`Escape stops with ${what}`, async () => (await stops()) > before);
   // The stop is in the list when it is sent, the latch when the robot has answered.
-  await until(`the robot is latched with ${what}`, async () => (await robot()).emergency_id !== null, 3000);
+  await until(`the robot is latched with ${what}`, async () => (await robot()).emergency_id !== null);
   assert.equal(await stops(), before + 1, `${what}: one stop`);
 }
 

@@ -151,7 +151,7 @@ const steps = {
     const large = await operator.context().newPage();
     await make_large(large);
     await large.goto(bench.http);
-    await until('all are known', async () => (await large.locator('.robot-entry').count()) === kKnown + kFleet + 1, 20_000);
+    await until('all are known', async () => (await large.locator('.robot-entry').count()) === kKnown + kFleet + 1);
     await entry(large, kRobot).click();
     await large.click('#stop-all');
     await large.locator('#stop-line[data-phase=kept]').waitFor();

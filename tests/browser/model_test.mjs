@@ -11,7 +11,7 @@ let page;
 const model = (gain_m_s) => ({ model_gain_m_s: [gain_m_s, 0.02, 0, 0], model_time_constant_s: [0.1, 0.5, 3, 15], fit_error: 0.0021, plant: {} });
 const foot = () => page.locator('#numeral-position .foot').innerText();
 const notice = () => page.locator('#model-line p').innerText();
-const says = (what, probe, part) => until(part, async () => (await probe()).includes(part), 15_000).catch(async () => assert.fail(`${what}: ${await probe()}`));
+const says = (what, probe, part) => until(part, async () => (await probe()).includes(part)).catch(async () => assert.fail(`${what}: ${await probe()}`));
 
 const steps = {
   async 'a fluid that is named brings its model, and the page says whose it is'() {
@@ -35,7 +35,7 @@ const steps = {
     assert.equal((await bench.post(`/robots/${kRobot}/commands`, { kind: 'set_parameter', name: 'model_gain_3_m_s', value: 0.01 })).status, 200);
     await says('numeral', foot, 'model assumed');
     await says('notice', notice, 'The model of water is not in force: the robot has taken it back: a parameter was changed.');
-    await page.locator('#take-control').waitFor({ timeout: 10_000 }); // the script has gone silent
+    await page.locator('#take-control').waitFor(); // the script has gone silent
     await page.click('#send-model');
     await says('numeral', foot, 'model of water, confirmed');
   },
