@@ -190,6 +190,14 @@ void add_verdict(const std::vector<Fit>& fits, std::vector<std::string>& warning
   }
 }
 
+// Of least squares; its slope is the weight of each position.
+double best_offset_m(OutputErrorSearch& search, const SearchPoint& point) {
+  const std::vector<int> free = search.free_parameters(Structure::fractional);
+  const auto at = std::ranges::find(free, kOffset);
+  const Eigen::VectorXd slope = search.jacobians(Structure::fractional, point).front().col(at - free.begin());
+  return slope.dot(search.residuals(point).front()) / slope.squaredNorm();
+}
+
 }  // namespace
 
 Recording make_recording(std::span<const double> time_s, std::span<const double> duty,
@@ -250,6 +258,28 @@ Identification identify(const Recording& recording, const IdentificationOptions&
   add(identifiability_warnings(recording, result.best, options));
   add_verdict(result.compared, warnings);
   return result;
+}
+
+Fit evaluate(const FractionalModel& model, const Recording& recording, const IdentificationOptions& options) {
+  check(recording);
+  IdentificationOptions fixed = options;
+  fixed.structure = Structure::fractional;
+  fixed.longest_dead_time_s = model.dead_time_s;  // so that the output can be as late
+  check(fixed, recording);
+  OutputErrorSearch search(recording, fixed);
+  if (!recording.acceleration_m_s2.empty()) search.find_sensor(1);
+  SearchResult found;
+  found.point = search.start(Structure::fractional, 0);
+  found.point.model = normalised(model);
+  found.point.offset_m = 0;
+  if (search.channels().front() == Channel::position && options.fits_offset) {
+    found.point.offset_m = best_offset_m(search, found.point);
+  }
+  found.end = search.sensor_search_end().value_or(SearchEnd::converged);
+  Fit fit = summary(search, recording, options.cost, Structure::fractional, found);
+  fit.one_sigma = {};
+  fit.correlation = {};
+  return fit;
 }
 
 }  // namespace control

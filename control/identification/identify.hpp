@@ -53,4 +53,9 @@ struct Identification {
 
 Identification identify(const Recording& recording, const IdentificationOptions& options);
 
+// How well a model follows a recording that it was not fitted to. Its parameters stay as they are, divided by b3;
+// fitted are the position's offset, and of an acceleration the sensor's bias, lag and clock. The dead time of a model
+// is in the sensor's lag then. No parameter has a sigma. The options' structure and dead time are not looked at.
+Fit evaluate(const FractionalModel& model, const Recording& recording, const IdentificationOptions& options = {});
+
 }  // namespace control

@@ -15,14 +15,16 @@ constexpr std::size_t kPositionsPage = 10'000;
 
 template <class Point>
 asio::awaitable<Result<std::vector<Point>>> AnalysisService::gather(storage::RunId run,
-                                                                    Point (*of)(const storage::StoredSample&)) {
+                                                                    Point (*of)(const storage::StoredSample&),
+                                                                    std::size_t limit) {
   std::vector<Point> points;
   std::optional<storage::SampleCursor> after;
   do {
     const auto page = co_await history_.samples(run, after, kPage);
     if (!page) co_return std::unexpected{page.error()};
-    if (points.size() + page->samples.size() > kMaxAnalysedSamples) {
-      co_return fail(ErrorCode::invalid, fmt::format("the run has more than {} samples", kMaxAnalysedSamples),
+    if (points.size() + page->samples.size() > limit) {
+      co_return fail(ErrorCode::invalid,
+                     fmt::format("run {} has more than {} samples; make a run of a part of it", run, limit),
                      "run_too_long");
     }
     for (const storage::StoredSample& sample : page->samples) points.push_back(of(sample));
@@ -57,16 +59,36 @@ asio::awaitable<Result<RunMeasures>> AnalysisService::measures(storage::RunId ru
   if (!gathered) co_return std::unexpected{gathered.error()};
   auto found = co_await reference_of(run);
   if (!found) co_return std::unexpected{found.error()};
-  auto job = [points = std::move(*gathered), reference = std::move(*found)] {
-    RunMeasures measures;
-    measures.steps = measure_steps(points, reference ? &*reference : nullptr);
-    if (reference) {
-      measures.reference = reference->reference;
-      measures.estimate_error = estimate_error(points, *reference);
-    }
-    return measures;
+  auto job = [points = std::move(*gathered), reference = std::move(*found)] { return measures_of(points, reference); };
+  co_return co_await maths_.run(std::move(job));
+}
+
+asio::awaitable<Result<RunMetrics>> AnalysisService::metrics(storage::Run run) {
+  auto gathered = co_await gather(run.id, run_point);
+  if (!gathered) co_return std::unexpected{gathered.error()};
+  auto found = co_await reference_of(run.id);
+  if (!found) co_return std::unexpected{found.error()};
+  auto job = [points = std::move(*gathered), reference = std::move(*found), run = std::move(run)] {
+    std::vector<StepPoint> steps;
+    steps.reserve(points.size());
+    for (const RunPoint& point : points) steps.push_back(point.step);
+    return RunMetrics{run_figures(points, run), measures_of(steps, reference)};
   };
   co_return co_await maths_.run(std::move(job));
+}
+
+asio::awaitable<Result<std::optional<storage::OutsideReference>>> AnalysisService::reference(storage::RunId run) {
+  auto find = [run](SQLite::Database& database) { return storage::find_reference(database, run); };
+  co_return co_await history_.reader().ask(std::move(find));
+}
+
+asio::awaitable<Result<RunSamples>> AnalysisService::samples(storage::RunId run, std::size_t limit) {
+  constexpr auto kWhole = [](const storage::StoredSample& stored) { return stored; };
+  auto gathered = co_await gather<storage::StoredSample>(run, kWhole, limit);
+  if (!gathered) co_return std::unexpected{gathered.error()};
+  auto found = co_await reference_of(run);
+  if (!found) co_return std::unexpected{found.error()};
+  co_return RunSamples{std::move(*gathered), std::move(*found)};
 }
 
 asio::awaitable<Result<PlacedReference>> AnalysisService::place(storage::RunId run, ReferenceRequest request,

@@ -7,20 +7,20 @@
 #include <utility>
 #include <vector>
 
+#include "server/analysis/metrics/run_figures.hpp"
+#include "server/analysis/metrics/run_steps.hpp"
 #include "server/analysis/reference_import.hpp"
 #include "server/analysis/run_recording.hpp"
-#include "server/analysis/run_steps.hpp"
 #include "server/runtime/result.hpp"
 #include "server/runtime/worker.hpp"
 #include "server/storage/query/history.hpp"
 
 namespace server::analysis {
 
-// Steps by the outside reference where there is one, and how far the robot's own position was from it.
-struct RunMeasures {
-  std::vector<MeasuredStep> steps;
-  std::optional<storage::OutsideReference> reference;
-  std::optional<EstimateError> estimate_error;  // over all of the reference
+// All that is recorded of a run.
+struct RunSamples {
+  std::vector<storage::StoredSample> samples;
+  std::optional<storage::StoredReference> reference;
 };
 
 class AnalysisService {
@@ -29,6 +29,15 @@ class AnalysisService {
 
   // The run's steps in order; invalid when the run has more samples than kMaxAnalysedSamples.
   boost::asio::awaitable<Result<RunMeasures>> measures(storage::RunId run);
+
+  // Steps and figures; errors as above.
+  boost::asio::awaitable<Result<RunMetrics>> metrics(storage::Run run);
+
+  // What is said of the position that was measured from outside, if the run has one.
+  boost::asio::awaitable<Result<std::optional<storage::OutsideReference>>> reference(storage::RunId run);
+
+  // In order of span and seq; invalid when there are more than so many.
+  boost::asio::awaitable<Result<RunSamples>> samples(storage::RunId run, std::size_t limit);
 
   // Puts an outside record onto the clock of the run; errors of place_reference, and as above.
   boost::asio::awaitable<Result<PlacedReference>> place(storage::RunId run, ReferenceRequest request,
@@ -46,7 +55,8 @@ class AnalysisService {
   // Of every sample of the run, what `of` makes of it.
   template <class Point>
   boost::asio::awaitable<Result<std::vector<Point>>> gather(storage::RunId run,
-                                                            Point (*of)(const storage::StoredSample&));
+                                                            Point (*of)(const storage::StoredSample&),
+                                                            std::size_t limit = kMaxAnalysedSamples);
 
   storage::History& history_;
   runtime::WorkerThread& maths_;

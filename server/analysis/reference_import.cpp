@@ -2,7 +2,6 @@
 #include "server/analysis/reference_import.hpp"
 
 #include <fmt/format.h>
-#include <sodium.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 
 #include "server/analysis/csv_columns.hpp"
 #include "server/analysis/reference_unit.hpp"
+#include "server/runtime/sha256.hpp"
 
 namespace server::analysis {
 namespace {
@@ -288,14 +288,6 @@ Result<void> find_zero(const Given& inside, const OwnRecord& own, storage::Outsi
   return {};
 }
 
-std::string sha256_of(const std::string& text) {
-  unsigned char hash[crypto_hash_sha256_BYTES];
-  crypto_hash_sha256(hash, reinterpret_cast<const unsigned char*>(text.data()), text.size());
-  std::string hexadecimal;
-  for (const unsigned char byte : hash) hexadecimal += fmt::format("{:02x}", byte);
-  return hexadecimal;
-}
-
 std::string plus_minus(std::optional<double> sd, double scale, const char* unit) {
   return sd ? fmt::format(" ± {:.2g} {} (2 sd)", 2 * scale * *sd, unit) : std::string{" (how exact is not known)"};
 }
@@ -325,7 +317,7 @@ Result<PlacedReference> place_reference(const ReferenceRequest& request, std::sp
   storage::OutsideReference& made = placed.reference;
   made.span = own->span;
   made.source = request.source;
-  made.sha256 = sha256_of(request.csv);
+  made.sha256 = runtime::sha256_of(request.csv);
   if (const auto found = find_clock(request, *given, *own, marker, made); !found) {
     return std::unexpected{found.error()};
   }

@@ -228,19 +228,6 @@ std::optional<std::string> driven_before(const Piece& piece) {
 
 }  // namespace
 
-StepPoint step_point(const storage::StoredSample& stored) {
-  StepPoint point;
-  point.span = stored.span;
-  point.seq = stored.seq;
-  point.robot_time_us = stored.robot_time_us;
-  point.position_m = stored.sample.position_m;
-  point.disturbance_m = station::or_nan(stored.disturbance_m);
-  point.setpoint_m = stored.setpoint_m.value_or(0);
-  point.steered = stored.mode == rheonaut_MODE_AUTO && stored.setpoint_m.has_value();
-  point.position_sd_m = station::or_nan(stored.position_sd_m);
-  return point;
-}
-
 std::string channels_reason(double largest_position_sd_m) {
   if (!(largest_position_sd_m > 0)) return "the position is known: position_sd_m is 0 throughout";
   return fmt::format(

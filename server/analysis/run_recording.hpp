@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "control/identification/identify.hpp"
-#include "server/analysis/run_steps.hpp"
+#include "server/analysis/metrics/run_steps.hpp"
 #include "server/runtime/result.hpp"
 #include "server/storage/runs/outside_reference.hpp"
 #include "server/storage/samples/stored_sample.hpp"
@@ -16,8 +16,6 @@
 namespace server::analysis {
 
 inline constexpr std::size_t kMaxAnalysedSamples = 2'000'000;  // 5 h at 100 Hz; 80 MB
-
-StepPoint step_point(const storage::StoredSample& stored);
 
 // Which part of a run: seconds of robot time since the first sample of the span.
 struct RunWindow {

@@ -84,6 +84,11 @@ CommandLine parse_command_line(int argc, char** argv) {
   offer<TokenCommand>(app, "token", "API tokens of a station: create, list, revoke", line);
   offer<RobotCommand>(app, "robot", "Robots of a station: enroll, list, revoke", line);
   offer<FluidCommand>(app, "fluid", "Fluids of a station and their models: list, model, remove-model", line);
+  offer<JobCommand>(app, "job", "Computations of a station on its runs: begin, list, show, cancel", line);
+  offer<DesignCommand>(app, "design", "Models and controllers that a station keeps: list, save, show, export, compare",
+                       line);
+  offer<MetricsQuestion>(app, "metrics", "Figures and steps of a run; several runs side by side, with their spread",
+                         line);
   offer<Model>(app, "model", "Show the motion models, compute the hydrodynamic one, fit the motor", line);
   offer<Bode>(app, "bode", "Crossover, margins and frequency response of the open loop", line);
   offer<Step>(app, "step", "Velocity and position after a step of duty, or any duty", line);

@@ -32,6 +32,9 @@ RecordingParts::RecordingParts(asio::io_context& loop, runtime::Clock& clock, ru
       markers{clock, recorder, reader},
       references{clock, recorder, reader},
       fluid_models{clock, recorder},
+      metrics{recorder, reader},
+      designs{clock, recorder, reader},
+      jobs{loop, clock, recorder, reader},
       history{options.path, recorder, readers},
       exports{options.path, recorder, exports_worker},
       disk_watch{clock, readers, options.path, space_limits(config)},
@@ -58,6 +61,7 @@ asio::awaitable<RestoredState> RecordingParts::open() {
   co_await runs.load();
   co_await references.open();
   co_await fluid_models.load();
+  co_await jobs.load();
   co_await retention.open();
   co_await disk_watch.look();
   co_return restored;
@@ -70,6 +74,7 @@ void RecordingParts::spawn(runtime::TaskGroup& tasks) {
   tasks.spawn("digester", digester.run());
   tasks.spawn("interrupted runs", runs.finish_loading());
   tasks.spawn("disk watch", disk_watch.run());
+  tasks.spawn("jobs", jobs.run());
   tasks.spawn("backups", backups.run());
   tasks.spawn("retention", retention.run());
 }

@@ -12,12 +12,15 @@
 #include "server/runtime/tasks.hpp"
 #include "server/station/station.hpp"
 #include "server/storage/database/database_reader.hpp"
+#include "server/storage/designs/designs.hpp"
 #include "server/storage/ingest/recorder.hpp"
+#include "server/storage/jobs/jobs.hpp"
 #include "server/storage/query/history.hpp"
 #include "server/storage/runs/fluid_models.hpp"
 #include "server/storage/runs/markers.hpp"
 #include "server/storage/runs/outside_references.hpp"
 #include "server/storage/runs/run_digester.hpp"
+#include "server/storage/runs/run_metrics.hpp"
 #include "server/storage/runs/runs.hpp"
 #include "server/storage/upkeep/backup.hpp"
 #include "server/storage/upkeep/disk_watch.hpp"
@@ -57,6 +60,9 @@ struct RecordingParts {
   Markers markers;
   OutsideReferences references;
   FluidModels fluid_models;
+  MetricsOfRuns metrics;
+  Designs designs;
+  Jobs jobs;
   History history;
   History exports;  // the same on a worker of its own, so that no page waits behind an export
   DiskWatch disk_watch;

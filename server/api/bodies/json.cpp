@@ -127,6 +127,23 @@ Result<void> Members::time(const char* name, std::optional<std::int64_t>& into) 
   return {};
 }
 
+Result<std::optional<double>> Members::optional_number(const char* name, Range<double> allowed) const {
+  if (!has(name)) return std::nullopt;
+  const auto value = number(name);
+  if (!value) return std::unexpected{value.error()};
+  if (*value >= allowed.minimum && *value <= allowed.maximum) return *value;
+  return fail(ErrorCode::invalid,
+              fmt::format("{} must be from {} to {}, is {}", name, allowed.minimum, allowed.maximum, *value),
+              "out_of_range");
+}
+
+Result<bool> Members::flag(const char* name) const {
+  if (!has(name)) return false;
+  const json& value = object_.at(name);
+  if (value.is_boolean()) return value.get<bool>();
+  return fail(ErrorCode::bad_request, fmt::format("{} must be true or false", name), "wrong_type");
+}
+
 Result<std::uint64_t> Members::id(const char* name) const {
   if (!has(name)) return missing(name);
   const json& value = object_.at(name);

@@ -1,6 +1,6 @@
 // All routes of the API, grouped by noun: routes_station, routes_recording, routes_robots, routes_commands,
 // routes_in_force, routes_fluids, routes_runs, routes_markers, routes_references, routes_samples, routes_overview,
-// routes_exports, routes_accounts, routes_audit.
+// routes_exports, routes_accounts, routes_audit; and those of server/api/analysis.
 //
 // Held to openapi.yaml both ways by a test. Each answer is a coroutine that can be called without a server.
 #pragma once
@@ -49,7 +49,6 @@ class Station;
 }  // namespace server::station
 
 namespace server::storage {
-class RunDigester;
 class DiskWatch;
 class FluidModels;
 class HeadWatch;
@@ -57,6 +56,7 @@ class History;
 class Markers;
 class OutsideReferences;
 class Recorder;
+class RunDigester;
 class Runs;
 struct OutsideReference;
 struct RecordingParts;

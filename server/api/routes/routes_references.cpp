@@ -16,19 +16,8 @@ namespace {
 
 constexpr std::int64_t kMaxPagePositions = 10'000;
 
-// Of a member that may be left out: none then.
-Result<std::optional<double>> number_within(const Members& body, const char* name, Range<double> allowed) {
-  if (!body.has(name)) return std::nullopt;
-  const auto value = body.number(name);
-  if (!value) return std::unexpected{value.error()};
-  if (*value >= allowed.minimum && *value <= allowed.maximum) return *value;
-  return fail(ErrorCode::invalid,
-              fmt::format("{} must be from {} to {}, is {}", name, allowed.minimum, allowed.maximum, *value),
-              "out_of_range");
-}
-
 Result<double> needed_number(const Members& body, const char* name, Range<double> allowed) {
-  const auto value = number_within(body, name, allowed);
+  const auto value = body.optional_number(name, allowed);
   if (!value) return std::unexpected{value.error()};
   if (*value) return **value;
   return fail(ErrorCode::bad_request, fmt::format("{} is missing", name), "missing_member");
@@ -51,9 +40,9 @@ Result<void> parse_marker_clock(const Members& body, analysis::ReferenceClockReq
 }
 
 Result<void> parse_search(const Members& body, analysis::ReferenceClockRequest& clock) {
-  const auto from_s = number_within(body, "from_s", numbers("ReferenceClock.from_s"));
+  const auto from_s = body.optional_number("from_s", numbers("ReferenceClock.from_s"));
   if (!from_s) return std::unexpected{from_s.error()};
-  const auto to_s = number_within(body, "to_s", numbers("ReferenceClock.to_s"));
+  const auto to_s = body.optional_number("to_s", numbers("ReferenceClock.to_s"));
   if (!to_s) return std::unexpected{to_s.error()};
   clock.search.from_s = from_s->value_or(clock.search.from_s);
   clock.search.to_s = to_s->value_or(clock.search.to_s);
@@ -92,18 +81,10 @@ Result<analysis::ReferenceClockRequest> parse_clock(const json& given) {
     return fail(ErrorCode::invalid, "clock.method is none of offset, utc, marker and correlation", "out_of_range");
   }
   if (!read) return std::unexpected{read.error()};
-  const auto sd_s = number_within(body, "sd_s", numbers("ReferenceClock.sd_s"));
+  const auto sd_s = body.optional_number("sd_s", numbers("ReferenceClock.sd_s"));
   if (!sd_s) return std::unexpected{sd_s.error()};
   clock.sd_s = *sd_s;
   return clock;
-}
-
-// False where it is missing.
-Result<bool> flag(const Members& body, const char* name) {
-  if (!body.has(name)) return false;
-  const json& value = body.object().at(name);
-  if (value.is_boolean()) return value.get<bool>();
-  return fail(ErrorCode::bad_request, fmt::format("{} must be true or false", name), "wrong_type");
 }
 
 Result<analysis::ReferenceRequest> parse_reference(const std::string& text) {
@@ -125,12 +106,12 @@ Result<analysis::ReferenceRequest> parse_reference(const std::string& text) {
     if (!span) return std::unexpected{span.error()};
     request.span = static_cast<std::uint32_t>(*span);
   }
-  const auto keeps_zero = flag(*body, "keep_zero"), is_in_metres = flag(*body, "metres");
+  const auto keeps_zero = body->flag("keep_zero"), is_in_metres = body->flag("metres");
   if (!keeps_zero) return std::unexpected{keeps_zero.error()};
   if (!is_in_metres) return std::unexpected{is_in_metres.error()};
   request.keeps_zero = *keeps_zero;
   request.is_in_metres = *is_in_metres;
-  const auto sd_m = number_within(*body, "sd_m", numbers("ReferenceBody.sd_m"));
+  const auto sd_m = body->optional_number("sd_m", numbers("ReferenceBody.sd_m"));
   if (!sd_m) return std::unexpected{sd_m.error()};
   request.sd_m = *sd_m;
   if (!body->has("reason")) return request;

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "server/analysis/analysis_service.hpp"
+#include "server/analysis/metrics/metrics_json.hpp"
 #include "server/api/bodies/json.hpp"
 #include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/routes.hpp"
@@ -178,45 +179,16 @@ http::Answer get_snapshot(RunRoutes parts, http::Request request) {
   co_return http::json_response(200, out);
 }
 
-json to_json(const std::optional<analysis::EstimateError>& error) {
-  if (!error) return nullptr;
-  return {{"rms_m", error->rms_m},
-          {"worst_m", error->worst_m},
-          {"within_2_sd", error->within_2_sd},
-          {"samples", error->samples}};
-}
-
-json to_json(const analysis::MeasuredStep& step) {
-  json out;
-  out["cause"] = text(step.cause);
-  out["span"] = step.span;
-  out["first_seq"] = step.first_seq;
-  out["last_seq"] = step.last_seq;
-  out["at_s"] = step.at_s;
-  out["start_m"] = base::decimal(static_cast<float>(step.start_m));
-  out["target_m"] = base::decimal(static_cast<float>(step.target_m));
-  out["band_m"] = step.band_m;
-  out["position_source"] = position_source(step);
-  out["position_sd_m"] = base::decimal(static_cast<float>(step.position_sd_m));
-  out["estimate_error"] = to_json(step.estimate_error);
-  out["settling_s"] = number_or_null(step.metrics.settling_s);
-  out["overshoot_percent"] = step.metrics.overshoot_percent;
-  out["peak_m"] = step.metrics.peak_m;
-  out["rise_10_90_s"] = number_or_null(step.metrics.rise_10_90_s);
-  out["steady_state_error_m"] = step.metrics.steady_state_error_m;
-  return out;
-}
-
 http::Answer get_step_metrics(RunRoutes parts, http::Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return http::problem(id.error());
   const auto measures = co_await parts.analysis.measures(*id);
   if (!measures) co_return http::problem(measures.error());
   json list = json::array();
-  for (const analysis::MeasuredStep& step : measures->steps) list.push_back(to_json(step));
+  for (const analysis::MeasuredStep& step : measures->steps) list.push_back(analysis::json_of(step));
   json out{{"steps", std::move(list)}};
   out["reference"] = measures->reference ? api::to_json(*measures->reference) : json(nullptr);
-  out["estimate_error"] = to_json(measures->estimate_error);
+  out["estimate_error"] = analysis::json_of(measures->estimate_error);
   co_return http::json_response(200, out);
 }
 

@@ -31,7 +31,7 @@ CLI::Validator robot_id() {
   return CLI::Validator{refuse, ""};
 }
 
-int list(const nlohmann::json& robots, bool as_json, std::ostream& out) {
+int list_robots(const nlohmann::json& robots, bool as_json, std::ostream& out) {
   if (as_json) {
     fmt::print(out, "{}\n", robots.dump(2));
     return 0;
@@ -93,7 +93,7 @@ int run(const RobotCommand& options, std::ostream& out) {
   if (options.settings.of != RobotSettingsCommand::Of::nothing) return run(options.settings, out);
   if (options.act == RobotCommand::Act::enroll) return enroll(options, out);
   AccountAccess accounts{options.data_dir, AccountAccess::Missing::refuse};
-  if (options.act == RobotCommand::Act::list) return list(accounts.enrolments(), options.json, out);
+  if (options.act == RobotCommand::Act::list) return list_robots(accounts.enrolments(), options.json, out);
   if (options.act == RobotCommand::Act::revoke) {
     accounts.revoke_robot(options.robot_id);
   } else {

@@ -20,7 +20,7 @@ CLI::App* offer(CLI::App& command, TokenCommand& options, TokenCommand::Act act,
   return sub;
 }
 
-int list(const nlohmann::json& tokens, bool as_json, std::ostream& out) {
+int list_tokens(const nlohmann::json& tokens, bool as_json, std::ostream& out) {
   if (as_json) {
     fmt::print(out, "{}\n", tokens.dump(2));
     return 0;
@@ -76,7 +76,7 @@ void add_options(CLI::App& command, TokenCommand& options) {
 int run(const TokenCommand& options, std::ostream& out) {
   if (options.act == TokenCommand::Act::create) return create(options, out);
   AccountAccess accounts{options.data_dir, AccountAccess::Missing::refuse};
-  if (options.act == TokenCommand::Act::list) return list(accounts.tokens(), options.json, out);
+  if (options.act == TokenCommand::Act::list) return list_tokens(accounts.tokens(), options.json, out);
   accounts.revoke_token(options.name);
   fmt::print(out, "Token {} was revoked\n", options.name);
   return 0;

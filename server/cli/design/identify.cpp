@@ -13,8 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "control/discretisation/estimator_model.hpp"
-#include "server/analysis/control_json.hpp"
+#include "server/analysis/identification_answer.hpp"
 #include "server/cli/terminal/options.hpp"
 
 namespace server::cli {
@@ -91,14 +90,6 @@ void add_plan(CLI::App& command, Identify& options) {
       ->check(non_negative());
 }
 
-std::vector<std::string> channels_of(const control::Recording& recording) {
-  std::vector<std::string> names;
-  if (!recording.position_m.empty()) names.emplace_back("position_m");
-  if (!recording.velocity_m_s.empty()) names.emplace_back("velocity_m_s");
-  if (!recording.acceleration_m_s2.empty()) names.emplace_back("acceleration_m_s2");
-  return names;
-}
-
 analysis::RunRecording recording_for(const Identify& options) {
   if (options.csv) return read_recording(*options.csv, options.window.with_velocity);
   if (!options.run.run) {
@@ -118,11 +109,11 @@ bool show_progress(const control::Progress& progress) {
   return true;
 }
 
-control::Identification search(const Identify& options, const control::Recording& recording) {
+control::Identification search(const Identify& options, const analysis::RunRecording& recorded) {
   control::IdentificationOptions settings = options.search;
   const bool is_watched = ::isatty(STDERR_FILENO) != 0;
   if (is_watched) settings.on_progress = show_progress;
-  control::Identification found = control::identify(recording, settings);
+  control::Identification found = analysis::identify_run(recorded, settings);
   if (is_watched) fmt::print(stderr, "\r\x1b[K");
   return found;
 }
@@ -136,48 +127,6 @@ void write_sensor(std::ostream& out, const control::SensorFit& sensor) {
   fmt::print(out, "its bias wandered by {} m/s²; {}\n", cell(sensor.bias_range_m_s2, 2),
              sensor.readings_are_recovered ? "its readings are recovered from the record, without the robot's own bias"
                                            : "the robot's own bias is still in the record, and fitted as a bias");
-}
-
-constexpr double kLargerThanSaid = 1.5;  // residuals, in sd of the reference
-
-// What a position from outside adds to the doubts.
-constexpr double kSuspiciousClockS = 0.005;
-
-void add_outside_doubts(const analysis::RunRecording& recorded, const Identify& options,
-                        control::Identification& found) {
-  if (!(recorded.position_sd_m > 0)) return;
-  const double residual_sd_m = found.best.residual_sd;
-  if (residual_sd_m > kLargerThanSaid * recorded.position_sd_m) {
-    found.warnings.push_back(fmt::format(
-        "the residuals, {:.2g} mm, are larger than the position from outside is said to be exact, {:.2g} mm: "
-        "its clock, its scale or the model is not right",
-        1e3 * residual_sd_m, 1e3 * recorded.position_sd_m));
-  }
-  // A dead time of the plant and a camera's clock that is ahead look the same: positions come late after the duty.
-  const control::Fit& best = found.best;
-  const double clock_sigma_s = best.position_clock_sigma_s.value_or(0);
-  if (std::abs(best.position_clock_s) > std::max(kSuspiciousClockS, 3 * clock_sigma_s)) {
-    found.warnings.push_back(fmt::format(
-        "the outside position's clock came out {:.0f} ms off: {}", 1e3 * best.position_clock_s,
-        best.position_clock_s < 0
-            ? "if it is not, that is a dead time of the plant; search with --dead-time-s"
-            : "the positions come before the duty that moves the robot, as no plant does; correct the clock's offset"));
-  }
-  if (options.search.longest_dead_time_s > 0) {
-    found.warnings.emplace_back("the dead time contains what is left of the error of the outside position's clock");
-  }
-}
-
-// Of positions from outside, by the sds that their importer gave them.
-struct ChiSquare {
-  double value = 0, degrees_of_freedom = 0;
-};
-
-std::optional<ChiSquare> chi_square_of(const analysis::RunRecording& recorded, const Fit& fit) {
-  const auto positions = static_cast<double>(fit.position_residual_m.size());
-  if (!(recorded.position_sd_m > 0) || !std::isfinite(fit.residual_sd)) return std::nullopt;
-  const double relative_sd = fit.residual_sd / recorded.position_sd_m;
-  return ChiSquare{positions * relative_sd * relative_sd, positions - fit.free_parameters};
 }
 
 void write_parameters(std::ostream& out, const Fit& fit) {
@@ -213,12 +162,6 @@ void write_compared(std::ostream& out, std::span<const Fit> compared) {
   table.write(out);
 }
 
-// None of a search that found no finite model.
-std::optional<control::EstimatorModel> estimator_of(const Fit& fit) {
-  if (!std::isfinite(fit.sse)) return std::nullopt;
-  return control::estimator_model(fit.model);
-}
-
 void write_estimator(std::ostream& out, const control::EstimatorModel& model) {
   if (model.is_met) {
     fmt::print(out,
@@ -228,16 +171,6 @@ void write_estimator(std::ostream& out, const control::EstimatorModel& model) {
   } else {
     fmt::print(out, "the robot's estimator cannot use it: {}\n", model.reason);
   }
-}
-
-// In metres, also of positions that are weighed in the fit.
-analysis::OrderedJson residuals_json(const Fit& fit, const analysis::RunRecording& recorded) {
-  std::vector<double> position_m = fit.position_residual_m;
-  const std::vector<double>& sd_m = recorded.recording.position_sd_m;
-  for (std::size_t i = 0; i < sd_m.size(); ++i) position_m[i] *= sd_m[i] / recorded.position_sd_m;
-  return {{"position_m", position_m},
-          {"velocity_m_s", fit.velocity_residual_m_s},
-          {"acceleration_m_s2", fit.acceleration_residual_m_s2}};
 }
 
 }  // namespace
@@ -264,29 +197,18 @@ int run(const Identify& options, std::ostream& out) {
   if (options.plan.is_wanted) return run_plan(options, out);
   const analysis::RunRecording recorded = recording_for(options);
   for (const std::string& warning : recorded.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
-  control::Identification found = search(options, recorded.recording);
-  found.warnings.insert(found.warnings.end(), recorded.warnings.begin(), recorded.warnings.end());
-  add_outside_doubts(recorded, options, found);
-  const std::optional<control::EstimatorModel> estimator = estimator_of(found.best);
+  const control::Identification found = search(options, recorded);
   if (options.form.is_json) {
-    analysis::OrderedJson answer = analysis::json_of(found);
-    answer["estimator"] = estimator ? analysis::json_of(*estimator) : analysis::OrderedJson{};
-    answer["channels"] = channels_of(recorded.recording);
-    answer["channels_reason"] = recorded.channels_reason;
-    if (const auto chi_square = chi_square_of(recorded, found.best)) {
-      answer["position_chi_square"] = chi_square->value;
-      answer["position_degrees_of_freedom"] = chi_square->degrees_of_freedom;
-    }
-    if (options.with_residuals) answer["residuals"] = residuals_json(found.best, recorded);
-    write_json(out, answer);
+    write_json(out, analysis::answer_json(recorded, found, options.with_residuals));
   } else {
-    fmt::print(out, "fitted: {}; {}\n\n", fmt::join(channels_of(recorded.recording), ", "), recorded.channels_reason);
+    fmt::print(out, "fitted: {}; {}\n\n", fmt::join(analysis::channels_of(recorded.recording), ", "),
+               recorded.channels_reason);
     write_parameters(out, found.best);
-    if (const auto chi_square = chi_square_of(recorded, found.best)) {
+    if (const auto chi_square = analysis::chi_square_of(recorded, found.best)) {
       fmt::print(out, "chi-square of the position from outside: {} with {} degrees of freedom\n",
                  fixed(chi_square->value, 1), chi_square->degrees_of_freedom);
     }
-    if (estimator) write_estimator(out, *estimator);
+    if (const auto estimator = analysis::estimator_of(found.best)) write_estimator(out, *estimator);
     write_compared(out, found.compared);
     for (const std::string& warning : found.warnings) fmt::print(out, "\nwarning: {}\n", warning);
   }

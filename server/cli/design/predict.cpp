@@ -8,7 +8,7 @@
 #include <algorithm>
 
 #include "server/analysis/control_json.hpp"
-#include "server/analysis/run_steps.hpp"
+#include "server/analysis/metrics/run_steps.hpp"
 #include "server/cli/design/robustness_table.hpp"
 #include "server/cli/terminal/options.hpp"
 

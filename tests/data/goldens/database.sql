@@ -1,5 +1,5 @@
 PRAGMA application_id = 1382573423;
-PRAGMA user_version = 7;
+PRAGMA user_version = 8;
 BEGIN;
 CREATE TABLE api_token (
   name TEXT PRIMARY KEY,
@@ -938,6 +938,49 @@ INSERT INTO outside_position VALUES(1,5320000,0.016,0.0005);
 INSERT INTO outside_position VALUES(1,5340000,1.80000000000000021094e-02,0.0005);
 INSERT INTO outside_position VALUES(1,5360000,0.02,0.0005);
 INSERT INTO outside_position VALUES(1,5380000,0.022,0.0005);
+CREATE TABLE job (
+  job_id INTEGER PRIMARY KEY,
+  kind TEXT NOT NULL,            -- identify, tune
+  state TEXT NOT NULL,           -- waiting, running, done, failed, cancelled, interrupted: the station stopped before
+  owner TEXT NOT NULL,           -- the actor
+  request TEXT NOT NULL,         -- JSON
+  created_at_us INTEGER NOT NULL,
+  started_at_us INTEGER,         -- NULL: it has not been begun
+  ended_at_us INTEGER,           -- NULL: it has not ended
+  result TEXT,                   -- JSON; of one that is done
+  error TEXT                     -- of one that failed, in words
+);
+CREATE TABLE design (
+  design_id INTEGER PRIMARY KEY,
+  kind TEXT NOT NULL,                       -- model, controller
+  name TEXT NOT NULL,
+  notes TEXT NOT NULL,
+  document TEXT NOT NULL,                   -- JSON, which the command line tools read as a plant or a controller
+  sha256 TEXT NOT NULL,                     -- of document
+  parent_id INTEGER REFERENCES design,      -- of the same kind: this one is a change of it
+  model_id INTEGER REFERENCES design,       -- of a controller: the model that it was designed for
+  options TEXT NOT NULL,                    -- JSON: how it was made
+  made_with TEXT NOT NULL,                  -- version of the program
+  made_by TEXT NOT NULL,                    -- the actor
+  made_at_us INTEGER NOT NULL
+);
+CREATE TABLE design_source (
+  design_id INTEGER NOT NULL REFERENCES design,
+  source INTEGER NOT NULL,                  -- from 0
+  run_id INTEGER NOT NULL,
+  span INTEGER,                             -- NULL: its only one
+  PRIMARY KEY (design_id, source)
+) WITHOUT ROWID;
+CREATE TABLE run_metrics (
+  run_id INTEGER NOT NULL REFERENCES run,
+  version INTEGER NOT NULL,                 -- of the computation
+  program TEXT NOT NULL,                    -- its version
+  samples INTEGER NOT NULL,                 -- of the run, when they were computed
+  reference_us INTEGER NOT NULL,            -- when the outside reference was made that they are measured by; 0: none
+  computed_at_us INTEGER NOT NULL,
+  document TEXT NOT NULL,                   -- JSON
+  PRIMARY KEY (run_id, version)
+) WITHOUT ROWID;
 DELETE FROM sqlite_sequence;
 INSERT INTO sqlite_sequence VALUES('run',7);
 CREATE INDEX boot_by_robot ON boot(robot_id);
@@ -1060,4 +1103,5 @@ FROM event LEFT JOIN boot USING (boot_key);
 CREATE INDEX outside_reference_by_run ON outside_reference(run_id);
 CREATE UNIQUE INDEX outside_reference_in_use ON outside_reference(run_id)
   WHERE completed_at_us IS NOT NULL AND removed_at_us IS NULL;
+CREATE INDEX design_source_by_run ON design_source(run_id);
 COMMIT;

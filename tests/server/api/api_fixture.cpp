@@ -48,6 +48,7 @@ ApiTest::ApiTest(config::Config of_station, storage::RecorderOptions of_recorder
   clock.add_worker(exports);
   clock.add_worker(maths);
   clock.add_worker(recording.backups.checker());
+  clock.add_worker(recording.jobs.worker());
   recording.connect(station);
   station.add_sink(live);
   bool started = false;

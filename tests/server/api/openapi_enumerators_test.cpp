@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "server/analysis/run_steps.hpp"
+#include "server/analysis/metrics/run_steps.hpp"
 #include "server/identity/account.hpp"
 #include "server/station/state/station_state.hpp"
 #include "server/storage/runs/outside_reference.hpp"

@@ -1,5 +1,5 @@
 // Recordings cut into steps.
-#include "server/analysis/run_steps.hpp"
+#include "server/analysis/metrics/run_steps.hpp"
 
 #include <gtest/gtest.h>
 

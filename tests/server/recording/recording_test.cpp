@@ -47,6 +47,7 @@ void RecordingTest::start(storage::RecorderOptions options, const config::Record
   recording_ = std::make_unique<storage::RecordingParts>(loop_, clock_, disk_, readers_, exports_worker_, checkpoints_,
                                                          options, config);
   clock_.add_worker(recording_->backups.checker());
+  clock_.add_worker(recording_->jobs.worker());
   recorder_ = &recording_->recorder;
   runs_ = &recording_->runs;
   history_ = &recording_->history;
@@ -76,7 +77,10 @@ void RecordingTest::stop() {
 void RecordingTest::kill() {
   if (tasks_) tasks_->stop();
   clock_.settle();
-  if (recording_) clock_.remove_worker(recording_->backups.checker());
+  if (recording_) {
+    clock_.remove_worker(recording_->backups.checker());
+    clock_.remove_worker(recording_->jobs.worker());
+  }
   recorder_ = nullptr;
   runs_ = nullptr;
   history_ = nullptr;

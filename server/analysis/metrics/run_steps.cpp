@@ -1,5 +1,5 @@
 // Cuts a recording into steps.
-#include "server/analysis/run_steps.hpp"
+#include "server/analysis/metrics/run_steps.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -261,6 +261,30 @@ std::optional<EstimateError> estimate_error(const std::vector<StepPoint>& points
     }
   }
   return comparison.end();
+}
+
+StepPoint step_point(const storage::StoredSample& stored) {
+  StepPoint point;
+  point.span = stored.span;
+  point.seq = stored.seq;
+  point.robot_time_us = stored.robot_time_us;
+  point.position_m = stored.sample.position_m;
+  point.disturbance_m = station::or_nan(stored.disturbance_m);
+  point.setpoint_m = stored.setpoint_m.value_or(0);
+  point.steered = stored.mode == rheonaut_MODE_AUTO && stored.setpoint_m.has_value();
+  point.position_sd_m = station::or_nan(stored.position_sd_m);
+  return point;
+}
+
+RunMeasures measures_of(const std::vector<StepPoint>& points,
+                        const std::optional<storage::StoredReference>& reference) {
+  RunMeasures measures;
+  measures.steps = measure_steps(points, reference ? &*reference : nullptr);
+  if (reference) {
+    measures.reference = reference->reference;
+    measures.estimate_error = estimate_error(points, *reference);
+  }
+  return measures;
 }
 
 }  // namespace server::analysis

@@ -15,6 +15,7 @@
 
 #include "control/responses/step_metrics.hpp"
 #include "server/storage/runs/outside_reference.hpp"
+#include "server/storage/samples/stored_sample.hpp"
 
 namespace server::analysis {
 
@@ -29,6 +30,8 @@ struct StepPoint {
   bool steered = false;     // in auto mode with a setpoint
   float position_sd_m = 0;  // of an estimated position; 0: known
 };
+
+StepPoint step_point(const storage::StoredSample& stored);
 
 // How far the robot's own position is from the one that was measured from outside.
 struct EstimateError {
@@ -66,5 +69,13 @@ std::vector<MeasuredStep> measure_steps(const std::vector<StepPoint>& points,
 // Over all of the reference; none where the two have no time in common.
 std::optional<EstimateError> estimate_error(const std::vector<StepPoint>& points,
                                             const storage::StoredReference& reference);
+
+// Steps by the outside reference where there is one, and how far the robot's own position was from it.
+struct RunMeasures {
+  std::vector<MeasuredStep> steps;
+  std::optional<storage::OutsideReference> reference;
+  std::optional<EstimateError> estimate_error;  // over all of the reference
+};
+RunMeasures measures_of(const std::vector<StepPoint>& points, const std::optional<storage::StoredReference>& reference);
 
 }  // namespace server::analysis

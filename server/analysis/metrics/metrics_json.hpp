@@ -1,0 +1,25 @@
+// The metrics of runs as JSON: of one run its figures and steps, of several the same beside each other.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+
+#include "server/analysis/metrics/run_figures.hpp"
+#include "server/storage/runs/run.hpp"
+
+namespace server::analysis {
+
+// Of the meaning of figures and steps: a number that changes when the same samples would give others.
+inline constexpr int kMetricsVersion = 1;
+
+nlohmann::json json_of(const std::optional<EstimateError>& error);
+nlohmann::json json_of(const MeasuredStep& step);
+nlohmann::json json_of(const RunMetrics& metrics);  // figures by name, steps, estimate_error
+
+// Each figure, and each measure of each step, over the runs: values, mean, sd, confidence, repeatability limit. Steps
+// are those of every run with the same number and cause; `documents` are what json_of(RunMetrics) gives, one for each
+// run.
+nlohmann::json comparison_json(std::span<const storage::Run> runs, std::span<const nlohmann::json> documents);
+
+}  // namespace server::analysis

@@ -1,0 +1,168 @@
+// Reads the members one by one; what is left out has the defaults of the command line.
+#include "server/api/bodies/job_body.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+#include <limits>
+
+#include "base/json_text.hpp"
+#include "server/analysis/control_json.hpp"
+#include "server/api/bodies/limits.hpp"
+
+namespace server::api {
+using nlohmann::json;
+
+namespace {
+
+// One of the values by its text; `into` stays as it is when the member is left out.
+template <class Value, std::size_t size>
+Result<void> read_word(const Members& body, const char* name, const std::array<Value, size>& values, Value& into) {
+  if (!body.has(name)) return {};
+  const auto word = body.text(name, {0, kMaxWordBytes});
+  if (!word) return std::unexpected{word.error()};
+  std::vector<std::string> words;
+  for (const Value value : values) {
+    using analysis::text;
+    if (*word == text(value)) {
+      into = value;
+      return {};
+    }
+    words.emplace_back(text(value));
+  }
+  return fail(ErrorCode::invalid, fmt::format("{} is '{}', allowed are {}", name, *word, fmt::join(words, ", ")),
+              "out_of_range");
+}
+
+Result<void> read_number(const Members& body, const char* name, Range<double> allowed, double& into) {
+  const auto value = body.optional_number(name, allowed);
+  if (!value) return std::unexpected{value.error()};
+  into = value->value_or(into);
+  return {};
+}
+
+struct WindowNames {
+  const char *span, *from_s, *to_s;
+};
+
+Result<void> read_window(const Members& body, const WindowNames& names, analysis::RunWindow& window) {
+  if (body.has(names.span)) {
+    const auto span = body.integer(names.span, integers("IdentifyJobBody.span"));
+    if (!span) return std::unexpected{span.error()};
+    window.span = static_cast<std::uint32_t>(*span);
+  }
+  if (const auto read = read_number(body, names.from_s, numbers("IdentifyJobBody.from_s"), window.from_s); !read) {
+    return read;
+  }
+  if (const auto read = read_number(body, names.to_s, numbers("IdentifyJobBody.to_s"), window.to_s); !read) return read;
+  if (window.from_s < window.to_s) return {};
+  return fail(
+      ErrorCode::invalid,
+      fmt::format("{} is {}, it must be below {}, which is {}", names.from_s, window.from_s, names.to_s, window.to_s),
+      "out_of_range");
+}
+
+Result<void> read_search(const Members& body, control::IdentificationOptions& search) {
+  using control::Cost;
+  using control::Structure;
+  constexpr std::array kStructures{Structure::first_order, Structure::second_order, Structure::fractional};
+  constexpr std::array kCosts{Cost::least_squares, Cost::absolute_error};
+  if (body.has("structure")) {
+    Structure structure{};
+    if (const auto read = read_word(body, "structure", kStructures, structure); !read) return read;
+    search.structure = structure;
+  }
+  if (const auto read = read_word(body, "cost", kCosts, search.cost); !read) return read;
+  if (body.has("fits_offset")) {
+    const auto fits_offset = body.flag("fits_offset");
+    if (!fits_offset) return std::unexpected{fits_offset.error()};
+    search.fits_offset = *fits_offset;
+  }
+  const Range<double> time_limit_s = numbers("IdentifyJobBody.time_limit_s");
+  if (const auto read = read_number(body, "time_limit_s", time_limit_s, search.time_limit_s); !read) return read;
+  const Range<double> dead_time_s = numbers("IdentifyJobBody.dead_time_s");
+  if (const auto read = read_number(body, "dead_time_s", dead_time_s, search.longest_dead_time_s); !read) return read;
+  const auto lag_s = body.optional_number("sensor_lag_s", numbers("IdentifyJobBody.sensor_lag_s"));
+  if (!lag_s) return std::unexpected{lag_s.error()};
+  search.sensor_lag_s = *lag_s;
+  return {};
+}
+
+Result<void> read_validation(const Members& body, analysis::IdentifyRequest& request) {
+  if (body.has("validation_run_id")) {
+    const auto run = body.integer("validation_run_id", integers("IdentifyJobBody.validation_run_id"));
+    if (!run) return std::unexpected{run.error()};
+    request.validation_run = *run;
+  }
+  constexpr WindowNames kNames{"validation_span", "validation_from_s", "validation_to_s"};
+  for (const char* name : {kNames.span, kNames.from_s, kNames.to_s}) {
+    if (!body.has(name) || request.validation_run) continue;
+    return fail(ErrorCode::invalid, fmt::format("{} needs validation_run_id", name), "out_of_range");
+  }
+  return read_window(body, kNames, request.validation_window);
+}
+
+Result<analysis::IdentifyRequest> identify_request(const Members& body) {
+  using analysis::ChannelChoice;
+  if (const auto known =
+          body.only({"kind", "run_id", "span", "from_s", "to_s", "channels", "structure", "cost", "fits_offset",
+                     "dead_time_s", "sensor_lag_s", "time_limit_s", "with_velocity", "residuals", "validation_run_id",
+                     "validation_span", "validation_from_s", "validation_to_s"});
+      !known) {
+    return std::unexpected{known.error()};
+  }
+  analysis::IdentifyRequest request;
+  const auto run = body.integer("run_id", integers("IdentifyJobBody.run_id"));
+  if (!run) return std::unexpected{run.error()};
+  request.run = *run;
+  if (const auto read = read_window(body, {"span", "from_s", "to_s"}, request.window); !read) {
+    return std::unexpected{read.error()};
+  }
+  constexpr std::array kChannels{ChannelChoice::best, ChannelChoice::outside, ChannelChoice::robot};
+  if (const auto read = read_word(body, "channels", kChannels, request.channels); !read) {
+    return std::unexpected{read.error()};
+  }
+  const auto with_velocity = body.flag("with_velocity"), residuals = body.flag("residuals");
+  if (!with_velocity) return std::unexpected{with_velocity.error()};
+  if (!residuals) return std::unexpected{residuals.error()};
+  request.window.with_velocity = request.validation_window.with_velocity = *with_velocity;
+  request.with_residuals = *residuals;
+  if (const auto read = read_search(body, request.search); !read) return std::unexpected{read.error()};
+  if (const auto read = read_validation(body, request); !read) return std::unexpected{read.error()};
+  return request;
+}
+
+}  // namespace
+
+Result<JobBody> parse_job(const std::string& text) {
+  const auto body = Members::parse(text, {});
+  if (!body) return std::unexpected{body.error()};
+  const auto kind = body->text("kind", {0, kMaxWordBytes});
+  if (!kind) return std::unexpected{kind.error()};
+  if (*kind != "identify") {
+    return fail(ErrorCode::invalid, fmt::format("kind is '{}', allowed is identify", *kind), "unknown_kind");
+  }
+  auto request = identify_request(*body);
+  if (!request) return std::unexpected{request.error()};
+  return JobBody{*kind, std::move(*request), base::dump(body->object())};
+}
+
+json to_json(const storage::Job& job) {
+  json out;
+  out["job_id"] = job.id;
+  out["kind"] = job.request.kind;
+  out["state"] = text(job.state);
+  out["owner"] = job.request.owner;
+  out["request"] = json::parse(job.request.document, nullptr, false);
+  out["created_at_us"] = job.created_at_us;
+  out["started_at_us"] = job.started_at_us ? json(*job.started_at_us) : json(nullptr);
+  out["ended_at_us"] = job.ended_at_us ? json(*job.ended_at_us) : json(nullptr);
+  out["error"] = job.error.empty() ? json(nullptr) : json(job.error);
+  out["cancelling"] = job.is_being_cancelled;
+  out["progress"] = nullptr;
+  if (job.progress) out["progress"] = {{"share", job.progress->share}, {"stage", job.progress->stage}};
+  return out;
+}
+
+}  // namespace server::api

@@ -1,0 +1,178 @@
+// One subcommand an act, each a request to the station; who waits asks again until the job has ended.
+#include "server/cli/accounts/job.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "server/cli/accounts/account_access.hpp"
+#include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/options.hpp"
+
+namespace server::cli {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kLook_ms = 500;  // between two looks at the progress
+constexpr const char* kJobs = "/api/v1/jobs";
+
+CLI::App* offer(CLI::App& command, JobCommand& options, JobCommand::Act act, const char* name, const char* purpose) {
+  CLI::App* sub = command.add_subcommand(name, purpose);
+  sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->add_flag("--json", options.json, "As JSON");
+  sub->callback([&options, act] { options.act = act; });
+  return sub;
+}
+
+void offer_number(CLI::App* sub, JobCommand& options) {
+  sub->add_option("job", options.job, "Its number, as `rheonaut job list` shows it")
+      ->required()
+      ->check(whole(1, std::numeric_limits<std::int64_t>::max()));
+}
+
+json ask(const JobCommand& options, const std::string& method, const std::string& target, const json& body = nullptr) {
+  const StationAnswer answer = StationClient{options.data_dir}.ask(method, target, body);
+  if (answer.status == 200 || answer.status == 202) return answer.body;
+  throw std::runtime_error{fmt::format("the station refused: {}", answer.body.value("detail", "no reason"))};
+}
+
+json read_request(const std::filesystem::path& file) {
+  std::ifstream from_file;
+  if (file != "-") from_file.open(file);
+  std::istream& in = file == "-" ? std::cin : from_file;
+  if (!in) throw std::runtime_error{fmt::format("cannot read '{}'", file.string())};
+  json request = json::parse(std::string{std::istreambuf_iterator<char>{in}, {}}, nullptr, false);
+  if (request.is_object()) return request;
+  throw std::runtime_error{
+      fmt::format("'{}' is not a JSON object such as {{\"kind\":\"identify\",\"run_id\":1}}", file.string())};
+}
+
+std::string progress_of(const json& job) {
+  const json& progress = job.at("progress");
+  if (progress.is_null()) return {};
+  return fmt::format("{:.0f} %, {}", 100 * progress.at("share").get<double>(), progress.at("stage").get<std::string>());
+}
+
+json wait_for(const JobCommand& options, std::int64_t id) {
+  const bool is_watched = ::isatty(STDERR_FILENO) != 0;
+  for (;;) {
+    json job = ask(options, "GET", fmt::format("{}/{}?wait_ms={}", kJobs, id, kLook_ms));
+    if (!job.at("ended_at_us").is_null()) {
+      if (is_watched) fmt::print(stderr, "\r\x1b[K");
+      return job;
+    }
+    if (is_watched) {
+      fmt::print(stderr, "\r\x1b[Kjob {}: {} {}", id, job.at("state").get<std::string>(), progress_of(job));
+      std::fflush(stderr);
+    }
+  }
+}
+
+// Of an ended job with its result; the result alone is what the tools read.
+int write_ended(const JobCommand& options, const json& job, std::ostream& out) {
+  const auto state = job.at("state").get<std::string>();
+  if (options.json) {
+    fmt::print(out, "{}\n", job.dump(2));
+  } else if (state == "done") {
+    fmt::print(out, "{}\n", job.at("result").dump(2));
+  } else {
+    const json& error = job.at("error");
+    fmt::print(out, "job {} {}{}\n", job.at("job_id").get<std::int64_t>(), state,
+               error.is_null() ? "" : ": " + error.get<std::string>());
+  }
+  return state == "done" ? 0 : kJobNotDone;
+}
+
+void write_line(std::ostream& out, const json& job) {
+  fmt::print(out, "{:>6}  {:<11}  {}  {}  {}  {}\n", job.at("job_id").get<std::int64_t>(),
+             job.at("state").get<std::string>(), job.at("kind").get<std::string>(), time_text(job.at("created_at_us")),
+             job.at("owner").get<std::string>(), progress_of(job));
+}
+
+int list(const JobCommand& options, std::ostream& out) {
+  const json jobs = ask(options, "GET", kJobs).at("jobs");
+  if (options.json) {
+    fmt::print(out, "{}\n", jobs.dump(2));
+    return 0;
+  }
+  if (jobs.empty()) fmt::print(out, "There is no job\n");
+  for (const json& job : jobs) write_line(out, job);
+  return 0;
+}
+
+int show(const JobCommand& options, std::ostream& out) {
+  const json job =
+      options.waits ? wait_for(options, options.job) : ask(options, "GET", fmt::format("{}/{}", kJobs, options.job));
+  if (!job.at("ended_at_us").is_null()) return write_ended(options, job, out);
+  if (options.json) {
+    fmt::print(out, "{}\n", job.dump(2));
+  } else {
+    write_line(out, job);
+  }
+  return 0;
+}
+
+int begin(const JobCommand& options, std::ostream& out) {
+  const json job = ask(options, "POST", kJobs, read_request(options.file));
+  const auto id = job.at("job_id").get<std::int64_t>();
+  if (options.waits) return write_ended(options, wait_for(options, id), out);
+  if (options.json) {
+    fmt::print(out, "{}\n", job.dump(2));
+  } else {
+    fmt::print(out, "job {} waits; `rheonaut job show {} --wait` prints its result\n", id, id);
+  }
+  return 0;
+}
+
+int cancel(const JobCommand& options, std::ostream& out) {
+  const json job = ask(options, "POST", fmt::format("{}/{}/cancel", kJobs, options.job));
+  if (options.json) {
+    fmt::print(out, "{}\n", job.dump(2));
+  } else {
+    fmt::print(out, "job {} {}\n", options.job,
+               job.at("ended_at_us").is_null() ? "is being cancelled" : "is cancelled");
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, JobCommand& options) {
+  command.require_subcommand(1);
+  CLI::App* begin = offer(command, options, JobCommand::Act::begin, "begin", "Ask for a computation on recorded runs");
+  begin->add_option("file", options.file, "The request as JSON (docs/api.md, Jobs); -: standard input")
+      ->required()
+      ->check(named());
+  begin->add_flag("--wait", options.waits, "Wait for its end and print its result");
+  begin->footer(
+      "Exit status 5: the job failed, was cancelled or interrupted.\n"
+      "Example: echo '{\"kind\":\"identify\",\"run_id\":1}' | rheonaut job begin - --wait --data lab");
+  offer(command, options, JobCommand::Act::list, "list", "List the jobs, newest first");
+  CLI::App* show = offer(command, options, JobCommand::Act::show, "show", "Show one job, or its result");
+  offer_number(show, options);
+  show->add_flag("--wait", options.waits, "Wait for its end");
+  offer_number(offer(command, options, JobCommand::Act::cancel, "cancel", "End a job that waits or runs"), options);
+  command.footer("Example: rheonaut job list --data lab");
+}
+
+int run(const JobCommand& options, std::ostream& out) {
+  switch (options.act) {
+    case JobCommand::Act::begin: return begin(options, out);
+    case JobCommand::Act::list: return list(options, out);
+    case JobCommand::Act::show: return show(options, out);
+    case JobCommand::Act::cancel: return cancel(options, out);
+  }
+  return 0;
+}
+
+}  // namespace server::cli

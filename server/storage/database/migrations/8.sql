@@ -1,0 +1,56 @@
+-- The eighth migration: jobs, models and controllers that are kept, metrics of runs.
+--
+-- It adds tables only: no row is rewritten.
+
+-- Computations that somebody asked the station for. Of those that have ended the newest 1000 are kept.
+CREATE TABLE job (
+  job_id INTEGER PRIMARY KEY,
+  kind TEXT NOT NULL,            -- identify, tune
+  state TEXT NOT NULL,           -- waiting, running, done, failed, cancelled, interrupted: the station stopped before
+  owner TEXT NOT NULL,           -- the actor
+  request TEXT NOT NULL,         -- JSON
+  created_at_us INTEGER NOT NULL,
+  started_at_us INTEGER,         -- NULL: it has not been begun
+  ended_at_us INTEGER,           -- NULL: it has not ended
+  result TEXT,                   -- JSON; of one that is done
+  error TEXT                     -- of one that failed, in words
+);
+
+-- A model or a controller that somebody keeps. Rows are added, and never changed or removed: a change is a new row with a
+-- parent.
+CREATE TABLE design (
+  design_id INTEGER PRIMARY KEY,
+  kind TEXT NOT NULL,                       -- model, controller
+  name TEXT NOT NULL,
+  notes TEXT NOT NULL,
+  document TEXT NOT NULL,                   -- JSON, which the command line tools read as a plant or a controller
+  sha256 TEXT NOT NULL,                     -- of document
+  parent_id INTEGER REFERENCES design,      -- of the same kind: this one is a change of it
+  model_id INTEGER REFERENCES design,       -- of a controller: the model that it was designed for
+  options TEXT NOT NULL,                    -- JSON: how it was made
+  made_with TEXT NOT NULL,                  -- version of the program
+  made_by TEXT NOT NULL,                    -- the actor
+  made_at_us INTEGER NOT NULL
+);
+
+-- The runs that a design was found from; a run may be discarded later.
+CREATE TABLE design_source (
+  design_id INTEGER NOT NULL REFERENCES design,
+  source INTEGER NOT NULL,                  -- from 0
+  run_id INTEGER NOT NULL,
+  span INTEGER,                             -- NULL: its only one
+  PRIMARY KEY (design_id, source)
+) WITHOUT ROWID;
+CREATE INDEX design_source_by_run ON design_source(run_id);
+
+-- The metrics of a run as they were computed; replaced when the run has another reference, or more samples.
+CREATE TABLE run_metrics (
+  run_id INTEGER NOT NULL REFERENCES run,
+  version INTEGER NOT NULL,                 -- of the computation
+  program TEXT NOT NULL,                    -- its version
+  samples INTEGER NOT NULL,                 -- of the run, when they were computed
+  reference_us INTEGER NOT NULL,            -- when the outside reference was made that they are measured by; 0: none
+  computed_at_us INTEGER NOT NULL,
+  document TEXT NOT NULL,                   -- JSON
+  PRIMARY KEY (run_id, version)
+) WITHOUT ROWID;
