@@ -17,6 +17,7 @@
 #include "server/cli/accounts/account_access.hpp"
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/output.hpp"
 
 namespace server::cli {
 namespace {
@@ -59,7 +60,7 @@ json read_request(const std::filesystem::path& file) {
 
 std::string progress_of(const json& job) {
   const json& progress = job.at("progress");
-  if (progress.is_null()) return {};
+  if (progress.is_null()) return "-";
   return fmt::format("{:.0f} %, {}", 100 * progress.at("share").get<double>(), progress.at("stage").get<std::string>());
 }
 
@@ -93,10 +94,13 @@ int write_ended(const JobCommand& options, const json& job, std::ostream& out) {
   return state == "done" ? 0 : kJobNotDone;
 }
 
-void write_line(std::ostream& out, const json& job) {
-  fmt::print(out, "{:>6}  {:<11}  {}  {}  {}  {}\n", job.at("job_id").get<std::int64_t>(),
-             job.at("state").get<std::string>(), job.at("kind").get<std::string>(), time_text(job.at("created_at_us")),
-             job.at("owner").get<std::string>(), progress_of(job));
+void write_jobs(std::ostream& out, const json& jobs) {
+  Table table{{"id", "<state", "<kind", "<begun", "<by", "<progress"}};
+  for (const json& job : jobs) {
+    table.row({fmt::format("{}", job.at("job_id").get<std::int64_t>()), job.at("state"), job.at("kind"),
+               time_text(job.at("created_at_us")), job.at("owner"), progress_of(job)});
+  }
+  table.write(out);
 }
 
 int list(const JobCommand& options, std::ostream& out) {
@@ -105,8 +109,7 @@ int list(const JobCommand& options, std::ostream& out) {
     fmt::print(out, "{}\n", jobs.dump(2));
     return 0;
   }
-  if (jobs.empty()) fmt::print(out, "There is no job\n");
-  for (const json& job : jobs) write_line(out, job);
+  write_jobs(out, jobs);
   return 0;
 }
 
@@ -117,7 +120,7 @@ int show(const JobCommand& options, std::ostream& out) {
   if (options.json) {
     fmt::print(out, "{}\n", job.dump(2));
   } else {
-    write_line(out, job);
+    write_jobs(out, json::array({job}));
   }
   return 0;
 }
