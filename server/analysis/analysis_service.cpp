@@ -77,6 +77,14 @@ asio::awaitable<Result<RunMetrics>> AnalysisService::metrics(storage::Run run) {
   co_return co_await maths_.run(std::move(job));
 }
 
+asio::awaitable<Result<RunTrace>> AnalysisService::trace(storage::RunId run) {
+  auto gathered = co_await gather(run, trace_point);
+  if (!gathered) co_return std::unexpected{gathered.error()};
+  auto found = co_await reference_of(run);
+  if (!found) co_return std::unexpected{found.error()};
+  co_return RunTrace{std::move(*gathered), std::move(*found)};
+}
+
 asio::awaitable<Result<std::optional<storage::OutsideReference>>> AnalysisService::reference(storage::RunId run) {
   auto find = [run](SQLite::Database& database) { return storage::find_reference(database, run); };
   co_return co_await history_.reader().ask(std::move(find));

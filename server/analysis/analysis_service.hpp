@@ -10,12 +10,18 @@
 #include "server/analysis/metrics/run_figures.hpp"
 #include "server/analysis/metrics/run_steps.hpp"
 #include "server/analysis/reference_import.hpp"
+#include "server/analysis/report/trace.hpp"
 #include "server/analysis/run_recording.hpp"
 #include "server/runtime/result.hpp"
 #include "server/runtime/worker.hpp"
 #include "server/storage/query/history.hpp"
 
 namespace server::analysis {
+
+struct RunTrace {
+  std::vector<TracePoint> points;
+  std::optional<storage::StoredReference> reference;
+};
 
 // All that is recorded of a run.
 struct RunSamples {
@@ -32,6 +38,9 @@ class AnalysisService {
 
   // Steps and figures; errors as above.
   boost::asio::awaitable<Result<RunMetrics>> metrics(storage::Run run);
+
+  // For plots; errors as above.
+  boost::asio::awaitable<Result<RunTrace>> trace(storage::RunId run);
 
   // What is said of the position that was measured from outside, if the run has one.
   boost::asio::awaitable<Result<std::optional<storage::OutsideReference>>> reference(storage::RunId run);

@@ -8,6 +8,7 @@
 #include "server/cli/accounts/fluid.hpp"
 #include "server/cli/accounts/job.hpp"
 #include "server/cli/accounts/metrics.hpp"
+#include "server/cli/accounts/report.hpp"
 #include "server/cli/accounts/robot.hpp"
 #include "server/cli/accounts/token.hpp"
 #include "server/cli/accounts/user.hpp"
@@ -43,10 +44,10 @@ struct Answered {
   int exit_code = 0;
 };
 
-using CommandLine =
-    std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
-                 Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
-                 FluidCommand, JobCommand, DesignCommand, MetricsQuestion, ReferenceCommand, ProfileQuestion>;
+using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model,
+                                 Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
+                                 TokenCommand, RobotCommand, FluidCommand, JobCommand, DesignCommand, MetricsQuestion,
+                                 ReportQuestion, ReferenceCommand, ProfileQuestion>;
 
 CommandLine parse_command_line(int argc, char** argv);
 

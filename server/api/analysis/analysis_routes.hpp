@@ -31,6 +31,8 @@ void add_job_routes(http::Router& router, JobRoutes parts);
 struct RunMetricsRoutes {
   analysis::AnalysisService& analysis;
   runtime::Clock& clock;
+  storage::RunDigester& digester;
+  storage::History& history;
   storage::MetricsOfRuns& metrics;
   storage::Runs& runs;
 };

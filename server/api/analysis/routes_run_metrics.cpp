@@ -1,13 +1,17 @@
-// Metrics of a run, computed when they are asked for and kept; several runs side by side.
+// Metrics of a run, computed when they are asked for and kept; several runs side by side; a run as a report.
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "base/json_text.hpp"
+#include "server/analysis/analysis_service.hpp"
 #include "server/analysis/metrics/metrics_json.hpp"
+#include "server/analysis/report/run_report.hpp"
 #include "server/api/analysis/analysis_routes.hpp"
 #include "server/api/bodies/json.hpp"
 #include "server/api/bodies/query_params.hpp"
+#include "server/storage/query/history.hpp"
+#include "server/storage/runs/run_digester.hpp"
 #include "server/storage/runs/run_metrics.hpp"
 #include "server/storage/runs/runs.hpp"
 
@@ -18,6 +22,7 @@ using nlohmann::json;
 namespace {
 
 constexpr std::size_t kMostComparedRuns = 50;
+constexpr std::size_t kAuditEntriesLookedAt = 1000;
 
 struct MetricsOfRun {
   storage::Run run;
@@ -108,6 +113,41 @@ http::Answer compare_runs(RunMetricsRoutes parts, http::Request request) {
   co_return http::json_response(200, analysis::comparison_json(runs, documents));
 }
 
+// The newest entries of the audit that are of the run.
+asio::awaitable<std::vector<storage::AuditEntry>> audit_of(RunMetricsRoutes parts, const storage::Run& run) {
+  storage::AuditFilter filter;
+  filter.robot_id = run.robot_id;
+  filter.action = "run";
+  filter.limit = kAuditEntriesLookedAt;
+  const std::string subject = fmt::format("{}", run.id);
+  auto page = co_await parts.history.audit(std::move(filter));
+  std::erase_if(page.entries, [&](const storage::AuditEntry& entry) { return entry.note.subject != subject; });
+  co_return std::move(page.entries);
+}
+
+http::Answer get_report(RunMetricsRoutes parts, http::Request request) {
+  const auto id = run_id_of(request);
+  if (!id) co_return http::problem(id.error());
+  auto found = co_await metrics_of(parts, *id);
+  if (!found) co_return http::problem(found.error());
+  auto trace = co_await parts.analysis.trace(*id);
+  if (!trace) co_return http::problem(trace.error());
+  analysis::RunReport report;
+  report.run = std::move(found->run);
+  report.trace = std::move(trace->points);
+  report.reference = std::move(trace->reference);
+  report.metrics = json::parse(found->metrics.document, nullptr, false);
+  const auto digest = co_await parts.digester.find(*id);
+  if (digest && digest->is_final) report.sha256 = digest->digest.sha256;
+  report.audit = co_await audit_of(parts, report.run);
+  report.program = RHEONAUT_VERSION;
+  report.made_at_us = parts.clock.utc_us();
+  auto write = [report = std::move(report)] { return analysis::html_of(report); };
+  http::Response response = http::html_response(200, co_await parts.analysis.compute(std::move(write)));
+  response.headers.emplace_back("Content-Disposition", fmt::format("attachment; filename=\"run-{}.html\"", *id));
+  co_return response;
+}
+
 }  // namespace
 
 void add_run_metrics_routes(http::Router& router, RunMetricsRoutes parts) {
@@ -116,6 +156,7 @@ void add_run_metrics_routes(http::Router& router, RunMetricsRoutes parts) {
     router.add({"GET", pattern, identity::Scope::read, std::move(query), with(parts, answer)});
   };
   add("/api/v1/runs/{run_id}/metrics", {}, get_metrics);
+  add("/api/v1/runs/{run_id}/report.html", {}, get_report);
   add("/api/v1/run-comparison", {"runs"}, compare_runs);
 }
 

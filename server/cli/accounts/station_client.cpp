@@ -47,13 +47,24 @@ std::string token_of(const std::filesystem::path& file) {
 
 using Request = http::request<http::string_body>;
 
+constexpr std::uint64_t kMaxAnswerBytes = 64'000'000;
+
 template <class Stream>
 StationAnswer converse(Stream& stream, const Request& request) {
   http::write(stream, request);
   boost::beast::flat_buffer buffer;
-  http::response<http::string_body> response;
-  http::read(stream, buffer, response);
-  return {static_cast<int>(response.result_int()), nlohmann::json::parse(response.body())};
+  http::response_parser<http::string_body> parser;
+  parser.body_limit(kMaxAnswerBytes);
+  http::read(stream, buffer, parser);
+  http::response<http::string_body> response = parser.release();
+  StationAnswer answer;
+  answer.status = static_cast<int>(response.result_int());
+  if (response[http::field::content_type].starts_with("text/html")) {
+    answer.text = std::move(response.body());
+  } else {
+    answer.body = nlohmann::json::parse(response.body());
+  }
+  return answer;
 }
 
 // SAFETY: another program may have taken the port; it must not get the token.

@@ -11,7 +11,8 @@ namespace server::cli {
 
 struct StationAnswer {
   int status = 0;
-  nlohmann::json body;  // of an error: problem details
+  nlohmann::json body;  // of an error: problem details; null of a page
+  std::string text;     // of an HTML page
 };
 
 class StationClient {

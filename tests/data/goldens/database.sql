@@ -1104,4 +1104,12 @@ CREATE INDEX outside_reference_by_run ON outside_reference(run_id);
 CREATE UNIQUE INDEX outside_reference_in_use ON outside_reference(run_id)
   WHERE completed_at_us IS NOT NULL AND removed_at_us IS NULL;
 CREATE INDEX design_source_by_run ON design_source(run_id);
+CREATE TRIGGER design_is_never_changed BEFORE UPDATE ON design
+BEGIN SELECT RAISE(ABORT, 'a design is never changed: store a new one with a parent'); END;
+CREATE TRIGGER design_is_never_removed BEFORE DELETE ON design
+BEGIN SELECT RAISE(ABORT, 'a design is never removed'); END;
+CREATE TRIGGER design_source_is_never_changed BEFORE UPDATE ON design_source
+BEGIN SELECT RAISE(ABORT, 'the sources of a design are never changed'); END;
+CREATE TRIGGER design_source_is_never_removed BEFORE DELETE ON design_source
+BEGIN SELECT RAISE(ABORT, 'the sources of a design are never removed'); END;
 COMMIT;

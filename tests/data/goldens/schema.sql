@@ -435,6 +435,14 @@ CREATE TABLE design_source (
   PRIMARY KEY (design_id, source)
 ) WITHOUT ROWID;
 CREATE INDEX design_source_by_run ON design_source(run_id);
+CREATE TRIGGER design_is_never_changed BEFORE UPDATE ON design
+BEGIN SELECT RAISE(ABORT, 'a design is never changed: store a new one with a parent'); END;
+CREATE TRIGGER design_is_never_removed BEFORE DELETE ON design
+BEGIN SELECT RAISE(ABORT, 'a design is never removed'); END;
+CREATE TRIGGER design_source_is_never_changed BEFORE UPDATE ON design_source
+BEGIN SELECT RAISE(ABORT, 'the sources of a design are never changed'); END;
+CREATE TRIGGER design_source_is_never_removed BEFORE DELETE ON design_source
+BEGIN SELECT RAISE(ABORT, 'the sources of a design are never removed'); END;
 CREATE TABLE run_metrics (
   run_id INTEGER NOT NULL REFERENCES run,
   version INTEGER NOT NULL,                 -- of the computation

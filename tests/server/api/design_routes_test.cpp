@@ -1,4 +1,5 @@
 // Models and controllers that are kept: what is stored, what is refused, ancestry and comparison.
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
@@ -90,6 +91,17 @@ TEST_F(DesignRoutesTest, AChangeIsANewOneWithAParent) {
   EXPECT_EQ(models[0]["design_id"], 3);
   EXPECT_FALSE(models[0].contains("document"));
   EXPECT_EQ(ask("GET", "/api/v1/designs?before=2").parsed()["designs"].size(), 1U);
+}
+
+TEST_F(DesignRoutesTest, TheDatabaseItselfRefusesAChange) {
+  make_run();
+  ASSERT_EQ(store_model("first", a_model(), {{"runs", {{{"run_id", 1}}}}}).status, 201);
+  SQLite::Database database{(folder.path() / "station.sqlite").string(), SQLite::OPEN_READWRITE};
+  for (const char* change : {"UPDATE design SET name = 'x'", "DELETE FROM design",
+                             "UPDATE design_source SET run_id = 2", "DELETE FROM design_source"}) {
+    EXPECT_THROW(database.exec(change), SQLite::Exception) << change;
+  }
+  EXPECT_EQ(get(1)["name"], "first");
 }
 
 TEST_F(DesignRoutesTest, ListsThoseFoundFromARun) {

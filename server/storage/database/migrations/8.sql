@@ -43,6 +43,15 @@ CREATE TABLE design_source (
 ) WITHOUT ROWID;
 CREATE INDEX design_source_by_run ON design_source(run_id);
 
+CREATE TRIGGER design_is_never_changed BEFORE UPDATE ON design
+BEGIN SELECT RAISE(ABORT, 'a design is never changed: store a new one with a parent'); END;
+CREATE TRIGGER design_is_never_removed BEFORE DELETE ON design
+BEGIN SELECT RAISE(ABORT, 'a design is never removed'); END;
+CREATE TRIGGER design_source_is_never_changed BEFORE UPDATE ON design_source
+BEGIN SELECT RAISE(ABORT, 'the sources of a design are never changed'); END;
+CREATE TRIGGER design_source_is_never_removed BEFORE DELETE ON design_source
+BEGIN SELECT RAISE(ABORT, 'the sources of a design are never removed'); END;
+
 -- The metrics of a run as they were computed; replaced when the run has another reference, or more samples.
 CREATE TABLE run_metrics (
   run_id INTEGER NOT NULL REFERENCES run,

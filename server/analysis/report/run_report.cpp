@@ -1,0 +1,254 @@
+// The sections of a report, each a function.
+#include "server/analysis/report/run_report.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <iterator>
+#include <limits>
+
+#include "server/analysis/report/svg_plot.hpp"
+
+namespace server::analysis {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kMeasured = "#1b2a33";
+constexpr const char* kCommanded = "#b0186f";
+constexpr const char* kOutside = "#12805c";
+constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+
+constexpr const char* kHead = R"(<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'">
+<meta name="viewport" content="width=device-width">
+<title>{title}</title>
+<style>
+body {{ font: 14px/1.45 system-ui, sans-serif; color: #1b2a33; background: #fff; max-width: 800px; margin: 24px auto; padding: 0 20px }}
+h1 {{ font-size: 24px; margin: 0 0 4px }}
+h2 {{ font-size: 16px; margin: 28px 0 8px; border-bottom: 1px solid #c9d2d6; padding-bottom: 3px }}
+p {{ margin: 6px 0 }}
+.quiet {{ color: #5b6b73 }}
+table {{ border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums }}
+th, td {{ text-align: left; padding: 3px 10px 3px 0; vertical-align: top; border-bottom: 1px solid #e6ebed }}
+th {{ font-weight: 600 }}
+td.number, th.number {{ text-align: right }}
+.pairs {{ columns: 2; column-gap: 32px }}
+.pairs div {{ display: flex; justify-content: space-between; gap: 12px; border-bottom: 1px solid #e6ebed; padding: 3px 0; break-inside: avoid }}
+.pairs span:last-child {{ text-align: right; overflow-wrap: anywhere }}
+svg {{ display: block; width: 100%; margin: 6px 0 2px; break-inside: avoid }}
+svg text {{ font: 11px system-ui, sans-serif; fill: #44545c }}
+svg text.title {{ font-weight: 600; fill: #1b2a33 }}
+svg .grid {{ stroke: #e3e9eb; fill: none }}
+svg .frame {{ stroke: #8b9aa1; fill: none }}
+code {{ font: 12px ui-monospace, monospace; overflow-wrap: anywhere }}
+@media print {{ body {{ margin: 0; max-width: none }} h2 {{ break-after: avoid }} tr {{ break-inside: avoid }} }}
+</style></head><body>
+)";
+
+std::string utc_text(std::int64_t at_us) {
+  return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(static_cast<std::time_t>(at_us / 1'000'000)));
+}
+
+std::string number_text(const json& value, int digits = 4) {
+  return value.is_number() ? fmt::format("{:.{}g}", value.get<double>(), digits) : "–";
+}
+
+// Rows of a name and a value; those without a value are left out.
+std::string pairs_of(const std::vector<std::pair<std::string, std::string>>& rows) {
+  std::string out = "<div class=\"pairs\">";
+  for (const auto& [name, value] : rows) {
+    if (value.empty()) continue;
+    out += fmt::format("<div><span>{}</span><span>{}</span></div>", html_escaped(name), html_escaped(value));
+  }
+  return out + "</div>\n";
+}
+
+std::string heading(const RunReport& report) {
+  const storage::Run& run = report.run;
+  std::string out = fmt::format(fmt::runtime(kHead), fmt::arg("title", html_escaped(run.conditions.name)));
+  out += fmt::format("<h1>{}</h1>\n<p class=\"quiet\">Run {} of robot {}, {}{}</p>\n",
+                     html_escaped(run.conditions.name), run.id, html_escaped(run.robot_id), utc_text(run.started_at_us),
+                     run.ended_at_us ? "" : ", not ended when this report was made");
+  if (!run.conditions.verdict.empty()) out += fmt::format("<p>{}</p>\n", html_escaped(run.conditions.verdict));
+  return out;
+}
+
+std::string conditions(const storage::Run& run) {
+  const storage::RunConditions& said = run.conditions;
+  std::string flow = said.mean_flow_m_s ? fmt::format("{} m/s", *said.mean_flow_m_s) : "";
+  std::string out = "<h2>Conditions</h2>\n";
+  out += pairs_of({{"Fluid", said.fluid.empty() ? "not known" : said.fluid},
+                   {"Pump", said.pump_profile},
+                   {"Mean flow", std::move(flow)},
+                   {"Tube", said.tube},
+                   {"Operator", said.operator_name},
+                   {"Experiment", said.profile},
+                   {"Firmware", run.firmware_version},
+                   {"Controller", fmt::format("{} (checksum {:08x})", run.controller_id, run.controller_checksum)},
+                   {"Parameters", fmt::format("checksum {:08x}", run.parameters_checksum)}});
+  if (!said.notes.empty()) out += fmt::format("<p>{}</p>\n", html_escaped(said.notes));
+  return out;
+}
+
+// A line of each sample, with a break where samples are missing.
+template <class Value>
+PlotLine line_of_trace(const RunReport& report, const std::vector<double>& times_s, Value value) {
+  PlotLine line;
+  for (std::size_t i = 0; i < report.trace.size(); ++i) {
+    if (i > 0 && !follows(report.trace[i - 1], report.trace[i])) {
+      line.time_s.push_back(times_s[i]);
+      line.value.push_back(kNothing);
+    }
+    line.time_s.push_back(times_s[i]);
+    line.value.push_back(static_cast<double>(value(report.trace[i])));
+  }
+  return line;
+}
+
+PlotBand band_of_trace(const PlotLine& position, const PlotLine& sd) {
+  PlotBand band{"± 2 sd", kMeasured, position.time_s, {}, {}};
+  for (std::size_t i = 0; i < position.value.size(); ++i) {
+    band.low.push_back(position.value[i] - 2 * sd.value[i]);
+    band.high.push_back(position.value[i] + 2 * sd.value[i]);
+  }
+  return band;
+}
+
+// Where it was measured from outside, on the time axis of the plots.
+PlotLine outside_line(const RunReport& report, const std::vector<double>& times_s) {
+  PlotLine line;
+  const storage::OutsidePositions& positions = report.reference->positions;
+  const auto in_span = [&](const TracePoint& point) { return point.span == report.reference->reference.span; };
+  const auto first = std::ranges::find_if(report.trace, in_span);
+  if (first == report.trace.end()) return line;
+  const double begins_s = times_s[static_cast<std::size_t>(first - report.trace.begin())];
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const auto since_us = static_cast<std::int64_t>(positions.robot_time_us[i] - first->robot_time_us);
+    line.time_s.push_back(begins_s + 1e-6 * static_cast<double>(since_us));
+    line.value.push_back(positions.position_m[i]);
+  }
+  return line;
+}
+
+bool has_value(const PlotLine& line) {
+  return std::ranges::any_of(line.value, [](double value) { return std::isfinite(value); });
+}
+
+Plot position_plot(const RunReport& report, const std::vector<double>& times_s) {
+  Plot plot;
+  plot.title = "Position (m)";
+  plot.height_px = 260;
+  PlotLine position = line_of_trace(report, times_s, [](const TracePoint& point) { return point.position_m; });
+  const PlotLine sd = line_of_trace(report, times_s, [](const TracePoint& point) { return point.position_sd_m; });
+  const bool is_estimate = std::ranges::any_of(sd.value, [](double value) { return value > 0; });
+  if (is_estimate) plot.band = band_of_trace(position, sd);
+  position.label = is_estimate ? "the robot's estimate" : "position";
+  position.colour = kMeasured;
+  PlotLine setpoint = line_of_trace(report, times_s, [](const TracePoint& point) { return point.setpoint_m; });
+  setpoint.label = "setpoint";
+  setpoint.colour = kCommanded;
+  setpoint.is_dashed = true;
+  plot.lines.push_back(std::move(position));
+  if (has_value(setpoint)) plot.lines.push_back(std::move(setpoint));
+  if (report.reference) {
+    PlotLine outside = outside_line(report, times_s);
+    outside.label = "measured from outside";
+    outside.colour = kOutside;
+    outside.is_dots = true;
+    plot.lines.push_back(std::move(outside));
+  }
+  return plot;
+}
+
+template <class Value>
+Plot plot_of(const RunReport& report, const std::vector<double>& times_s, const char* title, const char* label,
+             const char* colour, Value value) {
+  Plot plot;
+  plot.title = title;
+  plot.lines.push_back(line_of_trace(report, times_s, value));
+  plot.lines.back().label = label;
+  plot.lines.back().colour = colour;
+  return plot;
+}
+
+std::string plots(const RunReport& report) {
+  std::string out = "<h2>Record</h2>\n";
+  if (report.trace.empty()) return out + "<p>No sample of this run is stored.</p>\n";
+  const std::vector<double> times_s = times_of(report.trace);
+  std::vector<Plot> all;
+  all.push_back(position_plot(report, times_s));
+  all.push_back(
+      plot_of(report, times_s, "Duty", "commanded", kCommanded, [](const TracePoint& point) { return point.duty; }));
+  all.push_back(plot_of(report, times_s, "Impedance (mV)", "measured", kMeasured,
+                        [](const TracePoint& point) { return point.impedance_mv; }));
+  for (Plot& plot : all) {
+    plot.to_s = times_s.back();
+    out += svg_of(plot);
+  }
+  out +=
+      "<p class=\"quiet\">Seconds since the first sample, by the robot's clock. Where samples are missing, lines are "
+      "interrupted. A position with a band is the robot's own estimate.</p>\n";
+  return out;
+}
+
+std::string figures(const json& metrics) {
+  std::vector<std::pair<std::string, std::string>> rows;
+  for (const auto& [name, value] : metrics.at("figures").items()) rows.emplace_back(name, number_text(value, 6));
+  return "<h2>Figures</h2>\n" + pairs_of(rows);
+}
+
+std::string steps(const json& metrics) {
+  if (metrics.at("steps").empty()) return {};
+  std::string out = "<h2>Steps</h2>\n<table><tr><th>Cause</th>";
+  for (const char* name :
+       {"at (s)", "target (m)", "settling (s)", "overshoot (%)", "rise (s)", "error (m)", "± 2 sd (m)"}) {
+    out += fmt::format("<th class=\"number\">{}</th>", name);
+  }
+  out += "<th>Position</th></tr>\n";
+  for (const json& step : metrics.at("steps")) {
+    const json& sd_m = step.at("position_sd_m");
+    out += fmt::format("<tr><td>{}</td>", html_escaped(step.at("cause")));
+    for (const char* name :
+         {"at_s", "target_m", "settling_s", "overshoot_percent", "rise_10_90_s", "steady_state_error_m"}) {
+      out += fmt::format("<td class=\"number\">{}</td>", number_text(step.at(name)));
+    }
+    out += fmt::format("<td class=\"number\">{}</td><td>{}</td></tr>\n",
+                       sd_m.is_number() ? fmt::format("{:.2g}", 2 * sd_m.get<double>()) : "–",
+                       html_escaped(step.at("position_source")));
+  }
+  return out +
+         "</table>\n<p class=\"quiet\">A step that was measured by the robot's estimate says what the robot "
+         "believed, within ± 2 sd.</p>\n";
+}
+
+std::string origin(const RunReport& report) {
+  std::string out = "<h2>Origin</h2>\n";
+  out += report.sha256.empty()
+             ? std::string{"<p>The run has no certificate yet.</p>\n"}
+             : fmt::format("<p>SHA-256 of the run's certificate: <code>{}</code></p>\n", html_escaped(report.sha256));
+  if (!report.audit.empty()) {
+    out += "<table><tr><th>When</th><th>Who</th><th>What</th><th>Entry</th></tr>\n";
+    for (const storage::AuditEntry& entry : report.audit) {
+      out += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", utc_text(entry.note.by.at_us),
+                         html_escaped(entry.note.by.actor), html_escaped(entry.note.action), entry.entry);
+    }
+    out += "</table>\n";
+  }
+  out += fmt::format("<p class=\"quiet\">Made {} by Rheonaut {}.</p>\n", utc_text(report.made_at_us),
+                     html_escaped(report.program));
+  return out;
+}
+
+}  // namespace
+
+std::string html_of(const RunReport& report) {
+  return heading(report) + conditions(report.run) + plots(report) + steps(report.metrics) + figures(report.metrics) +
+         origin(report) + "</body></html>\n";
+}
+
+}  // namespace server::analysis

@@ -1,0 +1,31 @@
+// A run as one HTML file: conditions, plots, metrics, digest and audit. It loads nothing and has no script.
+//
+// Everything that people or robots wrote is escaped. Pure and slow for long runs: call it on a worker.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/analysis/report/trace.hpp"
+#include "server/storage/audit/audit_chain.hpp"
+#include "server/storage/runs/outside_reference.hpp"
+#include "server/storage/runs/run.hpp"
+
+namespace server::analysis {
+
+struct RunReport {
+  storage::Run run;
+  std::vector<TracePoint> trace;
+  std::optional<storage::StoredReference> reference;
+  nlohmann::json metrics;                  // as json_of(RunMetrics) gives them
+  std::string sha256;                      // of the run's certificate; empty: it has none yet
+  std::vector<storage::AuditEntry> audit;  // of the run, newest first
+  std::string program;                     // its version
+  std::int64_t made_at_us = 0;
+};
+
+std::string html_of(const RunReport& report);
+
+}  // namespace server::analysis

@@ -1,0 +1,42 @@
+// Takes what a plot shows out of stored samples.
+#include "server/analysis/report/trace.hpp"
+
+#include <limits>
+
+namespace server::analysis {
+
+TracePoint trace_point(const storage::StoredSample& stored) {
+  TracePoint point;
+  point.span = stored.span;
+  point.seq = stored.seq;
+  point.robot_time_us = stored.robot_time_us;
+  point.utc_us = stored.utc_us;
+  point.position_m = stored.sample.position_m;
+  point.position_sd_m = station::or_nan(stored.position_sd_m);
+  const bool is_steered = stored.mode == rheonaut_MODE_AUTO && stored.setpoint_m.has_value();
+  point.setpoint_m = is_steered ? *stored.setpoint_m : std::numeric_limits<float>::quiet_NaN();
+  point.duty = stored.sample.duty;
+  point.impedance_mv = stored.sample.impedance_mv;
+  return point;
+}
+
+std::vector<double> times_of(std::span<const TracePoint> points) {
+  std::vector<double> times_s;
+  times_s.reserve(points.size());
+  double span_begins_s = 0;
+  std::uint64_t span_began_us = points.empty() ? 0 : points.front().robot_time_us;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i > 0 && points[i].span != points[i - 1].span) {
+      span_begins_s = 1e-6 * static_cast<double>(points[i].utc_us - points.front().utc_us);
+      span_began_us = points[i].robot_time_us;
+    }
+    times_s.push_back(span_begins_s + 1e-6 * static_cast<double>(points[i].robot_time_us - span_began_us));
+  }
+  return times_s;
+}
+
+bool follows(const TracePoint& before, const TracePoint& after) {
+  return before.span == after.span && after.seq == before.seq + 1;
+}
+
+}  // namespace server::analysis
