@@ -10,6 +10,7 @@
 #include "server/config/data_folder.hpp"
 #include "server/config/endpoint.hpp"
 #include "server/config/station_document.hpp"
+#include "server/experiments/runner/experiments.hpp"
 #include "server/link/robot_listener.hpp"
 #include "server/live/live_feed.hpp"
 #include "server/net/transport_security.hpp"
@@ -19,7 +20,6 @@
 #include "server/storage/recording_parts.hpp"
 
 using namespace server;  // NOLINT: this file is the station, seen from outside
-
 static int serve(const config::Config& config) {
   runtime::start_log(config.log_level);
   config::DataFolder folder{config.data_dir};
@@ -32,7 +32,6 @@ static int serve(const config::Config& config) {
   net::TransportSecurity security{clock, config};  // of both ports
   // Centre: the only owner of live state, and the only way in for commands.
   station::Station station{loop, clock, config.envelope, config.link};
-
   // Out: they get the station's reports and never call it back; only what is durable comes back, through one function.
   const storage::RecorderOptions recorder{config.database(), config.enrolment};
   storage::RecordingParts recording{loop, clock, disk, readers, exports, checkpoints, recorder, config.recording};
@@ -47,17 +46,18 @@ static int serve(const config::Config& config) {
   link::RobotListener robots{
       loop, clock, tasks, station, recording.recorder, at, config.robots_or_any_port, security.robots()};
   station::ModelSender models{loop, tasks, clock, station, recording.fluid_models.in_force()};
-
-  // People and scripts.
+  // People and scripts, and the experiments that act in their name.
+  experiments::Experiments experiments{{loop, clock, tasks, station}, recording, maths, config.allow_unattended};
   analysis::AnalysisService analysis{recording.history, maths};
   const auto options = api::api_options(config, restored.store_id, config::text(robots.endpoint()), security);
-  api::ApiServer api{loop, tasks, clock, options, station, live, recording, analysis};
+  api::ApiServer api{loop, tasks, clock, options, station, live, recording, analysis, experiments};
   if (config.real_time) tasks.spawn("priorities", ask_for_real_time(disk));
   recording.spawn(tasks);
   tasks.spawn("control", station.watch_control());
   tasks.spawn("live feed", live.run());
   tasks.spawn("robots", robots.run());
   tasks.spawn("api", api.run());
+  tasks.spawn("experiments", experiments.run());
   tasks.spawn("signals", tasks.stop_on_signal());
   tasks.spawn("security", security.run());
   tasks.spawn("announcement", folder.announce(clock, {api.address(), options.robots_address, security.to_trust()}));

@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "server/api/analysis/analysis_routes.hpp"
+#include "server/api/experiments/experiment_json.hpp"
 #include "server/api/live_socket.hpp"
 #include "server/config/endpoint.hpp"
 #include "server/storage/recording_parts.hpp"
@@ -45,7 +46,8 @@ ApiOptions api_options(const config::Config& config, std::uint64_t store_id, std
 
 ApiServer::ApiServer(boost::asio::io_context& loop, runtime::TaskGroup& tasks, runtime::Clock& clock,
                      const ApiOptions& options, station::Station& station, live::LiveFeed& live,
-                     storage::RecordingParts& recording, analysis::AnalysisService& analysis)
+                     storage::RecordingParts& recording, analysis::AnalysisService& analysis,
+                     experiments::Experiments& experiments)
     : tasks_{tasks},
       clock_{clock},
       listener_{loop, clock, options.endpoint, options.or_any_port},
@@ -61,11 +63,12 @@ ApiServer::ApiServer(boost::asio::io_context& loop, runtime::TaskGroup& tasks, r
                   return serve_live(std::move(stream), std::move(upgrade), std::move(caller), live_);
                 }},
       server_{tasks, clock, listener_, options.security->http(), guard_, router_, upgrades_} {
-  add_routes(loop, station, live, recording, analysis);
+  add_routes(loop, station, live, recording, analysis, experiments);
 }
 
 void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& station, live::LiveFeed& live,
-                           storage::RecordingParts& recording, analysis::AnalysisService& analysis) {
+                           storage::RecordingParts& recording, analysis::AnalysisService& analysis,
+                           experiments::Experiments& experiments) {
   storage::History& history = recording.history;
   add_station_routes(router_, {auth_, clock_, recording.head_watch, recording.recorder, facts_});
   add_recording_routes(router_, {clock_, recording, station, *facts_.security, tasks_.exceptions()});
@@ -84,6 +87,10 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   add_export_routes(router_,
                     {tasks_, recording.exports, recording.disk_watch, recording.path(), recording.exports_folder()});
   add_account_routes(router_, {accounts_, auth_, logins_, clock_, station, facts_});
+  add_experiment_routes(router_, {clock_, experiments, station});
+  connect_controllers(experiments, recording.designs, station);
+  experiments.set_on_change(
+      [&live](const experiments::ExperimentView& view) { live.publish_experiment(to_json(view)); });
   add_audit_routes(router_, {clock_, history, recording.recorder});
 }
 

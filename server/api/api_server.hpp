@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/api/experiments/experiment_routes.hpp"
 #include "server/api/live_messages.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/config/config.hpp"
@@ -38,7 +39,7 @@ class ApiServer {
   // Opens the port and makes the token. Throws when either is not possible.
   ApiServer(boost::asio::io_context& loop, runtime::TaskGroup& tasks, runtime::Clock& clock, const ApiOptions& options,
             station::Station& station, live::LiveFeed& live, storage::RecordingParts& recording,
-            analysis::AnalysisService& analysis);
+            analysis::AnalysisService& analysis, experiments::Experiments& experiments);
 
   boost::asio::awaitable<void> run();
 
@@ -54,7 +55,8 @@ class ApiServer {
 
  private:
   void add_routes(boost::asio::io_context& loop, station::Station& station, live::LiveFeed& live,
-                  storage::RecordingParts& recording, analysis::AnalysisService& analysis);
+                  storage::RecordingParts& recording, analysis::AnalysisService& analysis,
+                  experiments::Experiments& experiments);
 
   runtime::TaskGroup& tasks_;
   runtime::Clock& clock_;

@@ -9,6 +9,7 @@ namespace {
 constexpr std::array<const char*, 10> kStepKinds{"rest", "duty",      "staircase", "ramp",        "chirp",
                                                  "prbs", "multisine", "setpoint",  "disturbance", "scan"};
 constexpr std::array<const char*, 3> kPumpFlows{"off", "constant", "pulse_70_bpm"};
+constexpr std::array<const char*, 3> kStartPositions{"zero", "here", "back"};
 
 // An empty list is an axis with the one value that changes nothing.
 template <class T>
@@ -21,6 +22,8 @@ std::vector<T> axis(const std::vector<T>& values, T otherwise) {
 std::span<const char* const> step_kinds() { return kStepKinds; }
 
 std::span<const char* const> pump_flows() { return kPumpFlows; }
+
+std::span<const char* const> start_positions() { return kStartPositions; }
 
 std::vector<Variant> variants_of(const Profile& profile) {
   std::vector<Variant> variants;

@@ -41,10 +41,15 @@ struct Step {
 enum class PumpFlow : std::uint8_t { off, constant, pulse_70_bpm };
 std::span<const char* const> pump_flows();
 
+// Where the position counts from, and where each run begins.
+enum class StartPosition : std::uint8_t { zero, here, back };
+std::span<const char* const> start_positions();
+
 struct Conditions {
   std::string fluid;  // empty: the one that the robot is in
   PumpFlow pump = PumpFlow::off;
   double mean_flow_m_s = 0;
+  StartPosition start = StartPosition::zero;
 };
 
 // Of what a profile may ask for, checked when it is read; the limits of the station hold as well.
@@ -76,6 +81,9 @@ struct Profile {
   Conditions conditions;
   ProfileLimits limits;
   AbortCriteria abort;
+  // SAFETY: of a profile in which all steps are closed-loop: it may go on while nobody is there, for the robot's
+  // auto_limit_s at most, where the station's configuration allows it.
+  bool is_unattended = false;
   std::vector<Step> steps;
   Sweep sweep;
 };

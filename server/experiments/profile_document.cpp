@@ -114,6 +114,12 @@ void fields(base::Fields& fields, Conditions& conditions) {
   fields.text("fluid", fluid, "name of the fluid; any: the one that the robot is in");
   fields.choice("pump", pump, pump_flows(), "flow in the vessel");
   fields.number("mean_flow_m_s", conditions.mean_flow_m_s, {-1, 1}, "mean velocity of the flow; 0 if the pump is off");
+  auto start = static_cast<std::size_t>(conditions.start);
+  fields.choice(
+      "start", start, start_positions(),
+      "zero: the position counts from where a run begins; here: it goes on; back: as zero, and the robot goes "
+      "back to 0 before further runs");
+  conditions.start = static_cast<StartPosition>(start);
   conditions.pump = static_cast<PumpFlow>(pump);
   conditions.fluid = fluid == "any" ? "" : fluid;
   fields.must([&conditions] {
@@ -187,6 +193,10 @@ void check_setpoint(const Step& step, const Profile& profile) {
 void check_newest_step(const Profile& profile) {
   const Step& step = profile.steps.back();
   if (profile.steps.size() > kMostSteps) base::throw_invalid("there are more than ", kMostSteps, " steps");
+  // SAFETY: a duty needs somebody who is there.
+  if (!is_closed_loop(step.kind) && profile.is_unattended) {
+    base::throw_invalid("a profile with unattended = true has only the steps setpoint, disturbance and scan");
+  }
   if (!is_closed_loop(step.kind)) check_duty(step, profile);
   if (step.kind == StepKind::setpoint || step.kind == StepKind::scan) check_setpoint(step, profile);
   const double duration_s = longest_duration_s(profile);
@@ -217,6 +227,7 @@ void fields(base::Fields& all, Profile& profile) {
     fields(inside, profile.sweep);
     inside.must([&] { check_number_of_runs(profile.sweep); });
   });
+  all.flag("unattended", profile.is_unattended, "it may go on while nobody is there; for closed-loop steps alone");
   all.tables("step", "", [&](base::Fields& inside) {
     Step step;
     fields(inside, step);

@@ -12,6 +12,19 @@ std::uint64_t scan_ticks(double distance_m, double velocity_m_s) {
   return static_cast<std::uint64_t>(std::ceil(std::abs(distance_m) / velocity_m_s / kTick_s - 1e-6));
 }
 
+// Where the mode changes nothing else is commanded for kModeChangeTicks: a robot drops what waits for its time then.
+struct ModeChange {
+  std::uint64_t before = 0;    // ticks before the step's own commands
+  std::uint64_t at_least = 0;  // ticks of a setpoint
+};
+
+ModeChange mode_change_at(const Step& step, bool& is_auto) {
+  const bool is_change = is_closed_loop(step.kind) != is_auto;
+  is_auto = is_closed_loop(step.kind);
+  if (!is_change) return {};
+  return step.kind == StepKind::setpoint ? ModeChange{0, kModeChangeTicks} : ModeChange{kModeChangeTicks, 0};
+}
+
 // Moves the setpoint in equal parts, the last one to its end; returns the ticks of the way.
 std::uint64_t add_scan(const Step& step, double from_m, double to_m, std::size_t index, TimeLine& line) {
   const std::uint64_t way = scan_ticks(to_m - from_m, step.velocity_m_s);
@@ -28,9 +41,16 @@ std::uint64_t add_scan(const Step& step, double from_m, double to_m, std::size_t
 TimeLine time_line_of(const Profile& profile, const Variant& variant) {
   TimeLine line;
   double setpoint_m = 0;
+  bool is_auto = false;
   for (std::size_t index = 0; index < profile.steps.size(); ++index) {
     const Step& step = profile.steps[index];
     line.step_begins.push_back(line.ticks);
+    const ModeChange change_of_mode = mode_change_at(step, is_auto);
+    if (change_of_mode.before > 0) {
+      const ActionKind kind = is_auto ? ActionKind::setpoint : ActionKind::duty;
+      line.actions.push_back({line.ticks, kind, is_auto ? setpoint_m : 0, index});
+      line.ticks += change_of_mode.before;
+    }
     for (const DutyChange& change : duty_changes(step)) {
       line.actions.push_back({line.ticks + change.tick, ActionKind::duty, change.duty * variant.duty_factor, index});
     }
@@ -42,7 +62,7 @@ TimeLine time_line_of(const Profile& profile, const Variant& variant) {
     }
     if (step.kind == StepKind::scan) line.ticks += add_scan(step, setpoint_m, target_m, index, line);
     if (step.kind == StepKind::setpoint || step.kind == StepKind::scan) setpoint_m = target_m;
-    line.ticks += ticks_of(step);
+    line.ticks += std::max(ticks_of(step), change_of_mode.at_least);
   }
   // SAFETY: a profile never ends with a running motor in manual.
   if (!profile.steps.empty() && !is_closed_loop(profile.steps.back().kind)) {
@@ -56,12 +76,14 @@ double longest_duration_s(const Profile& profile) {
   for (const double factor : profile.sweep.setpoint_factor) largest_factor = std::max(largest_factor, std::abs(factor));
   std::uint64_t ticks = 0;
   double setpoint_m = 0;
+  bool is_auto = false;
   for (const Step& step : profile.steps) {
+    const ModeChange change = mode_change_at(step, is_auto);
     if (step.kind == StepKind::scan) {
       ticks += scan_ticks((step.setpoint_m - setpoint_m) * largest_factor, step.velocity_m_s);
     }
     if (step.kind == StepKind::setpoint || step.kind == StepKind::scan) setpoint_m = step.setpoint_m;
-    ticks += ticks_of(step);
+    ticks += change.before + std::max(ticks_of(step), change.at_least);
   }
   return static_cast<double>(ticks) * kTick_s;
 }

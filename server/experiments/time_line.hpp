@@ -8,6 +8,9 @@
 
 namespace server::experiments {
 
+// 0.5 s without another command after a change between manual and auto.
+inline constexpr std::uint64_t kModeChangeTicks = 50;
+
 enum class ActionKind : std::uint8_t { duty, setpoint, disturbance };  // a duty: manual; a setpoint: auto
 
 struct Action {
@@ -25,7 +28,8 @@ struct TimeLine {
   double duration_s() const { return static_cast<double>(ticks) * kTick_s; }
 };
 
-// A scan begins at the setpoint before it, or at 0.
+// A scan begins at the setpoint before it, or at 0. A step in the other mode than the one before it begins with
+// kModeChangeTicks at duty 0 or at the beginning of its scan; a setpoint is kept for as long.
 TimeLine time_line_of(const Profile& profile, const Variant& variant);
 
 // Of all variants.

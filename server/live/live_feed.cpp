@@ -151,8 +151,13 @@ std::size_t LiveFeed::publish_robot(const Robot& robot, const Change& change) {
   return published;
 }
 
-void LiveFeed::publish_run(json run) {
-  Message message{[&] { return dump({{"type", "run"}, {"run", std::move(run)}}); }};
+void LiveFeed::publish_run(json run) { publish_to_all("run", std::move(run)); }
+
+void LiveFeed::publish_experiment(json experiment) { publish_to_all("experiment", std::move(experiment)); }
+
+// {"type": "run", "run": {…}}
+void LiveFeed::publish_to_all(const char* type, json value) {
+  Message message{[&] { return dump({{"type", type}, {type, std::move(value)}}); }};
   message.push(watch_all_, false);
   message.push(std::views::keys(filtered_), false);
 }

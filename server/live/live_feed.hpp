@@ -38,6 +38,7 @@ class LiveFeed final : public station::StationSink {
   void watch(Subscriber& subscriber, const std::set<station::RobotId>& robots);
 
   void publish_run(nlohmann::json run);
+  void publish_experiment(nlohmann::json experiment);
 
   std::size_t robots() const { return robots_.size(); }  // of which it keeps something
 
@@ -67,6 +68,7 @@ class LiveFeed final : public station::StationSink {
     std::string renewal_refusal;                   // why its last lease was not renewed; empty: it was
   };
 
+  void publish_to_all(const char* type, nlohmann::json value);
   static Headline headline(const station::RobotState& robot);
   bool has_subscribers() const { return !watch_all_.empty() || !filtered_.empty(); }
   bool is_watched(const Robot& robot) const { return !watch_all_.empty() || !robot.watchers.empty(); }

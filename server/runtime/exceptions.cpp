@@ -18,6 +18,7 @@ const char* text(Ended value) {
     case Ended::request: return "request";
     case Ended::live_page: return "live_page";
     case Ended::model: return "model";
+    case Ended::experiment: return "experiment";
   }
   return "unknown";
 }

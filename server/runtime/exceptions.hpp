@@ -1,9 +1,8 @@
 // Logs and counts exceptions that end something smaller than the station.
 //
-// An exception ends only the robot's session, connection, request, page or sending of a model that threw it. A client
-// may cause it as often as it likes, so the log has one line a second for each name and text, at most kMostNames of
-// them in a second, and one a second for all others of the kind. The counts are in /metrics.
-// Loop thread.
+// An exception ends only the robot's session, connection, request, page, sending of a model or experiment that threw
+// it. A client may cause it as often as it likes, so the log has one line a second for each name and text, at most
+// kMostNames of them in a second, and one a second for all others of the kind. The counts are in /metrics. Loop thread.
 #pragma once
 
 #include <array>
@@ -20,9 +19,9 @@ namespace server::runtime {
 
 // What was ended. `request` is one of HTTP, or a message of a page on /live; `model` the sending of a fluid's model to
 // one robot.
-enum class Ended : std::uint8_t { robot_session, http_connection, request, live_page, model };
-inline constexpr std::array kAllEnded{Ended::robot_session, Ended::http_connection, Ended::request, Ended::live_page,
-                                      Ended::model};
+enum class Ended : std::uint8_t { robot_session, http_connection, request, live_page, model, experiment };
+inline constexpr std::array kAllEnded{Ended::robot_session, Ended::http_connection, Ended::request,
+                                      Ended::live_page,     Ended::model,           Ended::experiment};
 const char* text(Ended value);
 
 class ExceptionLog {

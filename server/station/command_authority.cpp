@@ -75,6 +75,7 @@ Result<std::optional<Authority::Change>> CommandAuthority::change(const ControlR
 void CommandAuthority::keep(const std::string& actor, microseconds age) {
   // SAFETY: who looks at an old picture does not keep control.
   if (is_fresh(age)) authority_.keep_alive(actor);
+  presence_.note(actor, age);
 }
 
 }  // namespace server::station

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/station/commands/authority.hpp"
+#include "server/station/commands/presence.hpp"
 #include "server/station/commands/requests.hpp"
 
 namespace server::station {
@@ -16,7 +17,7 @@ const char* text(ControlAction action);
 
 class CommandAuthority {
  public:
-  explicit CommandAuthority(runtime::Clock& clock) : authority_{clock} {}
+  explicit CommandAuthority(runtime::Clock& clock) : authority_{clock}, presence_{clock} {}
 
   ControlState of(const RobotId& robot) const { return authority_.of(robot); }
   Result<void> may_use(const RobotId& robot, const std::string& actor) const {
@@ -34,10 +35,12 @@ class CommandAuthority {
   Result<std::optional<Authority::Change>> change(const ControlRequest& request);
   // The actor is still there.
   void keep(const std::string& actor, microseconds age);
+  std::optional<std::int64_t> seen_us(const std::string& actor) const { return presence_.seen_us(actor); }
   std::vector<Authority::Change> expire() { return authority_.expire(); }
 
  private:
   Authority authority_;
+  Presence presence_;
 };
 
 }  // namespace server::station

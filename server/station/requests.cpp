@@ -131,6 +131,10 @@ Result<ControlState> Station::control(const ControlRequest& request) {
 
 void Station::keep_control(const std::string& actor, microseconds age) { parts_->control.keep(actor, age); }
 
+std::optional<std::int64_t> Station::seen_us(const std::string& actor) const { return parts_->control.seen_us(actor); }
+
+std::string Station::holder(const RobotId& id) const { return parts_->control.of(id).holder; }
+
 asio::awaitable<void> Station::watch_control() {
   for (;;) {
     co_await parts_->clock.sleep_for(kWatchInterval);

@@ -70,6 +70,9 @@ class Station {
   Result<ControlState> control(const ControlRequest& request);
   // A sign of life of an actor: what it controls stays its own. `age`: of what it has seen of the robots.
   void keep_control(const std::string& actor, microseconds age);
+  // Steady time of what the actor saw with its last fresh sign of life; none: long ago, or never.
+  std::optional<std::int64_t> seen_us(const std::string& actor) const;
+  std::string holder(const RobotId& id) const;   // of control, now; empty: nobody
   boost::asio::awaitable<void> watch_control();  // reports when control has ended, until cancelled
 
   // Something was refused before it came to one of the functions above: the audit gets an entry. `what` is "command" or

@@ -74,6 +74,7 @@ export class Store {
       case 'problem':
         this.note(`The station refused a message of this page: ${message.problem.detail}`);
         break;
+      case 'experiment': // shown by what it does to the robot
       case 'stamp':
         break;
     }

@@ -453,3 +453,39 @@ CREATE TABLE run_metrics (
   document TEXT NOT NULL,                   -- JSON
   PRIMARY KEY (run_id, version)
 ) WITHOUT ROWID;
+CREATE TABLE experiment (
+  experiment_id INTEGER PRIMARY KEY,
+  robot_id TEXT NOT NULL,
+  name TEXT NOT NULL,                       -- of the profile
+  profile TEXT NOT NULL,                    -- its document, TOML or JSON
+  notes TEXT NOT NULL,
+  priority INTEGER NOT NULL,                -- the highest begins first
+  unattended INTEGER NOT NULL,              -- 1: it may go on while nobody is there
+  state TEXT NOT NULL,                      -- waiting, running, paused, aborting, done, aborted, cancelled, interrupted
+  reason TEXT NOT NULL DEFAULT '',          -- why it is paused, held or ended: docs/experiments.md
+  detail TEXT NOT NULL DEFAULT '',          -- the same in words
+  owner TEXT NOT NULL,                      -- the actor who asked for it
+  acts_for TEXT NOT NULL,                   -- the actor in whose name it commands the robot
+  held INTEGER NOT NULL DEFAULT 0,          -- 1: it waits until somebody releases it
+  place INTEGER NOT NULL,                   -- in the queue, among those of one priority
+  runs_planned INTEGER NOT NULL,
+  duration_s REAL NOT NULL,                 -- of all runs
+  created_at_us INTEGER NOT NULL,
+  started_at_us INTEGER,                    -- NULL: it has not begun
+  ended_at_us INTEGER                       -- NULL: it has not ended
+);
+CREATE INDEX experiment_by_robot ON experiment(robot_id);
+CREATE INDEX experiment_not_ended ON experiment(state) WHERE ended_at_us IS NULL;
+CREATE TABLE experiment_run (
+  experiment_id INTEGER NOT NULL REFERENCES experiment,
+  number INTEGER NOT NULL,                  -- from 1, in the order of the profile's grid
+  state TEXT NOT NULL,                      -- running, done, aborted, interrupted
+  run_id INTEGER,                           -- NULL: it did not come to one
+  reason TEXT NOT NULL DEFAULT '',          -- as of the experiment
+  variant TEXT NOT NULL,                    -- JSON: fluid, controller, factors, repeat
+  steps TEXT NOT NULL,                      -- JSON: when each step began, in the time of the robot
+  prediction TEXT,                          -- JSON: what the model in use predicted; NULL: nothing
+  started_at_us INTEGER NOT NULL,
+  ended_at_us INTEGER,                      -- NULL: it has not ended
+  PRIMARY KEY (experiment_id, number)
+) WITHOUT ROWID;

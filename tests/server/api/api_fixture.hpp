@@ -8,6 +8,7 @@
 
 #include "server/analysis/analysis_service.hpp"
 #include "server/api/api_server.hpp"
+#include "server/experiments/runner/experiments.hpp"
 #include "server/station/models/model_sender.hpp"
 #include "server/storage/recording_parts.hpp"
 #include "tests/server/link/test_robot.hpp"
@@ -79,6 +80,7 @@ class ApiTest : public ::testing::Test {
   net::TransportSecurity security{clock, config};
   link::RobotListener robots{
       loop, clock, tasks, station, recorder, {boost::asio::ip::address_v4::loopback(), 0}, false, security.robots()};
+  experiments::Experiments experiments{{loop, clock, tasks, station}, recording, maths, config.allow_unattended};
   std::unique_ptr<api::ApiServer> api;
   std::unique_ptr<TestRobot> robot;
 

@@ -57,8 +57,10 @@ TEST_F(RightsTest, AViewerChangesNothingButMayStop) {
   for (const http::Route& route : api->router().routes()) {
     if (route.method != "GET" && least_role(route.needs) == identity::Role::viewer) changes.insert(route.pattern);
   }
-  EXPECT_EQ(changes, (std::set<std::string>{"/api/v1/emergency-stop", "/api/v1/robots/{robot_id}/emergency-stop",
-                                            "/api/v1/login", "/api/v1/logout"}));
+  EXPECT_EQ(changes,
+            (std::set<std::string>{"/api/v1/emergency-stop", "/api/v1/experiments/{experiment_id}/abort",
+                                   "/api/v1/experiments/{experiment_id}/pause",
+                                   "/api/v1/robots/{robot_id}/emergency-stop", "/api/v1/login", "/api/v1/logout"}));
   std::set<std::string> of_admins;
   for (const http::Route& route : api->router().routes()) {
     if (route.needs == identity::Scope::admin) of_admins.insert(route.method + " " + route.pattern);
@@ -105,9 +107,11 @@ TEST_F(RightsTest, ATokenThatMayOnlyStopSeesWhatItsStopIsAboutAndNothingElse) {
   for (const http::Route& route : api->router().routes()) {
     if (route.needs != identity::Scope::anyone && !refused(route)) open.insert(route.method + " " + route.pattern);
   }
-  EXPECT_EQ(open, (std::set<std::string>{"GET /api/v1/robots", "GET /api/v1/robots/{robot_id}",
-                                         "GET /api/v1/commands/{command_id}", "POST /api/v1/emergency-stop",
-                                         "POST /api/v1/robots/{robot_id}/emergency-stop"}));
+  EXPECT_EQ(open,
+            (std::set<std::string>{
+                "GET /api/v1/robots", "GET /api/v1/robots/{robot_id}", "GET /api/v1/commands/{command_id}",
+                "POST /api/v1/emergency-stop", "POST /api/v1/experiments/{experiment_id}/abort",
+                "POST /api/v1/experiments/{experiment_id}/pause", "POST /api/v1/robots/{robot_id}/emergency-stop"}));
   const json robot_seen = ask("GET", "/api/v1/robots/r1").parsed();
   std::set<std::string> members;
   for (const auto& [member, value] : robot_seen.items()) members.insert(member);

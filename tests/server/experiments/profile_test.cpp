@@ -116,7 +116,7 @@ TEST(Profile, AStepBeyondItsLimitsIsRefusedAtItsPlace) {
               HasSubstr("with this step and its for_s a run takes 2 s, limits.duration_max_s is 1.5"));
   EXPECT_THAT(
       error_of("[limits]\nduration_max_s = 5\n[[step]]\nkind = \"scan\"\nsetpoint_m = 0.6\nvelocity_m_s = 0.1\n"),
-      HasSubstr("takes 6 s"));
+      HasSubstr("takes 6.5 s"));
 }
 
 TEST(Profile, ThoseOfTheProgramAreSound) {

@@ -58,8 +58,8 @@ TEST(TimeLine, TheLongestDurationIsThatOfTheLargestFactor) {
   scan.velocity_m_s = 0.1;
   profile.steps = {scan};
   profile.sweep.setpoint_factor = {1, -2};
-  EXPECT_DOUBLE_EQ(longest_duration_s(profile), 10);
-  EXPECT_DOUBLE_EQ(time_line_of(profile, variants_of(profile)[1]).duration_s(), 10);
+  EXPECT_DOUBLE_EQ(longest_duration_s(profile), 10.5) << "0.5 s of them at the beginning of the scan";
+  EXPECT_DOUBLE_EQ(time_line_of(profile, variants_of(profile)[1]).duration_s(), 10.5);
 }
 
 }  // namespace

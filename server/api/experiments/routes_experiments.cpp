@@ -1,0 +1,234 @@
+// Experiments and profiles: begin, list, watch, keep alive, pause, resume, abort, take over, move.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "server/api/bodies/controller_body.hpp"
+#include "server/api/bodies/query_params.hpp"
+#include "server/api/experiments/experiment_json.hpp"
+#include "server/api/experiments/experiment_routes.hpp"
+#include "server/experiments/profile_document.hpp"
+#include "server/identity/auth.hpp"
+#include "server/storage/designs/designs.hpp"
+
+namespace server::api {
+using nlohmann::json;
+
+namespace {
+
+constexpr std::int64_t kMaxWait_ms = 30'000;
+
+Result<storage::ExperimentId> experiment_id_of(const http::Request& request) {
+  const std::string& given = request.param.at("experiment_id");
+  const auto id = parse_id(given);
+  if (id && *id <= static_cast<std::uint64_t>(kMaxRunId)) return static_cast<storage::ExperimentId>(*id);
+  return fail(ErrorCode::not_found, fmt::format("there is no experiment '{}'", given), "no_such_experiment");
+}
+
+// SAFETY: what a script asks for is a sign of life of it, as old as the request; a page gives its own by the stamps on
+// /live.
+void note_sign_of_life(const ExperimentRoutes& parts, const http::Request& request) {
+  if (request.caller.session == 0) parts.station.keep_control(request.actor, request.unread);
+}
+
+http::Response view_response(int status, const Result<experiments::ExperimentView>& view) {
+  return view ? http::json_response(status, to_json(*view)) : http::problem(view.error());
+}
+
+// Who may stop and not read sees what became of it, and nothing else.
+http::Response stop_response(const http::Request& request, const Result<experiments::ExperimentView>& view) {
+  if (!view || request.caller.scopes.allow(identity::Scope::read)) return view_response(200, view);
+  return http::json_response(200, {{"experiment_id", view->experiment.id}, {"state", text(view->experiment.state)}});
+}
+
+http::Answer begin_experiment(ExperimentRoutes parts, http::Request request) {
+  auto body = parse_experiment(request.body);
+  if (!body) co_return http::problem(body.error());
+  if (auto stands = still_stands(request.caller); !stands) co_return http::problem(stands.error());
+  note_sign_of_life(parts, request);
+  const auto begun = co_await parts.experiments.begin(std::move(*body), author_of(request, parts.clock));
+  http::Response response = view_response(202, begun);
+  if (begun) {
+    response.headers.emplace_back("Location", fmt::format("/api/v1/experiments/{}", begun->experiment.id));
+  }
+  co_return response;
+}
+
+http::Answer list_experiments(ExperimentRoutes parts, http::Request request) {
+  const auto limit = query_number(request, "limit", 1, kMaxLimit, kDefaultLimit);
+  if (!limit) co_return http::problem(limit.error());
+  const auto before = query_number(request, "before", 1, kMaxRunId, 0);
+  if (!before) co_return http::problem(before.error());
+  storage::ExperimentFilter filter;
+  filter.before = *before;
+  filter.limit = static_cast<std::size_t>(*limit);
+  if (const auto given = request.query.find("robot_id"); given != request.query.end()) filter.robot_id = given->second;
+  if (const auto given = request.query.find("state"); given != request.query.end()) {
+    filter.state = storage::experiment_state_from(given->second);
+    if (!filter.state) co_return http::problem(400, "state is none that an experiment has", "out_of_range");
+  }
+  json list = json::array();
+  const auto views = co_await parts.experiments.list(std::move(filter));
+  for (const experiments::ExperimentView& view : views) list.push_back(to_json(view));
+  co_return http::json_response(200, {{"experiments", std::move(list)}});
+}
+
+http::Answer get_experiment(ExperimentRoutes parts, http::Request request) {
+  const auto id = experiment_id_of(request);
+  if (!id) co_return http::problem(id.error());
+  const auto wait_ms = query_number(request, "wait_ms", 0, kMaxWait_ms, 0);
+  if (!wait_ms) co_return http::problem(wait_ms.error());
+  const microseconds patience{*wait_ms * 1000};
+  const auto view = co_await parts.experiments.wait_for_change(*id, patience);
+  if (!view) co_return http::problem(view.error());
+  json out = to_json(*view);
+  out["profile"] = view->experiment.request.profile;
+  co_return http::json_response(200, out);
+}
+
+http::Answer get_prediction(ExperimentRoutes parts, http::Request request) {
+  const auto id = experiment_id_of(request);
+  if (!id) co_return http::problem(id.error());
+  const auto number = parse_id(request.param.at("number"));
+  if (number && *number <= experiments::kMostRuns) {
+    auto found = co_await parts.experiments.prediction(*id, static_cast<std::uint32_t>(*number));
+    if (found) co_return http::json_text_response(200, std::move(*found));
+  }
+  co_return http::problem(
+      404, fmt::format("there is no prediction of run '{}' of this experiment", request.param.at("number")),
+      "no_prediction");
+}
+
+http::Answer keep_alive(ExperimentRoutes parts, http::Request request) {
+  const auto id = experiment_id_of(request);
+  if (!id) co_return http::problem(id.error());
+  const auto actor = parts.experiments.actor_of(*id);
+  if (!actor || *actor != request.actor) {
+    co_return http::problem(409, actor ? fmt::format("it acts in the name of {}", *actor) : "it has ended",
+                            actor ? "acts_for_another" : "wrong_state");
+  }
+  note_sign_of_life(parts, request);
+  const auto view = co_await parts.experiments.find(*id);
+  co_return view_response(200, view);
+}
+
+http::Answer pause_experiment(ExperimentRoutes parts, http::Request request) {
+  const auto id = experiment_id_of(request);
+  if (!id) co_return http::problem(id.error());
+  const auto view = co_await parts.experiments.pause(*id, author_of(request, parts.clock));
+  co_return stop_response(request, view);
+}
+
+http::Answer resume_experiment(ExperimentRoutes parts, http::Request request) {
+  const auto id = experiment_id_of(request);
+  if (!id) co_return http::problem(id.error());
+  note_sign_of_life(parts, request);
+  const auto view = co_await parts.experiments.resume(*id, author_of(request, parts.clock));
+  co_return view_response(200, view);
+}
+
+http::Answer abort_experiment(ExperimentRoutes parts, http::Request request) {
+  const auto id = experiment_id_of(request);
+  if (!id) co_return http::problem(id.error());
+  auto reason = parse_abort(request.body);
+  if (!reason) co_return http::problem(reason.error());
+  const auto view = co_await parts.experiments.abort(*id, std::move(*reason), author_of(request, parts.clock));
+  co_return stop_response(request, view);
+}
+
+http::Answer take_over_experiment(ExperimentRoutes parts, http::Request request) {
+  const auto id = experiment_id_of(request);
+  if (!id) co_return http::problem(id.error());
+  note_sign_of_life(parts, request);
+  const auto view = co_await parts.experiments.take_over(*id, author_of(request, parts.clock));
+  co_return view_response(200, view);
+}
+
+http::Answer move_experiment(ExperimentRoutes parts, http::Request request) {
+  const auto id = experiment_id_of(request);
+  if (!id) co_return http::problem(id.error());
+  const auto move = parse_move(request.body);
+  if (!move) co_return http::problem(move.error());
+  const auto view = co_await parts.experiments.move(*id, move->before, move->priority, author_of(request, parts.clock));
+  co_return view_response(200, view);
+}
+
+http::Answer list_profiles(ExperimentRoutes, http::Request) {
+  json list = json::array();
+  for (const base::EmbeddedFile& shipped : experiments::shipped_profiles()) {
+    const experiments::Profile profile = experiments::find_profile(std::string{shipped.name});
+    list.push_back({{"profile", shipped.name},
+                    {"name", profile.name},
+                    {"purpose", profile.purpose},
+                    {"runs", experiments::variants_of(profile).size()},
+                    {"duration_s", experiments::longest_duration_s(profile)}});
+  }
+  co_return http::json_response(200, {{"profiles", std::move(list)}});
+}
+
+http::Answer get_profile(ExperimentRoutes, http::Request request) {
+  const std::string& name = request.param.at("profile");
+  for (const base::EmbeddedFile& shipped : experiments::shipped_profiles()) {
+    if (shipped.name == name) {
+      co_return http::json_response(200, {{"profile", name}, {"document", std::string{shipped.content}}});
+    }
+  }
+  co_return http::problem(404, fmt::format("there is no profile '{}'", name.substr(0, 40)), "no_such_profile");
+}
+
+// The newest of a name; its document is what `rheonaut discretise --json` prints, or what a set_controller takes.
+boost::asio::awaitable<Result<protocol::Controller>> controller_by_name(storage::Designs& designs,
+                                                                        station::Station& station, std::string name,
+                                                                        station::RobotId robot_id) {
+  storage::DesignFilter filter;
+  filter.kind = storage::DesignKind::controller;
+  filter.limit = static_cast<std::size_t>(kMaxLimit);
+  const auto kept = co_await designs.list(filter);
+  const auto found = std::ranges::find_if(kept, [&name](const storage::Design& one) { return one.made.name == name; });
+  if (found == kept.end())
+    co_return fail(ErrorCode::not_found, "the station keeps none of this name", "no_such_design");
+  const station::RobotSettings* settings = station.settings(robot_id);
+  const bool is_known = settings != nullptr && settings->is_controller_current && settings->controller;
+  if (!is_known) co_return fail(ErrorCode::conflict, "the controller in force is not known", "not_known");
+  const Members body{json{{"controller", json::parse(found->made.document, nullptr, false)}}};
+  const auto controller = controller_from(body, &*settings->controller);
+  if (!controller) co_return std::unexpected{controller.error()};
+  // SAFETY: an experiment gives no controller more of the motor than the one in force has.
+  const bool is_wider =
+      controller->duty_min < settings->controller->duty_min || controller->duty_max > settings->controller->duty_max;
+  if (is_wider) co_return fail(ErrorCode::forbidden, "its duty range is wider than that in force", "not_permitted");
+  co_return *controller;
+}
+
+}  // namespace
+
+void connect_controllers(experiments::Experiments& experiments, storage::Designs& designs, station::Station& station) {
+  experiments.set_controller_by_name([&designs, &station](std::string name, station::RobotId robot_id) {
+    return controller_by_name(designs, station, std::move(name), std::move(robot_id));
+  });
+}
+
+void add_experiment_routes(http::Router& router, ExperimentRoutes parts) {
+  const auto add = [&router, parts](const char* method, const std::string& pattern, identity::Scope needs,
+                                    std::vector<std::string> query,
+                                    http::Answer (*answer)(ExperimentRoutes, http::Request)) {
+    router.add({method, pattern, needs, std::move(query), with(parts, answer)});
+  };
+  using identity::Scope;
+  const std::string all = "/api/v1/experiments", one = all + "/{experiment_id}";
+  add("POST", all, Scope::command, {}, begin_experiment);
+  add("GET", all, Scope::read, {"robot_id", "state", "before", "limit"}, list_experiments);
+  add("GET", one, Scope::read, {"wait_ms"}, get_experiment);
+  add("GET", one + "/runs/{number}/prediction", Scope::read, {}, get_prediction);
+  add("POST", one + "/keep-alive", Scope::command, {}, keep_alive);
+  // SAFETY: everybody who may stop a robot may end, or pause, what moves it.
+  add("POST", one + "/pause", Scope::stop, {}, pause_experiment);
+  add("POST", one + "/abort", Scope::stop, {}, abort_experiment);
+  add("POST", one + "/resume", Scope::command, {}, resume_experiment);
+  add("POST", one + "/take-over", Scope::command, {}, take_over_experiment);
+  add("POST", one + "/move", Scope::command, {}, move_experiment);
+  add("GET", "/api/v1/experiment-profiles", Scope::read, {}, list_profiles);
+  add("GET", "/api/v1/experiment-profiles/{profile}", Scope::read, {}, get_profile);
+}
+
+}  // namespace server::api

@@ -1,0 +1,270 @@
+// One subcommand an act. Who waits asks again and again, which is also the sign of life that an experiment needs.
+#include "server/cli/experiments/experiment.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+
+#include "server/cli/accounts/account_access.hpp"
+#include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/options.hpp"
+#include "server/cli/terminal/output.hpp"
+
+namespace server::cli {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kWatch_ms = 120;  // between two signs of life; one counts for 400 ms
+constexpr const char* kExperiments = "/api/v1/experiments";
+
+CLI::App* offer(CLI::App& command, ExperimentCommand& options, ExperimentCommand::Act act, const char* name,
+                const char* purpose) {
+  CLI::App* sub = command.add_subcommand(name, purpose);
+  sub->add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  sub->add_flag("--json", options.json, "As JSON");
+  sub->callback([&options, act] { options.act = act; });
+  return sub;
+}
+
+CLI::App* offer_one(CLI::App& command, ExperimentCommand& options, ExperimentCommand::Act act, const char* name,
+                    const char* purpose) {
+  CLI::App* sub = offer(command, options, act, name, purpose);
+  sub->add_option("experiment", options.experiment, "Its number, as `rheonaut experiment list` shows it")
+      ->required()
+      ->check(whole(1, std::numeric_limits<std::int64_t>::max()));
+  return sub;
+}
+
+json ask_experiments(const StationClient& station, const std::string& method, const std::string& target,
+                     const json& body = nullptr) {
+  const StationAnswer answer = station.ask(method, target, body);
+  if (answer.status >= 200 && answer.status < 300) return answer.body;
+  throw std::runtime_error{fmt::format("the station refused: {}", answer.body.value("detail", "no reason"))};
+}
+
+// A file is sent as it is; anything else is the name of a profile that comes with the program.
+std::string profile_document(const std::string& name_or_file) {
+  if (!std::filesystem::is_regular_file(name_or_file)) return name_or_file;
+  std::ifstream file{name_or_file, std::ios::binary};
+  std::ostringstream text;
+  if (!(file && text << file.rdbuf())) throw std::runtime_error{fmt::format("cannot read '{}'", name_or_file)};
+  return text.str() + "\n";
+}
+
+std::string text_of(const json& value) { return value.is_null() ? "" : value.get<std::string>(); }
+
+std::string progress_line(const json& experiment) {
+  const json& progress = experiment.at("progress");
+  const auto state = experiment.at("state").get<std::string>();
+  if (state == "waiting" && !experiment.at("waits_for").is_null()) {
+    return "waits: " + text_of(experiment.at("waits_for_detail"));
+  }
+  if (state == "paused") return "paused: " + text_of(experiment.at("detail"));
+  if (progress.is_null()) return state;
+  return fmt::format("{}: run {} of {}, step {} of {}, {:.0f} of {:.0f} s", state, progress.at("run").get<int>(),
+                     progress.at("runs").get<int>(), progress.at("step").get<int>(), progress.at("steps").get<int>(),
+                     progress.at("elapsed_s").get<double>(), progress.at("duration_s").get<double>());
+}
+
+bool has_ended(const json& experiment) { return !experiment.at("ended_at_us").is_null(); }
+
+// Shows each change of the line once, or all the time on a terminal.
+class ProgressShown {
+ public:
+  void show(const json& experiment) {
+    const std::string line = progress_line(experiment);
+    if (line == last_) return;
+    if (is_terminal_) {
+      fmt::print(stderr, "\r\x1b[K{}", line);
+    } else if (kind_of(line) != kind_of(last_)) {
+      fmt::print(stderr, "{}\n", line);
+    }
+    std::fflush(stderr);
+    last_ = line;
+  }
+  void end() const {
+    if (is_terminal_) fmt::print(stderr, "\r\x1b[K");
+  }
+
+ private:
+  static std::string kind_of(const std::string& line) { return line.substr(0, line.rfind(',')); }
+
+  const bool is_terminal_ = ::isatty(STDERR_FILENO) != 0;
+  std::string last_;
+};
+
+// An interrupt of the person ends the experiment, and then the wait.
+class Interrupt {
+ public:
+  Interrupt() : signals_{loop_, SIGINT, SIGTERM} {
+    signals_.async_wait([this](const boost::system::error_code& error, int) { has_come_ = !error; });
+  }
+  // Within so long.
+  bool comes_within_ms(int ms) {
+    loop_.run_for(std::chrono::milliseconds{ms});
+    return std::exchange(has_come_, false);
+  }
+
+ private:
+  boost::asio::io_context loop_{1};
+  boost::asio::signal_set signals_;
+  bool has_come_ = false;
+};
+
+json watch(const StationClient& station, std::int64_t id) {
+  ProgressShown progress;
+  Interrupt interrupt;
+  const std::string one = fmt::format("{}/{}", kExperiments, id);
+  for (;;) {
+    // Refused when it has ended, or when somebody has taken it over: then it is theirs to keep alive.
+    const StationAnswer kept = station.ask("POST", one + "/keep-alive");
+    json experiment = kept.status == 200 ? kept.body : ask_experiments(station, "GET", one);
+    progress.show(experiment);
+    if (has_ended(experiment)) {
+      progress.end();
+      return experiment;
+    }
+    if (interrupt.comes_within_ms(kWatch_ms)) station.ask("POST", one + "/abort", {{"reason", "interrupted"}});
+  }
+}
+
+void write_runs(std::ostream& out, const json& experiment) {
+  Table table{{"run", "<state", "run id", "<fluid", "steps", "<reason"}};
+  for (const json& run : experiment.at("runs")) {
+    const json& fluid = run.at("variant").value("fluid", json());
+    table.row({std::to_string(run.at("number").get<int>()), run.at("state"),
+               run.at("run_id").is_null() ? "-" : std::to_string(run.at("run_id").get<std::int64_t>()),
+               fluid.is_null() ? "any" : fluid.get<std::string>(), std::to_string(run.at("steps").size()),
+               text_of(run.at("reason"))});
+  }
+  table.write(out);
+}
+
+int write_one(const ExperimentCommand& options, const json& experiment, std::ostream& out) {
+  const auto state = experiment.at("state").get<std::string>();
+  if (options.json) {
+    fmt::print(out, "{}\n", experiment.dump(2));
+  } else {
+    const std::string why = text_of(has_ended(experiment) || state == "paused" ? experiment.at("detail")
+                                                                               : experiment.at("waits_for_detail"));
+    fmt::print(out, "experiment {} ({}) is {}{}\n", experiment.at("experiment_id").get<std::int64_t>(),
+               one_line(experiment.at("name").get<std::string>()), state, why.empty() ? "" : ": " + why);
+    if (!experiment.at("runs").empty()) write_runs(out, experiment);
+  }
+  return has_ended(experiment) && state != "done" ? kExperimentNotDone : 0;
+}
+
+int begin_experiment(const ExperimentCommand& options, std::ostream& out) {
+  const StationClient station{options.data_dir};
+  json body{{"robot_id", options.robot},
+            {"profile", profile_document(options.profile)},
+            {"priority", options.priority},
+            {"unattended", options.is_unattended}};
+  if (!options.notes.empty()) body["notes"] = options.notes;
+  const json experiment = ask_experiments(station, "POST", kExperiments, body);
+  const auto id = experiment.at("experiment_id").get<std::int64_t>();
+  return write_one(options, options.waits ? watch(station, id) : experiment, out);
+}
+
+int list_experiments(const ExperimentCommand& options, std::ostream& out) {
+  const json experiments = ask_experiments(StationClient{options.data_dir}, "GET", kExperiments).at("experiments");
+  if (options.json) {
+    fmt::print(out, "{}\n", experiments.dump(2));
+    return 0;
+  }
+  Table table{{"id", "<state", "<robot", "<name", "runs", "<begun", "<by", "<why"}};
+  for (const json& one : experiments) {
+    const std::string why = text_of(one.at(one.at("state") == "waiting" ? "waits_for" : "reason"));
+    table.row({std::to_string(one.at("experiment_id").get<std::int64_t>()), one.at("state"), one.at("robot_id"),
+               one_line(one.at("name").get<std::string>()),
+               fmt::format("{} of {}", one.at("runs").size(), one.at("runs_planned").get<int>()),
+               time_text(one.at("created_at_us")), one.at("owner"), why});
+  }
+  table.write(out);
+  return 0;
+}
+
+int act_on(const ExperimentCommand& options, const char* what, const json& body, std::ostream& out) {
+  const StationClient station{options.data_dir};
+  const std::string target = fmt::format("{}/{}/{}", kExperiments, options.experiment, what);
+  const json experiment = ask_experiments(station, "POST", target, body);
+  const json shown = options.waits ? watch(station, options.experiment) : experiment;
+  const int status = write_one(options, shown, out);
+  return options.waits ? status : 0;
+}
+
+int show(const ExperimentCommand& options, std::ostream& out) {
+  const StationClient station{options.data_dir};
+  if (options.waits) return write_one(options, watch(station, options.experiment), out);
+  write_one(options, ask_experiments(station, "GET", fmt::format("{}/{}", kExperiments, options.experiment)), out);
+  return 0;
+}
+
+constexpr const char* kWaits = "Wait for its end, and be the sign of life that it needs; Ctrl-C aborts it";
+
+}  // namespace
+
+void add_options(CLI::App& command, ExperimentCommand& options) {
+  using Act = ExperimentCommand::Act;
+  command.require_subcommand(1);
+  CLI::App* begin = offer(command, options, Act::begin, "begin", "Put an experiment into the queue of a robot");
+  begin->add_option("profile", options.profile, "Name of a profile that comes with the program, or a file")
+      ->required()
+      ->check(named());
+  begin->add_option("--robot", options.robot, "Id of the robot")->required()->check(named());
+  begin->add_option("--notes", options.notes, "Of every run")->check(named());
+  begin->add_option("--priority", options.priority, "-100 to 100; the highest begins first")->check(whole(-100, 100));
+  begin->add_flag("--unattended", options.is_unattended, "It may go on while nobody is there, if its profile says so");
+  begin->add_flag("--wait", options.waits, kWaits);
+  begin->footer(
+      "Exit status 5: it was aborted, cancelled or interrupted.\n"
+      "Example: rheonaut experiment begin figure_7 --robot sim-1 --wait --data lab");
+  offer(command, options, Act::list, "list", "List the experiments, newest first");
+  offer_one(command, options, Act::show, "show", "Show one experiment and its runs")
+      ->add_flag("--wait", options.waits, kWaits);
+  offer_one(command, options, Act::pause, "pause", "Bring the robot to rest; its step is repeated later");
+  offer_one(command, options, Act::resume, "resume", "Go on with one that is paused or held")
+      ->add_flag("--wait", options.waits, kWaits);
+  offer_one(command, options, Act::abort, "abort", "End it, with the robot at rest")
+      ->add_option("--reason", options.reason, "Why")
+      ->check(named());
+  offer_one(command, options, Act::take_over, "take-over", "Go on with somebody else's experiment in your own name")
+      ->add_flag("--wait", options.waits, kWaits);
+  CLI::App* move = offer_one(command, options, Act::move, "move", "Give it another place in the queue of its robot");
+  move->add_option("--before", options.before, "The experiment that is to come after it")
+      ->check(whole(1, std::numeric_limits<std::int64_t>::max()));
+  move->add_option("--priority", options.priority, "Its new priority, without --before")->check(whole(-100, 100));
+  command.footer("Example: rheonaut experiment list --data lab");
+}
+
+int run(const ExperimentCommand& options, std::ostream& out) {
+  using Act = ExperimentCommand::Act;
+  switch (options.act) {
+    case Act::begin: return begin_experiment(options, out);
+    case Act::list: return list_experiments(options, out);
+    case Act::show: return show(options, out);
+    case Act::pause: return act_on(options, "pause", nullptr, out);
+    case Act::resume: return act_on(options, "resume", nullptr, out);
+    case Act::abort:
+      return act_on(options, "abort", options.reason.empty() ? json(nullptr) : json{{"reason", options.reason}}, out);
+    case Act::take_over: return act_on(options, "take-over", nullptr, out);
+    case Act::move: {
+      json body{{"priority", options.priority}};
+      if (options.before != 0) body["before"] = options.before;
+      return act_on(options, "move", body, out);
+    }
+  }
+  return 0;
+}
+
+}  // namespace server::cli

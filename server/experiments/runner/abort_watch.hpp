@@ -1,0 +1,50 @@
+// Holds the samples of a run against the abort criteria of its profile. Pure.
+//
+// SAFETY: a position counts with two standard deviations, since it is an estimate; without its disturbance, which only
+// the controller sees. A value that is no number counts as beyond every bound.
+#pragma once
+
+#include <bitset>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "server/experiments/profile.hpp"
+#include "server/station/state/station_state.hpp"
+
+namespace server::experiments {
+
+// Why an experiment does not go on: for programs and for people.
+struct Abort {
+  std::string reason;  // position, position_sd, power, gap, missing_samples, sensor_fault, …: docs/experiments.md
+  std::string detail;
+};
+
+class AbortWatch {
+ public:
+  // `now_us` is steady, here and below.
+  AbortWatch(const AbortCriteria& criteria, std::int64_t now_us) : criteria_{criteria}, received_at_us_{now_us} {}
+
+  // In any order: older samples may come after newer ones.
+  void on_samples(const station::SampleBatch& batch, std::int64_t now_us);
+
+  // What speaks against going on; the first of it stays.
+  std::optional<Abort> check(std::int64_t now_us) const;
+
+ private:
+  static constexpr std::size_t kWindow = 1000;  // samples: 10 s
+
+  void judge(const station::SampleBatch& batch, const station::Sample& sample);
+  void count(const station::SampleBatch& batch);
+  void abort(const char* reason, std::string detail);
+
+  const AbortCriteria criteria_;
+  std::optional<Abort> found_;
+  std::int64_t received_at_us_;
+  station::BootId boot_id_ = 0;
+  std::uint64_t first_seq_ = 0, next_seq_ = 0;  // counted from the first batch on
+  std::bitset<kWindow> received_;               // of the last kWindow samples before next_seq_, by seq modulo kWindow
+  double at_power_s_ = 0;
+};
+
+}  // namespace server::experiments

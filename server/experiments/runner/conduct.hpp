@@ -1,0 +1,93 @@
+// Conducts one experiment: prepares each run of its grid, records it, drives it, and says how it ended.
+//
+//   for each run: fluid → controller → model on the robot → beginning of the run → time line → end of the run
+//
+// Each run and its prediction is on disk before the robot moves. What cannot be prepared is a reason to pause (a person
+// must change the fluid) or to abort. Loop thread; all that it is given outlives it, and it outlives the loop's run()
+// or its own run().
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/experiments/runner/prediction.hpp"
+#include "server/experiments/runner/run_driver.hpp"
+#include "server/experiments/runner/stubborn_writer.hpp"
+#include "server/storage/experiments/experiment.hpp"
+#include "server/storage/runs/fluid_models.hpp"
+#include "server/storage/runs/runs.hpp"
+
+namespace server::experiments {
+
+inline constexpr microseconds kFluidWithin{3'600'000'000};  // for a person to change it
+
+// The controller of a name that a profile mentions, for this robot. Errors say what is wrong with the name.
+using ControllerByName =
+    std::function<boost::asio::awaitable<Result<protocol::Controller>>(std::string name, station::RobotId robot_id)>;
+
+struct ConductParts {
+  DriverParts driver;
+  storage::Runs& runs;
+  storage::FluidModels& fluid_models;
+  StubbornWriter& writer;
+  runtime::WorkerThread& maths;
+  const ControllerByName& controller_by_name;
+};
+
+class Conduct {
+ public:
+  Conduct(const ConductParts& parts, storage::Experiment experiment, Profile profile);
+
+  // None: all runs are done. The robot is at rest, in emergency, or of somebody else.
+  boost::asio::awaitable<std::optional<Abort>> run();
+
+  void pause(Abort why);
+  void resume();
+  void abort(Abort why);
+  void set_actor(const std::string& actor);
+
+  void on_samples(const station::SampleBatch& batch);
+  void on_robot(const station::RobotState& robot);
+  void on_command(const station::CommandRecord& record);
+
+  bool is_aborting() const { return abort_.has_value(); }
+  const Abort* pause_reason() const;  // null: it is not paused
+  const RunDriver* driver() const { return driver_.get(); }
+  std::uint32_t number() const { return number_; }  // of the run, from 1
+  const std::vector<storage::ExperimentRun>& runs() const { return begun_; }
+
+ private:
+  boost::asio::awaitable<void> one_run(Variant variant);
+  boost::asio::awaitable<void> prepare(Variant variant);
+  boost::asio::awaitable<void> await_fluid(std::string fluid);
+  boost::asio::awaitable<void> await_model();
+  boost::asio::awaitable<void> send_controller(std::string name);
+  boost::asio::awaitable<void> go_to_start();
+  boost::asio::awaitable<void> begin_recording(const Variant& variant, const TimeLine& line);
+  boost::asio::awaitable<std::string> predict(const TimeLine& line);
+  boost::asio::awaitable<DriveEnd> drive(TimeLine line);
+  boost::asio::awaitable<void> end_recording();
+  boost::asio::awaitable<void> submit(const char* what, protocol::Command command, std::string arguments);
+  storage::RunConditions conditions_of(const Variant& variant) const;
+  void take_control();
+  const station::RobotState& robot() const;
+  std::string peer() const;
+  storage::ExperimentRun& current() { return begun_.back(); }
+
+  const ConductParts parts_;
+  storage::Experiment experiment_;
+  Profile profile_;
+  std::unique_ptr<RunDriver> driver_;  // null: between runs
+  std::optional<Abort> abort_;
+  std::optional<Abort> waiting_for_;  // paused between runs
+  bool is_resumed_ = false;
+  std::uint32_t number_ = 0;
+  std::vector<storage::ExperimentRun> begun_;
+  runtime::Signal changed_;
+};
+
+}  // namespace server::experiments

@@ -1,0 +1,311 @@
+// What people do with experiments: begin, look, pause, resume, abort, take over, move.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "server/experiments/profile_document.hpp"
+#include "server/experiments/runner/experiments.hpp"
+#include "server/experiments/runner/limits_check.hpp"
+#include "server/runtime/counted.hpp"
+#include "server/station/state/audit_note.hpp"
+#include "server/storage/experiments/experiment_store.hpp"
+
+namespace server::experiments {
+namespace asio = boost::asio;
+using storage::Experiment;
+using storage::ExperimentId;
+using storage::ExperimentState;
+
+namespace {
+
+std::unexpected<Error> no_such_experiment(ExperimentId id) {
+  return fail(ErrorCode::not_found, fmt::format("there is no experiment {}", id), "no_such_experiment");
+}
+
+std::unexpected<Error> wrong_state(const ExperimentView& view, const char* what) {
+  return fail(
+      ErrorCode::conflict,
+      fmt::format("experiment {} is {} and cannot be {}", view.experiment.id, text(view.experiment.state), what),
+      "wrong_state");
+}
+
+}  // namespace
+
+Result<Experiments::Prepared> Experiments::prepare(const std::string& document, const config::Envelope& envelope,
+                                                   const std::string& fluid) {
+  try {
+    Prepared prepared;
+    prepared.profile = parse_profile(document, "profile");
+    if (auto allowed = check_limits(prepared.profile, envelope, fluid); !allowed)
+      return std::unexpected{allowed.error()};
+    for (const Variant& variant : variants_of(prepared.profile)) {
+      ++prepared.runs;
+      if (variant.repeat == 1)
+        prepared.duration_s +=
+            static_cast<double>(prepared.profile.sweep.repeats) * time_line_of(prepared.profile, variant).duration_s();
+    }
+    prepared.longest_auto_s = experiments::longest_auto_s(prepared.profile);
+    return prepared;
+  } catch (const std::invalid_argument& error) {
+    return fail(ErrorCode::invalid, error.what(), "profile");
+  }
+}
+
+Result<void> Experiments::check_request(const storage::ExperimentRequest& request) const {
+  if (parts_.station.find(request.robot_id) == nullptr) {
+    return fail(ErrorCode::not_found, fmt::format("no robot '{}' is known", request.robot_id), "unknown_robot");
+  }
+  // SAFETY: an administrator decides whether robots may move while nobody is there.
+  if (request.is_unattended && !allow_unattended_) {
+    return fail(ErrorCode::forbidden,
+                "the station's configuration does not allow unattended experiments (experiments.allow_unattended)",
+                "unattended_not_allowed");
+  }
+  if (!is_loaded_) return fail(ErrorCode::unavailable, "the station is just starting; try again", "starting");
+  if (entries_.size() + static_cast<std::size_t>(being_added_) < kMostQueued) return {};
+  return fail(ErrorCode::unavailable, fmt::format("{} experiments wait already", kMostQueued), "too_many_experiments");
+}
+
+asio::awaitable<Result<ExperimentView>> Experiments::begin(storage::ExperimentRequest request, station::Author by) {
+  if (auto allowed = check_request(request); !allowed) co_return std::unexpected{allowed.error()};
+  const runtime::Counted one_more{being_added_};
+  auto job = [document = request.profile, envelope = parts_.station.envelope(),
+              fluid = parts_.station.find(request.robot_id)->fluid] { return prepare(document, envelope, fluid); };
+  auto prepared = co_await maths_.run(std::move(job));
+  if (!prepared) co_return std::unexpected{prepared.error()};
+  if (request.is_unattended && !prepared->profile.is_unattended) {
+    co_return fail(ErrorCode::invalid, "the profile does not say unattended = true", "unattended_not_allowed");
+  }
+  const station::RobotSettings* settings = parts_.station.settings(request.robot_id);
+  const auto limit_s = settings == nullptr ? std::nullopt : settings->parameters.value("auto_limit_s");
+  if (limit_s && prepared->longest_auto_s > static_cast<double>(*limit_s)) {
+    co_return fail(ErrorCode::invalid,
+                   fmt::format("the profile stays in auto for {:.1f} s; the robot's auto_limit_s is {} s",
+                               prepared->longest_auto_s, *limit_s),
+                   "auto_limit");
+  }
+  Entry entry;
+  entry.profile = std::move(prepared->profile);
+  Experiment& experiment = entry.experiment;
+  experiment.request = std::move(request);
+  experiment.request.name = entry.profile.name;
+  experiment.owner = experiment.acts_for = by.actor;
+  experiment.runs_planned = prepared->runs;
+  experiment.duration_s = prepared->duration_s;
+  by.at_us = experiment.created_at_us = parts_.clock.utc_us();
+  station::AuditNote note = note_of(entry, "queued", by);
+  auto add = [&experiment, &note](storage::Database& database) -> Result<void> {
+    try {
+      storage::add_experiment(database, experiment, note);
+      return {};
+    } catch (const SQLite::Exception& error) {
+      return fail(ErrorCode::unavailable, fmt::format("it could not be stored: {}; try again", error.what()),
+                  "not_stored");
+    }
+  };
+  const Result<void> stored = co_await recording_.recorder.on_disk(std::move(add));
+  if (!stored) co_return std::unexpected{stored.error()};
+  const ExperimentId id = experiment.id;
+  Entry& kept = entries_[id];
+  kept = std::move(entry);
+  const Waits waits = waits_for(kept);
+  kept.waits_for = waits.reason;
+  kept.waits_for_detail = waits.detail;
+  publish(kept);
+  wake_.notify();
+  co_return view_of(kept);
+}
+
+asio::awaitable<Result<ExperimentView>> Experiments::find(ExperimentId id) {
+  if (const auto found = entries_.find(id); found != entries_.end()) co_return view_of(found->second);
+  auto query = [id](SQLite::Database& database) { return storage::find_experiment(database, id); };
+  auto found = co_await recording_.reader.ask(std::move(query));
+  if (!found) co_return no_such_experiment(id);
+  co_return ExperimentView{std::move(*found), "", "", std::nullopt};
+}
+
+asio::awaitable<std::vector<ExperimentView>> Experiments::list(storage::ExperimentFilter filter) {
+  auto query = [filter](SQLite::Database& database) { return storage::list_experiments(database, filter); };
+  std::vector<Experiment> found = co_await recording_.reader.ask(std::move(query));
+  std::vector<ExperimentView> views;
+  for (Experiment& experiment : found) {
+    const auto known = entries_.find(experiment.id);
+    views.push_back(known != entries_.end() ? view_of(known->second)
+                                            : ExperimentView{std::move(experiment), "", "", std::nullopt});
+  }
+  co_return views;
+}
+
+asio::awaitable<std::optional<std::string>> Experiments::prediction(ExperimentId id, std::uint32_t number) {
+  auto query = [id, number](SQLite::Database& database) {
+    return storage::experiment_prediction(database, id, number);
+  };
+  co_return co_await recording_.reader.ask(std::move(query));
+}
+
+asio::awaitable<Result<ExperimentView>> Experiments::wait_for_change(ExperimentId id, microseconds patience) {
+  const std::int64_t ends_us = parts_.clock.steady_us() + patience.count();
+  auto first = co_await find(id);
+  if (!first || storage::has_ended(first->experiment.state)) co_return first;
+  for (;;) {
+    if (parts_.clock.steady_us() >= ends_us) co_return co_await find(id);
+    co_await changed_.wait_until(parts_.clock, ends_us);
+    const auto known = entries_.find(id);
+    if (known == entries_.end() || state_of(known->second) != first->experiment.state) co_return co_await find(id);
+  }
+}
+
+// --- what changes one ---
+
+Result<Experiments::Entry*> Experiments::entry_of(ExperimentId id) {
+  const auto found = entries_.find(id);
+  if (found == entries_.end()) {
+    return fail(ErrorCode::conflict, fmt::format("experiment {} is not there, or has ended", id), "wrong_state");
+  }
+  return &found->second;
+}
+
+std::optional<std::string> Experiments::actor_of(ExperimentId id) const {
+  const auto found = entries_.find(id);
+  return found == entries_.end() ? std::nullopt : std::optional{found->second.experiment.acts_for};
+}
+
+station::AuditNote Experiments::note_of(const Entry& entry, const char* what, const station::Author& by) const {
+  station::AuditNote note;
+  note.by = by;
+  note.robot_id = entry.experiment.request.robot_id;
+  note.action = fmt::format("experiment.{}", what);
+  note.subject = fmt::format("{}", entry.experiment.id);
+  note.detail = station::audit_detail({{"name", entry.experiment.request.name}, {"reason", entry.experiment.reason}});
+  return note;
+}
+
+// What was done is on disk, with its entry in the audit, when it is answered.
+asio::awaitable<Result<ExperimentView>> Experiments::stored(ExperimentId id, station::AuditNote note) {
+  const auto entry = entry_of(id);
+  if (!entry) co_return co_await find(id);
+  auto store = [experiment = (*entry)->experiment, note = std::move(note)](storage::Database& database) {
+    storage::store_experiment(database, experiment, note);
+  };
+  publish(**entry);
+  wake_.notify();
+  co_await writer_.keep("the state of an experiment", std::move(store));
+  co_return co_await find(id);
+}
+
+asio::awaitable<Result<ExperimentView>> Experiments::pause(ExperimentId id, station::Author by) {
+  by.at_us = parts_.clock.utc_us();
+  const auto entry = entry_of(id);
+  if (!entry) co_return std::unexpected{entry.error()};
+  if (state_of(**entry) != ExperimentState::running) co_return wrong_state(view_of(**entry), "paused");
+  (*entry)->conduct->pause({"requested", fmt::format("{} has paused it", by.actor)});
+  co_return co_await stored(id, note_of(**entry, "paused", by));
+}
+
+asio::awaitable<Result<ExperimentView>> Experiments::resume(ExperimentId id, station::Author by) {
+  by.at_us = parts_.clock.utc_us();
+  const auto entry = entry_of(id);
+  if (!entry) co_return std::unexpected{entry.error()};
+  Experiment& experiment = (*entry)->experiment;
+  if (experiment.acts_for != by.actor) {
+    co_return fail(ErrorCode::conflict,
+                   fmt::format("it acts in the name of {}; take it over to go on with it", experiment.acts_for),
+                   "acts_for_another");
+  }
+  const ExperimentState state = state_of(**entry);
+  const bool is_held = state == ExperimentState::waiting && experiment.is_held;
+  if (state != ExperimentState::paused && !is_held) co_return wrong_state(view_of(**entry), "resumed");
+  experiment.is_held = false;
+  experiment.reason.clear();
+  if ((*entry)->conduct) (*entry)->conduct->resume();
+  co_return co_await stored(id, note_of(**entry, "resumed", by));
+}
+
+// SAFETY: first the robot, then the database.
+asio::awaitable<Result<ExperimentView>> Experiments::abort(ExperimentId id, std::string reason, station::Author by) {
+  by.at_us = parts_.clock.utc_us();
+  const auto found = entry_of(id);
+  if (!found) co_return std::unexpected{found.error()};
+  Entry& entry = **found;
+  const std::string detail =
+      reason.empty() ? fmt::format("{} has ended it", by.actor) : fmt::format("{} has ended it: {}", by.actor, reason);
+  if (entry.conduct) {
+    entry.conduct->abort({"requested", detail});
+    co_return co_await stored(id, note_of(entry, "abort_requested", by));
+  }
+  if (running_.contains(entry.experiment.request.robot_id) && running_[entry.experiment.request.robot_id] == id) {
+    co_return fail(ErrorCode::conflict, "it is just about to begin; try again", "wrong_state");
+  }
+  Experiment ended = entry.experiment;
+  ended.state = ExperimentState::cancelled;
+  ended.reason = "requested";
+  ended.detail = detail;
+  ended.ended_at_us = by.at_us;
+  const station::AuditNote note = note_of(entry, "cancelled", by);
+  entries_.erase(id);
+  auto store = [ended, note](storage::Database& database) { storage::store_experiment(database, ended, note); };
+  co_await writer_.keep("the end of an experiment", std::move(store));
+  on_change_({ended, "", "", std::nullopt});
+  changed_.notify();
+  wake_.notify();
+  co_return co_await find(id);
+}
+
+asio::awaitable<Result<ExperimentView>> Experiments::take_over(ExperimentId id, station::Author by) {
+  by.at_us = parts_.clock.utc_us();
+  const auto found = entry_of(id);
+  if (!found) co_return std::unexpected{found.error()};
+  Entry& entry = **found;
+  const std::string holder = parts_.station.holder(entry.experiment.request.robot_id);
+  // SAFETY: control never changes hands by the way of an experiment.
+  if (!holder.empty() && holder != by.actor) {
+    co_return fail(ErrorCode::conflict, fmt::format("control of its robot is with {}; take that first", holder),
+                   "not_in_control");
+  }
+  const bool needs_control = entry.conduct != nullptr && holder.empty();
+  if (needs_control) {
+    station::ControlRequest request;
+    request.robot_id = entry.experiment.request.robot_id;
+    request.actor = by.actor;
+    request.peer = by.peer;
+    const auto taken = parts_.station.control(request);
+    if (!taken) co_return std::unexpected{taken.error()};
+  }
+  entry.experiment.acts_for = by.actor;
+  if (entry.conduct) entry.conduct->set_actor(by.actor);
+  co_return co_await stored(id, note_of(entry, "taken_over", by));
+}
+
+asio::awaitable<Result<ExperimentView>> Experiments::move(ExperimentId id, ExperimentId before, std::int64_t priority,
+                                                          station::Author by) {
+  by.at_us = parts_.clock.utc_us();
+  const auto found = entry_of(id);
+  if (!found) co_return std::unexpected{found.error()};
+  Entry& entry = **found;
+  if (entry.conduct) co_return wrong_state(view_of(entry), "moved");
+  std::vector<Entry*> queue = queue_of(entry.experiment.request.robot_id);
+  std::erase(queue, &entry);
+  const auto at = std::ranges::find_if(queue, [before](const Entry* one) { return one->experiment.id == before; });
+  if (before != 0 && at == queue.end()) {
+    co_return fail(ErrorCode::invalid, fmt::format("experiment {} does not wait for this robot", before),
+                   "no_such_place");
+  }
+  std::vector<std::int64_t> places{entry.experiment.place};
+  for (const Entry* one : queue) places.push_back(one->experiment.place);
+  std::ranges::sort(places);
+  entry.experiment.request.priority = before == 0 ? priority : (*at)->experiment.request.priority;
+  queue.insert(at, &entry);
+  std::vector<Experiment> moved;
+  for (std::size_t i = 0; i < queue.size(); ++i) {
+    queue[i]->experiment.place = places[i];
+    moved.push_back(queue[i]->experiment);
+  }
+  auto store = [moved](storage::Database& database) {
+    for (const Experiment& experiment : moved) storage::store_experiment(database, experiment);
+  };
+  station::AuditNote note = note_of(entry, "moved", by);
+  co_await writer_.keep("the queue of a robot", std::move(store));
+  co_return co_await stored(id, std::move(note));
+}
+
+}  // namespace server::experiments

@@ -1,0 +1,319 @@
+// The queue: which experiment may begin, what it waits for, and what is left of it at its end.
+#include "server/experiments/runner/experiments.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "server/experiments/profile_document.hpp"
+#include "server/experiments/runner/limits_check.hpp"
+#include "server/storage/experiments/experiment_store.hpp"
+
+namespace server::experiments {
+namespace asio = boost::asio;
+using namespace std::chrono_literals;
+using storage::Experiment;
+using storage::ExperimentId;
+using storage::ExperimentState;
+
+namespace {
+
+constexpr microseconds kLookAtQueues = 200ms;
+constexpr microseconds kPublishEvery = 1s;
+constexpr const char* kStationActor = "station:experiments";
+
+// What keeps one experiment from its beginning and no other one behind it.
+constexpr std::array<std::string_view, 3> kLetsOthersGo{"held", "nobody_present", "control_of_another"};
+
+// The document was checked before it was stored.
+std::optional<Profile> profile_of(const Experiment& experiment) {
+  try {
+    return parse_profile(experiment.request.profile, experiment.request.name);
+  } catch (const std::invalid_argument& error) {
+    spdlog::error("experiment {} cannot be read any more: {}", experiment.id, error.what());
+    return std::nullopt;
+  }
+}
+
+bool comes_before(const Experiment& a, const Experiment& b) {
+  if (a.request.priority != b.request.priority) return a.request.priority > b.request.priority;
+  return a.place < b.place;
+}
+
+}  // namespace
+
+Experiments::Experiments(const DriverParts& parts, storage::RecordingParts& recording, runtime::WorkerThread& maths,
+                         bool allow_unattended)
+    : parts_{parts},
+      recording_{recording},
+      maths_{maths},
+      allow_unattended_{allow_unattended},
+      writer_{parts.clock, recording.recorder},
+      wake_{parts.loop},
+      changed_{parts.loop} {
+  parts.station.add_sink(*this);
+}
+
+Experiments::~Experiments() = default;
+
+asio::awaitable<void> Experiments::load() {
+  auto interrupt = [utc_us = parts_.clock.utc_us()](storage::Database& database) {
+    return storage::interrupt_experiments(database, utc_us);
+  };
+  const auto robots = co_await recording_.recorder.on_disk(std::move(interrupt));
+  to_rest_ = {robots.begin(), robots.end()};
+  auto query = [](storage::Database& database) { return storage::waiting_experiments(database.handle()); };
+  const std::vector<Experiment> waiting = co_await recording_.recorder.on_disk(std::move(query));
+  for (const Experiment& experiment : waiting) {
+    auto profile = profile_of(experiment);
+    if (!profile) continue;
+    Entry& entry = entries_[experiment.id];
+    entry.experiment = experiment;
+    entry.profile = std::move(*profile);
+  }
+  if (!robots.empty()) spdlog::warn("{} experiments were interrupted by the end of the station", robots.size());
+}
+
+asio::awaitable<void> Experiments::run() {
+  co_await load();
+  is_loaded_ = true;
+  std::int64_t published_us = 0;
+  for (;;) {
+    put_interrupted_to_rest();
+    begin_what_may();
+    co_await store_states();
+    const std::int64_t now_us = parts_.clock.steady_us();
+    if (now_us - published_us >= kPublishEvery.count()) {
+      published_us = now_us;
+      for (const auto& [robot, id] : running_) publish(entries_.at(id));
+    }
+    co_await wake_.wait_until(parts_.clock, now_us + kLookAtQueues.count());
+  }
+}
+
+// SAFETY: the robot of an experiment that a restart interrupted goes on in auto, if its link held; nobody watches it.
+void Experiments::put_interrupted_to_rest() {
+  for (auto at = to_rest_.begin(); at != to_rest_.end();) {
+    const station::RobotState* robot = parts_.station.find(*at);
+    const bool is_known = robot != nullptr && robot->link == station::LinkState::connected && robot->sample;
+    if (!is_known) {
+      ++at;
+      continue;
+    }
+    const bool goes_on = !robot->latched() && !is_at_rest(*robot);
+    if (goes_on) parts_.tasks.spawn("rest of robot '" + *at + "'", put_to_rest(*at));
+    at = to_rest_.erase(at);
+  }
+}
+
+asio::awaitable<void> Experiments::put_to_rest(station::RobotId robot_id) {
+  RestRequest request{robot_id, kStationActor, "experiment:interrupted"};
+  co_await bring_to_rest(parts_.station, parts_.clock, std::move(request));
+}
+
+// --- what may begin ---
+
+std::vector<Experiments::Entry*> Experiments::queue_of(const station::RobotId& robot_id) {
+  std::vector<Entry*> queue;
+  for (auto& [id, entry] : entries_) {
+    const bool waits = entry.experiment.state == ExperimentState::waiting && !entry.conduct;
+    if (waits && entry.experiment.request.robot_id == robot_id) queue.push_back(&entry);
+  }
+  std::ranges::sort(queue, [](const Entry* a, const Entry* b) { return comes_before(a->experiment, b->experiment); });
+  return queue;
+}
+
+Experiments::Waits Experiments::waits_for(const Entry& entry) const {
+  const Experiment& experiment = entry.experiment;
+  const station::RobotState* robot = parts_.station.find(experiment.request.robot_id);
+  if (experiment.is_held) return {"held", "it waits until somebody resumes it: " + experiment.reason};
+  if (running_.contains(experiment.request.robot_id)) return {"another_experiment", "another one runs on this robot"};
+  if (robot == nullptr || robot->link != station::LinkState::connected || !robot->sample) {
+    return {"robot_not_connected", "the robot is not connected"};
+  }
+  if (robot->latched()) return {"emergency", "the robot is in emergency"};
+  if (!is_at_rest(*robot)) return {"robot_not_at_rest", "the robot is not in manual at duty 0"};
+  const std::string holder = parts_.station.holder(robot->id);
+  if (!holder.empty() && holder != experiment.acts_for) return {"control_of_another", "control is with " + holder};
+  const auto seen_us = parts_.station.seen_us(experiment.acts_for);
+  const bool is_there = seen_us && parts_.clock.steady_us() - *seen_us <= station::kOldestSight.count();
+  // SAFETY: somebody is there when it begins, also for an unattended one.
+  if (!is_there) return {"nobody_present", experiment.acts_for + " gives no sign of life"};
+  const std::string fluid = variants_of(entry.profile).front().fluid;
+  if (!fluid.empty() && !robot->fluid.empty() && fluid != robot->fluid) {
+    return {"fluid", fmt::format("the robot is in '{}', the first run is in '{}'", robot->fluid, fluid)};
+  }
+  if (const auto room = recording_.disk_watch.may_begin("an experiment"); !room)
+    return {"disk_space", room.error().detail};
+  return {};
+}
+
+void Experiments::begin_what_may() {
+  std::set<station::RobotId> robots;
+  for (const auto& [id, entry] : entries_) robots.insert(entry.experiment.request.robot_id);
+  for (const station::RobotId& robot_id : robots) {
+    bool is_turn = true;
+    for (Entry* entry : queue_of(robot_id)) {
+      Waits waits = waits_for(*entry);
+      const bool lets_others_go = std::ranges::find(kLetsOthersGo, waits.reason) != kLetsOthersGo.end();
+      if (!is_turn && !lets_others_go) waits = {"others", "others are before it"};
+      is_turn = is_turn && lets_others_go;
+      entry->waits_for = std::move(waits.reason);
+      entry->waits_for_detail = std::move(waits.detail);
+      if (!entry->waits_for.empty()) continue;
+      const ExperimentId id = entry->experiment.id;
+      running_[robot_id] = id;
+      parts_.tasks.spawn(fmt::format("experiment {}", id), carry_out(id));
+      break;
+    }
+  }
+}
+
+// --- one that runs ---
+
+asio::awaitable<void> Experiments::carry_out(ExperimentId id) {
+  Entry& entry = entries_.at(id);
+  entry.waits_for.clear();
+  const ConductParts conduct_parts{parts_,  recording_.runs, recording_.fluid_models,
+                                   writer_, maths_,          controller_by_name_};
+  entry.experiment.started_at_us = parts_.clock.utc_us();
+  entry.experiment.state = ExperimentState::running;
+  entry.experiment.reason.clear();
+  entry.conduct = std::make_unique<Conduct>(conduct_parts, entry.experiment, entry.profile);
+  auto begun = [experiment = entry.experiment](storage::Database& database) {
+    storage::store_experiment(database, experiment);
+  };
+  co_await writer_.keep("the beginning of an experiment", std::move(begun));
+  publish(entry);
+  const std::string name = fmt::format("experiment {}", id);
+  co_await runtime::contained(parts_.tasks.exceptions(), parts_.clock, runtime::Ended::experiment, name,
+                              conduct(entry));
+  if (!entry.has_ended) {  // by an exception
+    entry.end = Abort{"internal", "the station could not go on with it; its log says why"};
+    RestRequest rest{entry.experiment.request.robot_id, entry.experiment.acts_for, fmt::format("experiment:{}", id)};
+    co_await bring_to_rest(parts_.station, parts_.clock, std::move(rest));
+  }
+  co_await finish(entry);
+}
+
+asio::awaitable<void> Experiments::conduct(Entry& entry) {
+  entry.end = co_await entry.conduct->run();
+  entry.has_ended = true;
+}
+
+asio::awaitable<void> Experiments::finish(Entry& entry) {
+  Experiment& experiment = entry.experiment;
+  experiment.state = entry.end ? ExperimentState::aborted : ExperimentState::done;
+  experiment.reason = entry.end ? entry.end->reason : "";
+  experiment.detail = entry.end ? entry.end->detail : "";
+  experiment.ended_at_us = parts_.clock.utc_us();
+  const station::Author by{experiment.acts_for, fmt::format("experiment:{}", experiment.id), *experiment.ended_at_us};
+  auto ended = [experiment, note = note_of(entry, entry.end ? "aborted" : "done", by)](storage::Database& database) {
+    storage::store_experiment(database, experiment, note);
+  };
+  co_await writer_.keep("the end of an experiment", std::move(ended));
+  if (experiment.request.is_unattended) {  // its control was taken for longer than a sign of life lasts
+    station::ControlRequest release;
+    release.robot_id = experiment.request.robot_id;
+    release.actor = experiment.acts_for;
+    release.peer = by.peer;
+    release.action = station::ControlAction::release;
+    static_cast<void>(parts_.station.control(release));
+  }
+  publish(entry);
+  const station::RobotId robot_id = experiment.request.robot_id;
+  const bool is_aborted = entry.end.has_value();
+  const ExperimentId id = experiment.id;
+  if (is_aborted) co_await hold_queue(robot_id);
+  running_.erase(robot_id);
+  entries_.erase(id);
+  changed_.notify();
+  wake_.notify();
+}
+
+// SAFETY: after an abort nothing begins before somebody has looked.
+asio::awaitable<void> Experiments::hold_queue(station::RobotId robot_id) {
+  std::vector<Experiment> held;
+  for (Entry* entry : queue_of(robot_id)) {
+    entry->experiment.is_held = true;
+    entry->experiment.reason = "previous_aborted";
+    held.push_back(entry->experiment);
+  }
+  auto hold = [held](storage::Database& database) {
+    for (const Experiment& experiment : held) storage::store_experiment(database, experiment);
+  };
+  co_await writer_.keep("the queue of a robot", std::move(hold));
+}
+
+storage::ExperimentState Experiments::state_of(const Entry& entry) const {
+  if (!entry.conduct || storage::has_ended(entry.experiment.state)) return entry.experiment.state;
+  if (entry.conduct->is_aborting()) return ExperimentState::aborting;
+  return entry.conduct->pause_reason() != nullptr ? ExperimentState::paused : ExperimentState::running;
+}
+
+// What has become of those that run, as far as the database does not know it.
+asio::awaitable<void> Experiments::store_states() {
+  std::vector<Experiment> changed;
+  for (auto& [id, entry] : entries_) {
+    const ExperimentState state = state_of(entry);
+    if (!entry.conduct || state == entry.experiment.state) continue;
+    const Abort* why = entry.conduct->pause_reason();
+    entry.experiment.state = state;
+    entry.experiment.reason = why == nullptr ? "" : why->reason;
+    entry.experiment.detail = why == nullptr ? "" : why->detail;
+    changed.push_back(entry.experiment);
+    publish(entry);
+  }
+  if (changed.empty()) co_return;
+  changed_.notify();
+  auto store = [changed](storage::Database& database) {
+    for (const Experiment& experiment : changed) storage::store_experiment(database, experiment);
+  };
+  co_await writer_.keep("the state of an experiment", std::move(store));
+}
+
+void Experiments::publish(const Entry& entry) {
+  changed_.notify();
+  on_change_(view_of(entry));
+}
+
+ExperimentView Experiments::view_of(const Entry& entry) const {
+  ExperimentView view{entry.experiment, entry.waits_for, entry.waits_for_detail, std::nullopt};
+  view.experiment.state = state_of(entry);
+  if (!entry.conduct) return view;
+  view.experiment.runs = entry.conduct->runs();
+  if (const Abort* why = entry.conduct->pause_reason()) {
+    view.experiment.reason = why->reason;
+    view.experiment.detail = why->detail;
+  }
+  const RunDriver* driver = entry.conduct->driver();
+  if (driver == nullptr || storage::has_ended(view.experiment.state)) return view;
+  view.progress = ExperimentProgress{entry.conduct->number(),    entry.experiment.runs_planned, driver->step() + 1,
+                                     entry.profile.steps.size(), driver->elapsed_s(),           driver->duration_s()};
+  return view;
+}
+
+// --- the station's reports ---
+
+Conduct* Experiments::conduct_of(const station::RobotId& robot_id) {
+  const auto found = running_.find(robot_id);
+  if (found == running_.end()) return nullptr;
+  return entries_.at(found->second).conduct.get();
+}
+
+void Experiments::on_samples(const station::RobotState& robot, const station::SampleBatch& batch) {
+  if (Conduct* conduct = conduct_of(robot.id)) conduct->on_samples(batch);
+}
+
+void Experiments::on_robot(const station::RobotState& robot) {
+  if (Conduct* conduct = conduct_of(robot.id)) conduct->on_robot(robot);
+}
+
+void Experiments::on_command(const station::CommandRecord& record) {
+  if (Conduct* conduct = conduct_of(record.robot_id)) conduct->on_command(record);
+}
+
+}  // namespace server::experiments

@@ -1,0 +1,144 @@
+// The experiments of the station: a queue for each robot, of which one at a time is conducted.
+//
+//   begin() → waiting → running ⇄ paused → done or aborted          every state is a row on disk; cancel() ends a
+//   waiting one
+//
+// SAFETY: nothing begins by itself. An experiment begins when the actor in whose name it acts is there (a page by its
+// stamps, a script by keep_alive()) and nobody else controls the robot; after an abort or a restart of the station what
+// waits is held until somebody releases it. At most kMostQueued wait. Abort, and what ends one, leaves the robot at
+// rest. Loop thread; what it is given outlives it.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "server/experiments/runner/conduct.hpp"
+#include "server/runtime/result.hpp"
+#include "server/storage/recording_parts.hpp"
+
+namespace server::experiments {
+
+inline constexpr std::size_t kMostQueued = 200;
+inline constexpr std::size_t kMaxProfileBytes = 32'000;
+
+struct ExperimentProgress {
+  std::uint32_t run = 0, runs = 0;       // from 1
+  std::size_t step = 0, steps = 0;       // from 1
+  double elapsed_s = 0, duration_s = 0;  // of the run
+};
+
+// What is known of one now.
+struct ExperimentView {
+  storage::Experiment experiment;
+  std::string waits_for;  // of a waiting one, for programs: nobody_present, robot_not_at_rest, …; empty: its turn
+  std::string waits_for_detail;
+  std::optional<ExperimentProgress> progress;  // of one that runs
+};
+
+class Experiments final : public station::StationSink {
+ public:
+  // It hears the station from now on.
+  Experiments(const DriverParts& parts, storage::RecordingParts& recording, runtime::WorkerThread& maths,
+              bool allow_unattended);
+  ~Experiments() override;
+
+  void set_controller_by_name(ControllerByName by_name) { controller_by_name_ = std::move(by_name); }
+  using OnChange = std::function<void(const ExperimentView&)>;
+  void set_on_change(OnChange on_change) { on_change_ = std::move(on_change); }  // and once a second while one runs
+
+  boost::asio::awaitable<void> run();  // until cancelled; before it nothing is begun
+
+  // At the end of the robot's queue, on disk. invalid: what the profile or the station's limits say against it;
+  // forbidden: unattended where the configuration does not allow it; not_found; unavailable: too many wait.
+  boost::asio::awaitable<Result<ExperimentView>> begin(storage::ExperimentRequest request, station::Author by);
+
+  boost::asio::awaitable<Result<ExperimentView>> find(storage::ExperimentId id);
+  boost::asio::awaitable<std::vector<ExperimentView>> list(storage::ExperimentFilter filter);
+  boost::asio::awaitable<std::optional<std::string>> prediction(storage::ExperimentId id, std::uint32_t number);
+  // As find(), once its state is another one than `known`, or so much later.
+  boost::asio::awaitable<Result<ExperimentView>> wait_for_change(storage::ExperimentId id, microseconds patience);
+
+  // By people. conflict: its state forbids it. Each is in the audit.
+  boost::asio::awaitable<Result<ExperimentView>> pause(storage::ExperimentId id, station::Author by);
+  boost::asio::awaitable<Result<ExperimentView>> resume(storage::ExperimentId id, station::Author by);
+  boost::asio::awaitable<Result<ExperimentView>> abort(storage::ExperimentId id, std::string reason,
+                                                       station::Author by);
+  // It acts in the caller's name from now on. conflict while somebody else controls the robot.
+  boost::asio::awaitable<Result<ExperimentView>> take_over(storage::ExperimentId id, station::Author by);
+  // Before another one of its robot's queue (0: to its end), with this priority.
+  boost::asio::awaitable<Result<ExperimentView>> move(storage::ExperimentId id, storage::ExperimentId before,
+                                                      std::int64_t priority, station::Author by);
+  // In whose name it acts; none: it is not known, or has ended.
+  std::optional<std::string> actor_of(storage::ExperimentId id) const;
+
+  void on_samples(const station::RobotState& robot, const station::SampleBatch& batch) override;
+  void on_robot(const station::RobotState& robot) override;
+  void on_command(const station::CommandRecord& record) override;
+
+ private:
+  struct Entry {
+    storage::Experiment experiment;
+    Profile profile;
+    std::string waits_for, waits_for_detail;
+    std::unique_ptr<Conduct> conduct;  // null: it waits
+    std::optional<Abort> end;          // of a conduct that has ended
+    bool has_ended = false;
+  };
+
+  struct Waits {
+    std::string reason, detail;
+  };
+
+  // A document that was read, on the worker.
+  struct Prepared {
+    Profile profile;
+    std::uint32_t runs = 0;
+    double duration_s = 0;
+    double longest_auto_s = 0;
+  };
+  static Result<Prepared> prepare(const std::string& document, const config::Envelope& envelope,
+                                  const std::string& fluid);
+
+  boost::asio::awaitable<void> load();
+  boost::asio::awaitable<void> carry_out(storage::ExperimentId id);
+  boost::asio::awaitable<void> conduct(Entry& entry);
+  boost::asio::awaitable<void> finish(Entry& entry);
+  boost::asio::awaitable<void> hold_queue(station::RobotId robot_id);
+  boost::asio::awaitable<void> put_to_rest(station::RobotId robot_id);
+  boost::asio::awaitable<void> store_states();
+  void begin_what_may();
+  void put_interrupted_to_rest();
+  Waits waits_for(const Entry& entry) const;
+  Entry* first_waiting(const station::RobotId& robot_id);
+  std::vector<Entry*> queue_of(const station::RobotId& robot_id);
+  Result<Entry*> entry_of(storage::ExperimentId id);
+  Result<void> check_request(const storage::ExperimentRequest& request) const;
+  storage::ExperimentState state_of(const Entry& entry) const;
+  ExperimentView view_of(const Entry& entry) const;
+  station::AuditNote note_of(const Entry& entry, const char* what, const station::Author& by) const;
+  boost::asio::awaitable<Result<ExperimentView>> stored(storage::ExperimentId id, station::AuditNote note);
+  void publish(const Entry& entry);
+  Conduct* conduct_of(const station::RobotId& robot_id);
+
+  const DriverParts parts_;
+  storage::RecordingParts& recording_;
+  runtime::WorkerThread& maths_;
+  const bool allow_unattended_;
+  StubbornWriter writer_;
+  ControllerByName controller_by_name_;
+  OnChange on_change_ = [](const ExperimentView&) {};
+  std::map<storage::ExperimentId, Entry> entries_;             // that have not ended
+  std::map<station::RobotId, storage::ExperimentId> running_;  // of each robot at most one
+  std::set<station::RobotId> to_rest_;  // whose experiment was interrupted: what they do is ended when they are back
+  bool is_loaded_ = false;
+  int being_added_ = 0;
+  runtime::Signal wake_;
+  runtime::Signal changed_;
+};
+
+}  // namespace server::experiments

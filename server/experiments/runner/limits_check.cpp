@@ -1,0 +1,73 @@
+#include "server/experiments/runner/limits_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace server::experiments {
+namespace {
+
+Result<void> within(const Action& action, const char* what, double minimum, double maximum) {
+  if (action.value >= minimum && action.value <= maximum) return {};
+  return fail(ErrorCode::invalid,
+              fmt::format("step {}: {} = {} is outside {} to {}, the limits of the station", action.step + 1, what,
+                          action.value, minimum, maximum),
+              "out_of_range");
+}
+
+Result<void> check_action(const Action& action, const config::CommandLimits& limits, double& setpoint_m) {
+  switch (action.kind) {
+    case ActionKind::duty: return within(action, "duty", limits.duty_min, limits.duty_max);
+    case ActionKind::disturbance:
+      return within(action, "disturbance_m", -limits.disturbance_max_m, limits.disturbance_max_m);
+    case ActionKind::setpoint: break;
+  }
+  if (auto allowed = within(action, "setpoint_m", limits.setpoint_min_m, limits.setpoint_max_m); !allowed)
+    return allowed;
+  const double step_m = std::abs(action.value - setpoint_m);
+  setpoint_m = action.value;
+  if (step_m <= limits.setpoint_step_m + 1e-6) return {};
+  return fail(ErrorCode::invalid,
+              fmt::format("step {}: setpoint_m = {} is {:.3f} m from the one before it; a step is at most {} m",
+                          action.step + 1, action.value, step_m, limits.setpoint_step_m),
+              "step_too_large");
+}
+
+}  // namespace
+
+Result<void> check_limits(const Profile& profile, const config::Envelope& envelope, const std::string& fluid_of_robot) {
+  for (const Variant& variant : variants_of(profile)) {
+    if (variant.repeat > 1) continue;
+    if (!variant.fluid.empty()) {
+      if (auto listed = envelope.listed(variant.fluid); !listed) return std::unexpected{listed.error()};
+    }
+    const config::CommandLimits& limits = envelope.in(variant.fluid.empty() ? fluid_of_robot : variant.fluid);
+    double setpoint_m = 0;
+    const TimeLine line = time_line_of(profile, variant);
+    for (const Action& action : line.actions) {
+      if (auto allowed = check_action(action, limits, setpoint_m); !allowed) return allowed;
+    }
+  }
+  return {};
+}
+
+double longest_auto_s(const Profile& profile) {
+  std::uint64_t longest = 0;
+  for (const Variant& variant : variants_of(profile)) {
+    if (variant.repeat > 1) continue;
+    const TimeLine line = time_line_of(profile, variant);
+    std::uint64_t since = line.ticks;
+    bool is_auto = false;
+    for (const Action& action : line.actions) {
+      const bool to_auto = action.kind != ActionKind::duty;
+      if (to_auto && !is_auto) since = action.tick;
+      if (!to_auto && is_auto) longest = std::max(longest, action.tick - since);
+      is_auto = to_auto;
+    }
+    if (is_auto) longest = std::max(longest, line.ticks - since);
+  }
+  return static_cast<double>(longest) * kTick_s;
+}
+
+}  // namespace server::experiments

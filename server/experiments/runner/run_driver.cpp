@@ -1,0 +1,304 @@
+#include "server/experiments/runner/run_driver.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <string_view>
+#include <utility>
+
+#include "server/experiments/runner/order_arguments.hpp"
+#include "server/runtime/counted.hpp"
+#include "server/station/commands/pending_command.hpp"
+
+namespace server::experiments {
+namespace asio = boost::asio;
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr microseconds kTurn = 20ms;           // between two looks, if no sample comes
+constexpr microseconds kBeginsAfter = 500ms;   // more than kLookAhead
+constexpr microseconds kWrongModeFor = 400ms;  // telemetry comes later than the time of a command
+constexpr microseconds kRenewsEvery = 120ms;   // a lease lasts 500 ms
+constexpr microseconds kTasksEndWithin = 10s;
+
+// Commands of which a run knows nothing, and that change what it measures.
+constexpr std::array<std::string_view, 8> kDisturbing{"set_mode",          "set_setpoint",       "set_duty",
+                                                      "set_duty_schedule", "inject_disturbance", "zero_position",
+                                                      "set_controller",    "restore_controller"};
+
+}  // namespace
+
+RunDriver::RunDriver(const DriverParts& parts, DriveRequest request, const AbortCriteria& criteria, TimeLine line)
+    : parts_{parts},
+      request_{std::move(request)},
+      line_{std::move(line)},
+      watch_{criteria, parts.clock.steady_us()},
+      feed_{line_, 0, 0},
+      changed_{parts.loop} {}
+
+std::uint64_t RunDriver::robot_now_us(const station::RobotState& robot) const {
+  return static_cast<std::uint64_t>(station::robot_now_us(robot, parts_.clock));
+}
+
+std::int64_t RunDriver::silent_for_us() const {
+  const auto seen_us = parts_.station.seen_us(request_.actor);
+  return seen_us ? parts_.clock.steady_us() - *seen_us : std::numeric_limits<std::int64_t>::max();
+}
+
+bool RunDriver::is_fresh() const { return silent_for_us() <= station::kOldestSight.count(); }
+
+void RunDriver::begin_at(std::size_t step) {
+  const station::RobotState* robot = parts_.station.find(request_.robot_id);
+  ++generation_;
+  wrong_mode_since_us_ = 0;
+  next_begin_ = step;
+  feed_ = CommandFeed{line_, step, robot_now_us(*robot) + static_cast<std::uint64_t>(kBeginsAfter.count())};
+}
+
+asio::awaitable<DriveEnd> RunDriver::run() {
+  const station::RobotState* robot = parts_.station.find(request_.robot_id);
+  if (robot == nullptr) co_return DriveEnd{Abort{"unknown_robot", "the robot is not known"}, Rest::latched};
+  boot_id_ = robot->boot_id;
+  begin_at(0);
+  co_await run_until_end();
+  ++generation_;
+  const Rest at_the_end = co_await rest();
+  co_await settle_tasks();
+  co_return DriveEnd{abort_, at_the_end};
+}
+
+asio::awaitable<void> RunDriver::run_until_end() {
+  for (;;) {
+    const station::RobotState& robot = *parts_.station.find(request_.robot_id);
+    if (auto found = watch_.check(parts_.clock.steady_us())) abort(std::move(*found));
+    if (!abort_ && !pause_) watch(robot);
+    if (abort_) co_return;
+    if (pause_) {
+      co_await stay_paused();
+      continue;
+    }
+    feed(robot);
+    renew_lease();
+    note_steps(robot_now_us(robot));
+    if (feed_.is_over(robot_now_us(robot)) && on_their_way_ == 0) co_return;
+    co_await changed_.wait_until(parts_.clock, parts_.clock.steady_us() + kTurn.count());
+  }
+}
+
+// --- what speaks against going on ---
+
+void RunDriver::watch(const station::RobotState& robot) {
+  if (robot.latched()) {
+    return abort(
+        {"emergency", fmt::format("the robot is in emergency ({})", protocol::text(robot.context.emergency_cause))});
+  }
+  watch_mode(robot);
+  watch_actor(robot);
+}
+
+void RunDriver::watch_mode(const station::RobotState& robot) {
+  const std::int64_t now_us = parts_.clock.steady_us();
+  const bool lapsed = (robot.context.flags & rheonaut_TELEMETRY_FLAG_LEASE_LAPSED) != 0;
+  if (lapsed && feed_.needs_lease(robot.latest_robot_time_us)) {
+    return pause_for({{"lease_lapsed", "the lease of the duty was not renewed in time"}, now_us, false, true});
+  }
+  if (robot.context.mode == feed_.mode_at(robot.latest_robot_time_us)) {
+    wrong_mode_since_us_ = 0;
+    return;
+  }
+  if (wrong_mode_since_us_ == 0) wrong_mode_since_us_ = now_us;
+  if (now_us - wrong_mode_since_us_ <= kWrongModeFor.count()) return;
+  abort({"mode_left", fmt::format("the robot is in the mode {} and was to be in {}", protocol::text(robot.context.mode),
+                                  protocol::text(feed_.mode_at(robot.latest_robot_time_us)))});
+}
+
+// SAFETY: nobody's motor runs while they are away, and nobody's but that of who is in control.
+void RunDriver::watch_actor(const station::RobotState& robot) {
+  const std::int64_t silent_us = silent_for_us(), now_us = parts_.clock.steady_us();
+  const std::string holder = parts_.station.holder(request_.robot_id);
+  if (!holder.empty() && holder != request_.actor) {
+    return pause_for({{"control_changed", fmt::format("control is with {} now", holder)}, now_us});
+  }
+  if (request_.is_unattended) {
+    if (silent_us <= request_.auto_limit.count() && !holder.empty()) return;
+    return abort({"unattended_limit", fmt::format("nobody was there for {} s", request_.auto_limit / 1s)});
+  }
+  if (silent_us > kAbsence.count() || holder.empty()) {
+    return abort(
+        {"nobody_present", fmt::format("{} has given no sign of life for {} s", request_.actor, kAbsence / 1s)});
+  }
+  const std::uint64_t robot_us = robot_now_us(robot);
+  const bool is_driving = feed_.needs_lease(robot_us) || feed_.is_about_to_drive(robot_us);
+  if (!is_driving || is_fresh()) return;
+  pause_for({{"nobody_present", fmt::format("{} gives no sign of life", request_.actor)}, now_us, false, true});
+}
+
+void RunDriver::on_samples(const station::SampleBatch& batch) {
+  watch_.on_samples(batch, parts_.clock.steady_us());
+  changed_.notify();
+}
+
+void RunDriver::on_robot(const station::RobotState& robot) {
+  if (boot_id_ != 0 && robot.boot_id != boot_id_) abort({"reboot", "the robot has booted again"});
+  if (boot_id_ != 0 && robot.link != station::LinkState::connected) abort({"link_lost", "the link to the robot broke"});
+}
+
+void RunDriver::on_command(const station::CommandRecord& record) {
+  if (record.peer == request_.peer || record.actor.starts_with("station")) return;
+  if (record.kind == "emergency_stop") {
+    return abort({"emergency_stop", fmt::format("{} has stopped the robot", record.actor)});
+  }
+  const bool is_new = record.acknowledged_after_us < 0 && record.ended_at_us == 0;
+  if (!is_new || std::ranges::find(kDisturbing, record.kind) == kDisturbing.end()) return;
+  abort({"operator_command", fmt::format("{} has sent {}", record.actor, record.kind)});
+}
+
+void RunDriver::abort(Abort why) {
+  if (!abort_) abort_ = std::move(why);
+  changed_.notify();
+}
+
+// --- what is sent ---
+
+void RunDriver::feed(const station::RobotState& robot) {
+  const std::uint64_t now_us = robot_now_us(robot);
+  // What comes after a change of mode is sent once telemetry shows it.
+  if (robot.context.mode != feed_.mode_at(now_us)) return;
+  while (auto fed = feed_.next(now_us)) {
+    parts_.tasks.spawn(request_.peer, send(std::move(*fed), now_us));
+  }
+}
+
+station::CommandRequest RunDriver::request_of(const protocol::Command& command) const {
+  station::CommandRequest request;
+  request.robot_id = request_.robot_id;
+  request.action = command;
+  request.actor = request_.actor;
+  request.peer = request_.peer;
+  request.takes_control = false;  // SAFETY: a program is no sign of life of its operator
+  return request;
+}
+
+asio::awaitable<void> RunDriver::send(FedCommand fed, std::uint64_t robot_now_us) {
+  const runtime::Counted one_more{on_their_way_};
+  const int generation = generation_;
+  station::CommandRequest request = request_of(fed.command);
+  request.arguments = arguments_of(fed.command);
+  const std::uint64_t at_us = fed.command.execute_at_robot_us;
+  request.time_to_live = microseconds{at_us - std::min(at_us, robot_now_us) + kGraceUs};
+  const auto sent = co_await parts_.station.submit(std::move(request));
+  const bool is_accepted = sent && was_accepted(sent->state);
+  if (is_accepted || generation != generation_) co_return;
+  const std::string why = sent ? sent->reason.empty() ? text(sent->state) : sent->reason : sent.error().detail;
+  abort({"command_refused", fmt::format("step {}: {}: {}", fed.step + 1, protocol::kind(fed.command), why)});
+}
+
+void RunDriver::renew_lease() {
+  const station::RobotState& robot = *parts_.station.find(request_.robot_id);
+  const std::int64_t now_us = parts_.clock.steady_us(), silent_us = silent_for_us();
+  // SAFETY: only by a fresh sign of life of the actor, and for no longer than that is worth.
+  if (request_.is_unattended || !is_fresh() || !feed_.needs_lease(robot_now_us(robot))) return;
+  if (is_renewing_ || now_us - renewed_at_us_ < kRenewsEvery.count()) return;
+  renewed_at_us_ = now_us;
+  is_renewing_ = true;
+  const microseconds life{std::max<std::int64_t>(station::kOldestSight.count() - silent_us, 1)};
+  parts_.tasks.spawn(request_.peer, send_renewal(life));
+}
+
+// What was not renewed lapses, and telemetry shows it.
+asio::awaitable<void> RunDriver::send_renewal(microseconds time_to_live) {
+  const runtime::Counted one_more{on_their_way_};
+  protocol::Command renew = rheonaut_Command_init_zero;
+  renew.which_action = rheonaut_Command_renew_lease_tag;
+  station::CommandRequest request = request_of(renew);
+  request.time_to_live = time_to_live;
+  co_await parts_.station.submit(std::move(request));
+  is_renewing_ = false;
+}
+
+void RunDriver::note_steps(std::uint64_t robot_now_us) {
+  while (next_begin_ < line_.step_begins.size()) {
+    const std::uint64_t at_us = feed_.robot_time_us(line_.step_begins[next_begin_]);
+    if (at_us > robot_now_us) return;
+    begins_.push_back({next_begin_++, at_us});
+  }
+}
+
+// --- pauses and the end ---
+
+void RunDriver::pause(std::string reason, std::string detail) {
+  pause_for({{std::move(reason), std::move(detail)}, parts_.clock.steady_us()});
+}
+
+void RunDriver::pause_for(Pause pause) {
+  if (!pause_) pause_ = std::move(pause);
+  changed_.notify();
+}
+
+void RunDriver::resume() {
+  if (pause_) pause_->is_resumed = true;
+  changed_.notify();
+}
+
+asio::awaitable<void> RunDriver::stay_paused() {
+  const station::RobotState& robot = *parts_.station.find(request_.robot_id);
+  const std::size_t broken_off = feed_.step_at(robot_now_us(robot));
+  ++generation_;
+  Rest resting = co_await rest();
+  while (!abort_ && !is_over_pause(*parts_.station.find(request_.robot_id))) {
+    co_await changed_.wait_until(parts_.clock, parts_.clock.steady_us() + kTurn.count());
+  }
+  if (!abort_ && resting == Rest::of_another) resting = co_await rest();  // it is ours again
+  if (!abort_ && resting != Rest::at_rest) abort({"emergency", "the robot is in emergency"});
+  if (!abort_ && ++repeats_ > kMostRepeats) {
+    abort({"too_many_repeats", fmt::format("steps were broken off {} times", repeats_)});
+  }
+  pause_.reset();
+  if (!abort_) begin_at(step_to_repeat(line_, broken_off));
+}
+
+void RunDriver::check_pause_limit() {
+  const std::int64_t paused_us = parts_.clock.steady_us() - pause_->since_us;
+  const bool is_of_control = pause_->why.reason == "control_changed";
+  const microseconds limit = pause_->ends_by_itself ? kAbsence : is_of_control ? kTakeOverWithin : kLongestPause;
+  if (paused_us <= limit.count()) return;
+  if (pause_->ends_by_itself || is_of_control) return abort(pause_->why);
+  abort({"paused_too_long", fmt::format("it was paused for {} s", limit / 1s)});
+}
+
+// SAFETY: it goes on only for somebody who is there now, and in control.
+bool RunDriver::is_over_pause(const station::RobotState& robot) {
+  if (auto found = watch_.check(parts_.clock.steady_us())) abort(std::move(*found));
+  if (robot.latched()) abort({"emergency", "the robot is in emergency"});
+  check_pause_limit();
+  if (abort_) return true;
+  const bool may_go_on = pause_->ends_by_itself || pause_->is_resumed;
+  const bool is_in_control = parts_.station.holder(request_.robot_id) == request_.actor;
+  return may_go_on && is_in_control && (is_fresh() || request_.is_unattended);
+}
+
+asio::awaitable<Rest> RunDriver::rest() {
+  RestRequest wanted{request_.robot_id, request_.actor, request_.peer};
+  co_return co_await bring_to_rest(parts_.station, parts_.clock, std::move(wanted));
+}
+
+// They end by themselves, since every command has a time to live.
+asio::awaitable<void> RunDriver::settle_tasks() {
+  const std::int64_t ends_us = parts_.clock.steady_us() + kTasksEndWithin.count();
+  while (on_their_way_ > 0 && parts_.clock.steady_us() < ends_us) co_await parts_.clock.sleep_for(kTurn);
+}
+
+double RunDriver::elapsed_s() const {
+  const station::RobotState* robot = parts_.station.find(request_.robot_id);
+  return robot == nullptr ? 0 : static_cast<double>(feed_.tick_at(robot_now_us(*robot))) * kTick_s;
+}
+
+std::size_t RunDriver::step() const {
+  const station::RobotState* robot = parts_.station.find(request_.robot_id);
+  return robot == nullptr ? 0 : feed_.step_at(robot_now_us(*robot));
+}
+
+}  // namespace server::experiments

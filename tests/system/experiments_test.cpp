@@ -1,0 +1,188 @@
+// Experiments on a real robot core: exact times, recorded duties, the queue of a robot, what people do with them.
+#include "tests/system/experiment_fixture.hpp"
+
+#include "server/experiments/profile_document.hpp"
+
+namespace server {
+namespace {
+
+using namespace server::experiments;
+
+constexpr const char* kSetpoint = "kind = \"setpoint\"\nsetpoint_m = 0.1\nfor_s = 3";
+constexpr const char* kDisturbance = "kind = \"disturbance\"\ndisturbance_m = -0.05\nfor_s = 2";
+constexpr const char* kDuty = "kind = \"duty\"\nduty = 0.3\nfor_s = 3";
+constexpr const char* kRest = "kind = \"rest\"\nfor_s = 1";
+
+class ExperimentsTest : public ExperimentTest {
+ protected:
+  ExperimentsTest() { begin(); }
+};
+
+TEST_F(ExperimentsTest, EachStepBeginsInItsTickOfTheRobot) {
+  const auto id = start(profile({kSetpoint, kDisturbance}));
+  until(id, ExperimentState::done);
+  const auto samples = samples_of_first_run(id);
+  std::optional<std::size_t> setpoint, disturbance;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!setpoint && samples[i].mode == rheonaut_MODE_AUTO) setpoint = i;
+    if (!disturbance && samples[i].disturbance_m != 0.0F) disturbance = i;
+  }
+  ASSERT_TRUE(setpoint && disturbance);
+  EXPECT_EQ(*disturbance - *setpoint, 300U);
+  const storage::ExperimentRun run = view(id).experiment.runs.at(0);
+  const auto steps = nlohmann::json::parse(run.steps);
+  ASSERT_EQ(steps.size(), 2U);
+  EXPECT_EQ(steps[1]["kind"], "disturbance");
+  EXPECT_LT(samples[*setpoint].robot_time_us - steps[0]["robot_time_us"].get<std::uint64_t>(), 10'000U);
+  EXPECT_TRUE(run.has_prediction);
+  const auto recorded = wait_for(runs->find(*run.run)).value();
+  EXPECT_EQ(recorded.conditions.verdict, "done");
+  EXPECT_EQ(recorded.samples_lost, 0U);
+  EXPECT_EQ(state().context.mode, rheonaut_MODE_MANUAL);
+}
+
+TEST_F(ExperimentsTest, TheRobotDoesEveryTickOfASignal) {
+  const char* chirp = "kind = \"chirp\"\namplitude = 0.4\nfrom_hz = 0.3\nto_hz = 3\nfor_s = 12";
+  const std::string document = profile({kRest, chirp, kRest});
+  const auto id = start(document);
+  until(id, ExperimentState::done);
+  const TimeLine line = time_line_of(parse_profile(document, "test"), {});
+  const auto samples = samples_of_first_run(id);
+  const auto first = std::ranges::find_if(samples, [](const auto& one) { return one.sample.duty != 0; });
+  const auto action = std::ranges::find_if(line.actions, [](const Action& one) { return one.value != 0; });
+  ASSERT_NE(first, samples.end());
+  std::size_t next = static_cast<std::size_t>(action - line.actions.begin());
+  float wanted = 0;
+  for (std::uint64_t tick = action->tick; tick < line.ticks; ++tick) {
+    for (; next < line.actions.size() && line.actions[next].tick <= tick; ++next) {
+      wanted = static_cast<float>(line.actions[next].value);
+    }
+    const auto at = first + static_cast<std::ptrdiff_t>(tick - action->tick);
+    ASSERT_LT(at, samples.end());
+    ASSERT_EQ(at->sample.duty, wanted) << "tick " << tick;
+  }
+}
+
+TEST_F(ExperimentsTest, DutiesAndSetpointsFollowEachOther) {
+  const char* scan = "kind = \"scan\"\nsetpoint_m = 0\nvelocity_m_s = 0.05";
+  const auto id = start(profile({kDuty, kSetpoint, scan, kRest, kDuty}));
+  until(id, ExperimentState::done);
+  EXPECT_EQ(nlohmann::json::parse(view(id).experiment.runs.at(0).steps).size(), 5U);
+}
+
+TEST_F(ExperimentsTest, AGridIsRunOneAfterAnotherAndGoesBackBetween) {
+  const std::string head = "[conditions]\nstart = \"back\"\n[sweep]\nsetpoint_factor = [1, 0.5]\nrepeats = 2\n";
+  const auto id = start(profile({kSetpoint}, head));
+  const storage::Experiment ended = until(id, ExperimentState::done, 200s);
+  ASSERT_EQ(ended.runs.size(), 4U);
+  const auto samples = samples_of(*ended.runs[3].run);
+  EXPECT_NEAR(samples.front().sample.position_m, 0, 0.004) << "it went back";
+  const auto setpoint = std::ranges::find_if(samples, [](const auto& one) { return one.setpoint_m.has_value(); });
+  ASSERT_NE(setpoint, samples.end());
+  EXPECT_FLOAT_EQ(*setpoint->setpoint_m, 0.05F);
+  EXPECT_EQ(wait_for(runs->find(*ended.runs[3].run))->conditions.name, "of a test (4 of 4)");
+}
+
+TEST_F(ExperimentsTest, OthersAreRefusedWhileItRuns) {
+  const auto id = start(profile({kSetpoint, kDisturbance}));
+  const auto refused = command_by("boris", sim_robot::set_setpoint(0.2F));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, "not_in_control");
+  until(id, ExperimentState::done);
+}
+
+TEST_F(ExperimentsTest, PausedAndResumedItRepeatsTheStep) {
+  const auto id = start(profile({kRest, kDuty}));
+  clock.run_for(1500ms);
+  ASSERT_TRUE(wait_for(experiments->pause(id, {"boris", "", 0})));
+  clock.run_for(1s);
+  EXPECT_EQ(robot->simulated().motor_duty(), 0);
+  EXPECT_EQ(until(id, ExperimentState::paused).reason, "requested");
+  EXPECT_EQ(wait_for(experiments->resume(id, {"boris", "", 0})).error().reason, "acts_for_another");
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  until(id, ExperimentState::done);
+  const auto steps = nlohmann::json::parse(view(id).experiment.runs.at(0).steps);
+  ASSERT_EQ(steps.size(), 3U) << steps;
+  EXPECT_EQ(steps[2]["step"], 2);
+  std::size_t driven = 0;
+  for (const auto& one : samples_of_first_run(id)) driven += one.sample.duty != 0 ? 1U : 0U;
+  EXPECT_GT(driven, 300U) << "the whole step once more";
+}
+
+TEST_F(ExperimentsTest, TheHighestPriorityBeginsFirstAndAnAbortHoldsTheQueue) {
+  come("anna");
+  const auto running = start(profile({kSetpoint}));
+  const auto second = enqueue(profile({kSetpoint}));
+  const auto third = enqueue(profile({kRest}));
+  ASSERT_TRUE(wait_for(experiments->move(third, second, 0, {"anna", "", 0})));
+  until(running, ExperimentState::done);
+  until(third, ExperimentState::done);
+  EXPECT_NE(view(second).experiment.state, ExperimentState::done);
+  until(second, ExperimentState::running);
+  const auto last = enqueue(profile({kRest}));
+  ASSERT_TRUE(wait_for(experiments->abort(second, "enough", {"boris", "", 0})));
+  expect_aborted(second, "requested");
+  clock.run_for(3s);
+  EXPECT_EQ(view(last).waits_for, "held");
+  ASSERT_TRUE(wait_for(experiments->resume(last, {"anna", "", 0})));
+  until(last, ExperimentState::done);
+}
+
+TEST_F(ExperimentsTest, OneThatWaitsIsCancelled) {
+  const auto id = enqueue(profile({kRest}));
+  clock.run_for(1s);
+  EXPECT_EQ(view(id).waits_for, "nobody_present");
+  ASSERT_TRUE(wait_for(experiments->abort(id, "", {"anna", "", 0})));
+  EXPECT_EQ(until(id, ExperimentState::cancelled).reason, "requested");
+}
+
+TEST_F(ExperimentsTest, WaitsForThePersonWhoChangesTheFluid) {
+  const std::string head = "[sweep]\nfluids = [\"non_newtonian\", \"water\"]\n";
+  const auto id = start(profile({kRest}, head));
+  EXPECT_EQ(state().fluid, "non_newtonian");
+  EXPECT_EQ(until(id, ExperimentState::paused).reason, "fluid");
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  clock.run_for(1s);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused) << "it is in the other fluid still";
+  ASSERT_TRUE(station.set_fluid("sim-1", "water", {"anna", "", clock.utc_us()}));
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  const storage::Experiment ended = until(id, ExperimentState::done);
+  EXPECT_EQ(wait_for(runs->find(*ended.runs.at(1).run))->conditions.fluid, "water");
+}
+
+TEST_F(ExperimentsTest, WhatTheStationsLimitsForbidIsNotQueued) {
+  const auto refused =
+      try_to_begin(profile({"kind = \"setpoint\"\nsetpoint_m = 5\nfor_s = 1"}, "[limits]\nposition_max_m = 9\n"));
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().detail.find("step 1"), std::string::npos) << refused.error().detail;
+  const auto unread = try_to_begin("name = \"x\"\n");
+  ASSERT_FALSE(unread);
+  EXPECT_EQ(unread.error().code, ErrorCode::invalid);
+}
+
+TEST_F(ExperimentsTest, AControllerThatIsNotThereAbortsBeforeAnythingMoves) {
+  experiments->set_controller_by_name(
+      [](std::string, station::RobotId) -> boost::asio::awaitable<Result<protocol::Controller>> {
+        co_return server::fail(ErrorCode::not_found, "there is none");
+      });
+  come("anna");
+  const auto id = enqueue(profile({kDuty}, "[sweep]\ncontrollers = [\"mine\"]\n"));
+  expect_aborted(id, "controller");
+  EXPECT_TRUE(view(id).experiment.runs.empty());
+}
+
+TEST_F(ExperimentsTest, AnExceptionEndsItAndNothingElse) {
+  experiments->set_controller_by_name(
+      [](std::string, station::RobotId) -> boost::asio::awaitable<Result<protocol::Controller>> {
+        throw std::runtime_error{"a fault"};
+        co_return server::fail(ErrorCode::internal, "");
+      });
+  come("anna");
+  const auto id = enqueue(profile({kDuty}, "[sweep]\ncontrollers = [\"mine\"]\n"));
+  expect_aborted(id, "internal");
+  const auto next = enqueue(profile({kRest}));
+  until(next, ExperimentState::done);
+}
+
+}  // namespace
+}  // namespace server

@@ -1,0 +1,117 @@
+"""Experiments of a real station with a simulated robot: one in one command; the queue under kill -9 at random moments."""
+import os
+import random
+import threading
+import time
+import unittest
+
+from processes import ApiError, lab, wait_until
+
+KILLS = int(os.environ.get("RHEONAUT_QUEUE_KILLS", "6"))  # 50 were run for docs/reliability.md
+ENDED = {"done", "aborted", "cancelled", "interrupted"}
+DUTY = {"name": "duty", "purpose": "moves", "conditions": {"start": "here"}, "limits": {"position_min_m": -50, "position_max_m": 50},
+        "step": [{"kind": "rest", "for_s": 0.3}, {"kind": "duty", "duty": 0.2, "for_s": 1.5}]}
+AUTO = {"name": "auto", "purpose": "moves", "step": [{"kind": "setpoint", "setpoint_m": 0.05, "for_s": 2}]}
+
+
+class SignsOfLife:
+    """Of the script, for whichever experiment takes them, until it is closed."""
+
+    def __init__(self, station):
+        self.station = station
+        self.ends = threading.Event()
+        self.thread = threading.Thread(target=self.run)
+        self.thread.start()
+
+    def run(self):
+        while not self.ends.wait(0.1):
+            try:
+                for one in self.station.get("/api/v1/experiments?limit=20")["experiments"]:
+                    if one["state"] not in ENDED:
+                        self.station.post(f"/api/v1/experiments/{one['experiment_id']}/keep-alive")
+                        break
+            except (ApiError, OSError):
+                pass  # it is being killed, or the experiment has just ended
+
+    def close(self):
+        self.ends.set()
+        self.thread.join()
+
+
+class ExperimentsTest(unittest.TestCase):
+    def test_a_profile_in_one_command(self):
+        with lab() as place:
+            station = place.start_station()
+            place.start_robot(station, "sim-1", "--sensor", "perfect")
+            station.wait_for_robot("sim-1")
+            profile = place.folder / "steps.toml"
+            profile.write_text('name = "Two steps"\npurpose = "To see it work."\n[conditions]\nfluid = "non_newtonian"\n'
+                               '[[step]]\nkind = "duty"\nduty = 0.3\nfor_s = 2\n'
+                               '[[step]]\nkind = "setpoint"\nsetpoint_m = 0.1\nfor_s = 3\n')
+            done = place.tool("experiment", "begin", profile, "--robot", "sim-1", "--wait", "--data", place.data)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            self.assertIn("experiment 1 (Two steps) is done", done.stdout)
+            run = station.get("/api/v1/runs/1")
+            self.assertEqual((run["state"], run["verdict"], run["fluid"]), ("ended", "done", "non_newtonian"))
+            prediction = station.get("/api/v1/experiments/1/runs/1/prediction")
+            self.assertEqual(prediction["model_of"], "(29)")
+            listed = place.tool("experiment", "list", "--data", place.data)
+            self.assertIn("Two steps", listed.stdout)
+            metrics = station.get("/api/v1/runs/1/metrics")
+            self.assertAlmostEqual(metrics["steps"][0]["target_m"], 0.1, places=6)
+
+    def at_rest(self, station):
+        robot = station.robot("sim-1")
+        return robot["link"] == "connected" and robot["mode"] == "manual" and robot["sample"]["duty"] == 0
+
+    def test_the_queue_loses_nothing_and_moves_nothing_by_itself_when_the_station_is_killed(self):
+        seed = random.randrange(2**32)
+        print(f"seed {seed}")
+        chance = random.Random(seed)
+        with lab() as place:
+            station = place.start_station()
+            robots = station.endpoints["robots"]
+            place.start_robot(station, "sim-1", "--sensor", "perfect")
+            station.wait_for_robot("sim-1")
+            asked = 0
+            for _ in range(KILLS):
+                alive = SignsOfLife(station)
+                for profile in chance.choices([DUTY, AUTO], k=2):
+                    station.post("/api/v1/experiments", {"robot_id": "sim-1", "profile": profile})
+                    asked += 1
+                time.sleep(chance.uniform(0.0, 4.0))
+                place.kill_station()
+                alive.close()
+                station = place.start_station(robots=robots)
+                station.wait_for_robot("sim-1", timeout_s=60)
+                wait_until(lambda: self.at_rest(station), 60, "the robot at rest")
+                alive = SignsOfLife(station)  # somebody is there, and nothing may begin all the same
+                self.expect_rest(station, asked)
+                alive.close()
+            alive = SignsOfLife(station)
+            held = [one["experiment_id"] for one in self.all_of(station) if one["held"]]
+            for one in reversed(held):
+                station.post(f"/api/v1/experiments/{one}/resume")
+            wait_until(lambda: all(one["state"] in ENDED for one in self.all_of(station)), 120, "all of the queue")
+            alive.close()
+            states = {one["experiment_id"]: one["state"] for one in self.all_of(station)}
+            self.assertTrue(all(states[one] in ("done", "aborted") for one in held), states)
+
+    def all_of(self, station):
+        return station.get("/api/v1/experiments?limit=1000")["experiments"]
+
+    def expect_rest(self, station, asked):
+        ends = time.monotonic() + 1.5
+        while time.monotonic() < ends:
+            self.assertTrue(self.at_rest(station), "nothing moves by itself")
+            time.sleep(0.05)
+        experiments = self.all_of(station)
+        self.assertEqual(len(experiments), asked, "none is lost")
+        for one in experiments:
+            self.assertTrue(one["state"] in ENDED or (one["state"] == "waiting" and one["held"]), one)
+            for run in one["runs"]:
+                self.assertIn(run["state"], ENDED, "none is stuck")
+
+
+if __name__ == "__main__":
+    unittest.main()
