@@ -6,8 +6,9 @@
 //
 // What the loop does elsewhere is known at the other two tones only: a design is refused if the loop's gain is not
 // above 1 at the lower tone and below 1 at the upper, because it would cross over there. Whether it crosses again
-// further up stays unknown, as does the stability of the closed loop; a model tells. Errors: throws
-// std::invalid_argument quoting the bad value. No solution is a result, not an error.
+// further up stays unknown, as does the stability of the closed loop; a model tells.
+//
+// Errors: throws std::invalid_argument quoting the bad value. No solution is a result, not an error.
 #pragma once
 
 #include <optional>

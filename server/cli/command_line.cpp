@@ -102,6 +102,8 @@ CommandLine parse_command_line(int argc, char** argv) {
                           line);
   offer<Predict>(app, "predict", "Predict a closed-loop experiment, beside a recorded one", line);
   offer<ProfileQuestion>(app, "profile", "List experiment profiles; check one and predict its runs", line);
+  offer<Autotune>(app, "autotune",
+                  "From an identification experiment to a verified controller on a robot, in one command", line);
   offer<Verify>(app, "verify", "Check a station's database and the certificates of its runs", line);
   try {
     app.parse(argc, argv);
