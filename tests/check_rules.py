@@ -29,19 +29,18 @@ MAY_INCLUDE = {
 ROOMS = """
 base base/tls
 control/models control/responses control/sensor control/search control/identification control/discretisation
-control/tuning
-sim_robot/world sim_robot/robot sim_robot/network sim_robot/faults sim_robot/scenario sim_robot/lab sim_robot/client
-sim_robot/fleet sim_robot/proxy sim_robot/cli
+control/tuning sim_robot/world sim_robot/robot sim_robot/network sim_robot/faults sim_robot/scenario sim_robot/lab
+sim_robot/client sim_robot/fleet sim_robot/proxy sim_robot/cli
 server/runtime server/config server/tls server/net
 server/station/state server/station/commands server/station server/station/models server/link server/live
 server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest
 server/storage/runs server/storage/jobs server/storage/designs server/storage/experiments server/storage/query
 server/storage/export server/storage/upkeep server/storage server/analysis/metrics server/analysis/report
-server/analysis server/experiments server/experiments/runner server/identity server/http server/api/bodies
-server/api/routes server/api/analysis server/api/experiments server/api server/cli/terminal server/cli/design
-server/cli/accounts server/cli/data server/cli/experiments server/cli
+server/analysis server/analysis/tuning server/experiments server/experiments/runner server/identity server/http
+server/api/bodies server/api/routes server/api/analysis server/api/experiments server/api server/cli/terminal
+server/cli/design server/cli/accounts server/cli/data server/cli/experiments server/cli
 """.split()
-ROOMS_WITH_CONTROL = set("server/analysis/metrics server/analysis server/experiments server/experiments/runner server/cli/design".split())
+ROOMS_WITH_CONTROL = {"server/" + room for room in "analysis analysis/metrics analysis/tuning experiments experiments/runner cli/design".split()}
 # What decides only about the order of work, and the files of server/ that know it ("Threads of the station").
 SEAMS = {
     "server/net/poll_set.hpp": {"server/net/poll_set.cpp", "server/net/byte_stream.cpp", "server/link/robot_listener.hpp"},

@@ -78,8 +78,9 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   add_fluid_routes(router_, {clock_, recording.fluid_models, recording.recorder, station});
   add_run_routes(router_, {analysis, recording.digester, clock_, recording.disk_watch, live, recording.runs, station});
   add_run_metrics_routes(router_, {analysis, clock_, recording.digester, history, recording.metrics, recording.runs});
-  add_job_routes(router_, {analysis, recording.fluid_models, recording.jobs, recording.runs});
+  add_job_routes(router_, {analysis, recording.designs, recording.fluid_models, recording.jobs, recording.runs});
   add_design_routes(router_, {clock_, recording.designs, recording.jobs});
+  add_push_routes(router_, {analysis, {clock_, history, station}, recording.designs});
   add_marker_routes(router_, {recording.markers, station});
   add_reference_routes(router_, {analysis, clock_, recording.references});
   add_sample_routes(router_, {history});
@@ -88,7 +89,7 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
                     {tasks_, recording.exports, recording.disk_watch, recording.path(), recording.exports_folder()});
   add_account_routes(router_, {accounts_, auth_, logins_, clock_, station, facts_});
   add_experiment_routes(router_, {clock_, experiments, station});
-  connect_controllers(experiments, recording.designs, station);
+  connect_controllers(experiments, {analysis, recording.designs, station});
   experiments.set_on_change(
       [&live](const experiments::ExperimentView& view) { live.publish_experiment(to_json(view)); });
   add_audit_routes(router_, {clock_, history, recording.recorder});

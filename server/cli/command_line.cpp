@@ -104,6 +104,8 @@ CommandLine parse_command_line(int argc, char** argv) {
   offer<ProfileQuestion>(app, "profile", "List experiment profiles; check one and predict its runs", line);
   offer<ExperimentCommand>(
       app, "experiment", "Profiles that robots of a station perform: begin, list, show, pause, resume, abort, …", line);
+  offer<Autotune>(app, "autotune",
+                  "From an identification experiment to a verified controller on a robot, in one command", line);
   offer<Verify>(app, "verify", "Check a station's database and the certificates of its runs", line);
   try {
     app.parse(argc, argv);

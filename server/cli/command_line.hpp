@@ -27,6 +27,7 @@
 #include "server/cli/design/profile.hpp"
 #include "server/cli/design/step.hpp"
 #include "server/cli/design/tune.hpp"
+#include "server/cli/experiments/autotune.hpp"
 #include "server/cli/experiments/experiment.hpp"
 #include "server/config/config.hpp"
 
@@ -48,7 +49,7 @@ struct Answered {
 using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model,
                                  Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
                                  TokenCommand, RobotCommand, FluidCommand, JobCommand, DesignCommand, MetricsQuestion,
-                                 ReportQuestion, ReferenceCommand, ProfileQuestion, ExperimentCommand>;
+                                 ReportQuestion, ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune>;
 
 CommandLine parse_command_line(int argc, char** argv);
 

@@ -1,4 +1,5 @@
-// The routes of what is computed from runs, grouped by noun: routes_jobs, routes_designs, routes_run_metrics.
+// The routes of what is computed from runs, grouped by noun: routes_jobs, routes_designs, routes_push,
+// routes_run_metrics.
 //
 // As in server/api/routes/routes.hpp: all of what they work with outlives the router.
 #pragma once
@@ -22,11 +23,19 @@ void add_design_routes(http::Router& router, DesignRoutes parts);
 
 struct JobRoutes {
   analysis::AnalysisService& analysis;
+  storage::Designs& designs;
   storage::FluidModels& fluid_models;
   storage::Jobs& jobs;
   storage::Runs& runs;
 };
 void add_job_routes(http::Router& router, JobRoutes parts);
+
+struct PushRoutes {
+  analysis::AnalysisService& analysis;
+  CommandRoutes commands;
+  storage::Designs& designs;
+};
+void add_push_routes(http::Router& router, PushRoutes parts);
 
 struct RunMetricsRoutes {
   analysis::AnalysisService& analysis;

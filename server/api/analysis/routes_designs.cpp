@@ -23,7 +23,8 @@ Result<storage::DesignId> design_id_from(const std::string& text) {
   return fail(ErrorCode::not_found, fmt::format("there is no design '{}'", text), "no_such_design");
 }
 
-// The result of a job that identified a run is a model, found from that run with these options.
+// The result of a job that identified a run is a model, found from that run with these options; that of one that tuned
+// is a controller, designed for its model.
 boost::asio::awaitable<Result<void>> take_result(DesignRoutes parts, storage::JobId id,
                                                  storage::DesignRequest& request) {
   const auto job = co_await parts.jobs.find(id);
@@ -40,9 +41,15 @@ boost::asio::awaitable<Result<void>> take_result(DesignRoutes parts, storage::Jo
   request.document = *result;
   request.options = job->request.document;
   const json asked = json::parse(job->request.document, nullptr, false);
-  storage::DesignSource source{asked.value("run_id", storage::RunId{0}), {}};
-  if (asked.contains("span")) source.span = asked.at("span").get<std::uint32_t>();
-  request.sources = {source};
+  if (asked.contains("run_id")) {
+    storage::DesignSource source{asked.at("run_id").get<storage::RunId>(), {}};
+    if (asked.contains("span")) source.span = asked.at("span").get<std::uint32_t>();
+    request.sources = {source};
+  }
+  const bool is_controller = request.kind == storage::DesignKind::controller;
+  if (is_controller && !request.model && asked.contains("model_id")) {
+    request.model = asked.at("model_id").get<storage::DesignId>();
+  }
   co_return Result<void>{};
 }
 

@@ -7,6 +7,7 @@
 #include "server/api/analysis/analysis_routes.hpp"
 #include "server/api/bodies/job_body.hpp"
 #include "server/api/bodies/query_params.hpp"
+#include "server/storage/designs/designs.hpp"
 #include "server/storage/jobs/jobs.hpp"
 #include "server/storage/runs/fluid_models.hpp"
 #include "server/storage/runs/runs.hpp"
@@ -24,31 +25,107 @@ Result<storage::JobId> job_id_of(const http::Request& request) {
   return fail(ErrorCode::not_found, fmt::format("there is no job '{}'", request.param.at("job_id")), "no_such_job");
 }
 
-// Of the fluid of a run: the model that robots in it are sent, where its document says which plant it is of.
+// The plant of a fluid's model, where its document says which plant it is of.
+std::optional<control::FractionalModel> plant_of(const station::FluidModel& model) {
+  const json document = json::parse(model.document, nullptr, false);
+  if (!document.is_object() || !document.contains("plant")) return std::nullopt;
+  const auto plant = analysis::model_from(document.at("plant"));
+  return plant ? std::optional{*plant} : std::nullopt;
+}
+
+// Of the fluid of a run: the model that robots in it are sent.
 boost::asio::awaitable<std::optional<analysis::ModelInUse>> model_in_use(JobRoutes parts, storage::RunId id) {
   const auto run = co_await parts.runs.find(id);
   if (!run) co_return std::nullopt;
   const std::string& fluid = run->conditions.fluid;
   const station::FluidModel* model = parts.fluid_models.in_force().find(fluid);
-  if (model == nullptr) co_return std::nullopt;
-  const json document = json::parse(model->document, nullptr, false);
-  if (!document.is_object() || !document.contains("plant")) co_return std::nullopt;
-  const auto plant = analysis::model_from(document.at("plant"));
+  const auto plant = model == nullptr ? std::nullopt : plant_of(*model);
   if (!plant) co_return std::nullopt;
   co_return analysis::ModelInUse{fluid, *plant};
+}
+
+// A plant to tune for, and where it is from.
+struct FoundPlant {
+  control::FractionalModel model;
+  analysis::OrderedJson source;
+};
+
+Result<FoundPlant> plant_of_design(const Result<storage::Design>& design) {
+  if (!design) return std::unexpected{design.error()};
+  if (design->made.kind != storage::DesignKind::model) {
+    return fail(ErrorCode::invalid, fmt::format("design {} is a {}; give a model", design->id, text(design->made.kind)),
+                "other_kind");
+  }
+  const auto model = analysis::model_from(json::parse(design->made.document, nullptr, false));
+  if (!model) return std::unexpected{model.error()};
+  return FoundPlant{*model, {{"model_id", design->id}}};
+}
+
+Result<FoundPlant> plant_of_fluid(const station::FluidModelList& models, const std::string& fluid) {
+  const station::FluidModel* in_force = models.find(fluid);
+  const auto model = in_force == nullptr ? std::nullopt : plant_of(*in_force);
+  if (model) return FoundPlant{*model, {{"fluid", fluid}}};
+  return fail(ErrorCode::not_found,
+              fmt::format("the fluid '{}' has no model with its plant (POST …/fluids/{{fluid}}/model)", fluid),
+              "no_model");
+}
+
+boost::asio::awaitable<Result<FoundPlant>> find_plant(JobRoutes parts, PlantOfJob asked) {
+  if (asked.given) co_return FoundPlant{*asked.given, {{"given", true}}};
+  if (!asked.model) co_return plant_of_fluid(parts.fluid_models.in_force(), asked.fluid);
+  const auto design = co_await parts.designs.find(*asked.model);
+  co_return plant_of_design(design);
+}
+
+std::vector<analysis::FluidPlant> plants_of_fluids(const station::FluidModelList& models) {
+  std::vector<analysis::FluidPlant> plants;
+  for (const auto& [fluid, model] : models.all()) {
+    if (const auto plant = plant_of(model)) plants.push_back({fluid, *plant});
+  }
+  return plants;
+}
+
+using Work = Result<storage::JobWork>;
+
+boost::asio::awaitable<Work> work_of(JobRoutes parts, analysis::IdentifyRequest identify) {
+  const auto run = co_await parts.runs.find(identify.run);
+  if (!run) co_return std::unexpected{run.error()};
+  auto in_use = co_await model_in_use(parts, identify.run);
+  auto work = [&analysis = parts.analysis, identify = std::move(identify), in_use](storage::JobRun& job) {
+    return analysis::identify_job(analysis, identify, in_use, job);
+  };
+  co_return storage::JobWork{std::move(work)};
+}
+
+boost::asio::awaitable<Work> work_of(JobRoutes parts, TuneBody body) {
+  auto plant = co_await find_plant(parts, body.plant);
+  if (!plant) co_return std::unexpected{plant.error()};
+  analysis::TuneRequest request = std::move(body.request);
+  request.plant = plant->model;
+  request.plant_source = std::move(plant->source);
+  request.fluids = plants_of_fluids(parts.fluid_models.in_force());
+  auto work = [request = std::move(request)](storage::JobRun& job) { return analysis::tune_job(request, job); };
+  co_return storage::JobWork{std::move(work)};
+}
+
+boost::asio::awaitable<Work> work_of(JobRoutes parts, TuningMapBody body) {
+  auto plant = co_await find_plant(parts, body.plant);
+  if (!plant) co_return std::unexpected{plant.error()};
+  analysis::TuningMapRequest request = std::move(body.request);
+  request.plant = plant->model;
+  request.plant_source = std::move(plant->source);
+  auto work = [request = std::move(request)](storage::JobRun& job) { return analysis::tuning_map_job(request, job); };
+  co_return storage::JobWork{std::move(work)};
 }
 
 http::Answer begin_job(JobRoutes parts, http::Request request) {
   auto body = parse_job(request.body);
   if (!body) co_return http::problem(body.error());
-  const auto run = co_await parts.runs.find(body->identify.run);
-  if (!run) co_return http::problem(run.error());
-  auto in_use = co_await model_in_use(parts, body->identify.run);
-  auto work = [&analysis = parts.analysis, identify = body->identify, in_use](storage::JobRun& job) {
-    return analysis::identify_job(analysis, identify, in_use, job);
-  };
+  auto look_up = std::visit([parts](auto& of) { return work_of(parts, std::move(of)); }, body->request);
+  auto work = co_await std::move(look_up);
+  if (!work) co_return http::problem(work.error());
   storage::JobRequest wanted{body->kind, body->document, request.actor};
-  const auto begun = co_await parts.jobs.begin(std::move(wanted), std::move(work));
+  const auto begun = co_await parts.jobs.begin(std::move(wanted), std::move(*work));
   if (!begun) co_return http::problem(begun.error());
   http::Response response = http::json_response(202, to_json(*begun));
   response.headers.emplace_back("Location", fmt::format("/api/v1/jobs/{}", begun->id));

@@ -133,6 +133,12 @@ Result<analysis::IdentifyRequest> identify_request(const Members& body) {
   return request;
 }
 
+template <class Request>
+Result<JobBody> job_of(const Members& body, const std::string& kind, Result<Request> request) {
+  if (!request) return std::unexpected{request.error()};
+  return JobBody{kind, std::move(*request), base::dump(body.object())};
+}
+
 }  // namespace
 
 Result<JobBody> parse_job(const std::string& text) {
@@ -140,12 +146,11 @@ Result<JobBody> parse_job(const std::string& text) {
   if (!body) return std::unexpected{body.error()};
   const auto kind = body->text("kind", {0, kMaxWordBytes});
   if (!kind) return std::unexpected{kind.error()};
-  if (*kind != "identify") {
-    return fail(ErrorCode::invalid, fmt::format("kind is '{}', allowed is identify", *kind), "unknown_kind");
-  }
-  auto request = identify_request(*body);
-  if (!request) return std::unexpected{request.error()};
-  return JobBody{*kind, std::move(*request), base::dump(body->object())};
+  if (*kind == "identify") return job_of(*body, *kind, identify_request(*body));
+  if (*kind == "tune") return job_of(*body, *kind, tune_body(*body));
+  if (*kind == "tuning_map") return job_of(*body, *kind, tuning_map_body(*body));
+  return fail(ErrorCode::invalid, fmt::format("kind is '{}', allowed are identify, tune, tuning_map", *kind),
+              "unknown_kind");
 }
 
 json to_json(const storage::Job& job) {

@@ -1,17 +1,19 @@
-// The body of POST /api/v1/jobs: which computation, on which runs.
+// The body of POST /api/v1/jobs: which computation, on which runs or models.
 #pragma once
 
 #include <string>
+#include <variant>
 
 #include "server/analysis/identify_job.hpp"
 #include "server/api/bodies/json.hpp"
+#include "server/api/bodies/tune_body.hpp"
 #include "server/storage/jobs/job.hpp"
 
 namespace server::api {
 
 struct JobBody {
   std::string kind;
-  analysis::IdentifyRequest identify;
+  std::variant<analysis::IdentifyRequest, TuneBody, TuningMapBody> request;
   std::string document;  // the body, as it is kept
 };
 

@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "server/analysis/reference_import.hpp"
+#include "server/analysis/tuning/tune_job.hpp"
 #include "server/api/bodies/json.hpp"
 #include "server/identity/accounts.hpp"
 #include "server/runtime/secrets.hpp"
@@ -75,6 +76,8 @@ inline constexpr Limit<std::size_t> kTextLimits[] = {
     {"RunEndBody.verdict", kTextBytes},
     {"ScopeList", {1, kMaxWordBytes}},
     {"SetParameterBody.name", {1, sizeof(rheonaut_SetParameter::name) - 1}},
+    {"TuneJobBody.fluid", kNameBytes},
+    {"TuningMapJobBody.fluid", kNameBytes},
     {"UserBody.password", {runtime::kMinPasswordBytes, runtime::kMaxPasswordBytes}},
     {"UserChange.password", {runtime::kMinPasswordBytes, runtime::kMaxPasswordBytes}},
 };
@@ -103,6 +106,7 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"IssuedAtUs", {0, kMaxTimeUs}},
     {"LifeMs", {1, protocol::kMaxTimeToLiveUs / 1000}},
     {"MarkerBody.at_us", {0, kMaxTimeUs - 1}},
+    {"PushControllerBody.design_id", {1, kMaxJavaScriptInteger}},
     {"ReferenceBody.span", {0, 1'000'000}},
     {"ReferenceClock.marker_id", {1, kMaxJavaScriptInteger}},
     {"ReferenceClock.zero_at_us", {0, kMaxJavaScriptInteger}},
@@ -116,6 +120,9 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"TimeSpan.from_us", {0, kMaxTimeUs - 1}},
     {"TimeSpan.to_us", {0, kMaxTimeUs - 1}},  // from from_us on
     {"TokenBody.days", {1, identity::kMaxTokenDays}},
+    {"TuneJobBody.model_id", {1, kMaxJavaScriptInteger}},
+    {"TuningMapJobBody.model_id", {1, kMaxJavaScriptInteger}},
+    {"TuningMapJobBody.points", {2, control::kMostMapPoints}},
 };
 
 inline constexpr Limit<double> kNumberLimits[] = {
@@ -137,13 +144,21 @@ inline constexpr Limit<double> kNumberLimits[] = {
     {"ReferenceClock.offset_s", kReferenceSeconds},
     {"ReferenceClock.sd_s", kReferenceClockSd_s},
     {"ReferenceClock.to_s", kReferenceSeconds},
+    {"TuneJobBody.crossover_rad_s", {1e-3, 1e4}},
+    {"TuneJobBody.duty_max", {0.01, 1}},
+    {"TuneJobBody.duty_min", {-1, 0}},
+    {"TuneJobBody.mu", {0.01, 1.99}},
+    {"TuneJobBody.period_s", {0.001, 1}},
+    {"TuneJobBody.phase_margin_deg", {0.1, 179.9}},
+    {"TuningMapJobBody.from_rad_s", {1e-3, 1e4}},
+    {"TuningMapJobBody.to_rad_s", {1e-3, 1e4}},
 };
 
 // SAFETY: the robot refuses what is outside; the station passes it on, since what it knows of a robot may be old.
 inline constexpr Limit<double> kLimitsOfTheRobot[] = {
-    {"SetControllerBody.duty_max", {0, 1}},  // not 0
-    {"SetControllerBody.duty_min", {-1, 0}},
-    {"SetDutyBody.duty", {-1, 1}},
+    {"PushControllerBody.duty_max", {0, 1}},                                                   // not 0
+    {"PushControllerBody.duty_min", {-1, 0}},         {"SetControllerBody.duty_max", {0, 1}},  // not 0
+    {"SetControllerBody.duty_min", {-1, 0}},          {"SetDutyBody.duty", {-1, 1}},
     {"SetDutyScheduleBody.schedule[].duty", {-1, 1}},
 };
 

@@ -23,6 +23,11 @@ struct ExperimentRoutes {
 void add_experiment_routes(http::Router& router, ExperimentRoutes parts);
 
 // Tells the experiments which controllers the names in their profiles mean: the newest kept one of that name.
-void connect_controllers(experiments::Experiments& experiments, storage::Designs& designs, station::Station& station);
+struct ControllerNames {
+  analysis::AnalysisService& analysis;
+  storage::Designs& designs;
+  station::Station& station;
+};
+void connect_controllers(experiments::Experiments& experiments, ControllerNames names);
 
 }  // namespace server::api

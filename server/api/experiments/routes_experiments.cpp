@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "server/analysis/analysis_service.hpp"
+#include "server/analysis/tuning/controller_document.hpp"
 #include "server/api/bodies/controller_body.hpp"
 #include "server/api/bodies/query_params.hpp"
 #include "server/api/experiments/experiment_json.hpp"
@@ -176,35 +178,40 @@ http::Answer get_profile(ExperimentRoutes, http::Request request) {
   co_return http::problem(404, fmt::format("there is no profile '{}'", name.substr(0, 40)), "no_such_profile");
 }
 
-// The newest of a name; its document is what `rheonaut discretise --json` prints, or what a set_controller takes.
-boost::asio::awaitable<Result<protocol::Controller>> controller_by_name(storage::Designs& designs,
-                                                                        station::Station& station, std::string name,
+// The newest of a name, as the robot is sent it; discretised for it where its document has no coefficients.
+boost::asio::awaitable<Result<protocol::Controller>> controller_by_name(ControllerNames names, std::string name,
                                                                         station::RobotId robot_id) {
   storage::DesignFilter filter;
   filter.kind = storage::DesignKind::controller;
   filter.limit = static_cast<std::size_t>(kMaxLimit);
-  const auto kept = co_await designs.list(filter);
+  const auto kept = co_await names.designs.list(filter);
   const auto found = std::ranges::find_if(kept, [&name](const storage::Design& one) { return one.made.name == name; });
   if (found == kept.end())
     co_return fail(ErrorCode::not_found, "the station keeps none of this name", "no_such_design");
-  const station::RobotSettings* settings = station.settings(robot_id);
+  const station::RobotSettings* settings = names.station.settings(robot_id);
   const bool is_known = settings != nullptr && settings->is_controller_current && settings->controller;
   if (!is_known) co_return fail(ErrorCode::conflict, "the controller in force is not known", "not_known");
-  const Members body{json{{"controller", json::parse(found->made.document, nullptr, false)}}};
-  const auto controller = controller_from(body, &*settings->controller);
+  const protocol::Controller in_force = *settings->controller;
+  auto discretise = [document = found->made.document, in_force] {
+    return analysis::sections_of(json::parse(document, nullptr, false), in_force.period_us / 1e6,
+                                 in_force.duty_min >= 0);
+  };
+  const auto sections = co_await names.analysis.compute(std::move(discretise));
+  if (!sections) co_return std::unexpected{sections.error()};
+  const Members body{json{{"controller", *sections}}};
+  const auto controller = controller_from(body, &in_force);
   if (!controller) co_return std::unexpected{controller.error()};
   // SAFETY: an experiment gives no controller more of the motor than the one in force has.
-  const bool is_wider =
-      controller->duty_min < settings->controller->duty_min || controller->duty_max > settings->controller->duty_max;
+  const bool is_wider = controller->duty_min < in_force.duty_min || controller->duty_max > in_force.duty_max;
   if (is_wider) co_return fail(ErrorCode::forbidden, "its duty range is wider than that in force", "not_permitted");
   co_return *controller;
 }
 
 }  // namespace
 
-void connect_controllers(experiments::Experiments& experiments, storage::Designs& designs, station::Station& station) {
-  experiments.set_controller_by_name([&designs, &station](std::string name, station::RobotId robot_id) {
-    return controller_by_name(designs, station, std::move(name), std::move(robot_id));
+void connect_controllers(experiments::Experiments& experiments, ControllerNames names) {
+  experiments.set_controller_by_name([names](std::string name, station::RobotId robot_id) {
+    return controller_by_name(names, std::move(name), std::move(robot_id));
   });
 }
 

@@ -100,6 +100,8 @@ struct CommandRoutes {
   station::Station& station;
 };
 void add_command_routes(http::Router& router, CommandRoutes parts);
+// The answer of POST …/commands, for routes that make the command's body themselves.
+http::Answer submit_command(CommandRoutes parts, http::Request request);
 
 struct ExportRoutes {
   runtime::TaskGroup& tasks;
@@ -122,6 +124,8 @@ struct InForceRoutes {
   station::Station& station;
 };
 void add_in_force_routes(http::Router& router, InForceRoutes parts);
+// What GET …/controller answers; null for a robot that is not known.
+nlohmann::json controller_in_force(const station::Station& station, const std::string& robot_id);
 
 struct MarkerRoutes {
   storage::Markers& markers;

@@ -190,6 +190,8 @@ station::CommandRequest request_of(const http::Request& request, ParsedCommand& 
   return command;
 }
 
+}  // namespace
+
 http::Answer submit_command(CommandRoutes parts, http::Request request) {
   const std::string& id = request.param.at("robot_id");
   if (parts.station.find(id) == nullptr) co_return unknown_robot(id);
@@ -222,6 +224,8 @@ http::Answer submit_command(CommandRoutes parts, http::Request request) {
   if (!record) co_return http::problem(record.error());
   co_return command_response(*record);
 }
+
+namespace {
 
 // What a page must say to begin to control, and may not ask for: it keeps control by signs of life.
 Result<void> check_sight(const http::Request& request, ParsedControl& parsed, runtime::Clock& clock) {

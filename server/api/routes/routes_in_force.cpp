@@ -42,15 +42,25 @@ http::Answer get_parameters(InForceRoutes parts, http::Request request) {
                                       {"parameters", std::move(table)}});
 }
 
+}  // namespace
+
+json controller_in_force(const station::Station& station, const std::string& id) {
+  const station::RobotSettings* known = station.settings(id);
+  if (known == nullptr) return nullptr;
+  const json controller = known->controller ? storage::controller_json(*known->controller) : json(nullptr);
+  return {{"robot_id", id},
+          {"is_current", is_connected(station, id) && known->is_controller_current},
+          {"told_at_us", live::time_or_null(known->controller_at_us)},
+          {"controller", controller}};
+}
+
+namespace {
+
 http::Answer get_controller(InForceRoutes parts, http::Request request) {
   const std::string& id = request.param.at("robot_id");
-  const station::RobotSettings* known = parts.station.settings(id);
-  if (known == nullptr) co_return http::problem(robot_not_known(id).error());
-  const json controller = known->controller ? storage::controller_json(*known->controller) : json(nullptr);
-  co_return http::json_response(200, {{"robot_id", id},
-                                      {"is_current", is_connected(parts.station, id) && known->is_controller_current},
-                                      {"told_at_us", live::time_or_null(known->controller_at_us)},
-                                      {"controller", controller}});
+  const json known = controller_in_force(parts.station, id);
+  if (known.is_null()) co_return http::problem(robot_not_known(id).error());
+  co_return http::json_response(200, known);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <fstream>
+#include <limits>
 #include <stdexcept>
 
 #include "server/analysis/control_json.hpp"
@@ -29,8 +30,9 @@ class Robot {
       : station_{options.data_dir}, path_{"/api/v1/robots/" + options.robot_id} {}
 
   json get(const char* what) const { return checked(station_.ask("GET", path_ + what)); }
-  json command(const json& body) const {
-    return checked(station_.ask("POST", path_ + "/commands?wait=verified", body));
+  json command(const json& body) const { return post("/commands?wait=verified", body); }
+  json post(const std::string& what, const json& body) const {
+    return checked(station_.ask("POST", path_ + what, body));
   }
 
  private:
@@ -154,15 +156,31 @@ json sections_in(const std::string& file, const Robot& robot) {
   return {{"period_s", made["period_s"]}, {"dc_gain", made["dc_gain"]}, {"sections", made["sections"]}};
 }
 
-int set_controller(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
-  json body{{"kind", "set_controller"}, {"controller", sections_in(options.set, robot)}};
+// What the options say beside the controller itself.
+void add_how(const RobotSettingsCommand& options, json& body) {
   if (options.duty_min) body["duty_min"] = *options.duty_min;
   if (options.duty_max) body["duty_max"] = *options.duty_max;
   if (!options.derivative_on.empty()) body["derivative_on"] = options.derivative_on;
   if (options.confirm) body["confirm"] = true;
+}
+
+int set_controller(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
+  json body{{"kind", "set_controller"}, {"controller", sections_in(options.set, robot)}};
+  add_how(options, body);
   const json record = robot.command(body);
   const json& id = record.at("arguments").at("controller").at("controller_id");
   return print_outcome(record, fmt::format("controller {}", id.dump()), options.json, out);
+}
+
+int push_design(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
+  json body{{"design_id", *options.design}};
+  add_how(options, body);
+  const json pushed = robot.post("/controller", body);
+  if (options.json) {
+    fmt::print(out, "{}\n", pushed.dump(2));
+    return pushed.at("verified").get<bool>() ? 0 : kNotVerified;
+  }
+  return print_outcome(pushed.at("command"), fmt::format("controller of design {}", *options.design), false, out);
 }
 
 int restore_controller(const Robot& robot, const RobotSettingsCommand& options, std::ostream& out) {
@@ -193,10 +211,16 @@ void add_options(CLI::App& robot, RobotSettingsCommand& options) {
   CLI::App* controller = offer(robot, options, Of::controller, "controller", "Show a robot's controller, or set one");
   CLI::Option* file = controller->add_option(
       "--set", options.set, "What discretise --json printed, or a controller as of tune, which is discretised first");
-  controller->add_flag("--restore", options.restore, "Back to the controller before the last change")->excludes(file);
-  controller->add_option("--duty-min", options.duty_min, "With --set (default: as the controller in force)")
+  CLI::Option* design =
+      controller->add_option("--design", options.design, "Set the controller that the station keeps under this number")
+          ->check(whole(1, std::numeric_limits<std::int64_t>::max()))
+          ->excludes(file);
+  controller->add_flag("--restore", options.restore, "Back to the controller before the last change")
+      ->excludes(file)
+      ->excludes(design);
+  controller->add_option("--duty-min", options.duty_min, "With --set or --design (default: as in force)")
       ->check(from_to(-1, 0));
-  controller->add_option("--duty-max", options.duty_max, "With --set (default: as the controller in force)")
+  controller->add_option("--duty-max", options.duty_max, "With --set or --design (default: as in force)")
       ->check(from_to(0, 1));
   controller->add_option("--derivative-on", options.derivative_on, "error or measurement (default: as in force)")
       ->check(CLI::IsMember({"error", "measurement"}));
@@ -210,6 +234,7 @@ int run(const RobotSettingsCommand& options, std::ostream& out) {
     return options.read_anew ? read_parameters(robot, options, out) : list_parameters(robot, options.json, out);
   }
   if (options.restore) return restore_controller(robot, options, out);
+  if (options.design) return push_design(robot, options, out);
   return options.set.empty() ? show_controller(robot, options.json, out) : set_controller(robot, options, out);
 }
 

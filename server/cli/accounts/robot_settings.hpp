@@ -19,7 +19,8 @@ struct RobotSettingsCommand {
   Of of = Of::nothing;
   std::filesystem::path data_dir = "rheonaut-data";
   std::string robot_id;
-  std::string set;  // NAME=VALUE, or the file of a controller; empty: nothing is set
+  std::string set;                     // NAME=VALUE, or the file of a controller; empty: nothing is set
+  std::optional<std::int64_t> design;  // a controller that the station keeps, to be set
   bool read_anew = false;
   bool restore = false;
   bool confirm = false;

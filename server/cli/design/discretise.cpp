@@ -81,23 +81,6 @@ void add_options(CLI::App& command, Sampling& sampling) {
       ->check(positive());
 }
 
-control::DiscretisationChoice discretised(const control::FopdController& controller, const Sampling& sampling) {
-  if (!sampling.method && !sampling.a) {
-    return control::choose_discretisation(controller, sampling.period_s, sampling.order, sampling.bandwidth_rad_s);
-  }
-  control::DiscretisationOptions options;
-  options.period_s = sampling.period_s;
-  options.order = sampling.order;
-  options.method = sampling.method.value_or(DiscretisationMethod::direct);
-  options.a = sampling.a.value_or(options.a);
-  options.loop_bandwidth_rad_s = sampling.bandwidth_rad_s;
-  if (sampling.a && options.method != DiscretisationMethod::direct) {
-    throw std::invalid_argument{fmt::format("--a {} belongs to --method direct; drop one of them", *sampling.a)};
-  }
-  const Discretisation made = control::discretise(controller, options);
-  return {made, "as asked for", {made}, {}};
-}
-
 void add_options(CLI::App& command, Discretise& options) {
   add_option(command, options.controller);
   add_options(command, options.sampling);

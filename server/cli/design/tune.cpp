@@ -7,8 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "control/tuning/tuning_alternatives.hpp"
-#include "server/analysis/control_json.hpp"
-#include "server/analysis/optional_json.hpp"
+#include "server/analysis/tuning/tuning_json.hpp"
 #include "server/cli/design/discretise.hpp"
 #include "server/cli/design/robustness_table.hpp"
 #include "server/cli/terminal/options.hpp"
@@ -50,60 +49,118 @@ void write_offers(std::ostream& out, const char* title, std::span<const control:
 
 using Ranges = std::vector<control::PhaseMarginRange>;
 
+std::string ranges_in_words(const Ranges& ranges) {
+  std::vector<std::string> words;
+  for (const auto& range : ranges) words.push_back(fmt::format("{:.2f} to {:.2f}", range.low_deg, range.high_deg));
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
 void write_ranges(std::ostream& out, const Tune& options, const Ranges& ranges) {
   if (ranges.empty()) {
     fmt::print(out, "\nno phase margin has a sound iso-damped design at {} rad/s\n", options.spec.gain_crossover_rad_s);
     return;
   }
-  std::vector<std::string> words;
-  for (const auto& range : ranges) words.push_back(fmt::format("{:.2f} to {:.2f}", range.low_deg, range.high_deg));
   fmt::print(out, "\niso-damped phase margins at {} rad/s: {} deg\n", options.spec.gain_crossover_rad_s,
-             fmt::join(words, ", "));
-}
-
-analysis::OrderedJson ends_of(const Ranges& ranges) {
-  if (ranges.empty()) return nullptr;
-  analysis::OrderedJson ends = analysis::OrderedJson::array();
-  for (const auto& range : ranges) ends.insert(ends.end(), {range.low_deg, range.high_deg});
-  return ends;
+             ranges_in_words(ranges));
 }
 
 analysis::OrderedJson answer_of(const Tune& options, const control::FractionalModel& plant,
                                 const control::TuningResult& result, const Ranges& ranges) {
-  analysis::OrderedJson answer = analysis::json_of(result);
-  answer["feasible_phase_margins_deg"] = ends_of(ranges);
-  answer["asked"] = {{"crossover_rad_s", options.spec.gain_crossover_rad_s},
-                     {"phase_margin_deg", options.spec.phase_margin_deg},
-                     {"mu", analysis::or_null(options.spec.mu)},
-                     {"velocity_loop", options.spec.is_velocity_loop}};
-  answer["plant"] = analysis::json_of(plant);
+  analysis::OrderedJson answer = analysis::tuning_json(plant, options.spec, result, ranges);
   if (options.with_robustness && result.tuned) {
     answer["robustness"] = analysis::json_of(robustness_of(plant, result.tuned->controller));
   }
   return answer;
 }
 
+void write_map_table(std::ostream& out, std::span<const control::TuningMapPoint> map) {
+  Table table{{"crossover (rad/s)", "lowest margin (deg)", "highest (deg)", "<ranges or reason"}};
+  for (const control::TuningMapPoint& point : map) {
+    const bool is_empty = point.ranges.empty();
+    const std::string words = is_empty ? analysis::text(point.reason) : ranges_in_words(point.ranges);
+    table.row({cell(point.gain_crossover_rad_s, 5), is_empty ? "-" : fixed(point.ranges.front().low_deg, 2),
+               is_empty ? "-" : fixed(point.ranges.back().high_deg, 2), words});
+  }
+  table.write(out);
+}
+
+// A line per range; a crossover without one has its reason and no numbers.
+void write_map_csv(std::ostream& out, std::span<const control::TuningMapPoint> map) {
+  fmt::print(out, "crossover_rad_s,lowest_phase_margin_deg,highest_phase_margin_deg,reason\n");
+  for (const control::TuningMapPoint& point : map) {
+    for (const auto& range : point.ranges) {
+      fmt::print(out, "{},{},{},{}\n", point.gain_crossover_rad_s, range.low_deg, range.high_deg,
+                 analysis::text(point.reason));
+    }
+    if (point.ranges.empty()) fmt::print(out, "{},,,{}\n", point.gain_crossover_rad_s, analysis::text(point.reason));
+  }
+}
+
+int write_map(const Tune& options, std::ostream& out) {
+  const control::FractionalModel plant = read(options.plant);
+  control::TuningMapSpec spec = options.map;
+  spec.is_velocity_loop = options.spec.is_velocity_loop;
+  const auto map = control::tuning_map(plant, spec);
+  if (options.form.is_json) {
+    write_json(out, analysis::tuning_map_json(plant, spec, map));
+  } else if (options.form.is_csv) {
+    write_map_csv(out, map);
+  } else {
+    write_map_table(out, map);
+  }
+  return 0;
+}
+
+// A map needs no specification, and CSV is of a map alone.
+void check_words(const Tune& options, const CLI::Option& crossover, const CLI::Option& margin) {
+  if (options.is_map) return;
+  for (const CLI::Option* option : {&crossover, &margin}) {
+    if (option->count() == 0) throw CLI::RequiredError{option->get_name()};
+  }
+  if (options.form.is_csv) throw CLI::RequiresError{"--csv", "--map"};
+}
+
+CLI::Option* add_map_options(CLI::App& command, Tune& options) {
+  auto* map = command.add_flag("--map", options.is_map,
+                               "Instead of a controller, which phase margins have one, crossover by crossover");
+  command.add_option("--from-rad-s", options.map.from_rad_s, "Of the map (default: 0.5)")
+      ->check(positive())
+      ->needs(map);
+  command.add_option("--to-rad-s", options.map.to_rad_s, "Of the map (default: 50)")->check(positive())->needs(map);
+  command.add_option("--points", options.map.points, "Of the map, spaced logarithmically (default: 60)")
+      ->check(whole(2, control::kMostMapPoints))
+      ->needs(map);
+  return map;
+}
+
 }  // namespace
 
 void add_options(CLI::App& command, Tune& options) {
   add_option(command, options.plant);
-  command.add_option("--crossover-rad-s", options.spec.gain_crossover_rad_s, "Gain crossover")
-      ->required()
-      ->check(positive());
-  command.add_option("--phase-margin-deg", options.spec.phase_margin_deg, "Phase margin")->required()->check(finite());
-  command
-      .add_option("--mu", options.spec.mu, "Order of the derivative, which gives up iso-damping (default: iso-damped)")
-      ->check(finite());
+  auto* crossover =
+      command.add_option("--crossover-rad-s", options.spec.gain_crossover_rad_s, "Gain crossover")->check(positive());
+  auto* margin =
+      command.add_option("--phase-margin-deg", options.spec.phase_margin_deg, "Phase margin")->check(finite());
+  auto* mu = command
+                 .add_option("--mu", options.spec.mu,
+                             "Order of the derivative, which gives up iso-damping (default: iso-damped)")
+                 ->check(finite());
   command.add_flag("--velocity-loop", options.spec.is_velocity_loop,
                    "Without the integrator from velocity to position");
-  command.add_flag("--robustness", options.with_robustness, "Also predict what becomes of it when the plant differs");
-  add_json_flag(command, options.form);
+  auto* robustness = command.add_flag("--robustness", options.with_robustness,
+                                      "Also predict what becomes of it when the plant differs");
+  CLI::Option* map = add_map_options(command, options);
+  for (CLI::Option* option : {crossover, margin, mu, robustness}) option->excludes(map);
+  add_json_and_csv_flags(command, options.form);
+  command.parse_complete_callback([&options, crossover, margin] { check_words(options, *crossover, *margin); });
   command.footer(
       "Exit status 3: nothing meets the specification; the answer says why, and what comes near.\n"
-      "Example: rheonaut tune --crossover-rad-s 5 --phase-margin-deg 91");
+      "Example: rheonaut tune --crossover-rad-s 5 --phase-margin-deg 91\n"
+      "         rheonaut tune --map --from-rad-s 1 --to-rad-s 10 --csv > map.csv");
 }
 
 int run(const Tune& options, std::ostream& out) {
+  if (options.is_map) return write_map(options, out);
   const control::FractionalModel plant = read(options.plant);
   const control::TuningResult result = control::tune(plant, options.spec);
   const Ranges ranges = control::sound_phase_margins(plant, options.spec);

@@ -1,9 +1,8 @@
-// `rheonaut tune`: a fractional PD controller for a crossover and a phase margin.
+// `rheonaut tune`: a fractional PD controller for a crossover and a phase margin, or a map of those that have one.
 #pragma once
 
-#include <optional>
-
 #include "control/tuning/tune.hpp"
+#include "control/tuning/tuning_map.hpp"
 #include "server/cli/design/control_files.hpp"
 #include "server/cli/terminal/output.hpp"
 
@@ -15,12 +14,14 @@ struct Tune {
   PlantChoice plant;
   control::TuningSpec spec;
   bool with_robustness = false;
+  bool is_map = false;  // instead of a controller
+  control::TuningMapSpec map;
   OutputForm form;
 };
 
 void add_options(CLI::App& command, Tune& options);
 
-// 0, or kInfeasible when nothing meets the specification.
+// 0, or kInfeasible when nothing meets the specification. A map is always 0.
 int run(const Tune& options, std::ostream& out);
 
 }  // namespace server::cli

@@ -76,7 +76,7 @@ std::string progress_line(const json& experiment) {
                      progress.at("elapsed_s").get<double>(), progress.at("duration_s").get<double>());
 }
 
-bool has_ended(const json& experiment) { return !experiment.at("ended_at_us").is_null(); }
+bool is_over(const json& experiment) { return !experiment.at("ended_at_us").is_null(); }
 
 // Shows each change of the line once, or all the time on a terminal.
 class ProgressShown {
@@ -130,7 +130,7 @@ json watch(const StationClient& station, std::int64_t id) {
     const StationAnswer kept = station.ask("POST", one + "/keep-alive");
     json experiment = kept.status == 200 ? kept.body : ask_experiments(station, "GET", one);
     progress.show(experiment);
-    if (has_ended(experiment)) {
+    if (is_over(experiment)) {
       progress.end();
       return experiment;
     }
@@ -155,13 +155,13 @@ int write_one(const ExperimentCommand& options, const json& experiment, std::ost
   if (options.json) {
     fmt::print(out, "{}\n", experiment.dump(2));
   } else {
-    const std::string why = text_of(has_ended(experiment) || state == "paused" ? experiment.at("detail")
-                                                                               : experiment.at("waits_for_detail"));
+    const std::string why =
+        text_of(is_over(experiment) || state == "paused" ? experiment.at("detail") : experiment.at("waits_for_detail"));
     fmt::print(out, "experiment {} ({}) is {}{}\n", experiment.at("experiment_id").get<std::int64_t>(),
                one_line(experiment.at("name").get<std::string>()), state, why.empty() ? "" : ": " + why);
     if (!experiment.at("runs").empty()) write_runs(out, experiment);
   }
-  return has_ended(experiment) && state != "done" ? kExperimentNotDone : 0;
+  return is_over(experiment) && state != "done" ? kExperimentNotDone : 0;
 }
 
 int begin_experiment(const ExperimentCommand& options, std::ostream& out) {

@@ -45,6 +45,7 @@ class FluidModelList {
     const auto found = models_.find(fluid);
     return found == models_.end() ? nullptr : &found->second;
   }
+  const std::map<std::string, FluidModel>& all() const { return models_; }
   void put(const std::string& fluid, FluidModel model) { models_[fluid] = std::move(model); }
   void remove(const std::string& fluid) { models_.erase(fluid); }
 

@@ -141,7 +141,7 @@ TEST(ParseJob, SaysWhichMemberIsWrong) {
     const char* words;
   };
   const Case cases[] = {
-      {{{"kind", "dance"}}, "kind is 'dance', allowed is identify"},
+      {{{"kind", "dance"}}, "kind is 'dance', allowed are identify, tune, tuning_map"},
       {{{"run_id", 0}}, "run_id = 0 is outside"},
       {{{"run", 1}}, "\"run\" is not known here"},
       {{{"channels", "all"}}, "channels is 'all', allowed are best, outside, robot"},
@@ -164,11 +164,12 @@ TEST(ParseJob, SaysWhichMemberIsWrong) {
   EXPECT_THAT(api::parse_job(R"({"kind":"identify"})").error().detail, HasSubstr("run_id is missing"));
   const auto parsed = api::parse_job(R"({"kind":"identify","run_id":7,"to_s":3,"sensor_lag_s":0.01,"span":2})");
   ASSERT_TRUE(parsed) << parsed.error().detail;
-  EXPECT_EQ(parsed->identify.run, 7);
-  EXPECT_EQ(parsed->identify.window.to_s, 3);
-  EXPECT_EQ(parsed->identify.window.span, 2U);
-  EXPECT_EQ(parsed->identify.search.sensor_lag_s, 0.01);
-  EXPECT_FALSE(parsed->identify.search.structure);
+  const auto& request = std::get<analysis::IdentifyRequest>(parsed->request);
+  EXPECT_EQ(request.run, 7);
+  EXPECT_EQ(request.window.to_s, 3);
+  EXPECT_EQ(request.window.span, 2U);
+  EXPECT_EQ(request.search.sensor_lag_s, 0.01);
+  EXPECT_FALSE(request.search.structure);
 }
 
 }  // namespace

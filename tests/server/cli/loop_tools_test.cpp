@@ -143,6 +143,32 @@ TEST_F(LoopTools, TuneSaysWhyThePapersSpecificationHasNoSolution) {
   EXPECT_THAT(table.text, HasSubstr("nearest"));
 }
 
+TEST_F(LoopTools, TheMapOfTuneHasTheMarginsOfEachCrossoverInThreeForms) {
+  const auto map = ask("tune --map --from-rad-s 3 --to-rad-s 12 --points 3 --json").json();
+  ASSERT_EQ(map["points"].size(), 3U);
+  EXPECT_EQ(map["points"][0]["reason"], "feasible");
+  EXPECT_NEAR(map["points"][0]["lowest_phase_margin_deg"], 88.61, 0.01);
+  EXPECT_NEAR(map["points"][0]["highest_phase_margin_deg"], 149.16, 0.01);
+  EXPECT_EQ(map["points"][0]["ranges_deg"].size(), 1U);
+  EXPECT_EQ(map["points"][2]["reason"], "phase_falls_too_fast");
+  EXPECT_EQ(map["points"][2]["highest_phase_margin_deg"], nullptr);
+  EXPECT_EQ(map["asked"]["to_rad_s"], 12);
+  const std::string csv = ask("tune --map --from-rad-s 3 --to-rad-s 12 --points 3 --csv").text;
+  EXPECT_THAT(csv, HasSubstr("crossover_rad_s,lowest_phase_margin_deg,highest_phase_margin_deg,reason\n3,88.6"));
+  EXPECT_THAT(csv, HasSubstr("\n12,,,phase_falls_too_fast\n"));
+  EXPECT_THAT(ask("tune --map --from-rad-s 3 --to-rad-s 12 --points 3").text, HasSubstr("88.61 to 149.16"));
+}
+
+TEST_F(LoopTools, TuneNeedsASpecificationUnlessAMapIsAskedFor) {
+  EXPECT_THAT(ask("tune --phase-margin-deg 90").error, HasSubstr("--crossover-rad-s is required"));
+  EXPECT_THAT(ask("tune --crossover-rad-s 3").error, HasSubstr("--phase-margin-deg is required"));
+  EXPECT_THAT(ask("tune --crossover-rad-s 3 --phase-margin-deg 90 --csv").error, HasSubstr("--csv requires --map"));
+  EXPECT_THAT(ask("tune --map --crossover-rad-s 3").error, HasSubstr("excludes"));
+  EXPECT_THAT(ask("tune --crossover-rad-s 3 --phase-margin-deg 90 --points 3").error,
+              HasSubstr("--points requires --map"));
+  EXPECT_THAT(ask("tune --map --from-rad-s 5 --to-rad-s 2").error, HasSubstr("to_rad_s must be above from_rad_s"));
+}
+
 TEST_F(LoopTools, TuneTableShowsAskedBesideAchieved) {
   const Answer answer = ask("tune --crossover-rad-s 5 --phase-margin-deg 91");
   EXPECT_THAT(answer.text, HasSubstr("asked"));

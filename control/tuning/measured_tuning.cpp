@@ -1,0 +1,87 @@
+// The demand on the controller comes from measured numbers; the rest is that of tune.
+#include "control/tuning/measured_tuning.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+#include "base/invalid_argument.hpp"
+#include "control/tuning/tuning_equations.hpp"
+#include "control/tuning/tuning_refusal.hpp"
+
+namespace control {
+namespace {
+
+constexpr double kSameCrossover = 1e-9;  // relative
+
+void check(const MeasuredPlant& plant, const TuningSpec& spec) {
+  const double measured_rad_s = plant.at_crossover().omega_rad_s;
+  if (!(std::abs(spec.gain_crossover_rad_s / measured_rad_s - 1) <= kSameCrossover)) {
+    base::throw_invalid("tuning: the plant was measured at ", measured_rad_s, " rad/s, the crossover asked for is ",
+                        spec.gain_crossover_rad_s);
+  }
+  if (!(spec.phase_margin_deg > 0 && spec.phase_margin_deg < 180)) {
+    base::throw_invalid("tuning: phase_margin_deg must lie in (0, 180), is ", spec.phase_margin_deg);
+  }
+  if (spec.mu && !(*spec.mu > 0 && *spec.mu < 2)) base::throw_invalid("tuning: mu must lie in (0, 2), is ", *spec.mu);
+  if (spec.is_velocity_loop) base::throw_invalid("tuning: what was measured is the position, not the velocity");
+}
+
+TuningDemand demand_of(const MeasuredPoint& at, double phase_fall, double phase_margin_deg) {
+  const double theta_rad = phase_margin_deg / kDegPerRad - std::numbers::pi - at.phase_rad;  // (2)
+  return {std::log(at.omega_rad_s), theta_rad, phase_fall, std::log(at.modulus)};
+}
+
+double loop_gain(const MeasuredPoint& at, const FopdController& controller) {
+  return at.modulus * std::abs(ControllerOnAxis{controller}.at(std::log(at.omega_rad_s)).value);
+}
+
+// d ln|L|/d ln ω at the crossover, by the measured moduli.
+double gain_slope(const MeasuredPlant& plant, const FopdController& controller) {
+  const MeasuredPoint &low = plant.points.front(), &high = plant.points.back();
+  return std::log(loop_gain(high, controller) / loop_gain(low, controller)) /
+         std::log(high.omega_rad_s / low.omega_rad_s);
+}
+
+std::string why_not_sound(const MeasuredPlant& plant, const FopdController& controller) {
+  const double low = loop_gain(plant.points.front(), controller), high = loop_gain(plant.points.back(), controller);
+  if (low > 1 && high < 1) return {};
+  std::ostringstream text;
+  text.precision(4);
+  text << "the loop would cross over elsewhere: its gain is " << low << " at " << plant.points.front().omega_rad_s
+       << " rad/s and " << high << " at " << plant.points.back().omega_rad_s
+       << " rad/s, and must fall through 1 between";
+  return text.str();
+}
+
+void add_sigmas(const MeasuredPlant& plant, MeasuredTuning& tuning) {
+  const MeasuredPoint& at = plant.at_crossover();
+  const double slope = std::abs(gain_slope(plant, *tuning.controller));
+  tuning.phase_margin_sigma_deg = at.sigma * kDegPerRad;
+  tuning.crossover_sigma_rad_s = at.sigma / slope * at.omega_rad_s;
+  tuning.phase_slope_sigma_deg_per_rad_s = plant.phase_fall_sigma * kDegPerRad / at.omega_rad_s;
+}
+
+}  // namespace
+
+MeasuredTuning tune_measured(const MeasuredPlant& plant, const TuningSpec& spec) {
+  MeasuredTuning tuning;
+  tuning.reason = plant.refusal;
+  if (!plant.refusal.empty()) return tuning;
+  check(plant, spec);
+  const TuningDemand demand = demand_of(plant.at_crossover(), plant.phase_fall, spec.phase_margin_deg);
+  tuning.theta_deg = demand.theta_rad * kDegPerRad;
+  tuning.phase_fall = demand.phase_fall;
+  if (!feasible_theta(spec.mu, demand.phase_fall).contains(demand.theta_rad)) {
+    tuning.reason = why_no_solution(spec, tuning.theta_deg, tuning.phase_fall);
+    return tuning;
+  }
+  const FopdController controller = controller_for(demand, spec.mu ? *spec.mu : iso_damping_mu(demand));
+  tuning.reason = why_not_sound(plant, controller);
+  if (!tuning.reason.empty()) return tuning;
+  tuning.controller = controller;
+  add_sigmas(plant, tuning);
+  return tuning;
+}
+
+}  // namespace control

@@ -1,0 +1,55 @@
+// Looks again until the work has ended.
+#include "server/cli/experiments/station_work.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <stdexcept>
+#include <string_view>
+
+namespace server::cli {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr int kFirstProblem = 300;
+constexpr std::string_view kEndedExperiment[] = {"done", "aborted", "cancelled", "interrupted"};
+
+bool has_ended(const json& experiment) {
+  const auto state = experiment.at("state").get<std::string>();
+  return std::ranges::find(kEndedExperiment, state) != std::end(kEndedExperiment);
+}
+
+}  // namespace
+
+json StationWork::checked(const std::string& method, const std::string& target, const json& body) const {
+  StationAnswer answer = ask_(method, target, body);
+  if (answer.status < kFirstProblem) return std::move(answer.body);
+  const json& problem = answer.body;
+  const std::string why = problem.is_object() ? problem.value("detail", std::string{}) : std::string{};
+  throw std::runtime_error{
+      fmt::format("the station refused: {}", why.empty() ? fmt::format("status {}", answer.status) : why)};
+}
+
+json StationWork::finished_job(std::int64_t job_id) const {
+  for (;;) {
+    json job = get(fmt::format("/api/v1/jobs/{}?wait_ms={}", job_id, kLook_ms));
+    on_look_(job);
+    if (!job.at("ended_at_us").is_null()) return job;
+  }
+}
+
+json StationWork::finished_experiment(std::int64_t experiment_id) const {
+  const std::string target = fmt::format("/api/v1/experiments/{}", experiment_id);
+  for (;;) {
+    // Refused for one that has just ended, which the next look shows.
+    (void)ask_("POST", target + "/keep-alive", json::object());
+    json experiment = get(fmt::format("{}?wait_ms={}", target, kLook_ms));
+    on_look_(experiment);
+    if (has_ended(experiment)) return experiment;
+  }
+}
+
+}  // namespace server::cli

@@ -1,0 +1,45 @@
+// Work that a station does for a tool: a job or an experiment is begun, watched to its end, and its answer taken.
+//
+// While an experiment is watched the tool gives signs of life: the robot stops when they end, so a tool that is
+// interrupted leaves nothing moving. Every wait is a request that the station answers after kLook_ms at the latest.
+// Errors: throws std::runtime_error with what the station refused.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "server/cli/accounts/station_client.hpp"
+
+namespace server::cli {
+
+inline constexpr int kLook_ms = 100;  // signs of life are needed every 200 ms
+
+using AskStation =
+    std::function<StationAnswer(const std::string& method, const std::string& target, const nlohmann::json& body)>;
+
+// Reports what a job or an experiment says of itself, at each look.
+using OnLook = std::function<void(const nlohmann::json& job_or_experiment)>;
+
+class StationWork {
+ public:
+  StationWork(AskStation ask, OnLook on_look) : ask_{std::move(ask)}, on_look_{std::move(on_look)} {}
+
+  nlohmann::json get(const std::string& target) const { return checked("GET", target, nullptr); }
+  nlohmann::json post(const std::string& target, const nlohmann::json& body) const {
+    return checked("POST", target, body);
+  }
+
+  // As the station answers it, ended: a job with its result, an experiment with its runs.
+  nlohmann::json finished_job(std::int64_t job_id) const;
+  nlohmann::json finished_experiment(std::int64_t experiment_id) const;
+
+ private:
+  nlohmann::json checked(const std::string& method, const std::string& target, const nlohmann::json& body) const;
+
+  AskStation ask_;
+  OnLook on_look_;
+};
+
+}  // namespace server::cli
