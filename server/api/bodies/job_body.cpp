@@ -9,6 +9,7 @@
 
 #include "base/json_text.hpp"
 #include "server/analysis/control_json.hpp"
+#include "server/api/bodies/document_body.hpp"
 #include "server/api/bodies/limits.hpp"
 
 namespace server::api {
@@ -133,6 +134,28 @@ Result<analysis::IdentifyRequest> identify_request(const Members& body) {
   return request;
 }
 
+Result<void> parse_identify(const Members& body, JobBody& into) {
+  auto request = identify_request(body);
+  if (!request) return std::unexpected{request.error()};
+  into.identify = std::move(*request);
+  return {};
+}
+
+Result<void> parse_document(const Members& body, JobBody& into) {
+  auto request = parse_document_job(into.kind, body);
+  if (!request) return std::unexpected{request.error()};
+  into.document_request = std::move(*request);
+  return {};
+}
+
+// Who reads the members of which kind.
+struct JobKind {
+  const char* name;
+  Result<void> (*parse)(const Members& body, JobBody& into);
+};
+constexpr std::array kJobKinds{JobKind{"identify", parse_identify}, JobKind{"report", parse_document},
+                               JobKind{"comparison", parse_document}, JobKind{"export", parse_document}};
+
 }  // namespace
 
 Result<JobBody> parse_job(const std::string& text) {
@@ -140,12 +163,17 @@ Result<JobBody> parse_job(const std::string& text) {
   if (!body) return std::unexpected{body.error()};
   const auto kind = body->text("kind", {0, kMaxWordBytes});
   if (!kind) return std::unexpected{kind.error()};
-  if (*kind != "identify") {
-    return fail(ErrorCode::invalid, fmt::format("kind is '{}', allowed is identify", *kind), "unknown_kind");
+  std::vector<std::string> names;
+  for (const JobKind& known : kJobKinds) {
+    names.emplace_back(known.name);
+    if (*kind != known.name) continue;
+    JobBody parsed{*kind, {}, {}, base::dump(body->object())};
+    const auto read = known.parse(*body, parsed);
+    if (!read) return std::unexpected{read.error()};
+    return parsed;
   }
-  auto request = identify_request(*body);
-  if (!request) return std::unexpected{request.error()};
-  return JobBody{*kind, std::move(*request), base::dump(body->object())};
+  return fail(ErrorCode::invalid, fmt::format("kind is '{}', allowed are {}", *kind, fmt::join(names, ", ")),
+              "unknown_kind");
 }
 
 json to_json(const storage::Job& job) {

@@ -12,6 +12,7 @@
 #include <limits>
 #include <string_view>
 
+#include "server/analysis/comparison/aligned_runs.hpp"
 #include "server/analysis/reference_import.hpp"
 #include "server/api/bodies/json.hpp"
 #include "server/identity/accounts.hpp"
@@ -28,6 +29,7 @@ struct Limit {
 
 inline constexpr std::int64_t kMaxUint32 = std::numeric_limits<std::uint32_t>::max();
 inline constexpr std::int64_t kMaxJavaScriptInteger = 9'007'199'254'740'991;
+inline constexpr std::int64_t kMostTracesMs = 86'400'000;
 inline constexpr Range<std::size_t> kNameBytes{1, 200}, kTextBytes{0, 4000}, kReasonBytes{1, 4000};
 inline constexpr Range<double> kReferenceSeconds{-1e10, 1e10}, kReferenceClockSd_s{0, 1000};
 
@@ -42,6 +44,7 @@ inline constexpr Limit<std::size_t> kTextLimits[] = {
     {"ControlBody.reason", kNameBytes},
     {"DesignBody.name", kNameBytes},
     {"DesignBody.notes", kTextBytes},
+    {"ExportJobBody.channels", kNameBytes},
     {"FluidBody.fluid", kNameBytes},
     {"FluidModelBody.comment", {0, kMaxDocumentBytes}},
     {"FluidModelBody.description", {0, kMaxDocumentBytes}},
@@ -72,12 +75,16 @@ inline constexpr Limit<std::size_t> kTextLimits[] = {
     {"RunEndBody.verdict", kTextBytes},
     {"ScopeList", {1, kMaxWordBytes}},
     {"SetParameterBody.name", {1, sizeof(rheonaut_SetParameter::name) - 1}},
+    {"TracesBody.channels", kNameBytes},
+    {"TracesBody.event", kNameBytes},
+    {"TracesBody.marker", kReasonBytes},
     {"UserBody.password", {runtime::kMinPasswordBytes, runtime::kMaxPasswordBytes}},
     {"UserChange.password", {runtime::kMinPasswordBytes, runtime::kMaxPasswordBytes}},
 };
 
 inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     // minimum, maximum
+    {"ComparisonJobBody.runs[]", {1, kMaxJavaScriptInteger}},
     {"ControlBody.lease_ms", {1, station::kLongestControl.count() / 1000}},
     {"ControlBody.stamp_us", {0, kMaxTimeUs}},
     {"Controller.checksum", {0, kMaxUint32}},
@@ -89,6 +96,8 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"DesignBody.runs[].run_id", {1, kMaxJavaScriptInteger}},
     {"DesignBody.runs[].span", {0, 1'000'000}},
     {"ExecuteAtRobotUs", {0, kMaxTimeUs}},
+    {"ExportJobBody.grid_us", {100, 3'600'000'000}},
+    {"ExportJobBody.run_id", {1, kMaxJavaScriptInteger}},
     {"GetParametersBody.first_index", {0, 255}},
     {"IdentifyJobBody.run_id", {1, kMaxJavaScriptInteger}},
     {"IdentifyJobBody.span", {0, 1'000'000}},
@@ -101,6 +110,7 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"ReferenceClock.marker_id", {1, kMaxJavaScriptInteger}},
     {"ReferenceClock.zero_at_us", {0, kMaxJavaScriptInteger}},
     {"RenewLeaseBody.lease_ms", {1, protocol::kLeaseMs}},
+    {"ReportJobBody.runs[]", {1, kMaxJavaScriptInteger}},
     {"SeqSpan.first_seq", {0, kMaxTimeUs - 1}},
     {"SeqSpan.last_seq", {0, kMaxTimeUs - 1}},  // from first_seq on
     {"SetControllerBody.controller_id", {1, kMaxUint32}},
@@ -110,6 +120,11 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"TimeSpan.from_us", {0, kMaxTimeUs - 1}},
     {"TimeSpan.to_us", {0, kMaxTimeUs - 1}},  // from from_us on
     {"TokenBody.days", {1, identity::kMaxTokenDays}},
+    {"TracesBody.from_ms", {-kMostTracesMs, kMostTracesMs}},
+    {"TracesBody.grid_us", {analysis::kFinestGrid_us, analysis::kCoarsestGrid_us}},
+    {"TracesBody.number", {1, analysis::kMostAlignmentNumber}},
+    {"TracesBody.reference_run_id", {1, kMaxJavaScriptInteger}},
+    {"TracesBody.to_ms", {-kMostTracesMs, kMostTracesMs}},
 };
 
 inline constexpr Limit<double> kNumberLimits[] = {
@@ -143,6 +158,7 @@ inline constexpr Limit<double> kLimitsOfTheRobot[] = {
 
 inline constexpr Limit<std::size_t> kListLimits[] = {
     // minItems, maxItems
+    {"ComparisonJobBody.runs", {2, analysis::kMostAlignedRuns}},
     {"Controller.biquad_a1", {0, std::size(rheonaut_Controller{}.biquad_a1)}},
     {"Controller.biquad_a2", {0, std::size(rheonaut_Controller{}.biquad_a2)}},
     {"Controller.biquad_b0", {0, std::size(rheonaut_Controller{}.biquad_b0)}},
@@ -152,6 +168,7 @@ inline constexpr Limit<std::size_t> kListLimits[] = {
     {"DesignBody.runs", {0, 100}},
     {"FluidModelBody.model_gain_m_s", {station::kFluidModelSections, station::kFluidModelSections}},
     {"FluidModelBody.model_time_constant_s", {station::kFluidModelSections, station::kFluidModelSections}},
+    {"ReportJobBody.runs", {1, analysis::kMostAlignedRuns}},
     {"SetDutyScheduleBody.schedule", {1, std::size(rheonaut_SetDutySchedule{}.duty)}},
 };
 
