@@ -11,8 +11,8 @@ import pathlib
 import re
 import sys
 
-FOLDERS = {"protocol", "control", "robot_fw", "sim_robot", "server", "external", "web", "tests", "deploy", "cmake", "docs"}
-SUFFIXES = ("", ".hpp", ".cpp", ".ts", ".tsx", ".py")
+FOLDERS = {"protocol", "control", "robot_fw", "sim_robot", "server", "external", "web", "tests", "deploy", "cmake", "docs", "examples"}
+SUFFIXES = ("", ".hpp", ".cpp", ".ts", ".tsx", ".py", ".m")
 
 
 def exists(root, path):

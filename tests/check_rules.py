@@ -9,7 +9,7 @@ import re
 import sys
 
 FOLDERS = ("base", "protocol", "control", "robot_fw", "sim_robot", "server")
-SEARCHED = (*FOLDERS, "external", "web", "tests", "deploy", "cmake", "docs")
+SEARCHED = (*FOLDERS, "external", "web", "tests", "deploy", "cmake", "docs", "examples")
 SKIPPED = {"node_modules", "dist", "build", "__pycache__", "data", "out"}
 CPP = {".cpp", ".hpp", ".h", ".c", ".ino"}
 SOURCE = CPP | {".py", ".ts", ".tsx", ".css", ".proto", ".sql", ".cmake"}
@@ -35,10 +35,11 @@ server/runtime server/config server/tls server/net
 server/station/state server/station/commands server/station server/station/models server/link server/live
 server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest
 server/storage/runs server/storage/jobs server/storage/designs server/storage/experiments server/storage/query
-server/storage/export server/storage/upkeep server/storage server/analysis/metrics server/analysis/report
-server/analysis server/analysis/tuning server/experiments server/experiments/runner server/identity server/http
-server/api/bodies server/api/routes server/api/analysis server/api/experiments server/api server/cli/terminal
-server/cli/design server/cli/accounts server/cli/data server/cli/experiments server/cli
+server/storage/export server/storage/upkeep server/storage
+server/analysis/metrics server/analysis/comparison server/analysis/report server/analysis server/analysis/tuning
+server/analysis/documents server/experiments server/experiments/runner server/identity server/http server/api/bodies
+server/api/routes server/api/analysis server/api/experiments server/api server/cli/terminal server/cli/design
+server/cli/accounts server/cli/analysis server/cli/data server/cli/experiments server/cli
 """.split()
 ROOMS_WITH_CONTROL = {"server/" + room for room in "analysis analysis/metrics analysis/tuning experiments experiments/runner cli/design".split()}
 # What decides only about the order of work, and the files of server/ that know it ("Threads of the station").

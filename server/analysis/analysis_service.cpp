@@ -77,8 +77,8 @@ asio::awaitable<Result<RunMetrics>> AnalysisService::metrics(storage::Run run) {
   co_return co_await maths_.run(std::move(job));
 }
 
-asio::awaitable<Result<RunTrace>> AnalysisService::trace(storage::RunId run) {
-  auto gathered = co_await gather(run, trace_point);
+asio::awaitable<Result<RunTrace>> AnalysisService::trace(storage::RunId run, std::size_t limit) {
+  auto gathered = co_await gather(run, trace_point, limit);
   if (!gathered) co_return std::unexpected{gathered.error()};
   auto found = co_await reference_of(run);
   if (!found) co_return std::unexpected{found.error()};

@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "server/analysis/comparison/trace.hpp"
 #include "server/analysis/metrics/run_figures.hpp"
 #include "server/analysis/metrics/run_steps.hpp"
 #include "server/analysis/reference_import.hpp"
-#include "server/analysis/report/trace.hpp"
 #include "server/analysis/run_recording.hpp"
 #include "server/runtime/result.hpp"
 #include "server/runtime/worker.hpp"
@@ -39,8 +39,8 @@ class AnalysisService {
   // Steps and figures; errors as above.
   boost::asio::awaitable<Result<RunMetrics>> metrics(storage::Run run);
 
-  // For plots; errors as above.
-  boost::asio::awaitable<Result<RunTrace>> trace(storage::RunId run);
+  // For plots and comparisons; errors as above, with this limit.
+  boost::asio::awaitable<Result<RunTrace>> trace(storage::RunId run, std::size_t limit = kMaxAnalysedSamples);
 
   // What is said of the position that was measured from outside, if the run has one.
   boost::asio::awaitable<Result<std::optional<storage::OutsideReference>>> reference(storage::RunId run);

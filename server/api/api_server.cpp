@@ -56,6 +56,7 @@ ApiServer::ApiServer(boost::asio::io_context& loop, runtime::TaskGroup& tasks, r
       logins_{clock, accounts_, options.password_cost},
       guard_{auth_, host_names(options), options.security->http().tls != nullptr},
       texts_{loop, station},
+      documents_{{analysis, clock, recording.digester, recording.history, recording.metrics, recording.runs}},
       facts_{facts_of(options, listener_, clock)},
       live_{loop, tasks, clock, station, live, texts_, options.version},
       upgrades_{"/live",
@@ -77,8 +78,12 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   add_in_force_routes(router_, {station});
   add_fluid_routes(router_, {clock_, recording.fluid_models, recording.recorder, station});
   add_run_routes(router_, {analysis, recording.digester, clock_, recording.disk_watch, live, recording.runs, station});
-  add_run_metrics_routes(router_, {analysis, clock_, recording.digester, history, recording.metrics, recording.runs});
-  add_job_routes(router_, {analysis, recording.designs, recording.fluid_models, recording.jobs, recording.runs});
+  add_run_metrics_routes(router_, {documents_});
+  add_comparison_routes(router_, {documents_});
+  const analysis::ExportParts exports{recording.exports, recording.disk_watch, recording.job_files, recording.path()};
+  add_job_routes(
+      router_,
+      {analysis, recording.designs, {documents_, exports}, recording.fluid_models, recording.jobs, recording.runs});
   add_design_routes(router_, {clock_, recording.designs, recording.jobs});
   add_push_routes(router_, {analysis, {clock_, history, station}, recording.designs});
   add_marker_routes(router_, {recording.markers, station});

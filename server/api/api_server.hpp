@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/analysis/documents/run_documents.hpp"
 #include "server/api/experiments/experiment_routes.hpp"
 #include "server/api/live_messages.hpp"
 #include "server/api/routes/routes.hpp"
@@ -66,6 +67,7 @@ class ApiServer {
   identity::Logins logins_;
   http::RequestGuard guard_;
   live::RobotTexts texts_;
+  analysis::RunDocuments documents_;
   StationFacts facts_;
   LiveParts live_;
   http::Upgrades upgrades_;

@@ -89,7 +89,9 @@ CommandLine parse_command_line(int argc, char** argv) {
                        line);
   offer<MetricsQuestion>(app, "metrics", "Figures and steps of a run; several runs side by side, with their spread",
                          line);
-  offer<ReportQuestion>(app, "report", "Save a run as an HTML file with plots, metrics, digest and audit", line);
+  offer<CompareQuestion>(app, "compare", "Traces of several runs on one time axis, and their differences", line);
+  offer<ImpedanceMapQuestion>(app, "impedance-map", "Impedance against position, with detections and deliveries", line);
+  offer<ReportQuestion>(app, "report", "Save a run, or several beside each other, as an HTML file with plots", line);
   offer<Model>(app, "model", "Show the motion models, compute the hydrodynamic one, fit the motor", line);
   offer<Bode>(app, "bode", "Crossover, margins and frequency response of the open loop", line);
   offer<Step>(app, "step", "Velocity and position after a step of duty, or any duty", line);

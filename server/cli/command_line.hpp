@@ -7,11 +7,13 @@
 #include "server/cli/accounts/design.hpp"
 #include "server/cli/accounts/fluid.hpp"
 #include "server/cli/accounts/job.hpp"
-#include "server/cli/accounts/metrics.hpp"
-#include "server/cli/accounts/report.hpp"
 #include "server/cli/accounts/robot.hpp"
 #include "server/cli/accounts/token.hpp"
 #include "server/cli/accounts/user.hpp"
+#include "server/cli/analysis/compare.hpp"
+#include "server/cli/analysis/impedance_map.hpp"
+#include "server/cli/analysis/metrics.hpp"
+#include "server/cli/analysis/report.hpp"
 #include "server/cli/data/backup.hpp"
 #include "server/cli/data/certificate.hpp"
 #include "server/cli/data/export.hpp"
@@ -46,10 +48,11 @@ struct Answered {
   int exit_code = 0;
 };
 
-using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model,
-                                 Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
-                                 TokenCommand, RobotCommand, FluidCommand, JobCommand, DesignCommand, MetricsQuestion,
-                                 ReportQuestion, ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune>;
+using CommandLine =
+    std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
+                 Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
+                 FluidCommand, JobCommand, DesignCommand, MetricsQuestion, CompareQuestion, ImpedanceMapQuestion,
+                 ReportQuestion, ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune>;
 
 CommandLine parse_command_line(int argc, char** argv);
 

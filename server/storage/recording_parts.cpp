@@ -37,6 +37,7 @@ RecordingParts::RecordingParts(asio::io_context& loop, runtime::Clock& clock, ru
       jobs{loop, clock, recorder, reader},
       history{options.path, recorder, readers},
       exports{options.path, recorder, exports_worker},
+      job_files{clock, exports.reader(), options.path.parent_path() / "job-files"},
       disk_watch{clock, readers, options.path, space_limits(config)},
       backups{loop, clock, recorder, readers, disk_watch, backup_folder(options.path, config)},
       retention{clock, recorder, reader, disk_watch, references, retention_policy(config)},
@@ -62,6 +63,7 @@ asio::awaitable<RestoredState> RecordingParts::open() {
   co_await references.open();
   co_await fluid_models.load();
   co_await jobs.load();
+  co_await job_files.open();
   co_await retention.open();
   co_await disk_watch.look();
   co_return restored;

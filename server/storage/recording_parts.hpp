@@ -14,6 +14,7 @@
 #include "server/storage/database/database_reader.hpp"
 #include "server/storage/designs/designs.hpp"
 #include "server/storage/ingest/recorder.hpp"
+#include "server/storage/jobs/job_files.hpp"
 #include "server/storage/jobs/jobs.hpp"
 #include "server/storage/query/history.hpp"
 #include "server/storage/runs/fluid_models.hpp"
@@ -65,6 +66,7 @@ struct RecordingParts {
   Jobs jobs;
   History history;
   History exports;  // the same on a worker of its own, so that no page waits behind an export
+  JobFiles job_files;
   DiskWatch disk_watch;
   Backups backups;
   Retention retention;

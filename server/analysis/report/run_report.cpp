@@ -1,15 +1,14 @@
 // The sections of a report, each a function.
 #include "server/analysis/report/run_report.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <iterator>
 #include <limits>
 
+#include "server/analysis/report/page.hpp"
 #include "server/analysis/report/svg_plot.hpp"
 
 namespace server::analysis {
@@ -17,60 +16,14 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kMeasured = "#1b2a33";
-constexpr const char* kCommanded = "#b0186f";
-constexpr const char* kOutside = "#12805c";
+constexpr const char* kMeasured = "var(--measured)";
+constexpr const char* kCommanded = "var(--commanded)";
+constexpr const char* kOutside = "var(--outside)";
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
-
-constexpr const char* kHead = R"(<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'">
-<meta name="viewport" content="width=device-width">
-<title>{title}</title>
-<style>
-body {{ font: 14px/1.45 system-ui, sans-serif; color: #1b2a33; background: #fff; max-width: 800px; margin: 24px auto; padding: 0 20px }}
-h1 {{ font-size: 24px; margin: 0 0 4px }}
-h2 {{ font-size: 16px; margin: 28px 0 8px; border-bottom: 1px solid #c9d2d6; padding-bottom: 3px }}
-p {{ margin: 6px 0 }}
-.quiet {{ color: #5b6b73 }}
-table {{ border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums }}
-th, td {{ text-align: left; padding: 3px 10px 3px 0; vertical-align: top; border-bottom: 1px solid #e6ebed }}
-th {{ font-weight: 600 }}
-td.number, th.number {{ text-align: right }}
-.pairs {{ columns: 2; column-gap: 32px }}
-.pairs div {{ display: flex; justify-content: space-between; gap: 12px; border-bottom: 1px solid #e6ebed; padding: 3px 0; break-inside: avoid }}
-.pairs span:last-child {{ text-align: right; overflow-wrap: anywhere }}
-svg {{ display: block; width: 100%; margin: 6px 0 2px; break-inside: avoid }}
-svg text {{ font: 11px system-ui, sans-serif; fill: #44545c }}
-svg text.title {{ font-weight: 600; fill: #1b2a33 }}
-svg .grid {{ stroke: #e3e9eb; fill: none }}
-svg .frame {{ stroke: #8b9aa1; fill: none }}
-code {{ font: 12px ui-monospace, monospace; overflow-wrap: anywhere }}
-@media print {{ body {{ margin: 0; max-width: none }} h2 {{ break-after: avoid }} tr {{ break-inside: avoid }} }}
-</style></head><body>
-)";
-
-std::string utc_text(std::int64_t at_us) {
-  return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(static_cast<std::time_t>(at_us / 1'000'000)));
-}
-
-std::string number_text(const json& value, int digits = 4) {
-  return value.is_number() ? fmt::format("{:.{}g}", value.get<double>(), digits) : "–";
-}
-
-// Rows of a name and a value; those without a value are left out.
-std::string pairs_of(const std::vector<std::pair<std::string, std::string>>& rows) {
-  std::string out = "<div class=\"pairs\">";
-  for (const auto& [name, value] : rows) {
-    if (value.empty()) continue;
-    out += fmt::format("<div><span>{}</span><span>{}</span></div>", html_escaped(name), html_escaped(value));
-  }
-  return out + "</div>\n";
-}
 
 std::string heading(const RunReport& report) {
   const storage::Run& run = report.run;
-  std::string out = fmt::format(fmt::runtime(kHead), fmt::arg("title", html_escaped(run.conditions.name)));
+  std::string out = page_head(run.conditions.name);
   out += fmt::format("<h1>{}</h1>\n<p class=\"quiet\">Run {} of robot {}, {}{}</p>\n",
                      html_escaped(run.conditions.name), run.id, html_escaped(run.robot_id), utc_text(run.started_at_us),
                      run.ended_at_us ? "" : ", not ended when this report was made");
@@ -101,17 +54,17 @@ PlotLine line_of_trace(const RunReport& report, const std::vector<double>& times
   PlotLine line;
   for (std::size_t i = 0; i < report.trace.size(); ++i) {
     if (i > 0 && !follows(report.trace[i - 1], report.trace[i])) {
-      line.time_s.push_back(times_s[i]);
+      line.x.push_back(times_s[i]);
       line.value.push_back(kNothing);
     }
-    line.time_s.push_back(times_s[i]);
+    line.x.push_back(times_s[i]);
     line.value.push_back(static_cast<double>(value(report.trace[i])));
   }
   return line;
 }
 
 PlotBand band_of_trace(const PlotLine& position, const PlotLine& sd) {
-  PlotBand band{"± 2 sd", kMeasured, position.time_s, {}, {}};
+  PlotBand band{"± 2 sd", kMeasured, position.x, {}, {}};
   for (std::size_t i = 0; i < position.value.size(); ++i) {
     band.low.push_back(position.value[i] - 2 * sd.value[i]);
     band.high.push_back(position.value[i] + 2 * sd.value[i]);
@@ -129,7 +82,7 @@ PlotLine outside_line(const RunReport& report, const std::vector<double>& times_
   const double begins_s = times_s[static_cast<std::size_t>(first - report.trace.begin())];
   for (std::size_t i = 0; i < positions.size(); ++i) {
     const auto since_us = static_cast<std::int64_t>(positions.robot_time_us[i] - first->robot_time_us);
-    line.time_s.push_back(begins_s + 1e-6 * static_cast<double>(since_us));
+    line.x.push_back(begins_s + 1e-6 * static_cast<double>(since_us));
     line.value.push_back(positions.position_m[i]);
   }
   return line;
@@ -146,7 +99,7 @@ Plot position_plot(const RunReport& report, const std::vector<double>& times_s) 
   PlotLine position = line_of_trace(report, times_s, [](const TracePoint& point) { return point.position_m; });
   const PlotLine sd = line_of_trace(report, times_s, [](const TracePoint& point) { return point.position_sd_m; });
   const bool is_estimate = std::ranges::any_of(sd.value, [](double value) { return value > 0; });
-  if (is_estimate) plot.band = band_of_trace(position, sd);
+  if (is_estimate) plot.bands.push_back(band_of_trace(position, sd));
   position.label = is_estimate ? "the robot's estimate" : "position";
   position.colour = kMeasured;
   PlotLine setpoint = line_of_trace(report, times_s, [](const TracePoint& point) { return point.setpoint_m; });
@@ -187,7 +140,7 @@ std::string plots(const RunReport& report) {
   all.push_back(plot_of(report, times_s, "Impedance (mV)", "measured", kMeasured,
                         [](const TracePoint& point) { return point.impedance_mv; }));
   for (Plot& plot : all) {
-    plot.to_s = times_s.back();
+    plot.x_to = times_s.back();
     out += svg_of(plot);
   }
   out +=
@@ -239,16 +192,14 @@ std::string origin(const RunReport& report) {
     }
     out += "</table>\n";
   }
-  out += fmt::format("<p class=\"quiet\">Made {} by Rheonaut {}.</p>\n", utc_text(report.made_at_us),
-                     html_escaped(report.program));
-  return out;
+  return out + made_by(report.made_at_us, report.program);
 }
 
 }  // namespace
 
 std::string html_of(const RunReport& report) {
   return heading(report) + conditions(report.run) + plots(report) + steps(report.metrics) + figures(report.metrics) +
-         origin(report) + "</body></html>\n";
+         origin(report) + page_end();
 }
 
 }  // namespace server::analysis

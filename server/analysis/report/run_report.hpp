@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/analysis/report/trace.hpp"
+#include "server/analysis/comparison/trace.hpp"
 #include "server/storage/audit/audit_chain.hpp"
 #include "server/storage/runs/outside_reference.hpp"
 #include "server/storage/runs/run.hpp"

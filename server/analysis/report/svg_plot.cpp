@@ -11,7 +11,7 @@
 namespace server::analysis {
 namespace {
 
-constexpr double kWidth_px = 760, kLeft_px = 62, kRight_px = 12, kTop_px = 26, kBottom_px = 26;
+constexpr double kWidth_px = 760, kLeft_px = 62, kRight_px = 12, kTop_px = 26, kBottom_px = 26, kRow_px = 16;
 constexpr double kPlotWidth_px = kWidth_px - kLeft_px - kRight_px;
 constexpr int kTimeTicks = 8, kValueTicks = 4;
 constexpr double kMargin = 0.06;  // of the range, above and below
@@ -36,9 +36,9 @@ struct Limits {
 Limits limits_of(const Plot& plot) {
   Limits limits;
   for (const PlotLine& line : plot.lines) limits.take(line.value);
-  if (plot.band) {
-    limits.take(plot.band->low);
-    limits.take(plot.band->high);
+  for (const PlotBand& band : plot.bands) {
+    limits.take(band.low);
+    limits.take(band.high);
   }
   if (!(limits.low <= limits.high)) limits = {0, 1};
   const double range = limits.high - limits.low;
@@ -56,8 +56,8 @@ class Path {
  public:
   Path(const Scale& x, const Scale& y) : x_{x}, y_{y} {}
 
-  void add(double time_s, double value) {
-    const double x_px = std::floor(x_(time_s)) + 0.5;
+  void add(double x, double value) {
+    const double x_px = std::floor(x_(x)) + 0.5;
     if (has_column_ && x_px == column_.x_px) {
       column_.least = std::min(column_.least, value);
       column_.greatest = std::max(column_.greatest, value);
@@ -103,10 +103,10 @@ std::string dots_of(const PlotLine& line, const Scale& x, const Scale& y) {
   std::string out;
   double last_px = -1;
   for (std::size_t i = 0; i < line.value.size(); ++i) {
-    const double x_px = x(line.time_s[i]);
+    const double x_px = x(line.x[i]);
     if (!std::isfinite(line.value[i]) || x_px - last_px < 1) continue;  // one for each column of pixels
     last_px = x_px;
-    fmt::format_to(std::back_inserter(out), "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"1.4\" fill=\"{}\"/>", x_px,
+    fmt::format_to(std::back_inserter(out), "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"1.4\" style=\"fill:{}\"/>", x_px,
                    y(line.value[i]), line.colour);
   }
   return out;
@@ -117,13 +117,13 @@ std::string line_of(const PlotLine& line, const Scale& x, const Scale& y) {
   Path path{x, y};
   for (std::size_t i = 0; i < line.value.size(); ++i) {
     if (std::isfinite(line.value[i])) {
-      path.add(line.time_s[i], line.value[i]);
+      path.add(line.x[i], line.value[i]);
     } else {
       path.end_piece();
     }
   }
-  return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.3\"{}/>", path.text(), line.colour,
-                     line.is_dashed ? " stroke-dasharray=\"6 3\"" : "");
+  return fmt::format("<path d=\"{}\" fill=\"none\" style=\"stroke:{}\" stroke-width=\"1.3\"{}/>", path.text(),
+                     line.colour, line.is_dashed ? " stroke-dasharray=\"6 3\"" : "");
 }
 
 // Each piece is one outline: along the upper edge, and back along the lower one.
@@ -139,7 +139,7 @@ std::string band_of(const PlotBand& band, const Scale& x, const Scale& y) {
   const auto finish_piece = [&] {
     finish_column();
     if (!forth.empty())
-      out += fmt::format("<path d=\"{}{}Z\" fill=\"{}\" fill-opacity=\"0.18\"/>", forth, back, band.colour);
+      out += fmt::format("<path d=\"{}{}Z\" style=\"fill:{}\" fill-opacity=\"0.18\"/>", forth, back, band.colour);
     forth.clear();
     back.clear();
   };
@@ -148,7 +148,7 @@ std::string band_of(const PlotBand& band, const Scale& x, const Scale& y) {
       finish_piece();
       continue;
     }
-    const double x_px = std::floor(x(band.time_s[i])) + 0.5;
+    const double x_px = std::floor(x(band.x[i])) + 0.5;
     if (x_px != column_px) {
       finish_column();
       column_px = x_px, low = band.low[i], high = band.high[i];
@@ -169,7 +169,7 @@ std::string tick_text(double value, double step) {
 std::string axes_of(const Plot& plot, const Scale& x, const Scale& y) {
   std::string out;
   const auto add = std::back_inserter(out);
-  const auto times = ticks_between(plot.from_s, plot.to_s, kTimeTicks);
+  const auto times = ticks_between(plot.x_from, plot.x_to, kTimeTicks);
   const double bottom_px = y.begin_px;
   for (const double time_s : times) {
     const double step = times.size() > 1 ? times[1] - times[0] : 1;
@@ -189,28 +189,61 @@ std::string axes_of(const Plot& plot, const Scale& x, const Scale& y) {
   return out;
 }
 
-// To the right of the title, from the right end on.
-std::string legend_of(const Plot& plot) {
-  constexpr double kLetter_px = 6.6, kMark_px = 24, kBetween_px = 14, kBaseline_px = 16;
-  std::string out;
-  double right_px = kWidth_px - kRight_px;
-  const auto entry = [&](const std::string& label, const std::string& mark) {
-    right_px -= kLetter_px * static_cast<double>(label.size());
-    out += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>", right_px, kBaseline_px, html_escaped(label));
-    right_px -= kMark_px;
-    out += fmt::format("<g transform=\"translate({:.1f} {:.1f})\">{}</g>", right_px, kBaseline_px - 4, mark);
-    right_px -= kBetween_px;
-  };
-  for (auto line = plot.lines.rbegin(); line != plot.lines.rend(); ++line) {
-    entry(line->label, line->is_dots ? fmt::format("<circle cx=\"9\" cy=\"0\" r=\"2\" fill=\"{}\"/>", line->colour)
-                                     : fmt::format("<path d=\"M0 0H18\" stroke=\"{}\" stroke-width=\"1.6\"{}/>",
-                                                   line->colour, line->is_dashed ? " stroke-dasharray=\"6 3\"" : ""));
+struct LegendEntry {
+  std::string label, mark;
+  double width_px() const {  // letters of UTF-8, of an average width
+    constexpr double kLetter_px = 6.3, kMark_px = 24, kBetween_px = 14;
+    const auto letters =
+        std::ranges::count_if(label, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; });
+    return kMark_px + kLetter_px * static_cast<double>(letters) + kBetween_px;
   }
-  if (plot.band) {
-    entry(plot.band->label, fmt::format("<rect y=\"-5\" width=\"18\" height=\"10\" fill=\"{}\" fill-opacity=\"0.25\"/>",
-                                        plot.band->colour));
+};
+
+std::vector<LegendEntry> legend_entries(const Plot& plot) {
+  std::vector<LegendEntry> entries;
+  for (const PlotBand& band : plot.bands) {
+    if (band.label.empty()) continue;
+    entries.push_back({band.label, fmt::format("<rect y=\"-5\" width=\"18\" height=\"10\" style=\"fill:{}\" "
+                                               "fill-opacity=\"0.25\"/>",
+                                               band.colour)});
   }
-  return out;
+  for (const PlotLine& line : plot.lines) {
+    if (line.label.empty()) continue;
+    const std::string stroke = fmt::format("<path d=\"M0 0H18\" style=\"stroke:{}\" stroke-width=\"1.6\"{}/>",
+                                           line.colour, line.is_dashed ? " stroke-dasharray=\"6 3\"" : "");
+    const std::string dot = fmt::format("<circle cx=\"9\" cy=\"0\" r=\"2\" style=\"fill:{}\"/>", line.colour);
+    entries.push_back({line.label, line.is_dots ? dot : stroke});
+  }
+  return entries;
+}
+
+// To the right of the title where it fits there, else in rows of its own below it.
+struct Legend {
+  std::string text;
+  int rows_below = 0;
+};
+
+Legend legend_of(const Plot& plot) {
+  constexpr double kBaseline_px = 16, kTitleLetter_px = 7.2, kAfterTitle_px = 24;
+  const std::vector<LegendEntry> entries = legend_entries(plot);
+  double width_px = 0;
+  for (const LegendEntry& entry : entries) width_px += entry.width_px();
+  const double title_px = kTitleLetter_px * static_cast<double>(plot.title.size()) + kAfterTitle_px;
+  const bool fits = title_px + width_px <= kPlotWidth_px;
+  Legend legend;
+  legend.rows_below = fits ? 0 : 1;
+  double x_px = fits ? kLeft_px + kPlotWidth_px - width_px : kLeft_px;
+  for (const LegendEntry& entry : entries) {
+    if (!fits && x_px > kLeft_px && x_px + entry.width_px() > kLeft_px + kPlotWidth_px) {
+      x_px = kLeft_px;
+      ++legend.rows_below;
+    }
+    const double y_px = kBaseline_px + kRow_px * legend.rows_below;
+    legend.text += fmt::format("<g transform=\"translate({:.1f} {:.1f})\">{}</g>", x_px, y_px - 4, entry.mark);
+    legend.text += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>", x_px + 24, y_px, html_escaped(entry.label));
+    x_px += entry.width_px();
+  }
+  return legend;
 }
 
 }  // namespace
@@ -244,17 +277,24 @@ std::string html_escaped(const std::string& text) {
 }
 
 std::string svg_of(const Plot& plot) {
-  const double bottom_px = plot.height_px - kBottom_px;
-  const double to_s = plot.to_s > plot.from_s ? plot.to_s : plot.from_s + 1;
+  const Legend legend = legend_of(plot);
+  const double top_px = kTop_px + kRow_px * legend.rows_below;
+  const double bottom_px = top_px + plot.height_px - kTop_px - kBottom_px;
+  const double height_px = bottom_px + kBottom_px + (plot.x_title.empty() ? 0 : kRow_px);
+  const double x_to = plot.x_to > plot.x_from ? plot.x_to : plot.x_from + 1;
   const Limits limits = limits_of(plot);
-  const Scale x{plot.from_s, to_s, kLeft_px, kLeft_px + kPlotWidth_px};
-  const Scale y{limits.low, limits.high, bottom_px, kTop_px};
-  std::string out = fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">", kWidth_px, plot.height_px,
+  const Scale x{plot.x_from, x_to, kLeft_px, kLeft_px + kPlotWidth_px};
+  const Scale y{limits.low, limits.high, bottom_px, top_px};
+  std::string out = fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">", kWidth_px, height_px,
                                 html_escaped(plot.title));
   out += axes_of(plot, x, y);
   out += fmt::format("<text x=\"{}\" y=\"16\" class=\"title\">{}</text>", kLeft_px, html_escaped(plot.title));
-  out += legend_of(plot);
-  if (plot.band) out += band_of(*plot.band, x, y);
+  out += legend.text;
+  if (!plot.x_title.empty()) {
+    out += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>", kLeft_px + kPlotWidth_px / 2,
+                       bottom_px + kBottom_px + 8, html_escaped(plot.x_title));
+  }
+  for (const PlotBand& band : plot.bands) out += band_of(band, x, y);
   for (const PlotLine& line : plot.lines) out += line_of(line, x, y);
   return out + "</svg>\n";
 }

@@ -1,10 +1,9 @@
-// A plot over time as SVG: lines and a band, with axes and a legend. Gaps stay gaps.
+// A plot over time or position as SVG: lines and bands, with axes and a legend. Gaps stay gaps.
 //
 // A line has at most four points for each column of pixels (the first, least, greatest and last of its values there),
 // so no excursion is lost and the text stays short. Pure.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,24 +12,25 @@ namespace server::analysis {
 // NaN ends a piece.
 struct PlotLine {
   std::string label;
-  const char* colour = "#000";
-  std::vector<double> time_s, value;
+  std::string colour = "#000";  // of CSS, which a page may change for the dark: "var(--run-1)"
+  std::vector<double> x, value;
   bool is_dashed = false;
   bool is_dots = false;  // measured now and then: not joined
 };
 
 struct PlotBand {
   std::string label;
-  const char* colour = "#000";
-  std::vector<double> time_s, low, high;
+  std::string colour = "#000";
+  std::vector<double> x, low, high;
 };
 
 struct Plot {
   std::string title;  // with unit
   std::vector<PlotLine> lines;
-  std::optional<PlotBand> band;
-  double from_s = 0, to_s = 1;  // of the time axis
-  int height_px = 190;
+  std::vector<PlotBand> bands;
+  double x_from = 0, x_to = 1;  // of the axis
+  std::string x_title;          // below it, with unit; may be empty
+  int height_px = 190;          // of what is drawn; a legend that needs more rows, and x_title, come on top
 };
 
 std::string svg_of(const Plot& plot);

@@ -1,15 +1,15 @@
 // The routes of what is computed from runs, grouped by noun: routes_jobs, routes_designs, routes_push,
-// routes_run_metrics.
+// routes_run_metrics, routes_comparisons.
 //
 // As in server/api/routes/routes.hpp: all of what they work with outlives the router.
 #pragma once
 
+#include "server/analysis/documents/document_jobs.hpp"
 #include "server/api/routes/routes.hpp"
 
 namespace server::storage {
 class Designs;
 class Jobs;
-class MetricsOfRuns;
 }  // namespace server::storage
 
 namespace server::api {
@@ -24,6 +24,7 @@ void add_design_routes(http::Router& router, DesignRoutes parts);
 struct JobRoutes {
   analysis::AnalysisService& analysis;
   storage::Designs& designs;
+  analysis::DocumentJobParts documents;
   storage::FluidModels& fluid_models;
   storage::Jobs& jobs;
   storage::Runs& runs;
@@ -37,14 +38,11 @@ struct PushRoutes {
 };
 void add_push_routes(http::Router& router, PushRoutes parts);
 
-struct RunMetricsRoutes {
-  analysis::AnalysisService& analysis;
-  runtime::Clock& clock;
-  storage::RunDigester& digester;
-  storage::History& history;
-  storage::MetricsOfRuns& metrics;
-  storage::Runs& runs;
+// Metrics and reports of one run, and of several side by side.
+struct DocumentRoutes {
+  analysis::RunDocuments& documents;
 };
-void add_run_metrics_routes(http::Router& router, RunMetricsRoutes parts);
+void add_run_metrics_routes(http::Router& router, DocumentRoutes parts);
+void add_comparison_routes(http::Router& router, DocumentRoutes parts);
 
 }  // namespace server::api

@@ -1,10 +1,11 @@
-// Jobs: begin, list, watch, take the result, cancel.
+// Jobs: begin, list, watch, take the result or the file, cancel.
 #include <fmt/format.h>
 
 #include "base/json_text.hpp"
 #include "server/analysis/control_json.hpp"
 #include "server/analysis/identify_job.hpp"
 #include "server/api/analysis/analysis_routes.hpp"
+#include "server/api/analysis/job_file_stream.hpp"
 #include "server/api/bodies/job_body.hpp"
 #include "server/api/bodies/query_params.hpp"
 #include "server/storage/designs/designs.hpp"
@@ -118,6 +119,17 @@ boost::asio::awaitable<Work> work_of(JobRoutes parts, TuningMapBody body) {
   co_return storage::JobWork{std::move(work)};
 }
 
+boost::asio::awaitable<Work> work_of(JobRoutes parts, analysis::DocumentRequest request) {
+  for (const storage::RunId id : runs_of(request)) {
+    const auto run = co_await parts.runs.find(id);
+    if (!run) co_return std::unexpected{run.error()};
+  }
+  auto work = [documents = parts.documents, request = std::move(request)](storage::JobRun& job) {
+    return analysis::document_job(documents, request, job);
+  };
+  co_return storage::JobWork{std::move(work)};
+}
+
 http::Answer begin_job(JobRoutes parts, http::Request request) {
   auto body = parse_job(request.body);
   if (!body) co_return http::problem(body.error());
@@ -159,6 +171,37 @@ http::Answer get_job(JobRoutes parts, http::Request request) {
   co_return http::json_text_response(200, std::move(text));
 }
 
+std::string content_type_of(const std::string& ending) {
+  if (ending == "html") return "text/html; charset=utf-8";
+  if (ending == "csv") return "text/csv; charset=utf-8";
+  return ending == "mat" ? "application/x-matlab-data" : "application/vnd.sqlite3";
+}
+
+http::Answer get_job_file(JobRoutes parts, http::Request request) {
+  const auto id = job_id_of(request);
+  if (!id) co_return http::problem(id.error());
+  const auto job = co_await parts.jobs.find(*id);
+  if (!job) co_return http::problem(job.error());
+  const auto file = co_await parts.documents.exports.files.find(*id);
+  std::unique_ptr<JobFileStream> stream;
+  if (file && job->state == storage::JobState::done) {
+    stream = co_await JobFileStream::open(parts.documents.exports.exports.reader(), *file);
+  }
+  if (!stream) {
+    co_return http::problem(404,
+                            fmt::format("job {}, {} and {}, has no file, or it is no longer kept", *id,
+                                        job->request.kind, text(job->state)),
+                            "no_file");
+  }
+  http::Response response;
+  response.content_type = content_type_of(file->ending);
+  response.headers.emplace_back("Cache-Control", "no-store");
+  response.headers.emplace_back("Content-Disposition",
+                                fmt::format("attachment; filename=\"job-{}.{}\"", *id, file->ending));
+  response.stream = std::move(stream);
+  co_return response;
+}
+
 http::Answer cancel_job(JobRoutes parts, http::Request request) {
   const auto id = job_id_of(request);
   if (!id) co_return http::problem(id.error());
@@ -184,6 +227,7 @@ void add_job_routes(http::Router& router, JobRoutes parts) {
   add("POST", "/api/v1/jobs", identity::Scope::record, {}, begin_job);
   add("GET", "/api/v1/jobs", identity::Scope::read, {"before", "limit"}, list_jobs);
   add("GET", "/api/v1/jobs/{job_id}", identity::Scope::read, {"wait_ms"}, get_job);
+  add("GET", "/api/v1/jobs/{job_id}/file", identity::Scope::record, {}, get_job_file);
   add("POST", "/api/v1/jobs/{job_id}/cancel", identity::Scope::record, {}, cancel_job);
 }
 

@@ -1,9 +1,11 @@
 // The body of POST /api/v1/jobs: which computation, on which runs or models.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <variant>
 
+#include "server/analysis/documents/document_jobs.hpp"
 #include "server/analysis/identify_job.hpp"
 #include "server/api/bodies/json.hpp"
 #include "server/api/bodies/tune_body.hpp"
@@ -13,7 +15,7 @@ namespace server::api {
 
 struct JobBody {
   std::string kind;
-  std::variant<analysis::IdentifyRequest, TuneBody, TuningMapBody> request;
+  std::variant<analysis::IdentifyRequest, TuneBody, TuningMapBody, analysis::DocumentRequest> request;
   std::string document;  // the body, as it is kept
 };
 

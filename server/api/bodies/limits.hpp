@@ -12,6 +12,7 @@
 #include <limits>
 #include <string_view>
 
+#include "server/analysis/comparison/aligned_runs.hpp"
 #include "server/analysis/reference_import.hpp"
 #include "server/analysis/tuning/tune_job.hpp"
 #include "server/api/bodies/json.hpp"
@@ -29,6 +30,7 @@ struct Limit {
 
 inline constexpr std::int64_t kMaxUint32 = std::numeric_limits<std::uint32_t>::max();
 inline constexpr std::int64_t kMaxJavaScriptInteger = 9'007'199'254'740'991;
+inline constexpr std::int64_t kMostTracesMs = 86'400'000;
 inline constexpr Range<std::size_t> kNameBytes{1, 200}, kTextBytes{0, 4000}, kReasonBytes{1, 4000};
 inline constexpr Range<double> kReferenceSeconds{-1e10, 1e10}, kReferenceClockSd_s{0, 1000};
 
@@ -46,6 +48,7 @@ inline constexpr Limit<std::size_t> kTextLimits[] = {
     {"ExperimentAbortBody.reason", kTextBytes},
     {"ExperimentBody.notes", kTextBytes},
     {"ExperimentBody.profile", {1, 32'000}},
+    {"ExportJobBody.channels", kNameBytes},
     {"FluidBody.fluid", kNameBytes},
     {"FluidModelBody.comment", {0, kMaxDocumentBytes}},
     {"FluidModelBody.description", {0, kMaxDocumentBytes}},
@@ -76,6 +79,9 @@ inline constexpr Limit<std::size_t> kTextLimits[] = {
     {"RunEndBody.verdict", kTextBytes},
     {"ScopeList", {1, kMaxWordBytes}},
     {"SetParameterBody.name", {1, sizeof(rheonaut_SetParameter::name) - 1}},
+    {"TracesBody.channels", kNameBytes},
+    {"TracesBody.event", kNameBytes},
+    {"TracesBody.marker", kReasonBytes},
     {"TuneJobBody.fluid", kNameBytes},
     {"TuningMapJobBody.fluid", kNameBytes},
     {"UserBody.password", {runtime::kMinPasswordBytes, runtime::kMaxPasswordBytes}},
@@ -84,6 +90,7 @@ inline constexpr Limit<std::size_t> kTextLimits[] = {
 
 inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     // minimum, maximum
+    {"ComparisonJobBody.runs[]", {1, kMaxJavaScriptInteger}},
     {"ControlBody.lease_ms", {1, station::kLongestControl.count() / 1000}},
     {"ControlBody.stamp_us", {0, kMaxTimeUs}},
     {"Controller.checksum", {0, kMaxUint32}},
@@ -98,6 +105,8 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"ExperimentBody.priority", {-100, 100}},
     {"ExperimentMoveBody.before", {1, kMaxJavaScriptInteger}},
     {"ExperimentMoveBody.priority", {-100, 100}},
+    {"ExportJobBody.grid_us", {100, 3'600'000'000}},
+    {"ExportJobBody.run_id", {1, kMaxJavaScriptInteger}},
     {"GetParametersBody.first_index", {0, 255}},
     {"IdentifyJobBody.run_id", {1, kMaxJavaScriptInteger}},
     {"IdentifyJobBody.span", {0, 1'000'000}},
@@ -111,6 +120,7 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"ReferenceClock.marker_id", {1, kMaxJavaScriptInteger}},
     {"ReferenceClock.zero_at_us", {0, kMaxJavaScriptInteger}},
     {"RenewLeaseBody.lease_ms", {1, protocol::kLeaseMs}},
+    {"ReportJobBody.runs[]", {1, kMaxJavaScriptInteger}},
     {"SeqSpan.first_seq", {0, kMaxTimeUs - 1}},
     {"SeqSpan.last_seq", {0, kMaxTimeUs - 1}},  // from first_seq on
     {"SetControllerBody.controller_id", {1, kMaxUint32}},
@@ -120,6 +130,11 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"TimeSpan.from_us", {0, kMaxTimeUs - 1}},
     {"TimeSpan.to_us", {0, kMaxTimeUs - 1}},  // from from_us on
     {"TokenBody.days", {1, identity::kMaxTokenDays}},
+    {"TracesBody.from_ms", {-kMostTracesMs, kMostTracesMs}},
+    {"TracesBody.grid_us", {analysis::kFinestGrid_us, analysis::kCoarsestGrid_us}},
+    {"TracesBody.number", {1, analysis::kMostAlignmentNumber}},
+    {"TracesBody.reference_run_id", {1, kMaxJavaScriptInteger}},
+    {"TracesBody.to_ms", {-kMostTracesMs, kMostTracesMs}},
     {"TuneJobBody.model_id", {1, kMaxJavaScriptInteger}},
     {"TuningMapJobBody.model_id", {1, kMaxJavaScriptInteger}},
     {"TuningMapJobBody.points", {2, control::kMostMapPoints}},
@@ -164,6 +179,7 @@ inline constexpr Limit<double> kLimitsOfTheRobot[] = {
 
 inline constexpr Limit<std::size_t> kListLimits[] = {
     // minItems, maxItems
+    {"ComparisonJobBody.runs", {2, analysis::kMostAlignedRuns}},
     {"Controller.biquad_a1", {0, std::size(rheonaut_Controller{}.biquad_a1)}},
     {"Controller.biquad_a2", {0, std::size(rheonaut_Controller{}.biquad_a2)}},
     {"Controller.biquad_b0", {0, std::size(rheonaut_Controller{}.biquad_b0)}},
@@ -173,6 +189,7 @@ inline constexpr Limit<std::size_t> kListLimits[] = {
     {"DesignBody.runs", {0, 100}},
     {"FluidModelBody.model_gain_m_s", {station::kFluidModelSections, station::kFluidModelSections}},
     {"FluidModelBody.model_time_constant_s", {station::kFluidModelSections, station::kFluidModelSections}},
+    {"ReportJobBody.runs", {1, analysis::kMostAlignedRuns}},
     {"SetDutyScheduleBody.schedule", {1, std::size(rheonaut_SetDutySchedule{}.duty)}},
 };
 

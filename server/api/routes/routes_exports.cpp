@@ -11,6 +11,7 @@
 #include "server/storage/query/history.hpp"
 #include "server/storage/query/run_reader.hpp"
 #include "server/storage/upkeep/disk_watch.hpp"
+#include "server/storage/upkeep/export_space.hpp"
 
 namespace server::api {
 namespace asio = boost::asio;
@@ -20,8 +21,6 @@ namespace {
 constexpr std::int64_t kMinGridUs = 100;
 constexpr std::int64_t kMaxGridUs = 3'600'000'000;
 constexpr std::uint64_t kUsualPeriodUs = 10'000;
-constexpr std::uint64_t kSampleBytes = 200;                  // at most, in any format's file
-constexpr std::uint64_t kSpareBytes = 512ULL * 1024 * 1024;  // that the recording goes on with
 
 struct ParsedExport {
   storage::ExportQuery query;
@@ -67,15 +66,7 @@ http::Answer export_csv(ExportRoutes parts, http::Request request) {
 Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folder, const char* ending,
                                               std::uint64_t samples) {
   auto file = std::make_unique<ExportFile>(folder, ending);
-  const std::uint64_t free_bytes = storage::free_bytes_of(folder);
-  const std::uint64_t wanted = 2 * samples * kSampleBytes + kSpareBytes;
-  if (free_bytes < wanted) {
-    return fail(ErrorCode::unavailable,
-                fmt::format("the export needs up to {} MB on the station's disk, {} MB are free; export CSV, which "
-                            "needs none",
-                            wanted / 1'000'000, free_bytes / 1'000'000),
-                "low_space");
-  }
+  if (const auto room = storage::room_for_export(folder, samples); !room) return std::unexpected{room.error()};
   return file;
 }
 
@@ -99,9 +90,8 @@ template <class Writer>
 asio::awaitable<Result<void>> write_in_slices(ExportRoutes parts, Writer& writer) {
   for (Result<bool> more = true; *more;) {
     auto slice = [&writer, folder = parts.folder](SQLite::Database& database) -> Result<bool> {
-      if (storage::free_bytes_of(folder) >= kSpareBytes) return writer.advance(database);
-      return fail(ErrorCode::unavailable, "the export would fill the station's disk; export CSV, which needs no room",
-                  "low_space");
+      if (const auto room = storage::room_for_more(folder); !room) return std::unexpected{room.error()};
+      return writer.advance(database);
     };
     more = co_await parts.history.reader().ask(std::move(slice));
     if (!more) co_return std::unexpected{more.error()};

@@ -42,9 +42,7 @@ void offer_number(CLI::App* sub, JobCommand& options) {
 }
 
 json ask(const JobCommand& options, const std::string& method, const std::string& target, const json& body = nullptr) {
-  const StationAnswer answer = StationClient{options.data_dir}.ask(method, target, body);
-  if (answer.status == 200 || answer.status == 202) return answer.body;
-  throw std::runtime_error{fmt::format("the station refused: {}", answer.body.value("detail", "no reason"))};
+  return asked(StationClient{options.data_dir}.ask(method, target, body));
 }
 
 json read_request(const std::filesystem::path& file) {
@@ -137,6 +135,12 @@ int begin(const JobCommand& options, std::ostream& out) {
   return 0;
 }
 
+int save_file(const JobCommand& options, std::ostream& out) {
+  StationClient{options.data_dir}.save(fmt::format("{}/{}/file", kJobs, options.job), options.to);
+  fmt::print(out, "{}\n", options.to.string());
+  return 0;
+}
+
 int cancel(const JobCommand& options, std::ostream& out) {
   const json job = ask(options, "POST", fmt::format("{}/{}/cancel", kJobs, options.job));
   if (options.json) {
@@ -164,6 +168,10 @@ void add_options(CLI::App& command, JobCommand& options) {
   CLI::App* show = offer(command, options, JobCommand::Act::show, "show", "Show one job, or its result");
   offer_number(show, options);
   show->add_flag("--wait", options.waits, "Wait for its end");
+  CLI::App* file =
+      offer(command, options, JobCommand::Act::file, "file", "Save the file that a report or export has made");
+  offer_number(file, options);
+  file->add_option("--to", options.to, "The file; one that is there is replaced")->required()->check(named());
   offer_number(offer(command, options, JobCommand::Act::cancel, "cancel", "End a job that waits or runs"), options);
   command.footer("Example: rheonaut job list --data lab");
 }
@@ -173,6 +181,7 @@ int run(const JobCommand& options, std::ostream& out) {
     case JobCommand::Act::begin: return begin(options, out);
     case JobCommand::Act::list: return list(options, out);
     case JobCommand::Act::show: return show(options, out);
+    case JobCommand::Act::file: return save_file(options, out);
     case JobCommand::Act::cancel: return cancel(options, out);
   }
   return 0;

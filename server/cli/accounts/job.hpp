@@ -14,10 +14,11 @@ namespace server::cli {
 inline constexpr int kJobNotDone = 5;  // exit status
 
 struct JobCommand {
-  enum class Act : std::uint8_t { begin, list, show, cancel };
+  enum class Act : std::uint8_t { begin, list, show, file, cancel };
   Act act = Act::list;
   std::filesystem::path data_dir = "rheonaut-data";
   std::filesystem::path file;  // the request as JSON; "-": standard input
+  std::filesystem::path to;    // where the job's file is saved
   std::int64_t job = 0;
   bool waits = false;
   bool json = false;

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "server/config/endpoint.hpp"
+#include "server/storage/database/finished_file.hpp"
 #include "server/tls/tls_certificate.hpp"
 
 namespace server::cli {
@@ -49,6 +50,17 @@ using Request = http::request<http::string_body>;
 
 constexpr std::uint64_t kMaxAnswerBytes = 64'000'000;
 
+StationAnswer answer_of(http::response<http::string_body> response) {
+  StationAnswer answer;
+  answer.status = static_cast<int>(response.result_int());
+  if (response[http::field::content_type].contains("json")) {
+    answer.body = nlohmann::json::parse(response.body());
+  } else {
+    answer.text = std::move(response.body());
+  }
+  return answer;
+}
+
 template <class Stream>
 StationAnswer converse(Stream& stream, const Request& request) {
   http::write(stream, request);
@@ -56,20 +68,33 @@ StationAnswer converse(Stream& stream, const Request& request) {
   http::response_parser<http::string_body> parser;
   parser.body_limit(kMaxAnswerBytes);
   http::read(stream, buffer, parser);
-  http::response<http::string_body> response = parser.release();
-  StationAnswer answer;
-  answer.status = static_cast<int>(response.result_int());
-  if (response[http::field::content_type].starts_with("text/html")) {
-    answer.text = std::move(response.body());
-  } else {
-    answer.body = nlohmann::json::parse(response.body());
+  return answer_of(parser.release());
+}
+
+// The body goes into the file; that of a refusal is the answer.
+template <class Stream>
+StationAnswer download(Stream& stream, const Request& request, const std::filesystem::path& file) {
+  http::write(stream, request);
+  boost::beast::flat_buffer buffer;
+  http::response_parser<http::empty_body> head;
+  http::read_header(stream, buffer, head);
+  if (head.get().result() != http::status::ok) {
+    http::response_parser<http::string_body> refusal{std::move(head)};
+    http::read(stream, buffer, refusal);
+    return answer_of(refusal.release());
   }
-  return answer;
+  http::response_parser<http::file_body> parser{std::move(head)};
+  parser.body_limit(boost::none);
+  boost::beast::error_code failed;
+  parser.get().body().open(file.c_str(), boost::beast::file_mode::write, failed);
+  if (failed) throw std::runtime_error{fmt::format("cannot write '{}': {}", file.string(), failed.message())};
+  http::read(stream, buffer, parser);
+  return {200, nullptr, {}};
 }
 
 // SAFETY: another program may have taken the port; it must not get the token.
-StationAnswer converse_in_tls(asio::ip::tcp::socket& socket, const Request& request,
-                              const std::filesystem::path& certificate) {
+template <class Talk>
+StationAnswer talk_in_tls(asio::ip::tcp::socket& socket, const std::filesystem::path& certificate, const Talk& talk) {
   asio::ssl::context context{asio::ssl::context::tls_client};
   asio::ssl::stream<asio::ip::tcp::socket&> stream{socket, context};
   stream.handshake(asio::ssl::stream_base::client);
@@ -77,10 +102,25 @@ StationAnswer converse_in_tls(asio::ip::tcp::socket& socket, const Request& requ
   if (shown == nullptr || tls::describe(*shown).pin != tls::describe(*tls::load_certificate(certificate)).pin) {
     throw std::runtime_error{fmt::format("its key is not that of '{}'", certificate.string())};
   }
-  return converse(stream, request);
+  return talk(stream);
+}
+
+Request request_to(const std::string& method, const std::string& target, const std::string& token) {
+  Request request{http::string_to_verb(method), target, 11};
+  request.set(http::field::host, "localhost");
+  request.set(http::field::authorization, "Bearer " + token);
+  request.keep_alive(false);
+  return request;
 }
 
 }  // namespace
+
+nlohmann::json asked(StationAnswer answer) {
+  if (answer.status == 200 || answer.status == 202) return std::move(answer.body);
+  const bool says_why = answer.body.is_object();
+  throw std::runtime_error{
+      fmt::format("the station refused: {}", says_why ? answer.body.value("detail", "no reason") : "no reason")};
+}
 
 StationClient::StationClient(const std::filesystem::path& data_dir) : token_{token_of(data_dir / "rheonaut.token")} {
   const nlohmann::json announcement = announcement_in(data_dir / "endpoints.json");
@@ -88,26 +128,36 @@ StationClient::StationClient(const std::filesystem::path& data_dir) : token_{tok
   certificate_ = announcement.value("tls_certificate", "");
 }
 
+template <class Talk>
+StationAnswer StationClient::with_connection(const Talk& talk) const {
+  try {
+    asio::io_context loop;
+    asio::ip::tcp::socket socket{loop};
+    socket.connect(endpoint_);
+    return certificate_.empty() ? talk(socket) : talk_in_tls(socket, certificate_, talk);
+  } catch (const std::exception& error) {
+    throw std::runtime_error{
+        fmt::format("the station on {} does not answer: {}", config::text(endpoint_), error.what())};
+  }
+}
+
 StationAnswer StationClient::ask(const std::string& method, const std::string& target,
                                  const nlohmann::json& body) const {
-  Request request{http::string_to_verb(method), target, 11};
-  request.set(http::field::host, "localhost");
-  request.set(http::field::authorization, "Bearer " + token_);
-  request.keep_alive(false);
+  Request request = request_to(method, target, token_);
   if (!body.is_null()) {
     request.set(http::field::content_type, "application/json");
     request.body() = body.dump();
   }
   request.prepare_payload();
-  try {
-    asio::io_context loop;
-    asio::ip::tcp::socket socket{loop};
-    socket.connect(endpoint_);
-    return certificate_.empty() ? converse(socket, request) : converse_in_tls(socket, request, certificate_);
-  } catch (const std::exception& error) {
-    throw std::runtime_error{
-        fmt::format("the station on {} does not answer: {}", config::text(endpoint_), error.what())};
-  }
+  return with_connection([&](auto& stream) { return converse(stream, request); });
+}
+
+void StationClient::save(const std::string& target, const std::filesystem::path& file) const {
+  const Request request = request_to("GET", target, token_);
+  const storage::Draft part{std::filesystem::path{file}.concat(".part")};
+  StationAnswer answer = with_connection([&](auto& stream) { return download(stream, request, part.path()); });
+  asked(std::move(answer));
+  storage::finish_file(part.path(), file);
 }
 
 }  // namespace server::cli

@@ -12,8 +12,11 @@ namespace server::cli {
 struct StationAnswer {
   int status = 0;
   nlohmann::json body;  // of an error: problem details; null of a page
-  std::string text;     // of an HTML page
+  std::string text;     // of what is not JSON
 };
+
+// The body of an answer 200 or 202. Throws std::runtime_error saying what the station refused.
+nlohmann::json asked(StationAnswer answer);
 
 class StationClient {
  public:
@@ -23,7 +26,14 @@ class StationClient {
   // One connection a request. Throws std::runtime_error when nobody answers in JSON.
   StationAnswer ask(const std::string& method, const std::string& target, const nlohmann::json& body = nullptr) const;
 
+  // The body of GET as a file, whatever its size; one that is there is replaced when it is whole. Throws
+  // std::runtime_error saying what the station refused, or that it cannot be written.
+  void save(const std::string& target, const std::filesystem::path& file) const;
+
  private:
+  template <class Talk>
+  StationAnswer with_connection(const Talk& talk) const;
+
   boost::asio::ip::tcp::endpoint endpoint_;
   std::filesystem::path certificate_;  // empty: plain HTTP
   std::string token_;

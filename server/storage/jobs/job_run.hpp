@@ -16,7 +16,10 @@ namespace server::storage {
 
 class JobRun {
  public:
-  JobRun(boost::asio::io_context& loop, runtime::WorkerThread& worker) : loop_{loop}, worker_{worker} {}
+  JobRun(JobId id, boost::asio::io_context& loop, runtime::WorkerThread& worker)
+      : id_{id}, loop_{loop}, worker_{worker} {}
+
+  JobId id() const { return id_; }
 
   void report(double share, std::string stage);
   const JobProgress& progress() const { return *progress_; }
@@ -31,6 +34,7 @@ class JobRun {
   }
 
  private:
+  JobId id_;
   boost::asio::io_context& loop_;
   runtime::WorkerThread& worker_;
   std::stop_source stop_;

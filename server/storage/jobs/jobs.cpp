@@ -91,7 +91,7 @@ asio::awaitable<void> Jobs::run_one(Waiting job) {
       jobs.ended_.notify();
     }
   };
-  running_ = std::make_unique<JobRun>(loop_, worker_);
+  running_ = std::make_unique<JobRun>(job.id, loop_, worker_);
   running_id_ = job.id;
   const Running running{*this};
   auto start = [id = job.id, utc_us = clock_.utc_us()](SQLite::Database& database) { start_job(database, id, utc_us); };

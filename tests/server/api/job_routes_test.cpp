@@ -141,7 +141,7 @@ TEST(ParseJob, SaysWhichMemberIsWrong) {
     const char* words;
   };
   const Case cases[] = {
-      {{{"kind", "dance"}}, "kind is 'dance', allowed are identify, tune, tuning_map"},
+      {{{"kind", "dance"}}, "kind is 'dance', allowed are identify, tune, tuning_map, report, comparison, export"},
       {{{"run_id", 0}}, "run_id = 0 is outside"},
       {{{"run", 1}}, "\"run\" is not known here"},
       {{{"channels", "all"}}, "channels is 'all', allowed are best, outside, robot"},

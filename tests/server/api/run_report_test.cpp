@@ -12,7 +12,6 @@
 namespace server {
 namespace {
 
-using analysis::TracePoint;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -24,8 +23,8 @@ std::size_t count_of(const std::string& text, const std::string& wanted) {
   return count;
 }
 
-TracePoint trace_at(std::uint64_t seq) {
-  TracePoint point;
+analysis::TracePoint trace_at(std::uint64_t seq) {
+  analysis::TracePoint point;
   point.seq = seq;
   point.robot_time_us = 5'000'000 + seq * 10'000;
   point.utc_us = 1'750'000'000'000'000 + static_cast<std::int64_t>(seq) * 10'000;
@@ -35,7 +34,7 @@ TracePoint trace_at(std::uint64_t seq) {
   return point;
 }
 
-analysis::RunReport report_of(std::vector<TracePoint> trace) {
+analysis::RunReport report_of(std::vector<analysis::TracePoint> trace) {
   analysis::RunReport report;
   report.run.conditions.name = "first";
   report.trace = std::move(trace);
@@ -75,7 +74,7 @@ TEST(RunReport, OfARunWithoutSamplesSaysSo) {
 TEST(RunReport, AnEstimateHasABandAndAKnownPositionHasNone) {
   EXPECT_THAT(analysis::html_of(report_of({trace_at(0), trace_at(1)})),
               AllOf(HasSubstr("± 2 sd</text>"), HasSubstr("the robot&#39;s estimate</text>")));
-  TracePoint known = trace_at(0);
+  analysis::TracePoint known = trace_at(0);
   known.position_sd_m = 0;
   EXPECT_THAT(analysis::html_of(report_of({known})), Not(HasSubstr("± 2 sd</text>")));
 }
@@ -85,7 +84,7 @@ TEST(RunReport, ALineIsInterruptedWhereSamplesAreMissing) {
   const std::string broken = analysis::html_of(report_of({trace_at(0), trace_at(1), trace_at(5)}));
   EXPECT_EQ(count_of(whole, "d=\"M62.5"), count_of(broken, "d=\"M62.5"));
   analysis::Plot plot;
-  plot.to_s = 10;
+  plot.x_to = 10;
   plot.lines.push_back({"x", "#000", {0, 4, 5, 10}, {1, 2, std::nan(""), 3}});
   const std::string svg = analysis::svg_of(plot);
   const std::string path = svg.substr(svg.rfind("<path"));
@@ -93,14 +92,14 @@ TEST(RunReport, ALineIsInterruptedWhereSamplesAreMissing) {
 }
 
 TEST(RunReport, TimesGoOnOverAReboot) {
-  TracePoint after = trace_at(0);
+  analysis::TracePoint after = trace_at(0);
   after.span = 1;
   after.robot_time_us = 40'000;
   after.utc_us += 7'000'000;
-  TracePoint next = after;
+  analysis::TracePoint next = after;
   next.seq = 1;
   next.robot_time_us += 10'000;
-  const std::vector<TracePoint> points{trace_at(0), trace_at(1), after, next};
+  const std::vector<analysis::TracePoint> points{trace_at(0), trace_at(1), after, next};
   const auto times_s = analysis::times_of(points);
   EXPECT_NEAR(times_s[1], 0.01, 1e-9);
   EXPECT_NEAR(times_s[2], 7, 1e-9);
@@ -110,10 +109,10 @@ TEST(RunReport, TimesGoOnOverAReboot) {
 
 TEST(SvgPlot, ALongLineHasFourPointsAColumnAndLosesNoPeak) {
   analysis::Plot plot;
-  plot.to_s = 1000;
+  plot.x_to = 1000;
   analysis::PlotLine line;
   for (int k = 0; k < 100'000; ++k) {
-    line.time_s.push_back(0.01 * k);
+    line.x.push_back(0.01 * k);
     line.value.push_back(k == 54'321 ? 10 : std::sin(0.1 * k));
   }
   plot.lines.push_back(line);
@@ -125,6 +124,18 @@ TEST(SvgPlot, ALongLineHasFourPointsAColumnAndLosesNoPeak) {
     highest_px = std::min(highest_px, std::stod(path.substr(path.find(' ', at) + 1)));
   }
   EXPECT_LT(highest_px, 40) << "the one sample of 10 is the top of the plot";
+}
+
+TEST(SvgPlot, ALegendThatDoesNotFitBesideTheTitleHasRowsOfItsOwn) {
+  analysis::Plot plot;
+  plot.title = "Position (m)";
+  plot.lines.push_back({"run 1", "var(--run-1)", {0, 1}, {1, 2}});
+  EXPECT_THAT(analysis::svg_of(plot), HasSubstr("viewBox=\"0 0 760 190\""));
+  for (int run = 2; run <= 12; ++run)
+    plot.lines.push_back({fmt::format("run {}", run), "var(--run-2)", {0, 1}, {1, 2}});
+  const std::string svg = analysis::svg_of(plot);
+  EXPECT_THAT(svg, HasSubstr("viewBox=\"0 0 760 222\"")) << "two rows of 16 pixels";
+  EXPECT_EQ(count_of(svg, ">run "), 12U);
 }
 
 TEST(SvgPlot, TicksAreRoundAndWithinTheRange) {

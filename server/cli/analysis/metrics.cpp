@@ -1,5 +1,5 @@
 // One request; a table of figures, and one of steps.
-#include "server/cli/accounts/metrics.hpp"
+#include "server/cli/analysis/metrics.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ostream.h>
@@ -7,7 +7,6 @@
 
 #include <CLI/CLI.hpp>
 #include <limits>
-#include <stdexcept>
 
 #include "server/cli/accounts/station_client.hpp"
 #include "server/cli/terminal/options.hpp"
@@ -17,12 +16,6 @@ namespace server::cli {
 namespace {
 
 using nlohmann::json;
-
-json ask(const MetricsQuestion& options, const std::string& target) {
-  const StationAnswer answer = StationClient{options.data_dir}.ask("GET", target);
-  if (answer.status == 200) return answer.body;
-  throw std::runtime_error{fmt::format("the station refused: {}", answer.body.value("detail", "no reason"))};
-}
 
 std::string number_text(const json& value) { return value.is_number() ? cell(value.get<double>(), 5) : "-"; }
 
@@ -44,7 +37,7 @@ void write_run(const json& metrics, std::ostream& out) {
   steps.write(out);
 }
 
-void write_rows(const MetricsQuestion& options, const char* title, const json& rows, std::ostream& out) {
+void write_metric_rows(const MetricsQuestion& options, const char* title, const json& rows, std::ostream& out) {
   std::vector<std::string> head{title};
   for (const std::int64_t run : options.runs) head.push_back(fmt::format("run {}", run));
   for (const char* name : {"mean", "sd", "± 95 %", "limit"}) head.emplace_back(name);
@@ -61,12 +54,12 @@ void write_rows(const MetricsQuestion& options, const char* title, const json& r
 }
 
 void write_comparison(const MetricsQuestion& options, const json& compared, std::ostream& out) {
-  write_rows(options, "figure", compared.at("figures"), out);
+  write_metric_rows(options, "figure", compared.at("figures"), out);
   std::size_t number = 0;
   for (const json& step : compared.at("steps")) {
     fmt::print(out, "\nstep {}, {}, by the position {}:\n", ++number, step.at("cause").get<std::string>(),
                fmt::join(step.at("position_source").get<std::vector<std::string>>(), ", "));
-    write_rows(options, "measure", step.at("measures"), out);
+    write_metric_rows(options, "measure", step.at("measures"), out);
   }
   const auto differing = compared.at("differing_conditions").get<std::vector<std::string>>();
   if (differing.empty()) return;
@@ -87,9 +80,9 @@ void add_options(CLI::App& command, MetricsQuestion& options) {
 
 int run(const MetricsQuestion& options, std::ostream& out) {
   const bool is_one = options.runs.size() == 1;
-  const json answer =
-      ask(options, is_one ? fmt::format("/api/v1/runs/{}/metrics", options.runs.front())
-                          : fmt::format("/api/v1/run-comparison?runs={}", fmt::join(options.runs, ",")));
+  const std::string target = is_one ? fmt::format("/api/v1/runs/{}/metrics", options.runs.front())
+                                    : fmt::format("/api/v1/run-comparison?runs={}", fmt::join(options.runs, ","));
+  const json answer = asked(StationClient{options.data_dir}.ask("GET", target));
   if (options.json) {
     fmt::print(out, "{}\n", answer.dump(2));
   } else if (is_one) {

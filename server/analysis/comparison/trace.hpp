@@ -1,4 +1,4 @@
-// The samples of a run as they are plotted.
+// The samples of a run as they are plotted and compared.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,16 @@ struct TracePoint {
   std::uint64_t seq = 0;
   std::uint64_t robot_time_us = 0;
   std::int64_t utc_us = 0;
-  float position_m = 0;
+  float position_m = 0;  // with the disturbance, as the robot's controller sees it
   float position_sd_m = 0;
-  float setpoint_m = 0;  // in auto mode
+  float velocity_m_s = 0;
+  float acceleration_m_s2 = 0;
+  float setpoint_m = 0;   // in auto mode
+  float reference_m = 0;  // in auto mode
+  float disturbance_m = 0;
   float duty = 0;
   float impedance_mv = 0;
+  bool is_manual = false;
 };
 TracePoint trace_point(const storage::StoredSample& stored);
 

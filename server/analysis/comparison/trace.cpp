@@ -1,5 +1,5 @@
-// Takes what a plot shows out of stored samples.
-#include "server/analysis/report/trace.hpp"
+// Takes what plots and comparisons need out of stored samples.
+#include "server/analysis/comparison/trace.hpp"
 
 #include <limits>
 
@@ -13,10 +13,16 @@ TracePoint trace_point(const storage::StoredSample& stored) {
   point.utc_us = stored.utc_us;
   point.position_m = stored.sample.position_m;
   point.position_sd_m = station::or_nan(stored.position_sd_m);
+  point.velocity_m_s = stored.sample.velocity_m_s;
+  point.acceleration_m_s2 = stored.sample.acceleration_m_s2;
+  const float nothing = std::numeric_limits<float>::quiet_NaN();
   const bool is_steered = stored.mode == rheonaut_MODE_AUTO && stored.setpoint_m.has_value();
-  point.setpoint_m = is_steered ? *stored.setpoint_m : std::numeric_limits<float>::quiet_NaN();
+  point.setpoint_m = is_steered ? *stored.setpoint_m : nothing;
+  point.reference_m = is_steered ? stored.sample.reference_m : nothing;
+  point.disturbance_m = station::or_nan(stored.disturbance_m);
   point.duty = stored.sample.duty;
   point.impedance_mv = stored.sample.impedance_mv;
+  point.is_manual = stored.mode == rheonaut_MODE_MANUAL;
   return point;
 }
 

@@ -1,19 +1,19 @@
-// `rheonaut report`: saves the report of a run that a running station makes.
+// `rheonaut report`: saves the report of a run, or of several beside each other, that a running station makes.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <iosfwd>
+#include <vector>
 
-namespace CLI {
-class App;
-}
+#include "server/cli/analysis/trace_options.hpp"
 
 namespace server::cli {
 
 struct ReportQuestion {
   std::filesystem::path data_dir = "rheonaut-data";
-  std::int64_t run = 0;
+  std::vector<std::int64_t> runs;
+  TraceOptions traces;  // of several
   std::filesystem::path file;
 };
 

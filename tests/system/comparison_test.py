@@ -1,0 +1,102 @@
+"""Runs of a real station and a simulated robot side by side: traces, impedance, reports, and the files of jobs."""
+
+import csv
+import io
+import json
+import time
+import unittest
+
+from processes import lab, wait_until
+
+SETPOINT_M = 0.05
+
+
+class ComparisonTest(unittest.TestCase):
+    def command(self, station, **body):
+        station.post("/api/v1/robots/sim-1/commands", body)
+
+    def record(self, station, name, before_s):
+        """A step after so long at rest, and back to rest."""
+        self.command(station, kind="set_mode", mode="manual")
+        self.command(station, kind="zero_position")
+        run = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": name})["run_id"]
+        time.sleep(before_s)
+        self.command(station, kind="set_mode", mode="auto", setpoint_m=SETPOINT_M)
+        time.sleep(2)
+        station.post(f"/api/v1/runs/{run}/end", {})
+        return run
+
+    def begin(self, place):
+        station = place.start_station()
+        place.start_robot(station, "sim-1", "--seed", "3")
+        station.wait_for_robot("sim-1")
+        return station, [self.record(station, f"repeat {n}", 0.3 + 0.4 * n) for n in range(2)]
+
+    def test_repeats_are_compared_and_reported(self):
+        with lab() as place:
+            station, (first, second) = self.begin(place)
+            asked = place.tool("compare", first, second, "--at", "step", "--json", "--data", place.data)
+            self.assertEqual(asked.returncode, 0, asked.stderr)
+            compared = json.loads(asked.stdout)
+            at_s = [run["aligned_at_s"] for run in compared["runs"]]
+            self.assertGreater(at_s[1] - at_s[0], 0.2, "it rested for 0.4 s longer")
+            begin = compared["time_s"].index(0)
+            for run in compared["runs"]:
+                self.assertEqual(run["position_source"], "estimate")
+                self.assertLess(abs(run["traces"]["position_m"][begin]), 0.01, "at the step it is where it was")
+                self.assertGreater(run["traces"]["duty"][begin + 1], 0.5, "and the motor begins")
+            end = begin + 150
+            self.assertLess(abs(compared["runs"][1]["differences"]["position_m"][end]), 0.01)
+            table = place.tool("compare", first, second, "--at", "step", "--data", place.data)
+            self.assertIn("differences from run 1, every 0.01 s", table.stdout)
+            rows = list(csv.reader(io.StringIO(place.tool("compare", first, second, "--at", "step", "--csv", "--data",
+                                                          place.data).stdout)))
+            self.assertEqual(len(rows), 1 + len(compared["time_s"]))
+            self.assertIn(f"run_{second}_difference_position_m", rows[0])
+            refused = place.tool("compare", first, second, "--at", "disturbance", "--data", place.data)
+            self.assertEqual(refused.returncode, 1)
+            self.assertIn("run 1 ('repeat 0') has no disturbance 1, none", refused.stderr)
+            mapped = place.tool("impedance-map", first, second, "--bin-mm", 10, "--data", place.data)
+            self.assertIn("warning: positions are the robot's own estimate", mapped.stdout, mapped.stderr)
+            report = place.folder / "two.html"
+            made = place.tool("report", first, second, "--at", "step", "--to", report, "--data", place.data)
+            self.assertEqual((made.returncode, made.stdout), (0, f"{report}\n"), made.stderr)
+            self.assertIn("Aligned at step 1; differences are from run 1.", report.read_text())
+            self.assertEqual(place.tool("report", 9, "--to", report, "--data", place.data).returncode, 1)
+            self.assertIn("Aligned at", report.read_text(), "a refusal replaces nothing")
+
+    def test_the_file_of_a_job_survives_kill_9_and_half_a_file_does_not(self):
+        with lab() as place:
+            station, (first, _) = self.begin(place)
+            request = place.folder / "request.json"
+            request.write_text(json.dumps({"kind": "export", "run_id": first, "format": "csv"}))
+            made = place.tool("job", "begin", request, "--wait", "--data", place.data)
+            self.assertEqual(made.returncode, 0, made.stderr)
+            size_bytes = json.loads(made.stdout)["size_bytes"]
+            kept = place.data / "job-files"
+            (kept / "job-2.part").write_text("half")
+            (kept / "job-2-1767225600.csv").write_text("whole, but its job is not done")
+            for _ in range(3):
+                station.post("/api/v1/jobs", {"kind": "report", "runs": [1, 2]})
+            place.kill_station()
+            station = place.start_station(robots=station.endpoints["robots"])
+            saved = place.folder / "saved.csv"
+            again = place.tool("job", "file", 1, "--to", saved, "--data", place.data)
+            self.assertEqual(again.returncode, 0, again.stderr)
+            self.assertEqual(saved.stat().st_size, size_bytes)
+            _, _, direct = station.request("GET", f"/api/v1/runs/{first}/samples.csv")
+            self.assertEqual(saved.read_bytes(), direct)
+            jobs = {job["job_id"]: job["state"] for job in station.get("/api/v1/jobs")["jobs"]}
+            self.assertLessEqual(set(jobs.values()), {"done", "interrupted"})
+            files = {int(path.name.split("-")[1]): path.name for path in kept.iterdir()}
+            self.assertEqual(set(files), {job for job, state in jobs.items() if state == "done"}, files)
+            self.assertFalse([name for name in files.values() if ".part" in name])
+            begun = station.post("/api/v1/jobs", {"kind": "report", "runs": [1, 2]})["job_id"]
+            wait_until(lambda: station.get(f"/api/v1/jobs/{begun}")["state"] == "done", 60, "the report's end")
+            status, headers, body = station.request("GET", f"/api/v1/jobs/{begun}/file")
+            self.assertEqual((status, headers["Content-Type"]), (200, "text/html; charset=utf-8"))
+            self.assertTrue(body.endswith(b"</html>\n"))
+
+
+if __name__ == "__main__":
+    unittest.main()

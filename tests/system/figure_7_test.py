@@ -1,0 +1,89 @@
+"""The programs of examples/ plot Figure 7 from the exports of a real station and a simulated robot."""
+
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+import unittest
+import xml.etree.ElementTree
+
+from processes import ROOT, lab
+
+EXAMPLES = ROOT / "examples"
+SVG = "{http://www.w3.org/2000/svg}"
+SETPOINT_M, DISTURBANCE_M = 0.1, -0.05
+
+
+def record(station):
+    """A step to 0.1 m, and a disturbance 3 s later; the run's number."""
+    station.post("/api/v1/robots/sim-1/commands", {"kind": "zero_position"})
+    run = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "Figure 7, short"})["run_id"]
+    time.sleep(0.5)
+    station.post("/api/v1/robots/sim-1/commands", {"kind": "set_mode", "mode": "auto", "setpoint_m": SETPOINT_M})
+    time.sleep(3)
+    station.post("/api/v1/robots/sim-1/commands", {"kind": "inject_disturbance", "disturbance_m": DISTURBANCE_M})
+    time.sleep(2)
+    station.post(f"/api/v1/runs/{run}/end", {})
+    station.post("/api/v1/robots/sim-1/commands", {"kind": "set_mode", "mode": "manual"})
+    return run
+
+
+def height_of_line(path):
+    """The y of each point, of a line drawn with M and L."""
+    points = path.replace("L", "M").split("M")[1:]
+    return [float(point.split()[1]) for point in points]
+
+
+class Figure7Test(unittest.TestCase):
+    def check(self, picture, run_title):
+        root = xml.etree.ElementTree.parse(picture).getroot()
+        self.assertEqual(root.tag, f"{SVG}svg")
+        texts = [text.text for text in root.iter(f"{SVG}text")]
+        for wanted in ("position (m)", "duty", "time (s)"):
+            self.assertIn(wanted, texts, run_title)
+        lines = [path.get("d") for path in root.iter(f"{SVG}path") if path.get("stroke-width") == "1.3"]
+        self.assertEqual(len(lines), 3, "setpoint, position, duty")
+        setpoint, position, _ = map(height_of_line, lines)
+        self.assertGreater(len(position), 400)
+        self.assertLess(len(setpoint), len(position), "it has none in manual")
+        self.assertLess(min(position), position[0] - 50, "the robot went up")
+        self.assertAlmostEqual(min(position), setpoint[0], delta=30, msg="to the setpoint")
+
+    def test_python_and_octave_plot_it(self):
+        with lab() as place:
+            station = place.start_station()
+            place.start_robot(station, "sim-1", "--seed", "3")
+            station.wait_for_robot("sim-1")
+            run = record(station)
+            with self.subTest("from the station"):
+                picture = place.folder / "asked.svg"
+                self.plot(place, "--station", "http://" + station.endpoints["http"], "--token-file",
+                          place.data / "rheonaut.token", "--run", run, "--to", picture)
+                self.check(picture, "from the station")
+            with self.subTest("from a CSV file"):
+                exported, picture = place.folder / "run.csv", place.folder / "exported.svg"
+                made = place.tool("export", "--run", run, "--format", "csv", "--to", exported, "--data", place.data)
+                self.assertEqual(made.returncode, 0, made.stderr)
+                self.plot(place, "--csv", exported, "--to", picture)
+                self.assertEqual(picture.read_text(), (place.folder / "asked.svg").read_text())
+            with self.subTest("from a MAT file"):
+                if shutil.which("octave-cli") is None:
+                    self.skipTest("octave is not installed")
+                exported, picture = place.folder / "run.mat", place.folder / "octave.svg"
+                made = place.tool("export", "--run", run, "--format", "mat", "--to", exported, "--data", place.data)
+                self.assertEqual(made.returncode, 0, made.stderr)
+                plotted = subprocess.run(["octave-cli", "--path", str(EXAMPLES), "--eval",
+                                          f"figure_7('{exported}', '{picture}')"], capture_output=True, text=True)
+                self.assertEqual(plotted.returncode, 0, plotted.stderr)
+                self.assertEqual(xml.etree.ElementTree.parse(picture).getroot().tag, f"{SVG}svg")
+
+    def plot(self, place, *arguments):
+        made = subprocess.run([sys.executable, "-B", str(EXAMPLES / "figure_7.py"), *map(str, arguments)],
+                              capture_output=True, text=True, timeout=60)
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assertTrue(pathlib.Path(made.stdout.strip()).exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
