@@ -62,7 +62,7 @@ TEST_F(TuneRoutesTest, FindsTheControllerOfTheTunerReadyForRobotsAndPredictedInE
   EXPECT_EQ(result["robustness"]["rows"].size(), 8U);
   ASSERT_EQ(result["predicted"].size(), 2U) << "the plant, and the fluid whose plant is known";
   EXPECT_EQ(result["predicted"][0]["fluid"], nullptr);
-  EXPECT_NEAR(result["predicted"][0]["step"]["settling_s"], 1.77, 0.06);
+  EXPECT_NEAR(result["predicted"][0]["step"]["settling_s"], 1.77, 0.1) << "1.77 s is with a = 0.5";
   EXPECT_EQ(result["predicted"][1]["fluid"], "water");
   EXPECT_LT(result["predicted"][1]["step"]["settling_s"], 1.2);
 }
