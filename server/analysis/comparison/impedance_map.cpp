@@ -120,12 +120,6 @@ std::vector<std::string> warnings_of(const ImpedanceMap& map, std::span<const Tr
   if (map.sources.front() == PositionSource::estimate) {
     warnings.emplace_back("positions are the robot's own estimate: where the vessel is, is known only within their sd");
   }
-  const auto is_blurred = [&](const auto& entry) { return entry.second.position_sd_m > map.bin_m; };
-  const auto blurred = std::ranges::count_if(map.bins, is_blurred);
-  if (blurred > 0) {
-    warnings.push_back(fmt::format("in {} of {} bins the sd of the position is larger than the bin is wide", blurred,
-                                   map.bins.size()));
-  }
   if (!points.empty() && points.front().span != points.back().span) {
     warnings.emplace_back(
         "the robot rebooted during the run: positions before and after may count from different points");
@@ -201,6 +195,16 @@ std::optional<double> ImpedanceBin::sd_mv() const {
   return std::sqrt(squares_mv2 / (static_cast<double>(count) - 1));
 }
 
+std::vector<std::string> ImpedanceMap::all_warnings() const {
+  std::vector<std::string> all = warnings;
+  const auto is_blurred = [&](const auto& entry) { return entry.second.position_sd_m > bin_m; };
+  const auto blurred = std::ranges::count_if(bins, is_blurred);
+  if (blurred == 0) return all;
+  all.push_back(
+      fmt::format("in {} of {} bins the sd of the position is larger than the bin is wide", blurred, bins.size()));
+  return all;
+}
+
 bool ImpedanceMap::has_detections() const {
   return std::ranges::any_of(events, [](const ImpedanceEvent& event) { return event.kind == kDetection; });
 }
@@ -270,7 +274,7 @@ ordered_json json_of(const ImpedanceMap& map) {
   out["backward"] = direction_json(map, Direction::backward);
   out["events"] = ordered_json::array();
   for (const ImpedanceEvent& event : map.events) out["events"].emplace_back(event_json(event));
-  out["warnings"] = map.warnings;
+  out["warnings"] = map.all_warnings();
   return out;
 }
 

@@ -61,8 +61,9 @@ struct ImpedanceMap {
   std::map<std::pair<Direction, std::int64_t>, ImpedanceBin> bins;  // by the number of the bin, from 0 m on
   std::vector<ImpedanceEvent> events;
   std::size_t samples = 0, samples_left_out = 0;  // without impedance or position
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings;              // what to know before believing the positions
 
+  std::vector<std::string> all_warnings() const;  // and how certain they are beside the width of the bins
   bool has_detections() const;
 };
 

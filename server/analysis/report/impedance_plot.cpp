@@ -116,9 +116,10 @@ std::string impedance_section(const ImpedanceMap& map) {
       "<p class=\"quiet\">Means of bins of {:.3g} mm, of all runs together; the largest ± 2 sd of a "
       "position in them is {:.2g} m.</p>\n",
       1e3 * map.bin_m, 2 * largest_sd_m);
-  if (map.warnings.empty()) return out;
+  const std::vector<std::string> warnings = map.all_warnings();
+  if (warnings.empty()) return out;
   out += "<ul class=\"quiet\">";
-  for (const std::string& warning : map.warnings) out += fmt::format("<li>{}</li>", html_escaped(warning));
+  for (const std::string& warning : warnings) out += fmt::format("<li>{}</li>", html_escaped(warning));
   return out + "</ul>\n";
 }
 

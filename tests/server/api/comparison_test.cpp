@@ -259,13 +259,13 @@ TEST(ImpedanceMaps, GoAndComeBackSeparately) {
   EXPECT_NEAR(map->events[0].at_s, 0.44, 1e-9);
   EXPECT_NEAR(map->events[0].position_m, 0.0442, 1e-6);
   EXPECT_TRUE(map->has_detections());
-  EXPECT_THAT(map->warnings, ElementsAre(HasSubstr("the robot's own estimate")));
+  EXPECT_THAT(map->all_warnings(), ElementsAre(HasSubstr("the robot's own estimate")));
 }
 
 TEST(ImpedanceMaps, SayWhereThePositionIsLessCertainThanTheBinIsWide) {
   const Trace trace = scan();
   const auto map = impedance_map(3, trace.points, {}, 0.001, nullptr);
-  EXPECT_THAT(map->warnings, ElementsAre(HasSubstr("estimate"), HasSubstr("larger than the bin is wide")));
+  EXPECT_THAT(map->all_warnings(), ElementsAre(HasSubstr("estimate"), HasSubstr("larger than the bin is wide")));
   EXPECT_FALSE(map->has_detections());
 }
 
@@ -283,7 +283,7 @@ TEST(ImpedanceMaps, UseThePositionFromOutsideAndLeaveOutWhatItMisses) {
   EXPECT_EQ(map->samples_left_out, 101U);
   EXPECT_EQ(map->bins.begin()->first.second, 100);
   EXPECT_THAT(map->sources, ElementsAre(analysis::PositionSource::outside));
-  EXPECT_TRUE(map->warnings.empty());
+  EXPECT_TRUE(map->all_warnings().empty());
 }
 
 TEST(ImpedanceMaps, OfSeveralRunsAreOneOverAll) {
