@@ -26,7 +26,7 @@ class ExperimentTest : public SystemTest {
  protected:
   // As a station that is started again: with what is on disk, and nothing else.
   void begin_again() {
-    before_ = std::move(experiments);
+    before_.push_back(std::move(experiments));
     make(false);
   }
 
@@ -129,7 +129,7 @@ class ExperimentTest : public SystemTest {
     }
   }
 
-  std::unique_ptr<server::experiments::Experiments> before_;
+  std::vector<std::unique_ptr<server::experiments::Experiments>> before_;
   std::map<std::string, bool> is_there_;
 };
 

@@ -72,6 +72,72 @@ TEST_F(ExperimentSafetyTest, ADutyDoesNotBeginWhileNobodyIsThere) {
   expect_aborted(id, "nobody_present", 10s);
 }
 
+TEST_F(ExperimentSafetyTest, APauseBeforeItMovesKeepsItFromMoving) {
+  come("anna");
+  const auto id = enqueue(profile({kLongSetpoint}));
+  ASSERT_TRUE(clock.run_until([&] { return view(id).experiment.state == ExperimentState::running; }, 5s));
+  ASSERT_FALSE(view(id).progress) << "it is being prepared";
+  ASSERT_TRUE(wait_for(experiments->pause(id, {"boris", "", 0})));
+  clock.run_for(5s);
+  EXPECT_EQ(until(id, ExperimentState::paused).reason, "requested");
+  EXPECT_EQ(state().context.mode, rheonaut_MODE_MANUAL);
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  until(id, ExperimentState::done);
+}
+
+TEST_F(ExperimentSafetyTest, APersonsPauseOutlivesThatOfAnAbsentPage) {
+  const auto id = start(profile({kLongDuty}));
+  clock.run_for(1s);
+  leave("anna");
+  until(id, ExperimentState::paused, 2s);
+  ASSERT_TRUE(wait_for(experiments->pause(id, {"boris", "", 0})));
+  come("anna");
+  clock.run_for(3s);
+  EXPECT_EQ(duty(), 0) << "it does not go on by itself";
+  ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
+  until(id, ExperimentState::done);
+}
+
+TEST_F(ExperimentSafetyTest, AutoIsNotEnteredForSomebodyWhoHasGone) {
+  const auto id = start(profile({"kind = \"rest\"\nfor_s = 2", kLongSetpoint}));
+  clock.run_for(500ms);
+  leave("anna");
+  expect_aborted(id, "nobody_present", 10s);
+  for (const auto& one : samples_of_first_run(id)) ASSERT_EQ(one.mode, rheonaut_MODE_MANUAL);
+}
+
+TEST_F(ExperimentSafetyTest, ARebootBetweenPreparationAndMotionEndsIt) {
+  come("anna");
+  const auto id = enqueue(profile({kLongSetpoint}));
+  ASSERT_TRUE(clock.run_until([&] { return view(id).experiment.state == ExperimentState::running; }, 5s));
+  robot->cut();
+  expect_aborted(id, "link_lost");
+  EXPECT_EQ(runs->any_open(), false) << "no run stays open";
+}
+
+TEST_F(ExperimentSafetyTest, AStopHoldsWhatWaitsAlsoWhenNothingRuns) {
+  const auto id = enqueue(profile({kLongDuty}));
+  send(sim_robot::emergency_stop());
+  clock.run_for(1s);
+  const auto cleared = command_by("anna", sim_robot::clear_emergency(state().context.emergency_id));
+  ASSERT_TRUE(cleared);
+  come("anna");
+  clock.run_for(8s);
+  EXPECT_EQ(view(id).waits_for, "held");
+  EXPECT_EQ(duty(), 0);
+}
+
+TEST_F(ExperimentSafetyTest, NothingBeginsTheMomentThatSomebodyLetsGo) {
+  come("anna");
+  ASSERT_TRUE(command_by("anna", sim_robot::set_duty(0.2F)));
+  const auto id = enqueue(profile({kLongDuty}));
+  ASSERT_TRUE(command_by("anna", sim_robot::set_duty(0)));
+  clock.run_for(2s);
+  EXPECT_EQ(view(id).waits_for, "robot_in_use");
+  EXPECT_EQ(duty(), 0);
+  until(id, ExperimentState::running);
+}
+
 TEST_F(ExperimentSafetyTest, AnEmergencyStopEndsItAndTheQueueIsHeld) {
   const auto id = start(profile({kLongSetpoint, kLater}));
   const auto next = enqueue(profile({kLongDuty}));
@@ -181,7 +247,12 @@ TEST_F(ExperimentSafetyTest, AfterARestartWhatRanIsInterruptedWhatWaitedIsHeldAn
   leave("anna");
   clock.run_for(4s);
   ASSERT_EQ(state().context.mode, rheonaut_MODE_AUTO);
+  robot->redial = false;  // the station is killed twice before the robot is back
+  robot->cut();
   begin_again();
+  clock.run_for(200ms);
+  begin_again();
+  robot->dial(*listener);
   EXPECT_EQ(view(ran.id).experiment.state, ExperimentState::interrupted);
   EXPECT_EQ(view(ran.id).experiment.reason, "station_restarted");
   EXPECT_TRUE(view(waited.id).experiment.is_held);

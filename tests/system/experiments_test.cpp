@@ -145,6 +145,8 @@ TEST_F(ExperimentsTest, WaitsForThePersonWhoChangesTheFluid) {
   clock.run_for(1s);
   EXPECT_EQ(view(id).experiment.state, ExperimentState::paused) << "it is in the other fluid still";
   ASSERT_TRUE(station.set_fluid("sim-1", "water", {"anna", "", clock.utc_us()}));
+  clock.run_for(3s);
+  EXPECT_EQ(view(id).experiment.state, ExperimentState::paused) << "SAFETY: naming the fluid moves nothing";
   ASSERT_TRUE(wait_for(experiments->resume(id, {"anna", "", 0})));
   const storage::Experiment ended = until(id, ExperimentState::done);
   EXPECT_EQ(wait_for(runs->find(*ended.runs.at(1).run))->conditions.fluid, "water");

@@ -103,19 +103,26 @@ class ProgressShown {
   std::string last_;
 };
 
-// An interrupt of the person ends the experiment, and then the wait.
+// The first interrupt of the person ends the experiment, the second one the wait.
 class Interrupt {
  public:
-  Interrupt() : signals_{loop_, SIGINT, SIGTERM} {
-    signals_.async_wait([this](const boost::system::error_code& error, int) { has_come_ = !error; });
-  }
+  Interrupt() : signals_{loop_, SIGINT, SIGTERM} { arm(); }
   // Within so long.
   bool comes_within_ms(int ms) {
+    loop_.restart();
     loop_.run_for(std::chrono::milliseconds{ms});
     return std::exchange(has_come_, false);
   }
 
  private:
+  void arm() {
+    signals_.async_wait([this](const boost::system::error_code& error, int) {
+      if (error) return;
+      has_come_ = true;
+      arm();
+    });
+  }
+
   boost::asio::io_context loop_{1};
   boost::asio::signal_set signals_;
   bool has_come_ = false;
@@ -125,16 +132,21 @@ json watch(const StationClient& station, std::int64_t id) {
   ProgressShown progress;
   Interrupt interrupt;
   const std::string one = fmt::format("{}/{}", kExperiments, id);
+  bool is_interrupted = false;
   for (;;) {
-    // Refused when it has ended, or when somebody has taken it over: then it is theirs to keep alive.
-    const StationAnswer kept = station.ask("POST", one + "/keep-alive");
-    json experiment = kept.status == 200 ? kept.body : ask_experiments(station, "GET", one);
+    // A sign of life. Refused when it has ended, or when somebody has taken it over: then it is theirs.
+    const StationAnswer kept = is_interrupted ? StationAnswer{} : station.ask("POST", one + "/keep-alive");
+    const bool is_ours = kept.status == 200;
+    json experiment = is_ours ? kept.body : ask_experiments(station, "GET", one);
     progress.show(experiment);
     if (is_over(experiment)) {
       progress.end();
       return experiment;
     }
-    if (interrupt.comes_within_ms(kWatch_ms)) station.ask("POST", one + "/abort", {{"reason", "interrupted"}});
+    if (!interrupt.comes_within_ms(kWatch_ms)) continue;
+    if (is_interrupted || !is_ours) throw std::runtime_error{"interrupted; the experiment is still there"};
+    is_interrupted = true;
+    station.ask("POST", one + "/abort", {{"reason", "interrupted"}});
   }
 }
 

@@ -41,7 +41,7 @@ bool CommandFeed::needs_lease(std::uint64_t robot_now_us) const { return robot_n
 
 bool CommandFeed::is_about_to_drive(std::uint64_t robot_now_us) const {
   if (next_ >= line_->actions.size() || is_held_up(robot_now_us)) return false;
-  return line_->actions[next_].kind == ActionKind::duty;
+  return line_->actions[next_].kind == ActionKind::duty || !is_auto_;
 }
 
 bool CommandFeed::is_over(std::uint64_t robot_now_us) const {

@@ -38,7 +38,7 @@ class CommandFeed {
   protocol::Mode mode_at(std::uint64_t robot_now_us) const;
   // A duty other than 0 runs or waits: its lease is to be renewed.
   bool needs_lease(std::uint64_t robot_now_us) const;
-  // The command that comes next, if it is soon, begins to move the motor in manual.
+  // The command that comes next, if it is soon, begins to move the robot: a duty, or a change into auto.
   bool is_about_to_drive(std::uint64_t robot_now_us) const;
   bool is_over(std::uint64_t robot_now_us) const;  // all has been sent, and its time is over
 

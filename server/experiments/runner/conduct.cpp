@@ -60,6 +60,7 @@ const station::RobotState& Conduct::robot() const {
 }
 
 asio::awaitable<std::optional<Abort>> Conduct::run() {
+  boot_id_ = robot().boot_id;
   for (const Variant& variant : variants_of(profile_)) {
     ++number_;
     co_await one_run(variant);
@@ -74,24 +75,66 @@ asio::awaitable<void> Conduct::one_run(Variant variant) {
   auto make = [profile = profile_, variant] { return time_line_of(profile, variant); };
   TimeLine line = co_await parts_.maths.run(std::move(make));
   co_await begin_recording(variant, line);
-  if (abort_) co_return;
+  if (begun_.size() < number_) co_return;  // it did not come to a run
+  begins_.clear();
   const DriveEnd end = co_await drive(std::move(line));
   if (end.abort) abort(*end.abort);
   if (!end.abort && end.rest != Rest::at_rest) abort({"not_at_rest", "the robot did not come to rest at its end"});
   co_await end_recording();
 }
 
+asio::awaitable<void> Conduct::end_after_failure() {
+  abort({"internal", "the station could not go on with it; its log says why"});
+  if (!begun_.empty() && !current().ended_at_us) co_await end_recording();
+}
+
 // --- before a run ---
 
 asio::awaitable<void> Conduct::prepare(Variant variant) {
-  take_control();
+  co_await await_actor();
+  if (!abort_) take_control();
   if (!abort_) co_await await_fluid(variant.fluid);
   if (!abort_ && !variant.controller.empty()) co_await send_controller(variant.controller);
   if (!abort_) co_await await_model();
   if (!abort_) co_await go_to_start();
 }
 
-// SAFETY: in the name of somebody who is there; an unattended one for as long as the robot may be alone.
+bool Conduct::is_actor_there() const {
+  const auto seen_us = parts_.driver.station.seen_us(experiment_.acts_for);
+  return seen_us && parts_.driver.clock.steady_us() - *seen_us <= station::kOldestSight.count();
+}
+
+// SAFETY: nothing is prepared, and no control taken, for somebody who is not there; an unattended one goes on alone.
+asio::awaitable<void> Conduct::await_actor() {
+  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kAbsence.count();
+  while (!abort_ && !experiment_.request.is_unattended && !is_actor_there()) {
+    if (parts_.driver.clock.steady_us() > ends_us) {
+      abort({"nobody_present", fmt::format("{} gives no sign of life", experiment_.acts_for)});
+    }
+    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
+  }
+}
+
+// Paused by somebody while no driver is at work, or until the fluid is another one.
+asio::awaitable<void> Conduct::await_resumption() {
+  const std::int64_t ends_us = parts_.driver.clock.steady_us() + kLongestPause.count();
+  const bool was_paused = waiting_for_.has_value();
+  while (!abort_ && waiting_for_ && !is_resumed_) {
+    if (parts_.driver.clock.steady_us() > ends_us) abort({"paused_too_long", "nobody resumed it"});
+    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
+  }
+  waiting_for_.reset();
+  if (!abort_ && was_paused) co_await await_actor();
+}
+
+// SAFETY: just before the robot is moved.
+void Conduct::check_robot() {
+  if (abort_) return;
+  if (robot().latched()) return abort({"emergency", "the robot is in emergency"});
+  if (!is_at_rest(robot())) abort({"robot_not_at_rest", "the robot is not in manual at duty 0"});
+}
+
+// For the actor; an unattended one for as long as the robot may be alone.
 void Conduct::take_control() {
   station::Station& station = parts_.driver.station;
   if (station.holder(experiment_.request.robot_id) == experiment_.acts_for && !experiment_.request.is_unattended)
@@ -113,17 +156,15 @@ asio::awaitable<void> Conduct::await_fluid(std::string fluid) {
   }
   const std::int64_t ends_us = parts_.driver.clock.steady_us() + kFluidWithin.count();
   while (!abort_ && !fluid.empty() && !robot().fluid.empty() && robot().fluid != fluid) {
-    if (!waiting_for_) is_resumed_ = false;
+    is_resumed_ = false;  // SAFETY: who resumes it does so once the fluid is the right one
     waiting_for_ =
         Abort{"fluid", fmt::format("put the robot into '{}', say so, and resume; it is in '{}'", fluid, robot().fluid)};
     if (parts_.driver.clock.steady_us() > ends_us) abort(*waiting_for_);
     co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
   }
-  while (!abort_ && waiting_for_ && !is_resumed_) {
-    if (parts_.driver.clock.steady_us() > ends_us) abort({"paused_too_long", "nobody resumed it"});
-    co_await changed_.wait_until(parts_.driver.clock, parts_.driver.clock.steady_us() + kLook.count());
-  }
-  waiting_for_.reset();
+  if (abort_ || !waiting_for_) co_return;
+  co_await await_resumption();
+  boot_id_ = robot().boot_id;  // it may have been switched off meanwhile
   if (!abort_) take_control();
 }
 
@@ -251,19 +292,23 @@ asio::awaitable<std::string> Conduct::predict(const TimeLine& line) {
 }
 
 asio::awaitable<DriveEnd> Conduct::drive(TimeLine line) {
+  co_await await_resumption();
+  check_robot();
+  if (abort_) co_return DriveEnd{abort_};
   DriveRequest request{experiment_.request.robot_id, experiment_.acts_for, peer(), experiment_.request.is_unattended};
   const station::RobotSettings* settings = parts_.driver.station.settings(request.robot_id);
   const auto limit_s = settings == nullptr ? std::nullopt : settings->parameters.value("auto_limit_s");
   if (limit_s) request.auto_limit = microseconds{static_cast<std::int64_t>(static_cast<double>(*limit_s) * 1e6)};
   driver_ = std::make_unique<RunDriver>(parts_.driver, std::move(request), profile_.abort, std::move(line));
-  if (abort_) driver_->abort(*abort_);
   DriveEnd end = co_await driver_->run();
+  begins_ = driver_->step_begins();
+  driver_.reset();
   co_return end;
 }
 
 asio::awaitable<void> Conduct::end_recording() {
   storage::ExperimentRun& run = current();
-  run.steps = steps_json(profile_, driver_->step_begins());
+  run.steps = steps_json(profile_, begins_);
   run.state = abort_ ? storage::ExperimentState::aborted : storage::ExperimentState::done;
   run.reason = abort_ ? abort_->reason : "";
   std::string verdict = abort_ ? fmt::format("aborted: {}", abort_->detail) : "done";
@@ -279,8 +324,11 @@ asio::awaitable<void> Conduct::end_recording() {
 
 // --- by people, and the station's reports ---
 
+// SAFETY: also between runs, and before the first one: then nothing moves until it is resumed.
 void Conduct::pause(Abort why) {
-  if (driver_) driver_->pause(std::move(why.reason), std::move(why.detail));
+  if (driver_) return driver_->pause(std::move(why.reason), std::move(why.detail));
+  is_resumed_ = false;
+  if (!waiting_for_) waiting_for_ = std::move(why);
 }
 
 void Conduct::resume() {
@@ -309,12 +357,17 @@ void Conduct::on_samples(const station::SampleBatch& batch) {
   if (driver_) driver_->on_samples(batch);
 }
 
+// SAFETY: what was prepared is lost with the boot. While the fluid is changed the robot may be switched off.
 void Conduct::on_robot(const station::RobotState& robot) {
   if (driver_) driver_->on_robot(robot);
+  if (boot_id_ == 0 || (waiting_for_ && waiting_for_->reason == "fluid")) return;
+  if (robot.boot_id != boot_id_) return abort({"reboot", "the robot has booted again"});
+  if (robot.link != station::LinkState::connected) abort({"link_lost", "the link to the robot broke"});
 }
 
 void Conduct::on_command(const station::CommandRecord& record) {
-  if (driver_) driver_->on_command(record);
+  if (driver_) return driver_->on_command(record);
+  if (auto found = disturbance_of(record, peer())) abort(std::move(*found));
 }
 
 }  // namespace server::experiments

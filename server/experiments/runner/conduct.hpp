@@ -44,6 +44,8 @@ class Conduct {
 
   // None: all runs are done. The robot is at rest, in emergency, or of somebody else.
   boost::asio::awaitable<std::optional<Abort>> run();
+  // After run() has thrown: the run that it was recording ends.
+  boost::asio::awaitable<void> end_after_failure();
 
   void pause(Abort why);
   void resume();
@@ -64,6 +66,8 @@ class Conduct {
   boost::asio::awaitable<void> one_run(Variant variant);
   boost::asio::awaitable<void> prepare(Variant variant);
   boost::asio::awaitable<void> await_fluid(std::string fluid);
+  boost::asio::awaitable<void> await_actor();
+  boost::asio::awaitable<void> await_resumption();
   boost::asio::awaitable<void> await_model();
   boost::asio::awaitable<void> send_controller(std::string name);
   boost::asio::awaitable<void> go_to_start();
@@ -74,6 +78,8 @@ class Conduct {
   boost::asio::awaitable<void> submit(const char* what, protocol::Command command, std::string arguments);
   storage::RunConditions conditions_of(const Variant& variant) const;
   void take_control();
+  void check_robot();
+  bool is_actor_there() const;
   const station::RobotState& robot() const;
   std::string peer() const;
   storage::ExperimentRun& current() { return begun_.back(); }
@@ -81,12 +87,14 @@ class Conduct {
   const ConductParts parts_;
   storage::Experiment experiment_;
   Profile profile_;
-  std::unique_ptr<RunDriver> driver_;  // null: between runs
+  std::unique_ptr<RunDriver> driver_;  // null: none is at work
   std::optional<Abort> abort_;
-  std::optional<Abort> waiting_for_;  // paused between runs
+  std::optional<Abort> waiting_for_;  // paused while no driver is at work
+  station::BootId boot_id_ = 0;
   bool is_resumed_ = false;
   std::uint32_t number_ = 0;
   std::vector<storage::ExperimentRun> begun_;
+  std::vector<StepBegin> begins_;  // of the last drive
   runtime::Signal changed_;
 };
 

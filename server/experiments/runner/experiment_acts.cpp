@@ -197,7 +197,10 @@ asio::awaitable<Result<ExperimentView>> Experiments::pause(ExperimentId id, stat
   by.at_us = parts_.clock.utc_us();
   const auto entry = entry_of(id);
   if (!entry) co_return std::unexpected{entry.error()};
-  if (state_of(**entry) != ExperimentState::running) co_return wrong_state(view_of(**entry), "paused");
+  // SAFETY: also one that is paused by itself, which would go on by itself.
+  const ExperimentState state = state_of(**entry);
+  const bool is_at_work = state == ExperimentState::running || state == ExperimentState::paused;
+  if (!is_at_work || !(*entry)->conduct) co_return wrong_state(view_of(**entry), "paused");
   (*entry)->conduct->pause({"requested", fmt::format("{} has paused it", by.actor)});
   co_return co_await stored(id, note_of(**entry, "paused", by));
 }
@@ -256,6 +259,10 @@ asio::awaitable<Result<ExperimentView>> Experiments::take_over(ExperimentId id, 
   const auto found = entry_of(id);
   if (!found) co_return std::unexpected{found.error()};
   Entry& entry = **found;
+  const ExperimentState state = state_of(entry);
+  if (state == ExperimentState::aborting || storage::has_ended(state)) {
+    co_return wrong_state(view_of(entry), "taken over");
+  }
   const std::string holder = parts_.station.holder(entry.experiment.request.robot_id);
   // SAFETY: control never changes hands by the way of an experiment.
   if (!holder.empty() && holder != by.actor) {

@@ -23,10 +23,13 @@ namespace {
 
 constexpr microseconds kLookAtQueues = 200ms;
 constexpr microseconds kPublishEvery = 1s;
+constexpr microseconds kUnusedFor = 3s;  // by people, before an experiment begins by itself
+constexpr microseconds kAgainAfter = 1s;
 constexpr const char* kStationActor = "station:experiments";
 
 // What keeps one experiment from its beginning and no other one behind it.
-constexpr std::array<std::string_view, 3> kLetsOthersGo{"held", "nobody_present", "control_of_another"};
+constexpr std::array<std::string_view, 5> kLetsOthersGo{"held", "nobody_present", "control_of_another", "unreadable",
+                                                        "unattended_not_allowed"};
 
 // The document was checked before it was stored.
 std::optional<Profile> profile_of(const Experiment& experiment) {
@@ -59,22 +62,34 @@ Experiments::Experiments(const DriverParts& parts, storage::RecordingParts& reco
 
 Experiments::~Experiments() = default;
 
+// What an earlier start of the station has left; tried again while the disk cannot be written.
 asio::awaitable<void> Experiments::load() {
-  auto interrupt = [utc_us = parts_.clock.utc_us()](storage::Database& database) {
-    return storage::interrupt_experiments(database, utc_us);
+  struct Left {
+    std::vector<station::RobotId> to_rest;
+    std::vector<Experiment> waiting;
   };
-  const auto robots = co_await recording_.recorder.on_disk(std::move(interrupt));
-  to_rest_ = {robots.begin(), robots.end()};
-  auto query = [](storage::Database& database) { return storage::waiting_experiments(database.handle()); };
-  const std::vector<Experiment> waiting = co_await recording_.recorder.on_disk(std::move(query));
-  for (const Experiment& experiment : waiting) {
-    auto profile = profile_of(experiment);
-    if (!profile) continue;
-    Entry& entry = entries_[experiment.id];
-    entry.experiment = experiment;
-    entry.profile = std::move(*profile);
+  std::optional<Left> left;
+  while (!left) {
+    auto read = [utc_us = parts_.clock.utc_us()](storage::Database& database) -> std::optional<Left> {
+      try {
+        auto robots = storage::interrupt_experiments(database, utc_us);
+        return Left{std::move(robots), storage::waiting_experiments(database.handle())};
+      } catch (const SQLite::Exception& error) {
+        spdlog::error("the experiments cannot be read: {}; it is tried again", error.what());
+        return std::nullopt;
+      }
+    };
+    left = co_await recording_.recorder.on_disk(std::move(read));
+    if (!left) co_await parts_.clock.sleep_for(kAgainAfter);
   }
-  if (!robots.empty()) spdlog::warn("{} experiments were interrupted by the end of the station", robots.size());
+  to_rest_ = {left->to_rest.begin(), left->to_rest.end()};
+  for (Experiment& experiment : left->waiting) {
+    Entry& entry = entries_[experiment.id];
+    entry.experiment = std::move(experiment);
+    auto profile = profile_of(entry.experiment);
+    if (profile) entry.profile = std::move(*profile);
+    entry.is_unreadable = !profile;
+  }
 }
 
 asio::awaitable<void> Experiments::run() {
@@ -84,7 +99,7 @@ asio::awaitable<void> Experiments::run() {
   for (;;) {
     put_interrupted_to_rest();
     begin_what_may();
-    co_await store_states();
+    note_states();
     const std::int64_t now_us = parts_.clock.steady_us();
     if (now_us - published_us >= kPublishEvery.count()) {
       published_us = now_us;
@@ -94,24 +109,38 @@ asio::awaitable<void> Experiments::run() {
   }
 }
 
+// What it throws ends the task alone.
+void Experiments::spawn(const std::string& name, asio::awaitable<void> task) {
+  parts_.tasks.spawn(name, runtime::contained(parts_.tasks.exceptions(), parts_.clock, runtime::Ended::experiment, name,
+                                              std::move(task)));
+}
+
 // SAFETY: the robot of an experiment that a restart interrupted goes on in auto, if its link held; nobody watches it.
+// It stays on the list, also over further restarts, until it was seen at rest, or somebody else controls it.
 void Experiments::put_interrupted_to_rest() {
-  for (auto at = to_rest_.begin(); at != to_rest_.end();) {
-    const station::RobotState* robot = parts_.station.find(*at);
+  const std::set<station::RobotId> robots = to_rest_;  // a task may begin, and end, at once
+  for (const station::RobotId& id : robots) {
+    const station::RobotState* robot = parts_.station.find(id);
     const bool is_known = robot != nullptr && robot->link == station::LinkState::connected && robot->sample;
-    if (!is_known) {
-      ++at;
-      continue;
-    }
-    const bool goes_on = !robot->latched() && !is_at_rest(*robot);
-    if (goes_on) parts_.tasks.spawn("rest of robot '" + *at + "'", put_to_rest(*at));
-    at = to_rest_.erase(at);
+    if (is_known && resting_.insert(id).second) spawn("rest of robot '" + id + "'", settle_rest(id));
   }
 }
 
-asio::awaitable<void> Experiments::put_to_rest(station::RobotId robot_id) {
-  RestRequest request{robot_id, kStationActor, "experiment:interrupted"};
-  co_await bring_to_rest(parts_.station, parts_.clock, std::move(request));
+asio::awaitable<void> Experiments::settle_rest(station::RobotId robot_id) {
+  struct Resting {
+    std::set<station::RobotId>& robots;
+    station::RobotId id;
+    ~Resting() { robots.erase(id); }
+  };
+  const Resting one{resting_, robot_id};
+  const station::RobotState* robot = parts_.station.find(robot_id);
+  if (!robot->latched() && !is_at_rest(*robot)) {
+    RestRequest request{robot_id, kStationActor, "experiment:interrupted"};
+    co_await bring_to_rest(parts_.station, parts_.clock, std::move(request));
+  }
+  to_rest_.erase(robot_id);
+  auto seen = [robot_id](storage::Database& database) { storage::note_rest(database, robot_id); };
+  co_await writer_.keep("the rest of a robot", std::move(seen));
 }
 
 // --- what may begin ---
@@ -134,15 +163,26 @@ Experiments::Waits Experiments::waits_for(const Entry& entry) const {
   if (robot == nullptr || robot->link != station::LinkState::connected || !robot->sample) {
     return {"robot_not_connected", "the robot is not connected"};
   }
+  if (entry.is_unreadable) return {"unreadable", "this version cannot read its profile; cancel it"};
+  // SAFETY: the administrator may have changed their mind since it was queued.
+  if (experiment.request.is_unattended && !allow_unattended_) {
+    return {"unattended_not_allowed", "the station's configuration does not allow unattended experiments"};
+  }
   if (robot->latched()) return {"emergency", "the robot is in emergency"};
   if (!is_at_rest(*robot)) return {"robot_not_at_rest", "the robot is not in manual at duty 0"};
   const std::string holder = parts_.station.holder(robot->id);
   if (!holder.empty() && holder != experiment.acts_for) return {"control_of_another", "control is with " + holder};
+  // SAFETY: nothing begins the moment that somebody lets go of the robot.
+  const auto commanded = commanded_at_us_.find(robot->id);
+  if (commanded != commanded_at_us_.end() && parts_.clock.steady_us() - commanded->second < kUnusedFor.count()) {
+    return {"robot_in_use", "somebody has just commanded the robot"};
+  }
   const auto seen_us = parts_.station.seen_us(experiment.acts_for);
   const bool is_there = seen_us && parts_.clock.steady_us() - *seen_us <= station::kOldestSight.count();
   // SAFETY: somebody is there when it begins, also for an unattended one.
   if (!is_there) return {"nobody_present", experiment.acts_for + " gives no sign of life"};
-  const std::string fluid = variants_of(entry.profile).front().fluid;
+  const std::vector<std::string>& fluids = entry.profile.sweep.fluids;
+  const std::string fluid = fluids.empty() ? entry.profile.conditions.fluid : fluids.front();
   if (!fluid.empty() && !robot->fluid.empty() && fluid != robot->fluid) {
     return {"fluid", fmt::format("the robot is in '{}', the first run is in '{}'", robot->fluid, fluid)};
   }
@@ -166,7 +206,7 @@ void Experiments::begin_what_may() {
       if (!entry->waits_for.empty()) continue;
       const ExperimentId id = entry->experiment.id;
       running_[robot_id] = id;
-      parts_.tasks.spawn(fmt::format("experiment {}", id), carry_out(id));
+      spawn(fmt::format("experiment {}", id), carry_out(id));
       break;
     }
   }
@@ -191,10 +231,12 @@ asio::awaitable<void> Experiments::carry_out(ExperimentId id) {
   const std::string name = fmt::format("experiment {}", id);
   co_await runtime::contained(parts_.tasks.exceptions(), parts_.clock, runtime::Ended::experiment, name,
                               conduct(entry));
-  if (!entry.has_ended) {  // by an exception
+  if (!entry.has_ended) {  // by an exception; SAFETY: first the robot
     entry.end = Abort{"internal", "the station could not go on with it; its log says why"};
     RestRequest rest{entry.experiment.request.robot_id, entry.experiment.acts_for, fmt::format("experiment:{}", id)};
     co_await bring_to_rest(parts_.station, parts_.clock, std::move(rest));
+    co_await runtime::contained(parts_.tasks.exceptions(), parts_.clock, runtime::Ended::experiment, name,
+                                entry.conduct->end_after_failure());
   }
   co_await finish(entry);
 }
@@ -211,11 +253,8 @@ asio::awaitable<void> Experiments::finish(Entry& entry) {
   experiment.detail = entry.end ? entry.end->detail : "";
   experiment.ended_at_us = parts_.clock.utc_us();
   const station::Author by{experiment.acts_for, fmt::format("experiment:{}", experiment.id), *experiment.ended_at_us};
-  auto ended = [experiment, note = note_of(entry, entry.end ? "aborted" : "done", by)](storage::Database& database) {
-    storage::store_experiment(database, experiment, note);
-  };
-  co_await writer_.keep("the end of an experiment", std::move(ended));
-  if (experiment.request.is_unattended) {  // its control was taken for longer than a sign of life lasts
+  // Its control was taken for longer than a sign of life lasts; who commands the robot by now keeps it.
+  if (experiment.request.is_unattended && experiment.reason != "operator_command") {
     station::ControlRequest release;
     release.robot_id = experiment.request.robot_id;
     release.actor = experiment.acts_for;
@@ -223,6 +262,10 @@ asio::awaitable<void> Experiments::finish(Entry& entry) {
     release.action = station::ControlAction::release;
     static_cast<void>(parts_.station.control(release));
   }
+  auto ended = [experiment, note = note_of(entry, entry.end ? "aborted" : "done", by)](storage::Database& database) {
+    storage::store_experiment(database, experiment, note);
+  };
+  co_await writer_.keep("the end of an experiment", std::move(ended));
   publish(entry);
   const station::RobotId robot_id = experiment.request.robot_id;
   const bool is_aborted = entry.end.has_value();
@@ -254,22 +297,38 @@ storage::ExperimentState Experiments::state_of(const Entry& entry) const {
   return entry.conduct->pause_reason() != nullptr ? ExperimentState::paused : ExperimentState::running;
 }
 
-// What has become of those that run, as far as the database does not know it.
-asio::awaitable<void> Experiments::store_states() {
+// What has become of those that run, or was held, as far as the database does not know it; stored aside, since a
+// failing disk must not keep this from its next look.
+void Experiments::note_states() {
+  if (is_storing_) return;
   std::vector<Experiment> changed;
   for (auto& [id, entry] : entries_) {
     const ExperimentState state = state_of(entry);
-    if (!entry.conduct || state == entry.experiment.state) continue;
-    const Abort* why = entry.conduct->pause_reason();
-    entry.experiment.state = state;
-    entry.experiment.reason = why == nullptr ? "" : why->reason;
-    entry.experiment.detail = why == nullptr ? "" : why->detail;
+    const bool is_other = entry.conduct && state != entry.experiment.state;
+    if (!is_other && !entry.is_changed) continue;
+    entry.is_changed = false;
+    if (is_other) {
+      const Abort* why = entry.conduct->pause_reason();
+      entry.experiment.state = state;
+      entry.experiment.reason = why == nullptr ? "" : why->reason;
+      entry.experiment.detail = why == nullptr ? "" : why->detail;
+    }
     changed.push_back(entry.experiment);
     publish(entry);
   }
-  if (changed.empty()) co_return;
+  if (changed.empty()) return;
+  is_storing_ = true;
   changed_.notify();
-  auto store = [changed](storage::Database& database) {
+  spawn("states of experiments", store_states(std::move(changed)));
+}
+
+asio::awaitable<void> Experiments::store_states(std::vector<Experiment> changed) {
+  struct Stored {
+    bool& is_storing;
+    ~Stored() { is_storing = false; }
+  };
+  const Stored stored{is_storing_};
+  auto store = [changed = std::move(changed)](storage::Database& database) {
     for (const Experiment& experiment : changed) storage::store_experiment(database, experiment);
   };
   co_await writer_.keep("the state of an experiment", std::move(store));
@@ -312,7 +371,22 @@ void Experiments::on_robot(const station::RobotState& robot) {
   if (Conduct* conduct = conduct_of(robot.id)) conduct->on_robot(robot);
 }
 
+// SAFETY: after a stop nothing begins before somebody has looked, whether an experiment ran or not.
+void Experiments::hold_after_stop(const station::RobotId& robot_id) {
+  for (Entry* entry : queue_of(robot_id)) {
+    if (entry->experiment.is_held) continue;
+    entry->experiment.is_held = entry->is_changed = true;
+    entry->experiment.reason = "emergency_stop";
+  }
+}
+
 void Experiments::on_command(const station::CommandRecord& record) {
+  const bool is_new = record.acknowledged_after_us < 0 && record.ended_at_us == 0;
+  if (record.kind == "emergency_stop" && is_new) hold_after_stop(record.robot_id);
+  if (is_new && disturbance_of(record, "")) {
+    const bool is_own = record.peer.starts_with("experiment:");
+    if (!is_own) commanded_at_us_[record.robot_id] = parts_.clock.steady_us();
+  }
   if (Conduct* conduct = conduct_of(record.robot_id)) conduct->on_command(record);
 }
 

@@ -88,6 +88,8 @@ class Experiments final : public station::StationSink {
     std::unique_ptr<Conduct> conduct;  // null: it waits
     std::optional<Abort> end;          // of a conduct that has ended
     bool has_ended = false;
+    bool is_unreadable = false;  // its profile is of another version
+    bool is_changed = false;     // and the database does not know it yet
   };
 
   struct Waits {
@@ -109,8 +111,11 @@ class Experiments final : public station::StationSink {
   boost::asio::awaitable<void> conduct(Entry& entry);
   boost::asio::awaitable<void> finish(Entry& entry);
   boost::asio::awaitable<void> hold_queue(station::RobotId robot_id);
-  boost::asio::awaitable<void> put_to_rest(station::RobotId robot_id);
-  boost::asio::awaitable<void> store_states();
+  boost::asio::awaitable<void> store_states(std::vector<storage::Experiment> changed);
+  boost::asio::awaitable<void> settle_rest(station::RobotId robot_id);
+  void hold_after_stop(const station::RobotId& robot_id);
+  void note_states();
+  void spawn(const std::string& name, boost::asio::awaitable<void> task);
   void begin_what_may();
   void put_interrupted_to_rest();
   Waits waits_for(const Entry& entry) const;
@@ -134,6 +139,9 @@ class Experiments final : public station::StationSink {
   OnChange on_change_ = [](const ExperimentView&) {};
   std::map<storage::ExperimentId, Entry> entries_;             // that have not ended
   std::map<station::RobotId, storage::ExperimentId> running_;  // of each robot at most one
+  std::map<station::RobotId, std::int64_t> commanded_at_us_;   // steady, when a person last commanded a robot
+  std::set<station::RobotId> resting_;                         // of to_rest_: somebody is at it
+  bool is_storing_ = false;
   std::set<station::RobotId> to_rest_;  // whose experiment was interrupted: what they do is ended when they are back
   bool is_loaded_ = false;
   int being_added_ = 0;

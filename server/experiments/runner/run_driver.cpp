@@ -22,7 +22,6 @@ constexpr microseconds kTurn = 20ms;           // between two looks, if no sampl
 constexpr microseconds kBeginsAfter = 500ms;   // more than kLookAhead
 constexpr microseconds kWrongModeFor = 400ms;  // telemetry comes later than the time of a command
 constexpr microseconds kRenewsEvery = 120ms;   // a lease lasts 500 ms
-constexpr microseconds kTasksEndWithin = 10s;
 
 // Commands of which a run knows nothing, and that change what it measures.
 constexpr std::array<std::string_view, 8> kDisturbing{"set_mode",          "set_setpoint",       "set_duty",
@@ -52,10 +51,15 @@ bool RunDriver::is_fresh() const { return silent_for_us() <= station::kOldestSig
 
 void RunDriver::begin_at(std::size_t step) {
   const station::RobotState* robot = parts_.station.find(request_.robot_id);
-  ++generation_;
+  begin_generation();
   wrong_mode_since_us_ = 0;
   next_begin_ = step;
   feed_ = CommandFeed{line_, step, robot_now_us(*robot) + static_cast<std::uint64_t>(kBeginsAfter.count())};
+}
+
+void RunDriver::begin_generation() {
+  ++generation_;
+  accepted_.clear();
 }
 
 asio::awaitable<DriveEnd> RunDriver::run() {
@@ -64,7 +68,7 @@ asio::awaitable<DriveEnd> RunDriver::run() {
   boot_id_ = robot->boot_id;
   begin_at(0);
   co_await run_until_end();
-  ++generation_;
+  begin_generation();
   const Rest at_the_end = co_await rest();
   co_await settle_tasks();
   co_return DriveEnd{abort_, at_the_end};
@@ -146,14 +150,28 @@ void RunDriver::on_robot(const station::RobotState& robot) {
   if (boot_id_ != 0 && robot.link != station::LinkState::connected) abort({"link_lost", "the link to the robot broke"});
 }
 
-void RunDriver::on_command(const station::CommandRecord& record) {
-  if (record.peer == request_.peer || record.actor.starts_with("station")) return;
+std::optional<Abort> disturbance_of(const station::CommandRecord& record, const std::string& peer) {
+  if (record.peer == peer || record.actor.starts_with("station")) return std::nullopt;
   if (record.kind == "emergency_stop") {
-    return abort({"emergency_stop", fmt::format("{} has stopped the robot", record.actor)});
+    return Abort{"emergency_stop", fmt::format("{} has stopped the robot", record.actor)};
   }
   const bool is_new = record.acknowledged_after_us < 0 && record.ended_at_us == 0;
-  if (!is_new || std::ranges::find(kDisturbing, record.kind) == kDisturbing.end()) return;
-  abort({"operator_command", fmt::format("{} has sent {}", record.actor, record.kind)});
+  if (!is_new || std::ranges::find(kDisturbing, record.kind) == kDisturbing.end()) return std::nullopt;
+  return Abort{"operator_command", fmt::format("{} has sent {}", record.actor, record.kind)};
+}
+
+void RunDriver::on_command(const station::CommandRecord& record) {
+  if (record.peer == request_.peer) return on_own_command(record);
+  if (auto found = disturbance_of(record, request_.peer)) abort(std::move(*found));
+}
+
+// SAFETY: what the robot has accepted for later and then not done is no step of the run.
+void RunDriver::on_own_command(const station::CommandRecord& record) {
+  using station::CommandState;
+  const bool has_failed = record.state == CommandState::rejected || record.state == CommandState::expired ||
+                          record.state == CommandState::failed || record.state == CommandState::superseded;
+  if (!has_failed || !accepted_.contains(record.id)) return;
+  abort({"command_refused", fmt::format("{}: {} {}", record.kind, text(record.state), record.reason)});
 }
 
 void RunDriver::abort(Abort why) {
@@ -168,8 +186,14 @@ void RunDriver::feed(const station::RobotState& robot) {
   // What comes after a change of mode is sent once telemetry shows it.
   if (robot.context.mode != feed_.mode_at(now_us)) return;
   while (auto fed = feed_.next(now_us)) {
-    parts_.tasks.spawn(request_.peer, send(std::move(*fed), now_us));
+    spawn(send(std::move(*fed), now_us));
   }
+}
+
+// What it throws ends the task alone; what it was to do is missed, and shows in telemetry.
+void RunDriver::spawn(asio::awaitable<void> task) {
+  parts_.tasks.spawn(request_.peer, runtime::contained(parts_.tasks.exceptions(), parts_.clock,
+                                                       runtime::Ended::experiment, request_.peer, std::move(task)));
 }
 
 station::CommandRequest RunDriver::request_of(const protocol::Command& command) const {
@@ -190,8 +214,11 @@ asio::awaitable<void> RunDriver::send(FedCommand fed, std::uint64_t robot_now_us
   const std::uint64_t at_us = fed.command.execute_at_robot_us;
   request.time_to_live = microseconds{at_us - std::min(at_us, robot_now_us) + kGraceUs};
   const auto sent = co_await parts_.station.submit(std::move(request));
-  const bool is_accepted = sent && was_accepted(sent->state);
-  if (is_accepted || generation != generation_) co_return;
+  if (generation != generation_) co_return;
+  if (sent && was_accepted(sent->state)) {
+    accepted_.insert(sent->id);
+    co_return;
+  }
   const std::string why = sent ? sent->reason.empty() ? text(sent->state) : sent->reason : sent.error().detail;
   abort({"command_refused", fmt::format("step {}: {}: {}", fed.step + 1, protocol::kind(fed.command), why)});
 }
@@ -205,7 +232,7 @@ void RunDriver::renew_lease() {
   renewed_at_us_ = now_us;
   is_renewing_ = true;
   const microseconds life{std::max<std::int64_t>(station::kOldestSight.count() - silent_us, 1)};
-  parts_.tasks.spawn(request_.peer, send_renewal(life));
+  spawn(send_renewal(life));
 }
 
 // What was not renewed lapses, and telemetry shows it.
@@ -215,8 +242,12 @@ asio::awaitable<void> RunDriver::send_renewal(microseconds time_to_live) {
   renew.which_action = rheonaut_Command_renew_lease_tag;
   station::CommandRequest request = request_of(renew);
   request.time_to_live = time_to_live;
+  struct Renewed {
+    bool& is_renewing;
+    ~Renewed() { is_renewing = false; }
+  };
+  const Renewed renewed{is_renewing_};
   co_await parts_.station.submit(std::move(request));
-  is_renewing_ = false;
 }
 
 void RunDriver::note_steps(std::uint64_t robot_now_us) {
@@ -229,8 +260,10 @@ void RunDriver::note_steps(std::uint64_t robot_now_us) {
 
 // --- pauses and the end ---
 
+// SAFETY: also while it is paused by itself: then it does not go on by itself any more.
 void RunDriver::pause(std::string reason, std::string detail) {
-  pause_for({{std::move(reason), std::move(detail)}, parts_.clock.steady_us()});
+  pause_ = Pause{{std::move(reason), std::move(detail)}, parts_.clock.steady_us()};
+  changed_.notify();
 }
 
 void RunDriver::pause_for(Pause pause) {
@@ -246,7 +279,7 @@ void RunDriver::resume() {
 asio::awaitable<void> RunDriver::stay_paused() {
   const station::RobotState& robot = *parts_.station.find(request_.robot_id);
   const std::size_t broken_off = feed_.step_at(robot_now_us(robot));
-  ++generation_;
+  begin_generation();
   Rest resting = co_await rest();
   while (!abort_ && !is_over_pause(*parts_.station.find(request_.robot_id))) {
     co_await changed_.wait_until(parts_.clock, parts_.clock.steady_us() + kTurn.count());
@@ -285,10 +318,9 @@ asio::awaitable<Rest> RunDriver::rest() {
   co_return co_await bring_to_rest(parts_.station, parts_.clock, std::move(wanted));
 }
 
-// They end by themselves, since every command has a time to live.
+// They end by themselves, since every command has a time to live; nothing of theirs is left when this returns.
 asio::awaitable<void> RunDriver::settle_tasks() {
-  const std::int64_t ends_us = parts_.clock.steady_us() + kTasksEndWithin.count();
-  while (on_their_way_ > 0 && parts_.clock.steady_us() < ends_us) co_await parts_.clock.sleep_for(kTurn);
+  while (on_their_way_ > 0) co_await parts_.clock.sleep_for(kTurn);
 }
 
 double RunDriver::elapsed_s() const {

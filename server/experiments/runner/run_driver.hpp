@@ -14,6 +14,7 @@
 #include <boost/asio/awaitable.hpp>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -57,12 +58,15 @@ struct StepBegin {
   std::uint64_t robot_time_us = 0;
 };
 
+// What somebody else's command to the robot means for a run; `peer` is that of the run's own commands. None: nothing.
+std::optional<Abort> disturbance_of(const station::CommandRecord& record, const std::string& peer);
+
 class RunDriver {
  public:
   // The robot is at rest, and the actor controls it.
   RunDriver(const DriverParts& parts, DriveRequest request, const AbortCriteria& criteria, TimeLine line);
 
-  boost::asio::awaitable<DriveEnd> run();
+  boost::asio::awaitable<DriveEnd> run();  // returns when no task of its own is left
 
   // --- by people ---
   void pause(std::string reason, std::string detail);  // until resume(); kLongestPause at most
@@ -94,6 +98,9 @@ class RunDriver {
   boost::asio::awaitable<void> stay_paused();
   boost::asio::awaitable<Rest> rest();
   boost::asio::awaitable<void> settle_tasks();
+  void spawn(boost::asio::awaitable<void> task);
+  void on_own_command(const station::CommandRecord& record);
+  void begin_generation();
   void begin_at(std::size_t step);
   void watch(const station::RobotState& robot);
   void watch_mode(const station::RobotState& robot);
@@ -124,8 +131,9 @@ class RunDriver {
   std::int64_t wrong_mode_since_us_ = 0;  // steady; 0: it is as it is to be
   std::int64_t renewed_at_us_ = 0;
   int repeats_ = 0;
-  int generation_ = 0;    // of what was sent: a pause ends one
-  int on_their_way_ = 0;  // tasks of its own
+  int generation_ = 0;                     // of what was sent: a pause ends one
+  std::set<station::CommandId> accepted_;  // commands of this generation that wait on the robot, or have acted
+  int on_their_way_ = 0;                   // tasks of its own
   bool is_renewing_ = false;
   runtime::Signal changed_;
 };

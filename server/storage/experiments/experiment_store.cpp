@@ -104,7 +104,8 @@ void store_experiment(Database& database, const Experiment& experiment, const st
   SQLite::Transaction transaction{handle, SQLite::TransactionBehavior::IMMEDIATE};
   SQLite::Statement update{handle,
                            "UPDATE experiment SET state = ?, reason = ?, detail = ?, acts_for = ?, held = ?,"
-                           " priority = ?, place = ?, started_at_us = ?, ended_at_us = ? WHERE experiment_id = ?"};
+                           " priority = ?, place = ?, started_at_us = ?, ended_at_us = ? WHERE experiment_id = ?"
+                           " AND ended_at_us IS NULL"};
   execute(update, text(experiment.state), experiment.reason, experiment.detail, experiment.acts_for,
           std::int64_t{experiment.is_held}, experiment.request.priority, experiment.place, experiment.started_at_us,
           experiment.ended_at_us, experiment.id);
@@ -129,25 +130,30 @@ void end_experiment_run(Database& database, ExperimentId id, const ExperimentRun
 std::vector<station::RobotId> interrupt_experiments(Database& database, std::int64_t utc_us) {
   SQLite::Database& handle = database.handle();
   SQLite::Transaction transaction{handle, SQLite::TransactionBehavior::IMMEDIATE};
-  std::vector<station::RobotId> robots;
-  SQLite::Statement begun{handle,
-                          "SELECT DISTINCT robot_id FROM experiment WHERE ended_at_us IS NULL AND state <> 'waiting'"};
-  while (begun.executeStep()) robots.push_back(begun.getColumn(0).getString());
-  begun.reset();
   SQLite::Statement runs{handle,
                          "UPDATE experiment_run SET state = 'interrupted', reason = 'station_restarted',"
                          " ended_at_us = ? WHERE ended_at_us IS NULL"};
   execute(runs, utc_us);
-  SQLite::Statement interrupt{
-      handle,
-      "UPDATE experiment SET state = 'interrupted', reason = 'station_restarted',"
-      " detail = 'the station stopped while it ran', ended_at_us = ? WHERE ended_at_us IS NULL AND state <> 'waiting'"};
+  SQLite::Statement interrupt{handle,
+                              "UPDATE experiment SET state = 'interrupted', reason = 'station_restarted',"
+                              " detail = 'the station stopped while it ran', ended_at_us = ?, needs_rest = 1 WHERE "
+                              "ended_at_us IS NULL AND state <> 'waiting'"};
   execute(interrupt, utc_us);
   SQLite::Statement hold{handle,
                          "UPDATE experiment SET held = 1, reason = 'station_restarted' WHERE state = 'waiting'"};
   hold.exec();
+  std::vector<station::RobotId> robots;
+  SQLite::Statement to_rest{handle, "SELECT DISTINCT robot_id FROM experiment WHERE needs_rest = 1"};
+  while (to_rest.executeStep()) robots.push_back(to_rest.getColumn(0).getString());
+  to_rest.reset();
   transaction.commit();
   return robots;
+}
+
+void note_rest(Database& database, const station::RobotId& robot_id) {
+  SQLite::Statement seen{database.handle(),
+                         "UPDATE experiment SET needs_rest = 0 WHERE robot_id = ? AND needs_rest = 1"};
+  execute(seen, robot_id);
 }
 
 std::optional<Experiment> find_experiment(SQLite::Database& database, ExperimentId id) {

@@ -28,8 +28,11 @@ void add_experiment_run(Database& database, ExperimentId id, const ExperimentRun
 void end_experiment_run(Database& database, ExperimentId id, const ExperimentRun& run);
 
 // SAFETY: after a restart of the station nothing goes on by itself: what had begun is interrupted, what waited is held.
-// Returns the robots whose experiment was interrupted.
+// Returns the robots whose experiment was interrupted, by this restart or an earlier one, and that have not been seen
+// at rest since.
 std::vector<station::RobotId> interrupt_experiments(Database& database, std::int64_t utc_us);
+
+void note_rest(Database& database, const station::RobotId& robot_id);  // it was seen at rest
 
 std::optional<Experiment> find_experiment(SQLite::Database& database, ExperimentId id);
 std::vector<Experiment> list_experiments(SQLite::Database& database, const ExperimentFilter& filter);

@@ -80,6 +80,7 @@ CREATE TABLE experiment (
   owner TEXT NOT NULL,                      -- the actor who asked for it
   acts_for TEXT NOT NULL,                   -- the actor in whose name it commands the robot
   held INTEGER NOT NULL DEFAULT 0,          -- 1: it waits until somebody releases it
+  needs_rest INTEGER NOT NULL DEFAULT 0,    -- 1: it was interrupted, and its robot was not seen at rest since
   place INTEGER NOT NULL,                   -- in the queue, among those of one priority
   runs_planned INTEGER NOT NULL,
   duration_s REAL NOT NULL,                 -- of all runs
@@ -89,6 +90,7 @@ CREATE TABLE experiment (
 );
 CREATE INDEX experiment_by_robot ON experiment(robot_id);
 CREATE INDEX experiment_not_ended ON experiment(state) WHERE ended_at_us IS NULL;
+CREATE INDEX experiment_needs_rest ON experiment(robot_id) WHERE needs_rest = 1;
 
 -- The runs of an experiment that have begun.
 CREATE TABLE experiment_run (
