@@ -7,7 +7,7 @@ import unittest
 
 from processes import ApiError, lab, wait_until
 
-KILLS = int(os.environ.get("RHEONAUT_QUEUE_KILLS", "6"))  # 50 were run for docs/reliability.md
+KILLS = int(os.environ.get("RHEONAUT_QUEUE_KILLS", "6"))  # docs/reliability.md has the figures of 50
 ENDED = {"done", "aborted", "cancelled", "interrupted"}
 DUTY = {"name": "duty", "purpose": "moves", "conditions": {"start": "here"}, "limits": {"position_min_m": -50, "position_max_m": 50},
         "step": [{"kind": "rest", "for_s": 0.3}, {"kind": "duty", "duty": 0.2, "for_s": 1.5}]}
