@@ -19,6 +19,8 @@ class ComparisonTest(unittest.TestCase):
         """A step after so long at rest, and back to rest."""
         self.command(station, kind="set_mode", mode="manual")
         self.command(station, kind="zero_position")
+        # Samples of before may still be on their way, and would be the first of the run.
+        wait_until(lambda: station.robot("sim-1")["mode"] == "manual", 20, "manual in telemetry")
         run = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": name})["run_id"]
         time.sleep(before_s)
         self.command(station, kind="set_mode", mode="auto", setpoint_m=SETPOINT_M)
