@@ -32,6 +32,9 @@ class RobotSettingsTest(unittest.TestCase):
     def test_documented_lines_run(self):
         self.run_line("rheonaut tune --crossover-rad-s 3 --phase-margin-deg 90 --json > c.json")
         self.run_line("rheonaut discretise --controller c.json --json > d.json")
+        for number in (1, 2):
+            kept = self.run_line(f"rheonaut design save c.json --kind controller --name c{number} --data lab")
+            self.assertEqual(kept.returncode, 0, kept.stderr)
         lines = LINE.findall((ROOT / "docs/commands.md").read_text(encoding="utf-8"))
         self.assertGreaterEqual(len(lines), 7)
         for line, status in lines:

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kUsPerS = 1e6;
 constexpr double kDefaultPeriod_s = 0.01;
+constexpr int kDefaultLife_ms = 10'000;  // the longest that a command may have: it pays for the discretisation
 
 // What a document without coefficients is discretised for.
 struct Robot {
@@ -42,6 +43,7 @@ http::Request command_request(http::Request request, json body, json controller)
   body.erase("design_id");
   body["kind"] = "set_controller";
   body["controller"] = std::move(controller);
+  if (!body.contains("life_ms")) body["life_ms"] = kDefaultLife_ms;
   request.body = base::dump(body);
   request.query["wait"] = "verified";
   return request;

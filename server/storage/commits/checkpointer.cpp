@@ -17,6 +17,8 @@ constexpr microseconds kTryInterval = 200ms;      // readers of our own are gone
 constexpr microseconds kHeldTryInterval = 1s;
 constexpr microseconds kRestartInterval = 2s;  // for the disk thread waits up to a second
 constexpr microseconds kHeldRestartInterval = 10s;
+constexpr int kRestartTries = 50;
+constexpr int kRestartTryMs = 20;  // with the line above, one second
 constexpr microseconds kHeldPatience = 5s;
 constexpr microseconds kWarningInterval = 10s;
 
@@ -37,8 +39,20 @@ CheckpointOutcome checkpoint(SQLite::Database& database, CheckpointMode mode) {
   int log_frames = 0;
   int moved_frames = 0;
   sqlite3* handle = database.getHandle();
-  const int how = mode == CheckpointMode::passive ? SQLITE_CHECKPOINT_PASSIVE : SQLITE_CHECKPOINT_RESTART;
-  const int result = sqlite3_wal_checkpoint_v2(handle, nullptr, how, &log_frames, &moved_frames);
+  int result = SQLITE_OK;
+  if (mode == CheckpointMode::passive) {
+    result = sqlite3_wal_checkpoint_v2(handle, nullptr, SQLITE_CHECKPOINT_PASSIVE, &log_frames, &moved_frames);
+  } else {
+    // One RESTART waits for the place of an old reader even after a new reader, which is in nobody's way, has taken that
+    // place. So a try is short, and the next one looks at the places anew.
+    const int usual_ms = database.execAndGet("PRAGMA busy_timeout").getInt();
+    database.setBusyTimeout(kRestartTryMs);
+    for (int i = 0; i < kRestartTries; ++i) {
+      result = sqlite3_wal_checkpoint_v2(handle, nullptr, SQLITE_CHECKPOINT_RESTART, &log_frames, &moved_frames);
+      if (result != SQLITE_BUSY) break;
+    }
+    database.setBusyTimeout(usual_ms);
+  }
   const bool is_busy = result == SQLITE_BUSY;
   CheckpointOutcome outcome{.log_frames = log_frames, .moved_frames = moved_frames, .is_busy = is_busy, .problem = {}};
   if (result != SQLITE_OK && !is_busy) outcome.problem = sqlite3_errmsg(handle);
