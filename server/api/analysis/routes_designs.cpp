@@ -23,7 +23,19 @@ Result<storage::DesignId> design_id_from(const std::string& text) {
   return fail(ErrorCode::not_found, fmt::format("there is no design '{}'", text), "no_such_design");
 }
 
-// The result of a job that identified a run is a model, found from that run with these options.
+// The runs that a job of kind identify was asked to fit, each once.
+std::vector<storage::DesignSource> sources_of(const json& asked) {
+  const json one = json::array({asked});
+  std::vector<storage::DesignSource> sources;
+  for (const json& part : asked.contains("runs") ? asked.at("runs") : one) {
+    storage::DesignSource source{part.value("run_id", storage::RunId{0}), {}};
+    if (part.contains("span")) source.span = part.at("span").get<std::uint32_t>();
+    if (std::ranges::find(sources, source) == sources.end()) sources.push_back(source);
+  }
+  return sources;
+}
+
+// The result of a job that identified runs is a model, found from them with these options.
 boost::asio::awaitable<Result<void>> take_result(DesignRoutes parts, storage::JobId id,
                                                  storage::DesignRequest& request) {
   const auto job = co_await parts.jobs.find(id);
@@ -39,10 +51,7 @@ boost::asio::awaitable<Result<void>> take_result(DesignRoutes parts, storage::Jo
   }
   request.document = *result;
   request.options = job->request.document;
-  const json asked = json::parse(job->request.document, nullptr, false);
-  storage::DesignSource source{asked.value("run_id", storage::RunId{0}), {}};
-  if (asked.contains("span")) source.span = asked.at("span").get<std::uint32_t>();
-  request.sources = {source};
+  request.sources = sources_of(json::parse(job->request.document, nullptr, false));
   co_return Result<void>{};
 }
 

@@ -24,26 +24,49 @@ Result<storage::JobId> job_id_of(const http::Request& request) {
   return fail(ErrorCode::not_found, fmt::format("there is no job '{}'", request.param.at("job_id")), "no_such_job");
 }
 
-// Of the fluid of a run: the model that robots in it are sent, where its document says which plant it is of.
-boost::asio::awaitable<std::optional<analysis::ModelInUse>> model_in_use(JobRoutes parts, storage::RunId id) {
-  const auto run = co_await parts.runs.find(id);
-  if (!run) co_return std::nullopt;
-  const std::string& fluid = run->conditions.fluid;
+// The model that robots in the fluid are sent, where its document says which plant it is of.
+std::optional<analysis::ModelInUse> model_in_use(JobRoutes parts, const std::string& fluid) {
   const station::FluidModel* model = parts.fluid_models.in_force().find(fluid);
-  if (model == nullptr) co_return std::nullopt;
+  if (model == nullptr) return std::nullopt;
   const json document = json::parse(model->document, nullptr, false);
-  if (!document.is_object() || !document.contains("plant")) co_return std::nullopt;
+  if (!document.is_object() || !document.contains("plant")) return std::nullopt;
   const auto plant = analysis::model_from(document.at("plant"));
-  if (!plant) co_return std::nullopt;
-  co_return analysis::ModelInUse{fluid, *plant};
+  if (!plant) return std::nullopt;
+  return analysis::ModelInUse{fluid, *plant};
+}
+
+// The fluid of each run of the request, where it is known; an error if a run is not there.
+boost::asio::awaitable<Result<std::vector<std::string>>> fluids_of(JobRoutes parts,
+                                                                   std::vector<analysis::RunPart> runs) {
+  std::vector<std::string> fluids;
+  for (const analysis::RunPart& part : runs) {
+    const auto run = co_await parts.runs.find(part.run);
+    if (!run) co_return std::unexpected{run.error()};
+    fluids.push_back(run->conditions.fluid);
+  }
+  co_return fluids;
+}
+
+// One model is of one fluid; a run without one may be in any.
+std::vector<std::string> fluid_doubts(const std::vector<analysis::RunPart>& runs,
+                                      const std::vector<std::string>& fluids) {
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < fluids.size(); ++i) {
+    if (fluids[first].empty()) first = i;
+    if (fluids[i].empty() || fluids[i] == fluids[first]) continue;
+    return {fmt::format("run {} is in the fluid '{}', run {} in '{}': one model can hardly be right for both",
+                        runs[first].run, fluids[first], runs[i].run, fluids[i])};
+  }
+  return {};
 }
 
 http::Answer begin_job(JobRoutes parts, http::Request request) {
   auto body = parse_job(request.body);
   if (!body) co_return http::problem(body.error());
-  const auto run = co_await parts.runs.find(body->identify.run);
-  if (!run) co_return http::problem(run.error());
-  auto in_use = co_await model_in_use(parts, body->identify.run);
+  const auto fluids = co_await fluids_of(parts, body->identify.runs);
+  if (!fluids) co_return http::problem(fluids.error());
+  body->identify.warnings = fluid_doubts(body->identify.runs, *fluids);
+  auto in_use = model_in_use(parts, fluids->front());
   auto work = [&analysis = parts.analysis, identify = body->identify, in_use](storage::JobRun& job) {
     return analysis::identify_job(analysis, identify, in_use, job);
   };

@@ -12,6 +12,7 @@
 #include <limits>
 #include <string_view>
 
+#include "server/analysis/identify_job.hpp"
 #include "server/analysis/reference_import.hpp"
 #include "server/api/bodies/json.hpp"
 #include "server/identity/accounts.hpp"
@@ -91,6 +92,8 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"ExecuteAtRobotUs", {0, kMaxTimeUs}},
     {"GetParametersBody.first_index", {0, 255}},
     {"IdentifyJobBody.run_id", {1, kMaxJavaScriptInteger}},
+    {"IdentifyJobBody.runs[].run_id", {1, kMaxJavaScriptInteger}},
+    {"IdentifyJobBody.runs[].span", {0, 1'000'000}},
     {"IdentifyJobBody.span", {0, 1'000'000}},
     {"IdentifyJobBody.validation_run_id", {1, kMaxJavaScriptInteger}},
     {"IdentifyJobBody.validation_span", {0, 1'000'000}},
@@ -120,6 +123,8 @@ inline constexpr Limit<double> kNumberLimits[] = {
     {"FluidModelBody.model_time_constant_s[]", {station::kMinModelTimeConstant_s, station::kMaxModelTimeConstant_s}},
     {"IdentifyJobBody.dead_time_s", {0, 1000}},
     {"IdentifyJobBody.from_s", {0, 1e6}},
+    {"IdentifyJobBody.runs[].from_s", {0, 1e6}},
+    {"IdentifyJobBody.runs[].to_s", {0, 1e6}},
     {"IdentifyJobBody.sensor_lag_s", {0, 1000}},
     {"IdentifyJobBody.time_limit_s", {0.1, 600}},
     {"IdentifyJobBody.to_s", {0, 1e6}},
@@ -152,6 +157,7 @@ inline constexpr Limit<std::size_t> kListLimits[] = {
     {"DesignBody.runs", {0, 100}},
     {"FluidModelBody.model_gain_m_s", {station::kFluidModelSections, station::kFluidModelSections}},
     {"FluidModelBody.model_time_constant_s", {station::kFluidModelSections, station::kFluidModelSections}},
+    {"IdentifyJobBody.runs", {1, control::kMostRecordings}},
     {"SetDutyScheduleBody.schedule", {1, std::size(rheonaut_SetDutySchedule{}.duty)}},
 };
 
