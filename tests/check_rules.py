@@ -37,7 +37,7 @@ server/station/state server/station/commands server/station server/station/model
 server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest
 server/storage/runs server/storage/jobs server/storage/designs server/storage/query server/storage/export
 server/storage/upkeep server/storage
-server/analysis/metrics server/analysis/report server/analysis server/experiments server/identity server/http
+server/analysis/metrics server/analysis/report server/analysis/capsule server/analysis server/experiments server/identity server/http
 server/api/bodies server/api/routes server/api/analysis server/api
 server/cli/terminal server/cli/design server/cli/accounts server/cli/data server/cli
 """.split()

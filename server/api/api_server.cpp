@@ -74,15 +74,18 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   add_in_force_routes(router_, {station});
   add_fluid_routes(router_, {clock_, recording.fluid_models, recording.recorder, station});
   add_run_routes(router_, {analysis, recording.digester, clock_, recording.disk_watch, live, recording.runs, station});
-  add_run_metrics_routes(router_, {analysis, clock_, recording.digester, history, recording.metrics, recording.runs});
+  const RunMetricsRoutes of_runs{analysis, clock_, recording.digester, history, recording.metrics, recording.runs};
+  const ExportRoutes exports{tasks_, recording.exports, recording.disk_watch, recording.path(),
+                             recording.exports_folder()};
+  add_run_metrics_routes(router_, of_runs);
+  add_capsule_routes(router_, {recording.designs, exports, of_runs});
   add_job_routes(router_, {analysis, recording.fluid_models, recording.jobs, recording.runs});
   add_design_routes(router_, {clock_, recording.designs, recording.jobs});
   add_marker_routes(router_, {recording.markers, station});
   add_reference_routes(router_, {analysis, clock_, recording.references});
   add_sample_routes(router_, {history});
   add_overview_routes(router_, {history});
-  add_export_routes(router_,
-                    {tasks_, recording.exports, recording.disk_watch, recording.path(), recording.exports_folder()});
+  add_export_routes(router_, exports);
   add_account_routes(router_, {accounts_, auth_, logins_, clock_, station, facts_});
   add_audit_routes(router_, {clock_, history, recording.recorder});
 }

@@ -90,6 +90,9 @@ CommandLine parse_command_line(int argc, char** argv) {
   offer<MetricsQuestion>(app, "metrics", "Figures and steps of a run; several runs side by side, with their spread",
                          line);
   offer<ReportQuestion>(app, "report", "Save a run as an HTML file with plots, metrics, digest and audit", line);
+  offer<CapsuleQuestion>(app, "capsule",
+                         "Save a run as an .eln archive with samples, metrics, configuration and report", line);
+  offer<Reproduce>(app, "reproduce", "Check the .eln archive of a run, and compute its metrics and plots again", line);
   offer<Model>(app, "model", "Show the motion models, compute the hydrodynamic one, fit the motor", line);
   offer<Bode>(app, "bode", "Crossover, margins and frequency response of the open loop", line);
   offer<Step>(app, "step", "Velocity and position after a step of duty, or any duty", line);

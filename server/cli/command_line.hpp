@@ -4,6 +4,7 @@
 #include <optional>
 #include <variant>
 
+#include "server/cli/accounts/capsule.hpp"
 #include "server/cli/accounts/design.hpp"
 #include "server/cli/accounts/fluid.hpp"
 #include "server/cli/accounts/job.hpp"
@@ -16,6 +17,7 @@
 #include "server/cli/data/certificate.hpp"
 #include "server/cli/data/export.hpp"
 #include "server/cli/data/reference.hpp"
+#include "server/cli/data/reproduce.hpp"
 #include "server/cli/data/restore.hpp"
 #include "server/cli/data/verify.hpp"
 #include "server/cli/design/bode.hpp"
@@ -47,7 +49,7 @@ struct Answered {
 using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model,
                                  Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
                                  TokenCommand, RobotCommand, FluidCommand, JobCommand, DesignCommand, MetricsQuestion,
-                                 ReportQuestion, ReferenceCommand, ProfileQuestion>;
+                                 ReportQuestion, CapsuleQuestion, Reproduce, ReferenceCommand, ProfileQuestion>;
 
 CommandLine parse_command_line(int argc, char** argv);
 

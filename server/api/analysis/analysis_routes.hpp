@@ -1,4 +1,5 @@
-// The routes of what is computed from runs, grouped by noun: routes_jobs, routes_designs, routes_run_metrics.
+// The routes of what is computed from runs, grouped by noun: routes_jobs, routes_designs, routes_run_metrics,
+// routes_capsule.
 //
 // As in server/api/routes/routes.hpp: all of what they work with outlives the router.
 #pragma once
@@ -37,5 +38,12 @@ struct RunMetricsRoutes {
   storage::Runs& runs;
 };
 void add_run_metrics_routes(http::Router& router, RunMetricsRoutes parts);
+
+struct CapsuleRoutes {
+  storage::Designs& designs;
+  ExportRoutes exports;
+  RunMetricsRoutes of_runs;
+};
+void add_capsule_routes(http::Router& router, CapsuleRoutes parts);
 
 }  // namespace server::api

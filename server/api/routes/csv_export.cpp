@@ -1,6 +1,7 @@
 // Pieces of bodies, made on the worker.
 #include "server/api/routes/csv_export.hpp"
 
+#include <fmt/format.h>
 #include <stdlib.h>
 #include <unistd.h>
 
@@ -14,6 +15,7 @@ namespace asio = boost::asio;
 namespace {
 
 constexpr std::size_t kPieceBytes = 256 * 1024;
+constexpr std::uint64_t kSampleBytes = 200;  // at most, in any format's file
 
 std::string read_piece(const std::filesystem::path& path, std::uint64_t offset) {
   std::ifstream file{path, std::ios::binary};
@@ -22,6 +24,22 @@ std::string read_piece(const std::filesystem::path& path, std::uint64_t offset) 
   file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
   piece.resize(static_cast<std::size_t>(file.gcount()));
   return piece;
+}
+
+// Makes the empty file, if there is room for what comes into it.
+Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folder, const char* ending,
+                                              std::uint64_t samples) {
+  auto file = std::make_unique<ExportFile>(folder, ending);
+  const std::uint64_t free_bytes = storage::free_bytes_of(folder);
+  const std::uint64_t wanted = 2 * samples * kSampleBytes + kSpareExportBytes;
+  if (free_bytes < wanted) {
+    return fail(ErrorCode::unavailable,
+                fmt::format("the export needs up to {} MB on the station's disk, {} MB are free; export CSV, which "
+                            "needs none",
+                            wanted / 1'000'000, free_bytes / 1'000'000),
+                "low_space");
+  }
+  return file;
 }
 
 }  // namespace
@@ -43,6 +61,19 @@ ExportFile::ExportFile(const std::filesystem::path& folder, const std::string& e
 ExportFile::~ExportFile() {
   std::error_code ignored;
   std::filesystem::remove(path_, ignored);
+}
+
+asio::awaitable<Result<ExportFilePtr>> begin_export_file(ExportRoutes parts, std::vector<storage::RecordedSpan> spans,
+                                                         std::uint64_t rows_per_sample, const char* ending) {
+  if (auto may = parts.disk_watch.may_begin("an export to a file"); !may) {
+    co_return std::unexpected{may.error()};
+  }
+  auto job = [folder = parts.folder, ending, spans = std::move(spans), rows_per_sample](SQLite::Database& database) {
+    return make_file(folder, ending, most_samples(database, spans) * rows_per_sample);
+  };
+  auto file = co_await parts.history.reader().ask(std::move(job));
+  if (!file) co_return std::unexpected{file.error()};
+  co_return ExportFilePtr{file->release(), EndOnWorker{parts.tasks, parts.history.reader()}};
 }
 
 asio::awaitable<Result<std::optional<std::string>>> FileStream::next() {

@@ -47,7 +47,7 @@ std::string token_of(const std::filesystem::path& file) {
 
 using Request = http::request<http::string_body>;
 
-constexpr std::uint64_t kMaxAnswerBytes = 64'000'000;
+constexpr std::uint64_t kMaxAnswerBytes = 2'000'000'000;  // of an archive of hours
 
 template <class Stream>
 StationAnswer converse(Stream& stream, const Request& request) {
@@ -59,7 +59,8 @@ StationAnswer converse(Stream& stream, const Request& request) {
   http::response<http::string_body> response = parser.release();
   StationAnswer answer;
   answer.status = static_cast<int>(response.result_int());
-  if (response[http::field::content_type].starts_with("text/html")) {
+  const auto type = response[http::field::content_type];
+  if (type.starts_with("text/html") || type.starts_with("application/vnd.eln+zip")) {
     answer.text = std::move(response.body());
   } else {
     answer.body = nlohmann::json::parse(response.body());

@@ -11,8 +11,8 @@ namespace server::cli {
 
 struct StationAnswer {
   int status = 0;
-  nlohmann::json body;  // of an error: problem details; null of a page
-  std::string text;     // of an HTML page
+  nlohmann::json body;  // of an error: problem details; null of a page or an archive
+  std::string text;     // of an HTML page, or the bytes of an archive
 };
 
 class StationClient {
