@@ -267,8 +267,7 @@ void add_options(CLI::App& command, Identify& options) {
   }
   command.footer(
       "Exit status 4: the search did not converge; the best that was found is printed.\n"
-      "Examples: rheonaut identify --csv run.csv --structure fractional\n"
-      "          rheonaut identify --run 3 --run 4 --data lab");
+      "Example: rheonaut identify --csv run.csv --structure fractional");
 }
 
 int run(const Identify& options, std::ostream& out) {
