@@ -22,7 +22,6 @@ using analysis::Reproduction;
 using ::testing::AllOf;
 using ::testing::Each;
 using ::testing::ElementsAre;
-using ::testing::Field;
 using ::testing::HasSubstr;
 
 constexpr const char* kCapsule = "/api/v1/runs/1/capsule.eln";
@@ -130,7 +129,7 @@ TEST_F(CapsuleTest, HoldsTheRunAndComesOutAgainBitForBit) {
   EXPECT_EQ(found->files, 8U);
   EXPECT_EQ(found->program, RHEONAUT_VERSION);
   EXPECT_GT(found->results.size(), 40U);  // 16 figures, two steps of 15 values, three plots
-  EXPECT_THAT(found->results, Each(Field(&analysis::Reproduced::agreement, Agreement::bit_for_bit)));
+  EXPECT_THAT(found->results, Each(::testing::Field(&analysis::Reproduced::agreement, Agreement::bit_for_bit)));
   EXPECT_TRUE(found->is_reproduced());
 }
 
