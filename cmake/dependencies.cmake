@@ -15,6 +15,7 @@ find_package(benchmark REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(sodium REQUIRED IMPORTED_TARGET libsodium)
 pkg_check_modules(matio REQUIRED IMPORTED_TARGET matio)
+pkg_check_modules(minizip REQUIRED IMPORTED_TARGET minizip)
 find_program(PROTOC protoc REQUIRED)
 find_program(PROTOC_GEN_NANOPB protoc-gen-nanopb REQUIRED)
 find_program(PYTHON3 python3 REQUIRED)  # checks in tests/ use its standard library only

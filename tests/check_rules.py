@@ -36,7 +36,7 @@ server/station/state server/station/commands server/station server/station/model
 server/storage/database server/storage/audit server/storage/samples server/storage/commits server/storage/ingest
 server/storage/runs server/storage/jobs server/storage/designs server/storage/experiments server/storage/query
 server/storage/export server/storage/upkeep server/storage
-server/analysis/metrics server/analysis/comparison server/analysis/report server/analysis server/analysis/tuning
+server/analysis/metrics server/analysis/comparison server/analysis/report server/analysis/capsule server/analysis server/analysis/tuning
 server/analysis/documents server/experiments server/experiments/runner server/identity server/http server/api/bodies
 server/api/routes server/api/analysis server/api/experiments server/api server/cli/terminal server/cli/design
 server/cli/accounts server/cli/analysis server/cli/data server/cli/experiments server/cli

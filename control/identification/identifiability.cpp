@@ -99,7 +99,7 @@ std::string better_experiment(const Recording& recording, const Fit& fit, bool f
   return "a ±1 PRBS of 60 s with 0.2 s bits and the same noise would give " + enumerated(words);
 }
 
-void add_undetermined(const Recording& recording, const Fit& fit, bool fits_offset,
+void add_undetermined(const Recording& recording, const Fit& fit, bool fits_offset, std::size_t runs,
                       std::vector<std::string>& warnings) {
   const auto value = values(fit.model);
   std::vector<std::size_t> doubtful;
@@ -113,7 +113,8 @@ void add_undetermined(const Recording& recording, const Fit& fit, bool fits_offs
     sigmas.push_back(sigma_words(i, fit.one_sigma[i], value[i]));
   }
   if (doubtful.empty()) return;
-  warnings.push_back("this run cannot determine " + enumerated(names) + ": one sigma is " + enumerated(sigmas) +
+  const std::string subject = runs == 1 ? "this run cannot" : "these runs together cannot";
+  warnings.push_back(subject + " determine " + enumerated(names) + ": one sigma is " + enumerated(sigmas) +
                      " (trust at most 0.1 times kp, 0.5 times b1 or b2, 0.1 for the orders); compare responses, not "
                      "parameters; " +
                      better_experiment(recording, fit, fits_offset, doubtful));
@@ -218,11 +219,11 @@ std::vector<std::string> search_doubts(const Fit& fit, const IdentificationOptio
 }
 
 std::vector<std::string> identifiability_warnings(const Recording& recording, const Fit& fit,
-                                                  const IdentificationOptions& options) {
+                                                  const IdentificationOptions& options, std::size_t runs) {
   std::vector<std::string> warnings;
-  add_constant_duty(recording, warnings);
+  if (runs == 1) add_constant_duty(recording, warnings);
   if (fit.starts == 0) return warnings;
-  add_undetermined(recording, fit, options.fits_offset && !recording.position_m.empty(), warnings);
+  add_undetermined(recording, fit, options.fits_offset && !recording.position_m.empty(), runs, warnings);
   add_correlated(fit, warnings);
   add_at_bounds(fit, options, warnings);
   return warnings;

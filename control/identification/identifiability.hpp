@@ -18,8 +18,9 @@ inline constexpr double kPoorFitPercent = 50;
 // How the search ended, and whether a limit of its own decided the result.
 std::vector<std::string> search_doubts(const Fit& fit, const IdentificationOptions& options);
 
+// Of several runs that were fitted together: the fit of the longest, with the sigmas of all.
 std::vector<std::string> identifiability_warnings(const Recording& recording, const Fit& fit,
-                                                  const IdentificationOptions& options);
+                                                  const IdentificationOptions& options, std::size_t runs = 1);
 
 // A fit that is poor in percent describes the run nevertheless where only the accelerometer's white noise is left.
 bool describes_run(const Fit& fit);

@@ -44,14 +44,28 @@ Recording make_recording(std::span<const double> time_s, std::span<const double>
                          std::span<const double> position_m, std::span<const double> velocity_m_s,
                          std::span<const double> acceleration_m_s2 = {});
 
+// One of several recordings that were fitted together.
+struct JointRun {
+  Fit fit;  // the common model; offset, clock, sensor, residuals and their quality are this run's
+  std::vector<std::string> warnings;
+};
+
 struct Identification {
   Fit best;
   std::vector<Fit> compared;  // one per structure: the best, then by AIC; unfinished and untried ones last
   std::optional<AmplitudeEvidence> amplitude;  // of the best; none: nothing to compare
   std::vector<std::string> warnings;           // in words, with numbers and what to do
+  std::vector<JointRun> runs;                  // of several recordings, in their order; empty: there was one
 };
 
 Identification identify(const Recording& recording, const IdentificationOptions& options);
+
+// One model for several recordings of one robot in one fluid: each with its own offset, clock, sensor and noise, which
+// are estimated beside the common model (joint_search.hpp). Of one recording it is identify(). In `best` the fit in
+// percent, the residual's sd and the whiteness are those of all runs (joint_fit.hpp), and residuals are in `runs`.
+// Warnings of one run only stand in it. kMostRecordings at most, kMostSamples in all.
+inline constexpr std::size_t kMostRecordings = 8;
+Identification identify_together(std::span<const Recording> recordings, const IdentificationOptions& options);
 
 // How well a model follows a recording that it was not fitted to. Its parameters stay as they are, divided by b3;
 // fitted are the position's offset, and of an acceleration the sensor's bias, lag and clock. The dead time of a model

@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <unsupported/Eigen/NonLinearOptimization>
 #include <utility>
+
+#include "control/search/descent.hpp"
 
 namespace control {
 namespace {
@@ -33,49 +34,6 @@ constexpr double kClockScaleS = 0.01, kLargestClock = 50;  // of a position's cl
 double scale_of(const Eigen::VectorXd& values) { return std::sqrt((values.array() - values.mean()).square().mean()); }
 
 }  // namespace
-
-struct OutputErrorSearch::Descent {
-  using Scalar = double;
-  OutputErrorSearch& search;
-  Structure structure;
-
-  bool is_not_finite = false;
-
-  // Negative: the solver stops.
-  int operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual) const {
-    if (search.limit_.is_reached()) return -1;
-    residual.setConstant(1e100);  // refused by the solver
-    if (!x.allFinite() || std::abs(x[0]) > 700) return 0;
-    const SearchPoint point = search.point_at(structure, x);
-    const auto parts = search.residuals(point);
-    if (search.limit_.is_reached()) return -1;
-    Index row = 0;
-    for (std::size_t c = 0; c < parts.size(); ++c, row += search.rows_) {
-      const Measured& measured = search.measured_[c];
-      residual.segment(row, search.rows_) = parts[c].cwiseProduct(measured.root_weight) / measured.sd;
-    }
-    if (!residual.allFinite()) residual.setConstant(1e100);
-    return 0;
-  }
-
-  int df(const Eigen::VectorXd& x, Eigen::MatrixXd& slopes) {
-    if (search.limit_.is_reached()) return -1;
-    const SearchPoint point = search.point_at(structure, x);
-    const auto parts = search.jacobians(structure, point);
-    if (search.limit_.is_reached()) return -1;
-    const Eigen::VectorXd chain = search.coordinate_slopes(structure, point);
-    Index row = 0;
-    for (std::size_t c = 0; c < parts.size(); ++c, row += search.rows_) {
-      const Measured& measured = search.measured_[c];
-      slopes.middleRows(row, search.rows_) =
-          (measured.root_weight / -measured.sd).asDiagonal() * parts[c] * chain.asDiagonal();
-    }
-    is_not_finite = !slopes.allFinite();
-    return is_not_finite ? -1 : 0;
-  }
-
-  Index values() const { return search.rows_ * static_cast<Index>(search.measured_.size()); }
-};
 
 OutputErrorSearch::OutputErrorSearch(const Recording& recording, const IdentificationOptions& options,
                                      SearchLimit::Clock clock)
@@ -133,6 +91,8 @@ std::vector<Channel> OutputErrorSearch::channels() const {
   for (const Measured& measured : measured_) result.push_back(measured.channel);
   return result;
 }
+
+double OutputErrorSearch::spread_of(std::size_t channel) const { return scale_of(measured_[channel].measured); }
 
 std::vector<Eigen::VectorXd> OutputErrorSearch::residuals(const SearchPoint& point) {
   std::vector<Eigen::VectorXd> result;
@@ -258,43 +218,50 @@ double OutputErrorSearch::absolute_cost(const SearchPoint& point) {
   return sum;
 }
 
-SearchEnd OutputErrorSearch::descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress) {
-  using Status = Eigen::LevenbergMarquardtSpace::Status;
-  Eigen::VectorXd x = coordinates(structure, point);
-  Descent descent{*this, structure};
-  Eigen::LevenbergMarquardt<Descent> solver(descent);
-  solver.parameters.ftol = 1e-10;
-  solver.parameters.xtol = 1e-11;
-  solver.parameters.maxfev = 20 * (iteration_limit + 1);
-  solver.useExternalScaling = true;  // the coordinates are of order 1, and their scale must not follow the valley
-  solver.diag.setOnes(x.size());
-  solver.parameters.factor = 1;
-  last_iterations_ = progress.iteration;
-  last_cost_ = std::numeric_limits<double>::infinity();
-  Status status = solver.minimizeInit(x);
-  if (status == Status::UserAsked) return limit_.end().value_or(SearchEnd::not_finite);
-  SearchEnd end = SearchEnd::converged;
-  for (int i = 0; status == Status::NotStarted || status == Status::Running; ++i) {
-    if (i >= iteration_limit) {
-      end = SearchEnd::iteration_limit;
-      break;
-    }
-    status = solver.minimizeOneStep(x);
-    if (status == Status::UserAsked && limit_.end()) break;
-    last_iterations_ = ++progress.iteration;
-    progress.sse = 0;
-    for (std::size_t c = 0; c < measured_.size(); ++c) {
-      const auto part = solver.fvec.segment(static_cast<Index>(c) * rows_, rows_);
-      progress.sse += measured_[c].sd * measured_[c].sd * part.squaredNorm();
-    }
-    limit_.report(progress);
-    if (limit_.is_reached()) break;
+bool OutputErrorSearch::weighed_residuals(const SearchPoint& point, Eigen::VectorXd& residual) {
+  const auto parts = residuals(point);
+  if (limit_.is_reached()) return false;
+  Index row = 0;
+  for (std::size_t c = 0; c < parts.size(); ++c, row += rows_) {
+    residual.segment(row, rows_) = parts[c].cwiseProduct(measured_[c].root_weight) / measured_[c].sd;
   }
-  if (descent.is_not_finite) end = SearchEnd::not_finite;
-  if (limit_.end()) end = *limit_.end();
-  if (x.allFinite()) point = point_at(structure, x);
-  last_cost_ = solver.fvec.squaredNorm();
-  return end;
+  return true;
+}
+
+bool OutputErrorSearch::weighed_slopes(Structure structure, const SearchPoint& point, Eigen::MatrixXd& slopes) {
+  const auto parts = jacobians(structure, point);
+  if (limit_.is_reached()) return false;
+  const Eigen::VectorXd chain = coordinate_slopes(structure, point);
+  Index row = 0;
+  for (std::size_t c = 0; c < parts.size(); ++c, row += rows_) {
+    const Measured& measured = measured_[c];
+    slopes.middleRows(row, rows_) = (measured.root_weight / -measured.sd).asDiagonal() * parts[c] * chain.asDiagonal();
+  }
+  return true;
+}
+
+SearchEnd OutputErrorSearch::descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress) {
+  SquaresToMinimise squares;
+  squares.values = rows_ * static_cast<Index>(measured_.size());
+  squares.residuals = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual) {
+    return weighed_residuals(point_at(structure, x), residual);
+  };
+  squares.slopes = [&](const Eigen::VectorXd& x, Eigen::MatrixXd& slopes) {
+    return weighed_slopes(structure, point_at(structure, x), slopes);
+  };
+  squares.sse = [&](const Eigen::VectorXd& residual) {
+    double sum = 0;
+    for (std::size_t c = 0; c < measured_.size(); ++c) {
+      const auto part = residual.segment(static_cast<Index>(c) * rows_, rows_);
+      sum += measured_[c].sd * measured_[c].sd * part.squaredNorm();
+    }
+    return sum;
+  };
+  const Descended found = control::descend(squares, coordinates(structure, point), iteration_limit, progress, limit_);
+  last_iterations_ = found.iterations;
+  last_cost_ = found.cost;
+  if (found.has_begun && found.x.allFinite()) point = point_at(structure, found.x);
+  return found.end;
 }
 
 SearchResult OutputErrorSearch::run(Structure structure, int parts) {

@@ -7,11 +7,10 @@
 //   (1) of position_weight.hpp
 //   q = ln kp, ln b1, ln b2, ln((α - 1)/(2 - α)), ln(β/(1 - β)), offset, ln(τ/(longest - τ))         (3)   unbounded
 //
-// Eigen's Levenberg-Marquardt (MINPACK's lmder) with the exact Jacobian. Every start's gain is the best for its other
-// parameters, which are the Newtonian model's for the first: so the units of the output do not matter.
-// The dead time's start is scanned for on a short piece of the record. The limits are asked for between all steps, and
-// inside those that are long; a start that was cut off before its first iteration does not count.
-// Errors: none thrown; how a search ended is in the result.
+// Each start descends (descent.hpp). Its gain is the best for its other parameters, which are the Newtonian model's for
+// the first: so the units of the output do not matter. The dead time's start is scanned for on a short piece of the
+// record. The limits are asked for between all steps, and inside those that are long; a start that was cut off before
+// its first iteration does not count. Errors: none thrown; how a search ended is in the result.
 #pragma once
 
 #include <Eigen/Core>
@@ -69,7 +68,14 @@ class OutputErrorSearch {
   SearchPoint start(Structure structure, int index) const;
   // The best gain, and offset if it is fitted; false, with a positive stand-in, if the best gain is not positive.
   bool fit_gain(SearchPoint& point);
+  // Of a position: the dead time that suits the other parameters best, of those that are tried on a short piece.
+  void fit_dead_time(SearchPoint& point);
   std::vector<int> free_parameters(Structure structure) const;
+  // The unbounded coordinates of the free parameters, and the derivative of each parameter with respect to its own.
+  Eigen::VectorXd coordinates(Structure structure, const SearchPoint& point) const;  // (3)
+  SearchPoint point_at(Structure structure, const Eigen::VectorXd& x) const;
+  Eigen::VectorXd coordinate_slopes(Structure structure, const SearchPoint& point) const;
+  double spread_of(std::size_t channel) const;  // the sd of all that was measured of it
   std::vector<Channel> channels() const;
   const SearchLimit& limit() const { return limit_; }
   long outputs_computed() const { return outputs_computed_; }  // of one channel each
@@ -93,7 +99,6 @@ class OutputErrorSearch {
     std::unique_ptr<SensorPath> path = nullptr;      // of an acceleration
     std::unique_ptr<PositionTimes> times = nullptr;  // of a position that has its own
   };
-  struct Descent;  // what Eigen's solver calls
 
   // The output, or a column of its slopes, as it is measured.
   Eigen::VectorXd seen(const Measured& measured, const SearchPoint& point, const Eigen::VectorXd& output) const;
@@ -106,16 +111,15 @@ class OutputErrorSearch {
   bool descend_again(SearchPoint& point);
   double sensor_sd(const SearchPoint& point);  // of a reading
   void run_starts(Structure structure, SearchResult& result);
-  void fit_dead_time(SearchPoint& point);
   void make_scan(const Recording& recording);
   SearchEnd descend(Structure structure, SearchPoint& point, int iteration_limit, Progress progress);
+  // What it minimises; false: the limit is reached.
+  bool weighed_residuals(const SearchPoint& point, Eigen::VectorXd& residual);
+  bool weighed_slopes(Structure structure, const SearchPoint& point, Eigen::MatrixXd& slopes);  // by (3)
   void refine_channel_weights(Structure structure, SearchResult& result);
   void refine_absolute_error(Structure structure, SearchResult& result);
-  double cost(const SearchPoint& point);                                             // (1)
-  double absolute_cost(const SearchPoint& point);                                    // (2)
-  Eigen::VectorXd coordinates(Structure structure, const SearchPoint& point) const;  // (3)
-  SearchPoint point_at(Structure structure, const Eigen::VectorXd& x) const;
-  Eigen::VectorXd coordinate_slopes(Structure structure, const SearchPoint& point) const;
+  double cost(const SearchPoint& point);           // (1)
+  double absolute_cost(const SearchPoint& point);  // (2)
 
   IdentificationOptions options_;
   double dt_s_;

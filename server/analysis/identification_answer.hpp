@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -29,5 +30,21 @@ std::optional<control::EstimatorModel> estimator_of(const control::Fit& fit);
 
 // Readable by the command-line tools as a model.
 OrderedJson answer_json(const RunRecording& recorded, const control::Identification& found, bool with_residuals);
+
+// One of several runs that are fitted together.
+struct RunOfMany {
+  storage::RunId run = 0;
+  RunRecording recorded;
+};
+
+// identify_together() on them, and the warnings of each run, in the run. Throws std::invalid_argument, which names the
+// run whose recording cannot be used.
+control::Identification identify_runs(std::span<const RunOfMany> runs, const control::IdentificationOptions& options);
+
+// As above, with `runs`: of each its channels, offset, sensor, quality, warnings, and residuals if they are asked for.
+OrderedJson answer_json(std::span<const RunOfMany> runs, const control::Identification& found, bool with_residuals);
+
+// In the order of the runs, each followed by its number.
+std::vector<std::string> warnings_of_runs(std::span<const RunOfMany> runs, const control::Identification& found);
 
 }  // namespace server::analysis

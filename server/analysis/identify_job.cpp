@@ -13,15 +13,18 @@ namespace asio = boost::asio;
 
 namespace {
 
-// What a run gives to a fit, or why it gives nothing.
-using Readable = Result<RunRecording>;
+// What was read of a run, and which piece of it is wanted.
+struct ReadRun {
+  RunPart part;
+  RunSamples samples;
+};
 
-Readable recording_in(const RunSamples& samples, storage::RunId run, const RunWindow& window, ChannelChoice channels) {
-  const storage::StoredReference* reference = samples.reference ? &*samples.reference : nullptr;
-  auto recording = recording_of(samples.samples, window, reference, channels);
-  if (recording) return recording;
+Result<RunOfMany> recording_in(const ReadRun& read, ChannelChoice channels) {
+  const auto& reference = read.samples.reference;
+  auto recording = recording_of(read.samples.samples, read.part.window, reference ? &*reference : nullptr, channels);
+  if (recording) return RunOfMany{read.part.run, std::move(*recording)};
   Error error = recording.error();
-  error.detail = fmt::format("run {}: {}", run, error.detail);
+  error.detail = fmt::format("run {}: {}", read.part.run, error.detail);
   return std::unexpected{std::move(error)};
 }
 
@@ -45,16 +48,39 @@ OrderedJson quality_json(const control::Fit& fit) {
           {"whiteness_p_value", fit.whiteness_p_value}};
 }
 
-OrderedJson validation_json(const RunRecording& recorded, const control::FractionalModel& model,
+OrderedJson validation_json(const RunOfMany& run, const control::FractionalModel& model,
                             const IdentifyRequest& request) {
-  OrderedJson answer = quality_json(control::evaluate(model, recorded.recording, request.search));
-  answer["run_id"] = *request.validation_run;
-  answer["channels"] = channels_of(recorded.recording);
+  OrderedJson answer = quality_json(control::evaluate(model, run.recorded.recording, request.search));
+  answer["run_id"] = run.run;
+  answer["channels"] = channels_of(run.recorded.recording);
   return answer;
 }
 
-// The numbers, and the model that is sent to robots now on the same recording.
-Result<std::string> compute(const RunRecording& recorded, const RunRecording* validation, IdentifyRequest request,
+// On one run as it always was; on several, one quality for each.
+OrderedJson in_use_json(std::span<const RunOfMany> runs, const ModelInUse& in_use, const IdentifyRequest& request) {
+  OrderedJson answer;
+  if (runs.size() == 1) {
+    answer = quality_json(control::evaluate(in_use.model, runs.front().recorded.recording, request.search));
+  } else {
+    answer["runs"] = OrderedJson::array();
+    for (const RunOfMany& run : runs) answer["runs"].push_back(validation_json(run, in_use.model, request));
+  }
+  answer["fluid"] = in_use.fluid;
+  answer["parameters"] = json_of(in_use.model);
+  return answer;
+}
+
+OrderedJson found_json(std::span<const RunOfMany> runs, control::Identification found, const IdentifyRequest& request) {
+  std::vector<std::string>& warnings = found.warnings;
+  warnings.insert(warnings.end(), request.warnings.begin(), request.warnings.end());
+  if (runs.size() > 1) return answer_json(runs, found, request.with_residuals);
+  OrderedJson answer = answer_json(runs.front().recorded, found, request.with_residuals);
+  answer["run_id"] = runs.front().run;
+  return answer;
+}
+
+// The numbers, and the model that is sent to robots now on the same recordings.
+Result<std::string> compute(std::span<const RunOfMany> runs, const RunOfMany* validation, IdentifyRequest request,
                             const std::optional<ModelInUse>& in_use, storage::JobRun& run) {
   control::IdentificationOptions& search = request.search;
   search.on_progress = [&run, &search](const control::Progress& progress) {
@@ -63,47 +89,53 @@ Result<std::string> compute(const RunRecording& recorded, const RunRecording* va
     return !run.is_cancelled();
   };
   run.report(0, "searching");
-  const control::Identification found = identify_run(recorded, search);
+  control::Identification found =
+      runs.size() == 1 ? identify_run(runs.front().recorded, search) : identify_runs(runs, search);
   if (run.is_cancelled()) return fail(ErrorCode::conflict, "cancelled");
   run.report(1, "trying the model on other data");
-  OrderedJson answer = answer_json(recorded, found, request.with_residuals);
-  answer["run_id"] = request.run;
   const bool has_model = std::isfinite(found.best.sse);
+  const control::FractionalModel model = found.best.model;
+  OrderedJson answer = found_json(runs, std::move(found), request);
   answer["validation"] =
-      validation != nullptr && has_model ? validation_json(*validation, found.best.model, request) : OrderedJson{};
-  answer["model_in_use"] = nullptr;
-  if (in_use) {
-    answer["model_in_use"] = quality_json(control::evaluate(in_use->model, recorded.recording, search));
-    answer["model_in_use"]["fluid"] = in_use->fluid;
-    answer["model_in_use"]["parameters"] = json_of(in_use->model);
-  }
+      validation != nullptr && has_model ? validation_json(*validation, model, request) : OrderedJson{};
+  answer["model_in_use"] = in_use ? in_use_json(runs, *in_use, request) : OrderedJson{};
   return answer.dump();
+}
+
+Result<std::string> work_on(const std::vector<ReadRun>& read, const std::optional<ReadRun>& others,
+                            const IdentifyRequest& request, const std::optional<ModelInUse>& in_use,
+                            storage::JobRun& run) {
+  std::vector<RunOfMany> runs;
+  for (const ReadRun& one : read) {
+    auto recording = recording_in(one, request.channels);
+    if (!recording) return std::unexpected{recording.error()};
+    runs.push_back(std::move(*recording));
+  }
+  Result<RunOfMany> validation = RunOfMany{};
+  if (others) validation = recording_in(*others, request.channels);
+  if (!validation) return std::unexpected{validation.error()};
+  return compute(runs, others ? &*validation : nullptr, request, in_use, run);
 }
 
 }  // namespace
 
 asio::awaitable<Result<std::string>> identify_job(AnalysisService& analysis, IdentifyRequest request,
                                                   std::optional<ModelInUse> in_use, storage::JobRun& run) {
-  run.report(0, fmt::format("reading run {}", request.run));
-  auto samples = co_await analysis.samples(request.run, control::kMostSamples);
-  if (!samples) co_return std::unexpected{samples.error()};
-  std::optional<RunSamples> others;
-  if (request.validation_run) {
-    auto read = co_await analysis.samples(*request.validation_run, control::kMostSamples);
-    if (!read) co_return std::unexpected{read.error()};
-    others = std::move(*read);
+  std::vector<ReadRun> read;
+  for (const RunPart& part : request.runs) {
+    run.report(0, fmt::format("reading run {}", part.run));
+    auto samples = co_await analysis.samples(part.run, control::kMostSamples);
+    if (!samples) co_return std::unexpected{samples.error()};
+    read.push_back({part, std::move(*samples)});
   }
-  auto work = [samples = std::move(*samples), others = std::move(others), request = std::move(request),
-               in_use = std::move(in_use), &run]() -> Result<std::string> {
-    const auto recorded = recording_in(samples, request.run, request.window, request.channels);
-    if (!recorded) return std::unexpected{recorded.error()};
-    Readable validation = RunRecording{};
-    if (others) {
-      validation = recording_in(*others, *request.validation_run, request.validation_window, request.channels);
-      if (!validation) return std::unexpected{validation.error()};
-    }
-    return compute(*recorded, others ? &*validation : nullptr, request, in_use, run);
-  };
+  std::optional<ReadRun> others;
+  if (request.validation) {
+    auto samples = co_await analysis.samples(request.validation->run, control::kMostSamples);
+    if (!samples) co_return std::unexpected{samples.error()};
+    others = ReadRun{*request.validation, std::move(*samples)};
+  }
+  auto work = [read = std::move(read), others = std::move(others), request = std::move(request),
+               in_use = std::move(in_use), &run] { return work_on(read, others, request, in_use, run); };
   co_return co_await run.compute(std::move(work));
 }
 

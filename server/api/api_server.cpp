@@ -80,18 +80,21 @@ void ApiServer::add_routes(boost::asio::io_context& loop, station::Station& stat
   add_run_routes(router_, {analysis, recording.digester, clock_, recording.disk_watch, live, recording.runs, station});
   add_run_metrics_routes(router_, {documents_});
   add_comparison_routes(router_, {documents_});
-  const analysis::ExportParts exports{recording.exports, recording.disk_watch, recording.job_files, recording.path()};
+  const analysis::ExportParts job_exports{recording.exports, recording.disk_watch, recording.job_files,
+                                          recording.path()};
   add_job_routes(
       router_,
-      {analysis, recording.designs, {documents_, exports}, recording.fluid_models, recording.jobs, recording.runs});
+      {analysis, recording.designs, {documents_, job_exports}, recording.fluid_models, recording.jobs, recording.runs});
+  const ExportRoutes exports{tasks_, recording.exports, recording.disk_watch, recording.path(),
+                             recording.exports_folder()};
+  add_capsule_routes(router_, {analysis, recording.designs, recording.digester, documents_, exports, recording.runs});
   add_design_routes(router_, {clock_, recording.designs, recording.jobs});
   add_push_routes(router_, {analysis, {clock_, history, station}, recording.designs});
   add_marker_routes(router_, {recording.markers, station});
   add_reference_routes(router_, {analysis, clock_, recording.references});
   add_sample_routes(router_, {history});
   add_overview_routes(router_, {history});
-  add_export_routes(router_,
-                    {tasks_, recording.exports, recording.disk_watch, recording.path(), recording.exports_folder()});
+  add_export_routes(router_, exports);
   add_account_routes(router_, {accounts_, auth_, logins_, clock_, station, facts_});
   add_experiment_routes(router_, {clock_, experiments, station});
   connect_controllers(experiments, {analysis, recording.designs, station});

@@ -92,6 +92,9 @@ CommandLine parse_command_line(int argc, char** argv) {
   offer<CompareQuestion>(app, "compare", "Traces of several runs on one time axis, and their differences", line);
   offer<ImpedanceMapQuestion>(app, "impedance-map", "Impedance against position, with detections and deliveries", line);
   offer<ReportQuestion>(app, "report", "Save a run, or several beside each other, as an HTML file with plots", line);
+  offer<CapsuleQuestion>(app, "capsule",
+                         "Save a run as an .eln archive with samples, metrics, configuration and report", line);
+  offer<Reproduce>(app, "reproduce", "Check the .eln archive of a run, and compute its metrics and plots again", line);
   offer<Model>(app, "model", "Show the motion models, compute the hydrodynamic one, fit the motor", line);
   offer<Bode>(app, "bode", "Crossover, margins and frequency response of the open loop", line);
   offer<Step>(app, "step", "Velocity and position after a step of duty, or any duty", line);

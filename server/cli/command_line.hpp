@@ -10,6 +10,7 @@
 #include "server/cli/accounts/robot.hpp"
 #include "server/cli/accounts/token.hpp"
 #include "server/cli/accounts/user.hpp"
+#include "server/cli/analysis/capsule.hpp"
 #include "server/cli/analysis/compare.hpp"
 #include "server/cli/analysis/impedance_map.hpp"
 #include "server/cli/analysis/metrics.hpp"
@@ -18,6 +19,7 @@
 #include "server/cli/data/certificate.hpp"
 #include "server/cli/data/export.hpp"
 #include "server/cli/data/reference.hpp"
+#include "server/cli/data/reproduce.hpp"
 #include "server/cli/data/restore.hpp"
 #include "server/cli/data/verify.hpp"
 #include "server/cli/design/bode.hpp"
@@ -48,11 +50,11 @@ struct Answered {
   int exit_code = 0;
 };
 
-using CommandLine =
-    std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model, Bode, Step,
-                 Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand, TokenCommand, RobotCommand,
-                 FluidCommand, JobCommand, DesignCommand, MetricsQuestion, CompareQuestion, ImpedanceMapQuestion,
-                 ReportQuestion, ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune>;
+using CommandLine = std::variant<Answered, Serve, CheckConfig, Certificate, Backup, Restore, Verify, Export, Model,
+                                 Bode, Step, Identify, EstimatorQuestion, Tune, Discretise, Predict, UserCommand,
+                                 TokenCommand, RobotCommand, FluidCommand, JobCommand, DesignCommand, MetricsQuestion,
+                                 CompareQuestion, ImpedanceMapQuestion, ReportQuestion, CapsuleQuestion, Reproduce,
+                                 ReferenceCommand, ProfileQuestion, ExperimentCommand, Autotune>;
 
 CommandLine parse_command_line(int argc, char** argv);
 

@@ -97,7 +97,7 @@ asio::awaitable<std::string> RunDocuments::sha256_of(storage::RunId run) {
   co_return digest && digest->is_final ? digest->digest.sha256 : std::string{};
 }
 
-asio::awaitable<Result<std::string>> RunDocuments::report(storage::RunId id) {
+asio::awaitable<Result<std::string>> RunDocuments::report(storage::RunId id, std::optional<std::int64_t> made_at_us) {
   auto found = co_await metrics(id);
   if (!found) co_return std::unexpected{found.error()};
   auto trace = co_await parts_.analysis.trace(id);
@@ -110,7 +110,7 @@ asio::awaitable<Result<std::string>> RunDocuments::report(storage::RunId id) {
   report.sha256 = co_await sha256_of(id);
   report.audit = co_await audit_of(report.run);
   report.program = RHEONAUT_VERSION;
-  report.made_at_us = parts_.clock.utc_us();
+  report.made_at_us = made_at_us.value_or(parts_.clock.utc_us());
   auto write = [report = std::move(report)] { return html_of(report); };
   co_return co_await parts_.analysis.compute(std::move(write));
 }

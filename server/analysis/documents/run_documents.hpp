@@ -8,6 +8,7 @@
 #include <boost/asio/awaitable.hpp>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,7 +54,8 @@ class RunDocuments {
   explicit RunDocuments(DocumentParts parts) : parts_{parts} {}
 
   boost::asio::awaitable<Result<MetricsOfRun>> metrics(storage::RunId run);
-  boost::asio::awaitable<Result<std::string>> report(storage::RunId run);  // HTML
+  // HTML, made at this UTC time; left out: now.
+  boost::asio::awaitable<Result<std::string>> report(storage::RunId run, std::optional<std::int64_t> made_at_us = {});
 
   using RunIds = std::vector<storage::RunId>;
 

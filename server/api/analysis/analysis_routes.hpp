@@ -1,5 +1,5 @@
 // The routes of what is computed from runs, grouped by noun: routes_jobs, routes_designs, routes_push,
-// routes_run_metrics, routes_comparisons.
+// routes_run_metrics, routes_comparisons, routes_capsule.
 //
 // As in server/api/routes/routes.hpp: all of what they work with outlives the router.
 #pragma once
@@ -44,5 +44,15 @@ struct DocumentRoutes {
 };
 void add_run_metrics_routes(http::Router& router, DocumentRoutes parts);
 void add_comparison_routes(http::Router& router, DocumentRoutes parts);
+
+struct CapsuleRoutes {
+  analysis::AnalysisService& analysis;
+  storage::Designs& designs;
+  storage::RunDigester& digester;
+  analysis::RunDocuments& documents;
+  ExportRoutes exports;
+  storage::Runs& runs;
+};
+void add_capsule_routes(http::Router& router, CapsuleRoutes parts);
 
 }  // namespace server::api

@@ -23,6 +23,18 @@ Result<storage::DesignId> design_id_from(const std::string& text) {
   return fail(ErrorCode::not_found, fmt::format("there is no design '{}'", text), "no_such_design");
 }
 
+// The runs that a job of kind identify was asked to fit, each once.
+std::vector<storage::DesignSource> sources_of(const json& asked) {
+  const json one = json::array({asked});
+  std::vector<storage::DesignSource> sources;
+  for (const json& part : asked.contains("runs") ? asked.at("runs") : one) {
+    storage::DesignSource source{part.value("run_id", storage::RunId{0}), {}};
+    if (part.contains("span")) source.span = part.at("span").get<std::uint32_t>();
+    if (std::ranges::find(sources, source) == sources.end()) sources.push_back(source);
+  }
+  return sources;
+}
+
 // The result of a job that identified a run is a model, found from that run with these options; that of one that tuned
 // is a controller, designed for its model.
 boost::asio::awaitable<Result<void>> take_result(DesignRoutes parts, storage::JobId id,
@@ -41,11 +53,7 @@ boost::asio::awaitable<Result<void>> take_result(DesignRoutes parts, storage::Jo
   request.document = *result;
   request.options = job->request.document;
   const json asked = json::parse(job->request.document, nullptr, false);
-  if (asked.contains("run_id")) {
-    storage::DesignSource source{asked.at("run_id").get<storage::RunId>(), {}};
-    if (asked.contains("span")) source.span = asked.at("span").get<std::uint32_t>();
-    request.sources = {source};
-  }
+  if (job->request.kind == "identify") request.sources = sources_of(asked);
   const bool is_controller = request.kind == storage::DesignKind::controller;
   if (is_controller && !request.model && asked.contains("model_id")) {
     request.model = asked.at("model_id").get<storage::DesignId>();

@@ -34,15 +34,37 @@ std::optional<control::FractionalModel> plant_of(const station::FluidModel& mode
   return plant ? std::optional{*plant} : std::nullopt;
 }
 
-// Of the fluid of a run: the model that robots in it are sent.
-boost::asio::awaitable<std::optional<analysis::ModelInUse>> model_in_use(JobRoutes parts, storage::RunId id) {
-  const auto run = co_await parts.runs.find(id);
-  if (!run) co_return std::nullopt;
-  const std::string& fluid = run->conditions.fluid;
+// Of a fluid: the model that robots in it are sent.
+std::optional<analysis::ModelInUse> model_in_use(JobRoutes parts, const std::string& fluid) {
   const station::FluidModel* model = parts.fluid_models.in_force().find(fluid);
   const auto plant = model == nullptr ? std::nullopt : plant_of(*model);
-  if (!plant) co_return std::nullopt;
-  co_return analysis::ModelInUse{fluid, *plant};
+  if (!plant) return std::nullopt;
+  return analysis::ModelInUse{fluid, *plant};
+}
+
+// The fluid of each run of the request, where it is known; an error if a run is not there.
+boost::asio::awaitable<Result<std::vector<std::string>>> fluids_of(JobRoutes parts,
+                                                                   std::vector<analysis::RunPart> runs) {
+  std::vector<std::string> fluids;
+  for (const analysis::RunPart& part : runs) {
+    const auto run = co_await parts.runs.find(part.run);
+    if (!run) co_return std::unexpected{run.error()};
+    fluids.push_back(run->conditions.fluid);
+  }
+  co_return fluids;
+}
+
+// One model is of one fluid; a run without one may be in any.
+std::vector<std::string> fluid_doubts(const std::vector<analysis::RunPart>& runs,
+                                      const std::vector<std::string>& fluids) {
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < fluids.size(); ++i) {
+    if (fluids[first].empty()) first = i;
+    if (fluids[i].empty() || fluids[i] == fluids[first]) continue;
+    return {fmt::format("run {} is in the fluid '{}', run {} in '{}': one model can hardly be right for both",
+                        runs[first].run, fluids[first], runs[i].run, fluids[i])};
+  }
+  return {};
 }
 
 // A plant to tune for, and where it is from.
@@ -89,9 +111,10 @@ std::vector<analysis::FluidPlant> plants_of_fluids(const station::FluidModelList
 using Work = Result<storage::JobWork>;
 
 boost::asio::awaitable<Work> work_of(JobRoutes parts, analysis::IdentifyRequest identify) {
-  const auto run = co_await parts.runs.find(identify.run);
-  if (!run) co_return std::unexpected{run.error()};
-  auto in_use = co_await model_in_use(parts, identify.run);
+  const auto fluids = co_await fluids_of(parts, identify.runs);
+  if (!fluids) co_return std::unexpected{fluids.error()};
+  identify.warnings = fluid_doubts(identify.runs, *fluids);
+  auto in_use = model_in_use(parts, fluids->front());
   auto work = [&analysis = parts.analysis, identify = std::move(identify), in_use](storage::JobRun& job) {
     return analysis::identify_job(analysis, identify, in_use, job);
   };

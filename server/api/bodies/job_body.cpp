@@ -47,6 +47,7 @@ Result<void> read_number(const Members& body, const char* name, Range<double> al
 struct WindowNames {
   const char *span, *from_s, *to_s;
 };
+constexpr WindowNames kWindow{"span", "from_s", "to_s"};  // of IdentifyJobBody and of its runs[], with one range each
 
 Result<void> read_window(const Members& body, const WindowNames& names, analysis::RunWindow& window) {
   if (body.has(names.span)) {
@@ -95,32 +96,81 @@ Result<void> read_validation(const Members& body, analysis::IdentifyRequest& req
   if (body.has("validation_run_id")) {
     const auto run = body.integer("validation_run_id", integers("IdentifyJobBody.validation_run_id"));
     if (!run) return std::unexpected{run.error()};
-    request.validation_run = *run;
+    request.validation = analysis::RunPart{*run, {}};
   }
   constexpr WindowNames kNames{"validation_span", "validation_from_s", "validation_to_s"};
   for (const char* name : {kNames.span, kNames.from_s, kNames.to_s}) {
-    if (!body.has(name) || request.validation_run) continue;
+    if (!body.has(name) || request.validation) continue;
     return fail(ErrorCode::invalid, fmt::format("{} needs validation_run_id", name), "out_of_range");
   }
-  return read_window(body, kNames, request.validation_window);
+  return request.validation ? read_window(body, kNames, request.validation->window) : Result<void>{};
+}
+
+Result<analysis::RunPart> read_part(const Members& body, Range<std::int64_t> ids) {
+  const auto run = body.integer("run_id", ids);
+  if (!run) return std::unexpected{run.error()};
+  analysis::RunPart part{*run, {}};
+  if (const auto read = read_window(body, kWindow, part.window); !read) return std::unexpected{read.error()};
+  return part;
+}
+
+Result<analysis::RunPart> read_element(const json& given, std::size_t index) {
+  if (!given.is_object()) {
+    return fail(ErrorCode::bad_request, fmt::format("runs[{}] is not an object", index), "wrong_type");
+  }
+  const Members element{given};
+  Result<analysis::RunPart> part = analysis::RunPart{};
+  if (const auto known = element.only({"run_id", "span", "from_s", "to_s"}); !known) {
+    part = std::unexpected{known.error()};
+  } else {
+    part = read_part(element, integers("IdentifyJobBody.runs[].run_id"));
+  }
+  if (part) return part;
+  Error error = part.error();
+  error.detail = fmt::format("runs[{}]: {}", index, error.detail);
+  return std::unexpected{std::move(error)};
+}
+
+// Either run_id with its window, or runs, each with its own.
+Result<void> read_runs(const Members& body, std::vector<analysis::RunPart>& runs) {
+  if (!body.has("runs")) {
+    auto part = read_part(body, integers("IdentifyJobBody.run_id"));
+    if (!part) return std::unexpected{part.error()};
+    runs.push_back(*part);
+    return {};
+  }
+  for (const char* name : {"run_id", kWindow.span, kWindow.from_s, kWindow.to_s}) {
+    if (body.has(name)) {
+      return fail(ErrorCode::bad_request, fmt::format("{} stands beside runs; give it in the elements of runs", name),
+                  "unknown_member");
+    }
+  }
+  const json& given = body.object().at("runs");
+  constexpr Range<std::size_t> kAllowed = list_size("IdentifyJobBody.runs");
+  if (!given.is_array() || given.size() < kAllowed.minimum || given.size() > kAllowed.maximum) {
+    return fail(ErrorCode::bad_request,
+                fmt::format("runs must be a list of {} to {} objects", kAllowed.minimum, kAllowed.maximum),
+                "wrong_type");
+  }
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    const auto part = read_element(given[i], i);
+    if (!part) return std::unexpected{part.error()};
+    runs.push_back(*part);
+  }
+  return {};
 }
 
 Result<analysis::IdentifyRequest> identify_request(const Members& body) {
   using analysis::ChannelChoice;
   if (const auto known =
-          body.only({"kind", "run_id", "span", "from_s", "to_s", "channels", "structure", "cost", "fits_offset",
+          body.only({"kind", "run_id", "runs", "span", "from_s", "to_s", "channels", "structure", "cost", "fits_offset",
                      "dead_time_s", "sensor_lag_s", "time_limit_s", "with_velocity", "residuals", "validation_run_id",
                      "validation_span", "validation_from_s", "validation_to_s"});
       !known) {
     return std::unexpected{known.error()};
   }
   analysis::IdentifyRequest request;
-  const auto run = body.integer("run_id", integers("IdentifyJobBody.run_id"));
-  if (!run) return std::unexpected{run.error()};
-  request.run = *run;
-  if (const auto read = read_window(body, {"span", "from_s", "to_s"}, request.window); !read) {
-    return std::unexpected{read.error()};
-  }
+  if (const auto read = read_runs(body, request.runs); !read) return std::unexpected{read.error()};
   constexpr std::array kChannels{ChannelChoice::best, ChannelChoice::outside, ChannelChoice::robot};
   if (const auto read = read_word(body, "channels", kChannels, request.channels); !read) {
     return std::unexpected{read.error()};
@@ -128,10 +178,11 @@ Result<analysis::IdentifyRequest> identify_request(const Members& body) {
   const auto with_velocity = body.flag("with_velocity"), residuals = body.flag("residuals");
   if (!with_velocity) return std::unexpected{with_velocity.error()};
   if (!residuals) return std::unexpected{residuals.error()};
-  request.window.with_velocity = request.validation_window.with_velocity = *with_velocity;
   request.with_residuals = *residuals;
   if (const auto read = read_search(body, request.search); !read) return std::unexpected{read.error()};
   if (const auto read = read_validation(body, request); !read) return std::unexpected{read.error()};
+  for (analysis::RunPart& part : request.runs) part.window.with_velocity = *with_velocity;
+  if (request.validation) request.validation->window.with_velocity = *with_velocity;
   return request;
 }
 

@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "server/analysis/comparison/aligned_runs.hpp"
+#include "server/analysis/identify_job.hpp"
 #include "server/analysis/reference_import.hpp"
 #include "server/analysis/tuning/tune_job.hpp"
 #include "server/api/bodies/json.hpp"
@@ -109,6 +110,8 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"ExportJobBody.run_id", {1, kMaxJavaScriptInteger}},
     {"GetParametersBody.first_index", {0, 255}},
     {"IdentifyJobBody.run_id", {1, kMaxJavaScriptInteger}},
+    {"IdentifyJobBody.runs[].run_id", {1, kMaxJavaScriptInteger}},
+    {"IdentifyJobBody.runs[].span", {0, 1'000'000}},
     {"IdentifyJobBody.span", {0, 1'000'000}},
     {"IdentifyJobBody.validation_run_id", {1, kMaxJavaScriptInteger}},
     {"IdentifyJobBody.validation_span", {0, 1'000'000}},
@@ -116,6 +119,7 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"LifeMs", {1, protocol::kMaxTimeToLiveUs / 1000}},
     {"MarkerBody.at_us", {0, kMaxTimeUs - 1}},
     {"PushControllerBody.design_id", {1, kMaxJavaScriptInteger}},
+    {"PushControllerBody.life_ms", {1, protocol::kMaxTimeToLiveUs / 1000}},
     {"ReferenceBody.span", {0, 1'000'000}},
     {"ReferenceClock.marker_id", {1, kMaxJavaScriptInteger}},
     {"ReferenceClock.zero_at_us", {0, kMaxJavaScriptInteger}},
@@ -148,6 +152,8 @@ inline constexpr Limit<double> kNumberLimits[] = {
     {"FluidModelBody.model_time_constant_s[]", {station::kMinModelTimeConstant_s, station::kMaxModelTimeConstant_s}},
     {"IdentifyJobBody.dead_time_s", {0, 1000}},
     {"IdentifyJobBody.from_s", {0, 1e6}},
+    {"IdentifyJobBody.runs[].from_s", {0, 1e6}},
+    {"IdentifyJobBody.runs[].to_s", {0, 1e6}},
     {"IdentifyJobBody.sensor_lag_s", {0, 1000}},
     {"IdentifyJobBody.time_limit_s", {0.1, 600}},
     {"IdentifyJobBody.to_s", {0, 1e6}},
@@ -189,6 +195,7 @@ inline constexpr Limit<std::size_t> kListLimits[] = {
     {"DesignBody.runs", {0, 100}},
     {"FluidModelBody.model_gain_m_s", {station::kFluidModelSections, station::kFluidModelSections}},
     {"FluidModelBody.model_time_constant_s", {station::kFluidModelSections, station::kFluidModelSections}},
+    {"IdentifyJobBody.runs", {1, control::kMostRecordings}},
     {"ReportJobBody.runs", {1, analysis::kMostAlignedRuns}},
     {"SetDutyScheduleBody.schedule", {1, std::size(rheonaut_SetDutySchedule{}.duty)}},
 };

@@ -8,6 +8,8 @@
 #include <fstream>
 #include <system_error>
 
+#include "server/storage/upkeep/disk_watch.hpp"
+
 namespace server::api {
 namespace asio = boost::asio;
 
@@ -22,6 +24,14 @@ std::string read_piece(const std::filesystem::path& path, std::uint64_t offset) 
   file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
   piece.resize(static_cast<std::size_t>(file.gcount()));
   return piece;
+}
+
+// Makes the empty file, if there is room for what comes into it.
+Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folder, const char* ending,
+                                              std::uint64_t samples) {
+  auto file = std::make_unique<ExportFile>(folder, ending);
+  if (const auto room = storage::room_for_export(folder, samples); !room) return std::unexpected{room.error()};
+  return file;
 }
 
 }  // namespace
@@ -43,6 +53,19 @@ ExportFile::ExportFile(const std::filesystem::path& folder, const std::string& e
 ExportFile::~ExportFile() {
   std::error_code ignored;
   std::filesystem::remove(path_, ignored);
+}
+
+asio::awaitable<Result<ExportFilePtr>> begin_export_file(ExportRoutes parts, std::vector<storage::RecordedSpan> spans,
+                                                         std::uint64_t rows_per_sample, const char* ending) {
+  if (auto may = parts.disk_watch.may_begin("an export to a file"); !may) {
+    co_return std::unexpected{may.error()};
+  }
+  auto job = [folder = parts.folder, ending, spans = std::move(spans), rows_per_sample](SQLite::Database& database) {
+    return make_file(folder, ending, most_samples(database, spans) * rows_per_sample);
+  };
+  auto file = co_await parts.history.reader().ask(std::move(job));
+  if (!file) co_return std::unexpected{file.error()};
+  co_return ExportFilePtr{file->release(), EndOnWorker{parts.tasks, parts.history.reader()}};
 }
 
 asio::awaitable<Result<std::optional<std::string>>> FileStream::next() {

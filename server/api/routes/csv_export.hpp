@@ -8,10 +8,12 @@
 #include <memory>
 #include <string>
 
+#include "server/api/routes/routes.hpp"
 #include "server/http/http.hpp"
 #include "server/runtime/tasks.hpp"
 #include "server/storage/export/csv_writer.hpp"
 #include "server/storage/query/history.hpp"
+#include "server/storage/upkeep/export_space.hpp"
 
 namespace server::api {
 
@@ -60,6 +62,25 @@ class ExportFile {
 };
 
 using ExportFilePtr = std::unique_ptr<ExportFile, EndOnWorker>;
+
+// An empty file for what is made of these samples, so many rows of each; low_space: there is no room for it.
+boost::asio::awaitable<Result<ExportFilePtr>> begin_export_file(ExportRoutes parts,
+                                                                std::vector<storage::RecordedSpan> spans,
+                                                                std::uint64_t rows_per_sample, const char* ending);
+
+// To its end, or until there is no room: nobody knows before how long the gaps of a grid are.
+template <class Writer>
+boost::asio::awaitable<Result<void>> write_in_slices(ExportRoutes parts, Writer& writer) {
+  for (Result<bool> more = true; *more;) {
+    auto slice = [&writer, folder = parts.folder](SQLite::Database& database) -> Result<bool> {
+      if (const auto room = storage::room_for_more(folder); !room) return std::unexpected{room.error()};
+      return writer.advance(database);
+    };
+    more = co_await parts.history.reader().ask(std::move(slice));
+    if (!more) co_return std::unexpected{more.error()};
+  }
+  co_return Result<void>{};
+}
 
 class FileStream final : public http::BodyStream {
  public:

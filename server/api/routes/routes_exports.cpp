@@ -1,8 +1,6 @@
 // A run to take away: as CSV, as a MAT file, as a SQLite file.
 #include <fmt/format.h>
 
-#include <filesystem>
-
 #include "server/api/bodies/query_params.hpp"
 #include "server/api/routes/csv_export.hpp"
 #include "server/api/routes/routes.hpp"
@@ -10,8 +8,6 @@
 #include "server/storage/export/run_file.hpp"
 #include "server/storage/query/history.hpp"
 #include "server/storage/query/run_reader.hpp"
-#include "server/storage/upkeep/disk_watch.hpp"
-#include "server/storage/upkeep/export_space.hpp"
 
 namespace server::api {
 namespace asio = boost::asio;
@@ -62,47 +58,17 @@ http::Answer export_csv(ExportRoutes parts, http::Request request) {
                        std::make_unique<CsvStream>(parts.history, std::move(parsed->spans), parsed->query));
 }
 
-// Makes the empty file, if there is room for what comes into it.
-Result<std::unique_ptr<ExportFile>> make_file(const std::filesystem::path& folder, const char* ending,
-                                              std::uint64_t samples) {
-  auto file = std::make_unique<ExportFile>(folder, ending);
-  if (const auto room = storage::room_for_export(folder, samples); !room) return std::unexpected{room.error()};
-  return file;
+// Of each sample.
+std::uint64_t most_rows(const ParsedExport& parsed) {
+  return 1 + kUsualPeriodUs / static_cast<std::uint64_t>(parsed.query.grid_us.value_or(kMaxGridUs));
 }
 
 EndOnWorker end_on_worker(ExportRoutes parts) { return {parts.tasks, parts.history.reader()}; }
 
-asio::awaitable<Result<ExportFilePtr>> begin_file(ExportRoutes parts, const ParsedExport& parsed, const char* ending) {
-  if (auto may = parts.disk_watch.may_begin("an export to a file"); !may) {
-    co_return std::unexpected{may.error()};
-  }
-  const auto grid_us = static_cast<std::uint64_t>(parsed.query.grid_us.value_or(kMaxGridUs));
-  auto job = [folder = parts.folder, ending, spans = parsed.spans, grid_us](SQLite::Database& database) {
-    return make_file(folder, ending, most_samples(database, spans) * (1 + kUsualPeriodUs / grid_us));
-  };
-  auto file = co_await parts.history.reader().ask(std::move(job));
-  if (!file) co_return std::unexpected{file.error()};
-  co_return ExportFilePtr{file->release(), end_on_worker(parts)};
-}
-
-// To its end, or until there is no room: nobody knows before how long the gaps of a grid are.
-template <class Writer>
-asio::awaitable<Result<void>> write_in_slices(ExportRoutes parts, Writer& writer) {
-  for (Result<bool> more = true; *more;) {
-    auto slice = [&writer, folder = parts.folder](SQLite::Database& database) -> Result<bool> {
-      if (const auto room = storage::room_for_more(folder); !room) return std::unexpected{room.error()};
-      return writer.advance(database);
-    };
-    more = co_await parts.history.reader().ask(std::move(slice));
-    if (!more) co_return std::unexpected{more.error()};
-  }
-  co_return Result<void>{};
-}
-
 http::Answer export_mat(ExportRoutes parts, http::Request request) {
   auto parsed = co_await parse_export(parts, std::move(request));
   if (!parsed) co_return http::problem(parsed.error());
-  auto file = co_await begin_file(parts, *parsed, ".mat");
+  auto file = co_await begin_export_file(parts, parsed->spans, most_rows(*parsed), ".mat");
   if (!file) co_return http::problem(file.error());
   const std::unique_ptr<storage::MatWriter, EndOnWorker> writer{
       new storage::MatWriter{(*file)->path(), std::move(parsed->spans), parsed->query}, end_on_worker(parts)};
@@ -115,7 +81,7 @@ http::Answer export_mat(ExportRoutes parts, http::Request request) {
 http::Answer export_sqlite(ExportRoutes parts, http::Request request) {
   auto parsed = co_await parse_export(parts, std::move(request));
   if (!parsed) co_return http::problem(parsed.error());
-  auto file = co_await begin_file(parts, *parsed, ".sqlite");
+  auto file = co_await begin_export_file(parts, parsed->spans, most_rows(*parsed), ".sqlite");
   if (!file) co_return http::problem(file.error());
   co_await parts.history.settle();  // events and commands that were received
   const std::unique_ptr<storage::RunFile, EndOnWorker> writer{

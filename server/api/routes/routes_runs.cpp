@@ -5,6 +5,7 @@
 #include "server/analysis/metrics/metrics_json.hpp"
 #include "server/api/bodies/json.hpp"
 #include "server/api/bodies/query_params.hpp"
+#include "server/api/bodies/run_json.hpp"
 #include "server/api/routes/routes.hpp"
 #include "server/identity/auth.hpp"
 #include "server/live/live_feed.hpp"
@@ -129,33 +130,12 @@ http::Answer discard_run(RunRoutes parts, http::Request request) {
   co_return http::json_response(200, api::to_json(*run));
 }
 
-json to_json(const storage::CurrentDigest& found, storage::RunId run) {
-  const storage::RunDigest& digest = found.digest;
-  json out;
-  out["run_id"] = run;
-  out["final"] = found.is_final;
-  out["format"] = digest.format;
-  out["samples_expected"] = digest.samples_expected;
-  out["samples_live"] = digest.samples_live;
-  out["samples_backfilled"] = digest.samples_backfilled;
-  out["samples_lost"] = digest.samples_lost;
-  out["samples_missing"] = digest.samples_missing();
-  out["lost_by_cause"] = digest.lost_by_cause;
-  out["longest_gap_samples"] = digest.longest_gap_samples;
-  out["longest_gap_us"] = digest.longest_gap_us;
-  out["worst_clock_uncertainty_us"] = digest.worst_clock_uncertainty_us;
-  out["samples_without_clock"] = digest.samples_without_clock;
-  out["sha256"] = found.is_final ? json(digest.sha256) : json(nullptr);
-  out["made_at_us"] = digest.made_at_us;
-  return out;
-}
-
 http::Answer get_digest(RunRoutes parts, http::Request request) {
   const auto id = run_id_of(request);
   if (!id) co_return http::problem(id.error());
   const auto digest = co_await parts.digester.find(*id);
   if (!digest) co_return http::problem(digest.error());
-  co_return http::json_response(200, to_json(*digest, *id));
+  co_return http::json_response(200, api::to_json(*digest, *id));
 }
 
 http::Answer get_snapshot(RunRoutes parts, http::Request request) {
@@ -163,20 +143,7 @@ http::Answer get_snapshot(RunRoutes parts, http::Request request) {
   if (!id) co_return http::problem(id.error());
   const auto snapshot = co_await parts.runs.snapshot(*id);
   if (!snapshot) co_return http::problem(snapshot.error());
-  json in_force = json::array();
-  for (const storage::InForce& document : snapshot->in_force) {
-    in_force.push_back({{"kind", document.kind},
-                        {"span", document.span},
-                        {"first_seq", document.first_seq},
-                        {"content", json::parse(document.content, nullptr, false)}});
-  }
-  json out;
-  out["firmware_version"] = snapshot->firmware_version;
-  out["controller_id"] = snapshot->controller_id;
-  out["controller_checksum"] = snapshot->controller_checksum;
-  out["parameters_checksum"] = snapshot->parameters_checksum;
-  out["in_force"] = std::move(in_force);
-  co_return http::json_response(200, out);
+  co_return http::json_response(200, api::to_json(*snapshot));
 }
 
 http::Answer get_step_metrics(RunRoutes parts, http::Request request) {

@@ -48,7 +48,7 @@ std::string token_of(const std::filesystem::path& file) {
 
 using Request = http::request<http::string_body>;
 
-constexpr std::uint64_t kMaxAnswerBytes = 64'000'000;
+constexpr std::uint64_t kMaxAnswerBytes = 2'000'000'000;  // of an archive of hours
 
 StationAnswer answer_of(http::response<http::string_body> response) {
   StationAnswer answer;

@@ -10,7 +10,10 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <span>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/analysis/identification_answer.hpp"
@@ -31,19 +34,26 @@ void add_source(CLI::App& command, Identify& options) {
   auto* csv = command.add_option("--csv", options.csv,
                                  "Recording with columns t_s (equally spaced), duty, and position_m or velocity_m_s");
   csv->check(named());
-  add_options(command, options.run);
-  auto* run = command.get_option("--run");
-  run->excludes(csv);
-  command.add_option("--span", options.window.span, "Which span of the run, if the robot rebooted during it")
+  auto* run = command.add_option("--run", options.runs,
+                                 "A recorded run by its number; may be given several times, for one model of all");
+  run->check(whole(1, std::numeric_limits<storage::RunId>::max()))->excludes(csv);
+  command.add_option("--data", options.data_dir, "Folder of the station that recorded it (default: rheonaut-data)")
+      ->check(named())
+      ->needs(run);
+  command
+      .add_option(
+          "--span", options.spans,
+          "Which span of the run, if the robot rebooted during it; like the two below for all runs, or once for "
+          "each --run in their order")
       ->check(whole(0, std::numeric_limits<std::uint32_t>::max()))
       ->needs(run);
-  command.add_option("--from-s", options.window.from_s, "First second of the span to use")->check(finite())->needs(run);
-  command.add_option("--to-s", options.window.to_s, "Last second of the span to use")->check(finite())->needs(run);
+  command.add_option("--from-s", options.from_s, "First second of the span to use")->check(finite())->needs(run);
+  command.add_option("--to-s", options.to_s, "Last second of the span to use")->check(finite())->needs(run);
   add_word(command, "--channels", options.channels,
            std::array{analysis::ChannelChoice::best, analysis::ChannelChoice::outside, analysis::ChannelChoice::robot},
            "best, outside or robot: whether a position from outside is fitted (default: best, where the run has one)")
       ->needs(run);
-  command.add_flag("--with-velocity", options.window.with_velocity,
+  command.add_flag("--with-velocity", options.with_velocity,
                    "Also fit the velocity that the robot recorded, where its position is known");
 }
 
@@ -90,16 +100,48 @@ void add_plan(CLI::App& command, Identify& options) {
       ->check(non_negative());
 }
 
-analysis::RunRecording recording_for(const Identify& options) {
-  if (options.csv) return read_recording(*options.csv, options.window.with_velocity);
-  if (!options.run.run) {
+// Of a flag that was given for all runs, or for each.
+template <class Value>
+std::optional<Value> value_for(const std::vector<Value>& given, std::size_t run) {
+  if (given.empty()) return std::nullopt;
+  return given.size() == 1 ? given.front() : given[run];
+}
+
+void check_counts(const Identify& options) {
+  if (options.runs.size() > control::kMostRecordings) {
+    throw std::runtime_error{fmt::format("identify fits at most {} runs together", control::kMostRecordings)};
+  }
+  const auto check = [&](const char* flag, std::size_t given) {
+    if (given <= 1 || given == options.runs.size()) return;
+    throw std::runtime_error{fmt::format("{} is given {} times, --run {} times: give it once, or once for each run",
+                                         flag, given, options.runs.size())};
+  };
+  check("--span", options.spans.size());
+  check("--from-s", options.from_s.size());
+  check("--to-s", options.to_s.size());
+}
+
+analysis::RunOfMany run_for(const Identify& options, std::size_t index) {
+  const RunChoice choice{options.runs[index], options.data_dir};
+  analysis::RunWindow window{value_for(options.spans, index), value_for(options.from_s, index).value_or(0),
+                             value_for(options.to_s, index).value_or(std::numeric_limits<double>::infinity()),
+                             options.with_velocity};
+  const std::vector<storage::StoredSample> samples = read_samples(choice);
+  const std::optional<storage::StoredReference> reference = read_reference(choice);
+  auto recording = recording_of(samples, window, reference ? &*reference : nullptr, options.channels);
+  if (!recording) throw std::runtime_error{fmt::format("run {}: {}", *choice.run, recording.error().detail)};
+  return {*choice.run, std::move(*recording)};
+}
+
+std::vector<analysis::RunOfMany> recordings_for(const Identify& options) {
+  if (options.csv) return {{0, read_recording(*options.csv, options.with_velocity)}};
+  if (options.runs.empty()) {
     throw std::runtime_error{"identify needs a recording: give --csv FILE or --run ID (or --plan for a forecast)"};
   }
-  const std::vector<storage::StoredSample> samples = read_samples(options.run);
-  const std::optional<storage::StoredReference> reference = read_reference(options.run);
-  auto recording = recording_of(samples, options.window, reference ? &*reference : nullptr, options.channels);
-  if (!recording) throw std::runtime_error{fmt::format("run {}: {}", *options.run.run, recording.error().detail)};
-  return std::move(*recording);
+  check_counts(options);
+  std::vector<analysis::RunOfMany> runs;
+  for (std::size_t i = 0; i < options.runs.size(); ++i) runs.push_back(run_for(options, i));
+  return runs;
 }
 
 bool show_progress(const control::Progress& progress) {
@@ -109,11 +151,12 @@ bool show_progress(const control::Progress& progress) {
   return true;
 }
 
-control::Identification search(const Identify& options, const analysis::RunRecording& recorded) {
+control::Identification search(const Identify& options, std::span<const analysis::RunOfMany> runs) {
   control::IdentificationOptions settings = options.search;
   const bool is_watched = ::isatty(STDERR_FILENO) != 0;
   if (is_watched) settings.on_progress = show_progress;
-  control::Identification found = analysis::identify_run(recorded, settings);
+  control::Identification found = runs.size() == 1 ? analysis::identify_run(runs.front().recorded, settings)
+                                                   : analysis::identify_runs(runs, settings);
   if (is_watched) fmt::print(stderr, "\r\x1b[K");
   return found;
 }
@@ -129,7 +172,7 @@ void write_sensor(std::ostream& out, const control::SensorFit& sensor) {
                                            : "the robot's own bias is still in the record, and fitted as a bias");
 }
 
-void write_parameters(std::ostream& out, const Fit& fit) {
+void write_parameters(std::ostream& out, const Fit& fit, bool is_of_one_run) {
   Table table{{text(fit.structure), "value", "one sigma"}};
   const auto values = values_of(fit.model);
   for (std::size_t i = 0; i < kParameters; ++i) {
@@ -137,8 +180,9 @@ void write_parameters(std::ostream& out, const Fit& fit) {
     table.row({kParameterNames[i], cell(values[i], 8), cell(fit.one_sigma[i], 3)});
   }
   table.write(out);
-  fmt::print(out, "fit {} %, residual sd {}, sse {}; offset {} m, dead time {} s\n", fixed(fit.fit_percent, 3),
-             cell(fit.residual_sd, 4), cell(fit.sse), cell(fit.offset_m, 4), cell(fit.model.dead_time_s, 4));
+  const std::string offset = is_of_one_run ? fmt::format("offset {} m, ", cell(fit.offset_m, 4)) : std::string{};
+  fmt::print(out, "fit {} %, residual sd {}, sse {}; {}dead time {} s\n", fixed(fit.fit_percent, 3),
+             cell(fit.residual_sd, 4), cell(fit.sse), offset, cell(fit.model.dead_time_s, 4));
   fmt::print(out, "residuals {} white (p = {}); {} after {} iterations; {} of {} starts agree\n",
              fit.residuals_are_white ? "look" : "are not", cell(fit.whiteness_p_value, 3), text(fit.end),
              fit.iterations, fit.starts_that_agree, fit.starts);
@@ -173,6 +217,39 @@ void write_estimator(std::ostream& out, const control::EstimatorModel& model) {
   }
 }
 
+// What belongs to one of several runs.
+void write_run(std::ostream& out, const analysis::RunOfMany& of, const Fit& fit) {
+  fmt::print(out, "run {}: {}; {}\n", of.run, fmt::join(analysis::channels_of(of.recorded.recording), ", "),
+             of.recorded.channels_reason);
+  fmt::print(out, "fit {} %, residual sd {}; offset {} m\n", fixed(fit.fit_percent, 3), cell(fit.residual_sd, 4),
+             cell(fit.offset_m, 4));
+  if (fit.sensor) write_sensor(out, *fit.sensor);
+}
+
+void write_text(std::ostream& out, std::span<const analysis::RunOfMany> runs, const control::Identification& found) {
+  const analysis::RunRecording& first = runs.front().recorded;
+  if (runs.size() == 1) {
+    fmt::print(out, "fitted: {}; {}\n\n", fmt::join(analysis::channels_of(first.recording), ", "),
+               first.channels_reason);
+  } else {
+    for (std::size_t i = 0; i < runs.size(); ++i) write_run(out, runs[i], found.runs[i].fit);
+    out << '\n';
+  }
+  write_parameters(out, found.best, runs.size() == 1);
+  const auto chi_square = runs.size() == 1 ? analysis::chi_square_of(first, found.best) : std::nullopt;
+  if (chi_square) {
+    fmt::print(out, "chi-square of the position from outside: {} with {} degrees of freedom\n",
+               fixed(chi_square->value, 1), chi_square->degrees_of_freedom);
+  }
+  if (const auto estimator = analysis::estimator_of(found.best)) write_estimator(out, *estimator);
+  write_compared(out, found.compared);
+  for (const std::string& warning : found.warnings) fmt::print(out, "\nwarning: {}\n", warning);
+  if (runs.size() == 1) return;
+  for (const std::string& warning : analysis::warnings_of_runs(runs, found)) {
+    fmt::print(out, "\nwarning: {}\n", warning);
+  }
+}
+
 }  // namespace
 
 void add_options(CLI::App& command, Identify& options) {
@@ -195,22 +272,16 @@ void add_options(CLI::App& command, Identify& options) {
 
 int run(const Identify& options, std::ostream& out) {
   if (options.plan.is_wanted) return run_plan(options, out);
-  const analysis::RunRecording recorded = recording_for(options);
-  for (const std::string& warning : recorded.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
-  const control::Identification found = search(options, recorded);
+  const std::vector<analysis::RunOfMany> runs = recordings_for(options);
+  for (const analysis::RunOfMany& one : runs) {
+    for (const std::string& warning : one.recorded.warnings) fmt::print(stderr, "rheonaut: warning: {}\n", warning);
+  }
+  const control::Identification found = search(options, runs);
   if (options.form.is_json) {
-    write_json(out, analysis::answer_json(recorded, found, options.with_residuals));
+    write_json(out, runs.size() == 1 ? analysis::answer_json(runs.front().recorded, found, options.with_residuals)
+                                     : analysis::answer_json(runs, found, options.with_residuals));
   } else {
-    fmt::print(out, "fitted: {}; {}\n\n", fmt::join(analysis::channels_of(recorded.recording), ", "),
-               recorded.channels_reason);
-    write_parameters(out, found.best);
-    if (const auto chi_square = analysis::chi_square_of(recorded, found.best)) {
-      fmt::print(out, "chi-square of the position from outside: {} with {} degrees of freedom\n",
-                 fixed(chi_square->value, 1), chi_square->degrees_of_freedom);
-    }
-    if (const auto estimator = analysis::estimator_of(found.best)) write_estimator(out, *estimator);
-    write_compared(out, found.compared);
-    for (const std::string& warning : found.warnings) fmt::print(out, "\nwarning: {}\n", warning);
+    write_text(out, runs, found);
   }
   if (!std::isfinite(found.best.sse)) {
     fmt::print(stderr,

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "control/identification/identify.hpp"
 #include "server/cli/design/control_files.hpp"
@@ -32,8 +34,12 @@ struct Plan {
 
 struct Identify {
   std::optional<std::string> csv;
-  RunChoice run;
-  analysis::RunWindow window;
+  std::vector<std::int64_t> runs;  // of several one model is found
+  std::filesystem::path data_dir = "rheonaut-data";
+  // Each once, for all runs, or once for each run in their order.
+  std::vector<std::uint32_t> spans;
+  std::vector<double> from_s, to_s;
+  bool with_velocity = false;
   analysis::ChannelChoice channels = analysis::ChannelChoice::best;
   control::IdentificationOptions search;
   bool with_residuals = false;

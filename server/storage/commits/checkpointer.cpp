@@ -43,8 +43,8 @@ CheckpointOutcome checkpoint(SQLite::Database& database, CheckpointMode mode) {
   if (mode == CheckpointMode::passive) {
     result = sqlite3_wal_checkpoint_v2(handle, nullptr, SQLITE_CHECKPOINT_PASSIVE, &log_frames, &moved_frames);
   } else {
-    // One RESTART waits for the place of an old reader even after a new reader, which is in nobody's way, has taken that
-    // place. So a try is short, and the next one looks at the places anew.
+    // One RESTART waits for the place of an old reader even after a new reader, which is in nobody's way, has taken
+    // that place. So a try is short, and the next one looks at the places anew.
     const int usual_ms = database.execAndGet("PRAGMA busy_timeout").getInt();
     database.setBusyTimeout(kRestartTryMs);
     for (int i = 0; i < kRestartTries; ++i) {

@@ -20,14 +20,18 @@ namespace {
 
 // The view gives the samples of a run in order of span and seq, without sorting. That of schema version 1, which a
 // station has not opened since, knows no time of the first receipt: the same as the last one's then.
-std::string run_query(std::int64_t version) {
+std::string select_samples(std::int64_t version) {
   std::string sql =
       fmt::format("SELECT span, boot_id, seq, robot_time_us, utc_us, clock_uncertainty_us, {}, received_at_us",
                   version == 1 ? "received_at_us" : "first_received_at_us");
   const auto add = [&](const auto& field) { (sql += ", ") += column_or_null(field, version); };
   station::for_each_sample_field(add);
   station::for_each_batch_field(add);
-  return sql + " FROM run_sample WHERE run_id = ? LIMIT ?";
+  return sql;
+}
+
+std::string run_query(std::int64_t version) {
+  return select_samples(version) + " FROM run_sample WHERE run_id = ? LIMIT ?";
 }
 
 std::uint64_t id_from(const std::string& text) {  // decimal text: it may exceed int64
@@ -147,6 +151,16 @@ Result<void> read_store(const std::filesystem::path& path, const ReadStore& read
   } catch (const SQLite::Exception& error) {
     return fail(ErrorCode::unavailable, fmt::format("cannot read {}: SQLite says '{}'", path.string(), error.what()));
   }
+}
+
+Result<std::vector<StoredSample>> read_exported_run(SQLite::Database& file, std::size_t limit) {
+  const auto newest = static_cast<std::int64_t>(migrations().size());
+  std::vector<StoredSample> samples;
+  SQLite::Statement rows{file, select_samples(newest) + " FROM sample ORDER BY span, seq LIMIT ?"};
+  bind_all(rows, static_cast<std::int64_t>(limit + 1));
+  while (rows.executeStep()) samples.push_back(sample_from(rows));
+  if (samples.size() <= limit) return samples;
+  return fail(ErrorCode::invalid, fmt::format("the run has more than {} samples", limit), "run_too_long");
 }
 
 Result<std::vector<StoredSample>> read_run(const std::filesystem::path& path, RunId run, std::size_t limit) {

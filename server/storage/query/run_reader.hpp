@@ -23,6 +23,10 @@ namespace server::storage {
 // more than limit samples.
 Result<std::vector<StoredSample>> read_run(const std::filesystem::path& database, RunId run, std::size_t limit);
 
+// The same of a run's own file of SQLite (export/run_file), whose table `sample` is in this order. invalid: more than
+// limit samples, or a table that lacks columns.
+Result<std::vector<StoredSample>> read_exported_run(SQLite::Database& file, std::size_t limit);
+
 // Reads something else in the same way. `read` gets the handle and the database as a URI for ATTACH; it begins again
 // from nothing when a station has opened the database meanwhile. Its failure is returned.
 using ReadStore = std::function<Result<void>(SQLite::Database& database, const std::string& uri)>;

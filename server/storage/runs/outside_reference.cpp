@@ -126,6 +126,21 @@ std::optional<StoredReference> read_reference(SQLite::Database& database, RunId 
   return StoredReference{std::move(*found), std::move(positions)};
 }
 
+std::optional<StoredReference> read_exported_reference(SQLite::Database& file) {
+  if (!file.tableExists("outside_reference")) return std::nullopt;
+  SQLite::Statement query{file, fmt::format("SELECT {} FROM outside_reference", kReferenceColumns)};
+  if (!query.executeStep()) return std::nullopt;
+  StoredReference stored{reference_from(query), {}};
+  SQLite::Statement rows{
+      file, "SELECT robot_time_us, position_m, position_sd_m FROM outside_position ORDER BY robot_time_us"};
+  while (rows.executeStep()) {
+    stored.positions.robot_time_us.push_back(unsigned_id(rows.getColumn(0)));
+    stored.positions.position_m.push_back(rows.getColumn(1).getDouble());
+    stored.positions.position_sd_m.push_back(rows.getColumn(2).getDouble());
+  }
+  return stored;
+}
+
 Error changed_while_read(RunId run) {
   return {ErrorCode::conflict,
           fmt::format("the reference of run {} was replaced or removed while it was read; ask again", run),

@@ -68,6 +68,8 @@ OutsidePositions read_positions(SQLite::Database& database, std::int64_t referen
 std::optional<StoredReference> read_reference(SQLite::Database& database, RunId run,
                                               std::optional<std::uint64_t> after_us = {},
                                               std::size_t limit = std::numeric_limits<std::int64_t>::max());
+// The one of a run's own file of SQLite (export/run_file), if it has one.
+std::optional<StoredReference> read_exported_reference(SQLite::Database& file);
 // Of one whose positions were read in pieces, and are fewer than it has.
 Error changed_while_read(RunId run);
 

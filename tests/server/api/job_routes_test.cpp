@@ -11,15 +11,17 @@
 namespace server {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class JobRoutesTest : public ApiTest {
  protected:
   JobRoutesTest() { connect_robot(); }
 
-  // A run of a robot whose position is known, under duties of 1 s each.
-  void record(const std::vector<double>& duties, const std::string& fluid = "") {
+  // A run of a robot whose position is known, under duties of 1 s each; it begins at `from_m`.
+  void record(const std::vector<double>& duties, const std::string& fluid = "", double from_m = 0) {
     json body{{"robot_id", "r1"}, {"name", "duties"}};
     if (!fluid.empty()) body["fluid"] = fluid;
     const Answered made = ask("POST", "/api/v1/runs", body);
@@ -27,19 +29,19 @@ class JobRoutesTest : public ApiTest {
     control::ModalPlant plant{control::kNonNewtonianModel, 0.01};
     for (const double duty : duties) {
       for (int frames = 0; frames < 4; ++frames) {
-        send(plant, duty);
+        send(plant, duty, from_m);
         clock.run_for(250ms);
       }
     }
     ASSERT_EQ(ask("POST", fmt::format("/api/v1/runs/{}/end", made.parsed()["run_id"].get<int>())).status, 200);
   }
-  void send(control::ModalPlant& plant, double duty) {
+  void send(control::ModalPlant& plant, double duty, double from_m) {
     constexpr pb_size_t kSamples = 25;
     auto frame = TestRobot::samples_frame(next_seq_, kSamples, 1'000'000 + next_seq_ * 10'000, 0);
     next_seq_ += kSamples;
     protocol::Telemetry& telemetry = frame.body.telemetry;
     for (pb_size_t i = 0; i < kSamples; ++i) {
-      telemetry.position_m[i] = static_cast<float>(plant.position_m());
+      telemetry.position_m[i] = static_cast<float>(from_m + plant.position_m());
       telemetry.velocity_m_s[i] = static_cast<float>(plant.velocity_m_s());
       telemetry.duty[i] = static_cast<float>(duty);
       plant.step(duty);
@@ -82,6 +84,66 @@ TEST_F(JobRoutesTest, IdentifiesARunAndTriesTheModelOnAnother) {
   const json listed = ask("GET", "/api/v1/jobs").parsed()["jobs"];
   ASSERT_EQ(listed.size(), 1U);
   EXPECT_FALSE(listed[0].contains("result"));
+}
+
+TEST_F(JobRoutesTest, IdentifiesSeveralRunsTogetherAndADesignNamesThem) {
+  const json plant{{"kp", 0.2}, {"b1", 0.0}, {"b2", 0.5}, {"alpha", 2}, {"beta", 1}};
+  const json model{{"model_gain_m_s", {0.1, 0, 0, 0}},
+                   {"model_time_constant_s", {0.1, 1, 1, 1}},
+                   {"fit_error", 0.001},
+                   {"plant", plant}};
+  ASSERT_EQ(ask("POST", "/api/v1/fluids/non_newtonian/model", model).status, 200);
+  record({0.3, -0.5, 0.6}, "non_newtonian", 0.25);
+  record({-0.4, 0.2, 0.5, -0.6}, "", -0.5);
+  record({0.5, -0.3});
+  const json body{{"kind", "identify"},        {"runs", {{{"run_id", 1}}, {{"run_id", 2}, {"to_s", 2.5}}}},
+                  {"structure", "fractional"}, {"time_limit_s", 600},
+                  {"residuals", true},         {"validation_run_id", 3}};
+  ASSERT_EQ(ask("POST", "/api/v1/jobs", body).status, 202);
+  const json job = ended(1);
+  ASSERT_EQ(job["state"], "done") << job;
+  const json& result = job["result"];
+  EXPECT_NEAR(result["parameters"]["kp"], control::kNonNewtonianModel.kp / control::kNonNewtonianModel.b3, 1e-3);
+  EXPECT_FALSE(result.contains("run_id"));
+  ASSERT_EQ(result["runs"].size(), 2U);
+  EXPECT_EQ(result["runs"][0]["run_id"], 1);
+  EXPECT_NEAR(result["runs"][0]["offset_m"].get<double>(), 0.25, 1e-3);
+  EXPECT_NEAR(result["runs"][1]["offset_m"].get<double>(), -0.5, 1e-3);
+  EXPECT_EQ(result["runs"][0]["residuals"]["position_m"].size(), 300U);
+  EXPECT_EQ(result["runs"][1]["residuals"]["position_m"].size(), 251U);
+  EXPECT_THAT(result["runs"][1]["channels"], ElementsAre("position_m"));
+  EXPECT_GT(result["validation"]["fit_percent"].get<double>(), 99.9);
+  EXPECT_EQ(result["model_in_use"]["fluid"], "non_newtonian");
+  EXPECT_EQ(result["model_in_use"]["runs"][1]["run_id"], 2);
+  EXPECT_LT(result["model_in_use"]["runs"][1]["fit_percent"].get<double>(), 90);
+
+  const Answered kept = ask("POST", "/api/v1/designs", {{"kind", "model"}, {"name", "of two"}, {"job_id", 1}});
+  ASSERT_EQ(kept.status, 201) << kept.body;
+  ASSERT_EQ(kept.parsed()["runs"].size(), 2U);
+  EXPECT_EQ(kept.parsed()["runs"][0]["run_id"], 1);
+  EXPECT_EQ(kept.parsed()["runs"][1]["run_id"], 2);
+  EXPECT_EQ(ask("GET", "/api/v1/designs?run_id=2").parsed()["designs"].size(), 1U);
+}
+
+TEST_F(JobRoutesTest, SaysThatRunsOfAJobAreInDifferentFluids) {
+  record({0.3, -0.5, 0.6}, "");
+  record({0.3, -0.5, 0.6}, "water");
+  record({0.3, -0.5, 0.6}, "non_newtonian");
+  json body{{"kind", "identify"}, {"runs", {{{"run_id", 1}}, {{"run_id", 2}}}}, {"structure", "first_order"}};
+  ASSERT_EQ(ask("POST", "/api/v1/jobs", body).status, 202);
+  EXPECT_THAT(ended(1)["result"]["warnings"].dump(), Not(HasSubstr("in the fluid")));
+  body["runs"].push_back({{"run_id", 3}});
+  ASSERT_EQ(ask("POST", "/api/v1/jobs", body).status, 202);
+  EXPECT_THAT(ended(2)["result"]["warnings"].dump(), HasSubstr("run 2 is in the fluid 'water', run 3 in"));
+}
+
+TEST_F(JobRoutesTest, ARunOfSeveralThatCannotBeUsedIsNamed) {
+  record({0.3, -0.5});
+  record({0.0, 0.0});
+  const json runs{{{"run_id", 1}}, {{"run_id", 2}}}, more{{{"run_id", 1}}, {{"run_id", 9}}};
+  ASSERT_EQ(ask("POST", "/api/v1/jobs", {{"kind", "identify"}, {"runs", runs}}).status, 202);
+  EXPECT_THAT(ended(1)["error"].get<std::string>(), AllOf(HasSubstr("run 2: "), HasSubstr("duty is 0 throughout")));
+  EXPECT_EQ(ask("POST", "/api/v1/jobs", {{"kind", "identify"}, {"runs", more}}).status, 404);
 }
 
 TEST_F(JobRoutesTest, ComparesWithTheModelThatRobotsInTheFluidAreSent) {
@@ -153,6 +215,7 @@ TEST(ParseJob, SaysWhichMemberIsWrong) {
       {{{"residuals", "yes"}}, "residuals must be true or false"},
       {{{"fits_offset", 1}}, "fits_offset must be true or false"},
       {{{"validation_from_s", 1}}, "validation_from_s needs validation_run_id"},
+      {{{"runs", {{{"run_id", 1}}}}}, "run_id stands beside runs"},
   };
   for (const Case& wrong : cases) {
     json body{{"kind", "identify"}, {"run_id", 1}};
@@ -165,11 +228,40 @@ TEST(ParseJob, SaysWhichMemberIsWrong) {
   const auto parsed = api::parse_job(R"({"kind":"identify","run_id":7,"to_s":3,"sensor_lag_s":0.01,"span":2})");
   ASSERT_TRUE(parsed) << parsed.error().detail;
   const auto& request = std::get<analysis::IdentifyRequest>(parsed->request);
-  EXPECT_EQ(request.run, 7);
-  EXPECT_EQ(request.window.to_s, 3);
-  EXPECT_EQ(request.window.span, 2U);
+  ASSERT_EQ(request.runs.size(), 1U);
+  EXPECT_EQ(request.runs[0].run, 7);
+  EXPECT_EQ(request.runs[0].window.to_s, 3);
+  EXPECT_EQ(request.runs[0].window.span, 2U);
   EXPECT_EQ(request.search.sensor_lag_s, 0.01);
   EXPECT_FALSE(request.search.structure);
+}
+
+TEST(ParseJob, SaysWhatIsWrongWithSeveralRuns) {
+  struct Case {
+    const char* runs;
+    const char* words;
+  };
+  const Case cases[] = {
+      {"[]", "runs must be a list of 1 to 8 objects"},
+      {R"({"run_id":1})", "runs must be a list of 1 to 8 objects"},
+      {"[1]", "runs[0] is not an object"},
+      {R"([{"run_id":1},{}])", "runs[1]: run_id is missing"},
+      {R"([{"run_id":1,"channels":"best"}])", "runs[0]: \"channels\" is not known here"},
+      {R"([{"run_id":1,"from_s":3,"to_s":2}])", "runs[0]: from_s is 3, it must be below to_s, which is 2"},
+      {R"([{"run_id":1,"span":-1}])", "runs[0]: span = -1 is outside"},
+  };
+  for (const Case& wrong : cases) {
+    const auto parsed = api::parse_job(fmt::format(R"({{"kind":"identify","runs":{}}})", wrong.runs));
+    ASSERT_FALSE(parsed) << wrong.runs;
+    EXPECT_THAT(parsed.error().detail, HasSubstr(wrong.words));
+  }
+  const auto parsed = api::parse_job(
+      R"({"kind":"identify","with_velocity":true,"runs":[{"run_id":7,"to_s":3},{"run_id":7,"from_s":5,"span":1}]})");
+  ASSERT_TRUE(parsed) << parsed.error().detail;
+  ASSERT_EQ(std::get<analysis::IdentifyRequest>(parsed->request).runs.size(), 2U);
+  EXPECT_EQ(std::get<analysis::IdentifyRequest>(parsed->request).runs[1].window.from_s, 5);
+  EXPECT_EQ(std::get<analysis::IdentifyRequest>(parsed->request).runs[1].window.span, 1U);
+  EXPECT_TRUE(std::get<analysis::IdentifyRequest>(parsed->request).runs[0].window.with_velocity);
 }
 
 }  // namespace

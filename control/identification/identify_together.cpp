@@ -1,0 +1,103 @@
+// Fits one model to several recordings: the same steps as for one, over all of them.
+#include <algorithm>
+#include <iterator>
+#include <map>
+#include <utility>
+
+#include "base/invalid_argument.hpp"
+#include "control/identification/amplitude_doubt.hpp"
+#include "control/identification/identifiability.hpp"
+#include "control/identification/identify.hpp"
+#include "control/identification/joint_fit.hpp"
+#include "control/identification/recording_checks.hpp"
+#include "control/identification/residual_doubts.hpp"
+#include "control/identification/second_opinions.hpp"
+#include "control/identification/structure_choice.hpp"
+
+namespace control {
+namespace {
+
+void append(std::vector<std::string>& warnings, std::vector<std::string> more) {
+  std::ranges::move(more, std::back_inserter(warnings));
+}
+
+void check_together(std::span<const Recording> recordings, const IdentificationOptions& options) {
+  if (recordings.empty() || recordings.size() > kMostRecordings) {
+    base::throw_invalid("identification: ", recordings.size(), " recordings: give 1 to ", kMostRecordings);
+  }
+  std::size_t samples = 0;
+  bool has_acceleration = false;
+  for (const Recording& recording : recordings) {
+    samples += recording.duty.size();
+    has_acceleration = has_acceleration || !recording.acceleration_m_s2.empty();
+  }
+  if (samples > kMostSamples) {
+    base::throw_invalid("identification: the recordings have ", samples, " samples together, more than ", kMostSamples);
+  }
+  for (const Recording& recording : recordings) {
+    IdentificationOptions of_run = options;
+    if (has_acceleration && recording.acceleration_m_s2.empty()) of_run.sensor_lag_s.reset();
+    check_recording(recording);
+    check_options(of_run, recording);
+  }
+}
+
+// What concerns one run only.
+std::vector<std::string> doubts_of(JointSearch& search, std::size_t i, const Recording& recording,
+                                   const IdentificationOptions& options, const Fit& fit,
+                                   const std::optional<AmplitudeEvidence>& amplitude) {
+  std::vector<std::string> warnings;
+  append(warnings, sensor_doubts(search.of_run(i)));
+  append(warnings, lag_doubts(recording, options, fit));
+  append(warnings, second_opinions(search.of_run(i), recording, options, fit));
+  const bool order_is_forced = options.structure && *options.structure != Structure::fractional;
+  append(warnings, amplitude_doubts(amplitude, recording, order_is_forced));
+  append(warnings, residual_doubts(recording, options, fit));
+  return warnings;
+}
+
+void add_runs(JointSearch& search, std::span<const Recording> recordings, const IdentificationOptions& options,
+              const JointResult& found, JointFit fit, Identification& result) {
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    JointRun run{std::move(fit.runs[i]), {}};
+    const auto amplitude = amplitude_evidence(search.of_run(i), recordings[i], run.fit, found.points[i]);
+    if (amplitude && (!result.amplitude || amplitude->f > result.amplitude->f)) result.amplitude = amplitude;
+    run.warnings = doubts_of(search, i, recordings[i], options, run.fit, amplitude);
+    result.runs.push_back(std::move(run));
+  }
+}
+
+}  // namespace
+
+Identification identify_together(std::span<const Recording> recordings, const IdentificationOptions& options) {
+  if (recordings.size() == 1) return identify(recordings.front(), options);
+  check_together(recordings, options);
+  JointSearch search(recordings, options);
+  std::vector<Structure> structures{Structure::first_order, Structure::second_order, Structure::fractional};
+  if (options.structure) structures = {*options.structure};
+
+  int left = static_cast<int>(structures.size());
+  search.find_sensors(left);
+  Identification result;
+  std::map<Structure, JointResult> found;
+  std::map<Structure, JointFit> fits;
+  for (const Structure structure : structures) {
+    found[structure] = search.run(structure, left--);
+    fits[structure] = joint_summary(search, recordings, options.cost, structure, found[structure]);
+    result.compared.push_back(fits[structure].all);
+  }
+  put_best_first(result.compared);
+  result.best = result.compared.front();
+  const Structure best = result.best.structure;
+  add_runs(search, recordings, options, found[best], std::move(fits[best]), result);
+  std::vector<std::string>& warnings = result.warnings;
+  append(warnings, search_doubts(result.best, options));
+  append(warnings, untried_structures(result.compared));
+  append(warnings, disagreement_doubts(search, best, found[best]));
+  const std::size_t longest = search.longest();
+  append(warnings, identifiability_warnings(recordings[longest], result.runs[longest].fit, options, recordings.size()));
+  add_verdict(result.compared, recordings.size(), warnings);
+  return result;
+}
+
+}  // namespace control

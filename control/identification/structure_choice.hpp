@@ -1,0 +1,24 @@
+// Which of the structures that were fitted is the best, and what the others say.
+//
+// Errors: none thrown.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "control/search/fit.hpp"
+
+namespace control {
+
+// The least AIC among those searched, first. The AIC of an unfinished one is an upper bound: so it may win, but where
+// it does not it is not ranked, and stands after the finished ones.
+void put_best_first(std::vector<Fit>& fits);
+
+// Of fits in that order: those that were not tried, or not to the end.
+std::vector<std::string> untried_structures(const std::vector<Fit>& fits);
+
+// That fractional orders are not called for by so many runs; only finished searches can say so.
+void add_verdict(const std::vector<Fit>& fits, std::size_t runs, std::vector<std::string>& warnings);
+
+}  // namespace control

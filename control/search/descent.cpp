@@ -1,0 +1,79 @@
+// Eigen's solver, stopped by the limit and by numbers that are not finite.
+#include "control/search/descent.hpp"
+
+#include <cmath>
+#include <limits>
+#include <unsupported/Eigen/NonLinearOptimization>
+#include <utility>
+
+namespace control {
+namespace {
+
+using Eigen::Index;
+
+// What the solver calls; negative: it stops.
+struct Functor {
+  using Scalar = double;
+  const SquaresToMinimise& squares;
+  SearchLimit& limit;
+  bool is_not_finite = false;
+
+  int operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual) const {
+    if (limit.is_reached()) return -1;
+    residual.setConstant(1e100);  // refused by the solver
+    if (!x.allFinite() || std::abs(x[0]) > 700) return 0;
+    if (!squares.residuals(x, residual)) return -1;
+    if (!residual.allFinite()) residual.setConstant(1e100);
+    return 0;
+  }
+
+  int df(const Eigen::VectorXd& x, Eigen::MatrixXd& slopes) {
+    if (limit.is_reached()) return -1;
+    if (!squares.slopes(x, slopes)) return -1;
+    is_not_finite = !slopes.allFinite();
+    return is_not_finite ? -1 : 0;
+  }
+
+  Index values() const { return squares.values; }
+};
+
+}  // namespace
+
+Descended descend(const SquaresToMinimise& squares, Eigen::VectorXd x, int iteration_limit, Progress progress,
+                  SearchLimit& limit) {
+  using Status = Eigen::LevenbergMarquardtSpace::Status;
+  Functor functor{squares, limit};
+  Eigen::LevenbergMarquardt<Functor> solver(functor);
+  solver.parameters.ftol = 1e-10;
+  solver.parameters.xtol = 1e-11;
+  solver.parameters.maxfev = 20 * (iteration_limit + 1);
+  solver.useExternalScaling = true;  // the coordinates are of order 1, and their scale must not follow the valley
+  solver.diag.setOnes(x.size());
+  solver.parameters.factor = 1;
+  Descended found{false, x, SearchEnd::converged, progress.iteration, std::numeric_limits<double>::infinity()};
+  Status status = solver.minimizeInit(x);
+  if (status == Status::UserAsked) {
+    found.end = limit.end().value_or(SearchEnd::not_finite);
+    return found;
+  }
+  found.has_begun = true;
+  for (int i = 0; status == Status::NotStarted || status == Status::Running; ++i) {
+    if (i >= iteration_limit) {
+      found.end = SearchEnd::iteration_limit;
+      break;
+    }
+    status = solver.minimizeOneStep(x);
+    if (status == Status::UserAsked && limit.end()) break;
+    found.iterations = ++progress.iteration;
+    progress.sse = squares.sse(solver.fvec);
+    limit.report(progress);
+    if (limit.is_reached()) break;
+  }
+  if (functor.is_not_finite) found.end = SearchEnd::not_finite;
+  if (limit.end()) found.end = *limit.end();
+  found.x = std::move(x);
+  found.cost = solver.fvec.squaredNorm();
+  return found;
+}
+
+}  // namespace control

@@ -1,0 +1,34 @@
+// One descent to the least sum of squares, by Eigen's Levenberg-Marquardt (MINPACK's lmder) with the exact Jacobian.
+//
+// The limit is asked between all steps. Errors: none thrown; how the descent ended is in the result.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+
+#include "control/search/fit.hpp"
+#include "control/search/search_limit.hpp"
+
+namespace control {
+
+// Shapes: residual has `values` elements, slopes are values × parameters. Both are of the right size already, and
+// return false when the search is to stop.
+struct SquaresToMinimise {
+  Eigen::Index values = 0;
+  std::function<bool(const Eigen::VectorXd& x, Eigen::VectorXd& residual)> residuals;
+  std::function<bool(const Eigen::VectorXd& x, Eigen::MatrixXd& slopes)> slopes;
+  std::function<double(const Eigen::VectorXd& residual)> sse;  // for the progress, in units of the channels
+};
+
+struct Descended {
+  bool has_begun = false;  // else x is where it was to begin
+  Eigen::VectorXd x;
+  SearchEnd end = SearchEnd::converged;
+  int iterations = 0;  // with those of the progress it began with
+  double cost = 0;     // the sum of squares; infinite if it has not begun
+};
+
+Descended descend(const SquaresToMinimise& squares, Eigen::VectorXd x, int iteration_limit, Progress progress,
+                  SearchLimit& limit);
+
+}  // namespace control

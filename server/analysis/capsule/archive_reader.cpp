@@ -1,0 +1,95 @@
+// minizip's unzip, which checks the CRC of each entry.
+#include "server/analysis/capsule/archive_reader.hpp"
+
+#include <fmt/format.h>
+#include <unzip.h>
+
+#include <algorithm>
+#include <fstream>
+#include <stdexcept>
+
+#include "server/analysis/capsule/archive_writer.hpp"
+
+namespace server::analysis {
+namespace {
+
+constexpr std::size_t kArchivePieceBytes = 256 * 1024;
+constexpr std::size_t kLongestName = 1000;
+constexpr int kCaseSensitive = 1;
+
+std::unexpected<Error> damaged(const std::string& name) {
+  return server::fail(ErrorCode::invalid, fmt::format("{} is damaged", name), "damaged");
+}
+
+}  // namespace
+
+ArchiveReader::ArchiveReader(std::filesystem::path path) : path_{std::move(path)}, zip_{unzOpen64(path_.c_str())} {
+  if (zip_ == nullptr) throw std::runtime_error{fmt::format("{} is no zip archive, or damaged", path_.string())};
+}
+
+ArchiveReader::~ArchiveReader() { unzClose(zip_); }
+
+std::vector<std::string> ArchiveReader::names() {
+  std::vector<std::string> all;
+  for (int found = unzGoToFirstFile(zip_); found == UNZ_OK; found = unzGoToNextFile(zip_)) {
+    std::string name(kLongestName, '\0');
+    unz_file_info64 about{};
+    if (unzGetCurrentFileInfo64(zip_, &about, name.data(), name.size(), nullptr, 0, nullptr, 0) != UNZ_OK) break;
+    name.resize(std::min<std::size_t>(about.size_filename, name.size()));
+    all.push_back(std::move(name));
+  }
+  return all;
+}
+
+Result<std::string> ArchiveReader::read(const std::string& name,
+                                        const std::function<void(const std::string& piece)>& take) {
+  if (unzLocateFile(zip_, name.c_str(), kCaseSensitive) != UNZ_OK) {
+    return server::fail(ErrorCode::invalid, fmt::format("{} is not in the archive", name), "missing");
+  }
+  if (unzOpenCurrentFile(zip_) != UNZ_OK) return damaged(name);
+  PieceHash hash;
+  std::string piece(kArchivePieceBytes, '\0');
+  int got = 0;
+  while ((got = unzReadCurrentFile(zip_, piece.data(), static_cast<unsigned>(piece.size()))) > 0) {
+    const std::string part = piece.substr(0, static_cast<std::size_t>(got));
+    hash.add(part.data(), part.size());
+    take(part);
+  }
+  const int closed = unzCloseCurrentFile(zip_);
+  if (got < 0 || closed != UNZ_OK) return damaged(name);
+  return hash.text();
+}
+
+Result<std::string> ArchiveReader::text(const std::string& name, std::size_t most_bytes) {
+  std::string all;
+  bool is_too_long = false;
+  const auto read_it = read(name, [&](const std::string& piece) {
+    is_too_long = is_too_long || all.size() + piece.size() > most_bytes;
+    if (!is_too_long) all += piece;
+  });
+  if (!read_it) return std::unexpected{read_it.error()};
+  if (is_too_long) return server::fail(ErrorCode::invalid, fmt::format("{} is longer than {} bytes", name, most_bytes));
+  return all;
+}
+
+Seal ArchiveReader::seal() const {
+  std::ifstream file{path_, std::ios::binary};
+  const std::uint64_t bytes = std::filesystem::file_size(path_);
+  const std::string words = kSealWords;
+  if (bytes < words.size() + kHashDigits) return Seal::none;
+  PieceHash hash;
+  std::string tail, piece;
+  for (std::uint64_t left = bytes - kHashDigits; left > 0; left -= piece.size()) {
+    piece.resize(std::min<std::uint64_t>(kArchivePieceBytes, left));
+    if (!file.read(piece.data(), static_cast<std::streamsize>(piece.size()))) return Seal::broken;
+    hash.add(piece.data(), piece.size());
+    tail = (tail + piece).substr(tail.size() + piece.size() - std::min(words.size(), tail.size() + piece.size()));
+  }
+  std::string digits(kHashDigits, '\0');
+  file.read(digits.data(), static_cast<std::streamsize>(digits.size()));
+  const bool is_hash = digits.find_first_not_of("0123456789abcdef") == std::string::npos;
+  if (tail != words && !is_hash) return Seal::none;
+  return tail == words && digits == hash.text() ? Seal::whole : Seal::broken;
+}
+
+}  // namespace server::analysis

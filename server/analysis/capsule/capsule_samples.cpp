@@ -1,0 +1,33 @@
+// The tables that storage/export/run_file writes.
+#include "server/analysis/capsule/capsule_samples.hpp"
+
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <fmt/format.h>
+
+#include "server/storage/export/run_file.hpp"
+#include "server/storage/query/run_reader.hpp"
+
+namespace server::analysis {
+namespace {
+
+Result<CapsuleSamples> read_all(SQLite::Database& database, std::size_t limit) {
+  if (database.execAndGet("PRAGMA application_id").getInt64() != storage::kRunFileApplicationId) {
+    return fail(ErrorCode::invalid, "samples.sqlite is not the export of a run");
+  }
+  auto samples = storage::read_exported_run(database, limit);
+  if (!samples) return std::unexpected{samples.error()};
+  return CapsuleSamples{std::move(*samples), storage::read_exported_reference(database)};
+}
+
+}  // namespace
+
+Result<CapsuleSamples> read_capsule_samples(const std::filesystem::path& file, std::size_t limit) {
+  try {
+    SQLite::Database database{storage::reading_uri(file, true), SQLite::OPEN_READONLY | SQLite::OPEN_URI};
+    return read_all(database, limit);
+  } catch (const SQLite::Exception& error) {
+    return fail(ErrorCode::invalid, fmt::format("cannot read samples.sqlite: SQLite says '{}'", error.what()));
+  }
+}
+
+}  // namespace server::analysis

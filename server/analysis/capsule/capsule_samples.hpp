@@ -1,0 +1,25 @@
+// The samples of a run's archive, read from its samples.sqlite.
+//
+// Blocks; for command-line tools.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "server/runtime/result.hpp"
+#include "server/storage/runs/outside_reference.hpp"
+#include "server/storage/runs/run.hpp"
+#include "server/storage/samples/stored_sample.hpp"
+
+namespace server::analysis {
+
+struct CapsuleSamples {
+  std::vector<storage::StoredSample> samples;  // in order of span and seq
+  std::optional<storage::StoredReference> reference;
+};
+
+// invalid: it is not an export of a run, or has more than so many samples.
+Result<CapsuleSamples> read_capsule_samples(const std::filesystem::path& file, std::size_t limit);
+
+}  // namespace server::analysis

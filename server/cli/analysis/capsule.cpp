@@ -1,0 +1,31 @@
+// One request, and a file.
+#include "server/cli/analysis/capsule.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <limits>
+
+#include "server/cli/accounts/station_client.hpp"
+#include "server/cli/terminal/options.hpp"
+
+namespace server::cli {
+
+void add_options(CLI::App& command, CapsuleQuestion& options) {
+  command.add_option("run", options.run, "The number of a run that has ended")
+      ->required()
+      ->check(whole(1, std::numeric_limits<std::int64_t>::max()));
+  command.add_option("--to", options.file, "The archive; one that is there is replaced")->required()->check(named());
+  command.add_option("--data", options.data_dir, "Folder of the station (default: rheonaut-data)")->check(named());
+  command.footer("Example: rheonaut capsule 1 --to run-1.eln --data lab");
+}
+
+int run(const CapsuleQuestion& options, std::ostream& out) {
+  StationClient{options.data_dir}.save(fmt::format("/api/v1/runs/{}/capsule.eln", options.run), options.file);
+  fmt::print(out, "{} ({} bytes)\n", options.file.string(), std::filesystem::file_size(options.file));
+  return 0;
+}
+
+}  // namespace server::cli

@@ -1,0 +1,93 @@
+"""A run of a real station as an .eln archive: saved, computed again, damaged, packed anew by another program."""
+
+import pathlib
+import subprocess
+import time
+import unittest
+import zipfile
+
+from processes import lab
+
+VALIDATOR = pathlib.Path(__file__).with_name("validate_crate.mjs")
+
+
+class CapsuleTest(unittest.TestCase):
+    def record(self, place, station):
+        """Two seconds in auto to 0.02 m, on the robot's own estimate."""
+        place.start_robot(station, "sim-1", "--seed", "5")
+        station.wait_for_robot("sim-1")
+        run = station.post("/api/v1/runs", {"robot_id": "sim-1", "name": "step"})["run_id"]
+        station.post("/api/v1/robots/sim-1/commands", {"kind": "set_mode", "mode": "auto", "setpoint_m": 0.02})
+        time.sleep(2)
+        station.post("/api/v1/robots/sim-1/commands", {"kind": "set_mode", "mode": "manual"})
+        station.post(f"/api/v1/runs/{run}/end", {})
+        return run
+
+    def reproduce(self, place, file, *flags):
+        return place.tool("reproduce", file, *flags)
+
+    def validate(self, place, archive, names):
+        """By the validator of the package ro-crate, which the cockpit's folder has."""
+        metadata = place.folder / "ro-crate-metadata.json"
+        metadata.write_bytes(archive.read(next(name for name in names if name.endswith(metadata.name))))
+        files = [name.split("/", 1)[1] for name in names]
+        checked = subprocess.run(["node", VALIDATOR, metadata, *files], capture_output=True, text=True, timeout=60)
+        self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+        metadata.write_text(metadata.read_text().replace('"license"', '"licence"'))
+        checked = subprocess.run(["node", VALIDATOR, metadata, *files], capture_output=True, text=True, timeout=60)
+        self.assertEqual(checked.returncode, 1, "a crate without a licence is not valid")
+
+    def test_an_archive_is_made_checked_and_computed_again(self):
+        with lab() as place:
+            station = place.start_station()
+            run = self.record(place, station)
+            file, again = place.folder / "run.eln", place.folder / "again.eln"
+            for to in (file, again):
+                made = place.tool("capsule", run, "--to", to, "--data", place.data)
+                self.assertEqual(made.returncode, 0, made.stderr)
+            whole = file.read_bytes()
+            self.assertEqual(whole, again.read_bytes(), "the same run gives the same bytes")
+            self.assertEqual(sorted(path.name for path in place.folder.glob("*.part")), [])
+            place.kill_station()
+
+            found = self.reproduce(place, file)
+            self.assertEqual(found.returncode, 0, found.stdout + found.stderr)
+            self.assertIn("the archive is as it was written", found.stdout)
+            self.assertIn(" 0 within 1e-9, 0 different", found.stdout)
+            self.assertIn("plot: Position (m)", found.stdout)
+
+            with zipfile.ZipFile(file) as archive:
+                self.assertIsNone(archive.testzip())
+                names = archive.namelist()
+                self.validate(place, archive, names)
+                csv = archive.getinfo(f"run-{run}/samples.csv")
+                anew = place.folder / "anew.eln"
+                with zipfile.ZipFile(anew, "w", zipfile.ZIP_STORED) as other:
+                    for name in names:
+                        other.writestr(name, archive.read(name))
+            repacked = self.reproduce(place, anew)
+            self.assertEqual(repacked.returncode, 0, repacked.stdout + repacked.stderr)
+            self.assertIn("packed by another program", repacked.stdout)
+
+            damaged = bytearray(whole)
+            damaged[csv.header_offset + 30 + len(csv.filename) + csv.compress_size // 2] ^= 1
+            file.write_bytes(damaged)
+            found = self.reproduce(place, file)
+            self.assertEqual(found.returncode, 1, found.stderr)
+            self.assertIn(f"run-{run}/samples.csv", found.stdout)
+
+    def test_what_is_no_archive_of_a_run_is_refused(self):
+        with lab() as place:
+            file = place.folder / "no.eln"
+            file.write_bytes(b"no archive")
+            self.assertEqual(self.reproduce(place, file).returncode, 1)
+            with zipfile.ZipFile(file, "w") as archive:
+                archive.writestr("run-1/text.txt", "no crate")
+            refused = self.reproduce(place, file)
+            self.assertEqual(refused.returncode, 2, refused.stdout)
+            self.assertIn("ro-crate-metadata.json", refused.stderr)
+            self.assertNotEqual(place.tool("capsule", 1, "--to", file, "--data", place.data).returncode, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()
