@@ -96,7 +96,8 @@ std::vector<DutyChange> duty_changes(const Step& step) {
     case StepKind::multisine: return multisine(step);
     case StepKind::setpoint:
     case StepKind::disturbance:
-    case StepKind::scan: break;
+    case StepKind::scan:
+    case StepKind::tones: break;
   }
   return {};
 }

@@ -6,8 +6,8 @@
 namespace server::experiments {
 namespace {
 
-constexpr std::array<const char*, 10> kStepKinds{"rest", "duty",      "staircase", "ramp",        "chirp",
-                                                 "prbs", "multisine", "setpoint",  "disturbance", "scan"};
+constexpr std::array<const char*, 11> kStepKinds{"rest",      "duty",     "staircase",   "ramp", "chirp", "prbs",
+                                                 "multisine", "setpoint", "disturbance", "scan", "tones"};
 constexpr std::array<const char*, 3> kPumpFlows{"off", "constant", "pulse_70_bpm"};
 constexpr std::array<const char*, 3> kStartPositions{"zero", "here", "back"};
 

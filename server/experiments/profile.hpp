@@ -17,9 +17,22 @@ inline constexpr std::size_t kMostSteps = 200, kMostRuns = 1000;
 
 // In the order of step_kinds(). Up to multisine the duty is given (manual), then the robot controls its position
 // (auto).
-enum class StepKind : std::uint8_t { rest, duty, staircase, ramp, chirp, prbs, multisine, setpoint, disturbance, scan };
+enum class StepKind : std::uint8_t {
+  rest,
+  duty,
+  staircase,
+  ramp,
+  chirp,
+  prbs,
+  multisine,
+  setpoint,
+  disturbance,
+  scan,
+  tones
+};
 std::span<const char* const> step_kinds();
 inline bool is_closed_loop(StepKind kind) { return kind >= StepKind::setpoint; }
+inline bool has_setpoint(StepKind kind) { return is_closed_loop(kind) && kind != StepKind::disturbance; }
 
 struct Step {
   StepKind kind = StepKind::rest;
@@ -36,6 +49,8 @@ struct Step {
   double setpoint_m = base::kMustBeGiven;
   double disturbance_m = base::kMustBeGiven;
   double velocity_m_s = base::kMustBeGiven;  // of a scan
+  double amplitude_m = base::kMustBeGiven;   // of each of the three tones
+  double crossover_rad_s = base::kMustBeGiven;
 };
 
 enum class PumpFlow : std::uint8_t { off, constant, pulse_70_bpm };

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 #include <sstream>
 #include <utility>
 
@@ -14,13 +15,14 @@
 #include "base/invalid_argument.hpp"
 #include "base/json_table.hpp"
 #include "base/toml_text.hpp"
+#include "control/identification/three_tones.hpp"
 #include "server/experiments/duty_signals.hpp"
 #include "server/experiments/time_line.hpp"
 
 namespace server::experiments {
 namespace {
 
-constexpr std::array<const char*, 10> kStepMeanings{
+constexpr std::array<const char*, 11> kStepMeanings{
     "duty 0",
     "a constant duty",
     "constant duties in equal distances",
@@ -31,6 +33,7 @@ constexpr std::array<const char*, 10> kStepMeanings{
     "to a position, by the controller",
     "adds to the position that the controller sees",
     "to a position at constant velocity",
+    "three sines of the setpoint about a position, from which `autotune --model-free` measures the robot",
 };
 
 constexpr base::Range kDuty{-1, 1}, kPosition_m{-100, 100}, kTime_s{kTick_s, 3600}, kFrequency_hz{0.001, 10};
@@ -60,6 +63,18 @@ void band(base::Fields& fields, Step& step) {
                           ", at most a quarter of a period of to_hz is allowed: ", 0.25 / step.to_hz);
     }
   });
+}
+
+void check_tones(const Step& step) {
+  const double shortest_s = control::tone_window_s(step.crossover_rad_s);
+  if (step.for_s < shortest_s) {
+    base::throw_invalid("for_s is ", step.for_s, ", one period of a tenth of crossover_rad_s is needed: ", shortest_s);
+  }
+  const double quarter_s = std::numbers::pi / 2 / control::three_tones_rad_s(step.crossover_rad_s).back();
+  if (step.every_s > quarter_s) {
+    base::throw_invalid("every_s is ", step.every_s,
+                        ", at most a quarter of a period of the fastest sine is allowed: ", quarter_s);
+  }
 }
 
 void fields(base::Fields& fields, Step& step) {
@@ -105,6 +120,13 @@ void fields(base::Fields& fields, Step& step) {
       held(fields, step);
       if (std::isnan(step.for_s)) step.for_s = 0;
       return fields.number("for_s", step.for_s, {0, kTime_s.maximum}, "how long the robot then stays");
+    case StepKind::tones:
+      fields.number("setpoint_m", step.setpoint_m, kPosition_m, "mean of the setpoint");
+      fields.number("amplitude_m", step.amplitude_m, {0.0001, 10}, "of each of the three sines");
+      fields.number("crossover_rad_s", step.crossover_rad_s, {0.01, 20}, "the sines are at 0.7, 1 and 1.4 times it");
+      timed(fields, step);
+      held(fields, step);
+      return fields.must([&step] { check_tones(step); });
   }
 }
 
@@ -182,10 +204,14 @@ void check_duty(const Step& step, const Profile& profile) {
 void check_setpoint(const Step& step, const Profile& profile) {
   for (const double factor : factors_of(profile.sweep.setpoint_factor)) {
     const double setpoint_m = step.setpoint_m * factor;
-    if (setpoint_m >= profile.limits.position_min_m && setpoint_m <= profile.limits.position_max_m) continue;
-    base::throw_invalid(
-        "setpoint_m is ", step.setpoint_m, factor == 1 ? "" : base::join_text(", times the setpoint_factor ", factor),
-        "; the limits of the profile allow ", profile.limits.position_min_m, " to ", profile.limits.position_max_m);
+    const double reach_m = step.kind == StepKind::tones ? std::abs(3 * step.amplitude_m * factor) : 0;
+    const auto [lowest_m, highest_m] = std::pair{setpoint_m - reach_m, setpoint_m + reach_m};
+    if (lowest_m >= profile.limits.position_min_m && highest_m <= profile.limits.position_max_m) continue;
+    base::throw_invalid("setpoint_m is ", step.setpoint_m,
+                        reach_m == 0 ? "" : base::join_text(", and three sines of ", step.amplitude_m, " about it"),
+                        factor == 1 ? "" : base::join_text(", times the setpoint_factor ", factor),
+                        "; the limits of the profile allow ", profile.limits.position_min_m, " to ",
+                        profile.limits.position_max_m);
   }
 }
 
@@ -195,10 +221,10 @@ void check_newest_step(const Profile& profile) {
   if (profile.steps.size() > kMostSteps) base::throw_invalid("there are more than ", kMostSteps, " steps");
   // SAFETY: a duty needs somebody who is there.
   if (!is_closed_loop(step.kind) && profile.is_unattended) {
-    base::throw_invalid("a profile with unattended = true has only the steps setpoint, disturbance and scan");
+    base::throw_invalid("a profile with unattended = true has only the steps setpoint, disturbance, scan and tones");
   }
   if (!is_closed_loop(step.kind)) check_duty(step, profile);
-  if (step.kind == StepKind::setpoint || step.kind == StepKind::scan) check_setpoint(step, profile);
+  if (has_setpoint(step.kind)) check_setpoint(step, profile);
   const double duration_s = longest_duration_s(profile);
   if (duration_s > profile.limits.duration_max_s) {
     base::throw_invalid("with this step and its for_s a run takes ", duration_s, " s, limits.duration_max_s is ",

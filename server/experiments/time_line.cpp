@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "control/identification/three_tones.hpp"
 #include "server/experiments/duty_signals.hpp"
 
 namespace server::experiments {
@@ -36,6 +37,21 @@ std::uint64_t add_scan(const Step& step, double from_m, double to_m, std::size_t
   return way;
 }
 
+// The three sines begin apart, so that they seldom add up to their largest sum. The step ends at their mean.
+void add_tones(const Step& step, double factor, std::size_t index, TimeLine& line) {
+  const auto tones_rad_s = control::three_tones_rad_s(step.crossover_rad_s);
+  const auto hold = static_cast<std::uint64_t>(std::llround(step.every_s / kTick_s));
+  for (std::uint64_t tick = 0; tick < ticks_of(step); tick += hold) {
+    double sum = 0;
+    for (std::size_t i = 0; i < tones_rad_s.size(); ++i) {
+      sum += std::sin(tones_rad_s[i] * static_cast<double>(tick) * kTick_s + 2 * static_cast<double>(i));
+    }
+    if (tick + hold >= ticks_of(step)) sum = 0;
+    const double setpoint_m = factor * (step.setpoint_m + step.amplitude_m * sum);
+    line.actions.push_back({line.ticks + tick, ActionKind::setpoint, setpoint_m, index});
+  }
+}
+
 }  // namespace
 
 TimeLine time_line_of(const Profile& profile, const Variant& variant) {
@@ -61,7 +77,8 @@ TimeLine time_line_of(const Profile& profile, const Variant& variant) {
       line.actions.push_back({line.ticks, ActionKind::disturbance, disturbance_m, index});
     }
     if (step.kind == StepKind::scan) line.ticks += add_scan(step, setpoint_m, target_m, index, line);
-    if (step.kind == StepKind::setpoint || step.kind == StepKind::scan) setpoint_m = target_m;
+    if (step.kind == StepKind::tones) add_tones(step, variant.setpoint_factor, index, line);
+    if (has_setpoint(step.kind)) setpoint_m = target_m;
     line.ticks += std::max(ticks_of(step), change_of_mode.at_least);
   }
   // SAFETY: a profile never ends with a running motor in manual.
@@ -82,7 +99,7 @@ double longest_duration_s(const Profile& profile) {
     if (step.kind == StepKind::scan) {
       ticks += scan_ticks((step.setpoint_m - setpoint_m) * largest_factor, step.velocity_m_s);
     }
-    if (step.kind == StepKind::setpoint || step.kind == StepKind::scan) setpoint_m = step.setpoint_m;
+    if (has_setpoint(step.kind)) setpoint_m = step.setpoint_m;
     ticks += change.before + std::max(ticks_of(step), change.at_least);
   }
   return static_cast<double>(ticks) * kTick_s;

@@ -23,7 +23,7 @@ Result<storage::DesignId> design_id_from(const std::string& text) {
   return fail(ErrorCode::not_found, fmt::format("there is no design '{}'", text), "no_such_design");
 }
 
-// The runs that a job of kind identify was asked to fit, each once.
+// The runs that a job of kind identify or tune_measured was asked to use, each once.
 std::vector<storage::DesignSource> sources_of(const json& asked) {
   const json one = json::array({asked});
   std::vector<storage::DesignSource> sources;
@@ -53,7 +53,8 @@ boost::asio::awaitable<Result<void>> take_result(DesignRoutes parts, storage::Jo
   request.document = *result;
   request.options = job->request.document;
   const json asked = json::parse(job->request.document, nullptr, false);
-  if (job->request.kind == "identify") request.sources = sources_of(asked);
+  const bool is_of_runs = job->request.kind == "identify" || job->request.kind == "tune_measured";
+  if (is_of_runs) request.sources = sources_of(asked);
   const bool is_controller = request.kind == storage::DesignKind::controller;
   if (is_controller && !request.model && asked.contains("model_id")) {
     request.model = asked.at("model_id").get<storage::DesignId>();

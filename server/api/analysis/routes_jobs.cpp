@@ -142,6 +142,15 @@ boost::asio::awaitable<Work> work_of(JobRoutes parts, TuningMapBody body) {
   co_return storage::JobWork{std::move(work)};
 }
 
+boost::asio::awaitable<Work> work_of(JobRoutes parts, analysis::MeasuredTuneRequest request) {
+  const auto run = co_await parts.runs.find(request.run);
+  if (!run) co_return std::unexpected{run.error()};
+  auto work = [&analysis = parts.analysis, request = std::move(request)](storage::JobRun& job) {
+    return analysis::measured_tune_job(analysis, request, job);
+  };
+  co_return storage::JobWork{std::move(work)};
+}
+
 boost::asio::awaitable<Work> work_of(JobRoutes parts, analysis::DocumentRequest request) {
   for (const storage::RunId id : runs_of(request)) {
     const auto run = co_await parts.runs.find(id);

@@ -202,14 +202,15 @@ Result<JobBody> parse_job(const std::string& text) {
   if (*kind == "identify") return job_of(*body, *kind, identify_request(*body));
   if (*kind == "tune") return job_of(*body, *kind, tune_body(*body));
   if (*kind == "tuning_map") return job_of(*body, *kind, tuning_map_body(*body));
+  if (*kind == "tune_measured") return job_of(*body, *kind, tune_measured_body(*body));
   constexpr std::array<std::string_view, 3> kDocuments{"report", "comparison", "export"};
   if (std::ranges::find(kDocuments, *kind) != kDocuments.end()) {
     return job_of(*body, *kind, parse_document_job(*kind, *body));
   }
-  return fail(
-      ErrorCode::invalid,
-      fmt::format("kind is '{}', allowed are identify, tune, tuning_map, {}", *kind, fmt::join(kDocuments, ", ")),
-      "unknown_kind");
+  return fail(ErrorCode::invalid,
+              fmt::format("kind is '{}', allowed are identify, tune, tuning_map, tune_measured, {}", *kind,
+                          fmt::join(kDocuments, ", ")),
+              "unknown_kind");
 }
 
 json to_json(const storage::Job& job) {

@@ -15,7 +15,9 @@ namespace server::api {
 
 struct JobBody {
   std::string kind;
-  std::variant<analysis::IdentifyRequest, TuneBody, TuningMapBody, analysis::DocumentRequest> request;
+  std::variant<analysis::IdentifyRequest, TuneBody, TuningMapBody, analysis::MeasuredTuneRequest,
+               analysis::DocumentRequest>
+      request;
   std::string document;  // the body, as it is kept
 };
 

@@ -140,6 +140,8 @@ inline constexpr Limit<std::int64_t> kIntegerLimits[] = {
     {"TracesBody.reference_run_id", {1, kMaxJavaScriptInteger}},
     {"TracesBody.to_ms", {-kMostTracesMs, kMostTracesMs}},
     {"TuneJobBody.model_id", {1, kMaxJavaScriptInteger}},
+    {"TuneMeasuredJobBody.run_id", {1, kMaxJavaScriptInteger}},
+    {"TuneMeasuredJobBody.span", {0, 1'000'000}},
     {"TuningMapJobBody.model_id", {1, kMaxJavaScriptInteger}},
     {"TuningMapJobBody.points", {2, control::kMostMapPoints}},
 };
@@ -171,6 +173,12 @@ inline constexpr Limit<double> kNumberLimits[] = {
     {"TuneJobBody.mu", {0.01, 1.99}},
     {"TuneJobBody.period_s", {0.001, 1}},
     {"TuneJobBody.phase_margin_deg", {0.1, 179.9}},
+    {"TuneMeasuredJobBody.crossover_rad_s", {1e-3, 1e4}},
+    {"TuneMeasuredJobBody.duty_max", {0.01, 1}},
+    {"TuneMeasuredJobBody.duty_min", {-1, 0}},
+    {"TuneMeasuredJobBody.mu", {0.01, 1.99}},
+    {"TuneMeasuredJobBody.period_s", {0.001, 1}},
+    {"TuneMeasuredJobBody.phase_margin_deg", {0.1, 179.9}},
     {"TuningMapJobBody.from_rad_s", {1e-3, 1e4}},
     {"TuningMapJobBody.to_rad_s", {1e-3, 1e4}},
 };

@@ -59,11 +59,12 @@ Result<void> read_specification(const Members& body, control::TuningSpec& spec) 
   spec.gain_crossover_rad_s = *crossover;
   spec.phase_margin_deg = *margin;
   spec.mu = *mu;
-  return read_loop(body, spec.is_velocity_loop);
+  return {};
 }
 
 // Of the robot that is to run the controller.
-Result<void> read_robot(const Members& body, analysis::TuneRequest& request) {
+template <class Request>
+Result<void> read_robot(const Members& body, Request& request) {
   const auto duty_min = body.optional_number("duty_min", numbers("TuneJobBody.duty_min"));
   if (!duty_min) return std::unexpected{duty_min.error()};
   const auto duty_max = body.optional_number("duty_max", numbers("TuneJobBody.duty_max"));
@@ -103,9 +104,29 @@ Result<TuneBody> tune_body(const Members& body) {
   TuneBody parsed;
   auto read = read_plant(body, integers("TuneJobBody.model_id"), text_bytes("TuneJobBody.fluid"), parsed.plant);
   if (read) read = read_specification(body, parsed.request.spec);
+  if (read) read = read_loop(body, parsed.request.spec.is_velocity_loop);
   if (read) read = read_robot(body, parsed.request);
   if (!read) return std::unexpected{read.error()};
   return parsed;
+}
+
+Result<analysis::MeasuredTuneRequest> tune_measured_body(const Members& body) {
+  const auto known = body.only(
+      {"kind", "run_id", "span", "crossover_rad_s", "phase_margin_deg", "mu", "duty_min", "duty_max", "period_s"});
+  if (!known) return std::unexpected{known.error()};
+  analysis::MeasuredTuneRequest request;
+  const auto run = body.integer("run_id", integers("TuneMeasuredJobBody.run_id"));
+  if (!run) return std::unexpected{run.error()};
+  request.run = *run;
+  if (body.has("span")) {
+    const auto span = body.integer("span", integers("TuneMeasuredJobBody.span"));
+    if (!span) return std::unexpected{span.error()};
+    request.window.span = static_cast<std::uint32_t>(*span);
+  }
+  auto read = read_specification(body, request.spec);
+  if (read) read = read_robot(body, request);
+  if (!read) return std::unexpected{read.error()};
+  return request;
 }
 
 Result<TuningMapBody> tuning_map_body(const Members& body) {

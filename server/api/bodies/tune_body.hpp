@@ -1,9 +1,10 @@
-// The bodies of the jobs `tune` and `tuning_map`.
+// The bodies of the jobs `tune`, `tuning_map` and `tune_measured`.
 #pragma once
 
 #include <optional>
 #include <string>
 
+#include "server/analysis/tuning/measured_tune_job.hpp"
 #include "server/analysis/tuning/tune_job.hpp"
 #include "server/api/bodies/json.hpp"
 #include "server/storage/designs/design.hpp"
@@ -32,5 +33,8 @@ Result<TuneBody> tune_body(const Members& body);
 
 // e.g. {"kind":"tuning_map","fluid":"water","from_rad_s":1,"to_rad_s":20,"points":40}
 Result<TuningMapBody> tuning_map_body(const Members& body);
+
+// e.g. {"kind":"tune_measured","run_id":7,"crossover_rad_s":4,"phase_margin_deg":70}
+Result<analysis::MeasuredTuneRequest> tune_measured_body(const Members& body);
 
 }  // namespace server::api

@@ -12,6 +12,7 @@
 #include "server/cli/experiments/autotune_comparison.hpp"
 #include "server/cli/terminal/options.hpp"
 #include "server/cli/terminal/output.hpp"
+#include "server/experiments/three_tones_document.hpp"
 
 namespace server::cli {
 
@@ -35,8 +36,11 @@ json profile_in(const std::string& name) {
 AutotuneRequest request_of(const Autotune& options) {
   AutotuneRequest request = options.request;
   request.profile = profile_in(options.profile);
+  if (request.is_model_free && options.profile == kIdentificationSet) {
+    request.profile = experiments::three_tones_document(request.crossover_rad_s, options.tone_amplitude_m);
+  }
   request.verify_profile = profile_in(options.verify_profile);
-  const bool is_shipped_set = !request.run && options.profile == kIdentificationSet;
+  const bool is_shipped_set = !request.run && !request.is_model_free && options.profile == kIdentificationSet;
   if (is_shipped_set && !request.fit_to_s && !request.validation_from_s) {
     request.fit_to_s = request.validation_from_s = kSecondPrbsFrom_s;
   }
@@ -99,6 +103,12 @@ void add_experiments(CLI::App& command, Autotune& options) {
       .add_option("--validation-from-s", options.request.validation_from_s,
                   "Try the model on the run from here on, which must be at rest (default: not tried)")
       ->check(positive());
+  auto* model_free = command.add_flag("--model-free", options.request.is_model_free,
+                                      "Find the controller from three tones in closed loop, without a model");
+  command.add_option("--tone-amplitude-m", options.tone_amplitude_m, "Of the setpoint, each tone (default: 0.02)")
+      ->check(from_to(1e-4, 1))
+      ->needs(model_free);
+  for (const char* of_a_model : {"--fit-to-s", "--validation-from-s"}) model_free->excludes(of_a_model);
   command
       .add_option("--verify-profile", options.verify_profile,
                   "Of the closed loop: a shipped profile, or a .json file (default: figure_7)")

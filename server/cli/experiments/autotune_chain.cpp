@@ -44,6 +44,7 @@ json fixed_request(const AutotuneRequest& request) {
   json fixed{{"robot_id", request.robot_id},
              {"profile", request.profile},
              {"verify_profile", request.verify_profile},
+             {"model_free", request.is_model_free},
              {"run_id", nullptr}};
   if (request.run) fixed["run_id"] = *request.run;
   return fixed;
@@ -148,7 +149,7 @@ json AutotuneChain::identify_body() const {
 }
 
 bool AutotuneChain::keep_model() {
-  if (state_.is_done(kModel)) return true;
+  if (request_.is_model_free || state_.is_done(kModel)) return true;
   const std::int64_t run = *state_.number(kIdentification, "run_id");
   say(fmt::format("model: fit of run {}", run));
   const auto job = finished_job(kModel, identify_body());
@@ -174,14 +175,26 @@ bool AutotuneChain::keep_model() {
 // The duty range and period are those of the robot, so that it is predicted as it will run.
 json AutotuneChain::tune_body() const {
   json body = specification(request_);
-  body["kind"] = "tune";
-  body["model_id"] = *state_.number(kModel, "design_id");
+  if (request_.is_model_free) {
+    body["kind"] = "tune_measured";
+    body["run_id"] = *state_.number(kIdentification, "run_id");
+  } else {
+    body["kind"] = "tune";
+    body["model_id"] = *state_.number(kModel, "design_id");
+  }
   const json in_force = station_.get(fmt::format("/api/v1/robots/{}/controller", request_.robot_id)).at("controller");
   if (in_force.is_null()) return body;
   body["duty_min"] = in_force.at("duty_min");
   body["duty_max"] = in_force.at("duty_max");
   body["period_s"] = in_force.at("period_us").get<double>() / kUsOfAS;
   return body;
+}
+
+bool AutotuneChain::is_feasible() {
+  if (tuning_.at("feasible").get<bool>()) return true;
+  say("tuning: not feasible: " + tuning_.at("reason").get<std::string>());
+  end_ = AutotuneEnd::infeasible;
+  return false;
 }
 
 bool AutotuneChain::tune() {
@@ -199,11 +212,7 @@ bool AutotuneChain::tune() {
   const auto job = finished_job(kTuning, tune_body());
   if (!job) return false;
   tuning_ = job->at("result");
-  if (!tuning_.at("feasible").get<bool>()) {
-    say("tuning: not feasible: " + tuning_.at("reason").get<std::string>());
-    end_ = AutotuneEnd::infeasible;
-    return false;
-  }
+  if (!is_feasible()) return false;
   const json controller{{"kp", tuning_.at("kp")}, {"kd", tuning_.at("kd")}, {"mu", tuning_.at("mu")}};
   state_.finish(kTuning, {{"asked", asked}, {"controller", controller}, {"achieved", tuning_.at("achieved")}});
   say(fmt::format("tuning: kp {:.6g}, kd {:.6g}, mu {:.6g}", controller.at("kp").get<double>(),

@@ -1,8 +1,9 @@
 // The chain from an experiment to a controller that was seen to work, stage by stage:
 //
 //   identification   an experiment of the station, or a run that is named        → run
-//   model            job `identify`, its result kept                             → design
+//   model            job `identify`, its result kept; none if it is model-free   → design
 //   tuning           job `tune` for crossover and margin, in every fluid         → kp, kd, mu, coefficients, prediction
+//                    model-free: job `tune_measured` on the run                  → kp, kd, mu, coefficients
 //   controller       its result kept                                             → design
 //   push             sent, reported back by the robot, compared bit for bit      → in force
 //   verification     an experiment in closed loop                                → run
@@ -30,7 +31,8 @@ struct AutotuneRequest {
   std::optional<double> validation_from_s;  // the rest of the run, of which nothing is fitted; none: no validation
   double crossover_rad_s = 0, phase_margin_deg = 0;
   std::optional<double> mu;
-  bool confirm = false;  // of a controller with a wider duty range than the one in force
+  bool is_model_free = false;  // the profile, or the run, has three tones; no model is found
+  bool confirm = false;        // of a controller with a wider duty range than the one in force
 };
 
 // What the file of an autotune must agree with; the specification may change until a controller is kept.
@@ -66,6 +68,7 @@ class AutotuneChain {
   std::optional<std::int64_t> run_of_experiment(const std::string& stage, const nlohmann::json& profile);
   nlohmann::json identify_body() const;
   nlohmann::json tune_body() const;
+  bool is_feasible();  // of the result; says why not
   void say(const std::string& line);
   bool stop(const std::string& stage, const std::string& why);  // false
   void show(const nlohmann::json& job_or_experiment);

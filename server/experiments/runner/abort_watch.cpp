@@ -18,6 +18,16 @@ void AbortWatch::abort(const char* reason, std::string detail) {
   if (!found_) found_ = Abort{reason, std::move(detail)};
 }
 
+std::optional<Abort> fault_of(const station::CommandRecord& accepted) {
+  using station::CommandState;
+  const bool is_unseen = accepted.state == CommandState::superseded && accepted.reason == "by_a_newer_command" &&
+                         accepted.acknowledged_after_us >= 0;
+  const bool has_failed = accepted.state == CommandState::rejected || accepted.state == CommandState::expired ||
+                          accepted.state == CommandState::failed || accepted.state == CommandState::superseded;
+  if (!has_failed || is_unseen) return std::nullopt;
+  return Abort{"command_refused", fmt::format("{}: {} {}", accepted.kind, text(accepted.state), accepted.reason)};
+}
+
 void AbortWatch::on_samples(const station::SampleBatch& batch, std::int64_t now_us) {
   if (boot_id_ == 0) {
     boot_id_ = batch.boot_id;

@@ -20,6 +20,10 @@ struct Abort {
   std::string detail;
 };
 
+// SAFETY: a command of the run that the robot accepted for later and then did not do is no step of the run. One that
+// the next command of the run replaced before a sample showed it has been done: samples are missing, which is counted.
+std::optional<Abort> fault_of(const station::CommandRecord& accepted);
+
 class AbortWatch {
  public:
   // `now_us` is steady, here and below.

@@ -165,13 +165,9 @@ void RunDriver::on_command(const station::CommandRecord& record) {
   if (auto found = disturbance_of(record, request_.peer)) abort(std::move(*found));
 }
 
-// SAFETY: what the robot has accepted for later and then not done is no step of the run.
 void RunDriver::on_own_command(const station::CommandRecord& record) {
-  using station::CommandState;
-  const bool has_failed = record.state == CommandState::rejected || record.state == CommandState::expired ||
-                          record.state == CommandState::failed || record.state == CommandState::superseded;
-  if (!has_failed || !accepted_.contains(record.id)) return;
-  abort({"command_refused", fmt::format("{}: {} {}", record.kind, text(record.state), record.reason)});
+  if (!accepted_.contains(record.id)) return;
+  if (auto fault = fault_of(record)) abort(std::move(*fault));
 }
 
 void RunDriver::abort(Abort why) {

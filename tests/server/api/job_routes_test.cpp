@@ -203,7 +203,8 @@ TEST(ParseJob, SaysWhichMemberIsWrong) {
     const char* words;
   };
   const Case cases[] = {
-      {{{"kind", "dance"}}, "kind is 'dance', allowed are identify, tune, tuning_map, report, comparison, export"},
+      {{{"kind", "dance"}},
+       "kind is 'dance', allowed are identify, tune, tuning_map, tune_measured, report, comparison, export"},
       {{{"run_id", 0}}, "run_id = 0 is outside"},
       {{{"run", 1}}, "\"run\" is not known here"},
       {{{"channels", "all"}}, "channels is 'all', allowed are best, outside, robot"},

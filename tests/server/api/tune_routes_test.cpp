@@ -37,6 +37,11 @@ class TuneRoutesTest : public ApiTest {
   std::string refusal(const json& body) { return ask("POST", "/api/v1/jobs", body).parsed()["detail"]; }
 };
 
+TEST_F(TuneRoutesTest, ARunThatIsNotThereIsNoneToMeasure) {
+  EXPECT_THAT(refusal({{"kind", "tune_measured"}, {"run_id", 7}, {"crossover_rad_s", 4}, {"phase_margin_deg", 95}}),
+              HasSubstr("there is no run 7"));
+}
+
 TEST_F(TuneRoutesTest, FindsTheControllerOfTheTunerReadyForRobotsAndPredictedInEveryFluid) {
   keep_model();
   const json water{{"model_gain_m_s", {0.1, 0, 0, 0}},
@@ -163,6 +168,8 @@ TEST(ParseTuneJob, SaysWhichMemberIsWrong) {
   EXPECT_THAT(map.error().detail, HasSubstr("from_rad_s is 5, it must be below to_rad_s, which is 5"));
   const auto plant = api::parse_job(R"({"kind":"tuning_map","plant":{"kp":1}})");
   EXPECT_THAT(plant.error().detail, HasSubstr("key \"b1\" is missing"));
+  const auto measured = api::parse_job(R"({"kind":"tune_measured","crossover_rad_s":4,"phase_margin_deg":90})");
+  EXPECT_THAT(measured.error().detail, HasSubstr("run_id is missing"));
   const auto points = api::parse_job(R"({"kind":"tuning_map","fluid":"water","points":1})");
   EXPECT_THAT(points.error().detail, HasSubstr("points = 1 is outside"));
 }

@@ -215,6 +215,25 @@ TEST_F(AutotuneTest, AsksForEachStageInOrderAndComparesAtTheEnd) {
   EXPECT_THAT(progress.str(), HasSubstr("  running, step 2 of 9"));
 }
 
+TEST_F(AutotuneTest, WithoutAModelARunWithTonesGoesToTheTuner) {
+  options.request.is_model_free = true;
+  ASSERT_EQ(tune(), 0) << progress.str();
+  const json step = station.body_of(kExperiments)["profile"]["step"][0];
+  EXPECT_EQ(step["kind"], "tones");
+  EXPECT_EQ(step["crossover_rad_s"], 3.0);
+  EXPECT_EQ(step["amplitude_m"], 0.02);
+  EXPECT_EQ(station.count(kJobs), 1) << "no model is looked for";
+  EXPECT_EQ(station.body_of(kJobs), (json{{"kind", "tune_measured"},
+                                          {"run_id", 101},
+                                          {"crossover_rad_s", 3.0},
+                                          {"phase_margin_deg", 90.0},
+                                          {"duty_min", -0.5},
+                                          {"duty_max", 0.75},
+                                          {"period_s", 0.02}}));
+  EXPECT_EQ(station.count(kDesigns), 1);
+  EXPECT_EQ(station.body_of(kPush), (json{{"design_id", 1}}));
+}
+
 // SAFETY's test: a robot moves only while its experiment is watched, so each look comes behind a sign of life.
 TEST_F(AutotuneTest, GivesASignOfLifeBeforeEachLook) {
   ASSERT_EQ(tune(), 0);

@@ -8,6 +8,7 @@
 
 #include "base/field_list.hpp"
 #include "server/experiments/profile_document.hpp"
+#include "server/experiments/three_tones_document.hpp"
 #include "server/experiments/time_line.hpp"
 
 namespace server::experiments {
@@ -119,8 +120,28 @@ TEST(Profile, AStepBeyondItsLimitsIsRefusedAtItsPlace) {
       HasSubstr("takes 6.5 s"));
 }
 
+TEST(Profile, TonesNeedAWholeWindowAndRoomForTheirSum) {
+  const auto tones = [](const std::string& more) {
+    return "[[step]]\nkind = \"tones\"\nsetpoint_m = 0\namplitude_m = 0.1\ncrossover_rad_s = 4\n" + more;
+  };
+  EXPECT_EQ(error_of(tones("for_s = 20\n")), "none");
+  EXPECT_THAT(error_of(tones("for_s = 15\n")), HasSubstr("for_s is 15, one period of a tenth of crossover_rad_s"));
+  EXPECT_THAT(error_of(tones("for_s = 20\nevery_s = 0.3\n")), HasSubstr("every_s is 0.3, at most a quarter"));
+  EXPECT_THAT(
+      error_of("[limits]\nposition_max_m = 0.25\n" + tones("for_s = 20\n")),
+      HasSubstr("setpoint_m is 0, and three sines of 0.1 about it; the limits of the profile allow -1 to 0.25"));
+}
+
+TEST(Profile, TheDocumentOfThreeTonesIsSoundAtEveryCrossover) {
+  for (const double crossover_rad_s : {0.2, 0.5, 1.0, 4.0, 20.0}) {
+    const auto profile = parse_profile(three_tones_document(crossover_rad_s, 0.02).dump(), "tones");
+    EXPECT_EQ(profile.steps.at(0).crossover_rad_s, crossover_rad_s);
+    if (crossover_rad_s >= 0.6) EXPECT_LE(longest_duration_s(profile), 120) << crossover_rad_s;
+  }
+}
+
 TEST(Profile, ThoseOfTheProgramAreSound) {
-  ASSERT_EQ(shipped_profiles().size(), 7U);
+  ASSERT_EQ(shipped_profiles().size(), 8U);
   for (const base::EmbeddedFile& shipped : shipped_profiles()) {
     const Profile profile = find_profile(std::string(shipped.name));
     EXPECT_FALSE(variants_of(profile).empty()) << shipped.name;

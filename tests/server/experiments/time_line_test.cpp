@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "tests/server/experiments/steps.hpp"
 
 namespace server::experiments {
@@ -49,6 +52,29 @@ TEST(TimeLine, AScanMovesTheSetpointAtItsVelocityAndEndsThere) {
   EXPECT_EQ(line.actions[3].value, 0.05) << "the last part is shorter";
   EXPECT_EQ(line.ticks, 100U + 50U + 100U);
   EXPECT_DOUBLE_EQ(longest_duration_s(profile), line.duration_s());
+}
+
+TEST(TimeLine, TonesAreThreeSinesOfTheSetpointThatEndAtTheirMean) {
+  Profile profile;
+  Step tones = step_of(StepKind::tones, 70);
+  tones.setpoint_m = 0.05;
+  tones.amplitude_m = 0.02;
+  tones.crossover_rad_s = 4;
+  profile.steps = {tones};
+  const TimeLine line = time_line_of(profile, {.setpoint_factor = 2});
+  const auto& first = line.actions.at(1);  // behind that of the change of mode
+  EXPECT_EQ(first.tick, kModeChangeTicks);
+  EXPECT_NEAR(first.value, 2 * (0.05 + 0.02 * (std::sin(2.0) + std::sin(4.0))), 1e-12);
+  double lowest_m = 1, highest_m = -1;
+  for (const Action& action : line.actions) {
+    lowest_m = std::min(lowest_m, action.value);
+    highest_m = std::max(highest_m, action.value);
+  }
+  EXPECT_GE(lowest_m, 2 * (0.05 - 0.06));
+  EXPECT_LE(highest_m, 2 * (0.05 + 0.06));
+  EXPECT_GT(highest_m - lowest_m, 0.15) << "they add up now and then";
+  EXPECT_DOUBLE_EQ(line.actions.back().value, 0.1);
+  EXPECT_LT(line.actions.back().tick, line.ticks);
 }
 
 TEST(TimeLine, TheLongestDurationIsThatOfTheLargestFactor) {

@@ -124,6 +124,29 @@ TEST_F(AbortWatchTest, ASensorFaultUnlessItIsAllowed) {
   EXPECT_EQ(reason(), "");
 }
 
+// SAFETY's test: what the robot took in and did not do ends the run; what only no sample has shown does not.
+TEST(FaultOfACommand, IsWhatTheRobotDidNotDo) {
+  using station::CommandState;
+  station::CommandRecord record;
+  record.kind = "set_setpoint";
+  record.acknowledged_after_us = 2000;
+  for (const CommandState state : {CommandState::rejected, CommandState::expired, CommandState::failed}) {
+    record.state = state;
+    EXPECT_EQ(fault_of(record)->reason, "command_refused") << text(state);
+  }
+  record.state = CommandState::superseded;
+  for (const char* reason : {"control_ended", "by_emergency_stop", "limits_changed"}) {
+    record.reason = reason;
+    EXPECT_TRUE(fault_of(record)) << reason;
+  }
+  record.reason = "by_a_newer_command";
+  EXPECT_FALSE(fault_of(record));
+  record.acknowledged_after_us = -1;
+  EXPECT_TRUE(fault_of(record)) << "it never reached the robot";
+  record.state = CommandState::verified;
+  EXPECT_FALSE(fault_of(record));
+}
+
 TEST_F(AbortWatchTest, AnotherBoot) {
   samples(0);
   batch_.boot_id = 8;
