@@ -136,6 +136,41 @@ TEST_F(ExperimentsTest, OneThatWaitsIsCancelled) {
   EXPECT_EQ(until(id, ExperimentState::cancelled).reason, "requested");
 }
 
+TEST_F(ExperimentsTest, AListCountsTheRunsAndOnlyTheOneHasThem) {
+  std::vector<storage::RunCounts> reported;
+  experiments->set_on_change([&reported](const ExperimentView& summary) {
+    EXPECT_TRUE(summary.experiment.runs.empty());
+    reported.push_back(summary.experiment.run_counts);
+  });
+  const auto id = start(profile({kRest}, "[sweep]\nrepeats = 3\n"));
+  until(id, ExperimentState::done);
+  const storage::RunCounts all_done{{ExperimentState::done, 3}};
+  EXPECT_EQ(reported.back(), all_done);
+  const storage::RunCounts one_runs{{ExperimentState::done, 2}, {ExperimentState::running, 1}};
+  EXPECT_NE(std::ranges::find(reported, one_runs), reported.end());
+  const auto listed = wait_for(experiments->list({}));
+  ASSERT_EQ(listed.size(), 1U);
+  EXPECT_TRUE(listed[0].experiment.runs.empty());
+  EXPECT_EQ(listed[0].experiment.run_counts, all_done);
+  EXPECT_EQ(view(id).experiment.runs.size(), 3U);
+  EXPECT_EQ(view(id).experiment.run_counts, all_done);
+  EXPECT_FALSE(experiments->summary(id)) << "it has ended";
+  experiments->set_on_change([](const ExperimentView&) {});
+}
+
+TEST_F(ExperimentsTest, AWholeQueueIsThereAgainAfterARestart) {
+  std::vector<storage::ExperimentId> queue;
+  for (std::size_t i = 0; i < kMostQueued; ++i) queue.push_back(enqueue(profile({kRest})));
+  begin_again();
+  clock.run_for(1s);
+  for (const storage::ExperimentId id : queue) {
+    const auto summary = experiments->summary(id);
+    ASSERT_TRUE(summary) << id;
+    EXPECT_EQ(summary->waits_for, "held");
+  }
+  EXPECT_EQ(try_to_begin(profile({kRest})).error().reason, "too_many_experiments");
+}
+
 TEST_F(ExperimentsTest, WaitsForThePersonWhoChangesTheFluid) {
   const std::string head = "[sweep]\nfluids = [\"non_newtonian\", \"water\"]\n";
   const auto id = start(profile({kRest}, head));

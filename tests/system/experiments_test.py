@@ -150,8 +150,7 @@ class ExperimentsTest(unittest.TestCase):
         self.assertEqual(len(experiments), asked, "none is lost")
         for one in experiments:
             self.assertTrue(one["state"] in ENDED or (one["state"] == "waiting" and one["held"]), one)
-            for run in one["runs"]:
-                self.assertIn(run["state"], ENDED, "none is stuck")
+            self.assertLessEqual(set(one["run_counts"]), ENDED, "no run is stuck")
 
 
 if __name__ == "__main__":
